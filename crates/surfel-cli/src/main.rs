@@ -1,0 +1,3 @@
+//! The program `surfel`.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Files: point clouds in and out, pictures out.

@@ -1,0 +1,10 @@
+//! Ray tracing of point clouds as continuous surfaces.
+
+pub mod math;
+pub mod progress;
+pub mod image;
+pub mod points;
+
+mod error;
+
+pub use error::{Error, Result};

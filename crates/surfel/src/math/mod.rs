@@ -1,0 +1,16 @@
+//! Boxes, rays, frames, sampling maps, eigenvectors and counter-based random numbers.
+
+mod aabb;
+mod eigen;
+mod frame;
+mod random;
+mod ray;
+mod sampling;
+
+pub use aabb::Aabb;
+pub use eigen::{SymmetricMatrix, smallest_eigenvector};
+pub use frame::Frame;
+pub use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3};
+pub use random::{Random, hash};
+pub use ray::Ray;
+pub use sampling::{cosine_hemisphere, disk, scrambled_pair, uniform_cone};

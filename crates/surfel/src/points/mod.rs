@@ -1,0 +1,5 @@
+//! Point clouds as columns, and the preparation that tracing needs.
+
+mod cloud;
+
+pub use cloud::{PointCloud, Scalar, Values};
