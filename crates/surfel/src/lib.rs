@@ -4,6 +4,13 @@ pub mod math;
 pub mod progress;
 pub mod image;
 pub mod points;
+pub mod bvh;
+pub mod surface;
+pub mod scene;
+pub mod flat;
+pub mod trace;
+pub mod integrator;
+pub mod render;
 
 mod error;
 

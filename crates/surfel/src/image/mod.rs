@@ -2,7 +2,7 @@
 
 mod srgb;
 
-pub use srgb::{decode_srgb, encode_srgb};
+pub use srgb::{decode_srgb, decode_srgb8, encode_srgb};
 
 use crate::math::Vec3;
 

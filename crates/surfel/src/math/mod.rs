@@ -3,6 +3,7 @@
 mod aabb;
 mod eigen;
 mod frame;
+mod lanes;
 mod random;
 mod ray;
 mod sampling;
@@ -11,6 +12,7 @@ pub use aabb::Aabb;
 pub use eigen::{SymmetricMatrix, smallest_eigenvector};
 pub use frame::Frame;
 pub use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3};
+pub use lanes::{LANES, LaneMask, Lanes, PortableLanes, PortableMask, Vec3Lanes};
 pub use random::{Random, hash};
 pub use ray::Ray;
 pub use sampling::{cosine_hemisphere, disk, scrambled_pair, uniform_cone};

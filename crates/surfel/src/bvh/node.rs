@@ -1,0 +1,174 @@
+//! One node: the boxes of eight children in 80 bytes.
+
+use crate::math::{Aabb, LANES, Vec3};
+
+/// Children's boxes as multiples of a power of two from a common corner, after Ylitie et al. 2017.
+///
+/// As stored in `FlatScene`. Decoded boxes contain the boxes that were encoded.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Node {
+    /// Lower corner of all children.
+    pub origin: [f32; 3],
+    /// Biased exponents of the step an axis: step = 2^(exponent - 127).
+    exponents: [u8; 4],
+    /// Index of the first child that is a node; the others follow it.
+    pub first_node: u32,
+    /// Index of the first child that is a block; the others follow it.
+    pub first_block: u32,
+    /// 0 = no child, else kind (`IS_NODE` or `IS_BLOCK`) and number among the children of that kind.
+    pub children: [u8; LANES],
+    /// Lower bounds in steps, an axis a row.
+    pub lower: [[u8; LANES]; 3],
+    /// Upper bounds in steps, an axis a row.
+    pub upper: [[u8; LANES]; 3],
+}
+
+/// What a child of a node is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Child {
+    Node(u32),
+    Block(u32),
+}
+
+const IS_NODE: u8 = 0x40;
+const IS_BLOCK: u8 = 0x80;
+const RANK: u8 = 0x07;
+
+impl Node {
+    /// Encodes up to eight children, each a box and whether it is a node (else a block).
+    pub fn new(children: &[(Aabb, bool)], first_node: u32, first_block: u32) -> Self {
+        assert!(children.len() <= LANES);
+        let bounds = children.iter().fold(Aabb::EMPTY, |all, (child, _)| all.union(*child));
+        let mut node =
+            Self { origin: bounds.min.to_array(), first_node, first_block, ..Self::default() };
+        for axis in 0..3 {
+            node.exponents[axis] = step_exponent(bounds.min[axis], bounds.max[axis]);
+        }
+        let (mut n_nodes, mut n_blocks) = (0, 0);
+        for (lane, &(child, is_node)) in children.iter().enumerate() {
+            let (kind, rank) =
+                if is_node { (IS_NODE, &mut n_nodes) } else { (IS_BLOCK, &mut n_blocks) };
+            node.children[lane] = kind | *rank;
+            *rank += 1;
+            node.set_bounds(lane, child);
+        }
+        node
+    }
+
+    /// What stands in `lane`, if anything.
+    #[inline(always)]
+    pub fn child(&self, lane: usize) -> Option<Child> {
+        let child = self.children[lane];
+        let rank = u32::from(child & RANK);
+        match child & !RANK {
+            0 => None,
+            IS_NODE => Some(Child::Node(self.first_node + rank)),
+            _ => Some(Child::Block(self.first_block + rank)),
+        }
+    }
+
+    /// Bit i is set if lane i holds a child.
+    #[inline(always)]
+    pub fn occupied(&self) -> u8 {
+        // The top bits of eight bytes, gathered by one multiplication into the highest byte.
+        let children = u64::from_le_bytes(self.children);
+        let any = ((children >> 7) | (children >> 6)) & 0x0101_0101_0101_0101;
+        (any.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u8
+    }
+
+    /// Length of a step along each axis.
+    #[inline(always)]
+    pub fn step(&self) -> Vec3 {
+        let power = |axis: usize| f32::from_bits(u32::from(self.exponents[axis]) << 23);
+        Vec3::new(power(0), power(1), power(2))
+    }
+
+    /// The decoded box of the child in `lane`.
+    pub fn bounds(&self, lane: usize) -> Aabb {
+        let corner = |steps: &[[u8; LANES]; 3]| {
+            let steps = Vec3::from_array([0, 1, 2].map(|axis| f32::from(steps[axis][lane])));
+            Vec3::from_array(self.origin) + steps * self.step()
+        };
+        Aabb { min: corner(&self.lower), max: corner(&self.upper) }
+    }
+
+    fn set_bounds(&mut self, lane: usize, bounds: Aabb) {
+        let step = self.step();
+        for axis in 0..3 {
+            let origin = self.origin[axis];
+            let decode = |steps: u8| origin + f32::from(steps) * step[axis];
+            // The division may round past a step; a wrong side would lose hits, so it is checked.
+            let mut low =
+                ((bounds.min[axis] - origin) / step[axis]).floor().clamp(0.0, 255.0) as u8;
+            while low > 0 && bounds.min[axis] < decode(low) {
+                low -= 1;
+            }
+            let mut high =
+                ((bounds.max[axis] - origin) / step[axis]).ceil().clamp(0.0, 255.0) as u8;
+            while high < 255 && decode(high) < bounds.max[axis] {
+                high += 1;
+            }
+            self.lower[axis][lane] = low;
+            self.upper[axis][lane] = high;
+        }
+    }
+}
+
+/// Smallest biased exponent whose step reaches from `min` to `max` within 255 steps.
+fn step_exponent(min: f32, max: f32) -> u8 {
+    let mut exponent = 1u8;
+    let wanted = (max - min) / 255.0;
+    if wanted > 0.0 {
+        exponent = ((wanted.to_bits() >> 23) as u8).clamp(1, 253);
+    }
+    while exponent < 254 && min + 255.0 * f32::from_bits(u32::from(exponent) << 23) < max {
+        exponent += 1;
+    }
+    exponent
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+
+    #[test]
+    fn decoded_boxes_contain_what_was_encoded() {
+        let mut random = Random::new(3, 0);
+        for case in 0..2000 {
+            let scale = 10f32.powi(case % 15 - 7);
+            let offset = if case % 2 == 0 { 0.0 } else { 1e5 * random.next_f32() };
+            let mut vector = || {
+                Vec3::new(random.next_f32(), random.next_f32(), random.next_f32()) * scale
+                    + Vec3::splat(offset)
+            };
+            let boxes: Vec<(Aabb, bool)> = (0..1 + case % 8)
+                .map(|i| (Aabb::of_points([vector(), vector()]), i % 3 == 0))
+                .collect();
+            let node = Node::new(&boxes, 100, 200);
+            assert_eq!(u32::from(node.occupied()), (1u32 << boxes.len()) - 1);
+            for (lane, (bounds, _)) in boxes.iter().enumerate() {
+                assert!(node.bounds(lane).contains(*bounds), "{:?} {bounds:?}", node.bounds(lane));
+                let excess = node.bounds(lane).size() - bounds.size();
+                assert!(excess.cmple(2.01 * node.step() + 1e-6 * offset).all());
+            }
+        }
+    }
+
+    #[test]
+    fn children_are_numbered_by_kind() {
+        let unit = Aabb::of_points([Vec3::ZERO, Vec3::ONE]);
+        let node = Node::new(&[(unit, false), (unit, true), (unit, false)], 10, 20);
+        let children: Vec<_> = (0..4).map(|lane| node.child(lane)).collect();
+        let expected =
+            [Some(Child::Block(20)), Some(Child::Node(10)), Some(Child::Block(21)), None];
+        assert_eq!(children, expected);
+        assert_eq!(node.occupied(), 0b0111);
+    }
+
+    #[test]
+    fn a_node_is_eighty_bytes() {
+        assert_eq!(size_of::<Node>(), 80);
+    }
+}

@@ -1,0 +1,5 @@
+//! Light along rays: what a batch of camera rays brings back.
+
+mod direct;
+
+pub use direct::{Radiance, RayCounts, Samples, radiance};

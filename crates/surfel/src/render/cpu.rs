@@ -1,0 +1,241 @@
+//! The CPU renderer: tiles on all threads, each a few batches of rays.
+
+use super::{RenderStats, Renderer, Settings, raster};
+use crate::error::Result;
+use crate::flat::FlatScene;
+use crate::image::{Image, NO_ID};
+use crate::integrator::{self, RayCounts, Samples};
+use crate::math::{Ray, Vec3, hash, scrambled_pair};
+use crate::progress::Progress;
+use crate::scene::View;
+use crate::surface::SurfaceKind;
+use crate::trace::{self, Simd, SurfaceHit};
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// Runs on the current rayon pool.
+#[derive(Clone, Copy, Debug)]
+pub struct CpuRenderer {
+    pub simd: Simd,
+}
+
+/// Pixels along a tile's side.
+const TILE: u32 = 16;
+/// Tiles finished before they are copied into the picture: bounds the memory they take.
+const TILES_AT_ONCE: usize = 4096;
+/// Rays of a batch, about: enough to fill tiles of few samples, little enough for the caches.
+const BATCH: u32 = 1024;
+
+impl Renderer for CpuRenderer {
+    fn name(&self) -> &'static str {
+        "cpu"
+    }
+
+    fn render(
+        &self,
+        scene: &FlatScene,
+        settings: &Settings,
+        progress: &dyn Progress,
+    ) -> Result<(Image, RenderStats)> {
+        settings.check()?;
+        let start = Instant::now();
+        let view = scene.camera.view(scene.origin, settings.width, settings.height);
+        let (image, mut stats) = if scene.surface == SurfaceKind::Points {
+            (raster::render(scene, &view, settings, progress)?, RenderStats::default())
+        } else {
+            self.trace(scene, &view, settings, progress)?
+        };
+        stats.frame_secs = start.elapsed().as_secs_f64();
+        Ok((image, stats))
+    }
+}
+
+impl CpuRenderer {
+    fn trace(
+        &self,
+        scene: &FlatScene,
+        view: &View,
+        settings: &Settings,
+        progress: &dyn Progress,
+    ) -> Result<(Image, RenderStats)> {
+        progress.begin("render", u64::from(settings.width) * u64::from(settings.height));
+        let mut image = Image::new(settings.width, settings.height);
+        let mut stats = RenderStats::default();
+        let tiles = TilePlace::all(settings);
+        for tiles in tiles.chunks(TILES_AT_ONCE) {
+            let render = |place: &TilePlace| {
+                progress.check()?;
+                let tile = Tile::render(scene, self.simd, view, settings, *place);
+                progress.advance(place.n_pixels() as u64);
+                Ok(tile)
+            };
+            for tile in tiles.par_iter().map(render).collect::<Result<Vec<_>>>()? {
+                tile.copy_to(&mut image, settings.with_layers);
+                stats.rays.primary += tile.counts.primary;
+                stats.rays.shadow += tile.counts.shadow;
+                stats.rays.sky += tile.counts.sky;
+                stats.trace_secs += tile.trace_secs / rayon::current_num_threads() as f64;
+            }
+        }
+        Ok((image, stats))
+    }
+}
+
+/// Where a tile lies.
+#[derive(Clone, Copy)]
+struct TilePlace {
+    x: u32,
+    y: u32,
+    width: u32,
+    height: u32,
+}
+
+impl TilePlace {
+    fn all(settings: &Settings) -> Vec<Self> {
+        let rows = (0..settings.height).step_by(TILE as usize);
+        let places =
+            rows.flat_map(|y| (0..settings.width).step_by(TILE as usize).map(move |x| (x, y)));
+        let (width, height) = (settings.width, settings.height);
+        let place =
+            |(x, y)| Self { x, y, width: TILE.min(width - x), height: TILE.min(height - y) };
+        places.map(place).collect()
+    }
+
+    fn n_pixels(self) -> usize {
+        (self.width * self.height) as usize
+    }
+
+    /// Coordinates in the picture of the tile's pixels, row by row.
+    fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
+        (0..self.width * self.height)
+            .map(move |i| (self.x + i % self.width, self.y + i / self.width))
+    }
+}
+
+/// A finished tile, its pixels row by row.
+struct Tile {
+    place: TilePlace,
+    color: Vec<[f32; 4]>,
+    coverage: Vec<f32>,
+    layers: Vec<LayerPixel>,
+    counts: RayCounts,
+    trace_secs: f64,
+}
+
+/// What the ray through a pixel's centre met.
+struct LayerPixel {
+    depth: f32,
+    position: Vec3,
+    hit: SurfaceHit,
+}
+
+impl Tile {
+    fn render(
+        scene: &FlatScene,
+        simd: Simd,
+        view: &View,
+        settings: &Settings,
+        place: TilePlace,
+    ) -> Self {
+        let n = place.n_pixels();
+        let mut tile = Self {
+            place,
+            color: vec![[0.0; 4]; n],
+            coverage: vec![0.0; n],
+            layers: Vec::new(),
+            counts: RayCounts::default(),
+            trace_secs: 0.0,
+        };
+        let n_samples = settings.samples_per_pixel;
+        let at_once = (BATCH / n as u32).clamp(1, n_samples);
+        for first in (0..n_samples).step_by(at_once as usize) {
+            tile.add_samples(scene, simd, view, settings, first..n_samples.min(first + at_once));
+        }
+        for (i, (_, y)) in place.pixels().enumerate() {
+            let behind = scene.background.at((y as f32 + 0.5) / settings.height as f32);
+            for (channel, behind) in tile.color[i].iter_mut().zip(behind) {
+                *channel = *channel / n_samples as f32
+                    + (1.0 - tile.coverage[i] / n_samples as f32) * behind;
+            }
+            tile.coverage[i] /= n_samples as f32;
+        }
+        if settings.with_layers {
+            tile.trace_layers(scene, simd, view);
+        }
+        tile
+    }
+
+    /// Adds up the camera rays of these numbers of all pixels.
+    fn add_samples(
+        &mut self,
+        scene: &FlatScene,
+        simd: Simd,
+        view: &View,
+        settings: &Settings,
+        numbers: std::ops::Range<u32>,
+    ) {
+        let per_pixel = numbers.len();
+        let (mut rays, mut keys, mut indices) = (Vec::new(), Vec::new(), Vec::new());
+        for (x, y) in self.place.pixels() {
+            let key = hash(settings.seed ^ hash(u64::from(y) << 32 | u64::from(x)));
+            for index in numbers.clone() {
+                let (dx, dy) = if settings.samples_per_pixel == 1 {
+                    (0.5, 0.5)
+                } else {
+                    scrambled_pair(index, key)
+                };
+                rays.push(view.ray(x as f32 + dx, y as f32 + dy));
+                keys.push(key);
+                indices.push(index);
+            }
+        }
+        let start = Instant::now();
+        let mut hits = vec![SurfaceHit::MISS; rays.len()];
+        trace::surface_hits(scene, simd, &rays, &mut hits);
+        self.trace_secs += start.elapsed().as_secs_f64();
+        let n_light = settings.light_samples.div_ceil(settings.samples_per_pixel);
+        let samples = Samples { keys: &keys, indices: &indices, n_light };
+        let (results, counts) = integrator::radiance(scene, simd, &rays, &hits, samples);
+        for (i, result) in results.iter().enumerate().filter(|(_, result)| !result.hit.is_miss()) {
+            let pixel = i / per_pixel;
+            let color = result.color.extend(1.0).to_array();
+            for (sum, channel) in self.color[pixel].iter_mut().zip(color) {
+                *sum += channel;
+            }
+            self.coverage[pixel] += 1.0;
+        }
+        self.counts.primary += counts.primary;
+        self.counts.shadow += counts.shadow;
+        self.counts.sky += counts.sky;
+    }
+
+    fn trace_layers(&mut self, scene: &FlatScene, simd: Simd, view: &View) {
+        let rays: Vec<Ray> =
+            self.place.pixels().map(|(x, y)| view.ray(x as f32 + 0.5, y as f32 + 0.5)).collect();
+        let mut hits = vec![SurfaceHit::MISS; rays.len()];
+        trace::surface_hits(scene, simd, &rays, &mut hits);
+        let layer = |(ray, hit): (&Ray, &SurfaceHit)| {
+            let position = if hit.is_miss() { Vec3::ZERO } else { ray.at(hit.distance) };
+            let depth = if hit.is_miss() { f32::INFINITY } else { view.depth(position) };
+            LayerPixel { depth, position, hit: *hit }
+        };
+        self.layers = rays.iter().zip(&hits).map(layer).collect();
+    }
+
+    fn copy_to(&self, image: &mut Image, with_layers: bool) {
+        for (i, (x, y)) in self.place.pixels().enumerate() {
+            let pixel = y as usize * image.width as usize + x as usize;
+            image.color[pixel] = self.color[i];
+            image.layers.coverage[pixel] = self.coverage[i];
+            if with_layers {
+                let LayerPixel { depth, position, hit } = &self.layers[i];
+                image.layers.depth[pixel] = *depth;
+                image.layers.position[pixel] = *position;
+                image.layers.normal[pixel] = hit.normal;
+                image.layers.point_id[pixel] = hit.id;
+                image.layers.instance_id[pixel] = if hit.is_miss() { NO_ID } else { 0 };
+                image.layers.albedo[pixel] = hit.color;
+            }
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Automatic cameras: the whole cloud in the picture, stray outliers left out.
+
+use super::light::ground_axes;
+use super::{Camera, Projection};
+use crate::math::{DVec3, Vec3};
+use crate::points::PointCloud;
+
+/// What is known of the wanted camera; the rest follows from the cloud.
+#[derive(Clone, Copy, Debug)]
+pub struct Framing {
+    pub up: Vec3,
+    /// Width over height of the picture.
+    pub aspect: f64,
+    pub is_orthographic: bool,
+    pub view_angle_deg: f64,
+    /// Direction of view, if it is given.
+    pub direction: Option<DVec3>,
+    /// Turns the automatic position about `up`, clockwise from above.
+    pub azimuth_deg: f64,
+    /// Height of the automatic position over the horizon; chosen from the cloud's shape if not given.
+    pub elevation_deg: Option<f64>,
+    /// Values above 1 come nearer.
+    pub zoom: f64,
+}
+
+/// Share of points on each side of an axis that may be stray.
+const STRAY: f64 = 0.005;
+/// Points looked at, at most.
+const MAX_SAMPLES: usize = 200_000;
+/// Free room around the cloud, as a share of the picture.
+const MARGIN: f64 = 0.04;
+
+/// A camera that shows all of `cloud` but its outliers.
+pub fn frame(cloud: &PointCloud, framing: &Framing) -> Camera {
+    let points = without_outliers(&sample(cloud));
+    let direction = framing.direction.and_then(DVec3::try_normalize);
+    let forward = direction.unwrap_or_else(|| automatic_direction(&points, framing));
+    let up = framing.up.as_dvec3();
+    let axes = Camera {
+        position: DVec3::ZERO,
+        focal_point: forward,
+        view_up: up,
+        projection: Projection::Orthographic { height: 1.0 },
+    }
+    .axes();
+    let local: Vec<DVec3> =
+        points.iter().map(|p| DVec3::from_array(axes.map(|axis| p.as_dvec3().dot(axis)))).collect();
+    let (eye, focal, projection) = fit(&local, framing);
+    let world = |p: DVec3| cloud.origin + p.x * axes[0] + p.y * axes[1] + p.z * axes[2];
+    Camera { position: world(eye), focal_point: world(focal), view_up: up, projection }
+}
+
+/// The part of the view in which a cloud's points lie when their stray ones are left out.
+fn without_outliers(points: &[Vec3]) -> Vec<Vec3> {
+    if points.is_empty() {
+        return vec![Vec3::ZERO];
+    }
+    let (mut low, mut high) = (Vec3::ZERO, Vec3::ZERO);
+    for axis in 0..3 {
+        let mut values: Vec<f32> = points.iter().map(|p| p[axis]).collect();
+        values.sort_unstable_by(f32::total_cmp);
+        let stray = (STRAY * values.len() as f64) as usize;
+        let (first, last) = (values[stray], values[values.len() - 1 - stray]);
+        let room = 0.25 * (last - first);
+        (low[axis], high[axis]) = (first - room, last + room);
+    }
+    points.iter().copied().filter(|p| low.cmple(*p).all() && p.cmple(high).all()).collect()
+}
+
+fn sample(cloud: &PointCloud) -> Vec<Vec3> {
+    let stride = cloud.len().div_ceil(MAX_SAMPLES).max(1);
+    cloud.positions.iter().step_by(stride).copied().filter(|p| p.is_finite()).collect()
+}
+
+/// From the front, a little to the side; the flatter the cloud, the higher up.
+fn automatic_direction(points: &[Vec3], framing: &Framing) -> DVec3 {
+    let (east, north) = ground_axes(framing.up);
+    let extent = |axis: Vec3| {
+        let along = points.iter().map(|p| p.dot(axis));
+        along.clone().fold(f32::MIN, f32::max) - along.fold(f32::MAX, f32::min)
+    };
+    let flatness = f64::from(extent(framing.up) / extent(east).max(extent(north)).max(1e-9));
+    let elevation_deg =
+        framing.elevation_deg.unwrap_or_else(|| 40.0 - 25.0 * (flatness / 0.6).min(1.0));
+    let (sin_azimuth, cos_azimuth) =
+        (FRONT_AZIMUTH_DEG + framing.azimuth_deg).to_radians().sin_cos();
+    let (sin_elevation, cos_elevation) = elevation_deg.to_radians().sin_cos();
+    let (east, north, up) = (east.as_dvec3(), north.as_dvec3(), framing.up.as_dvec3());
+    -(cos_elevation * (sin_azimuth * east + cos_azimuth * north) + sin_elevation * up)
+}
+
+/// The automatic camera stands in the south, a little to the east.
+const FRONT_AZIMUTH_DEG: f64 = 155.0;
+
+/// Eye, focal point and projection in the camera's own axes, so that all `points` are seen.
+fn fit(points: &[DVec3], framing: &Framing) -> (DVec3, DVec3, Projection) {
+    let low = points.iter().fold(DVec3::INFINITY, |all, p| all.min(*p));
+    let high = points.iter().fold(DVec3::NEG_INFINITY, |all, p| all.max(*p));
+    let (center, size) = (0.5 * (low + high), (high - low).max(DVec3::splat(1e-6)));
+    let scale = 1.0 / (1.0 - 2.0 * MARGIN) / framing.zoom;
+    if framing.is_orthographic {
+        let height = scale * size.y.max(size.x / framing.aspect);
+        let eye = center.with_z(low.z - size.length());
+        return (eye, center, Projection::Orthographic { height });
+    }
+    let tan = (framing.view_angle_deg.to_radians() / 2.0).tan();
+    // Each side plane of the view must have all points inside: p.x - x <= t (p.z - z) and its mirror
+    // image bound x + t z and x - t z; both are met with equality by one x and one z.
+    let apex = |axis: usize, t: f64| {
+        let right = points.iter().map(|p| p[axis] - t * p.z).fold(f64::MIN, f64::max);
+        let left = points.iter().map(|p| p[axis] + t * p.z).fold(f64::MAX, f64::min);
+        (0.5 * (left + right), (left - right) / (2.0 * t))
+    };
+    let (x, z_of_x) = apex(0, (1.0 - 2.0 * MARGIN) * tan * framing.aspect);
+    let (y, z_of_y) = apex(1, (1.0 - 2.0 * MARGIN) * tan);
+    let z = z_of_x.min(z_of_y).min(low.z - 1e-3 * size.length());
+    let distance = (center.z - z) / framing.zoom;
+    let focal = DVec3::new(x, y, center.z);
+    (
+        focal.with_z(center.z - distance),
+        focal,
+        Projection::Perspective { view_angle_deg: framing.view_angle_deg },
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+
+    const FRAMING: Framing = Framing {
+        up: Vec3::Z,
+        aspect: 16.0 / 9.0,
+        is_orthographic: false,
+        view_angle_deg: 35.0,
+        direction: None,
+        azimuth_deg: 0.0,
+        elevation_deg: None,
+        zoom: 1.0,
+    };
+
+    fn box_of_points(size: Vec3) -> PointCloud {
+        let mut random = Random::new(2, 0);
+        let mut axis = || random.next_f32() - 0.5;
+        let positions = (0..20_000).map(|_| Vec3::new(axis(), axis(), axis()) * size).collect();
+        PointCloud {
+            origin: DVec3::new(500_000.0, 4e6, 100.0),
+            ..PointCloud::from_positions(positions)
+        }
+    }
+
+    /// Bounds in pixels of what a 1600 x 900 picture shows.
+    fn shown(cloud: &PointCloud, camera: &Camera) -> (f32, f32, f32, f32) {
+        let view = camera.view(cloud.origin, 1600, 900);
+        let places = cloud.positions.iter().filter_map(|&p| view.project(p));
+        places.fold((f32::MAX, f32::MAX, f32::MIN, f32::MIN), |(a, b, c, d), (x, y, _)| {
+            (a.min(x), b.min(y), c.max(x), d.max(y))
+        })
+    }
+
+    #[test]
+    fn the_cloud_fills_the_picture_and_stays_inside() {
+        for size in [Vec3::ONE, Vec3::new(400.0, 300.0, 15.0), Vec3::new(0.1, 0.1, 3.0)] {
+            for is_orthographic in [false, true] {
+                let cloud = box_of_points(size);
+                let (left, top, right, bottom) =
+                    shown(&cloud, &frame(&cloud, &Framing { is_orthographic, ..FRAMING }));
+                assert!(
+                    0.0 < left && 0.0 < top && right < 1600.0 && bottom < 900.0,
+                    "{left} {top} {right} {bottom}"
+                );
+                assert!(0.85 < ((right - left) / 1600.0).max((bottom - top) / 900.0));
+            }
+        }
+    }
+
+    #[test]
+    fn a_stray_point_does_not_move_the_camera() {
+        let cloud = box_of_points(Vec3::splat(10.0));
+        let mut strayed = cloud.clone();
+        strayed.positions[7] = Vec3::new(4000.0, 0.0, -9000.0);
+        let (a, b) = (frame(&cloud, &FRAMING), frame(&strayed, &FRAMING));
+        assert!(a.position.distance(b.position) < 0.1, "{a:?} {b:?}");
+    }
+
+    #[test]
+    fn one_point_and_none_give_a_finite_camera() {
+        for positions in [vec![], vec![Vec3::ONE], vec![Vec3::ONE; 5]] {
+            let camera = frame(&PointCloud::from_positions(positions), &FRAMING);
+            assert!(camera.position.is_finite() && camera.focal_point != camera.position);
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Rays in batches against a flat scene: closest hit, any hit, gather; SIMD lives here.
+
+mod boundary;
+mod kernel;
+mod node;
+mod simd;
+mod surface;
+mod traverse;
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+
+pub use kernel::{Gather, Hit};
+pub use simd::Simd;
+pub use surface::SurfaceHit;
+
+use crate::flat::FlatScene;
+use crate::math::{PortableLanes, Ray};
+use simd::Level;
+
+/// Runs a batch kernel at a SIMD level; every level gives the same bytes.
+macro_rules! at_level {
+    ($simd:expr, $module:ident::$kernel:ident($($argument:expr),*)) => {
+        match $simd.level() {
+            Level::Portable => $module::$kernel::<PortableLanes>($($argument),*),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: a `Simd` of this level exists only where the processor has it.
+            Level::Avx2 => unsafe { avx2::$kernel($($argument),*) },
+        }
+    };
+}
+
+/// The nearest shape on each ray, each point on its own.
+pub fn closest_hits(scene: &FlatScene, simd: Simd, rays: &[Ray], hits: &mut [Hit]) {
+    at_level!(simd, kernel::closest_hits(scene, rays, hits));
+}
+
+/// Whether any shape lies in each ray's range, each point on its own.
+pub fn any_hits(scene: &FlatScene, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
+    at_level!(simd, kernel::any_hits(scene, rays, occluded));
+}
+
+/// The nearest shapes on each ray, all within a radius of each other.
+pub fn gathers(scene: &FlatScene, simd: Simd, rays: &[Ray], gathers: &mut [Gather]) {
+    at_level!(simd, kernel::gathers(scene, rays, gathers));
+}
+
+/// The nearest place of the continuous surface on each ray.
+pub fn surface_hits(scene: &FlatScene, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    at_level!(simd, surface::surface_hits(scene, rays, hits));
+}
+
+/// Whether the continuous surface lies in each ray's range.
+pub fn occlusions(scene: &FlatScene, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
+    at_level!(simd, surface::occlusions(scene, rays, occluded));
+}

@@ -1,0 +1,49 @@
+//! The SIMD level: chosen once, passed down.
+
+/// A level that this processor has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Simd(Level);
+
+/// Private, so that a level the processor lacks cannot be made up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Level {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+}
+
+impl Simd {
+    /// Works everywhere.
+    pub const PORTABLE: Self = Self(Level::Portable);
+
+    /// The fastest level of this processor.
+    pub fn detect() -> Self {
+        *Self::available().last().unwrap_or(&Self::PORTABLE)
+    }
+
+    /// All levels of this processor, slowest first.
+    pub fn available() -> Vec<Self> {
+        #[cfg_attr(
+            not(target_arch = "x86_64"),
+            expect(unused_mut, reason = "only x86-64 has more levels")
+        )]
+        let mut levels = vec![Self::PORTABLE];
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            levels.push(Self(Level::Avx2));
+        }
+        levels
+    }
+
+    pub fn name(self) -> &'static str {
+        match self.0 {
+            Level::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 => "avx2",
+        }
+    }
+
+    pub(super) fn level(self) -> Level {
+        self.0
+    }
+}

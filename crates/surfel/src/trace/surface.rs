@@ -1,0 +1,169 @@
+//! The continuous surface: discs gathered and blended, hits beyond its boundary refused.
+
+use super::boundary::judge;
+use super::kernel::{Hit, closest_hit, each_hit, gather};
+use crate::flat::FlatScene;
+use crate::math::{Lanes, Ray, Vec3};
+use crate::surface::{Boundary, Gathered, MAX_GATHERED, Surroundings, blend, surroundings};
+use std::ops::ControlFlow;
+
+/// Where a ray meets the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceHit {
+    /// Infinite if nothing was hit.
+    pub distance: f32,
+    /// Index in its cloud of the nearest point hit.
+    pub id: u32,
+    /// Of that point, in world units.
+    pub radius: f32,
+    /// Unit, facing the ray's origin.
+    pub normal: Vec3,
+    /// Linear.
+    pub color: Vec3,
+}
+
+impl SurfaceHit {
+    pub const MISS: Self = Self {
+        distance: f32::INFINITY,
+        id: u32::MAX,
+        radius: 0.0,
+        normal: Vec3::ZERO,
+        color: Vec3::ZERO,
+    };
+
+    pub fn is_miss(&self) -> bool {
+        self.id == u32::MAX
+    }
+}
+
+/// Refused hits after which a ray is taken to miss: it runs along a rim, where each step is tiny.
+const MAX_REFUSALS: usize = 24;
+/// A search goes on this many radii behind a refused hit.
+const RESUME: f32 = 0.05;
+
+#[inline(always)]
+pub(super) fn surface_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    for (ray, hit) in rays.iter().zip(hits) {
+        *hit = if scene.surface.is_oriented() {
+            surface_hit::<L>(scene, ray)
+        } else {
+            sphere_hit::<L>(scene, ray)
+        };
+    }
+}
+
+/// A hit is in doubt only up to the wide gap: one that is merely at an edge is taken in the end,
+/// whatever follows it, so the first such hit settles it.
+#[inline(always)]
+pub(super) fn occlusions<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &mut [bool]) {
+    let is_tested = scene.surface.is_oriented() && scene.boundary == Boundary::Gap;
+    for (ray, occluded) in rays.iter().zip(occluded) {
+        *occluded = false;
+        let mut refusals = 0;
+        each_hit::<L>(scene, ray, |hit| {
+            if refusals == MAX_REFUSALS {
+                return ControlFlow::Break(());
+            }
+            if is_tested {
+                let disc = scene.points.gathered(hit.slot, ray.at(hit.distance));
+                let radius = disc.radius / scene.surface.radius_factor();
+                if judge::<L>(&scene.points, disc.position, disc.normal, radius)
+                    == Surroundings::Outside
+                {
+                    refusals += 1;
+                    return ControlFlow::Continue(());
+                }
+            }
+            *occluded = true;
+            ControlFlow::Break(())
+        });
+    }
+}
+
+#[inline(always)]
+fn sphere_hit<L: Lanes>(scene: &FlatScene, ray: &Ray) -> SurfaceHit {
+    let hit = closest_hit::<L>(scene, ray);
+    if hit == Hit::MISS {
+        return SurfaceHit::MISS;
+    }
+    let sphere = scene.points.gathered(hit.slot, ray.at(hit.distance));
+    let outward = (sphere.position - sphere.center) / sphere.radius;
+    let normal = if outward.dot(ray.direction) < 0.0 { outward } else { -outward };
+    SurfaceHit {
+        distance: hit.distance,
+        id: hit.id,
+        radius: sphere.radius,
+        normal: normal.normalize_or(-ray.direction),
+        color: sphere.color,
+    }
+}
+
+#[inline(always)]
+fn surface_hit<L: Lanes>(scene: &FlatScene, ray: &Ray) -> SurfaceHit {
+    let mut rest = *ray;
+    let mut at_edge = SurfaceHit::MISS;
+    for _ in 0..MAX_REFUSALS {
+        let mut discs = [Gathered::NONE; MAX_GATHERED];
+        let (first, n) = pierced_discs::<L>(scene, &rest, &mut discs);
+        if n == 0 {
+            return at_edge;
+        }
+        let discs = &discs[..n];
+        let (normal, color) = blend(scene.surface, discs, ray.direction);
+        let radius = discs[0].radius / scene.surface.radius_factor();
+        let hit = SurfaceHit { distance: first.distance, id: first.id, radius, normal, color };
+        if scene.boundary == Boundary::Off {
+            return hit;
+        }
+        match judge_gathered::<L>(scene, discs, normal, radius) {
+            Surroundings::Enclosed => return hit,
+            Surroundings::Edge if at_edge.is_miss() => at_edge = hit,
+            _ => {}
+        }
+        rest.t_min =
+            (first.distance + RESUME * radius).max(first.distance * (1.0 + 2.0 * f32::EPSILON));
+    }
+    at_edge
+}
+
+/// Fills `discs` with what makes up the surface at the first hit; returns that hit and their number.
+#[inline(always)]
+fn pierced_discs<L: Lanes>(
+    scene: &FlatScene,
+    ray: &Ray,
+    discs: &mut [Gathered; MAX_GATHERED],
+) -> (Hit, usize) {
+    let disc = |hit: &Hit| scene.points.gathered(hit.slot, ray.at(hit.distance));
+    if !scene.surface.is_gathered() {
+        let hit = closest_hit::<L>(scene, ray);
+        if hit == Hit::MISS {
+            return (hit, 0);
+        }
+        discs[0] = disc(&hit);
+        return (hit, 1);
+    }
+    let gather = gather::<L>(scene, ray);
+    for (place, hit) in discs.iter_mut().zip(gather.hits()) {
+        *place = disc(hit);
+    }
+    (gather.hits().first().copied().unwrap_or(Hit::MISS), gather.hits().len())
+}
+
+/// The pierced discs' own centres mostly surround the hit already, and more points only narrow gaps.
+#[inline(always)]
+fn judge_gathered<L: Lanes>(
+    scene: &FlatScene,
+    discs: &[Gathered],
+    normal: Vec3,
+    radius: f32,
+) -> Surroundings {
+    let position = discs[0].position;
+    let mut offsets = [Vec3::ZERO; MAX_GATHERED];
+    for (offset, disc) in offsets.iter_mut().zip(discs) {
+        *offset = disc.center - position;
+    }
+    if surroundings(normal, radius, &offsets[..discs.len()]) == Surroundings::Enclosed {
+        return Surroundings::Enclosed;
+    }
+    judge::<L>(&scene.points, position, normal, radius)
+}
