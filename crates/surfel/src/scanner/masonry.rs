@@ -102,7 +102,8 @@ impl Ashlar {
 impl Solid for Column {
     fn distance(&self, point: DVec3) -> f64 {
         let r = point.truncate().length();
-        let hull = (r - 1.5 * self.radius).max(point.z - self.height).max(-point.z);
+        // The corners of the plinth reach furthest.
+        let hull = (r - 1.95 * self.radius).max(point.z - self.height).max(-point.z);
         if 0.3 < hull {
             return hull;
         }

@@ -24,7 +24,7 @@ pub struct View {
 /// Top of the platform, where the columns stand.
 pub const FLOOR: f64 = 1.05;
 /// Middle of the polished ball.
-pub const BALL_CENTER: DVec3 = DVec3::new(-1.4, 0.2, FLOOR + 2.05);
+pub const BALL_CENTER: DVec3 = DVec3::new(-0.5, 0.1, FLOOR + 2.05);
 pub const BALL_RADIUS: f64 = 1.0;
 /// Where a survey of the site places its origin: UTM zone 34 north, heights above the ellipsoid.
 pub const UTM_ORIGIN: DVec3 = DVec3::new(562_340.0, 4_183_210.0, 148.0);
@@ -52,8 +52,8 @@ pub fn site() -> Site {
 pub fn view() -> View {
     View {
         eye: DVec3::new(-15.5, -20.5, 6.8),
-        target: DVec3::new(1.3, 0.0, 2.1),
-        vertical_fov_deg: 32.0,
+        target: DVec3::new(1.6, 0.0, 2.2),
+        vertical_fov_deg: 32.5,
     }
 }
 
@@ -72,7 +72,7 @@ pub fn stations() -> [Station; 5] {
         toward(-14.0, -17.0, 8.5, 110.0, -50.0, 12.0),
         toward(2.0, -15.5, 1.8, 150.0, -35.0, 40.0),
         toward(17.5, -9.0, 8.0, 120.0, -50.0, 12.0),
-        toward(1.5, 15.0, 6.5, 150.0, -40.0, 25.0),
+        toward(-4.0, 15.5, 6.5, 220.0, -45.0, 25.0),
         inside,
     ]
 }
@@ -108,7 +108,7 @@ fn add_platform(site: &mut Site) {
 }
 
 /// Height that is left of each column, from west to east; 9 is a whole one.
-const FRONT_ROW: [f64; 7] = [9.0, 3.4, 1.5, 0.75, 2.4, 9.0, 9.0];
+const FRONT_ROW: [f64; 7] = [9.0, 3.2, 1.3, 0.75, 2.4, 9.0, 9.0];
 const BACK_ROW: [f64; 7] = [9.0, 9.0, 9.0, 9.0, 4.3, 9.0, 2.7];
 
 fn add_columns(site: &mut Site) {
@@ -164,8 +164,8 @@ fn add_ball(site: &mut Site) {
 }
 
 /// Middle of the arch's foot.
-const ARCH: (f64, f64) = (14.0, -2.5);
-const ARCH_YAW_RAD: f64 = 0.55;
+const ARCH: (f64, f64) = (15.2, -3.4);
+const ARCH_YAW_RAD: f64 = -0.8;
 
 fn add_arch(site: &mut Site) {
     let (x, y) = ARCH;
@@ -230,11 +230,60 @@ fn add_greenery(site: &mut Site) {
     add(-13.5, 10.5, DVec3::new(0.9, 0.9, 4.2), 3);
     add(-11.6, 4.5, DVec3::new(0.9, 0.7, 0.6), 4);
     add(9.0, -9.6, DVec3::new(0.7, 0.8, 0.5), 5);
-    add(-7.4, -9.8, DVec3::new(0.6, 0.7, 0.45), 6);
+    add(-0.9, -7.2, DVec3::new(0.6, 0.45, 0.4), 6);
     add(11.6, -7.8, DVec3::new(1.0, 0.8, 0.7), 7);
     add(-14.5, -3.5, DVec3::new(0.8, 0.9, 0.6), 8);
 }
 
 fn at(x: f64, y: f64, z: f64) -> Pose {
     Pose::upright(DVec3::new(x, y, z), 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Silent;
+    use crate::scanner::Beam;
+
+    #[test]
+    fn a_scan_has_every_part_of_the_ruin_and_about_the_points_asked_for() {
+        let cloud = scan(60_000, &Silent).unwrap();
+        assert!((54_000..66_000).contains(&cloud.len()), "{}", cloud.len());
+        assert!(cloud.positions.iter().all(|p| p.is_finite()));
+        assert!(cloud.intensity.as_ref().unwrap().iter().all(|i| (0.0..=65535.0).contains(i)));
+        let near = |place: DVec3, reach: f64| {
+            cloud.positions.iter().filter(|p| (p.as_dvec3() - place).length() < reach).count()
+        };
+        assert!(200 < near(BALL_CENTER, BALL_RADIUS + 0.02));
+        for i in [0, 1, 2, 3, 5] {
+            let middle_of_shaft = DVec3::new(column_x(i), ROW_OFFSET, FLOOR + 3.0);
+            assert!(50 < near(middle_of_shaft, 1.0), "column {i}");
+        }
+        let crown = DVec3::new(ARCH.0, ARCH.1, TERRAIN.height(ARCH.0, ARCH.1) - 0.4 + 3.2 + 2.1);
+        assert!(20 < near(crown, 0.9));
+        let ground = cloud.classification.as_ref().unwrap().iter().filter(|&&class| class == 2);
+        assert!(10_000 < ground.count());
+    }
+
+    #[test]
+    fn points_lie_on_the_site() {
+        let cloud = scan(50_000, &Silent).unwrap();
+        let site = site();
+        for position in &cloud.positions {
+            let distance = site.distance(position.as_dvec3());
+            // Five deviations of the noise, and the stop of the search.
+            assert!(distance.abs() < 0.011, "{position}: {distance}");
+        }
+    }
+
+    #[test]
+    fn the_view_sees_the_ball() {
+        let View { eye, target, .. } = view();
+        let toward_ball = (BALL_CENTER - eye).normalize();
+        assert!(0.95 < toward_ball.dot((target - eye).normalize()));
+        let beam = Beam { origin: eye, direction: toward_ball };
+        let hit = site().first_hit(&beam, 100.0).unwrap();
+        let expected = (BALL_CENTER - eye).length() - BALL_RADIUS;
+        assert!((hit.distance - expected).abs() < 1e-3, "{}", hit.distance);
+    }
 }

@@ -5,7 +5,7 @@ use crate::math::Vec3;
 
 /// A shape with a colour. Points are in the shape's own frame, metres, Z up.
 pub trait Solid: Send + Sync {
-    /// Signed distance to the surface, negative inside; outside it may be too short, never too long.
+    /// Signed distance to the surface, negative inside; outside it may be too short, never much too long.
     fn distance(&self, point: DVec3) -> f64;
 
     /// sRGB-encoded colour of the surface in [0, 1]; `normal` is in world space.
@@ -135,11 +135,12 @@ fn sphere_trace(solid: &dyn Solid, beam: &Beam, enter: f64, leave: f64) -> Optio
     let mut t = enter;
     for _ in 0..MAX_STEPS {
         let distance = solid.distance(beam.origin + t * beam.direction);
-        if distance < 1e-5 * (1.0 + t) {
+        if distance.abs() < 1e-5 * (1.0 + t) {
             return Some(t);
         }
+        // Where wear is steeper than its allowance a step may go through the surface; the next goes back.
         t += distance;
-        if leave < t {
+        if t < enter || leave < t {
             return None;
         }
     }

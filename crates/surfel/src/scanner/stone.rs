@@ -6,9 +6,9 @@ use crate::math::Vec3;
 
 const OCHRE: Vec3 = Vec3::new(0.82, 0.69, 0.50);
 const CREAM: Vec3 = Vec3::new(0.88, 0.79, 0.63);
-const ROSE: Vec3 = Vec3::new(0.79, 0.63, 0.50);
+const ROSE: Vec3 = Vec3::new(0.80, 0.66, 0.51);
 const GREY: Vec3 = Vec3::new(0.70, 0.66, 0.58);
-const MOSS: Vec3 = Vec3::new(0.37, 0.42, 0.20);
+const MOSS: Vec3 = Vec3::new(0.43, 0.43, 0.25);
 const LICHEN: Vec3 = Vec3::new(0.80, 0.79, 0.70);
 const SOOT: Vec3 = Vec3::new(0.42, 0.37, 0.31);
 
@@ -39,17 +39,18 @@ pub fn weathered(fresh: Vec3, world: DVec3, normal: DVec3) -> Vec3 {
     let low = 1.0 - smoothstep(0.2, 2.2, world.z);
     let flat = smoothstep(0.3, 0.95, normal.z);
     let patches = fbm(world * 1.3 + DVec3::splat(40.0), 4);
-    let moss = smoothstep(0.1, 0.5, patches + 0.35 * low + 0.25 * flat - 0.2);
+    let moss = smoothstep(0.1, 0.6, patches + 0.3 * low + 0.15 * flat - 0.2);
     spotted.lerp(MOSS * (1.0 + 0.2 * noise(world * 20.0) as f32), (0.75 * moss) as f32)
 }
 
 /// Polished green marble with light veins.
 pub fn marble(point: DVec3) -> Vec3 {
-    let warp = DVec3::new(fbm(point * 1.4, 3), fbm(point * 1.4 + DVec3::splat(9.0), 3), 0.0);
-    let band = (point + 0.9 * warp).dot(DVec3::new(2.2, 1.3, 2.9));
-    let vein = 1.0 - smoothstep(0.0, 0.22, (band - band.round()).abs());
+    let warp = DVec3::new(fbm(point * 1.1, 4), fbm(point * 1.1 + DVec3::splat(9.0), 3), 0.0);
+    let band = (point + 0.9 * warp).dot(DVec3::new(1.3, 0.8, 1.5));
     let cloud = 0.5 + 0.5 * fbm(point * 2.3, 3);
-    let ground = Vec3::new(0.13, 0.27, 0.23).lerp(Vec3::new(0.25, 0.43, 0.36), cloud as f32);
+    let width = 0.04 + 0.2 * cloud * cloud;
+    let vein = 1.0 - smoothstep(0.0, width, (band - band.round()).abs());
+    let ground = Vec3::new(0.15, 0.31, 0.26).lerp(Vec3::new(0.30, 0.50, 0.41), cloud as f32);
     ground.lerp(Vec3::new(0.80, 0.86, 0.80), (0.7 * vein) as f32)
 }
 
@@ -57,7 +58,7 @@ pub fn marble(point: DVec3) -> Vec3 {
 pub fn meadow(point: DVec3, bare: f64) -> Vec3 {
     let earth = Vec3::new(0.66, 0.56, 0.41);
     let straw = Vec3::new(0.67, 0.61, 0.37);
-    let grass = Vec3::new(0.41, 0.46, 0.22);
+    let grass = Vec3::new(0.45, 0.47, 0.26);
     let patches = fbm(point * 0.33, 4) - 0.8 * bare;
     let growth =
         straw.lerp(grass, smoothstep(-0.1, 0.4, patches + 0.3 * noise(point * 2.1)) as f32);
