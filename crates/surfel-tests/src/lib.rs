@@ -1,1 +1,3 @@
 //! Scenes with known answers, shared by the tests and the benchmarks.
+
+pub mod clouds;

@@ -8,6 +8,8 @@ pub enum Error {
     EmptyCloud,
     #[error("{name} must be {expected}, found {found}")]
     Setting { name: &'static str, found: String, expected: &'static str },
+    #[error("unknown {kind} '{found}'; known: {known}")]
+    UnknownName { kind: &'static str, found: String, known: String },
 }
 
 pub type Result<T> = std::result::Result<T, Error>;

@@ -1,8 +1,16 @@
 //! Linear pictures with named layers; tone and colour mapping.
 
+pub mod colormap;
+mod classification;
 mod srgb;
+mod stretch;
+mod tone;
 
+pub use classification::{class_color, class_name};
+pub use colormap::Colormap;
 pub use srgb::{decode_srgb, decode_srgb8, encode_srgb};
+pub use stretch::Stretch;
+pub use tone::Tone;
 
 use crate::math::Vec3;
 
