@@ -109,6 +109,11 @@ impl<'a> Tree<'a> {
         found.keys.iter().filter(|&&key| key < UNFILLED).map(|&key| neighbor(key)).collect()
     }
 
+    /// Those it was built over.
+    pub fn positions(&self) -> &'a [Vec3] {
+        self.positions
+    }
+
     fn root(&self) -> Subtree {
         Subtree { node: 0, first_leaf: 0, n_leaves: self.leaves.len() as u32 }
     }

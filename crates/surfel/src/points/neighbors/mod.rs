@@ -222,3 +222,6 @@ impl FromStr for Method {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
