@@ -6,6 +6,8 @@ pub enum Error {
     Cancelled,
     #[error("the cloud has no points")]
     EmptyCloud,
+    #[error("the cloud has {found} points; at most {limit} can be told apart")]
+    TooManyPoints { found: usize, limit: usize },
     #[error("{name} must be {expected}, found {found}")]
     Setting { name: &'static str, found: String, expected: &'static str },
     #[error("unknown {kind} '{found}'; known: {known}")]

@@ -24,6 +24,30 @@ impl SymmetricMatrix {
         self.zz += weight * v.z * v.z;
     }
 
+    fn scaled(&self, factor: f64) -> Self {
+        Self {
+            xx: factor * self.xx,
+            xy: factor * self.xy,
+            xz: factor * self.xz,
+            yy: factor * self.yy,
+            yz: factor * self.yz,
+            zz: factor * self.zz,
+        }
+    }
+
+    /// Adjugate of this matrix less `shift` times the identity.
+    fn adjugate(&self, shift: f64) -> Self {
+        let (xx, yy, zz) = (self.xx - shift, self.yy - shift, self.zz - shift);
+        Self {
+            xx: yy * zz - self.yz * self.yz,
+            xy: self.xz * self.yz - self.xy * zz,
+            xz: self.xy * self.yz - self.xz * yy,
+            yy: xx * zz - self.xz * self.xz,
+            yz: self.xy * self.xz - xx * self.yz,
+            zz: xx * yy - self.xy * self.xy,
+        }
+    }
+
     /// Eigenvalues in rising order with unit eigenvectors (cyclic Jacobi rotations, Jacobi 1846).
     pub fn eigen(&self) -> ([f64; 3], [DVec3; 3]) {
         let mut a =
@@ -47,9 +71,62 @@ impl SymmetricMatrix {
 }
 
 /// Unit eigenvector of the smallest eigenvalue, and all eigenvalues in rising order.
+///
+/// For positive semidefinite matrices such as covariances; others take the slow way.
 pub fn smallest_eigenvector(matrix: &SymmetricMatrix) -> (DVec3, [f64; 3]) {
-    let (values, vectors) = matrix.eigen();
-    (vectors[0], values)
+    closed_form(matrix).unwrap_or_else(|| {
+        let (values, vectors) = matrix.eigen();
+        (vectors[0], values)
+    })
+}
+
+/// The well-separated case, five times as fast as Jacobi; `None` where it would lose digits.
+fn closed_form(matrix: &SymmetricMatrix) -> Option<(DVec3, [f64; 3])> {
+    let trace = matrix.xx + matrix.yy + matrix.zz;
+    // Written so that NaN fails it.
+    if !(f64::MIN_POSITIVE.sqrt() < trace && trace < f64::MAX.sqrt()) {
+        return None;
+    }
+    let unit = matrix.scaled(1.0 / trace);
+    let adjugate = unit.adjugate(0.0);
+    let minors = adjugate.xx + adjugate.yy + adjugate.zz;
+    // A nearly linear covariance has its second eigenvalue near this bound.
+    if !(1e-5 < minors) {
+        return None;
+    }
+    let determinant = unit.xx * adjugate.xx + unit.xy * adjugate.xy + unit.xz * adjugate.xz;
+    let smallest = smallest_root(minors, determinant)?;
+    let projector = unit.adjugate(smallest);
+    let columns = [
+        DVec3::new(projector.xx, projector.xy, projector.xz),
+        DVec3::new(projector.xy, projector.yy, projector.yz),
+        DVec3::new(projector.xz, projector.yz, projector.zz),
+    ];
+    // The adjugate of A - l0 is (l1 - l0)(l2 - l0) v v^T: its largest diagonal entry has the best column.
+    let best = DVec3::new(projector.xx, projector.yy, projector.zz).max_position();
+    if !(1e-6 < columns[best][best]) {
+        return None;
+    }
+    let sum = 1.0 - smallest;
+    let product = minors - smallest * sum;
+    let spread = (0.25 * sum * sum - product).max(0.0).sqrt();
+    let values = [smallest, 0.5 * sum - spread, 0.5 * sum + spread];
+    Some((columns[best].normalize(), values.map(|value| trace * value)))
+}
+
+/// Smallest root of x^3 - x^2 + minors x - determinant, by Newton from the left: it rises without overshoot.
+fn smallest_root(minors: f64, determinant: f64) -> Option<f64> {
+    let mut x = 0.0;
+    for _ in 0..12 {
+        let value = ((x - 1.0) * x + minors) * x - determinant;
+        let slope = (3.0 * x - 2.0) * x + minors;
+        let step = value / slope;
+        x -= step;
+        if step.abs() <= 1e-15 {
+            return Some(x.max(0.0));
+        }
+    }
+    None
 }
 
 /// Zeroes `a[p][q]` by a rotation and applies it to the columns of `v`.
@@ -113,6 +190,45 @@ mod tests {
                 assert!(residual <= 1e-12 * values[2].abs(), "case {case}: {residual}");
                 assert!((vector.length() - 1.0).abs() < 1e-12);
             }
+        }
+    }
+
+    #[test]
+    fn the_closed_form_agrees_with_jacobi() {
+        let mut random = Random::new(2, 0);
+        let mut n_closed = 0;
+        for case in 0..4000 {
+            let thickness = 10f64.powi(-(case % 9));
+            let width = 10f64.powi(-(case / 9 % 4));
+            let scale = DVec3::new(1.0, width, thickness) * 10f64.powi(case % 21 - 10);
+            let turn = glam::DQuat::from_rotation_z(random.next_f64() * 6.0)
+                * glam::DQuat::from_rotation_x(random.next_f64() * 6.0);
+            let mut m = SymmetricMatrix::default();
+            for _ in 0..16 {
+                let v = DVec3::from_array(std::array::from_fn(|_| random.next_gaussian()));
+                m.add_outer(turn * (v * scale), 1.0);
+            }
+            let (exact_values, exact) = m.eigen();
+            let (vector, values) = smallest_eigenvector(&m);
+            n_closed += usize::from(closed_form(&m).is_some());
+            let gap = (exact_values[1] - exact_values[0]) / exact_values[2];
+            let sine = vector.cross(exact[0]).length();
+            assert!(sine < 1e-12 / gap, "case {case}: {sine} at gap {gap}");
+            for (value, exact) in values.iter().zip(exact_values) {
+                // The smallest is a difference of products: its error is relative to the widest ratio.
+                let tolerance = 1e-13 * exact_values[2] * exact_values[2] / exact_values[1];
+                assert!((value - exact).abs() < tolerance, "case {case}: {value} {exact}");
+            }
+        }
+        assert!(2000 < n_closed, "{n_closed}");
+    }
+
+    #[test]
+    fn matrices_that_no_covariance_gives_still_have_an_answer() {
+        for xx in [0.0, 1e-300, 1e300, -1.0] {
+            let (vector, values) =
+                smallest_eigenvector(&SymmetricMatrix { xx, ..SymmetricMatrix::default() });
+            assert!(vector.is_normalized() && values[0] <= values[2]);
         }
     }
 
