@@ -1,10 +1,12 @@
 //! The demo site: a temple in ruins, 30 metres across.
 
+use super::column::{Column, Drum};
 use super::foliage::Foliage;
-use super::masonry::{Arch, Ashlar, Column, Drum, MarbleBall};
+use super::masonry::{Arch, Ashlar, MarbleBall};
 use super::noise::unit;
-use super::scan::{Scanner, Station};
+use super::scan::Scanner;
 use super::site::Site;
+use super::station::Station;
 use super::terrain::Terrain;
 use super::weathered::{Break, Pose, Weathered};
 use crate::error::Result;
@@ -57,8 +59,8 @@ pub fn view() -> View {
     }
 }
 
-/// Two masts, two tripods on the ground and one between the columns.
-pub fn stations() -> [Station; 5] {
+/// Masts around the ruin, a tripod before it and one between its columns.
+pub fn stations() -> [Station; 6] {
     let center = DVec3::new(0.0, 0.0, FLOOR);
     let toward = |x, y, above: f64, span: f64, low: f64, high: f64| {
         let position = DVec3::new(x, y, TERRAIN.height(x, y) + above);
@@ -73,6 +75,7 @@ pub fn stations() -> [Station; 5] {
         toward(2.0, -15.5, 1.8, 150.0, -35.0, 40.0),
         toward(17.5, -9.0, 8.0, 120.0, -50.0, 12.0),
         toward(-4.0, 15.5, 6.5, 220.0, -45.0, 25.0),
+        toward(-17.5, 5.5, 5.0, 170.0, -45.0, 20.0),
         inside,
     ]
 }
@@ -80,7 +83,7 @@ pub fn stations() -> [Station; 5] {
 /// A scan of the ruin with about `n_points` points.
 pub fn scan(n_points: usize, progress: &dyn Progress) -> Result<PointCloud> {
     // Points a scan gives times the square of its angular step, measured at a million points.
-    const POINTS_TIMES_STEP_SQUARED: f64 = 11.94;
+    const POINTS_TIMES_STEP_SQUARED: f64 = 14.74;
     let step_rad = (POINTS_TIMES_STEP_SQUARED / n_points.max(100) as f64).sqrt();
     let scanner = Scanner { step_rad, origin: UTM_ORIGIN, ..Scanner::default() };
     scanner.scan(&site(), &stations(), progress)

@@ -1,6 +1,7 @@
 //! The scanner: beams from stations, each giving at most one point.
 
 use super::site::{Beam, Site};
+use super::station::Station;
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 use crate::math::Random;
@@ -9,7 +10,6 @@ use crate::math::hash;
 use crate::points::{PointCloud, Scalar, Values};
 use crate::progress::Progress;
 use rayon::prelude::*;
-use std::f64::consts::TAU;
 
 /// How the scanner works, the same at every station.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,18 +26,6 @@ pub struct Scanner {
     pub with_normals: bool,
 }
 
-/// One place that the scanner is set up at, and the window that it scans from there.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Station {
-    pub position: DVec3,
-    /// Middle of the window, counter-clockwise from +X.
-    pub azimuth_rad: f64,
-    /// Width of the window; a full turn sees all around.
-    pub azimuth_span_rad: f64,
-    /// Lowest and highest beam above the horizon.
-    pub elevation_rad: (f64, f64),
-}
-
 impl Default for Scanner {
     fn default() -> Self {
         Self {
@@ -48,30 +36,6 @@ impl Default for Scanner {
             origin: DVec3::ZERO,
             with_normals: false,
         }
-    }
-}
-
-impl Station {
-    /// All around and from 60 degrees below the horizon to the zenith: a tripod hides what is under it.
-    pub fn full_dome(position: DVec3) -> Self {
-        Self {
-            position,
-            azimuth_rad: 0.0,
-            azimuth_span_rad: TAU,
-            elevation_rad: ((-60f64).to_radians(), 90f64.to_radians()),
-        }
-    }
-
-    /// A window centred on `target`.
-    pub fn toward(
-        position: DVec3,
-        target: DVec3,
-        span_rad: f64,
-        elevation_rad: (f64, f64),
-    ) -> Self {
-        let offset = target - position;
-        let azimuth_rad = offset.y.atan2(offset.x);
-        Self { position, azimuth_rad, azimuth_span_rad: span_rad, elevation_rad }
     }
 }
 
@@ -86,11 +50,12 @@ impl Scanner {
         progress: &dyn Progress,
     ) -> Result<PointCloud> {
         self.validate()?;
-        let n_columns: usize = stations.iter().map(|station| self.n_columns(station)).sum();
+        let n_columns: usize =
+            stations.iter().map(|station| station.n_columns(self.step_rad)).sum();
         progress.begin("scan", n_columns as u64);
         let mut returns = Vec::new();
         for (station_idx, station) in stations.iter().enumerate() {
-            let columns: Vec<Vec<Return>> = (0..self.n_columns(station))
+            let columns: Vec<Vec<Return>> = (0..station.n_columns(self.step_rad))
                 .into_par_iter()
                 .map(|column| {
                     progress.check()?;
@@ -120,10 +85,6 @@ impl Scanner {
         Ok(())
     }
 
-    fn n_columns(&self, station: &Station) -> usize {
-        (station.azimuth_span_rad / self.step_rad).round() as usize
-    }
-
     /// One turn of the mirror: the beams of one azimuth.
     fn scan_column(
         &self,
@@ -132,25 +93,13 @@ impl Scanner {
         station_idx: usize,
         column: usize,
     ) -> Vec<Return> {
-        let (lowest, highest) = station.elevation_rad;
-        let n_beams = ((highest - lowest) / self.step_rad).round() as usize;
-        let start = station.azimuth_rad - 0.5 * station.azimuth_span_rad;
-        let azimuth = start + (column as f64 + 0.5) * self.step_rad;
         let scan_beam = |row: usize| {
-            let elevation = lowest + (row as f64 + 0.5) * self.step_rad;
-            let direction = DVec3::new(
-                elevation.cos() * azimuth.cos(),
-                elevation.cos() * azimuth.sin(),
-                elevation.sin(),
-            );
-            let beam = Beam { origin: station.position, direction };
-            let mut random = Random::new(
-                self.seed ^ hash(station_idx as u64),
-                ((column as u64) << 32) | row as u64,
-            );
+            let beam = station.beam(column, row, self.step_rad);
+            let seed = self.seed ^ hash(station_idx as u64);
+            let mut random = Random::new(seed, ((column as u64) << 32) | row as u64);
             self.measure(site, &beam, station_idx, &mut random)
         };
-        (0..n_beams).filter_map(scan_beam).collect()
+        (0..station.n_rows(self.step_rad)).filter_map(scan_beam).collect()
     }
 
     fn measure(
