@@ -109,7 +109,7 @@ impl PointBlock {
 
     /// Not of unit length, but never zero.
     #[inline(always)]
-    fn normals<L: Lanes>(&self) -> Vec3Lanes<L> {
+    pub fn normals<L: Lanes>(&self) -> Vec3Lanes<L> {
         let (x, y) = (L::from_i16(&self.normal[0]), L::from_i16(&self.normal[1]));
         let z = L::splat(NORMAL_MAX) - x.abs() - y.abs();
         let fold = L::splat(0.0).max(L::splat(0.0) - z);

@@ -183,6 +183,12 @@ impl<L: Lanes> Vec3Lanes<L> {
     }
 
     #[inline(always)]
+    pub fn store(self) -> [super::Vec3; LANES] {
+        let (x, y, z) = (self.x.store(), self.y.store(), self.z.store());
+        std::array::from_fn(|i| super::Vec3::new(x[i], y[i], z[i]))
+    }
+
+    #[inline(always)]
     pub fn dot(self, other: Self) -> L {
         self.x * other.x + self.y * other.y + self.z * other.z
     }

@@ -6,6 +6,10 @@ use crate::math::{Frame, Vec3};
 pub const NEIGHBOR_REACH: f32 = 1.3;
 /// ... if they are not farther than this many from the tangent plane.
 const THICKNESS: f32 = 0.8;
+/// Points that a ray passed by at least this many radii before the hit tell which side is free.
+const PASSED: f32 = 0.2;
+/// They contradict the hit's normal if theirs makes this cosine with it, or less.
+const CONTRARY: f32 = -0.5;
 /// More points than this do not change the answer.
 pub const MAX_NEIGHBORS: usize = 64;
 
@@ -20,21 +24,46 @@ pub enum Surroundings {
     Outside,
 }
 
-/// Judges a hit with unit `normal` by the points around it, given relative to the hit; those out of
-/// reach of `radius` are passed over.
-pub fn surroundings(normal: Vec3, radius: f32, offsets: &[Vec3]) -> Surroundings {
-    let frame = Frame::around(normal);
+/// A hit in question.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate {
+    /// Unit, facing the ray's origin.
+    pub normal: Vec3,
+    /// Of the ray, unit.
+    pub direction: Vec3,
+    pub radius: f32,
+}
+
+/// A point near a hit.
+#[derive(Clone, Copy, Debug)]
+pub struct Neighbor {
+    /// From the hit to the point.
+    pub offset: Vec3,
+    /// Of either sign; any length but zero.
+    pub normal: Vec3,
+}
+
+impl Neighbor {
+    /// Fills unused places.
+    pub const NONE: Self = Self { offset: Vec3::ZERO, normal: Vec3::Z };
+}
+
+/// Judges a hit by the points around it; those out of reach are passed over.
+pub fn surroundings(hit: &Candidate, neighbors: &[Neighbor]) -> Surroundings {
+    let frame = Frame::around(hit.normal);
+    let radius = hit.radius;
     let mut directions = [(0.0f32, 0.0f32); MAX_NEIGHBORS];
     let (mut n_near, mut n) = (0, 0);
-    for offset in offsets {
-        if n == MAX_NEIGHBORS {
-            break;
-        }
+    let mut near = [Neighbor::NONE; MAX_NEIGHBORS];
+    for neighbor in neighbors.iter().take(MAX_NEIGHBORS) {
         let reach = NEIGHBOR_REACH * radius;
-        if offset.length_squared() < reach * reach && normal.dot(*offset).abs() < THICKNESS * radius
+        let offset = neighbor.offset;
+        if offset.length_squared() < reach * reach
+            && hit.normal.dot(offset).abs() < THICKNESS * radius
         {
+            near[n_near] = *neighbor;
             n_near += 1;
-            let (x, y) = frame.project(*offset);
+            let (x, y) = frame.project(offset);
             let length = (x * x + y * y).sqrt();
             // A point straight under the hit has no angle.
             if 1e-3 * radius < length {
@@ -43,7 +72,28 @@ pub fn surroundings(normal: Vec3, radius: f32, offsets: &[Vec3]) -> Surroundings
             }
         }
     }
-    if n_near < 4 { Surroundings::Outside } else { judge_gaps(&mut directions[..n]) }
+    if n_near < 4 || is_from_within(hit, &near[..n_near]) {
+        return Surroundings::Outside;
+    }
+    judge_gaps(&mut directions[..n])
+}
+
+/// Just outside a silhouette, where a disc of the far side sticks out over the bend, a ray meets that
+/// disc from within; lit from the inside it would be a black rim. The ray came through free space, so
+/// the side on which it passed the points before the hit is the free side: a hit is refused if its
+/// normal, continued from theirs, faces away from the ray.
+fn is_from_within(hit: &Candidate, near: &[Neighbor]) -> bool {
+    let (mut free_side, mut n_passed) = (Vec3::ZERO, 0);
+    for Neighbor { offset, normal } in near {
+        let along = offset.dot(hit.direction);
+        if along < -PASSED * hit.radius {
+            let from_point_to_ray = along * hit.direction - *offset;
+            // The normal appears twice, so its sign and a common length do not matter.
+            free_side += normal.dot(from_point_to_ray) / normal.length_squared() * *normal;
+            n_passed += 1;
+        }
+    }
+    1 < n_passed && free_side.dot(hit.normal) < CONTRARY * free_side.length()
 }
 
 fn judge_gaps(directions: &mut [(f32, f32)]) -> Surroundings {
@@ -78,12 +128,20 @@ fn pseudo_angle((x, y): (f32, f32)) -> f32 {
 mod tests {
     use super::*;
 
-    fn at_angles(degrees: &[f32]) -> Vec<Vec3> {
-        degrees.iter().map(|a| Vec3::new(a.to_radians().cos(), a.to_radians().sin(), 0.1)).collect()
+    fn level(offset: Vec3) -> Neighbor {
+        Neighbor { offset, normal: Vec3::Z }
     }
 
+    fn at_angles(degrees: &[f32]) -> Vec<Neighbor> {
+        let place = |a: &f32| Vec3::new(a.to_radians().cos(), a.to_radians().sin(), 0.1);
+        degrees.iter().map(place).map(level).collect()
+    }
+
+    const FROM_ABOVE: Candidate =
+        Candidate { normal: Vec3::Z, direction: Vec3::NEG_Z, radius: 1.0 };
+
     fn judge(degrees: &[f32]) -> Surroundings {
-        surroundings(Vec3::Z, 1.0, &at_angles(degrees))
+        surroundings(&FROM_ABOVE, &at_angles(degrees))
     }
 
     #[test]
@@ -103,11 +161,42 @@ mod tests {
     fn points_off_the_plane_or_out_of_reach_do_not_count() {
         let mut points = at_angles(&[0.0, 90.0, 180.0]);
         for stray in [Vec3::new(0.0, -1.4, 0.0), Vec3::new(0.0, -0.5, 0.9)] {
-            points.push(stray);
-            assert_eq!(surroundings(Vec3::Z, 1.0, &points), Surroundings::Outside);
+            points.push(level(stray));
+            assert_eq!(surroundings(&FROM_ABOVE, &points), Surroundings::Outside);
             points.pop();
         }
-        points.push(Vec3::new(0.0, -1.2, 0.0));
-        assert_eq!(surroundings(Vec3::Z, 1.0, &points), Surroundings::Enclosed);
+        points.push(level(Vec3::new(0.0, -1.2, 0.0)));
+        assert_eq!(surroundings(&FROM_ABOVE, &points), Surroundings::Enclosed);
+    }
+
+    /// Points of a cylinder of radius 2 along Y under the place where a ray along +X passes it.
+    fn bend(height: f32, at: f32) -> Vec<Neighbor> {
+        let degrees = (-40..=40).step_by(8);
+        let points =
+            degrees.flat_map(|a| [-0.5f32, -0.1, 0.4].map(|y| ((a as f32).to_radians(), y)));
+        points
+            .map(|(angle, y)| {
+                let normal = Vec3::new(angle.sin(), 0.0, angle.cos());
+                Neighbor {
+                    offset: 2.0 * normal + y * Vec3::Y - Vec3::new(at, 0.0, 2.0 + height),
+                    normal,
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_disc_met_from_within_over_a_bend_is_refused() {
+        let angle = 0.3f32;
+        // The disc that touches at `angle` behind the top meets the line at `height` over the top here.
+        let height = 0.02;
+        let at = (2.0 - (2.0 + height) * angle.cos()) / angle.sin();
+        let outward = Vec3::new(angle.sin(), 0.0, angle.cos());
+        let from_within = Candidate { normal: -outward, direction: Vec3::X, radius: 1.0 };
+        assert_eq!(surroundings(&from_within, &bend(height, at)), Surroundings::Outside);
+        // Its mirror image before the top is met from outside.
+        let outward = Vec3::new(-angle.sin(), 0.0, angle.cos());
+        let from_outside = Candidate { normal: outward, direction: Vec3::X, radius: 1.0 };
+        assert_eq!(surroundings(&from_outside, &bend(height, -at)), Surroundings::Enclosed);
     }
 }

@@ -5,7 +5,9 @@ mod disc;
 mod sphere;
 mod splat;
 
-pub use boundary::{MAX_NEIGHBORS, NEIGHBOR_REACH, Surroundings, surroundings};
+pub use boundary::{
+    Candidate, MAX_NEIGHBORS, NEIGHBOR_REACH, Neighbor, Surroundings, surroundings,
+};
 pub use disc::Disc;
 pub use sphere::Sphere;
 pub use splat::{Gathered, MAX_GATHERED, blend, gather_limit};

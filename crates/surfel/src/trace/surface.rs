@@ -4,7 +4,9 @@ use super::boundary::judge;
 use super::kernel::{Hit, closest_hit, each_hit, gather};
 use crate::flat::FlatScene;
 use crate::math::{Lanes, Ray, Vec3};
-use crate::surface::{Boundary, Gathered, MAX_GATHERED, Surroundings, blend, surroundings};
+use crate::surface::{
+    Boundary, Candidate, Gathered, MAX_GATHERED, Neighbor, Surroundings, blend, surroundings,
+};
 use std::ops::ControlFlow;
 
 /// Where a ray meets the surface.
@@ -64,20 +66,23 @@ pub(super) fn occlusions<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &m
             if refusals == MAX_REFUSALS {
                 return ControlFlow::Break(());
             }
-            if is_tested {
-                let disc = scene.points.gathered(hit.slot, ray.at(hit.distance));
-                let radius = disc.radius / scene.surface.radius_factor();
-                if judge::<L>(&scene.points, disc.position, disc.normal, radius)
-                    == Surroundings::Outside
-                {
-                    refusals += 1;
-                    return ControlFlow::Continue(());
-                }
+            if is_tested && single_disc::<L>(scene, ray, &hit) == Surroundings::Outside {
+                refusals += 1;
+                return ControlFlow::Continue(());
             }
             *occluded = true;
             ControlFlow::Break(())
         });
     }
+}
+
+#[inline(always)]
+fn single_disc<L: Lanes>(scene: &FlatScene, ray: &Ray, hit: &Hit) -> Surroundings {
+    let disc = scene.points.gathered(hit.slot, ray.at(hit.distance));
+    let radius = disc.radius / scene.surface.radius_factor();
+    let normal = if 0.0 < disc.normal.dot(ray.direction) { -disc.normal } else { disc.normal };
+    let candidate = Candidate { normal, direction: ray.direction, radius };
+    judge::<L>(&scene.points, disc.position, &candidate)
 }
 
 #[inline(always)]
@@ -115,7 +120,11 @@ fn surface_hit<L: Lanes>(scene: &FlatScene, ray: &Ray) -> SurfaceHit {
         if scene.boundary == Boundary::Off {
             return hit;
         }
-        match judge_gathered::<L>(scene, discs, normal, radius) {
+        match judge_gathered::<L>(
+            scene,
+            discs,
+            &Candidate { normal, direction: ray.direction, radius },
+        ) {
             Surroundings::Enclosed => return hit,
             Surroundings::Edge if at_edge.is_miss() => at_edge = hit,
             _ => {}
@@ -149,21 +158,24 @@ fn pierced_discs<L: Lanes>(
     (gather.hits().first().copied().unwrap_or(Hit::MISS), gather.hits().len())
 }
 
-/// The pierced discs' own centres mostly surround the hit already, and more points only narrow gaps.
+/// On an even patch the pierced discs' own centres mostly surround the hit already, and more points
+/// only narrow gaps: then the search around the hit is saved.
 #[inline(always)]
 fn judge_gathered<L: Lanes>(
     scene: &FlatScene,
     discs: &[Gathered],
-    normal: Vec3,
-    radius: f32,
+    hit: &Candidate,
 ) -> Surroundings {
+    const COS_EVEN: f32 = 0.8;
     let position = discs[0].position;
-    let mut offsets = [Vec3::ZERO; MAX_GATHERED];
-    for (offset, disc) in offsets.iter_mut().zip(discs) {
-        *offset = disc.center - position;
+    if discs.iter().all(|disc| COS_EVEN < disc.normal.dot(hit.normal).abs()) {
+        let mut neighbors = [Neighbor::NONE; MAX_GATHERED];
+        for (neighbor, disc) in neighbors.iter_mut().zip(discs) {
+            *neighbor = Neighbor { offset: disc.center - position, normal: disc.normal };
+        }
+        if surroundings(hit, &neighbors[..discs.len()]) == Surroundings::Enclosed {
+            return Surroundings::Enclosed;
+        }
     }
-    if surroundings(normal, radius, &offsets[..discs.len()]) == Surroundings::Enclosed {
-        return Surroundings::Enclosed;
-    }
-    judge::<L>(&scene.points, position, normal, radius)
+    judge::<L>(&scene.points, position, hit)
 }
