@@ -10,7 +10,7 @@ mod sampling;
 pub use aabb::Aabb;
 pub use eigen::{SymmetricMatrix, smallest_eigenvector};
 pub use frame::Frame;
-pub use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3};
+pub use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3, Vec4};
 pub use random::{Random, hash};
 pub use ray::Ray;
 pub use sampling::{cosine_hemisphere, disk, scrambled_pair, uniform_cone};

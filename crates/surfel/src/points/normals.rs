@@ -35,8 +35,9 @@ pub fn fit_plane(positions: &[Vec3], point_idx: usize, neighbors: &[Neighbor]) -
     }
     let covariance = covariance(positions, point_idx, neighbors);
     let (normal, [smallest, middle, largest]) = smallest_eigenvector(&covariance);
-    // Written so that NaN fails it.
-    if !(LINE * largest < middle) {
+    // False for NaN too.
+    let is_plane = LINE * largest < middle;
+    if !is_plane {
         return PlaneFit::default();
     }
     let variation = smallest.max(0.0) / (smallest + middle + largest);

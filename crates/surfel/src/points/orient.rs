@@ -243,7 +243,7 @@ mod tests {
             .map(|_| Vec3::from_array(std::array::from_fn(|_| random.next_gaussian() as f32)))
             .map(Vec3::normalize)
             .collect();
-        let center = |i: usize| if i % 2 == 0 { Vec3::ZERO } else { Vec3::new(0.0, 9.0, 30.0) };
+        let center = |i: usize| if i < 2000 { Vec3::ZERO } else { Vec3::new(0.0, 9.0, 30.0) };
         let positions = outward.iter().enumerate().map(|(i, &n)| center(i) + n).collect();
         let mixed = outward.iter().map(|&n| if random.below(3) == 0 { -n } else { n }).collect();
         let mut cloud = PointCloud::from_positions(positions);
