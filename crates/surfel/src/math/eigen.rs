@@ -90,8 +90,9 @@ fn closed_form(matrix: &SymmetricMatrix) -> Option<(DVec3, [f64; 3])> {
     let unit = matrix.scaled(1.0 / trace);
     let adjugate = unit.adjugate(0.0);
     let minors = adjugate.xx + adjugate.yy + adjugate.zz;
-    // A nearly linear covariance has its second eigenvalue near this bound.
-    if !(1e-5 < minors) {
+    // A nearly linear covariance has its second eigenvalue near this bound. NaN is no plane either.
+    let is_plane = 1e-5 < minors;
+    if !is_plane {
         return None;
     }
     let determinant = unit.xx * adjugate.xx + unit.xy * adjugate.xy + unit.xz * adjugate.xz;
@@ -104,7 +105,8 @@ fn closed_form(matrix: &SymmetricMatrix) -> Option<(DVec3, [f64; 3])> {
     ];
     // The adjugate of A - l0 is (l1 - l0)(l2 - l0) v v^T: its largest diagonal entry has the best column.
     let best = DVec3::new(projector.xx, projector.yy, projector.zz).max_position();
-    if !(1e-6 < columns[best][best]) {
+    let is_separate = 1e-6 < columns[best][best];
+    if !is_separate {
         return None;
     }
     let sum = 1.0 - smallest;

@@ -11,7 +11,7 @@ mod sampling;
 pub use aabb::Aabb;
 pub use eigen::{SymmetricMatrix, smallest_eigenvector};
 pub use frame::Frame;
-pub use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3};
+pub use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3, Vec4};
 pub use lanes::{LANES, LaneMask, Lanes, PortableLanes, PortableMask, Vec3Lanes};
 pub use random::{Random, hash};
 pub use ray::Ray;

@@ -145,3 +145,76 @@ fn clean_radii(cloud: &mut PointCloud, report: &mut CleanReport) {
         cloud.radii = None;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    use crate::progress::Silent;
+
+    fn cleaned(cloud: PointCloud) -> (PointCloud, CleanReport) {
+        clean(cloud, &Silent).unwrap()
+    }
+
+    #[test]
+    fn duplicates_go_and_the_first_stays() {
+        let positions = [Vec3::X, Vec3::Y, Vec3::X, -Vec3::ZERO, Vec3::ZERO, Vec3::NAN, Vec3::Y];
+        let mut cloud = PointCloud::from_positions(positions.to_vec());
+        cloud.intensity = Some((0..7).map(|i| i as f32).collect());
+        let (cloud, report) = cleaned(cloud);
+        assert_eq!(cloud.intensity, Some(vec![0.0, 1.0, 3.0]));
+        assert_eq!((report.n_not_finite, report.n_duplicates), (1, 3));
+    }
+
+    #[test]
+    fn duplicates_equal_the_plain_loop() {
+        let mut random = Random::new(5, 0);
+        let mut next = || random.below(12) as f32 - 6.0;
+        let positions: Vec<Vec3> = (0..2000).map(|_| Vec3::new(next(), next(), next())).collect();
+        let mut expected: Vec<Vec3> = Vec::new();
+        for &position in &positions {
+            if !expected.contains(&position) {
+                expected.push(position);
+            }
+        }
+        assert_eq!(cleaned(PointCloud::from_positions(positions)).0.positions, expected);
+    }
+
+    #[test]
+    fn points_that_share_a_hash_are_told_apart() {
+        let positions = [Vec3::X, Vec3::Y, Vec3::X];
+        assert_eq!(repeats(&mut [0, 1, 2], &positions), [2]);
+    }
+
+    #[test]
+    fn a_clean_cloud_is_left_alone() {
+        let cloud = PointCloud::from_positions(vec![Vec3::X, Vec3::Y]);
+        let (cleaned, report) = cleaned(cloud.clone());
+        assert_eq!(cleaned, cloud);
+        assert_eq!(report, CleanReport { n_before: 2, ..CleanReport::default() });
+    }
+
+    #[test]
+    fn bad_normals_and_radii_are_marked() {
+        let mut cloud = PointCloud::from_positions(vec![Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE]);
+        let infinite = Vec3::new(f32::INFINITY, 0.0, 0.0);
+        cloud.normals = Some(vec![2.0 * Vec3::X, Vec3::NAN, infinite, Vec3::Z]);
+        cloud.radii = Some(vec![1.0, -1.0, f32::NAN, 0.0]);
+        let (cloud, report) = cleaned(cloud);
+        assert_eq!(cloud.normals, Some(vec![Vec3::X, Vec3::ZERO, Vec3::ZERO, Vec3::Z]));
+        assert_eq!(cloud.radii, Some(vec![1.0, 0.0, 0.0, 0.0]));
+        assert_eq!((report.n_bad_normals, report.n_scaled_normals), (2, 1));
+        assert_eq!(report.n_bad_radii, 3);
+    }
+
+    #[test]
+    fn columns_of_nothing_but_zeros_are_removed() {
+        let mut cloud = PointCloud::from_positions(vec![Vec3::X, Vec3::Y]);
+        cloud.normals = Some(vec![Vec3::ZERO; 2]);
+        cloud.radii = Some(vec![0.0; 2]);
+        let (cloud, report) = cleaned(cloud);
+        assert!(cloud.normals.is_none() && cloud.radii.is_none());
+        assert_eq!((report.n_bad_normals, report.n_bad_radii), (2, 2));
+        assert!(cleaned(PointCloud::default()).0.is_empty());
+    }
+}

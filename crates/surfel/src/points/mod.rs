@@ -9,6 +9,7 @@ mod orient;
 mod prepare;
 mod radius;
 mod select;
+mod up;
 
 pub use clean::{CleanReport, clean};
 pub use cloud::{PointCloud, Scalar, Values};
@@ -18,3 +19,4 @@ pub use orient::{Orientation, orient};
 pub use prepare::{Preparation, Report, SURFACE_VARIATION, prepare};
 pub use radius::{Radius, RadiusReport, Sample, estimate_radii, median_distance, spacing};
 pub use select::{Select, select};
+pub use up::{UpGuess, guess_up};

@@ -35,8 +35,9 @@ pub fn fit_plane(positions: &[Vec3], point_idx: usize, neighbors: &[Neighbor]) -
     }
     let covariance = covariance(positions, point_idx, neighbors);
     let (normal, [smallest, middle, largest]) = smallest_eigenvector(&covariance);
-    // Written so that NaN fails it.
-    if !(LINE * largest < middle) {
+    // False for NaN too.
+    let is_plane = LINE * largest < middle;
+    if !is_plane {
         return PlaneFit::default();
     }
     let variation = smallest.max(0.0) / (smallest + middle + largest);
@@ -109,5 +110,94 @@ impl NormalReport {
              the nearest point that has one, {n_up} got +Z",
             n_from_nearest + n_up
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    use crate::points::neighbors::{Method, Query, map_neighborhoods};
+    use crate::progress::Silent;
+
+    fn fits(positions: &[Vec3], query: Query) -> Vec<PlaneFit> {
+        let fit = |point: usize, neighbors: &[Neighbor]| fit_plane(positions, point, neighbors);
+        map_neighborhoods(positions, Method::Knn, query, &Silent, fit).unwrap()
+    }
+
+    fn sphere(n_points: usize) -> Vec<Vec3> {
+        let mut random = Random::new(1, 0);
+        let mut direction =
+            || Vec3::from_array(std::array::from_fn(|_| random.next_gaussian() as f32));
+        (0..n_points).map(|_| direction().normalize()).collect()
+    }
+
+    #[test]
+    fn normals_of_a_sphere_point_at_its_center() {
+        let positions = sphere(20_000);
+        for query in [Query::Nearest(16), Query::Within(0.05)] {
+            let fits = fits(&positions, query);
+            let good: Vec<(&PlaneFit, &Vec3)> =
+                fits.iter().zip(&positions).filter(|(fit, _)| fit.normal != Vec3::ZERO).collect();
+            assert!(fits.len() * 99 / 100 < good.len());
+            let mut angles: Vec<f32> = good
+                .iter()
+                .map(|(fit, direction)| {
+                    fit.normal.dot(**direction).abs().min(1.0).acos().to_degrees()
+                })
+                .collect();
+            angles.sort_unstable_by(f32::total_cmp);
+            // The neighbourhood's middle is half a spacing (0.7 degrees) away from the point.
+            assert!(angles[angles.len() / 2] < 0.6, "{}", angles[angles.len() / 2]);
+            assert!(angles[angles.len() * 99 / 100] < 2.5, "{}", angles[angles.len() * 99 / 100]);
+        }
+    }
+
+    #[test]
+    fn far_from_the_origin_normals_are_the_same() {
+        let near: Vec<Vec3> = sphere(500).into_iter().map(|p| (p * 1024.0).round()).collect();
+        let shift = Vec3::new(1e6, -2e6, 4e6);
+        let far: Vec<Vec3> = near.iter().map(|&p| p + shift).collect();
+        let (near, far) = (fits(&near, Query::Nearest(16)), fits(&far, Query::Nearest(16)));
+        assert!(near == far);
+    }
+
+    #[test]
+    fn variation_is_zero_on_a_plane_and_a_third_in_a_ball() {
+        let mut random = Random::new(4, 0);
+        let mut gauss = || random.next_gaussian() as f32;
+        let ball: Vec<Vec3> = (0..5000).map(|_| Vec3::new(gauss(), gauss(), gauss())).collect();
+        let flat: Vec<Vec3> = ball.iter().map(|p| Vec3::new(p.x, p.y, 7.0)).collect();
+        let everything = Query::Nearest(4999);
+        let fit = fit_plane(
+            &ball,
+            0,
+            &Tree::new(&ball, &Silent).unwrap().nearest(ball[0], 4999, Some(0)),
+        );
+        assert!((fit.variation - 1.0 / 3.0).abs() < 0.02, "{}", fit.variation);
+        let fit = fits(&flat[..200], everything)[0];
+        assert_eq!((fit.normal, fit.variation), (Vec3::Z, 0.0));
+    }
+
+    #[test]
+    fn lines_points_and_pairs_have_no_plane() {
+        let line: Vec<Vec3> = (0..50).map(|i| Vec3::new(1.0, 2.0, 3.0) * i as f32).collect();
+        for positions in [line, vec![Vec3::ONE; 20], vec![Vec3::X, Vec3::Y], vec![Vec3::X]] {
+            let fits = fits(&positions, Query::Nearest(16));
+            assert!(fits.iter().all(|fit| *fit == PlaneFit::default()));
+            let mut normals = vec![Vec3::ZERO; positions.len()];
+            let report = fill_missing(&positions, &mut normals, &Silent).unwrap();
+            assert_eq!(report.n_up, positions.len());
+            assert!(normals.iter().all(|&normal| normal == Vec3::Z));
+        }
+    }
+
+    #[test]
+    fn a_missing_normal_comes_from_the_nearest_good_point() {
+        let positions = [0.0, 1.0, 5.0, 6.0, 9.0].map(|x| Vec3::X * x);
+        let mut normals = [Vec3::ZERO, Vec3::Y, Vec3::ZERO, Vec3::X, Vec3::ZERO];
+        let report = fill_missing(&positions, &mut normals, &Silent).unwrap();
+        assert_eq!(normals, [Vec3::Y, Vec3::Y, Vec3::X, Vec3::X, Vec3::X]);
+        assert_eq!((report.n_estimated, report.n_from_nearest, report.n_up), (2, 3, 0));
     }
 }

@@ -229,3 +229,85 @@ impl FromStr for Orientation {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    use crate::progress::Silent;
+
+    /// Two balls apart, the outward normals of one third turned inward.
+    fn balls() -> (PointCloud, Vec<Vec3>) {
+        let mut random = Random::new(1, 0);
+        let outward: Vec<Vec3> = (0..4000)
+            .map(|_| Vec3::from_array(std::array::from_fn(|_| random.next_gaussian() as f32)))
+            .map(Vec3::normalize)
+            .collect();
+        let center = |i: usize| if i < 2000 { Vec3::ZERO } else { Vec3::new(0.0, 9.0, 30.0) };
+        let positions = outward.iter().enumerate().map(|(i, &n)| center(i) + n).collect();
+        let mixed = outward.iter().map(|&n| if random.below(3) == 0 { -n } else { n }).collect();
+        let mut cloud = PointCloud::from_positions(positions);
+        cloud.normals = Some(outward);
+        (cloud, mixed)
+    }
+
+    #[test]
+    fn a_spanning_tree_turns_closed_surfaces_outward() {
+        let (cloud, mixed) = balls();
+        let found = orient(&cloud, mixed, Orientation::SpanningTree, &Silent).unwrap();
+        assert_eq!(Some(found), cloud.normals);
+    }
+
+    #[test]
+    fn a_spanning_tree_turns_ground_up_whatever_its_shape() {
+        for bend in [-0.05f32, 0.0, 0.05] {
+            let height = |x: f32, y: f32| bend * (x * x + y * y);
+            let place = |i: usize| ((i % 40) as f32 - 20.0, (i / 40) as f32 - 20.0);
+            let points = (0..1600).map(|i| {
+                let (x, y) = place(i);
+                Vec3::new(x, y, height(x, y))
+            });
+            let cloud = PointCloud::from_positions(points.collect());
+            let normals: Vec<Vec3> = (0..1600)
+                .map(|i| {
+                    let (x, y) = place(i);
+                    let sign = if i % 7 < 3 { -1.0 } else { 1.0 };
+                    sign * Vec3::new(-2.0 * bend * x, -2.0 * bend * y, 1.0).normalize()
+                })
+                .collect();
+            let found = orient(&cloud, normals, Orientation::SpanningTree, &Silent).unwrap();
+            assert!(found.iter().all(|normal| 0.0 < normal.z), "bend {bend}");
+        }
+    }
+
+    #[test]
+    fn a_viewpoint_is_given_in_world_coordinates() {
+        let mut cloud = PointCloud::from_positions(vec![Vec3::ZERO, Vec3::X * 10.0]);
+        cloud.origin = DVec3::new(1e6, 0.0, 0.0);
+        let viewpoint = Orientation::Viewpoint(DVec3::new(1e6 + 5.0, 0.0, 0.0));
+        let found = orient(&cloud, vec![Vec3::X; 2], viewpoint, &Silent).unwrap();
+        assert_eq!(found, [Vec3::X, -Vec3::X]);
+        let found = orient(&cloud, vec![-Vec3::Z, Vec3::Z], Orientation::Up, &Silent).unwrap();
+        assert_eq!(found, [Vec3::Z; 2]);
+    }
+
+    #[test]
+    fn few_or_equal_points_do_no_harm() {
+        for positions in [vec![], vec![Vec3::X], vec![Vec3::X; 40], vec![Vec3::NAN, Vec3::X]] {
+            let normals = vec![-Vec3::Z; positions.len()];
+            let cloud = PointCloud::from_positions(positions);
+            let found = orient(&cloud, normals, Orientation::SpanningTree, &Silent).unwrap();
+            assert!(found.iter().all(|&normal| normal == Vec3::Z), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn texts() {
+        let viewpoint = Orientation::Viewpoint(DVec3::new(1.0, -2.5, 3e5));
+        assert_eq!("viewpoint:1, -2.5,3e5".parse::<Orientation>().unwrap(), viewpoint);
+        assert_eq!("mst".parse::<Orientation>().unwrap(), Orientation::SpanningTree);
+        for text in ["", "up:1", "viewpoint", "viewpoint:1,2", "viewpoint:1,2,nan", "down"] {
+            assert!(text.parse::<Orientation>().is_err(), "{text}");
+        }
+    }
+}

@@ -213,3 +213,105 @@ fn add_radii(cloud: &mut PointCloud, estimated: Vec<f32>) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    use crate::progress::Silent;
+
+    fn ball(n_points: usize) -> PointCloud {
+        let mut random = Random::new(1, 0);
+        let mut direction =
+            || Vec3::from_array(std::array::from_fn(|_| random.next_gaussian() as f32));
+        PointCloud::from_positions((0..n_points).map(|_| direction().normalize()).collect())
+    }
+
+    fn preparations() -> Vec<Preparation> {
+        let with = |neighbors| Preparation { neighbors, ..Preparation::default() };
+        vec![
+            Preparation::default(),
+            with(Method::Grid),
+            with(Method::ScanLine),
+            Preparation { normals: Query::Within(0.1), keep_variation: true, ..with(Method::Knn) },
+            Preparation {
+                orientation: Orientation::SpanningTree,
+                radius: Radius::Median { n: 6, samples: 20 },
+                select: Some(Select::Random(3000)),
+                ..Preparation::default()
+            },
+        ]
+    }
+
+    #[test]
+    fn the_number_of_threads_does_not_change_a_bit() {
+        let cloud = ball(5000);
+        for preparation in preparations() {
+            let with_threads = |n_threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+                pool.install(|| prepare(cloud.clone(), &preparation, &Silent).unwrap())
+            };
+            let (one, two) = (with_threads(1), with_threads(2));
+            assert!(one == two && one == with_threads(5), "{preparation:?}");
+        }
+    }
+
+    #[test]
+    fn poor_clouds_get_whole_columns_or_a_clear_error() {
+        let line = (0..40).map(|i| Vec3::X * i as f32).collect();
+        let clouds = [vec![Vec3::ONE], vec![Vec3::X, Vec3::Y], vec![Vec3::ONE; 50], line];
+        for preparation in preparations() {
+            for positions in &clouds {
+                let cloud = PointCloud::from_positions(positions.clone());
+                let (cloud, report) = prepare(cloud, &preparation, &Silent).unwrap();
+                assert!(cloud.normals.unwrap().iter().all(|normal| normal.is_normalized()));
+                assert!(cloud.radii.unwrap().iter().all(|&radius| 0.0 < radius && radius < 1e3));
+                assert!(0 < report.n_points);
+            }
+            for positions in [vec![], vec![Vec3::NAN; 3]] {
+                let cloud = PointCloud::from_positions(positions);
+                assert_eq!(prepare(cloud, &preparation, &Silent), Err(Error::EmptyCloud));
+            }
+        }
+    }
+
+    #[test]
+    fn what_a_file_gives_stays_and_only_the_missing_is_estimated() {
+        let mut cloud = ball(3000);
+        let mut normals: Vec<Vec3> = cloud.positions.iter().map(|&p| -p).collect();
+        normals[10] = Vec3::ZERO;
+        let mut radii = vec![0.25; 3000];
+        radii[20] = f32::NAN;
+        (cloud.normals, cloud.radii) = (Some(normals.clone()), Some(radii));
+        let (prepared, report) = prepare(cloud, &Preparation::default(), &Silent).unwrap();
+        let found = prepared.normals.unwrap();
+        assert!(found[10].dot(-prepared.positions[10]) > 0.99, "signed as the file's neighbours");
+        assert_eq!(report.normals.unwrap().n_estimated, 1);
+        assert!(found[11].dot(normals[11]) > 0.999_999);
+        let radii = prepared.radii.unwrap();
+        assert!(radii[19] == 0.25 && radii[20] != 0.25 && 0.0 < radii[20]);
+    }
+
+    #[test]
+    fn variation_is_kept_on_request() {
+        let preparation = Preparation { keep_variation: true, ..Preparation::default() };
+        let (cloud, _) = prepare(ball(500), &preparation, &Silent).unwrap();
+        let (cloud, report) = prepare(cloud, &preparation, &Silent).unwrap();
+        assert_eq!((report.normals, report.radii), (None, None));
+        assert_eq!(cloud.scalars.len(), 1);
+        assert_eq!(cloud.scalar(SURFACE_VARIATION).unwrap().len(), 500);
+    }
+
+    #[test]
+    fn cancelling_leaves_with_an_error() {
+        struct Cancelled;
+        impl Progress for Cancelled {
+            fn is_cancelled(&self) -> bool {
+                true
+            }
+        }
+        for preparation in preparations() {
+            assert_eq!(prepare(ball(100), &preparation, &Cancelled), Err(Error::Cancelled));
+        }
+    }
+}

@@ -248,3 +248,102 @@ impl FromStr for Radius {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Silent;
+
+    fn lattice(side: usize) -> Vec<Vec3> {
+        (0..side * side).map(|i| Vec3::new((i % side) as f32, (i / side) as f32, 0.0)).collect()
+    }
+
+    fn radii(positions: &[Vec3], radius: Radius) -> (Vec<f32>, RadiusReport) {
+        estimate_radii(positions, radius, 1, &Silent).unwrap()
+    }
+
+    #[test]
+    fn a_lattice_has_known_radii() {
+        let positions = lattice(60);
+        let (adaptive, report) = radii(&positions, Radius::Adaptive { k: 12 });
+        assert_eq!(adaptive[60 * 30 + 30], 2.0);
+        assert_eq!((report.smallest, report.median, report.n_cut), (2.0, 2.0, 0));
+        // The 12 nearest lie at 1 (4), sqrt 2 (4) and 2 (4).
+        let (median, report) = radii(&positions, Radius::Median { n: 6, samples: 100 });
+        assert_eq!((median[7], report.smallest), (2f32.sqrt(), report.largest));
+        assert_eq!(radii(&positions, Radius::Fixed(3.5)).0[5], 3.5);
+    }
+
+    #[test]
+    fn spacing_of_a_random_plane_is_about_that_of_its_density() {
+        let mut random = Random::new(2, 0);
+        let positions: Vec<Vec3> =
+            (0..10_000).map(|_| Vec3::new(random.next_f32(), random.next_f32(), 0.0)).collect();
+        let spacing = spacing(&positions, &Silent).unwrap();
+        // One point to each (1/100)^2; k points fill pi d^2, so that the estimate is 2 / sqrt(pi) of it.
+        assert!((spacing - 0.0113).abs() < 0.001, "{spacing}");
+    }
+
+    #[test]
+    fn a_stray_point_gets_no_giant_radius() {
+        let mut positions = lattice(60);
+        positions.push(Vec3::new(30.0, 30.0, 500.0));
+        let (radii, report) = radii(&positions, Radius::default());
+        assert_eq!(report.n_cut, 1);
+        assert!(radii[3600] <= 4.0 * 2.0 + 1e-3, "{}", radii[3600]);
+        assert!(report.largest <= 8.0);
+    }
+
+    #[test]
+    fn a_sparse_half_keeps_its_wide_radii() {
+        let mut positions = lattice(60);
+        positions.extend(lattice(15).into_iter().map(|p| 20.0 * p + Vec3::new(300.0, 0.0, 0.0)));
+        let (radii, report) = radii(&positions, Radius::default());
+        assert_eq!(report.n_cut, 0);
+        assert_eq!(radii[3600 + 15 * 7 + 7], 40.0);
+    }
+
+    #[test]
+    fn points_without_a_size_get_one() {
+        for positions in [vec![Vec3::ONE], vec![Vec3::ONE; 30], vec![Vec3::ONE; 2]] {
+            for radius in [Radius::default(), Radius::Median { n: 6, samples: 100 }] {
+                let (radii, _) = radii(&positions, radius);
+                assert!(radii.iter().all(|&radius| radius == 1.0));
+            }
+            spacing(&positions, &Silent).unwrap();
+        }
+        let (radii, report) = radii(&[Vec3::ZERO, Vec3::X * 3.0], Radius::default());
+        assert_eq!((radii, report.n_without_size), (vec![3.0; 2], 0));
+        assert_eq!(spacing(&[], &Silent), Err(Error::EmptyCloud));
+    }
+
+    #[test]
+    fn brute_force_finds_the_nearest() {
+        let mut random = Random::new(3, 0);
+        let positions: Vec<Vec3> = (0..500)
+            .map(|_| Vec3::new(random.next_f32(), random.next_f32(), random.next_f32()))
+            .collect();
+        let tree = Tree::new(&positions, &Silent).unwrap();
+        for k in [1, 5, 499, 600] {
+            let expected: Vec<f32> = tree
+                .nearest(positions[9], k, Some(9))
+                .iter()
+                .map(|neighbor| neighbor.distance_squared)
+                .collect();
+            let found = nearest_by_brute_force(&positions, 9, k);
+            assert_eq!(found.len(), expected.len());
+            assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() <= 1e-6 * b));
+        }
+    }
+
+    #[test]
+    fn texts() {
+        assert_eq!("auto".parse::<Radius>().unwrap(), Radius::Adaptive { k: 12 });
+        assert_eq!("adaptive:20".parse::<Radius>().unwrap(), Radius::Adaptive { k: 20 });
+        assert_eq!("median:4".parse::<Radius>().unwrap(), Radius::Median { n: 4, samples: 100 });
+        assert_eq!("0.25".parse::<Radius>().unwrap(), Radius::Fixed(0.25));
+        for text in ["", "0", "-1", "inf", "adaptive:0", "median:x", "auto:3", "mean"] {
+            assert!(text.parse::<Radius>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,35 +1,36 @@
 //! A balanced kd-tree without pointers: the nearest k points, or all within a distance.
 
-use super::{Index, Neighbor, Query, check_count, checked_square, key, map, neighbor};
+use super::found::{Found, Nearest};
+use super::leafwise::{NearestOfAll, WithinOfAll};
+use super::{Neighbor, Query, check_count, checked_square, key, map};
 use crate::error::{Error, Result};
-use crate::math::{Aabb, Vec3};
+use crate::math::{Aabb, Vec3, Vec4};
 use crate::progress::Progress;
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// Points a leaf holds: two SSE or one AVX register. 16 was slower: twice the distances, as many insertions.
-const LANES: usize = 8;
+pub(super) const LANES: usize = 8;
 
 /// A tree over the finite points of a cloud: 22 bytes a point.
 ///
 /// Halving by count bounds the depth by 30, whatever outliers or duplicates there are.
 pub struct Tree<'a> {
     positions: &'a [Vec3],
-    n_points: usize,
+    pub(super) n_points: usize,
     /// All full but the last.
-    leaves: Vec<Leaf>,
+    pub(super) leaves: Vec<Leaf>,
     /// In depth-first order: the left child of a node follows it, the right one follows the left's subtree.
-    nodes: Vec<Node>,
+    pub(super) nodes: Vec<Node>,
 }
 
 /// Eight points by component. An empty place has the position NaN, which no comparison lets in.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Leaf {
-    x: [f32; LANES],
-    y: [f32; LANES],
-    z: [f32; LANES],
-    index: [u32; LANES],
+pub(super) struct Leaf {
+    x: [Vec4; 2],
+    y: [Vec4; 2],
+    z: [Vec4; 2],
+    index: [[u32; 4]; 2],
 }
 
 /// The same memory while the tree is built.
@@ -41,18 +42,18 @@ struct Entry {
 }
 
 #[derive(Clone, Copy)]
-struct Node {
-    bounds: Aabb,
+pub(super) struct Node {
+    pub(super) bounds: Aabb,
     /// Lowest point index below: it lets a search stop among thousands of equally distant points.
     first_index: u32,
 }
 
 /// A subtree: its node, and the leaves it spans.
 #[derive(Clone, Copy, Default)]
-struct Subtree {
-    node: u32,
-    first_leaf: u32,
-    n_leaves: u32,
+pub(super) struct Subtree {
+    pub(super) node: u32,
+    pub(super) first_leaf: u32,
+    pub(super) n_leaves: u32,
 }
 
 impl<'a> Tree<'a> {
@@ -102,11 +103,13 @@ impl<'a> Tree<'a> {
     /// The k points nearest to `position`, except the one whose index is `without`.
     pub fn nearest(&self, position: Vec3, k: usize, without: Option<u32>) -> Vec<Neighbor> {
         let mut found = Nearest::new(k.min(self.n_points));
-        if !found.keys.is_empty() && position.is_finite() {
-            let query = Target { position, own: without.unwrap_or(u32::MAX) };
-            self.descend(self.root(), &query, &mut found);
+        let mut neighbors = Vec::new();
+        if 0 < k.min(self.n_points) && position.is_finite() {
+            let target = Target { position, own: without.unwrap_or(u32::MAX) };
+            self.descend(self.root(), &target, &mut found);
+            found.finish(&mut neighbors);
         }
-        found.keys.iter().filter(|&&key| key < UNFILLED).map(|&key| neighbor(key)).collect()
+        neighbors
     }
 
     /// Those it was built over.
@@ -114,12 +117,12 @@ impl<'a> Tree<'a> {
         self.positions
     }
 
-    fn root(&self) -> Subtree {
+    pub(super) fn root(&self) -> Subtree {
         Subtree { node: 0, first_leaf: 0, n_leaves: self.leaves.len() as u32 }
     }
 
     /// The siblings along the way from the root to a leaf: together with it they hold all points.
-    fn siblings(&self, leaf: u32, siblings: &mut Vec<Subtree>) {
+    pub(super) fn siblings(&self, leaf: u32, siblings: &mut Vec<Subtree>) {
         siblings.clear();
         let mut subtree = self.root();
         while 1 < subtree.n_leaves {
@@ -132,7 +135,7 @@ impl<'a> Tree<'a> {
     }
 
     /// Offers to `found` all points below `subtree` that can still be among the sought.
-    fn descend(&self, subtree: Subtree, target: &Target, found: &mut impl Found) {
+    pub(super) fn descend(&self, subtree: Subtree, target: &Target, found: &mut impl Found) {
         let mut waiting = [(0, Subtree::default()); 32];
         let mut n_waiting = 0;
         let (mut bound, mut subtree) = (self.lowest_key(subtree, target), subtree);
@@ -159,7 +162,7 @@ impl<'a> Tree<'a> {
 
     /// No point below `subtree` has a lower key. Rounding keeps order, so this holds to the last bit.
     #[inline]
-    fn lowest_key(&self, subtree: Subtree, target: &Target) -> u64 {
+    pub(super) fn lowest_key(&self, subtree: Subtree, target: &Target) -> u64 {
         let node = &self.nodes[subtree.node as usize];
         let (below, above) = (node.bounds.min - target.position, target.position - node.bounds.max);
         let gap = below.max(above).max(Vec3::ZERO);
@@ -167,27 +170,39 @@ impl<'a> Tree<'a> {
     }
 
     #[inline]
-    fn scan(&self, leaf: u32, target: &Target, found: &mut impl Found) {
+    pub(super) fn scan(&self, leaf: u32, target: &Target, found: &mut impl Found) {
         let leaf = &self.leaves[leaf as usize];
-        let mut distances = [0.0; LANES];
-        for lane in 0..LANES {
-            let x = leaf.x[lane] - target.position.x;
-            let y = leaf.y[lane] - target.position.y;
-            let z = leaf.z[lane] - target.position.z;
-            distances[lane] = x * x + y * y + z * z;
-        }
-        let limit = f32::from_bits((found.worst() >> 32) as u32);
-        for lane in 0..LANES {
-            if distances[lane] <= limit && leaf.index[lane] != target.own {
-                found.offer(key(distances[lane], leaf.index[lane]));
+        for (half, indices) in leaf.index.iter().enumerate() {
+            let x = leaf.x[half] - target.position.x;
+            let y = leaf.y[half] - target.position.y;
+            let z = leaf.z[half] - target.position.z;
+            let distances = x * x + y * y + z * z;
+            let mut near = distances.cmple(Vec4::splat(found.limit())).bitmask();
+            let distances = distances.to_array();
+            while near != 0 {
+                let lane = near.trailing_zeros() as usize % 4;
+                near &= near - 1;
+                let key = key(distances[lane], indices[lane]);
+                if key < found.worst() && indices[lane] != target.own {
+                    found.offer(key);
+                }
             }
         }
     }
 }
 
+impl Leaf {
+    /// The point in a place, as the target of a search.
+    pub(super) fn target(&self, lane: usize) -> Target {
+        let (half, lane) = (lane / 4, lane % 4);
+        let position = Vec3::new(self.x[half][lane], self.y[half][lane], self.z[half][lane]);
+        Target { position, own: self.index[half][lane] }
+    }
+}
+
 impl Subtree {
     #[inline]
-    fn children(self) -> (Self, Self) {
+    pub(super) fn children(self) -> (Self, Self) {
         let n_left = self.n_leaves / 2;
         let left = Self { node: self.node + 1, first_leaf: self.first_leaf, n_leaves: n_left };
         let right = Self {
@@ -233,165 +248,14 @@ fn rising_bits(value: f32) -> u32 {
 
 fn by_component(entries: [Entry; LANES]) -> Leaf {
     Leaf {
-        x: entries.map(|entry| entry.position.x),
-        y: entries.map(|entry| entry.position.y),
-        z: entries.map(|entry| entry.position.z),
-        index: entries.map(|entry| entry.index),
+        x: bytemuck::cast(entries.map(|entry| entry.position.x)),
+        y: bytemuck::cast(entries.map(|entry| entry.position.y)),
+        z: bytemuck::cast(entries.map(|entry| entry.position.z)),
+        index: bytemuck::cast(entries.map(|entry| entry.index)),
     }
 }
 
-struct Target {
-    position: Vec3,
-    own: u32,
-}
-
-/// What a search has found so far.
-trait Found {
-    /// Only lower keys are still sought.
-    fn worst(&self) -> u64;
-    fn offer(&mut self, key: u64);
-}
-
-/// Infinitely far, of an index that no point has.
-const UNFILLED: u64 = ((f32::INFINITY.to_bits() as u64) << 32) | u32::MAX as u64;
-
-/// The k lowest keys in rising order.
-struct Nearest {
-    keys: Vec<u64>,
-}
-
-impl Nearest {
-    fn new(k: usize) -> Self {
-        Self { keys: vec![UNFILLED; k] }
-    }
-}
-
-impl Found for Nearest {
-    #[inline]
-    fn worst(&self) -> u64 {
-        self.keys[self.keys.len() - 1]
-    }
-
-    #[inline]
-    fn offer(&mut self, key: u64) {
-        let mut place = self.keys.len() - 1;
-        if self.keys[place] <= key {
-            return;
-        }
-        while 0 < place && key < self.keys[place - 1] {
-            self.keys[place] = self.keys[place - 1];
-            place -= 1;
-        }
-        self.keys[place] = key;
-    }
-}
-
-/// All keys below a fixed one.
-struct Within {
-    limit: u64,
-    keys: Vec<u64>,
-}
-
-impl Found for Within {
-    fn worst(&self) -> u64 {
-        self.limit
-    }
-
-    fn offer(&mut self, key: u64) {
-        self.keys.push(key);
-    }
-}
-
-struct NearestOfAll<'a> {
-    tree: &'a Tree<'a>,
-    k: usize,
-}
-
-struct WithinOfAll<'a> {
-    tree: &'a Tree<'a>,
-    distance_squared: f32,
-}
-
-impl Index for NearestOfAll<'_> {
-    fn n_slots(&self) -> usize {
-        self.tree.n_points
-    }
-
-    fn run_length(&self) -> usize {
-        128 * LANES
-    }
-
-    fn visit_run(
-        &self,
-        slots: Range<usize>,
-        progress: &dyn Progress,
-        mut visit: impl FnMut(u32, &[Neighbor]),
-    ) -> Result<()> {
-        let mut found = Nearest::new(self.k.min(self.tree.n_points));
-        let mut neighbors = Vec::with_capacity(found.keys.len());
-        self.tree.search_leaves(slots, progress, &mut found, |found, point| {
-            neighbors.clear();
-            let filled = found.keys.iter().take_while(|&&key| key < UNFILLED);
-            neighbors.extend(filled.map(|&key| neighbor(key)));
-            visit(point, &neighbors);
-            found.keys.fill(UNFILLED);
-        })
-    }
-}
-
-impl Index for WithinOfAll<'_> {
-    fn n_slots(&self) -> usize {
-        self.tree.n_points
-    }
-
-    fn run_length(&self) -> usize {
-        128 * LANES
-    }
-
-    fn visit_run(
-        &self,
-        slots: Range<usize>,
-        progress: &dyn Progress,
-        mut visit: impl FnMut(u32, &[Neighbor]),
-    ) -> Result<()> {
-        let limit = key(self.distance_squared, u32::MAX);
-        let mut found = Within { limit, keys: Vec::new() };
-        let mut neighbors = Vec::new();
-        self.tree.search_leaves(slots, progress, &mut found, |found, point| {
-            found.keys.sort_unstable();
-            neighbors.clear();
-            neighbors.extend(found.keys.iter().map(|&key| neighbor(key)));
-            visit(point, &neighbors);
-            found.keys.clear();
-        })
-    }
-}
-
-impl Tree<'_> {
-    /// Searches around each point of `slots`, own leaf first: its points bound all that follows.
-    fn search_leaves<F: Found>(
-        &self,
-        slots: Range<usize>,
-        progress: &dyn Progress,
-        found: &mut F,
-        mut done: impl FnMut(&mut F, u32),
-    ) -> Result<()> {
-        let mut siblings = Vec::with_capacity(32);
-        for first_slot in slots.clone().step_by(LANES) {
-            progress.check()?;
-            let leaf_idx = (first_slot / LANES) as u32;
-            self.siblings(leaf_idx, &mut siblings);
-            let leaf = &self.leaves[leaf_idx as usize];
-            for lane in 0..LANES.min(slots.end - first_slot) {
-                let position = Vec3::new(leaf.x[lane], leaf.y[lane], leaf.z[lane]);
-                let target = Target { position, own: leaf.index[lane] };
-                self.scan(leaf_idx, &target, found);
-                for &sibling in siblings.iter().rev() {
-                    self.descend(sibling, &target, found);
-                }
-                done(found, target.own);
-            }
-        }
-        Ok(())
-    }
+pub(super) struct Target {
+    pub(super) position: Vec3,
+    pub(super) own: u32,
 }

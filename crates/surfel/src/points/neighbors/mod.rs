@@ -1,8 +1,11 @@
 //! Neighbourhoods of all points of a cloud: one question, three ways to the same answer.
 
+mod found;
 mod grid;
 mod knn;
+mod leafwise;
 mod scan_line;
+mod surroundings;
 
 use crate::error::{Error, Result};
 use crate::math::Vec3;
