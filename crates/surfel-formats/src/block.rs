@@ -194,7 +194,8 @@ mod tests {
         let scalar = |name: &str, values| Scalar { name: name.into(), values };
         let mut cloud = PointCloud::from_positions(vec![Vec3::ZERO]);
         cloud.radii = Some(vec![1.0]);
-        cloud.scalars = vec![scalar("time", Values::F32(vec![0.5])), scalar("a", Values::U8(vec![1]))];
+        cloud.scalars =
+            vec![scalar("time", Values::F32(vec![0.5])), scalar("a", Values::U8(vec![1]))];
         let mut other = PointCloud::from_positions(vec![Vec3::ONE]);
         other.colors = Some(vec![[1, 2, 3]]);
         other.scalars = vec![scalar("Time", Values::F64(vec![0.25]))];

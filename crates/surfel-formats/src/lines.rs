@@ -75,8 +75,8 @@ pub(crate) fn read_rows(
         let Some(sample) = batch.first() else { continue };
         let (layout, cloud) = started.get_or_insert_with(|| {
             let layout = layout_of(sample);
-            let origin = origin
-                .unwrap_or_else(|| origin_of_records(sample, &layout, Tolerance::UNSTATED));
+            let origin =
+                origin.unwrap_or_else(|| origin_of_records(sample, &layout, Tolerance::UNSTATED));
             let cloud = layout.empty_cloud(origin);
             (layout, cloud)
         });
@@ -96,7 +96,8 @@ pub(crate) fn parse_number(word: &[u8]) -> std::result::Result<f64, LineError> {
     fast_float2::parse(word).map_err(|_| {
         let text = word[..word.len().min(40)].escape_ascii();
         let has_comma = word.contains(&b',');
-        let expected = if has_comma { "a number with a decimal point, not a comma" } else { "a number" };
+        let expected =
+            if has_comma { "a number with a decimal point, not a comma" } else { "a number" };
         LineError { found: format!("`{text}`"), expected: expected.into() }
     })
 }

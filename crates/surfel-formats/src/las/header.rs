@@ -51,7 +51,12 @@ impl Header {
 pub(super) fn read_header(input: &Input) -> Result<Header> {
     let ends_early = |expected: &str| {
         let place = Place::Byte(input.len() as u64);
-        input.malformed(place, "the end of the file", expected, "copy the file again from its source")
+        input.malformed(
+            place,
+            "the end of the file",
+            expected,
+            "copy the file again from its source",
+        )
     };
     if input.len() < 227 {
         return Err(ends_early("a header of at least 227 bytes"));
@@ -69,7 +74,8 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
     let header_size = u64::from(read_u16(input, 94));
     let data_start = u64::from(read_u32(input, 96));
     if data_start < header_size.max(227) || (input.len() as u64) < data_start {
-        let expected = format!("between {} and {}, inside the file", header_size.max(227), input.len());
+        let expected =
+            format!("between {} and {}, inside the file", header_size.max(227), input.len());
         return Err(malformed(96, format!("points at byte {data_start}"), &expected));
     }
     let point_format = input[104] & 0x3f;
@@ -81,7 +87,9 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
         let expected = format!("at least {least} for point format {point_format}");
         return Err(malformed(105, format!("records of {record_length} bytes"), &expected));
     }
-    let vector = |byte| DVec3::new(read_f64(input, byte), read_f64(input, byte + 8), read_f64(input, byte + 16));
+    let vector = |byte| {
+        DVec3::new(read_f64(input, byte), read_f64(input, byte + 8), read_f64(input, byte + 16))
+    };
     let (scale, offset) = (vector(131), vector(155));
     if !scale.is_finite() || scale.cmpeq(DVec3::ZERO).any() || !offset.is_finite() {
         let found = format!("scale {scale} and offset {offset}");

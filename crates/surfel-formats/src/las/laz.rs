@@ -44,7 +44,8 @@ pub(super) fn find_chunks(input: &Input, header: &Header) -> Result<Chunks> {
     let vlr = read_laszip_record(input, header)?;
     let items = vlr.items().clone();
     let is_layered = matches!(items[0].item_type(), LazItemType::Point14);
-    let mut found = Chunks { chunks: Vec::new(), items, record_length: header.record_length, is_layered };
+    let mut found =
+        Chunks { chunks: Vec::new(), items, record_length: header.record_length, is_layered };
     if header.n_points == 0 {
         return Ok(found);
     }
@@ -173,7 +174,12 @@ fn n_layers(item: &LazItem) -> usize {
 fn read_laszip_record(input: &Input, header: &Header) -> Result<LazVlr> {
     let place = Place::Byte(header.data.start as u64);
     let Some(record) = header.record(input, USER_ID, LazVlr::RECORD_ID) else {
-        return Err(broken(input, place, "no laszip record", "one, since the points are compressed"));
+        return Err(broken(
+            input,
+            place,
+            "no laszip record",
+            "one, since the points are compressed",
+        ));
     };
     let vlr = LazVlr::from_buffer(record)
         .map_err(|error| broken(input, place, error.to_string(), "a laszip record"))?;
@@ -196,8 +202,8 @@ fn read_laszip_record(input: &Input, header: &Header) -> Result<LazVlr> {
         item.size() == size && is_new == is_layered && versions.contains(&item.version())
     };
     let total: usize = items.iter().map(|item| usize::from(item.size())).sum();
-    let begins_with_point = is_layered
-        || items.first().is_some_and(|item| item.item_type() == LazItemType::Point10);
+    let begins_with_point =
+        is_layered || items.first().is_some_and(|item| item.item_type() == LazItemType::Point10);
     if !begins_with_point
         || is_layered != (6 <= header.point_format)
         || !items.iter().all(fits)
@@ -241,7 +247,12 @@ fn read_chunk_table(input: &Input, header: &Header, vlr: &LazVlr) -> Result<Vec<
     // Each chunk begins with an uncompressed record.
     if ((header.data.len() / header.record_length) as u32) < n_chunks {
         let found = format!("{n_chunks} chunks");
-        return Err(broken(input, Place::Byte(at as u64 + 4), found, "at most one a record's length of bytes"));
+        return Err(broken(
+            input,
+            Place::Byte(at as u64 + 4),
+            found,
+            "at most one a record's length of bytes",
+        ));
     }
     let is_variable = vlr.uses_variable_size_chunks();
     let mut table_bytes = Cursor::new(&input[at..]);

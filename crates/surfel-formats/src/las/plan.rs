@@ -75,7 +75,8 @@ impl<'a> Plan<'a> {
             if intensity.iter().all(|v| v.fract() == 0.0 && (0.0..=65535.0).contains(v)) {
                 standard.intensity = Some(intensity);
             } else {
-                extras.push(Extra { name: "Intensity".into(), column: ExtraColumn::F32(intensity) });
+                extras
+                    .push(Extra { name: "Intensity".into(), column: ExtraColumn::F32(intensity) });
             }
         }
         for scalar in &cloud.scalars {
@@ -99,7 +100,8 @@ impl<'a> Plan<'a> {
             if let (place @ None, Some(values)) = field {
                 *place = Some(values);
             } else {
-                extras.push(Extra { name: scalar.name.clone(), column: ExtraColumn::Scalar(values) });
+                extras
+                    .push(Extra { name: scalar.name.clone(), column: ExtraColumn::Scalar(values) });
             }
         }
         let bounds = cloud.bounds();
@@ -157,8 +159,7 @@ impl<'a> Plan<'a> {
         let is_standard_time =
             self.standard.gps_time.is_some_and(|time| !all(time, |v| v <= SECONDS_PER_WEEK));
         let encoding = u16::from(is_standard_time) | u16::from(is_wkt) << 4;
-        let record_length =
-            RECORD_LENGTHS[usize::from(self.point_format)] + self.n_extra_bytes();
+        let record_length = RECORD_LENGTHS[usize::from(self.point_format)] + self.n_extra_bytes();
         let n_points = cloud.len() as u64;
 
         let mut header = vec![0; HEADER];

@@ -35,15 +35,15 @@ pub(crate) fn read(
     let layout = Layout::new(header.record_length, false, columns, &options.columns)
         .expect("every point format has x, y and z");
     let tolerance = header.scale.abs() / 4.0;
-    let origin_of = |sample: Vec<DVec3>| {
-        options.origin.unwrap_or_else(|| choose_origin(&sample, tolerance))
-    };
+    let origin_of =
+        |sample: Vec<DVec3>| options.origin.unwrap_or_else(|| choose_origin(&sample, tolerance));
     let n_withheld = AtomicU64::new(0);
     let mut cloud = if header.is_compressed {
         let chunks = find_chunks(input, &header)?;
         let sample = chunks.first_records(input).map(|record| layout.world_position(record));
         let origin = origin_of(sample.collect());
-        let task = Task { input, header: &header, layout: &layout, origin, n_withheld: &n_withheld };
+        let task =
+            Task { input, header: &header, layout: &layout, origin, n_withheld: &n_withheld };
         task.read_chunks(&chunks, selection(&options.columns), progress)?
     } else {
         let records = plain_records(input, &header)?;
@@ -56,8 +56,10 @@ pub(crate) fn read(
     if 0 < n_withheld {
         progress.note(&format!("{}: {n_withheld} points are flagged withheld; kept", input.name));
     }
-    mend_colors(input, &mut cloud, progress);
-    drop_empty_intensity(input, &mut cloud, progress);
+    if !cloud.is_empty() {
+        mend_colors(input, &mut cloud, progress);
+        drop_unset(input, &mut cloud, progress);
+    }
     Ok(Loaded { cloud, source: source(input, &header) })
 }
 
@@ -120,8 +122,11 @@ impl Task<'_> {
         let mut cloud = self.layout.empty_cloud(self.origin);
         grow_checked(&mut cloud, self.header.n_points as usize, self.input)?;
         let mut rest = Block::of_cloud(&mut cloud, 0);
-        let parts: Vec<(&Chunk, Block)> =
-            chunks.chunks.iter().map(|chunk| (chunk, rest.split_off_front(chunk.n_points))).collect();
+        let parts: Vec<(&Chunk, Block)> = chunks
+            .chunks
+            .iter()
+            .map(|chunk| (chunk, rest.split_off_front(chunk.n_points)))
+            .collect();
         parts.into_par_iter().with_max_len(1).try_for_each(|(chunk, mut block)| {
             chunks.decode(self.input, chunk, selection, |records| {
                 progress.check()?;
@@ -181,7 +186,7 @@ fn selection(choice: &ColumnChoice) -> DecompressionSelection {
 fn mend_colors(input: &Input, cloud: &mut PointCloud, progress: &dyn Progress) {
     let Some(colors) = &mut cloud.colors else { return };
     let largest = colors.par_iter().flatten_iter().copied().max().unwrap_or(0);
-    if largest == 0 && !colors.is_empty() {
+    if largest == 0 {
         progress.note(&format!("{}: all colours are zero; taken as absent", input.name));
         cloud.colors = None;
     } else if largest <= 255 {
@@ -190,10 +195,17 @@ fn mend_colors(input: &Input, cloud: &mut PointCloud, progress: &dyn Progress) {
     }
 }
 
-fn drop_empty_intensity(input: &Input, cloud: &mut PointCloud, progress: &dyn Progress) {
-    let is_empty = |column: &Vec<f32>| !column.is_empty() && column.par_iter().all(|v| *v == 0.0);
-    if cloud.intensity.as_ref().is_some_and(is_empty) {
-        progress.note(&format!("{}: all intensities are zero; taken as absent", input.name));
+/// The formats always have room for these; zeros everywhere mean that nobody filled it.
+fn drop_unset(input: &Input, cloud: &mut PointCloud, progress: &dyn Progress) {
+    let note = |what: &str| {
+        progress.note(&format!("{}: all {what} are zero; taken as absent", input.name));
+    };
+    if cloud.intensity.as_ref().is_some_and(|column| column.par_iter().all(|v| *v == 0.0)) {
+        note("intensities");
         cloud.intensity = None;
+    }
+    if cloud.classification.as_ref().is_some_and(|column| column.par_iter().all(|v| *v == 0)) {
+        note("classes");
+        cloud.classification = None;
     }
 }

@@ -94,9 +94,7 @@ fn laszip_bytes(vlr: &LazVlr) -> Vec<u8> {
 
 fn compress(vlr: &LazVlr, records: &[u8]) -> io::Result<Vec<u8>> {
     let mut compressor = LayeredPointRecordCompressor::new(io::Cursor::new(Vec::new()));
-    compressor
-        .set_fields_from(vlr.items())
-        .map_err(|error| io::Error::other(error.to_string()))?;
+    compressor.set_fields_from(vlr.items()).map_err(|error| io::Error::other(error.to_string()))?;
     compressor.compress_many(records)?;
     compressor.done()?;
     Ok(compressor.into_inner().into_inner())

@@ -26,10 +26,13 @@ pub(super) fn write(path: &Path, image: &Image, options: &ImageOptions) -> Resul
     let picture = ExrImage::from_layer(layer);
     write_file(path, |writer| {
         picture.write().to_buffered(writer).map_err(|error| {
-            write_failed(path, match error {
-                exr::error::Error::Io(source) => source,
-                other => std::io::Error::other(other.to_string()),
-            })
+            write_failed(
+                path,
+                match error {
+                    exr::error::Error::Io(source) => source,
+                    other => std::io::Error::other(other.to_string()),
+                },
+            )
         })
     })
 }

@@ -66,7 +66,12 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
                     "ascii" => Encoding::Ascii,
                     "binary_little_endian" => Encoding::LittleEndian,
                     "binary_big_endian" => Encoding::BigEndian,
-                    _ => return Err(malformed(&line, "ascii, binary_little_endian or binary_big_endian")),
+                    _ => {
+                        return Err(malformed(
+                            &line,
+                            "ascii, binary_little_endian or binary_big_endian",
+                        ));
+                    }
                 });
             }
             ["element", name, count] => {
@@ -84,7 +89,10 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
                     _ => None,
                 };
                 let Some((kind, list)) = property else {
-                    return Err(malformed(&line, "`property TYPE NAME` or `property list TYPE TYPE NAME` with types such as float and uchar"));
+                    return Err(malformed(
+                        &line,
+                        "`property TYPE NAME` or `property list TYPE TYPE NAME` with types such as float and uchar",
+                    ));
                 };
                 let Some(element) = elements.last_mut() else {
                     return Err(malformed(&line, "an element before its properties"));
@@ -97,7 +105,12 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
                 };
                 return Ok(Header { encoding, elements, body: lines.at, body_line: lines.number });
             }
-            _ => return Err(malformed(&line, "format, element, property, comment, obj_info or end_header")),
+            _ => {
+                return Err(malformed(
+                    &line,
+                    "format, element, property, comment, obj_info or end_header",
+                ));
+            }
         }
     }
 }

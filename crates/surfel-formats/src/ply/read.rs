@@ -101,7 +101,8 @@ fn read_binary(
         packed = pack_vertices(input, start, vertex, big_endian, progress)?;
         &packed
     };
-    let layout = layout(stride, big_endian, columns, &records[..records.len().min(1 << 20)], options);
+    let layout =
+        layout(stride, big_endian, columns, &records[..records.len().min(1 << 20)], options);
     let tolerance = match layout.position[0].kind {
         Kind::F64 => Tolerance::UNSTATED,
         _ => Tolerance::SINGLE,
@@ -154,7 +155,11 @@ fn read_ascii(
 }
 
 /// One ascii vertex: a number a property, and for a list its length and items, which are not kept.
-fn parse_vertex(line: &[u8], vertex: &Element, row: &mut Vec<f64>) -> std::result::Result<(), LineError> {
+fn parse_vertex(
+    line: &[u8],
+    vertex: &Element,
+    row: &mut Vec<f64>,
+) -> std::result::Result<(), LineError> {
     let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
     let mut number = |n_found: usize| {
         let word = words.next().ok_or_else(|| LineError {

@@ -40,7 +40,8 @@ impl Form {
 }
 
 fn header(cloud: &PointCloud, form: &Form) -> String {
-    let mut header = String::from("ply\nformat binary_little_endian 1.0\ncomment written by surfel\n");
+    let mut header =
+        String::from("ply\nformat binary_little_endian 1.0\ncomment written by surfel\n");
     header += &format!("element vertex {}\n", cloud.len());
     let mut property = |kind: &str, name: &str| header += &format!("property {kind} {name}\n");
     for name in ["x", "y", "z"] {

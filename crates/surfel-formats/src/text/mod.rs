@@ -45,12 +45,8 @@ pub(crate) fn read(
         Layout::new(stride, false, fields.clone(), &options.columns).expect("x, y and z were found")
     };
     let parse = |line: &[u8], row: &mut Vec<f64>| parse_line(line, &preamble, &columns, row);
-    let rows = Rows {
-        start: preamble.data,
-        line: preamble.data_line,
-        n_columns: kept.len(),
-        limit: None,
-    };
+    let rows =
+        Rows { start: preamble.data, line: preamble.data_line, n_columns: kept.len(), limit: None };
     progress.begin(&format!("read {}", input.name), (input.len() - preamble.data) as u64);
     let cloud = read_rows(input, rows, &parse, layout_of, options.origin, progress)?;
     if let Some(count) = preamble.count {
@@ -91,14 +87,14 @@ impl Separator {
         }
     }
 
-    /// The fields of a line; a separator at its end begins no further field.
     fn fields(self, line: &[u8]) -> impl Iterator<Item = &[u8]> {
         let separator = if self == Self::Semicolon { b';' } else { b',' };
         let is_separated = self != Self::Whitespace;
-        let line = if is_separated { line.strip_suffix(&[separator]).unwrap_or(line) } else { line };
-        line.split(move |byte| {
-            if is_separated { *byte == separator } else { byte.is_ascii_whitespace() }
-        })
+        line.split(
+            move |byte| {
+                if is_separated { *byte == separator } else { byte.is_ascii_whitespace() }
+            },
+        )
         .filter(move |field| is_separated || !field.is_empty())
         .map(|field| field.trim_ascii())
     }
@@ -144,13 +140,25 @@ fn read_preamble(input: &Input) -> Result<Preamble> {
             }
         }
         if fields.iter().all(|field| field.is_empty() || parse_number(field).is_ok()) {
-            let n_fields = fields.len();
-            return Ok(Preamble { names, count, separator, n_fields, data: start, data_line: number });
+            let has_empty_end = fields.last().is_some_and(|field| field.is_empty());
+            let n_names = names.as_ref().map_or(fields.len() - 1, Vec::len);
+            // A separator at the end of each line begins no further column.
+            let n_fields = if has_empty_end { n_names } else { fields.len() };
+            return Ok(Preamble {
+                names,
+                count,
+                separator,
+                n_fields,
+                data: start,
+                data_line: number,
+            });
         }
         let found = format!("`{}`", text[..text.len().min(60)].escape_ascii());
         let has_inner_space =
             |field: &&[u8]| separator != Separator::Whitespace && field.contains(&b' ');
-        if separator == Separator::Semicolon && text.contains(&b',') || fields.iter().any(has_inner_space) {
+        if separator == Separator::Semicolon && text.contains(&b',')
+            || fields.iter().any(has_inner_space)
+        {
             let expected = "numbers with a decimal point, not a comma";
             let advice = "replace the decimal commas by points";
             return Err(input.malformed(Place::Line(number), found, expected, advice));
@@ -165,11 +173,15 @@ fn read_preamble(input: &Input) -> Result<Preamble> {
 
 /// The fields as names of columns, if x, y and z are among them.
 fn names_of(fields: &[&[u8]]) -> Option<Vec<String>> {
-    let names: Vec<String> = fields
+    let mut names: Vec<String> = fields
         .iter()
         .map(|field| String::from_utf8_lossy(field).trim_matches(['"', '\'', ' ']).to_owned())
         .collect();
-    let has_axis = |axis| names.iter().any(|name| Role::of_name(name) == Some(Role::Position(axis)));
+    if names.last().is_some_and(String::is_empty) {
+        names.pop();
+    }
+    let has_axis =
+        |axis| names.iter().any(|name| Role::of_name(name) == Some(Role::Position(axis)));
     (0..3).all(has_axis).then_some(names)
 }
 
@@ -238,18 +250,21 @@ fn parse_line(
         return Ok(());
     }
     let mut n_fields = 0;
+    let mut has_empty_end = false;
     for field in preamble.separator.fields(line) {
         if let Some(Some(_)) = columns.get(n_fields) {
             row.push(if field.is_empty() { f64::NAN } else { parse_number(field)? });
         }
         n_fields += 1;
+        has_empty_end = field.is_empty();
     }
     // Each scan of a PTS file may have a line with its number of points.
     if n_fields == 1 && preamble.count.is_some() {
         row.clear();
         return Ok(());
     }
-    if n_fields != columns.len() {
+    let is_longer_by_empty_end = has_empty_end && n_fields == columns.len() + 1;
+    if n_fields != columns.len() && !is_longer_by_empty_end {
         let expected = format!("{} as in the lines before", columns.len());
         return Err(LineError { found: format!("{n_fields} fields"), expected });
     }
@@ -269,9 +284,10 @@ fn sample_rows(input: &Input, preamble: &Preamble) -> Vec<Vec<f64>> {
         for line in lines.take(LINES) {
             let line = line.trim_ascii();
             let fields = preamble.separator.fields(line);
-            let row: Vec<f64> =
+            let mut row: Vec<f64> =
                 fields.map(|field| parse_number(field).unwrap_or(f64::NAN)).collect();
-            if comment(line).is_none() && row.len() == preamble.n_fields {
+            if comment(line).is_none() && preamble.n_fields <= row.len() {
+                row.truncate(preamble.n_fields);
                 rows.push(row);
             }
         }

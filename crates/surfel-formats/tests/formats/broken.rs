@@ -87,7 +87,8 @@ fn a_header_of_ply_that_lies_or_lacks_is_refused() {
     ));
     let skipped = format!("element a 9999999999999\nproperty double b\nelement vertex 1\n{xyz}");
     assert!(message("a.ply", file(&skipped)).contains("elements `a`"));
-    let listed = format!("element a 9999999999999\nproperty list int int b\nelement vertex 1\n{xyz}");
+    let listed =
+        format!("element a 9999999999999\nproperty list int int b\nelement vertex 1\n{xyz}");
     assert!(message("a.ply", file(&listed)).contains("elements `a`"));
     let without = file("element vertex 1\nproperty float x\nproperty float y");
     assert!(message("a.ply", without).contains("expected vertex properties x, y and z"));
@@ -106,9 +107,11 @@ fn a_header_of_ply_that_lies_or_lacks_is_refused() {
         assert!(message.contains("line ") && message.contains("the header is broken"), "{message}");
     }
     assert!(message("a.ply", "ply\nend_header\n").contains("a `format` line"));
-    let ascii = format!("ply\nformat ascii 1.0\nelement vertex 3000000000\n{xyz}\nend_header\n1 2 3\n");
+    let ascii =
+        format!("ply\nformat ascii 1.0\nelement vertex 3000000000\n{xyz}\nend_header\n1 2 3\n");
     assert!(matches!(read("a.ply", ascii), Err(Error::Truncated { readable: 1, .. })));
-    let fields = format!("ply\nformat ascii 1.0\nelement vertex 2\n{xyz}\nend_header\n1 2 3\n1 x 3\n");
+    let fields =
+        format!("ply\nformat ascii 1.0\nelement vertex 2\n{xyz}\nend_header\n1 2 3\n1 x 3\n");
     assert!(message("a.ply", fields).contains("line 9: found `x`"));
 }
 

@@ -102,9 +102,9 @@ pub fn full_cloud(n: usize) -> PointCloud {
         positions: (0..n).map(|i| Vec3::new(f(i, 0.25), f(i + 1, 0.125), f(i + 2, 0.5))).collect(),
         normals: Some((0..n).map(|i| Vec3::new(f(i, 1.0), 1.0, 2.0).normalize()).collect()),
         radii: Some((0..n).map(|i| f(i, 0.001) + 0.5).collect()),
-        colors: Some((0..n).map(|i| [i as u16 * 257, 1000, 65535]).collect()),
+        colors: Some((0..n).map(|i| [(i % 256) as u16 * 257, 1000, 65535]).collect()),
         intensity: Some((0..n).map(|i| (1 + i * 3 % 60_000) as f32).collect()),
-        classification: Some((0..n).map(|i| (i % 19) as u8).collect()),
+        classification: Some((0..n).map(|i| 1 + (i % 18) as u8).collect()),
         scalars: vec![
             scalar("return_number", Values::U8((0..n).map(|i| 1 + (i % 5) as u8).collect())),
             scalar("gps_time", Values::F64((0..n).map(|i| 1e8 + i as f64 * 1e-3).collect())),

@@ -32,7 +32,8 @@ fn eight_bit_colours_survive_and_alpha_is_undone() {
         assert_eq!(pixel, [value as u8, value as u8, 0, 128]);
     }
 
-    let options = ImageOptions { depth: BitDepth::Sixteen, alpha: Alpha::Drop, ..Default::default() };
+    let options =
+        ImageOptions { depth: BitDepth::Sixteen, alpha: Alpha::Drop, ..Default::default() };
     image.color[0] = [2.0, 1.0, -1.0, 1.0];
     save_image(&path, &image, &options).unwrap();
     let (color, depth, bytes) = decode_png(&path);
@@ -85,9 +86,8 @@ fn exr_keeps_every_layer_and_the_origin() {
 #[test]
 fn outputs_that_cannot_be_written_are_told_before_the_work() {
     let folder = Folder::new("outputs");
-    let message = |name: &str| {
-        surfel_formats::check_output(&folder.path(name)).unwrap_err().to_string()
-    };
+    let message =
+        |name: &str| surfel_formats::check_output(&folder.path(name)).unwrap_err().to_string();
     assert!(message("none/a.png").contains("create the folder first"));
     assert!(message("a.jpg").contains("the extension `.jpg`"));
     assert!(message("a").contains("a name without extension"));

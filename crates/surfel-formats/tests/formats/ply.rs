@@ -38,20 +38,32 @@ fn every_type_is_read_in_both_byte_orders_and_spellings() {
             };
         }
         let body = body!(
-            1.5f32, 2.5f64, 3.5f32, -1i8, 200u8, -300i16, 60_000u16, -70_000i32, 3_000_000_000u32, 0.1f64
+            1.5f32,
+            2.5f64,
+            3.5f32,
+            -1i8,
+            200u8,
+            -300i16,
+            60_000u16,
+            -70_000i32,
+            3_000_000_000u32,
+            0.1f64
         );
         let cloud = read("a.ply", binary(&header, &body)).unwrap().cloud;
         assert_eq!(cloud.positions, [Vec3::new(1.5, 2.5, 3.5)]);
         let values: Vec<&Values> = cloud.scalars.iter().map(|scalar| &scalar.values).collect();
-        assert_eq!(values, [
-            &Values::I32(vec![-1]),
-            &Values::U8(vec![200]),
-            &Values::I32(vec![-300]),
-            &Values::U16(vec![60_000]),
-            &Values::I32(vec![-70_000]),
-            &Values::F64(vec![3e9]),
-            &Values::F64(vec![0.1]),
-        ]);
+        assert_eq!(
+            values,
+            [
+                &Values::I32(vec![-1]),
+                &Values::U8(vec![200]),
+                &Values::I32(vec![-300]),
+                &Values::U16(vec![60_000]),
+                &Values::I32(vec![-70_000]),
+                &Values::F64(vec![3e9]),
+                &Values::F64(vec![0.1]),
+            ]
+        );
     }
 }
 
