@@ -1,0 +1,92 @@
+//! Outputs are written beside their name and renamed: a failed run leaves no half file and destroys no old one.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// Has `write` fill a new file, which then takes the place of `path`.
+///
+/// On an error of any kind the new file is removed and an old one stays.
+pub(crate) fn write_file(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
+) -> Result<()> {
+    let (aside, file) = create_aside(path)?;
+    let remover = Remover(aside);
+    let mut writer = BufWriter::with_capacity(1 << 20, file);
+    write(&mut writer)?;
+    let file = writer.into_inner().map_err(|e| write_failed(path, e.into_error()))?;
+    drop(file);
+    fs::rename(&remover.0, path).map_err(|source| write_failed(path, source))?;
+    Ok(())
+}
+
+/// The error of a write to `path` that failed.
+pub(crate) fn write_failed(path: &Path, source: io::Error) -> Error {
+    let advice = match source.kind() {
+        io::ErrorKind::NotFound => "create the folder first",
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            "choose a folder you may write to"
+        }
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            "free space there or write elsewhere"
+        }
+        io::ErrorKind::IsADirectory => "name a file, not a folder",
+        _ => "check the disk and the connection to it",
+    };
+    Error::Io { file: path.display().to_string(), action: "written", source, advice }
+}
+
+/// Removes the file aside; after the rename there is none left to remove.
+struct Remover(PathBuf);
+
+impl Drop for Remover {
+    fn drop(&mut self) {
+        // Nobody is left to tell if this fails.
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+fn create_aside(path: &Path) -> Result<(PathBuf, File)> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let process = std::process::id();
+    // Several threads, or a run that was killed, may have left a file of the same name.
+    let mut attempt = 0;
+    loop {
+        let aside = path.with_file_name(format!(".{name}.{process}-{attempt}.part"));
+        match File::create_new(&aside) {
+            Ok(file) => return Ok((aside, file)),
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists && attempt < 1000 => attempt += 1,
+            Err(source) => return Err(write_failed(path, source)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    #[test]
+    fn an_old_file_survives_a_failure_and_nothing_is_left_beside_it() {
+        let folder = std::env::temp_dir().join(format!("surfel-atomic-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("out.ply");
+        fs::write(&path, "old").unwrap();
+
+        let failed = write_file(&path, |writer| {
+            writer.write_all(b"half").unwrap();
+            Err(surfel::Error::Cancelled.into())
+        });
+        assert!(matches!(failed, Err(Error::Surfel(surfel::Error::Cancelled))));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+
+        write_file(&path, |writer| writer.write_all(b"new").map_err(|e| write_failed(&path, e)))
+            .unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+        fs::remove_dir_all(&folder).unwrap();
+    }
+}

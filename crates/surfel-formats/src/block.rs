@@ -1,0 +1,208 @@
+//! Parts of a cloud's columns that threads fill side by side.
+
+use surfel::math::Vec3;
+use surfel::points::{PointCloud, Scalar, Values};
+
+/// The same points of every column.
+#[derive(Default)]
+pub(crate) struct Block<'a> {
+    pub positions: &'a mut [Vec3],
+    pub normals: Option<&'a mut [Vec3]>,
+    pub radii: Option<&'a mut [f32]>,
+    pub colors: Option<&'a mut [[u16; 3]]>,
+    pub intensity: Option<&'a mut [f32]>,
+    pub classification: Option<&'a mut [u8]>,
+    pub scalars: Vec<ValuesMut<'a>>,
+}
+
+pub(crate) enum ValuesMut<'a> {
+    U8(&'a mut [u8]),
+    U16(&'a mut [u16]),
+    I32(&'a mut [i32]),
+    F32(&'a mut [f32]),
+    F64(&'a mut [f64]),
+}
+
+impl<'a> Block<'a> {
+    /// All of `cloud` from point `start` on.
+    pub fn of_cloud(cloud: &'a mut PointCloud, start: usize) -> Self {
+        Self {
+            positions: &mut cloud.positions[start..],
+            normals: cloud.normals.as_mut().map(|column| &mut column[start..]),
+            radii: cloud.radii.as_mut().map(|column| &mut column[start..]),
+            colors: cloud.colors.as_mut().map(|column| &mut column[start..]),
+            intensity: cloud.intensity.as_mut().map(|column| &mut column[start..]),
+            classification: cloud.classification.as_mut().map(|column| &mut column[start..]),
+            scalars: cloud
+                .scalars
+                .iter_mut()
+                .map(|scalar| match &mut scalar.values {
+                    Values::U8(v) => ValuesMut::U8(&mut v[start..]),
+                    Values::U16(v) => ValuesMut::U16(&mut v[start..]),
+                    Values::I32(v) => ValuesMut::I32(&mut v[start..]),
+                    Values::F32(v) => ValuesMut::F32(&mut v[start..]),
+                    Values::F64(v) => ValuesMut::F64(&mut v[start..]),
+                })
+                .collect(),
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Takes the first `n` points away as a block of their own.
+    pub fn split_off_front(&mut self, n: usize) -> Self {
+        Self {
+            positions: front(&mut self.positions, n),
+            normals: self.normals.as_mut().map(|column| front(column, n)),
+            radii: self.radii.as_mut().map(|column| front(column, n)),
+            colors: self.colors.as_mut().map(|column| front(column, n)),
+            intensity: self.intensity.as_mut().map(|column| front(column, n)),
+            classification: self.classification.as_mut().map(|column| front(column, n)),
+            scalars: self
+                .scalars
+                .iter_mut()
+                .map(|values| match values {
+                    ValuesMut::U8(v) => ValuesMut::U8(front(v, n)),
+                    ValuesMut::U16(v) => ValuesMut::U16(front(v, n)),
+                    ValuesMut::I32(v) => ValuesMut::I32(front(v, n)),
+                    ValuesMut::F32(v) => ValuesMut::F32(front(v, n)),
+                    ValuesMut::F64(v) => ValuesMut::F64(front(v, n)),
+                })
+                .collect(),
+        }
+    }
+}
+
+/// Lengthens every column to `n` points of zeros; false if they do not fit in memory.
+pub(crate) fn grow(cloud: &mut PointCloud, n: usize) -> bool {
+    fn column<T: Copy + Default>(column: &mut Vec<T>, n: usize) -> bool {
+        if column.is_empty() {
+            // Fresh zeros come from the system untouched; the threads that fill them pay for them.
+            let fits = Vec::<T>::new().try_reserve_exact(n).is_ok();
+            if fits {
+                *column = vec![T::default(); n];
+            }
+            return fits;
+        }
+        let fits = column.try_reserve(n.saturating_sub(column.len())).is_ok();
+        if fits {
+            column.resize(n, T::default());
+        }
+        fits
+    }
+    column(&mut cloud.positions, n)
+        && cloud.normals.as_mut().is_none_or(|c| column(c, n))
+        && cloud.radii.as_mut().is_none_or(|c| column(c, n))
+        && cloud.colors.as_mut().is_none_or(|c| column(c, n))
+        && cloud.intensity.as_mut().is_none_or(|c| column(c, n))
+        && cloud.classification.as_mut().is_none_or(|c| column(c, n))
+        && cloud.scalars.iter_mut().all(|scalar| match &mut scalar.values {
+            Values::U8(v) => column(v, n),
+            Values::U16(v) => column(v, n),
+            Values::I32(v) => column(v, n),
+            Values::F32(v) => column(v, n),
+            Values::F64(v) => column(v, n),
+        })
+}
+
+/// Gives the memory that columns reserved and did not use back.
+pub(crate) fn shrink(cloud: &mut PointCloud) {
+    cloud.positions.shrink_to_fit();
+    cloud.normals.iter_mut().for_each(Vec::shrink_to_fit);
+    cloud.radii.iter_mut().for_each(Vec::shrink_to_fit);
+    cloud.colors.iter_mut().for_each(Vec::shrink_to_fit);
+    cloud.intensity.iter_mut().for_each(Vec::shrink_to_fit);
+    cloud.classification.iter_mut().for_each(Vec::shrink_to_fit);
+    for scalar in &mut cloud.scalars {
+        match &mut scalar.values {
+            Values::U8(v) => v.shrink_to_fit(),
+            Values::U16(v) => v.shrink_to_fit(),
+            Values::I32(v) => v.shrink_to_fit(),
+            Values::F32(v) => v.shrink_to_fit(),
+            Values::F64(v) => v.shrink_to_fit(),
+        }
+    }
+}
+
+/// Adds the points of `other` behind those of `cloud`; columns that one of them lacks are dropped.
+///
+/// Returns the names of the dropped columns. Both clouds have the same origin.
+pub(crate) fn append(cloud: &mut PointCloud, mut other: PointCloud) -> Vec<String> {
+    fn join<T>(
+        name: &str,
+        column: &mut Option<Vec<T>>,
+        other: Option<Vec<T>>,
+        dropped: &mut Vec<String>,
+    ) {
+        match (&mut *column, other) {
+            (Some(column), Some(mut other)) => column.append(&mut other),
+            (None, None) => {}
+            _ => {
+                *column = None;
+                dropped.push(name.into());
+            }
+        }
+    }
+    let mut dropped = Vec::new();
+    cloud.positions.append(&mut other.positions);
+    join("normals", &mut cloud.normals, other.normals, &mut dropped);
+    join("radii", &mut cloud.radii, other.radii, &mut dropped);
+    join("colors", &mut cloud.colors, other.colors, &mut dropped);
+    join("intensity", &mut cloud.intensity, other.intensity, &mut dropped);
+    join("classification", &mut cloud.classification, other.classification, &mut dropped);
+    cloud.scalars.retain_mut(|Scalar { name, values }| {
+        let twin = other.scalars.iter().position(|scalar| scalar.name.eq_ignore_ascii_case(name));
+        let Some(twin) = twin.map(|at| other.scalars.swap_remove(at)) else {
+            dropped.push(std::mem::take(name));
+            return false;
+        };
+        append_values(values, twin.values);
+        true
+    });
+    dropped.extend(other.scalars.into_iter().map(|scalar| scalar.name));
+    dropped
+}
+
+fn append_values(values: &mut Values, other: Values) {
+    match (&mut *values, other) {
+        (Values::U8(v), Values::U8(mut w)) => v.append(&mut w),
+        (Values::U16(v), Values::U16(mut w)) => v.append(&mut w),
+        (Values::I32(v), Values::I32(mut w)) => v.append(&mut w),
+        (Values::F32(v), Values::F32(mut w)) => v.append(&mut w),
+        // Files that store the same column in different types meet in the widest.
+        (v, w) => {
+            let wide = |values: &Values| (0..values.len()).map(|i| values.get(i)).collect();
+            let mut all: Vec<f64> = wide(v);
+            all.append(&mut wide(&w));
+            *values = Values::F64(all);
+        }
+    }
+}
+
+fn front<'a, T>(column: &mut &'a mut [T], n: usize) -> &'a mut [T] {
+    column.split_off_mut(..n).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn appending_keeps_common_columns_and_names_the_others() {
+        let scalar = |name: &str, values| Scalar { name: name.into(), values };
+        let mut cloud = PointCloud::from_positions(vec![Vec3::ZERO]);
+        cloud.radii = Some(vec![1.0]);
+        cloud.scalars =
+            vec![scalar("time", Values::F32(vec![0.5])), scalar("a", Values::U8(vec![1]))];
+        let mut other = PointCloud::from_positions(vec![Vec3::ONE]);
+        other.colors = Some(vec![[1, 2, 3]]);
+        other.scalars = vec![scalar("Time", Values::F64(vec![0.25]))];
+
+        let dropped = append(&mut cloud, other);
+        assert_eq!(dropped, ["radii", "colors", "a"]);
+        assert_eq!(cloud.len(), 2);
+        assert_eq!(cloud.scalars, [scalar("time", Values::F64(vec![0.5, 0.25]))]);
+    }
+}

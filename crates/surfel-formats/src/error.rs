@@ -1,0 +1,47 @@
+//! What can go wrong with a file.
+
+use std::fmt;
+use std::io;
+
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    #[error("{file}: cannot be {action}: {source}; {advice}")]
+    Io { file: String, action: &'static str, source: io::Error, advice: &'static str },
+    #[error("{file}: {place}: found {found}, expected {expected}; {advice}")]
+    Malformed { file: String, place: Place, found: String, expected: String, advice: &'static str },
+    #[error(
+        "{file}: the file ends early, at {place}: {readable} of {claimed} points are complete; \
+         copy the file again from its source, or write it again"
+    )]
+    Truncated { file: String, place: Place, readable: u64, claimed: u64 },
+    #[error("{file}: found {found}, which surfel cannot {action}; {advice}")]
+    Unsupported { file: String, action: &'static str, found: String, advice: &'static str },
+    #[error("{file}: {n_points} points do not fit in memory; load fewer columns or a smaller part")]
+    OutOfMemory { file: String, n_points: u64 },
+    #[error("no input file was named; name at least one")]
+    NoInput,
+    #[error(transparent)]
+    Surfel(#[from] surfel::Error),
+}
+
+/// Where in a file something was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    Byte(u64),
+    /// Counted from 1, as editors do.
+    Line(u64),
+    /// Counted from 0.
+    Point(u64),
+}
+
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Byte(byte) => write!(f, "byte {byte}"),
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Point(point) => write!(f, "point {point}"),
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! A file's bytes, with the name that messages give it.
+
+use std::borrow::Cow;
+use std::fs::File;
+use std::io;
+use std::ops::Deref;
+use std::path::Path;
+
+use crate::error::{Error, Place, Result};
+
+/// The bytes of one input.
+pub(crate) struct Input<'a> {
+    pub name: Cow<'a, str>,
+    bytes: Bytes<'a>,
+}
+
+enum Bytes<'a> {
+    Mapped(memmap2::Mmap),
+    Borrowed(&'a [u8]),
+}
+
+impl<'a> Input<'a> {
+    pub fn open(path: &Path) -> Result<Self> {
+        let name = path.display().to_string();
+        let failed = |source: io::Error| Error::Io {
+            file: name.clone(),
+            action: "read",
+            advice: match source.kind() {
+                io::ErrorKind::NotFound => "check the name and the folder",
+                io::ErrorKind::PermissionDenied => "ask for the right to read it",
+                _ => "check the disk and the connection to it",
+            },
+            source,
+        };
+        let file = File::open(path).map_err(failed)?;
+        let metadata = file.metadata().map_err(failed)?;
+        if metadata.is_dir() {
+            return Err(Error::Unsupported {
+                file: name,
+                action: "read",
+                found: "a folder".into(),
+                advice: "name the files in it",
+            });
+        }
+        // An empty file cannot be mapped.
+        if metadata.len() == 0 {
+            return Ok(Self { name: name.into(), bytes: Bytes::Borrowed(&[]) });
+        }
+        // SAFETY: the mapping is read only as plain bytes, all of whose values are valid. A file that
+        // another program shortens meanwhile ends this one with SIGBUS, as it does every reader of
+        // mapped files; reading by copy would hold every file in memory a second time.
+        let map = unsafe { memmap2::Mmap::map(&file) }.map_err(failed)?;
+        Ok(Self { name: name.into(), bytes: Bytes::Mapped(map) })
+    }
+
+    pub fn of_bytes(name: &'a str, bytes: &'a [u8]) -> Self {
+        Self { name: name.into(), bytes: Bytes::Borrowed(bytes) }
+    }
+
+    pub fn malformed(
+        &self,
+        place: Place,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+        advice: &'static str,
+    ) -> Error {
+        Error::Malformed {
+            file: self.name.to_string(),
+            place,
+            found: found.into(),
+            expected: expected.into(),
+            advice,
+        }
+    }
+
+    pub fn unsupported(&self, found: impl Into<String>, advice: &'static str) -> Error {
+        Error::Unsupported {
+            file: self.name.to_string(),
+            action: "read",
+            found: found.into(),
+            advice,
+        }
+    }
+
+    /// The lower-case extension of the name, without the dot.
+    pub fn extension(&self) -> String {
+        let path = Path::new(self.name.as_ref());
+        path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+    }
+}
+
+impl Deref for Input<'_> {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match &self.bytes {
+            Bytes::Mapped(map) => map,
+            Bytes::Borrowed(bytes) => bytes,
+        }
+    }
+}

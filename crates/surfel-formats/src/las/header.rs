@@ -1,0 +1,181 @@
+//! The header and the variable length records of LAS files.
+
+use std::ops::Range;
+
+use surfel::math::DVec3;
+
+use crate::error::{Place, Result};
+use crate::input::Input;
+
+pub(super) struct Header {
+    pub minor_version: u8,
+    pub point_format: u8,
+    pub is_compressed: bool,
+    pub record_length: usize,
+    pub n_points: u64,
+    pub scale: DVec3,
+    pub offset: DVec3,
+    /// The bytes from the first point to what follows the last.
+    pub data: Range<usize>,
+    pub records: Vec<Vlr>,
+}
+
+/// A variable length record, extended or not.
+pub(super) struct Vlr {
+    pub user_id: String,
+    pub record_id: u16,
+    pub data: Range<usize>,
+}
+
+pub(super) const VLR_HEADER: usize = 54;
+const EXTENDED_VLR_HEADER: usize = 60;
+/// Bytes of a point of each format without extra bytes (LAS 1.4 R15, tables 7 to 19).
+pub(super) const RECORD_LENGTHS: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
+
+impl Header {
+    /// The first record with this name.
+    pub fn record<'a>(&self, input: &'a Input, user_id: &str, record_id: u16) -> Option<&'a [u8]> {
+        let mut records = self.records.iter();
+        let record =
+            records.find(|record| record.user_id == user_id && record.record_id == record_id)?;
+        Some(&input[record.data.clone()])
+    }
+
+    /// Bytes of a point behind those of its format.
+    pub fn n_extra_bytes(&self) -> usize {
+        self.record_length - RECORD_LENGTHS[usize::from(self.point_format)]
+    }
+}
+
+/// Reads and checks the header of a LAS or LAZ file.
+pub(super) fn read_header(input: &Input) -> Result<Header> {
+    let ends_early = |expected: &str| {
+        let place = Place::Byte(input.len() as u64);
+        input.malformed(
+            place,
+            "the end of the file",
+            expected,
+            "copy the file again from its source",
+        )
+    };
+    if input.len() < 227 {
+        return Err(ends_early("a header of at least 227 bytes"));
+    }
+    let malformed = |byte: u64, found: String, expected: &str| {
+        let advice = "the header is broken; copy the file again from its source";
+        input.malformed(Place::Byte(byte), found, expected, advice)
+    };
+    let (major, minor_version) = (input[24], input[25]);
+    if major != 1 || 5 < minor_version {
+        let advice = "surfel reads LAS 1.0 to 1.4";
+        return Err(input.unsupported(format!("LAS version {major}.{minor_version}"), advice));
+    }
+    let is_1_4 = 4 <= minor_version && 375 <= input.len();
+    let header_size = u64::from(read_u16(input, 94));
+    let data_start = u64::from(read_u32(input, 96));
+    if data_start < header_size.max(227) || (input.len() as u64) < data_start {
+        let expected =
+            format!("between {} and {}, inside the file", header_size.max(227), input.len());
+        return Err(malformed(96, format!("points at byte {data_start}"), &expected));
+    }
+    let point_format = input[104] & 0x3f;
+    let record_length = usize::from(read_u16(input, 105));
+    let Some(&least) = RECORD_LENGTHS.get(usize::from(point_format)) else {
+        return Err(malformed(104, format!("point format {point_format}"), "0 to 10"));
+    };
+    if record_length < least {
+        let expected = format!("at least {least} for point format {point_format}");
+        return Err(malformed(105, format!("records of {record_length} bytes"), &expected));
+    }
+    let vector = |byte| {
+        DVec3::new(read_f64(input, byte), read_f64(input, byte + 8), read_f64(input, byte + 16))
+    };
+    let (scale, offset) = (vector(131), vector(155));
+    if !scale.is_finite() || scale.cmpeq(DVec3::ZERO).any() || !offset.is_finite() {
+        let found = format!("scale {scale} and offset {offset}");
+        return Err(malformed(131, found, "finite numbers, and scales other than 0"));
+    }
+    let legacy_count = u64::from(read_u32(input, 107));
+    let count = if is_1_4 { read_u64(input, 247) } else { 0 };
+    let n_points = if count == 0 { legacy_count } else { count };
+
+    let mut records = Vec::new();
+    let mut at = header_size as usize;
+    for _ in 0..read_u32(input, 100) {
+        let record = read_vlr(input, at).ok_or_else(|| ends_early("a variable length record"))?;
+        at = record.data.end;
+        records.push(record);
+    }
+    let mut data = data_start as usize..input.len();
+    let extended_start = if is_1_4 { read_u64(input, 235) } else { 0 };
+    let n_extended = if is_1_4 { read_u32(input, 243) } else { 0 };
+    if 0 < n_extended && data_start <= extended_start && extended_start < input.len() as u64 {
+        data.end = extended_start as usize;
+        let mut at = data.end;
+        for _ in 0..n_extended {
+            // They come last: a file cut off here still has all its points.
+            let Some(record) = read_extended_vlr(input, at) else { break };
+            at = record.data.end;
+            records.push(record);
+        }
+    }
+    let has_laszip = records.iter().any(|record| record.user_id == super::laz::USER_ID);
+    Ok(Header {
+        minor_version,
+        point_format,
+        is_compressed: input[104] & 0x80 != 0 || has_laszip,
+        record_length,
+        n_points,
+        scale,
+        offset,
+        data,
+        records,
+    })
+}
+
+fn read_vlr(bytes: &[u8], at: usize) -> Option<Vlr> {
+    let header = bytes.get(at..)?.get(..VLR_HEADER)?;
+    let start = at + VLR_HEADER;
+    vlr(bytes, header, start, u64::from(read_u16(header, 20)))
+}
+
+fn read_extended_vlr(bytes: &[u8], at: usize) -> Option<Vlr> {
+    let header = bytes.get(at..)?.get(..EXTENDED_VLR_HEADER)?;
+    vlr(bytes, header, at + EXTENDED_VLR_HEADER, read_u64(header, 20))
+}
+
+fn vlr(bytes: &[u8], header: &[u8], start: usize, length: u64) -> Option<Vlr> {
+    let end = usize::try_from(length).ok()?.checked_add(start)?;
+    (end <= bytes.len()).then(|| Vlr {
+        user_id: text(&header[2..18]),
+        record_id: read_u16(header, 18),
+        data: start..end,
+    })
+}
+
+/// Text up to its first zero.
+pub(super) fn text(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
+}
+
+pub(super) fn read_u16(bytes: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes(array(bytes, at))
+}
+
+pub(super) fn read_u32(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(array(bytes, at))
+}
+
+pub(super) fn read_u64(bytes: &[u8], at: usize) -> u64 {
+    u64::from_le_bytes(array(bytes, at))
+}
+
+pub(super) fn read_f64(bytes: &[u8], at: usize) -> f64 {
+    f64::from_le_bytes(array(bytes, at))
+}
+
+/// Bytes from `at`, zeros where there are none.
+fn array<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
+    bytes.get(at..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0; N])
+}

@@ -1,0 +1,352 @@
+//! How a cloud's columns go into LAS 1.4 records: point format, scales, extra bytes, and the header that says so.
+
+use std::ops::Range;
+
+use laz::LazVlr;
+use surfel::math::DVec3;
+use surfel::points::{PointCloud, Values};
+
+use super::crs;
+use super::fields::{DESCRIPTION, EXTRA_BYTES_RECORD_ID, EXTRA_BYTES_USER_ID, SCAN_ANGLE_STEP};
+use super::header::{RECORD_LENGTHS, VLR_HEADER};
+use crate::save::SaveOptions;
+
+/// Bytes of the fixed part of a LAS 1.4 header.
+const HEADER: usize = 375;
+/// Descriptions of extra columns that the 65,535 bytes of a record hold.
+pub(super) const MOST_EXTRAS: usize = 65535 / DESCRIPTION;
+/// Times of a GPS week end here; larger ones are "adjusted standard" times.
+const SECONDS_PER_WEEK: f64 = 604_800.0;
+
+pub(super) struct Plan<'a> {
+    pub point_format: u8,
+    pub has_coordinate_system: bool,
+    scale: DVec3,
+    offset: DVec3,
+    standard: Standard<'a>,
+    extras: Vec<Extra<'a>>,
+    system: Option<System>,
+}
+
+/// The columns that standard fields hold.
+#[derive(Default)]
+struct Standard<'a> {
+    intensity: Option<&'a [f32]>,
+    return_number: Option<&'a Values>,
+    number_of_returns: Option<&'a Values>,
+    user_data: Option<&'a Values>,
+    scan_angle: Option<&'a Values>,
+    point_source_id: Option<&'a Values>,
+    gps_time: Option<&'a Values>,
+    nir: Option<&'a Values>,
+}
+
+/// A column in the extra bytes.
+struct Extra<'a> {
+    name: String,
+    column: ExtraColumn<'a>,
+}
+
+enum ExtraColumn<'a> {
+    Normal(usize),
+    F32(&'a [f32]),
+    Scalar(&'a Values),
+}
+
+enum System {
+    Wkt(String),
+    Epsg(u16),
+}
+
+impl<'a> Plan<'a> {
+    pub fn new(cloud: &'a PointCloud, options: &SaveOptions) -> Self {
+        let mut standard = Standard::default();
+        let mut extras = Vec::new();
+        for axis in 0..3 {
+            if cloud.normals.is_some() {
+                let name = ["NormalX", "NormalY", "NormalZ"][axis].into();
+                extras.push(Extra { name, column: ExtraColumn::Normal(axis) });
+            }
+        }
+        if let Some(radii) = &cloud.radii {
+            extras.push(Extra { name: "Radius".into(), column: ExtraColumn::F32(radii) });
+        }
+        if let Some(intensity) = &cloud.intensity {
+            if intensity.iter().all(|v| v.fract() == 0.0 && (0.0..=65535.0).contains(v)) {
+                standard.intensity = Some(intensity);
+            } else {
+                extras
+                    .push(Extra { name: "Intensity".into(), column: ExtraColumn::F32(intensity) });
+            }
+        }
+        for scalar in &cloud.scalars {
+            let values = &scalar.values;
+            let whole = |largest: f64| {
+                all(values, |v| v.fract() == 0.0 && (0.0..=largest).contains(&v)).then_some(values)
+            };
+            let field = match scalar.name.to_lowercase().as_str() {
+                "return_number" => (&mut standard.return_number, whole(15.0)),
+                "number_of_returns" => (&mut standard.number_of_returns, whole(15.0)),
+                "user_data" => (&mut standard.user_data, whole(255.0)),
+                "point_source_id" => (&mut standard.point_source_id, whole(65535.0)),
+                "gps_time" => (&mut standard.gps_time, Some(values)),
+                "nir" if cloud.colors.is_some() => (&mut standard.nir, whole(65535.0)),
+                "scan_angle" => {
+                    let fits = all(values, |v| v.abs() <= 180.0);
+                    (&mut standard.scan_angle, fits.then_some(values))
+                }
+                _ => (&mut None, None),
+            };
+            if let (place @ None, Some(values)) = field {
+                *place = Some(values);
+            } else {
+                extras
+                    .push(Extra { name: scalar.name.clone(), column: ExtraColumn::Scalar(values) });
+            }
+        }
+        let bounds = cloud.bounds();
+        let reach = if cloud.is_empty() {
+            DVec3::ZERO
+        } else {
+            bounds.min.abs().max(bounds.max.abs()).as_dvec3()
+        };
+        let system = options.coordinate_system.as_deref().and_then(System::of_text);
+        Self {
+            point_format: match (&cloud.colors, standard.nir) {
+                (None, _) => 6,
+                (Some(_), None) => 7,
+                (Some(_), Some(_)) => 8,
+            },
+            has_coordinate_system: system.is_some(),
+            scale: choose_scale(reach, options.resolution),
+            offset: cloud.origin,
+            standard,
+            extras,
+            system,
+        }
+    }
+
+    pub fn n_extras(&self) -> usize {
+        self.extras.len()
+    }
+
+    pub fn n_extra_bytes(&self) -> usize {
+        self.extras.iter().map(Extra::size).sum()
+    }
+
+    /// Everything before the points; `laszip` is the record that says how they are compressed.
+    pub fn header(&self, cloud: &PointCloud, laszip: Option<&[u8]>) -> Vec<u8> {
+        let mut records = Vec::new();
+        let mut n_records = 0u32;
+        let mut add = |user_id: &str, record_id: u16, data: &[u8]| {
+            push_vlr(&mut records, user_id, record_id, data);
+            n_records += 1;
+        };
+        match &self.system {
+            Some(System::Wkt(wkt)) => add(crs::USER_ID, crs::WKT, &[wkt.as_bytes(), &[0]].concat()),
+            Some(System::Epsg(code)) => add(crs::USER_ID, crs::GEO_KEYS, &geo_keys(*code)),
+            None => {}
+        }
+        if !self.extras.is_empty() {
+            let descriptions: Vec<u8> = self.extras.iter().flat_map(Extra::description).collect();
+            add(EXTRA_BYTES_USER_ID, EXTRA_BYTES_RECORD_ID, &descriptions);
+        }
+        if let Some(data) = laszip {
+            add(LazVlr::USER_ID, LazVlr::RECORD_ID, data);
+        }
+
+        let is_wkt = matches!(self.system, Some(System::Wkt(_)));
+        let is_standard_time =
+            self.standard.gps_time.is_some_and(|time| !all(time, |v| v <= SECONDS_PER_WEEK));
+        let encoding = u16::from(is_standard_time) | u16::from(is_wkt) << 4;
+        let record_length = RECORD_LENGTHS[usize::from(self.point_format)] + self.n_extra_bytes();
+        let n_points = cloud.len() as u64;
+
+        let mut header = vec![0; HEADER];
+        let mut put = |at: usize, bytes: &[u8]| header[at..at + bytes.len()].copy_from_slice(bytes);
+        put(0, b"LASF");
+        put(6, &encoding.to_le_bytes());
+        put(24, &[1, 4]);
+        put(26, b"OTHER");
+        put(58, b"surfel");
+        put(94, &(HEADER as u16).to_le_bytes());
+        put(96, &((HEADER + records.len()) as u32).to_le_bytes());
+        put(100, &n_records.to_le_bytes());
+        put(104, &[self.point_format | if laszip.is_some() { 0x80 } else { 0 }]);
+        put(105, &(record_length as u16).to_le_bytes());
+        let (lowest, highest) = self.bounds(cloud);
+        for axis in 0..3 {
+            put(131 + 8 * axis, &self.scale[axis].to_le_bytes());
+            put(155 + 8 * axis, &self.offset[axis].to_le_bytes());
+            put(179 + 16 * axis, &highest[axis].to_le_bytes());
+            put(187 + 16 * axis, &lowest[axis].to_le_bytes());
+        }
+        put(247, &n_points.to_le_bytes());
+        for (i, count) in self.counts_by_return(n_points).iter().enumerate() {
+            put(255 + 8 * i, &count.to_le_bytes());
+        }
+        header.extend(records);
+        header
+    }
+
+    /// The records of these points.
+    pub fn encode(&self, cloud: &PointCloud, points: Range<usize>) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let whole = |column: Option<&Values>, i: usize| column.map(|values| values.get(i));
+        for i in points {
+            for coordinate in self.quantized(cloud, i) {
+                bytes.extend(coordinate.to_le_bytes());
+            }
+            let standard = &self.standard;
+            bytes.extend((standard.intensity.map_or(0, |v| v[i] as u16)).to_le_bytes());
+            let return_number = whole(standard.return_number, i).unwrap_or(1.0) as u8;
+            let number_of_returns = whole(standard.number_of_returns, i).unwrap_or(1.0) as u8;
+            bytes.extend([return_number | number_of_returns << 4, 0]);
+            bytes.push(cloud.classification.as_ref().map_or(0, |column| column[i]));
+            bytes.push(whole(standard.user_data, i).unwrap_or(0.0) as u8);
+            let angle = whole(standard.scan_angle, i).unwrap_or(0.0) / SCAN_ANGLE_STEP;
+            bytes.extend((angle.round() as i16).to_le_bytes());
+            let source_id = whole(standard.point_source_id, i).unwrap_or(0.0) as u16;
+            bytes.extend(source_id.to_le_bytes());
+            bytes.extend(whole(standard.gps_time, i).unwrap_or(0.0).to_le_bytes());
+            if let Some(colors) = &cloud.colors {
+                bytes.extend(colors[i].iter().flat_map(|channel| channel.to_le_bytes()));
+            }
+            if let Some(nir) = whole(standard.nir, i) {
+                bytes.extend((nir as u16).to_le_bytes());
+            }
+            for extra in &self.extras {
+                extra.encode(cloud, i, &mut bytes);
+            }
+        }
+        bytes
+    }
+
+    fn quantized(&self, cloud: &PointCloud, point_idx: usize) -> [i32; 3] {
+        let steps = (cloud.world_position(point_idx) - self.offset) / self.scale;
+        steps.to_array().map(|step| step.round() as i32)
+    }
+
+    /// Bounds of the points as they are stored.
+    fn bounds(&self, cloud: &PointCloud) -> (DVec3, DVec3) {
+        if cloud.is_empty() {
+            return (DVec3::ZERO, DVec3::ZERO);
+        }
+        let bounds = cloud.bounds();
+        let stored = |position: surfel::math::Vec3| {
+            (position.as_dvec3() / self.scale).round() * self.scale + self.offset
+        };
+        (stored(bounds.min), stored(bounds.max))
+    }
+
+    fn counts_by_return(&self, n_points: u64) -> [u64; 15] {
+        let mut counts = [0; 15];
+        let Some(returns) = self.standard.return_number else {
+            counts[0] = n_points;
+            return counts;
+        };
+        for i in 0..returns.len() {
+            // Return 0 is not valid, but scans have it.
+            if let Some(count) = (returns.get(i) as usize).checked_sub(1) {
+                counts[count] += 1;
+            }
+        }
+        counts
+    }
+}
+
+impl Extra<'_> {
+    fn size(&self) -> usize {
+        match self.column {
+            ExtraColumn::Normal(_) | ExtraColumn::F32(_) => 4,
+            ExtraColumn::Scalar(Values::U8(_)) => 1,
+            ExtraColumn::Scalar(Values::U16(_)) => 2,
+            ExtraColumn::Scalar(Values::I32(_) | Values::F32(_)) => 4,
+            ExtraColumn::Scalar(Values::F64(_)) => 8,
+        }
+    }
+
+    fn description(&self) -> [u8; DESCRIPTION] {
+        let mut description = [0; DESCRIPTION];
+        description[2] = match self.column {
+            ExtraColumn::Scalar(Values::U8(_)) => 1,
+            ExtraColumn::Scalar(Values::U16(_)) => 3,
+            ExtraColumn::Scalar(Values::I32(_)) => 6,
+            ExtraColumn::Scalar(Values::F64(_)) => 10,
+            _ => 9,
+        };
+        let mut length = self.name.len().min(32);
+        // A name is not cut inside a letter.
+        while !self.name.is_char_boundary(length) {
+            length -= 1;
+        }
+        description[4..4 + length].copy_from_slice(&self.name.as_bytes()[..length]);
+        description
+    }
+
+    fn encode(&self, cloud: &PointCloud, point_idx: usize, bytes: &mut Vec<u8>) {
+        let i = point_idx;
+        match self.column {
+            ExtraColumn::Normal(axis) => {
+                let normal = cloud.normals.as_ref().map_or(0.0, |normals| normals[i][axis]);
+                bytes.extend(normal.to_le_bytes());
+            }
+            ExtraColumn::F32(v) => bytes.extend(v[i].to_le_bytes()),
+            ExtraColumn::Scalar(Values::U8(v)) => bytes.push(v[i]),
+            ExtraColumn::Scalar(Values::U16(v)) => bytes.extend(v[i].to_le_bytes()),
+            ExtraColumn::Scalar(Values::I32(v)) => bytes.extend(v[i].to_le_bytes()),
+            ExtraColumn::Scalar(Values::F32(v)) => bytes.extend(v[i].to_le_bytes()),
+            ExtraColumn::Scalar(Values::F64(v)) => bytes.extend(v[i].to_le_bytes()),
+        }
+    }
+}
+
+impl System {
+    /// WKT, or "EPSG:" and the code of a horizontal system; a vertical code behind `+` is left out.
+    fn of_text(text: &str) -> Option<Self> {
+        if let Some(codes) = text.strip_prefix("EPSG:") {
+            return codes.split('+').next()?.parse().ok().map(Self::Epsg);
+        }
+        // A record holds 65,535 bytes, a zero among them.
+        (text.contains('[') && text.len() < 65535).then(|| Self::Wkt(text.into()))
+    }
+}
+
+fn all(values: &Values, holds: impl Fn(f64) -> bool) -> bool {
+    (0..values.len()).all(|i| holds(values.get(i)))
+}
+
+/// A directory with the one key that names the system.
+fn geo_keys(code: u16) -> Vec<u8> {
+    // EPSG gives geodetic systems the codes from 4000 to 4999, projected ones all others.
+    let is_geodetic = (4000..5000).contains(&code);
+    let key = if is_geodetic { crs::GEODETIC } else { crs::PROJECTED };
+    let model_type = if is_geodetic { 2 } else { 1 };
+    let entries = [[1, 1, 0, 2], [1024, 0, 1, model_type], [key, 0, 1, code]];
+    entries.as_flattened().iter().flat_map(|v: &u16| v.to_le_bytes()).collect()
+}
+
+fn push_vlr(records: &mut Vec<u8>, user_id: &str, record_id: u16, data: &[u8]) {
+    let mut header = [0; VLR_HEADER];
+    header[2..2 + user_id.len()].copy_from_slice(user_id.as_bytes());
+    header[18..20].copy_from_slice(&record_id.to_le_bytes());
+    header[20..22].copy_from_slice(&(data.len() as u16).to_le_bytes());
+    records.extend(header);
+    records.extend(data);
+}
+
+/// Steps of coordinates that lose nothing visible of f32 positions that reach as far as `reach`.
+fn choose_scale(reach: DVec3, resolution: Option<DVec3>) -> DVec3 {
+    let step = |axis: usize| {
+        let spacing = reach[axis].max(f64::MIN_POSITIVE) * 0.5_f64.powi(23);
+        let fine = 10.0_f64.powf(spacing.log10().floor()).clamp(1e-9, 1e-3);
+        let stated = resolution.map(|resolution| resolution[axis]);
+        let mut step = stated.filter(|step| 0.0 < *step && step.is_finite()).unwrap_or(fine);
+        // Coordinates are i32 multiples of the step.
+        while f64::from(i32::MAX) < reach[axis] / step {
+            step *= 10.0;
+        }
+        step
+    };
+    DVec3::new(step(0), step(1), step(2))
+}

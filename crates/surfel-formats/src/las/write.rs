@@ -1,0 +1,101 @@
+//! Writes clouds as LAS 1.4, plain or compressed.
+
+use std::io::{self, Seek, SeekFrom, Write};
+use std::ops::Range;
+use std::path::Path;
+
+use laz::laszip::{ChunkTable, ChunkTableEntry};
+use laz::record::{LayeredPointRecordCompressor, RecordCompressor};
+use laz::{LazItemRecordBuilder, LazVlr, LazVlrBuilder};
+use surfel::points::PointCloud;
+use surfel::progress::Progress;
+
+use super::laz::MOST_EXTRA_BYTES;
+use super::plan::{MOST_EXTRAS, Plan};
+use crate::atomic::{write_failed, write_file};
+use crate::encode::{POINTS_PER_PART, encode_points};
+use crate::error::{Error, Result};
+use crate::save::{SaveOptions, extension};
+
+pub(crate) fn write(
+    path: &Path,
+    cloud: &PointCloud,
+    options: &SaveOptions,
+    progress: &dyn Progress,
+) -> Result<()> {
+    if let Some(point) = cloud.positions.iter().position(|position| !position.is_finite()) {
+        return Err(Error::Unsupported {
+            file: path.display().to_string(),
+            action: "write",
+            found: format!("point {point} at {}", cloud.positions[point]),
+            advice: "LAS holds finite positions only; remove such points or write PLY",
+        });
+    }
+    progress.begin(&format!("write {}", path.display()), cloud.len() as u64);
+    let plan = Plan::new(cloud, options);
+    if options.coordinate_system.is_some() && !plan.has_coordinate_system {
+        let line = "the coordinate system is neither WKT nor an EPSG code, and is left out";
+        progress.note(&format!("{}: {line}", path.display()));
+    }
+    let failed = |source: io::Error| write_failed(path, source);
+    let is_compressed = extension(path) == "laz";
+    let n_extra_bytes = plan.n_extra_bytes();
+    if MOST_EXTRAS < plan.n_extras() || is_compressed && MOST_EXTRA_BYTES < n_extra_bytes {
+        return Err(Error::Unsupported {
+            file: path.display().to_string(),
+            action: "write",
+            found: format!("{} extra columns of {n_extra_bytes} bytes", plan.n_extras()),
+            advice: "LAS holds 341 and LAZ 1024 bytes of them; load fewer columns or write PLY",
+        });
+    }
+    let vlr = if is_compressed { Some(laszip_record(&plan).map_err(failed)?) } else { None };
+    write_file(path, |writer| {
+        let header = plan.header(cloud, vlr.as_ref().map(laszip_bytes).as_deref());
+        writer.write_all(&header).map_err(failed)?;
+        let encode = |points: Range<usize>| Ok(plan.encode(cloud, points));
+        let Some(vlr) = &vlr else {
+            let put = |bytes: &[u8]| writer.write_all(bytes).map_err(failed);
+            return encode_points(cloud.len(), encode, progress, put);
+        };
+        // The offset of the chunk table is known once the chunks are written.
+        writer.write_all(&[0; ChunkTable::OFFSET_SIZE]).map_err(failed)?;
+        let mut table = ChunkTable::default();
+        let compress = |points| compress(vlr, &plan.encode(cloud, points)).map_err(failed);
+        encode_points(cloud.len(), compress, progress, |bytes| {
+            // The number of points of chunks of fixed size is not stored.
+            let byte_count = bytes.len() as u64;
+            table.push(ChunkTableEntry { point_count: POINTS_PER_PART as u64, byte_count });
+            writer.write_all(bytes).map_err(failed)
+        })?;
+        let mut finish = || {
+            let at = writer.stream_position()?;
+            table.write_to(&mut *writer, vlr)?;
+            writer.seek(SeekFrom::Start(header.len() as u64))?;
+            writer.write_all(&at.to_le_bytes())
+        };
+        finish().map_err(failed)
+    })
+}
+
+fn laszip_record(plan: &Plan) -> io::Result<LazVlr> {
+    let items = LazItemRecordBuilder::default_for_point_format_id(
+        plan.point_format,
+        plan.n_extra_bytes() as u16,
+    );
+    let items = items.map_err(|error| io::Error::other(error.to_string()))?;
+    Ok(LazVlrBuilder::new(items).with_fixed_chunk_size(POINTS_PER_PART as u32).build())
+}
+
+fn laszip_bytes(vlr: &LazVlr) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    vlr.write_to(&mut bytes).expect("memory takes all that is written");
+    bytes
+}
+
+fn compress(vlr: &LazVlr, records: &[u8]) -> io::Result<Vec<u8>> {
+    let mut compressor = LayeredPointRecordCompressor::new(io::Cursor::new(Vec::new()));
+    compressor.set_fields_from(vlr.items()).map_err(|error| io::Error::other(error.to_string()))?;
+    compressor.compress_many(records)?;
+    compressor.done()?;
+    Ok(compressor.into_inner().into_inner())
+}

@@ -1,0 +1,153 @@
+//! Opens files, finds out their format and reads them.
+
+use std::path::{Path, PathBuf};
+
+use surfel::progress::Progress;
+
+use crate::block::append;
+use crate::error::{Error, Place, Result};
+use crate::input::Input;
+use crate::options::{LoadOptions, Loaded, Source};
+use crate::{las, obj, ply, text};
+
+const SUPPORTED: &str = "surfel reads .ply, .las, .laz (.copc.laz too), .xyz, .txt, .csv, .asc, .pts and .obj; \
+     convert the file to one of them";
+
+/// Reads the points of a file.
+pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Loaded> {
+    read(&Input::open(path)?, options, progress)
+}
+
+/// Reads points from the bytes of a file; `name` stands in messages, and its extension counts.
+pub fn load_bytes(
+    name: &str,
+    bytes: &[u8],
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<Loaded> {
+    read(&Input::of_bytes(name, bytes), options, progress)
+}
+
+/// Reads several files to one cloud about the origin of the first; the sources are in their order.
+///
+/// Columns that some of the files lack are dropped, and `progress` is told which.
+pub fn load_all(
+    paths: &[PathBuf],
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<(Loaded, Vec<Source>)> {
+    let (first, others) = paths.split_first().ok_or(Error::NoInput)?;
+    let mut all = load(first, options, progress)?;
+    let mut sources = vec![all.source.clone()];
+    let options = LoadOptions { origin: Some(all.cloud.origin), ..options.clone() };
+    for path in others {
+        let Loaded { cloud, source } = load(path, &options, progress)?;
+        let dropped = append(&mut all.cloud, cloud);
+        if !dropped.is_empty() {
+            let dropped = dropped.join(", ");
+            progress.note(&format!("{}: not in all files, dropped: {dropped}", path.display()));
+        }
+        if source.coordinate_system != all.source.coordinate_system {
+            progress.note(&format!(
+                "{}: its coordinate system differs from that of {}, or only one of them names it",
+                path.display(),
+                first.display()
+            ));
+        }
+        sources.push(source);
+    }
+    all.source = common_source(&sources);
+    Ok((all, sources))
+}
+
+/// What a file says about itself, without reading its points.
+pub fn inspect(path: &Path) -> Result<Source> {
+    let input = Input::open(path)?;
+    match format_of(&input)? {
+        Format::Ply => ply::inspect(&input),
+        Format::Las => las::inspect(&input),
+        Format::Text => text::inspect(&input),
+        Format::Obj => obj::inspect(&input),
+    }
+}
+
+enum Format {
+    Ply,
+    Las,
+    Text,
+    Obj,
+}
+
+fn read(input: &Input, options: &LoadOptions, progress: &dyn Progress) -> Result<Loaded> {
+    progress.check()?;
+    match format_of(input)? {
+        Format::Ply => ply::read(input, options, progress),
+        Format::Las => las::read(input, options, progress),
+        Format::Text => text::read(input, options, progress),
+        Format::Obj => obj::read(input, options, progress),
+    }
+}
+
+/// By the first bytes, and where they say nothing by the extension.
+fn format_of(input: &Input) -> Result<Format> {
+    let starts = |magic: &[u8]| input.starts_with(magic);
+    if input.is_empty() {
+        let advice = "write the file again or copy it again from its source";
+        return Err(input.malformed(Place::Byte(0), "an empty file", "points", advice));
+    }
+    if starts(ply::MAGIC) && input.get(3).is_some_and(u8::is_ascii_whitespace) {
+        return Ok(Format::Ply);
+    }
+    if starts(las::MAGIC) {
+        return Ok(Format::Las);
+    }
+    let known = [
+        (&b"ASTM-E57"[..], "an E57 file"),
+        (b"glTF", "a binary glTF file"),
+        (b"# .PCD", "a PCD file"),
+        (b"\x89HDF", "an HDF5 file"),
+        (b"PK\x03\x04", "a zip archive"),
+        (b"\x1f\x8b", "a gzip archive"),
+    ];
+    if let Some((_, found)) = known.iter().find(|(magic, _)| starts(magic)) {
+        return Err(input.unsupported(*found, SUPPORTED));
+    }
+    let wrong_magic = |expected: &str| {
+        let found = format!("`{}`", input[..input.len().min(4)].escape_ascii());
+        let advice = "the extension does not fit the content; give the file its right one";
+        Err(input.malformed(Place::Byte(0), found, expected, advice))
+    };
+    match input.extension().as_str() {
+        "xyz" | "txt" | "csv" | "asc" | "pts" | "xyzrgb" | "xyzn" => Ok(Format::Text),
+        "obj" => Ok(Format::Obj),
+        "ply" => wrong_magic("`ply` and the end of the line"),
+        "las" | "laz" => wrong_magic("`LASF`"),
+        "" => Err(input.unsupported("a name without extension and unknown content", SUPPORTED)),
+        other => Err(input.unsupported(format!("the extension `.{other}`"), SUPPORTED)),
+    }
+}
+
+/// What holds for all the files together.
+fn common_source(sources: &[Source]) -> Source {
+    let first = &sources[0];
+    let mut formats: Vec<&str> = sources.iter().map(|source| source.format.as_str()).collect();
+    formats.dedup();
+    let same_system =
+        sources.iter().all(|source| source.coordinate_system == first.coordinate_system);
+    Source {
+        format: formats.join("; "),
+        n_points: sources.iter().map(|source| source.n_points).sum(),
+        resolution: sources
+            .iter()
+            .map(|source| source.resolution)
+            .reduce(|a, b| Some(a?.min(b?)))
+            .flatten(),
+        coordinate_system: first.coordinate_system.clone().filter(|_| same_system),
+        columns: first
+            .columns
+            .iter()
+            .filter(|name| sources.iter().all(|source| source.columns.contains(name)))
+            .cloned()
+            .collect(),
+    }
+}

@@ -1,0 +1,92 @@
+//! What to load, and what is known about what was loaded.
+
+use surfel::math::DVec3;
+use surfel::points::PointCloud;
+
+use crate::role::Role;
+
+/// How to load a cloud.
+#[derive(Clone, Debug, Default)]
+pub struct LoadOptions {
+    pub columns: ColumnChoice,
+    /// The columns of a text file, in order; found out from the file if absent.
+    pub text_columns: Option<Vec<TextColumn>>,
+    /// World coordinates of the zero of the positions; chosen from the data if absent.
+    pub origin: Option<DVec3>,
+}
+
+/// Which columns to keep in memory; positions are always kept.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum ColumnChoice {
+    #[default]
+    All,
+    Only(Vec<Column>),
+}
+
+/// A column of a cloud besides its positions.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Column {
+    Normals,
+    Radii,
+    Colors,
+    Intensity,
+    Classification,
+    Scalar(String),
+}
+
+/// The meaning of one column of a text file, made by `TextColumn::parse`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextColumn(pub(crate) Option<Role>);
+
+/// A cloud and where it came from.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    pub cloud: PointCloud,
+    pub source: Source,
+}
+
+/// What a file says about itself.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Source {
+    /// As users call it: "LAZ 1.4, point format 6".
+    pub format: String,
+    /// As far as it is known without reading all points.
+    pub n_points: Option<u64>,
+    /// Smallest step between coordinates, if the format states one.
+    pub resolution: Option<DVec3>,
+    /// WKT, or "EPSG:" and a code, or other words of the file.
+    pub coordinate_system: Option<String>,
+    /// Names of the columns in the file.
+    pub columns: Vec<String>,
+}
+
+impl ColumnChoice {
+    pub(crate) fn wants(&self, role: &Role) -> bool {
+        let Self::Only(columns) = self else { return true };
+        columns.iter().any(|column| match (column, role) {
+            (Column::Normals, Role::Normal(_))
+            | (Column::Radii, Role::Radius)
+            | (Column::Colors, Role::Color(_))
+            | (Column::Intensity, Role::Intensity)
+            | (Column::Classification, Role::Classification) => true,
+            (Column::Scalar(wanted), Role::Scalar(name)) => wanted.eq_ignore_ascii_case(name),
+            (_, Role::Position(_)) => true,
+            _ => false,
+        })
+    }
+}
+
+impl TextColumn {
+    /// A column by its name; `-` and `skip` name one that is not read.
+    pub fn parse(name: &str) -> Self {
+        match name.trim() {
+            "-" | "skip" => Self(None),
+            name => Self(Some(Role::of_name(name).unwrap_or_else(|| Role::Scalar(name.into())))),
+        }
+    }
+
+    /// Columns separated by commas, as in `x,y,z,-,r,g,b`.
+    pub fn parse_list(list: &str) -> Vec<Self> {
+        list.split(',').map(Self::parse).collect()
+    }
+}

@@ -1,0 +1,314 @@
+//! Reads the vertices of PLY files: binary ones in place, ascii ones by lines.
+
+use surfel::points::PointCloud;
+use surfel::progress::Progress;
+
+use super::header::{Element, Encoding, Header, read_header};
+use crate::error::{Error, Place, Result};
+use crate::input::Input;
+use crate::lines::{LineError, Rows, read_rows};
+use crate::options::{LoadOptions, Loaded, Source};
+use crate::record::{ColumnField, Field, Kind, Layout};
+use crate::records::{Tolerance, origin_of_records, read_records};
+use crate::role::Role;
+
+pub(crate) fn inspect(input: &Input) -> Result<Source> {
+    let header = read_header(input)?;
+    let (_, vertex) = find_vertex(input, &header)?;
+    Ok(source(&header, vertex))
+}
+
+pub(crate) fn read(
+    input: &Input,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<Loaded> {
+    let header = read_header(input)?;
+    let (before, vertex) = find_vertex(input, &header)?;
+    let cloud = match header.encoding {
+        Encoding::Ascii => read_ascii(input, &header, before, vertex, options, progress)?,
+        _ => read_binary(input, &header, before, vertex, options, progress)?,
+    };
+    Ok(Loaded { cloud, source: source(&header, vertex) })
+}
+
+fn source(header: &Header, vertex: &Element) -> Source {
+    let encoding = match header.encoding {
+        Encoding::Ascii => "ascii",
+        Encoding::LittleEndian => "binary little endian",
+        Encoding::BigEndian => "binary big endian",
+    };
+    Source {
+        format: format!("PLY, {encoding}"),
+        n_points: Some(vertex.count),
+        columns: vertex.properties.iter().map(|property| property.name.clone()).collect(),
+        ..Source::default()
+    }
+}
+
+/// The vertex element and those before it.
+fn find_vertex<'a>(input: &Input, header: &'a Header) -> Result<(&'a [Element], &'a Element)> {
+    let at = header.elements.iter().position(|element| element.name == "vertex");
+    let missing = |expected: &str| {
+        let found: Vec<&str> = match at {
+            None => header.elements.iter().map(|element| element.name.as_str()).collect(),
+            Some(at) => header.elements[at].properties.iter().map(|p| p.name.as_str()).collect(),
+        };
+        let found = format!("only `{}`", found.join(" ").chars().take(80).collect::<String>());
+        input.malformed(Place::Byte(0), found, expected, "the file holds no points")
+    };
+    let Some(at) = at else { return Err(missing("an element `vertex`")) };
+    let vertex = &header.elements[at];
+    for axis in 0..3 {
+        let is_axis = |name: &str| Role::of_name(name) == Some(Role::Position(axis));
+        if !vertex.properties.iter().any(|p| p.list.is_none() && is_axis(&p.name)) {
+            return Err(missing("vertex properties x, y and z"));
+        }
+    }
+    Ok((&header.elements[..at], vertex))
+}
+
+fn read_binary(
+    input: &Input,
+    header: &Header,
+    before: &[Element],
+    vertex: &Element,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<PointCloud> {
+    let big_endian = header.encoding == Encoding::BigEndian;
+    let mut start = header.body;
+    for element in before {
+        start = skip_elements(input, start, element, big_endian, progress)?;
+    }
+    let mut columns = Vec::new();
+    let mut stride = 0;
+    for property in vertex.properties.iter().filter(|property| property.list.is_none()) {
+        columns.push((property.name.as_str(), Field::new(stride, property.kind)));
+        stride += property.kind.size();
+    }
+
+    // Lists between the numbers are taken out first; the rest is then of fixed length.
+    let packed;
+    let records = if vertex.stride().is_some() {
+        let rest = &input[start..];
+        let readable = rest.len() / stride;
+        if (readable as u64) < vertex.count {
+            return Err(truncated(input, readable as u64, vertex));
+        }
+        &rest[..vertex.count as usize * stride]
+    } else {
+        packed = pack_vertices(input, start, vertex, big_endian, progress)?;
+        &packed
+    };
+    let layout =
+        layout(stride, big_endian, columns, &records[..records.len().min(1 << 20)], options);
+    let tolerance = match layout.position[0].kind {
+        Kind::F64 => Tolerance::UNSTATED,
+        _ => Tolerance::SINGLE,
+    };
+    let origin = options.origin.unwrap_or_else(|| origin_of_records(records, &layout, tolerance));
+    progress.begin(&format!("read {}", input.name), vertex.count);
+    read_records(input, records, &layout, origin, progress)
+}
+
+fn read_ascii(
+    input: &Input,
+    header: &Header,
+    before: &[Element],
+    vertex: &Element,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<PointCloud> {
+    let mut rest = &input[header.body..];
+    let mut line = header.body_line;
+    for element in before.iter().filter(|element| !element.properties.is_empty()) {
+        for count in 0..element.count {
+            if count % 65536 == 0 {
+                progress.check()?;
+            }
+            let Some(end) = memchr::memchr(b'\n', rest) else {
+                return Err(truncated(input, 0, vertex));
+            };
+            rest = &rest[end + 1..];
+            line += 1;
+        }
+    }
+    let numbers = vertex.properties.iter().filter(|property| property.list.is_none());
+    let columns: Vec<(&str, Kind)> = numbers.map(|p| (p.name.as_str(), p.kind)).collect();
+    let n_columns = columns.len();
+    let rows = Rows { start: input.len() - rest.len(), line, n_columns, limit: Some(vertex.count) };
+    let parse = |line: &[u8], row: &mut Vec<f64>| parse_vertex(line, vertex, row);
+    let layout_of = |sample: &[u8]| {
+        let fields = columns.iter().enumerate().map(|(i, (name, kind))| {
+            (*name, Field { scale: 1.0, ..Field::new(8 * i, Kind::F64) }, *kind)
+        });
+        let columns = named_columns(fields, 8 * n_columns, false, sample);
+        Layout::new(8 * n_columns, false, columns, &options.columns).expect("x, y and z were found")
+    };
+    progress.begin(&format!("read {}", input.name), rest.len() as u64);
+    let cloud = read_rows(input, rows, &parse, layout_of, options.origin, progress)?;
+    if (cloud.len() as u64) < vertex.count {
+        return Err(truncated(input, cloud.len() as u64, vertex));
+    }
+    Ok(cloud)
+}
+
+/// One ascii vertex: a number a property, and for a list its length and items, which are not kept.
+fn parse_vertex(
+    line: &[u8],
+    vertex: &Element,
+    row: &mut Vec<f64>,
+) -> std::result::Result<(), LineError> {
+    let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let mut number = |n_found: usize| {
+        let word = words.next().ok_or_else(|| LineError {
+            found: format!("{n_found} values"),
+            expected: format!("{} properties a vertex", vertex.properties.len()),
+        })?;
+        crate::lines::parse_number(word)
+    };
+    for (i, property) in vertex.properties.iter().enumerate() {
+        let value = number(i)?;
+        if property.list.is_none() {
+            row.push(value);
+            continue;
+        }
+        // A length beyond the line ends at its last word with an error.
+        for _ in 0..value as u64 {
+            number(i)?;
+        }
+    }
+    Ok(())
+}
+
+fn layout(
+    stride: usize,
+    big_endian: bool,
+    columns: Vec<(&str, Field)>,
+    sample: &[u8],
+    options: &LoadOptions,
+) -> Layout {
+    let fields = columns.into_iter().map(|(name, field)| (name, field, field.kind));
+    let columns = named_columns(fields, stride, big_endian, sample);
+    Layout::new(stride, big_endian, columns, &options.columns).expect("x, y and z were found")
+}
+
+/// The meaning of properties by their names, types and, for classes, values in a sample of the records.
+fn named_columns<'a>(
+    fields: impl Iterator<Item = (&'a str, Field, Kind)>,
+    stride: usize,
+    big_endian: bool,
+    sample: &[u8],
+) -> Vec<ColumnField> {
+    let mut columns: Vec<ColumnField> = Vec::new();
+    for (name, mut field, kind) in fields.filter(|(name, ..)| !Role::is_alpha(name)) {
+        let mut role = Role::of_name(name).unwrap_or_else(|| Role::Scalar(name.into()));
+        let is_class = |v: f64| v.fract() == 0.0 && (0.0..256.0).contains(&v);
+        let holds_classes = || {
+            let records = sample.chunks_exact(stride);
+            records.into_iter().all(|record| is_class(field.value(record, big_endian)))
+        };
+        let is_taken = columns.iter().any(|column| column.role == role);
+        if is_taken || (role == Role::Classification && kind != Kind::U8 && !holds_classes()) {
+            role = Role::Scalar(name.into());
+        }
+        if let Role::Color(_) = role {
+            field.scale = match kind {
+                Kind::F32 | Kind::F64 => 65535.0,
+                Kind::U16 => 1.0,
+                _ => 257.0,
+            };
+        }
+        columns.push(ColumnField { role, field });
+    }
+    columns
+}
+
+/// The vertices without their lists.
+fn pack_vertices(
+    input: &Input,
+    start: usize,
+    vertex: &Element,
+    big_endian: bool,
+    progress: &dyn Progress,
+) -> Result<Vec<u8>> {
+    let mut packed = Vec::new();
+    let mut at = start;
+    for point in 0..vertex.count {
+        if point % 65536 == 0 {
+            progress.check()?;
+        }
+        for property in &vertex.properties {
+            let end = property_end(input, at, property, big_endian)
+                .ok_or_else(|| truncated(input, point, vertex))?;
+            if property.list.is_none() {
+                packed.extend_from_slice(&input[at..end]);
+            }
+            at = end;
+        }
+    }
+    Ok(packed)
+}
+
+/// The first byte behind all of `element`, which begins at `start`.
+fn skip_elements(
+    input: &Input,
+    start: usize,
+    element: &Element,
+    big_endian: bool,
+    progress: &dyn Progress,
+) -> Result<usize> {
+    let ends_early = || {
+        input.malformed(
+            Place::Byte(input.len() as u64),
+            "the end of the file",
+            format!("{} elements `{}`", element.count, element.name),
+            "copy the file again from its source",
+        )
+    };
+    if let Some(stride) = element.stride() {
+        let length = element.count.checked_mul(stride as u64).ok_or_else(ends_early)?;
+        let end = length.checked_add(start as u64).filter(|end| *end <= input.len() as u64);
+        return end.map(|end| end as usize).ok_or_else(ends_early);
+    }
+    let mut at = start;
+    for count in 0..element.count {
+        if count % 65536 == 0 {
+            progress.check()?;
+        }
+        for property in &element.properties {
+            at = property_end(input, at, property, big_endian).ok_or_else(ends_early)?;
+        }
+    }
+    Ok(at)
+}
+
+/// The first byte behind the property at `at`, if the file holds all of it.
+fn property_end(
+    bytes: &[u8],
+    at: usize,
+    property: &super::header::Property,
+    big_endian: bool,
+) -> Option<usize> {
+    let (at, n_items) = match property.list {
+        None => (at, 1),
+        Some(kind) => {
+            let length = bytes.get(at..)?.get(..kind.size())?;
+            let n_items = Field::new(0, kind).value(length, big_endian);
+            // The cast takes a negative length to zero items.
+            (at + kind.size(), n_items as usize)
+        }
+    };
+    let end = n_items.checked_mul(property.kind.size())?.checked_add(at)?;
+    (end <= bytes.len()).then_some(end)
+}
+
+fn truncated(input: &Input, readable: u64, vertex: &Element) -> Error {
+    Error::Truncated {
+        file: input.name.to_string(),
+        place: Place::Byte(input.len() as u64),
+        readable,
+        claimed: vertex.count,
+    }
+}

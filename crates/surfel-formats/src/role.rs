@@ -1,0 +1,62 @@
+//! What the columns of a file mean, by the names that programs give them.
+
+/// The meaning of a column.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Role {
+    /// 0, 1, 2: x, y, z.
+    Position(usize),
+    Normal(usize),
+    /// 0, 1, 2: red, green, blue.
+    Color(usize),
+    Radius,
+    Intensity,
+    Classification,
+    Scalar(String),
+}
+
+impl Role {
+    /// The meaning of a name, if it is one of the usual ones; spelling of case and separators is free.
+    pub fn of_name(name: &str) -> Option<Self> {
+        let plain: String =
+            name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
+        Some(match plain.as_str() {
+            "x" | "px" | "posx" | "xcoordinate" | "easting" => Self::Position(0),
+            "y" | "py" | "posy" | "ycoordinate" | "northing" => Self::Position(1),
+            "z" | "pz" | "posz" | "zcoordinate" | "elevation" | "height" => Self::Position(2),
+            "nx" | "normalx" => Self::Normal(0),
+            "ny" | "normaly" => Self::Normal(1),
+            "nz" | "normalz" => Self::Normal(2),
+            "r" | "red" | "diffusered" => Self::Color(0),
+            "g" | "green" | "diffusegreen" => Self::Color(1),
+            "b" | "blue" | "diffuseblue" => Self::Color(2),
+            "i" => Self::Intensity,
+            // CloudCompare writes `scalar_` before the names of its scalar fields.
+            _ => match plain.strip_prefix("scalar").unwrap_or(&plain) {
+                "radius" | "radii" => Self::Radius,
+                "intensity" | "reflectance" => Self::Intensity,
+                "class" | "classification" | "label" => Self::Classification,
+                _ => return None,
+            },
+        })
+    }
+
+    /// True for the opacity of a colour, which a cloud does not keep.
+    pub fn is_alpha(name: &str) -> bool {
+        ["alpha", "a", "diffuse_alpha"].contains(&name.to_lowercase().as_str())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usual_names_are_known() {
+        assert_eq!(Role::of_name("//X"), Some(Role::Position(0)));
+        assert_eq!(Role::of_name("normal_z"), Some(Role::Normal(2)));
+        assert_eq!(Role::of_name("diffuse_green"), Some(Role::Color(1)));
+        assert_eq!(Role::of_name("scalar_Intensity"), Some(Role::Intensity));
+        assert_eq!(Role::of_name("Scalar field"), None);
+        assert_eq!(Role::of_name("f_rest_0"), None);
+    }
+}

@@ -1,0 +1,310 @@
+//! Points as lines of text: XYZ, TXT, CSV, ASC and PTS.
+
+mod guess;
+
+use surfel::progress::Progress;
+
+use crate::error::{Place, Result};
+use crate::input::Input;
+use crate::lines::{LineError, Rows, parse_number, read_rows};
+use crate::options::{LoadOptions, Loaded, Source, TextColumn};
+use crate::record::{ColumnField, Field, Kind, Layout};
+use crate::role::Role;
+use guess::{color_scale, guess_columns, holds_classes};
+
+pub(crate) fn inspect(input: &Input) -> Result<Source> {
+    let preamble = read_preamble(input)?;
+    Ok(source(&preamble))
+}
+
+pub(crate) fn read(
+    input: &Input,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<Loaded> {
+    let preamble = read_preamble(input)?;
+    let sample = sample_rows(input, &preamble);
+    let columns = match (&options.text_columns, &preamble.names) {
+        (Some(stated), _) => stated.iter().map(|TextColumn(role)| role.clone()).collect(),
+        (None, Some(names)) => names.iter().map(|name| role_of_header(name)).collect(),
+        (None, None) => {
+            let (columns, description) = guess_columns(&sample, preamble.n_fields);
+            progress.note(&format!(
+                "{}: no header; columns taken as {description} (state them with --columns)",
+                input.name
+            ));
+            columns
+        }
+    };
+    check_columns(input, &columns, &preamble)?;
+    let kept: Vec<(usize, &Role)> =
+        columns.iter().enumerate().filter_map(|(i, role)| Some((i, role.as_ref()?))).collect();
+    let fields = column_fields(&kept, &sample, input, progress);
+    let stride = 8 * kept.len();
+    let layout_of = |_: &[u8]| {
+        Layout::new(stride, false, fields.clone(), &options.columns).expect("x, y and z were found")
+    };
+    let parse = |line: &[u8], row: &mut Vec<f64>| parse_line(line, &preamble, &columns, row);
+    let rows =
+        Rows { start: preamble.data, line: preamble.data_line, n_columns: kept.len(), limit: None };
+    progress.begin(&format!("read {}", input.name), (input.len() - preamble.data) as u64);
+    let cloud = read_rows(input, rows, &parse, layout_of, options.origin, progress)?;
+    if let Some(count) = preamble.count {
+        progress.note(&format!("{}: its first line says {count} points", input.name));
+    }
+    let mut source = source(&preamble);
+    source.n_points = Some(cloud.len() as u64);
+    Ok(Loaded { cloud, source })
+}
+
+/// What stands before the first point, and the shape of its line.
+struct Preamble {
+    names: Option<Vec<String>>,
+    /// The number of points, if a line says it as in PTS files.
+    count: Option<u64>,
+    separator: Separator,
+    n_fields: usize,
+    /// First byte and line of the points.
+    data: usize,
+    data_line: u64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Separator {
+    Whitespace,
+    Comma,
+    Semicolon,
+}
+
+impl Separator {
+    fn of_line(line: &[u8]) -> Self {
+        if line.contains(&b';') {
+            Self::Semicolon
+        } else if line.contains(&b',') {
+            Self::Comma
+        } else {
+            Self::Whitespace
+        }
+    }
+
+    fn fields(self, line: &[u8]) -> impl Iterator<Item = &[u8]> {
+        let separator = if self == Self::Semicolon { b';' } else { b',' };
+        let is_separated = self != Self::Whitespace;
+        line.split(
+            move |byte| {
+                if is_separated { *byte == separator } else { byte.is_ascii_whitespace() }
+            },
+        )
+        .filter(move |field| is_separated || !field.is_empty())
+        .map(|field| field.trim_ascii())
+    }
+}
+
+/// The text behind the mark of a comment.
+fn comment(line: &[u8]) -> Option<&[u8]> {
+    line.strip_prefix(b"#").or_else(|| line.strip_prefix(b"//"))
+}
+
+fn read_preamble(input: &Input) -> Result<Preamble> {
+    let mut names = None;
+    let mut count = None;
+    let mut at = 0;
+    let mut number = 0;
+    while at < input.len() {
+        let rest = &input[at..];
+        let length = memchr::memchr(b'\n', rest).map_or(rest.len(), |end| end + 1);
+        // Some programs put a byte order mark before UTF-8.
+        let line = rest[..length].trim_ascii();
+        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
+        number += 1;
+        let start = at;
+        at += length;
+        let (text, is_comment) = match comment(line) {
+            Some(text) => (text.trim_ascii(), true),
+            None => (line, false),
+        };
+        if text.is_empty() {
+            continue;
+        }
+        let separator = Separator::of_line(text);
+        let fields: Vec<&[u8]> = separator.fields(text).collect();
+        let is_names = names_of(&fields).is_some();
+        if is_comment || is_names {
+            names = names_of(&fields).or(names);
+            continue;
+        }
+        if let ([field], None) = (&fields[..], count) {
+            if let Ok(points) = String::from_utf8_lossy(field).parse() {
+                count = Some(points);
+                continue;
+            }
+        }
+        if fields.iter().all(|field| field.is_empty() || parse_number(field).is_ok()) {
+            let has_empty_end = fields.last().is_some_and(|field| field.is_empty());
+            let n_names = names.as_ref().map_or(fields.len() - 1, Vec::len);
+            // A separator at the end of each line begins no further column.
+            let n_fields = if has_empty_end { n_names } else { fields.len() };
+            return Ok(Preamble {
+                names,
+                count,
+                separator,
+                n_fields,
+                data: start,
+                data_line: number,
+            });
+        }
+        let found = format!("`{}`", text[..text.len().min(60)].escape_ascii());
+        let has_inner_space =
+            |field: &&[u8]| separator != Separator::Whitespace && field.contains(&b' ');
+        if separator == Separator::Semicolon && text.contains(&b',')
+            || fields.iter().any(has_inner_space)
+        {
+            let expected = "numbers with a decimal point, not a comma";
+            let advice = "replace the decimal commas by points";
+            return Err(input.malformed(Place::Line(number), found, expected, advice));
+        }
+        let expected = "numbers, or a header with at least x, y and z";
+        let advice = "remove the line or put # before it";
+        return Err(input.malformed(Place::Line(number), found, expected, advice));
+    }
+    let advice = "the file holds no points";
+    Err(input.malformed(Place::Line(number), "no line with numbers", "x y z in each line", advice))
+}
+
+/// The fields as names of columns, if x, y and z are among them.
+fn names_of(fields: &[&[u8]]) -> Option<Vec<String>> {
+    let mut names: Vec<String> = fields
+        .iter()
+        .map(|field| String::from_utf8_lossy(field).trim_matches(['"', '\'', ' ']).to_owned())
+        .collect();
+    if names.last().is_some_and(String::is_empty) {
+        names.pop();
+    }
+    let has_axis =
+        |axis| names.iter().any(|name| Role::of_name(name) == Some(Role::Position(axis)));
+    (0..3).all(has_axis).then_some(names)
+}
+
+fn role_of_header(name: &str) -> Option<Role> {
+    if Role::is_alpha(name) {
+        return None;
+    }
+    Some(Role::of_name(name).unwrap_or_else(|| Role::Scalar(name.into())))
+}
+
+fn check_columns(input: &Input, columns: &[Option<Role>], preamble: &Preamble) -> Result<()> {
+    let place = Place::Line(preamble.data_line);
+    if columns.len() != preamble.n_fields {
+        return Err(input.malformed(
+            place,
+            format!("{} columns", preamble.n_fields),
+            format!("{}", columns.len()),
+            "state all columns with --columns, `-` for one to skip",
+        ));
+    }
+    for axis in 0..3 {
+        if !columns.contains(&Some(Role::Position(axis))) {
+            let found = format!("{} columns without {}", columns.len(), ["x", "y", "z"][axis]);
+            let advice = "state the columns with --columns, as in x,y,z,-,r,g,b";
+            return Err(input.malformed(place, found, "columns x, y and z", advice));
+        }
+    }
+    Ok(())
+}
+
+/// Where the kept columns stand in a parsed row, and how their values are to be taken.
+fn column_fields(
+    kept: &[(usize, &Role)],
+    sample: &[Vec<f64>],
+    input: &Input,
+    progress: &dyn Progress,
+) -> Vec<ColumnField> {
+    let colors: Vec<usize> =
+        kept.iter().filter(|(_, role)| matches!(role, Role::Color(_))).map(|(i, _)| *i).collect();
+    let (scale, range) = color_scale(sample, &colors);
+    if !colors.is_empty() && scale != 257.0 {
+        progress.note(&format!("{}: colours taken as {range}", input.name));
+    }
+    let mut fields: Vec<ColumnField> = Vec::new();
+    for (place, (column, role)) in kept.iter().enumerate() {
+        let mut field = Field::new(8 * place, Kind::F64);
+        let mut role = (*role).clone();
+        if let Role::Color(_) = role {
+            field.scale = scale;
+        }
+        if role == Role::Classification && !holds_classes(sample, *column) {
+            role = Role::Scalar("classification".into());
+        }
+        fields.push(ColumnField { role, field });
+    }
+    fields
+}
+
+fn parse_line(
+    line: &[u8],
+    preamble: &Preamble,
+    columns: &[Option<Role>],
+    row: &mut Vec<f64>,
+) -> std::result::Result<(), LineError> {
+    if comment(line).is_some() {
+        return Ok(());
+    }
+    let mut n_fields = 0;
+    let mut has_empty_end = false;
+    for field in preamble.separator.fields(line) {
+        if let Some(Some(_)) = columns.get(n_fields) {
+            row.push(if field.is_empty() { f64::NAN } else { parse_number(field)? });
+        }
+        n_fields += 1;
+        has_empty_end = field.is_empty();
+    }
+    // Each scan of a PTS file may have a line with its number of points.
+    if n_fields == 1 && preamble.count.is_some() {
+        row.clear();
+        return Ok(());
+    }
+    let is_longer_by_empty_end = has_empty_end && n_fields == columns.len() + 1;
+    if n_fields != columns.len() && !is_longer_by_empty_end {
+        let expected = format!("{} as in the lines before", columns.len());
+        return Err(LineError { found: format!("{n_fields} fields"), expected });
+    }
+    Ok(())
+}
+
+/// All fields of some lines spread over the file; what is wrong with lines is told when they are read.
+fn sample_rows(input: &Input, preamble: &Preamble) -> Vec<Vec<f64>> {
+    const PLACES: usize = 64;
+    const LINES: usize = 16;
+    let data = &input[preamble.data..];
+    let mut rows = Vec::new();
+    for place in 0..PLACES {
+        let from = data.len() * place / PLACES;
+        // A line is begun at its start, not where the place happens to fall into it.
+        let lines = data[from..].split(|byte| *byte == b'\n').skip(usize::from(0 < place));
+        for line in lines.take(LINES) {
+            let line = line.trim_ascii();
+            let fields = preamble.separator.fields(line);
+            let mut row: Vec<f64> =
+                fields.map(|field| parse_number(field).unwrap_or(f64::NAN)).collect();
+            if comment(line).is_none() && preamble.n_fields <= row.len() {
+                row.truncate(preamble.n_fields);
+                rows.push(row);
+            }
+        }
+    }
+    rows
+}
+
+fn source(preamble: &Preamble) -> Source {
+    let separator = match preamble.separator {
+        Separator::Whitespace => "spaces",
+        Separator::Comma => "commas",
+        Separator::Semicolon => "semicolons",
+    };
+    Source {
+        format: format!("text, {} columns separated by {separator}", preamble.n_fields),
+        n_points: preamble.count,
+        columns: preamble.names.clone().unwrap_or_default(),
+        ..Source::default()
+    }
+}

@@ -1,0 +1,16 @@
+//! Files in and out: real scans, files made by the tests, and broken ones.
+
+#[path = "formats/common.rs"]
+mod common;
+#[path = "formats/broken.rs"]
+mod broken;
+#[path = "formats/ply.rs"]
+mod ply;
+#[path = "formats/pictures.rs"]
+mod pictures;
+#[path = "formats/round_trip.rs"]
+mod round_trip;
+#[path = "formats/scans.rs"]
+mod scans;
+#[path = "formats/text.rs"]
+mod text;

@@ -1,0 +1,168 @@
+//! Broken files: an error that names the place, never a panic, never memory out of proportion.
+
+use surfel::points::PointCloud;
+use surfel::progress::Silent;
+use surfel_formats::{Error, LoadOptions, load, load_bytes};
+
+use crate::common::{Folder, Listener, file_of, full_cloud, read};
+
+fn message(name: &str, bytes: impl AsRef<[u8]>) -> String {
+    read(name, bytes).unwrap_err().to_string()
+}
+
+/// Small files of every format, each with several points.
+fn small_files() -> Vec<(&'static str, Vec<u8>)> {
+    let cloud = full_cloud(5);
+    let lists = "ply\nformat binary_big_endian 1.0\nelement face 1\nproperty list uchar int i\n\
+        element vertex 2\nproperty float x\nproperty float y\nproperty list uchar char l\n\
+        property float z\nend_header\n";
+    let ascii = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n\
+        property float z\nproperty list uchar char l\nend_header\n0 1 2 1 5\n3 4 5 0\n";
+    vec![
+        ("a.ply", file_of(&cloud, "ply")),
+        ("lists.ply", [lists.as_bytes(), &[1, 0, 0, 0, 9], &[0; 26]].concat()),
+        ("ascii.ply", ascii.into()),
+        ("a.las", file_of(&cloud, "las")),
+        ("a.laz", file_of(&cloud, "laz")),
+        ("a.csv", "x,y,z,r,g,b,time\n1,2,3,4,5,6,7.5\n-1,2e3,nan,4,5,6,\n".into()),
+        ("a.pts", "2\n1 2 3 -4 5 6 7\n1 2 3 -4 5 6 7\n".into()),
+        ("a.obj", "o cube\nv 1 2 3\nv 1 2 3\nf 1 2 1\n".into()),
+    ]
+}
+
+#[test]
+fn files_cut_off_at_any_length_do_not_panic() {
+    for (name, bytes) in small_files() {
+        let whole = read(name, &bytes).unwrap().cloud.len();
+        for length in 0..bytes.len() {
+            // Text may be cut off without a sign; what is read is then no more than there was.
+            if let Ok(loaded) = read(name, &bytes[..length]) {
+                assert!(loaded.cloud.len() <= whole, "{name} {length}");
+                assert!(!name.ends_with(".las") || loaded.cloud.len() == whole, "{name} {length}");
+            }
+        }
+    }
+}
+
+#[test]
+fn files_with_any_byte_changed_do_not_panic() {
+    for (name, mut bytes) in small_files() {
+        for at in 0..bytes.len() {
+            for value in [0, 1, 0x7f, 0x80, 0xff, bytes[at] ^ 0x10] {
+                let old = std::mem::replace(&mut bytes[at], value);
+                if let Ok(loaded) = read(name, &bytes) {
+                    assert!(loaded.cloud.len() <= bytes.len() * 100, "{name} {at} {value}");
+                }
+                bytes[at] = old;
+            }
+        }
+    }
+}
+
+#[test]
+fn empty_files_wrong_magic_and_absent_files_are_told() {
+    assert!(message("a.ply", "").contains("found an empty file"));
+    assert!(message("a.ply", "plx\n").contains("found `plx\\n`, expected `ply`"));
+    assert!(message("a.laz", "PK").contains("the extension does not fit"));
+    assert!(message("a.what", "1 2 3").contains("the extension `.what`"));
+    assert!(message("what", "1 2 3").contains("without extension"));
+    let folder = Folder::new("absent");
+    let failed = |name: &str| {
+        load(&folder.path(name), &LoadOptions::default(), &Silent).unwrap_err().to_string()
+    };
+    assert!(failed("a.ply").contains("check the name and the folder"));
+    assert!(failed("").contains("found a folder"));
+    std::fs::write(folder.path("empty.las"), "").unwrap();
+    assert!(failed("empty.las").contains("an empty file"));
+}
+
+#[test]
+fn a_header_of_ply_that_lies_or_lacks_is_refused() {
+    let file = |lines: &str| format!("ply\nformat binary_little_endian 1.0\n{lines}\nend_header\n");
+    let xyz = "property float x\nproperty float y\nproperty float z";
+    let billions = file(&format!("element vertex 4000000000\n{xyz}")) + "0123456789ab";
+    assert!(matches!(
+        read("a.ply", &billions),
+        Err(Error::Truncated { readable: 1, claimed: 4_000_000_000, .. })
+    ));
+    let skipped = format!("element a 9999999999999\nproperty double b\nelement vertex 1\n{xyz}");
+    assert!(message("a.ply", file(&skipped)).contains("elements `a`"));
+    let listed =
+        format!("element a 9999999999999\nproperty list int int b\nelement vertex 1\n{xyz}");
+    assert!(message("a.ply", file(&listed)).contains("elements `a`"));
+    let without = file("element vertex 1\nproperty float x\nproperty float y");
+    assert!(message("a.ply", without).contains("expected vertex properties x, y and z"));
+    assert!(message("a.ply", file("element face 1")).contains("expected an element `vertex`"));
+    let bad = [
+        "element vertex many",
+        "property float x",
+        "element vertex 1\nproperty quad x",
+        "element vertex 1\nproperty list float int x",
+        "element vertex 1\nproperty list uchar x",
+        "format binary_middle_endian 1.0",
+        "rubbish",
+    ];
+    for lines in bad {
+        let message = message("a.ply", file(lines));
+        assert!(message.contains("line ") && message.contains("the header is broken"), "{message}");
+    }
+    assert!(message("a.ply", "ply\nend_header\n").contains("a `format` line"));
+    let ascii =
+        format!("ply\nformat ascii 1.0\nelement vertex 3000000000\n{xyz}\nend_header\n1 2 3\n");
+    assert!(matches!(read("a.ply", ascii), Err(Error::Truncated { readable: 1, .. })));
+    let fields =
+        format!("ply\nformat ascii 1.0\nelement vertex 2\n{xyz}\nend_header\n1 2 3\n1 x 3\n");
+    assert!(message("a.ply", fields).contains("line 9: found `x`"));
+}
+
+/// The file with some bytes replaced.
+fn with(mut bytes: Vec<u8>, at: usize, new: &[u8]) -> Vec<u8> {
+    bytes[at..at + new.len()].copy_from_slice(new);
+    bytes
+}
+
+#[test]
+fn headers_of_las_that_lie_are_refused() {
+    let las = || file_of(&full_cloud(5), "las");
+    let laz = || file_of(&full_cloud(5), "laz");
+    let billions = 4_000_000_000_u64.to_le_bytes();
+    let truncated = read("a.las", with(las(), 247, &billions));
+    assert!(matches!(truncated, Err(Error::Truncated { readable: 5, .. })));
+    assert!(message("a.laz", with(laz(), 247, &billions)).contains("4000000000"));
+    // More than the bytes can hold, in one chunk of as many.
+    let n_points = 40_000_u64.to_le_bytes();
+    assert!(read("a.laz", with(laz(), 247, &n_points)).is_err());
+    for file in [las(), laz()] {
+        let changed = |at, new: &[u8]| message("a.las", with(file.clone(), at, new));
+        assert!(changed(96, &u32::MAX.to_le_bytes()).contains("points at byte 4294967295"));
+        assert!(changed(105, &[0, 0]).contains("records of 0 bytes"));
+        assert!(changed(104, &[11]).contains("point format 11"));
+        assert!(changed(24, &[2, 0]).contains("LAS version 2.0"));
+        assert!(changed(131, &0.0_f64.to_le_bytes()).contains("scales other than 0"));
+        assert!(changed(155, &f64::NAN.to_le_bytes()).contains("finite"));
+        assert!(changed(100, &u32::MAX.to_le_bytes()).contains("variable length record"));
+        // The length of the first record behind the header.
+        assert!(changed(395, &[0xff, 0xff]).contains("variable length record"));
+    }
+}
+
+#[test]
+fn no_points_and_one_point_are_read() {
+    for n in [0, 1] {
+        for extension in ["ply", "las", "laz"] {
+            let cloud = PointCloud { origin: Default::default(), ..full_cloud(n) };
+            let name = format!("a.{extension}");
+            assert_eq!(read(&name, file_of(&cloud, extension)).unwrap().cloud.len(), n);
+        }
+    }
+}
+
+#[test]
+fn reading_stops_when_it_is_cancelled() {
+    let listener = Listener::default();
+    listener.cancelled.store(true, std::sync::atomic::Ordering::Relaxed);
+    for (name, bytes) in small_files() {
+        let cancelled = load_bytes(name, &bytes, &LoadOptions::default(), &listener);
+        assert!(matches!(cancelled, Err(Error::Surfel(surfel::Error::Cancelled))), "{name}");
+    }
+}

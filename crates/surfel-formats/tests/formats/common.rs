@@ -1,0 +1,124 @@
+//! What the tests share: scans if they are there, a folder to write to, small clouds.
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use surfel::math::{DVec3, Vec3};
+use surfel::points::{PointCloud, Scalar, Values};
+use surfel::progress::{Progress, Silent};
+use surfel_formats::{Error, LoadOptions, Loaded, SaveOptions, load, load_bytes, save};
+
+/// A file of the shared test data; without them a line is printed and the test has nothing to do.
+pub fn shared(name: &str) -> Option<PathBuf> {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    if !data.is_dir() {
+        #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
+        {
+            println!("skipped: ../shared/data is absent");
+        }
+        return None;
+    }
+    Some(data.join(name))
+}
+
+/// A folder of its own for a test, removed at its end.
+pub struct Folder(PathBuf);
+
+impl Folder {
+    pub fn new(test: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("surfel-{test}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        Self(folder)
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    pub fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.0).unwrap();
+        entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Keeps the notes; cancelled if asked for.
+#[derive(Default)]
+pub struct Listener {
+    pub notes: Mutex<Vec<String>>,
+    pub cancelled: AtomicBool,
+}
+
+impl Listener {
+    pub fn heard(&self, words: &str) -> bool {
+        self.notes.lock().unwrap().iter().any(|note| note.contains(words))
+    }
+}
+
+impl Progress for Listener {
+    fn note(&self, line: &str) {
+        self.notes.lock().unwrap().push(line.into());
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+}
+
+pub fn read(name: &str, bytes: impl AsRef<[u8]>) -> Result<Loaded, Error> {
+    load_bytes(name, bytes.as_ref(), &LoadOptions::default(), &Silent)
+}
+
+/// The cloud after it was written to a file of this extension and read again.
+pub fn there_and_back(cloud: &PointCloud, extension: &str, options: &SaveOptions) -> Loaded {
+    static COUNT: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    let folder = Folder::new(&format!("there-and-back-{count}"));
+    let path = folder.path(&format!("cloud.{extension}"));
+    save(&path, cloud, options, &Silent).unwrap();
+    load(&path, &LoadOptions::default(), &Silent).unwrap()
+}
+
+/// The bytes of the file that the cloud becomes.
+pub fn file_of(cloud: &PointCloud, extension: &str) -> Vec<u8> {
+    let folder = Folder::new(&format!("file-of-{extension}-{:p}", cloud));
+    let path = folder.path(&format!("cloud.{extension}"));
+    save(&path, cloud, &SaveOptions::default(), &Silent).unwrap();
+    std::fs::read(&path).unwrap()
+}
+
+/// Points with every column.
+pub fn full_cloud(n: usize) -> PointCloud {
+    let f = |i: usize, step: f32| ((i * 7919) % 1000) as f32 * step;
+    let scalar = |name: &str, values| Scalar { name: name.into(), values };
+    PointCloud {
+        origin: DVec3::new(500_000.0, 4_900_000.0, 100.0),
+        positions: (0..n).map(|i| Vec3::new(f(i, 0.25), f(i + 1, 0.125), f(i + 2, 0.5))).collect(),
+        normals: Some((0..n).map(|i| Vec3::new(f(i, 1.0), 1.0, 2.0).normalize()).collect()),
+        radii: Some((0..n).map(|i| f(i, 0.001) + 0.5).collect()),
+        colors: Some((0..n).map(|i| [(i % 256) as u16 * 257, 1000, 65535]).collect()),
+        intensity: Some((0..n).map(|i| (1 + i * 3 % 60_000) as f32).collect()),
+        classification: Some((0..n).map(|i| 1 + (i % 18) as u8).collect()),
+        scalars: vec![
+            scalar("return_number", Values::U8((0..n).map(|i| 1 + (i % 5) as u8).collect())),
+            scalar("gps_time", Values::F64((0..n).map(|i| 1e8 + i as f64 * 1e-3).collect())),
+            scalar("Deviation", Values::U16((0..n).map(|i| i as u16).collect())),
+            scalar("amplitude", Values::F32((0..n).map(|i| f(i, -0.3)).collect())),
+            scalar("count", Values::I32((0..n).map(|i| -(i as i32)).collect())),
+        ],
+    }
+}
+
+/// The largest distance on an axis between the same points of two clouds.
+pub fn largest_difference(a: &PointCloud, b: &PointCloud) -> DVec3 {
+    assert_eq!(a.len(), b.len());
+    (0..a.len())
+        .map(|i| (a.world_position(i) - b.world_position(i)).abs())
+        .fold(DVec3::ZERO, DVec3::max)
+}

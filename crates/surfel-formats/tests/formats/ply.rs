@@ -1,0 +1,136 @@
+//! PLY: every type, byte order and kind of header.
+
+use surfel::math::{DVec3, Vec3};
+use surfel::points::Values;
+use surfel::progress::Silent;
+use surfel_formats::{Column, ColumnChoice, LoadOptions, load_bytes};
+
+use crate::common::read;
+
+fn binary(header: &str, body: &[u8]) -> Vec<u8> {
+    [header.as_bytes(), body].concat()
+}
+
+#[test]
+fn lists_comments_crlf_and_other_elements_are_passed_over() {
+    let text = "ply\r\nformat ascii 1.0\r\ncomment a\r\nobj_info b c\r\nelement camera 2\r\n\
+        property float fov\r\nelement vertex 2\r\nproperty list uchar int near\r\nproperty float x\r\n\
+        property float y\r\nproperty list uchar float far\r\nproperty double z\r\n\
+        element face 1\r\nproperty list uchar int vertex_indices\r\nend_header\r\n\
+        45\r\n46\r\n2 7 8 1 2 0 3\r\n0 4 5 1 9.5 6\r\n3 0 1 1";
+    let cloud = read("a.ply", text).unwrap().cloud;
+    assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
+    assert!(cloud.scalars.is_empty());
+}
+
+#[test]
+fn every_type_is_read_in_both_byte_orders_and_spellings() {
+    for (order, is_big) in [("little", false), ("big", true)] {
+        let header = format!(
+            "ply\nformat binary_{order}_endian 1.0\nelement vertex 1\nproperty float32 x\n\
+            property double y\nproperty float z\nproperty char a1\nproperty uint8 a2\n\
+            property int16 a3\nproperty ushort a4\nproperty int32 a5\nproperty uint a6\n\
+            property float64 a7\nend_header\n"
+        );
+        macro_rules! body {
+            ($($value:expr),*) => {
+                [$(if is_big { $value.to_be_bytes().to_vec() } else { $value.to_le_bytes().to_vec() }),*].concat()
+            };
+        }
+        let body = body!(
+            1.5f32,
+            2.5f64,
+            3.5f32,
+            -1i8,
+            200u8,
+            -300i16,
+            60_000u16,
+            -70_000i32,
+            3_000_000_000u32,
+            0.1f64
+        );
+        let cloud = read("a.ply", binary(&header, &body)).unwrap().cloud;
+        assert_eq!(cloud.positions, [Vec3::new(1.5, 2.5, 3.5)]);
+        let values: Vec<&Values> = cloud.scalars.iter().map(|scalar| &scalar.values).collect();
+        assert_eq!(
+            values,
+            [
+                &Values::I32(vec![-1]),
+                &Values::U8(vec![200]),
+                &Values::I32(vec![-300]),
+                &Values::U16(vec![60_000]),
+                &Values::I32(vec![-70_000]),
+                &Values::F64(vec![3e9]),
+                &Values::F64(vec![0.1]),
+            ]
+        );
+    }
+}
+
+#[test]
+fn binary_lists_before_and_between_numbers_are_passed_over() {
+    let header = "ply\nformat binary_little_endian 1.0\nelement strip 2\n\
+        property list uchar ushort i\nelement vertex 2\nproperty uchar x\n\
+        property list ushort uchar l\nproperty uchar y\nproperty uchar z\nend_header\n";
+    let body = [1, 9, 9, 0, /* points */ 1, 2, 0, 7, 7, 2, 3, 4, 0, 0, 5, 6];
+    let cloud = read("a.ply", binary(header, &body)).unwrap().cloud;
+    assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
+}
+
+#[test]
+fn colours_of_any_type_come_to_16_bits() {
+    let file = |kind: &str, values: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+            property float z\nproperty {kind} red\nproperty {kind} green\nproperty {kind} blue\n\
+            property {kind} alpha\nend_header\n0 0 0 {values}\n"
+        )
+    };
+    let color = |kind, values| read("a.ply", file(kind, values)).unwrap().cloud.colors.unwrap()[0];
+    assert_eq!(color("uchar", "0 128 255 255"), [0, 128 * 257, 65535]);
+    assert_eq!(color("ushort", "0 128 65535 1"), [0, 128, 65535]);
+    assert_eq!(color("float", "0 0.5 1.5 1"), [0, 32768, 65535]);
+}
+
+#[test]
+fn classes_are_classes_only_if_they_are_whole_and_small() {
+    let file = |value: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+            property float z\nproperty float scalar_Classification\nproperty float radii\n\
+            property float scalar_Intensity\nend_header\n0 0 0 {value} 0.5 7\n"
+        )
+    };
+    let whole = read("a.ply", file("6")).unwrap().cloud;
+    assert_eq!(whole.classification, Some(vec![6]));
+    assert_eq!((whole.radii, whole.intensity), (Some(vec![0.5]), Some(vec![7.0])));
+    let broken = read("a.ply", file("6.5")).unwrap().cloud;
+    assert_eq!(broken.classification, None);
+    assert_eq!(broken.scalar("scalar_classification").unwrap().get(0), 6.5);
+}
+
+#[test]
+fn wide_coordinates_keep_their_digits_and_nan_spoils_no_origin() {
+    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 3\n\
+        property double x\nproperty double y\nproperty double z\nend_header\n";
+    let rows = [[589_500.01, 231_300.02, 500.03], [f64::NAN; 3], [589_501.01, 231_301.02, 501.03]];
+    let body: Vec<u8> = rows.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
+    let cloud = read("a.ply", binary(header, &body)).unwrap().cloud;
+    assert!((cloud.world_position(0) - DVec3::from_array(rows[0])).abs().max_element() < 1e-6);
+    assert!(cloud.positions[1].is_nan());
+    assert!(cloud.origin.is_finite());
+}
+
+#[test]
+fn only_the_chosen_columns_are_kept() {
+    let text = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+        property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+        property float intensity\nproperty float time\nproperty float other\nend_header\n\
+        0 0 0 1 2 3 4 5 6\n";
+    let wanted = vec![Column::Colors, Column::Scalar("Time".into())];
+    let options = LoadOptions { columns: ColumnChoice::Only(wanted), ..LoadOptions::default() };
+    let cloud = load_bytes("a.ply", text.as_bytes(), &options, &Silent).unwrap().cloud;
+    assert_eq!(cloud.colors, Some(vec![[257, 514, 771]]));
+    assert_eq!(cloud.intensity, None);
+    assert_eq!(cloud.scalars.len(), 1);
+}

@@ -1,0 +1,164 @@
+//! What is written is read back the same, to the resolution of the format.
+
+use surfel::math::{DVec3, Vec3};
+use surfel::points::{PointCloud, Values};
+use surfel::progress::Silent;
+use surfel_formats::{Error, LoadOptions, Loaded, SaveOptions, load, load_all, save};
+
+use crate::common::{Folder, Listener, full_cloud, largest_difference, shared, there_and_back};
+
+#[test]
+fn every_column_comes_back() {
+    for n in [0, 1, 2, 120_000] {
+        for extension in ["ply", "las", "laz"] {
+            let cloud = full_cloud(n);
+            let options =
+                SaveOptions { resolution: Some(DVec3::splat(0.001)), ..Default::default() };
+            let back = there_and_back(&cloud, extension, &options).cloud;
+            let allowed = if extension == "ply" { 0.0 } else { 1e-3 };
+            assert!(largest_difference(&cloud, &back).max_element() <= allowed, "{extension} {n}");
+            assert!(back.normals == cloud.normals, "{extension} {n}");
+            assert!(back.radii == cloud.radii, "{extension} {n}");
+            assert!(back.colors == cloud.colors, "{extension} {n}");
+            assert!(back.intensity == cloud.intensity, "{extension} {n}");
+            assert!(back.classification == cloud.classification, "{extension} {n}");
+            for scalar in &cloud.scalars {
+                assert_eq!(back.scalar(&scalar.name), Some(&scalar.values), "{extension} {n}");
+            }
+        }
+    }
+}
+
+#[test]
+fn positions_about_zero_come_back_bit_by_bit_from_ply() {
+    let positions = vec![Vec3::new(0.1, 1e-20, -3e7), Vec3::new(f32::NAN, f32::INFINITY, 0.0)];
+    let back = there_and_back(
+        &PointCloud::from_positions(positions.clone()),
+        "ply",
+        &SaveOptions::default(),
+    );
+    let bits = |positions: &[Vec3]| -> Vec<[u32; 3]> {
+        positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
+    };
+    assert_eq!(bits(&back.cloud.positions), bits(&positions));
+}
+
+#[test]
+fn las_steps_are_fine_enough_for_the_cloud() {
+    for size in [1e-3f32, 1.0, 50.0, 3e4, 1e9] {
+        let positions =
+            (0..100).map(|i| Vec3::splat(size * i as f32 / 99.0 - size / 3.0)).collect();
+        let cloud = PointCloud::from_positions(positions);
+        let back = there_and_back(&cloud, "laz", &SaveOptions::default()).cloud;
+        let error = largest_difference(&cloud, &back).max_element();
+        assert!(error <= f64::from(size) * 1e-6, "{size} {error}");
+    }
+}
+
+#[test]
+fn las_refuses_points_at_infinity_and_an_old_file_stays() {
+    let folder = Folder::new("infinite");
+    let path = folder.path("a.las");
+    std::fs::write(&path, "old").unwrap();
+    let cloud = PointCloud::from_positions(vec![Vec3::ZERO, Vec3::splat(f32::INFINITY)]);
+    let error = save(&path, &cloud, &SaveOptions::default(), &Silent).unwrap_err().to_string();
+    assert!(error.contains("point 1"), "{error}");
+    let listener = Listener::default();
+    listener.cancelled.store(true, std::sync::atomic::Ordering::Relaxed);
+    let cancelled = save(&path, &full_cloud(10), &SaveOptions::default(), &listener);
+    assert!(matches!(cancelled, Err(Error::Surfel(surfel::Error::Cancelled))));
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+    assert_eq!(folder.names(), ["a.las"]);
+}
+
+#[test]
+fn coordinate_systems_are_carried_over() {
+    for system in ["EPSG:2154", "EPSG:4326", "PROJCS[\"somewhere\"]"] {
+        for extension in ["las", "laz"] {
+            let options =
+                SaveOptions { coordinate_system: Some(system.into()), ..Default::default() };
+            let back = there_and_back(&full_cloud(3), extension, &options);
+            assert_eq!(back.source.coordinate_system.as_deref(), Some(system));
+        }
+    }
+}
+
+#[test]
+fn another_reader_reads_what_is_written() {
+    let folder = Folder::new("oracle");
+    let cloud = full_cloud(60_000);
+    for extension in ["las", "laz"] {
+        let path = folder.path(&format!("a.{extension}"));
+        save(&path, &cloud, &SaveOptions::default(), &Silent).unwrap();
+        let mut reader = las::Reader::from_path(&path).unwrap();
+        assert_eq!(reader.header().number_of_points(), 60_000);
+        let bounds = reader.header().bounds();
+        for (i, point) in reader.read_all().unwrap().points().enumerate() {
+            let point = point.unwrap();
+            let position = DVec3::new(point.x, point.y, point.z);
+            assert!((position - cloud.world_position(i)).abs().max_element() < 1e-3);
+            assert!(bounds.min.x <= point.x && point.x <= bounds.max.x);
+            assert_eq!(f32::from(point.intensity), cloud.intensity.as_ref().unwrap()[i]);
+            let color = point.color.unwrap();
+            assert_eq!([color.red, color.green, color.blue], cloud.colors.as_ref().unwrap()[i]);
+            assert_eq!(point.gps_time.unwrap(), cloud.scalar("gps_time").unwrap().get(i));
+            assert_eq!(
+                f64::from(point.return_number),
+                cloud.scalar("return_number").unwrap().get(i)
+            );
+        }
+    }
+}
+
+#[test]
+fn scans_come_back_to_their_resolution() {
+    for name in ["lone-star.copc.laz", "ign_lidar_697k.laz", "sample_c.las", "vol_total.ply"] {
+        let Some(path) = shared(&format!("clouds/{name}")) else { return };
+        let Loaded { cloud, source } = load(&path, &LoadOptions::default(), &Silent).unwrap();
+        let options = SaveOptions {
+            resolution: source.resolution,
+            coordinate_system: source.coordinate_system.clone(),
+        };
+        for extension in ["ply", "laz"] {
+            let back = there_and_back(&cloud, extension, &options);
+            let step = source.resolution.unwrap_or(DVec3::splat(1e-3));
+            let error = largest_difference(&cloud, &back.cloud) / step;
+            assert!(error.max_element() <= 0.51, "{name} {extension}: {error} steps");
+            assert!(back.cloud.colors == cloud.colors, "{name} {extension}");
+            assert!(back.cloud.intensity == cloud.intensity, "{name} {extension}");
+            assert!(back.cloud.classification == cloud.classification, "{name} {extension}");
+            for scalar in &cloud.scalars {
+                // LAS 1.4 keeps scan angles in steps of 0.006 degrees.
+                let allowed = if scalar.name == "scan_angle" { 0.0031 } else { 0.0 };
+                let other =
+                    back.cloud.scalar(&scalar.name).unwrap_or_else(|| panic!("{}", scalar.name));
+                for i in 0..cloud.len() {
+                    let difference = (scalar.values.get(i) - other.get(i)).abs();
+                    assert!(difference <= allowed, "{name} {extension} {} {i}", scalar.name);
+                }
+            }
+            if extension == "laz" {
+                assert_eq!(back.source.coordinate_system, source.coordinate_system, "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn several_files_make_one_cloud_of_their_common_columns() {
+    let folder = Folder::new("several");
+    let mut other = full_cloud(4);
+    other.origin += DVec3::new(100.0, 0.0, 0.0);
+    other.radii = None;
+    let paths = [folder.path("a.laz"), folder.path("b.ply")];
+    save(&paths[0], &full_cloud(3), &SaveOptions::default(), &Silent).unwrap();
+    save(&paths[1], &other, &SaveOptions::default(), &Silent).unwrap();
+
+    let listener = Listener::default();
+    let (all, sources) = load_all(&paths, &LoadOptions::default(), &listener).unwrap();
+    assert_eq!((all.cloud.len(), sources.len()), (7, 2));
+    assert!(listener.heard("dropped: radii"));
+    assert!((all.cloud.world_position(3) - other.world_position(0)).length() < 1e-3);
+    assert!(matches!(all.cloud.scalar("gps_time"), Some(Values::F64(_))));
+    assert!(matches!(load_all(&[], &LoadOptions::default(), &Silent), Err(Error::NoInput)));
+}

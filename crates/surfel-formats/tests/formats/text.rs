@@ -1,0 +1,105 @@
+//! Text: separators, headers, guesses and their limits.
+
+use surfel::math::{DVec3, Vec3};
+use surfel_formats::{LoadOptions, TextColumn, load_bytes};
+
+use crate::common::{Listener, read};
+
+#[test]
+fn separators_comments_and_headers_are_recognised() {
+    let files = [
+        "1 2 3\n4 5 6",
+        "1\t2\t3\r\n4\t5\t6\r\n",
+        "# made by hand\n1, 2, 3,\n// more\n4, 5, 6,\n",
+        "\u{feff}X;Y;Z\n1;2;3\n4;5;6\n",
+        "//X Y Z\n1 2 3\n\n4 5 6\n",
+        "\"x\",\"y\",\"z\"\n1,2,3\n4,5,6\n",
+        "2\n1 2 3\n4 5 6\n",
+    ];
+    for file in files {
+        let cloud = read("a.txt", file).unwrap().cloud;
+        let expected = [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)];
+        assert_eq!(cloud.positions, expected, "{file:?}");
+        assert!(cloud.scalars.is_empty(), "{file:?}");
+    }
+}
+
+#[test]
+fn headers_name_columns() {
+    let file = "x,y,z,R,G,B,Alpha,Intensity,nx,ny,nz,Class,GPS time\n\
+        1,2,3,10,20,30,255,0.5,0,0,2,6,123.25\n1,2,3,10,20,30,255,,0,1,0,2,124\n";
+    let cloud = read("a.csv", file).unwrap().cloud;
+    assert_eq!(cloud.colors.as_ref().unwrap()[0], [10 * 257, 20 * 257, 30 * 257]);
+    assert_eq!(cloud.normals.as_ref().unwrap()[..], [Vec3::Z, Vec3::Y]);
+    assert_eq!(cloud.classification, Some(vec![6, 2]));
+    assert_eq!(cloud.scalar("gps time").unwrap().get(0), 123.25);
+    assert!(cloud.intensity.unwrap()[1].is_nan(), "an empty field is not a number");
+}
+
+#[test]
+fn columns_are_guessed_by_number_and_range_and_told() {
+    let guess = |line: &str| {
+        let listener = Listener::default();
+        let options = LoadOptions::default();
+        let cloud = load_bytes("a.xyz", line.as_bytes(), &options, &listener).unwrap().cloud;
+        assert!(listener.heard("columns taken as x y z"), "{line}");
+        cloud
+    };
+    assert_eq!(guess("1 2 3 0.5").intensity, Some(vec![0.5]));
+    assert_eq!(guess("1 2 3 0 128 255").colors, Some(vec![[0, 128 * 257, 65535]]));
+    assert_eq!(guess("1 2 3 0 -1 0").normals, Some(vec![-Vec3::Y]));
+    let pts = guess("1 2 3 -700 1 2 3");
+    assert_eq!((pts.intensity, pts.colors), (Some(vec![-700.0]), Some(vec![[257, 514, 771]])));
+    let behind = guess("1 2 3 1 2 3 0.5");
+    assert_eq!((behind.intensity, behind.colors), (Some(vec![0.5]), Some(vec![[257, 514, 771]])));
+    assert_eq!(guess("1 2 3 4 5").scalars.len(), 2);
+}
+
+#[test]
+fn stated_columns_go_before_guesses() {
+    let columns = TextColumn::parse_list("intensity,-,x,y,z,quality");
+    let options = LoadOptions { text_columns: Some(columns), ..LoadOptions::default() };
+    let file = b"7 what 1 2 3 0.5\n8 ever 4 5 6 0.25\n";
+    // The first line is not all numbers, so a header has to say so.
+    let file = [b"# intensity word x y z quality\n".as_slice(), b"7 0 1 2 3 0.5\n", file].concat();
+    let cloud = load_bytes("a.txt", &file, &options, &Listener::default()).unwrap().cloud;
+    assert_eq!(cloud.len(), 3);
+    assert_eq!(cloud.intensity, Some(vec![7.0, 7.0, 8.0]));
+    assert_eq!(cloud.scalar("quality").unwrap().get(2), 0.25);
+}
+
+#[test]
+fn wide_coordinates_keep_their_digits() {
+    let file = "500000.123 4900000.456 100.5\n500010.123 4900010.456 101.5\n";
+    let cloud = read("a.xyz", file).unwrap().cloud;
+    let expected = DVec3::new(500_010.123, 4_900_010.456, 101.5);
+    assert!((cloud.world_position(1) - expected).abs().max_element() < 1e-6);
+}
+
+#[test]
+fn broken_lines_are_named() {
+    let message = |file: &str| read("a.xyz", file).unwrap_err().to_string();
+    assert_eq!(
+        message("1 2 3\n4 5\n"),
+        "a.xyz: line 2: found 2 fields, expected 3 as in the lines before; mend or remove the line"
+    );
+    assert!(message("1 2 3\n# c\n\n4 x 6\n").contains("line 4: found `x`, expected a number"));
+    assert!(message("1,5;2,5;3,5\n").contains("not a comma"));
+    assert!(message("1,5 2,5 3,5\n").contains("not a comma"));
+    assert!(message("1 2\n3 4\n").contains("2 columns without z"));
+    assert!(message("hello world\n").contains("expected numbers, or a header"));
+    assert!(message("# only words\n").contains("no line with numbers"));
+    let long = "1 2 3\n".repeat(200_000) + "1 2\n" + &"1 2 3\n".repeat(100_000);
+    assert!(message(&long).contains("line 200001:"), "{}", message(&long));
+}
+
+#[test]
+fn obj_vertices_are_read_with_their_colours() {
+    let plain = "# cube\nmtllib a\nv 1 2 3\nvn 0 0 1\nvt 0 0\nv 4 5 6 1.0\nf 1 2 1\n";
+    let cloud = read("a.obj", plain).unwrap().cloud;
+    assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
+    let colored = read("a.obj", "v 1 2 3 0 0.5 1\nv 1 2 3 1 1 1\n").unwrap().cloud;
+    assert_eq!(colored.colors.unwrap()[0], [0, 32768, 65535]);
+    let error = read("a.obj", "v 1 2 3\nv 1 2\n").unwrap_err().to_string();
+    assert!(error.contains("line 2: found 2 numbers"), "{error}");
+}

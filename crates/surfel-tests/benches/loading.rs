@@ -1,0 +1,126 @@
+//! Loading: binary PLY by points a second, LAZ against what its decoder alone does with the same bytes.
+
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use laz::{LazVlr, ParLasZipDecompressor};
+use surfel::math::{DVec3, Vec3};
+use surfel::points::PointCloud;
+use surfel::progress::Silent;
+use surfel_formats::{LoadOptions, SaveOptions, load, load_bytes, save};
+
+criterion_group!(benches, ply, laz);
+criterion_main!(benches);
+
+fn ply(criterion: &mut Criterion) {
+    let cloud = PointCloud { intensity: None, origin: DVec3::ZERO, ..survey(12_000_000) };
+    let path = file(&cloud, "ply");
+    drop(cloud);
+    let mut group = criterion.benchmark_group("ply");
+    group.throughput(Throughput::Elements(12_000_000)).sample_size(10);
+    group.bench_function("xyz float, rgb uchar", |bencher| {
+        bencher.iter(|| load(&path, &LoadOptions::default(), &Silent).unwrap());
+    });
+    group.finish();
+    std::fs::remove_file(path).unwrap();
+}
+
+fn laz(criterion: &mut Criterion) {
+    let generated = file(&survey(5_000_000), "laz");
+    let scan = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../../shared/data/clouds/ign_lidar_697k.laz");
+    for path in [&scan, &generated] {
+        let Ok(bytes) = std::fs::read(path) else {
+            say(&format!("skipped: {} is absent", path.display()));
+            continue;
+        };
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mut decoder = Decoder::new(&bytes);
+        let read = || load_bytes("a.laz", &bytes, &LoadOptions::default(), &Silent).unwrap();
+
+        let mut group = criterion.benchmark_group("laz");
+        group.throughput(Throughput::Elements(decoder.n_points)).sample_size(10);
+        group.bench_function(BenchmarkId::new("decoder alone", &name), |bencher| {
+            bencher.iter(|| decoder.decode(&bytes));
+        });
+        group.bench_function(BenchmarkId::new("load", &name), |bencher| bencher.iter(read));
+        group.finish();
+
+        let ratio = median_ratio(|| decoder.decode(&bytes), || drop(read()));
+        say(&format!("{name}: load has {:.0} % of the decoder's throughput", 100.0 * ratio));
+    }
+    std::fs::remove_file(generated).unwrap();
+}
+
+/// All points to one buffer by the decoder's own threads; the buffer is there before.
+struct Decoder {
+    vlr: LazVlr,
+    data_start: u64,
+    n_points: u64,
+    records: Vec<u8>,
+}
+
+impl Decoder {
+    fn new(bytes: &[u8]) -> Self {
+        let user_id = LazVlr::USER_ID.as_bytes();
+        let at = bytes.windows(user_id.len()).position(|window| window == user_id).unwrap();
+        let vlr = LazVlr::from_buffer(&bytes[at + 52..]).unwrap();
+        let number = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+        let n_points = number(247);
+        let records = vec![0; n_points as usize * vlr.items_size() as usize];
+        Self { vlr, data_start: number(96) & 0xffff_ffff, n_points, records }
+    }
+
+    fn decode(&mut self, bytes: &[u8]) {
+        let mut source = Cursor::new(bytes);
+        source.set_position(self.data_start);
+        let mut decompressor = ParLasZipDecompressor::new(source, self.vlr.clone()).unwrap();
+        decompressor.decompress_many(&mut self.records).unwrap();
+    }
+}
+
+/// Seconds of `a` by those of `b`: the median over pairs of runs, so that both see the same machine.
+fn median_ratio(mut a: impl FnMut(), mut b: impl FnMut()) -> f64 {
+    fn time(run: &mut impl FnMut()) -> Duration {
+        let start = Instant::now();
+        run();
+        start.elapsed()
+    }
+    let mut ratios: Vec<f64> =
+        (0..9).map(|_| time(&mut a).as_secs_f64() / time(&mut b).as_secs_f64()).collect();
+    ratios.sort_by(f64::total_cmp);
+    ratios[ratios.len() / 2]
+}
+
+/// A hilly site scanned line by line, with noise, colours and intensities.
+fn survey(n: usize) -> PointCloud {
+    let noise = |i: usize| ((i as u32).wrapping_mul(2_654_435_761) >> 16) as f32 / 65536.0;
+    let position = |i: usize| {
+        let (x, y) = ((i % 2000) as f32 * 0.15 + 0.1 * noise(i), (i / 2000) as f32 * 0.15);
+        let hills = 8.0 * (0.02 * x).sin() * (0.03 * y).cos();
+        Vec3::new(x, y + 0.1 * noise(i + 1), hills + 0.05 * noise(i + 2))
+    };
+    let color = |i: usize| [0, 3, 5].map(|shift| (96.0 + 64.0 * noise(i / 7 + shift)) as u16 * 257);
+    PointCloud {
+        origin: DVec3::new(484_800.0, 6_632_800.0, 100.0),
+        positions: (0..n).map(position).collect(),
+        colors: Some((0..n).map(color).collect()),
+        intensity: Some((0..n).map(|i| (1.0 + 2000.0 * noise(i / 3)).floor()).collect()),
+        ..PointCloud::default()
+    }
+}
+
+fn file(cloud: &PointCloud, extension: &str) -> PathBuf {
+    let name = format!("surfel-loading-{}.{extension}", std::process::id());
+    let path = std::env::temp_dir().join(name);
+    let options = SaveOptions { resolution: Some(DVec3::splat(0.001)), ..SaveOptions::default() };
+    save(&path, cloud, &options, &Silent).unwrap();
+    path
+}
+
+#[expect(clippy::print_stderr, reason = "a benchmark speaks to whoever runs it")]
+fn say(line: &str) {
+    eprintln!("{line}");
+}
