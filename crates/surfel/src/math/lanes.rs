@@ -185,7 +185,11 @@ impl<L: Lanes> Vec3Lanes<L> {
     #[inline(always)]
     pub fn store(self) -> [super::Vec3; LANES] {
         let (x, y, z) = (self.x.store(), self.y.store(), self.z.store());
-        std::array::from_fn(|i| super::Vec3::new(x[i], y[i], z[i]))
+        let mut vectors = [super::Vec3::ZERO; LANES];
+        for lane in 0..LANES {
+            vectors[lane] = super::Vec3::new(x[lane], y[lane], z[lane]);
+        }
+        vectors
     }
 
     #[inline(always)]

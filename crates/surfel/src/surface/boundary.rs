@@ -51,31 +51,40 @@ impl Neighbor {
 /// Judges a hit by the points around it; those out of reach are passed over.
 pub fn surroundings(hit: &Candidate, neighbors: &[Neighbor]) -> Surroundings {
     let frame = Frame::around(hit.normal);
-    let radius = hit.radius;
-    let mut directions = [(0.0f32, 0.0f32); MAX_NEIGHBORS];
-    let (mut n_near, mut n) = (0, 0);
+    let (reach, thickness) = (NEIGHBOR_REACH * hit.radius, THICKNESS * hit.radius);
     let mut near = [Neighbor::NONE; MAX_NEIGHBORS];
+    let mut places = [(0.0f32, 0.0f32); MAX_NEIGHBORS];
+    let (mut n_near, mut n_places, mut octants) = (0, 0, 0u8);
     for neighbor in neighbors.iter().take(MAX_NEIGHBORS) {
-        let reach = NEIGHBOR_REACH * radius;
         let offset = neighbor.offset;
-        if offset.length_squared() < reach * reach
-            && hit.normal.dot(offset).abs() < THICKNESS * radius
-        {
-            near[n_near] = *neighbor;
-            n_near += 1;
-            let (x, y) = frame.project(offset);
-            let length = (x * x + y * y).sqrt();
-            // A point straight under the hit has no angle.
-            if 1e-3 * radius < length {
-                directions[n] = (x / length, y / length);
-                n += 1;
-            }
+        if reach * reach <= offset.length_squared() || thickness <= hit.normal.dot(offset).abs() {
+            continue;
+        }
+        near[n_near] = *neighbor;
+        n_near += 1;
+        let (x, y) = frame.project(offset);
+        // A point straight under the hit has no angle.
+        if 1e-6 * hit.radius * hit.radius < x * x + y * y {
+            places[n_places] = (x, y);
+            n_places += 1;
+            octants |= 1 << octant(x, y);
         }
     }
     if n_near < 4 || is_from_within(hit, &near[..n_near]) {
         return Surroundings::Outside;
     }
-    judge_gaps(&mut directions[..n])
+    // No two neighbouring octants empty: no gap reaches 135 degrees. Mostly so, and it saves the sorting.
+    if !octants & !octants.rotate_left(1) == 0 {
+        return Surroundings::Enclosed;
+    }
+    judge_gaps(&mut places[..n_places])
+}
+
+/// Which eighth of the full turn a place lies in, counted by angle.
+fn octant(x: f32, y: f32) -> u8 {
+    const BY_SIGNS: [u8; 8] = [0, 1, 3, 2, 7, 6, 4, 5];
+    let signs = u8::from(y < 0.0) << 2 | u8::from(x < 0.0) << 1 | u8::from(x.abs() < y.abs());
+    BY_SIGNS[usize::from(signs)]
 }
 
 /// Just outside a silhouette, where a disc of the far side sticks out over the bend, a ray meets that
@@ -101,6 +110,10 @@ fn judge_gaps(directions: &mut [(f32, f32)]) -> Surroundings {
     const COS_200: f32 = -0.939_692_6;
     if directions.is_empty() {
         return Surroundings::Outside;
+    }
+    for (x, y) in directions.iter_mut() {
+        let length = (*x * *x + *y * *y).sqrt();
+        (*x, *y) = (*x / length, *y / length);
     }
     directions.sort_unstable_by(|a, b| pseudo_angle(*a).total_cmp(&pseudo_angle(*b)));
     let mut worst = Surroundings::Enclosed;
@@ -155,6 +168,14 @@ mod tests {
         assert_eq!(judge(&[300.0, 301.0, 299.0, 298.0]), Surroundings::Outside);
         assert_eq!(judge(&[45.0; 5]), Surroundings::Outside);
         assert_eq!(judge(&[0.0, 120.0, 240.0]), Surroundings::Outside);
+    }
+
+    #[test]
+    fn octants_go_round() {
+        for eighth in 0..8u8 {
+            let (sin, cos) = (f32::from(eighth) * 45.0 + 22.0).to_radians().sin_cos();
+            assert_eq!(octant(cos, sin), eighth);
+        }
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! The points around a hit, collected for the angular-gap test.
 
-use super::traverse::around;
+use super::traverse::{BallVisitor, around};
 use crate::flat::FlatPoints;
-use crate::math::{LANES, LaneMask, Lanes, Vec3, Vec3Lanes};
+use crate::math::{LaneMask, Lanes, Vec3, Vec3Lanes};
 use crate::surface::{
     Candidate, MAX_NEIGHBORS, NEIGHBOR_REACH, Neighbor, Surroundings, surroundings,
 };
@@ -11,26 +11,41 @@ use std::ops::ControlFlow;
 /// Judges a hit at `position` by all points near it.
 #[inline(always)]
 pub fn judge<L: Lanes>(points: &FlatPoints, position: Vec3, hit: &Candidate) -> Surroundings {
-    let mut neighbors = [Neighbor::NONE; MAX_NEIGHBORS];
-    let mut n = 0;
     let reach = NEIGHBOR_REACH * hit.radius;
-    around::<L>(points, position, reach, |points, block_idx| {
+    let neighbors = [Neighbor::NONE; MAX_NEIGHBORS];
+    let mut found = Neighborhood { position, reach, neighbors, n: 0 };
+    around::<L>(points, position, reach, &mut found);
+    surroundings(hit, &found.neighbors[..found.n])
+}
+
+struct Neighborhood {
+    position: Vec3,
+    reach: f32,
+    neighbors: [Neighbor; MAX_NEIGHBORS],
+    n: usize,
+}
+
+impl BallVisitor for Neighborhood {
+    #[inline(always)]
+    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
         let block = &points.blocks[block_idx as usize];
-        let centers: Vec3Lanes<L> = block.centers(position);
-        let near =
-            centers.dot(centers).less_equal(L::splat(reach * reach)).bits() & block.occupied();
+        let centers: Vec3Lanes<L> = block.centers(self.position);
+        let reach_squared = L::splat(self.reach * self.reach);
+        let near = centers.dot(centers).less_equal(reach_squared).bits();
+        let mut near = if near == 0 { 0 } else { near & block.occupied() };
         if near == 0 {
             return ControlFlow::Continue(());
         }
         let (offsets, normals) = (centers.store(), block.normals::<L>().store());
-        for lane in (0..LANES).filter(|lane| near >> lane & 1 == 1) {
-            if n == MAX_NEIGHBORS {
+        while near != 0 {
+            let lane = near.trailing_zeros() as usize;
+            near &= near - 1;
+            if self.n == MAX_NEIGHBORS {
                 return ControlFlow::Break(());
             }
-            neighbors[n] = Neighbor { offset: offsets[lane], normal: normals[lane] };
-            n += 1;
+            self.neighbors[self.n] = Neighbor { offset: offsets[lane], normal: normals[lane] };
+            self.n += 1;
         }
         ControlFlow::Continue(())
-    });
-    surroundings(hit, &neighbors[..n])
+    }
 }

@@ -77,11 +77,11 @@ pub(super) fn closest_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut
 #[inline(always)]
 pub(super) fn any_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &mut [bool]) {
     for (ray, occluded) in rays.iter().zip(occluded) {
-        *occluded = false;
-        each_hit::<L>(scene, ray, |_| {
-            *occluded = true;
-            ControlFlow::Break(())
-        });
+        *occluded = if scene.surface.is_oriented() {
+            any_hit::<L, Disc>(scene, ray)
+        } else {
+            any_hit::<L, Sphere>(scene, ray)
+        };
     }
 }
 
@@ -95,84 +95,85 @@ pub(super) fn gathers<L: Lanes>(scene: &FlatScene, rays: &[Ray], gathers: &mut [
 #[inline(always)]
 pub(super) fn closest_hit<L: Lanes>(scene: &FlatScene, ray: &Ray) -> Hit {
     if scene.surface.is_oriented() {
-        let mut closest = Closest {
-            ray,
-            shape: PhantomData::<Disc>,
-            hit: Hit { distance: ray.t_max, ..Hit::MISS },
-        };
-        along_ray::<L>(&scene.points, ray, &mut closest);
-        closest.result()
+        closest_of::<L, Disc>(scene, ray)
     } else {
-        let mut closest = Closest {
-            ray,
-            shape: PhantomData::<Sphere>,
-            hit: Hit { distance: ray.t_max, ..Hit::MISS },
-        };
-        along_ray::<L>(&scene.points, ray, &mut closest);
-        closest.result()
+        closest_of::<L, Sphere>(scene, ray)
     }
 }
 
 /// Discs only: spheres do not blend.
 #[inline(always)]
 pub(super) fn gather<L: Lanes>(scene: &FlatScene, ray: &Ray) -> Gather {
-    let mut gathering = Gathering { ray, gather: Gather::EMPTY };
-    gathering.gather.limit = ray.t_max;
+    let gather = Gather { limit: ray.t_max, ..Gather::EMPTY };
+    let mut gathering = Gathering { ray, gather };
     along_ray::<L>(&scene.points, ray, &mut gathering);
     gathering.gather
 }
 
-/// Shows `found` hits in the ray's range, in any order, until it breaks off.
 #[inline(always)]
-pub(super) fn each_hit<L: Lanes>(
-    scene: &FlatScene,
-    ray: &Ray,
-    found: impl FnMut(Hit) -> ControlFlow<()>,
-) {
-    if scene.surface.is_oriented() {
-        along_ray::<L>(&scene.points, ray, &mut Each { ray, shape: PhantomData::<Disc>, found });
-    } else {
-        along_ray::<L>(&scene.points, ray, &mut Each { ray, shape: PhantomData::<Sphere>, found });
-    }
+fn closest_of<L: Lanes, S: Shape>(scene: &FlatScene, ray: &Ray) -> Hit {
+    let hit = Hit { distance: ray.t_max, ..Hit::MISS };
+    let mut closest = Closest { ray, shape: PhantomData::<S>, hit };
+    along_ray::<L>(&scene.points, ray, &mut closest);
+    if closest.hit.id == Hit::MISS.id { Hit::MISS } else { closest.hit }
 }
 
-/// Shows `found` the hits in one block, up to `t_max`, as lane, hit and all radii.
 #[inline(always)]
-fn block_hits<L: Lanes, S: Shape>(
-    points: &FlatPoints,
+pub(super) fn any_hit<L: Lanes, S: Shape>(scene: &FlatScene, ray: &Ray) -> bool {
+    let mut any = Any { ray, shape: PhantomData::<S>, is_hit: false };
+    along_ray::<L>(&scene.points, ray, &mut any);
+    any.is_hit
+}
+
+/// The hits in one block.
+pub(super) struct BlockHits {
     block_idx: u32,
-    ray: &Ray,
-    t_max: f32,
-    mut found: impl FnMut(Hit, f32) -> ControlFlow<()>,
-) -> ControlFlow<()> {
-    let block = &points.blocks[block_idx as usize];
-    let lanes = block.points::<L>(ray.origin);
-    let (distances, mask) = S::intersect(&lanes, &RayLanes::<L>::new(ray));
-    let mut hit_lanes = (mask & distances.less_equal(L::splat(t_max))).bits();
-    if hit_lanes == 0 {
-        return ControlFlow::Continue(());
+    lanes: u8,
+    distances: [f32; LANES],
+    radii: [f32; LANES],
+}
+
+impl BlockHits {
+    /// Up to `t_max`. Loops over these rather than closures: a closure would not be compiled for the
+    /// SIMD level of the kernel around it.
+    #[inline(always)]
+    pub(super) fn find<L: Lanes, S: Shape>(
+        points: &FlatPoints,
+        block_idx: u32,
+        ray: &Ray,
+        t_max: f32,
+    ) -> Self {
+        let block = &points.blocks[block_idx as usize];
+        let lanes = block.points::<L>(ray.origin);
+        let (distances, mask) = S::intersect(&lanes, &RayLanes::<L>::new(ray));
+        let hit_lanes = (mask & distances.less_equal(L::splat(t_max))).bits();
+        let lanes_left = if hit_lanes == 0 { 0 } else { hit_lanes & block.occupied() };
+        Self {
+            block_idx,
+            lanes: lanes_left,
+            distances: distances.store(),
+            radii: lanes.radius.store(),
+        }
     }
-    hit_lanes &= block.occupied();
-    let (distances, radii) = (distances.store(), lanes.radius.store());
-    while hit_lanes != 0 {
-        let lane = hit_lanes.trailing_zeros() as usize;
-        hit_lanes &= hit_lanes - 1;
-        let slot = block_idx * LANES as u32 + lane as u32;
-        found(Hit { distance: distances[lane], slot, id: block.id[lane] }, radii[lane])?;
+
+    /// The next hit and the radius of what was hit.
+    #[inline(always)]
+    pub(super) fn next(&mut self, points: &FlatPoints) -> Option<(Hit, f32)> {
+        if self.lanes == 0 {
+            return None;
+        }
+        let lane = self.lanes.trailing_zeros() as usize;
+        self.lanes &= self.lanes - 1;
+        let slot = self.block_idx * LANES as u32 + lane as u32;
+        let id = points.blocks[self.block_idx as usize].id[lane];
+        Some((Hit { distance: self.distances[lane], slot, id }, self.radii[lane]))
     }
-    ControlFlow::Continue(())
 }
 
 struct Closest<'r, S> {
     ray: &'r Ray,
     shape: PhantomData<S>,
     hit: Hit,
-}
-
-impl<S> Closest<'_, S> {
-    fn result(self) -> Hit {
-        if self.hit.id == Hit::MISS.id { Hit::MISS } else { self.hit }
-    }
 }
 
 impl<S: Shape> RayVisitor for Closest<'_, S> {
@@ -183,13 +184,33 @@ impl<S: Shape> RayVisitor for Closest<'_, S> {
 
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let nearest = &mut self.hit;
-        block_hits::<L, S>(points, block_idx, self.ray, nearest.distance, |hit, _| {
-            if hit.is_before(nearest) {
-                *nearest = hit;
+        let mut hits = BlockHits::find::<L, S>(points, block_idx, self.ray, self.hit.distance);
+        while let Some((hit, _)) = hits.next(points) {
+            if hit.is_before(&self.hit) {
+                self.hit = hit;
             }
-            ControlFlow::Continue(())
-        })
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+struct Any<'r, S> {
+    ray: &'r Ray,
+    shape: PhantomData<S>,
+    is_hit: bool,
+}
+
+impl<S: Shape> RayVisitor for Any<'_, S> {
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.ray.t_max
+    }
+
+    #[inline(always)]
+    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
+        let hits = BlockHits::find::<L, S>(points, block_idx, self.ray, self.ray.t_max);
+        self.is_hit = hits.lanes != 0;
+        if self.is_hit { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 
@@ -206,30 +227,13 @@ impl RayVisitor for Gathering<'_> {
 
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let gather = &mut self.gather;
-        block_hits::<L, Disc>(points, block_idx, self.ray, gather.reach(), |hit, radius| {
-            if hit.distance <= gather.limit {
-                gather.insert(hit, radius);
+        let reach = self.gather.reach();
+        let mut hits = BlockHits::find::<L, Disc>(points, block_idx, self.ray, reach);
+        while let Some((hit, radius)) = hits.next(points) {
+            if hit.distance <= self.gather.limit {
+                self.gather.insert(hit, radius);
             }
-            ControlFlow::Continue(())
-        })
-    }
-}
-
-struct Each<'r, S, F> {
-    ray: &'r Ray,
-    shape: PhantomData<S>,
-    found: F,
-}
-
-impl<S: Shape, F: FnMut(Hit) -> ControlFlow<()>> RayVisitor for Each<'_, S, F> {
-    #[inline(always)]
-    fn limit(&self) -> f32 {
-        self.ray.t_max
-    }
-
-    #[inline(always)]
-    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        block_hits::<L, S>(points, block_idx, self.ray, self.ray.t_max, |hit, _| (self.found)(hit))
+        }
+        ControlFlow::Continue(())
     }
 }

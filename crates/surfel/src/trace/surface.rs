@@ -1,11 +1,12 @@
 //! The continuous surface: discs gathered and blended, hits beyond its boundary refused.
 
 use super::boundary::judge;
-use super::kernel::{Hit, closest_hit, each_hit, gather};
-use crate::flat::FlatScene;
+use super::kernel::{BlockHits, Hit, any_hits, closest_hit, gather};
+use super::traverse::{RayVisitor, along_ray};
+use crate::flat::{FlatPoints, FlatScene};
 use crate::math::{Lanes, Ray, Vec3};
 use crate::surface::{
-    Boundary, Candidate, Gathered, MAX_GATHERED, Neighbor, Surroundings, blend, surroundings,
+    Boundary, Candidate, Disc, Gathered, MAX_GATHERED, Neighbor, Surroundings, blend, surroundings,
 };
 use std::ops::ControlFlow;
 
@@ -58,21 +59,43 @@ pub(super) fn surface_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut
 /// whatever follows it, so the first such hit settles it.
 #[inline(always)]
 pub(super) fn occlusions<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &mut [bool]) {
-    let is_tested = scene.surface.is_oriented() && scene.boundary == Boundary::Gap;
+    if !scene.surface.is_oriented() || scene.boundary == Boundary::Off {
+        return any_hits::<L>(scene, rays, occluded);
+    }
     for (ray, occluded) in rays.iter().zip(occluded) {
-        *occluded = false;
-        let mut refusals = 0;
-        each_hit::<L>(scene, ray, |hit| {
-            if refusals == MAX_REFUSALS {
+        let mut search = OccluderSearch { scene, ray, n_refused: 0, is_occluded: false };
+        along_ray::<L>(&scene.points, ray, &mut search);
+        *occluded = search.is_occluded;
+    }
+}
+
+struct OccluderSearch<'a> {
+    scene: &'a FlatScene,
+    ray: &'a Ray,
+    n_refused: usize,
+    is_occluded: bool,
+}
+
+impl RayVisitor for OccluderSearch<'_> {
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.ray.t_max
+    }
+
+    #[inline(always)]
+    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
+        let mut hits = BlockHits::find::<L, Disc>(points, block_idx, self.ray, self.ray.t_max);
+        while let Some((hit, _)) = hits.next(points) {
+            if single_disc::<L>(self.scene, self.ray, &hit) != Surroundings::Outside {
+                self.is_occluded = true;
                 return ControlFlow::Break(());
             }
-            if is_tested && single_disc::<L>(scene, ray, &hit) == Surroundings::Outside {
-                refusals += 1;
-                return ControlFlow::Continue(());
+            self.n_refused += 1;
+            if self.n_refused == MAX_REFUSALS {
+                return ControlFlow::Break(());
             }
-            *occluded = true;
-            ControlFlow::Break(())
-        });
+        }
+        ControlFlow::Continue(())
     }
 }
 

@@ -3,7 +3,7 @@
 use super::node::{BoxRay, ball_overlaps, ray_entries};
 use crate::bvh::{Child, STACK_SIZE};
 use crate::flat::FlatPoints;
-use crate::math::{LANES, Lanes, Ray, Vec3};
+use crate::math::{Lanes, Ray, Vec3};
 use std::ops::ControlFlow;
 
 /// Looks at the blocks that a ray comes by.
@@ -57,13 +57,18 @@ pub fn along_ray<L: Lanes>(points: &FlatPoints, ray: &Ray, visitor: &mut impl Ra
     }
 }
 
-/// Shows `visit` every block whose box comes within `radius` of `center`.
+/// Looks at the blocks around a place.
+pub trait BallVisitor {
+    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()>;
+}
+
+/// Shows `visitor` every block whose box comes within `radius` of `center`.
 #[inline(always)]
 pub fn around<L: Lanes>(
     points: &FlatPoints,
     center: Vec3,
     radius: f32,
-    mut visit: impl FnMut(&FlatPoints, u32) -> ControlFlow<()>,
+    visitor: &mut impl BallVisitor,
 ) {
     if points.nodes.is_empty() {
         return;
@@ -73,14 +78,20 @@ pub fn around<L: Lanes>(
     while 0 < size {
         size -= 1;
         let node = &points.nodes[stack[size] as usize];
-        let lanes = ball_overlaps::<L>(node, center, radius);
-        for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
+        let mut lanes = ball_overlaps::<L>(node, center, radius);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
             match node.child(lane) {
                 Some(Child::Node(node_idx)) => {
                     stack[size] = node_idx;
                     size += 1;
                 }
-                Some(Child::Block(block_idx)) if visit(points, block_idx).is_break() => return,
+                Some(Child::Block(block_idx))
+                    if visitor.visit::<L>(points, block_idx).is_break() =>
+                {
+                    return;
+                }
                 _ => {}
             }
         }
