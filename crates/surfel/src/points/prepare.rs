@@ -160,7 +160,9 @@ fn measure_together(
         (fit, kth_distance(neighbors, k_radius))
     };
     let both = tree.map(Query::Nearest(k_normal.max(k_radius)), progress, visit)?;
-    let (fits, distances) = both.into_iter().unzip();
+    // Not unzipped: the fits take over the memory of both.
+    let distances = both.iter().map(|(_, distance)| *distance).collect();
+    let fits = both.into_iter().map(|(fit, _)| fit).collect();
     let radii = limit_strays(&tree, k_radius, distances, progress)?;
     Ok(Local { fits: Some(fits), radii: Some(radii) })
 }
