@@ -80,7 +80,7 @@ pub fn smallest_eigenvector(matrix: &SymmetricMatrix) -> (DVec3, [f64; 3]) {
     })
 }
 
-/// The well-separated case, five times as fast as Jacobi; `None` where it would lose digits.
+/// The well-separated case, without iterated rotations; `None` where it would lose digits.
 fn closed_form(matrix: &SymmetricMatrix) -> Option<(DVec3, [f64; 3])> {
     let trace = matrix.xx + matrix.yy + matrix.zz;
     // Written so that NaN fails it.

@@ -9,8 +9,7 @@ use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::str::FromStr;
 
-/// Neighbours that each point may pass its orientation to. With 8, scans of two parallel sheets stay apart
-/// better than with 16, and edges take half the memory.
+/// Neighbours that each point may pass its orientation to; each costs about 10 bytes a point for a while.
 const DEGREE: usize = 8;
 
 /// No neighbour.
@@ -83,9 +82,8 @@ fn by_spanning_tree(
         pieces.join(a, b, normals[a as usize].dot(normals[b as usize]) < 0.0);
     }
     drop((edges, links));
-    progress.check()?;
-    let places: Vec<Place> = (0..normals.len() as u32).map(|point| pieces.find(point)).collect();
-    let (backward_pieces, n_pieces) = backward_pieces(positions, &normals, &places);
+    let places = pieces.places(progress)?;
+    let (backward_pieces, n_pieces) = backward_pieces(positions, &normals, &places, progress)?;
     progress.note(&format!("normals oriented along a spanning tree in {n_pieces} pieces"));
     Ok(turned(normals, |i, _| places[i].flipped != backward_pieces.contains(&places[i].root)))
 }
@@ -156,6 +154,17 @@ impl Pieces {
         }
     }
 
+    fn places(&mut self, progress: &dyn Progress) -> Result<Vec<Place>> {
+        let mut places = Vec::with_capacity(self.parents.len());
+        for point in 0..self.parents.len() as u32 {
+            if point.is_multiple_of(1 << 16) {
+                progress.check()?;
+            }
+            places.push(self.find(point));
+        }
+        Ok(places)
+    }
+
     fn join(&mut self, a: u32, b: u32, opposite: bool) {
         let (a, b) = (self.find(a), self.find(b));
         if a.root == b.root {
@@ -175,9 +184,13 @@ fn backward_pieces(
     positions: &[Vec3],
     normals: &[Vec3],
     places: &[Place],
-) -> (HashSet<u32>, usize) {
+    progress: &dyn Progress,
+) -> Result<(HashSet<u32>, usize)> {
     let mut pieces: HashMap<u32, Piece> = HashMap::new();
     for (point, place) in places.iter().enumerate() {
+        if point % (1 << 16) == 0 {
+            progress.check()?;
+        }
         let piece = pieces.entry(place.root).or_insert(Piece { top: point, ..Piece::default() });
         if positions[piece.top].z < positions[point].z {
             piece.top = point;
@@ -194,7 +207,7 @@ fn backward_pieces(
         let facing = if 0.2 < normal.z.abs() { normal.z } else { normal.dot(outward) };
         facing < 0.0
     });
-    (backward.map(|(root, _)| root).collect(), n_pieces)
+    Ok((backward.map(|(root, _)| root).collect(), n_pieces))
 }
 
 #[derive(Default)]

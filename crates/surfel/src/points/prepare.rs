@@ -42,6 +42,19 @@ impl Default for Preparation {
     }
 }
 
+impl Preparation {
+    /// The error that `prepare` would give for a value out of range.
+    pub fn check(&self) -> Result<()> {
+        self.radius.check()?;
+        if let Query::Nearest(k @ 0..2) = self.normals {
+            let expected = "at least 2, to span a plane";
+            let name = "number of neighbours for normals";
+            return Err(Error::Setting { name, found: k.to_string(), expected });
+        }
+        Ok(())
+    }
+}
+
 /// What was done; `None` where the cloud already had what it needs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
@@ -57,7 +70,7 @@ pub fn prepare(
     preparation: &Preparation,
     progress: &dyn Progress,
 ) -> Result<(PointCloud, Report)> {
-    preparation.radius.check()?;
+    preparation.check()?;
     let (mut cloud, clean) = clean(cloud, progress)?;
     if let Some(choice) = preparation.select {
         cloud = select(&cloud, choice, preparation.seed, progress)?;
@@ -73,11 +86,14 @@ pub fn prepare(
             add_variation(&mut cloud, &fits);
         }
         if missing.normals {
-            report.normals = Some(add_normals(&mut cloud, &fits, preparation, progress)?);
+            let found = add_normals(&mut cloud, &fits, preparation, progress)?;
+            progress.note(&format!("{} normals estimated from neighbours", found.n_estimated));
+            report.normals = Some(found);
         }
     }
     if let Some((radii, found)) = local.radii {
         add_radii(&mut cloud, radii);
+        progress.note(&found.line(preparation.radius));
         report.radii = Some(found);
     }
     Ok((cloud, report))
@@ -144,7 +160,9 @@ fn measure_together(
         (fit, kth_distance(neighbors, k_radius))
     };
     let both = tree.map(Query::Nearest(k_normal.max(k_radius)), progress, visit)?;
-    let (fits, distances) = both.into_iter().unzip();
+    // Not unzipped: the fits take over the memory of both.
+    let distances = both.iter().map(|(_, distance)| *distance).collect();
+    let fits = both.into_iter().map(|(fit, _)| fit).collect();
     let radii = limit_strays(&tree, k_radius, distances, progress)?;
     Ok(Local { fits: Some(fits), radii: Some(radii) })
 }
@@ -157,7 +175,7 @@ fn fit_planes(
     let Preparation { neighbors: method, normals: mut query, seed, .. } = *preparation;
     if let (Query::Nearest(k), Method::Grid | Method::ScanLine) = (query, method) {
         // Half of all k nearest lie within the median; twice as many within sqrt(2) times it.
-        let sample = Sample { k, samples: 100, seed };
+        let sample = Sample { k: k.min(positions.len()), samples: 100, seed };
         let distance = std::f32::consts::SQRT_2 * median_distance(positions, &sample, progress)?;
         progress.note(&format!("normals from all points within {distance}, about {k}"));
         query = Query::Within(distance);
@@ -300,6 +318,18 @@ mod tests {
         assert_eq!((report.normals, report.radii), (None, None));
         assert_eq!(cloud.scalars.len(), 1);
         assert_eq!(cloud.scalar(SURFACE_VARIATION).unwrap().len(), 500);
+    }
+
+    #[test]
+    fn settings_without_a_meaning_are_errors() {
+        for preparation in [
+            Preparation { normals: Query::Nearest(1), ..Preparation::default() },
+            Preparation { normals: Query::Within(0.0), ..Preparation::default() },
+            Preparation { radius: Radius::Fixed(-1.0), ..Preparation::default() },
+            Preparation { select: Some(Select::Stride(0.5)), ..Preparation::default() },
+        ] {
+            assert!(matches!(prepare(ball(9), &preparation, &Silent), Err(Error::Setting { .. })));
+        }
     }
 
     #[test]

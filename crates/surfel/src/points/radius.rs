@@ -53,7 +53,6 @@ pub fn estimate_radii(
         Radius::Median { n, samples } => {
             let sample = Sample { k: 2 * n, samples, seed };
             let median = median_distance(positions, &sample, progress)?;
-            progress.note(&format!("radius {median}, the median distance to {} nearest", 2 * n));
             Ok(with_report(vec![median; positions.len()]))
         }
         Radius::Adaptive { k } => {
@@ -96,7 +95,9 @@ pub(super) fn limit_strays(
     distances: Vec<f32>,
     progress: &dyn Progress,
 ) -> Result<(Vec<f32>, RadiusReport)> {
-    let typical = median(distances.iter().copied().filter(|r| usable(*r)).collect());
+    // A million of them are enough to tell, and take no memory to speak of.
+    let sample = distances.iter().copied().step_by((distances.len() >> 20) + 1);
+    let typical = median(sample.filter(|r| usable(*r)).collect());
     let typical = typical.unwrap_or(1.0);
     let limited = |(point, &distance): (usize, &f32)| {
         progress.check()?;
@@ -132,6 +133,21 @@ enum Repair {
 }
 
 impl RadiusReport {
+    /// What was chosen, for people.
+    pub fn line(&self, radius: Radius) -> String {
+        let Self { smallest, median, largest, .. } = self;
+        match radius {
+            Radius::Fixed(radius) => format!("radius {radius}, as asked"),
+            Radius::Median { n, .. } => {
+                format!("radius {median}, the median distance to the {} nearest points", 2 * n)
+            }
+            Radius::Adaptive { k } => format!(
+                "radius of each point: the distance to its neighbour {k}, {median} at the median, \
+                 from {smallest} to {largest}"
+            ),
+        }
+    }
+
     fn lines(&self) -> Vec<String> {
         let cut =
             format!("{} radii of stray points cut to {STRAY} times their neighbours'", self.n_cut);
@@ -206,7 +222,7 @@ fn pick(n_points: usize, samples: usize, seed: u64) -> Result<Vec<usize>> {
 
 /// Squared distances to the k nearest other points, in no order.
 fn nearest_by_brute_force(positions: &[Vec3], point: usize, k: usize) -> Vec<f32> {
-    let mut nearest: Vec<f32> = Vec::with_capacity(2 * k);
+    let mut nearest: Vec<f32> = Vec::new();
     let mut bound = f32::INFINITY;
     for (other, position) in positions.iter().enumerate() {
         let squared = position.distance_squared(positions[point]);

@@ -106,7 +106,7 @@ fn by_spacing(positions: &[Vec3], distance: f32, progress: &dyn Progress) -> Res
     Ok(taken)
 }
 
-/// The standard library's hash is three times as slow here and differs from run to run.
+/// Cells need a quick hash rather than one that is different in every run.
 #[derive(Default)]
 struct CellHasher(u64);
 

@@ -52,8 +52,9 @@ impl Found for Nearest {
     }
 
     /// Every key becomes the middle one of itself, its predecessor and the new key. That inserts without a
-    /// branch; shifting up to the place took half as long again, for the place cannot be predicted. Each
-    /// pair is read just as it was written: reading across two waits until both have left the store buffer.
+    /// branch; with a loop that shifts up to the place, which cannot be predicted, all normals of a cloud
+    /// took 1.4 times as many cycles. Each pair is read just as it was written: a read across two pairs
+    /// waits until both have left the store buffer.
     #[inline]
     fn offer(&mut self, key: u64) {
         let key = f64::from_bits(key);

@@ -8,10 +8,10 @@ use crate::math::{Aabb, Vec3, Vec4};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
-/// Points a leaf holds: two SSE or one AVX register. 16 was slower: twice the distances, as many insertions.
+/// Points a leaf holds: two registers of four.
 pub(super) const LANES: usize = 8;
 
-/// A tree over the finite points of a cloud: 22 bytes a point.
+/// A tree over the finite points of a cloud: 23 bytes a point.
 ///
 /// Halving by count bounds the depth by 30, whatever outliers or duplicates there are.
 pub struct Tree<'a> {

@@ -84,12 +84,19 @@ impl Index for WithinOfAll<'_> {
         let mut found = Within::new(self.distance_squared);
         let mut neighbors = Vec::new();
         let mut siblings = Vec::with_capacity(32);
+        let mut surroundings = Surroundings::new();
         for leaf in leaves(&slots) {
             progress.check()?;
             self.tree.siblings(leaf, &mut siblings);
+            let bounds = self.tree.bounds_of_leaf(leaf);
+            let listed = surroundings.list(self.tree, &siblings, bounds, self.distance_squared);
             for target in self.tree.targets(leaf, &slots) {
                 self.tree.scan(leaf, &target, &mut found);
-                search(self.tree, &siblings, &target, &mut found);
+                if listed {
+                    surroundings.search(self.tree, &target, &mut found);
+                } else {
+                    search(self.tree, &siblings, &target, &mut found);
+                }
                 found.finish(&mut neighbors);
                 visit(target.own, &neighbors);
             }
