@@ -2,3 +2,5 @@
 
 pub mod clouds;
 pub mod scenes;
+pub mod mesh;
+pub mod quality;

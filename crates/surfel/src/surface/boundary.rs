@@ -18,7 +18,9 @@ pub const MAX_NEIGHBORS: usize = 64;
 pub enum Surroundings {
     /// No gap of 150 degrees: on the surface.
     Enclosed,
-    /// A gap of 150 to 200 degrees: at an edge, taken if nothing better follows.
+    /// A gap of 150 to 180 degrees: at an edge, taken if nothing better follows. Up to 200 degrees
+    /// were tried: on the points of a cube that leaves 1.2 % of false pixels at the silhouettes, up to
+    /// 190 0.4 %, up to 180 0.002 %, while misses grow from 0.02 to 0.17 %.
     Edge,
     /// A wider gap, or too few points: beyond the surface.
     Outside,
@@ -107,7 +109,6 @@ fn is_from_within(hit: &Candidate, near: &[Neighbor]) -> bool {
 
 fn judge_gaps(directions: &mut [(f32, f32)]) -> Surroundings {
     const COS_150: f32 = -0.866_025_4;
-    const COS_200: f32 = -0.939_692_6;
     if directions.is_empty() {
         return Surroundings::Outside;
     }
@@ -122,10 +123,10 @@ fn judge_gaps(directions: &mut [(f32, f32)]) -> Surroundings {
         let (cos, sin) = (x * next_x + y * next_y, x * next_y - y * next_x);
         // A single direction, or several equal ones, leaves a full turn.
         let is_full_turn = i + 1 == directions.len() && sin == 0.0 && 0.0 < cos;
-        if is_full_turn || (sin < 0.0 && COS_200 < cos) {
+        if is_full_turn || sin < 0.0 {
             return Surroundings::Outside;
         }
-        if sin < 0.0 || cos < COS_150 {
+        if cos < COS_150 {
             worst = Surroundings::Edge;
         }
     }
@@ -162,8 +163,8 @@ mod tests {
         assert_eq!(judge(&[0.0, 90.0, 180.0, 270.0]), Surroundings::Enclosed);
         assert_eq!(judge(&[0.0, 70.0, 140.0, 211.0]), Surroundings::Enclosed);
         assert_eq!(judge(&[0.0, 60.0, 120.0, 208.0]), Surroundings::Edge);
-        assert_eq!(judge(&[10.0, 60.0, 120.0, 171.0]), Surroundings::Edge);
-        assert_eq!(judge(&[10.0, 60.0, 120.0, 169.0]), Surroundings::Outside);
+        assert_eq!(judge(&[10.0, 60.0, 120.0, 191.0]), Surroundings::Edge);
+        assert_eq!(judge(&[10.0, 60.0, 120.0, 189.0]), Surroundings::Outside);
         assert_eq!(judge(&[0.0, 20.0, 40.0, 60.0]), Surroundings::Outside);
         assert_eq!(judge(&[300.0, 301.0, 299.0, 298.0]), Surroundings::Outside);
         assert_eq!(judge(&[45.0; 5]), Surroundings::Outside);

@@ -1,0 +1,129 @@
+//! Triangle meshes as the truth that point clouds of the same shape are measured against.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use surfel::bvh::{self, Bvh, Child, NO_PRIMITIVE, Primitive};
+use surfel::math::{Aabb, LANES, Ray, Vec3};
+use surfel::progress::Silent;
+
+/// Triangles and a tree over them.
+pub struct Mesh {
+    pub vertices: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    tree: Bvh,
+}
+
+/// Distance along the ray, and the unit normal of the triangle facing the ray's origin.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshHit {
+    pub distance: f32,
+    pub normal: Vec3,
+}
+
+/// The folder of test data beside the checkout, or `None` with a line that says so.
+pub fn shared_data() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    #[expect(clippy::print_stdout, reason = "a skipped test says so aloud")]
+    {
+        println!("skipped: ../shared/data is absent");
+    }
+    None
+}
+
+impl Mesh {
+    /// From an ascii PLY whose vertices begin with x y z and whose faces are triangles.
+    pub fn from_ascii_ply(path: &Path) -> Self {
+        let text = fs::read_to_string(path).unwrap();
+        let (header, body) = text.split_once("end_header").unwrap();
+        let count = |element: &str| -> usize {
+            let line = header.lines().find_map(|line| line.strip_prefix(element)).unwrap();
+            line.trim().parse().unwrap()
+        };
+        let (n_vertices, n_faces) = (count("element vertex"), count("element face"));
+        let mut lines = body.trim_start().lines();
+        let vertices: Vec<Vec3> = lines.by_ref().take(n_vertices).map(vertex).collect();
+        let triangles = lines.take(n_faces).map(triangle).collect();
+        Self::new(vertices, triangles)
+    }
+
+    pub fn new(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
+        let corners = |triangle: &[u32; 3]| triangle.map(|i| vertices[i as usize]);
+        let mut primitives: Vec<Primitive> = (0u32..)
+            .zip(&triangles)
+            .map(|(index, triangle)| Primitive {
+                bounds: Aabb::of_points(corners(triangle)),
+                index,
+            })
+            .collect();
+        let tree = bvh::build(&mut primitives, |_| true, &Silent).unwrap();
+        Self { vertices, triangles, tree }
+    }
+
+    /// The nearest triangle: a plain walk, slow but short.
+    pub fn closest_hit(&self, ray: &Ray) -> Option<MeshHit> {
+        let mut nearest: Option<MeshHit> = None;
+        let mut open = vec![0u32];
+        while let Some(node_idx) = open.pop() {
+            let node = &self.tree.nodes[node_idx as usize];
+            for lane in 0..LANES {
+                let Some(child) = node.child(lane) else { continue };
+                let limit = nearest.map_or(f32::INFINITY, |hit| hit.distance);
+                if !meets_box(ray, node.bounds(lane), limit) {
+                    continue;
+                }
+                match child {
+                    Child::Node(child) => open.push(child),
+                    Child::Block(block) => {
+                        for &index in &self.tree.blocks[block as usize] {
+                            let hit = (index != NO_PRIMITIVE).then(|| self.intersect(index, ray));
+                            let limit = nearest.map_or(f32::INFINITY, |hit| hit.distance);
+                            nearest = hit.flatten().filter(|hit| hit.distance < limit).or(nearest);
+                        }
+                    }
+                }
+            }
+        }
+        nearest
+    }
+
+    /// Moeller and Trumbore 1997.
+    fn intersect(&self, index: u32, ray: &Ray) -> Option<MeshHit> {
+        let [a, b, c] = self.triangles[index as usize].map(|i| self.vertices[i as usize]);
+        let (ab, ac) = (b - a, c - a);
+        let across = ray.direction.cross(ac);
+        let determinant = ab.dot(across);
+        let from_a = ray.origin - a;
+        let u = from_a.dot(across) / determinant;
+        let around = from_a.cross(ab);
+        let v = ray.direction.dot(around) / determinant;
+        let distance = ac.dot(around) / determinant;
+        let inside = 0.0 <= u && 0.0 <= v && u + v <= 1.0 && ray.t_min < distance;
+        let normal = ab.cross(ac).normalize_or(-ray.direction);
+        let normal = if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
+        inside.then_some(MeshHit { distance, normal })
+    }
+}
+
+fn vertex(line: &str) -> Vec3 {
+    let mut numbers = line.split_whitespace().map(|word| word.parse::<f32>().unwrap());
+    let mut next = || numbers.next().unwrap();
+    Vec3::new(next(), next(), next())
+}
+
+fn triangle(line: &str) -> [u32; 3] {
+    let numbers: Vec<u32> = line.split_whitespace().map(|word| word.parse().unwrap()).collect();
+    assert_eq!(numbers[0], 3, "only triangles");
+    [numbers[1], numbers[2], numbers[3]]
+}
+
+fn meets_box(ray: &Ray, bounds: Aabb, limit: f32) -> bool {
+    let (low, high) =
+        ((bounds.min - ray.origin) / ray.direction, (bounds.max - ray.origin) / ray.direction);
+    let enter = low.min(high).max_element().max(ray.t_min);
+    let leave = low.max(high).min_element().min(limit);
+    // Widened by what rounding may take away.
+    enter <= leave * (1.0 + 1e-5) + 1e-6
+}
