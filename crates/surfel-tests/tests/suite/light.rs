@@ -1,0 +1,168 @@
+//! Light with known answers: furnace, shadow, unlit colour.
+
+use surfel::flat::FlatScene;
+use surfel::image::{Image, Tone};
+use surfel::math::{DVec3, Vec3};
+use surfel::points::PointCloud;
+use surfel::progress::Silent;
+use surfel::render::{CpuRenderer, Renderer, Settings};
+use surfel::scene::{Camera, Light, Material, Projection, Scene, Sky, Sun};
+use surfel::surface::SurfaceKind;
+use surfel::trace::Simd;
+use surfel_tests::{clouds, scenes};
+
+const SETTINGS: Settings = Settings {
+    width: 64,
+    height: 64,
+    samples_per_pixel: 1,
+    light_samples: 16,
+    seed: 1,
+    with_layers: true,
+};
+
+fn render(scene: &Scene, settings: &Settings) -> Image {
+    let flat = FlatScene::new(scene, &Silent).unwrap();
+    let renderer = CpuRenderer { simd: Simd::detect() };
+    renderer.render(&flat, settings, &Silent).unwrap().0
+}
+
+const FURNACE: Sky =
+    Sky { up: Vec3::Z, zenith: Vec3::ONE, ground: Vec3::ONE, reach: f32::INFINITY };
+
+#[test]
+fn a_white_sphere_in_a_furnace_is_white() {
+    for kind in [SurfaceKind::Sphere, SurfaceKind::Disc, SurfaceKind::Splat, SurfaceKind::SplatFit]
+    {
+        let scene = scenes::scene(clouds::sphere(20_000, 1.0), kind);
+        let n = scene.cloud.len();
+        let scene = Scene { lights: vec![Light::Sky(FURNACE)], colors: vec![[255; 3]; n], ..scene };
+        let image = render(&scene, &SETTINGS);
+        let covered = image.color.iter().filter(|pixel| pixel[3] == 1.0);
+        let (sum, count) = covered.fold((0.0, 0), |(sum, n), pixel| (sum + pixel[0], n + 1));
+        let mean = sum / count as f32;
+        // Balls shade each other in the dents between them; a convex surface of discs hardly does.
+        let least = if kind == SurfaceKind::Sphere { 0.70 } else { 0.985 };
+        assert!(
+            600 < count && (least..=1.0).contains(&mean),
+            "{}: {mean} over {count}",
+            kind.name()
+        );
+    }
+}
+
+/// A ball above a floor, the sun straight above or at 45 degrees.
+fn ball_over_floor(sun: Sun) -> Scene {
+    let floor = clouds::plane(150, 0.4, 8).positions.into_iter().map(|p| 3.0 * p);
+    let ball = clouds::sphere(6000, 0.5).positions.into_iter().map(|p| p + Vec3::Z);
+    let cloud = PointCloud::from_positions(floor.chain(ball).collect());
+    let camera = Camera {
+        position: DVec3::new(0.0, 0.0, -10.0),
+        focal_point: DVec3::ZERO,
+        view_up: DVec3::Y,
+        projection: Projection::Orthographic { height: 4.0 },
+    };
+    // Seen from below, so that the ball does not hide its shadow: the floor is one sheet of points.
+    Scene { lights: vec![Light::Sun(sun)], camera, ..scenes::scene(cloud, SurfaceKind::Splat) }
+}
+
+#[test]
+fn a_shadow_lies_where_the_sun_casts_it() {
+    // From below the floor faces away from a sun above: use one that shines from below on a ball under it.
+    let sun = Sun { direction: Vec3::Z, color: Vec3::ONE, angular_diameter_deg: 0.0 };
+    let mut scene = ball_over_floor(sun);
+    scene.camera.position = DVec3::new(0.0, 0.0, 10.0);
+    for (direction, center) in
+        [(Vec3::Z, Vec3::ZERO), (Vec3::new(1.0, 0.0, 1.0).normalize(), Vec3::new(-1.0, 0.0, 0.0))]
+    {
+        scene.lights = vec![Light::Sun(Sun { direction, ..sun })];
+        let image = render(&scene, &SETTINGS);
+        let mut n_checked = 0;
+        for (pixel, position) in image.color.iter().zip(&image.layers.position) {
+            // On the floor, and not hidden by the ball.
+            if 0.2 < position.z || 1.9 < position.abs().max_element() {
+                continue;
+            }
+            // The shadow is the ball's shadow along the sun's direction: within 0.5 of its axis.
+            let from_center = *position - center.with_z(0.0);
+            let across = from_center - from_center.dot(direction) * direction;
+            let is_dark = pixel[0] < 0.1;
+            if (across.length() - 0.5).abs() > 0.06 {
+                assert_eq!(is_dark, across.length() < 0.5, "at {position} toward {direction}");
+                n_checked += 1;
+            }
+        }
+        assert!(2500 < n_checked, "{n_checked}");
+    }
+}
+
+#[test]
+fn a_wide_sun_has_a_half_shadow() {
+    let sun = Sun { direction: Vec3::Z, color: Vec3::ONE, angular_diameter_deg: 30.0 };
+    let mut scene = ball_over_floor(sun);
+    scene.camera.position = DVec3::new(0.0, 0.0, 10.0);
+    let settings = Settings { light_samples: 64, ..SETTINGS };
+    let image = render(&scene, &settings);
+    let grey = image
+        .color
+        .iter()
+        .zip(&image.layers.position)
+        .filter(|(pixel, position)| position.z < 0.2 && (0.1..0.4).contains(&pixel[0]))
+        .count();
+    assert!(100 < grey, "{grey} pixels in half shadow");
+}
+
+#[test]
+fn unlit_colors_come_out_as_they_went_in() {
+    for (name, kind) in SurfaceKind::ALL {
+        for value in [0u8, 1, 64, 128, 200, 255] {
+            let scene = scenes::scene(clouds::sphere(8000, 1.0), kind);
+            let n = scene.cloud.len();
+            let scene =
+                Scene { material: Material::Unlit, colors: vec![[value, 128, value]; n], ..scene };
+            let settings = Settings { samples_per_pixel: 4, ..SETTINGS };
+            let image = render(&scene, &settings);
+            let center = image.color[32 * 64 + 32];
+            let full = if kind == SurfaceKind::Points {
+                image.color.iter().find(|pixel| pixel[3] == 1.0).copied().unwrap()
+            } else {
+                center
+            };
+            assert_eq!(Tone::default().rgba8(full), [value, 128, value, 255], "{name}");
+        }
+    }
+}
+
+#[test]
+fn layers_tell_what_the_pixel_centres_meet() {
+    let scene =
+        scenes::scene(clouds::georeferenced(&clouds::sphere(20_000, 1.0)), SurfaceKind::Splat);
+    let image = render(&scene, &SETTINGS);
+    let layers = &image.layers;
+    let center = 32 * 64 + 32;
+    assert!((layers.depth[center] - 5.0).abs() < 0.01, "{}", layers.depth[center]);
+    assert!(layers.position[center].distance(Vec3::X) < 0.06);
+    assert!(0.99 < layers.normal[center].x);
+    assert_eq!((layers.instance_id[center], layers.coverage[center]), (0, 1.0));
+    let point = scene.cloud.positions[layers.point_id[center] as usize];
+    assert!(point.distance(layers.position[center]) < 0.06);
+    assert_eq!((layers.point_id[0], layers.instance_id[0]), (u32::MAX, u32::MAX));
+    assert_eq!(
+        (layers.depth[0], layers.coverage[0], image.color[0]),
+        (f32::INFINITY, 0.0, [0.0; 4])
+    );
+}
+
+#[test]
+fn impossible_settings_are_errors() {
+    let flat = scenes::flat(clouds::sphere(50, 1.0), SurfaceKind::Splat);
+    let renderer = CpuRenderer { simd: Simd::detect() };
+    for settings in [
+        Settings { width: 0, ..SETTINGS },
+        Settings { width: 1 << 20, height: 1 << 20, ..SETTINGS },
+        Settings { samples_per_pixel: 0, ..SETTINGS },
+        Settings { light_samples: 0, ..SETTINGS },
+    ] {
+        let result = renderer.render(&flat, &settings, &Silent);
+        assert!(matches!(result, Err(surfel::Error::Setting { .. })), "{settings:?}");
+    }
+}

@@ -1,0 +1,152 @@
+//! Shapes with closed forms: where the surface lies and how it faces.
+
+use surfel::flat::FlatScene;
+use surfel::math::{Ray, Vec3};
+use surfel::points::PointCloud;
+use surfel::surface::{Boundary, SurfaceKind};
+use surfel::trace::{self, Simd, SurfaceHit};
+use surfel_tests::{clouds, scenes};
+
+fn hits(scene: &FlatScene, rays: &[Ray]) -> Vec<SurfaceHit> {
+    let mut hits = vec![SurfaceHit::MISS; rays.len()];
+    trace::surface_hits(scene, Simd::detect(), rays, &mut hits);
+    hits
+}
+
+/// Parallel rays along -Z through the places of a square grid.
+fn rays_from_above(half_side: f32, n_side: usize) -> Vec<Ray> {
+    let at = |i: usize| half_side * ((2 * i + 1) as f32 / n_side as f32 - 1.0);
+    let places = (0..n_side * n_side).map(|i| Vec3::new(at(i % n_side), at(i / n_side), 5.0));
+    places.map(|origin| Ray::new(origin, Vec3::NEG_Z)).collect()
+}
+
+/// A sphere of 20,000 points of radius 1 has spacing 0.025 and disc radius 0.05.
+#[test]
+fn a_sphere_of_points_has_the_depth_and_normals_of_a_sphere() {
+    // Depth in units and angle in degrees, mean and most. A ball of radius r stands out by r, a disc by
+    // r^2 / 2 at its rim, where it leans by r: 2.9 degrees; splats of twice the radius by four times that; rays come in at up to 45 degrees.
+    let (r, slant) = (0.05, 1.0 / 0.7);
+    let rim = slant * r * r / 2.0;
+    let bounds = [
+        (SurfaceKind::Sphere, [1.2 * r, slant * r], [20.0, 50.0]),
+        (SurfaceKind::Disc, [rim, 1.5 * rim], [2.9, 3.5]),
+        (SurfaceKind::SplatMean, [rim, 1.5 * rim], [0.8, 3.0]),
+        (SurfaceKind::Splat, [rim, 1.5 * rim], [0.8, 3.0]),
+        (SurfaceKind::SplatFit, [4.0 * rim, 6.0 * rim], [3.5, 9.0]),
+    ];
+    for (kind, depth_bounds, angle_bounds) in bounds {
+        let scene = scenes::flat(clouds::sphere(20_000, 1.0), kind);
+        // Up to 0.7 of the radius: all rays come in within 45 degrees of the normal.
+        let rays: Vec<Ray> = rays_from_above(0.7, 100)
+            .into_iter()
+            .filter(|ray| ray.origin.truncate().length() < 0.7)
+            .collect();
+        let (mut depths, mut angles) = (Vec::new(), Vec::new());
+        for (ray, hit) in rays.iter().zip(hits(&scene, &rays)) {
+            let height = (1.0 - ray.origin.truncate().length_squared()).sqrt();
+            let true_normal = ray.origin.with_z(height);
+            depths.push((hit.distance - (5.0 - height)).abs());
+            angles.push(hit.normal.angle_between(true_normal).to_degrees());
+        }
+        check(kind, "depth", &depths, depth_bounds);
+        check(kind, "angle", &angles, angle_bounds);
+    }
+}
+
+fn check(kind: SurfaceKind, what: &str, values: &[f32], [mean_bound, most_bound]: [f32; 2]) {
+    let mean = values.iter().sum::<f32>() / values.len() as f32;
+    let most = values.iter().copied().fold(0.0, f32::max);
+    assert!(
+        mean <= mean_bound && most <= most_bound,
+        "{}: {what} {mean} (most {most})",
+        kind.name()
+    );
+}
+
+#[test]
+fn a_plane_is_flat_and_ends_at_its_outermost_points() {
+    for kind in
+        [SurfaceKind::Disc, SurfaceKind::SplatMean, SurfaceKind::Splat, SurfaceKind::SplatFit]
+    {
+        let scene = scenes::flat(clouds::plane(50, 0.3, 4), kind);
+        for (ray, hit) in
+            rays_from_above(0.95, 60).iter().zip(hits(&scene, &rays_from_above(0.95, 60)))
+        {
+            assert!((hit.distance - 5.0).abs() < 1e-5, "{kind:?} {ray:?} {hit:?}");
+            assert!(1.0 - 1e-6 < hit.normal.z, "{kind:?} {hit:?}");
+        }
+        // The outermost points are 0.02 from the rim at ±1, give or take their jitter.
+        let beyond: Vec<Ray> = rays_from_above(1.2, 120)
+            .into_iter()
+            .filter(|ray| 1.0 < ray.origin.truncate().abs().max_element())
+            .collect();
+        let n_false = hits(&scene, &beyond).iter().filter(|hit| !hit.is_miss()).count();
+        assert_eq!(n_false, 0, "{kind:?}: of {} rays past the rim", beyond.len());
+        let open = FlatScene { boundary: Boundary::Off, ..scene };
+        let n_false = hits(&open, &beyond).iter().filter(|hit| !hit.is_miss()).count();
+        assert!(100 < n_false, "{kind:?}: without the test discs stick out ({n_false})");
+    }
+}
+
+/// Level discs near the crossing stick out through the upright plane and the other way round; the
+/// points around such a place lie on the disc's own plane, so the gap test accepts them: what it must
+/// refuse are discs past the ends of the planes.
+#[test]
+fn crossing_planes_end_where_their_points_end() {
+    let scene = scenes::flat(clouds::crossing_planes(50, 0.3, 5), SurfaceKind::Splat);
+    let level = hits(&scene, &rays_from_above(0.95, 60));
+    for (ray, hit) in rays_from_above(0.95, 60).iter().zip(&level) {
+        if 0.15 < ray.origin.x.abs() {
+            assert!((hit.distance - 5.0).abs() < 1e-4 && 0.999 < hit.normal.z, "{ray:?} {hit:?}");
+        } else {
+            assert!(!hit.is_miss(), "a hole beside the crossing: {ray:?}");
+        }
+    }
+    // Rays along X just above the upright plane's upper end meet nothing; just below they meet it.
+    let along_x = |height: f32| -> Vec<Ray> {
+        let ys = (0..50).map(|i| -0.9 + 1.8 * i as f32 / 49.0);
+        ys.map(|y| Ray::new(Vec3::new(5.0, y, height), Vec3::NEG_X)).collect()
+    };
+    assert!(hits(&scene, &along_x(1.01)).iter().all(SurfaceHit::is_miss));
+    for hit in hits(&scene, &along_x(0.9)) {
+        assert!((hit.distance - 5.0).abs() < 1e-4, "{hit:?}");
+    }
+}
+
+#[test]
+fn the_search_goes_on_behind_a_refused_hit() {
+    // Beyond the end of the upper sheet its discs are refused, and the lower sheet is found.
+    let upper = clouds::plane(40, 0.3, 6);
+    let lower = clouds::plane(80, 0.3, 7).positions.into_iter().map(|p| 2.0 * p - Vec3::Z);
+    let positions: Vec<Vec3> = upper.positions.iter().copied().chain(lower).collect();
+    let scene = scenes::flat(PointCloud::from_positions(positions), SurfaceKind::Splat);
+    let rays: Vec<Ray> = rays_from_above(1.3, 130)
+        .into_iter()
+        .filter(|ray| (1.0..1.1).contains(&ray.origin.truncate().abs().max_element()))
+        .collect();
+    for (ray, hit) in rays.iter().zip(hits(&scene, &rays)) {
+        assert!((hit.distance - 6.0).abs() < 1e-3, "{ray:?} {hit:?}");
+    }
+}
+
+#[test]
+fn aligned_normals_survive_where_plain_means_cancel() {
+    // Normals of random sign: the mean is worthless, the aligned one is not.
+    let mut cloud = clouds::sphere(20_000, 1.0);
+    for (i, normal) in cloud.normals.as_mut().unwrap().iter_mut().enumerate() {
+        if surfel::math::hash(i as u64) & 1 == 1 {
+            *normal = -*normal;
+        }
+    }
+    let mean_angle = |kind| {
+        let scene = scenes::flat(cloud.clone(), kind);
+        let rays = rays_from_above(0.5, 50);
+        let angles = rays.iter().zip(hits(&scene, &rays)).map(|(ray, hit)| {
+            let height = (1.0 - ray.origin.truncate().length_squared()).sqrt();
+            hit.normal.angle_between(ray.origin.with_z(height)).to_degrees()
+        });
+        angles.sum::<f32>() / rays.len() as f32
+    };
+    let (plain, aligned) = (mean_angle(SurfaceKind::SplatMean), mean_angle(SurfaceKind::Splat));
+    assert!(aligned < 0.6 && 4.0 * aligned < plain, "mean {plain}, aligned {aligned}");
+}
