@@ -2,7 +2,7 @@
 
 use super::light::ground_axes;
 use super::{Camera, Projection};
-use crate::math::{DVec3, Vec3};
+use crate::math::{Aabb, DVec3, Vec3};
 use crate::points::PointCloud;
 
 /// What is known of the wanted camera; the rest follows from the cloud.
@@ -48,6 +48,11 @@ pub fn frame(cloud: &PointCloud, framing: &Framing) -> Camera {
     let (eye, focal, projection) = fit(&local, framing);
     let world = |p: DVec3| cloud.origin + p.x * axes[0] + p.y * axes[1] + p.z * axes[2];
     Camera { position: world(eye), focal_point: world(focal), view_up: up, projection }
+}
+
+/// Bounds of all but the outliers, relative to the cloud's origin.
+pub fn usual_bounds(cloud: &PointCloud) -> Aabb {
+    Aabb::of_points(without_outliers(&sample(cloud)))
 }
 
 /// The part of the view in which a cloud's points lie when their stray ones are left out.

@@ -1,11 +1,12 @@
 //! What an author describes: a cloud, how it is shaped, coloured and lit, and who looks at it.
 
 mod camera;
+pub mod color;
 mod framing;
 mod light;
 
 pub use camera::{Camera, Projection, View};
-pub use framing::{Framing, frame};
+pub use framing::{Framing, frame, usual_bounds};
 pub use light::{Light, Sky, Sun};
 
 use crate::math::Vec3;

@@ -1,0 +1,118 @@
+//! Options of the camera.
+
+use super::{Usage, parse};
+use crate::report::Report;
+use clap::Args;
+use surfel::math::{DVec3, Vec3};
+use surfel::points::{PointCloud, guess_up};
+use surfel::scene::{Camera, Framing, Projection, frame};
+use surfel_formats::Source;
+
+#[derive(Args)]
+#[command(next_help_heading = "Camera (in the file's own coordinates)")]
+pub struct CameraArgs {
+    /// Where the camera is; chosen so that the whole cloud is seen if not given.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vector, allow_hyphen_values = true)]
+    camera_position: Option<DVec3>,
+    /// What the camera looks at: the middle of the picture.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vector, allow_hyphen_values = true)]
+    camera_focal_point: Option<DVec3>,
+    /// What is up in the picture.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::direction, allow_hyphen_values = true)]
+    camera_view_up: Option<DVec3>,
+    /// Vertical angle of view in degrees.
+    #[arg(long, value_name = "DEG", default_value = "35", value_parser = parse::number_in::<1, 170>)]
+    camera_view_angle: f64,
+    /// Without perspective; HEIGHT of the picture in the cloud's unit, or all of the cloud.
+    #[arg(long, value_name = "HEIGHT", num_args = 0..=1, value_parser = parse::positive)]
+    camera_orthographic: Option<Option<f64>>,
+    /// Direction in which the camera looks at the whole cloud: 0,0,-1 for a map.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::direction, allow_hyphen_values = true,
+        conflicts_with_all = ["camera_azimuth_angle", "camera_elevation_angle"])]
+    camera_direction: Option<DVec3>,
+    /// Turns the chosen camera about the cloud, in degrees, clockwise from above.
+    #[arg(long, value_name = "DEG", default_value = "0", value_parser = parse::number_in::<-360, 360>,
+        allow_negative_numbers = true)]
+    camera_azimuth_angle: f64,
+    /// Height of the chosen camera over the horizon in degrees.
+    #[arg(long, value_name = "DEG", value_parser = parse::number_in::<-90, 90>,
+        allow_negative_numbers = true)]
+    camera_elevation_angle: Option<f64>,
+    /// Values above 1 bring the chosen camera nearer.
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = parse::positive)]
+    camera_zoom_factor: f64,
+    /// The axis that points up: +Z, -Y, x,y,z; found out from the cloud if not given.
+    #[arg(long, value_name = "AXIS", value_parser = parse::up, allow_hyphen_values = true)]
+    up: Option<Vec3>,
+}
+
+impl CameraArgs {
+    /// The world's up, from the option or the cloud.
+    pub fn up(&self, cloud: &PointCloud, source: &Source, report: &Report) -> Vec3 {
+        self.up.unwrap_or_else(|| {
+            let guess = guess_up(cloud, is_georeferenced(cloud, source));
+            report.choice(&guess.reason, "--up");
+            guess.up
+        })
+    }
+
+    pub fn check(&self) -> Result<(), Usage> {
+        if self.camera_position.is_some() && self.camera_position == self.camera_focal_point {
+            let text = "--camera-position and --camera-focal-point are the same; move one of them";
+            return Err(Usage(text.into()));
+        }
+        Ok(())
+    }
+
+    pub fn camera(&self, cloud: &PointCloud, up: Vec3, aspect: f64, report: &Report) -> Camera {
+        let framed = frame(cloud, &self.framing(up, aspect));
+        let focal_point = self.camera_focal_point.unwrap_or(framed.focal_point);
+        let beside = framed.position + (focal_point - framed.focal_point);
+        let position = self.camera_position.unwrap_or(beside);
+        let view_up =
+            self.camera_view_up.unwrap_or_else(|| upright(framed.view_up, focal_point - position));
+        let projection = match self.camera_orthographic.flatten() {
+            Some(height) => Projection::Orthographic { height },
+            None => framed.projection,
+        };
+        if self.camera_position.is_none() {
+            let line = format!("camera at {} looks at {}", short(position), short(focal_point));
+            report.choice(&line, "--camera-position, --camera-focal-point, --camera-azimuth-angle");
+        }
+        Camera { position, focal_point, view_up, projection }
+    }
+
+    fn framing(&self, up: Vec3, aspect: f64) -> Framing {
+        Framing {
+            up,
+            aspect,
+            is_orthographic: self.camera_orthographic.is_some(),
+            view_angle_deg: self.camera_view_angle,
+            direction: self.camera_direction,
+            azimuth_deg: self.camera_azimuth_angle,
+            elevation_deg: self.camera_elevation_angle,
+            zoom: self.camera_zoom_factor,
+        }
+    }
+}
+
+/// `up`, or north for a camera that looks along it, as on a map.
+fn upright(up: DVec3, forward: DVec3) -> DVec3 {
+    let looks_along_up = forward.normalize_or_zero().cross(up).length() < 1e-3;
+    let north = if up.z.abs() < 0.9 { -DVec3::Z } else { DVec3::Y };
+    if looks_along_up { north } else { up }
+}
+
+/// Survey formats and coordinates far from zero, as those of national grids, have Z up.
+pub fn is_georeferenced(cloud: &PointCloud, source: &Source) -> bool {
+    let is_survey =
+        ["LAS", "LAZ", "COPC", "E57"].iter().any(|name| source.format.starts_with(name));
+    let size = cloud.bounds().max - cloud.bounds().min;
+    let is_far = 1e4 < cloud.origin.length() && f64::from(size.length()) < cloud.origin.length();
+    is_survey || source.coordinate_system.is_some() || is_far
+}
+
+fn short(position: DVec3) -> String {
+    let digits = if 1000.0 < position.abs().max_element() { 1 } else { 4 };
+    position.to_array().map(|x| format!("{x:.digits$}")).join(",")
+}

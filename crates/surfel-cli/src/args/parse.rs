@@ -1,0 +1,163 @@
+//! Values as they are typed: vectors, directions, sizes, colours.
+
+use surfel::image::{Colormap, decode_srgb8};
+use surfel::math::{DVec3, Vec3};
+use surfel::scene::Background;
+use surfel::scene::color::parse_hex;
+
+/// `x,y,z`, finite.
+pub fn vector(text: &str) -> Result<DVec3, String> {
+    let numbers = numbers(text).filter(|numbers| numbers.len() == 3);
+    let numbers = numbers.ok_or("expected three numbers as in 1.5,-2,0")?;
+    let vector = DVec3::from_slice(&numbers);
+    // Beyond this the squares of lengths are no longer finite in f32.
+    if vector.abs().max_element() < 1e15 {
+        Ok(vector)
+    } else {
+        Err("expected values below 1e15".into())
+    }
+}
+
+/// A vector that points somewhere.
+pub fn direction(text: &str) -> Result<DVec3, String> {
+    let vector = vector(text)?;
+    vector.try_normalize().ok_or_else(|| "expected a direction other than 0,0,0".into())
+}
+
+/// `+X`, `-Y`, `Z` and so on, or a vector.
+pub fn up(text: &str) -> Result<Vec3, String> {
+    let (sign, axis) = match text.strip_prefix('-') {
+        Some(axis) => (-1.0, axis),
+        None => (1.0, text.strip_prefix('+').unwrap_or(text)),
+    };
+    let axis = match axis {
+        "X" | "x" => Vec3::X,
+        "Y" | "y" => Vec3::Y,
+        "Z" | "z" => Vec3::Z,
+        _ => {
+            let up = direction(text).map_err(|_| "expected +X, -X, +Y, -Y, +Z, -Z or x,y,z")?;
+            return Ok(up.as_vec3());
+        }
+    };
+    Ok(sign * axis)
+}
+
+/// `1920x1080` or `1920,1080`.
+pub fn resolution(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once(['x', ',']);
+    let sides = sides.and_then(|(w, h)| Some((w.trim().parse().ok()?, h.trim().parse().ok()?)));
+    let (width, height): (u32, u32) = sides.ok_or("expected width and height as in 1920x1080")?;
+    let n_pixels = u64::from(width) * u64::from(height);
+    if (1..=surfel::render::MAX_PIXELS).contains(&n_pixels) {
+        Ok((width, height))
+    } else {
+        Err(format!("expected 1 to {} pixels in all", surfel::render::MAX_PIXELS))
+    }
+}
+
+/// `lo,hi`.
+pub fn range(text: &str) -> Result<(f64, f64), String> {
+    match numbers(text).as_deref() {
+        Some(&[low, high]) if low != high => Ok((low, high)),
+        _ => Err("expected two different numbers as in 0,255".into()),
+    }
+}
+
+/// `transparent`, `gradient`, `#RRGGBB`, or two colours: top and bottom.
+pub fn background(text: &str) -> Result<Background, String> {
+    if text == "transparent" {
+        return Ok(Background::Transparent);
+    }
+    let text = if text == "gradient" { GRADIENT } else { text };
+    let colors: Option<Vec<Vec3>> = text.split(',').map(|color| linear(color.trim())).collect();
+    match colors.as_deref() {
+        Some(&[plain]) => Ok(Background::Gradient { top: plain, bottom: plain }),
+        Some(&[top, bottom]) => Ok(Background::Gradient { top, bottom }),
+        _ => {
+            Err("expected #RRGGBB, two such as in #AAAAAA,#BBBBBB, gradient or transparent".into())
+        }
+    }
+}
+
+/// Dark enough above for light stone to stand out, light enough below for what is dark.
+const GRADIENT: &str = "#6f7c8a,#c9ced3";
+
+fn linear(color: &str) -> Option<Vec3> {
+    Some(Vec3::from_array(parse_hex(color)?.map(decode_srgb8)))
+}
+
+pub fn colormap(text: &str) -> Result<Colormap, String> {
+    Colormap::from_name(text).map_err(|error| error.to_string())
+}
+
+/// Bytes: a number with K, M, G or T of 1024 each, or without.
+pub fn memory(text: &str) -> Result<u64, String> {
+    let upper = text.to_uppercase();
+    let short = upper.trim_end_matches('B').trim_end_matches('I');
+    let (number, power) = match short.char_indices().last() {
+        Some((last, unit)) => match "KMGT".find(unit) {
+            Some(power) => (&short[..last], power + 1),
+            None => (short, 0),
+        },
+        None => (short, 0),
+    };
+    let number: Option<f64> = number.trim().parse().ok();
+    let bytes = number.map(|number| number * 1024f64.powi(power as i32));
+    match bytes {
+        Some(bytes) if 1.0 <= bytes && bytes.is_finite() => Ok(bytes as u64),
+        _ => Err("expected a size as in 800M or 8G".into()),
+    }
+}
+
+/// A number in a range, both ends included.
+pub fn number_in<const LOW: i32, const HIGH: i32>(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok();
+    let number = number.filter(|number| (f64::from(LOW)..=f64::from(HIGH)).contains(number));
+    number.ok_or_else(|| format!("expected a number from {LOW} to {HIGH}"))
+}
+
+/// A positive finite number.
+pub fn positive(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok();
+    let number = number.filter(|number| 1e-9 < *number && *number < 1e15);
+    number.ok_or_else(|| "expected a positive number".into())
+}
+
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+    text.split(',').map(number).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_read_as_people_write_them() {
+        assert_eq!(vector("1, -2.5,3e2"), Ok(DVec3::new(1.0, -2.5, 300.0)));
+        assert_eq!((up("-y"), up("Z"), up("0,0,2")), (Ok(-Vec3::Y), Ok(Vec3::Z), Ok(Vec3::Z)));
+        assert_eq!((resolution("64x48"), resolution("64,48")), (Ok((64, 48)), Ok((64, 48))));
+        assert_eq!((memory("8G"), memory("1.5KiB"), memory("70")), (Ok(8 << 30), Ok(1536), Ok(70)));
+        assert!(matches!(background("transparent"), Ok(Background::Transparent)));
+        assert_eq!(background("#fff"), background("#ffffff,#FFFFFF"));
+        assert_eq!(range("-1,2"), Ok((-1.0, 2.0)));
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        for text in ["", "1,2", "1,2,NaN", "inf,0,0", "1e99,0,0", "a,b,c", "1,2,3,4"] {
+            assert!(vector(text).is_err(), "{text}");
+        }
+        for text in ["0x0", "x", "1920", "-1x5", "100000x100000", "5x"] {
+            assert!(resolution(text).is_err(), "{text}");
+        }
+        for text in ["", "G", "-1G", "NaN", "1e400", "8 potatoes"] {
+            assert!(memory(text).is_err(), "{text}");
+        }
+        for text in ["", "#12", "red", "#fff,#fff,#fff"] {
+            assert!(background(text).is_err(), "{text}");
+        }
+        assert!(up("W").is_err() && direction("0,0,0").is_err() && range("1,1").is_err());
+        assert!(positive("0").is_err() && positive("NaN").is_err() && positive("inf").is_err());
+    }
+}

@@ -1,0 +1,87 @@
+//! Options of the preparation of points.
+
+use clap::Args;
+use surfel::points::neighbors::{Method, Query};
+use surfel::points::{Orientation, Preparation, Radius, SURFACE_VARIATION, Select};
+use surfel::scene::color::ColorSource;
+use surfel_formats::{Column, ColumnChoice, LoadOptions, TextColumn};
+
+#[derive(Args)]
+#[command(next_help_heading = "Preparation")]
+pub struct PreparationArgs {
+    /// Fewer points: first:N, random:N, stride:S or spacing:LENGTH.
+    #[arg(long, value_name = "CHOICE", value_parser = select)]
+    pub select: Option<Select>,
+    /// How neighbours are found: knn, grid or scan-line.
+    #[arg(long, value_name = "METHOD", default_value = "knn")]
+    neighbors: Method,
+    /// Neighbours that a normal is estimated from [default: 16].
+    #[arg(long, value_name = "K", conflicts_with = "normals_radius",
+        value_parser = clap::value_parser!(u32).range(2..=10_000))]
+    normals_k: Option<u32>,
+    /// Estimate normals from all neighbours within this distance.
+    #[arg(long, value_name = "LENGTH", value_parser = super::parse::positive)]
+    normals_radius: Option<f64>,
+    /// Which side of the surface is its front: none, up, mst or viewpoint:X,Y,Z.
+    #[arg(long, value_name = "RULE", default_value = "none")]
+    pub orient: Orientation,
+    /// How far each point's surface reaches: a length, adaptive[:K] or median[:N] [default: adaptive:12].
+    #[arg(long, value_name = "RADIUS")]
+    pub radius: Option<Radius>,
+    /// Columns of a text file, as in x,y,z,-,r,g,b; found out from the file if not given.
+    #[arg(long, value_name = "NAMES")]
+    columns: Option<String>,
+}
+
+impl PreparationArgs {
+    /// `color` may ask for a column that only the preparation makes.
+    pub fn preparation(&self, seed: u64, color: Option<&ColorSource>) -> Preparation {
+        let default = Preparation::default();
+        let within = self.normals_radius.map(|radius| Query::Within(radius as f32));
+        let nearest = self.normals_k.map(|k| Query::Nearest(k as usize));
+        Preparation {
+            select: self.select,
+            neighbors: self.neighbors,
+            normals: within.or(nearest).unwrap_or(default.normals),
+            orientation: self.orient,
+            radius: self.radius.unwrap_or(default.radius),
+            keep_variation: matches!(color, Some(ColorSource::Column(name)) if name == SURFACE_VARIATION),
+            seed,
+        }
+    }
+
+    pub fn load_options(&self, columns: ColumnChoice) -> LoadOptions {
+        let text_columns = self.columns.as_deref().map(TextColumn::parse_list);
+        LoadOptions { columns, text_columns, origin: None }
+    }
+
+    /// Only the columns that a picture of these colours needs; normals and radii that are to be
+    /// estimated in a given way are not taken from the file.
+    pub fn columns(&self, color: Option<&ColorSource>) -> ColumnChoice {
+        let mut columns = Vec::new();
+        if self.normals_k.is_none() && self.normals_radius.is_none() {
+            columns.push(Column::Normals);
+        }
+        if self.radius.is_none() {
+            columns.push(Column::Radii);
+        }
+        match color {
+            None => columns.extend([Column::Colors, Column::Intensity]),
+            Some(ColorSource::Rgb) => columns.push(Column::Colors),
+            Some(ColorSource::Intensity) => columns.push(Column::Intensity),
+            Some(ColorSource::Class) => columns.push(Column::Classification),
+            Some(ColorSource::Column(name)) => columns.push(Column::Scalar(name.clone())),
+            Some(ColorSource::Elevation | ColorSource::Normal | ColorSource::Constant(_)) => {}
+        }
+        ColumnChoice::Only(columns)
+    }
+}
+
+/// Refuses a selection of nothing, which the library takes at its word.
+fn select(text: &str) -> Result<Select, String> {
+    match text.parse() {
+        Ok(Select::First(0) | Select::Random(0)) => Err("expected at least one point".into()),
+        Ok(choice) => Ok(choice),
+        Err(error) => Err(error.to_string()),
+    }
+}

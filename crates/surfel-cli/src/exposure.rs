@@ -1,0 +1,59 @@
+//! Automatic exposure: a small preview tells how bright the cloud's brightest parts come out.
+
+use crate::report::Muted;
+use surfel::flat::FlatScene;
+use surfel::render::{Renderer, Settings};
+
+/// Linear luminance that the brightest parts get: just below white.
+const TARGET: f32 = 0.78;
+/// Share of the covered pixels that are darker.
+const PERCENTILE: f32 = 0.93;
+/// Stops, at least and at most: a black object must not turn white.
+const LIMITS: (f32, f32) = (-1.0, 2.5);
+/// Width of the preview.
+const WIDTH: u32 = 200;
+
+/// Stops that the lights of `scene` lack.
+pub fn automatic(
+    renderer: &dyn Renderer,
+    scene: &FlatScene,
+    settings: &Settings,
+    muted: &Muted,
+) -> surfel::Result<f32> {
+    let height = u64::from(WIDTH) * u64::from(settings.height) / u64::from(settings.width);
+    let preview = Settings {
+        width: WIDTH,
+        height: height.clamp(1, 4 * u64::from(WIDTH)) as u32,
+        samples_per_pixel: 1,
+        with_layers: false,
+        ..*settings
+    };
+    let (image, _) = renderer.render(scene, &preview, muted)?;
+    let covered = image.color.iter().zip(&image.layers.coverage).filter(|(_, c)| 0.0 < **c);
+    let luminance = |[r, g, b, _]: [f32; 4]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    Ok(stops(covered.map(|(color, _)| luminance(*color)).collect()))
+}
+
+fn stops(mut luminances: Vec<f32>) -> f32 {
+    let rank = (PERCENTILE * luminances.len() as f32) as usize;
+    if luminances.len() <= rank {
+        return 0.0;
+    }
+    let bright = *luminances.select_nth_unstable_by(rank, f32::total_cmp).1;
+    (TARGET / bright.max(1e-6)).log2().clamp(LIMITS.0, LIMITS.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stops_bring_the_bright_parts_to_the_target() {
+        assert_eq!(stops(vec![]), 0.0);
+        assert_eq!(stops(vec![TARGET / 2.0; 50]), 1.0);
+        assert_eq!((stops(vec![0.0; 50]), stops(vec![9.0; 50])), (LIMITS.1, LIMITS.0));
+        let mut mostly_dark = vec![TARGET / 4.0; 99];
+        mostly_dark.push(100.0);
+        assert_eq!(stops(mostly_dark), 2.0);
+    }
+}

@@ -1,0 +1,10 @@
+//! stub
+#[derive(clap::Args)]
+pub struct Args {}
+pub fn run(
+    _args: &Args,
+    _global: &crate::args::Global,
+    _report: &crate::report::Report,
+) -> anyhow::Result<()> {
+    Ok(())
+}

@@ -1,0 +1,101 @@
+//! Numbers about a run, as JSON.
+
+use crate::report;
+use anyhow::Context;
+use serde_json::{Value, json};
+use std::fs;
+use std::path::Path;
+use surfel::flat::{FlatScene, PointBlock};
+use surfel::render::RenderStats;
+use surfel::trace::Simd;
+
+/// Seconds that the steps took.
+#[derive(Clone, Copy, Default)]
+pub struct Seconds {
+    pub load: f64,
+    pub prepare: f64,
+    pub build: f64,
+    pub total: f64,
+}
+
+/// A finished run of `render`.
+pub struct Run<'a> {
+    pub flat: &'a FlatScene,
+    pub n_points: usize,
+    pub seconds: Seconds,
+    pub rendered: RenderStats,
+    pub resolution: (u32, u32),
+    pub simd: Simd,
+}
+
+impl Run<'_> {
+    pub fn json(&self) -> Value {
+        let Seconds { load, prepare, build, total } = self.seconds;
+        let RenderStats { rays, trace_secs, frame_secs } = self.rendered;
+        json!({
+            "points": self.n_points,
+            "triangles": 0,
+            "seconds": {
+                "load": load, "prepare": prepare, "build": build,
+                "trace": trace_secs, "frame": frame_secs, "total": total,
+            },
+            "rays": { "primary": rays.primary, "shadow": rays.shadow, "sky": rays.sky },
+            "mrays_per_s": {
+                "primary": mrays_per_s(rays.primary, trace_secs),
+                "all": mrays_per_s(rays.primary + rays.shadow + rays.sky, frame_secs),
+            },
+            "bytes_per_point": bytes_per_point(self.flat, self.n_points),
+            "peak_rss_bytes": peak_rss_bytes(),
+            "backend": "cpu",
+            "device": device(),
+            "threads": rayon::current_num_threads(),
+            "simd": self.simd.name(),
+            "resolution": [self.resolution.0, self.resolution.1],
+        })
+    }
+}
+
+/// Bytes that tree and points take in the flat form, for each of `n_points`.
+pub fn bytes_per_point(scene: &FlatScene, n_points: usize) -> Value {
+    let per_point = |n: usize, size: usize| (n * size) as f64 / n_points.max(1) as f64;
+    let tree = per_point(scene.points.nodes.len(), size_of::<surfel::bvh::Node>());
+    let points = per_point(scene.points.blocks.len(), size_of::<PointBlock>());
+    json!({ "tree": tree, "points": points, "total": tree + points })
+}
+
+/// Most memory ever held, where the system tells it.
+pub fn peak_rss_bytes() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(1024 * kilobytes)
+}
+
+/// Name of the processor.
+pub fn device() -> String {
+    let info = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = info.lines().find(|line| line.starts_with("model name"));
+    let model = model.and_then(|line| line.split_once(':')).map(|(_, name)| name.trim().to_owned());
+    model.unwrap_or_else(|| std::env::consts::ARCH.to_owned())
+}
+
+/// Million a second; none took no time.
+pub fn mrays_per_s(n_rays: u64, secs: f64) -> Option<f64> {
+    (0.0 < secs && 0 < n_rays).then(|| n_rays as f64 / secs / 1e6)
+}
+
+/// To a file, or to stdout for `-`.
+pub fn write(path: &Path, stats: &Value) -> anyhow::Result<()> {
+    let text = serde_json::to_string_pretty(stats)?;
+    if path == Path::new("-") {
+        return report::print(&text).context("stdout cannot be written");
+    }
+    // Beside and renamed, so that a full disk destroys no old file.
+    let aside = path.with_added_extension(format!("{}.part", std::process::id()));
+    let written = fs::write(&aside, text + "\n").and_then(|()| fs::rename(&aside, path));
+    if written.is_err() {
+        // Nobody is left to tell if this fails.
+        let _ = fs::remove_file(&aside);
+    }
+    written.with_context(|| format!("{}: cannot be written", path.display()))
+}
