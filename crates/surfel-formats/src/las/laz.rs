@@ -9,6 +9,7 @@ use laz::record::{
     LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
 };
 use laz::{DecompressionSelection, LazItem, LazItemType, LazVlr};
+use surfel::progress::Progress;
 
 use super::header::{Header, read_u16, read_u32, read_u64};
 use crate::error::{Error, Place, Result};
@@ -40,7 +41,11 @@ pub(super) struct Chunk {
 }
 
 /// Finds the chunks of a file and checks that they lie in it.
-pub(super) fn find_chunks(input: &Input, header: &Header) -> Result<Chunks> {
+pub(super) fn find_chunks(
+    input: &Input,
+    header: &Header,
+    progress: &dyn Progress,
+) -> Result<Chunks> {
     let vlr = read_laszip_record(input, header)?;
     let items = vlr.items().clone();
     let is_layered = matches!(items[0].item_type(), LazItemType::Point14);
@@ -91,7 +96,7 @@ pub(super) fn find_chunks(input: &Input, header: &Header) -> Result<Chunks> {
             claimed: header.n_points,
         });
     }
-    found.try_unusual(input)?;
+    found.try_unusual(input, progress)?;
     Ok(found)
 }
 
@@ -151,10 +156,15 @@ impl Chunks {
     }
 
     /// Decodes chunks with an unusual number of points once, so that no memory is taken for a false claim.
-    fn try_unusual(&self, input: &Input) -> Result<()> {
+    fn try_unusual(&self, input: &Input, progress: &dyn Progress) -> Result<()> {
         for chunk in &self.chunks {
             if USUAL_POINTS_PER_BYTE * (chunk.bytes.len() as u64) < chunk.n_points as u64 {
-                self.decode(input, chunk, DecompressionSelection::all(), |_| Ok(()))?;
+                self.decode(
+                    input,
+                    chunk,
+                    DecompressionSelection::all(),
+                    |_| Ok(progress.check()?),
+                )?;
             }
         }
         Ok(())

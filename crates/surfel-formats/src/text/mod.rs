@@ -133,11 +133,11 @@ fn read_preamble(input: &Input) -> Result<Preamble> {
             names = names_of(&fields).or(names);
             continue;
         }
-        if let ([field], None) = (&fields[..], count) {
-            if let Ok(points) = String::from_utf8_lossy(field).parse() {
-                count = Some(points);
-                continue;
-            }
+        if let ([field], None) = (&fields[..], count)
+            && let Ok(points) = String::from_utf8_lossy(field).parse()
+        {
+            count = Some(points);
+            continue;
         }
         if fields.iter().all(|field| field.is_empty() || parse_number(field).is_ok()) {
             let has_empty_end = fields.last().is_some_and(|field| field.is_empty());
