@@ -3,6 +3,7 @@
 mod header;
 mod crs;
 mod fields;
+mod extra;
 mod laz;
 mod plan;
 mod read;
