@@ -69,21 +69,13 @@ fn source(input: &Input, header: &Header) -> Source {
         true => "LAZ",
         false => "LAS",
     };
-    let names = columns(input, header).into_iter().map(|column| match column.role {
-        Role::Position(axis) => ["x", "y", "z"][axis].into(),
-        Role::Color(channel) => ["red", "green", "blue"][channel].into(),
-        Role::Normal(axis) => ["nx", "ny", "nz"][axis].into(),
-        Role::Radius => "radius".into(),
-        Role::Intensity => "intensity".into(),
-        Role::Classification => "classification".into(),
-        Role::Scalar(name) => name,
-    });
+    let columns = columns(input, header);
     Source {
         format: format!("{name} 1.{}, point format {}", header.minor_version, header.point_format),
         n_points: Some(header.n_points),
         resolution: Some(header.scale.abs()),
         coordinate_system: coordinate_system(input, header),
-        columns: names.collect(),
+        columns: columns.iter().map(|column| column.role.name().to_owned()).collect(),
     }
 }
 

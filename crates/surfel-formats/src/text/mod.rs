@@ -52,10 +52,13 @@ pub(crate) fn read(
     progress.begin(&format!("read {}", input.name), (input.len() - preamble.data) as u64);
     let cloud = read_rows(input, rows, &parse, layout_of, options.origin, progress)?;
     if let Some(count) = preamble.count {
-        progress.note(&format!("{}: its first line says {count} points", input.name));
+        let n_points = cloud.len();
+        let line = format!("a line before the points says {count} points, {n_points} were read");
+        progress.note(&format!("{}: {line}", input.name));
     }
     let mut source = source(&preamble);
     source.n_points = Some(cloud.len() as u64);
+    source.columns = kept.iter().map(|(_, role)| role.name().to_owned()).collect();
     Ok(Loaded { cloud, source })
 }
 
