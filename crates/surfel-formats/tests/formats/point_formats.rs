@@ -22,7 +22,7 @@ fn point(i: usize, format: &Format) -> Point {
         return_number: 1 + (i % 3) as u8,
         number_of_returns: 3,
         classification: las::point::Classification::new(2 + (i % 4) as u8).unwrap(),
-        is_withheld: i % 100 == 0,
+        is_withheld: i.is_multiple_of(100),
         scan_angle: (i % 40) as f32 - 20.0,
         user_data: (i % 256) as u8,
         point_source_id: (i % 1000) as u16,
