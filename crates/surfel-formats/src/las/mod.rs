@@ -4,6 +4,8 @@ mod header;
 mod crs;
 mod fields;
 mod extra;
+mod gps;
+mod point14;
 mod laz;
 mod plan;
 mod read;
