@@ -26,7 +26,13 @@ fn point(i: usize, format: &Format) -> Point {
         scan_angle: (i % 40) as f32 - 20.0,
         user_data: (i % 256) as u8,
         point_source_id: (i % 1000) as u16,
-        gps_time: format.has_gps_time.then_some(1e5 + i as f64 * 1e-4),
+        // Several scanners, each with its own clock, and jumps now and then.
+        scanner_channel: if format.is_extended { (i / 70 % 4) as u8 } else { 0 },
+        is_edge_of_flight_line: i.is_multiple_of(150),
+        gps_time: format.has_gps_time.then_some({
+            let clock = 1e5 * (1 + i % 3) as f64 + 1e7 * (i / 9000) as f64;
+            clock + (i / 4) as f64 * if i % 500 < 250 { 1e-4 } else { 7e-3 }
+        }),
         color: format.has_color.then(|| Color::new(i as u16, (i / 3) as u16, 77)),
         nir: format.has_nir.then_some((i % 999) as u16),
         waveform: format.has_waveform.then(Waveform::default),
