@@ -5,6 +5,7 @@ mod crs;
 mod fields;
 mod extra;
 mod gps;
+mod median;
 mod point14;
 mod laz;
 mod plan;

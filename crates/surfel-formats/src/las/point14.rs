@@ -10,6 +10,7 @@ use laz::record::LayeredFieldDecompressor;
 
 use super::gps::{Generation, GpsTimes};
 use super::header::{read_u16, read_u32, read_u64};
+use super::median::Median;
 
 const SIZE: usize = 30;
 
@@ -341,44 +342,6 @@ impl Point {
         out[18..20].copy_from_slice(&self.scan_angle.to_le_bytes());
         out[20..22].copy_from_slice(&self.source_id.to_le_bytes());
         out[22..30].copy_from_slice(&self.gps_time.to_le_bytes());
-    }
-}
-
-/// A running guess at the median: of five values, the farthest out makes room for each new one.
-#[derive(Clone, Copy)]
-struct Median {
-    /// In ascending order.
-    values: [i32; 5],
-    /// True if the largest value goes next, false if the smallest.
-    drops_largest: bool,
-}
-
-impl Default for Median {
-    fn default() -> Self {
-        Self { values: [0; 5], drops_largest: true }
-    }
-}
-
-impl Median {
-    fn get(&self) -> i32 {
-        self.values[2]
-    }
-
-    fn add(&mut self, value: i32) {
-        let values = &mut self.values;
-        let middle = values[2];
-        if self.drops_largest {
-            // The place is found from below, so that equal values come behind.
-            let at = values[..4].iter().position(|v| value < *v).unwrap_or(4);
-            values[at..].rotate_right(1);
-            values[at] = value;
-            self.drops_largest = value < middle;
-        } else {
-            let at = values[1..].iter().rposition(|v| *v < value).map_or(0, |at| at + 1);
-            values[..=at].rotate_left(1);
-            values[at] = value;
-            self.drops_largest = value <= middle;
-        }
     }
 }
 
