@@ -1,4 +1,26 @@
 //! Files: point clouds in and out, pictures out.
+//!
+//! A file becomes a [`surfel::points::PointCloud`] by [`load`], whatever its format; [`save`] goes
+//! the other way, and [`save_image`] writes what was rendered.
+//!
+//! ```
+//! use surfel::progress::Silent;
+//! use surfel_formats::{LoadOptions, SaveOptions, load, load_bytes, save};
+//!
+//! # fn main() -> Result<(), surfel_formats::Error> {
+//! let text = b"x,y,z,intensity\n500000.25,4900000.5,12.0,7\n500001.25,4900001.5,13.0,8\n";
+//! let loaded = load_bytes("site.csv", text, &LoadOptions::default(), &Silent)?;
+//! assert_eq!(loaded.cloud.intensity, Some(vec![7.0, 8.0]));
+//!
+//! let path = std::env::temp_dir().join(format!("site-{}.laz", std::process::id()));
+//! save(&path, &loaded.cloud, &SaveOptions::default(), &Silent)?;
+//! let again = load(&path, &LoadOptions::default(), &Silent)?;
+//! assert_eq!(again.source.format, "LAZ 1.4, point format 6");
+//! assert_eq!(again.cloud.world_position(1), loaded.cloud.world_position(1));
+//! # std::fs::remove_file(&path).unwrap();
+//! # Ok(())
+//! # }
+//! ```
 
 mod error;
 mod input;

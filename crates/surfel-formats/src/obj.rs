@@ -10,7 +10,7 @@ use crate::record::{ColumnField, Field, Kind, Layout};
 use crate::role::Role;
 
 pub(crate) fn inspect(input: &Input) -> Result<Source> {
-    first_vertex(input).map(|n_columns| source(n_columns))
+    first_vertex(input).map(source)
 }
 
 // Not by tobj: it builds meshes, and keeps only the vertices that faces use.

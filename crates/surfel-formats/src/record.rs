@@ -76,50 +76,53 @@ impl Field {
 
     /// The field's value in the record that `record` starts with.
     pub fn value(&self, record: &[u8], big_endian: bool) -> f64 {
-        let mut value = 0.0;
-        self.for_each(record, record.len(), big_endian, |_, v| value = v);
-        value
+        let mut value = [0.0];
+        self.fill(record, record.len(), big_endian, &mut value, |slot, v| *slot = v);
+        value[0]
     }
 
-    /// Hands `take` the index and value of the field in each record.
-    fn for_each(
+    /// Has `set` put the field's value in each record into the same place of `out`.
+    fn fill<T>(
         &self,
         records: &[u8],
         stride: usize,
         big_endian: bool,
-        mut take: impl FnMut(usize, f64),
+        out: &mut [T],
+        set: impl Fn(&mut T, f64),
     ) {
+        let records = records.chunks_exact(stride).zip(out);
+        if let Some((lowest, n_bits)) = self.bits {
+            let mask = ((1u16 << n_bits) - 1) as u8;
+            for (record, slot) in records {
+                set(slot, f64::from((record[self.byte] >> lowest) & mask));
+            }
+            return;
+        }
         // The kind is looked at once, not once a record: each arm is a loop of its own.
-        macro_rules! each {
+        macro_rules! fill {
             ($number:ty) => {
-                for (i, record) in records.chunks_exact(stride).enumerate() {
+                for (record, slot) in records {
                     let bytes = record[self.byte..].first_chunk().copied().unwrap_or_default();
                     let number = if big_endian {
                         <$number>::from_be_bytes(bytes)
                     } else {
                         <$number>::from_le_bytes(bytes)
                     };
-                    take(i, number as f64 * self.scale + self.offset);
+                    set(slot, number as f64 * self.scale + self.offset);
                 }
             };
         }
-        if let Some((lowest, n_bits)) = self.bits {
-            for (i, record) in records.chunks_exact(stride).enumerate() {
-                take(i, f64::from((record[self.byte] >> lowest) & ((1u16 << n_bits) - 1) as u8));
-            }
-            return;
-        }
         match self.kind {
-            Kind::I8 => each!(i8),
-            Kind::U8 => each!(u8),
-            Kind::I16 => each!(i16),
-            Kind::U16 => each!(u16),
-            Kind::I32 => each!(i32),
-            Kind::U32 => each!(u32),
-            Kind::I64 => each!(i64),
-            Kind::U64 => each!(u64),
-            Kind::F32 => each!(f32),
-            Kind::F64 => each!(f64),
+            Kind::I8 => fill!(i8),
+            Kind::U8 => fill!(u8),
+            Kind::I16 => fill!(i16),
+            Kind::U16 => fill!(u16),
+            Kind::I32 => fill!(i32),
+            Kind::U32 => fill!(u32),
+            Kind::I64 => fill!(i64),
+            Kind::U64 => fill!(u64),
+            Kind::F32 => fill!(f32),
+            Kind::F64 => fill!(f64),
         }
     }
 
@@ -206,44 +209,44 @@ impl Layout {
     /// Fills `block` from as many records.
     pub fn decode(&self, records: &[u8], origin: DVec3, block: &mut Block) {
         for axis in 0..3 {
-            self.each(&self.position[axis], records, |i, v| {
-                block.positions[i][axis] = (v - origin[axis]) as f32;
-            });
+            let zero = origin[axis];
+            let set = |position: &mut Vec3, v: f64| position[axis] = (v - zero) as f32;
+            self.fill(&self.position[axis], records, block.positions, set);
         }
         if let (Some(fields), Some(normals)) = (&self.normal, &mut block.normals) {
             for (axis, field) in fields.iter().enumerate() {
-                self.each(field, records, |i, v| normals[i][axis] = v as f32);
+                self.fill(field, records, normals, |normal, v| normal[axis] = v as f32);
             }
             normals.iter_mut().for_each(|normal| *normal = unit(*normal));
         }
         if let (Some(fields), Some(colors)) = (&self.color, &mut block.colors) {
             for (channel, field) in fields.iter().enumerate() {
                 // The cast takes what lies outside to the nearest end, and NaN to black.
-                self.each(field, records, |i, v| colors[i][channel] = (v + 0.5) as u16);
+                self.fill(field, records, colors, |color, v| color[channel] = (v + 0.5) as u16);
             }
         }
         if let (Some(field), Some(radii)) = (&self.radius, &mut block.radii) {
-            self.each(field, records, |i, v| radii[i] = v as f32);
+            self.fill(field, records, radii, |radius, v| *radius = v as f32);
         }
         if let (Some(field), Some(intensity)) = (&self.intensity, &mut block.intensity) {
-            self.each(field, records, |i, v| intensity[i] = v as f32);
+            self.fill(field, records, intensity, |slot, v| *slot = v as f32);
         }
         if let (Some(field), Some(classes)) = (&self.classification, &mut block.classification) {
-            self.each(field, records, |i, v| classes[i] = v as u8);
+            self.fill(field, records, classes, |class, v| *class = v as u8);
         }
         for ((_, field), values) in self.scalars.iter().zip(&mut block.scalars) {
             match values {
-                ValuesMut::U8(out) => self.each(field, records, |i, v| out[i] = v as u8),
-                ValuesMut::U16(out) => self.each(field, records, |i, v| out[i] = v as u16),
-                ValuesMut::I32(out) => self.each(field, records, |i, v| out[i] = v as i32),
-                ValuesMut::F32(out) => self.each(field, records, |i, v| out[i] = v as f32),
-                ValuesMut::F64(out) => self.each(field, records, |i, v| out[i] = v),
+                ValuesMut::U8(out) => self.fill(field, records, out, |slot, v| *slot = v as u8),
+                ValuesMut::U16(out) => self.fill(field, records, out, |slot, v| *slot = v as u16),
+                ValuesMut::I32(out) => self.fill(field, records, out, |slot, v| *slot = v as i32),
+                ValuesMut::F32(out) => self.fill(field, records, out, |slot, v| *slot = v as f32),
+                ValuesMut::F64(out) => self.fill(field, records, out, |slot, v| *slot = v),
             }
         }
     }
 
-    fn each(&self, field: &Field, records: &[u8], take: impl FnMut(usize, f64)) {
-        field.for_each(records, self.stride, self.big_endian, take);
+    fn fill<T>(&self, field: &Field, records: &[u8], out: &mut [T], set: impl Fn(&mut T, f64)) {
+        field.fill(records, self.stride, self.big_endian, out, set);
     }
 }
 

@@ -40,6 +40,19 @@ impl Role {
         })
     }
 
+    /// The name that users see.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Position(axis) => ["x", "y", "z"][*axis],
+            Self::Normal(axis) => ["nx", "ny", "nz"][*axis],
+            Self::Color(channel) => ["red", "green", "blue"][*channel],
+            Self::Radius => "radius",
+            Self::Intensity => "intensity",
+            Self::Classification => "classification",
+            Self::Scalar(name) => name,
+        }
+    }
+
     /// True for the opacity of a colour, which a cloud does not keep.
     pub fn is_alpha(name: &str) -> bool {
         ["alpha", "a", "diffuse_alpha"].contains(&name.to_lowercase().as_str())

@@ -8,6 +8,8 @@ mod broken;
 mod ply;
 #[path = "formats/pictures.rs"]
 mod pictures;
+#[path = "formats/point_formats.rs"]
+mod point_formats;
 #[path = "formats/round_trip.rs"]
 mod round_trip;
 #[path = "formats/scans.rs"]

@@ -12,9 +12,22 @@ pub(super) const DESCRIPTION: usize = 192;
 /// Degrees a step of the scan angle, from point format 6 on.
 pub(super) const SCAN_ANGLE_STEP: f64 = 0.006;
 
-/// The columns of the file, the extra ones first: one that repeats a standard column has the better values.
+/// The columns of the file; an extra one that repeats a standard one is there for its better values.
 pub(super) fn columns(input: &Input, header: &Header) -> Vec<ColumnField> {
-    let mut columns = extra_columns(input, header);
+    let extras = extra_columns(input, header);
+    let mut columns = standard_columns(header);
+    columns.retain(|column| extras.iter().all(|extra| extra.role != column.role));
+    columns.extend(extras);
+    columns
+}
+
+/// Where a point's withheld flag stands: byte and mask.
+pub(super) fn withheld_flag(point_format: u8) -> (usize, u8) {
+    if point_format < 6 { (15, 0x80) } else { (15, 0x04) }
+}
+
+fn standard_columns(header: &Header) -> Vec<ColumnField> {
+    let mut columns = Vec::new();
     let mut add = |role: Role, field: Field| columns.push(ColumnField { role, field });
     let scalar = |name: &str| Role::Scalar(name.into());
     let bits = |byte, lowest, n| Field { bits: Some((lowest, n)), ..Field::new(byte, Kind::U8) };
@@ -65,11 +78,6 @@ pub(super) fn columns(input: &Input, header: &Header) -> Vec<ColumnField> {
         add(scalar("nir"), Field::new(36, Kind::U16));
     }
     columns
-}
-
-/// Where a point's withheld flag stands: byte and mask.
-pub(super) fn withheld_flag(point_format: u8) -> (usize, u8) {
-    if point_format < 6 { (15, 0x80) } else { (15, 0x04) }
 }
 
 fn extra_columns(input: &Input, header: &Header) -> Vec<ColumnField> {

@@ -9,8 +9,11 @@ use laz::record::{
     LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
 };
 use laz::{DecompressionSelection, LazItem, LazItemType, LazVlr};
+use surfel::progress::Progress;
 
+use super::gps::GpsTimeField;
 use super::header::{Header, read_u16, read_u32, read_u64};
+use super::point14::Point14;
 use crate::error::{Error, Place, Result};
 use crate::input::Input;
 
@@ -40,7 +43,11 @@ pub(super) struct Chunk {
 }
 
 /// Finds the chunks of a file and checks that they lie in it.
-pub(super) fn find_chunks(input: &Input, header: &Header) -> Result<Chunks> {
+pub(super) fn find_chunks(
+    input: &Input,
+    header: &Header,
+    progress: &dyn Progress,
+) -> Result<Chunks> {
     let vlr = read_laszip_record(input, header)?;
     let items = vlr.items().clone();
     let is_layered = matches!(items[0].item_type(), LazItemType::Point14);
@@ -91,7 +98,7 @@ pub(super) fn find_chunks(input: &Input, header: &Header) -> Result<Chunks> {
             claimed: header.n_points,
         });
     }
-    found.try_unusual(input)?;
+    found.try_unusual(input, progress)?;
     Ok(found)
 }
 
@@ -112,12 +119,7 @@ impl Chunks {
         let place = Place::Byte(chunk.bytes.start as u64);
         let broken_chunk = |found: String| broken(input, place, found, "a chunk that decodes");
         let bytes = Cursor::new(&input[chunk.bytes.clone()]);
-        let mut decoder: Box<dyn RecordDecompressor<Cursor<&[u8]>>> = if self.is_layered {
-            Box::new(LayeredPointRecordDecompressor::new(bytes))
-        } else {
-            Box::new(SequentialPointRecordDecompressor::new(bytes))
-        };
-        decoder.set_fields_from(&self.items).map_err(|error| broken_chunk(error.to_string()))?;
+        let mut decoder = self.decoder(bytes).map_err(|error| broken_chunk(error.to_string()))?;
         decoder.set_selection(selection);
         let mut piece = vec![0; POINTS_PER_PIECE.min(chunk.n_points) * self.record_length];
         let mut left = chunk.n_points;
@@ -133,6 +135,35 @@ impl Chunks {
             left -= n;
         }
         Ok(())
+    }
+
+    /// The decoder for a chunk, our own for the parts that hold GPS times.
+    fn decoder<'a>(
+        &self,
+        bytes: Cursor<&'a [u8]>,
+    ) -> laz::Result<Box<dyn RecordDecompressor<Cursor<&'a [u8]>> + 'a>> {
+        if self.is_layered {
+            let mut decoder = LayeredPointRecordDecompressor::new(bytes);
+            for item in &self.items {
+                match item.item_type() {
+                    LazItemType::Point14 => {
+                        decoder.add_field_decompressor(Point14::new(item.version()));
+                    }
+                    _ => decoder.set_fields_from(&vec![*item])?,
+                }
+            }
+            return Ok(Box::new(decoder));
+        }
+        let mut decoder = SequentialPointRecordDecompressor::new(bytes);
+        for item in &self.items {
+            match (item.item_type(), item.version()) {
+                (LazItemType::GpsTime, 2) => {
+                    decoder.add_field_decompressor(GpsTimeField::default());
+                }
+                _ => decoder.set_fields_from(&vec![*item])?,
+            }
+        }
+        Ok(Box::new(decoder))
     }
 
     /// Checks that the first record and the layers that a chunk announces lie in it.
@@ -151,10 +182,15 @@ impl Chunks {
     }
 
     /// Decodes chunks with an unusual number of points once, so that no memory is taken for a false claim.
-    fn try_unusual(&self, input: &Input) -> Result<()> {
+    fn try_unusual(&self, input: &Input, progress: &dyn Progress) -> Result<()> {
         for chunk in &self.chunks {
             if USUAL_POINTS_PER_BYTE * (chunk.bytes.len() as u64) < chunk.n_points as u64 {
-                self.decode(input, chunk, DecompressionSelection::all(), |_| Ok(()))?;
+                self.decode(
+                    input,
+                    chunk,
+                    DecompressionSelection::all(),
+                    |_| Ok(progress.check()?),
+                )?;
             }
         }
         Ok(())

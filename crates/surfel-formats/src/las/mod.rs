@@ -3,6 +3,10 @@
 mod header;
 mod crs;
 mod fields;
+mod extra;
+mod gps;
+mod median;
+mod point14;
 mod laz;
 mod plan;
 mod read;

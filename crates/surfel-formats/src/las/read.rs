@@ -39,7 +39,7 @@ pub(crate) fn read(
         |sample: Vec<DVec3>| options.origin.unwrap_or_else(|| choose_origin(&sample, tolerance));
     let n_withheld = AtomicU64::new(0);
     let mut cloud = if header.is_compressed {
-        let chunks = find_chunks(input, &header)?;
+        let chunks = find_chunks(input, &header, progress)?;
         let sample = chunks.first_records(input).map(|record| layout.world_position(record));
         let origin = origin_of(sample.collect());
         let task =
@@ -69,21 +69,13 @@ fn source(input: &Input, header: &Header) -> Source {
         true => "LAZ",
         false => "LAS",
     };
-    let names = columns(input, header).into_iter().filter_map(|column| match column.role {
-        Role::Position(axis) => Some(["x", "y", "z"][axis].into()),
-        Role::Color(channel) => Some(["red", "green", "blue"][channel].into()),
-        Role::Normal(axis) => Some(["nx", "ny", "nz"][axis].into()),
-        Role::Radius => Some("radius".into()),
-        Role::Intensity => Some("intensity".into()),
-        Role::Classification => Some("classification".into()),
-        Role::Scalar(name) => Some(name),
-    });
+    let columns = columns(input, header);
     Source {
         format: format!("{name} 1.{}, point format {}", header.minor_version, header.point_format),
         n_points: Some(header.n_points),
         resolution: Some(header.scale.abs()),
         coordinate_system: coordinate_system(input, header),
-        columns: names.collect(),
+        columns: columns.iter().map(|column| column.role.name().to_owned()).collect(),
     }
 }
 

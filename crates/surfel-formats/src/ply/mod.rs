@@ -1,6 +1,7 @@
 //! PLY: polygon files, of which the vertices are read as points.
 
 mod header;
+mod walk;
 mod read;
 mod write;
 

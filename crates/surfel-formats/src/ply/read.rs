@@ -4,6 +4,7 @@ use surfel::points::PointCloud;
 use surfel::progress::Progress;
 
 use super::header::{Element, Encoding, Header, read_header};
+use super::walk::{pack_vertices, skip_elements};
 use crate::error::{Error, Place, Result};
 use crate::input::Input;
 use crate::lines::{LineError, Rows, read_rows};
@@ -201,8 +202,19 @@ fn named_columns<'a>(
     big_endian: bool,
     sample: &[u8],
 ) -> Vec<ColumnField> {
+    let fields: Vec<(&str, Field, Kind)> =
+        fields.filter(|(name, ..)| !Role::is_alpha(name)).collect();
+    // Most programs write colours that are floats from 0 to 1, some from 0 to 255.
+    let colors =
+        fields.iter().filter(|(name, ..)| matches!(Role::of_name(name), Some(Role::Color(_))));
+    let largest = colors
+        .flat_map(|(_, field, _)| {
+            sample.chunks_exact(stride).map(|record| field.value(record, big_endian))
+        })
+        .fold(0.0, f64::max);
+    let float_scale = if largest <= 1.0 { 65535.0 } else { 257.0 };
     let mut columns: Vec<ColumnField> = Vec::new();
-    for (name, mut field, kind) in fields.filter(|(name, ..)| !Role::is_alpha(name)) {
+    for (name, mut field, kind) in fields {
         let mut role = Role::of_name(name).unwrap_or_else(|| Role::Scalar(name.into()));
         let is_class = |v: f64| v.fract() == 0.0 && (0.0..256.0).contains(&v);
         let holds_classes = || {
@@ -215,7 +227,7 @@ fn named_columns<'a>(
         }
         if let Role::Color(_) = role {
             field.scale = match kind {
-                Kind::F32 | Kind::F64 => 65535.0,
+                Kind::F32 | Kind::F64 => float_scale,
                 Kind::U16 => 1.0,
                 _ => 257.0,
             };
@@ -225,86 +237,7 @@ fn named_columns<'a>(
     columns
 }
 
-/// The vertices without their lists.
-fn pack_vertices(
-    input: &Input,
-    start: usize,
-    vertex: &Element,
-    big_endian: bool,
-    progress: &dyn Progress,
-) -> Result<Vec<u8>> {
-    let mut packed = Vec::new();
-    let mut at = start;
-    for point in 0..vertex.count {
-        if point % 65536 == 0 {
-            progress.check()?;
-        }
-        for property in &vertex.properties {
-            let end = property_end(input, at, property, big_endian)
-                .ok_or_else(|| truncated(input, point, vertex))?;
-            if property.list.is_none() {
-                packed.extend_from_slice(&input[at..end]);
-            }
-            at = end;
-        }
-    }
-    Ok(packed)
-}
-
-/// The first byte behind all of `element`, which begins at `start`.
-fn skip_elements(
-    input: &Input,
-    start: usize,
-    element: &Element,
-    big_endian: bool,
-    progress: &dyn Progress,
-) -> Result<usize> {
-    let ends_early = || {
-        input.malformed(
-            Place::Byte(input.len() as u64),
-            "the end of the file",
-            format!("{} elements `{}`", element.count, element.name),
-            "copy the file again from its source",
-        )
-    };
-    if let Some(stride) = element.stride() {
-        let length = element.count.checked_mul(stride as u64).ok_or_else(ends_early)?;
-        let end = length.checked_add(start as u64).filter(|end| *end <= input.len() as u64);
-        return end.map(|end| end as usize).ok_or_else(ends_early);
-    }
-    let mut at = start;
-    for count in 0..element.count {
-        if count % 65536 == 0 {
-            progress.check()?;
-        }
-        for property in &element.properties {
-            at = property_end(input, at, property, big_endian).ok_or_else(ends_early)?;
-        }
-    }
-    Ok(at)
-}
-
-/// The first byte behind the property at `at`, if the file holds all of it.
-fn property_end(
-    bytes: &[u8],
-    at: usize,
-    property: &super::header::Property,
-    big_endian: bool,
-) -> Option<usize> {
-    let (at, n_items) = match property.list {
-        None => (at, 1),
-        Some(kind) => {
-            let length = bytes.get(at..)?.get(..kind.size())?;
-            let n_items = Field::new(0, kind).value(length, big_endian);
-            // The cast takes a negative length to zero items.
-            (at + kind.size(), n_items as usize)
-        }
-    };
-    let end = n_items.checked_mul(property.kind.size())?.checked_add(at)?;
-    (end <= bytes.len()).then_some(end)
-}
-
-fn truncated(input: &Input, readable: u64, vertex: &Element) -> Error {
+pub(super) fn truncated(input: &Input, readable: u64, vertex: &Element) -> Error {
     Error::Truncated {
         file: input.name.to_string(),
         place: Place::Byte(input.len() as u64),

@@ -1,6 +1,7 @@
 //! Points as lines of text: XYZ, TXT, CSV, ASC and PTS.
 
 mod guess;
+mod preamble;
 
 use surfel::progress::Progress;
 
@@ -11,6 +12,7 @@ use crate::options::{LoadOptions, Loaded, Source, TextColumn};
 use crate::record::{ColumnField, Field, Kind, Layout};
 use crate::role::Role;
 use guess::{color_scale, guess_columns, holds_classes};
+use preamble::{Preamble, Separator, comment, read_preamble};
 
 pub(crate) fn inspect(input: &Input) -> Result<Source> {
     let preamble = read_preamble(input)?;
@@ -50,139 +52,14 @@ pub(crate) fn read(
     progress.begin(&format!("read {}", input.name), (input.len() - preamble.data) as u64);
     let cloud = read_rows(input, rows, &parse, layout_of, options.origin, progress)?;
     if let Some(count) = preamble.count {
-        progress.note(&format!("{}: its first line says {count} points", input.name));
+        let n_points = cloud.len();
+        let line = format!("a line before the points says {count} points, {n_points} were read");
+        progress.note(&format!("{}: {line}", input.name));
     }
     let mut source = source(&preamble);
     source.n_points = Some(cloud.len() as u64);
+    source.columns = kept.iter().map(|(_, role)| role.name().to_owned()).collect();
     Ok(Loaded { cloud, source })
-}
-
-/// What stands before the first point, and the shape of its line.
-struct Preamble {
-    names: Option<Vec<String>>,
-    /// The number of points, if a line says it as in PTS files.
-    count: Option<u64>,
-    separator: Separator,
-    n_fields: usize,
-    /// First byte and line of the points.
-    data: usize,
-    data_line: u64,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Separator {
-    Whitespace,
-    Comma,
-    Semicolon,
-}
-
-impl Separator {
-    fn of_line(line: &[u8]) -> Self {
-        if line.contains(&b';') {
-            Self::Semicolon
-        } else if line.contains(&b',') {
-            Self::Comma
-        } else {
-            Self::Whitespace
-        }
-    }
-
-    fn fields(self, line: &[u8]) -> impl Iterator<Item = &[u8]> {
-        let separator = if self == Self::Semicolon { b';' } else { b',' };
-        let is_separated = self != Self::Whitespace;
-        line.split(
-            move |byte| {
-                if is_separated { *byte == separator } else { byte.is_ascii_whitespace() }
-            },
-        )
-        .filter(move |field| is_separated || !field.is_empty())
-        .map(|field| field.trim_ascii())
-    }
-}
-
-/// The text behind the mark of a comment.
-fn comment(line: &[u8]) -> Option<&[u8]> {
-    line.strip_prefix(b"#").or_else(|| line.strip_prefix(b"//"))
-}
-
-fn read_preamble(input: &Input) -> Result<Preamble> {
-    let mut names = None;
-    let mut count = None;
-    let mut at = 0;
-    let mut number = 0;
-    while at < input.len() {
-        let rest = &input[at..];
-        let length = memchr::memchr(b'\n', rest).map_or(rest.len(), |end| end + 1);
-        // Some programs put a byte order mark before UTF-8.
-        let line = rest[..length].trim_ascii();
-        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
-        number += 1;
-        let start = at;
-        at += length;
-        let (text, is_comment) = match comment(line) {
-            Some(text) => (text.trim_ascii(), true),
-            None => (line, false),
-        };
-        if text.is_empty() {
-            continue;
-        }
-        let separator = Separator::of_line(text);
-        let fields: Vec<&[u8]> = separator.fields(text).collect();
-        let is_names = names_of(&fields).is_some();
-        if is_comment || is_names {
-            names = names_of(&fields).or(names);
-            continue;
-        }
-        if let ([field], None) = (&fields[..], count) {
-            if let Ok(points) = String::from_utf8_lossy(field).parse() {
-                count = Some(points);
-                continue;
-            }
-        }
-        if fields.iter().all(|field| field.is_empty() || parse_number(field).is_ok()) {
-            let has_empty_end = fields.last().is_some_and(|field| field.is_empty());
-            let n_names = names.as_ref().map_or(fields.len() - 1, Vec::len);
-            // A separator at the end of each line begins no further column.
-            let n_fields = if has_empty_end { n_names } else { fields.len() };
-            return Ok(Preamble {
-                names,
-                count,
-                separator,
-                n_fields,
-                data: start,
-                data_line: number,
-            });
-        }
-        let found = format!("`{}`", text[..text.len().min(60)].escape_ascii());
-        let has_inner_space =
-            |field: &&[u8]| separator != Separator::Whitespace && field.contains(&b' ');
-        if separator == Separator::Semicolon && text.contains(&b',')
-            || fields.iter().any(has_inner_space)
-        {
-            let expected = "numbers with a decimal point, not a comma";
-            let advice = "replace the decimal commas by points";
-            return Err(input.malformed(Place::Line(number), found, expected, advice));
-        }
-        let expected = "numbers, or a header with at least x, y and z";
-        let advice = "remove the line or put # before it";
-        return Err(input.malformed(Place::Line(number), found, expected, advice));
-    }
-    let advice = "the file holds no points";
-    Err(input.malformed(Place::Line(number), "no line with numbers", "x y z in each line", advice))
-}
-
-/// The fields as names of columns, if x, y and z are among them.
-fn names_of(fields: &[&[u8]]) -> Option<Vec<String>> {
-    let mut names: Vec<String> = fields
-        .iter()
-        .map(|field| String::from_utf8_lossy(field).trim_matches(['"', '\'', ' ']).to_owned())
-        .collect();
-    if names.last().is_some_and(String::is_empty) {
-        names.pop();
-    }
-    let has_axis =
-        |axis| names.iter().any(|name| Role::of_name(name) == Some(Role::Position(axis)));
-    (0..3).all(has_axis).then_some(names)
 }
 
 fn role_of_header(name: &str) -> Option<Role> {

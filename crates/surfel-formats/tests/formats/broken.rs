@@ -166,3 +166,16 @@ fn reading_stops_when_it_is_cancelled() {
         assert!(matches!(cancelled, Err(Error::Surfel(surfel::Error::Cancelled))), "{name}");
     }
 }
+
+/// Inputs that a fuzzer or a user once found trouble with; each has its story in its name.
+#[test]
+fn finds_stay_harmless() {
+    let finds = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/finds");
+    for entry in std::fs::read_dir(finds).unwrap() {
+        let path = entry.unwrap().path();
+        if let Ok(loaded) = load(&path, &LoadOptions::default(), &Silent) {
+            let n_bytes = std::fs::metadata(&path).unwrap().len() as usize;
+            assert!(loaded.cloud.len() <= 100 * n_bytes, "{}", path.display());
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! What stands before the points of a text file, and how its lines are separated.
+
+use crate::error::{Error, Place, Result};
+use crate::input::Input;
+use crate::lines::parse_number;
+use crate::role::Role;
+
+/// What stands before the first point, and the shape of its line.
+pub(super) struct Preamble {
+    pub names: Option<Vec<String>>,
+    /// The number of points, if a line says it as in PTS files.
+    pub count: Option<u64>,
+    pub separator: Separator,
+    pub n_fields: usize,
+    /// First byte and line of the points.
+    pub data: usize,
+    pub data_line: u64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Separator {
+    Whitespace,
+    Comma,
+    Semicolon,
+}
+
+impl Separator {
+    fn of_line(line: &[u8]) -> Self {
+        if line.contains(&b';') {
+            Self::Semicolon
+        } else if line.contains(&b',') {
+            Self::Comma
+        } else {
+            Self::Whitespace
+        }
+    }
+
+    pub fn fields(self, line: &[u8]) -> impl Iterator<Item = &[u8]> {
+        let separator = if self == Self::Semicolon { b';' } else { b',' };
+        let is_separated = self != Self::Whitespace;
+        line.split(
+            move |byte| {
+                if is_separated { *byte == separator } else { byte.is_ascii_whitespace() }
+            },
+        )
+        .filter(move |field| is_separated || !field.is_empty())
+        .map(|field| field.trim_ascii())
+    }
+}
+
+/// The text behind the mark of a comment.
+pub(super) fn comment(line: &[u8]) -> Option<&[u8]> {
+    line.strip_prefix(b"#").or_else(|| line.strip_prefix(b"//"))
+}
+
+/// Reads up to the first line of numbers.
+pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
+    let mut names = None;
+    let mut count = None;
+    let mut at = 0;
+    let mut number = 0;
+    while at < input.len() {
+        let rest = &input[at..];
+        let length = memchr::memchr(b'\n', rest).map_or(rest.len(), |end| end + 1);
+        // Some programs put a byte order mark before UTF-8.
+        let line = rest[..length].trim_ascii();
+        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
+        number += 1;
+        let start = at;
+        at += length;
+        let (text, is_comment) = match comment(line) {
+            Some(text) => (text.trim_ascii(), true),
+            None => (line, false),
+        };
+        if text.is_empty() {
+            continue;
+        }
+        let separator = Separator::of_line(text);
+        let fields: Vec<&[u8]> = separator.fields(text).collect();
+        let is_names = names_of(&fields).is_some();
+        if is_comment || is_names {
+            names = names_of(&fields).or(names);
+            continue;
+        }
+        if let ([field], None) = (&fields[..], count)
+            && let Ok(points) = String::from_utf8_lossy(field).parse()
+        {
+            count = Some(points);
+            continue;
+        }
+        if fields.iter().all(|field| field.is_empty() || parse_number(field).is_ok()) {
+            let has_empty_end = fields.last().is_some_and(|field| field.is_empty());
+            let n_names = names.as_ref().map_or(fields.len() - 1, Vec::len);
+            // A separator at the end of each line begins no further column.
+            let n_fields = if has_empty_end { n_names } else { fields.len() };
+            return Ok(Preamble {
+                names,
+                count,
+                separator,
+                n_fields,
+                data: start,
+                data_line: number,
+            });
+        }
+        return Err(not_numbers(input, Place::Line(number), text, separator));
+    }
+    let advice = "the file holds no points";
+    Err(input.malformed(Place::Line(number), "no line with numbers", "x y z in each line", advice))
+}
+
+/// The error of a line that is neither numbers nor a header.
+fn not_numbers(input: &Input, place: Place, text: &[u8], separator: Separator) -> Error {
+    let found = format!("`{}`", text[..text.len().min(60)].escape_ascii());
+    let has_inner_space =
+        separator == Separator::Comma && separator.fields(text).any(|field| field.contains(&b' '));
+    if has_inner_space || separator == Separator::Semicolon && text.contains(&b',') {
+        let expected = "numbers with a decimal point, not a comma";
+        return input.malformed(place, found, expected, "replace the decimal commas by points");
+    }
+    let expected = "numbers, or a header with at least x, y and z";
+    input.malformed(place, found, expected, "remove the line or put # before it")
+}
+
+/// The fields as names of columns, if x, y and z are among them.
+fn names_of(fields: &[&[u8]]) -> Option<Vec<String>> {
+    let mut names: Vec<String> = fields
+        .iter()
+        .map(|field| String::from_utf8_lossy(field).trim_matches(['"', '\'', ' ']).to_owned())
+        .collect();
+    if names.last().is_some_and(String::is_empty) {
+        names.pop();
+    }
+    let has_axis =
+        |axis| names.iter().any(|name| Role::of_name(name) == Some(Role::Position(axis)));
+    (0..3).all(has_axis).then_some(names)
+}

@@ -1,0 +1,64 @@
+//! Writes small valid files for the fuzzer to begin with, to the folder `corpus` beside this file.
+
+use std::fs;
+use std::path::Path;
+
+use surfel::math::{DVec3, Vec3};
+use surfel::points::{PointCloud, Scalar, Values};
+use surfel::progress::Silent;
+use surfel_formats::{SaveOptions, save};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
+    for target in ["ply", "xyz", "las"] {
+        fs::create_dir_all(corpus.join(target))?;
+    }
+    for (name, cloud) in [("bare", bare(7)), ("full", full(7))] {
+        for (target, extension) in [("ply", "ply"), ("las", "las"), ("las", "laz")] {
+            let path = corpus.join(target).join(format!("{name}.{extension}"));
+            save(&path, &cloud, &SaveOptions::default(), &Silent)?;
+        }
+    }
+    let ply = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int i\n\
+        element vertex 2\nproperty float x\nproperty double y\nproperty short z\n\
+        property list uint ushort l\nend_header\n3 1 2 3\n0 1 2 1 5\n3 4 5 0\n";
+    fs::write(corpus.join("ply/ascii.ply"), ply)?;
+    for order in ["big", "little"] {
+        let binary = ply.replace("ascii", &format!("binary_{order}_endian"));
+        fs::write(corpus.join(format!("ply/{order}.ply")), binary)?;
+    }
+    let texts = [
+        "1 2 3\n4 5 6\n",
+        "2\n1 2 3 -4 5 6 7\n1 2 3 -4 5 6 7\n",
+        "# c\nx,y,z,r,g,b,time\n1,2,3,4,5,6,\n-1,2e3,nan,4,5,6,7.5",
+        "1;2;3;0;6;7;8;9\n",
+        "v 1 2 3\nv 1 2 3 1\nf 1 2 1\n",
+        "v 1 2 3 0 0.5 1\n",
+    ];
+    for (i, text) in texts.iter().enumerate() {
+        fs::write(corpus.join(format!("xyz/{i}")), text)?;
+    }
+    Ok(())
+}
+
+fn bare(n: u16) -> PointCloud {
+    let position = |i| Vec3::new(f32::from(i), 0.5 * f32::from(i * i % 5), -1.0);
+    PointCloud::from_positions((0..n).map(position).collect())
+}
+
+fn full(n: u16) -> PointCloud {
+    let scalar = |name: &str, values| Scalar { name: name.into(), values };
+    PointCloud {
+        origin: DVec3::new(500_000.0, 4_900_000.0, 0.0),
+        normals: Some((0..n).map(|_| Vec3::Z).collect()),
+        colors: Some((0..n).map(|i| [257 * i, 0, 65535]).collect()),
+        intensity: Some((0..n).map(f32::from).collect()),
+        classification: Some((0..n).map(|i| i as u8).collect()),
+        scalars: vec![
+            scalar("gps_time", Values::F64((0..n).map(f64::from).collect())),
+            scalar("nir", Values::U16((0..n).collect())),
+            scalar("other", Values::U8((0..n).map(|i| i as u8).collect())),
+        ],
+        ..bare(n)
+    }
+}
