@@ -4,6 +4,7 @@ use crate::args::{Global, PreparationArgs, SurfaceArgs, parse};
 use crate::memory::Plan;
 use crate::report::{Report, print};
 use crate::stats;
+use anyhow::Context;
 use clap::ValueEnum;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -106,7 +107,8 @@ fn scene(args: &Args, report: &Report) -> anyhow::Result<Scene> {
     report.begin("load", 0);
     let options = args.preparation.load_options(ColumnChoice::Only(args.preparation.geometry()));
     let loaded = surfel_formats::load(&args.cloud, &options, report)?;
-    let (cloud, _) = prepare(loaded.cloud, &args.preparation.preparation(0, None), report)?;
+    let (cloud, _) = prepare(loaded.cloud, &args.preparation.preparation(0, None), report)
+        .with_context(|| args.cloud.display().to_string())?;
     let (width, height) = args.resolution;
     let framing = Framing {
         up: guess_up(&cloud, crate::args::is_georeferenced(&cloud, &loaded.source)).up,

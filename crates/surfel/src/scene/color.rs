@@ -94,7 +94,7 @@ pub fn colorize(
 
 /// What to show when nothing was asked for, and why.
 pub fn choose(cloud: &PointCloud) -> (ColorSource, &'static str) {
-    if cloud.colors.as_ref().is_some_and(|colors| differ(colors)) {
+    if cloud.colors.as_ref().is_some_and(|colors| are_meant(colors)) {
         return (ColorSource::Rgb, "the file has colours");
     }
     match &cloud.intensity {
@@ -114,8 +114,10 @@ fn to_8_bits(value: u16) -> u8 {
     ((u32::from(value) + 128) / 257) as u8
 }
 
-fn differ(colors: &[[u16; 3]]) -> bool {
-    colors.iter().any(|color| *color != colors[0])
+/// Programs fill columns of colours that nobody measured with black or white.
+fn are_meant(colors: &[[u16; 3]]) -> bool {
+    let filler = [[0; 3], [u16::MAX; 3]].into_iter().find(|filler| Some(filler) == colors.first());
+    colors.iter().any(|color| Some(*color) != filler)
 }
 
 fn mapped(
@@ -338,6 +340,8 @@ mod tests {
         let darkest = colorize(&cloud, &coloring(None), &Silent).unwrap()[0][0];
         assert!(70 < darkest && darkest < 80, "{darkest}");
         assert_eq!(colorize(&cloud, &coloring(Some("intensity")), &Silent).unwrap()[0], [0; 3]);
+        cloud.colors = Some(vec![[0x8080; 3]; 2500]);
+        assert_eq!(choose(&cloud).0, ColorSource::Rgb);
         cloud.colors = Some((0..2500).map(|i| [i, 0, 0]).collect());
         assert_eq!(choose(&cloud).0, ColorSource::Rgb);
         cloud.intensity = Some(vec![0.5; 2500]);
