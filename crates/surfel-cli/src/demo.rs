@@ -1,10 +1,99 @@
-//! stub
+//! `surfel demo`: scans a ruin, writes the cloud, and renders it as a user would.
+
+use crate::args::Global;
+use crate::render;
+use crate::report::{Report, print};
+use anyhow::Context;
+use clap::Parser;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use surfel::math::DVec3;
+use surfel::progress::Progress;
+use surfel::scanner::ruin;
+use surfel_formats::SaveOptions;
+
 #[derive(clap::Args)]
-pub struct Args {}
-pub fn run(
-    _args: &Args,
-    _global: &crate::args::Global,
-    _report: &crate::report::Report,
-) -> anyhow::Result<()> {
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Folder for demo.laz and demo.png; made if it does not exist.
+    #[arg(short, long, value_name = "FOLDER", default_value = "demo")]
+    output: PathBuf,
+    /// Points of the scan, about.
+    #[arg(long, value_name = "N", default_value_t = 1_500_000,
+        value_parser = clap::value_parser!(u64).range(1000..=100_000_000))]
+    points: u64,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  surfel demo
+  surfel demo -o /tmp/ruin --points 5000000";
+
+/// The command line that makes the picture, taken apart as the program takes its own.
+#[derive(Parser)]
+enum Line {
+    Render(Box<render::Args>),
+}
+
+pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
+    let start = Instant::now();
+    let folder = &args.output;
+    fs::create_dir_all(folder)
+        .with_context(|| format!("{}: the folder cannot be made", folder.display()))?;
+    let (cloud_path, picture_path) = (folder.join("demo.laz"), folder.join("demo.png"));
+    let cloud = ruin::scan(args.points as usize, report)?;
+    report.begin("write", 0);
+    let options = SaveOptions {
+        resolution: Some(DVec3::splat(0.001)),
+        coordinate_system: Some("EPSG:32634".into()),
+    };
+    surfel_formats::save(&cloud_path, &cloud, &options, report)?;
+    report.end_stage();
+    let n_points = cloud.len();
+    drop(cloud);
+
+    let mut words = ["surfel", "render"].map(str::to_owned).to_vec();
+    words.extend([
+        cloud_path.display().to_string(),
+        "-o".into(),
+        picture_path.display().to_string(),
+    ]);
+    words.extend(camera_words());
+    let Line::Render(args) = Line::try_parse_from(&words)?;
+    render::run(&args, global, report)?;
+    tell(&cloud_path, &words, n_points, start)
+}
+
+/// The ruin's own view as options.
+fn camera_words() -> Vec<String> {
+    let ruin::View { eye, target, vertical_fov_deg } = ruin::view();
+    let vector = |p: DVec3| (ruin::UTM_ORIGIN + p).to_array().map(|x| x.to_string()).join(",");
+    vec![
+        "--resolution".into(),
+        "1280x720".into(),
+        "--camera-position".into(),
+        vector(eye),
+        "--camera-focal-point".into(),
+        vector(target),
+        "--camera-view-angle".into(),
+        vertical_fov_deg.to_string(),
+    ]
+}
+
+fn tell(cloud: &Path, words: &[String], n_points: usize, start: Instant) -> anyhow::Result<()> {
+    let cloud = cloud.display();
+    print(&format!(
+        "A virtual scanner measured a ruin from six stations: {n_points} points, in {cloud}.\n\
+         The picture was made from that file, all in {:.0} s, by\n  {}\n\
+         Try next:\n  \
+         surfel info {cloud}\n  \
+         surfel render {cloud} -o front.png\n  \
+         surfel render {cloud} -o map.png --camera-direction 0,0,-1 --camera-orthographic\n  \
+         surfel render {cloud} -o classes.png --color class --light sky\n  \
+         surfel render {cloud} -o points.png --surface points",
+        start.elapsed().as_secs_f64(),
+        words.join(" "),
+    ))?;
     Ok(())
 }

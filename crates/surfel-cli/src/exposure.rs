@@ -4,10 +4,10 @@ use crate::report::Muted;
 use surfel::flat::FlatScene;
 use surfel::render::{Renderer, Settings};
 
-/// Linear luminance that the brightest parts get: just below white.
-const TARGET: f32 = 0.78;
+/// Linear value that the brightest parts get: below white, which leaves highlights their shape.
+const TARGET: f32 = 0.74;
 /// Share of the covered pixels that are darker.
-const PERCENTILE: f32 = 0.93;
+const PERCENTILE: f32 = 0.95;
 /// Stops, at least and at most: a black object must not turn white.
 const LIMITS: (f32, f32) = (-1.0, 2.5);
 /// Width of the preview.
@@ -30,16 +30,16 @@ pub fn automatic(
     };
     let (image, _) = renderer.render(scene, &preview, muted)?;
     let covered = image.color.iter().zip(&image.layers.coverage).filter(|(_, c)| 0.0 < **c);
-    let luminance = |[r, g, b, _]: [f32; 4]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    Ok(stops(covered.map(|(color, _)| luminance(*color)).collect()))
+    // The strongest channel, not luminance: a meadow whose green is cut off turns to neon.
+    Ok(stops(covered.map(|([r, g, b, _], _)| r.max(*g).max(*b)).collect()))
 }
 
-fn stops(mut luminances: Vec<f32>) -> f32 {
-    let rank = (PERCENTILE * luminances.len() as f32) as usize;
-    if luminances.len() <= rank {
+fn stops(mut values: Vec<f32>) -> f32 {
+    let rank = (PERCENTILE * values.len() as f32) as usize;
+    if values.len() <= rank {
         return 0.0;
     }
-    let bright = *luminances.select_nth_unstable_by(rank, f32::total_cmp).1;
+    let bright = *values.select_nth_unstable_by(rank, f32::total_cmp).1;
     (TARGET / bright.max(1e-6)).log2().clamp(LIMITS.0, LIMITS.1)
 }
 

@@ -1,6 +1,164 @@
-//! stub
+//! `surfel info`: what is in a file, as a table or as JSON.
+
+use crate::args::is_georeferenced;
+use crate::report::{Report, print};
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+use surfel::math::Vec3;
+use surfel::points::{PointCloud, guess_up, spacing};
+use surfel::progress::Progress;
+use surfel_formats::{LoadOptions, Loaded, TextColumn};
+
 #[derive(clap::Args)]
-pub struct Args {}
-pub fn run(_args: &Args, _report: &crate::report::Report) -> anyhow::Result<()> {
-    Ok(())
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Point clouds.
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    /// JSON instead of a table: one object a file, in an array if there are several.
+    #[arg(long)]
+    json: bool,
+    /// Columns of a text file, as in x,y,z,-,r,g,b; found out from the file if not given.
+    #[arg(long, value_name = "NAMES")]
+    columns: Option<String>,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  surfel info scan.laz
+  surfel info --json scan.laz | jq .bounds";
+
+pub fn run(args: &Args, report: &Report) -> anyhow::Result<()> {
+    let text_columns = args.columns.as_deref().map(TextColumn::parse_list);
+    let options = LoadOptions { text_columns, ..LoadOptions::default() };
+    let mut all = Vec::new();
+    for file in &args.files {
+        report.begin("load", 0);
+        let loaded = surfel_formats::load(file, &options, report)?;
+        let info = describe(file, &loaded, report)?;
+        report.end_stage();
+        if args.json {
+            all.push(info);
+        } else {
+            print(&table(&info))?;
+        }
+    }
+    match all.as_slice() {
+        [] => Ok(()),
+        [only] => Ok(print(&format!("{only:#}"))?),
+        several => Ok(print(&format!("{:#}", json!(several)))?),
+    }
+}
+
+fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel::Result<Value> {
+    let Loaded { cloud, source } = loaded;
+    let bounds = cloud.bounds();
+    let corner =
+        |corner: Vec3| (!cloud.is_empty()).then(|| (cloud.origin + corner.as_dvec3()).to_array());
+    let distance = if cloud.is_empty() { 0.0 } else { spacing(&cloud.positions, report)? };
+    let up = guess_up(cloud, is_georeferenced(cloud, source));
+    Ok(json!({
+        "file": file.display().to_string(),
+        "format": source.format,
+        "points": cloud.len(),
+        "bounds": { "min": corner(bounds.min), "max": corner(bounds.max) },
+        "global_shift": cloud.origin.to_array(),
+        "spacing": distance,
+        "resolution": source.resolution.map(|step| step.to_array()),
+        "coordinate_system": source.coordinate_system,
+        "up": { "axis": up.up.to_array(), "reason": up.reason },
+        "columns": columns(cloud),
+        "columns_in_file": source.columns,
+    }))
+}
+
+/// Columns by name with their least and greatest values.
+fn columns(cloud: &PointCloud) -> Map<String, Value> {
+    let mut columns = Map::new();
+    let mut add = |name: &str, values: &mut dyn Iterator<Item = f64>| {
+        let finite = values.filter(|value| value.is_finite());
+        let none = (f64::INFINITY, f64::NEG_INFINITY);
+        let (low, high) = finite.fold(none, |(low, high), v| (v.min(low), v.max(high)));
+        let range = if low <= high { json!([low, high]) } else { Value::Null };
+        columns.insert(name.to_owned(), range);
+    };
+    if let Some(colors) = &cloud.colors {
+        add("rgb", &mut colors.iter().flatten().map(|&channel| channel.into()));
+    }
+    if let Some(values) = &cloud.intensity {
+        add("intensity", &mut values.iter().map(|&value| value.into()));
+    }
+    if let Some(classes) = &cloud.classification {
+        add("class", &mut classes.iter().map(|&class| class.into()));
+    }
+    if let Some(normals) = &cloud.normals {
+        add("normal", &mut normals.iter().flat_map(|n| n.as_dvec3().to_array()));
+    }
+    if let Some(radii) = &cloud.radii {
+        add("radius", &mut radii.iter().map(|&radius| radius.into()));
+    }
+    for scalar in &cloud.scalars {
+        add(&scalar.name, &mut (0..cloud.len()).map(|i| scalar.values.get(i)));
+    }
+    columns
+}
+
+fn table(info: &Value) -> String {
+    let mut lines = vec![info["file"].as_str().unwrap_or_default().to_owned()];
+    let mut row = |name: &str, value: String| lines.push(format!("  {name:<14}{value}"));
+    row("format", text(&info["format"]));
+    row("points", text(&info["points"]));
+    row("bounds", format!("{} to {}", text(&info["bounds"]["min"]), text(&info["bounds"]["max"])));
+    row("global shift", text(&info["global_shift"]));
+    row("spacing", format!("{} between points, about", text(&info["spacing"])));
+    row("resolution", text(&info["resolution"]));
+    row("coordinates", text(&info["coordinate_system"]));
+    row("up", text(&info["up"]["reason"]));
+    for (place, (name, range)) in info["columns"].as_object().into_iter().flatten().enumerate() {
+        let title = if place == 0 { "columns" } else { "" };
+        row(title, format!("{name:<24}{}", range_text(range)));
+    }
+    lines.join("\n")
+}
+
+fn range_text(range: &Value) -> String {
+    match range.as_array().map(Vec::as_slice) {
+        Some([low, high]) => format!("{} to {}", text(low), text(high)),
+        _ => "no values".to_owned(),
+    }
+}
+
+fn text(value: &Value) -> String {
+    match value {
+        Value::Null => "not stated".to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Array(values) => values.iter().map(text).collect::<Vec<_>>().join(", "),
+        Value::Number(number) if number.is_f64() => short(number.as_f64().unwrap_or(f64::NAN)),
+        other => other.to_string(),
+    }
+}
+
+/// Six digits at least, and no zeros at the end.
+fn short(value: f64) -> String {
+    let digits =
+        if value == 0.0 { 0 } else { (6 - value.abs().log10().floor() as i32).clamp(3, 12) };
+    let text = format!("{value:.*}", digits as usize);
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_exact_enough() {
+        assert_eq!(short(0.0), "0");
+        assert_eq!(short(6_632_630.25), "6632630.25");
+        assert_eq!(short(0.000_123_456_7), "0.0001234567");
+        assert_eq!(short(-100.0), "-100");
+    }
 }

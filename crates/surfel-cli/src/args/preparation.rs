@@ -2,7 +2,7 @@
 
 use clap::Args;
 use surfel::points::neighbors::{Method, Query};
-use surfel::points::{Orientation, Preparation, Radius, SURFACE_VARIATION, Select};
+use surfel::points::{Orientation, PointCloud, Preparation, Radius, SURFACE_VARIATION, Select};
 use surfel::scene::color::ColorSource;
 use surfel_formats::{Column, ColumnChoice, LoadOptions, TextColumn};
 
@@ -55,16 +55,9 @@ impl PreparationArgs {
         LoadOptions { columns, text_columns, origin: None }
     }
 
-    /// Only the columns that a picture of these colours needs; normals and radii that are to be
-    /// estimated in a given way are not taken from the file.
+    /// Only the columns that a picture of these colours needs.
     pub fn columns(&self, color: Option<&ColorSource>) -> ColumnChoice {
-        let mut columns = Vec::new();
-        if self.normals_k.is_none() && self.normals_radius.is_none() {
-            columns.push(Column::Normals);
-        }
-        if self.radius.is_none() {
-            columns.push(Column::Radii);
-        }
+        let mut columns = self.geometry();
         match color {
             None => columns.extend([Column::Colors, Column::Intensity]),
             Some(ColorSource::Rgb) => columns.push(Column::Colors),
@@ -74,6 +67,28 @@ impl PreparationArgs {
             Some(ColorSource::Elevation | ColorSource::Normal | ColorSource::Constant(_)) => {}
         }
         ColumnChoice::Only(columns)
+    }
+
+    /// The columns that say where the surface is, but for those that are to be estimated in a given way.
+    pub fn geometry(&self) -> Vec<Column> {
+        let normals = (!self.names_normals()).then_some(Column::Normals);
+        let radii = self.radius.is_none().then_some(Column::Radii);
+        normals.into_iter().chain(radii).collect()
+    }
+
+    /// Whether it is said how normals are to be estimated.
+    pub fn names_normals(&self) -> bool {
+        self.normals_k.is_some() || self.normals_radius.is_some()
+    }
+
+    /// Drops the normals and radii that are to be estimated in a given way.
+    pub fn forget(&self, cloud: &mut PointCloud) {
+        if self.names_normals() {
+            cloud.normals = None;
+        }
+        if self.radius.is_some() {
+            cloud.radii = None;
+        }
     }
 }
 

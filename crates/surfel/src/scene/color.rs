@@ -40,6 +40,9 @@ pub struct Coloring {
 /// Light stone: white objects glare, and a grey without warmth looks dead.
 pub const PLAIN: [u8; 3] = [0xd6, 0xd2, 0xca];
 
+/// Part of the map that an automatic choice uses: light and shadow cannot show on black.
+const SHADED: (f32, f32) = (0.3, 0.95);
+
 /// One colour a point, sRGB-encoded. `progress` is told the choice and the range.
 pub fn colorize(
     cloud: &PointCloud,
@@ -91,7 +94,7 @@ pub fn colorize(
 
 /// What to show when nothing was asked for, and why.
 pub fn choose(cloud: &PointCloud) -> (ColorSource, &'static str) {
-    if cloud.colors.as_ref().is_some_and(|colors| differ(colors)) {
+    if cloud.colors.as_ref().is_some_and(|colors| are_meant(colors)) {
         return (ColorSource::Rgb, "the file has colours");
     }
     match &cloud.intensity {
@@ -111,8 +114,10 @@ fn to_8_bits(value: u16) -> u8 {
     ((u32::from(value) + 128) / 257) as u8
 }
 
-fn differ(colors: &[[u16; 3]]) -> bool {
-    colors.iter().any(|color| *color != colors[0])
+/// Programs fill columns of colours that nobody measured with black or white.
+fn are_meant(colors: &[[u16; 3]]) -> bool {
+    let filler = [[0; 3], [u16::MAX; 3]].into_iter().find(|filler| Some(filler) == colors.first());
+    colors.iter().any(|color| Some(*color) != filler)
 }
 
 fn mapped(
@@ -133,7 +138,10 @@ fn mapped(
     let origin = if given.is_some() { "as given" } else { "2 % to 98 % of the values" };
     let Stretch { low, high } = range;
     progress.note(&format!("color {source} from {low} to {high} ({origin}), map {}", map.name()));
-    Ok((0..n_values).into_par_iter().map(|i| map.color(range.unit(value_at(i)))).collect())
+    let is_automatic = coloring.source.is_none() && coloring.colormap.is_none();
+    let (first, last) = if is_automatic { SHADED } else { (0.0, 1.0) };
+    let color = |i| map.color(first + (last - first) * range.unit(value_at(i)));
+    Ok((0..n_values).into_par_iter().map(color).collect())
 }
 
 /// Patches looked at to tell a picture from noise.
@@ -329,6 +337,11 @@ mod tests {
         assert_eq!(choose(&cloud).0, ColorSource::Intensity);
         cloud.colors = Some(vec![[0; 3]; 2500]);
         assert_eq!(choose(&cloud).0, ColorSource::Intensity);
+        let darkest = colorize(&cloud, &coloring(None), &Silent).unwrap()[0][0];
+        assert!(70 < darkest && darkest < 80, "{darkest}");
+        assert_eq!(colorize(&cloud, &coloring(Some("intensity")), &Silent).unwrap()[0], [0; 3]);
+        cloud.colors = Some(vec![[0x8080; 3]; 2500]);
+        assert_eq!(choose(&cloud).0, ColorSource::Rgb);
         cloud.colors = Some((0..2500).map(|i| [i, 0, 0]).collect());
         assert_eq!(choose(&cloud).0, ColorSource::Rgb);
         cloud.intensity = Some(vec![0.5; 2500]);

@@ -35,6 +35,13 @@ pub fn frame(cloud: &PointCloud, framing: &Framing) -> Camera {
     let points = without_outliers(&sample(cloud));
     let direction = framing.direction.and_then(DVec3::try_normalize);
     let forward = direction.unwrap_or_else(|| automatic_direction(&points, framing));
+    let camera = fit_along(forward, &points, framing);
+    let world = |p: DVec3| cloud.origin + p;
+    Camera { position: world(camera.position), focal_point: world(camera.focal_point), ..camera }
+}
+
+/// A camera that looks along `forward` at all of `points`, and is relative to the same zero.
+fn fit_along(forward: DVec3, points: &[Vec3], framing: &Framing) -> Camera {
     let up = framing.up.as_dvec3();
     let axes = Camera {
         position: DVec3::ZERO,
@@ -46,8 +53,8 @@ pub fn frame(cloud: &PointCloud, framing: &Framing) -> Camera {
     let local: Vec<DVec3> =
         points.iter().map(|p| DVec3::from_array(axes.map(|axis| p.as_dvec3().dot(axis)))).collect();
     let (eye, focal, projection) = fit(&local, framing);
-    let world = |p: DVec3| cloud.origin + p.x * axes[0] + p.y * axes[1] + p.z * axes[2];
-    Camera { position: world(eye), focal_point: world(focal), view_up: up, projection }
+    let unturned = |p: DVec3| p.x * axes[0] + p.y * axes[1] + p.z * axes[2];
+    Camera { position: unturned(eye), focal_point: unturned(focal), view_up: up, projection }
 }
 
 /// Bounds of all but the outliers, relative to the cloud's origin.
@@ -77,7 +84,8 @@ fn sample(cloud: &PointCloud) -> Vec<Vec3> {
     cloud.positions.iter().step_by(stride).copied().filter(|p| p.is_finite()).collect()
 }
 
-/// From the front, a little to the side; the flatter the cloud, the higher up.
+/// From the front, a little to the side; the flatter the cloud, the higher up. Land has no front: it is
+/// turned so that it fills the picture.
 fn automatic_direction(points: &[Vec3], framing: &Framing) -> DVec3 {
     let (east, north) = ground_axes(framing.up);
     let extent = |axis: Vec3| {
@@ -87,12 +95,41 @@ fn automatic_direction(points: &[Vec3], framing: &Framing) -> DVec3 {
     let flatness = f64::from(extent(framing.up) / extent(east).max(extent(north)).max(1e-9));
     let elevation_deg =
         framing.elevation_deg.unwrap_or_else(|| 40.0 - 25.0 * (flatness / 0.6).min(1.0));
-    let (sin_azimuth, cos_azimuth) =
-        (FRONT_AZIMUTH_DEG + framing.azimuth_deg).to_radians().sin_cos();
+    let azimuth_deg = if flatness < LAND {
+        filling_azimuth_deg(points, elevation_deg, framing)
+    } else {
+        FRONT_AZIMUTH_DEG
+    };
+    direction_from(azimuth_deg + framing.azimuth_deg, elevation_deg, framing.up)
+}
+
+/// Of places in the south, the one from which the whole cloud is seen from nearest by.
+fn filling_azimuth_deg(points: &[Vec3], elevation_deg: f64, framing: &Framing) -> f64 {
+    let some: Vec<Vec3> = points.iter().step_by(points.len().div_ceil(10_000)).copied().collect();
+    let distance = |azimuth_deg: f64| {
+        let forward = direction_from(azimuth_deg, elevation_deg, framing.up);
+        let camera = fit_along(forward, &some, framing);
+        match camera.projection {
+            Projection::Perspective { .. } => camera.position.distance(camera.focal_point),
+            Projection::Orthographic { height } => height,
+        }
+    };
+    let places = (0..12).map(|step| FRONT_AZIMUTH_DEG + 15.0 * f64::from(step) - 60.0);
+    let nearest = places.min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+    nearest.unwrap_or(FRONT_AZIMUTH_DEG)
+}
+
+/// Direction of view from a place at this azimuth and height over the horizon.
+fn direction_from(azimuth_deg: f64, elevation_deg: f64, up: Vec3) -> DVec3 {
+    let (east, north) = ground_axes(up);
+    let (sin_azimuth, cos_azimuth) = azimuth_deg.to_radians().sin_cos();
     let (sin_elevation, cos_elevation) = elevation_deg.to_radians().sin_cos();
-    let (east, north, up) = (east.as_dvec3(), north.as_dvec3(), framing.up.as_dvec3());
+    let (east, north, up) = (east.as_dvec3(), north.as_dvec3(), up.as_dvec3());
     -(cos_elevation * (sin_azimuth * east + cos_azimuth * north) + sin_elevation * up)
 }
+
+/// Height over width below which a cloud is land.
+const LAND: f64 = 0.25;
 
 /// The automatic camera stands in the south, a little to the east.
 const FRONT_AZIMUTH_DEG: f64 = 155.0;
@@ -186,6 +223,16 @@ mod tests {
         strayed.positions[7] = Vec3::new(4000.0, 0.0, -9000.0);
         let (a, b) = (frame(&cloud, &FRAMING), frame(&strayed, &FRAMING));
         assert!(a.position.distance(b.position) < 0.1, "{a:?} {b:?}");
+    }
+
+    #[test]
+    fn land_lies_across_the_picture() {
+        for size in [Vec3::new(300.0, 60.0, 5.0), Vec3::new(60.0, 300.0, 5.0)] {
+            let cloud = box_of_points(size);
+            let [right, ..] = frame(&cloud, &FRAMING).axes();
+            let long = if size.y < size.x { DVec3::X } else { DVec3::Y };
+            assert!(0.9 < right.dot(long).abs(), "{right}");
+        }
     }
 
     #[test]

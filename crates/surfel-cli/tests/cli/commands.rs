@@ -1,0 +1,150 @@
+//! Every command end to end.
+
+use super::common::{Folder, dome, read_png, succeed, surfel};
+use serde_json::Value;
+use std::fs;
+
+#[test]
+fn render_makes_a_picture_and_stats() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(40));
+    let picture = folder.path("dome.png");
+    let stats =
+        succeed(&["render", &cloud, "-o", &picture, "--resolution", "96x54", "--stats", "-"]);
+    let stats: Value = serde_json::from_str(&stats).unwrap();
+    assert_eq!(stats["points"], 1600);
+    assert_eq!(stats["rays"]["primary"], 96 * 54 * 4);
+    assert!(stats["bytes_per_point"]["total"].as_f64().unwrap() < 200.0);
+    for key in ["load", "prepare", "build", "trace", "frame", "total"] {
+        assert!(stats["seconds"][key].as_f64().unwrap() >= 0.0, "{key}");
+    }
+    let (width, height, channels, samples) = read_png(&picture);
+    assert_eq!((width, height, channels), (96, 54, 3));
+    assert!(samples.iter().max() > samples.iter().min());
+    assert_eq!(folder.names(), ["dome.ply", "dome.png"]);
+}
+
+#[test]
+fn render_takes_all_surfaces_and_colors() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(30));
+    let picture = folder.path("dome.png");
+    let render = |options: &[&str]| {
+        let common = ["render", &cloud, "-o", &picture, "--resolution", "32x24", "--spp", "1"];
+        succeed(&[&common, options].concat());
+    };
+    for surface in ["points", "sphere", "disc", "splat-mean", "splat", "splat-fit"] {
+        render(&["--surface", surface]);
+    }
+    for color in
+        ["rgb", "elevation", "class", "normal", "#ff8000", "rain", "RAIN", "surface_variation"]
+    {
+        render(&["--color", color, "--cmap", "turbo_r"]);
+    }
+    for light in ["sun", "sky", "headlight", "sun,sky,headlight", "none"] {
+        render(&["--light", light, "--sun-angle", "0"]);
+    }
+    render(&["--camera-orthographic", "--camera-direction", "0,0,-1"]);
+    render(&["--camera-orthographic", "3", "--up", "-Y", "--exposure", "-1"]);
+    render(&["--camera-position", "-3,-3,2", "--camera-focal-point", "0,0,0"]);
+    render(&["--select", "random:200", "--radius", "0.1", "--normals-k", "8", "--orient", "up"]);
+    render(&["--neighbors", "grid", "--normals-radius", "0.2", "--radius", "median:6"]);
+}
+
+#[test]
+fn dry_run_tells_the_choices_and_renders_nothing() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let choices = succeed(&["render", &cloud, "-o", &folder.path("no.png"), "--dry-run"]);
+    let choices: Value = serde_json::from_str(&choices).unwrap();
+    assert_eq!((&choices["surface"], &choices["color"]), (&"splat".into(), &"rgb".into()));
+    assert_eq!(folder.names(), ["dome.ply"]);
+}
+
+#[test]
+fn the_picture_may_go_to_stdout() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let output = surfel(&["render", &cloud, "-o", "-", "--resolution", "16x9"]);
+    assert!(output.status.success() && output.stdout.starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn quiet_says_nothing_and_choices_name_their_flags() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let picture = folder.path("dome.png");
+    let arguments = ["render", &cloud, "-o", &picture, "--resolution", "16x9"];
+    let told = String::from_utf8(surfel(&arguments).stderr).unwrap();
+    let flags = ["--up", "--camera-position", "--sun-azimuth", "--sky-reach", "--normals-k"];
+    for flag in flags.iter().chain(&["--radius", "--color", "--exposure", "--threads"]) {
+        assert!(told.contains(&format!("[{flag}")), "{flag}: {told}");
+    }
+    let quiet = surfel(&[&arguments[..], &["--quiet"]].concat());
+    assert!(quiet.stderr.is_empty() && quiet.stdout.is_empty());
+}
+
+#[test]
+fn prepare_does_what_is_asked_for_alone_or_all() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(30));
+    let prepared = folder.path("out.ply");
+    let columns = |options: &[&str]| {
+        succeed(&[&["prepare", &cloud, "-o", &prepared], options].concat());
+        let info: Value = serde_json::from_str(&succeed(&["info", "--json", &prepared])).unwrap();
+        let has = |name: &str| info["columns"].get(name).is_some();
+        assert!(has("rgb") && has("class") && has("rain"));
+        let columns = [has("normal"), has("radius"), has("surface_variation")];
+        (info["points"].as_u64().unwrap(), columns)
+    };
+    assert_eq!(columns(&[]), (900, [true, true, false]));
+    assert_eq!(columns(&["--normals"]), (900, [true, false, false]));
+    assert_eq!(columns(&["--radius", "0.1"]), (900, [false, true, false]));
+    assert_eq!(columns(&["--orient", "mst"]), (900, [true, false, false]));
+    assert_eq!(columns(&["--keep-variation"]), (900, [false, false, true]));
+    assert_eq!(columns(&["--select", "first:10"]), (10, [false, false, false]));
+}
+
+#[test]
+fn info_tells_a_person_and_a_program() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let table = succeed(&["info", &cloud]);
+    assert!(table.contains("PLY") && table.contains("rain") && table.contains("400"), "{table}");
+    let both: Value = serde_json::from_str(&succeed(&["info", "--json", &cloud, &cloud])).unwrap();
+    assert_eq!(both.as_array().unwrap().len(), 2);
+    assert_eq!(both[0]["bounds"]["min"][0], -1.0);
+}
+
+#[test]
+fn demo_scans_and_renders() {
+    let folder = Folder::new();
+    let output = folder.path("demo");
+    let told = succeed(&["demo", "-o", &output, "--points", "3000"]);
+    assert!(told.contains("surfel render") && told.contains("demo.laz"), "{told}");
+    let (width, height, ..) = read_png(folder.0.join("demo/demo.png"));
+    assert_eq!((width, height), (1280, 720));
+    assert!(fs::metadata(folder.0.join("demo/demo.laz")).unwrap().len() > 10_000);
+}
+
+#[test]
+fn bench_measures_every_kind_of_ray() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(30));
+    let result = succeed(&["bench", &cloud, "--resolution", "64x64", "--runs", "2", "--json"]);
+    let result: Value = serde_json::from_str(&result).unwrap();
+    let rays = &result["rays"];
+    assert_eq!(rays["primary"]["rays"], 64 * 64);
+    assert!(rays["primary"]["hits"].as_u64() >= rays["surface"]["hits"].as_u64());
+    assert_eq!(rays["bounce-any"]["hits"], rays["bounce"]["hits"]);
+    assert_eq!(rays.as_object().unwrap().len(), 6);
+    succeed(&["bench", &cloud, "--resolution", "32x32", "--runs", "1", "--surface", "sphere"]);
+}
+
+#[test]
+fn help_has_examples() {
+    for command in ["render", "info", "prepare", "demo", "bench"] {
+        let help = succeed(&[command, "--help"]);
+        assert!(help.contains("Examples:") && help.contains("--threads"), "{help}");
+    }
+}

@@ -1,0 +1,117 @@
+//! Files that are broken, absent or not what they say: a clear error, no old output destroyed.
+
+use super::common::{Folder, dome, fail, square};
+use std::fs;
+
+/// The header of a LAS 1.2 file that claims four billion points in 200 bytes.
+fn lying_las() -> Vec<u8> {
+    let mut bytes = vec![0; 227];
+    bytes[..4].copy_from_slice(b"LASF");
+    bytes[24..26].copy_from_slice(&[1, 2]);
+    bytes[94..96].copy_from_slice(&227u16.to_le_bytes());
+    bytes[96..100].copy_from_slice(&227u32.to_le_bytes());
+    bytes[105..107].copy_from_slice(&20u16.to_le_bytes());
+    bytes[107..111].copy_from_slice(&4_000_000_000u32.to_le_bytes());
+    bytes
+}
+
+fn broken_files() -> Vec<(&'static str, Vec<u8>)> {
+    let header = |count: u64| {
+        let properties = "property float x\nproperty float y\nproperty float z\nend_header\n";
+        format!("ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{properties}")
+    };
+    let mut truncated = dome(20).into_bytes();
+    truncated.truncate(3000);
+    vec![
+        ("empty.ply", vec![]),
+        ("empty.las", vec![]),
+        ("empty.xyz", vec![]),
+        ("no-points.ply", header(0).into_bytes()),
+        ("billions.ply", header(3_000_000_000).into_bytes()),
+        ("billions.las", lying_las()),
+        ("truncated.ply", truncated),
+        ("magic.ply", b"plush toys, a list\n".to_vec()),
+        ("magic.las", b"FSAL and then nothing that is known".to_vec()),
+        ("magic.laz", vec![0xff; 500]),
+        ("nan.xyz", b"NaN NaN NaN\nNaN NaN NaN\n".to_vec()),
+        ("words.xyz", b"here are no numbers\n".to_vec()),
+        ("cloud.docx", b"PK\x03\x04 something else".to_vec()),
+    ]
+}
+
+#[test]
+fn a_broken_file_is_named_and_nothing_is_written() {
+    let folder = Folder::new();
+    let picture = folder.write("old.png", "an old picture");
+    let cloud = folder.write("old.ply", "an old cloud");
+    for (name, content) in broken_files() {
+        let file = folder.write(name, content);
+        for arguments in [
+            &["render", &file, "-o", &picture, "--resolution", "32x18"][..],
+            &["prepare", &file, "-o", &cloud],
+            &["bench", &file, "--runs", "1"],
+        ] {
+            let text = fail(arguments, 1);
+            assert!(text.contains(name), "{arguments:?}: {text}");
+        }
+        fs::remove_file(file).unwrap();
+    }
+    assert_eq!(fs::read_to_string(picture).unwrap(), "an old picture");
+    assert_eq!(fs::read_to_string(cloud).unwrap(), "an old cloud");
+    assert_eq!(folder.names(), ["old.ply", "old.png"]);
+}
+
+#[test]
+fn absent_paths_and_folders_are_named() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let (absent, nowhere) = (folder.path("absent.laz"), folder.path("no/such/out.png"));
+    let picture = folder.path("out.png");
+    let folder_path = folder.0.display().to_string();
+    assert!(fail(&["render", &absent, "-o", &picture], 1).contains("absent.laz"));
+    assert!(fail(&["render", &folder_path, "-o", &picture], 1).contains(&folder_path));
+    assert!(fail(&["info", &absent], 1).contains("absent.laz"));
+    assert!(fail(&["render", &cloud, "-o", &nowhere], 1).contains("out.png"));
+    assert!(fail(&["render", &cloud, "-o", &folder_path], 2).contains(&folder_path));
+    assert!(fail(&["render", &cloud, "-o", &folder.path("out.gif")], 2).contains("gif"));
+    assert!(fail(&["prepare", &cloud, "-o", &picture], 2).contains("out.png"));
+    assert_eq!(folder.names(), ["dome.ply"]);
+}
+
+#[test]
+fn a_missing_column_names_those_there_are() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let picture = folder.path("out.png");
+    for color in ["intensity", "snow"] {
+        let text = fail(&["render", &cloud, "-o", &picture, "--color", color], 1);
+        assert!(text.contains(color) && text.contains("rain"), "{text}");
+    }
+}
+
+#[test]
+fn memory_is_refused_before_it_is_taken() {
+    let folder = Folder::new();
+    let cloud = folder.write("square.xyz", square(100, 9));
+    let picture = folder.path("out.png");
+    let arguments = ["render", &cloud, "-o", &picture, "--memory-limit", "1M"];
+    let text = fail(&arguments, 1);
+    assert!(text.contains("--select") && text.contains("1.0 MB"), "{text}");
+    let text = fail(&["prepare", &cloud, "-o", &folder.path("a.ply"), "--memory-limit", "9K"], 1);
+    assert!(text.contains("--memory-limit"), "{text}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_an_error() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let arguments = ["render", &cloud, "-o", "-", "--resolution", "64x36"];
+    let output = super::common::command(&arguments).stdout(full()).output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", super::common::stderr(&output));
+    fail(&["render", &cloud, "-o", "/dev/full"], 2);
+    let arguments = ["info", &cloud];
+    let output = super::common::command(&arguments).stdout(full()).output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", super::common::stderr(&output));
+}
