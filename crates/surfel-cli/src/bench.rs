@@ -1,6 +1,6 @@
 //! `surfel bench`: how many rays a second are traced, by kind of ray, from rays stored beforehand.
 
-use crate::args::{Global, PreparationArgs, SurfaceArgs, parse};
+use crate::args::{Global, PreparationArgs, SurfaceArgs, is_georeferenced, parse};
 use crate::memory::Plan;
 use crate::report::{Report, print};
 use crate::stats;
@@ -73,7 +73,7 @@ const TILE: u32 = 16;
 
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
     let source = surfel_formats::inspect(&args.cloud)?;
-    let plan = Plan::new(&[source], &[args.cloud.clone()], args.preparation.select, 0);
+    let plan = Plan::new(&[source], std::slice::from_ref(&args.cloud), args.preparation.select, 0);
     plan.check(global)?;
     let scene = scene(args, report)?;
     let n_points = scene.cloud.len();
@@ -86,7 +86,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let simd = Simd::detect();
     let bench = Bench { flat: &flat, simd, runs: args.runs, report };
     let primary = camera_rays(&flat, args.resolution);
-    let hits = bench.hits(&primary);
+    let hits = bench.surface_hits(&primary);
     let mut found = Map::new();
     for kind in &args.rays {
         let name = kind.to_possible_value().map_or(String::new(), |v| v.get_name().to_owned());
@@ -104,24 +104,15 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
 }
 
 fn scene(args: &Args, report: &Report) -> anyhow::Result<Scene> {
-    report.begin("load", 0);
     let options = args.preparation.load_options(ColumnChoice::Only(args.preparation.geometry()));
     let loaded = surfel_formats::load(&args.cloud, &options, report)?;
     let (cloud, _) = prepare(loaded.cloud, &args.preparation.preparation(0, None), report)
         .with_context(|| args.cloud.display().to_string())?;
     let (width, height) = args.resolution;
-    let framing = Framing {
-        up: guess_up(&cloud, crate::args::is_georeferenced(&cloud, &loaded.source)).up,
-        aspect: f64::from(width) / f64::from(height),
-        is_orthographic: false,
-        view_angle_deg: 35.0,
-        direction: None,
-        azimuth_deg: 0.0,
-        elevation_deg: None,
-        zoom: 1.0,
-    };
+    let up = guess_up(&cloud, is_georeferenced(&cloud, &loaded.source)).up;
+    let aspect = f64::from(width) / f64::from(height);
     Ok(Scene {
-        camera: frame(&cloud, &framing),
+        camera: frame(&cloud, &Framing::automatic(up, aspect)),
         colors: vec![[200; 3]; cloud.len()],
         cloud,
         surface: args.surface.surface,
@@ -152,7 +143,7 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    fn hits(&self, rays: &[Vec<Ray>]) -> Vec<Vec<SurfaceHit>> {
+    fn surface_hits(&self, rays: &[Vec<Ray>]) -> Vec<Vec<SurfaceHit>> {
         let hits = |rays: &Vec<Ray>| {
             let mut hits = vec![SurfaceHit::MISS; rays.len()];
             trace::surface_hits(self.flat, self.simd, rays, &mut hits);
@@ -167,19 +158,7 @@ impl Bench<'_> {
         primary: &[Vec<Ray>],
         hits: &[Vec<SurfaceHit>],
     ) -> surfel::Result<Value> {
-        let rays: Vec<Vec<Ray>> = match kind {
-            Rays::Primary | Rays::Gather | Rays::Surface => primary.to_vec(),
-            Rays::Shadow => self.secondary(primary, hits, |_, position, _| {
-                let light = self.flat.camera.position - self.flat.origin;
-                let light = light.as_vec3() + Vec3::new(-0.6, 0.3, 0.5) * light.as_vec3().length();
-                (light - position, 1.0)
-            }),
-            Rays::BounceAny | Rays::Bounce => self.secondary(primary, hits, |i, _, normal| {
-                let mut random = Random::new(0, i as u64);
-                let local = cosine_hemisphere((random.next_f32(), random.next_f32()));
-                (Frame::around(normal).to_world(local), f32::INFINITY)
-            }),
-        };
+        let rays = self.rays(kind, primary, hits);
         let n_rays: usize = rays.iter().map(Vec::len).sum();
         let (mut seconds, mut n_hits) = (Vec::new(), 0);
         for _ in 0..self.runs {
@@ -196,6 +175,20 @@ impl Bench<'_> {
             "median_mrays_per_s": speed(seconds[seconds.len() / 2]),
             "best_mrays_per_s": speed(seconds[0]),
         }))
+    }
+
+    fn rays(&self, kind: Rays, primary: &[Vec<Ray>], hits: &[Vec<SurfaceHit>]) -> Vec<Vec<Ray>> {
+        let eye = (self.flat.camera.position - self.flat.origin).as_vec3();
+        let light = eye + Vec3::new(-0.6, 0.3, 0.5) * eye.length();
+        match kind {
+            Rays::Primary | Rays::Gather | Rays::Surface => primary.to_vec(),
+            Rays::Shadow => self.secondary(primary, hits, |_, position, _| (light - position, 1.0)),
+            Rays::BounceAny | Rays::Bounce => self.secondary(primary, hits, |i, _, normal| {
+                let mut random = Random::new(0, i as u64);
+                let local = cosine_hemisphere((random.next_f32(), random.next_f32()));
+                (Frame::around(normal).to_world(local), f32::INFINITY)
+            }),
+        }
     }
 
     /// Rays from hits; `aim(index of the ray, position, normal)` gives direction and share of its length.
@@ -249,26 +242,16 @@ impl Bench<'_> {
 }
 
 fn table(result: &Value) -> String {
-    let mut lines = vec![format!(
-        "{:<12}{:>10}{:>10}{:>12}{:>12}",
-        "rays", "number", "hits", "median M/s", "best M/s"
-    )];
+    let number = |value: &Value| value.as_f64().unwrap_or(0.0);
+    let mut text = "rays            number      hits  median M/s    best M/s\n".to_owned();
     for (name, row) in result["rays"].as_object().into_iter().flatten() {
-        let speed = |key: &str| row[key].as_f64().unwrap_or(0.0);
-        lines.push(format!(
-            "{name:<12}{:>10}{:>10}{:>12.2}{:>12.2}",
-            row["rays"].to_string(),
-            row["hits"].to_string(),
-            speed("median_mrays_per_s"),
-            speed("best_mrays_per_s"),
-        ));
+        let [rays, hits] = ["rays", "hits"].map(|key| number(&row[key]));
+        let [median, best] =
+            ["median_mrays_per_s", "best_mrays_per_s"].map(|key| number(&row[key]));
+        text += &format!("{name:<12}{rays:>10}{hits:>10}{median:>12.2}{best:>12.2}\n");
     }
-    lines.push(format!(
-        "built in {:.2} s, {:.1} bytes a point, {} threads, {}",
-        result["build_s"].as_f64().unwrap_or(0.0),
-        result["bytes_per_point"]["total"].as_f64().unwrap_or(0.0),
-        result["threads"],
-        result["simd"].as_str().unwrap_or_default(),
-    ));
-    lines.join("\n")
+    let (build_s, bytes) =
+        (number(&result["build_s"]), number(&result["bytes_per_point"]["total"]));
+    let threads = &result["threads"];
+    text + &format!("built in {build_s:.2} s, {bytes:.1} bytes a point, {threads} threads")
 }

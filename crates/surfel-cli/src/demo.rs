@@ -9,7 +9,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use surfel::math::DVec3;
-use surfel::progress::Progress;
 use surfel::scanner::ruin;
 use surfel_formats::SaveOptions;
 
@@ -43,7 +42,6 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         .with_context(|| format!("{}: the folder cannot be made", folder.display()))?;
     let (cloud_path, picture_path) = (folder.join("demo.laz"), folder.join("demo.png"));
     let cloud = ruin::scan(args.points as usize, report)?;
-    report.begin("write", 0);
     let options = SaveOptions {
         resolution: Some(DVec3::splat(0.001)),
         coordinate_system: Some("EPSG:32634".into()),

@@ -6,7 +6,6 @@ use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use surfel::math::Vec3;
 use surfel::points::{PointCloud, guess_up, spacing};
-use surfel::progress::Progress;
 use surfel_formats::{LoadOptions, Loaded, TextColumn};
 
 #[derive(clap::Args)]
@@ -33,7 +32,6 @@ pub fn run(args: &Args, report: &Report) -> anyhow::Result<()> {
     let options = LoadOptions { text_columns, ..LoadOptions::default() };
     let mut all = Vec::new();
     for file in &args.files {
-        report.begin("load", 0);
         let loaded = surfel_formats::load(file, &options, report)?;
         let info = describe(file, &loaded, report)?;
         report.end_stage();

@@ -40,7 +40,7 @@ Examples:
 #[derive(Subcommand)]
 enum Command {
     /// Render point clouds to a picture.
-    Render(render::Args),
+    Render(Box<render::Args>),
     /// Tell what is in a file.
     Info(info::Args),
     /// Clean a cloud, add normals and radii, write it to a file.

@@ -84,7 +84,6 @@ fn load(args: &Args, global: &Global, report: &Report) -> anyhow::Result<Loaded>
     let inspected = args.files.iter().map(|file| surfel_formats::inspect(file));
     let sources = inspected.collect::<Result<Vec<_>, _>>()?;
     Plan::new(&sources, &args.files, args.preparation.select, n_pixels).check(global)?;
-    report.begin("load", 0);
     let options =
         args.preparation.load_options(args.preparation.columns(args.color.color.as_ref()));
     let (loaded, _) = surfel_formats::load_all(&args.files, &options, report)?;
@@ -113,7 +112,10 @@ fn choose_from(cloud: &PointCloud, source: &Source, args: &Args, report: &Report
     let camera = args.camera.camera(cloud, up, f64::from(width) / f64::from(height), report);
     let bounds = usual_bounds(cloud);
     let diagonal = (bounds.max - bounds.min).length();
-    let lights = light::lights(&args.light, &Lit { camera, up, diagonal }, report);
+    // Points as pixels are shaded by their depth alone.
+    let is_shaded = args.surface.surface != SurfaceKind::Points;
+    let lit = Lit { camera, up, diagonal };
+    let lights = if is_shaded { light::lights(&args.light, &lit, report) } else { Vec::new() };
     Choices { up, camera, lights }
 }
 
@@ -191,7 +193,7 @@ fn expose(
 ) -> anyhow::Result<()> {
     let stops = match args.light.exposure {
         Exposure::Stops(stops) => stops as f32,
-        Exposure::Auto if flat.lights.is_empty() || flat.surface == SurfaceKind::Points => {
+        Exposure::Auto if flat.lights.is_empty() => {
             return Ok(());
         }
         Exposure::Auto => {

@@ -56,7 +56,6 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let Loaded { cloud, source } = load(args, global, report)?;
     let cloud =
         prepared(cloud, args, report).with_context(|| args.files[0].display().to_string())?;
-    report.begin("write", 0);
     let options =
         SaveOptions { resolution: source.resolution, coordinate_system: source.coordinate_system };
     surfel_formats::save(&args.output, &cloud, &options, report)?;
@@ -69,7 +68,6 @@ fn load(args: &Args, global: &Global, report: &Report) -> anyhow::Result<Loaded>
     let inspected = args.files.iter().map(|file| surfel_formats::inspect(file));
     let sources = inspected.collect::<Result<Vec<_>, _>>()?;
     Plan::new(&sources, &args.files, args.preparation.select, 0).check(global)?;
-    report.begin("load", 0);
     let options = args.preparation.load_options(ColumnChoice::All);
     let (mut loaded, _) = surfel_formats::load_all(&args.files, &options, report)?;
     report.end_stage();

@@ -5,7 +5,7 @@ use crate::report::Report;
 use clap::Args;
 use surfel::math::{DVec3, Vec3};
 use surfel::points::{PointCloud, guess_up};
-use surfel::scene::{Camera, Framing, Projection, frame};
+use surfel::scene::{Camera, Framing, Projection, frame, upright};
 use surfel_formats::Source;
 
 #[derive(Args)]
@@ -69,8 +69,7 @@ impl CameraArgs {
         let focal_point = self.camera_focal_point.unwrap_or(framed.focal_point);
         let beside = framed.position + (focal_point - framed.focal_point);
         let position = self.camera_position.unwrap_or(beside);
-        let view_up =
-            self.camera_view_up.unwrap_or_else(|| upright(framed.view_up, focal_point - position));
+        let view_up = self.camera_view_up.unwrap_or_else(|| upright(up, focal_point - position));
         let projection = match self.camera_orthographic.flatten() {
             Some(height) => Projection::Orthographic { height },
             None => framed.projection,
@@ -94,13 +93,6 @@ impl CameraArgs {
             zoom: self.camera_zoom_factor,
         }
     }
-}
-
-/// `up`, or north for a camera that looks along it, as on a map.
-fn upright(up: DVec3, forward: DVec3) -> DVec3 {
-    let looks_along_up = forward.normalize_or_zero().cross(up).length() < 1e-3;
-    let north = if up.z.abs() < 0.9 { -DVec3::Z } else { DVec3::Y };
-    if looks_along_up { north } else { up }
 }
 
 /// Survey formats and coordinates far from zero, as those of national grids, have Z up.

@@ -23,6 +23,22 @@ pub struct Framing {
     pub zoom: f64,
 }
 
+impl Framing {
+    /// Nothing is known but `up` and the picture's aspect.
+    pub fn automatic(up: Vec3, aspect: f64) -> Self {
+        Self {
+            up,
+            aspect,
+            is_orthographic: false,
+            view_angle_deg: 35.0,
+            direction: None,
+            azimuth_deg: 0.0,
+            elevation_deg: None,
+            zoom: 1.0,
+        }
+    }
+}
+
 /// Share of points on each side of an axis that may be stray.
 const STRAY: f64 = 0.005;
 /// Points looked at, at most.
@@ -42,11 +58,11 @@ pub fn frame(cloud: &PointCloud, framing: &Framing) -> Camera {
 
 /// A camera that looks along `forward` at all of `points`, and is relative to the same zero.
 fn fit_along(forward: DVec3, points: &[Vec3], framing: &Framing) -> Camera {
-    let up = framing.up.as_dvec3();
+    let view_up = upright(framing.up, forward);
     let axes = Camera {
         position: DVec3::ZERO,
         focal_point: forward,
-        view_up: up,
+        view_up,
         projection: Projection::Orthographic { height: 1.0 },
     }
     .axes();
@@ -54,7 +70,14 @@ fn fit_along(forward: DVec3, points: &[Vec3], framing: &Framing) -> Camera {
         points.iter().map(|p| DVec3::from_array(axes.map(|axis| p.as_dvec3().dot(axis)))).collect();
     let (eye, focal, projection) = fit(&local, framing);
     let unturned = |p: DVec3| p.x * axes[0] + p.y * axes[1] + p.z * axes[2];
-    Camera { position: unturned(eye), focal_point: unturned(focal), view_up: up, projection }
+    Camera { position: unturned(eye), focal_point: unturned(focal), view_up, projection }
+}
+
+/// What is up in a picture seen along `forward`: the world's up, or north where that is hidden, as on a map.
+pub fn upright(up: Vec3, forward: DVec3) -> DVec3 {
+    let is_hidden = forward.normalize_or_zero().cross(up.as_dvec3()).length() < 1e-3;
+    let up = if is_hidden { ground_axes(up).1 } else { up };
+    up.as_dvec3()
 }
 
 /// Bounds of all but the outliers, relative to the cloud's origin.
@@ -170,16 +193,9 @@ mod tests {
     use super::*;
     use crate::math::Random;
 
-    const FRAMING: Framing = Framing {
-        up: Vec3::Z,
-        aspect: 16.0 / 9.0,
-        is_orthographic: false,
-        view_angle_deg: 35.0,
-        direction: None,
-        azimuth_deg: 0.0,
-        elevation_deg: None,
-        zoom: 1.0,
-    };
+    fn framing() -> Framing {
+        Framing::automatic(Vec3::Z, 16.0 / 9.0)
+    }
 
     fn box_of_points(size: Vec3) -> PointCloud {
         let mut random = Random::new(2, 0);
@@ -206,7 +222,7 @@ mod tests {
             for is_orthographic in [false, true] {
                 let cloud = box_of_points(size);
                 let (left, top, right, bottom) =
-                    shown(&cloud, &frame(&cloud, &Framing { is_orthographic, ..FRAMING }));
+                    shown(&cloud, &frame(&cloud, &Framing { is_orthographic, ..framing() }));
                 assert!(
                     0.0 < left && 0.0 < top && right < 1600.0 && bottom < 900.0,
                     "{left} {top} {right} {bottom}"
@@ -221,24 +237,36 @@ mod tests {
         let cloud = box_of_points(Vec3::splat(10.0));
         let mut strayed = cloud.clone();
         strayed.positions[7] = Vec3::new(4000.0, 0.0, -9000.0);
-        let (a, b) = (frame(&cloud, &FRAMING), frame(&strayed, &FRAMING));
+        let (a, b) = (frame(&cloud, &framing()), frame(&strayed, &framing()));
         assert!(a.position.distance(b.position) < 0.1, "{a:?} {b:?}");
     }
 
     #[test]
-    fn land_lies_across_the_picture() {
+    fn a_map_has_north_at_its_top_and_fills_the_picture() {
+        let cloud = box_of_points(Vec3::new(400.0, 200.0, 15.0));
+        let framing = Framing { direction: Some(-DVec3::Z), is_orthographic: true, ..framing() };
+        let camera = frame(&cloud, &framing);
+        assert_eq!(camera.axes()[1].round(), DVec3::Y);
+        let (left, _, right, _) = shown(&cloud, &camera);
+        assert!(0.85 < (right - left) / 1600.0, "{left} {right}");
+    }
+
+    #[test]
+    fn land_is_turned_to_be_seen_from_nearby() {
         for size in [Vec3::new(300.0, 60.0, 5.0), Vec3::new(60.0, 300.0, 5.0)] {
             let cloud = box_of_points(size);
-            let [right, ..] = frame(&cloud, &FRAMING).axes();
-            let long = if size.y < size.x { DVec3::X } else { DVec3::Y };
-            assert!(0.9 < right.dot(long).abs(), "{right}");
+            let distance = |azimuth_deg: f64| {
+                let camera = frame(&cloud, &Framing { azimuth_deg, ..framing() });
+                camera.position.distance(camera.focal_point)
+            };
+            assert!(distance(0.0) < 0.95 * distance(90.0), "{size}");
         }
     }
 
     #[test]
     fn one_point_and_none_give_a_finite_camera() {
         for positions in [vec![], vec![Vec3::ONE], vec![Vec3::ONE; 5]] {
-            let camera = frame(&PointCloud::from_positions(positions), &FRAMING);
+            let camera = frame(&PointCloud::from_positions(positions), &framing());
             assert!(camera.position.is_finite() && camera.focal_point != camera.position);
         }
     }

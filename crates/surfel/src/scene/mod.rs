@@ -6,7 +6,7 @@ mod framing;
 mod light;
 
 pub use camera::{Camera, Projection, View};
-pub use framing::{Framing, frame, usual_bounds};
+pub use framing::{Framing, frame, upright, usual_bounds};
 pub use light::{Light, Sky, Sun};
 
 use crate::math::Vec3;

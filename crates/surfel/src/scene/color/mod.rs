@@ -1,5 +1,9 @@
 //! Colours of points: from one of a cloud's columns, which is chosen from the data if none is named.
 
+mod choose;
+
+pub use choose::{PLAIN, choose};
+
 use crate::error::{Error, Result};
 use crate::image::{Colormap, Stretch, class_color};
 use crate::math::Vec3;
@@ -36,9 +40,6 @@ pub struct Coloring {
     pub range: Option<(f64, f64)>,
     pub up: Vec3,
 }
-
-/// Light stone: white objects glare, and a grey without warmth looks dead.
-pub const PLAIN: [u8; 3] = [0xd6, 0xd2, 0xca];
 
 /// Part of the map that an automatic choice uses: light and shadow cannot show on black.
 const SHADED: (f32, f32) = (0.3, 0.95);
@@ -92,32 +93,9 @@ pub fn colorize(
     }
 }
 
-/// What to show when nothing was asked for, and why.
-pub fn choose(cloud: &PointCloud) -> (ColorSource, &'static str) {
-    if cloud.colors.as_ref().is_some_and(|colors| are_meant(colors)) {
-        return (ColorSource::Rgb, "the file has colours");
-    }
-    match &cloud.intensity {
-        Some(values) if is_picture(&cloud.positions, values) => {
-            (ColorSource::Intensity, "the file has intensities and no colours")
-        }
-        Some(_) => (
-            ColorSource::Constant(PLAIN),
-            "the file has no colours, and its intensities differ between neighbours as much as anywhere",
-        ),
-        None => (ColorSource::Constant(PLAIN), "the file has no colours and no intensities"),
-    }
-}
-
 /// A 16-bit channel as the 8-bit value that it was, or is nearest to.
 fn to_8_bits(value: u16) -> u8 {
     ((u32::from(value) + 128) / 257) as u8
-}
-
-/// Programs fill columns of colours that nobody measured with black or white.
-fn are_meant(colors: &[[u16; 3]]) -> bool {
-    let filler = [[0; 3], [u16::MAX; 3]].into_iter().find(|filler| Some(filler) == colors.first());
-    colors.iter().any(|color| Some(*color) != filler)
 }
 
 fn mapped(
@@ -136,65 +114,18 @@ fn mapped(
         None => Colormap::from_name("viridis")?,
     };
     let origin = if given.is_some() { "as given" } else { "2 % to 98 % of the values" };
-    let Stretch { low, high } = range;
-    progress.note(&format!("color {source} from {low} to {high} ({origin}), map {}", map.name()));
+    progress.note(&format!("color {source} from {} ({origin}), map {}", words(range), map.name()));
     let is_automatic = coloring.source.is_none() && coloring.colormap.is_none();
     let (first, last) = if is_automatic { SHADED } else { (0.0, 1.0) };
     let color = |i| map.color(first + (last - first) * range.unit(value_at(i)));
     Ok((0..n_values).into_par_iter().map(color).collect())
 }
 
-/// Patches looked at to tell a picture from noise.
-const N_PATCHES: usize = 64;
-/// Points of a patch.
-const PATCH: usize = 24;
-/// Share of the variance that points of one patch must have in common.
-const IN_COMMON: f64 = 0.3;
-
-/// Whether neighbouring points have similar values, as where the values show the surface.
-///
-/// The share of the variance that lies between patches, not within them (the intraclass correlation).
-fn is_picture(positions: &[Vec3], values: &[f32]) -> bool {
-    let stride = positions.len().div_ceil(N_PATCHES).max(1);
-    let centers: Vec<usize> = (0..positions.len()).step_by(stride).collect();
-    let patches: Vec<(f64, f64)> = centers
-        .into_par_iter()
-        .map(|center| mean_and_variance(nearest(positions, center).map(|i| f64::from(values[i]))))
-        .filter(|(mean, variance)| mean.is_finite() && variance.is_finite())
-        .collect();
-    let (_, between) = mean_and_variance(patches.iter().map(|(mean, _)| *mean));
-    let (within, _) = mean_and_variance(patches.iter().map(|(_, variance)| *variance));
-    IN_COMMON * (between + within) < between
-}
-
-/// The points nearest to one of them, by looking at all.
-fn nearest(positions: &[Vec3], center: usize) -> impl Iterator<Item = usize> {
-    let mut nearest: Vec<(f32, usize)> = Vec::with_capacity(2 * PATCH);
-    let mut bound = f32::INFINITY;
-    for (i, position) in positions.iter().enumerate() {
-        let squared = position.distance_squared(positions[center]);
-        if squared < bound {
-            nearest.push((squared, i));
-            if nearest.len() == 2 * PATCH {
-                nearest.select_nth_unstable_by(PATCH, |a, b| a.0.total_cmp(&b.0));
-                nearest.truncate(PATCH);
-                bound = nearest.iter().fold(0.0, |all, (squared, _)| all.max(*squared));
-            }
-        }
-    }
-    nearest.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    nearest.into_iter().take(PATCH).map(|(_, i)| i)
-}
-
-fn mean_and_variance(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
-    for value in values {
-        n += 1.0;
-        sum += value;
-        squares += value * value;
-    }
-    let mean = sum / n;
-    (mean, (squares / n - mean * mean).max(0.0))
+/// Both ends, with as many digits as tell a thousandth of the range.
+fn words(Stretch { low, high }: Stretch) -> String {
+    let size = (high - low).abs().log10();
+    let digits = if size.is_finite() { (3.0 - size).clamp(0.0, 12.0) as usize } else { 3 };
+    format!("{low:.digits$} to {high:.digits$}")
 }
 
 fn missing_column(cloud: &PointCloud, source: &ColorSource) -> Error {
@@ -269,7 +200,6 @@ pub fn parse_hex(text: &str) -> Option<[u8; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Random;
     use crate::points::{Scalar, Values};
     use crate::progress::Silent;
     use std::sync::Mutex;
@@ -316,7 +246,7 @@ mod tests {
         let found = colorize(&cloud, &coloring(Some("deviation")), &listener).unwrap();
         let viridis = Colormap::from_name("viridis").unwrap();
         assert_eq!((found[0], found[2499]), (viridis.color(0.0), viridis.color(1.0)));
-        assert!(listener.0.lock().unwrap()[0].contains("49.98 to 2449.02"));
+        assert!(listener.0.lock().unwrap()[0].contains("50 to 2449 ("));
         assert_eq!(found, colorize(&cloud, &coloring(Some("elevation")), &Silent).unwrap());
         let range = Coloring {
             range: Some((0.0, 10_000.0)),
@@ -327,27 +257,12 @@ mod tests {
     }
 
     #[test]
-    fn the_choice_falls_on_what_shows_something() {
-        let mut cloud = lattice();
-        assert_eq!(choose(&cloud).0, ColorSource::Constant(PLAIN));
-        let mut random = Random::new(1, 0);
-        cloud.intensity = Some((0..2500).map(|_| random.next_f32()).collect());
-        assert_eq!(choose(&cloud).0, ColorSource::Constant(PLAIN));
-        cloud.intensity = Some((0..2500).map(|i| ((i % 50) / 10 % 2) as f32).collect());
-        assert_eq!(choose(&cloud).0, ColorSource::Intensity);
-        cloud.colors = Some(vec![[0; 3]; 2500]);
-        assert_eq!(choose(&cloud).0, ColorSource::Intensity);
+    fn an_automatic_gray_is_never_black() {
+        let intensity = Some((0..2500).map(|i| i as f32).collect());
+        let cloud = PointCloud { intensity, ..lattice() };
         let darkest = colorize(&cloud, &coloring(None), &Silent).unwrap()[0][0];
         assert!(70 < darkest && darkest < 80, "{darkest}");
         assert_eq!(colorize(&cloud, &coloring(Some("intensity")), &Silent).unwrap()[0], [0; 3]);
-        cloud.colors = Some(vec![[0x8080; 3]; 2500]);
-        assert_eq!(choose(&cloud).0, ColorSource::Rgb);
-        cloud.colors = Some((0..2500).map(|i| [i, 0, 0]).collect());
-        assert_eq!(choose(&cloud).0, ColorSource::Rgb);
-        cloud.intensity = Some(vec![0.5; 2500]);
-        cloud.colors = None;
-        assert_eq!(choose(&cloud).0, ColorSource::Constant(PLAIN));
-        assert_eq!(choose(&PointCloud::default()).0, ColorSource::Constant(PLAIN));
     }
 
     #[test]
