@@ -85,6 +85,11 @@ impl View {
             .then(|| (self.center.0 + place(self.right), self.center.1 - place(self.up), depth))
     }
 
+    /// What a pixel spans at distance 1 (perspective), or anywhere (orthographic), in world units.
+    pub fn pixel_size(&self) -> f32 {
+        self.pixel_size
+    }
+
     /// Distance of `position` along the view axis.
     pub fn depth(&self, position: Vec3) -> f32 {
         (position - self.position).dot(self.forward)

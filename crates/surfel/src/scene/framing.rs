@@ -1,6 +1,7 @@
 //! Automatic cameras: the whole cloud in the picture, stray outliers left out.
 
 use super::light::ground_axes;
+use super::prospect::automatic_direction;
 use super::{Camera, Projection};
 use crate::math::{Aabb, DVec3, Vec3};
 use crate::points::PointCloud;
@@ -57,7 +58,7 @@ pub fn frame(cloud: &PointCloud, framing: &Framing) -> Camera {
 }
 
 /// A camera that looks along `forward` at all of `points`, and is relative to the same zero.
-fn fit_along(forward: DVec3, points: &[Vec3], framing: &Framing) -> Camera {
+pub(super) fn fit_along(forward: DVec3, points: &[Vec3], framing: &Framing) -> Camera {
     let view_up = upright(framing.up, forward);
     let axes = Camera {
         position: DVec3::ZERO,
@@ -106,56 +107,6 @@ fn sample(cloud: &PointCloud) -> Vec<Vec3> {
     let stride = cloud.len().div_ceil(MAX_SAMPLES).max(1);
     cloud.positions.iter().step_by(stride).copied().filter(|p| p.is_finite()).collect()
 }
-
-/// From the front, a little to the side; the flatter the cloud, the higher up. Land has no front: it is
-/// turned so that it fills the picture.
-fn automatic_direction(points: &[Vec3], framing: &Framing) -> DVec3 {
-    let (east, north) = ground_axes(framing.up);
-    let extent = |axis: Vec3| {
-        let along = points.iter().map(|p| p.dot(axis));
-        along.clone().fold(f32::MIN, f32::max) - along.fold(f32::MAX, f32::min)
-    };
-    let flatness = f64::from(extent(framing.up) / extent(east).max(extent(north)).max(1e-9));
-    let elevation_deg =
-        framing.elevation_deg.unwrap_or_else(|| 40.0 - 25.0 * (flatness / 0.6).min(1.0));
-    let azimuth_deg = if flatness < LAND {
-        filling_azimuth_deg(points, elevation_deg, framing)
-    } else {
-        FRONT_AZIMUTH_DEG
-    };
-    direction_from(azimuth_deg + framing.azimuth_deg, elevation_deg, framing.up)
-}
-
-/// Of places in the south, the one from which the whole cloud is seen from nearest by.
-fn filling_azimuth_deg(points: &[Vec3], elevation_deg: f64, framing: &Framing) -> f64 {
-    let some: Vec<Vec3> = points.iter().step_by(points.len().div_ceil(10_000)).copied().collect();
-    let distance = |azimuth_deg: f64| {
-        let forward = direction_from(azimuth_deg, elevation_deg, framing.up);
-        let camera = fit_along(forward, &some, framing);
-        match camera.projection {
-            Projection::Perspective { .. } => camera.position.distance(camera.focal_point),
-            Projection::Orthographic { height } => height,
-        }
-    };
-    let places = (0..12).map(|step| FRONT_AZIMUTH_DEG + 15.0 * f64::from(step) - 60.0);
-    let nearest = places.min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
-    nearest.unwrap_or(FRONT_AZIMUTH_DEG)
-}
-
-/// Direction of view from a place at this azimuth and height over the horizon.
-fn direction_from(azimuth_deg: f64, elevation_deg: f64, up: Vec3) -> DVec3 {
-    let (east, north) = ground_axes(up);
-    let (sin_azimuth, cos_azimuth) = azimuth_deg.to_radians().sin_cos();
-    let (sin_elevation, cos_elevation) = elevation_deg.to_radians().sin_cos();
-    let (east, north, up) = (east.as_dvec3(), north.as_dvec3(), up.as_dvec3());
-    -(cos_elevation * (sin_azimuth * east + cos_azimuth * north) + sin_elevation * up)
-}
-
-/// Height over width below which a cloud is land.
-const LAND: f64 = 0.25;
-
-/// The automatic camera stands in the south, a little to the east.
-const FRONT_AZIMUTH_DEG: f64 = 155.0;
 
 /// Eye, focal point and projection in the camera's own axes, so that all `points` are seen.
 fn fit(points: &[DVec3], framing: &Framing) -> (DVec3, DVec3, Projection) {

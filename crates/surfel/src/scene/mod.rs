@@ -4,6 +4,7 @@ mod camera;
 pub mod color;
 mod framing;
 mod light;
+mod prospect;
 
 pub use camera::{Camera, Projection, View};
 pub use framing::{Framing, frame, upright, usual_bounds};
