@@ -16,10 +16,10 @@ use surfel_formats::SaveOptions;
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// Folder for demo.laz and demo.png; made if it does not exist.
-    #[arg(short, long, value_name = "FOLDER", default_value = "demo")]
+    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
     /// Points of the scan, about.
-    #[arg(long, value_name = "N", default_value_t = 1_500_000,
+    #[arg(long, value_name = "N", default_value_t = 2_500_000,
         value_parser = clap::value_parser!(u64).range(1000..=100_000_000))]
     points: u64,
 }

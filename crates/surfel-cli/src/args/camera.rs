@@ -39,7 +39,8 @@ pub struct CameraArgs {
         allow_negative_numbers = true)]
     camera_elevation_angle: Option<f64>,
     /// Values above 1 bring the chosen camera nearer.
-    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = parse::positive)]
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = parse::positive,
+        conflicts_with = "camera_position")]
     camera_zoom_factor: f64,
     /// The axis that points up: +Z, -Y, x,y,z; found out from the cloud if not given.
     #[arg(long, value_name = "AXIS", value_parser = parse::up, allow_hyphen_values = true)]

@@ -17,10 +17,10 @@ use crate::error::Result;
 pub(super) fn write(path: &Path, image: &Image, options: &ImageOptions) -> Result<()> {
     let size = (image.width as usize, image.height as usize);
     let mut attributes = LayerAttributes::default();
-    // The format's own vectors are f32, too coarse for coordinates of national grids.
-    for (name, value) in ["originX", "originY", "originZ"].iter().zip(options.origin.to_array()) {
-        attributes.other.insert(Text::from(*name), AttributeValue::F64(value));
-    }
+    // As text: the format's own vectors are f32, too coarse for coordinates of national grids. One
+    // attribute only: several would be written in an order that changes from run to run.
+    let origin = options.origin.to_array().map(|coordinate| coordinate.to_string()).join(" ");
+    attributes.other.insert(Text::from("origin"), AttributeValue::Text(Text::from(&*origin)));
     let channels = AnyChannels::sort(channels(image).into_iter().collect());
     let layer = Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, channels);
     let picture = ExrImage::from_layer(layer);

@@ -78,9 +78,9 @@ fn exr_keeps_every_layer_and_the_origin() {
     assert_eq!(sample("instance").0, 7.0);
     assert_eq!(sample("albedo.G").0, 0.5);
     assert_eq!(sample("coverage").0, 0.75);
-    let origin_x = layer.attributes.other.iter().find(|(name, _)| **name == *"originX");
-    let expected = exr::meta::attribute::AttributeValue::F64(origin.x);
-    assert_eq!(origin_x.map(|(_, value)| value), Some(&expected));
+    let text = exr::meta::attribute::AttributeValue::Text("484800.123456 6632800 100".into());
+    let origin = layer.attributes.other.iter().find(|(name, _)| **name == *"origin");
+    assert_eq!(origin.map(|(_, value)| value), Some(&text));
 }
 
 #[test]

@@ -150,3 +150,20 @@ fn aligned_normals_survive_where_plain_means_cancel() {
     let (plain, aligned) = (mean_angle(SurfaceKind::SplatMean), mean_angle(SurfaceKind::Splat));
     assert!(aligned < 0.6 && 4.0 * aligned < plain, "mean {plain}, aligned {aligned}");
 }
+
+#[test]
+fn a_regular_lattice_has_no_holes() {
+    let lattice = (0..900).map(|i| Vec3::new((i % 30) as f32, (i / 30) as f32, 0.0)).collect();
+    let scene = scenes::flat(PointCloud::from_positions(lattice), SurfaceKind::Splat);
+    // From straight above and aslant, in line with the rows and not.
+    for eye in
+        [Vec3::new(14.5, 14.5, 30.0), Vec3::new(14.5, -10.0, 12.0), Vec3::new(40.0, -7.0, 9.0)]
+    {
+        let places =
+            (0..200 * 200).map(|i| Vec3::new((i % 200) as f32, (i / 200) as f32, 0.0) * 0.14 + 0.5);
+        let rays: Vec<Ray> =
+            places.map(|p| Ray::new(eye, (p.with_z(0.0) - eye).normalize())).collect();
+        let holes = hits(&scene, &rays).iter().filter(|hit| hit.is_miss()).count();
+        assert_eq!(holes, 0, "seen from {eye}, of {}", rays.len());
+    }
+}

@@ -1,7 +1,9 @@
 //! Direct light: sun with shadows, sky with occlusion, headlight, on matte surfaces.
 
+use crate::error::Result;
 use crate::flat::FlatScene;
 use crate::math::{Frame, Ray, Vec3, cosine_hemisphere, hash, scrambled_pair, uniform_cone};
+use crate::progress::Progress;
 use crate::scene::{Light, Material, Sky, Sun};
 use crate::trace::{self, Simd, SurfaceHit};
 
@@ -16,14 +18,6 @@ pub struct Samples<'a> {
     pub n_light: u32,
 }
 
-/// What one ray brings back.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Radiance {
-    /// Linear; zero where nothing was hit.
-    pub color: Vec3,
-    pub hit: SurfaceHit,
-}
-
 /// Rays traced, by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RayCounts {
@@ -32,24 +26,28 @@ pub struct RayCounts {
     pub sky: u64,
 }
 
-/// Shades the hits of `rays`, one result a ray; the hits are traced by the caller.
-pub fn radiance(
-    scene: &FlatScene,
-    simd: Simd,
-    rays: &[Ray],
-    hits: &[SurfaceHit],
-    samples: Samples,
-) -> (Vec<Radiance>, RayCounts) {
+/// A batch of camera rays and what they hit.
+#[derive(Clone, Copy)]
+pub struct Batch<'a> {
+    pub scene: &'a FlatScene,
+    pub simd: Simd,
+    pub rays: &'a [Ray],
+    pub hits: &'a [SurfaceHit],
+    pub samples: Samples<'a>,
+}
+
+/// Shades the hits of a batch: linear colours, one a ray, black where nothing was hit.
+pub fn radiance(batch: &Batch, progress: &dyn Progress) -> Result<(Vec<Vec3>, RayCounts)> {
+    let Batch { scene, rays, hits, .. } = *batch;
     let mut counts = RayCounts { primary: rays.len() as u64, ..RayCounts::default() };
+    if scene.material == Material::Unlit {
+        return Ok((hits.iter().map(|hit| hit.color).collect(), counts));
+    }
     let mut light = vec![Vec3::ZERO; rays.len()];
     for source in &scene.lights {
         match source {
-            Light::Sun(sun) => {
-                counts.shadow += add_sun(scene, simd, sun, rays, hits, samples, &mut light)
-            }
-            Light::Sky(sky) => {
-                counts.sky += add_sky(scene, simd, sky, rays, hits, samples, &mut light)
-            }
+            Light::Sun(sun) => counts.shadow += batch.add_sun(sun, &mut light, progress)?,
+            Light::Sky(sky) => counts.sky += batch.add_sky(sky, &mut light, progress)?,
             Light::Headlight(strength) => {
                 for ((light, hit), ray) in light.iter_mut().zip(hits).zip(rays) {
                     *light += strength * hit.normal.dot(-ray.direction).max(0.0);
@@ -57,106 +55,98 @@ pub fn radiance(
             }
         }
     }
-    let shade = |(hit, light): (&SurfaceHit, Vec3)| {
-        let lit = if scene.material == Material::Unlit { Vec3::ONE } else { light };
-        Radiance { color: hit.color * lit, hit: *hit }
-    };
-    (hits.iter().zip(light).map(shade).collect(), counts)
+    Ok((hits.iter().zip(light).map(|(hit, light)| hit.color * light).collect(), counts))
 }
 
 /// Random dimensions, so that no two uses share numbers.
 const SKY_DIRECTION: u64 = 1;
 const SKY_REACH: u64 = 2;
 const SUN_DIRECTION: u64 = 3;
+/// Light rays traced at once, about: bounds their memory however many a hit asks for.
+const LIGHT_RAYS_AT_ONCE: u32 = 1 << 14;
 
-fn add_sun(
-    scene: &FlatScene,
-    simd: Simd,
-    sun: &Sun,
-    rays: &[Ray],
-    hits: &[SurfaceHit],
-    samples: Samples,
-    light: &mut [Vec3],
-) -> u64 {
-    let frame = Frame::around(sun.direction);
-    let cos_max = (sun.angular_diameter_deg.to_radians() / 2.0).cos();
-    let is_point = sun.angular_diameter_deg <= 0.0;
-    let samples = if is_point { Samples { n_light: 1, ..samples } } else { samples };
-    let mut shadows = LightRays::default();
-    shadows.collect(scene, rays, hits, samples, |key, index, normal| {
-        let direction = if is_point {
-            sun.direction
-        } else {
-            frame.to_world(uniform_cone(scrambled_pair(index, hash(key ^ SUN_DIRECTION)), cos_max))
+/// A ray toward a light: direction, range, and what it brings if it arrives.
+struct LightRay {
+    direction: Vec3,
+    reach: f32,
+    brings: Vec3,
+}
+
+impl Batch<'_> {
+    fn add_sun(&self, sun: &Sun, light: &mut [Vec3], progress: &dyn Progress) -> Result<u64> {
+        let frame = Frame::around(sun.direction);
+        let cos_max = (sun.angular_diameter_deg.to_radians() / 2.0).cos();
+        let is_point = sun.angular_diameter_deg <= 0.0;
+        let n_light = if is_point { 1 } else { self.samples.n_light };
+        let sample = |key: u64, index: u32, normal: Vec3| {
+            let direction = if is_point {
+                sun.direction
+            } else {
+                let uv = scrambled_pair(index, hash(key ^ SUN_DIRECTION));
+                frame.to_world(uniform_cone(uv, cos_max))
+            };
+            let cos = normal.dot(direction);
+            let ray = LightRay { direction, reach: f32::INFINITY, brings: cos * sun.color };
+            (0.0 < cos).then_some(ray)
         };
-        let cos = normal.dot(direction);
-        (0.0 < cos).then_some((direction, f32::INFINITY, cos * sun.color))
-    });
-    shadows.deliver(scene, simd, samples.n_light, light)
-}
-
-fn add_sky(
-    scene: &FlatScene,
-    simd: Simd,
-    sky: &Sky,
-    rays: &[Ray],
-    hits: &[SurfaceHit],
-    samples: Samples,
-    light: &mut [Vec3],
-) -> u64 {
-    let mut shadows = LightRays::default();
-    shadows.collect(scene, rays, hits, samples, |key, index, normal| {
-        let local = cosine_hemisphere(scrambled_pair(index, hash(key ^ SKY_DIRECTION)));
-        let direction = Frame::around(normal).to_world(local);
-        // A reach drawn evenly up to the farthest makes an occluder count linearly with its nearness.
-        let reach = sky.reach * (1.0 - scrambled_pair(index, hash(key ^ SKY_REACH)).0);
-        Some((direction, reach, sky.radiance(direction)))
-    });
-    shadows.deliver(scene, simd, samples.n_light, light)
-}
-
-/// A batch of rays toward a light, with what each brings if it arrives.
-#[derive(Default)]
-struct LightRays {
-    rays: Vec<Ray>,
-    brings: Vec<(u32, Vec3)>,
-}
-
-impl LightRays {
-    /// Asks `sample(pixel key, sample index, normal)` for direction, range and light of each ray.
-    fn collect(
-        &mut self,
-        scene: &FlatScene,
-        rays: &[Ray],
-        hits: &[SurfaceHit],
-        samples: Samples,
-        sample: impl Fn(u64, u32, Vec3) -> Option<(Vec3, f32, Vec3)>,
-    ) {
-        if scene.material == Material::Unlit {
-            return;
-        }
-        for (i, hit) in hits.iter().enumerate().filter(|(_, hit)| !hit.is_miss()) {
-            let position = rays[i].at(hit.distance);
-            for n in 0..samples.n_light {
-                let index = samples.indices[i] * samples.n_light + n;
-                if let Some((direction, reach, light)) = sample(samples.keys[i], index, hit.normal)
-                {
-                    let ray = scene.surface.spawn_ray(position, hit.normal, hit.radius, direction);
-                    self.rays.push(Ray { t_max: reach, ..ray });
-                    self.brings.push((i as u32, light));
-                }
-            }
-        }
+        self.add_light(n_light, sample, light, progress)
     }
 
-    /// Adds the light of the rays that arrive; returns how many were traced.
-    fn deliver(self, scene: &FlatScene, simd: Simd, n_light: u32, light: &mut [Vec3]) -> u64 {
-        let mut occluded = vec![false; self.rays.len()];
-        trace::occlusions(scene, simd, &self.rays, &mut occluded);
+    fn add_sky(&self, sky: &Sky, light: &mut [Vec3], progress: &dyn Progress) -> Result<u64> {
+        let sample = |key: u64, index: u32, normal: Vec3| {
+            let local = cosine_hemisphere(scrambled_pair(index, hash(key ^ SKY_DIRECTION)));
+            let direction = Frame::around(normal).to_world(local);
+            // A reach drawn evenly up to the farthest makes an occluder count linearly with its nearness.
+            let reach = sky.reach * (1.0 - scrambled_pair(index, hash(key ^ SKY_REACH)).0);
+            Some(LightRay { direction, reach, brings: sky.radiance(direction) })
+        };
+        self.add_light(self.samples.n_light, sample, light, progress)
+    }
+
+    /// Asks `sample(pixel key, sample index, normal)` for `n_light` rays from each hit and adds what
+    /// arrives to `light`; returns how many were traced.
+    fn add_light(
+        &self,
+        n_light: u32,
+        sample: impl Fn(u64, u32, Vec3) -> Option<LightRay>,
+        light: &mut [Vec3],
+        progress: &dyn Progress,
+    ) -> Result<u64> {
+        let mut n_rays = 0;
+        let (mut rays, mut brings, mut occluded) = (Vec::new(), Vec::new(), Vec::new());
         let share = 1.0 / n_light as f32;
-        for ((i, brings), _) in self.brings.iter().zip(occluded).filter(|(_, occluded)| !occluded) {
-            light[*i as usize] += share * *brings;
+        let hits_at_once = (LIGHT_RAYS_AT_ONCE / n_light).max(1) as usize;
+        for first in (0..self.hits.len()).step_by(hits_at_once) {
+            progress.check()?;
+            rays.clear();
+            brings.clear();
+            for i in first..self.hits.len().min(first + hits_at_once) {
+                let (ray, hit) = (&self.rays[i], &self.hits[i]);
+                if hit.is_miss() {
+                    continue;
+                }
+                let position = ray.at(hit.distance);
+                for n in 0..n_light {
+                    let index = self.samples.indices[i] * n_light + n;
+                    let sampled = sample(self.samples.keys[i], index, hit.normal);
+                    let Some(LightRay { direction, reach, brings: light }) = sampled else {
+                        continue;
+                    };
+                    let surface = self.scene.surface;
+                    let ray = surface.spawn_ray(position, hit.normal, hit.radius, direction);
+                    rays.push(Ray { t_max: reach, ..ray });
+                    brings.push((i, share * light));
+                }
+            }
+            occluded.clear();
+            occluded.resize(rays.len(), false);
+            trace::occlusions(self.scene, self.simd, &rays, &mut occluded);
+            for ((i, brings), _) in brings.iter().zip(&occluded).filter(|(_, occluded)| !**occluded)
+            {
+                light[*i] += *brings;
+            }
+            n_rays += rays.len() as u64;
         }
-        self.rays.len() as u64
+        Ok(n_rays)
     }
 }

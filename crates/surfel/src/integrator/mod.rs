@@ -2,4 +2,4 @@
 
 mod direct;
 
-pub use direct::{Radiance, RayCounts, Samples, radiance};
+pub use direct::{Batch, RayCounts, Samples, radiance};

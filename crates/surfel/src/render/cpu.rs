@@ -4,7 +4,7 @@ use super::{RenderStats, Renderer, Settings, raster};
 use crate::error::Result;
 use crate::flat::FlatScene;
 use crate::image::{Image, NO_ID};
-use crate::integrator::{self, RayCounts, Samples};
+use crate::integrator::{self, Batch, RayCounts, Samples};
 use crate::math::{Ray, Vec3, hash, scrambled_pair};
 use crate::progress::Progress;
 use crate::scene::View;
@@ -62,10 +62,10 @@ impl CpuRenderer {
         let mut image = Image::new(settings.width, settings.height);
         let mut stats = RenderStats::default();
         let tiles = TilePlace::all(settings);
+        let job = Job { scene, simd: self.simd, view, settings, progress };
         for tiles in tiles.chunks(TILES_AT_ONCE) {
             let render = |place: &TilePlace| {
-                progress.check()?;
-                let tile = Tile::render(scene, self.simd, view, settings, *place);
+                let tile = Tile::render(&job, *place)?;
                 progress.advance(place.n_pixels() as u64);
                 Ok(tile)
             };
@@ -79,6 +79,15 @@ impl CpuRenderer {
         }
         Ok((image, stats))
     }
+}
+
+/// What all tiles share.
+struct Job<'a> {
+    scene: &'a FlatScene,
+    simd: Simd,
+    view: &'a View,
+    settings: &'a Settings,
+    progress: &'a dyn Progress,
 }
 
 /// Where a tile lies.
@@ -130,13 +139,8 @@ struct LayerPixel {
 }
 
 impl Tile {
-    fn render(
-        scene: &FlatScene,
-        simd: Simd,
-        view: &View,
-        settings: &Settings,
-        place: TilePlace,
-    ) -> Self {
+    fn render(job: &Job, place: TilePlace) -> Result<Self> {
+        let Job { scene, settings, .. } = *job;
         let n = place.n_pixels();
         let mut tile = Self {
             place,
@@ -149,7 +153,9 @@ impl Tile {
         let n_samples = settings.samples_per_pixel;
         let at_once = (BATCH / n as u32).clamp(1, n_samples);
         for first in (0..n_samples).step_by(at_once as usize) {
-            tile.add_samples(scene, simd, view, settings, first..n_samples.min(first + at_once));
+            job.progress.check()?;
+            let numbers = first..n_samples.min(first + at_once);
+            tile.add_samples(job, numbers)?;
         }
         for (i, (_, y)) in place.pixels().enumerate() {
             let behind = scene.background.at((y as f32 + 0.5) / settings.height as f32);
@@ -160,20 +166,14 @@ impl Tile {
             tile.coverage[i] /= n_samples as f32;
         }
         if settings.with_layers {
-            tile.trace_layers(scene, simd, view);
+            tile.trace_layers(job);
         }
-        tile
+        Ok(tile)
     }
 
     /// Adds up the camera rays of these numbers of all pixels.
-    fn add_samples(
-        &mut self,
-        scene: &FlatScene,
-        simd: Simd,
-        view: &View,
-        settings: &Settings,
-        numbers: std::ops::Range<u32>,
-    ) {
+    fn add_samples(&mut self, job: &Job, numbers: std::ops::Range<u32>) -> Result<()> {
+        let Job { scene, simd, view, settings, progress } = *job;
         let per_pixel = numbers.len();
         let (mut rays, mut keys, mut indices) = (Vec::new(), Vec::new(), Vec::new());
         for (x, y) in self.place.pixels() {
@@ -195,11 +195,11 @@ impl Tile {
         self.trace_secs += start.elapsed().as_secs_f64();
         let n_light = settings.light_samples.div_ceil(settings.samples_per_pixel);
         let samples = Samples { keys: &keys, indices: &indices, n_light };
-        let (results, counts) = integrator::radiance(scene, simd, &rays, &hits, samples);
-        for (i, result) in results.iter().enumerate().filter(|(_, result)| !result.hit.is_miss()) {
+        let batch = Batch { scene, simd, rays: &rays, hits: &hits, samples };
+        let (colors, counts) = integrator::radiance(&batch, progress)?;
+        for (i, color) in colors.iter().enumerate().filter(|(i, _)| !hits[*i].is_miss()) {
             let pixel = i / per_pixel;
-            let color = result.color.extend(1.0).to_array();
-            for (sum, channel) in self.color[pixel].iter_mut().zip(color) {
+            for (sum, channel) in self.color[pixel].iter_mut().zip(color.extend(1.0).to_array()) {
                 *sum += channel;
             }
             self.coverage[pixel] += 1.0;
@@ -207,9 +207,11 @@ impl Tile {
         self.counts.primary += counts.primary;
         self.counts.shadow += counts.shadow;
         self.counts.sky += counts.sky;
+        Ok(())
     }
 
-    fn trace_layers(&mut self, scene: &FlatScene, simd: Simd, view: &View) {
+    fn trace_layers(&mut self, job: &Job) {
+        let Job { scene, simd, view, .. } = *job;
         let rays: Vec<Ray> =
             self.place.pixels().map(|(x, y)| view.ray(x as f32 + 0.5, y as f32 + 0.5)).collect();
         let mut hits = vec![SurfaceHit::MISS; rays.len()];
