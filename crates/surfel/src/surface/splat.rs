@@ -38,20 +38,41 @@ pub fn gather_limit(distance: f32, radius: f32) -> f32 {
 }
 
 /// Unit normal facing against `direction`, and colour, of the surface that `hits` (nearest first) describe.
+///
+/// The thesis turns each normal toward the ray's origin on its own. On a silhouette that turns the discs
+/// behind the bend inside out; here the nearest one is turned, and the others follow it.
 pub fn blend(kind: SurfaceKind, hits: &[Gathered], direction: Vec3) -> (Vec3, Vec3) {
-    let facing = |normal: Vec3| if 0.0 < normal.dot(direction) { -normal } else { normal };
+    let nearest = turned_with(hits[0].normal, -direction);
     let (mut normal, mut color, mut total) = (Vec3::ZERO, Vec3::ZERO, 0.0);
     for hit in hits {
         let weight = (1.0 - hit.position.distance(hit.center) / hit.radius).max(1e-4);
-        normal += weight * if kind == SurfaceKind::Splat { facing(hit.normal) } else { hit.normal };
+        let is_aligned = kind == SurfaceKind::Splat;
+        normal += weight * if is_aligned { turned_with(hit.normal, nearest) } else { hit.normal };
         color += weight * hit.color;
         total += weight;
     }
-    if kind == SurfaceKind::SplatFit {
-        normal = plane_normal(hits).unwrap_or(hits[0].normal);
-    }
     // Opposite normals may cancel in splat-mean; the nearest disc's own is then as good as any.
-    (facing(normal.try_normalize().unwrap_or(hits[0].normal)), color / total)
+    let normal = match kind {
+        SurfaceKind::Splat => facing(normal.normalize_or(nearest), direction),
+        SurfaceKind::SplatFit => turned_with(plane_normal(hits).unwrap_or(nearest), -direction),
+        _ => turned_with(normal.normalize_or(nearest), -direction),
+    };
+    (normal, color / total)
+}
+
+/// `normal` with the sign that it shares with `guide`.
+fn turned_with(normal: Vec3, guide: Vec3) -> Vec3 {
+    if normal.dot(guide) < 0.0 { -normal } else { normal }
+}
+
+/// A normal that leans away a little, over a bend, is only brought upright: turned around it would
+/// point inward.
+fn facing(normal: Vec3, direction: Vec3) -> Vec3 {
+    let away = normal.dot(direction);
+    if away <= 0.0 {
+        return normal;
+    }
+    (normal - away * direction).try_normalize().unwrap_or(-direction)
 }
 
 /// Normal of the plane through the gathered points, if they span one.
