@@ -5,9 +5,7 @@ mod disc;
 mod sphere;
 mod splat;
 
-pub use boundary::{
-    Candidate, MAX_NEIGHBORS, NEIGHBOR_REACH, Neighbor, Surroundings, surroundings,
-};
+pub use boundary::{Candidate, Judgement, NEIGHBOR_REACH, Surroundings};
 pub use disc::Disc;
 pub use sphere::Sphere;
 pub use splat::{Gathered, MAX_GATHERED, blend, gather_limit};
@@ -102,10 +100,10 @@ impl std::str::FromStr for SurfaceKind {
 
     fn from_str(text: &str) -> Result<Self, Error> {
         let known = Self::ALL.iter().find(|(name, _)| *name == text);
-        known.map(|(_, kind)| *kind).ok_or_else(|| Error::Setting {
-            name: "surface",
+        known.map(|(_, kind)| *kind).ok_or_else(|| Error::UnknownName {
+            kind: "surface",
             found: text.to_owned(),
-            expected: "points, sphere, disc, splat-mean, splat or splat-fit",
+            known: Self::ALL.map(|(name, _)| name).join(", "),
         })
     }
 }

@@ -1,28 +1,24 @@
-//! The points around a hit, collected for the angular-gap test.
+//! The points around a hit, shown to the angular-gap test.
 
 use super::traverse::{BallVisitor, around};
 use crate::flat::FlatPoints;
 use crate::math::{LaneMask, Lanes, Vec3, Vec3Lanes};
-use crate::surface::{
-    Candidate, MAX_NEIGHBORS, NEIGHBOR_REACH, Neighbor, Surroundings, surroundings,
-};
+use crate::surface::{Candidate, Judgement, NEIGHBOR_REACH, Surroundings};
 use std::ops::ControlFlow;
 
 /// Judges a hit at `position` by all points near it.
 #[inline(always)]
-pub fn judge<L: Lanes>(points: &FlatPoints, position: Vec3, hit: &Candidate) -> Surroundings {
+pub fn judge<L: Lanes>(points: &FlatPoints, position: Vec3, hit: &Candidate) -> Judgement {
     let reach = NEIGHBOR_REACH * hit.radius;
-    let neighbors = [Neighbor::NONE; MAX_NEIGHBORS];
-    let mut found = Neighborhood { position, reach, neighbors, n: 0 };
+    let mut found = Neighborhood { position, reach, surroundings: Surroundings::new(*hit) };
     around::<L>(points, position, reach, &mut found);
-    surroundings(hit, &found.neighbors[..found.n])
+    found.surroundings.judge()
 }
 
 struct Neighborhood {
     position: Vec3,
     reach: f32,
-    neighbors: [Neighbor; MAX_NEIGHBORS],
-    n: usize,
+    surroundings: Surroundings,
 }
 
 impl BallVisitor for Neighborhood {
@@ -40,11 +36,7 @@ impl BallVisitor for Neighborhood {
         while near != 0 {
             let lane = near.trailing_zeros() as usize;
             near &= near - 1;
-            if self.n == MAX_NEIGHBORS {
-                return ControlFlow::Break(());
-            }
-            self.neighbors[self.n] = Neighbor { offset: offsets[lane], normal: normals[lane] };
-            self.n += 1;
+            self.surroundings.add(offsets[lane], normals[lane]);
         }
         ControlFlow::Continue(())
     }

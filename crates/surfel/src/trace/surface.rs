@@ -6,7 +6,7 @@ use super::traverse::{RayVisitor, along_ray};
 use crate::flat::{FlatPoints, FlatScene};
 use crate::math::{Lanes, Ray, Vec3};
 use crate::surface::{
-    Boundary, Candidate, Disc, Gathered, MAX_GATHERED, Neighbor, Surroundings, blend, surroundings,
+    Boundary, Candidate, Disc, Gathered, Judgement, MAX_GATHERED, Surroundings, blend,
 };
 use std::ops::ControlFlow;
 
@@ -86,7 +86,7 @@ impl RayVisitor for OccluderSearch<'_> {
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
         let mut hits = BlockHits::find::<L, Disc>(points, block_idx, self.ray, self.ray.t_max);
         while let Some((hit, _)) = hits.next(points) {
-            if single_disc::<L>(self.scene, self.ray, &hit) != Surroundings::Outside {
+            if single_disc::<L>(self.scene, self.ray, &hit) != Judgement::Outside {
                 self.is_occluded = true;
                 return ControlFlow::Break(());
             }
@@ -100,7 +100,7 @@ impl RayVisitor for OccluderSearch<'_> {
 }
 
 #[inline(always)]
-fn single_disc<L: Lanes>(scene: &FlatScene, ray: &Ray, hit: &Hit) -> Surroundings {
+fn single_disc<L: Lanes>(scene: &FlatScene, ray: &Ray, hit: &Hit) -> Judgement {
     let disc = scene.points.gathered(hit.slot, ray.at(hit.distance));
     let radius = disc.radius / scene.surface.radius_factor();
     let normal = if 0.0 < disc.normal.dot(ray.direction) { -disc.normal } else { disc.normal };
@@ -148,8 +148,8 @@ fn surface_hit<L: Lanes>(scene: &FlatScene, ray: &Ray) -> SurfaceHit {
             discs,
             &Candidate { normal, direction: ray.direction, radius },
         ) {
-            Surroundings::Enclosed => return hit,
-            Surroundings::Edge if at_edge.is_miss() => at_edge = hit,
+            Judgement::Enclosed => return hit,
+            Judgement::Edge if at_edge.is_miss() => at_edge = hit,
             _ => {}
         }
         rest.t_min =
@@ -184,20 +184,16 @@ fn pierced_discs<L: Lanes>(
 /// On an even patch the pierced discs' own centres mostly surround the hit already, and more points
 /// only narrow gaps: then the search around the hit is saved.
 #[inline(always)]
-fn judge_gathered<L: Lanes>(
-    scene: &FlatScene,
-    discs: &[Gathered],
-    hit: &Candidate,
-) -> Surroundings {
+fn judge_gathered<L: Lanes>(scene: &FlatScene, discs: &[Gathered], hit: &Candidate) -> Judgement {
     const COS_EVEN: f32 = 0.8;
     let position = discs[0].position;
     if discs.iter().all(|disc| COS_EVEN < disc.normal.dot(hit.normal).abs()) {
-        let mut neighbors = [Neighbor::NONE; MAX_GATHERED];
-        for (neighbor, disc) in neighbors.iter_mut().zip(discs) {
-            *neighbor = Neighbor { offset: disc.center - position, normal: disc.normal };
+        let mut surroundings = Surroundings::new(*hit);
+        for disc in discs {
+            surroundings.add(disc.center - position, disc.normal);
         }
-        if surroundings(hit, &neighbors[..discs.len()]) == Surroundings::Enclosed {
-            return Surroundings::Enclosed;
+        if surroundings.judge() == Judgement::Enclosed {
+            return Judgement::Enclosed;
         }
     }
     judge::<L>(&scene.points, position, hit)
