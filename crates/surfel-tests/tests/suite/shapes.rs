@@ -167,3 +167,14 @@ fn a_regular_lattice_has_no_holes() {
         assert_eq!(holes, 0, "seen from {eye}, of {}", rays.len());
     }
 }
+
+#[test]
+fn small_radii_leave_no_holes_where_discs_still_overlap() {
+    // Radii of 0.85 spacings: a hit has fewer than four points in reach, too few to judge by.
+    let mut cloud = clouds::plane(50, 0.1, 12);
+    cloud.radii = Some(vec![0.85 * 0.04; cloud.len()]);
+    let scene = scenes::flat(cloud, SurfaceKind::Splat);
+    let rays = rays_from_above(0.9, 150);
+    let holes = hits(&scene, &rays).iter().filter(|hit| hit.is_miss()).count();
+    assert_eq!(holes, 0, "of {}", rays.len());
+}

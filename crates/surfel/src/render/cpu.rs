@@ -165,7 +165,7 @@ impl Tile {
             }
             tile.coverage[i] /= n_samples as f32;
         }
-        if settings.with_layers {
+        if settings.with_layers && n_samples > 1 {
             tile.trace_layers(job);
         }
         Ok(tile)
@@ -193,6 +193,9 @@ impl Tile {
         let mut hits = vec![SurfaceHit::MISS; rays.len()];
         trace::surface_hits(scene, simd, &rays, &mut hits);
         self.trace_secs += start.elapsed().as_secs_f64();
+        if settings.with_layers && settings.samples_per_pixel == 1 {
+            self.keep_layers(view, &rays, &hits);
+        }
         let n_light = settings.light_samples.div_ceil(settings.samples_per_pixel);
         let samples = Samples { keys: &keys, indices: &indices, n_light };
         let batch = Batch { scene, simd, rays: &rays, hits: &hits, samples };
@@ -211,17 +214,25 @@ impl Tile {
     }
 
     fn trace_layers(&mut self, job: &Job) {
-        let Job { scene, simd, view, .. } = *job;
-        let rays: Vec<Ray> =
-            self.place.pixels().map(|(x, y)| view.ray(x as f32 + 0.5, y as f32 + 0.5)).collect();
+        let rays: Vec<Ray> = self
+            .place
+            .pixels()
+            .map(|(x, y)| job.view.ray(x as f32 + 0.5, y as f32 + 0.5))
+            .collect();
         let mut hits = vec![SurfaceHit::MISS; rays.len()];
-        trace::surface_hits(scene, simd, &rays, &mut hits);
+        trace::surface_hits(job.scene, job.simd, &rays, &mut hits);
+        self.counts.primary += rays.len() as u64;
+        self.keep_layers(job.view, &rays, &hits);
+    }
+
+    /// Takes the layers from the rays through the pixels' centres.
+    fn keep_layers(&mut self, view: &View, rays: &[Ray], hits: &[SurfaceHit]) {
         let layer = |(ray, hit): (&Ray, &SurfaceHit)| {
             let position = if hit.is_miss() { Vec3::ZERO } else { ray.at(hit.distance) };
             let depth = if hit.is_miss() { f32::INFINITY } else { view.depth(position) };
             LayerPixel { depth, position, hit: *hit }
         };
-        self.layers = rays.iter().zip(&hits).map(layer).collect();
+        self.layers = rays.iter().zip(hits).map(layer).collect();
     }
 
     fn copy_to(&self, image: &mut Image, with_layers: bool) {

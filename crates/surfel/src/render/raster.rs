@@ -29,7 +29,8 @@ pub fn render(
                 progress.check()?;
                 progress.advance(1024);
             }
-            for lane in (0..LANES).filter(|lane| block.occupied() >> lane & 1 == 1) {
+            let occupied = block.occupied();
+            for lane in (0..LANES).filter(|lane| occupied >> lane & 1 == 1) {
                 let Some((x, y, depth)) = view.project(block.position(lane)) else { continue };
                 if (0.0..width as f32).contains(&x) && (0.0..height as f32).contains(&y) {
                     // The bits of positive floats are ordered as the floats are.

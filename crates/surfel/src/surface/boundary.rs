@@ -10,6 +10,11 @@ const THICKNESS: f32 = 0.8;
 const PASSED: f32 = 0.2;
 /// They contradict the hit's normal if theirs makes this cosine with it, or less.
 const CONTRARY: f32 = -0.5;
+/// With fewer points than this in reach one looks farther; at 8 the bunny's depths got worse by a sixth,
+/// at 4 radii of 0.85 spacings left holes.
+const SPARSE: u32 = 5;
+/// Fewer points than this are no surface.
+const FEWEST: u32 = 4;
 /// Sectors of the tangent plane in which the outermost points are remembered: gaps are exact, and
 /// any number of points takes the same room.
 const SECTORS: usize = 64;
@@ -92,8 +97,13 @@ impl Surroundings {
         }
     }
 
+    /// Whether there are too few points for a judgement.
+    pub fn is_sparse(&self) -> bool {
+        self.n_near < SPARSE
+    }
+
     pub fn judge(&self) -> Judgement {
-        if self.n_near < 4 || self.is_from_within() {
+        if self.n_near < FEWEST || self.is_from_within() {
             return Judgement::Outside;
         }
         // No two neighbouring octants empty: no gap reaches 135 degrees. Mostly so, and it saves the rest.

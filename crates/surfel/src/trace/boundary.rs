@@ -6,13 +6,25 @@ use crate::math::{LaneMask, Lanes, Vec3, Vec3Lanes};
 use crate::surface::{Candidate, Judgement, NEIGHBOR_REACH, Surroundings};
 use std::ops::ControlFlow;
 
+/// A neighbourhood with too few points to judge by is looked at once more this many times as wide.
+const WIDER: f32 = 2.0;
+
 /// Judges a hit at `position` by all points near it.
 #[inline(always)]
 pub fn judge<L: Lanes>(points: &FlatPoints, position: Vec3, hit: &Candidate) -> Judgement {
+    let found = look_around::<L>(points, position, *hit);
+    if !found.is_sparse() {
+        return found.judge();
+    }
+    look_around::<L>(points, position, Candidate { radius: WIDER * hit.radius, ..*hit }).judge()
+}
+
+#[inline(always)]
+fn look_around<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> Surroundings {
     let reach = NEIGHBOR_REACH * hit.radius;
-    let mut found = Neighborhood { position, reach, surroundings: Surroundings::new(*hit) };
+    let mut found = Neighborhood { position, reach, surroundings: Surroundings::new(hit) };
     around::<L>(points, position, reach, &mut found);
-    found.surroundings.judge()
+    found.surroundings
 }
 
 struct Neighborhood {
