@@ -23,6 +23,7 @@
 //! ```
 
 mod error;
+mod number;
 mod input;
 mod atomic;
 mod role;
@@ -36,6 +37,7 @@ mod ply;
 mod las;
 mod text;
 mod obj;
+mod extent;
 mod load;
 mod save;
 mod picture;
