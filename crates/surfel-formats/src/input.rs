@@ -32,16 +32,23 @@ impl<'a> Input<'a> {
             },
             source,
         };
-        let file = File::open(path).map_err(failed)?;
-        let metadata = file.metadata().map_err(failed)?;
-        if metadata.is_dir() {
+        // Asked before opening: to open a pipe is to wait for its writer.
+        let kind = std::fs::metadata(path).map_err(failed)?.file_type();
+        if !kind.is_file() {
+            let (found, advice) = if kind.is_dir() {
+                ("a folder", "name the files in it")
+            } else {
+                ("a pipe or device, not a regular file", "write it to a file first and name that")
+            };
             return Err(Error::Unsupported {
                 file: name,
                 action: "read",
-                found: "a folder".into(),
-                advice: "name the files in it",
+                found: found.into(),
+                advice,
             });
         }
+        let file = File::open(path).map_err(failed)?;
+        let metadata = file.metadata().map_err(failed)?;
         // An empty file cannot be mapped.
         if metadata.len() == 0 {
             return Ok(Self { name: name.into(), bytes: Bytes::Borrowed(&[]) });
