@@ -7,7 +7,7 @@ use surfel::progress::Progress;
 
 use crate::error::{Place, Result};
 use crate::input::Input;
-use crate::lines::{LineError, Rows, parse_number, read_rows};
+use crate::lines::{LONGEST_LINE, LineError, Rows, parse_number, read_rows};
 use crate::options::{LoadOptions, Loaded, Source, TextColumn};
 use crate::record::{ColumnField, Field, Kind, Layout};
 use crate::role::Role;
@@ -156,15 +156,17 @@ fn sample_rows(input: &Input, preamble: &Preamble) -> Vec<Vec<f64>> {
     let mut rows = Vec::new();
     for place in 0..PLACES {
         let from = data.len() * place / PLACES;
+        let near = &data[from..data.len().min(from + LONGEST_LINE)];
+        let is_cut = from + near.len() < data.len();
+        let end = if is_cut { memchr::memrchr(b'\n', near).unwrap_or(0) } else { near.len() };
         // A line is begun at its start, not where the place happens to fall into it.
-        let lines = data[from..].split(|byte| *byte == b'\n').skip(usize::from(0 < place));
+        let lines = near[..end].split(|byte| *byte == b'\n').skip(usize::from(0 < place));
         for line in lines.take(LINES) {
             let line = line.trim_ascii();
-            let fields = preamble.separator.fields(line);
-            let mut row: Vec<f64> =
+            let fields = preamble.separator.fields(line).take(preamble.n_fields);
+            let row: Vec<f64> =
                 fields.map(|field| parse_number(field).unwrap_or(f64::NAN)).collect();
-            if comment(line).is_none() && preamble.n_fields <= row.len() {
-                row.truncate(preamble.n_fields);
+            if comment(line).is_none() && row.len() == preamble.n_fields {
                 rows.push(row);
             }
         }

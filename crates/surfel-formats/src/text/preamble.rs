@@ -2,8 +2,10 @@
 
 use crate::error::{Error, Place, Result};
 use crate::input::Input;
-use crate::lines::parse_number;
+use crate::lines::{LONGEST_LINE, MOST_FIELDS, parse_number};
 use crate::role::Role;
+
+const NO_LINES: &str = "put each point on a line of its own";
 
 /// What stands before the first point, and the shape of its line.
 pub(super) struct Preamble {
@@ -61,7 +63,18 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
     let mut number = 0;
     while at < input.len() {
         let rest = &input[at..];
-        let length = memchr::memchr(b'\n', rest).map_or(rest.len(), |end| end + 1);
+        let near = &rest[..rest.len().min(LONGEST_LINE + 1)];
+        let end = memchr::memchr(b'\n', near).map(|end| end + 1);
+        if end.is_none() && near.len() < rest.len() {
+            let expected = format!("lines of at most {LONGEST_LINE} bytes");
+            return Err(input.malformed(
+                Place::Line(number + 1),
+                "a longer line",
+                expected,
+                NO_LINES,
+            ));
+        }
+        let length = end.unwrap_or(rest.len());
         // Some programs put a byte order mark before UTF-8.
         let line = rest[..length].trim_ascii();
         let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
@@ -76,6 +89,15 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
             continue;
         }
         let separator = Separator::of_line(text);
+        let has_too_many = separator.fields(text).nth(MOST_FIELDS).is_some();
+        if has_too_many && is_comment {
+            continue;
+        }
+        if has_too_many {
+            let found = format!("more than {MOST_FIELDS} fields");
+            let expected = format!("at most {MOST_FIELDS} in a line");
+            return Err(input.malformed(Place::Line(number), found, expected, NO_LINES));
+        }
         let fields: Vec<&[u8]> = separator.fields(text).collect();
         let is_names = names_of(&fields).is_some();
         if is_comment || is_names {

@@ -115,6 +115,40 @@ fn a_header_of_ply_that_lies_or_lacks_is_refused() {
     assert!(message("a.ply", fields).contains("line 9: found `x`"));
 }
 
+#[test]
+fn lines_too_long_to_be_points_are_refused_at_once() {
+    let wide = "1 ".repeat(500_000);
+    let long = "1 ".repeat(600_000);
+    assert!(message("a.xyz", &wide).contains("line 1: found more than 1000 fields"));
+    assert!(message("a.xyz", &long).contains("line 1: found a longer line"));
+    assert!(message("a.xyz", format!("1 2 3\n{wide}\n")).contains("found 500000 fields"));
+    assert!(message("a.xyz", format!("1 2 3\n{long}\n")).contains("a line of 1199999 bytes"));
+    assert!(message("a.xyz", format!("x y z {wide}\n1 2 3\n")).contains("1000 fields"));
+    let remark = format!("# {wide}\n1 2 3\n");
+    assert_eq!(read("a.xyz", remark).unwrap().cloud.len(), 1);
+    let thousand = "1 ".repeat(1000) + "\n";
+    assert_eq!(read("a.xyz", thousand).unwrap().cloud.scalars.len(), 997);
+    assert!(message("a.obj", format!("v 1 2 3\nv {long}\n")).contains("bytes"));
+
+    let properties = "property float a\n".repeat(1001);
+    let ply = format!("ply\nformat ascii 1.0\nelement vertex 1\n{properties}end_header\n");
+    assert!(message("a.ply", ply).contains("at most 1000 properties"));
+    assert!(message("a.ply", format!("ply\ncomment {long}\n")).contains("a longer line"));
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_are_refused_without_waiting() {
+    let folder = Folder::new("pipe");
+    let pipe = folder.path("pipe.ply");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for path in [pipe.as_path(), std::path::Path::new("/dev/null")] {
+        let error = load(path, &LoadOptions::default(), &Silent).unwrap_err().to_string();
+        assert!(error.contains("not a regular file"), "{error}");
+        assert!(error.contains("write it to a file first"), "{error}");
+    }
+}
+
 /// The file with some bytes replaced.
 fn with(mut bytes: Vec<u8>, at: usize, new: &[u8]) -> Vec<u8> {
     bytes[at..at + new.len()].copy_from_slice(new);
