@@ -22,15 +22,15 @@ enum Bytes<'a> {
 impl<'a> Input<'a> {
     pub fn open(path: &Path) -> Result<Self> {
         let name = path.display().to_string();
-        let failed = |source: io::Error| Error::Io {
+        let failed = |cause: io::Error| Error::Io {
             file: name.clone(),
             action: "read",
-            advice: match source.kind() {
+            advice: match cause.kind() {
                 io::ErrorKind::NotFound => "check the name and the folder",
                 io::ErrorKind::PermissionDenied => "ask for the right to read it",
                 _ => "check the disk and the connection to it",
             },
-            source,
+            cause,
         };
         // Asked before opening: to open a pipe is to wait for its writer.
         let kind = std::fs::metadata(path).map_err(failed)?.file_type();
