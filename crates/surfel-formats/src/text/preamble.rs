@@ -58,6 +58,8 @@ pub(super) fn comment(line: &[u8]) -> Option<&[u8]> {
 /// Reads up to the first line of numbers.
 pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
     let mut names = None;
+    // A comment may be a header or only speak of x, y and z: the data decides.
+    let mut comment_names = None;
     let mut count = None;
     let mut at = 0;
     let mut number = 0;
@@ -99,9 +101,12 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
             return Err(input.malformed(Place::Line(number), found, expected, NO_LINES));
         }
         let fields: Vec<&[u8]> = separator.fields(text).collect();
-        let is_names = names_of(&fields).is_some();
-        if is_comment || is_names {
-            names = names_of(&fields).or(names);
+        if is_comment {
+            comment_names = names_of(&fields).or(comment_names);
+            continue;
+        }
+        if let Some(header) = names_of(&fields) {
+            names = Some(header);
             continue;
         }
         if let ([field], None) = (&fields[..], count)
@@ -112,6 +117,10 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
         }
         if fields.iter().all(|field| field.is_empty() || parse_number(field).is_ok()) {
             let has_empty_end = fields.last().is_some_and(|field| field.is_empty());
+            let fits = |names: &Vec<String>| {
+                names.len() == fields.len() || has_empty_end && names.len() + 1 == fields.len()
+            };
+            let names = names.or(comment_names.filter(fits));
             let n_names = names.as_ref().map_or(fields.len() - 1, Vec::len);
             // A separator at the end of each line begins no further column.
             let n_fields = if has_empty_end { n_names } else { fields.len() };
