@@ -213,16 +213,15 @@ fn named_columns<'a>(
         })
         .fold(0.0, f64::max);
     let float_scale = if largest <= 1.0 { 65535.0 } else { 257.0 };
+    let names: Vec<&str> = fields.iter().map(|(name, ..)| *name).collect();
     let mut columns: Vec<ColumnField> = Vec::new();
-    for (name, mut field, kind) in fields {
-        let mut role = Role::of_name(name).unwrap_or_else(|| Role::Scalar(name.into()));
+    for (mut role, (name, mut field, kind)) in Role::of_names(&names).into_iter().zip(fields) {
         let is_class = |v: f64| v.fract() == 0.0 && (0.0..256.0).contains(&v);
         let holds_classes = || {
             let records = sample.chunks_exact(stride);
             records.into_iter().all(|record| is_class(field.value(record, big_endian)))
         };
-        let is_taken = columns.iter().any(|column| column.role == role);
-        if is_taken || (role == Role::Classification && kind != Kind::U8 && !holds_classes()) {
+        if role == Role::Classification && kind != Kind::U8 && !holds_classes() {
             role = Role::Scalar(name.into());
         }
         if let Role::Color(_) = role {

@@ -28,7 +28,7 @@ pub(crate) fn read(
     let sample = sample_rows(input, &preamble);
     let columns = match (&options.text_columns, &preamble.names) {
         (Some(stated), _) => stated.iter().map(|TextColumn(role)| role.clone()).collect(),
-        (None, Some(names)) => names.iter().map(|name| role_of_header(name)).collect(),
+        (None, Some(names)) => roles_of_header(names),
         (None, None) => {
             let (columns, description) = guess_columns(&sample, preamble.n_fields);
             progress.note(&format!(
@@ -62,11 +62,10 @@ pub(crate) fn read(
     Ok(Loaded { cloud, source })
 }
 
-fn role_of_header(name: &str) -> Option<Role> {
-    if Role::is_alpha(name) {
-        return None;
-    }
-    Some(Role::of_name(name).unwrap_or_else(|| Role::Scalar(name.into())))
+fn roles_of_header(names: &[String]) -> Vec<Option<Role>> {
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let roles = Role::of_names(&names).into_iter().zip(names);
+    roles.map(|(role, name)| (!Role::is_alpha(name)).then_some(role)).collect()
 }
 
 fn check_columns(input: &Input, columns: &[Option<Role>], preamble: &Preamble) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use surfel::points::PointCloud;
 use surfel::progress::Silent;
-use surfel_formats::{Error, LoadOptions, load, load_bytes};
+use surfel_formats::{Error, LoadOptions, check_output, load, load_bytes};
 
 use crate::common::{Folder, Listener, file_of, full_cloud, read};
 
@@ -74,6 +74,19 @@ fn empty_files_wrong_magic_and_absent_files_are_told() {
     assert!(failed("").contains("found a folder"));
     std::fs::write(folder.path("empty.las"), "").unwrap();
     assert!(failed("empty.las").contains("an empty file"));
+}
+
+#[test]
+fn the_words_of_the_system_stand_once_in_an_error() {
+    let folder = Folder::new("once");
+    let error = load(&folder.path("a.ply"), &LoadOptions::default(), &Silent).unwrap_err();
+    assert!(std::error::Error::source(&error).is_none());
+    assert_eq!(error.to_string().matches("os error").count(), 1, "{error}");
+
+    let out = folder.path("none/out.ply");
+    let error = check_output(&out).unwrap_err().to_string();
+    let missing = folder.path("none").display().to_string();
+    assert!(error.contains(&format!("no folder `{missing}`; create it first")), "{error}");
 }
 
 #[test]
@@ -174,6 +187,8 @@ fn headers_of_las_that_lie_are_refused() {
         assert!(changed(24, &[2, 0]).contains("LAS version 2.0"));
         assert!(changed(131, &0.0_f64.to_le_bytes()).contains("scales other than 0"));
         assert!(changed(155, &f64::NAN.to_le_bytes()).contains("finite"));
+        let huge = [1e300_f64.to_le_bytes(), 0.0_f64.to_le_bytes()].concat();
+        assert!(changed(131, &huge).contains("scale [1e300, 0,"));
         assert!(changed(100, &u32::MAX.to_le_bytes()).contains("variable length record"));
         // The length of the first record behind the header.
         assert!(changed(395, &[0xff, 0xff]).contains("variable length record"));
