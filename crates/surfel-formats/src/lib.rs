@@ -27,6 +27,7 @@ mod number;
 mod input;
 mod atomic;
 mod role;
+mod range;
 mod options;
 mod block;
 mod record;

@@ -9,9 +9,10 @@ use crate::error::{Place, Result};
 use crate::input::Input;
 use crate::lines::{LONGEST_LINE, LineError, Rows, parse_number, read_rows};
 use crate::options::{LoadOptions, Loaded, Source, TextColumn};
+use crate::range::ColorRange;
 use crate::record::{ColumnField, Field, Kind, Layout};
 use crate::role::Role;
-use guess::{color_scale, guess_columns, holds_classes};
+use guess::{color_range, guess_columns, holds_classes};
 use preamble::{Preamble, Separator, comment, read_preamble};
 
 pub(crate) fn inspect(input: &Input) -> Result<Source> {
@@ -97,16 +98,16 @@ fn column_fields(
 ) -> Vec<ColumnField> {
     let colors: Vec<usize> =
         kept.iter().filter(|(_, role)| matches!(role, Role::Color(_))).map(|(i, _)| *i).collect();
-    let (scale, range) = color_scale(sample, &colors);
-    if !colors.is_empty() && scale != 257.0 {
-        progress.note(&format!("{}: colours taken as {range}", input.name));
+    let range = color_range(sample, &colors);
+    if !colors.is_empty() && range != ColorRange::Bits8 {
+        progress.note(&format!("{}: colours taken as {}", input.name, range.words()));
     }
     let mut fields: Vec<ColumnField> = Vec::new();
     for (place, (column, role)) in kept.iter().enumerate() {
         let mut field = Field::new(8 * place, Kind::F64);
         let mut role = (*role).clone();
         if let Role::Color(_) = role {
-            field.scale = scale;
+            field.scale = range.scale();
         }
         if role == Role::Classification && !holds_classes(sample, *column) {
             role = Role::Scalar("classification".into());
