@@ -59,10 +59,8 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
             return Err(malformed("the end of the file", "`end_header`"));
         };
         if LONGEST_LINE < line.len() {
-            return Err(malformed(
-                "a longer line",
-                &format!("at most {LONGEST_LINE} bytes a line"),
-            ));
+            let start = String::from_utf8_lossy(&line[..80]);
+            return Err(malformed(&start, &format!("at most {LONGEST_LINE} bytes in a line")));
         }
         let line = String::from_utf8_lossy(line);
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
