@@ -24,9 +24,12 @@ pub(crate) fn write_file(
 }
 
 /// The error of a write to `path` that failed.
-pub(crate) fn write_failed(path: &Path, source: io::Error) -> Error {
-    let advice = match source.kind() {
-        io::ErrorKind::NotFound => "create the folder first",
+pub(crate) fn write_failed(path: &Path, cause: io::Error) -> Error {
+    let file = path.display().to_string();
+    let advice = match cause.kind() {
+        io::ErrorKind::NotFound => {
+            return Error::NoFolder { file, folder: folder_of(path).display().to_string() };
+        }
         io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
             "choose a folder you may write to"
         }
@@ -34,9 +37,16 @@ pub(crate) fn write_failed(path: &Path, source: io::Error) -> Error {
             "free space there or write elsewhere"
         }
         io::ErrorKind::IsADirectory => "name a file, not a folder",
+        io::ErrorKind::NotADirectory => "name a file in a folder, not in a file",
         _ => "check the disk and the connection to it",
     };
-    Error::Io { file: path.display().to_string(), action: "written", source, advice }
+    Error::Io { file, action: "written", cause, advice }
+}
+
+/// The folder that a file of this name is in.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    folder.unwrap_or(Path::new("."))
 }
 
 /// Removes the file aside; after the rename there is none left to remove.

@@ -1,7 +1,7 @@
 //! Parts of a cloud's columns that threads fill side by side.
 
 use surfel::math::Vec3;
-use surfel::points::{PointCloud, Scalar, Values};
+use surfel::points::{PointCloud, Values};
 
 /// The same points of every column.
 #[derive(Default)]
@@ -126,83 +126,6 @@ pub(crate) fn shrink(cloud: &mut PointCloud) {
     }
 }
 
-/// Adds the points of `other` behind those of `cloud`; columns that one of them lacks are dropped.
-///
-/// Returns the names of the dropped columns. Both clouds have the same origin.
-pub(crate) fn append(cloud: &mut PointCloud, mut other: PointCloud) -> Vec<String> {
-    fn join<T>(
-        name: &str,
-        column: &mut Option<Vec<T>>,
-        other: Option<Vec<T>>,
-        dropped: &mut Vec<String>,
-    ) {
-        match (&mut *column, other) {
-            (Some(column), Some(mut other)) => column.append(&mut other),
-            (None, None) => {}
-            _ => {
-                *column = None;
-                dropped.push(name.into());
-            }
-        }
-    }
-    let mut dropped = Vec::new();
-    cloud.positions.append(&mut other.positions);
-    join("normals", &mut cloud.normals, other.normals, &mut dropped);
-    join("radii", &mut cloud.radii, other.radii, &mut dropped);
-    join("colors", &mut cloud.colors, other.colors, &mut dropped);
-    join("intensity", &mut cloud.intensity, other.intensity, &mut dropped);
-    join("classification", &mut cloud.classification, other.classification, &mut dropped);
-    cloud.scalars.retain_mut(|Scalar { name, values }| {
-        let twin = other.scalars.iter().position(|scalar| scalar.name.eq_ignore_ascii_case(name));
-        let Some(twin) = twin.map(|at| other.scalars.swap_remove(at)) else {
-            dropped.push(std::mem::take(name));
-            return false;
-        };
-        append_values(values, twin.values);
-        true
-    });
-    dropped.extend(other.scalars.into_iter().map(|scalar| scalar.name));
-    dropped
-}
-
-fn append_values(values: &mut Values, other: Values) {
-    match (&mut *values, other) {
-        (Values::U8(v), Values::U8(mut w)) => v.append(&mut w),
-        (Values::U16(v), Values::U16(mut w)) => v.append(&mut w),
-        (Values::I32(v), Values::I32(mut w)) => v.append(&mut w),
-        (Values::F32(v), Values::F32(mut w)) => v.append(&mut w),
-        // Files that store the same column in different types meet in the widest.
-        (v, w) => {
-            let wide = |values: &Values| (0..values.len()).map(|i| values.get(i)).collect();
-            let mut all: Vec<f64> = wide(v);
-            all.append(&mut wide(&w));
-            *values = Values::F64(all);
-        }
-    }
-}
-
 fn front<'a, T>(column: &mut &'a mut [T], n: usize) -> &'a mut [T] {
     column.split_off_mut(..n).unwrap_or_default()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn appending_keeps_common_columns_and_names_the_others() {
-        let scalar = |name: &str, values| Scalar { name: name.into(), values };
-        let mut cloud = PointCloud::from_positions(vec![Vec3::ZERO]);
-        cloud.radii = Some(vec![1.0]);
-        cloud.scalars =
-            vec![scalar("time", Values::F32(vec![0.5])), scalar("a", Values::U8(vec![1]))];
-        let mut other = PointCloud::from_positions(vec![Vec3::ONE]);
-        other.colors = Some(vec![[1, 2, 3]]);
-        other.scalars = vec![scalar("Time", Values::F64(vec![0.25]))];
-
-        let dropped = append(&mut cloud, other);
-        assert_eq!(dropped, ["radii", "colors", "a"]);
-        assert_eq!(cloud.len(), 2);
-        assert_eq!(cloud.scalars, [scalar("time", Values::F64(vec![0.5, 0.25]))]);
-    }
 }

@@ -5,8 +5,11 @@ use std::io;
 
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    #[error("{file}: cannot be {action}: {source}; {advice}")]
-    Io { file: String, action: &'static str, source: io::Error, advice: &'static str },
+    // Not named `source`: programs that print the chain of sources would print it a second time.
+    #[error("{file}: cannot be {action}: {cause}; {advice}")]
+    Io { file: String, action: &'static str, cause: io::Error, advice: &'static str },
+    #[error("{file}: cannot be written: there is no folder `{folder}`; create it first")]
+    NoFolder { file: String, folder: String },
     #[error("{file}: {place}: found {found}, expected {expected}; {advice}")]
     Malformed { file: String, place: Place, found: String, expected: String, advice: &'static str },
     #[error(

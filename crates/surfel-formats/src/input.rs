@@ -22,26 +22,33 @@ enum Bytes<'a> {
 impl<'a> Input<'a> {
     pub fn open(path: &Path) -> Result<Self> {
         let name = path.display().to_string();
-        let failed = |source: io::Error| Error::Io {
+        let failed = |cause: io::Error| Error::Io {
             file: name.clone(),
             action: "read",
-            advice: match source.kind() {
+            advice: match cause.kind() {
                 io::ErrorKind::NotFound => "check the name and the folder",
                 io::ErrorKind::PermissionDenied => "ask for the right to read it",
                 _ => "check the disk and the connection to it",
             },
-            source,
+            cause,
         };
-        let file = File::open(path).map_err(failed)?;
-        let metadata = file.metadata().map_err(failed)?;
-        if metadata.is_dir() {
+        // Asked before opening: to open a pipe is to wait for its writer.
+        let kind = std::fs::metadata(path).map_err(failed)?.file_type();
+        if !kind.is_file() {
+            let (found, advice) = if kind.is_dir() {
+                ("a folder", "name the files in it")
+            } else {
+                ("a pipe or device, not a regular file", "write it to a file first and name that")
+            };
             return Err(Error::Unsupported {
                 file: name,
                 action: "read",
-                found: "a folder".into(),
-                advice: "name the files in it",
+                found: found.into(),
+                advice,
             });
         }
+        let file = File::open(path).map_err(failed)?;
+        let metadata = file.metadata().map_err(failed)?;
         // An empty file cannot be mapped.
         if metadata.len() == 0 {
             return Ok(Self { name: name.into(), bytes: Bytes::Borrowed(&[]) });

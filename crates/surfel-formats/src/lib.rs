@@ -23,9 +23,11 @@
 //! ```
 
 mod error;
+mod number;
 mod input;
 mod atomic;
 mod role;
+mod range;
 mod options;
 mod block;
 mod record;
@@ -36,6 +38,7 @@ mod ply;
 mod las;
 mod text;
 mod obj;
+mod extent;
 mod load;
 mod save;
 mod picture;

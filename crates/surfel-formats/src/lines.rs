@@ -15,6 +15,11 @@ use crate::records::{Tolerance, grow_checked, origin_of_records};
 const BYTES_PER_TASK: usize = 1 << 18;
 const TASKS_PER_BATCH: usize = 32;
 
+/// Longer lines, and lines of more fields, are not text that holds points: they are refused before
+/// memory goes into them.
+pub(crate) const LONGEST_LINE: usize = 1 << 20;
+pub(crate) const MOST_FIELDS: usize = 1000;
+
 /// Which lines to read.
 pub(crate) struct Rows {
     /// First byte, and the number of its line.
@@ -102,6 +107,14 @@ pub(crate) fn parse_number(word: &[u8]) -> std::result::Result<f64, LineError> {
     })
 }
 
+fn check_length(line: &[u8]) -> std::result::Result<(), LineError> {
+    if line.len() <= LONGEST_LINE {
+        return Ok(());
+    }
+    let expected = format!("lines of at most {LONGEST_LINE} bytes");
+    Err(LineError { found: format!("a line of {} bytes", line.len()), expected })
+}
+
 struct Parsed {
     /// Rows of little-endian f64.
     records: Vec<u8>,
@@ -136,7 +149,7 @@ fn parse_text(text: &[u8], parse: ParseLine, n_columns: usize) -> Parsed {
             continue;
         }
         row.clear();
-        if let Err(error) = parse(line, &mut row) {
+        if let Err(error) = check_length(line).and_then(|()| parse(line, &mut row)) {
             parsed.error = Some(error);
             break;
         }

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use surfel::points::merge;
 use surfel::progress::Progress;
 
-use crate::block::append;
 use crate::error::{Error, Place, Result};
+use crate::extent::Extent;
 use crate::input::Input;
 use crate::options::{LoadOptions, Loaded, Source};
 use crate::{las, obj, ply, text};
@@ -28,36 +29,47 @@ pub fn load_bytes(
     read(&Input::of_bytes(name, bytes), options, progress)
 }
 
-/// Reads several files to one cloud about the origin of the first; the sources are in their order.
+/// Reads several files to one cloud about the origin of the largest; the sources are in their order.
 ///
-/// Columns that some of the files lack are dropped, and `progress` is told which.
+/// Columns that some of the files lack are dropped; `progress` is told which, and where the common
+/// origin is too far from a file's points to keep their resolution.
 pub fn load_all(
     paths: &[PathBuf],
     options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<(Loaded, Vec<Source>)> {
-    let (first, others) = paths.split_first().ok_or(Error::NoInput)?;
-    let mut all = load(first, options, progress)?;
-    let mut sources = vec![all.source.clone()];
-    let options = LoadOptions { origin: Some(all.cloud.origin), ..options.clone() };
-    for path in others {
-        let Loaded { cloud, source } = load(path, &options, progress)?;
-        let dropped = append(&mut all.cloud, cloud);
-        if !dropped.is_empty() {
-            let dropped = dropped.join(", ");
-            progress.note(&format!("{}: not in all files, dropped: {dropped}", path.display()));
+    let first = paths.first().ok_or(Error::NoInput)?;
+    let mut clouds = Vec::new();
+    let mut sources = Vec::new();
+    for path in paths {
+        let Loaded { cloud, source } = load(path, options, progress)?;
+        clouds.push(cloud);
+        sources.push(source);
+    }
+    if let ([_], [source]) = (&clouds[..], &sources[..]) {
+        let source = source.clone();
+        let cloud = clouds.pop().unwrap_or_default();
+        return Ok((Loaded { cloud, source }, sources));
+    }
+    let extents: Vec<Extent> =
+        clouds.iter().zip(&sources).map(|(cloud, source)| Extent::of(cloud, source)).collect();
+    let (cloud, dropped) = merge(clouds);
+    if !dropped.is_empty() {
+        progress.note(&format!("not in all files, dropped: {}", dropped.join(", ")));
+    }
+    for ((path, extent), source) in paths.iter().zip(&extents).zip(&sources) {
+        if let Some(loss) = extent.loss_about(cloud.origin) {
+            progress.note(&format!("{}: {loss}", path.display()));
         }
-        if source.coordinate_system != all.source.coordinate_system {
+        if source.coordinate_system != sources[0].coordinate_system {
             progress.note(&format!(
                 "{}: its coordinate system differs from that of {}, or only one of them names it",
                 path.display(),
                 first.display()
             ));
         }
-        sources.push(source);
     }
-    all.source = common_source(&sources);
-    Ok((all, sources))
+    Ok((Loaded { cloud, source: common_source(&sources) }, sources))
 }
 
 /// What a file says about itself, without reading its points.

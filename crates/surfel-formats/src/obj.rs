@@ -6,6 +6,7 @@ use crate::error::{Place, Result};
 use crate::input::Input;
 use crate::lines::{LineError, Rows, parse_number, read_rows};
 use crate::options::{LoadOptions, Loaded, Source};
+use crate::range::ColorRange;
 use crate::record::{ColumnField, Field, Kind, Layout};
 use crate::role::Role;
 
@@ -22,13 +23,12 @@ pub(crate) fn read(
     let n_columns = first_vertex(input)?;
     let roles = [0, 1, 2].map(Role::Position).into_iter().chain([0, 1, 2].map(Role::Color));
     let layout_of = |sample: &[u8]| {
-        // Most programs write colours from 0 to 1, some from 0 to 255.
         let values = sample.chunks_exact(8).map(|v| Field::new(0, Kind::F64).value(v, false));
         let colors = values.enumerate().filter(|(i, _)| n_columns == 6 && 3 <= i % 6);
-        let scale = if colors.fold(0.0, |max, (_, v)| v.max(max)) <= 1.0 { 65535.0 } else { 257.0 };
+        let color_scale = ColorRange::of_floats(colors.map(|(_, v)| v)).scale();
         let columns = roles.clone().take(n_columns).enumerate().map(|(i, role)| {
             let is_color = matches!(role, Role::Color(_));
-            let scale = if is_color { scale } else { 1.0 };
+            let scale = if is_color { color_scale } else { 1.0 };
             ColumnField { role, field: Field { scale, ..Field::new(8 * i, Kind::F64) } }
         });
         Layout::new(8 * n_columns, false, columns.collect(), &options.columns)

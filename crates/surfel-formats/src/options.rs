@@ -81,12 +81,19 @@ impl TextColumn {
     pub fn parse(name: &str) -> Self {
         match name.trim() {
             "-" | "skip" => Self(None),
-            name => Self(Some(Role::of_name(name).unwrap_or_else(|| Role::Scalar(name.into())))),
+            name => Self(Role::of_names(&[name]).pop()),
         }
     }
 
     /// Columns separated by commas, as in `x,y,z,-,r,g,b`.
     pub fn parse_list(list: &str) -> Vec<Self> {
-        list.split(',').map(Self::parse).collect()
+        let mut columns: Vec<Self> = list.split(',').map(Self::parse).collect();
+        let names = list.split(',').map(str::trim).zip(&columns);
+        let names: Vec<&str> =
+            names.filter(|(_, column)| column.0.is_some()).map(|(name, _)| name).collect();
+        // Of several names of one role, only all of them together tell which has it.
+        let kept = columns.iter_mut().filter_map(|column| column.0.as_mut());
+        kept.zip(Role::of_names(&names)).for_each(|(role, given)| *role = given);
+        columns
     }
 }

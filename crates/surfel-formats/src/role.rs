@@ -40,6 +40,29 @@ impl Role {
         })
     }
 
+    /// The meanings of columns by their names: a role is given to one of them, the others are scalars.
+    ///
+    /// Of several names of a role its own, such as `z`, goes before synonyms, such as `height`, and
+    /// then the first before the others.
+    pub fn of_names(names: &[&str]) -> Vec<Self> {
+        let scalar = |name: &str| Self::Scalar(name.into());
+        let wished: Vec<Self> =
+            names.iter().map(|name| Self::of_name(name).unwrap_or_else(|| scalar(name))).collect();
+        let has_role = |role: &Self| {
+            let mut columns = (0..names.len()).filter(|i| wished[*i] == *role);
+            let first = columns.clone().next();
+            columns.find(|i| names[*i].trim().eq_ignore_ascii_case(role.name())).or(first)
+        };
+        let columns = wished.iter().zip(names).enumerate();
+        let given =
+            columns.map(
+                |(i, (role, name))| {
+                    if has_role(role) == Some(i) { role.clone() } else { scalar(name) }
+                },
+            );
+        given.collect()
+    }
+
     /// The name that users see.
     pub fn name(&self) -> &str {
         match self {
@@ -71,5 +94,21 @@ mod tests {
         assert_eq!(Role::of_name("scalar_Intensity"), Some(Role::Intensity));
         assert_eq!(Role::of_name("Scalar field"), None);
         assert_eq!(Role::of_name("f_rest_0"), None);
+    }
+
+    #[test]
+    fn a_role_goes_to_its_own_name_and_the_others_are_kept_as_scalars() {
+        let names = ["x", "y", "height", "Z", "elevation", "time"];
+        let scalar = |name: &str| Role::Scalar(name.into());
+        let expected = [
+            Role::Position(0),
+            Role::Position(1),
+            scalar("height"),
+            Role::Position(2),
+            scalar("elevation"),
+            scalar("time"),
+        ];
+        assert_eq!(Role::of_names(&names), expected);
+        assert_eq!(Role::of_names(&["label", "class"]), [Role::Classification, scalar("class")]);
     }
 }

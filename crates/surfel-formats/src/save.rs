@@ -6,6 +6,7 @@ use surfel::math::DVec3;
 use surfel::points::PointCloud;
 use surfel::progress::Progress;
 
+use crate::atomic::{folder_of, write_failed};
 use crate::error::{Error, Result};
 use crate::{las, ply};
 
@@ -45,10 +46,7 @@ pub fn check_output(path: &Path) -> Result<()> {
     if !["png", "exr", "ply", "las", "laz"].contains(&extension(path).as_str()) {
         return Err(unsupported(path, ANY));
     }
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(path);
     let problem = if path.is_dir() {
         std::io::ErrorKind::IsADirectory
     } else if !folder.exists() {
@@ -58,7 +56,7 @@ pub fn check_output(path: &Path) -> Result<()> {
     } else {
         return Ok(());
     };
-    Err(crate::atomic::write_failed(path, problem.into()))
+    Err(write_failed(path, problem.into()))
 }
 
 /// The lower-case extension, without the dot.

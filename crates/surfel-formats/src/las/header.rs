@@ -6,6 +6,7 @@ use surfel::math::DVec3;
 
 use crate::error::{Place, Result};
 use crate::input::Input;
+use crate::number::numbers;
 
 pub(super) struct Header {
     pub minor_version: u8,
@@ -92,7 +93,7 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
     };
     let (scale, offset) = (vector(131), vector(155));
     if !scale.is_finite() || scale.cmpeq(DVec3::ZERO).any() || !offset.is_finite() {
-        let found = format!("scale {scale} and offset {offset}");
+        let found = format!("scale {} and offset {}", numbers(scale), numbers(offset));
         return Err(malformed(131, found, "finite numbers, and scales other than 0"));
     }
     let legacy_count = u64::from(read_u32(input, 107));

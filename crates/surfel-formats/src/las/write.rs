@@ -15,6 +15,7 @@ use super::plan::{MOST_EXTRAS, Plan};
 use crate::atomic::{write_failed, write_file};
 use crate::encode::{POINTS_PER_PART, encode_points};
 use crate::error::{Error, Result};
+use crate::number::numbers;
 use crate::save::{SaveOptions, extension};
 
 pub(crate) fn write(
@@ -27,7 +28,7 @@ pub(crate) fn write(
         return Err(Error::Unsupported {
             file: path.display().to_string(),
             action: "write",
-            found: format!("point {point} at {}", cloud.positions[point]),
+            found: format!("point {point} at {}", numbers(cloud.positions[point].as_dvec3())),
             advice: "LAS holds finite positions only; remove such points or write PLY",
         });
     }

@@ -2,6 +2,7 @@
 
 use crate::error::{Place, Result};
 use crate::input::Input;
+use crate::lines::{LONGEST_LINE, MOST_FIELDS};
 use crate::record::Kind;
 
 pub(super) struct Header {
@@ -57,6 +58,10 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
         let Some(line) = lines.next() else {
             return Err(malformed("the end of the file", "`end_header`"));
         };
+        if LONGEST_LINE < line.len() {
+            let start = String::from_utf8_lossy(&line[..80]);
+            return Err(malformed(&start, &format!("at most {LONGEST_LINE} bytes in a line")));
+        }
         let line = String::from_utf8_lossy(line);
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
         match words.as_slice() {
@@ -97,6 +102,10 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
                 let Some(element) = elements.last_mut() else {
                     return Err(malformed(&line, "an element before its properties"));
                 };
+                if element.properties.len() == MOST_FIELDS {
+                    let expected = format!("at most {MOST_FIELDS} properties an element");
+                    return Err(malformed(&line, &expected));
+                }
                 element.properties.push(Property { name: (*name).into(), kind, list });
             }
             ["end_header"] => {

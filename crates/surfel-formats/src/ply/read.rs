@@ -9,6 +9,7 @@ use crate::error::{Error, Place, Result};
 use crate::input::Input;
 use crate::lines::{LineError, Rows, read_rows};
 use crate::options::{LoadOptions, Loaded, Source};
+use crate::range::{ColorRange, is_byte};
 use crate::record::{ColumnField, Field, Kind, Layout};
 use crate::records::{Tolerance, origin_of_records, read_records};
 use crate::role::Role;
@@ -204,33 +205,28 @@ fn named_columns<'a>(
 ) -> Vec<ColumnField> {
     let fields: Vec<(&str, Field, Kind)> =
         fields.filter(|(name, ..)| !Role::is_alpha(name)).collect();
-    // Most programs write colours that are floats from 0 to 1, some from 0 to 255.
     let colors =
         fields.iter().filter(|(name, ..)| matches!(Role::of_name(name), Some(Role::Color(_))));
-    let largest = colors
-        .flat_map(|(_, field, _)| {
-            sample.chunks_exact(stride).map(|record| field.value(record, big_endian))
-        })
-        .fold(0.0, f64::max);
-    let float_scale = if largest <= 1.0 { 65535.0 } else { 257.0 };
+    let float_range = ColorRange::of_floats(colors.flat_map(|(_, field, _)| {
+        sample.chunks_exact(stride).map(|record| field.value(record, big_endian))
+    }));
+    let names: Vec<&str> = fields.iter().map(|(name, ..)| *name).collect();
     let mut columns: Vec<ColumnField> = Vec::new();
-    for (name, mut field, kind) in fields {
-        let mut role = Role::of_name(name).unwrap_or_else(|| Role::Scalar(name.into()));
-        let is_class = |v: f64| v.fract() == 0.0 && (0.0..256.0).contains(&v);
+    for (mut role, (name, mut field, kind)) in Role::of_names(&names).into_iter().zip(fields) {
         let holds_classes = || {
             let records = sample.chunks_exact(stride);
-            records.into_iter().all(|record| is_class(field.value(record, big_endian)))
+            records.into_iter().all(|record| is_byte(field.value(record, big_endian)))
         };
-        let is_taken = columns.iter().any(|column| column.role == role);
-        if is_taken || (role == Role::Classification && kind != Kind::U8 && !holds_classes()) {
+        if role == Role::Classification && kind != Kind::U8 && !holds_classes() {
             role = Role::Scalar(name.into());
         }
         if let Role::Color(_) = role {
-            field.scale = match kind {
-                Kind::F32 | Kind::F64 => float_scale,
-                Kind::U16 => 1.0,
-                _ => 257.0,
+            let range = match kind {
+                Kind::F32 | Kind::F64 => float_range,
+                Kind::U16 => ColorRange::Bits16,
+                _ => ColorRange::Bits8,
             };
+            field.scale = range.scale();
         }
         columns.push(ColumnField { role, field });
     }

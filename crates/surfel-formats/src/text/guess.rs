@@ -1,5 +1,6 @@
 //! The meaning of text columns that no header names, guessed from their number and values.
 
+use crate::range::{ColorRange, is_byte};
 use crate::role::Role;
 
 /// Roles of `n_fields` columns, and the same in words.
@@ -27,24 +28,12 @@ pub(super) fn guess_columns(sample: &[Vec<f64>], n_fields: usize) -> (Vec<Option
     (columns, description)
 }
 
-/// The factor to 0..65535 that colours in these columns need, and their range in words.
-pub(super) fn color_scale(sample: &[Vec<f64>], columns: &[usize]) -> (f64, &'static str) {
-    let values = || {
-        let rows = sample.iter();
-        rows.flat_map(|row| columns.iter().map(|column| row[*column])).filter(|v| v.is_finite())
-    };
-    let largest = values().fold(0.0, f64::max);
-    let has_fractions = values().any(|v| v.fract() != 0.0);
-    if has_fractions && largest <= 1.0 {
-        (65535.0, "0 to 1")
-    } else if largest <= 255.0 {
-        (257.0, "0 to 255")
-    } else {
-        (1.0, "0 to 65535")
-    }
+/// The range of the colours in these columns.
+pub(super) fn color_range(sample: &[Vec<f64>], columns: &[usize]) -> ColorRange {
+    ColorRange::of_text(sample.iter().flat_map(|row| columns.iter().map(|column| row[*column])))
 }
 
 /// True if the column has only whole numbers from 0 to 255.
 pub(super) fn holds_classes(sample: &[Vec<f64>], column: usize) -> bool {
-    sample.iter().all(|row| row[column].fract() == 0.0 && (0.0..256.0).contains(&row[column]))
+    sample.iter().all(|row| is_byte(row[column]))
 }

@@ -7,11 +7,12 @@ use surfel::progress::Progress;
 
 use crate::error::{Place, Result};
 use crate::input::Input;
-use crate::lines::{LineError, Rows, parse_number, read_rows};
+use crate::lines::{LONGEST_LINE, LineError, Rows, parse_number, read_rows};
 use crate::options::{LoadOptions, Loaded, Source, TextColumn};
+use crate::range::ColorRange;
 use crate::record::{ColumnField, Field, Kind, Layout};
 use crate::role::Role;
-use guess::{color_scale, guess_columns, holds_classes};
+use guess::{color_range, guess_columns, holds_classes};
 use preamble::{Preamble, Separator, comment, read_preamble};
 
 pub(crate) fn inspect(input: &Input) -> Result<Source> {
@@ -28,7 +29,7 @@ pub(crate) fn read(
     let sample = sample_rows(input, &preamble);
     let columns = match (&options.text_columns, &preamble.names) {
         (Some(stated), _) => stated.iter().map(|TextColumn(role)| role.clone()).collect(),
-        (None, Some(names)) => names.iter().map(|name| role_of_header(name)).collect(),
+        (None, Some(names)) => roles_of_header(names),
         (None, None) => {
             let (columns, description) = guess_columns(&sample, preamble.n_fields);
             progress.note(&format!(
@@ -62,11 +63,10 @@ pub(crate) fn read(
     Ok(Loaded { cloud, source })
 }
 
-fn role_of_header(name: &str) -> Option<Role> {
-    if Role::is_alpha(name) {
-        return None;
-    }
-    Some(Role::of_name(name).unwrap_or_else(|| Role::Scalar(name.into())))
+fn roles_of_header(names: &[String]) -> Vec<Option<Role>> {
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let roles = Role::of_names(&names).into_iter().zip(names);
+    roles.map(|(role, name)| (!Role::is_alpha(name)).then_some(role)).collect()
 }
 
 fn check_columns(input: &Input, columns: &[Option<Role>], preamble: &Preamble) -> Result<()> {
@@ -98,16 +98,16 @@ fn column_fields(
 ) -> Vec<ColumnField> {
     let colors: Vec<usize> =
         kept.iter().filter(|(_, role)| matches!(role, Role::Color(_))).map(|(i, _)| *i).collect();
-    let (scale, range) = color_scale(sample, &colors);
-    if !colors.is_empty() && scale != 257.0 {
-        progress.note(&format!("{}: colours taken as {range}", input.name));
+    let range = color_range(sample, &colors);
+    if !colors.is_empty() && range != ColorRange::Bits8 {
+        progress.note(&format!("{}: colours taken as {}", input.name, range.words()));
     }
     let mut fields: Vec<ColumnField> = Vec::new();
     for (place, (column, role)) in kept.iter().enumerate() {
         let mut field = Field::new(8 * place, Kind::F64);
         let mut role = (*role).clone();
         if let Role::Color(_) = role {
-            field.scale = scale;
+            field.scale = range.scale();
         }
         if role == Role::Classification && !holds_classes(sample, *column) {
             role = Role::Scalar("classification".into());
@@ -156,15 +156,17 @@ fn sample_rows(input: &Input, preamble: &Preamble) -> Vec<Vec<f64>> {
     let mut rows = Vec::new();
     for place in 0..PLACES {
         let from = data.len() * place / PLACES;
+        let near = &data[from..data.len().min(from + LONGEST_LINE)];
+        let is_cut = from + near.len() < data.len();
+        let end = if is_cut { memchr::memrchr(b'\n', near).unwrap_or(0) } else { near.len() };
         // A line is begun at its start, not where the place happens to fall into it.
-        let lines = data[from..].split(|byte| *byte == b'\n').skip(usize::from(0 < place));
+        let lines = near[..end].split(|byte| *byte == b'\n').skip(usize::from(0 < place));
         for line in lines.take(LINES) {
             let line = line.trim_ascii();
-            let fields = preamble.separator.fields(line);
-            let mut row: Vec<f64> =
+            let fields = preamble.separator.fields(line).take(preamble.n_fields);
+            let row: Vec<f64> =
                 fields.map(|field| parse_number(field).unwrap_or(f64::NAN)).collect();
-            if comment(line).is_none() && preamble.n_fields <= row.len() {
-                row.truncate(preamble.n_fields);
+            if comment(line).is_none() && row.len() == preamble.n_fields {
                 rows.push(row);
             }
         }

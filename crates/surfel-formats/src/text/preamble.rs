@@ -2,8 +2,10 @@
 
 use crate::error::{Error, Place, Result};
 use crate::input::Input;
-use crate::lines::parse_number;
+use crate::lines::{LONGEST_LINE, MOST_FIELDS, parse_number};
 use crate::role::Role;
+
+const NO_LINES: &str = "put each point on a line of its own";
 
 /// What stands before the first point, and the shape of its line.
 pub(super) struct Preamble {
@@ -56,12 +58,25 @@ pub(super) fn comment(line: &[u8]) -> Option<&[u8]> {
 /// Reads up to the first line of numbers.
 pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
     let mut names = None;
+    // A comment may be a header or only speak of x, y and z: the data decides.
+    let mut comment_names = None;
     let mut count = None;
     let mut at = 0;
     let mut number = 0;
     while at < input.len() {
         let rest = &input[at..];
-        let length = memchr::memchr(b'\n', rest).map_or(rest.len(), |end| end + 1);
+        let near = &rest[..rest.len().min(LONGEST_LINE + 1)];
+        let end = memchr::memchr(b'\n', near).map(|end| end + 1);
+        if end.is_none() && near.len() < rest.len() {
+            let expected = format!("lines of at most {LONGEST_LINE} bytes");
+            return Err(input.malformed(
+                Place::Line(number + 1),
+                "a longer line",
+                expected,
+                NO_LINES,
+            ));
+        }
+        let length = end.unwrap_or(rest.len());
         // Some programs put a byte order mark before UTF-8.
         let line = rest[..length].trim_ascii();
         let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
@@ -76,10 +91,22 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
             continue;
         }
         let separator = Separator::of_line(text);
+        let has_too_many = separator.fields(text).nth(MOST_FIELDS).is_some();
+        if has_too_many && is_comment {
+            continue;
+        }
+        if has_too_many {
+            let found = format!("more than {MOST_FIELDS} fields");
+            let expected = format!("at most {MOST_FIELDS} in a line");
+            return Err(input.malformed(Place::Line(number), found, expected, NO_LINES));
+        }
         let fields: Vec<&[u8]> = separator.fields(text).collect();
-        let is_names = names_of(&fields).is_some();
-        if is_comment || is_names {
-            names = names_of(&fields).or(names);
+        if is_comment {
+            comment_names = names_of(&fields).or(comment_names);
+            continue;
+        }
+        if let Some(header) = names_of(&fields) {
+            names = Some(header);
             continue;
         }
         if let ([field], None) = (&fields[..], count)
@@ -90,6 +117,10 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
         }
         if fields.iter().all(|field| field.is_empty() || parse_number(field).is_ok()) {
             let has_empty_end = fields.last().is_some_and(|field| field.is_empty());
+            let fits = |names: &Vec<String>| {
+                names.len() == fields.len() || has_empty_end && names.len() + 1 == fields.len()
+            };
+            let names = names.or(comment_names.filter(fits));
             let n_names = names.as_ref().map_or(fields.len() - 1, Vec::len);
             // A separator at the end of each line begins no further column.
             let n_fields = if has_empty_end { n_names } else { fields.len() };

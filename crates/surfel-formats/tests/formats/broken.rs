@@ -2,7 +2,7 @@
 
 use surfel::points::PointCloud;
 use surfel::progress::Silent;
-use surfel_formats::{Error, LoadOptions, load, load_bytes};
+use surfel_formats::{Error, LoadOptions, check_output, load, load_bytes};
 
 use crate::common::{Folder, Listener, file_of, full_cloud, read};
 
@@ -77,6 +77,19 @@ fn empty_files_wrong_magic_and_absent_files_are_told() {
 }
 
 #[test]
+fn the_words_of_the_system_stand_once_in_an_error() {
+    let folder = Folder::new("once");
+    let error = load(&folder.path("a.ply"), &LoadOptions::default(), &Silent).unwrap_err();
+    assert!(std::error::Error::source(&error).is_none());
+    assert_eq!(error.to_string().matches("os error").count(), 1, "{error}");
+
+    let out = folder.path("none/out.ply");
+    let error = check_output(&out).unwrap_err().to_string();
+    let missing = folder.path("none").display().to_string();
+    assert!(error.contains(&format!("no folder `{missing}`; create it first")), "{error}");
+}
+
+#[test]
 fn a_header_of_ply_that_lies_or_lacks_is_refused() {
     let file = |lines: &str| format!("ply\nformat binary_little_endian 1.0\n{lines}\nend_header\n");
     let xyz = "property float x\nproperty float y\nproperty float z";
@@ -115,6 +128,40 @@ fn a_header_of_ply_that_lies_or_lacks_is_refused() {
     assert!(message("a.ply", fields).contains("line 9: found `x`"));
 }
 
+#[test]
+fn lines_too_long_to_be_points_are_refused_at_once() {
+    let wide = "1 ".repeat(500_000);
+    let long = "1 ".repeat(600_000);
+    assert!(message("a.xyz", &wide).contains("line 1: found more than 1000 fields"));
+    assert!(message("a.xyz", &long).contains("line 1: found a longer line"));
+    assert!(message("a.xyz", format!("1 2 3\n{wide}\n")).contains("found 500000 fields"));
+    assert!(message("a.xyz", format!("1 2 3\n{long}\n")).contains("a line of 1199999 bytes"));
+    assert!(message("a.xyz", format!("x y z {wide}\n1 2 3\n")).contains("1000 fields"));
+    let remark = format!("# {wide}\n1 2 3\n");
+    assert_eq!(read("a.xyz", remark).unwrap().cloud.len(), 1);
+    let thousand = "1 ".repeat(1000) + "\n";
+    assert_eq!(read("a.xyz", thousand).unwrap().cloud.scalars.len(), 997);
+    assert!(message("a.obj", format!("v 1 2 3\nv {long}\n")).contains("bytes"));
+
+    let properties = "property float a\n".repeat(1001);
+    let ply = format!("ply\nformat ascii 1.0\nelement vertex 1\n{properties}end_header\n");
+    assert!(message("a.ply", ply).contains("at most 1000 properties"));
+    assert!(message("a.ply", format!("ply\ncomment {long}\n")).contains("at most 1048576 bytes"));
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_are_refused_without_waiting() {
+    let folder = Folder::new("pipe");
+    let pipe = folder.path("pipe.ply");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for path in [pipe.as_path(), std::path::Path::new("/dev/null")] {
+        let error = load(path, &LoadOptions::default(), &Silent).unwrap_err().to_string();
+        assert!(error.contains("not a regular file"), "{error}");
+        assert!(error.contains("write it to a file first"), "{error}");
+    }
+}
+
 /// The file with some bytes replaced.
 fn with(mut bytes: Vec<u8>, at: usize, new: &[u8]) -> Vec<u8> {
     bytes[at..at + new.len()].copy_from_slice(new);
@@ -140,6 +187,8 @@ fn headers_of_las_that_lie_are_refused() {
         assert!(changed(24, &[2, 0]).contains("LAS version 2.0"));
         assert!(changed(131, &0.0_f64.to_le_bytes()).contains("scales other than 0"));
         assert!(changed(155, &f64::NAN.to_le_bytes()).contains("finite"));
+        let huge = [1e300_f64.to_le_bytes(), 0.0_f64.to_le_bytes()].concat();
+        assert!(changed(131, &huge).contains("scale [1e300, 0,"));
         assert!(changed(100, &u32::MAX.to_le_bytes()).contains("variable length record"));
         // The length of the first record behind the header.
         assert!(changed(395, &[0xff, 0xff]).contains("variable length record"));

@@ -88,7 +88,7 @@ fn outputs_that_cannot_be_written_are_told_before_the_work() {
     let folder = Folder::new("outputs");
     let message =
         |name: &str| surfel_formats::check_output(&folder.path(name)).unwrap_err().to_string();
-    assert!(message("none/a.png").contains("create the folder first"));
+    assert!(message("none/a.png").contains("create it first"));
     assert!(message("a.jpg").contains("the extension `.jpg`"));
     assert!(message("a").contains("a name without extension"));
     std::fs::create_dir(folder.path("b.png")).unwrap();

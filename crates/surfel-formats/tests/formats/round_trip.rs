@@ -162,3 +162,33 @@ fn several_files_make_one_cloud_of_their_common_columns() {
     assert!(matches!(all.cloud.scalar("gps_time"), Some(Values::F64(_))));
     assert!(matches!(load_all(&[], &LoadOptions::default(), &Silent), Err(Error::NoInput)));
 }
+
+#[test]
+fn files_far_apart_are_each_read_in_full_and_the_loss_is_told() {
+    let folder = Folder::new("far-apart");
+    let n = 1000;
+    let (near, far) = (folder.path("near.xyz"), folder.path("far.xyz"));
+    let lines = |zero: f64, n: usize| -> String {
+        (0..n).map(|i| format!("{} 2.25 3.5\n", zero + i as f64 * 0.01)).collect()
+    };
+    std::fs::write(&near, lines(0.0, n)).unwrap();
+    std::fs::write(&far, lines(4_900_000.0, 10)).unwrap();
+
+    // Whatever the order, the larger file keeps its positions and the smaller is told about.
+    for paths in [[far.clone(), near.clone()], [near.clone(), far.clone()]] {
+        let listener = Listener::default();
+        let (all, _) = load_all(&paths, &LoadOptions::default(), &listener).unwrap();
+        let mut places: Vec<u32> = all.cloud.positions.iter().map(|p| p.x.to_bits()).collect();
+        places.sort_unstable();
+        places.dedup();
+        assert!(n <= places.len(), "{} places", places.len());
+        assert!(listener.heard("far.xyz: far from the common origin [0, 0, 0]: its x is rounded"));
+        assert!(!listener.heard("near.xyz: far"));
+    }
+
+    let listener = Listener::default();
+    let (single, sources) = load_all(&[far], &LoadOptions::default(), &listener).unwrap();
+    assert_eq!(sources, [single.source]);
+    assert!((single.cloud.world_position(9).x - 4_900_000.09).abs() < 1e-6);
+    assert!(!listener.heard("common origin"));
+}

@@ -37,6 +37,35 @@ fn headers_name_columns() {
 }
 
 #[test]
+fn a_second_column_of_a_role_is_kept_by_its_name() {
+    for file in ["x,y,z,height\n1,2,3,4\n", "x,y,height,z\n1,2,4,3\n"] {
+        let cloud = read("a.csv", file).unwrap().cloud;
+        assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0)], "{file}");
+        assert_eq!(cloud.scalar("height").unwrap().get(0), 4.0, "{file}");
+    }
+    let alone = read("a.csv", "x,y,height\n1,2,4\n").unwrap().cloud;
+    assert_eq!(alone.positions, [Vec3::new(1.0, 2.0, 4.0)]);
+    let columns = TextColumn::parse_list("x,y,-,height,z");
+    let options = LoadOptions { text_columns: Some(columns), ..LoadOptions::default() };
+    let stated = load_bytes("a.txt", b"1 2 9 4 3\n", &options, &Listener::default()).unwrap().cloud;
+    assert_eq!(stated.positions, [Vec3::new(1.0, 2.0, 3.0)]);
+    assert_eq!(stated.scalar("height").unwrap().get(0), 4.0);
+}
+
+#[test]
+fn comments_are_headers_only_if_they_fit_the_data() {
+    for remark in ["# Columns: X Y Z", "# x y z in metres", "// x y"] {
+        let cloud = read("a.xyz", format!("{remark}\n1 2 3\n4 5 6\n")).unwrap().cloud;
+        assert_eq!(cloud.len(), 2, "{remark}");
+        assert!(cloud.scalars.is_empty(), "{remark}");
+    }
+    let header = read("a.xyz", "# x y z time\n1 2 3 4\n").unwrap().cloud;
+    assert_eq!(header.scalar("time").unwrap().get(0), 4.0);
+    let both = read("a.csv", "x,y,z,time\n# z x y quality\n1,2,3,4\n").unwrap().cloud;
+    assert_eq!(both.scalar("time").unwrap().get(0), 4.0);
+}
+
+#[test]
 fn columns_are_guessed_by_number_and_range_and_told() {
     let guess = |line: &str| {
         let listener = Listener::default();

@@ -4,30 +4,33 @@ use super::{PointCloud, Scalar, Values};
 
 /// The clouds one after another, and the names of the columns that were left out.
 ///
-/// Points of empty clouds ask for no column. Scalars of different types meet in f64.
-pub fn merge(clouds: Vec<PointCloud>) -> (PointCloud, Vec<String>) {
-    let mut clouds: Vec<PointCloud> =
-        clouds.into_iter().filter(|cloud| !cloud.is_empty()).collect();
+/// The origin is that of the largest cloud. Points of empty clouds ask for no column. Scalars of
+/// different types meet in f64. Column after column is moved, so that little is held twice.
+pub fn merge(mut clouds: Vec<PointCloud>) -> (PointCloud, Vec<String>) {
+    clouds.retain(|cloud| !cloud.is_empty());
     if clouds.len() < 2 {
         return (clouds.pop().unwrap_or_default(), Vec::new());
     }
     let origin = common_origin(&clouds);
-    clouds.iter_mut().for_each(|cloud| cloud.rebase(origin));
+    for cloud in clouds.iter_mut().filter(|cloud| cloud.origin != origin) {
+        cloud.rebase(origin);
+    }
+    let positions = clouds.iter_mut().map(|cloud| std::mem::take(&mut cloud.positions)).collect();
     let mut dropped = Vec::new();
     let merged = PointCloud {
         origin,
-        positions: clouds.iter().flat_map(|cloud| &cloud.positions).copied().collect(),
-        normals: column("normals", &clouds, |cloud| cloud.normals.as_ref(), &mut dropped),
-        radii: column("radii", &clouds, |cloud| cloud.radii.as_ref(), &mut dropped),
-        colors: column("colors", &clouds, |cloud| cloud.colors.as_ref(), &mut dropped),
-        intensity: column("intensity", &clouds, |cloud| cloud.intensity.as_ref(), &mut dropped),
+        positions: concatenate(positions),
+        normals: column("normals", &mut clouds, |cloud| cloud.normals.take(), &mut dropped),
+        radii: column("radii", &mut clouds, |cloud| cloud.radii.take(), &mut dropped),
+        colors: column("colors", &mut clouds, |cloud| cloud.colors.take(), &mut dropped),
+        intensity: column("intensity", &mut clouds, |cloud| cloud.intensity.take(), &mut dropped),
         classification: column(
             "classification",
-            &clouds,
-            |cloud| cloud.classification.as_ref(),
+            &mut clouds,
+            |cloud| cloud.classification.take(),
             &mut dropped,
         ),
-        scalars: scalars(&clouds, &mut dropped),
+        scalars: scalars(&mut clouds, &mut dropped),
     };
     (merged, dropped)
 }
@@ -38,15 +41,15 @@ fn common_origin(clouds: &[PointCloud]) -> crate::math::DVec3 {
     largest.map(|cloud| cloud.origin).unwrap_or_default()
 }
 
-fn column<'a, T: Copy + 'a>(
+fn column<T>(
     name: &str,
-    clouds: &'a [PointCloud],
-    of: impl Fn(&'a PointCloud) -> Option<&'a Vec<T>>,
+    clouds: &mut [PointCloud],
+    take: impl Fn(&mut PointCloud) -> Option<Vec<T>>,
     dropped: &mut Vec<String>,
 ) -> Option<Vec<T>> {
-    let columns: Vec<&Vec<T>> = clouds.iter().filter_map(of).collect();
+    let columns: Vec<Vec<T>> = clouds.iter_mut().filter_map(take).collect();
     if columns.len() == clouds.len() {
-        return Some(columns.into_iter().flatten().copied().collect());
+        return Some(concatenate(columns));
     }
     if !columns.is_empty() {
         dropped.push(name.to_owned());
@@ -54,40 +57,58 @@ fn column<'a, T: Copy + 'a>(
     None
 }
 
-fn scalars(clouds: &[PointCloud], dropped: &mut Vec<String>) -> Vec<Scalar> {
-    let mut names: Vec<&str> = Vec::new();
-    for name in clouds.iter().flat_map(|cloud| &cloud.scalars).map(|scalar| scalar.name.as_str()) {
+fn scalars(clouds: &mut [PointCloud], dropped: &mut Vec<String>) -> Vec<Scalar> {
+    let mut names: Vec<String> = Vec::new();
+    for Scalar { name, .. } in clouds.iter().flat_map(|cloud| &cloud.scalars) {
         if !names.iter().any(|known| known.eq_ignore_ascii_case(name)) {
-            names.push(name);
+            names.push(name.clone());
         }
     }
     let mut kept = Vec::new();
     for name in names {
-        let columns: Vec<&Values> = clouds.iter().filter_map(|cloud| cloud.scalar(name)).collect();
+        let is_named = |scalar: &Scalar| scalar.name.eq_ignore_ascii_case(&name);
+        let take = |cloud: &mut PointCloud| {
+            let at = cloud.scalars.iter().position(is_named)?;
+            Some(cloud.scalars.swap_remove(at).values)
+        };
+        let columns: Vec<Values> = clouds.iter_mut().filter_map(take).collect();
         if columns.len() == clouds.len() {
-            kept.push(Scalar { name: name.to_owned(), values: concatenate(&columns) });
+            kept.push(Scalar { name, values: concatenate_values(columns) });
         } else {
-            dropped.push(name.to_owned());
+            dropped.push(name);
         }
     }
     kept
 }
 
-fn concatenate(columns: &[&Values]) -> Values {
+/// The columns end to end; each part is given back as soon as it is copied behind the first.
+fn concatenate<T>(columns: Vec<Vec<T>>) -> Vec<T> {
+    let n: usize = columns.iter().map(Vec::len).sum();
+    let mut columns = columns.into_iter();
+    let mut all = columns.next().unwrap_or_default();
+    all.reserve_exact(n - all.len());
+    columns.for_each(|column| all.extend(column));
+    all
+}
+
+fn concatenate_values(columns: Vec<Values>) -> Values {
     macro_rules! same_type {
         ($($kind:ident),*) => {
             $(if columns.iter().all(|values| matches!(values, Values::$kind(_))) {
-                let all = columns.iter().flat_map(|values| match values {
-                    Values::$kind(values) => values.as_slice(),
-                    _ => &[],
+                let columns = columns.into_iter().filter_map(|values| match values {
+                    Values::$kind(values) => Some(values),
+                    _ => None,
                 });
-                return Values::$kind(all.copied().collect());
+                return Values::$kind(concatenate(columns.collect()));
             })*
         };
     }
     same_type!(U8, U16, I32, F32, F64);
-    let values = |values: &&Values| (0..values.len()).map(|i| values.get(i)).collect::<Vec<_>>();
-    Values::F64(columns.iter().flat_map(values).collect())
+    let mut all = Vec::with_capacity(columns.iter().map(Values::len).sum());
+    for values in columns {
+        all.extend((0..values.len()).map(|i| values.get(i)));
+    }
+    Values::F64(all)
 }
 
 #[cfg(test)]
@@ -136,5 +157,15 @@ mod tests {
         assert_eq!(merged.scalar("time"), Some(&Values::F64(vec![1.0, 2.0, 0.5, 3.0])));
         let (merged, _) = merge(vec![bytes.clone(), bytes]);
         assert_eq!(merged.scalar("time"), Some(&Values::U8(vec![1, 2, 1, 2])));
+    }
+
+    #[test]
+    fn nothing_is_copied_that_can_be_moved() {
+        let single = cloud(1000.0, None);
+        let before = single.positions.as_ptr();
+        assert_eq!(merge(vec![single]).0.positions.as_ptr(), before);
+        let several = vec![cloud(0.0, None), cloud(0.0, None), cloud(0.0, None)];
+        let (merged, _) = merge(several);
+        assert_eq!((merged.len(), merged.positions.capacity()), (6, 6));
     }
 }
