@@ -118,9 +118,13 @@ fn check_color(cloud: &PointCloud, source: &Source, args: &Args) -> anyhow::Resu
         return Ok(());
     }
     bail!(
-        "{}: no column {color}; --color takes elevation, normal, {SURFACE_VARIATION}, #RRGGBB{}",
+        "{}: no column {color}; --color takes elevation, normal, {SURFACE_VARIATION}, #RRGGBB and \
+         what the file has: {}",
         name_files(args),
-        shown(&source.columns).iter().map(|name| format!(", {name}")).collect::<String>(),
+        match shown(&source.columns) {
+            none if none.is_empty() => "only positions".to_owned(),
+            columns => columns.join(", "),
+        },
     )
 }
 
