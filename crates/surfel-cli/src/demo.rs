@@ -26,8 +26,12 @@ pub struct Args {
 
 const EXAMPLES: &str = "\
 Examples:
-  surfel demo
-  surfel demo -o /tmp/ruin --points 5000000";
+  surfel demo                                   demo.laz and demo.png in this folder
+  surfel demo -o /tmp/ruin --points 5000000     twice the points, elsewhere";
+
+/// A clear sky, and a sun that lights the front and throws the columns' shadows over the floor.
+const LIGHT: [&str; 6] =
+    ["--sun-azimuth", "190", "--sun-elevation", "32", "--background", "#4f7fb8,#d5e2ee"];
 
 /// The command line that makes the picture, taken apart as the program takes its own.
 #[derive(Parser)]
@@ -58,6 +62,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         picture_path.display().to_string(),
     ]);
     words.extend(camera_words());
+    words.extend(LIGHT.map(str::to_owned));
     let Line::Render(args) = Line::try_parse_from(&words)?;
     render::run(&args, global, report)?;
     tell(&cloud_path, &words, n_points, start)
@@ -91,7 +96,13 @@ fn tell(cloud: &Path, words: &[String], n_points: usize, start: Instant) -> anyh
          surfel render {cloud} -o classes.png --color class --light sky\n  \
          surfel render {cloud} -o points.png --surface points",
         start.elapsed().as_secs_f64(),
-        words.join(" "),
+        words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" "),
     ))?;
     Ok(())
+}
+
+/// As a shell takes it for one word: `#` would begin a comment, a space another word.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_./,:+".contains(c);
+    if word.chars().all(is_plain) { word.to_owned() } else { format!("'{word}'") }
 }

@@ -9,7 +9,7 @@ const TARGET: f32 = 0.74;
 /// Share of the covered pixels that are darker.
 const PERCENTILE: f32 = 0.95;
 /// Stops, at least and at most: a black object must not turn white.
-const LIMITS: (f32, f32) = (-1.0, 2.5);
+const LIMITS: (f32, f32) = (-1.0, 1.5);
 /// Width of the preview.
 const WIDTH: u32 = 200;
 
@@ -52,8 +52,8 @@ mod tests {
         assert_eq!(stops(vec![]), 0.0);
         assert_eq!(stops(vec![TARGET / 2.0; 50]), 1.0);
         assert_eq!((stops(vec![0.0; 50]), stops(vec![9.0; 50])), (LIMITS.1, LIMITS.0));
-        let mut mostly_dark = vec![TARGET / 4.0; 99];
+        let mut mostly_dark = vec![TARGET / 2.0; 99];
         mostly_dark.push(100.0);
-        assert_eq!(stops(mostly_dark), 2.0);
+        assert_eq!(stops(mostly_dark), 1.0);
     }
 }

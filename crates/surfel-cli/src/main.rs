@@ -32,7 +32,7 @@ struct Cli {
 
 const EXAMPLES: &str = "\
 Examples:
-  surfel demo                            a ruin to play with: demo/demo.laz and demo/demo.png
+  surfel demo                            a ruin to play with: demo.laz and demo.png, here
   surfel render scan.laz -o scan.png     a finished picture; every choice is told and is a flag
   surfel info scan.laz                   what is in a file
   surfel COMMAND --help                  all options of a command, with examples";
@@ -64,7 +64,7 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: &Cli, report: &Report) -> anyhow::Result<()> {
-    interrupt::listen(report.cancellation())?;
+    interrupt::listen(&report.cancellation())?;
     cli.global.start_threads()?;
     match &cli.command {
         Command::Render(args) => render::run(args, &cli.global, report),

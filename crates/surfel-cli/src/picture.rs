@@ -7,16 +7,16 @@ use crate::render::Args;
 use crate::report::{Muted, Report};
 use crate::stats::{Run, Seconds};
 use crate::{dry_run, exposure, stats};
-use anyhow::Context;
+use anyhow::{Context, bail};
 use std::path::Path;
 use std::time::Instant;
 use surfel::flat::FlatScene;
 use surfel::image::Image;
 use surfel::math::Vec3;
-use surfel::points::{PointCloud, Radius, prepare};
+use surfel::points::{self, PointCloud, SURFACE_VARIATION, prepare};
 use surfel::progress::Progress;
 use surfel::render::{CpuRenderer, Renderer, Settings};
-use surfel::scene::color::colorize;
+use surfel::scene::color::{ColorSource, colorize};
 use surfel::scene::{Background, Camera, Light, Material, Scene, usual_bounds};
 use surfel::surface::SurfaceKind;
 use surfel::trace::Simd;
@@ -34,11 +34,12 @@ pub fn make(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()>
     check_output(&args.output)?;
     let mut seconds = Seconds::default();
     let Loaded { cloud, source } = timed(&mut seconds.load, || load(args, global, report))?;
+    check_color(&cloud, &source, args)?;
     let choices = choose_from(&cloud, &source, args, report);
     if args.dry_run {
         return Ok(crate::report::print(&dry_run::resolved(&cloud, &choices, args))?);
     }
-    let scene = timed(&mut seconds.prepare, || describe(cloud, &source, choices, args, report))?;
+    let scene = timed(&mut seconds.prepare, || describe(cloud, choices, args, report))?;
     let n_points = scene.cloud.len();
     let mut flat = timed(&mut seconds.build, || Ok(FlatScene::new(&scene, report)?))?;
     drop(scene);
@@ -65,6 +66,10 @@ pub fn make(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()>
 
 /// Fails before the work where the output could not be written after it.
 pub fn check_output(path: &Path) -> anyhow::Result<()> {
+    // A finished file takes the place of its name, and would end a pipe or a device there.
+    if path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        bail!("{}: a device or a pipe stands there; name a file", path.display());
+    }
     surfel_formats::check_output(path).map_err(|error| match error {
         surfel_formats::Error::Unsupported { .. } => Usage(error.to_string()).into(),
         other => other.into(),
@@ -100,6 +105,46 @@ fn load(args: &Args, global: &Global, report: &Report) -> anyhow::Result<Loaded>
     Ok(loaded)
 }
 
+/// Fails before the preparation if no file has the column asked for. The library knows only the columns
+/// that were loaded, which are those asked for.
+fn check_color(cloud: &PointCloud, source: &Source, args: &Args) -> anyhow::Result<()> {
+    let Some(color) = &args.color.color else { return Ok(()) };
+    let is_prepared = match color {
+        ColorSource::Normal => true,
+        ColorSource::Column(name) => name == SURFACE_VARIATION,
+        _ => false,
+    };
+    if is_prepared || color.is_in(cloud) {
+        return Ok(());
+    }
+    bail!(
+        "{}: no column {color}; --color takes elevation, normal, {SURFACE_VARIATION}, #RRGGBB and \
+         what the file has: {}",
+        name_files(args),
+        match shown(&source.columns) {
+            none if none.is_empty() => "only positions".to_owned(),
+            columns => columns.join(", "),
+        },
+    )
+}
+
+/// Columns of a file as `--color` takes them.
+fn shown(columns: &[String]) -> Vec<&str> {
+    let mut names: Vec<&str> = Vec::new();
+    for column in columns {
+        let name = match column.to_ascii_lowercase().as_str() {
+            "x" | "y" | "z" | "nx" | "ny" | "nz" | "normal" | "radius" => continue,
+            "red" | "green" | "blue" | "r" | "g" | "b" | "rgb" => "rgb",
+            "classification" => "class",
+            _ => column,
+        };
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
 fn name_files(args: &Args) -> String {
     let more = args.files.len() - 1;
     let first = args.files[0].display();
@@ -121,7 +166,6 @@ fn choose_from(cloud: &PointCloud, source: &Source, args: &Args, report: &Report
 
 fn describe(
     cloud: PointCloud,
-    source: &Source,
     choices: Choices,
     args: &Args,
     report: &Report,
@@ -134,9 +178,7 @@ fn describe(
     tell_prepared(&prepared, args, report);
     let coloring = args.color.coloring(choices.up);
     let colors = colorize(&cloud, &coloring, &report.with_flag("--color, --cmap, --range"))
-        .with_context(|| {
-            format!("{}, whose columns are {}", name_files(args), source.columns.join(", "))
-        })?;
+        .with_context(|| name_files(args))?;
     let is_lit = !args.light.has(LightKind::None);
     Ok(Scene {
         cloud,
@@ -150,25 +192,15 @@ fn describe(
     })
 }
 
-fn tell_prepared(prepared: &surfel::points::Report, args: &Args, report: &Report) {
-    match &prepared.normals {
-        Some(found) => report.choice(
-            &format!("{} normals estimated from neighbours", found.n_estimated),
-            "--normals-k, --normals-radius",
-        ),
-        None => report.choice("normals as in the file", "--normals-k"),
+fn tell_prepared(prepared: &points::Report, args: &Args, report: &Report) {
+    if prepared.normals.is_none() {
+        report.choice("normals as in the file", "--normals-k");
     }
-    match (&prepared.radii, args.preparation.radius) {
-        (None, _) => report.choice("radii as in the file", "--radius"),
-        (Some(_), Some(Radius::Fixed(_))) => {}
-        (Some(found), _) => report.choice(
-            &format!(
-                "radii {:.4} to {:.4}, median {:.4}",
-                found.smallest, found.largest, found.median
-            ),
-            "--radius",
-        ),
+    args.preparation.tell_normals(prepared, report);
+    if prepared.radii.is_none() {
+        report.choice("radii as in the file", "--radius");
     }
+    args.preparation.tell_radii(prepared, report);
 }
 
 fn settings(args: &Args) -> Settings {

@@ -96,12 +96,11 @@ fn prepared(cloud: PointCloud, args: &Args, report: &Report) -> anyhow::Result<P
     if !wanted.radii && !had.1 {
         cloud.radii = None;
     }
-    if let (true, Some(normals)) = (wanted.normals, &found.normals) {
-        report.note(&format!("{} normals estimated", normals.n_estimated));
+    if wanted.normals {
+        args.preparation.tell_normals(&found, report);
     }
-    if let (true, Some(radii)) = (wanted.radii, &found.radii) {
-        let surfel::points::RadiusReport { smallest, median, largest, .. } = radii;
-        report.note(&format!("radii {smallest:.4} to {largest:.4}, median {median:.4}"));
+    if wanted.radii {
+        args.preparation.tell_radii(&found, report);
     }
     Ok(cloud)
 }

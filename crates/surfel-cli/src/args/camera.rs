@@ -70,6 +70,7 @@ impl CameraArgs {
         let focal_point = self.camera_focal_point.unwrap_or(framed.focal_point);
         let beside = framed.position + (focal_point - framed.focal_point);
         let position = self.camera_position.unwrap_or(beside);
+        // Places that are given may look elsewhere than the framed camera did.
         let view_up = self.camera_view_up.unwrap_or_else(|| upright(up, focal_point - position));
         let projection = match self.camera_orthographic.flatten() {
             Some(height) => Projection::Orthographic { height },
@@ -89,6 +90,7 @@ impl CameraArgs {
             is_orthographic: self.camera_orthographic.is_some(),
             view_angle_deg: self.camera_view_angle,
             direction: self.camera_direction,
+            view_up: self.camera_view_up,
             azimuth_deg: self.camera_azimuth_angle,
             elevation_deg: self.camera_elevation_angle,
             zoom: self.camera_zoom_factor,

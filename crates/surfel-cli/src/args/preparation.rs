@@ -1,8 +1,11 @@
 //! Options of the preparation of points.
 
+use crate::report::Report;
 use clap::Args;
 use surfel::points::neighbors::{Method, Query};
-use surfel::points::{Orientation, PointCloud, Preparation, Radius, SURFACE_VARIATION, Select};
+use surfel::points::{
+    self, Orientation, PointCloud, Preparation, Radius, SURFACE_VARIATION, Select,
+};
 use surfel::scene::color::ColorSource;
 use surfel_formats::{Column, ColumnChoice, LoadOptions, TextColumn};
 
@@ -79,6 +82,25 @@ impl PreparationArgs {
     /// Whether it is said how normals are to be estimated.
     pub fn names_normals(&self) -> bool {
         self.normals_k.is_some() || self.normals_radius.is_some()
+    }
+
+    /// Tells how normals were estimated.
+    pub fn tell_normals(&self, prepared: &points::Report, report: &Report) {
+        if let (Some(found), Some(query)) = (&prepared.normals, prepared.normals_from) {
+            let flag = match query {
+                Query::Nearest(_) => "--normals-k",
+                Query::Within(_) => "--normals-radius",
+            };
+            report.choice(&found.line(query), flag);
+        }
+    }
+
+    /// Tells how radii were chosen, if that was not asked for in numbers.
+    pub fn tell_radii(&self, prepared: &points::Report, report: &Report) {
+        let radius = self.radius.unwrap_or_default();
+        if let (Some(found), false) = (&prepared.radii, matches!(radius, Radius::Fixed(_))) {
+            report.choice(&found.line(radius), "--radius");
+        }
     }
 
     /// Drops the normals and radii that are to be estimated in a given way.

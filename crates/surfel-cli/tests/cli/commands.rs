@@ -80,6 +80,10 @@ fn quiet_says_nothing_and_choices_name_their_flags() {
     for flag in flags.iter().chain(&["--radius", "--color", "--exposure", "--threads"]) {
         assert!(told.contains(&format!("[{flag}")), "{flag}: {told}");
     }
+    for what in ["normals of 400 points from 16 neighbours [", "radii 0.", "color rgb"] {
+        assert_eq!(told.matches(what).count(), 1, "{what}: {told}");
+    }
+    assert_eq!(told.matches("normals").count(), 2, "once in words, once as a flag: {told}");
     let quiet = surfel(&[&arguments[..], &["--quiet"]].concat());
     assert!(quiet.stderr.is_empty() && quiet.stdout.is_empty());
 }
@@ -122,6 +126,8 @@ fn demo_scans_and_renders() {
     let output = folder.path("demo");
     let told = succeed(&["demo", "-o", &output, "--points", "3000"]);
     assert!(told.contains("surfel render") && told.contains("demo.laz"), "{told}");
+    // What it prints can be typed again.
+    assert!(told.contains("--background '#4f7fb8,#d5e2ee'"), "{told}");
     let (width, height, ..) = read_png(folder.0.join("demo/demo.png"));
     assert_eq!((width, height), (1280, 720));
     assert!(fs::metadata(folder.0.join("demo/demo.laz")).unwrap().len() > 10_000);

@@ -1,6 +1,6 @@
 //! Files that are broken, absent or not what they say: a clear error, no old output destroyed.
 
-use super::common::{Folder, dome, fail, square};
+use super::common::{Folder, dome, fail, square, succeed};
 use std::fs;
 
 /// The header of a LAS 1.2 file that claims four billion points in 200 bytes.
@@ -79,13 +79,24 @@ fn absent_paths_and_folders_are_named() {
 }
 
 #[test]
-fn a_missing_column_names_those_there_are() {
+fn a_missing_column_names_those_of_the_file() {
     let folder = Folder::new();
-    let cloud = folder.write("dome.ply", dome(10));
+    let dome = folder.write("dome.ply", dome(10));
     let picture = folder.path("out.png");
-    for color in ["intensity", "snow"] {
-        let text = fail(&["render", &cloud, "-o", &picture, "--color", color], 1);
-        assert!(text.contains(color) && text.contains("rain"), "{text}");
+    for cloud in [dome.clone(), folder.path("dome.las")] {
+        if cloud != dome {
+            succeed(&["prepare", &dome, "-o", &cloud, "--select", "first:90"]);
+        }
+        for color in ["intensity", "snow"] {
+            let arguments = ["render", &cloud, "-o", &picture, "--color", color];
+            let text = fail(&arguments, 1);
+            assert!(text.contains(&format!("no column {color}; ")), "{text}");
+            for known in [" rgb", " class", " rain", " elevation"] {
+                assert!(text.contains(known), "{known}: {text}");
+            }
+            // Before the work, and not only after it.
+            assert!(!text.contains("normals of"), "{text}");
+        }
     }
 }
 
@@ -114,4 +125,42 @@ fn a_full_disk_is_an_error() {
     let arguments = ["info", &cloud];
     let output = super::common::command(&arguments).stdout(full()).output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{}", super::common::stderr(&output));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn no_device_is_replaced_by_a_file() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    for (command, name) in [("prepare", "full.ply"), ("render", "full.png")] {
+        let full = folder.path(name);
+        std::os::unix::fs::symlink("/dev/full", &full).unwrap();
+        let text = fail(&[command, &cloud, "-o", &full], 1);
+        assert!(text.contains(name) && text.contains("device"), "{text}");
+        assert_eq!(fs::read_link(&full).unwrap().to_str(), Some("/dev/full"));
+    }
+    assert_eq!(folder.names(), ["dome.ply", "full.ply", "full.png"]);
+}
+
+/// A file may not grow past a kilobyte here, so that writes fail as they do on a full disk.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_cannot_be_written_to_the_end_leaves_the_old_one() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(60));
+    for (command, name) in [("prepare", "old.ply"), ("prepare", "old.laz"), ("render", "old.png")] {
+        let old = folder.write(name, "an old file");
+        let limited = "trap '' XFSZ; ulimit -f 1; exec \"$@\"";
+        let arguments = [env!("CARGO_BIN_EXE_surfel"), command, &cloud, "-o", &old];
+        let shell = std::process::Command::new("bash")
+            .args(["-c", limited, "bash"])
+            .args(arguments)
+            .output()
+            .unwrap();
+        let text = super::common::stderr(&shell);
+        assert_eq!(shell.status.code(), Some(1), "{text}");
+        assert!(text.contains(&format!("error: {old}")), "{text}");
+        assert_eq!(fs::read_to_string(&old).unwrap(), "an old file");
+    }
+    assert_eq!(folder.names(), ["dome.ply", "old.laz", "old.ply", "old.png"]);
 }

@@ -1,6 +1,7 @@
 //! Normals: the direction in which a point's neighbourhood is thinnest.
 
-use super::neighbors::{Neighbor, Tree};
+use super::neighbors::{Neighbor, Query, Tree};
+use super::radius::three_digits;
 use crate::error::Result;
 use crate::math::{DVec3, SymmetricMatrix, Vec3, smallest_eigenvector};
 use crate::progress::Progress;
@@ -98,18 +99,30 @@ pub fn fill_missing(
         report.n_up += usize::from(source.is_none());
         normals[point as usize] = source.map_or(Vec3::Z, |source| normals[source as usize]);
     }
-    progress.note(&report.line());
     Ok(report)
 }
 
 impl NormalReport {
-    fn line(&self) -> String {
+    /// What was estimated, for people; `query` is what the planes were fitted to.
+    pub fn line(&self, query: Query) -> String {
+        let n_points = self.n_estimated + self.n_from_nearest + self.n_up;
+        match query {
+            Query::Nearest(k) => format!("normals of {n_points} points from {k} neighbours"),
+            Query::Within(distance) => format!(
+                "normals of {n_points} points from all points within {}",
+                three_digits(distance)
+            ),
+        }
+    }
+
+    /// What was put where there was no plane, if that happened.
+    pub(super) fn repairs(&self) -> Option<String> {
         let Self { n_from_nearest, n_up, .. } = self;
-        format!(
-            "{} points without a plane through their neighbours: {n_from_nearest} got the normal of \
-             the nearest point that has one, {n_up} got +Z",
-            n_from_nearest + n_up
-        )
+        let n_points = n_from_nearest + n_up;
+        let got = if *n_up == 0 { "the normal of the nearest point that has one" } else { "+Z" };
+        (0 < n_points).then(|| {
+            format!("{n_points} points without a plane through their neighbours got {got}")
+        })
     }
 }
 
@@ -117,7 +130,7 @@ impl NormalReport {
 mod tests {
     use super::*;
     use crate::math::Random;
-    use crate::points::neighbors::{Method, Query, map_neighborhoods};
+    use crate::points::neighbors::{Method, map_neighborhoods};
     use crate::progress::Silent;
 
     fn fits(positions: &[Vec3], query: Query) -> Vec<PlaneFit> {

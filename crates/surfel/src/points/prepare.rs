@@ -61,6 +61,8 @@ pub struct Report {
     pub clean: CleanReport,
     pub n_points: usize,
     pub normals: Option<NormalReport>,
+    /// What normals were estimated from: `Preparation::normals`, or the distance that stands for it.
+    pub normals_from: Option<Query>,
     pub radii: Option<RadiusReport>,
 }
 
@@ -81,19 +83,19 @@ pub fn prepare(
     let missing = Missing::of(&cloud, preparation);
     let mut report = Report { clean, n_points: cloud.len(), ..Report::default() };
     let local = measure(&cloud, preparation, &missing, progress)?;
-    if let Some(fits) = local.fits {
+    if let Some((fits, query)) = local.fits {
         if preparation.keep_variation {
             add_variation(&mut cloud, &fits);
         }
         if missing.normals {
             let found = add_normals(&mut cloud, &fits, preparation, progress)?;
-            progress.note(&format!("{} normals estimated from neighbours", found.n_estimated));
+            found.repairs().iter().for_each(|line| progress.note(line));
             report.normals = Some(found);
+            report.normals_from = Some(query);
         }
     }
     if let Some((radii, found)) = local.radii {
         add_radii(&mut cloud, radii);
-        progress.note(&found.line(preparation.radius));
         report.radii = Some(found);
     }
     Ok((cloud, report))
@@ -116,7 +118,7 @@ impl Missing {
 /// What neighbourhoods tell, as far as it is missing.
 #[derive(Default)]
 struct Local {
-    fits: Option<Vec<PlaneFit>>,
+    fits: Option<(Vec<PlaneFit>, Query)>,
     radii: Option<(Vec<f32>, RadiusReport)>,
 }
 
@@ -164,25 +166,23 @@ fn measure_together(
     let distances = both.iter().map(|(_, distance)| *distance).collect();
     let fits = both.into_iter().map(|(fit, _)| fit).collect();
     let radii = limit_strays(&tree, k_radius, distances, progress)?;
-    Ok(Local { fits: Some(fits), radii: Some(radii) })
+    Ok(Local { fits: Some((fits, Query::Nearest(k_normal))), radii: Some(radii) })
 }
 
 fn fit_planes(
     positions: &[Vec3],
     preparation: &Preparation,
     progress: &dyn Progress,
-) -> Result<Vec<PlaneFit>> {
+) -> Result<(Vec<PlaneFit>, Query)> {
     let Preparation { neighbors: method, normals: mut query, seed, .. } = *preparation;
     if let (Query::Nearest(k), Method::Grid | Method::ScanLine) = (query, method) {
         // Half of all k nearest lie within the median; twice as many within sqrt(2) times it.
         let sample = Sample { k: k.min(positions.len()), samples: 100, seed };
         let distance = std::f32::consts::SQRT_2 * median_distance(positions, &sample, progress)?;
-        progress.note(&format!("normals from all points within {distance}, about {k}"));
         query = Query::Within(distance);
     }
-    map_neighborhoods(positions, method, query, progress, |point, neighbors| {
-        fit_plane(positions, point, neighbors)
-    })
+    let fit = |point: usize, neighbors: &[Neighbor]| fit_plane(positions, point, neighbors);
+    Ok((map_neighborhoods(positions, method, query, progress, fit)?, query))
 }
 
 fn add_variation(cloud: &mut PointCloud, fits: &[PlaneFit]) {
@@ -203,7 +203,7 @@ fn add_normals(
         cloud.normals = Some(orient(cloud, normals, preparation.orientation, progress)?);
         return Ok(report);
     };
-    // Each takes its sign from the nearest normal that the file gives.
+    // Each takes its sign from the nearest normal that the file gives; `clean` leaves at least one.
     let mut normals = given.clone();
     fill_missing(&cloud.positions, &mut normals, progress)?;
     let mut report = NormalReport::default();
@@ -305,9 +305,34 @@ mod tests {
         let found = prepared.normals.unwrap();
         assert!(found[10].dot(-prepared.positions[10]) > 0.99, "signed as the file's neighbours");
         assert_eq!(report.normals.unwrap().n_estimated, 1);
+        assert_eq!(report.normals.unwrap().repairs(), None);
         assert!(found[11].dot(normals[11]) > 0.999_999);
         let radii = prepared.radii.unwrap();
         assert!(radii[19] == 0.25 && radii[20] != 0.25 && 0.0 < radii[20]);
+    }
+
+    #[test]
+    fn what_was_estimated_is_told_by_the_report_and_only_repairs_are_notes() {
+        struct Listener(std::sync::Mutex<Vec<String>>);
+        impl Progress for Listener {
+            fn note(&self, line: &str) {
+                self.0.lock().unwrap().push(line.to_owned());
+            }
+        }
+        let listener = Listener(Default::default());
+        let mut cloud = ball(3000);
+        let (_, report) = prepare(cloud.clone(), &Preparation::default(), &listener).unwrap();
+        let line = report.normals.unwrap().line(report.normals_from.unwrap());
+        assert_eq!(line, "normals of 3000 points from 16 neighbours");
+        // A line of points far away has no planes.
+        cloud.positions.extend((0..40).map(|i| Vec3::X * (1000.0 + i as f32)));
+        let grid = Preparation { neighbors: Method::Grid, ..Preparation::default() };
+        let (_, report) = prepare(cloud, &grid, &listener).unwrap();
+        let line = report.normals.unwrap().line(report.normals_from.unwrap());
+        assert!(line.starts_with("normals of 3040 points from all points within 0."), "{line}");
+        let notes = listener.0.lock().unwrap();
+        assert_eq!(notes.iter().filter(|note| note.contains("without a plane")).count(), 1);
+        assert!(notes.iter().all(|note| !note.starts_with("normals")), "{notes:?}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Radii: how far each point's piece of surface reaches so that the pieces close.
 
-use super::neighbors::{Neighbor, Query, Tree};
+use super::neighbors::{Neighbor, Query, Tree, nearest_by_brute_force};
 use crate::error::{Error, Result};
 use crate::math::{Random, Vec3};
 use crate::progress::Progress;
@@ -135,15 +135,16 @@ enum Repair {
 impl RadiusReport {
     /// What was chosen, for people.
     pub fn line(&self, radius: Radius) -> String {
-        let Self { smallest, median, largest, .. } = self;
+        let [smallest, median, largest] =
+            [self.smallest, self.median, self.largest].map(three_digits);
         match radius {
-            Radius::Fixed(radius) => format!("radius {radius}, as asked"),
+            Radius::Fixed(_) => format!("radius {median}, as asked"),
             Radius::Median { n, .. } => {
                 format!("radius {median}, the median distance to the {} nearest points", 2 * n)
             }
             Radius::Adaptive { k } => format!(
-                "radius of each point: the distance to its neighbour {k}, {median} at the median, \
-                 from {smallest} to {largest}"
+                "radii {smallest} to {largest}, median {median}, to the {} neighbour",
+                ordinal(k)
             ),
         }
     }
@@ -151,8 +152,11 @@ impl RadiusReport {
     fn lines(&self) -> Vec<String> {
         let cut =
             format!("{} radii of stray points cut to {STRAY} times their neighbours'", self.n_cut);
-        let sizeless =
-            format!("{} radii without a size set to {}", self.n_without_size, self.median);
+        let sizeless = format!(
+            "{} radii without a size set to {}",
+            self.n_without_size,
+            three_digits(self.median)
+        );
         let lines = [(self.n_cut, cut), (self.n_without_size, sizeless)];
         lines.into_iter().filter(|(count, _)| 0 < *count).map(|(_, line)| line).collect()
     }
@@ -164,6 +168,26 @@ fn with_report(radii: Vec<f32>) -> (Vec<f32>, RadiusReport) {
     let middle = if smallest == largest { Some(largest) } else { median(radii.clone()) };
     let median = middle.unwrap_or(0.0);
     (radii, RadiusReport { smallest, median, largest, ..RadiusReport::default() })
+}
+
+/// A length as people read it: 0.459, 7.63, 4120.
+pub(super) fn three_digits(length: f32) -> String {
+    if !(1e-6..1e9).contains(&length) {
+        return format!("{length:.2e}");
+    }
+    let digits = (2 - length.log10().floor() as i32).max(0) as usize;
+    format!("{length:.digits$}")
+}
+
+/// 1st, 2nd, 3rd, 4th, 11th, 21st.
+fn ordinal(n: usize) -> String {
+    let ending = match (n % 10, n % 100) {
+        (1, last_two) if last_two != 11 => "st",
+        (2, last_two) if last_two != 12 => "nd",
+        (3, last_two) if last_two != 13 => "rd",
+        _ => "th",
+    };
+    format!("{n}{ending}")
 }
 
 fn usable(radius: f32) -> bool {
@@ -191,8 +215,8 @@ pub fn median_distance(
         Ok(nearest_by_brute_force(positions, point, sample.k))
     };
     let distances = points.par_iter().map(distances).collect::<Result<Vec<_>>>()?;
-    let lengths = distances.into_iter().flatten().map(f32::sqrt).filter(|d| usable(*d));
-    Ok(median(lengths.collect()).unwrap_or(1.0))
+    let lengths = distances.into_iter().flatten().map(|found| found.distance_squared.sqrt());
+    Ok(median(lengths.filter(|d| usable(*d)).collect()).unwrap_or(1.0))
 }
 
 /// Mean distance between points on the surface that they sample: rho = 2 sqrt(d_k^2 / k), k = 16, of
@@ -218,25 +242,6 @@ fn pick(n_points: usize, samples: usize, seed: u64) -> Result<Vec<usize>> {
     }
     let mut random = Random::new(seed, 0);
     Ok((0..samples).map(|_| random.below(n_points as u64) as usize).collect())
-}
-
-/// Squared distances to the k nearest other points, in no order.
-fn nearest_by_brute_force(positions: &[Vec3], point: usize, k: usize) -> Vec<f32> {
-    let mut nearest: Vec<f32> = Vec::new();
-    let mut bound = f32::INFINITY;
-    for (other, position) in positions.iter().enumerate() {
-        let squared = position.distance_squared(positions[point]);
-        if squared < bound && other != point {
-            nearest.push(squared);
-            if nearest.len() == 2 * k {
-                bound = *nearest.select_nth_unstable_by(k - 1, f32::total_cmp).1;
-                nearest.truncate(k);
-            }
-        }
-    }
-    nearest.sort_unstable_by(f32::total_cmp);
-    nearest.truncate(k);
-    nearest
 }
 
 fn median(mut values: Vec<f32>) -> Option<f32> {
@@ -334,22 +339,18 @@ mod tests {
     }
 
     #[test]
-    fn brute_force_finds_the_nearest() {
-        let mut random = Random::new(3, 0);
-        let positions: Vec<Vec3> = (0..500)
-            .map(|_| Vec3::new(random.next_f32(), random.next_f32(), random.next_f32()))
-            .collect();
-        let tree = Tree::new(&positions, &Silent).unwrap();
-        for k in [1, 5, 499, 600] {
-            let expected: Vec<f32> = tree
-                .nearest(positions[9], k, Some(9))
-                .iter()
-                .map(|neighbor| neighbor.distance_squared)
-                .collect();
-            let found = nearest_by_brute_force(&positions, 9, k);
-            assert_eq!(found.len(), expected.len());
-            assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() <= 1e-6 * b));
-        }
+    fn people_are_told_three_digits() {
+        let report = RadiusReport {
+            smallest: 0.459_123,
+            median: 0.701_4,
+            largest: 7.628_9,
+            ..RadiusReport::default()
+        };
+        let line = report.line(Radius::Adaptive { k: 12 });
+        assert_eq!(line, "radii 0.459 to 7.63, median 0.701, to the 12th neighbour");
+        let lengths = [4123.4, 0.095_432_76, 1e-12].map(three_digits);
+        assert_eq!(lengths, ["4123", "0.0954", "1.00e-12"]);
+        assert_eq!([1, 2, 3, 11, 22].map(ordinal), ["1st", "2nd", "3rd", "11th", "22nd"]);
     }
 
     #[test]

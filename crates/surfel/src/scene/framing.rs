@@ -16,6 +16,8 @@ pub struct Framing {
     pub view_angle_deg: f64,
     /// Direction of view, if it is given.
     pub direction: Option<DVec3>,
+    /// What is up in the picture, if it is not `up`.
+    pub view_up: Option<DVec3>,
     /// Turns the automatic position about `up`, clockwise from above.
     pub azimuth_deg: f64,
     /// Height of the automatic position over the horizon; chosen from the cloud's shape if not given.
@@ -33,6 +35,7 @@ impl Framing {
             is_orthographic: false,
             view_angle_deg: 35.0,
             direction: None,
+            view_up: None,
             azimuth_deg: 0.0,
             elevation_deg: None,
             zoom: 1.0,
@@ -59,7 +62,7 @@ pub fn frame(cloud: &PointCloud, framing: &Framing) -> Camera {
 
 /// A camera that looks along `forward` at all of `points`, and is relative to the same zero.
 pub(super) fn fit_along(forward: DVec3, points: &[Vec3], framing: &Framing) -> Camera {
-    let view_up = upright(framing.up, forward);
+    let view_up = framing.view_up.unwrap_or_else(|| upright(framing.up, forward));
     let axes = Camera {
         position: DVec3::ZERO,
         focal_point: forward,
@@ -200,6 +203,22 @@ mod tests {
         assert_eq!(camera.axes()[1].round(), DVec3::Y);
         let (left, _, right, _) = shown(&cloud, &camera);
         assert!(0.85 < (right - left) / 1600.0, "{left} {right}");
+    }
+
+    #[test]
+    fn the_picture_is_filled_whatever_is_up_in_it() {
+        let cloud = box_of_points(Vec3::new(600.0, 266.0, 67.0));
+        let map = Framing { direction: Some(-DVec3::Z), is_orthographic: true, ..framing() };
+        let east_up = Framing { view_up: Some(DVec3::X), ..map };
+        for (framing, expected) in [(map, 600.0 / (16.0 / 9.0)), (east_up, 600.0)] {
+            let camera = frame(&cloud, &framing);
+            let Projection::Orthographic { height } = camera.projection else { panic!() };
+            let expected = expected / (1.0 - 2.0 * MARGIN);
+            assert!((height / expected - 1.0).abs() < 0.01, "{height} {expected}");
+            let (left, top, right, bottom) = shown(&cloud, &camera);
+            let filled = ((right - left) / 1600.0).max((bottom - top) / 900.0);
+            assert!(0.9 < filled && 0.0 < left && 0.0 < top, "{left} {top} {right} {bottom}");
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Neighbourhoods of all points of a cloud: one question, three ways to the same answer.
 
+mod brute_force;
 mod found;
 mod grid;
 mod knn;
@@ -14,6 +15,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::str::FromStr;
 
+pub use brute_force::nearest_by_brute_force;
 pub use knn::Tree;
 
 /// How neighbours are found; the answer does not depend on it.

@@ -4,6 +4,7 @@ use super::ColorSource;
 use crate::math::Random;
 use crate::math::Vec3;
 use crate::points::PointCloud;
+use crate::points::neighbors::nearest_by_brute_force;
 use rayon::prelude::*;
 
 /// Light stone: white objects glare, and a grey without warmth looks dead.
@@ -12,17 +13,16 @@ pub const PLAIN: [u8; 3] = [0xd6, 0xd2, 0xca];
 /// What to show when nothing was asked for, and why.
 pub fn choose(cloud: &PointCloud) -> (ColorSource, &'static str) {
     if cloud.colors.as_ref().is_some_and(|colors| are_meant(colors)) {
-        return (ColorSource::Rgb, "the file has colours");
+        return (ColorSource::Rgb, "the colours of the file");
     }
     match &cloud.intensity {
         Some(values) if is_picture(&cloud.positions, values) => {
-            (ColorSource::Intensity, "the file has intensities and no colours")
+            (ColorSource::Intensity, "no colours in the file")
         }
-        Some(_) => (
-            ColorSource::Constant(PLAIN),
-            "the file has no colours, and its intensities differ between neighbours as much as anywhere",
-        ),
-        None => (ColorSource::Constant(PLAIN), "the file has no colours and no intensities"),
+        Some(_) => {
+            (ColorSource::Constant(PLAIN), "no colours in the file; its intensity looks like noise")
+        }
+        None => (ColorSource::Constant(PLAIN), "no colours and no intensity in the file"),
     }
 }
 
@@ -53,31 +53,16 @@ fn is_picture(positions: &[Vec3], values: &[f32]) -> bool {
         (0..N_PATCHES).map(|_| random.below(positions.len() as u64) as usize).collect();
     let patches: Vec<(f64, f64)> = centers
         .into_par_iter()
-        .map(|center| mean_and_variance(nearest(positions, center).map(|i| f64::from(values[i]))))
+        .map(|center| {
+            let around = nearest_by_brute_force(positions, center, PATCH - 1);
+            let others = around.iter().map(|neighbor| neighbor.index as usize);
+            mean_and_variance(others.chain([center]).map(|i| f64::from(values[i])))
+        })
         .filter(|(mean, variance)| mean.is_finite() && variance.is_finite())
         .collect();
     let (_, between) = mean_and_variance(patches.iter().map(|(mean, _)| *mean));
     let (within, _) = mean_and_variance(patches.iter().map(|(_, variance)| *variance));
     IN_COMMON * (between + within) < between
-}
-
-/// The points nearest to one of them, by looking at all.
-fn nearest(positions: &[Vec3], center: usize) -> impl Iterator<Item = usize> {
-    let mut nearest: Vec<(f32, usize)> = Vec::with_capacity(2 * PATCH);
-    let mut bound = f32::INFINITY;
-    for (i, position) in positions.iter().enumerate() {
-        let squared = position.distance_squared(positions[center]);
-        if squared < bound {
-            nearest.push((squared, i));
-            if nearest.len() == 2 * PATCH {
-                nearest.select_nth_unstable_by(PATCH, |a, b| a.0.total_cmp(&b.0));
-                nearest.truncate(PATCH);
-                bound = nearest.iter().fold(0.0, |all, (squared, _)| all.max(*squared));
-            }
-        }
-    }
-    nearest.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    nearest.into_iter().take(PATCH).map(|(_, i)| i)
 }
 
 fn mean_and_variance(values: impl Iterator<Item = f64>) -> (f64, f64) {

@@ -54,12 +54,15 @@ pub fn colorize(
         Some(source) => source.clone(),
         None => {
             let (source, reason) = choose(cloud);
-            progress.note(&format!("color {source}: {reason}"));
+            // Intensity is told with its range.
+            if source != ColorSource::Intensity {
+                progress.note(&format!("color {source}: {reason}"));
+            }
             source
         }
     };
     progress.check()?;
-    let missing = || missing_column(cloud, &source);
+    let missing = || source.missing_from(cloud);
     let all = |color: &(dyn Fn(usize) -> [u8; 3] + Sync)| {
         (0..cloud.len()).into_par_iter().map(color).collect()
     };
@@ -128,20 +131,31 @@ fn words(Stretch { low, high }: Stretch) -> String {
     format!("{low:.digits$} to {high:.digits$}")
 }
 
-fn missing_column(cloud: &PointCloud, source: &ColorSource) -> Error {
-    let mut known: Vec<&str> = vec!["elevation", "#RRGGBB"];
-    let columns = [
-        ("rgb", cloud.colors.is_some()),
-        ("intensity", cloud.intensity.is_some()),
-        ("class", cloud.classification.is_some()),
-        ("normal", cloud.normals.is_some()),
-    ];
-    known.extend(columns.iter().filter(|(_, is_present)| *is_present).map(|(name, _)| *name));
-    known.extend(cloud.scalars.iter().map(|scalar| scalar.name.as_str()));
-    Error::UnknownName {
-        kind: "column of this cloud",
-        found: source.to_string(),
-        known: known.join(", "),
+impl ColorSource {
+    /// Whether `cloud` has what it takes.
+    pub fn is_in(&self, cloud: &PointCloud) -> bool {
+        match self {
+            Self::Rgb => cloud.colors.is_some(),
+            Self::Intensity => cloud.intensity.is_some(),
+            Self::Class => cloud.classification.is_some(),
+            Self::Normal => cloud.normals.is_some(),
+            Self::Elevation | Self::Constant(_) => true,
+            Self::Column(name) => cloud.scalar(name).is_some(),
+        }
+    }
+
+    fn missing_from(&self, cloud: &PointCloud) -> Error {
+        let mut known: Vec<&str> = vec!["elevation", "#RRGGBB"];
+        let columns = [
+            ("rgb", Self::Rgb),
+            ("intensity", Self::Intensity),
+            ("class", Self::Class),
+            ("normal", Self::Normal),
+        ];
+        known.extend(columns.iter().filter(|(_, color)| color.is_in(cloud)).map(|(name, _)| *name));
+        known.extend(cloud.scalars.iter().map(|scalar| scalar.name.as_str()));
+        let kind = "column of this cloud";
+        Error::UnknownName { kind, found: self.to_string(), known: known.join(", ") }
     }
 }
 
@@ -257,11 +271,13 @@ mod tests {
     }
 
     #[test]
-    fn an_automatic_gray_is_never_black() {
+    fn an_automatic_gray_is_never_black_and_told_in_one_line() {
         let intensity = Some((0..2500).map(|i| i as f32).collect());
         let cloud = PointCloud { intensity, ..lattice() };
-        let darkest = colorize(&cloud, &coloring(None), &Silent).unwrap()[0][0];
+        let listener = Listener(Mutex::default());
+        let darkest = colorize(&cloud, &coloring(None), &listener).unwrap()[0][0];
         assert!(70 < darkest && darkest < 80, "{darkest}");
+        assert_eq!(listener.0.lock().unwrap().len(), 1);
         assert_eq!(colorize(&cloud, &coloring(Some("intensity")), &Silent).unwrap()[0], [0; 3]);
     }
 
