@@ -29,7 +29,7 @@ pub fn automatic(
         ..*settings
     };
     let (image, _) = renderer.render(scene, &preview, muted)?;
-    let covered = image.color.iter().zip(&image.layers.coverage).filter(|(_, c)| 0.0 < **c);
+    let covered = image.color.iter().zip(&image.coverage).filter(|(_, c)| 0.0 < **c);
     // The strongest channel, not luminance: a meadow whose green is cut off turns to neon.
     Ok(stops(covered.map(|([r, g, b, _], _)| r.max(*g).max(*b)).collect()))
 }

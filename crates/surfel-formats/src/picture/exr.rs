@@ -43,7 +43,8 @@ fn channels(image: &Image) -> Vec<AnyChannel<FlatSamples>> {
     for (channel, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
         add(name, FlatSamples::F32(image.color.iter().map(|color| color[channel]).collect()));
     }
-    let layers = &image.layers;
+    add("coverage", FlatSamples::F32(image.coverage.clone()));
+    let Some(layers) = &image.layers else { return channels };
     let mut add_triple = |names: [&str; 3], triples: &[Vec3]| {
         for (axis, name) in names.into_iter().enumerate() {
             add(name, FlatSamples::F32(triples.iter().map(|triple| triple[axis]).collect()));
@@ -53,7 +54,6 @@ fn channels(image: &Image) -> Vec<AnyChannel<FlatSamples>> {
     add_triple(["P.X", "P.Y", "P.Z"], &layers.position);
     add_triple(["albedo.R", "albedo.G", "albedo.B"], &layers.albedo);
     add("Z", FlatSamples::F32(layers.depth.clone()));
-    add("coverage", FlatSamples::F32(layers.coverage.clone()));
     add("id", FlatSamples::U32(layers.point_id.clone()));
     add("instance", FlatSamples::U32(layers.instance_id.clone()));
     channels

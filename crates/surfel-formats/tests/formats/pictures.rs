@@ -45,15 +45,16 @@ fn eight_bit_colours_survive_and_alpha_is_undone() {
 fn exr_keeps_every_layer_and_the_origin() {
     let folder = Folder::new("exr");
     let path = folder.path("a.exr");
-    let mut image = Image::new(3, 2);
+    let mut image = Image::with_layers(3, 2);
     image.color[4] = [0.25, 0.5, 2.0, 1.0];
-    image.layers.depth[4] = 12.5;
-    image.layers.normal[4] = Vec3::Z;
-    image.layers.position[4] = Vec3::new(1.0, 2.0, 3.0);
-    image.layers.point_id[4] = 0xfeed_beef;
-    image.layers.instance_id[4] = 7;
-    image.layers.albedo[4] = Vec3::splat(0.5);
-    image.layers.coverage[4] = 0.75;
+    image.coverage[4] = 0.75;
+    let layers = image.layers.as_mut().unwrap();
+    layers.depth[4] = 12.5;
+    layers.normal[4] = Vec3::Z;
+    layers.position[4] = Vec3::new(1.0, 2.0, 3.0);
+    layers.point_id[4] = 0xfeed_beef;
+    layers.instance_id[4] = 7;
+    layers.albedo[4] = Vec3::splat(0.5);
     let origin = DVec3::new(484_800.123_456, 6_632_800.0, 100.0);
     save_image(&path, &image, &ImageOptions { origin, ..Default::default() }).unwrap();
 

@@ -77,7 +77,7 @@ fn a_shadow_lies_where_the_sun_casts_it() {
         scene.lights = vec![Light::Sun(Sun { direction, ..sun })];
         let image = render(&scene, &SETTINGS);
         let mut n_checked = 0;
-        for (pixel, position) in image.color.iter().zip(&image.layers.position) {
+        for (pixel, position) in image.color.iter().zip(&image.layers.as_ref().unwrap().position) {
             // On the floor, and not hidden by the ball.
             if 0.2 < position.z || 1.9 < position.abs().max_element() {
                 continue;
@@ -105,7 +105,7 @@ fn a_wide_sun_has_a_half_shadow() {
     let grey = image
         .color
         .iter()
-        .zip(&image.layers.position)
+        .zip(&image.layers.as_ref().unwrap().position)
         .filter(|(pixel, position)| position.z < 0.2 && (0.1..0.4).contains(&pixel[0]))
         .count();
     assert!(100 < grey, "{grey} pixels in half shadow");
@@ -137,17 +137,17 @@ fn layers_tell_what_the_pixel_centres_meet() {
     let scene =
         scenes::scene(clouds::georeferenced(&clouds::sphere(20_000, 1.0)), SurfaceKind::Splat);
     let image = render(&scene, &SETTINGS);
-    let layers = &image.layers;
+    let layers = image.layers.as_ref().unwrap();
     let center = 32 * 64 + 32;
     assert!((layers.depth[center] - 5.0).abs() < 0.01, "{}", layers.depth[center]);
     assert!(layers.position[center].distance(Vec3::X) < 0.06);
     assert!(0.99 < layers.normal[center].x);
-    assert_eq!((layers.instance_id[center], layers.coverage[center]), (0, 1.0));
+    assert_eq!((layers.instance_id[center], image.coverage[center]), (0, 1.0));
     let point = scene.cloud.positions[layers.point_id[center] as usize];
     assert!(point.distance(layers.position[center]) < 0.06);
     assert_eq!((layers.point_id[0], layers.instance_id[0]), (u32::MAX, u32::MAX));
     assert_eq!(
-        (layers.depth[0], layers.coverage[0], image.color[0]),
+        (layers.depth[0], image.coverage[0], image.color[0]),
         (f32::INFINITY, 0.0, [0.0; 4])
     );
 }

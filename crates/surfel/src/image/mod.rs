@@ -21,8 +21,10 @@ pub struct Image {
     pub height: u32,
     /// Linear Rec.709, premultiplied by alpha.
     pub color: Vec<[f32; 4]>,
-    /// What was seen along the ray through each pixel's centre.
-    pub layers: Layers,
+    /// Share of each pixel's samples that hit something.
+    pub coverage: Vec<f32>,
+    /// What was seen along the rays through the pixels' centres, if that was asked for.
+    pub layers: Option<Layers>,
 }
 
 /// What the ray through each pixel's centre met.
@@ -40,30 +42,29 @@ pub struct Layers {
     pub instance_id: Vec<u32>,
     /// Linear surface colour; zero where nothing was hit.
     pub albedo: Vec<Vec3>,
-    /// Share of the pixel's samples that hit something.
-    pub coverage: Vec<f32>,
 }
 
 /// Marks a pixel that shows no point.
 pub const NO_ID: u32 = u32::MAX;
 
 impl Image {
-    /// A transparent picture that shows nothing.
+    /// A transparent picture that shows nothing, without layers.
     pub fn new(width: u32, height: u32) -> Self {
         let n = width as usize * height as usize;
-        Self {
-            width,
-            height,
-            color: vec![[0.0; 4]; n],
-            layers: Layers {
-                depth: vec![f32::INFINITY; n],
-                normal: vec![Vec3::ZERO; n],
-                position: vec![Vec3::ZERO; n],
-                point_id: vec![NO_ID; n],
-                instance_id: vec![NO_ID; n],
-                albedo: vec![Vec3::ZERO; n],
-                coverage: vec![0.0; n],
-            },
-        }
+        Self { width, height, color: vec![[0.0; 4]; n], coverage: vec![0.0; n], layers: None }
+    }
+
+    /// The same, with layers that show nothing.
+    pub fn with_layers(width: u32, height: u32) -> Self {
+        let n = width as usize * height as usize;
+        let layers = Layers {
+            depth: vec![f32::INFINITY; n],
+            normal: vec![Vec3::ZERO; n],
+            position: vec![Vec3::ZERO; n],
+            point_id: vec![NO_ID; n],
+            instance_id: vec![NO_ID; n],
+            albedo: vec![Vec3::ZERO; n],
+        };
+        Self { layers: Some(layers), ..Self::new(width, height) }
     }
 }

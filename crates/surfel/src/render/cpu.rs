@@ -59,7 +59,7 @@ impl CpuRenderer {
         progress: &dyn Progress,
     ) -> Result<(Image, RenderStats)> {
         progress.begin("render", u64::from(settings.width) * u64::from(settings.height));
-        let mut image = Image::new(settings.width, settings.height);
+        let mut image = settings.blank();
         let mut stats = RenderStats::default();
         let tiles = TilePlace::all(settings);
         let job = Job { scene, simd: self.simd, view, settings, progress };
@@ -70,7 +70,7 @@ impl CpuRenderer {
                 Ok(tile)
             };
             for tile in tiles.par_iter().map(render).collect::<Result<Vec<_>>>()? {
-                tile.copy_to(&mut image, settings.with_layers);
+                tile.copy_to(&mut image);
                 stats.rays.primary += tile.counts.primary;
                 stats.rays.shadow += tile.counts.shadow;
                 stats.rays.sky += tile.counts.sky;
@@ -235,19 +235,19 @@ impl Tile {
         self.layers = rays.iter().zip(hits).map(layer).collect();
     }
 
-    fn copy_to(&self, image: &mut Image, with_layers: bool) {
+    fn copy_to(&self, image: &mut Image) {
         for (i, (x, y)) in self.place.pixels().enumerate() {
             let pixel = y as usize * image.width as usize + x as usize;
             image.color[pixel] = self.color[i];
-            image.layers.coverage[pixel] = self.coverage[i];
-            if with_layers {
+            image.coverage[pixel] = self.coverage[i];
+            if let Some(layers) = &mut image.layers {
                 let LayerPixel { depth, position, hit } = &self.layers[i];
-                image.layers.depth[pixel] = *depth;
-                image.layers.position[pixel] = *position;
-                image.layers.normal[pixel] = hit.normal;
-                image.layers.point_id[pixel] = hit.id;
-                image.layers.instance_id[pixel] = if hit.is_miss() { NO_ID } else { 0 };
-                image.layers.albedo[pixel] = hit.color;
+                layers.depth[pixel] = *depth;
+                layers.position[pixel] = *position;
+                layers.normal[pixel] = hit.normal;
+                layers.point_id[pixel] = hit.id;
+                layers.instance_id[pixel] = if hit.is_miss() { NO_ID } else { 0 };
+                layers.albedo[pixel] = hit.color;
             }
         }
     }

@@ -25,6 +25,14 @@ pub struct Settings {
     pub with_layers: bool,
 }
 
+impl Settings {
+    /// A picture of this size with the layers that are wanted, showing nothing yet.
+    fn blank(&self) -> Image {
+        let new = if self.with_layers { Image::with_layers } else { Image::new };
+        new(self.width, self.height)
+    }
+}
+
 /// What making a picture took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RenderStats {

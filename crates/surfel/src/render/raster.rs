@@ -47,7 +47,7 @@ pub fn render(
 }
 
 fn shade(scene: &FlatScene, settings: &Settings, nearest: &[u64]) -> Image {
-    let mut image = Image::new(settings.width, settings.height);
+    let mut image = settings.blank();
     let width = settings.width as usize;
     for (pixel, &key) in nearest.iter().enumerate() {
         let (x, y) = (pixel % width, pixel / width);
@@ -61,8 +61,8 @@ fn shade(scene: &FlatScene, settings: &Settings, nearest: &[u64]) -> Image {
         let lit = scene.material != Material::Unlit;
         let shade = if lit { eye_dome(nearest, settings, x, y) } else { 1.0 };
         image.color[pixel] = (shade * albedo).extend(1.0).to_array();
-        let layers = &mut image.layers;
-        layers.coverage[pixel] = 1.0;
+        image.coverage[pixel] = 1.0;
+        let Some(layers) = &mut image.layers else { continue };
         layers.depth[pixel] = depth(key);
         layers.position[pixel] = block.position(lane);
         layers.point_id[pixel] = block.id[lane];
