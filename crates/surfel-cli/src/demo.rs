@@ -85,7 +85,7 @@ fn camera_words() -> Vec<String> {
 }
 
 fn tell(cloud: &Path, words: &[String], n_points: usize, start: Instant) -> anyhow::Result<()> {
-    let cloud = cloud.display();
+    let cloud = quoted(&cloud.display().to_string());
     print(&format!(
         "A virtual scanner measured a ruin from six stations: {n_points} points, in {cloud}.\n\
          The picture was made from that file, all in {:.0} s, by\n  {}\n\
@@ -104,5 +104,21 @@ fn tell(cloud: &Path, words: &[String], n_points: usize, start: Instant) -> anyh
 /// As a shell takes it for one word: `#` would begin a comment, a space another word.
 fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_./,:+".contains(c);
-    if word.chars().all(is_plain) { word.to_owned() } else { format!("'{word}'") }
+    if word.chars().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_quoted_where_a_shell_would_change_them() {
+        assert_eq!(quoted("a/demo.laz"), "a/demo.laz");
+        assert_eq!(quoted("#fff,#000"), "'#fff,#000'");
+        assert_eq!(quoted("it's here"), r"'it'\''s here'");
+    }
 }

@@ -66,14 +66,15 @@ pub fn make(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()>
 
 /// Fails before the work where the output could not be written after it.
 pub fn check_output(path: &Path) -> anyhow::Result<()> {
-    // A finished file takes the place of its name, and would end a pipe or a device there.
-    if path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-        bail!("{}: a device or a pipe stands there; name a file", path.display());
-    }
     surfel_formats::check_output(path).map_err(|error| match error {
         surfel_formats::Error::Unsupported { .. } => Usage(error.to_string()).into(),
-        other => other.into(),
-    })
+        other => anyhow::Error::from(other),
+    })?;
+    // A finished file takes the place of its name, and would end a pipe or a device there.
+    if path.metadata().is_ok_and(|found| !found.is_file()) {
+        bail!("{}: a device or a pipe stands there; name a file", path.display());
+    }
+    Ok(())
 }
 
 fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
