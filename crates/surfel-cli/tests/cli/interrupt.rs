@@ -1,6 +1,7 @@
 //! Ctrl-C and SIGTERM.
 
 use super::common::{Folder, command, dome};
+use std::io::Read;
 use std::os::unix::process::ExitStatusExt;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -36,11 +37,13 @@ fn one_signal_stops_within_a_second_and_leaves_no_file() {
 #[test]
 fn a_second_signal_ends_work_that_does_not_ask() {
     let folder = Folder::new();
-    // Nobody writes to this pipe: opening it to read waits for ever.
-    let pipe = folder.path("pipe.ply");
-    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    let mut child = command(&["info", &pipe]).stderr(Stdio::piped()).spawn().unwrap();
-    std::thread::sleep(Duration::from_millis(500));
+    let cloud = folder.write("dome.ply", dome(30));
+    // A noisy picture is more than a pipe holds, so writing it waits for ever for somebody to read on.
+    let arguments =
+        ["render", &cloud, "-o", "-", "--resolution", "600x500", "--spp", "1", "--samples", "1"];
+    let mut child =
+        command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    child.stdout.as_mut().unwrap().read_exact(&mut [0]).unwrap();
     send("-INT", &child);
     std::thread::sleep(Duration::from_millis(300));
     assert!(child.try_wait().unwrap().is_none(), "the first signal only asks");
