@@ -164,3 +164,12 @@ fn an_output_that_cannot_be_written_to_the_end_leaves_the_old_one() {
     }
     assert_eq!(folder.names(), ["dome.ply", "old.laz", "old.ply", "old.png"]);
 }
+
+#[test]
+fn damaged_laz_is_an_error_without_a_word_of_panic() {
+    let folder = Folder::new();
+    let finds = concat!(env!("CARGO_MANIFEST_DIR"), "/../surfel-formats/tests/finds");
+    let message =
+        fail(&["prepare", &format!("{finds}/decoder_state.laz"), "-o", &folder.path("a.ply")], 1);
+    assert!(message.contains("decoder_state.laz") && !message.contains("panicked"), "{message}");
+}
