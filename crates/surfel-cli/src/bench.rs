@@ -220,7 +220,7 @@ impl Bench<'_> {
             Rays::Primary | Rays::Bounce => {
                 let mut hits = vec![Hit::MISS; n];
                 trace::closest_hits(flat, simd, rays, &mut hits);
-                hits.iter().filter(|hit| **hit != Hit::MISS).count()
+                hits.iter().filter(|hit| !hit.is_miss()).count()
             }
             Rays::Gather => {
                 let mut gathers = vec![Gather::EMPTY; n];

@@ -39,7 +39,7 @@ impl Plan {
 
     /// Columns, flat form and what building it takes beside, picture.
     fn bytes(&self) -> [u64; 3] {
-        let flat = (size_of::<PointBlock>() / LANES) as u64 + 5;
+        let flat = (size_of::<PointBlock>() / LANES + size_of::<u32>()) as u64 + 5;
         let columns = self.n_points.saturating_mul(COLUMNS);
         [columns, self.n_selected.saturating_mul(flat) / 2 * 5, self.n_pixels * PIXEL]
     }

@@ -5,7 +5,7 @@ use anyhow::Context;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
-use surfel::flat::{FlatScene, PointBlock};
+use surfel::flat::FlatScene;
 use surfel::render::RenderStats;
 use surfel::trace::Simd;
 
@@ -57,9 +57,8 @@ impl Run<'_> {
 
 /// Bytes that tree and points take in the flat form, for each of `n_points`.
 pub fn bytes_per_point(scene: &FlatScene, n_points: usize) -> Value {
-    let per_point = |n: usize, size: usize| (n * size) as f64 / n_points.max(1) as f64;
-    let tree = per_point(scene.points.nodes.len(), size_of::<surfel::bvh::Node>());
-    let points = per_point(scene.points.blocks.len(), size_of::<PointBlock>());
+    let (tree, points) = scene.points.bytes();
+    let [tree, points] = [tree, points].map(|bytes| bytes as f64 / n_points.max(1) as f64);
     json!({ "tree": tree, "points": points, "total": tree + points })
 }
 

@@ -71,7 +71,7 @@ fn preparation_and_tree_do_not_depend_on_threads() {
             let flat =
                 FlatScene::new(&Scene { cloud, colors, ..scene(SurfaceKind::Splat) }, &Silent)
                     .unwrap();
-            (flat.points.nodes, flat.points.blocks)
+            (flat.points.nodes, flat.points.blocks, flat.points.ids)
         })
     };
     assert!(build(1) == build(2));

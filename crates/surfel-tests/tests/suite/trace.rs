@@ -28,14 +28,12 @@ fn plain_hits(scene: &FlatScene, ray: &Ray) -> Vec<Found> {
             let distance = distances.store()[lane];
             if distance <= ray.t_max {
                 let slot = (block_idx * LANES + lane) as u32;
-                found.push((
-                    Hit { distance, slot, id: block.id[lane] },
-                    points.radius.store()[lane],
-                ));
+                found.push((Hit { distance, slot }, points.radius.store()[lane]));
             }
         }
     }
-    found.sort_by(|(a, _), (b, _)| a.distance.total_cmp(&b.distance).then(a.id.cmp(&b.id)));
+    let id = |hit: &Hit| scene.points.id(hit.slot);
+    found.sort_by(|(a, _), (b, _)| a.distance.total_cmp(&b.distance).then(id(a).cmp(&id(b))));
     found
 }
 
@@ -123,7 +121,7 @@ fn equal_points_are_told_apart_by_their_index() {
     check("equal points", &flat, &rays);
     let mut hits = [Hit::MISS];
     trace::closest_hits(&flat, Simd::detect(), &rays, &mut hits);
-    assert_eq!(hits[0].id, 0);
+    assert_eq!(flat.points.id(hits[0].slot), 0);
 }
 
 #[test]

@@ -3,8 +3,8 @@
 mod block;
 mod points;
 
-pub use block::{BlockPoint, NO_POINT, PointBlock};
-pub use points::{FlatPoints, Slot};
+pub use block::{BlockPoint, PointBlock};
+pub use points::{FlatPoints, NO_POINT, Slot};
 
 use crate::error::{Error, Result};
 use crate::math::DVec3;

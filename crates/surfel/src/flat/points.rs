@@ -1,6 +1,6 @@
 //! A cloud in the form that kernels read: tree nodes and leaf blocks.
 
-use super::block::{BlockPoint, NO_POINT, PointBlock, fits};
+use super::block::{BlockPoint, PointBlock, fits};
 use crate::bvh::{self, NO_PRIMITIVE, Node, Primitive};
 use crate::error::{Error, Result};
 use crate::image::decode_srgb8;
@@ -15,7 +15,12 @@ use rayon::prelude::*;
 pub struct FlatPoints {
     pub nodes: Vec<Node>,
     pub blocks: Vec<PointBlock>,
+    /// Index in the cloud of the point at each slot; `NO_POINT` where there is none.
+    pub ids: Vec<u32>,
 }
+
+/// Marks a slot without a point.
+pub const NO_POINT: u32 = u32::MAX;
 
 /// A point's place: eight times its block, plus its lane.
 pub type Slot = u32;
@@ -51,7 +56,6 @@ impl FlatPoints {
                     .filter(|_| is_traced)
                     .map_or(0.0, |radii| factor * radii[i]),
                 color: colors[i],
-                id,
             }
         };
         let mut primitives: Vec<Primitive> = (0..cloud.len() as u32)
@@ -70,17 +74,19 @@ impl FlatPoints {
             let points = ids.iter().filter(|&&id| id != NO_PRIMITIVE).map(|&id| point(id));
             PointBlock::new(&points.collect::<Vec<_>>())
         };
-        Ok(Self { blocks: tree.blocks.par_iter().map(encode).collect(), nodes: tree.nodes })
+        let blocks = tree.blocks.par_iter().map(encode).collect();
+        Ok(Self { nodes: tree.nodes, blocks, ids: tree.blocks.into_flattened() })
     }
 
     /// Bytes of the tree, and of the points.
     pub fn bytes(&self) -> (usize, usize) {
-        (size_of_val(self.nodes.as_slice()), size_of_val(self.blocks.as_slice()))
+        let points = size_of_val(self.blocks.as_slice()) + size_of_val(self.ids.as_slice());
+        (size_of_val(self.nodes.as_slice()), points)
     }
 
     /// The point's index in its cloud.
     pub fn id(&self, slot: Slot) -> u32 {
-        self.blocks[slot as usize / LANES].id[slot as usize % LANES]
+        self.ids[slot as usize]
     }
 
     pub fn radius(&self, slot: Slot) -> f32 {
@@ -101,15 +107,14 @@ impl FlatPoints {
 
     /// Slots that hold points.
     pub fn slots(&self) -> impl Iterator<Item = Slot> {
-        let n_slots = (self.blocks.len() * LANES) as u32;
-        (0..n_slots).filter(|&slot| self.id(slot) != NO_POINT)
+        (0..self.ids.len() as Slot).filter(|&slot| self.id(slot) != NO_POINT)
     }
 }
 
 /// Larger than the point by what encoding and the rounding of coordinates may move it.
 fn padded_bounds(kind: SurfaceKind, point: &BlockPoint) -> Aabb {
     let bounds = kind.bounds(point.position, point.normal, point.radius);
-    let padding = 1e-3 * point.radius + 2.0 * f32::EPSILON * point.position.abs().max_element();
+    let padding = 3e-3 * point.radius + 2.0 * f32::EPSILON * point.position.abs().max_element();
     Aabb { min: bounds.min - padding, max: bounds.max + padding }
 }
 

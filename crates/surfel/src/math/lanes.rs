@@ -16,7 +16,10 @@ pub trait Lanes:
     fn load(values: &[f32; LANES]) -> Self;
     fn from_u8(values: &[u8; LANES]) -> Self;
     fn from_u16(values: &[u16; LANES]) -> Self;
-    fn from_i16(values: &[i16; LANES]) -> Self;
+    /// The 10 bits above the `SHIFT` lowest of each word, as signed integers.
+    fn from_signed_bits<const SHIFT: i32>(words: &[u32; LANES]) -> Self;
+    /// The 2 highest bits of each word.
+    fn from_top_bits(words: &[u32; LANES]) -> Self;
     fn store(self) -> [f32; LANES];
     /// `other` where either is NaN, as on x86.
     fn min(self, other: Self) -> Self;
@@ -75,8 +78,13 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    fn from_i16(values: &[i16; LANES]) -> Self {
-        Self(values.map(f32::from))
+    fn from_signed_bits<const SHIFT: i32>(words: &[u32; LANES]) -> Self {
+        Self(words.map(|word| ((word << (22 - SHIFT)) as i32 >> 22) as f32))
+    }
+
+    #[inline(always)]
+    fn from_top_bits(words: &[u32; LANES]) -> Self {
+        Self(words.map(|word| (word >> 30) as f32))
     }
 
     #[inline(always)]

@@ -65,7 +65,7 @@ fn shade(scene: &FlatScene, settings: &Settings, nearest: &[u64]) -> Image {
         let Some(layers) = &mut image.layers else { continue };
         layers.depth[pixel] = depth(key);
         layers.position[pixel] = block.position(lane);
-        layers.point_id[pixel] = block.id[lane];
+        layers.point_id[pixel] = scene.points.id(slot);
         layers.instance_id[pixel] = 0;
         layers.albedo[pixel] = albedo;
     }

@@ -17,8 +17,8 @@ impl Shape for Disc {
         let distance = points.normal.dot(points.center) / points.normal.dot(ray.direction);
         let offset = points.center.minus(ray.direction.scaled(distance));
         // A ray in the disc's plane gives NaN or infinity here, and fails both tests.
-        let hit = offset.dot(offset).less_equal(points.radius * points.radius)
-            & ray.t_min.less_equal(distance);
+        let hit =
+            offset.dot(offset).less(points.radius * points.radius) & ray.t_min.less_equal(distance);
         (distance, hit)
     }
 }

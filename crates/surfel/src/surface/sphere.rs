@@ -17,7 +17,7 @@ impl Shape for Sphere {
         let half_chord = squared.max(L::splat(0.0)).sqrt();
         let (near, far) = (along - half_chord, along + half_chord);
         let distance = L::select(ray.t_min.less_equal(near), near, far);
-        let hit = L::splat(0.0).less_equal(squared) & ray.t_min.less_equal(distance);
+        let hit = L::splat(0.0).less(squared) & ray.t_min.less_equal(distance);
         (distance, hit)
     }
 }

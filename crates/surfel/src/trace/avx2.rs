@@ -68,9 +68,17 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    fn from_i16(values: &[i16; LANES]) -> Self {
-        avx2!(Self(_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(
-            values.as_ptr().cast()
+    fn from_signed_bits<const SHIFT: i32>(words: &[u32; LANES]) -> Self {
+        avx2!(Self(_mm256_cvtepi32_ps(_mm256_srai_epi32::<22>(_mm256_sll_epi32(
+            _mm256_loadu_si256(words.as_ptr().cast()),
+            _mm_cvtsi32_si128(22 - SHIFT)
+        )))))
+    }
+
+    #[inline(always)]
+    fn from_top_bits(words: &[u32; LANES]) -> Self {
+        avx2!(Self(_mm256_cvtepi32_ps(_mm256_srli_epi32::<30>(_mm256_loadu_si256(
+            words.as_ptr().cast()
         )))))
     }
 

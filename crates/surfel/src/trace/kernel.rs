@@ -13,16 +13,21 @@ pub struct Hit {
     /// Infinite if nothing was hit.
     pub distance: f32,
     pub slot: Slot,
-    /// Index of the point in its cloud.
-    pub id: u32,
 }
 
 impl Hit {
-    pub const MISS: Self = Self { distance: f32::INFINITY, slot: 0, id: u32::MAX };
+    pub const MISS: Self = Self { distance: f32::INFINITY, slot: Slot::MAX };
+
+    pub fn is_miss(&self) -> bool {
+        self.slot == Slot::MAX
+    }
 
     #[inline(always)]
-    fn is_before(&self, other: &Self) -> bool {
-        self.distance < other.distance || (self.distance == other.distance && self.id < other.id)
+    fn is_before(&self, other: &Self, points: &FlatPoints) -> bool {
+        let first_id = |hit: &Self| points.ids.get(hit.slot as usize).copied();
+        self.distance < other.distance
+            || self.distance == other.distance
+                && (other.is_miss() || first_id(self) < first_id(other))
     }
 }
 
@@ -43,13 +48,13 @@ impl Gather {
 
     /// Takes `hit` in if it is near enough, and drops what is no longer.
     #[inline(always)]
-    fn insert(&mut self, hit: Hit, radius: f32) {
+    fn insert(&mut self, points: &FlatPoints, hit: Hit, radius: f32) {
         self.limit = self.limit.min(gather_limit(hit.distance, radius));
         let mut place = self.len.min(MAX_GATHERED - 1);
-        if self.len == MAX_GATHERED && !hit.is_before(&self.hits[place]) {
+        if self.len == MAX_GATHERED && !hit.is_before(&self.hits[place], points) {
             return;
         }
-        while 0 < place && hit.is_before(&self.hits[place - 1]) {
+        while 0 < place && hit.is_before(&self.hits[place - 1], points) {
             self.hits[place] = self.hits[place - 1];
             place -= 1;
         }
@@ -115,7 +120,7 @@ fn closest_of<L: Lanes, S: Shape>(scene: &FlatScene, ray: &Ray) -> Hit {
     let hit = Hit { distance: ray.t_max, ..Hit::MISS };
     let mut closest = Closest { ray, shape: PhantomData::<S>, hit };
     along_ray::<L>(&scene.points, ray, &mut closest);
-    if closest.hit.id == Hit::MISS.id { Hit::MISS } else { closest.hit }
+    if closest.hit.is_miss() { Hit::MISS } else { closest.hit }
 }
 
 #[inline(always)]
@@ -147,10 +152,9 @@ impl BlockHits {
         let lanes = block.points::<L>(ray.origin);
         let (distances, mask) = S::intersect(&lanes, &RayLanes::<L>::new(ray));
         let hit_lanes = (mask & distances.less_equal(L::splat(t_max))).bits();
-        let lanes_left = if hit_lanes == 0 { 0 } else { hit_lanes & block.occupied() };
         Self {
             block_idx,
-            lanes: lanes_left,
+            lanes: hit_lanes,
             distances: distances.store(),
             radii: lanes.radius.store(),
         }
@@ -158,15 +162,14 @@ impl BlockHits {
 
     /// The next hit and the radius of what was hit.
     #[inline(always)]
-    pub(super) fn next(&mut self, points: &FlatPoints) -> Option<(Hit, f32)> {
+    pub(super) fn next(&mut self) -> Option<(Hit, f32)> {
         if self.lanes == 0 {
             return None;
         }
         let lane = self.lanes.trailing_zeros() as usize;
         self.lanes &= self.lanes - 1;
         let slot = self.block_idx * LANES as u32 + lane as u32;
-        let id = points.blocks[self.block_idx as usize].id[lane];
-        Some((Hit { distance: self.distances[lane], slot, id }, self.radii[lane]))
+        Some((Hit { distance: self.distances[lane], slot }, self.radii[lane]))
     }
 }
 
@@ -185,8 +188,8 @@ impl<S: Shape> RayVisitor for Closest<'_, S> {
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
         let mut hits = BlockHits::find::<L, S>(points, block_idx, self.ray, self.hit.distance);
-        while let Some((hit, _)) = hits.next(points) {
-            if hit.is_before(&self.hit) {
+        while let Some((hit, _)) = hits.next() {
+            if hit.is_before(&self.hit, points) {
                 self.hit = hit;
             }
         }
@@ -229,9 +232,9 @@ impl RayVisitor for Gathering<'_> {
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
         let reach = self.gather.reach();
         let mut hits = BlockHits::find::<L, Disc>(points, block_idx, self.ray, reach);
-        while let Some((hit, radius)) = hits.next(points) {
+        while let Some((hit, radius)) = hits.next() {
             if hit.distance <= self.gather.limit {
-                self.gather.insert(hit, radius);
+                self.gather.insert(points, hit, radius);
             }
         }
         ControlFlow::Continue(())

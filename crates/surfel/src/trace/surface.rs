@@ -85,7 +85,7 @@ impl RayVisitor for OccluderSearch<'_> {
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
         let mut hits = BlockHits::find::<L, Disc>(points, block_idx, self.ray, self.ray.t_max);
-        while let Some((hit, _)) = hits.next(points) {
+        while let Some((hit, _)) = hits.next() {
             if single_disc::<L>(self.scene, self.ray, &hit) != Judgement::Outside {
                 self.is_occluded = true;
                 return ControlFlow::Break(());
@@ -111,7 +111,7 @@ fn single_disc<L: Lanes>(scene: &FlatScene, ray: &Ray, hit: &Hit) -> Judgement {
 #[inline(always)]
 fn sphere_hit<L: Lanes>(scene: &FlatScene, ray: &Ray) -> SurfaceHit {
     let hit = closest_hit::<L>(scene, ray);
-    if hit == Hit::MISS {
+    if hit.is_miss() {
         return SurfaceHit::MISS;
     }
     let sphere = scene.points.gathered(hit.slot, ray.at(hit.distance));
@@ -119,7 +119,7 @@ fn sphere_hit<L: Lanes>(scene: &FlatScene, ray: &Ray) -> SurfaceHit {
     let normal = if outward.dot(ray.direction) < 0.0 { outward } else { -outward };
     SurfaceHit {
         distance: hit.distance,
-        id: hit.id,
+        id: scene.points.id(hit.slot),
         radius: sphere.radius,
         normal: normal.normalize_or(-ray.direction),
         color: sphere.color,
@@ -139,7 +139,13 @@ fn surface_hit<L: Lanes>(scene: &FlatScene, ray: &Ray) -> SurfaceHit {
         let discs = &discs[..n];
         let (normal, color) = blend(scene.surface, discs, ray.direction);
         let radius = discs[0].radius / scene.surface.radius_factor();
-        let hit = SurfaceHit { distance: first.distance, id: first.id, radius, normal, color };
+        let hit = SurfaceHit {
+            distance: first.distance,
+            id: scene.points.id(first.slot),
+            radius,
+            normal,
+            color,
+        };
         if scene.boundary == Boundary::Off {
             return hit;
         }
@@ -168,7 +174,7 @@ fn pierced_discs<L: Lanes>(
     let disc = |hit: &Hit| scene.points.gathered(hit.slot, ray.at(hit.distance));
     if !scene.surface.is_gathered() {
         let hit = closest_hit::<L>(scene, ray);
-        if hit == Hit::MISS {
+        if hit.is_miss() {
             return (hit, 0);
         }
         discs[0] = disc(&hit);
