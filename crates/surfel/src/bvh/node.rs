@@ -31,6 +31,27 @@ pub enum Child {
     Block(u32),
 }
 
+impl Child {
+    const BLOCK_BIT: u32 = 1 << 31;
+
+    /// In one word, for the stacks of traversals: there are less than 2^31 of either kind.
+    #[inline(always)]
+    pub fn pack(self) -> u32 {
+        match self {
+            Self::Node(node_idx) => node_idx,
+            Self::Block(block_idx) => block_idx | Self::BLOCK_BIT,
+        }
+    }
+
+    #[inline(always)]
+    pub fn unpack(word: u32) -> Self {
+        match word & Self::BLOCK_BIT {
+            0 => Self::Node(word),
+            _ => Self::Block(word & !Self::BLOCK_BIT),
+        }
+    }
+}
+
 const IS_NODE: u8 = 0x40;
 const IS_BLOCK: u8 = 0x80;
 const RANK: u8 = 0x07;

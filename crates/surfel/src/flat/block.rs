@@ -92,25 +92,39 @@ impl PointBlock {
         (0..LANES).fold(0, |bits, lane| bits | u8::from(is_used(lane)) << lane)
     }
 
-    /// Centres, relative to `origin`.
+    /// Lower corner of the centres.
+    pub fn corner(&self) -> Vec3 {
+        Vec3::from_array(self.origin)
+    }
+
+    /// Centres, relative to the corner.
+    #[inline(always)]
+    pub fn offsets<L: Lanes>(&self) -> Vec3Lanes<L> {
+        let step = L::splat(self.position_step());
+        Vec3Lanes {
+            x: L::from_u16(&self.position[0]) * step,
+            y: L::from_u16(&self.position[1]) * step,
+            z: L::from_u16(&self.position[2]) * step,
+        }
+    }
+
+    /// Centres, relative to `origin`. The corner is made relative first, so that rounding is in
+    /// proportion to the distance.
     #[inline(always)]
     pub fn centers<L: Lanes>(&self, origin: Vec3) -> Vec3Lanes<L> {
-        let step = L::splat(self.position_step());
-        let corner = Vec3::from_array(self.origin) - origin;
-        let coordinate =
-            |axis: usize| L::splat(corner[axis]) + L::from_u16(&self.position[axis]) * step;
-        Vec3Lanes { x: coordinate(0), y: coordinate(1), z: coordinate(2) }
+        Vec3Lanes::splat(self.corner() - origin).plus(self.offsets())
+    }
+
+    #[inline(always)]
+    pub fn radii<L: Lanes>(&self) -> L {
+        let steps = L::from_u8(&self.radius) + L::from_top_bits(&self.normal) * L::splat(256.0);
+        steps * L::splat(self.radius_step())
     }
 
     /// All that an intersection needs, relative to `origin`. The radius of an unused lane is 0.
     #[inline(always)]
     pub fn points<L: Lanes>(&self, origin: Vec3) -> PointLanes<L> {
-        let steps = L::from_u8(&self.radius) + L::from_top_bits(&self.normal) * L::splat(256.0);
-        PointLanes {
-            center: self.centers(origin),
-            normal: self.normals(),
-            radius: steps * L::splat(self.radius_step()),
-        }
+        PointLanes { center: self.centers(origin), normal: self.normals(), radius: self.radii() }
     }
 
     /// Not of unit length, but never zero in a lane that holds a point.

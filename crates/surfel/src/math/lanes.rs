@@ -1,34 +1,26 @@
-//! Eight floats at once: the arithmetic that kernels are written in, and its portable form.
+//! Eight or sixteen floats at once: the arithmetic that kernels are written in, and its portable form.
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 /// Lanes of a kernel step, of a leaf block and of a tree node.
 pub const LANES: usize = 8;
 
-/// Eight f32, each operation rounded on its own (IEEE 754, nothing fused), so that every
+/// Rays of a packet.
+pub const WIDE: usize = 2 * LANES;
+
+/// Floats in lanes, each operation rounded on its own (IEEE 754, nothing fused), so that every
 /// implementation gives the same bits.
-pub trait Lanes:
+pub trait Floats:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     type Mask: LaneMask;
 
     fn splat(value: f32) -> Self;
-    fn load(values: &[f32; LANES]) -> Self;
-    fn from_u8(values: &[u8; LANES]) -> Self;
-    fn from_u16(values: &[u16; LANES]) -> Self;
-    /// The 10 bits above the `SHIFT` lowest of each word, as signed integers.
-    fn from_signed_bits<const SHIFT: i32>(words: &[u32; LANES]) -> Self;
-    /// The 2 highest bits of each word.
-    fn from_top_bits(words: &[u32; LANES]) -> Self;
-    fn store(self) -> [f32; LANES];
     /// `other` where either is NaN, as on x86.
     fn min(self, other: Self) -> Self;
     /// `other` where either is NaN, as on x86.
     fn max(self, other: Self) -> Self;
     fn sqrt(self) -> Self;
-    fn abs(self) -> Self;
-    /// Magnitude of `self`, sign of `sign`.
-    fn copysign(self, sign: Self) -> Self;
     fn less(self, other: Self) -> Self::Mask;
     fn less_equal(self, other: Self) -> Self::Mask;
     fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self;
@@ -37,7 +29,43 @@ pub trait Lanes:
 /// One truth value a lane.
 pub trait LaneMask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
     /// Bit i is lane i.
-    fn bits(self) -> u8;
+    fn bits(self) -> u32;
+}
+
+/// Eight floats: the children of a node, or the points of a block.
+pub trait Lanes: Floats {
+    /// Twice as many at the same SIMD level.
+    type Wide: Wide;
+
+    fn load(values: &[f32; LANES]) -> Self;
+    fn from_u8(values: &[u8; LANES]) -> Self;
+    fn from_u16(values: &[u16; LANES]) -> Self;
+    /// The 10 bits above the `SHIFT` lowest of each word, as signed integers.
+    fn from_signed_bits<const SHIFT: i32>(words: &[u32; LANES]) -> Self;
+    /// The 2 highest bits of each word.
+    fn from_top_bits(words: &[u32; LANES]) -> Self;
+    fn store(self) -> [f32; LANES];
+    /// The greatest of the lanes, none of which may be NaN.
+    fn max_lane(self) -> f32;
+    /// Asks for the memory of `data` to be near soon.
+    fn prefetch<T>(data: &T);
+}
+
+/// Sixteen floats: the rays of a packet.
+pub trait Wide: Floats {
+    fn load(values: &[f32; WIDE]) -> Self;
+    fn store(self) -> [f32; WIDE];
+    /// The greatest of the lanes, none of which may be NaN.
+    fn max_lane(self) -> f32;
+
+    /// Sets the elements of `words` that `lanes` has bits for to `value`.
+    fn assign(words: &mut [u32; WIDE], lanes: u32, value: u32);
+
+    /// The least of the lanes, none of which may be NaN.
+    #[inline(always)]
+    fn min_lane(self) -> f32 {
+        -(Self::splat(0.0) - self).max_lane()
+    }
 }
 
 /// Eight floats in an array: the reference that other implementations are tested against.
@@ -54,13 +82,47 @@ impl PortableLanes {
     }
 }
 
-impl Lanes for PortableLanes {
+impl Floats for PortableLanes {
     type Mask = PortableMask;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
         Self([value; LANES])
     }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.map(other, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.map(other, |a, b| if b < a { a } else { b })
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f32::sqrt))
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> PortableMask {
+        PortableMask(std::array::from_fn(|i| self.0[i] < other.0[i]))
+    }
+
+    #[inline(always)]
+    fn less_equal(self, other: Self) -> PortableMask {
+        PortableMask(std::array::from_fn(|i| self.0[i] <= other.0[i]))
+    }
+
+    #[inline(always)]
+    fn select(mask: PortableMask, if_true: Self, if_false: Self) -> Self {
+        Self(std::array::from_fn(|i| if mask.0[i] { if_true.0[i] } else { if_false.0[i] }))
+    }
+}
+
+impl Lanes for PortableLanes {
+    type Wide = Pair<Self>;
 
     #[inline(always)]
     fn load(values: &[f32; LANES]) -> Self {
@@ -93,44 +155,12 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        self.map(other, |a, b| if a < b { a } else { b })
+    fn max_lane(self) -> f32 {
+        self.0.into_iter().fold(f32::NEG_INFINITY, f32::max)
     }
 
     #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.map(other, |a, b| if b < a { a } else { b })
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(self.0.map(f32::sqrt))
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Self(self.0.map(f32::abs))
-    }
-
-    #[inline(always)]
-    fn copysign(self, sign: Self) -> Self {
-        self.map(sign, f32::copysign)
-    }
-
-    #[inline(always)]
-    fn less(self, other: Self) -> PortableMask {
-        PortableMask(std::array::from_fn(|i| self.0[i] < other.0[i]))
-    }
-
-    #[inline(always)]
-    fn less_equal(self, other: Self) -> PortableMask {
-        PortableMask(std::array::from_fn(|i| self.0[i] <= other.0[i]))
-    }
-
-    #[inline(always)]
-    fn select(mask: PortableMask, if_true: Self, if_false: Self) -> Self {
-        Self(std::array::from_fn(|i| if mask.0[i] { if_true.0[i] } else { if_false.0[i] }))
-    }
+    fn prefetch<T>(_: &T) {}
 }
 
 macro_rules! portable_operator {
@@ -153,8 +183,8 @@ portable_operator!(Div, div, /);
 
 impl LaneMask for PortableMask {
     #[inline(always)]
-    fn bits(self) -> u8 {
-        self.0.iter().enumerate().fold(0, |bits, (i, &set)| bits | (u8::from(set) << i))
+    fn bits(self) -> u32 {
+        self.0.iter().enumerate().fold(0, |bits, (i, &set)| bits | u32::from(set) << i)
     }
 }
 
@@ -176,6 +206,105 @@ impl BitOr for PortableMask {
     }
 }
 
+/// Two of eight lanes as sixteen.
+#[derive(Clone, Copy)]
+pub struct Pair<L>(L, L);
+
+impl<L: Lanes> Wide for Pair<L> {
+    #[inline(always)]
+    fn load(values: &[f32; WIDE]) -> Self {
+        let ([low, high], []) = values.as_chunks() else { unreachable!("16 are twice 8") };
+        Self(L::load(low), L::load(high))
+    }
+
+    #[inline(always)]
+    fn store(self) -> [f32; WIDE] {
+        let (low, high) = (self.0.store(), self.1.store());
+        let mut values = [0.0; WIDE];
+        values[..LANES].copy_from_slice(&low);
+        values[LANES..].copy_from_slice(&high);
+        values
+    }
+
+    #[inline(always)]
+    fn max_lane(self) -> f32 {
+        self.0.max(self.1).max_lane()
+    }
+
+    #[inline(always)]
+    fn assign(words: &mut [u32; WIDE], lanes: u32, value: u32) {
+        for (lane, word) in words.iter_mut().enumerate() {
+            *word = if lanes >> lane & 1 == 1 { value } else { *word };
+        }
+    }
+}
+
+impl<L: Lanes> Floats for Pair<L> {
+    type Mask = Pair<L::Mask>;
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(L::splat(value), L::splat(value))
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(self.0.min(other.0), self.1.min(other.1))
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(self.0.max(other.0), self.1.max(other.1))
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt(), self.1.sqrt())
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> Self::Mask {
+        Pair(self.0.less(other.0), self.1.less(other.1))
+    }
+
+    #[inline(always)]
+    fn less_equal(self, other: Self) -> Self::Mask {
+        Pair(self.0.less_equal(other.0), self.1.less_equal(other.1))
+    }
+
+    #[inline(always)]
+    fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self {
+        Self(L::select(mask.0, if_true.0, if_false.0), L::select(mask.1, if_true.1, if_false.1))
+    }
+}
+
+impl<M: LaneMask> LaneMask for Pair<M> {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        self.0.bits() | self.1.bits() << LANES
+    }
+}
+
+macro_rules! pair_operator {
+    ($trait:ident, $method:ident) => {
+        impl<T: $trait<Output = T>> $trait for Pair<T> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0.$method(other.0), self.1.$method(other.1))
+            }
+        }
+    };
+}
+
+pair_operator!(Add, add);
+pair_operator!(Sub, sub);
+pair_operator!(Mul, mul);
+pair_operator!(Div, div);
+pair_operator!(BitAnd, bitand);
+pair_operator!(BitOr, bitor);
+
 /// Three coordinates in lanes.
 #[derive(Clone, Copy)]
 pub struct Vec3Lanes<L> {
@@ -186,11 +315,6 @@ pub struct Vec3Lanes<L> {
 
 impl<L: Lanes> Vec3Lanes<L> {
     #[inline(always)]
-    pub fn splat(vector: super::Vec3) -> Self {
-        Self { x: L::splat(vector.x), y: L::splat(vector.y), z: L::splat(vector.z) }
-    }
-
-    #[inline(always)]
     pub fn store(self) -> [super::Vec3; LANES] {
         let (x, y, z) = (self.x.store(), self.y.store(), self.z.store());
         let mut vectors = [super::Vec3::ZERO; LANES];
@@ -199,15 +323,27 @@ impl<L: Lanes> Vec3Lanes<L> {
         }
         vectors
     }
+}
+
+impl<F: Floats> Vec3Lanes<F> {
+    #[inline(always)]
+    pub fn splat(vector: super::Vec3) -> Self {
+        Self { x: F::splat(vector.x), y: F::splat(vector.y), z: F::splat(vector.z) }
+    }
 
     #[inline(always)]
-    pub fn dot(self, other: Self) -> L {
+    pub fn dot(self, other: Self) -> F {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
     #[inline(always)]
-    pub fn scaled(self, factor: L) -> Self {
+    pub fn scaled(self, factor: F) -> Self {
         Self { x: self.x * factor, y: self.y * factor, z: self.z * factor }
+    }
+
+    #[inline(always)]
+    pub fn plus(self, other: Self) -> Self {
+        Self { x: self.x + other.x, y: self.y + other.y, z: self.z + other.z }
     }
 
     #[inline(always)]

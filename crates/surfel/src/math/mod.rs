@@ -12,7 +12,9 @@ pub use aabb::Aabb;
 pub use eigen::{SymmetricMatrix, smallest_eigenvector};
 pub use frame::Frame;
 pub use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3, Vec4};
-pub use lanes::{LANES, LaneMask, Lanes, PortableLanes, PortableMask, Vec3Lanes};
+pub use lanes::{
+    Floats, LANES, LaneMask, Lanes, Pair, PortableLanes, PortableMask, Vec3Lanes, WIDE, Wide,
+};
 pub use random::{Random, hash};
 pub use ray::Ray;
 pub use sampling::{cosine_hemisphere, disk, scrambled_pair, uniform_cone};

@@ -1,7 +1,7 @@
 //! Discs: a point given the flat surface that its normal and radius describe (Wiesmeier 2011).
 
 use super::{PointLanes, RayLanes, Shape};
-use crate::math::{Aabb, Lanes, Vec3};
+use crate::math::{Aabb, Floats, Vec3};
 
 /// Secondary rays start this many radii above the surface ...
 pub(super) const SPAWN_OFFSET: f32 = 0.5;
@@ -13,7 +13,7 @@ pub struct Disc;
 impl Shape for Disc {
     /// Two-sided; the normal need not have unit length.
     #[inline(always)]
-    fn intersect<L: Lanes>(points: &PointLanes<L>, ray: &RayLanes<L>) -> (L, L::Mask) {
+    fn intersect<F: Floats>(points: &PointLanes<F>, ray: &RayLanes<F>) -> (F, F::Mask) {
         let distance = points.normal.dot(points.center) / points.normal.dot(ray.direction);
         let offset = points.center.minus(ray.direction.scaled(distance));
         // A ray in the disc's plane gives NaN or infinity here, and fails both tests.

@@ -11,7 +11,7 @@ pub use sphere::Sphere;
 pub use splat::{Gathered, MAX_GATHERED, blend, gather_limit};
 
 use crate::error::Error;
-use crate::math::{Aabb, Lanes, Ray, Vec3, Vec3Lanes};
+use crate::math::{Aabb, Floats, Ray, Vec3, Vec3Lanes};
 
 /// The shape given to the points of a cloud (Wiesmeier, Ray Tracing Point Clouds, 2011).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -124,31 +124,31 @@ impl std::str::FromStr for Boundary {
     }
 }
 
-/// Eight points as a kernel meets them.
-pub struct PointLanes<L> {
+/// Points as a kernel meets them: eight before one ray, or one before sixteen rays.
+pub struct PointLanes<F> {
     /// Relative to the ray's origin.
-    pub center: Vec3Lanes<L>,
+    pub center: Vec3Lanes<F>,
     /// Any length but zero.
-    pub normal: Vec3Lanes<L>,
-    pub radius: L,
+    pub normal: Vec3Lanes<F>,
+    pub radius: F,
 }
 
 /// A ray spread over lanes; its origin is where the points' centres are relative to.
 #[derive(Clone, Copy)]
-pub struct RayLanes<L> {
-    pub direction: Vec3Lanes<L>,
-    pub t_min: L,
+pub struct RayLanes<F> {
+    pub direction: Vec3Lanes<F>,
+    pub t_min: F,
 }
 
-impl<L: Lanes> RayLanes<L> {
+impl<F: Floats> RayLanes<F> {
     #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
-        Self { direction: Vec3Lanes::splat(ray.direction), t_min: L::splat(ray.t_min) }
+        Self { direction: Vec3Lanes::splat(ray.direction), t_min: F::splat(ray.t_min) }
     }
 }
 
 /// How a ray meets the shape of a single point.
 pub trait Shape {
     /// Distances at and beyond the ray's `t_min`, and the lanes that are hit.
-    fn intersect<L: Lanes>(points: &PointLanes<L>, ray: &RayLanes<L>) -> (L, L::Mask);
+    fn intersect<F: Floats>(points: &PointLanes<F>, ray: &RayLanes<F>) -> (F, F::Mask);
 }

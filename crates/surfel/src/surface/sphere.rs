@@ -1,23 +1,23 @@
 //! Spheres: a point as a ball of its radius (Wiesmeier 2011).
 
 use super::{PointLanes, RayLanes, Shape};
-use crate::math::{Aabb, Lanes, Vec3};
+use crate::math::{Aabb, Floats, Vec3};
 
 pub struct Sphere;
 
 impl Shape for Sphere {
     /// The nearest root within the ray's range: the far side if the ray starts inside.
     #[inline(always)]
-    fn intersect<L: Lanes>(points: &PointLanes<L>, ray: &RayLanes<L>) -> (L, L::Mask) {
+    fn intersect<F: Floats>(points: &PointLanes<F>, ray: &RayLanes<F>) -> (F, F::Mask) {
         let along = points.center.dot(ray.direction);
         // The distance of the centre from the line, rather than b^2 - 4ac, which cancels for far spheres
         // (Haines et al., Precision Improvements for Ray/Sphere Intersection, 2019).
         let across = points.center.minus(ray.direction.scaled(along));
         let squared = points.radius * points.radius - across.dot(across);
-        let half_chord = squared.max(L::splat(0.0)).sqrt();
+        let half_chord = squared.max(F::splat(0.0)).sqrt();
         let (near, far) = (along - half_chord, along + half_chord);
-        let distance = L::select(ray.t_min.less_equal(near), near, far);
-        let hit = L::splat(0.0).less(squared) & ray.t_min.less_equal(distance);
+        let distance = F::select(ray.t_min.less_equal(near), near, far);
+        let hit = F::splat(0.0).less(squared) & ray.t_min.less_equal(distance);
         (distance, hit)
     }
 }

@@ -2,51 +2,106 @@
 //!
 //! Without fused multiply-add: results must equal the portable ones bit for bit.
 
-use super::kernel::{self, Gather, Hit};
+use super::hit::{Gather, Hit};
 use super::surface::{self, SurfaceHit};
+use super::{any, closest, gather};
 use crate::flat::FlatScene;
-use crate::math::{LANES, LaneMask, Lanes, Ray};
+use crate::math::{Floats, LANES, LaneMask, Lanes, Pair, Ray, Wide};
 use std::arch::x86_64::*;
+use std::marker::PhantomData;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 macro_rules! kernel {
     ($module:ident::$name:ident($result:ty)) => {
         /// The batch kernel of the same name.
-        #[target_feature(enable = "avx2")]
+        #[target_feature(enable = "avx2,fma")]
         pub(super) fn $name(scene: &FlatScene, rays: &[Ray], results: &mut [$result]) {
-            $module::$name::<Avx2Lanes>(scene, rays, results);
+            $module::$name::<Eight<Avx2>>(scene, rays, results);
         }
     };
 }
 
-kernel!(kernel::closest_hits(Hit));
-kernel!(kernel::any_hits(bool));
-kernel!(kernel::gathers(Gather));
+kernel!(closest::closest_hits(Hit));
+kernel!(any::any_hits(bool));
+kernel!(gather::gathers(Gather));
 kernel!(surface::surface_hits(SurfaceHit));
 kernel!(surface::occlusions(bool));
 
-/// Used only inside the kernels above, which are entered only where AVX2 is present: that is what
-/// makes each `unsafe` of this file sound.
-#[derive(Clone, Copy)]
-struct Avx2Lanes(__m256);
+/// What sixteen lanes are beside `Eight` of this level.
+pub(super) trait Level: Copy {
+    type Wide: Wide;
+}
 
 #[derive(Clone, Copy)]
-struct Avx2Mask(__m256);
+struct Avx2;
+
+impl Level for Avx2 {
+    type Wide = Pair<Eight<Self>>;
+}
+
+/// Used only inside the kernels of this file and of `avx512`, which are entered only where AVX2 is
+/// present: that is what makes each `unsafe` of this file sound.
+#[derive(Clone, Copy)]
+pub(super) struct Eight<L>(__m256, PhantomData<L>);
+
+#[derive(Clone, Copy)]
+pub(super) struct EightMask(__m256);
 
 macro_rules! avx2 {
     ($wrap:ident($($call:tt)*)) => {
-        // SAFETY: see `Avx2Lanes`; loads and stores go through references to arrays of the full width.
-        $wrap(unsafe { $($call)* })
+        // SAFETY: see `Eight`; loads and stores go through references to arrays of the full width.
+        $wrap(unsafe { $($call)* }, PhantomData)
     };
 }
 
-impl Lanes for Avx2Lanes {
-    type Mask = Avx2Mask;
+macro_rules! mask {
+    (($($call:tt)*)) => {
+        // SAFETY: see `Eight`.
+        EightMask(unsafe { $($call)* })
+    };
+}
+
+impl<L: Level> Floats for Eight<L> {
+    type Mask = EightMask;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
         avx2!(Self(_mm256_set1_ps(value)))
     }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        avx2!(Self(_mm256_min_ps(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        avx2!(Self(_mm256_max_ps(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        avx2!(Self(_mm256_sqrt_ps(self.0)))
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> EightMask {
+        mask!((_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn less_equal(self, other: Self) -> EightMask {
+        mask!((_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn select(mask: EightMask, if_true: Self, if_false: Self) -> Self {
+        avx2!(Self(_mm256_blendv_ps(if_false.0, if_true.0, mask.0)))
+    }
+}
+
+impl<L: Level> Lanes for Eight<L> {
+    type Wide = L::Wide;
 
     #[inline(always)]
     fn load(values: &[f32; LANES]) -> Self {
@@ -91,60 +146,39 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        avx2!(Self(_mm256_min_ps(self.0, other.0)))
+    fn max_lane(self) -> f32 {
+        // SAFETY: as for `avx2!`.
+        unsafe {
+            let half =
+                _mm_max_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
+            let pair = _mm_max_ps(half, _mm_movehl_ps(half, half));
+            _mm_cvtss_f32(_mm_max_ss(pair, _mm_movehdup_ps(pair)))
+        }
     }
 
     #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        avx2!(Self(_mm256_max_ps(self.0, other.0)))
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        avx2!(Self(_mm256_sqrt_ps(self.0)))
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        avx2!(Self(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)))
-    }
-
-    #[inline(always)]
-    fn copysign(self, sign: Self) -> Self {
-        avx2!(Self(_mm256_or_ps(
-            _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0),
-            _mm256_and_ps(_mm256_set1_ps(-0.0), sign.0)
-        )))
-    }
-
-    #[inline(always)]
-    fn less(self, other: Self) -> Avx2Mask {
-        avx2!(Avx2Mask(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)))
-    }
-
-    #[inline(always)]
-    fn less_equal(self, other: Self) -> Avx2Mask {
-        avx2!(Avx2Mask(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)))
-    }
-
-    #[inline(always)]
-    fn select(mask: Avx2Mask, if_true: Self, if_false: Self) -> Self {
-        avx2!(Self(_mm256_blendv_ps(if_false.0, if_true.0, mask.0)))
+    fn prefetch<T>(data: &T) {
+        let lines = size_of::<T>().div_ceil(64);
+        for line in 0..lines {
+            // SAFETY: a hint: no address is an error.
+            unsafe {
+                _mm_prefetch::<_MM_HINT_T0>((&raw const *data).cast::<i8>().wrapping_add(64 * line))
+            };
+        }
     }
 }
 
-impl LaneMask for Avx2Mask {
+impl LaneMask for EightMask {
     #[inline(always)]
-    fn bits(self) -> u8 {
+    fn bits(self) -> u32 {
         // SAFETY: as for `avx2!`.
-        unsafe { _mm256_movemask_ps(self.0) as u8 }
+        unsafe { _mm256_movemask_ps(self.0) as u32 }
     }
 }
 
 macro_rules! operator {
-    ($type:ident: $trait:ident, $method:ident, $intrinsic:ident) => {
-        impl $trait for $type {
+    ($trait:ident, $method:ident, $intrinsic:ident) => {
+        impl<L: Level> $trait for Eight<L> {
             type Output = Self;
 
             #[inline(always)]
@@ -155,9 +189,25 @@ macro_rules! operator {
     };
 }
 
-operator!(Avx2Lanes: Add, add, _mm256_add_ps);
-operator!(Avx2Lanes: Sub, sub, _mm256_sub_ps);
-operator!(Avx2Lanes: Mul, mul, _mm256_mul_ps);
-operator!(Avx2Lanes: Div, div, _mm256_div_ps);
-operator!(Avx2Mask: BitAnd, bitand, _mm256_and_ps);
-operator!(Avx2Mask: BitOr, bitor, _mm256_or_ps);
+operator!(Add, add, _mm256_add_ps);
+operator!(Sub, sub, _mm256_sub_ps);
+operator!(Mul, mul, _mm256_mul_ps);
+operator!(Div, div, _mm256_div_ps);
+
+impl BitAnd for EightMask {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        mask!((_mm256_and_ps(self.0, other.0)))
+    }
+}
+
+impl BitOr for EightMask {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        mask!((_mm256_or_ps(self.0, other.0)))
+    }
+}

@@ -2,7 +2,7 @@
 
 use super::traverse::{BallVisitor, around};
 use crate::flat::FlatPoints;
-use crate::math::{LaneMask, Lanes, Vec3, Vec3Lanes};
+use crate::math::{Floats, LaneMask, Lanes, Vec3, Vec3Lanes};
 use crate::surface::{Candidate, Judgement, NEIGHBOR_REACH, Surroundings};
 use std::ops::ControlFlow;
 
@@ -40,7 +40,7 @@ impl BallVisitor for Neighborhood {
         let centers: Vec3Lanes<L> = block.centers(self.position);
         let reach_squared = L::splat(self.reach * self.reach);
         let near = centers.dot(centers).less_equal(reach_squared).bits();
-        let mut near = if near == 0 { 0 } else { near & block.occupied() };
+        let mut near = if near == 0 { 0 } else { near & u32::from(block.occupied()) };
         if near == 0 {
             return ControlFlow::Continue(());
         }

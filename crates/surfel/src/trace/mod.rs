@@ -1,16 +1,24 @@
 //! Rays in batches against a flat scene: closest hit, any hit, gather; SIMD lives here.
 
+mod any;
+mod block;
 mod boundary;
-mod kernel;
+mod closest;
+mod frustum;
+mod gather;
+mod hit;
 mod node;
+mod packet;
 mod simd;
 mod surface;
 mod traverse;
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 
-pub use kernel::{Gather, Hit};
+pub use hit::{Gather, Hit};
 pub use simd::Simd;
 pub use surface::SurfaceHit;
 
@@ -26,23 +34,26 @@ macro_rules! at_level {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: a `Simd` of this level exists only where the processor has it.
             Level::Avx2 => unsafe { avx2::$kernel($($argument),*) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Level::Avx512 => unsafe { avx512::$kernel($($argument),*) },
         }
     };
 }
 
 /// The nearest shape on each ray, each point on its own.
 pub fn closest_hits(scene: &FlatScene, simd: Simd, rays: &[Ray], hits: &mut [Hit]) {
-    at_level!(simd, kernel::closest_hits(scene, rays, hits));
+    at_level!(simd, closest::closest_hits(scene, rays, hits));
 }
 
 /// Whether any shape lies in each ray's range, each point on its own.
 pub fn any_hits(scene: &FlatScene, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
-    at_level!(simd, kernel::any_hits(scene, rays, occluded));
+    at_level!(simd, any::any_hits(scene, rays, occluded));
 }
 
 /// The nearest shapes on each ray, all within a radius of each other.
 pub fn gathers(scene: &FlatScene, simd: Simd, rays: &[Ray], gathers: &mut [Gather]) {
-    at_level!(simd, kernel::gathers(scene, rays, gathers));
+    at_level!(simd, gather::gathers(scene, rays, gathers));
 }
 
 /// The nearest place of the continuous surface on each ray.

@@ -1,11 +1,11 @@
 //! The boxes of a node against a ray, and against a ball.
 
 use crate::bvh::Node;
-use crate::math::{LANES, LaneMask, Lanes, Ray, Vec3};
+use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3};
 
 /// Rounding allowed for, as a share of the distances involved: far more than f32 loses in a box or
 /// disc test, far less than a radius. A box is never missed that a hit inside it would need.
-const ROUNDING: f32 = 1e-6;
+pub const ROUNDING: f32 = 1e-6;
 
 /// A ray prepared for many boxes.
 pub struct BoxRay {
@@ -25,13 +25,14 @@ impl BoxRay {
 
 /// Lanes whose boxes the ray meets before `t_max`, and where it enters them.
 #[inline(always)]
-pub fn ray_entries<L: Lanes>(node: &Node, ray: &BoxRay, t_max: f32) -> (u8, [f32; LANES]) {
+pub fn ray_entries<L: Lanes>(node: &Node, ray: &BoxRay, t_max: f32) -> (u32, [f32; LANES]) {
     let (mut enter, mut leave) = (L::splat(ray.t_min), L::splat(t_max));
     let step = node.step();
+    let corner = Vec3::from_array(node.origin) - ray.origin;
+    let slack = ROUNDING * (corner.abs().max_element() + 256.0 * step.max_element());
     for axis in 0..3 {
-        let inverse = ray.inverse[axis];
-        let corner = node.origin[axis] - ray.origin[axis];
-        let slack = (ROUNDING * (corner.abs() + 256.0 * step[axis]) * inverse).abs();
+        let (inverse, corner) = (ray.inverse[axis], corner[axis]);
+        let slack = (slack * inverse).abs();
         let per_step = L::splat(step[axis] * inverse);
         let (first, last) = if 0.0 < inverse {
             (&node.lower[axis], &node.upper[axis])
@@ -43,12 +44,12 @@ pub fn ray_entries<L: Lanes>(node: &Node, ray: &BoxRay, t_max: f32) -> (u8, [f32
         enter = near.max(enter);
         leave = far.min(leave);
     }
-    (enter.less_equal(leave).bits() & node.occupied(), enter.store())
+    (enter.less_equal(leave).bits() & u32::from(node.occupied()), enter.store())
 }
 
 /// Lanes whose boxes come within `radius` of `center`.
 #[inline(always)]
-pub fn ball_overlaps<L: Lanes>(node: &Node, center: Vec3, radius: f32) -> u8 {
+pub fn ball_overlaps<L: Lanes>(node: &Node, center: Vec3, radius: f32) -> u32 {
     let mut squared = L::splat(0.0);
     let step = node.step();
     for axis in 0..3 {
@@ -59,5 +60,5 @@ pub fn ball_overlaps<L: Lanes>(node: &Node, center: Vec3, radius: f32) -> u8 {
         let outside = below.max(above).max(L::splat(0.0));
         squared = squared + outside * outside;
     }
-    squared.less_equal(L::splat(radius * radius * (1.0 + 1e-4))).bits() & node.occupied()
+    squared.less_equal(L::splat(radius * radius * (1.0 + 1e-4))).bits() & u32::from(node.occupied())
 }

@@ -9,7 +9,11 @@ pub struct Simd(Level);
 pub(super) enum Level {
     Portable,
     #[cfg(target_arch = "x86_64")]
+    /// AVX2 and FMA.
     Avx2,
+    #[cfg(target_arch = "x86_64")]
+    /// AVX-512 F, VL, DQ and BW.
+    Avx512,
 }
 
 impl Simd {
@@ -29,8 +33,15 @@ impl Simd {
         )]
         let mut levels = vec![Self::PORTABLE];
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
             levels.push(Self(Level::Avx2));
+            if is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512bw")
+            {
+                levels.push(Self(Level::Avx512));
+            }
         }
         levels
     }
@@ -40,6 +51,8 @@ impl Simd {
             Level::Portable => "portable",
             #[cfg(target_arch = "x86_64")]
             Level::Avx2 => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 => "avx512",
         }
     }
 

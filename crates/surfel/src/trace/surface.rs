@@ -1,8 +1,12 @@
 //! The continuous surface: discs gathered and blended, hits beyond its boundary refused.
 
+use super::any::any_hits;
+use super::block::BlockHits;
 use super::boundary::judge;
-use super::kernel::{BlockHits, Hit, any_hits, closest_hit, gather};
-use super::traverse::{RayVisitor, along_ray};
+use super::closest::closest_hit;
+use super::gather::gather;
+use super::hit::Hit;
+use super::traverse::{ROOT, RayStack, RayVisitor, along_ray};
 use crate::flat::{FlatPoints, FlatScene};
 use crate::math::{Lanes, Ray, Vec3};
 use crate::surface::{
@@ -46,11 +50,12 @@ const RESUME: f32 = 0.05;
 
 #[inline(always)]
 pub(super) fn surface_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    let mut stack = RayStack::new();
     for (ray, hit) in rays.iter().zip(hits) {
         *hit = if scene.surface.is_oriented() {
-            surface_hit::<L>(scene, ray)
+            surface_hit::<L>(scene, ray, &mut stack)
         } else {
-            sphere_hit::<L>(scene, ray)
+            sphere_hit::<L>(scene, ray, &mut stack)
         };
     }
 }
@@ -62,9 +67,10 @@ pub(super) fn occlusions<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &m
     if !scene.surface.is_oriented() || scene.boundary == Boundary::Off {
         return any_hits::<L>(scene, rays, occluded);
     }
+    let mut stack = RayStack::new();
     for (ray, occluded) in rays.iter().zip(occluded) {
         let mut search = OccluderSearch { scene, ray, n_refused: 0, is_occluded: false };
-        along_ray::<L>(&scene.points, ray, &mut search);
+        along_ray::<L>(&scene.points, ROOT, ray, &mut stack, &mut search);
         *occluded = search.is_occluded;
     }
 }
@@ -109,8 +115,8 @@ fn single_disc<L: Lanes>(scene: &FlatScene, ray: &Ray, hit: &Hit) -> Judgement {
 }
 
 #[inline(always)]
-fn sphere_hit<L: Lanes>(scene: &FlatScene, ray: &Ray) -> SurfaceHit {
-    let hit = closest_hit::<L>(scene, ray);
+fn sphere_hit<L: Lanes>(scene: &FlatScene, ray: &Ray, stack: &mut RayStack) -> SurfaceHit {
+    let hit = closest_hit::<L>(scene, ray, stack);
     if hit.is_miss() {
         return SurfaceHit::MISS;
     }
@@ -127,12 +133,12 @@ fn sphere_hit<L: Lanes>(scene: &FlatScene, ray: &Ray) -> SurfaceHit {
 }
 
 #[inline(always)]
-fn surface_hit<L: Lanes>(scene: &FlatScene, ray: &Ray) -> SurfaceHit {
+fn surface_hit<L: Lanes>(scene: &FlatScene, ray: &Ray, stack: &mut RayStack) -> SurfaceHit {
     let mut rest = *ray;
     let mut at_edge = SurfaceHit::MISS;
     for _ in 0..MAX_REFUSALS {
         let mut discs = [Gathered::NONE; MAX_GATHERED];
-        let (first, n) = pierced_discs::<L>(scene, &rest, &mut discs);
+        let (first, n) = pierced_discs::<L>(scene, &rest, stack, &mut discs);
         if n == 0 {
             return at_edge;
         }
@@ -169,18 +175,19 @@ fn surface_hit<L: Lanes>(scene: &FlatScene, ray: &Ray) -> SurfaceHit {
 fn pierced_discs<L: Lanes>(
     scene: &FlatScene,
     ray: &Ray,
+    stack: &mut RayStack,
     discs: &mut [Gathered; MAX_GATHERED],
 ) -> (Hit, usize) {
     let disc = |hit: &Hit| scene.points.gathered(hit.slot, ray.at(hit.distance));
     if !scene.surface.is_gathered() {
-        let hit = closest_hit::<L>(scene, ray);
+        let hit = closest_hit::<L>(scene, ray, stack);
         if hit.is_miss() {
             return (hit, 0);
         }
         discs[0] = disc(&hit);
         return (hit, 1);
     }
-    let gather = gather::<L>(scene, ray);
+    let gather = gather::<L>(scene, ray, stack);
     for (place, hit) in discs.iter_mut().zip(gather.hits()) {
         *place = disc(hit);
     }

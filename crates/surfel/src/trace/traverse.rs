@@ -6,6 +6,19 @@ use crate::flat::FlatPoints;
 use crate::math::{Lanes, Ray, Vec3};
 use std::ops::ControlFlow;
 
+/// Where a search of the whole tree begins.
+pub const ROOT: Child = Child::Node(0);
+
+/// What a search of one ray has still to look at: where each box is entered and the packed child. Kept
+/// from ray to ray, as clearing it takes longer than many a search.
+pub struct RayStack([(f32, u32); STACK_SIZE]);
+
+impl RayStack {
+    pub fn new() -> Self {
+        Self([(0.0, 0); STACK_SIZE])
+    }
+}
+
 /// Looks at the blocks that a ray comes by.
 pub trait RayVisitor {
     /// Boxes entered beyond this distance are left out.
@@ -14,15 +27,18 @@ pub trait RayVisitor {
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()>;
 }
 
-/// Shows `visitor` every block whose box `ray` enters before the visitor's limit, nearest boxes first.
+/// Shows `visitor` every block under `start` whose box `ray` enters before the visitor's limit, nearest
+/// boxes first.
 #[inline(always)]
-pub fn along_ray<L: Lanes>(points: &FlatPoints, ray: &Ray, visitor: &mut impl RayVisitor) {
-    if points.nodes.is_empty() {
-        return;
-    }
+pub fn along_ray<L: Lanes>(
+    points: &FlatPoints,
+    start: Child,
+    ray: &Ray,
+    RayStack(stack): &mut RayStack,
+    visitor: &mut impl RayVisitor,
+) {
     let box_ray = BoxRay::new(ray);
-    let mut stack = [(0.0f32, Child::Block(0)); STACK_SIZE];
-    stack[0] = (ray.t_min, Child::Node(0));
+    stack[0] = (ray.t_min, start.pack());
     let mut size = 1;
     while 0 < size {
         size -= 1;
@@ -30,7 +46,7 @@ pub fn along_ray<L: Lanes>(points: &FlatPoints, ray: &Ray, visitor: &mut impl Ra
         if visitor.limit() < entry {
             continue;
         }
-        let node = match child {
+        let node = match Child::unpack(child) {
             Child::Node(node_idx) => &points.nodes[node_idx as usize],
             Child::Block(block_idx) => {
                 if visitor.visit::<L>(points, block_idx).is_break() {
@@ -51,7 +67,7 @@ pub fn along_ray<L: Lanes>(points: &FlatPoints, ray: &Ray, visitor: &mut impl Ra
                 stack[place] = stack[place - 1];
                 place -= 1;
             }
-            stack[place] = (entries[lane], child);
+            stack[place] = (entries[lane], child.pack());
             size += 1;
         }
     }

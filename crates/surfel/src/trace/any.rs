@@ -1,0 +1,124 @@
+//! Whether any shape lies in each ray's range, each point on its own.
+
+use super::block::{BlockForPacket, BlockHits};
+use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
+use super::traverse::{ROOT, RayStack, RayVisitor, along_ray};
+use crate::bvh::Child;
+use crate::flat::{FlatPoints, FlatScene};
+use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, WIDE, Wide};
+use crate::surface::{Disc, Shape, Sphere};
+use std::marker::PhantomData;
+use std::ops::ControlFlow;
+
+#[inline(always)]
+pub(super) fn any_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &mut [bool]) {
+    if scene.surface.is_oriented() {
+        any_of_shape::<L, Disc>(&scene.points, rays, occluded);
+    } else {
+        any_of_shape::<L, Sphere>(&scene.points, rays, occluded);
+    }
+}
+
+#[inline(always)]
+fn any_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], occluded: &mut [bool]) {
+    let mut stack = PacketStack::new();
+    for (rays, occluded) in rays.chunks(WIDE).zip(occluded.chunks_mut(WIDE)) {
+        if let Some(packet) = Packet::new(rays, true) {
+            any_in_packet::<L, S>(points, &packet, &mut stack, occluded);
+            continue;
+        }
+        for (ray, occluded) in rays.iter().zip(occluded) {
+            *occluded = any_from::<L, S>(points, ROOT, ray, &mut stack.alone);
+        }
+    }
+}
+
+#[inline(always)]
+fn any_from<L: Lanes, S: Shape>(
+    points: &FlatPoints,
+    start: Child,
+    ray: &Ray,
+    stack: &mut RayStack,
+) -> bool {
+    let mut any = Any { ray, shape: PhantomData::<S>, is_hit: false };
+    along_ray::<L>(points, start, ray, stack, &mut any);
+    any.is_hit
+}
+
+struct Any<'r, S> {
+    ray: &'r Ray,
+    shape: PhantomData<S>,
+    is_hit: bool,
+}
+
+impl<S: Shape> RayVisitor for Any<'_, S> {
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.ray.t_max
+    }
+
+    #[inline(always)]
+    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
+        let hits = BlockHits::find::<L, S>(points, block_idx, self.ray, self.ray.t_max);
+        self.is_hit = !hits.is_empty();
+        if self.is_hit { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+#[inline(always)]
+fn any_in_packet<L: Lanes, S: Shape>(
+    points: &FlatPoints,
+    packet: &Packet<L::Wide>,
+    stack: &mut PacketStack,
+    occluded: &mut [bool],
+) {
+    let limits = packet.limits();
+    let mut any = AnyInPacket::<L, S> { packet, shape: PhantomData, limits, is_hit: 0 };
+    along_packet::<L, false>(points, packet, stack, &mut any);
+    for (lane, occluded) in occluded.iter_mut().enumerate() {
+        *occluded = any.is_hit >> lane & 1 == 1;
+    }
+}
+
+struct AnyInPacket<'p, L: Lanes, S> {
+    packet: &'p Packet<'p, L::Wide>,
+    shape: PhantomData<S>,
+    /// Below all distances for rays that have hit something.
+    limits: [f32; WIDE],
+    is_hit: u32,
+}
+
+impl<L: Lanes, S: Shape> PacketVisitor<L> for AnyInPacket<'_, L, S> {
+    #[inline(always)]
+    fn limits(&self) -> &[f32; WIDE] {
+        &self.limits
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        let block = BlockForPacket::<L>::new(&points.blocks[block_idx as usize], self.packet);
+        let mut limits = L::Wide::load(&self.limits);
+        let blocked = L::Wide::splat(f32::NEG_INFINITY);
+        for lane in 0..LANES {
+            let (distance, mask) = block.intersect::<S>(lane);
+            let hits = mask & distance.less_equal(limits);
+            self.is_hit |= hits.bits();
+            limits = L::Wide::select(hits, blocked, limits);
+        }
+        self.limits = limits.store();
+    }
+
+    #[inline(always)]
+    fn visit_alone(
+        &mut self,
+        points: &FlatPoints,
+        child: Child,
+        lane: usize,
+        stack: &mut RayStack,
+    ) {
+        if any_from::<L, S>(points, child, &self.packet.rays[lane], stack) {
+            self.is_hit |= 1 << lane;
+            self.limits[lane] = f32::NEG_INFINITY;
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Sixteen floats in one AVX-512 register, and the batch kernels compiled for AVX-512.
+
+use super::avx2::{Eight, Level};
+use super::hit::{Gather, Hit};
+use super::surface::{self, SurfaceHit};
+use super::{any, closest, gather};
+use crate::flat::FlatScene;
+use crate::math::{Floats, LaneMask, Ray, WIDE, Wide};
+use std::arch::x86_64::*;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
+
+macro_rules! kernel {
+    ($module:ident::$name:ident($result:ty)) => {
+        /// The batch kernel of the same name.
+        #[target_feature(enable = "avx2,fma,avx512f,avx512vl,avx512dq,avx512bw")]
+        pub(super) fn $name(scene: &FlatScene, rays: &[Ray], results: &mut [$result]) {
+            $module::$name::<Eight<Avx512>>(scene, rays, results);
+        }
+    };
+}
+
+kernel!(closest::closest_hits(Hit));
+kernel!(any::any_hits(bool));
+kernel!(gather::gathers(Gather));
+kernel!(surface::surface_hits(SurfaceHit));
+kernel!(surface::occlusions(bool));
+
+#[derive(Clone, Copy)]
+struct Avx512;
+
+impl Level for Avx512 {
+    type Wide = Sixteen;
+}
+
+/// Used only inside the kernels above, which are entered only where AVX-512 is present: that is what
+/// makes each `unsafe` of this file sound.
+#[derive(Clone, Copy)]
+struct Sixteen(__m512);
+
+#[derive(Clone, Copy)]
+struct SixteenMask(__mmask16);
+
+macro_rules! avx512 {
+    ($wrap:ident($($call:tt)*)) => {
+        // SAFETY: see `Sixteen`; loads and stores go through references to arrays of the full width.
+        $wrap(unsafe { $($call)* })
+    };
+}
+
+impl Floats for Sixteen {
+    type Mask = SixteenMask;
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        avx512!(Self(_mm512_set1_ps(value)))
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        avx512!(Self(_mm512_min_ps(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        avx512!(Self(_mm512_max_ps(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        avx512!(Self(_mm512_sqrt_ps(self.0)))
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> SixteenMask {
+        avx512!(SixteenMask(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn less_equal(self, other: Self) -> SixteenMask {
+        avx512!(SixteenMask(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn select(mask: SixteenMask, if_true: Self, if_false: Self) -> Self {
+        avx512!(Self(_mm512_mask_blend_ps(mask.0, if_false.0, if_true.0)))
+    }
+}
+
+impl Wide for Sixteen {
+    #[inline(always)]
+    fn load(values: &[f32; WIDE]) -> Self {
+        avx512!(Self(_mm512_loadu_ps(values.as_ptr())))
+    }
+
+    #[inline(always)]
+    fn store(self) -> [f32; WIDE] {
+        let mut values = [0.0; WIDE];
+        // SAFETY: as for `avx512!`.
+        unsafe { _mm512_storeu_ps(values.as_mut_ptr(), self.0) };
+        values
+    }
+
+    #[inline(always)]
+    fn max_lane(self) -> f32 {
+        // SAFETY: as for `avx512!`.
+        unsafe { _mm512_reduce_max_ps(self.0) }
+    }
+
+    #[inline(always)]
+    fn assign(words: &mut [u32; WIDE], lanes: u32, value: u32) {
+        // SAFETY: as for `avx512!`.
+        unsafe {
+            let value = _mm512_set1_epi32(value as i32);
+            _mm512_mask_storeu_epi32(words.as_mut_ptr().cast(), lanes as u16, value);
+        }
+    }
+}
+
+impl LaneMask for SixteenMask {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        u32::from(self.0)
+    }
+}
+
+macro_rules! operator {
+    ($type:ident: $trait:ident, $method:ident, $intrinsic:ident) => {
+        impl $trait for $type {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                avx512!(Self($intrinsic(self.0, other.0)))
+            }
+        }
+    };
+}
+
+operator!(Sixteen: Add, add, _mm512_add_ps);
+operator!(Sixteen: Sub, sub, _mm512_sub_ps);
+operator!(Sixteen: Mul, mul, _mm512_mul_ps);
+operator!(Sixteen: Div, div, _mm512_div_ps);
+operator!(SixteenMask: BitAnd, bitand, _kand_mask16);
+operator!(SixteenMask: BitOr, bitor, _kor_mask16);

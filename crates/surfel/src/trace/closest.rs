@@ -1,0 +1,157 @@
+//! The nearest shape on each ray, each point on its own.
+
+use super::block::{BlockForPacket, BlockHits};
+use super::hit::{Hit, precedes};
+use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
+use super::traverse::{ROOT, RayStack, RayVisitor, along_ray};
+use crate::bvh::Child;
+use crate::flat::{FlatPoints, FlatScene};
+use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, WIDE, Wide};
+use crate::surface::{Disc, Shape, Sphere};
+use std::marker::PhantomData;
+use std::ops::ControlFlow;
+
+#[inline(always)]
+pub(super) fn closest_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [Hit]) {
+    if scene.surface.is_oriented() {
+        closest_of_shape::<L, Disc>(&scene.points, rays, hits);
+    } else {
+        closest_of_shape::<L, Sphere>(&scene.points, rays, hits);
+    }
+}
+
+#[inline(always)]
+fn closest_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], hits: &mut [Hit]) {
+    let mut stack = PacketStack::new();
+    for (rays, hits) in rays.chunks(WIDE).zip(hits.chunks_mut(WIDE)) {
+        if let Some(packet) = Packet::new(rays, false) {
+            closest_in_packet::<L, S>(points, &packet, &mut stack, hits);
+            continue;
+        }
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = closest_of_ray::<L, S>(points, ray, &mut stack.alone);
+        }
+    }
+}
+
+#[inline(always)]
+pub(super) fn closest_hit<L: Lanes>(scene: &FlatScene, ray: &Ray, stack: &mut RayStack) -> Hit {
+    if scene.surface.is_oriented() {
+        closest_of_ray::<L, Disc>(&scene.points, ray, stack)
+    } else {
+        closest_of_ray::<L, Sphere>(&scene.points, ray, stack)
+    }
+}
+
+#[inline(always)]
+fn closest_of_ray<L: Lanes, S: Shape>(points: &FlatPoints, ray: &Ray, stack: &mut RayStack) -> Hit {
+    let mut closest = Closest::<S>::new(ray, Hit { distance: ray.t_max, ..Hit::MISS });
+    along_ray::<L>(points, ROOT, ray, stack, &mut closest);
+    if closest.hit.is_miss() { Hit::MISS } else { closest.hit }
+}
+
+struct Closest<'r, S> {
+    ray: &'r Ray,
+    shape: PhantomData<S>,
+    hit: Hit,
+}
+
+impl<'r, S> Closest<'r, S> {
+    #[inline(always)]
+    fn new(ray: &'r Ray, hit: Hit) -> Self {
+        Self { ray, shape: PhantomData, hit }
+    }
+}
+
+impl<S: Shape> RayVisitor for Closest<'_, S> {
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.hit.distance
+    }
+
+    #[inline(always)]
+    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
+        let mut hits = BlockHits::find::<L, S>(points, block_idx, self.ray, self.hit.distance);
+        while let Some((hit, _)) = hits.next() {
+            if hit.is_before(&self.hit, points) {
+                self.hit = hit;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+#[inline(always)]
+fn closest_in_packet<L: Lanes, S: Shape>(
+    points: &FlatPoints,
+    packet: &Packet<L::Wide>,
+    stack: &mut PacketStack,
+    hits: &mut [Hit],
+) {
+    let mut closest = ClosestInPacket::<L, S> {
+        packet,
+        shape: PhantomData,
+        distances: packet.limits(),
+        slots: [Hit::MISS.slot; WIDE],
+    };
+    along_packet::<L, true>(points, packet, stack, &mut closest);
+    for (lane, hit) in hits.iter_mut().enumerate() {
+        let found = Hit { distance: closest.distances[lane], slot: closest.slots[lane] };
+        *hit = if found.is_miss() { Hit::MISS } else { found };
+    }
+}
+
+struct ClosestInPacket<'p, L: Lanes, S> {
+    packet: &'p Packet<'p, L::Wide>,
+    shape: PhantomData<S>,
+    distances: [f32; WIDE],
+    slots: [u32; WIDE],
+}
+
+impl<L: Lanes, S: Shape> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
+    #[inline(always)]
+    fn limits(&self) -> &[f32; WIDE] {
+        &self.distances
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        let block = BlockForPacket::<L>::new(&points.blocks[block_idx as usize], self.packet);
+        let mut distances = L::Wide::load(&self.distances);
+        for lane in 0..LANES {
+            let (distance, mask) = block.intersect::<S>(lane);
+            let near = (mask & distance.less_equal(distances)).bits();
+            if near == 0 {
+                continue;
+            }
+            let slot = block_idx * LANES as u32 + lane as u32;
+            let closer = mask & distance.less(distances);
+            let mut replaced = closer.bits();
+            let mut ties = near & !replaced;
+            while ties != 0 {
+                let tie = ties.trailing_zeros() as usize;
+                ties &= ties - 1;
+                replaced |= u32::from(precedes(points, slot, self.slots[tie])) << tie;
+            }
+            distances = L::Wide::select(closer, distance, distances);
+            L::Wide::assign(&mut self.slots, replaced, slot);
+        }
+        self.distances = distances.store();
+    }
+
+    #[inline(always)]
+    fn visit_alone(
+        &mut self,
+        points: &FlatPoints,
+        child: Child,
+        lane: usize,
+        stack: &mut RayStack,
+    ) {
+        let ray = &self.packet.rays[lane];
+        let hit = Hit { distance: self.distances[lane], slot: self.slots[lane] };
+        let mut closest = Closest::<S>::new(ray, hit);
+        along_ray::<L>(points, child, ray, stack, &mut closest);
+        self.distances[lane] = closest.hit.distance;
+        self.slots[lane] = closest.hit.slot;
+    }
+}

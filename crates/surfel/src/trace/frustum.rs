@@ -1,0 +1,171 @@
+//! The room that a packet's rays take up: slopes and offsets along the axis they mostly follow.
+
+use super::node::ROUNDING;
+use super::packet::WideRays;
+use crate::bvh::Node;
+use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3, WIDE, Wide};
+
+/// Rays whose slopes differ by more than this are no packet.
+const WIDEST: f32 = 0.25;
+
+/// Along the main axis, at `x` in the rays' sense from the anchor, the rays lie in
+/// `offset.0 + slope.0 x .. offset.1 + slope.1 x` on each of the other two axes.
+pub struct Frustum {
+    pub anchor: Vec3,
+    main: usize,
+    /// 1 or -1: where the frustum opens to.
+    sense: f32,
+    across: [usize; 2],
+    slope: [(f32, f32); 2],
+    offset: [(f32, f32); 2],
+    /// Largest distance of an origin from the anchor plane.
+    depth: f32,
+    /// Nothing beyond this is on any ray.
+    farthest: f32,
+    /// How far origins lie from the anchor, for the bounds of rounding.
+    spread: f32,
+}
+
+/// The boxes of a node's children, relative to the frustum's anchor, widened by rounding.
+pub struct Boxes<L> {
+    min: [L; 3],
+    max: [L; 3],
+}
+
+impl<L: Lanes> Boxes<L> {
+    #[inline(always)]
+    pub fn store(&self) -> ([[f32; LANES]; 3], [[f32; LANES]; 3]) {
+        let ([x0, y0, z0], [x1, y1, z1]) = (self.min, self.max);
+        ([x0.store(), y0.store(), z0.store()], [x1.store(), y1.store(), z1.store()])
+    }
+}
+
+impl Frustum {
+    /// Around rays in lanes, of which `first` is one, unless they go too different ways.
+    #[inline(always)]
+    pub fn new<W: Wide>(first: &Ray, rays: &WideRays<W>, ends_meet: bool) -> Option<Self> {
+        let main = main_axis(first.direction);
+        let sense = 1f32.copysign(first.direction[main]);
+        let along = rays.direction[main] * W::splat(sense);
+        if along.min_lane() <= 0.0 {
+            return None;
+        }
+        let across = [(main + 1) % 3, (main + 2) % 3];
+        let inverse = W::splat(1.0) / rays.direction[main];
+        let slopes = [rays.direction[across[0]] * inverse, rays.direction[across[1]] * inverse];
+        let slope = [range(slopes[0]), range(slopes[1])];
+        if !(slope[0].1 - slope[0].0 < WIDEST && slope[1].1 - slope[1].0 < WIDEST) {
+            return None;
+        }
+        let is_backward = ends_meet && first.t_max < f32::INFINITY;
+        let mut anchor = if is_backward { first.at(first.t_max) } else { first.origin };
+        // The plane from which x counts lies before all starts, or behind all ends.
+        let starts = if is_backward {
+            rays.origin[main] + rays.direction[main] * rays.t_max
+        } else {
+            rays.origin[main]
+        };
+        anchor[main] = match is_backward == (0.0 < sense) {
+            true => starts.max_lane(),
+            false => starts.min_lane(),
+        };
+        let start = [
+            rays.origin[0] - W::splat(anchor.x),
+            rays.origin[1] - W::splat(anchor.y),
+            rays.origin[2] - W::splat(anchor.z),
+        ];
+        let distance = Vec3::new(largest(start[0]), largest(start[1]), largest(start[2]));
+        let offset = [
+            range(start[across[0]] - start[main] * slopes[0]),
+            range(start[across[1]] - start[main] * slopes[1]),
+        ];
+        let runs_down = is_backward == (0.0 < sense);
+        Some(Self {
+            anchor,
+            main,
+            sense: if runs_down { -1.0 } else { 1.0 },
+            across,
+            slope: if runs_down { [flipped(slope[0]), flipped(slope[1])] } else { slope },
+            offset,
+            depth: distance[main],
+            farthest: if is_backward { distance[main] } else { f32::INFINITY },
+            spread: distance.max_element(),
+        })
+    }
+
+    #[inline(always)]
+    pub fn boxes<L: Lanes>(&self, node: &Node) -> Boxes<L> {
+        let corner = Vec3::from_array(node.origin) - self.anchor;
+        let step = node.step();
+        let slack =
+            ROUNDING * (corner.abs().max_element() + 256.0 * step.max_element() + self.spread);
+        let (low, high) = (corner - slack, corner + slack);
+        Boxes {
+            min: [
+                bounds::<L>(&node.lower[0], step.x, low.x),
+                bounds::<L>(&node.lower[1], step.y, low.y),
+                bounds::<L>(&node.lower[2], step.z, low.z),
+            ],
+            max: [
+                bounds::<L>(&node.upper[0], step.x, high.x),
+                bounds::<L>(&node.upper[1], step.y, high.y),
+                bounds::<L>(&node.upper[2], step.z, high.z),
+            ],
+        }
+    }
+
+    /// The lanes whose boxes reach into the frustum up to `limit` along the main axis, and where they begin.
+    #[inline(always)]
+    pub fn meets<L: Lanes>(&self, boxes: &Boxes<L>, limit: f32) -> (u32, [f32; LANES]) {
+        let zero = L::splat(0.0);
+        let (min, max) = (boxes.min[self.main], boxes.max[self.main]);
+        let (near, far) = if 0.0 < self.sense { (min, max) } else { (zero - max, zero - min) };
+        let entry = near.max(zero);
+        let mut meets = zero.less_equal(far) & entry.less_equal(L::splat(limit));
+        for i in 0..2 {
+            let (min, max) = (boxes.min[self.across[i]], boxes.max[self.across[i]]);
+            let (low, high) = (L::splat(self.slope[i].0), L::splat(self.slope[i].1));
+            let upper = L::splat(self.offset[i].1) + (high * entry).max(high * far);
+            let lower = L::splat(self.offset[i].0) + (low * entry).min(low * far);
+            meets = meets & min.less_equal(upper) & lower.less_equal(max);
+        }
+        (meets.bits(), entry.store())
+    }
+
+    /// How far along the main axis any ray still looks.
+    #[inline(always)]
+    pub fn limit<W: Wide>(&self, rays: &WideRays<W>, limits: &[f32; WIDE]) -> f32 {
+        let along = rays.direction[self.main];
+        let along = along.max(W::splat(0.0) - along);
+        let limit = (W::load(limits) * along).max_lane() + self.depth;
+        limit.min(self.farthest) * (1.0 + ROUNDING)
+    }
+}
+
+fn main_axis(direction: Vec3) -> usize {
+    let size = direction.abs();
+    match (size.y <= size.x, size.z <= size.x, size.z <= size.y) {
+        (true, true, _) => 0,
+        (_, _, true) => 1,
+        _ => 2,
+    }
+}
+
+#[inline(always)]
+fn bounds<L: Lanes>(steps: &[u8; LANES], step: f32, corner: f32) -> L {
+    L::from_u8(steps) * L::splat(step) + L::splat(corner)
+}
+
+#[inline(always)]
+fn range<W: Wide>(values: W) -> (f32, f32) {
+    (values.min_lane(), values.max_lane())
+}
+
+#[inline(always)]
+fn largest<W: Wide>(values: W) -> f32 {
+    values.max(W::splat(0.0) - values).max_lane()
+}
+
+fn flipped((low, high): (f32, f32)) -> (f32, f32) {
+    (-high, -low)
+}

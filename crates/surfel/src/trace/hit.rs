@@ -1,0 +1,81 @@
+//! What the searches find.
+
+use crate::flat::{FlatPoints, Slot};
+use crate::surface::{MAX_GATHERED, gather_limit};
+
+/// The nearest shape on a ray: the one with the lower point id where two are equally near.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Infinite if nothing was hit.
+    pub distance: f32,
+    /// Where the point lies; `FlatPoints::id` tells its index in the cloud.
+    pub slot: Slot,
+}
+
+impl Hit {
+    pub const MISS: Self = Self { distance: f32::INFINITY, slot: Slot::MAX };
+
+    pub fn is_miss(&self) -> bool {
+        self.slot == Slot::MAX
+    }
+
+    #[inline(always)]
+    pub(super) fn is_before(&self, other: &Self, points: &FlatPoints) -> bool {
+        self.distance < other.distance
+            || self.distance == other.distance && precedes(points, self.slot, other.slot)
+    }
+}
+
+/// Whether the point at `slot` comes before the one at `other`, if there is one, at the same distance.
+#[cold]
+pub(super) fn precedes(points: &FlatPoints, slot: Slot, other: Slot) -> bool {
+    other == Hit::MISS.slot || points.id(slot) < points.id(other)
+}
+
+/// The nearest shapes on a ray, nearest first, none farther than the least `gather_limit` of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Gather {
+    hits: [Hit; MAX_GATHERED],
+    len: usize,
+    limit: f32,
+}
+
+impl Gather {
+    pub const EMPTY: Self = Self { hits: [Hit::MISS; MAX_GATHERED], len: 0, limit: f32::INFINITY };
+
+    pub(super) fn up_to(limit: f32) -> Self {
+        Self { limit, ..Self::EMPTY }
+    }
+
+    pub fn hits(&self) -> &[Hit] {
+        &self.hits[..self.len]
+    }
+
+    /// Takes `hit` in if it is near enough, and drops what is no longer.
+    #[inline(always)]
+    pub(super) fn insert(&mut self, points: &FlatPoints, hit: Hit, radius: f32) {
+        if self.limit < hit.distance {
+            return;
+        }
+        self.limit = self.limit.min(gather_limit(hit.distance, radius));
+        let mut place = self.len.min(MAX_GATHERED - 1);
+        if self.len == MAX_GATHERED && !hit.is_before(&self.hits[place], points) {
+            return;
+        }
+        while 0 < place && hit.is_before(&self.hits[place - 1], points) {
+            self.hits[place] = self.hits[place - 1];
+            place -= 1;
+        }
+        self.hits[place] = hit;
+        self.len = (self.len + 1).min(MAX_GATHERED);
+        while 0 < self.len && self.limit < self.hits[self.len - 1].distance {
+            self.len -= 1;
+        }
+    }
+
+    /// Once full, nothing beyond the last is taken in any more.
+    #[inline(always)]
+    pub(super) fn reach(&self) -> f32 {
+        if self.len == MAX_GATHERED { self.hits[MAX_GATHERED - 1].distance } else { self.limit }
+    }
+}

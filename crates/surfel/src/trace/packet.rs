@@ -1,0 +1,222 @@
+//! Sixteen rays that go much the same way, walked through the tree together.
+
+use super::frustum::Frustum;
+use super::traverse::RayStack;
+use crate::bvh::{Child, STACK_SIZE};
+use crate::flat::FlatPoints;
+use crate::math::{Floats, LaneMask, Lanes, Ray, WIDE, Wide};
+
+/// With no more rays than this left on a node, or on a block, each goes on alone: without that
+/// packets lose to single rays among ten million points.
+const FEW_ON_NODE: u32 = 2;
+const FEW_ON_BLOCK: u32 = 4;
+
+/// Sixteen rays in lanes.
+pub struct WideRays<W> {
+    pub origin: [W; 3],
+    pub direction: [W; 3],
+    pub t_min: W,
+    pub t_max: W,
+}
+
+/// Up to sixteen rays that are alike.
+pub struct Packet<'r, W> {
+    pub rays: &'r [Ray],
+    pub wide: WideRays<W>,
+    inverse: [W; 3],
+    frustum: Frustum,
+    /// Origins relative to the frustum's anchor.
+    from_anchor: [W; 3],
+}
+
+/// What is looked for along the rays of a packet.
+pub trait PacketVisitor<L: Lanes> {
+    /// A box entered beyond this is left out; below any distance where the ray needs nothing more.
+    fn limits(&self) -> &[f32; WIDE];
+
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32);
+
+    /// Lets the ray in this lane search `child` alone.
+    fn visit_alone(&mut self, points: &FlatPoints, child: Child, lane: usize, stack: &mut RayStack);
+}
+
+impl<W: Wide> WideRays<W> {
+    /// Of one to sixteen rays; the last one fills the lanes that are left.
+    #[inline(always)]
+    pub fn new(rays: &[Ray]) -> Self {
+        let (mut origin, mut direction) = ([[0.0; WIDE]; 3], [[0.0; WIDE]; 3]);
+        let (mut t_min, mut t_max) = ([0.0; WIDE], [0.0; WIDE]);
+        for lane in 0..WIDE {
+            let ray = &rays[lane.min(rays.len() - 1)];
+            (t_min[lane], t_max[lane]) = (ray.t_min, ray.t_max);
+            for axis in 0..3 {
+                origin[axis][lane] = ray.origin[axis];
+                direction[axis][lane] = ray.direction[axis];
+            }
+        }
+        Self {
+            origin: [W::load(&origin[0]), W::load(&origin[1]), W::load(&origin[2])],
+            direction: [W::load(&direction[0]), W::load(&direction[1]), W::load(&direction[2])],
+            t_min: W::load(&t_min),
+            t_max: W::load(&t_max),
+        }
+    }
+}
+
+impl<'r, W: Wide> Packet<'r, W> {
+    /// One to sixteen rays, if they are alike enough. `ends_meet` says that the rays' far ends may be
+    /// closer to each other than their origins, as at a light.
+    #[inline(always)]
+    pub fn new(rays: &'r [Ray], ends_meet: bool) -> Option<Self> {
+        let wide = WideRays::new(rays);
+        let frustum = Frustum::new(&rays[0], &wide, ends_meet)?;
+        let anchor = frustum.anchor;
+        let [x, y, z] = wide.direction;
+        Some(Self {
+            rays,
+            inverse: [inverse(x), inverse(y), inverse(z)],
+            from_anchor: [
+                wide.origin[0] - W::splat(anchor.x),
+                wide.origin[1] - W::splat(anchor.y),
+                wide.origin[2] - W::splat(anchor.z),
+            ],
+            wide,
+            frustum,
+        })
+    }
+
+    /// How far each ray looks at first; nowhere in lanes without a ray.
+    #[inline(always)]
+    pub fn limits(&self) -> [f32; WIDE] {
+        let mut limits = self.wide.t_max.store();
+        limits[self.rays.len()..].fill(f32::NEG_INFINITY);
+        limits
+    }
+
+    /// The lanes whose rays pass the box before `limits`.
+    #[inline(always)]
+    fn passing(&self, bounds: &ChildBox, limits: &[f32; WIDE]) -> u32 {
+        let (mut enter, mut leave) = (self.wide.t_min, W::load(limits));
+        for axis in 0..3 {
+            let low = (W::splat(bounds.min[axis]) - self.from_anchor[axis]) * self.inverse[axis];
+            let high = (W::splat(bounds.max[axis]) - self.from_anchor[axis]) * self.inverse[axis];
+            enter = low.min(high).max(enter);
+            leave = low.max(high).min(leave);
+        }
+        enter.less_equal(leave).bits()
+    }
+}
+
+/// Kept finite, so that no product of an infinity and a zero gives NaN.
+#[inline(always)]
+fn inverse<F: Floats>(direction: F) -> F {
+    const LEAST: f32 = 1e-18;
+    let is_small = direction.less(F::splat(LEAST)) & F::splat(-LEAST).less(direction);
+    F::splat(1.0) / F::select(is_small, F::splat(LEAST), direction)
+}
+
+/// A child on the stack with its box, relative to the frustum's anchor.
+#[derive(Clone, Copy)]
+struct ChildBox {
+    /// Packed.
+    child: u32,
+    entry: f32,
+    min: [f32; 3],
+    max: [f32; 3],
+}
+
+/// What a search of a packet, and of a ray of it alone, has still to look at.
+pub struct PacketStack {
+    boxes: [ChildBox; STACK_SIZE],
+    pub alone: RayStack,
+}
+
+impl PacketStack {
+    pub fn new() -> Self {
+        let nothing = ChildBox { child: 0, entry: 0.0, min: [0.0; 3], max: [0.0; 3] };
+        Self { boxes: [nothing; STACK_SIZE], alone: RayStack::new() }
+    }
+}
+
+/// Shows `visitor` every block whose box a ray of the packet enters before its limit, near boxes first
+/// if `IS_ORDERED`.
+#[inline(always)]
+pub fn along_packet<L: Lanes, const IS_ORDERED: bool>(
+    points: &FlatPoints,
+    packet: &Packet<L::Wide>,
+    stack: &mut PacketStack,
+    visitor: &mut impl PacketVisitor<L>,
+) {
+    let PacketStack { boxes: stack, alone } = stack;
+    let mut size = push_children::<L, IS_ORDERED>(points, packet, 0, f32::INFINITY, stack, 0);
+    let mut limit = packet.frustum.limit(&packet.wide, visitor.limits());
+    while 0 < size {
+        size -= 1;
+        let next = stack[size];
+        if IS_ORDERED && limit < next.entry {
+            continue;
+        }
+        let mut lanes = packet.passing(&next, visitor.limits());
+        if lanes == 0 {
+            continue;
+        }
+        let n_lanes = lanes.count_ones();
+        match Child::unpack(next.child) {
+            Child::Node(node_idx) if FEW_ON_NODE < n_lanes => {
+                size = push_children::<L, IS_ORDERED>(points, packet, node_idx, limit, stack, size);
+                continue;
+            }
+            Child::Block(block_idx) if FEW_ON_BLOCK < n_lanes => {
+                visitor.visit(points, block_idx);
+            }
+            child => {
+                while lanes != 0 {
+                    visitor.visit_alone(points, child, lanes.trailing_zeros() as usize, alone);
+                    lanes &= lanes - 1;
+                }
+            }
+        }
+        limit = packet.frustum.limit(&packet.wide, visitor.limits());
+        if limit == f32::NEG_INFINITY {
+            return;
+        }
+    }
+}
+
+/// Pushes the children of a node that the frustum meets; returns the size of the stack.
+#[inline(always)]
+fn push_children<L: Lanes, const IS_ORDERED: bool>(
+    points: &FlatPoints,
+    packet: &Packet<L::Wide>,
+    node_idx: u32,
+    limit: f32,
+    stack: &mut [ChildBox; STACK_SIZE],
+    size: usize,
+) -> usize {
+    let node = &points.nodes[node_idx as usize];
+    let boxes = packet.frustum.boxes::<L>(node);
+    let (mut lanes, entries) = packet.frustum.meets::<L>(&boxes, limit);
+    lanes &= u32::from(node.occupied());
+    let (min, max) = boxes.store();
+    let mut top = size;
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes - 1;
+        let Some(child) = node.child(lane) else { continue };
+        let mut place = top;
+        if IS_ORDERED {
+            while size < place && stack[place - 1].entry < entries[lane] {
+                stack[place] = stack[place - 1];
+                place -= 1;
+            }
+        }
+        stack[place] = ChildBox {
+            child: child.pack(),
+            entry: entries[lane],
+            min: [min[0][lane], min[1][lane], min[2][lane]],
+            max: [max[0][lane], max[1][lane], max[2][lane]],
+        };
+        top += 1;
+    }
+    top
+}
