@@ -32,8 +32,7 @@ fn plain_hits(scene: &FlatScene, ray: &Ray) -> Vec<Found> {
             }
         }
     }
-    let id = |hit: &Hit| scene.points.id(hit.slot);
-    found.sort_by(|(a, _), (b, _)| a.distance.total_cmp(&b.distance).then(id(a).cmp(&id(b))));
+    found.sort_by(|(a, _), (b, _)| a.distance.total_cmp(&b.distance).then(a.slot.cmp(&b.slot)));
     found
 }
 

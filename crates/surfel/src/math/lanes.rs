@@ -47,6 +47,8 @@ pub trait Lanes: Floats {
     fn store(self) -> [f32; LANES];
     /// The greatest of the lanes, none of which may be NaN.
     fn max_lane(self) -> f32;
+    /// Compares the lanes' bits as unsigned numbers: lanes may hold those as well.
+    fn less_bits(self, other: Self) -> Self::Mask;
     /// Asks for the memory of `data` to be near soon.
     fn prefetch<T>(data: &T);
 }
@@ -57,9 +59,8 @@ pub trait Wide: Floats {
     fn store(self) -> [f32; WIDE];
     /// The greatest of the lanes, none of which may be NaN.
     fn max_lane(self) -> f32;
-
-    /// Sets the elements of `words` that `lanes` has bits for to `value`.
-    fn assign(words: &mut [u32; WIDE], lanes: u32, value: u32);
+    /// Compares the lanes' bits as unsigned numbers: lanes may hold those as well.
+    fn less_bits(self, other: Self) -> Self::Mask;
 
     /// The least of the lanes, none of which may be NaN.
     #[inline(always)]
@@ -160,6 +161,11 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
+    fn less_bits(self, other: Self) -> PortableMask {
+        PortableMask(std::array::from_fn(|i| self.0[i].to_bits() < other.0[i].to_bits()))
+    }
+
+    #[inline(always)]
     fn prefetch<T>(_: &T) {}
 }
 
@@ -232,10 +238,8 @@ impl<L: Lanes> Wide for Pair<L> {
     }
 
     #[inline(always)]
-    fn assign(words: &mut [u32; WIDE], lanes: u32, value: u32) {
-        for (lane, word) in words.iter_mut().enumerate() {
-            *word = if lanes >> lane & 1 == 1 { value } else { *word };
-        }
+    fn less_bits(self, other: Self) -> Self::Mask {
+        Pair(self.0.less_bits(other.0), self.1.less_bits(other.1))
     }
 }
 

@@ -14,7 +14,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 macro_rules! kernel {
     ($module:ident::$name:ident($result:ty)) => {
         /// The batch kernel of the same name.
-        #[target_feature(enable = "avx2,fma")]
+        #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         pub(super) fn $name(scene: &FlatScene, rays: &[Ray], results: &mut [$result]) {
             $module::$name::<Eight<Avx2>>(scene, rays, results);
         }
@@ -154,6 +154,16 @@ impl<L: Level> Lanes for Eight<L> {
             let pair = _mm_max_ps(half, _mm_movehl_ps(half, half));
             _mm_cvtss_f32(_mm_max_ss(pair, _mm_movehdup_ps(pair)))
         }
+    }
+
+    #[inline(always)]
+    fn less_bits(self, other: Self) -> EightMask {
+        mask!(
+            (_mm256_castsi256_ps(_mm256_cmpgt_epi32(
+                _mm256_xor_si256(_mm256_castps_si256(other.0), _mm256_set1_epi32(i32::MIN)),
+                _mm256_xor_si256(_mm256_castps_si256(self.0), _mm256_set1_epi32(i32::MIN))
+            )))
+        )
     }
 
     #[inline(always)]

@@ -12,7 +12,9 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 macro_rules! kernel {
     ($module:ident::$name:ident($result:ty)) => {
         /// The batch kernel of the same name.
-        #[target_feature(enable = "avx2,fma,avx512f,avx512vl,avx512dq,avx512bw")]
+        #[target_feature(
+            enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512vl,avx512dq,avx512bw"
+        )]
         pub(super) fn $name(scene: &FlatScene, rays: &[Ray], results: &mut [$result]) {
             $module::$name::<Eight<Avx512>>(scene, rays, results);
         }
@@ -107,12 +109,11 @@ impl Wide for Sixteen {
     }
 
     #[inline(always)]
-    fn assign(words: &mut [u32; WIDE], lanes: u32, value: u32) {
-        // SAFETY: as for `avx512!`.
-        unsafe {
-            let value = _mm512_set1_epi32(value as i32);
-            _mm512_mask_storeu_epi32(words.as_mut_ptr().cast(), lanes as u16, value);
-        }
+    fn less_bits(self, other: Self) -> SixteenMask {
+        avx512!(SixteenMask(_mm512_cmplt_epu32_mask(
+            _mm512_castps_si512(self.0),
+            _mm512_castps_si512(other.0)
+        )))
     }
 }
 

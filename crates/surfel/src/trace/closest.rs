@@ -1,7 +1,7 @@
 //! The nearest shape on each ray, each point on its own.
 
 use super::block::{BlockForPacket, BlockHits};
-use super::hit::{Hit, precedes};
+use super::hit::Hit;
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
 use super::traverse::{ROOT, RayStack, RayVisitor, along_ray};
 use crate::bvh::Child;
@@ -73,7 +73,7 @@ impl<S: Shape> RayVisitor for Closest<'_, S> {
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
         let mut hits = BlockHits::find::<L, S>(points, block_idx, self.ray, self.hit.distance);
         while let Some((hit, _)) = hits.next() {
-            if hit.is_before(&self.hit, points) {
+            if hit.is_before(&self.hit) {
                 self.hit = hit;
             }
         }
@@ -92,11 +92,11 @@ fn closest_in_packet<L: Lanes, S: Shape>(
         packet,
         shape: PhantomData,
         distances: packet.limits(),
-        slots: [Hit::MISS.slot; WIDE],
+        slots: [f32::from_bits(Hit::MISS.slot); WIDE],
     };
     along_packet::<L, true>(points, packet, stack, &mut closest);
     for (lane, hit) in hits.iter_mut().enumerate() {
-        let found = Hit { distance: closest.distances[lane], slot: closest.slots[lane] };
+        let found = Hit { distance: closest.distances[lane], slot: closest.slots[lane].to_bits() };
         *hit = if found.is_miss() { Hit::MISS } else { found };
     }
 }
@@ -105,7 +105,8 @@ struct ClosestInPacket<'p, L: Lanes, S> {
     packet: &'p Packet<'p, L::Wide>,
     shape: PhantomData<S>,
     distances: [f32; WIDE],
-    slots: [u32; WIDE],
+    /// As the bits of floats, which is how lanes hold them.
+    slots: [f32; WIDE],
 }
 
 impl<L: Lanes, S: Shape> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
@@ -118,24 +119,17 @@ impl<L: Lanes, S: Shape> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
         let block = BlockForPacket::<L>::new(&points.blocks[block_idx as usize], self.packet);
         let mut distances = L::Wide::load(&self.distances);
+        let mut slots = L::Wide::load(&self.slots);
+        // No branch: whether a disc is hit cannot be foretold, and on a plane all are equally near.
         for lane in 0..LANES {
+            let slot = L::Wide::splat(f32::from_bits(block_idx * LANES as u32 + lane as u32));
             let (distance, mask) = block.intersect::<S>(lane);
-            let near = (mask & distance.less_equal(distances)).bits();
-            if near == 0 {
-                continue;
-            }
-            let slot = block_idx * LANES as u32 + lane as u32;
-            let closer = mask & distance.less(distances);
-            let mut replaced = closer.bits();
-            let mut ties = near & !replaced;
-            while ties != 0 {
-                let tie = ties.trailing_zeros() as usize;
-                ties &= ties - 1;
-                replaced |= u32::from(precedes(points, slot, self.slots[tie])) << tie;
-            }
+            let is_first = distance.less(distances) | slot.less_bits(slots);
+            let closer = mask & distance.less_equal(distances) & is_first;
+            slots = L::Wide::select(closer, slot, slots);
             distances = L::Wide::select(closer, distance, distances);
-            L::Wide::assign(&mut self.slots, replaced, slot);
         }
+        self.slots = slots.store();
         self.distances = distances.store();
     }
 
@@ -148,10 +142,10 @@ impl<L: Lanes, S: Shape> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
         stack: &mut RayStack,
     ) {
         let ray = &self.packet.rays[lane];
-        let hit = Hit { distance: self.distances[lane], slot: self.slots[lane] };
+        let hit = Hit { distance: self.distances[lane], slot: self.slots[lane].to_bits() };
         let mut closest = Closest::<S>::new(ray, hit);
         along_ray::<L>(points, child, ray, stack, &mut closest);
         self.distances[lane] = closest.hit.distance;
-        self.slots[lane] = closest.hit.slot;
+        self.slots[lane] = f32::from_bits(closest.hit.slot);
     }
 }

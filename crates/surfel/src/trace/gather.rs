@@ -40,7 +40,7 @@ impl RayVisitor for Gathering<'_> {
         let reach = self.gather.reach();
         let mut hits = BlockHits::find::<L, Disc>(points, block_idx, self.ray, reach);
         while let Some((hit, radius)) = hits.next() {
-            self.gather.insert(points, hit, radius);
+            self.gather.insert(hit, radius);
         }
         ControlFlow::Continue(())
     }

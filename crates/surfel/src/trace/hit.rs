@@ -1,9 +1,9 @@
 //! What the searches find.
 
-use crate::flat::{FlatPoints, Slot};
+use crate::flat::Slot;
 use crate::surface::{MAX_GATHERED, gather_limit};
 
-/// The nearest shape on a ray: the one with the lower point id where two are equally near.
+/// The nearest shape on a ray: the one in the lower slot where two are equally near.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Infinite if nothing was hit.
@@ -20,16 +20,9 @@ impl Hit {
     }
 
     #[inline(always)]
-    pub(super) fn is_before(&self, other: &Self, points: &FlatPoints) -> bool {
-        self.distance < other.distance
-            || self.distance == other.distance && precedes(points, self.slot, other.slot)
+    pub(super) fn is_before(&self, other: &Self) -> bool {
+        self.distance < other.distance || self.distance == other.distance && self.slot < other.slot
     }
-}
-
-/// Whether the point at `slot` comes before the one at `other`, if there is one, at the same distance.
-#[cold]
-pub(super) fn precedes(points: &FlatPoints, slot: Slot, other: Slot) -> bool {
-    other == Hit::MISS.slot || points.id(slot) < points.id(other)
 }
 
 /// The nearest shapes on a ray, nearest first, none farther than the least `gather_limit` of them.
@@ -53,16 +46,16 @@ impl Gather {
 
     /// Takes `hit` in if it is near enough, and drops what is no longer.
     #[inline(always)]
-    pub(super) fn insert(&mut self, points: &FlatPoints, hit: Hit, radius: f32) {
+    pub(super) fn insert(&mut self, hit: Hit, radius: f32) {
         if self.limit < hit.distance {
             return;
         }
         self.limit = self.limit.min(gather_limit(hit.distance, radius));
         let mut place = self.len.min(MAX_GATHERED - 1);
-        if self.len == MAX_GATHERED && !hit.is_before(&self.hits[place], points) {
+        if self.len == MAX_GATHERED && !hit.is_before(&self.hits[place]) {
             return;
         }
-        while 0 < place && hit.is_before(&self.hits[place - 1], points) {
+        while 0 < place && hit.is_before(&self.hits[place - 1]) {
             self.hits[place] = self.hits[place - 1];
             place -= 1;
         }

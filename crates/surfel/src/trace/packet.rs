@@ -8,8 +8,8 @@ use crate::math::{Floats, LaneMask, Lanes, Ray, WIDE, Wide};
 
 /// With no more rays than this left on a node, or on a block, each goes on alone: without that
 /// packets lose to single rays among ten million points.
-const FEW_ON_NODE: u32 = 2;
-const FEW_ON_BLOCK: u32 = 4;
+const FEW_ON_NODE: u32 = 1;
+const FEW_ON_BLOCK: u32 = 1;
 
 /// Sixteen rays in lanes.
 pub struct WideRays<W> {
