@@ -1,6 +1,6 @@
 //! One node: the boxes of eight children in 80 bytes.
 
-use crate::math::{Aabb, LANES, Vec3};
+use crate::math::{Aabb, LANES, Lanes, Vec3, Vec3A};
 
 /// Children's boxes as multiples of a power of two from a common corner, after Ylitie et al. 2017.
 ///
@@ -11,12 +11,13 @@ pub struct Node {
     /// Lower corner of all children.
     pub origin: [f32; 3],
     /// Biased exponents of the step an axis: step = 2^(exponent - 127).
-    exponents: [u8; 4],
+    exponents: [u8; 3],
+    n_children: u8,
     /// Index of the first child that is a node; the others follow it.
     pub first_node: u32,
     /// Index of the first child that is a block; the others follow it.
     pub first_block: u32,
-    /// 0 = no child, else kind (`IS_NODE` or `IS_BLOCK`) and number among the children of that kind.
+    /// For the first `n_children`: kind (`IS_NODE` or `IS_BLOCK`) and number among the children of that kind.
     pub children: [u8; LANES],
     /// Lower bounds in steps, an axis a row.
     pub lower: [[u8; LANES]; 3],
@@ -63,6 +64,7 @@ impl Node {
         let bounds = children.iter().fold(Aabb::EMPTY, |all, (child, _)| all.union(*child));
         let mut node =
             Self { origin: bounds.min.to_array(), first_node, first_block, ..Self::default() };
+        node.n_children = children.len() as u8;
         for axis in 0..3 {
             node.exponents[axis] = step_exponent(bounds.min[axis], bounds.max[axis]);
         }
@@ -89,27 +91,42 @@ impl Node {
         }
     }
 
+    /// The children of all lanes as `Child::pack` has them, which lanes hold as bits.
+    #[inline(always)]
+    pub fn packed_children<L: Lanes>(&self) -> L {
+        L::from_tagged(&self.children, self.first_node, self.first_block | Child::BLOCK_BIT)
+    }
+
+    /// They take the first lanes.
+    #[inline(always)]
+    pub fn n_children(&self) -> u8 {
+        self.n_children
+    }
+
     /// Bit i is set if lane i holds a child.
     #[inline(always)]
-    pub fn occupied(&self) -> u8 {
-        // The top bits of eight bytes, gathered by one multiplication into the highest byte.
-        let children = u64::from_le_bytes(self.children);
-        let any = ((children >> 7) | (children >> 6)) & 0x0101_0101_0101_0101;
-        (any.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u8
+    pub fn occupied(&self) -> u32 {
+        (1 << self.n_children) - 1
     }
 
     /// Length of a step along each axis.
     #[inline(always)]
-    pub fn step(&self) -> Vec3 {
-        let power = |axis: usize| f32::from_bits(u32::from(self.exponents[axis]) << 23);
-        Vec3::new(power(0), power(1), power(2))
+    pub fn step(&self) -> Vec3A {
+        let [x, y, z] = self.exponents.map(|exponent| f32::from_bits(u32::from(exponent) << 23));
+        Vec3A::new(x, y, z)
+    }
+
+    /// Upper bound of the size of the box around all children.
+    #[inline(always)]
+    pub fn size(&self) -> f32 {
+        256.0 * self.step().max_element()
     }
 
     /// The decoded box of the child in `lane`.
     pub fn bounds(&self, lane: usize) -> Aabb {
         let corner = |steps: &[[u8; LANES]; 3]| {
             let steps = Vec3::from_array([0, 1, 2].map(|axis| f32::from(steps[axis][lane])));
-            Vec3::from_array(self.origin) + steps * self.step()
+            Vec3::from_array(self.origin) + steps * Vec3::from(self.step())
         };
         Aabb { min: corner(&self.lower), max: corner(&self.upper) }
     }
@@ -168,11 +185,11 @@ mod tests {
                 .map(|i| (Aabb::of_points([vector(), vector()]), i % 3 == 0))
                 .collect();
             let node = Node::new(&boxes, 100, 200);
-            assert_eq!(u32::from(node.occupied()), (1u32 << boxes.len()) - 1);
+            assert_eq!(node.occupied(), (1u32 << boxes.len()) - 1);
             for (lane, (bounds, _)) in boxes.iter().enumerate() {
                 assert!(node.bounds(lane).contains(*bounds), "{:?} {bounds:?}", node.bounds(lane));
                 let excess = node.bounds(lane).size() - bounds.size();
-                assert!(excess.cmple(2.01 * node.step() + 1e-6 * offset).all());
+                assert!(excess.cmple(2.01 * Vec3::from(node.step()) + 1e-6 * offset).all());
             }
         }
     }

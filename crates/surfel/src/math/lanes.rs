@@ -44,13 +44,30 @@ pub trait Lanes: Floats {
     fn from_signed_bits<const SHIFT: i32>(words: &[u32; LANES]) -> Self;
     /// The 2 highest bits of each word.
     fn from_top_bits(words: &[u32; LANES]) -> Self;
+    /// Bits: the 3 lowest of each byte, plus `tagged` where its highest bit is set and `plain` elsewhere.
+    fn from_tagged(bytes: &[u8; LANES], plain: u32, tagged: u32) -> Self;
     fn store(self) -> [f32; LANES];
+    /// Moves the chosen lanes to the front, in their order.
+    fn compress(self, lanes: u32) -> Self;
+    /// Sorts the chosen lanes, none of them negative, by falling value to the front, and `others` with
+    /// them. Values may come out smaller by some 2^-20 of themselves.
+    fn sort_from_far(self, lanes: Self::Mask, others: Self) -> (Self, Self);
+    /// `self * factor + summand`, perhaps rounded only once: for bounds, never for results.
+    fn times_plus(self, factor: Self, summand: Self) -> Self;
+    /// True in this many lanes from the first.
+    fn first(n: u8) -> Self::Mask;
     /// The greatest of the lanes, none of which may be NaN.
     fn max_lane(self) -> f32;
     /// Compares the lanes' bits as unsigned numbers: lanes may hold those as well.
     fn less_bits(self, other: Self) -> Self::Mask;
-    /// Asks for the memory of `data` to be near soon.
-    fn prefetch<T>(data: &T);
+    /// The least of the lanes, none of which may be NaN.
+    #[inline(always)]
+    fn min_lane(self) -> f32 {
+        -(Self::splat(0.0) - self).max_lane()
+    }
+
+    /// Asks for the memory of `data` to be near soon. It need not be anyone's.
+    fn prefetch<T>(data: *const T);
 }
 
 /// Sixteen floats: the rays of a packet.
@@ -122,6 +139,23 @@ impl Floats for PortableLanes {
     }
 }
 
+/// The chosen lanes in the order of `keys`' falling values.
+fn order_from_far(keys: [f32; LANES], mut lanes: u32) -> [usize; LANES] {
+    let (mut order, mut n) = ([0; LANES], 0);
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes - 1;
+        let mut place = n;
+        while 0 < place && keys[order[place - 1]] <= keys[lane] {
+            order[place] = order[place - 1];
+            place -= 1;
+        }
+        order[place] = lane;
+        n += 1;
+    }
+    order
+}
+
 impl Lanes for PortableLanes {
     type Wide = Pair<Self>;
 
@@ -161,12 +195,44 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
+    fn from_tagged(bytes: &[u8; LANES], plain: u32, tagged: u32) -> Self {
+        let word = |byte: u8| u32::from(byte & 7) + if byte < 0x80 { plain } else { tagged };
+        Self(bytes.map(|byte| f32::from_bits(word(byte))))
+    }
+
+    #[inline(always)]
+    fn compress(self, mut lanes: u32) -> Self {
+        let mut values = [0.0; LANES];
+        for value in &mut values[..lanes.count_ones() as usize] {
+            *value = self.0[lanes.trailing_zeros() as usize];
+            lanes &= lanes - 1;
+        }
+        Self(values)
+    }
+
+    #[inline(always)]
+    fn sort_from_far(self, lanes: PortableMask, others: Self) -> (Self, Self) {
+        let order = order_from_far(self.0, lanes.bits());
+        (Self(order.map(|lane| self.0[lane])), Self(order.map(|lane| others.0[lane])))
+    }
+
+    #[inline(always)]
+    fn times_plus(self, factor: Self, summand: Self) -> Self {
+        self * factor + summand
+    }
+
+    #[inline(always)]
+    fn first(n: u8) -> PortableMask {
+        PortableMask(std::array::from_fn(|lane| lane < usize::from(n)))
+    }
+
+    #[inline(always)]
     fn less_bits(self, other: Self) -> PortableMask {
         PortableMask(std::array::from_fn(|i| self.0[i].to_bits() < other.0[i].to_bits()))
     }
 
     #[inline(always)]
-    fn prefetch<T>(_: &T) {}
+    fn prefetch<T>(_: *const T) {}
 }
 
 macro_rules! portable_operator {

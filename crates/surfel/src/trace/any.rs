@@ -1,6 +1,7 @@
 //! Whether any shape lies in each ray's range, each point on its own.
 
 use super::block::{BlockForPacket, BlockHits};
+use super::flight::fly;
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
 use super::traverse::{ROOT, RayStack, RayVisitor, along_ray};
 use crate::bvh::Child;
@@ -22,14 +23,21 @@ pub(super) fn any_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &mut
 #[inline(always)]
 fn any_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], occluded: &mut [bool]) {
     let mut stack = PacketStack::new();
-    for (rays, occluded) in rays.chunks(WIDE).zip(occluded.chunks_mut(WIDE)) {
-        if let Some(packet) = Packet::new(rays, true) {
+    let (mut loose, mut indices) = (Vec::new(), Vec::new());
+    for (first, rays) in rays.chunks(WIDE).enumerate() {
+        if let Some(packet) = Packet::new(&points.nodes[0], rays, true) {
+            let occluded = &mut occluded[first * WIDE..][..rays.len()];
             any_in_packet::<L, S>(points, &packet, &mut stack, occluded);
             continue;
         }
-        for (ray, occluded) in rays.iter().zip(occluded) {
-            *occluded = any_from::<L, S>(points, ROOT, ray, &mut stack.alone);
+        for (lane, ray) in rays.iter().enumerate() {
+            loose.push(Any { ray, shape: PhantomData::<S>, is_hit: false });
+            indices.push(first * WIDE + lane);
         }
+    }
+    fly::<L, _>(points, &mut loose);
+    for (ray_idx, any) in indices.into_iter().zip(loose) {
+        occluded[ray_idx] = any.is_hit;
     }
 }
 
@@ -52,6 +60,13 @@ struct Any<'r, S> {
 }
 
 impl<S: Shape> RayVisitor for Any<'_, S> {
+    const IS_ORDERED: bool = false;
+
+    #[inline(always)]
+    fn ray(&self) -> &Ray {
+        self.ray
+    }
+
     #[inline(always)]
     fn limit(&self) -> f32 {
         self.ray.t_max
@@ -59,8 +74,8 @@ impl<S: Shape> RayVisitor for Any<'_, S> {
 
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let hits = BlockHits::find::<L, S>(points, block_idx, self.ray, self.ray.t_max);
-        self.is_hit = !hits.is_empty();
+        let hits = BlockHits::<L>::find::<S>(points, block_idx, self.ray);
+        self.is_hit = hits.lanes(self.ray.t_max) != 0;
         if self.is_hit { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }

@@ -167,16 +167,120 @@ impl<L: Level> Lanes for Eight<L> {
     }
 
     #[inline(always)]
-    fn prefetch<T>(data: &T) {
-        let lines = size_of::<T>().div_ceil(64);
-        for line in 0..lines {
+    fn from_tagged(bytes: &[u8; LANES], plain: u32, tagged: u32) -> Self {
+        avx2!(Self({
+            let words = _mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes.as_ptr().cast()));
+            // A lane is tagged where bit 7, moved to the sign, is set.
+            let base = _mm256_blendv_ps(
+                _mm256_castsi256_ps(_mm256_set1_epi32(plain as i32)),
+                _mm256_castsi256_ps(_mm256_set1_epi32(tagged as i32)),
+                _mm256_castsi256_ps(_mm256_slli_epi32::<24>(words)),
+            );
+            let rank = _mm256_and_si256(words, _mm256_set1_epi32(7));
+            _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(base), rank))
+        }))
+    }
+
+    #[inline(always)]
+    fn compress(self, lanes: u32) -> Self {
+        avx2!(Self({
+            let order = _mm_loadl_epi64(COMPRESSED[lanes as usize & 0xff].as_ptr().cast());
+            _mm256_permutevar8x32_ps(self.0, _mm256_cvtepu8_epi32(order))
+        }))
+    }
+
+    /// A bitonic sort of keys: the bits of a value, the lane it comes from in the lowest three.
+    #[inline(always)]
+    fn sort_from_far(self, lanes: EightMask, others: Self) -> (Self, Self) {
+        // SAFETY: as for `avx2!`.
+        unsafe {
+            let low_bits = _mm256_set1_epi32(7);
+            // Not less than zero, and never what an empty lane has.
+            let value = _mm256_max_epi32(_mm256_castps_si256(self.0), _mm256_set1_epi32(8));
+            let key = _mm256_or_si256(_mm256_andnot_si256(low_bits, value), lane_indices());
+            let key = _mm256_and_si256(_mm256_castps_si256(lanes.0), key);
+            let key = exchange::<0b10_11_00_01, 0b0110_0110>(key);
+            let key = exchange::<0b01_00_11_10, 0b0011_1100>(key);
+            let key = exchange::<0b10_11_00_01, 0b0101_1010>(key);
+            let key = exchange_halves(key);
+            let key = exchange::<0b01_00_11_10, 0b1100_1100>(key);
+            let key = exchange::<0b10_11_00_01, 0b1010_1010>(key);
+            let others = _mm256_permutevar8x32_ps(others.0, key);
+            (
+                Self(_mm256_castsi256_ps(_mm256_andnot_si256(low_bits, key)), PhantomData),
+                Self(others, PhantomData),
+            )
+        }
+    }
+
+    #[inline(always)]
+    fn times_plus(self, factor: Self, summand: Self) -> Self {
+        avx2!(Self(_mm256_fmadd_ps(self.0, factor.0, summand.0)))
+    }
+
+    #[inline(always)]
+    fn first(n: u8) -> EightMask {
+        mask!((_mm256_castsi256_ps(_mm256_cmpgt_epi32(
+            _mm256_set1_epi32(i32::from(n)),
+            lane_indices()
+        ))))
+    }
+
+    #[inline(always)]
+    fn prefetch<T>(data: *const T) {
+        for line in 0..size_of::<T>().div_ceil(64) {
             // SAFETY: a hint: no address is an error.
-            unsafe {
-                _mm_prefetch::<_MM_HINT_T0>((&raw const *data).cast::<i8>().wrapping_add(64 * line))
-            };
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(data.cast::<i8>().wrapping_add(64 * line)) };
         }
     }
 }
+
+#[inline(always)]
+unsafe fn lane_indices() -> __m256i {
+    // SAFETY: as for `avx2!`.
+    unsafe { _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7) }
+}
+
+/// A step of the sort: lanes meet those that `ORDER` puts beside them within each half, and take the
+/// lesser of the two where `LESSER` has a bit, else the greater.
+#[inline(always)]
+unsafe fn exchange<const ORDER: i32, const LESSER: i32>(key: __m256i) -> __m256i {
+    // SAFETY: as for `avx2!`.
+    unsafe {
+        let other = _mm256_shuffle_epi32::<ORDER>(key);
+        let (lesser, greater) = (_mm256_min_epi32(key, other), _mm256_max_epi32(key, other));
+        _mm256_blend_epi32::<LESSER>(greater, lesser)
+    }
+}
+
+/// The step of the sort in which the halves meet: the greater go first.
+#[inline(always)]
+unsafe fn exchange_halves(key: __m256i) -> __m256i {
+    // SAFETY: as for `avx2!`.
+    unsafe {
+        let other = _mm256_permute2x128_si256::<1>(key, key);
+        let (lesser, greater) = (_mm256_min_epi32(key, other), _mm256_max_epi32(key, other));
+        _mm256_blend_epi32::<0b1111_0000>(greater, lesser)
+    }
+}
+
+/// For each set of lanes, these lanes in order.
+static COMPRESSED: [[u8; LANES]; 256] = {
+    let mut table = [[0; LANES]; 256];
+    let mut lanes = 0;
+    while lanes < 256 {
+        let (mut lane, mut place) = (0, 0);
+        while lane < LANES {
+            if lanes >> lane & 1 == 1 {
+                table[lanes][place] = lane as u8;
+                place += 1;
+            }
+            lane += 1;
+        }
+        lanes += 1;
+    }
+    table
+};
 
 impl LaneMask for EightMask {
     #[inline(always)]

@@ -2,43 +2,64 @@
 
 use super::hit::Hit;
 use super::packet::Packet;
-use crate::flat::{FlatPoints, PointBlock};
+use crate::flat::{FlatPoints, PointBlock, Slot};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3Lanes};
 use crate::surface::{PointLanes, RayLanes, Shape};
 
-/// The hits of one ray in one block.
-pub struct BlockHits {
-    block_idx: u32,
+/// Where one ray meets the points of one block.
+pub struct BlockHits<L: Floats> {
+    first_slot: Slot,
+    distances: L,
+    radii: L,
+    is_hit: L::Mask,
+}
+
+impl<L: Lanes> BlockHits<L> {
+    #[inline(always)]
+    pub fn find<S: Shape>(points: &FlatPoints, block_idx: u32, ray: &Ray) -> Self {
+        let lanes = points.blocks[block_idx as usize].points::<L>(ray.origin);
+        let (distances, is_hit) = S::intersect(&lanes, &RayLanes::<L>::new(ray));
+        Self { first_slot: block_idx * LANES as u32, distances, radii: lanes.radius, is_hit }
+    }
+
+    /// The lanes that are hit up to `t_max`.
+    #[inline(always)]
+    pub fn lanes(&self, t_max: f32) -> u32 {
+        (self.is_hit & self.distances.less_equal(L::splat(t_max))).bits()
+    }
+
+    /// The nearest, at infinity if there is none: found without a branch, as it cannot be foretold.
+    #[inline(always)]
+    pub fn nearest(&self) -> Hit {
+        let distances = L::select(self.is_hit, self.distances, L::splat(f32::INFINITY));
+        // Of the two zeros the positive one.
+        let distance = distances.min_lane() + 0.0;
+        let lane = distances.less_equal(L::splat(distance)).bits().trailing_zeros();
+        let is_hit = distance < f32::INFINITY;
+        Hit { distance, slot: if is_hit { self.first_slot + lane } else { Hit::MISS.slot } }
+    }
+
+    /// All up to `t_max`, each with the radius of what was hit. A list to loop over rather than a function
+    /// to call with a closure, which would not be compiled for the SIMD level of the kernel around it.
+    #[inline(always)]
+    pub fn up_to(&self, t_max: f32) -> HitList {
+        HitList {
+            first_slot: self.first_slot,
+            lanes: self.lanes(t_max),
+            distances: self.distances.store(),
+            radii: self.radii.store(),
+        }
+    }
+}
+
+pub struct HitList {
+    first_slot: Slot,
     lanes: u32,
     distances: [f32; LANES],
     radii: [f32; LANES],
 }
 
-impl BlockHits {
-    /// Up to `t_max`. Loops over these rather than closures: a closure would not be compiled for the
-    /// SIMD level of the kernel around it.
-    #[inline(always)]
-    pub fn find<L: Lanes, S: Shape>(
-        points: &FlatPoints,
-        block_idx: u32,
-        ray: &Ray,
-        t_max: f32,
-    ) -> Self {
-        let lanes = points.blocks[block_idx as usize].points::<L>(ray.origin);
-        let (distances, mask) = S::intersect(&lanes, &RayLanes::<L>::new(ray));
-        Self {
-            block_idx,
-            lanes: (mask & distances.less_equal(L::splat(t_max))).bits(),
-            distances: distances.store(),
-            radii: lanes.radius.store(),
-        }
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.lanes == 0
-    }
-
-    /// The next hit and the radius of what was hit.
+impl HitList {
     #[inline(always)]
     pub fn next(&mut self) -> Option<(Hit, f32)> {
         if self.lanes == 0 {
@@ -46,8 +67,8 @@ impl BlockHits {
         }
         let lane = self.lanes.trailing_zeros() as usize;
         self.lanes &= self.lanes - 1;
-        let slot = self.block_idx * LANES as u32 + lane as u32;
-        Some((Hit { distance: self.distances[lane], slot }, self.radii[lane]))
+        let slot = self.first_slot + lane as u32;
+        Some((Hit { distance: self.distances[lane] + 0.0, slot }, self.radii[lane]))
     }
 }
 

@@ -1,6 +1,7 @@
 //! The nearest shape on each ray, each point on its own.
 
 use super::block::{BlockForPacket, BlockHits};
+use super::flight::fly;
 use super::hit::Hit;
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
 use super::traverse::{ROOT, RayStack, RayVisitor, along_ray};
@@ -23,14 +24,22 @@ pub(super) fn closest_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut
 #[inline(always)]
 fn closest_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], hits: &mut [Hit]) {
     let mut stack = PacketStack::new();
-    for (rays, hits) in rays.chunks(WIDE).zip(hits.chunks_mut(WIDE)) {
-        if let Some(packet) = Packet::new(rays, false) {
+    let (mut loose, mut indices) = (Vec::new(), Vec::new());
+    for (first, rays) in rays.chunks(WIDE).enumerate() {
+        if let Some(packet) = Packet::new(&points.nodes[0], rays, false) {
+            let hits = &mut hits[first * WIDE..][..rays.len()];
             closest_in_packet::<L, S>(points, &packet, &mut stack, hits);
             continue;
         }
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = closest_of_ray::<L, S>(points, ray, &mut stack.alone);
+        for (lane, ray) in rays.iter().enumerate() {
+            let hit = Hit { distance: ray.t_max, ..Hit::MISS };
+            loose.push(Closest::<S>::new(ray, hit));
+            indices.push(first * WIDE + lane);
         }
+    }
+    fly::<L, _>(points, &mut loose);
+    for (ray_idx, Closest { hit, .. }) in indices.into_iter().zip(loose) {
+        hits[ray_idx] = if hit.is_miss() { Hit::MISS } else { hit };
     }
 }
 
@@ -64,6 +73,13 @@ impl<'r, S> Closest<'r, S> {
 }
 
 impl<S: Shape> RayVisitor for Closest<'_, S> {
+    const IS_ORDERED: bool = true;
+
+    #[inline(always)]
+    fn ray(&self) -> &Ray {
+        self.ray
+    }
+
     #[inline(always)]
     fn limit(&self) -> f32 {
         self.hit.distance
@@ -71,12 +87,8 @@ impl<S: Shape> RayVisitor for Closest<'_, S> {
 
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let mut hits = BlockHits::find::<L, S>(points, block_idx, self.ray, self.hit.distance);
-        while let Some((hit, _)) = hits.next() {
-            if hit.is_before(&self.hit) {
-                self.hit = hit;
-            }
-        }
+        let hit = BlockHits::<L>::find::<S>(points, block_idx, self.ray).nearest();
+        self.hit = hit.nearer(self.hit);
         ControlFlow::Continue(())
     }
 }

@@ -1,6 +1,6 @@
 //! The room that a packet's rays take up: slopes and offsets along the axis they mostly follow.
 
-use super::node::ROUNDING;
+use super::node::slack;
 use super::packet::WideRays;
 use crate::bvh::Node;
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3, WIDE, Wide};
@@ -22,8 +22,8 @@ pub struct Frustum {
     depth: f32,
     /// Nothing beyond this is on any ray.
     farthest: f32,
-    /// How far origins lie from the anchor, for the bounds of rounding.
-    spread: f32,
+    /// Boxes are widened by this, for rounding.
+    slack: f32,
 }
 
 /// The boxes of a node's children, relative to the frustum's anchor, widened by rounding.
@@ -43,7 +43,12 @@ impl<L: Lanes> Boxes<L> {
 impl Frustum {
     /// Around rays in lanes, of which `first` is one, unless they go too different ways.
     #[inline(always)]
-    pub fn new<W: Wide>(first: &Ray, rays: &WideRays<W>, ends_meet: bool) -> Option<Self> {
+    pub fn new<W: Wide>(
+        root: &Node,
+        first: &Ray,
+        rays: &WideRays<W>,
+        ends_meet: bool,
+    ) -> Option<Self> {
         let main = main_axis(first.direction);
         let sense = 1f32.copysign(first.direction[main]);
         let along = rays.direction[main] * W::splat(sense);
@@ -89,7 +94,7 @@ impl Frustum {
             offset,
             depth: distance[main],
             farthest: if is_backward { distance[main] } else { f32::INFINITY },
-            spread: distance.max_element(),
+            slack: slack(root, anchor.into()) + 1e-6 * distance.max_element(),
         })
     }
 
@@ -97,9 +102,7 @@ impl Frustum {
     pub fn boxes<L: Lanes>(&self, node: &Node) -> Boxes<L> {
         let corner = Vec3::from_array(node.origin) - self.anchor;
         let step = node.step();
-        let slack =
-            ROUNDING * (corner.abs().max_element() + 256.0 * step.max_element() + self.spread);
-        let (low, high) = (corner - slack, corner + slack);
+        let (low, high) = (corner - self.slack, corner + self.slack);
         Boxes {
             min: [
                 bounds::<L>(&node.lower[0], step.x, low.x),
@@ -138,7 +141,7 @@ impl Frustum {
         let along = rays.direction[self.main];
         let along = along.max(W::splat(0.0) - along);
         let limit = (W::load(limits) * along).max_lane() + self.depth;
-        limit.min(self.farthest) * (1.0 + ROUNDING)
+        limit.min(self.farthest) + self.slack
     }
 }
 
@@ -153,7 +156,7 @@ fn main_axis(direction: Vec3) -> usize {
 
 #[inline(always)]
 fn bounds<L: Lanes>(steps: &[u8; LANES], step: f32, corner: f32) -> L {
-    L::from_u8(steps) * L::splat(step) + L::splat(corner)
+    L::from_u8(steps).times_plus(L::splat(step), L::splat(corner))
 }
 
 #[inline(always)]

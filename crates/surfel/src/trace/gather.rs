@@ -30,6 +30,13 @@ struct Gathering<'r> {
 }
 
 impl RayVisitor for Gathering<'_> {
+    const IS_ORDERED: bool = true;
+
+    #[inline(always)]
+    fn ray(&self) -> &Ray {
+        self.ray
+    }
+
     #[inline(always)]
     fn limit(&self) -> f32 {
         self.gather.reach()
@@ -38,7 +45,7 @@ impl RayVisitor for Gathering<'_> {
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
         let reach = self.gather.reach();
-        let mut hits = BlockHits::find::<L, Disc>(points, block_idx, self.ray, reach);
+        let mut hits = BlockHits::<L>::find::<Disc>(points, block_idx, self.ray).up_to(reach);
         while let Some((hit, radius)) = hits.next() {
             self.gather.insert(hit, radius);
         }

@@ -4,6 +4,7 @@ mod any;
 mod block;
 mod boundary;
 mod closest;
+mod flight;
 mod frustum;
 mod gather;
 mod hit;

@@ -2,7 +2,7 @@
 
 use super::frustum::Frustum;
 use super::traverse::RayStack;
-use crate::bvh::{Child, STACK_SIZE};
+use crate::bvh::{Child, Node, STACK_SIZE};
 use crate::flat::FlatPoints;
 use crate::math::{Floats, LaneMask, Lanes, Ray, WIDE, Wide};
 
@@ -67,9 +67,9 @@ impl<'r, W: Wide> Packet<'r, W> {
     /// One to sixteen rays, if they are alike enough. `ends_meet` says that the rays' far ends may be
     /// closer to each other than their origins, as at a light.
     #[inline(always)]
-    pub fn new(rays: &'r [Ray], ends_meet: bool) -> Option<Self> {
+    pub fn new(root: &Node, rays: &'r [Ray], ends_meet: bool) -> Option<Self> {
         let wide = WideRays::new(rays);
-        let frustum = Frustum::new(&rays[0], &wide, ends_meet)?;
+        let frustum = Frustum::new(root, &rays[0], &wide, ends_meet)?;
         let anchor = frustum.anchor;
         let [x, y, z] = wide.direction;
         Some(Self {
@@ -196,7 +196,7 @@ fn push_children<L: Lanes, const IS_ORDERED: bool>(
     let node = &points.nodes[node_idx as usize];
     let boxes = packet.frustum.boxes::<L>(node);
     let (mut lanes, entries) = packet.frustum.meets::<L>(&boxes, limit);
-    lanes &= u32::from(node.occupied());
+    lanes &= node.occupied();
     let (min, max) = boxes.store();
     let mut top = size;
     while lanes != 0 {

@@ -83,6 +83,13 @@ struct OccluderSearch<'a> {
 }
 
 impl RayVisitor for OccluderSearch<'_> {
+    const IS_ORDERED: bool = true;
+
+    #[inline(always)]
+    fn ray(&self) -> &Ray {
+        self.ray
+    }
+
     #[inline(always)]
     fn limit(&self) -> f32 {
         self.ray.t_max
@@ -90,7 +97,8 @@ impl RayVisitor for OccluderSearch<'_> {
 
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let mut hits = BlockHits::find::<L, Disc>(points, block_idx, self.ray, self.ray.t_max);
+        let hits = BlockHits::<L>::find::<Disc>(points, block_idx, self.ray);
+        let mut hits = hits.up_to(self.ray.t_max);
         while let Some((hit, _)) = hits.next() {
             if single_disc::<L>(self.scene, self.ray, &hit) != Judgement::Outside {
                 self.is_occluded = true;

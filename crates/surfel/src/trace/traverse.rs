@@ -3,7 +3,7 @@
 use super::node::{BoxRay, ball_overlaps, ray_entries};
 use crate::bvh::{Child, STACK_SIZE};
 use crate::flat::FlatPoints;
-use crate::math::{Lanes, Ray, Vec3};
+use crate::math::{LaneMask, Lanes, Ray, Vec3};
 use std::ops::ControlFlow;
 
 /// Where a search of the whole tree begins.
@@ -21,6 +21,11 @@ impl RayStack {
 
 /// Looks at the blocks that a ray comes by.
 pub trait RayVisitor {
+    /// Whether near blocks are better seen first.
+    const IS_ORDERED: bool;
+
+    fn ray(&self) -> &Ray;
+
     /// Boxes entered beyond this distance are left out.
     fn limit(&self) -> f32;
 
@@ -37,7 +42,7 @@ pub fn along_ray<L: Lanes>(
     RayStack(stack): &mut RayStack,
     visitor: &mut impl RayVisitor,
 ) {
-    let box_ray = BoxRay::new(ray);
+    let box_ray = BoxRay::new(&points.nodes[0], ray);
     stack[0] = (ray.t_min, start.pack());
     let mut size = 1;
     while 0 < size {
@@ -55,7 +60,8 @@ pub fn along_ray<L: Lanes>(
                 continue;
             }
         };
-        let (mut lanes, entries) = ray_entries::<L>(node, &box_ray, visitor.limit());
+        let (lanes, entries) = ray_entries::<L>(node, &box_ray, visitor.limit());
+        let (mut lanes, entries) = (lanes.bits(), entries.store());
         let first = size;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
