@@ -33,7 +33,8 @@ pub enum Child {
 }
 
 impl Child {
-    const BLOCK_BIT: u32 = 1 << 31;
+    /// Set in a packed block.
+    pub const BLOCK_BIT: u32 = 1 << 31;
 
     /// In one word, for the stacks of traversals: there are less than 2^31 of either kind.
     #[inline(always)]
@@ -97,10 +98,22 @@ impl Node {
         L::from_tagged(&self.children, self.first_node, self.first_block | Child::BLOCK_BIT)
     }
 
-    /// They take the first lanes.
+    /// The lanes that hold a child: the first ones.
     #[inline(always)]
-    pub fn n_children(&self) -> u8 {
-        self.n_children
+    pub fn filled<L: Lanes>(&self) -> L::Mask {
+        L::below(self.n_children)
+    }
+
+    /// Lower and upper bounds of all children along an axis.
+    #[inline(always)]
+    pub fn sides<L: Lanes, const AXIS: usize>(&self) -> (L, L) {
+        let [x, y, z] = self.exponents;
+        let step = L::power_of_two::<AXIS>(u32::from_le_bytes([x, y, z, self.n_children]));
+        let corner = L::splat(self.origin[AXIS]);
+        (
+            L::from_u8(&self.lower[AXIS]).times_plus(step, corner),
+            L::from_u8(&self.upper[AXIS]).times_plus(step, corner),
+        )
     }
 
     /// Bit i is set if lane i holds a child.

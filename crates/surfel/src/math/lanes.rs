@@ -54,8 +54,12 @@ pub trait Lanes: Floats {
     fn sort_from_far(self, lanes: Self::Mask, others: Self) -> (Self, Self);
     /// `self * factor + summand`, perhaps rounded only once: for bounds, never for results.
     fn times_plus(self, factor: Self, summand: Self) -> Self;
+    /// `self * factor - subtrahend`, in the same way.
+    fn times_minus(self, factor: Self, subtrahend: Self) -> Self;
     /// True in this many lanes from the first.
-    fn first(n: u8) -> Self::Mask;
+    fn below(n: u8) -> Self::Mask;
+    /// All lanes 2^(e - 127), where e is this byte of `exponents` from the lowest.
+    fn power_of_two<const BYTE: usize>(exponents: u32) -> Self;
     /// The greatest of the lanes, none of which may be NaN.
     fn max_lane(self) -> f32;
     /// Compares the lanes' bits as unsigned numbers: lanes may hold those as well.
@@ -222,8 +226,18 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    fn first(n: u8) -> PortableMask {
+    fn times_minus(self, factor: Self, subtrahend: Self) -> Self {
+        self * factor - subtrahend
+    }
+
+    #[inline(always)]
+    fn below(n: u8) -> PortableMask {
         PortableMask(std::array::from_fn(|lane| lane < usize::from(n)))
+    }
+
+    #[inline(always)]
+    fn power_of_two<const BYTE: usize>(exponents: u32) -> Self {
+        Self::splat(f32::from_bits((exponents >> (8 * BYTE) & 0xff) << 23))
     }
 
     #[inline(always)]

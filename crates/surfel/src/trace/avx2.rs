@@ -219,11 +219,27 @@ impl<L: Level> Lanes for Eight<L> {
     }
 
     #[inline(always)]
-    fn first(n: u8) -> EightMask {
-        mask!((_mm256_castsi256_ps(_mm256_cmpgt_epi32(
-            _mm256_set1_epi32(i32::from(n)),
-            lane_indices()
-        ))))
+    fn times_minus(self, factor: Self, subtrahend: Self) -> Self {
+        avx2!(Self(_mm256_fmsub_ps(self.0, factor.0, subtrahend.0)))
+    }
+
+    #[inline(always)]
+    fn below(n: u8) -> EightMask {
+        mask!(
+            (_mm256_castsi256_ps(_mm256_cmpgt_epi32(
+                _mm256_set1_epi32(i32::from(n)),
+                lane_indices()
+            )))
+        )
+    }
+
+    #[inline(always)]
+    fn power_of_two<const BYTE: usize>(exponents: u32) -> Self {
+        avx2!(Self({
+            let shift = _mm_cvtsi32_si128(23 - 8 * BYTE as i32);
+            let moved = _mm256_sll_epi32(_mm256_set1_epi32(exponents as i32), shift);
+            _mm256_castsi256_ps(_mm256_and_si256(moved, _mm256_set1_epi32(0xff << 23)))
+        }))
     }
 
     #[inline(always)]

@@ -3,23 +3,23 @@
 use crate::bvh::Node;
 use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3, Vec3A};
 
-/// Rounding allowed for, as a share of the farthest distance in the tree: far more than f32 loses in a
-/// box or disc test, far less than a radius. A box is never missed that a hit inside it would need.
+/// Rounding allowed for, as a share of the largest coordinates involved: far more than f32 loses in a box
+/// or disc test, far less than a radius. A box is never missed that a hit inside it would need.
 const ROUNDING: f32 = 1e-6;
 
 /// What boxes are widened by, all ways, for a ray from `origin`.
 #[inline(always)]
 pub fn slack(root: &Node, origin: Vec3A) -> f32 {
-    ROUNDING * ((Vec3A::from_array(root.origin) - origin).abs().max_element() + root.size())
+    let corner = Vec3A::from_array(root.origin);
+    ROUNDING * (corner.abs().max(origin.abs()).max_element() + root.size())
 }
 
-/// A ray prepared for many boxes.
+/// A ray prepared for many boxes: it meets the plane x at x `inverse` - `at_origin`.
 #[derive(Clone, Copy)]
 pub struct BoxRay {
-    /// Moved by the slack, for the boxes' lower and for their upper bounds.
-    origin_low: Vec3A,
-    origin_high: Vec3A,
-    inverse: Vec3A,
+    inverse: [f32; 3],
+    /// For lower and for upper bounds, moved apart by the slack.
+    at_origin: [[f32; 3]; 2],
     t_min: f32,
 }
 
@@ -33,27 +33,33 @@ impl BoxRay {
         let inverse = 1.0 / Vec3A::select(is_small, LEAST, direction);
         let origin = Vec3A::from(ray.origin);
         let slack = slack(root, origin);
-        let (origin_low, origin_high) = (origin + slack, origin - slack);
-        Self { origin_low, origin_high, inverse, t_min: ray.t_min }
+        let at_origin = [(origin + slack) * inverse, (origin - slack) * inverse];
+        Self {
+            inverse: inverse.to_array(),
+            at_origin: [at_origin[0].to_array(), at_origin[1].to_array()],
+            t_min: ray.t_min,
+        }
+    }
+
+    /// Narrows `range` to where the ray is between the sides of each child along an axis.
+    #[inline(always)]
+    fn between<L: Lanes, const AXIS: usize>(&self, node: &Node, range: (L, L)) -> (L, L) {
+        let (low, high) = node.sides::<L, AXIS>();
+        let inverse = L::splat(self.inverse[AXIS]);
+        let at_low = low.times_minus(inverse, L::splat(self.at_origin[0][AXIS]));
+        let at_high = high.times_minus(inverse, L::splat(self.at_origin[1][AXIS]));
+        (at_low.min(at_high).max(range.0), at_low.max(at_high).min(range.1))
     }
 }
 
 /// Lanes whose boxes the ray meets before `t_max`, and where it enters them.
 #[inline(always)]
 pub fn ray_entries<L: Lanes>(node: &Node, ray: &BoxRay, t_max: f32) -> (L::Mask, L) {
-    let (mut enter, mut leave) = (L::splat(ray.t_min), L::splat(t_max));
-    let corner = Vec3A::from_array(node.origin);
-    let low = ((corner - ray.origin_low) * ray.inverse).to_array();
-    let high = ((corner - ray.origin_high) * ray.inverse).to_array();
-    let per_step = (node.step() * ray.inverse).to_array();
-    for axis in 0..3 {
-        let per_step = L::splat(per_step[axis]);
-        let first = L::from_u8(&node.lower[axis]).times_plus(per_step, L::splat(low[axis]));
-        let second = L::from_u8(&node.upper[axis]).times_plus(per_step, L::splat(high[axis]));
-        enter = first.min(second).max(enter);
-        leave = first.max(second).min(leave);
-    }
-    (enter.less_equal(leave) & L::first(node.n_children()), enter)
+    let range = (L::splat(ray.t_min), L::splat(t_max));
+    let range = ray.between::<L, 0>(node, range);
+    let range = ray.between::<L, 1>(node, range);
+    let (enter, leave) = ray.between::<L, 2>(node, range);
+    (enter.less_equal(leave) & node.filled::<L>(), enter)
 }
 
 /// Lanes whose boxes come within `radius` of `center`.
