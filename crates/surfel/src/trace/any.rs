@@ -3,8 +3,7 @@
 use super::block::{BlockForPacket, BlockHits};
 use super::flight::fly;
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
-use super::traverse::{ROOT, RayStack, RayVisitor, along_ray};
-use crate::bvh::Child;
+use super::traverse::RayVisitor;
 use crate::flat::{FlatPoints, FlatScene};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, WIDE, Wide};
 use crate::surface::{Disc, Shape, Sphere};
@@ -39,18 +38,6 @@ fn any_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], occluded:
     for (ray_idx, any) in indices.into_iter().zip(loose) {
         occluded[ray_idx] = any.is_hit;
     }
-}
-
-#[inline(always)]
-fn any_from<L: Lanes, S: Shape>(
-    points: &FlatPoints,
-    start: Child,
-    ray: &Ray,
-    stack: &mut RayStack,
-) -> bool {
-    let mut any = Any { ray, shape: PhantomData::<S>, is_hit: false };
-    along_ray::<L>(points, start, ray, stack, &mut any);
-    any.is_hit
 }
 
 struct Any<'r, S> {
@@ -124,14 +111,9 @@ impl<L: Lanes, S: Shape> PacketVisitor<L> for AnyInPacket<'_, L, S> {
     }
 
     #[inline(always)]
-    fn visit_alone(
-        &mut self,
-        points: &FlatPoints,
-        child: Child,
-        lane: usize,
-        stack: &mut RayStack,
-    ) {
-        if any_from::<L, S>(points, child, &self.packet.rays[lane], stack) {
+    fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
+        let hits = BlockHits::<L>::find::<S>(points, block_idx, &self.packet.rays[lane]);
+        if hits.lanes(self.limits[lane]) != 0 {
             self.is_hit |= 1 << lane;
             self.limits[lane] = f32::NEG_INFINITY;
         }

@@ -99,6 +99,10 @@ impl<L: Lanes> BlockForPacket<L> {
         }
     }
 
+    pub fn radius(&self, lane: usize) -> f32 {
+        self.radius[lane]
+    }
+
     /// The point in `lane` before all rays.
     #[inline(always)]
     pub fn intersect<S: Shape>(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask) {

@@ -2,7 +2,7 @@
 
 use super::traverse::{BallVisitor, around};
 use crate::flat::FlatPoints;
-use crate::math::{Floats, LaneMask, Lanes, Vec3, Vec3Lanes};
+use crate::math::{LaneMask, Lanes, Vec3, Vec3Lanes};
 use crate::surface::{Candidate, Judgement, NEIGHBOR_REACH, Surroundings};
 use std::ops::ControlFlow;
 

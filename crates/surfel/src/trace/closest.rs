@@ -4,10 +4,9 @@ use super::block::{BlockForPacket, BlockHits};
 use super::flight::fly;
 use super::hit::Hit;
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
-use super::traverse::{ROOT, RayStack, RayVisitor, along_ray};
-use crate::bvh::Child;
+use super::traverse::{RayStack, RayVisitor, along_ray};
 use crate::flat::{FlatPoints, FlatScene};
-use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, WIDE, Wide};
+use crate::math::{Floats, LANES, Lanes, Ray, WIDE, Wide};
 use crate::surface::{Disc, Shape, Sphere};
 use std::marker::PhantomData;
 use std::ops::ControlFlow;
@@ -55,7 +54,7 @@ pub(super) fn closest_hit<L: Lanes>(scene: &FlatScene, ray: &Ray, stack: &mut Ra
 #[inline(always)]
 fn closest_of_ray<L: Lanes, S: Shape>(points: &FlatPoints, ray: &Ray, stack: &mut RayStack) -> Hit {
     let mut closest = Closest::<S>::new(ray, Hit { distance: ray.t_max, ..Hit::MISS });
-    along_ray::<L>(points, ROOT, ray, stack, &mut closest);
+    along_ray::<L>(points, ray, stack, &mut closest);
     if closest.hit.is_miss() { Hit::MISS } else { closest.hit }
 }
 
@@ -146,18 +145,11 @@ impl<L: Lanes, S: Shape> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
     }
 
     #[inline(always)]
-    fn visit_alone(
-        &mut self,
-        points: &FlatPoints,
-        child: Child,
-        lane: usize,
-        stack: &mut RayStack,
-    ) {
+    fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
         let ray = &self.packet.rays[lane];
         let hit = Hit { distance: self.distances[lane], slot: self.slots[lane].to_bits() };
-        let mut closest = Closest::<S>::new(ray, hit);
-        along_ray::<L>(points, child, ray, stack, &mut closest);
-        self.distances[lane] = closest.hit.distance;
-        self.slots[lane] = f32::from_bits(closest.hit.slot);
+        let hit = BlockHits::<L>::find::<S>(points, block_idx, ray).nearest().nearer(hit);
+        self.distances[lane] = hit.distance;
+        self.slots[lane] = f32::from_bits(hit.slot);
     }
 }

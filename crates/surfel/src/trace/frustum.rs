@@ -3,7 +3,7 @@
 use super::node::slack;
 use super::packet::WideRays;
 use crate::bvh::Node;
-use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3, WIDE, Wide};
+use crate::math::{LANES, LaneMask, Lanes, Ray, Vec3, WIDE, Wide};
 
 /// Rays whose slopes differ by more than this are no packet.
 const WIDEST: f32 = 0.25;

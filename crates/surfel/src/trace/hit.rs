@@ -57,6 +57,13 @@ impl Gather {
         &self.hits[..self.len]
     }
 
+    /// Appends the next hit of a sorted list.
+    #[inline(always)]
+    pub(super) fn push(&mut self, hit: Hit) {
+        self.hits[self.len % MAX_GATHERED] = hit;
+        self.len += 1;
+    }
+
     /// Takes `hit` in if it is near enough, and drops what is no longer.
     #[inline(always)]
     pub(super) fn insert(&mut self, hit: Hit, radius: f32) {

@@ -8,6 +8,7 @@ mod flight;
 mod frustum;
 mod gather;
 mod hit;
+mod lists;
 mod node;
 mod packet;
 mod simd;

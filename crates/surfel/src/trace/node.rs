@@ -1,7 +1,7 @@
 //! The boxes of a node against a ray, and against a ball.
 
 use crate::bvh::Node;
-use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3, Vec3A};
+use crate::math::{LaneMask, Lanes, Ray, Vec3, Vec3A};
 
 /// Rounding allowed for, as a share of the largest coordinates involved: far more than f32 loses in a box
 /// or disc test, far less than a radius. A box is never missed that a hit inside it would need.

@@ -1,15 +1,9 @@
 //! Sixteen rays that go much the same way, walked through the tree together.
 
 use super::frustum::Frustum;
-use super::traverse::RayStack;
 use crate::bvh::{Child, Node, STACK_SIZE};
 use crate::flat::FlatPoints;
 use crate::math::{Floats, LaneMask, Lanes, Ray, WIDE, Wide};
-
-/// With no more rays than this left on a node, or on a block, each goes on alone: without that
-/// packets lose to single rays among ten million points.
-const FEW_ON_NODE: u32 = 1;
-const FEW_ON_BLOCK: u32 = 1;
 
 /// Sixteen rays in lanes.
 pub struct WideRays<W> {
@@ -36,8 +30,8 @@ pub trait PacketVisitor<L: Lanes> {
 
     fn visit(&mut self, points: &FlatPoints, block_idx: u32);
 
-    /// Lets the ray in this lane search `child` alone.
-    fn visit_alone(&mut self, points: &FlatPoints, child: Child, lane: usize, stack: &mut RayStack);
+    /// Shows the block to the ray in this lane alone.
+    fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize);
 }
 
 impl<W: Wide> WideRays<W> {
@@ -125,16 +119,12 @@ struct ChildBox {
     max: [f32; 3],
 }
 
-/// What a search of a packet, and of a ray of it alone, has still to look at.
-pub struct PacketStack {
-    boxes: [ChildBox; STACK_SIZE],
-    pub alone: RayStack,
-}
+/// What a search of a packet has still to look at. Kept from packet to packet.
+pub struct PacketStack([ChildBox; STACK_SIZE]);
 
 impl PacketStack {
     pub fn new() -> Self {
-        let nothing = ChildBox { child: 0, entry: 0.0, min: [0.0; 3], max: [0.0; 3] };
-        Self { boxes: [nothing; STACK_SIZE], alone: RayStack::new() }
+        Self([ChildBox { child: 0, entry: 0.0, min: [0.0; 3], max: [0.0; 3] }; STACK_SIZE])
     }
 }
 
@@ -144,10 +134,9 @@ impl PacketStack {
 pub fn along_packet<L: Lanes, const IS_ORDERED: bool>(
     points: &FlatPoints,
     packet: &Packet<L::Wide>,
-    stack: &mut PacketStack,
+    PacketStack(stack): &mut PacketStack,
     visitor: &mut impl PacketVisitor<L>,
 ) {
-    let PacketStack { boxes: stack, alone } = stack;
     let mut size = push_children::<L, IS_ORDERED>(points, packet, 0, f32::INFINITY, stack, 0);
     let mut limit = packet.frustum.limit(&packet.wide, visitor.limits());
     while 0 < size {
@@ -156,25 +145,19 @@ pub fn along_packet<L: Lanes, const IS_ORDERED: bool>(
         if IS_ORDERED && limit < next.entry {
             continue;
         }
-        let mut lanes = packet.passing(&next, visitor.limits());
+        let lanes = packet.passing(&next, visitor.limits());
         if lanes == 0 {
             continue;
         }
-        let n_lanes = lanes.count_ones();
         match Child::unpack(next.child) {
-            Child::Node(node_idx) if FEW_ON_NODE < n_lanes => {
+            Child::Node(node_idx) => {
                 size = push_children::<L, IS_ORDERED>(points, packet, node_idx, limit, stack, size);
                 continue;
             }
-            Child::Block(block_idx) if FEW_ON_BLOCK < n_lanes => {
-                visitor.visit(points, block_idx);
+            Child::Block(block_idx) if lanes.is_power_of_two() => {
+                visitor.visit_alone(points, block_idx, lanes.trailing_zeros() as usize);
             }
-            child => {
-                while lanes != 0 {
-                    visitor.visit_alone(points, child, lanes.trailing_zeros() as usize, alone);
-                    lanes &= lanes - 1;
-                }
-            }
+            Child::Block(block_idx) => visitor.visit(points, block_idx),
         }
         limit = packet.frustum.limit(&packet.wide, visitor.limits());
         if limit == f32::NEG_INFINITY {

@@ -6,7 +6,7 @@ use super::boundary::judge;
 use super::closest::closest_hit;
 use super::gather::gather;
 use super::hit::Hit;
-use super::traverse::{ROOT, RayStack, RayVisitor, along_ray};
+use super::traverse::{RayStack, RayVisitor, along_ray};
 use crate::flat::{FlatPoints, FlatScene};
 use crate::math::{Lanes, Ray, Vec3};
 use crate::surface::{
@@ -70,7 +70,7 @@ pub(super) fn occlusions<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &m
     let mut stack = RayStack::new();
     for (ray, occluded) in rays.iter().zip(occluded) {
         let mut search = OccluderSearch { scene, ray, n_refused: 0, is_occluded: false };
-        along_ray::<L>(&scene.points, ROOT, ray, &mut stack, &mut search);
+        along_ray::<L>(&scene.points, ray, &mut stack, &mut search);
         *occluded = search.is_occluded;
     }
 }
@@ -195,7 +195,7 @@ fn pierced_discs<L: Lanes>(
         discs[0] = disc(&hit);
         return (hit, 1);
     }
-    let gather = gather::<L>(scene, ray, stack);
+    let gather = gather::<L>(&scene.points, ray, stack);
     for (place, hit) in discs.iter_mut().zip(gather.hits()) {
         *place = disc(hit);
     }

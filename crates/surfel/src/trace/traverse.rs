@@ -6,9 +6,6 @@ use crate::flat::FlatPoints;
 use crate::math::{LaneMask, Lanes, Ray, Vec3};
 use std::ops::ControlFlow;
 
-/// Where a search of the whole tree begins.
-pub const ROOT: Child = Child::Node(0);
-
 /// What a search of one ray has still to look at: where each box is entered and the packed child. Kept
 /// from ray to ray, as clearing it takes longer than many a search.
 pub struct RayStack([(f32, u32); STACK_SIZE]);
@@ -32,18 +29,17 @@ pub trait RayVisitor {
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()>;
 }
 
-/// Shows `visitor` every block under `start` whose box `ray` enters before the visitor's limit, nearest
+/// Shows `visitor` every block whose box `ray` enters before the visitor's limit, nearest
 /// boxes first.
 #[inline(always)]
 pub fn along_ray<L: Lanes>(
     points: &FlatPoints,
-    start: Child,
     ray: &Ray,
     RayStack(stack): &mut RayStack,
     visitor: &mut impl RayVisitor,
 ) {
     let box_ray = BoxRay::new(&points.nodes[0], ray);
-    stack[0] = (ray.t_min, start.pack());
+    stack[0] = (ray.t_min, Child::Node(0).pack());
     let mut size = 1;
     while 0 < size {
         size -= 1;
