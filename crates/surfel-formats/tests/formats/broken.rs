@@ -27,6 +27,7 @@ fn small_files() -> Vec<(&'static str, Vec<u8>)> {
         ("a.csv", "x,y,z,r,g,b,time\n1,2,3,4,5,6,7.5\n-1,2e3,nan,4,5,6,\n".into()),
         ("a.pts", "2\n1 2 3 -4 5 6 7\n1 2 3 -4 5 6 7\n".into()),
         ("a.obj", "o cube\nv 1 2 3\nv 1 2 3\nf 1 2 1\n".into()),
+        ("a.bin", [1.0f32; 7 * 3].map(f32::to_le_bytes).concat()),
     ]
 }
 
