@@ -29,34 +29,29 @@ pub enum Rays {
     Surface,
 }
 
-/// All that the measurements share.
+/// What all measurements share.
 pub struct Bench<'a> {
     pub scene: &'a FlatScene,
     pub simd: Simd,
     pub runs: u32,
-    /// Relative to the scene's origin.
+    /// Relative to the scene's origin, as all rays are.
     pub light: Vec3,
-    pub report: &'a Report,
-    primary: Vec<Ray>,
+    pub primary: Vec<Ray>,
     /// Of the primary rays, where all others start.
-    hits: Vec<Hit>,
+    pub hits: Vec<Hit>,
+    pub report: &'a Report,
 }
 
-impl<'a> Bench<'a> {
-    pub fn new(
-        scene: &'a FlatScene,
-        simd: Simd,
-        runs: u32,
-        primary: Vec<Ray>,
-        light: Vec3,
-        report: &'a Report,
-    ) -> Self {
-        let mut hits = vec![Hit::MISS; primary.len()];
-        let find = |rays: &[Ray], hits: &mut [Hit]| trace::closest_hits(scene, simd, rays, hits);
-        for_each_chunk(&primary, &mut hits, &find);
-        Self { scene, simd, runs, light, report, primary, hits }
-    }
+/// The nearest hits, untimed.
+pub fn closest_hits(scene: &FlatScene, simd: Simd, rays: &[Ray]) -> Vec<Hit> {
+    let mut hits = vec![Hit::MISS; rays.len()];
+    let find = |rays: &[Ray], hits: &mut [Hit]| trace::closest_hits(scene, simd, rays, hits);
+    for_each_chunk(rays, &mut hits, &find);
+    hits
+}
 
+impl Bench<'_> {
+    /// Rays, hits and rates of a kind, as JSON.
     pub fn measure(&self, kind: Rays) -> surfel::Result<Value> {
         let (primary, hits) = (&self.primary, &self.hits);
         let bounces = || bounce_rays(self.scene, primary, hits);

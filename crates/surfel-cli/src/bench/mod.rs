@@ -16,8 +16,8 @@ use camera_file::CameraFile;
 use clap::ValueEnum;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clock::{Spent, timed};
-use measure::{Bench, Rays};
-use serde_json::{Map, json};
+use measure::{Bench, Rays, closest_hits};
+use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use surfel::flat::FlatScene;
 use surfel::math::{DVec3, Vec3};
@@ -81,16 +81,8 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     report.end_stage();
 
     let simd = args.simd.unwrap_or_else(Simd::detect);
-    let primary = rays::camera_rays(&flat, file.as_ref(), args.resolution);
-    let light = light(&flat, file.as_ref(), report);
-    let bench = Bench::new(&flat, simd, args.runs, primary, light, report);
-    let mut found = Map::new();
-    for kind in kinds {
-        let name = kind.to_possible_value().map_or(String::new(), |v| v.get_name().to_owned());
-        found.insert(name, bench.measure(kind)?);
-    }
     let result = json!({
-        "rays": found,
+        "rays": measure(args, &kinds, &flat, simd, file.as_ref(), report)?,
         "build_s": build.wall,
         "bytes_per_point": stats::bytes_per_point(&flat, n_points),
         "peak_rss_bytes": stats::peak_rss_bytes(),
@@ -101,6 +93,25 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         "surface": flat.surface.name(),
     });
     Ok(print(&if args.json { format!("{result:#}") } else { table::table(&result) })?)
+}
+
+/// Each kind of ray by its name.
+fn measure(
+    args: &Args,
+    kinds: &[Rays],
+    scene: &FlatScene,
+    simd: Simd,
+    file: Option<&CameraFile>,
+    report: &Report,
+) -> surfel::Result<Map<String, Value>> {
+    let primary = rays::camera_rays(scene, file, args.resolution);
+    let hits = closest_hits(scene, simd, &primary);
+    let light = light(scene, file, report);
+    let bench = Bench { scene, simd, runs: args.runs, light, primary, hits, report };
+    let name = |kind: &Rays| kind.to_possible_value().map(|value| value.get_name().to_owned());
+    let named =
+        kinds.iter().map(|kind| Ok((name(kind).unwrap_or_default(), bench.measure(*kind)?)));
+    named.collect()
 }
 
 /// The kinds of rays that the surface can be traced with.
