@@ -10,7 +10,7 @@ use surfel_formats::{SaveOptions, save};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
-    for target in ["ply", "xyz", "las"] {
+    for target in ["ply", "xyz", "las", "bin"] {
         fs::create_dir_all(corpus.join(target))?;
     }
     for (name, cloud) in [("bare", bare(7)), ("full", full(7))] {
@@ -38,6 +38,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (i, text) in texts.iter().enumerate() {
         fs::write(corpus.join(format!("xyz/{i}")), text)?;
     }
+    let record = [1.0f32, 2.0, 3.0, 0.5, 0.0, 0.0, 1.0].map(f32::to_le_bytes).concat();
+    let lost = [f32::NAN, 1e30, -0.0, -1.0, 0.0, f32::INFINITY, 2.0].map(f32::to_le_bytes).concat();
+    fs::write(corpus.join("bin/one.bin"), &record)?;
+    fs::write(corpus.join("bin/three.bin"), [&record[..], &lost, &record].concat())?;
     Ok(())
 }
 

@@ -48,7 +48,7 @@ enum Command {
     /// Scan a ruin with a virtual scanner and render it: something to begin with.
     Demo(demo::Args),
     /// Measure how many rays a second are traced.
-    Bench(bench::Args),
+    Bench(Box<bench::Args>),
 }
 
 fn main() -> ExitCode {

@@ -38,6 +38,7 @@ mod ply;
 mod las;
 mod text;
 mod obj;
+mod bin;
 mod extent;
 mod load;
 mod save;

@@ -9,9 +9,9 @@ use crate::error::{Error, Place, Result};
 use crate::extent::Extent;
 use crate::input::Input;
 use crate::options::{LoadOptions, Loaded, Source};
-use crate::{las, obj, ply, text};
+use crate::{bin, las, obj, ply, text};
 
-const SUPPORTED: &str = "surfel reads .ply, .las, .laz (.copc.laz too), .xyz, .txt, .csv, .asc, .pts and .obj; \
+const SUPPORTED: &str = "surfel reads .ply, .las, .laz (.copc.laz too), .xyz, .txt, .csv, .asc, .pts, .obj and .bin; \
      convert the file to one of them";
 
 /// Reads the points of a file.
@@ -80,6 +80,7 @@ pub fn inspect(path: &Path) -> Result<Source> {
         Format::Las => las::inspect(&input),
         Format::Text => text::inspect(&input),
         Format::Obj => obj::inspect(&input),
+        Format::Bin => bin::inspect(&input),
     }
 }
 
@@ -88,6 +89,7 @@ enum Format {
     Las,
     Text,
     Obj,
+    Bin,
 }
 
 fn read(input: &Input, options: &LoadOptions, progress: &dyn Progress) -> Result<Loaded> {
@@ -97,6 +99,7 @@ fn read(input: &Input, options: &LoadOptions, progress: &dyn Progress) -> Result
         Format::Las => las::read(input, options, progress),
         Format::Text => text::read(input, options, progress),
         Format::Obj => obj::read(input, options, progress),
+        Format::Bin => bin::read(input, options, progress),
     }
 }
 
@@ -112,6 +115,10 @@ fn format_of(input: &Input) -> Result<Format> {
     }
     if starts(las::MAGIC) {
         return Ok(Format::Las);
+    }
+    // Before the magics of other formats: a coordinate may begin with the two bytes of one.
+    if input.extension() == "bin" {
+        return Ok(Format::Bin);
     }
     let known = [
         (&b"ASTM-E57"[..], "an E57 file"),

@@ -63,6 +63,9 @@ pub struct Source {
 impl ColumnChoice {
     pub(crate) fn wants(&self, role: &Role) -> bool {
         let Self::Only(columns) = self else { return true };
+        if let Role::Position(_) = role {
+            return true;
+        }
         columns.iter().any(|column| match (column, role) {
             (Column::Normals, Role::Normal(_))
             | (Column::Radii, Role::Radius)
@@ -70,7 +73,6 @@ impl ColumnChoice {
             | (Column::Intensity, Role::Intensity)
             | (Column::Classification, Role::Classification) => true,
             (Column::Scalar(wanted), Role::Scalar(name)) => wanted.eq_ignore_ascii_case(name),
-            (_, Role::Position(_)) => true,
             _ => false,
         })
     }

@@ -2,6 +2,8 @@
 
 #[path = "formats/common.rs"]
 mod common;
+#[path = "formats/bin.rs"]
+mod bin;
 #[path = "formats/broken.rs"]
 mod broken;
 #[path = "formats/ply.rs"]

@@ -107,7 +107,8 @@ pub fn is_georeferenced(cloud: &PointCloud, source: &Source) -> bool {
     is_survey || source.coordinate_system.is_some() || is_far
 }
 
-fn short(position: DVec3) -> String {
+/// Few digits, for people.
+pub fn short(position: DVec3) -> String {
     let digits = if 1000.0 < position.abs().max_element() { 1 } else { 4 };
     position.to_array().map(|x| format!("{x:.digits$}")).join(",")
 }

@@ -6,7 +6,7 @@ mod light;
 pub mod parse;
 mod preparation;
 
-pub use camera::{CameraArgs, is_georeferenced};
+pub use camera::{CameraArgs, is_georeferenced, short};
 pub use color::ColorArgs;
 pub use light::{Exposure, LightArgs, LightKind};
 pub use preparation::PreparationArgs;

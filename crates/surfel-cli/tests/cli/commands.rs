@@ -134,20 +134,6 @@ fn demo_scans_and_renders() {
 }
 
 #[test]
-fn bench_measures_every_kind_of_ray() {
-    let folder = Folder::new();
-    let cloud = folder.write("dome.ply", dome(30));
-    let result = succeed(&["bench", &cloud, "--resolution", "64x64", "--runs", "2", "--json"]);
-    let result: Value = serde_json::from_str(&result).unwrap();
-    let rays = &result["rays"];
-    assert_eq!(rays["primary"]["rays"], 64 * 64);
-    assert!(rays["primary"]["hits"].as_u64() >= rays["surface"]["hits"].as_u64());
-    assert_eq!(rays["bounce-any"]["hits"], rays["bounce"]["hits"]);
-    assert_eq!(rays.as_object().unwrap().len(), 6);
-    succeed(&["bench", &cloud, "--resolution", "32x32", "--runs", "1", "--surface", "sphere"]);
-}
-
-#[test]
 fn help_has_examples() {
     for command in ["render", "info", "prepare", "demo", "bench"] {
         let help = succeed(&[command, "--help"]);

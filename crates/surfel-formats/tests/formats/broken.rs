@@ -2,7 +2,7 @@
 
 use surfel::points::PointCloud;
 use surfel::progress::Silent;
-use surfel_formats::{Error, LoadOptions, check_output, load, load_bytes};
+use surfel_formats::{ColumnChoice, Error, LoadOptions, check_output, load, load_bytes};
 
 use crate::common::{Folder, Listener, file_of, full_cloud, read};
 
@@ -27,6 +27,7 @@ fn small_files() -> Vec<(&'static str, Vec<u8>)> {
         ("a.csv", "x,y,z,r,g,b,time\n1,2,3,4,5,6,7.5\n-1,2e3,nan,4,5,6,\n".into()),
         ("a.pts", "2\n1 2 3 -4 5 6 7\n1 2 3 -4 5 6 7\n".into()),
         ("a.obj", "o cube\nv 1 2 3\nv 1 2 3\nf 1 2 1\n".into()),
+        ("a.bin", [1.0f32; 7 * 3].map(f32::to_le_bytes).concat()),
     ]
 }
 
@@ -41,6 +42,17 @@ fn files_cut_off_at_any_length_do_not_panic() {
                 assert!(!name.ends_with(".las") || loaded.cloud.len() == whole, "{name} {length}");
             }
         }
+    }
+}
+
+#[test]
+fn positions_alone_can_be_asked_for() {
+    let bare = LoadOptions { columns: ColumnChoice::Only(vec![]), ..LoadOptions::default() };
+    for (name, bytes) in small_files() {
+        let cloud = load_bytes(name, &bytes, &bare, &Silent).unwrap().cloud;
+        let whole = read(name, &bytes).unwrap().cloud;
+        assert_eq!(cloud.len(), whole.len(), "{name}");
+        assert!(cloud.normals.is_none() && cloud.scalars.is_empty(), "{name}");
     }
 }
 

@@ -93,6 +93,17 @@ impl FlatPoints {
         self.blocks[slot as usize / LANES].radius(slot as usize % LANES)
     }
 
+    #[inline]
+    pub fn center(&self, slot: Slot) -> Vec3 {
+        self.blocks[slot as usize / LANES].position(slot as usize % LANES)
+    }
+
+    /// Unit.
+    #[inline]
+    pub fn normal(&self, slot: Slot) -> Vec3 {
+        self.blocks[slot as usize / LANES].normal(slot as usize % LANES)
+    }
+
     /// The disc at `slot`, pierced at `position`.
     pub fn gathered(&self, slot: Slot, position: Vec3) -> Gathered {
         let (block, lane) = (&self.blocks[slot as usize / LANES], slot as usize % LANES);

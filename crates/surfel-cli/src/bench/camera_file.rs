@@ -1,0 +1,108 @@
+//! Cameras as files: one line `ex,ey,ez,tx,ty,tz,fovy_deg,lx,ly,lz`, with Z up.
+
+use anyhow::Context;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use surfel::math::DVec3;
+use surfel::scene::{Camera, Projection};
+
+/// In world coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraFile {
+    pub eye: DVec3,
+    /// The middle of the picture.
+    pub target: DVec3,
+    /// Vertical.
+    pub view_angle_deg: f64,
+    pub light: DVec3,
+}
+
+const FORM: &str = "one line of ten numbers: eye x,y,z, target x,y,z, vertical angle of view in \
+    degrees, light x,y,z";
+/// A line is far shorter; a file that is longer is another one, and is not read to its end.
+const MOST_BYTES: u64 = 4096;
+
+impl CameraFile {
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        let text = text(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+        let camera = Self::parse(text.trim()).map_err(anyhow::Error::msg);
+        camera.with_context(|| path.display().to_string())
+    }
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let numbers = text.split(',').map(number).collect::<Result<Vec<f64>, String>>()?;
+        let &[ex, ey, ez, tx, ty, tz, view_angle_deg, lx, ly, lz] = &numbers[..] else {
+            return Err(format!("found {} numbers, expected {FORM}", numbers.len()));
+        };
+        let [eye, target, light] = [[ex, ey, ez], [tx, ty, tz], [lx, ly, lz]].map(DVec3::from);
+        let camera = Self { eye, target, view_angle_deg, light };
+        camera.check().map(|()| camera)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if !(0.0 < self.view_angle_deg && self.view_angle_deg < 180.0) {
+            let found = self.view_angle_deg;
+            return Err(format!("found an angle of view of {found}, expected 0 to 180 degrees"));
+        }
+        let forward = (self.target - self.eye).try_normalize();
+        let forward = forward.ok_or("found eye and target at one place, expected two places")?;
+        if forward.cross(DVec3::Z).length() < 1e-6 {
+            return Err("found a view straight up or down, expected one with Z up".into());
+        }
+        Ok(())
+    }
+
+    pub fn camera(&self) -> Camera {
+        let projection = Projection::Perspective { view_angle_deg: self.view_angle_deg };
+        Camera { position: self.eye, focal_point: self.target, view_up: DVec3::Z, projection }
+    }
+}
+
+fn text(path: &Path) -> std::io::Result<String> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MOST_BYTES).read_to_end(&mut bytes)?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok();
+    // Beyond this the squares of lengths are no longer finite in f32.
+    number.filter(|number| number.abs() < 1e15).ok_or_else(|| {
+        let found: String = text.trim().chars().take(40).collect();
+        format!("found `{}`, expected {FORM}", found.escape_debug())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_read() {
+        let camera = CameraFile::parse("-11,-25, 4.5,1.5,0,6.2,42,14,-3e1,22").unwrap();
+        assert_eq!(camera.eye, DVec3::new(-11.0, -25.0, 4.5));
+        assert_eq!(camera.target, DVec3::new(1.5, 0.0, 6.2));
+        assert_eq!((camera.view_angle_deg, camera.light), (42.0, DVec3::new(14.0, -30.0, 22.0)));
+    }
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        let wrong = [
+            ("", "found ``, expected one line of ten numbers"),
+            ("1,2,3", "found 3 numbers, expected one line of ten numbers"),
+            ("1,2,3,4,5,6,40,8,9,10,11", "found 11 numbers"),
+            ("1,2,3,4,5,6,40,8,9,10\n1,2,3,4,5,6,40,8,9,10", "found `10\\n1`"),
+            ("1,2,3,4,5,6,40,8,9,nan", "found `nan`"),
+            ("1,2,3,4,5,6,40,8,9,1e300", "found `1e300`"),
+            ("1,2,x,4,5,6,40,8,9,10", "found `x`"),
+            ("1,2,3,4,5,6,180,8,9,10", "found an angle of view of 180, expected 0 to 180"),
+            ("1,2,3,1,2,3,40,8,9,10", "found eye and target at one place"),
+            ("1,2,3,1,2,9,40,8,9,10", "found a view straight up or down"),
+        ];
+        for (text, words) in wrong {
+            let error = CameraFile::parse(text).unwrap_err();
+            assert!(error.contains(words), "{text}: {error}");
+        }
+    }
+}

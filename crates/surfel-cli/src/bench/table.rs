@@ -1,0 +1,38 @@
+//! The result as a table for people.
+
+use serde_json::Value;
+
+pub fn table(result: &Value) -> String {
+    let mut text = "rays          number      hits  median M/s  best M/s  wall M/s\n".to_owned();
+    for (name, row) in result["rays"].as_object().into_iter().flatten() {
+        let [rays, hits] = ["rays", "hits"].map(|key| row[key].to_string());
+        let [median, best, wall] = ["median_mrays_per_s", "best_mrays_per_s", "wall_mrays_per_s"]
+            .map(|key| two(&row[key]));
+        text += &format!("{name:<10}{rays:>10}{hits:>10}{median:>12}{best:>10}{wall:>10}");
+        if row["hits_per_ray"].is_number() {
+            text += &format!("  {} discs a hit", two(&row["hits_per_ray"]));
+        }
+        text += "\n";
+    }
+    text + &footer(result)
+}
+
+fn footer(result: &Value) -> String {
+    let [wall, cpu] = ["build_s", "build_cpu_s"].map(|key| three(&result[key]));
+    let [tree, points, total] =
+        ["tree", "points", "total"].map(|key| two(&result["bytes_per_point"][key]));
+    let (threads, simd) = (&result["threads"], result["simd"].as_str().unwrap_or_default());
+    format!(
+        "built in {wall} s ({cpu} s of processor time); {total} bytes a point: tree {tree}, \
+         points {points}\nthreads: {threads}; simd: {simd}; rates by processor time / threads, \
+         the last by the wall"
+    )
+}
+
+fn two(value: &Value) -> String {
+    value.as_f64().map_or("-".into(), |number| format!("{number:.2}"))
+}
+
+fn three(value: &Value) -> String {
+    value.as_f64().map_or("-".into(), |number| format!("{number:.3}"))
+}
