@@ -168,17 +168,14 @@ fn a_closed_surface_occludes_where_it_is_hit() {
 fn the_tree_holds_every_point_once_within_its_boxes() {
     use surfel::bvh::{Primitive, build};
     let cloud = scenes::scene(clouds::sphere(20_000, 1.0), SurfaceKind::Disc).cloud;
-    let mut primitives: Vec<Primitive> = (0..cloud.len())
-        .map(|i| Primitive {
-            bounds: SurfaceKind::Disc.bounds(
-                cloud.positions[i],
-                cloud.normals.as_ref().unwrap()[i],
-                0.02,
-            ),
-            index: i as u32,
+    let primitives: Vec<Primitive> = (0..cloud.len())
+        .map(|i| {
+            let normal = cloud.normals.as_ref().unwrap()[i];
+            let bounds = SurfaceKind::Disc.bounds(cloud.positions[i], normal, 0.02);
+            Primitive::new(bounds, i as u32, 0.02)
         })
         .collect();
-    let tree = build(&mut primitives, |_| true, &surfel::progress::Silent).unwrap();
+    let tree = build(primitives.clone(), |_| true, &surfel::progress::Silent).unwrap();
     tree.validate(&primitives);
     let filled = cloud.len() as f64 / (tree.blocks.len() * LANES) as f64;
     assert!(0.97 < filled, "blocks are {filled} full");
