@@ -56,10 +56,9 @@ pub(super) fn partition_chunk(
 ) -> usize {
     let mut n_left = 0;
     for i in 0..primitives.len() {
-        let primitive = primitives[i];
-        primitives[i] = primitives[n_left];
-        primitives[n_left] = primitive;
-        n_left += usize::from(is_left(&primitive));
+        let goes_left = is_left(&primitives[i]);
+        primitives.swap(i, n_left);
+        n_left += usize::from(goes_left);
     }
     n_left
 }

@@ -36,10 +36,12 @@ pub(super) fn halve(primitives: &mut [Primitive], extent: &Extent) -> Sides {
 
 /// Splits come at multiples of this.
 fn unit(n: usize) -> usize {
-    match n {
-        0..=LANES => 1,
-        0..=FULL_NODE => LANES,
-        _ => FULL_NODE,
+    if FULL_NODE < n {
+        FULL_NODE
+    } else if LANES < n {
+        LANES
+    } else {
+        1
     }
 }
 
