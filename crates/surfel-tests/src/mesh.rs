@@ -51,14 +51,14 @@ impl Mesh {
 
     pub fn new(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
         let corners = |triangle: &[u32; 3]| triangle.map(|i| vertices[i as usize]);
-        let mut primitives: Vec<Primitive> = (0u32..)
-            .zip(&triangles)
-            .map(|(index, triangle)| Primitive {
-                bounds: Aabb::of_points(corners(triangle)),
-                index,
-            })
-            .collect();
-        let tree = bvh::build(&mut primitives, |_| true, &Silent).unwrap();
+        let boxes = triangles.iter().map(|triangle| Aabb::of_points(corners(triangle)));
+        let boxes: Vec<Aabb> = boxes.collect();
+        let primitives = (0u32..).zip(&boxes).map(|(i, bounds)| Primitive::new(*bounds, i, 0.0));
+        let mut tree = bvh::build(primitives.collect(), |_| true, &Silent).unwrap();
+        bvh::fit_boxes(&mut tree.nodes, |block| {
+            let members = tree.blocks[block as usize].iter().filter(|&&i| i != NO_PRIMITIVE);
+            members.fold(Aabb::EMPTY, |all, &i| all.union(boxes[i as usize]))
+        });
         Self { vertices, triangles, tree }
     }
 

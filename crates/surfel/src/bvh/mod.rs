@@ -1,27 +1,27 @@
 //! The tree: built from boxes, eight children a node, and knows no shapes.
 
 mod build;
+mod emit;
+mod fit;
 mod node;
+mod partition;
+mod primitive;
+mod small;
+mod split;
 mod validate;
 
 pub use build::build;
+pub use fit::fit_boxes;
 pub use node::{Child, Node};
-
-use crate::math::Aabb;
-
-/// A box to be sorted into the tree, with the index of what it bounds.
-#[derive(Clone, Copy, Debug)]
-pub struct Primitive {
-    pub bounds: Aabb,
-    pub index: u32,
-}
+pub use primitive::Primitive;
+pub use validate::validate_boxes;
 
 /// An eight-wide tree over blocks of up to eight primitives.
 #[derive(Clone, Debug, Default)]
 pub struct Bvh {
-    /// The root first; empty if there are no primitives.
+    /// The root first; empty if there are no primitives. What is below a node stands together behind it.
     pub nodes: Vec<Node>,
-    /// Primitive indices: block b holds entries 8b .. 8b + 8, with `NO_PRIMITIVE` in unused lanes at its end.
+    /// Primitive indices, `NO_PRIMITIVE` in unused lanes at a block's end.
     pub blocks: Vec<[u32; crate::math::LANES]>,
 }
 

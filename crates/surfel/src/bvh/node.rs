@@ -59,25 +59,32 @@ const IS_BLOCK: u8 = 0x80;
 const RANK: u8 = 0x07;
 
 impl Node {
-    /// Encodes up to eight children, each a box and whether it is a node (else a block).
-    pub fn new(children: &[(Aabb, bool)], first_node: u32, first_block: u32) -> Self {
-        assert!(children.len() <= LANES);
-        let bounds = children.iter().fold(Aabb::EMPTY, |all, (child, _)| all.union(*child));
-        let mut node =
-            Self { origin: bounds.min.to_array(), first_node, first_block, ..Self::default() };
-        node.n_children = children.len() as u8;
-        for axis in 0..3 {
-            node.exponents[axis] = step_exponent(bounds.min[axis], bounds.max[axis]);
-        }
+    /// A node over up to eight children, each a node or else a block; `set_boxes` adds their boxes.
+    pub fn new(are_nodes: impl Iterator<Item = bool>, first_node: u32, first_block: u32) -> Self {
+        let mut node = Self { first_node, first_block, ..Self::default() };
         let (mut n_nodes, mut n_blocks) = (0, 0);
-        for (lane, &(child, is_node)) in children.iter().enumerate() {
+        for (child, is_node) in node.children.iter_mut().zip(are_nodes) {
             let (kind, rank) =
                 if is_node { (IS_NODE, &mut n_nodes) } else { (IS_BLOCK, &mut n_blocks) };
-            node.children[lane] = kind | *rank;
+            *child = kind | *rank;
             *rank += 1;
-            node.set_bounds(lane, child);
         }
+        node.n_children = n_nodes + n_blocks;
         node
+    }
+
+    /// Encodes the box of the child in each lane; those of lanes without a child must be empty.
+    pub fn set_boxes(&mut self, boxes: &[Aabb; LANES]) {
+        let bounds = boxes.iter().copied().reduce(Aabb::union).unwrap_or(Aabb::EMPTY);
+        self.origin = bounds.min.to_array();
+        for axis in 0..3 {
+            self.exponents[axis] = step_exponent(bounds.min[axis], bounds.max[axis]);
+            self.set_bounds_along(axis, boxes);
+        }
+    }
+
+    pub(super) fn n_child_nodes(&self) -> usize {
+        self.children.iter().filter(|child| **child & IS_NODE != 0).count()
     }
 
     /// What stands in `lane`, if anything.
@@ -144,20 +151,20 @@ impl Node {
         Aabb { min: corner(&self.lower), max: corner(&self.upper) }
     }
 
-    fn set_bounds(&mut self, lane: usize, bounds: Aabb) {
-        let step = self.step();
-        for axis in 0..3 {
-            let origin = self.origin[axis];
-            let decode = |steps: u8| origin + f32::from(steps) * step[axis];
-            // The division may round past a step; a wrong side would lose hits, so it is checked.
-            let mut low =
-                ((bounds.min[axis] - origin) / step[axis]).floor().clamp(0.0, 255.0) as u8;
-            while low > 0 && bounds.min[axis] < decode(low) {
+    fn set_bounds_along(&mut self, axis: usize, boxes: &[Aabb; LANES]) {
+        let (origin, step) = (self.origin[axis], self.step()[axis]);
+        let decode = |steps: u8| origin + f32::from(steps) * step;
+        // Exact: the step is a power of two.
+        let per_step = 1.0 / step;
+        for lane in (0..LANES).filter(|lane| self.children[*lane] != 0) {
+            let (min, max) = (boxes[lane].min[axis], boxes[lane].max[axis]);
+            // The difference may round past a step; a wrong side would lose hits, so it is checked.
+            let mut low = ((min - origin) * per_step) as u8;
+            while 0 < low && min < decode(low) {
                 low -= 1;
             }
-            let mut high =
-                ((bounds.max[axis] - origin) / step[axis]).ceil().clamp(0.0, 255.0) as u8;
-            while high < 255 && decode(high) < bounds.max[axis] {
+            let mut high = ((max - origin) * per_step) as u8;
+            while high < 255 && decode(high) < max {
                 high += 1;
             }
             self.lower[axis][lane] = low;
@@ -194,12 +201,13 @@ mod tests {
                 Vec3::new(random.next_f32(), random.next_f32(), random.next_f32()) * scale
                     + Vec3::splat(offset)
             };
-            let boxes: Vec<(Aabb, bool)> = (0..1 + case % 8)
-                .map(|i| (Aabb::of_points([vector(), vector()]), i % 3 == 0))
-                .collect();
-            let node = Node::new(&boxes, 100, 200);
-            assert_eq!(node.occupied(), (1u32 << boxes.len()) - 1);
-            for (lane, (bounds, _)) in boxes.iter().enumerate() {
+            let n = 1 + case as usize % LANES;
+            let mut boxes = [Aabb::EMPTY; LANES];
+            boxes[..n].fill_with(|| Aabb::of_points([vector(), vector()]));
+            let mut node = Node::new((0..n).map(|i| i % 3 == 0), 100, 200);
+            node.set_boxes(&boxes);
+            assert_eq!(node.occupied(), (1u32 << n) - 1);
+            for (lane, bounds) in boxes[..n].iter().enumerate() {
                 assert!(node.bounds(lane).contains(*bounds), "{:?} {bounds:?}", node.bounds(lane));
                 let excess = node.bounds(lane).size() - bounds.size();
                 assert!(excess.cmple(2.01 * Vec3::from(node.step()) + 1e-6 * offset).all());
@@ -209,8 +217,7 @@ mod tests {
 
     #[test]
     fn children_are_numbered_by_kind() {
-        let unit = Aabb::of_points([Vec3::ZERO, Vec3::ONE]);
-        let node = Node::new(&[(unit, false), (unit, true), (unit, false)], 10, 20);
+        let node = Node::new([false, true, false].into_iter(), 10, 20);
         let children: Vec<_> = (0..4).map(|lane| node.child(lane)).collect();
         let expected =
             [Some(Child::Block(20)), Some(Child::Node(10)), Some(Child::Block(21)), None];

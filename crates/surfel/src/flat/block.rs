@@ -57,23 +57,21 @@ impl PointBlock {
             steps: radius_step | u32::from(exponent),
             ..bytemuck::Zeroable::zeroed()
         };
+        let (position_step, radius_step) = (block.position_step(), block.radius_step());
+        // Exact: the step is a power of two.
+        let per_step = if 0.0 < position_step { 1.0 / position_step } else { 0.0 };
         for (lane, point) in points.iter().enumerate() {
-            block.set(lane, point);
+            let steps = (point.position - bounds.min) * per_step;
+            for axis in 0..3 {
+                block.position[axis][lane] = rounded(steps[axis]) as u16;
+            }
+            let radius = if 0.0 < radius_step { point.radius / radius_step } else { 0.0 };
+            let radius = radius.clamp(1.0, RADIUS_MAX) as u32;
+            block.radius[lane] = radius as u8;
+            block.normal[lane] = packed_normal(point.normal) | (radius >> 8) << 30;
+            block.color[lane] = point.color;
         }
         block
-    }
-
-    fn set(&mut self, lane: usize, point: &BlockPoint) {
-        let steps = |value: f32, step: f32| if 0.0 < step { value / step } else { 0.0 };
-        for axis in 0..3 {
-            let offset = point.position[axis] - self.origin[axis];
-            self.position[axis][lane] = steps(offset, self.position_step()).round() as u16;
-        }
-        let radius = steps(point.radius, self.radius_step()).clamp(1.0, RADIUS_MAX) as u32;
-        self.radius[lane] = radius as u8;
-        let normal = integer_normal(point.normal).map(|n| n as u32 & 0x3ff);
-        self.normal[lane] = normal[0] | normal[1] << 10 | normal[2] << 20 | (radius >> 8) << 30;
-        self.color[lane] = point.color;
     }
 
     #[inline(always)]
@@ -172,13 +170,19 @@ fn step_exponent(wanted: f32) -> u8 {
     ((bits >> 23) + u32::from(!is_power)).clamp(1, 254) as u8
 }
 
+/// Nearest integer to a number below 2^22, in the low bits and in two's complement: at 1.5 * 2^23
+/// neighbouring floats are 1 apart. `round` is a call into the C library where SSE 4 is not assumed.
+fn rounded(value: f32) -> u32 {
+    (value + 12_582_912.0).to_bits()
+}
+
 /// `normal` times what makes its longest axis 511, rounded; Z if it has no direction.
-fn integer_normal(normal: Vec3) -> [i32; 3] {
+fn packed_normal(normal: Vec3) -> u32 {
     let longest = normal.abs().max_element();
-    if !(0.0 < longest && longest.is_finite()) {
-        return [0, 0, NORMAL_MAX as i32];
-    }
-    (normal * (NORMAL_MAX / longest)).to_array().map(|n| n.round() as i32)
+    let has_direction = 0.0 < longest && normal.is_finite();
+    let normal = if has_direction { normal * (NORMAL_MAX / longest) } else { NORMAL_MAX * Vec3::Z };
+    let [x, y, z] = normal.to_array().map(|n| rounded(n) & 0x3ff);
+    x | y << 10 | z << 20
 }
 
 #[cfg(test)]

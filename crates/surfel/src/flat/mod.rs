@@ -1,7 +1,9 @@
 //! One instant of a scene as plain arrays: the only thing that a kernel reads.
 
 mod block;
+mod bounds;
 mod points;
+mod source;
 
 pub use block::{BlockPoint, PointBlock};
 pub use points::{FlatPoints, NO_POINT, Slot};

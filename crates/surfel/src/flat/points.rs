@@ -1,8 +1,10 @@
 //! A cloud in the form that kernels read: tree nodes and leaf blocks.
 
-use super::block::{BlockPoint, PointBlock, fits};
+use super::block::{PointBlock, fits};
+use super::bounds::block_bounds;
+use super::source::Source;
 use crate::bvh::{self, NO_PRIMITIVE, Node, Primitive};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::image::decode_srgb8;
 use crate::math::{Aabb, LANES, Vec3};
 use crate::points::PointCloud;
@@ -36,46 +38,15 @@ impl FlatPoints {
         colors: &[[u8; 3]],
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let is_traced = kind != SurfaceKind::Points;
-        if is_traced && cloud.radii.is_none() {
-            return Err(missing("radii"));
-        }
-        if kind.is_oriented() && cloud.normals.is_none() {
-            return Err(missing("normals"));
-        }
-        let factor = kind.radius_factor();
-        let point = |id: u32| {
-            let i = id as usize;
-            let normal = cloud.normals.as_ref().map_or(Vec3::Z, |normals| normals[i]);
-            BlockPoint {
-                position: cloud.positions[i],
-                normal,
-                radius: cloud
-                    .radii
-                    .as_ref()
-                    .filter(|_| is_traced)
-                    .map_or(0.0, |radii| factor * radii[i]),
-                color: colors[i],
-            }
-        };
-        let mut primitives: Vec<Primitive> = (0..cloud.len() as u32)
-            .into_par_iter()
-            .map(|id| Primitive { bounds: padded_bounds(kind, &point(id)), index: id })
-            .collect();
-        let fit = |primitives: &[Primitive]| {
-            let points = primitives.iter().map(|p| point(p.index));
-            let size = Aabb::of_points(points.clone().map(|p| p.position)).size();
-            let smallest = points.clone().fold(f32::INFINITY, |r, p| r.min(p.radius));
-            !is_traced || fits(size, smallest, points.fold(0.0, |r, p| r.max(p.radius)))
-        };
-        let tree = bvh::build(&mut primitives, fit, progress)?;
-        drop(primitives);
-        let encode = |ids: &[u32; LANES]| {
-            let points = ids.iter().filter(|&&id| id != NO_PRIMITIVE).map(|&id| point(id));
-            PointBlock::new(&points.collect::<Vec<_>>())
-        };
-        let blocks = tree.blocks.par_iter().map(encode).collect();
-        Ok(Self { nodes: tree.nodes, blocks, ids: tree.blocks.into_flattened() })
+        let source = Source::new(cloud, kind, colors)?;
+        let ids = 0..source.len() as u32;
+        let primitives = ids.into_par_iter().map(|id| source.primitive(id)).collect();
+        let tree = bvh::build(primitives, |primitives| share_a_block(kind, primitives), progress)?;
+        let blocks: Vec<PointBlock> =
+            tree.blocks.par_iter().map(|ids| encode(&source, ids)).collect();
+        let mut nodes = tree.nodes;
+        bvh::fit_boxes(&mut nodes, |block| block_bounds(kind, &blocks[block as usize]));
+        Ok(Self { nodes, blocks, ids: tree.blocks.into_flattened() })
     }
 
     /// Bytes of the tree, and of the points.
@@ -122,17 +93,18 @@ impl FlatPoints {
     }
 }
 
-/// Larger than the point by what encoding and the rounding of coordinates may move it.
-fn padded_bounds(kind: SurfaceKind, point: &BlockPoint) -> Aabb {
-    let bounds = kind.bounds(point.position, point.normal, point.radius);
-    let padding = 3e-3 * point.radius + 2.0 * f32::EPSILON * point.position.abs().max_element();
-    Aabb { min: bounds.min - padding, max: bounds.max + padding }
+fn share_a_block(kind: SurfaceKind, primitives: &[Primitive]) -> bool {
+    let size = Aabb::of_points(primitives.iter().map(Primitive::center)).size();
+    let radii = primitives.iter().map(Primitive::scale);
+    let smallest = radii.clone().fold(f32::INFINITY, f32::min);
+    kind == SurfaceKind::Points || fits(size, smallest, radii.fold(0.0, f32::max))
 }
 
-fn missing(column: &'static str) -> Error {
-    Error::Setting {
-        name: column,
-        found: "none".into(),
-        expected: "one for each point (see points::prepare)",
+fn encode(source: &Source, ids: &[u32; LANES]) -> PointBlock {
+    let n_points = ids.iter().filter(|&&id| id != NO_PRIMITIVE).count();
+    let mut points = [source.point(ids[0]); LANES];
+    for (point, &id) in points[..n_points].iter_mut().zip(ids) {
+        *point = source.point(id);
     }
+    PointBlock::new(&points[..n_points])
 }
