@@ -3,10 +3,11 @@
 //! Such rays wait for memory most of the time. While one waits for its next node or block, asked for a
 //! round before, the others do their steps.
 
+use super::memory::Memory;
 use super::node::{BoxRay, ray_entries};
 use super::traverse::RayVisitor;
-use crate::bvh::{Child, Node, STACK_SIZE};
-use crate::flat::{FlatPoints, PointBlock};
+use crate::bvh::{Child, STACK_SIZE};
+use crate::flat::FlatPoints;
 use crate::math::{LANES, LaneMask, Lanes};
 use std::ops::ControlFlow;
 
@@ -52,27 +53,6 @@ impl Queues {
         self.at_blocks[self.n_blocks % IN_FLIGHT] = flyer_idx as u8;
         self.n_nodes += 1 - is_block;
         self.n_blocks += is_block;
-    }
-}
-
-/// Where nodes and blocks lie: start, and size of one. A table, as a branch between the two could not be
-/// foretold; it would cost a sixth of the time.
-struct Memory([(*const u8, usize); 2]);
-
-impl Memory {
-    fn new(points: &FlatPoints) -> Self {
-        Self([
-            (points.nodes.as_ptr().cast(), size_of::<Node>()),
-            (points.blocks.as_ptr().cast(), size_of::<PointBlock>()),
-        ])
-    }
-
-    /// Asks for the two cache lines of a packed child.
-    #[inline(always)]
-    fn prefetch<L: Lanes>(&self, child: u32) {
-        let (start, size) = self.0[(child >> 31) as usize];
-        let place = start.wrapping_add((child & !Child::BLOCK_BIT) as usize * size);
-        L::prefetch(place.cast::<[u8; 128]>());
     }
 }
 

@@ -9,6 +9,7 @@ mod frustum;
 mod gather;
 mod hit;
 mod lists;
+mod memory;
 mod node;
 mod packet;
 mod simd;

@@ -1,6 +1,7 @@
 //! Sixteen rays that go much the same way, walked through the tree together.
 
 use super::frustum::Frustum;
+use super::memory::Memory;
 use crate::bvh::{Child, Node, STACK_SIZE};
 use crate::flat::FlatPoints;
 use crate::math::{Floats, LaneMask, Lanes, Ray, WIDE, Wide};
@@ -120,11 +121,66 @@ struct ChildBox {
 }
 
 /// What a search of a packet has still to look at. Kept from packet to packet.
-pub struct PacketStack([ChildBox; STACK_SIZE]);
+pub struct PacketStack {
+    boxes: [ChildBox; STACK_SIZE],
+    size: usize,
+}
 
 impl PacketStack {
     pub fn new() -> Self {
-        Self([ChildBox { child: 0, entry: 0.0, min: [0.0; 3], max: [0.0; 3] }; STACK_SIZE])
+        let nothing = ChildBox { child: 0, entry: 0.0, min: [0.0; 3], max: [0.0; 3] };
+        Self { boxes: [nothing; STACK_SIZE], size: 0 }
+    }
+
+    /// Begins with the root, whose box holds all.
+    #[inline(always)]
+    fn start(&mut self) {
+        let (min, max) = ([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
+        self.boxes[0] = ChildBox { child: Child::Node(0).pack(), entry: 0.0, min, max };
+        self.size = 1;
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<ChildBox> {
+        self.size = self.size.checked_sub(1)?;
+        Some(self.boxes[self.size])
+    }
+
+    /// Pushes the children of a node that the frustum meets up to `limit`, and asks for their memory.
+    #[inline(always)]
+    fn push_children<L: Lanes, const IS_ORDERED: bool>(
+        &mut self,
+        node: &Node,
+        memory: &Memory,
+        frustum: &Frustum,
+        limit: f32,
+    ) {
+        let boxes = frustum.boxes::<L>(node);
+        let (mut lanes, entries) = frustum.meets::<L>(&boxes, limit);
+        lanes &= node.occupied();
+        let (min, max) = boxes.store();
+        let children = node.packed_children::<L>().store();
+        let first = self.size;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            let child = children[lane].to_bits();
+            memory.prefetch::<L>(child);
+            let mut place = self.size;
+            if IS_ORDERED {
+                while first < place && self.boxes[place - 1].entry < entries[lane] {
+                    self.boxes[place] = self.boxes[place - 1];
+                    place -= 1;
+                }
+            }
+            self.boxes[place] = ChildBox {
+                child,
+                entry: entries[lane],
+                min: [min[0][lane], min[1][lane], min[2][lane]],
+                max: [max[0][lane], max[1][lane], max[2][lane]],
+            };
+            self.size += 1;
+        }
     }
 }
 
@@ -134,14 +190,13 @@ impl PacketStack {
 pub fn along_packet<L: Lanes, const IS_ORDERED: bool>(
     points: &FlatPoints,
     packet: &Packet<L::Wide>,
-    PacketStack(stack): &mut PacketStack,
+    stack: &mut PacketStack,
     visitor: &mut impl PacketVisitor<L>,
 ) {
-    let mut size = push_children::<L, IS_ORDERED>(points, packet, 0, f32::INFINITY, stack, 0);
+    let memory = Memory::new(points);
     let mut limit = packet.frustum.limit(&packet.wide, visitor.limits());
-    while 0 < size {
-        size -= 1;
-        let next = stack[size];
+    stack.start();
+    while let Some(next) = stack.pop() {
         if IS_ORDERED && limit < next.entry {
             continue;
         }
@@ -151,7 +206,8 @@ pub fn along_packet<L: Lanes, const IS_ORDERED: bool>(
         }
         match Child::unpack(next.child) {
             Child::Node(node_idx) => {
-                size = push_children::<L, IS_ORDERED>(points, packet, node_idx, limit, stack, size);
+                let node = &points.nodes[node_idx as usize];
+                stack.push_children::<L, IS_ORDERED>(node, &memory, &packet.frustum, limit);
                 continue;
             }
             Child::Block(block_idx) if lanes.is_power_of_two() => {
@@ -164,42 +220,4 @@ pub fn along_packet<L: Lanes, const IS_ORDERED: bool>(
             return;
         }
     }
-}
-
-/// Pushes the children of a node that the frustum meets; returns the size of the stack.
-#[inline(always)]
-fn push_children<L: Lanes, const IS_ORDERED: bool>(
-    points: &FlatPoints,
-    packet: &Packet<L::Wide>,
-    node_idx: u32,
-    limit: f32,
-    stack: &mut [ChildBox; STACK_SIZE],
-    size: usize,
-) -> usize {
-    let node = &points.nodes[node_idx as usize];
-    let boxes = packet.frustum.boxes::<L>(node);
-    let (mut lanes, entries) = packet.frustum.meets::<L>(&boxes, limit);
-    lanes &= node.occupied();
-    let (min, max) = boxes.store();
-    let mut top = size;
-    while lanes != 0 {
-        let lane = lanes.trailing_zeros() as usize;
-        lanes &= lanes - 1;
-        let Some(child) = node.child(lane) else { continue };
-        let mut place = top;
-        if IS_ORDERED {
-            while size < place && stack[place - 1].entry < entries[lane] {
-                stack[place] = stack[place - 1];
-                place -= 1;
-            }
-        }
-        stack[place] = ChildBox {
-            child: child.pack(),
-            entry: entries[lane],
-            min: [min[0][lane], min[1][lane], min[2][lane]],
-            max: [max[0][lane], max[1][lane], max[2][lane]],
-        };
-        top += 1;
-    }
-    top
 }
