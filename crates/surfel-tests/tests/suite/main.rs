@@ -1,8 +1,10 @@
 //! Tests across crates: known answers, fast against plain, the same bytes everywhere.
 
+mod build;
 mod light;
 mod quality;
 mod reference;
+mod refit;
 mod repeatable;
 mod shapes;
 mod trace;

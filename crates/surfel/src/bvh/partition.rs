@@ -56,9 +56,10 @@ pub(super) fn partition_chunk(
 ) -> usize {
     let mut n_left = 0;
     for i in 0..primitives.len() {
-        let goes_left = is_left(&primitives[i]);
-        primitives.swap(i, n_left);
-        n_left += usize::from(goes_left);
+        // Both read before both written: `swap` goes by way of memory.
+        let (primitive, first_right) = (primitives[i], primitives[n_left]);
+        (primitives[i], primitives[n_left]) = (first_right, primitive);
+        n_left += usize::from(is_left(&primitive));
     }
     n_left
 }

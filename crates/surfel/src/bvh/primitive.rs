@@ -64,6 +64,13 @@ impl Primitive {
     pub(super) fn doubled_center(&self) -> Vec4 {
         self.lower + self.upper
     }
+
+    #[inline(always)]
+    pub(super) fn doubled_center_along(&self, axis: usize) -> f32 {
+        // As arrays: to index a `Vec4` is a jump.
+        let (lower, upper): (&[f32; 4], &[f32; 4]) = (self.lower.as_ref(), self.upper.as_ref());
+        lower[axis] + upper[axis]
+    }
 }
 
 impl WideBox {

@@ -4,6 +4,9 @@ use super::primitive::{Primitive, WideBox};
 use super::split::FULL_NODE;
 use crate::math::LANES;
 
+/// Steps that fit in 16 bits beside a position.
+const KEY_STEPS: f32 = 1023.0;
+
 /// Positions of primitives, in the order of their centres along an axis.
 type Order = [u8; FULL_NODE];
 
@@ -26,27 +29,29 @@ pub(super) fn sort_into_blocks(primitives: &mut [Primitive]) {
 fn order_along(axis: usize, primitives: &[Primitive]) -> Order {
     let mut centers = [f32::INFINITY; FULL_NODE];
     for (center, primitive) in centers.iter_mut().zip(primitives) {
-        *center = primitive.doubled_center()[axis];
+        *center = primitive.doubled_center_along(axis);
     }
     let keys = unique_keys(&centers[..primitives.len()]);
     let mut order = [0; FULL_NODE];
     for i in 0..primitives.len() {
-        let rank: i32 = keys.iter().map(|&key| i32::from(key < keys[i])).sum();
+        let rank: i16 = keys.iter().map(|&key| i16::from(key < keys[i])).sum();
         order[rank as usize] = i as u8;
     }
     order
 }
 
-/// Numbers in the order of `centers`, equal ones told apart by their position.
-fn unique_keys(centers: &[f32]) -> [i32; FULL_NODE] {
+/// Numbers in the order of `centers` to a thousandth of their range, equal ones told apart by their
+/// position: 16 bits, so that one instruction compares eight.
+fn unique_keys(centers: &[f32]) -> [i16; FULL_NODE] {
     let (min, max) = centers
         .iter()
         .fold((f32::INFINITY, f32::NEG_INFINITY), |(min, max), &c| (c.min(min), c.max(max)));
-    let steps = ((1 << 24) - 1) as f32 / (max - min);
+    let steps = KEY_STEPS / (max - min);
     let steps = if steps.is_finite() { steps } else { 0.0 };
-    let mut keys = [i32::MAX; FULL_NODE];
+    let mut keys = [i16::MAX; FULL_NODE];
     for (i, (key, center)) in keys.iter_mut().zip(centers).enumerate() {
-        *key = ((center - min) * steps) as i32 * FULL_NODE as i32 + i as i32;
+        let step = ((center - min) * steps) as i32;
+        *key = (step * FULL_NODE as i32 + i as i32 + i32::from(i16::MIN)) as i16;
     }
     keys
 }

@@ -18,11 +18,11 @@ pub(super) fn split(primitives: &mut [Primitive], extent: &Extent) -> Sides {
     let Some(cut) = best_cut(&bins_of(primitives, binning)) else {
         return halve(primitives, extent);
     };
-    let is_left = |p: &Primitive| binning.bin(p)[cut.axis] < cut.first_right;
+    let bin_of = binning.along(cut.axis);
     if primitives.len() <= ROUNDED_MAX {
-        return split_rounded(primitives, binning, &cut);
+        return split_rounded(primitives, bin_of, &cut);
     }
-    partition(primitives, is_left)
+    partition(primitives, |primitive| bin_of(primitive) < cut.first_right)
 }
 
 /// Splits by count along the longest axis: ends for any input.
@@ -54,19 +54,26 @@ fn select(primitives: &mut [Primitive], n_left: usize, axis: usize) {
 }
 
 /// Only the bin in which the moved split falls needs an order.
-fn split_rounded(primitives: &mut [Primitive], binning: Binning, cut: &Cut) -> Sides {
+fn split_rounded(
+    primitives: &mut [Primitive],
+    bin_of: impl Fn(&Primitive) -> usize,
+    cut: &Cut,
+) -> Sides {
     let n = primitives.len();
     let n_left = ((cut.n_left + FULL_NODE / 2) / FULL_NODE * FULL_NODE)
         .clamp(FULL_NODE, (n - 1) / FULL_NODE * FULL_NODE);
     let bin = cut.bin_at(n_left);
-    let n_below = partition_chunk(primitives, |p| binning.bin(p)[cut.axis] < bin);
+    let n_below = partition_chunk(primitives, |p| bin_of(p) < bin);
     let rest = &mut primitives[n_below..];
     if n_below < n_left {
-        let n_within = partition_chunk(rest, |p| binning.bin(p)[cut.axis] == bin);
+        let n_within = partition_chunk(rest, |p| bin_of(p) == bin);
         select(&mut rest[..n_within], n_left - n_below, cut.axis);
     }
     Sides::at(primitives, n_left)
 }
+
+/// From here to twice this neighbouring f32 are 1 apart, and their low bits are a whole number.
+const UNIT_SPACING: f32 = 8_388_608.0;
 
 /// Maps centres to equal intervals of each axis.
 #[derive(Clone, Copy)]
@@ -82,11 +89,21 @@ impl Binning {
         Self { min: centers.lower, per_unit }
     }
 
-    /// Rounded to the nearest: at 2^23 the spacing of f32 is 1, and the low bits are the number.
+    /// Rounded to the nearest.
     #[inline(always)]
-    fn bin(self, primitive: &Primitive) -> [usize; 3] {
-        let bins = (primitive.doubled_center() - self.min) * self.per_unit + 8_388_608.0;
+    fn bins(self, primitive: &Primitive) -> [usize; 3] {
+        let bins = (primitive.doubled_center() - self.min) * self.per_unit + UNIT_SPACING;
         [bins.x, bins.y, bins.z].map(|bin| bin.to_bits() as usize % N_BINS)
+    }
+
+    /// The same for one axis.
+    #[inline(always)]
+    fn along(self, axis: usize) -> impl Fn(&Primitive) -> usize {
+        let (min, per_unit) = (self.min[axis], self.per_unit[axis]);
+        move |primitive| {
+            let bin = (primitive.doubled_center_along(axis) - min) * per_unit + UNIT_SPACING;
+            bin.to_bits() as usize % N_BINS
+        }
     }
 }
 
@@ -101,21 +118,23 @@ const NO_BINS: Bins = [[Bin { bounds: WideBox::EMPTY, n: 0 }; N_BINS]; 3];
 
 /// Minima, maxima and counts do not depend on the order of reduction, so neither does the tree.
 fn bins_of(primitives: &[Primitive], binning: Binning) -> Bins {
-    let count = |chunk: &[Primitive]| {
-        let mut bins = NO_BINS;
-        for primitive in chunk {
-            for (axis, bin) in binning.bin(primitive).into_iter().enumerate() {
-                let bin = &mut bins[axis][bin];
-                bin.bounds = bin.bounds.union(primitive.wide());
-                bin.n += 1;
-            }
-        }
-        bins
-    };
     if primitives.len() <= CHUNK {
-        return count(primitives);
+        return bins_of_chunk(primitives, binning);
     }
-    primitives.par_chunks(CHUNK).map(count).reduce(|| NO_BINS, merge)
+    let chunks = primitives.par_chunks(CHUNK);
+    chunks.map(|chunk| bins_of_chunk(chunk, binning)).reduce(|| NO_BINS, merge)
+}
+
+fn bins_of_chunk(primitives: &[Primitive], binning: Binning) -> Bins {
+    let mut bins = NO_BINS;
+    for primitive in primitives {
+        for (axis, bin) in binning.bins(primitive).into_iter().enumerate() {
+            let bin = &mut bins[axis][bin];
+            bin.bounds = bin.bounds.union(primitive.wide());
+            bin.n += 1;
+        }
+    }
+    bins
 }
 
 fn merge(mut a: Bins, b: Bins) -> Bins {

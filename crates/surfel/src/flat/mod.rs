@@ -3,10 +3,12 @@
 mod block;
 mod bounds;
 mod points;
+mod refit;
 mod source;
 
 pub use block::{BlockPoint, PointBlock};
 pub use points::{FlatPoints, NO_POINT, Slot};
+pub use refit::{REBUILD_COST, Refit};
 
 use crate::error::{Error, Result};
 use crate::math::DVec3;

@@ -1,12 +1,12 @@
 //! A cloud in the form that kernels read: tree nodes and leaf blocks.
 
-use super::block::{PointBlock, fits};
+use super::block::PointBlock;
 use super::bounds::block_bounds;
-use super::source::Source;
-use crate::bvh::{self, NO_PRIMITIVE, Node, Primitive};
+use super::source::{Source, fits};
+use crate::bvh::{self, Node, Primitive};
 use crate::error::Result;
 use crate::image::decode_srgb8;
-use crate::math::{Aabb, LANES, Vec3};
+use crate::math::{LANES, Vec3};
 use crate::points::PointCloud;
 use crate::progress::Progress;
 use crate::surface::{Gathered, SurfaceKind};
@@ -19,6 +19,8 @@ pub struct FlatPoints {
     pub blocks: Vec<PointBlock>,
     /// Index in the cloud of the point at each slot; `NO_POINT` where there is none.
     pub ids: Vec<u32>,
+    /// Of the tree when it was built: the nodes and blocks that a random ray is expected to visit.
+    pub cost: f64,
 }
 
 /// Marks a slot without a point.
@@ -31,7 +33,8 @@ impl FlatPoints {
     /// Sorts `cloud` into a tree. Each point needs a radius (but for `SurfaceKind::Points`) and, for
     /// oriented kinds, a normal.
     ///
-    /// `colors` are sRGB-encoded, one a point.
+    /// `colors` are sRGB-encoded, one a point. Points that nothing can hit are left out: those whose
+    /// position or radius is not finite, or whose radius is not positive.
     pub fn new(
         cloud: &PointCloud,
         kind: SurfaceKind,
@@ -41,12 +44,31 @@ impl FlatPoints {
         let source = Source::new(cloud, kind, colors)?;
         let ids = 0..source.len() as u32;
         let primitives = ids.into_par_iter().map(|id| source.primitive(id)).collect();
-        let tree = bvh::build(primitives, |primitives| share_a_block(kind, primitives), progress)?;
-        let blocks: Vec<PointBlock> =
-            tree.blocks.par_iter().map(|ids| encode(&source, ids)).collect();
-        let mut nodes = tree.nodes;
-        bvh::fit_boxes(&mut nodes, |block| block_bounds(kind, &blocks[block as usize]));
-        Ok(Self { nodes, blocks, ids: tree.blocks.into_flattened() })
+        let fits = |primitives: &[Primitive]| {
+            fits(kind, primitives.iter().map(|p| (p.center(), p.scale())))
+        };
+        let tree = bvh::build(primitives, fits, progress)?;
+        let encode = |ids: &[u32; LANES]| PointBlock::new(source.points(ids).as_slice());
+        let blocks: Vec<PointBlock> = tree.blocks.par_iter().map(encode).collect();
+        let ids = tree.blocks.into_flattened();
+        let mut points = Self { nodes: tree.nodes, blocks, ids, cost: 0.0 };
+        points.cost = points.fit_boxes(kind);
+        if cfg!(debug_assertions) {
+            points.validate(kind);
+        }
+        Ok(points)
+    }
+
+    /// Sets the boxes of the tree and returns its cost.
+    pub(super) fn fit_boxes(&mut self, kind: SurfaceKind) -> f64 {
+        let Self { nodes, blocks, .. } = self;
+        bvh::fit_boxes(nodes, |block| block_bounds(kind, &blocks[block as usize]))
+    }
+
+    /// Panics unless the boxes of the tree contain all that a ray can hit.
+    pub fn validate(&self, kind: SurfaceKind) {
+        bvh::validate_boxes(&self.nodes, |block| block_bounds(kind, &self.blocks[block as usize]));
+        assert_eq!(self.ids.len(), self.blocks.len() * LANES);
     }
 
     /// Bytes of the tree, and of the points.
@@ -91,20 +113,4 @@ impl FlatPoints {
     pub fn slots(&self) -> impl Iterator<Item = Slot> {
         (0..self.ids.len() as Slot).filter(|&slot| self.id(slot) != NO_POINT)
     }
-}
-
-fn share_a_block(kind: SurfaceKind, primitives: &[Primitive]) -> bool {
-    let size = Aabb::of_points(primitives.iter().map(Primitive::center)).size();
-    let radii = primitives.iter().map(Primitive::scale);
-    let smallest = radii.clone().fold(f32::INFINITY, f32::min);
-    kind == SurfaceKind::Points || fits(size, smallest, radii.fold(0.0, f32::max))
-}
-
-fn encode(source: &Source, ids: &[u32; LANES]) -> PointBlock {
-    let n_points = ids.iter().filter(|&&id| id != NO_PRIMITIVE).count();
-    let mut points = [source.point(ids[0]); LANES];
-    for (point, &id) in points[..n_points].iter_mut().zip(ids) {
-        *point = source.point(id);
-    }
-    PointBlock::new(&points[..n_points])
 }
