@@ -142,21 +142,20 @@ pub fn check(name: &str, scene: &FlatScene, rays: &[Ray]) {
 
 fn plain_closest_hit(scene: &FlatScene, ray: &Ray) -> Hit {
     let ray_lanes = RayLanes::new(ray);
-    let mut nearest = (Hit::MISS, NO_POINT);
+    let mut nearest = Hit::MISS;
     for (block_idx, block) in scene.points.blocks.iter().enumerate() {
         let points = block.points::<PortableLanes>(ray.origin);
         let (distances, mask) = match scene.surface {
             SurfaceKind::Sphere => Sphere::intersect(&points, &ray_lanes),
             _ => Disc::intersect(&points, &ray_lanes),
         };
-        for lane in (0..LANES).filter(|lane| (mask.bits() & block.occupied()) >> lane & 1 == 1) {
-            let slot = (block_idx * LANES + lane) as u32;
-            let found = (Hit { distance: distances.store()[lane], slot }, scene.points.id(slot));
-            let is_nearer = found.0.distance < nearest.0.distance && found.0.distance <= ray.t_max;
-            if is_nearer || (found.0.distance == nearest.0.distance && found.1 < nearest.1) {
-                nearest = found;
+        let lanes = mask.bits() & u32::from(block.occupied());
+        for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
+            let distance = distances.store()[lane];
+            if distance < nearest.distance && distance <= ray.t_max {
+                nearest = Hit { distance, slot: (block_idx * LANES + lane) as u32 };
             }
         }
     }
-    nearest.0
+    nearest
 }
