@@ -97,15 +97,15 @@ impl FlatPoints {
         self.blocks[slot as usize / LANES].normal(slot as usize % LANES)
     }
 
-    /// The disc at `slot`, pierced at `position`.
-    pub fn gathered(&self, slot: Slot, position: Vec3) -> Gathered {
+    /// The point at `slot`, with its colour.
+    #[inline]
+    pub fn gathered(&self, slot: Slot) -> Gathered {
         let (block, lane) = (&self.blocks[slot as usize / LANES], slot as usize % LANES);
         Gathered {
             center: block.position(lane),
             normal: block.normal(lane),
             radius: block.radius(lane),
             color: Vec3::from_array(block.color(lane).map(decode_srgb8)),
-            position,
         }
     }
 

@@ -1,6 +1,6 @@
 //! Orthonormal frames around a direction.
 
-use super::Vec3;
+use super::{Floats, Vec3, Vec3Lanes};
 
 /// A right-handed orthonormal basis whose third vector was given.
 #[derive(Clone, Copy, Debug)]
@@ -26,9 +26,19 @@ impl Frame {
     pub fn to_world(&self, local: Vec3) -> Vec3 {
         local.x * self.tangent + local.y * self.bitangent + local.z * self.normal
     }
+}
 
-    /// Components of `vector` along tangent and bitangent.
-    pub fn project(&self, vector: Vec3) -> (f32, f32) {
-        (vector.dot(self.tangent), vector.dot(self.bitangent))
-    }
+/// Tangents and bitangents around unit normals in lanes, as `Frame::around` has them.
+#[inline(always)]
+pub fn tangents<F: Floats>(normal: Vec3Lanes<F>) -> [Vec3Lanes<F>; 2] {
+    let (zero, one) = (F::splat(0.0), F::splat(1.0));
+    let sign = F::select(normal.z.less(zero), F::splat(-1.0), one);
+    let a = F::splat(-1.0) / (sign + normal.z);
+    let b = normal.x * normal.y * a;
+    let tangent = Vec3Lanes {
+        x: one + sign * normal.x * normal.x * a,
+        y: sign * b,
+        z: zero - sign * normal.x,
+    };
+    [tangent, Vec3Lanes { x: b, y: sign + normal.y * normal.y * a, z: zero - normal.y }]
 }

@@ -24,12 +24,27 @@ pub trait Floats:
     fn less(self, other: Self) -> Self::Mask;
     fn less_equal(self, other: Self) -> Self::Mask;
     fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self;
+    /// Of each lane, truncated to an integer below 32, the word in which only this bit is set.
+    fn to_single_bit(self) -> Self;
+    fn or_bits(self, other: Self) -> Self;
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.max(Self::splat(0.0) - self)
+    }
 }
 
 /// One truth value a lane.
 pub trait LaneMask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> {
     /// Bit i is lane i.
     fn bits(self) -> u32;
+}
+
+/// Work that is compiled once for each SIMD level, where all else is compiled into each place that uses it.
+pub trait Task {
+    type Output;
+
+    fn run(self) -> Self::Output;
 }
 
 /// Eight floats: the children of a node, or the points of a block.
@@ -69,6 +84,9 @@ pub trait Lanes: Floats {
     fn min_lane(self) -> f32 {
         -(Self::splat(0.0) - self).max_lane()
     }
+
+    /// Runs `task` as a function of its own.
+    fn call<T: Task>(task: T) -> T::Output;
 
     /// Asks for the memory of `data` to be near soon. It need not be anyone's.
     fn prefetch<T>(data: *const T);
@@ -135,6 +153,16 @@ impl Floats for PortableLanes {
     #[inline(always)]
     fn less_equal(self, other: Self) -> PortableMask {
         PortableMask(std::array::from_fn(|i| self.0[i] <= other.0[i]))
+    }
+
+    #[inline(always)]
+    fn to_single_bit(self) -> Self {
+        Self(self.0.map(|bit| f32::from_bits(1u32.checked_shl(bit as i32 as u32).unwrap_or(0))))
+    }
+
+    #[inline(always)]
+    fn or_bits(self, other: Self) -> Self {
+        self.map(other, |a, b| f32::from_bits(a.to_bits() | b.to_bits()))
     }
 
     #[inline(always)]
@@ -243,6 +271,11 @@ impl Lanes for PortableLanes {
     #[inline(always)]
     fn less_bits(self, other: Self) -> PortableMask {
         PortableMask(std::array::from_fn(|i| self.0[i].to_bits() < other.0[i].to_bits()))
+    }
+
+    #[inline(never)]
+    fn call<T: Task>(task: T) -> T::Output {
+        task.run()
     }
 
     #[inline(always)]
@@ -357,6 +390,16 @@ impl<L: Lanes> Floats for Pair<L> {
     }
 
     #[inline(always)]
+    fn to_single_bit(self) -> Self {
+        Self(self.0.to_single_bit(), self.1.to_single_bit())
+    }
+
+    #[inline(always)]
+    fn or_bits(self, other: Self) -> Self {
+        Self(self.0.or_bits(other.0), self.1.or_bits(other.1))
+    }
+
+    #[inline(always)]
     fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self {
         Self(L::select(mask.0, if_true.0, if_false.0), L::select(mask.1, if_true.1, if_false.1))
     }
@@ -399,13 +442,20 @@ pub struct Vec3Lanes<L> {
 
 impl<L: Lanes> Vec3Lanes<L> {
     #[inline(always)]
-    pub fn store(self) -> [super::Vec3; LANES] {
-        let (x, y, z) = (self.x.store(), self.y.store(), self.z.store());
-        let mut vectors = [super::Vec3::ZERO; LANES];
-        for lane in 0..LANES {
-            vectors[lane] = super::Vec3::new(x[lane], y[lane], z[lane]);
-        }
-        vectors
+    pub fn store(self) -> [[f32; LANES]; 3] {
+        [self.x.store(), self.y.store(), self.z.store()]
+    }
+}
+
+impl<W: Wide> Vec3Lanes<W> {
+    #[inline(always)]
+    pub fn load_wide([x, y, z]: &[[f32; WIDE]; 3]) -> Self {
+        Self { x: W::load(x), y: W::load(y), z: W::load(z) }
+    }
+
+    #[inline(always)]
+    pub fn store_wide(self) -> [[f32; WIDE]; 3] {
+        [self.x.store(), self.y.store(), self.z.store()]
     }
 }
 
@@ -413,6 +463,15 @@ impl<F: Floats> Vec3Lanes<F> {
     #[inline(always)]
     pub fn splat(vector: super::Vec3) -> Self {
         Self { x: F::splat(vector.x), y: F::splat(vector.y), z: F::splat(vector.z) }
+    }
+
+    #[inline(always)]
+    pub fn select(mask: F::Mask, if_true: Self, if_false: Self) -> Self {
+        Self {
+            x: F::select(mask, if_true.x, if_false.x),
+            y: F::select(mask, if_true.y, if_false.y),
+            z: F::select(mask, if_true.z, if_false.z),
+        }
     }
 
     #[inline(always)]

@@ -10,10 +10,10 @@ mod sampling;
 
 pub use aabb::Aabb;
 pub use eigen::{SymmetricMatrix, smallest_eigenvector};
-pub use frame::Frame;
+pub use frame::{Frame, tangents};
 pub use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3, Vec3A, Vec4};
 pub use lanes::{
-    Floats, LANES, LaneMask, Lanes, Pair, PortableLanes, PortableMask, Vec3Lanes, WIDE, Wide,
+    Floats, LANES, LaneMask, Lanes, Pair, PortableLanes, PortableMask, Task, Vec3Lanes, WIDE, Wide,
 };
 pub use random::{Random, hash};
 pub use ray::Ray;

@@ -1,6 +1,7 @@
 //! The angular-gap test: do the points surround a hit, or does it lie beyond the edge of the surface?
 
-use crate::math::{Frame, Vec3};
+use super::PointLanes;
+use crate::math::{Floats, LANES, LaneMask, Lanes, Vec3, Vec3Lanes, WIDE, Wide, tangents};
 
 /// Points within this many radii of the hit count ...
 pub const NEIGHBOR_REACH: f32 = 1.3;
@@ -41,11 +42,59 @@ pub struct Candidate {
     pub radius: f32,
 }
 
+/// Hits in question: a different one in each lane, or the same in all.
+#[derive(Clone, Copy)]
+pub struct Candidates<F> {
+    normal: Vec3Lanes<F>,
+    direction: Vec3Lanes<F>,
+    radius: F,
+    tangents: [Vec3Lanes<F>; 2],
+}
+
+impl<F: Floats> Candidates<F> {
+    #[inline(always)]
+    pub fn new(normal: Vec3Lanes<F>, direction: Vec3Lanes<F>, radius: F) -> Self {
+        Self { normal, direction, radius, tangents: tangents(normal) }
+    }
+
+    /// Which points at `offset` from the hit count.
+    #[inline(always)]
+    fn near(&self, offset: Vec3Lanes<F>) -> F::Mask {
+        let reach = F::splat(NEIGHBOR_REACH) * self.radius;
+        let thickness = F::splat(THICKNESS) * self.radius;
+        let height = self.normal.dot(offset).abs();
+        offset.dot(offset).less(reach * reach) & height.less(thickness)
+    }
+
+    /// Which points the ray passed well before the hit.
+    #[inline(always)]
+    fn passed(&self, offset: Vec3Lanes<F>) -> F::Mask {
+        offset.dot(self.direction).less(F::splat(-PASSED) * self.radius)
+    }
+
+    /// How far the ray, where it passed a point, was from the point's plane, along its normal. That may
+    /// have either sign and any length but zero, as it appears twice.
+    #[inline(always)]
+    fn lift(&self, offset: Vec3Lanes<F>, normal: Vec3Lanes<F>) -> Vec3Lanes<F> {
+        let along = offset.dot(self.direction);
+        let height = normal.dot(self.direction.scaled(along).minus(offset)) / normal.dot(normal);
+        normal.scaled(height)
+    }
+
+    /// The `turn` of points about the hit, and which have one: those straight under it have not.
+    #[inline(always)]
+    fn turn(&self, offset: Vec3Lanes<F>) -> (F, F::Mask) {
+        let (x, y) = (offset.dot(self.tangents[0]), offset.dot(self.tangents[1]));
+        let least = F::splat(1e-6) * self.radius * self.radius;
+        (turn(x, y), least.less(x * x + y * y))
+    }
+}
+
 /// What the points around a hit have told so far; the order in which they come does not matter but
 /// for rounding.
-pub struct Surroundings {
-    hit: Candidate,
-    frame: Frame,
+pub struct Surroundings<L: Lanes> {
+    hit: Candidates<L>,
+    normal: Vec3,
     n_near: u32,
     /// Which eighths of the full turn hold points.
     octants: u8,
@@ -55,11 +104,13 @@ pub struct Surroundings {
     free_side: Vec3,
 }
 
-impl Surroundings {
-    pub fn new(hit: Candidate) -> Self {
+impl<L: Lanes> Surroundings<L> {
+    #[inline(always)]
+    pub fn new(Candidate { normal, direction, radius }: Candidate) -> Self {
+        let (lanes, direction) = (Vec3Lanes::splat(normal), Vec3Lanes::splat(direction));
         Self {
-            hit,
-            frame: Frame::around(hit.normal),
+            hit: Candidates::new(lanes, direction, L::splat(radius)),
+            normal,
             n_near: 0,
             octants: 0,
             sectors: [(f32::INFINITY, f32::NEG_INFINITY); SECTORS],
@@ -68,27 +119,31 @@ impl Surroundings {
         }
     }
 
-    /// Takes in a point at `offset` from the hit; one out of reach is passed over. Its `normal` may have
-    /// either sign and any length but zero.
+    /// Takes in points, relative to the hit; those out of reach or of radius 0 are passed over.
     #[inline(always)]
-    pub fn add(&mut self, offset: Vec3, normal: Vec3) {
-        let Candidate { normal: hit_normal, direction, radius } = self.hit;
-        let (reach, thickness) = (NEIGHBOR_REACH * radius, THICKNESS * radius);
-        if reach * reach <= offset.length_squared() || thickness <= hit_normal.dot(offset).abs() {
+    pub fn add(&mut self, points: &PointLanes<L>) {
+        let PointLanes { center: offset, normal, radius } = *points;
+        let is_near = self.hit.near(offset) & L::splat(0.0).less(radius);
+        let near = is_near.bits();
+        if near == 0 {
             return;
         }
-        self.n_near += 1;
-        let along = offset.dot(direction);
-        if along < -PASSED * radius {
-            // The normal appears twice, so its sign and length do not matter.
-            let height = normal.dot(along * direction - offset) / normal.length_squared();
-            self.free_side += height * normal;
-            self.n_passed += 1;
+        self.n_near += near.count_ones();
+        let mut passed = (self.hit.passed(offset) & is_near).bits();
+        if passed != 0 {
+            let [x, y, z] = self.hit.lift(offset, normal).store();
+            self.n_passed += passed.count_ones();
+            while passed != 0 {
+                let lane = passed.trailing_zeros() as usize % LANES;
+                passed &= passed - 1;
+                self.free_side += Vec3::new(x[lane], y[lane], z[lane]);
+            }
         }
-        let (x, y) = self.frame.project(offset);
-        // A point straight under the hit has no angle.
-        if 1e-6 * radius * radius < x * x + y * y {
-            let turn = turn(x, y);
+        let (turns, has_turn) = self.hit.turn(offset);
+        let (turns, mut angled) = (turns.store(), near & has_turn.bits());
+        while angled != 0 {
+            let turn = turns[angled.trailing_zeros() as usize % LANES];
+            angled &= angled - 1;
             self.octants |= 1 << ((2.0 * turn) as u8 & 7);
             let (low, high) = &mut self.sectors[(turn * (SECTORS / 4) as f32) as usize % SECTORS];
             *low = low.min(turn);
@@ -101,6 +156,7 @@ impl Surroundings {
         self.n_near < SPARSE
     }
 
+    #[inline(always)]
     pub fn judge(&self) -> Judgement {
         if self.n_near < FEWEST || self.is_from_within() {
             return Judgement::Outside;
@@ -116,9 +172,12 @@ impl Surroundings {
     /// disc from within; lit from the inside it would be a black rim. The ray came through free space, so
     /// the side on which it passed the points before the hit is the free side: a hit is refused if its
     /// normal, continued from theirs, faces away from the ray.
+    #[inline(always)]
     fn is_from_within(&self) -> bool {
-        let contrary = CONTRARY * self.free_side.length();
-        1 < self.n_passed && self.free_side.dot(self.hit.normal) < contrary
+        if self.n_passed < 2 {
+            return false;
+        }
+        self.free_side.dot(self.normal) < CONTRARY * self.free_side.length()
     }
 
     fn judge_gaps(&self) -> Judgement {
@@ -144,23 +203,105 @@ impl Surroundings {
     }
 }
 
-/// Grows with the angle of a vector, from 0 to 4, by 1 a quarter and by 1/2 an eighth (no arc tangent:
-/// the same on every machine).
-#[inline(always)]
-fn turn(x: f32, y: f32) -> f32 {
-    let share = y.abs() / (x.abs() + y.abs());
-    match (x < 0.0, y < 0.0) {
-        (false, false) => share,
-        (true, false) => 2.0 - share,
-        (true, true) => 2.0 + share,
-        (false, true) => 4.0 - share,
+/// The surroundings of sixteen hits, a point at a time. Gives those judgements of `Surroundings` that do
+/// not take exact angles.
+pub struct Vicinities<W> {
+    hits: Candidates<W>,
+    n_near: W,
+    n_passed: W,
+    free_side: Vec3Lanes<W>,
+    /// A bit for each of 64 sectors that holds points: a quarter of the full turn has 16, of 3.8 to 7.1
+    /// degrees.
+    sectors: [W; 2],
+}
+
+/// The lanes whose judgement is known.
+pub struct Verdicts {
+    pub enclosed: u32,
+    pub outside: u32,
+}
+
+impl<W: Wide> Vicinities<W> {
+    #[inline(always)]
+    pub fn new(hits: Candidates<W>) -> Self {
+        let zero = W::splat(0.0);
+        let free_side = Vec3Lanes::splat(Vec3::ZERO);
+        Self { hits, n_near: zero, n_passed: zero, free_side, sectors: [zero; 2] }
+    }
+
+    /// Takes in a point at `offset` from each hit.
+    #[inline(always)]
+    pub fn add(&mut self, offset: Vec3Lanes<W>, normal: Vec3Lanes<W>) {
+        let (zero, one) = (W::splat(0.0), W::splat(1.0));
+        let is_near = self.hits.near(offset);
+        if is_near.bits() == 0 {
+            return;
+        }
+        self.n_near = self.n_near + W::select(is_near, one, zero);
+        let is_passed = is_near & self.hits.passed(offset);
+        if is_passed.bits() != 0 {
+            self.n_passed = self.n_passed + W::select(is_passed, one, zero);
+            let lift = self.hits.lift(offset, normal);
+            let none = Vec3Lanes::splat(Vec3::ZERO);
+            self.free_side = self.free_side.plus(Vec3Lanes::select(is_passed, lift, none));
+        }
+        let (turn, has_turn) = self.hits.turn(offset);
+        // A turn of 4 is one of 0.
+        let turn = W::select(turn.less(W::splat(4.0)), turn, zero);
+        for half in 0..2 {
+            let sector = turn * W::splat(16.0) - W::splat(32.0 * half as f32);
+            let is_here = zero.less_equal(sector) & sector.less(W::splat(32.0));
+            let bit = W::select(is_near & has_turn & is_here, sector.to_single_bit(), zero);
+            self.sectors[half] = self.sectors[half].or_bits(bit);
+        }
+    }
+
+    #[inline(always)]
+    pub fn judge(&self) -> Verdicts {
+        let length = self.free_side.dot(self.free_side).sqrt();
+        let contrary = self.free_side.dot(self.hits.normal).less(W::splat(CONTRARY) * length);
+        let from_within = (contrary & W::splat(1.0).less(self.n_passed)).bits();
+        // Points that are too few here may yet be enough farther away.
+        let suffice = W::splat(SPARSE as f32).less_equal(self.n_near).bits();
+        let (mut narrow, mut wide) = (0, 0);
+        let (low, high) = (self.sectors[0].store(), self.sectors[1].store());
+        for lane in 0..WIDE {
+            let empty = !(u64::from(low[lane].to_bits()) | u64::from(high[lane].to_bits()) << 32);
+            let two = empty & empty.rotate_right(1);
+            let four = two & two.rotate_right(2);
+            let eight = four & four.rotate_right(4);
+            let sixteen = eight & eight.rotate_right(8);
+            let twenty_four = sixteen & eight.rotate_right(16);
+            let thirty_three = sixteen & sixteen.rotate_right(16) & empty.rotate_right(32);
+            // So many empty sectors in a row leave, with those at their ends, a gap of less than 149
+            // degrees, or one of more than 180.
+            narrow |= u32::from(twenty_four == 0) << lane;
+            wide |= u32::from(thirty_three != 0) << lane;
+        }
+        Verdicts {
+            enclosed: suffice & narrow & !from_within,
+            outside: suffice & (wide | from_within),
+        }
     }
 }
 
-/// The unit vector whose `turn` this is, modulo 4.
+/// Grows with the angle of a vector, from 0 to 4, by 1 a quarter and by 1/2 an eighth (no arc tangent:
+/// the same on every machine).
+#[inline(always)]
+fn turn<F: Floats>(x: F, y: F) -> F {
+    let zero = F::splat(0.0);
+    let (is_left, is_below) = (x.less(zero), y.less(zero));
+    let share = y.abs() / (x.abs() + y.abs());
+    let (two, four) = (F::splat(2.0), F::splat(4.0));
+    let left = F::select(is_below, two + share, two - share);
+    F::select(is_left, left, F::select(is_below, four - share, share))
+}
+
+/// The unit vector whose `turn` this is, below 8.
 fn direction(turn: f32) -> (f32, f32) {
-    let turn = turn % 4.0;
-    let share = 1.0 - (turn % 2.0 - 1.0).abs();
+    let turn = if turn < 4.0 { turn } else { turn - 4.0 };
+    let half = if turn < 2.0 { turn } else { turn - 2.0 };
+    let share = 1.0 - (half - 1.0).abs();
     let x = if (1.0..3.0).contains(&turn) { share - 1.0 } else { 1.0 - share };
     let y = if turn < 2.0 { share } else { -share };
     let length = (x * x + y * y).sqrt();
@@ -170,6 +311,7 @@ fn direction(turn: f32) -> (f32, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::PortableLanes;
 
     /// Offset and normal.
     type Point = (Vec3, Vec3);
@@ -184,8 +326,21 @@ mod tests {
     }
 
     fn surroundings(hit: &Candidate, points: &[Point]) -> Judgement {
-        let mut found = Surroundings::new(*hit);
-        points.iter().for_each(|(offset, normal)| found.add(*offset, *normal));
+        let mut found = Surroundings::<PortableLanes>::new(*hit);
+        for points in points.chunks(LANES) {
+            let lanes = |value: &dyn Fn(&Point) -> f32| {
+                let mut values = [0.0; LANES];
+                values.iter_mut().zip(points).for_each(|(lane, point)| *lane = value(point));
+                PortableLanes::load(&values)
+            };
+            let vector = |of: fn(&Point) -> Vec3| Vec3Lanes {
+                x: lanes(&|point| of(point).x),
+                y: lanes(&|point| of(point).y),
+                z: lanes(&|point| of(point).z),
+            };
+            let (center, normal) = (vector(|point| point.0), vector(|point| point.1));
+            found.add(&PointLanes { center, normal, radius: lanes(&|_| 1.0) });
+        }
         found.judge()
     }
 
@@ -213,6 +368,7 @@ mod tests {
     fn turns_and_directions_are_inverse_and_eighths_are_eighths() {
         for degrees in (0..360).map(|d| d as f32 + 0.5) {
             let (sin, cos) = degrees.to_radians().sin_cos();
+            let turn = |x, y| turn(PortableLanes::splat(x), PortableLanes::splat(y)).store()[0];
             let (x, y) = direction(turn(3.0 * cos, 3.0 * sin));
             assert!((x - cos).abs() < 1e-5 && (y - sin).abs() < 1e-5, "{degrees}: {x} {y}");
             assert_eq!((2.0 * turn(cos, sin)) as u32, (degrees / 45.0) as u32);

@@ -5,10 +5,10 @@ mod disc;
 mod sphere;
 mod splat;
 
-pub use boundary::{Candidate, Judgement, NEIGHBOR_REACH, Surroundings};
+pub use boundary::{Candidate, Candidates, Judgement, NEIGHBOR_REACH, Surroundings, Verdicts, Vicinities};
 pub use disc::Disc;
 pub use sphere::Sphere;
-pub use splat::{Gathered, MAX_GATHERED, blend, gather_limit};
+pub use splat::{Blend, Gathered, MAX_GATHERED, gather_limit, plane_normal};
 
 use crate::error::Error;
 use crate::math::{Aabb, Floats, Ray, Vec3, Vec3Lanes};

@@ -1,12 +1,12 @@
 //! Splats: the discs just behind the first one blended into a smooth surface (Wiesmeier 2011, 'multi').
 
 use super::SurfaceKind;
-use crate::math::{DVec3, SymmetricMatrix, Vec3, smallest_eigenvector};
+use crate::math::{DVec3, Floats, SymmetricMatrix, Vec3, Vec3Lanes, smallest_eigenvector};
 
 /// Discs blended at most; the nearest are kept.
 pub const MAX_GATHERED: usize = 16;
 
-/// One of the discs that a ray pierced.
+/// A disc that rays pierce.
 #[derive(Clone, Copy, Debug)]
 pub struct Gathered {
     pub center: Vec3,
@@ -15,73 +15,108 @@ pub struct Gathered {
     pub radius: f32,
     /// Linear.
     pub color: Vec3,
-    /// Where the ray pierced the disc.
-    pub position: Vec3,
-}
-
-impl Gathered {
-    /// Fills unused places.
-    pub const NONE: Self = Self {
-        center: Vec3::ZERO,
-        normal: Vec3::Z,
-        radius: 0.0,
-        color: Vec3::ZERO,
-        position: Vec3::ZERO,
-    };
 }
 
 /// Farthest distance gathered if a disc of `radius` is hit at `distance`; the least over all hits counts,
 /// which does not depend on the order in which they are found.
 #[inline(always)]
-pub fn gather_limit(distance: f32, radius: f32) -> f32 {
+pub fn gather_limit<T: std::ops::Add<Output = T>>(distance: T, radius: T) -> T {
     distance + radius
 }
 
-/// Unit normal facing against `direction`, and colour, of the surface that `hits` (nearest first) describe.
+/// The surface that discs describe, one ray a lane and one disc at a time.
 ///
 /// The thesis turns each normal toward the ray's origin on its own. On a silhouette that turns the discs
 /// behind the bend inside out; here the nearest one is turned, and the others follow it.
-pub fn blend(kind: SurfaceKind, hits: &[Gathered], direction: Vec3) -> (Vec3, Vec3) {
-    let nearest = turned_with(hits[0].normal, -direction);
-    let (mut normal, mut color, mut total) = (Vec3::ZERO, Vec3::ZERO, 0.0);
-    for hit in hits {
-        let weight = (1.0 - hit.position.distance(hit.center) / hit.radius).max(1e-4);
-        let is_aligned = kind == SurfaceKind::Splat;
-        normal += weight * if is_aligned { turned_with(hit.normal, nearest) } else { hit.normal };
-        color += weight * hit.color;
-        total += weight;
+pub struct Blend<F> {
+    kind: SurfaceKind,
+    direction: Vec3Lanes<F>,
+    /// The nearest disc's normal, turned toward the ray's origin.
+    nearest: Vec3Lanes<F>,
+    normal: Vec3Lanes<F>,
+    color: Vec3Lanes<F>,
+    total: F,
+}
+
+impl<F: Floats> Blend<F> {
+    /// `nearest` is the unit normal of the nearest disc on each ray.
+    #[inline(always)]
+    pub fn new(kind: SurfaceKind, nearest: Vec3Lanes<F>, direction: Vec3Lanes<F>) -> Self {
+        let zero = Vec3Lanes::splat(Vec3::ZERO);
+        let nearest = turned_with(nearest, zero.minus(direction));
+        Self { kind, direction, nearest, normal: zero, color: zero, total: F::splat(0.0) }
     }
-    // Opposite normals may cancel in splat-mean; the nearest disc's own is then as good as any.
-    let normal = match kind {
-        SurfaceKind::Splat => facing(normal.normalize_or(nearest), direction),
-        SurfaceKind::SplatFit => turned_with(plane_normal(hits).unwrap_or(nearest), -direction),
-        _ => turned_with(normal.normalize_or(nearest), -direction),
-    };
-    (normal, color / total)
+
+    /// Adds a disc for the rays that pierce it at `offset` from its centre.
+    #[inline(always)]
+    pub fn add(&mut self, disc: &Gathered, offset: Vec3Lanes<F>, is_pierced: F::Mask) {
+        let zero = F::splat(0.0);
+        let nearness = F::splat(1.0) - offset.dot(offset).sqrt() / F::splat(disc.radius);
+        let weight = F::select(is_pierced, nearness.max(F::splat(1e-4)), zero);
+        let normal = Vec3Lanes::splat(disc.normal);
+        let sign = if self.kind == SurfaceKind::Splat {
+            let is_contrary = normal.dot(self.nearest).less(zero);
+            F::select(is_contrary, zero - weight, weight)
+        } else {
+            weight
+        };
+        self.normal = self.normal.plus(normal.scaled(sign));
+        self.color = self.color.plus(Vec3Lanes::splat(disc.color).scaled(weight));
+        self.total = self.total + weight;
+    }
+
+    /// Unit normal facing the ray's origin, and colour. The normal of `SplatFit` is that of the nearest
+    /// disc: `plane_normal` replaces it where there is one.
+    #[inline(always)]
+    pub fn finish(self) -> (Vec3Lanes<F>, Vec3Lanes<F>) {
+        let color = self.color.scaled(F::splat(1.0) / self.total);
+        // Opposite normals may cancel in splat-mean; the nearest disc's own is then as good as any.
+        let normal = match self.kind {
+            SurfaceKind::Splat => facing(normalized(self.normal, self.nearest), self.direction),
+            SurfaceKind::SplatFit => self.nearest,
+            _ => {
+                let toward = Vec3Lanes::splat(Vec3::ZERO).minus(self.direction);
+                turned_with(normalized(self.normal, self.nearest), toward)
+            }
+        };
+        (normal, color)
+    }
 }
 
 /// `normal` with the sign that it shares with `guide`.
-fn turned_with(normal: Vec3, guide: Vec3) -> Vec3 {
-    if normal.dot(guide) < 0.0 { -normal } else { normal }
+#[inline(always)]
+fn turned_with<F: Floats>(normal: Vec3Lanes<F>, guide: Vec3Lanes<F>) -> Vec3Lanes<F> {
+    let zero = F::splat(0.0);
+    let sign = F::select(normal.dot(guide).less(zero), F::splat(-1.0), F::splat(1.0));
+    normal.scaled(sign)
+}
+
+/// Of unit length, or `otherwise` if the vector has next to none.
+#[inline(always)]
+fn normalized<F: Floats>(vector: Vec3Lanes<F>, otherwise: Vec3Lanes<F>) -> Vec3Lanes<F> {
+    let squared = vector.dot(vector);
+    let has_length = F::splat(1e-30).less(squared);
+    let unit = vector.scaled(F::splat(1.0) / squared.sqrt());
+    Vec3Lanes::select(has_length, unit, otherwise)
 }
 
 /// A normal that leans away a little, over a bend, is only brought upright: turned around it would
 /// point inward.
-fn facing(normal: Vec3, direction: Vec3) -> Vec3 {
+#[inline(always)]
+fn facing<F: Floats>(normal: Vec3Lanes<F>, direction: Vec3Lanes<F>) -> Vec3Lanes<F> {
     let away = normal.dot(direction);
-    if away <= 0.0 {
-        return normal;
-    }
-    (normal - away * direction).try_normalize().unwrap_or(-direction)
+    let toward = Vec3Lanes::splat(Vec3::ZERO).minus(direction);
+    let upright = normalized(normal.minus(direction.scaled(away)), toward);
+    Vec3Lanes::select(F::splat(0.0).less(away), upright, normal)
 }
 
-/// Normal of the plane through the gathered points, if they span one.
-fn plane_normal(hits: &[Gathered]) -> Option<Vec3> {
-    let relative = |hit: &Gathered| (hit.center - hits[0].center).as_dvec3();
-    let mean = hits.iter().map(relative).sum::<DVec3>() / hits.len() as f64;
+/// Unit normal of the plane through points, if they span one; of either sign.
+pub fn plane_normal(points: &[Vec3]) -> Option<Vec3> {
+    let relative = |point: &Vec3| (*point - points[0]).as_dvec3();
+    let mean = points.iter().map(relative).sum::<DVec3>() / points.len() as f64;
     let mut covariance = SymmetricMatrix::default();
-    for hit in hits {
-        covariance.add_outer(relative(hit) - mean, 1.0);
+    for point in points {
+        covariance.add_outer(relative(point) - mean, 1.0);
     }
     let (normal, values) = smallest_eigenvector(&covariance);
     // Fewer than three points, or points on a line, leave the second eigenvalue at zero.

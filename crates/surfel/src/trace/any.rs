@@ -2,35 +2,76 @@
 
 use super::block::{BlockForPacket, BlockHits};
 use super::flight::fly;
-use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
+use super::hit::Hit;
+use super::packet::{Packet, PacketStack, PacketVisitor, WideRays, along_packet};
 use super::traverse::RayVisitor;
-use crate::flat::{FlatPoints, FlatScene};
+use crate::flat::{FlatPoints, FlatScene, Slot};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, WIDE, Wide};
 use crate::surface::{Disc, Shape, Sphere};
 use std::marker::PhantomData;
 use std::ops::ControlFlow;
 
-#[inline(always)]
-pub(super) fn any_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &mut [bool]) {
-    if scene.surface.is_oriented() {
-        any_of_shape::<L, Disc>(&scene.points, rays, occluded);
-    } else {
-        any_of_shape::<L, Sphere>(&scene.points, rays, occluded);
+/// Says which hits count.
+pub trait Judge: Copy {
+    /// Whether all do.
+    const IS_LENIENT: bool;
+
+    fn counts<L: Lanes>(&self, ray: &Ray, hit: &Hit) -> bool;
+
+    /// Of rays in `lanes` that hit the shape at `slot`, those for which it counts.
+    fn counting<L: Lanes>(
+        &self,
+        rays: &WideRays<L::Wide>,
+        lanes: u32,
+        distances: L::Wide,
+        slot: Slot,
+    ) -> u32;
+}
+
+/// Every hit counts.
+#[derive(Clone, Copy)]
+pub struct Lenient;
+
+impl Judge for Lenient {
+    const IS_LENIENT: bool = true;
+
+    #[inline(always)]
+    fn counts<L: Lanes>(&self, _: &Ray, _: &Hit) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn counting<L: Lanes>(&self, _: &WideRays<L::Wide>, lanes: u32, _: L::Wide, _: Slot) -> u32 {
+        lanes
     }
 }
 
 #[inline(always)]
-fn any_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], occluded: &mut [bool]) {
+pub(super) fn any_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &mut [bool]) {
+    if scene.surface.is_oriented() {
+        any_that_counts::<L, Disc, _>(&scene.points, rays, Lenient, occluded);
+    } else {
+        any_that_counts::<L, Sphere, _>(&scene.points, rays, Lenient, occluded);
+    }
+}
+
+#[inline(always)]
+pub(super) fn any_that_counts<L: Lanes, S: Shape, J: Judge>(
+    points: &FlatPoints,
+    rays: &[Ray],
+    judge: J,
+    occluded: &mut [bool],
+) {
     let mut stack = PacketStack::new();
     let (mut loose, mut indices) = (Vec::new(), Vec::new());
     for (first, rays) in rays.chunks(WIDE).enumerate() {
         if let Some(packet) = Packet::new(&points.nodes[0], rays, true) {
             let occluded = &mut occluded[first * WIDE..][..rays.len()];
-            any_in_packet::<L, S>(points, &packet, &mut stack, occluded);
+            any_in_packet::<L, S, J>(points, &packet, judge, &mut stack, occluded);
             continue;
         }
         for (lane, ray) in rays.iter().enumerate() {
-            loose.push(Any { ray, shape: PhantomData::<S>, is_hit: false });
+            loose.push(Any { ray, judge, shape: PhantomData::<S>, is_hit: false });
             indices.push(first * WIDE + lane);
         }
     }
@@ -40,13 +81,14 @@ fn any_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], occluded:
     }
 }
 
-struct Any<'r, S> {
+struct Any<'r, S, J> {
     ray: &'r Ray,
+    judge: J,
     shape: PhantomData<S>,
     is_hit: bool,
 }
 
-impl<S: Shape> RayVisitor for Any<'_, S> {
+impl<S: Shape, J: Judge> RayVisitor for Any<'_, S, J> {
     const IS_ORDERED: bool = false;
 
     #[inline(always)]
@@ -62,35 +104,69 @@ impl<S: Shape> RayVisitor for Any<'_, S> {
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
         let hits = BlockHits::<L>::find::<S>(points, block_idx, self.ray);
-        self.is_hit = hits.lanes(self.ray.t_max) != 0;
+        if J::IS_LENIENT {
+            self.is_hit = hits.lanes(self.ray.t_max) != 0;
+        } else {
+            self.is_hit = has_counting::<L, J>(&hits, self.ray, self.ray.t_max, self.judge);
+        }
         if self.is_hit { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 
 #[inline(always)]
-fn any_in_packet<L: Lanes, S: Shape>(
+fn has_counting<L: Lanes, J: Judge>(
+    hits: &BlockHits<L>,
+    ray: &Ray,
+    limit: f32,
+    judge: J,
+) -> bool {
+    let mut hits = hits.up_to(limit);
+    while let Some((hit, _)) = hits.next() {
+        if judge.counts::<L>(ray, &hit) {
+            return true;
+        }
+    }
+    false
+}
+
+#[inline(always)]
+fn any_in_packet<L: Lanes, S: Shape, J: Judge>(
     points: &FlatPoints,
     packet: &Packet<L::Wide>,
+    judge: J,
     stack: &mut PacketStack,
     occluded: &mut [bool],
 ) {
     let limits = packet.limits();
-    let mut any = AnyInPacket::<L, S> { packet, shape: PhantomData, limits, is_hit: 0 };
+    let mut any = AnyInPacket::<L, S, J> { packet, judge, shape: PhantomData, limits, is_hit: 0 };
     along_packet::<L, false>(points, packet, stack, &mut any);
     for (lane, occluded) in occluded.iter_mut().enumerate() {
         *occluded = any.is_hit >> lane & 1 == 1;
     }
 }
 
-struct AnyInPacket<'p, L: Lanes, S> {
+struct AnyInPacket<'p, L: Lanes, S, J> {
     packet: &'p Packet<'p, L::Wide>,
+    judge: J,
     shape: PhantomData<S>,
     /// Below all distances for rays that have hit something.
     limits: [f32; WIDE],
     is_hit: u32,
 }
 
-impl<L: Lanes, S: Shape> PacketVisitor<L> for AnyInPacket<'_, L, S> {
+impl<L: Lanes, S: Shape, J: Judge> AnyInPacket<'_, L, S, J> {
+    /// The rays in these lanes need nothing more.
+    #[inline(always)]
+    fn block(&mut self, mut lanes: u32) {
+        self.is_hit |= lanes;
+        while lanes != 0 {
+            self.limits[lanes.trailing_zeros() as usize % WIDE] = f32::NEG_INFINITY;
+            lanes &= lanes - 1;
+        }
+    }
+}
+
+impl<L: Lanes, S: Shape, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> {
     #[inline(always)]
     fn limits(&self) -> &[f32; WIDE] {
         &self.limits
@@ -99,6 +175,17 @@ impl<L: Lanes, S: Shape> PacketVisitor<L> for AnyInPacket<'_, L, S> {
     #[inline(always)]
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
         let block = BlockForPacket::<L>::new(&points.blocks[block_idx as usize], self.packet);
+        if !J::IS_LENIENT {
+            for lane in 0..LANES {
+                let (distance, mask) = block.intersect::<S>(lane);
+                let lanes = (mask & distance.less_equal(L::Wide::load(&self.limits))).bits();
+                if lanes != 0 {
+                    let slot = block_idx * LANES as u32 + lane as u32;
+                    self.block(self.judge.counting::<L>(&self.packet.wide, lanes, distance, slot));
+                }
+            }
+            return;
+        }
         let mut limits = L::Wide::load(&self.limits);
         let blocked = L::Wide::splat(f32::NEG_INFINITY);
         for lane in 0..LANES {
@@ -112,10 +199,10 @@ impl<L: Lanes, S: Shape> PacketVisitor<L> for AnyInPacket<'_, L, S> {
 
     #[inline(always)]
     fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
-        let hits = BlockHits::<L>::find::<S>(points, block_idx, &self.packet.rays[lane]);
-        if hits.lanes(self.limits[lane]) != 0 {
-            self.is_hit |= 1 << lane;
-            self.limits[lane] = f32::NEG_INFINITY;
+        let (ray, limit) = (&self.packet.rays[lane], self.limits[lane]);
+        let hits = BlockHits::<L>::find::<S>(points, block_idx, ray);
+        if has_counting::<L, J>(&hits, ray, limit, self.judge) {
+            self.block(1 << lane);
         }
     }
 }

@@ -3,10 +3,11 @@
 //! Without fused multiply-add: results must equal the portable ones bit for bit.
 
 use super::hit::{Gather, Hit};
+use super::splat::{self, Splat};
 use super::surface::{self, SurfaceHit};
 use super::{any, closest, gather};
 use crate::flat::FlatScene;
-use crate::math::{Floats, LANES, LaneMask, Lanes, Pair, Ray, Wide};
+use crate::math::{Floats, LANES, LaneMask, Lanes, Pair, Ray, Task, Wide};
 use std::arch::x86_64::*;
 use std::marker::PhantomData;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
@@ -24,12 +25,15 @@ macro_rules! kernel {
 kernel!(closest::closest_hits(Hit));
 kernel!(any::any_hits(bool));
 kernel!(gather::gathers(Gather));
+kernel!(splat::splats(Splat));
 kernel!(surface::surface_hits(SurfaceHit));
 kernel!(surface::occlusions(bool));
 
 /// What sixteen lanes are beside `Eight` of this level.
 pub(super) trait Level: Copy {
     type Wide: Wide;
+
+    fn call<T: Task>(task: T) -> T::Output;
 }
 
 #[derive(Clone, Copy)]
@@ -37,6 +41,18 @@ struct Avx2;
 
 impl Level for Avx2 {
     type Wide = Pair<Eight<Self>>;
+
+    #[inline(always)]
+    fn call<T: Task>(task: T) -> T::Output {
+        // SAFETY: see `Eight`.
+        unsafe { call(task) }
+    }
+}
+
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+#[inline(never)]
+fn call<T: Task>(task: T) -> T::Output {
+    task.run()
 }
 
 /// Used only inside the kernels of this file and of `avx512`, which are entered only where AVX2 is
@@ -92,6 +108,19 @@ impl<L: Level> Floats for Eight<L> {
     #[inline(always)]
     fn less_equal(self, other: Self) -> EightMask {
         mask!((_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn to_single_bit(self) -> Self {
+        avx2!(Self(_mm256_castsi256_ps(_mm256_sllv_epi32(
+            _mm256_set1_epi32(1),
+            _mm256_cvttps_epi32(self.0)
+        ))))
+    }
+
+    #[inline(always)]
+    fn or_bits(self, other: Self) -> Self {
+        avx2!(Self(_mm256_or_ps(self.0, other.0)))
     }
 
     #[inline(always)]
@@ -240,6 +269,11 @@ impl<L: Level> Lanes for Eight<L> {
             let moved = _mm256_sll_epi32(_mm256_set1_epi32(exponents as i32), shift);
             _mm256_castsi256_ps(_mm256_and_si256(moved, _mm256_set1_epi32(0xff << 23)))
         }))
+    }
+
+    #[inline(always)]
+    fn call<T: Task>(task: T) -> T::Output {
+        L::call(task)
     }
 
     #[inline(always)]

@@ -2,10 +2,11 @@
 
 use super::avx2::{Eight, Level};
 use super::hit::{Gather, Hit};
+use super::splat::{self, Splat};
 use super::surface::{self, SurfaceHit};
 use super::{any, closest, gather};
 use crate::flat::FlatScene;
-use crate::math::{Floats, LaneMask, Ray, WIDE, Wide};
+use crate::math::{Floats, LaneMask, Ray, Task, WIDE, Wide};
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
@@ -24,6 +25,7 @@ macro_rules! kernel {
 kernel!(closest::closest_hits(Hit));
 kernel!(any::any_hits(bool));
 kernel!(gather::gathers(Gather));
+kernel!(splat::splats(Splat));
 kernel!(surface::surface_hits(SurfaceHit));
 kernel!(surface::occlusions(bool));
 
@@ -32,6 +34,18 @@ struct Avx512;
 
 impl Level for Avx512 {
     type Wide = Sixteen;
+
+    #[inline(always)]
+    fn call<T: Task>(task: T) -> T::Output {
+        // SAFETY: see `Sixteen`.
+        unsafe { call(task) }
+    }
+}
+
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
+#[inline(never)]
+fn call<T: Task>(task: T) -> T::Output {
+    task.run()
 }
 
 /// Used only inside the kernels above, which are entered only where AVX-512 is present: that is what
@@ -80,6 +94,19 @@ impl Floats for Sixteen {
     #[inline(always)]
     fn less_equal(self, other: Self) -> SixteenMask {
         avx512!(SixteenMask(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn to_single_bit(self) -> Self {
+        avx512!(Self(_mm512_castsi512_ps(_mm512_sllv_epi32(
+            _mm512_set1_epi32(1),
+            _mm512_cvttps_epi32(self.0)
+        ))))
+    }
+
+    #[inline(always)]
+    fn or_bits(self, other: Self) -> Self {
+        avx512!(Self(_mm512_or_ps(self.0, other.0)))
     }
 
     #[inline(always)]

@@ -1,55 +1,230 @@
-//! The points around a hit, shown to the angular-gap test.
+//! The points around hits, shown to the angular-gap test.
 
-use super::traverse::{BallVisitor, around};
-use crate::flat::FlatPoints;
-use crate::math::{LaneMask, Lanes, Vec3, Vec3Lanes};
-use crate::surface::{Candidate, Judgement, NEIGHBOR_REACH, Surroundings};
-use std::ops::ControlFlow;
+use super::region::{RegionVisitor, within};
+use crate::flat::{FlatPoints, PointBlock};
+use crate::math::{Aabb, Floats, LANES, LaneMask, Lanes, Task, Vec3, Vec3Lanes, WIDE, Wide};
+use crate::surface::{
+    Candidate, Candidates, Judgement, NEIGHBOR_REACH, Surroundings, Verdicts, Vicinities,
+};
+use std::marker::PhantomData;
 
 /// A neighbourhood with too few points to judge by is looked at once more this many times as wide.
 const WIDER: f32 = 2.0;
+/// Hits at most this many radii from the first of them, along any axis, are judged together.
+const SPREAD: f32 = 3.0;
+/// Blocks near them that are kept in mind.
+const MAX_BLOCKS: usize = 64;
 
 /// Judges a hit at `position` by all points near it.
 #[inline(always)]
-pub fn judge<L: Lanes>(points: &FlatPoints, position: Vec3, hit: &Candidate) -> Judgement {
-    let found = look_around::<L>(points, position, *hit);
-    if !found.is_sparse() {
-        return found.judge();
+pub fn judge<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> Judgement {
+    L::call(JudgeOne { points, position, hit, lanes: PhantomData::<L> })
+}
+
+struct JudgeOne<'p, L> {
+    points: &'p FlatPoints,
+    position: Vec3,
+    hit: Candidate,
+    lanes: PhantomData<L>,
+}
+
+impl<L: Lanes> Task for JudgeOne<'_, L> {
+    type Output = Judgement;
+
+    #[inline(always)]
+    fn run(self) -> Judgement {
+        let Self { points, position, mut hit, .. } = self;
+        loop {
+            let mut found = Neighborhood { position, surroundings: Surroundings::<L>::new(hit) };
+            let reach = Vec3::splat(NEIGHBOR_REACH * hit.radius);
+            let region = Aabb { min: position - reach, max: position + reach };
+            within::<L>(points, &region, &mut found);
+            if !found.surroundings.is_sparse() || self.hit.radius < hit.radius {
+                return found.surroundings.judge();
+            }
+            hit.radius *= WIDER;
+        }
     }
-    look_around::<L>(points, position, Candidate { radius: WIDER * hit.radius, ..*hit }).judge()
+}
+
+struct Neighborhood<L: Lanes> {
+    position: Vec3,
+    surroundings: Surroundings<L>,
+}
+
+impl<L: Lanes> RegionVisitor for Neighborhood<L> {
+    #[inline(always)]
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        self.surroundings.add(&points.blocks[block_idx as usize].points(self.position));
+    }
+}
+
+/// Hits of up to sixteen rays that are judged at once.
+#[derive(Clone, Copy)]
+pub struct WideHits<W> {
+    pub position: Vec3Lanes<W>,
+    /// Unit, facing the rays' origins.
+    pub normal: Vec3Lanes<W>,
+    /// Of the rays, unit.
+    pub direction: Vec3Lanes<W>,
+    pub radius: W,
+}
+
+/// As `judge` does; hits close to each other share the way through the tree. Only what stands in `lanes`
+/// counts.
+#[inline(always)]
+pub fn judge_wide<L: Lanes>(
+    points: &FlatPoints,
+    lanes: u32,
+    hits: &WideHits<L::Wide>,
+) -> [Judgement; WIDE] {
+    L::call(JudgeWide::<L> { points, lanes, hits })
+}
+
+struct JudgeWide<'p, L: Lanes> {
+    points: &'p FlatPoints,
+    lanes: u32,
+    hits: &'p WideHits<L::Wide>,
+}
+
+impl<L: Lanes> Task for JudgeWide<'_, L> {
+    type Output = [Judgement; WIDE];
+
+    #[inline(always)]
+    fn run(self) -> [Judgement; WIDE] {
+        let Self { points, mut lanes, hits } = self;
+        let mut judgements = [Judgement::Outside; WIDE];
+        let [x, y, z] = hits.position.store_wide();
+        let radii = hits.radius.store();
+        while lanes != 0 {
+            let first = lanes.trailing_zeros() as usize % WIDE;
+            let center = Vec3::new(x[first], y[first], z[first]);
+            let group = 1 << first | lanes & hits.near(center, SPREAD * radii[first]);
+            lanes &= !group;
+            judge_group::<L>(points, group, hits, &mut judgements);
+        }
+        judgements
+    }
 }
 
 #[inline(always)]
-fn look_around<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> Surroundings {
-    let reach = NEIGHBOR_REACH * hit.radius;
-    let mut found = Neighborhood { position, reach, surroundings: Surroundings::new(hit) };
-    around::<L>(points, position, reach, &mut found);
-    found.surroundings
+fn judge_group<L: Lanes>(
+    points: &FlatPoints,
+    group: u32,
+    hits: &WideHits<L::Wide>,
+    judgements: &mut [Judgement; WIDE],
+) {
+    let candidates = Candidates::new(hits.normal, hits.direction, hits.radius);
+    let mut found = Neighborhoods::<L> {
+        position: hits.position,
+        vicinities: Vicinities::new(candidates),
+        blocks: [0; MAX_BLOCKS],
+        n_blocks: 0,
+    };
+    within::<L>(points, &hits.region(group), &mut found);
+    let Verdicts { enclosed, outside } = found.vicinities.judge();
+    for lane in 0..WIDE {
+        if (group & enclosed) >> lane & 1 == 1 {
+            judgements[lane] = Judgement::Enclosed;
+        }
+    }
+    let mut doubtful = group & !(enclosed | outside);
+    while doubtful != 0 {
+        let lane = doubtful.trailing_zeros() as usize % WIDE;
+        doubtful &= doubtful - 1;
+        judgements[lane] = found.judge_again(points, hits.in_lane(lane));
+    }
 }
 
-struct Neighborhood {
-    position: Vec3,
-    reach: f32,
-    surroundings: Surroundings,
-}
-
-impl BallVisitor for Neighborhood {
+impl<W: Wide> WideHits<W> {
+    /// The lanes within this distance along each axis.
     #[inline(always)]
-    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let block = &points.blocks[block_idx as usize];
-        let centers: Vec3Lanes<L> = block.centers(self.position);
-        let reach_squared = L::splat(self.reach * self.reach);
-        let near = centers.dot(centers).less_equal(reach_squared).bits();
-        let mut near = if near == 0 { 0 } else { near & u32::from(block.occupied()) };
-        if near == 0 {
-            return ControlFlow::Continue(());
+    fn near(&self, center: Vec3, distance: f32) -> u32 {
+        let offset = self.position.minus(Vec3Lanes::splat(center));
+        let offset = offset.x.abs().max(offset.y.abs()).max(offset.z.abs());
+        offset.less_equal(W::splat(distance)).bits()
+    }
+
+    /// Around all points near the hits in these lanes.
+    #[inline(always)]
+    fn region(&self, lanes: u32) -> Aabb {
+        let reach = W::splat(NEIGHBOR_REACH) * self.radius;
+        let mut region = Aabb::EMPTY;
+        let position = [self.position.x, self.position.y, self.position.z];
+        for axis in 0..3 {
+            let (low, high) = ((position[axis] - reach).store(), (position[axis] + reach).store());
+            let mut left = lanes;
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize % WIDE;
+                left &= left - 1;
+                region.min[axis] = region.min[axis].min(low[lane]);
+                region.max[axis] = region.max[axis].max(high[lane]);
+            }
         }
-        let (offsets, normals) = (centers.store(), block.normals::<L>().store());
-        while near != 0 {
-            let lane = near.trailing_zeros() as usize;
-            near &= near - 1;
-            self.surroundings.add(offsets[lane], normals[lane]);
+        region
+    }
+
+    /// Place and candidate.
+    #[inline(always)]
+    fn in_lane(&self, lane: usize) -> (Vec3, Candidate) {
+        let vector = |rows: [[f32; WIDE]; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
+        let candidate = Candidate {
+            normal: vector(self.normal.store_wide()),
+            direction: vector(self.direction.store_wide()),
+            radius: self.radius.store()[lane],
+        };
+        (vector(self.position.store_wide()), candidate)
+    }
+}
+
+struct Neighborhoods<L: Lanes> {
+    position: Vec3Lanes<L::Wide>,
+    vicinities: Vicinities<L::Wide>,
+    /// Those seen, if there is room.
+    blocks: [u32; MAX_BLOCKS],
+    n_blocks: usize,
+}
+
+impl<L: Lanes> Neighborhoods<L> {
+    /// By exact angles, or farther around.
+    #[inline(always)]
+    fn judge_again(&self, points: &FlatPoints, (position, hit): (Vec3, Candidate)) -> Judgement {
+        if let Some(blocks) = self.blocks.get(..self.n_blocks) {
+            let mut surroundings = Surroundings::<L>::new(hit);
+            for block_idx in blocks {
+                surroundings.add(&points.blocks[*block_idx as usize].points(position));
+            }
+            if !surroundings.is_sparse() {
+                return surroundings.judge();
+            }
         }
-        ControlFlow::Continue(())
+        judge::<L>(points, position, hit)
+    }
+}
+
+impl<L: Lanes> RegionVisitor for Neighborhoods<L> {
+    #[inline(always)]
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        if let Some(place) = self.blocks.get_mut(self.n_blocks) {
+            *place = block_idx;
+        }
+        self.n_blocks += 1;
+        let block: &PointBlock = &points.blocks[block_idx as usize];
+        let corner = Vec3Lanes::splat(block.corner()).minus(self.position);
+        let (offsets, normals) = (block.offsets::<L>().store(), block.normals::<L>().store());
+        let n_points = L::splat(0.0).less(block.radii()).bits().count_ones() as usize;
+        for lane in 0..n_points.min(LANES) {
+            let offset = Vec3Lanes {
+                x: corner.x + L::Wide::splat(offsets[0][lane]),
+                y: corner.y + L::Wide::splat(offsets[1][lane]),
+                z: corner.z + L::Wide::splat(offsets[2][lane]),
+            };
+            let normal = Vec3Lanes {
+                x: L::Wide::splat(normals[0][lane]),
+                y: L::Wide::splat(normals[1][lane]),
+                z: L::Wide::splat(normals[2][lane]),
+            };
+            self.vicinities.add(offset, normal);
+        }
     }
 }

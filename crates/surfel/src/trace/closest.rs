@@ -4,7 +4,7 @@ use super::block::{BlockForPacket, BlockHits};
 use super::flight::fly;
 use super::hit::Hit;
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
-use super::traverse::{RayStack, RayVisitor, along_ray};
+use super::traverse::RayVisitor;
 use crate::flat::{FlatPoints, FlatScene};
 use crate::math::{Floats, LANES, Lanes, Ray, WIDE, Wide};
 use crate::surface::{Disc, Shape, Sphere};
@@ -40,22 +40,6 @@ fn closest_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], hits:
     for (ray_idx, Closest { hit, .. }) in indices.into_iter().zip(loose) {
         hits[ray_idx] = if hit.is_miss() { Hit::MISS } else { hit };
     }
-}
-
-#[inline(always)]
-pub(super) fn closest_hit<L: Lanes>(scene: &FlatScene, ray: &Ray, stack: &mut RayStack) -> Hit {
-    if scene.surface.is_oriented() {
-        closest_of_ray::<L, Disc>(&scene.points, ray, stack)
-    } else {
-        closest_of_ray::<L, Sphere>(&scene.points, ray, stack)
-    }
-}
-
-#[inline(always)]
-fn closest_of_ray<L: Lanes, S: Shape>(points: &FlatPoints, ray: &Ray, stack: &mut RayStack) -> Hit {
-    let mut closest = Closest::<S>::new(ray, Hit { distance: ray.t_max, ..Hit::MISS });
-    along_ray::<L>(points, ray, stack, &mut closest);
-    if closest.hit.is_miss() { Hit::MISS } else { closest.hit }
 }
 
 struct Closest<'r, S> {

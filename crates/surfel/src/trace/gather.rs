@@ -2,10 +2,10 @@
 
 use super::block::{BlockForPacket, BlockHits};
 use super::flight::fly;
-use super::hit::Gather;
-use super::lists::Lists;
+use super::hit::{Gather, Hit};
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
-use super::traverse::{RayStack, RayVisitor, along_ray};
+use super::sightings::{Sighting, settle};
+use super::traverse::RayVisitor;
 use crate::flat::{FlatPoints, FlatScene};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, WIDE, Wide};
 use crate::surface::{Disc, gather_limit};
@@ -14,30 +14,68 @@ use std::ops::ControlFlow;
 /// Discs only: spheres do not blend.
 #[inline(always)]
 pub(super) fn gathers<L: Lanes>(scene: &FlatScene, rays: &[Ray], gathers: &mut [Gather]) {
-    let points = &scene.points;
     let mut stack = PacketStack::new();
     let mut sightings = Vec::new();
-    let (mut loose, mut indices) = (Vec::new(), Vec::new());
-    for (first, rays) in rays.chunks(WIDE).enumerate() {
-        if let Some(packet) = Packet::new(&points.nodes[0], rays, false) {
-            let gathers = &mut gathers[first * WIDE..][..rays.len()];
-            gather_in_packet::<L>(points, &packet, &mut stack, &mut sightings, gathers);
-            continue;
+    for (rays, gathers) in rays.chunks(WIDE).zip(gathers.chunks_mut(WIDE)) {
+        sightings.clear();
+        let limits = gather::<L>(&scene.points, rays, &mut stack, &mut sightings);
+        settle::<L::Wide>(&mut sightings, &limits);
+        for (lane, gather) in gathers.iter_mut().enumerate() {
+            *gather = gather_of_lane(&sightings, lane);
         }
-        for (lane, ray) in rays.iter().enumerate() {
-            loose.push(Gathering { ray, gather: Gather::up_to(ray.t_max) });
-            indices.push(first * WIDE + lane);
-        }
-    }
-    fly::<L, _>(points, &mut loose);
-    for (ray_idx, Gathering { gather, .. }) in indices.into_iter().zip(loose) {
-        gathers[ray_idx] = gather;
     }
 }
 
+/// Adds to `sightings` all discs of one to sixteen rays within limits that it returns, and some beyond.
+#[inline(always)]
+pub(super) fn gather<L: Lanes>(
+    points: &FlatPoints,
+    rays: &[Ray],
+    stack: &mut PacketStack,
+    sightings: &mut Vec<Sighting>,
+) -> [f32; WIDE] {
+    if let Some(packet) = Packet::new(&points.nodes[0], rays, false) {
+        let mut gathering =
+            GatherInPacket::<L> { packet: &packet, limits: packet.limits(), sightings };
+        along_packet::<L, true>(points, &packet, stack, &mut gathering);
+        return gathering.limits;
+    }
+    let mut gatherings = [Gathering::new(&rays[0]); WIDE];
+    for lane in 0..rays.len() {
+        gatherings[lane] = Gathering::new(&rays[lane]);
+    }
+    fly::<L, _>(points, &mut gatherings[..rays.len()]);
+    for (lane, Gathering { gather, .. }) in gatherings[..rays.len()].iter().enumerate() {
+        for hit in gather.hits() {
+            sightings.push(Sighting::by_one(lane, *hit));
+        }
+    }
+    [f32::MAX; WIDE]
+}
+
+fn gather_of_lane(sightings: &[Sighting], lane: usize) -> Gather {
+    let mut gather = Gather::EMPTY;
+    for Sighting { slot, distances } in sightings {
+        if !distances[lane].is_nan() {
+            gather.insert(Hit { distance: distances[lane], slot: *slot });
+        }
+    }
+    gather
+}
+
+/// The discs that a ray pierces.
+#[derive(Clone, Copy)]
 struct Gathering<'r> {
     ray: &'r Ray,
     gather: Gather,
+    limit: f32,
+}
+
+impl<'r> Gathering<'r> {
+    #[inline(always)]
+    fn new(ray: &'r Ray) -> Self {
+        Self { ray, gather: Gather::EMPTY, limit: ray.t_max }
+    }
 }
 
 impl RayVisitor for Gathering<'_> {
@@ -50,51 +88,25 @@ impl RayVisitor for Gathering<'_> {
 
     #[inline(always)]
     fn limit(&self) -> f32 {
-        self.gather.reach()
+        self.gather.reach().min(self.limit)
     }
 
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let reach = self.gather.reach();
-        let mut hits = BlockHits::<L>::find::<Disc>(points, block_idx, self.ray).up_to(reach);
+        let hits = BlockHits::<L>::find::<Disc>(points, block_idx, self.ray);
+        let mut hits = hits.up_to(self.limit());
         while let Some((hit, radius)) = hits.next() {
-            self.gather.insert(hit, radius);
+            if hit.distance <= self.limit {
+                self.limit = self.limit.min(gather_limit(hit.distance, radius));
+                self.gather.insert(hit);
+                self.gather.drop_beyond(self.limit);
+            }
         }
         ControlFlow::Continue(())
     }
 }
 
-/// A disc that rays of a packet hit. Which of them keep it is known only when the nearest is.
-#[derive(Clone, Copy)]
-struct Sighting {
-    distances: [f32; WIDE],
-    lanes: u32,
-    slot: u32,
-}
-
-#[inline(always)]
-fn gather_in_packet<L: Lanes>(
-    points: &FlatPoints,
-    packet: &Packet<L::Wide>,
-    stack: &mut PacketStack,
-    sightings: &mut Vec<Sighting>,
-    gathers: &mut [Gather],
-) {
-    sightings.clear();
-    let mut gathering = GatherInPacket::<L> { packet, limits: packet.limits(), sightings };
-    along_packet::<L, true>(points, packet, stack, &mut gathering);
-    let limits = gathering.limits;
-    let mut lists = Lists::new();
-    for sighting in sightings {
-        let kept = L::Wide::load(&sighting.distances).less_equal(L::Wide::load(&limits));
-        lists.add(kept.bits() & sighting.lanes, &sighting.distances, sighting.slot);
-    }
-    lists.sort::<L::Wide>();
-    for (lane, gather) in gathers.iter_mut().enumerate() {
-        lists.copy_to(lane, gather);
-    }
-}
-
+/// The discs that the rays of a packet pierce. Which of them a ray keeps is known only at the end.
 struct GatherInPacket<'p, L: Lanes> {
     packet: &'p Packet<'p, L::Wide>,
     limits: [f32; WIDE],
@@ -113,15 +125,17 @@ impl<L: Lanes> PacketVisitor<L> for GatherInPacket<'_, L> {
         let mut limits = L::Wide::load(&self.limits);
         for lane in 0..LANES {
             let (distance, mask) = block.intersect::<Disc>(lane);
-            let hits = mask & distance.less_equal(limits);
-            let lanes = hits.bits();
-            if lanes == 0 {
+            let is_hit = mask & distance.less_equal(limits);
+            if is_hit.bits() == 0 {
                 continue;
             }
-            let limit = distance + L::Wide::splat(block.radius(lane));
-            limits = L::Wide::select(hits, limit.min(limits), limits);
+            let limit = gather_limit(distance, L::Wide::splat(block.radius(lane)));
+            limits = L::Wide::select(is_hit, limit.min(limits), limits);
             let slot = block_idx * LANES as u32 + lane as u32;
-            self.sightings.push(Sighting { distances: distance.store(), lanes, slot });
+            // Of the two zeros the positive one.
+            let distance = distance + L::Wide::splat(0.0);
+            let distances = L::Wide::select(is_hit, distance, L::Wide::splat(f32::NAN)).store();
+            self.sightings.push(Sighting { slot, distances });
         }
         self.limits = limits.store();
     }
@@ -133,17 +147,7 @@ impl<L: Lanes> PacketVisitor<L> for GatherInPacket<'_, L> {
         let mut hits = hits.up_to(self.limits[lane]);
         while let Some((hit, radius)) = hits.next() {
             self.limits[lane] = self.limits[lane].min(gather_limit(hit.distance, radius));
-            let mut distances = [0.0; WIDE];
-            distances[lane] = hit.distance;
-            self.sightings.push(Sighting { distances, lanes: 1 << lane, slot: hit.slot });
+            self.sightings.push(Sighting::by_one(lane, hit));
         }
     }
-}
-
-/// One ray that is not part of a packet.
-#[inline(always)]
-pub(super) fn gather<L: Lanes>(points: &FlatPoints, ray: &Ray, stack: &mut RayStack) -> Gather {
-    let mut gathering = Gathering { ray, gather: Gather::up_to(ray.t_max) };
-    along_ray::<L>(points, ray, stack, &mut gathering);
-    gathering.gather
 }

@@ -1,7 +1,7 @@
 //! What the searches find.
 
 use crate::flat::Slot;
-use crate::surface::{MAX_GATHERED, gather_limit};
+use crate::surface::MAX_GATHERED;
 
 /// The nearest shape on a ray: the one in the lower slot where two are equally near.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +33,7 @@ impl Hit {
     /// Orders hits by distance, which is never negative, then by slot: the bits of positive floats are
     /// ordered as the floats are. In one number, as a branch here could not be foretold.
     #[inline(always)]
-    fn key(&self) -> u64 {
+    pub(super) fn key(&self) -> u64 {
         u64::from(self.distance.to_bits()) << 32 | u64::from(self.slot)
     }
 }
@@ -43,34 +43,18 @@ impl Hit {
 pub struct Gather {
     hits: [Hit; MAX_GATHERED],
     len: usize,
-    limit: f32,
 }
 
 impl Gather {
-    pub const EMPTY: Self = Self { hits: [Hit::MISS; MAX_GATHERED], len: 0, limit: f32::INFINITY };
-
-    pub(super) fn up_to(limit: f32) -> Self {
-        Self { limit, ..Self::EMPTY }
-    }
+    pub const EMPTY: Self = Self { hits: [Hit::MISS; MAX_GATHERED], len: 0 };
 
     pub fn hits(&self) -> &[Hit] {
         &self.hits[..self.len]
     }
 
-    /// Appends the next hit of a sorted list.
+    /// Takes `hit` in if it is among the nearest.
     #[inline(always)]
-    pub(super) fn push(&mut self, hit: Hit) {
-        self.hits[self.len % MAX_GATHERED] = hit;
-        self.len += 1;
-    }
-
-    /// Takes `hit` in if it is near enough, and drops what is no longer.
-    #[inline(always)]
-    pub(super) fn insert(&mut self, hit: Hit, radius: f32) {
-        if self.limit < hit.distance {
-            return;
-        }
-        self.limit = self.limit.min(gather_limit(hit.distance, radius));
+    pub(super) fn insert(&mut self, hit: Hit) {
         let mut place = self.len.min(MAX_GATHERED - 1);
         if self.len == MAX_GATHERED && !hit.is_before(&self.hits[place]) {
             return;
@@ -81,7 +65,11 @@ impl Gather {
         }
         self.hits[place] = hit;
         self.len = (self.len + 1).min(MAX_GATHERED);
-        while 0 < self.len && self.limit < self.hits[self.len - 1].distance {
+    }
+
+    #[inline(always)]
+    pub(super) fn drop_beyond(&mut self, limit: f32) {
+        while 0 < self.len && limit < self.hits[self.len - 1].distance {
             self.len -= 1;
         }
     }
@@ -89,6 +77,6 @@ impl Gather {
     /// Once full, nothing beyond the last is taken in any more.
     #[inline(always)]
     pub(super) fn reach(&self) -> f32 {
-        if self.len == MAX_GATHERED { self.hits[MAX_GATHERED - 1].distance } else { self.limit }
+        if self.len == MAX_GATHERED { self.hits[MAX_GATHERED - 1].distance } else { f32::INFINITY }
     }
 }

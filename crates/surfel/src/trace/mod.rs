@@ -8,11 +8,13 @@ mod flight;
 mod frustum;
 mod gather;
 mod hit;
-mod lists;
 mod memory;
 mod node;
 mod packet;
+mod region;
+mod sightings;
 mod simd;
+mod splat;
 mod surface;
 mod traverse;
 
@@ -23,6 +25,7 @@ mod avx512;
 
 pub use hit::{Gather, Hit};
 pub use simd::Simd;
+pub use splat::Splat;
 pub use surface::SurfaceHit;
 
 use crate::flat::FlatScene;
@@ -57,6 +60,11 @@ pub fn any_hits(scene: &FlatScene, simd: Simd, rays: &[Ray], occluded: &mut [boo
 /// The nearest shapes on each ray, all within a radius of each other.
 pub fn gathers(scene: &FlatScene, simd: Simd, rays: &[Ray], gathers: &mut [Gather]) {
     at_level!(simd, gather::gathers(scene, rays, gathers));
+}
+
+/// The shapes of `gathers` blended, without regard to the surface's boundary; discs only.
+pub fn splats(scene: &FlatScene, simd: Simd, rays: &[Ray], splats: &mut [Splat]) {
+    at_level!(simd, splat::splats(scene, rays, splats));
 }
 
 /// The nearest place of the continuous surface on each ray.

@@ -1,7 +1,7 @@
-//! The boxes of a node against a ray, and against a ball.
+//! The boxes of a node against a ray, and against a box.
 
 use crate::bvh::Node;
-use crate::math::{LaneMask, Lanes, Ray, Vec3, Vec3A};
+use crate::math::{Aabb, LaneMask, Lanes, Ray, Vec3A};
 
 /// Rounding allowed for, as a share of the largest coordinates involved: far more than f32 loses in a box
 /// or disc test, far less than a radius. A box is never missed that a hit inside it would need.
@@ -62,18 +62,18 @@ pub fn ray_entries<L: Lanes>(node: &Node, ray: &BoxRay, t_max: f32) -> (L::Mask,
     (enter.less_equal(leave) & node.filled::<L>(), enter)
 }
 
-/// Lanes whose boxes come within `radius` of `center`.
+/// Lanes whose boxes overlap `region`.
 #[inline(always)]
-pub fn ball_overlaps<L: Lanes>(node: &Node, center: Vec3, radius: f32) -> u32 {
-    let mut squared = L::splat(0.0);
-    let step = node.step();
-    for axis in 0..3 {
-        let corner = L::splat(node.origin[axis] - center[axis]);
-        let per_step = L::splat(step[axis]);
-        let below = corner + L::from_u8(&node.lower[axis]) * per_step;
-        let above = L::splat(0.0) - (corner + L::from_u8(&node.upper[axis]) * per_step);
-        let outside = below.max(above).max(L::splat(0.0));
-        squared = squared + outside * outside;
-    }
-    squared.less_equal(L::splat(radius * radius * (1.0 + 1e-4))).bits() & node.occupied()
+pub fn box_overlaps<L: Lanes>(node: &Node, region: &Aabb) -> u32 {
+    let overlaps = overlaps_along::<L, 0>(node, region)
+        & overlaps_along::<L, 1>(node, region)
+        & overlaps_along::<L, 2>(node, region);
+    (overlaps & node.filled::<L>()).bits()
+}
+
+#[inline(always)]
+fn overlaps_along<L: Lanes, const AXIS: usize>(node: &Node, region: &Aabb) -> L::Mask {
+    let (low, high) = node.sides::<L, AXIS>();
+    let (min, max) = (L::splat(region.min[AXIS]), L::splat(region.max[AXIS]));
+    low.less_equal(max) & min.less_equal(high)
 }

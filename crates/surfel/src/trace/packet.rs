@@ -4,7 +4,7 @@ use super::frustum::Frustum;
 use super::memory::Memory;
 use crate::bvh::{Child, Node, STACK_SIZE};
 use crate::flat::FlatPoints;
-use crate::math::{Floats, LaneMask, Lanes, Ray, WIDE, Wide};
+use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3Lanes, WIDE, Wide};
 
 /// Sixteen rays in lanes.
 pub struct WideRays<W> {
@@ -55,6 +55,20 @@ impl<W: Wide> WideRays<W> {
             t_min: W::load(&t_min),
             t_max: W::load(&t_max),
         }
+    }
+}
+
+impl<W: Wide> WideRays<W> {
+    #[inline(always)]
+    pub fn origin(&self) -> Vec3Lanes<W> {
+        let [x, y, z] = self.origin;
+        Vec3Lanes { x, y, z }
+    }
+
+    #[inline(always)]
+    pub fn direction(&self) -> Vec3Lanes<W> {
+        let [x, y, z] = self.direction;
+        Vec3Lanes { x, y, z }
     }
 }
 

@@ -1,18 +1,14 @@
 //! The continuous surface: discs gathered and blended, hits beyond its boundary refused.
 
-use super::any::any_hits;
-use super::block::BlockHits;
-use super::boundary::judge;
-use super::closest::closest_hit;
-use super::gather::gather;
+use super::any::{Judge, any_hits, any_that_counts};
+use super::boundary::{WideHits, judge, judge_wide};
+use super::closest::closest_hits;
 use super::hit::Hit;
-use super::traverse::{RayStack, RayVisitor, along_ray};
-use crate::flat::{FlatPoints, FlatScene};
-use crate::math::{Lanes, Ray, Vec3};
-use crate::surface::{
-    Boundary, Candidate, Disc, Gathered, Judgement, MAX_GATHERED, Surroundings, blend,
-};
-use std::ops::ControlFlow;
+use super::packet::WideRays;
+use super::splat::{Splat, find_splats};
+use crate::flat::{FlatScene, Slot};
+use crate::math::{Floats, Lanes, Ray, Vec3, Vec3Lanes, WIDE};
+use crate::surface::{Boundary, Candidate, Disc, Judgement};
 
 /// Where a ray meets the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,172 +46,151 @@ const RESUME: f32 = 0.05;
 
 #[inline(always)]
 pub(super) fn surface_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]) {
-    let mut stack = RayStack::new();
-    for (ray, hit) in rays.iter().zip(hits) {
-        *hit = if scene.surface.is_oriented() {
-            surface_hit::<L>(scene, ray, &mut stack)
-        } else {
-            sphere_hit::<L>(scene, ray, &mut stack)
-        };
+    if scene.surface.is_oriented() {
+        splat_hits::<L>(scene, rays, hits);
+    } else {
+        sphere_hits::<L>(scene, rays, hits);
     }
 }
 
-/// A hit is in doubt only up to the wide gap: one that is merely at an edge is taken in the end,
-/// whatever follows it, so the first such hit settles it.
+/// Whether the surface blocks each ray: at an edge as well, which a ray that sees it would take in the
+/// end, whatever follows. So any such hit settles it.
 #[inline(always)]
 pub(super) fn occlusions<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &mut [bool]) {
     if !scene.surface.is_oriented() || scene.boundary == Boundary::Off {
-        return any_hits::<L>(scene, rays, occluded);
-    }
-    let mut stack = RayStack::new();
-    for (ray, occluded) in rays.iter().zip(occluded) {
-        let mut search = OccluderSearch { scene, ray, n_refused: 0, is_occluded: false };
-        along_ray::<L>(&scene.points, ray, &mut stack, &mut search);
-        *occluded = search.is_occluded;
+        any_hits::<L>(scene, rays, occluded);
+    } else {
+        any_that_counts::<L, Disc, _>(&scene.points, rays, WithinBoundary(scene), occluded);
     }
 }
 
-struct OccluderSearch<'a> {
-    scene: &'a FlatScene,
-    ray: &'a Ray,
-    n_refused: usize,
-    is_occluded: bool,
+#[derive(Clone, Copy)]
+struct WithinBoundary<'s>(&'s FlatScene);
+
+impl WithinBoundary<'_> {
+    fn radius(&self, slot: Slot) -> f32 {
+        self.0.points.radius(slot) / self.0.surface.radius_factor()
+    }
 }
 
-impl RayVisitor for OccluderSearch<'_> {
-    const IS_ORDERED: bool = true;
+impl Judge for WithinBoundary<'_> {
+    const IS_LENIENT: bool = false;
 
     #[inline(always)]
-    fn ray(&self) -> &Ray {
-        self.ray
+    fn counts<L: Lanes>(&self, ray: &Ray, hit: &Hit) -> bool {
+        let normal = self.0.points.normal(hit.slot);
+        let candidate = Candidate {
+            normal: if 0.0 < normal.dot(ray.direction) { -normal } else { normal },
+            direction: ray.direction,
+            radius: self.radius(hit.slot),
+        };
+        judge::<L>(&self.0.points, ray.at(hit.distance), candidate) != Judgement::Outside
     }
 
     #[inline(always)]
-    fn limit(&self) -> f32 {
-        self.ray.t_max
+    fn counting<L: Lanes>(
+        &self,
+        rays: &WideRays<L::Wide>,
+        lanes: u32,
+        distances: L::Wide,
+        slot: Slot,
+    ) -> u32 {
+        let (origin, direction) = (rays.origin(), rays.direction());
+        let normal = Vec3Lanes::splat(self.0.points.normal(slot));
+        let is_away = L::Wide::splat(0.0).less(normal.dot(direction));
+        let sign = L::Wide::select(is_away, L::Wide::splat(-1.0), L::Wide::splat(1.0));
+        let hits = WideHits {
+            position: origin.plus(direction.scaled(distances)),
+            normal: normal.scaled(sign),
+            direction,
+            radius: L::Wide::splat(self.radius(slot)),
+        };
+        let judgements = judge_wide::<L>(&self.0.points, lanes, &hits);
+        let mut counting = 0;
+        for lane in 0..WIDE {
+            counting |= u32::from(judgements[lane] != Judgement::Outside) << lane;
+        }
+        counting & lanes
     }
+}
 
-    #[inline(always)]
-    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let hits = BlockHits::<L>::find::<Disc>(points, block_idx, self.ray);
-        let mut hits = hits.up_to(self.ray.t_max);
-        while let Some((hit, _)) = hits.next() {
-            if single_disc::<L>(self.scene, self.ray, &hit) != Judgement::Outside {
-                self.is_occluded = true;
-                return ControlFlow::Break(());
+#[inline(always)]
+fn sphere_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    let mut nearest = vec![Hit::MISS; rays.len()];
+    closest_hits::<L>(scene, rays, &mut nearest);
+    for ((ray, nearest), hit) in rays.iter().zip(nearest).zip(hits) {
+        *hit = SurfaceHit::MISS;
+        if nearest.is_miss() {
+            continue;
+        }
+        let sphere = scene.points.gathered(nearest.slot);
+        let outward = (ray.at(nearest.distance) - sphere.center) / sphere.radius;
+        let normal = if outward.dot(ray.direction) < 0.0 { outward } else { -outward };
+        *hit = SurfaceHit {
+            distance: nearest.distance,
+            id: scene.points.id(nearest.slot),
+            radius: sphere.radius,
+            normal: normal.normalize_or(-ray.direction),
+            color: sphere.color,
+        };
+    }
+}
+
+/// All rays search on together until each has a hit within the boundary, or nothing is left on it. A hit at
+/// an edge stands if none follows.
+#[inline(always)]
+fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    hits.fill(SurfaceHit::MISS);
+    if scene.boundary == Boundary::Off {
+        let mut splats = vec![Splat::MISS; rays.len()];
+        find_splats::<L>(scene, rays, false, &mut splats);
+        for (hit, splat) in hits.iter_mut().zip(&splats) {
+            *hit = surface_hit(scene, splat);
+        }
+        return;
+    }
+    let mut searching: Vec<u32> = (0..rays.len() as u32).collect();
+    let mut rays = rays.to_vec();
+    let mut splats = vec![Splat::MISS; rays.len()];
+    for _ in 0..MAX_REFUSALS {
+        let splats = &mut splats[..rays.len()];
+        find_splats::<L>(scene, &rays, true, splats);
+        let mut n_left = 0;
+        for i in 0..splats.len() {
+            let (splat, ray, ray_idx) = (&splats[i], rays[i], searching[i]);
+            if splat.hit.is_miss() {
+                continue;
             }
-            self.n_refused += 1;
-            if self.n_refused == MAX_REFUSALS {
-                return ControlFlow::Break(());
+            let found = surface_hit(scene, splat);
+            let hit = &mut hits[ray_idx as usize];
+            let judgement = splat.judgement;
+            if judgement == Judgement::Enclosed || judgement == Judgement::Edge && hit.is_miss() {
+                *hit = found;
+            }
+            if judgement != Judgement::Enclosed {
+                let behind = splat.hit.distance + RESUME * found.radius;
+                let t_min = behind.max(splat.hit.distance * (1.0 + 2.0 * f32::EPSILON));
+                (rays[n_left], searching[n_left]) = (Ray { t_min, ..ray }, ray_idx);
+                n_left += 1;
             }
         }
-        ControlFlow::Continue(())
+        rays.truncate(n_left);
+        if rays.is_empty() {
+            return;
+        }
     }
 }
 
 #[inline(always)]
-fn single_disc<L: Lanes>(scene: &FlatScene, ray: &Ray, hit: &Hit) -> Judgement {
-    let disc = scene.points.gathered(hit.slot, ray.at(hit.distance));
-    let radius = disc.radius / scene.surface.radius_factor();
-    let normal = if 0.0 < disc.normal.dot(ray.direction) { -disc.normal } else { disc.normal };
-    let candidate = Candidate { normal, direction: ray.direction, radius };
-    judge::<L>(&scene.points, disc.position, &candidate)
-}
-
-#[inline(always)]
-fn sphere_hit<L: Lanes>(scene: &FlatScene, ray: &Ray, stack: &mut RayStack) -> SurfaceHit {
-    let hit = closest_hit::<L>(scene, ray, stack);
-    if hit.is_miss() {
+fn surface_hit(scene: &FlatScene, splat: &Splat) -> SurfaceHit {
+    if splat.hit.is_miss() {
         return SurfaceHit::MISS;
     }
-    let sphere = scene.points.gathered(hit.slot, ray.at(hit.distance));
-    let outward = (sphere.position - sphere.center) / sphere.radius;
-    let normal = if outward.dot(ray.direction) < 0.0 { outward } else { -outward };
     SurfaceHit {
-        distance: hit.distance,
-        id: scene.points.id(hit.slot),
-        radius: sphere.radius,
-        normal: normal.normalize_or(-ray.direction),
-        color: sphere.color,
+        distance: splat.hit.distance,
+        id: scene.points.id(splat.hit.slot),
+        radius: splat.radius / scene.surface.radius_factor(),
+        normal: splat.normal,
+        color: splat.color,
     }
-}
-
-#[inline(always)]
-fn surface_hit<L: Lanes>(scene: &FlatScene, ray: &Ray, stack: &mut RayStack) -> SurfaceHit {
-    let mut rest = *ray;
-    let mut at_edge = SurfaceHit::MISS;
-    for _ in 0..MAX_REFUSALS {
-        let mut discs = [Gathered::NONE; MAX_GATHERED];
-        let (first, n) = pierced_discs::<L>(scene, &rest, stack, &mut discs);
-        if n == 0 {
-            return at_edge;
-        }
-        let discs = &discs[..n];
-        let (normal, color) = blend(scene.surface, discs, ray.direction);
-        let radius = discs[0].radius / scene.surface.radius_factor();
-        let hit = SurfaceHit {
-            distance: first.distance,
-            id: scene.points.id(first.slot),
-            radius,
-            normal,
-            color,
-        };
-        if scene.boundary == Boundary::Off {
-            return hit;
-        }
-        match judge_gathered::<L>(
-            scene,
-            discs,
-            &Candidate { normal, direction: ray.direction, radius },
-        ) {
-            Judgement::Enclosed => return hit,
-            Judgement::Edge if at_edge.is_miss() => at_edge = hit,
-            _ => {}
-        }
-        rest.t_min =
-            (first.distance + RESUME * radius).max(first.distance * (1.0 + 2.0 * f32::EPSILON));
-    }
-    at_edge
-}
-
-/// Fills `discs` with what makes up the surface at the first hit; returns that hit and their number.
-#[inline(always)]
-fn pierced_discs<L: Lanes>(
-    scene: &FlatScene,
-    ray: &Ray,
-    stack: &mut RayStack,
-    discs: &mut [Gathered; MAX_GATHERED],
-) -> (Hit, usize) {
-    let disc = |hit: &Hit| scene.points.gathered(hit.slot, ray.at(hit.distance));
-    if !scene.surface.is_gathered() {
-        let hit = closest_hit::<L>(scene, ray, stack);
-        if hit.is_miss() {
-            return (hit, 0);
-        }
-        discs[0] = disc(&hit);
-        return (hit, 1);
-    }
-    let gather = gather::<L>(&scene.points, ray, stack);
-    for (place, hit) in discs.iter_mut().zip(gather.hits()) {
-        *place = disc(hit);
-    }
-    (gather.hits().first().copied().unwrap_or(Hit::MISS), gather.hits().len())
-}
-
-/// On an even patch the pierced discs' own centres mostly surround the hit already, and more points
-/// only narrow gaps: then the search around the hit is saved.
-#[inline(always)]
-fn judge_gathered<L: Lanes>(scene: &FlatScene, discs: &[Gathered], hit: &Candidate) -> Judgement {
-    const COS_EVEN: f32 = 0.8;
-    let position = discs[0].position;
-    if discs.iter().all(|disc| COS_EVEN < disc.normal.dot(hit.normal).abs()) {
-        let mut surroundings = Surroundings::new(*hit);
-        for disc in discs {
-            surroundings.add(disc.center - position, disc.normal);
-        }
-        if surroundings.judge() == Judgement::Enclosed {
-            return Judgement::Enclosed;
-        }
-    }
-    judge::<L>(&scene.points, position, hit)
 }

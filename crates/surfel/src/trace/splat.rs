@@ -1,0 +1,214 @@
+//! The discs near each ray's first one, blended: sixteen rays at a time.
+
+use super::boundary::{WideHits, judge_wide};
+use super::closest::closest_hits;
+use super::gather::gather;
+use super::hit::Hit;
+use super::packet::{PacketStack, WideRays};
+use super::sightings::{Sighting, settle};
+use crate::flat::FlatScene;
+use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
+use crate::surface::{Blend, Gathered, Judgement, MAX_GATHERED, SurfaceKind, plane_normal};
+
+/// The blended discs of a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Splat {
+    /// The nearest.
+    pub hit: Hit,
+    pub n_discs: u32,
+    /// Of the nearest disc.
+    pub radius: f32,
+    /// Unit, facing the ray's origin.
+    pub normal: Vec3,
+    /// Linear.
+    pub color: Vec3,
+    /// Found only where it is asked for.
+    pub(super) judgement: Judgement,
+}
+
+impl Splat {
+    pub const MISS: Self = Self {
+        hit: Hit::MISS,
+        n_discs: 0,
+        radius: 0.0,
+        normal: Vec3::ZERO,
+        color: Vec3::ZERO,
+        judgement: Judgement::Outside,
+    };
+}
+
+#[inline(always)]
+pub(super) fn splats<L: Lanes>(scene: &FlatScene, rays: &[Ray], splats: &mut [Splat]) {
+    find_splats::<L>(scene, rays, false, splats);
+}
+
+/// Judges the hits if asked to.
+#[inline(always)]
+pub(super) fn find_splats<L: Lanes>(
+    scene: &FlatScene,
+    rays: &[Ray],
+    judges: bool,
+    splats: &mut [Splat],
+) {
+    let mut stack = PacketStack::new();
+    let mut mixer = Mixer { scene, judges, sightings: Vec::new(), discs: Vec::new() };
+    for (rays, splats) in rays.chunks(WIDE).zip(splats.chunks_mut(WIDE)) {
+        let limits = if scene.surface.is_gathered() {
+            gather::<L>(&scene.points, rays, &mut stack, &mut mixer.sightings)
+        } else {
+            find_closest::<L>(scene, rays, &mut mixer.sightings)
+        };
+        mixer.mix::<L>(&WideRays::new(rays), &limits, splats);
+    }
+}
+
+/// The nearest disc of each ray, alone.
+#[inline(always)]
+fn find_closest<L: Lanes>(
+    scene: &FlatScene,
+    rays: &[Ray],
+    sightings: &mut Vec<Sighting>,
+) -> [f32; WIDE] {
+    let mut hits = [Hit::MISS; WIDE];
+    closest_hits::<L>(scene, rays, &mut hits[..rays.len()]);
+    for (lane, hit) in hits.iter().enumerate().filter(|(_, hit)| !hit.is_miss()) {
+        sightings.push(Sighting::by_one(lane, *hit));
+    }
+    [f32::MAX; WIDE]
+}
+
+/// Blends sightings into splats.
+struct Mixer<'s> {
+    scene: &'s FlatScene,
+    judges: bool,
+    sightings: Vec<Sighting>,
+    discs: Vec<Gathered>,
+}
+
+/// The nearest disc of each ray.
+struct Nearest<W> {
+    distances: W,
+    /// As the bits of floats, which is how lanes hold them.
+    slots: W,
+    normals: Vec3Lanes<W>,
+    radii: W,
+    n_discs: W,
+}
+
+impl Mixer<'_> {
+    /// Blends what was seen by one to sixteen rays up to their limits, and forgets it.
+    #[inline(always)]
+    fn mix<L: Lanes>(
+        &mut self,
+        rays: &WideRays<L::Wide>,
+        limits: &[f32; WIDE],
+        splats: &mut [Splat],
+    ) {
+        settle::<L::Wide>(&mut self.sightings, limits);
+        if self.sightings.is_empty() {
+            splats.fill(Splat::MISS);
+            return;
+        }
+        let nearest = self.find_nearest::<L::Wide>();
+        let (origin, direction) = (rays.origin(), rays.direction());
+        let mut blend = Blend::new(self.scene.surface, nearest.normals, direction);
+        for (disc, sighting) in self.discs.iter().zip(&self.sightings) {
+            let (distances, is_pierced) = pierced::<L::Wide>(sighting);
+            let position = origin.plus(direction.scaled(distances));
+            blend.add(disc, position.minus(Vec3Lanes::splat(disc.center)), is_pierced);
+        }
+        let (mut normals, colors) = blend.finish();
+        if self.scene.surface == SurfaceKind::SplatFit {
+            normals = self.fit_planes(normals, splats.len());
+        }
+        let n_discs = nearest.n_discs.store();
+        let mut judgements = [Judgement::Outside; WIDE];
+        if self.judges {
+            let hits = WideHits {
+                position: origin.plus(direction.scaled(nearest.distances)),
+                normal: normals,
+                direction,
+                radius: nearest.radii / L::Wide::splat(self.scene.surface.radius_factor()),
+            };
+            let is_hit = L::Wide::splat(0.0).less(nearest.n_discs).bits();
+            let lanes = is_hit & ((1 << splats.len()) - 1);
+            judgements = judge_wide::<L>(&self.scene.points, lanes, &hits);
+        }
+        self.sightings.clear();
+        let (distances, slots) = (nearest.distances.store(), nearest.slots.store());
+        let radii = nearest.radii.store();
+        let (normals, colors) = (normals.store_wide(), colors.store_wide());
+        for lane in 0..splats.len() {
+            splats[lane] = Splat::MISS;
+            if 0.0 < n_discs[lane] {
+                let vector = |rows: &[[f32; WIDE]; 3]| {
+                    Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane])
+                };
+                splats[lane] = Splat {
+                    hit: Hit { distance: distances[lane], slot: slots[lane].to_bits() },
+                    n_discs: n_discs[lane] as u32,
+                    radius: radii[lane],
+                    normal: vector(&normals),
+                    color: vector(&colors),
+                    judgement: judgements[lane],
+                };
+            }
+        }
+    }
+
+    /// Fills `discs` with the discs seen.
+    #[inline(always)]
+    fn find_nearest<W: Wide>(&mut self) -> Nearest<W> {
+        let zero = W::splat(0.0);
+        let mut nearest = Nearest {
+            distances: W::splat(f32::INFINITY),
+            slots: W::splat(f32::from_bits(Hit::MISS.slot)),
+            normals: Vec3Lanes::splat(Vec3::Z),
+            radii: zero,
+            n_discs: zero,
+        };
+        self.discs.clear();
+        for sighting in &self.sightings {
+            let disc = self.scene.points.gathered(sighting.slot);
+            let (distances, is_pierced) = pierced::<W>(sighting);
+            // They come by slot, so of equal ones the first counts.
+            let is_nearer = distances.less(nearest.distances);
+            let slot = W::splat(f32::from_bits(sighting.slot));
+            let normal = Vec3Lanes::splat(disc.normal);
+            nearest.distances = W::select(is_nearer, distances, nearest.distances);
+            nearest.slots = W::select(is_nearer, slot, nearest.slots);
+            nearest.normals = Vec3Lanes::select(is_nearer, normal, nearest.normals);
+            nearest.radii = W::select(is_nearer, W::splat(disc.radius), nearest.radii);
+            nearest.n_discs = nearest.n_discs + W::select(is_pierced, W::splat(1.0), zero);
+            self.discs.push(disc);
+        }
+        nearest
+    }
+
+    /// Replaces normals by those of planes through the discs' centres, where these span one.
+    fn fit_planes<W: Wide>(&self, normals: Vec3Lanes<W>, n_rays: usize) -> Vec3Lanes<W> {
+        let [mut x, mut y, mut z] = normals.store_wide();
+        for lane in 0..n_rays {
+            let mut centers = [Vec3::ZERO; MAX_GATHERED];
+            let mut n = 0;
+            for (disc, sighting) in self.discs.iter().zip(&self.sightings) {
+                if !sighting.distances[lane].is_nan() {
+                    centers[n] = disc.center;
+                    n += 1;
+                }
+            }
+            let facing = Vec3::new(x[lane], y[lane], z[lane]);
+            if let Some(normal) = (0 < n).then(|| plane_normal(&centers[..n])).flatten() {
+                let normal = if normal.dot(facing) < 0.0 { -normal } else { normal };
+                [x[lane], y[lane], z[lane]] = normal.to_array();
+            }
+        }
+        Vec3Lanes::load_wide(&[x, y, z])
+    }
+}
+
+#[inline(always)]
+fn pierced<W: Wide>(sighting: &Sighting) -> (W, W::Mask) {
+    let distances = W::load(&sighting.distances);
+    (distances, distances.less_equal(W::splat(f32::MAX)))
+}
