@@ -9,10 +9,12 @@ use super::traverse::RayVisitor;
 use crate::bvh::{Child, STACK_SIZE};
 use crate::flat::FlatPoints;
 use crate::math::{LANES, LaneMask, Lanes};
-use std::ops::ControlFlow;
 
 /// Rays on the way at a time: enough to hide a read from memory, few enough for the first cache.
 const IN_FLIGHT: usize = 32;
+
+/// With fewer at nodes, those elsewhere go on first: each change of kind is a branch foretold wrongly.
+const FEW: u32 = 16;
 
 /// A ray on its way.
 #[derive(Clone, Copy)]
@@ -27,33 +29,43 @@ struct Flyer {
     waiting: Waiting,
 }
 
-/// Children to look at later: packed, and where their boxes are entered. Whole lanes are stored on top,
-/// of which the last ones may hold nothing.
+/// Children to look at later: packed, and where their boxes are entered. The root lies at the bottom:
+/// who comes back to it is done. Whole lanes are stored on top, of which the last ones may hold nothing.
 #[derive(Clone, Copy)]
 struct Waiting {
     children: [f32; STACK_SIZE],
     entries: [f32; STACK_SIZE],
 }
 
-/// The flyers whose next step is a node, and those whose is a block.
+/// Flyers by their next step, a bit each.
 #[derive(Clone, Copy)]
-struct Queues {
-    at_nodes: [u8; IN_FLIGHT],
-    at_blocks: [u8; IN_FLIGHT],
-    n_nodes: usize,
-    n_blocks: usize,
+struct Steps {
+    at_blocks: u32,
+    done: u32,
 }
 
-impl Queues {
-    /// Writes to both and counts in one: which one it is cannot be foretold.
-    #[inline(always)]
-    fn push(&mut self, flyer_idx: usize, child: u32) {
-        let is_block = (child >> 31) as usize;
-        self.at_nodes[self.n_nodes % IN_FLIGHT] = flyer_idx as u8;
-        self.at_blocks[self.n_blocks % IN_FLIGHT] = flyer_idx as u8;
-        self.n_nodes += 1 - is_block;
-        self.n_blocks += is_block;
+impl Steps {
+    fn at_nodes(self) -> u32 {
+        !(self.at_blocks | self.done)
     }
+
+    /// Without a branch: what comes next cannot be foretold.
+    #[inline(always)]
+    fn add(&mut self, flyer_idx: usize, next: u32) {
+        self.at_blocks |= (next >> 31) << flyer_idx;
+        self.done |= u32::from(next == ROOT) << flyer_idx;
+    }
+}
+
+/// Takes the lowest bit out.
+#[inline(always)]
+fn pop(flyers: &mut u32) -> Option<usize> {
+    if *flyers == 0 {
+        return None;
+    }
+    let flyer_idx = flyers.trailing_zeros() as usize;
+    *flyers &= *flyers - 1;
+    Some(flyer_idx)
 }
 
 /// Lets each of `visitors` see every block whose box its ray enters before its limit, near boxes first if
@@ -61,7 +73,8 @@ impl Queues {
 #[inline(always)]
 pub fn fly<L: Lanes, V: RayVisitor>(points: &FlatPoints, visitors: &mut [V]) {
     let Some(first) = visitors.first() else { return };
-    let waiting = Waiting { children: [0.0; STACK_SIZE], entries: [0.0; STACK_SIZE] };
+    let root = f32::from_bits(ROOT);
+    let waiting = Waiting { children: [root; STACK_SIZE], entries: [0.0; STACK_SIZE] };
     let mut flyers = [Flyer {
         ray: BoxRay::new(&points.nodes[0], first.ray()),
         visitor_idx: 0,
@@ -72,38 +85,42 @@ pub fn fly<L: Lanes, V: RayVisitor>(points: &FlatPoints, visitors: &mut [V]) {
     }; IN_FLIGHT];
     let memory = Memory::new(points);
     let mut n_started = 0;
-    let nobody = [0; IN_FLIGHT];
-    let mut queues = Queues { at_nodes: nobody, at_blocks: nobody, n_nodes: 0, n_blocks: 0 };
-    for (flyer_idx, flyer) in flyers.iter_mut().enumerate() {
-        if flyer.start(points, visitors, &mut n_started) {
-            queues.push(flyer_idx, flyer.next);
+    let mut steps = Steps { at_blocks: 0, done: u32::MAX };
+    loop {
+        let mut done = steps.done;
+        while n_started < visitors.len()
+            && let Some(flyer_idx) = pop(&mut done)
+        {
+            flyers[flyer_idx].start(points, n_started, &visitors[n_started]);
+            n_started += 1;
         }
-    }
-    while 0 < queues.n_nodes + queues.n_blocks {
-        let (at_nodes, n_nodes) = (queues.at_nodes, queues.n_nodes);
-        queues.n_nodes = 0;
-        for place in 0..n_nodes {
-            let flyer_idx = usize::from(at_nodes[place % IN_FLIGHT]) % IN_FLIGHT;
-            let flyer = &mut flyers[flyer_idx];
-            flyer.enter::<L, V>(points);
-            if flyer.go_on::<L, V>(&memory) || flyer.start(points, visitors, &mut n_started) {
-                queues.push(flyer_idx, flyer.next);
+        steps.done = done;
+        if done == u32::MAX {
+            return;
+        }
+        loop {
+            let mut at_nodes = steps.at_nodes();
+            while let Some(flyer_idx) = pop(&mut at_nodes) {
+                let flyer = &mut flyers[flyer_idx];
+                flyer.enter::<L, V>(points);
+                flyer.go_on::<L, V>(&memory);
+                steps.add(flyer_idx, flyer.next);
+            }
+            if steps.at_nodes().count_ones() < FEW {
+                break;
             }
         }
-        let (at_blocks, n_blocks) = (queues.at_blocks, queues.n_blocks);
-        queues.n_blocks = 0;
-        for place in 0..n_blocks {
-            let flyer_idx = usize::from(at_blocks[place % IN_FLIGHT]) % IN_FLIGHT;
+        let mut at_blocks = std::mem::take(&mut steps.at_blocks);
+        while let Some(flyer_idx) = pop(&mut at_blocks) {
             let flyer = &mut flyers[flyer_idx];
             let visitor = &mut visitors[flyer.visitor_idx as usize];
             let block_idx = flyer.next & !Child::BLOCK_BIT;
-            if visitor.visit::<L>(points, block_idx) == ControlFlow::Break(()) {
-                flyer.n_waiting = 0;
-            }
+            let goes_on = visitor.visit::<L>(points, block_idx).is_continue();
+            // As whether something is hit cannot be foretold either.
+            flyer.n_waiting = 1 + (flyer.n_waiting - 1) * usize::from(goes_on);
             flyer.limit = visitor.limit();
-            if flyer.go_on::<L, V>(&memory) || flyer.start(points, visitors, &mut n_started) {
-                queues.push(flyer_idx, flyer.next);
-            }
+            flyer.go_on::<L, V>(&memory);
+            steps.add(flyer_idx, flyer.next);
         }
     }
 }
@@ -111,21 +128,13 @@ pub fn fly<L: Lanes, V: RayVisitor>(points: &FlatPoints, visitors: &mut [V]) {
 const ROOT: u32 = 0;
 
 impl Flyer {
-    /// Begins with the next ray that waits; false if none does.
     #[inline(always)]
-    fn start(
-        &mut self,
-        points: &FlatPoints,
-        visitors: &[impl RayVisitor],
-        n_started: &mut usize,
-    ) -> bool {
-        let Some(visitor) = visitors.get(*n_started) else { return false };
+    fn start(&mut self, points: &FlatPoints, visitor_idx: usize, visitor: &impl RayVisitor) {
         self.ray = BoxRay::new(&points.nodes[0], visitor.ray());
         self.limit = visitor.limit();
-        self.visitor_idx = *n_started as u32;
+        self.visitor_idx = visitor_idx as u32;
         self.next = ROOT;
-        *n_started += 1;
-        true
+        self.n_waiting = 1;
     }
 
     /// Lets those children of the next node wait that the ray enters.
@@ -146,20 +155,16 @@ impl Flyer {
         self.n_waiting += lanes.bits().count_ones() as usize;
     }
 
-    /// Takes the next child, and asks for its memory; false if none waits.
+    /// Takes the next child, and asks for its memory.
     #[inline(always)]
-    fn go_on<L: Lanes, V: RayVisitor>(&mut self, memory: &Memory) -> bool {
-        loop {
-            if self.n_waiting == 0 {
-                return false;
-            }
-            self.n_waiting -= 1;
-            if !V::IS_ORDERED || self.waiting.entries[self.n_waiting] <= self.limit {
-                break;
+    fn go_on<L: Lanes, V: RayVisitor>(&mut self, memory: &Memory) {
+        self.n_waiting -= 1;
+        if V::IS_ORDERED {
+            while 0 < self.n_waiting && self.limit < self.waiting.entries[self.n_waiting] {
+                self.n_waiting -= 1;
             }
         }
         self.next = self.waiting.children[self.n_waiting].to_bits();
         memory.prefetch::<L>(self.next);
-        true
     }
 }

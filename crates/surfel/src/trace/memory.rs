@@ -10,17 +10,19 @@ pub struct Memory([(*const u8, usize); 2]);
 
 impl Memory {
     pub fn new(points: &FlatPoints) -> Self {
-        Self([
-            (points.nodes.as_ptr().cast(), size_of::<Node>()),
-            (points.blocks.as_ptr().cast(), size_of::<PointBlock>()),
-        ])
+        const BLOCK_BIT: usize = Child::BLOCK_BIT as usize;
+        let (nodes, blocks) = (points.nodes.as_ptr().cast(), points.blocks.as_ptr().cast::<u8>());
+        let block_size = size_of::<PointBlock>();
+        // As if there were a block for each word without the bit.
+        let before = blocks.wrapping_sub(BLOCK_BIT.wrapping_mul(block_size));
+        Self([(nodes, size_of::<Node>()), (before, block_size)])
     }
 
     /// Asks for the two cache lines of a packed child.
     #[inline(always)]
     pub fn prefetch<L: Lanes>(&self, child: u32) {
         let (start, size) = self.0[(child >> 31) as usize];
-        let place = start.wrapping_add((child & !Child::BLOCK_BIT) as usize * size);
+        let place = start.wrapping_add((child as usize).wrapping_mul(size));
         L::prefetch(place.cast::<[u8; 128]>());
     }
 }
