@@ -18,6 +18,7 @@ const FEW: u32 = 16;
 
 /// A ray on its way.
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 struct Flyer {
     ray: BoxRay,
     visitor_idx: u32,
@@ -150,7 +151,7 @@ impl Flyer {
             place.copy_from_slice(&children.store());
             self.waiting.entries[top..top + LANES].copy_from_slice(&entries.store());
         } else {
-            place.copy_from_slice(&children.compress(lanes.bits()).store());
+            place.copy_from_slice(&children.compress(lanes).store());
         }
         self.n_waiting += lanes.bits().count_ones() as usize;
     }
