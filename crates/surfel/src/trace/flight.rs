@@ -16,6 +16,9 @@ const IN_FLIGHT: usize = 32;
 /// With fewer at nodes, those elsewhere go on first: each change of kind is a branch foretold wrongly.
 const FEW: u32 = 16;
 
+/// Of a stack that is read and written by whole lanes.
+const ROOM: usize = STACK_SIZE + LANES;
+
 /// A ray on its way.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
@@ -34,8 +37,8 @@ struct Flyer {
 /// who comes back to it is done. Whole lanes are stored on top, of which the last ones may hold nothing.
 #[derive(Clone, Copy)]
 struct Waiting {
-    children: [f32; STACK_SIZE],
-    entries: [f32; STACK_SIZE],
+    children: [f32; ROOM],
+    entries: [f32; ROOM],
 }
 
 /// Flyers by their next step, a bit each.
@@ -75,7 +78,7 @@ fn pop(flyers: &mut u32) -> Option<usize> {
 pub fn fly<L: Lanes, V: RayVisitor>(points: &FlatPoints, visitors: &mut [V]) {
     let Some(first) = visitors.first() else { return };
     let root = f32::from_bits(ROOT);
-    let waiting = Waiting { children: [root; STACK_SIZE], entries: [0.0; STACK_SIZE] };
+    let waiting = Waiting { children: [root; ROOM], entries: [0.0; ROOM] };
     let mut flyers = [Flyer {
         ray: BoxRay::new(&points.nodes[0], first.ray()),
         visitor_idx: 0,
@@ -104,7 +107,7 @@ pub fn fly<L: Lanes, V: RayVisitor>(points: &FlatPoints, visitors: &mut [V]) {
             while let Some(flyer_idx) = pop(&mut at_nodes) {
                 let flyer = &mut flyers[flyer_idx];
                 flyer.enter::<L, V>(points);
-                flyer.go_on::<L, V>(&memory);
+                flyer.go_on::<L>(&memory);
                 steps.add(flyer_idx, flyer.next);
             }
             if steps.at_nodes().count_ones() < FEW {
@@ -120,7 +123,10 @@ pub fn fly<L: Lanes, V: RayVisitor>(points: &FlatPoints, visitors: &mut [V]) {
             // As whether something is hit cannot be foretold either.
             flyer.n_waiting = 1 + (flyer.n_waiting - 1) * usize::from(goes_on);
             flyer.limit = visitor.limit();
-            flyer.go_on::<L, V>(&memory);
+            if V::IS_ORDERED {
+                flyer.forget_far::<L>();
+            }
+            flyer.go_on::<L>(&memory);
             steps.add(flyer_idx, flyer.next);
         }
     }
@@ -156,16 +162,39 @@ impl Flyer {
         self.n_waiting += lanes.bits().count_ones() as usize;
     }
 
+    /// Drops what waits beyond the limit: all at once, as a loop that ends at the first child to keep
+    /// could not be foretold.
+    #[inline(always)]
+    fn forget_far<L: Lanes>(&mut self) {
+        let Waiting { children, entries } = &mut self.waiting;
+        let (mut first, mut n_kept) = (1, 1);
+        while first < self.n_waiting {
+            let (child, entry) =
+                (lanes_from::<L>(children, first), lanes_from::<L>(entries, first));
+            let there = L::below::<0>((self.n_waiting - first).min(LANES) as u32);
+            let near = there & entry.less_equal(L::splat(self.limit));
+            children[n_kept..n_kept + LANES].copy_from_slice(&child.compress(near).store());
+            entries[n_kept..n_kept + LANES].copy_from_slice(&entry.compress(near).store());
+            n_kept += near.bits().count_ones() as usize;
+            first += LANES;
+        }
+        self.n_waiting = n_kept;
+    }
+
     /// Takes the next child, and asks for its memory.
     #[inline(always)]
-    fn go_on<L: Lanes, V: RayVisitor>(&mut self, memory: &Memory) {
+    fn go_on<L: Lanes>(&mut self, memory: &Memory) {
         self.n_waiting -= 1;
-        if V::IS_ORDERED {
-            while 0 < self.n_waiting && self.limit < self.waiting.entries[self.n_waiting] {
-                self.n_waiting -= 1;
-            }
-        }
         self.next = self.waiting.children[self.n_waiting].to_bits();
         memory.prefetch::<L>(self.next);
+    }
+}
+
+/// Eight of `values` from `first` on, zeros if there are fewer.
+#[inline(always)]
+fn lanes_from<L: Lanes>(values: &[f32], first: usize) -> L {
+    match values[first..].first_chunk() {
+        Some(values) => L::load(values),
+        None => L::splat(0.0),
     }
 }
