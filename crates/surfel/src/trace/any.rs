@@ -22,7 +22,8 @@ pub(super) fn any_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &mut
 #[inline(always)]
 fn any_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], occluded: &mut [bool]) {
     let mut stack = PacketStack::new();
-    let (mut loose, mut indices) = (Vec::new(), Vec::new());
+    let mut loose = Vec::with_capacity(rays.len());
+    let mut indices = Vec::with_capacity(rays.len());
     for (first, rays) in rays.chunks(WIDE).enumerate() {
         if let Some(packet) = Packet::new(&points.nodes[0], rays, true) {
             let occluded = &mut occluded[first * WIDE..][..rays.len()];

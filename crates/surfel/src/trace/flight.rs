@@ -9,6 +9,7 @@ use super::traverse::RayVisitor;
 use crate::bvh::{Child, STACK_SIZE};
 use crate::flat::FlatPoints;
 use crate::math::{LANES, LaneMask, Lanes};
+use std::hint::select_unpredictable;
 
 /// Rays on the way at a time: enough to hide a read from memory, few enough for the first cache.
 const IN_FLIGHT: usize = 32;
@@ -29,7 +30,7 @@ struct Flyer {
     limit: f32,
     /// Packed child.
     next: u32,
-    n_waiting: usize,
+    n_waiting: u32,
     waiting: Waiting,
 }
 
@@ -121,7 +122,7 @@ pub fn fly<L: Lanes, V: RayVisitor>(points: &FlatPoints, visitors: &mut [V]) {
             let block_idx = flyer.next & !Child::BLOCK_BIT;
             let goes_on = visitor.visit::<L>(points, block_idx).is_continue();
             // As whether something is hit cannot be foretold either.
-            flyer.n_waiting = 1 + (flyer.n_waiting - 1) * usize::from(goes_on);
+            flyer.n_waiting = select_unpredictable(goes_on, flyer.n_waiting, 1);
             flyer.limit = visitor.limit();
             if V::IS_ORDERED {
                 flyer.forget_far::<L>();
@@ -150,7 +151,7 @@ impl Flyer {
         let node = &points.nodes[self.next as usize];
         let (lanes, entries) = ray_entries::<L>(node, &self.ray, self.limit);
         let children = node.packed_children::<L>();
-        let top = self.n_waiting.min(STACK_SIZE - LANES);
+        let top = (self.n_waiting as usize).min(STACK_SIZE - LANES);
         let place = &mut self.waiting.children[top..top + LANES];
         if V::IS_ORDERED {
             let (entries, children) = entries.sort_from_far(lanes, children);
@@ -159,7 +160,7 @@ impl Flyer {
         } else {
             place.copy_from_slice(&children.compress(lanes).store());
         }
-        self.n_waiting += lanes.bits().count_ones() as usize;
+        self.n_waiting += lanes.bits().count_ones();
     }
 
     /// Drops what waits beyond the limit: all at once, as a loop that ends at the first child to keep
@@ -168,24 +169,25 @@ impl Flyer {
     fn forget_far<L: Lanes>(&mut self) {
         let Waiting { children, entries } = &mut self.waiting;
         let (mut first, mut n_kept) = (1, 1);
-        while first < self.n_waiting {
+        let n_waiting = self.n_waiting as usize;
+        while first < n_waiting {
             let (child, entry) =
                 (lanes_from::<L>(children, first), lanes_from::<L>(entries, first));
-            let there = L::below::<0>((self.n_waiting - first).min(LANES) as u32);
+            let there = L::below::<0>((n_waiting - first).min(LANES) as u32);
             let near = there & entry.less_equal(L::splat(self.limit));
             children[n_kept..n_kept + LANES].copy_from_slice(&child.compress(near).store());
             entries[n_kept..n_kept + LANES].copy_from_slice(&entry.compress(near).store());
             n_kept += near.bits().count_ones() as usize;
             first += LANES;
         }
-        self.n_waiting = n_kept;
+        self.n_waiting = n_kept as u32;
     }
 
     /// Takes the next child, and asks for its memory.
     #[inline(always)]
     fn go_on<L: Lanes>(&mut self, memory: &Memory) {
         self.n_waiting -= 1;
-        self.next = self.waiting.children[self.n_waiting].to_bits();
+        self.next = self.waiting.children[self.n_waiting as usize].to_bits();
         memory.prefetch::<L>(self.next);
     }
 }
