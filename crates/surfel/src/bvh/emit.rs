@@ -50,13 +50,10 @@ impl<'b> Place<'b> {
 
 fn emit_branch(branch: &Branch, primitives: &[Primitive], node: &mut Node, mut place: Place) {
     let is_node = |child: &Subtree| matches!(child, Subtree::Branch(_));
-    *node = Node::new(
-        branch.children.iter().map(is_node),
-        place.first_node as u32,
-        place.first_block as u32,
-    );
     let n_nodes = branch.children.iter().filter(|child| is_node(child)).count();
-    let own = place.take(n_nodes, branch.children.len() - n_nodes);
+    let n_blocks = branch.children.len() - n_nodes;
+    *node = Node::new(n_nodes, n_blocks, place.first_node as u32, place.first_block as u32);
+    let own = place.take(n_nodes, n_blocks);
     let (mut nodes, mut blocks) = (own.nodes.iter_mut(), own.blocks.iter_mut());
     let mut branches = Vec::with_capacity(n_nodes);
     for child in &branch.children {

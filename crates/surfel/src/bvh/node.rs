@@ -1,4 +1,4 @@
-//! One node: the boxes of eight children in 80 bytes.
+//! One node: the boxes of eight children in 72 bytes.
 
 use crate::math::{Aabb, LANES, Lanes, Vec3, Vec3A};
 
@@ -10,15 +10,13 @@ use crate::math::{Aabb, LANES, Lanes, Vec3, Vec3A};
 pub struct Node {
     /// Lower corner of all children.
     pub origin: [f32; 3],
-    /// Biased exponents of the step an axis: step = 2^(exponent - 127).
-    exponents: [u8; 3],
-    n_children: u8,
-    /// Index of the first child that is a node; the others follow it.
+    /// Biased exponents of the step an axis, a byte each from the lowest: step = 2^(exponent - 127).
+    /// Above them the number of children, and at `N_NODES` how many of these are nodes.
+    exponents_and_counts: u32,
+    /// Index of the first child that is a node; the others follow it in the next lanes.
     pub first_node: u32,
-    /// Index of the first child that is a block; the others follow it.
-    pub first_block: u32,
-    /// For the first `n_children`: kind (`IS_NODE` or `IS_BLOCK`) and number among the children of that kind.
-    pub children: [u8; LANES],
+    /// What lane 0 would be as a packed block: blocks stand behind the nodes, in lanes as in memory.
+    lane_zero_as_block: u32,
     /// Lower bounds in steps, an axis a row.
     pub lower: [[u8; LANES]; 3],
     /// Upper bounds in steps, an axis a row.
@@ -54,23 +52,21 @@ impl Child {
     }
 }
 
-const IS_NODE: u8 = 0x40;
-const IS_BLOCK: u8 = 0x80;
-const RANK: u8 = 0x07;
+/// Lowest of the four bits that hold the number of children.
+const N_CHILDREN: i32 = 24;
+/// Of those that hold how many are nodes.
+const N_NODES: i32 = 28;
 
 impl Node {
-    /// A node over up to eight children, each a node or else a block; `set_boxes` adds their boxes.
-    pub fn new(are_nodes: impl Iterator<Item = bool>, first_node: u32, first_block: u32) -> Self {
-        let mut node = Self { first_node, first_block, ..Self::default() };
-        let (mut n_nodes, mut n_blocks) = (0, 0);
-        for (child, is_node) in node.children.iter_mut().zip(are_nodes) {
-            let (kind, rank) =
-                if is_node { (IS_NODE, &mut n_nodes) } else { (IS_BLOCK, &mut n_blocks) };
-            *child = kind | *rank;
-            *rank += 1;
+    /// A node over up to eight children, first nodes and then blocks; `set_boxes` adds their boxes.
+    pub fn new(n_nodes: usize, n_blocks: usize, first_node: u32, first_block: u32) -> Self {
+        let (n_nodes, n_children) = (n_nodes as u32, (n_nodes + n_blocks) as u32);
+        Self {
+            exponents_and_counts: n_children << N_CHILDREN | n_nodes << N_NODES,
+            first_node,
+            lane_zero_as_block: (first_block | Child::BLOCK_BIT) - n_nodes,
+            ..Self::default()
         }
-        node.n_children = n_nodes + n_blocks;
-        node
     }
 
     /// Encodes the box of the child in each lane; those of lanes without a child must be empty.
@@ -78,44 +74,51 @@ impl Node {
         let bounds = boxes.iter().copied().reduce(Aabb::union).unwrap_or(Aabb::EMPTY);
         self.origin = bounds.min.to_array();
         for axis in 0..3 {
-            self.exponents[axis] = step_exponent(bounds.min[axis], bounds.max[axis]);
+            let exponent = step_exponent(bounds.min[axis], bounds.max[axis]);
+            self.exponents_and_counts &= !(0xff << (8 * axis));
+            self.exponents_and_counts |= u32::from(exponent) << (8 * axis);
             self.set_bounds_along(axis, boxes);
         }
     }
 
+    #[inline(always)]
     pub(super) fn n_child_nodes(&self) -> usize {
-        self.children.iter().filter(|child| **child & IS_NODE != 0).count()
+        (self.exponents_and_counts >> N_NODES) as usize
+    }
+
+    #[inline(always)]
+    fn n_children(&self) -> usize {
+        (self.exponents_and_counts >> N_CHILDREN & 0xf) as usize
     }
 
     /// What stands in `lane`, if anything.
     #[inline(always)]
     pub fn child(&self, lane: usize) -> Option<Child> {
-        let child = self.children[lane];
-        let rank = u32::from(child & RANK);
-        match child & !RANK {
-            0 => None,
-            IS_NODE => Some(Child::Node(self.first_node + rank)),
-            _ => Some(Child::Block(self.first_block + rank)),
+        if self.n_children() <= lane {
+            return None;
         }
+        let is_node = lane < self.n_child_nodes();
+        let first = if is_node { self.first_node } else { self.lane_zero_as_block };
+        Some(Child::unpack(first + lane as u32))
     }
 
     /// The children of all lanes as `Child::pack` has them, which lanes hold as bits.
     #[inline(always)]
     pub fn packed_children<L: Lanes>(&self) -> L {
-        L::from_tagged(&self.children, self.first_node, self.first_block | Child::BLOCK_BIT)
+        let are_nodes = L::below::<N_NODES>(self.exponents_and_counts);
+        L::numbered(are_nodes, self.first_node, self.lane_zero_as_block)
     }
 
     /// The lanes that hold a child: the first ones.
     #[inline(always)]
     pub fn filled<L: Lanes>(&self) -> L::Mask {
-        L::below(self.n_children)
+        L::below::<N_CHILDREN>(self.exponents_and_counts)
     }
 
     /// Lower and upper bounds of all children along an axis.
     #[inline(always)]
     pub fn sides<L: Lanes, const AXIS: usize>(&self) -> (L, L) {
-        let [x, y, z] = self.exponents;
-        let step = L::power_of_two::<AXIS>(u32::from_le_bytes([x, y, z, self.n_children]));
+        let step = L::power_of_two::<AXIS>(self.exponents_and_counts);
         let corner = L::splat(self.origin[AXIS]);
         (
             L::from_u8(&self.lower[AXIS]).times_plus(step, corner),
@@ -126,14 +129,19 @@ impl Node {
     /// Bit i is set if lane i holds a child.
     #[inline(always)]
     pub fn occupied(&self) -> u32 {
-        (1 << self.n_children) - 1
+        (1 << self.n_children()) - 1
     }
 
     /// Length of a step along each axis.
     #[inline(always)]
     pub fn step(&self) -> Vec3A {
-        let [x, y, z] = self.exponents.map(|exponent| f32::from_bits(u32::from(exponent) << 23));
-        Vec3A::new(x, y, z)
+        const EXPONENT: u32 = 0xff << 23;
+        let exponents = self.exponents_and_counts;
+        Vec3A::new(
+            f32::from_bits(exponents << 23 & EXPONENT),
+            f32::from_bits(exponents << 15 & EXPONENT),
+            f32::from_bits(exponents << 7 & EXPONENT),
+        )
     }
 
     /// Upper bound of the size of the box around all children.
@@ -156,7 +164,7 @@ impl Node {
         let decode = |steps: u8| origin + f32::from(steps) * step;
         // Exact: the step is a power of two.
         let per_step = 1.0 / step;
-        for lane in (0..LANES).filter(|lane| self.children[*lane] != 0) {
+        for lane in 0..self.n_children() {
             let (min, max) = (boxes[lane].min[axis], boxes[lane].max[axis]);
             // The difference may round past a step; a wrong side would lose hits, so it is checked.
             let mut low = ((min - origin) * per_step) as u8;
@@ -189,7 +197,7 @@ fn step_exponent(min: f32, max: f32) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Random;
+    use crate::math::{LaneMask, PortableLanes, Random};
 
     #[test]
     fn decoded_boxes_contain_what_was_encoded() {
@@ -204,7 +212,7 @@ mod tests {
             let n = 1 + case as usize % LANES;
             let mut boxes = [Aabb::EMPTY; LANES];
             boxes[..n].fill_with(|| Aabb::of_points([vector(), vector()]));
-            let mut node = Node::new((0..n).map(|i| i % 3 == 0), 100, 200);
+            let mut node = Node::new(n / 3, n - n / 3, 100, 200);
             node.set_boxes(&boxes);
             assert_eq!(node.occupied(), (1u32 << n) - 1);
             for (lane, bounds) in boxes[..n].iter().enumerate() {
@@ -216,17 +224,31 @@ mod tests {
     }
 
     #[test]
-    fn children_are_numbered_by_kind() {
-        let node = Node::new([false, true, false].into_iter(), 10, 20);
+    fn nodes_stand_before_blocks() {
+        let node = Node::new(1, 2, 10, 20);
         let children: Vec<_> = (0..4).map(|lane| node.child(lane)).collect();
         let expected =
-            [Some(Child::Block(20)), Some(Child::Node(10)), Some(Child::Block(21)), None];
+            [Some(Child::Node(10)), Some(Child::Block(20)), Some(Child::Block(21)), None];
         assert_eq!(children, expected);
         assert_eq!(node.occupied(), 0b0111);
+        let only_nodes = Node::new(LANES, 0, 1, 0);
+        assert_eq!(only_nodes.child(LANES - 1), Some(Child::Node(LANES as u32)));
     }
 
     #[test]
-    fn a_node_is_eighty_bytes() {
-        assert_eq!(size_of::<Node>(), 80);
+    fn lanes_hold_the_packed_children() {
+        for (n_nodes, n_blocks) in [(0, 8), (1, 2), (3, 5), (7, 1), (8, 0)] {
+            let node = Node::new(n_nodes, n_blocks, 10, 3);
+            let packed = node.packed_children::<PortableLanes>().store();
+            for lane in 0..n_nodes + n_blocks {
+                assert_eq!(Some(Child::unpack(packed[lane].to_bits())), node.child(lane));
+            }
+            assert_eq!(node.filled::<PortableLanes>().bits(), node.occupied());
+        }
+    }
+
+    #[test]
+    fn a_node_is_seventy_two_bytes() {
+        assert_eq!(size_of::<Node>(), 72);
     }
 }

@@ -59,11 +59,11 @@ pub trait Lanes: Floats {
     fn from_signed_bits<const SHIFT: i32>(words: &[u32; LANES]) -> Self;
     /// The 2 highest bits of each word.
     fn from_top_bits(words: &[u32; LANES]) -> Self;
-    /// Bits: the 3 lowest of each byte, plus `tagged` where its highest bit is set and `plain` elsewhere.
-    fn from_tagged(bytes: &[u8; LANES], plain: u32, tagged: u32) -> Self;
+    /// Bits: each lane's number from `first` where chosen, from `other` elsewhere.
+    fn numbered(lanes: Self::Mask, first: u32, other: u32) -> Self;
     fn store(self) -> [f32; LANES];
     /// Moves the chosen lanes to the front, in their order.
-    fn compress(self, lanes: u32) -> Self;
+    fn compress(self, lanes: Self::Mask) -> Self;
     /// Sorts the chosen lanes, none of them negative, by falling value to the front, and `others` with
     /// them. Values may come out smaller by some 2^-20 of themselves.
     fn sort_from_far(self, lanes: Self::Mask, others: Self) -> (Self, Self);
@@ -71,8 +71,8 @@ pub trait Lanes: Floats {
     fn times_plus(self, factor: Self, summand: Self) -> Self;
     /// `self * factor - subtrahend`, in the same way.
     fn times_minus(self, factor: Self, subtrahend: Self) -> Self;
-    /// True in this many lanes from the first.
-    fn below(n: u8) -> Self::Mask;
+    /// True in so many lanes from the first as the four bits of `word` from `SHIFT` on say.
+    fn below<const SHIFT: i32>(word: u32) -> Self::Mask;
     /// All lanes 2^(e - 127), where e is this byte of `exponents` from the lowest.
     fn power_of_two<const BYTE: usize>(exponents: u32) -> Self;
     /// The greatest of the lanes, none of which may be NaN.
@@ -227,14 +227,14 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    fn from_tagged(bytes: &[u8; LANES], plain: u32, tagged: u32) -> Self {
-        let word = |byte: u8| u32::from(byte & 7) + if byte < 0x80 { plain } else { tagged };
-        Self(bytes.map(|byte| f32::from_bits(word(byte))))
+    fn numbered(lanes: PortableMask, first: u32, other: u32) -> Self {
+        let word = |i: usize| if lanes.0[i] { first } else { other }.wrapping_add(i as u32);
+        Self(std::array::from_fn(|i| f32::from_bits(word(i))))
     }
 
     #[inline(always)]
-    fn compress(self, mut lanes: u32) -> Self {
-        let mut values = [0.0; LANES];
+    fn compress(self, lanes: PortableMask) -> Self {
+        let (mut lanes, mut values) = (lanes.bits(), [0.0; LANES]);
         for value in &mut values[..lanes.count_ones() as usize] {
             *value = self.0[lanes.trailing_zeros() as usize];
             lanes &= lanes - 1;
@@ -259,8 +259,9 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    fn below(n: u8) -> PortableMask {
-        PortableMask(std::array::from_fn(|lane| lane < usize::from(n)))
+    fn below<const SHIFT: i32>(word: u32) -> PortableMask {
+        let n = (word >> SHIFT & 0xf) as usize;
+        PortableMask(std::array::from_fn(|lane| lane < n))
     }
 
     #[inline(always)]

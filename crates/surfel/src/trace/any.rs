@@ -63,7 +63,8 @@ pub(super) fn any_that_counts<L: Lanes, S: Shape, J: Judge>(
     occluded: &mut [bool],
 ) {
     let mut stack = PacketStack::new();
-    let (mut loose, mut indices) = (Vec::new(), Vec::new());
+    let mut loose = Vec::with_capacity(rays.len());
+    let mut indices = Vec::with_capacity(rays.len());
     for (first, rays) in rays.chunks(WIDE).enumerate() {
         if let Some(packet) = Packet::new(&points.nodes[0], rays, true) {
             let occluded = &mut occluded[first * WIDE..][..rays.len()];
@@ -114,12 +115,7 @@ impl<S: Shape, J: Judge> RayVisitor for Any<'_, S, J> {
 }
 
 #[inline(always)]
-fn has_counting<L: Lanes, J: Judge>(
-    hits: &BlockHits<L>,
-    ray: &Ray,
-    limit: f32,
-    judge: J,
-) -> bool {
+fn has_counting<L: Lanes, J: Judge>(hits: &BlockHits<L>, ray: &Ray, limit: f32, judge: J) -> bool {
     let mut hits = hits.up_to(limit);
     while let Some((hit, _)) = hits.next() {
         if judge.counts::<L>(ray, &hit) {

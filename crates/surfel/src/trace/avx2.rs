@@ -29,10 +29,32 @@ kernel!(splat::splats(Splat));
 kernel!(surface::surface_hits(SurfaceHit));
 kernel!(surface::occlusions(bool));
 
-/// What sixteen lanes are beside `Eight` of this level.
-pub(super) trait Level: Copy {
-    type Wide: Wide;
+macro_rules! avx2 {
+    ($wrap:ident($($call:tt)*)) => {
+        // SAFETY: see `Eight`; loads and stores go through references to arrays of the full width.
+        $wrap(unsafe { $($call)* }, PhantomData)
+    };
+}
 
+macro_rules! mask {
+    (($($call:tt)*)) => {
+        // SAFETY: see `Eight`.
+        EightMask(unsafe { $($call)* })
+    };
+}
+
+/// What differs between levels that have registers of eight floats.
+pub(super) trait Level: Copy {
+    /// Sixteen lanes.
+    type Wide: Wide;
+    type Mask: LaneMask;
+
+    fn less(left: __m256, right: __m256) -> Self::Mask;
+    fn less_equal(left: __m256, right: __m256) -> Self::Mask;
+    fn less_bits(left: __m256, right: __m256) -> Self::Mask;
+    fn below<const SHIFT: i32>(word: u32) -> Self::Mask;
+    fn select(mask: Self::Mask, if_true: __m256, if_false: __m256) -> __m256;
+    fn compress(values: __m256, mask: Self::Mask) -> __m256;
     fn call<T: Task>(task: T) -> T::Output;
 }
 
@@ -41,6 +63,57 @@ struct Avx2;
 
 impl Level for Avx2 {
     type Wide = Pair<Eight<Self>>;
+    type Mask = EightMask;
+
+    #[inline(always)]
+    fn less(left: __m256, right: __m256) -> EightMask {
+        mask!((_mm256_cmp_ps::<_CMP_LT_OQ>(left, right)))
+    }
+
+    #[inline(always)]
+    fn less_equal(left: __m256, right: __m256) -> EightMask {
+        mask!((_mm256_cmp_ps::<_CMP_LE_OQ>(left, right)))
+    }
+
+    #[inline(always)]
+    fn less_bits(left: __m256, right: __m256) -> EightMask {
+        mask!(
+            (_mm256_castsi256_ps(_mm256_cmpgt_epi32(
+                _mm256_xor_si256(_mm256_castps_si256(right), _mm256_set1_epi32(i32::MIN)),
+                _mm256_xor_si256(_mm256_castps_si256(left), _mm256_set1_epi32(i32::MIN))
+            )))
+        )
+    }
+
+    #[inline(always)]
+    fn below<const SHIFT: i32>(word: u32) -> EightMask {
+        mask!(
+            ({
+                let top =
+                    _mm256_sll_epi32(_mm256_set1_epi32(word as i32), _mm_cvtsi32_si128(28 - SHIFT));
+                _mm256_castsi256_ps(_mm256_cmpgt_epi32(
+                    _mm256_srli_epi32::<28>(top),
+                    lane_indices(),
+                ))
+            })
+        )
+    }
+
+    #[inline(always)]
+    fn select(mask: EightMask, if_true: __m256, if_false: __m256) -> __m256 {
+        // SAFETY: see `Eight`.
+        unsafe { _mm256_blendv_ps(if_false, if_true, mask.0) }
+    }
+
+    #[inline(always)]
+    fn compress(values: __m256, mask: EightMask) -> __m256 {
+        let order = &COMPRESSED[mask.bits() as usize & 0xff];
+        // SAFETY: as for `avx2!`.
+        unsafe {
+            let order = _mm_loadl_epi64(order.as_ptr().cast());
+            _mm256_permutevar8x32_ps(values, _mm256_cvtepu8_epi32(order))
+        }
+    }
 
     #[inline(always)]
     fn call<T: Task>(task: T) -> T::Output {
@@ -63,22 +136,8 @@ pub(super) struct Eight<L>(__m256, PhantomData<L>);
 #[derive(Clone, Copy)]
 pub(super) struct EightMask(__m256);
 
-macro_rules! avx2 {
-    ($wrap:ident($($call:tt)*)) => {
-        // SAFETY: see `Eight`; loads and stores go through references to arrays of the full width.
-        $wrap(unsafe { $($call)* }, PhantomData)
-    };
-}
-
-macro_rules! mask {
-    (($($call:tt)*)) => {
-        // SAFETY: see `Eight`.
-        EightMask(unsafe { $($call)* })
-    };
-}
-
 impl<L: Level> Floats for Eight<L> {
-    type Mask = EightMask;
+    type Mask = L::Mask;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -101,13 +160,13 @@ impl<L: Level> Floats for Eight<L> {
     }
 
     #[inline(always)]
-    fn less(self, other: Self) -> EightMask {
-        mask!((_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)))
+    fn less(self, other: Self) -> L::Mask {
+        L::less(self.0, other.0)
     }
 
     #[inline(always)]
-    fn less_equal(self, other: Self) -> EightMask {
-        mask!((_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)))
+    fn less_equal(self, other: Self) -> L::Mask {
+        L::less_equal(self.0, other.0)
     }
 
     #[inline(always)]
@@ -124,8 +183,8 @@ impl<L: Level> Floats for Eight<L> {
     }
 
     #[inline(always)]
-    fn select(mask: EightMask, if_true: Self, if_false: Self) -> Self {
-        avx2!(Self(_mm256_blendv_ps(if_false.0, if_true.0, mask.0)))
+    fn select(mask: L::Mask, if_true: Self, if_false: Self) -> Self {
+        Self(L::select(mask, if_true.0, if_false.0), PhantomData)
     }
 }
 
@@ -186,48 +245,42 @@ impl<L: Level> Lanes for Eight<L> {
     }
 
     #[inline(always)]
-    fn less_bits(self, other: Self) -> EightMask {
-        mask!(
-            (_mm256_castsi256_ps(_mm256_cmpgt_epi32(
-                _mm256_xor_si256(_mm256_castps_si256(other.0), _mm256_set1_epi32(i32::MIN)),
-                _mm256_xor_si256(_mm256_castps_si256(self.0), _mm256_set1_epi32(i32::MIN))
-            )))
-        )
+    fn less_bits(self, other: Self) -> L::Mask {
+        L::less_bits(self.0, other.0)
     }
 
     #[inline(always)]
-    fn from_tagged(bytes: &[u8; LANES], plain: u32, tagged: u32) -> Self {
-        avx2!(Self({
-            let words = _mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes.as_ptr().cast()));
-            // A lane is tagged where bit 7, moved to the sign, is set.
-            let base = _mm256_blendv_ps(
-                _mm256_castsi256_ps(_mm256_set1_epi32(plain as i32)),
-                _mm256_castsi256_ps(_mm256_set1_epi32(tagged as i32)),
-                _mm256_castsi256_ps(_mm256_slli_epi32::<24>(words)),
-            );
-            let rank = _mm256_and_si256(words, _mm256_set1_epi32(7));
-            _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(base), rank))
-        }))
+    fn numbered(lanes: L::Mask, first: u32, other: u32) -> Self {
+        // SAFETY: as for `avx2!`.
+        let (first, other) = unsafe {
+            (
+                _mm256_castsi256_ps(_mm256_set1_epi32(first as i32)),
+                _mm256_castsi256_ps(_mm256_set1_epi32(other as i32)),
+            )
+        };
+        let base = L::select(lanes, first, other);
+        avx2!(Self(_mm256_castsi256_ps(_mm256_add_epi32(
+            _mm256_castps_si256(base),
+            lane_indices()
+        ))))
     }
 
     #[inline(always)]
-    fn compress(self, lanes: u32) -> Self {
-        avx2!(Self({
-            let order = _mm_loadl_epi64(COMPRESSED[lanes as usize & 0xff].as_ptr().cast());
-            _mm256_permutevar8x32_ps(self.0, _mm256_cvtepu8_epi32(order))
-        }))
+    fn compress(self, lanes: L::Mask) -> Self {
+        Self(L::compress(self.0, lanes), PhantomData)
     }
 
     /// A bitonic sort of keys: the bits of a value, the lane it comes from in the lowest three.
     #[inline(always)]
-    fn sort_from_far(self, lanes: EightMask, others: Self) -> (Self, Self) {
+    fn sort_from_far(self, lanes: L::Mask, others: Self) -> (Self, Self) {
         // SAFETY: as for `avx2!`.
         unsafe {
             let low_bits = _mm256_set1_epi32(7);
             // Not less than zero, and never what an empty lane has.
             let value = _mm256_max_epi32(_mm256_castps_si256(self.0), _mm256_set1_epi32(8));
             let key = _mm256_or_si256(_mm256_andnot_si256(low_bits, value), lane_indices());
-            let key = _mm256_and_si256(_mm256_castps_si256(lanes.0), key);
+            let key = L::select(lanes, _mm256_castsi256_ps(key), _mm256_setzero_ps());
+            let key = _mm256_castps_si256(key);
             let key = exchange::<0b10_11_00_01, 0b0110_0110>(key);
             let key = exchange::<0b01_00_11_10, 0b0011_1100>(key);
             let key = exchange::<0b10_11_00_01, 0b0101_1010>(key);
@@ -253,13 +306,8 @@ impl<L: Level> Lanes for Eight<L> {
     }
 
     #[inline(always)]
-    fn below(n: u8) -> EightMask {
-        mask!(
-            (_mm256_castsi256_ps(_mm256_cmpgt_epi32(
-                _mm256_set1_epi32(i32::from(n)),
-                lane_indices()
-            )))
-        )
+    fn below<const SHIFT: i32>(word: u32) -> L::Mask {
+        L::below::<SHIFT>(word)
     }
 
     #[inline(always)]

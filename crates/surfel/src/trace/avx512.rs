@@ -6,7 +6,7 @@ use super::splat::{self, Splat};
 use super::surface::{self, SurfaceHit};
 use super::{any, closest, gather};
 use crate::flat::FlatScene;
-use crate::math::{Floats, LaneMask, Ray, Task, WIDE, Wide};
+use crate::math::{Floats, LANES, LaneMask, Ray, Task, WIDE, Wide};
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
@@ -29,11 +29,58 @@ kernel!(splat::splats(Splat));
 kernel!(surface::surface_hits(SurfaceHit));
 kernel!(surface::occlusions(bool));
 
+macro_rules! avx512 {
+    ($wrap:ident($($call:tt)*)) => {
+        // SAFETY: see `Sixteen`; loads and stores go through references to arrays of the full width.
+        $wrap(unsafe { $($call)* })
+    };
+}
+
 #[derive(Clone, Copy)]
 struct Avx512;
 
 impl Level for Avx512 {
     type Wide = Sixteen;
+    type Mask = EightMask;
+
+    #[inline(always)]
+    fn less(left: __m256, right: __m256) -> EightMask {
+        avx512!(EightMask(_mm256_cmp_ps_mask::<_CMP_LT_OQ>(left, right)))
+    }
+
+    #[inline(always)]
+    fn less_equal(left: __m256, right: __m256) -> EightMask {
+        avx512!(EightMask(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(left, right)))
+    }
+
+    #[inline(always)]
+    fn less_bits(left: __m256, right: __m256) -> EightMask {
+        avx512!(EightMask(_mm256_cmplt_epu32_mask(
+            _mm256_castps_si256(left),
+            _mm256_castps_si256(right)
+        )))
+    }
+
+    #[inline(always)]
+    fn below<const SHIFT: i32>(word: u32) -> EightMask {
+        avx512!(EightMask({
+            let top =
+                _mm256_sll_epi32(_mm256_set1_epi32(word as i32), _mm_cvtsi32_si128(28 - SHIFT));
+            _mm256_cmple_epu32_mask(_mm256_loadu_si256(COUNTED_FROM.as_ptr().cast()), top)
+        }))
+    }
+
+    #[inline(always)]
+    fn select(mask: EightMask, if_true: __m256, if_false: __m256) -> __m256 {
+        // SAFETY: see `Sixteen`.
+        unsafe { _mm256_mask_blend_ps(mask.0, if_false, if_true) }
+    }
+
+    #[inline(always)]
+    fn compress(values: __m256, mask: EightMask) -> __m256 {
+        // SAFETY: see `Sixteen`.
+        unsafe { _mm256_maskz_compress_ps(mask.0, values) }
+    }
 
     #[inline(always)]
     fn call<T: Task>(task: T) -> T::Output {
@@ -48,6 +95,14 @@ fn call<T: Task>(task: T) -> T::Output {
     task.run()
 }
 
+/// For each lane the lowest word whose highest four bits count it in.
+static COUNTED_FROM: [u32; LANES] =
+    [1 << 28, 2 << 28, 3 << 28, 4 << 28, 5 << 28, 6 << 28, 7 << 28, 8 << 28];
+
+/// Of eight lanes.
+#[derive(Clone, Copy)]
+struct EightMask(__mmask8);
+
 /// Used only inside the kernels above, which are entered only where AVX-512 is present: that is what
 /// makes each `unsafe` of this file sound.
 #[derive(Clone, Copy)]
@@ -55,13 +110,6 @@ struct Sixteen(__m512);
 
 #[derive(Clone, Copy)]
 struct SixteenMask(__mmask16);
-
-macro_rules! avx512 {
-    ($wrap:ident($($call:tt)*)) => {
-        // SAFETY: see `Sixteen`; loads and stores go through references to arrays of the full width.
-        $wrap(unsafe { $($call)* })
-    };
-}
 
 impl Floats for Sixteen {
     type Mask = SixteenMask;
@@ -144,6 +192,13 @@ impl Wide for Sixteen {
     }
 }
 
+impl LaneMask for EightMask {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        u32::from(self.0)
+    }
+}
+
 impl LaneMask for SixteenMask {
     #[inline(always)]
     fn bits(self) -> u32 {
@@ -168,5 +223,7 @@ operator!(Sixteen: Add, add, _mm512_add_ps);
 operator!(Sixteen: Sub, sub, _mm512_sub_ps);
 operator!(Sixteen: Mul, mul, _mm512_mul_ps);
 operator!(Sixteen: Div, div, _mm512_div_ps);
+operator!(EightMask: BitAnd, bitand, _kand_mask8);
+operator!(EightMask: BitOr, bitor, _kor_mask8);
 operator!(SixteenMask: BitAnd, bitand, _kand_mask16);
 operator!(SixteenMask: BitOr, bitor, _kor_mask16);

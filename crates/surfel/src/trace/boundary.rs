@@ -167,7 +167,8 @@ impl<W: Wide> WideHits<W> {
     /// Place and candidate.
     #[inline(always)]
     fn in_lane(&self, lane: usize) -> (Vec3, Candidate) {
-        let vector = |rows: [[f32; WIDE]; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
+        let vector =
+            |rows: [[f32; WIDE]; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
         let candidate = Candidate {
             normal: vector(self.normal.store_wide()),
             direction: vector(self.direction.store_wide()),

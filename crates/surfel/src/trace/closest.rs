@@ -23,7 +23,8 @@ pub(super) fn closest_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut
 #[inline(always)]
 fn closest_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], hits: &mut [Hit]) {
     let mut stack = PacketStack::new();
-    let (mut loose, mut indices) = (Vec::new(), Vec::new());
+    let mut loose = Vec::with_capacity(rays.len());
+    let mut indices = Vec::with_capacity(rays.len());
     for (first, rays) in rays.chunks(WIDE).enumerate() {
         if let Some(packet) = Packet::new(&points.nodes[0], rays, false) {
             let hits = &mut hits[first * WIDE..][..rays.len()];

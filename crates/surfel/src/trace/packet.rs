@@ -1,6 +1,6 @@
 //! Sixteen rays that go much the same way, walked through the tree together.
 
-use super::frustum::Frustum;
+use super::frustum::{self, Frustum};
 use super::memory::Memory;
 use crate::bvh::{Child, Node, STACK_SIZE};
 use crate::flat::FlatPoints;
@@ -77,6 +77,9 @@ impl<'r, W: Wide> Packet<'r, W> {
     /// closer to each other than their origins, as at a light.
     #[inline(always)]
     pub fn new(root: &Node, rays: &'r [Ray], ends_meet: bool) -> Option<Self> {
+        if !frustum::may_be_alike(rays) {
+            return None;
+        }
         let wide = WideRays::new(rays);
         let frustum = Frustum::new(root, &rays[0], &wide, ends_meet)?;
         let anchor = frustum.anchor;
