@@ -21,6 +21,8 @@ pub struct CpuRenderer {
 
 /// Pixels along a tile's side.
 const TILE: u32 = 16;
+/// Pixels along the side of a cell, whose rays make a packet.
+const CELL: u32 = 4;
 /// Tiles finished before they are copied into the picture: bounds the memory they take.
 const TILES_AT_ONCE: usize = 4096;
 /// Rays of a batch, about: enough to fill tiles of few samples, little enough for the caches.
@@ -114,14 +116,19 @@ impl TilePlace {
         (self.width * self.height) as usize
     }
 
-    /// Coordinates in the picture of the tile's pixels, row by row.
+    /// Coordinates in the picture of the tile's pixels: cell by cell, as rays of a packet should be close.
     fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
-        (0..self.width * self.height)
-            .map(move |i| (self.x + i % self.width, self.y + i / self.width))
+        let cells = |size: u32| (0..size).step_by(CELL as usize);
+        let cells = cells(self.height).flat_map(move |y| cells(self.width).map(move |x| (x, y)));
+        cells.flat_map(move |(x, y)| {
+            let rows = y..self.height.min(y + CELL);
+            let columns = x..self.width.min(x + CELL);
+            rows.flat_map(move |y| columns.clone().map(move |x| (self.x + x, self.y + y)))
+        })
     }
 }
 
-/// A finished tile, its pixels row by row.
+/// A finished tile, its pixels in the order of `TilePlace::pixels`.
 struct Tile {
     place: TilePlace,
     color: Vec<[f32; 4]>,

@@ -16,6 +16,8 @@ const CONTRARY: f32 = -0.5;
 const SPARSE: u32 = 5;
 /// Fewer points than this are no surface.
 const FEWEST: u32 = 4;
+/// Cosine between a hit's normal and those of the points of an even patch, at least.
+const COS_EVEN: f32 = 0.8;
 /// Sectors of the tangent plane in which the outermost points are remembered: gaps are exact, and
 /// any number of points takes the same room.
 const SECTORS: usize = 64;
@@ -203,9 +205,9 @@ impl<L: Lanes> Surroundings<L> {
     }
 }
 
-/// The surroundings of sixteen hits, a point at a time. Gives those judgements of `Surroundings` that do
-/// not take exact angles.
-pub struct Vicinities<W> {
+/// Hits of sixteen rays, each seen by the discs that its ray pierces. On an even patch these mostly surround
+/// the hit already, and further points only narrow gaps: no more need be looked at.
+pub struct Patches<W> {
     hits: Candidates<W>,
     n_near: W,
     n_passed: W,
@@ -213,30 +215,31 @@ pub struct Vicinities<W> {
     /// A bit for each of 64 sectors that holds points: a quarter of the full turn has 16, of 3.8 to 7.1
     /// degrees.
     sectors: [W; 2],
+    /// The lanes with a normal that differs much from the hit's.
+    uneven: u32,
 }
 
-/// The lanes whose judgement is known.
-pub struct Verdicts {
-    pub enclosed: u32,
-    pub outside: u32,
-}
-
-impl<W: Wide> Vicinities<W> {
+impl<W: Wide> Patches<W> {
     #[inline(always)]
     pub fn new(hits: Candidates<W>) -> Self {
         let zero = W::splat(0.0);
-        let free_side = Vec3Lanes::splat(Vec3::ZERO);
-        Self { hits, n_near: zero, n_passed: zero, free_side, sectors: [zero; 2] }
+        Self {
+            hits,
+            n_near: zero,
+            n_passed: zero,
+            free_side: Vec3Lanes::splat(Vec3::ZERO),
+            sectors: [zero; 2],
+            uneven: 0,
+        }
     }
 
-    /// Takes in a point at `offset` from each hit.
+    /// Takes in a disc with a unit normal, its centre at `offset` from each hit, for the rays that pierce it.
     #[inline(always)]
-    pub fn add(&mut self, offset: Vec3Lanes<W>, normal: Vec3Lanes<W>) {
+    pub fn add(&mut self, offset: Vec3Lanes<W>, normal: Vec3Lanes<W>, is_pierced: W::Mask) {
         let (zero, one) = (W::splat(0.0), W::splat(1.0));
-        let is_near = self.hits.near(offset);
-        if is_near.bits() == 0 {
-            return;
-        }
+        let cos = normal.dot(self.hits.normal).abs();
+        self.uneven |= (is_pierced & cos.less(W::splat(COS_EVEN))).bits();
+        let is_near = is_pierced & self.hits.near(offset);
         self.n_near = self.n_near + W::select(is_near, one, zero);
         let is_passed = is_near & self.hits.passed(offset);
         if is_passed.bits() != 0 {
@@ -256,32 +259,25 @@ impl<W: Wide> Vicinities<W> {
         }
     }
 
+    /// The lanes whose hits are enclosed.
     #[inline(always)]
-    pub fn judge(&self) -> Verdicts {
+    pub fn enclosed(&self) -> u32 {
         let length = self.free_side.dot(self.free_side).sqrt();
         let contrary = self.free_side.dot(self.hits.normal).less(W::splat(CONTRARY) * length);
         let from_within = (contrary & W::splat(1.0).less(self.n_passed)).bits();
-        // Points that are too few here may yet be enough farther away.
-        let suffice = W::splat(SPARSE as f32).less_equal(self.n_near).bits();
-        let (mut narrow, mut wide) = (0, 0);
+        let suffice = W::splat(FEWEST as f32).less_equal(self.n_near).bits();
+        let mut narrow = 0;
         let (low, high) = (self.sectors[0].store(), self.sectors[1].store());
         for lane in 0..WIDE {
             let empty = !(u64::from(low[lane].to_bits()) | u64::from(high[lane].to_bits()) << 32);
             let two = empty & empty.rotate_right(1);
             let four = two & two.rotate_right(2);
             let eight = four & four.rotate_right(4);
-            let sixteen = eight & eight.rotate_right(8);
-            let twenty_four = sixteen & eight.rotate_right(16);
-            let thirty_three = sixteen & sixteen.rotate_right(16) & empty.rotate_right(32);
-            // So many empty sectors in a row leave, with those at their ends, a gap of less than 149
-            // degrees, or one of more than 180.
+            let twenty_four = eight & eight.rotate_right(8) & eight.rotate_right(16);
+            // At most 23 empty sectors, with those at their ends, make a gap of less than 149 degrees.
             narrow |= u32::from(twenty_four == 0) << lane;
-            wide |= u32::from(thirty_three != 0) << lane;
         }
-        Verdicts {
-            enclosed: suffice & narrow & !from_within,
-            outside: suffice & (wide | from_within),
-        }
+        suffice & narrow & !from_within & !self.uneven
     }
 }
 

@@ -1,18 +1,16 @@
 //! The points around hits, shown to the angular-gap test.
 
 use super::region::{RegionVisitor, within};
-use crate::flat::{FlatPoints, PointBlock};
-use crate::math::{Aabb, Floats, LANES, LaneMask, Lanes, Task, Vec3, Vec3Lanes, WIDE, Wide};
-use crate::surface::{
-    Candidate, Candidates, Judgement, NEIGHBOR_REACH, Surroundings, Verdicts, Vicinities,
-};
+use crate::flat::FlatPoints;
+use crate::math::{Aabb, LANES, LaneMask, Lanes, Task, Vec3, Vec3Lanes, WIDE, Wide};
+use crate::surface::{Candidate, Judgement, NEIGHBOR_REACH, Surroundings};
 use std::marker::PhantomData;
 
 /// A neighbourhood with too few points to judge by is looked at once more this many times as wide.
 const WIDER: f32 = 2.0;
 /// Hits at most this many radii from the first of them, along any axis, are judged together.
 const SPREAD: f32 = 3.0;
-/// Blocks near them that are kept in mind.
+/// Blocks near them that are kept in mind; where there are more, each hit looks for its own.
 const MAX_BLOCKS: usize = 64;
 
 /// Judges a hit at `position` by all points near it.
@@ -54,7 +52,7 @@ struct Neighborhood<L: Lanes> {
 
 impl<L: Lanes> RegionVisitor for Neighborhood<L> {
     #[inline(always)]
-    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32, _: [[f32; 2]; 3]) {
         self.surroundings.add(&points.blocks[block_idx as usize].points(self.position));
     }
 }
@@ -110,30 +108,30 @@ impl<L: Lanes> Task for JudgeWide<'_, L> {
 #[inline(always)]
 fn judge_group<L: Lanes>(
     points: &FlatPoints,
-    group: u32,
+    mut group: u32,
     hits: &WideHits<L::Wide>,
     judgements: &mut [Judgement; WIDE],
 ) {
-    let candidates = Candidates::new(hits.normal, hits.direction, hits.radius);
-    let mut found = Neighborhoods::<L> {
-        position: hits.position,
-        vicinities: Vicinities::new(candidates),
-        blocks: [0; MAX_BLOCKS],
-        n_blocks: 0,
-    };
-    within::<L>(points, &hits.region(group), &mut found);
-    let Verdicts { enclosed, outside } = found.vicinities.judge();
-    for lane in 0..WIDE {
-        if (group & enclosed) >> lane & 1 == 1 {
-            judgements[lane] = Judgement::Enclosed;
-        }
+    let mut blocks =
+        NearBlocks { indices: [0; MAX_BLOCKS], bounds: [[[0.0; MAX_BLOCKS]; 2]; 3], n: 0 };
+    within::<L>(points, &hits.region(group), &mut blocks);
+    let (position, normal) = (hits.position.store_wide(), hits.normal.store_wide());
+    let (direction, radius) = (hits.direction.store_wide(), hits.radius.store());
+    while group != 0 {
+        let lane = group.trailing_zeros() as usize % WIDE;
+        group &= group - 1;
+        let candidate = Candidate {
+            normal: in_lane(&normal, lane),
+            direction: in_lane(&direction, lane),
+            radius: radius[lane],
+        };
+        judgements[lane] = blocks.judge::<L>(points, in_lane(&position, lane), candidate);
     }
-    let mut doubtful = group & !(enclosed | outside);
-    while doubtful != 0 {
-        let lane = doubtful.trailing_zeros() as usize % WIDE;
-        doubtful &= doubtful - 1;
-        judgements[lane] = found.judge_again(points, hits.in_lane(lane));
-    }
+}
+
+#[inline(always)]
+fn in_lane([x, y, z]: &[[f32; WIDE]; 3], lane: usize) -> Vec3 {
+    Vec3::new(x[lane], y[lane], z[lane])
 }
 
 impl<W: Wide> WideHits<W> {
@@ -163,69 +161,69 @@ impl<W: Wide> WideHits<W> {
         }
         region
     }
+}
 
-    /// Place and candidate.
+/// The blocks around a group of hits.
+struct NearBlocks {
+    indices: [u32; MAX_BLOCKS],
+    /// Lower and upper, axis by axis.
+    bounds: [[[f32; MAX_BLOCKS]; 2]; 3],
+    /// More than there is room for if too many were found.
+    n: usize,
+}
+
+impl RegionVisitor for NearBlocks {
     #[inline(always)]
-    fn in_lane(&self, lane: usize) -> (Vec3, Candidate) {
-        let vector =
-            |rows: [[f32; WIDE]; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
-        let candidate = Candidate {
-            normal: vector(self.normal.store_wide()),
-            direction: vector(self.direction.store_wide()),
-            radius: self.radius.store()[lane],
-        };
-        (vector(self.position.store_wide()), candidate)
+    fn visit(&mut self, _: &FlatPoints, block_idx: u32, bounds: [[f32; 2]; 3]) {
+        if self.n < MAX_BLOCKS {
+            self.indices[self.n] = block_idx;
+            for axis in 0..3 {
+                for side in 0..2 {
+                    self.bounds[axis][side][self.n] = bounds[axis][side];
+                }
+            }
+        }
+        self.n += 1;
     }
 }
 
-struct Neighborhoods<L: Lanes> {
-    position: Vec3Lanes<L::Wide>,
-    vicinities: Vicinities<L::Wide>,
-    /// Those seen, if there is room.
-    blocks: [u32; MAX_BLOCKS],
-    n_blocks: usize,
-}
-
-impl<L: Lanes> Neighborhoods<L> {
-    /// By exact angles, or farther around.
+impl NearBlocks {
     #[inline(always)]
-    fn judge_again(&self, points: &FlatPoints, (position, hit): (Vec3, Candidate)) -> Judgement {
-        if let Some(blocks) = self.blocks.get(..self.n_blocks) {
-            let mut surroundings = Surroundings::<L>::new(hit);
-            for block_idx in blocks {
-                surroundings.add(&points.blocks[*block_idx as usize].points(position));
+    fn judge<L: Lanes>(&self, points: &FlatPoints, position: Vec3, hit: Candidate) -> Judgement {
+        if MAX_BLOCKS < self.n {
+            return judge::<L>(points, position, hit);
+        }
+        let mut surroundings = Surroundings::<L>::new(hit);
+        for first in (0..self.n).step_by(LANES) {
+            let mut near = self.near::<L>(first, position, NEIGHBOR_REACH * hit.radius);
+            if self.n < first + LANES {
+                near &= (1 << (self.n - first)) - 1;
             }
-            if !surroundings.is_sparse() {
-                return surroundings.judge();
+            while near != 0 {
+                let block_idx = self.indices[first + near.trailing_zeros() as usize % LANES];
+                near &= near - 1;
+                surroundings.add(&points.blocks[block_idx as usize].points(position));
             }
         }
-        judge::<L>(points, position, hit)
+        if surroundings.is_sparse() {
+            return judge::<L>(points, position, hit);
+        }
+        surroundings.judge()
     }
-}
 
-impl<L: Lanes> RegionVisitor for Neighborhoods<L> {
+    /// Those of eight blocks whose boxes are within `reach` of `position` along each axis.
     #[inline(always)]
-    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        if let Some(place) = self.blocks.get_mut(self.n_blocks) {
-            *place = block_idx;
-        }
-        self.n_blocks += 1;
-        let block: &PointBlock = &points.blocks[block_idx as usize];
-        let corner = Vec3Lanes::splat(block.corner()).minus(self.position);
-        let (offsets, normals) = (block.offsets::<L>().store(), block.normals::<L>().store());
-        let n_points = L::splat(0.0).less(block.radii()).bits().count_ones() as usize;
-        for lane in 0..n_points.min(LANES) {
-            let offset = Vec3Lanes {
-                x: corner.x + L::Wide::splat(offsets[0][lane]),
-                y: corner.y + L::Wide::splat(offsets[1][lane]),
-                z: corner.z + L::Wide::splat(offsets[2][lane]),
+    fn near<L: Lanes>(&self, first: usize, position: Vec3, reach: f32) -> u32 {
+        let mut is_near = L::splat(0.0).less_equal(L::splat(0.0));
+        for axis in 0..3 {
+            let [low, high] = &self.bounds[axis];
+            let (Some(low), Some(high)) = (low[first..].first_chunk(), high[first..].first_chunk())
+            else {
+                unreachable!("blocks come in eights")
             };
-            let normal = Vec3Lanes {
-                x: L::Wide::splat(normals[0][lane]),
-                y: L::Wide::splat(normals[1][lane]),
-                z: L::Wide::splat(normals[2][lane]),
-            };
-            self.vicinities.add(offset, normal);
+            let (min, max) = (L::splat(position[axis] - reach), L::splat(position[axis] + reach));
+            is_near = is_near & L::load(low).less_equal(max) & min.less_equal(L::load(high));
         }
+        is_near.bits()
     }
 }

@@ -8,7 +8,9 @@ use super::packet::{PacketStack, WideRays};
 use super::sightings::{Sighting, settle};
 use crate::flat::FlatScene;
 use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
-use crate::surface::{Blend, Gathered, Judgement, MAX_GATHERED, SurfaceKind, plane_normal};
+use crate::surface::{
+    Blend, Candidates, Gathered, Judgement, MAX_GATHERED, Patches, SurfaceKind, plane_normal,
+};
 
 /// The blended discs of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,9 +123,7 @@ impl Mixer<'_> {
         if self.scene.surface == SurfaceKind::SplatFit {
             normals = self.fit_planes(normals, splats.len());
         }
-        let n_discs = nearest.n_discs.store();
-        let mut judgements = [Judgement::Outside; WIDE];
-        if self.judges {
+        let judgements = if self.judges {
             let hits = WideHits {
                 position: origin.plus(direction.scaled(nearest.distances)),
                 normal: normals,
@@ -131,12 +131,13 @@ impl Mixer<'_> {
                 radius: nearest.radii / L::Wide::splat(self.scene.surface.radius_factor()),
             };
             let is_hit = L::Wide::splat(0.0).less(nearest.n_discs).bits();
-            let lanes = is_hit & ((1 << splats.len()) - 1);
-            judgements = judge_wide::<L>(&self.scene.points, lanes, &hits);
-        }
+            self.judge::<L>(is_hit & ((1 << splats.len()) - 1), &hits)
+        } else {
+            [Judgement::Outside; WIDE]
+        };
         self.sightings.clear();
         let (distances, slots) = (nearest.distances.store(), nearest.slots.store());
-        let radii = nearest.radii.store();
+        let (n_discs, radii) = (nearest.n_discs.store(), nearest.radii.store());
         let (normals, colors) = (normals.store_wide(), colors.store_wide());
         for lane in 0..splats.len() {
             splats[lane] = Splat::MISS;
@@ -183,6 +184,25 @@ impl Mixer<'_> {
             self.discs.push(disc);
         }
         nearest
+    }
+
+    /// By the discs seen where these suffice, else by all points around.
+    #[inline(always)]
+    fn judge<L: Lanes>(&self, lanes: u32, hits: &WideHits<L::Wide>) -> [Judgement; WIDE] {
+        let mut patches = Patches::new(Candidates::new(hits.normal, hits.direction, hits.radius));
+        for (disc, sighting) in self.discs.iter().zip(&self.sightings) {
+            let offset = Vec3Lanes::splat(disc.center).minus(hits.position);
+            let (_, is_pierced) = pierced::<L::Wide>(sighting);
+            patches.add(offset, Vec3Lanes::splat(disc.normal), is_pierced);
+        }
+        let enclosed = patches.enclosed();
+        let mut judgements = judge_wide::<L>(&self.scene.points, lanes & !enclosed, hits);
+        for lane in 0..WIDE {
+            if (lanes & enclosed) >> lane & 1 == 1 {
+                judgements[lane] = Judgement::Enclosed;
+            }
+        }
+        judgements
     }
 
     /// Replaces normals by those of planes through the discs' centres, where these span one.
