@@ -16,8 +16,6 @@ const CONTRARY: f32 = -0.5;
 const SPARSE: u32 = 5;
 /// Fewer points than this are no surface.
 const FEWEST: u32 = 4;
-/// Cosine between a hit's normal and those of the points of an even patch, at least.
-const COS_EVEN: f32 = 0.8;
 /// Sectors of the tangent plane in which the outermost points are remembered: gaps are exact, and
 /// any number of points takes the same room.
 const SECTORS: usize = 64;
@@ -98,9 +96,9 @@ pub struct Surroundings<L: Lanes> {
     hit: Candidates<L>,
     normal: Vec3,
     n_near: u32,
-    /// Which eighths of the full turn hold points.
-    octants: u8,
-    /// Least and greatest angle (as `turn` has it) of the points of each sector.
+    /// A bit for each sector that holds points.
+    taken: u64,
+    /// Least and greatest angle (as `turn` has it) of the points of each sector that holds any.
     sectors: [(f32, f32); SECTORS],
     n_passed: u32,
     free_side: Vec3,
@@ -114,7 +112,7 @@ impl<L: Lanes> Surroundings<L> {
             hit: Candidates::new(lanes, direction, L::splat(radius)),
             normal,
             n_near: 0,
-            octants: 0,
+            taken: 0,
             sectors: [(f32::INFINITY, f32::NEG_INFINITY); SECTORS],
             n_passed: 0,
             free_side: Vec3::ZERO,
@@ -146,8 +144,9 @@ impl<L: Lanes> Surroundings<L> {
         while angled != 0 {
             let turn = turns[angled.trailing_zeros() as usize % LANES];
             angled &= angled - 1;
-            self.octants |= 1 << ((2.0 * turn) as u8 & 7);
-            let (low, high) = &mut self.sectors[(turn * (SECTORS / 4) as f32) as usize % SECTORS];
+            let sector = (turn * (SECTORS / 4) as f32) as usize % SECTORS;
+            self.taken |= 1 << sector;
+            let (low, high) = &mut self.sectors[sector];
             *low = low.min(turn);
             *high = high.max(turn);
         }
@@ -163,11 +162,12 @@ impl<L: Lanes> Surroundings<L> {
         if self.n_near < FEWEST || self.is_from_within() {
             return Judgement::Outside;
         }
-        // No two neighbouring octants empty: no gap reaches 135 degrees. Mostly so, and it saves the rest.
-        if !self.octants & !self.octants.rotate_left(1) == 0 {
-            return Judgement::Enclosed;
+        // Mostly the sectors tell, and it saves the rest.
+        match rough_gap(self.taken) {
+            RoughGap::Narrow => Judgement::Enclosed,
+            RoughGap::Wide => Judgement::Outside,
+            RoughGap::Doubtful => self.judge_gaps(),
         }
-        self.judge_gaps()
     }
 
     /// Just outside a silhouette, where a disc of the far side sticks out over the bend, a ray meets that
@@ -184,11 +184,18 @@ impl<L: Lanes> Surroundings<L> {
 
     fn judge_gaps(&self) -> Judgement {
         const COS_150: f32 = -0.866_025_4;
-        let mut taken = self.sectors.iter().filter(|(low, high)| low <= high);
-        let Some(&(first, mut end)) = taken.next() else { return Judgement::Outside };
+        let mut taken = self.taken;
+        let (first, mut end) = self.sectors[taken.trailing_zeros() as usize % SECTORS];
+        let mut is_done = false;
         let mut worst = Judgement::Enclosed;
         // Gaps within a sector are too small to count, so only those from one to the next are looked at.
-        for (low, high) in taken.copied().chain([(first + 4.0, first)]) {
+        while !is_done {
+            taken &= taken - 1;
+            is_done = taken == 0;
+            let (low, high) = match is_done {
+                true => (first + 4.0, first),
+                false => self.sectors[taken.trailing_zeros() as usize % SECTORS],
+            };
             let ((x, y), (next_x, next_y)) = (direction(end), direction(low));
             let (cos, sin) = (x * next_x + y * next_y, x * next_y - y * next_x);
             // A wrap onto the same point is the full turn.
@@ -205,41 +212,39 @@ impl<L: Lanes> Surroundings<L> {
     }
 }
 
-/// Hits of sixteen rays, each seen by the discs that its ray pierces. On an even patch these mostly surround
-/// the hit already, and further points only narrow gaps: no more need be looked at.
-pub struct Patches<W> {
+/// The surroundings of sixteen hits, a point at a time. Gives those judgements of `Surroundings` that do
+/// not take exact angles.
+pub struct Vicinities<W> {
     hits: Candidates<W>,
     n_near: W,
     n_passed: W,
     free_side: Vec3Lanes<W>,
-    /// A bit for each of 64 sectors that holds points: a quarter of the full turn has 16, of 3.8 to 7.1
-    /// degrees.
+    /// A bit for each sector that holds points.
     sectors: [W; 2],
-    /// The lanes with a normal that differs much from the hit's.
-    uneven: u32,
 }
 
-impl<W: Wide> Patches<W> {
+/// The lanes whose judgement is known.
+pub struct Verdicts {
+    pub enclosed: u32,
+    pub outside: u32,
+}
+
+impl<W: Wide> Vicinities<W> {
     #[inline(always)]
     pub fn new(hits: Candidates<W>) -> Self {
         let zero = W::splat(0.0);
-        Self {
-            hits,
-            n_near: zero,
-            n_passed: zero,
-            free_side: Vec3Lanes::splat(Vec3::ZERO),
-            sectors: [zero; 2],
-            uneven: 0,
-        }
+        let free_side = Vec3Lanes::splat(Vec3::ZERO);
+        Self { hits, n_near: zero, n_passed: zero, free_side, sectors: [zero; 2] }
     }
 
-    /// Takes in a disc with a unit normal, its centre at `offset` from each hit, for the rays that pierce it.
+    /// Takes in a point at `offset` from each hit, for the hits in `lanes`.
     #[inline(always)]
-    pub fn add(&mut self, offset: Vec3Lanes<W>, normal: Vec3Lanes<W>, is_pierced: W::Mask) {
+    pub fn add(&mut self, offset: Vec3Lanes<W>, normal: Vec3Lanes<W>, lanes: W::Mask) {
         let (zero, one) = (W::splat(0.0), W::splat(1.0));
-        let cos = normal.dot(self.hits.normal).abs();
-        self.uneven |= (is_pierced & cos.less(W::splat(COS_EVEN))).bits();
-        let is_near = is_pierced & self.hits.near(offset);
+        let is_near = lanes & self.hits.near(offset);
+        if is_near.bits() == 0 {
+            return;
+        }
         self.n_near = self.n_near + W::select(is_near, one, zero);
         let is_passed = is_near & self.hits.passed(offset);
         if is_passed.bits() != 0 {
@@ -259,25 +264,53 @@ impl<W: Wide> Patches<W> {
         }
     }
 
-    /// The lanes whose hits are enclosed.
     #[inline(always)]
-    pub fn enclosed(&self) -> u32 {
+    pub fn judge(&self) -> Verdicts {
         let length = self.free_side.dot(self.free_side).sqrt();
         let contrary = self.free_side.dot(self.hits.normal).less(W::splat(CONTRARY) * length);
         let from_within = (contrary & W::splat(1.0).less(self.n_passed)).bits();
-        let suffice = W::splat(FEWEST as f32).less_equal(self.n_near).bits();
-        let mut narrow = 0;
+        // Points that are too few here may yet be enough farther away.
+        let suffice = W::splat(SPARSE as f32).less_equal(self.n_near).bits();
+        let (mut narrow, mut wide) = (0, 0);
         let (low, high) = (self.sectors[0].store(), self.sectors[1].store());
         for lane in 0..WIDE {
-            let empty = !(u64::from(low[lane].to_bits()) | u64::from(high[lane].to_bits()) << 32);
-            let two = empty & empty.rotate_right(1);
-            let four = two & two.rotate_right(2);
-            let eight = four & four.rotate_right(4);
-            let twenty_four = eight & eight.rotate_right(8) & eight.rotate_right(16);
-            // At most 23 empty sectors, with those at their ends, make a gap of less than 149 degrees.
-            narrow |= u32::from(twenty_four == 0) << lane;
+            let taken = u64::from(low[lane].to_bits()) | u64::from(high[lane].to_bits()) << 32;
+            let gap = rough_gap(taken);
+            narrow |= u32::from(gap == RoughGap::Narrow) << lane;
+            wide |= u32::from(gap == RoughGap::Wide) << lane;
         }
-        suffice & narrow & !from_within & !self.uneven
+        Verdicts {
+            enclosed: suffice & narrow & !from_within,
+            outside: suffice & (wide | from_within),
+        }
+    }
+}
+
+/// What the sectors tell of the widest gap between points.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum RoughGap {
+    /// Less than 150 degrees.
+    Narrow,
+    Doubtful,
+    /// More than 180 degrees.
+    Wide,
+}
+
+/// A quarter of the full turn has 16 sectors, of 3.8 to 7.1 degrees: 23 empty ones in a row make, with those
+/// at their ends, a gap of less than 149 degrees, 33 alone one of more than 183.
+#[inline(always)]
+fn rough_gap(taken: u64) -> RoughGap {
+    let empty = !taken;
+    let two = empty & empty.rotate_right(1);
+    let four = two & two.rotate_right(2);
+    let eight = four & four.rotate_right(4);
+    let sixteen = eight & eight.rotate_right(8);
+    if sixteen & eight.rotate_right(16) == 0 {
+        RoughGap::Narrow
+    } else if sixteen & sixteen.rotate_right(16) & empty.rotate_right(32) == 0 {
+        RoughGap::Doubtful
+    } else {
+        RoughGap::Wide
     }
 }
 

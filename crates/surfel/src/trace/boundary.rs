@@ -1,16 +1,19 @@
 //! The points around hits, shown to the angular-gap test.
 
 use super::region::{RegionVisitor, within};
-use crate::flat::FlatPoints;
-use crate::math::{Aabb, LANES, LaneMask, Lanes, Task, Vec3, Vec3Lanes, WIDE, Wide};
-use crate::surface::{Candidate, Judgement, NEIGHBOR_REACH, Surroundings};
+use super::sightings::Sighting;
+use crate::flat::{FlatPoints, PointBlock};
+use crate::math::{Aabb, Floats, LANES, LaneMask, Lanes, Task, Vec3, Vec3Lanes, WIDE, Wide};
+use crate::surface::{
+    Candidate, Candidates, Judgement, NEIGHBOR_REACH, Surroundings, Verdicts, Vicinities,
+};
 use std::marker::PhantomData;
 
 /// A neighbourhood with too few points to judge by is looked at once more this many times as wide.
 const WIDER: f32 = 2.0;
 /// Hits at most this many radii from the first of them, along any axis, are judged together.
 const SPREAD: f32 = 3.0;
-/// Blocks near them that are kept in mind; where there are more, each hit looks for its own.
+/// Blocks near them that are kept in mind.
 const MAX_BLOCKS: usize = 64;
 
 /// Judges a hit at `position` by all points near it.
@@ -52,7 +55,7 @@ struct Neighborhood<L: Lanes> {
 
 impl<L: Lanes> RegionVisitor for Neighborhood<L> {
     #[inline(always)]
-    fn visit(&mut self, points: &FlatPoints, block_idx: u32, _: [[f32; 2]; 3]) {
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
         self.surroundings.add(&points.blocks[block_idx as usize].points(self.position));
     }
 }
@@ -70,17 +73,22 @@ pub struct WideHits<W> {
 
 /// As `judge` does; hits close to each other share the way through the tree. Only what stands in `lanes`
 /// counts.
+///
+/// A hit that is enclosed by the points in the blocks of the discs that its ray pierces is not looked at any
+/// further. `sightings` are these, sorted by slot; there need not be any.
 #[inline(always)]
 pub fn judge_wide<L: Lanes>(
     points: &FlatPoints,
+    sightings: &[Sighting],
     lanes: u32,
     hits: &WideHits<L::Wide>,
 ) -> [Judgement; WIDE] {
-    L::call(JudgeWide::<L> { points, lanes, hits })
+    L::call(JudgeWide::<L> { points, sightings, lanes, hits })
 }
 
 struct JudgeWide<'p, L: Lanes> {
     points: &'p FlatPoints,
+    sightings: &'p [Sighting],
     lanes: u32,
     hits: &'p WideHits<L::Wide>,
 }
@@ -90,8 +98,13 @@ impl<L: Lanes> Task for JudgeWide<'_, L> {
 
     #[inline(always)]
     fn run(self) -> [Judgement; WIDE] {
-        let Self { points, mut lanes, hits } = self;
+        let Self { points, sightings, mut lanes, hits } = self;
         let mut judgements = [Judgement::Outside; WIDE];
+        if !sightings.is_empty() {
+            let enclosed = lanes & enclosed_by_blocks::<L>(points, sightings, hits);
+            set_enclosed(&mut judgements, enclosed);
+            lanes &= !enclosed;
+        }
         let [x, y, z] = hits.position.store_wide();
         let radii = hits.radius.store();
         while lanes != 0 {
@@ -106,32 +119,86 @@ impl<L: Lanes> Task for JudgeWide<'_, L> {
 }
 
 #[inline(always)]
-fn judge_group<L: Lanes>(
+fn set_enclosed(judgements: &mut [Judgement; WIDE], mut lanes: u32) {
+    while lanes != 0 {
+        judgements[lanes.trailing_zeros() as usize % WIDE] = Judgement::Enclosed;
+        lanes &= lanes - 1;
+    }
+}
+
+/// The hits that are enclosed by the points in the blocks that their rays sight.
+#[inline(always)]
+fn enclosed_by_blocks<L: Lanes>(
     points: &FlatPoints,
-    mut group: u32,
+    sightings: &[Sighting],
     hits: &WideHits<L::Wide>,
-    judgements: &mut [Judgement; WIDE],
+) -> u32 {
+    let mut vicinities = Vicinities::new(Candidates::new(hits.normal, hits.direction, hits.radius));
+    let block_of = |place: usize| sightings[place].slot / LANES as u32;
+    let mut first = 0;
+    while first < sightings.len() {
+        let block_idx = block_of(first);
+        let mut lanes = sightings[first].is_seen::<L::Wide>();
+        first += 1;
+        while first < sightings.len() && block_of(first) == block_idx {
+            lanes = lanes | sightings[first].is_seen::<L::Wide>();
+            first += 1;
+        }
+        let block = &points.blocks[block_idx as usize];
+        show_block::<L>(block, &hits.position, lanes, &mut vicinities);
+    }
+    vicinities.judge().enclosed
+}
+
+/// Shows the points of a block to the hits in `lanes`.
+#[inline(always)]
+fn show_block<L: Lanes>(
+    block: &PointBlock,
+    position: &Vec3Lanes<L::Wide>,
+    lanes: <L::Wide as Floats>::Mask,
+    vicinities: &mut Vicinities<L::Wide>,
 ) {
-    let mut blocks =
-        NearBlocks { indices: [0; MAX_BLOCKS], bounds: [[[0.0; MAX_BLOCKS]; 2]; 3], n: 0 };
-    within::<L>(points, &hits.region(group), &mut blocks);
-    let (position, normal) = (hits.position.store_wide(), hits.normal.store_wide());
-    let (direction, radius) = (hits.direction.store_wide(), hits.radius.store());
-    while group != 0 {
-        let lane = group.trailing_zeros() as usize % WIDE;
-        group &= group - 1;
-        let candidate = Candidate {
-            normal: in_lane(&normal, lane),
-            direction: in_lane(&direction, lane),
-            radius: radius[lane],
+    let corner = Vec3Lanes::splat(block.corner()).minus(*position);
+    let (offsets, normals) = (block.offsets::<L>().store(), block.normals::<L>().store());
+    let n_points = L::splat(0.0).less(block.radii()).bits().count_ones() as usize;
+    for lane in 0..n_points.min(LANES) {
+        let offset = Vec3Lanes {
+            x: corner.x + L::Wide::splat(offsets[0][lane]),
+            y: corner.y + L::Wide::splat(offsets[1][lane]),
+            z: corner.z + L::Wide::splat(offsets[2][lane]),
         };
-        judgements[lane] = blocks.judge::<L>(points, in_lane(&position, lane), candidate);
+        let normal = Vec3Lanes {
+            x: L::Wide::splat(normals[0][lane]),
+            y: L::Wide::splat(normals[1][lane]),
+            z: L::Wide::splat(normals[2][lane]),
+        };
+        vicinities.add(offset, normal, lanes);
     }
 }
 
 #[inline(always)]
-fn in_lane([x, y, z]: &[[f32; WIDE]; 3], lane: usize) -> Vec3 {
-    Vec3::new(x[lane], y[lane], z[lane])
+fn judge_group<L: Lanes>(
+    points: &FlatPoints,
+    group: u32,
+    hits: &WideHits<L::Wide>,
+    judgements: &mut [Judgement; WIDE],
+) {
+    let candidates = Candidates::new(hits.normal, hits.direction, hits.radius);
+    let mut found = Neighborhoods::<L> {
+        position: hits.position,
+        vicinities: Vicinities::new(candidates),
+        blocks: [0; MAX_BLOCKS],
+        n_blocks: 0,
+    };
+    within::<L>(points, &hits.region(group), &mut found);
+    let Verdicts { enclosed, outside } = found.vicinities.judge();
+    set_enclosed(judgements, group & enclosed);
+    let mut doubtful = group & !(enclosed | outside);
+    while doubtful != 0 {
+        let lane = doubtful.trailing_zeros() as usize % WIDE;
+        doubtful &= doubtful - 1;
+        judgements[lane] = found.judge_again(points, hits.in_lane(lane));
+    }
 }
 
 impl<W: Wide> WideHits<W> {
@@ -161,69 +228,55 @@ impl<W: Wide> WideHits<W> {
         }
         region
     }
-}
 
-/// The blocks around a group of hits.
-struct NearBlocks {
-    indices: [u32; MAX_BLOCKS],
-    /// Lower and upper, axis by axis.
-    bounds: [[[f32; MAX_BLOCKS]; 2]; 3],
-    /// More than there is room for if too many were found.
-    n: usize,
-}
-
-impl RegionVisitor for NearBlocks {
+    /// Place and candidate.
     #[inline(always)]
-    fn visit(&mut self, _: &FlatPoints, block_idx: u32, bounds: [[f32; 2]; 3]) {
-        if self.n < MAX_BLOCKS {
-            self.indices[self.n] = block_idx;
-            for axis in 0..3 {
-                for side in 0..2 {
-                    self.bounds[axis][side][self.n] = bounds[axis][side];
-                }
-            }
-        }
-        self.n += 1;
+    fn in_lane(&self, lane: usize) -> (Vec3, Candidate) {
+        let vector =
+            |rows: [[f32; WIDE]; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
+        let candidate = Candidate {
+            normal: vector(self.normal.store_wide()),
+            direction: vector(self.direction.store_wide()),
+            radius: self.radius.store()[lane],
+        };
+        (vector(self.position.store_wide()), candidate)
     }
 }
 
-impl NearBlocks {
-    #[inline(always)]
-    fn judge<L: Lanes>(&self, points: &FlatPoints, position: Vec3, hit: Candidate) -> Judgement {
-        if MAX_BLOCKS < self.n {
-            return judge::<L>(points, position, hit);
-        }
-        let mut surroundings = Surroundings::<L>::new(hit);
-        for first in (0..self.n).step_by(LANES) {
-            let mut near = self.near::<L>(first, position, NEIGHBOR_REACH * hit.radius);
-            if self.n < first + LANES {
-                near &= (1 << (self.n - first)) - 1;
-            }
-            while near != 0 {
-                let block_idx = self.indices[first + near.trailing_zeros() as usize % LANES];
-                near &= near - 1;
-                surroundings.add(&points.blocks[block_idx as usize].points(position));
-            }
-        }
-        if surroundings.is_sparse() {
-            return judge::<L>(points, position, hit);
-        }
-        surroundings.judge()
-    }
+struct Neighborhoods<L: Lanes> {
+    position: Vec3Lanes<L::Wide>,
+    vicinities: Vicinities<L::Wide>,
+    /// Those seen, if there is room.
+    blocks: [u32; MAX_BLOCKS],
+    n_blocks: usize,
+}
 
-    /// Those of eight blocks whose boxes are within `reach` of `position` along each axis.
+impl<L: Lanes> Neighborhoods<L> {
+    /// By exact angles, or farther around.
     #[inline(always)]
-    fn near<L: Lanes>(&self, first: usize, position: Vec3, reach: f32) -> u32 {
-        let mut is_near = L::splat(0.0).less_equal(L::splat(0.0));
-        for axis in 0..3 {
-            let [low, high] = &self.bounds[axis];
-            let (Some(low), Some(high)) = (low[first..].first_chunk(), high[first..].first_chunk())
-            else {
-                unreachable!("blocks come in eights")
-            };
-            let (min, max) = (L::splat(position[axis] - reach), L::splat(position[axis] + reach));
-            is_near = is_near & L::load(low).less_equal(max) & min.less_equal(L::load(high));
+    fn judge_again(&self, points: &FlatPoints, (position, hit): (Vec3, Candidate)) -> Judgement {
+        if let Some(blocks) = self.blocks.get(..self.n_blocks) {
+            let mut surroundings = Surroundings::<L>::new(hit);
+            for block_idx in blocks {
+                surroundings.add(&points.blocks[*block_idx as usize].points(position));
+            }
+            if !surroundings.is_sparse() {
+                return surroundings.judge();
+            }
         }
-        is_near.bits()
+        judge::<L>(points, position, hit)
+    }
+}
+
+impl<L: Lanes> RegionVisitor for Neighborhoods<L> {
+    #[inline(always)]
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        if let Some(place) = self.blocks.get_mut(self.n_blocks) {
+            *place = block_idx;
+        }
+        self.n_blocks += 1;
+        let all = L::Wide::splat(0.0).less_equal(L::Wide::splat(0.0));
+        let block = &points.blocks[block_idx as usize];
+        show_block::<L>(block, &self.position, all, &mut self.vicinities);
     }
 }

@@ -20,6 +20,12 @@ impl Sighting {
         distances[lane] = hit.distance;
         Self { slot: hit.slot, distances }
     }
+
+    /// The lanes of the rays that pierce it.
+    #[inline(always)]
+    pub fn is_seen<W: Wide>(&self) -> W::Mask {
+        W::load(&self.distances).less_equal(W::splat(f32::MAX))
+    }
 }
 
 /// Drops what lies beyond the rays' limits and what is not among the nearest `MAX_GATHERED` of a ray, and

@@ -8,9 +8,7 @@ use super::packet::{PacketStack, WideRays};
 use super::sightings::{Sighting, settle};
 use crate::flat::FlatScene;
 use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
-use crate::surface::{
-    Blend, Candidates, Gathered, Judgement, MAX_GATHERED, Patches, SurfaceKind, plane_normal,
-};
+use crate::surface::{Blend, Gathered, Judgement, MAX_GATHERED, SurfaceKind, plane_normal};
 
 /// The blended discs of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -115,15 +113,21 @@ impl Mixer<'_> {
         let (origin, direction) = (rays.origin(), rays.direction());
         let mut blend = Blend::new(self.scene.surface, nearest.normals, direction);
         for (disc, sighting) in self.discs.iter().zip(&self.sightings) {
-            let (distances, is_pierced) = pierced::<L::Wide>(sighting);
+            let distances = L::Wide::load(&sighting.distances);
             let position = origin.plus(direction.scaled(distances));
-            blend.add(disc, position.minus(Vec3Lanes::splat(disc.center)), is_pierced);
+            blend.add(
+                disc,
+                position.minus(Vec3Lanes::splat(disc.center)),
+                sighting.is_seen::<L::Wide>(),
+            );
         }
         let (mut normals, colors) = blend.finish();
         if self.scene.surface == SurfaceKind::SplatFit {
             normals = self.fit_planes(normals, splats.len());
         }
-        let judgements = if self.judges {
+        let n_discs = nearest.n_discs.store();
+        let mut judgements = [Judgement::Outside; WIDE];
+        if self.judges {
             let hits = WideHits {
                 position: origin.plus(direction.scaled(nearest.distances)),
                 normal: normals,
@@ -131,13 +135,12 @@ impl Mixer<'_> {
                 radius: nearest.radii / L::Wide::splat(self.scene.surface.radius_factor()),
             };
             let is_hit = L::Wide::splat(0.0).less(nearest.n_discs).bits();
-            self.judge::<L>(is_hit & ((1 << splats.len()) - 1), &hits)
-        } else {
-            [Judgement::Outside; WIDE]
-        };
+            let lanes = is_hit & ((1 << splats.len()) - 1);
+            judgements = judge_wide::<L>(&self.scene.points, &self.sightings, lanes, &hits);
+        }
         self.sightings.clear();
         let (distances, slots) = (nearest.distances.store(), nearest.slots.store());
-        let (n_discs, radii) = (nearest.n_discs.store(), nearest.radii.store());
+        let radii = nearest.radii.store();
         let (normals, colors) = (normals.store_wide(), colors.store_wide());
         for lane in 0..splats.len() {
             splats[lane] = Splat::MISS;
@@ -171,7 +174,7 @@ impl Mixer<'_> {
         self.discs.clear();
         for sighting in &self.sightings {
             let disc = self.scene.points.gathered(sighting.slot);
-            let (distances, is_pierced) = pierced::<W>(sighting);
+            let distances = W::load(&sighting.distances);
             // They come by slot, so of equal ones the first counts.
             let is_nearer = distances.less(nearest.distances);
             let slot = W::splat(f32::from_bits(sighting.slot));
@@ -180,29 +183,11 @@ impl Mixer<'_> {
             nearest.slots = W::select(is_nearer, slot, nearest.slots);
             nearest.normals = Vec3Lanes::select(is_nearer, normal, nearest.normals);
             nearest.radii = W::select(is_nearer, W::splat(disc.radius), nearest.radii);
-            nearest.n_discs = nearest.n_discs + W::select(is_pierced, W::splat(1.0), zero);
+            nearest.n_discs =
+                nearest.n_discs + W::select(sighting.is_seen::<W>(), W::splat(1.0), zero);
             self.discs.push(disc);
         }
         nearest
-    }
-
-    /// By the discs seen where these suffice, else by all points around.
-    #[inline(always)]
-    fn judge<L: Lanes>(&self, lanes: u32, hits: &WideHits<L::Wide>) -> [Judgement; WIDE] {
-        let mut patches = Patches::new(Candidates::new(hits.normal, hits.direction, hits.radius));
-        for (disc, sighting) in self.discs.iter().zip(&self.sightings) {
-            let offset = Vec3Lanes::splat(disc.center).minus(hits.position);
-            let (_, is_pierced) = pierced::<L::Wide>(sighting);
-            patches.add(offset, Vec3Lanes::splat(disc.normal), is_pierced);
-        }
-        let enclosed = patches.enclosed();
-        let mut judgements = judge_wide::<L>(&self.scene.points, lanes & !enclosed, hits);
-        for lane in 0..WIDE {
-            if (lanes & enclosed) >> lane & 1 == 1 {
-                judgements[lane] = Judgement::Enclosed;
-            }
-        }
-        judgements
     }
 
     /// Replaces normals by those of planes through the discs' centres, where these span one.
@@ -225,10 +210,4 @@ impl Mixer<'_> {
         }
         Vec3Lanes::load_wide(&[x, y, z])
     }
-}
-
-#[inline(always)]
-fn pierced<W: Wide>(sighting: &Sighting) -> (W, W::Mask) {
-    let distances = W::load(&sighting.distances);
-    (distances, distances.less_equal(W::splat(f32::MAX)))
 }

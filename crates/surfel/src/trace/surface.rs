@@ -105,7 +105,7 @@ impl Judge for WithinBoundary<'_> {
             direction,
             radius: L::Wide::splat(self.radius(slot)),
         };
-        let judgements = judge_wide::<L>(&self.0.points, lanes, &hits);
+        let judgements = judge_wide::<L>(&self.0.points, &[], lanes, &hits);
         let mut counting = 0;
         for lane in 0..WIDE {
             counting |= u32::from(judgements[lane] != Judgement::Outside) << lane;
