@@ -152,7 +152,7 @@ fn decoded_points_are_within_a_thousandth_of_their_radius() {
                     <= 1e-3 * radius + 2e-4 * f32::from(name == "far away" || name == "outlier"),
                 "{name} {id}"
             );
-            assert!((disc.radius - radius).abs() <= 2e-3 * radius, "{name} {id}");
+            assert!((disc.radius - radius).abs() < 2e-3 * radius, "{name} {id}");
         }
     }
 }
