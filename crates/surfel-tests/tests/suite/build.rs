@@ -1,12 +1,12 @@
 //! Trees over bad input: building ends, memory is bounded, and every hit is found.
 
+use crate::plain::Plain;
 use surfel::flat::{FlatScene, NO_POINT};
-use surfel::math::{Aabb, LANES, LaneMask, Lanes, PortableLanes, Random, Ray, Vec3};
+use surfel::math::{Aabb, Random, Ray, Vec3};
 use surfel::points::PointCloud;
 use surfel::progress::Silent;
 use surfel::scene::Scene;
-use surfel::surface::{Disc, RayLanes, Shape, Sphere, SurfaceKind};
-use surfel::trace::{self, Hit, Simd};
+use surfel::surface::SurfaceKind;
 use surfel_tests::{clouds, scenes};
 
 /// Not prepared, which would mend it.
@@ -32,7 +32,7 @@ fn ball(n: usize) -> Vec<Vec3> {
     (0..n).map(|_| Vec3::new(gaussian(), gaussian(), gaussian())).collect()
 }
 
-fn bad_clouds() -> Vec<(&'static str, PointCloud)> {
+pub fn bad_clouds() -> Vec<(&'static str, PointCloud)> {
     let line = |x: fn(usize) -> f32, n: usize| (0..n).map(|i| Vec3::X * x(i)).collect();
     let with_copies = [ball(3000), vec![Vec3::splat(0.3); 10_000]].concat();
     let survey = ball(3000).iter().map(|p| 0.05 * *p + Vec3::new(1e7, -1e7, 0.0)).collect();
@@ -86,7 +86,7 @@ fn every_hit_in_a_bad_cloud_is_found() {
         for kind in [SurfaceKind::Sphere, SurfaceKind::Disc] {
             let flat = flat(cloud.clone(), kind);
             let rays = rays_toward(&cloud, 150);
-            check(name, &flat, &rays);
+            Plain::new(&flat, rays).check_in_order(name);
         }
     }
 }
@@ -110,14 +110,14 @@ fn points_that_cannot_be_hit_are_left_out() {
         let ids: Vec<u32> = flat.points.slots().map(|slot| flat.points.id(slot)).collect();
         assert!(!ids.iter().any(|id| left_out.contains(id)));
         assert_eq!(ids.len() + left_out.len(), cloud.len());
-        check("NaN", &flat, &rays_toward(&cloud.subset(&ids), 300));
+        Plain::new(&flat, rays_toward(&cloud.subset(&ids), 300)).check_in_order("NaN");
     }
     cloud.positions.fill(Vec3::NAN);
     assert!(flat(cloud, SurfaceKind::Disc).points.nodes.is_empty());
 }
 
 /// From around the cloud toward points of it.
-fn rays_toward(cloud: &PointCloud, n: usize) -> Vec<Ray> {
+pub fn rays_toward(cloud: &PointCloud, n: usize) -> Vec<Ray> {
     let bounds = Aabb::of_points(cloud.positions.iter().copied());
     let mut random = Random::new(23, 0);
     let mut gaussian = || random.next_gaussian() as f32;
@@ -129,33 +129,4 @@ fn rays_toward(cloud: &PointCloud, n: usize) -> Vec<Ray> {
             Ray::new(origin, (target - origin).normalize())
         })
         .collect()
-}
-
-/// The nearest hits are those of a plain loop over all blocks.
-pub fn check(name: &str, scene: &FlatScene, rays: &[Ray]) {
-    let mut hits = vec![Hit::MISS; rays.len()];
-    trace::closest_hits(scene, Simd::detect(), rays, &mut hits);
-    for (ray, hit) in rays.iter().zip(&hits) {
-        assert_eq!(*hit, plain_closest_hit(scene, ray), "{name}, {:?}, {ray:?}", scene.surface);
-    }
-}
-
-fn plain_closest_hit(scene: &FlatScene, ray: &Ray) -> Hit {
-    let ray_lanes = RayLanes::new(ray);
-    let mut nearest = Hit::MISS;
-    for (block_idx, block) in scene.points.blocks.iter().enumerate() {
-        let points = block.points::<PortableLanes>(ray.origin);
-        let (distances, mask) = match scene.surface {
-            SurfaceKind::Sphere => Sphere::intersect(&points, &ray_lanes),
-            _ => Disc::intersect(&points, &ray_lanes),
-        };
-        let lanes = mask.bits() & u32::from(block.occupied());
-        for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
-            let distance = distances.store()[lane];
-            if distance < nearest.distance && distance <= ray.t_max {
-                nearest = Hit { distance, slot: (block_idx * LANES + lane) as u32 };
-            }
-        }
-    }
-    nearest
 }

@@ -2,6 +2,8 @@
 
 mod build;
 mod light;
+mod modes;
+mod plain;
 mod quality;
 mod reference;
 mod refit;

@@ -1,6 +1,7 @@
 //! Moved points in the tree they had: the same bytes if they have not moved, the same hits if they have.
 
-use crate::build::{check, flat};
+use crate::build::flat;
+use crate::plain::Plain;
 use surfel::flat::{FlatScene, REBUILD_COST, Refit};
 use surfel::math::{Quat, Random, Vec3};
 use surfel::points::PointCloud;
@@ -62,7 +63,7 @@ fn moved_points_are_hit_where_they_are() {
         let moved = twisted(cloud(), 0.4);
         assert!(matches!(refit(&mut scene, &moved), Refit::Kept { .. }), "{kind:?}");
         scene.points.validate(kind);
-        check("twisted", &scene, &rays);
+        Plain::new(&scene, rays.clone()).check_in_order("twisted");
         // And back.
         refit(&mut scene, &cloud());
         assert!(same_bytes(&scene, &flat(cloud(), kind)));

@@ -1,71 +1,14 @@
 //! Every search against a plain loop over the decoded points, at every SIMD level.
 
+use crate::plain::Plain;
 use surfel::flat::FlatScene;
-use surfel::math::{DVec3, LANES, LaneMask, Lanes, PortableLanes, Ray, Vec3};
+use surfel::math::{DVec3, LANES, Ray, Vec3};
 use surfel::points::PointCloud;
-use surfel::surface::{
-    Boundary, Disc, MAX_GATHERED, RayLanes, Shape, Sphere, SurfaceKind, gather_limit,
-};
-use surfel::trace::{self, Gather, Hit, Simd, SurfaceHit};
+use surfel::surface::{Boundary, SurfaceKind};
+use surfel::trace::{self, Hit, Simd, SurfaceHit};
 use surfel_tests::{clouds, scenes};
 
-/// One hit with the radius of what was hit.
-type Found = (Hit, f32);
-
-/// All hits in the ray's range, in order.
-fn plain_hits(scene: &FlatScene, ray: &Ray) -> Vec<Found> {
-    let mut found = Vec::new();
-    for (block_idx, block) in scene.points.blocks.iter().enumerate() {
-        let points = block.points::<PortableLanes>(ray.origin);
-        let ray_lanes = RayLanes::new(ray);
-        let (distances, mask) = if scene.surface.is_oriented() {
-            Disc::intersect(&points, &ray_lanes)
-        } else {
-            Sphere::intersect(&points, &ray_lanes)
-        };
-        let lanes = mask.bits() & u32::from(block.occupied());
-        for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
-            let distance = distances.store()[lane];
-            if distance <= ray.t_max {
-                let slot = (block_idx * LANES + lane) as u32;
-                found.push((Hit { distance, slot }, points.radius.store()[lane]));
-            }
-        }
-    }
-    found.sort_by(|(a, _), (b, _)| a.distance.total_cmp(&b.distance).then(a.slot.cmp(&b.slot)));
-    found
-}
-
-fn plain_gather(hits: &[Found]) -> Vec<Hit> {
-    let limit =
-        hits.iter().fold(f32::INFINITY, |all, (hit, r)| all.min(gather_limit(hit.distance, *r)));
-    let near = hits.iter().map(|(hit, _)| *hit).filter(|hit| hit.distance <= limit);
-    near.take(MAX_GATHERED).collect()
-}
-
-fn check(name: &str, scene: &FlatScene, rays: &[Ray]) {
-    let n = rays.len();
-    let expected: Vec<Vec<Found>> = rays.iter().map(|ray| plain_hits(scene, ray)).collect();
-    for simd in Simd::available() {
-        let mut closest = vec![Hit::MISS; n];
-        let mut any = vec![false; n];
-        let mut gathers = vec![Gather::EMPTY; n];
-        trace::closest_hits(scene, simd, rays, &mut closest);
-        trace::any_hits(scene, simd, rays, &mut any);
-        trace::gathers(scene, simd, rays, &mut gathers);
-        for i in 0..n {
-            let context = || format!("{name}, {}, ray {i}: {:?}", simd.name(), rays[i]);
-            let first = expected[i].first().map_or(Hit::MISS, |(hit, _)| *hit);
-            assert_eq!(closest[i], first, "{}", context());
-            assert_eq!(any[i], !expected[i].is_empty(), "{}", context());
-            if scene.surface.is_oriented() {
-                assert_eq!(gathers[i].hits(), plain_gather(&expected[i]), "{}", context());
-            }
-        }
-    }
-}
-
-fn test_clouds() -> Vec<(&'static str, PointCloud)> {
+pub fn test_clouds() -> Vec<(&'static str, PointCloud)> {
     let far = |cloud: &PointCloud| {
         let positions =
             cloud.positions.iter().map(|&p| p + Vec3::new(3000.0, -2000.0, 0.0)).collect();
@@ -96,7 +39,8 @@ fn every_search_equals_a_plain_loop() {
             .map(|ray| Ray { origin: ray.origin + center, ..ray })
             .collect();
         for kind in [SurfaceKind::Sphere, SurfaceKind::Disc, SurfaceKind::SplatFit] {
-            check(name, &scenes::flat(cloud.clone(), kind), &rays);
+            let flat = scenes::flat(cloud.clone(), kind);
+            Plain::new(&flat, rays.clone()).check_in_order(name);
         }
     }
 }
@@ -117,7 +61,7 @@ fn equal_points_are_told_apart_by_their_slot() {
     };
     let flat = FlatScene::new(&scene, &surfel::progress::Silent).unwrap();
     let rays = [Ray::new(Vec3::new(5.0, 2.1, 3.0), -Vec3::X)];
-    check("equal points", &flat, &rays);
+    Plain::new(&flat, rays.to_vec()).check_in_order("equal points");
     let mut hits = [Hit::MISS];
     trace::closest_hits(&flat, Simd::detect(), &rays, &mut hits);
     assert_eq!(hits[0].slot, 0);
