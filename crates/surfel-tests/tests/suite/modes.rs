@@ -428,12 +428,11 @@ fn check_surface(name: &str, scene: &FlatScene, rays: &[Ray]) {
     }
 }
 
-/// Cases that are known to fail: run them with `--ignored`.
+/// Cases that once failed.
 mod known {
     use super::*;
 
     #[test]
-    #[ignore = "a packet gives -0.0, and then takes a farther hit or a higher slot for nearer"]
     fn a_disc_that_the_ray_starts_on_is_hit_at_zero() {
         let rays = grid_rays([-1.0, 0.0, 0.5, 2.0]);
         for n in 1..=17 {
@@ -446,7 +445,6 @@ mod known {
     }
 
     #[test]
-    #[ignore = "with AVX2 a box entered at zero is put behind a hit at zero, and left out"]
     fn of_discs_that_the_ray_starts_on_the_one_in_the_lowest_slot_is_hit() {
         let scene = scenes::flat(clouds::plane(12, 0.0, 1), SurfaceKind::Disc);
         let from_centers = some_slots(&scene).into_iter().flat_map(|slot| {
@@ -459,7 +457,6 @@ mod known {
     }
 
     #[test]
-    #[ignore = "a range that ends at -0.0 is taken for one without an end"]
     fn a_range_may_end_at_negative_zero() {
         let scene = scenes::flat(clouds::sphere(300, 1.0), SurfaceKind::Sphere);
         let rays = camera_rays(&scene, 2).into_iter().map(|ray| {
@@ -470,7 +467,6 @@ mod known {
     }
 
     #[test]
-    #[ignore = "any_hits counts from the far ends, though one is at infinity or nearly so"]
     fn finite_and_infinite_ranges_may_share_a_packet() {
         for kind in [SurfaceKind::Sphere, SurfaceKind::Disc] {
             let scene = scenes::flat(clouds::sphere(300, 1.0), kind);
@@ -484,7 +480,6 @@ mod known {
     }
 
     #[test]
-    #[ignore = "in a packet with a ray that is not a number others miss what they should hit"]
     fn a_ray_that_is_not_a_number_leaves_the_others_of_its_packet_alone() {
         for kind in [SurfaceKind::Sphere, SurfaceKind::Disc] {
             let scene = scenes::flat(clouds::sphere(300, 1.0), kind);
@@ -496,7 +491,6 @@ mod known {
     }
 
     #[test]
-    #[ignore = "the searches look for a root, which a tree without points lacks"]
     fn nothing_is_hit_where_no_point_can_be() {
         let mut cloud = scenes::scene(clouds::sphere(20, 1.0), SurfaceKind::Disc).cloud;
         cloud.positions.fill(Vec3::NAN);

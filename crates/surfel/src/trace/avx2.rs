@@ -288,6 +288,8 @@ impl<L: Level> Lanes for Eight<L> {
             let key = exchange::<0b01_00_11_10, 0b1100_1100>(key);
             let key = exchange::<0b10_11_00_01, 0b1010_1010>(key);
             let others = _mm256_permutevar8x32_ps(others.0, key);
+            // With the bit that tells zero from an empty lane.
+            let low_bits = _mm256_set1_epi32(15);
             (
                 Self(_mm256_castsi256_ps(_mm256_andnot_si256(low_bits, key)), PhantomData),
                 Self(others, PhantomData),

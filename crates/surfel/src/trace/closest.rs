@@ -32,7 +32,7 @@ fn closest_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], hits:
             continue;
         }
         for (lane, ray) in rays.iter().enumerate() {
-            let hit = Hit { distance: ray.t_max, ..Hit::MISS };
+            let hit = Hit { distance: ray.t_max + 0.0, ..Hit::MISS };
             loose.push(Closest::<S>::new(ray, hit));
             indices.push(first * WIDE + lane);
         }
@@ -92,7 +92,8 @@ fn closest_in_packet<L: Lanes, S: Shape>(
     };
     along_packet::<L, true>(points, packet, stack, &mut closest);
     for (lane, hit) in hits.iter_mut().enumerate() {
-        let found = Hit { distance: closest.distances[lane], slot: closest.slots[lane].to_bits() };
+        let found =
+            Hit { distance: closest.distances[lane] + 0.0, slot: closest.slots[lane].to_bits() };
         *hit = if found.is_miss() { Hit::MISS } else { found };
     }
 }
@@ -132,7 +133,7 @@ impl<L: Lanes, S: Shape> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
     #[inline(always)]
     fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
         let ray = &self.packet.rays[lane];
-        let hit = Hit { distance: self.distances[lane], slot: self.slots[lane].to_bits() };
+        let hit = Hit { distance: self.distances[lane] + 0.0, slot: self.slots[lane].to_bits() };
         let hit = BlockHits::<L>::find::<S>(points, block_idx, ray).nearest().nearer(hit);
         self.distances[lane] = hit.distance;
         self.slots[lane] = f32::from_bits(hit.slot);

@@ -7,6 +7,10 @@ use crate::math::{LANES, LaneMask, Lanes, Ray, Vec3, WIDE, Wide};
 
 /// Rays whose slopes differ by more than this are no packet.
 const WIDEST: f32 = 0.25;
+/// Ends beyond this are no place to count from.
+const FAR: f32 = 1e18;
+/// The lanes of all rays.
+const ALL: u32 = (1 << WIDE) - 1;
 
 /// False for most rays that go different ways, told from a few of them before any work on all.
 ///
@@ -71,7 +75,7 @@ impl Frustum {
         let main = main_axis(first.direction);
         let sense = 1f32.copysign(first.direction[main]);
         let along = rays.direction[main] * W::splat(sense);
-        if along.min_lane() <= 0.0 {
+        if W::splat(0.0).less(along).bits() != ALL {
             return None;
         }
         let across = [(main + 1) % 3, (main + 2) % 3];
@@ -81,7 +85,7 @@ impl Frustum {
         if !(slope[0].1 - slope[0].0 < WIDEST && slope[1].1 - slope[1].0 < WIDEST) {
             return None;
         }
-        let is_backward = ends_meet && first.t_max < f32::INFINITY;
+        let is_backward = ends_meet && rays.t_max.less(W::splat(FAR)).bits() == ALL;
         let mut anchor = if is_backward { first.at(first.t_max) } else { first.origin };
         // The plane from which x counts lies before all starts, or behind all ends.
         let starts = if is_backward {
@@ -98,6 +102,12 @@ impl Frustum {
             rays.origin[1] - W::splat(anchor.y),
             rays.origin[2] - W::splat(anchor.z),
         ];
+        // Lowest and highest of lanes, one of which is not a number, may be those of only some.
+        let all = start[0] + start[1] + start[2] + slopes[0] + slopes[1];
+        let is_finite = all.less(W::splat(f32::INFINITY)) & W::splat(f32::NEG_INFINITY).less(all);
+        if is_finite.bits() != ALL {
+            return None;
+        }
         let distance = Vec3::new(largest(start[0]), largest(start[1]), largest(start[2]));
         let offset = [
             range(start[across[0]] - start[main] * slopes[0]),

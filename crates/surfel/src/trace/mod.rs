@@ -49,30 +49,48 @@ macro_rules! at_level {
 
 /// The nearest shape on each ray, each point on its own.
 pub fn closest_hits(scene: &FlatScene, simd: Simd, rays: &[Ray], hits: &mut [Hit]) {
+    if scene.points.nodes.is_empty() {
+        return hits.fill(Hit::MISS);
+    }
     at_level!(simd, closest::closest_hits(scene, rays, hits));
 }
 
 /// Whether any shape lies in each ray's range, each point on its own.
 pub fn any_hits(scene: &FlatScene, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
+    if scene.points.nodes.is_empty() {
+        return occluded.fill(false);
+    }
     at_level!(simd, any::any_hits(scene, rays, occluded));
 }
 
 /// The nearest shapes on each ray, all within a radius of each other.
 pub fn gathers(scene: &FlatScene, simd: Simd, rays: &[Ray], gathers: &mut [Gather]) {
+    if scene.points.nodes.is_empty() {
+        return gathers.fill(Gather::EMPTY);
+    }
     at_level!(simd, gather::gathers(scene, rays, gathers));
 }
 
 /// The shapes of `gathers` blended, without regard to the surface's boundary; discs only.
 pub fn splats(scene: &FlatScene, simd: Simd, rays: &[Ray], splats: &mut [Splat]) {
+    if scene.points.nodes.is_empty() {
+        return splats.fill(Splat::MISS);
+    }
     at_level!(simd, splat::splats(scene, rays, splats));
 }
 
 /// The nearest place of the continuous surface on each ray.
 pub fn surface_hits(scene: &FlatScene, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    if scene.points.nodes.is_empty() {
+        return hits.fill(SurfaceHit::MISS);
+    }
     at_level!(simd, surface::surface_hits(scene, rays, hits));
 }
 
 /// Whether the continuous surface lies in each ray's range.
 pub fn occlusions(scene: &FlatScene, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
+    if scene.points.nodes.is_empty() {
+        return occluded.fill(false);
+    }
     at_level!(simd, surface::occlusions(scene, rays, occluded));
 }
