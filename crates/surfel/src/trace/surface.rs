@@ -164,15 +164,19 @@ fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]
             let found = surface_hit(scene, splat);
             let hit = &mut hits[ray_idx as usize];
             let judgement = splat.judgement;
-            if judgement == Judgement::Enclosed || judgement == Judgement::Edge && hit.is_miss() {
+            let mut t_max = ray.t_max;
+            if judgement == Judgement::Enclosed {
                 *hit = found;
+                continue;
             }
-            if judgement != Judgement::Enclosed {
-                let behind = splat.hit.distance + RESUME * found.radius;
-                let t_min = behind.max(splat.hit.distance * (1.0 + 2.0 * f32::EPSILON));
-                (rays[n_left], searching[n_left]) = (Ray { t_min, ..ray }, ray_idx);
-                n_left += 1;
+            if judgement == Judgement::Edge && hit.is_miss() {
+                *hit = found;
+                t_max = t_max.min(found.distance + found.radius);
             }
+            let behind = splat.hit.distance + RESUME * found.radius;
+            let t_min = behind.max(splat.hit.distance * (1.0 + 2.0 * f32::EPSILON));
+            (rays[n_left], searching[n_left]) = (Ray { t_min, t_max, ..ray }, ray_idx);
+            n_left += 1;
         }
         rays.truncate(n_left);
         if rays.is_empty() {
