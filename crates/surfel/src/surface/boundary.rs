@@ -20,18 +20,6 @@ const FEWEST: u32 = 4;
 /// any number of points takes the same room.
 const SECTORS: usize = 64;
 
-/// How the points lie around a hit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Judgement {
-    /// No gap of 150 degrees: on the surface.
-    Enclosed,
-    /// A gap of 150 to 180 degrees: at an edge, taken if nothing better follows. Up to 200 degrees
-    /// leaves several times as many false pixels at the silhouettes of a cube's points.
-    Edge,
-    /// A wider gap, or too few points: beyond the surface.
-    Outside,
-}
-
 /// A hit in question.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate {
@@ -157,16 +145,19 @@ impl<L: Lanes> Surroundings<L> {
         self.n_near < SPARSE
     }
 
+    /// Whether the points leave no gap of 180 degrees: the hit lies on the surface, not beyond its edge. At
+    /// 150 degrees closed surfaces have holes through which one sees their far side, at 200 several times
+    /// as many pixels at the silhouettes of a cube's points are false.
     #[inline(always)]
-    pub fn judge(&self) -> Judgement {
+    pub fn enclose(&self) -> bool {
         if self.n_near < FEWEST || self.is_from_within() {
-            return Judgement::Outside;
+            return false;
         }
         // Mostly the sectors tell, and it saves the rest.
         match rough_gap(self.taken) {
-            RoughGap::Narrow => Judgement::Enclosed,
-            RoughGap::Wide => Judgement::Outside,
-            RoughGap::Doubtful => self.judge_gaps(),
+            RoughGap::Narrow => true,
+            RoughGap::Doubtful => self.has_no_gap(),
+            RoughGap::Wide => false,
         }
     }
 
@@ -182,33 +173,28 @@ impl<L: Lanes> Surroundings<L> {
         self.free_side.dot(self.normal) < CONTRARY * self.free_side.length()
     }
 
-    fn judge_gaps(&self) -> Judgement {
-        const COS_150: f32 = -0.866_025_4;
+    fn has_no_gap(&self) -> bool {
         let mut taken = self.taken;
         let (first, mut end) = self.sectors[taken.trailing_zeros() as usize % SECTORS];
-        let mut is_done = false;
-        let mut worst = Judgement::Enclosed;
         // Gaps within a sector are too small to count, so only those from one to the next are looked at.
-        while !is_done {
+        loop {
             taken &= taken - 1;
-            is_done = taken == 0;
-            let (low, high) = match is_done {
+            let is_last = taken == 0;
+            let (low, high) = match is_last {
                 true => (first + 4.0, first),
                 false => self.sectors[taken.trailing_zeros() as usize % SECTORS],
             };
             let ((x, y), (next_x, next_y)) = (direction(end), direction(low));
-            let (cos, sin) = (x * next_x + y * next_y, x * next_y - y * next_x);
             // A wrap onto the same point is the full turn.
-            let is_full_turn = first + 4.0 <= low && end <= first;
-            if is_full_turn || sin < 0.0 {
-                return Judgement::Outside;
+            let is_full_turn = is_last && end <= first;
+            if is_full_turn || x * next_y - y * next_x < 0.0 {
+                return false;
             }
-            if cos < COS_150 {
-                worst = Judgement::Edge;
+            if is_last {
+                return true;
             }
             end = high;
         }
-        worst
     }
 }
 
@@ -289,15 +275,15 @@ impl<W: Wide> Vicinities<W> {
 /// What the sectors tell of the widest gap between points.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum RoughGap {
-    /// Less than 150 degrees.
+    /// Less than 180 degrees.
     Narrow,
     Doubtful,
     /// More than 180 degrees.
     Wide,
 }
 
-/// A quarter of the full turn has 16 sectors, of 3.8 to 7.1 degrees: 23 empty ones in a row make, with those
-/// at their ends, a gap of less than 149 degrees, 33 alone one of more than 183.
+/// A quarter of the full turn has 16 sectors: 30 empty ones in a row make, with those at their ends, a gap
+/// of less than 180 degrees, 33 alone one of more.
 #[inline(always)]
 fn rough_gap(taken: u64) -> RoughGap {
     let empty = !taken;
@@ -305,7 +291,7 @@ fn rough_gap(taken: u64) -> RoughGap {
     let four = two & two.rotate_right(2);
     let eight = four & four.rotate_right(4);
     let sixteen = eight & eight.rotate_right(8);
-    if sixteen & eight.rotate_right(16) == 0 {
+    if sixteen & sixteen.rotate_right(15) == 0 {
         RoughGap::Narrow
     } else if sixteen & sixteen.rotate_right(16) & empty.rotate_right(32) == 0 {
         RoughGap::Doubtful
@@ -354,7 +340,7 @@ mod tests {
         degrees.iter().map(place).map(level).collect()
     }
 
-    fn surroundings(hit: &Candidate, points: &[Point]) -> Judgement {
+    fn surroundings(hit: &Candidate, points: &[Point]) -> bool {
         let mut found = Surroundings::<PortableLanes>::new(*hit);
         for points in points.chunks(LANES) {
             let lanes = |value: &dyn Fn(&Point) -> f32| {
@@ -370,27 +356,26 @@ mod tests {
             let (center, normal) = (vector(|point| point.0), vector(|point| point.1));
             found.add(&PointLanes { center, normal, radius: lanes(&|_| 1.0) });
         }
-        found.judge()
+        found.enclose()
     }
 
     const FROM_ABOVE: Candidate =
         Candidate { normal: Vec3::Z, direction: Vec3::NEG_Z, radius: 1.0 };
 
-    fn judge(degrees: &[f32]) -> Judgement {
+    fn judge(degrees: &[f32]) -> bool {
         surroundings(&FROM_ABOVE, &at_angles(degrees))
     }
 
     #[test]
     fn the_largest_gap_decides() {
-        assert_eq!(judge(&[0.0, 90.0, 180.0, 270.0]), Judgement::Enclosed);
-        assert_eq!(judge(&[0.0, 70.0, 140.0, 211.0]), Judgement::Enclosed);
-        assert_eq!(judge(&[0.0, 60.0, 120.0, 208.0]), Judgement::Edge);
-        assert_eq!(judge(&[10.0, 60.0, 120.0, 191.0]), Judgement::Edge);
-        assert_eq!(judge(&[10.0, 60.0, 120.0, 189.0]), Judgement::Outside);
-        assert_eq!(judge(&[0.0, 20.0, 40.0, 60.0]), Judgement::Outside);
-        assert_eq!(judge(&[300.0, 301.0, 299.0, 298.0]), Judgement::Outside);
-        assert_eq!(judge(&[45.0; 5]), Judgement::Outside);
-        assert_eq!(judge(&[0.0, 120.0, 240.0]), Judgement::Outside);
+        assert!(judge(&[0.0, 90.0, 180.0, 270.0]));
+        assert!(judge(&[0.0, 60.0, 120.0, 208.0]));
+        assert!(judge(&[10.0, 60.0, 120.0, 191.0]));
+        assert!(!judge(&[10.0, 60.0, 120.0, 189.0]));
+        assert!(!judge(&[0.0, 20.0, 40.0, 60.0]));
+        assert!(!judge(&[300.0, 301.0, 299.0, 298.0]));
+        assert!(!judge(&[45.0; 5]));
+        assert!(!judge(&[0.0, 120.0, 240.0]));
     }
 
     #[test]
@@ -408,9 +393,9 @@ mod tests {
     fn any_number_of_points_counts_to_the_last() {
         // The first hundred all lie on one side; the last two close the gap.
         let mut degrees: Vec<f32> = (0..100).map(|i| i as f32).collect();
-        assert_eq!(judge(&degrees), Judgement::Outside);
+        assert!(!judge(&degrees));
         degrees.extend([200.0, 280.0]);
-        assert_eq!(judge(&degrees), Judgement::Enclosed);
+        assert!(judge(&degrees));
     }
 
     #[test]
@@ -424,13 +409,9 @@ mod tests {
             angles.sort_by(f32::total_cmp);
             angles.push(angles[0] + 360.0);
             let widest = angles.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f32::max);
-            let expected = match widest {
-                ..149.99 => Judgement::Enclosed,
-                150.01..179.99 => Judgement::Edge,
-                180.01.. => Judgement::Outside,
-                _ => continue,
-            };
-            assert_eq!(found, expected, "{angles:?}");
+            if 0.01 < (widest - 180.0).abs() {
+                assert_eq!(found, widest < 180.0, "{angles:?}");
+            }
         }
     }
 
@@ -439,11 +420,11 @@ mod tests {
         let mut points = at_angles(&[0.0, 90.0, 180.0]);
         for stray in [Vec3::new(0.0, -1.4, 0.0), Vec3::new(0.0, -0.5, 0.9)] {
             points.push(level(stray));
-            assert_eq!(surroundings(&FROM_ABOVE, &points), Judgement::Outside);
+            assert!(!surroundings(&FROM_ABOVE, &points));
             points.pop();
         }
         points.push(level(Vec3::new(0.0, -1.2, 0.0)));
-        assert_eq!(surroundings(&FROM_ABOVE, &points), Judgement::Enclosed);
+        assert!(surroundings(&FROM_ABOVE, &points));
     }
 
     /// Points of a cylinder of radius 2 along Y under the place where a ray along +X passes it.
@@ -467,10 +448,10 @@ mod tests {
         let at = (2.0 - (2.0 + height) * angle.cos()) / angle.sin();
         let outward = Vec3::new(angle.sin(), 0.0, angle.cos());
         let from_within = Candidate { normal: -outward, direction: Vec3::X, radius: 1.0 };
-        assert_eq!(surroundings(&from_within, &bend(height, at)), Judgement::Outside);
+        assert!(!surroundings(&from_within, &bend(height, at)));
         // Its mirror image before the top is met from outside.
         let outward = Vec3::new(-angle.sin(), 0.0, angle.cos());
         let from_outside = Candidate { normal: outward, direction: Vec3::X, radius: 1.0 };
-        assert_eq!(surroundings(&from_outside, &bend(height, -at)), Judgement::Enclosed);
+        assert!(surroundings(&from_outside, &bend(height, -at)));
     }
 }

@@ -4,9 +4,7 @@ use super::region::{RegionVisitor, within};
 use super::sightings::Sighting;
 use crate::flat::{FlatPoints, PointBlock};
 use crate::math::{Aabb, Floats, LANES, LaneMask, Lanes, Task, Vec3, Vec3Lanes, WIDE, Wide};
-use crate::surface::{
-    Candidate, Candidates, Judgement, NEIGHBOR_REACH, Surroundings, Verdicts, Vicinities,
-};
+use crate::surface::{Candidate, Candidates, NEIGHBOR_REACH, Surroundings, Verdicts, Vicinities};
 use std::marker::PhantomData;
 
 /// A neighbourhood with too few points to judge by is looked at once more this many times as wide.
@@ -16,9 +14,9 @@ const SPREAD: f32 = 3.0;
 /// Blocks near them that are kept in mind.
 const MAX_BLOCKS: usize = 64;
 
-/// Judges a hit at `position` by all points near it.
+/// Whether the points near it enclose a hit at `position`.
 #[inline(always)]
-pub fn judge<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> Judgement {
+pub fn is_enclosed<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> bool {
     L::call(JudgeOne { points, position, hit, lanes: PhantomData::<L> })
 }
 
@@ -30,10 +28,10 @@ struct JudgeOne<'p, L> {
 }
 
 impl<L: Lanes> Task for JudgeOne<'_, L> {
-    type Output = Judgement;
+    type Output = bool;
 
     #[inline(always)]
-    fn run(self) -> Judgement {
+    fn run(self) -> bool {
         let Self { points, position, mut hit, .. } = self;
         loop {
             let mut found = Neighborhood { position, surroundings: Surroundings::<L>::new(hit) };
@@ -41,7 +39,7 @@ impl<L: Lanes> Task for JudgeOne<'_, L> {
             let region = Aabb { min: position - reach, max: position + reach };
             within::<L>(points, &region, &mut found);
             if !found.surroundings.is_sparse() || self.hit.radius < hit.radius {
-                return found.surroundings.judge();
+                return found.surroundings.enclose();
             }
             hit.radius *= WIDER;
         }
@@ -71,18 +69,17 @@ pub struct WideHits<W> {
     pub radius: W,
 }
 
-/// As `judge` does; hits close to each other share the way through the tree. Only what stands in `lanes`
-/// counts.
+/// The `lanes` in which hits are enclosed. Hits close to each other share the way through the tree.
 ///
 /// A hit that is enclosed by the points in the blocks of the discs that its ray pierces is not looked at any
 /// further. `sightings` are these, sorted by slot; there need not be any.
 #[inline(always)]
-pub fn judge_wide<L: Lanes>(
+pub fn enclosed<L: Lanes>(
     points: &FlatPoints,
     sightings: &[Sighting],
     lanes: u32,
     hits: &WideHits<L::Wide>,
-) -> [Judgement; WIDE] {
+) -> u32 {
     L::call(JudgeWide::<L> { points, sightings, lanes, hits })
 }
 
@@ -94,15 +91,14 @@ struct JudgeWide<'p, L: Lanes> {
 }
 
 impl<L: Lanes> Task for JudgeWide<'_, L> {
-    type Output = [Judgement; WIDE];
+    type Output = u32;
 
     #[inline(always)]
-    fn run(self) -> [Judgement; WIDE] {
+    fn run(self) -> u32 {
         let Self { points, sightings, mut lanes, hits } = self;
-        let mut judgements = [Judgement::Outside; WIDE];
+        let mut enclosed = 0;
         if !sightings.is_empty() {
-            let enclosed = lanes & enclosed_by_blocks::<L>(points, sightings, hits);
-            set_enclosed(&mut judgements, enclosed);
+            enclosed = lanes & enclosed_by_blocks::<L>(points, sightings, hits);
             lanes &= !enclosed;
         }
         let [x, y, z] = hits.position.store_wide();
@@ -112,17 +108,9 @@ impl<L: Lanes> Task for JudgeWide<'_, L> {
             let center = Vec3::new(x[first], y[first], z[first]);
             let group = 1 << first | lanes & hits.near(center, SPREAD * radii[first]);
             lanes &= !group;
-            judge_group::<L>(points, group, hits, &mut judgements);
+            enclosed |= judge_group::<L>(points, group, hits);
         }
-        judgements
-    }
-}
-
-#[inline(always)]
-fn set_enclosed(judgements: &mut [Judgement; WIDE], mut lanes: u32) {
-    while lanes != 0 {
-        judgements[lanes.trailing_zeros() as usize % WIDE] = Judgement::Enclosed;
-        lanes &= lanes - 1;
+        enclosed
     }
 }
 
@@ -177,12 +165,7 @@ fn show_block<L: Lanes>(
 }
 
 #[inline(always)]
-fn judge_group<L: Lanes>(
-    points: &FlatPoints,
-    group: u32,
-    hits: &WideHits<L::Wide>,
-    judgements: &mut [Judgement; WIDE],
-) {
+fn judge_group<L: Lanes>(points: &FlatPoints, group: u32, hits: &WideHits<L::Wide>) -> u32 {
     let candidates = Candidates::new(hits.normal, hits.direction, hits.radius);
     let mut found = Neighborhoods::<L> {
         position: hits.position,
@@ -192,13 +175,14 @@ fn judge_group<L: Lanes>(
     };
     within::<L>(points, &hits.region(group), &mut found);
     let Verdicts { enclosed, outside } = found.vicinities.judge();
-    set_enclosed(judgements, group & enclosed);
     let mut doubtful = group & !(enclosed | outside);
+    let mut enclosed = group & enclosed;
     while doubtful != 0 {
         let lane = doubtful.trailing_zeros() as usize % WIDE;
         doubtful &= doubtful - 1;
-        judgements[lane] = found.judge_again(points, hits.in_lane(lane));
+        enclosed |= u32::from(found.judge_again(points, hits.in_lane(lane))) << lane;
     }
+    enclosed
 }
 
 impl<W: Wide> WideHits<W> {
@@ -254,17 +238,17 @@ struct Neighborhoods<L: Lanes> {
 impl<L: Lanes> Neighborhoods<L> {
     /// By exact angles, or farther around.
     #[inline(always)]
-    fn judge_again(&self, points: &FlatPoints, (position, hit): (Vec3, Candidate)) -> Judgement {
+    fn judge_again(&self, points: &FlatPoints, (position, hit): (Vec3, Candidate)) -> bool {
         if let Some(blocks) = self.blocks.get(..self.n_blocks) {
             let mut surroundings = Surroundings::<L>::new(hit);
             for block_idx in blocks {
                 surroundings.add(&points.blocks[*block_idx as usize].points(position));
             }
             if !surroundings.is_sparse() {
-                return surroundings.judge();
+                return surroundings.enclose();
             }
         }
-        judge::<L>(points, position, hit)
+        is_enclosed::<L>(points, position, hit)
     }
 }
 

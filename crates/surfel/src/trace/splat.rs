@@ -1,6 +1,6 @@
 //! The discs near each ray's first one, blended: sixteen rays at a time.
 
-use super::boundary::{WideHits, judge_wide};
+use super::boundary::{WideHits, enclosed};
 use super::closest::closest_hits;
 use super::gather::gather;
 use super::hit::Hit;
@@ -8,7 +8,7 @@ use super::packet::{PacketStack, WideRays};
 use super::sightings::{Sighting, settle};
 use crate::flat::FlatScene;
 use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
-use crate::surface::{Blend, Gathered, Judgement, MAX_GATHERED, SurfaceKind, plane_normal};
+use crate::surface::{Blend, Gathered, MAX_GATHERED, SurfaceKind, plane_normal};
 
 /// The blended discs of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,8 +22,8 @@ pub struct Splat {
     pub normal: Vec3,
     /// Linear.
     pub color: Vec3,
-    /// Found only where it is asked for.
-    pub(super) judgement: Judgement,
+    /// Whether the points around it enclose the hit; found only where it is asked for.
+    pub(super) is_enclosed: bool,
 }
 
 impl Splat {
@@ -33,7 +33,7 @@ impl Splat {
         radius: 0.0,
         normal: Vec3::ZERO,
         color: Vec3::ZERO,
-        judgement: Judgement::Outside,
+        is_enclosed: false,
     };
 }
 
@@ -126,7 +126,7 @@ impl Mixer<'_> {
             normals = self.fit_planes(normals, splats.len());
         }
         let n_discs = nearest.n_discs.store();
-        let mut judgements = [Judgement::Outside; WIDE];
+        let mut is_enclosed = 0;
         if self.judges {
             let hits = WideHits {
                 position: origin.plus(direction.scaled(nearest.distances)),
@@ -136,7 +136,7 @@ impl Mixer<'_> {
             };
             let is_hit = L::Wide::splat(0.0).less(nearest.n_discs).bits();
             let lanes = is_hit & ((1 << splats.len()) - 1);
-            judgements = judge_wide::<L>(&self.scene.points, &self.sightings, lanes, &hits);
+            is_enclosed = enclosed::<L>(&self.scene.points, &self.sightings, lanes, &hits);
         }
         self.sightings.clear();
         let (distances, slots) = (nearest.distances.store(), nearest.slots.store());
@@ -154,7 +154,7 @@ impl Mixer<'_> {
                     radius: radii[lane],
                     normal: vector(&normals),
                     color: vector(&colors),
-                    judgement: judgements[lane],
+                    is_enclosed: is_enclosed >> lane & 1 == 1,
                 };
             }
         }

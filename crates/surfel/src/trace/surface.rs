@@ -1,14 +1,14 @@
 //! The continuous surface: discs gathered and blended, hits beyond its boundary refused.
 
 use super::any::{Judge, any_hits, any_that_counts};
-use super::boundary::{WideHits, judge, judge_wide};
+use super::boundary::{WideHits, enclosed, is_enclosed};
 use super::closest::closest_hits;
 use super::hit::Hit;
 use super::packet::WideRays;
 use super::splat::{Splat, find_splats};
 use crate::flat::{FlatScene, Slot};
-use crate::math::{Floats, Lanes, Ray, Vec3, Vec3Lanes, WIDE};
-use crate::surface::{Boundary, Candidate, Disc, Judgement};
+use crate::math::{Floats, Lanes, Ray, Vec3, Vec3Lanes};
+use crate::surface::{Boundary, Candidate, Disc};
 
 /// Where a ray meets the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,8 +53,7 @@ pub(super) fn surface_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut
     }
 }
 
-/// Whether the surface blocks each ray: at an edge as well, which a ray that sees it would take in the
-/// end, whatever follows. So any such hit settles it.
+/// Whether the surface blocks each ray.
 #[inline(always)]
 pub(super) fn occlusions<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &mut [bool]) {
     if !scene.surface.is_oriented() || scene.boundary == Boundary::Off {
@@ -84,7 +83,7 @@ impl Judge for WithinBoundary<'_> {
             direction: ray.direction,
             radius: self.radius(hit.slot),
         };
-        judge::<L>(&self.0.points, ray.at(hit.distance), candidate) != Judgement::Outside
+        is_enclosed::<L>(&self.0.points, ray.at(hit.distance), candidate)
     }
 
     #[inline(always)]
@@ -105,12 +104,7 @@ impl Judge for WithinBoundary<'_> {
             direction,
             radius: L::Wide::splat(self.radius(slot)),
         };
-        let judgements = judge_wide::<L>(&self.0.points, &[], lanes, &hits);
-        let mut counting = 0;
-        for lane in 0..WIDE {
-            counting |= u32::from(judgements[lane] != Judgement::Outside) << lane;
-        }
-        counting & lanes
+        enclosed::<L>(&self.0.points, &[], lanes, &hits)
     }
 }
 
@@ -136,8 +130,7 @@ fn sphere_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit
     }
 }
 
-/// All rays search on together until each has a hit within the boundary, or nothing is left on it. A hit at
-/// an edge stands if none follows.
+/// All rays search on together until each has a hit within the boundary, or nothing is left on it.
 #[inline(always)]
 fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]) {
     hits.fill(SurfaceHit::MISS);
@@ -162,20 +155,13 @@ fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]
                 continue;
             }
             let found = surface_hit(scene, splat);
-            let hit = &mut hits[ray_idx as usize];
-            let judgement = splat.judgement;
-            let mut t_max = ray.t_max;
-            if judgement == Judgement::Enclosed {
-                *hit = found;
+            if splat.is_enclosed {
+                hits[ray_idx as usize] = found;
                 continue;
-            }
-            if judgement == Judgement::Edge && hit.is_miss() {
-                *hit = found;
-                t_max = t_max.min(found.distance + found.radius);
             }
             let behind = splat.hit.distance + RESUME * found.radius;
             let t_min = behind.max(splat.hit.distance * (1.0 + 2.0 * f32::EPSILON));
-            (rays[n_left], searching[n_left]) = (Ray { t_min, t_max, ..ray }, ray_idx);
+            (rays[n_left], searching[n_left]) = (Ray { t_min, ..ray }, ray_idx);
             n_left += 1;
         }
         rays.truncate(n_left);
