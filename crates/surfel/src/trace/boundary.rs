@@ -10,20 +10,31 @@ use std::marker::PhantomData;
 /// A neighbourhood with too few points to judge by is looked at once more this many times as wide.
 const WIDER: f32 = 2.0;
 /// Hits at most this many radii from the first of them, along any axis, are judged together.
-const SPREAD: f32 = 3.0;
+const SPREAD: f32 = 2.0;
+/// Fewer hits are judged one by one.
+const FEWEST_TOGETHER: u32 = 3;
 /// Blocks near them that are kept in mind.
 const MAX_BLOCKS: usize = 64;
 
 /// Whether the points near it enclose a hit at `position`.
 #[inline(always)]
 pub fn is_enclosed<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> bool {
-    L::call(JudgeOne { points, position, hit, lanes: PhantomData::<L> })
+    L::call(JudgeOne { points, position, hit, is_last: false, lanes: PhantomData::<L> })
+}
+
+/// The same, once too few points are known to be near.
+#[inline(always)]
+fn is_enclosed_widely<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> bool {
+    let hit = Candidate { radius: WIDER * hit.radius, ..hit };
+    L::call(JudgeOne { points, position, hit, is_last: true, lanes: PhantomData::<L> })
 }
 
 struct JudgeOne<'p, L> {
     points: &'p FlatPoints,
     position: Vec3,
     hit: Candidate,
+    /// Whether one does not look farther around.
+    is_last: bool,
     lanes: PhantomData<L>,
 }
 
@@ -32,16 +43,17 @@ impl<L: Lanes> Task for JudgeOne<'_, L> {
 
     #[inline(always)]
     fn run(self) -> bool {
-        let Self { points, position, mut hit, .. } = self;
+        let Self { points, position, mut hit, mut is_last, .. } = self;
         loop {
             let mut found = Neighborhood { position, surroundings: Surroundings::<L>::new(hit) };
             let reach = Vec3::splat(NEIGHBOR_REACH * hit.radius);
             let region = Aabb { min: position - reach, max: position + reach };
             within::<L>(points, &region, &mut found);
-            if !found.surroundings.is_sparse() || self.hit.radius < hit.radius {
+            if is_last || !found.surroundings.is_sparse() {
                 return found.surroundings.enclose();
             }
             hit.radius *= WIDER;
+            is_last = true;
         }
     }
 }
@@ -108,7 +120,11 @@ impl<L: Lanes> Task for JudgeWide<'_, L> {
             let center = Vec3::new(x[first], y[first], z[first]);
             let group = 1 << first | lanes & hits.near(center, SPREAD * radii[first]);
             lanes &= !group;
-            enclosed |= judge_group::<L>(points, group, hits);
+            enclosed |= if group.count_ones() < FEWEST_TOGETHER {
+                judge_each::<L>(points, group, hits)
+            } else {
+                judge_group::<L>(points, group, hits)
+            };
         }
         enclosed
     }
@@ -162,6 +178,18 @@ fn show_block<L: Lanes>(
         };
         vicinities.add(offset, normal, lanes);
     }
+}
+
+#[inline(always)]
+fn judge_each<L: Lanes>(points: &FlatPoints, mut lanes: u32, hits: &WideHits<L::Wide>) -> u32 {
+    let mut enclosed = 0;
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize % WIDE;
+        lanes &= lanes - 1;
+        let (position, hit) = hits.in_lane(lane);
+        enclosed |= u32::from(is_enclosed::<L>(points, position, hit)) << lane;
+    }
+    enclosed
 }
 
 #[inline(always)]
@@ -244,9 +272,10 @@ impl<L: Lanes> Neighborhoods<L> {
             for block_idx in blocks {
                 surroundings.add(&points.blocks[*block_idx as usize].points(position));
             }
-            if !surroundings.is_sparse() {
-                return surroundings.enclose();
+            if surroundings.is_sparse() {
+                return is_enclosed_widely::<L>(points, position, hit);
             }
+            return surroundings.enclose();
         }
         is_enclosed::<L>(points, position, hit)
     }
