@@ -2,12 +2,10 @@
 
 use surfel::flat::FlatScene;
 use surfel::math::{Ray, Vec3};
-use surfel::trace::{self, Gather, Hit, Simd, SurfaceHit};
+use surfel::trace::{self, Hit, Simd, Splat, SurfaceHit};
 
 /// Rays that a thread claims at a time, at most.
 pub const CHUNK: usize = 1024;
-/// Gathers are large: this many stay near the processor until they are shaded.
-const GATHERS: usize = 256;
 
 /// Of a ray's nearest hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,27 +54,13 @@ pub fn surface(scene: &FlatScene, simd: Simd, rays: &[Ray], found: &mut [Nearest
     }
 }
 
+/// The discs' normals are averaged as `splat` does: each turned with the nearest one, by their nearness to
+/// the ray.
 pub fn gather(scene: &FlatScene, simd: Simd, rays: &[Ray], found: &mut [Shaded]) {
-    let mut gathers = [Gather::EMPTY; GATHERS];
-    for (rays, found) in rays.chunks(GATHERS).zip(found.chunks_mut(GATHERS)) {
-        let gathers = &mut gathers[..rays.len()];
-        trace::gathers(scene, simd, rays, gathers);
-        for ((found, ray), gather) in found.iter_mut().zip(rays).zip(gathers) {
-            *found = shade(scene, ray, gather.hits());
-        }
+    let mut splats = [Splat::MISS; CHUNK];
+    let splats = &mut splats[..rays.len()];
+    trace::splats(scene, simd, rays, splats);
+    for (found, splat) in found.iter_mut().zip(splats) {
+        *found = Shaded { normal: splat.normal, n_discs: splat.n_discs as f32 };
     }
-}
-
-/// The mean of the discs' normals, each turned toward the ray's origin, by their nearness to the ray.
-fn shade(scene: &FlatScene, ray: &Ray, hits: &[Hit]) -> Shaded {
-    let mut sum = Vec3::ZERO;
-    for hit in hits {
-        let normal = scene.points.normal(hit.slot);
-        let offset = ray.at(hit.distance) - scene.points.center(hit.slot);
-        let weight = 1.0 - offset.length() / scene.points.radius(hit.slot);
-        // A hit on the rim counts a little, so that a sum of only such has a direction.
-        let weight = if weight <= 0.0 { 1e-6 } else { weight };
-        sum += normal * if 0.0 < normal.dot(ray.direction) { -weight } else { weight };
-    }
-    Shaded { normal: sum.normalize_or_zero(), n_discs: hits.len() as f32 }
 }

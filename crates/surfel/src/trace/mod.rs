@@ -71,7 +71,8 @@ pub fn gathers(scene: &FlatScene, simd: Simd, rays: &[Ray], gathers: &mut [Gathe
     at_level!(simd, gather::gathers(scene, rays, gathers));
 }
 
-/// The shapes of `gathers` blended, without regard to the surface's boundary; discs only.
+/// The discs of `gathers` blended as the scene's surface asks for, or else as `splat`; no regard is paid
+/// to the surface's boundary.
 pub fn splats(scene: &FlatScene, simd: Simd, rays: &[Ray], splats: &mut [Splat]) {
     if scene.points.nodes.is_empty() {
         return splats.fill(Splat::MISS);

@@ -39,21 +39,24 @@ impl Splat {
 
 #[inline(always)]
 pub(super) fn splats<L: Lanes>(scene: &FlatScene, rays: &[Ray], splats: &mut [Splat]) {
-    find_splats::<L>(scene, rays, false, splats);
+    let kind = scene.surface;
+    let kind = if kind.is_gathered() { kind } else { SurfaceKind::Splat };
+    find_splats::<L>(scene, kind, rays, false, splats);
 }
 
 /// Judges the hits if asked to.
 #[inline(always)]
 pub(super) fn find_splats<L: Lanes>(
     scene: &FlatScene,
+    kind: SurfaceKind,
     rays: &[Ray],
     judges: bool,
     splats: &mut [Splat],
 ) {
     let mut stack = PacketStack::new();
-    let mut mixer = Mixer { scene, judges, sightings: Vec::new(), discs: Vec::new() };
+    let mut mixer = Mixer { scene, kind, judges, sightings: Vec::new(), discs: Vec::new() };
     for (rays, splats) in rays.chunks(WIDE).zip(splats.chunks_mut(WIDE)) {
-        let limits = if scene.surface.is_gathered() {
+        let limits = if kind.is_gathered() {
             gather::<L>(&scene.points, rays, &mut stack, &mut mixer.sightings)
         } else {
             find_closest::<L>(scene, rays, &mut mixer.sightings)
@@ -80,6 +83,7 @@ fn find_closest<L: Lanes>(
 /// Blends sightings into splats.
 struct Mixer<'s> {
     scene: &'s FlatScene,
+    kind: SurfaceKind,
     judges: bool,
     sightings: Vec<Sighting>,
     discs: Vec<Gathered>,
@@ -111,7 +115,7 @@ impl Mixer<'_> {
         }
         let nearest = self.find_nearest::<L::Wide>();
         let (origin, direction) = (rays.origin(), rays.direction());
-        let mut blend = Blend::new(self.scene.surface, nearest.normals, direction);
+        let mut blend = Blend::new(self.kind, nearest.normals, direction);
         for (disc, sighting) in self.discs.iter().zip(&self.sightings) {
             let distances = L::Wide::load(&sighting.distances);
             let position = origin.plus(direction.scaled(distances));
@@ -122,7 +126,7 @@ impl Mixer<'_> {
             );
         }
         let (mut normals, colors) = blend.finish();
-        if self.scene.surface == SurfaceKind::SplatFit {
+        if self.kind == SurfaceKind::SplatFit {
             normals = self.fit_planes(normals, splats.len());
         }
         let n_discs = nearest.n_discs.store();

@@ -136,7 +136,7 @@ fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]
     hits.fill(SurfaceHit::MISS);
     if scene.boundary == Boundary::Off {
         let mut splats = vec![Splat::MISS; rays.len()];
-        find_splats::<L>(scene, rays, false, &mut splats);
+        find_splats::<L>(scene, scene.surface, rays, false, &mut splats);
         for (hit, splat) in hits.iter_mut().zip(&splats) {
             *hit = surface_hit(scene, splat);
         }
@@ -147,7 +147,7 @@ fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]
     let mut splats = vec![Splat::MISS; rays.len()];
     for _ in 0..MAX_REFUSALS {
         let splats = &mut splats[..rays.len()];
-        find_splats::<L>(scene, &rays, true, splats);
+        find_splats::<L>(scene, scene.surface, &rays, true, splats);
         let mut n_left = 0;
         for i in 0..splats.len() {
             let (splat, ray, ray_idx) = (&splats[i], rays[i], searching[i]);
