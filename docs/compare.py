@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Runs `surfel bench` and the Embree point benchmark in turn and prints the ratios as a table.
 
-  compare.py SURFEL EMBREE_POINTS CLOUDS... [--rounds 3] [--threads 1,2] [--surfaces disc,sphere]
+  compare.py SURFEL EMBREE_POINTS CLOUDS... [--rounds 7] [--surfaces disc,sphere]
 
-CLOUDS are NAME.bin with NAME.cam beside. Both programs trace the same rays; rates are million rays a
-second of processor time over threads, the median of seven runs. Embree counts with the better of its two
-set-ups for each kind of ray. A ratio is the median over the rounds; in brackets its least and greatest.
+CLOUDS are NAME.bin with NAME.cam beside. Both programs trace the same rays, on one thread and on two; rates
+are million rays a second of processor time over threads. In each round every program runs once, in turn.
+Embree counts with the better of its two set-ups for each kind of ray, and of single rays and packets of 16.
+Printed are the medians over the rounds and that of the ratios; in brackets the least and the greatest.
 """
 import argparse, json, re, statistics, subprocess
 from pathlib import Path
@@ -14,31 +15,52 @@ KINDS = {"primary-isect": "primary", "shadow-occl": "shadow", "bounce-occl": "bo
          "bounce-isect": "bounce", "multi-1pass": "gather", "multi-2pass": "gather"}
 
 
+BUILD = "build, s"
+THREADS = (1, 2)
+
+
 def run(command):
     return subprocess.run([str(word) for word in command], check=True, capture_output=True, text=True).stdout
 
 
-def embree(program, cloud, mode, threads):
-    """Best rate of each kind over both set-ups, and the best build seconds."""
+def embree(program, cloud, surface, rounds_rates):
+    """Adds the best rate of each kind over both set-ups, by threads and kind."""
     camera = cloud.with_suffix(".cam").read_text().strip()
-    rates, build = {}, float("inf")
-    for setup in [[], ["--user"]]:
-        text = run([program, cloud, mode, 1024, 1024, camera, "--cfg", f"threads={threads}", *setup])
-        build = min(build, float(re.search(r"build  min ([\d.]+) s", text)[1]))
-        for line in text.splitlines():
-            name = line.split()[0] if line.split() else ""
-            if name in KINDS and (name.startswith("multi") == (mode == "multi")):
-                found = re.search(rf"{threads}T best [\d.]+ median ([\d.]+)", line)
-                kind = KINDS[name]
-                rates[kind] = max(rates.get(kind, 0.0), float(found[1]))
-    return rates, build
+    rates = {}
+    for mode in ["disc", "multi"] if surface == "disc" else [surface]:
+        for setup in [[], ["--user"]]:
+            text = run([program, cloud, mode, 1024, 1024, camera, "--runs", 1, "--k", "1,16", "--fast", *setup])
+            for line in text.splitlines():
+                name = line.split()[0] if line.split() else ""
+                if name in KINDS and name.startswith("multi") == (mode == "multi"):
+                    for threads in THREADS:
+                        rate = float(re.search(rf"{threads}T best [\d.]+ median ([\d.]+)", line)[1])
+                        key = threads, KINDS[name]
+                        rates[key] = max(rates.get(key, 0.0), rate)
+    for threads in THREADS:
+        builds = []
+        for setup in [[], ["--user"]]:
+            command = [program, cloud, surface, 64, 64, camera, "--runs", 0, *setup]
+            text = run([*command, "--cfg", f"threads={threads}"])
+            builds.append(float(re.search(r"build  min ([\d.]+) s", text)[1]))
+        rates[threads, BUILD] = min(builds)
+    add(rounds_rates, rates)
 
 
-def surfel(program, cloud, surface, threads):
+def surfel(program, cloud, surface, rounds_rates):
     command = [program, "bench", cloud, "--camera-file", cloud.with_suffix(".cam"), "--surface", surface]
-    result = json.loads(run([*command, "--threads", threads, "--json"]))
-    rates = {kind: row["median_mrays_per_s"] for kind, row in result["rays"].items()}
-    return rates, result["build_s"]
+    rates = {}
+    for threads in THREADS:
+        result = json.loads(run([*command, "--threads", threads, "--runs", 1, "--json"]))
+        for kind, row in result["rays"].items():
+            rates[threads, kind] = row["median_mrays_per_s"]
+        rates[threads, BUILD] = result["build_s"]
+    add(rounds_rates, rates)
+
+
+def add(rounds_rates, rates):
+    for key, rate in rates.items():
+        rounds_rates.setdefault(key, []).append(rate)
 
 
 def main():
@@ -46,35 +68,25 @@ def main():
     parser.add_argument("surfel")
     parser.add_argument("embree")
     parser.add_argument("clouds", nargs="+", type=Path)
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--threads", default="1,2")
+    parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--surfaces", default="disc,sphere")
     args = parser.parse_args()
     print("| cloud | surface | threads | rays | surfel | Embree | ratio |\n|---|---|---|---|---|---|---|")
     for cloud in args.clouds:
         for surface in args.surfaces.split(","):
-            for threads in map(int, args.threads.split(",")):
-                compare(args, cloud, surface, threads)
+            compare(args, cloud, surface)
 
 
-def compare(args, cloud, surface, threads):
+def compare(args, cloud, surface):
     ours, theirs = {}, {}
     for _ in range(args.rounds):
-        rates, build = surfel(args.surfel, cloud, surface, threads)
-        rates["build, s"] = build
-        other, build = embree(args.embree, cloud, surface, threads)
-        if surface == "disc":
-            other |= {"gather": embree(args.embree, cloud, "multi", threads)[0]["gather"]}
-        other["build, s"] = build
-        for kind in rates:
-            ours.setdefault(kind, []).append(rates[kind])
-            theirs.setdefault(kind, []).append(other[kind])
-    for kind in ours:
-        ratios = [a / b for a, b in zip(ours[kind], theirs[kind])]
-        if kind == "build, s":
-            ratios = [1 / ratio for ratio in ratios]
+        surfel(args.surfel, cloud, surface, ours)
+        embree(args.embree, cloud, surface, theirs)
+    for threads, kind in sorted(ours):
+        found, other = ours[threads, kind], theirs[threads, kind]
+        ratios = [b / a if kind == BUILD else a / b for a, b in zip(found, other)]
         middle = statistics.median
-        print(f"| {cloud.stem} | {surface} | {threads} | {kind} | {middle(ours[kind]):.3g} | {middle(theirs[kind]):.3g} "
+        print(f"| {cloud.stem} | {surface} | {threads} | {kind} | {middle(found):.3g} | {middle(other):.3g} "
               f"| {middle(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f}) |", flush=True)
 
 

@@ -164,8 +164,8 @@ impl Node {
         let decode = |steps: u8| origin + f32::from(steps) * step;
         // Exact: the step is a power of two.
         let per_step = 1.0 / step;
-        for lane in 0..self.n_children() {
-            let (min, max) = (boxes[lane].min[axis], boxes[lane].max[axis]);
+        for (lane, bounds) in boxes[..self.n_children()].iter().enumerate() {
+            let (min, max) = (bounds.min[axis], bounds.max[axis]);
             // The difference may round past a step; a wrong side would lose hits, so it is checked.
             let mut low = ((min - origin) * per_step) as u8;
             while 0 < low && min < decode(low) {
@@ -240,8 +240,8 @@ mod tests {
         for (n_nodes, n_blocks) in [(0, 8), (1, 2), (3, 5), (7, 1), (8, 0)] {
             let node = Node::new(n_nodes, n_blocks, 10, 3);
             let packed = node.packed_children::<PortableLanes>().store();
-            for lane in 0..n_nodes + n_blocks {
-                assert_eq!(Some(Child::unpack(packed[lane].to_bits())), node.child(lane));
+            for (lane, packed) in packed[..n_nodes + n_blocks].iter().enumerate() {
+                assert_eq!(Some(Child::unpack(packed.to_bits())), node.child(lane));
             }
             assert_eq!(node.filled::<PortableLanes>().bits(), node.occupied());
         }

@@ -4,6 +4,8 @@ mod aabb;
 mod eigen;
 mod frame;
 mod lanes;
+mod pair;
+mod portable;
 mod random;
 mod ray;
 mod sampling;
@@ -12,9 +14,9 @@ pub use aabb::Aabb;
 pub use eigen::{SymmetricMatrix, smallest_eigenvector};
 pub use frame::{Frame, tangents};
 pub use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3, Vec3A, Vec4};
-pub use lanes::{
-    Floats, LANES, LaneMask, Lanes, Pair, PortableLanes, PortableMask, Task, Vec3Lanes, WIDE, Wide,
-};
+pub use lanes::{Floats, LANES, LaneMask, Lanes, Task, Vec3Lanes, WIDE, Wide};
+pub use pair::Pair;
+pub use portable::{PortableLanes, PortableMask};
 pub use random::{Random, hash};
 pub use ray::Ray;
 pub use sampling::{cosine_hemisphere, disk, scrambled_pair, uniform_cone};

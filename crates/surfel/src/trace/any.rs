@@ -1,10 +1,9 @@
 //! Whether any shape lies in each ray's range, each point on its own.
 
 use super::block::{BlockForPacket, BlockHits};
-use super::flight::fly;
+use super::flight::{RayVisitor, fly};
 use super::hit::Hit;
 use super::packet::{Packet, PacketStack, PacketVisitor, WideRays, along_packet};
-use super::traverse::RayVisitor;
 use crate::flat::{FlatPoints, FlatScene, Slot};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, WIDE, Wide};
 use crate::surface::{Disc, Shape, Sphere};

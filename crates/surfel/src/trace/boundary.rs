@@ -227,9 +227,9 @@ impl<W: Wide> WideHits<W> {
     fn region(&self, lanes: u32) -> Aabb {
         let reach = W::splat(NEIGHBOR_REACH) * self.radius;
         let mut region = Aabb::EMPTY;
-        let position = [self.position.x, self.position.y, self.position.z];
-        for axis in 0..3 {
-            let (low, high) = ((position[axis] - reach).store(), (position[axis] + reach).store());
+        let Vec3Lanes { x, y, z } = self.position;
+        for (axis, position) in [x, y, z].into_iter().enumerate() {
+            let (low, high) = ((position - reach).store(), (position + reach).store());
             let mut left = lanes;
             while left != 0 {
                 let lane = left.trailing_zeros() as usize % WIDE;

@@ -1,10 +1,9 @@
 //! The nearest shape on each ray, each point on its own.
 
 use super::block::{BlockForPacket, BlockHits};
-use super::flight::fly;
+use super::flight::{RayVisitor, fly};
 use super::hit::Hit;
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
-use super::traverse::RayVisitor;
 use crate::flat::{FlatPoints, FlatScene};
 use crate::math::{Floats, LANES, Lanes, Ray, WIDE, Wide};
 use crate::surface::{Disc, Shape, Sphere};

@@ -5,11 +5,24 @@
 
 use super::memory::Memory;
 use super::node::{BoxRay, ray_entries};
-use super::traverse::RayVisitor;
 use crate::bvh::{Child, STACK_SIZE};
 use crate::flat::FlatPoints;
-use crate::math::{LANES, LaneMask, Lanes};
+use crate::math::{LANES, LaneMask, Lanes, Ray};
 use std::hint::select_unpredictable;
+use std::ops::ControlFlow;
+
+/// Looks at the blocks that a ray comes by.
+pub trait RayVisitor {
+    /// Whether near blocks are better seen first.
+    const IS_ORDERED: bool;
+
+    fn ray(&self) -> &Ray;
+
+    /// Boxes entered beyond this distance are left out.
+    fn limit(&self) -> f32;
+
+    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()>;
+}
 
 /// Rays on the way at a time: enough to hide a read from memory, few enough for the first cache.
 const IN_FLIGHT: usize = 32;

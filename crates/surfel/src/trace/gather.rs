@@ -1,11 +1,10 @@
 //! The nearest shapes on each ray, all within a radius of each other.
 
 use super::block::{BlockForPacket, BlockHits};
-use super::flight::fly;
+use super::flight::{RayVisitor, fly};
 use super::hit::{Gather, Hit};
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
 use super::sightings::{Sighting, settle};
-use super::traverse::RayVisitor;
 use crate::flat::{FlatPoints, FlatScene};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, WIDE, Wide};
 use crate::surface::{Disc, gather_limit};

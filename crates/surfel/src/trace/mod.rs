@@ -16,7 +16,6 @@ mod sightings;
 mod simd;
 mod splat;
 mod surface;
-mod traverse;
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

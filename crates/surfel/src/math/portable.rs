@@ -1,0 +1,222 @@
+//! The arithmetic of kernels without SIMD instructions.
+
+use super::{Floats, LANES, LaneMask, Lanes, Pair, Task};
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
+
+/// Eight floats in an array: the reference that other implementations are tested against.
+#[derive(Clone, Copy, Debug)]
+pub struct PortableLanes([f32; LANES]);
+
+#[derive(Clone, Copy, Debug)]
+pub struct PortableMask([bool; LANES]);
+
+impl PortableLanes {
+    #[inline(always)]
+    fn map(self, other: Self, operation: impl Fn(f32, f32) -> f32) -> Self {
+        Self(std::array::from_fn(|i| operation(self.0[i], other.0[i])))
+    }
+}
+
+impl Floats for PortableLanes {
+    type Mask = PortableMask;
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self([value; LANES])
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.map(other, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.map(other, |a, b| if b < a { a } else { b })
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f32::sqrt))
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> PortableMask {
+        PortableMask(std::array::from_fn(|i| self.0[i] < other.0[i]))
+    }
+
+    #[inline(always)]
+    fn less_equal(self, other: Self) -> PortableMask {
+        PortableMask(std::array::from_fn(|i| self.0[i] <= other.0[i]))
+    }
+
+    #[inline(always)]
+    fn to_single_bit(self) -> Self {
+        Self(self.0.map(|bit| f32::from_bits(1u32.checked_shl(bit as i32 as u32).unwrap_or(0))))
+    }
+
+    #[inline(always)]
+    fn or_bits(self, other: Self) -> Self {
+        self.map(other, |a, b| f32::from_bits(a.to_bits() | b.to_bits()))
+    }
+
+    #[inline(always)]
+    fn select(mask: PortableMask, if_true: Self, if_false: Self) -> Self {
+        Self(std::array::from_fn(|i| if mask.0[i] { if_true.0[i] } else { if_false.0[i] }))
+    }
+}
+
+/// The chosen lanes in the order of `keys`' falling values.
+fn order_from_far(keys: [f32; LANES], mut lanes: u32) -> [usize; LANES] {
+    let (mut order, mut n) = ([0; LANES], 0);
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes - 1;
+        let mut place = n;
+        while 0 < place && keys[order[place - 1]] <= keys[lane] {
+            order[place] = order[place - 1];
+            place -= 1;
+        }
+        order[place] = lane;
+        n += 1;
+    }
+    order
+}
+
+impl Lanes for PortableLanes {
+    type Wide = Pair<Self>;
+
+    #[inline(always)]
+    fn load(values: &[f32; LANES]) -> Self {
+        Self(*values)
+    }
+
+    #[inline(always)]
+    fn from_u8(values: &[u8; LANES]) -> Self {
+        Self(values.map(f32::from))
+    }
+
+    #[inline(always)]
+    fn from_u16(values: &[u16; LANES]) -> Self {
+        Self(values.map(f32::from))
+    }
+
+    #[inline(always)]
+    fn from_signed_bits<const SHIFT: i32>(words: &[u32; LANES]) -> Self {
+        Self(words.map(|word| ((word << (22 - SHIFT)) as i32 >> 22) as f32))
+    }
+
+    #[inline(always)]
+    fn from_top_bits(words: &[u32; LANES]) -> Self {
+        Self(words.map(|word| (word >> 30) as f32))
+    }
+
+    #[inline(always)]
+    fn store(self) -> [f32; LANES] {
+        self.0
+    }
+
+    #[inline(always)]
+    fn max_lane(self) -> f32 {
+        self.0.into_iter().fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    #[inline(always)]
+    fn numbered(lanes: PortableMask, first: u32, other: u32) -> Self {
+        let word = |i: usize| if lanes.0[i] { first } else { other }.wrapping_add(i as u32);
+        Self(std::array::from_fn(|i| f32::from_bits(word(i))))
+    }
+
+    #[inline(always)]
+    fn compress(self, lanes: PortableMask) -> Self {
+        let (mut lanes, mut values) = (lanes.bits(), [0.0; LANES]);
+        for value in &mut values[..lanes.count_ones() as usize] {
+            *value = self.0[lanes.trailing_zeros() as usize];
+            lanes &= lanes - 1;
+        }
+        Self(values)
+    }
+
+    #[inline(always)]
+    fn sort_from_far(self, lanes: PortableMask, others: Self) -> (Self, Self) {
+        let order = order_from_far(self.0, lanes.bits());
+        (Self(order.map(|lane| self.0[lane])), Self(order.map(|lane| others.0[lane])))
+    }
+
+    #[inline(always)]
+    fn times_plus(self, factor: Self, summand: Self) -> Self {
+        self * factor + summand
+    }
+
+    #[inline(always)]
+    fn times_minus(self, factor: Self, subtrahend: Self) -> Self {
+        self * factor - subtrahend
+    }
+
+    #[inline(always)]
+    fn below<const SHIFT: i32>(word: u32) -> PortableMask {
+        let n = (word >> SHIFT & 0xf) as usize;
+        PortableMask(std::array::from_fn(|lane| lane < n))
+    }
+
+    #[inline(always)]
+    fn power_of_two<const BYTE: usize>(exponents: u32) -> Self {
+        Self::splat(f32::from_bits((exponents >> (8 * BYTE) & 0xff) << 23))
+    }
+
+    #[inline(always)]
+    fn less_bits(self, other: Self) -> PortableMask {
+        PortableMask(std::array::from_fn(|i| self.0[i].to_bits() < other.0[i].to_bits()))
+    }
+
+    #[inline(never)]
+    fn call<T: Task>(task: T) -> T::Output {
+        task.run()
+    }
+
+    #[inline(always)]
+    fn prefetch<T>(_: *const T) {}
+}
+
+macro_rules! portable_operator {
+    ($trait:ident, $method:ident, $operator:tt) => {
+        impl $trait for PortableLanes {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                self.map(other, |a, b| a $operator b)
+            }
+        }
+    };
+}
+
+portable_operator!(Add, add, +);
+portable_operator!(Sub, sub, -);
+portable_operator!(Mul, mul, *);
+portable_operator!(Div, div, /);
+
+impl LaneMask for PortableMask {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        self.0.iter().enumerate().fold(0, |bits, (i, &set)| bits | u32::from(set) << i)
+    }
+}
+
+impl BitAnd for PortableMask {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] & other.0[i]))
+    }
+}
+
+impl BitOr for PortableMask {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] | other.0[i]))
+    }
+}
