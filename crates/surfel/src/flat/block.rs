@@ -1,6 +1,6 @@
 //! A leaf block: eight points, quantised against their common corner.
 
-use crate::math::{Aabb, LANES, Lanes, Vec3, Vec3Lanes};
+use crate::math::{Aabb, LANES, LaneMask, Lanes, Vec3, Vec3Lanes};
 use crate::surface::PointLanes;
 
 /// Eight points in two cache lines, lane by lane.
@@ -111,6 +111,19 @@ impl PointBlock {
     #[inline(always)]
     pub fn centers<L: Lanes>(&self, origin: Vec3) -> Vec3Lanes<L> {
         Vec3Lanes::splat(self.corner() - origin).plus(self.offsets())
+    }
+
+    /// The lanes of points whose centres lie in `region`, but for rounding.
+    #[inline(always)]
+    pub fn lanes_within<L: Lanes>(&self, region: &Aabb) -> u32 {
+        let Vec3Lanes { x, y, z } = self.offsets::<L>();
+        let (low, high) = (region.min - self.corner(), region.max - self.corner());
+        let mut is_within = L::splat(0.0).less(self.radii());
+        for (offset, low, high) in [(x, low.x, high.x), (y, low.y, high.y), (z, low.z, high.z)] {
+            is_within = is_within & L::splat(low).less_equal(offset);
+            is_within = is_within & offset.less_equal(L::splat(high));
+        }
+        is_within.bits()
     }
 
     #[inline(always)]

@@ -213,6 +213,8 @@ pub struct Vicinities<W> {
 pub struct Verdicts {
     pub enclosed: u32,
     pub outside: u32,
+    /// There are too few points for a judgement.
+    pub sparse: u32,
 }
 
 impl<W: Wide> Vicinities<W> {
@@ -268,6 +270,7 @@ impl<W: Wide> Vicinities<W> {
         Verdicts {
             enclosed: suffice & narrow & !from_within,
             outside: suffice & (wide | from_within),
+            sparse: !suffice,
         }
     }
 }

@@ -4,7 +4,7 @@ use super::region::{RegionVisitor, within};
 use super::sightings::Sighting;
 use crate::flat::{FlatPoints, PointBlock};
 use crate::math::{Aabb, Floats, LANES, LaneMask, Lanes, Task, Vec3, Vec3Lanes, WIDE, Wide};
-use crate::surface::{Candidate, Candidates, NEIGHBOR_REACH, Surroundings, Verdicts, Vicinities};
+use crate::surface::{Candidate, Candidates, NEIGHBOR_REACH, Surroundings, Vicinities};
 use std::marker::PhantomData;
 
 /// A neighbourhood with too few points to judge by is looked at once more this many times as wide.
@@ -13,48 +13,72 @@ const WIDER: f32 = 2.0;
 const SPREAD: f32 = 2.0;
 /// Fewer hits are judged one by one.
 const FEWEST_TOGETHER: u32 = 3;
+/// Of coordinates in single precision, with some to spare.
+const ROUNDING: f32 = 1e-6;
 /// Blocks near them that are kept in mind.
 const MAX_BLOCKS: usize = 64;
 
 /// Whether the points near it enclose a hit at `position`.
 #[inline(always)]
 pub fn is_enclosed<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> bool {
-    L::call(JudgeOne { points, position, hit, is_last: false, lanes: PhantomData::<L> })
+    match judge_one::<L>(points, position, hit) {
+        Verdict::Enclosed => true,
+        Verdict::Outside => false,
+        Verdict::Sparse { .. } => {
+            let hit = Candidate { radius: WIDER * hit.radius, ..hit };
+            judge_one::<L>(points, position, hit).is_final_yes()
+        }
+    }
 }
 
-/// The same, once too few points are known to be near.
 #[inline(always)]
-fn is_enclosed_widely<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> bool {
-    let hit = Candidate { radius: WIDER * hit.radius, ..hit };
-    L::call(JudgeOne { points, position, hit, is_last: true, lanes: PhantomData::<L> })
+fn judge_one<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> Verdict {
+    L::call(JudgeOne { points, position, hit, lanes: PhantomData::<L> })
+}
+
+/// What the points around a hit say.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Verdict {
+    Enclosed,
+    Outside,
+    /// One should look farther around; if that has been done, it is or is not enclosed.
+    Sparse { is_enclosed: bool },
+}
+
+impl Verdict {
+    fn new<L: Lanes>(surroundings: &Surroundings<L>) -> Self {
+        let is_enclosed = surroundings.enclose();
+        match (surroundings.is_sparse(), is_enclosed) {
+            (true, is_enclosed) => Self::Sparse { is_enclosed },
+            (false, true) => Self::Enclosed,
+            (false, false) => Self::Outside,
+        }
+    }
+
+    /// Once one has looked as far around as one will.
+    fn is_final_yes(self) -> bool {
+        matches!(self, Self::Enclosed | Self::Sparse { is_enclosed: true })
+    }
 }
 
 struct JudgeOne<'p, L> {
     points: &'p FlatPoints,
     position: Vec3,
     hit: Candidate,
-    /// Whether one does not look farther around.
-    is_last: bool,
     lanes: PhantomData<L>,
 }
 
 impl<L: Lanes> Task for JudgeOne<'_, L> {
-    type Output = bool;
+    type Output = Verdict;
 
     #[inline(always)]
-    fn run(self) -> bool {
-        let Self { points, position, mut hit, mut is_last, .. } = self;
-        loop {
-            let mut found = Neighborhood { position, surroundings: Surroundings::<L>::new(hit) };
-            let reach = Vec3::splat(NEIGHBOR_REACH * hit.radius);
-            let region = Aabb { min: position - reach, max: position + reach };
-            within::<L>(points, &region, &mut found);
-            if is_last || !found.surroundings.is_sparse() {
-                return found.surroundings.enclose();
-            }
-            hit.radius *= WIDER;
-            is_last = true;
-        }
+    fn run(self) -> Verdict {
+        let Self { points, position, hit, .. } = self;
+        let mut found = Neighborhood { position, surroundings: Surroundings::<L>::new(hit) };
+        let reach = Vec3::splat(NEIGHBOR_REACH * hit.radius);
+        let region = Aabb { min: position - reach, max: position + reach };
+        within::<L>(points, &region, &mut found);
+        Verdict::new(&found.surroundings)
     }
 }
 
@@ -113,21 +137,67 @@ impl<L: Lanes> Task for JudgeWide<'_, L> {
             enclosed = lanes & enclosed_by_blocks::<L>(points, sightings, hits);
             lanes &= !enclosed;
         }
-        let [x, y, z] = hits.position.store_wide();
-        let radii = hits.radius.store();
-        while lanes != 0 {
-            let first = lanes.trailing_zeros() as usize % WIDE;
-            let center = Vec3::new(x[first], y[first], z[first]);
-            let group = 1 << first | lanes & hits.near(center, SPREAD * radii[first]);
-            lanes &= !group;
-            enclosed |= if group.count_ones() < FEWEST_TOGETHER {
-                judge_each::<L>(points, group, hits)
-            } else {
-                judge_group::<L>(points, group, hits)
-            };
+        let mut hits = *hits;
+        for is_last in [false, true] {
+            let verdicts = judge_by_groups::<L>(points, lanes, &hits, is_last);
+            enclosed |= verdicts.enclosed;
+            lanes = verdicts.sparse;
+            if lanes == 0 {
+                break;
+            }
+            hits.radius = L::Wide::splat(WIDER) * hits.radius;
         }
         enclosed
     }
+}
+
+/// The lanes of which this is known.
+#[derive(Clone, Copy, Default)]
+struct LaneVerdicts {
+    enclosed: u32,
+    /// One should look farther around; there are none once this has been done.
+    sparse: u32,
+}
+
+impl LaneVerdicts {
+    #[inline(always)]
+    fn set(&mut self, lane: usize, verdict: Verdict, is_last: bool) {
+        if is_last {
+            self.enclosed |= u32::from(verdict.is_final_yes()) << lane;
+        } else {
+            self.enclosed |= u32::from(verdict == Verdict::Enclosed) << lane;
+            self.sparse |= u32::from(matches!(verdict, Verdict::Sparse { .. })) << lane;
+        }
+    }
+}
+
+#[inline(always)]
+fn judge_by_groups<L: Lanes>(
+    points: &FlatPoints,
+    mut lanes: u32,
+    hits: &WideHits<L::Wide>,
+    is_last: bool,
+) -> LaneVerdicts {
+    let [x, y, z] = hits.position.store_wide();
+    let radii = hits.radius.store();
+    let mut verdicts = LaneVerdicts::default();
+    while lanes != 0 {
+        let first = lanes.trailing_zeros() as usize % WIDE;
+        let center = Vec3::new(x[first], y[first], z[first]);
+        let mut group = 1 << first | lanes & hits.near(center, SPREAD * radii[first]);
+        lanes &= !group;
+        if FEWEST_TOGETHER <= group.count_ones() {
+            judge_group::<L>(points, group, hits, is_last, &mut verdicts);
+            continue;
+        }
+        while group != 0 {
+            let lane = group.trailing_zeros() as usize % WIDE;
+            group &= group - 1;
+            let (position, hit) = hits.in_lane(lane);
+            verdicts.set(lane, judge_one::<L>(points, position, hit), is_last);
+        }
+    }
+    verdicts
 }
 
 /// The hits that are enclosed by the points in the blocks that their rays sight.
@@ -149,23 +219,26 @@ fn enclosed_by_blocks<L: Lanes>(
             first += 1;
         }
         let block = &points.blocks[block_idx as usize];
-        show_block::<L>(block, &hits.position, lanes, &mut vicinities);
+        let all = L::splat(0.0).less(block.radii()).bits();
+        show_block::<L>(block, all, &hits.position, lanes, &mut vicinities);
     }
     vicinities.judge().enclosed
 }
 
-/// Shows the points of a block to the hits in `lanes`.
+/// Shows these points of a block to the hits in `lanes`.
 #[inline(always)]
 fn show_block<L: Lanes>(
     block: &PointBlock,
+    mut points: u32,
     position: &Vec3Lanes<L::Wide>,
     lanes: <L::Wide as Floats>::Mask,
     vicinities: &mut Vicinities<L::Wide>,
 ) {
     let corner = Vec3Lanes::splat(block.corner()).minus(*position);
     let (offsets, normals) = (block.offsets::<L>().store(), block.normals::<L>().store());
-    let n_points = L::splat(0.0).less(block.radii()).bits().count_ones() as usize;
-    for lane in 0..n_points.min(LANES) {
+    while points != 0 {
+        let lane = points.trailing_zeros() as usize % LANES;
+        points &= points - 1;
         let offset = Vec3Lanes {
             x: corner.x + L::Wide::splat(offsets[0][lane]),
             y: corner.y + L::Wide::splat(offsets[1][lane]),
@@ -181,36 +254,35 @@ fn show_block<L: Lanes>(
 }
 
 #[inline(always)]
-fn judge_each<L: Lanes>(points: &FlatPoints, mut lanes: u32, hits: &WideHits<L::Wide>) -> u32 {
-    let mut enclosed = 0;
-    while lanes != 0 {
-        let lane = lanes.trailing_zeros() as usize % WIDE;
-        lanes &= lanes - 1;
-        let (position, hit) = hits.in_lane(lane);
-        enclosed |= u32::from(is_enclosed::<L>(points, position, hit)) << lane;
-    }
-    enclosed
-}
-
-#[inline(always)]
-fn judge_group<L: Lanes>(points: &FlatPoints, group: u32, hits: &WideHits<L::Wide>) -> u32 {
+fn judge_group<L: Lanes>(
+    points: &FlatPoints,
+    group: u32,
+    hits: &WideHits<L::Wide>,
+    is_last: bool,
+    verdicts: &mut LaneVerdicts,
+) {
     let candidates = Candidates::new(hits.normal, hits.direction, hits.radius);
+    let region = hits.region(group);
     let mut found = Neighborhoods::<L> {
         position: hits.position,
+        region,
         vicinities: Vicinities::new(candidates),
         blocks: [0; MAX_BLOCKS],
         n_blocks: 0,
     };
-    within::<L>(points, &hits.region(group), &mut found);
-    let Verdicts { enclosed, outside } = found.vicinities.judge();
-    let mut doubtful = group & !(enclosed | outside);
-    let mut enclosed = group & enclosed;
+    within::<L>(points, &region, &mut found);
+    let known = found.vicinities.judge();
+    verdicts.enclosed |= group & known.enclosed;
+    let mut doubtful = group & !(known.enclosed | known.outside);
+    if !is_last {
+        verdicts.sparse |= doubtful & known.sparse;
+        doubtful &= !known.sparse;
+    }
     while doubtful != 0 {
         let lane = doubtful.trailing_zeros() as usize % WIDE;
         doubtful &= doubtful - 1;
-        enclosed |= u32::from(found.judge_again(points, hits.in_lane(lane))) << lane;
+        verdicts.set(lane, found.judge_exactly(points, hits.in_lane(lane)), is_last);
     }
-    enclosed
 }
 
 impl<W: Wide> WideHits<W> {
@@ -238,7 +310,8 @@ impl<W: Wide> WideHits<W> {
                 region.max[axis] = region.max[axis].max(high[lane]);
             }
         }
-        region
+        let rounding = Vec3::splat(ROUNDING * region.min.abs().max(region.max.abs()).max_element());
+        Aabb { min: region.min - rounding, max: region.max + rounding }
     }
 
     /// Place and candidate.
@@ -257,6 +330,7 @@ impl<W: Wide> WideHits<W> {
 
 struct Neighborhoods<L: Lanes> {
     position: Vec3Lanes<L::Wide>,
+    region: Aabb,
     vicinities: Vicinities<L::Wide>,
     /// Those seen, if there is room.
     blocks: [u32; MAX_BLOCKS],
@@ -264,32 +338,33 @@ struct Neighborhoods<L: Lanes> {
 }
 
 impl<L: Lanes> Neighborhoods<L> {
-    /// By exact angles, or farther around.
+    /// By angles instead of sectors.
     #[inline(always)]
-    fn judge_again(&self, points: &FlatPoints, (position, hit): (Vec3, Candidate)) -> bool {
-        if let Some(blocks) = self.blocks.get(..self.n_blocks) {
-            let mut surroundings = Surroundings::<L>::new(hit);
-            for block_idx in blocks {
-                surroundings.add(&points.blocks[*block_idx as usize].points(position));
-            }
-            if surroundings.is_sparse() {
-                return is_enclosed_widely::<L>(points, position, hit);
-            }
-            return surroundings.enclose();
+    fn judge_exactly(&self, points: &FlatPoints, (position, hit): (Vec3, Candidate)) -> Verdict {
+        let Some(blocks) = self.blocks.get(..self.n_blocks) else {
+            return judge_one::<L>(points, position, hit);
+        };
+        let mut surroundings = Surroundings::<L>::new(hit);
+        for block_idx in blocks {
+            surroundings.add(&points.blocks[*block_idx as usize].points(position));
         }
-        is_enclosed::<L>(points, position, hit)
+        Verdict::new(&surroundings)
     }
 }
 
 impl<L: Lanes> RegionVisitor for Neighborhoods<L> {
     #[inline(always)]
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        let block = &points.blocks[block_idx as usize];
+        let inside = block.lanes_within::<L>(&self.region);
+        if inside == 0 {
+            return;
+        }
         if let Some(place) = self.blocks.get_mut(self.n_blocks) {
             *place = block_idx;
         }
         self.n_blocks += 1;
         let all = L::Wide::splat(0.0).less_equal(L::Wide::splat(0.0));
-        let block = &points.blocks[block_idx as usize];
-        show_block::<L>(block, &self.position, all, &mut self.vicinities);
+        show_block::<L>(block, inside, &self.position, all, &mut self.vicinities);
     }
 }
