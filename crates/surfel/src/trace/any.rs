@@ -17,13 +17,13 @@ pub trait Judge: Copy {
 
     fn counts<L: Lanes>(&self, ray: &Ray, hit: &Hit) -> bool;
 
-    /// Of rays in `lanes` that hit the shape at `slot`, those for which it counts.
+    /// Of rays in `lanes`, each of which hits the shape at its slot, those for which that counts.
     fn counting<L: Lanes>(
         &self,
         rays: &WideRays<L::Wide>,
         lanes: u32,
         distances: L::Wide,
-        slot: Slot,
+        slots: &[Slot; WIDE],
     ) -> u32;
 }
 
@@ -40,7 +40,13 @@ impl Judge for Lenient {
     }
 
     #[inline(always)]
-    fn counting<L: Lanes>(&self, _: &WideRays<L::Wide>, lanes: u32, _: L::Wide, _: Slot) -> u32 {
+    fn counting<L: Lanes>(
+        &self,
+        _: &WideRays<L::Wide>,
+        lanes: u32,
+        _: L::Wide,
+        _: &[Slot; WIDE],
+    ) -> u32 {
         lanes
     }
 }
@@ -161,6 +167,43 @@ impl<L: Lanes, S: Shape, J: Judge> AnyInPacket<'_, L, S, J> {
     }
 }
 
+impl<L: Lanes, S: Shape, J: Judge> AnyInPacket<'_, L, S, J> {
+    /// One hit of each ray is judged at a time, as judging many at once costs little more than one.
+    #[inline(always)]
+    fn visit_with_judge(&mut self, block: &BlockForPacket<L>, block_idx: u32) {
+        let limits = L::Wide::load(&self.limits);
+        let mut found = [([0.0; WIDE], 0); LANES];
+        let mut open = 0;
+        for lane in 0..LANES {
+            let (distance, mask) = block.intersect::<S>(lane);
+            let lanes = (mask & distance.less_equal(limits)).bits();
+            found[lane] = (distance.store(), lanes);
+            open |= lanes;
+        }
+        while open != 0 {
+            let (mut distances, mut slots, mut judged) = ([0.0; WIDE], [0; WIDE], 0);
+            for (place, (found, lanes)) in found.iter_mut().enumerate() {
+                let mut now = *lanes & open & !judged;
+                judged |= now;
+                *lanes &= !now;
+                while now != 0 {
+                    let lane = now.trailing_zeros() as usize % WIDE;
+                    now &= now - 1;
+                    distances[lane] = found[lane];
+                    slots[lane] = block_idx * LANES as u32 + place as u32;
+                }
+            }
+            if judged == 0 {
+                return;
+            }
+            let distances = L::Wide::load(&distances);
+            let counting = self.judge.counting::<L>(&self.packet.wide, judged, distances, &slots);
+            self.block(counting);
+            open = judged & !counting;
+        }
+    }
+}
+
 impl<L: Lanes, S: Shape, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> {
     #[inline(always)]
     fn limits(&self) -> &[f32; WIDE] {
@@ -171,14 +214,7 @@ impl<L: Lanes, S: Shape, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J>
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
         let block = BlockForPacket::<L>::new(&points.blocks[block_idx as usize], self.packet);
         if !J::IS_LENIENT {
-            for lane in 0..LANES {
-                let (distance, mask) = block.intersect::<S>(lane);
-                let lanes = (mask & distance.less_equal(L::Wide::load(&self.limits))).bits();
-                if lanes != 0 {
-                    let slot = block_idx * LANES as u32 + lane as u32;
-                    self.block(self.judge.counting::<L>(&self.packet.wide, lanes, distance, slot));
-                }
-            }
+            self.visit_with_judge(&block, block_idx);
             return;
         }
         let mut limits = L::Wide::load(&self.limits);

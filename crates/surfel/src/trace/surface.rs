@@ -7,7 +7,7 @@ use super::hit::Hit;
 use super::packet::WideRays;
 use super::splat::{Splat, find_splats};
 use crate::flat::{FlatScene, Slot};
-use crate::math::{Floats, Lanes, Ray, Vec3, Vec3Lanes};
+use crate::math::{Floats, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
 use crate::surface::{Boundary, Candidate, Disc};
 
 /// Where a ray meets the surface.
@@ -92,17 +92,26 @@ impl Judge for WithinBoundary<'_> {
         rays: &WideRays<L::Wide>,
         lanes: u32,
         distances: L::Wide,
-        slot: Slot,
+        slots: &[Slot; WIDE],
     ) -> u32 {
         let (origin, direction) = (rays.origin(), rays.direction());
-        let normal = Vec3Lanes::splat(self.0.points.normal(slot));
+        let (mut normals, mut radii) = ([[0.0; WIDE]; 3], [0.0; WIDE]);
+        let mut left = lanes;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize % WIDE;
+            left &= left - 1;
+            [normals[0][lane], normals[1][lane], normals[2][lane]] =
+                self.0.points.normal(slots[lane]).to_array();
+            radii[lane] = self.radius(slots[lane]);
+        }
+        let normal = Vec3Lanes::load_wide(&normals);
         let is_away = L::Wide::splat(0.0).less(normal.dot(direction));
         let sign = L::Wide::select(is_away, L::Wide::splat(-1.0), L::Wide::splat(1.0));
         let hits = WideHits {
             position: origin.plus(direction.scaled(distances)),
             normal: normal.scaled(sign),
             direction,
-            radius: L::Wide::splat(self.radius(slot)),
+            radius: L::Wide::load(&radii),
         };
         enclosed::<L>(&self.0.points, &[], lanes, &hits)
     }
