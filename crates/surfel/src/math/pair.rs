@@ -68,8 +68,10 @@ impl<L: Lanes> Floats for Pair<L> {
     }
 
     #[inline(always)]
-    fn to_single_bit(self) -> Self {
-        Self(self.0.to_single_bit(), self.1.to_single_bit())
+    fn to_single_bit(self) -> [Self; 2] {
+        let ([low, high], [second_low, second_high]) =
+            (self.0.to_single_bit(), self.1.to_single_bit());
+        [Self(low, second_low), Self(high, second_high)]
     }
 
     #[inline(always)]

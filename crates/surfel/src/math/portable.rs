@@ -51,8 +51,9 @@ impl Floats for PortableLanes {
     }
 
     #[inline(always)]
-    fn to_single_bit(self) -> Self {
-        Self(self.0.map(|bit| f32::from_bits(1u32.checked_shl(bit as i32 as u32).unwrap_or(0))))
+    fn to_single_bit(self) -> [Self; 2] {
+        let words = self.0.map(|bit| 1u64 << (bit as i32 & 63));
+        [0, 32].map(|shift| Self(words.map(|word| f32::from_bits((word >> shift) as u32))))
     }
 
     #[inline(always)]

@@ -242,14 +242,10 @@ impl<W: Wide> Vicinities<W> {
             self.free_side = self.free_side.plus(Vec3Lanes::select(is_passed, lift, none));
         }
         let (turn, has_turn) = self.hits.turn(offset);
-        // A turn of 4 is one of 0.
-        let turn = W::select(turn.less(W::splat(4.0)), turn, zero);
-        for half in 0..2 {
-            let sector = turn * W::splat(16.0) - W::splat(32.0 * half as f32);
-            let is_here = zero.less_equal(sector) & sector.less(W::splat(32.0));
-            let bit = W::select(is_near & has_turn & is_here, sector.to_single_bit(), zero);
-            self.sectors[half] = self.sectors[half].or_bits(bit);
-        }
+        let counts = is_near & has_turn;
+        let [low, high] = (turn * W::splat((SECTORS / 4) as f32)).to_single_bit();
+        self.sectors[0] = self.sectors[0].or_bits(W::select(counts, low, zero));
+        self.sectors[1] = self.sectors[1].or_bits(W::select(counts, high, zero));
     }
 
     #[inline(always)]
