@@ -42,7 +42,9 @@ enum Verdict {
     Enclosed,
     Outside,
     /// One should look farther around; if that has been done, it is or is not enclosed.
-    Sparse { is_enclosed: bool },
+    Sparse {
+        is_enclosed: bool,
+    },
 }
 
 impl Verdict {
