@@ -10,6 +10,8 @@ use crate::surface::{Disc, Shape, Sphere};
 use std::marker::PhantomData;
 use std::ops::ControlFlow;
 
+const ALL_LANES: u32 = (1 << WIDE) - 1;
+
 /// Says which hits count.
 pub trait Judge: Copy {
     /// Whether all do.
@@ -162,7 +164,7 @@ fn any_in_packet<L: Lanes, S: Shape, J: Judge>(
                 refused: slots,
                 is_hit: 0,
             };
-            others.block(counting | !first.is_hit);
+            others.block(ALL_LANES & (counting | !first.is_hit));
             along_packet::<L, false>(points, packet, stack, &mut others);
             counting = others.is_hit & first.is_hit;
         }
