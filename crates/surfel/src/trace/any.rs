@@ -10,8 +10,6 @@ use crate::surface::{Disc, Shape, Sphere};
 use std::marker::PhantomData;
 use std::ops::ControlFlow;
 
-const ALL_LANES: u32 = (1 << WIDE) - 1;
-
 /// Says which hits count.
 pub trait Judge: Copy {
     /// Whether all do.
@@ -132,8 +130,6 @@ fn has_counting<L: Lanes, J: Judge>(hits: &BlockHits<L>, ray: &Ray, limit: f32, 
     false
 }
 
-/// Judging many hits at once costs little more than one. So the hits that are met first are judged
-/// together; only for rays whose first one does not count the others are judged where they are met.
 #[inline(always)]
 fn any_in_packet<L: Lanes, S: Shape, J: Judge>(
     points: &FlatPoints,
@@ -142,109 +138,24 @@ fn any_in_packet<L: Lanes, S: Shape, J: Judge>(
     stack: &mut PacketStack,
     occluded: &mut [bool],
 ) {
-    let mut first = FirstInPacket::<L, S, J> {
-        packet,
-        traits: PhantomData,
-        limits: packet.limits(),
-        is_hit: 0,
-        distances: [0.0; WIDE],
-        slots: [Hit::MISS.slot; WIDE],
-    };
-    along_packet::<L, false>(points, packet, stack, &mut first);
-    let FirstInPacket { distances, slots, is_hit: mut counting, .. } = first;
-    if !J::IS_LENIENT && counting != 0 {
-        let distances = L::Wide::load(&distances);
-        counting = judge.counting::<L>(&packet.wide, counting, distances, &slots);
-        if counting != first.is_hit {
-            let mut others = OthersInPacket::<L, S, J> {
-                packet,
-                judge,
-                shape: PhantomData,
-                limits: packet.limits(),
-                refused: slots,
-                is_hit: 0,
-            };
-            others.block(ALL_LANES & (counting | !first.is_hit));
-            along_packet::<L, false>(points, packet, stack, &mut others);
-            counting = others.is_hit & first.is_hit;
-        }
-    }
+    let limits = packet.limits();
+    let mut any = AnyInPacket::<L, S, J> { packet, judge, shape: PhantomData, limits, is_hit: 0 };
+    along_packet::<L, false>(points, packet, stack, &mut any);
     for (lane, occluded) in occluded.iter_mut().enumerate() {
-        *occluded = counting >> lane & 1 == 1;
+        *occluded = any.is_hit >> lane & 1 == 1;
     }
 }
 
-/// The shape that each ray meets first on the way through the tree; not the nearest.
-struct FirstInPacket<'p, L: Lanes, S, J> {
-    packet: &'p Packet<'p, L::Wide>,
-    traits: PhantomData<(S, J)>,
-    limits: [f32; WIDE],
-    is_hit: u32,
-    /// Known only if there is something to judge.
-    distances: [f32; WIDE],
-    slots: [Slot; WIDE],
-}
-
-impl<L: Lanes, S: Shape, J: Judge> FirstInPacket<'_, L, S, J> {
-    #[inline(always)]
-    fn take(&mut self, slot: Slot, distances: &[f32; WIDE], mut lanes: u32) {
-        self.is_hit |= lanes;
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % WIDE;
-            lanes &= lanes - 1;
-            (self.distances[lane], self.slots[lane]) = (distances[lane], slot);
-        }
-    }
-}
-
-impl<L: Lanes, S: Shape, J: Judge> PacketVisitor<L> for FirstInPacket<'_, L, S, J> {
-    #[inline(always)]
-    fn limits(&self) -> &[f32; WIDE] {
-        &self.limits
-    }
-
-    #[inline(always)]
-    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let block = BlockForPacket::<L>::new(&points.blocks[block_idx as usize], self.packet);
-        let mut limits = L::Wide::load(&self.limits);
-        let blocked = L::Wide::splat(f32::NEG_INFINITY);
-        for lane in 0..LANES {
-            let (distance, mask) = block.intersect::<S>(lane);
-            let hits = mask & distance.less_equal(limits);
-            limits = L::Wide::select(hits, blocked, limits);
-            if J::IS_LENIENT {
-                self.is_hit |= hits.bits();
-            } else if hits.bits() != 0 {
-                let slot = block_idx * LANES as u32 + lane as u32;
-                self.take(slot, &distance.store(), hits.bits());
-            }
-        }
-        self.limits = limits.store();
-    }
-
-    #[inline(always)]
-    fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
-        let ray = &self.packet.rays[lane];
-        let hits = BlockHits::<L>::find::<S>(points, block_idx, ray);
-        if let Some((hit, _)) = hits.up_to(self.limits[lane]).next() {
-            self.is_hit |= 1 << lane;
-            (self.distances[lane], self.slots[lane]) = (hit.distance, hit.slot);
-            self.limits[lane] = f32::NEG_INFINITY;
-        }
-    }
-}
-
-/// Whether any but one shape counts, which has been refused.
-struct OthersInPacket<'p, L: Lanes, S, J> {
+struct AnyInPacket<'p, L: Lanes, S, J> {
     packet: &'p Packet<'p, L::Wide>,
     judge: J,
     shape: PhantomData<S>,
+    /// Below all distances for rays that have hit something.
     limits: [f32; WIDE],
-    refused: [Slot; WIDE],
     is_hit: u32,
 }
 
-impl<L: Lanes, S: Shape, J: Judge> OthersInPacket<'_, L, S, J> {
+impl<L: Lanes, S: Shape, J: Judge> AnyInPacket<'_, L, S, J> {
     /// The rays in these lanes need nothing more.
     #[inline(always)]
     fn block(&mut self, mut lanes: u32) {
@@ -256,34 +167,18 @@ impl<L: Lanes, S: Shape, J: Judge> OthersInPacket<'_, L, S, J> {
     }
 }
 
-impl<L: Lanes, S: Shape, J: Judge> PacketVisitor<L> for OthersInPacket<'_, L, S, J> {
+impl<L: Lanes, S: Shape, J: Judge> AnyInPacket<'_, L, S, J> {
+    /// One hit of each ray is judged at a time, as judging many at once costs little more than one.
     #[inline(always)]
-    fn limits(&self) -> &[f32; WIDE] {
-        &self.limits
-    }
-
-    /// One hit of each ray at a time.
-    #[inline(always)]
-    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let block = BlockForPacket::<L>::new(&points.blocks[block_idx as usize], self.packet);
+    fn visit_with_judge(&mut self, block: &BlockForPacket<L>, block_idx: u32) {
         let limits = L::Wide::load(&self.limits);
-        let first_slot = block_idx * LANES as u32;
         let mut found = [([0.0; WIDE], 0); LANES];
         let mut open = 0;
-        for (lane, found) in found.iter_mut().enumerate() {
+        for lane in 0..LANES {
             let (distance, mask) = block.intersect::<S>(lane);
-            let hits = (mask & distance.less_equal(limits)).bits();
-            *found = (distance.store(), hits);
-            open |= hits;
-        }
-        let mut left = open;
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize % WIDE;
-            left &= left - 1;
-            let place = self.refused[lane].wrapping_sub(first_slot);
-            if let Some((_, hits)) = found.get_mut(place as usize) {
-                *hits &= !(1 << lane);
-            }
+            let lanes = (mask & distance.less_equal(limits)).bits();
+            found[lane] = (distance.store(), lanes);
+            open |= lanes;
         }
         while open != 0 {
             let (mut distances, mut slots, mut judged) = ([0.0; WIDE], [0; WIDE], 0);
@@ -294,7 +189,8 @@ impl<L: Lanes, S: Shape, J: Judge> PacketVisitor<L> for OthersInPacket<'_, L, S,
                 while now != 0 {
                     let lane = now.trailing_zeros() as usize % WIDE;
                     now &= now - 1;
-                    (distances[lane], slots[lane]) = (found[lane], first_slot + place as u32);
+                    distances[lane] = found[lane];
+                    slots[lane] = block_idx * LANES as u32 + place as u32;
                 }
             }
             if judged == 0 {
@@ -306,17 +202,38 @@ impl<L: Lanes, S: Shape, J: Judge> PacketVisitor<L> for OthersInPacket<'_, L, S,
             open = judged & !counting;
         }
     }
+}
+
+impl<L: Lanes, S: Shape, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> {
+    #[inline(always)]
+    fn limits(&self) -> &[f32; WIDE] {
+        &self.limits
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        let block = BlockForPacket::<L>::new(&points.blocks[block_idx as usize], self.packet);
+        if !J::IS_LENIENT {
+            self.visit_with_judge(&block, block_idx);
+            return;
+        }
+        let mut limits = L::Wide::load(&self.limits);
+        let blocked = L::Wide::splat(f32::NEG_INFINITY);
+        for lane in 0..LANES {
+            let (distance, mask) = block.intersect::<S>(lane);
+            let hits = mask & distance.less_equal(limits);
+            self.is_hit |= hits.bits();
+            limits = L::Wide::select(hits, blocked, limits);
+        }
+        self.limits = limits.store();
+    }
 
     #[inline(always)]
     fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
         let (ray, limit) = (&self.packet.rays[lane], self.limits[lane]);
         let hits = BlockHits::<L>::find::<S>(points, block_idx, ray);
-        let mut hits = hits.up_to(limit);
-        while let Some((hit, _)) = hits.next() {
-            if hit.slot != self.refused[lane] && self.judge.counts::<L>(ray, &hit) {
-                self.block(1 << lane);
-                return;
-            }
+        if has_counting::<L, J>(&hits, ray, limit, self.judge) {
+            self.block(1 << lane);
         }
     }
 }
