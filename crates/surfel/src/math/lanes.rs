@@ -24,10 +24,6 @@ pub trait Floats:
     fn less(self, other: Self) -> Self::Mask;
     fn less_equal(self, other: Self) -> Self::Mask;
     fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self;
-    /// Of each lane, truncated to an integer modulo 64, the word of 64 bits in which only this bit is set:
-    /// its lower and its upper half.
-    fn to_single_bit(self) -> [Self; 2];
-    fn or_bits(self, other: Self) -> Self;
 
     #[inline(always)]
     fn abs(self) -> Self {

@@ -68,18 +68,6 @@ impl<L: Lanes> Floats for Pair<L> {
     }
 
     #[inline(always)]
-    fn to_single_bit(self) -> [Self; 2] {
-        let ([low, high], [second_low, second_high]) =
-            (self.0.to_single_bit(), self.1.to_single_bit());
-        [Self(low, second_low), Self(high, second_high)]
-    }
-
-    #[inline(always)]
-    fn or_bits(self, other: Self) -> Self {
-        Self(self.0.or_bits(other.0), self.1.or_bits(other.1))
-    }
-
-    #[inline(always)]
     fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self {
         Self(L::select(mask.0, if_true.0, if_false.0), L::select(mask.1, if_true.1, if_false.1))
     }

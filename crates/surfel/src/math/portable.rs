@@ -3,6 +3,53 @@
 use super::{Floats, LANES, LaneMask, Lanes, Pair, Task};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
+/// A single lane, for what is not worth more.
+impl Floats for f32 {
+    type Mask = bool;
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        if other < self { self } else { other }
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f32::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> bool {
+        self < other
+    }
+
+    #[inline(always)]
+    fn less_equal(self, other: Self) -> bool {
+        self <= other
+    }
+
+    #[inline(always)]
+    fn select(mask: bool, if_true: Self, if_false: Self) -> Self {
+        if mask { if_true } else { if_false }
+    }
+}
+
+impl LaneMask for bool {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        u32::from(self)
+    }
+}
+
 /// Eight floats in an array: the reference that other implementations are tested against.
 #[derive(Clone, Copy, Debug)]
 pub struct PortableLanes([f32; LANES]);
@@ -27,12 +74,12 @@ impl Floats for PortableLanes {
 
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        self.map(other, |a, b| if a < b { a } else { b })
+        self.map(other, Floats::min)
     }
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        self.map(other, |a, b| if b < a { a } else { b })
+        self.map(other, Floats::max)
     }
 
     #[inline(always)]
@@ -48,17 +95,6 @@ impl Floats for PortableLanes {
     #[inline(always)]
     fn less_equal(self, other: Self) -> PortableMask {
         PortableMask(std::array::from_fn(|i| self.0[i] <= other.0[i]))
-    }
-
-    #[inline(always)]
-    fn to_single_bit(self) -> [Self; 2] {
-        let words = self.0.map(|bit| 1u64 << (bit as i32 & 63));
-        [0, 32].map(|shift| Self(words.map(|word| f32::from_bits((word >> shift) as u32))))
-    }
-
-    #[inline(always)]
-    fn or_bits(self, other: Self) -> Self {
-        self.map(other, |a, b| f32::from_bits(a.to_bits() | b.to_bits()))
     }
 
     #[inline(always)]

@@ -5,7 +5,7 @@ mod disc;
 mod sphere;
 mod splat;
 
-pub use boundary::{Candidate, Candidates, NEIGHBOR_REACH, Surroundings, Verdicts, Vicinities};
+pub use boundary::{Candidate, Candidates, NEIGHBOR_REACH, Surroundings, Verdicts};
 pub use disc::Disc;
 pub use sphere::Sphere;
 pub use splat::{Blend, Gathered, MAX_GATHERED, gather_limit, plane_normal};

@@ -170,23 +170,6 @@ impl<L: Level> Floats for Eight<L> {
     }
 
     #[inline(always)]
-    fn to_single_bit(self) -> [Self; 2] {
-        // SAFETY: see `Eight`.
-        let [low, high] = unsafe {
-            let (one, half) = (_mm256_set1_epi32(1), _mm256_set1_epi32(32));
-            let bit = _mm256_and_si256(_mm256_cvttps_epi32(self.0), _mm256_set1_epi32(63));
-            // Shifted by 32 or more, the bit is lost.
-            [_mm256_sllv_epi32(one, bit), _mm256_sllv_epi32(one, _mm256_sub_epi32(bit, half))]
-        };
-        [avx2!(Self(_mm256_castsi256_ps(low))), avx2!(Self(_mm256_castsi256_ps(high)))]
-    }
-
-    #[inline(always)]
-    fn or_bits(self, other: Self) -> Self {
-        avx2!(Self(_mm256_or_ps(self.0, other.0)))
-    }
-
-    #[inline(always)]
     fn select(mask: L::Mask, if_true: Self, if_false: Self) -> Self {
         Self(L::select(mask, if_true.0, if_false.0), PhantomData)
     }

@@ -145,23 +145,6 @@ impl Floats for Sixteen {
     }
 
     #[inline(always)]
-    fn to_single_bit(self) -> [Self; 2] {
-        // SAFETY: see `Sixteen`.
-        let [low, high] = unsafe {
-            let (one, half) = (_mm512_set1_epi32(1), _mm512_set1_epi32(32));
-            let bit = _mm512_and_si512(_mm512_cvttps_epi32(self.0), _mm512_set1_epi32(63));
-            // Shifted by 32 or more, the bit is lost.
-            [_mm512_sllv_epi32(one, bit), _mm512_sllv_epi32(one, _mm512_sub_epi32(bit, half))]
-        };
-        [avx512!(Self(_mm512_castsi512_ps(low))), avx512!(Self(_mm512_castsi512_ps(high)))]
-    }
-
-    #[inline(always)]
-    fn or_bits(self, other: Self) -> Self {
-        avx512!(Self(_mm512_or_ps(self.0, other.0)))
-    }
-
-    #[inline(always)]
     fn select(mask: SixteenMask, if_true: Self, if_false: Self) -> Self {
         avx512!(Self(_mm512_mask_blend_ps(mask.0, if_false.0, if_true.0)))
     }

@@ -4,7 +4,7 @@ use super::region::{RegionVisitor, within};
 use super::sightings::Sighting;
 use crate::flat::{FlatPoints, PointBlock};
 use crate::math::{Aabb, Floats, LANES, LaneMask, Lanes, Task, Vec3, Vec3Lanes, WIDE, Wide};
-use crate::surface::{Candidate, Candidates, NEIGHBOR_REACH, Surroundings, Vicinities};
+use crate::surface::{Candidate, Candidates, NEIGHBOR_REACH, Surroundings, Verdicts};
 use std::marker::PhantomData;
 
 /// A neighbourhood with too few points to judge by is looked at once more this many times as wide.
@@ -15,52 +15,21 @@ const SPREAD: f32 = 2.0;
 const FEWEST_TOGETHER: u32 = 3;
 /// Of coordinates in single precision, with some to spare.
 const ROUNDING: f32 = 1e-6;
-/// Blocks near them that are kept in mind.
-const MAX_BLOCKS: usize = 64;
 
 /// Whether the points near it enclose a hit at `position`.
 #[inline(always)]
 pub fn is_enclosed<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> bool {
-    match judge_one::<L>(points, position, hit) {
-        Verdict::Enclosed => true,
-        Verdict::Outside => false,
-        Verdict::Sparse { .. } => {
-            let hit = Candidate { radius: WIDER * hit.radius, ..hit };
-            judge_one::<L>(points, position, hit).is_final_yes()
-        }
+    let mut verdict = judge_one::<L>(points, position, hit);
+    if verdict.sparse != 0 {
+        let hit = Candidate { radius: WIDER * hit.radius, ..hit };
+        verdict = judge_one::<L>(points, position, hit);
     }
+    verdict.enclosed != 0
 }
 
 #[inline(always)]
-fn judge_one<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> Verdict {
+fn judge_one<L: Lanes>(points: &FlatPoints, position: Vec3, hit: Candidate) -> Verdicts {
     L::call(JudgeOne { points, position, hit, lanes: PhantomData::<L> })
-}
-
-/// What the points around a hit say.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Verdict {
-    Enclosed,
-    Outside,
-    /// One should look farther around; if that has been done, it is or is not enclosed.
-    Sparse {
-        is_enclosed: bool,
-    },
-}
-
-impl Verdict {
-    fn new<L: Lanes>(surroundings: &Surroundings<L>) -> Self {
-        let is_enclosed = surroundings.enclose();
-        match (surroundings.is_sparse(), is_enclosed) {
-            (true, is_enclosed) => Self::Sparse { is_enclosed },
-            (false, true) => Self::Enclosed,
-            (false, false) => Self::Outside,
-        }
-    }
-
-    /// Once one has looked as far around as one will.
-    fn is_final_yes(self) -> bool {
-        matches!(self, Self::Enclosed | Self::Sparse { is_enclosed: true })
-    }
 }
 
 struct JudgeOne<'p, L> {
@@ -71,29 +40,52 @@ struct JudgeOne<'p, L> {
 }
 
 impl<L: Lanes> Task for JudgeOne<'_, L> {
-    type Output = Verdict;
+    type Output = Verdicts;
 
     #[inline(always)]
-    fn run(self) -> Verdict {
+    fn run(self) -> Verdicts {
         let Self { points, position, hit, .. } = self;
-        let mut found = Neighborhood { position, surroundings: Surroundings::<L>::new(hit) };
+        let mut found = Neighborhood::<L> {
+            position,
+            hit: Candidates::of_one(&hit),
+            surroundings: Surroundings::new(Candidates::of_one(&hit)),
+        };
         let reach = Vec3::splat(NEIGHBOR_REACH * hit.radius);
         let region = Aabb { min: position - reach, max: position + reach };
         within::<L>(points, &region, &mut found);
-        Verdict::new(&found.surroundings)
+        found.surroundings.judge()
     }
 }
 
 struct Neighborhood<L: Lanes> {
     position: Vec3,
-    surroundings: Surroundings<L>,
+    hit: Candidates<L>,
+    surroundings: Surroundings<f32>,
 }
 
 impl<L: Lanes> RegionVisitor for Neighborhood<L> {
+    /// Eight points are tested at once; those near, few, are taken in one by one.
     #[inline(always)]
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        self.surroundings.add(&points.blocks[block_idx as usize].points(self.position));
+        let points = points.blocks[block_idx as usize].points::<L>(self.position);
+        let is_near = self.hit.near(points.center) & L::splat(0.0).less(points.radius);
+        let mut near = is_near.bits();
+        if near == 0 {
+            return;
+        }
+        let (offsets, normals) = (points.center.store(), points.normal.store());
+        while near != 0 {
+            let lane = near.trailing_zeros() as usize % LANES;
+            near &= near - 1;
+            self.surroundings.add(in_lane(&offsets, lane), in_lane(&normals, lane), true);
+        }
     }
+}
+
+/// A vector from one lane, in all lanes.
+#[inline(always)]
+fn in_lane<F: Floats>([x, y, z]: &[[f32; LANES]; 3], lane: usize) -> Vec3Lanes<F> {
+    Vec3Lanes { x: F::splat(x[lane]), y: F::splat(y[lane]), z: F::splat(z[lane]) }
 }
 
 /// Hits of up to sixteen rays that are judged at once.
@@ -141,8 +133,11 @@ impl<L: Lanes> Task for JudgeWide<'_, L> {
         }
         let mut hits = *hits;
         for is_last in [false, true] {
-            let verdicts = judge_by_groups::<L>(points, lanes, &hits, is_last);
-            enclosed |= verdicts.enclosed;
+            let verdicts = judge_by_groups::<L>(points, lanes, &hits);
+            if is_last {
+                return enclosed | verdicts.enclosed;
+            }
+            enclosed |= verdicts.enclosed & !verdicts.sparse;
             lanes = verdicts.sparse;
             if lanes == 0 {
                 break;
@@ -153,50 +148,33 @@ impl<L: Lanes> Task for JudgeWide<'_, L> {
     }
 }
 
-/// The lanes of which this is known.
-#[derive(Clone, Copy, Default)]
-struct LaneVerdicts {
-    enclosed: u32,
-    /// One should look farther around; there are none once this has been done.
-    sparse: u32,
-}
-
-impl LaneVerdicts {
-    #[inline(always)]
-    fn set(&mut self, lane: usize, verdict: Verdict, is_last: bool) {
-        if is_last {
-            self.enclosed |= u32::from(verdict.is_final_yes()) << lane;
-        } else {
-            self.enclosed |= u32::from(verdict == Verdict::Enclosed) << lane;
-            self.sparse |= u32::from(matches!(verdict, Verdict::Sparse { .. })) << lane;
-        }
-    }
-}
-
 #[inline(always)]
 fn judge_by_groups<L: Lanes>(
     points: &FlatPoints,
     mut lanes: u32,
     hits: &WideHits<L::Wide>,
-    is_last: bool,
-) -> LaneVerdicts {
+) -> Verdicts {
     let [x, y, z] = hits.position.store_wide();
     let radii = hits.radius.store();
-    let mut verdicts = LaneVerdicts::default();
+    let mut verdicts = Verdicts { enclosed: 0, sparse: 0 };
     while lanes != 0 {
         let first = lanes.trailing_zeros() as usize % WIDE;
         let center = Vec3::new(x[first], y[first], z[first]);
         let mut group = 1 << first | lanes & hits.near(center, SPREAD * radii[first]);
         lanes &= !group;
         if FEWEST_TOGETHER <= group.count_ones() {
-            judge_group::<L>(points, group, hits, is_last, &mut verdicts);
+            let Verdicts { enclosed, sparse } = judge_group::<L>(points, group, hits);
+            verdicts.enclosed |= group & enclosed;
+            verdicts.sparse |= group & sparse;
             continue;
         }
         while group != 0 {
             let lane = group.trailing_zeros() as usize % WIDE;
             group &= group - 1;
             let (position, hit) = hits.in_lane(lane);
-            verdicts.set(lane, judge_one::<L>(points, position, hit), is_last);
+            let Verdicts { enclosed, sparse } = judge_one::<L>(points, position, hit);
+            verdicts.enclosed |= enclosed << lane;
+            verdicts.sparse |= sparse << lane;
         }
     }
     verdicts
@@ -209,7 +187,7 @@ fn enclosed_by_blocks<L: Lanes>(
     sightings: &[Sighting],
     hits: &WideHits<L::Wide>,
 ) -> u32 {
-    let mut vicinities = Vicinities::new(Candidates::new(hits.normal, hits.direction, hits.radius));
+    let mut found = Surroundings::new(hits.candidates());
     let block_of = |place: usize| sightings[place].slot / LANES as u32;
     let mut first = 0;
     while first < sightings.len() {
@@ -222,9 +200,10 @@ fn enclosed_by_blocks<L: Lanes>(
         }
         let block = &points.blocks[block_idx as usize];
         let all = L::splat(0.0).less(block.radii()).bits();
-        show_block::<L>(block, all, &hits.position, lanes, &mut vicinities);
+        show_block::<L>(block, all, &hits.position, lanes, &mut found);
     }
-    vicinities.judge().enclosed
+    let Verdicts { enclosed, sparse } = found.judge();
+    enclosed & !sparse
 }
 
 /// Shows these points of a block to the hits in `lanes`.
@@ -234,60 +213,39 @@ fn show_block<L: Lanes>(
     mut points: u32,
     position: &Vec3Lanes<L::Wide>,
     lanes: <L::Wide as Floats>::Mask,
-    vicinities: &mut Vicinities<L::Wide>,
+    found: &mut Surroundings<L::Wide>,
 ) {
     let corner = Vec3Lanes::splat(block.corner()).minus(*position);
     let (offsets, normals) = (block.offsets::<L>().store(), block.normals::<L>().store());
     while points != 0 {
         let lane = points.trailing_zeros() as usize % LANES;
         points &= points - 1;
-        let offset = Vec3Lanes {
-            x: corner.x + L::Wide::splat(offsets[0][lane]),
-            y: corner.y + L::Wide::splat(offsets[1][lane]),
-            z: corner.z + L::Wide::splat(offsets[2][lane]),
-        };
-        let normal = Vec3Lanes {
-            x: L::Wide::splat(normals[0][lane]),
-            y: L::Wide::splat(normals[1][lane]),
-            z: L::Wide::splat(normals[2][lane]),
-        };
-        vicinities.add(offset, normal, lanes);
+        let offset = corner.plus(in_lane(&offsets, lane));
+        let is_near = lanes & found.near(offset);
+        if is_near.bits() != 0 {
+            found.add(offset, in_lane(&normals, lane), is_near);
+        }
     }
 }
 
 #[inline(always)]
-fn judge_group<L: Lanes>(
-    points: &FlatPoints,
-    group: u32,
-    hits: &WideHits<L::Wide>,
-    is_last: bool,
-    verdicts: &mut LaneVerdicts,
-) {
-    let candidates = Candidates::new(hits.normal, hits.direction, hits.radius);
+fn judge_group<L: Lanes>(points: &FlatPoints, group: u32, hits: &WideHits<L::Wide>) -> Verdicts {
     let region = hits.region(group);
     let mut found = Neighborhoods::<L> {
         position: hits.position,
         region,
-        vicinities: Vicinities::new(candidates),
-        blocks: [0; MAX_BLOCKS],
-        n_blocks: 0,
+        surroundings: Surroundings::new(hits.candidates()),
     };
     within::<L>(points, &region, &mut found);
-    let known = found.vicinities.judge();
-    verdicts.enclosed |= group & known.enclosed;
-    let mut doubtful = group & !(known.enclosed | known.outside);
-    if !is_last {
-        verdicts.sparse |= doubtful & known.sparse;
-        doubtful &= !known.sparse;
-    }
-    while doubtful != 0 {
-        let lane = doubtful.trailing_zeros() as usize % WIDE;
-        doubtful &= doubtful - 1;
-        verdicts.set(lane, found.judge_exactly(points, hits.in_lane(lane)), is_last);
-    }
+    found.surroundings.judge()
 }
 
 impl<W: Wide> WideHits<W> {
+    #[inline(always)]
+    fn candidates(&self) -> Candidates<W> {
+        Candidates::new(self.normal, self.direction, self.radius)
+    }
+
     /// The lanes within this distance along each axis.
     #[inline(always)]
     fn near(&self, center: Vec3, distance: f32) -> u32 {
@@ -333,25 +291,7 @@ impl<W: Wide> WideHits<W> {
 struct Neighborhoods<L: Lanes> {
     position: Vec3Lanes<L::Wide>,
     region: Aabb,
-    vicinities: Vicinities<L::Wide>,
-    /// Those seen, if there is room.
-    blocks: [u32; MAX_BLOCKS],
-    n_blocks: usize,
-}
-
-impl<L: Lanes> Neighborhoods<L> {
-    /// By angles instead of sectors.
-    #[inline(always)]
-    fn judge_exactly(&self, points: &FlatPoints, (position, hit): (Vec3, Candidate)) -> Verdict {
-        let Some(blocks) = self.blocks.get(..self.n_blocks) else {
-            return judge_one::<L>(points, position, hit);
-        };
-        let mut surroundings = Surroundings::<L>::new(hit);
-        for block_idx in blocks {
-            surroundings.add(&points.blocks[*block_idx as usize].points(position));
-        }
-        Verdict::new(&surroundings)
-    }
+    surroundings: Surroundings<L::Wide>,
 }
 
 impl<L: Lanes> RegionVisitor for Neighborhoods<L> {
@@ -359,14 +299,9 @@ impl<L: Lanes> RegionVisitor for Neighborhoods<L> {
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
         let block = &points.blocks[block_idx as usize];
         let inside = block.lanes_within::<L>(&self.region);
-        if inside == 0 {
-            return;
+        if inside != 0 {
+            let all = L::Wide::splat(0.0).less_equal(L::Wide::splat(0.0));
+            show_block::<L>(block, inside, &self.position, all, &mut self.surroundings);
         }
-        if let Some(place) = self.blocks.get_mut(self.n_blocks) {
-            *place = block_idx;
-        }
-        self.n_blocks += 1;
-        let all = L::Wide::splat(0.0).less_equal(L::Wide::splat(0.0));
-        show_block::<L>(block, inside, &self.position, all, &mut self.vicinities);
     }
 }
