@@ -67,4 +67,56 @@ impl Image {
         };
         Self { layers: Some(layers), ..Self::new(width, height) }
     }
+
+    /// The picture cut into bands of so many rows, the last one of fewer, from the top.
+    pub fn bands_mut(&mut self, n_rows: usize) -> Vec<Band<'_>> {
+        let n = n_rows * self.width as usize;
+        let mut layers = self.layers.as_mut().map(|layers| layers.bands_mut(n).into_iter());
+        let pixels = self.color.chunks_mut(n).zip(self.coverage.chunks_mut(n));
+        let band = |(color, coverage)| {
+            let layers = layers.as_mut().and_then(Iterator::next);
+            Band { color, coverage, layers }
+        };
+        pixels.map(band).collect()
+    }
+}
+
+/// Rows of an image.
+pub struct Band<'i> {
+    pub color: &'i mut [[f32; 4]],
+    pub coverage: &'i mut [f32],
+    pub layers: Option<LayersBand<'i>>,
+}
+
+/// Rows of an image's layers.
+pub struct LayersBand<'i> {
+    pub depth: &'i mut [f32],
+    pub normal: &'i mut [Vec3],
+    pub position: &'i mut [Vec3],
+    pub point_id: &'i mut [u32],
+    pub instance_id: &'i mut [u32],
+    pub albedo: &'i mut [Vec3],
+}
+
+impl Layers {
+    /// Cut after every `n` pixels.
+    fn bands_mut(&mut self, n: usize) -> Vec<LayersBand<'_>> {
+        let mut depth = self.depth.chunks_mut(n);
+        let mut normal = self.normal.chunks_mut(n);
+        let mut position = self.position.chunks_mut(n);
+        let mut point_id = self.point_id.chunks_mut(n);
+        let mut instance_id = self.instance_id.chunks_mut(n);
+        let mut albedo = self.albedo.chunks_mut(n);
+        let next = || {
+            Some(LayersBand {
+                depth: depth.next()?,
+                normal: normal.next()?,
+                position: position.next()?,
+                point_id: point_id.next()?,
+                instance_id: instance_id.next()?,
+                albedo: albedo.next()?,
+            })
+        };
+        std::iter::from_fn(next).collect()
+    }
 }

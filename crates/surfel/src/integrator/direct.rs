@@ -26,6 +26,14 @@ pub struct RayCounts {
     pub sky: u64,
 }
 
+impl std::ops::AddAssign for RayCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.primary += other.primary;
+        self.shadow += other.shadow;
+        self.sky += other.sky;
+    }
+}
+
 /// A batch of camera rays and what they hit.
 #[derive(Clone, Copy)]
 pub struct Batch<'a> {

@@ -3,7 +3,7 @@
 use super::{RenderStats, Renderer, Settings, raster};
 use crate::error::Result;
 use crate::flat::FlatScene;
-use crate::image::{Image, NO_ID};
+use crate::image::{Band, Image, NO_ID};
 use crate::integrator::{self, Batch, RayCounts, Samples};
 use crate::math::{Ray, Vec3, hash, scrambled_pair};
 use crate::progress::Progress;
@@ -23,8 +23,6 @@ pub struct CpuRenderer {
 const TILE: u32 = 16;
 /// Pixels along the side of a cell, whose rays make a packet.
 const CELL: u32 = 4;
-/// Tiles finished before they are copied into the picture: bounds the memory they take.
-const TILES_AT_ONCE: usize = 4096;
 /// Rays of a batch, about: enough to fill tiles of few samples, little enough for the caches.
 const BATCH: u32 = 1024;
 
@@ -62,22 +60,23 @@ impl CpuRenderer {
     ) -> Result<(Image, RenderStats)> {
         progress.begin("render", u64::from(settings.width) * u64::from(settings.height));
         let mut image = settings.blank();
-        let mut stats = RenderStats::default();
-        let tiles = TilePlace::all(settings);
         let job = Job { scene, simd: self.simd, view, settings, progress };
-        for tiles in tiles.chunks(TILES_AT_ONCE) {
-            let render = |place: &TilePlace| {
-                let tile = Tile::render(&job, *place)?;
+        let bands: Vec<_> = image.bands_mut(TILE as usize).into_iter().enumerate().collect();
+        let bands = bands.into_par_iter().map(|(row, mut band)| {
+            let render = |place| {
+                let tile = Tile::render(&job, place)?;
                 progress.advance(place.n_pixels() as u64);
                 Ok(tile)
             };
-            for tile in tiles.par_iter().map(render).collect::<Result<Vec<_>>>()? {
-                tile.copy_to(&mut image);
-                stats.rays.primary += tile.counts.primary;
-                stats.rays.shadow += tile.counts.shadow;
-                stats.rays.sky += tile.counts.sky;
-                stats.trace_secs += tile.trace_secs / rayon::current_num_threads() as f64;
-            }
+            let places: Vec<_> = TilePlace::of_row(row as u32, settings).collect();
+            let tiles: Vec<_> = places.into_par_iter().map(render).collect::<Result<_>>()?;
+            tiles.iter().for_each(|tile| tile.copy_to(&mut band, settings.width));
+            Ok(tiles.iter().map(|tile| (tile.counts, tile.trace_secs)).collect::<Vec<_>>())
+        });
+        let mut stats = RenderStats::default();
+        for (counts, trace_secs) in bands.collect::<Result<Vec<_>>>()?.into_iter().flatten() {
+            stats.rays += counts;
+            stats.trace_secs += trace_secs / rayon::current_num_threads() as f64;
         }
         Ok((image, stats))
     }
@@ -102,14 +101,12 @@ struct TilePlace {
 }
 
 impl TilePlace {
-    fn all(settings: &Settings) -> Vec<Self> {
-        let rows = (0..settings.height).step_by(TILE as usize);
-        let places =
-            rows.flat_map(|y| (0..settings.width).step_by(TILE as usize).map(move |x| (x, y)));
-        let (width, height) = (settings.width, settings.height);
-        let place =
-            |(x, y)| Self { x, y, width: TILE.min(width - x), height: TILE.min(height - y) };
-        places.map(place).collect()
+    /// The tiles of a row of them, from the left.
+    fn of_row(row: u32, settings: &Settings) -> impl Iterator<Item = Self> {
+        let (y, width) = (row * TILE, settings.width);
+        let height = TILE.min(settings.height - y);
+        let place = move |x| Self { x, y, width: TILE.min(width - x), height };
+        (0..width).step_by(TILE as usize).map(place)
     }
 
     fn n_pixels(self) -> usize {
@@ -214,9 +211,7 @@ impl Tile {
             }
             self.coverage[pixel] += 1.0;
         }
-        self.counts.primary += counts.primary;
-        self.counts.shadow += counts.shadow;
-        self.counts.sky += counts.sky;
+        self.counts += counts;
         Ok(())
     }
 
@@ -242,12 +237,12 @@ impl Tile {
         self.layers = rays.iter().zip(hits).map(layer).collect();
     }
 
-    fn copy_to(&self, image: &mut Image) {
+    fn copy_to(&self, band: &mut Band, width: u32) {
         for (i, (x, y)) in self.place.pixels().enumerate() {
-            let pixel = y as usize * image.width as usize + x as usize;
-            image.color[pixel] = self.color[i];
-            image.coverage[pixel] = self.coverage[i];
-            if let Some(layers) = &mut image.layers {
+            let pixel = ((y - self.place.y) * width + x) as usize;
+            band.color[pixel] = self.color[i];
+            band.coverage[pixel] = self.coverage[i];
+            if let Some(layers) = &mut band.layers {
                 let LayerPixel { depth, position, hit } = &self.layers[i];
                 layers.depth[pixel] = *depth;
                 layers.position[pixel] = *position;
