@@ -65,13 +65,12 @@ impl<F: Floats> Candidates<F> {
         offset.dot(self.direction).less(F::splat(-PASSED) * self.radius)
     }
 
-    /// How far the ray, where it passed a point, was from the point's plane, along its normal. That may
-    /// have either sign and any length but zero, as it appears twice.
+    /// The points' normals, as long as the ray was above their planes where it passed them, negative below.
+    /// Normals of other lengths weigh more or less, but those of points near each other are much alike.
     #[inline(always)]
     fn lift(&self, offset: Vec3Lanes<F>, normal: Vec3Lanes<F>) -> Vec3Lanes<F> {
         let along = offset.dot(self.direction);
-        let height = normal.dot(self.direction.scaled(along).minus(offset)) / normal.dot(normal);
-        normal.scaled(height)
+        normal.scaled(normal.dot(self.direction.scaled(along).minus(offset)))
     }
 
     /// Where points lie in the tangent plane, and which lie in some direction there: those straight under
