@@ -165,19 +165,17 @@ impl<L: Lanes, S: Shape, J: Judge> AnyInPacket<'_, L, S, J> {
             lanes &= lanes - 1;
         }
     }
-}
 
-impl<L: Lanes, S: Shape, J: Judge> AnyInPacket<'_, L, S, J> {
-    /// One hit of each ray is judged at a time, as judging many at once costs little more than one.
+    /// Judges one hit of each ray at a time: to judge many at once costs little more than one.
     #[inline(always)]
     fn visit_with_judge(&mut self, block: &BlockForPacket<L>, block_idx: u32) {
         let limits = L::Wide::load(&self.limits);
         let mut found = [([0.0; WIDE], 0); LANES];
         let mut open = 0;
-        for lane in 0..LANES {
+        for (lane, found) in found.iter_mut().enumerate() {
             let (distance, mask) = block.intersect::<S>(lane);
             let lanes = (mask & distance.less_equal(limits)).bits();
-            found[lane] = (distance.store(), lanes);
+            *found = (distance.store(), lanes);
             open |= lanes;
         }
         while open != 0 {
