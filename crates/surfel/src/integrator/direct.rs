@@ -121,9 +121,11 @@ impl Batch<'_> {
         progress: &dyn Progress,
     ) -> Result<u64> {
         let mut n_rays = 0;
-        let (mut rays, mut brings, mut occluded) = (Vec::new(), Vec::new(), Vec::new());
         let share = 1.0 / n_light as f32;
         let hits_at_once = (LIGHT_RAYS_AT_ONCE / n_light).max(1) as usize;
+        let most = self.hits.len().min(hits_at_once) * n_light as usize;
+        let (mut rays, mut brings) = (Vec::with_capacity(most), Vec::with_capacity(most));
+        let mut occluded = Vec::with_capacity(most);
         for first in (0..self.hits.len()).step_by(hits_at_once) {
             progress.check()?;
             rays.clear();

@@ -115,13 +115,15 @@ impl TilePlace {
 
     /// Coordinates in the picture of the tile's pixels: cell by cell, as rays of a packet should be close.
     fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
-        let cells = |size: u32| (0..size).step_by(CELL as usize);
-        let cells = cells(self.height).flat_map(move |y| cells(self.width).map(move |x| (x, y)));
-        cells.flat_map(move |(x, y)| {
-            let rows = y..self.height.min(y + CELL);
-            let columns = x..self.width.min(x + CELL);
-            rows.flat_map(move |y| columns.clone().map(move |x| (self.x + x, self.y + y)))
-        })
+        const CELLS: u32 = TILE / CELL;
+        let place = |i: u32| {
+            let (cell, pixel) = (i / CELL.pow(2), i % CELL.pow(2));
+            let (cell_x, cell_y) = (cell % CELLS, cell / CELLS);
+            (cell_x * CELL + pixel % CELL, cell_y * CELL + pixel / CELL)
+        };
+        let places = (0..TILE.pow(2)).map(place);
+        let places = places.filter(move |&(x, y)| x < self.width && y < self.height);
+        places.map(move |(x, y)| (self.x + x, self.y + y))
     }
 }
 
@@ -179,7 +181,9 @@ impl Tile {
     fn add_samples(&mut self, job: &Job, numbers: std::ops::Range<u32>) -> Result<()> {
         let Job { scene, simd, view, settings, progress } = *job;
         let per_pixel = numbers.len();
-        let (mut rays, mut keys, mut indices) = (Vec::new(), Vec::new(), Vec::new());
+        let n = self.color.len() * per_pixel;
+        let mut rays = Vec::with_capacity(n);
+        let (mut keys, mut indices) = (Vec::with_capacity(n), Vec::with_capacity(n));
         for (x, y) in self.place.pixels() {
             let key = hash(settings.seed ^ hash(u64::from(y) << 32 | u64::from(x)));
             for index in numbers.clone() {

@@ -41,27 +41,33 @@ impl Splat {
 pub(super) fn splats<L: Lanes>(scene: &FlatScene, rays: &[Ray], splats: &mut [Splat]) {
     let kind = scene.surface;
     let kind = if kind.is_gathered() { kind } else { SurfaceKind::Splat };
-    find_splats::<L>(scene, kind, rays, false, splats);
+    Finder::new(scene, kind, false).find::<L>(rays, splats);
 }
 
-/// Judges the hits if asked to.
-#[inline(always)]
-pub(super) fn find_splats<L: Lanes>(
-    scene: &FlatScene,
-    kind: SurfaceKind,
-    rays: &[Ray],
-    judges: bool,
-    splats: &mut [Splat],
-) {
-    let mut stack = PacketStack::new();
-    let mut mixer = Mixer { scene, kind, judges, sightings: Vec::new(), discs: Vec::new() };
-    for (rays, splats) in rays.chunks(WIDE).zip(splats.chunks_mut(WIDE)) {
-        let limits = if kind.is_gathered() {
-            gather::<L>(&scene.points, rays, &mut stack, &mut mixer.sightings)
-        } else {
-            find_closest::<L>(scene, rays, &mut mixer.sightings)
-        };
-        mixer.mix::<L>(&WideRays::new(rays), &limits, splats);
+/// Finds splats, and keeps the room it needs from search to search.
+pub(super) struct Finder<'s> {
+    stack: PacketStack,
+    mixer: Mixer<'s>,
+}
+
+impl<'s> Finder<'s> {
+    /// Judges the hits if asked to.
+    pub fn new(scene: &'s FlatScene, kind: SurfaceKind, judges: bool) -> Self {
+        let mixer = Mixer { scene, kind, judges, sightings: Vec::new(), discs: Vec::new() };
+        Self { stack: PacketStack::new(), mixer }
+    }
+
+    #[inline(always)]
+    pub fn find<L: Lanes>(&mut self, rays: &[Ray], splats: &mut [Splat]) {
+        let Self { stack, mixer } = self;
+        for (rays, splats) in rays.chunks(WIDE).zip(splats.chunks_mut(WIDE)) {
+            let limits = if mixer.kind.is_gathered() {
+                gather::<L>(&mixer.scene.points, rays, stack, &mut mixer.sightings)
+            } else {
+                find_closest::<L>(mixer.scene, rays, &mut mixer.sightings)
+            };
+            mixer.mix::<L>(&WideRays::new(rays), &limits, splats);
+        }
     }
 }
 

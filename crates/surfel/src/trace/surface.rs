@@ -5,7 +5,7 @@ use super::boundary::{WideHits, enclosed, is_enclosed};
 use super::closest::closest_hits;
 use super::hit::Hit;
 use super::packet::WideRays;
-use super::splat::{Splat, find_splats};
+use super::splat::{Finder, Splat};
 use crate::flat::{FlatScene, Slot};
 use crate::math::{Floats, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
 use crate::surface::{Boundary, Candidate, Disc};
@@ -145,7 +145,7 @@ fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]
     hits.fill(SurfaceHit::MISS);
     if scene.boundary == Boundary::Off {
         let mut splats = vec![Splat::MISS; rays.len()];
-        find_splats::<L>(scene, scene.surface, rays, false, &mut splats);
+        Finder::new(scene, scene.surface, false).find::<L>(rays, &mut splats);
         for (hit, splat) in hits.iter_mut().zip(&splats) {
             *hit = surface_hit(scene, splat);
         }
@@ -154,9 +154,10 @@ fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]
     let mut searching: Vec<u32> = (0..rays.len() as u32).collect();
     let mut rays = rays.to_vec();
     let mut splats = vec![Splat::MISS; rays.len()];
+    let mut finder = Finder::new(scene, scene.surface, true);
     for _ in 0..MAX_REFUSALS {
         let splats = &mut splats[..rays.len()];
-        find_splats::<L>(scene, scene.surface, &rays, true, splats);
+        finder.find::<L>(&rays, splats);
         let mut n_left = 0;
         for i in 0..splats.len() {
             let (splat, ray, ray_idx) = (&splats[i], rays[i], searching[i]);
