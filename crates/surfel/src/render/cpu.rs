@@ -20,11 +20,11 @@ pub struct CpuRenderer {
 }
 
 /// Pixels along a tile's side.
-const TILE: u32 = 16;
+const TILE: u32 = 32;
 /// Pixels along the side of a cell, whose rays make a packet.
 const CELL: u32 = 4;
 /// Rays of a batch, about: enough to fill tiles of few samples, little enough for the caches.
-const BATCH: u32 = 1024;
+const BATCH: u32 = 4096;
 
 impl Renderer for CpuRenderer {
     fn name(&self) -> &'static str {
