@@ -2,7 +2,7 @@
 #![expect(clippy::print_stdout, reason = "a benchmark prints its table")]
 
 use surfel::math::{Mat3, Vec3};
-use surfel::points::{PointCloud, spacing};
+use surfel::points::{PointCloud, Preparation, Radius, prepare, spacing};
 use surfel::progress::Silent;
 use surfel::surface::{Boundary, SurfaceKind};
 use surfel_tests::clouds;
@@ -37,6 +37,25 @@ fn bunny() {
     let cloud = PointCloud::from_positions(mesh.vertices.clone());
     println!("the bunny's {} vertices against its mesh", cloud.len());
     table(&cloud, &mesh);
+    radii(&cloud, &mesh);
+}
+
+/// What larger radii cost.
+fn radii(cloud: &PointCloud, mesh: &Mesh) {
+    let spacing = spacing(&cloud.positions, &Silent).unwrap();
+    println!("| `splat`, gap | false hits | misses | normals |");
+    println!("| --- | --- | --- | --- |");
+    for k in [6, 8, 10, 12] {
+        let preparation = Preparation { radius: Radius::Adaptive { k }, ..Preparation::default() };
+        let (cloud, _) = prepare(cloud.clone(), &preparation, &Silent).unwrap();
+        let Quality { false_hits, misses, normal_deg, .. } =
+            compare(&cloud, mesh, SurfaceKind::Splat, Boundary::Gap, spacing);
+        println!(
+            "| `--radius adaptive:{k}` | {:.2} % | {:.2} % | {normal_deg:.2} deg |",
+            100.0 * false_hits,
+            100.0 * misses,
+        );
+    }
 }
 
 fn table(cloud: &PointCloud, mesh: &Mesh) {

@@ -1,5 +1,6 @@
 //! Tests across crates: known answers, fast against plain, the same bytes everywhere.
 
+mod batches;
 mod build;
 mod light;
 mod modes;

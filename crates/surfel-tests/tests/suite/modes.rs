@@ -1,6 +1,7 @@
 //! Every way a batch may take through the tree (packets, whole, partial or with far ends that meet, and
 //! rays in flight) against a plain loop, at every SIMD level.
 
+use crate::batches::surface;
 use crate::plain::Plain;
 use crate::{build, trace};
 use std::path::Path;
@@ -8,8 +9,8 @@ use surfel::bvh::Node;
 use surfel::flat::FlatScene;
 use surfel::math::{Aabb, Frame, LANES, Random, Ray, Vec3};
 use surfel::points::PointCloud;
-use surfel::surface::{Boundary, SurfaceKind};
-use surfel::trace::{Hit, Simd, SurfaceHit, occlusions, surface_hits};
+use surfel::surface::SurfaceKind;
+use surfel::trace::{Hit, Simd};
 use surfel_formats::{LoadOptions, load};
 use surfel_tests::mesh::{Mesh, shared_data};
 use surfel_tests::{clouds, scenes};
@@ -95,7 +96,7 @@ fn check_modes(name: &str, scene: &FlatScene, n_tiles: usize) {
     plain.check(&format!("{name} one astray"), &one_astray.collect::<Vec<_>>(), &[1000]);
 }
 
-fn shuffled<T>(mut values: Vec<T>) -> Vec<T> {
+pub fn shuffled<T>(mut values: Vec<T>) -> Vec<T> {
     let mut random = Random::new(51, 0);
     for i in (1..values.len()).rev() {
         values.swap(i, random.below(i as u64 + 1) as usize);
@@ -108,7 +109,7 @@ fn centers(scene: &FlatScene) -> Vec<Vec3> {
 }
 
 /// From one eye through tiles of four by four pixels, each about a point.
-fn camera_rays(scene: &FlatScene, n_tiles: usize) -> Vec<Ray> {
+pub fn camera_rays(scene: &FlatScene, n_tiles: usize) -> Vec<Ray> {
     let centers = centers(scene);
     let bounds = Aabb::of_points(centers.iter().copied());
     let to_eye = (bounds.diagonal() + scene.points.radius(0)) * Vec3::new(0.8, 0.5, 0.6);
@@ -128,7 +129,7 @@ fn camera_rays(scene: &FlatScene, n_tiles: usize) -> Vec<Ray> {
 }
 
 /// From where rays hit to a light whose distance is the end of their range.
-fn shadow_rays(scene: &FlatScene, camera: &Plain) -> Vec<Ray> {
+pub fn shadow_rays(scene: &FlatScene, camera: &Plain) -> Vec<Ray> {
     let bounds = Aabb::of_points(centers(scene));
     let light = bounds.center() + bounds.diagonal() * Vec3::new(0.4, 0.7, 0.5);
     let hits = camera.rays.iter().zip(&camera.closest).filter(|(_, hit)| !hit.is_miss());
@@ -141,7 +142,7 @@ fn shadow_rays(scene: &FlatScene, camera: &Plain) -> Vec<Ray> {
 }
 
 /// From near and far toward points, some of bounded range, some along an axis.
-fn loose_rays(scene: &FlatScene, n: usize) -> Vec<Ray> {
+pub fn loose_rays(scene: &FlatScene, n: usize) -> Vec<Ray> {
     let centers = centers(scene);
     let diagonal = Aabb::of_points(centers.iter().copied()).diagonal();
     let mut random = Random::new(52, 0);
@@ -213,7 +214,7 @@ fn check_strays(scene: &FlatScene, strays: Vec<Ray>) {
 }
 
 /// Along axes, in planes of discs, past rims, on faces of boxes, of bare and empty ranges, from far away.
-fn degenerate_rays(scene: &FlatScene) -> Vec<Ray> {
+pub fn degenerate_rays(scene: &FlatScene) -> Vec<Ray> {
     let points = &scene.points;
     let mut rays = Vec::new();
     for slot in some_slots(scene) {
@@ -369,65 +370,6 @@ fn grid_rays(along: [f32; 4]) -> Vec<Ray> {
     directions.flat_map(from_everywhere).collect()
 }
 
-type Seen = (SurfaceHit, bool);
-
-fn surface(scene: &FlatScene, simd: Simd, rays: &[Ray]) -> Vec<Seen> {
-    let mut hits = vec![SurfaceHit::MISS; rays.len()];
-    let mut occluded = vec![false; rays.len()];
-    surface_hits(scene, simd, rays, &mut hits);
-    occlusions(scene, simd, rays, &mut occluded);
-    hits.into_iter().zip(occluded).collect()
-}
-
-#[test]
-fn the_surface_is_the_same_whatever_rays_are_beside() {
-    for (name, cloud) in [
-        ("one point", clouds::sphere(1, 1.0)),
-        ("sphere", clouds::sphere(500, 1.0)),
-        ("crossing planes", clouds::crossing_planes(20, 0.4, 2)),
-        ("even cube", clouds::cube(5, 0.0, 5)),
-        ("line", clouds::line(60)),
-    ] {
-        for (_, kind) in SurfaceKind::ALL {
-            let flat = scenes::flat(cloud.clone(), kind);
-            let camera = Plain::new(&flat, camera_rays(&flat, 8));
-            let shadow = shadow_rays(&flat, &camera);
-            let odd = degenerate_rays(&flat).into_iter().step_by(7).collect();
-            let rays = [camera.rays, shadow, loose_rays(&flat, 100), odd].concat();
-            let (ending, endless): (Vec<Ray>, Vec<Ray>) =
-                rays.into_iter().partition(|ray| ray.t_max.is_finite());
-            for boundary in [Boundary::Gap, Boundary::Off] {
-                let scene = FlatScene { boundary, ..flat.clone() };
-                check_surface(name, &scene, &ending);
-                check_surface(name, &scene, &endless);
-            }
-        }
-    }
-}
-
-/// In order, shuffled, in small batches and one by one.
-fn check_surface(name: &str, scene: &FlatScene, rays: &[Ray]) {
-    let one_by_one: Vec<Seen> =
-        rays.iter().flat_map(|&ray| surface(scene, Simd::PORTABLE, &[ray])).collect();
-    let in_order: Vec<usize> = (0..rays.len()).collect();
-    let shuffled = shuffled(in_order.clone());
-    for simd in Simd::available() {
-        for (order, batch_len) in
-            [(&in_order, 1000), (&shuffled, 1000), (&shuffled, 17), (&in_order, 1)]
-        {
-            for batch in order.chunks(batch_len) {
-                let batch_rays: Vec<Ray> = batch.iter().map(|&i| rays[i]).collect();
-                let seen = surface(scene, simd, &batch_rays);
-                for ((seen, &i), ray) in seen.iter().zip(batch).zip(&batch_rays) {
-                    let (kind, boundary, simd) = (scene.surface, scene.boundary, simd.name());
-                    let context = format!("{name}, {kind:?}, {boundary:?}, {simd}, {ray:?}");
-                    assert_eq!(*seen, one_by_one[i], "{context}, batches of {batch_len}");
-                }
-            }
-        }
-    }
-}
-
 /// Cases that once failed.
 mod known {
     use super::*;
@@ -488,16 +430,5 @@ mod known {
             let strays = camera_rays(&scene, 4).into_iter().flat_map(not_numbers);
             check_strays(&scene, strays.collect());
         }
-    }
-
-    #[test]
-    fn nothing_is_hit_where_no_point_can_be() {
-        let mut cloud = scenes::scene(clouds::sphere(20, 1.0), SurfaceKind::Disc).cloud;
-        cloud.positions.fill(Vec3::NAN);
-        let scene = build::flat(cloud, SurfaceKind::Disc);
-        let rays = scenes::random_rays(40, 1.0, 54);
-        Plain::new(&scene, rays.clone()).check_in_order("no points");
-        let seen = surface(&scene, Simd::detect(), &rays);
-        assert!(seen.iter().all(|(hit, is_occluded)| hit.is_miss() && !is_occluded));
     }
 }

@@ -15,16 +15,22 @@ pub trait Judge: Copy {
     /// Whether all do.
     const IS_LENIENT: bool;
 
-    fn counts<L: Lanes>(&self, ray: &Ray, hit: &Hit) -> bool;
+    #[inline(always)]
+    fn counts<L: Lanes>(&self, _ray: &Ray, _hit: &Hit) -> bool {
+        true
+    }
 
     /// Of rays in `lanes`, each of which hits the shape at its slot, those for which that counts.
+    #[inline(always)]
     fn counting<L: Lanes>(
         &self,
-        rays: &WideRays<L::Wide>,
+        _rays: &WideRays<L::Wide>,
         lanes: u32,
-        distances: L::Wide,
-        slots: &[Slot; WIDE],
-    ) -> u32;
+        _distances: L::Wide,
+        _slots: &[Slot; WIDE],
+    ) -> u32 {
+        lanes
+    }
 }
 
 /// Every hit counts.
@@ -33,22 +39,6 @@ pub struct Lenient;
 
 impl Judge for Lenient {
     const IS_LENIENT: bool = true;
-
-    #[inline(always)]
-    fn counts<L: Lanes>(&self, _: &Ray, _: &Hit) -> bool {
-        true
-    }
-
-    #[inline(always)]
-    fn counting<L: Lanes>(
-        &self,
-        _: &WideRays<L::Wide>,
-        lanes: u32,
-        _: L::Wide,
-        _: &[Slot; WIDE],
-    ) -> u32 {
-        lanes
-    }
 }
 
 #[inline(always)]
