@@ -105,11 +105,16 @@ impl Node {
     /// The children of all lanes as `Child::pack` has them, which lanes hold as bits.
     #[inline(always)]
     pub fn packed_children<L: Lanes>(&self) -> L {
-        let are_nodes = L::below::<N_NODES>(self.exponents_and_counts);
-        L::numbered(are_nodes, self.first_node, self.lane_zero_as_block)
+        L::numbered(self.nodes::<L>(), self.first_node, self.lane_zero_as_block)
     }
 
-    /// The lanes that hold a child: the first ones.
+    /// The lanes that hold nodes: the first ones.
+    #[inline(always)]
+    pub fn nodes<L: Lanes>(&self) -> L::Mask {
+        L::below::<N_NODES>(self.exponents_and_counts)
+    }
+
+    /// The lanes that hold a child: the first ones too.
     #[inline(always)]
     pub fn filled<L: Lanes>(&self) -> L::Mask {
         L::below::<N_CHILDREN>(self.exponents_and_counts)

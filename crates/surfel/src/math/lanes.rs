@@ -61,6 +61,8 @@ pub trait Lanes: Floats {
     fn store(self) -> [f32; LANES];
     /// Moves the chosen lanes to the front, in their order.
     fn compress(self, lanes: Self::Mask) -> Self;
+    /// Each lane's value from the one `BY` lanes on, from the last one on to the first.
+    fn rotated<const BY: usize>(self) -> Self;
     /// Sorts the chosen lanes, none of them negative, by falling value to the front, and `others` with
     /// them. Values may come out smaller by some 2^-20 of themselves.
     fn sort_from_far(self, lanes: Self::Mask, others: Self) -> (Self, Self);

@@ -165,6 +165,12 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
+    fn rotated<const BY: usize>(mut self) -> Self {
+        self.0.rotate_left(BY);
+        self
+    }
+
+    #[inline(always)]
     fn compress(self, lanes: PortableMask) -> Self {
         let (mut lanes, mut values) = (lanes.bits(), [0.0; LANES]);
         for value in &mut values[..lanes.count_ones() as usize] {

@@ -1,6 +1,6 @@
 //! The angular-gap test: do the points surround a hit, or does it lie beyond the edge of the surface?
 
-use crate::math::{Floats, LaneMask, Vec3, Vec3Lanes, tangents};
+use crate::math::{Floats, LaneMask, Lanes, Vec3, Vec3Lanes, tangents};
 
 /// Points within this many radii of the hit count ...
 pub const NEIGHBOR_REACH: f32 = 1.3;
@@ -154,6 +154,28 @@ impl<F: Floats> Surroundings<F> {
     }
 }
 
+impl<L: Lanes> Surroundings<L> {
+    /// What all lanes have told together, of a hit that is the same in all of them.
+    #[inline(always)]
+    pub fn together(self) -> Self {
+        self.with_rotated::<4>().with_rotated::<2>().with_rotated::<1>()
+    }
+
+    /// Adds to each lane what the one `BY` lanes on has told.
+    #[inline(always)]
+    fn with_rotated<const BY: usize>(self) -> Self {
+        let Vec3Lanes { x, y, z } = self.free_side;
+        let free_side = Vec3Lanes { x: x.rotated::<BY>(), y: y.rotated::<BY>(), z: z.rotated::<BY>() };
+        Self {
+            hit: self.hit,
+            n_near: self.n_near + self.n_near.rotated::<BY>(),
+            wedge: self.wedge.with_rotated::<BY>(),
+            n_passed: self.n_passed + self.n_passed.rotated::<BY>(),
+            free_side: self.free_side.plus(free_side),
+        }
+    }
+}
+
 /// The directions of a plane between those met so far, as long as they leave a gap of 180 degrees.
 struct Wedge<F: Floats> {
     /// The one from which all others are met counterclockwise; infinite before there is any.
@@ -189,6 +211,21 @@ impl<F: Floats> Wedge<F> {
         let (is_first, is_last) = (is_new | lanes & is_before, is_new | lanes & is_after);
         self.first = [F::select(is_first, x, first_x), F::select(is_first, y, first_y)];
         self.last = [F::select(is_last, x, last_x), F::select(is_last, y, last_y)];
+    }
+}
+
+impl<L: Lanes> Wedge<L> {
+    /// The ends of a wedge tell all there is to know of it.
+    #[inline(always)]
+    fn with_rotated<const BY: usize>(mut self) -> Self {
+        let rotated = |[x, y]: [L; 2]| [x.rotated::<BY>(), y.rotated::<BY>()];
+        let (first, last) = (rotated(self.first), rotated(self.last));
+        let is_full = L::select(self.is_full, L::splat(1.0), L::splat(0.0)).rotated::<BY>();
+        let is_any = first[0].less(L::splat(f32::INFINITY));
+        self.add(first, is_any);
+        self.add(last, is_any);
+        self.is_full = self.is_full | L::splat(0.0).less(is_full);
+        self
     }
 }
 

@@ -257,6 +257,15 @@ impl<L: Level> Lanes for Eight<L> {
         Self(L::compress(self.0, lanes), PhantomData)
     }
 
+    #[inline(always)]
+    fn rotated<const BY: usize>(self) -> Self {
+        let order: [i32; LANES] = const { rotation(BY) };
+        avx2!(Self(_mm256_permutevar8x32_ps(
+            self.0,
+            _mm256_loadu_si256(order.as_ptr().cast())
+        )))
+    }
+
     /// A bitonic sort of keys: the bits of a value, the lane it comes from in the lowest three.
     #[inline(always)]
     fn sort_from_far(self, lanes: L::Mask, others: Self) -> (Self, Self) {
@@ -349,6 +358,16 @@ unsafe fn exchange_halves(key: __m256i) -> __m256i {
         let (lesser, greater) = (_mm256_min_epi32(key, other), _mm256_max_epi32(key, other));
         _mm256_blend_epi32::<0b1111_0000>(greater, lesser)
     }
+}
+
+/// For each lane the one `by` lanes on.
+const fn rotation(by: usize) -> [i32; LANES] {
+    let (mut order, mut lane) = ([0; LANES], 0);
+    while lane < LANES {
+        order[lane] = ((lane + by) % LANES) as i32;
+        lane += 1;
+    }
+    order
 }
 
 /// For each set of lanes, these lanes in order.

@@ -47,37 +47,29 @@ impl<L: Lanes> Task for JudgeOne<'_, L> {
         let Self { points, position, hit, .. } = self;
         let mut found = Neighborhood::<L> {
             position,
-            hit: Candidates::of_one(&hit),
             surroundings: Surroundings::new(Candidates::of_one(&hit)),
         };
         let reach = Vec3::splat(NEIGHBOR_REACH * hit.radius);
         let region = Aabb { min: position - reach, max: position + reach };
         within::<L>(points, &region, &mut found);
-        found.surroundings.judge()
+        let Verdicts { enclosed, sparse } = found.surroundings.together().judge();
+        Verdicts { enclosed: enclosed & 1, sparse: sparse & 1 }
     }
 }
 
+/// Eight points before one hit: each lane takes in its own.
 struct Neighborhood<L: Lanes> {
     position: Vec3,
-    hit: Candidates<L>,
-    surroundings: Surroundings<f32>,
+    surroundings: Surroundings<L>,
 }
 
 impl<L: Lanes> RegionVisitor for Neighborhood<L> {
-    /// Eight points are tested at once; those near, few, are taken in one by one.
     #[inline(always)]
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
         let points = points.blocks[block_idx as usize].points::<L>(self.position);
-        let is_near = self.hit.near(points.center) & L::splat(0.0).less(points.radius);
-        let mut near = is_near.bits();
-        if near == 0 {
-            return;
-        }
-        let (offsets, normals) = (points.center.store(), points.normal.store());
-        while near != 0 {
-            let lane = near.trailing_zeros() as usize % LANES;
-            near &= near - 1;
-            self.surroundings.add(in_lane(&offsets, lane), in_lane(&normals, lane), true);
+        let is_near = self.surroundings.near(points.center) & L::splat(0.0).less(points.radius);
+        if is_near.bits() != 0 {
+            self.surroundings.add(points.center, points.normal, is_near);
         }
     }
 }
@@ -99,23 +91,58 @@ pub struct WideHits<W> {
     pub radius: W,
 }
 
-/// The `lanes` in which hits are enclosed. Hits close to each other share the way through the tree.
-///
-/// A hit that is enclosed by the points in the blocks of the discs that its ray pierces is not looked at any
-/// further. `sightings` are these, sorted by slot; there need not be any.
+/// The `lanes` in which hits are enclosed by the points in the blocks of the discs that their rays pierce
+/// alone: most of those on even surfaces. `sightings` are these discs, sorted by slot.
 #[inline(always)]
-pub fn enclosed<L: Lanes>(
+pub fn enclosed_by_blocks<L: Lanes>(
     points: &FlatPoints,
     sightings: &[Sighting],
     lanes: u32,
     hits: &WideHits<L::Wide>,
 ) -> u32 {
-    L::call(JudgeWide::<L> { points, sightings, lanes, hits })
+    lanes & L::call(JudgeByBlocks::<L> { points, sightings, hits })
+}
+
+struct JudgeByBlocks<'p, L: Lanes> {
+    points: &'p FlatPoints,
+    sightings: &'p [Sighting],
+    hits: &'p WideHits<L::Wide>,
+}
+
+impl<L: Lanes> Task for JudgeByBlocks<'_, L> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run(self) -> u32 {
+        let Self { points, sightings, hits } = self;
+        let mut found = Surroundings::new(hits.candidates());
+        let block_of = |place: usize| sightings[place].slot / LANES as u32;
+        let mut first = 0;
+        while first < sightings.len() {
+            let block_idx = block_of(first);
+            let mut lanes = sightings[first].is_seen::<L::Wide>();
+            first += 1;
+            while first < sightings.len() && block_of(first) == block_idx {
+                lanes = lanes | sightings[first].is_seen::<L::Wide>();
+                first += 1;
+            }
+            let block = &points.blocks[block_idx as usize];
+            let all = L::splat(0.0).less(block.radii()).bits();
+            show_block::<L>(block, all, &hits.position, lanes, &mut found);
+        }
+        let Verdicts { enclosed, sparse } = found.judge();
+        enclosed & !sparse
+    }
+}
+
+/// The `lanes` in which hits are enclosed. Hits close to each other share the way through the tree.
+#[inline(always)]
+pub fn enclosed<L: Lanes>(points: &FlatPoints, lanes: u32, hits: &WideHits<L::Wide>) -> u32 {
+    L::call(JudgeWide::<L> { points, lanes, hits })
 }
 
 struct JudgeWide<'p, L: Lanes> {
     points: &'p FlatPoints,
-    sightings: &'p [Sighting],
     lanes: u32,
     hits: &'p WideHits<L::Wide>,
 }
@@ -125,24 +152,12 @@ impl<L: Lanes> Task for JudgeWide<'_, L> {
 
     #[inline(always)]
     fn run(self) -> u32 {
-        let Self { points, sightings, mut lanes, hits } = self;
-        let mut enclosed = 0;
-        if !sightings.is_empty() {
-            enclosed = lanes & enclosed_by_blocks::<L>(points, sightings, hits);
-            lanes &= !enclosed;
-        }
-        let mut hits = *hits;
-        for is_last in [false, true] {
-            let verdicts = judge_by_groups::<L>(points, lanes, &hits);
-            if is_last {
-                return enclosed | verdicts.enclosed;
-            }
-            enclosed |= verdicts.enclosed & !verdicts.sparse;
-            lanes = verdicts.sparse;
-            if lanes == 0 {
-                break;
-            }
-            hits.radius = L::Wide::splat(WIDER) * hits.radius;
+        let Self { points, lanes, hits } = self;
+        let Verdicts { mut enclosed, sparse } = judge_by_groups::<L>(points, lanes, hits);
+        if sparse != 0 {
+            let hits = WideHits { radius: L::Wide::splat(WIDER) * hits.radius, ..*hits };
+            let wider = judge_by_groups::<L>(points, sparse, &hits);
+            enclosed = enclosed & !sparse | wider.enclosed;
         }
         enclosed
     }
@@ -180,32 +195,6 @@ fn judge_by_groups<L: Lanes>(
     verdicts
 }
 
-/// The hits that are enclosed by the points in the blocks that their rays sight.
-#[inline(always)]
-fn enclosed_by_blocks<L: Lanes>(
-    points: &FlatPoints,
-    sightings: &[Sighting],
-    hits: &WideHits<L::Wide>,
-) -> u32 {
-    let mut found = Surroundings::new(hits.candidates());
-    let block_of = |place: usize| sightings[place].slot / LANES as u32;
-    let mut first = 0;
-    while first < sightings.len() {
-        let block_idx = block_of(first);
-        let mut lanes = sightings[first].is_seen::<L::Wide>();
-        first += 1;
-        while first < sightings.len() && block_of(first) == block_idx {
-            lanes = lanes | sightings[first].is_seen::<L::Wide>();
-            first += 1;
-        }
-        let block = &points.blocks[block_idx as usize];
-        let all = L::splat(0.0).less(block.radii()).bits();
-        show_block::<L>(block, all, &hits.position, lanes, &mut found);
-    }
-    let Verdicts { enclosed, sparse } = found.judge();
-    enclosed & !sparse
-}
-
 /// Shows these points of a block to the hits in `lanes`.
 #[inline(always)]
 fn show_block<L: Lanes>(
@@ -241,6 +230,29 @@ fn judge_group<L: Lanes>(points: &FlatPoints, group: u32, hits: &WideHits<L::Wid
 }
 
 impl<W: Wide> WideHits<W> {
+    /// Of one to sixteen; the last one fills the lanes that are left.
+    #[inline(always)]
+    pub fn new(hits: &[(Vec3, Candidate)]) -> Self {
+        let (mut position, mut normal, mut direction) =
+            ([[0.0; WIDE]; 3], [[0.0; WIDE]; 3], [[0.0; WIDE]; 3]);
+        let mut radius = [0.0; WIDE];
+        for lane in 0..WIDE {
+            let (place, hit) = &hits[lane.min(hits.len() - 1)];
+            radius[lane] = hit.radius;
+            for axis in 0..3 {
+                position[axis][lane] = place[axis];
+                normal[axis][lane] = hit.normal[axis];
+                direction[axis][lane] = hit.direction[axis];
+            }
+        }
+        Self {
+            position: Vec3Lanes::load_wide(&position),
+            normal: Vec3Lanes::load_wide(&normal),
+            direction: Vec3Lanes::load_wide(&direction),
+            radius: W::load(&radius),
+        }
+    }
+
     #[inline(always)]
     fn candidates(&self) -> Candidates<W> {
         Candidates::new(self.normal, self.direction, self.radius)
@@ -257,18 +269,18 @@ impl<W: Wide> WideHits<W> {
     /// Around all points near the hits in these lanes.
     #[inline(always)]
     fn region(&self, lanes: u32) -> Aabb {
+        let mut is_member = [0.0; WIDE];
+        for (lane, is_member) in is_member.iter_mut().enumerate() {
+            *is_member = (lanes >> lane & 1) as f32;
+        }
+        let lanes = W::splat(0.0).less(W::load(&is_member));
         let reach = W::splat(NEIGHBOR_REACH) * self.radius;
-        let mut region = Aabb::EMPTY;
+        let none = W::splat(f32::INFINITY);
         let Vec3Lanes { x, y, z } = self.position;
+        let mut region = Aabb::EMPTY;
         for (axis, position) in [x, y, z].into_iter().enumerate() {
-            let (low, high) = ((position - reach).store(), (position + reach).store());
-            let mut left = lanes;
-            while left != 0 {
-                let lane = left.trailing_zeros() as usize % WIDE;
-                left &= left - 1;
-                region.min[axis] = region.min[axis].min(low[lane]);
-                region.max[axis] = region.max[axis].max(high[lane]);
-            }
+            region.min[axis] = W::select(lanes, position - reach, none).min_lane();
+            region.max[axis] = W::select(lanes, position + reach, W::splat(0.0) - none).max_lane();
         }
         let rounding = Vec3::splat(ROUNDING * region.min.abs().max(region.max.abs()).max_element());
         Aabb { min: region.min - rounding, max: region.max + rounding }

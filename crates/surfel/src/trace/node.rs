@@ -1,7 +1,7 @@
 //! The boxes of a node against a ray, and against a box.
 
 use crate::bvh::Node;
-use crate::math::{Aabb, LaneMask, Lanes, Ray, Vec3A};
+use crate::math::{Aabb, Lanes, Ray, Vec3A};
 
 /// Rounding allowed for, as a share of the largest coordinates involved: far more than f32 loses in a box
 /// or disc test, far less than a radius. A box is never missed that a hit inside it would need.
@@ -64,11 +64,11 @@ pub fn ray_entries<L: Lanes>(node: &Node, ray: &BoxRay, t_max: f32) -> (L::Mask,
 
 /// Lanes whose boxes overlap `region`.
 #[inline(always)]
-pub fn box_overlaps<L: Lanes>(node: &Node, region: &Aabb) -> u32 {
+pub fn box_overlaps<L: Lanes>(node: &Node, region: &Aabb) -> L::Mask {
     let overlaps = overlaps_along::<L, 0>(node, region)
         & overlaps_along::<L, 1>(node, region)
         & overlaps_along::<L, 2>(node, region);
-    (overlaps & node.filled::<L>()).bits()
+    overlaps & node.filled::<L>()
 }
 
 #[inline(always)]

@@ -1,9 +1,9 @@
 //! The blocks in a region.
 
 use super::node::box_overlaps;
-use crate::bvh::{Child, STACK_SIZE};
+use crate::bvh::Child;
 use crate::flat::FlatPoints;
-use crate::math::{Aabb, LANES, Lanes};
+use crate::math::{Aabb, LANES, LaneMask, Lanes};
 
 /// Looks at blocks.
 pub trait RegionVisitor {
@@ -11,28 +11,72 @@ pub trait RegionVisitor {
 }
 
 /// Shows `visitor` every block whose box overlaps `region`.
+///
+/// The tree is walked in breadth: the next node is known before the last one is done, and no branch depends
+/// on what a node holds, so that the processor works on several nodes, and then blocks, at once.
 #[inline(always)]
 pub fn within<L: Lanes>(points: &FlatPoints, region: &Aabb, visitor: &mut impl RegionVisitor) {
     if points.nodes.is_empty() {
         return;
     }
-    let mut stack = [0u32; STACK_SIZE];
-    let mut size = 1;
-    while 0 < size {
-        size -= 1;
-        let node = &points.nodes[stack[size] as usize];
-        let mut lanes = box_overlaps::<L>(node, region);
-        let children = node.packed_children::<L>().store();
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % LANES;
-            lanes &= lanes - 1;
-            match Child::unpack(children[lane].to_bits()) {
-                Child::Node(node_idx) => {
-                    stack[size] = node_idx;
-                    size += 1;
-                }
-                Child::Block(block_idx) => visitor.visit(points, block_idx),
+    let mut nodes = Row::EMPTY;
+    let mut blocks = Row::EMPTY;
+    // Nodes for which there was no room: hardly ever any.
+    let mut left: Vec<f32> = Vec::new();
+    nodes.ends_at = 1;
+    loop {
+        let mut place = 0;
+        while place < nodes.ends_at {
+            if nodes.is_full() {
+                left.extend(&nodes.children[place..nodes.ends_at]);
+                break;
             }
+            if blocks.is_full() {
+                blocks.show(points, visitor);
+            }
+            let node = &points.nodes[nodes.children[place].to_bits() as usize];
+            let overlapping = box_overlaps::<L>(node, region);
+            let children = node.packed_children::<L>();
+            let are_blocks = L::splat(f32::from_bits(Child::BLOCK_BIT - 1)).less_bits(children);
+            nodes.add(children, overlapping & node.nodes::<L>());
+            blocks.add(children, overlapping & are_blocks);
+            place += 1;
         }
+        blocks.show(points, visitor);
+        let Some(node) = left.pop() else { return };
+        (nodes.children[0], nodes.ends_at) = (node, 1);
+    }
+}
+
+/// Packed children, as the bits of floats, one after the other.
+struct Row {
+    children: [f32; Self::ROOM],
+    ends_at: usize,
+}
+
+impl Row {
+    const ROOM: usize = 128;
+    const EMPTY: Self = Self { children: [0.0; Self::ROOM], ends_at: 0 };
+
+    #[inline(always)]
+    fn is_full(&self) -> bool {
+        Self::ROOM - LANES < self.ends_at
+    }
+
+    /// Stores whole lanes, of which the last ones may hold nothing.
+    #[inline(always)]
+    fn add<L: Lanes>(&mut self, children: L, lanes: L::Mask) {
+        let end = self.ends_at.min(Self::ROOM - LANES);
+        self.children[end..end + LANES].copy_from_slice(&children.compress(lanes).store());
+        self.ends_at = end + lanes.bits().count_ones() as usize;
+    }
+
+    /// Shows the blocks, and forgets them.
+    #[inline(always)]
+    fn show(&mut self, points: &FlatPoints, visitor: &mut impl RegionVisitor) {
+        for child in &self.children[..self.ends_at] {
+            visitor.visit(points, child.to_bits() & !Child::BLOCK_BIT);
+        }
+        self.ends_at = 0;
     }
 }

@@ -1,6 +1,6 @@
 //! The discs near each ray's first one, blended: sixteen rays at a time.
 
-use super::boundary::{WideHits, enclosed};
+use super::boundary::{WideHits, enclosed_by_blocks};
 use super::closest::closest_hits;
 use super::gather::gather;
 use super::hit::Hit;
@@ -146,7 +146,7 @@ impl Mixer<'_> {
             };
             let is_hit = L::Wide::splat(0.0).less(nearest.n_discs).bits();
             let lanes = is_hit & ((1 << splats.len()) - 1);
-            is_enclosed = enclosed::<L>(&self.scene.points, &self.sightings, lanes, &hits);
+            is_enclosed = enclosed_by_blocks::<L>(&self.scene.points, &self.sightings, lanes, &hits);
         }
         self.sightings.clear();
         let (distances, slots) = (nearest.distances.store(), nearest.slots.store());
