@@ -117,12 +117,10 @@ impl<F: Floats> Surroundings<F> {
         let (zero, one) = (F::splat(0.0), F::splat(1.0));
         self.n_near = self.n_near + F::select(is_near, one, zero);
         let is_passed = is_near & self.hit.passed(offset);
-        if is_passed.bits() != 0 {
-            self.n_passed = self.n_passed + F::select(is_passed, one, zero);
-            let lift = self.hit.lift(offset, normal);
-            let none = Vec3Lanes::splat(Vec3::ZERO);
-            self.free_side = self.free_side.plus(Vec3Lanes::select(is_passed, lift, none));
-        }
+        self.n_passed = self.n_passed + F::select(is_passed, one, zero);
+        let lift = self.hit.lift(offset, normal);
+        let none = Vec3Lanes::splat(Vec3::ZERO);
+        self.free_side = self.free_side.plus(Vec3Lanes::select(is_passed, lift, none));
         let (place, has_direction) = self.hit.flattened(offset);
         self.wedge.add(place, is_near & has_direction);
     }
