@@ -122,20 +122,22 @@ impl<L: Lanes> PacketVisitor<L> for GatherInPacket<'_, L> {
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
         let block = BlockForPacket::<L>::new(&points.blocks[block_idx as usize], self.packet);
         let mut limits = L::Wide::load(&self.limits);
+        let mut end = self.sightings.len();
+        self.sightings.resize(end + LANES, Sighting::NONE);
+        // No branch: whether a disc is hit cannot be foretold.
         for lane in 0..LANES {
             let (distance, mask) = block.intersect::<Disc>(lane);
             let is_hit = mask & distance.less_equal(limits);
-            if is_hit.bits() == 0 {
-                continue;
-            }
             let limit = gather_limit(distance, L::Wide::splat(block.radius(lane)));
             limits = L::Wide::select(is_hit, limit.min(limits), limits);
             let slot = block_idx * LANES as u32 + lane as u32;
             // Of the two zeros the positive one.
             let distance = distance + L::Wide::splat(0.0);
             let distances = L::Wide::select(is_hit, distance, L::Wide::splat(f32::NAN)).store();
-            self.sightings.push(Sighting { slot, distances });
+            self.sightings[end] = Sighting { slot, distances };
+            end += usize::from(is_hit.bits() != 0);
         }
+        self.sightings.truncate(end);
         self.limits = limits.store();
     }
 

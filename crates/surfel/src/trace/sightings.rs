@@ -13,6 +13,8 @@ pub struct Sighting {
 }
 
 impl Sighting {
+    pub const NONE: Self = Self { slot: 0, distances: [f32::NAN; WIDE] };
+
     /// Of the ray in one lane.
     #[inline(always)]
     pub fn by_one(lane: usize, hit: Hit) -> Self {
