@@ -163,7 +163,8 @@ impl<L: Lanes> Surroundings<L> {
     #[inline(always)]
     fn with_rotated<const BY: usize>(self) -> Self {
         let Vec3Lanes { x, y, z } = self.free_side;
-        let free_side = Vec3Lanes { x: x.rotated::<BY>(), y: y.rotated::<BY>(), z: z.rotated::<BY>() };
+        let free_side =
+            Vec3Lanes { x: x.rotated::<BY>(), y: y.rotated::<BY>(), z: z.rotated::<BY>() };
         Self {
             hit: self.hit,
             n_near: self.n_near + self.n_near.rotated::<BY>(),
@@ -213,16 +214,23 @@ impl<F: Floats> Wedge<F> {
 }
 
 impl<L: Lanes> Wedge<L> {
-    /// The ends of a wedge tell all there is to know of it.
+    /// Adds to each lane's wedge the ends of that of the lane `BY` on.
     #[inline(always)]
     fn with_rotated<const BY: usize>(mut self) -> Self {
         let rotated = |[x, y]: [L; 2]| [x.rotated::<BY>(), y.rotated::<BY>()];
         let (first, last) = (rotated(self.first), rotated(self.last));
-        let is_full = L::select(self.is_full, L::splat(1.0), L::splat(0.0)).rotated::<BY>();
+        let (none, one) = (L::splat(0.0), L::splat(1.0));
+        let is_full = L::select(self.is_full, one, none).rotated::<BY>();
         let is_any = first[0].less(L::splat(f32::INFINITY));
         self.add(first, is_any);
+        // The ends of a half turn do not tell to which side it lies.
+        let turn = first[0] * last[1] - first[1] * last[0];
+        let is_half = turn.less_equal(none) & (first[0] * last[0] + first[1] * last[1]).less(none);
+        if (is_any & is_half).bits() != 0 {
+            self.add([none - first[1], first[0]], is_any & is_half);
+        }
         self.add(last, is_any);
-        self.is_full = self.is_full | L::splat(0.0).less(is_full);
+        self.is_full = self.is_full | none.less(is_full);
         self
     }
 }
@@ -230,6 +238,7 @@ impl<L: Lanes> Wedge<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{LANES, PortableLanes};
 
     /// Offset and normal.
     type Point = (Vec3, Vec3);
@@ -312,6 +321,62 @@ mod tests {
             let widest = angles.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f32::max);
             if 0.01 < (widest - 180.0).abs() {
                 assert_eq!(found, widest < 180.0, "{angles:?}");
+            }
+        }
+    }
+
+    /// Each point in a lane of its own choice.
+    fn judge_in_lanes(points: &[(usize, Vec3)]) -> Verdicts {
+        let mut found = Surroundings::new(Candidates::<PortableLanes>::of_one(&FROM_ABOVE));
+        for &(lane, offset) in points {
+            let mut is_point = [0.0; LANES];
+            is_point[lane] = 1.0;
+            let is_point = PortableLanes::splat(0.0).less(PortableLanes::load(&is_point));
+            let offset = Vec3Lanes::splat(offset);
+            let is_near = is_point & found.near(offset);
+            found.add(offset, Vec3Lanes::splat(Vec3::Z), is_near);
+        }
+        found.together().judge()
+    }
+
+    #[test]
+    fn lanes_tell_together_what_they_would_tell_one_by_one() {
+        let mut random = crate::math::Random::new(9, 0);
+        for _ in 0..2000 {
+            let n = 1 + random.below(2 * LANES as u64) as usize;
+            let span = 400.0 * random.next_f32();
+            let degrees: Vec<f32> = (0..n).map(|_| span * random.next_f32()).collect();
+            let points = at_angles(&degrees);
+            let mut lane = || random.below(LANES as u64) as usize;
+            let in_lanes: Vec<_> = points.iter().map(|(offset, _)| (lane(), *offset)).collect();
+            let Verdicts { enclosed, sparse } = judge_in_lanes(&in_lanes);
+            assert_eq!(enclosed & 1 == 1, surroundings(&FROM_ABOVE, &points), "{degrees:?}");
+            assert_eq!(sparse & 1 == 1, points.len() < SPARSE as usize);
+        }
+    }
+
+    #[test]
+    fn half_turns_in_lanes_keep_their_side() {
+        let mut random = crate::math::Random::new(10, 0);
+        let eighth = |i: usize| {
+            let [x, y] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)]
+                .map(|(x, y)| [x as f32, y as f32])[i];
+            Vec3::new(x, y, 0.1) * 0.5
+        };
+        for _ in 0..20_000 {
+            let n = 4 + random.below(8) as usize;
+            let points: Vec<_> = (0..n)
+                .map(|_| (random.below(LANES as u64) as usize, random.below(8) as usize))
+                .collect();
+            let is_there = |i: usize| points.iter().any(|&(_, eighth)| eighth == i % 8);
+            let gap = |from: usize| (1..=8).find(|step| is_there(from + step)).unwrap_or(8);
+            let widest = (0..8).filter(|&i| is_there(i)).map(gap).max().unwrap_or(8);
+            let in_lanes: Vec<_> = points.iter().map(|&(lane, i)| (lane, eighth(i))).collect();
+            let enclosed = judge_in_lanes(&in_lanes).enclosed & 1 == 1;
+            match widest {
+                // The hit lies on the edge itself, which may count or not.
+                4 => {}
+                _ => assert_eq!(enclosed, widest < 4, "{points:?}"),
             }
         }
     }

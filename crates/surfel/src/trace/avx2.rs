@@ -260,10 +260,7 @@ impl<L: Level> Lanes for Eight<L> {
     #[inline(always)]
     fn rotated<const BY: usize>(self) -> Self {
         let order: [i32; LANES] = const { rotation(BY) };
-        avx2!(Self(_mm256_permutevar8x32_ps(
-            self.0,
-            _mm256_loadu_si256(order.as_ptr().cast())
-        )))
+        avx2!(Self(_mm256_permutevar8x32_ps(self.0, _mm256_loadu_si256(order.as_ptr().cast()))))
     }
 
     /// A bitonic sort of keys: the bits of a value, the lane it comes from in the lowest three.

@@ -80,3 +80,54 @@ impl Row {
         self.ends_at = 0;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{PortableLanes, Random, Vec3};
+    use crate::points::PointCloud;
+    use crate::progress::Silent;
+    use crate::surface::SurfaceKind;
+
+    struct Seen(Vec<u32>);
+
+    impl RegionVisitor for Seen {
+        fn visit(&mut self, _: &FlatPoints, block_idx: u32) {
+            self.0.push(block_idx);
+        }
+    }
+
+    fn cloud(n: usize) -> FlatPoints {
+        let mut random = Random::new(4, 0);
+        let mut vector = || Vec3::new(random.next_f32(), random.next_f32(), random.next_f32());
+        let cloud = PointCloud {
+            positions: (0..n).map(|_| vector()).collect(),
+            radii: Some(vec![0.01; n]),
+            ..PointCloud::default()
+        };
+        FlatPoints::new(&cloud, SurfaceKind::Sphere, &vec![[0; 3]; n], &Silent).unwrap()
+    }
+
+    #[test]
+    fn blocks_are_shown_once_each_however_many() {
+        // Of 20,000 points a row of nodes holds only a part.
+        let points = cloud(20_000);
+        let mut random = Random::new(5, 0);
+        let mut regions = vec![Aabb { min: Vec3::splat(-1.0), max: Vec3::splat(2.0) }];
+        for _ in 0..200 {
+            let mut corner = || Vec3::new(random.next_f32(), random.next_f32(), random.next_f32());
+            regions.push(Aabb::of_points([corner(), corner()]));
+        }
+        for region in regions {
+            let mut seen = Seen(Vec::new());
+            within::<PortableLanes>(&points, &region, &mut seen);
+            seen.0.sort_unstable();
+            assert!(seen.0.windows(2).all(|pair| pair[0] < pair[1]), "{region:?}");
+            for (block_idx, block) in points.blocks.iter().enumerate() {
+                if block.lanes_within::<PortableLanes>(&region) != 0 {
+                    assert!(seen.0.binary_search(&(block_idx as u32)).is_ok(), "{region:?}");
+                }
+            }
+        }
+    }
+}

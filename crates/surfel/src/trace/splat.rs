@@ -146,7 +146,8 @@ impl Mixer<'_> {
             };
             let is_hit = L::Wide::splat(0.0).less(nearest.n_discs).bits();
             let lanes = is_hit & ((1 << splats.len()) - 1);
-            is_enclosed = enclosed_by_blocks::<L>(&self.scene.points, &self.sightings, lanes, &hits);
+            is_enclosed =
+                enclosed_by_blocks::<L>(&self.scene.points, &self.sightings, lanes, &hits);
         }
         self.sightings.clear();
         let (distances, slots) = (nearest.distances.store(), nearest.slots.store());

@@ -186,7 +186,8 @@ fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]
 #[inline(always)]
 fn judge<L: Lanes>(scene: &FlatScene, rays: &[Ray], splats: &mut [Splat]) {
     let mut open = [0; WIDE];
-    let mut hits = [(Vec3::ZERO, Candidate { normal: Vec3::ZERO, direction: Vec3::ZERO, radius: 0.0 }); WIDE];
+    let mut hits =
+        [(Vec3::ZERO, Candidate { normal: Vec3::ZERO, direction: Vec3::ZERO, radius: 0.0 }); WIDE];
     let mut n_open = 0;
     for splat_idx in 0..splats.len() {
         let (splat, ray) = (&splats[splat_idx], &rays[splat_idx]);
