@@ -43,8 +43,9 @@ pub fn resolved(cloud: &PointCloud, choices: &Choices, args: &Args) -> String {
 fn camera(choices: &Choices) -> Value {
     let camera = &choices.camera;
     let (name, value) = match camera.projection {
-        Projection::Perspective { view_angle_deg } => ("view_angle", view_angle_deg),
-        Projection::Orthographic { height } => ("orthographic", height),
+        Projection::Perspective { view_angle_deg } => ("view_angle", json!(view_angle_deg)),
+        Projection::Orthographic { height } => ("orthographic", json!(height)),
+        Projection::Panorama => ("panorama", json!(true)),
     };
     json!({
         "position": camera.position.to_array(),

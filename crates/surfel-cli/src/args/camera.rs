@@ -5,7 +5,7 @@ use crate::report::Report;
 use clap::Args;
 use surfel::math::{DVec3, Vec3};
 use surfel::points::{PointCloud, guess_up};
-use surfel::scene::{Camera, Framing, Projection, frame, upright};
+use surfel::scene::{Camera, Framing, Projection, frame, look_around, upright};
 use surfel_formats::Source;
 
 #[derive(Args)]
@@ -26,11 +26,16 @@ pub struct CameraArgs {
     /// Without perspective; HEIGHT of the picture in the cloud's unit, or all of the cloud.
     #[arg(long, value_name = "HEIGHT", num_args = 0..=1, value_parser = parse::positive)]
     camera_orthographic: Option<Option<f64>>,
+    /// All around, from the middle of the cloud if no position is given: the width is a full turn, the height
+    /// reaches from straight up to straight down (equirectangular). Best twice as wide as high.
+    #[arg(long, conflicts_with_all = ["camera_orthographic", "camera_direction", "camera_elevation_angle",
+        "camera_zoom_factor", "camera_view_angle"])]
+    camera_panorama: bool,
     /// Direction in which the camera looks at the whole cloud: 0,0,-1 for a map.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::direction, allow_hyphen_values = true,
         conflicts_with_all = ["camera_azimuth_angle", "camera_elevation_angle"])]
     camera_direction: Option<DVec3>,
-    /// Turns the chosen camera about the cloud, in degrees, clockwise from above.
+    /// Turns the chosen camera about the cloud, or a panorama from north, in degrees, clockwise from above.
     #[arg(long, value_name = "DEG", default_value = "0", value_parser = parse::number_in::<-360, 360>,
         allow_negative_numbers = true)]
     camera_azimuth_angle: f64,
@@ -66,6 +71,9 @@ impl CameraArgs {
     }
 
     pub fn camera(&self, cloud: &PointCloud, up: Vec3, aspect: f64, report: &Report) -> Camera {
+        if self.camera_panorama {
+            return self.panorama(cloud, up, report);
+        }
         let framed = frame(cloud, &self.framing(up, aspect));
         let focal_point = self.camera_focal_point.unwrap_or(framed.focal_point);
         let beside = framed.position + (focal_point - framed.focal_point);
@@ -81,6 +89,22 @@ impl CameraArgs {
             report.choice(&line, "--camera-position, --camera-focal-point, --camera-azimuth-angle");
         }
         Camera { position, focal_point, view_up, projection }
+    }
+
+    fn panorama(&self, cloud: &PointCloud, up: Vec3, report: &Report) -> Camera {
+        let middle = look_around(cloud, up, self.camera_azimuth_angle);
+        let position = self.camera_position.unwrap_or(middle.position);
+        let ahead = position + (middle.focal_point - middle.position);
+        if self.camera_position.is_none() {
+            let line = format!("camera at {} looks all around", short(position));
+            report.choice(&line, "--camera-position, --camera-azimuth-angle");
+        }
+        Camera {
+            position,
+            focal_point: self.camera_focal_point.unwrap_or(ahead),
+            view_up: self.camera_view_up.unwrap_or(middle.view_up),
+            projection: middle.projection,
+        }
     }
 
     fn framing(&self, up: Vec3, aspect: f64) -> Framing {

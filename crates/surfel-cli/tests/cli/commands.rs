@@ -46,6 +46,8 @@ fn render_takes_all_surfaces_and_colors() {
     }
     render(&["--camera-orthographic", "--camera-direction", "0,0,-1"]);
     render(&["--camera-orthographic", "3", "--up", "-Y", "--exposure", "-1"]);
+    render(&["--camera-panorama"]);
+    render(&["--camera-panorama", "--camera-position", "0,0,0.2", "--camera-azimuth-angle", "30"]);
     render(&["--camera-position", "-3,-3,2", "--camera-focal-point", "0,0,0"]);
     render(&["--select", "random:200", "--radius", "0.1", "--normals-k", "8", "--orient", "up"]);
     render(&["--neighbors", "grid", "--normals-radius", "0.2", "--radius", "median:6"]);
@@ -59,6 +61,22 @@ fn dry_run_tells_the_choices_and_renders_nothing() {
     let choices: Value = serde_json::from_str(&choices).unwrap();
     assert_eq!((&choices["surface"], &choices["color"]), (&"splat".into(), &"rgb".into()));
     assert_eq!(folder.names(), ["dome.ply"]);
+}
+
+#[test]
+fn a_panorama_looks_north_from_where_it_is_told() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let common = ["render", &cloud, "-o", &folder.path("no.png"), "--dry-run", "--camera-panorama"];
+    let camera = |options: &[&str]| {
+        let choices = succeed(&[&common, options].concat());
+        serde_json::from_str::<Value>(&choices).unwrap()["camera"].take()
+    };
+    let north = camera(&["--camera-position", "1,2,3", "--up", "+Z"]);
+    assert_eq!(north["panorama"], true);
+    assert_eq!(north["focal_point"], serde_json::json!([1.0, 3.0, 3.0]));
+    let told = camera(&["--camera-position", "1,2,3", "--camera-focal-point", "4,5,6"]);
+    assert_eq!(told["focal_point"], serde_json::json!([4.0, 5.0, 6.0]));
 }
 
 #[test]

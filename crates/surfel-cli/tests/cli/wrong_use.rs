@@ -28,6 +28,8 @@ fn values_that_are_wrong_by_themselves_are_wrong_use() {
         &["--camera-view-angle", "NaN"],
         &["--camera-zoom-factor", "0"],
         &["--camera-orthographic", "-1"],
+        &["--camera-panorama", "--camera-orthographic"],
+        &["--camera-panorama", "--camera-view-angle", "60"],
         &["--camera-position", "1,2,3", "--camera-focal-point", "1,2,3"],
         &["--up", "W"],
         &["--light", "moon"],

@@ -105,13 +105,19 @@ impl Node {
     /// The children of all lanes as `Child::pack` has them, which lanes hold as bits.
     #[inline(always)]
     pub fn packed_children<L: Lanes>(&self) -> L {
-        L::numbered(self.nodes::<L>(), self.first_node, self.lane_zero_as_block)
+        L::numbered(self.child_nodes::<L>(), self.first_node, self.lane_zero_as_block)
     }
 
     /// The lanes that hold nodes: the first ones.
     #[inline(always)]
-    pub fn nodes<L: Lanes>(&self) -> L::Mask {
+    pub fn child_nodes<L: Lanes>(&self) -> L::Mask {
         L::below::<N_NODES>(self.exponents_and_counts)
+    }
+
+    /// The lanes that hold blocks, and those after them.
+    #[inline(always)]
+    pub fn child_blocks<L: Lanes>(&self) -> L::Mask {
+        L::splat(f32::from_bits(Child::BLOCK_BIT - 1)).less_bits(self.packed_children::<L>())
     }
 
     /// The lanes that hold a child: the first ones too.

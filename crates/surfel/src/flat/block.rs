@@ -1,7 +1,7 @@
 //! A leaf block: eight points, quantised against their common corner.
 
-use crate::math::{Aabb, LANES, LaneMask, Lanes, Vec3, Vec3Lanes};
-use crate::surface::PointLanes;
+use crate::math::{Aabb, LANES, LaneMask, Lanes, TO_INTEGER, Vec3, Vec3Lanes};
+use crate::surface::{NORMAL_MAX, PointLanes};
 
 /// Eight points in two cache lines, lane by lane.
 ///
@@ -36,7 +36,6 @@ pub struct BlockPoint {
 }
 
 const POSITION_MAX: f32 = 65535.0;
-const NORMAL_MAX: f32 = 511.0;
 const RADIUS_MAX: f32 = 1023.0;
 
 /// Whether points of these bounds (of their centres) and radii may share a block within its precision.
@@ -183,10 +182,10 @@ fn step_exponent(wanted: f32) -> u8 {
     ((bits >> 23) + u32::from(!is_power)).clamp(1, 254) as u8
 }
 
-/// Nearest integer to a number below 2^22, in the low bits and in two's complement: at 1.5 * 2^23
-/// neighbouring floats are 1 apart. `round` is a call into the C library where SSE 4 is not assumed.
+/// Nearest integer to a number below 2^22, in the low bits: `round` is a call into the C library where SSE 4
+/// is not assumed.
 fn rounded(value: f32) -> u32 {
-    (value + 12_582_912.0).to_bits()
+    (value + TO_INTEGER).to_bits()
 }
 
 /// `normal` times what makes its longest axis 511, rounded; Z if it has no direction.

@@ -8,6 +8,10 @@ pub const LANES: usize = 8;
 /// Rays of a packet.
 pub const WIDE: usize = 2 * LANES;
 
+/// Added to a number below 2^22 and taken away again it leaves the nearest integer, which also stands in the
+/// low bits of the sum, in two's complement: here, at 1.5 * 2^23, neighbouring floats are 1 apart.
+pub const TO_INTEGER: f32 = 12_582_912.0;
+
 /// Floats in lanes, each operation rounded on its own (IEEE 754, nothing fused), so that every
 /// implementation gives the same bits.
 pub trait Floats:
@@ -61,7 +65,7 @@ pub trait Lanes: Floats {
     fn store(self) -> [f32; LANES];
     /// Moves the chosen lanes to the front, in their order.
     fn compress(self, lanes: Self::Mask) -> Self;
-    /// Each lane's value from the one `BY` lanes on, from the last one on to the first.
+    /// Lane i gets the value of lane (i + `BY`) mod `LANES`.
     fn rotated<const BY: usize>(self) -> Self;
     /// Sorts the chosen lanes, none of them negative, by falling value to the front, and `others` with
     /// them. Values may come out smaller by some 2^-20 of themselves.

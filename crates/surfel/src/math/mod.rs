@@ -14,7 +14,7 @@ pub use aabb::Aabb;
 pub use eigen::{SymmetricMatrix, smallest_eigenvector};
 pub use frame::{Frame, tangents};
 pub use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3, Vec3A, Vec4};
-pub use lanes::{Floats, LANES, LaneMask, Lanes, Task, Vec3Lanes, WIDE, Wide};
+pub use lanes::{Floats, LANES, LaneMask, Lanes, TO_INTEGER, Task, Vec3Lanes, WIDE, Wide};
 pub use pair::Pair;
 pub use portable::{PortableLanes, PortableMask};
 pub use random::{Random, hash};

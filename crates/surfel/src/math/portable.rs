@@ -3,53 +3,6 @@
 use super::{Floats, LANES, LaneMask, Lanes, Pair, Task};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-/// A single lane, for what is not worth more.
-impl Floats for f32 {
-    type Mask = bool;
-
-    #[inline(always)]
-    fn splat(value: f32) -> Self {
-        value
-    }
-
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        if self < other { self } else { other }
-    }
-
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        if other < self { self } else { other }
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        f32::sqrt(self)
-    }
-
-    #[inline(always)]
-    fn less(self, other: Self) -> bool {
-        self < other
-    }
-
-    #[inline(always)]
-    fn less_equal(self, other: Self) -> bool {
-        self <= other
-    }
-
-    #[inline(always)]
-    fn select(mask: bool, if_true: Self, if_false: Self) -> Self {
-        if mask { if_true } else { if_false }
-    }
-}
-
-impl LaneMask for bool {
-    #[inline(always)]
-    fn bits(self) -> u32 {
-        u32::from(self)
-    }
-}
-
 /// Eight floats in an array: the reference that other implementations are tested against.
 #[derive(Clone, Copy, Debug)]
 pub struct PortableLanes([f32; LANES]);
@@ -74,12 +27,12 @@ impl Floats for PortableLanes {
 
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        self.map(other, Floats::min)
+        self.map(other, |a, b| if a < b { a } else { b })
     }
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        self.map(other, Floats::max)
+        self.map(other, |a, b| if b < a { a } else { b })
     }
 
     #[inline(always)]

@@ -1,6 +1,7 @@
 //! Cameras: who looks, from where, and the rays through a picture's pixels.
 
 use crate::math::{DVec3, Ray, Vec3};
+use std::f64::consts::{PI, TAU};
 
 /// A camera in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +19,9 @@ pub enum Projection {
     Perspective { view_angle_deg: f64 },
     /// Height of the picture in world units.
     Orthographic { height: f64 },
+    /// All directions (equirectangular): the width is a full turn about the view's up, with the focal point
+    /// over or under the middle, the height reaches from straight up to straight down.
+    Panorama,
 }
 
 /// A camera with its picture's size, relative to a scene's origin: the source of primary rays.
@@ -27,10 +31,19 @@ pub struct View {
     forward: Vec3,
     right: Vec3,
     up: Vec3,
-    is_perspective: bool,
-    /// World units (orthographic), or units at distance 1, from one pixel to the next.
-    pixel_size: f32,
+    lens: Lens,
     center: (f32, f32),
+}
+
+/// How places in the picture become rays.
+#[derive(Clone, Copy, Debug)]
+enum Lens {
+    /// Units at distance 1 from one pixel to the next.
+    Perspective { pixel_size: f32 },
+    /// World units from one pixel to the next.
+    Orthographic { pixel_size: f32 },
+    /// Radians from one pixel to the next, across and along.
+    Panorama { turn: (f32, f32) },
 }
 
 impl Camera {
@@ -42,62 +55,103 @@ impl Camera {
         [right, right.cross(forward), forward]
     }
 
+    /// Those of a picture that stays level however high the focal point is.
+    fn level_axes(&self) -> [DVec3; 3] {
+        let [right, ..] = self.axes();
+        let up = self.view_up.try_normalize().unwrap_or(DVec3::Z);
+        let right = (right - right.dot(up) * up).try_normalize();
+        let right = right.unwrap_or_else(|| up.any_orthonormal_vector());
+        [right, up, up.cross(right)]
+    }
+
     /// For a picture of `width` x `height` pixels of a scene about `origin`.
     pub fn view(&self, origin: DVec3, width: u32, height: u32) -> View {
-        let [right, up, forward] = self.axes().map(|axis| axis.as_vec3());
-        let (is_perspective, extent) = match self.projection {
+        let (width, height) = (f64::from(width), f64::from(height));
+        let pixel_size = |extent: f64| (extent / height) as f32;
+        let lens = match self.projection {
             Projection::Perspective { view_angle_deg } => {
-                (true, 2.0 * (view_angle_deg.to_radians() / 2.0).tan())
+                let tan = (view_angle_deg.to_radians() / 2.0).tan();
+                Lens::Perspective { pixel_size: pixel_size(2.0 * tan) }
             }
-            Projection::Orthographic { height } => (false, height),
+            Projection::Orthographic { height } => {
+                Lens::Orthographic { pixel_size: pixel_size(height) }
+            }
+            Projection::Panorama => {
+                Lens::Panorama { turn: ((TAU / width) as f32, (PI / height) as f32) }
+            }
         };
-        View {
-            position: (self.position - origin).as_vec3(),
-            forward,
-            right,
-            up,
-            is_perspective,
-            pixel_size: (extent / f64::from(height)) as f32,
-            center: (width as f32 / 2.0, height as f32 / 2.0),
-        }
+        let is_level = matches!(lens, Lens::Panorama { .. });
+        let axes = if is_level { self.level_axes() } else { self.axes() };
+        let [right, up, forward] = axes.map(|axis| axis.as_vec3());
+        let center = (width as f32 / 2.0, height as f32 / 2.0);
+        View { position: (self.position - origin).as_vec3(), forward, right, up, lens, center }
     }
 }
 
 impl View {
     /// The ray through a place in the picture, in pixels from its top left corner.
     pub fn ray(&self, x: f32, y: f32) -> Ray {
-        let across = self.pixel_size * (x - self.center.0) * self.right;
-        let along = self.pixel_size * (self.center.1 - y) * self.up;
-        if self.is_perspective {
-            Ray::new(self.position, (self.forward + across + along).normalize())
-        } else {
-            Ray::new(self.position + across + along, self.forward)
+        let (across, along) = (x - self.center.0, self.center.1 - y);
+        match self.lens {
+            Lens::Perspective { pixel_size } => {
+                let aside = pixel_size * across * self.right + pixel_size * along * self.up;
+                Ray::new(self.position, (self.forward + aside).normalize())
+            }
+            Lens::Orthographic { pixel_size } => {
+                let aside = pixel_size * across * self.right + pixel_size * along * self.up;
+                Ray::new(self.position + aside, self.forward)
+            }
+            Lens::Panorama { turn } => {
+                let (sin_across, cos_across) = (turn.0 * across).sin_cos();
+                let (sin_along, cos_along) = (turn.1 * along).sin_cos();
+                let level = cos_across * self.forward + sin_across * self.right;
+                Ray::new(self.position, (cos_along * level + sin_along * self.up).normalize())
+            }
         }
     }
 
-    /// Place in the picture in pixels, and depth along the view axis, of a point before the camera.
+    /// Place in the picture in pixels, and depth, of a point before the camera.
     pub fn project(&self, position: Vec3) -> Option<(f32, f32, f32)> {
         let offset = position - self.position;
-        let depth = offset.dot(self.forward);
-        let scale = if self.is_perspective { depth * self.pixel_size } else { self.pixel_size };
-        let place = |axis: Vec3| offset.dot(axis) / scale;
-        (0.0 < depth)
-            .then(|| (self.center.0 + place(self.right), self.center.1 - place(self.up), depth))
+        let [right, up, forward] = [self.right, self.up, self.forward].map(|axis| offset.dot(axis));
+        let depth = self.depth(position);
+        let (across, along) = match self.lens {
+            Lens::Perspective { pixel_size } => {
+                (right / (depth * pixel_size), up / (depth * pixel_size))
+            }
+            Lens::Orthographic { pixel_size } => (right / pixel_size, up / pixel_size),
+            Lens::Panorama { turn } => {
+                let height = up.atan2(right.hypot(forward));
+                (right.atan2(forward) / turn.0, height / turn.1)
+            }
+        };
+        (0.0 < depth).then_some((self.center.0 + across, self.center.1 - along, depth))
     }
 
-    /// What a pixel spans at distance 1 (perspective), or anywhere (orthographic), in world units.
+    /// What a pixel in the middle spans at distance 1 or, in an orthographic picture, anywhere, in world
+    /// units.
     pub fn pixel_size(&self) -> f32 {
-        self.pixel_size
+        match self.lens {
+            Lens::Perspective { pixel_size } | Lens::Orthographic { pixel_size } => pixel_size,
+            Lens::Panorama { turn } => turn.1,
+        }
     }
 
-    /// Distance of `position` along the view axis.
+    /// Distance of `position` along the view axis; in a panorama, which has none, from the camera.
     pub fn depth(&self, position: Vec3) -> f32 {
-        (position - self.position).dot(self.forward)
+        let offset = position - self.position;
+        match self.lens {
+            Lens::Panorama { .. } => offset.length(),
+            _ => offset.dot(self.forward),
+        }
     }
 
     /// Unit vector from `position` toward the camera.
     pub fn toward_camera(&self, position: Vec3) -> Vec3 {
-        if self.is_perspective { (self.position - position).normalize() } else { -self.forward }
+        match self.lens {
+            Lens::Orthographic { .. } => -self.forward,
+            _ => (self.position - position).normalize(),
+        }
     }
 }
 
@@ -105,9 +159,10 @@ impl View {
 mod tests {
     use super::*;
 
-    fn cameras() -> [Camera; 2] {
+    fn cameras() -> [Camera; 3] {
         let perspective = Projection::Perspective { view_angle_deg: 40.0 };
-        [perspective, Projection::Orthographic { height: 8.0 }].map(|projection| Camera {
+        let orthographic = Projection::Orthographic { height: 8.0 };
+        [perspective, orthographic, Projection::Panorama].map(|projection| Camera {
             position: DVec3::new(500_003.0, -4.0, 2.0),
             focal_point: DVec3::new(500_000.0, 1.0, 0.5),
             view_up: DVec3::Z,
@@ -134,9 +189,35 @@ mod tests {
             let view = camera.view(origin, 64, 48);
             let focal = (camera.focal_point - origin).as_vec3();
             let (x, y, _) = view.project(focal).unwrap();
-            assert!((x - 32.0).abs() < 1e-3 && (y - 24.0).abs() < 1e-3);
+            assert!((x - 32.0).abs() < 1e-3);
+            // A panorama stays level.
+            assert!((y - 24.0).abs() < 1e-3 || camera.projection == Projection::Panorama);
             assert!(view.project(focal + 0.1 * Vec3::Z).unwrap().1 < y);
         }
+    }
+
+    #[test]
+    fn a_panorama_shows_all_around() {
+        let camera = Camera {
+            position: DVec3::new(1.0, 2.0, 3.0),
+            focal_point: DVec3::new(1.0, 5.0, 4.0),
+            view_up: DVec3::Z,
+            projection: Projection::Panorama,
+        };
+        let view = camera.view(DVec3::ZERO, 80, 40);
+        // North in the middle, east to the right, south at both ends; straight up and down at the rims.
+        for ((x, y), direction) in [
+            ((40.0, 20.0), Vec3::Y),
+            ((60.0, 20.0), Vec3::X),
+            ((20.0, 20.0), Vec3::NEG_X),
+            ((0.0, 20.0), Vec3::NEG_Y),
+            ((80.0, 20.0), Vec3::NEG_Y),
+            ((13.0, 0.0), Vec3::Z),
+            ((70.0, 40.0), Vec3::NEG_Z),
+        ] {
+            assert!(view.ray(x, y).direction.distance(direction) < 1e-6, "{x}, {y}");
+        }
+        assert_eq!(view.depth(Vec3::new(1.0, 2.0, 7.0)), 4.0);
     }
 
     #[test]

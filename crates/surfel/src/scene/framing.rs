@@ -60,6 +60,20 @@ pub fn frame(cloud: &PointCloud, framing: &Framing) -> Camera {
     Camera { position: world(camera.position), focal_point: world(camera.focal_point), ..camera }
 }
 
+/// A camera that sees all around from the middle of `cloud`; north, turned by `azimuth_deg` clockwise from
+/// above, is in the middle of the picture.
+pub fn look_around(cloud: &PointCloud, up: Vec3, azimuth_deg: f64) -> Camera {
+    let (east, north) = ground_axes(up);
+    let (sin, cos) = azimuth_deg.to_radians().sin_cos();
+    let position = cloud.origin + usual_bounds(cloud).center().as_dvec3();
+    Camera {
+        position,
+        focal_point: position + sin * east.as_dvec3() + cos * north.as_dvec3(),
+        view_up: up.as_dvec3(),
+        projection: Projection::Panorama,
+    }
+}
+
 /// A camera that looks along `forward` at all of `points`, and is relative to the same zero.
 pub(super) fn fit_along(forward: DVec3, points: &[Vec3], framing: &Framing) -> Camera {
     let view_up = framing.view_up.unwrap_or_else(|| upright(framing.up, forward));
@@ -168,6 +182,17 @@ mod tests {
         places.fold((f32::MAX, f32::MAX, f32::MIN, f32::MIN), |(a, b, c, d), (x, y, _)| {
             (a.min(x), b.min(y), c.max(x), d.max(y))
         })
+    }
+
+    #[test]
+    fn a_panorama_is_seen_from_the_middle_with_north_in_the_middle() {
+        let corners = [Vec3::new(-1.0, 0.0, 0.0), Vec3::new(3.0, 2.0, 4.0)];
+        let cloud = PointCloud::from_positions(corners.to_vec());
+        for (azimuth_deg, toward) in [(0.0, DVec3::Y), (90.0, DVec3::X), (-90.0, DVec3::NEG_X)] {
+            let camera = look_around(&cloud, Vec3::Z, azimuth_deg);
+            assert!(camera.position.distance(DVec3::new(1.0, 1.0, 2.0)) < 1e-6);
+            assert!((camera.focal_point - camera.position).distance(toward) < 1e-6);
+        }
     }
 
     #[test]

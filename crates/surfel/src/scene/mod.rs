@@ -7,7 +7,7 @@ mod light;
 mod prospect;
 
 pub use camera::{Camera, Projection, View};
-pub use framing::{Framing, frame, upright, usual_bounds};
+pub use framing::{Framing, frame, look_around, upright, usual_bounds};
 pub use light::{Light, Sky, Sun};
 
 use crate::math::Vec3;

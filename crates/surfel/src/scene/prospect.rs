@@ -36,8 +36,8 @@ fn filling_azimuth_deg(points: &[Vec3], elevation_deg: f64, framing: &Framing) -
         let forward = direction_from(azimuth_deg, elevation_deg, framing.up);
         let camera = fit_along(forward, &some, framing);
         match camera.projection {
-            Projection::Perspective { .. } => camera.position.distance(camera.focal_point),
             Projection::Orthographic { height } => height,
+            _ => camera.position.distance(camera.focal_point),
         }
     };
     let places = (0..12).map(|step| FRONT_AZIMUTH_DEG + 15.0 * f64::from(step) - 60.0);
@@ -80,8 +80,8 @@ fn share_in_sight(points: &[Vec3], camera: &Camera, aspect: f64) -> f64 {
     }
     // A surface that leans away within a pixel does not hide itself.
     let span = match camera.projection {
-        Projection::Perspective { .. } => camera.position.distance(camera.focal_point) as f32,
         Projection::Orthographic { .. } => 1.0,
+        _ => camera.position.distance(camera.focal_point) as f32,
     };
     let slack = 4.0 * span * view.pixel_size();
     let in_sight =

@@ -124,11 +124,14 @@ impl std::str::FromStr for Boundary {
     }
 }
 
+/// The longest axis of the normals of points, which are whole numbers.
+pub const NORMAL_MAX: f32 = 511.0;
+
 /// Points as a kernel meets them: eight before one ray, or one before sixteen rays.
 pub struct PointLanes<F> {
     /// Relative to the ray's origin.
     pub center: Vec3Lanes<F>,
-    /// Any length but zero.
+    /// Whole numbers, `NORMAL_MAX` the greatest.
     pub normal: Vec3Lanes<F>,
     pub radius: F,
 }

@@ -91,8 +91,8 @@ pub struct WideHits<W> {
     pub radius: W,
 }
 
-/// The `lanes` in which hits are enclosed by the points in the blocks of the discs that their rays pierce
-/// alone: most of those on even surfaces. `sightings` are these discs, sorted by slot.
+/// The `lanes` in which hits are enclosed by these alone: the points in the blocks of the discs that their
+/// rays pierce. They are most of those on even surfaces. `sightings` are these discs, sorted by slot.
 #[inline(always)]
 pub fn enclosed_by_blocks<L: Lanes>(
     points: &FlatPoints,
@@ -169,13 +169,12 @@ fn judge_by_groups<L: Lanes>(
     mut lanes: u32,
     hits: &WideHits<L::Wide>,
 ) -> Verdicts {
-    let [x, y, z] = hits.position.store_wide();
-    let radii = hits.radius.store();
+    let stored = hits.store();
     let mut verdicts = Verdicts { enclosed: 0, sparse: 0 };
     while lanes != 0 {
         let first = lanes.trailing_zeros() as usize % WIDE;
-        let center = Vec3::new(x[first], y[first], z[first]);
-        let mut group = 1 << first | lanes & hits.near(center, SPREAD * radii[first]);
+        let (center, Candidate { radius, .. }) = stored.in_lane(first);
+        let mut group = 1 << first | lanes & hits.near(center, SPREAD * radius);
         lanes &= !group;
         if FEWEST_TOGETHER <= group.count_ones() {
             let Verdicts { enclosed, sparse } = judge_group::<L>(points, group, hits);
@@ -186,7 +185,7 @@ fn judge_by_groups<L: Lanes>(
         while group != 0 {
             let lane = group.trailing_zeros() as usize % WIDE;
             group &= group - 1;
-            let (position, hit) = hits.in_lane(lane);
+            let (position, hit) = stored.in_lane(lane);
             let Verdicts { enclosed, sparse } = judge_one::<L>(points, position, hit);
             verdicts.enclosed |= enclosed << lane;
             verdicts.sparse |= sparse << lane;
@@ -275,28 +274,48 @@ impl<W: Wide> WideHits<W> {
         }
         let lanes = W::splat(0.0).less(W::load(&is_member));
         let reach = W::splat(NEIGHBOR_REACH) * self.radius;
-        let none = W::splat(f32::INFINITY);
+        let (none_low, none_high) = (W::splat(f32::INFINITY), W::splat(f32::NEG_INFINITY));
         let Vec3Lanes { x, y, z } = self.position;
         let mut region = Aabb::EMPTY;
         for (axis, position) in [x, y, z].into_iter().enumerate() {
-            region.min[axis] = W::select(lanes, position - reach, none).min_lane();
-            region.max[axis] = W::select(lanes, position + reach, W::splat(0.0) - none).max_lane();
+            region.min[axis] = W::select(lanes, position - reach, none_low).min_lane();
+            region.max[axis] = W::select(lanes, position + reach, none_high).max_lane();
         }
         let rounding = Vec3::splat(ROUNDING * region.min.abs().max(region.max.abs()).max_element());
         Aabb { min: region.min - rounding, max: region.max + rounding }
     }
 
+    #[inline(always)]
+    fn store(&self) -> StoredHits {
+        StoredHits {
+            position: self.position.store_wide(),
+            normal: self.normal.store_wide(),
+            direction: self.direction.store_wide(),
+            radius: self.radius.store(),
+        }
+    }
+}
+
+/// Hits to take single ones from.
+struct StoredHits {
+    position: [[f32; WIDE]; 3],
+    normal: [[f32; WIDE]; 3],
+    direction: [[f32; WIDE]; 3],
+    radius: [f32; WIDE],
+}
+
+impl StoredHits {
     /// Place and candidate.
     #[inline(always)]
     fn in_lane(&self, lane: usize) -> (Vec3, Candidate) {
         let vector =
-            |rows: [[f32; WIDE]; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
+            |rows: &[[f32; WIDE]; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
         let candidate = Candidate {
-            normal: vector(self.normal.store_wide()),
-            direction: vector(self.direction.store_wide()),
-            radius: self.radius.store()[lane],
+            normal: vector(&self.normal),
+            direction: vector(&self.direction),
+            radius: self.radius[lane],
         };
-        (vector(self.position.store_wide()), candidate)
+        (vector(&self.position), candidate)
     }
 }
 

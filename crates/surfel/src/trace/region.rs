@@ -12,23 +12,24 @@ pub trait RegionVisitor {
 
 /// Shows `visitor` every block whose box overlaps `region`.
 ///
-/// The tree is walked in breadth: the next node is known before the last one is done, and no branch depends
-/// on what a node holds, so that the processor works on several nodes, and then blocks, at once.
+/// The tree is walked in breadth: the next node is known before the last one is done, and there is no branch
+/// on single children, so that the processor works on several nodes, and then blocks, at once.
 #[inline(always)]
 pub fn within<L: Lanes>(points: &FlatPoints, region: &Aabb, visitor: &mut impl RegionVisitor) {
     if points.nodes.is_empty() {
         return;
     }
-    let mut nodes = Row::EMPTY;
-    let mut blocks = Row::EMPTY;
+    let mut nodes = Row::new();
+    let mut blocks = Row::new();
     // Nodes for which there was no room: hardly ever any.
     let mut left: Vec<f32> = Vec::new();
-    nodes.ends_at = 1;
-    loop {
+    let mut start = Some(f32::from_bits(Child::Node(0).pack()));
+    while let Some(node) = start {
+        nodes.begin_with(node);
         let mut place = 0;
-        while place < nodes.ends_at {
+        while place < nodes.end {
             if nodes.is_full() {
-                left.extend(&nodes.children[place..nodes.ends_at]);
+                left.extend(&nodes.children[place..nodes.end]);
                 break;
             }
             if blocks.is_full() {
@@ -37,47 +38,56 @@ pub fn within<L: Lanes>(points: &FlatPoints, region: &Aabb, visitor: &mut impl R
             let node = &points.nodes[nodes.children[place].to_bits() as usize];
             let overlapping = box_overlaps::<L>(node, region);
             let children = node.packed_children::<L>();
-            let are_blocks = L::splat(f32::from_bits(Child::BLOCK_BIT - 1)).less_bits(children);
-            nodes.add(children, overlapping & node.nodes::<L>());
-            blocks.add(children, overlapping & are_blocks);
+            nodes.add(children, overlapping & node.child_nodes::<L>());
+            blocks.add(children, overlapping & node.child_blocks::<L>());
             place += 1;
         }
         blocks.show(points, visitor);
-        let Some(node) = left.pop() else { return };
-        (nodes.children[0], nodes.ends_at) = (node, 1);
+        start = left.pop();
     }
 }
 
 /// Packed children, as the bits of floats, one after the other.
 struct Row {
     children: [f32; Self::ROOM],
-    ends_at: usize,
+    end: usize,
 }
 
 impl Row {
     const ROOM: usize = 128;
-    const EMPTY: Self = Self { children: [0.0; Self::ROOM], ends_at: 0 };
+
+    #[inline(always)]
+    fn new() -> Self {
+        Self { children: [0.0; Self::ROOM], end: 0 }
+    }
+
+    #[inline(always)]
+    fn begin_with(&mut self, child: f32) {
+        (self.children[0], self.end) = (child, 1);
+    }
 
     #[inline(always)]
     fn is_full(&self) -> bool {
-        Self::ROOM - LANES < self.ends_at
+        Self::ROOM - LANES < self.end
     }
 
-    /// Stores whole lanes, of which the last ones may hold nothing.
+    /// Adds to a row that is not full. Whole lanes are stored, of which the last ones may hold nothing.
     #[inline(always)]
     fn add<L: Lanes>(&mut self, children: L, lanes: L::Mask) {
-        let end = self.ends_at.min(Self::ROOM - LANES);
+        debug_assert!(!self.is_full());
+        // Says so to the compiler.
+        let end = self.end.min(Self::ROOM - LANES);
         self.children[end..end + LANES].copy_from_slice(&children.compress(lanes).store());
-        self.ends_at = end + lanes.bits().count_ones() as usize;
+        self.end = end + lanes.bits().count_ones() as usize;
     }
 
     /// Shows the blocks, and forgets them.
     #[inline(always)]
     fn show(&mut self, points: &FlatPoints, visitor: &mut impl RegionVisitor) {
-        for child in &self.children[..self.ends_at] {
+        for child in &self.children[..self.end] {
             visitor.visit(points, child.to_bits() & !Child::BLOCK_BIT);
         }
-        self.ends_at = 0;
+        self.end = 0;
     }
 }
 
@@ -110,8 +120,8 @@ mod tests {
 
     #[test]
     fn blocks_are_shown_once_each_however_many() {
-        // Of 20,000 points a row of nodes holds only a part.
         let points = cloud(20_000);
+        assert!(2 * Row::ROOM < points.nodes.len());
         let mut random = Random::new(5, 0);
         let mut regions = vec![Aabb { min: Vec3::splat(-1.0), max: Vec3::splat(2.0) }];
         for _ in 0..200 {

@@ -13,6 +13,7 @@ pub struct Sighting {
 }
 
 impl Sighting {
+    /// Of no ray.
     pub const NONE: Self = Self { slot: 0, distances: [f32::NAN; WIDE] };
 
     /// Of the ray in one lane.

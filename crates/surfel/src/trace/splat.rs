@@ -1,6 +1,6 @@
 //! The discs near each ray's first one, blended: sixteen rays at a time.
 
-use super::boundary::{WideHits, enclosed_by_blocks};
+use super::boundary::{WideHits, enclosed, enclosed_by_blocks};
 use super::closest::closest_hits;
 use super::gather::gather;
 use super::hit::Hit;
@@ -8,7 +8,9 @@ use super::packet::{PacketStack, WideRays};
 use super::sightings::{Sighting, settle};
 use crate::flat::FlatScene;
 use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
-use crate::surface::{Blend, Gathered, MAX_GATHERED, SurfaceKind, plane_normal};
+use crate::surface::{
+    Blend, Boundary, Candidate, Gathered, MAX_GATHERED, SurfaceKind, plane_normal,
+};
 
 /// The blended discs of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +24,7 @@ pub struct Splat {
     pub normal: Vec3,
     /// Linear.
     pub color: Vec3,
-    /// Whether the points around it enclose the hit; found only where it is asked for.
+    /// Whether the points around the hit are known to enclose it; told only where it is asked for.
     pub(super) is_enclosed: bool,
 }
 
@@ -41,25 +43,29 @@ impl Splat {
 pub(super) fn splats<L: Lanes>(scene: &FlatScene, rays: &[Ray], splats: &mut [Splat]) {
     let kind = scene.surface;
     let kind = if kind.is_gathered() { kind } else { SurfaceKind::Splat };
-    Finder::new(scene, kind, false).find::<L>(rays, splats);
+    Finder::new(scene, kind, Boundary::Off).find::<L>(rays, splats);
 }
 
 /// Finds splats, and keeps the room it needs from search to search.
 pub(super) struct Finder<'s> {
     stack: PacketStack,
     mixer: Mixer<'s>,
+    /// Splats that are still in question, and their hits.
+    open: Vec<u32>,
+    open_hits: Vec<(Vec3, Candidate)>,
 }
 
 impl<'s> Finder<'s> {
-    /// Judges the hits if asked to.
-    pub fn new(scene: &'s FlatScene, kind: SurfaceKind, judges: bool) -> Self {
-        let mixer = Mixer { scene, kind, judges, sightings: Vec::new(), discs: Vec::new() };
-        Self { stack: PacketStack::new(), mixer }
+    /// Finds out whether hits are enclosed if `boundary` asks for that.
+    pub fn new(scene: &'s FlatScene, kind: SurfaceKind, boundary: Boundary) -> Self {
+        let (sightings, discs) = (Vec::new(), Vec::new());
+        let mixer = Mixer { scene, kind, judges: boundary == Boundary::Gap, sightings, discs };
+        Self { stack: PacketStack::new(), mixer, open: Vec::new(), open_hits: Vec::new() }
     }
 
     #[inline(always)]
     pub fn find<L: Lanes>(&mut self, rays: &[Ray], splats: &mut [Splat]) {
-        let Self { stack, mixer } = self;
+        let Self { stack, mixer, .. } = self;
         for (rays, splats) in rays.chunks(WIDE).zip(splats.chunks_mut(WIDE)) {
             let limits = if mixer.kind.is_gathered() {
                 gather::<L>(&mixer.scene.points, rays, stack, &mut mixer.sightings)
@@ -67,6 +73,33 @@ impl<'s> Finder<'s> {
                 find_closest::<L>(mixer.scene, rays, &mut mixer.sightings)
             };
             mixer.mix::<L>(&WideRays::new(rays), &limits, splats);
+        }
+        if mixer.judges {
+            self.judge::<L>(rays, splats);
+        }
+    }
+
+    /// Judges the hits not known to be enclosed, those of many packets together.
+    #[inline(always)]
+    fn judge<L: Lanes>(&mut self, rays: &[Ray], splats: &mut [Splat]) {
+        let Self { mixer, open, open_hits, .. } = self;
+        open.clear();
+        open_hits.clear();
+        for (splat_idx, (splat, ray)) in splats.iter().zip(rays).enumerate() {
+            if splat.hit.is_miss() || splat.is_enclosed {
+                continue;
+            }
+            let radius = splat.radius / mixer.scene.surface.radius_factor();
+            let candidate = Candidate { normal: splat.normal, direction: ray.direction, radius };
+            open.push(splat_idx as u32);
+            open_hits.push((ray.at(splat.hit.distance), candidate));
+        }
+        for (open, hits) in open.chunks(WIDE).zip(open_hits.chunks(WIDE)) {
+            let lanes = (1 << open.len()) - 1;
+            let enclosed = enclosed::<L>(&mixer.scene.points, lanes, &WideHits::new(hits));
+            for (lane, splat_idx) in open.iter().enumerate() {
+                splats[*splat_idx as usize].is_enclosed = enclosed >> lane & 1 == 1;
+            }
         }
     }
 }

@@ -145,7 +145,7 @@ fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]
     hits.fill(SurfaceHit::MISS);
     if scene.boundary == Boundary::Off {
         let mut splats = vec![Splat::MISS; rays.len()];
-        Finder::new(scene, scene.surface, false).find::<L>(rays, &mut splats);
+        Finder::new(scene, scene.surface, Boundary::Off).find::<L>(rays, &mut splats);
         for (hit, splat) in hits.iter_mut().zip(&splats) {
             *hit = surface_hit(scene, splat);
         }
@@ -154,11 +154,10 @@ fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]
     let mut searching: Vec<u32> = (0..rays.len() as u32).collect();
     let mut rays = rays.to_vec();
     let mut splats = vec![Splat::MISS; rays.len()];
-    let mut finder = Finder::new(scene, scene.surface, true);
+    let mut finder = Finder::new(scene, scene.surface, Boundary::Gap);
     for _ in 0..MAX_REFUSALS {
         let splats = &mut splats[..rays.len()];
         finder.find::<L>(&rays, splats);
-        judge::<L>(scene, &rays, splats);
         let mut n_left = 0;
         for i in 0..splats.len() {
             let (splat, ray, ray_idx) = (&splats[i], rays[i], searching[i]);
@@ -178,33 +177,6 @@ fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]
         rays.truncate(n_left);
         if rays.is_empty() {
             return;
-        }
-    }
-}
-
-/// Judges the hits that are not known to be enclosed, those of many packets together.
-#[inline(always)]
-fn judge<L: Lanes>(scene: &FlatScene, rays: &[Ray], splats: &mut [Splat]) {
-    let mut open = [0; WIDE];
-    let mut hits =
-        [(Vec3::ZERO, Candidate { normal: Vec3::ZERO, direction: Vec3::ZERO, radius: 0.0 }); WIDE];
-    let mut n_open = 0;
-    for splat_idx in 0..splats.len() {
-        let (splat, ray) = (&splats[splat_idx], &rays[splat_idx]);
-        if !splat.hit.is_miss() && !splat.is_enclosed {
-            let radius = splat.radius / scene.surface.radius_factor();
-            let candidate = Candidate { normal: splat.normal, direction: ray.direction, radius };
-            hits[n_open] = (ray.at(splat.hit.distance), candidate);
-            open[n_open] = splat_idx;
-            n_open += 1;
-        }
-        if n_open == WIDE || 0 < n_open && splat_idx + 1 == splats.len() {
-            let lanes = (1 << n_open) - 1;
-            let enclosed = enclosed::<L>(&scene.points, lanes, &WideHits::new(&hits[..n_open]));
-            for (lane, splat_idx) in open[..n_open].iter().enumerate() {
-                splats[*splat_idx].is_enclosed = enclosed >> lane & 1 == 1;
-            }
-            n_open = 0;
         }
     }
 }
