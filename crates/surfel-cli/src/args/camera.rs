@@ -26,7 +26,7 @@ pub struct CameraArgs {
     /// Without perspective; HEIGHT of the picture in the cloud's unit, or all of the cloud.
     #[arg(long, value_name = "HEIGHT", num_args = 0..=1, value_parser = parse::positive)]
     camera_orthographic: Option<Option<f64>>,
-    /// All around, from the middle of the cloud if no position is given: the width is a full turn, the height
+    /// All around, from a free place inside the cloud if no position is given: the width is a full turn, the height
     /// reaches from straight up to straight down (equirectangular). Best twice as wide as high.
     #[arg(long, conflicts_with_all = ["camera_orthographic", "camera_direction", "camera_elevation_angle",
         "camera_zoom_factor", "camera_view_angle"])]
@@ -92,9 +92,9 @@ impl CameraArgs {
     }
 
     fn panorama(&self, cloud: &PointCloud, up: Vec3, report: &Report) -> Camera {
-        let middle = look_around(cloud, up, self.camera_azimuth_angle);
-        let position = self.camera_position.unwrap_or(middle.position);
-        let ahead = position + (middle.focal_point - middle.position);
+        let found = look_around(cloud, up, self.camera_azimuth_angle);
+        let position = self.camera_position.unwrap_or(found.position);
+        let ahead = position + (found.focal_point - found.position);
         if self.camera_position.is_none() {
             let line = format!("camera at {} looks all around", short(position));
             report.choice(&line, "--camera-position, --camera-azimuth-angle");
@@ -102,8 +102,8 @@ impl CameraArgs {
         Camera {
             position,
             focal_point: self.camera_focal_point.unwrap_or(ahead),
-            view_up: self.camera_view_up.unwrap_or(middle.view_up),
-            projection: middle.projection,
+            view_up: self.camera_view_up.unwrap_or(found.view_up),
+            projection: found.projection,
         }
     }
 

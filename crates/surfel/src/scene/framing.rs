@@ -60,18 +60,47 @@ pub fn frame(cloud: &PointCloud, framing: &Framing) -> Camera {
     Camera { position: world(camera.position), focal_point: world(camera.focal_point), ..camera }
 }
 
-/// A camera that sees all around from the middle of `cloud`; north, turned by `azimuth_deg` clockwise from
-/// above, is in the middle of the picture.
+/// A camera that sees all around from a free place inside `cloud`; north, turned by `azimuth_deg` clockwise
+/// from above, is in the middle of the picture.
 pub fn look_around(cloud: &PointCloud, up: Vec3, azimuth_deg: f64) -> Camera {
     let (east, north) = ground_axes(up);
     let (sin, cos) = azimuth_deg.to_radians().sin_cos();
-    let position = cloud.origin + usual_bounds(cloud).center().as_dvec3();
+    let position = cloud.origin + free_place(cloud, up).as_dvec3();
     Camera {
         position,
         focal_point: position + sin * east.as_dvec3() + cos * north.as_dvec3(),
         view_up: up.as_dvec3(),
         projection: Projection::Panorama,
     }
+}
+
+/// Of places in the middle half of the cloud and not high up, the one farthest from all points.
+fn free_place(cloud: &PointCloud, up: Vec3) -> Vec3 {
+    const MOST_POINTS: usize = 20_000;
+    const N_ACROSS: usize = 12;
+    const N_UP: usize = 4;
+    let points = without_outliers(&sample(cloud));
+    let points: Vec<Vec3> =
+        points.iter().step_by(points.len().div_ceil(MOST_POINTS)).copied().collect();
+    let (east, north) = ground_axes(up);
+    let range = |axis: Vec3| {
+        let along = points.iter().map(|p| p.dot(axis));
+        (along.clone().fold(f32::INFINITY, f32::min), along.fold(f32::NEG_INFINITY, f32::max))
+    };
+    let within = |(low, high): (f32, f32), share: f32| low + share * (high - low);
+    let (along_east, along_north, along_up) = (range(east), range(north), range(up));
+    let middle = |i: usize| 0.25 + 0.5 * (i as f32 + 0.5) / N_ACROSS as f32;
+    let places = (0..N_ACROSS * N_ACROSS * N_UP).map(|i| {
+        let (x, y, z) = (i % N_ACROSS, i / N_ACROSS % N_ACROSS, i / (N_ACROSS * N_ACROSS));
+        within(along_east, middle(x)) * east
+            + within(along_north, middle(y)) * north
+            + within(along_up, 0.1 * (z + 1) as f32) * up
+    });
+    let room = |place: Vec3| {
+        points.iter().map(|p| p.distance_squared(place)).fold(f32::INFINITY, f32::min)
+    };
+    let freest = places.max_by(|a, b| room(*a).total_cmp(&room(*b)));
+    freest.unwrap_or(Vec3::ZERO)
 }
 
 /// A camera that looks along `forward` at all of `points`, and is relative to the same zero.
@@ -184,15 +213,37 @@ mod tests {
         })
     }
 
+    /// A square room with a pillar a little off its middle.
+    fn room() -> PointCloud {
+        let side = |i: i32| i as f32 / 20.0;
+        let mut points = Vec::new();
+        for i in -60..=60 {
+            for j in 0..=40 {
+                let (along, height) = (side(i), side(j));
+                points.extend([Vec3::new(along, -3.0, height), Vec3::new(along, 3.0, height)]);
+                points.extend([Vec3::new(-3.0, along, height), Vec3::new(3.0, along, height)]);
+                let (sin, cos) = side(i).sin_cos();
+                points.push(Vec3::new(0.3 + 0.5 * cos, 0.2 + 0.5 * sin, height));
+            }
+            points.extend((-60..=60).map(|j| Vec3::new(side(i), side(j), 0.0)));
+        }
+        let origin = DVec3::new(500.0, 600.0, 70.0);
+        PointCloud { origin, ..PointCloud::from_positions(points) }
+    }
+
     #[test]
-    fn a_panorama_is_seen_from_the_middle_with_north_in_the_middle() {
-        let corners = [Vec3::new(-1.0, 0.0, 0.0), Vec3::new(3.0, 2.0, 4.0)];
-        let cloud = PointCloud::from_positions(corners.to_vec());
+    fn a_panorama_is_seen_from_where_there_is_room_with_north_in_the_middle() {
+        let cloud = room();
         for (azimuth_deg, toward) in [(0.0, DVec3::Y), (90.0, DVec3::X), (-90.0, DVec3::NEG_X)] {
             let camera = look_around(&cloud, Vec3::Z, azimuth_deg);
-            assert!(camera.position.distance(DVec3::new(1.0, 1.0, 2.0)) < 1e-6);
+            let place = (camera.position - cloud.origin).as_vec3();
+            let nearest = cloud.positions.iter().map(|p| p.distance(place)).fold(9.0, f32::min);
+            assert!(0.6 < nearest && place.abs().max_element() < 2.0, "{place}");
             assert!((camera.focal_point - camera.position).distance(toward) < 1e-6);
         }
+        // Anywhere in a cloud without room.
+        let point = PointCloud::from_positions(vec![Vec3::ONE]);
+        assert_eq!(look_around(&point, Vec3::Z, 0.0).position, DVec3::ONE);
     }
 
     #[test]
