@@ -30,7 +30,7 @@ pub struct Image {
 /// What the ray through each pixel's centre met.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layers {
-    /// Along the view axis, in world units; infinite where nothing was hit.
+    /// Along the view axis, or from the camera of a panorama, in world units; infinite where nothing was hit.
     pub depth: Vec<f32>,
     /// World space, unit, facing the camera; zero where nothing was hit.
     pub normal: Vec<Vec3>,

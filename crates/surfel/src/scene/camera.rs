@@ -92,14 +92,14 @@ impl View {
     /// The ray through a place in the picture, in pixels from its top left corner.
     pub fn ray(&self, x: f32, y: f32) -> Ray {
         let (across, along) = (x - self.center.0, self.center.1 - y);
+        let aside =
+            |pixel_size: f32| pixel_size * across * self.right + pixel_size * along * self.up;
         match self.lens {
             Lens::Perspective { pixel_size } => {
-                let aside = pixel_size * across * self.right + pixel_size * along * self.up;
-                Ray::new(self.position, (self.forward + aside).normalize())
+                Ray::new(self.position, (self.forward + aside(pixel_size)).normalize())
             }
             Lens::Orthographic { pixel_size } => {
-                let aside = pixel_size * across * self.right + pixel_size * along * self.up;
-                Ray::new(self.position + aside, self.forward)
+                Ray::new(self.position + aside(pixel_size), self.forward)
             }
             Lens::Panorama { turn } => {
                 let (sin_across, cos_across) = (turn.0 * across).sin_cos();

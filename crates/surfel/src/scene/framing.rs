@@ -80,15 +80,11 @@ fn free_place(cloud: &PointCloud, up: Vec3) -> Vec3 {
     const N_ACROSS: usize = 12;
     const N_UP: usize = 4;
     let points = without_outliers(&sample(cloud));
-    let points: Vec<Vec3> =
-        points.iter().step_by(points.len().div_ceil(MOST_POINTS)).copied().collect();
+    let stride = points.len().div_ceil(MOST_POINTS).max(1);
+    let points: Vec<Vec3> = points.iter().step_by(stride).copied().collect();
     let (east, north) = ground_axes(up);
-    let range = |axis: Vec3| {
-        let along = points.iter().map(|p| p.dot(axis));
-        (along.clone().fold(f32::INFINITY, f32::min), along.fold(f32::NEG_INFINITY, f32::max))
-    };
     let within = |(low, high): (f32, f32), share: f32| low + share * (high - low);
-    let (along_east, along_north, along_up) = (range(east), range(north), range(up));
+    let [along_east, along_north, along_up] = [east, north, up].map(|axis| range(&points, axis));
     let middle = |i: usize| 0.25 + 0.5 * (i as f32 + 0.5) / N_ACROSS as f32;
     let places = (0..N_ACROSS * N_ACROSS * N_UP).map(|i| {
         let (x, y, z) = (i % N_ACROSS, i / N_ACROSS % N_ACROSS, i / (N_ACROSS * N_ACROSS));
@@ -101,6 +97,12 @@ fn free_place(cloud: &PointCloud, up: Vec3) -> Vec3 {
     };
     let freest = places.max_by(|a, b| room(*a).total_cmp(&room(*b)));
     freest.unwrap_or(Vec3::ZERO)
+}
+
+/// From where to where `points` reach along an axis.
+pub(super) fn range(points: &[Vec3], axis: Vec3) -> (f32, f32) {
+    let along = points.iter().map(|p| p.dot(axis));
+    (along.clone().fold(f32::MAX, f32::min), along.fold(f32::MIN, f32::max))
 }
 
 /// A camera that looks along `forward` at all of `points`, and is relative to the same zero.

@@ -1,6 +1,6 @@
 //! From where to look at a cloud that nothing is known of.
 
-use super::framing::{Framing, fit_along};
+use super::framing::{Framing, fit_along, range};
 use super::light::ground_axes;
 use super::{Camera, Projection};
 use crate::math::{DVec3, Vec3};
@@ -15,8 +15,8 @@ const LAND: f64 = 0.25;
 pub(super) fn automatic_direction(points: &[Vec3], framing: &Framing) -> DVec3 {
     let (east, north) = ground_axes(framing.up);
     let extent = |axis: Vec3| {
-        let along = points.iter().map(|p| p.dot(axis));
-        along.clone().fold(f32::MIN, f32::max) - along.fold(f32::MAX, f32::min)
+        let (low, high) = range(points, axis);
+        high - low
     };
     let flatness = f64::from(extent(framing.up) / extent(east).max(extent(north)).max(1e-9));
     let elevation_deg =

@@ -232,23 +232,23 @@ impl<W: Wide> WideHits<W> {
     /// Of one to sixteen; the last one fills the lanes that are left.
     #[inline(always)]
     pub fn new(hits: &[(Vec3, Candidate)]) -> Self {
-        let (mut position, mut normal, mut direction) =
-            ([[0.0; WIDE]; 3], [[0.0; WIDE]; 3], [[0.0; WIDE]; 3]);
-        let mut radius = [0.0; WIDE];
+        let rows = [[0.0; WIDE]; 3];
+        let mut stored =
+            StoredHits { position: rows, normal: rows, direction: rows, radius: [0.0; WIDE] };
         for lane in 0..WIDE {
-            let (place, hit) = &hits[lane.min(hits.len() - 1)];
-            radius[lane] = hit.radius;
+            let (position, hit) = &hits[lane.min(hits.len() - 1)];
+            stored.radius[lane] = hit.radius;
             for axis in 0..3 {
-                position[axis][lane] = place[axis];
-                normal[axis][lane] = hit.normal[axis];
-                direction[axis][lane] = hit.direction[axis];
+                stored.position[axis][lane] = position[axis];
+                stored.normal[axis][lane] = hit.normal[axis];
+                stored.direction[axis][lane] = hit.direction[axis];
             }
         }
         Self {
-            position: Vec3Lanes::load_wide(&position),
-            normal: Vec3Lanes::load_wide(&normal),
-            direction: Vec3Lanes::load_wide(&direction),
-            radius: W::load(&radius),
+            position: Vec3Lanes::load_wide(&stored.position),
+            normal: Vec3Lanes::load_wide(&stored.normal),
+            direction: Vec3Lanes::load_wide(&stored.direction),
+            radius: W::load(&stored.radius),
         }
     }
 
@@ -296,7 +296,7 @@ impl<W: Wide> WideHits<W> {
     }
 }
 
-/// Hits to take single ones from.
+/// Hits from which single ones are taken, or put together.
 struct StoredHits {
     position: [[f32; WIDE]; 3],
     normal: [[f32; WIDE]; 3],
