@@ -186,7 +186,7 @@ fn describe(
         surface: args.surface.surface,
         boundary: args.surface.boundary,
         colors,
-        material: if is_lit { Material::Matte } else { Material::Unlit },
+        material: if is_lit { Material::MATTE } else { Material::UNLIT },
         lights: choices.lights,
         background: args.color.background(),
         camera: choices.camera,

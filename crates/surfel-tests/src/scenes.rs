@@ -22,7 +22,7 @@ pub fn scene(cloud: PointCloud, surface: SurfaceKind) -> Scene {
         surface,
         boundary: Boundary::Gap,
         colors,
-        material: Material::Matte,
+        material: Material::MATTE,
         lights: vec![Light::Headlight(1.0)],
         background: Background::Transparent,
         camera,

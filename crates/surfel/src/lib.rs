@@ -27,7 +27,7 @@
 //!     cloud,
 //!     surface: SurfaceKind::Splat,
 //!     boundary: Boundary::Gap,
-//!     material: Material::Matte,
+//!     material: Material::MATTE,
 //!     lights: vec![Light::Headlight(1.0)],
 //!     background: Background::Transparent,
 //!     camera,

@@ -152,7 +152,7 @@ fn scene(args: &Args, file: Option<&CameraFile>, report: &Report) -> anyhow::Res
         cloud,
         surface: args.surface.surface,
         boundary: args.surface.boundary,
-        material: Material::Matte,
+        material: Material::MATTE,
         lights: vec![Light::Headlight(1.0)],
         background: Background::Transparent,
     })

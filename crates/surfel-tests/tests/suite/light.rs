@@ -118,7 +118,7 @@ fn unlit_colors_come_out_as_they_went_in() {
             let scene = scenes::scene(clouds::sphere(8000, 1.0), kind);
             let n = scene.cloud.len();
             let scene =
-                Scene { material: Material::Unlit, colors: vec![[value, 128, value]; n], ..scene };
+                Scene { material: Material::UNLIT, colors: vec![[value, 128, value]; n], ..scene };
             let settings = Settings { samples_per_pixel: 4, ..SETTINGS };
             let image = render(&scene, &settings);
             let center = image.color[32 * 64 + 32];

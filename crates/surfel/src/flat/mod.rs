@@ -40,7 +40,7 @@ impl FlatScene {
             points: FlatPoints::new(&scene.cloud, scene.surface, &scene.colors, progress)?,
             surface: scene.surface,
             boundary: scene.boundary,
-            material: scene.material,
+            material: scene.material.clone(),
             lights: scene.lights.clone(),
             background: scene.background,
             camera: scene.camera,

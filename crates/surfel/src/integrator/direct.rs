@@ -48,7 +48,7 @@ pub struct Batch<'a> {
 pub fn radiance(batch: &Batch, progress: &dyn Progress) -> Result<(Vec<Vec3>, RayCounts)> {
     let Batch { scene, rays, hits, .. } = *batch;
     let mut counts = RayCounts { primary: rays.len() as u64, ..RayCounts::default() };
-    if scene.material == Material::Unlit {
+    if scene.material == Material::UNLIT {
         return Ok((hits.iter().map(|hit| hit.color).collect(), counts));
     }
     let mut light = vec![Vec3::ZERO; rays.len()];

@@ -13,7 +13,9 @@ mod sampling;
 pub use aabb::Aabb;
 pub use eigen::{SymmetricMatrix, smallest_eigenvector};
 pub use frame::{Frame, tangents};
-pub use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3, Vec3A, Vec4};
+pub use glam::{
+    Affine3A, DAffine3, DMat3, DQuat, DVec2, DVec3, Mat3, Quat, Vec2, Vec3, Vec3A, Vec4,
+};
 pub use lanes::{Floats, LANES, LaneMask, Lanes, TO_INTEGER, Task, Vec3Lanes, WIDE, Wide};
 pub use pair::Pair;
 pub use portable::{PortableLanes, PortableMask};

@@ -58,7 +58,7 @@ fn shade(scene: &FlatScene, settings: &Settings, nearest: &[u64]) -> Image {
         let slot = key as u32;
         let (block, lane) = (&scene.points.blocks[slot as usize / LANES], slot as usize % LANES);
         let albedo = Vec3::from_array(block.color(lane).map(decode_srgb8));
-        let lit = scene.material != Material::Unlit;
+        let lit = scene.material != Material::UNLIT;
         let shade = if lit { eye_dome(nearest, settings, x, y) } else { 1.0 };
         image.color[pixel] = (shade * albedo).extend(1.0).to_array();
         image.coverage[pixel] = 1.0;

@@ -33,6 +33,31 @@ pub struct Sky {
     pub reach: f32,
 }
 
+/// A light that stands at a node and shines along its -Z (KHR_lights_punctual).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lamp {
+    pub kind: LampKind,
+    /// Linear colour times intensity: what a white surface facing it at distance 1 throws back, times pi
+    /// (candela; lux for a directional one).
+    pub color: Vec3,
+    /// Nothing beyond this distance is lit; may be infinite.
+    pub range: f32,
+    /// Of the ball that shines, in world units: 0 gives hard shadows.
+    pub radius: f32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LampKind {
+    /// Parallel light from infinitely far away.
+    Directional,
+    Point,
+    /// Full within the inner angle from the axis, nothing beyond the outer one.
+    Spot {
+        inner_rad: f32,
+        outer_rad: f32,
+    },
+}
+
 impl Sky {
     /// Radiance from `direction` (unit).
     pub fn radiance(&self, direction: Vec3) -> Vec3 {

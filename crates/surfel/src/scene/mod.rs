@@ -1,14 +1,24 @@
 //! What an author describes: a cloud, how it is shaped, coloured and lit, and who looks at it.
 
+mod animation;
 mod camera;
 pub mod color;
 mod framing;
+mod graph;
 mod light;
+mod material;
+mod mesh;
 mod prospect;
+mod texture;
 
+pub use animation::{Animation, Channel, Interpolation, Keys, Track, Value};
 pub use camera::{Camera, Projection, View};
 pub use framing::{Framing, frame, look_around, upright, usual_bounds};
-pub use light::{Light, Sky, Sun};
+pub use graph::{Geometry, Graph, Joint, Node, Part, Points, Transform};
+pub use light::{Lamp, LampKind, Light, Sky, Sun};
+pub use material::{AlphaMode, Material, Textures};
+pub use mesh::{Mesh, Morph, Skin};
+pub use texture::{Texture, TextureRef, Wrap};
 
 use crate::math::Vec3;
 use crate::points::PointCloud;
@@ -26,16 +36,6 @@ pub struct Scene {
     pub lights: Vec<Light>,
     pub background: Background,
     pub camera: Camera,
-}
-
-/// How the surface answers light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Material {
-    /// Diffuse, with the points' colours as albedo.
-    #[default]
-    Matte,
-    /// The points' colours as they are, without light.
-    Unlit,
 }
 
 /// What is seen where no point is.

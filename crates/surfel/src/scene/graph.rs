@@ -1,0 +1,148 @@
+//! The graph of a scene after glTF 2.0: geometry under nodes that stand, turn and move.
+
+use super::animation::Animation;
+use super::camera::Projection;
+use super::light::Lamp;
+use super::material::Material;
+use super::mesh::Mesh;
+use super::texture::Texture;
+use crate::math::{DAffine3, DQuat, DVec3};
+use crate::points::PointCloud;
+use crate::surface::{Boundary, SurfaceKind};
+
+/// What several files are put together to. Indices are into the columns here.
+#[derive(Clone, Debug, Default)]
+pub struct Graph {
+    pub geometries: Vec<Geometry>,
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+    /// Parents stand before their children.
+    pub nodes: Vec<Node>,
+    pub animation: Animation,
+}
+
+#[derive(Clone, Debug)]
+pub enum Geometry {
+    Points(Points),
+    Triangles(Mesh),
+}
+
+/// A cloud, how it is shaped, and how coloured.
+#[derive(Clone, Debug, Default)]
+pub struct Points {
+    /// With radii, and normals where the surface needs them.
+    pub cloud: PointCloud,
+    /// One a point, sRGB-encoded.
+    pub colors: Vec<[u8; 3]>,
+    pub surface: SurfaceKind,
+    pub boundary: Boundary,
+    /// Whether normals point out of what the points enclose, which tells glass its inside. Where they do
+    /// not, a ray is inside after every other passage (Schaufler and Jensen 2000).
+    pub has_outward_normals: bool,
+}
+
+/// A place in the world, or in that of another node.
+#[derive(Clone, Debug)]
+pub struct Node {
+    pub name: String,
+    /// Index of a node before this one.
+    pub parent: Option<usize>,
+    pub transform: Transform,
+    /// What is seen here. Geometry that several nodes show is held once.
+    pub parts: Vec<Part>,
+    pub lamp: Option<Lamp>,
+    /// Looks along -Z, with +Y up.
+    pub camera: Option<Projection>,
+    /// Whether this node's own parts and lamp are there.
+    pub is_visible: bool,
+    /// Of the morph targets of the parts.
+    pub morph_weights: Vec<f32>,
+    /// Nodes whose movement carries the vertices of skinned parts, each with its inverse bind matrix.
+    pub joints: Vec<Joint>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    pub geometry: usize,
+    pub material: usize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint {
+    pub node: usize,
+    /// From the mesh's coordinates to the joint's when it was bound.
+    pub joint_from_mesh: DAffine3,
+}
+
+/// From a node's coordinates to its parent's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Transform {
+    Parts { translation: DVec3, rotation: DQuat, scale: DVec3 },
+    Matrix(DAffine3),
+}
+
+impl Transform {
+    pub const IDENTITY: Self =
+        Self::Parts { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
+
+    pub fn matrix(&self) -> DAffine3 {
+        match *self {
+            Self::Parts { translation, rotation, scale } => {
+                DAffine3::from_scale_rotation_translation(scale, rotation, translation)
+            }
+            Self::Matrix(matrix) => matrix,
+        }
+    }
+}
+
+impl Node {
+    /// Shows nothing, where its parent is.
+    pub fn new(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            parent: None,
+            transform: Transform::IDENTITY,
+            parts: Vec::new(),
+            lamp: None,
+            camera: None,
+            is_visible: true,
+            morph_weights: Vec::new(),
+            joints: Vec::new(),
+        }
+    }
+}
+
+impl Graph {
+    /// Takes `other` in beside what is here; returns the index of its first node.
+    pub fn append(&mut self, other: Self) -> usize {
+        let (geometry, material) = (self.geometries.len(), self.materials.len());
+        let (texture, node) = (self.textures.len(), self.nodes.len());
+        self.geometries.extend(other.geometries);
+        self.textures.extend(other.textures);
+        self.materials.extend(other.materials.into_iter().map(|mut material| {
+            material.textures.each_mut(|reference| reference.texture += texture);
+            material
+        }));
+        self.nodes.extend(other.nodes.into_iter().map(|mut moved| {
+            moved.parent = moved.parent.map(|parent| parent + node);
+            for part in &mut moved.parts {
+                part.geometry += geometry;
+                part.material += material;
+            }
+            moved.joints.iter_mut().for_each(|joint| joint.node += node);
+            moved
+        }));
+        self.animation.append(other.animation, node);
+        node
+    }
+
+    /// From each node's coordinates to the world's.
+    pub fn world_from_nodes(&self) -> Vec<DAffine3> {
+        let mut world_from_nodes: Vec<DAffine3> = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            let world_from_parent = node.parent.map_or(DAffine3::IDENTITY, |i| world_from_nodes[i]);
+            world_from_nodes.push(world_from_parent * node.transform.matrix());
+        }
+        world_from_nodes
+    }
+}
