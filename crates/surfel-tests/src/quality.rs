@@ -3,7 +3,7 @@
 use crate::mesh::{Mesh, MeshHit};
 use crate::scenes;
 use rayon::prelude::*;
-use surfel::flat::FlatScene;
+use surfel::flat::FlatCloud;
 use surfel::math::{DVec3, Ray, Vec3};
 use surfel::points::PointCloud;
 use surfel::scene::{Camera, Projection};
@@ -34,7 +34,7 @@ pub fn compare(
     boundary: Boundary,
     spacing: f32,
 ) -> Quality {
-    let flat = FlatScene { boundary, ..scenes::flat(cloud.clone(), kind) };
+    let flat = FlatCloud { boundary, ..scenes::flat(cloud.clone(), kind) };
     let mut counts = Counts::default();
     for camera in cameras(cloud) {
         let rays = pixel_rays(&camera, cloud.origin);

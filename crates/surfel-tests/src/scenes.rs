@@ -1,16 +1,29 @@
 //! Scenes for tests and benchmarks: clouds from `clouds`, made ready to trace.
 
-use surfel::flat::FlatScene;
+use surfel::flat::FlatCloud;
 use surfel::math::{DVec3, Random, Ray, Vec3};
 use surfel::points::{PointCloud, Preparation, prepare};
 use surfel::progress::Silent;
-use surfel::scene::{Background, Camera, Light, Material, Projection, Scene};
+use surfel::scene::{
+    Background, Camera, Geometry, Graph, Light, Material, Points, Projection, Scene,
+};
 use surfel::surface::{Boundary, SurfaceKind};
 
-/// `cloud` with the radii and normals it lacks, grey, lit from the camera, seen from +X.
-pub fn scene(cloud: PointCloud, surface: SurfaceKind) -> Scene {
+/// `cloud` with the radii and normals it lacks, grey.
+pub fn points(cloud: PointCloud, surface: SurfaceKind) -> Points {
     let (cloud, _) = prepare(cloud, &Preparation::default(), &Silent).unwrap();
     let colors = vec![[188; 3]; cloud.len()];
+    Points { cloud, colors, surface, boundary: Boundary::Gap, has_outward_normals: false }
+}
+
+/// `cloud` made ready, matte, lit from the camera, seen from +X.
+pub fn scene(cloud: PointCloud, surface: SurfaceKind) -> Scene {
+    lit(points(cloud, surface))
+}
+
+/// Points, matte, lit from the camera, seen from +X.
+pub fn lit(points: Points) -> Scene {
+    let cloud = &points.cloud;
     let camera = Camera {
         position: cloud.origin + DVec3::new(6.0, 0.0, 0.0),
         focal_point: cloud.origin,
@@ -18,20 +31,24 @@ pub fn scene(cloud: PointCloud, surface: SurfaceKind) -> Scene {
         projection: Projection::Perspective { view_angle_deg: 30.0 },
     };
     Scene {
-        cloud,
-        surface,
-        boundary: Boundary::Gap,
-        colors,
-        material: Material::MATTE,
+        graph: Graph::of(Geometry::Points(points), Material::MATTE),
         lights: vec![Light::Headlight(1.0)],
         background: Background::Transparent,
         camera,
     }
 }
 
-/// The flat form of [`scene`].
-pub fn flat(cloud: PointCloud, surface: SurfaceKind) -> FlatScene {
-    FlatScene::new(&scene(cloud, surface), &Silent).unwrap()
+/// The flat form of [`points`].
+pub fn flat(cloud: PointCloud, surface: SurfaceKind) -> FlatCloud {
+    FlatCloud::new(&points(cloud, surface), &Silent).unwrap()
+}
+
+/// The only cloud of a scene.
+pub fn cloud(scene: &Scene) -> &Points {
+    match &scene.graph.geometries[..] {
+        [Geometry::Points(points)] => points,
+        _ => panic!("not one cloud"),
+    }
 }
 
 /// Rays from around a ball of `radius` about the origin toward places within it, some of bounded range.

@@ -8,8 +8,9 @@
 //! use surfel::points::{PointCloud, Preparation, prepare};
 //! use surfel::progress::Silent;
 //! use surfel::render::{CpuRenderer, Renderer, Settings};
-//! use surfel::scene::{Background, Framing, Light, Material, Scene, frame};
-//! use surfel::surface::{Boundary, SurfaceKind};
+//! use surfel::scene::{
+//!     Background, Framing, Geometry, Graph, Light, Material, Points, Scene, frame,
+//! };
 //! use surfel::trace::Simd;
 //!
 //! // A hill of 50 by 50 points; files are read by the crate `surfel-formats`.
@@ -22,12 +23,10 @@
 //! // Normals and radii are added where they are missing.
 //! let (cloud, _) = prepare(cloud, &Preparation::default(), &Silent)?;
 //! let camera = frame(&cloud, &Framing::automatic(Vec3::Z, 4.0 / 3.0));
+//! let colors = vec![[200, 180, 150]; cloud.len()];
+//! let hill = Points { cloud, colors, ..Points::default() };
 //! let scene = Scene {
-//!     colors: vec![[200, 180, 150]; cloud.len()],
-//!     cloud,
-//!     surface: SurfaceKind::Splat,
-//!     boundary: Boundary::Gap,
-//!     material: Material::MATTE,
+//!     graph: Graph::of(Geometry::Points(hill), Material::PLASTIC),
 //!     lights: vec![Light::Headlight(1.0)],
 //!     background: Background::Transparent,
 //!     camera,
@@ -38,6 +37,7 @@
 //!     height: 48,
 //!     samples_per_pixel: 1,
 //!     light_samples: 1,
+//!     max_depth: 8,
 //!     seed: 0,
 //!     with_layers: false,
 //! };

@@ -3,7 +3,7 @@
 use crate::build;
 use crate::modes::{camera_rays, degenerate_rays, loose_rays, shadow_rays, shuffled};
 use crate::plain::Plain;
-use surfel::flat::FlatScene;
+use surfel::flat::FlatCloud;
 use surfel::math::{Ray, Vec3};
 use surfel::surface::{Boundary, SurfaceKind};
 use surfel::trace::{Simd, SurfaceHit, occlusions, surface_hits};
@@ -11,7 +11,7 @@ use surfel_tests::{clouds, scenes};
 
 pub type Seen = (SurfaceHit, bool);
 
-pub fn surface(scene: &FlatScene, simd: Simd, rays: &[Ray]) -> Vec<Seen> {
+pub fn surface(scene: &FlatCloud, simd: Simd, rays: &[Ray]) -> Vec<Seen> {
     let mut hits = vec![SurfaceHit::MISS; rays.len()];
     let mut occluded = vec![false; rays.len()];
     surface_hits(scene, simd, rays, &mut hits);
@@ -37,7 +37,7 @@ fn the_surface_is_the_same_whatever_rays_are_beside() {
             let (ending, endless): (Vec<Ray>, Vec<Ray>) =
                 rays.into_iter().partition(|ray| ray.t_max.is_finite());
             for boundary in [Boundary::Gap, Boundary::Off] {
-                let scene = FlatScene { boundary, ..flat.clone() };
+                let scene = FlatCloud { boundary, ..flat.clone() };
                 check_surface(name, &scene, &ending);
                 check_surface(name, &scene, &endless);
             }
@@ -46,7 +46,7 @@ fn the_surface_is_the_same_whatever_rays_are_beside() {
 }
 
 /// In order, shuffled, in small batches and one by one.
-fn check_surface(name: &str, scene: &FlatScene, rays: &[Ray]) {
+fn check_surface(name: &str, scene: &FlatCloud, rays: &[Ray]) {
     let one_by_one: Vec<Seen> =
         rays.iter().flat_map(|&ray| surface(scene, Simd::PORTABLE, &[ray])).collect();
     let in_order: Vec<usize> = (0..rays.len()).collect();
@@ -70,7 +70,7 @@ fn check_surface(name: &str, scene: &FlatScene, rays: &[Ray]) {
 
 #[test]
 fn nothing_is_hit_where_no_point_can_be() {
-    let mut cloud = scenes::scene(clouds::sphere(20, 1.0), SurfaceKind::Disc).cloud;
+    let mut cloud = scenes::points(clouds::sphere(20, 1.0), SurfaceKind::Disc).cloud;
     cloud.positions.fill(Vec3::NAN);
     let scene = build::flat(cloud, SurfaceKind::Disc);
     let rays = scenes::random_rays(40, 1.0, 54);

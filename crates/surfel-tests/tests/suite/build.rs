@@ -1,19 +1,18 @@
 //! Trees over bad input: building ends, memory is bounded, and every hit is found.
 
 use crate::plain::Plain;
-use surfel::flat::{FlatScene, NO_POINT};
+use surfel::flat::{FlatCloud, NO_POINT};
 use surfel::math::{Aabb, Random, Ray, Vec3};
 use surfel::points::PointCloud;
 use surfel::progress::Silent;
-use surfel::scene::Scene;
+use surfel::scene::Points;
 use surfel::surface::SurfaceKind;
-use surfel_tests::{clouds, scenes};
 
 /// Not prepared, which would mend it.
-pub fn flat(cloud: PointCloud, surface: SurfaceKind) -> FlatScene {
+pub fn flat(cloud: PointCloud, surface: SurfaceKind) -> FlatCloud {
     let colors = vec![[188; 3]; cloud.len()];
-    let model = scenes::scene(clouds::sphere(9, 1.0), surface);
-    FlatScene::new(&Scene { colors, cloud, ..model }, &Silent).unwrap()
+    let points = Points { colors, cloud, surface, ..Points::default() };
+    FlatCloud::new(&points, &Silent).unwrap()
 }
 
 /// Positions with a normal and a radius each, drawn at random.

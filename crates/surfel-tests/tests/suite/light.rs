@@ -6,7 +6,7 @@ use surfel::math::{DVec3, Vec3};
 use surfel::points::PointCloud;
 use surfel::progress::Silent;
 use surfel::render::{CpuRenderer, Renderer, Settings};
-use surfel::scene::{Camera, Light, Material, Projection, Scene, Sky, Sun};
+use surfel::scene::{Camera, Light, Material, Points, Projection, Scene, Sky, Sun};
 use surfel::surface::SurfaceKind;
 use surfel::trace::Simd;
 use surfel_tests::{clouds, scenes};
@@ -16,6 +16,7 @@ const SETTINGS: Settings = Settings {
     height: 64,
     samples_per_pixel: 1,
     light_samples: 16,
+    max_depth: 8,
     seed: 1,
     with_layers: true,
 };
@@ -33,9 +34,10 @@ const FURNACE: Sky =
 fn a_white_sphere_in_a_furnace_is_white() {
     for kind in [SurfaceKind::Sphere, SurfaceKind::Disc, SurfaceKind::Splat, SurfaceKind::SplatFit]
     {
-        let scene = scenes::scene(clouds::sphere(20_000, 1.0), kind);
-        let n = scene.cloud.len();
-        let scene = Scene { lights: vec![Light::Sky(FURNACE)], colors: vec![[255; 3]; n], ..scene };
+        let points = scenes::points(clouds::sphere(20_000, 1.0), kind);
+        let colors = vec![[255; 3]; points.cloud.len()];
+        let scene = scenes::lit(Points { colors, ..points });
+        let scene = Scene { lights: vec![Light::Sky(FURNACE)], ..scene };
         let image = render(&scene, &SETTINGS);
         let covered = image.color.iter().filter(|pixel| pixel[3] == 1.0);
         let (sum, count) = covered.fold((0.0, 0), |(sum, n), pixel| (sum + pixel[0], n + 1));
@@ -115,10 +117,10 @@ fn a_wide_sun_has_a_half_shadow() {
 fn unlit_colors_come_out_as_they_went_in() {
     for (name, kind) in SurfaceKind::ALL {
         for value in [0u8, 1, 64, 128, 200, 255] {
-            let scene = scenes::scene(clouds::sphere(8000, 1.0), kind);
-            let n = scene.cloud.len();
-            let scene =
-                Scene { material: Material::UNLIT, colors: vec![[value, 128, value]; n], ..scene };
+            let points = scenes::points(clouds::sphere(8000, 1.0), kind);
+            let colors = vec![[value, 128, value]; points.cloud.len()];
+            let mut scene = scenes::lit(Points { colors, ..points });
+            scene.graph.materials[0] = Material::UNLIT;
             let settings = Settings { samples_per_pixel: 4, ..SETTINGS };
             let image = render(&scene, &settings);
             let center = image.color[32 * 64 + 32];
@@ -143,7 +145,7 @@ fn layers_tell_what_the_pixel_centres_meet() {
     assert!(layers.position[center].distance(Vec3::X) < 0.06);
     assert!(0.99 < layers.normal[center].x);
     assert_eq!((layers.instance_id[center], image.coverage[center]), (0, 1.0));
-    let point = scene.cloud.positions[layers.point_id[center] as usize];
+    let point = scenes::cloud(&scene).cloud.positions[layers.point_id[center] as usize];
     assert!(point.distance(layers.position[center]) < 0.06);
     assert_eq!((layers.point_id[0], layers.instance_id[0]), (u32::MAX, u32::MAX));
     assert_eq!(
@@ -154,7 +156,8 @@ fn layers_tell_what_the_pixel_centres_meet() {
 
 #[test]
 fn impossible_settings_are_errors() {
-    let flat = scenes::flat(clouds::sphere(50, 1.0), SurfaceKind::Splat);
+    let scene = scenes::scene(clouds::sphere(50, 1.0), SurfaceKind::Splat);
+    let flat = FlatScene::new(&scene, &Silent).unwrap();
     let renderer = CpuRenderer { simd: Simd::detect() };
     for settings in [
         Settings { width: 0, ..SETTINGS },

@@ -6,7 +6,7 @@ use crate::plain::Plain;
 use crate::{build, trace};
 use std::path::Path;
 use surfel::bvh::Node;
-use surfel::flat::FlatScene;
+use surfel::flat::FlatCloud;
 use surfel::math::{Aabb, Frame, LANES, Random, Ray, Vec3};
 use surfel::points::PointCloud;
 use surfel::surface::SurfaceKind;
@@ -73,7 +73,7 @@ fn loaded(path: &Path) -> PointCloud {
 }
 
 /// Camera rays, shadow rays from where they hit, rays that go all ways: sorted, mixed and one astray.
-fn check_modes(name: &str, scene: &FlatScene, n_tiles: usize) {
+fn check_modes(name: &str, scene: &FlatCloud, n_tiles: usize) {
     let camera = Plain::new(scene, camera_rays(scene, n_tiles));
     let shadow = shadow_rays(scene, &camera);
     let rays = [camera.rays, shadow, loose_rays(scene, n_tiles * TILE)].concat();
@@ -104,12 +104,12 @@ pub fn shuffled<T>(mut values: Vec<T>) -> Vec<T> {
     values
 }
 
-fn centers(scene: &FlatScene) -> Vec<Vec3> {
+fn centers(scene: &FlatCloud) -> Vec<Vec3> {
     scene.points.slots().map(|slot| scene.points.center(slot)).collect()
 }
 
 /// From one eye through tiles of four by four pixels, each about a point.
-pub fn camera_rays(scene: &FlatScene, n_tiles: usize) -> Vec<Ray> {
+pub fn camera_rays(scene: &FlatCloud, n_tiles: usize) -> Vec<Ray> {
     let centers = centers(scene);
     let bounds = Aabb::of_points(centers.iter().copied());
     let to_eye = (bounds.diagonal() + scene.points.radius(0)) * Vec3::new(0.8, 0.5, 0.6);
@@ -129,7 +129,7 @@ pub fn camera_rays(scene: &FlatScene, n_tiles: usize) -> Vec<Ray> {
 }
 
 /// From where rays hit to a light whose distance is the end of their range.
-pub fn shadow_rays(scene: &FlatScene, camera: &Plain) -> Vec<Ray> {
+pub fn shadow_rays(scene: &FlatCloud, camera: &Plain) -> Vec<Ray> {
     let bounds = Aabb::of_points(centers(scene));
     let light = bounds.center() + bounds.diagonal() * Vec3::new(0.4, 0.7, 0.5);
     let hits = camera.rays.iter().zip(&camera.closest).filter(|(_, hit)| !hit.is_miss());
@@ -142,7 +142,7 @@ pub fn shadow_rays(scene: &FlatScene, camera: &Plain) -> Vec<Ray> {
 }
 
 /// From near and far toward points, some of bounded range, some along an axis.
-pub fn loose_rays(scene: &FlatScene, n: usize) -> Vec<Ray> {
+pub fn loose_rays(scene: &FlatCloud, n: usize) -> Vec<Ray> {
     let centers = centers(scene);
     let diagonal = Aabb::of_points(centers.iter().copied()).diagonal();
     let mut random = Random::new(52, 0);
@@ -200,7 +200,7 @@ fn a_degenerate_ray_leaves_the_others_of_its_packet_alone() {
 }
 
 /// Packets of sound rays in which one place is taken by each of `strays`.
-fn check_strays(scene: &FlatScene, strays: Vec<Ray>) {
+fn check_strays(scene: &FlatCloud, strays: Vec<Ray>) {
     let n_tiles = 4;
     let first = n_tiles * TILE;
     let plain = Plain::new(scene, [camera_rays(scene, n_tiles), strays].concat());
@@ -214,7 +214,7 @@ fn check_strays(scene: &FlatScene, strays: Vec<Ray>) {
 }
 
 /// Along axes, in planes of discs, past rims, on faces of boxes, of bare and empty ranges, from far away.
-pub fn degenerate_rays(scene: &FlatScene) -> Vec<Ray> {
+pub fn degenerate_rays(scene: &FlatCloud) -> Vec<Ray> {
     let points = &scene.points;
     let mut rays = Vec::new();
     for slot in some_slots(scene) {
@@ -233,7 +233,7 @@ pub fn degenerate_rays(scene: &FlatScene) -> Vec<Ray> {
     rays
 }
 
-fn some_slots(scene: &FlatScene) -> Vec<u32> {
+fn some_slots(scene: &FlatCloud) -> Vec<u32> {
     let slots: Vec<u32> = scene.points.slots().collect();
     slots.iter().copied().step_by(slots.len().div_ceil(5)).collect()
 }
@@ -254,7 +254,7 @@ fn ranges(distance: f32) -> impl Iterator<Item = (f32, f32)> {
     at_hit.into_iter().chain(beside).chain(empty).chain(short)
 }
 
-fn from_box_faces(scene: &FlatScene) -> Vec<Ray> {
+fn from_box_faces(scene: &FlatCloud) -> Vec<Ray> {
     let children = |node| (0..LANES).filter(move |&lane| Node::child(node, lane).is_some());
     let nodes = scene.points.nodes.iter().take(3);
     let boxes = nodes.flat_map(|node| children(node).map(|lane| node.bounds(lane)));
@@ -333,7 +333,7 @@ fn all_modes_agree_on_the_corners_of_a_cube() {
     }
 }
 
-fn check_grid(name: &str, scene: &FlatScene, rays: &[Ray]) {
+fn check_grid(name: &str, scene: &FlatCloud, rays: &[Ray]) {
     let plain = Plain::new(scene, rays.to_vec());
     plain.check_in_order(name);
     let shuffled = shuffled((0..rays.len()).collect());

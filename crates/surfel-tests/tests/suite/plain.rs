@@ -1,20 +1,20 @@
 //! The searches as a plain loop over the decoded points, and batches of rays compared with it.
 
-use surfel::flat::FlatScene;
+use surfel::flat::FlatCloud;
 use surfel::math::{LANES, LaneMask, Lanes, PortableLanes, Ray};
 use surfel::surface::{Disc, MAX_GATHERED, RayLanes, Shape, Sphere, gather_limit};
 use surfel::trace::{self, Gather, Hit, Simd};
 
 /// Rays with what each of them finds.
 pub struct Plain<'s> {
-    scene: &'s FlatScene,
+    scene: &'s FlatCloud,
     pub rays: Vec<Ray>,
     pub closest: Vec<Hit>,
     gathers: Vec<Vec<Hit>>,
 }
 
 impl<'s> Plain<'s> {
-    pub fn new(scene: &'s FlatScene, rays: Vec<Ray>) -> Self {
+    pub fn new(scene: &'s FlatCloud, rays: Vec<Ray>) -> Self {
         let hits: Vec<Vec<Found>> = rays.iter().map(|ray| all_hits(scene, ray)).collect();
         let closest = hits.iter().map(|hits| hits.first().map_or(Hit::MISS, |(hit, _)| *hit));
         let (closest, gathers) =
@@ -76,7 +76,7 @@ fn bits(hit: &Hit) -> (u32, u32) {
 type Found = (Hit, f32);
 
 /// All hits in the ray's range, in order.
-fn all_hits(scene: &FlatScene, ray: &Ray) -> Vec<Found> {
+fn all_hits(scene: &FlatCloud, ray: &Ray) -> Vec<Found> {
     let ray_lanes = RayLanes::new(ray);
     let mut found = Vec::new();
     for (block_idx, block) in scene.points.blocks.iter().enumerate() {

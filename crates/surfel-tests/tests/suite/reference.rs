@@ -8,7 +8,7 @@ use surfel::image::{Image, Tone};
 use surfel::math::{DVec3, Vec3};
 use surfel::progress::Silent;
 use surfel::render::{CpuRenderer, Renderer, Settings};
-use surfel::scene::{Background, Camera, Light, Projection, Scene, Sky, Sun};
+use surfel::scene::{Background, Camera, Light, Points, Projection, Scene, Sky, Sun};
 use surfel::surface::SurfaceKind;
 use surfel::trace::Simd;
 use surfel_formats::{ImageOptions, save_image};
@@ -25,15 +25,11 @@ fn picture(kind: SurfaceKind) -> Image {
     let ball = clouds::sphere(1500, 0.7).positions.into_iter().map(|p| p + 1.7 * Vec3::Z);
     cloud.positions.extend(ball);
     cloud.normals = None;
-    let scene = scenes::scene(cloud, kind);
-    let colors = scene
-        .cloud
-        .positions
-        .iter()
-        .map(|p| if 1.0 < p.z { [230, 120, 60] } else { [150, 170, 190] });
+    let points = scenes::points(cloud, kind);
+    let color = |p: &Vec3| if 1.0 < p.z { [230, 120, 60] } else { [150, 170, 190] };
+    let colors = points.cloud.positions.iter().map(color).collect();
     let toward_sun = Vec3::new(0.6, -0.5, 0.7).normalize();
     let scene = Scene {
-        colors: colors.collect(),
         lights: vec![
             Light::Sun(Sun { direction: toward_sun, color: Vec3::ONE, angular_diameter_deg: 0.5 }),
             Light::Sky(Sky {
@@ -50,13 +46,14 @@ fn picture(kind: SurfaceKind) -> Image {
             view_up: DVec3::Z,
             projection: Projection::Perspective { view_angle_deg: 32.0 },
         },
-        ..scene
+        ..scenes::lit(Points { colors, ..points })
     };
     let settings = Settings {
         width: SIZE.0,
         height: SIZE.1,
         samples_per_pixel: 4,
         light_samples: 16,
+        max_depth: 8,
         seed: 0,
         with_layers: false,
     };

@@ -2,7 +2,7 @@
 
 use crate::build::flat;
 use crate::plain::Plain;
-use surfel::flat::{FlatScene, REBUILD_COST, Refit};
+use surfel::flat::{FlatCloud, REBUILD_COST, Refit};
 use surfel::math::{Quat, Random, Vec3};
 use surfel::points::PointCloud;
 use surfel::progress::Silent;
@@ -12,7 +12,7 @@ use surfel_tests::{clouds, scenes};
 const KINDS: [SurfaceKind; 3] = [SurfaceKind::Sphere, SurfaceKind::Disc, SurfaceKind::SplatFit];
 
 fn cloud() -> PointCloud {
-    scenes::scene(clouds::sphere(5000, 1.0), SurfaceKind::Disc).cloud
+    scenes::points(clouds::sphere(5000, 1.0), SurfaceKind::Disc).cloud
 }
 
 /// Turned about Z by so much for each unit of height.
@@ -35,12 +35,12 @@ fn scattered(mut cloud: PointCloud, by_radii: f32) -> PointCloud {
     cloud
 }
 
-fn refit(scene: &mut FlatScene, cloud: &PointCloud) -> Refit {
+fn refit(scene: &mut FlatCloud, cloud: &PointCloud) -> Refit {
     let colors = vec![[188; 3]; cloud.len()];
     scene.points.refit(cloud, scene.surface, &colors, &Silent).unwrap()
 }
 
-fn same_bytes(a: &FlatScene, b: &FlatScene) -> bool {
+fn same_bytes(a: &FlatCloud, b: &FlatCloud) -> bool {
     let (a, b) = (&a.points, &b.points);
     a.nodes == b.nodes && a.blocks == b.blocks && a.ids == b.ids && a.cost == b.cost
 }

@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use surfel::flat::FlatScene;
 use surfel::image::Image;
 use surfel::math::Vec3;
-use surfel::points::{Preparation, prepare};
 use surfel::progress::{Progress, Silent};
 use surfel::render::{CpuRenderer, Renderer, Settings};
 use surfel::scene::{Light, Scene, Sky, Sun};
@@ -18,6 +17,7 @@ const SETTINGS: Settings = Settings {
     height: 50,
     samples_per_pixel: 4,
     light_samples: 8,
+    max_depth: 8,
     seed: 3,
     with_layers: true,
 };
@@ -66,11 +66,7 @@ fn preparation_and_tree_do_not_depend_on_threads() {
         pool.install(|| {
             let mut cloud = clouds::sphere(60_000, 1.0);
             cloud.normals = None;
-            let (cloud, _) = prepare(cloud, &Preparation::default(), &Silent).unwrap();
-            let colors = vec![[9; 3]; cloud.len()];
-            let flat =
-                FlatScene::new(&Scene { cloud, colors, ..scene(SurfaceKind::Splat) }, &Silent)
-                    .unwrap();
+            let flat = scenes::flat(cloud, SurfaceKind::Splat);
             (flat.points.nodes, flat.points.blocks, flat.points.ids)
         })
     };

@@ -1,13 +1,13 @@
 //! Shapes with closed forms: where the surface lies and how it faces.
 
-use surfel::flat::FlatScene;
+use surfel::flat::FlatCloud;
 use surfel::math::{Ray, Vec3};
 use surfel::points::PointCloud;
 use surfel::surface::{Boundary, SurfaceKind};
 use surfel::trace::{self, Simd, SurfaceHit};
 use surfel_tests::{clouds, scenes};
 
-fn hits(scene: &FlatScene, rays: &[Ray]) -> Vec<SurfaceHit> {
+fn hits(scene: &FlatCloud, rays: &[Ray]) -> Vec<SurfaceHit> {
     let mut hits = vec![SurfaceHit::MISS; rays.len()];
     trace::surface_hits(scene, Simd::detect(), rays, &mut hits);
     hits
@@ -82,7 +82,7 @@ fn a_plane_is_flat_and_ends_at_its_outermost_points() {
             .collect();
         let n_false = hits(&scene, &beyond).iter().filter(|hit| !hit.is_miss()).count();
         assert_eq!(n_false, 0, "{kind:?}: of {} rays past the rim", beyond.len());
-        let open = FlatScene { boundary: Boundary::Off, ..scene };
+        let open = FlatCloud { boundary: Boundary::Off, ..scene };
         let n_false = hits(&open, &beyond).iter().filter(|hit| !hit.is_miss()).count();
         assert!(100 < n_false, "{kind:?}: without the test discs stick out ({n_false})");
     }

@@ -1,9 +1,10 @@
 //! Every search against a plain loop over the decoded points, at every SIMD level.
 
 use crate::plain::Plain;
-use surfel::flat::FlatScene;
+use surfel::flat::{FlatCloud, FlatScene};
 use surfel::math::{DVec3, LANES, Ray, Vec3};
 use surfel::points::PointCloud;
+use surfel::scene::Points;
 use surfel::surface::{Boundary, SurfaceKind};
 use surfel::trace::{self, Hit, Simd, SurfaceHit};
 use surfel_tests::{clouds, scenes};
@@ -54,12 +55,12 @@ fn equal_points_are_told_apart_by_their_slot() {
         radii: Some(vec![0.5; n]),
         ..clouds::equal_points(n)
     };
-    let scene = surfel::scene::Scene {
+    let points = Points {
         colors: vec![[188; 3]; n],
         cloud,
-        ..scenes::scene(clouds::sphere(9, 1.0), SurfaceKind::Disc)
+        ..scenes::points(clouds::sphere(9, 1.0), SurfaceKind::Disc)
     };
-    let flat = FlatScene::new(&scene, &surfel::progress::Silent).unwrap();
+    let flat = FlatCloud::new(&points, &surfel::progress::Silent).unwrap();
     let rays = [Ray::new(Vec3::new(5.0, 2.1, 3.0), -Vec3::X)];
     Plain::new(&flat, rays.to_vec()).check_in_order("equal points");
     let mut hits = [Hit::MISS];
@@ -72,7 +73,7 @@ fn the_surface_is_the_same_at_every_simd_level() {
     let rays = scenes::random_rays(3000, 1.2, 9);
     for (_, kind) in SurfaceKind::ALL {
         for boundary in [Boundary::Gap, Boundary::Off] {
-            let flat = FlatScene { boundary, ..scenes::flat(clouds::sphere(2000, 1.0), kind) };
+            let flat = FlatCloud { boundary, ..scenes::flat(clouds::sphere(2000, 1.0), kind) };
             let results: Vec<_> = Simd::available()
                 .into_iter()
                 .map(|simd| {
@@ -110,7 +111,7 @@ fn a_closed_surface_occludes_where_it_is_hit() {
 #[test]
 fn the_tree_holds_every_point_once_within_its_boxes() {
     use surfel::bvh::{Primitive, build};
-    let cloud = scenes::scene(clouds::sphere(20_000, 1.0), SurfaceKind::Disc).cloud;
+    let cloud = scenes::points(clouds::sphere(20_000, 1.0), SurfaceKind::Disc).cloud;
     let primitives: Vec<Primitive> = (0..cloud.len())
         .map(|i| {
             let normal = cloud.normals.as_ref().unwrap()[i];
@@ -141,13 +142,13 @@ fn the_flat_form_takes_at_most_24_bytes_a_point() {
 #[test]
 fn decoded_points_are_within_a_thousandth_of_their_radius() {
     for (name, cloud) in test_clouds() {
-        let scene = scenes::scene(cloud, SurfaceKind::Splat);
-        let flat = FlatScene::new(&scene, &surfel::progress::Silent).unwrap();
+        let points = scenes::points(cloud, SurfaceKind::Splat);
+        let flat = FlatCloud::new(&points, &surfel::progress::Silent).unwrap();
         for slot in flat.points.slots() {
             let (id, disc) = (flat.points.id(slot) as usize, flat.points.gathered(slot));
-            let radius = scene.cloud.radii.as_ref().unwrap()[id];
+            let radius = points.cloud.radii.as_ref().unwrap()[id];
             assert!(
-                disc.center.distance(scene.cloud.positions[id])
+                disc.center.distance(points.cloud.positions[id])
                     <= 1e-3 * radius + 2e-4 * f32::from(name == "far away" || name == "outlier"),
                 "{name} {id}"
             );
@@ -158,11 +159,7 @@ fn decoded_points_are_within_a_thousandth_of_their_radius() {
 
 #[test]
 fn an_empty_cloud_is_an_error() {
-    let scene = surfel::scene::Scene {
-        cloud: PointCloud::default(),
-        colors: vec![],
-        ..scenes::scene(clouds::sphere(9, 1.0), SurfaceKind::Splat)
-    };
+    let scene = scenes::lit(Points::default());
     let result = FlatScene::new(&scene, &surfel::progress::Silent);
     assert!(matches!(result, Err(surfel::Error::EmptyCloud)));
     assert_eq!(scene.camera.focal_point, DVec3::ZERO);

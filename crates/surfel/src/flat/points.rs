@@ -3,6 +3,7 @@
 use super::block::PointBlock;
 use super::bounds::block_bounds;
 use super::source::{Source, fits};
+use super::tree::BlockTree;
 use crate::bvh::{self, Node, Primitive};
 use crate::error::Result;
 use crate::image::decode_srgb8;
@@ -21,6 +22,20 @@ pub struct FlatPoints {
     pub ids: Vec<u32>,
     /// Of the tree when it was built: the nodes and blocks that a random ray is expected to visit.
     pub cost: f64,
+}
+
+impl BlockTree for FlatPoints {
+    type Block = PointBlock;
+
+    #[inline(always)]
+    fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    #[inline(always)]
+    fn blocks(&self) -> &[PointBlock] {
+        &self.blocks
+    }
 }
 
 /// Marks a slot without a point.

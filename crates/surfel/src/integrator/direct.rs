@@ -1,162 +1,256 @@
-//! Direct light: sun with shadows, sky with occlusion, headlight, on matte surfaces.
+//! Direct light: sun, sky, surroundings and lamps with their shadows, and the headlight.
 
+use super::RayCounts;
+use super::shading::Shading;
+use super::specular::gloss;
+use super::through::light_through;
 use crate::error::Result;
-use crate::flat::FlatScene;
-use crate::math::{Frame, Ray, Vec3, cosine_hemisphere, hash, scrambled_pair, uniform_cone};
+use crate::flat::{FlatLamp, FlatScene};
+use crate::math::{Frame, Ray, Vec3, cosine_hemisphere, disk, hash, scrambled_pair, uniform_cone};
 use crate::progress::Progress;
-use crate::scene::{Light, Material, Sky, Sun};
-use crate::trace::{self, Simd, SurfaceHit};
+use crate::scene::{Environment, LampKind, Light, Sky, Sun};
+use crate::trace::Simd;
+use std::f32::consts::PI;
 
-/// Which of its pixel's samples each ray of a batch is.
+/// A place that light falls on.
 #[derive(Clone, Copy, Debug)]
-pub struct Samples<'a> {
-    /// Random key of each ray's pixel.
-    pub keys: &'a [u64],
-    /// Number of each ray among its pixel's.
-    pub indices: &'a [u32],
-    /// Rays toward each extended light from each hit.
-    pub n_light: u32,
+pub struct Receiver {
+    pub shading: Shading,
+    /// Unit, to the viewer.
+    pub to_viewer: Vec3,
+    /// Share of light thrown back to all sides, and to one side with the blur of the roughness; with what
+    /// is left of it on the way to the camera.
+    pub diffuse: Vec3,
+    pub glossy: Vec3,
+    /// Index of the result that it adds to.
+    pub slot: u32,
+    /// Random key, and number among those that share it.
+    pub key: u64,
+    pub index: u32,
 }
 
-/// Rays traced, by kind.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RayCounts {
-    pub primary: u64,
-    pub shadow: u64,
-    pub sky: u64,
-}
-
-impl std::ops::AddAssign for RayCounts {
-    fn add_assign(&mut self, other: Self) {
-        self.primary += other.primary;
-        self.shadow += other.shadow;
-        self.sky += other.sky;
-    }
-}
-
-/// A batch of camera rays and what they hit.
+/// The light of a scene.
 #[derive(Clone, Copy)]
-pub struct Batch<'a> {
+pub struct DirectLight<'a> {
     pub scene: &'a FlatScene,
     pub simd: Simd,
-    pub rays: &'a [Ray],
-    pub hits: &'a [SurfaceHit],
-    pub samples: Samples<'a>,
-}
-
-/// Shades the hits of a batch: linear colours, one a ray, black where nothing was hit.
-pub fn radiance(batch: &Batch, progress: &dyn Progress) -> Result<(Vec<Vec3>, RayCounts)> {
-    let Batch { scene, rays, hits, .. } = *batch;
-    let mut counts = RayCounts { primary: rays.len() as u64, ..RayCounts::default() };
-    if scene.material == Material::UNLIT {
-        return Ok((hits.iter().map(|hit| hit.color).collect(), counts));
-    }
-    let mut light = vec![Vec3::ZERO; rays.len()];
-    for source in &scene.lights {
-        match source {
-            Light::Sun(sun) => counts.shadow += batch.add_sun(sun, &mut light, progress)?,
-            Light::Sky(sky) => counts.sky += batch.add_sky(sky, &mut light, progress)?,
-            Light::Headlight(strength) => {
-                for ((light, hit), ray) in light.iter_mut().zip(hits).zip(rays) {
-                    *light += strength * hit.normal.dot(-ray.direction).max(0.0);
-                }
-            }
-        }
-    }
-    Ok((hits.iter().zip(light).map(|(hit, light)| hit.color * light).collect(), counts))
+    /// Rays toward each extended light from each receiver.
+    pub n_light: u32,
 }
 
 /// Random dimensions, so that no two uses share numbers.
 const SKY_DIRECTION: u64 = 1;
 const SKY_REACH: u64 = 2;
 const SUN_DIRECTION: u64 = 3;
+const ENVIRONMENT_DIRECTION: u64 = 4;
+const LAMP_PLACE: u64 = 5;
 /// Light rays traced at once, about: bounds their memory however many a hit asks for.
 const LIGHT_RAYS_AT_ONCE: u32 = 1 << 14;
 
-/// A ray toward a light: direction, range, and what it brings if it arrives.
+/// A ray toward a light: direction, range, and what it brings to the viewer if it arrives.
 struct LightRay {
     direction: Vec3,
     reach: f32,
     brings: Vec3,
 }
 
-impl Batch<'_> {
-    fn add_sun(&self, sun: &Sun, light: &mut [Vec3], progress: &dyn Progress) -> Result<u64> {
+impl DirectLight<'_> {
+    /// Adds what falls on `receivers` and goes to the viewer to `light`.
+    pub fn add(
+        &self,
+        receivers: &[Receiver],
+        light: &mut [Vec3],
+        progress: &dyn Progress,
+    ) -> Result<RayCounts> {
+        let mut counts = RayCounts::default();
+        for source in &self.scene.lights {
+            match source {
+                Light::Sun(sun) => {
+                    counts.shadow += self.add_sun(sun, receivers, light, progress)?
+                }
+                Light::Sky(sky) => counts.sky += self.add_sky(sky, receivers, light, progress)?,
+                Light::Environment(environment) => {
+                    counts.sky += self.add_environment(environment, receivers, light, progress)?;
+                }
+                Light::Headlight(strength) => {
+                    for Receiver { shading, to_viewer, diffuse, slot, .. } in receivers {
+                        let cos = shading.normal.dot(*to_viewer).max(0.0);
+                        light[*slot as usize] += strength * cos * diffuse;
+                    }
+                }
+            }
+        }
+        for (lamp_idx, lamp) in self.scene.lamps.iter().enumerate() {
+            counts.shadow += self.add_lamp(lamp_idx as u64, lamp, receivers, light, progress)?;
+        }
+        Ok(counts)
+    }
+
+    fn add_sun(
+        &self,
+        sun: &Sun,
+        receivers: &[Receiver],
+        light: &mut [Vec3],
+        progress: &dyn Progress,
+    ) -> Result<u64> {
         let frame = Frame::around(sun.direction);
         let cos_max = (sun.angular_diameter_deg.to_radians() / 2.0).cos();
         let is_point = sun.angular_diameter_deg <= 0.0;
-        let n_light = if is_point { 1 } else { self.samples.n_light };
-        let sample = |key: u64, index: u32, normal: Vec3| {
+        let n_light = if is_point { 1 } else { self.n_light };
+        let sample = |receiver: &Receiver, index: u32| {
             let direction = if is_point {
                 sun.direction
             } else {
-                let uv = scrambled_pair(index, hash(key ^ SUN_DIRECTION));
+                let uv = scrambled_pair(index, hash(receiver.key ^ SUN_DIRECTION));
                 frame.to_world(uniform_cone(uv, cos_max))
             };
-            let cos = normal.dot(direction);
-            let ray = LightRay { direction, reach: f32::INFINITY, brings: cos * sun.color };
-            (0.0 < cos).then_some(ray)
+            let brings = receiver.throws_back(direction, sun.color)?;
+            Some(LightRay { direction, reach: f32::INFINITY, brings })
         };
-        self.add_light(n_light, sample, light, progress)
+        self.add_light(n_light, sample, receivers, light, progress)
     }
 
-    fn add_sky(&self, sky: &Sky, light: &mut [Vec3], progress: &dyn Progress) -> Result<u64> {
-        let sample = |key: u64, index: u32, normal: Vec3| {
+    fn add_sky(
+        &self,
+        sky: &Sky,
+        receivers: &[Receiver],
+        light: &mut [Vec3],
+        progress: &dyn Progress,
+    ) -> Result<u64> {
+        let sample = |receiver: &Receiver, index: u32| {
+            let key = receiver.key;
             let local = cosine_hemisphere(scrambled_pair(index, hash(key ^ SKY_DIRECTION)));
-            let direction = Frame::around(normal).to_world(local);
+            let direction = Frame::around(receiver.shading.normal).to_world(local);
             // A reach drawn evenly up to the farthest makes an occluder count linearly with its nearness.
             let reach = sky.reach * (1.0 - scrambled_pair(index, hash(key ^ SKY_REACH)).0);
-            Some(LightRay { direction, reach, brings: sky.radiance(direction) })
+            Some(LightRay { direction, reach, brings: sky.radiance(direction) * receiver.diffuse })
         };
-        self.add_light(self.samples.n_light, sample, light, progress)
+        self.add_light(self.n_light, sample, receivers, light, progress)
     }
 
-    /// Asks `sample(pixel key, sample index, normal)` for `n_light` rays from each hit and adds what
-    /// arrives to `light`; returns how many were traced.
+    /// Half of the directions are those of the picture's light, half those that the surface favours; each
+    /// is weighed by how likely either half finds it (balance heuristic, Veach and Guibas 1995).
+    fn add_environment(
+        &self,
+        environment: &Environment,
+        receivers: &[Receiver],
+        light: &mut [Vec3],
+        progress: &dyn Progress,
+    ) -> Result<u64> {
+        let sample = |receiver: &Receiver, index: u32| {
+            let normal = receiver.shading.normal;
+            let (u, v) = scrambled_pair(index, hash(receiver.key ^ ENVIRONMENT_DIRECTION));
+            let direction = if u < 0.5 {
+                environment.sample((2.0 * u, v)).0
+            } else {
+                Frame::around(normal).to_world(cosine_hemisphere((2.0 * u - 1.0, v)))
+            };
+            let cos = normal.dot(direction);
+            if cos <= 0.0 {
+                return None;
+            }
+            let density = 0.5 * environment.pdf(direction) + 0.5 * cos / PI;
+            let brings = environment.radiance(direction) * (cos / PI / density) * receiver.diffuse;
+            Some(LightRay { direction, reach: f32::INFINITY, brings })
+        };
+        self.add_light(self.n_light, sample, receivers, light, progress)
+    }
+
+    fn add_lamp(
+        &self,
+        lamp_idx: u64,
+        lamp: &FlatLamp,
+        receivers: &[Receiver],
+        light: &mut [Vec3],
+        progress: &dyn Progress,
+    ) -> Result<u64> {
+        let n_light = if lamp.radius <= 0.0 { 1 } else { self.n_light };
+        let sample = |receiver: &Receiver, index: u32| {
+            let position = receiver.shading.position;
+            if lamp.kind == LampKind::Directional {
+                let direction = -lamp.direction;
+                let brings = receiver.throws_back(direction, lamp.color)?;
+                return Some(LightRay { direction, reach: f32::INFINITY, brings });
+            }
+            let mut place = lamp.position;
+            if 0.0 < lamp.radius {
+                // The half of the ball that the receiver sees, as it sees it: a disc.
+                let uv =
+                    scrambled_pair(index, hash(receiver.key ^ hash(LAMP_PLACE ^ lamp_idx << 8)));
+                let frame = Frame::around((position - place).normalize_or(Vec3::Z));
+                let (x, y) = disk(uv);
+                place += lamp.radius * (x * frame.tangent + y * frame.bitangent);
+            }
+            let way = place - position;
+            let distance = way.length();
+            let direction = way.try_normalize()?;
+            let strength = lamp.falloff(-direction, distance);
+            if strength <= 0.0 {
+                return None;
+            }
+            let brings = receiver.throws_back(direction, strength * lamp.color)?;
+            Some(LightRay { direction, reach: distance - lamp.radius.min(0.5 * distance), brings })
+        };
+        self.add_light(n_light, sample, receivers, light, progress)
+    }
+
+    /// Asks `sample(receiver, sample index)` for `n_light` rays from each receiver and adds what arrives to
+    /// `light`; returns how many were traced.
     fn add_light(
         &self,
         n_light: u32,
-        sample: impl Fn(u64, u32, Vec3) -> Option<LightRay>,
+        sample: impl Fn(&Receiver, u32) -> Option<LightRay>,
+        receivers: &[Receiver],
         light: &mut [Vec3],
         progress: &dyn Progress,
     ) -> Result<u64> {
         let mut n_rays = 0;
         let share = 1.0 / n_light as f32;
-        let hits_at_once = (LIGHT_RAYS_AT_ONCE / n_light).max(1) as usize;
-        let most = self.hits.len().min(hits_at_once) * n_light as usize;
+        let receivers_at_once = (LIGHT_RAYS_AT_ONCE / n_light).max(1) as usize;
+        let most = receivers.len().min(receivers_at_once) * n_light as usize;
         let (mut rays, mut brings) = (Vec::with_capacity(most), Vec::with_capacity(most));
-        let mut occluded = Vec::with_capacity(most);
-        for first in (0..self.hits.len()).step_by(hits_at_once) {
+        let mut shares = Vec::with_capacity(most);
+        for receivers in receivers.chunks(receivers_at_once) {
             progress.check()?;
             rays.clear();
             brings.clear();
-            for i in first..self.hits.len().min(first + hits_at_once) {
-                let (ray, hit) = (&self.rays[i], &self.hits[i]);
-                if hit.is_miss() {
-                    continue;
-                }
-                let position = ray.at(hit.distance);
+            for receiver in receivers {
                 for n in 0..n_light {
-                    let index = self.samples.indices[i] * n_light + n;
-                    let sampled = sample(self.samples.keys[i], index, hit.normal);
-                    let Some(LightRay { direction, reach, brings: light }) = sampled else {
-                        continue;
-                    };
-                    let surface = self.scene.surface;
-                    let ray = surface.spawn_ray(position, hit.normal, hit.radius, direction);
-                    rays.push(Ray { t_max: reach, ..ray });
-                    brings.push((i, share * light));
+                    let index = receiver.index * n_light + n;
+                    let Some(sampled) = sample(receiver, index) else { continue };
+                    let ray = receiver.shading.spawn(sampled.direction);
+                    rays.push(Ray { t_max: sampled.reach, ..ray });
+                    brings.push((receiver.slot, share * sampled.brings));
                 }
             }
-            occluded.clear();
-            occluded.resize(rays.len(), false);
-            trace::occlusions(self.scene, self.simd, &rays, &mut occluded);
-            for ((i, brings), _) in brings.iter().zip(&occluded).filter(|(_, occluded)| !**occluded)
-            {
-                light[*i] += *brings;
+            shares.clear();
+            shares.resize(rays.len(), Vec3::ZERO);
+            light_through(self.scene, self.simd, &rays, &mut shares);
+            for ((slot, brings), share) in brings.iter().zip(&shares) {
+                light[*slot as usize] += *share * *brings;
             }
             n_rays += rays.len() as u64;
         }
         Ok(n_rays)
+    }
+}
+
+impl Receiver {
+    /// What goes to the viewer of light of this strength from a direction; none from behind.
+    fn throws_back(&self, direction: Vec3, strength: Vec3) -> Option<Vec3> {
+        let normal = self.shading.normal;
+        let cos = normal.dot(direction);
+        if cos <= 0.0 || self.shading.facet.dot(direction) <= 0.0 {
+            return None;
+        }
+        let mut share = self.diffuse;
+        if self.glossy != Vec3::ZERO {
+            let half = (direction + self.to_viewer).normalize_or(normal);
+            let cos_view = normal.dot(self.to_viewer).max(1e-3);
+            // A light of strength 1 brings pi to a surface that faces it.
+            share +=
+                PI * gloss(cos_view, cos, normal.dot(half), self.shading.roughness) * self.glossy;
+        }
+        Some(cos * share * strength)
     }
 }

@@ -158,6 +158,16 @@ impl<F: Floats> Vec3Lanes<F> {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
+    /// Rounded so that swapping both vectors changes nothing but the sign.
+    #[inline(always)]
+    pub fn cross(self, other: Self) -> Self {
+        Self {
+            x: self.y * other.z - self.z * other.y,
+            y: self.z * other.x - self.x * other.z,
+            z: self.x * other.y - self.y * other.x,
+        }
+    }
+
     #[inline(always)]
     pub fn scaled(self, factor: F) -> Self {
         Self { x: self.x * factor, y: self.y * factor, z: self.z * factor }

@@ -3,13 +3,12 @@
 use super::{RenderStats, Renderer, Settings, raster};
 use crate::error::Result;
 use crate::flat::FlatScene;
-use crate::image::{Band, Image, NO_ID};
-use crate::integrator::{self, Batch, RayCounts, Samples};
-use crate::math::{Ray, Vec3, hash, scrambled_pair};
+use crate::image::{Band, Image};
+use crate::integrator::{self, Batch, Integrator, RayCounts, Samples, Whitted};
+use crate::math::{Ray, Vec3, Vec4, hash, scrambled_pair};
 use crate::progress::Progress;
 use crate::scene::View;
-use crate::surface::SurfaceKind;
-use crate::trace::{self, Simd, SurfaceHit};
+use crate::trace::{self, SceneHit, Simd, Which};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -40,7 +39,7 @@ impl Renderer for CpuRenderer {
         settings.check()?;
         let start = Instant::now();
         let view = scene.camera.view(scene.origin, settings.width, settings.height);
-        let (image, mut stats) = if scene.surface == SurfaceKind::Points {
+        let (image, mut stats) = if raster::is_asked_for(scene)? {
             (raster::render(scene, &view, settings, progress)?, RenderStats::default())
         } else {
             self.trace(scene, &view, settings, progress)?
@@ -91,6 +90,12 @@ struct Job<'a> {
     progress: &'a dyn Progress,
 }
 
+/// What is behind the scene in a row of pixels, with alpha.
+fn background(job: &Job, y: u32) -> Vec4 {
+    let height = (y as f32 + 0.5) / job.settings.height as f32;
+    Vec4::from_array(job.scene.background.at(height))
+}
+
 /// Where a tile lies.
 #[derive(Clone, Copy)]
 struct TilePlace {
@@ -130,7 +135,7 @@ impl TilePlace {
 /// A finished tile, its pixels in the order of `TilePlace::pixels`.
 struct Tile {
     place: TilePlace,
-    color: Vec<[f32; 4]>,
+    color: Vec<Vec4>,
     coverage: Vec<f32>,
     layers: Vec<LayerPixel>,
     counts: RayCounts,
@@ -141,16 +146,17 @@ struct Tile {
 struct LayerPixel {
     depth: f32,
     position: Vec3,
-    hit: SurfaceHit,
+    albedo: Vec3,
+    hit: SceneHit,
 }
 
 impl Tile {
     fn render(job: &Job, place: TilePlace) -> Result<Self> {
-        let Job { scene, settings, .. } = *job;
+        let Job { settings, .. } = *job;
         let n = place.n_pixels();
         let mut tile = Self {
             place,
-            color: vec![[0.0; 4]; n],
+            color: vec![Vec4::ZERO; n],
             coverage: vec![0.0; n],
             layers: Vec::new(),
             counts: RayCounts::default(),
@@ -164,12 +170,10 @@ impl Tile {
             tile.add_samples(job, numbers)?;
         }
         for (i, (_, y)) in place.pixels().enumerate() {
-            let behind = scene.background.at((y as f32 + 0.5) / settings.height as f32);
-            for (channel, behind) in tile.color[i].iter_mut().zip(behind) {
-                *channel = *channel / n_samples as f32
-                    + (1.0 - tile.coverage[i] / n_samples as f32) * behind;
-            }
-            tile.coverage[i] /= n_samples as f32;
+            let n_samples = n_samples as f32;
+            tile.coverage[i] /= n_samples;
+            tile.color[i] =
+                tile.color[i] / n_samples + (1.0 - tile.coverage[i]) * background(job, y);
         }
         if settings.with_layers && n_samples > 1 {
             tile.trace_layers(job);
@@ -184,8 +188,10 @@ impl Tile {
         let n = self.color.len() * per_pixel;
         let mut rays = Vec::with_capacity(n);
         let (mut keys, mut indices) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let mut behind = Vec::with_capacity(n);
         for (x, y) in self.place.pixels() {
             let key = hash(settings.seed ^ hash(u64::from(y) << 32 | u64::from(x)));
+            let background = background(job, y);
             for index in numbers.clone() {
                 let (dx, dy) = if settings.samples_per_pixel == 1 {
                     (0.5, 0.5)
@@ -195,25 +201,24 @@ impl Tile {
                 rays.push(view.ray(x as f32 + dx, y as f32 + dy));
                 keys.push(key);
                 indices.push(index);
+                behind.push(background);
             }
         }
         let start = Instant::now();
-        let mut hits = vec![SurfaceHit::MISS; rays.len()];
-        trace::surface_hits(scene, simd, &rays, &mut hits);
+        let mut hits = vec![SceneHit::MISS; rays.len()];
+        trace::scene_hits(scene, simd, Which::All, &rays, &mut hits);
         self.trace_secs += start.elapsed().as_secs_f64();
         if settings.with_layers && settings.samples_per_pixel == 1 {
-            self.keep_layers(view, &rays, &hits);
+            self.keep_layers(job, &rays, &hits);
         }
         let n_light = settings.light_samples.div_ceil(settings.samples_per_pixel);
-        let samples = Samples { keys: &keys, indices: &indices, n_light };
+        let samples = Samples { keys: &keys, indices: &indices, behind: &behind, n_light };
         let batch = Batch { scene, simd, rays: &rays, hits: &hits, samples };
-        let (colors, counts) = integrator::radiance(&batch, progress)?;
-        for (i, color) in colors.iter().enumerate().filter(|(i, _)| !hits[*i].is_miss()) {
-            let pixel = i / per_pixel;
-            for (sum, channel) in self.color[pixel].iter_mut().zip(color.extend(1.0).to_array()) {
-                *sum += channel;
-            }
-            self.coverage[pixel] += 1.0;
+        let integrator = Whitted { max_depth: settings.max_depth };
+        let (colors, counts) = integrator.radiance(&batch, progress)?;
+        for (i, color) in colors.iter().enumerate() {
+            self.color[i / per_pixel] += *color;
+            self.coverage[i / per_pixel] += color.w;
         }
         self.counts += counts;
         Ok(())
@@ -225,18 +230,22 @@ impl Tile {
             .pixels()
             .map(|(x, y)| job.view.ray(x as f32 + 0.5, y as f32 + 0.5))
             .collect();
-        let mut hits = vec![SurfaceHit::MISS; rays.len()];
-        trace::surface_hits(job.scene, job.simd, &rays, &mut hits);
+        let mut hits = vec![SceneHit::MISS; rays.len()];
+        trace::scene_hits(job.scene, job.simd, Which::All, &rays, &mut hits);
         self.counts.primary += rays.len() as u64;
-        self.keep_layers(job.view, &rays, &hits);
+        self.keep_layers(job, &rays, &hits);
     }
 
     /// Takes the layers from the rays through the pixels' centres.
-    fn keep_layers(&mut self, view: &View, rays: &[Ray], hits: &[SurfaceHit]) {
-        let layer = |(ray, hit): (&Ray, &SurfaceHit)| {
-            let position = if hit.is_miss() { Vec3::ZERO } else { ray.at(hit.distance) };
-            let depth = if hit.is_miss() { f32::INFINITY } else { view.depth(position) };
-            LayerPixel { depth, position, hit: *hit }
+    fn keep_layers(&mut self, job: &Job, rays: &[Ray], hits: &[SceneHit]) {
+        let layer = |(ray, hit): (&Ray, &SceneHit)| {
+            if hit.is_miss() {
+                let (depth, nothing) = (f32::INFINITY, Vec3::ZERO);
+                return LayerPixel { depth, position: nothing, albedo: nothing, hit: *hit };
+            }
+            let position = ray.at(hit.distance);
+            let albedo = integrator::albedo(job.scene, ray, hit);
+            LayerPixel { depth: job.view.depth(position), position, albedo, hit: *hit }
         };
         self.layers = rays.iter().zip(hits).map(layer).collect();
     }
@@ -244,16 +253,16 @@ impl Tile {
     fn copy_to(&self, band: &mut Band, width: u32) {
         for (i, (x, y)) in self.place.pixels().enumerate() {
             let pixel = ((y - self.place.y) * width + x) as usize;
-            band.color[pixel] = self.color[i];
+            band.color[pixel] = self.color[i].to_array();
             band.coverage[pixel] = self.coverage[i];
             if let Some(layers) = &mut band.layers {
-                let LayerPixel { depth, position, hit } = &self.layers[i];
+                let LayerPixel { depth, position, albedo, hit } = &self.layers[i];
                 layers.depth[pixel] = *depth;
                 layers.position[pixel] = *position;
                 layers.normal[pixel] = hit.normal;
                 layers.point_id[pixel] = hit.id;
-                layers.instance_id[pixel] = if hit.is_miss() { NO_ID } else { 0 };
-                layers.albedo[pixel] = hit.color;
+                layers.instance_id[pixel] = hit.instance;
+                layers.albedo[pixel] = *albedo;
             }
         }
     }

@@ -20,6 +20,8 @@ pub struct Settings {
     pub samples_per_pixel: u32,
     /// Rays toward the sky, and toward the sun if its shadows are soft, a pixel.
     pub light_samples: u32,
+    /// Reflections and refractions of a ray, at most.
+    pub max_depth: u32,
     pub seed: u64,
     /// Whether the layers beside colour and coverage are wanted.
     pub with_layers: bool,

@@ -53,7 +53,7 @@ pub struct Node {
     pub lamp: Option<Lamp>,
     /// Looks along -Z, with +Y up.
     pub camera: Option<Projection>,
-    /// Whether this node's own parts and lamp are there.
+    /// Whether this node and those below it are there.
     pub is_visible: bool,
     /// Of the morph targets of the parts.
     pub morph_weights: Vec<f32>,
@@ -112,7 +112,28 @@ impl Node {
     }
 }
 
+impl Geometry {
+    /// Object coordinates of the zero of its positions.
+    pub fn origin(&self) -> DVec3 {
+        match self {
+            Self::Points(points) => points.cloud.origin,
+            Self::Triangles(mesh) => mesh.origin,
+        }
+    }
+}
+
 impl Graph {
+    /// One thing of one material, where it is.
+    pub fn of(geometry: Geometry, material: Material) -> Self {
+        let parts = vec![Part { geometry: 0, material: 0 }];
+        Self {
+            geometries: vec![geometry],
+            materials: vec![material],
+            nodes: vec![Node { parts, ..Node::new("") }],
+            ..Self::default()
+        }
+    }
+
     /// Takes `other` in beside what is here; returns the index of its first node.
     pub fn append(&mut self, other: Self) -> usize {
         let (geometry, material) = (self.geometries.len(), self.materials.len());
@@ -134,6 +155,16 @@ impl Graph {
         }));
         self.animation.append(other.animation, node);
         node
+    }
+
+    /// Of each node, whether it and all above it are visible.
+    pub fn visible_nodes(&self) -> Vec<bool> {
+        let mut is_visible: Vec<bool> = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            let is_above = node.parent.is_none_or(|parent| is_visible[parent]);
+            is_visible.push(node.is_visible && is_above);
+        }
+        is_visible
     }
 
     /// From each node's coordinates to the world's.

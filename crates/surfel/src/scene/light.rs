@@ -1,11 +1,14 @@
 //! Lights. A white matte surface facing a light of strength 1 has radiance 1.
 
+use super::environment::Environment;
 use crate::math::Vec3;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Light {
     Sun(Sun),
     Sky(Sky),
+    /// A picture of all that is around.
+    Environment(Environment),
     /// At the camera, without shadows: its strength.
     Headlight(f32),
 }

@@ -120,6 +120,11 @@ impl Material {
     /// The geometry's colours as they are, without light.
     pub const UNLIT: Self = Self { is_unlit: true, ..Self::MATTE };
 
+    /// Whether light may go on through the surface.
+    pub fn is_see_through(&self) -> bool {
+        0.0 < self.transmission || self.alpha_mode != AlphaMode::Opaque
+    }
+
     /// The materials that have names.
     pub const NAMED: [(&'static str, Self); 7] = [
         ("matte", Self::MATTE),

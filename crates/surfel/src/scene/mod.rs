@@ -1,8 +1,9 @@
-//! What an author describes: a cloud, how it is shaped, coloured and lit, and who looks at it.
+//! What an author describes: a graph of geometry, what it is made of, what lights it, and who looks at it.
 
 mod animation;
 mod camera;
 pub mod color;
+mod environment;
 mod framing;
 mod graph;
 mod light;
@@ -13,26 +14,20 @@ mod texture;
 
 pub use animation::{Animation, Channel, Interpolation, Keys, Track, Value};
 pub use camera::{Camera, Projection, View};
+pub use environment::Environment;
 pub use framing::{Framing, frame, look_around, upright, usual_bounds};
 pub use graph::{Geometry, Graph, Joint, Node, Part, Points, Transform};
 pub use light::{Lamp, LampKind, Light, Sky, Sun};
 pub use material::{AlphaMode, Material, Textures};
 pub use mesh::{Mesh, Morph, Skin};
-pub use texture::{Texture, TextureRef, Wrap};
+pub use texture::{Encoding, Texture, TextureRef, Wrap};
 
 use crate::math::Vec3;
-use crate::points::PointCloud;
-use crate::surface::{Boundary, SurfaceKind};
 
-/// One picture's worth of world: right-handed, Z up, in the cloud's unit.
+/// One picture's worth of world: right-handed, Z up, in the unit of its clouds.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    pub cloud: PointCloud,
-    pub surface: SurfaceKind,
-    pub boundary: Boundary,
-    /// One a point, sRGB-encoded.
-    pub colors: Vec<[u8; 3]>,
-    pub material: Material,
+    pub graph: Graph,
     pub lights: Vec<Light>,
     pub background: Background,
     pub camera: Camera,

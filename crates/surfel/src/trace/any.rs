@@ -1,12 +1,12 @@
 //! Whether any shape lies in each ray's range, each point on its own.
 
-use super::block::{BlockForPacket, BlockHits};
+use super::block::{BeforePacket, BlockHits, Leaf};
 use super::flight::{RayVisitor, fly};
 use super::hit::Hit;
 use super::packet::{Packet, PacketStack, PacketVisitor, WideRays, along_packet};
-use crate::flat::{FlatPoints, FlatScene, Slot};
+use crate::flat::{BlockTree, FlatCloud, FlatTriangles, Slot};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, WIDE, Wide};
-use crate::surface::{Disc, Shape, Sphere};
+use crate::surface::{Disc, Sphere, Triangle};
 use std::marker::PhantomData;
 use std::ops::ControlFlow;
 
@@ -42,17 +42,27 @@ impl Judge for Lenient {
 }
 
 #[inline(always)]
-pub(super) fn any_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &mut [bool]) {
-    if scene.surface.is_oriented() {
-        any_that_counts::<L, Disc, _>(&scene.points, rays, Lenient, occluded);
+pub(super) fn any_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [bool]) {
+    if cloud.surface.is_oriented() {
+        any_that_counts::<L, Disc, _>(&cloud.points, rays, Lenient, occluded);
     } else {
-        any_that_counts::<L, Sphere, _>(&scene.points, rays, Lenient, occluded);
+        any_that_counts::<L, Sphere, _>(&cloud.points, rays, Lenient, occluded);
     }
 }
 
+/// Whether any triangle lies in each ray's range.
 #[inline(always)]
-pub(super) fn any_that_counts<L: Lanes, S: Shape, J: Judge>(
-    points: &FlatPoints,
+pub(super) fn any_triangles<L: Lanes>(
+    triangles: &FlatTriangles,
+    rays: &[Ray],
+    occluded: &mut [bool],
+) {
+    any_that_counts::<L, Triangle, _>(triangles, rays, Lenient, occluded);
+}
+
+#[inline(always)]
+pub(super) fn any_that_counts<L: Lanes, S: Leaf, J: Judge>(
+    tree: &S::Tree,
     rays: &[Ray],
     judge: J,
     occluded: &mut [bool],
@@ -61,9 +71,9 @@ pub(super) fn any_that_counts<L: Lanes, S: Shape, J: Judge>(
     let mut loose = Vec::with_capacity(rays.len());
     let mut indices = Vec::with_capacity(rays.len());
     for (first, rays) in rays.chunks(WIDE).enumerate() {
-        if let Some(packet) = Packet::new(&points.nodes[0], rays, true) {
+        if let Some(packet) = Packet::new(&tree.nodes()[0], rays, true) {
             let occluded = &mut occluded[first * WIDE..][..rays.len()];
-            any_in_packet::<L, S, J>(points, &packet, judge, &mut stack, occluded);
+            any_in_packet::<L, S, J>(tree, &packet, judge, &mut stack, occluded);
             continue;
         }
         for (lane, ray) in rays.iter().enumerate() {
@@ -71,7 +81,7 @@ pub(super) fn any_that_counts<L: Lanes, S: Shape, J: Judge>(
             indices.push(first * WIDE + lane);
         }
     }
-    fly::<L, _>(points, &mut loose);
+    fly::<L, _>(tree, &mut loose);
     for (ray_idx, any) in indices.into_iter().zip(loose) {
         occluded[ray_idx] = any.is_hit;
     }
@@ -84,7 +94,8 @@ struct Any<'r, S, J> {
     is_hit: bool,
 }
 
-impl<S: Shape, J: Judge> RayVisitor for Any<'_, S, J> {
+impl<S: Leaf, J: Judge> RayVisitor for Any<'_, S, J> {
+    type Tree = S::Tree;
     const IS_ORDERED: bool = false;
 
     #[inline(always)]
@@ -98,8 +109,8 @@ impl<S: Shape, J: Judge> RayVisitor for Any<'_, S, J> {
     }
 
     #[inline(always)]
-    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let hits = BlockHits::<L>::find::<S>(points, block_idx, self.ray);
+    fn visit<L: Lanes>(&mut self, tree: &S::Tree, block_idx: u32) -> ControlFlow<()> {
+        let hits = S::hits::<L>(tree, block_idx, self.ray);
         if J::IS_LENIENT {
             self.is_hit = hits.lanes(self.ray.t_max) != 0;
         } else {
@@ -121,8 +132,8 @@ fn has_counting<L: Lanes, J: Judge>(hits: &BlockHits<L>, ray: &Ray, limit: f32, 
 }
 
 #[inline(always)]
-fn any_in_packet<L: Lanes, S: Shape, J: Judge>(
-    points: &FlatPoints,
+fn any_in_packet<L: Lanes, S: Leaf, J: Judge>(
+    tree: &S::Tree,
     packet: &Packet<L::Wide>,
     judge: J,
     stack: &mut PacketStack,
@@ -130,7 +141,7 @@ fn any_in_packet<L: Lanes, S: Shape, J: Judge>(
 ) {
     let limits = packet.limits();
     let mut any = AnyInPacket::<L, S, J> { packet, judge, shape: PhantomData, limits, is_hit: 0 };
-    along_packet::<L, false>(points, packet, stack, &mut any);
+    along_packet::<L, _, false>(tree, packet, stack, &mut any);
     for (lane, occluded) in occluded.iter_mut().enumerate() {
         *occluded = any.is_hit >> lane & 1 == 1;
     }
@@ -145,7 +156,7 @@ struct AnyInPacket<'p, L: Lanes, S, J> {
     is_hit: u32,
 }
 
-impl<L: Lanes, S: Shape, J: Judge> AnyInPacket<'_, L, S, J> {
+impl<L: Lanes, S: Leaf, J: Judge> AnyInPacket<'_, L, S, J> {
     /// The rays in these lanes need nothing more.
     #[inline(always)]
     fn block(&mut self, mut lanes: u32) {
@@ -158,12 +169,12 @@ impl<L: Lanes, S: Shape, J: Judge> AnyInPacket<'_, L, S, J> {
 
     /// Judges one hit of each ray at a time: to judge many at once costs little more than one.
     #[inline(always)]
-    fn visit_with_judge(&mut self, block: &BlockForPacket<L>, block_idx: u32) {
+    fn visit_with_judge(&mut self, block: &S::BeforePacket<L>, block_idx: u32) {
         let limits = L::Wide::load(&self.limits);
         let mut found = [([0.0; WIDE], 0); LANES];
         let mut open = 0;
         for (lane, found) in found.iter_mut().enumerate() {
-            let (distance, mask) = block.intersect::<S>(lane);
+            let (distance, mask) = block.intersect(lane);
             let lanes = (mask & distance.less_equal(limits)).bits();
             *found = (distance.store(), lanes);
             open |= lanes;
@@ -192,15 +203,17 @@ impl<L: Lanes, S: Shape, J: Judge> AnyInPacket<'_, L, S, J> {
     }
 }
 
-impl<L: Lanes, S: Shape, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> {
+impl<L: Lanes, S: Leaf, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> {
+    type Tree = S::Tree;
+
     #[inline(always)]
     fn limits(&self) -> &[f32; WIDE] {
         &self.limits
     }
 
     #[inline(always)]
-    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let block = BlockForPacket::<L>::new(&points.blocks[block_idx as usize], self.packet);
+    fn visit(&mut self, tree: &S::Tree, block_idx: u32) {
+        let block = S::before_packet::<L>(tree, block_idx, self.packet);
         if !J::IS_LENIENT {
             self.visit_with_judge(&block, block_idx);
             return;
@@ -208,7 +221,7 @@ impl<L: Lanes, S: Shape, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J>
         let mut limits = L::Wide::load(&self.limits);
         let blocked = L::Wide::splat(f32::NEG_INFINITY);
         for lane in 0..LANES {
-            let (distance, mask) = block.intersect::<S>(lane);
+            let (distance, mask) = block.intersect(lane);
             let hits = mask & distance.less_equal(limits);
             self.is_hit |= hits.bits();
             limits = L::Wide::select(hits, blocked, limits);
@@ -217,9 +230,9 @@ impl<L: Lanes, S: Shape, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J>
     }
 
     #[inline(always)]
-    fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
+    fn visit_alone(&mut self, tree: &S::Tree, block_idx: u32, lane: usize) {
         let (ray, limit) = (&self.packet.rays[lane], self.limits[lane]);
-        let hits = BlockHits::<L>::find::<S>(points, block_idx, ray);
+        let hits = S::hits::<L>(tree, block_idx, ray);
         if has_counting::<L, J>(&hits, ray, limit, self.judge) {
             self.block(1 << lane);
         }

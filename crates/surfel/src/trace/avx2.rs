@@ -6,28 +6,30 @@ use super::hit::{Gather, Hit};
 use super::splat::{self, Splat};
 use super::surface::{self, SurfaceHit};
 use super::{any, closest, gather};
-use crate::flat::FlatScene;
+use crate::flat::{FlatCloud, FlatTriangles};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Pair, Ray, Task, Wide};
 use std::arch::x86_64::*;
 use std::marker::PhantomData;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 macro_rules! kernel {
-    ($module:ident::$name:ident($result:ty)) => {
+    ($module:ident::$name:ident($from:ty => $result:ty)) => {
         /// The batch kernel of the same name.
         #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-        pub(super) fn $name(scene: &FlatScene, rays: &[Ray], results: &mut [$result]) {
-            $module::$name::<Eight<Avx2>>(scene, rays, results);
+        pub(super) fn $name(from: &$from, rays: &[Ray], results: &mut [$result]) {
+            $module::$name::<Eight<Avx2>>(from, rays, results);
         }
     };
 }
 
-kernel!(closest::closest_hits(Hit));
-kernel!(any::any_hits(bool));
-kernel!(gather::gathers(Gather));
-kernel!(splat::splats(Splat));
-kernel!(surface::surface_hits(SurfaceHit));
-kernel!(surface::occlusions(bool));
+kernel!(closest::closest_hits(FlatCloud => Hit));
+kernel!(any::any_hits(FlatCloud => bool));
+kernel!(gather::gathers(FlatCloud => Gather));
+kernel!(splat::splats(FlatCloud => Splat));
+kernel!(surface::surface_hits(FlatCloud => SurfaceHit));
+kernel!(surface::occlusions(FlatCloud => bool));
+kernel!(closest::closest_triangles(FlatTriangles => Hit));
+kernel!(any::any_triangles(FlatTriangles => bool));
 
 macro_rules! avx2 {
     ($wrap:ident($($call:tt)*)) => {

@@ -1,12 +1,35 @@
-//! The points of a block: eight before one ray, or one after the other before sixteen rays.
+//! The shapes of a block: eight before one ray, or one after the other before sixteen rays.
 
 use super::hit::Hit;
 use super::packet::Packet;
-use crate::flat::{FlatPoints, PointBlock, Slot};
+use crate::flat::{BlockTree, FlatPoints, FlatTriangles, PointBlock, Slot, TriangleBlock};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3Lanes};
-use crate::surface::{PointLanes, RayLanes, Shape};
+use crate::surface::{PointLanes, RayLanes, Shape, Triangle, TriangleLanes};
+use std::marker::PhantomData;
 
-/// Where one ray meets the points of one block.
+/// What stands in the leaves of a tree.
+pub trait Leaf {
+    type Tree: BlockTree;
+    type BeforePacket<L: Lanes>: BeforePacket<L>;
+
+    /// A block's shapes before one ray.
+    fn hits<L: Lanes>(tree: &Self::Tree, block_idx: u32, ray: &Ray) -> BlockHits<L>;
+
+    /// A block made ready for the rays of a packet.
+    fn before_packet<L: Lanes>(
+        tree: &Self::Tree,
+        block_idx: u32,
+        packet: &Packet<L::Wide>,
+    ) -> Self::BeforePacket<L>;
+}
+
+/// A block before sixteen rays.
+pub trait BeforePacket<L: Lanes> {
+    /// Where all rays meet the shape in `lane`.
+    fn intersect(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask);
+}
+
+/// Where one ray meets the shapes of one block.
 pub struct BlockHits<L: Floats> {
     first_slot: Slot,
     distances: L,
@@ -15,13 +38,6 @@ pub struct BlockHits<L: Floats> {
 }
 
 impl<L: Lanes> BlockHits<L> {
-    #[inline(always)]
-    pub fn find<S: Shape>(points: &FlatPoints, block_idx: u32, ray: &Ray) -> Self {
-        let lanes = points.blocks[block_idx as usize].points::<L>(ray.origin);
-        let (distances, is_hit) = S::intersect(&lanes, &RayLanes::<L>::new(ray));
-        Self { first_slot: block_idx * LANES as u32, distances, radii: lanes.radius, is_hit }
-    }
-
     /// The lanes that are hit up to `t_max`.
     #[inline(always)]
     pub fn lanes(&self, t_max: f32) -> u32 {
@@ -72,8 +88,30 @@ impl HitList {
     }
 }
 
-/// A block made ready for the rays of a packet.
-pub struct BlockForPacket<L: Lanes> {
+impl<S: Shape> Leaf for S {
+    type Tree = FlatPoints;
+    type BeforePacket<L: Lanes> = PointsBeforePacket<L, S>;
+
+    #[inline(always)]
+    fn hits<L: Lanes>(points: &FlatPoints, block_idx: u32, ray: &Ray) -> BlockHits<L> {
+        let lanes = points.blocks[block_idx as usize].points::<L>(ray.origin);
+        let (distances, is_hit) = S::intersect(&lanes, &RayLanes::<L>::new(ray));
+        BlockHits { first_slot: block_idx * LANES as u32, distances, radii: lanes.radius, is_hit }
+    }
+
+    #[inline(always)]
+    fn before_packet<L: Lanes>(
+        points: &FlatPoints,
+        block_idx: u32,
+        packet: &Packet<L::Wide>,
+    ) -> PointsBeforePacket<L, S> {
+        PointsBeforePacket::new(&points.blocks[block_idx as usize], packet)
+    }
+}
+
+/// Points as sixteen rays meet them.
+pub struct PointsBeforePacket<L: Lanes, S> {
+    shape: PhantomData<S>,
     corner: Vec3Lanes<L::Wide>,
     rays: RayLanes<L::Wide>,
     offset: [[f32; LANES]; 3],
@@ -81,18 +119,14 @@ pub struct BlockForPacket<L: Lanes> {
     radius: [f32; LANES],
 }
 
-impl<L: Lanes> BlockForPacket<L> {
+impl<L: Lanes, S> PointsBeforePacket<L, S> {
     #[inline(always)]
-    pub fn new(block: &PointBlock, packet: &Packet<L::Wide>) -> Self {
+    fn new(block: &PointBlock, packet: &Packet<L::Wide>) -> Self {
         let (offset, normal) = (block.offsets::<L>(), block.normals::<L>());
-        let [x, y, z] = packet.wide.origin;
-        let [to_x, to_y, to_z] = packet.wide.direction;
         Self {
-            corner: Vec3Lanes::splat(block.corner()).minus(Vec3Lanes { x, y, z }),
-            rays: RayLanes {
-                direction: Vec3Lanes { x: to_x, y: to_y, z: to_z },
-                t_min: packet.wide.t_min,
-            },
+            shape: PhantomData,
+            corner: Vec3Lanes::splat(block.corner()).minus(packet.wide.origin()),
+            rays: packet.wide.lanes(),
             offset: [offset.x.store(), offset.y.store(), offset.z.store()],
             normal: [normal.x.store(), normal.y.store(), normal.z.store()],
             radius: block.radii::<L>().store(),
@@ -102,16 +136,60 @@ impl<L: Lanes> BlockForPacket<L> {
     pub fn radius(&self, lane: usize) -> f32 {
         self.radius[lane]
     }
+}
 
-    /// The point in `lane` before all rays.
+impl<L: Lanes, S: Shape> BeforePacket<L> for PointsBeforePacket<L, S> {
     #[inline(always)]
-    pub fn intersect<S: Shape>(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask) {
+    fn intersect(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask) {
         let point = PointLanes {
             center: self.corner.plus(splat(&self.offset, lane)),
             normal: splat(&self.normal, lane),
             radius: L::Wide::splat(self.radius[lane]),
         };
         S::intersect(&point, &self.rays)
+    }
+}
+
+impl Leaf for Triangle {
+    type Tree = FlatTriangles;
+    type BeforePacket<L: Lanes> = TrianglesBeforePacket<L>;
+
+    #[inline(always)]
+    fn hits<L: Lanes>(triangles: &FlatTriangles, block_idx: u32, ray: &Ray) -> BlockHits<L> {
+        let origin = Vec3Lanes::splat(ray.origin);
+        let corners = triangles.blocks[block_idx as usize].corners::<L>();
+        let lanes = TriangleLanes { corners: corners.map(|corner| corner.minus(origin)) };
+        let (distances, is_hit) = lanes.intersect(&RayLanes::<L>::new(ray));
+        let first_slot = block_idx * LANES as u32;
+        BlockHits { first_slot, distances, radii: L::splat(0.0), is_hit }
+    }
+
+    #[inline(always)]
+    fn before_packet<L: Lanes>(
+        triangles: &FlatTriangles,
+        block_idx: u32,
+        packet: &Packet<L::Wide>,
+    ) -> TrianglesBeforePacket<L> {
+        TrianglesBeforePacket {
+            block: triangles.blocks[block_idx as usize],
+            origin: packet.wide.origin(),
+            rays: packet.wide.lanes(),
+        }
+    }
+}
+
+/// Triangles as sixteen rays meet them.
+pub struct TrianglesBeforePacket<L: Lanes> {
+    block: TriangleBlock,
+    origin: Vec3Lanes<L::Wide>,
+    rays: RayLanes<L::Wide>,
+}
+
+impl<L: Lanes> BeforePacket<L> for TrianglesBeforePacket<L> {
+    #[inline(always)]
+    fn intersect(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask) {
+        let corner = |i: usize| splat(&self.block.corners[i], lane).minus(self.origin);
+        TriangleLanes { corners: [corner(0), corner(1), corner(2)] }.intersect(&self.rays)
     }
 }
 

@@ -1,33 +1,43 @@
 //! The nearest shape on each ray, each point on its own.
 
-use super::block::{BlockForPacket, BlockHits};
+use super::block::{BeforePacket, Leaf};
 use super::flight::{RayVisitor, fly};
 use super::hit::Hit;
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
-use crate::flat::{FlatPoints, FlatScene};
+use crate::flat::{BlockTree, FlatCloud, FlatTriangles};
 use crate::math::{Floats, LANES, Lanes, Ray, WIDE, Wide};
-use crate::surface::{Disc, Shape, Sphere};
+use crate::surface::{Disc, Sphere, Triangle};
 use std::marker::PhantomData;
 use std::ops::ControlFlow;
 
 #[inline(always)]
-pub(super) fn closest_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [Hit]) {
-    if scene.surface.is_oriented() {
-        closest_of_shape::<L, Disc>(&scene.points, rays, hits);
+pub(super) fn closest_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [Hit]) {
+    if cloud.surface.is_oriented() {
+        closest_of_shape::<L, Disc>(&cloud.points, rays, hits);
     } else {
-        closest_of_shape::<L, Sphere>(&scene.points, rays, hits);
+        closest_of_shape::<L, Sphere>(&cloud.points, rays, hits);
     }
 }
 
+/// The nearest triangle on each ray.
 #[inline(always)]
-fn closest_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], hits: &mut [Hit]) {
+pub(super) fn closest_triangles<L: Lanes>(
+    triangles: &FlatTriangles,
+    rays: &[Ray],
+    hits: &mut [Hit],
+) {
+    closest_of_shape::<L, Triangle>(triangles, rays, hits);
+}
+
+#[inline(always)]
+fn closest_of_shape<L: Lanes, S: Leaf>(tree: &S::Tree, rays: &[Ray], hits: &mut [Hit]) {
     let mut stack = PacketStack::new();
     let mut loose = Vec::with_capacity(rays.len());
     let mut indices = Vec::with_capacity(rays.len());
     for (first, rays) in rays.chunks(WIDE).enumerate() {
-        if let Some(packet) = Packet::new(&points.nodes[0], rays, false) {
+        if let Some(packet) = Packet::new(&tree.nodes()[0], rays, false) {
             let hits = &mut hits[first * WIDE..][..rays.len()];
-            closest_in_packet::<L, S>(points, &packet, &mut stack, hits);
+            closest_in_packet::<L, S>(tree, &packet, &mut stack, hits);
             continue;
         }
         for (lane, ray) in rays.iter().enumerate() {
@@ -36,7 +46,7 @@ fn closest_of_shape<L: Lanes, S: Shape>(points: &FlatPoints, rays: &[Ray], hits:
             indices.push(first * WIDE + lane);
         }
     }
-    fly::<L, _>(points, &mut loose);
+    fly::<L, _>(tree, &mut loose);
     for (ray_idx, Closest { hit, .. }) in indices.into_iter().zip(loose) {
         hits[ray_idx] = if hit.is_miss() { Hit::MISS } else { hit };
     }
@@ -55,7 +65,8 @@ impl<'r, S> Closest<'r, S> {
     }
 }
 
-impl<S: Shape> RayVisitor for Closest<'_, S> {
+impl<S: Leaf> RayVisitor for Closest<'_, S> {
+    type Tree = S::Tree;
     const IS_ORDERED: bool = true;
 
     #[inline(always)]
@@ -69,16 +80,16 @@ impl<S: Shape> RayVisitor for Closest<'_, S> {
     }
 
     #[inline(always)]
-    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let hit = BlockHits::<L>::find::<S>(points, block_idx, self.ray).nearest();
+    fn visit<L: Lanes>(&mut self, tree: &S::Tree, block_idx: u32) -> ControlFlow<()> {
+        let hit = S::hits::<L>(tree, block_idx, self.ray).nearest();
         self.hit = hit.nearer(self.hit);
         ControlFlow::Continue(())
     }
 }
 
 #[inline(always)]
-fn closest_in_packet<L: Lanes, S: Shape>(
-    points: &FlatPoints,
+fn closest_in_packet<L: Lanes, S: Leaf>(
+    tree: &S::Tree,
     packet: &Packet<L::Wide>,
     stack: &mut PacketStack,
     hits: &mut [Hit],
@@ -89,7 +100,7 @@ fn closest_in_packet<L: Lanes, S: Shape>(
         distances: packet.limits(),
         slots: [f32::from_bits(Hit::MISS.slot); WIDE],
     };
-    along_packet::<L, true>(points, packet, stack, &mut closest);
+    along_packet::<L, _, true>(tree, packet, stack, &mut closest);
     for (lane, hit) in hits.iter_mut().enumerate() {
         let found =
             Hit { distance: closest.distances[lane] + 0.0, slot: closest.slots[lane].to_bits() };
@@ -105,21 +116,23 @@ struct ClosestInPacket<'p, L: Lanes, S> {
     slots: [f32; WIDE],
 }
 
-impl<L: Lanes, S: Shape> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
+impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
+    type Tree = S::Tree;
+
     #[inline(always)]
     fn limits(&self) -> &[f32; WIDE] {
         &self.distances
     }
 
     #[inline(always)]
-    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let block = BlockForPacket::<L>::new(&points.blocks[block_idx as usize], self.packet);
+    fn visit(&mut self, tree: &S::Tree, block_idx: u32) {
+        let block = S::before_packet::<L>(tree, block_idx, self.packet);
         let mut distances = L::Wide::load(&self.distances);
         let mut slots = L::Wide::load(&self.slots);
         // No branch: whether a disc is hit cannot be foretold, and on a plane all are equally near.
         for lane in 0..LANES {
             let slot = L::Wide::splat(f32::from_bits(block_idx * LANES as u32 + lane as u32));
-            let (distance, mask) = block.intersect::<S>(lane);
+            let (distance, mask) = block.intersect(lane);
             let is_first = distance.less(distances) | slot.less_bits(slots);
             let closer = mask & distance.less_equal(distances) & is_first;
             slots = L::Wide::select(closer, slot, slots);
@@ -130,10 +143,10 @@ impl<L: Lanes, S: Shape> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
     }
 
     #[inline(always)]
-    fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
+    fn visit_alone(&mut self, tree: &S::Tree, block_idx: u32, lane: usize) {
         let ray = &self.packet.rays[lane];
         let hit = Hit { distance: self.distances[lane] + 0.0, slot: self.slots[lane].to_bits() };
-        let hit = BlockHits::<L>::find::<S>(points, block_idx, ray).nearest().nearer(hit);
+        let hit = S::hits::<L>(tree, block_idx, ray).nearest().nearer(hit);
         self.distances[lane] = hit.distance;
         self.slots[lane] = f32::from_bits(hit.slot);
     }

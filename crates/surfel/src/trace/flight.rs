@@ -6,13 +6,15 @@
 use super::memory::Memory;
 use super::node::{BoxRay, ray_entries};
 use crate::bvh::{Child, STACK_SIZE};
-use crate::flat::FlatPoints;
+use crate::flat::BlockTree;
 use crate::math::{LANES, LaneMask, Lanes, Ray};
 use std::hint::select_unpredictable;
 use std::ops::ControlFlow;
 
 /// Looks at the blocks that a ray comes by.
 pub trait RayVisitor {
+    type Tree: BlockTree;
+
     /// Whether near blocks are better seen first.
     const IS_ORDERED: bool;
 
@@ -21,7 +23,7 @@ pub trait RayVisitor {
     /// Boxes entered beyond this distance are left out.
     fn limit(&self) -> f32;
 
-    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()>;
+    fn visit<L: Lanes>(&mut self, tree: &Self::Tree, block_idx: u32) -> ControlFlow<()>;
 }
 
 /// Rays on the way at a time: enough to hide a read from memory, few enough for the first cache.
@@ -90,19 +92,19 @@ fn pop(flyers: &mut u32) -> Option<usize> {
 /// Lets each of `visitors` see every block whose box its ray enters before its limit, near boxes first if
 /// they ask for that.
 #[inline(always)]
-pub fn fly<L: Lanes, V: RayVisitor>(points: &FlatPoints, visitors: &mut [V]) {
+pub fn fly<L: Lanes, V: RayVisitor>(tree: &V::Tree, visitors: &mut [V]) {
     let Some(first) = visitors.first() else { return };
     let root = f32::from_bits(ROOT);
     let waiting = Waiting { children: [root; ROOM], entries: [0.0; ROOM] };
     let mut flyers = [Flyer {
-        ray: BoxRay::new(&points.nodes[0], first.ray()),
+        ray: BoxRay::new(&tree.nodes()[0], first.ray()),
         visitor_idx: 0,
         limit: 0.0,
         next: ROOT,
         n_waiting: 0,
         waiting,
     }; IN_FLIGHT];
-    let memory = Memory::new(points);
+    let memory = Memory::new(tree);
     let mut n_started = 0;
     let mut steps = Steps { at_blocks: 0, done: u32::MAX };
     loop {
@@ -110,7 +112,7 @@ pub fn fly<L: Lanes, V: RayVisitor>(points: &FlatPoints, visitors: &mut [V]) {
         while n_started < visitors.len()
             && let Some(flyer_idx) = pop(&mut done)
         {
-            flyers[flyer_idx].start(points, n_started, &visitors[n_started]);
+            flyers[flyer_idx].start(tree, n_started, &visitors[n_started]);
             n_started += 1;
         }
         steps.done = done;
@@ -121,7 +123,7 @@ pub fn fly<L: Lanes, V: RayVisitor>(points: &FlatPoints, visitors: &mut [V]) {
             let mut at_nodes = steps.at_nodes();
             while let Some(flyer_idx) = pop(&mut at_nodes) {
                 let flyer = &mut flyers[flyer_idx];
-                flyer.enter::<L, V>(points);
+                flyer.enter::<L, V>(tree);
                 flyer.go_on::<L>(&memory);
                 steps.add(flyer_idx, flyer.next);
             }
@@ -134,7 +136,7 @@ pub fn fly<L: Lanes, V: RayVisitor>(points: &FlatPoints, visitors: &mut [V]) {
             let flyer = &mut flyers[flyer_idx];
             let visitor = &mut visitors[flyer.visitor_idx as usize];
             let block_idx = flyer.next & !Child::BLOCK_BIT;
-            let goes_on = visitor.visit::<L>(points, block_idx).is_continue();
+            let goes_on = visitor.visit::<L>(tree, block_idx).is_continue();
             // As whether something is hit cannot be foretold either.
             flyer.n_waiting = select_unpredictable(goes_on, flyer.n_waiting, 1);
             flyer.limit = visitor.limit();
@@ -151,8 +153,8 @@ const ROOT: u32 = 0;
 
 impl Flyer {
     #[inline(always)]
-    fn start(&mut self, points: &FlatPoints, visitor_idx: usize, visitor: &impl RayVisitor) {
-        self.ray = BoxRay::new(&points.nodes[0], visitor.ray());
+    fn start<V: RayVisitor>(&mut self, tree: &V::Tree, visitor_idx: usize, visitor: &V) {
+        self.ray = BoxRay::new(&tree.nodes()[0], visitor.ray());
         self.limit = visitor.limit();
         self.visitor_idx = visitor_idx as u32;
         self.next = ROOT;
@@ -161,8 +163,8 @@ impl Flyer {
 
     /// Lets those children of the next node wait that the ray enters.
     #[inline(always)]
-    fn enter<L: Lanes, V: RayVisitor>(&mut self, points: &FlatPoints) {
-        let node = &points.nodes[self.next as usize];
+    fn enter<L: Lanes, V: RayVisitor>(&mut self, tree: &V::Tree) {
+        let node = &tree.nodes()[self.next as usize];
         let (lanes, entries) = ray_entries::<L>(node, &self.ray, self.limit);
         let children = node.packed_children::<L>();
         let top = (self.n_waiting as usize).min(STACK_SIZE - LANES);

@@ -1,23 +1,23 @@
 //! The nearest shapes on each ray, all within a radius of each other.
 
-use super::block::{BlockForPacket, BlockHits};
+use super::block::{BeforePacket, Leaf};
 use super::flight::{RayVisitor, fly};
 use super::hit::{Gather, Hit};
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
 use super::sightings::{Sighting, settle};
-use crate::flat::{FlatPoints, FlatScene};
+use crate::flat::{FlatCloud, FlatPoints};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, WIDE, Wide};
 use crate::surface::{Disc, gather_limit};
 use std::ops::ControlFlow;
 
 /// Discs only: spheres do not blend.
 #[inline(always)]
-pub(super) fn gathers<L: Lanes>(scene: &FlatScene, rays: &[Ray], gathers: &mut [Gather]) {
+pub(super) fn gathers<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], gathers: &mut [Gather]) {
     let mut stack = PacketStack::new();
     let mut sightings = Vec::new();
     for (rays, gathers) in rays.chunks(WIDE).zip(gathers.chunks_mut(WIDE)) {
         sightings.clear();
-        let limits = gather::<L>(&scene.points, rays, &mut stack, &mut sightings);
+        let limits = gather::<L>(&cloud.points, rays, &mut stack, &mut sightings);
         settle::<L::Wide>(&mut sightings, &limits);
         for (lane, gather) in gathers.iter_mut().enumerate() {
             *gather = gather_of_lane(&sightings, lane);
@@ -36,7 +36,7 @@ pub(super) fn gather<L: Lanes>(
     if let Some(packet) = Packet::new(&points.nodes[0], rays, false) {
         let mut gathering =
             GatherInPacket::<L> { packet: &packet, limits: packet.limits(), sightings };
-        along_packet::<L, true>(points, &packet, stack, &mut gathering);
+        along_packet::<L, _, true>(points, &packet, stack, &mut gathering);
         return gathering.limits;
     }
     let mut gatherings = [Gathering::new(&rays[0]); WIDE];
@@ -78,6 +78,7 @@ impl<'r> Gathering<'r> {
 }
 
 impl RayVisitor for Gathering<'_> {
+    type Tree = FlatPoints;
     const IS_ORDERED: bool = true;
 
     #[inline(always)]
@@ -92,7 +93,7 @@ impl RayVisitor for Gathering<'_> {
 
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let hits = BlockHits::<L>::find::<Disc>(points, block_idx, self.ray);
+        let hits = Disc::hits::<L>(points, block_idx, self.ray);
         let mut hits = hits.up_to(self.limit());
         while let Some((hit, radius)) = hits.next() {
             if hit.distance <= self.limit {
@@ -113,6 +114,8 @@ struct GatherInPacket<'p, L: Lanes> {
 }
 
 impl<L: Lanes> PacketVisitor<L> for GatherInPacket<'_, L> {
+    type Tree = FlatPoints;
+
     #[inline(always)]
     fn limits(&self) -> &[f32; WIDE] {
         &self.limits
@@ -120,13 +123,13 @@ impl<L: Lanes> PacketVisitor<L> for GatherInPacket<'_, L> {
 
     #[inline(always)]
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let block = BlockForPacket::<L>::new(&points.blocks[block_idx as usize], self.packet);
+        let block = Disc::before_packet::<L>(points, block_idx, self.packet);
         let mut limits = L::Wide::load(&self.limits);
         let mut end = self.sightings.len();
         self.sightings.resize(end + LANES, Sighting::NONE);
         // No branch: whether a disc is hit cannot be foretold.
         for lane in 0..LANES {
-            let (distance, mask) = block.intersect::<Disc>(lane);
+            let (distance, mask) = block.intersect(lane);
             let is_hit = mask & distance.less_equal(limits);
             let limit = gather_limit(distance, L::Wide::splat(block.radius(lane)));
             limits = L::Wide::select(is_hit, limit.min(limits), limits);
@@ -144,7 +147,7 @@ impl<L: Lanes> PacketVisitor<L> for GatherInPacket<'_, L> {
     #[inline(always)]
     fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
         let ray = &self.packet.rays[lane];
-        let hits = BlockHits::<L>::find::<Disc>(points, block_idx, ray);
+        let hits = Disc::hits::<L>(points, block_idx, ray);
         let mut hits = hits.up_to(self.limits[lane]);
         while let Some((hit, radius)) = hits.next() {
             self.limits[lane] = self.limits[lane].min(gather_limit(hit.distance, radius));

@@ -1,7 +1,7 @@
 //! Asking for nodes and blocks before they are needed.
 
 use crate::bvh::{Child, Node};
-use crate::flat::{FlatPoints, PointBlock};
+use crate::flat::BlockTree;
 use crate::math::Lanes;
 
 /// Where nodes and blocks lie: start, and size of one. A table, as a branch between the two could not be
@@ -12,16 +12,16 @@ pub struct Memory {
 }
 
 impl Memory {
-    pub fn new(points: &FlatPoints) -> Self {
+    pub fn new<T: BlockTree>(tree: &T) -> Self {
         const BLOCK_BIT: usize = Child::BLOCK_BIT as usize;
-        let (nodes, blocks) = (points.nodes.as_ptr().cast(), points.blocks.as_ptr().cast::<u8>());
-        let block_size = size_of::<PointBlock>();
+        let (nodes, blocks) = (tree.nodes().as_ptr().cast(), tree.blocks().as_ptr().cast::<u8>());
+        let block_size = size_of::<T::Block>();
         // As if there were a block for each word without the bit.
         let before = blocks.wrapping_sub(BLOCK_BIT.wrapping_mul(block_size));
         Self { starts: [nodes, before], sizes: [size_of::<Node>(), block_size] }
     }
 
-    /// Asks for the two cache lines of a packed child.
+    /// Asks for the first two cache lines of a packed child.
     #[inline(always)]
     pub fn prefetch<L: Lanes>(&self, child: u32) {
         let is_block = (child >> 31) as usize;

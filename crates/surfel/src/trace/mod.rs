@@ -1,4 +1,4 @@
-//! Rays in batches against a flat scene: closest hit, any hit, gather; SIMD lives here.
+//! Rays in batches against a flat cloud: closest hit, any hit, gather; SIMD lives here.
 
 mod any;
 mod block;
@@ -16,6 +16,7 @@ mod sightings;
 mod simd;
 mod splat;
 mod surface;
+mod world;
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -26,8 +27,9 @@ pub use hit::{Gather, Hit};
 pub use simd::Simd;
 pub use splat::Splat;
 pub use surface::SurfaceHit;
+pub use world::{SceneHit, Which, scene_hits, scene_occlusions};
 
-use crate::flat::FlatScene;
+use crate::flat::{FlatCloud, FlatTriangles};
 use crate::math::{PortableLanes, Ray};
 use simd::Level;
 
@@ -47,50 +49,66 @@ macro_rules! at_level {
 }
 
 /// The nearest shape on each ray, each point on its own.
-pub fn closest_hits(scene: &FlatScene, simd: Simd, rays: &[Ray], hits: &mut [Hit]) {
-    if scene.points.nodes.is_empty() {
+pub fn closest_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [Hit]) {
+    if cloud.points.nodes.is_empty() {
         return hits.fill(Hit::MISS);
     }
-    at_level!(simd, closest::closest_hits(scene, rays, hits));
+    at_level!(simd, closest::closest_hits(cloud, rays, hits));
 }
 
 /// Whether any shape lies in each ray's range, each point on its own.
-pub fn any_hits(scene: &FlatScene, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
-    if scene.points.nodes.is_empty() {
+pub fn any_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
+    if cloud.points.nodes.is_empty() {
         return occluded.fill(false);
     }
-    at_level!(simd, any::any_hits(scene, rays, occluded));
+    at_level!(simd, any::any_hits(cloud, rays, occluded));
 }
 
 /// The nearest shapes on each ray, all within a radius of each other.
-pub fn gathers(scene: &FlatScene, simd: Simd, rays: &[Ray], gathers: &mut [Gather]) {
-    if scene.points.nodes.is_empty() {
+pub fn gathers(cloud: &FlatCloud, simd: Simd, rays: &[Ray], gathers: &mut [Gather]) {
+    if cloud.points.nodes.is_empty() {
         return gathers.fill(Gather::EMPTY);
     }
-    at_level!(simd, gather::gathers(scene, rays, gathers));
+    at_level!(simd, gather::gathers(cloud, rays, gathers));
 }
 
-/// The discs of `gathers` blended as the scene's surface asks for, or else as `splat`; no regard is paid
+/// The discs of `gathers` blended as the cloud's surface asks for, or else as `splat`; no regard is paid
 /// to the surface's boundary.
-pub fn splats(scene: &FlatScene, simd: Simd, rays: &[Ray], splats: &mut [Splat]) {
-    if scene.points.nodes.is_empty() {
+pub fn splats(cloud: &FlatCloud, simd: Simd, rays: &[Ray], splats: &mut [Splat]) {
+    if cloud.points.nodes.is_empty() {
         return splats.fill(Splat::MISS);
     }
-    at_level!(simd, splat::splats(scene, rays, splats));
+    at_level!(simd, splat::splats(cloud, rays, splats));
 }
 
 /// The nearest place of the continuous surface on each ray.
-pub fn surface_hits(scene: &FlatScene, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
-    if scene.points.nodes.is_empty() {
+pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    if cloud.points.nodes.is_empty() {
         return hits.fill(SurfaceHit::MISS);
     }
-    at_level!(simd, surface::surface_hits(scene, rays, hits));
+    at_level!(simd, surface::surface_hits(cloud, rays, hits));
 }
 
 /// Whether the continuous surface lies in each ray's range.
-pub fn occlusions(scene: &FlatScene, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
-    if scene.points.nodes.is_empty() {
+pub fn occlusions(cloud: &FlatCloud, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
+    if cloud.points.nodes.is_empty() {
         return occluded.fill(false);
     }
-    at_level!(simd, surface::occlusions(scene, rays, occluded));
+    at_level!(simd, surface::occlusions(cloud, rays, occluded));
+}
+
+/// The nearest triangle on each ray.
+pub fn closest_triangles(triangles: &FlatTriangles, simd: Simd, rays: &[Ray], hits: &mut [Hit]) {
+    if triangles.nodes.is_empty() {
+        return hits.fill(Hit::MISS);
+    }
+    at_level!(simd, closest::closest_triangles(triangles, rays, hits));
+}
+
+/// Whether any triangle lies in each ray's range.
+pub fn any_triangles(triangles: &FlatTriangles, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
+    if triangles.nodes.is_empty() {
+        return occluded.fill(false);
+    }
+    at_level!(simd, any::any_triangles(triangles, rays, occluded));
 }

@@ -3,8 +3,9 @@
 use super::frustum::{self, Frustum};
 use super::memory::Memory;
 use crate::bvh::{Child, Node, STACK_SIZE};
-use crate::flat::FlatPoints;
+use crate::flat::BlockTree;
 use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3Lanes, WIDE, Wide};
+use crate::surface::RayLanes;
 
 /// Sixteen rays in lanes.
 pub struct WideRays<W> {
@@ -26,13 +27,15 @@ pub struct Packet<'r, W> {
 
 /// What is looked for along the rays of a packet.
 pub trait PacketVisitor<L: Lanes> {
+    type Tree: BlockTree;
+
     /// A box entered beyond this is left out; below any distance where the ray needs nothing more.
     fn limits(&self) -> &[f32; WIDE];
 
-    fn visit(&mut self, points: &FlatPoints, block_idx: u32);
+    fn visit(&mut self, tree: &Self::Tree, block_idx: u32);
 
     /// Shows the block to the ray in this lane alone.
-    fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize);
+    fn visit_alone(&mut self, tree: &Self::Tree, block_idx: u32, lane: usize);
 }
 
 impl<W: Wide> WideRays<W> {
@@ -59,6 +62,11 @@ impl<W: Wide> WideRays<W> {
 }
 
 impl<W: Wide> WideRays<W> {
+    #[inline(always)]
+    pub fn lanes(&self) -> RayLanes<W> {
+        RayLanes { direction: self.direction(), t_min: self.t_min }
+    }
+
     #[inline(always)]
     pub fn origin(&self) -> Vec3Lanes<W> {
         let [x, y, z] = self.origin;
@@ -204,13 +212,13 @@ impl PacketStack {
 /// Shows `visitor` every block whose box a ray of the packet enters before its limit, near boxes first
 /// if `IS_ORDERED`.
 #[inline(always)]
-pub fn along_packet<L: Lanes, const IS_ORDERED: bool>(
-    points: &FlatPoints,
+pub fn along_packet<L: Lanes, V: PacketVisitor<L>, const IS_ORDERED: bool>(
+    tree: &V::Tree,
     packet: &Packet<L::Wide>,
     stack: &mut PacketStack,
-    visitor: &mut impl PacketVisitor<L>,
+    visitor: &mut V,
 ) {
-    let memory = Memory::new(points);
+    let memory = Memory::new(tree);
     let mut limit = packet.frustum.limit(&packet.wide, visitor.limits());
     stack.start();
     while let Some(next) = stack.pop() {
@@ -223,14 +231,14 @@ pub fn along_packet<L: Lanes, const IS_ORDERED: bool>(
         }
         match Child::unpack(next.child) {
             Child::Node(node_idx) => {
-                let node = &points.nodes[node_idx as usize];
+                let node = &tree.nodes()[node_idx as usize];
                 stack.push_children::<L, IS_ORDERED>(node, &memory, &packet.frustum, limit);
                 continue;
             }
             Child::Block(block_idx) if lanes.is_power_of_two() => {
-                visitor.visit_alone(points, block_idx, lanes.trailing_zeros() as usize);
+                visitor.visit_alone(tree, block_idx, lanes.trailing_zeros() as usize);
             }
-            Child::Block(block_idx) => visitor.visit(points, block_idx),
+            Child::Block(block_idx) => visitor.visit(tree, block_idx),
         }
         limit = packet.frustum.limit(&packet.wide, visitor.limits());
         if limit == f32::NEG_INFINITY {

@@ -6,7 +6,7 @@ use super::gather::gather;
 use super::hit::Hit;
 use super::packet::{PacketStack, WideRays};
 use super::sightings::{Sighting, settle};
-use crate::flat::FlatScene;
+use crate::flat::FlatCloud;
 use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
 use crate::surface::{
     Blend, Boundary, Candidate, Gathered, MAX_GATHERED, SurfaceKind, plane_normal,
@@ -40,10 +40,10 @@ impl Splat {
 }
 
 #[inline(always)]
-pub(super) fn splats<L: Lanes>(scene: &FlatScene, rays: &[Ray], splats: &mut [Splat]) {
-    let kind = scene.surface;
+pub(super) fn splats<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], splats: &mut [Splat]) {
+    let kind = cloud.surface;
     let kind = if kind.is_gathered() { kind } else { SurfaceKind::Splat };
-    Finder::new(scene, kind, Boundary::Off).find::<L>(rays, splats);
+    Finder::new(cloud, kind, Boundary::Off).find::<L>(rays, splats);
 }
 
 /// Finds splats, and keeps the room it needs from search to search.
@@ -57,9 +57,9 @@ pub(super) struct Finder<'s> {
 
 impl<'s> Finder<'s> {
     /// Finds out whether hits are enclosed if `boundary` asks for that.
-    pub fn new(scene: &'s FlatScene, kind: SurfaceKind, boundary: Boundary) -> Self {
+    pub fn new(cloud: &'s FlatCloud, kind: SurfaceKind, boundary: Boundary) -> Self {
         let (sightings, discs) = (Vec::new(), Vec::new());
-        let mixer = Mixer { scene, kind, judges: boundary == Boundary::Gap, sightings, discs };
+        let mixer = Mixer { cloud, kind, judges: boundary == Boundary::Gap, sightings, discs };
         Self { stack: PacketStack::new(), mixer, open: Vec::new(), open_hits: Vec::new() }
     }
 
@@ -68,9 +68,9 @@ impl<'s> Finder<'s> {
         let Self { stack, mixer, .. } = self;
         for (rays, splats) in rays.chunks(WIDE).zip(splats.chunks_mut(WIDE)) {
             let limits = if mixer.kind.is_gathered() {
-                gather::<L>(&mixer.scene.points, rays, stack, &mut mixer.sightings)
+                gather::<L>(&mixer.cloud.points, rays, stack, &mut mixer.sightings)
             } else {
-                find_closest::<L>(mixer.scene, rays, &mut mixer.sightings)
+                find_closest::<L>(mixer.cloud, rays, &mut mixer.sightings)
             };
             mixer.mix::<L>(&WideRays::new(rays), &limits, splats);
         }
@@ -89,14 +89,14 @@ impl<'s> Finder<'s> {
             if splat.hit.is_miss() || splat.is_enclosed {
                 continue;
             }
-            let radius = splat.radius / mixer.scene.surface.radius_factor();
+            let radius = splat.radius / mixer.cloud.surface.radius_factor();
             let candidate = Candidate { normal: splat.normal, direction: ray.direction, radius };
             open.push(splat_idx as u32);
             open_hits.push((ray.at(splat.hit.distance), candidate));
         }
         for (open, hits) in open.chunks(WIDE).zip(open_hits.chunks(WIDE)) {
             let lanes = (1 << open.len()) - 1;
-            let enclosed = enclosed::<L>(&mixer.scene.points, lanes, &WideHits::new(hits));
+            let enclosed = enclosed::<L>(&mixer.cloud.points, lanes, &WideHits::new(hits));
             for (lane, splat_idx) in open.iter().enumerate() {
                 splats[*splat_idx as usize].is_enclosed = enclosed >> lane & 1 == 1;
             }
@@ -107,12 +107,12 @@ impl<'s> Finder<'s> {
 /// The nearest disc of each ray, alone.
 #[inline(always)]
 fn find_closest<L: Lanes>(
-    scene: &FlatScene,
+    cloud: &FlatCloud,
     rays: &[Ray],
     sightings: &mut Vec<Sighting>,
 ) -> [f32; WIDE] {
     let mut hits = [Hit::MISS; WIDE];
-    closest_hits::<L>(scene, rays, &mut hits[..rays.len()]);
+    closest_hits::<L>(cloud, rays, &mut hits[..rays.len()]);
     for (lane, hit) in hits.iter().enumerate().filter(|(_, hit)| !hit.is_miss()) {
         sightings.push(Sighting::by_one(lane, *hit));
     }
@@ -121,7 +121,7 @@ fn find_closest<L: Lanes>(
 
 /// Blends sightings into splats.
 struct Mixer<'s> {
-    scene: &'s FlatScene,
+    cloud: &'s FlatCloud,
     kind: SurfaceKind,
     judges: bool,
     sightings: Vec<Sighting>,
@@ -175,12 +175,12 @@ impl Mixer<'_> {
                 position: origin.plus(direction.scaled(nearest.distances)),
                 normal: normals,
                 direction,
-                radius: nearest.radii / L::Wide::splat(self.scene.surface.radius_factor()),
+                radius: nearest.radii / L::Wide::splat(self.cloud.surface.radius_factor()),
             };
             let is_hit = L::Wide::splat(0.0).less(nearest.n_discs).bits();
             let lanes = is_hit & ((1 << splats.len()) - 1);
             is_enclosed =
-                enclosed_by_blocks::<L>(&self.scene.points, &self.sightings, lanes, &hits);
+                enclosed_by_blocks::<L>(&self.cloud.points, &self.sightings, lanes, &hits);
         }
         self.sightings.clear();
         let (distances, slots) = (nearest.distances.store(), nearest.slots.store());
@@ -217,7 +217,7 @@ impl Mixer<'_> {
         };
         self.discs.clear();
         for sighting in &self.sightings {
-            let disc = self.scene.points.gathered(sighting.slot);
+            let disc = self.cloud.points.gathered(sighting.slot);
             let distances = W::load(&sighting.distances);
             // They come by slot, so of equal ones the first counts.
             let is_nearer = distances.less(nearest.distances);

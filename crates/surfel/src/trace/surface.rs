@@ -6,7 +6,7 @@ use super::closest::closest_hits;
 use super::hit::Hit;
 use super::packet::WideRays;
 use super::splat::{Finder, Splat};
-use crate::flat::{FlatScene, Slot};
+use crate::flat::{FlatCloud, Slot};
 use crate::math::{Floats, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
 use crate::surface::{Boundary, Candidate, Disc};
 
@@ -23,6 +23,8 @@ pub struct SurfaceHit {
     pub normal: Vec3,
     /// Linear.
     pub color: Vec3,
+    /// Whether that point's own normal faces away: the ray comes from behind it.
+    pub is_inner: bool,
 }
 
 impl SurfaceHit {
@@ -32,6 +34,7 @@ impl SurfaceHit {
         radius: 0.0,
         normal: Vec3::ZERO,
         color: Vec3::ZERO,
+        is_inner: false,
     };
 
     pub fn is_miss(&self) -> bool {
@@ -45,26 +48,26 @@ const MAX_REFUSALS: usize = 24;
 const RESUME: f32 = 0.05;
 
 #[inline(always)]
-pub(super) fn surface_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]) {
-    if scene.surface.is_oriented() {
-        splat_hits::<L>(scene, rays, hits);
+pub(super) fn surface_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    if cloud.surface.is_oriented() {
+        splat_hits::<L>(cloud, rays, hits);
     } else {
-        sphere_hits::<L>(scene, rays, hits);
+        sphere_hits::<L>(cloud, rays, hits);
     }
 }
 
 /// Whether the surface blocks each ray.
 #[inline(always)]
-pub(super) fn occlusions<L: Lanes>(scene: &FlatScene, rays: &[Ray], occluded: &mut [bool]) {
-    if !scene.surface.is_oriented() || scene.boundary == Boundary::Off {
-        any_hits::<L>(scene, rays, occluded);
+pub(super) fn occlusions<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [bool]) {
+    if !cloud.surface.is_oriented() || cloud.boundary == Boundary::Off {
+        any_hits::<L>(cloud, rays, occluded);
     } else {
-        any_that_counts::<L, Disc, _>(&scene.points, rays, WithinBoundary(scene), occluded);
+        any_that_counts::<L, Disc, _>(&cloud.points, rays, WithinBoundary(cloud), occluded);
     }
 }
 
 #[derive(Clone, Copy)]
-struct WithinBoundary<'s>(&'s FlatScene);
+struct WithinBoundary<'s>(&'s FlatCloud);
 
 impl WithinBoundary<'_> {
     fn radius(&self, slot: Slot) -> f32 {
@@ -118,43 +121,44 @@ impl Judge for WithinBoundary<'_> {
 }
 
 #[inline(always)]
-fn sphere_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]) {
+fn sphere_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
     let mut nearest = vec![Hit::MISS; rays.len()];
-    closest_hits::<L>(scene, rays, &mut nearest);
+    closest_hits::<L>(cloud, rays, &mut nearest);
     for ((ray, nearest), hit) in rays.iter().zip(nearest).zip(hits) {
         *hit = SurfaceHit::MISS;
         if nearest.is_miss() {
             continue;
         }
-        let sphere = scene.points.gathered(nearest.slot);
+        let sphere = cloud.points.gathered(nearest.slot);
         let outward = (ray.at(nearest.distance) - sphere.center) / sphere.radius;
         let normal = if outward.dot(ray.direction) < 0.0 { outward } else { -outward };
         *hit = SurfaceHit {
             distance: nearest.distance,
-            id: scene.points.id(nearest.slot),
+            id: cloud.points.id(nearest.slot),
             radius: sphere.radius,
             normal: normal.normalize_or(-ray.direction),
             color: sphere.color,
+            is_inner: 0.0 < outward.dot(ray.direction),
         };
     }
 }
 
 /// All rays search on together until each has a hit within the boundary, or nothing is left on it.
 #[inline(always)]
-fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]) {
+fn splat_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
     hits.fill(SurfaceHit::MISS);
-    if scene.boundary == Boundary::Off {
+    if cloud.boundary == Boundary::Off {
         let mut splats = vec![Splat::MISS; rays.len()];
-        Finder::new(scene, scene.surface, Boundary::Off).find::<L>(rays, &mut splats);
-        for (hit, splat) in hits.iter_mut().zip(&splats) {
-            *hit = surface_hit(scene, splat);
+        Finder::new(cloud, cloud.surface, Boundary::Off).find::<L>(rays, &mut splats);
+        for ((hit, ray), splat) in hits.iter_mut().zip(rays).zip(&splats) {
+            *hit = surface_hit(cloud, ray, splat);
         }
         return;
     }
     let mut searching: Vec<u32> = (0..rays.len() as u32).collect();
     let mut rays = rays.to_vec();
     let mut splats = vec![Splat::MISS; rays.len()];
-    let mut finder = Finder::new(scene, scene.surface, Boundary::Gap);
+    let mut finder = Finder::new(cloud, cloud.surface, Boundary::Gap);
     for _ in 0..MAX_REFUSALS {
         let splats = &mut splats[..rays.len()];
         finder.find::<L>(&rays, splats);
@@ -164,7 +168,7 @@ fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]
             if splat.hit.is_miss() {
                 continue;
             }
-            let found = surface_hit(scene, splat);
+            let found = surface_hit(cloud, &ray, splat);
             if splat.is_enclosed {
                 hits[ray_idx as usize] = found;
                 continue;
@@ -182,15 +186,16 @@ fn splat_hits<L: Lanes>(scene: &FlatScene, rays: &[Ray], hits: &mut [SurfaceHit]
 }
 
 #[inline(always)]
-fn surface_hit(scene: &FlatScene, splat: &Splat) -> SurfaceHit {
+fn surface_hit(cloud: &FlatCloud, ray: &Ray, splat: &Splat) -> SurfaceHit {
     if splat.hit.is_miss() {
         return SurfaceHit::MISS;
     }
     SurfaceHit {
         distance: splat.hit.distance,
-        id: scene.points.id(splat.hit.slot),
-        radius: splat.radius / scene.surface.radius_factor(),
+        id: cloud.points.id(splat.hit.slot),
+        radius: splat.radius / cloud.surface.radius_factor(),
         normal: splat.normal,
         color: splat.color,
+        is_inner: 0.0 < cloud.points.normal(splat.hit.slot).dot(ray.direction),
     }
 }

@@ -1,0 +1,54 @@
+//! A mesh as kernels and shading read it: its triangles, and what their corners carry.
+
+use super::triangles::FlatTriangles;
+use super::{Refit, points::Slot};
+use crate::error::Result;
+use crate::math::{Vec2, Vec3, Vec4};
+use crate::progress::Progress;
+use crate::scene::Mesh;
+
+/// Columns as those of `Mesh`, empty where it has none.
+#[derive(Clone, Debug, Default)]
+pub struct FlatMesh {
+    /// Relative to the mesh's origin.
+    pub triangles: FlatTriangles,
+    pub corners: Vec<[u32; 3]>,
+    pub normals: Vec<Vec3>,
+    pub tangents: Vec<Vec4>,
+    pub uvs: [Vec<Vec2>; 2],
+    pub colors: Vec<Vec4>,
+}
+
+impl FlatMesh {
+    pub fn new(mesh: &Mesh, progress: &dyn Progress) -> Result<Self> {
+        let [first, second] = &mesh.uvs;
+        Ok(Self {
+            triangles: FlatTriangles::new(&mesh.positions, &mesh.triangles, progress)?,
+            corners: mesh.triangles.clone(),
+            normals: mesh.normals.clone().unwrap_or_default(),
+            tangents: mesh.tangents.clone().unwrap_or_default(),
+            uvs: [first.clone().unwrap_or_default(), second.clone().unwrap_or_default()],
+            colors: mesh.colors.clone().unwrap_or_default(),
+        })
+    }
+
+    /// Moves the vertices to where `mesh`, with the same triangles, now has them.
+    pub fn refit(&mut self, mesh: &Mesh, progress: &dyn Progress) -> Result<Refit> {
+        self.normals = mesh.normals.clone().unwrap_or_default();
+        self.tangents = mesh.tangents.clone().unwrap_or_default();
+        self.triangles.refit(&mesh.positions, &mesh.triangles, progress)
+    }
+
+    /// What a column of vertices has at a place in the triangle at `slot`; none if it is empty.
+    pub fn at<T>(&self, column: &[T], slot: Slot, shares: [f32; 3]) -> Option<T>
+    where
+        T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>,
+    {
+        if column.is_empty() {
+            return None;
+        }
+        let [a, b, c] = self.corners[self.triangles.id(slot) as usize];
+        let [a, b, c] = [a, b, c].map(|vertex| column[vertex as usize]);
+        Some(a * shares[0] + b * shares[1] + c * shares[2])
+    }
+}

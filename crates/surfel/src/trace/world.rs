@@ -1,0 +1,356 @@
+//! Rays against whole scenes: each ray goes from instance to instance, nearest box first, and all that are
+//! at the same instance are traced there as one batch.
+
+use super::hit::Hit;
+use super::node::{BoxRay, ray_entries};
+use super::surface::SurfaceHit;
+use super::{Simd, any_triangles, closest_triangles, occlusions, surface_hits};
+use crate::bvh::{Child, NO_PRIMITIVE, STACK_SIZE};
+use crate::flat::{FlatCloud, FlatGeometry, FlatMesh, FlatScene, Instance, Slot};
+use crate::math::{LaneMask, PortableLanes, Ray, Vec3, Vec4};
+use crate::surface::triangle;
+
+/// Where a ray meets a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SceneHit {
+    /// Infinite if nothing was hit.
+    pub distance: f32,
+    /// Index in the scene's instances.
+    pub instance: u32,
+    /// Of the nearest point hit in its cloud, or of the triangle in its mesh.
+    pub id: u32,
+    /// Of that triangle; 0 for points.
+    pub slot: Slot,
+    /// Shares of a triangle's second and third corners.
+    pub shares: (f32, f32),
+    /// Of the nearest point hit, in world units; 0 for triangles.
+    pub radius: f32,
+    /// Unit, facing the ray's origin; between the corners' normals where a triangle has them.
+    pub normal: Vec3,
+    /// Unit, facing the ray's origin: that of the triangle's plane, or `normal` again.
+    pub facet: Vec3,
+    /// The geometry's own colour, linear.
+    pub color: Vec3,
+    /// The geometry's own alpha.
+    pub alpha: f32,
+    /// Whether the surface is hit from within, as far as its orientation tells.
+    pub is_inner: bool,
+}
+
+impl SceneHit {
+    pub const MISS: Self = Self {
+        distance: f32::INFINITY,
+        instance: u32::MAX,
+        id: u32::MAX,
+        slot: 0,
+        shares: (0.0, 0.0),
+        radius: 0.0,
+        normal: Vec3::ZERO,
+        facet: Vec3::ZERO,
+        color: Vec3::ZERO,
+        alpha: 0.0,
+        is_inner: false,
+    };
+
+    pub fn is_miss(&self) -> bool {
+        self.instance == u32::MAX
+    }
+}
+
+/// Which instances count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Which {
+    All,
+    /// Those that no light goes through.
+    Opaque,
+    SeeThrough,
+}
+
+impl Which {
+    fn counts(self, instance: &Instance) -> bool {
+        match self {
+            Self::All => true,
+            Self::Opaque => !instance.is_see_through,
+            Self::SeeThrough => instance.is_see_through,
+        }
+    }
+}
+
+/// The nearest surface on each ray.
+pub fn scene_hits(
+    scene: &FlatScene,
+    simd: Simd,
+    which: Which,
+    rays: &[Ray],
+    hits: &mut [SceneHit],
+) {
+    hits.fill(SceneHit::MISS);
+    let mut batch = Batch::default();
+    let mut rounds = Rounds::new(scene, which, rays);
+    loop {
+        let limit =
+            |ray_idx: u32| hits[ray_idx as usize].distance.min(rays[ray_idx as usize].t_max);
+        let Some(jobs) = rounds.next(limit) else { return };
+        for jobs in jobs.chunk_by(|a, b| a.instance == b.instance) {
+            let instance = &scene.instances[jobs[0].instance as usize];
+            batch.enter(instance, jobs, |ray_idx| {
+                let ray = rays[ray_idx as usize];
+                Ray { t_max: ray.t_max.min(hits[ray_idx as usize].distance), ..ray }
+            });
+            batch.trace(scene, simd, instance);
+            for (i, job) in jobs.iter().enumerate() {
+                let Some(hit) = batch.hit(scene, i, job.instance, instance) else { continue };
+                let nearest = &mut hits[job.ray as usize];
+                let is_first = hit.distance == nearest.distance && hit.instance < nearest.instance;
+                if hit.distance < nearest.distance || is_first {
+                    *nearest = hit;
+                }
+            }
+        }
+    }
+}
+
+/// Whether any surface lies in each ray's range.
+pub fn scene_occlusions(
+    scene: &FlatScene,
+    simd: Simd,
+    which: Which,
+    rays: &[Ray],
+    occluded: &mut [bool],
+) {
+    occluded.fill(false);
+    let mut batch = Batch::default();
+    let mut rounds = Rounds::new(scene, which, rays);
+    loop {
+        let limit = |ray_idx: u32| match occluded[ray_idx as usize] {
+            true => f32::NEG_INFINITY,
+            false => rays[ray_idx as usize].t_max,
+        };
+        let Some(jobs) = rounds.next(limit) else { return };
+        for jobs in jobs.chunk_by(|a, b| a.instance == b.instance) {
+            let instance = &scene.instances[jobs[0].instance as usize];
+            batch.enter(instance, jobs, |ray_idx| rays[ray_idx as usize]);
+            batch.block(scene, simd, instance);
+            for (job, is_blocked) in jobs.iter().zip(&batch.occluded) {
+                occluded[job.ray as usize] |= is_blocked;
+            }
+        }
+    }
+}
+
+/// A ray that is to visit an instance.
+#[derive(Clone, Copy)]
+struct Job {
+    instance: u32,
+    ray: u32,
+}
+
+/// Where the rays still have to go.
+struct Rounds {
+    /// Of all rays, one ray's after another's, each sorted by where it enters the instance's box.
+    visits: Vec<(f32, u32)>,
+    /// The visits that are left of each ray that is still on its way.
+    left: Vec<(u32, std::ops::Range<u32>)>,
+    jobs: Vec<Job>,
+}
+
+impl Rounds {
+    fn new(scene: &FlatScene, which: Which, rays: &[Ray]) -> Self {
+        let mut rounds =
+            Self { visits: Vec::new(), left: Vec::with_capacity(rays.len()), jobs: Vec::new() };
+        let mut counting = scene.instances.iter().enumerate();
+        let mut counting = counting.by_ref().filter(|(_, instance)| which.counts(instance));
+        let (first, second) = (counting.next(), counting.next());
+        let Some((only, _)) = first else { return rounds };
+        if second.is_none() {
+            // Its own tree tells which rays meet it.
+            rounds.visits = vec![(f32::NEG_INFINITY, only as u32)];
+            rounds.left.extend((0..rays.len() as u32).map(|ray_idx| (ray_idx, 0..1)));
+            return rounds;
+        }
+        for (ray_idx, ray) in rays.iter().enumerate() {
+            let first = rounds.visits.len();
+            visit_boxes(scene, which, ray, &mut rounds.visits);
+            let end = rounds.visits.len();
+            if first < end {
+                rounds.visits[first..]
+                    .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                rounds.left.push((ray_idx as u32, first as u32..end as u32));
+            }
+        }
+        rounds
+    }
+
+    /// The next visit of each ray that has one within its limit, sorted by instance and ray.
+    fn next(&mut self, limit: impl Fn(u32) -> f32) -> Option<&[Job]> {
+        let Self { visits, left, jobs } = self;
+        jobs.clear();
+        left.retain_mut(|(ray, left)| {
+            let Some(next) = left.next() else { return false };
+            let (entry, instance) = visits[next as usize];
+            let goes = entry <= limit(*ray);
+            if goes {
+                jobs.push(Job { instance, ray: *ray });
+            }
+            goes
+        });
+        // A stable sort: rays stay in their order, which is what makes packets.
+        jobs.sort_by_key(|job| job.instance);
+        (!jobs.is_empty()).then_some(jobs)
+    }
+}
+
+/// Adds the instances whose boxes the ray meets, and where it enters them.
+fn visit_boxes(scene: &FlatScene, which: Which, ray: &Ray, visits: &mut Vec<(f32, u32)>) {
+    let top = &scene.top;
+    let Some(root) = top.nodes.first() else { return };
+    let prepared = BoxRay::new(root, ray);
+    let mut stack = [0; STACK_SIZE];
+    let mut size = 1;
+    while 0 < size {
+        size -= 1;
+        let node = &top.nodes[stack[size] as usize];
+        let (lanes, _) = ray_entries::<PortableLanes>(node, &prepared, ray.t_max);
+        let mut lanes = lanes.bits();
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            match node.child(lane) {
+                Some(Child::Node(child)) => {
+                    stack[size] = child;
+                    size += 1;
+                }
+                Some(Child::Block(block)) => {
+                    for &i in top.blocks[block as usize].iter().filter(|&&i| i != NO_PRIMITIVE) {
+                        let instance = &scene.instances[i as usize];
+                        if which.counts(instance) {
+                            visits.extend(enter(instance, ray).map(|entry| (entry, i)));
+                        }
+                    }
+                }
+                None => {}
+            }
+        }
+    }
+}
+
+/// Where the ray enters an instance's box, if it does within its range.
+fn enter(instance: &Instance, ray: &Ray) -> Option<f32> {
+    let inverse = 1.0 / ray.direction;
+    let low = (instance.bounds.min - ray.origin) * inverse;
+    let high = (instance.bounds.max - ray.origin) * inverse;
+    // A side that the ray runs along gives NaN, which `min` and `max` pass over.
+    let near = low.min(high).max_element().max(ray.t_min);
+    let far = low.max(high).min_element().min(ray.t_max);
+    // More than the rounding above.
+    let slack = 8.0 * f32::EPSILON * near.abs().max(far.abs());
+    (near <= far + slack).then_some(near - slack)
+}
+
+/// Rays at one instance, in its coordinates, and what they find there.
+#[derive(Default)]
+struct Batch {
+    rays: Vec<Ray>,
+    /// Object lengths that make one of the world along each ray.
+    scales: Vec<f32>,
+    on_points: Vec<SurfaceHit>,
+    on_triangles: Vec<Hit>,
+    occluded: Vec<bool>,
+}
+
+impl Batch {
+    fn enter(&mut self, instance: &Instance, jobs: &[Job], ray: impl Fn(u32) -> Ray) {
+        self.rays.clear();
+        self.scales.clear();
+        for job in jobs {
+            let (ray, scale) = instance.object_ray(&ray(job.ray));
+            self.rays.push(ray);
+            self.scales.push(scale);
+        }
+    }
+
+    fn trace(&mut self, scene: &FlatScene, simd: Simd, instance: &Instance) {
+        let Self { rays, on_points, on_triangles, .. } = self;
+        match scene.geometry(instance) {
+            FlatGeometry::Cloud(cloud) => {
+                on_points.resize(rays.len(), SurfaceHit::MISS);
+                surface_hits(cloud, simd, rays, on_points);
+            }
+            FlatGeometry::Mesh(mesh) => {
+                on_triangles.resize(rays.len(), Hit::MISS);
+                closest_triangles(&mesh.triangles, simd, rays, on_triangles);
+            }
+        }
+    }
+
+    fn block(&mut self, scene: &FlatScene, simd: Simd, instance: &Instance) {
+        let Self { rays, occluded, .. } = self;
+        occluded.resize(rays.len(), false);
+        match scene.geometry(instance) {
+            FlatGeometry::Cloud(cloud) => occlusions(cloud, simd, rays, occluded),
+            FlatGeometry::Mesh(mesh) => any_triangles(&mesh.triangles, simd, rays, occluded),
+        }
+    }
+
+    /// What the ray at `i` found, as the world sees it.
+    fn hit(
+        &self,
+        scene: &FlatScene,
+        i: usize,
+        instance_idx: u32,
+        instance: &Instance,
+    ) -> Option<SceneHit> {
+        let (ray, scale) = (&self.rays[i], self.scales[i]);
+        let hit = match scene.geometry(instance) {
+            FlatGeometry::Cloud(cloud) => point_hit(cloud, &self.on_points[i], instance),
+            FlatGeometry::Mesh(mesh) => triangle_hit(mesh, &self.on_triangles[i], ray, instance),
+        }?;
+        Some(SceneHit { distance: hit.distance / scale, instance: instance_idx, ..hit })
+    }
+}
+
+fn point_hit(cloud: &FlatCloud, hit: &SurfaceHit, instance: &Instance) -> Option<SceneHit> {
+    if hit.is_miss() {
+        return None;
+    }
+    let normal = instance.world_normal(hit.normal);
+    Some(SceneHit {
+        distance: hit.distance,
+        id: hit.id,
+        radius: hit.radius * instance.scale,
+        normal,
+        facet: normal,
+        color: hit.color,
+        alpha: 1.0,
+        is_inner: cloud.has_outward_normals && hit.is_inner,
+        ..SceneHit::MISS
+    })
+}
+
+fn triangle_hit(mesh: &FlatMesh, hit: &Hit, ray: &Ray, instance: &Instance) -> Option<SceneHit> {
+    if hit.is_miss() {
+        return None;
+    }
+    let corners = mesh.triangles.triangle(hit.slot);
+    let shares = triangle::barycentric(corners.map(|corner| corner - ray.origin), ray.direction);
+    let [a, b, c] = corners;
+    let outward = (b - a).cross(c - a);
+    let is_inner = 0.0 < outward.dot(ray.direction);
+    let side = if is_inner { -1.0 } else { 1.0 };
+    let facet = instance.world_normal((side * outward).normalize());
+    let between = mesh.at(&mesh.normals, hit.slot, shares).map(|normal| side * normal);
+    let normal = between.map_or(facet, |normal| instance.world_normal(normal.normalize_or(facet)));
+    let color = mesh.at(&mesh.colors, hit.slot, shares).unwrap_or(Vec4::ONE);
+    Some(SceneHit {
+        distance: hit.distance,
+        id: mesh.triangles.id(hit.slot),
+        slot: hit.slot,
+        shares: (shares[1], shares[2]),
+        normal,
+        facet,
+        color: color.truncate(),
+        alpha: color.w,
+        is_inner,
+        ..SceneHit::MISS
+    })
+}
