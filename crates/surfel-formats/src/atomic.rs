@@ -13,12 +13,22 @@ pub(crate) fn write_file(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
 ) -> Result<()> {
+    write_aside(path, |_, file| {
+        let mut writer = BufWriter::with_capacity(1 << 20, file);
+        write(&mut writer)?;
+        writer.into_inner().map_err(|e| write_failed(path, e.into_error()))?;
+        Ok(())
+    })
+}
+
+/// The same for other programs, which open the new file by its name.
+pub(crate) fn write_aside(
+    path: &Path,
+    write: impl FnOnce(&Path, File) -> Result<()>,
+) -> Result<()> {
     let (aside, file) = create_aside(path)?;
     let remover = Remover(aside);
-    let mut writer = BufWriter::with_capacity(1 << 20, file);
-    write(&mut writer)?;
-    let file = writer.into_inner().map_err(|e| write_failed(path, e.into_error()))?;
-    drop(file);
+    write(&remover.0, file)?;
     fs::rename(&remover.0, path).map_err(|source| write_failed(path, source))?;
     Ok(())
 }

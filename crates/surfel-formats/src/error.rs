@@ -19,6 +19,21 @@ pub enum Error {
     Truncated { file: String, place: Place, readable: u64, claimed: u64 },
     #[error("{file}: found {found}, which surfel cannot {action}; {advice}")]
     Unsupported { file: String, action: &'static str, found: String, advice: &'static str },
+    #[error("{file}: found {found}, expected {expected}; {advice}")]
+    Frames { file: String, found: String, expected: String, advice: &'static str },
+    #[error(
+        "{file}: its frames were begun as `{found}`, and are now asked for as `{expected}`; \
+         ask for the same again, or run without --resume to start again"
+    )]
+    OtherSettings { file: String, found: String, expected: String },
+    #[error(
+        "{file}: video is made by the program `{program}`, which was not found; install it \
+         (https://ffmpeg.org, or from your system's packages), or write .gif, .png or \
+         frame_####.png, which need no other program"
+    )]
+    NoEncoder { file: String, program: String },
+    #[error("{file}: the program `{program}` failed: {message}; {advice}")]
+    Encoder { file: String, program: String, message: String, advice: &'static str },
     #[error("{file}: {n_points} points do not fit in memory; load fewer columns or a smaller part")]
     OutOfMemory { file: String, n_points: u64 },
     #[error("no input file was named; name at least one")]
@@ -37,7 +52,7 @@ pub enum Place {
     Point(u64),
 }
 
-pub type Result<T> = std::result::Result<T, Error>;
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

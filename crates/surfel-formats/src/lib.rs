@@ -1,7 +1,7 @@
-//! Files: point clouds in and out, pictures out.
+//! Files: point clouds in and out, pictures and movies out.
 //!
 //! A file becomes a [`surfel::points::PointCloud`] by [`load`], whatever its format; [`save`] goes
-//! the other way, and [`save_image`] writes what was rendered.
+//! the other way. [`save_image`] writes what was rendered, and a [`Movie`] many such pictures.
 //!
 //! ```
 //! use surfel::progress::Silent;
@@ -43,9 +43,11 @@ mod extent;
 mod load;
 mod save;
 mod picture;
+mod movie;
 
 pub use error::{Error, Place, Result};
 pub use load::{inspect, load, load_all, load_bytes};
+pub use movie::{Container, Movie, MovieFormat, MovieOptions, check_movie};
 pub use options::{Column, ColumnChoice, LoadOptions, Loaded, Source, TextColumn};
 pub use picture::{Alpha, BitDepth, ImageOptions, save_image};
 pub use save::{SaveOptions, check_output, save};

@@ -46,6 +46,11 @@ pub fn check_output(path: &Path) -> Result<()> {
     if !["png", "exr", "ply", "las", "laz"].contains(&extension(path).as_str()) {
         return Err(unsupported(path, ANY));
     }
+    check_place(path)
+}
+
+/// Tells whether a file can stand at `path`: its folder exists, and no folder has its name.
+pub(crate) fn check_place(path: &Path) -> Result<()> {
     let folder = folder_of(path);
     let problem = if path.is_dir() {
         std::io::ErrorKind::IsADirectory

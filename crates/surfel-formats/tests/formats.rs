@@ -6,6 +6,8 @@ mod common;
 mod bin;
 #[path = "formats/broken.rs"]
 mod broken;
+#[path = "formats/movies.rs"]
+mod movies;
 #[path = "formats/ply.rs"]
 mod ply;
 #[path = "formats/pictures.rs"]

@@ -1,7 +1,7 @@
 //! Pictures out: PNG for eyes, EXR with all layers.
 
 mod exr;
-mod png;
+pub(crate) mod png;
 
 use std::path::Path;
 

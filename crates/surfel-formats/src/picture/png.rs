@@ -1,6 +1,7 @@
 //! PNG: eight or sixteen bits a channel, sRGB-encoded.
 
-use std::io::{self, Write};
+use std::fs::File;
+use std::io::{self, BufReader, Write};
 use std::path::Path;
 
 use surfel::image::{Image, encode_srgb};
@@ -22,18 +23,55 @@ pub(super) fn write_to_stdout(image: &Image, options: &ImageOptions) -> Result<(
         .map_err(|source| write_failed(Path::new("-"), source))
 }
 
-fn encode(writer: impl Write, image: &Image, options: &ImageOptions) -> io::Result<()> {
-    let mut encoder = png::Encoder::new(writer, image.width, image.height);
-    encoder.set_color(match options.alpha {
+/// The samples of a picture of this size that was written with the same options; else what is wrong with it.
+pub(crate) fn read(
+    path: &Path,
+    (width, height): (u32, u32),
+    options: &ImageOptions,
+) -> Result<Vec<u8>, String> {
+    let file = File::open(path).map_err(|error| error.to_string())?;
+    let decoder = png::Decoder::new(BufReader::new(file));
+    let mut reader = decoder.read_info().map_err(|error| error.to_string())?;
+    let info = reader.info();
+    let found = (info.width, info.height, info.color_type, info.bit_depth);
+    let (color, depth) = sample_type(options);
+    // The size is compared before any memory is taken for it.
+    if found != (width, height, color, depth) {
+        return Err(format!("{}x{} pixels of {:?} {:?}", found.0, found.1, found.2, found.3));
+    }
+    let mut samples = vec![0; reader.output_buffer_size().ok_or("too many pixels")?];
+    reader.next_frame(&mut samples).map_err(|error| error.to_string())?;
+    Ok(samples)
+}
+
+/// An encoder of pictures with these options, whose header is still to be written.
+pub(crate) fn encoder<W: Write>(
+    writer: W,
+    (width, height): (u32, u32),
+    options: &ImageOptions,
+) -> png::Encoder<'static, W> {
+    let mut encoder = png::Encoder::new(writer, width, height);
+    let (color, depth) = sample_type(options);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    encoder
+}
+
+fn sample_type(options: &ImageOptions) -> (png::ColorType, png::BitDepth) {
+    let color = match options.alpha {
         Alpha::Keep => png::ColorType::Rgba,
         Alpha::Drop => png::ColorType::Rgb,
-    });
-    encoder.set_depth(match options.depth {
+    };
+    let depth = match options.depth {
         BitDepth::Eight => png::BitDepth::Eight,
         BitDepth::Sixteen => png::BitDepth::Sixteen,
-    });
-    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    let mut writer = encoder.write_header()?;
+    };
+    (color, depth)
+}
+
+fn encode(writer: impl Write, image: &Image, options: &ImageOptions) -> io::Result<()> {
+    let mut writer = encoder(writer, (image.width, image.height), options).write_header()?;
     writer.write_image_data(&samples(image, options))?;
     writer.finish()?;
     Ok(())

@@ -1,0 +1,443 @@
+//! Movies, read back by the crates of their formats and by ffmpeg, after runs whole and interrupted.
+
+use std::fs;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use surfel::image::{Image, decode_srgb};
+use surfel::progress::Silent;
+use surfel_formats::{
+    Alpha, BitDepth, Error, ImageOptions, Movie, MovieFormat, MovieOptions, check_movie, save_image,
+};
+
+use crate::common::{Folder, Listener};
+
+/// Eight-bit sRGB of a pixel: smooth, of more than 256 colours, another in each frame.
+fn color_at(frame: u32, x: u32, y: u32) -> [u8; 3] {
+    [(40 + x) as u8, (60 + y * 2) as u8, (30 + frame * 40) as u8]
+}
+
+fn picture(options: &MovieOptions, frame: u32) -> Image {
+    let mut image = Image::new(options.width, options.height);
+    for (pixel, color) in image.color.iter_mut().enumerate() {
+        let (x, y) = (pixel as u32 % options.width, pixel as u32 / options.width);
+        let [r, g, b] =
+            color_at(frame, x, y).map(|channel| decode_srgb(f32::from(channel) / 255.0));
+        *color = [r, g, b, 1.0];
+    }
+    image
+}
+
+fn options() -> MovieOptions {
+    MovieOptions {
+        width: 48,
+        height: 32,
+        fps: 30.0,
+        n_frames: 5,
+        image: ImageOptions::default(),
+        fingerprint: "a church\nonce around".into(),
+    }
+}
+
+/// Adds the frames that are missing, at most so many, and tells which.
+fn add_missing(movie: &mut Movie, options: &MovieOptions, most: usize) -> Vec<u32> {
+    let missing = (0..options.n_frames).filter(|&frame| !movie.has(frame));
+    let missing: Vec<u32> = missing.take(most).collect();
+    for &frame in &missing {
+        movie.add(frame, &picture(options, frame)).unwrap();
+    }
+    missing
+}
+
+fn make(path: &Path, options: &MovieOptions) {
+    let mut movie = Movie::open(path, options, false).unwrap();
+    add_missing(&mut movie, options, usize::MAX);
+    movie.finish(&Silent).unwrap();
+}
+
+/// Without the program a line is printed, and the test has nothing to do.
+fn has_ffmpeg() -> bool {
+    let found = Command::new("ffmpeg").arg("-version").stdout(Stdio::null()).status().is_ok();
+    if !found {
+        #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
+        {
+            println!("skipped: ffmpeg is absent");
+        }
+    }
+    found
+}
+
+fn bytes_of(folder: &Folder) -> Vec<(String, Vec<u8>)> {
+    let mut names = folder.names();
+    names.sort();
+    names.into_iter().map(|name| (name.clone(), fs::read(folder.path(&name)).unwrap())).collect()
+}
+
+#[test]
+fn an_animated_png_has_every_frame_without_loss() {
+    let folder = Folder::new("apng");
+    for (depth, alpha, fps, delay) in [
+        (BitDepth::Eight, Alpha::Keep, 30.0, (1, 30)),
+        (BitDepth::Eight, Alpha::Drop, 23.976, (125, 2997)),
+        (BitDepth::Sixteen, Alpha::Keep, 0.5, (2, 1)),
+    ] {
+        let path = folder.path("film.png");
+        let image = ImageOptions { depth, alpha, ..Default::default() };
+        let options = MovieOptions { image, fps, ..options() };
+        make(&path, &options);
+
+        let decoder = png::Decoder::new(BufReader::new(fs::File::open(&path).unwrap()));
+        let mut reader = decoder.read_info().unwrap();
+        let control = *reader.info().animation_control().unwrap();
+        assert_eq!((control.num_frames, control.num_plays), (5, 0));
+        let mut samples = vec![0; reader.output_buffer_size().unwrap()];
+        for frame in 0..options.n_frames {
+            reader.next_frame(&mut samples).unwrap();
+            let control = reader.info().frame_control().unwrap();
+            assert_eq!((control.delay_num, control.delay_den), delay);
+            assert_eq!(samples, still_samples(&folder.path("still.png"), &options, frame));
+        }
+    }
+    assert_eq!(folder.names().len(), 2);
+}
+
+/// The samples of a frame as a picture of its own.
+fn still_samples(path: &Path, options: &MovieOptions, frame: u32) -> Vec<u8> {
+    save_image(path, &picture(options, frame), &options.image).unwrap();
+    let mut reader =
+        png::Decoder::new(BufReader::new(fs::File::open(path).unwrap())).read_info().unwrap();
+    let mut samples = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut samples).unwrap();
+    samples
+}
+
+#[test]
+fn a_gif_has_every_frame_at_its_time_and_nearly_its_colors() {
+    let folder = Folder::new("gif");
+    let path = folder.path("film.GIF");
+    let options = MovieOptions { width: 128, height: 96, n_frames: 6, ..options() };
+    make(&path, &options);
+
+    let mut decoding = gif::DecodeOptions::new();
+    decoding.set_color_output(gif::ColorOutput::RGBA);
+    let mut decoder = decoding.read_info(fs::File::open(&path).unwrap()).unwrap();
+    assert_eq!((decoder.width(), decoder.height()), (128, 96));
+    let (mut delays, mut sum) = (Vec::new(), 0);
+    while let Some(frame) = decoder.read_next_frame().unwrap() {
+        for (pixel, found) in frame.buffer.chunks_exact(4).enumerate() {
+            let expected = color_at(delays.len() as u32, pixel as u32 % 128, pixel as u32 / 128);
+            for (found, expected) in found.iter().zip(expected) {
+                let difference = found.abs_diff(expected);
+                assert!(difference <= 32, "{pixel}: {found} for {expected}");
+                sum += usize::from(difference);
+            }
+            assert_eq!(found[3], 255);
+        }
+        delays.push(frame.delay);
+    }
+    // Some ten thousand colours share 256 places.
+    let mean = sum as f64 / (delays.len() * 128 * 96 * 3) as f64;
+    assert!(mean < 4.0, "{mean}");
+    // Six thirtieths are a fifth of a second, though a thirtieth is no whole number of hundredths.
+    assert_eq!(delays, [3, 4, 3, 3, 4, 3]);
+    assert_eq!(decoder.repeat(), gif::Repeat::Infinite);
+    assert_eq!(folder.names(), ["film.GIF"]);
+}
+
+#[test]
+fn numbered_pictures_have_as_many_digits_as_the_name_has_signs() {
+    let folder = Folder::new("numbered");
+    let options = MovieOptions { n_frames: 11, ..options() };
+    make(&folder.path("shot#2_###.png"), &options);
+    make(&folder.path("#.exr"), &options);
+    let mut expected: Vec<String> = (1..=11).map(|i| format!("shot#2_{i:03}.png")).collect();
+    expected.extend((1..=11).map(|i| format!("{i}.exr")));
+    expected.sort();
+    let mut names = folder.names();
+    names.sort();
+    assert_eq!(names, expected);
+    let still = folder.path("still.png");
+    save_image(&still, &picture(&options, 4), &options.image).unwrap();
+    assert_eq!(fs::read(folder.path("shot#2_005.png")).unwrap(), fs::read(&still).unwrap());
+}
+
+#[test]
+fn a_resumed_run_ends_with_the_same_bytes() {
+    resumed_is_whole(&["film.png", "film.gif", "frame_####.png", "frame_##.exr"]);
+}
+
+#[test]
+fn a_resumed_video_ends_with_the_same_bytes() {
+    if has_ffmpeg() {
+        resumed_is_whole(&["film.mp4", "film.mov", "film.mkv", "film.webm", "film.avi"]);
+    }
+}
+
+fn resumed_is_whole(names: &[&str]) {
+    for name in names {
+        let (whole, resumed) = (Folder::new(&format!("whole-{name}")), Folder::new(name));
+        let options = options();
+        make(&whole.path(name), &options);
+
+        let path = resumed.path(name);
+        let mut movie = Movie::open(&path, &options, true).unwrap();
+        assert_eq!(add_missing(&mut movie, &options, 2), [0, 1]);
+        drop(movie);
+        let mut movie = Movie::open(&path, &options, true).unwrap();
+        assert_eq!(movie.n_done(), 2);
+        movie.add(4, &picture(&options, 4)).unwrap();
+        let error = movie.finish(&Silent).unwrap_err().to_string();
+        assert!(error.contains("3 of 5 frames"), "{error}");
+        let mut movie = Movie::open(&path, &options, true).unwrap();
+        assert_eq!(add_missing(&mut movie, &options, 9), [2, 3]);
+        movie.finish(&Silent).unwrap();
+        assert_eq!(bytes_of(&resumed), bytes_of(&whole), "{name}");
+    }
+}
+
+#[test]
+fn frames_of_other_settings_are_not_mixed_in() {
+    for name in ["film.gif", "frame_####.png"] {
+        let folder = Folder::new(&format!("settings-{name}"));
+        let (path, first) = (folder.path(name), options());
+        let mut movie = Movie::open(&path, &first, true).unwrap();
+        add_missing(&mut movie, &first, 2);
+        drop(movie);
+
+        let (other, larger) = ("another church".into(), 64);
+        for changed in [
+            MovieOptions { fingerprint: other, ..options() },
+            MovieOptions { width: larger, ..options() },
+            MovieOptions { n_frames: 6, ..options() },
+        ] {
+            let Err(error) = Movie::open(&path, &changed, true) else { panic!("{name}: mixed") };
+            assert!(matches!(error, Error::OtherSettings { .. }), "{error}");
+            assert!(error.to_string().contains("without --resume"), "{error}");
+        }
+        // The refusals cost nothing; the film's speed is not a matter of its frames.
+        let faster = MovieOptions { fps: 50.0, ..options() };
+        assert_eq!(Movie::open(&path, &faster, true).unwrap().n_done(), 2);
+        assert_eq!(Movie::open(&path, &first, false).unwrap().n_done(), 0);
+        assert_eq!(Movie::open(&path, &first, true).unwrap().n_done(), 0);
+    }
+}
+
+#[test]
+fn pictures_of_an_older_movie_are_not_taken_for_done() {
+    let folder = Folder::new("stale");
+    let (path, older) = (folder.path("frame_##.png"), options());
+    make(&path, &older);
+    let newer = MovieOptions { fingerprint: "later".into(), ..options() };
+    let mut movie = Movie::open(&path, &newer, false).unwrap();
+    add_missing(&mut movie, &newer, 1);
+    drop(movie);
+    assert_eq!(folder.names().len(), 6);
+    let movie = Movie::open(&path, &newer, true).unwrap();
+    assert!(movie.has(0) && !movie.has(1));
+    drop(movie);
+    // Nor is one that was removed since.
+    fs::remove_file(folder.path("frame_01.png")).unwrap();
+    assert_eq!(Movie::open(&path, &newer, true).unwrap().n_done(), 0);
+}
+
+#[test]
+fn a_line_that_was_cut_short_counts_no_frame() {
+    let folder = Folder::new("torn");
+    let (path, options) = (folder.path("film.gif"), options());
+    let mut movie = Movie::open(&path, &options, false).unwrap();
+    add_missing(&mut movie, &options, 3);
+    drop(movie);
+    let note = folder.path("film.gif.frames/settings");
+    let text = fs::read_to_string(&note).unwrap();
+    let settings = text.lines().next().unwrap();
+    for (frames, n_done) in [("1\n2", 1), ("1\n\n0\n-1\n99999999999\nx\n3\n", 2), ("", 0)] {
+        fs::write(&note, format!("{settings}\n{frames}")).unwrap();
+        let movie = Movie::open(&path, &options, true).unwrap();
+        assert_eq!(movie.n_done(), n_done);
+        // Keeps the frames in spite of the last, empty note.
+        std::mem::forget(movie);
+    }
+}
+
+#[test]
+fn a_movie_without_frames_leaves_nothing() {
+    for name in ["film.png", "frame_####.exr"] {
+        let folder = Folder::new(&format!("nothing-{name}"));
+        drop(Movie::open(&folder.path(name), &options(), false).unwrap());
+        assert_eq!(folder.names(), [""; 0]);
+    }
+}
+
+#[test]
+fn files_of_others_stay_where_they_are() {
+    let folder = Folder::new("foreign");
+    let (path, options) = (folder.path("film.gif"), options());
+    let frames = folder.path("film.gif.frames");
+    let refused = || match Movie::open(&path, &options, false) {
+        Err(Error::Frames { found, .. }) => found,
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("took what is not its own"),
+    };
+    fs::write(&frames, "a file").unwrap();
+    assert_eq!(refused(), "a file");
+    fs::remove_file(&frames).unwrap();
+    fs::create_dir(&frames).unwrap();
+    fs::write(frames.join("000001.png"), "mine").unwrap();
+    assert_eq!(refused(), "files without surfel's `settings`");
+    fs::remove_file(frames.join("000001.png")).unwrap();
+
+    let mut movie = Movie::open(&path, &options, false).unwrap();
+    fs::write(frames.join("remarks.txt"), "mine").unwrap();
+    add_missing(&mut movie, &options, 9);
+    movie.finish(&Silent).unwrap();
+    let left: Vec<PathBuf> =
+        fs::read_dir(&frames).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert_eq!(left, [frames.join("remarks.txt")]);
+}
+
+#[test]
+fn a_broken_frame_is_named_and_can_be_made_again() {
+    for name in ["film.gif", "film.png"] {
+        let folder = Folder::new(&format!("broken-{name}"));
+        let (path, options) = (folder.path(name), options());
+        fs::write(&path, "old").unwrap();
+        let broken = folder.path(&format!("{name}.frames/000003.png"));
+        let small = folder.path("small.png");
+        save_image(&small, &Image::new(3, 3), &options.image).unwrap();
+        let small_bytes = fs::read(&small).unwrap();
+        fs::remove_file(&small).unwrap();
+        // Cut short, empty, of another size.
+        for bytes in [&small_bytes[..small_bytes.len() / 2], &[], &small_bytes] {
+            let mut movie = Movie::open(&path, &options, true).unwrap();
+            add_missing(&mut movie, &options, 9);
+            fs::write(&broken, bytes).unwrap();
+            let error = movie.finish(&Silent).unwrap_err().to_string();
+            assert!(error.contains("000003.png: found"), "{error}");
+            assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+            fs::remove_file(&broken).unwrap();
+        }
+        let mut movie = Movie::open(&path, &options, true).unwrap();
+        assert_eq!(add_missing(&mut movie, &options, 9), [2]);
+        movie.finish(&Silent).unwrap();
+        assert_eq!(folder.names(), [name]);
+    }
+}
+
+#[test]
+fn a_cancelled_end_keeps_the_frames_and_the_old_film() {
+    let folder = Folder::new("cancelled");
+    let (path, options) = (folder.path("film.gif"), options());
+    fs::write(&path, "old").unwrap();
+    let mut movie = Movie::open(&path, &options, false).unwrap();
+    add_missing(&mut movie, &options, 9);
+    let listener = Listener { cancelled: true.into(), ..Default::default() };
+    let error = movie.finish(&listener).unwrap_err();
+    assert!(matches!(error, Error::Surfel(surfel::Error::Cancelled)));
+    assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+    let movie = Movie::open(&path, &options, true).unwrap();
+    assert_eq!(movie.n_done(), 5);
+    movie.finish(&Silent).unwrap();
+    assert_eq!(folder.names(), ["film.gif"]);
+}
+
+#[test]
+fn frames_that_were_not_announced_are_refused() {
+    let folder = Folder::new("unannounced");
+    let options = options();
+    let mut movie = Movie::open(&folder.path("film.gif"), &options, false).unwrap();
+    for (frame, width) in [(5, 48), (0, 47)] {
+        let error = movie.add(frame, &Image::new(width, 32)).unwrap_err().to_string();
+        assert!(error.contains("expected frames 0 to 4 of 48x32"), "{error}");
+    }
+    assert_eq!(movie.n_done(), 0);
+}
+
+#[test]
+fn movies_that_cannot_be_written_are_told_before_the_work() {
+    let folder = Folder::new("movies-early");
+    let message = |name: &str, options: &MovieOptions| {
+        check_movie(&folder.path(name), options).unwrap_err().to_string()
+    };
+    for name in ["film.mpg", "film", "film.exr", "####", "frame_####.jpg", "-"] {
+        let message = message(name, &options());
+        for part in ["cannot write", ".mp4", ".gif", ".png (animated)", "frame_####.exr"] {
+            assert!(message.contains(part), "{message}");
+        }
+    }
+    assert!(message("none/film.gif", &options()).contains("create it first"));
+    assert!(message("none/frame_####.png", &options()).contains("create it first"));
+    fs::create_dir(folder.path("folder.gif")).unwrap();
+    assert!(message("folder.gif", &options()).contains("name a file, not a folder"));
+    let fast = MovieOptions { fps: 60.0, ..options() };
+    assert!(message("film.gif", &fast).contains("at most 50 times a second"));
+    check_movie(&folder.path("film.png"), &fast).unwrap();
+    for fps in [0.0, -30.0, f64::NAN, f64::INFINITY, 1e-9, 1e9] {
+        let options = MovieOptions { fps, ..options() };
+        assert!(message("film.png", &options).contains("frames a second"));
+    }
+    for (name, width, n_frames) in
+        [("film.png", 0, 1), ("film.gif", 65536, 1), ("a_#.png", 1 << 31, 1), ("a_#.png", 1, 0)]
+    {
+        let options = MovieOptions { width, n_frames, ..options() };
+        assert!(message(name, &options).contains("choose"));
+    }
+    assert_eq!(MovieFormat::of(Path::new("a#1.mp4")).unwrap(), {
+        MovieFormat::of(Path::new("a.MP4")).unwrap()
+    });
+    assert_eq!(folder.names(), ["folder.gif"]);
+}
+
+#[test]
+fn ffmpeg_makes_videos_of_every_kind() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = Folder::new("ffmpeg");
+    // A colon is part of a protocol's name to ffmpeg, a percent sign of a number's place.
+    let odd = if cfg!(windows) { "a%d.mov" } else { "a:%d.mov" };
+    for name in ["film.mp4", odd, "-film.mkv", "film.webm", "film.avi"] {
+        for (width, height) in [(48, 32), (47, 31)] {
+            let path = folder.path(name);
+            let options = MovieOptions { width, height, fps: 29.97, ..options() };
+            make(&path, &options);
+            let found = decode(&path);
+            assert_eq!(found.len(), 5 * 48 * 32 * 3, "{name}");
+            for (index, (found, pixel)) in found.chunks_exact(3).zip(0..).enumerate() {
+                let (frame, pixel) = (pixel / (48 * 32), pixel % (48 * 32));
+                let (x, y) = ((pixel % 48).min(width - 1), (pixel / 48).min(height - 1));
+                for (found, expected) in found.iter().zip(color_at(frame, x, y)) {
+                    assert!(found.abs_diff(expected) <= 12, "{name} {index}: {found} {expected}");
+                }
+            }
+        }
+    }
+    assert_eq!(folder.names().len(), 5);
+}
+
+/// The frames as ffmpeg decodes them, eight bits a channel, by the colours that the file claims.
+fn decode(path: &Path) -> Vec<u8> {
+    let mut input = std::ffi::OsString::from("file:");
+    input.push(path);
+    let decoded = Command::new("ffmpeg")
+        .args(["-loglevel", "error", "-i"])
+        .arg(input)
+        .args(["-vf", "scale=in_color_matrix=bt709", "-f", "rawvideo", "-pix_fmt", "rgb24", "-"])
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    assert!(decoded.status.success(), "{}", String::from_utf8_lossy(&decoded.stderr));
+    decoded.stdout
+}
+
+#[test]
+fn a_size_that_ffmpeg_refuses_is_told_before_the_work() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = Folder::new("refused-size");
+    let options = MovieOptions { width: 20_000, height: 2, ..options() };
+    let error = check_movie(&folder.path("film.mp4"), &options).unwrap_err();
+    assert!(matches!(error, Error::Encoder { .. }), "{error}");
+    assert_eq!(folder.names(), [""; 0]);
+}
