@@ -1,6 +1,7 @@
-//! Boxes, rays, frames, sampling maps, eigenvectors and counter-based random numbers.
+//! Boxes, rays, frames, sampling maps, weighted draws, eigenvectors and counter-based random numbers.
 
 mod aabb;
+mod distribution;
 mod eigen;
 mod frame;
 mod lanes;
@@ -11,6 +12,7 @@ mod ray;
 mod sampling;
 
 pub use aabb::Aabb;
+pub use distribution::{Distribution1d, Distribution2d};
 pub use eigen::{SymmetricMatrix, smallest_eigenvector};
 pub use frame::{Frame, tangents};
 pub use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3, Vec3A, Vec4};

@@ -2,11 +2,13 @@
 
 mod camera;
 pub mod color;
+mod environment;
 mod framing;
 mod light;
 mod prospect;
 
 pub use camera::{Camera, Projection, View};
+pub use environment::Environment;
 pub use framing::{Framing, frame, look_around, upright, usual_bounds};
 pub use light::{Light, Sky, Sun};
 
