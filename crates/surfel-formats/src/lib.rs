@@ -1,7 +1,8 @@
-//! Files: point clouds in and out, pictures out.
+//! Files: point clouds in and out, pictures out, pictures of light in.
 //!
 //! A file becomes a [`surfel::points::PointCloud`] by [`load`], whatever its format; [`save`] goes
-//! the other way, and [`save_image`] writes what was rendered.
+//! the other way, and [`save_image`] writes what was rendered. Light for a scene comes from
+//! [`load_environment_picture`].
 //!
 //! ```
 //! use surfel::progress::Silent;
@@ -43,7 +44,9 @@ mod extent;
 mod load;
 mod save;
 mod picture;
+mod environment;
 
+pub use environment::{LinearPicture, load_environment_picture, load_environment_picture_bytes};
 pub use error::{Error, Place, Result};
 pub use load::{inspect, load, load_all, load_bytes};
 pub use options::{Column, ColumnChoice, LoadOptions, Loaded, Source, TextColumn};

@@ -6,6 +6,8 @@ mod common;
 mod bin;
 #[path = "formats/broken.rs"]
 mod broken;
+#[path = "formats/environments.rs"]
+mod environments;
 #[path = "formats/ply.rs"]
 mod ply;
 #[path = "formats/pictures.rs"]
