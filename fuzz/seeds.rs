@@ -3,14 +3,15 @@
 use std::fs;
 use std::path::Path;
 
+use surfel::image::Image;
 use surfel::math::{DVec3, Vec3};
 use surfel::points::{PointCloud, Scalar, Values};
 use surfel::progress::Silent;
-use surfel_formats::{SaveOptions, save};
+use surfel_formats::{ImageOptions, SaveOptions, save, save_image};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
-    for target in ["ply", "xyz", "las", "bin"] {
+    for target in ["ply", "xyz", "las", "bin", "environment"] {
         fs::create_dir_all(corpus.join(target))?;
     }
     for (name, cloud) in [("bare", bare(7)), ("full", full(7))] {
@@ -42,7 +43,22 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let lost = [f32::NAN, 1e30, -0.0, -1.0, 0.0, f32::INFINITY, 2.0].map(f32::to_le_bytes).concat();
     fs::write(corpus.join("bin/one.bin"), &record)?;
     fs::write(corpus.join("bin/three.bin"), [&record[..], &lost, &record].concat())?;
-    Ok(())
+    pictures(&corpus.join("environment"))
+}
+
+/// HDR in each of its encodings, and an EXR.
+fn pictures(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let head = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\nCOLORCORR=1 1 2\n\n";
+    let channels = [&[2, 2, 0, 9, 137, 50, 3, 1, 2, 3, 134, 9][..], &[137, 0, 137, 136]].concat();
+    let hdrs = [
+        ("flat.hdr", "-Y 1 +X 2\n", vec![1, 2, 3, 136, 4, 5, 6, 130]),
+        ("old.hdr", "+X 1 -Y 300\n", vec![1, 2, 3, 136, 1, 1, 1, 43, 1, 1, 1, 1]),
+        ("channels.hdr", "+Y 2 -X 9\n", channels.repeat(2)),
+    ];
+    for (name, size, pixels) in hdrs {
+        fs::write(folder.join(name), [head.as_bytes(), size.as_bytes(), &pixels].concat())?;
+    }
+    Ok(save_image(&folder.join("light.exr"), &Image::new(9, 3), &ImageOptions::default())?)
 }
 
 fn bare(n: u16) -> PointCloud {

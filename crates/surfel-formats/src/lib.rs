@@ -1,7 +1,8 @@
-//! Files: point clouds in and out, pictures and movies out.
+//! Files: point clouds in and out, pictures and movies out, pictures of light in.
 //!
 //! A file becomes a [`surfel::points::PointCloud`] by [`load`], whatever its format; [`save`] goes
-//! the other way. [`save_image`] writes what was rendered, and a [`Movie`] many such pictures.
+//! the other way. [`save_image`] writes what was rendered, and a [`Movie`] many such pictures. Light
+//! for a scene comes from [`load_environment_picture`].
 //!
 //! ```
 //! use surfel::progress::Silent;
@@ -44,7 +45,9 @@ mod load;
 mod save;
 mod picture;
 mod movie;
+mod environment;
 
+pub use environment::{LinearPicture, load_environment_picture, load_environment_picture_bytes};
 pub use error::{Error, Place, Result};
 pub use load::{inspect, load, load_all, load_bytes};
 pub use movie::{Container, Movie, MovieFormat, MovieOptions, check_movie};

@@ -8,6 +8,8 @@ mod bin;
 mod broken;
 #[path = "formats/movies.rs"]
 mod movies;
+#[path = "formats/environments.rs"]
+mod environments;
 #[path = "formats/ply.rs"]
 mod ply;
 #[path = "formats/pictures.rs"]

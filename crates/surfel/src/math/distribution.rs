@@ -174,7 +174,7 @@ mod tests {
     fn cells_are_drawn_as_often_as_told_and_evenly_inside() {
         let (width, height) = (7, 5);
         let weight = |x: usize, y: usize| {
-            if (x + y) % 3 == 0 { 0.0 } else { (hash((x * 10 + y) as u64) % 97) as f32 }
+            if (x + y).is_multiple_of(3) { 0.0 } else { (hash((x * 10 + y) as u64) % 97) as f32 }
         };
         let grid = Distribution2d::new(width, height, weight).unwrap();
         let (n, mut counts, mut places) = (1 << 16, vec![0u32; 35], (0.0, 0.0));

@@ -1,4 +1,4 @@
-//! Boxes, rays, frames, sampling maps, eigenvectors and counter-based random numbers.
+//! Boxes, rays, frames, sampling maps, weighted draws, eigenvectors and counter-based random numbers.
 
 mod aabb;
 mod distribution;

@@ -172,13 +172,14 @@ fn repair(mut pixels: Vec<Vec3>) -> Option<(Vec<Vec3>, usize)> {
     if most < 0.0 {
         return None;
     }
-    let infinite = most.max(LARGEST_HALF).min(MOST_RADIANCE);
+    let infinite = most.clamp(LARGEST_HALF, MOST_RADIANCE);
     let mut n_repaired = 0;
     for pixel in &mut pixels {
         let repaired = pixel.to_array().map(|value| match value {
             f32::INFINITY => infinite,
-            // NaN too becomes 0; minus zero becomes zero by the sum.
-            _ => value.max(0.0).min(MOST_RADIANCE) + 0.0,
+            _ if 0.0 < value => value.min(MOST_RADIANCE),
+            // NaN too.
+            _ => 0.0,
         });
         n_repaired += usize::from(pixel.to_array() != repaired);
         *pixel = Vec3::from_array(repaired);
