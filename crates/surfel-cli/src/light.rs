@@ -3,7 +3,10 @@
 use crate::args::{LightArgs, LightKind};
 use crate::report::Report;
 use surfel::math::Vec3;
-use surfel::scene::{Camera, Light, Sky, Sun};
+use anyhow::Context;
+use surfel::flat::FlatScene;
+use surfel::scene::{Camera, Environment, Light, Sky, Sun};
+use surfel_formats::LinearPicture;
 
 /// Warm sun and bluish sky, which on level ground under the usual sun add up to white. With a third of
 /// it the sky gives more than outdoors: with a quarter, shadows of dark scans were black.
@@ -24,8 +27,18 @@ pub struct Lit {
     pub diagonal: f32,
 }
 
-pub fn lights(args: &LightArgs, lit: &Lit, report: &Report) -> Vec<Light> {
+pub fn lights(args: &LightArgs, lit: &Lit, report: &Report) -> anyhow::Result<Vec<Light>> {
     let mut lights = Vec::new();
+    if let Some(file) = &args.environment {
+        let picture = surfel_formats::load_environment_picture(file, report)?;
+        report.end_stage();
+        let LinearPicture { width, height, pixels } = picture;
+        let rotation_deg = args.environment_rotation as f32;
+        let mut environment = Environment::new(width, height, pixels, lit.up, rotation_deg)
+            .with_context(|| file.display().to_string())?;
+        environment.gain(args.environment_strength as f32);
+        lights.push(Light::Environment(environment));
+    }
     if args.has(LightKind::Sun) {
         lights.push(Light::Sun(sun(args, lit, report)));
     }
@@ -35,22 +48,28 @@ pub fn lights(args: &LightArgs, lit: &Lit, report: &Report) -> Vec<Light> {
     if args.has(LightKind::Headlight) {
         lights.push(Light::Headlight(0.8));
     }
-    lights
+    Ok(lights)
 }
 
 /// All lights this many stops brighter; the background stays.
-pub fn expose(lights: &mut [Light], stops: f32) {
+pub fn expose(scene: &mut FlatScene, stops: f32) {
     let gain = stops.exp2();
-    for light in lights {
+    for light in &mut scene.lights {
         match light {
             Light::Sun(sun) => sun.color *= gain,
             Light::Sky(sky) => {
                 sky.zenith *= gain;
                 sky.ground *= gain;
             }
+            Light::Environment(environment) => environment.gain(gain),
             Light::Headlight(strength) => *strength *= gain,
         }
     }
+    scene.lamps.iter_mut().for_each(|lamp| lamp.color *= gain);
+    scene.materials.iter_mut().for_each(|material| {
+        material.emissive *= gain;
+        material.glow *= gain;
+    });
 }
 
 fn sun(args: &LightArgs, lit: &Lit, report: &Report) -> Sun {

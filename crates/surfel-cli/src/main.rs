@@ -1,6 +1,7 @@
 //! The program `surfel`: parses the command line, calls the libraries, reports.
 
 mod args;
+mod assemble;
 mod bench;
 mod demo;
 mod dry_run;

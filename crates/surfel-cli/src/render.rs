@@ -1,7 +1,8 @@
 //! `surfel render`: options, and the resolved choices as JSON.
 
 use crate::args::{
-    CameraArgs, ColorArgs, Global, LightArgs, PictureArgs, PreparationArgs, SurfaceArgs, Usage,
+    CameraArgs, ColorArgs, Global, LightArgs, MaterialArgs, PictureArgs, PreparationArgs,
+    SurfaceArgs, Usage,
 };
 use crate::picture;
 use crate::report::Report;
@@ -28,6 +29,8 @@ pub struct Args {
     pub surface: SurfaceArgs,
     #[command(flatten)]
     pub camera: CameraArgs,
+    #[command(flatten)]
+    pub material: MaterialArgs,
     #[command(flatten)]
     pub light: LightArgs,
     #[command(flatten)]

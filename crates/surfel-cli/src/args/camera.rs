@@ -56,6 +56,10 @@ impl CameraArgs {
     /// The world's up, from the option or the cloud.
     pub fn up(&self, cloud: &PointCloud, source: &Source, report: &Report) -> Vec3 {
         self.up.unwrap_or_else(|| {
+            if source.format.starts_with("glTF") {
+                report.choice("up is +Z, to which glTF files are turned", "--up");
+                return Vec3::Z;
+            }
             let guess = guess_up(cloud, is_georeferenced(cloud, source));
             report.choice(&guess.reason, "--up");
             guess.up

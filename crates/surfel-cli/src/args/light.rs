@@ -2,13 +2,15 @@
 
 use super::{Usage, parse};
 use clap::{Args, ValueEnum};
+use std::path::PathBuf;
 
 #[derive(Args)]
 #[command(next_help_heading = "Light")]
 pub struct LightArgs {
-    /// One or more, separated by commas; none shows the colours as they are.
-    #[arg(long, value_name = "KINDS", value_delimiter = ',', default_value = "sun,sky")]
-    light: Vec<LightKind>,
+    /// One or more, separated by commas; none shows the colours as they are [default: sun,sky, or none but
+    /// the environment where there is one].
+    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    light: Option<Vec<LightKind>>,
     /// Direction of the sun, clockwise from north; behind the camera to the left if not given.
     #[arg(long, value_name = "DEG", value_parser = parse::number_in::<-360, 360>,
         allow_negative_numbers = true)]
@@ -29,6 +31,16 @@ pub struct LightArgs {
     /// How far away things still dim the sky, in the cloud's unit; a share of its size if not given.
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     pub sky_reach: Option<f64>,
+    /// Light from a picture of all that is around: .hdr or .exr, equirectangular.
+    #[arg(long, value_name = "FILE")]
+    pub environment: Option<PathBuf>,
+    /// Turns it, clockwise from above; its middle looks north if not given.
+    #[arg(long, value_name = "DEG", default_value = "0", value_parser = parse::number_in::<-360, 360>,
+        allow_negative_numbers = true)]
+    pub environment_rotation: f64,
+    /// Multiplies its light.
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = parse::number_in::<0, 1000>)]
+    pub environment_strength: f64,
     /// In stops; auto makes the brightest parts of the cloud nearly white.
     #[arg(long, value_name = "EV", default_value = "auto", value_parser = exposure,
         allow_negative_numbers = true)]
@@ -51,14 +63,20 @@ pub enum Exposure {
 
 impl LightArgs {
     pub fn check(&self) -> Result<(), Usage> {
-        if self.light.contains(&LightKind::None) && 1 < self.light.len() {
+        let is_none = self.has(LightKind::None);
+        if is_none && self.light.as_ref().is_some_and(|kinds| 1 < kinds.len()) {
             return Err(Usage("--light none stands alone; leave out the others".into()));
         }
         Ok(())
     }
 
     pub fn has(&self, kind: LightKind) -> bool {
-        self.light.contains(&kind)
+        match &self.light {
+            Some(kinds) => kinds.contains(&kind),
+            None => {
+                self.environment.is_none() && matches!(kind, LightKind::Sun | LightKind::Sky)
+            }
+        }
     }
 }
 

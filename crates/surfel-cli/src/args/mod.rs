@@ -3,12 +3,14 @@
 mod camera;
 mod color;
 mod light;
+mod material;
 pub mod parse;
 mod preparation;
 
 pub use camera::{CameraArgs, is_georeferenced, short};
 pub use color::ColorArgs;
 pub use light::{Exposure, LightArgs, LightKind};
+pub use material::MaterialArgs;
 pub use preparation::PreparationArgs;
 
 use crate::report::Verbosity;

@@ -82,6 +82,11 @@ pub fn background(text: &str) -> Result<Background, String> {
 /// Dark enough above for light stone to stand out, light enough below for what is dark.
 const GRADIENT: &str = "#6f7c8a,#c9ced3";
 
+/// `#RRGGBB`, linear.
+pub fn color(text: &str) -> Result<Vec3, String> {
+    linear(text.trim()).ok_or_else(|| "expected a colour as in #aabbcc".into())
+}
+
 fn linear(color: &str) -> Option<Vec3> {
     Some(Vec3::from_array(parse_hex(color)?.map(decode_srgb8)))
 }

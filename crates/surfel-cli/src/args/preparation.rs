@@ -103,6 +103,11 @@ impl PreparationArgs {
         }
     }
 
+    /// Whether the orientation tells inside and outside of what the points enclose.
+    pub fn orients_outward(&self) -> bool {
+        self.orient == Orientation::Mst
+    }
+
     /// Drops the normals and radii that are to be estimated in a given way.
     pub fn forget(&self, cloud: &mut PointCloud) {
         if self.names_normals() {

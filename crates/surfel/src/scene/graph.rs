@@ -6,7 +6,7 @@ use super::light::Lamp;
 use super::material::Material;
 use super::mesh::Mesh;
 use super::texture::Texture;
-use crate::math::{DAffine3, DQuat, DVec3};
+use crate::math::{DAffine3, DQuat, DVec3, Vec3};
 use crate::points::PointCloud;
 use crate::surface::{Boundary, SurfaceKind};
 
@@ -120,6 +120,14 @@ impl Geometry {
             Self::Triangles(mesh) => mesh.origin,
         }
     }
+
+    /// Of points, or of vertices.
+    pub fn positions(&self) -> &[Vec3] {
+        match self {
+            Self::Points(points) => &points.cloud.positions,
+            Self::Triangles(mesh) => &mesh.positions,
+        }
+    }
 }
 
 impl Graph {
@@ -155,6 +163,36 @@ impl Graph {
         }));
         self.animation.append(other.animation, node);
         node
+    }
+
+    /// Points and triangles, each geometry once.
+    pub fn counts(&self) -> (usize, usize) {
+        self.geometries.iter().fold((0, 0), |(n_points, n_triangles), geometry| match geometry {
+            Geometry::Points(points) => (n_points + points.cloud.len(), n_triangles),
+            Geometry::Triangles(mesh) => (n_points, n_triangles + mesh.triangles.len()),
+        })
+    }
+
+    /// Points that show where everything visible is: some of the clouds' points and of the vertices.
+    pub fn outline(&self) -> PointCloud {
+        const MOST: usize = 400_000;
+        let (world, is_visible) = (self.world_from_nodes(), self.visible_nodes());
+        let nodes = self.nodes.iter().zip(&world).zip(&is_visible).filter(|(_, visible)| **visible);
+        let parts: Vec<(&Geometry, &DAffine3)> = nodes
+            .flat_map(|((node, world), _)| node.parts.iter().map(move |part| (part, world)))
+            .map(|(part, world)| (&self.geometries[part.geometry], world))
+            .collect();
+        let n_places: usize = parts.iter().map(|(geometry, _)| geometry.positions().len()).sum();
+        let step = n_places.div_ceil(MOST).max(1);
+        let mut places = Vec::new();
+        for (geometry, world) in parts {
+            let origin = geometry.origin();
+            let place = |p: &Vec3| world.transform_point3(origin + p.as_dvec3());
+            places.extend(geometry.positions().iter().step_by(step).map(place));
+        }
+        let origin = PointCloud::choose_origin(&places);
+        let positions = places.iter().map(|place| (*place - origin).as_vec3()).collect();
+        PointCloud { origin, ..PointCloud::from_positions(positions) }
     }
 
     /// Of each node, whether it and all above it are visible.
