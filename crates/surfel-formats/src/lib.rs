@@ -33,20 +33,26 @@ mod block;
 mod record;
 mod records;
 mod lines;
+mod pieces;
+mod weld;
+mod mesh;
 mod encode;
 mod ply;
 mod las;
 mod text;
+mod beside;
+mod texture;
 mod obj;
+mod stl;
 mod bin;
 mod extent;
 mod load;
+mod graph;
 mod save;
 mod picture;
-#[cfg_attr(not(test), expect(dead_code, reason = "the readers of OBJ and glTF use it"))]
-mod texture;
 
 pub use error::{Error, Place, Result};
+pub use graph::{load_graph, load_graph_bytes};
 pub use load::{inspect, load, load_all, load_bytes};
 pub use options::{Column, ColumnChoice, LoadOptions, Loaded, Source, TextColumn};
 pub use picture::{Alpha, BitDepth, ImageOptions, save_image};

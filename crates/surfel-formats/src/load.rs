@@ -9,9 +9,9 @@ use crate::error::{Error, Place, Result};
 use crate::extent::Extent;
 use crate::input::Input;
 use crate::options::{LoadOptions, Loaded, Source};
-use crate::{bin, las, obj, ply, text};
+use crate::{bin, las, obj, ply, stl, text};
 
-const SUPPORTED: &str = "surfel reads .ply, .las, .laz (.copc.laz too), .xyz, .txt, .csv, .asc, .pts, .obj and .bin; \
+const SUPPORTED: &str = "surfel reads .ply, .las, .laz (.copc.laz too), .xyz, .txt, .csv, .asc, .pts, .obj, .stl and .bin; \
      convert the file to one of them";
 
 /// Reads the points of a file.
@@ -80,31 +80,38 @@ pub fn inspect(path: &Path) -> Result<Source> {
         Format::Las => las::inspect(&input),
         Format::Text => text::inspect(&input),
         Format::Obj => obj::inspect(&input),
+        Format::Stl => stl::inspect(&input),
         Format::Bin => bin::inspect(&input),
     }
 }
 
-enum Format {
+pub(crate) enum Format {
     Ply,
     Las,
     Text,
     Obj,
+    Stl,
     Bin,
 }
 
-fn read(input: &Input, options: &LoadOptions, progress: &dyn Progress) -> Result<Loaded> {
+pub(crate) fn read(
+    input: &Input,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<Loaded> {
     progress.check()?;
     match format_of(input)? {
         Format::Ply => ply::read(input, options, progress),
         Format::Las => las::read(input, options, progress),
         Format::Text => text::read(input, options, progress),
         Format::Obj => obj::read(input, options, progress),
+        Format::Stl => stl::read(input, options, progress),
         Format::Bin => bin::read(input, options, progress),
     }
 }
 
 /// By the first bytes, and where they say nothing by the extension.
-fn format_of(input: &Input) -> Result<Format> {
+pub(crate) fn format_of(input: &Input) -> Result<Format> {
     let starts = |magic: &[u8]| input.starts_with(magic);
     if input.is_empty() {
         let advice = "write the file again or copy it again from its source";
@@ -139,6 +146,7 @@ fn format_of(input: &Input) -> Result<Format> {
     match input.extension().as_str() {
         "xyz" | "txt" | "csv" | "asc" | "pts" | "xyzrgb" | "xyzn" => Ok(Format::Text),
         "obj" => Ok(Format::Obj),
+        "stl" => Ok(Format::Stl),
         "ply" => wrong_magic("`ply` and the end of the line"),
         "las" | "laz" => wrong_magic("`LASF`"),
         "" => Err(input.unsupported("a name without extension and unknown content", SUPPORTED)),
@@ -156,6 +164,7 @@ fn common_source(sources: &[Source]) -> Source {
     Source {
         format: formats.join("; "),
         n_points: sources.iter().map(|source| source.n_points).sum(),
+        n_triangles: sources.iter().map(|source| source.n_triangles).sum(),
         resolution: sources
             .iter()
             .map(|source| source.resolution)

@@ -6,6 +6,12 @@ mod common;
 mod bin;
 #[path = "formats/broken.rs"]
 mod broken;
+#[path = "formats/meshes.rs"]
+mod meshes;
+#[path = "formats/broken_meshes.rs"]
+mod broken_meshes;
+#[path = "formats/materials.rs"]
+mod materials;
 #[path = "formats/ply.rs"]
 mod ply;
 #[path = "formats/pictures.rs"]
