@@ -120,7 +120,8 @@ fn count(input: &Input) -> Result<usize> {
 }
 
 fn read_binary(input: &Input, progress: &dyn Progress) -> Result<Vec<Vec3>> {
-    let records = &input[BODY..][..STRIDE * count(input)?];
+    let n_bytes = STRIDE * count(input)?;
+    let records = &input[BODY..][..n_bytes];
     progress.check()?;
     let corners = records.par_chunks_exact(STRIDE).flat_map_iter(|record| {
         let (numbers, _) = record[12..48].as_chunks::<4>();

@@ -181,7 +181,11 @@ fn index(
         let what = ["vertex", "texture coordinates", "normal"][kind];
         LineError {
             found: format!("{what} `{}`", number[..number.len().min(40)].escape_ascii()),
-            expected: format!("1 to {}, or -1 to -{}", total[kind], before[kind]),
+            expected: match (total[kind], before[kind]) {
+                (0, _) => "none, since the file has none".into(),
+                (n_all, 0) => format!("1 to {n_all}"),
+                (n_all, n_before) => format!("1 to {n_all}, or -1 to -{n_before}"),
+            },
         }
     })
 }
