@@ -9,9 +9,9 @@ use crate::error::{Error, Place, Result};
 use crate::extent::Extent;
 use crate::input::Input;
 use crate::options::{LoadOptions, Loaded, Source};
-use crate::{bin, las, obj, ply, text};
+use crate::{bin, las, obj, ply, stl, text};
 
-const SUPPORTED: &str = "surfel reads .ply, .las, .laz (.copc.laz too), .xyz, .txt, .csv, .asc, .pts, .obj and .bin; \
+const SUPPORTED: &str = "surfel reads .ply, .las, .laz (.copc.laz too), .xyz, .txt, .csv, .asc, .pts, .obj, .stl and .bin; \
      convert the file to one of them";
 
 /// Reads the points of a file.
@@ -30,30 +30,36 @@ pub fn load_bytes(
 }
 
 /// Reads several files to one cloud about the origin of the largest; the sources are in their order.
-///
-/// Columns that some of the files lack are dropped; `progress` is told which, and where the common
-/// origin is too far from a file's points to keep their resolution.
 pub fn load_all(
     paths: &[PathBuf],
     options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<(Loaded, Vec<Source>)> {
-    let first = paths.first().ok_or(Error::NoInput)?;
-    let mut clouds = Vec::new();
-    let mut sources = Vec::new();
-    for path in paths {
-        let Loaded { cloud, source } = load(path, options, progress)?;
-        clouds.push(cloud);
-        sources.push(source);
+    let parts =
+        paths.iter().map(|path| load(path, options, progress)).collect::<Result<Vec<_>>>()?;
+    let sources: Vec<Source> = parts.iter().map(|part| part.source.clone()).collect();
+    if parts.is_empty() {
+        return Err(Error::NoInput);
     }
-    if let ([_], [source]) = (&clouds[..], &sources[..]) {
-        let source = source.clone();
-        let cloud = clouds.pop().unwrap_or_default();
-        return Ok((Loaded { cloud, source }, sources));
+    Ok((merge_loaded(parts, paths, progress), sources))
+}
+
+/// Makes one cloud of those of several files, about the origin of the largest.
+///
+/// Columns that some of the files lack are dropped; `progress` is told which, and where the common
+/// origin is too far from a file's points to keep their resolution.
+pub fn merge_loaded(
+    mut parts: Vec<Loaded>,
+    paths: &[PathBuf],
+    progress: &dyn Progress,
+) -> Loaded {
+    if parts.len() < 2 {
+        return parts.pop().unwrap_or_default();
     }
+    let sources: Vec<Source> = parts.iter().map(|part| part.source.clone()).collect();
     let extents: Vec<Extent> =
-        clouds.iter().zip(&sources).map(|(cloud, source)| Extent::of(cloud, source)).collect();
-    let (cloud, dropped) = merge(clouds);
+        parts.iter().map(|Loaded { cloud, source }| Extent::of(cloud, source)).collect();
+    let (cloud, dropped) = merge(parts.into_iter().map(|part| part.cloud).collect());
     if !dropped.is_empty() {
         progress.note(&format!("not in all files, dropped: {}", dropped.join(", ")));
     }
@@ -65,11 +71,11 @@ pub fn load_all(
             progress.note(&format!(
                 "{}: its coordinate system differs from that of {}, or only one of them names it",
                 path.display(),
-                first.display()
+                paths[0].display()
             ));
         }
     }
-    Ok((Loaded { cloud, source: common_source(&sources) }, sources))
+    Loaded { cloud, source: common_source(&sources) }
 }
 
 /// What a file says about itself, without reading its points.
@@ -80,31 +86,38 @@ pub fn inspect(path: &Path) -> Result<Source> {
         Format::Las => las::inspect(&input),
         Format::Text => text::inspect(&input),
         Format::Obj => obj::inspect(&input),
+        Format::Stl => stl::inspect(&input),
         Format::Bin => bin::inspect(&input),
     }
 }
 
-enum Format {
+pub(crate) enum Format {
     Ply,
     Las,
     Text,
     Obj,
+    Stl,
     Bin,
 }
 
-fn read(input: &Input, options: &LoadOptions, progress: &dyn Progress) -> Result<Loaded> {
+pub(crate) fn read(
+    input: &Input,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<Loaded> {
     progress.check()?;
     match format_of(input)? {
         Format::Ply => ply::read(input, options, progress),
         Format::Las => las::read(input, options, progress),
         Format::Text => text::read(input, options, progress),
         Format::Obj => obj::read(input, options, progress),
+        Format::Stl => stl::read(input, options, progress),
         Format::Bin => bin::read(input, options, progress),
     }
 }
 
 /// By the first bytes, and where they say nothing by the extension.
-fn format_of(input: &Input) -> Result<Format> {
+pub(crate) fn format_of(input: &Input) -> Result<Format> {
     let starts = |magic: &[u8]| input.starts_with(magic);
     if input.is_empty() {
         let advice = "write the file again or copy it again from its source";
@@ -139,6 +152,7 @@ fn format_of(input: &Input) -> Result<Format> {
     match input.extension().as_str() {
         "xyz" | "txt" | "csv" | "asc" | "pts" | "xyzrgb" | "xyzn" => Ok(Format::Text),
         "obj" => Ok(Format::Obj),
+        "stl" => Ok(Format::Stl),
         "ply" => wrong_magic("`ply` and the end of the line"),
         "las" | "laz" => wrong_magic("`LASF`"),
         "" => Err(input.unsupported("a name without extension and unknown content", SUPPORTED)),
@@ -147,8 +161,8 @@ fn format_of(input: &Input) -> Result<Format> {
 }
 
 /// What holds for all the files together.
-fn common_source(sources: &[Source]) -> Source {
-    let first = &sources[0];
+pub fn common_source(sources: &[Source]) -> Source {
+    let Some(first) = sources.first() else { return Source::default() };
     let mut formats: Vec<&str> = sources.iter().map(|source| source.format.as_str()).collect();
     formats.dedup();
     let same_system =
@@ -156,6 +170,7 @@ fn common_source(sources: &[Source]) -> Source {
     Source {
         format: formats.join("; "),
         n_points: sources.iter().map(|source| source.n_points).sum(),
+        n_triangles: sources.iter().map(|source| source.n_triangles).sum(),
         resolution: sources
             .iter()
             .map(|source| source.resolution)

@@ -5,7 +5,7 @@ use surfel::points::PointCloud;
 
 use crate::role::Role;
 
-/// How to load a cloud.
+/// How to load a file.
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
     pub columns: ColumnChoice,
@@ -39,7 +39,7 @@ pub enum Column {
 pub struct TextColumn(pub(crate) Option<Role>);
 
 /// A cloud and where it came from.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Loaded {
     pub cloud: PointCloud,
     pub source: Source,
@@ -52,6 +52,8 @@ pub struct Source {
     pub format: String,
     /// As far as it is known without reading all points.
     pub n_points: Option<u64>,
+    /// Of a mesh; before it is read the number of its faces, which may have more corners.
+    pub n_triangles: Option<u64>,
     /// Smallest step between coordinates, if the format states one.
     pub resolution: Option<DVec3>,
     /// WKT, or "EPSG:" and a code, or other words of the file.
@@ -75,6 +77,11 @@ impl ColumnChoice {
             (Column::Scalar(wanted), Role::Scalar(name)) => wanted.eq_ignore_ascii_case(name),
             _ => false,
         })
+    }
+
+    /// Whether the scalar column is asked for by its name.
+    pub(crate) fn names(&self, scalar: &str) -> bool {
+        *self != Self::All && self.wants(&Role::Scalar(scalar.into()))
     }
 }
 

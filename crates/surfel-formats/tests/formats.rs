@@ -10,6 +10,12 @@ mod broken;
 mod movies;
 #[path = "formats/environments.rs"]
 mod environments;
+#[path = "formats/meshes.rs"]
+mod meshes;
+#[path = "formats/broken_meshes.rs"]
+mod broken_meshes;
+#[path = "formats/materials.rs"]
+mod materials;
 #[path = "formats/ply.rs"]
 mod ply;
 #[path = "formats/pictures.rs"]

@@ -8,6 +8,8 @@ use crate::record::Kind;
 pub(super) struct Header {
     pub encoding: Encoding,
     pub elements: Vec<Element>,
+    /// The file of a texture, as MeshLab names it in a comment.
+    pub texture: Option<String>,
     /// First byte behind the header, and the number of its line.
     pub body: usize,
     pub body_line: u64,
@@ -48,6 +50,7 @@ impl Element {
 pub(super) fn read_header(input: &Input) -> Result<Header> {
     let mut lines = Lines::new(input);
     let mut encoding = None;
+    let mut texture = None;
     let mut elements: Vec<Element> = Vec::new();
     loop {
         let number = lines.number;
@@ -65,6 +68,10 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
         let line = String::from_utf8_lossy(line);
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
         match words.as_slice() {
+            ["comment", "TextureFile", ..] => {
+                let name = line.split_once("TextureFile").map(|(_, name)| name.trim().to_owned());
+                texture = texture.or(name);
+            }
             ["ply"] | ["comment" | "obj_info", ..] | [] => {}
             ["format", name, _version] => {
                 encoding = Some(match *name {
@@ -112,7 +119,8 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
                 let Some(encoding) = encoding else {
                     return Err(malformed(&line, "a `format` line before it"));
                 };
-                return Ok(Header { encoding, elements, body: lines.at, body_line: lines.number });
+                let (body, body_line) = (lines.at, lines.number);
+                return Ok(Header { encoding, elements, texture, body, body_line });
             }
             _ => {
                 return Err(malformed(

@@ -1,10 +1,14 @@
-//! PLY: polygon files, of which the vertices are read as points.
+//! PLY: polygon files, read as points by their vertices alone or as meshes.
 
 mod header;
 mod walk;
+mod lines;
+mod faces;
 mod read;
+mod mesh;
 mod write;
 
+pub(crate) use mesh::{has_faces, read_mesh};
 pub(crate) use read::{inspect, read};
 pub(crate) use write::write;
 

@@ -3,12 +3,14 @@
 use surfel::points::PointCloud;
 use surfel::progress::Progress;
 
+use super::faces::count_faces;
 use super::header::{Element, Encoding, Header, read_header};
+use super::lines::end_of_lines;
 use super::walk::{pack_vertices, skip_elements};
 use crate::error::{Error, Place, Result};
 use crate::input::Input;
 use crate::lines::{LineError, Rows, read_rows};
-use crate::options::{LoadOptions, Loaded, Source};
+use crate::options::{ColumnChoice, LoadOptions, Loaded, Source};
 use crate::range::{ColorRange, is_byte};
 use crate::record::{ColumnField, Field, Kind, Layout};
 use crate::records::{Tolerance, origin_of_records, read_records};
@@ -26,30 +28,47 @@ pub(crate) fn read(
     progress: &dyn Progress,
 ) -> Result<Loaded> {
     let header = read_header(input)?;
-    let (before, vertex) = find_vertex(input, &header)?;
-    let cloud = match header.encoding {
-        Encoding::Ascii => read_ascii(input, &header, before, vertex, options, progress)?,
-        _ => read_binary(input, &header, before, vertex, options, progress)?,
-    };
+    let cloud = read_cloud(input, &header, options, progress)?;
+    let (_, vertex) = find_vertex(input, &header)?;
     Ok(Loaded { cloud, source: source(&header, vertex) })
 }
 
-fn source(header: &Header, vertex: &Element) -> Source {
+/// The vertices as points.
+pub(super) fn read_cloud(
+    input: &Input,
+    header: &Header,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<PointCloud> {
+    let (before, vertex) = find_vertex(input, header)?;
+    match header.encoding {
+        Encoding::Ascii => read_ascii(input, header, before, vertex, options, progress),
+        _ => read_binary(input, header, before, vertex, options, progress),
+    }
+}
+
+pub(super) fn source(header: &Header, vertex: &Element) -> Source {
     let encoding = match header.encoding {
         Encoding::Ascii => "ascii",
         Encoding::LittleEndian => "binary little endian",
         Encoding::BigEndian => "binary big endian",
     };
+    let n_faces = count_faces(header);
+    let kind = if 0 < n_faces { ", mesh" } else { "" };
     Source {
-        format: format!("PLY, {encoding}"),
+        format: format!("PLY, {encoding}{kind}"),
         n_points: Some(vertex.count),
+        n_triangles: (0 < n_faces).then_some(n_faces),
         columns: vertex.properties.iter().map(|property| property.name.clone()).collect(),
         ..Source::default()
     }
 }
 
 /// The vertex element and those before it.
-fn find_vertex<'a>(input: &Input, header: &'a Header) -> Result<(&'a [Element], &'a Element)> {
+pub(super) fn find_vertex<'a>(
+    input: &Input,
+    header: &'a Header,
+) -> Result<(&'a [Element], &'a Element)> {
     let at = header.elements.iter().position(|element| element.name == "vertex");
     let missing = |expected: &str| {
         let found: Vec<&str> = match at {
@@ -122,33 +141,25 @@ fn read_ascii(
     options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<PointCloud> {
-    let mut rest = &input[header.body..];
-    let mut line = header.body_line;
-    for element in before.iter().filter(|element| !element.properties.is_empty()) {
-        for count in 0..element.count {
-            if count % 65536 == 0 {
-                progress.check()?;
-            }
-            let Some(end) = memchr::memchr(b'\n', rest) else {
-                return Err(truncated(input, 0, vertex));
-            };
-            rest = &rest[end + 1..];
-            line += 1;
-        }
+    let mut start = header.body;
+    for element in before {
+        start = end_of_lines(input, start, element, progress)?;
     }
+    let lines_between = memchr::memchr_iter(b'\n', &input[header.body..start]).count();
+    let line = header.body_line + lines_between as u64;
     let numbers = vertex.properties.iter().filter(|property| property.list.is_none());
     let columns: Vec<(&str, Kind)> = numbers.map(|p| (p.name.as_str(), p.kind)).collect();
     let n_columns = columns.len();
-    let rows = Rows { start: input.len() - rest.len(), line, n_columns, limit: Some(vertex.count) };
+    let rows = Rows { start, line, n_columns, limit: Some(vertex.count) };
     let parse = |line: &[u8], row: &mut Vec<f64>| parse_vertex(line, vertex, row);
     let layout_of = |sample: &[u8]| {
         let fields = columns.iter().enumerate().map(|(i, (name, kind))| {
             (*name, Field { scale: 1.0, ..Field::new(8 * i, Kind::F64) }, *kind)
         });
-        let columns = named_columns(fields, 8 * n_columns, false, sample);
+        let columns = named_columns(fields, 8 * n_columns, false, sample, &options.columns);
         Layout::new(8 * n_columns, false, columns, &options.columns).expect("x, y and z were found")
     };
-    progress.begin(&format!("read {}", input.name), rest.len() as u64);
+    progress.begin(&format!("read {}", input.name), (input.len() - start) as u64);
     let cloud = read_rows(input, rows, &parse, layout_of, options.origin, progress)?;
     if (cloud.len() as u64) < vertex.count {
         return Err(truncated(input, cloud.len() as u64, vertex));
@@ -192,7 +203,7 @@ fn layout(
     options: &LoadOptions,
 ) -> Layout {
     let fields = columns.into_iter().map(|(name, field)| (name, field, field.kind));
-    let columns = named_columns(fields, stride, big_endian, sample);
+    let columns = named_columns(fields, stride, big_endian, sample, &options.columns);
     Layout::new(stride, big_endian, columns, &options.columns).expect("x, y and z were found")
 }
 
@@ -202,9 +213,11 @@ fn named_columns<'a>(
     stride: usize,
     big_endian: bool,
     sample: &[u8],
+    choice: &ColumnChoice,
 ) -> Vec<ColumnField> {
+    let keeps_alpha = choice.names("alpha");
     let fields: Vec<(&str, Field, Kind)> =
-        fields.filter(|(name, ..)| !Role::is_alpha(name)).collect();
+        fields.filter(|(name, ..)| keeps_alpha || !Role::is_alpha(name)).collect();
     let colors =
         fields.iter().filter(|(name, ..)| matches!(Role::of_name(name), Some(Role::Color(_))));
     let float_range = ColorRange::of_floats(colors.flat_map(|(_, field, _)| {
@@ -220,13 +233,16 @@ fn named_columns<'a>(
         if role == Role::Classification && kind != Kind::U8 && !holds_classes() {
             role = Role::Scalar(name.into());
         }
+        let range = match kind {
+            Kind::F32 | Kind::F64 => float_range,
+            Kind::U16 => ColorRange::Bits16,
+            _ => ColorRange::Bits8,
+        };
         if let Role::Color(_) = role {
-            let range = match kind {
-                Kind::F32 | Kind::F64 => float_range,
-                Kind::U16 => ColorRange::Bits16,
-                _ => ColorRange::Bits8,
-            };
             field.scale = range.scale();
+        } else if Role::is_alpha(name) {
+            role = Role::Scalar("alpha".into());
+            field.scale = range.scale() / 65535.0;
         }
         columns.push(ColumnField { role, field });
     }

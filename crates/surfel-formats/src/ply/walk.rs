@@ -4,7 +4,7 @@ use surfel::progress::Progress;
 
 use super::header::{Element, Property};
 use super::read::truncated;
-use crate::error::{Place, Result};
+use crate::error::{Error, Place, Result};
 use crate::input::Input;
 use crate::record::Field;
 
@@ -42,14 +42,7 @@ pub(super) fn skip_elements(
     big_endian: bool,
     progress: &dyn Progress,
 ) -> Result<usize> {
-    let ends_early = || {
-        input.malformed(
-            Place::Byte(input.len() as u64),
-            "the end of the file",
-            format!("{} elements `{}`", element.count, element.name),
-            "copy the file again from its source",
-        )
-    };
+    let ends_early = || ends_early(input, element);
     if let Some(stride) = element.stride() {
         let length = element.count.checked_mul(stride as u64).ok_or_else(ends_early)?;
         let end = length.checked_add(start as u64).filter(|end| *end <= input.len() as u64);
@@ -67,8 +60,23 @@ pub(super) fn skip_elements(
     Ok(at)
 }
 
+/// The error of a file that ends within `element`.
+pub(super) fn ends_early(input: &Input, element: &Element) -> Error {
+    input.malformed(
+        Place::Byte(input.len() as u64),
+        "the end of the file",
+        format!("{} elements `{}`", element.count, element.name),
+        "copy the file again from its source",
+    )
+}
+
 /// The first byte behind the property at `at`, if the file holds all of it.
-fn property_end(bytes: &[u8], at: usize, property: &Property, big_endian: bool) -> Option<usize> {
+pub(super) fn property_end(
+    bytes: &[u8],
+    at: usize,
+    property: &Property,
+    big_endian: bool,
+) -> Option<usize> {
     let (at, n_items) = match property.list {
         None => (at, 1),
         Some(kind) => {

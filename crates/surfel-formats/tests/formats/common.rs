@@ -7,7 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use surfel::math::{DVec3, Vec3};
 use surfel::points::{PointCloud, Scalar, Values};
 use surfel::progress::{Progress, Silent};
-use surfel_formats::{Error, LoadOptions, Loaded, SaveOptions, load, load_bytes, save};
+use surfel::scene::{Geometry, Graph, Mesh};
+use surfel_formats::{
+    Error, LoadOptions, Loaded, SaveOptions, Source, load, load_bytes, load_graph_bytes, save,
+};
 
 /// A file of the shared test data; without them a line is printed and the test has nothing to do.
 pub fn shared(name: &str) -> Option<PathBuf> {
@@ -73,6 +76,24 @@ impl Progress for Listener {
 
 pub fn read(name: &str, bytes: impl AsRef<[u8]>) -> Result<Loaded, Error> {
     load_bytes(name, bytes.as_ref(), &LoadOptions::default(), &Silent)
+}
+
+/// The file as a graph, with what was noted.
+pub fn read_graph(name: &str, bytes: impl AsRef<[u8]>) -> Result<(Graph, Source, Listener), Error> {
+    let listener = Listener::default();
+    let (graph, source) =
+        load_graph_bytes(name, bytes.as_ref(), &LoadOptions::default(), &listener)?;
+    Ok((graph, source, listener))
+}
+
+/// The only mesh of a file.
+pub fn read_mesh(name: &str, bytes: impl AsRef<[u8]>) -> Mesh {
+    let (mut graph, ..) = read_graph(name, bytes).unwrap();
+    assert_eq!(graph.geometries.len(), 1, "{name}");
+    match graph.geometries.remove(0) {
+        Geometry::Triangles(mesh) => mesh,
+        Geometry::Points(_) => panic!("{name}: points"),
+    }
 }
 
 /// The cloud after it was written to a file of this extension and read again.

@@ -1,5 +1,7 @@
 //! Triangles as columns, and what deforms them.
 
+use std::collections::HashMap;
+
 use crate::math::{Aabb, DVec3, Vec2, Vec3, Vec4};
 
 /// Triangles over shared vertices. Every column of vertices that is present has one entry for each position.
@@ -48,5 +50,106 @@ impl Mesh {
     /// Corners of a triangle, relative to `origin`.
     pub fn corners(&self, triangle_idx: usize) -> [Vec3; 3] {
         self.triangles[triangle_idx].map(|vertex| self.positions[vertex as usize])
+    }
+
+    /// Gives each vertex the mean normal of the triangles around it, weighted by their angles there
+    /// (Thürmer and Wüthrich 1998): how a corner is cut into triangles does not matter.
+    ///
+    /// Vertices at the same place share a normal, so that seams of textures do not show. One that no
+    /// triangle with an area uses gets +Z. Tangents, which belong to the normals before, are dropped.
+    pub fn smooth_normals(&mut self) {
+        let places = self.places();
+        let mut sums = vec![DVec3::ZERO; self.positions.len()];
+        for triangle in &self.triangles {
+            let corners = triangle.map(|vertex| self.positions[vertex as usize].as_dvec3());
+            let [a, b, c] = corners;
+            let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
+            for (i, vertex) in triangle.iter().enumerate() {
+                let sides = [1, 2].map(|step| corners[(i + step) % 3] - corners[i]);
+                sums[places[*vertex as usize] as usize] +=
+                    sides[0].angle_between(sides[1]) * normal;
+            }
+        }
+        let normal = |place: &u32| sums[*place as usize].normalize_or(DVec3::Z).as_vec3();
+        self.normals = Some(places.iter().map(normal).collect());
+        self.tangents = None;
+    }
+
+    /// For each vertex the first one at the same place.
+    fn places(&self) -> Vec<u32> {
+        let mut firsts = HashMap::with_capacity(self.positions.len());
+        let positions = (0..).zip(&self.positions);
+        // Adding zero makes one zero of the two.
+        let first = |(vertex, position): (u32, &Vec3)| {
+            *firsts.entry((*position + 0.0).to_array().map(f32::to_bits)).or_insert(vertex)
+        };
+        positions.map(first).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cube about zero; its sides are cut along diagonals that do not look the same from all corners.
+    fn cube() -> Mesh {
+        let sign = |bit: u32| if bit == 0 { -1.0 } else { 1.0 };
+        let corner = |i: u32| Vec3::new(sign(i & 1), sign(i & 2), sign(i & 4));
+        let sides =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        Mesh {
+            positions: (0..8).map(corner).collect(),
+            triangles: sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+            ..Mesh::default()
+        }
+    }
+
+    #[test]
+    fn smooth_normals_do_not_depend_on_diagonals() {
+        let mut mesh = cube();
+        mesh.tangents = Some(vec![Vec4::X; 8]);
+        mesh.smooth_normals();
+        for (normal, position) in mesh.normals.unwrap().into_iter().zip(mesh.positions) {
+            assert!((normal - position.normalize()).length() < 1e-6, "{normal} at {position}");
+        }
+        assert_eq!(mesh.tangents, None);
+    }
+
+    #[test]
+    fn vertices_at_one_place_share_their_smooth_normal() {
+        let mut whole = cube();
+        // Every triangle with vertices of its own, and one zero written as two.
+        let corners = whole.triangles.as_flattened().iter();
+        let mut split = Mesh {
+            positions: corners.map(|vertex| whole.positions[*vertex as usize]).collect(),
+            triangles: (0..12).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+            ..Mesh::default()
+        };
+        for mesh in [&mut whole, &mut split] {
+            mesh.positions.iter_mut().for_each(|position| position.x += 1.0);
+        }
+        split.positions.iter_mut().skip(1).filter(|p| p.x == 0.0).for_each(|p| p.x = -0.0);
+        whole.smooth_normals();
+        split.smooth_normals();
+        let (whole_normals, split_normals) = (whole.normals.unwrap(), split.normals.unwrap());
+        for (corner, vertex) in whole.triangles.as_flattened().iter().enumerate() {
+            let difference = split_normals[corner] - whole_normals[*vertex as usize];
+            assert!(difference.length() < 1e-6, "{corner}");
+        }
+    }
+
+    #[test]
+    fn vertices_without_an_area_have_a_normal_all_the_same() {
+        let positions = [Vec3::ZERO, Vec3::X, 2.0 * Vec3::X, Vec3::NAN, Vec3::Y];
+        let mut mesh = Mesh {
+            positions: positions.to_vec(),
+            triangles: vec![[0, 1, 2], [0, 0, 1], [0, 1, 3]],
+            ..Mesh::default()
+        };
+        mesh.smooth_normals();
+        assert_eq!(mesh.normals, Some(vec![Vec3::Z; 5]));
+        let mut none = Mesh::default();
+        none.smooth_normals();
+        assert_eq!(none.normals, Some(vec![]));
     }
 }

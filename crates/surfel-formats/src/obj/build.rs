@@ -1,0 +1,93 @@
+//! Builds meshes from the polygons of an OBJ file.
+
+use std::ops::Range;
+
+use surfel::image::decode_srgb;
+use surfel::math::{DVec3, Vec2, Vec3, Vec4};
+use surfel::scene::Mesh;
+
+use super::parse::{ABSENT, Corner, Parsed};
+use crate::mesh::about_origin;
+use crate::options::LoadOptions;
+use crate::range::ColorRange;
+use crate::records::Tolerance;
+use crate::weld::weld;
+
+/// A file's columns as meshes have them.
+pub(super) struct Columns {
+    origin: DVec3,
+    positions: Vec<Vec3>,
+    /// Linear; empty if there are none.
+    colors: Vec<Vec4>,
+    uvs: Vec<Vec2>,
+    normals: Vec<Vec3>,
+    corners: Vec<Corner>,
+    polygon_ends: Vec<usize>,
+}
+
+impl Columns {
+    pub fn of(parsed: Parsed, options: &LoadOptions) -> Self {
+        let (origin, positions) = about_origin(&parsed.positions, Tolerance::UNSTATED, options);
+        let Parsed { colors, uvs, normals, corners, polygon_ends, .. } = parsed;
+        let channels = colors.iter().flat_map(|color| color.to_array());
+        let range = ColorRange::of_floats(channels.map(f64::from));
+        let scale = (range.scale() / 65535.0) as f32;
+        // What has no colour is white beside the others.
+        let linear = |channel: f32| if channel.is_nan() { 1.0 } else { decode(scale * channel) };
+        let colors =
+            colors.iter().map(|color| Vec3::from(color.to_array().map(linear)).extend(1.0));
+        let colors = colors.collect();
+        Self { origin, positions, colors, uvs, normals, corners, polygon_ends }
+    }
+
+    /// The polygons in these ranges as a mesh with vertices of its own.
+    ///
+    /// Returns also how many had fewer than three corners.
+    pub fn mesh(&self, polygons: &[Range<usize>]) -> (Mesh, u64) {
+        let ends = || polygons.iter().flat_map(|range| self.corner_ranges(range.clone()));
+        let corners: Vec<Corner> = ends().flat_map(|range| &self.corners[range]).copied().collect();
+        let welded = weld(&corners);
+        let mut triangles = Vec::new();
+        let mut n_short = 0;
+        let mut rest = welded.vertex_of_corner.as_slice();
+        for range in ends() {
+            let (polygon, behind) = rest.split_at(range.len());
+            rest = behind;
+            if let [first, others @ ..] = polygon {
+                triangles.extend(others.array_windows().map(|[a, b]| [*first, *a, *b]));
+            }
+            n_short += u64::from(polygon.len() < 3);
+        }
+        let vertices: Vec<Corner> =
+            welded.first_corners.iter().map(|corner| corners[*corner as usize]).collect();
+        let mesh = Mesh {
+            origin: self.origin,
+            positions: vertices.iter().map(|vertex| self.positions[vertex[0] as usize]).collect(),
+            triangles,
+            normals: column(&vertices, 2, &self.normals),
+            uvs: [column(&vertices, 1, &self.uvs), None],
+            colors: column(&vertices, 0, &self.colors),
+            ..Mesh::default()
+        };
+        (mesh, n_short)
+    }
+
+    /// Corners of each polygon.
+    fn corner_ranges(&self, polygons: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+        polygons.map(|i| {
+            let start = i.checked_sub(1).map_or(0, |before| self.polygon_ends[before]);
+            start..self.polygon_ends[i]
+        })
+    }
+}
+
+/// What vertices have of a column, if any has something; zeros where one has nothing.
+fn column<T: Copy + Default>(vertices: &[Corner], kind: usize, values: &[T]) -> Option<Vec<T>> {
+    let has_values = !values.is_empty() && vertices.iter().any(|vertex| vertex[kind] != ABSENT);
+    let value = |vertex: &Corner| values.get(vertex[kind] as usize).copied().unwrap_or_default();
+    has_values.then(|| vertices.iter().map(value).collect())
+}
+
+fn decode(encoded: f32) -> f32 {
+    decode_srgb(encoded.clamp(0.0, 1.0))
+}

@@ -1,0 +1,12 @@
+//! OBJ: meshes as text with their materials in MTL files, or the vertices alone as points.
+
+mod lines;
+mod points;
+mod parse;
+mod build;
+mod mtl;
+mod textures;
+mod mesh;
+
+pub(crate) use mesh::{has_faces, read_mesh};
+pub(crate) use points::{inspect, read};

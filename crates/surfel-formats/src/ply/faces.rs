@@ -1,0 +1,208 @@
+//! Faces of PLY files: polygons and strips become triangles.
+
+use surfel::progress::Progress;
+
+use super::header::{Element, Encoding, Header};
+use super::lines::end_of_lines;
+use super::walk::{ends_early, property_end, skip_elements};
+use crate::error::{Place, Result};
+use crate::input::Input;
+use crate::lines::{LineError, parse_number};
+use crate::pieces::{Fault, Piece, line_of, parse_pieces, plain_line};
+use crate::record::{Field, Kind};
+
+/// What the elements of faces hold.
+#[derive(Default)]
+pub(super) struct Faces {
+    pub triangles: Vec<[u32; 3]>,
+    /// Faces of fewer than three corners.
+    pub n_short: u64,
+    /// Where the first face stands.
+    pub place: Option<Place>,
+}
+
+/// An element of faces.
+struct FaceElement<'a> {
+    element: &'a Element,
+    /// Which of its properties lists the vertices.
+    indices: usize,
+    /// Whether the list is of strips, with negative numbers between them, not of a polygon.
+    is_strips: bool,
+    n_vertices: u64,
+}
+
+/// Number of faces in the file; a strip counts as one.
+pub(super) fn count_faces(header: &Header) -> u64 {
+    let elements = header.elements.iter();
+    let faces = elements.filter(|element| FaceElement::of(element, 0).is_some());
+    faces.fold(0, |sum, element| sum.saturating_add(element.count))
+}
+
+pub(super) fn read_faces(
+    input: &Input,
+    header: &Header,
+    n_vertices: u64,
+    progress: &dyn Progress,
+) -> Result<Faces> {
+    progress.begin(&format!("read the faces of {}", input.name), count_faces(header));
+    let big_endian = header.encoding == Encoding::BigEndian;
+    let is_ascii = header.encoding == Encoding::Ascii;
+    let mut faces = Faces::default();
+    let mut at = header.body;
+    for element in &header.elements {
+        let Some(face_element) = FaceElement::of(element, n_vertices) else {
+            at = match is_ascii {
+                true => end_of_lines(input, at, element, progress)?,
+                false => skip_elements(input, at, element, big_endian, progress)?,
+            };
+            continue;
+        };
+        let place = if is_ascii { line_of(input, at) } else { Place::Byte(at as u64) };
+        faces.place.get_or_insert(place);
+        at = match is_ascii {
+            true => face_element.read_ascii(input, at, &mut faces, progress)?,
+            false => face_element.read_binary(input, at, big_endian, &mut faces, progress)?,
+        };
+    }
+    Ok(faces)
+}
+
+impl<'a> FaceElement<'a> {
+    fn of(element: &'a Element, n_vertices: u64) -> Option<Self> {
+        let is_strips = element.name == "tristrips";
+        let is_named = |name: &str| ["vertex_indices", "vertex_index"].contains(&name);
+        let mut properties = element.properties.iter();
+        let indices = properties.position(|p| p.list.is_some() && is_named(&p.name))?;
+        let has_faces = (is_strips || element.name == "face") && 0 < element.count;
+        has_faces.then_some(Self { element, indices, is_strips, n_vertices })
+    }
+
+    /// Returns the first byte behind the element.
+    fn read_binary(
+        &self,
+        input: &Input,
+        start: usize,
+        big_endian: bool,
+        faces: &mut Faces,
+        progress: &dyn Progress,
+    ) -> Result<usize> {
+        let mut at = start;
+        let mut corners = Vec::new();
+        for count in 0..self.element.count {
+            if count % 65536 == 0 {
+                progress.check()?;
+                progress.advance(65536.min(self.element.count - count));
+            }
+            let first = at;
+            for (i, property) in self.element.properties.iter().enumerate() {
+                let end = property_end(input, at, property, big_endian)
+                    .ok_or_else(|| ends_early(input, self.element))?;
+                if i == self.indices {
+                    let items = &input[at + property.list.map_or(0, Kind::size)..end];
+                    let item = Field::new(0, property.kind);
+                    let items = items.chunks_exact(property.kind.size());
+                    corners.clear();
+                    corners.extend(items.map(|bytes| item.value(bytes, big_endian)));
+                }
+                at = end;
+            }
+            self.add(&corners, faces).map_err(|LineError { found, expected }| {
+                let advice = "the face is broken: write the file again from its source";
+                input.malformed(Place::Byte(first as u64), found, expected, advice)
+            })?;
+        }
+        Ok(at)
+    }
+
+    fn read_ascii(
+        &self,
+        input: &Input,
+        start: usize,
+        faces: &mut Faces,
+        progress: &dyn Progress,
+    ) -> Result<usize> {
+        let end = end_of_lines(input, start, self.element, progress)?;
+        let pieces = Piece { text: &input[start..end], start }.cut(plain_line);
+        let parse = |_: usize, piece: Piece| {
+            let mut faces = Faces::default();
+            let mut corners = Vec::new();
+            for (at, line) in piece.lines(plain_line) {
+                let parsed = self.parse_line(line, &mut corners);
+                let added = parsed.and_then(|()| self.add(&corners, &mut faces));
+                added.map_err(|error| Fault::new(at, error))?;
+            }
+            Ok(faces)
+        };
+        for parsed in parse_pieces(input, &pieces, parse, progress)? {
+            faces.triangles.extend(parsed.triangles);
+            faces.n_short += parsed.n_short;
+        }
+        Ok(end)
+    }
+
+    /// The list of vertices in a line.
+    fn parse_line(
+        &self,
+        line: &[u8],
+        corners: &mut Vec<f64>,
+    ) -> std::result::Result<(), LineError> {
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let mut number = || {
+            let word = words.next().ok_or_else(|| LineError {
+                found: "the end of the line".into(),
+                expected: "as many numbers as the lengths of its lists say".into(),
+            })?;
+            parse_number(word)
+        };
+        corners.clear();
+        for (i, property) in self.element.properties.iter().enumerate() {
+            let n_items = if property.list.is_some() { number()? as u64 } else { 1 };
+            // A length beyond the line ends at its last word with an error.
+            for _ in 0..n_items {
+                let item = number()?;
+                if i == self.indices {
+                    corners.push(item);
+                }
+            }
+            // What stands behind the vertices is of no use here.
+            if i == self.indices {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the triangles of a polygon, or of strips.
+    fn add(&self, corners: &[f64], faces: &mut Faces) -> std::result::Result<(), LineError> {
+        let vertex = |corner: f64| {
+            let is_vertex =
+                corner.fract() == 0.0 && 0.0 <= corner && corner < self.n_vertices as f64;
+            is_vertex.then_some(corner as u32).ok_or_else(|| LineError {
+                found: format!("vertex {corner}"),
+                expected: format!("one of the {} vertices, counted from 0", self.n_vertices),
+            })
+        };
+        if self.is_strips {
+            for strip in corners.split(|corner| *corner < 0.0) {
+                for (i, three) in strip.array_windows().enumerate() {
+                    let [a, b, c] = *three;
+                    let [a, b, c] = [vertex(a)?, vertex(b)?, vertex(c)?];
+                    // Every other triangle of a strip goes round the other way.
+                    faces.triangles.push(if i % 2 == 0 { [a, b, c] } else { [b, a, c] });
+                }
+            }
+            return Ok(());
+        }
+        let [first, rest @ ..] = corners else {
+            faces.n_short += 1;
+            return Ok(());
+        };
+        let first = vertex(*first)?;
+        for pair in rest.array_windows() {
+            let [a, b] = *pair;
+            faces.triangles.push([first, vertex(a)?, vertex(b)?]);
+        }
+        faces.n_short += u64::from(rest.len() < 2);
+        Ok(())
+    }
+}

@@ -1,0 +1,131 @@
+//! Materials of OBJ files and their textures.
+
+use surfel::math::{Vec2, Vec3};
+use surfel::scene::{AlphaMode, Geometry, Graph, Material, Wrap};
+use surfel_formats::{LoadOptions, Source, load_graph};
+
+use crate::common::{Folder, Listener, read_graph};
+
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n";
+
+/// A picture of one texel.
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x01\0\0\0\x01\x08\x02\0\0\0\x90wS\xde\0\0\0\x0cIDATx\x9cc\xf8\xcf\xc0\0\0\x03\x01\x01\0\xc9\xfe\x92\xef\0\0\0\0IEND\xaeB`\x82";
+
+/// `a.obj` of these lines in a folder with these other files.
+fn load_with(test: &str, obj: &str, others: &[(&str, &[u8])]) -> (Graph, Source, Listener) {
+    let folder = Folder::new(test);
+    for (name, bytes) in others {
+        let path = folder.path(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    }
+    std::fs::write(folder.path("a.obj"), obj).unwrap();
+    let listener = Listener::default();
+    let options = LoadOptions::default();
+    let (graph, source) = load_graph(&folder.path("a.obj"), &options, &listener).unwrap();
+    (graph, source, listener)
+}
+
+/// The material that these lines of an MTL file describe.
+fn material(test: &str, lines: &str) -> Material {
+    let obj = format!("mtllib a.mtl\n{TRIANGLE}usemtl m\nf 1 2 3\n");
+    let mtl = format!("newmtl m\n{lines}");
+    let (mut graph, ..) = load_with(test, &obj, &[("a.mtl", mtl.as_bytes())]);
+    assert_eq!(graph.materials.len(), 1);
+    graph.materials.remove(0)
+}
+
+#[test]
+fn mtl_comes_down_to_metallic_and_roughness() {
+    let read = |lines: &str| material("mtl", lines);
+    let close = |a: f32, b: f32| (a - b).abs() < 1e-6;
+    let matte = read("Kd 0.5 0.25 1\nKs 0 0 0\nNs 10\nillum 2\n");
+    assert_eq!(matte, Material { base_color: Vec3::new(0.5, 0.25, 1.0), ..Material::MATTE });
+    let glossy = read("Kd 0.5 # grey\nKs 0.5 0.5 0.5\nNs 30\n");
+    assert_eq!((glossy.base_color, glossy.ior), (Vec3::splat(0.5), 1.5));
+    assert!(close(glossy.roughness, 0.5), "{}", glossy.roughness);
+    let lamp = read("Kd 0 0 0\nKe 10 5 0\n");
+    assert_eq!((lamp.base_color, lamp.emissive), (Vec3::ZERO, Vec3::new(10.0, 5.0, 0.0)));
+    let mirror = read("Kd 0 0 0\nKs 1 0.5 0.25\nillum 3\n");
+    assert_eq!((mirror.metallic, mirror.roughness), (1.0, 0.0));
+    assert_eq!(mirror.base_color, Vec3::new(1.0, 0.5, 0.25));
+    let glass = read("Kd 0 0 0\nTf 1 0.5 1\nNi 1.33\nillum 7\n");
+    let expected = Material { base_color: Vec3::new(1.0, 0.5, 1.0), ior: 1.33, ..Material::GLASS };
+    assert_eq!(glass, expected);
+    let lambert = read("illum 4\nKd 0.5 0.5 0.5\nTf 1 1 1\nNi 1.00\n");
+    assert_eq!(lambert.transmission, 0.0, "some programs give model 4 to all they write");
+    let pane = read("Kd 1 0 0\nd 0.25\nTr 0\n");
+    assert_eq!((pane.alpha, pane.alpha_mode), (0.25, AlphaMode::Blend));
+    assert_eq!(read("Tr 0.25\n").alpha, 0.75);
+    let new = read("Kd 1 0 0\nKs 1 1 1\nPr 0.3\nPm 1\nillum 3\n");
+    assert_eq!((new.base_color, new.roughness, new.metallic), (Vec3::X, 0.3, 1.0));
+    assert_eq!(read("Kd -1 nan 2\nNs inf\nPr 7\nd q\nillum 99999999999\n").metallic, 0.0);
+}
+
+#[test]
+fn materials_get_a_mesh_each_under_one_node() {
+    let obj = format!(
+        "mtllib no.mtl\nmtllib sub/my materials.mtl\nmtllib x.mtl y.mtl\n{TRIANGLE}f 1 2 3\n\
+        usemtl red one\nf 1/1 2/2 3/3\nusemtl other\nusemtl blue\nf 3 2 1\nusemtl red one\nf 2 3 1\nusemtl lost\nf 1 2 3\n"
+    );
+    let others = [
+        ("sub/my materials.mtl", &b"newmtl red one\nKd 1 0 0\nnewmtl red one\nKd 0 1 0\n"[..]),
+        ("y.mtl", b"newmtl blue\nKd 0 0 1\nKd q\n"),
+    ];
+    let (graph, source, listener) = load_with("materials", &obj, &others);
+    let colors: Vec<Vec3> = graph.materials.iter().map(|material| material.base_color).collect();
+    assert_eq!(colors, [Vec3::ONE, Vec3::X, Vec3::Z]);
+    let counts: Vec<usize> = graph
+        .geometries
+        .iter()
+        .map(|geometry| match geometry {
+            Geometry::Triangles(mesh) => mesh.triangles.len(),
+            Geometry::Points(_) => 0,
+        })
+        .collect();
+    assert_eq!(counts, [2, 2, 1]);
+    assert_eq!((source.n_triangles, graph.nodes.len()), (Some(5), 1));
+    assert_eq!((graph.nodes[0].name.as_str(), graph.nodes[0].parts.len()), ("a", 3));
+    assert!(graph.nodes[0].parts.iter().enumerate().all(|(i, part)| part.material == i));
+    assert!(listener.heard("materials are plain: ") && listener.heard("no.mtl"));
+    assert!(listener.heard("y.mtl: line 3: found `q`, expected a number"));
+    assert!(listener.heard("no MTL file has `lost`"));
+    let Geometry::Triangles(red) = &graph.geometries[1] else { panic!() };
+    let uvs = red.uvs[0].as_ref().unwrap();
+    assert_eq!(uvs[..3], [Vec2::Y, Vec2::ONE, Vec2::ZERO]);
+    assert_eq!(red.positions.len(), 6, "corners without texture coordinates are others");
+}
+
+#[test]
+fn textures_are_found_read_once_and_missed_aloud() {
+    let mtl = "newmtl a\nmap_Kd -s 2 3 1 -o 0.5 0.25 -clamp on C:\\art\\one texel.png\nmap_Ke one texel.png\n\
+        norm -bm 0.5 sub/n.png\nnewmtl b\nKd 0.5 0.5 0.5\nmap_Kd none.png\nmap_Bump sub/n.png\nmap_Ke text.png\n";
+    let obj = format!("mtllib a.mtl\n{TRIANGLE}usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 2/2 3/3\n");
+    let others = [
+        ("a.mtl", mtl.as_bytes()),
+        ("one texel.png", PNG),
+        ("sub/n.png", PNG),
+        ("text.png", b"no picture"),
+    ];
+    let (graph, _, listener) = load_with("textures", &obj, &others);
+    let [a, b] = graph.materials.as_slice() else { panic!("{} materials", graph.materials.len()) };
+    let base = a.textures.base_color.unwrap();
+    assert_eq!((base.scale, base.wrap), (Vec2::new(2.0, 3.0), [Wrap::ClampToEdge; 2]));
+    // The picture's row at v in the file is at 1 - v from the top: 1 - (0.25 + 3 (1 - v)).
+    assert_eq!(base.offset, Vec2::new(0.5, -2.25));
+    assert_eq!((a.base_color, a.emissive), (Vec3::ONE, Vec3::ONE));
+    let normal = a.textures.normal.unwrap();
+    assert_eq!((normal.0.texture, normal.1, graph.textures[normal.0.texture].width), (2, 0.5, 1));
+    assert_eq!(b.textures.base_color, None);
+    assert_eq!((b.base_color, b.textures.normal), (Vec3::splat(0.5), None));
+    assert!(listener.heard("a texture is left out: ") && listener.heard("none.png"));
+    assert!(listener.heard("(and 1 others)"));
+}
+
+#[test]
+fn bytes_reach_no_other_file() {
+    let (graph, _, listener) =
+        read_graph("a.obj", format!("mtllib /etc/passwd\n{TRIANGLE}usemtl a\nf 1 2 3\n")).unwrap();
+    assert_eq!(graph.materials, [Material::MATTE]);
+    assert!(listener.heard("/etc/passwd is a file of its own, and not looked for"));
+}
