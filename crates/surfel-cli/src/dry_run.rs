@@ -1,17 +1,19 @@
 //! What `surfel render --dry-run` tells: every choice, resolved.
 
 use crate::args::Exposure;
+use crate::assemble::Assembly;
 use crate::picture::Choices;
 use crate::render::Args;
 use serde_json::{Value, json};
-use surfel::points::PointCloud;
 use surfel::scene::color::choose;
 use surfel::scene::{Light, Projection};
 use surfel::trace::Simd;
 
-pub fn resolved(cloud: &PointCloud, choices: &Choices, args: &Args) -> String {
+pub fn resolved(assembly: &Assembly, choices: &Choices, args: &Args) -> String {
     let preparation = args.preparation.preparation(args.picture.seed, args.color.color.as_ref());
-    let color = args.color.color.clone().unwrap_or_else(|| choose(cloud).0);
+    let chosen = || assembly.clouds().next().map(|cloud| choose(cloud).0);
+    let color = args.color.color.clone().or_else(chosen);
+    let (n_points, n_triangles) = assembly.graph.counts();
     let exposure = match args.light.exposure {
         Exposure::Auto => json!("auto"),
         Exposure::Stops(stops) => json!(stops),
@@ -19,7 +21,8 @@ pub fn resolved(cloud: &PointCloud, choices: &Choices, args: &Args) -> String {
     let choices = json!({
         "files": args.files,
         "output": args.output,
-        "points": cloud.len(),
+        "points": n_points,
+        "triangles": n_triangles,
         "surface": args.surface.surface.name(),
         "boundary": format!("{:?}", args.surface.boundary).to_lowercase(),
         "resolution": [args.picture.resolution.0, args.picture.resolution.1],
@@ -30,7 +33,7 @@ pub fn resolved(cloud: &PointCloud, choices: &Choices, args: &Args) -> String {
         "camera": camera(choices),
         "lights": choices.lights.iter().map(light).collect::<Vec<_>>(),
         "exposure": exposure,
-        "color": color.to_string(),
+        "color": color.map(|color| color.to_string()),
         "background": format!("{:?}", args.color.background()),
         "preparation": format!("{preparation:?}"),
         "threads": rayon::current_num_threads(),
@@ -70,6 +73,9 @@ fn light(light: &Light) -> Value {
                 "ground": sky.ground.to_array(),
                 "reach": sky.reach,
             }
+        }),
+        Light::Environment(environment) => json!({
+            "environment": { "average": environment.average().to_array() }
         }),
         Light::Headlight(strength) => json!({ "headlight": strength }),
     }

@@ -2,9 +2,9 @@
 
 use crate::args::{LightArgs, LightKind};
 use crate::report::Report;
-use surfel::math::Vec3;
 use anyhow::Context;
 use surfel::flat::FlatScene;
+use surfel::math::Vec3;
 use surfel::scene::{Camera, Environment, Light, Sky, Sun};
 use surfel_formats::LinearPicture;
 

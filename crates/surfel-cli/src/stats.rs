@@ -5,7 +5,7 @@ use anyhow::Context;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
-use surfel::flat::FlatScene;
+use surfel::flat::{FlatCloud, FlatMesh, FlatScene};
 use surfel::render::RenderStats;
 use surfel::trace::Simd;
 
@@ -21,7 +21,8 @@ pub struct Seconds {
 /// A finished run of `render`.
 pub struct Run<'a> {
     pub flat: &'a FlatScene,
-    pub n_points: usize,
+    /// Points and triangles of the graph.
+    pub counts: (usize, usize),
     pub seconds: Seconds,
     pub rendered: RenderStats,
     pub resolution: (u32, u32),
@@ -31,20 +32,26 @@ pub struct Run<'a> {
 impl Run<'_> {
     pub fn json(&self) -> Value {
         let Seconds { load, prepare, build, total } = self.seconds;
+        let (n_points, n_triangles) = self.counts;
         let RenderStats { rays, trace_secs, frame_secs } = self.rendered;
         json!({
-            "points": self.n_points,
-            "triangles": 0,
+            "points": n_points,
+            "triangles": n_triangles,
+            "instances": self.flat.instances.len(),
             "seconds": {
                 "load": load, "prepare": prepare, "build": build,
                 "trace": trace_secs, "frame": frame_secs, "total": total,
             },
-            "rays": { "primary": rays.primary, "shadow": rays.shadow, "sky": rays.sky },
+            "rays": {
+                "primary": rays.primary, "shadow": rays.shadow, "sky": rays.sky,
+                "secondary": rays.secondary,
+            },
             "mrays_per_s": {
                 "primary": mrays_per_s(rays.primary, trace_secs),
-                "all": mrays_per_s(rays.primary + rays.shadow + rays.sky, frame_secs),
+                "all": mrays_per_s(rays.all(), frame_secs),
             },
-            "bytes_per_point": bytes_per_point(self.flat, self.n_points),
+            "bytes_per_point": bytes_per_point(self.flat.clouds(), n_points),
+            "bytes_per_triangle": bytes_per_triangle(self.flat.meshes(), n_triangles),
             "peak_rss_bytes": peak_rss_bytes(),
             "backend": "cpu",
             "device": device(),
@@ -56,10 +63,24 @@ impl Run<'_> {
 }
 
 /// Bytes that tree and points take in the flat form, for each of `n_points`.
-pub fn bytes_per_point(scene: &FlatScene, n_points: usize) -> Value {
-    let (tree, points) = scene.points.bytes();
+pub fn bytes_per_point<'c>(clouds: impl Iterator<Item = &'c FlatCloud>, n_points: usize) -> Value {
+    let (tree, points) = sum(clouds.map(|cloud| cloud.points.bytes()));
     let [tree, points] = [tree, points].map(|bytes| bytes as f64 / n_points.max(1) as f64);
     json!({ "tree": tree, "points": points, "total": tree + points })
+}
+
+/// Bytes that tree and triangles take in the flat form, for each of `n_triangles`.
+pub fn bytes_per_triangle<'m>(
+    meshes: impl Iterator<Item = &'m FlatMesh>,
+    n_triangles: usize,
+) -> Value {
+    let (tree, triangles) = sum(meshes.map(|mesh| mesh.triangles.bytes()));
+    let [tree, triangles] = [tree, triangles].map(|bytes| bytes as f64 / n_triangles.max(1) as f64);
+    json!({ "tree": tree, "triangles": triangles, "total": tree + triangles })
+}
+
+fn sum(pairs: impl Iterator<Item = (usize, usize)>) -> (usize, usize) {
+    pairs.fold((0, 0), |(a, b), (c, d)| (a + c, b + d))
 }
 
 /// Most memory ever held, where the system tells it.

@@ -48,11 +48,7 @@ pub fn load_all(
 ///
 /// Columns that some of the files lack are dropped; `progress` is told which, and where the common
 /// origin is too far from a file's points to keep their resolution.
-pub fn merge_loaded(
-    mut parts: Vec<Loaded>,
-    paths: &[PathBuf],
-    progress: &dyn Progress,
-) -> Loaded {
+pub fn merge_loaded(mut parts: Vec<Loaded>, paths: &[PathBuf], progress: &dyn Progress) -> Loaded {
     if parts.len() < 2 {
         return parts.pop().unwrap_or_default();
     }

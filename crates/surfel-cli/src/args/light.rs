@@ -73,9 +73,7 @@ impl LightArgs {
     pub fn has(&self, kind: LightKind) -> bool {
         match &self.light {
             Some(kinds) => kinds.contains(&kind),
-            None => {
-                self.environment.is_none() && matches!(kind, LightKind::Sun | LightKind::Sky)
-            }
+            None => self.environment.is_none() && matches!(kind, LightKind::Sun | LightKind::Sky),
         }
     }
 }

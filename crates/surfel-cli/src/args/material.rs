@@ -41,9 +41,10 @@ impl MaterialArgs {
     }
 
     fn choice_of(&self, file: &Path) -> Option<&Choice> {
-        self.material.iter().rev().find(|choice| {
-            choice.file.as_ref().is_some_and(|name| is_named(file, name))
-        })
+        self.material
+            .iter()
+            .rev()
+            .find(|choice| choice.file.as_ref().is_some_and(|name| is_named(file, name)))
     }
 
     /// Fails if a material is for a file that is not there.
@@ -53,8 +54,7 @@ impl MaterialArgs {
     ) -> Result<(), Usage> {
         for name in self.material.iter().filter_map(|choice| choice.file.as_ref()) {
             if !files.clone().any(|file| is_named(file, name)) {
-                let known: Vec<String> =
-                    files.map(|file| file.display().to_string()).collect();
+                let known: Vec<String> = files.map(|file| file.display().to_string()).collect();
                 return Err(Usage(format!(
                     "--material {name}=...: no such file among those to render: {}",
                     known.join(", ")
@@ -83,9 +83,9 @@ fn choice(text: &str) -> Result<Choice, String> {
     };
     let mut material: Material = name.parse().map_err(|error: surfel::Error| error.to_string())?;
     for property in properties.into_iter().flat_map(|text| text.split(',')) {
-        let (name, value) = property
-            .split_once('=')
-            .ok_or_else(|| format!("{property}: expected a property and its value, as in ior=1.33"))?;
+        let (name, value) = property.split_once('=').ok_or_else(|| {
+            format!("{property}: expected a property and its value, as in ior=1.33")
+        })?;
         set(&mut material, name.trim(), value.trim())
             .map_err(|error| format!("{name}: {error}"))?;
     }
@@ -118,10 +118,7 @@ pub fn set(material: &mut Material, name: &str, value: &str) -> Result<(), Strin
             material.is_thin = value.parse().map_err(|_| "expected true or false".to_owned())?;
         }
         _ => {
-            return Err(format!(
-                "no such property; known: {}",
-                PROPERTIES.join(", ")
-            ));
+            return Err(format!("no such property; known: {}", PROPERTIES.join(", ")));
         }
     }
     Ok(())

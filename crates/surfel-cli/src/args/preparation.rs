@@ -105,7 +105,7 @@ impl PreparationArgs {
 
     /// Whether the orientation tells inside and outside of what the points enclose.
     pub fn orients_outward(&self) -> bool {
-        self.orient == Orientation::Mst
+        self.orient == Orientation::SpanningTree
     }
 
     /// Drops the normals and radii that are to be estimated in a given way.

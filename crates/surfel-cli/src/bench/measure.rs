@@ -1,5 +1,6 @@
 //! Measures a kind of ray: all rays traced several times by all threads, chunk by chunk.
 
+use super::Stage;
 use super::clock::{Spent, timed};
 use super::rays::{bounce_rays, shadow_rays};
 use super::search::{self, CHUNK, Nearest, Shaded};
@@ -8,20 +9,20 @@ use crate::stats::mrays_per_s;
 use clap::ValueEnum;
 use serde_json::{Value, json};
 use std::sync::{Mutex, PoisonError};
-use surfel::flat::FlatScene;
+use surfel::flat::FlatGeometry;
 use surfel::math::{Ray, Vec3};
 use surfel::progress::Progress;
-use surfel::trace::{self, Hit, Simd};
+use surfel::trace::{Hit, Simd};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Rays {
-    /// Camera rays, nearest disc or sphere.
+    /// Camera rays, nearest disc, sphere or triangle.
     Primary,
     /// From each hit to a light at one point: is anything between?
     Shadow,
     /// From each hit in one random direction: is anything there?
     BounceAny,
-    /// The same, nearest disc or sphere.
+    /// The same, nearest disc, sphere or triangle.
     Bounce,
     /// Camera rays, up to 16 discs within a radius behind the nearest, and the mean of their normals.
     Gather,
@@ -31,10 +32,10 @@ pub enum Rays {
 
 /// What all measurements share.
 pub struct Bench<'a> {
-    pub scene: &'a FlatScene,
+    pub stage: &'a Stage,
     pub simd: Simd,
     pub runs: u32,
-    /// Relative to the scene's origin, as all rays are.
+    /// Relative to the stage's origin, as all rays are.
     pub light: Vec3,
     pub primary: Vec<Ray>,
     /// Of the primary rays, where all others start.
@@ -43,9 +44,9 @@ pub struct Bench<'a> {
 }
 
 /// The nearest hits, untimed.
-pub fn closest_hits(scene: &FlatScene, simd: Simd, rays: &[Ray]) -> Vec<Hit> {
+pub fn closest_hits(stage: &Stage, simd: Simd, rays: &[Ray]) -> Vec<Hit> {
     let mut hits = vec![Hit::MISS; rays.len()];
-    let find = |rays: &[Ray], hits: &mut [Hit]| trace::closest_hits(scene, simd, rays, hits);
+    let find = |rays: &[Ray], hits: &mut [Hit]| search::closest(&stage.geometry, simd, rays, hits);
     for_each_chunk(rays, &mut hits, &find);
     hits
 }
@@ -54,13 +55,13 @@ impl Bench<'_> {
     /// Rays, hits and rates of a kind, as JSON.
     pub fn measure(&self, kind: Rays) -> surfel::Result<Value> {
         let (primary, hits) = (&self.primary, &self.hits);
-        let bounces = || bounce_rays(self.scene, primary, hits);
+        let bounces = || bounce_rays(self.stage, primary, hits);
         match kind {
             Rays::Primary => self.nearest(primary, search::nearest),
             Rays::Surface => self.nearest(primary, search::surface),
             Rays::Bounce => self.nearest(&bounces(), search::nearest),
             Rays::BounceAny => self.any(&bounces()),
-            Rays::Shadow => self.any(&shadow_rays(self.scene, primary, hits, self.light)),
+            Rays::Shadow => self.any(&shadow_rays(self.stage, primary, hits, self.light)),
             Rays::Gather => self.gather(primary),
         }
     }
@@ -76,7 +77,7 @@ impl Bench<'_> {
     }
 
     fn any(&self, rays: &[Ray]) -> surfel::Result<Value> {
-        let (times, found) = self.time(rays, false, trace::any_hits)?;
+        let (times, found) = self.time(rays, false, search::any)?;
         Ok(times.json(rays.len(), found.iter().filter(|is_hit| **is_hit).count()))
     }
 
@@ -97,7 +98,8 @@ impl Bench<'_> {
         search: Search<T>,
     ) -> surfel::Result<(Times, Vec<T>)> {
         let mut found = vec![nothing; rays.len()];
-        let work = |rays: &[Ray], found: &mut [T]| search(self.scene, self.simd, rays, found);
+        let work =
+            |rays: &[Ray], found: &mut [T]| search(&self.stage.geometry, self.simd, rays, found);
         for_each_chunk(rays, &mut found, &work);
         let mut runs = Vec::new();
         for _ in 0..self.runs {
@@ -109,7 +111,7 @@ impl Bench<'_> {
 }
 
 /// Answers a chunk of rays.
-type Search<T> = fn(&FlatScene, Simd, &[Ray], &mut [T]);
+type Search<T> = fn(&FlatGeometry, Simd, &[Ray], &mut [T]);
 
 /// All threads claim chunks until none is left.
 fn for_each_chunk<T: Send>(

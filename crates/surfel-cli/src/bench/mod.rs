@@ -19,10 +19,10 @@ use clock::{Spent, timed};
 use measure::{Bench, Rays, closest_hits};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
-use surfel::flat::FlatScene;
+use surfel::flat::FlatGeometry;
 use surfel::math::{DVec3, Vec3};
 use surfel::points::{PointCloud, prepare};
-use surfel::scene::{Background, Camera, Light, Material, Scene};
+use surfel::scene::{Camera, Geometry, Graph, Points};
 use surfel::surface::SurfaceKind;
 use surfel::trace::Simd;
 use surfel_formats::{ColumnChoice, Source};
@@ -30,7 +30,7 @@ use surfel_formats::{ColumnChoice, Source};
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// A point cloud.
+    /// A point cloud or a mesh.
     #[arg(value_name = "CLOUD")]
     cloud: PathBuf,
     /// Kinds of rays, separated by commas [default: primary,shadow,bounce-any,bounce,gather].
@@ -70,65 +70,92 @@ Examples:
 const USUAL: [Rays; 5] = [Rays::Primary, Rays::Shadow, Rays::BounceAny, Rays::Bounce, Rays::Gather];
 
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    let kinds = kinds(args, report)?;
+    check_surface(args)?;
     args.camera.check()?;
     let file = args.camera_file.as_deref().map(CameraFile::read).transpose()?;
     plan(args)?.check(global)?;
-    let scene = scene(args, file.as_ref(), report)?;
-    let n_points = scene.cloud.len();
-    let (flat, build) = build(&scene, report)?;
-    drop(scene);
+    let described = describe(args, file.as_ref(), report)?;
+    let (n_points, n_triangles) = described.graph.counts();
+    let (stage, build) = build(described, report)?;
     report.end_stage();
 
     let simd = args.simd.unwrap_or_else(Simd::detect);
-    let result = json!({
-        "rays": measure(args, &kinds, &flat, simd, file.as_ref(), report)?,
+    let mut result = json!({
+        "rays": measure(args, &kinds(args, &stage, report)?, &stage, simd, file.as_ref(), report)?,
         "build_s": build.wall,
-        "bytes_per_point": stats::bytes_per_point(&flat, n_points),
         "peak_rss_bytes": stats::peak_rss_bytes(),
         "threads": rayon::current_num_threads(),
         "simd": simd.name(),
         "build_cpu_s": build.cpu,
-        "points": n_points,
-        "surface": flat.surface.name(),
     });
+    match &stage.geometry {
+        FlatGeometry::Cloud(cloud) => {
+            let clouds = std::iter::once(cloud);
+            result["bytes_per_point"] = stats::bytes_per_point(clouds, n_points);
+            result["points"] = json!(n_points);
+            result["surface"] = json!(cloud.surface.name());
+        }
+        FlatGeometry::Mesh(mesh) => {
+            let meshes = std::iter::once(mesh);
+            result["bytes_per_triangle"] = stats::bytes_per_triangle(meshes, n_triangles);
+            result["triangles"] = json!(n_triangles);
+        }
+    }
     Ok(print(&if args.json { format!("{result:#}") } else { table::table(&result) })?)
+}
+
+/// What is measured: one geometry, and who looks at it.
+pub struct Stage {
+    /// World coordinates of the geometry's zero, to which all rays are relative.
+    pub origin: DVec3,
+    pub geometry: FlatGeometry,
+    pub camera: Camera,
+}
+
+/// A stage before its tree is built.
+struct Described {
+    graph: Graph,
+    camera: Camera,
 }
 
 /// Each kind of ray by its name.
 fn measure(
     args: &Args,
     kinds: &[Rays],
-    scene: &FlatScene,
+    stage: &Stage,
     simd: Simd,
     file: Option<&CameraFile>,
     report: &Report,
 ) -> surfel::Result<Map<String, Value>> {
-    let primary = rays::camera_rays(scene, file, args.resolution);
-    let hits = closest_hits(scene, simd, &primary);
-    let light = light(scene, file, report);
-    let bench = Bench { scene, simd, runs: args.runs, light, primary, hits, report };
+    let primary = rays::camera_rays(stage, file, args.resolution);
+    let hits = closest_hits(stage, simd, &primary);
+    let light = light(stage, file, report);
+    let bench = Bench { stage, simd, runs: args.runs, light, primary, hits, report };
     let name = |kind: &Rays| kind.to_possible_value().map(|value| value.get_name().to_owned());
     let named =
         kinds.iter().map(|kind| Ok((name(kind).unwrap_or_default(), bench.measure(*kind)?)));
     named.collect()
 }
 
-/// The kinds of rays that the surface can be traced with.
-fn kinds(args: &Args, report: &Report) -> Result<Vec<Rays>, Usage> {
-    let surface = args.surface.surface;
-    if surface == SurfaceKind::Points {
+fn check_surface(args: &Args) -> Result<(), Usage> {
+    if args.surface.surface == SurfaceKind::Points {
         return Err(Usage("--surface points meets no rays; name another kind".into()));
     }
+    Ok(())
+}
+
+/// The kinds of rays that the geometry can be traced with.
+fn kinds(args: &Args, stage: &Stage, report: &Report) -> Result<Vec<Rays>, Usage> {
     let kinds = args.rays.clone().unwrap_or(USUAL.to_vec());
-    if surface.is_oriented() || !kinds.contains(&Rays::Gather) {
-        return Ok(kinds);
+    let unblended = match &stage.geometry {
+        FlatGeometry::Cloud(cloud) if cloud.surface.is_oriented() => return Ok(kinds),
+        FlatGeometry::Cloud(_) => "spheres",
+        FlatGeometry::Mesh(_) => "triangles",
+    };
+    if args.rays.is_some() && kinds.contains(&Rays::Gather) {
+        return Err(Usage(format!("--rays gather blends discs; {unblended} do not blend")));
     }
-    if args.rays.is_some() {
-        let name = surface.name();
-        return Err(Usage(format!("--rays gather blends discs, which --surface {name} has not")));
-    }
-    report.choice("gather left out: spheres do not blend", "--rays");
+    report.choice(&format!("gather left out: {unblended} do not blend"), "--rays");
     Ok(kinds.into_iter().filter(|kind| *kind != Rays::Gather).collect())
 }
 
@@ -140,56 +167,69 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
     Ok(Plan::new(&[source], files, args.preparation.select, n_pixels))
 }
 
-fn scene(args: &Args, file: Option<&CameraFile>, report: &Report) -> anyhow::Result<Scene> {
+fn describe(args: &Args, file: Option<&CameraFile>, report: &Report) -> anyhow::Result<Described> {
     let options = args.preparation.load_options(ColumnChoice::Only(args.preparation.geometry()));
-    let loaded = surfel_formats::load(&args.cloud, &options, report)?;
-    let (cloud, _) = prepare(loaded.cloud, &args.preparation.preparation(0, None), report)
-        .with_context(|| args.cloud.display().to_string())?;
-    let automatic = || camera(args, &cloud, &loaded.source, report);
-    Ok(Scene {
-        camera: file.map_or_else(automatic, CameraFile::camera),
-        colors: vec![[200; 3]; cloud.len()],
-        cloud,
-        surface: args.surface.surface,
-        boundary: args.surface.boundary,
-        material: Material::MATTE,
-        lights: vec![Light::Headlight(1.0)],
-        background: Background::Transparent,
-    })
+    let (mut graph, source) = surfel_formats::load_graph(&args.cloud, &options, report)?;
+    let name = || args.cloud.display().to_string();
+    if graph.geometries.len() != 1 {
+        let n = graph.geometries.len();
+        anyhow::bail!("{}: holds {n} things; one cloud or mesh is measured at a time", name());
+    }
+    for geometry in &mut graph.geometries {
+        let Geometry::Points(points) = geometry else { continue };
+        let preparation = args.preparation.preparation(0, None);
+        let (cloud, _) =
+            prepare(std::mem::take(&mut points.cloud), &preparation, report).with_context(name)?;
+        *points = Points {
+            colors: vec![[200; 3]; cloud.len()],
+            cloud,
+            surface: args.surface.surface,
+            boundary: args.surface.boundary,
+            has_outward_normals: false,
+        };
+    }
+    let camera = match file {
+        Some(file) => file.camera(),
+        None => camera(args, &graph.outline(), &source, report),
+    };
+    Ok(Described { graph, camera })
 }
 
-fn camera(args: &Args, cloud: &PointCloud, source: &Source, report: &Report) -> Camera {
+fn camera(args: &Args, outline: &PointCloud, source: &Source, report: &Report) -> Camera {
     let (width, height) = args.resolution;
-    let up = args.camera.up(cloud, source, report);
-    args.camera.camera(cloud, up, f64::from(width) / f64::from(height), report)
+    let up = args.camera.up(outline, source, report);
+    args.camera.camera(outline, up, f64::from(width) / f64::from(height), report)
 }
 
-/// Builds the tree, a small one several times; the last scene and the least time.
-fn build(scene: &Scene, report: &Report) -> anyhow::Result<(FlatScene, Spent)> {
-    let n_builds = match scene.cloud.len() {
+/// Builds the tree, a small one several times; the last stage and the least time.
+fn build(described: Described, report: &Report) -> anyhow::Result<(Stage, Spent)> {
+    let Described { graph, camera } = described;
+    let source = &graph.geometries[0];
+    let n_builds = match source.positions().len() {
         0..=2_000_000 => 5,
         2_000_001..=20_000_000 => 2,
         _ => 1,
     };
-    let (mut flat, mut least) = timed(|| FlatScene::new(scene, report));
+    let flat = || FlatGeometry::new(source, report);
+    let (mut geometry, mut least) = timed(flat);
     for _ in 1..n_builds {
         // Frees its memory before the next one takes as much.
-        drop(flat?);
+        drop(geometry?);
         let spent;
-        (flat, spent) = timed(|| FlatScene::new(scene, report));
+        (geometry, spent) = timed(flat);
         least = least.least(spent);
     }
-    Ok((flat?, least))
+    Ok((Stage { origin: source.origin(), geometry: geometry?, camera }, least))
 }
 
-/// Where shadow rays end, relative to the scene's origin.
-fn light(scene: &FlatScene, file: Option<&CameraFile>, report: &Report) -> Vec3 {
+/// Where shadow rays end, relative to the stage's origin.
+fn light(stage: &Stage, file: Option<&CameraFile>, report: &Report) -> Vec3 {
     if let Some(file) = file {
-        return (file.light - scene.origin).as_vec3();
+        return (file.light - stage.origin).as_vec3();
     }
-    let eye = scene.camera.position - scene.origin;
+    let eye = stage.camera.position - stage.origin;
     let light = eye + DVec3::new(-0.6, 0.3, 0.5) * eye.length();
-    let line = format!("point light at {}", short(light + scene.origin));
+    let line = format!("point light at {}", short(light + stage.origin));
     report.choice(&line, "--camera-file");
     light.as_vec3()
 }

@@ -3,39 +3,40 @@
 //! Order and formulas are those of the program that measures Embree (docs/benchmarks.md), in f32 as
 //! there, so that both trace the same rays.
 
+use super::Stage;
 use super::camera_file::CameraFile;
 use std::f32::consts::TAU;
-use surfel::flat::FlatScene;
+use surfel::flat::FlatGeometry;
 use surfel::math::{DVec3, Ray, Vec3};
 use surfel::trace::Hit;
 
 /// Pixels along the side of a tile.
 const TILE: u32 = 16;
 
-/// Rays through the centres of all pixels: of the file's camera, or else of the scene's.
-pub fn camera_rays(scene: &FlatScene, file: Option<&CameraFile>, size: (u32, u32)) -> Vec<Ray> {
+/// Rays through the centres of all pixels: of the file's camera, or else of the stage's.
+pub fn camera_rays(stage: &Stage, file: Option<&CameraFile>, size: (u32, u32)) -> Vec<Ray> {
     if let Some(file) = file {
-        let pinhole = Pinhole::new(file, scene.origin);
+        let pinhole = Pinhole::new(file, stage.origin);
         return pixels(size).map(|pixel| pinhole.ray(pixel, size)).collect();
     }
-    let view = scene.camera.view(scene.origin, size.0, size.1);
+    let view = stage.camera.view(stage.origin, size.0, size.1);
     pixels(size).map(|(x, y)| view.ray(x as f32 + 0.5, y as f32 + 0.5)).collect()
 }
 
 /// From each hit to `light`, and no farther.
-pub fn shadow_rays(scene: &FlatScene, rays: &[Ray], hits: &[Hit], light: Vec3) -> Vec<Ray> {
+pub fn shadow_rays(stage: &Stage, rays: &[Ray], hits: &[Hit], light: Vec3) -> Vec<Ray> {
     let shadow_ray = |start: Start| {
         let toward = light - start.origin;
         let direction = toward.normalize_or(start.normal);
         Ray { t_max: toward.length(), ..Ray::new(start.origin, direction) }
     };
-    starts(scene, rays, hits).map(shadow_ray).collect()
+    starts(stage, rays, hits).map(shadow_ray).collect()
 }
 
 /// From each hit in one direction, cosine-distributed around the normal.
-pub fn bounce_rays(scene: &FlatScene, rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
+pub fn bounce_rays(stage: &Stage, rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
     let direction = |start: &Start| cosine_direction(start.normal, start.ray_idx as u32);
-    starts(scene, rays, hits).map(|start| Ray::new(start.origin, direction(&start))).collect()
+    starts(stage, rays, hits).map(|start| Ray::new(start.origin, direction(&start))).collect()
 }
 
 /// All pixels in tiles, the tiles row by row; inside a tile in Morton order.
@@ -55,7 +56,7 @@ fn even_bits(place: u32) -> u32 {
     (0..4).map(|bit| (place >> (2 * bit) & 1) << bit).sum()
 }
 
-/// A camera relative to a scene's origin.
+/// A camera relative to a stage's origin.
 struct Pinhole {
     eye: Vec3,
     forward: Vec3,
@@ -91,16 +92,27 @@ struct Start {
     normal: Vec3,
 }
 
-fn starts(scene: &FlatScene, rays: &[Ray], hits: &[Hit]) -> impl Iterator<Item = Start> {
+fn starts(stage: &Stage, rays: &[Ray], hits: &[Hit]) -> impl Iterator<Item = Start> {
     let hit = rays.iter().zip(hits).enumerate().filter(|(_, (_, hit))| **hit != Hit::MISS);
-    hit.map(|(ray_idx, (ray, hit))| start(scene, ray_idx, ray, hit))
+    hit.map(|(ray_idx, (ray, hit))| start(stage, ray_idx, ray, hit))
 }
 
-fn start(scene: &FlatScene, ray_idx: usize, ray: &Ray, hit: &Hit) -> Start {
-    let points = &scene.points;
+fn start(stage: &Stage, ray_idx: usize, ray: &Ray, hit: &Hit) -> Start {
     let position = ray.at(hit.distance);
+    let cloud = match &stage.geometry {
+        FlatGeometry::Cloud(cloud) => cloud,
+        FlatGeometry::Mesh(mesh) => {
+            let [a, b, c] = mesh.triangles.triangle(hit.slot);
+            let normal = (b - a).cross(c - a).normalize();
+            let normal = if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
+            // Far more than the rounding of a hit, far less than a triangle.
+            let offset = 1e-4 * a.distance(b);
+            return Start { ray_idx, origin: position + offset * normal, normal };
+        }
+    };
+    let points = &cloud.points;
     // Discs overlap, spheres are solid: half a radius lifts a ray out of the discs around its own.
-    let (normal, offset) = if scene.surface.is_oriented() {
+    let (normal, offset) = if cloud.surface.is_oriented() {
         (points.normal(hit.slot), 0.5)
     } else {
         ((position - points.center(hit.slot)).normalize_or(-ray.direction), 1e-3)

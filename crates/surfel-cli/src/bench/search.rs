@@ -1,6 +1,6 @@
 //! What is timed: a chunk of rays in, what a renderer would keep of each out.
 
-use surfel::flat::FlatScene;
+use surfel::flat::FlatGeometry;
 use surfel::math::{Ray, Vec3};
 use surfel::trace::{self, Hit, Simd, Splat, SurfaceHit};
 
@@ -35,20 +35,39 @@ impl Shaded {
     pub const EMPTY: Self = Self { normal: Vec3::ZERO, n_discs: 0.0 };
 }
 
-pub fn nearest(scene: &FlatScene, simd: Simd, rays: &[Ray], found: &mut [Nearest]) {
+pub fn closest(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], hits: &mut [Hit]) {
+    match geometry {
+        FlatGeometry::Cloud(cloud) => trace::closest_hits(cloud, simd, rays, hits),
+        FlatGeometry::Mesh(mesh) => trace::closest_triangles(&mesh.triangles, simd, rays, hits),
+    }
+}
+
+pub fn any(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
+    match geometry {
+        FlatGeometry::Cloud(cloud) => trace::any_hits(cloud, simd, rays, occluded),
+        FlatGeometry::Mesh(mesh) => trace::any_triangles(&mesh.triangles, simd, rays, occluded),
+    }
+}
+
+pub fn nearest(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], found: &mut [Nearest]) {
     let mut hits = [Hit::MISS; CHUNK];
     let hits = &mut hits[..rays.len()];
-    trace::closest_hits(scene, simd, rays, hits);
+    closest(geometry, simd, rays, hits);
     for (found, hit) in found.iter_mut().zip(hits) {
-        let id = if *hit == Hit::MISS { Nearest::MISS.id } else { scene.points.id(hit.slot) };
+        let id = match geometry {
+            _ if hit.is_miss() => Nearest::MISS.id,
+            FlatGeometry::Cloud(cloud) => cloud.points.id(hit.slot),
+            FlatGeometry::Mesh(mesh) => mesh.triangles.id(hit.slot),
+        };
         *found = Nearest { distance: hit.distance, id };
     }
 }
 
-pub fn surface(scene: &FlatScene, simd: Simd, rays: &[Ray], found: &mut [Nearest]) {
+pub fn surface(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], found: &mut [Nearest]) {
+    let FlatGeometry::Cloud(cloud) = geometry else { return nearest(geometry, simd, rays, found) };
     let mut hits = [SurfaceHit::MISS; CHUNK];
     let hits = &mut hits[..rays.len()];
-    trace::surface_hits(scene, simd, rays, hits);
+    trace::surface_hits(cloud, simd, rays, hits);
     for (found, hit) in found.iter_mut().zip(hits) {
         *found = Nearest { distance: hit.distance, id: hit.id };
     }
@@ -56,10 +75,11 @@ pub fn surface(scene: &FlatScene, simd: Simd, rays: &[Ray], found: &mut [Nearest
 
 /// The discs' normals are averaged as `splat` does: each turned with the nearest one, by their nearness to
 /// the ray.
-pub fn gather(scene: &FlatScene, simd: Simd, rays: &[Ray], found: &mut [Shaded]) {
+pub fn gather(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], found: &mut [Shaded]) {
+    let FlatGeometry::Cloud(cloud) = geometry else { return found.fill(Shaded::EMPTY) };
     let mut splats = [Splat::MISS; CHUNK];
     let splats = &mut splats[..rays.len()];
-    trace::splats(scene, simd, rays, splats);
+    trace::splats(cloud, simd, rays, splats);
     for (found, splat) in found.iter_mut().zip(splats) {
         *found = Shaded { normal: splat.normal, n_discs: splat.n_discs as f32 };
     }

@@ -35,6 +35,15 @@ pub enum FlatGeometry {
 }
 
 impl FlatGeometry {
+    /// Sorts points or triangles into their tree; points have to be prepared.
+    pub fn new(geometry: &Geometry, progress: &dyn Progress) -> Result<Self> {
+        match geometry {
+            Geometry::Points(points) if points.cloud.is_empty() => Err(Error::EmptyCloud),
+            Geometry::Points(points) => Ok(Self::Cloud(FlatCloud::new(points, progress)?)),
+            Geometry::Triangles(mesh) => Ok(Self::Mesh(FlatMesh::new(mesh, progress)?)),
+        }
+    }
+
     fn nodes(&self) -> &[Node] {
         match self {
             Self::Cloud(cloud) => &cloud.points.nodes,
@@ -69,19 +78,11 @@ impl FlatScene {
         };
         for source in sources(&scene.graph) {
             let geometry = match (&scene.graph.geometries[source.0], source.1) {
-                (Geometry::Points(points), _) => {
-                    if points.cloud.is_empty() {
-                        return Err(Error::EmptyCloud);
-                    }
-                    FlatGeometry::Cloud(FlatCloud::new(points, progress)?)
-                }
-                (Geometry::Triangles(mesh), None) => {
-                    FlatGeometry::Mesh(FlatMesh::new(mesh, progress)?)
-                }
                 (Geometry::Triangles(mesh), Some(node)) => {
                     let bent = deformed(mesh, &scene.graph, node, &world);
                     FlatGeometry::Mesh(FlatMesh::new(&bent, progress)?)
                 }
+                (geometry, _) => FlatGeometry::new(geometry, progress)?,
             };
             flat.geometries.push(geometry);
             flat.sources.push(source);
