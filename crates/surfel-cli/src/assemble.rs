@@ -10,7 +10,7 @@ use surfel::points::{self, PointCloud, prepare};
 use surfel::progress::Progress;
 use surfel::scene::color::colorize;
 use surfel::scene::{Geometry, Graph, Material, Node, Part, Points};
-use surfel_formats::{ColumnChoice, Source};
+use surfel_formats::{ColumnChoice, Loaded, Source};
 
 /// What files hold, before it is prepared.
 pub struct Assembly {
@@ -47,12 +47,18 @@ impl Assembly {
             Self { graph: Graph::default(), source: Source::default(), files: Vec::new() };
         let (mut merging, mut merged_files, mut sources) = (Vec::new(), Vec::new(), Vec::new());
         for file in files {
-            let (graph, source) = surfel_formats::load_graph(file, &options, report)?;
+            let (graph, source) = if preparation.vertices {
+                let Loaded { cloud, source } = surfel_formats::load(file, &options, report)?;
+                let points = Points { cloud, ..Points::default() };
+                (Graph::of(Geometry::Points(points), Material::MATTE), source)
+            } else {
+                surfel_formats::load_graph(file, &options, report)?
+            };
             report.end_stage();
             let is_alone = material.of_file(file).is_some();
             match into_cloud(graph, is_alone) {
                 Ok(cloud) => {
-                    merging.push(surfel_formats::Loaded { cloud, source: source.clone() });
+                    merging.push(Loaded { cloud, source: source.clone() });
                     merged_files.push(file.clone());
                 }
                 Err(graph) => {

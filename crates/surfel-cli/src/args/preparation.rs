@@ -31,6 +31,9 @@ pub struct PreparationArgs {
     /// How far each point's surface reaches: a length, adaptive[:K] or median[:N] [default: adaptive:12].
     #[arg(long, value_name = "RADIUS")]
     pub radius: Option<Radius>,
+    /// Take the vertices of meshes as points.
+    #[arg(long)]
+    pub vertices: bool,
     /// Columns of a text file, as in x,y,z,-,r,g,b; found out from the file if not given.
     #[arg(long, value_name = "NAMES")]
     columns: Option<String>,
