@@ -1,10 +1,10 @@
 //! `surfel demo`: scans a ruin, writes the cloud, and renders it as a user would.
 
 use crate::args::Global;
-use crate::render;
 use crate::report::{Report, print};
+use crate::scene_file::Line;
 use anyhow::Context;
-use clap::Parser;
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -33,12 +33,6 @@ Examples:
 const LIGHT: [&str; 6] =
     ["--sun-azimuth", "190", "--sun-elevation", "32", "--background", "#4f7fb8,#d5e2ee"];
 
-/// The command line that makes the picture, taken apart as the program takes its own.
-#[derive(Parser)]
-enum Line {
-    Render(Box<render::Args>),
-}
-
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
     let start = Instant::now();
     let folder = &args.output;
@@ -63,8 +57,8 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     ]);
     words.extend(camera_words());
     words.extend(LIGHT.map(str::to_owned));
-    let Line::Render(args) = Line::try_parse_from(&words)?;
-    render::run(&args, global, report)?;
+    let (cli, line) = Line::parse(words.iter().map(OsString::from).collect())?;
+    crate::run_command(&cli.command, &line, global, report)?;
     tell(&cloud_path, &words, n_points, start)
 }
 

@@ -1,5 +1,6 @@
 //! The program `surfel`: parses the command line, calls the libraries, reports.
 
+mod animate;
 mod args;
 mod assemble;
 mod bench;
@@ -14,14 +15,17 @@ mod picture;
 mod prepare;
 mod render;
 mod report;
+mod scene_file;
 mod stats;
 
-use args::{Global, Usage};
+use args::{Global, SceneArgs, Usage};
 use clap::{Parser, Subcommand};
-use report::Report;
+use report::{Report, Verbosity};
+use scene_file::Line;
 use std::process::ExitCode;
 
-/// Turns point clouds into pictures by ray tracing the points themselves, as a continuous surface.
+/// Turns point clouds into pictures and films by ray tracing the points themselves, as a continuous surface,
+/// together with meshes.
 #[derive(Parser)]
 #[command(name = "surfel", version, after_help = EXAMPLES, max_term_width = 100)]
 struct Cli {
@@ -40,8 +44,10 @@ Examples:
 
 #[derive(Subcommand)]
 enum Command {
-    /// Render point clouds to a picture.
+    /// Render point clouds, meshes and scenes to a picture.
     Render(Box<render::Args>),
+    /// Render a film of a scene that moves, or of a turn around anything.
+    Animate(Box<animate::Args>),
     /// Tell what is in a file.
     Info(info::Args),
     /// Clean a cloud, add normals and radii, write it to a file.
@@ -54,26 +60,57 @@ enum Command {
 
 fn main() -> ExitCode {
     quiet_decoder();
-    let cli = Cli::parse();
+    let (cli, line) = match Line::parse(std::env::args_os().collect()) {
+        Ok(parsed) => parsed,
+        Err(error) => {
+            Report::new(Verbosity::Normal).error(&error);
+            return exit_code(&error);
+        }
+    };
     let report = Report::new(cli.global.verbosity());
-    match run(&cli, &report) {
+    match run(&cli, &line, &report) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             report.error(&error);
-            ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
+            exit_code(&error)
         }
     }
 }
 
-fn run(cli: &Cli, report: &Report) -> anyhow::Result<()> {
+fn exit_code(error: &anyhow::Error) -> ExitCode {
+    ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
+}
+
+impl Cli {
+    /// What is seen, of commands that show a scene.
+    fn into_scene(self) -> Option<SceneArgs> {
+        match self.command {
+            Command::Render(args) => Some(args.scene),
+            Command::Animate(args) => Some(args.scene),
+            _ => None,
+        }
+    }
+}
+
+fn run(cli: &Cli, line: &Line, report: &Report) -> anyhow::Result<()> {
     interrupt::listen(&report.cancellation())?;
     cli.global.start_threads()?;
-    match &cli.command {
-        Command::Render(args) => render::run(args, &cli.global, report),
+    run_command(&cli.command, line, &cli.global, report)
+}
+
+fn run_command(
+    command: &Command,
+    line: &Line,
+    global: &Global,
+    report: &Report,
+) -> anyhow::Result<()> {
+    match command {
+        Command::Render(args) => render::run(args, line, global, report),
+        Command::Animate(args) => animate::run(args, line, global, report),
         Command::Info(args) => info::run(args, report),
-        Command::Prepare(args) => prepare::run(args, &cli.global, report),
-        Command::Demo(args) => demo::run(args, &cli.global, report),
-        Command::Bench(args) => bench::run(args, &cli.global, report),
+        Command::Prepare(args) => prepare::run(args, global, report),
+        Command::Demo(args) => demo::run(args, global, report),
+        Command::Bench(args) => bench::run(args, global, report),
     }
 }
 

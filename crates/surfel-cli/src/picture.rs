@@ -1,27 +1,27 @@
 //! From files to a picture: load, choose, prepare, build, expose, render, save.
 
-use crate::args::{Exposure, Global, Usage};
-use crate::assemble::{Assembly, Making, name_files};
+use crate::args::{Exposure, Global, SceneArgs, Usage};
+use crate::assemble::{Assembly, name_files};
 use crate::light::{self, Lit};
 use crate::memory::Plan;
 use crate::render::Args;
 use crate::report::{Muted, Report};
+use crate::scene_file::{Line, is_scene_file};
 use crate::stats::{Run, Seconds};
 use crate::{dry_run, exposure, stats};
 use anyhow::bail;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use surfel::flat::FlatScene;
-use surfel::image::Image;
-use surfel::math::Vec3;
-use surfel::points::{PointCloud, SURFACE_VARIATION};
+use surfel::math::{DVec3, Vec3};
+use surfel::points::SURFACE_VARIATION;
 use surfel::progress::Progress;
 use surfel::render::{CpuRenderer, Renderer, Settings};
 use surfel::scene::color::ColorSource;
 use surfel::scene::{Background, Camera, Light, Scene, usual_bounds};
 use surfel::surface::SurfaceKind;
 use surfel::trace::Simd;
-use surfel_formats::{Alpha, BitDepth, ImageOptions, Source};
+use surfel_formats::{Alpha, BitDepth, ImageOptions};
 
 /// What was chosen from the data.
 pub struct Choices {
@@ -30,39 +30,52 @@ pub struct Choices {
     pub lights: Vec<Light>,
 }
 
-pub fn make(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
+pub fn make(
+    args: &Args,
+    output: &Path,
+    line: &Line,
+    global: &Global,
+    report: &Report,
+) -> anyhow::Result<()> {
     let start = Instant::now();
-    check_output(&args.output)?;
+    check_output(output)?;
     let mut seconds = Seconds::default();
-    let assembly = timed(&mut seconds.load, || load(args, global, report))?;
-    check_color(&assembly, args)?;
-    let choices = choose_from(&assembly.outline(), &assembly.source, args, report)?;
+    let mut assembly = timed(&mut seconds.load, || load(&args.scene, line, global, report))?;
+    assembly.graph.pose(args.time);
+    let choices = choose(&assembly, &args.scene, report)?;
     if args.dry_run {
-        return Ok(crate::report::print(&dry_run::resolved(&assembly, &choices, args))?);
+        return Ok(crate::report::print(&dry_run::resolved(&assembly, &choices, args, line))?);
     }
-    let scene = timed(&mut seconds.prepare, || describe(assembly, choices, args, report))?;
+    let camera = camera_at(args.time, &assembly, &choices);
+    let scene = timed(&mut seconds.prepare, || describe(assembly, choices, &args.scene, report))?;
+    let scene = Scene { camera, ..scene };
     let counts = scene.graph.counts();
     let mut flat = timed(&mut seconds.build, || Ok(FlatScene::new(&scene, report)?))?;
     drop(scene);
 
     let renderer = CpuRenderer { simd: Simd::detect() };
-    let settings = settings(args);
-    expose(&renderer, &mut flat, &settings, args, report)?;
-    report.choice(
-        &format!("{} threads, {}", rayon::current_num_threads(), renderer.simd.name()),
-        "--threads",
-    );
+    let with_layers = output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    let settings = Settings { with_layers, ..settings(&args.scene) };
+    let stops = exposure(&renderer, &flat, &settings, &args.scene, report)?;
+    light::expose(&mut flat, stops);
+    tell_threads(&renderer, report);
     let (image, rendered) = renderer.render(&flat, &settings, report)?;
     report.end_stage();
     report.check()?;
-    save(&image, &flat, args)?;
+    let options = image_options(flat.origin, &args.scene);
+    surfel_formats::save_image(output, &image, &options)?;
     if let Some(path) = &args.stats {
         seconds.total = start.elapsed().as_secs_f64();
-        let resolution = args.picture.resolution;
+        let resolution = args.scene.picture.resolution;
         let run = Run { flat: &flat, counts, seconds, rendered, resolution, simd: renderer.simd };
         stats::write(path, &run.json())?;
     }
     Ok(())
+}
+
+pub fn tell_threads(renderer: &CpuRenderer, report: &Report) {
+    let n_threads = rayon::current_num_threads();
+    report.choice(&format!("{n_threads} threads, {}", renderer.simd.name()), "--threads");
 }
 
 /// Fails before the work where the output could not be written after it.
@@ -78,44 +91,60 @@ pub fn check_output(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
+pub fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
     let start = Instant::now();
     let result = work();
     *seconds = start.elapsed().as_secs_f64();
     result
 }
 
-fn load(args: &Args, global: &Global, report: &Report) -> anyhow::Result<Assembly> {
+/// Reads all files, if memory suffices and they have what is asked for.
+pub fn load<'a>(
+    args: &'a SceneArgs,
+    line: &Line,
+    global: &Global,
+    report: &Report,
+) -> anyhow::Result<Assembly<'a>> {
     let (width, height) = args.picture.resolution;
     let n_pixels = u64::from(width) * u64::from(height);
-    let inspected = args.files.iter().map(|file| surfel_formats::inspect(file));
+    let objects = line.scene.objects.iter().flat_map(|object| &object.files);
+    let files = args.files.iter().filter(|file| !is_scene_file(file)).chain(objects);
+    let files: Vec<PathBuf> = files.cloned().collect();
+    if files.is_empty() {
+        bail!("{}: no objects; add an [[object]] with a file", name_files(&args.files));
+    }
+    let inspected = files.iter().map(|file| surfel_formats::inspect(file));
     let sources = inspected.collect::<Result<Vec<_>, _>>()?;
-    Plan::new(&sources, &args.files, args.preparation.select, n_pixels).check(global)?;
-    let columns = args.preparation.columns(args.color.color.as_ref());
-    Assembly::load(&args.files, columns, &args.preparation, &args.material, report)
+    Plan::new(&sources, &files, args.preparation.select, n_pixels).check(global)?;
+    let assembly = Assembly::load(args, line, report)?;
+    check_color(&assembly, args)?;
+    Ok(assembly)
 }
 
 /// Fails before the preparation if no file has the column asked for. The library knows only the columns
 /// that were loaded, which are those asked for.
-fn check_color(assembly: &Assembly, args: &Args) -> anyhow::Result<()> {
-    let Some(color) = &args.color.color else { return Ok(()) };
-    let is_prepared = match color {
-        ColorSource::Normal => true,
-        ColorSource::Column(name) => name == SURFACE_VARIATION,
-        _ => false,
-    };
-    if is_prepared || assembly.clouds().all(|cloud| color.is_in(cloud)) {
-        return Ok(());
+fn check_color(assembly: &Assembly, args: &SceneArgs) -> anyhow::Result<()> {
+    for (cloud, of_cloud) in assembly.clouds() {
+        let Some(color) = &of_cloud.color.color else { continue };
+        let is_prepared = match color {
+            ColorSource::Normal => true,
+            ColorSource::Column(name) => name == SURFACE_VARIATION,
+            _ => false,
+        };
+        if is_prepared || color.is_in(cloud) {
+            continue;
+        }
+        bail!(
+            "{}: no column {color}; --color takes elevation, normal, {SURFACE_VARIATION}, #RRGGBB \
+             and what the file has: {}",
+            name_files(&args.files),
+            match shown(&assembly.source.columns) {
+                none if none.is_empty() => "only positions".to_owned(),
+                columns => columns.join(", "),
+            },
+        )
     }
-    bail!(
-        "{}: no column {color}; --color takes elevation, normal, {SURFACE_VARIATION}, #RRGGBB and \
-         what the file has: {}",
-        name_files(&args.files),
-        match shown(&assembly.source.columns) {
-            none if none.is_empty() => "only positions".to_owned(),
-            columns => columns.join(", "),
-        },
-    )
+    Ok(())
 }
 
 /// Columns of a file as `--color` takes them.
@@ -135,16 +164,13 @@ fn shown(columns: &[String]) -> Vec<&str> {
     names
 }
 
-fn choose_from(
-    outline: &PointCloud,
-    source: &Source,
-    args: &Args,
-    report: &Report,
-) -> anyhow::Result<Choices> {
-    let up = args.camera.up(outline, source, report);
+/// Up, camera and lights from the options and the data.
+pub fn choose(assembly: &Assembly, args: &SceneArgs, report: &Report) -> anyhow::Result<Choices> {
+    let outline = assembly.outline();
+    let up = args.camera.up(&outline, &assembly.source, report);
     let (width, height) = args.picture.resolution;
-    let camera = args.camera.camera(outline, up, f64::from(width) / f64::from(height), report);
-    let bounds = usual_bounds(outline);
+    let camera = args.camera.camera(&outline, up, f64::from(width) / f64::from(height), report);
+    let bounds = usual_bounds(&outline);
     let diagonal = (bounds.max - bounds.min).length();
     // Points as pixels are shaded by their depth alone.
     let is_shaded = args.surface.surface != SurfaceKind::Points;
@@ -153,32 +179,30 @@ fn choose_from(
     Ok(Choices { up, camera, lights })
 }
 
-fn describe(
+/// The camera as its motion has it at a time.
+pub fn camera_at(time_secs: f64, assembly: &Assembly, choices: &Choices) -> Camera {
+    match &assembly.camera_motion {
+        Some(motion) => motion.at(time_secs, choices.camera, choices.up),
+        None => choices.camera,
+    }
+}
+
+pub fn describe(
     assembly: Assembly,
     choices: Choices,
-    args: &Args,
+    args: &SceneArgs,
     report: &Report,
 ) -> anyhow::Result<Scene> {
-    let making = Making {
-        surface: &args.surface,
-        preparation: &args.preparation,
-        color: &args.color,
-        material: &args.material,
-        light: &args.light,
-        seed: args.picture.seed,
-        up: choices.up,
-    };
     Ok(Scene {
-        graph: assembly.make(&making, report)?,
+        graph: assembly.make(choices.up, report)?,
         lights: choices.lights,
         background: args.color.background(),
         camera: choices.camera,
     })
 }
 
-fn settings(args: &Args) -> Settings {
+pub fn settings(args: &SceneArgs) -> Settings {
     let (width, height) = args.picture.resolution;
-    let extension = args.output.extension().unwrap_or_default();
     Settings {
         width,
         height,
@@ -186,38 +210,34 @@ fn settings(args: &Args) -> Settings {
         light_samples: args.picture.samples,
         max_depth: args.material.max_depth,
         seed: args.picture.seed,
-        with_layers: extension.eq_ignore_ascii_case("exr"),
+        with_layers: false,
     }
 }
 
-fn expose(
+/// Stops by which all light is to be brighter.
+pub fn exposure(
     renderer: &CpuRenderer,
-    flat: &mut FlatScene,
+    flat: &FlatScene,
     settings: &Settings,
-    args: &Args,
+    args: &SceneArgs,
     report: &Report,
-) -> anyhow::Result<()> {
-    let stops = match args.light.exposure {
-        Exposure::Stops(stops) => stops as f32,
-        Exposure::Auto if flat.lights.is_empty() && flat.lamps.is_empty() => {
-            return Ok(());
-        }
+) -> anyhow::Result<f32> {
+    match args.light.exposure {
+        Exposure::Stops(stops) => Ok(stops as f32),
+        Exposure::Auto if flat.lights.is_empty() && flat.lamps.is_empty() => Ok(0.0),
         Exposure::Auto => {
             let stops = exposure::automatic(renderer, flat, settings, &Muted(report))?;
             report.choice(&format!("exposure {stops:+.2} stops"), "--exposure");
-            stops
+            Ok(stops)
         }
-    };
-    light::expose(flat, stops);
-    Ok(())
+    }
 }
 
-fn save(image: &Image, flat: &FlatScene, args: &Args) -> anyhow::Result<()> {
-    let is_opaque = flat.background != Background::Transparent;
-    let options = ImageOptions {
+pub fn image_options(origin: DVec3, args: &SceneArgs) -> ImageOptions {
+    let is_opaque = args.color.background() != Background::Transparent;
+    ImageOptions {
         depth: if args.picture.bit_depth == "16" { BitDepth::Sixteen } else { BitDepth::Eight },
         alpha: if is_opaque { Alpha::Drop } else { Alpha::Keep },
-        origin: flat.origin,
-    };
-    Ok(surfel_formats::save_image(&args.output, image, &options)?)
+        origin,
+    }
 }

@@ -19,7 +19,8 @@ pub struct ColorArgs {
     /// Values of the first and last colour of the map; 2 % to 98 % of the values if not given.
     #[arg(long, value_name = "LOW,HIGH", value_parser = parse::range, allow_hyphen_values = true)]
     range: Option<(f64, f64)>,
-    /// #RRGGBB, two of them (top,bottom), gradient or transparent.
+    /// #RRGGBB, two of them (top,bottom), gradient, transparent, or surroundings: the sky or environment
+    /// that gives light.
     #[arg(long, value_name = "COLOR", default_value = "gradient", value_parser = parse::background)]
     background: Background,
     /// The same as --background transparent.

@@ -25,14 +25,24 @@ pub struct MaterialArgs {
 struct Choice {
     file: Option<String>,
     material: Material,
+    /// Its name and properties as they were typed.
+    words: (String, Vec<(String, String)>),
 }
 
 impl MaterialArgs {
     /// The material asked for a file: its own before that for all, the last one given.
     pub fn of(&self, file: &Path) -> Option<Material> {
+        Some(self.asked_for(file)?.material.clone())
+    }
+
+    /// The same as words: name, and properties with their values.
+    pub fn words_of(&self, file: &Path) -> Option<(String, Vec<(String, String)>)> {
+        Some(self.asked_for(file)?.words.clone())
+    }
+
+    fn asked_for(&self, file: &Path) -> Option<&Choice> {
         let for_all = || self.material.iter().rev().find(|choice| choice.file.is_none());
-        let choice = self.choice_of(file).or_else(for_all)?;
-        Some(choice.material.clone())
+        self.choice_of(file).or_else(for_all)
     }
 
     /// The material asked for this very file.
@@ -82,14 +92,16 @@ fn choice(text: &str) -> Result<Choice, String> {
         None => (None, name),
     };
     let mut material: Material = name.parse().map_err(|error: surfel::Error| error.to_string())?;
+    let mut words = (name.to_owned(), Vec::new());
     for property in properties.into_iter().flat_map(|text| text.split(',')) {
         let (name, value) = property.split_once('=').ok_or_else(|| {
             format!("{property}: expected a property and its value, as in ior=1.33")
         })?;
         set(&mut material, name.trim(), value.trim())
             .map_err(|error| format!("{name}: {error}"))?;
+        words.1.push((name.trim().to_owned(), value.trim().to_owned()));
     }
-    Ok(Choice { file, material })
+    Ok(Choice { file, material, words })
 }
 
 /// Sets a property by its name.
@@ -144,9 +156,10 @@ mod tests {
 
     #[test]
     fn a_material_is_for_all_files_or_for_one() {
-        assert_eq!(choice("glass"), Ok(Choice { file: None, material: Material::GLASS }));
-        let mirror = Choice { file: Some("a b.ply".into()), material: Material::MIRROR };
-        assert_eq!(choice("a b.ply=mirror"), Ok(mirror));
+        let glass = choice("glass").unwrap();
+        assert_eq!((glass.file, glass.material), (None, Material::GLASS));
+        let mirror = choice("a b.ply=mirror").unwrap();
+        assert_eq!((mirror.file.as_deref(), mirror.material), (Some("a b.ply"), Material::MIRROR));
         let water = choice("pool.las=glass:ior=1.33,color=#ffffff").unwrap();
         assert_eq!((water.file.as_deref(), water.material.ior), (Some("pool.las"), 1.33));
         for wrong in ["brick", "a.ply=", "glass:ior", "glass:ior=9", "glass:colour=#fff"] {

@@ -3,15 +3,17 @@
 mod camera;
 mod color;
 mod light;
-mod material;
+pub mod material;
 pub mod parse;
 mod preparation;
+mod scene;
 
 pub use camera::{CameraArgs, is_georeferenced, short};
 pub use color::ColorArgs;
 pub use light::{Exposure, LightArgs, LightKind};
 pub use material::MaterialArgs;
 pub use preparation::PreparationArgs;
+pub use scene::SceneArgs;
 
 use crate::report::Verbosity;
 use anyhow::Context;

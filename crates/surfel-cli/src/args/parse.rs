@@ -63,19 +63,22 @@ pub fn range(text: &str) -> Result<(f64, f64), String> {
     }
 }
 
-/// `transparent`, `gradient`, `#RRGGBB`, or two colours: top and bottom.
+/// `transparent`, `surroundings`, `gradient`, `#RRGGBB`, or two colours: top and bottom.
 pub fn background(text: &str) -> Result<Background, String> {
     if text == "transparent" {
         return Ok(Background::Transparent);
+    }
+    if text == "surroundings" {
+        return Ok(Background::Surroundings);
     }
     let text = if text == "gradient" { GRADIENT } else { text };
     let colors: Option<Vec<Vec3>> = text.split(',').map(|color| linear(color.trim())).collect();
     match colors.as_deref() {
         Some(&[plain]) => Ok(Background::Gradient { top: plain, bottom: plain }),
         Some(&[top, bottom]) => Ok(Background::Gradient { top, bottom }),
-        _ => {
-            Err("expected #RRGGBB, two such as in #AAAAAA,#BBBBBB, gradient or transparent".into())
-        }
+        _ => Err("expected #RRGGBB, two such as in #AAAAAA,#BBBBBB, gradient, surroundings or \
+                 transparent"
+            .into()),
     }
 }
 

@@ -12,6 +12,7 @@ use super::{Batch, Integrator, RayCounts};
 use crate::error::Result;
 use crate::math::{Frame, Ray, Vec3, Vec4, hash, scrambled_pair};
 use crate::progress::Progress;
+use crate::scene::Background;
 use crate::trace::{self, SceneHit, Which};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -194,6 +195,11 @@ impl Search<'_> {
         let behind = self.batch.samples.behind[slot];
         let with_sun = path.sees == (Sees::Sky { with_sun: true });
         match path.sees {
+            Sees::Behind if self.batch.scene.background == Background::Surroundings => {
+                let radiance = surroundings(self.batch.scene, path.ray.direction, false);
+                self.light[slot] += path.weight * radiance;
+                self.alpha[slot] += path.weight.max_element();
+            }
             // The renderer puts what is behind there.
             Sees::Behind => {}
             Sees::BehindGlass if 0.0 < behind.w => {

@@ -2,6 +2,7 @@
 
 use super::graph::{Graph, Transform};
 use crate::math::{DQuat, DVec3};
+use std::f64::consts::TAU;
 
 /// Channels that change nodes over time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -148,6 +149,47 @@ impl<T: Value> Keys<T> {
     }
 }
 
+impl Keys<DVec3> {
+    /// The same keys with a smooth way between them (Catmull and Rom 1974): at each key the rate is that from
+    /// the key before to the one after.
+    pub fn smoothed(self) -> Self {
+        let Self { times_secs, values, .. } = self;
+        let last = values.len().saturating_sub(1);
+        let rate = |i: usize| {
+            let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
+            let secs = times_secs[after] - times_secs[before];
+            if 0.0 < secs { (values[after] - values[before]) / secs } else { DVec3::ZERO }
+        };
+        let values = (0..values.len()).flat_map(|i| [rate(i), values[i], rate(i)]).collect();
+        Self { times_secs, values, interpolation: Interpolation::Cubic }
+    }
+}
+
+/// Through two places or more, in so many seconds, at a speed that is even from place to place.
+pub fn smooth_path(places: &[DVec3], secs: f64) -> Keys<DVec3> {
+    let mut way = vec![0.0];
+    for pair in places.windows(2) {
+        // Places that are the same still take their time: keys rise.
+        way.push(way[way.len() - 1] + pair[0].distance(pair[1]).max(1e-9));
+    }
+    let whole = way[way.len() - 1];
+    let times_secs = way.iter().map(|along| secs * along / whole).collect();
+    Keys { times_secs, values: places.to_vec(), interpolation: Interpolation::Linear }.smoothed()
+}
+
+/// So many even turns about an axis, counter-clockwise as it points to the viewer.
+pub fn orbit(axis: DVec3, turns: f64, secs: f64) -> Keys<DQuat> {
+    let axis = axis.try_normalize().unwrap_or(DVec3::Z);
+    // A third of a turn a key at most: between keys the way is the short one.
+    let n = (3.0 * turns.abs()).ceil().max(1.0) as usize;
+    let share = |i: usize| i as f64 / n as f64;
+    Keys {
+        times_secs: (0..=n).map(|i| secs * share(i)).collect(),
+        values: (0..=n).map(|i| DQuat::from_axis_angle(axis, TAU * turns * share(i))).collect(),
+        interpolation: Interpolation::Linear,
+    }
+}
+
 /// Weights of a Hermite spline: start, leaving, end, arriving.
 fn hermite(share: f64, secs: f64) -> [f64; 4] {
     let (t, t2, t3) = (share, share * share, share * share * share);
@@ -233,6 +275,20 @@ mod tests {
         let keys = keys(Interpolation::Cubic, vec![0.0, 10.0, 5.0, 5.0, 20.0, 0.0]);
         for (time, value) in [(1.0, 10.0), (1.5, 12.5), (2.0, 15.0), (2.75, 18.75), (3.0, 20.0)] {
             assert!((keys.at(time)[0] - value).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn an_orbit_is_even_and_a_path_meets_its_places() {
+        let keys = orbit(DVec3::Z, 2.0, 8.0);
+        for (time, degrees) in [(0.5, 45.0), (1.0, 90.0), (3.0, 270.0), (7.0, 630.0f64)] {
+            let expected = DQuat::from_rotation_z(degrees.to_radians());
+            assert!(keys.at(time).angle_between(expected) < 1e-6, "{time}");
+        }
+        let places = [DVec3::ZERO, 2.0 * DVec3::X, DVec3::new(2.0, 1.0, 0.0)];
+        let keys = smooth_path(&places, 6.0);
+        for (time, place) in [0.0, 4.0, 6.0].into_iter().zip(places) {
+            assert!(keys.at(time).distance(place) < 1e-9);
         }
     }
 

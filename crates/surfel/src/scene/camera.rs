@@ -1,6 +1,6 @@
 //! Cameras: who looks, from where, and the rays through a picture's pixels.
 
-use crate::math::{DVec3, Ray, Vec3};
+use crate::math::{DQuat, DVec3, Ray, Vec3};
 use std::f64::consts::{PI, TAU};
 
 /// A camera in world coordinates.
@@ -53,6 +53,12 @@ impl Camera {
         let right = forward.cross(self.view_up).try_normalize();
         let right = right.unwrap_or_else(|| forward.any_orthonormal_vector());
         [right, right.cross(forward), forward]
+    }
+
+    /// The camera carried about its focal point.
+    pub fn turned(self, turn: DQuat) -> Self {
+        let position = self.focal_point + turn * (self.position - self.focal_point);
+        Self { position, view_up: turn * self.view_up, ..self }
     }
 
     /// Those of a picture that stays level however high the focal point is.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::light::ground_axes;
 use crate::error::{Error, Result};
-use crate::math::{DVec3, Distribution2d, Vec3};
+use crate::math::{DQuat, DVec3, Distribution2d, Vec3};
 
 /// An equirectangular picture as light from infinitely far away, drawn in proportion to its luminance.
 ///
@@ -81,6 +81,12 @@ impl Environment {
     /// Number of pixels with components that were not light or cut off.
     pub fn n_repaired(&self) -> usize {
         self.n_repaired
+    }
+
+    /// The same, carried about the scene.
+    pub fn turned(&self, turn: DQuat) -> Self {
+        let axes = self.axes.map(|axis| (turn * axis.as_dvec3()).as_vec3());
+        Self { axes, ..self.clone() }
     }
 
     /// Multiplies the radiance by `factor`, which counts as 0 if it is negative or NaN. Costs nothing.

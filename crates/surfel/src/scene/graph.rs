@@ -1,6 +1,6 @@
 //! The graph of a scene after glTF 2.0: geometry under nodes that stand, turn and move.
 
-use super::animation::Animation;
+use super::animation::{Animation, Channel};
 use super::camera::Projection;
 use super::light::Lamp;
 use super::material::Material;
@@ -85,6 +85,10 @@ impl Transform {
     pub const IDENTITY: Self =
         Self::Parts { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
 
+    pub const fn translated(translation: DVec3) -> Self {
+        Self::Parts { translation, rotation: DQuat::IDENTITY, scale: DVec3::ONE }
+    }
+
     pub fn matrix(&self) -> DAffine3 {
         match *self {
             Self::Parts { translation, rotation, scale } => {
@@ -163,6 +167,55 @@ impl Graph {
         }));
         self.animation.append(other.animation, node);
         node
+    }
+
+    /// Empties the clouds and meshes that never bend, once their flat form holds all that is needed.
+    pub fn forget_static(&mut self) {
+        let bends = |mesh: &Mesh| !mesh.morphs.is_empty() || mesh.skin.is_some();
+        for geometry in &mut self.geometries {
+            match geometry {
+                Geometry::Points(points) => {
+                    let origin = points.cloud.origin;
+                    points.cloud = PointCloud { origin, ..PointCloud::default() };
+                    points.colors = Vec::new();
+                }
+                Geometry::Triangles(mesh) if !bends(mesh) => {
+                    *mesh = Mesh { origin: mesh.origin, ..Mesh::default() };
+                }
+                Geometry::Triangles(_) => {}
+            }
+        }
+    }
+
+    /// Puts a new node at the end; returns its index.
+    pub fn add(&mut self, node: Node) -> usize {
+        self.nodes.push(node);
+        self.nodes.len() - 1
+    }
+
+    /// Shows a range of nodes, which holds all below its roots, once more under `parent`; geometry is
+    /// shared. Returns the index of the first copy.
+    pub fn add_copy(&mut self, nodes: std::ops::Range<usize>, parent: usize) -> usize {
+        let first = self.nodes.len();
+        let moved =
+            |node: usize| if nodes.contains(&node) { node - nodes.start + first } else { node };
+        for i in nodes.clone() {
+            let mut node = self.nodes[i].clone();
+            node.parent = Some(match node.parent {
+                Some(old) if nodes.contains(&old) => moved(old),
+                _ => parent,
+            });
+            node.joints.iter_mut().for_each(|joint| joint.node = moved(joint.node));
+            self.nodes.push(node);
+        }
+        let channels = &mut self.animation.channels;
+        for i in 0..channels.len() {
+            if nodes.contains(&channels[i].node) {
+                let copy = Channel { node: moved(channels[i].node), ..channels[i].clone() };
+                channels.push(copy);
+            }
+        }
+        first
     }
 
     /// Points and triangles, each geometry once.

@@ -1,7 +1,7 @@
 //! Lights. A white matte surface facing a light of strength 1 has radiance 1.
 
 use super::environment::Environment;
-use crate::math::Vec3;
+use crate::math::{DQuat, Vec3};
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
@@ -67,6 +67,19 @@ impl Sky {
         // A smooth horizon: a step would show as an edge on every slowly turning surface.
         let height = (0.5 + direction.dot(self.up)).clamp(0.0, 1.0);
         self.ground.lerp(self.zenith, height * height * (3.0 - 2.0 * height))
+    }
+}
+
+impl Light {
+    /// The light carried about the scene.
+    pub fn turned(&self, turn: DQuat) -> Self {
+        let turned = |direction: Vec3| (turn * direction.as_dvec3()).as_vec3();
+        match self {
+            Self::Sun(sun) => Self::Sun(Sun { direction: turned(sun.direction), ..*sun }),
+            Self::Sky(sky) => Self::Sky(Sky { up: turned(sky.up), ..*sky }),
+            Self::Environment(environment) => Self::Environment(environment.turned(turn)),
+            Self::Headlight(strength) => Self::Headlight(*strength),
+        }
     }
 }
 

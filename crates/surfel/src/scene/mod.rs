@@ -12,7 +12,7 @@ mod mesh;
 mod prospect;
 mod texture;
 
-pub use animation::{Animation, Channel, Interpolation, Keys, Track, Value};
+pub use animation::{Animation, Channel, Interpolation, Keys, Track, Value, orbit, smooth_path};
 pub use camera::{Camera, Projection, View};
 pub use environment::Environment;
 pub use framing::{Framing, frame, look_around, upright, usual_bounds};
@@ -37,6 +37,8 @@ pub struct Scene {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Background {
     Transparent,
+    /// The sky or the environment that gives light.
+    Surroundings,
     /// Linear, from the top to the bottom of the picture; the same twice for a plain colour.
     Gradient {
         top: Vec3,
@@ -45,10 +47,11 @@ pub enum Background {
 }
 
 impl Background {
-    /// Linear colour and alpha at a height from 0 (top of the picture) to 1 (bottom).
+    /// Linear colour and alpha at a height from 0 (top of the picture) to 1 (bottom); nothing of surroundings,
+    /// which depend on the direction.
     pub fn at(self, height: f32) -> [f32; 4] {
         match self {
-            Self::Transparent => [0.0; 4],
+            Self::Transparent | Self::Surroundings => [0.0; 4],
             Self::Gradient { top, bottom } => top.lerp(bottom, height).extend(1.0).to_array(),
         }
     }

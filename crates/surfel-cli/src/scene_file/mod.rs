@@ -1,0 +1,165 @@
+//! Scene files: options by their names, objects, lamps and what moves, in TOML or JSON.
+
+mod fields;
+mod lamp;
+mod line;
+mod motion;
+mod object;
+mod options;
+
+pub use line::Line;
+pub use motion::{CameraMotion, Motion};
+pub use object::Object;
+pub use options::Options;
+
+use crate::args::Usage;
+use anyhow::{Context, bail};
+use fields::Fields;
+use lamp::LampSpec;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use surfel::scene::Node;
+
+/// A scene file, read and checked; files that it names are found from where it lies.
+#[derive(Clone, Debug, Default)]
+pub struct SceneFile {
+    pub options: Options,
+    pub objects: Vec<Object>,
+    pub lamps: Vec<Node>,
+    pub motions: Vec<Motion>,
+    pub camera_motion: Option<CameraMotion>,
+    /// Tables of objects, lamps and animations as they were written, with files in full.
+    raw: [Vec<Value>; 3],
+}
+
+/// Of `raw`.
+const TABLES: [&str; 3] = ["object", "lamp", "animation"];
+
+/// Bytes of the largest scene file: it names data, it does not hold them.
+const MOST_BYTES: u64 = 64 << 20;
+
+/// Whether a file is a scene file, by its name.
+pub fn is_scene_file(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    ["toml", "json"].contains(&extension.as_str())
+}
+
+impl SceneFile {
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        let name = path.display();
+        let size =
+            std::fs::metadata(path).with_context(|| format!("{name}: cannot be read"))?.len();
+        if MOST_BYTES < size {
+            bail!("{name}: {size} bytes, expected a scene file of at most {MOST_BYTES}");
+        }
+        let text = std::fs::read_to_string(path).with_context(|| {
+            format!("{name}: cannot be read as text; check that it is a scene file")
+        })?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        Self::parse(&text, is_json, &folder)
+            .map_err(|error| Usage(format!("{name}: {error}")).into())
+    }
+
+    /// `folder` is where the files lie that the scene names.
+    pub fn parse(text: &str, is_json: bool, folder: &Path) -> Result<Self, String> {
+        let value: Value = if is_json {
+            serde_json::from_str(text).map_err(|error| error.to_string())?
+        } else {
+            toml::from_str(text).map_err(|error| error.to_string().trim().replace('\n', " "))?
+        };
+        let Value::Object(map) = value else { return Err("expected keys and values".into()) };
+        let mut fields = Fields::new(String::new(), map);
+        let mut scene = Self::default();
+        scene.raw = TABLES.map(|key| raw(&fields, key, folder));
+        for object in fields.tables("object")? {
+            scene.objects.push(Object::read(object, folder)?);
+        }
+        for lamp in fields.tables("lamp")? {
+            scene.lamps.push(LampSpec::read(lamp)?);
+        }
+        for motion in fields.tables("animation")? {
+            motion::read(motion, &mut scene)?;
+        }
+        // What a dry run tells about the data.
+        fields.take("info");
+        scene.options = Options::read(fields, folder)?;
+        scene.check_names()?;
+        Ok(scene)
+    }
+
+    /// Tables of objects as they were written, with files in full.
+    pub fn raw_objects(&self) -> &[Value] {
+        &self.raw[0]
+    }
+
+    /// The same of lamps and animations, by their keys.
+    pub fn raw_others(&self) -> impl Iterator<Item = (&'static str, &Vec<Value>)> {
+        TABLES.into_iter().zip(&self.raw).skip(1).filter(|(_, tables)| !tables.is_empty())
+    }
+
+    /// Whether there is nothing in it.
+    pub fn is_empty(&self) -> bool {
+        self.options.is_empty() && self.objects.is_empty() && self.lamps.is_empty()
+    }
+
+    /// Takes `other` in behind what is here.
+    pub fn append(&mut self, other: Self) {
+        self.options.append(other.options);
+        self.objects.extend(other.objects);
+        self.lamps.extend(other.lamps);
+        self.motions.extend(other.motions);
+        for (tables, more) in self.raw.iter_mut().zip(other.raw) {
+            tables.extend(more);
+        }
+        self.camera_motion = other.camera_motion.or(self.camera_motion.take());
+    }
+
+    fn check_names(&self) -> Result<(), String> {
+        let mut names: Vec<&str> = self.objects.iter().map(|object| object.name.as_str()).collect();
+        for (object_idx, object) in self.objects.iter().enumerate() {
+            let Some(parent) = &object.parent else { continue };
+            if !names[..object_idx].contains(&parent.as_str()) {
+                return Err(format!(
+                    "object `{}`: no object `{parent}` before it to be its parent",
+                    object.name
+                ));
+            }
+        }
+        names.extend(self.lamps.iter().map(|lamp| lamp.name.as_str()));
+        for motion in &self.motions {
+            if !names.contains(&motion.object.as_str()) {
+                let nearest = fields::nearest(&motion.object, names.iter().copied());
+                return Err(format!("animation: no object `{}`{nearest}", motion.object));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn raw(fields: &Fields, key: &str, folder: &Path) -> Vec<Value> {
+    let mut tables = match fields.peek(key) {
+        Some(Value::Array(tables)) => tables.clone(),
+        Some(table) => vec![table.clone()],
+        None => Vec::new(),
+    };
+    let in_full = |file: &mut Value| {
+        if let Value::String(path) = file {
+            *path = crate::dry_run::in_full(&beside(folder, path));
+        }
+    };
+    for table in tables.iter_mut().filter_map(Value::as_object_mut) {
+        table.get_mut("file").into_iter().for_each(in_full);
+        match table.get_mut("files") {
+            Some(Value::Array(files)) => files.iter_mut().for_each(in_full),
+            Some(pattern) => in_full(pattern),
+            None => {}
+        }
+    }
+    tables
+}
+
+/// `path` as it is seen from `folder`.
+fn beside(folder: &Path, path: &str) -> PathBuf {
+    folder.join(path)
+}
