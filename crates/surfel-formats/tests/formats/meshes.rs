@@ -50,7 +50,7 @@ fn faces_stand_anywhere_between_other_elements_in_all_encodings() {
     let vertex = "element vertex 3\nproperty list uchar uchar near\nproperty double x\n\
         property float y\nproperty short z\n";
     let face = "element face 2\nproperty float quality\nproperty list ushort uchar vertex_index\n\
-        property list uchar float texcoord\n";
+        property list uchar float other\n";
     let edge = "element edge 2\nproperty list uchar ushort ends\nproperty int flag\n";
     let note = "element note 1\nproperty uchar a\n";
     let texts = [
