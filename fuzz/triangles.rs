@@ -5,6 +5,7 @@ use surfel::scene::{Geometry, Graph};
 use surfel_formats::{LoadOptions, load_bytes, load_graph_bytes};
 
 /// Reads `bytes` as a graph and as points.
+#[allow(dead_code, reason = "materials are read in a way of their own")]
 pub fn read(name: &str, bytes: &[u8]) {
     let options = LoadOptions::default();
     if let Ok((graph, source)) = load_graph_bytes(name, bytes, &options, &Silent) {

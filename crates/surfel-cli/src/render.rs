@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Point clouds: .ply, .las, .laz, .copc.laz, .xyz, .txt, .csv, .asc, .pts, .obj, .bin; several make one.
+    /// Point clouds: .ply, .las, .laz, .copc.laz, .xyz, .txt, .csv, .asc, .pts, .obj, .stl, .bin; several make one.
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<PathBuf>,
     /// The picture: .png, .exr (linear, with all layers) or - for PNG on stdout.

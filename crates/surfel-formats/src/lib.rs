@@ -1,7 +1,8 @@
-//! Files: point clouds in and out, pictures out.
+//! Files: point clouds in and out, meshes in, pictures out.
 //!
 //! A file becomes a [`surfel::points::PointCloud`] by [`load`], whatever its format; [`save`] goes
-//! the other way, and [`save_image`] writes what was rendered.
+//! the other way, and [`save_image`] writes what was rendered. [`load_graph`] keeps the triangles of
+//! meshes, with their materials, as a [`surfel::scene::Graph`].
 //!
 //! ```
 //! use surfel::progress::Silent;

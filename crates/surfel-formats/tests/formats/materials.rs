@@ -118,6 +118,7 @@ fn textures_are_found_read_once_and_missed_aloud() {
     assert_eq!((normal.0.texture, normal.1, graph.textures[normal.0.texture].width), (2, 0.5, 1));
     assert_eq!(b.textures.base_color, None);
     assert_eq!((b.base_color, b.textures.normal), (Vec3::splat(0.5), None));
+    assert_eq!((b.emissive, b.textures.emissive), (Vec3::ZERO, None));
     assert!(listener.heard("a texture is left out: ") && listener.heard("none.png"));
     assert!(listener.heard("(and 1 others)"));
 }
