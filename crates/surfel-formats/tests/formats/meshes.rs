@@ -168,6 +168,16 @@ fn lines_of_obj_may_go_on_and_have_comments_and_colours() {
     assert_eq!(colors[2], Vec4::ONE);
 }
 
+#[test]
+fn lines_of_obj_go_on_wherever_the_file_is_cut_for_threads() {
+    let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n#";
+    let face = "f 1 \\\r\n\\\n2 3\r\n";
+    for shift in 0..face.len() {
+        let file = format!("{vertices}{}\n{}", "-".repeat(shift), face.repeat(20_000));
+        assert_eq!(read_mesh("a.obj", file).triangles.len(), 20_000, "{shift}");
+    }
+}
+
 /// A tetrahedron as one format after the other has it.
 fn stl_files() -> [(&'static str, Vec<u8>); 4] {
     let corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
