@@ -11,7 +11,7 @@ use surfel_formats::{ImageOptions, SaveOptions, save, save_image};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
-    for target in ["ply", "xyz", "las", "bin", "environment"] {
+    for target in ["ply", "xyz", "las", "bin", "environment", "obj", "stl", "mtl"] {
         fs::create_dir_all(corpus.join(target))?;
     }
     for (name, cloud) in [("bare", bare(7)), ("full", full(7))] {
@@ -28,6 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let binary = ply.replace("ascii", &format!("binary_{order}_endian"));
         fs::write(corpus.join(format!("ply/{order}.ply")), binary)?;
     }
+    write_meshes(&corpus)?;
     let texts = [
         "1 2 3\n4 5 6\n",
         "2\n1 2 3 -4 5 6 7\n1 2 3 -4 5 6 7\n",
@@ -59,6 +60,42 @@ fn pictures(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
         fs::write(folder.join(name), [head.as_bytes(), size.as_bytes(), &pixels].concat())?;
     }
     Ok(save_image(&folder.join("light.exr"), &Image::new(9, 3), &ImageOptions::default())?)
+}
+
+/// Triangles of every format, and materials.
+fn write_meshes(corpus: &Path) -> std::io::Result<()> {
+    let ply = "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement tristrips 1\n\
+        property list int int vertex_indices\nelement vertex 4\nproperty float x\nproperty double y\n\
+        property float z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty uchar red\n\
+        property uchar green\nproperty uchar blue\nproperty uchar alpha\nproperty float s\n\
+        property float t\nelement face 1\nproperty list uchar uint vertex_index\n\
+        property list uchar float texcoord\nend_header\n\
+        5 0 1 2 -1 3\n0 0 0 0 0 1 1 2 3 4 0 1\n1 0 0 0 0 1 1 2 3 4 0 1\n1 1 0 0 0 1 1 2 3 4 0 1\n\
+        0 1 0 0 0 1 1 2 3 4 0 1\n4 0 1 2 3 8 0 0 1 0 1 1 0 1\n";
+    fs::write(corpus.join("ply/mesh.ply"), ply)?;
+    let header = "element vertex 3\nproperty char x\nproperty char y\nproperty char z\n\
+        element face 2\nproperty list uchar uchar vertex_index\nend_header\n";
+    let body = [0, 0, 0, 1, 0, 0, 0, 1, 0, /* faces */ 3, 0, 1, 2, 4, 2, 1, 0, 1];
+    for order in ["big", "little"] {
+        let header = format!("ply\nformat binary_{order}_endian 1.0\n{header}");
+        let mesh = [header.as_bytes(), &body].concat();
+        fs::write(corpus.join(format!("ply/mesh-{order}.ply")), mesh)?;
+    }
+    let obj = "mtllib a.mtl b.mtl\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nvt 0 0.5\nvn 0 0 1\n\
+        usemtl a\nf 1/1/1 2/1/1 3/1/1\nusemtl b\nf -3//1 -2//-1 \\\n -1 # c\ng x\ns 1\nf 1 2 3 1\n";
+    fs::write(corpus.join("obj/all.obj"), obj)?;
+    fs::write(corpus.join("obj/faces.obj"), "f 1 2 3\nf -1/-1/-1 1/1/1 2//1\n")?;
+    let stl = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e0 0\n\
+        endloop\nendfacet\nendsolid a\n";
+    fs::write(corpus.join("stl/ascii.stl"), stl)?;
+    let corners = [0.0f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, -0.0];
+    let facet = [&corners.map(f32::to_le_bytes).concat()[..], &[0; 2]].concat();
+    fs::write(corpus.join("stl/facet"), &facet)?;
+    fs::write(corpus.join("stl/binary.stl"), [&[b' '; 80][..], &[1, 0, 0, 0], &facet].concat())?;
+    let mtl = "newmtl m\nKd 0.5 0.25 1\nKs 0.5\nNs 30\nKe 1 2 3\nTf 1 1 1\nNi 1.5\nd 0.5\nTr 0.5\nillum 7\n\
+        Pr 0.5\nPm 1\nmap_Kd -s 2 3 1 -o 0.5 -clamp on -mm 0 1 a.png\nmap_Ke b.png\nnorm -bm 2 c.png\n";
+    fs::write(corpus.join("mtl/all.mtl"), mtl)?;
+    fs::write(corpus.join("mtl/mirror.mtl"), "newmtl m\nKs 1 1 0.5\nillum 3\n")
 }
 
 fn bare(n: u16) -> PointCloud {

@@ -59,6 +59,7 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel::Result<Val
         "file": file.display().to_string(),
         "format": source.format,
         "points": cloud.len(),
+        "triangles": source.n_triangles,
         "bounds": { "min": corner(bounds.min), "max": corner(bounds.max) },
         "global_shift": cloud.origin.to_array(),
         "spacing": distance,
@@ -106,6 +107,9 @@ fn table(info: &Value) -> String {
     let mut row = |name: &str, value: String| lines.push(format!("  {name:<14}{value}"));
     row("format", text(&info["format"]));
     row("points", text(&info["points"]));
+    if !info["triangles"].is_null() {
+        row("triangles", text(&info["triangles"]));
+    }
     row("bounds", format!("{} to {}", text(&info["bounds"]["min"]), text(&info["bounds"]["max"])));
     row("global shift", text(&info["global_shift"]));
     row("spacing", format!("{} between points, about", text(&info["spacing"])));

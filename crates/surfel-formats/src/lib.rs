@@ -1,8 +1,9 @@
-//! Files: point clouds in and out, pictures and movies out, pictures of light in.
+//! Files: point clouds, meshes and scenes in, pictures of light in; clouds, pictures and movies out.
 //!
 //! A file becomes a [`surfel::points::PointCloud`] by [`load`], whatever its format; [`save`] goes
-//! the other way. [`save_image`] writes what was rendered, and a [`Movie`] many such pictures. Light
-//! for a scene comes from [`load_environment_picture`].
+//! the other way. [`load_graph`] keeps triangles, materials and movement too, as a
+//! [`surfel::scene::Graph`]. [`save_image`] writes what was rendered, and a [`Movie`] many such
+//! pictures. Light for a scene comes from [`load_environment_picture`].
 //!
 //! ```
 //! use surfel::progress::Silent;

@@ -29,7 +29,8 @@ struct Dropped {
 
 /// Takes out what no ray can hit and mends normals; returns how many triangles are left.
 ///
-/// What was done is noted; that no triangle is left is an error. The faces, of which `n_short` had fewer than three corners, begin at `place`.
+/// What was done is noted; that no triangle is left is an error. The faces begin at `place`, and
+/// `n_short` of them had fewer than three corners.
 pub(crate) fn finish(
     input: &Input,
     mut model: Model,

@@ -47,9 +47,11 @@ impl<'a> Piece<'a> {
         let mut start = 0;
         while start < self.text.len() {
             let rest = &self.text[start..];
-            // An end may be known by the byte before it only.
             let near = rest.len().min(BYTES_PER_PIECE);
-            let end = find_end(&rest[near - 1..]).map_or(rest.len(), |length| near - 1 + length);
+            // Whether a line ends may depend on what is before its end: that is not to be cut off.
+            let ends = rest[near..].iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
+            let near = near + ends.count();
+            let end = find_end(&rest[near..]).map_or(rest.len(), |length| near + length);
             pieces.push(Self { text: &rest[..end], start: self.start + start });
             start += end;
         }

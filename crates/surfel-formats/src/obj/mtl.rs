@@ -16,7 +16,7 @@ pub(super) struct Mtl {
     specular: Option<Vec3>,
     /// Of Phong's highlight.
     exponent: f32,
-    emissive: Vec3,
+    pub emissive: Vec3,
     /// Colour of what goes through.
     filter: Option<Vec3>,
     /// 1 if nothing is seen through.

@@ -15,6 +15,10 @@ pub(super) fn textured(mtl: &Mtl, textures: &mut Textures) -> Material {
         material.textures.base_color = reference(&mtl.diffuse_map);
     }
     material.textures.emissive = reference(&mtl.emissive_map);
+    // Without its picture nothing says how it shines.
+    if material.textures.emissive.is_none() {
+        material.emissive = mtl.emissive;
+    }
     let strength = mtl.normal_map.as_ref().map_or(1.0, |map| map.strength);
     material.textures.normal = reference(&mtl.normal_map).map(|normal| (normal, strength));
     material

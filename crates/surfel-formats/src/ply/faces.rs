@@ -1,5 +1,6 @@
 //! Faces of PLY files: polygons and strips become triangles.
 
+use surfel::math::Vec2;
 use surfel::progress::Progress;
 
 use super::header::{Element, Encoding, Header};
@@ -15,6 +16,8 @@ use crate::record::{Field, Kind};
 #[derive(Default)]
 pub(super) struct Faces {
     pub triangles: Vec<[u32; 3]>,
+    /// Texture coordinates of their corners, v up as in the file; as many, or none.
+    pub uvs: Vec<[Vec2; 3]>,
     /// Faces of fewer than three corners.
     pub n_short: u64,
     /// Where the first face stands.
@@ -26,9 +29,18 @@ struct FaceElement<'a> {
     element: &'a Element,
     /// Which of its properties lists the vertices.
     indices: usize,
+    /// Which lists texture coordinates, two numbers a corner, as MeshLab writes them.
+    texcoords: Option<usize>,
     /// Whether the list is of strips, with negative numbers between them, not of a polygon.
     is_strips: bool,
     n_vertices: u64,
+}
+
+/// The lists of one face.
+#[derive(Default)]
+struct Lists {
+    corners: Vec<f64>,
+    texcoords: Vec<f64>,
 }
 
 /// Number of faces in the file; a strip counts as one.
@@ -70,11 +82,14 @@ pub(super) fn read_faces(
 impl<'a> FaceElement<'a> {
     fn of(element: &'a Element, n_vertices: u64) -> Option<Self> {
         let is_strips = element.name == "tristrips";
-        let is_named = |name: &str| ["vertex_indices", "vertex_index"].contains(&name);
-        let mut properties = element.properties.iter();
-        let indices = properties.position(|p| p.list.is_some() && is_named(&p.name))?;
+        let list = |names: [&str; 2]| {
+            let mut properties = element.properties.iter();
+            properties.position(|p| p.list.is_some() && names.contains(&p.name.as_str()))
+        };
+        let indices = list(["vertex_indices", "vertex_index"])?;
+        let texcoords = list(["texcoord", "texcoords"]).filter(|_| !is_strips);
         let has_faces = (is_strips || element.name == "face") && 0 < element.count;
-        has_faces.then_some(Self { element, indices, is_strips, n_vertices })
+        has_faces.then_some(Self { element, indices, texcoords, is_strips, n_vertices })
     }
 
     /// Returns the first byte behind the element.
@@ -87,7 +102,7 @@ impl<'a> FaceElement<'a> {
         progress: &dyn Progress,
     ) -> Result<usize> {
         let mut at = start;
-        let mut corners = Vec::new();
+        let mut lists = Lists::default();
         for count in 0..self.element.count {
             if count % 65536 == 0 {
                 progress.check()?;
@@ -97,16 +112,16 @@ impl<'a> FaceElement<'a> {
             for (i, property) in self.element.properties.iter().enumerate() {
                 let end = property_end(input, at, property, big_endian)
                     .ok_or_else(|| ends_early(input, self.element))?;
-                if i == self.indices {
+                if let Some(list) = self.list(i, &mut lists) {
                     let items = &input[at + property.list.map_or(0, Kind::size)..end];
                     let item = Field::new(0, property.kind);
                     let items = items.chunks_exact(property.kind.size());
-                    corners.clear();
-                    corners.extend(items.map(|bytes| item.value(bytes, big_endian)));
+                    list.clear();
+                    list.extend(items.map(|bytes| item.value(bytes, big_endian)));
                 }
                 at = end;
             }
-            self.add(&corners, faces).map_err(|LineError { found, expected }| {
+            self.add(&lists, faces).map_err(|LineError { found, expected }| {
                 let advice = "the face is broken: write the file again from its source";
                 input.malformed(Place::Byte(first as u64), found, expected, advice)
             })?;
@@ -125,27 +140,24 @@ impl<'a> FaceElement<'a> {
         let pieces = Piece { text: &input[start..end], start }.cut(plain_line);
         let parse = |_: usize, piece: Piece| {
             let mut faces = Faces::default();
-            let mut corners = Vec::new();
+            let mut lists = Lists::default();
             for (at, line) in piece.lines(plain_line) {
-                let parsed = self.parse_line(line, &mut corners);
-                let added = parsed.and_then(|()| self.add(&corners, &mut faces));
+                let parsed = self.parse_line(line, &mut lists);
+                let added = parsed.and_then(|()| self.add(&lists, &mut faces));
                 added.map_err(|error| Fault::new(at, error))?;
             }
             Ok(faces)
         };
         for parsed in parse_pieces(input, &pieces, parse, progress)? {
             faces.triangles.extend(parsed.triangles);
+            faces.uvs.extend(parsed.uvs);
             faces.n_short += parsed.n_short;
         }
         Ok(end)
     }
 
-    /// The list of vertices in a line.
-    fn parse_line(
-        &self,
-        line: &[u8],
-        corners: &mut Vec<f64>,
-    ) -> std::result::Result<(), LineError> {
+    /// The lists in a line.
+    fn parse_line(&self, line: &[u8], lists: &mut Lists) -> std::result::Result<(), LineError> {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         let mut number = || {
             let word = words.next().ok_or_else(|| LineError {
@@ -154,26 +166,32 @@ impl<'a> FaceElement<'a> {
             })?;
             parse_number(word)
         };
-        corners.clear();
-        for (i, property) in self.element.properties.iter().enumerate() {
+        // What stands behind the lists is of no use here.
+        let last = self.texcoords.map_or(self.indices, |texcoords| texcoords.max(self.indices));
+        for (i, property) in self.element.properties[..=last].iter().enumerate() {
             let n_items = if property.list.is_some() { number()? as u64 } else { 1 };
+            let mut list = self.list(i, lists);
+            list.iter_mut().for_each(|list| list.clear());
             // A length beyond the line ends at its last word with an error.
             for _ in 0..n_items {
                 let item = number()?;
-                if i == self.indices {
-                    corners.push(item);
-                }
-            }
-            // What stands behind the vertices is of no use here.
-            if i == self.indices {
-                break;
+                list.iter_mut().for_each(|list| list.push(item));
             }
         }
         Ok(())
     }
 
+    /// Where the items of a property go, if they are wanted.
+    fn list<'b>(&self, property: usize, lists: &'b mut Lists) -> Option<&'b mut Vec<f64>> {
+        match property {
+            _ if property == self.indices => Some(&mut lists.corners),
+            _ if Some(property) == self.texcoords => Some(&mut lists.texcoords),
+            _ => None,
+        }
+    }
+
     /// Adds the triangles of a polygon, or of strips.
-    fn add(&self, corners: &[f64], faces: &mut Faces) -> std::result::Result<(), LineError> {
+    fn add(&self, lists: &Lists, faces: &mut Faces) -> std::result::Result<(), LineError> {
         let vertex = |corner: f64| {
             let is_vertex =
                 corner.fract() == 0.0 && 0.0 <= corner && corner < self.n_vertices as f64;
@@ -183,7 +201,7 @@ impl<'a> FaceElement<'a> {
             })
         };
         if self.is_strips {
-            for strip in corners.split(|corner| *corner < 0.0) {
+            for strip in lists.corners.split(|corner| *corner < 0.0) {
                 for (i, three) in strip.array_windows().enumerate() {
                     let [a, b, c] = *three;
                     let [a, b, c] = [vertex(a)?, vertex(b)?, vertex(c)?];
@@ -193,7 +211,7 @@ impl<'a> FaceElement<'a> {
             }
             return Ok(());
         }
-        let [first, rest @ ..] = corners else {
+        let [first, rest @ ..] = lists.corners.as_slice() else {
             faces.n_short += 1;
             return Ok(());
         };
@@ -203,6 +221,13 @@ impl<'a> FaceElement<'a> {
             faces.triangles.push([first, vertex(a)?, vertex(b)?]);
         }
         faces.n_short += u64::from(rest.len() < 2);
+        if self.texcoords.is_some() {
+            let uv = |corner: usize| {
+                let pair = lists.texcoords.get(2 * corner..2 * corner + 2);
+                pair.map_or(Vec2::ZERO, |pair| Vec2::new(pair[0] as f32, pair[1] as f32))
+            };
+            faces.uvs.extend((1..rest.len()).map(|i| [uv(0), uv(i), uv(i + 1)]));
+        }
         Ok(())
     }
 }

@@ -8,8 +8,8 @@ use crate::record::Kind;
 pub(super) struct Header {
     pub encoding: Encoding,
     pub elements: Vec<Element>,
-    /// The file of a texture, as MeshLab names it in a comment.
-    pub texture: Option<String>,
+    /// Files of textures, as MeshLab names them in comments.
+    pub textures: Vec<String>,
     /// First byte behind the header, and the number of its line.
     pub body: usize,
     pub body_line: u64,
@@ -50,7 +50,7 @@ impl Element {
 pub(super) fn read_header(input: &Input) -> Result<Header> {
     let mut lines = Lines::new(input);
     let mut encoding = None;
-    let mut texture = None;
+    let mut textures = Vec::new();
     let mut elements: Vec<Element> = Vec::new();
     loop {
         let number = lines.number;
@@ -70,7 +70,7 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
         match words.as_slice() {
             ["comment", "TextureFile", ..] => {
                 let name = line.split_once("TextureFile").map(|(_, name)| name.trim().to_owned());
-                texture = texture.or(name);
+                textures.extend(name);
             }
             ["ply"] | ["comment" | "obj_info", ..] | [] => {}
             ["format", name, _version] => {
@@ -120,7 +120,7 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
                     return Err(malformed(&line, "a `format` line before it"));
                 };
                 let (body, body_line) = (lines.at, lines.number);
-                return Ok(Header { encoding, elements, texture, body, body_line });
+                return Ok(Header { encoding, elements, textures, body, body_line });
             }
             _ => {
                 return Err(malformed(

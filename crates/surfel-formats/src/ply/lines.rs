@@ -20,7 +20,7 @@ pub(super) fn end_of_lines(
     let mut left = if element.properties.is_empty() { 0 } else { element.count };
     let mut n_lines = 0u64;
     while 0 < left {
-        if n_lines % 65536 == 0 {
+        if n_lines.is_multiple_of(65536) {
             progress.check()?;
         }
         n_lines += 1;

@@ -14,6 +14,7 @@ use crate::error::{Place, Result};
 use crate::input::Input;
 use crate::mesh::{Model, finish};
 use crate::options::{Column, ColumnChoice, LoadOptions, Source};
+use crate::weld::weld;
 
 /// Names of texture coordinates, as Blender and MeshLab write them.
 const UV_NAMES: [[&str; 2]; 4] =
@@ -41,7 +42,7 @@ pub(crate) fn read_mesh(
     let options = LoadOptions { columns: ColumnChoice::Only(columns), ..options.clone() };
     let cloud = read_cloud(input, &header, &options, progress)?;
     let faces = read_faces(input, &header, vertex.count, progress)?;
-    let mesh = Mesh {
+    let mut mesh = Mesh {
         origin: cloud.origin,
         uvs: [uvs(&cloud), None],
         colors: linear_colors(&cloud),
@@ -50,10 +51,22 @@ pub(crate) fn read_mesh(
         normals: cloud.normals,
         ..Mesh::default()
     };
+    // Of several elements of faces, one may have texture coordinates and another none.
+    if !faces.uvs.is_empty() && faces.uvs.len() == mesh.triangles.len() {
+        if u32::MAX as usize / 3 <= faces.uvs.len() {
+            let found = format!("{} triangles", faces.uvs.len());
+            return Err(input.unsupported(found, "cut the mesh into several files"));
+        }
+        mesh = with_corner_uvs(&mesh, &faces.uvs);
+    }
     let mut textures = Textures::new(beside);
     let mut material = Material::MATTE;
-    if let (Some(_), Some(name)) = (&mesh.uvs[0], &header.texture) {
+    if let (Some(_), [name, others @ ..]) = (&mesh.uvs[0], header.textures.as_slice()) {
         material.textures.base_color = textures.read(name).map(TextureRef::new);
+        if !others.is_empty() {
+            let n_textures = header.textures.len();
+            progress.note(&format!("{}: the first of {n_textures} textures is on all", input.name));
+        }
     }
     textures.missing.tell("a texture is left out", progress);
     let model = Model { parts: vec![(mesh, material)], textures: textures.all };
@@ -62,11 +75,37 @@ pub(crate) fn read_mesh(
     Ok((model, Source { n_triangles: Some(n_triangles), ..source(&header, vertex) }))
 }
 
-/// Texture coordinates with v down; in the file it goes up.
+/// The mesh with a vertex for each pair of a vertex and texture coordinates.
+fn with_corner_uvs(mesh: &Mesh, uvs: &[[Vec2; 3]]) -> Mesh {
+    let (vertices, uvs) = (mesh.triangles.as_flattened(), uvs.as_flattened());
+    let key = |(vertex, uv): (&u32, &Vec2)| [*vertex, uv.x.to_bits(), uv.y.to_bits()];
+    let welded = weld(&vertices.iter().zip(uvs).map(key).collect::<Vec<_>>());
+    let corners = || welded.first_corners.iter().map(|corner| *corner as usize);
+    fn of<T: Copy>(column: &[T], vertices: impl Iterator<Item = u32>) -> Vec<T> {
+        vertices.map(|vertex| column[vertex as usize]).collect()
+    }
+    let vertices = || corners().map(|corner| vertices[corner]);
+    Mesh {
+        origin: mesh.origin,
+        positions: of(&mesh.positions, vertices()),
+        normals: mesh.normals.as_ref().map(|normals| of(normals, vertices())),
+        colors: mesh.colors.as_ref().map(|colors| of(colors, vertices())),
+        uvs: [Some(corners().map(|corner| downward(uvs[corner])).collect()), None],
+        triangles: welded.vertex_of_corner.as_chunks().0.to_vec(),
+        ..Mesh::default()
+    }
+}
+
+/// In the file v goes up.
+fn downward(uv: Vec2) -> Vec2 {
+    Vec2::new(uv.x, 1.0 - uv.y)
+}
+
+/// Texture coordinates of vertices.
 fn uvs(cloud: &PointCloud) -> Option<Vec<Vec2>> {
     UV_NAMES.iter().find_map(|[u, v]| {
         let (u, v) = (cloud.scalar(u)?, cloud.scalar(v)?);
-        let uv = |i| Vec2::new(u.get(i) as f32, (1.0 - v.get(i)) as f32);
+        let uv = |i| downward(Vec2::new(u.get(i) as f32, v.get(i) as f32));
         Some((0..cloud.len()).map(uv).collect())
     })
 }

@@ -118,6 +118,7 @@ fn textures_are_found_read_once_and_missed_aloud() {
     assert_eq!((normal.0.texture, normal.1, graph.textures[normal.0.texture].width), (2, 0.5, 1));
     assert_eq!(b.textures.base_color, None);
     assert_eq!((b.base_color, b.textures.normal), (Vec3::splat(0.5), None));
+    assert_eq!((b.emissive, b.textures.emissive), (Vec3::ZERO, None));
     assert!(listener.heard("a texture is left out: ") && listener.heard("none.png"));
     assert!(listener.heard("(and 1 others)"));
 }
@@ -128,4 +129,28 @@ fn bytes_reach_no_other_file() {
         read_graph("a.obj", format!("mtllib /etc/passwd\n{TRIANGLE}usemtl a\nf 1 2 3\n")).unwrap();
     assert_eq!(graph.materials, [Material::MATTE]);
     assert!(listener.heard("/etc/passwd is a file of its own, and not looked for"));
+}
+
+#[test]
+fn texture_coordinates_of_corners_in_ply_split_vertices() {
+    let ply = "ply\nformat ascii 1.0\ncomment TextureFile my picture.png\ncomment TextureFile b.png\n\
+        element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
+        property uchar green\nproperty uchar blue\nelement face 2\n\
+        property list uchar int vertex_indices\nproperty list uchar float texcoord\n\
+        property int texnumber\nend_header\n0 0 0 255 0 0\n1 0 0 0 255 0\n1 1 0 0 0 0\n0 1 0 0 0 0\n\
+        4 0 1 2 3 8 0 0 1 0 1 1 0 1 0\n3 0 1 2 6 0 0 0.5 0.5 1 1 0\n";
+    let folder = Folder::new("texcoord");
+    std::fs::write(folder.path("my picture.png"), PNG).unwrap();
+    std::fs::write(folder.path("a.ply"), ply).unwrap();
+    let listener = Listener::default();
+    let options = LoadOptions::default();
+    let (graph, _) = load_graph(&folder.path("a.ply"), &options, &listener).unwrap();
+    let Geometry::Triangles(mesh) = &graph.geometries[0] else { panic!() };
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 4, 2]]);
+    assert_eq!(mesh.positions[4], Vec3::X);
+    let uvs = [Vec2::Y, Vec2::ONE, Vec2::X, Vec2::ZERO, Vec2::splat(0.5)];
+    assert_eq!(mesh.uvs[0].as_deref(), Some(&uvs[..]));
+    assert_eq!(mesh.colors.as_ref().unwrap()[4].truncate(), Vec3::Y);
+    assert_eq!(graph.materials[0].textures.base_color.unwrap().texture, 0);
+    assert!(listener.heard("the first of 2 textures is on all"));
 }

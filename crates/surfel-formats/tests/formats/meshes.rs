@@ -50,7 +50,7 @@ fn faces_stand_anywhere_between_other_elements_in_all_encodings() {
     let vertex = "element vertex 3\nproperty list uchar uchar near\nproperty double x\n\
         property float y\nproperty short z\n";
     let face = "element face 2\nproperty float quality\nproperty list ushort uchar vertex_index\n\
-        property list uchar float texcoord\n";
+        property list uchar float other\n";
     let edge = "element edge 2\nproperty list uchar ushort ends\nproperty int flag\n";
     let note = "element note 1\nproperty uchar a\n";
     let texts = [
@@ -166,6 +166,16 @@ fn lines_of_obj_may_go_on_and_have_comments_and_colours() {
     assert_eq!(colors[0], Vec4::new(1.0, 0.0, 0.0, 1.0));
     assert!((colors[1].x - 0.21404).abs() < 1e-4, "a weight stands before the colour");
     assert_eq!(colors[2], Vec4::ONE);
+}
+
+#[test]
+fn lines_of_obj_go_on_wherever_the_file_is_cut_for_threads() {
+    let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n#";
+    let face = "f 1 \\\r\n\\\n2 3\r\n";
+    for shift in 0..face.len() {
+        let file = format!("{vertices}{}\n{}", "-".repeat(shift), face.repeat(20_000));
+        assert_eq!(read_mesh("a.obj", file).triangles.len(), 20_000, "{shift}");
+    }
 }
 
 /// A tetrahedron as one format after the other has it.
