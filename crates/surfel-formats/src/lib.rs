@@ -43,6 +43,8 @@ mod extent;
 mod load;
 mod save;
 mod picture;
+#[cfg_attr(not(test), expect(dead_code, reason = "the readers of OBJ and glTF use it"))]
+mod texture;
 
 pub use error::{Error, Place, Result};
 pub use load::{inspect, load, load_all, load_bytes};
