@@ -43,10 +43,11 @@ mod extent;
 mod load;
 mod save;
 mod picture;
-#[cfg_attr(not(test), expect(dead_code, reason = "the readers of OBJ and glTF use it"))]
 mod texture;
+mod gltf;
 
 pub use error::{Error, Place, Result};
+pub use gltf::{load_gltf, load_gltf_bytes};
 pub use load::{inspect, load, load_all, load_bytes};
 pub use options::{Column, ColumnChoice, LoadOptions, Loaded, Source, TextColumn};
 pub use picture::{Alpha, BitDepth, ImageOptions, save_image};

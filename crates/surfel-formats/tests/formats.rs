@@ -6,6 +6,12 @@ mod common;
 mod bin;
 #[path = "formats/broken.rs"]
 mod broken;
+#[path = "formats/gltf.rs"]
+mod gltf;
+#[path = "formats/gltf_asset.rs"]
+mod gltf_asset;
+#[path = "formats/gltf_broken.rs"]
+mod gltf_broken;
 #[path = "formats/ply.rs"]
 mod ply;
 #[path = "formats/pictures.rs"]

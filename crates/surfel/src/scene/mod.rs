@@ -10,6 +10,7 @@ mod material;
 mod mesh;
 mod prospect;
 mod texture;
+mod validate;
 
 pub use animation::{Animation, Channel, Interpolation, Keys, Track, Value};
 pub use camera::{Camera, Projection, View};
