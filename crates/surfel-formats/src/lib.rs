@@ -1,7 +1,8 @@
-//! Files: point clouds in and out, pictures out.
+//! Files: point clouds in and out, scenes in, pictures out.
 //!
 //! A file becomes a [`surfel::points::PointCloud`] by [`load`], whatever its format; [`save`] goes
-//! the other way, and [`save_image`] writes what was rendered.
+//! the other way, and [`save_image`] writes what was rendered. A scene of glTF becomes a
+//! [`surfel::scene::Graph`] by [`load_gltf`].
 //!
 //! ```
 //! use surfel::progress::Silent;

@@ -66,6 +66,7 @@ pub(super) fn load_buffers<'a>(
 }
 
 impl<'a> Document<'a> {
+    /// What is in a file of `n_bytes` and its buffers.
     pub fn new(
         root: Json<'a>,
         buffers: &'a [Buffer<'a>],
@@ -73,8 +74,12 @@ impl<'a> Document<'a> {
         folder: Option<&'a Path>,
         progress: &'a dyn Progress,
     ) -> Self {
-        let in_buffers = buffers.iter().filter_map(|Buffer(bytes, _)| bytes.as_deref());
-        let n_bytes = (n_bytes + in_buffers.map(<[u8]>::len).sum::<usize>()) as u64;
+        // The buffer of a GLB is in the file itself.
+        let beside = buffers.iter().filter_map(|Buffer(bytes, _)| match bytes {
+            Some(Bytes::File(_) | Bytes::Decoded(_)) => bytes.as_deref(),
+            _ => None,
+        });
+        let n_bytes = (n_bytes + beside.map(<[u8]>::len).sum::<usize>()) as u64;
         Self {
             root,
             folder,

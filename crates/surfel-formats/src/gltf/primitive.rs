@@ -146,6 +146,10 @@ fn read_mesh(vertices: &Vertices, triangles: Vec<[u32; 3]>) -> Result<Option<Mes
         let line = format!("{n_mended} normals without direction follow from the triangles");
         vertices.document.note(line);
     }
+    if mesh.normals.is_none() {
+        // There is nothing that they could be added to.
+        mesh.morphs.iter_mut().for_each(|morph| morph.normals = None);
+    }
     Ok((!mesh.triangles.is_empty()).then_some(mesh))
 }
 

@@ -436,6 +436,11 @@ fn skins_and_morph_targets_are_read() {
     assert_eq!((&tilt.positions, &tilt.normals), (&vec![Vec3::ZERO; 4], &Some(vec![Vec3::X; 4])));
     assert_eq!(graph.nodes[1].morph_weights, [0.25, 0.5]);
     assert_eq!(graph.nodes[4].morph_weights, [1.0, 0.0]);
+    // Without normals, nothing can be added to them.
+    let mut flat = asset.clone();
+    let attributes = &mut flat.json["meshes"][0]["primitives"][0]["attributes"];
+    attributes.as_object_mut().unwrap().remove("NORMAL");
+    assert_eq!(flat.mesh().morphs[1].normals, None);
     // Node 2 of the file is the second of the scene, and node 1 is below it.
     let [first, second] = &graph.nodes[1].joints[..] else { panic!() };
     assert_eq!((first.node, second.node), (2, 3));

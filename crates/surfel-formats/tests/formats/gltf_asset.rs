@@ -179,6 +179,8 @@ pub fn puppet() -> Asset {
         primitive["attributes"]["JOINTS_0"] = asset.numbers("VEC4", &joints).into();
         let weights = [51u8, 204, 0, 0].repeat(4);
         primitive["attributes"]["WEIGHTS_0"] = asset.numbers("VEC4", &weights).into();
+        let normals = asset.numbers("VEC3", &[0i8, 0, 1].repeat(4));
+        primitive["attributes"]["NORMAL"] = normals.into();
         let up = asset.numbers("VEC3", &[0.0f32, 0.0, 1.0].repeat(4));
         let tilt = asset.numbers("VEC3", &[1i8, 0, 0].repeat(4));
         primitive["targets"] = json!([{"POSITION": up}, {"NORMAL": tilt}]);
