@@ -43,13 +43,15 @@ pub enum Error {
 }
 
 /// Where in a file something was found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     Byte(u64),
     /// Counted from 1, as editors do.
     Line(u64),
     /// Counted from 0.
     Point(u64),
+    /// A JSON pointer, as in `/accessors/3/count`.
+    Json(String),
 }
 
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -60,6 +62,8 @@ impl fmt::Display for Place {
             Self::Byte(byte) => write!(f, "byte {byte}"),
             Self::Line(line) => write!(f, "line {line}"),
             Self::Point(point) => write!(f, "point {point}"),
+            Self::Json(pointer) if pointer.is_empty() => f.write_str("the whole of its JSON"),
+            Self::Json(pointer) => f.write_str(pointer),
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::input::Input;
 use crate::load::{Format, format_of, read as read_points};
 use crate::options::{LoadOptions, Loaded, Source};
-use crate::{obj, ply, stl};
+use crate::{gltf, obj, ply, stl};
 
 /// Reads a file to a graph: triangles with their materials if it has some, its points if not.
 ///
@@ -21,7 +21,11 @@ pub fn load_graph(
     options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<(Graph, Source)> {
-    read(&Input::open(path)?, &Beside::file(path), options, progress)
+    let input = Input::open(path)?;
+    if gltf::is_gltf(&input) {
+        return gltf::load_gltf(path, progress);
+    }
+    read(&input, &Beside::file(path), options, progress)
 }
 
 /// Reads the bytes of a file to a graph; `name` stands in messages, and its extension counts.
@@ -33,7 +37,11 @@ pub fn load_graph_bytes(
     options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<(Graph, Source)> {
-    read(&Input::of_bytes(name, bytes), &Beside::Nowhere, options, progress)
+    let input = Input::of_bytes(name, bytes);
+    if gltf::is_gltf(&input) {
+        return gltf::load_gltf_bytes(name, bytes, progress);
+    }
+    read(&input, &Beside::Nowhere, options, progress)
 }
 
 fn read(
@@ -43,7 +51,6 @@ fn read(
     progress: &dyn Progress,
 ) -> Result<(Graph, Source)> {
     progress.check()?;
-    // Formats that describe whole scenes come here, before those of a single mesh or cloud.
     let (model, source) = match format_of(input)? {
         Format::Ply if ply::has_faces(input)? => ply::read_mesh(input, beside, options, progress)?,
         Format::Obj if obj::has_faces(input) => obj::read_mesh(input, beside, options, progress)?,

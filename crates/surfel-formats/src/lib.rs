@@ -54,9 +54,11 @@ mod save;
 mod picture;
 mod movie;
 mod environment;
+mod gltf;
 
 pub use environment::{LinearPicture, load_environment_picture, load_environment_picture_bytes};
 pub use error::{Error, Place, Result};
+pub use gltf::{load_gltf, load_gltf_bytes};
 pub use graph::{load_graph, load_graph_bytes};
 pub use load::{common_source, inspect, load, load_all, load_bytes, merge_loaded};
 pub use movie::{Container, Movie, MovieFormat, MovieOptions, check_movie};

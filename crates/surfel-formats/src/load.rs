@@ -9,7 +9,7 @@ use crate::error::{Error, Place, Result};
 use crate::extent::Extent;
 use crate::input::Input;
 use crate::options::{LoadOptions, Loaded, Source};
-use crate::{bin, las, obj, ply, stl, text};
+use crate::{bin, gltf, las, obj, ply, stl, text};
 
 const SUPPORTED: &str = "surfel reads .ply, .las, .laz (.copc.laz too), .xyz, .txt, .csv, .asc, .pts, .obj, .stl and .bin; \
      convert the file to one of them";
@@ -77,6 +77,10 @@ pub fn merge_loaded(mut parts: Vec<Loaded>, paths: &[PathBuf], progress: &dyn Pr
 /// What a file says about itself, without reading its points.
 pub fn inspect(path: &Path) -> Result<Source> {
     let input = Input::open(path)?;
+    if gltf::is_gltf(&input) {
+        // How much it holds is known only once it is read.
+        return Ok(Source { format: "glTF 2.0".into(), ..Source::default() });
+    }
     match format_of(&input)? {
         Format::Ply => ply::inspect(&input),
         Format::Las => las::inspect(&input),

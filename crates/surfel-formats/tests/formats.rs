@@ -16,6 +16,12 @@ mod meshes;
 mod broken_meshes;
 #[path = "formats/materials.rs"]
 mod materials;
+#[path = "formats/gltf.rs"]
+mod gltf;
+#[path = "formats/gltf_asset.rs"]
+mod gltf_asset;
+#[path = "formats/gltf_broken.rs"]
+mod gltf_broken;
 #[path = "formats/ply.rs"]
 mod ply;
 #[path = "formats/pictures.rs"]

@@ -65,17 +65,18 @@ pub(super) fn read(input: &Input, progress: &dyn Progress) -> Result<LinearPictu
         }
         let decode = |(end, chunk): (u64, Chunk)| {
             progress.check()?;
-            let place = Place::Byte(end.saturating_sub(compressed_bytes(&chunk).len() as u64));
+            let start = end.saturating_sub(compressed_bytes(&chunk).len() as u64);
+            let place = || Place::Byte(start);
             let of_other = || {
                 let expected = "one of the first part in full size";
-                broken(input, place, "a block of another picture", expected)
+                broken(input, place(), "a block of another picture", expected)
             };
             if chunk.layer_index != 0 {
                 return Err(of_other());
             }
-            check_dwa(input, place, header, &chunk)?;
+            check_dwa(input, place(), header, &chunk)?;
             let decode = || UncompressedBlock::decompress_chunk(chunk, &meta_data, false);
-            let block = guarded(input, || place, decode)?;
+            let block = guarded(input, place, decode)?;
             if is_of_picture(&block.index) { Ok(block) } else { Err(of_other()) }
         };
         let n_chunks = batch.len() as u64;
@@ -91,10 +92,9 @@ pub(super) fn read(input: &Input, progress: &dyn Progress) -> Result<LinearPictu
 
 /// Refuses a part whose pixels, or one of whose blocks, the file's bytes cannot stand for.
 fn check_sizes(input: &Input, header: &Header) -> Result<()> {
-    let place = Place::Byte(0);
     let bytes_per_pixel = header.channels.bytes_per_pixel as u64;
     let size = [header.layer_size.0, header.layer_size.1].map(|side| side as u64);
-    check_size(input, place, size, bytes_per_pixel)?;
+    check_size(input, Place::Byte(0), size, bytes_per_pixel)?;
     let pixels_per_block = match header.blocks {
         BlockDescription::Tiles(tiles) => {
             (tiles.tile_size.0 as u64).saturating_mul(tiles.tile_size.1 as u64)
@@ -105,7 +105,7 @@ fn check_sizes(input: &Input, header: &Header) -> Result<()> {
     };
     if granted_bytes(input) < pixels_per_block.saturating_mul(bytes_per_pixel) {
         let found = format!("blocks of {pixels_per_block} pixels in {} bytes", input.len());
-        return Err(broken(input, place, found, "blocks that the bytes can hold"));
+        return Err(broken(input, Place::Byte(0), found, "blocks that the bytes can hold"));
     }
     Ok(())
 }

@@ -117,7 +117,8 @@ impl Chunks {
         mut take: impl FnMut(&[u8]) -> Result<()>,
     ) -> Result<()> {
         let place = Place::Byte(chunk.bytes.start as u64);
-        let broken_chunk = |found: String| broken(input, place, found, "a chunk that decodes");
+        let broken_chunk =
+            |found: String| broken(input, place.clone(), found, "a chunk that decodes");
         let bytes = Cursor::new(&input[chunk.bytes.clone()]);
         let mut decoder = self.decoder(bytes).map_err(|error| broken_chunk(error.to_string()))?;
         decoder.set_selection(selection);
@@ -218,7 +219,7 @@ fn read_laszip_record(input: &Input, header: &Header) -> Result<LazVlr> {
         ));
     };
     let vlr = LazVlr::from_buffer(record)
-        .map_err(|error| broken(input, place, error.to_string(), "a laszip record"))?;
+        .map_err(|error| broken(input, place.clone(), error.to_string(), "a laszip record"))?;
     let items = vlr.items();
     let is_layered = items.first().is_some_and(|item| item.item_type() == LazItemType::Point14);
     let versions = if is_layered { 3..=4 } else { 1..=2 };

@@ -11,6 +11,7 @@ mod material;
 mod mesh;
 mod prospect;
 mod texture;
+mod validate;
 
 pub use animation::{Animation, Channel, Interpolation, Keys, Track, Value, orbit, smooth_path};
 pub use camera::{Camera, Projection, View};

@@ -1,0 +1,512 @@
+//! glTF that is wrong: an error that names the place, or a whole graph, never a panic.
+
+use serde_json::{Value, json};
+use surfel::math::Random;
+use surfel::progress::Silent;
+use surfel_formats::{load_gltf, load_gltf_bytes};
+
+use crate::common::{Folder, Listener};
+use crate::gltf_asset::{Asset, everything, load_bytes, png, square, triangle};
+
+/// Puts a value at a pointer, over what is there.
+fn set(json: &mut Value, pointer: &str, value: Value) {
+    let (parent, key) = pointer.rsplit_once('/').unwrap();
+    let parent = json.pointer_mut(parent).unwrap_or_else(|| panic!("no {pointer}"));
+    match parent {
+        Value::Array(items) => items[key.parse::<usize>().unwrap()] = value,
+        parent => parent[key] = value,
+    }
+}
+
+fn message_with(asset: &Asset, pointer: &str, value: Value) -> String {
+    let mut broken = asset.clone();
+    set(&mut broken.json, pointer, value);
+    broken.message()
+}
+
+#[test]
+fn the_file_with_everything_is_whole() {
+    let graph = everything().graph();
+    assert_eq!((graph.geometries.len(), graph.textures.len()), (2, 1));
+    assert!(graph.nodes.iter().any(|node| node.camera.is_some()));
+    assert!(graph.nodes.iter().any(|node| node.lamp.is_some()));
+}
+
+#[test]
+fn references_to_what_is_not_there_name_their_place() {
+    let asset = everything();
+    for pointer in [
+        "/scene",
+        "/scenes/0/nodes/0",
+        "/nodes/2/children/0",
+        "/nodes/0/mesh",
+        "/nodes/0/skin",
+        "/nodes/1/camera",
+        "/nodes/2/extensions/KHR_lights_punctual/light",
+        "/nodes/4/extensions/EXT_mesh_gpu_instancing/attributes/TRANSLATION",
+        "/meshes/0/primitives/0/indices",
+        "/meshes/0/primitives/0/material",
+        "/meshes/0/primitives/0/attributes/POSITION",
+        "/meshes/0/primitives/0/attributes/JOINTS_0",
+        "/meshes/0/primitives/0/targets/0/POSITION",
+        "/meshes/0/primitives/0/targets/1/NORMAL",
+        "/skins/0/joints/0",
+        "/skins/0/inverseBindMatrices",
+        "/materials/0/pbrMetallicRoughness/baseColorTexture/index",
+        "/textures/0/source",
+        "/textures/0/sampler",
+        "/images/0/bufferView",
+        "/accessors/0/bufferView",
+        "/bufferViews/0/buffer",
+        "/animations/0/channels/0/sampler",
+        "/animations/0/channels/0/target/node",
+        "/animations/0/samplers/0/input",
+        "/animations/0/samplers/0/output",
+    ] {
+        for (value, found) in [
+            (json!(99), "found index 99, expected one of the "),
+            (json!(u64::MAX), "found index 18446744073709551615"),
+            (json!(-1), "found -1, expected a whole number"),
+            (json!(0.5), "found 0.5, expected a whole number"),
+            (json!("0"), "found `0`, expected a whole number"),
+        ] {
+            let message = message_with(&asset, pointer, value);
+            assert!(message.starts_with(&format!("asset.glb: {pointer}: {found}")), "{message}");
+        }
+    }
+}
+
+#[test]
+fn broken_values_name_their_place() {
+    let asset = everything();
+    let primitive = "/meshes/0/primitives/0";
+    let volume = "/materials/0/extensions/KHR_materials_volume";
+    let table = [
+        ("/asset/version", json!("1.0"), "found glTF 1.0, which surfel cannot read; convert"),
+        ("/asset/version", json!(2), "/asset/version: found 2, expected a text"),
+        ("/asset/minVersion", json!("2.1"), "found glTF 2.1"),
+        ("/asset", json!([]), "/asset: found an array of 0, expected an object"),
+        ("/asset", Value::Null, "found no `asset`, expected one"),
+        ("/nodes", json!({}), "/nodes: found an object, expected an array"),
+        ("/nodes/0", json!(3), "/nodes/0: found 3, expected an object"),
+        ("/nodes/2/children", json!([2]), "node 2 below itself"),
+        ("/nodes/1/children", json!([2]), "below itself, expected nodes without cycles"),
+        ("/nodes/3/children", json!([1]), "node 1, which is below node 2 already"),
+        ("/nodes/3/children", json!([0, 0]), "node 0, which is below node 3 already"),
+        (
+            "/scenes/0/nodes",
+            json!([0, 0]),
+            "/scenes/0/nodes/1: found node 0, which is below another",
+        ),
+        ("/scenes/0/nodes", json!([1]), "/scenes/0/nodes/0: found node 1, which is below another"),
+        ("/nodes/0/rotation", json!([0, 0, 0, 0]), "/nodes/0/rotation: found [0.0, 0.0, 0.0, 0.0]"),
+        ("/nodes/0/rotation", json!([0, 0, 1]), "found 3 numbers, expected 4"),
+        ("/nodes/0/translation", json!([0, 0, 1e300]), "/nodes/0: found node, which its transform"),
+        ("/nodes/0/scale", json!([0, 0, "x"]), "/nodes/0/scale/2: found `x`, expected a number"),
+        ("/nodes/0/scale", json!([1e200, 1, 1]), "expected a place and a size within 1e30"),
+        ("/nodes/0/matrix", json!([1, 2]), "found 2 numbers, expected 16"),
+        ("/nodes/0/matrix", json!(vec![1.0; 16]), "as last row, expected 0, 0, 0, 1"),
+        ("/nodes/0/weights", json!([1]), "found 1 weights, expected 2"),
+        ("/meshes/0/weights", json!([1, 2, 3]), "found 3 weights, expected 2"),
+        ("/meshes/0/primitives", Value::Null, "/meshes/0: found no `primitives`"),
+        ("/meshes/0/primitives/0/attributes", Value::Null, "found no `attributes`"),
+        ("/meshes/0/primitives/0/mode", json!(7), "found 7, expected a mode from 0 to 6"),
+        ("/meshes/0/primitives/0/mode", json!("x"), "expected a whole number"),
+        (
+            "/accessors/0/count",
+            json!(5),
+            "/accessors/0: found 5 elements of 12 bytes, 12 apart, from 0",
+        ),
+        ("/accessors/0/count", json!(3), "found 3 at 5, expected less than the 3 positions"),
+        ("/accessors/0/count", json!(u64::MAX), "elements of 12 bytes"),
+        ("/accessors/0/byteOffset", json!(4), "expected 48 bytes at most"),
+        ("/accessors/0/byteOffset", json!(u64::MAX), "expected 48 bytes at most"),
+        ("/accessors/0/componentType", json!(5124), "expected 5120, 5121"),
+        ("/accessors/0/componentType", json!(4_294_972_422_u64), "expected 5120, 5121"),
+        ("/accessors/0/componentType", json!(5125), "found components of kind U32"),
+        ("/accessors/0/type", json!("VEC4"), "16 bytes, 16 apart"),
+        ("/accessors/0/type", json!("VEC2"), "found type VEC2, expected VEC3"),
+        ("/accessors/0/type", json!("VEC5"), "expected SCALAR, VEC2"),
+        ("/accessors/0/normalized", json!(1), "expected true or false"),
+        ("/accessors/1/componentType", json!(5120), "expected 5121, 5123 or 5125"),
+        ("/accessors/1/type", json!("VEC2"), "6 elements of 2 bytes, 2 apart, from 0"),
+        ("/accessors/2/count", json!(3), "JOINTS_0: found 3 elements in /accessors/2, expected 4"),
+        ("/bufferViews/0/byteStride", json!(8), "a byteStride of 8 in bufferView 0"),
+        ("/bufferViews/0/byteStride", json!(0), "a byteStride of 0 in bufferView 0"),
+        ("/bufferViews/0/byteStride", json!(24), "4 elements of 12 bytes, 24 apart"),
+        ("/bufferViews/0/byteStride", json!(u64::MAX), "18446744073709551615 apart"),
+        ("/bufferViews/0/byteLength", json!(40), "expected 40 bytes at most"),
+        ("/bufferViews/0/byteLength", json!(u64::MAX), "expected a part of the buffer's"),
+        ("/bufferViews/0/byteOffset", json!(u64::MAX), "expected a part of the buffer's"),
+        (
+            "/buffers",
+            json!([{"byteLength": 1_000_000}]),
+            "/buffers/0/byteLength: found 1000000, but",
+        ),
+        ("/buffers", json!([{}]), "/buffers/0: found no `byteLength`"),
+        (
+            "/buffers",
+            json!([{"byteLength": 9, "uri": "data:;base64,AAAA"}]),
+            "the buffer has 3 bytes",
+        ),
+        (
+            "/buffers",
+            json!([{"byteLength": 9, "uri": "data:;base64,A*AA"}]),
+            "`data:` and bytes in Base64",
+        ),
+        ("/buffers", json!([{"byteLength": 9, "uri": "data:AAAA"}]), "`data:` and bytes in Base64"),
+        ("/buffers", json!([{"byteLength": 9, "uri": "a.bin"}]), "pack all into one .glb"),
+        ("/skins/0/joints", Value::Null, "/skins/0: found no `joints`"),
+        ("/skins/0/joints", json!([1]), "found a skin of 1 joints, expected the 2"),
+        ("/skins/0/inverseBindMatrices", json!(0), "found type VEC3, expected MAT4"),
+        ("/materials/0/alphaMode", json!("GLASS"), "expected OPAQUE, MASK or BLEND"),
+        ("/materials/0/emissiveFactor", json!([1, 1]), "found 2 numbers, expected 3"),
+        ("/materials/0/emissiveFactor", json!([1, 1, 1e99]), "numbers of usual size"),
+        ("/materials/0/extensions/KHR_materials_ior/ior", json!(0.5), "expected 0, or 1 and more"),
+        (&format!("{volume}/attenuationDistance"), json!(0), "expected a distance above 0"),
+        ("/samplers/0/wrapS", json!(1), "/samplers/0/wrapS: found 1, expected 10497"),
+        ("/cameras/0/type", Value::Null, "/cameras/0: found no `type`"),
+        ("/cameras/0/perspective", Value::Null, "found no `perspective`"),
+        ("/cameras/0/perspective/yfov", json!(4), "expected an angle above 0 and below pi"),
+        ("/extensions/KHR_lights_punctual/lights/0/range", json!(-1), "a distance above 0"),
+        ("/extensions/KHR_lights_punctual/lights/0/type", Value::Null, "found no `type`"),
+        (
+            "/extensions/KHR_lights_punctual/lights/0/spot/outerConeAngle",
+            json!(9),
+            "found cones of 0 and 9",
+        ),
+        ("/extensions", Value::Null, "expected lights in the extension of the whole file"),
+        ("/animations/0/channels", Value::Null, "/animations/0: found no `channels`"),
+        ("/animations/0/channels/0/target", Value::Null, "found no `target`"),
+        ("/animations/0/channels/0/target/path", json!("size"), "expected translation, rotation"),
+        ("/animations/0/channels/0/target/path", json!("rotation"), "expected VEC4"),
+        ("/animations/0/samplers/0/interpolation", json!("EASE"), "expected LINEAR, STEP"),
+        (
+            "/animations/0/samplers/0/interpolation",
+            json!("CUBICSPLINE"),
+            "3 values for 3 keys (animation `walk`, /animations/0/channels/0), expected 9",
+        ),
+        ("/animations/0/samplers/0/output", json!(1), "6 values for 3 keys"),
+        ("/extensionsUsed", json!([1]), "/extensionsUsed/0: found 1, expected a text"),
+        (&format!("{primitive}/extensions"), json!({"KHR_draco_mesh_compression": 1}), ""),
+    ];
+    let mut wrong = Vec::new();
+    for (pointer, value, words) in table {
+        if words.is_empty() {
+            // The vertices are there without the extension too.
+            let mut fine = asset.clone();
+            set(&mut fine.json, pointer, value);
+            fine.graph();
+            continue;
+        }
+        let message = message_with(&asset, pointer, value);
+        if !(message.starts_with("asset.glb") && message.contains(words)) {
+            wrong.push(format!("{words}\n  {message}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn compressed_vertices_are_refused_though_nobody_says_they_are_required() {
+    let mut asset = triangle();
+    asset.json["accessors"][0].as_object_mut().unwrap().remove("bufferView");
+    asset.json["meshes"][0]["primitives"][0]["extensions"] =
+        json!({"KHR_draco_mesh_compression": {"bufferView": 0}});
+    assert!(asset.message().contains("gltf-transform copy"));
+}
+
+#[test]
+fn numbers_that_are_none_are_refused_in_animations_and_skins() {
+    let asset = everything();
+    let place = |asset: &Asset, accessor: usize| {
+        let view = asset.json["accessors"][accessor]["bufferView"].as_u64().unwrap();
+        asset.json["bufferViews"][view as usize]["byteOffset"].as_u64().unwrap() as usize
+    };
+    let sampler = |i: usize, key: &str| {
+        asset.json["animations"][0]["samplers"][i][key].as_u64().unwrap() as usize
+    };
+    let binds = asset.json["skins"][0]["inverseBindMatrices"].as_u64().unwrap() as usize;
+    let with = |accessor: usize, at: usize, value: f32| {
+        let mut broken = asset.clone();
+        let at = place(&broken, accessor) + 4 * at;
+        broken.buffer[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        broken.message()
+    };
+    for (accessor, at, value, words) in [
+        (sampler(0, "input"), 1, f32::NAN, "found NaN at key 1 (animation `walk`"),
+        (
+            sampler(0, "input"),
+            1,
+            3.0,
+            "found 2 s after 3 s at key 2 (animation `walk`, /animations/0/channels/0), expected times that rise",
+        ),
+        (
+            sampler(0, "output"),
+            4,
+            f32::INFINITY,
+            "/animations/0/samplers/0/output: found no number at 1",
+        ),
+        (binds, 3, f32::NAN, "/skins/0/inverseBindMatrices: found a matrix that is not finite"),
+    ] {
+        let message = with(accessor, at, value);
+        assert!(message.contains(words), "{message}");
+    }
+    // Turned by the quaternion 0.
+    let mut broken = asset.clone();
+    let at = place(&broken, sampler(1, "output"));
+    broken.buffer[at..at + 4].fill(0);
+    assert!(broken.message().contains("the quaternion [0.0, 0.0, 0.0, 0.0] at 0"));
+    let mut broken = asset.clone();
+    broken.json["accessors"][sampler(0, "input")]["count"] = json!(0);
+    assert!(broken.message().contains("found no keys"));
+}
+
+#[test]
+fn sparse_accessors_are_checked() {
+    let mut asset = square(|_, _| ());
+    let indices = asset.view(&[1, 3, 0, 0]);
+    let values = asset.view(&[0; 24]);
+    set(
+        &mut asset.json,
+        "/accessors/0/sparse",
+        json!({"count": 2,
+        "indices": {"bufferView": indices, "componentType": 5121},
+        "values": {"bufferView": values}}),
+    );
+    asset.graph();
+    for (pointer, value, words) in [
+        ("/count", json!(3), "found 0 after 3, expected indices that rise"),
+        ("/count", json!(5), "/accessors/0/sparse/indices: found 5 elements of 1 bytes"),
+        ("/count", json!(u64::MAX), "/accessors/0/sparse/indices"),
+        ("/indices/componentType", json!(5120), "expected 5121, 5123 or 5125"),
+        ("/indices/componentType", json!(5123), "found 0 after 769, expected indices that rise"),
+        ("/indices/bufferView", json!(9), "found index 9"),
+        ("/indices", Value::Null, "found no `indices`"),
+        ("/values/bufferView", json!(indices), "/accessors/0/sparse/values: found 2 elements"),
+        ("/values/byteOffset", json!(1), "/accessors/0/sparse/values"),
+    ] {
+        let message = message_with(&asset, &format!("/accessors/0/sparse{pointer}"), value);
+        assert!(message.contains(words), "{message}");
+    }
+    let beyond = asset.view(&[1, 4]);
+    let message = message_with(&asset, "/accessors/0/sparse/indices/bufferView", json!(beyond));
+    assert!(message.contains("found index 4, expected less than the count of 4"), "{message}");
+}
+
+#[test]
+fn claims_of_much_memory_are_refused() {
+    // Zeros that take no room in the file.
+    let mut asset = triangle();
+    let accessor = asset.json["accessors"][0].as_object_mut().unwrap();
+    accessor.remove("bufferView");
+    for count in [100_000_000_u64, 4_000_000_000, u64::MAX / 2, u64::MAX] {
+        asset.json["accessors"][0]["count"] = json!(count);
+        assert!(asset.message().contains("no more memory than a file of this size can need"));
+    }
+    // The same vertices over and over, in ways that differ.
+    let mut asset = Asset::new();
+    let positions = vec![0.0f32; 300_000];
+    let position = asset.numbers("VEC3", &positions);
+    let indices: Vec<u8> = vec![0; 100_000];
+    let view = asset.view(&indices);
+    let primitives: Vec<Value> = (0..2000)
+        .map(|i| {
+            let accessor = asset.push(
+                "accessors",
+                json!({"bufferView": view, "byteOffset": i,
+                "componentType": 5121, "type": "SCALAR", "count": 90_000}),
+            );
+            json!({"mode": 0, "attributes": {"POSITION": position}, "indices": accessor})
+        })
+        .collect();
+    let mesh = asset.push("meshes", json!({ "primitives": primitives }));
+    asset.push("nodes", json!({ "mesh": mesh }));
+    assert!(asset.message().contains("no more memory"));
+    // A picture, and the same bytes again under other names: each might grow to a gigabyte.
+    let picture = [&png()[..], &[0; 1 << 20]].concat();
+    for (n_views, is_fine) in [(1, true), (2, false)] {
+        let mut asset = triangle();
+        for i in 0..n_views {
+            let view = asset.view(if i == 0 { &picture } else { &[] });
+            let first = asset.json["bufferViews"][view - i]["byteOffset"].clone();
+            let length = json!(picture.len());
+            asset.json["bufferViews"][view] =
+                json!({"buffer": 0, "byteOffset": first, "byteLength": length});
+            asset.push("images", json!({ "bufferView": view }));
+            asset.push("textures", json!({ "source": i }));
+            let base = json!({"baseColorTexture": {"index": i}});
+            asset.push("materials", json!({ "pbrMetallicRoughness": base }));
+        }
+        let loaded = asset.load();
+        assert_eq!(loaded.is_ok(), is_fine, "{:?}", loaded.err());
+    }
+}
+
+#[test]
+fn missing_and_broken_pictures_are_told_and_left_out() {
+    let mut asset = everything();
+    let external = |uri: &str| json!({ "uri": uri });
+    for (image, words) in [
+        (external("wood.png"), "/images/0 is left out: asset.glb: found the reference `wood.png`"),
+        (
+            external("data:image/png;base64,AAAA"),
+            "/images/0 is left out: asset.glb/images/0: byte 0",
+        ),
+        (json!({"bufferView": 0}), "is left out: asset.glb/images/0: byte 0: found `"),
+    ] {
+        asset.json["images"][0] = image;
+        let loaded = asset.load().unwrap();
+        assert!(loaded.heard(words), "{:?}", loaded.notes);
+        assert_eq!(loaded.graph.materials[0].textures.base_color, None);
+    }
+    asset.json["textures"][0] = json!({"extensions": {"EXT_texture_webp": {"source": 0}}});
+    assert!(asset.load().unwrap().heard("/textures/0 has no PNG or JPEG"));
+    let folder = Folder::new("gltf-missing");
+    let path = folder.path("a.gltf");
+    let mut asset = triangle();
+    asset.buffer.clear();
+    asset.json = json!({"asset": {"version": "2.0"}, "images": [{"uri": "wood%20.png"}],
+        "textures": [{"source": 0}], "materials": [{"normalTexture": {"index": 0}}]});
+    std::fs::write(&path, asset.json.to_string()).unwrap();
+    let listener = Listener::default();
+    load_gltf(&path, &listener).unwrap();
+    assert!(
+        listener.heard("found `wood%20.png`, and ") && listener.heard("wood .png cannot be read")
+    );
+}
+
+#[test]
+fn buffers_that_are_missing_or_elsewhere_are_refused_by_name() {
+    let folder = Folder::new("gltf-elsewhere");
+    let path = folder.path("a.gltf");
+    let message = |uri: &str| {
+        let mut asset = triangle();
+        asset.json["buffers"] = json!([{"byteLength": 36, "uri": uri}]);
+        std::fs::write(&path, asset.json.to_string()).unwrap();
+        load_gltf(&path, &Silent).unwrap_err().to_string()
+    };
+    let missing = message("far.bin");
+    assert!(missing.contains("a.gltf: /buffers/0/uri: found `far.bin`, and"), "{missing}");
+    assert!(missing.contains("a file beside this one, copied along with it"), "{missing}");
+    for uri in
+        ["http://a.b/c.bin", "/etc/passwd", "C:\\a.bin", "file:///etc/passwd", "%2fetc/passwd"]
+    {
+        let message = message(uri);
+        assert!(message.contains(uri) && message.contains("its relative path"), "{message}");
+    }
+    assert!(message(".").contains("found a folder"));
+    std::fs::write(folder.path("short.bin"), [0; 35]).unwrap();
+    assert!(message("short.bin").contains("found 36, but the buffer has 35 bytes"));
+    assert!(message("a\0b").contains("cannot be read"));
+}
+
+#[test]
+fn what_is_no_gltf_is_told() {
+    let message = |bytes: &[u8]| load_bytes("a.glb", bytes).err().unwrap().to_string();
+    assert!(message(b"").contains("found an empty file"));
+    assert!(message(b"x").contains("a.glb: line 1: found expected value"));
+    assert!(message(b"[1]").contains("found no object"));
+    assert!(message(b"{}").contains("the whole of its JSON: found no `asset`"));
+    assert!(message(b"{\"asset\":\n{\"version\": NaN}}").contains("line 2"));
+    assert!(message("[".repeat(100_000).as_bytes()).contains("recursion limit"));
+    assert!(message(b"glTF").contains("byte 4: found the end of 4 bytes"));
+    let glb = triangle().glb();
+    let with = |at: usize, value: u32| {
+        let mut glb = glb.clone();
+        glb[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        message(&glb)
+    };
+    assert!(with(4, 1).contains("version 1 of GLB"));
+    assert!(with(8, u32::MAX).contains("expected the 4294967295 that its header announces"));
+    assert!(with(12, u32::MAX).contains("byte 12: found a chunk of 4294967295 bytes"));
+    assert!(with(16, 0).contains("found no chunk `JSON`"));
+    assert!(with(8, 12).contains("found no chunk `JSON`"));
+}
+
+#[test]
+fn a_glb_cut_off_anywhere_is_an_error() {
+    let glb = everything().glb();
+    for length in 0..glb.len() {
+        assert!(load_bytes("a.glb", &glb[..length]).is_err(), "{length}");
+    }
+}
+
+#[test]
+fn a_glb_with_any_bytes_changed_is_an_error_or_whole() {
+    let glb = everything().glb();
+    let mut n_read = 0;
+    for seed in 0..6000 {
+        let mut random = Random::new(7, seed);
+        let mut broken = glb.clone();
+        for _ in 0..1 + seed % 4 {
+            broken[random.below(glb.len() as u64) as usize] ^= 1 << random.below(8);
+        }
+        // A graph that is read is checked.
+        n_read += usize::from(load_bytes("a.glb", &broken).is_ok());
+    }
+    assert!(500 < n_read && n_read < 5500, "{n_read}");
+}
+
+#[test]
+fn any_value_of_the_json_may_be_anything() {
+    let asset = everything();
+    let mut pointers = Vec::new();
+    all_pointers(&asset.json, String::new(), &mut pointers);
+    assert!(200 < pointers.len());
+    let huge = json!(1e308);
+    for pointer in &pointers {
+        let values = [
+            json!(0),
+            json!(1),
+            json!(-1),
+            huge.clone(),
+            json!("x"),
+            json!([]),
+            json!({}),
+            json!(true),
+        ];
+        for value in values.into_iter().chain([Value::Null, json!([0, 0, 0, 0])]) {
+            let mut broken = asset.clone();
+            set(&mut broken.json, pointer, value);
+            let _ = load_bytes("a.glb", &broken.glb());
+        }
+    }
+}
+
+fn all_pointers(json: &Value, pointer: String, found: &mut Vec<String>) {
+    match json {
+        Value::Array(items) => {
+            for (i, item) in items.iter().enumerate() {
+                all_pointers(item, format!("{pointer}/{i}"), found);
+            }
+        }
+        Value::Object(members) => {
+            for (key, value) in members {
+                all_pointers(value, format!("{pointer}/{key}"), found);
+            }
+        }
+        _ => {}
+    }
+    if !pointer.is_empty() {
+        found.push(pointer);
+    }
+}
+
+#[test]
+fn long_chains_of_nodes_are_no_trouble() {
+    let n = 50_000;
+    let nodes: Vec<Value> =
+        (0..n).map(|i| if i + 1 < n { json!({"children": [i + 1]}) } else { json!({}) }).collect();
+    let mut asset = triangle();
+    asset.json["nodes"] = json!(nodes);
+    assert_eq!(asset.graph().nodes.len(), n + 1);
+}
+
+#[test]
+fn reading_stops_when_it_is_cancelled() {
+    let listener = Listener::default();
+    listener.cancelled.store(true, std::sync::atomic::Ordering::Relaxed);
+    let error = load_gltf_bytes("a.glb", &triangle().glb(), &listener).unwrap_err();
+    assert!(matches!(error, surfel_formats::Error::Surfel(surfel::Error::Cancelled)));
+}
