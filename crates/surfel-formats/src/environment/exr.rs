@@ -176,7 +176,7 @@ fn check_dwa(input: &Input, place: Place, header: &Header, chunk: &Chunk) -> Res
     }
     let area = guarded(
         input,
-        || place,
+        || place.clone(),
         || {
             let tile = header.get_block_data_indices(&chunk.compressed_block)?;
             Ok(header.get_absolute_block_pixel_coordinates(tile)?.size.area())
