@@ -4,7 +4,7 @@ use std::array;
 
 use super::document::Document;
 use super::json::Json;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// A column of `count` elements.
 pub(super) struct Accessor<'a> {
@@ -196,7 +196,7 @@ impl<'a> Accessor<'a> {
         Err(self.json.error(found, format!("{expected} for what refers to it")))
     }
 
-    fn unfit_component(&self, expected: &str) -> crate::Error {
+    fn unfit_component(&self, expected: &str) -> Error {
         let found = format!("components of kind {:?}", self.component);
         self.json.error(found, format!("{expected} for what refers to it"))
     }
