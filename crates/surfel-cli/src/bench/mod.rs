@@ -80,27 +80,28 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     report.end_stage();
 
     let simd = args.simd.unwrap_or_else(Simd::detect);
-    let mut result = json!({
-        "rays": measure(args, &kinds(args, &stage, report)?, &stage, simd, file.as_ref(), report)?,
+    let kinds = kinds(args, &stage, report)?;
+    let (bytes_of, bytes, count_of, count, surface) = match &stage.geometry {
+        FlatGeometry::Cloud(cloud) => {
+            let bytes = stats::bytes_per_point(std::iter::once(cloud), n_points);
+            ("bytes_per_point", bytes, "points", n_points, cloud.surface.name())
+        }
+        FlatGeometry::Mesh(mesh) => {
+            let bytes = stats::bytes_per_triangle(std::iter::once(mesh), n_triangles);
+            ("bytes_per_triangle", bytes, "triangles", n_triangles, "triangle")
+        }
+    };
+    let result = json!({
+        "rays": measure(args, &kinds, &stage, simd, file.as_ref(), report)?,
         "build_s": build.wall,
+        bytes_of: bytes,
         "peak_rss_bytes": stats::peak_rss_bytes(),
         "threads": rayon::current_num_threads(),
         "simd": simd.name(),
         "build_cpu_s": build.cpu,
+        count_of: count,
+        "surface": surface,
     });
-    match &stage.geometry {
-        FlatGeometry::Cloud(cloud) => {
-            let clouds = std::iter::once(cloud);
-            result["bytes_per_point"] = stats::bytes_per_point(clouds, n_points);
-            result["points"] = json!(n_points);
-            result["surface"] = json!(cloud.surface.name());
-        }
-        FlatGeometry::Mesh(mesh) => {
-            let meshes = std::iter::once(mesh);
-            result["bytes_per_triangle"] = stats::bytes_per_triangle(meshes, n_triangles);
-            result["triangles"] = json!(n_triangles);
-        }
-    }
     Ok(print(&if args.json { format!("{result:#}") } else { table::table(&result) })?)
 }
 
@@ -147,13 +148,16 @@ fn check_surface(args: &Args) -> Result<(), Usage> {
 /// The kinds of rays that the geometry can be traced with.
 fn kinds(args: &Args, stage: &Stage, report: &Report) -> Result<Vec<Rays>, Usage> {
     let kinds = args.rays.clone().unwrap_or(USUAL.to_vec());
-    let unblended = match &stage.geometry {
+    let (unblended, why) = match &stage.geometry {
         FlatGeometry::Cloud(cloud) if cloud.surface.is_oriented() => return Ok(kinds),
-        FlatGeometry::Cloud(_) => "spheres",
-        FlatGeometry::Mesh(_) => "triangles",
+        FlatGeometry::Cloud(_) => ("spheres", "--surface sphere"),
+        FlatGeometry::Mesh(_) => ("triangles", "a mesh"),
     };
-    if args.rays.is_some() && kinds.contains(&Rays::Gather) {
-        return Err(Usage(format!("--rays gather blends discs; {unblended} do not blend")));
+    if !kinds.contains(&Rays::Gather) {
+        return Ok(kinds);
+    }
+    if args.rays.is_some() {
+        return Err(Usage(format!("--rays gather blends discs, which {why} has not")));
     }
     report.choice(&format!("gather left out: {unblended} do not blend"), "--rays");
     Ok(kinds.into_iter().filter(|kind| *kind != Rays::Gather).collect())

@@ -19,12 +19,14 @@ pub fn table(result: &Value) -> String {
 
 fn footer(result: &Value) -> String {
     let [wall, cpu] = ["build_s", "build_cpu_s"].map(|key| three(&result[key]));
-    let [tree, points, total] =
-        ["tree", "points", "total"].map(|key| two(&result["bytes_per_point"][key]));
+    let is_mesh = result["triangles"].is_number();
+    let (one, many) = if is_mesh { ("triangle", "triangles") } else { ("point", "points") };
+    let bytes = &result[format!("bytes_per_{one}")];
+    let [tree, leaves, total] = ["tree", many, "total"].map(|key| two(&bytes[key]));
     let (threads, simd) = (&result["threads"], result["simd"].as_str().unwrap_or_default());
     format!(
-        "built in {wall} s ({cpu} s of processor time); {total} bytes a point: tree {tree}, \
-         points {points}\nthreads: {threads}; simd: {simd}; rates by processor time / threads, \
+        "built in {wall} s ({cpu} s of processor time); {total} bytes a {one}: tree \
+         {tree}, {many} {leaves}\nthreads: {threads}; simd: {simd}; rates by processor time / threads, \
          the last by the wall"
     )
 }

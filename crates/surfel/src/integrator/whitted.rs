@@ -76,12 +76,11 @@ impl Integrator for Whitted {
         let direct =
             DirectLight { scene: batch.scene, simd: batch.simd, n_light: batch.samples.n_light };
         let mut counts = RayCounts { primary: batch.rays.len() as u64, ..RayCounts::default() };
-        let mut wave = search.camera_paths();
-        let mut hits = batch.hits.to_vec();
+        for (path, hit) in search.camera_paths().zip(batch.hits) {
+            search.follow(&path, hit);
+        }
+        let (mut wave, mut hits) = (Vec::new(), Vec::new());
         loop {
-            for (path, hit) in wave.iter().zip(&hits) {
-                search.follow(path, hit);
-            }
             counts += direct.add(&search.receivers, &mut search.light, progress)?;
             search.receivers.clear();
             wave.clear();
@@ -94,6 +93,9 @@ impl Integrator for Whitted {
             hits.resize(rays.len(), SceneHit::MISS);
             trace::scene_hits(batch.scene, batch.simd, Which::All, &rays, &mut hits);
             counts.secondary += rays.len() as u64;
+            for (path, hit) in wave.iter().zip(&hits) {
+                search.follow(path, hit);
+            }
         }
         let colors = search.light.iter().zip(&search.alpha);
         Ok((colors.map(|(light, alpha)| light.extend(*alpha)).collect(), counts))
@@ -120,10 +122,10 @@ struct Lobes {
     eta: f32,
 }
 
-impl Search<'_> {
-    fn camera_paths(&self) -> Vec<Path> {
+impl<'a> Search<'a> {
+    fn camera_paths(&self) -> impl Iterator<Item = Path> + use<'a> {
         let Batch { rays, samples, .. } = self.batch;
-        let path = |(i, ray): (usize, &Ray)| Path {
+        let path = move |(i, ray): (usize, &Ray)| Path {
             ray: *ray,
             weight: Vec3::ONE,
             slot: i as u32,
@@ -134,7 +136,7 @@ impl Search<'_> {
             medium: None,
             sees: Sees::Behind,
         };
-        rays.iter().enumerate().map(path).collect()
+        rays.iter().enumerate().map(path)
     }
 
     /// Adds what a ray brings from where it ends, and sends on what it becomes there.
@@ -305,6 +307,12 @@ impl Lobes {
         let Shading { metallic, ior, transmission, base_color, is_thin, .. } = *shading;
         let cos = -shading.normal.dot(path.ray.direction);
         let eta = if is_inside && !is_thin { ior } else { 1.0 / ior };
+        if metallic == 0.0 && ior == 1.0 {
+            // Matte: all that the rest would come to.
+            let (refracted, diffuse) =
+                (transmission * base_color, (1.0 - transmission) * base_color);
+            return Self { reflected: Vec3::ZERO, refracted, diffuse, eta };
+        }
         let mut at_boundary = fresnel(cos, eta);
         if is_thin {
             // Both sides of a pane, and all that goes to and fro between them.

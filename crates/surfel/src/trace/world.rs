@@ -84,8 +84,16 @@ pub fn scene_hits(
     rays: &[Ray],
     hits: &mut [SceneHit],
 ) {
-    hits.fill(SceneHit::MISS);
     let mut batch = Batch::default();
+    if let Some((instance_idx, instance)) = only(scene, which) {
+        batch.trace(scene, simd, instance, rays);
+        for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate() {
+            let found = batch.hit(scene, i, ray, instance);
+            *hit = found.map_or(SceneHit::MISS, |hit| SceneHit { instance: instance_idx, ..hit });
+        }
+        return;
+    }
+    hits.fill(SceneHit::MISS);
     let mut rounds = Rounds::new(scene, which, rays);
     loop {
         let limit =
@@ -93,13 +101,16 @@ pub fn scene_hits(
         let Some(jobs) = rounds.next(limit) else { return };
         for jobs in jobs.chunk_by(|a, b| a.instance == b.instance) {
             let instance = &scene.instances[jobs[0].instance as usize];
-            batch.enter(instance, jobs, |ray_idx| {
+            let there = enter(instance, jobs, |ray_idx| {
                 let ray = rays[ray_idx as usize];
                 Ray { t_max: ray.t_max.min(hits[ray_idx as usize].distance), ..ray }
             });
-            batch.trace(scene, simd, instance);
+            batch.trace(scene, simd, instance, &there.rays);
             for (i, job) in jobs.iter().enumerate() {
-                let Some(hit) = batch.hit(scene, i, job.instance, instance) else { continue };
+                let found = batch.hit(scene, i, &there.rays[i], instance);
+                let Some(hit) = found else { continue };
+                let distance = hit.distance / there.scales[i];
+                let hit = SceneHit { distance, instance: job.instance, ..hit };
                 let nearest = &mut hits[job.ray as usize];
                 let is_first = hit.distance == nearest.distance && hit.instance < nearest.instance;
                 if hit.distance < nearest.distance || is_first {
@@ -118,8 +129,11 @@ pub fn scene_occlusions(
     rays: &[Ray],
     occluded: &mut [bool],
 ) {
+    if let Some((_, instance)) = only(scene, which) {
+        return block(scene, simd, instance, rays, occluded);
+    }
     occluded.fill(false);
-    let mut batch = Batch::default();
+    let mut blocked = Vec::new();
     let mut rounds = Rounds::new(scene, which, rays);
     loop {
         let limit = |ray_idx: u32| match occluded[ray_idx as usize] {
@@ -129,13 +143,22 @@ pub fn scene_occlusions(
         let Some(jobs) = rounds.next(limit) else { return };
         for jobs in jobs.chunk_by(|a, b| a.instance == b.instance) {
             let instance = &scene.instances[jobs[0].instance as usize];
-            batch.enter(instance, jobs, |ray_idx| rays[ray_idx as usize]);
-            batch.block(scene, simd, instance);
-            for (job, is_blocked) in jobs.iter().zip(&batch.occluded) {
+            let there = enter(instance, jobs, |ray_idx| rays[ray_idx as usize]);
+            blocked.resize(jobs.len(), false);
+            block(scene, simd, instance, &there.rays, &mut blocked);
+            for (job, is_blocked) in jobs.iter().zip(&blocked) {
                 occluded[job.ray as usize] |= is_blocked;
             }
         }
     }
+}
+
+/// The instance that counts, if there is just one and it is in place: its rays are those of the world.
+fn only(scene: &FlatScene, which: Which) -> Option<(u32, &Instance)> {
+    let instances = scene.instances.iter().enumerate();
+    let mut counting = instances.filter(|(_, instance)| which.counts(instance));
+    let (first, second) = (counting.next()?, counting.next());
+    (second.is_none() && first.1.is_in_place).then_some((first.0 as u32, first.1))
 }
 
 /// A ray that is to visit an instance.
@@ -224,7 +247,7 @@ fn visit_boxes(scene: &FlatScene, which: Which, ray: &Ray, visits: &mut Vec<(f32
                     for &i in top.blocks[block as usize].iter().filter(|&&i| i != NO_PRIMITIVE) {
                         let instance = &scene.instances[i as usize];
                         if which.counts(instance) {
-                            visits.extend(enter(instance, ray).map(|entry| (entry, i)));
+                            visits.extend(box_entry(instance, ray).map(|entry| (entry, i)));
                         }
                     }
                 }
@@ -235,7 +258,7 @@ fn visit_boxes(scene: &FlatScene, which: Which, ray: &Ray, visits: &mut Vec<(f32
 }
 
 /// Where the ray enters an instance's box, if it does within its range.
-fn enter(instance: &Instance, ray: &Ray) -> Option<f32> {
+fn box_entry(instance: &Instance, ray: &Ray) -> Option<f32> {
     let inverse = 1.0 / ray.direction;
     let low = (instance.bounds.min - ray.origin) * inverse;
     let high = (instance.bounds.max - ray.origin) * inverse;
@@ -247,65 +270,54 @@ fn enter(instance: &Instance, ray: &Ray) -> Option<f32> {
     (near <= far + slack).then_some(near - slack)
 }
 
-/// Rays at one instance, in its coordinates, and what they find there.
-#[derive(Default)]
-struct Batch {
+/// Rays at one instance, in its coordinates.
+struct RaysThere {
     rays: Vec<Ray>,
     /// Object lengths that make one of the world along each ray.
     scales: Vec<f32>,
+}
+
+fn enter(instance: &Instance, jobs: &[Job], ray: impl Fn(u32) -> Ray) -> RaysThere {
+    let there = jobs.iter().map(|job| instance.object_ray(&ray(job.ray)));
+    let (rays, scales) = there.unzip();
+    RaysThere { rays, scales }
+}
+
+/// What rays find at one instance; its room is kept from one to the next.
+#[derive(Default)]
+struct Batch {
     on_points: Vec<SurfaceHit>,
     on_triangles: Vec<Hit>,
-    occluded: Vec<bool>,
 }
 
 impl Batch {
-    fn enter(&mut self, instance: &Instance, jobs: &[Job], ray: impl Fn(u32) -> Ray) {
-        self.rays.clear();
-        self.scales.clear();
-        for job in jobs {
-            let (ray, scale) = instance.object_ray(&ray(job.ray));
-            self.rays.push(ray);
-            self.scales.push(scale);
-        }
-    }
-
-    fn trace(&mut self, scene: &FlatScene, simd: Simd, instance: &Instance) {
-        let Self { rays, on_points, on_triangles, .. } = self;
+    fn trace(&mut self, scene: &FlatScene, simd: Simd, instance: &Instance, rays: &[Ray]) {
         match scene.geometry(instance) {
             FlatGeometry::Cloud(cloud) => {
-                on_points.resize(rays.len(), SurfaceHit::MISS);
-                surface_hits(cloud, simd, rays, on_points);
+                self.on_points.resize(rays.len(), SurfaceHit::MISS);
+                surface_hits(cloud, simd, rays, &mut self.on_points);
             }
             FlatGeometry::Mesh(mesh) => {
-                on_triangles.resize(rays.len(), Hit::MISS);
-                closest_triangles(&mesh.triangles, simd, rays, on_triangles);
+                self.on_triangles.resize(rays.len(), Hit::MISS);
+                closest_triangles(&mesh.triangles, simd, rays, &mut self.on_triangles);
             }
         }
     }
 
-    fn block(&mut self, scene: &FlatScene, simd: Simd, instance: &Instance) {
-        let Self { rays, occluded, .. } = self;
-        occluded.resize(rays.len(), false);
+    /// What the ray at `i` found, at its distance in the object's coordinates.
+    fn hit(&self, scene: &FlatScene, i: usize, ray: &Ray, instance: &Instance) -> Option<SceneHit> {
         match scene.geometry(instance) {
-            FlatGeometry::Cloud(cloud) => occlusions(cloud, simd, rays, occluded),
-            FlatGeometry::Mesh(mesh) => any_triangles(&mesh.triangles, simd, rays, occluded),
-        }
-    }
-
-    /// What the ray at `i` found, as the world sees it.
-    fn hit(
-        &self,
-        scene: &FlatScene,
-        i: usize,
-        instance_idx: u32,
-        instance: &Instance,
-    ) -> Option<SceneHit> {
-        let (ray, scale) = (&self.rays[i], self.scales[i]);
-        let hit = match scene.geometry(instance) {
             FlatGeometry::Cloud(cloud) => point_hit(cloud, &self.on_points[i], instance),
             FlatGeometry::Mesh(mesh) => triangle_hit(mesh, &self.on_triangles[i], ray, instance),
-        }?;
-        Some(SceneHit { distance: hit.distance / scale, instance: instance_idx, ..hit })
+        }
+    }
+}
+
+/// Whether an instance blocks rays in its coordinates.
+fn block(scene: &FlatScene, simd: Simd, instance: &Instance, rays: &[Ray], occluded: &mut [bool]) {
+    match scene.geometry(instance) {
+        FlatGeometry::Cloud(cloud) => occlusions(cloud, simd, rays, occluded),
+        FlatGeometry::Mesh(mesh) => any_triangles(&mesh.triangles, simd, rays, occluded),
     }
 }
 
