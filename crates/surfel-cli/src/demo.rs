@@ -1,6 +1,7 @@
 //! `surfel demo`: scans a ruin, writes the cloud, and renders it as a user would.
 
 use crate::args::Global;
+use crate::gallery;
 use crate::report::{Report, print};
 use crate::scene_file::Line;
 use anyhow::Context;
@@ -22,12 +23,16 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 2_500_000,
         value_parser = clap::value_parser!(u64).range(1000..=100_000_000))]
     points: u64,
+    /// Then put glass, a mirror and a mesh into the ruin, and make a picture and a film of that, too.
+    #[arg(long)]
+    gallery: bool,
 }
 
 const EXAMPLES: &str = "\
 Examples:
   surfel demo                                   demo.laz and demo.png in this folder
-  surfel demo -o /tmp/ruin --points 5000000     twice the points, elsewhere";
+  surfel demo -o /tmp/ruin --points 5000000     twice the points, elsewhere
+  surfel demo --gallery                         also glass, a mirror, a mesh, and a film of them";
 
 /// A clear sky, and a sun that lights the front and throws the columns' shadows over the floor.
 const LIGHT: [&str; 6] =
@@ -59,7 +64,32 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     words.extend(LIGHT.map(str::to_owned));
     let (cli, line) = Line::parse(words.iter().map(OsString::from).collect())?;
     crate::run_command(&cli.command, &line, global, report)?;
-    tell(&cloud_path, &words, n_points, start)
+    tell(&cloud_path, &words, n_points, start)?;
+    if args.gallery {
+        make_gallery(folder, global, report)?;
+    }
+    Ok(())
+}
+
+/// gallery.png and gallery.gif, each as a user would make it.
+fn make_gallery(folder: &Path, global: &Global, report: &Report) -> anyhow::Result<()> {
+    gallery::write(folder, report)?;
+    let scene = folder.join("gallery.toml").display().to_string();
+    let picture = folder.join("gallery.png").display().to_string();
+    let film = folder.join("gallery.gif").display().to_string();
+    let mut lines = Vec::new();
+    for (command, output, options) in [
+        ("render", &picture, &["--spp", "16"][..]),
+        ("animate", &film, &["--fps", "10", "--resolution", "480x270", "--spp", "2"]),
+    ] {
+        let mut words = vec!["surfel", command, &scene, "-o", output];
+        words.extend(options);
+        lines.push(words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" "));
+        let (cli, line) = Line::parse(words.into_iter().map(OsString::from).collect())?;
+        crate::run_command(&cli.command, &line, global, report)?;
+    }
+    print(&format!("The gallery was made by\n  {}", lines.join("\n  ")))?;
+    Ok(())
 }
 
 /// The ruin's own view as options.

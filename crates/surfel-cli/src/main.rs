@@ -7,6 +7,7 @@ mod bench;
 mod demo;
 mod dry_run;
 mod exposure;
+mod gallery;
 mod info;
 mod interrupt;
 mod light;

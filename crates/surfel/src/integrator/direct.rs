@@ -237,6 +237,7 @@ impl DirectLight<'_> {
 
 impl Receiver {
     /// What goes to the viewer of light of this strength from a direction; none from behind.
+    #[inline]
     fn throws_back(&self, direction: Vec3, strength: Vec3) -> Option<Vec3> {
         let normal = self.shading.normal;
         let cos = normal.dot(direction);

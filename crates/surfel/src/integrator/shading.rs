@@ -35,6 +35,7 @@ pub struct Shading {
 
 impl Shading {
     /// Of a hit that is no miss.
+    #[inline]
     pub fn new(scene: &FlatScene, ray: &Ray, hit: &SceneHit) -> Self {
         let instance = &scene.instances[hit.instance as usize];
         let material = &scene.materials[instance.material as usize];

@@ -77,7 +77,7 @@ impl Integrator for Whitted {
             DirectLight { scene: batch.scene, simd: batch.simd, n_light: batch.samples.n_light };
         let mut counts = RayCounts { primary: batch.rays.len() as u64, ..RayCounts::default() };
         for (path, hit) in search.camera_paths().zip(batch.hits) {
-            search.follow(&path, hit);
+            search.follow(path, hit);
         }
         let (mut wave, mut hits) = (Vec::new(), Vec::new());
         loop {
@@ -94,7 +94,7 @@ impl Integrator for Whitted {
             trace::scene_hits(batch.scene, batch.simd, Which::All, &rays, &mut hits);
             counts.secondary += rays.len() as u64;
             for (path, hit) in wave.iter().zip(&hits) {
-                search.follow(path, hit);
+                search.follow(*path, hit);
             }
         }
         let colors = search.light.iter().zip(&search.alpha);
@@ -140,13 +140,13 @@ impl<'a> Search<'a> {
     }
 
     /// Adds what a ray brings from where it ends, and sends on what it becomes there.
-    fn follow(&mut self, path: &Path, hit: &SceneHit) {
+    #[inline]
+    fn follow(&mut self, mut path: Path, hit: &SceneHit) {
         let slot = path.slot as usize;
         if hit.is_miss() {
-            return self.leave(path);
+            return self.leave(&path);
         }
         let scene = self.batch.scene;
-        let mut path = *path;
         if let Some(medium) = path.medium {
             path.weight *= absorbed(scene, medium, hit.distance);
         }

@@ -350,8 +350,14 @@ fn triangle_hit(mesh: &FlatMesh, hit: &Hit, ray: &Ray, instance: &Instance) -> O
     let is_inner = 0.0 < outward.dot(ray.direction);
     let side = if is_inner { -1.0 } else { 1.0 };
     let facet = instance.world_normal((side * outward).normalize());
-    let between = mesh.at(&mesh.normals, hit.slot, shares).map(|normal| side * normal);
-    let normal = between.map_or(facet, |normal| instance.world_normal(normal.normalize_or(facet)));
+    let normal = match mesh.at(&mesh.normals, hit.slot, shares).and_then(Vec3::try_normalize) {
+        Some(between) => {
+            let normal = instance.world_normal(between);
+            // Not by `is_inner`: some programs write normals against the way that corners go round.
+            if normal.dot(facet) < 0.0 { -normal } else { normal }
+        }
+        None => facet,
+    };
     let color = mesh.at(&mesh.colors, hit.slot, shares).unwrap_or(Vec4::ONE);
     Some(SceneHit {
         distance: hit.distance,

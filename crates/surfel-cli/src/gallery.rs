@@ -1,0 +1,147 @@
+//! What `surfel demo --gallery` adds to the ruin: a ball of points, a knot of triangles, and a scene file
+//! that makes glass, a mirror and gold of them.
+
+use anyhow::Context;
+use std::f64::consts::{PI, TAU};
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+use surfel::math::{DVec3, Vec3};
+use surfel::points::PointCloud;
+use surfel::progress::Progress;
+use surfel::scanner::ruin::UTM_ORIGIN;
+use surfel_formats::SaveOptions;
+
+/// Where things stand on the site.
+const GLASS: DVec3 = DVec3::new(-6.4, -9.6, 1.62);
+const MIRROR: DVec3 = DVec3::new(-1.5, -10.2, 1.32);
+const KNOT: DVec3 = DVec3::new(-9.8, -8.2, 1.75);
+const EYE: DVec3 = DVec3::new(-13.2, -21.0, 4.2);
+const TARGET: DVec3 = DVec3::new(-2.6, -3.0, 2.6);
+
+/// Writes ball.ply, knot.obj and gallery.toml beside demo.laz.
+pub fn write(folder: &Path, progress: &dyn Progress) -> anyhow::Result<()> {
+    surfel_formats::save(
+        &folder.join("ball.ply"),
+        &ball(60_000),
+        &SaveOptions::default(),
+        progress,
+    )?;
+    for (name, text) in [("knot.obj", knot()), ("gallery.toml", scene())] {
+        let path = folder.join(name);
+        fs::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
+    }
+    Ok(())
+}
+
+/// Points of the unit sphere, on a spiral that keeps them evenly apart (Swinbank and Purser 2006).
+fn ball(n: usize) -> PointCloud {
+    let golden = PI * (3.0 - 5f64.sqrt());
+    let place = |i: usize| {
+        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
+        let (sin, cos) = (golden * i as f64).sin_cos();
+        let level = (1.0 - z * z).sqrt();
+        DVec3::new(level * cos, level * sin, z).as_vec3()
+    };
+    let positions: Vec<Vec3> = (0..n).map(place).collect();
+    PointCloud { normals: Some(positions.clone()), ..PointCloud::from_positions(positions) }
+}
+
+/// A trefoil of a round tube as OBJ, with normals.
+fn knot() -> String {
+    const N_ALONG: usize = 600;
+    const N_AROUND: usize = 80;
+    const THICKNESS: f64 = 0.34;
+    let spine = |t: f64| {
+        let (sin, cos) = (2.0 * t).sin_cos();
+        let reach = 1.0 + 0.45 * (3.0 * t).cos();
+        DVec3::new(reach * cos, reach * sin, 0.62 * (3.0 * t).sin())
+    };
+    let mut text = "# A trefoil knot\n".to_owned();
+    for i in 0..N_ALONG {
+        let t = TAU * i as f64 / N_ALONG as f64;
+        let along = (spine(t + 1e-4) - spine(t - 1e-4)).normalize();
+        let across = along.cross(spine(t)).normalize();
+        let outward = across.cross(along);
+        for j in 0..N_AROUND {
+            let (sin, cos) = (TAU * j as f64 / N_AROUND as f64).sin_cos();
+            let normal = cos * outward + sin * across;
+            let place = spine(t) + THICKNESS * normal;
+            // Writing to a text cannot fail.
+            let _ = writeln!(text, "v {:.6} {:.6} {:.6}", place.x, place.y, place.z);
+            let _ = writeln!(text, "vn {:.5} {:.5} {:.5}", normal.x, normal.y, normal.z);
+        }
+    }
+    let vertex = |i: usize, j: usize| N_AROUND * (i % N_ALONG) + j % N_AROUND + 1;
+    for i in 0..N_ALONG {
+        for j in 0..N_AROUND {
+            let [a, b, c, d] =
+                [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| vertex(i, j));
+            let _ = writeln!(text, "f {a}//{a} {d}//{d} {c}//{c} {b}//{b}");
+        }
+    }
+    text
+}
+
+fn scene() -> String {
+    let world = |place: DVec3| {
+        let [x, y, z] = (UTM_ORIGIN + place).to_array();
+        format!("[{x:.3}, {y:.3}, {z:.3}]")
+    };
+    let (eye, target) = (world(EYE), world(TARGET));
+    let (glass, mirror, knot) = (world(GLASS), world(MIRROR), world(KNOT));
+    format!(
+        r##"# A ruin as it was scanned, and three things put into it. docs/scenes.md explains the keys.
+resolution = "1280x720"
+background = "#4f7fb8,#d5e2ee"
+
+[camera]
+position = {eye}
+focal-point = {target}
+view-angle = 34
+
+[sun]
+azimuth = 190
+elevation = 32
+
+[[object]]
+file = "demo.laz"
+
+# Points of a ball: 60 thousand of them, no mesh.
+[[object]]
+name = "glass"
+file = "ball.ply"
+orient = "mst"
+material = {{ kind = "glass", attenuation-color = "#bfe8d8", attenuation-distance = 2 }}
+translate = {glass}
+scale = 1.6
+
+# The same points again, held once.
+[[object]]
+name = "mirror"
+file = "ball.ply"
+orient = "mst"
+material = "mirror"
+translate = {mirror}
+scale = 1.3
+
+# Triangles.
+[[object]]
+name = "knot"
+file = "knot.obj"
+material = {{ kind = "metal", color = "#d9a441", roughness = 0.12 }}
+translate = {knot}
+rotate = [70, 0, 20]
+
+[[animation]]
+object = "knot"
+kind = "orbit"
+seconds = 6
+
+[[animation]]
+object = "camera"
+kind = "orbit"
+seconds = 6
+"##
+    )
+}
