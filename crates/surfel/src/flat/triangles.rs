@@ -47,11 +47,6 @@ impl TriangleBlock {
 
     #[inline(always)]
     pub fn corners<L: Lanes>(&self) -> [Vec3Lanes<L>; 3] {
-        let load = |[x, y, z]: &[[f32; LANES]; 3]| Vec3Lanes {
-            x: L::load(x),
-            y: L::load(y),
-            z: L::load(z),
-        };
         [load(&self.corners[0]), load(&self.corners[1]), load(&self.corners[2])]
     }
 
@@ -62,6 +57,11 @@ impl TriangleBlock {
     fn bounds(&self) -> Aabb {
         Aabb::of_points((0..LANES).flat_map(|lane| self.triangle(lane)))
     }
+}
+
+#[inline(always)]
+fn load<L: Lanes>([x, y, z]: &[[f32; LANES]; 3]) -> Vec3Lanes<L> {
+    Vec3Lanes { x: L::load(x), y: L::load(y), z: L::load(z) }
 }
 
 impl BlockTree for FlatTriangles {

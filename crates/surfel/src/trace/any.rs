@@ -1,6 +1,6 @@
 //! Whether any shape lies in each ray's range, each point on its own.
 
-use super::block::{BeforePacket, BlockHits, Leaf};
+use super::block::{BeforePacket, BlockHits, Leaf, Worth};
 use super::flight::{RayVisitor, fly};
 use super::hit::Hit;
 use super::packet::{Packet, PacketStack, PacketVisitor, WideRays, along_packet};
@@ -220,7 +220,13 @@ impl<L: Lanes, S: Leaf, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> 
         }
         let mut limits = L::Wide::load(&self.limits);
         let blocked = L::Wide::splat(f32::NEG_INFINITY);
-        for lane in 0..LANES {
+        let mut lanes = match block.worth_trying() {
+            Worth::All => (1 << LANES) - 1,
+            Worth::These(lanes) => lanes,
+        };
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            lanes &= lanes - 1;
             let (distance, mask) = block.intersect(lane);
             let hits = mask & distance.less_equal(limits);
             self.is_hit |= hits.bits();

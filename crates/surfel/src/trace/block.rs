@@ -2,9 +2,9 @@
 
 use super::hit::Hit;
 use super::packet::Packet;
-use crate::flat::{BlockTree, FlatPoints, FlatTriangles, PointBlock, Slot, TriangleBlock};
+use crate::flat::{BlockTree, FlatPoints, FlatTriangles, PointBlock, Slot};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3Lanes};
-use crate::surface::{PointLanes, RayLanes, Shape, Triangle, TriangleLanes};
+use crate::surface::{PointLanes, RayLanes, Shape, Triangle, TriangleLanes, TrianglesSeen};
 use std::marker::PhantomData;
 
 /// What stands in the leaves of a tree.
@@ -25,8 +25,19 @@ pub trait Leaf {
 
 /// A block before sixteen rays.
 pub trait BeforePacket<L: Lanes> {
+    /// The lanes whose shapes some of the rays may meet. All of them where to find out costs more than to
+    /// try: then no loop over the lanes needs a branch.
+    fn worth_trying(&self) -> Worth;
+
     /// Where all rays meet the shape in `lane`.
     fn intersect(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask);
+}
+
+/// Lanes to try.
+#[derive(Clone, Copy)]
+pub enum Worth {
+    All,
+    These(u32),
 }
 
 /// Where one ray meets the shapes of one block.
@@ -140,6 +151,11 @@ impl<L: Lanes, S> PointsBeforePacket<L, S> {
 
 impl<L: Lanes, S: Shape> BeforePacket<L> for PointsBeforePacket<L, S> {
     #[inline(always)]
+    fn worth_trying(&self) -> Worth {
+        Worth::All
+    }
+
+    #[inline(always)]
     fn intersect(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask) {
         let point = PointLanes {
             center: self.corner.plus(splat(&self.offset, lane)),
@@ -156,10 +172,9 @@ impl Leaf for Triangle {
 
     #[inline(always)]
     fn hits<L: Lanes>(triangles: &FlatTriangles, block_idx: u32, ray: &Ray) -> BlockHits<L> {
-        let origin = Vec3Lanes::splat(ray.origin);
         let corners = triangles.blocks[block_idx as usize].corners::<L>();
-        let lanes = TriangleLanes { corners: corners.map(|corner| corner.minus(origin)) };
-        let (distances, is_hit) = lanes.intersect(&RayLanes::<L>::new(ray));
+        let seen = TriangleLanes::new(corners).seen_from(Vec3Lanes::splat(ray.origin));
+        let (distances, is_hit) = seen.intersect(&RayLanes::<L>::new(ray));
         let first_slot = block_idx * LANES as u32;
         BlockHits { first_slot, distances, radii: L::splat(0.0), is_hit }
     }
@@ -170,9 +185,15 @@ impl Leaf for Triangle {
         block_idx: u32,
         packet: &Packet<L::Wide>,
     ) -> TrianglesBeforePacket<L> {
+        let corners = triangles.blocks[block_idx as usize].corners::<L>();
+        let lanes = TriangleLanes::new(corners);
+        let view = match packet.common_origin {
+            Some(origin) => View::FromOne(lanes.seen_from(Vec3Lanes::splat(origin)).store()),
+            None => View::FromMany(lanes.store(), packet.wide.origin()),
+        };
         TrianglesBeforePacket {
-            block: triangles.blocks[block_idx as usize],
-            origin: packet.wide.origin(),
+            view,
+            near: packet.frustum.meets_triangles(corners),
             rays: packet.wide.lanes(),
         }
     }
@@ -180,16 +201,32 @@ impl Leaf for Triangle {
 
 /// Triangles as sixteen rays meet them.
 pub struct TrianglesBeforePacket<L: Lanes> {
-    block: TriangleBlock,
-    origin: Vec3Lanes<L::Wide>,
+    view: View<L::Wide>,
+    /// The lanes whose boxes reach into the packet's frustum.
+    near: u32,
     rays: RayLanes<L::Wide>,
+}
+
+/// From where rays see triangles: what holds for all rays that start at one place is worked out once, eight
+/// triangles at a time. Both give the same bits.
+enum View<W> {
+    FromOne(TrianglesSeen<[f32; LANES]>),
+    FromMany(TriangleLanes<[f32; LANES]>, Vec3Lanes<W>),
 }
 
 impl<L: Lanes> BeforePacket<L> for TrianglesBeforePacket<L> {
     #[inline(always)]
+    fn worth_trying(&self) -> Worth {
+        Worth::These(self.near)
+    }
+
+    #[inline(always)]
     fn intersect(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask) {
-        let corner = |i: usize| splat(&self.block.corners[i], lane).minus(self.origin);
-        TriangleLanes { corners: [corner(0), corner(1), corner(2)] }.intersect(&self.rays)
+        let seen = match &self.view {
+            View::FromOne(seen) => seen.splat(lane),
+            View::FromMany(lanes, origin) => lanes.splat(lane).seen_from(*origin),
+        };
+        seen.intersect(&self.rays)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The nearest shape on each ray, each point on its own.
 
-use super::block::{BeforePacket, Leaf};
+use super::block::{BeforePacket, Leaf, Worth};
 use super::flight::{RayVisitor, fly};
 use super::hit::Hit;
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
@@ -108,6 +108,22 @@ fn closest_in_packet<L: Lanes, S: Leaf>(
     }
 }
 
+#[inline(always)]
+fn try_lane<L: Lanes, S: Leaf>(
+    block: &S::BeforePacket<L>,
+    lane: usize,
+    slot: u32,
+    distances: &mut L::Wide,
+    slots: &mut L::Wide,
+) {
+    let slot = L::Wide::splat(f32::from_bits(slot));
+    let (distance, mask) = block.intersect(lane);
+    let is_first = distance.less(*distances) | slot.less_bits(*slots);
+    let closer = mask & distance.less_equal(*distances) & is_first;
+    *slots = L::Wide::select(closer, slot, *slots);
+    *distances = L::Wide::select(closer, distance, *distances);
+}
+
 struct ClosestInPacket<'p, L: Lanes, S> {
     packet: &'p Packet<'p, L::Wide>,
     shape: PhantomData<S>,
@@ -129,14 +145,22 @@ impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
         let block = S::before_packet::<L>(tree, block_idx, self.packet);
         let mut distances = L::Wide::load(&self.distances);
         let mut slots = L::Wide::load(&self.slots);
-        // No branch: whether a disc is hit cannot be foretold, and on a plane all are equally near.
-        for lane in 0..LANES {
-            let slot = L::Wide::splat(f32::from_bits(block_idx * LANES as u32 + lane as u32));
-            let (distance, mask) = block.intersect(lane);
-            let is_first = distance.less(distances) | slot.less_bits(slots);
-            let closer = mask & distance.less_equal(distances) & is_first;
-            slots = L::Wide::select(closer, slot, slots);
-            distances = L::Wide::select(closer, distance, distances);
+        match block.worth_trying() {
+            // No branch: whether a disc is hit cannot be foretold, and on a plane all are equally near.
+            Worth::All => {
+                for lane in 0..LANES {
+                    let slot = block_idx * LANES as u32 + lane as u32;
+                    try_lane::<L, S>(&block, lane, slot, &mut distances, &mut slots);
+                }
+            }
+            Worth::These(mut lanes) => {
+                while lanes != 0 {
+                    let lane = lanes.trailing_zeros() as usize % LANES;
+                    lanes &= lanes - 1;
+                    let slot = block_idx * LANES as u32 + lane as u32;
+                    try_lane::<L, S>(&block, lane, slot, &mut distances, &mut slots);
+                }
+            }
         }
         self.slots = slots.store();
         self.distances = distances.store();

@@ -3,7 +3,7 @@
 use super::node::slack;
 use super::packet::WideRays;
 use crate::bvh::Node;
-use crate::math::{LANES, LaneMask, Lanes, Ray, Vec3, WIDE, Wide};
+use crate::math::{LANES, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
 
 /// Rays whose slopes differ by more than this are no packet.
 const WIDEST: f32 = 0.25;
@@ -162,6 +162,24 @@ impl Frustum {
             meets = meets & min.less_equal(upper) & lower.less_equal(max);
         }
         (meets.bits(), entry.store())
+    }
+
+    /// The lanes whose triangles may reach into the frustum, told by the boxes around them.
+    #[inline(always)]
+    pub fn meets_triangles<L: Lanes>(&self, [a, b, c]: [Vec3Lanes<L>; 3]) -> u32 {
+        let boxes = Boxes {
+            min: [
+                a.x.min(b.x).min(c.x) - L::splat(self.anchor.x + self.slack),
+                a.y.min(b.y).min(c.y) - L::splat(self.anchor.y + self.slack),
+                a.z.min(b.z).min(c.z) - L::splat(self.anchor.z + self.slack),
+            ],
+            max: [
+                a.x.max(b.x).max(c.x) - L::splat(self.anchor.x - self.slack),
+                a.y.max(b.y).max(c.y) - L::splat(self.anchor.y - self.slack),
+                a.z.max(b.z).max(c.z) - L::splat(self.anchor.z - self.slack),
+            ],
+        };
+        self.meets::<L>(&boxes, f32::INFINITY).0
     }
 
     /// How far along the main axis any ray still looks.

@@ -4,7 +4,7 @@ use super::frustum::{self, Frustum};
 use super::memory::Memory;
 use crate::bvh::{Child, Node, STACK_SIZE};
 use crate::flat::BlockTree;
-use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3Lanes, WIDE, Wide};
+use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
 use crate::surface::RayLanes;
 
 /// Sixteen rays in lanes.
@@ -20,9 +20,11 @@ pub struct Packet<'r, W> {
     pub rays: &'r [Ray],
     pub wide: WideRays<W>,
     inverse: [W; 3],
-    frustum: Frustum,
+    pub frustum: Frustum,
     /// Origins relative to the frustum's anchor.
     from_anchor: [W; 3],
+    /// Where all rays start, if that is one place.
+    pub common_origin: Option<Vec3>,
 }
 
 /// What is looked for along the rays of a packet.
@@ -92,7 +94,10 @@ impl<'r, W: Wide> Packet<'r, W> {
         let frustum = Frustum::new(root, &rays[0], &wide, ends_meet)?;
         let anchor = frustum.anchor;
         let [x, y, z] = wide.direction;
+        let start = rays[0].origin;
+        let is_common = rays.iter().all(|ray| ray.origin == start);
         Some(Self {
+            common_origin: is_common.then_some(start),
             rays,
             inverse: [inverse(x), inverse(y), inverse(z)],
             from_anchor: [
