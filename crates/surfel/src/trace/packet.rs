@@ -44,19 +44,25 @@ impl<W: Wide> WideRays<W> {
     /// Of one to sixteen rays; the last one fills the lanes that are left.
     #[inline(always)]
     pub fn new(rays: &[Ray]) -> Self {
-        let (mut origin, mut direction) = ([[0.0; WIDE]; 3], [[0.0; WIDE]; 3]);
-        let (mut t_min, mut t_max) = ([0.0; WIDE], [0.0; WIDE]);
-        for lane in 0..WIDE {
-            let ray = &rays[lane.min(rays.len() - 1)];
-            (t_min[lane], t_max[lane]) = (ray.t_min, ray.t_max);
-            for axis in 0..3 {
-                origin[axis][lane] = ray.origin[axis];
-                direction[axis][lane] = ray.direction[axis];
+        let mut filled = [rays[rays.len() - 1]; WIDE];
+        let rays: &[Ray; WIDE] = match rays.first_chunk() {
+            Some(rays) => rays,
+            None => {
+                filled[..rays.len()].copy_from_slice(rays);
+                &filled
+            }
+        };
+        let rays: &[[f32; 8]; WIDE] = bytemuck::cast_ref(rays);
+        let mut rows = [[0.0; WIDE]; 8];
+        for (row, values) in rows.iter_mut().enumerate() {
+            for lane in 0..WIDE {
+                values[lane] = rays[lane][row];
             }
         }
+        let [x, y, z, t_min, to_x, to_y, to_z, t_max] = rows;
         Self {
-            origin: [W::load(&origin[0]), W::load(&origin[1]), W::load(&origin[2])],
-            direction: [W::load(&direction[0]), W::load(&direction[1]), W::load(&direction[2])],
+            origin: [W::load(&x), W::load(&y), W::load(&z)],
+            direction: [W::load(&to_x), W::load(&to_y), W::load(&to_z)],
             t_min: W::load(&t_min),
             t_max: W::load(&t_max),
         }
@@ -64,6 +70,17 @@ impl<W: Wide> WideRays<W> {
 }
 
 impl<W: Wide> WideRays<W> {
+    /// `start` if all rays start there.
+    #[inline(always)]
+    fn common_origin(&self, start: Vec3) -> Option<Vec3> {
+        let [x, y, z] = self.origin;
+        let (at_x, at_y, at_z) = (W::splat(start.x), W::splat(start.y), W::splat(start.z));
+        let not_beyond = x.less_equal(at_x) & y.less_equal(at_y) & z.less_equal(at_z);
+        let not_before = at_x.less_equal(x) & at_y.less_equal(y) & at_z.less_equal(z);
+        let is_common = (not_beyond & not_before).bits() == (1 << WIDE) - 1;
+        if is_common { Some(start) } else { None }
+    }
+
     #[inline(always)]
     pub fn lanes(&self) -> RayLanes<W> {
         RayLanes { direction: self.direction(), t_min: self.t_min }
@@ -94,10 +111,8 @@ impl<'r, W: Wide> Packet<'r, W> {
         let frustum = Frustum::new(root, &rays[0], &wide, ends_meet)?;
         let anchor = frustum.anchor;
         let [x, y, z] = wide.direction;
-        let start = rays[0].origin;
-        let is_common = rays.iter().all(|ray| ray.origin == start);
         Some(Self {
-            common_origin: is_common.then_some(start),
+            common_origin: wide.common_origin(rays[0].origin),
             rays,
             inverse: [inverse(x), inverse(y), inverse(z)],
             from_anchor: [
