@@ -1,7 +1,7 @@
 //! Triangles: flat between three corners, without gaps where they share an edge.
 
 use super::RayLanes;
-use crate::math::{Aabb, Floats, Vec3, Vec3Lanes};
+use crate::math::{Aabb, Floats, Vec3, Vec3Lanes, tangents};
 
 pub struct Triangle;
 
@@ -11,40 +11,55 @@ pub struct TriangleLanes<F> {
     pub corners: [Vec3Lanes<F>; 3],
 }
 
-/// On which side of each edge a line passes, seen along it: of one sign where it meets the triangle. Each
-/// is the share of the corner opposite, but for their sum.
-struct Sides<F>([F; 3]);
+/// A ray as it meets triangles: with the plane across it, in which it is a point.
+#[derive(Clone, Copy)]
+pub struct LineLanes<F> {
+    ray: RayLanes<F>,
+    across: [Vec3Lanes<F>; 2],
+}
+
+impl<F: Floats> LineLanes<F> {
+    #[inline(always)]
+    pub fn new(ray: RayLanes<F>) -> Self {
+        Self { ray, across: tangents(ray.direction) }
+    }
+
+    /// Where a corner is seen in the plane across the line, which is its zero.
+    #[inline(always)]
+    fn seen(&self, corner: Vec3Lanes<F>) -> (F, F) {
+        (corner.dot(self.across[0]), corner.dot(self.across[1]))
+    }
+}
+
+/// On which side of the zero an edge passes.
+#[inline(always)]
+fn side<F: Floats>(from: (F, F), to: (F, F)) -> F {
+    from.0 * to.1 - from.1 * to.0
+}
 
 impl<F: Floats> TriangleLanes<F> {
-    /// Two-sided, and watertight as Woop, Benthin and Wald (2013) have it: a line that passes an edge has
-    /// the same side of it, but for the sign, in both triangles that share it, as all that enters are the
-    /// edge's ends relative to the ray's origin, and no rounding depends on their order. (In the form of
-    /// Davidovic et al. 2012, which needs no axis to be chosen for each ray.)
+    /// Two-sided, and watertight as Woop, Benthin and Wald (2013) have it: each corner is seen at one place
+    /// by all triangles that share it, and the side on which an edge between two such places passes is
+    /// exact or zero, as the greater of two products is never rounded below the other. (Their axes, which
+    /// have to be chosen for each ray, are replaced by tangents. Sides from cross products of edges, after
+    /// Davidovic et al. 2012, are of one mind about edges, but not about corners: rounding may have a ray
+    /// pass all edges around a corner on their outer side.)
     #[inline(always)]
-    pub fn intersect(&self, ray: &RayLanes<F>) -> (F, F::Mask) {
+    pub fn intersect(&self, line: &LineLanes<F>) -> (F, F::Mask) {
         let [a, b, c] = self.corners;
-        let edges = [c.minus(b), a.minus(c), b.minus(a)];
-        let Sides([at_a, at_b, at_c]) = self.sides(&edges, ray.direction);
+        let (seen_a, seen_b, seen_c) = (line.seen(a), line.seen(b), line.seen(c));
+        let (at_a, at_b, at_c) = (side(seen_b, seen_c), side(seen_c, seen_a), side(seen_a, seen_b));
         let zero = F::splat(0.0);
         let least = at_a.min(at_b).min(at_c);
         let most = at_a.max(at_b).max(at_c);
-        let normal = edges[2].cross(edges[1]);
+        let ray = &line.ray;
+        let normal = b.minus(a).cross(a.minus(c));
         let distance = normal.dot(a) / normal.dot(ray.direction);
         // A ray in the triangle's plane gives NaN or infinity here, and fails the last tests.
         let is_hit = (zero.less_equal(least) | most.less_equal(zero))
             & ray.t_min.less_equal(distance)
             & distance.less(F::splat(f32::INFINITY));
         (distance, is_hit)
-    }
-
-    #[inline(always)]
-    fn sides(&self, [bc, ca, ab]: &[Vec3Lanes<F>; 3], direction: Vec3Lanes<F>) -> Sides<F> {
-        let [a, b, c] = self.corners;
-        Sides([
-            bc.cross(b.plus(c)).dot(direction),
-            ca.cross(c.plus(a)).dot(direction),
-            ab.cross(a.plus(b)).dot(direction),
-        ])
     }
 }
 

@@ -4,7 +4,7 @@ use super::hit::Hit;
 use super::packet::Packet;
 use crate::flat::{BlockTree, FlatPoints, FlatTriangles, PointBlock, Slot, TriangleBlock};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3Lanes};
-use crate::surface::{PointLanes, RayLanes, Shape, Triangle, TriangleLanes};
+use crate::surface::{LineLanes, PointLanes, RayLanes, Shape, Triangle, TriangleLanes};
 use std::marker::PhantomData;
 
 /// What stands in the leaves of a tree.
@@ -159,7 +159,7 @@ impl Leaf for Triangle {
         let origin = Vec3Lanes::splat(ray.origin);
         let corners = triangles.blocks[block_idx as usize].corners::<L>();
         let lanes = TriangleLanes { corners: corners.map(|corner| corner.minus(origin)) };
-        let (distances, is_hit) = lanes.intersect(&RayLanes::<L>::new(ray));
+        let (distances, is_hit) = lanes.intersect(&LineLanes::new(RayLanes::<L>::new(ray)));
         let first_slot = block_idx * LANES as u32;
         BlockHits { first_slot, distances, radii: L::splat(0.0), is_hit }
     }
@@ -173,7 +173,7 @@ impl Leaf for Triangle {
         TrianglesBeforePacket {
             block: triangles.blocks[block_idx as usize],
             origin: packet.wide.origin(),
-            rays: packet.wide.lanes(),
+            lines: LineLanes::new(packet.wide.lanes()),
         }
     }
 }
@@ -182,14 +182,14 @@ impl Leaf for Triangle {
 pub struct TrianglesBeforePacket<L: Lanes> {
     block: TriangleBlock,
     origin: Vec3Lanes<L::Wide>,
-    rays: RayLanes<L::Wide>,
+    lines: LineLanes<L::Wide>,
 }
 
 impl<L: Lanes> BeforePacket<L> for TrianglesBeforePacket<L> {
     #[inline(always)]
     fn intersect(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask) {
         let corner = |i: usize| splat(&self.block.corners[i], lane).minus(self.origin);
-        TriangleLanes { corners: [corner(0), corner(1), corner(2)] }.intersect(&self.rays)
+        TriangleLanes { corners: [corner(0), corner(1), corner(2)] }.intersect(&self.lines)
     }
 }
 
