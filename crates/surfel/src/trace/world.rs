@@ -93,9 +93,16 @@ pub fn scene_hits(
         let Some(jobs) = rounds.next(limit) else { return };
         for jobs in jobs.chunk_by(|a, b| a.instance == b.instance) {
             let instance = &scene.instances[jobs[0].instance as usize];
+            // Discs behind the nearest are blended with it, whatever other instances are among them.
+            let is_gathered = match scene.geometry(instance) {
+                FlatGeometry::Cloud(cloud) => cloud.surface.is_gathered(),
+                FlatGeometry::Mesh(_) => false,
+            };
             batch.enter(instance, jobs, |ray_idx| {
                 let ray = rays[ray_idx as usize];
-                Ray { t_max: ray.t_max.min(hits[ray_idx as usize].distance), ..ray }
+                let nearest =
+                    if is_gathered { f32::INFINITY } else { hits[ray_idx as usize].distance };
+                Ray { t_max: ray.t_max.min(nearest), ..ray }
             });
             batch.trace(scene, simd, instance);
             for (i, job) in jobs.iter().enumerate() {
@@ -236,15 +243,17 @@ fn visit_boxes(scene: &FlatScene, which: Which, ray: &Ray, visits: &mut Vec<(f32
 
 /// Where the ray enters an instance's box, if it does within its range.
 fn enter(instance: &Instance, ray: &Ray) -> Option<f32> {
-    let inverse = 1.0 / ray.direction;
+    const LEAST: Vec3 = Vec3::splat(1e-18);
+    // Kept finite, so that no product of an infinity and a zero, and no difference of infinities, gives NaN.
+    let is_small = ray.direction.abs().cmplt(LEAST);
+    let inverse = 1.0 / Vec3::select(is_small, LEAST, ray.direction);
     let low = (instance.bounds.min - ray.origin) * inverse;
     let high = (instance.bounds.max - ray.origin) * inverse;
-    // A side that the ray runs along gives NaN, which `min` and `max` pass over.
     let near = low.min(high).max_element().max(ray.t_min);
     let far = low.max(high).min_element().min(ray.t_max);
     // More than the rounding above.
     let slack = 8.0 * f32::EPSILON * near.abs().max(far.abs());
-    (near <= far + slack).then_some(near - slack)
+    (near <= far + slack && near < f32::INFINITY).then_some(near - slack)
 }
 
 /// Rays at one instance, in its coordinates, and what they find there.
@@ -334,12 +343,12 @@ fn triangle_hit(mesh: &FlatMesh, hit: &Hit, ray: &Ray, instance: &Instance) -> O
     let corners = mesh.triangles.triangle(hit.slot);
     let shares = triangle::barycentric(corners.map(|corner| corner - ray.origin), ray.direction);
     let [a, b, c] = corners;
-    let outward = (b - a).cross(c - a);
+    let outward = unit((b - a).cross(c - a));
     let is_inner = 0.0 < outward.dot(ray.direction);
     let side = if is_inner { -1.0 } else { 1.0 };
-    let facet = instance.world_normal((side * outward).normalize());
-    let between = mesh.at(&mesh.normals, hit.slot, shares).map(|normal| side * normal);
-    let normal = between.map_or(facet, |normal| instance.world_normal(normal.normalize_or(facet)));
+    let facet = instance.world_normal(side * outward);
+    let between = mesh.at(&mesh.normals, hit.slot, shares).and_then(Vec3::try_normalize);
+    let normal = between.map_or(facet, |normal| instance.world_normal(side * normal));
     let color = mesh.at(&mesh.colors, hit.slot, shares).unwrap_or(Vec4::ONE);
     Some(SceneHit {
         distance: hit.distance,
@@ -353,4 +362,9 @@ fn triangle_hit(mesh: &FlatMesh, hit: &Hit, ray: &Ray, instance: &Instance) -> O
         is_inner,
         ..SceneHit::MISS
     })
+}
+
+/// Unit, even where squares are beyond the range of f32.
+fn unit(vector: Vec3) -> Vec3 {
+    (vector / vector.abs().max_element()).normalize()
 }
