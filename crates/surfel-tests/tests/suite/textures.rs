@@ -224,7 +224,7 @@ fn normal_maps_bend_normals_to_their_right_and_up() {
 
 /// Textures other than colour multiply what the material says.
 #[test]
-fn textures_scale_roughness_metal_transmission_and_emission() {
+fn textures_scale_transmission_and_emission() {
     let texel = |texel: [u8; 4]| Texture { width: 1, height: 1, texels: vec![texel] };
     let see = |material: Material, texture: Texture| {
         let graph = square(material, texture);
@@ -254,14 +254,27 @@ fn textures_scale_roughness_metal_transmission_and_emission() {
         1e-3,
         "transmission",
     );
-    // A metal of black colour reflects nothing straight on; what is left of it is matte.
-    let metal = Textures { metallic_roughness: reference, ..Textures::default() };
-    let half_metal =
-        Material { metallic: 1.0, roughness: 0.0, base_color: Vec3::splat(0.5), ..Material::MATTE };
-    assert_near(
-        see(with(metal, half_metal), texel([0, 0, 51, 255])),
-        Vec3::splat(0.25),
-        1e-3,
-        "metal",
-    );
+}
+
+/// Roughness is in green and metal in blue: a mirror for a fifth of the light, sharp although the material
+/// is rough, before a background that is bright above and dark below.
+#[test]
+fn a_texture_scales_roughness_by_green_and_metal_by_blue() {
+    let reference = Some(TextureRef::new(0));
+    let textures = Textures { metallic_roughness: reference, ..Textures::default() };
+    let base_color = Vec3::splat(0.5);
+    let rough = Material { metallic: 1.0, base_color, textures, ..Material::MATTE };
+    let background = Background::Gradient { top: Vec3::ONE, bottom: Vec3::ZERO };
+    let see = |texel: [u8; 4]| {
+        let graph = square(rough.clone(), Texture { width: 1, height: 1, texels: vec![texel] });
+        let scene = Scene { background, ..scene(graph, Vec::new(), from_above(1.0)) };
+        render(&scene, &SETTINGS).color
+    };
+    // Straight back, half way from bottom to top.
+    for pixel in see([255, 0, 51, 255]) {
+        assert_near(rgb(pixel), Vec3::splat(0.2 * 0.5 * 0.5), 1e-5, "sharp");
+    }
+    let (sharp, rough) = (see([0, 0, 255, 255]), see([0, 128, 255, 255]));
+    assert!(sharp.iter().all(|pixel| *pixel == sharp[0]));
+    assert!(rough.iter().any(|pixel| 0.05 < (pixel[0] - sharp[0][0]).abs()));
 }
