@@ -101,9 +101,14 @@ pub fn scene_hits(
         let Some(jobs) = rounds.next(limit) else { return };
         for jobs in jobs.chunk_by(|a, b| a.instance == b.instance) {
             let instance = &scene.instances[jobs[0].instance as usize];
+            // Discs behind the nearest are blended with it, whatever other instances are among them.
+            let reach = match scene.geometry(instance) {
+                FlatGeometry::Cloud(cloud) => instance.scale * cloud.reach,
+                FlatGeometry::Mesh(_) => 0.0,
+            };
             let there = enter(instance, jobs, |ray_idx| {
                 let ray = rays[ray_idx as usize];
-                Ray { t_max: ray.t_max.min(hits[ray_idx as usize].distance), ..ray }
+                Ray { t_max: ray.t_max.min(hits[ray_idx as usize].distance + reach), ..ray }
             });
             batch.trace(scene, simd, instance, &there.rays);
             for (i, job) in jobs.iter().enumerate() {
@@ -259,15 +264,17 @@ fn visit_boxes(scene: &FlatScene, which: Which, ray: &Ray, visits: &mut Vec<(f32
 
 /// Where the ray enters an instance's box, if it does within its range.
 fn box_entry(instance: &Instance, ray: &Ray) -> Option<f32> {
-    let inverse = 1.0 / ray.direction;
+    const LEAST: Vec3 = Vec3::splat(1e-18);
+    // Kept finite, so that no product of an infinity and a zero, and no difference of infinities, gives NaN.
+    let is_small = ray.direction.abs().cmplt(LEAST);
+    let inverse = 1.0 / Vec3::select(is_small, LEAST, ray.direction);
     let low = (instance.bounds.min - ray.origin) * inverse;
     let high = (instance.bounds.max - ray.origin) * inverse;
-    // A side that the ray runs along gives NaN, which `min` and `max` pass over.
     let near = low.min(high).max_element().max(ray.t_min);
     let far = low.max(high).min_element().min(ray.t_max);
     // More than the rounding above.
     let slack = 8.0 * f32::EPSILON * near.abs().max(far.abs());
-    (near <= far + slack).then_some(near - slack)
+    (near <= far + slack && near < f32::INFINITY).then_some(near - slack)
 }
 
 /// Rays at one instance, in its coordinates.
@@ -346,10 +353,10 @@ fn triangle_hit(mesh: &FlatMesh, hit: &Hit, ray: &Ray, instance: &Instance) -> O
     let corners = mesh.triangles.triangle(hit.slot);
     let shares = triangle::barycentric(corners.map(|corner| corner - ray.origin), ray.direction);
     let [a, b, c] = corners;
-    let outward = (b - a).cross(c - a);
+    let outward = unit((b - a).cross(c - a));
     let is_inner = 0.0 < outward.dot(ray.direction);
     let side = if is_inner { -1.0 } else { 1.0 };
-    let facet = instance.world_normal((side * outward).normalize());
+    let facet = instance.world_normal(side * outward);
     let normal = match mesh.at(&mesh.normals, hit.slot, shares).and_then(Vec3::try_normalize) {
         Some(between) => {
             let normal = instance.world_normal(between);
@@ -371,4 +378,9 @@ fn triangle_hit(mesh: &FlatMesh, hit: &Hit, ray: &Ray, instance: &Instance) -> O
         is_inner,
         ..SceneHit::MISS
     })
+}
+
+/// Unit, even where squares are beyond the range of f32.
+fn unit(vector: Vec3) -> Vec3 {
+    (vector / vector.abs().max_element()).normalize()
 }
