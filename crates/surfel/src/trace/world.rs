@@ -4,11 +4,12 @@
 use super::hit::Hit;
 use super::node::{BoxRay, ray_entries};
 use super::surface::SurfaceHit;
-use super::{Simd, any_triangles, closest_triangles, occlusions, surface_hits};
+use super::{Simd, any_triangles, box_entries, closest_triangles, occlusions, surface_hits};
 use crate::bvh::{Child, NO_PRIMITIVE, STACK_SIZE};
 use crate::flat::{FlatCloud, FlatGeometry, FlatMesh, FlatScene, Instance, Slot};
-use crate::math::{LaneMask, PortableLanes, Ray, Vec3, Vec4};
+use crate::math::{Aabb, LaneMask, PortableLanes, Ray, Vec3, Vec4};
 use crate::surface::triangle;
+use std::ops::Range;
 
 /// Where a ray meets a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,7 +95,7 @@ pub fn scene_hits(
         return;
     }
     hits.fill(SceneHit::MISS);
-    let mut rounds = Rounds::new(scene, which, rays);
+    let mut rounds = Rounds::new(scene, simd, which, rays);
     loop {
         let limit =
             |ray_idx: u32| hits[ray_idx as usize].distance.min(rays[ray_idx as usize].t_max);
@@ -139,7 +140,7 @@ pub fn scene_occlusions(
     }
     occluded.fill(false);
     let mut blocked = Vec::new();
-    let mut rounds = Rounds::new(scene, which, rays);
+    let mut rounds = Rounds::new(scene, simd, which, rays);
     loop {
         let limit = |ray_idx: u32| match occluded[ray_idx as usize] {
             true => f32::NEG_INFINITY,
@@ -175,57 +176,95 @@ struct Job {
 
 /// Where the rays still have to go.
 struct Rounds {
-    /// Of all rays, one ray's after another's, each sorted by where it enters the instance's box.
-    visits: Vec<(f32, u32)>,
-    /// The visits that are left of each ray that is still on its way.
-    left: Vec<(u32, std::ops::Range<u32>)>,
+    visits: Visits,
+    /// Those to be made next, sorted by instance and ray.
     jobs: Vec<Job>,
 }
 
+enum Visits {
+    /// Of few instances: where each ray enters the box of each, instance after instance, at infinity once it
+    /// was there; and the rays still on their way.
+    Few { instances: Vec<u32>, entries: Vec<f32>, open: Vec<u32> },
+    /// Of many: all that each ray comes by, sorted by where it enters, one ray's after another's; and what
+    /// is left of that of each ray still on its way.
+    Many { entries: Vec<(f32, u32)>, left: Vec<(u32, Range<u32>)> },
+}
+
+/// With more instances, the tree over them is asked: their boxes one by one would cost more.
+const FEW: usize = 16;
+
 impl Rounds {
-    fn new(scene: &FlatScene, which: Which, rays: &[Ray]) -> Self {
-        let mut rounds =
-            Self { visits: Vec::new(), left: Vec::with_capacity(rays.len()), jobs: Vec::new() };
-        let mut counting = scene.instances.iter().enumerate();
-        let mut counting = counting.by_ref().filter(|(_, instance)| which.counts(instance));
-        let (first, second) = (counting.next(), counting.next());
-        let Some((only, _)) = first else { return rounds };
-        if second.is_none() {
-            // Its own tree tells which rays meet it.
-            rounds.visits = vec![(f32::NEG_INFINITY, only as u32)];
-            rounds.left.extend((0..rays.len() as u32).map(|ray_idx| (ray_idx, 0..1)));
-            return rounds;
-        }
-        for (ray_idx, ray) in rays.iter().enumerate() {
-            let first = rounds.visits.len();
-            visit_boxes(scene, which, ray, &mut rounds.visits);
-            let end = rounds.visits.len();
-            if first < end {
-                rounds.visits[first..]
-                    .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                rounds.left.push((ray_idx as u32, first as u32..end as u32));
-            }
-        }
-        rounds
+    fn new(scene: &FlatScene, simd: Simd, which: Which, rays: &[Ray]) -> Self {
+        let counting = scene.instances.iter().enumerate();
+        let counting = counting.filter(|(_, instance)| which.counts(instance));
+        let instances: Vec<u32> = counting.take(FEW + 1).map(|(i, _)| i as u32).collect();
+        let visits = if instances.len() <= FEW {
+            let boxes: Vec<Aabb> =
+                instances.iter().map(|&i| scene.instances[i as usize].bounds).collect();
+            let mut entries = vec![f32::INFINITY; boxes.len() * rays.len()];
+            box_entries(&boxes, simd, rays, &mut entries);
+            Visits::Few { instances, entries, open: (0..rays.len() as u32).collect() }
+        } else {
+            visits_of_many(scene, which, rays)
+        };
+        Self { visits, jobs: Vec::new() }
     }
 
     /// The next visit of each ray that has one within its limit, sorted by instance and ray.
     fn next(&mut self, limit: impl Fn(u32) -> f32) -> Option<&[Job]> {
-        let Self { visits, left, jobs } = self;
+        let Self { visits, jobs } = self;
         jobs.clear();
-        left.retain_mut(|(ray, left)| {
-            let Some(next) = left.next() else { return false };
-            let (entry, instance) = visits[next as usize];
-            let goes = entry <= limit(*ray);
-            if goes {
-                jobs.push(Job { instance, ray: *ray });
+        match visits {
+            Visits::Few { instances, entries, open } => {
+                let n_rays = entries.len() / instances.len().max(1);
+                let mut nearest = Vec::with_capacity(open.len());
+                open.retain(|&ray| {
+                    let place = |i: usize| i * n_rays + ray as usize;
+                    let by_entry =
+                        |a: &usize, b: &usize| entries[place(*a)].total_cmp(&entries[place(*b)]);
+                    let Some(next) = (0..instances.len()).min_by(by_entry) else { return false };
+                    let entry = &mut entries[place(next)];
+                    let goes = *entry < f32::INFINITY && *entry <= limit(ray);
+                    *entry = f32::INFINITY;
+                    if goes {
+                        nearest.push(next);
+                    }
+                    goes
+                });
+                for (i, &instance) in instances.iter().enumerate() {
+                    let there = open.iter().zip(&nearest).filter(|(_, nearest)| **nearest == i);
+                    jobs.extend(there.map(|(&ray, _)| Job { instance, ray }));
+                }
             }
-            goes
-        });
-        // A stable sort: rays stay in their order, which is what makes packets.
-        jobs.sort_by_key(|job| job.instance);
+            Visits::Many { entries, left } => {
+                left.retain_mut(|(ray, left)| {
+                    let Some(next) = left.next() else { return false };
+                    let (entry, instance) = entries[next as usize];
+                    let goes = entry <= limit(*ray);
+                    if goes {
+                        jobs.push(Job { instance, ray: *ray });
+                    }
+                    goes
+                });
+                // A stable sort: rays stay in their order, which is what makes packets.
+                jobs.sort_by_key(|job| job.instance);
+            }
+        }
         (!jobs.is_empty()).then_some(jobs)
     }
+}
+
+fn visits_of_many(scene: &FlatScene, which: Which, rays: &[Ray]) -> Visits {
+    let (mut entries, mut left) = (Vec::new(), Vec::with_capacity(rays.len()));
+    for (ray_idx, ray) in rays.iter().enumerate() {
+        let first = entries.len();
+        visit_boxes(scene, which, ray, &mut entries);
+        if first < entries.len() {
+            entries[first..].sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            left.push((ray_idx as u32, first as u32..entries.len() as u32));
+        }
+    }
+    Visits::Many { entries, left }
 }
 
 /// Adds the instances whose boxes the ray meets, and where it enters them.
