@@ -50,6 +50,9 @@ impl<'a> Assembly<'a> {
             materials: Vec::new(),
             sources: Vec::new(),
         };
+        let files = args.files.iter().filter(|file| !is_scene_file(file));
+        let names = line.scene.objects.iter().map(|object| Path::new(&object.name));
+        args.material.check_names(files.map(PathBuf::as_path).chain(names))?;
         assembly.add_files(report)?;
         for (object_idx, object) in line.scene.objects.iter().enumerate() {
             assembly.add_object(&line.scene.objects[..object_idx], object, line, report)?;
@@ -155,8 +158,12 @@ impl<'a> Assembly<'a> {
             let place = self.graph.add(place);
             self.graph.add_copy(content.clone(), place);
         }
-        let material = object.look.material.clone();
-        self.materials.extend(material.map(|material| (first..self.graph.nodes.len(), material)));
+        let nodes = first..self.graph.nodes.len();
+        // One for this very object before its own, its own before one for all.
+        let asked = &self.args.material;
+        let material = asked.of_name(&object.name).or_else(|| object.look.material.clone());
+        let material = material.or_else(|| asked.of_all());
+        self.materials.extend(material.map(|material| (nodes, material)));
         Ok(())
     }
 
@@ -267,7 +274,6 @@ impl<'a> Assembly<'a> {
 
     fn give_materials(&mut self) -> anyhow::Result<()> {
         let Self { graph, files, args, materials, .. } = self;
-        args.material.check_files(files.iter().map(|(file, _)| file.as_path()))?;
         let of_files = files.iter().filter_map(|(file, nodes)| {
             args.material.of(file).map(|material| (nodes.clone(), material))
         });
@@ -279,7 +285,8 @@ impl<'a> Assembly<'a> {
                 node.parts.iter_mut().for_each(|part| part.material = material_idx);
             }
         }
-        if args.light.has(LightKind::None) {
+        let has_lamps = graph.nodes.iter().any(|node| node.lamp.is_some());
+        if args.light.has(LightKind::None) && !has_lamps {
             let lit = graph.materials.iter_mut().filter(|material| **material == Material::MATTE);
             lit.for_each(|material| material.is_unlit = true);
         }

@@ -57,16 +57,27 @@ impl MaterialArgs {
             .find(|choice| choice.file.as_ref().is_some_and(|name| is_named(file, name)))
     }
 
-    /// Fails if a material is for a file that is not there.
-    pub fn check_files<'f>(
+    /// The material asked for everything.
+    pub fn of_all(&self) -> Option<Material> {
+        let for_all = self.material.iter().rev().find(|choice| choice.file.is_none());
+        for_all.map(|choice| choice.material.clone())
+    }
+
+    /// The material asked for an object of this name.
+    pub fn of_name(&self, name: &str) -> Option<Material> {
+        self.of_file(Path::new(name)).cloned()
+    }
+
+    /// Fails if a material is for a file or an object that is not there.
+    pub fn check_names<'f>(
         &self,
-        files: impl Iterator<Item = &'f Path> + Clone,
+        names: impl Iterator<Item = &'f Path> + Clone,
     ) -> Result<(), Usage> {
-        for name in self.material.iter().filter_map(|choice| choice.file.as_ref()) {
-            if !files.clone().any(|file| is_named(file, name)) {
-                let known: Vec<String> = files.map(|file| file.display().to_string()).collect();
+        for wanted in self.material.iter().filter_map(|choice| choice.file.as_ref()) {
+            if !names.clone().any(|name| is_named(name, wanted)) {
+                let known: Vec<String> = names.map(|name| name.display().to_string()).collect();
                 return Err(Usage(format!(
-                    "--material {name}=...: no such file among those to render: {}",
+                    "--material {wanted}=...: no such file or object among {}",
                     known.join(", ")
                 )));
             }

@@ -30,6 +30,22 @@ pub struct Look {
     pub material: Option<Material>,
 }
 
+/// Keys of an object beside its options.
+pub const KEYS: [&str; 12] = [
+    "file",
+    "files",
+    "fps",
+    "name",
+    "material",
+    "parent",
+    "translate",
+    "rotate",
+    "scale",
+    "matrix",
+    "copies",
+    "visible",
+];
+
 impl Object {
     pub fn read(mut fields: Fields, folder: &Path) -> Result<Self, String> {
         let files = files(&mut fields, folder)?;

@@ -112,8 +112,11 @@ fn find<'c>(command: &'c Command, key: &str) -> Result<&'c Arg, String> {
     let known = || command.get_arguments().filter(|arg| arg.get_long().is_some());
     let found = known().find(|arg| arg.get_long() == Some(key));
     found.ok_or_else(|| {
-        let tables = ["object", "lamp", "animation"];
-        let names = known().filter_map(Arg::get_long).chain(tables);
+        let tables = match command.get_name() {
+            "object" => &super::object::KEYS[..],
+            _ => &["object", "lamp", "animation"],
+        };
+        let names = known().filter_map(Arg::get_long).chain(tables.iter().copied());
         format!("unknown key `{key}`{}", nearest(key, names))
     })
 }
