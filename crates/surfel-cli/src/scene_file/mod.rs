@@ -7,7 +7,7 @@ mod motion;
 mod object;
 mod options;
 
-pub use line::Line;
+pub(crate) use line::Line;
 pub use motion::{CameraMotion, Motion};
 pub use object::Object;
 pub use options::Options;
@@ -70,8 +70,8 @@ impl SceneFile {
         };
         let Value::Object(map) = value else { return Err("expected keys and values".into()) };
         let mut fields = Fields::new(String::new(), map);
-        let mut scene = Self::default();
-        scene.raw = TABLES.map(|key| raw(&fields, key, folder));
+        let raw = TABLES.map(|key| raw(&fields, key, folder));
+        let mut scene = Self { raw, ..Self::default() };
         for object in fields.tables("object")? {
             scene.objects.push(Object::read(object, folder)?);
         }

@@ -96,7 +96,7 @@ fn matching(pattern: &Path) -> Result<Vec<PathBuf>, String> {
         start.len() + end.len() <= name.len() && name.starts_with(start) && name.ends_with(end)
     };
     let mut names: Vec<String> = names.filter(fits).collect();
-    names.sort_by(|a, b| natural(a).cmp(&natural(b)));
+    names.sort_by_cached_key(|name| natural(name));
     if names.is_empty() {
         return Err(format!("{}: no file of that name", pattern.display()));
     }
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn names_are_in_the_order_of_their_numbers() {
         let mut names = ["f10.ply", "f9.ply", "f1.ply", "e2.ply"];
-        names.sort_by(|a, b| natural(a).cmp(&natural(b)));
+        names.sort_by_key(|name| natural(name));
         assert_eq!(names, ["e2.ply", "f1.ply", "f9.ply", "f10.ply"]);
     }
 }
