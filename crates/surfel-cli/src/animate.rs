@@ -5,7 +5,7 @@ use crate::picture::{self, camera_at};
 use crate::report::{Muted, Report};
 use crate::scene_file::{CameraMotion, Line};
 use crate::{dry_run, light};
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use std::path::{Path, PathBuf};
 use surfel::flat::{FlatLamp, FlatScene};
 use surfel::math::{DQuat, DVec3};
@@ -74,10 +74,13 @@ pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow
     resolved["output"] = serde_json::json!(output);
     resolved["frames"] = serde_json::json!(options.n_frames);
     resolved["fps"] = serde_json::json!(args.fps);
+    if let Some(seconds) = args.turntable {
+        resolved["turntable"] = serde_json::json!(seconds);
+    }
     if args.dry_run {
         return Ok(crate::report::print(&format!("{resolved:#}"))?);
     }
-    options.fingerprint = fingerprint(&resolved, &args.scene, line, args.turntable);
+    options.fingerprint = fingerprint(&resolved, &args.scene, line);
     let cameras: Vec<Camera> = (0..options.n_frames)
         .map(|frame| camera_at(f64::from(frame) / args.fps, &assembly, &choices))
         .collect();
@@ -96,21 +99,31 @@ pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow
     }
     report.begin("animate", u64::from(options.n_frames));
     for frame in 0..options.n_frames {
-        report.check()?;
         if !movie.has(frame) {
             let time_secs = f64::from(frame) / args.fps;
             let turn = args.turntable.map(|seconds| {
                 DQuat::from_axis_angle(turn_axis, std::f64::consts::TAU * time_secs / seconds)
             });
-            let image = film.frame(time_secs, cameras[frame as usize], turn, report)?;
-            movie.add(frame, &image)?;
+            let image = film.frame(time_secs, cameras[frame as usize], turn, report);
+            let kept = image.and_then(|image| Ok(movie.add(frame, &image)?));
+            kept.map_err(|error| with_advice(error, movie.n_done(), options.n_frames))?;
         }
         report.advance(1);
     }
     report.end_stage();
-    movie.finish(report)?;
+    let n_done = movie.n_done();
+    let finished = movie.finish(report).map_err(anyhow::Error::from);
+    finished.map_err(|error| with_advice(error, n_done, options.n_frames))?;
     report.end_stage();
     Ok(())
+}
+
+/// Tells that what was made is not lost.
+fn with_advice(error: anyhow::Error, n_done: u32, n_frames: u32) -> anyhow::Error {
+    if n_done == 0 {
+        return error;
+    }
+    anyhow!("{error:#}; {n_done} of {n_frames} frames are kept, go on from there with --resume")
 }
 
 fn check(output: &Path, options: &MovieOptions) -> anyhow::Result<()> {
@@ -134,13 +147,9 @@ fn n_frames(args: &Args, graph: &Graph, camera: Option<&CameraMotion>) -> Result
 }
 
 /// Changes with all that frames depend on.
-fn fingerprint(
-    resolved: &serde_json::Value,
-    args: &SceneArgs,
-    line: &Line,
-    turntable: Option<f64>,
-) -> String {
+fn fingerprint(resolved: &serde_json::Value, args: &SceneArgs, line: &Line) -> String {
     let objects = line.scene.objects.iter().flat_map(|object| &object.files);
+    let objects = objects.chain(&args.light.environment);
     let stamp = |file: &PathBuf| {
         let data = std::fs::metadata(file).ok()?;
         Some((file.clone(), data.len(), data.modified().ok()?))
@@ -149,7 +158,7 @@ fn fingerprint(
     let mut scene = resolved.clone();
     scene["info"]["threads"] = serde_json::Value::Null;
     scene["info"]["simd"] = serde_json::Value::Null;
-    let text = format!("{} {scene} {turntable:?} {files:?}", env!("CARGO_PKG_VERSION"));
+    let text = format!("{} {scene} {files:?}", env!("CARGO_PKG_VERSION"));
     let hash = text.bytes().fold(0, |hash, byte| surfel::math::hash(hash ^ u64::from(byte)));
     format!("{hash:016x}")
 }

@@ -7,7 +7,7 @@ use anyhow::Context;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use surfel::math::{DAffine3, Vec3};
+use surfel::math::Vec3;
 use surfel::points::{self, PointCloud, prepare};
 use surfel::progress::Progress;
 use surfel::scene::color::colorize;
@@ -23,14 +23,25 @@ pub struct Assembly<'a> {
     pub source: Source,
     pub camera_motion: Option<CameraMotion>,
     args: &'a SceneArgs,
+    line: &'a Line,
     /// Each file of the command line with the nodes that came from it.
     files: Vec<(PathBuf, Range<usize>)>,
+    /// Objects of scene files that were added.
+    objects: Vec<Added>,
     /// Options of their own that objects have.
     object_args: Vec<SceneArgs>,
     /// Of each geometry, the index in `object_args`; none for the scene's own options.
     args_of: Vec<Option<usize>>,
-    materials: Vec<(Range<usize>, Material)>,
     sources: Vec<Source>,
+}
+
+/// What an object became.
+struct Added {
+    node: usize,
+    /// Nodes of its files, without those of its copies.
+    content: Range<usize>,
+    /// Nodes of its files and copies.
+    all: Range<usize>,
 }
 
 impl<'a> Assembly<'a> {
@@ -38,24 +49,22 @@ impl<'a> Assembly<'a> {
     ///
     /// Clouds of the command line that have no material of their own become one, whose points lie among
     /// each other; everything else stands beside it.
-    pub fn load(args: &'a SceneArgs, line: &Line, report: &Report) -> anyhow::Result<Self> {
+    pub fn load(args: &'a SceneArgs, line: &'a Line, report: &Report) -> anyhow::Result<Self> {
         let mut assembly = Self {
             graph: Graph::default(),
             source: Source::default(),
             camera_motion: line.scene.camera_motion.clone(),
             args,
+            line,
             files: Vec::new(),
+            objects: Vec::new(),
             object_args: Vec::new(),
             args_of: Vec::new(),
-            materials: Vec::new(),
             sources: Vec::new(),
         };
-        let files = args.files.iter().filter(|file| !is_scene_file(file));
-        let names = line.scene.objects.iter().map(|object| Path::new(&object.name));
-        args.material.check_names(files.map(PathBuf::as_path).chain(names))?;
         assembly.add_files(report)?;
-        for (object_idx, object) in line.scene.objects.iter().enumerate() {
-            assembly.add_object(&line.scene.objects[..object_idx], object, line, report)?;
+        for object in &line.scene.objects {
+            assembly.add_object(object, report)?;
         }
         for lamp in &line.scene.lamps {
             let transform = lamp.transform;
@@ -64,14 +73,17 @@ impl<'a> Assembly<'a> {
         }
         assembly.source = surfel_formats::common_source(&assembly.sources);
         let told = what_is_told(&assembly.graph);
-        let names = name_files(&assembly.all_files(line));
+        let names = name_files(&assembly.all_files());
         report.note(&format!("{names}: {told}, {}", assembly.source.format));
         Ok(assembly)
     }
 
-    fn all_files(&self, line: &Line) -> Vec<PathBuf> {
+    fn all_files(&self) -> Vec<PathBuf> {
         let files = self.files.iter().map(|(file, _)| file);
-        files.chain(line.scene.objects.iter().flat_map(|object| &object.files)).cloned().collect()
+        files
+            .chain(self.line.scene.objects.iter().flat_map(|object| &object.files))
+            .cloned()
+            .collect()
     }
 
     fn add_files(&mut self, report: &Report) -> anyhow::Result<()> {
@@ -95,12 +107,7 @@ impl<'a> Assembly<'a> {
         if merging.is_empty() {
             return Ok(());
         }
-        let cloud = surfel_formats::merge_loaded(merging, &merged_files, report).cloud;
-        if cloud.is_empty() {
-            return Err(surfel::Error::EmptyCloud).context(name_files(&merged_files));
-        }
-        let mut graph = Graph::of(Geometry::Points(of_cloud(cloud)), Material::MATTE);
-        graph.nodes[0].name = file_name(&merged_files[0]);
+        let graph = merged(merging, &merged_files, report)?;
         let nodes = self.append(graph, None);
         self.files.extend(merged_files.into_iter().map(|file| (file, nodes.clone())));
         Ok(())
@@ -113,44 +120,25 @@ impl<'a> Assembly<'a> {
         first..self.graph.nodes.len()
     }
 
-    fn add_object(
-        &mut self,
-        before: &[Object],
-        object: &Object,
-        line: &Line,
-        report: &Report,
-    ) -> anyhow::Result<()> {
+    fn add_object(&mut self, object: &Object, report: &Report) -> anyhow::Result<()> {
+        let line = self.line;
+        let before = &line.scene.objects[..self.objects.len()];
+        let parent = object.parent.as_ref();
+        let parent = parent.and_then(|name| before.iter().position(|other| other.name == *name));
         let node = Node {
-            parent: object.parent.as_ref().and_then(|name| self.node_named(name)),
+            parent: parent.map(|object_idx| self.objects[object_idx].node),
             transform: object.transform,
             is_visible: object.is_visible,
             ..Node::new(&object.name)
         };
         let node = self.add_moving(node, &line.scene.motions);
         let first = self.graph.nodes.len();
-        let twin = before
-            .iter()
-            .find(|other| other.files == object.files && other.look.options == object.look.options);
-        if let Some(content) = twin.and_then(|twin| self.content_of(&twin.name)) {
+        if let Some(twin) = before.iter().position(|other| other.holds_the_same_as(object)) {
             // The same file made in the same way: held once.
-            self.graph.add_copy(content, node);
+            self.graph.add_copy(self.objects[twin].content.clone(), node);
         } else {
-            let args = line.for_object(&object.name, &object.look.options)?;
-            self.object_args.push(args);
-            for (file_idx, file) in object.files.iter().enumerate() {
-                let object_args = self.object_args.len() - 1;
-                let (graph, source) = load(file, &self.object_args[object_args], report)?;
-                self.sources.push(source);
-                let above =
-                    self.graph.add(Node { parent: Some(node), ..Node::new(file_name(file)) });
-                if 1 < object.files.len() {
-                    self.show_in_turn(above, file_idx, object);
-                }
-                let nodes = self.append(graph, Some(object_args));
-                for node in &mut self.graph.nodes[nodes] {
-                    node.parent.get_or_insert(above);
-                }
-            }
+            self.object_args.push(line.for_object(&object.name, &object.look.options)?);
+            self.add_content(node, object, report)?;
         }
         let content = first..self.graph.nodes.len();
         for copy in &object.copies {
@@ -158,13 +146,42 @@ impl<'a> Assembly<'a> {
             let place = self.graph.add(place);
             self.graph.add_copy(content.clone(), place);
         }
-        let nodes = first..self.graph.nodes.len();
-        // One for this very object before its own, its own before one for all.
-        let asked = &self.args.material;
-        let material = asked.of_name(&object.name).or_else(|| object.look.material.clone());
-        let material = material.or_else(|| asked.of_all());
-        self.materials.extend(material.map(|material| (nodes, material)));
+        self.objects.push(Added { node, content, all: first..self.graph.nodes.len() });
         Ok(())
+    }
+
+    /// Puts what an object's files hold under its node.
+    fn add_content(&mut self, node: usize, object: &Object, report: &Report) -> anyhow::Result<()> {
+        let object_args = self.object_args.len() - 1;
+        let mut merging = Vec::new();
+        for (file_idx, file) in object.files.iter().enumerate() {
+            let (graph, source) = load(file, &self.object_args[object_args], report)?;
+            self.sources.push(source.clone());
+            if object.is_merged {
+                let Ok(cloud) = into_cloud(graph, false) else {
+                    anyhow::bail!("{}: is no cloud, and `merge` is for clouds", file.display());
+                };
+                merging.push(Loaded { cloud, source });
+                continue;
+            }
+            let above = self.graph.add(Node { parent: Some(node), ..Node::new(file_name(file)) });
+            if 1 < object.files.len() {
+                self.show_in_turn(above, file_idx, object);
+            }
+            self.append_below(above, graph, object_args);
+        }
+        if object.is_merged {
+            let graph = merged(merging, &object.files, report)?;
+            self.append_below(node, graph, object_args);
+        }
+        Ok(())
+    }
+
+    fn append_below(&mut self, above: usize, graph: Graph, object_args: usize) {
+        let nodes = self.append(graph, Some(object_args));
+        for node in &mut self.graph.nodes[nodes] {
+            node.parent.get_or_insert(above);
+        }
     }
 
     /// Shows a file of a sequence for its time; the last one stays.
@@ -188,14 +205,15 @@ impl<'a> Assembly<'a> {
         let name = node.name.clone();
         let motions = motions.iter().filter(|motion| motion.object == name);
         for motion in motions.clone().filter(|motion| motion.is_orbit) {
-            let matrix = node.transform.matrix();
-            let center = motion.pivot.unwrap_or(matrix.translation);
+            let center = motion.pivot.unwrap_or(node.transform.matrix().translation);
             let mut middle = Node { parent: node.parent, ..Node::new("") };
             middle.transform = Transform::translated(center);
             let middle = self.graph.add(middle);
-            node.parent = Some(middle);
-            node.transform = Transform::Matrix(DAffine3::from_translation(-center) * matrix);
             self.add_tracks(middle, motion);
+            // Back again, so that keys of the node's own count from where they always do.
+            let mut back = Node { parent: Some(middle), ..Node::new("") };
+            back.transform = Transform::translated(-center);
+            node.parent = Some(self.graph.add(back));
         }
         let node = self.graph.add(node);
         for motion in motions.filter(|motion| !motion.is_orbit) {
@@ -209,28 +227,10 @@ impl<'a> Assembly<'a> {
         self.graph.animation.channels.extend(channels);
     }
 
-    fn node_named(&self, name: &str) -> Option<usize> {
-        self.graph.nodes.iter().position(|node| node.name == name)
-    }
-
-    /// The nodes of an object's files, without those of its copies.
-    fn content_of(&self, name: &str) -> Option<Range<usize>> {
-        let node = self.node_named(name)?;
-        let is_below = |mut i: usize| loop {
-            match self.graph.nodes[i].parent {
-                Some(parent) if parent == node => return true,
-                Some(parent) => i = parent,
-                None => return false,
-            }
-        };
-        let end = (node + 1..self.graph.nodes.len()).find(|&i| {
-            !is_below(i) || (self.graph.nodes[i].parent == Some(node) && self.is_copy(i, name))
-        });
-        Some(node + 1..end.unwrap_or(self.graph.nodes.len()))
-    }
-
-    fn is_copy(&self, node: usize, name: &str) -> bool {
-        self.graph.nodes[node].name == name
+    /// Files of the command line, those together that became one cloud.
+    pub fn files(&self) -> impl Iterator<Item = Vec<&Path>> {
+        let groups = self.files.chunk_by(|(_, a), (_, b)| a == b);
+        groups.map(|group| group.iter().map(|(file, _)| file.as_path()).collect())
     }
 
     /// Points that show where everything is.
@@ -273,15 +273,18 @@ impl<'a> Assembly<'a> {
     }
 
     fn give_materials(&mut self) -> anyhow::Result<()> {
-        let Self { graph, files, args, materials, .. } = self;
-        let of_files = files.iter().filter_map(|(file, nodes)| {
-            args.material.of(file).map(|material| (nodes.clone(), material))
-        });
-        let of_files: Vec<_> = of_files.collect();
-        for (nodes, material) in of_files.into_iter().chain(materials.drain(..)) {
+        let Self { graph, files, args, objects, .. } = self;
+        let of_files = files
+            .iter()
+            .map(|(file, nodes)| (nodes, args.material.of(file).map(|choice| &choice.material)));
+        let of_objects = objects.iter().zip(&self.line.scene.objects);
+        let of_objects =
+            of_objects.map(|(added, object)| (&added.all, object.material(&args.material)));
+        for (nodes, material) in of_files.chain(of_objects) {
+            let Some(material) = material else { continue };
             let material_idx = graph.materials.len();
-            graph.materials.push(material);
-            for node in &mut graph.nodes[nodes] {
+            graph.materials.push(material.clone());
+            for node in &mut graph.nodes[nodes.clone()] {
                 node.parts.iter_mut().for_each(|part| part.material = material_idx);
             }
         }
@@ -305,6 +308,17 @@ fn load(file: &Path, args: &SceneArgs, report: &Report) -> anyhow::Result<(Graph
     };
     report.end_stage();
     Ok(loaded)
+}
+
+/// Clouds as one, whose points lie among each other.
+fn merged(clouds: Vec<Loaded>, files: &[PathBuf], report: &Report) -> anyhow::Result<Graph> {
+    let cloud = surfel_formats::merge_loaded(clouds, files, report).cloud;
+    if cloud.is_empty() {
+        return Err(surfel::Error::EmptyCloud).context(name_files(files));
+    }
+    let mut graph = Graph::of(Geometry::Points(of_cloud(cloud)), Material::MATTE);
+    graph.nodes[0].name = file_name(&files[0]);
+    Ok(graph)
 }
 
 fn of_cloud(cloud: PointCloud) -> Points {

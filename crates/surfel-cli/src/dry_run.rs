@@ -1,15 +1,16 @@
 //! What `--dry-run` tells: every choice, resolved, as a scene file that makes the same picture.
 
-use crate::args::{Exposure, SceneArgs};
+use crate::args::{Choice, Exposure, SceneArgs};
 use crate::assemble::Assembly;
 use crate::picture::Choices;
 use crate::render::Args;
-use crate::scene_file::{Line, is_scene_file};
+use crate::scene_file::Line;
+use clap::ValueEnum;
 use serde_json::{Map, Value, json};
 use std::path::{Path, absolute};
 use surfel::math::Vec3;
-use surfel::scene::color::choose;
-use surfel::scene::{Background, Light, Projection, Sun};
+use surfel::scene::color::{ColorSource, choose};
+use surfel::scene::{Background, Light, Projection};
 use surfel::trace::Simd;
 
 pub fn resolved(assembly: &Assembly, choices: &Choices, args: &Args, line: &Line) -> String {
@@ -21,8 +22,7 @@ pub fn resolved(assembly: &Assembly, choices: &Choices, args: &Args, line: &Line
 
 /// All that decides what a picture shows.
 pub fn scene(assembly: &Assembly, choices: &Choices, args: &SceneArgs, line: &Line) -> Value {
-    let chosen = || assembly.clouds().next().map(|(cloud, _)| choose(cloud).0);
-    let color = args.color.color.clone().or_else(chosen);
+    let color = args.color.color.clone().or_else(|| chosen_color(assembly));
     let (n_points, n_triangles) = assembly.graph.counts();
     let preparation = args.preparation.preparation(args.picture.seed, args.color.color.as_ref());
     let (width, height) = args.picture.resolution;
@@ -47,7 +47,13 @@ pub fn scene(assembly: &Assembly, choices: &Choices, args: &SceneArgs, line: &Li
         scene["color"] = json!(color.to_string());
     }
     add_lights(&mut scene, choices, args);
-    let objects = file_objects(args).chain(line.scene.raw_objects().iter().cloned());
+    for (key, value) in line.given() {
+        let is_told = scene.get(&key).is_some() || key == "no_background";
+        if !is_told {
+            scene[key] = value;
+        }
+    }
+    let objects = file_objects(assembly, args).chain(scene_objects(args, line));
     scene["object"] = Value::Array(objects.collect());
     for (key, tables) in line.scene.raw_others() {
         scene[key] = Value::Array(tables.clone());
@@ -63,18 +69,49 @@ pub fn scene(assembly: &Assembly, choices: &Choices, args: &SceneArgs, line: &Li
     scene
 }
 
+/// What all clouds that leave it open are coloured by, if that is the same.
+fn chosen_color(assembly: &Assembly) -> Option<ColorSource> {
+    let open = assembly.clouds().filter(|(_, args)| args.color.color.is_none());
+    let mut chosen = open.map(|(cloud, _)| choose(cloud).0);
+    let first = chosen.next()?;
+    chosen.all(|other| other == first).then_some(first)
+}
+
 /// The command line's files as objects.
-fn file_objects(args: &SceneArgs) -> impl Iterator<Item = Value> {
-    args.files.iter().filter(|file| !is_scene_file(file)).map(|file| {
-        let mut object = json!({ "file": in_full(file) });
-        if let Some((kind, properties)) = args.material.words_of(file) {
-            let mut material = Map::new();
-            material.insert("kind".into(), json!(kind));
-            material.extend(properties.into_iter().map(|(name, value)| (name, json!(value))));
-            object["material"] = Value::Object(material);
+fn file_objects(assembly: &Assembly, args: &SceneArgs) -> impl Iterator<Item = Value> {
+    assembly.files().map(|files| {
+        let mut object = match &files[..] {
+            [only] => json!({ "file": in_full(only) }),
+            several => {
+                let files: Vec<String> = several.iter().map(|file| in_full(file)).collect();
+                json!({ "files": files, "merge": true })
+            }
+        };
+        if let Some(choice) = args.material.of(files[files.len() - 1]) {
+            object["material"] = material(choice);
         }
         object
     })
+}
+
+/// Objects of scene files, with the materials that the command line has for them.
+fn scene_objects(args: &SceneArgs, line: &Line) -> impl Iterator<Item = Value> {
+    let objects = line.scene.objects.iter().zip(line.scene.raw_objects());
+    objects.map(|(object, raw)| {
+        let mut raw = raw.clone();
+        if let Some(choice) = object.choice(&args.material) {
+            raw["material"] = material(choice);
+        }
+        raw
+    })
+}
+
+fn material(choice: &Choice) -> Value {
+    let (kind, properties) = &choice.words;
+    let mut material = Map::new();
+    material.insert("kind".into(), json!(kind));
+    material.extend(properties.iter().map(|(name, value)| (name.clone(), json!(value))));
+    Value::Object(material)
 }
 
 /// From the root, so that the scene may lie anywhere.
@@ -111,21 +148,17 @@ fn background(background: Background) -> Value {
 }
 
 fn add_lights(scene: &mut Value, choices: &Choices, args: &SceneArgs) {
-    let mut kinds = Vec::new();
     for light in &choices.lights {
         match light {
-            Light::Sun(sun) => {
-                let (azimuth, elevation) = sun_angles(sun, choices.up);
-                kinds.push("sun");
+            Light::Sun(_) => {
                 scene["sun"] = json!({
-                    "azimuth": azimuth,
-                    "elevation": elevation,
+                    "azimuth": choices.sun_azimuth_deg,
+                    "elevation": args.light.sun_elevation,
                     "angle": args.light.sun_angle,
                     "strength": args.light.sun_strength,
                 });
             }
             Light::Sky(sky) => {
-                kinds.push("sky");
                 scene["sky"] = json!({ "reach": sky.reach, "strength": args.light.sky_strength });
             }
             Light::Environment(_) => {
@@ -133,20 +166,13 @@ fn add_lights(scene: &mut Value, choices: &Choices, args: &SceneArgs) {
                 scene["environment_rotation"] = json!(args.light.environment_rotation);
                 scene["environment_strength"] = json!(args.light.environment_strength);
             }
-            Light::Headlight(_) => kinds.push("headlight"),
+            Light::Headlight(_) => {}
         }
     }
-    let has_environment = args.light.environment.is_some();
-    if !kinds.is_empty() {
-        scene["light"] = json!(kinds);
-    } else if !has_environment {
-        scene["light"] = json!(["none"]);
+    let kinds = args.light.kinds().into_iter();
+    let names = kinds.filter_map(|kind| Some(kind.to_possible_value()?.get_name().to_owned()));
+    let names: Vec<String> = names.collect();
+    if !names.is_empty() {
+        scene["light"] = json!(names);
     }
-}
-
-/// Degrees clockwise from north, and above the horizon.
-fn sun_angles(sun: &Sun, up: Vec3) -> (f32, f32) {
-    let (north, east) = (Sun::toward(0.0, 0.0, up), Sun::toward(90.0, 0.0, up));
-    let azimuth = sun.direction.dot(east).atan2(sun.direction.dot(north)).to_degrees();
-    (azimuth.rem_euclid(360.0), sun.direction.dot(up).clamp(-1.0, 1.0).asin().to_degrees())
 }

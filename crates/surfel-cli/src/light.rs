@@ -77,9 +77,14 @@ pub fn expose_lamps(lamps: &mut [FlatLamp], stops: f32) {
     lamps.iter_mut().for_each(|lamp| lamp.color *= stops.exp2());
 }
 
+/// Clockwise from north.
+pub fn sun_azimuth_deg(args: &LightArgs, lit: &Lit) -> f64 {
+    args.sun_azimuth.unwrap_or_else(|| automatic_azimuth_deg(lit))
+}
+
 fn sun(args: &LightArgs, lit: &Lit, report: &Report) -> Sun {
-    let azimuth_deg = args.sun_azimuth.unwrap_or_else(|| {
-        let azimuth_deg = automatic_azimuth_deg(lit);
+    let azimuth_deg = sun_azimuth_deg(args, lit);
+    if args.sun_azimuth.is_none() {
         let elevation_deg = args.sun_elevation;
         report.choice(
             &format!(
@@ -87,8 +92,7 @@ fn sun(args: &LightArgs, lit: &Lit, report: &Report) -> Sun {
             ),
             "--sun-azimuth, --sun-elevation",
         );
-        azimuth_deg
-    });
+    }
     Sun {
         direction: Sun::toward(azimuth_deg as f32, args.sun_elevation as f32, lit.up),
         color: args.sun_strength as f32 * SUN_COLOR,

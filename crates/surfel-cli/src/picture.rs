@@ -28,6 +28,7 @@ pub struct Choices {
     pub up: Vec3,
     pub camera: Camera,
     pub lights: Vec<Light>,
+    pub sun_azimuth_deg: f64,
 }
 
 pub fn make(
@@ -101,7 +102,7 @@ pub fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> anyhow::Result<T>) -> 
 /// Reads all files, if memory suffices and they have what is asked for.
 pub fn load<'a>(
     args: &'a SceneArgs,
-    line: &Line,
+    line: &'a Line,
     global: &Global,
     report: &Report,
 ) -> anyhow::Result<Assembly<'a>> {
@@ -111,8 +112,12 @@ pub fn load<'a>(
     let files = args.files.iter().filter(|file| !is_scene_file(file)).chain(objects);
     let files: Vec<PathBuf> = files.cloned().collect();
     if files.is_empty() {
-        bail!("{}: no objects; add an [[object]] with a file", name_files(&args.files));
+        let scenes = name_files(&args.files);
+        return Err(Usage(format!("{scenes}: no objects; add an [[object]] with a file")).into());
     }
+    let names = line.scene.objects.iter().flat_map(|object| object.names());
+    let names: Vec<&Path> = args.files.iter().map(PathBuf::as_path).chain(names).collect();
+    args.material.check_names(&names)?;
     let inspected = files.iter().map(|file| surfel_formats::inspect(file));
     let sources = inspected.collect::<Result<Vec<_>, _>>()?;
     Plan::new(&sources, &files, args.preparation.select, n_pixels).check(global)?;
@@ -176,7 +181,8 @@ pub fn choose(assembly: &Assembly, args: &SceneArgs, report: &Report) -> anyhow:
     let is_shaded = args.surface.surface != SurfaceKind::Points;
     let lit = Lit { camera, up, diagonal };
     let lights = if is_shaded { light::lights(&args.light, &lit, report)? } else { Vec::new() };
-    Ok(Choices { up, camera, lights })
+    let sun_azimuth_deg = light::sun_azimuth_deg(&args.light, &lit);
+    Ok(Choices { up, camera, lights, sun_azimuth_deg })
 }
 
 /// The camera as its motion has it at a time.

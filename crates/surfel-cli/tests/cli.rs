@@ -2,14 +2,20 @@
 
 #[path = "cli/common.rs"]
 mod common;
+#[path = "cli/animate.rs"]
+mod animate;
 #[path = "cli/bench.rs"]
 mod bench;
 #[path = "cli/commands.rs"]
 mod commands;
 #[path = "cli/pictures.rs"]
 mod pictures;
+#[path = "cli/scenes.rs"]
+mod scenes;
 #[path = "cli/wrong_input.rs"]
 mod wrong_input;
+#[path = "cli/wrong_scenes.rs"]
+mod wrong_scenes;
 #[path = "cli/wrong_use.rs"]
 mod wrong_use;
 #[cfg(unix)]

@@ -70,6 +70,11 @@ impl LightArgs {
         Ok(())
     }
 
+    /// The kinds asked for, or the usual ones.
+    pub fn kinds(&self) -> Vec<LightKind> {
+        LightKind::value_variants().iter().copied().filter(|kind| self.has(*kind)).collect()
+    }
+
     pub fn has(&self, kind: LightKind) -> bool {
         match &self.light {
             Some(kinds) => kinds.contains(&kind),

@@ -22,62 +22,40 @@ pub struct MaterialArgs {
 
 /// A material for one file or for all.
 #[derive(Clone, Debug, PartialEq)]
-struct Choice {
+pub struct Choice {
     file: Option<String>,
-    material: Material,
+    pub material: Material,
     /// Its name and properties as they were typed.
-    words: (String, Vec<(String, String)>),
+    pub words: (String, Vec<(String, String)>),
 }
 
 impl MaterialArgs {
     /// The material asked for a file: its own before that for all, the last one given.
-    pub fn of(&self, file: &Path) -> Option<Material> {
-        Some(self.asked_for(file)?.material.clone())
+    pub fn of(&self, file: &Path) -> Option<&Choice> {
+        self.of_file(file).or_else(|| self.for_all())
     }
 
-    /// The same as words: name, and properties with their values.
-    pub fn words_of(&self, file: &Path) -> Option<(String, Vec<(String, String)>)> {
-        Some(self.asked_for(file)?.words.clone())
-    }
-
-    fn asked_for(&self, file: &Path) -> Option<&Choice> {
-        let for_all = || self.material.iter().rev().find(|choice| choice.file.is_none());
-        self.choice_of(file).or_else(for_all)
+    /// The material asked for whatever has none of its own.
+    pub fn for_all(&self) -> Option<&Choice> {
+        self.material.iter().rev().find(|choice| choice.file.is_none())
     }
 
     /// The material asked for this very file.
-    pub fn of_file(&self, file: &Path) -> Option<&Material> {
-        self.choice_of(file).map(|choice| &choice.material)
-    }
-
-    fn choice_of(&self, file: &Path) -> Option<&Choice> {
+    pub fn of_file(&self, file: &Path) -> Option<&Choice> {
         self.material
             .iter()
             .rev()
             .find(|choice| choice.file.as_ref().is_some_and(|name| is_named(file, name)))
     }
 
-    /// The material asked for everything.
-    pub fn of_all(&self) -> Option<Material> {
-        let for_all = self.material.iter().rev().find(|choice| choice.file.is_none());
-        for_all.map(|choice| choice.material.clone())
-    }
-
-    /// The material asked for an object of this name.
-    pub fn of_name(&self, name: &str) -> Option<Material> {
-        self.of_file(Path::new(name)).cloned()
-    }
-
     /// Fails if a material is for a file or an object that is not there.
-    pub fn check_names<'f>(
-        &self,
-        names: impl Iterator<Item = &'f Path> + Clone,
-    ) -> Result<(), Usage> {
-        for wanted in self.material.iter().filter_map(|choice| choice.file.as_ref()) {
-            if !names.clone().any(|name| is_named(name, wanted)) {
-                let known: Vec<String> = names.map(|name| name.display().to_string()).collect();
+    pub fn check_names(&self, known: &[&Path]) -> Result<(), Usage> {
+        for name in self.material.iter().filter_map(|choice| choice.file.as_ref()) {
+            if !known.iter().any(|file| is_named(file, name)) {
+                let known: Vec<String> =
+                    known.iter().map(|file| file.display().to_string()).collect();
                 return Err(Usage(format!(
-                    "--material {wanted}=...: no such file or object among {}",
+                    "--material {name}=...: nothing of that name is to be rendered; there is {}",
                     known.join(", ")
                 )));
             }

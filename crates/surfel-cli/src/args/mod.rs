@@ -11,7 +11,7 @@ mod scene;
 pub use camera::{CameraArgs, is_georeferenced, short};
 pub use color::ColorArgs;
 pub use light::{Exposure, LightArgs, LightKind};
-pub use material::MaterialArgs;
+pub use material::{Choice, MaterialArgs};
 pub use preparation::PreparationArgs;
 pub use scene::SceneArgs;
 

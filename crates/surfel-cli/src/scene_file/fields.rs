@@ -28,8 +28,11 @@ impl Fields {
     }
 
     pub fn error(&self, key: &str, found: &Value, expected: &str) -> String {
-        let place = if self.name.is_empty() { String::new() } else { format!("{}: ", self.name) };
-        format!("{place}{key}: found {found}, expected {expected}")
+        format!("{}{key}: found {found}, expected {expected}", self.place())
+    }
+
+    fn place(&self) -> String {
+        if self.name.is_empty() { String::new() } else { format!("{}: ", self.name) }
     }
 
     /// All that is left, which is to be known elsewhere.
@@ -66,7 +69,7 @@ impl Fields {
             Some(other) => return Err(self.error(key, &other, "tables")),
         };
         let named = tables.into_iter().enumerate().map(|(i, table)| match table {
-            Value::Object(map) => Ok(Self::new(format!("{key} {}", i + 1), map)),
+            Value::Object(map) => Ok(Self::new(format!("{}{key} {}", self.place(), i + 1), map)),
             other => Err(self.error(key, &other, "a table")),
         });
         named.collect()
@@ -127,21 +130,22 @@ impl Fields {
             let Ok(rows) = rows else {
                 return Err(format!("{}: matrix: expected 16 numbers, row by row", self.name));
             };
-            return self.checked(Transform::Matrix(affine(rows)));
+            return self.checked("matrix", Transform::Matrix(affine(rows)));
         }
         let translation = self.vector("translate")?.unwrap_or(DVec3::ZERO);
         let rotation = self.rotation("rotate")?.unwrap_or(DQuat::IDENTITY);
         let scale = self.scale("scale")?.unwrap_or(DVec3::ONE);
-        self.checked(Transform::Parts { translation, rotation, scale })
+        self.checked("scale", Transform::Parts { translation, rotation, scale })
     }
 
-    fn checked(&self, transform: Transform) -> Result<Transform, String> {
+    fn checked(&self, key: &str, transform: Transform) -> Result<Transform, String> {
         let matrix = transform.matrix();
+        let largest = matrix.to_cols_array().into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         let volume = matrix.matrix3.determinant();
-        if matrix.is_finite() && volume.is_finite() && volume != 0.0 {
+        if matrix.is_finite() && largest < LARGEST && volume != 0.0 {
             return Ok(transform);
         }
-        Err(format!("{}: the transform leaves nothing to be seen; check `scale`", self.name))
+        Err(format!("{}: {key}: it leaves nothing to be seen, or makes it endless", self.name))
     }
 
     /// Degrees about X, then Y, then Z, or `{ axis = [0, 0, 1], angle = 30 }`.
@@ -154,16 +158,24 @@ impl Fields {
 
     fn scale(&mut self, key: &str) -> Result<Option<DVec3>, String> {
         let Some(value) = self.take(key) else { return Ok(None) };
-        let scale = value.as_f64().map(DVec3::splat).or_else(|| vector(&value));
-        let expected = "a number or three";
-        scale.map(Some).ok_or_else(|| self.error(key, &value, expected))
+        let expected = "a number or three, below 1e15";
+        scale(&value).map(Some).ok_or_else(|| self.error(key, &value, expected))
     }
+}
+
+/// Lengths and factors stay below: beyond, their squares are no longer finite in f32.
+const LARGEST: f64 = 1e15;
+
+/// One factor for all axes, or three.
+pub fn scale(value: &Value) -> Option<DVec3> {
+    let even = value.as_f64().filter(|factor| factor.abs() < LARGEST).map(DVec3::splat);
+    even.or_else(|| vector(value))
 }
 
 fn vector(value: &Value) -> Option<DVec3> {
     let [x, y, z] = value.as_array()?.as_slice() else { return None };
     let vector = DVec3::new(x.as_f64()?, y.as_f64()?, z.as_f64()?);
-    (vector.is_finite() && vector.abs().max_element() < 1e15).then_some(vector)
+    (vector.is_finite() && vector.abs().max_element() < LARGEST).then_some(vector)
 }
 
 pub fn rotation(value: &Value) -> Option<DQuat> {
@@ -187,10 +199,14 @@ fn affine(rows: [f64; 16]) -> DAffine3 {
 /// "; the nearest is `x`", or all that is known if nothing is near.
 pub fn nearest<'k>(found: &str, known: impl Iterator<Item = &'k str>) -> String {
     let known: Vec<&str> = known.collect();
-    let likeness = |name: &&&str| strsim::jaro_winkler(found, name);
+    let likeness = |name: &&&str| match strsim::osa_distance(found, name) {
+        // Two letters of a short word in the wrong order, which the other measure takes for another word.
+        0 | 1 => 1.0,
+        _ => strsim::jaro_winkler(found, name),
+    };
     let best = known.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
     match best {
-        Some(best) if 0.75 < strsim::jaro_winkler(found, best) => {
+        Some(best) if 0.75 < likeness(&best) => {
             format!("; the nearest known one is `{best}`")
         }
         Some(_) => format!("; known: {}", known.join(", ")),

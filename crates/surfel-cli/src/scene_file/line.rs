@@ -1,22 +1,27 @@
 //! The command line together with the options of a scene file: one set of options, parsed in one place.
 
-use super::{Options, SceneFile, is_scene_file};
+use super::options::{Known, is_in};
+use super::{Options, SceneFile, TABLES, is_scene_file, object};
 use crate::Cli;
 use crate::args::{SceneArgs, Usage};
 use clap::error::ErrorKind;
-use clap::{ArgMatches, Command, CommandFactory, FromArgMatches};
+use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
+use serde_json::Value;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// The words that were parsed, those of the scene file among them.
 pub struct Line {
     words: Vec<OsString>,
+    files: Vec<PathBuf>,
     /// Of the scene files named.
     pub scene: SceneFile,
 }
 
 /// Groups of options that an object may have for itself.
 const OF_OBJECTS: [&str; 3] = ["Surface", "Preparation", "Colour"];
+/// Commands that show scenes.
+const OF_SCENES: [&str; 2] = ["render", "animate"];
 /// Those of them that belong to the picture all the same.
 const OF_PICTURES: [&str; 2] = ["background", "no-background"];
 
@@ -26,49 +31,109 @@ impl Line {
     pub fn parse(mut words: Vec<OsString>) -> anyhow::Result<(Cli, Self)> {
         let matches = command().get_matches_from(&words);
         let mut scene = SceneFile::default();
-        if let Some((name, given)) = matches.subcommand()
-            && let Ok(Some(files)) = given.try_get_many::<PathBuf>("files")
+        let mut scene_files = Vec::new();
+        if let Some((name, given)) =
+            matches.subcommand().filter(|(name, _)| OF_SCENES.contains(name))
         {
-            let after_name = 1 + words.iter().position(|word| word == name).unwrap_or(0);
             let mut added = Vec::new();
+            let files = given.get_many::<PathBuf>("files").into_iter().flatten();
             for file in files.filter(|file| is_scene_file(file)) {
                 let read = SceneFile::read(file)?;
-                added.extend(
-                    option_words(&read.options, name, given)
-                        .map_err(|error| Usage(format!("{}: {error}", file.display())))?,
-                );
+                let wrong = |error: String| Usage(format!("{}: {error}", file.display()));
+                check_objects(&read).map_err(wrong)?;
+                added.extend(option_words(&read.options, name, given).map_err(wrong)?);
                 scene.append(read);
+                scene_files.push(file.clone());
             }
-            words.splice(after_name..after_name, added.into_iter().map(OsString::from));
+            let place = place_of_options(&words, name);
+            words.splice(place..place, added.into_iter().map(OsString::from));
         }
-        let line = Self { words, scene };
+        let line = Self { words, files: scene_files, scene };
         let cli = line.cli(&[])?;
+        for object in line.scene.objects.iter().filter(|object| !object.look.options.is_empty()) {
+            line.for_object(&object.name, &object.look.options)?;
+        }
         Ok((cli, line))
     }
 
     /// The scene's options with those of one object put over them.
     pub fn for_object(&self, name: &str, options: &Options) -> anyhow::Result<SceneArgs> {
-        let wrong = |error: String| Usage(format!("object `{name}`: {error}"));
-        let command = of_objects();
-        let words = options.words(&command, None).map_err(wrong)?;
-        Ok(self.cli(&words)?.into_scene().ok_or_else(|| wrong("no scene".into()))?)
+        let wrong = |error: String| Usage(format!("{}: object `{name}`: {error}", self.names()));
+        let words = options.words(&known_to_objects(&of_objects()), None).map_err(wrong)?;
+        let cli = self.parsed(&words).map_err(|error| wrong(short(&error)))?;
+        Ok(cli.into_scene().ok_or_else(|| wrong("no scene".into()))?)
+    }
+
+    /// What was said about surface, preparation and colour, as keys and values.
+    pub fn given(&self) -> Vec<(String, Value)> {
+        let Ok(matches) = command().try_get_matches_from(&self.words) else { return Vec::new() };
+        let Some((name, given)) = matches.subcommand() else { return Vec::new() };
+        let root = Cli::command();
+        let args = root.find_subcommand(name).into_iter().flat_map(Command::get_arguments);
+        let is_of_object =
+            |arg: &&Arg| arg.get_help_heading().is_some_and(|name| OF_OBJECTS.contains(&name));
+        let value = |arg: &Arg| {
+            if matches!(arg.get_action(), ArgAction::SetTrue) {
+                return Some(Value::Bool(true));
+            }
+            let word = given.get_raw(arg.get_id().as_str())?.next_back()?;
+            Some(Value::String(word.to_string_lossy().into_owned()))
+        };
+        let told = args.filter(is_of_object).filter(is_in(given));
+        told.filter_map(|arg| Some((arg.get_long()?.replace('-', "_"), value(arg)?))).collect()
     }
 
     fn cli(&self, more: &[String]) -> anyhow::Result<Cli> {
-        let words = self.words.iter().cloned().chain(more.iter().map(OsString::from));
-        let parsed = command().try_get_matches_from(words).and_then(|m| Cli::from_arg_matches(&m));
-        parsed.map_err(|error| {
-            if self.scene.is_empty() || error.kind() == ErrorKind::DisplayHelp {
+        self.parsed(more).map_err(|error| {
+            if self.files.is_empty() || error.kind() == ErrorKind::DisplayHelp {
                 error.exit();
             }
-            let text = error.to_string();
-            let text = text.trim_start_matches("error: ");
-            let text = text.split("\n\nUsage").next().unwrap_or(text);
-            let text: Vec<&str> = text.split_whitespace().collect();
-            Usage(format!("the options of the scene file and the command line: {}", text.join(" ")))
-                .into()
+            // The command line alone was right: it is the file's, or does not go with it.
+            Usage(format!("{}: {}", self.names(), short(&error))).into()
         })
     }
+
+    fn parsed(&self, more: &[String]) -> Result<Cli, clap::Error> {
+        let words = self.words.iter().cloned().chain(more.iter().map(OsString::from));
+        Cli::from_arg_matches(&command().try_get_matches_from(words)?)
+    }
+
+    fn names(&self) -> String {
+        crate::assemble::name_files(&self.files)
+    }
+}
+
+/// Where options of scene files go: behind the command and files, before what begins with a dash. Right
+/// before a file, an option whose value may be left out would take it for its value.
+fn place_of_options(words: &[OsString], name: &str) -> usize {
+    let after_name = 1 + words.iter().position(|word| word == name).unwrap_or(0);
+    let is_option = |word: &OsString| word != "-" && word.as_encoded_bytes().starts_with(b"-");
+    let first = words[after_name..].iter().position(is_option);
+    first.map_or(words.len(), |first| after_name + first)
+}
+
+/// What clap says, in one line and without advice on the command line.
+fn short(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let text = text.trim_start_matches("error: ");
+    let text = ["\n\nUsage", "\n\nFor more"]
+        .iter()
+        .fold(text, |text, end| text.split(end).next().unwrap_or(text));
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Fails at the first key of an object that is none.
+fn check_objects(scene: &SceneFile) -> Result<(), String> {
+    let command = of_objects();
+    for (object_idx, object) in scene.objects.iter().enumerate() {
+        let words = object.look.options.words(&known_to_objects(&command), None);
+        words.map_err(|error| format!("object {}: {error}", object_idx + 1))?;
+    }
+    Ok(())
+}
+
+fn known_to_objects(command: &Command) -> Known<'_> {
+    Known { command, others: &object::KEYS, elsewhere: Vec::new() }
 }
 
 /// The last of several values counts: those of the command line stand behind those of files.
@@ -80,11 +145,11 @@ fn command() -> Command {
 /// One with the options that objects may have.
 fn of_objects() -> Command {
     let render = Cli::command().find_subcommand("render").cloned().unwrap_or_default();
-    let is_of_object = |arg: &&clap::Arg| {
+    let is_of_object = |arg: &&Arg| {
         arg.get_help_heading().is_some_and(|heading| OF_OBJECTS.contains(&heading))
             && arg.get_long().is_some_and(|long| !OF_PICTURES.contains(&long))
     };
-    let args: Vec<clap::Arg> = render.get_arguments().filter(is_of_object).cloned().collect();
+    let args: Vec<Arg> = render.get_arguments().filter(is_of_object).cloned().collect();
     Command::new("object").args(args)
 }
 
@@ -92,6 +157,8 @@ fn option_words(options: &Options, name: &str, given: &ArgMatches) -> Result<Vec
     let root = Cli::command();
     let Some(command) = root.find_subcommand(name) else { return Ok(Vec::new()) };
     // Threads and the like are the whole program's.
-    let global: Vec<clap::Arg> = root.get_arguments().cloned().collect();
-    options.words(&command.clone().args(global), Some(given))
+    let global: Vec<Arg> = root.get_arguments().cloned().collect();
+    let elsewhere = OF_SCENES.iter().filter_map(|name| root.find_subcommand(name)).collect();
+    let known = Known { command: &command.clone().args(global), others: &TABLES, elsewhere };
+    options.words(&known, Some(given))
 }

@@ -7,16 +7,18 @@ mod motion;
 mod object;
 mod options;
 
-pub use line::Line;
+pub(crate) use line::Line;
 pub use motion::{CameraMotion, Motion};
 pub use object::Object;
 pub use options::Options;
 
 use crate::args::Usage;
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use fields::Fields;
 use lamp::LampSpec;
 use serde_json::Value;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use surfel::scene::Node;
 
@@ -47,14 +49,16 @@ pub fn is_scene_file(path: &Path) -> bool {
 impl SceneFile {
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let name = path.display();
-        let size =
-            std::fs::metadata(path).with_context(|| format!("{name}: cannot be read"))?.len();
-        if MOST_BYTES < size {
-            bail!("{name}: {size} bytes, expected a scene file of at most {MOST_BYTES}");
+        let file = File::open(path).with_context(|| format!("{name}: cannot be read"))?;
+        let mut bytes = Vec::new();
+        file.take(MOST_BYTES + 1)
+            .read_to_end(&mut bytes)
+            .with_context(|| format!("{name}: cannot be read"))?;
+        if MOST_BYTES < bytes.len() as u64 {
+            bail!("{name}: too large, expected a scene file of at most {MOST_BYTES} bytes");
         }
-        let text = std::fs::read_to_string(path).with_context(|| {
-            format!("{name}: cannot be read as text; check that it is a scene file")
-        })?;
+        let text = String::from_utf8(bytes)
+            .map_err(|_| anyhow!("{name}: is not text; check that it is a scene file"))?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         Self::parse(&text, is_json, &folder)
@@ -66,12 +70,17 @@ impl SceneFile {
         let value: Value = if is_json {
             serde_json::from_str(text).map_err(|error| error.to_string())?
         } else {
-            toml::from_str(text).map_err(|error| error.to_string().trim().replace('\n', " "))?
+            toml::from_str(text).map_err(|error| toml_error(text, &error))?
         };
+        // TOML knows no null: it stands for numbers that JSON does not know.
+        if !is_json && let Some(place) = place_of_null(&value) {
+            let place = place.trim_start_matches(": ");
+            return Err(format!("{place}: found nan or inf, expected a number"));
+        }
         let Value::Object(map) = value else { return Err("expected keys and values".into()) };
         let mut fields = Fields::new(String::new(), map);
-        let mut scene = Self::default();
-        scene.raw = TABLES.map(|key| raw(&fields, key, folder));
+        let raw = TABLES.map(|key| raw(&fields, key, folder));
+        let mut scene = Self { raw, ..Self::default() };
         for object in fields.tables("object")? {
             scene.objects.push(Object::read(object, folder)?);
         }
@@ -134,6 +143,36 @@ impl SceneFile {
             }
         }
         Ok(())
+    }
+}
+
+/// In one line, with the place.
+fn toml_error(text: &str, error: &toml::de::Error) -> String {
+    let message = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
+    let Some(span) = error.span() else { return message };
+    let Some((before, found)) = text.get(..span.start).zip(text.get(span)) else { return message };
+    let line = 1 + before.matches('\n').count();
+    let column = 1 + before.chars().rev().take_while(|c| *c != '\n').count();
+    let is_short = !found.is_empty() && found.len() < 40 && !found.contains('\n');
+    let found = if is_short { format!(" at `{found}`") } else { String::new() };
+    format!("line {line}, column {column}: {message}{found}")
+}
+
+/// The keys that lead to a null.
+fn place_of_null(value: &Value) -> Option<String> {
+    match value {
+        Value::Null => Some(String::new()),
+        Value::Array(values) => values.iter().enumerate().find_map(|(i, value)| {
+            let place = place_of_null(value)?;
+            // Tables are counted, as elsewhere; of numbers, the key is enough.
+            let number = if value.is_object() { format!(" {}", i + 1) } else { String::new() };
+            Some(format!("{number}{place}"))
+        }),
+        Value::Object(map) => map.iter().find_map(|(key, value)| {
+            let place = place_of_null(value)?;
+            Some(format!(": {key}{place}"))
+        }),
+        _ => None,
     }
 }
 

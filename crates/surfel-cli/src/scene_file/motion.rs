@@ -1,7 +1,7 @@
 //! What moves in a scene file: keys, orbits and paths, of objects and of the camera.
 
 use super::SceneFile;
-use super::fields::{Fields, rotation};
+use super::fields::{Fields, rotation, scale};
 use serde_json::Value;
 use std::f64::consts::TAU;
 use surfel::math::{DQuat, DVec3, Vec3};
@@ -73,8 +73,12 @@ pub fn read(mut fields: Fields, scene: &mut SceneFile) -> Result<(), String> {
                         .map(|values| keyed(&place, &times, values, how))
                         .transpose()
                 };
-                motion.position = keys("position")?.or(motion.position.take());
-                motion.focal_point = keys("focal-point")?.or(motion.focal_point.take());
+                let (position, focal_point) = (keys("position")?, keys("focal-point")?);
+                if position.is_none() && focal_point.is_none() {
+                    return Err(format!("{place}: nothing moves; give position or focal-point"));
+                }
+                motion.position = position.or(motion.position.take());
+                motion.focal_point = focal_point.or(motion.focal_point.take());
             }
             "path" => {
                 motion.position = Some(path(&mut fields)?);
@@ -107,8 +111,10 @@ fn unknown(place: &str, kind: &str) -> String {
 
 fn read_orbit(fields: &mut Fields) -> Result<Orbit, String> {
     let seconds = seconds(fields)?;
-    let is_number = |number: f64| number != 0.0 && number.abs() <= 1e6;
-    let turns = fields.number("turns", "a number other than 0", is_number)?.unwrap_or(1.0);
+    // Each turn takes keys, so that a line of a file could ask for any amount of memory.
+    let is_number = |number: f64| number != 0.0 && number.abs() <= 1000.0;
+    let expected = "a number other than 0, from -1000 to 1000";
+    let turns = fields.number("turns", expected, is_number)?.unwrap_or(1.0);
     let axis = fields.vector("axis")?;
     if axis.is_some_and(|axis| axis.try_normalize().is_none()) {
         return Err(format!("{}: axis: expected a direction other than [0, 0, 0]", fields.name()));
@@ -172,14 +178,6 @@ fn tracks(fields: &mut Fields, place: &str) -> Result<Vec<Track>, String> {
         }));
     }
     if let Some(values) = fields.take("scale") {
-        let scale = |value: &Value| match value.as_f64() {
-            Some(number) => Some(DVec3::splat(number)),
-            None => {
-                let numbers: Option<Vec<f64>> =
-                    value.as_array()?.iter().map(Value::as_f64).collect();
-                Some(DVec3::from_array(numbers?.try_into().ok()?))
-            }
-        };
         let scales: Option<Vec<DVec3>> =
             values.as_array().and_then(|all| all.iter().map(scale).collect());
         let scales = scales
@@ -221,7 +219,12 @@ fn check_count(place: &str, times: &[f64], n_values: usize) -> Result<(), String
     if times.len() == n_values {
         return Ok(());
     }
-    Err(format!("{place}: {n_values} values for {} times", times.len()))
+    let (values, times) = (count(n_values, "value"), count(times.len(), "time"));
+    Err(format!("{place}: {values} for {times}; give one for each"))
+}
+
+fn count(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 impl CameraMotion {

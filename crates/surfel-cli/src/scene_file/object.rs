@@ -2,7 +2,7 @@
 
 use super::fields::Fields;
 use super::{Options, beside};
-use crate::args::material;
+use crate::args::{Choice, MaterialArgs, material};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use surfel::scene::{Material, Transform};
@@ -14,6 +14,8 @@ pub struct Object {
     pub files: Vec<PathBuf>,
     /// Of a sequence.
     pub fps: f64,
+    /// Whether the files are clouds that together are one.
+    pub is_merged: bool,
     pub look: Look,
     pub parent: Option<String>,
     pub transform: Transform,
@@ -30,22 +32,6 @@ pub struct Look {
     pub material: Option<Material>,
 }
 
-/// Keys of an object beside its options.
-pub const KEYS: [&str; 12] = [
-    "file",
-    "files",
-    "fps",
-    "name",
-    "material",
-    "parent",
-    "translate",
-    "rotate",
-    "scale",
-    "matrix",
-    "copies",
-    "visible",
-];
-
 impl Object {
     pub fn read(mut fields: Fields, folder: &Path) -> Result<Self, String> {
         let files = files(&mut fields, folder)?;
@@ -53,6 +39,7 @@ impl Object {
         let name = fields.text("name")?.unwrap_or(first);
         let is_rate = |number: f64| (0.01..=1000.0).contains(&number);
         let fps = fields.number("fps", "frames a second from 0.01 to 1000", is_rate)?;
+        let is_merged = fields.flag("merge")?.unwrap_or(false);
         let material = read_material(&mut fields)?;
         let parent = fields.text("parent")?;
         let transform = fields.transform()?;
@@ -69,6 +56,7 @@ impl Object {
             name,
             files,
             fps: fps.unwrap_or(10.0),
+            is_merged,
             look,
             parent,
             transform,
@@ -78,10 +66,58 @@ impl Object {
     }
 }
 
+impl Object {
+    /// By which materials of the command line may be for it.
+    pub fn names(&self) -> impl Iterator<Item = &Path> {
+        self.files.iter().map(PathBuf::as_path).chain([Path::new(&self.name)])
+    }
+
+    /// What the command line makes it of: a material named for it, or, if it has none of its own, that for all.
+    pub fn choice<'c>(&self, args: &'c MaterialArgs) -> Option<&'c Choice> {
+        let named = self.names().find_map(|name| args.of_file(name));
+        let has_own = self.look.material.is_some();
+        named.or_else(|| args.for_all().filter(|_| !has_own))
+    }
+
+    pub fn material<'m>(&'m self, args: &'m MaterialArgs) -> Option<&'m Material> {
+        let asked_for = self.choice(args).map(|choice| &choice.material);
+        asked_for.or(self.look.material.as_ref())
+    }
+
+    /// Whether both show the same geometry, at whatever place.
+    pub fn holds_the_same_as(&self, other: &Self) -> bool {
+        let is_at_one_rate = self.files.len() == 1 || self.fps == other.fps;
+        self.files == other.files
+            && self.is_merged == other.is_merged
+            && self.look.options == other.look.options
+            && is_at_one_rate
+    }
+}
+
+/// Keys that are no options; an unknown one may be meant for one of these.
+pub const KEYS: [&str; 13] = [
+    "name",
+    "file",
+    "files",
+    "fps",
+    "merge",
+    "material",
+    "parent",
+    "matrix",
+    "translate",
+    "rotate",
+    "scale",
+    "copies",
+    "visible",
+];
+
 fn files(fields: &mut Fields, folder: &Path) -> Result<Vec<PathBuf>, String> {
     let files = match (fields.text("file")?, fields.take("files")) {
         (Some(file), None) => vec![file],
-        (None, Some(Value::String(pattern))) => return matching(&beside(folder, &pattern)),
+        (None, Some(Value::String(pattern))) => {
+            let found = matching(&beside(folder, &pattern));
+            return found.map_err(|error| format!("{}: files: {error}", fields.name()));
+        }
         (None, Some(Value::Array(files))) if !files.is_empty() => {
             let names = files.iter().map(|file| file.as_str().map(str::to_owned));
             let names: Option<Vec<String>> = names.collect();
@@ -112,9 +148,9 @@ fn matching(pattern: &Path) -> Result<Vec<PathBuf>, String> {
         start.len() + end.len() <= name.len() && name.starts_with(start) && name.ends_with(end)
     };
     let mut names: Vec<String> = names.filter(fits).collect();
-    names.sort_by(|a, b| natural(a).cmp(&natural(b)));
+    names.sort_by_cached_key(|name| natural(name));
     if names.is_empty() {
-        return Err(format!("{}: no file of that name", pattern.display()));
+        return Err(format!("no file fits {}", pattern.display()));
     }
     Ok(names.into_iter().map(|name| folder.join(name)).collect())
 }
@@ -175,7 +211,7 @@ mod tests {
     #[test]
     fn names_are_in_the_order_of_their_numbers() {
         let mut names = ["f10.ply", "f9.ply", "f1.ply", "e2.ply"];
-        names.sort_by(|a, b| natural(a).cmp(&natural(b)));
+        names.sort_by_key(|name| natural(name));
         assert_eq!(names, ["e2.ply", "f1.ply", "f9.ply", "f10.ply"]);
     }
 }

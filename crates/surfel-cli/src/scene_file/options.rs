@@ -3,6 +3,7 @@
 use super::beside;
 use super::fields::{Fields, nearest};
 use clap::builder::ArgAction;
+use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
@@ -12,6 +13,15 @@ use std::path::{Path, PathBuf};
 pub struct Options {
     values: Vec<(String, Value)>,
     folder: PathBuf,
+}
+
+/// What keys may mean to a command.
+pub struct Known<'c> {
+    pub command: &'c Command,
+    /// Keys that are no options, for messages.
+    pub others: &'c [&'c str],
+    /// Commands whose own options are no mistake here, but mean nothing.
+    pub elsewhere: Vec<&'c Command>,
 }
 
 /// Options that name files to read.
@@ -24,22 +34,20 @@ impl Options {
         Ok(Self { values, folder: folder.to_owned() })
     }
 
-    /// As words that `command` parses, but for those that `given` says otherwise, or that do not go with
+    /// As words that the command parses, but for those that `given` says otherwise, or that do not go with
     /// what it says.
-    pub fn words(
-        &self,
-        command: &Command,
-        given: Option<&ArgMatches>,
-    ) -> Result<Vec<String>, String> {
-        let is_given = |arg: &Arg| {
-            let source = given.and_then(|given| given.value_source(arg.get_id().as_str()));
-            source == Some(clap::parser::ValueSource::CommandLine)
-        };
+    pub fn words(&self, known: &Known, given: Option<&ArgMatches>) -> Result<Vec<String>, String> {
+        let command = known.command;
+        let given: Vec<&Arg> = given
+            .map_or(Vec::new(), |given| command.get_arguments().filter(is_in(given)).collect());
+        // Of two options that do not go together, one says so.
+        let excludes = |a: &Arg, b: &Arg| command.get_arg_conflicts_with(a).contains(&b);
         let mut words = Vec::new();
         for (key, value) in &self.values {
-            let arg = find(command, key)?;
-            let conflicting = command.get_arg_conflicts_with(arg);
-            if is_given(arg) || conflicting.into_iter().any(is_given) {
+            let Some(arg) = find(known, key)? else { continue };
+            let is_overruled =
+                |other: &&Arg| *other == arg || excludes(arg, other) || excludes(other, arg);
+            if given.iter().any(is_overruled) {
                 continue;
             }
             self.add_words(arg, key, value, &mut words)?;
@@ -62,13 +70,16 @@ impl Options {
         value: &Value,
         words: &mut Vec<String>,
     ) -> Result<(), String> {
-        let takes_none = matches!(arg.get_action(), ArgAction::SetTrue | ArgAction::Count)
-            || arg.get_num_args().is_some_and(|range| range.min_values() == 0);
+        let is_flag = matches!(arg.get_action(), ArgAction::SetTrue | ArgAction::Count);
+        let takes_none = is_flag || arg.get_num_args().is_some_and(|range| range.min_values() == 0);
         let several =
             matches!(arg.get_action(), ArgAction::Append) && arg.get_value_delimiter().is_none();
         match value {
             Value::Bool(true) if takes_none => words.push(format!("--{key}")),
             Value::Bool(false) if takes_none => {}
+            other if is_flag => {
+                return Err(format!("{key}: found {other}, expected true or false"));
+            }
             Value::Array(values) if several => {
                 for value in values {
                     words.push(format!("--{key}={}", text(value, key)?));
@@ -108,17 +119,27 @@ fn flatten(
     Ok(())
 }
 
-fn find<'c>(command: &'c Command, key: &str) -> Result<&'c Arg, String> {
-    let known = || command.get_arguments().filter(|arg| arg.get_long().is_some());
-    let found = known().find(|arg| arg.get_long() == Some(key));
-    found.ok_or_else(|| {
-        let tables = match command.get_name() {
-            "object" => &super::object::KEYS[..],
-            _ => &["object", "lamp", "animation"],
-        };
-        let names = known().filter_map(Arg::get_long).chain(tables.iter().copied());
-        format!("unknown key `{key}`{}", nearest(key, names))
-    })
+/// Whether the words that were parsed say something about an option.
+pub fn is_in(given: &ArgMatches) -> impl Fn(&&Arg) -> bool {
+    // Asked of an option that the command has not, clap would panic.
+    let known: Vec<&clap::Id> = given.ids().collect();
+    move |arg| {
+        let source = || given.value_source(arg.get_id().as_str());
+        known.contains(&arg.get_id()) && source() == Some(ValueSource::CommandLine)
+    }
+}
+
+/// None for what means nothing here.
+fn find<'c>(known: &Known<'c>, key: &str) -> Result<Option<&'c Arg>, String> {
+    let is_asked_for = |arg: &&Arg| arg.get_long() == Some(key);
+    if let Some(arg) = known.command.get_arguments().find(is_asked_for) {
+        return Ok(Some(arg));
+    }
+    if known.elsewhere.iter().any(|command| command.get_arguments().any(|arg| is_asked_for(&arg))) {
+        return Ok(None);
+    }
+    let options = known.command.get_arguments().filter_map(Arg::get_long);
+    Err(format!("unknown key `{key}`{}", nearest(key, options.chain(known.others.iter().copied()))))
 }
 
 fn text(value: &Value, key: &str) -> Result<String, String> {

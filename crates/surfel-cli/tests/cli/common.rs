@@ -105,3 +105,58 @@ pub fn read_png(path: impl AsRef<Path>) -> (u32, u32, usize, Vec<u8>) {
     samples.truncate(info.buffer_size());
     (info.width, info.height, info.color_type.samples(), samples)
 }
+
+/// Two triangles that make a square at a height, in one colour, as PLY.
+pub fn tile(size: f64, z: f64, color: [u8; 3]) -> String {
+    let [r, g, b] = color;
+    let corners = [(-size, -size), (size, -size), (size, size), (-size, size)];
+    let corners = corners.map(|(x, y)| format!("{x} {y} {z} {r} {g} {b}\n")).concat();
+    let header = "property float x\nproperty float y\nproperty float z\nproperty uchar red\n\
+        property uchar green\nproperty uchar blue\nelement face 2\n\
+        property list uchar int vertex_index\nend_header\n";
+    format!("ply\nformat ascii 1.0\nelement vertex 4\n{header}{corners}3 0 1 2\n3 0 2 3\n")
+}
+
+/// A triangle that moves three to the right within two seconds and stays there, as glTF.
+pub fn gltf() -> String {
+    let triangle = [-1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.0, 0.0f32];
+    let (times, places) = ([0.0, 2.0f32], [0.0, 0.0, 0.0, 3.0, 0.0, 0.0f32]);
+    let floats = triangle.iter().chain(&times).chain(&places);
+    let data: String =
+        floats.flat_map(|f| f.to_le_bytes()).map(|byte| format!("%{byte:02x}")).collect();
+    let view = |offset: usize, length: usize| {
+        format!(r#"{{"buffer":0,"byteOffset":{offset},"byteLength":{length}}}"#)
+    };
+    let views = [view(0, 36), view(36, 8), view(44, 24)].join(",");
+    let accessor = |view: usize, kind: &str, count: usize| {
+        format!(r#"{{"bufferView":{view},"componentType":5126,"type":"{kind}","count":{count}}}"#)
+    };
+    let accessors = [accessor(0, "VEC3", 3), accessor(1, "SCALAR", 2), accessor(2, "VEC3", 2)];
+    let accessors = accessors.join(",");
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":68,"uri":"data:,{data}"}}],
+"bufferViews":[{views}],"accessors":[{accessors}],"scene":0,"scenes":[{{"nodes":[0]}}],
+"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+"animations":[{{"samplers":[{{"input":1,"output":2}}],
+"channels":[{{"sampler":0,"target":{{"node":0,"path":"translation"}}}}]}}]}}"#
+    )
+}
+
+/// A picture of light, twice as wide as high: bright where the east is.
+pub fn light_picture() -> Vec<u8> {
+    let head = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n";
+    let row = [[40, 60, 90, 128], [60, 60, 60, 128], [250, 200, 90, 130], [60, 60, 60, 128]];
+    [&head[..], row.as_flattened(), row.as_flattened()].concat()
+}
+
+/// The bytes of a small picture.
+pub fn shot(folder: &Folder, arguments: &[&str]) -> Vec<u8> {
+    let picture = folder.path("shot.png");
+    succeed(&[&["render"], arguments, &SMALL, &["-o", &picture]].concat());
+    let bytes = fs::read(&picture).unwrap();
+    fs::remove_file(picture).unwrap();
+    bytes
+}
+
+/// Options of a picture that takes no time.
+pub const SMALL: [&str; 6] = ["--resolution", "32x24", "--spp", "1", "--samples", "1"];

@@ -1,0 +1,394 @@
+//! Films: their frames, how they are taken up again, and what moves in them.
+
+use super::common::{Folder, SMALL, command, dome, fail, gltf, read_png, stderr, succeed, tile};
+use std::fs;
+use std::process::Command;
+
+fn film(arguments: &[&str]) {
+    succeed(&[&["animate"], arguments, &SMALL].concat());
+}
+
+/// Frames and the seconds that each is seen.
+fn read_apng(path: &str) -> (Vec<Vec<u8>>, Vec<f64>) {
+    let file = std::io::BufReader::new(fs::File::open(path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let n_frames = reader.info().animation_control().unwrap().num_frames;
+    let mut samples = vec![0; reader.output_buffer_size().unwrap()];
+    (0..n_frames)
+        .map(|_| {
+            let info = reader.next_frame(&mut samples).unwrap();
+            let control = reader.info().frame_control().unwrap();
+            let secs = f64::from(control.delay_num) / f64::from(control.delay_den);
+            (samples[..info.buffer_size()].to_vec(), secs)
+        })
+        .unzip()
+}
+
+/// Sums of the hundredths of a second and the number of frames.
+fn read_gif(path: &str) -> (usize, u32) {
+    let mut reader = gif::DecodeOptions::new().read_info(fs::File::open(path).unwrap()).unwrap();
+    let (mut n_frames, mut hundredths) = (0, 0);
+    while let Some(frame) = reader.read_next_frame().unwrap() {
+        n_frames += 1;
+        hundredths += u32::from(frame.delay);
+    }
+    (n_frames, hundredths)
+}
+
+/// Mean difference of two pictures' samples, of 255.
+fn difference(a: &[u8], b: &[u8]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let sum: u64 = a.iter().zip(b).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+    sum as f64 / a.len() as f64
+}
+
+#[test]
+fn a_turntable_makes_every_kind_of_film() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let turn = ["--turntable", "2", "--fps", "4"];
+    let make = |name: &str| {
+        let film_path = folder.path(name);
+        film(&[&[&cloud, "-o", &film_path], &turn[..]].concat());
+        film_path
+    };
+    let (frames, secs) = read_apng(&make("turn.png"));
+    assert_eq!((frames.len(), secs), (8, vec![0.25; 8]));
+    assert!(1.0 < difference(&frames[0], &frames[4]));
+    assert_eq!(read_gif(&make("turn.gif")), (8, 200));
+    make("frame_##.png");
+    let pictures: Vec<String> = (1..=8).map(|i| format!("frame_{i:02}.png")).collect();
+    let mut expected = vec!["dome.ply".to_owned(), "turn.gif".into(), "turn.png".into()];
+    expected.extend(pictures.iter().cloned());
+    expected.sort();
+    assert_eq!(folder.names(), expected);
+    for (picture, frame) in pictures.iter().zip(&frames) {
+        assert!(&read_png(folder.path(picture)).3 == frame, "{picture}");
+    }
+    make("f#.exr");
+    assert!(folder.names().contains(&"f8.exr".to_owned()));
+}
+
+#[test]
+fn a_whole_turn_ends_where_it_began() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let path = folder.path("turn.png");
+    film(&[&cloud, "-o", &path, "--turntable", "1", "--fps", "8", "--frames", "9"]);
+    let (frames, _) = read_apng(&path);
+    // Only what rounding moves over a pixel's edge.
+    assert!(difference(&frames[0], &frames[8]) < 0.5, "{}", difference(&frames[0], &frames[8]));
+    assert!(1.0 < difference(&frames[0], &frames[2]));
+}
+
+#[test]
+fn video_is_made_where_ffmpeg_is() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let video = folder.path("turn.mp4");
+    let arguments = ["animate", &cloud, "-o", &video, "--turntable", "1", "--fps", "5"];
+    let has_ffmpeg = Command::new("ffmpeg").arg("-version").output().is_ok();
+    if has_ffmpeg {
+        succeed(&[&arguments[..], &SMALL].concat());
+        let bytes = fs::read(&video).unwrap();
+        assert_eq!(&bytes[4..8], b"ftyp");
+    } else {
+        #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
+        {
+            println!("skipped: ffmpeg is absent");
+        }
+    }
+    // Without ffmpeg a film is refused before the work, with other kinds to choose from.
+    let nowhere = folder.path("");
+    let output = command(&[&arguments[..], &SMALL].concat()).env("PATH", nowhere).output().unwrap();
+    let told = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("ffmpeg") && told.contains(".gif"), "{told}");
+}
+
+#[test]
+fn as_many_frames_as_the_movement_lasts() {
+    let folder = Folder::new();
+    folder.write("dome.ply", dome(10));
+    let object = "[[object]]\nname = \"dome\"\nfile = \"dome.ply\"\n";
+    let n_frames = |movement: &str, options: &[&str]| {
+        let scene = folder.write("scene.toml", format!("{object}{movement}"));
+        let path = folder.path("film.png");
+        film(&[&[scene.as_str(), "-o", &path, "--fps", "4"], options].concat());
+        read_apng(&path).0.len()
+    };
+    let keys = "[[animation]]\nobject = \"dome\"\ntimes = [0, 1.5]\nscale = [1, 2]\n";
+    assert_eq!(n_frames(keys, &[]), 6);
+    assert_eq!(n_frames(keys, &["--frames", "3"]), 3);
+    assert_eq!(n_frames(keys, &["--turntable", "2"]), 8);
+    let orbit = "[[animation]]\nobject = \"camera\"\nkind = \"orbit\"\nseconds = 2.5\n";
+    assert_eq!(n_frames(&format!("{keys}{orbit}"), &[]), 10);
+    let path = "[[animation]]\nobject = \"dome\"\nkind = \"path\"\nseconds = 1\n\
+        points = [[0, 0, 0], [1, 0, 0]]\n";
+    assert_eq!(n_frames(path, &[]), 4);
+    assert_eq!(n_frames("", &["--frames", "2"]), 2, "a still film");
+}
+
+/// Pictures of a scene at times, seen from above by a camera that stays.
+fn at_times(folder: &Folder, text: &str, times: &[&str]) -> Vec<Vec<u8>> {
+    let scene = folder.write("scene.toml", text);
+    let picture = |time: &&str| {
+        let path = folder.path("at.png");
+        let view = ["--camera-direction", "0,0,-1", "--camera-orthographic", "12", "--light"];
+        let view = [&view[..], &["none", "--camera-focal-point", "0,0,0", "--up", "+Z"]].concat();
+        succeed(&[&["render", &scene, "-o", &path, "--time", time], &view[..], &SMALL].concat());
+        read_png(path).3
+    };
+    times.iter().map(picture).collect()
+}
+
+fn tile_at(place: [f64; 2], more: &str) -> String {
+    let [x, y] = place;
+    format!("[[object]]\nname = \"t\"\nfile = \"tile.ply\"\ntranslate = [{x}, {y}, 0]\n{more}\n")
+}
+
+#[test]
+fn orbits_keys_and_paths_move_things_to_where_they_are_told() {
+    let folder = Folder::new();
+    folder.write("tile.ply", tile(1.0, 0.0, [250, 10, 10]));
+    let still = |x, y| at_times(&folder, &tile_at([x, y], ""), &["0"]).remove(0);
+    let cases = [
+        (
+            "times = [0, 2]\ntranslate = [[-3, 0, 0], [3, 2, 0]]",
+            ["0", "1", "2", "9"],
+            [[-3.0, 0.0], [0.0, 1.0], [3.0, 2.0], [3.0, 2.0]],
+        ),
+        (
+            "times = [0, 2, 4]\ntranslate = [[-3, 0, 0], [3, 2, 0], [0, 0, 0]]\n\
+             interpolation = \"step\"",
+            ["0", "1.9", "2", "4"],
+            [[-3.0, 0.0], [-3.0, 0.0], [3.0, 2.0], [0.0, 0.0]],
+        ),
+        (
+            "kind = \"orbit\"\ncenter = [0, 0, 0]\nseconds = 4\naxis = [0, 0, 1]",
+            ["0", "1", "2", "4"],
+            [[3.0, 0.0], [0.0, 3.0], [-3.0, 0.0], [3.0, 0.0]],
+        ),
+        (
+            "kind = \"path\"\nseconds = 2\npoints = [[0, 0, 0], [0, 2, 0], [4, 2, 0]]",
+            ["0", "0.6666666666666", "2", "3"],
+            [[0.0, 0.0], [0.0, 2.0], [4.0, 2.0], [4.0, 2.0]],
+        ),
+    ];
+    for (movement, times, places) in cases {
+        let text = tile_at([3.0, 0.0], &format!("[[animation]]\nobject = \"t\"\n{movement}"));
+        let shown = at_times(&folder, &text, &times);
+        for ((time, place), frame) in times.iter().zip(places).zip(&shown) {
+            let found = difference(frame, &still(place[0], place[1]));
+            assert!(found < 1.0, "{movement} at {time}: {found}");
+        }
+        assert!(3.0 < difference(&shown[0], &shown[1]) || movement.contains("step"));
+    }
+}
+
+#[test]
+fn an_orbit_goes_on_top_of_keys() {
+    let folder = Folder::new();
+    folder.write("tile.ply", tile(1.0, 0.0, [250, 10, 10]));
+    let still = |x, y| at_times(&folder, &tile_at([x, y], ""), &["0"]).remove(0);
+    let movement = "[[animation]]\nobject = \"t\"\nkind = \"orbit\"\ncenter = [1, 0, 0]\n\
+        seconds = 4\n[[animation]]\nobject = \"t\"\ntimes = [0, 2]\n\
+        translate = [[3, 0, 0], [5, 0, 0]]";
+    let shown = at_times(&folder, &tile_at([3.0, 0.0], movement), &["0", "1", "2"]);
+    // Where keys have it, turned about the middle: a quarter, then half.
+    for (frame, (x, y)) in shown.iter().zip([(3.0, 0.0), (1.0, 3.0), (-3.0, 0.0)]) {
+        assert!(difference(frame, &still(x, y)) < 1.0, "{x}, {y}");
+    }
+}
+
+#[test]
+fn the_camera_and_lamps_move_too() {
+    let folder = Folder::new();
+    folder.write("dome.ply", dome(20));
+    let object = "light = [\"sun\"]\n[[object]]\nfile = \"dome.ply\"\n";
+    let frames = |movement: &str| {
+        let scene = folder.write("scene.toml", format!("{object}{movement}"));
+        let path = folder.path("film.png");
+        film(&[&scene, "-o", &path, "--fps", "4", "--frames", "5"]);
+        read_apng(&path).0
+    };
+    for movement in [
+        "[[animation]]\nobject = \"camera\"\nkind = \"orbit\"\nseconds = 1",
+        "[[lamp]]\nname = \"l\"\nposition = [2, 0, 1]\nstrength = 20\n\
+         [[animation]]\nobject = \"l\"\nkind = \"orbit\"\ncenter = [0, 0, 1]\nseconds = 1",
+        "[[animation]]\nobject = \"camera\"\ntimes = [0, 0.5, 1]\n\
+         position = [[3, 3, 3], [3, -3, 3], [3, 3, 3]]",
+    ] {
+        let frames = frames(movement);
+        assert!(1.0 < difference(&frames[0], &frames[2]), "{movement}");
+        assert!(difference(&frames[0], &frames[4]) < 0.5, "{movement}");
+    }
+}
+
+#[test]
+fn the_animation_of_a_gltf_file_plays() {
+    let folder = Folder::new();
+    let scene = folder.write("triangle.gltf", gltf());
+    let path = folder.path("film.png");
+    film(&[&scene, "-o", &path, "--fps", "2"]);
+    let (frames, _) = read_apng(&path);
+    assert_eq!(frames.len(), 4, "two seconds");
+    assert!(1.0 < difference(&frames[0], &frames[3]));
+    // The same through a scene file that adds nothing.
+    let scene = folder.write("scene.toml", "[[object]]\nfile = \"triangle.gltf\"\n");
+    film(&[&scene, "-o", &path, "--fps", "2"]);
+    assert!(read_apng(&path).0 == frames);
+}
+
+#[test]
+fn a_sequence_shows_one_file_after_the_other() {
+    let folder = Folder::new();
+    for (number, color) in [(1, [250, 0, 0]), (2, [0, 250, 0]), (10, [0, 0, 250])] {
+        folder.write(&format!("f{number}.ply"), tile(4.0, 0.0, color));
+    }
+    let scene = "light = \"none\"\n[camera]\ndirection = [0, 0, -1]\northographic = 2\n\
+        [[object]]\nfiles = \"f*.ply\"\nfps = 2\n";
+    let scene = folder.write("scene.toml", scene);
+    let path = folder.path("film.png");
+    film(&[&scene, "-o", &path, "--fps", "4"]);
+    let (frames, _) = read_apng(&path);
+    let colors: Vec<[u8; 3]> = frames.iter().map(|frame| frame[..3].try_into().unwrap()).collect();
+    let [r, g, b] = [[250, 0, 0], [0, 250, 0], [0, 0, 250]];
+    assert_eq!(colors, [r, r, g, g, b, b]);
+}
+
+#[test]
+fn what_cannot_be_a_film_is_refused_before_the_work() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let gif = folder.path("film.gif");
+    let told = fail(&["animate", &cloud, "-o", &gif], 2);
+    assert!(told.contains("nothing moves") && told.contains("--turntable"), "{told}");
+    let told = fail(&["animate", &cloud, "--turntable", "1"], 2);
+    assert!(told.contains("-o"), "{told}");
+    for name in ["film.doc", "film", "film.jpg"] {
+        let told = fail(&["animate", &cloud, "-o", &folder.path(name), "--turntable", "1"], 2);
+        assert!(told.contains(name) && told.contains(".gif"), "{told}");
+    }
+    let nowhere = folder.path("no/such/film.gif");
+    let told = fail(&["animate", &cloud, "-o", &nowhere, "--turntable", "1"], 1);
+    assert!(told.contains("film.gif"), "{told}");
+    for options in [
+        &["--turntable", "0"][..],
+        &["--turntable", "NaN"],
+        &["--turntable", "1", "--fps", "0"],
+        &["--turntable", "1", "--fps", "1000"],
+        &["--turntable", "1", "--fps", "60"],
+        &["--frames", "0"],
+    ] {
+        fail(&[&["animate", &cloud, "-o", &gif], options].concat(), 2);
+    }
+    assert_eq!(folder.names(), ["dome.ply"]);
+}
+
+#[test]
+fn a_dry_run_of_a_film_makes_the_same_film() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let path = folder.path("film.png");
+    let arguments = [&cloud, "-o", &path, "--turntable", "1.5", "--fps", "3", "--color", "rain"];
+    let arguments = [&["animate"], &arguments[..], &SMALL].concat();
+    let told = succeed(&[&arguments[..], &["--dry-run"]].concat());
+    assert_eq!(folder.names(), ["dome.ply"]);
+    succeed(&arguments);
+    let made = fs::read(&path).unwrap();
+    fs::remove_file(&path).unwrap();
+    let told = folder.write("told.json", told);
+    succeed(&["animate", &told]);
+    assert!(fs::read(&path).unwrap() == made);
+    // The same file is a picture of the first frame.
+    let picture = folder.path("first.png");
+    succeed(&["render", &told, "-o", &picture]);
+    assert!(read_png(&picture).3 == read_apng(&path).0[0]);
+}
+
+#[cfg(unix)]
+mod resume {
+    use super::*;
+    use std::process::Stdio;
+    use std::time::{Duration, Instant};
+
+    /// Stops a film by Ctrl-C when so many frames of it are kept in a folder.
+    fn interrupt(arguments: &[&str], folder: &str, pattern: &str) {
+        let mut child = command(arguments).stderr(Stdio::piped()).spawn().unwrap();
+        let start = Instant::now();
+        let is_begun = || {
+            let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+            let names = entries.map(|entry| entry.file_name().into_string().unwrap());
+            names.into_iter().any(|name| name == pattern)
+        };
+        while !is_begun() {
+            assert!(
+                start.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none()
+            );
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+        assert!(kill.unwrap().success());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+        assert!(stderr(&output).contains("--resume"), "{}", stderr(&output));
+    }
+
+    /// Long enough that it is stopped on its way.
+    const LONG: [&str; 8] =
+        ["--turntable", "4", "--fps", "10", "--resolution", "160x120", "--spp", "4"];
+
+    #[test]
+    fn a_film_that_was_stopped_is_taken_up_where_it_was() {
+        let folder = Folder::new();
+        let cloud = folder.write("dome.ply", dome(40));
+        let whole = folder.path("whole.gif");
+        succeed(&[&["animate", &cloud, "-o", &whole], &LONG[..]].concat());
+        let part = folder.path("part.gif");
+        let arguments = [&["animate", &cloud, "-o", &part], &LONG[..]].concat();
+        let frames = folder.path("part.gif.frames");
+        interrupt(&arguments, &frames, "000002.png");
+        assert!(!folder.names().contains(&"part.gif".to_owned()));
+        let first = fs::metadata(format!("{frames}/000001.png")).unwrap().modified().unwrap();
+
+        // Other settings, another file: refused, and what is there stays.
+        let resume = [&arguments[..], &["--resume"]].concat();
+        for other in [&["--seed", "3"][..], &["--cmap", "turbo"], &["--radius", "0.3"]] {
+            let told = fail(&[&resume[..], other].concat(), 1);
+            assert!(told.contains("part.gif") && told.contains("ask for the same"), "{told}");
+        }
+        let again = fs::metadata(format!("{frames}/000001.png")).unwrap().modified().unwrap();
+        assert_eq!(first, again);
+
+        let told = stderr(&command(&resume).output().unwrap());
+        assert!(told.contains("of 40 frames are there already"), "{told}");
+        assert!(fs::read(&part).unwrap() == fs::read(&whole).unwrap());
+        assert_eq!(folder.names(), ["dome.ply", "part.gif", "whole.gif"]);
+    }
+
+    #[test]
+    fn numbered_pictures_are_taken_up_too() {
+        let folder = Folder::new();
+        let cloud = folder.write("dome.ply", dome(40));
+        let part = folder.path("f##.png");
+        let arguments = [&["animate", &cloud, "-o", &part], &LONG[..]].concat();
+        interrupt(&arguments, &folder.path(""), "f03.png");
+        let early = fs::metadata(folder.path("f01.png")).unwrap().modified().unwrap();
+        succeed(&[&arguments[..], &["--resume"]].concat());
+        assert_eq!(early, fs::metadata(folder.path("f01.png")).unwrap().modified().unwrap());
+        assert_eq!(folder.names().len(), 41);
+        let resumed = fs::read(folder.path("f40.png")).unwrap();
+        succeed(&arguments);
+        assert!(resumed == fs::read(folder.path("f40.png")).unwrap());
+    }
+
+    #[test]
+    fn nothing_to_take_up_is_a_film_from_the_start() {
+        let folder = Folder::new();
+        let cloud = folder.write("dome.ply", dome(10));
+        let path = folder.path("film.gif");
+        film(&[&cloud, "-o", &path, "--turntable", "1", "--fps", "3", "--resume"]);
+        assert_eq!(read_gif(&path).0, 3);
+    }
+}
