@@ -99,28 +99,28 @@ pub fn scene_hits(
     loop {
         let limit =
             |ray_idx: u32| hits[ray_idx as usize].distance.min(rays[ray_idx as usize].t_max);
-        let Some(jobs) = rounds.next(limit) else { return };
-        for jobs in jobs.chunk_by(|a, b| a.instance == b.instance) {
-            let instance = &scene.instances[jobs[0].instance as usize];
+        let Some(batches) = rounds.next(limit) else { return };
+        for (instance_idx, ray_indices) in batches.iter().filter(|(_, rays)| !rays.is_empty()) {
+            let instance = &scene.instances[*instance_idx as usize];
             // Discs behind the nearest are blended with it, whatever other instances are among them.
             let reach = match scene.geometry(instance) {
                 FlatGeometry::Cloud(cloud) => instance.scale * cloud.reach,
                 FlatGeometry::Mesh(_) => 0.0,
             };
-            let there = enter(instance, jobs, |ray_idx| {
+            let there = enter(instance, ray_indices, |ray_idx| {
                 let ray = rays[ray_idx as usize];
                 Ray { t_max: ray.t_max.min(hits[ray_idx as usize].distance + reach), ..ray }
             });
             batch.trace(scene, simd, instance, &there.rays);
-            for (i, job) in jobs.iter().enumerate() {
-                let found = batch.hit(scene, i, &there.rays[i], instance);
-                let Some(hit) = found else { continue };
-                let distance = hit.distance / there.scales[i];
-                let hit = SceneHit { distance, instance: job.instance, ..hit };
-                let nearest = &mut hits[job.ray as usize];
-                let is_first = hit.distance == nearest.distance && hit.instance < nearest.instance;
-                if hit.distance < nearest.distance || is_first {
-                    *nearest = hit;
+            for (i, &ray_idx) in ray_indices.iter().enumerate() {
+                let nearest = &mut hits[ray_idx as usize];
+                let distance = batch.distance(scene, i, instance) / there.scales[i];
+                let is_first = distance == nearest.distance && *instance_idx < nearest.instance;
+                if !(distance < nearest.distance || is_first) {
+                    continue;
+                }
+                if let Some(hit) = batch.hit(scene, i, &there.rays[i], instance) {
+                    *nearest = SceneHit { distance, instance: *instance_idx, ..hit };
                 }
             }
         }
@@ -146,14 +146,14 @@ pub fn scene_occlusions(
             true => f32::NEG_INFINITY,
             false => rays[ray_idx as usize].t_max,
         };
-        let Some(jobs) = rounds.next(limit) else { return };
-        for jobs in jobs.chunk_by(|a, b| a.instance == b.instance) {
-            let instance = &scene.instances[jobs[0].instance as usize];
-            let there = enter(instance, jobs, |ray_idx| rays[ray_idx as usize]);
-            blocked.resize(jobs.len(), false);
+        let Some(batches) = rounds.next(limit) else { return };
+        for (instance_idx, ray_indices) in batches.iter().filter(|(_, rays)| !rays.is_empty()) {
+            let instance = &scene.instances[*instance_idx as usize];
+            let there = enter(instance, ray_indices, |ray_idx| rays[ray_idx as usize]);
+            blocked.resize(ray_indices.len(), false);
             block(scene, simd, instance, &there.rays, &mut blocked);
-            for (job, is_blocked) in jobs.iter().zip(&blocked) {
-                occluded[job.ray as usize] |= is_blocked;
+            for (&ray_idx, is_blocked) in ray_indices.iter().zip(&blocked) {
+                occluded[ray_idx as usize] |= is_blocked;
             }
         }
     }
@@ -167,24 +167,17 @@ fn only(scene: &FlatScene, which: Which) -> Option<(u32, &Instance)> {
     (second.is_none() && first.1.is_in_place).then_some((first.0 as u32, first.1))
 }
 
-/// A ray that is to visit an instance.
-#[derive(Clone, Copy)]
-struct Job {
-    instance: u32,
-    ray: u32,
-}
-
 /// Where the rays still have to go.
 struct Rounds {
     visits: Visits,
-    /// Those to be made next, sorted by instance and ray.
-    jobs: Vec<Job>,
+    /// Instances, each with the rays that visit it next, in their order: that is what makes packets.
+    batches: Vec<(u32, Vec<u32>)>,
 }
 
 enum Visits {
     /// Of few instances: where each ray enters the box of each, instance after instance, at infinity once it
     /// was there; and the rays still on their way.
-    Few { instances: Vec<u32>, entries: Vec<f32>, open: Vec<u32> },
+    Few { entries: Vec<f32>, open: Vec<u32> },
     /// Of many: all that each ray comes by, sorted by where it enters, one ray's after another's; and what
     /// is left of that of each ray still on its way.
     Many { entries: Vec<(f32, u32)>, left: Vec<(u32, Range<u32>)> },
@@ -198,59 +191,63 @@ impl Rounds {
         let counting = scene.instances.iter().enumerate();
         let counting = counting.filter(|(_, instance)| which.counts(instance));
         let instances: Vec<u32> = counting.take(FEW + 1).map(|(i, _)| i as u32).collect();
-        let visits = if instances.len() <= FEW {
-            let boxes: Vec<Aabb> =
-                instances.iter().map(|&i| scene.instances[i as usize].bounds).collect();
-            let mut entries = vec![f32::INFINITY; boxes.len() * rays.len()];
-            box_entries(&boxes, simd, rays, &mut entries);
-            Visits::Few { instances, entries, open: (0..rays.len() as u32).collect() }
-        } else {
-            visits_of_many(scene, which, rays)
-        };
-        Self { visits, jobs: Vec::new() }
+        if FEW < instances.len() {
+            return Self { visits: visits_of_many(scene, which, rays), batches: Vec::new() };
+        }
+        let boxes: Vec<Aabb> =
+            instances.iter().map(|&i| scene.instances[i as usize].bounds).collect();
+        let mut entries = vec![f32::INFINITY; boxes.len() * rays.len()];
+        box_entries(&boxes, simd, rays, &mut entries);
+        Self {
+            visits: Visits::Few { entries, open: (0..rays.len() as u32).collect() },
+            batches: instances.into_iter().map(|instance| (instance, Vec::new())).collect(),
+        }
     }
 
-    /// The next visit of each ray that has one within its limit, sorted by instance and ray.
-    fn next(&mut self, limit: impl Fn(u32) -> f32) -> Option<&[Job]> {
-        let Self { visits, jobs } = self;
-        jobs.clear();
+    /// The next visit of each ray that has one within its limit; none if no ray has.
+    fn next(&mut self, limit: impl Fn(u32) -> f32) -> Option<&[(u32, Vec<u32>)]> {
+        let Self { visits, batches } = self;
         match visits {
-            Visits::Few { instances, entries, open } => {
-                let n_rays = entries.len() / instances.len().max(1);
-                let mut nearest = Vec::with_capacity(open.len());
+            Visits::Few { entries, open } => {
+                batches.iter_mut().for_each(|(_, rays)| rays.clear());
+                let n_rays = entries.len() / batches.len().max(1);
                 open.retain(|&ray| {
-                    let place = |i: usize| i * n_rays + ray as usize;
-                    let by_entry =
-                        |a: &usize, b: &usize| entries[place(*a)].total_cmp(&entries[place(*b)]);
-                    let Some(next) = (0..instances.len()).min_by(by_entry) else { return false };
-                    let entry = &mut entries[place(next)];
-                    let goes = *entry < f32::INFINITY && *entry <= limit(ray);
-                    *entry = f32::INFINITY;
+                    let (mut nearest, mut entry) = (0, f32::INFINITY);
+                    for i in 0..batches.len() {
+                        let other = entries[i * n_rays + ray as usize];
+                        if other < entry {
+                            (nearest, entry) = (i, other);
+                        }
+                    }
+                    let goes = entry < f32::INFINITY && entry <= limit(ray);
                     if goes {
-                        nearest.push(next);
+                        entries[nearest * n_rays + ray as usize] = f32::INFINITY;
+                        batches[nearest].1.push(ray);
                     }
                     goes
                 });
-                for (i, &instance) in instances.iter().enumerate() {
-                    let there = open.iter().zip(&nearest).filter(|(_, nearest)| **nearest == i);
-                    jobs.extend(there.map(|(&ray, _)| Job { instance, ray }));
-                }
+                (!open.is_empty()).then_some(batches)
             }
             Visits::Many { entries, left } => {
+                let mut jobs = Vec::with_capacity(left.len());
                 left.retain_mut(|(ray, left)| {
                     let Some(next) = left.next() else { return false };
                     let (entry, instance) = entries[next as usize];
                     let goes = entry <= limit(*ray);
                     if goes {
-                        jobs.push(Job { instance, ray: *ray });
+                        jobs.push((instance, *ray));
                     }
                     goes
                 });
-                // A stable sort: rays stay in their order, which is what makes packets.
-                jobs.sort_by_key(|job| job.instance);
+                jobs.sort_by_key(|(instance, _)| *instance);
+                let groups = jobs.chunk_by(|a, b| a.0 == b.0);
+                batches.clear();
+                batches.extend(
+                    groups.map(|group| (group[0].0, group.iter().map(|(_, ray)| *ray).collect())),
+                );
+                (!batches.is_empty()).then_some(batches)
             }
         }
-        (!jobs.is_empty()).then_some(jobs)
     }
 }
 
@@ -323,8 +320,8 @@ struct RaysThere {
     scales: Vec<f32>,
 }
 
-fn enter(instance: &Instance, jobs: &[Job], ray: impl Fn(u32) -> Ray) -> RaysThere {
-    let there = jobs.iter().map(|job| instance.object_ray(&ray(job.ray)));
+fn enter(instance: &Instance, indices: &[u32], ray: impl Fn(u32) -> Ray) -> RaysThere {
+    let there = indices.iter().map(|&ray_idx| instance.object_ray(&ray(ray_idx)));
     let (rays, scales) = there.unzip();
     RaysThere { rays, scales }
 }
@@ -350,7 +347,17 @@ impl Batch {
         }
     }
 
+    /// Where the ray at `i` found something, in the object's coordinates; at infinity if it did not.
+    #[inline]
+    fn distance(&self, scene: &FlatScene, i: usize, instance: &Instance) -> f32 {
+        match scene.geometry(instance) {
+            FlatGeometry::Cloud(_) => self.on_points[i].distance,
+            FlatGeometry::Mesh(_) => self.on_triangles[i].distance,
+        }
+    }
+
     /// What the ray at `i` found, at its distance in the object's coordinates.
+    #[inline]
     fn hit(&self, scene: &FlatScene, i: usize, ray: &Ray, instance: &Instance) -> Option<SceneHit> {
         match scene.geometry(instance) {
             FlatGeometry::Cloud(cloud) => point_hit(cloud, &self.on_points[i], instance),
@@ -367,6 +374,7 @@ fn block(scene: &FlatScene, simd: Simd, instance: &Instance, rays: &[Ray], occlu
     }
 }
 
+#[inline]
 fn point_hit(cloud: &FlatCloud, hit: &SurfaceHit, instance: &Instance) -> Option<SceneHit> {
     if hit.is_miss() {
         return None;
