@@ -295,6 +295,7 @@ fn a_dry_run_of_a_film_makes_the_same_film() {
     let arguments = [&["animate"], &arguments[..], &SMALL].concat();
     let told = succeed(&[&arguments[..], &["--dry-run"]].concat());
     assert_eq!(folder.names(), ["dome.ply"]);
+    assert!(succeed(&["animate", &cloud, "--frames", "3", "--dry-run"]).contains("\"frames\": 3"));
     succeed(&arguments);
     let made = fs::read(&path).unwrap();
     fs::remove_file(&path).unwrap();
