@@ -7,7 +7,7 @@ use crate::scene_file::{CameraMotion, Line};
 use crate::{dry_run, light};
 use anyhow::{Context, anyhow};
 use std::path::{Path, PathBuf};
-use surfel::flat::FlatScene;
+use surfel::flat::{FlatLamp, FlatScene};
 use surfel::math::{DQuat, DVec3};
 use surfel::progress::Progress;
 use surfel::render::{CpuRenderer, Renderer};
@@ -169,6 +169,8 @@ struct Film<'a> {
     flat: FlatScene,
     /// As they are at the start of a turntable's turn.
     lights: Vec<Light>,
+    lamps: Vec<FlatLamp>,
+    stops: f32,
     renderer: CpuRenderer,
     args: &'a SceneArgs,
     with_layers: bool,
@@ -189,6 +191,8 @@ impl<'a> Film<'a> {
         Ok(Self {
             graph,
             lights: flat.lights.clone(),
+            lamps: flat.lamps.clone(),
+            stops,
             flat,
             renderer,
             args: &args.scene,
@@ -206,19 +210,23 @@ impl<'a> Film<'a> {
         if !self.graph.animation.channels.is_empty() {
             self.graph.pose(time_secs);
             self.flat.update(&self.graph, report)?;
+            light::expose_lamps(&mut self.flat.lamps, self.stops);
+            self.lamps.clone_from(&self.flat.lamps);
         }
         self.flat.camera = camera;
         if let Some(turn) = turn {
             // Camera and light go round together: to turn everything else would move every tree.
             self.flat.camera = camera.turned(turn);
             self.flat.lights = self.lights.iter().map(|light| light.turned(turn)).collect();
+            let center = (camera.focal_point - self.flat.origin).as_vec3();
+            self.flat.lamps = self.lamps.iter().map(|lamp| lamp.turned(turn, center)).collect();
         }
         let settings = picture::settings(self.args);
         let settings = surfel::render::Settings { with_layers: self.with_layers, ..settings };
         let (image, _) = self
             .renderer
             .render(&self.flat, &settings, &Muted(report))
-            .with_context(|| format!("at {time_secs:.3} s"))?;
+            .with_context(|| format!("at {time_secs:.3} s (go on later with --resume)"))?;
         Ok(image)
     }
 }

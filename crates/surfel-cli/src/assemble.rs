@@ -295,7 +295,8 @@ impl<'a> Assembly<'a> {
                 node.parts.iter_mut().for_each(|part| part.material = material_idx);
             }
         }
-        if args.light.has(LightKind::None) {
+        let has_lamps = graph.nodes.iter().any(|node| node.lamp.is_some());
+        if args.light.has(LightKind::None) && !has_lamps {
             let lit = graph.materials.iter_mut().filter(|material| **material == Material::MATTE);
             lit.for_each(|material| material.is_unlit = true);
         }

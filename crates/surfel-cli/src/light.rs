@@ -3,7 +3,7 @@
 use crate::args::{LightArgs, LightKind};
 use crate::report::Report;
 use anyhow::Context;
-use surfel::flat::FlatScene;
+use surfel::flat::{FlatLamp, FlatScene};
 use surfel::math::Vec3;
 use surfel::scene::{Camera, Environment, Light, Sky, Sun};
 use surfel_formats::LinearPicture;
@@ -65,11 +65,16 @@ pub fn expose(scene: &mut FlatScene, stops: f32) {
             Light::Headlight(strength) => *strength *= gain,
         }
     }
-    scene.lamps.iter_mut().for_each(|lamp| lamp.color *= gain);
+    expose_lamps(&mut scene.lamps, stops);
     scene.materials.iter_mut().for_each(|material| {
         material.emissive *= gain;
         material.glow *= gain;
     });
+}
+
+/// The same for lamps that have been placed anew.
+pub fn expose_lamps(lamps: &mut [FlatLamp], stops: f32) {
+    lamps.iter_mut().for_each(|lamp| lamp.color *= stops.exp2());
 }
 
 /// Clockwise from north.

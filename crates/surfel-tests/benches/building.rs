@@ -5,32 +5,14 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use surfel::flat::{FlatPoints, Refit};
-use surfel::math::{Random, Vec3};
-use surfel::points::PointCloud;
 use surfel::progress::Silent;
 use surfel::surface::SurfaceKind;
+use surfel_tests::clouds::waves;
 
 criterion_group!(benches, building);
 criterion_main!(benches);
 
 const KIND: SurfaceKind = SurfaceKind::Splat;
-
-/// Waves with one point at a random place in each unit square, row by row.
-fn waves(n_points: usize, phase: f32) -> PointCloud {
-    let row_length = n_points.isqrt();
-    let mut random = Random::new(1, 0);
-    let mut cloud = PointCloud::default();
-    let (mut normals, radii) = (Vec::new(), vec![1.0; n_points]);
-    for i in 0..n_points {
-        let x = (i / row_length) as f32 + random.next_f32();
-        let y = (i % row_length) as f32 + random.next_f32();
-        let (sin_x, cos_x) = (0.02 * x + phase).sin_cos();
-        let (sin_y, cos_y) = (0.03 * y).sin_cos();
-        cloud.positions.push(Vec3::new(x, y, 20.0 * sin_x * cos_y));
-        normals.push(Vec3::new(-0.4 * cos_x * cos_y, 0.6 * sin_x * sin_y, 1.0).normalize());
-    }
-    PointCloud { normals: Some(normals), radii: Some(radii), ..cloud }
-}
 
 fn building(criterion: &mut Criterion) {
     let n_points = std::env::var("POINTS").ok().and_then(|text| text.parse().ok());

@@ -70,6 +70,23 @@ pub fn equal_points(n: usize) -> PointCloud {
     PointCloud::from_positions(vec![Vec3::new(1.0, 2.0, 3.0); n])
 }
 
+/// Waves with one point at a random place in each unit square, row by row.
+pub fn waves(n_points: usize, phase: f32) -> PointCloud {
+    let row_length = n_points.isqrt();
+    let mut random = Random::new(1, 0);
+    let mut cloud = PointCloud::default();
+    let (mut normals, radii) = (Vec::new(), vec![1.0; n_points]);
+    for i in 0..n_points {
+        let x = (i / row_length) as f32 + random.next_f32();
+        let y = (i % row_length) as f32 + random.next_f32();
+        let (sin_x, cos_x) = (0.02 * x + phase).sin_cos();
+        let (sin_y, cos_y) = (0.03 * y).sin_cos();
+        cloud.positions.push(Vec3::new(x, y, 20.0 * sin_x * cos_y));
+        normals.push(Vec3::new(-0.4 * cos_x * cos_y, 0.6 * sin_x * sin_y, 1.0).normalize());
+    }
+    PointCloud { normals: Some(normals), radii: Some(radii), ..cloud }
+}
+
 /// The same cloud as a survey would deliver it: far from the origin of a national grid.
 pub fn georeferenced(cloud: &PointCloud) -> PointCloud {
     let origin = cloud.origin + DVec3::new(562_340.25, 4_183_210.5, 148.125);

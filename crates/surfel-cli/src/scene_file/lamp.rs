@@ -45,6 +45,8 @@ impl LampSpec {
         };
         let position = match (position, kind) {
             (Some(position), _) => position,
+            // Parallel light comes from a direction, which a place says too: from above.
+            (None, LampKind::Directional) => target + DVec3::Z,
             (None, _) => return Err(format!("{}: position is missing", fields.name())),
         };
         let toward = (target - position).try_normalize().unwrap_or(-DVec3::Z);

@@ -2,12 +2,20 @@
 
 mod batches;
 mod build;
+mod furnace;
+mod instances;
+mod lamps;
 mod light;
+mod materials;
 mod modes;
+mod moving;
 mod plain;
 mod quality;
 mod reference;
 mod refit;
 mod repeatable;
 mod shapes;
+mod statistics;
+mod textures;
 mod trace;
+mod triangles;

@@ -162,6 +162,10 @@ impl PointBlock {
         self.radius_steps(lane) as f32 * self.radius_step()
     }
 
+    pub(super) fn greatest_radius(&self) -> f32 {
+        (0..LANES).map(|lane| self.radius(lane)).fold(0.0, f32::max)
+    }
+
     fn radius_steps(&self, lane: usize) -> u32 {
         (self.normal[lane] >> 30) << 8 | u32::from(self.radius[lane])
     }

@@ -1,6 +1,6 @@
 //! Lamps where they stand in the world.
 
-use crate::math::{DAffine3, DVec3, Vec3};
+use crate::math::{DAffine3, DQuat, DVec3, Vec3};
 use crate::scene::{Lamp, LampKind};
 use std::f32::consts::PI;
 
@@ -31,6 +31,13 @@ impl FlatLamp {
             range: lamp.range,
             radius: lamp.radius,
         })
+    }
+
+    /// The lamp carried about a place.
+    pub fn turned(&self, turn: DQuat, center: Vec3) -> Self {
+        let turned = |vector: Vec3| (turn * vector.as_dvec3()).as_vec3();
+        let position = center + turned(self.position - center);
+        Self { position, direction: turned(self.direction), ..*self }
     }
 
     /// What share of the lamp's light reaches a place in `direction` (unit, from the lamp) at a distance.

@@ -97,6 +97,10 @@ impl FlatPoints {
         self.ids[slot as usize]
     }
 
+    pub(super) fn greatest_radius(&self) -> f32 {
+        self.blocks.par_iter().map(PointBlock::greatest_radius).reduce(|| 0.0, f32::max)
+    }
+
     pub fn radius(&self, slot: Slot) -> f32 {
         self.blocks[slot as usize / LANES].radius(slot as usize % LANES)
     }

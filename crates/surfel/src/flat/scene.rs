@@ -76,23 +76,37 @@ impl FlatScene {
             camera: scene.camera,
             sources: Vec::new(),
         };
-        for source in sources(&scene.graph) {
-            let geometry = match (&scene.graph.geometries[source.0], source.1) {
-                (Geometry::Triangles(mesh), Some(node)) => {
-                    let bent = deformed(mesh, &scene.graph, node, &world);
-                    FlatGeometry::Mesh(FlatMesh::new(&bent, progress)?)
-                }
-                (geometry, _) => FlatGeometry::new(geometry, progress)?,
-            };
-            flat.geometries.push(geometry);
-            flat.sources.push(source);
-        }
+        flat.add_geometry(&scene.graph, &world, progress)?;
         flat.place(&scene.graph, &world)?;
         Ok(flat)
     }
 
+    /// Builds what nodes show and is not there yet.
+    fn add_geometry(
+        &mut self,
+        graph: &Graph,
+        world: &[DAffine3],
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        for source in sources(graph) {
+            if self.sources.contains(&source) {
+                continue;
+            }
+            let geometry = match (&graph.geometries[source.0], source.1) {
+                (Geometry::Triangles(mesh), Some(node)) => {
+                    let bent = deformed(mesh, graph, node, world);
+                    FlatGeometry::Mesh(FlatMesh::new(&bent, progress)?)
+                }
+                (geometry, _) => FlatGeometry::new(geometry, progress)?,
+            };
+            self.geometries.push(geometry);
+            self.sources.push(source);
+        }
+        Ok(())
+    }
+
     /// Follows the graph, of which only nodes may have changed, to where they now are: what bends is
-    /// refitted, instances and lamps are placed anew, all else stays.
+    /// refitted, or built where nothing bent it before, instances and lamps are placed anew, all else stays.
     pub fn update(&mut self, graph: &Graph, progress: &dyn Progress) -> Result<()> {
         let world = graph.world_from_nodes();
         for (geometry, source) in self.geometries.iter_mut().zip(&self.sources) {
@@ -101,6 +115,7 @@ impl FlatScene {
                 flat.refit(&deformed(mesh, graph, node, &world), progress)?;
             }
         }
+        self.add_geometry(graph, &world, progress)?;
         self.place(graph, &world)
     }
 

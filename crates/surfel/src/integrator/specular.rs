@@ -24,6 +24,12 @@ pub fn fresnel(cos: f32, eta: f32) -> f32 {
     0.5 * (across * across + along * along)
 }
 
+/// Share of light that a pane reflects in air: both its sides, and all that goes to and fro between them.
+pub fn pane_fresnel(cos: f32, ior: f32) -> f32 {
+    let at_side = fresnel(cos, 1.0 / ior);
+    2.0 * at_side / (1.0 + at_side)
+}
+
 /// That of a metal whose colour is `facing` (Schlick 1994).
 pub fn metal_fresnel(cos: f32, facing: Vec3) -> Vec3 {
     facing + (1.0 - facing) * (1.0 - cos).clamp(0.0, 1.0).powi(5)

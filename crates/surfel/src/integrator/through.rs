@@ -1,7 +1,7 @@
 //! Light that reaches a place: stopped by what is opaque, tinted by what it goes through.
 
 use super::shading::Shading;
-use super::specular::fresnel;
+use super::specular::{fresnel, pane_fresnel};
 use crate::flat::FlatScene;
 use crate::math::{Ray, Vec3};
 use crate::scene::Material;
@@ -73,7 +73,11 @@ pub fn light_through(scene: &FlatScene, simd: Simd, rays: &[Ray], shares: &mut [
 /// What a surface lets pass.
 fn passed(shading: &Shading, direction: Vec3) -> Vec3 {
     let cos = -shading.normal.dot(direction);
-    let entering = (1.0 - fresnel(cos, 1.0 / shading.ior)) * (1.0 - shading.metallic);
+    let at_boundary = match shading.is_thin {
+        true => pane_fresnel(cos, shading.ior),
+        false => fresnel(cos, 1.0 / shading.ior),
+    };
+    let entering = (1.0 - at_boundary) * (1.0 - shading.metallic);
     let through = entering * shading.transmission * shading.base_color;
     Vec3::splat(1.0 - shading.alpha) + shading.alpha * through
 }

@@ -3,8 +3,8 @@
 use super::direct::{DirectLight, Receiver};
 use super::shading::Shading;
 use super::specular::{
-    LEAST_ROUGHNESS, energy, fresnel, masking_of_light, metal_fresnel, reflect, refract,
-    visible_normal,
+    LEAST_ROUGHNESS, energy, fresnel, masking_of_light, metal_fresnel, pane_fresnel, reflect,
+    refract, visible_normal,
 };
 use super::surroundings::surroundings;
 use super::through::absorbed;
@@ -313,11 +313,7 @@ impl Lobes {
                 (transmission * base_color, (1.0 - transmission) * base_color);
             return Self { reflected: Vec3::ZERO, refracted, diffuse, eta };
         }
-        let mut at_boundary = fresnel(cos, eta);
-        if is_thin {
-            // Both sides of a pane, and all that goes to and fro between them.
-            at_boundary = 2.0 * at_boundary / (1.0 + at_boundary);
-        }
+        let at_boundary = if is_thin { pane_fresnel(cos, ior) } else { fresnel(cos, eta) };
         let entering = (1.0 - metallic) * (1.0 - at_boundary);
         Self {
             reflected: (1.0 - metallic) * Vec3::splat(at_boundary)

@@ -10,7 +10,7 @@ pub use boundary::{Candidate, Candidates, NEIGHBOR_REACH, Surroundings, Verdicts
 pub use disc::Disc;
 pub use sphere::Sphere;
 pub use splat::{Blend, Gathered, MAX_GATHERED, gather_limit, plane_normal};
-pub use triangle::{Triangle, TriangleLanes, TrianglesSeen};
+pub use triangle::{LineLanes, Triangle, TriangleLanes, TrianglesSeen};
 
 use crate::error::Error;
 use crate::math::{Aabb, Floats, Ray, Vec3, Vec3Lanes};

@@ -1,105 +1,137 @@
 //! Triangles: flat between three corners, without gaps where they share an edge.
 
 use super::RayLanes;
-use crate::math::{Aabb, Floats, LANES, Lanes, Vec3, Vec3Lanes};
+use crate::math::{Aabb, Floats, LANES, Lanes, Vec3, Vec3Lanes, tangents};
 
 pub struct Triangle;
 
 /// What of triangles does not depend on rays.
 #[derive(Clone, Copy)]
-pub struct TriangleLanes<F> {
-    corners: [Vec3Lanes<F>; 3],
-    /// From each corner's successor to its predecessor: each lies opposite a corner.
-    edges: [Vec3Lanes<F>; 3],
+pub struct TriangleLanes<V> {
+    corners: [V; 3],
     /// Not of unit length.
-    normal: Vec3Lanes<F>,
+    normal: V,
 }
 
 /// Triangles as rays from one place meet them: eight before one ray, or one before sixteen rays.
-///
-/// Two-sided, and watertight as Woop, Benthin and Wald (2013) have it: a line that passes an edge is on the
-/// same side of it, but for the sign, in both triangles that share it, as all that enters are the edge's
-/// ends, and no rounding depends on their order. (In the form of Davidovic et al. 2012, which needs no axis
-/// to be chosen for each ray.)
 #[derive(Clone, Copy)]
-pub struct TrianglesSeen<F> {
-    /// The sides of the pyramid over each triangle: a line's place among them are the shares of the corners
-    /// opposite, but for their sum.
-    sides: [Vec3Lanes<F>; 3],
-    normal: Vec3Lanes<F>,
-    /// The normal's share in the way to the triangle's plane.
+pub struct TrianglesSeen<V, F> {
+    /// Relative to the rays' origin.
+    corners: [V; 3],
+    normal: V,
+    /// The way to the triangle's plane, times the normal's length.
     away: F,
 }
 
-impl<F: Floats> TriangleLanes<F> {
+/// A ray as it meets triangles: with the plane across it, in which it is a point.
+#[derive(Clone, Copy)]
+pub struct LineLanes<F> {
+    ray: RayLanes<F>,
+    across: [Vec3Lanes<F>; 2],
+}
+
+/// Eight triangles, from which single ones are taken.
+pub type Rows = Vec3Lanes<[f32; LANES]>;
+
+impl<F: Floats> LineLanes<F> {
+    #[inline(always)]
+    pub fn new(ray: RayLanes<F>) -> Self {
+        Self { ray, across: tangents(ray.direction) }
+    }
+
+    /// Where a corner is seen in the plane across the line, which is its zero.
+    #[inline(always)]
+    fn seen(&self, corner: Vec3Lanes<F>) -> (F, F) {
+        (corner.dot(self.across[0]), corner.dot(self.across[1]))
+    }
+}
+
+/// On which side of the zero an edge passes.
+#[inline(always)]
+fn side<F: Floats>(from: (F, F), to: (F, F)) -> F {
+    from.0 * to.1 - from.1 * to.0
+}
+
+impl<F: Floats> TriangleLanes<Vec3Lanes<F>> {
     #[inline(always)]
     pub fn new(corners: [Vec3Lanes<F>; 3]) -> Self {
         let [a, b, c] = corners;
-        let edges = [c.minus(b), a.minus(c), b.minus(a)];
-        Self { corners, edges, normal: edges[2].cross(edges[1]) }
+        Self { corners, normal: b.minus(a).cross(a.minus(c)) }
     }
 
     #[inline(always)]
-    pub fn seen_from(&self, origin: Vec3Lanes<F>) -> TrianglesSeen<F> {
+    pub fn seen_from(&self, origin: Vec3Lanes<F>) -> TrianglesSeen<Vec3Lanes<F>, F> {
         let [a, b, c] = self.corners;
-        let (a, b, c) = (a.minus(origin), b.minus(origin), c.minus(origin));
-        let [bc, ca, ab] = self.edges;
-        TrianglesSeen {
-            sides: [bc.cross(b.plus(c)), ca.cross(c.plus(a)), ab.cross(a.plus(b))],
-            normal: self.normal,
-            away: self.normal.dot(a),
-        }
+        let corners = [a.minus(origin), b.minus(origin), c.minus(origin)];
+        TrianglesSeen { corners, normal: self.normal, away: self.normal.dot(corners[0]) }
     }
 }
 
-impl<L: Lanes> TriangleLanes<L> {
-    /// Row by row, to take single triangles from.
+impl<F: Floats> TrianglesSeen<Vec3Lanes<F>, F> {
+    /// Distances at and beyond the rays' `t_min`, and the lanes that are hit.
+    ///
+    /// Two-sided, and watertight as Woop, Benthin and Wald (2013) have it: each corner is seen at one place
+    /// by all triangles that share it, and the side on which an edge between two such places passes is
+    /// exact or zero, as the greater of two products is never rounded below the other. (Their axes, which
+    /// have to be chosen for each ray, are replaced by tangents. Sides from cross products of edges, after
+    /// Davidovic et al. 2012, are of one mind about edges, but not about corners: rounding may have a ray
+    /// pass all edges around a corner on their outer side.)
     #[inline(always)]
-    pub fn store(&self) -> TriangleLanes<[f32; LANES]> {
+    pub fn intersect(&self, line: &LineLanes<F>) -> (F, F::Mask) {
         let [a, b, c] = self.corners;
-        let [bc, ca, ab] = self.edges;
-        TriangleLanes {
-            corners: [rows(a), rows(b), rows(c)],
-            edges: [rows(bc), rows(ca), rows(ab)],
-            normal: rows(self.normal),
-        }
+        let (seen_a, seen_b, seen_c) = (line.seen(a), line.seen(b), line.seen(c));
+        let (at_a, at_b, at_c) = (side(seen_b, seen_c), side(seen_c, seen_a), side(seen_a, seen_b));
+        let zero = F::splat(0.0);
+        let least = at_a.min(at_b).min(at_c);
+        let most = at_a.max(at_b).max(at_c);
+        let distance = self.away / self.normal.dot(line.ray.direction);
+        // A ray in the triangle's plane gives NaN or infinity here, and fails the last tests.
+        let is_hit = (zero.less_equal(least) | most.less_equal(zero))
+            & line.ray.t_min.less_equal(distance)
+            & distance.less(F::splat(f32::INFINITY));
+        (distance, is_hit)
     }
 }
 
-impl TriangleLanes<[f32; LANES]> {
+impl<L: Lanes> TriangleLanes<Vec3Lanes<L>> {
+    #[inline(always)]
+    pub fn store(&self) -> TriangleLanes<Rows> {
+        let [a, b, c] = self.corners;
+        TriangleLanes { corners: [rows(a), rows(b), rows(c)], normal: rows(self.normal) }
+    }
+}
+
+impl TriangleLanes<Rows> {
     /// The triangle in `lane` before many rays.
     #[inline(always)]
-    pub fn splat<F: Floats>(&self, lane: usize) -> TriangleLanes<F> {
+    pub fn splat<F: Floats>(&self, lane: usize) -> TriangleLanes<Vec3Lanes<F>> {
         let [a, b, c] = &self.corners;
-        let [bc, ca, ab] = &self.edges;
         TriangleLanes {
             corners: [in_all(a, lane), in_all(b, lane), in_all(c, lane)],
-            edges: [in_all(bc, lane), in_all(ca, lane), in_all(ab, lane)],
             normal: in_all(&self.normal, lane),
         }
     }
 }
 
-impl<L: Lanes> TrianglesSeen<L> {
-    /// Row by row, to take single triangles from.
+impl<L: Lanes> TrianglesSeen<Vec3Lanes<L>, L> {
     #[inline(always)]
-    pub fn store(&self) -> TrianglesSeen<[f32; LANES]> {
-        let [a, b, c] = self.sides;
+    pub fn store(&self) -> TrianglesSeen<Rows, [f32; LANES]> {
+        let [a, b, c] = self.corners;
         TrianglesSeen {
-            sides: [rows(a), rows(b), rows(c)],
+            corners: [rows(a), rows(b), rows(c)],
             normal: rows(self.normal),
             away: self.away.store(),
         }
     }
 }
 
-impl TrianglesSeen<[f32; LANES]> {
+impl TrianglesSeen<Rows, [f32; LANES]> {
     /// The triangle in `lane` before many rays.
     #[inline(always)]
-    pub fn splat<F: Floats>(&self, lane: usize) -> TrianglesSeen<F> {
-        let [a, b, c] = &self.sides;
+    pub fn splat<F: Floats>(&self, lane: usize) -> TrianglesSeen<Vec3Lanes<F>, F> {
+        let [a, b, c] = &self.corners;
         TrianglesSeen {
-            sides: [in_all(a, lane), in_all(b, lane), in_all(c, lane)],
+            corners: [in_all(a, lane), in_all(b, lane), in_all(c, lane)],
             normal: in_all(&self.normal, lane),
             away: F::splat(self.away[lane]),
         }
@@ -107,31 +139,13 @@ impl TrianglesSeen<[f32; LANES]> {
 }
 
 #[inline(always)]
-fn rows<L: Lanes>(vector: Vec3Lanes<L>) -> Vec3Lanes<[f32; LANES]> {
+fn rows<L: Lanes>(vector: Vec3Lanes<L>) -> Rows {
     Vec3Lanes { x: vector.x.store(), y: vector.y.store(), z: vector.z.store() }
 }
 
 #[inline(always)]
-fn in_all<F: Floats>(rows: &Vec3Lanes<[f32; LANES]>, lane: usize) -> Vec3Lanes<F> {
+fn in_all<F: Floats>(rows: &Rows, lane: usize) -> Vec3Lanes<F> {
     Vec3Lanes { x: F::splat(rows.x[lane]), y: F::splat(rows.y[lane]), z: F::splat(rows.z[lane]) }
-}
-
-impl<F: Floats> TrianglesSeen<F> {
-    /// Distances at and beyond the rays' `t_min`, and the lanes that are hit.
-    #[inline(always)]
-    pub fn intersect(&self, ray: &RayLanes<F>) -> (F, F::Mask) {
-        let [a, b, c] = self.sides;
-        let at = [a.dot(ray.direction), b.dot(ray.direction), c.dot(ray.direction)];
-        let zero = F::splat(0.0);
-        let least = at[0].min(at[1]).min(at[2]);
-        let most = at[0].max(at[1]).max(at[2]);
-        let distance = self.away / self.normal.dot(ray.direction);
-        // A ray in the triangle's plane gives NaN or infinity here, and fails the last tests.
-        let is_hit = (zero.less_equal(least) | most.less_equal(zero))
-            & ray.t_min.less_equal(distance)
-            & distance.less(F::splat(f32::INFINITY));
-        (distance, is_hit)
-    }
 }
 
 /// Shares of the three corners in the place where a line of `direction` meets the triangle of `corners`

@@ -140,17 +140,18 @@ fn any_in_packet<L: Lanes, S: Leaf, J: Judge>(
     occluded: &mut [bool],
 ) {
     let limits = packet.limits();
-    let mut any = AnyInPacket::<L, S, J> { packet, judge, shape: PhantomData, limits, is_hit: 0 };
+    let mut any =
+        AnyInPacket::<L, S, J> { packet, judge, lines: S::lines(&packet.wide), limits, is_hit: 0 };
     along_packet::<L, _, false>(tree, packet, stack, &mut any);
     for (lane, occluded) in occluded.iter_mut().enumerate() {
         *occluded = any.is_hit >> lane & 1 == 1;
     }
 }
 
-struct AnyInPacket<'p, L: Lanes, S, J> {
+struct AnyInPacket<'p, L: Lanes, S: Leaf, J> {
     packet: &'p Packet<'p, L::Wide>,
     judge: J,
-    shape: PhantomData<S>,
+    lines: S::Lines<L::Wide>,
     /// Below all distances for rays that have hit something.
     limits: [f32; WIDE],
     is_hit: u32,
@@ -213,7 +214,7 @@ impl<L: Lanes, S: Leaf, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> 
 
     #[inline(always)]
     fn visit(&mut self, tree: &S::Tree, block_idx: u32) {
-        let block = S::before_packet::<L>(tree, block_idx, self.packet);
+        let block = S::before_packet::<L>(tree, block_idx, self.packet, self.lines);
         if !J::IS_LENIENT {
             self.visit_with_judge(&block, block_idx);
             return;

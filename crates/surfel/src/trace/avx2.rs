@@ -5,9 +5,9 @@
 use super::hit::{Gather, Hit};
 use super::splat::{self, Splat};
 use super::surface::{self, SurfaceHit};
-use super::{any, closest, gather};
+use super::{any, boxes, closest, gather};
 use crate::flat::{FlatCloud, FlatTriangles};
-use crate::math::{Floats, LANES, LaneMask, Lanes, Pair, Ray, Task, Wide};
+use crate::math::{Aabb, Floats, LANES, LaneMask, Lanes, Pair, Ray, Task, Wide};
 use std::arch::x86_64::*;
 use std::marker::PhantomData;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
@@ -30,6 +30,7 @@ kernel!(surface::surface_hits(FlatCloud => SurfaceHit));
 kernel!(surface::occlusions(FlatCloud => bool));
 kernel!(closest::closest_triangles(FlatTriangles => Hit));
 kernel!(any::any_triangles(FlatTriangles => bool));
+kernel!(boxes::box_entries([Aabb] => f32));
 
 macro_rules! avx2 {
     ($wrap:ident($($call:tt)*)) => {

@@ -4,9 +4,9 @@ use super::avx2::{Eight, Level};
 use super::hit::{Gather, Hit};
 use super::splat::{self, Splat};
 use super::surface::{self, SurfaceHit};
-use super::{any, closest, gather};
+use super::{any, boxes, closest, gather};
 use crate::flat::{FlatCloud, FlatTriangles};
-use crate::math::{Floats, LANES, LaneMask, Ray, Task, WIDE, Wide};
+use crate::math::{Aabb, Floats, LANES, LaneMask, Ray, Task, WIDE, Wide};
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
@@ -30,6 +30,7 @@ kernel!(surface::surface_hits(FlatCloud => SurfaceHit));
 kernel!(surface::occlusions(FlatCloud => bool));
 kernel!(closest::closest_triangles(FlatTriangles => Hit));
 kernel!(any::any_triangles(FlatTriangles => bool));
+kernel!(boxes::box_entries([Aabb] => f32));
 
 macro_rules! avx512 {
     ($wrap:ident($($call:tt)*)) => {

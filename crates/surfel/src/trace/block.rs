@@ -1,16 +1,23 @@
 //! The shapes of a block: eight before one ray, or one after the other before sixteen rays.
 
 use super::hit::Hit;
-use super::packet::Packet;
+use super::packet::{Packet, WideRays};
 use crate::flat::{BlockTree, FlatPoints, FlatTriangles, PointBlock, Slot};
-use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3Lanes};
-use crate::surface::{PointLanes, RayLanes, Shape, Triangle, TriangleLanes, TrianglesSeen};
+use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3Lanes, Wide};
+use crate::surface::triangle::Rows;
+use crate::surface::{
+    LineLanes, PointLanes, RayLanes, Shape, Triangle, TriangleLanes, TrianglesSeen,
+};
 use std::marker::PhantomData;
 
 /// What stands in the leaves of a tree.
 pub trait Leaf {
     type Tree: BlockTree;
+    /// Rays of a packet as the shapes meet them.
+    type Lines<W: Wide>: Copy;
     type BeforePacket<L: Lanes>: BeforePacket<L>;
+
+    fn lines<W: Wide>(rays: &WideRays<W>) -> Self::Lines<W>;
 
     /// A block's shapes before one ray.
     fn hits<L: Lanes>(tree: &Self::Tree, block_idx: u32, ray: &Ray) -> BlockHits<L>;
@@ -20,6 +27,7 @@ pub trait Leaf {
         tree: &Self::Tree,
         block_idx: u32,
         packet: &Packet<L::Wide>,
+        lines: Self::Lines<L::Wide>,
     ) -> Self::BeforePacket<L>;
 }
 
@@ -101,7 +109,13 @@ impl HitList {
 
 impl<S: Shape> Leaf for S {
     type Tree = FlatPoints;
+    type Lines<W: Wide> = RayLanes<W>;
     type BeforePacket<L: Lanes> = PointsBeforePacket<L, S>;
+
+    #[inline(always)]
+    fn lines<W: Wide>(rays: &WideRays<W>) -> RayLanes<W> {
+        rays.lanes()
+    }
 
     #[inline(always)]
     fn hits<L: Lanes>(points: &FlatPoints, block_idx: u32, ray: &Ray) -> BlockHits<L> {
@@ -115,8 +129,9 @@ impl<S: Shape> Leaf for S {
         points: &FlatPoints,
         block_idx: u32,
         packet: &Packet<L::Wide>,
+        lines: RayLanes<L::Wide>,
     ) -> PointsBeforePacket<L, S> {
-        PointsBeforePacket::new(&points.blocks[block_idx as usize], packet)
+        PointsBeforePacket::new(&points.blocks[block_idx as usize], packet, lines)
     }
 }
 
@@ -132,12 +147,12 @@ pub struct PointsBeforePacket<L: Lanes, S> {
 
 impl<L: Lanes, S> PointsBeforePacket<L, S> {
     #[inline(always)]
-    fn new(block: &PointBlock, packet: &Packet<L::Wide>) -> Self {
+    fn new(block: &PointBlock, packet: &Packet<L::Wide>, rays: RayLanes<L::Wide>) -> Self {
         let (offset, normal) = (block.offsets::<L>(), block.normals::<L>());
         Self {
             shape: PhantomData,
             corner: Vec3Lanes::splat(block.corner()).minus(packet.wide.origin()),
-            rays: packet.wide.lanes(),
+            rays,
             offset: [offset.x.store(), offset.y.store(), offset.z.store()],
             normal: [normal.x.store(), normal.y.store(), normal.z.store()],
             radius: block.radii::<L>().store(),
@@ -168,13 +183,19 @@ impl<L: Lanes, S: Shape> BeforePacket<L> for PointsBeforePacket<L, S> {
 
 impl Leaf for Triangle {
     type Tree = FlatTriangles;
+    type Lines<W: Wide> = LineLanes<W>;
     type BeforePacket<L: Lanes> = TrianglesBeforePacket<L>;
+
+    #[inline(always)]
+    fn lines<W: Wide>(rays: &WideRays<W>) -> LineLanes<W> {
+        LineLanes::new(rays.lanes())
+    }
 
     #[inline(always)]
     fn hits<L: Lanes>(triangles: &FlatTriangles, block_idx: u32, ray: &Ray) -> BlockHits<L> {
         let corners = triangles.blocks[block_idx as usize].corners::<L>();
         let seen = TriangleLanes::new(corners).seen_from(Vec3Lanes::splat(ray.origin));
-        let (distances, is_hit) = seen.intersect(&RayLanes::<L>::new(ray));
+        let (distances, is_hit) = seen.intersect(&LineLanes::new(RayLanes::<L>::new(ray)));
         let first_slot = block_idx * LANES as u32;
         BlockHits { first_slot, distances, radii: L::splat(0.0), is_hit }
     }
@@ -184,6 +205,7 @@ impl Leaf for Triangle {
         triangles: &FlatTriangles,
         block_idx: u32,
         packet: &Packet<L::Wide>,
+        lines: LineLanes<L::Wide>,
     ) -> TrianglesBeforePacket<L> {
         let corners = triangles.blocks[block_idx as usize].corners::<L>();
         let lanes = TriangleLanes::new(corners);
@@ -191,11 +213,7 @@ impl Leaf for Triangle {
             Some(origin) => View::FromOne(lanes.seen_from(Vec3Lanes::splat(origin)).store()),
             None => View::FromMany(lanes.store(), packet.wide.origin()),
         };
-        TrianglesBeforePacket {
-            view,
-            near: packet.frustum.meets_triangles(corners),
-            rays: packet.wide.lanes(),
-        }
+        TrianglesBeforePacket { view, near: packet.frustum.meets_triangles(corners), lines }
     }
 }
 
@@ -204,14 +222,14 @@ pub struct TrianglesBeforePacket<L: Lanes> {
     view: View<L::Wide>,
     /// The lanes whose boxes reach into the packet's frustum.
     near: u32,
-    rays: RayLanes<L::Wide>,
+    lines: LineLanes<L::Wide>,
 }
 
 /// From where rays see triangles: what holds for all rays that start at one place is worked out once, eight
 /// triangles at a time. Both give the same bits.
 enum View<W> {
-    FromOne(TrianglesSeen<[f32; LANES]>),
-    FromMany(TriangleLanes<[f32; LANES]>, Vec3Lanes<W>),
+    FromOne(TrianglesSeen<Rows, [f32; LANES]>),
+    FromMany(TriangleLanes<Rows>, Vec3Lanes<W>),
 }
 
 impl<L: Lanes> BeforePacket<L> for TrianglesBeforePacket<L> {
@@ -226,7 +244,7 @@ impl<L: Lanes> BeforePacket<L> for TrianglesBeforePacket<L> {
             View::FromOne(seen) => seen.splat(lane),
             View::FromMany(lanes, origin) => lanes.splat(lane).seen_from(*origin),
         };
-        seen.intersect(&self.rays)
+        seen.intersect(&self.lines)
     }
 }
 

@@ -96,7 +96,7 @@ fn closest_in_packet<L: Lanes, S: Leaf>(
 ) {
     let mut closest = ClosestInPacket::<L, S> {
         packet,
-        shape: PhantomData,
+        lines: S::lines(&packet.wide),
         distances: packet.limits(),
         slots: [f32::from_bits(Hit::MISS.slot); WIDE],
     };
@@ -124,9 +124,9 @@ fn try_lane<L: Lanes, S: Leaf>(
     *distances = L::Wide::select(closer, distance, *distances);
 }
 
-struct ClosestInPacket<'p, L: Lanes, S> {
+struct ClosestInPacket<'p, L: Lanes, S: Leaf> {
     packet: &'p Packet<'p, L::Wide>,
-    shape: PhantomData<S>,
+    lines: S::Lines<L::Wide>,
     distances: [f32; WIDE],
     /// As the bits of floats, which is how lanes hold them.
     slots: [f32; WIDE],
@@ -142,7 +142,7 @@ impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
 
     #[inline(always)]
     fn visit(&mut self, tree: &S::Tree, block_idx: u32) {
-        let block = S::before_packet::<L>(tree, block_idx, self.packet);
+        let block = S::before_packet::<L>(tree, block_idx, self.packet, self.lines);
         let mut distances = L::Wide::load(&self.distances);
         let mut slots = L::Wide::load(&self.slots);
         match block.worth_trying() {

@@ -123,7 +123,8 @@ impl<L: Lanes> PacketVisitor<L> for GatherInPacket<'_, L> {
 
     #[inline(always)]
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let block = Disc::before_packet::<L>(points, block_idx, self.packet);
+        let block =
+            Disc::before_packet::<L>(points, block_idx, self.packet, self.packet.wide.lanes());
         let mut limits = L::Wide::load(&self.limits);
         let mut end = self.sightings.len();
         self.sightings.resize(end + LANES, Sighting::NONE);

@@ -2,6 +2,7 @@
 
 mod any;
 mod block;
+mod boxes;
 mod boundary;
 mod closest;
 mod flight;
@@ -30,7 +31,7 @@ pub use surface::SurfaceHit;
 pub use world::{SceneHit, Which, scene_hits, scene_occlusions};
 
 use crate::flat::{FlatCloud, FlatTriangles};
-use crate::math::{PortableLanes, Ray};
+use crate::math::{Aabb, PortableLanes, Ray};
 use simd::Level;
 
 /// Runs a batch kernel at a SIMD level; every level gives the same bytes.
@@ -95,6 +96,11 @@ pub fn occlusions(cloud: &FlatCloud, simd: Simd, rays: &[Ray], occluded: &mut [b
         return occluded.fill(false);
     }
     at_level!(simd, surface::occlusions(cloud, rays, occluded));
+}
+
+/// Where each ray enters each box within its range, box after box; infinity where it does not.
+fn box_entries(boxes: &[Aabb], simd: Simd, rays: &[Ray], entries: &mut [f32]) {
+    at_level!(simd, boxes::box_entries(boxes, rays, entries));
 }
 
 /// The nearest triangle on each ray.

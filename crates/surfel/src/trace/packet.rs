@@ -1,10 +1,11 @@
 //! Sixteen rays that go much the same way, walked through the tree together.
 
+use super::boxes::inverse;
 use super::frustum::{self, Frustum};
 use super::memory::Memory;
 use crate::bvh::{Child, Node, STACK_SIZE};
 use crate::flat::BlockTree;
-use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
+use crate::math::{LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
 use crate::surface::RayLanes;
 
 /// Sixteen rays in lanes.
@@ -145,14 +146,6 @@ impl<'r, W: Wide> Packet<'r, W> {
         }
         enter.less_equal(leave).bits()
     }
-}
-
-/// Kept finite, so that no product of an infinity and a zero gives NaN.
-#[inline(always)]
-fn inverse<F: Floats>(direction: F) -> F {
-    const LEAST: f32 = 1e-18;
-    let is_small = direction.less(F::splat(LEAST)) & F::splat(-LEAST).less(direction);
-    F::splat(1.0) / F::select(is_small, F::splat(LEAST), direction)
 }
 
 /// A child on the stack with its box, relative to the frustum's anchor.

@@ -4,11 +4,12 @@
 use super::hit::Hit;
 use super::node::{BoxRay, ray_entries};
 use super::surface::SurfaceHit;
-use super::{Simd, any_triangles, closest_triangles, occlusions, surface_hits};
+use super::{Simd, any_triangles, box_entries, closest_triangles, occlusions, surface_hits};
 use crate::bvh::{Child, NO_PRIMITIVE, STACK_SIZE};
 use crate::flat::{FlatCloud, FlatGeometry, FlatMesh, FlatScene, Instance, Slot};
-use crate::math::{LaneMask, PortableLanes, Ray, Vec3, Vec4};
+use crate::math::{Aabb, LaneMask, PortableLanes, Ray, Vec3, Vec4};
 use crate::surface::triangle;
+use std::ops::Range;
 
 /// Where a ray meets a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,16 +95,21 @@ pub fn scene_hits(
         return;
     }
     hits.fill(SceneHit::MISS);
-    let mut rounds = Rounds::new(scene, which, rays);
+    let mut rounds = Rounds::new(scene, simd, which, rays);
     loop {
         let limit =
             |ray_idx: u32| hits[ray_idx as usize].distance.min(rays[ray_idx as usize].t_max);
         let Some(jobs) = rounds.next(limit) else { return };
         for jobs in jobs.chunk_by(|a, b| a.instance == b.instance) {
             let instance = &scene.instances[jobs[0].instance as usize];
+            // Discs behind the nearest are blended with it, whatever other instances are among them.
+            let reach = match scene.geometry(instance) {
+                FlatGeometry::Cloud(cloud) => instance.scale * cloud.reach,
+                FlatGeometry::Mesh(_) => 0.0,
+            };
             let there = enter(instance, jobs, |ray_idx| {
                 let ray = rays[ray_idx as usize];
-                Ray { t_max: ray.t_max.min(hits[ray_idx as usize].distance), ..ray }
+                Ray { t_max: ray.t_max.min(hits[ray_idx as usize].distance + reach), ..ray }
             });
             batch.trace(scene, simd, instance, &there.rays);
             for (i, job) in jobs.iter().enumerate() {
@@ -134,7 +140,7 @@ pub fn scene_occlusions(
     }
     occluded.fill(false);
     let mut blocked = Vec::new();
-    let mut rounds = Rounds::new(scene, which, rays);
+    let mut rounds = Rounds::new(scene, simd, which, rays);
     loop {
         let limit = |ray_idx: u32| match occluded[ray_idx as usize] {
             true => f32::NEG_INFINITY,
@@ -170,57 +176,95 @@ struct Job {
 
 /// Where the rays still have to go.
 struct Rounds {
-    /// Of all rays, one ray's after another's, each sorted by where it enters the instance's box.
-    visits: Vec<(f32, u32)>,
-    /// The visits that are left of each ray that is still on its way.
-    left: Vec<(u32, std::ops::Range<u32>)>,
+    visits: Visits,
+    /// Those to be made next, sorted by instance and ray.
     jobs: Vec<Job>,
 }
 
+enum Visits {
+    /// Of few instances: where each ray enters the box of each, instance after instance, at infinity once it
+    /// was there; and the rays still on their way.
+    Few { instances: Vec<u32>, entries: Vec<f32>, open: Vec<u32> },
+    /// Of many: all that each ray comes by, sorted by where it enters, one ray's after another's; and what
+    /// is left of that of each ray still on its way.
+    Many { entries: Vec<(f32, u32)>, left: Vec<(u32, Range<u32>)> },
+}
+
+/// With more instances, the tree over them is asked: their boxes one by one would cost more.
+const FEW: usize = 16;
+
 impl Rounds {
-    fn new(scene: &FlatScene, which: Which, rays: &[Ray]) -> Self {
-        let mut rounds =
-            Self { visits: Vec::new(), left: Vec::with_capacity(rays.len()), jobs: Vec::new() };
-        let mut counting = scene.instances.iter().enumerate();
-        let mut counting = counting.by_ref().filter(|(_, instance)| which.counts(instance));
-        let (first, second) = (counting.next(), counting.next());
-        let Some((only, _)) = first else { return rounds };
-        if second.is_none() {
-            // Its own tree tells which rays meet it.
-            rounds.visits = vec![(f32::NEG_INFINITY, only as u32)];
-            rounds.left.extend((0..rays.len() as u32).map(|ray_idx| (ray_idx, 0..1)));
-            return rounds;
-        }
-        for (ray_idx, ray) in rays.iter().enumerate() {
-            let first = rounds.visits.len();
-            visit_boxes(scene, which, ray, &mut rounds.visits);
-            let end = rounds.visits.len();
-            if first < end {
-                rounds.visits[first..]
-                    .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                rounds.left.push((ray_idx as u32, first as u32..end as u32));
-            }
-        }
-        rounds
+    fn new(scene: &FlatScene, simd: Simd, which: Which, rays: &[Ray]) -> Self {
+        let counting = scene.instances.iter().enumerate();
+        let counting = counting.filter(|(_, instance)| which.counts(instance));
+        let instances: Vec<u32> = counting.take(FEW + 1).map(|(i, _)| i as u32).collect();
+        let visits = if instances.len() <= FEW {
+            let boxes: Vec<Aabb> =
+                instances.iter().map(|&i| scene.instances[i as usize].bounds).collect();
+            let mut entries = vec![f32::INFINITY; boxes.len() * rays.len()];
+            box_entries(&boxes, simd, rays, &mut entries);
+            Visits::Few { instances, entries, open: (0..rays.len() as u32).collect() }
+        } else {
+            visits_of_many(scene, which, rays)
+        };
+        Self { visits, jobs: Vec::new() }
     }
 
     /// The next visit of each ray that has one within its limit, sorted by instance and ray.
     fn next(&mut self, limit: impl Fn(u32) -> f32) -> Option<&[Job]> {
-        let Self { visits, left, jobs } = self;
+        let Self { visits, jobs } = self;
         jobs.clear();
-        left.retain_mut(|(ray, left)| {
-            let Some(next) = left.next() else { return false };
-            let (entry, instance) = visits[next as usize];
-            let goes = entry <= limit(*ray);
-            if goes {
-                jobs.push(Job { instance, ray: *ray });
+        match visits {
+            Visits::Few { instances, entries, open } => {
+                let n_rays = entries.len() / instances.len().max(1);
+                let mut nearest = Vec::with_capacity(open.len());
+                open.retain(|&ray| {
+                    let place = |i: usize| i * n_rays + ray as usize;
+                    let by_entry =
+                        |a: &usize, b: &usize| entries[place(*a)].total_cmp(&entries[place(*b)]);
+                    let Some(next) = (0..instances.len()).min_by(by_entry) else { return false };
+                    let entry = &mut entries[place(next)];
+                    let goes = *entry < f32::INFINITY && *entry <= limit(ray);
+                    *entry = f32::INFINITY;
+                    if goes {
+                        nearest.push(next);
+                    }
+                    goes
+                });
+                for (i, &instance) in instances.iter().enumerate() {
+                    let there = open.iter().zip(&nearest).filter(|(_, nearest)| **nearest == i);
+                    jobs.extend(there.map(|(&ray, _)| Job { instance, ray }));
+                }
             }
-            goes
-        });
-        // A stable sort: rays stay in their order, which is what makes packets.
-        jobs.sort_by_key(|job| job.instance);
+            Visits::Many { entries, left } => {
+                left.retain_mut(|(ray, left)| {
+                    let Some(next) = left.next() else { return false };
+                    let (entry, instance) = entries[next as usize];
+                    let goes = entry <= limit(*ray);
+                    if goes {
+                        jobs.push(Job { instance, ray: *ray });
+                    }
+                    goes
+                });
+                // A stable sort: rays stay in their order, which is what makes packets.
+                jobs.sort_by_key(|job| job.instance);
+            }
+        }
         (!jobs.is_empty()).then_some(jobs)
     }
+}
+
+fn visits_of_many(scene: &FlatScene, which: Which, rays: &[Ray]) -> Visits {
+    let (mut entries, mut left) = (Vec::new(), Vec::with_capacity(rays.len()));
+    for (ray_idx, ray) in rays.iter().enumerate() {
+        let first = entries.len();
+        visit_boxes(scene, which, ray, &mut entries);
+        if first < entries.len() {
+            entries[first..].sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            left.push((ray_idx as u32, first as u32..entries.len() as u32));
+        }
+    }
+    Visits::Many { entries, left }
 }
 
 /// Adds the instances whose boxes the ray meets, and where it enters them.
@@ -259,15 +303,17 @@ fn visit_boxes(scene: &FlatScene, which: Which, ray: &Ray, visits: &mut Vec<(f32
 
 /// Where the ray enters an instance's box, if it does within its range.
 fn box_entry(instance: &Instance, ray: &Ray) -> Option<f32> {
-    let inverse = 1.0 / ray.direction;
+    const LEAST: Vec3 = Vec3::splat(1e-18);
+    // Kept finite, so that no product of an infinity and a zero, and no difference of infinities, gives NaN.
+    let is_small = ray.direction.abs().cmplt(LEAST);
+    let inverse = 1.0 / Vec3::select(is_small, LEAST, ray.direction);
     let low = (instance.bounds.min - ray.origin) * inverse;
     let high = (instance.bounds.max - ray.origin) * inverse;
-    // A side that the ray runs along gives NaN, which `min` and `max` pass over.
     let near = low.min(high).max_element().max(ray.t_min);
     let far = low.max(high).min_element().min(ray.t_max);
     // More than the rounding above.
     let slack = 8.0 * f32::EPSILON * near.abs().max(far.abs());
-    (near <= far + slack).then_some(near - slack)
+    (near <= far + slack && near < f32::INFINITY).then_some(near - slack)
 }
 
 /// Rays at one instance, in its coordinates.
@@ -346,10 +392,10 @@ fn triangle_hit(mesh: &FlatMesh, hit: &Hit, ray: &Ray, instance: &Instance) -> O
     let corners = mesh.triangles.triangle(hit.slot);
     let shares = triangle::barycentric(corners.map(|corner| corner - ray.origin), ray.direction);
     let [a, b, c] = corners;
-    let outward = (b - a).cross(c - a);
+    let outward = unit((b - a).cross(c - a));
     let is_inner = 0.0 < outward.dot(ray.direction);
     let side = if is_inner { -1.0 } else { 1.0 };
-    let facet = instance.world_normal((side * outward).normalize());
+    let facet = instance.world_normal(side * outward);
     let normal = match mesh.at(&mesh.normals, hit.slot, shares).and_then(Vec3::try_normalize) {
         Some(between) => {
             let normal = instance.world_normal(between);
@@ -371,4 +417,9 @@ fn triangle_hit(mesh: &FlatMesh, hit: &Hit, ray: &Ray, instance: &Instance) -> O
         is_inner,
         ..SceneHit::MISS
     })
+}
+
+/// Unit, even where squares are beyond the range of f32.
+fn unit(vector: Vec3) -> Vec3 {
+    (vector / vector.abs().max_element()).normalize()
 }

@@ -1,0 +1,168 @@
+//! Whole scenes: what a frame costs in which things move, and what it costs that things stand side by side.
+//!
+//! `cargo bench -p surfel-tests --bench scenes`; `RAYON_NUM_THREADS` sets the threads, `POINTS` the number
+//! of points that stand still (10 million by default).
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use std::f32::consts::{PI, TAU};
+use surfel::flat::{FlatMesh, FlatScene, Refit};
+use surfel::math::{DQuat, DVec3, Ray, Vec3};
+use surfel::progress::Silent;
+use surfel::scene::{
+    Background, Camera, Geometry, Graph, Material, Mesh, Node, Part, Points, Projection, Scene,
+    Transform,
+};
+use surfel::trace::{SceneHit, Simd, Which, scene_hits};
+use surfel_tests::clouds::waves;
+
+criterion_group!(benches, moving, side_by_side);
+criterion_main!(benches);
+
+fn n_points(usual: usize) -> usize {
+    std::env::var("POINTS").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
+}
+
+fn cloud(n: usize) -> Points {
+    Points { cloud: waves(n, 0.0), colors: vec![[188; 3]; n], ..Points::default() }
+}
+
+/// A ball with bumps, of `2 * n_along * n_around` triangles.
+fn bumpy_ball(n_along: usize, n_around: usize, phase: f32) -> Mesh {
+    let place = |i: usize, j: usize| {
+        // Open at the poles, where triangles would have no area.
+        let height = PI * (i as f32 + 0.5) / (n_along + 1) as f32;
+        let turn = TAU * j as f32 / n_around as f32;
+        let radius = 1.0 + 0.05 * (11.0 * turn + phase).sin() * (9.0 * height).sin();
+        let (sin, cos) = height.sin_cos();
+        radius * Vec3::new(sin * turn.cos(), sin * turn.sin(), cos)
+    };
+    let positions = (0..=n_along).flat_map(|i| (0..n_around).map(move |j| place(i, j))).collect();
+    let vertex = |i: usize, j: usize| (i * n_around + j % n_around) as u32;
+    let quads = (0..n_along).flat_map(|i| (0..n_around).map(move |j| (i, j)));
+    let triangles = quads.flat_map(|(i, j)| {
+        let [a, b] = [vertex(i, j), vertex(i + 1, j)];
+        let [c, d] = [vertex(i + 1, j + 1), vertex(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    });
+    Mesh { positions, triangles: triangles.collect(), ..Mesh::default() }
+}
+
+fn camera(position: DVec3, focal_point: DVec3) -> Camera {
+    let projection = Projection::Perspective { view_angle_deg: 40.0 };
+    Camera { position, focal_point, view_up: DVec3::Z, projection }
+}
+
+fn scene(graph: Graph, camera: Camera) -> Scene {
+    Scene { graph, lights: Vec::new(), background: Background::Transparent, camera }
+}
+
+/// Something of one material under a node of its own.
+fn thing(geometry: Geometry, material: Material, translation: DVec3, scale: f64) -> Graph {
+    let mut graph = Graph::of(geometry, material);
+    graph.nodes[0].transform =
+        Transform::Parts { translation, rotation: DQuat::IDENTITY, scale: DVec3::splat(scale) };
+    graph
+}
+
+fn moving(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("frame");
+    group.sample_size(20);
+    let mut graph = Graph::of(Geometry::Points(cloud(n_points(10_000_000))), Material::MATTE);
+    graph.geometries.push(Geometry::Triangles(bumpy_ball(100, 200, 0.0)));
+    graph.nodes.extend((0..100).map(|i| {
+        let parts = vec![Part { geometry: 1, material: 0 }];
+        Node { parts, ..Node::new(format!("ball {i}")) }
+    }));
+    let camera = camera(DVec3::new(0.0, 0.0, 300.0), DVec3::ZERO);
+    let mut flat = FlatScene::new(&scene(graph.clone(), camera), &Silent).unwrap();
+    graph.forget_static();
+    let mut time = 0.0;
+    group.bench_function("100 instances moved", |bencher| {
+        bencher.iter(|| {
+            time += 0.04;
+            for (i, node) in graph.nodes[1..].iter_mut().enumerate() {
+                let turn = DQuat::from_rotation_z(time + i as f64);
+                let place = turn * DVec3::new(30.0 * i as f64, 0.0, 40.0);
+                node.transform = Transform::Parts {
+                    translation: place,
+                    rotation: turn,
+                    scale: DVec3::splat(5.0),
+                };
+            }
+            flat.update(&graph, &Silent).unwrap();
+            assert_eq!(flat.instances.len(), 101);
+        });
+    });
+    drop(flat);
+    let meshes = [0.0, 0.3].map(|phase| bumpy_ball(500, 1000, phase));
+    let mut mesh = FlatMesh::new(&meshes[0], &Silent).unwrap();
+    let mut next = meshes.iter().cycle();
+    group.bench_function("1 million triangles bent", |bencher| {
+        bencher.iter(|| {
+            let refit = mesh.refit(next.next().unwrap(), &Silent).unwrap();
+            assert!(matches!(refit, Refit::Kept { .. }), "{refit:?}");
+        });
+    });
+    group.finish();
+}
+
+/// Points, a mesh and a mirror: all primary rays before all of them, and before each alone those rays that
+/// end on it.
+fn side_by_side(criterion: &mut Criterion) {
+    const SIZE: u32 = 1024;
+    let mut group = criterion.benchmark_group("primary rays");
+    group.sample_size(20);
+    let floor = Mesh {
+        positions: [(0.0, -300.0), (1000.0, -300.0), (1000.0, 0.0), (0.0, 0.0)]
+            .map(|(x, y)| Vec3::new(x, y, -10.0))
+            .to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    };
+    let ball = bumpy_ball(150, 304, 0.0);
+    let things = [
+        thing(Geometry::Points(cloud(1_000_000)), Material::MATTE, DVec3::ZERO, 1.0),
+        thing(Geometry::Triangles(ball), Material::MATTE, DVec3::new(500.0, 200.0, 140.0), 130.0),
+        thing(Geometry::Triangles(floor), Material::MIRROR, DVec3::ZERO, 1.0),
+    ];
+    let camera = camera(DVec3::new(500.0, -700.0, 420.0), DVec3::new(500.0, 250.0, 20.0));
+    let flat = |graph: Graph| FlatScene::new(&scene(graph, camera), &Silent).unwrap();
+    let mut together = Graph::default();
+    for graph in &things {
+        together.append(graph.clone());
+    }
+    let together = flat(together);
+    let view = camera.view(together.origin, SIZE, SIZE);
+    // In cells of four by four pixels, as pictures are rendered.
+    let cells = (0..SIZE * SIZE / 16).flat_map(|cell| (0..16).map(move |i| (cell, i)));
+    let pixel = |(cell, i): (u32, u32)| (cell % 256 * 4 + i % 4, cell / 256 * 4 + i / 4);
+    let rays: Vec<Ray> =
+        cells.map(pixel).map(|(x, y)| view.ray(x as f32 + 0.5, y as f32 + 0.5)).collect();
+    let mut hits = vec![SceneHit::MISS; rays.len()];
+    let trace = |flat: &FlatScene, rays: &[Ray], hits: &mut [SceneHit]| {
+        for (rays, hits) in rays.chunks(4096).zip(hits.chunks_mut(4096)) {
+            scene_hits(flat, Simd::detect(), Which::All, rays, hits);
+        }
+    };
+    trace(&together, &rays, &mut hits);
+    let alone: Vec<(FlatScene, Vec<Ray>)> = things
+        .into_iter()
+        .enumerate()
+        .map(|(i, graph)| {
+            let is_own = |hit: &SceneHit| hit.instance == i as u32 || (i == 0 && hit.is_miss());
+            let own = rays.iter().zip(&hits).filter(|(_, hit)| is_own(hit)).map(|(ray, _)| *ray);
+            let own: Vec<Ray> = own.collect();
+            assert!(rays.len() < 50 * own.len(), "{} rays end on thing {i}", own.len());
+            (flat(graph), own)
+        })
+        .collect();
+    group.bench_function("together", |bencher| bencher.iter(|| trace(&together, &rays, &mut hits)));
+    group.bench_function("each alone", |bencher| {
+        bencher.iter(|| {
+            for (flat, rays) in &alone {
+                trace(flat, rays, &mut hits[..rays.len()]);
+            }
+        });
+    });
+    group.finish();
+}

@@ -1,0 +1,320 @@
+//! Noisy light has the right mean: many pictures of different seeds against plain integration.
+//!
+//! A z-test for each pixel, corrected for their number, and one for the whole picture, as the tests of
+//! mitsuba3 have it (`src/render/tests/test_renders.py`). What light a place gets is worked out here from
+//! the formulas alone, in double precision, with what blocks it as geometry.
+
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
+use surfel::flat::FlatScene;
+use surfel::math::{DAffine3, DVec3, Random, Vec3};
+use surfel::progress::Silent;
+use surfel::render::{CpuRenderer, Renderer, Settings};
+use surfel::scene::{
+    Background, Camera, Environment, Geometry, Graph, Lamp, LampKind, Light, Material, Node,
+    Projection, Scene, Sun, Transform,
+};
+use surfel::trace::Simd;
+use surfel_tests::scenes::{self, from_above};
+
+const SIDE: u32 = 12;
+/// Pictures where each has several samples a pixel, and where it has one.
+const N_RUNS: u64 = 64;
+const N_LONG_RUNS: u64 = 1024;
+
+/// Samples a run; more let the stratification within a run count.
+const SETTINGS: Settings = Settings {
+    width: SIDE,
+    height: SIDE,
+    samples_per_pixel: 1,
+    light_samples: 4,
+    max_depth: 2,
+    seed: 0,
+    with_layers: true,
+};
+
+/// Two-sided: one false alarm in a hundred pictures, shared among their pixels (Sidak 1967), is 3.98 for a
+/// normal distribution. That of a mean of 64 runs has heavier tails: 4.3 (Student's).
+const MOST_Z: f64 = 4.3;
+/// The same for one number.
+const MOST_Z_OF_ALL: f64 = 3.5;
+
+/// Panics unless the mean of all runs is what `expected` says of each pixel's place and the direction
+/// toward the viewer. `inexact` is the share of it that the formulas of the renderer leave open.
+fn check(
+    name: &str,
+    scene: &Scene,
+    n_runs: u64,
+    inexact: f64,
+    expected: impl Fn(DVec3, DVec3) -> f64 + Sync,
+) {
+    let flat = FlatScene::new(scene, &Silent).unwrap();
+    let renderer = CpuRenderer { simd: Simd::detect() };
+    let runs: Vec<_> = (0..n_runs)
+        .map(|seed| renderer.render(&flat, &Settings { seed, ..SETTINGS }, &Silent).unwrap().0)
+        .collect();
+    let positions = &runs[0].layers.as_ref().unwrap().position;
+    let view = scene.camera.view(flat.origin, SIDE, SIDE);
+    let answers: Vec<f64> = positions
+        .par_iter()
+        .map(|position| expected(position.as_dvec3(), view.toward_camera(*position).as_dvec3()))
+        .collect();
+    let brightest = answers.iter().copied().fold(0.0, f64::max);
+    // What one sample of all runs brings. That none is found of ten expected ones, which the variance of
+    // the others does not tell, happens once in 20 thousand times.
+    let one = brightest / (n_runs as f64 * f64::from(SETTINGS.light_samples));
+    let n = n_runs as f64;
+    let (mut sum, mut sum_expected, mut sum_variance) = (0.0, 0.0, 0.0);
+    for (i, answer) in answers.iter().enumerate() {
+        let values = || runs.iter().map(|run| f64::from(run.color[i][1]));
+        let mean = values().sum::<f64>() / n;
+        let variance = values().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0) / n;
+        let off = ((mean - answer).abs() - inexact * answer).max(0.0);
+        let z = off / variance.sqrt();
+        assert!(
+            z < MOST_Z || off < 10.0 * one,
+            "{name}, pixel {i}: {mean} for {answer}, {z} standard errors"
+        );
+        sum += mean;
+        sum_expected += answer;
+        sum_variance += variance;
+    }
+    let off = ((sum - sum_expected).abs() - (inexact + INTEGRATION) * sum_expected).max(0.0);
+    let z = off / sum_variance.sqrt();
+    let (mean, answer) = (sum / answers.len() as f64, sum_expected / answers.len() as f64);
+    assert!(z < MOST_Z_OF_ALL, "{name}: mean {mean} for {answer}, {z} standard errors");
+    // The test tells something: the whole picture is known to within 2 percent.
+    assert!(sum_variance.sqrt() < 0.02 * sum, "{name}: too noisy");
+}
+
+/// What the plain integrations here are off by, as a share.
+const INTEGRATION: f64 = 5e-4;
+
+/// A white floor, lit as `lights` say, beside what blocks them.
+fn floor_scene(lights: Vec<Light>) -> Scene {
+    let graph = scenes::graph(vec![
+        (Geometry::Triangles(scenes::floor(0.0, 10.0)), Material::MATTE),
+        (Geometry::Triangles(blocker()), Material::MATTE),
+    ]);
+    let camera = Camera {
+        // From the side and below the blocker.
+        position: DVec3::new(0.0, -6.0, 2.0),
+        focal_point: DVec3::ZERO,
+        view_up: DVec3::Z,
+        projection: Projection::Orthographic { height: 1.0 },
+    };
+    Scene { graph, lights, background: Background::Transparent, camera }
+}
+
+/// A sheet at z = 2.
+fn blocker() -> surfel::scene::Mesh {
+    scenes::quad(2.0 * Vec3::Z, 0.5 * Vec3::X, 0.3 * Vec3::Y)
+}
+
+/// Whether nothing blocks the way from `position` up to a height.
+fn is_open(position: DVec3, direction: DVec3, height: f64) -> bool {
+    if height < 2.0 || direction.z <= 0.0 {
+        return true;
+    }
+    let at_sheet = position + (2.0 - position.z) / direction.z * direction;
+    0.5 < at_sheet.x.abs() || 0.3 < at_sheet.y.abs()
+}
+
+/// Middles of `n` by `n` cells of the unit square.
+fn cells(n: u32) -> impl Iterator<Item = (f64, f64)> {
+    let middle = move |i: u32| (f64::from(i) + 0.5) / f64::from(n);
+    (0..n * n).map(move |i| (middle(i % n), middle(i / n)))
+}
+
+/// An orthonormal frame around a direction.
+fn frame(direction: DVec3) -> [DVec3; 3] {
+    let [tangent, bitangent] = direction.any_orthonormal_pair().into();
+    [tangent, bitangent, direction]
+}
+
+/// Direction at a height above the plane across a frame's third axis, and at an angle around it.
+fn direction(frame: &[DVec3; 3], height: f64, angle: f64) -> DVec3 {
+    let level = (1.0 - height * height).max(0.0).sqrt();
+    level * angle.cos() * frame[0] + level * angle.sin() * frame[1] + height * frame[2]
+}
+
+#[test]
+fn soft_shadows_of_the_sun_have_their_mean() {
+    let toward = Vec3::new(0.3, -0.2, 1.0).normalize();
+    let sun = Sun { direction: toward, color: Vec3::ONE, angular_diameter_deg: 25.0 };
+    let cos_max = (12.5f64).to_radians().cos();
+    let frame = frame(toward.as_dvec3());
+    check("sun", &floor_scene(vec![Light::Sun(sun)]), N_RUNS, 0.0, |position, _| {
+        let light = |(u, v): (f64, f64)| {
+            let toward = direction(&frame, 1.0 - u * (1.0 - cos_max), TAU * v);
+            if is_open(position, toward, f64::INFINITY) { toward.z.max(0.0) } else { 0.0 }
+        };
+        cells(200).map(light).sum::<f64>() / 200f64.powi(2)
+    });
+}
+
+#[test]
+fn soft_shadows_of_a_lamp_have_their_mean() {
+    let place = DVec3::new(0.4, 0.2, 4.0);
+    let radius = 0.5;
+    let lamp = Lamp {
+        kind: LampKind::Point,
+        color: 16.0 * std::f32::consts::PI * Vec3::ONE,
+        range: f32::INFINITY,
+        radius: radius as f32,
+    };
+    let mut scene = floor_scene(Vec::new());
+    let transform = Transform::Matrix(DAffine3::from_translation(place));
+    scene.graph.nodes.push(Node { lamp: Some(lamp), transform, ..Node::new("lamp") });
+    // A disc that faces the receiver, every place of which shines to all sides alike.
+    check("lamp", &scene, N_RUNS, 0.0, |position, _| {
+        let frame = frame((place - position).normalize());
+        let light = |(u, v): (f64, f64)| {
+            let (x, y) = (u.sqrt() * (TAU * v).cos(), u.sqrt() * (TAU * v).sin());
+            let way = place + radius * (x * frame[0] + y * frame[1]) - position;
+            let is_open = is_open(position, way.normalize(), way.z);
+            if is_open { 16.0 * way.z / way.length().powi(3) } else { 0.0 }
+        };
+        cells(200).map(light).sum::<f64>() / 200f64.powi(2)
+    });
+}
+
+/// A picture of pixels some of which are bright.
+fn structured(width: u32, share_bright: f32) -> Environment {
+    let mut random = Random::new(91, 0);
+    let mut pixel = || {
+        let is_bright = random.next_f32() < share_bright;
+        (if is_bright { 4.0 } else { 0.5 } * random.next_f32()) * Vec3::ONE
+    };
+    let pixels = (0..width * width / 2).map(|_| pixel()).collect();
+    Environment::new(width, width / 2, pixels, Vec3::new(0.1, 0.2, 1.0), 25.0).unwrap()
+}
+
+#[test]
+fn an_environment_over_a_floor_has_its_mean() {
+    let environment = structured(16, 0.2);
+    let scene = floor_scene(vec![Light::Environment(environment.clone())]);
+    check("environment", &scene, N_RUNS, 0.0, |position, _| {
+        let light = |(u, v): (f64, f64)| {
+            // Even in the square of the height: in proportion to the cosine.
+            let toward = direction(&[DVec3::X, DVec3::Y, DVec3::Z], u.sqrt(), TAU * v);
+            if !is_open(position, toward, f64::INFINITY) {
+                return 0.0;
+            }
+            f64::from(environment.radiance(toward.as_vec3()).y)
+        };
+        cells(200).map(light).sum::<f64>() / 200f64.powi(2)
+    });
+}
+
+/// A plane of rough metal seen from aslant.
+fn metal(roughness: f32, lights: Vec<Light>) -> Scene {
+    let rough = Material { ignores_colors: true, roughness, ..Material::METAL };
+    let graph = Graph::of(Geometry::Triangles(scenes::floor(0.0, 10.0)), rough);
+    let camera = Camera {
+        position: DVec3::new(1.0, -4.0, 3.0),
+        focal_point: DVec3::ZERO,
+        view_up: DVec3::Z,
+        projection: Projection::Perspective { view_angle_deg: 40.0 },
+    };
+    Scene { graph, lights, background: Background::Transparent, camera }
+}
+
+/// Radiance times cosine that a rough metal sends to the viewer for a unit of radiance from `toward`, but
+/// for the share that is lost between its facets: GGX (Walter et al. 2007) with the height-correlated
+/// masking of Smith (Heitz 2014), alpha the square of the roughness.
+fn single_bounce(viewer: DVec3, toward: DVec3, roughness: f64) -> f64 {
+    let alpha_squared = roughness.powi(4);
+    let half = (viewer + toward).normalize();
+    let tan_squared = |d: DVec3| (1.0 - d.z * d.z) / (d.z * d.z);
+    let facets =
+        alpha_squared / (PI * half.z.powi(4) * (alpha_squared + tan_squared(half)).powi(2));
+    let lambda = |d: DVec3| 0.5 * ((1.0 + alpha_squared * tan_squared(d)).sqrt() - 1.0);
+    let unmasked = 1.0 / (1.0 + lambda(viewer) + lambda(toward));
+    facets * unmasked / (4.0 * viewer.z)
+}
+
+/// The integral of `single_bounce` and of its product with `radiance` over the hemisphere. Facets' normals
+/// are gone through rather than directions, evenly in what they make of the lobe.
+fn over_hemisphere(viewer: DVec3, roughness: f64, radiance: impl Fn(DVec3) -> f64) -> (f64, f64) {
+    let n = 160;
+    let (mut all, mut lit) = (0.0, 0.0);
+    for (u, v) in cells(n) {
+        // Tangent of the facet's angle such that cells have equal shares of the distribution's area.
+        let tan_squared = roughness.powi(4) * u / (1.0 - u);
+        let cos = 1.0 / (1.0 + tan_squared).sqrt();
+        let half = direction(&[DVec3::X, DVec3::Y, DVec3::Z], cos, TAU * v);
+        let toward = 2.0 * viewer.dot(half) * half - viewer;
+        if toward.z <= 0.0 || viewer.dot(half) <= 0.0 {
+            continue;
+        }
+        // The density of such facets times that of directions per facet.
+        let alpha_squared = roughness.powi(4);
+        let density = alpha_squared
+            / (PI * cos.powi(3) * (alpha_squared + tan_squared).powi(2))
+            / (4.0 * viewer.dot(half));
+        let weight = single_bounce(viewer, toward, roughness) / density;
+        all += weight;
+        lit += weight * radiance(toward);
+    }
+    let n_cells = f64::from(n).powi(2);
+    (all / n_cells, lit / n_cells)
+}
+
+/// The table of shares lost between facets is interpolated: off by up to this.
+const TABLE: f64 = 0.01;
+
+#[test]
+fn rough_reflections_of_an_environment_have_their_mean() {
+    let environment = structured(32, 0.1);
+    for roughness in [0.3f32, 0.7] {
+        let scene = metal(roughness, vec![Light::Environment(environment.clone())]);
+        check(&format!("metal {roughness}"), &scene, N_LONG_RUNS, TABLE, |_, viewer| {
+            let radiance = |toward: DVec3| f64::from(environment.radiance(toward.as_vec3()).y);
+            let (all, lit) = over_hemisphere(viewer, f64::from(roughness), radiance);
+            lit / all
+        });
+    }
+}
+
+#[test]
+fn highlights_of_the_sun_on_rough_metal_have_their_mean() {
+    let toward = Vec3::new(-0.2, 0.7, 0.6).normalize();
+    let sun = Sun { direction: toward, color: Vec3::ONE, angular_diameter_deg: 20.0 };
+    let cos_max = 10f64.to_radians().cos();
+    let around_sun = frame(toward.as_dvec3());
+    for roughness in [0.3f32, 0.7] {
+        let scene = metal(roughness, vec![Light::Sun(sun)]);
+        check(&format!("metal {roughness}"), &scene, N_RUNS, TABLE, |_, viewer| {
+            let (all, _) = over_hemisphere(viewer, f64::from(roughness), |_| 0.0);
+            let light = |(u, v): (f64, f64)| {
+                let toward = direction(&around_sun, 1.0 - u * (1.0 - cos_max), TAU * v);
+                // A sun of strength 1 sends pi to what faces it.
+                if toward.z <= 0.0 {
+                    0.0
+                } else {
+                    PI * single_bounce(viewer, toward, roughness.into())
+                }
+            };
+            cells(100).map(light).sum::<f64>() / 100f64.powi(2) / all
+        });
+    }
+}
+
+/// The test itself: a light a little stronger than said is noticed.
+#[test]
+fn the_test_would_notice_two_percent() {
+    let sun = |strength: f32| {
+        let color = strength * Vec3::ONE;
+        Light::Sun(Sun { direction: Vec3::Z, color, angular_diameter_deg: 25.0 })
+    };
+    let cos_max = (12.5f64).to_radians().cos();
+    let is_noticed = |strength: f32| {
+        let mut scene = floor_scene(vec![sun(strength)]);
+        scene.camera = from_above(0.5);
+        scene.graph.nodes[1].is_visible = false;
+        let check = || check("strong sun", &scene, N_RUNS, 0.0, |_, _| 0.5 * (1.0 + cos_max));
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(check)).is_err()
+    };
+    assert_eq!([1.0, 1.02].map(is_noticed), [false, true]);
+}

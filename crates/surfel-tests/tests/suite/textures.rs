@@ -1,0 +1,280 @@
+//! Colours, textures, masks and normal maps on triangles, where they should be.
+
+use crate::materials::{
+    SETTINGS, WHITE_SKY, assert_near, mesh, pane, rgb, scene, shadow_of, sun, with_positions,
+};
+use std::f32::consts::FRAC_PI_2;
+use surfel::math::{Vec2, Vec3};
+use surfel::scene::{
+    AlphaMode, Background, Graph, Light, Material, Mesh, Scene, Texture, TextureRef, Textures,
+};
+use surfel_tests::scenes::{self, from_above, render};
+
+const RED: [u8; 4] = [255, 0, 0, 255];
+const GREEN: [u8; 4] = [0, 255, 0, 255];
+const BLUE: [u8; 4] = [0, 0, 255, 255];
+const WHITE: [u8; 4] = [255; 4];
+
+fn two_by_two(texels: [[u8; 4]; 4]) -> Texture {
+    Texture { width: 2, height: 2, texels: texels.to_vec() }
+}
+
+fn nearest() -> TextureRef {
+    TextureRef { is_nearest: true, ..TextureRef::new(0) }
+}
+
+/// The square |x|, |y| <= 1 that fills the picture, without light.
+fn square(material: Material, texture: Texture) -> Graph {
+    let mut graph = Graph::of(mesh(scenes::floor(0.0, 1.0)), material);
+    graph.textures = vec![texture];
+    graph
+}
+
+fn textured(base_color: TextureRef, material: Material) -> Material {
+    let textures = Textures { base_color: Some(base_color), ..Textures::default() };
+    Material { textures, ..material }
+}
+
+/// The colour expected at a place of a square.
+type ColorAt<'a> = &'a dyn Fn(f32, f32) -> Vec3;
+
+#[test]
+fn a_texture_lies_on_a_quad_the_right_way_up() {
+    let texture = two_by_two([RED, GREEN, BLUE, WHITE]);
+    let color = |x: f32, y: f32| match (x < 0.0, y < 0.0) {
+        (true, false) => Vec3::X,
+        (false, false) => Vec3::Y,
+        (true, true) => Vec3::Z,
+        (false, true) => Vec3::ONE,
+    };
+    let turned = TextureRef { rotation_rad: FRAC_PI_2, offset: Vec2::Y, ..nearest() };
+    let scaled = TextureRef { scale: Vec2::new(2.0, 1.0), ..nearest() };
+    let at_turned = |x: f32, y: f32| color(-y, x);
+    let at_scaled = |x: f32, y: f32| color(x - 0.5f32.copysign(x), y);
+    let cases: [(&str, TextureRef, ColorAt); 3] = [
+        ("as it is", nearest(), &color),
+        // Coordinates turn counter-clockwise, so the picture turns the other way.
+        ("turned", turned, &at_turned),
+        ("repeated", scaled, &at_scaled),
+    ];
+    for (name, reference, expected) in cases {
+        let graph = square(textured(reference, Material::UNLIT), texture.clone());
+        let image = render(&scene(graph, Vec::new(), from_above(2.0)), &SETTINGS);
+        for (i, (found, position)) in with_positions(&image).enumerate() {
+            assert_eq!(found, expected(position.x, position.y), "{name} at {position}");
+            // The picture's own left and top.
+            assert_eq!((i % 32 < 16, i / 32 < 16), (position.x < 0.0, 0.0 < position.y));
+        }
+    }
+}
+
+#[test]
+fn the_second_set_of_texture_coordinates_counts_where_it_is_asked_for() {
+    let mut upside_down = scenes::floor(0.0, 1.0);
+    let turned = upside_down.uvs[0].iter().flatten().map(|uv| Vec2::ONE - uv).collect();
+    upside_down.uvs[1] = Some(turned);
+    let reference = TextureRef { uv_set: 1, ..nearest() };
+    let mut graph =
+        square(textured(reference, Material::UNLIT), two_by_two([RED, GREEN, BLUE, WHITE]));
+    graph.geometries = vec![mesh(upside_down)];
+    let image = render(&scene(graph, Vec::new(), from_above(2.0)), &SETTINGS);
+    let corners = [0, 31, 31 * 32, 32 * 32 - 1].map(|i| rgb(image.color[i]));
+    assert_eq!(corners, [Vec3::ONE, Vec3::Z, Vec3::Y, Vec3::X]);
+}
+
+#[test]
+fn unlit_colours_on_triangles_are_exact() {
+    let base_color = Vec3::new(0.1, 0.7, 3.0);
+    let material = Material { base_color, ..Material::UNLIT };
+    let graph = Graph::of(mesh(scenes::floor(0.0, 1.0)), material);
+    let lights = vec![sun(Vec3::X), Light::Sky(WHITE_SKY), Light::Headlight(7.0)];
+    let image = render(&scene(graph, lights, from_above(2.0)), &SETTINGS);
+    assert!(image.color.iter().all(|pixel| rgb(*pixel) == base_color && pixel[3] == 1.0));
+}
+
+#[test]
+fn emission_and_glow_add_to_light() {
+    let material = Material {
+        base_color: Vec3::new(0.5, 0.25, 1.0),
+        emissive: Vec3::new(0.1, 0.2, 0.0),
+        glow: 2.0,
+        ..Material::MATTE
+    };
+    let expected = Vec3::new(1.1, 0.7, 2.0);
+    let graph = Graph::of(mesh(scenes::floor(0.0, 1.0)), material);
+    for (strength, reflected) in [(0.0, Vec3::ZERO), (3.0, Vec3::new(1.5, 0.75, 3.0))] {
+        let lights = vec![Light::Headlight(strength)];
+        let image = render(&scene(graph.clone(), lights, from_above(2.0)), &SETTINGS);
+        for (color, _) in with_positions(&image) {
+            assert_near(color, expected + reflected, 1e-5, "emission");
+        }
+    }
+}
+
+#[test]
+fn colours_of_vertices_are_linear_between_them() {
+    let mut square = scenes::floor(0.0, 1.0);
+    let color = |p: Vec3| Vec3::new(0.5 + 0.5 * p.x, 0.5 - 0.3 * p.y, 0.2 * (p.x + p.y) + 0.5);
+    let of_vertex = |p: &Vec3| color(*p).extend(1.0);
+    square.colors = Some(square.positions.iter().map(of_vertex).collect());
+    for (ignores_colors, material) in [(false, Material::UNLIT), (true, Material::UNLIT)] {
+        let graph = Graph::of(mesh(square.clone()), Material { ignores_colors, ..material });
+        let image = render(&scene(graph, Vec::new(), from_above(2.0)), &SETTINGS);
+        for (found, position) in with_positions(&image) {
+            let expected = if ignores_colors { Vec3::ONE } else { color(position) };
+            assert_near(found, expected, 1e-5, "vertex colours");
+        }
+    }
+}
+
+#[test]
+fn a_mask_cuts_holes_into_picture_and_shadow() {
+    // The left upper and the right lower quarters are there.
+    let (full, none) = ([255u8; 4], [255, 255, 255, 100]);
+    let texture = two_by_two([full, none, none, full]);
+    let mask = Material { alpha_mode: AlphaMode::Mask(0.5), ..Material::MATTE };
+    let material = textured(nearest(), mask);
+    let is_there = |position: Vec3| (position.x < 0.0) == (0.0 < position.y);
+    let graph = square(material.clone(), texture.clone());
+    let image = render(&scene(graph, vec![Light::Headlight(1.0)], from_above(2.0)), &SETTINGS);
+    for (i, pixel) in image.color.iter().enumerate() {
+        let place = Vec3::new((i % 32) as f32 - 15.5, 15.5 - (i / 32) as f32, 0.0);
+        let expected = if is_there(place) { 1.0 } else { 0.0 };
+        assert!(pixel.iter().all(|value| (value - expected).abs() < 1e-5), "{pixel:?} at {place}");
+    }
+    for (color, position) in shadow_of(mesh(pane()), material, vec![texture]) {
+        let from_edge =
+            (position.abs().max_element() - 0.5).abs().min(position.x.abs()).min(position.y.abs());
+        if from_edge < 1e-3 {
+            continue;
+        }
+        let is_dark = position.x.abs().max(position.y.abs()) < 0.5 && is_there(position);
+        assert_near(color, Vec3::splat(if is_dark { 0.0 } else { 1.0 }), 1e-5, "shadow");
+    }
+}
+
+#[test]
+fn alpha_mixes_a_surface_with_what_is_behind() {
+    let there = Material {
+        alpha: 0.25,
+        alpha_mode: AlphaMode::Blend,
+        base_color: Vec3::X,
+        ..Material::UNLIT
+    };
+    let behind = Material { base_color: Vec3::Y, ..Material::UNLIT };
+    let graph = scenes::graph(vec![
+        (mesh(scenes::floor(1.0, 2.0)), there.clone()),
+        (mesh(scenes::floor(0.5, 2.0)), there),
+        (mesh(scenes::quad(Vec3::X, Vec3::X, 2.0 * Vec3::Y)), behind),
+    ]);
+    let image = render(&scene(graph, Vec::new(), from_above(2.0)), &SETTINGS);
+    let red = 0.25 + 0.75 * 0.25;
+    for (i, pixel) in image.color.iter().enumerate() {
+        let expected = if i % 32 < 16 { [red, 0.0, 0.0, red] } else { [red, 1.0 - red, 0.0, 1.0] };
+        let off = pixel.iter().zip(expected).fold(0.0, |most: f32, (a, b)| most.max((a - b).abs()));
+        assert!(off < 1e-5, "{pixel:?}");
+    }
+}
+
+/// A square with a normal map of one colour, under a sun.
+fn bumped(texel: [u8; 3], toward_sun: Vec3, change: impl Fn(&mut Mesh, &mut f32)) -> Vec3 {
+    let (mut square, mut scale) = (scenes::floor(0.0, 1.0), 1.0);
+    change(&mut square, &mut scale);
+    let [x, y, z] = texel;
+    let texture = Texture { width: 1, height: 1, texels: vec![[x, y, z, 255]] };
+    let textures = Textures { normal: Some((TextureRef::new(0), scale)), ..Textures::default() };
+    let mut graph = Graph::of(mesh(square), Material { textures, ..Material::MATTE });
+    graph.textures = vec![texture];
+    let image = render(&scene(graph, vec![sun(toward_sun)], from_above(1.0)), &SETTINGS);
+    let color = rgb(image.color[0]);
+    assert!(image.color.iter().all(|pixel| rgb(*pixel).distance(color) < 1e-5));
+    color
+}
+
+#[test]
+fn normal_maps_bend_normals_to_their_right_and_up() {
+    let flat = [128, 128, 255];
+    let as_it_is = |_: &mut Mesh, _: &mut f32| {};
+    let toward = Vec3::new(0.6, 0.48, 0.64);
+    // 128 of 255 is not quite the middle: 0.004 to either side.
+    assert_near(bumped(flat, toward, as_it_is), Vec3::splat(0.64), 0.006, "flat");
+    let not_at_all = |_: &mut Mesh, scale: &mut f32| *scale = 0.0;
+    assert_near(bumped([255, 200, 255], toward, not_at_all), Vec3::splat(0.64), 1e-6, "scale 0");
+    // Leaning by 45 degrees: (1, 0, 1) and (0, 1, 1).
+    let lit = |x: f32, y: f32| Vec3::splat(Vec3::new(x, y, 1.0).normalize().dot(toward));
+    let mirrored = |square: &mut Mesh, _: &mut f32| {
+        square.uvs[0].iter_mut().flatten().for_each(|uv| uv.x = 1.0 - uv.x);
+    };
+    let with_tangents = |square: &mut Mesh, _: &mut f32| {
+        // Those that the texture coordinates have: bitangents up.
+        square.normals = Some(vec![Vec3::Z; 4]);
+        square.tangents = Some(vec![Vec3::X.extend(1.0); 4]);
+    };
+    for (name, change, sign) in [
+        ("of the coordinates", &as_it_is as &dyn Fn(&mut Mesh, &mut f32), 1.0),
+        ("of tangents", &with_tangents, 1.0),
+        ("mirrored", &mirrored, -1.0),
+    ] {
+        let found = bumped([255, 128, 255], toward, change);
+        assert_near(found, lit(sign, 0.0), 0.006, &format!("right, {name}"));
+        let found = bumped([128, 255, 255], toward, change);
+        assert_near(found, lit(0.0, 1.0), 0.006, &format!("up, {name}"));
+    }
+}
+
+/// Textures other than colour multiply what the material says.
+#[test]
+fn textures_scale_transmission_and_emission() {
+    let texel = |texel: [u8; 4]| Texture { width: 1, height: 1, texels: vec![texel] };
+    let see = |material: Material, texture: Texture| {
+        let graph = square(material, texture);
+        let background = Background::Gradient { top: Vec3::ONE, bottom: Vec3::ONE };
+        let mut dim = WHITE_SKY;
+        (dim.zenith, dim.ground) = (Vec3::splat(0.5), Vec3::splat(0.5));
+        let scene = Scene { background, ..scene(graph, vec![Light::Sky(dim)], from_above(1.0)) };
+        rgb(render(&scene, &SETTINGS).color[0])
+    };
+    let with = |textures: Textures, material: Material| Material { textures, ..material };
+    let reference = Some(TextureRef::new(0));
+    // Emission is stored as colours are: 188 stands for 0.503.
+    let emissive = Textures { emissive: reference, ..Textures::default() };
+    let material = Material { base_color: Vec3::ZERO, emissive: Vec3::ONE, ..Material::MATTE };
+    assert_near(
+        see(with(emissive, material), texel([188, 0, 255, 255])),
+        Vec3::new(0.503, 0.0, 1.0),
+        1e-3,
+        "emissive",
+    );
+    // Half matte white under half light, half clear before white.
+    let transmission = Textures { transmission: reference, ..Textures::default() };
+    let clear = Material { ior: 1.0, ..Material::GLASS };
+    assert_near(
+        see(with(transmission, clear), texel([51, 0, 0, 255])),
+        Vec3::splat(0.2 + 0.8 * 0.5),
+        1e-3,
+        "transmission",
+    );
+}
+
+/// Roughness is in green and metal in blue: a mirror for a fifth of the light, sharp although the material
+/// is rough, before a background that is bright above and dark below.
+#[test]
+fn a_texture_scales_roughness_by_green_and_metal_by_blue() {
+    let reference = Some(TextureRef::new(0));
+    let textures = Textures { metallic_roughness: reference, ..Textures::default() };
+    let base_color = Vec3::splat(0.5);
+    let rough = Material { metallic: 1.0, base_color, textures, ..Material::MATTE };
+    let background = Background::Gradient { top: Vec3::ONE, bottom: Vec3::ZERO };
+    let see = |texel: [u8; 4]| {
+        let graph = square(rough.clone(), Texture { width: 1, height: 1, texels: vec![texel] });
+        let scene = Scene { background, ..scene(graph, Vec::new(), from_above(1.0)) };
+        render(&scene, &SETTINGS).color
+    };
+    // Straight back, half way from bottom to top.
+    for pixel in see([255, 0, 51, 255]) {
+        assert_near(rgb(pixel), Vec3::splat(0.2 * 0.5 * 0.5), 1e-5, "sharp");
+    }
+    let (sharp, rough) = (see([0, 0, 255, 255]), see([0, 128, 255, 255]));
+    assert!(sharp.iter().all(|pixel| *pixel == sharp[0]));
+    assert!(rough.iter().any(|pixel| 0.05 < (pixel[0] - sharp[0][0]).abs()));
+}
