@@ -226,7 +226,7 @@ impl<'a> Film<'a> {
         let (image, _) = self
             .renderer
             .render(&self.flat, &settings, &Muted(report))
-            .with_context(|| format!("at {time_secs:.3} s (go on later with --resume)"))?;
+            .with_context(|| format!("at {time_secs:.3} s"))?;
         Ok(image)
     }
 }
