@@ -11,7 +11,8 @@ use surfel_formats::{ImageOptions, SaveOptions, save, save_image};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
-    for target in ["ply", "xyz", "las", "bin", "environment", "obj", "stl", "mtl", "gltf", "scene"] {
+    for target in ["ply", "xyz", "las", "bin", "environment", "obj", "stl", "mtl", "gltf", "scene"]
+    {
         fs::create_dir_all(corpus.join(target))?;
     }
     for (name, cloud) in [("bare", bare(7)), ("full", full(7))] {

@@ -53,9 +53,9 @@ Examples:
 
 pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow::Result<()> {
     args.scene.check()?;
-    let Some(output) = &args.output else {
+    if args.output.is_none() && !args.dry_run {
         return Err(Usage("name the film with -o, as in -o film.mp4".into()).into());
-    };
+    }
     let (width, height) = args.scene.picture.resolution;
     let mut options = MovieOptions {
         width,
@@ -65,21 +65,21 @@ pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow
         image: picture::image_options(DVec3::ZERO, &args.scene),
         fingerprint: String::new(),
     };
-    check(output, &options)?;
+    args.output.as_deref().map_or(Ok(()), |output| check(output, &options))?;
     let mut assembly = picture::load(&args.scene, line, global, report)?;
     options.n_frames = n_frames(args, &assembly.graph, assembly.camera_motion.as_ref())?;
     assembly.graph.pose(0.0);
     let choices = picture::choose(&assembly, &args.scene, report)?;
     let mut resolved = dry_run::scene(&assembly, &choices, &args.scene, line);
-    resolved["output"] = serde_json::json!(output);
+    resolved["output"] = serde_json::json!(args.output);
     resolved["frames"] = serde_json::json!(options.n_frames);
     resolved["fps"] = serde_json::json!(args.fps);
     if let Some(seconds) = args.turntable {
         resolved["turntable"] = serde_json::json!(seconds);
     }
-    if args.dry_run {
+    let (Some(output), false) = (&args.output, args.dry_run) else {
         return Ok(crate::report::print(&format!("{resolved:#}"))?);
-    }
+    };
     options.fingerprint = fingerprint(&resolved, &args.scene, line);
     let cameras: Vec<Camera> = (0..options.n_frames)
         .map(|frame| camera_at(f64::from(frame) / args.fps, &assembly, &choices))
@@ -226,7 +226,7 @@ impl<'a> Film<'a> {
         let (image, _) = self
             .renderer
             .render(&self.flat, &settings, &Muted(report))
-            .with_context(|| format!("at {time_secs:.3} s (go on later with --resume)"))?;
+            .with_context(|| format!("at {time_secs:.3} s"))?;
         Ok(image)
     }
 }

@@ -28,8 +28,8 @@ pub struct Assembly<'a> {
     files: Vec<(PathBuf, Range<usize>)>,
     /// Objects of scene files that were added.
     objects: Vec<Added>,
-    /// Options of their own that objects have.
-    object_args: Vec<SceneArgs>,
+    /// Options of their own that objects have, and the files these are for.
+    object_args: Vec<(SceneArgs, &'a [PathBuf])>,
     /// Of each geometry, the index in `object_args`; none for the scene's own options.
     args_of: Vec<Option<usize>>,
     sources: Vec<Source>,
@@ -120,7 +120,7 @@ impl<'a> Assembly<'a> {
         first..self.graph.nodes.len()
     }
 
-    fn add_object(&mut self, object: &Object, report: &Report) -> anyhow::Result<()> {
+    fn add_object(&mut self, object: &'a Object, report: &Report) -> anyhow::Result<()> {
         let line = self.line;
         let before = &line.scene.objects[..self.objects.len()];
         let parent = object.parent.as_ref();
@@ -137,7 +137,8 @@ impl<'a> Assembly<'a> {
             // The same file made in the same way: held once.
             self.graph.add_copy(self.objects[twin].content.clone(), node);
         } else {
-            self.object_args.push(line.for_object(&object.name, &object.look.options)?);
+            let args = line.for_object(&object.name, &object.look.options)?;
+            self.object_args.push((args, &object.files));
             self.add_content(node, object, report)?;
         }
         let content = first..self.graph.nodes.len();
@@ -155,7 +156,7 @@ impl<'a> Assembly<'a> {
         let object_args = self.object_args.len() - 1;
         let mut merging = Vec::new();
         for (file_idx, file) in object.files.iter().enumerate() {
-            let (graph, source) = load(file, &self.object_args[object_args], report)?;
+            let (graph, source) = load(file, &self.object_args[object_args].0, report)?;
             self.sources.push(source.clone());
             if object.is_merged {
                 let Ok(cloud) = into_cloud(graph, false) else {
@@ -243,28 +244,34 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Clouds, with the options that they are made by.
-    pub fn clouds(&self) -> impl Iterator<Item = (&PointCloud, &SceneArgs)> {
-        self.graph.geometries.iter().zip(&self.args_of).filter_map(
-            |(geometry, args)| match geometry {
-                Geometry::Points(points) => Some((&points.cloud, self.args(*args))),
+    /// Clouds, with the options that they are made by, and the files that they came from.
+    pub fn clouds(&self) -> impl Iterator<Item = (&PointCloud, &SceneArgs, &[PathBuf])> {
+        self.graph.geometries.iter().zip(&self.args_of).filter_map(|(geometry, object_args)| {
+            match geometry {
+                Geometry::Points(points) => {
+                    let (args, files) = self.args(*object_args);
+                    Some((&points.cloud, args, files))
+                }
                 Geometry::Triangles(_) => None,
-            },
-        )
+            }
+        })
     }
 
-    fn args(&self, object_args: Option<usize>) -> &SceneArgs {
-        object_args.map_or(self.args, |i| &self.object_args[i])
+    fn args(&self, object_args: Option<usize>) -> (&SceneArgs, &[PathBuf]) {
+        match object_args {
+            Some(i) => (&self.object_args[i].0, self.object_args[i].1),
+            None => (self.args, &self.args.files),
+        }
     }
 
     /// Prepares and colours all clouds, and gives everything its material.
     pub fn make(mut self, up: Vec3, report: &Report) -> anyhow::Result<Graph> {
         let mut geometries = std::mem::take(&mut self.graph.geometries);
-        for (geometry, args) in geometries.iter_mut().zip(&self.args_of) {
+        for (geometry, object_args) in geometries.iter_mut().zip(&self.args_of) {
             if let Geometry::Points(points) = geometry {
-                let args = self.args(*args);
+                let (args, files) = self.args(*object_args);
                 make_points(points, args, self.args.picture.seed, up, report)
-                    .with_context(|| name_files(&self.args.files))?;
+                    .with_context(|| name_files(files))?;
             }
         }
         self.graph.geometries = geometries;

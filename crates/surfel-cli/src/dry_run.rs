@@ -71,8 +71,8 @@ pub fn scene(assembly: &Assembly, choices: &Choices, args: &SceneArgs, line: &Li
 
 /// What all clouds that leave it open are coloured by, if that is the same.
 fn chosen_color(assembly: &Assembly) -> Option<ColorSource> {
-    let open = assembly.clouds().filter(|(_, args)| args.color.color.is_none());
-    let mut chosen = open.map(|(cloud, _)| choose(cloud).0);
+    let open = assembly.clouds().filter(|(_, args, _)| args.color.color.is_none());
+    let mut chosen = open.map(|(cloud, ..)| choose(cloud).0);
     let first = chosen.next()?;
     chosen.all(|other| other == first).then_some(first)
 }

@@ -44,9 +44,6 @@ pub fn make(
     let mut assembly = timed(&mut seconds.load, || load(&args.scene, line, global, report))?;
     assembly.graph.pose(args.time);
     let choices = choose(&assembly, &args.scene, report)?;
-    if args.dry_run {
-        return Ok(crate::report::print(&dry_run::resolved(&assembly, &choices, args, line))?);
-    }
     let camera = camera_at(args.time, &assembly, &choices);
     let scene = timed(&mut seconds.prepare, || describe(assembly, choices, &args.scene, report))?;
     let scene = Scene { camera, ..scene };
@@ -72,6 +69,15 @@ pub fn make(
         stats::write(path, &run.json())?;
     }
     Ok(())
+}
+
+/// Prints what would be made, and makes nothing.
+pub fn tell(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow::Result<()> {
+    args.output.as_deref().map_or(Ok(()), check_output)?;
+    let mut assembly = load(&args.scene, line, global, report)?;
+    assembly.graph.pose(args.time);
+    let choices = choose(&assembly, &args.scene, report)?;
+    Ok(crate::report::print(&dry_run::resolved(&assembly, &choices, args, line))?)
 }
 
 pub fn tell_threads(renderer: &CpuRenderer, report: &Report) {
@@ -122,14 +128,14 @@ pub fn load<'a>(
     let sources = inspected.collect::<Result<Vec<_>, _>>()?;
     Plan::new(&sources, &files, args.preparation.select, n_pixels).check(global)?;
     let assembly = Assembly::load(args, line, report)?;
-    check_color(&assembly, args)?;
+    check_color(&assembly)?;
     Ok(assembly)
 }
 
 /// Fails before the preparation if no file has the column asked for. The library knows only the columns
 /// that were loaded, which are those asked for.
-fn check_color(assembly: &Assembly, args: &SceneArgs) -> anyhow::Result<()> {
-    for (cloud, of_cloud) in assembly.clouds() {
+fn check_color(assembly: &Assembly) -> anyhow::Result<()> {
+    for (cloud, of_cloud, files) in assembly.clouds() {
         let Some(color) = &of_cloud.color.color else { continue };
         let is_prepared = match color {
             ColorSource::Normal => true,
@@ -142,7 +148,7 @@ fn check_color(assembly: &Assembly, args: &SceneArgs) -> anyhow::Result<()> {
         bail!(
             "{}: no column {color}; --color takes elevation, normal, {SURFACE_VARIATION}, #RRGGBB \
              and what the file has: {}",
-            name_files(&args.files),
+            name_files(files),
             match shown(&assembly.source.columns) {
                 none if none.is_empty() => "only positions".to_owned(),
                 columns => columns.join(", "),

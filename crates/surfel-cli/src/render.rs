@@ -40,6 +40,9 @@ Examples:
 
 pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow::Result<()> {
     args.scene.check()?;
+    if args.dry_run {
+        return picture::tell(args, line, global, report);
+    }
     let stdout = Path::new("-");
     let Some(output) = &args.output else {
         return Err(Usage("name the picture with -o, as in -o picture.png".into()).into());

@@ -226,6 +226,29 @@ fn the_camera_and_lamps_move_too() {
 }
 
 #[test]
+fn frames_are_the_pictures_at_their_times() {
+    let folder = Folder::new();
+    folder.write("dome.ply", dome(20));
+    let scene = "light = [\"sun\"]\nexposure = 0.5\nup = \"+Z\"\nsun.azimuth = 40\n\
+        camera.position = [2, -3, 3]\ncamera.focal-point = [0, 0, 0]\n\
+        [[object]]\nfile = \"dome.ply\"\n\
+        [[lamp]]\nname = \"l\"\nposition = [2, 0, 1]\nstrength = 3\n\
+        [[lamp]]\nkind = \"directional\"\nstrength = 0.2\n\
+        [[animation]]\nobject = \"l\"\nkind = \"orbit\"\ncenter = [0, 0, 1]\nseconds = 2\n\
+        [[animation]]\nobject = \"dome\"\ntimes = [0, 1]\ntranslate = [[0, 0, 0], [0.5, 0, 0]]\n";
+    let scene = folder.write("scene.toml", scene);
+    let path = folder.path("film.png");
+    film(&[&scene, "-o", &path, "--fps", "2"]);
+    let (frames, _) = read_apng(&path);
+    assert_eq!(frames.len(), 4);
+    for (time, frame) in ["0", "0.5", "1", "1.5"].iter().zip(&frames) {
+        let picture = folder.path("at.png");
+        succeed(&[&["render", &scene, "-o", &picture, "--time", time], &SMALL[..]].concat());
+        assert!(&read_png(&picture).3 == frame, "{time}");
+    }
+}
+
+#[test]
 fn the_animation_of_a_gltf_file_plays() {
     let folder = Folder::new();
     let scene = folder.write("triangle.gltf", gltf());
@@ -295,6 +318,7 @@ fn a_dry_run_of_a_film_makes_the_same_film() {
     let arguments = [&["animate"], &arguments[..], &SMALL].concat();
     let told = succeed(&[&arguments[..], &["--dry-run"]].concat());
     assert_eq!(folder.names(), ["dome.ply"]);
+    assert!(succeed(&["animate", &cloud, "--frames", "3", "--dry-run"]).contains("\"frames\": 3"));
     succeed(&arguments);
     let made = fs::read(&path).unwrap();
     fs::remove_file(&path).unwrap();

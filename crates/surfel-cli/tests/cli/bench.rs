@@ -1,6 +1,6 @@
 //! `surfel bench`: the same rays and answers as Embree's, and the form in which they are told.
 
-use super::common::{Folder, dome, fail, stderr, succeed, surfel};
+use super::common::{Folder, dome, fail, stderr, succeed, surfel, tile};
 use serde_json::Value;
 use surfel::progress::Silent;
 use surfel_formats::{LoadOptions, load, load_bytes};
@@ -144,6 +144,21 @@ fn spheres_are_not_gathered() {
     let text = fail(&[&spheres[..], &["--rays", "primary,gather"]].concat(), 2);
     assert!(text.contains("--surface sphere"), "{text}");
     assert!(fail(&["bench", &cloud, "--surface", "points"], 2).contains("name another kind"));
+}
+
+#[test]
+fn a_mesh_is_measured_in_triangles() {
+    let folder = Folder::new();
+    let mesh = folder.write("tile.ply", tile(2.0, 1.0, [9; 3]));
+    let result = bench(&[&mesh, "--resolution", "32x32"]);
+    assert_eq!((&result["triangles"], &result["surface"]), (&2.into(), &"triangle".into()));
+    assert!(result.get("points").is_none() && result.get("bytes_per_point").is_none());
+    assert_eq!(keys(&result["bytes_per_triangle"]), ["tree", "triangles", "total"]);
+    assert!(100 < result["rays"]["primary"]["hits"].as_u64().unwrap());
+    assert_eq!(keys(&result["rays"]), ["primary", "shadow", "bounce-any", "bounce"]);
+    let told = fail(&["bench", &mesh, "--runs", "1", "--rays", "gather"], 2);
+    assert!(told.contains("a mesh"), "{told}");
+    assert!(succeed(&["bench", &mesh, "--runs", "1", "--resolution", "9x9"]).contains("triangle"));
 }
 
 #[test]

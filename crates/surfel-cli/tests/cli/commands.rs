@@ -1,6 +1,6 @@
 //! Every command end to end.
 
-use super::common::{Folder, dome, read_png, succeed, surfel};
+use super::common::{Folder, dome, read_png, succeed, surfel, tile};
 use serde_json::Value;
 use std::fs;
 
@@ -139,6 +139,20 @@ fn info_tells_a_person_and_a_program() {
 }
 
 #[test]
+fn info_and_prepare_take_a_mesh() {
+    let folder = Folder::new();
+    let mesh = folder.write("tile.ply", tile(2.0, 1.0, [10, 20, 30]));
+    let info: Value = serde_json::from_str(&succeed(&["info", "--json", &mesh])).unwrap();
+    assert_eq!((&info["points"], &info["triangles"]), (&4.into(), &2.into()));
+    assert!(succeed(&["info", &mesh]).contains("triangles"));
+    let prepared = folder.path("out.ply");
+    succeed(&["prepare", &mesh, "-o", &prepared]);
+    let info: Value = serde_json::from_str(&succeed(&["info", "--json", &prepared])).unwrap();
+    assert_eq!((&info["points"], &info["triangles"]), (&4.into(), &Value::Null));
+    assert!(info["columns"].get("normal").is_some() && info["columns"].get("rgb").is_some());
+}
+
+#[test]
 fn demo_scans_and_renders() {
     let folder = Folder::new();
     let output = folder.path("demo");
@@ -153,7 +167,7 @@ fn demo_scans_and_renders() {
 
 #[test]
 fn help_has_examples() {
-    for command in ["render", "info", "prepare", "demo", "bench"] {
+    for command in ["render", "animate", "info", "prepare", "demo", "bench"] {
         let help = succeed(&[command, "--help"]);
         assert!(help.contains("Examples:") && help.contains("--threads"), "{help}");
     }

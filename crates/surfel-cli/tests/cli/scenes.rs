@@ -245,7 +245,7 @@ fn a_dry_run_of_clouds_with_other_columns_can_be_rendered() {
 }
 
 fn dry(arguments: &[&str]) -> Value {
-    let told = succeed(&[&["render"], arguments, &["-o", "no.png", "--dry-run"]].concat());
+    let told = succeed(&[&["render"], arguments, &["--dry-run"]].concat());
     serde_json::from_str(&told).unwrap()
 }
 

@@ -203,6 +203,7 @@ fn scene_files_that_cannot_be_read_are_named() {
     for (text, name) in [
         ("[[object]]\nfile = \"absent.ply\"", "absent.ply"),
         ("[[object]]\nfiles = [\"a.ply\", \"absent.ply\"]", "absent.ply"),
+        ("[[object]]\nfile = \"b.ply\"\n[[object]]\nfile = \"a.ply\"\ncolor = \"snow\"", "a.ply"),
         ("environment = \"absent.hdr\"\n[[object]]\nfile = \"a.ply\"", "absent.hdr"),
     ] {
         let scene = folder.write("scene.toml", text);
