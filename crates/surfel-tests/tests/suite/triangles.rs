@@ -182,13 +182,14 @@ fn loose_rays(mesh: &Mesh, n: usize) -> Vec<Ray> {
         .collect();
     let ray = |i: usize| {
         let away = Vec3::new(gaussian(), gaussian(), gaussian());
-        let reach = if i % 2 == 0 { 0.1 } else { 0.8 };
+        let reach = if i.is_multiple_of(2) { 0.1 } else { 0.8 };
         let origin = bounds.center() + reach * bounds.diagonal() * away;
         let [a, b, c] = corners[i * 7919 % corners.len()];
         let target = [a, 0.5 * (a + b), (a + b + c) / 3.0, origin + away][i / 2 % 4];
         let distance = origin.distance(target);
-        let direction = if i % 7 == 0 { Vec3::AXES[i % 3] } else { (target - origin) / distance };
-        let range = if i % 5 == 0 { 0.5..1.5 } else { 0.0..f32::INFINITY };
+        let direction =
+            if i.is_multiple_of(7) { Vec3::AXES[i % 3] } else { (target - origin) / distance };
+        let range = if i.is_multiple_of(5) { 0.5..1.5 } else { 0.0..f32::INFINITY };
         Ray { origin, t_min: range.start * distance, direction, t_max: range.end * distance }
     };
     (0..n).map(ray).collect()

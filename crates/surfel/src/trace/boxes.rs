@@ -23,9 +23,9 @@ fn entry<W: Wide>(rays: &WideRays<W>, inverse: &[W; 3], bounds: &Aabb) -> W {
     // More than the rounding in here, as a share of the distances.
     const SLACK: f32 = 8.0 * f32::EPSILON;
     let (mut near, mut far) = (rays.t_min, rays.t_max);
-    for axis in 0..3 {
-        let low = (W::splat(bounds.min[axis]) - rays.origin[axis]) * inverse[axis];
-        let high = (W::splat(bounds.max[axis]) - rays.origin[axis]) * inverse[axis];
+    for (axis, inverse) in inverse.iter().enumerate() {
+        let low = (W::splat(bounds.min[axis]) - rays.origin[axis]) * *inverse;
+        let high = (W::splat(bounds.max[axis]) - rays.origin[axis]) * *inverse;
         near = low.min(high).max(near);
         far = low.max(high).min(far);
     }

@@ -94,12 +94,12 @@ pub fn scene_hits(
         }
         return;
     }
-    hits.fill(SceneHit::MISS);
+    // Beside the hits, which are large: most rays look at theirs only once.
+    let mut distances = vec![f32::INFINITY; rays.len()];
     let mut rounds = Rounds::new(scene, simd, which, rays);
     loop {
-        let limit =
-            |ray_idx: u32| hits[ray_idx as usize].distance.min(rays[ray_idx as usize].t_max);
-        let Some(batches) = rounds.next(limit) else { return };
+        let limit = |ray_idx: u32| distances[ray_idx as usize].min(rays[ray_idx as usize].t_max);
+        let Some(batches) = rounds.next(limit) else { break };
         for (instance_idx, ray_indices) in batches.iter().filter(|(_, rays)| !rays.is_empty()) {
             let instance = &scene.instances[*instance_idx as usize];
             // Discs behind the nearest are blended with it, whatever other instances are among them.
@@ -109,21 +109,28 @@ pub fn scene_hits(
             };
             let there = enter(instance, ray_indices, |ray_idx| {
                 let ray = rays[ray_idx as usize];
-                Ray { t_max: ray.t_max.min(hits[ray_idx as usize].distance + reach), ..ray }
+                Ray { t_max: ray.t_max.min(distances[ray_idx as usize] + reach), ..ray }
             });
             batch.trace(scene, simd, instance, &there.rays);
             for (i, &ray_idx) in ray_indices.iter().enumerate() {
-                let nearest = &mut hits[ray_idx as usize];
+                let place = ray_idx as usize;
                 let distance = batch.distance(scene, i, instance) / there.scales[i];
-                let is_first = distance == nearest.distance && *instance_idx < nearest.instance;
-                if !(distance < nearest.distance || is_first) {
+                let is_first = || {
+                    let is_tie = distance == distances[place] && distance < f32::INFINITY;
+                    is_tie && *instance_idx < hits[place].instance
+                };
+                if !(distance < distances[place] || is_first()) {
                     continue;
                 }
                 if let Some(hit) = batch.hit(scene, i, &there.rays[i], instance) {
-                    *nearest = SceneHit { distance, instance: *instance_idx, ..hit };
+                    hits[place] = SceneHit { distance, instance: *instance_idx, ..hit };
+                    distances[place] = distance;
                 }
             }
         }
+    }
+    for (hit, _) in hits.iter_mut().zip(&distances).filter(|(_, distance)| distance.is_infinite()) {
+        *hit = SceneHit::MISS;
     }
 }
 
@@ -196,7 +203,7 @@ impl Rounds {
         }
         let boxes: Vec<Aabb> =
             instances.iter().map(|&i| scene.instances[i as usize].bounds).collect();
-        let mut entries = vec![f32::INFINITY; boxes.len() * rays.len()];
+        let mut entries = vec![0.0; boxes.len() * rays.len()];
         box_entries(&boxes, simd, rays, &mut entries);
         Self {
             visits: Visits::Few { entries, open: (0..rays.len() as u32).collect() },
