@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""Runs `surfel bench` and the Embree point benchmark in turn and prints the ratios as a table.
+"""Runs `surfel bench` and the same on Embree in turn and prints the ratios as a table.
 
-  compare.py SURFEL EMBREE_POINTS CLOUDS... [--rounds 7] [--surfaces disc,sphere]
+  compare.py SURFEL EMBREE_POINTS CLOUD.bin... [--rounds 7] [--surfaces disc,sphere]
+  compare.py SURFEL EMBREE_TRIANGLES MESH.ply... [--rounds 7] [--surfaces triangle,triangle-robust]
 
-CLOUDS are NAME.bin with NAME.cam beside. Both programs trace the same rays, on one thread and on two; rates
-are million rays a second of processor time over threads. In each round every program runs once, in turn.
-Embree counts with the better of its two set-ups for each kind of ray, and of single rays and packets of 16.
+Beside NAME.bin or NAME.ply lies NAME.cam, and beside a mesh also NAME.tri, the same for Embree. Both programs
+trace the same rays, on one thread and on two; rates are million rays a second of processor time over threads.
+In each round every program runs once, in turn. Embree counts with the better of single rays and packets of 16,
+and on points of its two set-ups, for each kind of ray; triangles without and with its flag for robust scenes.
 Printed are the medians over the rounds and that of the ratios; in brackets the least and the greatest.
 """
 import argparse, json, re, statistics, subprocess
@@ -13,8 +15,7 @@ from pathlib import Path
 
 KINDS = {"primary-isect": "primary", "shadow-occl": "shadow", "bounce-occl": "bounce-any",
          "bounce-isect": "bounce", "multi-1pass": "gather", "multi-2pass": "gather"}
-
-
+TRIANGLES = {"triangle": [], "triangle-robust": ["--robust"]}
 BUILD = "build, s"
 THREADS = (1, 2)
 
@@ -23,8 +24,8 @@ def run(command):
     return subprocess.run([str(word) for word in command], check=True, capture_output=True, text=True).stdout
 
 
-def embree(program, cloud, surface, rounds_rates):
-    """Adds the best rate of each kind over both set-ups, by threads and kind."""
+def embree_points(program, cloud, surface):
+    """The best rate of each kind over both set-ups, by threads and kind."""
     camera = cloud.with_suffix(".cam").read_text().strip()
     rates = {}
     for mode in ["disc", "multi"] if surface == "disc" else [surface]:
@@ -44,50 +45,62 @@ def embree(program, cloud, surface, rounds_rates):
             text = run([*command, "--cfg", f"threads={threads}"])
             builds.append(float(re.search(r"build  min ([\d.]+) s", text)[1]))
         rates[threads, BUILD] = min(builds)
-    add(rounds_rates, rates)
+    return rates
 
 
-def surfel(program, cloud, surface, rounds_rates):
-    command = [program, "bench", cloud, "--camera-file", cloud.with_suffix(".cam"), "--surface", surface]
+def embree_triangles(program, mesh, surface):
+    files = [mesh.with_suffix(".tri"), mesh.with_suffix(".cam")]
+    return by_threads([program, *files, *TRIANGLES[surface]])
+
+
+def surfel(program, file, surface):
+    command = [program, "bench", file, "--camera-file", file.with_suffix(".cam"), "--json"]
+    return by_threads(command if surface in TRIANGLES else [*command, "--surface", surface])
+
+
+def by_threads(command):
+    """What both programs print as JSON, by threads and kind."""
     rates = {}
     for threads in THREADS:
-        result = json.loads(run([*command, "--threads", threads, "--runs", 1, "--json"]))
+        result = json.loads(run([*command, "--threads", threads, "--runs", 1]))
         for kind, row in result["rays"].items():
             rates[threads, kind] = row["median_mrays_per_s"]
         rates[threads, BUILD] = result["build_s"]
-    add(rounds_rates, rates)
-
-
-def add(rounds_rates, rates):
-    for key, rate in rates.items():
-        rounds_rates.setdefault(key, []).append(rate)
+    return rates
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("surfel")
     parser.add_argument("embree")
-    parser.add_argument("clouds", nargs="+", type=Path)
+    parser.add_argument("files", nargs="+", type=Path)
     parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--surfaces", default="disc,sphere")
+    parser.add_argument("--surfaces")
     args = parser.parse_args()
-    print("| cloud | surface | threads | rays | surfel | Embree | ratio |\n|---|---|---|---|---|---|---|")
-    for cloud in args.clouds:
-        for surface in args.surfaces.split(","):
-            compare(args, cloud, surface)
+    print("| file | surface | threads | rays | surfel | Embree | ratio |\n|---|---|---|---|---|---|---|")
+    for file in args.files:
+        usual = "disc,sphere" if file.suffix == ".bin" else "triangle,triangle-robust"
+        for surface in (args.surfaces or usual).split(","):
+            compare(args, file, surface)
 
 
-def compare(args, cloud, surface):
+def compare(args, file, surface):
+    embree = embree_triangles if surface in TRIANGLES else embree_points
     ours, theirs = {}, {}
     for _ in range(args.rounds):
-        surfel(args.surfel, cloud, surface, ours)
-        embree(args.embree, cloud, surface, theirs)
+        add(ours, surfel(args.surfel, file, surface))
+        add(theirs, embree(args.embree, file, surface))
     for threads, kind in sorted(ours):
         found, other = ours[threads, kind], theirs[threads, kind]
         ratios = [b / a if kind == BUILD else a / b for a, b in zip(found, other)]
         middle = statistics.median
-        print(f"| {cloud.stem} | {surface} | {threads} | {kind} | {middle(found):.3g} | {middle(other):.3g} "
+        print(f"| {file.stem} | {surface} | {threads} | {kind} | {middle(found):.3g} | {middle(other):.3g} "
               f"| {middle(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f}) |", flush=True)
+
+
+def add(rounds_rates, rates):
+    for key, rate in rates.items():
+        rounds_rates.setdefault(key, []).append(rate)
 
 
 if __name__ == "__main__":

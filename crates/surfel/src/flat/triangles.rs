@@ -5,7 +5,7 @@ use super::refit::{REBUILD_COST, Refit};
 use super::tree::BlockTree;
 use crate::bvh::{self, NO_PRIMITIVE, Node, Primitive};
 use crate::error::Result;
-use crate::math::{Aabb, LANES, Lanes, Vec3, Vec3Lanes};
+use crate::math::{Aabb, Floats, LANES, Lanes, PortableLanes, Vec3, Vec3Lanes};
 use crate::progress::Progress;
 use crate::surface::triangle;
 use rayon::prelude::*;
@@ -54,8 +54,15 @@ impl TriangleBlock {
         self.corners.map(|[x, y, z]| Vec3::new(x[lane], y[lane], z[lane]))
     }
 
+    /// Unused lanes have a place of the first triangle, so that all lanes count.
     fn bounds(&self) -> Aabb {
-        Aabb::of_points((0..LANES).flat_map(|lane| self.triangle(lane)))
+        let [a, b, c] = self.corners::<PortableLanes>();
+        let low = [a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y), a.z.min(b.z).min(c.z)];
+        let high = [a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y), a.z.max(b.z).max(c.z)];
+        Aabb {
+            min: Vec3::from_array(low.map(|lanes| lanes.min_lane())),
+            max: Vec3::from_array(high.map(|lanes| lanes.max_lane())),
+        }
     }
 }
 
