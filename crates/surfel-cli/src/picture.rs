@@ -10,6 +10,7 @@ use crate::scene_file::{Line, is_scene_file};
 use crate::stats::{Run, Seconds};
 use crate::{dry_run, exposure, stats};
 use anyhow::bail;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use surfel::flat::FlatScene;
@@ -116,7 +117,9 @@ pub fn load<'a>(
     let n_pixels = u64::from(width) * u64::from(height);
     let objects = line.scene.objects.iter().flat_map(|object| &object.files);
     let files = args.files.iter().filter(|file| !is_scene_file(file)).chain(objects);
-    let files: Vec<PathBuf> = files.cloned().collect();
+    // Each once: objects of the same file share what it holds.
+    let files: BTreeSet<PathBuf> = files.cloned().collect();
+    let files: Vec<PathBuf> = files.into_iter().collect();
     if files.is_empty() {
         let scenes = name_files(&args.files);
         return Err(Usage(format!("{scenes}: no objects; add an [[object]] with a file")).into());

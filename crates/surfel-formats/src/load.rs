@@ -11,12 +11,18 @@ use crate::input::Input;
 use crate::options::{LoadOptions, Loaded, Source};
 use crate::{bin, gltf, las, obj, ply, stl, text};
 
-const SUPPORTED: &str = "surfel reads .ply, .las, .laz (.copc.laz too), .xyz, .txt, .csv, .asc, .pts, .obj, .stl and .bin; \
+const SUPPORTED: &str = "surfel reads .ply, .las, .laz (.copc.laz too), .xyz, .txt, .csv, .asc, .pts, .obj, .stl, .gltf, .glb and .bin; \
      convert the file to one of them";
 
 /// Reads the points of a file.
+///
+/// Of meshes and glTF scenes these are the vertices and the points, where the scene has them.
 pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Loaded> {
-    read(&Input::open(path)?, options, progress)
+    let input = Input::open(path)?;
+    if gltf::is_gltf(&input) {
+        return Ok(gltf::points_of(gltf::load_gltf(path, progress)?));
+    }
+    read(&input, options, progress)
 }
 
 /// Reads points from the bytes of a file; `name` stands in messages, and its extension counts.
@@ -26,7 +32,11 @@ pub fn load_bytes(
     options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<Loaded> {
-    read(&Input::of_bytes(name, bytes), options, progress)
+    let input = Input::of_bytes(name, bytes);
+    if gltf::is_gltf(&input) {
+        return Ok(gltf::points_of(gltf::load_gltf_bytes(name, bytes, progress)?));
+    }
+    read(&input, options, progress)
 }
 
 /// Reads several files to one cloud about the origin of the largest; the sources are in their order.
@@ -135,7 +145,6 @@ pub(crate) fn format_of(input: &Input) -> Result<Format> {
     }
     let known = [
         (&b"ASTM-E57"[..], "an E57 file"),
-        (b"glTF", "a binary glTF file"),
         (b"# .PCD", "a PCD file"),
         (b"\x89HDF", "an HDF5 file"),
         (b"PK\x03\x04", "a zip archive"),

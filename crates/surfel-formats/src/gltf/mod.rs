@@ -11,6 +11,7 @@ mod document;
 mod accessor;
 mod extensions;
 mod picture;
+mod points;
 mod material;
 mod triangles;
 mod attributes;
@@ -22,6 +23,8 @@ mod hierarchy;
 mod instancing;
 mod node;
 mod animation;
+
+pub(crate) use points::points_of;
 
 use std::path::Path;
 

@@ -7,7 +7,7 @@ use surfel::scene::{
     AlphaMode, Geometry, Graph, Interpolation, LampKind, Material, Mesh, Part, Projection, Track,
     Transform, Wrap,
 };
-use surfel_formats::{load_gltf, load_gltf_bytes};
+use surfel_formats::{LoadOptions, Loaded, load, load_gltf, load_gltf_bytes};
 
 use crate::common::{Folder, Listener, shared};
 use crate::gltf_asset::{Asset, SQUARE, moving, png, puppet, square, triangle};
@@ -632,5 +632,11 @@ fn clouds_of_points_are_read_whole() {
         let [Geometry::Points(points)] = &graph.geometries[..] else { panic!() };
         assert_eq!(points.cloud.len(), n_points);
         assert_eq!(points.cloud.colors.is_some(), has_colors);
+        // As a cloud the same points, where the scene has them: turned to have Z up.
+        let Loaded { cloud, source } = load(&path, &LoadOptions::default(), &Silent).unwrap();
+        assert_eq!((cloud.len(), source.n_points), (n_points, Some(n_points as u64)));
+        assert_eq!(cloud.colors, points.cloud.colors);
+        let [p, q] = [points.cloud.world_position(7), cloud.world_position(7)];
+        assert!(q.distance(DVec3::new(p.x, -p.z, p.y)) < 1e-5, "{p} {q}");
     }
 }

@@ -112,11 +112,7 @@ fn text_scans_agree_with_what_they_were_made_from() {
 
 #[test]
 fn formats_that_are_not_read_are_named() {
-    let facts = [
-        ("clouds/pumpA.e57", "E57"),
-        ("gltf/pumpA_points.glb", "glTF"),
-        ("clouds/pumpA_grid.ptx", "ptx"),
-    ];
+    let facts = [("clouds/pumpA.e57", "E57"), ("clouds/pumpA_grid.ptx", "ptx")];
     for (name, words) in facts {
         let Some(path) = shared(name) else { return };
         let error = load(&path, &LoadOptions::default(), &Silent).unwrap_err();
