@@ -81,9 +81,13 @@ pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow
         return Ok(crate::report::print(&format!("{resolved:#}"))?);
     };
     options.fingerprint = fingerprint(&resolved, &args.scene, line);
-    let cameras: Vec<Camera> = (0..options.n_frames)
-        .map(|frame| camera_at(f64::from(frame) / args.fps, &assembly, &choices))
-        .collect();
+    let camera_of = |frame: u32| {
+        let time_secs = f64::from(frame) / args.fps;
+        assembly.graph.pose(time_secs);
+        camera_at(time_secs, &assembly, &choices)
+    };
+    let cameras: Vec<Camera> = (0..options.n_frames).map(camera_of).collect();
+    assembly.graph.pose(0.0);
     let turn_axis = choices.up.as_dvec3();
     let scene = picture::describe(assembly, choices, &args.scene, report)?;
     let mut film = Film::new(scene, args, report)?;

@@ -28,6 +28,8 @@ use surfel_formats::{Alpha, BitDepth, ImageOptions};
 pub struct Choices {
     pub up: Vec3,
     pub camera: Camera,
+    /// Whether that is a camera of the files, which may move.
+    pub is_of_file: bool,
     pub lights: Vec<Light>,
     pub sun_azimuth_deg: f64,
 }
@@ -183,7 +185,18 @@ pub fn choose(assembly: &Assembly, args: &SceneArgs, report: &Report) -> anyhow:
     let outline = assembly.outline();
     let up = args.camera.up(&outline, &assembly.source, report);
     let (width, height) = args.picture.resolution;
-    let camera = args.camera.camera(&outline, up, f64::from(width) / f64::from(height), report);
+    let of_file = assembly.graph.camera().filter(|_| args.camera.is_automatic());
+    let camera = match of_file {
+        Some((node, camera)) => {
+            let name = &assembly.graph.nodes[node].name;
+            report.choice(&format!("camera `{name}` of the file"), "--camera-position");
+            camera
+        }
+        None => {
+            let aspect = f64::from(width) / f64::from(height);
+            args.camera.camera(&outline, up, aspect, report)
+        }
+    };
     let bounds = usual_bounds(&outline);
     let diagonal = (bounds.max - bounds.min).length();
     // Points as pixels are shaded by their depth alone.
@@ -191,14 +204,17 @@ pub fn choose(assembly: &Assembly, args: &SceneArgs, report: &Report) -> anyhow:
     let lit = Lit { camera, up, diagonal };
     let lights = if is_shaded { light::lights(&args.light, &lit, report)? } else { Vec::new() };
     let sun_azimuth_deg = light::sun_azimuth_deg(&args.light, &lit);
-    Ok(Choices { up, camera, lights, sun_azimuth_deg })
+    let is_of_file = of_file.is_some();
+    Ok(Choices { up, camera, is_of_file, lights, sun_azimuth_deg })
 }
 
-/// The camera as its motion has it at a time.
+/// The camera as its motion, or that of its node, has it at a time, at which the graph is posed.
 pub fn camera_at(time_secs: f64, assembly: &Assembly, choices: &Choices) -> Camera {
+    let of_file = assembly.graph.camera().filter(|_| choices.is_of_file);
+    let camera = of_file.map_or(choices.camera, |(_, camera)| camera);
     match &assembly.camera_motion {
-        Some(motion) => motion.at(time_secs, choices.camera, choices.up),
-        None => choices.camera,
+        Some(motion) => motion.at(time_secs, camera, choices.up),
+        None => camera,
     }
 }
 

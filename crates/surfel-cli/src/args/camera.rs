@@ -66,6 +66,18 @@ impl CameraArgs {
         })
     }
 
+    /// Whether nothing is asked of the camera.
+    pub fn is_automatic(&self) -> bool {
+        let places = [self.camera_position, self.camera_focal_point, self.camera_view_up];
+        places.iter().all(Option::is_none)
+            && self.camera_direction.is_none()
+            && self.camera_orthographic.is_none()
+            && self.camera_elevation_angle.is_none()
+            && !self.camera_panorama
+            && self.camera_azimuth_angle == 0.0
+            && self.camera_zoom_factor == 1.0
+    }
+
     pub fn check(&self) -> Result<(), Usage> {
         if self.camera_position.is_some() && self.camera_position == self.camera_focal_point {
             let text = "--camera-position and --camera-focal-point are the same; move one of them";

@@ -432,3 +432,28 @@ fn two_scene_files_are_one_scene() {
     assert_eq!((&told["spp"], &told["seed"]), (&json!(2), &json!(5)));
     assert_eq!(dry(&[&b, &a])["seed"], 4);
 }
+
+#[test]
+fn a_camera_of_the_file_is_taken_unless_another_is_asked_for() {
+    let folder = Folder::new();
+    let nodes = r#""nodes":[{"mesh":0},{"name":"eye","camera":0,"translation":[0,1,7]}]"#;
+    let cameras = r#""cameras":[{"type":"perspective","perspective":{"yfov":0.5,"znear":0.1}}]"#;
+    let text = gltf()
+        .replace(r#""nodes":[{"mesh":0}]"#, &format!("{nodes},{cameras}"))
+        .replace(r#""scenes":[{"nodes":[0]}]"#, r#""scenes":[{"nodes":[0,1]}]"#);
+    let file = folder.write("eye.gltf", text);
+    let camera = |options: &[&str]| {
+        let told = succeed(&[&["render", &file, "--dry-run"], options].concat());
+        serde_json::from_str::<Value>(&told).unwrap()["camera"].take()
+    };
+    let own = camera(&[]);
+    // Turned to have Z up.
+    let near = |found: &Value, expected: [f64; 3]| {
+        let found = found.as_array().unwrap().iter().map(|value| value.as_f64().unwrap());
+        assert!(found.zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{own}");
+    };
+    near(&own["position"], [0.0, -7.0, 1.0]);
+    near(&own["focal_point"], [0.0, -6.0, 1.0]);
+    assert!((own["view_angle"].as_f64().unwrap() - 0.5f64.to_degrees()).abs() < 1e-4);
+    assert_ne!(camera(&["--camera-azimuth-angle", "30"])["position"], own["position"]);
+}

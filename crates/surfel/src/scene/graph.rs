@@ -1,7 +1,7 @@
 //! The graph of a scene after glTF 2.0: geometry under nodes that stand, turn and move.
 
 use super::animation::{Animation, Channel};
-use super::camera::Projection;
+use super::camera::{Camera, Projection};
 use super::light::Lamp;
 use super::material::Material;
 use super::mesh::Mesh;
@@ -246,6 +246,23 @@ impl Graph {
         let origin = PointCloud::choose_origin(&places);
         let positions = places.iter().map(|place| (*place - origin).as_vec3()).collect();
         PointCloud { origin, ..PointCloud::from_positions(positions) }
+    }
+
+    /// The first visible node with a camera, and that camera where it stands, if it is in one piece.
+    pub fn camera(&self) -> Option<(usize, Camera)> {
+        let (world, is_visible) = (self.world_from_nodes(), self.visible_nodes());
+        let mut nodes = self.nodes.iter().enumerate().filter(|(i, _)| is_visible[*i]);
+        nodes.find_map(|(i, node)| {
+            let place = world[i];
+            let forward = place.transform_vector3(-DVec3::Z).try_normalize()?;
+            let camera = Camera {
+                position: place.translation,
+                focal_point: place.translation + forward,
+                view_up: place.transform_vector3(DVec3::Y).try_normalize()?,
+                projection: node.camera?,
+            };
+            place.is_finite().then_some((i, camera))
+        })
     }
 
     /// Of each node, whether it and all above it are visible.
