@@ -18,10 +18,16 @@ mod broken_meshes;
 mod materials;
 #[path = "formats/gltf.rs"]
 mod gltf;
+#[path = "formats/gltf_geometry.rs"]
+mod gltf_geometry;
+#[path = "formats/gltf_scene.rs"]
+mod gltf_scene;
 #[path = "formats/gltf_asset.rs"]
 mod gltf_asset;
 #[path = "formats/gltf_broken.rs"]
 mod gltf_broken;
+#[path = "formats/gltf_broken_files.rs"]
+mod gltf_broken_files;
 #[path = "formats/ply.rs"]
 mod ply;
 #[path = "formats/pictures.rs"]

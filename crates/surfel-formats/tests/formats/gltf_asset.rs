@@ -261,3 +261,13 @@ pub fn everything() -> Asset {
     asset.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(node));
     asset
 }
+
+/// Puts a value at a pointer, over what is there.
+pub fn set(json: &mut Value, pointer: &str, value: Value) {
+    let (parent, key) = pointer.rsplit_once('/').unwrap();
+    let parent = json.pointer_mut(parent).unwrap_or_else(|| panic!("no {pointer}"));
+    match parent {
+        Value::Array(items) => items[key.parse::<usize>().unwrap()] = value,
+        parent => parent[key] = value,
+    }
+}

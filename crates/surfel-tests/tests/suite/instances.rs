@@ -1,25 +1,25 @@
 //! Instances: what nodes show is what copies would be that had been moved beforehand.
 
 use std::f64::consts::FRAC_PI_3;
-use surfel::flat::{FlatGeometry, FlatScene, Instance};
-use surfel::math::{DAffine3, DMat3, DQuat, DVec3, Random, Ray, Vec3};
+use surfel::flat::FlatScene;
+use surfel::math::{DAffine3, DMat3, DQuat, DVec3, Ray, Vec3};
 use surfel::points::PointCloud;
 use surfel::progress::Silent;
 use surfel::scene::{
-    AlphaMode, Background, Geometry, Graph, Lamp, LampKind, Light, Material, Mesh, Node, Points,
-    Scene, Transform,
+    Background, Geometry, Graph, Lamp, LampKind, Light, Material, Mesh, Node, Points, Scene,
+    Transform,
 };
 use surfel::surface::{Boundary, SurfaceKind};
-use surfel::trace::{self, Hit, SceneHit, Simd, SurfaceHit, Which};
+use surfel::trace::{self, SceneHit, Simd, Which};
 use surfel_tests::{clouds, scenes};
 
-fn flat(graph: Graph) -> FlatScene {
+pub fn flat(graph: Graph) -> FlatScene {
     let (lights, background) = (vec![Light::Headlight(1.0)], Background::Transparent);
     let scene = Scene { graph, lights, background, camera: scenes::from_above(4.0) };
     FlatScene::new(&scene, &Silent).unwrap()
 }
 
-fn hits(scene: &FlatScene, which: Which, rays: &[Ray]) -> Vec<SceneHit> {
+pub fn hits(scene: &FlatScene, which: Which, rays: &[Ray]) -> Vec<SceneHit> {
     let all = Simd::available().into_iter().map(|simd| {
         let mut hits = vec![SceneHit::MISS; rays.len()];
         trace::scene_hits(scene, simd, which, rays, &mut hits);
@@ -30,13 +30,13 @@ fn hits(scene: &FlatScene, which: Which, rays: &[Ray]) -> Vec<SceneHit> {
     all.into_iter().next().unwrap()
 }
 
-fn occlusions(scene: &FlatScene, which: Which, rays: &[Ray]) -> Vec<bool> {
+pub fn occlusions(scene: &FlatScene, which: Which, rays: &[Ray]) -> Vec<bool> {
     let mut occluded = vec![false; rays.len()];
     trace::scene_occlusions(scene, Simd::detect(), which, rays, &mut occluded);
     occluded
 }
 
-fn at(translation: DVec3) -> DAffine3 {
+pub fn at(translation: DVec3) -> DAffine3 {
     DAffine3::from_translation(translation)
 }
 
@@ -305,257 +305,5 @@ fn nodes_stand_in_their_parents_and_vanish_with_them() {
 fn assert_near(found: &[f32], expected: &[f32]) {
     for (a, b) in found.iter().zip(expected) {
         assert!((a - b).abs() < 0.03, "{found:?} {expected:?}");
-    }
-}
-
-/// The nearest of what each instance gives on its own, the first of equally near ones.
-fn plain_hits(scene: &FlatScene, which: impl Fn(&Instance) -> bool, rays: &[Ray]) -> Vec<PlainHit> {
-    let mut nearest = vec![PlainHit::MISS; rays.len()];
-    for (i, instance) in scene.instances.iter().enumerate().filter(|(_, i)| which(i)) {
-        let inside: Vec<(Ray, f32)> = rays.iter().map(|ray| instance.object_ray(ray)).collect();
-        let (object_rays, scales): (Vec<Ray>, Vec<f32>) = inside.into_iter().unzip();
-        let found: Vec<(f32, Vec3)> = match scene.geometry(instance) {
-            FlatGeometry::Cloud(cloud) => {
-                let mut hits = vec![SurfaceHit::MISS; rays.len()];
-                trace::surface_hits(cloud, Simd::detect(), &object_rays, &mut hits);
-                hits.iter().map(|hit| (hit.distance, hit.normal)).collect()
-            }
-            FlatGeometry::Mesh(mesh) => {
-                let mut hits = vec![Hit::MISS; rays.len()];
-                trace::closest_triangles(&mesh.triangles, Simd::detect(), &object_rays, &mut hits);
-                hits.iter().map(|hit| (hit.distance, Vec3::ZERO)).collect()
-            }
-        };
-        for ((nearest, (distance, normal)), scale) in nearest.iter_mut().zip(found).zip(scales) {
-            if distance / scale < nearest.distance {
-                let normal =
-                    if normal == Vec3::ZERO { normal } else { instance.world_normal(normal) };
-                *nearest = PlainHit { distance: distance / scale, instance: i as u32, normal };
-            }
-        }
-    }
-    nearest
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct PlainHit {
-    distance: f32,
-    instance: u32,
-    /// Of points.
-    normal: Vec3,
-}
-
-impl PlainHit {
-    const MISS: Self = Self { distance: f32::INFINITY, instance: u32::MAX, normal: Vec3::ZERO };
-
-    fn of(scene: &FlatScene, hit: &SceneHit) -> Self {
-        let is_point = !hit.is_miss()
-            && matches!(
-                scene.geometry(&scene.instances[hit.instance as usize]),
-                FlatGeometry::Cloud(_)
-            );
-        let normal = if is_point { hit.normal } else { Vec3::ZERO };
-        Self { distance: hit.distance, instance: hit.instance, normal }
-    }
-}
-
-/// Panics unless the scene is hit as a plain loop over its instances is, bit for bit.
-fn check_plain(name: &str, scene: &FlatScene, rays: &[Ray]) -> usize {
-    let expected = plain_hits(scene, |_| true, rays);
-    let found = hits(scene, Which::All, rays);
-    let occluded = occlusions(scene, Which::All, rays);
-    let alone = rays.iter().flat_map(|ray| hits(scene, Which::All, &[*ray]));
-    assert!(found.iter().copied().eq(alone), "{name}");
-    let mut n_differing = 0;
-    for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
-        assert_eq!(PlainHit::of(scene, found), *expected, "{name} {:?}", rays[i]);
-        n_differing += usize::from(occluded[i] != (expected.instance != u32::MAX));
-    }
-    // Hits judge a rim by the blended normal, occlusions by one disc's: 3 rays in a thousand may differ.
-    let is_gathered = scene.clouds().any(|cloud| cloud.surface.is_gathered());
-    let allowed = if is_gathered { 3 * rays.len() / 1000 } else { 0 };
-    assert!(n_differing <= allowed, "{name}: {n_differing}");
-    expected.iter().filter(|hit| hit.instance != u32::MAX).count()
-}
-
-#[test]
-fn ten_thousand_instances_take_the_room_of_one_and_are_all_hit() {
-    let points = scenes::points(clouds::sphere(200, 0.3), SurfaceKind::Disc);
-    let alone = scenes::flat(clouds::sphere(200, 0.3), SurfaceKind::Disc).points.bytes();
-    let mut graph = Graph::of(Geometry::Points(points), Material::MATTE);
-    let mut random = Random::new(73, 0);
-    let mut along = || 40.0 * random.next_f64() - 20.0;
-    graph.nodes = (0..10_000)
-        .map(|i| {
-            let turn = DQuat::from_rotation_y(f64::from(i));
-            let place = DVec3::new(along(), along(), along());
-            let scale = DVec3::splat(0.5 + 0.1 * f64::from(i % 10));
-            let place = DAffine3::from_scale_rotation_translation(scale, turn, place);
-            scenes::node(0, 0, place)
-        })
-        .collect();
-    let scene = flat(graph);
-    assert_eq!((scene.geometries.len(), scene.instances.len()), (1, 10_000));
-    assert_eq!(scene.clouds().map(|cloud| cloud.points.bytes()).collect::<Vec<_>>(), [alone]);
-    let n_hits = check_plain("ten thousand", &scene, &scenes::random_rays(64, 20.0, 74));
-    assert!((20..60).contains(&n_hits), "{n_hits}");
-}
-
-/// Two of each kind where the other is too, and one a hair's breadth away.
-fn overlapping(kind: SurfaceKind) -> Graph {
-    let ball = Geometry::Triangles(scenes::uv_sphere(16, 32, 0.99));
-    let points = scenes::points(clouds::sphere(1000, 1.0), kind);
-    let things = vec![(Geometry::Points(points), Material::MATTE), (ball, Material::MATTE)];
-    let mut graph = scenes::graph(things);
-    let turn = DAffine3::from_rotation_y(0.4);
-    let place = |shift: f64| turn * at(shift * DVec3::new(0.6, -0.8, 0.0));
-    graph.nodes.extend([
-        scenes::node(0, 0, place(0.0)),
-        scenes::node(1, 1, place(0.01)),
-        scenes::node(0, 0, place(0.03)),
-        scenes::node(0, 0, place(0.0)),
-    ]);
-    graph
-}
-
-#[test]
-fn what_overlaps_is_hit_as_if_each_were_alone() {
-    let rays = scenes::random_rays(1500, 1.2, 75);
-    for kind in [
-        SurfaceKind::Sphere,
-        SurfaceKind::Disc,
-        SurfaceKind::SplatMean,
-        SurfaceKind::Splat,
-        SurfaceKind::SplatFit,
-    ] {
-        let scene = flat(overlapping(kind));
-        let n_hits = check_plain(kind.name(), &scene, &rays);
-        assert!(500 < n_hits, "{n_hits}");
-    }
-}
-
-#[test]
-fn of_two_at_one_place_the_first_is_hit() {
-    let quad = Geometry::Triangles(scenes::floor(0.0, 1.0));
-    let mut graph = Graph::of(quad, Material::MATTE);
-    let place = DAffine3::from_rotation_z(0.5) * at(DVec3::X);
-    graph.nodes = [place, at(9.0 * DVec3::Z), place, place].map(|p| scenes::node(0, 0, p)).into();
-    // The zero of the scene is at the first.
-    let scene = flat(graph);
-    let rays: Vec<Ray> =
-        (0..40).map(|i| Ray::new(Vec3::new(0.04 * i as f32 - 0.8, 0.3, 5.0), -Vec3::Z)).collect();
-    let found = hits(&scene, Which::All, &rays);
-    assert!(20 < found.iter().filter(|hit| !hit.is_miss()).count());
-    assert!(found.iter().all(|hit| hit.is_miss() || hit.instance == 0));
-}
-
-#[test]
-fn opaque_and_see_through_instances_are_told_apart() {
-    let ball = Geometry::Triangles(scenes::uv_sphere(8, 16, 0.5));
-    let materials = [
-        Material::GLASS,
-        Material::MATTE,
-        Material { alpha_mode: AlphaMode::Blend, alpha: 0.5, ..Material::MATTE },
-        Material { alpha_mode: AlphaMode::Mask(0.5), ..Material::MATTE },
-        Material::MIRROR,
-    ];
-    let mut graph = scenes::graph(materials.map(|material| (ball.clone(), material)).into());
-    for (i, node) in graph.nodes.iter_mut().enumerate() {
-        node.transform = Transform::Matrix(at(0.7 * i as f64 * DVec3::X));
-    }
-    let scene = flat(graph);
-    let rays = scenes::random_rays(3000, 2.0, 76);
-    for (which, counts) in [
-        (Which::All, [true; 5]),
-        (Which::Opaque, [false, true, false, false, true]),
-        (Which::SeeThrough, [true, false, true, true, false]),
-    ] {
-        let counts = |instance: &Instance| counts[instance.node as usize];
-        let expected = plain_hits(&scene, counts, &rays);
-        let found = hits(&scene, which, &rays);
-        assert!(expected.iter().filter(|hit| hit.instance != u32::MAX).count() > 50);
-        for (found, expected) in found.iter().zip(&expected) {
-            assert_eq!(PlainHit::of(&scene, found), *expected, "{which:?}");
-        }
-        let is_blocked = expected.iter().map(|hit| hit.instance != u32::MAX);
-        assert!(occlusions(&scene, which, &rays).into_iter().eq(is_blocked), "{which:?}");
-    }
-}
-
-#[test]
-fn no_ray_slips_between_instances_that_share_an_edge() {
-    let half = |side: f32| {
-        let quad = scenes::quad(side * 0.5 * Vec3::X, 0.5 * Vec3::X, Vec3::Y);
-        (Geometry::Triangles(quad), Material::MATTE)
-    };
-    let mut graph = scenes::graph(vec![half(-1.0), half(1.0)]);
-    let in_place = flat(graph.clone());
-    // The same, its halves side by side by their nodes; the zero of the scene is in the middle of one.
-    graph.geometries = vec![Geometry::Triangles(scenes::floor(0.0, 1.0))];
-    graph.nodes = [-1.0, 1.0].map(|side| scenes::node(0, 0, at(side * DVec3::X))).into();
-    graph.nodes.insert(0, Node::new("nothing"));
-    let placed = flat(graph);
-    for (scene, edge) in [(&in_place, 0.0), (&placed, 1.0)] {
-        let edge = edge * Vec3::X;
-        let rays: Vec<Ray> = (-40..=40)
-            .flat_map(|i| {
-                let target = edge + 0.02 * i as f32 * Vec3::Y;
-                [-Vec3::Z, Vec3::new(0.0, 0.6, -0.8), Vec3::new(0.6, 0.0, -0.8)]
-                    .map(|direction| Ray::new(target - 2.0 * direction, direction))
-            })
-            .collect();
-        let found = hits(scene, Which::All, &rays);
-        let missed = found.iter().position(SceneHit::is_miss);
-        assert_eq!(missed.map(|i| rays[i]), None);
-        assert!(!occlusions(scene, Which::All, &rays).contains(&false));
-    }
-}
-
-/// Cases that once failed.
-mod known {
-    use super::*;
-
-    /// The infinity by which it never comes beside made the order of visits no number.
-    #[test]
-    fn a_ray_along_an_axis_passes_boxes_beside_it() {
-        let ball = Geometry::Triangles(scenes::uv_sphere(8, 16, 0.5));
-        let mut graph = Graph::of(ball, Material::MATTE);
-        let places = [DVec3::ZERO, 3.0 * DVec3::Y, -3.0 * DVec3::Z, 3.0 * DVec3::X];
-        graph.nodes = places.map(|place| scenes::node(0, 0, at(place))).into();
-        let scene = flat(graph);
-        for axis in Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
-            let ray = Ray::new(-9.0 * axis, axis);
-            assert!(!hits(&scene, Which::All, &[ray])[0].is_miss(), "{axis}");
-            assert_eq!(occlusions(&scene, Which::All, &[ray]), [true], "{axis}");
-        }
-    }
-
-    #[test]
-    fn normals_of_no_length_are_those_of_the_plane() {
-        let mesh = Mesh { normals: Some(vec![Vec3::ZERO; 4]), ..scenes::floor(0.0, 1.0) };
-        let mut graph = Graph::of(Geometry::Triangles(mesh), Material::MATTE);
-        graph.nodes = vec![scenes::node(0, 0, DAffine3::from_rotation_x(1.0))];
-        let up = Vec3::new(0.0, -1f32.sin(), 1f32.cos());
-        let found = hits(&flat(graph), Which::All, &[Ray::new(2.0 * up, -up)]);
-        assert!(found[0].normal.distance(up) < 1e-6, "{found:?}");
-    }
-
-    #[test]
-    fn tiny_and_huge_triangles_have_unit_normals() {
-        for scale in [1e-11f32, 1e-8, 1e-5, 1.0, 1e5, 1e8, 1e11] {
-            for mesh in [scenes::floor(0.0, scale), scenes::uv_sphere(8, 16, scale)] {
-                let scene = flat(Graph::of(Geometry::Triangles(mesh), Material::MATTE));
-                let origin = scale * Vec3::new(0.1, 0.2, 3.0);
-                let found = hits(&scene, Which::All, &[Ray::new(origin, -Vec3::Z)]);
-                let (normal, facet) = (found[0].normal, found[0].facet);
-                assert!(
-                    !found[0].is_miss() && 0.9 < normal.z && 0.9 < facet.z,
-                    "{scale}: {found:?}"
-                );
-                assert!(
-                    (normal.length() - 1.0).abs() < 1e-5 && (facet.length() - 1.0).abs() < 1e-5
-                );
-            }
-        }
     }
 }

@@ -2,21 +2,12 @@
 
 use std::f32::consts::PI;
 use surfel::math::{DAffine3, DQuat, DVec3, Vec3};
-use surfel::render::Settings;
 use surfel::scene::{
     Background, Geometry, Graph, Lamp, LampKind, Light, Material, Node, Scene, Sun, Transform,
 };
 use surfel_tests::scenes::{self, from_above, render};
 
-const SETTINGS: Settings = Settings {
-    width: 32,
-    height: 32,
-    samples_per_pixel: 1,
-    light_samples: 16,
-    max_depth: 8,
-    seed: 1,
-    with_layers: true,
-};
+use crate::materials::SETTINGS;
 
 fn lamp(kind: LampKind) -> Lamp {
     Lamp { kind, color: PI * Vec3::new(1.0, 2.0, 0.5), range: f32::INFINITY, radius: 0.0 }

@@ -2,6 +2,7 @@
 
 mod batches;
 mod build;
+mod crowds;
 mod furnace;
 mod instances;
 mod lamps;
