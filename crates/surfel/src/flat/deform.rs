@@ -1,7 +1,7 @@
 //! Meshes that bend: morph targets, then the joints that carry their vertices.
 
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
-use crate::scene::{Graph, Mesh, Node, Skin};
+use crate::scene::{Graph, Joint, Mesh, Node, Skin};
 
 /// Whether a node shows `mesh` other than it is.
 pub fn is_deformed(mesh: &Mesh, node: &Node) -> bool {
@@ -13,36 +13,53 @@ fn is_skinned(mesh: &Mesh, node: &Node) -> bool {
     mesh.skin.is_some() && !node.joints.is_empty()
 }
 
-/// `mesh` as the node at `node_idx` bends it, in that node's coordinates.
-pub fn deformed(mesh: &Mesh, graph: &Graph, node_idx: usize, world: &[DAffine3]) -> Mesh {
-    let node = &graph.nodes[node_idx];
-    let mut bent = Mesh { morphs: Vec::new(), skin: None, ..mesh.clone() };
-    for (morph, &weight) in mesh.morphs.iter().zip(&node.morph_weights).filter(|(_, w)| **w != 0.0)
-    {
-        for (position, offset) in bent.positions.iter_mut().zip(&morph.positions) {
-            *position += weight * offset;
+/// How a node bends meshes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pose {
+    morph_weights: Vec<f32>,
+    /// In the node's coordinates, what each joint does to places of the mesh it was bound to.
+    node_from_mesh: Vec<DAffine3>,
+}
+
+impl Pose {
+    pub fn of(graph: &Graph, node_idx: usize, world: &[DAffine3]) -> Self {
+        let node = &graph.nodes[node_idx];
+        let node_from_world = world[node_idx].inverse();
+        let carried = |joint: &Joint| node_from_world * world[joint.node] * joint.joint_from_mesh;
+        Self {
+            morph_weights: node.morph_weights.clone(),
+            node_from_mesh: node.joints.iter().map(carried).collect(),
         }
-        if let (Some(normals), Some(offsets)) = (&mut bent.normals, &morph.normals) {
-            for (normal, offset) in normals.iter_mut().zip(offsets) {
-                *normal += weight * offset;
+    }
+
+    /// `mesh` in this pose, in the node's coordinates.
+    pub fn bend(&self, mesh: &Mesh) -> Mesh {
+        let mut bent = Mesh { morphs: Vec::new(), skin: None, ..mesh.clone() };
+        let morphs = mesh.morphs.iter().zip(&self.morph_weights);
+        for (morph, &weight) in morphs.filter(|(_, weight)| **weight != 0.0) {
+            for (position, offset) in bent.positions.iter_mut().zip(&morph.positions) {
+                *position += weight * offset;
+            }
+            if let (Some(normals), Some(offsets)) = (&mut bent.normals, &morph.normals) {
+                for (normal, offset) in normals.iter_mut().zip(offsets) {
+                    *normal += weight * offset;
+                }
             }
         }
+        if let (Some(skin), false) = (&mesh.skin, self.node_from_mesh.is_empty()) {
+            let carry = self.node_from_mesh.iter().map(|node_from_mesh| {
+                let about_origin = DAffine3::from_translation(-mesh.origin)
+                    * *node_from_mesh
+                    * DAffine3::from_translation(mesh.origin);
+                (about_origin, about_origin.matrix3.inverse().transpose())
+            });
+            carry_by_joints(&mut bent, skin, &carry.collect::<Vec<_>>());
+        }
+        if let Some(normals) = &mut bent.normals {
+            normals.iter_mut().for_each(|normal| *normal = normal.normalize_or(Vec3::Z));
+        }
+        bent
     }
-    if let (Some(skin), true) = (&mesh.skin, is_skinned(mesh, node)) {
-        let node_from_world = world[node_idx].inverse();
-        let carry = node.joints.iter().map(|joint| {
-            let node_from_mesh = node_from_world * world[joint.node] * joint.joint_from_mesh;
-            let about_origin = DAffine3::from_translation(-mesh.origin)
-                * node_from_mesh
-                * DAffine3::from_translation(mesh.origin);
-            (about_origin, about_origin.matrix3.inverse().transpose())
-        });
-        carry_by_joints(&mut bent, skin, &carry.collect::<Vec<_>>());
-    }
-    if let Some(normals) = &mut bent.normals {
-        normals.iter_mut().for_each(|normal| *normal = normal.normalize_or(Vec3::Z));
-    }
-    bent
 }
 
 /// Linear blend skinning; `carry` has what each joint does to places and to normals.

@@ -1,7 +1,7 @@
 //! The whole: geometry once, instances of it, light, camera.
 
 use super::cloud::FlatCloud;
-use super::deform::{deformed, is_deformed};
+use super::deform::{Pose, is_deformed};
 use super::instance::{Instance, TopTree};
 use super::lamp::FlatLamp;
 use super::mesh::FlatMesh;
@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::math::{Aabb, Affine3A, DAffine3, DVec3, LANES, Mat3};
 use crate::progress::Progress;
 use crate::scene::{Background, Camera, Geometry, Graph, Light, Material, Scene, Texture};
+use std::collections::BTreeMap;
 
 #[derive(Clone, Debug)]
 pub struct FlatScene {
@@ -24,8 +25,18 @@ pub struct FlatScene {
     pub lamps: Vec<FlatLamp>,
     pub background: Background,
     pub camera: Camera,
-    /// What each geometry was made from: that of the graph, and the node that bends it.
-    sources: Vec<(usize, Option<usize>)>,
+    built: BTreeMap<Source, Built>,
+}
+
+/// What a geometry is made from: that of the graph, and the node that bends it.
+type Source = (usize, Option<usize>);
+
+#[derive(Clone, Debug)]
+struct Built {
+    /// Index in the scene's geometries.
+    geometry: u32,
+    /// In which it was last bent.
+    pose: Pose,
 }
 
 #[derive(Clone, Debug)]
@@ -74,7 +85,7 @@ impl FlatScene {
             lamps: Vec::new(),
             background: scene.background,
             camera: scene.camera,
-            sources: Vec::new(),
+            built: BTreeMap::new(),
         };
         flat.add_geometry(&scene.graph, &world, progress)?;
         flat.place(&scene.graph, &world)?;
@@ -88,19 +99,22 @@ impl FlatScene {
         world: &[DAffine3],
         progress: &dyn Progress,
     ) -> Result<()> {
-        for source in sources(graph) {
-            if self.sources.contains(&source) {
+        let shown = graph.nodes.iter().enumerate();
+        let shown = shown.flat_map(|(i, node)| node.parts.iter().map(move |part| (i, part)));
+        for (node_idx, part) in shown {
+            let source = source(graph, node_idx, part.geometry);
+            if self.built.contains_key(&source) {
                 continue;
             }
-            let geometry = match (&graph.geometries[source.0], source.1) {
+            let (geometry, pose) = match (&graph.geometries[source.0], source.1) {
                 (Geometry::Triangles(mesh), Some(node)) => {
-                    let bent = deformed(mesh, graph, node, world);
-                    FlatGeometry::Mesh(FlatMesh::new(&bent, progress)?)
+                    let pose = Pose::of(graph, node, world);
+                    (FlatGeometry::Mesh(FlatMesh::new(&pose.bend(mesh), progress)?), pose)
                 }
-                (geometry, _) => FlatGeometry::new(geometry, progress)?,
+                (geometry, _) => (FlatGeometry::new(geometry, progress)?, Pose::default()),
             };
+            self.built.insert(source, Built { geometry: self.geometries.len() as u32, pose });
             self.geometries.push(geometry);
-            self.sources.push(source);
         }
         Ok(())
     }
@@ -109,10 +123,18 @@ impl FlatScene {
     /// refitted, or built where nothing bent it before, instances and lamps are placed anew, all else stays.
     pub fn update(&mut self, graph: &Graph, progress: &dyn Progress) -> Result<()> {
         let world = graph.world_from_nodes();
-        for (geometry, source) in self.geometries.iter_mut().zip(&self.sources) {
-            let (FlatGeometry::Mesh(flat), Some(node)) = (geometry, source.1) else { continue };
-            if let Geometry::Triangles(mesh) = &graph.geometries[source.0] {
-                flat.refit(&deformed(mesh, graph, node, &world), progress)?;
+        for ((geometry, node), built) in &mut self.built {
+            let Some(node) = node else { continue };
+            let pose = Pose::of(graph, *node, &world);
+            if pose == built.pose {
+                continue;
+            }
+            let flat = &mut self.geometries[built.geometry as usize];
+            if let (FlatGeometry::Mesh(flat), Geometry::Triangles(mesh)) =
+                (flat, &graph.geometries[*geometry])
+            {
+                flat.refit(&pose.bend(mesh), progress)?;
+                built.pose = pose;
             }
         }
         self.add_geometry(graph, &world, progress)?;
@@ -131,21 +153,20 @@ impl FlatScene {
             }
             for part in &node.parts {
                 let source = source(graph, node_idx, part.geometry);
-                let Some(geometry) = self.sources.iter().position(|known| *known == source) else {
-                    continue;
-                };
-                if bounds[geometry].is_empty() {
+                let Some(&Built { geometry, .. }) = self.built.get(&source) else { continue };
+                let object_bounds = bounds[geometry as usize];
+                if object_bounds.is_empty() {
                     continue;
                 }
                 let mut instance = Instance {
-                    geometry: geometry as u32,
+                    geometry,
                     material: part.material as u32,
                     node: node_idx as u32,
                     is_see_through: self.materials[part.material].is_see_through(),
                     ..Instance::NOWHERE
                 };
                 let origin = graph.geometries[part.geometry].origin();
-                if instance.place(world[node_idx], origin, self.origin, bounds[geometry]) {
+                if instance.place(world[node_idx], origin, self.origin, object_bounds) {
                     self.instances.push(instance);
                 }
             }
@@ -204,27 +225,13 @@ impl Instance {
 }
 
 /// What a part of a node is made from.
-fn source(graph: &Graph, node_idx: usize, geometry: usize) -> (usize, Option<usize>) {
+fn source(graph: &Graph, node_idx: usize, geometry: usize) -> Source {
     let node = &graph.nodes[node_idx];
     let bends = match &graph.geometries[geometry] {
         Geometry::Triangles(mesh) => is_deformed(mesh, node),
         Geometry::Points(_) => false,
     };
     (geometry, bends.then_some(node_idx))
-}
-
-/// All that nodes show, each once, in the order of the nodes.
-fn sources(graph: &Graph) -> Vec<(usize, Option<usize>)> {
-    let mut sources = Vec::new();
-    for (node_idx, node) in graph.nodes.iter().enumerate() {
-        for part in &node.parts {
-            let source = source(graph, node_idx, part.geometry);
-            if !sources.contains(&source) {
-                sources.push(source);
-            }
-        }
-    }
-    sources
 }
 
 /// The first part's own zero where it stands: a single cloud keeps its coordinates bit by bit.
