@@ -34,7 +34,17 @@ impl Pose {
 
     /// `mesh` in this pose, in the node's coordinates.
     pub fn bend(&self, mesh: &Mesh) -> Mesh {
-        let mut bent = Mesh { morphs: Vec::new(), skin: None, ..mesh.clone() };
+        let mut bent = Mesh {
+            origin: mesh.origin,
+            positions: mesh.positions.clone(),
+            triangles: mesh.triangles.clone(),
+            normals: mesh.normals.clone(),
+            tangents: mesh.tangents.clone(),
+            uvs: mesh.uvs.clone(),
+            colors: mesh.colors.clone(),
+            morphs: Vec::new(),
+            skin: None,
+        };
         let morphs = mesh.morphs.iter().zip(&self.morph_weights);
         for (morph, &weight) in morphs.filter(|(_, weight)| **weight != 0.0) {
             for (position, offset) in bent.positions.iter_mut().zip(&morph.positions) {
@@ -74,6 +84,14 @@ fn carry_by_joints(bent: &mut Mesh, skin: &Skin, carry: &[(DAffine3, DMat3)]) {
         let moved =
             joints.clone().map(|((place_by, _), weight)| weight * place_by.transform_point3(place));
         bent.positions[vertex] = moved.sum::<DVec3>().as_vec3();
+        if let Some(tangents) = &mut bent.tangents {
+            let tangent = tangents[vertex];
+            let along = tangent.truncate().as_dvec3();
+            let carried = joints.clone();
+            let turned = carried.map(|((by, _), weight)| weight * by.transform_vector3(along));
+            let along = turned.sum::<DVec3>().normalize_or(along).as_vec3();
+            tangents[vertex] = along.extend(tangent.w);
+        }
         if let Some(normals) = &mut bent.normals {
             let normal = normals[vertex].as_dvec3();
             let turned = joints.map(|((_, turn_by), weight)| weight * (*turn_by * normal));

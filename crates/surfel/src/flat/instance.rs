@@ -12,7 +12,7 @@ pub struct Instance {
     pub world_from_object: Affine3A,
     /// Turns normals: the inverse transpose, so that they stay upright where scales differ.
     pub world_from_normal: Mat3,
-    /// What lengths grow by, at most.
+    /// What lengths along the object's axes grow by, at most.
     pub scale: f32,
     /// Whether object and world are the same.
     pub is_in_place: bool,
@@ -26,43 +26,47 @@ pub struct Instance {
     pub is_see_through: bool,
 }
 
+/// Where geometry is to stand.
+pub(super) struct Placement {
+    pub world_from_object: DAffine3,
+    /// Object coordinates of the zero of the geometry's own.
+    pub object_origin: DVec3,
+    /// Relative to that zero.
+    pub object_bounds: Aabb,
+    pub scene_origin: DVec3,
+}
+
 impl Instance {
-    /// `world_from_object` in double precision; `object_origin` is the zero of the geometry's coordinates.
-    /// None where the transform is not finite or leaves no volume.
-    pub(super) fn place(
-        &mut self,
-        world_from_object: DAffine3,
-        object_origin: DVec3,
-        scene_origin: DVec3,
-        object_bounds: Aabb,
-    ) -> bool {
-        let shift = world_from_object.transform_point3(object_origin) - scene_origin;
-        let matrix = world_from_object.matrix3;
-        let place = DAffine3 { matrix3: matrix, translation: shift };
+    /// The first geometry, made of the first material, at a place; none where the transform is not finite or
+    /// leaves no volume.
+    pub(super) fn new(placement: Placement) -> Option<Self> {
+        let Placement { world_from_object, object_origin, object_bounds, scene_origin } = placement;
+        let matrix3 = world_from_object.matrix3;
+        let translation = world_from_object.transform_point3(object_origin) - scene_origin;
+        let place = DAffine3 { matrix3, translation };
         let inverse = place.inverse();
         if !(place.is_finite() && inverse.is_finite()) {
-            return false;
+            return None;
         }
-        self.is_in_place = place == DAffine3::IDENTITY;
-        self.world_from_object = affine(place);
-        self.object_from_world = affine(inverse);
-        self.world_from_normal = inverse.matrix3.transpose().as_mat3();
-        let lengths = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(DVec3::length);
-        self.scale = lengths.into_iter().fold(0.0, f64::max) as f32;
-        self.bounds = if self.is_in_place { object_bounds } else { self.moved(object_bounds) };
-        true
-    }
-
-    /// Around the corners of a box of the object, a little widened for rounding.
-    fn moved(&self, object: Aabb) -> Aabb {
-        let corner = |i: usize| {
-            let pick = |axis: usize| [object.min, object.max][i >> axis & 1][axis];
-            self.world_from_object.transform_point3(Vec3::new(pick(0), pick(1), pick(2)))
-        };
-        let bounds = Aabb::of_points((0..8).map(corner));
-        let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
-        let rounding = Vec3::splat(8.0 * f32::EPSILON * reach);
-        Aabb { min: bounds.min - rounding, max: bounds.max + rounding }
+        let is_in_place = place == DAffine3::IDENTITY;
+        let world_from_object = affine(place);
+        let lengths = [matrix3.x_axis, matrix3.y_axis, matrix3.z_axis].map(DVec3::length);
+        Some(Self {
+            object_from_world: affine(inverse),
+            world_from_object,
+            world_from_normal: inverse.matrix3.transpose().as_mat3(),
+            scale: lengths.into_iter().fold(0.0, f64::max) as f32,
+            is_in_place,
+            bounds: if is_in_place {
+                object_bounds
+            } else {
+                moved(object_bounds, world_from_object)
+            },
+            geometry: 0,
+            material: 0,
+            node: 0,
+            is_see_through: false,
+        })
     }
 
     /// The ray in the object's coordinates, its direction unit again, and how many of the object's lengths
@@ -90,6 +94,18 @@ impl Instance {
     pub fn world_normal(&self, normal: Vec3) -> Vec3 {
         if self.is_in_place { normal } else { (self.world_from_normal * normal).normalize() }
     }
+}
+
+/// Around the corners of a box, a little widened for rounding.
+fn moved(object: Aabb, world_from_object: Affine3A) -> Aabb {
+    let corner = |i: usize| {
+        let pick = |axis: usize| [object.min, object.max][i >> axis & 1][axis];
+        world_from_object.transform_point3(Vec3::new(pick(0), pick(1), pick(2)))
+    };
+    let bounds = Aabb::of_points((0..8).map(corner));
+    let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
+    let rounding = Vec3::splat(8.0 * f32::EPSILON * reach);
+    Aabb { min: bounds.min - rounding, max: bounds.max + rounding }
 }
 
 fn affine(place: DAffine3) -> Affine3A {

@@ -2,12 +2,12 @@
 
 use super::cloud::FlatCloud;
 use super::deform::{Pose, is_deformed};
-use super::instance::{Instance, TopTree};
+use super::instance::{Instance, Placement, TopTree};
 use super::lamp::FlatLamp;
 use super::mesh::FlatMesh;
 use crate::bvh::Node;
 use crate::error::{Error, Result};
-use crate::math::{Aabb, Affine3A, DAffine3, DVec3, LANES, Mat3};
+use crate::math::{Aabb, DAffine3, DVec3, LANES};
 use crate::progress::Progress;
 use crate::scene::{Background, Camera, Geometry, Graph, Light, Material, Scene, Texture};
 use std::collections::BTreeMap;
@@ -25,6 +25,8 @@ pub struct FlatScene {
     pub lamps: Vec<FlatLamp>,
     pub background: Background,
     pub camera: Camera,
+    /// Whether light may go through any instance.
+    pub is_see_through: bool,
     built: BTreeMap<Source, Built>,
 }
 
@@ -85,6 +87,7 @@ impl FlatScene {
             lamps: Vec::new(),
             background: scene.background,
             camera: scene.camera,
+            is_see_through: false,
             built: BTreeMap::new(),
         };
         flat.add_geometry(&scene.graph, &world, progress)?;
@@ -158,26 +161,25 @@ impl FlatScene {
                 if object_bounds.is_empty() {
                     continue;
                 }
-                let mut instance = Instance {
+                let place = Placement {
+                    world_from_object: world[node_idx],
+                    object_origin: graph.geometries[part.geometry].origin(),
+                    object_bounds,
+                    scene_origin: self.origin,
+                };
+                let is_see_through = self.materials[part.material].is_see_through();
+                self.instances.extend(Instance::new(place).map(|instance| Instance {
                     geometry,
                     material: part.material as u32,
                     node: node_idx as u32,
-                    is_see_through: self.materials[part.material].is_see_through(),
-                    ..Instance::NOWHERE
-                };
-                let origin = graph.geometries[part.geometry].origin();
-                if instance.place(world[node_idx], origin, self.origin, object_bounds) {
-                    self.instances.push(instance);
-                }
+                    is_see_through,
+                    ..instance
+                }));
             }
         }
+        self.is_see_through = self.instances.iter().any(|instance| instance.is_see_through);
         self.top = TopTree::new(&self.instances)?;
         Ok(())
-    }
-
-    /// Of all that is there, relative to the origin.
-    pub fn bounds(&self) -> Aabb {
-        self.instances.iter().fold(Aabb::EMPTY, |all, instance| all.union(instance.bounds))
     }
 
     pub fn geometry(&self, instance: &Instance) -> &FlatGeometry {
@@ -207,21 +209,6 @@ impl FlatScene {
             FlatGeometry::Cloud(_) => None,
         })
     }
-}
-
-impl Instance {
-    const NOWHERE: Self = Self {
-        object_from_world: Affine3A::IDENTITY,
-        world_from_object: Affine3A::IDENTITY,
-        world_from_normal: Mat3::IDENTITY,
-        scale: 1.0,
-        is_in_place: true,
-        bounds: Aabb::EMPTY,
-        geometry: 0,
-        material: 0,
-        node: 0,
-        is_see_through: false,
-    };
 }
 
 /// What a part of a node is made from.

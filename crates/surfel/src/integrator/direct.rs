@@ -73,9 +73,9 @@ impl DirectLight<'_> {
                     counts.sky += self.add_environment(environment, receivers, light, progress)?;
                 }
                 Light::Headlight(strength) => {
-                    for Receiver { shading, to_viewer, diffuse, slot, .. } in receivers {
-                        let cos = shading.normal.dot(*to_viewer).max(0.0);
-                        light[*slot as usize] += strength * cos * diffuse;
+                    for receiver in receivers {
+                        let back = receiver.throws_back(receiver.to_viewer, Vec3::splat(*strength));
+                        light[receiver.slot as usize] += back.unwrap_or(Vec3::ZERO);
                     }
                 }
             }
@@ -164,7 +164,8 @@ impl DirectLight<'_> {
         light: &mut [Vec3],
         progress: &dyn Progress,
     ) -> Result<u64> {
-        let n_light = if lamp.radius <= 0.0 { 1 } else { self.n_light };
+        let is_point = lamp.radius <= 0.0 || lamp.kind == LampKind::Directional;
+        let n_light = if is_point { 1 } else { self.n_light };
         let sample = |receiver: &Receiver, index: u32| {
             let position = receiver.shading.position;
             if lamp.kind == LampKind::Directional {
@@ -218,6 +219,11 @@ impl DirectLight<'_> {
                 for n in 0..n_light {
                     let index = receiver.index * n_light + n;
                     let Some(sampled) = sample(receiver, index) else { continue };
+                    // A bent normal may ask for light from behind the plane.
+                    let is_behind = receiver.shading.facet.dot(sampled.direction) <= 0.0;
+                    if is_behind || sampled.brings == Vec3::ZERO {
+                        continue;
+                    }
                     let ray = receiver.shading.spawn(sampled.direction);
                     rays.push(Ray { t_max: sampled.reach, ..ray });
                     brings.push((receiver.slot, share * sampled.brings));
@@ -241,7 +247,7 @@ impl Receiver {
     fn throws_back(&self, direction: Vec3, strength: Vec3) -> Option<Vec3> {
         let normal = self.shading.normal;
         let cos = normal.dot(direction);
-        if cos <= 0.0 || self.shading.facet.dot(direction) <= 0.0 {
+        if cos <= 0.0 {
             return None;
         }
         let mut share = self.diffuse;

@@ -159,8 +159,11 @@ impl Place<'_> {
             None => (Frame::around(normal).tangent, 1.0),
         };
         let Some(along) = along.try_normalize() else { return normal };
-        // On the back of a triangle the normal is turned, and what is left and right with it.
-        let side = if self.hit.is_inner { -1.0 } else { 1.0 };
+        // Where the normal is turned, as on the back of a triangle, or space mirrored, left is not right.
+        let own = self.at(&self.mesh.normals).map(|normal| self.instance.world_normal(normal));
+        let is_turned = own.map_or(self.hit.is_inner, |own| own.dot(normal) < 0.0);
+        let is_mirrored = self.instance.world_from_object.matrix3.determinant() < 0.0;
+        let side = if is_turned != is_mirrored { -1.0 } else { 1.0 };
         let across = side * sign * normal.cross(along);
         (local.x * along + local.y * across + local.z * normal).normalize_or(normal)
     }

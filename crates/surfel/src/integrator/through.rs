@@ -20,7 +20,7 @@ pub fn light_through(scene: &FlatScene, simd: Simd, rays: &[Ray], shares: &mut [
     for (share, is_occluded) in shares.iter_mut().zip(&occluded) {
         *share = if *is_occluded { Vec3::ZERO } else { Vec3::ONE };
     }
-    if !scene.instances.iter().any(|instance| instance.is_see_through) {
+    if !scene.is_see_through {
         return;
     }
     let open = (0..rays.len() as u32).filter(|&i| !occluded[i as usize]);
@@ -39,13 +39,10 @@ pub fn light_through(scene: &FlatScene, simd: Simd, rays: &[Ray], shares: &mut [
             let share = &mut shares[ray_idx as usize];
             let shading = Shading::new(scene, &ray, hit);
             *share *= passed(&shading, ray.direction);
-            let inside = if scene.has_outside(hit.instance) {
-                hit.is_inner.then_some(hit.instance)
-            } else {
-                medium
-            };
-            if inside.is_some() {
-                *share *= absorbed(scene, hit.instance, hit.distance);
+            let is_inner = scene.has_outside(hit.instance) && hit.is_inner;
+            let medium = medium.or_else(|| is_inner.then_some(hit.instance));
+            if let Some(medium) = medium {
+                *share *= absorbed(scene, medium, hit.distance);
             }
             if share.max_element() < LEAST {
                 *share = Vec3::ZERO;
@@ -55,8 +52,9 @@ pub fn light_through(scene: &FlatScene, simd: Simd, rays: &[Ray], shares: &mut [
             let t_max = (ray.t_max - hit.distance).max(0.0);
             rays[n_left] = Ray { t_max, ..on };
             let is_solid = 0.0 < shading.transmission && !shading.is_thin;
-            let entered = (is_solid && inside.is_none()).then_some(hit.instance);
-            passing[n_left] = (ray_idx, entered);
+            let is_leaving = medium == Some(hit.instance);
+            let medium = if is_solid { (!is_leaving).then_some(hit.instance) } else { medium };
+            passing[n_left] = (ray_idx, medium);
             n_left += 1;
         }
         rays.truncate(n_left);

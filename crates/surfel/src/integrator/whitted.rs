@@ -186,9 +186,11 @@ impl<'a> Search<'a> {
             });
         }
         if path.depth < self.max_depth {
-            let inside = is_inside.then_some(hit.instance);
-            self.reflect(&path, &shading, &lobes, inside);
-            self.refract(&path, &shading, &lobes, inside);
+            if is_inside && 0.0 < shading.transmission {
+                path.medium = Some(hit.instance);
+            }
+            self.reflect(&path, &shading, &lobes);
+            self.refract(&path, &shading, &lobes, is_inside);
         }
     }
 
@@ -228,7 +230,7 @@ impl<'a> Search<'a> {
         });
     }
 
-    fn reflect(&mut self, path: &Path, shading: &Shading, lobes: &Lobes, inside: Option<u32>) {
+    fn reflect(&mut self, path: &Path, shading: &Shading, lobes: &Lobes) {
         if lobes.reflected == Vec3::ZERO {
             return;
         }
@@ -253,33 +255,38 @@ impl<'a> Search<'a> {
             weight: path.weight * lobes.reflected * share,
             key: hash(path.key ^ REFLECTED),
             depth: path.depth + 1,
-            medium: inside,
             sees: Sees::Sky { with_sun: is_sharp },
             ..*path
         });
     }
 
-    fn refract(&mut self, path: &Path, shading: &Shading, lobes: &Lobes, inside: Option<u32>) {
+    fn refract(&mut self, path: &Path, shading: &Shading, lobes: &Lobes, is_inside: bool) {
         if lobes.refracted == Vec3::ZERO {
             return;
         }
         let direction = path.ray.direction;
         let (normal, _) = bent_normal(path, shading);
-        let eta = if shading.is_thin { 1.0 } else { lobes.eta };
-        // A rough boundary's own normal may reflect totally where the mean one does not.
-        let Some(refracted) =
-            refract(direction, normal, eta).or_else(|| refract(direction, shading.normal, eta))
-        else {
-            return;
+        let refracted = if shading.is_thin {
+            // Through a pane light goes straight on, blurred as what it mirrors.
+            let mirrored = reflect(direction, normal);
+            Some(mirrored - 2.0 * mirrored.dot(shading.normal) * shading.normal)
+        } else {
+            // A rough boundary's own normal may reflect totally where the mean one does not.
+            refract(direction, normal, lobes.eta)
+                .or_else(|| refract(direction, shading.normal, lobes.eta))
         };
+        let Some(refracted) = refracted else { return };
         let refracted = if refracted.dot(shading.facet) < 0.0 { refracted } else { direction };
-        let is_entering = inside.is_none() && !shading.is_thin;
         self.send(Path {
             ray: shading.spawn(refracted),
             weight: path.weight * lobes.refracted,
             key: hash(path.key ^ REFRACTED),
             depth: path.depth + 1,
-            medium: is_entering.then_some(shading.instance),
+            medium: match (shading.is_thin, is_inside) {
+                (true, _) => path.medium,
+                (false, true) => None,
+                (false, false) => Some(shading.instance),
+            },
             sees: match path.sees {
                 Sees::Behind => Sees::BehindGlass,
                 seen => seen,

@@ -26,6 +26,7 @@ pub struct Distribution2d {
 }
 
 impl Distribution1d {
+    #[cfg(test)]
     /// None without cells. Weights that are negative or not finite count as 0; if all do, each cell
     /// is as likely as any other.
     pub fn new(weights: &[f32]) -> Option<Self> {

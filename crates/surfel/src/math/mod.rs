@@ -12,7 +12,7 @@ mod ray;
 mod sampling;
 
 pub use aabb::Aabb;
-pub use distribution::{Distribution1d, Distribution2d};
+pub use distribution::Distribution2d;
 pub use eigen::{SymmetricMatrix, smallest_eigenvector};
 pub use frame::{Frame, tangents};
 pub use glam::{

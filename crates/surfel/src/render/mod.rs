@@ -18,7 +18,7 @@ pub struct Settings {
     pub height: u32,
     /// Camera rays a pixel.
     pub samples_per_pixel: u32,
-    /// Rays toward the sky, and toward the sun if its shadows are soft, a pixel.
+    /// Rays toward the sky or environment, and toward suns and lamps whose shadows are soft, a pixel.
     pub light_samples: u32,
     /// Reflections and refractions of a ray, at most.
     pub max_depth: u32,

@@ -115,11 +115,6 @@ pub trait Value: Clone {
 }
 
 impl<T: Value> Keys<T> {
-    /// A value that never changes.
-    pub fn constant(value: T) -> Self {
-        Self { times_secs: vec![0.0], values: vec![value], interpolation: Interpolation::Step }
-    }
-
     /// The value at a time. Needs a key at least.
     pub fn at(&self, time_secs: f64) -> T {
         let next = self.times_secs.partition_point(|&time| time <= time_secs);

@@ -25,7 +25,7 @@ pub use texture::{Encoding, Texture, TextureRef, Wrap};
 
 use crate::math::Vec3;
 
-/// One picture's worth of world: right-handed, Z up, in the unit of its clouds.
+/// One picture's worth of world: right-handed, Z up, in the unit of its files.
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub graph: Graph,
@@ -34,7 +34,7 @@ pub struct Scene {
     pub camera: Camera,
 }
 
-/// What is seen where no point is.
+/// What is seen where nothing is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Background {
     Transparent,

@@ -1,4 +1,4 @@
-//! Rays in batches against a flat cloud: closest hit, any hit, gather; SIMD lives here.
+//! Rays in batches against a cloud, a mesh or a whole scene: closest hit, any hit, gather; SIMD lives here.
 
 mod any;
 mod block;

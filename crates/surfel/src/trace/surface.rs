@@ -17,7 +17,7 @@ pub struct SurfaceHit {
     pub distance: f32,
     /// Index in its cloud of the nearest point hit.
     pub id: u32,
-    /// Of that point, in world units.
+    /// Of that point, in the cloud's own units.
     pub radius: f32,
     /// Unit, facing the ray's origin.
     pub normal: Vec3,

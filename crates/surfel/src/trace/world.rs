@@ -104,13 +104,14 @@ pub fn scene_hits(
             let instance = &scene.instances[*instance_idx as usize];
             // Discs behind the nearest are blended with it, whatever other instances are among them.
             let reach = match scene.geometry(instance) {
-                FlatGeometry::Cloud(cloud) => instance.scale * cloud.reach,
+                FlatGeometry::Cloud(cloud) => cloud.reach,
                 FlatGeometry::Mesh(_) => 0.0,
             };
-            let there = enter(instance, ray_indices, |ray_idx| {
-                let ray = rays[ray_idx as usize];
-                Ray { t_max: ray.t_max.min(distances[ray_idx as usize] + reach), ..ray }
-            });
+            let mut there = enter(instance, ray_indices, rays);
+            let nearest = ray_indices.iter().map(|&ray_idx| distances[ray_idx as usize]);
+            for ((ray, scale), nearest) in there.rays.iter_mut().zip(&there.scales).zip(nearest) {
+                ray.t_max = ray.t_max.min(nearest * scale + reach);
+            }
             batch.trace(scene, simd, instance, &there.rays);
             for (i, &ray_idx) in ray_indices.iter().enumerate() {
                 let place = ray_idx as usize;
@@ -156,7 +157,7 @@ pub fn scene_occlusions(
         let Some(batches) = rounds.next(limit) else { return };
         for (instance_idx, ray_indices) in batches.iter().filter(|(_, rays)| !rays.is_empty()) {
             let instance = &scene.instances[*instance_idx as usize];
-            let there = enter(instance, ray_indices, |ray_idx| rays[ray_idx as usize]);
+            let there = enter(instance, ray_indices, rays);
             blocked.resize(ray_indices.len(), false);
             block(scene, simd, instance, &there.rays, &mut blocked);
             for (&ray_idx, is_blocked) in ray_indices.iter().zip(&blocked) {
@@ -327,8 +328,8 @@ struct RaysThere {
     scales: Vec<f32>,
 }
 
-fn enter(instance: &Instance, indices: &[u32], ray: impl Fn(u32) -> Ray) -> RaysThere {
-    let there = indices.iter().map(|&ray_idx| instance.object_ray(&ray(ray_idx)));
+fn enter(instance: &Instance, indices: &[u32], rays: &[Ray]) -> RaysThere {
+    let there = indices.iter().map(|&ray_idx| instance.object_ray(&rays[ray_idx as usize]));
     let (rays, scales) = there.unzip();
     RaysThere { rays, scales }
 }
