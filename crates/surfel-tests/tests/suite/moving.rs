@@ -102,7 +102,7 @@ fn strip() -> Mesh {
 
 /// All vertices of a flat mesh that triangles use, as they were bent.
 fn bent_positions(scene: &FlatScene, geometry: usize) -> Vec<Vec3> {
-    let FlatGeometry::Mesh(mesh) = &scene.geometries[geometry] else { panic!("no mesh") };
+    let FlatGeometry::Mesh(mesh) = &*scene.geometries[geometry] else { panic!("no mesh") };
     let n = mesh.corners.as_flattened().iter().max().unwrap() + 1;
     let mut positions = vec![Vec3::NAN; n as usize];
     for slot in mesh.triangles.slots() {
@@ -115,7 +115,7 @@ fn bent_positions(scene: &FlatScene, geometry: usize) -> Vec<Vec3> {
 }
 
 fn bent_normals(scene: &FlatScene, geometry: usize) -> &[Vec3] {
-    let FlatGeometry::Mesh(mesh) = &scene.geometries[geometry] else { panic!("no mesh") };
+    let FlatGeometry::Mesh(mesh) = &*scene.geometries[geometry] else { panic!("no mesh") };
     &mesh.normals
 }
 

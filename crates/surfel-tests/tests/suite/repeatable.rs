@@ -6,7 +6,7 @@ use surfel::flat::FlatScene;
 use surfel::image::Image;
 use surfel::math::Vec3;
 use surfel::progress::{Progress, Silent};
-use surfel::render::{CpuRenderer, Renderer, Settings};
+use surfel::render::{CpuRenderer, Piece, Renderer, Settings};
 use surfel::scene::{Light, Scene, Sky, Sun};
 use surfel::surface::SurfaceKind;
 use surfel::trace::Simd;
@@ -92,5 +92,46 @@ fn every_stage_can_be_cancelled() {
             CpuRenderer { simd: Simd::detect() }.render(&flat, &SETTINGS, &progress)
         });
         assert!(matches!(result, Err(surfel::Error::Cancelled)), "after {left}");
+    }
+}
+
+#[test]
+fn pieces_make_the_whole_picture() {
+    for (name, kind) in SurfaceKind::ALL {
+        let flat = FlatScene::new(&scene(kind), &Silent).unwrap();
+        let renderer = CpuRenderer { simd: Simd::detect() };
+        let whole = renderer.render(&flat, &SETTINGS, &Silent).unwrap().0;
+        let piece = |rows, samples| {
+            let piece = Piece { rows, samples };
+            renderer.render_piece(&flat, &SETTINGS, piece, &Silent).unwrap().0
+        };
+        let rows = [(0, 7), (7, 40), (40, 50)].map(|rows| piece(rows, (0, 4)));
+        assert_eq!(rows.each_ref().map(|image| image.height), [7, 33, 10]);
+        let stacked: Vec<[f32; 4]> = rows.iter().flat_map(|image| image.color.clone()).collect();
+        assert!(stacked == whole.color, "{name}");
+        if kind == SurfaceKind::Points {
+            continue;
+        }
+        let samples = [(0, 1), (1, 2), (2, 4)].map(|samples| piece((0, 50), samples));
+        for (pixel, expected) in whole.color.iter().enumerate() {
+            let weighted = samples.iter().zip([0.25, 0.25, 0.5]);
+            for channel in 0..4 {
+                let mean: f32 = weighted.clone().map(|(s, w)| w * s.color[pixel][channel]).sum();
+                assert!((mean - expected[channel]).abs() < 1e-5, "{name}, pixel {pixel}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_piece_outside_the_picture_is_an_error() {
+    let flat = FlatScene::new(&scene(SurfaceKind::Disc), &Silent).unwrap();
+    let renderer = CpuRenderer { simd: Simd::detect() };
+    for (rows, samples) in
+        [((0, 51), (0, 4)), ((9, 9), (0, 4)), ((0, 50), (3, 5)), ((5, 4), (0, 1))]
+    {
+        let piece = Piece { rows, samples };
+        let error = renderer.render_piece(&flat, &SETTINGS, piece, &Silent).unwrap_err();
+        assert!(error.to_string().contains("piece"), "{error}");
     }
 }

@@ -11,12 +11,14 @@ use crate::math::{Aabb, DAffine3, DVec3, LANES};
 use crate::progress::Progress;
 use crate::scene::{Background, Camera, Geometry, Graph, Light, Material, Scene, Texture};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 #[derive(Clone, Debug)]
 pub struct FlatScene {
     /// World coordinates of the zero of everything below.
     pub origin: DVec3,
-    pub geometries: Vec<FlatGeometry>,
+    /// Shared by the clones of a scene: one geometry in other light costs no memory.
+    pub geometries: Vec<Arc<FlatGeometry>>,
     pub instances: Vec<Instance>,
     pub top: TopTree,
     pub materials: Vec<Material>,
@@ -117,7 +119,7 @@ impl FlatScene {
                 (geometry, _) => (FlatGeometry::new(geometry, progress)?, Pose::default()),
             };
             self.built.insert(source, Built { geometry: self.geometries.len() as u32, pose });
-            self.geometries.push(geometry);
+            self.geometries.push(Arc::new(geometry));
         }
         Ok(())
     }
@@ -132,7 +134,7 @@ impl FlatScene {
             if pose == built.pose {
                 continue;
             }
-            let flat = &mut self.geometries[built.geometry as usize];
+            let flat = Arc::make_mut(&mut self.geometries[built.geometry as usize]);
             if let (FlatGeometry::Mesh(flat), Geometry::Triangles(mesh)) =
                 (flat, &graph.geometries[*geometry])
             {
@@ -149,7 +151,7 @@ impl FlatScene {
         let is_visible = graph.visible_nodes();
         self.instances.clear();
         self.lamps.clear();
-        let bounds: Vec<Aabb> = self.geometries.iter().map(FlatGeometry::bounds).collect();
+        let bounds: Vec<Aabb> = self.geometries.iter().map(|geometry| geometry.bounds()).collect();
         for (node_idx, node) in graph.nodes.iter().enumerate().filter(|(i, _)| is_visible[*i]) {
             if let Some(lamp) = &node.lamp {
                 self.lamps.extend(FlatLamp::place(lamp, world[node_idx], self.origin));
@@ -196,7 +198,7 @@ impl FlatScene {
 
     /// Geometry of clouds, each once.
     pub fn clouds(&self) -> impl Iterator<Item = &FlatCloud> {
-        self.geometries.iter().filter_map(|geometry| match geometry {
+        self.geometries.iter().filter_map(|geometry| match &**geometry {
             FlatGeometry::Cloud(cloud) => Some(cloud),
             FlatGeometry::Mesh(_) => None,
         })
@@ -204,7 +206,7 @@ impl FlatScene {
 
     /// Geometry of meshes, each once.
     pub fn meshes(&self) -> impl Iterator<Item = &FlatMesh> {
-        self.geometries.iter().filter_map(|geometry| match geometry {
+        self.geometries.iter().filter_map(|geometry| match &**geometry {
             FlatGeometry::Mesh(mesh) => Some(mesh),
             FlatGeometry::Cloud(_) => None,
         })

@@ -1,6 +1,6 @@
 //! The CPU renderer: tiles on all threads, each a few batches of rays.
 
-use super::{RenderStats, Renderer, Settings, raster};
+use super::{Piece, RenderStats, Renderer, Settings, raster};
 use crate::error::Result;
 use crate::flat::FlatScene;
 use crate::image::{Band, Image};
@@ -30,55 +30,50 @@ impl Renderer for CpuRenderer {
         "cpu"
     }
 
-    fn render(
+    fn render_piece(
         &self,
         scene: &FlatScene,
         settings: &Settings,
+        piece: Piece,
         progress: &dyn Progress,
     ) -> Result<(Image, RenderStats)> {
         settings.check()?;
+        piece.check(settings)?;
         let start = Instant::now();
         let view = scene.camera.view(scene.origin, settings.width, settings.height);
         let (image, mut stats) = if raster::is_asked_for(scene)? {
-            (raster::render(scene, &view, settings, progress)?, RenderStats::default())
+            (raster::render(scene, &view, settings, piece, progress)?, RenderStats::default())
         } else {
-            self.trace(scene, &view, settings, progress)?
+            let job = Job { scene, simd: self.simd, view: &view, settings, piece, progress };
+            trace(&job)?
         };
         stats.frame_secs = start.elapsed().as_secs_f64();
         Ok((image, stats))
     }
 }
 
-impl CpuRenderer {
-    fn trace(
-        &self,
-        scene: &FlatScene,
-        view: &View,
-        settings: &Settings,
-        progress: &dyn Progress,
-    ) -> Result<(Image, RenderStats)> {
-        progress.begin("render", u64::from(settings.width) * u64::from(settings.height));
-        let mut image = settings.blank();
-        let job = Job { scene, simd: self.simd, view, settings, progress };
-        let bands: Vec<_> = image.bands_mut(TILE as usize).into_iter().enumerate().collect();
-        let bands = bands.into_par_iter().map(|(row, mut band)| {
-            let render = |place| {
-                let tile = Tile::render(&job, place)?;
-                progress.advance(place.n_pixels() as u64);
-                Ok(tile)
-            };
-            let places: Vec<_> = TilePlace::of_row(row as u32, settings).collect();
-            let tiles: Vec<_> = places.into_par_iter().map(render).collect::<Result<_>>()?;
-            tiles.iter().for_each(|tile| tile.copy_to(&mut band, settings.width));
-            Ok(tiles.iter().map(|tile| (tile.counts, tile.trace_secs)).collect::<Vec<_>>())
-        });
-        let mut stats = RenderStats::default();
-        for (counts, trace_secs) in bands.collect::<Result<Vec<_>>>()?.into_iter().flatten() {
-            stats.rays += counts;
-            stats.trace_secs += trace_secs / rayon::current_num_threads() as f64;
-        }
-        Ok((image, stats))
+fn trace(job: &Job) -> Result<(Image, RenderStats)> {
+    let Job { settings, piece, progress, .. } = *job;
+    progress.begin("render", u64::from(settings.width) * u64::from(piece.n_rows()));
+    let mut image = settings.blank(piece);
+    let bands: Vec<_> = image.bands_mut(TILE as usize).into_iter().enumerate().collect();
+    let bands = bands.into_par_iter().map(|(row, mut band)| {
+        let render = |place| {
+            let tile = Tile::render(job, place)?;
+            progress.advance(place.n_pixels() as u64);
+            Ok(tile)
+        };
+        let places: Vec<_> = TilePlace::of_row(row as u32, job).collect();
+        let tiles: Vec<_> = places.into_par_iter().map(render).collect::<Result<_>>()?;
+        tiles.iter().for_each(|tile| tile.copy_to(&mut band, settings.width));
+        Ok(tiles.iter().map(|tile| (tile.counts, tile.trace_secs)).collect::<Vec<_>>())
+    });
+    let mut stats = RenderStats::default();
+    for (counts, trace_secs) in bands.collect::<Result<Vec<_>>>()?.into_iter().flatten() {
+        stats.rays += counts;
+        stats.trace_secs += trace_secs / rayon::current_num_threads() as f64;
     }
+    Ok((image, stats))
 }
 
 /// What all tiles share.
@@ -87,6 +82,7 @@ struct Job<'a> {
     simd: Simd,
     view: &'a View,
     settings: &'a Settings,
+    piece: Piece,
     progress: &'a dyn Progress,
 }
 
@@ -106,10 +102,10 @@ struct TilePlace {
 }
 
 impl TilePlace {
-    /// The tiles of a row of them, from the left.
-    fn of_row(row: u32, settings: &Settings) -> impl Iterator<Item = Self> {
-        let (y, width) = (row * TILE, settings.width);
-        let height = TILE.min(settings.height - y);
+    /// The tiles of a row of them in the piece, from the left.
+    fn of_row(row: u32, job: &Job) -> impl Iterator<Item = Self> {
+        let (y, width) = (job.piece.rows.0 + row * TILE, job.settings.width);
+        let height = TILE.min(job.piece.rows.1 - y);
         let place = move |x| Self { x, y, width: TILE.min(width - x), height };
         (0..width).step_by(TILE as usize).map(place)
     }
@@ -162,12 +158,12 @@ impl Tile {
             counts: RayCounts::default(),
             trace_secs: 0.0,
         };
-        let n_samples = settings.samples_per_pixel;
+        let n_samples = job.piece.n_samples();
+        let (first, end) = job.piece.samples;
         let at_once = (BATCH / n as u32).clamp(1, n_samples);
-        for first in (0..n_samples).step_by(at_once as usize) {
+        for first in (first..end).step_by(at_once as usize) {
             job.progress.check()?;
-            let numbers = first..n_samples.min(first + at_once);
-            tile.add_samples(job, numbers)?;
+            tile.add_samples(job, first..end.min(first + at_once))?;
         }
         for (i, (_, y)) in place.pixels().enumerate() {
             let n_samples = n_samples as f32;
@@ -175,7 +171,7 @@ impl Tile {
             tile.color[i] =
                 tile.color[i] / n_samples + (1.0 - tile.coverage[i]) * background(job, y);
         }
-        if settings.with_layers && n_samples > 1 {
+        if settings.with_layers && 1 < settings.samples_per_pixel {
             tile.trace_layers(job);
         }
         Ok(tile)
@@ -183,7 +179,7 @@ impl Tile {
 
     /// Adds up the camera rays of these numbers of all pixels.
     fn add_samples(&mut self, job: &Job, numbers: std::ops::Range<u32>) -> Result<()> {
-        let Job { scene, simd, view, settings, progress } = *job;
+        let Job { scene, simd, view, settings, progress, .. } = *job;
         let per_pixel = numbers.len();
         let n = self.color.len() * per_pixel;
         let mut rays = Vec::with_capacity(n);

@@ -1,6 +1,6 @@
 //! Points as single pixels with a z-buffer, shaded by eye-dome lighting.
 
-use super::Settings;
+use super::{Piece, Settings};
 use crate::error::{Error, Result};
 use crate::flat::{FlatCloud, FlatGeometry, FlatScene, Instance};
 use crate::image::{Image, NO_ID};
@@ -38,20 +38,52 @@ struct Seen {
     slot: u32,
 }
 
+/// Rows of a picture, from `first` to before `end`.
+#[derive(Clone, Copy)]
+struct Rows {
+    width: usize,
+    first: usize,
+    end: usize,
+}
+
+impl Rows {
+    /// Those of a piece and those beside it, which shade it.
+    fn around(piece: Piece, settings: &Settings) -> Self {
+        Self {
+            width: settings.width as usize,
+            first: piece.rows.0.saturating_sub(1) as usize,
+            end: settings.height.min(piece.rows.1 + 1) as usize,
+        }
+    }
+
+    fn n_pixels(self) -> usize {
+        self.width * (self.end - self.first)
+    }
+
+    /// Where a pixel of the picture is kept, if it is.
+    fn index(self, x: i64, y: i64) -> Option<usize> {
+        let is_in = (0..self.width as i64).contains(&x)
+            && (self.first as i64..self.end as i64).contains(&y);
+        is_in.then(|| (y as usize - self.first) * self.width + x as usize)
+    }
+}
+
 /// The nearest point of each pixel; of equally near ones that of the first instance and lowest slot.
 pub fn render(
     scene: &FlatScene,
     view: &View,
     settings: &Settings,
+    piece: Piece,
     progress: &dyn Progress,
 ) -> Result<Image> {
-    let n_pixels = settings.width as usize * settings.height as usize;
+    let rows = Rows::around(piece, settings);
+    let n_pixels = rows.n_pixels();
     let blocks = |instance: &Instance| cloud(scene, instance).points.blocks.len() as u64;
     progress.begin("render", scene.instances.iter().map(blocks).sum());
     let mut depths = vec![f32::INFINITY; n_pixels];
     let mut seen = vec![Seen { instance: NO_ID, slot: 0 }; n_pixels];
     for (instance_idx, instance) in scene.instances.iter().enumerate() {
-        let nearest = nearest(scene, instance, view, settings, progress)?;
+        let nearest = nearest(scene, instance, view, rows, progress)?;
         for (pixel, key) in nearest.into_iter().enumerate().filter(|(_, key)| *key != EMPTY) {
             let depth = f32::from_bits((key >> 32) as u32);
             if depth < depths[pixel] {
@@ -60,7 +92,7 @@ pub fn render(
             }
         }
     }
-    Ok(shade(scene, settings, &depths, &seen))
+    Ok(shade(scene, settings, piece, rows, &depths, &seen))
 }
 
 /// Depth and slot of the point of one instance in each pixel, as one number.
@@ -68,11 +100,10 @@ fn nearest(
     scene: &FlatScene,
     instance: &Instance,
     view: &View,
-    settings: &Settings,
+    rows: Rows,
     progress: &dyn Progress,
 ) -> Result<Vec<u64>> {
-    let (width, height) = (settings.width as usize, settings.height as usize);
-    let nearest: Vec<AtomicU64> = (0..width * height).map(|_| AtomicU64::new(EMPTY)).collect();
+    let nearest: Vec<AtomicU64> = (0..rows.n_pixels()).map(|_| AtomicU64::new(EMPTY)).collect();
     let blocks = &cloud(scene, instance).points.blocks;
     blocks.par_iter().enumerate().with_min_len(1024).try_for_each(|(block_idx, block)| {
         if block_idx % 1024 == 0 {
@@ -83,12 +114,11 @@ fn nearest(
         for lane in (0..LANES).filter(|lane| occupied >> lane & 1 == 1) {
             let position = instance.world_position(block.position(lane));
             let Some((x, y, depth)) = view.project(position) else { continue };
-            if (0.0..width as f32).contains(&x) && (0.0..height as f32).contains(&y) {
-                // The bits of positive floats are ordered as the floats are.
-                let slot = (block_idx * LANES + lane) as u64;
-                let key = u64::from(depth.to_bits()) << 32 | slot;
-                nearest[y as usize * width + x as usize].fetch_min(key, Ordering::Relaxed);
-            }
+            let Some(pixel) = rows.index(x.floor() as i64, y.floor() as i64) else { continue };
+            // The bits of positive floats are ordered as the floats are.
+            let slot = (block_idx * LANES + lane) as u64;
+            let key = u64::from(depth.to_bits()) << 32 | slot;
+            nearest[pixel].fetch_min(key, Ordering::Relaxed);
         }
         Ok(())
     })?;
@@ -102,11 +132,20 @@ fn cloud<'s>(scene: &'s FlatScene, instance: &Instance) -> &'s FlatCloud {
     }
 }
 
-fn shade(scene: &FlatScene, settings: &Settings, depths: &[f32], seen: &[Seen]) -> Image {
-    let mut image = settings.blank();
-    let width = settings.width as usize;
-    for (pixel, Seen { instance, slot }) in seen.iter().enumerate() {
-        let (x, y) = (pixel % width, pixel / width);
+fn shade(
+    scene: &FlatScene,
+    settings: &Settings,
+    piece: Piece,
+    rows: Rows,
+    depths: &[f32],
+    seen: &[Seen],
+) -> Image {
+    let mut image = settings.blank(piece);
+    let places =
+        (piece.rows.0..piece.rows.1).flat_map(|y| (0..settings.width).map(move |x| (x, y)));
+    for (pixel, (x, y)) in places.enumerate() {
+        let Some(place) = rows.index(i64::from(x), i64::from(y)) else { continue };
+        let Seen { instance, slot } = &seen[place];
         if *instance == NO_ID {
             image.color[pixel] = scene.background.at((y as f32 + 0.5) / settings.height as f32);
             continue;
@@ -115,11 +154,11 @@ fn shade(scene: &FlatScene, settings: &Settings, depths: &[f32], seen: &[Seen]) 
         let points = &cloud(scene, placed).points;
         let material = &scene.materials[placed.material as usize];
         let albedo = material.base_color * points.gathered(*slot).color;
-        let shade = if material.is_unlit { 1.0 } else { eye_dome(depths, settings, x, y) };
+        let shade = if material.is_unlit { 1.0 } else { eye_dome(depths, rows, (x, y), place) };
         image.color[pixel] = (shade * albedo).extend(1.0).to_array();
         image.coverage[pixel] = 1.0;
         let Some(layers) = &mut image.layers else { continue };
-        layers.depth[pixel] = depths[pixel];
+        layers.depth[pixel] = depths[place];
         layers.position[pixel] = placed.world_position(points.center(*slot));
         layers.point_id[pixel] = points.id(*slot);
         layers.instance_id[pixel] = *instance;
@@ -129,18 +168,13 @@ fn shade(scene: &FlatScene, settings: &Settings, depths: &[f32], seen: &[Seen]) 
 }
 
 /// Eye-dome lighting (Boucheny 2009): darker the farther a pixel lies behind its neighbours.
-fn eye_dome(depths: &[f32], settings: &Settings, x: usize, y: usize) -> f32 {
+fn eye_dome(depths: &[f32], rows: Rows, (x, y): (u32, u32), place: usize) -> f32 {
     const STRENGTH: f32 = 300.0 * 0.4;
-    let (width, height) = (settings.width as i64, settings.height as i64);
-    let own = depths[y * width as usize + x].log2();
+    let own = depths[place].log2();
     let ring = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
-    let mut sum = 0.0;
-    for (dx, dy) in ring {
-        let (x, y) = (x as i64 + dx, y as i64 + dy);
-        if (0..width).contains(&x) && (0..height).contains(&y) {
-            // Farther than all where there is nothing.
-            sum += (own - depths[(y * width + x) as usize].log2()).max(0.0);
-        }
-    }
+    let beside = ring.map(|(dx, dy)| rows.index(i64::from(x) + dx, i64::from(y) + dy));
+    // Farther than all where there is nothing.
+    let behind = |beside: usize| (own - depths[beside].log2()).max(0.0);
+    let sum: f32 = beside.into_iter().flatten().map(behind).sum();
     (-STRENGTH * sum / 8.0).exp()
 }
