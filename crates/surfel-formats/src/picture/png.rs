@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Write};
 use std::path::Path;
 
-use surfel::image::{Image, encode_srgb};
+use surfel::image::{Image, encode_srgb, encode_srgb8};
 
 use super::{Alpha, BitDepth, ImageOptions};
 use crate::atomic::{write_failed, write_file};
@@ -79,11 +79,7 @@ fn encode(writer: impl Write, image: &Image, options: &ImageOptions) -> io::Resu
 
 fn samples(image: &Image, options: &ImageOptions) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let mut put = |value: f32| match options.depth {
-        // The casts take NaN to black.
-        BitDepth::Eight => bytes.push((value * 255.0 + 0.5) as u8),
-        BitDepth::Sixteen => bytes.extend(((value * 65535.0 + 0.5) as u16).to_be_bytes()),
-    };
+    let deep = |encoded: f32| ((encoded * 65535.0 + 0.5) as u16).to_be_bytes();
     for &[r, g, b, a] in &image.color {
         let a = a.clamp(0.0, 1.0);
         let opacity = match options.alpha {
@@ -91,10 +87,17 @@ fn samples(image: &Image, options: &ImageOptions) -> Vec<u8> {
             _ => 1.0,
         };
         for channel in [r, g, b] {
-            put(encode_srgb((channel / opacity).clamp(0.0, 1.0)));
+            let linear = channel / opacity;
+            match options.depth {
+                BitDepth::Eight => bytes.push(encode_srgb8(linear)),
+                // The cast takes NaN to black.
+                BitDepth::Sixteen => bytes.extend(deep(encode_srgb(linear.clamp(0.0, 1.0)))),
+            }
         }
-        if options.alpha == Alpha::Keep {
-            put(a);
+        match (options.alpha, options.depth) {
+            (Alpha::Drop, _) => {}
+            (Alpha::Keep, BitDepth::Eight) => bytes.push((a * 255.0 + 0.5) as u8),
+            (Alpha::Keep, BitDepth::Sixteen) => bytes.extend(deep(a)),
         }
     }
     bytes

@@ -8,7 +8,7 @@ mod tone;
 
 pub use classification::{class_color, class_name};
 pub use colormap::Colormap;
-pub use srgb::{decode_srgb, decode_srgb8, encode_srgb};
+pub use srgb::{decode_srgb, decode_srgb8, encode_srgb, encode_srgb8};
 pub use stretch::Stretch;
 pub use tone::Tone;
 

@@ -1,0 +1,101 @@
+//! From linear pictures to what a browser shows: JPEG while things move, PNG when they stand still.
+
+use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
+use rayon::prelude::*;
+use surfel::image::{decode_srgb8, encode_srgb8};
+
+/// What the page has behind a transparent picture, sRGB.
+const BEHIND: [u8; 3] = [48, 50, 54];
+/// Pixels that are encoded by a thread at once.
+const CHUNK: usize = 16_384;
+
+/// Linear pixels, premultiplied by alpha, each the sum of `weight` samples.
+#[derive(Clone, Copy)]
+pub struct Pixels<'p> {
+    pub width: u16,
+    pub height: u16,
+    pub sum: &'p [[f32; 4]],
+    pub weight: f32,
+}
+
+/// With alpha laid over the page's own grey.
+pub fn jpeg(pixels: Pixels, quality: u8) -> Vec<u8> {
+    let behind = BEHIND.map(decode_srgb8);
+    let opaque = |[r, g, b, a]: [f32; 4]| {
+        let over = |channel: f32, behind: f32| encode_srgb8(channel + (1.0 - a) * behind);
+        [over(r, behind[0]), over(g, behind[1]), over(b, behind[2])]
+    };
+    let bytes = bytes(pixels, opaque);
+    let mut out = Vec::with_capacity(bytes.len() / 8);
+    let mut encoder = Encoder::new(&mut out, quality);
+    encoder.set_sampling_factor(SamplingFactor::F_2_2);
+    // Fails only for pictures without pixels, which are never made.
+    let encoded = encoder.encode(&bytes, pixels.width, pixels.height, ColorType::Rgb);
+    debug_assert!(encoded.is_ok(), "{encoded:?}");
+    out
+}
+
+pub fn png(pixels: Pixels) -> Vec<u8> {
+    let is_opaque = pixels.sum.iter().all(|[.., a]| pixels.weight <= *a + 1e-3);
+    let (color, bytes) = if is_opaque {
+        (png::ColorType::Rgb, bytes(pixels, |[r, g, b, _]| [r, g, b].map(encode_srgb8)))
+    } else {
+        (png::ColorType::Rgba, bytes(pixels, straight))
+    };
+    let mut out = Vec::with_capacity(bytes.len() / 2);
+    let mut encoder =
+        png::Encoder::new(&mut out, u32::from(pixels.width), u32::from(pixels.height));
+    encoder.set_color(color);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(&bytes));
+    // Memory takes all that is written.
+    debug_assert!(written.is_ok(), "{written:?}");
+    out
+}
+
+fn straight([r, g, b, a]: [f32; 4]) -> [u8; 4] {
+    let opacity = if 0.0 < a { a.min(1.0) } else { 1.0 };
+    let [r, g, b] = [r, g, b].map(|channel| encode_srgb8(channel / opacity));
+    [r, g, b, (255.0 * a.clamp(0.0, 1.0)).round() as u8]
+}
+
+fn bytes<const N: usize>(pixels: Pixels, encode: impl Fn([f32; 4]) -> [u8; N] + Sync) -> Vec<u8> {
+    let share = 1.0 / pixels.weight;
+    let mut bytes = vec![0; N * pixels.sum.len()];
+    let chunks = bytes.par_chunks_mut(N * CHUNK).zip(pixels.sum.par_chunks(CHUNK));
+    chunks.for_each(|(bytes, sums)| {
+        for (bytes, sum) in bytes.chunks_exact_mut(N).zip(sums) {
+            bytes.copy_from_slice(&encode(sum.map(|channel| share * channel)));
+        }
+    });
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pixels(sum: &[[f32; 4]]) -> Pixels<'_> {
+        Pixels { width: sum.len() as u16, height: 1, sum, weight: 2.0 }
+    }
+
+    #[test]
+    fn a_png_keeps_every_code_and_alpha() {
+        let half = [decode_srgb8(200), decode_srgb8(100), 0.0, 1.0];
+        let opaque = [2.0 * decode_srgb8(17), 2.0, 0.0, 2.0];
+        let image = image::load_from_memory(&png(pixels(&[half, opaque]))).unwrap().into_rgba8();
+        assert_eq!(image.get_pixel(0, 0).0, [200, 100, 0, 128]);
+        assert_eq!(image.get_pixel(1, 0).0, [17, 255, 0, 255]);
+        let image = image::load_from_memory(&png(pixels(&[opaque]))).unwrap();
+        assert_eq!(image.color(), image::ColorType::Rgb8);
+    }
+
+    #[test]
+    fn a_jpeg_lies_over_the_grey_of_the_page() {
+        let sum = vec![[0.0; 4]; 64];
+        let image = image::load_from_memory(&jpeg(pixels(&sum), 90)).unwrap().into_rgb8();
+        let [r, g, b] = image.get_pixel(30, 0).0;
+        assert!(r.abs_diff(48) < 4 && g.abs_diff(50) < 4 && b.abs_diff(54) < 4);
+    }
+}

@@ -1,0 +1,146 @@
+//! From a page's wishes to the scene it looks at: all of them at once, one scene after the other.
+
+use crate::camera;
+use crate::client::{Client, Outgoing};
+use crate::hall::Hall;
+use crate::session::{answer, refusal};
+use crate::studio::{Error, Keys, Stage, Studio, merge};
+use crate::telling::{Telling, Told};
+use crate::wishes::{Wish, Wishes};
+use serde_json::{Value, json};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use surfel::progress::Progress;
+use tokio::sync::mpsc;
+
+/// Work for older wishes is given up for newer ones after so long: sooner, nothing would be seen of a
+/// slider that is being dragged.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+pub async fn run(
+    hall: Arc<Hall>,
+    client: Arc<Client>,
+    wishes: Arc<Wishes>,
+    out: mpsc::Sender<Outgoing>,
+) {
+    let Some(studio) = loaded(&hall, &out).await else { return };
+    let settings = studio.opening();
+    answer(&out, &json!({ "type": "welcome", "scene": settings, "info": studio.info() })).await;
+    let mut staging = Staging { hall, client, wishes, out, studio, settings };
+    let first = staging.wishes.take().await;
+    staging.sketch(&first).await;
+    staging.grant(first).await;
+    loop {
+        let wish = staging.wishes.take().await;
+        staging.grant(wish).await;
+    }
+}
+
+/// Waits for the files, and tells meanwhile how they come.
+async fn loaded(hall: &Hall, out: &mpsc::Sender<Outgoing>) -> Option<Arc<dyn Studio>> {
+    let mut loading = hall.loading.subscribe();
+    loading.mark_changed();
+    loop {
+        tokio::select! {
+            studio = hall.studio() => return studio,
+            changed = loading.changed() => {
+                changed.ok()?;
+                let told = loading.borrow_and_update().clone();
+                answer(out, &state(told.as_ref())).await;
+            }
+        }
+    }
+}
+
+fn state(told: Option<&Told>) -> Value {
+    json!({
+        "type": "state",
+        "text": told.map(|told| &told.stage),
+        "done": told.and_then(|told| told.done),
+        "left_secs": told.and_then(|told| told.left_secs),
+    })
+}
+
+struct Staging {
+    hall: Arc<Hall>,
+    client: Arc<Client>,
+    wishes: Arc<Wishes>,
+    out: mpsc::Sender<Outgoing>,
+    studio: Arc<dyn Studio>,
+    /// Of what is seen.
+    settings: Keys,
+}
+
+impl Staging {
+    /// Shows something before everything is prepared.
+    async fn sketch(&mut self, wish: &Wish) {
+        let (studio, settings) = (self.studio.clone(), self.settings_with(wish));
+        let telling = self.telling();
+        let made = self.hall.work(move || studio.sketch(&settings, &telling)).await;
+        if let Ok(Some(Ok(stage))) = made {
+            self.show(stage, wish).await;
+        }
+    }
+
+    /// Makes the scene that is wished for, or says why not.
+    async fn grant(&mut self, wish: Wish) {
+        let (studio, settings) = (self.studio.clone(), self.settings_with(&wish));
+        let telling = self.telling();
+        let made = self.hall.work(move || studio.stage(&settings, &telling)).await;
+        match made.and_then(|made| made) {
+            Ok(stage) => self.show(stage, &wish).await,
+            Err(Error::Cancelled) => self.wishes.put_back(wish),
+            Err(error) => {
+                answer(&self.out, &refusal(None, Some(wish.input), &error.to_string())).await;
+                // A page whose own settings are wrong still sees what it was opened for.
+                if self.client.sight().stage.is_none() && !wish.patch.is_empty() {
+                    self.wishes.add(Wish::default());
+                }
+            }
+        }
+        answer(&self.out, &state(None)).await;
+    }
+
+    fn settings_with(&self, wish: &Wish) -> Keys {
+        let mut settings = if wish.is_anew { self.studio.given() } else { self.settings.clone() };
+        if !wish.is_anew && !self.client.sight().camera_keys.is_null() {
+            settings.insert("camera".into(), self.client.sight().camera_keys);
+        }
+        merge(&mut settings, &wish.patch);
+        settings
+    }
+
+    async fn show(&mut self, stage: Stage, wish: &Wish) {
+        self.settings = stage.settings.clone();
+        let message = json!({ "type": "scene", "scene": stage.settings, "legend": stage.legend });
+        let has_camera = wish.is_anew || wish.patch.contains_key("camera");
+        let keys = stage.settings.get("camera").cloned().unwrap_or_default();
+        let camera = camera::parse(&keys).ok();
+        let stage = Arc::new(stage);
+        self.client.look(|sight| {
+            if sight.camera.is_none() || has_camera {
+                (sight.camera, sight.camera_keys) = (camera, keys);
+            }
+            sight.stage = Some(stage);
+            sight.input = sight.input.max(wish.input);
+            sight.is_moving = wish.is_moving;
+        });
+        self.hall.easel.call();
+        answer(&self.out, &message).await;
+    }
+
+    /// Tells the page of long work, which ends for newer wishes or when nobody waits for it any more.
+    fn telling(&self) -> impl Progress + Send + 'static {
+        let (out, hall, wishes) = (self.out.clone(), self.hall.clone(), self.wishes.clone());
+        let (gone, start) = (self.out.clone(), Instant::now());
+        // What finds no room is not missed.
+        let tell = move |told: Told| {
+            let _ = out.try_send(Outgoing::Text(state(Some(&told)).to_string()));
+        };
+        let is_cancelled = move || {
+            let is_old = PATIENCE < start.elapsed() && !wishes.is_empty();
+            is_old || hall.is_stopped() || gone.is_closed()
+        };
+        Telling::new(tell, is_cancelled)
+    }
+}
