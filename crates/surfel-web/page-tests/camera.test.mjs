@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import * as cameras from '../page/camera.js';
-import { cross, distance, dot, length, subtract } from '../page/vector.js';
+import { cross, distance, dot, length } from '../page/vector.js';
 
 const size = { width: 64, height: 48 };
 const placed = { position: [500003, -4, 2], focal_point: [500000, 1, 0.5], view_up: [0, 0, 1] };
@@ -32,7 +32,7 @@ test('axes are unit, orthogonal and right-handed', () => {
   for (const camera of [perspective, orthographic, panorama, steep]) {
     const { right, up: pictureUp, forward } = cameras.axesOf(camera);
     for (const axis of [right, pictureUp, forward]) close(length(axis), 1);
-    near(cross(right, forward), pictureUp.map((value) => value));
+    near(cross(right, forward), pictureUp);
     close(dot(right, pictureUp), 0);
   }
 });
@@ -151,5 +151,4 @@ test('a panorama looks north in its middle and east to the right', () => {
   near(cameras.rayThrough(north, wide, 60, 20).direction, [1, 0, 0]);
   near(cameras.rayThrough(north, wide, 13, 0).direction, [0, 0, 1]);
   close(cameras.depthOf(north, [1, 2, 7]), 4);
-  assert.ok(length(subtract(north.position, north.focal_point)) > 0);
 });

@@ -33,7 +33,7 @@ test('hashes are plain letters, keep any name, and a micrometre', () => {
   assert.match(hash, /^#view=[A-Za-z0-9_-]+$/);
   const back = patchOfHash(hash);
   assert.deepEqual(back.material, patch.material);
-  assert.ok(Math.abs(back.camera.position[0] - 4183168.2669447) < 1e-5);
+  assert.ok(Math.abs(back.camera.position[0] - 4183168.2669447) < 1e-6);
 });
 
 test('what is no link is none', () => {

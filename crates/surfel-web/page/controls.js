@@ -17,15 +17,17 @@ export const surfaceControls = [
   { key: 'surface', label: 'Kind', kind: 'select', options: ({ info }) => info.surfaces, help: 'The shape given to the points' },
   { key: 'radius_scale', label: 'Radius', ...SLIDING, range: [0.25, 4], limits: [0.01, 100], scale: 'logarithmic',
     read: (scene) => scene.radius_scale ?? 1, help: 'How far each point reaches, as a multiple' },
-  { key: 'boundary', label: 'Boundary', kind: 'select',
-    options: () => [{ value: 'gap', label: 'at the outermost points' }, { value: 'off', label: 'at the rims of discs' }] },
+  { key: 'boundary', label: 'Ends at', kind: 'select', help: 'Where the surface has its rims',
+    options: () => [{ value: 'gap', label: 'outermost points' }, { value: 'off', label: 'rims of discs' }] },
 ];
 
 const hasMap = (scene, { legend }) => legend?.kind === 'map';
 
 export const colorControls = [
   { key: 'color', label: 'Colour by', kind: 'select', options: ({ info }) => info.colors },
-  { key: 'cmap', label: 'Colour map', kind: 'select', options: ({ info }) => info.colormaps, shown: hasMap },
+  { key: 'cmap', label: 'Colour map', kind: 'select', shown: hasMap,
+    options: ({ info }) => [{ value: '', label: 'automatic' }, ...info.colormaps],
+    read: (scene) => scene.cmap ?? '', write: (name) => ({ cmap: name || null }) },
   { key: 'range', label: 'Range', kind: 'numbers', names: ['low', 'high'], automatic: true, shown: hasMap,
     read: (scene, { legend }) => scene.range ?? (legend?.kind === 'map' ? [legend.low, legend.high] : null),
     write: (range) => ({ range }) },

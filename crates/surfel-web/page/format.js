@@ -1,8 +1,10 @@
 // Numbers as text: coordinates with all their digits, lengths with as many as help.
 
-/** Thirteen digits: more than any survey has, fewer than show a double's own error. */
+/** Six decimals, or seven digits of what is small: all that files hold, and nothing of a number's own error. */
 export function exact(value) {
-  return typeof value === 'number' && !Number.isInteger(value) ? String(Number(value.toPrecision(13))) : String(value);
+  if (typeof value !== 'number' || Number.isInteger(value) || !Number.isFinite(value)) return String(value);
+  const whole = Math.max(1, Math.floor(Math.log10(Math.abs(value))) + 1);
+  return String(Number(value.toPrecision(Math.min(15, whole + 6))));
 }
 
 /** About five digits, thousands apart. */

@@ -3,8 +3,8 @@
 const FLIGHT = {
   w: [0, 0, 1], s: [0, 0, -1], a: [-1, 0, 0], d: [1, 0, 0], q: [0, -1, 0], e: [0, 1, 0],
 };
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-/** Of an arrow key, as a share of a drag over the picture's height. */
+const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+/** The camera goes where the arrow points, as by a drag the other way: this share of the picture's height. */
 const ARROW_STEP = 1 / 36;
 const SIDES = ['front', 'back', 'left', 'right', 'top', 'bottom'];
 const HASTE = 4;

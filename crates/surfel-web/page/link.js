@@ -35,7 +35,7 @@ export function patchOfHash(hash) {
   }
 }
 
-/** Twelve digits: a micrometre on a national grid, and short links. */
+/** Thirteen digits: a micrometre on a national grid, and short links. */
 function rounded(value) {
-  return Number(value.toPrecision(12));
+  return Number(value.toPrecision(13));
 }

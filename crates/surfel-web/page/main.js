@@ -91,6 +91,9 @@ function fillPanel() {
   const rows = (table) => controlRows(table, viewer);
   const materials = section('Materials', false);
   viewer.infoChanged.listen(() => {
+    const isFilled = materials.dataset.of === viewer.info.name;
+    materials.dataset.of = viewer.info.name;
+    if (isFilled) return;
     const tables = viewer.info.objects.map((object) => controls.materialControls(object));
     materials.querySelector('.section-body').replaceChildren(...tables.flatMap(rows));
   });

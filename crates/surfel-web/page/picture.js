@@ -40,6 +40,7 @@ export class Picture {
       try {
         const bitmap = await createImageBitmap(file);
         this.#draw(bitmap);
+        this.canvas.classList.add('is-drawn');
         bitmap.close();
       } catch {
         // A broken picture is passed over; the server still waits to hear that it was seen.

@@ -1,6 +1,6 @@
 // The sun by day, hour and latitude, in the panel under the sun's own controls.
 
-import { element } from './dom.js';
+import { element, icon } from './dom.js';
 import { patchOf } from './patch.js';
 import { sunByHour } from './sun.js';
 
@@ -31,7 +31,7 @@ export function sunClock(viewer) {
   const row = (label, ...fields) => element('div', { class: 'row' },
     element('label', { for: fields[0].id }, label), element('div', { class: 'field slider' }, ...fields));
   const made = element('details', { class: 'inner', 'data-section': 'sun by hour' },
-    element('summary', {}, 'By day and hour'),
+    element('summary', {}, icon('chevron'), 'By day and hour'),
     row('Day', day), row('Hour', hour, clock), row('Latitude', latitude),
     element('p', { class: 'note' }, 'Hours by the sun: noon is when it stands highest, give or take a quarter.'));
   viewer.sceneChanged.listen(() => { made.hidden = !viewer.scene.light?.includes('sun'); });

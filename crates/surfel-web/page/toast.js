@@ -5,8 +5,11 @@ import { element } from './dom.js';
 const SHOWN_MS = 6000;
 
 export function showToast(text) {
+  const toasts = document.getElementById('toasts');
+  // The same again takes the place of what is still there.
+  [...toasts.children].find((shown) => shown.textContent === text)?.remove();
   const toast = element('div', { class: 'toast' }, text);
-  document.getElementById('toasts').append(toast);
+  toasts.append(toast);
   setTimeout(() => toast.remove(), SHOWN_MS);
 }
 

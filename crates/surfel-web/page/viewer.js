@@ -40,6 +40,8 @@ export class Viewer {
   #dueCamera = null;
   #isMoving = false;
   #lastCameraInput = 0;
+  /** As the server last told it, and the patches that it did not yet know of. */
+  #toldScene = null;
   #patchesUnderway = [];
   #camerasByInput = new Map();
   #sentAt = new Map();
@@ -194,10 +196,11 @@ export class Viewer {
     const isAnother = this.info?.name !== info.name;
     this.info = info;
     this.opening = scene;
-    this.scene = mergePatch(scene, this.#helloPatch);
+    this.#toldScene = mergePatch(scene, this.#helloPatch);
+    this.#patchesUnderway = [];
+    this.#mergeUnderway();
     if (isAnother) this.camera = this.scene.camera;
     this.#camerasByInput.set(this.#input, this.camera);
-    this.#patchesUnderway = [];
     this.#takesNextCamera = isAnother;
     this.isConnected = true;
     this.connectionChanged({ isConnected: true });
@@ -208,10 +211,9 @@ export class Viewer {
 
   #receiveScene({ scene, legend, input = this.#input }) {
     this.legend = legend;
+    this.#toldScene = scene;
     this.#patchesUnderway = this.#patchesUnderway.filter((underway) => input < underway.input);
-    const patches = this.#patchesUnderway.map(({ patch }) => patch);
-    if (this.#duePatch) patches.push(this.#duePatch.patch);
-    this.scene = patches.reduce(mergePatch, scene);
+    this.#mergeUnderway();
     const isAtRest = !this.#dueCamera && !this.#isMoving && this.#lastCameraInput <= input;
     if ((isAtRest || this.#takesNextCamera) && !areEqual(scene.camera, this.camera)) {
       this.camera = scene.camera;
@@ -222,13 +224,24 @@ export class Viewer {
     this.sceneChanged();
   }
 
+  #mergeUnderway() {
+    const patches = this.#patchesUnderway.map(({ patch }) => patch);
+    if (this.#duePatch) patches.push(this.#duePatch.patch);
+    this.scene = patches.reduce(mergePatch, this.#toldScene);
+  }
+
   #receivePicture(header, blob) {
     if (header.kind === SAVED_PICTURE) this.#answer({ id: header.frame, blob });
     else this.pictureCame(header, blob);
   }
 
-  #receiveError({ id, text }) {
+  #receiveError({ id, input, text }) {
     this.#takesNextCamera = false;
+    if (input !== undefined) {
+      this.#patchesUnderway = this.#patchesUnderway.filter((underway) => underway.input !== input);
+      this.#mergeUnderway();
+      this.sceneChanged();
+    }
     if (this.#questions.has(id)) this.#fail(id, text);
     else if (text !== 'cancelled') this.refused(text);
   }
