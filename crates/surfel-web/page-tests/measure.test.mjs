@@ -36,7 +36,7 @@ test('labels stand in the middle, heights over their foot', () => {
 
 test('results name what they are', () => {
   const height = resultsOf({ kind: 'height', points: [[0, 0, 5], [1, 1, 2]] }, up);
-  assert.deepEqual(height, [{ name: 'Height', value: 3, power: 1 }]);
+  assert.deepEqual(height, [{ name: 'Height', value: 3 }]);
   const square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]];
   assert.deepEqual(resultsOf({ kind: 'area', points: square }, up).map(({ value }) => value), [1, 1, 4]);
 });

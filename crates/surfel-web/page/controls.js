@@ -108,9 +108,10 @@ export function materialControls({ name }) {
   const found = (scene) => materialOf(scene.material, name);
   const property = (word, control) => ({
     key: `material.${name}.${word}`, of: 'material', ...control,
-    read: (scene) => {
+    read: (scene, viewer) => {
       const text = found(scene)?.properties[word];
-      return text !== undefined && control.kind === 'slider' ? Number(text) : text ?? control.usual?.(found(scene)?.kind);
+      if (text === undefined) return control.usual?.(found(viewer.scene)?.kind);
+      return control.kind === 'slider' ? Number(text) : text;
     },
     write: (value, scene) => {
       const { kind, properties: { [word]: _, ...others } } = found(scene);
@@ -120,7 +121,7 @@ export function materialControls({ name }) {
     shown: (scene) => control.kinds.includes(found(scene)?.kind),
   });
   return [
-    { key: `material.${name}`, of: 'material', label: name, kind: 'select', options: ({ info }) => [FILES_OWN, ...info.materials],
+    { key: `material.${name}`, of: 'material', label: name, help: name, kind: 'select', options: ({ info }) => [FILES_OWN, ...info.materials],
       read: (scene) => found(scene)?.kind ?? '',
       write: (kind, scene) => ({ material: withMaterial(scene.material, name, kind || null, {}) }) },
     property('color', { label: 'Colour', kind: 'color', placeholder: 'of the points', kinds: ['matte', 'metal', 'glass', 'plastic', 'emissive', 'unlit'] }),

@@ -27,11 +27,6 @@ export function duration(seconds) {
   return `${Math.floor(whole / 3600)} h ${Math.floor((whole % 3600) / 60)} min`;
 }
 
-/** A length, or an area with `power` 2. */
-export function measure(value, power) {
-  return rounded(value, 6) + (power === 2 ? ' □' : '');
-}
-
 /** Steps of a scale between two ends: about `wanted` of them, at round numbers. */
 export function ticks(low, high, wanted) {
   const raw = (high - low) / wanted;

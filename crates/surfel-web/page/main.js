@@ -33,6 +33,9 @@ const measureTool = new MeasureTool(viewer, overlay);
 overlay.add(clipPainter(viewer));
 overlay.add(pivotPainter(navigation));
 
+/** What was last asked of the picture. */
+let lastPick = null;
+
 const helpDialog = document.getElementById('help-dialog');
 const showHelp = () => helpDialog.showModal();
 const saveDialog = prepareSaveDialog(viewer);
@@ -50,16 +53,19 @@ followPointer(stage, viewer, navigation, {
   grab: (event) => grabHandle(viewer, event),
   hover: (place) => measureTool.hover(inCssPixels(place)),
   async click(place, event) {
-    const isMeasuring = MEASURE_TOOLS.includes(viewer.tool) && !event.altKey;
-    if (!isMeasuring && viewer.tool !== 'pick' && !event.altKey) return;
-    const point = await viewer.pick(place);
+    const { tool } = viewer;
+    const isMeasuring = MEASURE_TOOLS.includes(tool) && !event.altKey;
+    if (!isMeasuring && tool !== 'pick' && !event.altKey) return;
+    lastPick = viewer.pick(place);
+    const point = await lastPick;
+    if (viewer.tool !== tool) return;
     if (!point) showToast('Nothing is there.');
     else if (isMeasuring) measureTool.add(point.kind === 'point' ? point.position : point.surface);
     else pickCard.show(point);
   },
   async doubleClick(place) {
     if (viewer.tool === 'area') {
-      measureTool.finish();
+      await finishArea();
       return;
     }
     const point = await viewer.pick(place);
@@ -69,7 +75,7 @@ followPointer(stage, viewer, navigation, {
 
 followKeys(viewer, navigation, {
   help: showHelp,
-  enter: () => measureTool.finish(),
+  enter: finishArea,
   escape() {
     if (navigation.turntable_secs) navigation.stop();
     else if (measureTool.isUnderway) measureTool.cancel();
@@ -81,6 +87,12 @@ followKeys(viewer, navigation, {
 new Picture(document.getElementById('picture'), viewer);
 exposeState(viewer);
 viewer.connect();
+
+/** The last corner may still be on its way. */
+async function finishArea() {
+  await lastPick;
+  measureTool.finish();
+}
 
 function inCssPixels({ x, y }) {
   const factor = stage.clientWidth / viewer.size.width;

@@ -1,12 +1,14 @@
 // Measuring on the picture: points are clicked, figures drawn, results listed.
 
 import { copyButton, element, iconButton } from './dom.js';
-import { measure as text } from './format.js';
+import { rounded } from './format.js';
 import { corner, middle, resultsOf } from './measure.js';
 import { mix } from './vector.js';
 
 export const MEASURE_TOOLS = ['distance', 'height', 'area'];
 const DOT_RADIUS = 4;
+/** Figures are in the unit of the file. */
+const text = (value) => rounded(value, 6);
 
 export class MeasureTool {
   #finished = [];
@@ -79,8 +81,8 @@ export class MeasureTool {
       this.#finished = this.#finished.filter((other) => other !== figure);
       this.#list();
     };
-    const rows = this.#results(figure).flatMap(({ name, value, power }) =>
-      [element('dt', {}, name), element('dd', {}, element('span', {}, text(value, power)))]);
+    const rows = this.#results(figure).flatMap(({ name, value }) =>
+      [element('dt', {}, name), element('dd', {}, element('span', {}, text(value)))]);
     return element('section', { class: 'measurement' },
       element('header', {}, element('h3', {}, figure.name),
         copyButton(`Copy ${figure.name}`, () => this.#wordsOf(figure)),
@@ -110,8 +112,7 @@ export class MeasureTool {
   #paintFigure(view, figure) {
     const { up } = this.viewer.info;
     const { kind, points } = figure;
-    const lines = this.#results(figure).map(({ name, value, power }) =>
-      (kind === 'distance' || kind === 'area' ? `${name} ${text(value, power)}` : text(value, power)));
+    const lines = this.#results(figure).map(({ name, value }) => (kind === 'height' ? text(value) : `${name} ${text(value)}`));
     if (kind === 'area') {
       return [...view.polygon(points, 'measure-area'), ...view.path(points, 'measure', true), ...dots(view, points),
         ...view.label(middle(points), lines)];

@@ -49,16 +49,16 @@ function newell(points) {
 export function resultsOf({ kind, points }, up) {
   if (kind === 'area') {
     return [
-      { name: 'Area', value: area(points), power: 2 },
-      { name: 'Level area', value: levelArea(points, up), power: 2 },
-      { name: 'Perimeter', value: perimeter(points), power: 1 },
+      { name: 'Area', value: area(points) },
+      { name: 'Level area', value: levelArea(points, up) },
+      { name: 'Perimeter', value: perimeter(points) },
     ];
   }
   const found = distances(points[0], points[1], up);
-  if (kind === 'height') return [{ name: 'Height', value: Math.abs(found.vertical), power: 1 }];
+  if (kind === 'height') return [{ name: 'Height', value: Math.abs(found.vertical) }];
   return [
-    { name: 'Distance', value: found.straight, power: 1 },
-    { name: 'Horizontal', value: found.horizontal, power: 1 },
-    { name: 'Vertical', value: found.vertical, power: 1 },
+    { name: 'Distance', value: found.straight },
+    { name: 'Horizontal', value: found.horizontal },
+    { name: 'Vertical', value: found.vertical },
   ];
 }

@@ -7,6 +7,7 @@ import { mix } from './vector.js';
 /** Share of a line's depth at which it is cut off before the camera. */
 const NEAR = 1e-3;
 const LABEL_LINE = 16;
+const LABEL_GAP = 10;
 
 export class Overlay {
   #painters = [];
@@ -69,11 +70,13 @@ function viewOf(camera, size) {
     return at ? [svg('circle', { class: className, cx: at.x, cy: at.y, r: radius, ...attributes })] : [];
   };
 
+  /** Lines of text over a point. */
   const label = (point, lines) => {
-    const at = place(point);
-    if (!at) return [];
+    const foot = place(point);
+    if (!foot) return [];
     const width = 14 + 6.7 * Math.max(...lines.map((text) => text.length));
     const height = 8 + LABEL_LINE * lines.length;
+    const at = { x: foot.x, y: foot.y - height / 2 - LABEL_GAP };
     const texts = lines.map((text, i) =>
       svg('text', { x: at.x, y: at.y - height / 2 + LABEL_LINE * (i + 1) }, text));
     const frame = svg('rect', { x: at.x - width / 2, y: at.y - height / 2, width, height, rx: 6 });

@@ -12,6 +12,8 @@ export class Picture {
     viewer.pictureCame.listen((header, blob) => this.#receive(header, blob));
     viewer.infoChanged.listen(() => this.resize());
     new ResizeObserver(() => this.resize()).observe(canvas);
+    // Another screen may have other pixels.
+    window.addEventListener('resize', () => this.resize());
     this.resize();
   }
 
