@@ -1,0 +1,72 @@
+// Words for numbers and materials, and the size of pictures.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { count, duration, exact, rounded, ticks } from '../page/format.js';
+import { formatMaterial, materialOf, parseMaterial, withMaterial } from '../page/materials.js';
+import { readHeader, socketAddress } from '../page/connection.js';
+import { pictureSize } from '../page/picture.js';
+
+test('coordinates keep their digits and lose the error of a double', () => {
+  assert.equal(exact(562339.8540000001), '562339.854');
+  assert.equal(exact(4183203.123456), '4183203.123456');
+  assert.equal(exact(0.1 + 0.2), '0.3');
+  assert.equal(exact(0.031234567), '0.03123457');
+  assert.equal(exact(-12), '-12');
+  assert.equal(exact('ground'), 'ground');
+});
+
+test('other numbers are short', () => {
+  assert.equal(rounded(1234.5678), '1\u202f234.6');
+  assert.equal(rounded(0.00123456), '0.0012');
+  assert.equal(count(2499578), '2\u202f499\u202f578');
+  assert.equal(duration(2.44), '2.4 s');
+  assert.equal(duration(200), '3 min 20 s');
+  assert.equal(duration(7380), '2 h 3 min');
+});
+
+test('scales have round marks', () => {
+  assert.deepEqual(ticks(147.21, 156.04, 4), [150, 155]);
+  assert.deepEqual(ticks(0, 1, 5), [0, 0.2, 0.4, 0.6, 0.8, 1]);
+  assert.deepEqual(ticks(3, 3, 4), []);
+});
+
+test('materials come back from their words', () => {
+  for (const words of ['glass', 'statue.ply=glass', 'a=glass:ior=1.33,color=#88ccff', 'glass:ior=1.5']) {
+    assert.equal(formatMaterial(parseMaterial(words)), words);
+  }
+  assert.deepEqual(parseMaterial('a=glass:ior=1.33').properties, { ior: '1.33' });
+});
+
+test('the material of an object is its own before that of all, the last one given', () => {
+  const list = ['a=metal', 'glass', 'a=mirror'];
+  assert.equal(materialOf(list, 'a').kind, 'mirror');
+  assert.equal(materialOf(list, 'b').kind, 'glass');
+  assert.equal(materialOf(undefined, 'b'), null);
+  assert.deepEqual(withMaterial(list, 'a', 'plastic', { roughness: 0.1 }), ['glass', 'a=plastic:roughness=0.1']);
+  assert.deepEqual(withMaterial(list, 'a', null, {}), ['glass']);
+});
+
+test('pictures have as many pixels as the screen, or as the server allows', () => {
+  assert.deepEqual(pictureSize(800, 600, 2, Infinity), { width: 1600, height: 1200 });
+  const limited = pictureSize(1600, 900, 2, 1_000_000);
+  assert.ok(limited.width * limited.height <= 1_000_000 && 990_000 < limited.width * limited.height);
+});
+
+test('the header of a picture is read as it is written', () => {
+  const bytes = new DataView(new ArrayBuffer(20));
+  bytes.setUint8(0, 2);
+  bytes.setUint8(1, 1);
+  bytes.setUint32(4, 70000, true);
+  bytes.setUint32(8, 12, true);
+  [1280, 720, 4, 16].forEach((value, i) => bytes.setUint16(12 + 2 * i, value, true));
+  assert.deepEqual(readHeader(bytes.buffer), {
+    kind: 2, finished: true, frame: 70000, input: 12, width: 1280, height: 720, samples: 4, of_samples: 16, type: 'image/png',
+  });
+});
+
+test('the socket is where the page is, with its token', () => {
+  const at = (protocol, search) => socketAddress({ protocol, host: 'host:8000', search });
+  assert.equal(at('http:', ''), 'ws://host:8000/ws');
+  assert.equal(at('https:', '?token=a%20b'), 'wss://host:8000/ws?token=a%20b');
+});

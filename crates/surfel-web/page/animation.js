@@ -1,0 +1,57 @@
+// The clock of scenes that move: play, pause, scrub and loop.
+
+import { element, icon } from './dom.js';
+
+export function animationRows(viewer, section) {
+  let isPlaying = false;
+  let startedAt = 0;
+  let startTime = 0;
+  const duration = () => viewer.info.duration_secs;
+  const time = () => viewer.scene.time ?? 0;
+
+  const play = element('button', { type: 'button', class: 'button', 'data-action': 'play', onclick: () => setPlaying(!isPlaying) });
+  const scrub = element('input', { type: 'range', min: 0, max: 1000, 'aria-label': 'Time', title: 'time', 'data-key': 'time' });
+  const clock = element('output', { 'data-output': 'time' });
+  const loop = element('input', { type: 'checkbox', role: 'switch', id: 'animation-loop', 'data-key': 'animation.loop', checked: true });
+
+  const show = () => {
+    scrub.value = (1000 * time()) / duration();
+    scrub.style.setProperty('--share', `${scrub.value / 10}%`);
+    clock.value = `${time().toFixed(2)} s`;
+  };
+  const setPlaying = (isOn) => {
+    isPlaying = isOn;
+    play.replaceChildren(icon(isOn ? 'pause' : 'play'), isOn ? 'Pause' : 'Play');
+    if (!isOn) {
+      viewer.set({ time: time() }, false);
+      return;
+    }
+    startedAt = performance.now();
+    startTime = duration() <= time() ? 0 : time();
+    requestAnimationFrame(step);
+  };
+  const step = () => {
+    if (!isPlaying) return;
+    const now = startTime + (performance.now() - startedAt) / 1000;
+    if (duration() <= now && !loop.checked) {
+      viewer.set({ time: duration() }, false);
+      setPlaying(false);
+      return;
+    }
+    viewer.set({ time: now % duration() }, true);
+    requestAnimationFrame(step);
+  };
+  scrub.addEventListener('input', () => {
+    if (isPlaying) setPlaying(false);
+    viewer.set({ time: (scrub.value / 1000) * duration() }, true);
+  });
+  scrub.addEventListener('change', () => viewer.set({ time: time() }, false));
+
+  play.replaceChildren(icon('play'), 'Play');
+  viewer.infoChanged.listen(() => { section().hidden = !(0 < duration()); });
+  viewer.sceneChanged.listen(() => { if (0 < duration()) show(); });
+  return [
+    element('div', { class: 'row animation' }, play, scrub, clock),
+    element('div', { class: 'row' }, element('label', { for: loop.id }, 'Loop'), element('div', { class: 'field toggle' }, loop)),
+  ];
+}

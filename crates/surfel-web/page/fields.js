@@ -1,0 +1,127 @@
+// Fields of the panel, a maker for each kind: an element that shows a value, and tells when it is changed.
+
+import { element, icon } from './dom.js';
+
+const SLIDER_STEPS = 1000;
+
+// Every maker takes the control's row of the table (see controls.js), `change(value, isMoving)`, and the id of
+// the field that the label names; it returns { element, show(value, viewer) }.
+export const makers = { slider, select, toggle, color, numbers, button };
+
+function slider(control, change, id) {
+  let ends = Array.isArray(control.range) ? control.range : [0, 1];
+  const range = element('input', { type: 'range', id, min: 0, max: SLIDER_STEPS, step: 1, 'data-key': control.key });
+  const number = numberInput(control.label);
+  number.dataset.number = control.key;
+  const value = () => rounded(control, valueOf(control, ends, range.value / SLIDER_STEPS));
+  const paint = () => range.style.setProperty('--share', `${(100 * range.value) / SLIDER_STEPS}%`);
+  range.addEventListener('input', () => {
+    number.value = value();
+    paint();
+    change(value(), true);
+  });
+  range.addEventListener('change', () => change(value(), false));
+  number.addEventListener('change', () => {
+    if (Number.isFinite(number.valueAsNumber)) change(limited(control, number.valueAsNumber), false);
+  });
+  const show = (shown, viewer) => {
+    if (typeof control.range === 'function') ends = control.range(viewer);
+    const isNumber = typeof shown === 'number';
+    // A choice such as `auto` stands in the place of the number.
+    number.placeholder = isNumber ? '' : shown ?? '–';
+    if (document.activeElement !== number) number.value = isNumber ? rounded(control, shown) : '';
+    if (!isNumber) return;
+    range.value = Math.round(shareOf(control, ends, shown) * SLIDER_STEPS);
+    range.setAttribute('aria-valuetext', rounded(control, shown));
+    paint();
+  };
+  return { element: element('div', { class: 'field slider' }, range, number), show };
+}
+
+/** Where a value lies between the ends of its slider. */
+function shareOf({ scale }, [low, high], value) {
+  const share = scale === 'logarithmic' ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+  return Math.min(1, Math.max(0, share));
+}
+
+function valueOf({ scale }, [low, high], share) {
+  return scale === 'logarithmic' ? low * Math.pow(high / low, share) : low + share * (high - low);
+}
+
+function rounded(control, value) {
+  if (control.step) return Number((Math.round(value / control.step) * control.step).toPrecision(12));
+  return Number(value.toPrecision(3));
+}
+
+function limited({ limits: [low, high] = [-Infinity, Infinity] }, value) {
+  return Math.min(high, Math.max(low, value));
+}
+
+function numberInput(label) {
+  return element('input', { type: 'number', step: 'any', 'aria-label': label, inputmode: 'decimal' });
+}
+
+function select(control, change, id) {
+  const field = element('select', { id, 'data-key': control.key, onchange: () => change(field.value, false) });
+  const show = (value, viewer) => {
+    const options = control.options(viewer);
+    const known = options.map(optionOf);
+    if (value !== undefined && !known.some((option) => option.value === value)) known.unshift(optionOf(value));
+    const texts = known.map(({ value: of, label }) => `${of}\n${label}`).join('\n\n');
+    if (field.dataset.options !== texts) {
+      field.dataset.options = texts;
+      field.replaceChildren(...known.map((option) => element('option', { value: option.value }, option.label)));
+    }
+    field.value = value ?? '';
+  };
+  return { element: element('div', { class: 'field select' }, field, icon('chevron')), show };
+}
+
+const optionOf = (option) => (typeof option === 'object' ? option : { value: option, label: option });
+
+function toggle(control, change, id) {
+  const box = element('input', {
+    type: 'checkbox', role: 'switch', id, 'data-key': control.key, onchange: () => change(box.checked, false),
+  });
+  const show = (value) => { box.checked = Boolean(value); };
+  return { element: element('div', { class: 'field toggle' }, box), show };
+}
+
+function color(control, change, id) {
+  const field = element('input', {
+    type: 'color', id, 'data-key': control.key,
+    oninput: () => change(field.value, true), onchange: () => change(field.value, false),
+  });
+  const text = element('output', {});
+  const show = (value) => {
+    field.value = value ?? '#ffffff';
+    text.value = value ?? control.placeholder ?? '';
+  };
+  return { element: element('div', { class: 'field color' }, field, text), show };
+}
+
+/** Several numbers side by side, as `names` tells. */
+function numbers(control, change, id) {
+  const inputs = control.names.map((name, i) => {
+    const input = numberInput(`${control.label}: ${name}`);
+    Object.assign(input, { placeholder: name, title: name });
+    input.dataset.key = `${control.key}.${i}`;
+    input.addEventListener('change', () => {
+      const values = inputs.map((one) => one.valueAsNumber);
+      if (values.every(Number.isFinite)) change(values, false);
+    });
+    return input;
+  });
+  inputs[0].id = id;
+  const show = (values) => inputs.forEach((input, i) => {
+    if (document.activeElement !== input) input.value = values ? Number(values[i].toPrecision(9)) : '';
+  });
+  return { element: element('div', { class: 'field numbers' }, ...inputs), show };
+}
+
+function button(control, change, id) {
+  const field = element('button', {
+    type: 'button', class: 'button', id, 'data-key': control.key, onclick: () => change(true, false),
+  }, control.text);
+  return { element: element('div', { class: 'field' }, field), show: () => {} };
+}

@@ -1,0 +1,44 @@
+// Numbers as text: coordinates with all their digits, lengths with as many as help.
+
+/** Six decimals, or seven digits of what is small: all that files hold, and nothing of a number's own error. */
+export function exact(value) {
+  if (typeof value !== 'number' || Number.isInteger(value) || !Number.isFinite(value)) return String(value);
+  const whole = Math.max(1, Math.floor(Math.log10(Math.abs(value))) + 1);
+  return String(Number(value.toPrecision(Math.min(15, whole + 6))));
+}
+
+/** About five digits, thousands apart. */
+export function rounded(value, digits = 5) {
+  const whole = Math.abs(value) < 1 ? 0 : Math.floor(Math.log10(Math.abs(value))) + 1;
+  const maximumFractionDigits = Math.min(8, Math.max(0, digits - Math.max(whole, 1)));
+  return spaced(value, { maximumFractionDigits });
+}
+
+export function count(value) {
+  return spaced(value, { maximumFractionDigits: 0 });
+}
+
+/** Seconds in words: `2.4 s`, `3 min 20 s`. */
+export function duration(seconds) {
+  if (seconds < 10) return `${seconds.toFixed(1)} s`;
+  const whole = Math.round(seconds);
+  if (whole < 60) return `${whole} s`;
+  if (whole < 3600) return `${Math.floor(whole / 60)} min ${whole % 60} s`;
+  return `${Math.floor(whole / 3600)} h ${Math.floor((whole % 3600) / 60)} min`;
+}
+
+/** Steps of a scale between two ends: about `wanted` of them, at round numbers. */
+export function ticks(low, high, wanted) {
+  const raw = (high - low) / wanted;
+  if (!(0 < raw) || !Number.isFinite(raw)) return [];
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((factor) => factor * power).find((size) => raw <= size * 1.0001);
+  const first = Math.ceil(low / step - 1e-9);
+  const last = Math.floor(high / step + 1e-9);
+  return Array.from({ length: last - first + 1 }, (_, i) => Number(((first + i) * step).toPrecision(12)));
+}
+
+function spaced(value, options) {
+  // Thin spaces, as commas would be decimal signs to half of the readers.
+  return value.toLocaleString('en-US', options).replaceAll(',', '\u202f');
+}

@@ -1,0 +1,67 @@
+// The panel's part for the camera: projection, angle of view, sides, and the turntable.
+
+import { isOrthographic } from './camera.js';
+import { element, icon } from './dom.js';
+import { makers } from './fields.js';
+
+const SIDES = ['front', 'back', 'left', 'right', 'top', 'bottom'];
+
+export function viewRows(viewer, navigation) {
+  const projection = fieldRow(viewer, {
+    key: 'camera.projection', label: 'Projection', kind: 'select', title: 'O, P\ncamera.orthographic, camera.view_angle',
+    options: () => ['perspective', 'orthographic'],
+    read: (camera) => (isOrthographic(camera) ? 'orthographic' : 'perspective'),
+    write: (value) => navigation.setOrthographic(value === 'orthographic'),
+  });
+  const angle = fieldRow(viewer, {
+    key: 'camera.view_angle', label: 'Angle', kind: 'slider', range: [5, 120], limits: [1, 170], step: 1,
+    title: 'Vertical angle of view in degrees\ncamera.view_angle',
+    read: (camera) => camera.view_angle,
+    write: (value, isMoving) => navigation.setViewAngle(value, isMoving),
+    shown: (camera) => !isOrthographic(camera) && !camera.panorama,
+  });
+  const trackball = fieldRow(viewer, {
+    key: 'camera.trackball', label: 'Free turning', kind: 'toggle', title: 'The horizon need not stay level',
+    read: () => navigation.isTrackball,
+    write: (isOn) => { navigation.isTrackball = isOn; },
+  });
+  const sides = element('div', { class: 'sides' }, ...SIDES.map((side, i) => element('button', {
+    type: 'button', class: 'button', title: `${side} (${i + 1})`, 'data-side': side, onclick: () => navigation.lookFrom(side),
+  }, side)));
+  return [projection, angle, trackball, sides, turntable(viewer, navigation)];
+}
+
+/** A row that follows the camera instead of the scene. */
+function fieldRow(viewer, control) {
+  const id = `field-${control.key.replaceAll('.', '_')}`;
+  const field = makers[control.kind](control, control.write, id);
+  const made = element('div', { class: 'row', 'data-row': control.key },
+    element('label', { for: id, title: control.title }, control.label), field.element);
+  viewer.cameraChanged.listen(() => {
+    if (!viewer.camera) return;
+    made.hidden = control.shown ? !control.shown(viewer.camera) : false;
+    field.show(control.read(viewer.camera), viewer);
+  });
+  return made;
+}
+
+function turntable(viewer, navigation) {
+  const seconds = element('input', { type: 'number', id: 'turntable-seconds', min: 1, max: 600, value: 12, 'data-key': 'turntable.seconds' });
+  const start = element('button', { type: 'button', class: 'button', 'data-action': 'turntable', 'aria-pressed': 'false' });
+  const show = () => {
+    const isTurning = 0 < navigation.turntable_secs;
+    if (start.getAttribute('aria-pressed') === String(isTurning) && start.hasChildNodes()) return;
+    start.setAttribute('aria-pressed', isTurning);
+    start.replaceChildren(icon(isTurning ? 'pause' : 'play'), isTurning ? 'Stop' : 'Turn');
+  };
+  start.addEventListener('click', () => {
+    if (0 < navigation.turntable_secs) navigation.stop();
+    else navigation.startTurntable(Math.max(1, seconds.valueAsNumber || 12));
+    show();
+  });
+  viewer.cameraChanged.listen(show);
+  show();
+  return element('div', { class: 'row' },
+    element('label', { for: seconds.id, title: 'Seconds for a turn about the pivot' }, 'Turntable', element('small', {}, 's')),
+    element('div', { class: 'field turntable' }, seconds, start));
+}
