@@ -4,9 +4,10 @@ use super::Settings;
 use crate::error::{Error, Result};
 use crate::flat::{FlatCloud, FlatGeometry, FlatScene, Instance};
 use crate::image::{Image, NO_ID};
+use crate::integrator::surroundings;
 use crate::math::LANES;
 use crate::progress::Progress;
-use crate::scene::View;
+use crate::scene::{Background, View};
 use crate::surface::SurfaceKind;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -48,11 +49,13 @@ pub fn render(
     let n_pixels = settings.width as usize * settings.height as usize;
     let blocks = |instance: &Instance| cloud(scene, instance).points.blocks.len() as u64;
     progress.begin("render", scene.instances.iter().map(blocks).sum());
+    let nearest: Vec<AtomicU64> = (0..n_pixels).map(|_| AtomicU64::new(EMPTY)).collect();
     let mut depths = vec![f32::INFINITY; n_pixels];
     let mut seen = vec![Seen { instance: NO_ID, slot: 0 }; n_pixels];
     for (instance_idx, instance) in scene.instances.iter().enumerate() {
-        let nearest = nearest(scene, instance, view, settings, progress)?;
-        for (pixel, key) in nearest.into_iter().enumerate().filter(|(_, key)| *key != EMPTY) {
+        project(scene, instance, view, settings, progress, &nearest)?;
+        let keys = nearest.iter().map(|nearest| nearest.swap(EMPTY, Ordering::Relaxed));
+        for (pixel, key) in keys.enumerate().filter(|(_, key)| *key != EMPTY) {
             let depth = f32::from_bits((key >> 32) as u32);
             if depth < depths[pixel] {
                 depths[pixel] = depth;
@@ -60,19 +63,19 @@ pub fn render(
             }
         }
     }
-    Ok(shade(scene, settings, &depths, &seen))
+    Ok(shade(scene, view, settings, &depths, &seen))
 }
 
-/// Depth and slot of the point of one instance in each pixel, as one number.
-fn nearest(
+/// Sets `nearest` to depth and slot, as one number, of the nearest point of one instance in each pixel.
+fn project(
     scene: &FlatScene,
     instance: &Instance,
     view: &View,
     settings: &Settings,
     progress: &dyn Progress,
-) -> Result<Vec<u64>> {
+    nearest: &[AtomicU64],
+) -> Result<()> {
     let (width, height) = (settings.width as usize, settings.height as usize);
-    let nearest: Vec<AtomicU64> = (0..width * height).map(|_| AtomicU64::new(EMPTY)).collect();
     let blocks = &cloud(scene, instance).points.blocks;
     blocks.par_iter().enumerate().with_min_len(1024).try_for_each(|(block_idx, block)| {
         if block_idx % 1024 == 0 {
@@ -91,8 +94,7 @@ fn nearest(
             }
         }
         Ok(())
-    })?;
-    Ok(nearest.into_iter().map(AtomicU64::into_inner).collect())
+    })
 }
 
 fn cloud<'s>(scene: &'s FlatScene, instance: &Instance) -> &'s FlatCloud {
@@ -102,13 +104,25 @@ fn cloud<'s>(scene: &'s FlatScene, instance: &Instance) -> &'s FlatCloud {
     }
 }
 
-fn shade(scene: &FlatScene, settings: &Settings, depths: &[f32], seen: &[Seen]) -> Image {
+fn shade(
+    scene: &FlatScene,
+    view: &View,
+    settings: &Settings,
+    depths: &[f32],
+    seen: &[Seen],
+) -> Image {
     let mut image = settings.blank();
     let width = settings.width as usize;
     for (pixel, Seen { instance, slot }) in seen.iter().enumerate() {
         let (x, y) = (pixel % width, pixel / width);
         if *instance == NO_ID {
-            image.color[pixel] = scene.background.at((y as f32 + 0.5) / settings.height as f32);
+            let (x, y) = (x as f32 + 0.5, y as f32 + 0.5);
+            image.color[pixel] = match scene.background {
+                Background::Surroundings => {
+                    surroundings(scene, view.ray(x, y).direction, false).extend(1.0).to_array()
+                }
+                plain => plain.at(y / settings.height as f32),
+            };
             continue;
         }
         let placed = &scene.instances[*instance as usize];
