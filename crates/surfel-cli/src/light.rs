@@ -36,6 +36,10 @@ pub fn lights(args: &LightArgs, lit: &Lit, report: &Report) -> anyhow::Result<Ve
         let rotation_deg = args.environment_rotation as f32;
         let mut environment = Environment::new(width, height, pixels, lit.up, rotation_deg)
             .with_context(|| file.display().to_string())?;
+        if 0 < environment.n_repaired() {
+            let what = "pixels with values that are no light (negative, infinite, NaN) mended";
+            report.note(&format!("{}: {} {what}", file.display(), environment.n_repaired()));
+        }
         environment.gain(args.environment_strength as f32);
         lights.push(Light::Environment(environment));
     }

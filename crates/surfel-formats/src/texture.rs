@@ -43,7 +43,7 @@ pub(crate) fn decode(name: &str, bytes: &[u8]) -> Result<Texture> {
     limits.max_alloc = Some(16 * n_texels + (1 << 20));
     decoder.set_limits(limits).map_err(read)?;
     let image = DynamicImage::from_decoder(decoder).map_err(read)?.into_rgba8();
-    Ok(Texture { width, height, texels: image.into_raw().as_chunks().0.to_vec() })
+    Ok(Texture { width, height, texels: image.into_raw().as_chunks().0.into() })
 }
 
 fn failed(name: &str, format: ImageFormat, error: &ImageError) -> Error {

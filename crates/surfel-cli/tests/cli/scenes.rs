@@ -1,7 +1,7 @@
 //! Scene files, and several files at once: what they show, and how options go together.
 
 use super::common::{Folder, SMALL, command, dome, gltf, light_picture, read_png, shot, tile};
-use super::common::{fail, square, succeed};
+use super::common::{fail, square, stderr, succeed, surfel};
 use serde_json::{Value, json};
 use std::fs;
 
@@ -166,7 +166,7 @@ fn files_are_found_from_where_the_scene_lies_and_the_output_from_where_one_is() 
         .current_dir(folder.0.join("work"))
         .output()
         .unwrap();
-    assert!(status.status.success(), "{}", super::common::stderr(&status));
+    assert!(status.status.success(), "{}", stderr(&status));
     let there = fs::read(folder.path("work/picture.png")).unwrap();
     assert_eq!(shot(&folder, &[&folder.path("data/scene.toml")]), there);
     assert_eq!(fs::read_dir(folder.0.join("data")).unwrap().count(), 3);
@@ -347,6 +347,12 @@ fn an_environment_gives_light_and_may_be_seen() {
     let around = ["--background", "surroundings", "--camera-elevation-angle", "10"];
     let (black, seen) = (["--background", "#000", around[2], around[3]], lit(&around));
     assert_ne!(lit(&black), seen);
+    let dark = folder.path("dark.exr");
+    let pixel = |x, y| if (x, y) == (0, 0) { (-1.0, f32::NAN, 0.5) } else { (1.0f32, 1.0, 1.0) };
+    exr::prelude::write_rgb_file(&dark, 4, 2, pixel).unwrap();
+    let output = surfel(&[&["render", &cloud, "--environment", &dark], &SMALL[..]].concat());
+    let text = stderr(&output);
+    assert!(text.contains("dark.exr: 1 pixels with values that are no light"), "{text}");
     let broken = folder.write("broken.hdr", "#?RADIANCE\n\n-Y 9");
     let text = fail(&["render", &cloud, "-o", "no.png", "--environment", &broken], 1);
     assert!(text.contains("broken.hdr"), "{text}");

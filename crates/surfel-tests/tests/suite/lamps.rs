@@ -1,10 +1,14 @@
 //! Lamps with known answers: fall-off, cones, ranges, shadows, and where their nodes put them.
 
 use std::f32::consts::PI;
+use surfel::flat::FlatScene;
 use surfel::math::{DAffine3, DQuat, DVec3, Vec3};
+use surfel::progress::Silent;
+use surfel::render::{CpuRenderer, Renderer};
 use surfel::scene::{
     Background, Geometry, Graph, Lamp, LampKind, Light, Material, Node, Scene, Sun, Transform,
 };
+use surfel::trace::Simd;
 use surfel_tests::scenes::{self, from_above, render};
 
 use crate::materials::SETTINGS;
@@ -39,7 +43,7 @@ fn check(name: &str, scene: &Scene, expected: impl Fn(Vec3) -> f32) {
 }
 
 /// What a lamp of intensity pi at `place` gives a white floor: the inverse square and the cosine.
-fn inverse_square(place: Vec3, position: Vec3) -> f32 {
+pub fn inverse_square(place: Vec3, position: Vec3) -> f32 {
     let way = place - position;
     way.z / way.length().powi(3)
 }
@@ -150,6 +154,19 @@ fn a_ball_shadows_the_cone_behind_it() {
         n_lit += u32::from(!is_dark);
     }
     assert!(20 < n_dark && 500 < n_lit, "{n_dark} {n_lit}");
+}
+
+/// Its light comes from one direction, however large it is said to be.
+#[test]
+fn a_directional_lamp_takes_one_ray_a_place() {
+    let above = DAffine3::from_translation(DVec3::Z);
+    for (kind, n_rays) in [(LampKind::Directional, 1), (LampKind::Point, 16)] {
+        let scene = over_floor(Lamp { radius: 0.5, ..lamp(kind) }, above);
+        let flat = FlatScene::new(&scene, &Silent).unwrap();
+        let renderer = CpuRenderer { simd: Simd::detect() };
+        let (_, stats) = renderer.render(&flat, &SETTINGS, &Silent).unwrap();
+        assert_eq!(stats.rays.shadow, n_rays * 32 * 32, "{kind:?}");
+    }
 }
 
 #[test]

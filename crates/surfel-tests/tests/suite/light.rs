@@ -6,7 +6,9 @@ use surfel::math::{DVec3, Vec3};
 use surfel::points::PointCloud;
 use surfel::progress::Silent;
 use surfel::render::{CpuRenderer, Renderer, Settings};
-use surfel::scene::{Camera, Light, Material, Points, Projection, Scene, Sky, Sun};
+use surfel::scene::{
+    Background, Camera, Geometry, Light, Material, Points, Projection, Scene, Sky, Sun,
+};
 use surfel::surface::SurfaceKind;
 use surfel::trace::Simd;
 use surfel_tests::{clouds, scenes};
@@ -152,6 +154,55 @@ fn layers_tell_what_the_pixel_centres_meet() {
         (layers.depth[0], image.coverage[0], image.color[0]),
         (f32::INFINITY, 0.0, [0.0; 4])
     );
+}
+
+/// Points as pixels stand before what traced ones stand before.
+#[test]
+fn surroundings_are_seen_behind_points() {
+    for camera_direction in [DVec3::X, DVec3::new(0.5, 1.0, 2.0), -DVec3::Z] {
+        let picture = |kind: SurfaceKind| {
+            let mut scene = scenes::scene(clouds::sphere(2000, 1.0), kind);
+            scene.camera.position = 8.0 * camera_direction.normalize();
+            scene.camera.view_up = DVec3::Y;
+            scene.background = Background::Surroundings;
+            let ground = Vec3::new(0.1, 0.2, 0.3);
+            scene.lights = vec![Light::Sky(Sky { ground, ..FURNACE })];
+            render(&scene, &SETTINGS)
+        };
+        let (points, splats) = (picture(SurfaceKind::Points), picture(SurfaceKind::Splat));
+        for corner in [0, 63, 63 * 64, 64 * 64 - 1] {
+            assert_eq!(points.color[corner], splats.color[corner]);
+            assert_eq!(points.color[corner][3], 1.0);
+        }
+    }
+}
+
+/// Two clouds as pixels are what one of all their points is.
+#[test]
+fn of_the_points_of_several_clouds_the_nearest_are_seen() {
+    let (a, b) = (clouds::sphere(4000, 1.0), clouds::plane(60, 0.3, 4));
+    let both = a.positions.iter().chain(&b.positions).copied().collect();
+    let points = |cloud: PointCloud| scenes::points(cloud, SurfaceKind::Points);
+    let together = scenes::lit(points(PointCloud::from_positions(both)));
+    let mut apart = together.clone();
+    apart.graph = scenes::graph(vec![
+        (Geometry::Points(points(a)), Material::MATTE),
+        (Geometry::Points(points(b)), Material::MATTE),
+    ]);
+    for position in [DVec3::new(5.0, 1.0, 3.0), DVec3::new(1.0, 5.0, -4.0)] {
+        let picture = |scene: &Scene| {
+            let camera = Camera { position, ..scene.camera };
+            render(&Scene { camera, ..scene.clone() }, &SETTINGS)
+        };
+        let (together, apart) = (picture(&together), picture(&apart));
+        let [a, b] = [&together, &apart].map(|image| &image.layers.as_ref().unwrap().depth);
+        // Positions are stored with 16 bits: some points fall into the pixel beside.
+        let is_other = |(a, b): &(&f32, &f32)| a != b && !((*a - *b).abs() < 1e-3);
+        let n_others = a.iter().zip(b).filter(is_other).count();
+        assert!(n_others < 40, "{n_others}");
+        let instances = &apart.layers.as_ref().unwrap().instance_id;
+        assert!([0, 1].iter().all(|i| 100 < instances.iter().filter(|found| *found == i).count()));
+    }
 }
 
 #[test]

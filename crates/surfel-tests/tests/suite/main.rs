@@ -4,6 +4,7 @@ mod batches;
 mod build;
 mod crowds;
 mod furnace;
+mod glass;
 mod instances;
 mod lamps;
 mod light;

@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 use surfel::flat::{FlatGeometry, FlatScene};
 use surfel::image::Image;
-use surfel::math::{DAffine3, DQuat, DVec3, Vec3};
+use surfel::math::{DAffine3, DQuat, DVec3, Vec3, Vec4};
 use surfel::progress::Silent;
 use surfel::render::{CpuRenderer, Renderer, Settings};
 use surfel::scene::{
@@ -96,6 +96,7 @@ fn strip() -> Mesh {
             .flat_map(|i| [[0, 1, 3], [0, 3, 2]].map(|corners| corners.map(|c| 2 * i + c)))
             .collect(),
         normals: Some(vec![-Vec3::Y; 2 * n as usize + 2]),
+        tangents: Some(vec![Vec3::Z.extend(-1.0); 2 * n as usize + 2]),
         ..Mesh::default()
     }
 }
@@ -117,6 +118,11 @@ fn bent_positions(scene: &FlatScene, geometry: usize) -> Vec<Vec3> {
 fn bent_normals(scene: &FlatScene, geometry: usize) -> &[Vec3] {
     let FlatGeometry::Mesh(mesh) = &*scene.geometries[geometry] else { panic!("no mesh") };
     &mesh.normals
+}
+
+fn bent_tangents(scene: &FlatScene, geometry: usize) -> &[Vec4] {
+    let FlatGeometry::Mesh(mesh) = &scene.geometries[geometry] else { panic!("no mesh") };
+    &mesh.tangents
 }
 
 fn seen(graph: Graph) -> Scene {
@@ -207,6 +213,38 @@ fn joints_carry_vertices_by_their_weights() {
         let normal = (-DVec3::Y).lerp(turn * -DVec3::Y, share).normalize();
         assert!(bent_normals(&scene, 0)[i].as_dvec3().distance(normal) < 1e-6, "vertex {i}");
     }
+}
+
+#[test]
+fn tangents_bend_with_their_mesh() {
+    let mut graph = skinned();
+    let mut updated = FlatScene::new(&seen(graph.clone()), &Silent).unwrap();
+    let turn = DQuat::from_rotation_x(0.8);
+    graph.nodes[2].transform =
+        Transform::Matrix(DAffine3::from_rotation_translation(turn, DVec3::Z));
+    updated.update(&graph, &Silent).unwrap();
+    let anew = FlatScene::new(&seen(graph), &Silent).unwrap();
+    for scene in [updated, anew] {
+        for (tangent, place) in bent_tangents(&scene, 0).iter().zip(strip().positions) {
+            let share = f64::from((place.z - 0.5).clamp(0.0, 1.0));
+            let expected = DVec3::Z.lerp(turn * DVec3::Z, share).normalize().as_vec3();
+            assert!(tangent.distance(expected.extend(-1.0)) < 1e-6, "{tangent} at {place}");
+        }
+    }
+}
+
+#[test]
+fn a_mesh_is_bent_anew_only_in_a_new_pose() {
+    let mut graph = skinned();
+    let mut flat = FlatScene::new(&seen(graph.clone()), &Silent).unwrap();
+    let FlatGeometry::Mesh(mesh) = &mut flat.geometries[0] else { panic!("no mesh") };
+    // Known again as long as nobody writes them.
+    mesh.normals.fill(Vec3::ONE);
+    flat.update(&graph, &Silent).unwrap();
+    assert!(bent_normals(&flat, 0).iter().all(|normal| *normal == Vec3::ONE));
+    graph.nodes[2].transform = Transform::Matrix(DAffine3::from_rotation_x(0.1));
+    flat.update(&graph, &Silent).unwrap();
+    assert!(bent_normals(&flat, 0).iter().all(|normal| *normal != Vec3::ONE));
 }
 
 /// Something of every kind, all but the floor on the move.

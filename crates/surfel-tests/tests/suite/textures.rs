@@ -4,9 +4,14 @@ use crate::materials::{
     SETTINGS, WHITE_SKY, assert_near, mesh, pane, rgb, scene, shadow_of, sun, with_positions,
 };
 use std::f32::consts::FRAC_PI_2;
-use surfel::math::{Vec2, Vec3};
+use std::sync::Arc;
+use surfel::flat::FlatScene;
+use surfel::math::{DAffine3, DVec3, Vec2, Vec3};
+use surfel::progress::Silent;
+use surfel::render::Settings;
 use surfel::scene::{
-    AlphaMode, Background, Graph, Light, Material, Mesh, Scene, Texture, TextureRef, Textures,
+    AlphaMode, Background, Environment, Graph, Lamp, LampKind, Light, Material, Mesh, Node, Scene,
+    Texture, TextureRef, Textures, Transform,
 };
 use surfel_tests::scenes::{self, from_above, render};
 
@@ -16,7 +21,7 @@ const BLUE: [u8; 4] = [0, 0, 255, 255];
 const WHITE: [u8; 4] = [255; 4];
 
 fn two_by_two(texels: [[u8; 4]; 4]) -> Texture {
-    Texture { width: 2, height: 2, texels: texels.to_vec() }
+    Texture { width: 2, height: 2, texels: texels.into() }
 }
 
 fn nearest() -> TextureRef {
@@ -176,15 +181,24 @@ fn alpha_mixes_a_surface_with_what_is_behind() {
     }
 }
 
-/// A square with a normal map of one colour, under a sun.
-fn bumped(texel: [u8; 3], toward_sun: Vec3, change: impl Fn(&mut Mesh, &mut f32)) -> Vec3 {
+/// A square with a normal map of one colour.
+fn bumpy(texel: [u8; 3], change: impl Fn(&mut Mesh, &mut f32)) -> Graph {
     let (mut square, mut scale) = (scenes::floor(0.0, 1.0), 1.0);
     change(&mut square, &mut scale);
     let [x, y, z] = texel;
-    let texture = Texture { width: 1, height: 1, texels: vec![[x, y, z, 255]] };
+    let texture = Texture { width: 1, height: 1, texels: [[x, y, z, 255]].into() };
     let textures = Textures { normal: Some((TextureRef::new(0), scale)), ..Textures::default() };
     let mut graph = Graph::of(mesh(square), Material { textures, ..Material::MATTE });
     graph.textures = vec![texture];
+    graph
+}
+
+/// Its colour under a sun.
+fn bumped(texel: [u8; 3], toward_sun: Vec3, change: impl Fn(&mut Mesh, &mut f32)) -> Vec3 {
+    color_of(bumpy(texel, change), toward_sun)
+}
+
+fn color_of(graph: Graph, toward_sun: Vec3) -> Vec3 {
     let image = render(&scene(graph, vec![sun(toward_sun)], from_above(1.0)), &SETTINGS);
     let color = rgb(image.color[0]);
     assert!(image.color.iter().all(|pixel| rgb(*pixel).distance(color) < 1e-5));
@@ -222,10 +236,105 @@ fn normal_maps_bend_normals_to_their_right_and_up() {
     }
 }
 
+#[test]
+fn normal_maps_of_mirrored_objects_are_mirrored() {
+    let toward = Vec3::new(0.6, 0.48, 0.64);
+    let lit = |x: f32, y: f32| Vec3::splat(Vec3::new(x, y, 1.0).normalize().dot(toward));
+    let of_coordinates = |_: &mut Mesh, _: &mut f32| {};
+    let of_tangents = |square: &mut Mesh, _: &mut f32| {
+        square.normals = Some(vec![Vec3::Z; 4]);
+        square.tangents = Some(vec![Vec3::X.extend(1.0); 4]);
+    };
+    // Some programs write normals against the way that corners go round.
+    let of_turned_normals = |square: &mut Mesh, _: &mut f32| {
+        square.normals = Some(vec![-Vec3::Z; 4]);
+        square.tangents = Some(vec![Vec3::X.extend(-1.0); 4]);
+    };
+    for (name, change) in [
+        ("coordinates", &of_coordinates as &dyn Fn(&mut Mesh, &mut f32)),
+        ("tangents", &of_tangents),
+        ("turned normals", &of_turned_normals),
+    ] {
+        for (x, y) in [(1.0f32, 1.0f32), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
+            let scale = DVec3::new(f64::from(x), f64::from(y), 1.0);
+            let placed = |texel: [u8; 3]| {
+                let mut graph = bumpy(texel, change);
+                graph.nodes[0].transform = Transform::Matrix(DAffine3::from_scale(scale));
+                color_of(graph, toward)
+            };
+            let context = |way: &str| format!("{way}, {name}, scaled by {scale}");
+            assert_near(placed([255, 128, 255]), lit(x, 0.0), 0.006, &context("right"));
+            assert_near(placed([128, 255, 255]), lit(0.0, y), 0.006, &context("up"));
+        }
+    }
+}
+
+/// Light from below a floor whose normals lean toward it.
+#[test]
+fn no_light_comes_from_behind_a_bent_normal() {
+    let leaning = |square: &mut Mesh, _: &mut f32| {
+        square.normals = Some(vec![Vec3::new(0.8, 0.0, 0.6); 4]);
+        square.tangents = Some(vec![Vec3::new(0.6, 0.0, -0.8).extend(1.0); 4]);
+    };
+    let flat = |_: &mut Mesh, _: &mut f32| {};
+    // Dark above and at the horizon.
+    let pixel = |i: usize| if 9 * 8 <= i { Vec3::ONE } else { Vec3::ZERO };
+    let from_below =
+        Environment::new(8, 16, (0..8 * 16).map(pixel).collect(), Vec3::Z, 0.0).unwrap();
+    let lamp = Lamp { kind: LampKind::Point, color: Vec3::ONE, range: f32::INFINITY, radius: 0.0 };
+    let place = Transform::translated(DVec3::new(4.0, 0.0, -1.0));
+    for (name, graph) in
+        [("vertices", bumpy([128, 128, 255], leaning)), ("texture", bumpy([255, 128, 128], flat))]
+    {
+        let mut with_lamp = graph.clone();
+        with_lamp.nodes.push(Node { lamp: Some(lamp), transform: place, ..Node::new("lamp") });
+        let environment = Light::Environment(from_below.clone());
+        for (light, graph, lights) in [
+            ("sun", graph.clone(), vec![sun(Vec3::new(0.95, 0.0, -0.3))]),
+            ("environment", graph.clone(), vec![environment]),
+            ("lamp", with_lamp, Vec::new()),
+        ] {
+            let image = render(&scene(graph, lights, from_above(1.0)), &SETTINGS);
+            let is_dark = image.color.iter().all(|pixel| rgb(*pixel) == Vec3::ZERO);
+            assert!(is_dark, "{light}, normals of {name}");
+        }
+    }
+}
+
+#[test]
+fn a_rough_pane_blurs_what_is_behind_it() {
+    let paint = |base_color| Material { base_color, ..Material::UNLIT };
+    let half = |x: f32| mesh(scenes::quad(x * Vec3::X, Vec3::X, 2.0 * Vec3::Y));
+    let see = |roughness: f32| {
+        let pane = Material { is_thin: true, roughness, ..Material::GLASS };
+        let graph = scenes::graph(vec![
+            (half(-1.0), paint(Vec3::X)),
+            (half(1.0), paint(Vec3::Y)),
+            (mesh(scenes::floor(0.5, 2.0)), pane),
+        ]);
+        let settings = Settings { samples_per_pixel: 64, ..SETTINGS };
+        render(&scene(graph, Vec::new(), from_above(1.0)), &settings)
+    };
+    // Of red, at the middle of the left half and just right of the edge.
+    let reds = |image: &surfel::image::Image| [8, 18].map(|x| image.color[16 * 32 + x][0]);
+    let (sharp, rough) = (reds(&see(0.0)), reds(&see(0.5)));
+    let passed = 0.96 / 1.04;
+    assert!((sharp[0] - passed).abs() < 1e-4 && sharp[1] == 0.0, "{sharp:?}");
+    assert!((0.1..0.8).contains(&(rough[1] / rough[0])), "{rough:?}");
+}
+
+#[test]
+fn flat_scenes_share_textures_with_their_graph() {
+    let texture = two_by_two([RED, GREEN, BLUE, WHITE]);
+    let graph = square(textured(nearest(), Material::UNLIT), texture.clone());
+    let flat = FlatScene::new(&scene(graph, Vec::new(), from_above(1.0)), &Silent).unwrap();
+    assert!(Arc::ptr_eq(&flat.textures[0].texels, &texture.texels));
+}
+
 /// Textures other than colour multiply what the material says.
 #[test]
 fn textures_scale_transmission_and_emission() {
-    let texel = |texel: [u8; 4]| Texture { width: 1, height: 1, texels: vec![texel] };
+    let texel = |texel: [u8; 4]| Texture { width: 1, height: 1, texels: [texel].into() };
     let see = |material: Material, texture: Texture| {
         let graph = square(material, texture);
         let background = Background::Gradient { top: Vec3::ONE, bottom: Vec3::ONE };
@@ -266,7 +375,7 @@ fn a_texture_scales_roughness_by_green_and_metal_by_blue() {
     let rough = Material { metallic: 1.0, base_color, textures, ..Material::MATTE };
     let background = Background::Gradient { top: Vec3::ONE, bottom: Vec3::ZERO };
     let see = |texel: [u8; 4]| {
-        let graph = square(rough.clone(), Texture { width: 1, height: 1, texels: vec![texel] });
+        let graph = square(rough.clone(), Texture { width: 1, height: 1, texels: [texel].into() });
         let scene = Scene { background, ..scene(graph, Vec::new(), from_above(1.0)) };
         render(&scene, &SETTINGS).color
     };

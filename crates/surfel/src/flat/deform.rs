@@ -1,6 +1,6 @@
 //! Meshes that bend: morph targets, then the joints that carry their vertices.
 
-use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+use crate::math::{DAffine3, DMat3, DVec3, Vec3, Vec4};
 use crate::scene::{Graph, Joint, Mesh, Node, Skin};
 
 /// Whether a node shows `mesh` other than it is.
@@ -11,6 +11,13 @@ pub fn is_deformed(mesh: &Mesh, node: &Node) -> bool {
 
 fn is_skinned(mesh: &Mesh, node: &Node) -> bool {
     mesh.skin.is_some() && !node.joints.is_empty()
+}
+
+/// The columns of a mesh that bend, those that it lacks empty.
+pub struct Bent {
+    pub positions: Vec<Vec3>,
+    pub normals: Vec<Vec3>,
+    pub tangents: Vec<Vec4>,
 }
 
 /// How a node bends meshes.
@@ -33,27 +40,19 @@ impl Pose {
     }
 
     /// `mesh` in this pose, in the node's coordinates.
-    pub fn bend(&self, mesh: &Mesh) -> Mesh {
-        let mut bent = Mesh {
-            origin: mesh.origin,
+    pub fn bend(&self, mesh: &Mesh) -> Bent {
+        let mut bent = Bent {
             positions: mesh.positions.clone(),
-            triangles: mesh.triangles.clone(),
-            normals: mesh.normals.clone(),
-            tangents: mesh.tangents.clone(),
-            uvs: mesh.uvs.clone(),
-            colors: mesh.colors.clone(),
-            morphs: Vec::new(),
-            skin: None,
+            normals: mesh.normals.clone().unwrap_or_default(),
+            tangents: mesh.tangents.clone().unwrap_or_default(),
         };
         let morphs = mesh.morphs.iter().zip(&self.morph_weights);
         for (morph, &weight) in morphs.filter(|(_, weight)| **weight != 0.0) {
             for (position, offset) in bent.positions.iter_mut().zip(&morph.positions) {
                 *position += weight * offset;
             }
-            if let (Some(normals), Some(offsets)) = (&mut bent.normals, &morph.normals) {
-                for (normal, offset) in normals.iter_mut().zip(offsets) {
-                    *normal += weight * offset;
-                }
+            for (normal, offset) in bent.normals.iter_mut().zip(morph.normals.iter().flatten()) {
+                *normal += weight * offset;
             }
         }
         if let (Some(skin), false) = (&mesh.skin, self.node_from_mesh.is_empty()) {
@@ -65,15 +64,13 @@ impl Pose {
             });
             carry_by_joints(&mut bent, skin, &carry.collect::<Vec<_>>());
         }
-        if let Some(normals) = &mut bent.normals {
-            normals.iter_mut().for_each(|normal| *normal = normal.normalize_or(Vec3::Z));
-        }
+        bent.normals.iter_mut().for_each(|normal| *normal = normal.normalize_or(Vec3::Z));
         bent
     }
 }
 
 /// Linear blend skinning; `carry` has what each joint does to places and to normals.
-fn carry_by_joints(bent: &mut Mesh, skin: &Skin, carry: &[(DAffine3, DMat3)]) {
+fn carry_by_joints(bent: &mut Bent, skin: &Skin, carry: &[(DAffine3, DMat3)]) {
     for vertex in 0..bent.positions.len() {
         let joints = skin.joints[vertex].into_iter().zip(skin.weights[vertex]);
         let joints = joints.filter_map(|(joint, weight)| {
@@ -84,18 +81,17 @@ fn carry_by_joints(bent: &mut Mesh, skin: &Skin, carry: &[(DAffine3, DMat3)]) {
         let moved =
             joints.clone().map(|((place_by, _), weight)| weight * place_by.transform_point3(place));
         bent.positions[vertex] = moved.sum::<DVec3>().as_vec3();
-        if let Some(tangents) = &mut bent.tangents {
-            let tangent = tangents[vertex];
+        if let Some(tangent) = bent.tangents.get_mut(vertex) {
             let along = tangent.truncate().as_dvec3();
             let carried = joints.clone();
             let turned = carried.map(|((by, _), weight)| weight * by.transform_vector3(along));
             let along = turned.sum::<DVec3>().normalize_or(along).as_vec3();
-            tangents[vertex] = along.extend(tangent.w);
+            *tangent = along.extend(tangent.w);
         }
-        if let Some(normals) = &mut bent.normals {
-            let normal = normals[vertex].as_dvec3();
-            let turned = joints.map(|((_, turn_by), weight)| weight * (*turn_by * normal));
-            normals[vertex] = turned.sum::<DVec3>().as_vec3();
+        if let Some(normal) = bent.normals.get_mut(vertex) {
+            let unbent = normal.as_dvec3();
+            let turned = joints.map(|((_, turn_by), weight)| weight * (*turn_by * unbent));
+            *normal = turned.sum::<DVec3>().as_vec3();
         }
     }
 }

@@ -1,5 +1,6 @@
 //! A mesh as kernels and shading read it: its triangles, and what their corners carry.
 
+use super::deform::Bent;
 use super::triangles::FlatTriangles;
 use super::{Refit, points::Slot};
 use crate::error::Result;
@@ -21,22 +22,39 @@ pub struct FlatMesh {
 
 impl FlatMesh {
     pub fn new(mesh: &Mesh, progress: &dyn Progress) -> Result<Self> {
-        let [first, second] = &mesh.uvs;
         Ok(Self {
             triangles: FlatTriangles::new(&mesh.positions, &mesh.triangles, progress)?,
-            corners: mesh.triangles.clone(),
             normals: mesh.normals.clone().unwrap_or_default(),
             tangents: mesh.tangents.clone().unwrap_or_default(),
-            uvs: [first.clone().unwrap_or_default(), second.clone().unwrap_or_default()],
-            colors: mesh.colors.clone().unwrap_or_default(),
+            ..Self::of_what_stays(mesh)
         })
     }
 
-    /// Moves the vertices to where `mesh`, with the same triangles, now has them.
-    pub fn refit(&mut self, mesh: &Mesh, progress: &dyn Progress) -> Result<Refit> {
-        self.normals = mesh.normals.clone().unwrap_or_default();
-        self.tangents = mesh.tangents.clone().unwrap_or_default();
-        self.triangles.refit(&mesh.positions, &mesh.triangles, progress)
+    /// `mesh` as it is bent.
+    pub(super) fn bent(mesh: &Mesh, bent: Bent, progress: &dyn Progress) -> Result<Self> {
+        Ok(Self {
+            triangles: FlatTriangles::new(&bent.positions, &mesh.triangles, progress)?,
+            normals: bent.normals,
+            tangents: bent.tangents,
+            ..Self::of_what_stays(mesh)
+        })
+    }
+
+    /// The columns that bending leaves as they are.
+    fn of_what_stays(mesh: &Mesh) -> Self {
+        let [first, second] = &mesh.uvs;
+        Self {
+            corners: mesh.triangles.clone(),
+            uvs: [first.clone().unwrap_or_default(), second.clone().unwrap_or_default()],
+            colors: mesh.colors.clone().unwrap_or_default(),
+            ..Self::default()
+        }
+    }
+
+    /// Moves the vertices to where the same mesh is bent to now.
+    pub(super) fn refit(&mut self, bent: Bent, progress: &dyn Progress) -> Result<Refit> {
+        (self.normals, self.tangents) = (bent.normals, bent.tangents);
+        self.triangles.refit(&bent.positions, &self.corners, progress)
     }
 
     /// What a column of vertices has at a place in the triangle at `slot`; none if it is empty.

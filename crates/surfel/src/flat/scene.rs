@@ -114,7 +114,7 @@ impl FlatScene {
             let (geometry, pose) = match (&graph.geometries[source.0], source.1) {
                 (Geometry::Triangles(mesh), Some(node)) => {
                     let pose = Pose::of(graph, node, world);
-                    (FlatGeometry::Mesh(FlatMesh::new(&pose.bend(mesh), progress)?), pose)
+                    (FlatGeometry::Mesh(FlatMesh::bent(mesh, pose.bend(mesh), progress)?), pose)
                 }
                 (geometry, _) => (FlatGeometry::new(geometry, progress)?, Pose::default()),
             };
@@ -138,7 +138,7 @@ impl FlatScene {
             if let (FlatGeometry::Mesh(flat), Geometry::Triangles(mesh)) =
                 (flat, &graph.geometries[*geometry])
             {
-                flat.refit(&pose.bend(mesh), progress)?;
+                flat.refit(pose.bend(mesh), progress)?;
                 built.pose = pose;
             }
         }

@@ -1,6 +1,7 @@
 //! Direct light: sun, sky, surroundings and lamps with their shadows, and the headlight.
 
 use super::RayCounts;
+use super::media::{Media, Way};
 use super::shading::Shading;
 use super::specular::gloss;
 use super::through::light_through;
@@ -16,6 +17,8 @@ use std::f32::consts::PI;
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver {
     pub shading: Shading,
+    /// On the viewer's side.
+    pub media: Media,
     /// Unit, to the viewer.
     pub to_viewer: Vec3,
     /// Share of light thrown back to all sides, and to one side with the blur of the roughness; with what
@@ -141,7 +144,7 @@ impl DirectLight<'_> {
             let normal = receiver.shading.normal;
             let (u, v) = scrambled_pair(index, hash(receiver.key ^ ENVIRONMENT_DIRECTION));
             let direction = if u < 0.5 {
-                environment.sample((2.0 * u, v)).0
+                environment.sample((2.0 * u, v))
             } else {
                 Frame::around(normal).to_world(cosine_hemisphere((2.0 * u - 1.0, v)))
             };
@@ -149,8 +152,9 @@ impl DirectLight<'_> {
             if cos <= 0.0 {
                 return None;
             }
-            let density = 0.5 * environment.pdf(direction) + 0.5 * cos / PI;
-            let brings = environment.radiance(direction) * (cos / PI / density) * receiver.diffuse;
+            let (radiance, density) = environment.radiance_and_density(direction);
+            let density = 0.5 * density + 0.5 * cos / PI;
+            let brings = radiance * (cos / PI / density) * receiver.diffuse;
             Some(LightRay { direction, reach: f32::INFINITY, brings })
         };
         self.add_light(self.n_light, sample, receivers, light, progress)
@@ -215,7 +219,7 @@ impl DirectLight<'_> {
             progress.check()?;
             rays.clear();
             brings.clear();
-            for receiver in receivers {
+            for (i, receiver) in receivers.iter().enumerate() {
                 for n in 0..n_light {
                     let index = receiver.index * n_light + n;
                     let Some(sampled) = sample(receiver, index) else { continue };
@@ -226,14 +230,18 @@ impl DirectLight<'_> {
                     }
                     let ray = receiver.shading.spawn(sampled.direction);
                     rays.push(Ray { t_max: sampled.reach, ..ray });
-                    brings.push((receiver.slot, share * sampled.brings));
+                    brings.push((i, share * sampled.brings));
                 }
             }
             shares.clear();
             shares.resize(rays.len(), Vec3::ZERO);
-            light_through(self.scene, self.simd, &rays, &mut shares);
-            for ((slot, brings), share) in brings.iter().zip(&shares) {
-                light[*slot as usize] += *share * *brings;
+            let way = |ray: usize| {
+                let Receiver { shading, media, .. } = &receivers[brings[ray].0];
+                Way::from_surface(shading, rays[ray], *media)
+            };
+            light_through(self.scene, self.simd, &rays, way, &mut shares);
+            for ((receiver, brings), share) in brings.iter().zip(&shares) {
+                light[receivers[*receiver].slot as usize] += *share * *brings;
             }
             n_rays += rays.len() as u64;
         }

@@ -1,16 +1,18 @@
 //! Light along rays: what a batch of camera rays brings back.
 //!
 //! An integrator is one file behind [`Integrator`]; `direct` (light from lamps and skies), `shading` (what
-//! a hit is made of), `specular` (mirrors and gloss), `surroundings` (what is seen where nothing is) and
-//! `through` (light that surfaces let pass) are there for all of them.
+//! a hit is made of), `media` (glass within glass), `specular` (mirrors and gloss), `surroundings` (what is
+//! seen where nothing is) and `through` (light that surfaces let pass) are there for all of them.
 
 mod direct;
+mod media;
 mod shading;
 mod specular;
 mod surroundings;
 mod through;
 mod whitted;
 
+pub(crate) use surroundings::surroundings;
 pub use whitted::Whitted;
 
 use crate::error::Result;

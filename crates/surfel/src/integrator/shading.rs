@@ -24,7 +24,6 @@ pub struct Shading {
     pub is_thin: bool,
     pub emission: Vec3,
     pub is_unlit: bool,
-    pub instance: u32,
     /// Of the point, in world units; 0 for triangles.
     pub radius: f32,
     /// Of points.
@@ -54,7 +53,6 @@ impl Shading {
             is_thin: material.is_thin,
             emission: material.emissive,
             is_unlit: material.is_unlit,
-            instance: hit.instance,
             radius: hit.radius,
             surface: None,
             reach: position.abs().max(ray.origin.abs()).max_element(),
@@ -111,6 +109,11 @@ impl Shading {
         if -LEAST < away {
             self.normal = (self.normal - (away + LEAST) * direction).normalize_or(self.facet);
         }
+    }
+
+    /// Whether light goes on inside of what the surface is around.
+    pub fn has_inside(&self) -> bool {
+        0.0 < self.transmission && !self.is_thin
     }
 
     /// A ray that leaves on the side to which `direction` points and does not meet the surface again at once.

@@ -24,9 +24,10 @@ pub fn fresnel(cos: f32, eta: f32) -> f32 {
     0.5 * (across * across + along * along)
 }
 
-/// Share of light that a pane reflects in air: both its sides, and all that goes to and fro between them.
-pub fn pane_fresnel(cos: f32, ior: f32) -> f32 {
-    let at_side = fresnel(cos, 1.0 / ior);
+/// Share of light that a pane reflects: both its sides, and all that goes to and fro between them. `eta` is
+/// the index of refraction around it over its own.
+pub fn pane_fresnel(cos: f32, eta: f32) -> f32 {
+    let at_side = fresnel(cos, eta);
     2.0 * at_side / (1.0 + at_side)
 }
 

@@ -1,10 +1,10 @@
 //! Light that reaches a place: stopped by what is opaque, tinted by what it goes through.
 
+use super::media::Way;
 use super::shading::Shading;
 use super::specular::{fresnel, pane_fresnel};
 use crate::flat::FlatScene;
 use crate::math::{Ray, Vec3};
-use crate::scene::Material;
 use crate::trace::{self, SceneHit, Simd, Which};
 
 /// Surfaces that light goes through at most.
@@ -13,8 +13,14 @@ const MOST_SURFACES: usize = 64;
 const LEAST: f32 = 1.0 / 512.0;
 
 /// The share of light that goes along each ray to its end. It goes straight on: what glass focuses is left
-/// out.
-pub fn light_through(scene: &FlatScene, simd: Simd, rays: &[Ray], shares: &mut [Vec3]) {
+/// out. `way` has what the ray of an index begins inside of.
+pub fn light_through(
+    scene: &FlatScene,
+    simd: Simd,
+    rays: &[Ray],
+    way: impl Fn(usize) -> Way,
+    shares: &mut [Vec3],
+) {
     let mut occluded = vec![false; rays.len()];
     trace::scene_occlusions(scene, simd, Which::Opaque, rays, &mut occluded);
     for (share, is_occluded) in shares.iter_mut().zip(&occluded) {
@@ -24,37 +30,32 @@ pub fn light_through(scene: &FlatScene, simd: Simd, rays: &[Ray], shares: &mut [
         return;
     }
     let open = (0..rays.len() as u32).filter(|&i| !occluded[i as usize]);
-    let mut passing: Vec<(u32, Option<u32>)> = open.map(|ray_idx| (ray_idx, None)).collect();
-    let mut rays: Vec<Ray> = passing.iter().map(|(i, _)| rays[*i as usize]).collect();
+    let mut passing: Vec<(u32, Way)> = open.map(|i| (i, way(i as usize))).collect();
+    let mut rays: Vec<Ray> = passing.iter().map(|(_, way)| way.ray).collect();
     let mut hits = vec![SceneHit::MISS; rays.len()];
     for _ in 0..MOST_SURFACES {
         hits.truncate(rays.len());
         trace::scene_hits(scene, simd, Which::SeeThrough, &rays, &mut hits);
         let mut n_left = 0;
         for i in 0..rays.len() {
-            let ((ray_idx, medium), ray, hit) = (passing[i], rays[i], &hits[i]);
+            let ((ray_idx, way), hit) = (passing[i], &hits[i]);
+            let share = &mut shares[ray_idx as usize];
             if hit.is_miss() {
+                *share *= way.left_at_end(scene);
                 continue;
             }
-            let share = &mut shares[ray_idx as usize];
+            let ray = way.ray;
             let shading = Shading::new(scene, &ray, hit);
-            *share *= passed(&shading, ray.direction);
-            let is_inner = scene.has_outside(hit.instance) && hit.is_inner;
-            let medium = medium.or_else(|| is_inner.then_some(hit.instance));
-            if let Some(medium) = medium {
-                *share *= absorbed(scene, medium, hit.distance);
-            }
+            let boundary = way.boundary(scene, &shading, hit);
+            *share *= boundary.left * passed(&shading, ray.direction, boundary.eta);
             if share.max_element() < LEAST {
                 *share = Vec3::ZERO;
                 continue;
             }
-            let on = shading.spawn(ray.direction);
             let t_max = (ray.t_max - hit.distance).max(0.0);
-            rays[n_left] = Ray { t_max, ..on };
-            let is_solid = 0.0 < shading.transmission && !shading.is_thin;
-            let is_leaving = medium == Some(hit.instance);
-            let medium = if is_solid { (!is_leaving).then_some(hit.instance) } else { medium };
-            passing[n_left] = (ray_idx, medium);
+            let on = Ray { t_max, ..shading.spawn(ray.direction) };
+            rays[n_left] = on;
+            passing[n_left] = (ray_idx, Way::from_surface(&shading, on, boundary.beyond));
             n_left += 1;
         }
         rays.truncate(n_left);
@@ -68,25 +69,16 @@ pub fn light_through(scene: &FlatScene, simd: Simd, rays: &[Ray], shares: &mut [
     }
 }
 
-/// What a surface lets pass.
-fn passed(shading: &Shading, direction: Vec3) -> Vec3 {
+/// What a surface lets pass. As nothing bends the light, it meets both sides of a body at the angle that
+/// it has in the thinner medium.
+fn passed(shading: &Shading, direction: Vec3, eta: f32) -> Vec3 {
     let cos = -shading.normal.dot(direction);
+    let eta = eta.min(1.0 / eta);
     let at_boundary = match shading.is_thin {
-        true => pane_fresnel(cos, shading.ior),
-        false => fresnel(cos, 1.0 / shading.ior),
+        true => pane_fresnel(cos, eta),
+        false => fresnel(cos, eta),
     };
     let entering = (1.0 - at_boundary) * (1.0 - shading.metallic);
     let through = entering * shading.transmission * shading.base_color;
     Vec3::splat(1.0 - shading.alpha) + shading.alpha * through
-}
-
-/// What is left of light after a way inside an instance (Beer's law).
-pub fn absorbed(scene: &FlatScene, instance: u32, distance: f32) -> Vec3 {
-    let instance = &scene.instances[instance as usize];
-    let Material { attenuation_color, attenuation_distance, .. } =
-        scene.materials[instance.material as usize];
-    if !(attenuation_distance < f32::INFINITY && distance < f32::INFINITY) {
-        return Vec3::ONE;
-    }
-    attenuation_color.powf(distance / (attenuation_distance * instance.scale))
 }

@@ -1,13 +1,13 @@
 //! Light along rays that mirrors send on and glass splits (Whitted 1980), a wave of rays a bounce.
 
 use super::direct::{DirectLight, Receiver};
+use super::media::{Boundary, Way};
 use super::shading::Shading;
 use super::specular::{
     LEAST_ROUGHNESS, energy, fresnel, masking_of_light, metal_fresnel, pane_fresnel, reflect,
     refract, visible_normal,
 };
 use super::surroundings::surroundings;
-use super::through::absorbed;
 use super::{Batch, Integrator, RayCounts};
 use crate::error::Result;
 use crate::math::{Frame, Ray, Vec3, Vec4, hash, scrambled_pair};
@@ -36,7 +36,7 @@ const PASSED: u64 = 15;
 /// A ray on its way from the camera.
 #[derive(Clone, Copy)]
 struct Path {
-    ray: Ray,
+    way: Way,
     /// What share of the light that it finds reaches the camera.
     weight: Vec3,
     /// Of the camera ray.
@@ -46,8 +46,6 @@ struct Path {
     index: u32,
     depth: u32,
     n_passed: u32,
-    /// The instance that it is inside of.
-    medium: Option<u32>,
     sees: Sees,
 }
 
@@ -89,7 +87,7 @@ impl Integrator for Whitted {
                 break;
             }
             progress.check()?;
-            let rays: Vec<Ray> = wave.iter().map(|path| path.ray).collect();
+            let rays: Vec<Ray> = wave.iter().map(|path| path.way.ray).collect();
             hits.resize(rays.len(), SceneHit::MISS);
             trace::scene_hits(batch.scene, batch.simd, Which::All, &rays, &mut hits);
             counts.secondary += rays.len() as u64;
@@ -118,22 +116,19 @@ struct Lobes {
     reflected: Vec3,
     refracted: Vec3,
     diffuse: Vec3,
-    /// Index of refraction on the viewer's side over that beyond.
-    eta: f32,
 }
 
 impl<'a> Search<'a> {
     fn camera_paths(&self) -> impl Iterator<Item = Path> + use<'a> {
         let Batch { rays, samples, .. } = self.batch;
         let path = move |(i, ray): (usize, &Ray)| Path {
-            ray: *ray,
+            way: Way::from_camera(*ray),
             weight: Vec3::ONE,
             slot: i as u32,
             key: samples.keys[i],
             index: samples.indices[i],
             depth: 0,
             n_passed: 0,
-            medium: None,
             sees: Sees::Behind,
         };
         rays.iter().enumerate().map(path)
@@ -147,10 +142,10 @@ impl<'a> Search<'a> {
             return self.leave(&path);
         }
         let scene = self.batch.scene;
-        if let Some(medium) = path.medium {
-            path.weight *= absorbed(scene, medium, hit.distance);
-        }
-        let shading = Shading::new(scene, &path.ray, hit);
+        let shading = Shading::new(scene, &path.way.ray, hit);
+        let boundary = path.way.boundary(scene, &shading, hit);
+        let coverage = shading.alpha * path.weight.max_element();
+        path.weight *= boundary.left;
         if shading.alpha < 1.0 {
             self.pass(&path, &shading);
             path.weight *= shading.alpha;
@@ -159,25 +154,22 @@ impl<'a> Search<'a> {
             }
         }
         if path.sees == Sees::Behind {
-            self.alpha[slot] += path.weight.max_element();
+            self.alpha[slot] += coverage;
         }
         if shading.is_unlit {
             self.light[slot] += path.weight * shading.base_color;
             return;
         }
         self.light[slot] += path.weight * shading.emission;
-        let is_inside = if scene.has_outside(hit.instance) {
-            hit.is_inner
-        } else {
-            path.medium == Some(hit.instance)
-        };
-        let lobes = Lobes::new(&shading, &path, is_inside);
+        let direction = path.way.ray.direction;
+        let lobes = Lobes::new(&shading, direction, boundary.eta);
         let is_rough = LEAST_ROUGHNESS <= shading.roughness;
         let glossy = if is_rough { lobes.reflected } else { Vec3::ZERO };
         if lobes.diffuse != Vec3::ZERO || glossy != Vec3::ZERO {
             self.receivers.push(Receiver {
                 shading,
-                to_viewer: -path.ray.direction,
+                media: boundary.here,
+                to_viewer: -direction,
                 diffuse: path.weight * lobes.diffuse,
                 glossy: path.weight * glossy,
                 slot: path.slot,
@@ -186,32 +178,31 @@ impl<'a> Search<'a> {
             });
         }
         if path.depth < self.max_depth {
-            if is_inside && 0.0 < shading.transmission {
-                path.medium = Some(hit.instance);
-            }
-            self.reflect(&path, &shading, &lobes);
-            self.refract(&path, &shading, &lobes, is_inside);
+            self.reflect(&path, &shading, &lobes, &boundary);
+            self.refract(&path, &shading, &lobes, &boundary);
         }
     }
 
     fn leave(&mut self, path: &Path) {
         let slot = path.slot as usize;
         let behind = self.batch.samples.behind[slot];
+        let direction = path.way.ray.direction;
+        let weight = path.weight * path.way.left_at_end(self.batch.scene);
         let with_sun = path.sees == (Sees::Sky { with_sun: true });
         match path.sees {
             Sees::Behind if self.batch.scene.background == Background::Surroundings => {
-                let radiance = surroundings(self.batch.scene, path.ray.direction, false);
-                self.light[slot] += path.weight * radiance;
+                let radiance = surroundings(self.batch.scene, direction, false);
+                self.light[slot] += weight * radiance;
                 self.alpha[slot] += path.weight.max_element();
             }
             // The renderer puts what is behind there.
             Sees::Behind => {}
             Sees::BehindGlass if 0.0 < behind.w => {
-                self.light[slot] += path.weight * behind.truncate();
+                self.light[slot] += weight * behind.truncate();
             }
             Sees::BehindGlass | Sees::Sky { .. } => {
-                let radiance = surroundings(self.batch.scene, path.ray.direction, with_sun);
-                self.light[slot] += path.weight * radiance;
+                let radiance = surroundings(self.batch.scene, direction, with_sun);
+                self.light[slot] += weight * radiance;
             }
         }
     }
@@ -221,8 +212,9 @@ impl<'a> Search<'a> {
         if MOST_PASSED <= path.n_passed {
             return;
         }
+        let ray = shading.spawn(path.way.ray.direction);
         self.send(Path {
-            ray: shading.spawn(path.ray.direction),
+            way: Way::from_surface(shading, ray, path.way.media),
             weight: path.weight * (1.0 - shading.alpha),
             key: hash(path.key ^ PASSED),
             n_passed: path.n_passed + 1,
@@ -230,11 +222,11 @@ impl<'a> Search<'a> {
         });
     }
 
-    fn reflect(&mut self, path: &Path, shading: &Shading, lobes: &Lobes) {
+    fn reflect(&mut self, path: &Path, shading: &Shading, lobes: &Lobes, boundary: &Boundary) {
         if lobes.reflected == Vec3::ZERO {
             return;
         }
-        let direction = path.ray.direction;
+        let direction = path.way.ray.direction;
         let (normal, share) = bent_normal(path, shading);
         let mut reflected = reflect(direction, normal);
         if reflected.dot(shading.facet) <= 0.0 {
@@ -251,7 +243,7 @@ impl<'a> Search<'a> {
         });
         let is_sharp = shading.roughness < LEAST_ROUGHNESS;
         self.send(Path {
-            ray: shading.spawn(reflected),
+            way: Way::from_surface(shading, shading.spawn(reflected), boundary.here),
             weight: path.weight * lobes.reflected * share,
             key: hash(path.key ^ REFLECTED),
             depth: path.depth + 1,
@@ -260,11 +252,11 @@ impl<'a> Search<'a> {
         });
     }
 
-    fn refract(&mut self, path: &Path, shading: &Shading, lobes: &Lobes, is_inside: bool) {
+    fn refract(&mut self, path: &Path, shading: &Shading, lobes: &Lobes, boundary: &Boundary) {
         if lobes.refracted == Vec3::ZERO {
             return;
         }
-        let direction = path.ray.direction;
+        let direction = path.way.ray.direction;
         let (normal, _) = bent_normal(path, shading);
         let refracted = if shading.is_thin {
             // Through a pane light goes straight on, blurred as what it mirrors.
@@ -272,21 +264,16 @@ impl<'a> Search<'a> {
             Some(mirrored - 2.0 * mirrored.dot(shading.normal) * shading.normal)
         } else {
             // A rough boundary's own normal may reflect totally where the mean one does not.
-            refract(direction, normal, lobes.eta)
-                .or_else(|| refract(direction, shading.normal, lobes.eta))
+            refract(direction, normal, boundary.eta)
+                .or_else(|| refract(direction, shading.normal, boundary.eta))
         };
         let Some(refracted) = refracted else { return };
         let refracted = if refracted.dot(shading.facet) < 0.0 { refracted } else { direction };
         self.send(Path {
-            ray: shading.spawn(refracted),
+            way: Way::from_surface(shading, shading.spawn(refracted), boundary.beyond),
             weight: path.weight * lobes.refracted,
             key: hash(path.key ^ REFRACTED),
             depth: path.depth + 1,
-            medium: match (shading.is_thin, is_inside) {
-                (true, _) => path.medium,
-                (false, true) => None,
-                (false, false) => Some(shading.instance),
-            },
             sees: match path.sees {
                 Sees::Behind => Sees::BehindGlass,
                 seen => seen,
@@ -310,24 +297,23 @@ impl<'a> Search<'a> {
 }
 
 impl Lobes {
-    fn new(shading: &Shading, path: &Path, is_inside: bool) -> Self {
-        let Shading { metallic, ior, transmission, base_color, is_thin, .. } = *shading;
-        let cos = -shading.normal.dot(path.ray.direction);
-        let eta = if is_inside && !is_thin { ior } else { 1.0 / ior };
-        if metallic == 0.0 && ior == 1.0 {
+    /// `eta` is the index of refraction on the viewer's side over that beyond.
+    fn new(shading: &Shading, direction: Vec3, eta: f32) -> Self {
+        let Shading { metallic, transmission, base_color, is_thin, .. } = *shading;
+        let cos = -shading.normal.dot(direction);
+        if metallic == 0.0 && eta == 1.0 {
             // Matte: all that the rest would come to.
             let (refracted, diffuse) =
                 (transmission * base_color, (1.0 - transmission) * base_color);
-            return Self { reflected: Vec3::ZERO, refracted, diffuse, eta };
+            return Self { reflected: Vec3::ZERO, refracted, diffuse };
         }
-        let at_boundary = if is_thin { pane_fresnel(cos, ior) } else { fresnel(cos, eta) };
+        let at_boundary = if is_thin { pane_fresnel(cos, eta) } else { fresnel(cos, eta) };
         let entering = (1.0 - metallic) * (1.0 - at_boundary);
         Self {
             reflected: (1.0 - metallic) * Vec3::splat(at_boundary)
                 + metallic * metal_fresnel(cos, base_color),
             refracted: entering * transmission * base_color,
             diffuse: entering * (1.0 - transmission) * base_color,
-            eta,
         }
     }
 }
@@ -339,7 +325,7 @@ fn bent_normal(path: &Path, shading: &Shading) -> (Vec3, Option<f32>) {
         return (shading.normal, None);
     }
     let frame = Frame::around(shading.normal);
-    let to_viewer = -path.ray.direction;
+    let to_viewer = -path.way.ray.direction;
     let view = Vec3::new(
         to_viewer.dot(frame.tangent),
         to_viewer.dot(frame.bitangent),

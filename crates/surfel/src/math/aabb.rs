@@ -1,6 +1,6 @@
 //! Axis-aligned boxes.
 
-use super::Vec3;
+use super::{Ray, Vec3};
 
 /// All points between `min` and `max`, faces included.
 #[repr(C)]
@@ -51,8 +51,42 @@ impl Aabb {
         size.x * size.y + size.y * size.z + size.z * size.x
     }
 
+    /// Length of what a ray's range has inside.
+    pub fn length_along(self, ray: &Ray) -> f32 {
+        let (mut near, mut far) = (ray.t_min, ray.t_max);
+        for axis in 0..3 {
+            let side = |side: Vec3| (side[axis] - ray.origin[axis]) / ray.direction[axis];
+            let (low, high) = (side(self.min), side(self.max));
+            // NaN in the plane of a side, where the ray stays.
+            if !(low.is_nan() || high.is_nan()) {
+                near = near.max(low.min(high));
+                far = far.min(low.max(high));
+            }
+        }
+        (far - near).max(0.0)
+    }
+
     /// Index of the longest side.
     pub fn longest_axis(self) -> usize {
         self.size().max_position()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ray_has_as_much_inside_as_its_range_says() {
+        let unit = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
+        let from = |x: f32, y: f32| Ray::new(Vec3::new(x, y, 0.5), Vec3::X);
+        assert_eq!(unit.length_along(&from(-2.0, 0.5)), 1.0);
+        assert_eq!(unit.length_along(&from(0.25, 0.5)), 0.75);
+        assert_eq!(unit.length_along(&Ray { t_max: 2.5, ..from(-2.0, 0.5) }), 0.5);
+        assert_eq!(unit.length_along(&from(2.0, 0.5)), 0.0);
+        assert_eq!(unit.length_along(&from(-2.0, 1.5)), 0.0);
+        // Along a side, whose plane it never crosses.
+        assert_eq!(unit.length_along(&from(-2.0, 1.0)), 1.0);
+        assert_eq!(unit.length_along(&from(-2.0, 0.0)), 1.0);
     }
 }

@@ -26,9 +26,9 @@ pub struct Distribution2d {
 }
 
 impl Distribution1d {
-    #[cfg(test)]
     /// None without cells. Weights that are negative or not finite count as 0; if all do, each cell
     /// is as likely as any other.
+    #[cfg(test)]
     pub fn new(weights: &[f32]) -> Option<Self> {
         let weights: Vec<f64> = weights.iter().map(|weight| f64::from(*weight)).collect();
         Self::of_weights(&weights)

@@ -144,6 +144,12 @@ impl<F: Floats> Vec3Lanes<F> {
         Self { x: F::splat(vector.x), y: F::splat(vector.y), z: F::splat(vector.z) }
     }
 
+    /// What was stored from `lane`, in all lanes.
+    #[inline(always)]
+    pub fn splat_lane([x, y, z]: &[[f32; LANES]; 3], lane: usize) -> Self {
+        Self { x: F::splat(x[lane]), y: F::splat(y[lane]), z: F::splat(z[lane]) }
+    }
+
     #[inline(always)]
     pub fn select(mask: F::Mask, if_true: Self, if_false: Self) -> Self {
         Self {

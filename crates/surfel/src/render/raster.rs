@@ -4,9 +4,10 @@ use super::{Piece, Settings};
 use crate::error::{Error, Result};
 use crate::flat::{FlatCloud, FlatGeometry, FlatScene, Instance};
 use crate::image::{Image, NO_ID};
+use crate::integrator::surroundings;
 use crate::math::LANES;
 use crate::progress::Progress;
-use crate::scene::View;
+use crate::scene::{Background, View};
 use crate::surface::SurfaceKind;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -80,11 +81,13 @@ pub fn render(
     let n_pixels = rows.n_pixels();
     let blocks = |instance: &Instance| cloud(scene, instance).points.blocks.len() as u64;
     progress.begin("render", scene.instances.iter().map(blocks).sum());
+    let nearest: Vec<AtomicU64> = (0..n_pixels).map(|_| AtomicU64::new(EMPTY)).collect();
     let mut depths = vec![f32::INFINITY; n_pixels];
     let mut seen = vec![Seen { instance: NO_ID, slot: 0 }; n_pixels];
     for (instance_idx, instance) in scene.instances.iter().enumerate() {
-        let nearest = nearest(scene, instance, view, rows, progress)?;
-        for (pixel, key) in nearest.into_iter().enumerate().filter(|(_, key)| *key != EMPTY) {
+        project(scene, instance, view, rows, progress, &nearest)?;
+        let keys = nearest.iter().map(|nearest| nearest.swap(EMPTY, Ordering::Relaxed));
+        for (pixel, key) in keys.enumerate().filter(|(_, key)| *key != EMPTY) {
             let depth = f32::from_bits((key >> 32) as u32);
             if depth < depths[pixel] {
                 depths[pixel] = depth;
@@ -92,18 +95,18 @@ pub fn render(
             }
         }
     }
-    Ok(shade(scene, settings, piece, rows, &depths, &seen))
+    Ok(Raster { rows, depths, seen }.shade(scene, view, settings, piece))
 }
 
-/// Depth and slot of the point of one instance in each pixel, as one number.
-fn nearest(
+/// Sets `nearest` to depth and slot, as one number, of the nearest point of one instance in each pixel.
+fn project(
     scene: &FlatScene,
     instance: &Instance,
     view: &View,
     rows: Rows,
     progress: &dyn Progress,
-) -> Result<Vec<u64>> {
-    let nearest: Vec<AtomicU64> = (0..rows.n_pixels()).map(|_| AtomicU64::new(EMPTY)).collect();
+    nearest: &[AtomicU64],
+) -> Result<()> {
     let blocks = &cloud(scene, instance).points.blocks;
     blocks.par_iter().enumerate().with_min_len(1024).try_for_each(|(block_idx, block)| {
         if block_idx % 1024 == 0 {
@@ -121,8 +124,7 @@ fn nearest(
             nearest[pixel].fetch_min(key, Ordering::Relaxed);
         }
         Ok(())
-    })?;
-    Ok(nearest.into_iter().map(AtomicU64::into_inner).collect())
+    })
 }
 
 fn cloud<'s>(scene: &'s FlatScene, instance: &Instance) -> &'s FlatCloud {
@@ -132,49 +134,57 @@ fn cloud<'s>(scene: &'s FlatScene, instance: &Instance) -> &'s FlatCloud {
     }
 }
 
-fn shade(
-    scene: &FlatScene,
-    settings: &Settings,
-    piece: Piece,
+/// The nearest points of some rows of a picture.
+struct Raster {
     rows: Rows,
-    depths: &[f32],
-    seen: &[Seen],
-) -> Image {
-    let mut image = settings.blank(piece);
-    let places =
-        (piece.rows.0..piece.rows.1).flat_map(|y| (0..settings.width).map(move |x| (x, y)));
-    for (pixel, (x, y)) in places.enumerate() {
-        let Some(place) = rows.index(i64::from(x), i64::from(y)) else { continue };
-        let Seen { instance, slot } = &seen[place];
-        if *instance == NO_ID {
-            image.color[pixel] = scene.background.at((y as f32 + 0.5) / settings.height as f32);
-            continue;
-        }
-        let placed = &scene.instances[*instance as usize];
-        let points = &cloud(scene, placed).points;
-        let material = &scene.materials[placed.material as usize];
-        let albedo = material.base_color * points.gathered(*slot).color;
-        let shade = if material.is_unlit { 1.0 } else { eye_dome(depths, rows, (x, y), place) };
-        image.color[pixel] = (shade * albedo).extend(1.0).to_array();
-        image.coverage[pixel] = 1.0;
-        let Some(layers) = &mut image.layers else { continue };
-        layers.depth[pixel] = depths[place];
-        layers.position[pixel] = placed.world_position(points.center(*slot));
-        layers.point_id[pixel] = points.id(*slot);
-        layers.instance_id[pixel] = *instance;
-        layers.albedo[pixel] = albedo;
-    }
-    image
+    depths: Vec<f32>,
+    seen: Vec<Seen>,
 }
 
-/// Eye-dome lighting (Boucheny 2009): darker the farther a pixel lies behind its neighbours.
-fn eye_dome(depths: &[f32], rows: Rows, (x, y): (u32, u32), place: usize) -> f32 {
-    const STRENGTH: f32 = 300.0 * 0.4;
-    let own = depths[place].log2();
-    let ring = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
-    let beside = ring.map(|(dx, dy)| rows.index(i64::from(x) + dx, i64::from(y) + dy));
-    // Farther than all where there is nothing.
-    let behind = |beside: usize| (own - depths[beside].log2()).max(0.0);
-    let sum: f32 = beside.into_iter().flatten().map(behind).sum();
-    (-STRENGTH * sum / 8.0).exp()
+impl Raster {
+    fn shade(&self, scene: &FlatScene, view: &View, settings: &Settings, piece: Piece) -> Image {
+        let mut image = settings.blank(piece);
+        let (first, end) = piece.rows;
+        let places = (first..end).flat_map(|y| (0..settings.width).map(move |x| (x, y)));
+        for (pixel, (x, y)) in places.enumerate() {
+            let Some(place) = self.rows.index(i64::from(x), i64::from(y)) else { continue };
+            let Seen { instance, slot } = self.seen[place];
+            if instance == NO_ID {
+                let (x, y) = (x as f32 + 0.5, y as f32 + 0.5);
+                image.color[pixel] = match scene.background {
+                    Background::Surroundings => {
+                        surroundings(scene, view.ray(x, y).direction, false).extend(1.0).to_array()
+                    }
+                    plain => plain.at(y / settings.height as f32),
+                };
+                continue;
+            }
+            let placed = &scene.instances[instance as usize];
+            let points = &cloud(scene, placed).points;
+            let material = &scene.materials[placed.material as usize];
+            let albedo = material.base_color * points.gathered(slot).color;
+            let shade = if material.is_unlit { 1.0 } else { self.eye_dome((x, y), place) };
+            image.color[pixel] = (shade * albedo).extend(1.0).to_array();
+            image.coverage[pixel] = 1.0;
+            let Some(layers) = &mut image.layers else { continue };
+            layers.depth[pixel] = self.depths[place];
+            layers.position[pixel] = placed.world_position(points.center(slot));
+            layers.point_id[pixel] = points.id(slot);
+            layers.instance_id[pixel] = instance;
+            layers.albedo[pixel] = albedo;
+        }
+        image
+    }
+
+    /// Eye-dome lighting (Boucheny 2009): darker the farther a pixel lies behind its neighbours.
+    fn eye_dome(&self, (x, y): (u32, u32), place: usize) -> f32 {
+        const STRENGTH: f32 = 300.0 * 0.4;
+        let own = self.depths[place].log2();
+        let ring = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+        let beside = ring.map(|(dx, dy)| self.rows.index(i64::from(x) + dx, i64::from(y) + dy));
+        // Farther than all where there is nothing.
+        let behind = |beside: usize| (own - self.depths[beside].log2()).max(0.0);
+        let sum: f32 = beside.into_iter().flatten().map(behind).sum();
+        (-STRENGTH * sum / 8.0).exp()
+    }
 }

@@ -2,14 +2,16 @@
 
 use crate::image::decode_srgb8;
 use crate::math::{Vec2, Vec4};
+use std::sync::Arc;
 
 /// A picture whose meaning (colour, roughness, normal) follows from the place in a material that uses it.
+/// Clones share the texels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     pub width: u32,
     pub height: u32,
     /// Row 0 is the top; `width * height` entries.
-    pub texels: Vec<[u8; 4]>,
+    pub texels: Arc<[[u8; 4]]>,
 }
 
 /// How a material uses a texture.
@@ -125,7 +127,7 @@ mod tests {
 
     fn checks() -> Texture {
         let texel = |grey: u8| [grey, grey, grey, 255];
-        Texture { width: 2, height: 1, texels: vec![texel(0), texel(255)] }
+        Texture { width: 2, height: 1, texels: [texel(0), texel(255)].into() }
     }
 
     fn red(u: f32, reference: TextureRef) -> f32 {

@@ -31,7 +31,7 @@ pub struct LineLanes<F> {
 }
 
 /// Eight triangles, from which single ones are taken.
-pub type Rows = Vec3Lanes<[f32; LANES]>;
+pub type Rows = [[f32; LANES]; 3];
 
 impl<F: Floats> LineLanes<F> {
     #[inline(always)]
@@ -97,7 +97,7 @@ impl<L: Lanes> TriangleLanes<Vec3Lanes<L>> {
     #[inline(always)]
     pub fn store(&self) -> TriangleLanes<Rows> {
         let [a, b, c] = self.corners;
-        TriangleLanes { corners: [rows(a), rows(b), rows(c)], normal: rows(self.normal) }
+        TriangleLanes { corners: [a.store(), b.store(), c.store()], normal: self.normal.store() }
     }
 }
 
@@ -105,10 +105,9 @@ impl TriangleLanes<Rows> {
     /// The triangle in `lane` before many rays.
     #[inline(always)]
     pub fn splat<F: Floats>(&self, lane: usize) -> TriangleLanes<Vec3Lanes<F>> {
-        let [a, b, c] = &self.corners;
         TriangleLanes {
-            corners: [in_all(a, lane), in_all(b, lane), in_all(c, lane)],
-            normal: in_all(&self.normal, lane),
+            corners: splat_corners(&self.corners, lane),
+            normal: Vec3Lanes::splat_lane(&self.normal, lane),
         }
     }
 }
@@ -118,8 +117,8 @@ impl<L: Lanes> TrianglesSeen<Vec3Lanes<L>, L> {
     pub fn store(&self) -> TrianglesSeen<Rows, [f32; LANES]> {
         let [a, b, c] = self.corners;
         TrianglesSeen {
-            corners: [rows(a), rows(b), rows(c)],
-            normal: rows(self.normal),
+            corners: [a.store(), b.store(), c.store()],
+            normal: self.normal.store(),
             away: self.away.store(),
         }
     }
@@ -129,23 +128,17 @@ impl TrianglesSeen<Rows, [f32; LANES]> {
     /// The triangle in `lane` before many rays.
     #[inline(always)]
     pub fn splat<F: Floats>(&self, lane: usize) -> TrianglesSeen<Vec3Lanes<F>, F> {
-        let [a, b, c] = &self.corners;
         TrianglesSeen {
-            corners: [in_all(a, lane), in_all(b, lane), in_all(c, lane)],
-            normal: in_all(&self.normal, lane),
+            corners: splat_corners(&self.corners, lane),
+            normal: Vec3Lanes::splat_lane(&self.normal, lane),
             away: F::splat(self.away[lane]),
         }
     }
 }
 
 #[inline(always)]
-fn rows<L: Lanes>(vector: Vec3Lanes<L>) -> Rows {
-    Vec3Lanes { x: vector.x.store(), y: vector.y.store(), z: vector.z.store() }
-}
-
-#[inline(always)]
-fn in_all<F: Floats>(rows: &Rows, lane: usize) -> Vec3Lanes<F> {
-    Vec3Lanes { x: F::splat(rows.x[lane]), y: F::splat(rows.y[lane]), z: F::splat(rows.z[lane]) }
+fn splat_corners<F: Floats>([a, b, c]: &[Rows; 3], lane: usize) -> [Vec3Lanes<F>; 3] {
+    [Vec3Lanes::splat_lane(a, lane), Vec3Lanes::splat_lane(b, lane), Vec3Lanes::splat_lane(c, lane)]
 }
 
 /// Shares of the three corners in the place where a line of `direction` meets the triangle of `corners`

@@ -153,8 +153,8 @@ impl<L: Lanes, S> PointsBeforePacket<L, S> {
             shape: PhantomData,
             corner: Vec3Lanes::splat(block.corner()).minus(packet.wide.origin()),
             rays,
-            offset: [offset.x.store(), offset.y.store(), offset.z.store()],
-            normal: [normal.x.store(), normal.y.store(), normal.z.store()],
+            offset: offset.store(),
+            normal: normal.store(),
             radius: block.radii::<L>().store(),
         }
     }
@@ -173,8 +173,8 @@ impl<L: Lanes, S: Shape> BeforePacket<L> for PointsBeforePacket<L, S> {
     #[inline(always)]
     fn intersect(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask) {
         let point = PointLanes {
-            center: self.corner.plus(splat(&self.offset, lane)),
-            normal: splat(&self.normal, lane),
+            center: self.corner.plus(Vec3Lanes::splat_lane(&self.offset, lane)),
+            normal: Vec3Lanes::splat_lane(&self.normal, lane),
             radius: L::Wide::splat(self.radius[lane]),
         };
         S::intersect(&point, &self.rays)
@@ -246,9 +246,4 @@ impl<L: Lanes> BeforePacket<L> for TrianglesBeforePacket<L> {
         };
         seen.intersect(&self.lines)
     }
-}
-
-#[inline(always)]
-fn splat<F: Floats>([x, y, z]: &[[f32; LANES]; 3], lane: usize) -> Vec3Lanes<F> {
-    Vec3Lanes { x: F::splat(x[lane]), y: F::splat(y[lane]), z: F::splat(z[lane]) }
 }
