@@ -83,7 +83,7 @@ export function pointAtDepth(camera, size, x, y, depth) {
 }
 
 /** East and north for a world with this up, the directions from which the sun's azimuth counts. */
-export function groundAxes(up) {
+function groundAxes(up) {
   const axis = Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0];
   const east = normalize(addScaled(axis, up, -dot(axis, up)));
   return { east, north: cross(up, east) };
@@ -179,7 +179,7 @@ export function withViewAngle(camera, view_angle) {
 }
 
 /** Directions of view of the six sides, with what is up in their pictures. */
-export function sideAxes(side, up) {
+function sideAxes(side, up) {
   const { east, north } = groundAxes(up);
   const sides = {
     front: [north, up], back: [scale(north, -1), up], left: [east, up], right: [scale(east, -1), up],

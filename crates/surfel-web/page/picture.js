@@ -1,5 +1,8 @@
 // The picture on the screen: decodes what comes, draws the newest, asks for the size that the window has.
 
+/** Until the server tells its own limit: a larger picture might be refused. */
+const CAUTIOUS_PIXELS = 2_000_000;
+
 export class Picture {
   #context;
   #next = null;
@@ -20,7 +23,7 @@ export class Picture {
   /** Asks for as many pixels as the screen has, or as the server allows. */
   resize() {
     const { clientWidth, clientHeight } = this.canvas;
-    const most = this.viewer.info?.limits.max_pixels ?? Infinity;
+    const most = this.viewer.info?.limits.max_pixels ?? CAUTIOUS_PIXELS;
     const size = pictureSize(clientWidth, clientHeight, window.devicePixelRatio, most);
     const { canvas } = this;
     if (size.width !== canvas.width || size.height !== canvas.height) {

@@ -44,8 +44,8 @@ export function prepareSaveDialog(viewer) {
     show(true, 'Rendering');
     abort = new AbortController();
     const progress = ({ done, left_secs }) => {
-      bar.value = done;
-      note.textContent = left_secs === null ? 'Rendering' : `Rendering, ${duration(left_secs)} left`;
+      if (typeof done === 'number') bar.value = done;
+      note.textContent = typeof left_secs === 'number' ? `Rendering, ${duration(left_secs)} left` : 'Rendering';
     };
     try {
       const { blob } = await viewer.ask({ type: 'save', ...size }, { progress, abort: abort.signal });

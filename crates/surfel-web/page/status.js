@@ -3,25 +3,40 @@
 import { element } from './dom.js';
 import { count, duration, rounded } from './format.js';
 
+/** Work that is done so soon is not worth a word. */
+const SHORT_WORK_MS = 150;
+
 export function followStatus(viewer) {
   const bar = document.getElementById('work-bar');
   const work = document.getElementById('work-text');
   const numbers = document.getElementById('numbers');
   let isWorking = false;
+  let waiting = 0;
+  let news = null;
 
-  viewer.workChanged.listen(({ text, done, left_secs }) => {
-    isWorking = text !== null;
-    const left = typeof left_secs === 'number' ? `, ${duration(left_secs)} left` : '';
-    work.textContent = isWorking ? text + left : '';
-    bar.hidden = !isWorking;
+  const showWork = () => {
+    waiting = 0;
+    const { text, done, left_secs } = news;
+    work.textContent = typeof left_secs === 'number' ? `${text}, ${duration(left_secs)} left` : text;
+    bar.hidden = false;
     if (typeof done === 'number') bar.value = done;
     else bar.removeAttribute('value');
-  });
-  viewer.connectionChanged.listen(({ isConnected }) => {
-    if (isConnected) return;
+  };
+  const endWork = () => {
+    clearTimeout(waiting);
+    waiting = 0;
+    isWorking = false;
     work.textContent = '';
     bar.hidden = true;
+  };
+  viewer.workChanged.listen((message) => {
+    news = message;
+    if (message.text === null) endWork();
+    else if (!isWorking) waiting = setTimeout(showWork, SHORT_WORK_MS);
+    else if (!waiting) showWork();
+    isWorking = message.text !== null;
   });
+  viewer.connectionChanged.listen(({ isConnected }) => isConnected || endWork());
   viewer.frameShown.listen(() => {
     if (!isWorking) work.textContent = viewer.lastFrame.finished ? 'finished' : '';
     const { width, height, samples, of_samples } = viewer.lastFrame;
@@ -48,8 +63,8 @@ export function statisticsTable(viewer) {
       ['Rays', `${rounded(stats.mrays_per_s, 3)} million/s`],
       ['Picture', `${stats.width} × ${stats.height}`],
       ['Samples', `${stats.samples} of ${stats.of_samples}`],
-      ['Points', count(stats.n_points)],
-      ['Triangles', count(stats.n_triangles)],
+      ['Points', count(info.points)],
+      ['Triangles', count(info.triangles)],
       ['Processor', `${info.threads} threads, ${info.simd}`],
       ...(info.coordinate_system ? [['Coordinates', info.coordinate_system]] : []),
       ['surfel', info.version],

@@ -107,6 +107,7 @@ export class Viewer {
 
   load(name, text) {
     this.#takesNextCamera = true;
+    this.#patchesUnderway = [];
     this.#connection.send({ type: 'load', id: ++this.#question, name, text });
   }
 
@@ -238,7 +239,7 @@ export class Viewer {
   #receiveError({ id, input, text }) {
     this.#takesNextCamera = false;
     if (input !== undefined) {
-      this.#patchesUnderway = this.#patchesUnderway.filter((underway) => underway.input !== input);
+      this.#patchesUnderway = this.#patchesUnderway.filter((underway) => input < underway.input);
       this.#mergeUnderway();
       this.sceneChanged();
     }
