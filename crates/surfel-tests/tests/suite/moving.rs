@@ -1,6 +1,7 @@
 //! What moves: tracks drive nodes, vertices bend, and an updated scene is the one built anew.
 
 use std::f64::consts::FRAC_PI_2;
+use std::sync::Arc;
 use surfel::flat::{FlatGeometry, FlatScene};
 use surfel::image::Image;
 use surfel::math::{DAffine3, DQuat, DVec3, Vec3, Vec4};
@@ -121,7 +122,7 @@ fn bent_normals(scene: &FlatScene, geometry: usize) -> &[Vec3] {
 }
 
 fn bent_tangents(scene: &FlatScene, geometry: usize) -> &[Vec4] {
-    let FlatGeometry::Mesh(mesh) = &scene.geometries[geometry] else { panic!("no mesh") };
+    let FlatGeometry::Mesh(mesh) = &*scene.geometries[geometry] else { panic!("no mesh") };
     &mesh.tangents
 }
 
@@ -237,7 +238,7 @@ fn tangents_bend_with_their_mesh() {
 fn a_mesh_is_bent_anew_only_in_a_new_pose() {
     let mut graph = skinned();
     let mut flat = FlatScene::new(&seen(graph.clone()), &Silent).unwrap();
-    let FlatGeometry::Mesh(mesh) = &mut flat.geometries[0] else { panic!("no mesh") };
+    let FlatGeometry::Mesh(mesh) = Arc::make_mut(&mut flat.geometries[0]) else { panic!("no mesh") };
     // Known again as long as nobody writes them.
     mesh.normals.fill(Vec3::ONE);
     flat.update(&graph, &Silent).unwrap();
