@@ -1,10 +1,8 @@
 //! What `surfel demo --gallery` adds to the ruin: a ball of points, a knot of triangles, and a scene file
 //! that makes glass, a mirror and gold of them.
 
-use anyhow::Context;
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
-use std::fs;
 use std::path::Path;
 use surfel::math::{DVec3, Vec3};
 use surfel::points::PointCloud;
@@ -28,8 +26,7 @@ pub fn write(folder: &Path, progress: &dyn Progress) -> anyhow::Result<()> {
         progress,
     )?;
     for (name, text) in [("knot.obj", knot()), ("gallery.toml", scene())] {
-        let path = folder.join(name);
-        fs::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
+        surfel_formats::save_text(&folder.join(name), &text)?;
     }
     Ok(())
 }
