@@ -142,7 +142,7 @@ fn forget_what_comes_later(
     sources: &mut BTreeMap<&Path, Source>,
     line: &Line,
 ) -> anyhow::Result<()> {
-    for object in &line.scene.objects {
+    for object in line.scene.objects.iter().filter(|object| 1 < object.files.len()) {
         if is_read_in_turn(object, &line.for_object(&object.name, &object.options)?)? {
             let n_points = |file: &&PathBuf| {
                 sources.get(file.as_path()).map_or(0, |source| n_points(file, source))

@@ -429,6 +429,8 @@ fn options_of_an_object_win_over_those_of_the_scene() {
     assert_ne!(own, plain);
     // Also where the two do not go together, and where what follows `--` is files.
     assert_eq!(shot(&folder, &[&scene("normals_k = 8", "normals_radius = 0.4")]), own);
+    let nearest = shot(&folder, &[&scene("", "normals_k = 8")]);
+    assert_eq!(shot(&folder, &[&scene("normals_radius = 0.4", "normals_k = 8")]), nearest);
     let output = folder.path("own.png");
     let behind = scene("", "normals_radius = 0.4");
     succeed(&[&["render", "-o", &output], &SMALL[..], &["--", &behind]].concat());
