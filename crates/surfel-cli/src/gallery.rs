@@ -142,3 +142,28 @@ seconds = 6
 "##
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+    use surfel::progress::Silent;
+
+    #[test]
+    fn files_are_written_aside_and_take_the_place_of_old_ones() {
+        let folder = std::env::temp_dir().join(format!("surfel-gallery-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let names = ["ball.ply", "knot.obj", "gallery.toml"];
+        for name in names {
+            fs::write(folder.join(name), "old").unwrap();
+            // Another name of the old file, which would change if that were written over.
+            fs::hard_link(folder.join(name), folder.join(format!("{name}.old"))).unwrap();
+        }
+        write(&folder, &Silent).unwrap();
+        for name in names {
+            assert_eq!(fs::read(folder.join(format!("{name}.old"))).unwrap(), b"old", "{name}");
+            assert!(3 < fs::metadata(folder.join(name)).unwrap().len(), "{name}");
+        }
+        fs::remove_dir_all(&folder).unwrap();
+    }
+}
