@@ -1,19 +1,17 @@
 //! `surfel animate`: a film of a scene that moves, frame by frame, or of a turn around anything.
 
 use crate::args::{Global, SceneArgs, Usage};
-use crate::picture::{self, camera_at};
-use crate::report::{Muted, Report};
-use crate::scene_file::{CameraMotion, Line};
-use crate::{dry_run, light};
+use crate::playback::Playback;
+use crate::report::Report;
+use crate::scene_file::Line;
+use crate::{dry_run, picture};
 use anyhow::{Context, anyhow};
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
-use surfel::flat::{FlatLamp, FlatScene};
-use surfel::math::{DQuat, DVec3};
+use surfel::image::Image;
+use surfel::math::DVec3;
 use surfel::progress::Progress;
-use surfel::render::{CpuRenderer, Renderer};
-use surfel::scene::{Camera, Graph, Light, Scene};
-use surfel::trace::Simd;
-use surfel_formats::{Movie, MovieOptions};
+use surfel_formats::{Movie, MovieOptions, Source};
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -66,9 +64,8 @@ pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow
         fingerprint: String::new(),
     };
     args.output.as_deref().map_or(Ok(()), |output| check(output, &options))?;
-    let mut assembly = picture::load(&args.scene, line, global, report)?;
-    options.n_frames = n_frames(args, &assembly.graph, assembly.camera_motion.as_ref())?;
-    assembly.graph.pose(0.0);
+    let assembly = picture::load(&args.scene, line, global, report)?;
+    options.n_frames = n_frames(args, assembly.duration_secs())?;
     let choices = picture::choose(&assembly, &args.scene, report)?;
     let mut resolved = dry_run::scene(&assembly, &choices, &args.scene, line);
     resolved["output"] = serde_json::json!(args.output);
@@ -80,18 +77,13 @@ pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow
     let (Some(output), false) = (&args.output, args.dry_run) else {
         return Ok(crate::report::print(&format!("{resolved:#}"))?);
     };
-    options.fingerprint = fingerprint(&resolved, &args.scene, line);
-    let camera_of = |frame: u32| {
-        let time_secs = f64::from(frame) / args.fps;
-        assembly.graph.pose(time_secs);
-        camera_at(time_secs, &assembly, &choices)
-    };
-    let cameras: Vec<Camera> = (0..options.n_frames).map(camera_of).collect();
-    assembly.graph.pose(0.0);
-    let turn_axis = choices.up.as_dvec3();
-    let scene = picture::describe(assembly, choices, &args.scene, report)?;
-    let mut film = Film::new(scene, args, report)?;
-    options.image = picture::image_options(film.flat.origin, &args.scene);
+    options.fingerprint = fingerprint(&resolved, &args.scene, line, &assembly.sources);
+    let prepared = picture::prepare(assembly, choices, &args.scene, report)?;
+    let settings = picture::settings(&args.scene, output);
+    let mut playback = Playback::new(prepared, settings, report)?;
+    playback.expose(&args.scene, report)?;
+    playback.tell_threads(report);
+    options.image = picture::image_options(playback.flat.origin, &args.scene);
 
     let mut movie = Movie::open(output, &options, args.resume)?;
     if 0 < movie.n_done() {
@@ -104,11 +96,7 @@ pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow
     report.begin("animate", u64::from(options.n_frames));
     for frame in 0..options.n_frames {
         if !movie.has(frame) {
-            let time_secs = f64::from(frame) / args.fps;
-            let turn = args.turntable.map(|seconds| {
-                DQuat::from_axis_angle(turn_axis, std::f64::consts::TAU * time_secs / seconds)
-            });
-            let image = film.frame(time_secs, cameras[frame as usize], turn, report);
+            let image = make_frame(&mut playback, f64::from(frame) / args.fps, args, report);
             let kept = image.and_then(|image| Ok(movie.add(frame, &image)?));
             kept.map_err(|error| with_advice(error, movie.n_done(), options.n_frames))?;
         }
@@ -120,6 +108,22 @@ pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow
     finished.map_err(|error| with_advice(error, n_done, options.n_frames))?;
     report.end_stage();
     Ok(())
+}
+
+fn make_frame(
+    playback: &mut Playback,
+    time_secs: f64,
+    args: &Args,
+    report: &Report,
+) -> anyhow::Result<Image> {
+    let muted = report.muted();
+    playback.seek(time_secs, &muted)?;
+    if let Some(seconds) = args.turntable {
+        playback.turn(TAU * time_secs / seconds);
+    }
+    let rendered = playback.render(&muted);
+    let (image, _) = rendered.with_context(|| format!("at {time_secs:.3} s"))?;
+    Ok(image)
 }
 
 /// Tells that what was made is not lost.
@@ -137,12 +141,11 @@ fn check(output: &Path, options: &MovieOptions) -> anyhow::Result<()> {
     })
 }
 
-fn n_frames(args: &Args, graph: &Graph, camera: Option<&CameraMotion>) -> Result<u32, Usage> {
+fn n_frames(args: &Args, moving_secs: f64) -> Result<u32, Usage> {
     if let Some(frames) = args.frames {
         return Ok(frames);
     }
-    let camera = camera.map_or(0.0, CameraMotion::duration_secs);
-    let duration = graph.animation.duration_secs().max(camera).max(args.turntable.unwrap_or(0.0));
+    let duration = moving_secs.max(args.turntable.unwrap_or(0.0));
     if duration <= 0.0 {
         let text = "nothing moves; give --turntable SECONDS, or --frames for a still film";
         return Err(Usage(text.into()));
@@ -151,86 +154,24 @@ fn n_frames(args: &Args, graph: &Graph, camera: Option<&CameraMotion>) -> Result
 }
 
 /// Changes with all that frames depend on.
-fn fingerprint(resolved: &serde_json::Value, args: &SceneArgs, line: &Line) -> String {
+fn fingerprint(
+    resolved: &serde_json::Value,
+    args: &SceneArgs,
+    line: &Line,
+    sources: &[Source],
+) -> String {
     let objects = line.scene.objects.iter().flat_map(|object| &object.files);
-    let objects = objects.chain(&args.light.environment);
+    let beside = sources.iter().flat_map(|source| &source.beside);
+    let named = objects.chain(&args.light.environment).chain(beside);
     let stamp = |file: &PathBuf| {
         let data = std::fs::metadata(file).ok()?;
         Some((file.clone(), data.len(), data.modified().ok()?))
     };
-    let files: Vec<_> = args.files.iter().chain(objects).map(stamp).collect();
+    let files: Vec<_> = args.files.iter().chain(named).map(stamp).collect();
     let mut scene = resolved.clone();
     scene["info"]["threads"] = serde_json::Value::Null;
     scene["info"]["simd"] = serde_json::Value::Null;
     let text = format!("{} {scene} {files:?}", env!("CARGO_PKG_VERSION"));
     let hash = text.bytes().fold(0, |hash, byte| surfel::math::hash(hash ^ u64::from(byte)));
     format!("{hash:016x}")
-}
-
-/// A scene made ready once, of which each frame moves what moves.
-struct Film<'a> {
-    graph: Graph,
-    flat: FlatScene,
-    /// As they are at the start of a turntable's turn.
-    lights: Vec<Light>,
-    lamps: Vec<FlatLamp>,
-    stops: f32,
-    renderer: CpuRenderer,
-    args: &'a SceneArgs,
-    with_layers: bool,
-}
-
-impl<'a> Film<'a> {
-    fn new(scene: Scene, args: &'a Args, report: &Report) -> anyhow::Result<Self> {
-        let mut flat = FlatScene::new(&scene, report)?;
-        report.end_stage();
-        let renderer = CpuRenderer { simd: Simd::detect() };
-        let settings = picture::settings(&args.scene);
-        let stops = picture::exposure(&renderer, &flat, &settings, &args.scene, report)?;
-        light::expose(&mut flat, stops);
-        picture::tell_threads(&renderer, report);
-        let output = args.output.as_deref().and_then(Path::extension);
-        let mut graph = scene.graph;
-        graph.forget_static();
-        Ok(Self {
-            graph,
-            lights: flat.lights.clone(),
-            lamps: flat.lamps.clone(),
-            stops,
-            flat,
-            renderer,
-            args: &args.scene,
-            with_layers: output.is_some_and(|extension| extension.eq_ignore_ascii_case("exr")),
-        })
-    }
-
-    fn frame(
-        &mut self,
-        time_secs: f64,
-        camera: Camera,
-        turn: Option<DQuat>,
-        report: &Report,
-    ) -> anyhow::Result<surfel::image::Image> {
-        if !self.graph.animation.channels.is_empty() {
-            self.graph.pose(time_secs);
-            self.flat.update(&self.graph, report)?;
-            light::expose_lamps(&mut self.flat.lamps, self.stops);
-            self.lamps.clone_from(&self.flat.lamps);
-        }
-        self.flat.camera = camera;
-        if let Some(turn) = turn {
-            // Camera and light go round together: to turn everything else would move every tree.
-            self.flat.camera = camera.turned(turn);
-            self.flat.lights = self.lights.iter().map(|light| light.turned(turn)).collect();
-            let center = (camera.focal_point - self.flat.origin).as_vec3();
-            self.flat.lamps = self.lamps.iter().map(|lamp| lamp.turned(turn, center)).collect();
-        }
-        let settings = picture::settings(self.args);
-        let settings = surfel::render::Settings { with_layers: self.with_layers, ..settings };
-        let (image, _) = self
-            .renderer
-            .render(&self.flat, &settings, &Muted(report))
-            .with_context(|| format!("at {time_secs:.3} s"))?;
-        Ok(image)
-    }
 }

@@ -1,26 +1,28 @@
 //! From files to a graph: what they hold, side by side, prepared, coloured, of the materials asked for.
 
 use crate::args::{LightKind, SceneArgs};
+use crate::cloud::{graph_of, into_cloud, load, make_points};
 use crate::report::Report;
 use crate::scene_file::{CameraMotion, Line, Motion, Object, is_scene_file};
+use crate::sequence::{Sequence, is_read_in_turn};
 use anyhow::Context;
 use std::borrow::Cow;
+use std::iter::successors;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use surfel::math::Vec3;
-use surfel::points::{self, PointCloud, prepare};
+use surfel::points::PointCloud;
 use surfel::progress::Progress;
-use surfel::scene::color::colorize;
 use surfel::scene::{
-    Channel, Geometry, Graph, Interpolation, Keys, Material, Node, Points, Track, Transform,
+    Channel, Geometry, Graph, Interpolation, Keys, Material, Node, Track, Transform,
 };
 use surfel_formats::{Loaded, Source};
 
 /// What files hold, before it is prepared.
 pub struct Assembly<'a> {
     pub graph: Graph,
-    /// Of all files together.
-    pub source: Source,
+    /// Of each file.
+    pub sources: Vec<Source>,
     pub camera_motion: Option<CameraMotion>,
     args: &'a SceneArgs,
     line: &'a Line,
@@ -32,7 +34,7 @@ pub struct Assembly<'a> {
     object_args: Vec<(SceneArgs, &'a [PathBuf])>,
     /// Of each geometry, the index in `object_args`; none for the scene's own options.
     args_of: Vec<Option<usize>>,
-    sources: Vec<Source>,
+    sequences: Vec<Sequence<'a>>,
 }
 
 /// What an object became.
@@ -52,7 +54,7 @@ impl<'a> Assembly<'a> {
     pub fn load(args: &'a SceneArgs, line: &'a Line, report: &Report) -> anyhow::Result<Self> {
         let mut assembly = Self {
             graph: Graph::default(),
-            source: Source::default(),
+            sources: Vec::new(),
             camera_motion: line.scene.camera_motion.clone(),
             args,
             line,
@@ -60,22 +62,38 @@ impl<'a> Assembly<'a> {
             objects: Vec::new(),
             object_args: Vec::new(),
             args_of: Vec::new(),
-            sources: Vec::new(),
+            sequences: Vec::new(),
         };
         assembly.add_files(report)?;
         for object in &line.scene.objects {
             assembly.add_object(object, report)?;
         }
         for lamp in &line.scene.lamps {
-            let transform = lamp.transform;
-            let node = Node { transform, ..lamp.clone() };
-            assembly.add_moving(node, &line.scene.motions);
+            assembly.add_moving(lamp.clone(), &line.scene.motions);
         }
-        assembly.source = surfel_formats::common_source(&assembly.sources);
         let told = what_is_told(&assembly.graph);
         let names = name_files(&assembly.all_files());
-        report.note(&format!("{names}: {told}, {}", assembly.source.format));
+        report.note(&format!("{names}: {told}, {}", assembly.source().format));
         Ok(assembly)
+    }
+
+    /// Of all files together.
+    pub fn source(&self) -> Source {
+        surfel_formats::common_source(&self.sources)
+    }
+
+    /// Until when something moves.
+    pub fn duration_secs(&self) -> f64 {
+        let camera = self.camera_motion.as_ref().map_or(0.0, CameraMotion::duration_secs);
+        let sequences = self.sequences.iter().map(Sequence::duration_secs);
+        sequences.fold(self.graph.animation.duration_secs().max(camera), f64::max)
+    }
+
+    /// Whether a node of the graph, or one that it hangs on, moves.
+    pub fn moves(&self, node: usize) -> bool {
+        let above = successors(Some(node), |node| self.graph.nodes[*node].parent);
+        let channels = &self.graph.animation.channels;
+        above.into_iter().any(|node| channels.iter().any(|channel| channel.node == node))
     }
 
     fn all_files(&self) -> Vec<PathBuf> {
@@ -92,9 +110,11 @@ impl<'a> Assembly<'a> {
             self.args.files.iter().filter(|file| !is_scene_file(file)).collect();
         for &file in &files {
             let (graph, source) = load(file, self.args, report)?;
-            match into_cloud(graph, self.args.material.of_file(file).is_some()) {
+            self.sources.push(source.clone());
+            let is_alone = self.args.material.of_file(file).is_some();
+            match if is_alone { Err(graph) } else { into_cloud(graph) } {
                 Ok(cloud) => {
-                    merging.push(Loaded { cloud, source: source.clone() });
+                    merging.push(Loaded { cloud, source });
                     merged_files.push(file.clone());
                 }
                 Err(graph) => {
@@ -102,7 +122,6 @@ impl<'a> Assembly<'a> {
                     self.files.push((file.clone(), nodes));
                 }
             }
-            self.sources.push(source);
         }
         if merging.is_empty() {
             return Ok(());
@@ -137,7 +156,7 @@ impl<'a> Assembly<'a> {
             // The same file made in the same way: held once.
             self.graph.add_copy(self.objects[twin].content.clone(), node);
         } else {
-            let args = line.for_object(&object.name, &object.look.options)?;
+            let args = line.for_object(&object.name, &object.options)?;
             self.object_args.push((args, &object.files));
             self.add_content(node, object, report)?;
         }
@@ -152,14 +171,22 @@ impl<'a> Assembly<'a> {
     }
 
     /// Puts what an object's files hold under its node.
-    fn add_content(&mut self, node: usize, object: &Object, report: &Report) -> anyhow::Result<()> {
+    fn add_content(
+        &mut self,
+        node: usize,
+        object: &'a Object,
+        report: &Report,
+    ) -> anyhow::Result<()> {
         let object_args = self.object_args.len() - 1;
+        if is_read_in_turn(object, &self.object_args[object_args].0)? {
+            return self.add_sequence(node, object, report);
+        }
         let mut merging = Vec::new();
         for (file_idx, file) in object.files.iter().enumerate() {
             let (graph, source) = load(file, &self.object_args[object_args].0, report)?;
             self.sources.push(source.clone());
             if object.is_merged {
-                let Ok(cloud) = into_cloud(graph, false) else {
+                let Ok(cloud) = into_cloud(graph) else {
                     anyhow::bail!("{}: is no cloud, and `merge` is for clouds", file.display());
                 };
                 merging.push(Loaded { cloud, source });
@@ -175,6 +202,24 @@ impl<'a> Assembly<'a> {
             let graph = merged(merging, &object.files, report)?;
             self.append_below(node, graph, object_args);
         }
+        Ok(())
+    }
+
+    /// Puts the first file of a sequence of clouds under an object's node; the others come in its place.
+    fn add_sequence(
+        &mut self,
+        node: usize,
+        object: &'a Object,
+        report: &Report,
+    ) -> anyhow::Result<()> {
+        let args = self.line.for_object(&object.name, &object.options)?;
+        let first = &object.files[0];
+        let (graph, source) = load(first, &args, report)?;
+        self.sources.push(source);
+        let above = self.graph.add(Node { parent: Some(node), ..Node::new(file_name(first)) });
+        self.append_below(above, graph, self.object_args.len() - 1);
+        let geometry = self.graph.geometries.len() - 1;
+        self.sequences.push(Sequence::new(&object.files, object.fps, args, geometry));
         Ok(())
     }
 
@@ -265,18 +310,19 @@ impl<'a> Assembly<'a> {
     }
 
     /// Prepares and colours all clouds, and gives everything its material.
-    pub fn make(mut self, up: Vec3, report: &Report) -> anyhow::Result<Graph> {
+    pub fn make(mut self, up: Vec3, report: &Report) -> anyhow::Result<(Graph, Vec<Sequence<'a>>)> {
         let mut geometries = std::mem::take(&mut self.graph.geometries);
         for (geometry, object_args) in geometries.iter_mut().zip(&self.args_of) {
             if let Geometry::Points(points) = geometry {
                 let (args, files) = self.args(*object_args);
-                make_points(points, args, self.args.picture.seed, up, report)
-                    .with_context(|| name_files(files))?;
+                let cloud = std::mem::take(&mut points.cloud);
+                let made = make_points(cloud, args, up, report);
+                *points = made.with_context(|| name_files(files))?;
             }
         }
         self.graph.geometries = geometries;
         self.give_materials()?;
-        Ok(self.graph)
+        Ok((self.graph, self.sequences))
     }
 
     fn give_materials(&mut self) -> anyhow::Result<()> {
@@ -296,25 +342,20 @@ impl<'a> Assembly<'a> {
             }
         }
         let has_lamps = graph.nodes.iter().any(|node| node.lamp.is_some());
-        if args.light.has(LightKind::None) && !has_lamps {
-            let lit = graph.materials.iter_mut().filter(|material| **material == Material::MATTE);
-            lit.for_each(|material| material.is_unlit = true);
+        let is_dark = args.light.has(LightKind::None) && args.light.environment.is_none();
+        if is_dark && !has_lamps {
+            let black = graph.materials.iter_mut().filter(|material| needs_light(material));
+            black.for_each(|material| material.is_unlit = true);
         }
         Ok(())
     }
 }
 
-fn load(file: &Path, args: &SceneArgs, report: &Report) -> anyhow::Result<(Graph, Source)> {
-    let columns = args.preparation.columns(args.color.color.as_ref());
-    let options = args.preparation.load_options(columns);
-    let loaded = if args.preparation.vertices {
-        let Loaded { cloud, source } = surfel_formats::load(file, &options, report)?;
-        (Graph::of(Geometry::Points(of_cloud(cloud)), Material::MATTE), source)
-    } else {
-        surfel_formats::load_graph(file, &options, report)?
-    };
-    report.end_stage();
-    Ok(loaded)
+/// Whether something is black without light: it neither shines nor shows what is around or behind it.
+fn needs_light(material: &Material) -> bool {
+    let reflects = 0.5 < material.metallic && material.roughness < 1.0;
+    let shines = 0.0 < material.glow || material.emissive != Vec3::ZERO;
+    !reflects && !shines && material.transmission == 0.0
 }
 
 /// Clouds as one, whose points lie among each other.
@@ -323,61 +364,9 @@ fn merged(clouds: Vec<Loaded>, files: &[PathBuf], report: &Report) -> anyhow::Re
     if cloud.is_empty() {
         return Err(surfel::Error::EmptyCloud).context(name_files(files));
     }
-    let mut graph = Graph::of(Geometry::Points(of_cloud(cloud)), Material::MATTE);
+    let mut graph = graph_of(cloud);
     graph.nodes[0].name = file_name(&files[0]);
     Ok(graph)
-}
-
-fn of_cloud(cloud: PointCloud) -> Points {
-    Points { cloud, ..Points::default() }
-}
-
-/// The cloud of a graph that holds nothing else and is not to stand alone.
-fn into_cloud(mut graph: Graph, is_alone: bool) -> Result<PointCloud, Graph> {
-    let is_in_place = matches!(&graph.nodes[..], [node] if node.transform == Transform::IDENTITY);
-    let is_cloud = matches!(graph.geometries[..], [Geometry::Points(_)]);
-    if is_alone || !is_cloud || !is_in_place {
-        return Err(graph);
-    }
-    match graph.geometries.pop() {
-        Some(Geometry::Points(points)) => Ok(points.cloud),
-        _ => Err(graph),
-    }
-}
-
-fn make_points(
-    points: &mut Points,
-    args: &SceneArgs,
-    seed: u64,
-    up: Vec3,
-    report: &Report,
-) -> anyhow::Result<()> {
-    let cloud = std::mem::take(&mut points.cloud);
-    let preparation = args.preparation.preparation(seed, args.color.color.as_ref());
-    let (cloud, prepared) = prepare(cloud, &preparation, report)?;
-    report.end_stage();
-    tell_prepared(&prepared, args, report);
-    let report = report.with_flag("--color, --cmap, --range");
-    let colors = colorize(&cloud, &args.color.coloring(up), &report)?;
-    *points = Points {
-        cloud,
-        colors,
-        surface: args.surface.surface,
-        boundary: args.surface.boundary,
-        has_outward_normals: args.preparation.orients_outward(),
-    };
-    Ok(())
-}
-
-fn tell_prepared(prepared: &points::Report, args: &SceneArgs, report: &Report) {
-    if prepared.normals.is_none() {
-        report.choice("normals as in the file", "--normals-k");
-    }
-    args.preparation.tell_normals(prepared, report);
-    if prepared.radii.is_none() {
-        report.choice("radii as in the file", "--radius");
-    }
-    args.preparation.tell_radii(prepared, report);
 }
 
 fn what_is_told(graph: &Graph) -> String {

@@ -36,7 +36,7 @@ pub fn scene(assembly: &Assembly, choices: &Choices, args: &SceneArgs, line: &Li
         "surface": args.surface.surface.name(),
         "boundary": format!("{:?}", args.surface.boundary).to_lowercase(),
         "up": choices.up.to_array(),
-        "camera": camera(choices),
+        "camera": camera(assembly, choices, args),
         "exposure": match args.light.exposure {
             Exposure::Auto => json!("auto"),
             Exposure::Stops(stops) => json!(stops),
@@ -119,8 +119,13 @@ pub fn in_full(file: &Path) -> String {
     absolute(file).unwrap_or_else(|_| file.to_owned()).display().to_string()
 }
 
-fn camera(choices: &Choices) -> Value {
-    let camera = &choices.camera;
+/// Where it stands, or by its name if it is one of a file that moves.
+fn camera(assembly: &Assembly, choices: &Choices, args: &SceneArgs) -> Value {
+    let camera = &choices.eye.camera;
+    if let Some(node) = choices.eye.node.filter(|node| assembly.moves(*node)) {
+        let name = &assembly.graph.nodes[node].name;
+        return json!({ "name": name, "view_angle": args.camera.camera_view_angle });
+    }
     let (name, value) = match camera.projection {
         Projection::Perspective { view_angle_deg } => ("view_angle", json!(view_angle_deg)),
         Projection::Orthographic { height } => ("orthographic", json!(height)),

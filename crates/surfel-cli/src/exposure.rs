@@ -1,7 +1,7 @@
 //! Automatic exposure: a small preview tells how bright the cloud's brightest parts come out.
 
-use crate::report::Muted;
 use surfel::flat::FlatScene;
+use surfel::progress::Progress;
 use surfel::render::{Renderer, Settings};
 
 /// Linear value that the brightest parts get: below white, which leaves highlights their shape.
@@ -18,7 +18,7 @@ pub fn automatic(
     renderer: &dyn Renderer,
     scene: &FlatScene,
     settings: &Settings,
-    muted: &Muted,
+    progress: &dyn Progress,
 ) -> surfel::Result<f32> {
     let height = u64::from(WIDTH) * u64::from(settings.height) / u64::from(settings.width);
     let preview = Settings {
@@ -28,7 +28,7 @@ pub fn automatic(
         with_layers: false,
         ..*settings
     };
-    let (image, _) = renderer.render(scene, &preview, muted)?;
+    let (image, _) = renderer.render(scene, &preview, progress)?;
     let covered = image.color.iter().zip(&image.coverage).filter(|(_, c)| 0.0 < **c);
     // The strongest channel, not luminance: a meadow whose green is cut off turns to neon.
     Ok(stops(covered.map(|([r, g, b, _], _)| r.max(*g).max(*b)).collect()))

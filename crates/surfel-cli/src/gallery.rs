@@ -1,10 +1,8 @@
 //! What `surfel demo --gallery` adds to the ruin: a ball of points, a knot of triangles, and a scene file
 //! that makes glass, a mirror and gold of them.
 
-use anyhow::Context;
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
-use std::fs;
 use std::path::Path;
 use surfel::math::{DVec3, Vec3};
 use surfel::points::PointCloud;
@@ -28,8 +26,7 @@ pub fn write(folder: &Path, progress: &dyn Progress) -> anyhow::Result<()> {
         progress,
     )?;
     for (name, text) in [("knot.obj", knot()), ("gallery.toml", scene())] {
-        let path = folder.join(name);
-        fs::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
+        surfel_formats::save_text(&folder.join(name), &text)?;
     }
     Ok(())
 }
@@ -144,4 +141,29 @@ kind = "orbit"
 seconds = 6
 "##
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+    use surfel::progress::Silent;
+
+    #[test]
+    fn files_are_written_aside_and_take_the_place_of_old_ones() {
+        let folder = std::env::temp_dir().join(format!("surfel-gallery-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let names = ["ball.ply", "knot.obj", "gallery.toml"];
+        for name in names {
+            fs::write(folder.join(name), "old").unwrap();
+            // Another name of the old file, which would change if that were written over.
+            fs::hard_link(folder.join(name), folder.join(format!("{name}.old"))).unwrap();
+        }
+        write(&folder, &Silent).unwrap();
+        for name in names {
+            assert_eq!(fs::read(folder.join(format!("{name}.old"))).unwrap(), b"old", "{name}");
+            assert!(3 < fs::metadata(folder.join(name)).unwrap().len(), "{name}");
+        }
+        fs::remove_dir_all(&folder).unwrap();
+    }
 }

@@ -11,7 +11,7 @@ use surfel_formats::{LoadOptions, Loaded, TextColumn};
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Point clouds.
+    /// Point clouds, meshes and glTF scenes.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// JSON instead of a table: one object a file, in an array if there are several.
@@ -54,7 +54,7 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel::Result<Val
     let corner =
         |corner: Vec3| (!cloud.is_empty()).then(|| (cloud.origin + corner.as_dvec3()).to_array());
     let distance = if cloud.is_empty() { 0.0 } else { spacing(&cloud.positions, report)? };
-    let up = guess_up(cloud, is_georeferenced(cloud, source));
+    let up = guess_up(cloud, is_georeferenced(cloud, std::slice::from_ref(source)));
     Ok(json!({
         "file": file.display().to_string(),
         "format": source.format,

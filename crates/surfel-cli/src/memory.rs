@@ -2,21 +2,30 @@
 
 use crate::args::Global;
 use anyhow::bail;
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::Path;
 use surfel::flat::PointBlock;
 use surfel::math::LANES;
 use surfel::points::Select;
+use surfel::scene::Graph;
 use surfel_formats::Source;
 
 /// What is known of a picture before it is made.
 pub struct Plan {
-    pub n_points: u64,
-    pub n_selected: u64,
-    pub n_pixels: u64,
+    n_points: u64,
+    n_selected: u64,
+    n_triangles: u64,
+    n_texels: u64,
+    n_pixels: u64,
 }
 
 /// Position, normal, radius, colour and intensity as they are loaded or made.
 const COLUMNS: u64 = 12 + 12 + 4 + 6 + 4;
+/// Corners of a triangle, with position, normal and texture coordinates of about a vertex, as loaded.
+const TRIANGLE: u64 = 12 + 12 + 12 + 8;
+/// Tree and corners of a triangle.
+const FLAT_TRIANGLE: u64 = 42;
+const TEXEL: u64 = 4;
 /// A pixel with all its layers.
 const PIXEL: u64 = 16 + 52;
 /// Bytes of an average line of text, where a file does not tell how many there are.
@@ -24,45 +33,73 @@ const LINE: u64 = 30;
 
 impl Plan {
     /// From the headers of files, without reading their points.
-    pub fn new(
-        sources: &[Source],
-        files: &[PathBuf],
-        select: Option<Select>,
-        n_pixels: u64,
-    ) -> Self {
-        let by_size = |file: &PathBuf| std::fs::metadata(file).map_or(0, |data| data.len() / LINE);
-        let n_points =
-            |(source, file): (&Source, &PathBuf)| source.n_points.unwrap_or_else(|| by_size(file));
-        let n_points = sources.iter().zip(files).map(n_points).sum();
-        Self { n_points, n_selected: selected(n_points, select), n_pixels }
+    pub fn new(sources: &BTreeMap<&Path, Source>, select: Option<Select>, n_pixels: u64) -> Self {
+        let clouds = sources.iter().filter(|(_, source)| source.n_triangles.is_none());
+        let n_points = sum(clouds.map(|(file, source)| (n_points(file, source), 1)));
+        let triangles = sources.values().filter_map(|source| source.n_triangles);
+        let n_triangles = sum(triangles.map(|n| (n, 1)));
+        let n_selected = selected(n_points, select);
+        Self { n_points, n_selected, n_triangles, n_texels: 0, n_pixels }
     }
 
-    /// Columns, flat form and what building it takes beside, picture.
+    /// From what was read, where textures are known, too.
+    pub fn of(graph: &Graph, select: Option<Select>, n_pixels: u64) -> Self {
+        let (n_points, n_triangles) = graph.counts();
+        let (n_points, n_triangles) = (n_points as u64, n_triangles as u64);
+        let n_texels = graph.textures.iter().map(|texture| texture.texels.len() as u64).sum();
+        let n_selected = selected(n_points, select);
+        Self { n_points, n_selected, n_triangles, n_texels, n_pixels }
+    }
+
+    /// What was read, flat form and what building it takes beside, picture.
     fn bytes(&self) -> [u64; 3] {
-        let flat = (size_of::<PointBlock>() / LANES + size_of::<u32>()) as u64 + 5;
-        let columns = self.n_points.saturating_mul(COLUMNS);
-        [columns, self.n_selected.saturating_mul(flat) / 2 * 5, self.n_pixels * PIXEL]
+        let point = (size_of::<PointBlock>() / LANES + size_of::<u32>()) as u64 + 5;
+        let meshes = sum([(self.n_triangles, TRIANGLE), (self.n_texels, TEXEL)]);
+        let read = sum([(self.n_points, COLUMNS), (meshes, 1)]);
+        let trees = sum([(self.n_selected, point), (self.n_triangles, FLAT_TRIANGLE)]);
+        // Vertices and textures stand in the flat form as they were read.
+        let flat = sum([(trees / 2, 5), (meshes, 1)]);
+        [read, flat, sum([(self.n_pixels, PIXEL)])]
     }
 
     pub fn check(&self, global: &Global) -> anyhow::Result<()> {
         let Some(limit) = global.memory_limit else { return Ok(()) };
-        let [columns, flat, picture] = self.bytes();
-        let all = columns.saturating_add(flat).saturating_add(picture);
+        let [read, flat, picture] = self.bytes();
+        let all = sum([(read, 1), (flat, 1), (picture, 1)]);
         if limit < all {
+            let things = [(self.n_points, "points"), (self.n_triangles, "triangles")];
+            let there = things.iter().filter(|(count, _)| 0 < *count);
+            let things: Vec<String> =
+                there.map(|(count, name)| format!("{count} {name}")).collect();
+            let fewer = match self.n_points / 4 {
+                0 => String::new(),
+                fewer => format!("take fewer points with --select random:{fewer} or "),
+            };
             bail!(
-                "{} points need about {} of memory ({} columns, {} tree, {} picture), and \
-                 --memory-limit is {}; take fewer points with --select random:{} or raise the limit",
-                self.n_points,
+                "{} need about {} of memory ({} as read, {} tree, {} picture), and \
+                 --memory-limit is {}; {fewer}raise the limit",
+                things.join(" and "),
                 readable(all),
-                readable(columns),
+                readable(read),
                 readable(flat),
                 readable(picture),
                 readable(limit),
-                (self.n_points / 4).max(1),
             );
         }
         Ok(())
     }
+}
+
+/// So many things of so many bytes each; headers may claim any number.
+fn sum(things: impl IntoIterator<Item = (u64, u64)>) -> u64 {
+    let bytes = things.into_iter().map(|(count, each)| count.saturating_mul(each));
+    bytes.fold(0, u64::saturating_add)
+}
+
+/// What a file says, or about what one of its size has.
+pub fn n_points(file: &Path, source: &Source) -> u64 {
+    let by_size = || std::fs::metadata(file).map_or(0, |data| data.len() / LINE);
+    source.n_points.unwrap_or_else(by_size)
 }
 
 fn selected(n_points: u64, select: Option<Select>) -> u64 {

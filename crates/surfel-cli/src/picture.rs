@@ -2,34 +2,34 @@
 
 use crate::args::{Exposure, Global, SceneArgs, Usage};
 use crate::assemble::{Assembly, name_files};
+use crate::eye::{Eye, keep_camera};
 use crate::light::{self, Lit};
-use crate::memory::Plan;
+use crate::memory::{Plan, n_points};
+use crate::playback::{Playback, Prepared};
 use crate::render::Args;
-use crate::report::{Muted, Report};
+use crate::report::Report;
 use crate::scene_file::{Line, is_scene_file};
+use crate::sequence::is_read_in_turn;
 use crate::stats::{Run, Seconds};
 use crate::{dry_run, exposure, stats};
 use anyhow::bail;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use surfel::flat::FlatScene;
 use surfel::math::{DVec3, Vec3};
 use surfel::points::SURFACE_VARIATION;
 use surfel::progress::Progress;
-use surfel::render::{CpuRenderer, Renderer, Settings};
+use surfel::render::{CpuRenderer, Settings};
 use surfel::scene::color::ColorSource;
-use surfel::scene::{Background, Camera, Light, Scene, usual_bounds};
+use surfel::scene::{Background, Light, Scene, usual_bounds};
 use surfel::surface::SurfaceKind;
-use surfel::trace::Simd;
-use surfel_formats::{Alpha, BitDepth, ImageOptions};
+use surfel_formats::{Alpha, BitDepth, ImageOptions, Source};
 
 /// What was chosen from the data.
 pub struct Choices {
     pub up: Vec3,
-    pub camera: Camera,
-    /// Whether that is a camera of the files, which may move.
-    pub is_of_file: bool,
+    pub eye: Eye,
     pub lights: Vec<Light>,
     pub sun_azimuth_deg: f64,
 }
@@ -44,31 +44,26 @@ pub fn make(
     let start = Instant::now();
     check_output(output)?;
     let mut seconds = Seconds::default();
-    let mut assembly = timed(&mut seconds.load, || load(&args.scene, line, global, report))?;
-    assembly.graph.pose(args.time);
+    let assembly = timed(&mut seconds.load, || load(&args.scene, line, global, report))?;
     let choices = choose(&assembly, &args.scene, report)?;
-    let camera = camera_at(args.time, &assembly, &choices);
-    let scene = timed(&mut seconds.prepare, || describe(assembly, choices, &args.scene, report))?;
-    let scene = Scene { camera, ..scene };
-    let counts = scene.graph.counts();
-    let mut flat = timed(&mut seconds.build, || Ok(FlatScene::new(&scene, report)?))?;
-    drop(scene);
-
-    let renderer = CpuRenderer { simd: Simd::detect() };
-    let with_layers = output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-    let settings = Settings { with_layers, ..settings(&args.scene) };
-    let stops = exposure(&renderer, &flat, &settings, &args.scene, report)?;
-    light::expose(&mut flat, stops);
-    tell_threads(&renderer, report);
-    let (image, rendered) = renderer.render(&flat, &settings, report)?;
+    let prepared = timed(&mut seconds.prepare, || prepare(assembly, choices, &args.scene, report))?;
+    let counts = prepared.scene.graph.counts();
+    let settings = settings(&args.scene, output);
+    let build = || Playback::new(prepared, settings, report);
+    let mut playback = timed(&mut seconds.build, build)?;
+    playback.expose(&args.scene, report)?;
+    playback.tell_threads(report);
+    playback.seek(args.time, report)?;
+    let (image, rendered) = playback.render(report)?;
     report.end_stage();
     report.check()?;
-    let options = image_options(flat.origin, &args.scene);
+    let options = image_options(playback.flat.origin, &args.scene);
     surfel_formats::save_image(output, &image, &options)?;
     if let Some(path) = &args.stats {
         seconds.total = start.elapsed().as_secs_f64();
         let resolution = args.scene.picture.resolution;
-        let run = Run { flat: &flat, counts, seconds, rendered, resolution, simd: renderer.simd };
+        let (flat, simd) = (&playback.flat, playback.simd());
+        let run = Run { flat, counts, seconds, rendered, resolution, simd };
         stats::write(path, &run.json())?;
     }
     Ok(())
@@ -77,15 +72,9 @@ pub fn make(
 /// Prints what would be made, and makes nothing.
 pub fn tell(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow::Result<()> {
     args.output.as_deref().map_or(Ok(()), check_output)?;
-    let mut assembly = load(&args.scene, line, global, report)?;
-    assembly.graph.pose(args.time);
+    let assembly = load(&args.scene, line, global, report)?;
     let choices = choose(&assembly, &args.scene, report)?;
     Ok(crate::report::print(&dry_run::resolved(&assembly, &choices, args, line))?)
-}
-
-pub fn tell_threads(renderer: &CpuRenderer, report: &Report) {
-    let n_threads = rayon::current_num_threads();
-    report.choice(&format!("{n_threads} threads, {}", renderer.simd.name()), "--threads");
 }
 
 /// Fails before the work where the output could not be written after it.
@@ -108,7 +97,7 @@ pub fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> anyhow::Result<T>) -> 
     result
 }
 
-/// Reads all files, if memory suffices and they have what is asked for.
+/// Reads all files, if memory suffices and they have what is asked for, and sets all to second 0.
 pub fn load<'a>(
     args: &'a SceneArgs,
     line: &'a Line,
@@ -117,11 +106,7 @@ pub fn load<'a>(
 ) -> anyhow::Result<Assembly<'a>> {
     let (width, height) = args.picture.resolution;
     let n_pixels = u64::from(width) * u64::from(height);
-    let objects = line.scene.objects.iter().flat_map(|object| &object.files);
-    let files = args.files.iter().filter(|file| !is_scene_file(file)).chain(objects);
-    // Each once: objects of the same file share what it holds.
-    let files: BTreeSet<PathBuf> = files.cloned().collect();
-    let files: Vec<PathBuf> = files.into_iter().collect();
+    let files = files(args, line);
     if files.is_empty() {
         let scenes = name_files(&args.files);
         return Err(Usage(format!("{scenes}: no objects; add an [[object]] with a file")).into());
@@ -129,12 +114,45 @@ pub fn load<'a>(
     let names = line.scene.objects.iter().flat_map(|object| object.names());
     let names: Vec<&Path> = args.files.iter().map(PathBuf::as_path).chain(names).collect();
     args.material.check_names(&names)?;
-    let inspected = files.iter().map(|file| surfel_formats::inspect(file));
-    let sources = inspected.collect::<Result<Vec<_>, _>>()?;
-    Plan::new(&sources, &files, args.preparation.select, n_pixels).check(global)?;
-    let assembly = Assembly::load(args, line, report)?;
+    // All of them: what is missing or no file of its kind is told before the work.
+    let inspected = files.into_iter().map(|file| Ok((file, surfel_formats::inspect(file)?)));
+    let mut sources = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, Source>>>()?;
+    forget_what_comes_later(&mut sources, line)?;
+    let select = args.preparation.select;
+    Plan::new(&sources, select, n_pixels).check(global)?;
+    let mut assembly = Assembly::load(args, line, report)?;
+    Plan::of(&assembly.graph, select, n_pixels).check(global)?;
     check_color(&assembly)?;
+    assembly.graph.pose(0.0);
+    if let Some(name) = &args.camera_name {
+        keep_camera(&mut assembly.graph, name)?;
+    }
     Ok(assembly)
+}
+
+/// Those of the command line and of objects, each once: objects of the same file share what it holds.
+fn files<'a>(args: &'a SceneArgs, line: &'a Line) -> BTreeSet<&'a Path> {
+    let objects = line.scene.objects.iter().flat_map(|object| &object.files);
+    let files = args.files.iter().filter(|file| !is_scene_file(file)).chain(objects);
+    files.map(PathBuf::as_path).collect()
+}
+
+/// Of sequences that are read one by one, leaves the largest.
+fn forget_what_comes_later(
+    sources: &mut BTreeMap<&Path, Source>,
+    line: &Line,
+) -> anyhow::Result<()> {
+    for object in line.scene.objects.iter().filter(|object| 1 < object.files.len()) {
+        if is_read_in_turn(object, &line.for_object(&object.name, &object.options)?)? {
+            let n_points = |file: &&PathBuf| {
+                sources.get(file.as_path()).map_or(0, |source| n_points(file, source))
+            };
+            let largest = object.files.iter().max_by_key(n_points).cloned();
+            let others = object.files.iter().filter(|file| Some(*file) != largest.as_ref());
+            others.for_each(|file| _ = sources.remove(file.as_path()));
+        }
+    }
+    Ok(())
 }
 
 /// Fails before the preparation if no file has the column asked for. The library knows only the columns
@@ -154,7 +172,7 @@ fn check_color(assembly: &Assembly) -> anyhow::Result<()> {
             "{}: no column {color}; --color takes elevation, normal, {SURFACE_VARIATION}, #RRGGBB \
              and what the file has: {}",
             name_files(files),
-            match shown(&assembly.source.columns) {
+            match shown(&assembly.source().columns) {
                 none if none.is_empty() => "only positions".to_owned(),
                 columns => columns.join(", "),
             },
@@ -183,56 +201,34 @@ fn shown(columns: &[String]) -> Vec<&str> {
 /// Up, camera and lights from the options and the data.
 pub fn choose(assembly: &Assembly, args: &SceneArgs, report: &Report) -> anyhow::Result<Choices> {
     let outline = assembly.outline();
-    let up = args.camera.up(&outline, &assembly.source, report);
-    let (width, height) = args.picture.resolution;
-    let of_file = assembly.graph.camera().filter(|_| args.camera.is_automatic());
-    let camera = match of_file {
-        Some((node, camera)) => {
-            let name = &assembly.graph.nodes[node].name;
-            report.choice(&format!("camera `{name}` of the file"), "--camera-position");
-            camera
-        }
-        None => {
-            let aspect = f64::from(width) / f64::from(height);
-            args.camera.camera(&outline, up, aspect, report)
-        }
-    };
+    let up = args.camera.up(&outline, &assembly.sources, report);
+    let motion = assembly.camera_motion.clone();
+    let eye = Eye::choose(&assembly.graph, &outline, up, args, motion, report);
     let bounds = usual_bounds(&outline);
     let diagonal = (bounds.max - bounds.min).length();
     // Points as pixels are shaded by their depth alone.
     let is_shaded = args.surface.surface != SurfaceKind::Points;
-    let lit = Lit { camera, up, diagonal };
+    let lit = Lit { camera: eye.camera, up, diagonal };
     let lights = if is_shaded { light::lights(&args.light, &lit, report)? } else { Vec::new() };
     let sun_azimuth_deg = light::sun_azimuth_deg(&args.light, &lit);
-    let is_of_file = of_file.is_some();
-    Ok(Choices { up, camera, is_of_file, lights, sun_azimuth_deg })
+    Ok(Choices { up, eye, lights, sun_azimuth_deg })
 }
 
-/// The camera as its motion, or that of its node, has it at a time, at which the graph is posed.
-pub fn camera_at(time_secs: f64, assembly: &Assembly, choices: &Choices) -> Camera {
-    let of_file = assembly.graph.camera().filter(|_| choices.is_of_file);
-    let camera = of_file.map_or(choices.camera, |(_, camera)| camera);
-    match &assembly.camera_motion {
-        Some(motion) => motion.at(time_secs, camera, choices.up),
-        None => camera,
-    }
-}
-
-pub fn describe(
-    assembly: Assembly,
+/// Makes all clouds ready for their trees.
+pub fn prepare<'a>(
+    assembly: Assembly<'a>,
     choices: Choices,
     args: &SceneArgs,
     report: &Report,
-) -> anyhow::Result<Scene> {
-    Ok(Scene {
-        graph: assembly.make(choices.up, report)?,
-        lights: choices.lights,
-        background: args.color.background(),
-        camera: choices.camera,
-    })
+) -> anyhow::Result<Prepared<'a>> {
+    let Choices { up, eye, lights, .. } = choices;
+    let (graph, sequences) = assembly.make(up, report)?;
+    let camera = eye.at(0.0, &graph);
+    let scene = Scene { graph, lights, background: args.color.background(), camera };
+    Ok(Prepared { scene, sequences, eye, up })
 }
 
-pub fn settings(args: &SceneArgs) -> Settings {
+pub fn settings(args: &SceneArgs, output: &Path) -> Settings {
     let (width, height) = args.picture.resolution;
     Settings {
         width,
@@ -241,7 +237,7 @@ pub fn settings(args: &SceneArgs) -> Settings {
         light_samples: args.picture.samples,
         max_depth: args.material.max_depth,
         seed: args.picture.seed,
-        with_layers: false,
+        with_layers: output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")),
     }
 }
 
@@ -257,7 +253,7 @@ pub fn exposure(
         Exposure::Stops(stops) => Ok(stops as f32),
         Exposure::Auto if flat.lights.is_empty() && flat.lamps.is_empty() => Ok(0.0),
         Exposure::Auto => {
-            let stops = exposure::automatic(renderer, flat, settings, &Muted(report))?;
+            let stops = exposure::automatic(renderer, flat, settings, &report.muted())?;
             report.choice(&format!("exposure {stops:+.2} stops"), "--exposure");
             Ok(stops)
         }

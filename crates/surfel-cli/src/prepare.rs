@@ -13,7 +13,7 @@ use surfel_formats::{ColumnChoice, Loaded, SaveOptions};
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Point clouds; several make one.
+    /// Point clouds, or meshes and glTF scenes, of which the vertices are taken; several make one.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// The prepared cloud: .ply (all columns), .las or .laz.
@@ -65,9 +65,10 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
 }
 
 fn load(args: &Args, global: &Global, report: &Report) -> anyhow::Result<Loaded> {
-    let inspected = args.files.iter().map(|file| surfel_formats::inspect(file));
-    let sources = inspected.collect::<Result<Vec<_>, _>>()?;
-    Plan::new(&sources, &args.files, args.preparation.select, 0).check(global)?;
+    let inspected =
+        args.files.iter().map(|file| Ok((file.as_path(), surfel_formats::inspect(file)?)));
+    let sources = inspected.collect::<surfel_formats::Result<_>>()?;
+    Plan::new(&sources, args.preparation.select, 0).check(global)?;
     let options = args.preparation.load_options(ColumnChoice::All);
     let (mut loaded, _) = surfel_formats::load_all(&args.files, &options, report)?;
     report.end_stage();

@@ -37,6 +37,11 @@ impl Report {
         self.cancelled.clone()
     }
 
+    /// One that tells nothing, for work that the user need not know of; both are cancelled together.
+    pub fn muted(&self) -> Self {
+        Self { cancelled: self.cancellation(), ..Self::new(Verbosity::Quiet) }
+    }
+
     /// An automatic choice with the flag that makes it.
     pub fn choice(&self, line: &str, flag: &str) {
         self.note(&format!("{line} [{flag}]"));
@@ -141,14 +146,5 @@ pub fn print(line: &str) -> std::io::Result<()> {
     match writeln!(stdout, "{line}").and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         result => result,
-    }
-}
-
-/// Passes on nothing but cancellation, for work that the user need not know of.
-pub struct Muted<'a>(pub &'a Report);
-
-impl Progress for Muted<'_> {
-    fn is_cancelled(&self) -> bool {
-        self.0.is_cancelled()
     }
 }

@@ -110,12 +110,5 @@ pub fn write(path: &Path, stats: &Value) -> anyhow::Result<()> {
     if path == Path::new("-") {
         return report::print(&text).context("stdout cannot be written");
     }
-    // Beside and renamed, so that a full disk destroys no old file.
-    let aside = path.with_added_extension(format!("{}.part", std::process::id()));
-    let written = fs::write(&aside, text + "\n").and_then(|()| fs::rename(&aside, path));
-    if written.is_err() {
-        // Nobody is left to tell if this fails.
-        let _ = fs::remove_file(&aside);
-    }
-    written.with_context(|| format!("{}: cannot be written", path.display()))
+    Ok(surfel_formats::save_text(path, &(text + "\n"))?)
 }

@@ -6,6 +6,8 @@ mod common;
 mod animate;
 #[path = "cli/bench.rs"]
 mod bench;
+#[path = "cli/cameras.rs"]
+mod cameras;
 #[path = "cli/commands.rs"]
 mod commands;
 #[path = "cli/pictures.rs"]

@@ -1,10 +1,17 @@
 //! Outputs are written beside their name and renamed: a failed run leaves no half file and destroys no old one.
 
 use std::fs::{self, File};
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+
+/// Writes a text to a file, which takes the place of an old one once it is whole.
+pub fn save_text(path: &Path, text: &str) -> Result<()> {
+    write_file(path, |writer| {
+        writer.write_all(text.as_bytes()).map_err(|cause| write_failed(path, cause))
+    })
+}
 
 /// Has `write` fill a new file, which then takes the place of `path`.
 ///
@@ -87,7 +94,6 @@ fn create_aside(path: &Path) -> Result<(PathBuf, File)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::io::Write;
 
     #[test]
     fn an_old_file_survives_a_failure_and_nothing_is_left_beside_it() {

@@ -1,7 +1,8 @@
 //! Files that a file names: materials and textures, each read once.
 
+use std::cell::RefCell;
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use surfel::progress::Progress;
 use surfel::scene::Texture;
@@ -9,11 +10,11 @@ use surfel::scene::Texture;
 use crate::input::Input;
 use crate::texture::decode;
 
-/// Where such files are looked for.
-pub(crate) enum Beside<'a> {
-    Folder(&'a Path),
-    /// Nowhere: the file itself is none of the disk.
-    Nowhere,
+/// Where such files are looked for, and which were.
+pub(crate) struct Beside<'a> {
+    /// None if the file itself is none of the disk.
+    pub folder: Option<&'a Path>,
+    wanted: RefCell<Vec<PathBuf>>,
 }
 
 /// The textures that have been read, and what could not be.
@@ -33,7 +34,23 @@ pub(crate) struct Missing {
 
 impl<'a> Beside<'a> {
     pub fn file(path: &'a Path) -> Self {
-        Self::Folder(path.parent().unwrap_or(Path::new("")))
+        Self { folder: Some(path.parent().unwrap_or(Path::new(""))), ..Self::nowhere() }
+    }
+
+    pub fn nowhere() -> Self {
+        Self { folder: None, wanted: RefCell::default() }
+    }
+
+    /// The first of `paths` where there is a file, or the first of all.
+    pub fn choose<'p>(&self, paths: &'p [PathBuf]) -> &'p Path {
+        let path = paths.iter().find(|path| path.is_file()).unwrap_or(&paths[0]);
+        self.wanted.borrow_mut().push(path.clone());
+        path
+    }
+
+    /// Files that were looked for, also those that are not there.
+    pub fn into_wanted(self) -> Vec<PathBuf> {
+        self.wanted.into_inner()
     }
 
     /// The file of this name, or why there is none.
@@ -41,14 +58,13 @@ impl<'a> Beside<'a> {
     /// Programs write the paths of their own machine: where there is nothing, the last part of the
     /// path is looked for in the folder.
     pub fn open(&self, name: &str) -> Result<Input<'static>, String> {
-        let Self::Folder(folder) = self else {
+        let Some(folder) = self.folder else {
             return Err(format!("{name} is a file of its own, and not looked for"));
         };
         let path = name.replace('\\', "/");
         let last = path.rsplit('/').next().unwrap_or_default();
         let paths = [folder.join(&path), folder.join(last)];
-        let there = paths.iter().find(|path| path.is_file());
-        Input::open(there.unwrap_or(&paths[0])).map_err(|error| error.to_string())
+        Input::open(self.choose(&paths)).map_err(|error| error.to_string())
     }
 }
 

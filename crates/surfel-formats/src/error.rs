@@ -36,6 +36,8 @@ pub enum Error {
     Encoder { file: String, program: String, message: String, advice: &'static str },
     #[error("{file}: {n_points} points do not fit in memory; load fewer columns or a smaller part")]
     OutOfMemory { file: String, n_points: u64 },
+    #[error("{file}: has no animation `{wanted}`; there is {known}")]
+    NoAnimation { file: String, wanted: String, known: String },
     #[error("no input file was named; name at least one")]
     NoInput,
     #[error(transparent)]

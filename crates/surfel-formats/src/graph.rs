@@ -23,9 +23,15 @@ pub fn load_graph(
 ) -> Result<(Graph, Source)> {
     let input = Input::open(path)?;
     if gltf::is_gltf(&input) {
-        return gltf::load_gltf(path, progress);
+        return gltf::read(&input, Beside::file(path), options.animation.as_deref(), progress);
     }
-    read(&input, &Beside::file(path), options, progress)
+    read(&input, Beside::file(path), options, progress)
+}
+
+/// Whether [`load_graph`] reads nothing but points from a file, which become one cloud in its place.
+pub fn is_cloud(path: &Path) -> Result<bool> {
+    let input = Input::open(path)?;
+    Ok(!gltf::is_gltf(&input) && !has_triangles(&input)?)
 }
 
 /// Reads the bytes of a file to a graph; `name` stands in messages, and its extension counts.
@@ -39,31 +45,41 @@ pub fn load_graph_bytes(
 ) -> Result<(Graph, Source)> {
     let input = Input::of_bytes(name, bytes);
     if gltf::is_gltf(&input) {
-        return gltf::load_gltf_bytes(name, bytes, progress);
+        return gltf::read(&input, Beside::nowhere(), options.animation.as_deref(), progress);
     }
-    read(&input, &Beside::Nowhere, options, progress)
+    read(&input, Beside::nowhere(), options, progress)
 }
 
 fn read(
     input: &Input,
-    beside: &Beside,
+    beside: Beside,
     options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<(Graph, Source)> {
     progress.check()?;
-    let (model, source) = match format_of(input)? {
-        Format::Ply if ply::has_faces(input)? => ply::read_mesh(input, beside, options, progress)?,
-        Format::Obj if obj::has_faces(input) => obj::read_mesh(input, beside, options, progress)?,
-        Format::Stl => stl::read_mesh(input, options, progress)?,
-        _ => {
-            let Loaded { cloud, source } = read_points(input, options, progress)?;
-            let points = Geometry::Points(Points { cloud, ..Points::default() });
-            return Ok((graph_of(input, vec![(points, Material::MATTE)], Vec::new()), source));
-        }
+    if !has_triangles(input)? {
+        let Loaded { cloud, source } = read_points(input, options, progress)?;
+        let points = Geometry::Points(Points { cloud, ..Points::default() });
+        return Ok((graph_of(input, vec![(points, Material::MATTE)], Vec::new()), source));
+    }
+    let (model, mut source) = match format_of(input)? {
+        Format::Ply => ply::read_mesh(input, &beside, options, progress)?,
+        Format::Obj => obj::read_mesh(input, &beside, options, progress)?,
+        _ => stl::read_mesh(input, options, progress)?,
     };
+    source.beside = beside.into_wanted();
     let parts = model.parts.into_iter();
     let parts = parts.map(|(mesh, material)| (Geometry::Triangles(mesh), material)).collect();
     Ok((graph_of(input, parts, model.textures), source))
+}
+
+fn has_triangles(input: &Input) -> Result<bool> {
+    Ok(match format_of(input)? {
+        Format::Ply => ply::has_faces(input)?,
+        Format::Obj => obj::has_faces(input),
+        Format::Stl => true,
+        Format::Las | Format::Text | Format::Bin => false,
+    })
 }
 
 /// All parts under one node, each with a material of its own.

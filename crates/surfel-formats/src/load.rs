@@ -88,8 +88,7 @@ pub fn merge_loaded(mut parts: Vec<Loaded>, paths: &[PathBuf], progress: &dyn Pr
 pub fn inspect(path: &Path) -> Result<Source> {
     let input = Input::open(path)?;
     if gltf::is_gltf(&input) {
-        // How much it holds is known only once it is read.
-        return Ok(Source { format: "glTF 2.0".into(), ..Source::default() });
+        return gltf::inspect(&input);
     }
     match format_of(&input)? {
         Format::Ply => ply::inspect(&input),
@@ -192,5 +191,6 @@ pub fn common_source(sources: &[Source]) -> Source {
             .filter(|name| sources.iter().all(|source| source.columns.contains(name)))
             .cloned()
             .collect(),
+        beside: sources.iter().flat_map(|source| source.beside.clone()).collect(),
     }
 }

@@ -1,5 +1,7 @@
 //! What to load, and what is known about what was loaded.
 
+use std::path::PathBuf;
+
 use surfel::math::DVec3;
 use surfel::points::PointCloud;
 
@@ -13,6 +15,8 @@ pub struct LoadOptions {
     pub text_columns: Option<Vec<TextColumn>>,
     /// World coordinates of the zero of the positions; chosen from the data if absent.
     pub origin: Option<DVec3>,
+    /// Name of the animation of glTF files that have any; the first if absent.
+    pub animation: Option<String>,
 }
 
 /// Which columns to keep in memory; positions are always kept.
@@ -60,6 +64,8 @@ pub struct Source {
     pub coordinate_system: Option<String>,
     /// Names of the columns in the file.
     pub columns: Vec<String>,
+    /// Further files that it names and that were looked for as it was read: buffers, materials, textures.
+    pub beside: Vec<PathBuf>,
 }
 
 impl ColumnChoice {

@@ -8,8 +8,11 @@ use surfel::points::{PointCloud, guess_up};
 use surfel::scene::{Camera, Framing, Projection, frame, look_around, upright};
 use surfel_formats::Source;
 
+/// Heading of the options.
+pub const CAMERA: &str = "Camera (in the file's own coordinates)";
+
 #[derive(Args)]
-#[command(next_help_heading = "Camera (in the file's own coordinates)")]
+#[command(next_help_heading = CAMERA)]
 pub struct CameraArgs {
     /// Where the camera is; chosen so that the whole cloud is seen if not given.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::vector, allow_hyphen_values = true)]
@@ -20,9 +23,9 @@ pub struct CameraArgs {
     /// What is up in the picture.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::direction, allow_hyphen_values = true)]
     camera_view_up: Option<DVec3>,
-    /// Vertical angle of view in degrees.
-    #[arg(long, value_name = "DEG", default_value = "35", value_parser = parse::number_in::<1, 170>)]
-    camera_view_angle: f64,
+    /// Vertical angle of view in degrees [default: 35, or that of the file's camera].
+    #[arg(long, value_name = "DEG", value_parser = parse::view_angle)]
+    pub camera_view_angle: Option<f64>,
     /// Without perspective; HEIGHT of the picture in the cloud's unit, or all of the cloud.
     #[arg(long, value_name = "HEIGHT", num_args = 0..=1, value_parser = parse::positive)]
     camera_orthographic: Option<Option<f64>>,
@@ -54,19 +57,19 @@ pub struct CameraArgs {
 
 impl CameraArgs {
     /// The world's up, from the option or the cloud.
-    pub fn up(&self, cloud: &PointCloud, source: &Source, report: &Report) -> Vec3 {
+    pub fn up(&self, cloud: &PointCloud, sources: &[Source], report: &Report) -> Vec3 {
         self.up.unwrap_or_else(|| {
-            if source.format.starts_with("glTF") {
+            if sources.iter().all(|source| source.format.starts_with("glTF")) {
                 report.choice("up is +Z, to which glTF files are turned", "--up");
                 return Vec3::Z;
             }
-            let guess = guess_up(cloud, is_georeferenced(cloud, source));
+            let guess = guess_up(cloud, is_georeferenced(cloud, sources));
             report.choice(&guess.reason, "--up");
             guess.up
         })
     }
 
-    /// Whether nothing is asked of the camera.
+    /// Whether nothing is asked of the camera but how wide it sees.
     pub fn is_automatic(&self) -> bool {
         let places = [self.camera_position, self.camera_focal_point, self.camera_view_up];
         places.iter().all(Option::is_none)
@@ -124,11 +127,12 @@ impl CameraArgs {
     }
 
     fn framing(&self, up: Vec3, aspect: f64) -> Framing {
+        let automatic = Framing::automatic(up, aspect);
         Framing {
             up,
             aspect,
             is_orthographic: self.camera_orthographic.is_some(),
-            view_angle_deg: self.camera_view_angle,
+            view_angle_deg: self.camera_view_angle.unwrap_or(automatic.view_angle_deg),
             direction: self.camera_direction,
             view_up: self.camera_view_up,
             azimuth_deg: self.camera_azimuth_angle,
@@ -139,12 +143,15 @@ impl CameraArgs {
 }
 
 /// Survey formats and coordinates far from zero, as those of national grids, have Z up.
-pub fn is_georeferenced(cloud: &PointCloud, source: &Source) -> bool {
-    let is_survey =
-        ["LAS", "LAZ", "COPC", "E57"].iter().any(|name| source.format.starts_with(name));
+pub fn is_georeferenced(cloud: &PointCloud, sources: &[Source]) -> bool {
+    let is_survey = |source: &Source| {
+        let formats = ["LAS", "LAZ", "COPC", "E57"];
+        let is_of_surveyors = formats.iter().any(|name| source.format.starts_with(name));
+        is_of_surveyors || source.coordinate_system.is_some()
+    };
     let size = cloud.bounds().max - cloud.bounds().min;
     let is_far = 1e4 < cloud.origin.length() && f64::from(size.length()) < cloud.origin.length();
-    is_survey || source.coordinate_system.is_some() || is_far
+    is_far || sources.iter().any(is_survey)
 }
 
 /// Few digits, for people.

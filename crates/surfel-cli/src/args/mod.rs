@@ -8,7 +8,7 @@ pub mod parse;
 mod preparation;
 mod scene;
 
-pub use camera::{CameraArgs, is_georeferenced, short};
+pub use camera::{CAMERA, CameraArgs, is_georeferenced, short};
 pub use color::ColorArgs;
 pub use light::{Exposure, LightArgs, LightKind};
 pub use material::{Choice, MaterialArgs};

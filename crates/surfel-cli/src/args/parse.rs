@@ -128,6 +128,12 @@ pub fn number_in<const LOW: i32, const HIGH: i32>(text: &str) -> Result<f64, Str
     number.ok_or_else(|| format!("expected a number from {LOW} to {HIGH}"))
 }
 
+/// Degrees, as wide as a flat picture can be.
+pub fn view_angle(text: &str) -> Result<f64, String> {
+    let angle = text.trim().parse::<f64>().ok().filter(|angle| (1e-6..180.0).contains(angle));
+    angle.ok_or_else(|| "expected degrees above 0 and below 180".into())
+}
+
 /// A positive finite number.
 pub fn positive(text: &str) -> Result<f64, String> {
     let number = text.trim().parse::<f64>().ok();

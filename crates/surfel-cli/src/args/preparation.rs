@@ -1,7 +1,7 @@
 //! Options of the preparation of points.
 
 use crate::report::Report;
-use clap::Args;
+use clap::{ArgAction, Args};
 use surfel::points::neighbors::{Method, Query};
 use surfel::points::{
     self, Orientation, PointCloud, Preparation, Radius, SURFACE_VARIATION, Select,
@@ -32,7 +32,9 @@ pub struct PreparationArgs {
     #[arg(long, value_name = "RADIUS")]
     pub radius: Option<Radius>,
     /// Take the vertices of meshes as points.
-    #[arg(long)]
+    #[arg(long, action = ArgAction::Set, num_args = 0..=1, require_equals = true, value_name = "BOOL",
+        default_value = "false", default_missing_value = "true", hide_default_value = true,
+        hide_possible_values = true)]
     pub vertices: bool,
     /// Columns of a text file, as in x,y,z,-,r,g,b; found out from the file if not given.
     #[arg(long, value_name = "NAMES")]
@@ -58,7 +60,7 @@ impl PreparationArgs {
 
     pub fn load_options(&self, columns: ColumnChoice) -> LoadOptions {
         let text_columns = self.columns.as_deref().map(TextColumn::parse_list);
-        LoadOptions { columns, text_columns, origin: None }
+        LoadOptions { columns, text_columns, ..LoadOptions::default() }
     }
 
     /// Only the columns that a picture of these colours needs.

@@ -1,7 +1,8 @@
 //! All that says what is seen: files or a scene file, and the options of their picture.
 
 use super::{
-    CameraArgs, ColorArgs, LightArgs, MaterialArgs, PictureArgs, PreparationArgs, SurfaceArgs,
+    CAMERA, CameraArgs, ColorArgs, LightArgs, MaterialArgs, PictureArgs, PreparationArgs,
+    SurfaceArgs,
 };
 use clap::Args;
 use std::path::PathBuf;
@@ -18,6 +19,11 @@ pub struct SceneArgs {
     pub surface: SurfaceArgs,
     #[command(flatten)]
     pub camera: CameraArgs,
+    /// Look by the camera of this name in a glTF file [default: the first].
+    #[arg(long, value_name = "NAME", help_heading = CAMERA, conflicts_with_all = ["camera_position",
+        "camera_focal_point", "camera_view_up", "camera_orthographic", "camera_panorama", "camera_direction",
+        "camera_azimuth_angle", "camera_elevation_angle", "camera_zoom_factor"])]
+    pub camera_name: Option<String>,
     #[command(flatten)]
     pub material: MaterialArgs,
     #[command(flatten)]
@@ -26,6 +32,9 @@ pub struct SceneArgs {
     pub color: ColorArgs,
     #[command(flatten)]
     pub preparation: PreparationArgs,
+    /// Play the animation of this name of glTF files that have any [default: the first].
+    #[arg(long, value_name = "NAME", help_heading = "Preparation")]
+    pub animation_name: Option<String>,
 }
 
 impl SceneArgs {

@@ -167,8 +167,8 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
     let source = surfel_formats::inspect(&args.cloud)?;
     // Two rays and what is found along them take a little more than a pixel with its layers.
     let n_pixels = 2 * u64::from(args.resolution.0) * u64::from(args.resolution.1);
-    let files = std::slice::from_ref(&args.cloud);
-    Ok(Plan::new(&[source], files, args.preparation.select, n_pixels))
+    let sources = [(args.cloud.as_path(), source)].into();
+    Ok(Plan::new(&sources, args.preparation.select, n_pixels))
 }
 
 fn describe(args: &Args, file: Option<&CameraFile>, report: &Report) -> anyhow::Result<Described> {
@@ -201,7 +201,7 @@ fn describe(args: &Args, file: Option<&CameraFile>, report: &Report) -> anyhow::
 
 fn camera(args: &Args, outline: &PointCloud, source: &Source, report: &Report) -> Camera {
     let (width, height) = args.resolution;
-    let up = args.camera.up(outline, source, report);
+    let up = args.camera.up(outline, std::slice::from_ref(source), report);
     args.camera.camera(outline, up, f64::from(width) / f64::from(height), report)
 }
 

@@ -126,6 +126,9 @@ impl Fields {
     /// Where something stands: `matrix`, or `translate`, `rotate` and `scale`.
     pub fn transform(&mut self) -> Result<Transform, String> {
         if let Some(numbers) = self.numbers("matrix")? {
+            if let Some(other) = PARTS.into_iter().find(|key| self.map.contains_key(*key)) {
+                return Err(format!("{}: matrix stands alone; leave out {other}", self.name));
+            }
             let rows: Result<[f64; 16], _> = numbers.try_into();
             let Ok(rows) = rows else {
                 return Err(format!("{}: matrix: expected 16 numbers, row by row", self.name));
@@ -162,6 +165,9 @@ impl Fields {
         scale(&value).map(Some).ok_or_else(|| self.error(key, &value, expected))
     }
 }
+
+/// Of a transform.
+const PARTS: [&str; 3] = ["translate", "rotate", "scale"];
 
 /// Lengths and factors stay below: beyond, their squares are no longer finite in f32.
 const LARGEST: f64 = 1e15;

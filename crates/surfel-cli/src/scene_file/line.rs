@@ -4,8 +4,9 @@ use super::options::{Known, is_in};
 use super::{Options, SceneFile, TABLES, is_scene_file, object};
 use crate::Cli;
 use crate::args::{SceneArgs, Usage};
+use crate::assemble::name_files;
 use clap::error::ErrorKind;
-use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
+use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches, Id};
 use serde_json::Value;
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -47,11 +48,15 @@ impl Line {
             }
             let place = place_of_options(&words, name);
             words.splice(place..place, added.into_iter().map(OsString::from));
+            let wrong = |error| Usage(format!("{}: {error}", name_files(&scene_files)));
+            if 1 < scene_files.len() {
+                scene.check_names().map_err(wrong)?;
+            }
         }
         let line = Self { words, files: scene_files, scene };
-        let cli = line.cli(&[])?;
-        for object in line.scene.objects.iter().filter(|object| !object.look.options.is_empty()) {
-            line.for_object(&object.name, &object.look.options)?;
+        let cli = line.cli()?;
+        for object in line.scene.objects.iter().filter(|object| !object.options.is_empty()) {
+            line.for_object(&object.name, &object.options)?;
         }
         Ok((cli, line))
     }
@@ -59,8 +64,12 @@ impl Line {
     /// The scene's options with those of one object put over them.
     pub fn for_object(&self, name: &str, options: &Options) -> anyhow::Result<SceneArgs> {
         let wrong = |error: String| Usage(format!("{}: object `{name}`: {error}", self.names()));
-        let words = options.words(&known_to_objects(&of_objects()), None).map_err(wrong)?;
-        let cli = self.parsed(&words).map_err(|error| wrong(short(&error)))?;
+        let of_objects = of_objects();
+        let words = options.words(&known_to_objects(&of_objects), None).map_err(wrong)?;
+        let alone = of_objects.clone().no_binary_name(true).try_get_matches_from(&words);
+        alone.map_err(|error| wrong(short(&error)))?;
+        let command = overruled_by(&of_objects, command());
+        let cli = self.parsed(command, &words).map_err(|error| wrong(short(&error)))?;
         Ok(cli.into_scene().ok_or_else(|| wrong("no scene".into()))?)
     }
 
@@ -83,8 +92,8 @@ impl Line {
         told.filter_map(|arg| Some((arg.get_long()?.replace('-', "_"), value(arg)?))).collect()
     }
 
-    fn cli(&self, more: &[String]) -> anyhow::Result<Cli> {
-        self.parsed(more).map_err(|error| {
+    fn cli(&self) -> anyhow::Result<Cli> {
+        self.parsed(command(), &[]).map_err(|error| {
             if self.files.is_empty() || error.kind() == ErrorKind::DisplayHelp {
                 error.exit();
             }
@@ -93,13 +102,16 @@ impl Line {
         })
     }
 
-    fn parsed(&self, more: &[String]) -> Result<Cli, clap::Error> {
-        let words = self.words.iter().cloned().chain(more.iter().map(OsString::from));
-        Cli::from_arg_matches(&command().try_get_matches_from(words)?)
+    fn parsed(&self, command: Command, more: &[String]) -> Result<Cli, clap::Error> {
+        let mut words = self.words.clone();
+        // Behind all other options; what follows `--` is files.
+        let end = words.iter().position(|word| word == "--").unwrap_or(words.len());
+        words.splice(end..end, more.iter().map(OsString::from));
+        Cli::from_arg_matches(&command.try_get_matches_from(words)?)
     }
 
     fn names(&self) -> String {
-        crate::assemble::name_files(&self.files)
+        name_files(&self.files)
     }
 }
 
@@ -126,7 +138,7 @@ fn short(error: &clap::Error) -> String {
 fn check_objects(scene: &SceneFile) -> Result<(), String> {
     let command = of_objects();
     for (object_idx, object) in scene.objects.iter().enumerate() {
-        let words = object.look.options.words(&known_to_objects(&command), None);
+        let words = object.options.words(&known_to_objects(&command), None);
         words.map_err(|error| format!("object {}: {error}", object_idx + 1))?;
     }
     Ok(())
@@ -140,6 +152,19 @@ fn known_to_objects(command: &Command) -> Known<'_> {
 fn command() -> Command {
     let overriding = |command: Command| command.args_override_self(true);
     overriding(Cli::command()).mut_subcommands(overriding)
+}
+
+/// One in which of options that do not go together the last one counts, if objects may have them.
+fn overruled_by(of_objects: &Command, command: Command) -> Command {
+    let overriding = |mut command: Command| {
+        for arg in of_objects.get_arguments() {
+            let others = of_objects.get_arg_conflicts_with(arg).into_iter();
+            let others: Vec<Id> = others.map(|other| other.get_id().clone()).collect();
+            command = command.mut_arg(arg.get_id(), |arg| arg.overrides_with_all(others));
+        }
+        command
+    };
+    OF_SCENES.into_iter().fold(command, |command, name| command.mut_subcommand(name, overriding))
 }
 
 /// One with the options that objects may have.

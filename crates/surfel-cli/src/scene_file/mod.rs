@@ -15,7 +15,6 @@ pub use options::Options;
 use crate::args::Usage;
 use anyhow::{Context, anyhow, bail};
 use fields::Fields;
-use lamp::LampSpec;
 use serde_json::Value;
 use std::fs::File;
 use std::io::Read;
@@ -85,7 +84,7 @@ impl SceneFile {
             scene.objects.push(Object::read(object, folder)?);
         }
         for lamp in fields.tables("lamp")? {
-            scene.lamps.push(LampSpec::read(lamp)?);
+            scene.lamps.push(lamp::read(lamp)?);
         }
         for motion in fields.tables("animation")? {
             motion::read(motion, &mut scene)?;
@@ -107,11 +106,6 @@ impl SceneFile {
         TABLES.into_iter().zip(&self.raw).skip(1).filter(|(_, tables)| !tables.is_empty())
     }
 
-    /// Whether there is nothing in it.
-    pub fn is_empty(&self) -> bool {
-        self.options.is_empty() && self.objects.is_empty() && self.lamps.is_empty()
-    }
-
     /// Takes `other` in behind what is here.
     pub fn append(&mut self, other: Self) {
         self.options.append(other.options);
@@ -124,26 +118,46 @@ impl SceneFile {
         self.camera_motion = other.camera_motion.or(self.camera_motion.take());
     }
 
+    /// Fails where a parent or an animation names nothing, or several things.
     fn check_names(&self) -> Result<(), String> {
-        let mut names: Vec<&str> = self.objects.iter().map(|object| object.name.as_str()).collect();
-        for (object_idx, object) in self.objects.iter().enumerate() {
+        let names = self.objects.iter().map(|object| object.name.as_str());
+        let objects: Vec<(String, &str)> = numbered("object", names).collect();
+        for (object, before) in self.objects.iter().zip(0..) {
             let Some(parent) = &object.parent else { continue };
-            if !names[..object_idx].contains(&parent.as_str()) {
-                return Err(format!(
-                    "object `{}`: no object `{parent}` before it to be its parent",
-                    object.name
-                ));
+            let place = format!("object `{}`", object.name);
+            if !is_one_of(&objects[..before], parent, &place)? {
+                return Err(format!("{place}: no object `{parent}` before it to be its parent"));
             }
         }
-        names.extend(self.lamps.iter().map(|lamp| lamp.name.as_str()));
-        for motion in &self.motions {
-            if !names.contains(&motion.object.as_str()) {
-                let nearest = fields::nearest(&motion.object, names.iter().copied());
-                return Err(format!("animation: no object `{}`{nearest}", motion.object));
+        let lamps = numbered("lamp", self.lamps.iter().map(|lamp| lamp.name.as_str()));
+        let all: Vec<(String, &str)> = objects.into_iter().chain(lamps).collect();
+        for Motion { object, .. } in &self.motions {
+            if !is_one_of(&all, object, "animation")? {
+                let nearest = fields::nearest(object, all.iter().map(|(_, name)| *name));
+                return Err(format!("animation: no object `{object}`{nearest}"));
             }
         }
         Ok(())
     }
+}
+
+/// Names with what bears them: `object 1` and so on.
+fn numbered<'n>(
+    kind: &str,
+    names: impl Iterator<Item = &'n str>,
+) -> impl Iterator<Item = (String, &'n str)> {
+    (1..).zip(names).map(move |(number, name)| (format!("{kind} {number}"), name))
+}
+
+/// Whether something bears a name; fails if it cannot be told which of several is meant.
+fn is_one_of(named: &[(String, &str)], wanted: &str, place: &str) -> Result<bool, String> {
+    let bearers = named.iter().filter(|(_, name)| *name == wanted);
+    let bearers: Vec<&str> = bearers.map(|(bearer, _)| bearer.as_str()).collect();
+    if bearers.len() < 2 {
+        return Ok(!bearers.is_empty());
+    }
+    let bearers = bearers.join(" and ");
+    Err(format!("{place}: `{wanted}` is the name of {bearers}; give each one of its own"))
 }
 
 /// In one line, with the place.

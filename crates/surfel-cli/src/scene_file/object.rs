@@ -16,20 +16,14 @@ pub struct Object {
     pub fps: f64,
     /// Whether the files are clouds that together are one.
     pub is_merged: bool,
-    pub look: Look,
+    /// Options of surface, preparation and colour that differ from the scene's.
+    pub options: Options,
+    pub material: Option<Material>,
     pub parent: Option<String>,
     pub transform: Transform,
     /// Further places where the same is seen, in the object's own coordinates; none for once, as it is.
     pub copies: Vec<Transform>,
     pub is_visible: bool,
-}
-
-/// How something is made and what of.
-#[derive(Clone, Debug, Default)]
-pub struct Look {
-    /// Options of surface, preparation and colour that differ from the scene's.
-    pub options: Options,
-    pub material: Option<Material>,
 }
 
 impl Object {
@@ -51,13 +45,13 @@ impl Object {
         let is_visible = fields.flag("visible")?.unwrap_or(true);
         let place = fields.name().to_owned();
         let options = Options::read(fields, folder).map_err(|error| format!("{place}: {error}"))?;
-        let look = Look { options, material };
         Ok(Self {
             name,
             files,
             fps: fps.unwrap_or(10.0),
             is_merged,
-            look,
+            options,
+            material,
             parent,
             transform,
             copies,
@@ -75,13 +69,13 @@ impl Object {
     /// What the command line makes it of: a material named for it, or, if it has none of its own, that for all.
     pub fn choice<'c>(&self, args: &'c MaterialArgs) -> Option<&'c Choice> {
         let named = self.names().find_map(|name| args.of_file(name));
-        let has_own = self.look.material.is_some();
+        let has_own = self.material.is_some();
         named.or_else(|| args.for_all().filter(|_| !has_own))
     }
 
     pub fn material<'m>(&'m self, args: &'m MaterialArgs) -> Option<&'m Material> {
         let asked_for = self.choice(args).map(|choice| &choice.material);
-        asked_for.or(self.look.material.as_ref())
+        asked_for.or(self.material.as_ref())
     }
 
     /// Whether both show the same geometry, at whatever place.
@@ -89,7 +83,7 @@ impl Object {
         let is_at_one_rate = self.files.len() == 1 || self.fps == other.fps;
         self.files == other.files
             && self.is_merged == other.is_merged
-            && self.look.options == other.look.options
+            && self.options == other.options
             && is_at_one_rate
     }
 }

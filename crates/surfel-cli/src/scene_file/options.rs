@@ -6,6 +6,7 @@ use clap::builder::ArgAction;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
 use serde_json::{Map, Value};
+use std::any::TypeId;
 use std::path::{Path, PathBuf};
 
 /// Options by their long names, in the order of the file.
@@ -71,7 +72,8 @@ impl Options {
         words: &mut Vec<String>,
     ) -> Result<(), String> {
         let is_flag = matches!(arg.get_action(), ArgAction::SetTrue | ArgAction::Count);
-        let takes_none = is_flag || arg.get_num_args().is_some_and(|range| range.min_values() == 0);
+        let may_be_bare = arg.get_num_args().is_some_and(|range| range.min_values() == 0);
+        let takes_none = is_flag || (may_be_bare && !takes_bool(arg));
         let several =
             matches!(arg.get_action(), ArgAction::Append) && arg.get_value_delimiter().is_none();
         match value {
@@ -100,6 +102,11 @@ impl Options {
         }
         Ok(())
     }
+}
+
+/// Whether `=false` switches an option off that is on elsewhere.
+fn takes_bool(arg: &Arg) -> bool {
+    arg.get_value_parser().type_id() == TypeId::of::<bool>()
 }
 
 /// Tables in tables are one name: `[camera] position` is `camera-position`.

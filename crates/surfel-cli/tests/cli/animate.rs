@@ -1,6 +1,8 @@
 //! Films: their frames, how they are taken up again, and what moves in them.
 
-use super::common::{Folder, SMALL, command, dome, fail, gltf, read_png, stderr, succeed, tile};
+use super::common::{
+    Folder, SMALL, command, dome, fail, gltf, read_png, square, stderr, succeed, tile,
+};
 use std::fs;
 use std::process::Command;
 
@@ -249,6 +251,25 @@ fn frames_are_the_pictures_at_their_times() {
 }
 
 #[test]
+fn a_picture_at_a_time_is_chosen_as_the_film_is() {
+    let folder = Folder::new();
+    folder.write("dome.ply", dome(20));
+    // It goes away, shrinks and gets dark: camera, sun and exposure are those of the beginning.
+    let scene = "[[object]]\nfile = \"dome.ply\"\n[[animation]]\nobject = \"dome\"\ntimes = [0, 1]\n\
+        translate = [[0, 0, 0], [0.5, 2, 1]]\nscale = [1, 0.2]\n\
+        [[animation]]\nobject = \"camera\"\nkind = \"orbit\"\nseconds = 3\n";
+    let scene = folder.write("scene.toml", scene);
+    let path = folder.path("film.png");
+    film(&[&scene, "-o", &path, "--fps", "2", "--frames", "3"]);
+    let (frames, _) = read_apng(&path);
+    for (time, frame) in ["0", "0.5", "1"].iter().zip(&frames) {
+        let picture = folder.path("at.png");
+        succeed(&[&["render", &scene, "-o", &picture, "--time", time], &SMALL[..]].concat());
+        assert!(&read_png(&picture).3 == frame, "{time}");
+    }
+}
+
+#[test]
 fn the_animation_of_a_gltf_file_plays() {
     let folder = Folder::new();
     let scene = folder.write("triangle.gltf", gltf());
@@ -261,6 +282,33 @@ fn the_animation_of_a_gltf_file_plays() {
     let scene = folder.write("scene.toml", "[[object]]\nfile = \"triangle.gltf\"\n");
     film(&[&scene, "-o", &path, "--fps", "2"]);
     assert!(read_apng(&path).0 == frames);
+}
+
+#[test]
+fn an_animation_of_a_gltf_file_is_chosen_by_its_name() {
+    let folder = Folder::new();
+    let rest = r#"{"name":"rest","samplers":[],"channels":[]}"#;
+    let text =
+        gltf().replace(r#""animations":[{"#, &format!(r#""animations":[{rest},{{"name":"walk","#));
+    let file = folder.write("walker.gltf", text);
+    let at_end =
+        |options: &[&str]| read_shot(&folder, &[&[&file, "--time", "2"], options].concat());
+    let rest = at_end(&[]);
+    assert!(rest == at_end(&["--animation-name", "rest"]));
+    assert!(rest != at_end(&["--animation-name", "walk"]));
+    let told = fail(&["render", &file, "-o", "no.png", "--animation-name", "fly"], 1);
+    assert!(told.contains("`rest`, `walk`"), "{told}");
+    // Two of one file, each in its own way.
+    let object = |name: &str| {
+        format!(
+            "[[object]]\nname = \"{name}\"\nfile = \"walker.gltf\"\nanimation-name = \"{name}\"\n"
+        )
+    };
+    let scene = folder.write("scene.toml", object("rest") + &object("walk"));
+    let path = folder.path("film.png");
+    film(&[&scene, "-o", &path, "--fps", "2"]);
+    let (frames, _) = read_apng(&path);
+    assert!(frames.len() == 4 && frames[0] != frames[3]);
 }
 
 #[test]
@@ -278,6 +326,45 @@ fn a_sequence_shows_one_file_after_the_other() {
     let colors: Vec<[u8; 3]> = frames.iter().map(|frame| frame[..3].try_into().unwrap()).collect();
     let [r, g, b] = [[250, 0, 0], [0, 250, 0], [0, 0, 250]];
     assert_eq!(colors, [r, r, g, g, b, b]);
+}
+
+#[test]
+fn a_sequence_of_clouds_is_read_as_it_comes() {
+    let folder = Folder::new();
+    let n_files = 24;
+    for number in 0..n_files {
+        folder.write(&format!("f{number}.xyz"), square(9, 10 * number as u8));
+    }
+    let view = "light = \"none\"\nradius = 1\n[camera]\ndirection = [0, 0, -1]\northographic = 4\n";
+    let sequence = "[[object]]\nfiles = \"f*.xyz\"\nfps = 4\n";
+    let scene = folder.write("scene.toml", format!("{view}{sequence}"));
+    let path = folder.path("film.png");
+    film(&[&scene, "-o", &path, "--fps", "4"]);
+    let (frames, _) = read_apng(&path);
+    assert_eq!(frames.len(), n_files);
+    // Each frame is what a picture of its file alone shows; so is a picture at a time.
+    for (number, time) in [(0, "0"), (7, "1.75"), (23, "5.75"), (23, "99")] {
+        let alone = format!("{view}[[object]]\nfile = \"f{number}.xyz\"\n");
+        let alone = read_shot(&folder, &[&folder.write("alone.toml", alone)]);
+        assert!(frames[number] == alone, "{number}");
+        assert!(read_shot(&folder, &[&scene, "--time", time]) == alone, "{time}");
+    }
+    // What is held is one cloud, whatever the number of files.
+    let told = succeed(&["animate", &scene, "--dry-run"]);
+    assert!(told.contains("\"points\": 81,"), "{told}");
+    // A file that is missing or no cloud is told before the first frame.
+    let files: Vec<String> = (0..9).map(|number| format!("\"f{number}.xyz\"")).collect();
+    let missing =
+        format!("{view}[[object]]\nfiles = [{}, \"gone.xyz\"]\nfps = 4\n", files.join(","));
+    fs::remove_file(&path).unwrap();
+    let text = fail(&["animate", &folder.write("missing.toml", missing), "-o", &path], 1);
+    assert!(text.contains("gone.xyz") && !text.contains("frames are kept"), "{text}");
+}
+
+fn read_shot(folder: &Folder, arguments: &[&str]) -> Vec<u8> {
+    let path = folder.path("shot.png");
+    succeed(&[&["render"], arguments, &SMALL, &["-o", &path]].concat());
+    read_png(path).3
 }
 
 #[test]
@@ -389,6 +476,22 @@ mod resume {
         assert!(told.contains("of 40 frames are there already"), "{told}");
         assert!(fs::read(&part).unwrap() == fs::read(&whole).unwrap());
         assert_eq!(folder.names(), ["dome.ply", "part.gif", "whole.gif"]);
+    }
+
+    #[test]
+    fn a_film_is_not_taken_up_with_other_materials() {
+        let folder = Folder::new();
+        let grid = (0..400).map(|i| format!("v {} {} {}\n", i % 20, i / 20, (i * i) % 5));
+        let faces = (1..379).map(|i| format!("f {i} {} {}\n", i + 1, i + 20));
+        let mesh: String = grid.chain(["usemtl m\n".to_owned()]).chain(faces).collect();
+        let mesh = folder.write("mesh.obj", format!("mtllib m.mtl\n{mesh}"));
+        folder.write("m.mtl", "newmtl m\nKd 1 0 0\n");
+        let part = folder.path("part.gif");
+        let arguments = [&["animate", &mesh, "-o", &part], &LONG[..]].concat();
+        interrupt(&arguments, &folder.path("part.gif.frames"), "000002.png");
+        folder.write("m.mtl", "newmtl m\nKd 0 0.5 0\n");
+        let told = fail(&[&arguments[..], &["--resume"]].concat(), 1);
+        assert!(told.contains("ask for the same"), "{told}");
     }
 
     #[test]

@@ -142,6 +142,21 @@ pub fn gltf() -> String {
     )
 }
 
+/// The same triangle before two cameras: `still` at rest, which sees 0.5 rad, and `eye`, which goes three to
+/// the right.
+pub fn gltf_with_cameras() -> String {
+    let nodes = r#"{"mesh":0,"name":"triangle"},
+{"name":"still","camera":0,"translation":[0,1,7]},{"name":"eye","camera":1,"translation":[0,1,9]}"#;
+    let camera = |angle: f64| {
+        format!(r#"{{"type":"perspective","perspective":{{"yfov":{angle},"znear":0.1}}}}"#)
+    };
+    let cameras = [camera(0.5), camera(0.7)].join(",");
+    gltf()
+        .replace(r#""nodes":[{"mesh":0}]"#, &format!(r#""nodes":[{nodes}],"cameras":[{cameras}]"#))
+        .replace(r#""scenes":[{"nodes":[0]}]"#, r#""scenes":[{"nodes":[0,1,2]}]"#)
+        .replace(r#""target":{"node":0"#, r#""target":{"node":2"#)
+}
+
 /// A picture of light, twice as wide as high: bright where the east is.
 pub fn light_picture() -> Vec<u8> {
     let head = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n";

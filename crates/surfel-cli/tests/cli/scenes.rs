@@ -333,6 +333,32 @@ fn without_light_colours_of_meshes_are_as_they_are() {
 }
 
 #[test]
+fn without_light_materials_that_need_it_are_as_they_are() {
+    let folder = Folder::new();
+    let mesh = folder.write("tile.ply", tile(1.0, 0.0, [255, 255, 255]));
+    let light = folder.write("light.hdr", light_picture());
+    let view =
+        ["--camera-direction", "0,0,-1", "--camera-orthographic", "1", "--background", "#000"];
+    let is_all = |color: [u8; 3], options: &[&str]| {
+        let picture = folder.path("a.png");
+        let dark = ["render", &mesh, "-o", &picture, "--light", "none", "--exposure", "0"];
+        succeed(&[&dark, &SMALL[..], &view, options].concat());
+        read_png(&picture).3.chunks(3).all(|pixel| pixel == color)
+    };
+    for kind in ["matte:", "plastic:", "metal:roughness=1,"] {
+        let material = format!("{kind}color=#8040c8");
+        assert!(is_all([128, 64, 200], &["--material", &material]), "{kind}");
+    }
+    // What mirrors, shines or lets light through shows just that.
+    for kind in ["mirror", "metal", "glass"] {
+        assert!(is_all([0; 3], &["--material", kind]), "{kind}");
+    }
+    // An environment gives light.
+    let lit = ["--material", "matte:color=#8040c8", "--environment", &light];
+    assert!(!is_all([128, 64, 200], &lit));
+}
+
+#[test]
 fn an_environment_gives_light_and_may_be_seen() {
     let folder = site();
     let cloud = folder.path("dome.ply");
@@ -398,6 +424,78 @@ fn a_parent_is_an_object_and_not_a_node_in_a_file() {
 }
 
 #[test]
+fn options_of_an_object_win_over_those_of_the_scene() {
+    let folder = site();
+    let scene = |options: &str, own: &str| {
+        let text = format!("{options}\n[[object]]\nfile = \"dome.ply\"\n{own}\n");
+        folder.write("scene.toml", text)
+    };
+    let own = shot(&folder, &[&scene("", "normals_radius = 0.4")]);
+    let plain = shot(&folder, &[&scene("", "")]);
+    assert_ne!(own, plain);
+    // Also where the two do not go together, and where what follows `--` is files.
+    assert_eq!(shot(&folder, &[&scene("normals_k = 8", "normals_radius = 0.4")]), own);
+    let nearest = shot(&folder, &[&scene("", "normals_k = 8")]);
+    assert_eq!(shot(&folder, &[&scene("normals_radius = 0.4", "normals_k = 8")]), nearest);
+    let output = folder.path("own.png");
+    let behind = scene("", "normals_radius = 0.4");
+    succeed(&[&["render", "-o", &output], &SMALL[..], &["--", &behind]].concat());
+    assert_eq!(fs::read(&output).unwrap(), own);
+    let text =
+        fail(&["render", &scene("", "normals_radius = 0.4\nnormals_k = 8"), "-o", "no.png"], 2);
+    assert!(text.contains("`dome`") && text.contains("--normals-k"), "{text}");
+}
+
+#[test]
+fn an_object_switches_a_flag_of_the_scene_off() {
+    let folder = site();
+    let scene = |options: &str, own: &str| {
+        let text = format!("{options}\nradius = 1\n[[object]]\nfile = \"tile.ply\"\n{own}\n");
+        let told = dry(&[&folder.write("scene.toml", text)])["info"].take();
+        (told["points"].as_u64().unwrap(), told["triangles"].as_u64().unwrap())
+    };
+    assert_eq!(scene("vertices = true", ""), (4, 0));
+    assert_eq!(scene("vertices = true", "vertices = false"), (0, 2));
+    assert_eq!(scene("vertices = false", "vertices = true"), (4, 0));
+}
+
+#[test]
+fn objects_may_share_a_name_that_nothing_refers_to() {
+    let folder = site();
+    let twice =
+        "[[object]]\nfile = \"tile.ply\"\n[[object]]\nfile = \"tile.ply\"\ntranslate = [9, 0, 0]\n";
+    shot(&folder, &[&folder.write("twice.toml", twice)]);
+    for more in [
+        "[[object]]\nfile = \"dome.ply\"\nparent = \"tile\"",
+        "[[animation]]\nobject = \"tile\"\nkind = \"orbit\"\nseconds = 1",
+    ] {
+        let scene = folder.write("scene.toml", format!("{twice}{more}\n"));
+        let text = fail(&["render", &scene, "-o", "no.png"], 2);
+        assert!(text.contains("`tile`") && text.contains("object 1 and object 2"), "{text}");
+    }
+    // Nor may a second file add one of that name.
+    let orbit = "[[object]]\nfile = \"tile.ply\"\n[[animation]]\nobject = \"tile\"\nkind = \"orbit\"\nseconds = 1\n";
+    let (a, b) = (folder.write("a.toml", orbit), "[[object]]\nfile = \"tile.ply\"\n");
+    let b = folder.write("b.toml", b);
+    let text = fail(&["render", &a, &b, "-o", "no.png"], 2);
+    assert!(text.contains("object 1 and object 2"), "{text}");
+}
+
+#[test]
+fn up_does_not_depend_on_the_order_of_files() {
+    let folder = Folder::new();
+    let scene = folder.write("triangle.gltf", gltf());
+    let cloud = folder.path("stick.laz");
+    let tall: String = (0..200).map(|i| format!("{} {} {}\n", i % 3, i, i % 5)).collect();
+    succeed(&["prepare", &folder.write("stick.xyz", tall), "-o", &cloud]);
+    let up = |files: [&str; 2]| dry(&files)["up"].take();
+    assert_eq!(up([&scene, &cloud]), up([&cloud, &scene]));
+    assert_eq!(up([&cloud, &scene]), json!([0.0, 0.0, 1.0]));
+    let flat = folder.write("wall.xyz", "0 0 0\n1 0 0\n0 9 0\n1 9 0\n0 5 0.1\n");
+    assert_eq!(up([&scene, &flat]), up([&flat, &scene]));
+}
+
+#[test]
 fn sequences_at_other_rates_keep_them() {
     let folder = site();
     let text = |rate: &str, place: &str| {
@@ -437,29 +535,4 @@ fn two_scene_files_are_one_scene() {
     // Of options that both have, the last file's count.
     assert_eq!((&told["spp"], &told["seed"]), (&json!(2), &json!(5)));
     assert_eq!(dry(&[&b, &a])["seed"], 4);
-}
-
-#[test]
-fn a_camera_of_the_file_is_taken_unless_another_is_asked_for() {
-    let folder = Folder::new();
-    let nodes = r#""nodes":[{"mesh":0},{"name":"eye","camera":0,"translation":[0,1,7]}]"#;
-    let cameras = r#""cameras":[{"type":"perspective","perspective":{"yfov":0.5,"znear":0.1}}]"#;
-    let text = gltf()
-        .replace(r#""nodes":[{"mesh":0}]"#, &format!("{nodes},{cameras}"))
-        .replace(r#""scenes":[{"nodes":[0]}]"#, r#""scenes":[{"nodes":[0,1]}]"#);
-    let file = folder.write("eye.gltf", text);
-    let camera = |options: &[&str]| {
-        let told = succeed(&[&["render", &file, "--dry-run"], options].concat());
-        serde_json::from_str::<Value>(&told).unwrap()["camera"].take()
-    };
-    let own = camera(&[]);
-    // Turned to have Z up.
-    let near = |found: &Value, expected: [f64; 3]| {
-        let found = found.as_array().unwrap().iter().map(|value| value.as_f64().unwrap());
-        assert!(found.zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{own}");
-    };
-    near(&own["position"], [0.0, -7.0, 1.0]);
-    near(&own["focal_point"], [0.0, -6.0, 1.0]);
-    assert!((own["view_angle"].as_f64().unwrap() - 0.5f64.to_degrees()).abs() < 1e-4);
-    assert_ne!(camera(&["--camera-azimuth-angle", "30"])["position"], own["position"]);
 }

@@ -112,6 +112,35 @@ fn memory_is_refused_before_it_is_taken() {
     assert!(text.contains("--memory-limit"), "{text}");
 }
 
+#[test]
+fn triangles_and_textures_count_against_the_limit_of_memory() {
+    let folder = Folder::new();
+    let corner = |i: usize| format!("v {} {} {}\nvt 0 0\n", i % 50, i / 50, i % 7);
+    let corners: String = (0..2500).map(corner).collect();
+    let faces: String = (1..2400).map(|i| format!("f {i}/1 {}/1 {}/1\n", i + 1, i + 51)).collect();
+    let mesh = folder.write("mesh.obj", format!("{corners}{faces}"));
+    let picture = folder.path("out.png");
+    let render = |file: &str, limit: &str| {
+        let options = ["-o", &picture, "--resolution", "32x24", "--memory-limit", limit];
+        [&["render", file], &options[..]].concat().iter().map(|word| word.to_string()).collect()
+    };
+    let words: Vec<String> = render(&mesh, "500K");
+    let text = fail(&words.iter().map(String::as_str).collect::<Vec<_>>(), 1);
+    assert!(text.contains("2399 triangles need") && !text.contains("--select"), "{text}");
+    let textured = format!("mtllib m.mtl\n{corners}usemtl m\n{faces}");
+    folder.write("m.mtl", "newmtl m\nmap_Kd white.png\n");
+    let mut white =
+        png::Encoder::new(fs::File::create(folder.path("white.png")).unwrap(), 800, 800);
+    white.set_color(png::ColorType::Grayscale);
+    white.write_header().unwrap().write_image_data(&[255; 800 * 800]).unwrap();
+    let words: Vec<String> = render(&folder.write("textured.obj", textured), "3M");
+    let text = fail(&words.iter().map(String::as_str).collect::<Vec<_>>(), 1);
+    assert!(text.contains("--memory-limit"), "{text}");
+    fs::remove_file(folder.path("white.png")).unwrap();
+    let words: Vec<String> = render(&folder.path("textured.obj"), "3M");
+    succeed(&words.iter().map(String::as_str).collect::<Vec<_>>());
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_an_error() {

@@ -96,6 +96,10 @@ fn wrong_types_and_values_are_told_with_what_is_expected() {
         (object("copies = 3"), &["object 1: copies", "3"]),
         (object("matrix = [1, 2, 3]"), &["object 1: matrix", "16"]),
         (object("matrix = [1,0,0,0, 0,0,0,0, 0,0,1,0, 0,0,0,1]"), &["object 1", "matrix"]),
+        (
+            object("scale = 2\nmatrix = [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]"),
+            &["matrix stands alone", "scale"],
+        ),
         (object("visible = \"yes\""), &["object 1: visible", "true or false"]),
         (object("fps = 0"), &["object 1: fps", "0", "0.01"]),
         (object("parent = \"p\""), &["`o`", "`p`", "parent"]),

@@ -1,4 +1,4 @@
-//! Animations: the channels of the first one.
+//! Animations: the channels of one of them.
 
 use surfel::math::{DQuat, DVec3};
 use surfel::scene::{Animation, Channel, Interpolation, Keys, Node, Track};
@@ -6,37 +6,54 @@ use surfel::scene::{Animation, Channel, Interpolation, Keys, Node, Track};
 use super::accessor::{Accessor, Meaning};
 use super::document::Document;
 use super::hierarchy::Hierarchy;
-use super::json::Json;
+use super::json::{Json, shortened};
 use super::transform::rotation;
 use crate::error::{Error, Result};
 
-/// The first animation of the file; the others are told.
+/// The animation called `wanted`, or the first; the others are told.
 pub(super) fn read<'a>(
     document: &Document<'a>,
     hierarchy: &Hierarchy<'a>,
     nodes: &[Node],
+    wanted: Option<&str>,
 ) -> Result<Animation> {
     let animations = document.root.list("animations")?;
-    let Some((first, others)) = animations.split_first() else { return Ok(Animation::default()) };
-    if !others.is_empty() {
-        let titles = animations.iter().enumerate().map(|(i, animation)| {
-            let title = animation.title();
-            if title.is_empty() { i.to_string() } else { title.trim_start().to_owned() }
-        });
-        let titles: Vec<String> = titles.take(20).collect();
-        let line = format!(
-            "the first of {} animations plays, {}; there are also {}",
-            animations.len(),
-            titles[0],
-            titles[1..].join(", ")
-        );
-        document.note(line);
-    }
+    let Some(chosen) = choose(document, &animations, wanted)? else {
+        return Ok(Animation::default());
+    };
     let mut channels = Vec::new();
-    for channel in first.need("channels")?.items()? {
-        channels.extend(read_channel(document, hierarchy, nodes, first, &channel)?);
+    for channel in chosen.need("channels")?.items()? {
+        channels.extend(read_channel(document, hierarchy, nodes, chosen, &channel)?);
     }
     Ok(Animation { channels })
+}
+
+fn choose<'j, 'a>(
+    document: &Document<'a>,
+    animations: &'j [Json<'a>],
+    wanted: Option<&str>,
+) -> Result<Option<&'j Json<'a>>> {
+    const MOST_TOLD: usize = 20;
+    let name = |(i, animation): (usize, &Json)| match animation.get("name") {
+        Some(name) => name.text().map_or(i.to_string(), str::to_owned),
+        None => i.to_string(),
+    };
+    let names: Vec<String> = animations.iter().enumerate().map(name).collect();
+    let quoted = names.iter().take(MOST_TOLD).map(|name| format!("`{}`", shortened(name)));
+    let known = quoted.collect::<Vec<_>>().join(", ");
+    let Some(wanted) = wanted.filter(|_| !animations.is_empty()) else {
+        if 1 < animations.len() {
+            let n = animations.len();
+            document.note(format!("the first of {n} animations plays; they are {known}"));
+        }
+        return Ok(animations.first());
+    };
+    let found = names.iter().position(|name| name == wanted);
+    let Some(found) = found else {
+        let (file, wanted) = (document.root.file().to_owned(), wanted.to_owned());
+        return Err(Error::NoAnimation { file, wanted, known });
+    };
+    Ok(Some(&animations[found]))
 }
 
 fn read_channel<'a>(

@@ -1,12 +1,12 @@
 //! What all parts of the reader share: the JSON, the buffers, and a limit to what they may grow to.
 
 use std::cell::{Cell, RefCell};
-use std::path::Path;
 
 use surfel::progress::Progress;
 
 use super::json::Json;
 use super::uri::{Bytes, fetch};
+use crate::beside::Beside;
 use crate::error::{Error, Result};
 
 /// Decoded bytes that any file may ask for; what is not in a buffer counts as zeros and takes no room there.
@@ -18,8 +18,7 @@ const MOST_NOTES: usize = 20;
 
 pub(super) struct Document<'a> {
     pub root: Json<'a>,
-    /// Where the file is, if it is one.
-    pub folder: Option<&'a Path>,
+    pub beside: &'a Beside<'a>,
     pub progress: &'a dyn Progress,
     buffers: &'a [Buffer<'a>],
     bytes_left: Cell<u64>,
@@ -43,13 +42,13 @@ pub(super) struct View<'a> {
 pub(super) fn load_buffers<'a>(
     root: &Json<'a>,
     chunk: Option<&'a [u8]>,
-    folder: Option<&Path>,
+    beside: &Beside,
 ) -> Result<Vec<Buffer<'a>>> {
     let mut buffers = Vec::new();
     for (i, buffer) in root.list("buffers")?.into_iter().enumerate() {
         let length = buffer.need("byteLength")?;
         let bytes = match buffer.get("uri") {
-            Some(uri) => Some(fetch(folder, &uri)?),
+            Some(uri) => Some(fetch(beside, &uri)?),
             None if i == 0 => chunk.map(Bytes::Chunk),
             None => None,
         };
@@ -71,18 +70,18 @@ impl<'a> Document<'a> {
         root: Json<'a>,
         buffers: &'a [Buffer<'a>],
         n_bytes: usize,
-        folder: Option<&'a Path>,
+        beside: &'a Beside<'a>,
         progress: &'a dyn Progress,
     ) -> Self {
         // The buffer of a GLB is in the file itself.
-        let beside = buffers.iter().filter_map(|Buffer(bytes, _)| match bytes {
+        let outside = buffers.iter().filter_map(|Buffer(bytes, _)| match bytes {
             Some(Bytes::File(_) | Bytes::Decoded(_)) => bytes.as_deref(),
             _ => None,
         });
-        let n_bytes = (n_bytes + beside.map(<[u8]>::len).sum::<usize>()) as u64;
+        let n_bytes = (n_bytes + outside.map(<[u8]>::len).sum::<usize>()) as u64;
         Self {
             root,
-            folder,
+            beside,
             progress,
             buffers,
             bytes_left: Cell::new(BASE_BYTES + BYTES_PER_BYTE.saturating_mul(n_bytes)),

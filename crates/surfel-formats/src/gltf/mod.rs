@@ -12,10 +12,10 @@ mod accessor;
 mod extensions;
 mod picture;
 mod points;
+mod inspect;
 mod material;
 mod triangles;
 mod attributes;
-mod mend;
 mod primitive;
 mod mesh;
 mod transform;
@@ -24,18 +24,21 @@ mod instancing;
 mod node;
 mod animation;
 
+pub(crate) use inspect::inspect;
 pub(crate) use points::points_of;
 
 use std::path::Path;
 
 use surfel::progress::Progress;
-use surfel::scene::{Geometry, Graph};
+use surfel::scene::Graph;
 
+use self::container::Container;
 use self::document::{Document, load_buffers};
 use self::hierarchy::Hierarchy;
 use self::json::Json;
 use self::mesh::Meshes;
 use self::picture::Pictures;
+use crate::beside::Beside;
 use crate::error::{Error, Result};
 use crate::input::Input;
 use crate::options::Source;
@@ -50,8 +53,7 @@ use crate::options::Source;
 ///
 /// Points have their colours in the cloud, sRGB-encoded; they are neither prepared nor otherwise coloured.
 pub fn load_gltf(path: &Path, progress: &dyn Progress) -> Result<(Graph, Source)> {
-    let folder = path.parent().unwrap_or(Path::new(""));
-    read(&Input::open(path)?, Some(folder), progress)
+    read(&Input::open(path)?, Beside::file(path), None, progress)
 }
 
 /// By the first bytes or the extension.
@@ -65,26 +67,31 @@ pub fn load_gltf_bytes(
     bytes: &[u8],
     progress: &dyn Progress,
 ) -> Result<(Graph, Source)> {
-    read(&Input::of_bytes(name, bytes), None, progress)
+    read(&Input::of_bytes(name, bytes), Beside::nowhere(), None, progress)
 }
 
-fn read(input: &Input, folder: Option<&Path>, progress: &dyn Progress) -> Result<(Graph, Source)> {
+/// The animation is that of the name `wanted`, or the first.
+pub(crate) fn read(
+    input: &Input,
+    beside: Beside,
+    wanted: Option<&str>,
+    progress: &dyn Progress,
+) -> Result<(Graph, Source)> {
     progress.check()?;
     let container = container::open(input)?;
     let root = Json::root(&input.name, &container.json);
     check_version(&root)?;
-    let buffers = load_buffers(&root, container.chunk, folder)?;
-    let document = Document::new(root, &buffers, input.len(), folder, progress);
+    let buffers = load_buffers(&root, container.chunk, &beside)?;
+    let document = Document::new(root, &buffers, input.len(), &beside, progress);
     extensions::check(&document)?;
-    let (graph, columns) = read_graph(&document)?;
+    let (graph, columns) = read_graph(&document, wanted)?;
     document.tell_notes();
-    let n_points = graph.geometries.iter().filter_map(|geometry| match geometry {
-        Geometry::Points(points) => Some(points.cloud.len() as u64),
-        Geometry::Triangles(_) => None,
-    });
+    let (n_points, n_triangles) = graph.counts();
     let source = Source {
-        format: if container.is_binary { "glTF 2.0, binary" } else { "glTF 2.0" }.into(),
-        n_points: n_points.reduce(|a, b| a + b),
+        format: format_name(&container),
+        beside: beside.into_wanted(),
+        n_points: (0 < n_points).then_some(n_points as u64),
+        n_triangles: (0 < n_triangles).then_some(n_triangles as u64),
         columns,
         ..Source::default()
     };
@@ -92,7 +99,7 @@ fn read(input: &Input, folder: Option<&Path>, progress: &dyn Progress) -> Result
 }
 
 /// The graph and the names of the attributes in it.
-fn read_graph(document: &Document) -> Result<(Graph, Vec<String>)> {
+fn read_graph(document: &Document, wanted: Option<&str>) -> Result<(Graph, Vec<String>)> {
     let n_meshes = document.root.list("meshes")?.len();
     document.progress.begin(&format!("read {}", document.root.file()), n_meshes as u64);
     let hierarchy = Hierarchy::read(document)?;
@@ -101,7 +108,7 @@ fn read_graph(document: &Document) -> Result<(Graph, Vec<String>)> {
     let mut meshes = Meshes::new(document, materials);
     let name = Path::new(document.root.file()).file_stem().unwrap_or_default().to_string_lossy();
     let nodes = node::read_all(document, &hierarchy, &mut meshes, name.into_owned())?;
-    let animation = animation::read(document, &hierarchy, &nodes)?;
+    let animation = animation::read(document, &hierarchy, &nodes, wanted)?;
     let Meshes { primitives, materials, .. } = meshes;
     let mut graph = Graph {
         geometries: primitives.geometries,
@@ -115,6 +122,10 @@ fn read_graph(document: &Document) -> Result<(Graph, Vec<String>)> {
         graph.validate();
     }
     Ok((graph, primitives.columns.into_iter().collect()))
+}
+
+fn format_name(container: &Container) -> String {
+    if container.is_binary { "glTF 2.0, binary" } else { "glTF 2.0" }.into()
 }
 
 fn check_version(root: &Json) -> Result<()> {

@@ -72,15 +72,17 @@ fn read<'a>(
     Ok(node)
 }
 
-/// A node's own name, or that of its mesh, or its number.
+/// A node's own name, or that of its mesh or camera, or its number.
 fn name<'a>(document: &Document<'a>, json: &Json<'a>) -> String {
     let name_of = |json: &Json<'a>| json.get("name")?.text().ok();
-    let of_mesh = || {
-        let mesh = json.get("mesh")?;
-        name_of(&document.referred("meshes", &mesh).ok()?)
+    let name_of_its = |key: &str, list: &str| {
+        let reference = json.get(key)?;
+        name_of(&document.referred(list, &reference).ok()?)
     };
     let number = json.pointer().trim_start_matches("/nodes/");
-    let name = name_of(json).or_else(of_mesh);
+    let name = name_of(json)
+        .or_else(|| name_of_its("mesh", "meshes"))
+        .or_else(|| name_of_its("camera", "cameras"));
     name.map_or_else(|| format!("node {number}"), str::to_owned)
 }
 

@@ -98,7 +98,7 @@ impl<'a> Pictures<'a> {
             let name = format!("{}{}", image.file(), image.pointer());
             return decode(&name, bytes).map_err(Unread::Picture);
         };
-        let bytes = fetch(self.document.folder, &uri).map_err(Unread::Picture)?;
+        let bytes = fetch(self.document.beside, &uri).map_err(Unread::Picture)?;
         let name = match uri.text().map_err(Unread::File)? {
             data if is_data(data) => format!("{}{}", image.file(), image.pointer()),
             path => path.into(),

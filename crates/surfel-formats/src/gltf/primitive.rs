@@ -12,9 +12,9 @@ use super::attributes::Vertices;
 use super::document::Document;
 use super::extensions;
 use super::json::Json;
-use super::mend::{drop_lost_vertices, mend_normals};
 use super::triangles::{Mode, assemble, compact};
 use crate::error::Result;
+use crate::mend::{drop_unusable, mend_normals};
 
 /// The geometry that nodes have asked for so far.
 pub(super) struct Primitives<'d, 'a> {
@@ -136,7 +136,8 @@ fn read_mesh(vertices: &Vertices, triangles: Vec<[u32; 3]>) -> Result<Option<Mes
         skin: vertices.skin()?,
         ..Mesh::default()
     };
-    let n_lost = drop_lost_vertices(&mut mesh);
+    // Those without an area are left out untold: programs write many, and nobody misses them.
+    let n_lost = drop_unusable(&mut mesh).n_lost;
     if 0 < n_lost {
         let line = format!("{n_lost} triangles with a corner that is not finite are left out");
         vertices.document.note(line);

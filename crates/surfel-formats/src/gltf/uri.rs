@@ -1,9 +1,10 @@
 //! References to bytes: other files beside this one, and data written into the JSON.
 
 use std::ops::Deref;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::json::{Json, shortened};
+use crate::beside::Beside;
 use crate::error::{Error, Result};
 use crate::input::Input;
 
@@ -31,11 +32,11 @@ pub(super) fn is_data(uri: &str) -> bool {
     strip_prefix_ignoring_case(uri, "data:").is_some()
 }
 
-/// What `reference` names: `data:` followed by the bytes, or a file beside that in `folder`.
+/// What `reference` names: `data:` followed by the bytes, or a file beside that.
 ///
 /// A path may lead up by `..`, as users lay out their folders; an absolute one or an address in a network
 /// would make the picture depend on the machine, and is refused.
-pub(super) fn fetch<'a>(folder: Option<&Path>, reference: &Json<'a>) -> Result<Bytes<'a>> {
+pub(super) fn fetch<'a>(beside: &Beside, reference: &Json<'a>) -> Result<Bytes<'a>> {
     let uri = reference.text()?;
     if let Some(data) = strip_prefix_ignoring_case(uri, "data:") {
         return decode_data(data).map(Bytes::Decoded).ok_or_else(|| {
@@ -48,15 +49,14 @@ pub(super) fn fetch<'a>(folder: Option<&Path>, reference: &Json<'a>) -> Result<B
         found: format!("the reference `{}` at {}", shortened(uri), reference.pointer()),
         advice,
     };
-    let Some(folder) = folder else {
+    let Some(folder) = beside.folder else {
         return Err(unfit("only a file on disk can have others beside it; pack all into one .glb"));
     };
     if is_absolute(uri) {
         return Err(unfit("copy what it names into the folder and write its relative path"));
     }
     let paths = candidates(uri).map(|path| folder.join(path));
-    let path = paths.iter().find(|path| path.exists()).unwrap_or(&paths[0]);
-    Input::open(path).map(Bytes::File).map_err(|error| match error {
+    Input::open(beside.choose(&paths)).map(Bytes::File).map_err(|error| match error {
         Error::Io { file, cause, .. } => {
             let found = format!("`{}`, and {file} cannot be read ({cause})", shortened(uri));
             reference.error(found, "a file beside this one, copied along with it")

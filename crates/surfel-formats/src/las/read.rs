@@ -74,6 +74,7 @@ fn source(input: &Input, header: &Header) -> Source {
         format: format!("{name} 1.{}, point format {}", header.minor_version, header.point_format),
         n_points: Some(header.n_points),
         n_triangles: None,
+        beside: Vec::new(),
         resolution: Some(header.scale.abs()),
         coordinate_system: coordinate_system(input, header),
         columns: columns.iter().map(|column| column.role.name().to_owned()).collect(),

@@ -5,7 +5,7 @@ use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crate::atomic::{write_failed, write_file};
+use crate::atomic::{save_text, write_failed};
 use crate::error::{Error, Result};
 
 use super::format::MovieFormat;
@@ -54,9 +54,7 @@ impl Kept {
         let note = &self.files.note;
         let mut text = format!("{settings}\n");
         text.extend(self.done.iter().map(|&frame| format!("{}\n", u64::from(frame) + 1)));
-        write_file(note, |writer| {
-            writer.write_all(text.as_bytes()).map_err(|cause| write_failed(note, cause))
-        })
+        save_text(note, &text)
     }
 }
 

@@ -4,10 +4,12 @@ use serde_json::json;
 use surfel::math::DVec3;
 use surfel::progress::Silent;
 use surfel::scene::{Geometry, Graph, Mesh};
-use surfel_formats::{LoadOptions, Loaded, load, load_gltf, load_gltf_bytes};
+use surfel_formats::{
+    LoadOptions, Loaded, inspect, load, load_gltf, load_gltf_bytes, load_graph_bytes,
+};
 
 use crate::common::{Folder, Listener, shared};
-use crate::gltf_asset::{Asset, triangle};
+use crate::gltf_asset::{Asset, moving, triangle};
 
 /// The asset as plain JSON that has its buffer as Base64.
 fn embedded(asset: &Asset) -> Vec<u8> {
@@ -53,14 +55,50 @@ fn data_may_be_inside_beside_or_above() {
         json["buffers"] = json!([{"byteLength": asset.buffer.len(), "uri": uri}]);
         let file = folder.path("in side/scene.gltf");
         std::fs::write(&file, json.to_string()).unwrap();
-        let (graph, _) = load_gltf(&file, &Silent).unwrap();
+        let (graph, source) = load_gltf(&file, &Silent).unwrap();
         assert_eq!(graph.nodes[0].name, "scene");
+        let [buffer] = &source.beside[..] else { panic!("{:?}", source.beside) };
+        assert_eq!(buffer.canonicalize().unwrap(), folder.path(path).canonicalize().unwrap());
         assert_eq!(mesh_of(graph), mesh, "{uri}");
         std::fs::remove_file(folder.path(path)).unwrap();
     }
     // A mark in front of the JSON, as some editors leave it.
     let marked = ["\u{feff}".as_bytes(), &embedded(&asset)].concat();
     assert!(load_gltf_bytes("a.gltf", &marked, &Silent).is_ok());
+}
+
+#[test]
+fn what_a_file_holds_is_known_before_it_is_read() {
+    let mut asset = triangle();
+    let attributes = asset.json["meshes"][0]["primitives"][0]["attributes"].clone();
+    let indices = asset.numbers("SCALAR", &[0u8, 1, 2, 0]);
+    asset.json["meshes"][0]["primitives"] = json!([
+        { "attributes": attributes, "indices": indices, "mode": 5 },
+        { "attributes": attributes, "mode": 0 },
+        { "attributes": attributes },
+    ]);
+    let folder = Folder::new("gltf-inspect");
+    let file = folder.path("a.glb");
+    std::fs::write(&file, asset.glb()).unwrap();
+    let source = inspect(&file).unwrap();
+    assert_eq!((source.n_points, source.n_triangles), (Some(3), Some(3)));
+    assert_eq!(source.format, "glTF 2.0, binary");
+}
+
+#[test]
+fn an_animation_is_chosen_by_its_name() {
+    let bytes = moving().glb();
+    let n_channels = |name: &str| {
+        let options = LoadOptions { animation: Some(name.into()), ..LoadOptions::default() };
+        let loaded = load_graph_bytes("a.glb", &bytes, &options, &Silent);
+        loaded.map(|(graph, _)| graph.animation.channels.len())
+    };
+    assert_eq!((n_channels("walk").unwrap(), n_channels("run").unwrap()), (4, 0));
+    let message = n_channels("fly").unwrap_err().to_string();
+    assert_eq!(message, "a.glb: has no animation `fly`; there is `walk`, `run`");
+    // What does not move is none the worse for it.
+    let options = LoadOptions { animation: Some("fly".into()), ..LoadOptions::default() };
+    assert!(load_graph_bytes("a.glb", &triangle().glb(), &options, &Silent).is_ok());
 }
 
 #[test]

@@ -244,7 +244,7 @@ fn the_first_animation_is_read_and_the_others_told() {
     assert_eq!((sizes.interpolation, sizes.values.len()), (Interpolation::Cubic, 9));
     let Track::MorphWeights(weights) = &channels[3].track else { panic!() };
     assert_eq!(weights.values, [[0.0, 1.0], [0.2, 0.0], [0.0, 0.0]]);
-    assert!(loaded.heard("the first of 2 animations plays, `walk`; there are also `run`"));
+    assert!(loaded.heard("the first of 2 animations plays; they are `walk`, `run`"));
     assert!(loaded.heard("an animation of morph weights of a node without any"));
 }
 

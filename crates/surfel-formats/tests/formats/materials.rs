@@ -107,7 +107,10 @@ fn textures_are_found_read_once_and_missed_aloud() {
         ("sub/n.png", PNG),
         ("text.png", b"no picture"),
     ];
-    let (graph, _, listener) = load_with("textures", &obj, &others);
+    let (graph, source, listener) = load_with("textures", &obj, &others);
+    let names = source.beside.iter().map(|path| path.file_name().unwrap().to_str().unwrap());
+    let names: Vec<&str> = names.collect();
+    assert_eq!(names, ["a.mtl", "one texel.png", "one texel.png", "n.png", "none.png", "text.png"]);
     let [a, b] = graph.materials.as_slice() else { panic!("{} materials", graph.materials.len()) };
     let base = a.textures.base_color.unwrap();
     assert_eq!((base.scale, base.wrap), (Vec2::new(2.0, 3.0), [Wrap::ClampToEdge; 2]));

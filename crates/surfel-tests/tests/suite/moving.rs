@@ -398,3 +398,18 @@ mod known {
         assert!(render(&flat, Simd::detect()) == render(&anew, Simd::detect()));
     }
 }
+
+#[test]
+fn a_geometry_that_takes_the_place_of_another_is_as_if_built_anew() {
+    let renderer = CpuRenderer { simd: Simd::detect() };
+    let picture = |flat: &FlatScene| renderer.render(flat, &SETTINGS, &Silent).unwrap().0;
+    let scene = |cloud| scenes::scene(cloud, SurfaceKind::Splat);
+    let (before, after) = (scene(clouds::plane(30, 0.1, 1)), scene(clouds::sphere(2000, 1.0)));
+    let mut flat = FlatScene::new(&before, &Silent).unwrap();
+    let first = picture(&flat);
+    flat.replace(0, &after.graph.geometries[0], &Silent).unwrap();
+    flat.update(&after.graph, &Silent).unwrap();
+    flat.camera = after.camera;
+    let expected = picture(&FlatScene::new(&after, &Silent).unwrap());
+    assert!(picture(&flat) == expected && first != expected);
+}

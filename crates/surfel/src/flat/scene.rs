@@ -146,6 +146,22 @@ impl FlatScene {
         self.place(graph, &world)
     }
 
+    /// Puts other points or triangles in place of a geometry of the graph that no node bends; `update` has
+    /// to follow.
+    pub fn replace(
+        &mut self,
+        geometry_idx: usize,
+        geometry: &Geometry,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let Some(built) = self.built.get(&(geometry_idx, None)) else { return Ok(()) };
+        let place = &mut self.geometries[built.geometry as usize];
+        // Frees its memory before the new one takes as much.
+        *place = FlatGeometry::Mesh(FlatMesh::default());
+        *place = FlatGeometry::new(geometry, progress)?;
+        Ok(())
+    }
+
     /// Sets instances, the tree over them, and lamps.
     fn place(&mut self, graph: &Graph, world: &[DAffine3]) -> Result<()> {
         let is_visible = graph.visible_nodes();
