@@ -157,8 +157,8 @@ impl FlatScene {
         let Some(built) = self.built.get(&(geometry_idx, None)) else { return Ok(()) };
         let place = &mut self.geometries[built.geometry as usize];
         // Frees its memory before the new one takes as much.
-        *place = FlatGeometry::Mesh(FlatMesh::default());
-        *place = FlatGeometry::new(geometry, progress)?;
+        *place = Arc::new(FlatGeometry::Mesh(FlatMesh::default()));
+        *place = Arc::new(FlatGeometry::new(geometry, progress)?);
         Ok(())
     }
 
