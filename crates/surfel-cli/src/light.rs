@@ -5,6 +5,7 @@ use crate::report::Report;
 use anyhow::Context;
 use surfel::flat::{FlatLamp, FlatScene};
 use surfel::math::Vec3;
+use surfel::progress::Progress;
 use surfel::scene::{Camera, Environment, Light, Sky, Sun};
 use surfel_formats::LinearPicture;
 
