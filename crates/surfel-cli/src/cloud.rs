@@ -48,10 +48,29 @@ pub fn make_points(
     up: Vec3,
     report: &Report,
 ) -> anyhow::Result<Points> {
+    dress(prepare_points(cloud, args, report)?, args, up, report)
+}
+
+/// Cleans a cloud, and adds the normals and radii that are missing.
+pub fn prepare_points(
+    cloud: PointCloud,
+    args: &SceneArgs,
+    report: &Report,
+) -> anyhow::Result<PointCloud> {
     let preparation = args.preparation.preparation(args.picture.seed, args.color.color.as_ref());
     let (cloud, prepared) = prepare(cloud, &preparation, report)?;
     report.end_stage();
     tell_prepared(&prepared, args, report);
+    Ok(cloud)
+}
+
+/// Gives a prepared cloud its surface and colours.
+pub fn dress(
+    cloud: PointCloud,
+    args: &SceneArgs,
+    up: Vec3,
+    report: &Report,
+) -> anyhow::Result<Points> {
     let report = report.with_flag("--color, --cmap, --range");
     Ok(Points {
         colors: colorize(&cloud, &args.color.coloring(up), &report)?,
