@@ -1,7 +1,7 @@
 //! From files to a graph: what they hold, side by side, prepared, coloured, of the materials asked for.
 
 use crate::args::{LightKind, SceneArgs};
-use crate::cloud::{graph_of, into_cloud, load, make_points};
+use crate::cloud::{dress, graph_of, into_cloud, load, prepare_points};
 use crate::report::Report;
 use crate::scene_file::{CameraMotion, Line, Motion, Object, is_scene_file};
 use crate::sequence::{Sequence, is_read_in_turn};
@@ -14,7 +14,7 @@ use surfel::math::Vec3;
 use surfel::points::PointCloud;
 use surfel::progress::Progress;
 use surfel::scene::{
-    Channel, Geometry, Graph, Interpolation, Keys, Material, Node, Track, Transform,
+    Channel, Geometry, Graph, Interpolation, Keys, Material, Node, Points, Track, Transform,
 };
 use surfel_formats::{Loaded, Source};
 
@@ -30,14 +30,15 @@ pub struct Assembly<'a> {
     files: Vec<(PathBuf, Range<usize>)>,
     /// Objects of scene files that were added.
     objects: Vec<Added>,
-    /// Options of their own that objects have, and the files these are for.
-    object_args: Vec<(SceneArgs, &'a [PathBuf])>,
+    /// Options of their own that objects have, and the index of the object.
+    object_args: Vec<(SceneArgs, usize)>,
     /// Of each geometry, the index in `object_args`; none for the scene's own options.
     args_of: Vec<Option<usize>>,
     sequences: Vec<Sequence<'a>>,
 }
 
 /// What an object became.
+#[derive(Clone)]
 struct Added {
     node: usize,
     /// Nodes of its files, without those of its copies.
@@ -94,6 +95,11 @@ impl<'a> Assembly<'a> {
         let above = successors(Some(node), |node| self.graph.nodes[*node].parent);
         let channels = &self.graph.animation.channels;
         above.into_iter().any(|node| channels.iter().any(|channel| channel.node == node))
+    }
+
+    /// Files as the command line names them, scene files among them.
+    pub fn typed(&self) -> &[PathBuf] {
+        &self.args.files
     }
 
     fn all_files(&self) -> Vec<PathBuf> {
@@ -157,7 +163,7 @@ impl<'a> Assembly<'a> {
             self.graph.add_copy(self.objects[twin].content.clone(), node);
         } else {
             let args = line.for_object(&object.name, &object.options)?;
-            self.object_args.push((args, &object.files));
+            self.object_args.push((args, self.objects.len()));
             self.add_content(node, object, report)?;
         }
         let content = first..self.graph.nodes.len();
@@ -304,25 +310,74 @@ impl<'a> Assembly<'a> {
 
     fn args(&self, object_args: Option<usize>) -> (&SceneArgs, &[PathBuf]) {
         match object_args {
-            Some(i) => (&self.object_args[i].0, self.object_args[i].1),
+            Some(i) => {
+                let (args, object_idx) = &self.object_args[i];
+                (args, &self.line.scene.objects[*object_idx].files)
+            }
             None => (self.args, &self.args.files),
         }
     }
 
     /// Prepares and colours all clouds, and gives everything its material.
     pub fn make(mut self, up: Vec3, report: &Report) -> anyhow::Result<(Graph, Vec<Sequence<'a>>)> {
+        let mut clouds = Vec::new();
+        for geometry_idx in 0..self.graph.geometries.len() {
+            if let Geometry::Points(points) = &mut self.graph.geometries[geometry_idx] {
+                let cloud = std::mem::take(&mut points.cloud);
+                let (args, files) = self.args(self.args_of[geometry_idx]);
+                let prepared = prepare_points(cloud, args, report);
+                clouds.push(prepared.with_context(|| name_files(files))?);
+            }
+        }
+        self.dress(clouds, up, report)
+    }
+
+    /// Colours clouds that are prepared, in the order of the graph, and gives everything its material.
+    pub fn dress(
+        mut self,
+        clouds: Vec<PointCloud>,
+        up: Vec3,
+        report: &Report,
+    ) -> anyhow::Result<(Graph, Vec<Sequence<'a>>)> {
+        let mut clouds = clouds.into_iter();
         let mut geometries = std::mem::take(&mut self.graph.geometries);
         for (geometry, object_args) in geometries.iter_mut().zip(&self.args_of) {
             if let Geometry::Points(points) = geometry {
                 let (args, files) = self.args(*object_args);
-                let cloud = std::mem::take(&mut points.cloud);
-                let made = make_points(cloud, args, up, report);
-                *points = made.with_context(|| name_files(files))?;
+                let dressed = dress(clouds.next().unwrap_or_default(), args, up, report);
+                *points = dressed.with_context(|| name_files(files))?;
             }
         }
         self.graph.geometries = geometries;
         self.give_materials()?;
         Ok((self.graph, self.sequences))
+    }
+
+    /// The same files, which are read already, under other options; their points stay here.
+    pub fn under<'o>(&self, args: &'o SceneArgs, line: &'o Line) -> anyhow::Result<Assembly<'o>> {
+        let object_args = |(_, object_idx): &(SceneArgs, usize)| {
+            let object = &line.scene.objects[*object_idx];
+            Ok((line.for_object(&object.name, &object.options)?, *object_idx))
+        };
+        let sequence = |sequence: &Sequence| {
+            let object_args = self.args_of[sequence.geometry];
+            let object_idx = object_args.map_or(0, |i| self.object_args[i].1);
+            let object = &line.scene.objects[object_idx];
+            let args = line.for_object(&object.name, &object.options)?;
+            Ok(Sequence::new(&object.files, object.fps, args, sequence.geometry))
+        };
+        Ok(Assembly {
+            graph: without_points(&self.graph),
+            sources: self.sources.clone(),
+            camera_motion: self.camera_motion.clone(),
+            args,
+            line,
+            files: self.files.clone(),
+            objects: self.objects.clone(),
+            object_args: self.object_args.iter().map(object_args).collect::<anyhow::Result<_>>()?,
+            args_of: self.args_of.clone(),
+            sequences: self.sequences.iter().map(sequence).collect::<anyhow::Result<_>>()?,
+        })
     }
 
     fn give_materials(&mut self) -> anyhow::Result<()> {
@@ -356,6 +411,23 @@ fn needs_light(material: &Material) -> bool {
     let reflects = 0.5 < material.metallic && material.roughness < 1.0;
     let shines = 0.0 < material.glow || material.emissive != Vec3::ZERO;
     !reflects && !shines && material.transmission == 0.0
+}
+
+fn without_points(graph: &Graph) -> Graph {
+    let geometries = graph.geometries.iter().map(|geometry| match geometry {
+        Geometry::Points(points) => {
+            let cloud = PointCloud { origin: points.cloud.origin, ..PointCloud::default() };
+            Geometry::Points(Points { cloud, ..Points::default() })
+        }
+        Geometry::Triangles(mesh) => Geometry::Triangles(mesh.clone()),
+    });
+    Graph {
+        geometries: geometries.collect(),
+        nodes: graph.nodes.clone(),
+        materials: graph.materials.clone(),
+        textures: graph.textures.clone(),
+        animation: graph.animation.clone(),
+    }
 }
 
 /// Clouds as one, whose points lie among each other.

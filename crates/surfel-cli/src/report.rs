@@ -21,7 +21,7 @@ pub struct Report<'l> {
     stage: Mutex<Option<(String, Instant)>>,
     bar: RwLock<ProgressBar>,
     /// Hears all of it, and may cancel, too.
-    pub listener: Option<&'l dyn Progress>,
+    listener: Option<&'l dyn Progress>,
 }
 
 impl<'l> Report<'l> {
@@ -35,13 +35,17 @@ impl<'l> Report<'l> {
         }
     }
 
-    /// One that tells nothing but what `listener` hears.
-    pub fn heard_by(listener: &'l dyn Progress) -> Self {
-        Self { listener: Some(listener), ..Self::new(Verbosity::Quiet) }
+    /// One that `listener` hears, too.
+    pub fn heard_by(self, listener: &dyn Progress) -> Report<'_> {
+        Report {
+            listener: Some(listener),
+            cancelled: self.cancelled,
+            ..Report::new(self.verbosity)
+        }
     }
 
-    /// The same as this one, for another thread's work.
-    pub fn for_thread<'o>(&self) -> Report<'o> {
+    /// Another of the same kind, for another thread; both are cancelled together.
+    pub fn twin<'o>(&self) -> Report<'o> {
         Report { cancelled: self.cancellation(), ..Report::new(self.verbosity) }
     }
 

@@ -40,7 +40,7 @@ pub struct Bench<'a> {
     pub primary: Vec<Ray>,
     /// Of the primary rays, where all others start.
     pub hits: Vec<Hit>,
-    pub report: &'a Report,
+    pub report: &'a Report<'a>,
 }
 
 /// The nearest hits, untimed.

@@ -1,13 +1,12 @@
 //! The command line together with the options of a scene file: one set of options, parsed in one place.
 
-use super::options::{Known, is_in};
+use super::options::Known;
 use super::{Options, SceneFile, TABLES, is_scene_file, object};
 use crate::Cli;
 use crate::args::{SceneArgs, Usage};
 use crate::assemble::name_files;
 use clap::error::ErrorKind;
-use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches, Id};
-use serde_json::Value;
+use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches, Id};
 use std::ffi::OsString;
 use std::path::PathBuf;
 

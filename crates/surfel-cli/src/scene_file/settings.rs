@@ -46,7 +46,8 @@ impl Line {
         words.extend(options.words(&known, None)?.into_iter().map(OsString::from));
         words.push("--".into());
         words.extend(self.inputs().map_err(|error| error.to_string())?);
-        let line = Self { words, ..self.clone() };
+        let mut line = self.clone();
+        line.words = words;
         let args = line.scene_args().map_err(|error| format!("{error:#}"))?;
         Ok((args, line))
     }

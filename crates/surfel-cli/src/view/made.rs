@@ -134,8 +134,12 @@ impl Made {
             Geometry::Triangles(_) => Vec::new(),
         });
         let indices = indices.collect();
-        let scene =
-            Scene { graph, lights: Vec::new(), background: Background::Transparent, camera: NOBODY };
+        let scene = Scene {
+            graph,
+            lights: Vec::new(),
+            background: Background::Transparent,
+            camera: NOBODY,
+        };
         let flat = FlatScene::new(&scene, report)?;
         report.end_stage();
         let mut graph = scene.graph;

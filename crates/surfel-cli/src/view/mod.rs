@@ -61,9 +61,9 @@ pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow
     if args.open && !browser::open(&server.link()) {
         report.note("no browser could be started; open the link yourself");
     }
-    let (line, global, report_there) = (line.clone(), global.clone(), report.for_thread());
+    let (line, global, report_there) = (line.clone(), global.clone(), report.twin());
     let open = move |progress: &dyn Progress| {
-        let report = Report { listener: Some(progress), ..report_there };
+        let report = report_there.heard_by(progress);
         let studio = ScanStudio::open(line, &global, &report).map_err(settings::refusal)?;
         Ok(Arc::new(studio) as Arc<dyn Studio>)
     };

@@ -50,7 +50,8 @@ fn columns(cloud: &PointCloud, index: usize) -> Vec<Value> {
     let mut columns = Vec::new();
     if let Some(colors) = &cloud.colors {
         let names = ["red", "green", "blue"];
-        columns.extend(names.into_iter().zip(colors[index]).map(|(name, c)| column(name, c.into())));
+        columns
+            .extend(names.into_iter().zip(colors[index]).map(|(name, c)| column(name, c.into())));
     }
     if let Some(intensity) = &cloud.intensity {
         columns.push(column("intensity", shortest(intensity[index])));

@@ -133,8 +133,7 @@ pub fn written(asked: &Asked, files: &[String], scene: &Value) -> Result<Written
         words.push(format!("--time={}", asked.time));
     }
     let words: Vec<String> = words.iter().map(|word| quoted(word)).collect();
-    let toml =
-        toml::to_string_pretty(scene).map_err(|error| Error::Refused(error.to_string()))?;
+    let toml = toml::to_string_pretty(scene).map_err(|error| Error::Refused(error.to_string()))?;
     Ok(Written {
         command: format!("surfel render {} -o picture.png", words.join(" ")),
         toml,
@@ -174,7 +173,8 @@ mod tests {
         let served = ["/data/scan.laz".to_owned()];
         let settings = from_file("a.toml", "spp = 9\n[[object]]\nfile = \"scan.laz\"", &served);
         assert_eq!(Value::Object(settings.unwrap()), json!({ "spp": 9 }));
-        for wrong in ["[[object]]\nfile = \"/etc/passwd\"", "object = { files = [\"x\"] }", "spp ="] {
+        for wrong in ["[[object]]\nfile = \"/etc/passwd\"", "object = { files = [\"x\"] }", "spp ="]
+        {
             assert!(from_file("a.toml", wrong, &served).is_err(), "{wrong}");
         }
     }

@@ -19,11 +19,11 @@ use surfel::points::PointCloud;
 use surfel::progress::Progress;
 use surfel::render::{CpuRenderer, Renderer};
 use surfel::scene::color::{Coloring, Legend, choose, legend};
-use surfel::scene::{Graph, usual_bounds};
+use surfel::scene::{Graph, Material, usual_bounds};
 use surfel::surface::SurfaceKind;
 use surfel::trace::Simd;
 use surfel_web::limits::{MOST_PIXELS, MOST_SAVED_PIXELS};
-use surfel_web::{Error, Keys, Place, Result, Stage, Studio, Written};
+use surfel_web::{Keys, Place, Result, Stage, Studio, Written};
 
 pub struct ScanStudio {
     line: &'static Line,
@@ -201,7 +201,7 @@ impl Studio for ScanStudio {
             "surfaces": SurfaceKind::ALL.map(|(name, _)| name),
             "colors": colors,
             "colormaps": colormap::names().collect::<Vec<_>>(),
-            "materials": crate::args::material::NAMES,
+            "materials": Material::NAMED.map(|(name, _)| name),
             "objects": self.objects(),
             "duration_secs": self.base.duration_secs(),
             "threads": rayon::current_num_threads(),
@@ -239,7 +239,7 @@ impl Studio for ScanStudio {
     }
 
     fn stage(&self, settings: &Keys, progress: &dyn Progress) -> Result<Stage> {
-        let report = Report::heard_by(progress);
+        let report = Report::new(Verbosity::Quiet).heard_by(progress);
         let asked = settings::read(self.line, &self.given, settings)?;
         self.stage_of(&asked, &report).map_err(settings::refusal)
     }
@@ -249,7 +249,7 @@ impl Studio for ScanStudio {
     }
 
     fn picture(&self, settings: &Keys, progress: &dyn Progress) -> Result<Vec<u8>> {
-        let report = Report::heard_by(progress);
+        let report = Report::new(Verbosity::Quiet).heard_by(progress);
         let asked = settings::read(self.line, &self.given, settings)?;
         settings::check_rays(&asked.args)?;
         let stage = self.stage_of(&asked, &report).map_err(settings::refusal)?;
