@@ -12,6 +12,7 @@ use crate::scene::Mesh;
 pub struct FlatMesh {
     /// Relative to the mesh's origin.
     pub triangles: FlatTriangles,
+    /// The vertices of each triangle of the mesh; empty where these carry nothing but their places.
     pub corners: Vec<[u32; 3]>,
     pub normals: Vec<Vec3>,
     pub tangents: Vec<Vec4>,
@@ -24,7 +25,7 @@ impl FlatMesh {
         let [first, second] = &mesh.uvs;
         Ok(Self {
             triangles: FlatTriangles::new(&mesh.positions, &mesh.triangles, progress)?,
-            corners: mesh.triangles.clone(),
+            corners: if carries_columns(mesh) { mesh.triangles.clone() } else { Vec::new() },
             normals: mesh.normals.clone().unwrap_or_default(),
             tangents: mesh.tangents.clone().unwrap_or_default(),
             uvs: [first.clone().unwrap_or_default(), second.clone().unwrap_or_default()],
@@ -32,7 +33,7 @@ impl FlatMesh {
         })
     }
 
-    /// Moves the vertices to where `mesh`, with the same triangles, now has them.
+    /// Moves the vertices to where `mesh`, with the same triangles and columns, now has them.
     pub fn refit(&mut self, mesh: &Mesh, progress: &dyn Progress) -> Result<Refit> {
         self.normals = mesh.normals.clone().unwrap_or_default();
         self.tangents = mesh.tangents.clone().unwrap_or_default();
@@ -51,4 +52,9 @@ impl FlatMesh {
         let [a, b, c] = [a, b, c].map(|vertex| column[vertex as usize]);
         Some(a * shares[0] + b * shares[1] + c * shares[2])
     }
+}
+
+fn carries_columns(mesh: &Mesh) -> bool {
+    let has_uvs = mesh.uvs.iter().any(Option::is_some);
+    has_uvs || mesh.normals.is_some() || mesh.tangents.is_some() || mesh.colors.is_some()
 }
