@@ -111,13 +111,14 @@ fn closest_in_packet<L: Lanes, S: Leaf>(
 #[inline(always)]
 fn try_lane<L: Lanes, S: Leaf>(
     block: &S::BeforePacket<L>,
+    lines: &S::Lines<L::Wide>,
     lane: usize,
     slot: u32,
     distances: &mut L::Wide,
     slots: &mut L::Wide,
 ) {
     let slot = L::Wide::splat(f32::from_bits(slot));
-    let (distance, mask) = block.intersect(lane);
+    let (distance, mask) = block.intersect(lines, lane);
     let is_first = distance.less(*distances) | slot.less_bits(*slots);
     let closer = mask & distance.less_equal(*distances) & is_first;
     *slots = L::Wide::select(closer, slot, *slots);
@@ -142,7 +143,7 @@ impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
 
     #[inline(always)]
     fn visit(&mut self, tree: &S::Tree, block_idx: u32) {
-        let block = S::before_packet::<L>(tree, block_idx, self.packet, self.lines);
+        let block = S::before_packet::<L>(tree, block_idx, self.packet);
         let mut distances = L::Wide::load(&self.distances);
         let mut slots = L::Wide::load(&self.slots);
         match block.worth_trying() {
@@ -150,7 +151,7 @@ impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
             Worth::All => {
                 for lane in 0..LANES {
                     let slot = block_idx * LANES as u32 + lane as u32;
-                    try_lane::<L, S>(&block, lane, slot, &mut distances, &mut slots);
+                    try_lane::<L, S>(&block, &self.lines, lane, slot, &mut distances, &mut slots);
                 }
             }
             Worth::These(mut lanes) => {
@@ -158,7 +159,7 @@ impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
                     let lane = lanes.trailing_zeros() as usize % LANES;
                     lanes &= lanes - 1;
                     let slot = block_idx * LANES as u32 + lane as u32;
-                    try_lane::<L, S>(&block, lane, slot, &mut distances, &mut slots);
+                    try_lane::<L, S>(&block, &self.lines, lane, slot, &mut distances, &mut slots);
                 }
             }
         }
