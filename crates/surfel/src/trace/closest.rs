@@ -101,10 +101,24 @@ fn closest_in_packet<L: Lanes, S: Leaf>(
         slots: [f32::from_bits(Hit::MISS.slot); WIDE],
     };
     along_packet::<L, _, true>(tree, packet, stack, &mut closest);
+    write_hits::<L::Wide>(&closest.distances, &closest.slots, hits);
+}
+
+/// All sixteen at once where there are so many: one by one they took a twentieth of the time of camera rays.
+#[inline(always)]
+fn write_hits<W: Wide>(distances: &[f32; WIDE], slots: &[f32; WIDE], hits: &mut [Hit]) {
+    let is_hit = W::load(slots).less_bits(W::splat(f32::from_bits(Hit::MISS.slot)));
+    // Of the two zeros the positive one.
+    let distances = W::load(distances) + W::splat(0.0);
+    let distances = W::select(is_hit, distances, W::splat(Hit::MISS.distance)).store();
+    if let Some(hits) = hits.first_chunk_mut::<WIDE>() {
+        for lane in 0..WIDE {
+            hits[lane] = Hit { distance: distances[lane], slot: slots[lane].to_bits() };
+        }
+        return;
+    }
     for (lane, hit) in hits.iter_mut().enumerate() {
-        let found =
-            Hit { distance: closest.distances[lane] + 0.0, slot: closest.slots[lane].to_bits() };
-        *hit = if found.is_miss() { Hit::MISS } else { found };
+        *hit = Hit { distance: distances[lane], slot: slots[lane].to_bits() };
     }
 }
 

@@ -53,20 +53,8 @@ impl<W: Wide> WideRays<W> {
                 &filled
             }
         };
-        let rays: &[[f32; 8]; WIDE] = bytemuck::cast_ref(rays);
-        let mut rows = [[0.0; WIDE]; 8];
-        for (row, values) in rows.iter_mut().enumerate() {
-            for lane in 0..WIDE {
-                values[lane] = rays[lane][row];
-            }
-        }
-        let [x, y, z, t_min, to_x, to_y, to_z, t_max] = rows;
-        Self {
-            origin: [W::load(&x), W::load(&y), W::load(&z)],
-            direction: [W::load(&to_x), W::load(&to_y), W::load(&to_z)],
-            t_min: W::load(&t_min),
-            t_max: W::load(&t_max),
-        }
+        let [x, y, z, t_min, to_x, to_y, to_z, t_max] = W::columns(bytemuck::cast_ref(rays));
+        Self { origin: [x, y, z], direction: [to_x, to_y, to_z], t_min, t_max }
     }
 }
 
