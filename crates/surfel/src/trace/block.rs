@@ -215,8 +215,8 @@ impl Leaf for Triangle {
         block_idx: u32,
         packet: &Packet<L::Wide>,
     ) -> TrianglesBeforePacket<L> {
-        let corners = triangles.blocks[block_idx as usize].corners::<L>();
-        let lanes = TriangleLanes::new(corners);
+        let block = &triangles.blocks[block_idx as usize];
+        let lanes = TriangleLanes::new(block.corners::<L>());
         let (from, origins) = match packet.common_origin {
             Some(origin) => (origin, None),
             None => (Vec3::ZERO, Some(packet.wide.origin())),
@@ -224,7 +224,7 @@ impl Leaf for Triangle {
         TrianglesBeforePacket {
             seen: lanes.seen_from(Vec3Lanes::splat(from)).store(),
             origins,
-            near: packet.frustum.meets_triangles(corners),
+            near: packet.frustum.meets_triangles::<L>(&block.corners),
         }
     }
 }
