@@ -40,11 +40,7 @@ pub trait BeforePacket<L: Lanes> {
 
     /// Where all rays meet the shape in `lane`. The lines stand apart: to copy them for each block would
     /// take as long as to meet a triangle.
-    fn intersect(
-        &self,
-        lines: &Self::Lines,
-        lane: usize,
-    ) -> (L::Wide, <L::Wide as Floats>::Mask);
+    fn intersect(&self, lines: &Self::Lines, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask);
 }
 
 /// Lanes to try.

@@ -176,11 +176,7 @@ impl Frustum {
     }
 
     #[inline(always)]
-    fn triangle_sides<L: Lanes>(
-        &self,
-        [a, b, c]: &[[[f32; LANES]; 3]; 3],
-        axis: usize,
-    ) -> (L, L) {
+    fn triangle_sides<L: Lanes>(&self, [a, b, c]: &[[[f32; LANES]; 3]; 3], axis: usize) -> (L, L) {
         let (a, b, c) = (L::load(&a[axis]), L::load(&b[axis]), L::load(&c[axis]));
         let anchor = self.anchor[axis];
         (
