@@ -155,6 +155,12 @@ impl Node {
         )
     }
 
+    /// The same along one of them.
+    #[inline(always)]
+    pub fn step_along(&self, axis: usize) -> f32 {
+        f32::from_bits((self.exponents_and_counts >> (8 * axis) & 0xff) << 23)
+    }
+
     /// Upper bound of the size of the box around all children.
     #[inline(always)]
     pub fn size(&self) -> f32 {

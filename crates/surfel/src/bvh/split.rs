@@ -86,7 +86,9 @@ impl Binning {
     fn new(centers: &WideBox) -> Self {
         let per_unit = (N_BINS - 1) as f32 / (centers.upper - centers.lower);
         let per_unit = per_unit.map(|x| if x.is_finite() { x } else { 0.0 });
-        Self { min: centers.lower, per_unit }
+        // The index in the fourth lane, as bits, would be a denormal number, which takes multiplication
+        // some hundred cycles: a quarter of the time to build triangles.
+        Self { min: centers.lower.with_w(1.0), per_unit: per_unit.with_w(0.0) }
     }
 
     /// Rounded to the nearest.

@@ -13,6 +13,7 @@ use crate::scene::Mesh;
 pub struct FlatMesh {
     /// Relative to the mesh's origin.
     pub triangles: FlatTriangles,
+    /// The vertices of each triangle of the mesh; empty where these carry nothing but their places.
     pub corners: Vec<[u32; 3]>,
     pub normals: Vec<Vec3>,
     pub tangents: Vec<Vec4>,
@@ -44,7 +45,7 @@ impl FlatMesh {
     fn of_what_stays(mesh: &Mesh) -> Self {
         let [first, second] = &mesh.uvs;
         Self {
-            corners: mesh.triangles.clone(),
+            corners: if carries_columns(mesh) { mesh.triangles.clone() } else { Vec::new() },
             uvs: [first.clone().unwrap_or_default(), second.clone().unwrap_or_default()],
             colors: mesh.colors.clone().unwrap_or_default(),
             ..Self::default()
@@ -52,9 +53,14 @@ impl FlatMesh {
     }
 
     /// Moves the vertices to where the same mesh is bent to now.
-    pub(super) fn refit(&mut self, bent: Bent, progress: &dyn Progress) -> Result<Refit> {
+    pub(super) fn refit(
+        &mut self,
+        mesh: &Mesh,
+        bent: Bent,
+        progress: &dyn Progress,
+    ) -> Result<Refit> {
         (self.normals, self.tangents) = (bent.normals, bent.tangents);
-        self.triangles.refit(&bent.positions, &self.corners, progress)
+        self.triangles.refit(&bent.positions, &mesh.triangles, progress)
     }
 
     /// What a column of vertices has at a place in the triangle at `slot`; none if it is empty.
@@ -69,4 +75,9 @@ impl FlatMesh {
         let [a, b, c] = [a, b, c].map(|vertex| column[vertex as usize]);
         Some(a * shares[0] + b * shares[1] + c * shares[2])
     }
+}
+
+fn carries_columns(mesh: &Mesh) -> bool {
+    let has_uvs = mesh.uvs.iter().any(Option::is_some);
+    has_uvs || mesh.normals.is_some() || mesh.tangents.is_some() || mesh.colors.is_some()
 }

@@ -138,7 +138,7 @@ impl FlatScene {
             if let (FlatGeometry::Mesh(flat), Geometry::Triangles(mesh)) =
                 (flat, &graph.geometries[*geometry])
             {
-                flat.refit(pose.bend(mesh), progress)?;
+                flat.refit(mesh, pose.bend(mesh), progress)?;
                 built.pose = pose;
             }
         }

@@ -98,6 +98,19 @@ pub trait Lanes: Floats {
 /// Sixteen floats: the rays of a packet.
 pub trait Wide: Floats {
     fn load(values: &[f32; WIDE]) -> Self;
+    /// A lane from each row, of all rows their first value, their second and so on.
+    #[inline(always)]
+    fn columns(rows: &[[f32; 8]; WIDE]) -> [Self; 8] {
+        let mut columns = [[0.0; WIDE]; 8];
+        for (i, column) in columns.iter_mut().enumerate() {
+            for lane in 0..WIDE {
+                column[lane] = rows[lane][i];
+            }
+        }
+        let [a, b, c, d, e, f, g, h] = &columns;
+        let [a, b, c, d] = [Self::load(a), Self::load(b), Self::load(c), Self::load(d)];
+        [a, b, c, d, Self::load(e), Self::load(f), Self::load(g), Self::load(h)]
+    }
     fn store(self) -> [f32; WIDE];
     /// The greatest of the lanes, none of which may be NaN.
     fn max_lane(self) -> f32;

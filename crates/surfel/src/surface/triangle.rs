@@ -68,6 +68,12 @@ impl<F: Floats> TriangleLanes<Vec3Lanes<F>> {
 }
 
 impl<F: Floats> TrianglesSeen<Vec3Lanes<F>, F> {
+    /// From `origin` instead of zero.
+    #[inline(always)]
+    pub fn seen_from(&self, origin: Vec3Lanes<F>) -> Self {
+        TriangleLanes { corners: self.corners, normal: self.normal }.seen_from(origin)
+    }
+
     /// Distances at and beyond the rays' `t_min`, and the lanes that are hit.
     ///
     /// Two-sided, and watertight as Woop, Benthin and Wald (2013) have it: each corner is seen at one place
@@ -90,25 +96,6 @@ impl<F: Floats> TrianglesSeen<Vec3Lanes<F>, F> {
             & line.ray.t_min.less_equal(distance)
             & distance.less(F::splat(f32::INFINITY));
         (distance, is_hit)
-    }
-}
-
-impl<L: Lanes> TriangleLanes<Vec3Lanes<L>> {
-    #[inline(always)]
-    pub fn store(&self) -> TriangleLanes<Rows> {
-        let [a, b, c] = self.corners;
-        TriangleLanes { corners: [a.store(), b.store(), c.store()], normal: self.normal.store() }
-    }
-}
-
-impl TriangleLanes<Rows> {
-    /// The triangle in `lane` before many rays.
-    #[inline(always)]
-    pub fn splat<F: Floats>(&self, lane: usize) -> TriangleLanes<Vec3Lanes<F>> {
-        TriangleLanes {
-            corners: splat_corners(&self.corners, lane),
-            normal: Vec3Lanes::splat_lane(&self.normal, lane),
-        }
     }
 }
 

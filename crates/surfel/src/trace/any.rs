@@ -175,7 +175,7 @@ impl<L: Lanes, S: Leaf, J: Judge> AnyInPacket<'_, L, S, J> {
         let mut found = [([0.0; WIDE], 0); LANES];
         let mut open = 0;
         for (lane, found) in found.iter_mut().enumerate() {
-            let (distance, mask) = block.intersect(lane);
+            let (distance, mask) = block.intersect(&self.lines, lane);
             let lanes = (mask & distance.less_equal(limits)).bits();
             *found = (distance.store(), lanes);
             open |= lanes;
@@ -214,7 +214,7 @@ impl<L: Lanes, S: Leaf, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> 
 
     #[inline(always)]
     fn visit(&mut self, tree: &S::Tree, block_idx: u32) {
-        let block = S::before_packet::<L>(tree, block_idx, self.packet, self.lines);
+        let block = S::before_packet::<L>(tree, block_idx, self.packet);
         if !J::IS_LENIENT {
             self.visit_with_judge(&block, block_idx);
             return;
@@ -228,7 +228,7 @@ impl<L: Lanes, S: Leaf, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> 
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
-            let (distance, mask) = block.intersect(lane);
+            let (distance, mask) = block.intersect(&self.lines, lane);
             let hits = mask & distance.less_equal(limits);
             self.is_hit |= hits.bits();
             limits = L::Wide::select(hits, blocked, limits);

@@ -160,6 +160,13 @@ impl Wide for Sixteen {
     }
 
     #[inline(always)]
+    fn columns(rows: &[[f32; 8]; WIDE]) -> [Self; 8] {
+        let [a, b, c, d] = four_columns(rows, 0);
+        let [e, f, g, h] = four_columns(rows, 4);
+        [a, b, c, d, e, f, g, h]
+    }
+
+    #[inline(always)]
     fn store(self) -> [f32; WIDE] {
         let mut values = [0.0; WIDE];
         // SAFETY: as for `avx512!`.
@@ -179,6 +186,40 @@ impl Wide for Sixteen {
             _mm512_castps_si512(self.0),
             _mm512_castps_si512(other.0)
         )))
+    }
+}
+
+/// Four columns from `first` on. A third of the instructions that come of loading value by value.
+#[inline(always)]
+fn four_columns(rows: &[[f32; 8]; WIDE], first: usize) -> [Sixteen; 4] {
+    let [p, q] = [every_fourth(rows, 0, first), every_fourth(rows, 1, first)];
+    let [r, s] = [every_fourth(rows, 2, first), every_fourth(rows, 3, first)];
+    // SAFETY: see `Sixteen`.
+    unsafe {
+        let (low_pq, high_pq) = (_mm512_unpacklo_ps(p, q), _mm512_unpackhi_ps(p, q));
+        let (low_rs, high_rs) = (_mm512_unpacklo_ps(r, s), _mm512_unpackhi_ps(r, s));
+        let (low_pq, high_pq) = (_mm512_castps_pd(low_pq), _mm512_castps_pd(high_pq));
+        let (low_rs, high_rs) = (_mm512_castps_pd(low_rs), _mm512_castps_pd(high_rs));
+        [
+            Sixteen(_mm512_castpd_ps(_mm512_unpacklo_pd(low_pq, low_rs))),
+            Sixteen(_mm512_castpd_ps(_mm512_unpackhi_pd(low_pq, low_rs))),
+            Sixteen(_mm512_castpd_ps(_mm512_unpacklo_pd(high_pq, high_rs))),
+            Sixteen(_mm512_castpd_ps(_mm512_unpackhi_pd(high_pq, high_rs))),
+        ]
+    }
+}
+
+/// Of each fourth row from `row` on the four values from `first` on.
+#[inline(always)]
+fn every_fourth(rows: &[[f32; 8]; WIDE], row: usize, first: usize) -> __m512 {
+    let [a, b] = [&rows[row][first..first + 4], &rows[row + 4][first..first + 4]];
+    let [c, d] = [&rows[row + 8][first..first + 4], &rows[row + 12][first..first + 4]];
+    // SAFETY: see `Sixteen`; each slice has four values.
+    unsafe {
+        let quarter = _mm512_castps128_ps512(_mm_loadu_ps(a.as_ptr()));
+        let half = _mm512_insertf32x4::<1>(quarter, _mm_loadu_ps(b.as_ptr()));
+        let most = _mm512_insertf32x4::<2>(half, _mm_loadu_ps(c.as_ptr()));
+        _mm512_insertf32x4::<3>(most, _mm_loadu_ps(d.as_ptr()))
     }
 }
 

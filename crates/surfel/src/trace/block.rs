@@ -3,7 +3,7 @@
 use super::hit::Hit;
 use super::packet::{Packet, WideRays};
 use crate::flat::{BlockTree, FlatPoints, FlatTriangles, PointBlock, Slot};
-use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3Lanes, Wide};
+use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, Wide};
 use crate::surface::triangle::Rows;
 use crate::surface::{
     LineLanes, PointLanes, RayLanes, Shape, Triangle, TriangleLanes, TrianglesSeen,
@@ -15,7 +15,7 @@ pub trait Leaf {
     type Tree: BlockTree;
     /// Rays of a packet as the shapes meet them.
     type Lines<W: Wide>: Copy;
-    type BeforePacket<L: Lanes>: BeforePacket<L>;
+    type BeforePacket<L: Lanes>: BeforePacket<L, Lines = Self::Lines<L::Wide>>;
 
     fn lines<W: Wide>(rays: &WideRays<W>) -> Self::Lines<W>;
 
@@ -27,18 +27,20 @@ pub trait Leaf {
         tree: &Self::Tree,
         block_idx: u32,
         packet: &Packet<L::Wide>,
-        lines: Self::Lines<L::Wide>,
     ) -> Self::BeforePacket<L>;
 }
 
 /// A block before sixteen rays.
 pub trait BeforePacket<L: Lanes> {
+    type Lines;
+
     /// The lanes whose shapes some of the rays may meet. All of them where to find out costs more than to
     /// try: then no loop over the lanes needs a branch.
     fn worth_trying(&self) -> Worth;
 
-    /// Where all rays meet the shape in `lane`.
-    fn intersect(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask);
+    /// Where all rays meet the shape in `lane`. The lines stand apart: to copy them for each block would
+    /// take as long as to meet a triangle.
+    fn intersect(&self, lines: &Self::Lines, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask);
 }
 
 /// Lanes to try.
@@ -129,9 +131,8 @@ impl<S: Shape> Leaf for S {
         points: &FlatPoints,
         block_idx: u32,
         packet: &Packet<L::Wide>,
-        lines: RayLanes<L::Wide>,
     ) -> PointsBeforePacket<L, S> {
-        PointsBeforePacket::new(&points.blocks[block_idx as usize], packet, lines)
+        PointsBeforePacket::new(&points.blocks[block_idx as usize], packet)
     }
 }
 
@@ -139,7 +140,6 @@ impl<S: Shape> Leaf for S {
 pub struct PointsBeforePacket<L: Lanes, S> {
     shape: PhantomData<S>,
     corner: Vec3Lanes<L::Wide>,
-    rays: RayLanes<L::Wide>,
     offset: [[f32; LANES]; 3],
     normal: [[f32; LANES]; 3],
     radius: [f32; LANES],
@@ -147,12 +147,11 @@ pub struct PointsBeforePacket<L: Lanes, S> {
 
 impl<L: Lanes, S> PointsBeforePacket<L, S> {
     #[inline(always)]
-    fn new(block: &PointBlock, packet: &Packet<L::Wide>, rays: RayLanes<L::Wide>) -> Self {
+    fn new(block: &PointBlock, packet: &Packet<L::Wide>) -> Self {
         let (offset, normal) = (block.offsets::<L>(), block.normals::<L>());
         Self {
             shape: PhantomData,
             corner: Vec3Lanes::splat(block.corner()).minus(packet.wide.origin()),
-            rays,
             offset: offset.store(),
             normal: normal.store(),
             radius: block.radii::<L>().store(),
@@ -165,19 +164,25 @@ impl<L: Lanes, S> PointsBeforePacket<L, S> {
 }
 
 impl<L: Lanes, S: Shape> BeforePacket<L> for PointsBeforePacket<L, S> {
+    type Lines = RayLanes<L::Wide>;
+
     #[inline(always)]
     fn worth_trying(&self) -> Worth {
         Worth::All
     }
 
     #[inline(always)]
-    fn intersect(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask) {
+    fn intersect(
+        &self,
+        rays: &RayLanes<L::Wide>,
+        lane: usize,
+    ) -> (L::Wide, <L::Wide as Floats>::Mask) {
         let point = PointLanes {
             center: self.corner.plus(Vec3Lanes::splat_lane(&self.offset, lane)),
             normal: Vec3Lanes::splat_lane(&self.normal, lane),
             radius: L::Wide::splat(self.radius[lane]),
         };
-        S::intersect(&point, &self.rays)
+        S::intersect(&point, rays)
     }
 }
 
@@ -205,45 +210,50 @@ impl Leaf for Triangle {
         triangles: &FlatTriangles,
         block_idx: u32,
         packet: &Packet<L::Wide>,
-        lines: LineLanes<L::Wide>,
     ) -> TrianglesBeforePacket<L> {
-        let corners = triangles.blocks[block_idx as usize].corners::<L>();
-        let lanes = TriangleLanes::new(corners);
-        let view = match packet.common_origin {
-            Some(origin) => View::FromOne(lanes.seen_from(Vec3Lanes::splat(origin)).store()),
-            None => View::FromMany(lanes.store(), packet.wide.origin()),
+        let block = &triangles.blocks[block_idx as usize];
+        let lanes = TriangleLanes::new(block.corners::<L>());
+        let (from, origins) = match packet.common_origin {
+            Some(origin) => (origin, None),
+            None => (Vec3::ZERO, Some(packet.wide.origin())),
         };
-        TrianglesBeforePacket { view, near: packet.frustum.meets_triangles(corners), lines }
+        TrianglesBeforePacket {
+            seen: lanes.seen_from(Vec3Lanes::splat(from)).store(),
+            origins,
+            near: packet.frustum.meets_triangles::<L>(&block.corners),
+        }
     }
 }
 
 /// Triangles as sixteen rays meet them.
 pub struct TrianglesBeforePacket<L: Lanes> {
-    view: View<L::Wide>,
+    /// From where all rays start, which is worked out once for eight triangles, or else from zero.
+    seen: TrianglesSeen<Rows, [f32; LANES]>,
+    /// Where the rays start if not in one place.
+    origins: Option<Vec3Lanes<L::Wide>>,
     /// The lanes whose boxes reach into the packet's frustum.
     near: u32,
-    lines: LineLanes<L::Wide>,
-}
-
-/// From where rays see triangles: what holds for all rays that start at one place is worked out once, eight
-/// triangles at a time. Both give the same bits.
-enum View<W> {
-    FromOne(TrianglesSeen<Rows, [f32; LANES]>),
-    FromMany(TriangleLanes<Rows>, Vec3Lanes<W>),
 }
 
 impl<L: Lanes> BeforePacket<L> for TrianglesBeforePacket<L> {
+    type Lines = LineLanes<L::Wide>;
+
     #[inline(always)]
     fn worth_trying(&self) -> Worth {
         Worth::These(self.near)
     }
 
+    /// Both ways give the same bits.
     #[inline(always)]
-    fn intersect(&self, lane: usize) -> (L::Wide, <L::Wide as Floats>::Mask) {
-        let seen = match &self.view {
-            View::FromOne(seen) => seen.splat(lane),
-            View::FromMany(lanes, origin) => lanes.splat(lane).seen_from(*origin),
-        };
-        seen.intersect(&self.lines)
+    fn intersect(
+        &self,
+        lines: &LineLanes<L::Wide>,
+        lane: usize,
+    ) -> (L::Wide, <L::Wide as Floats>::Mask) {
+        let seen = self.seen.splat::<L::Wide>(lane);
+        match self.origins {
+            None => seen.intersect(lines),
+            Some(origins) => seen.seen_from(origins).intersect(lines),
+        }
     }
 }

@@ -101,23 +101,38 @@ fn closest_in_packet<L: Lanes, S: Leaf>(
         slots: [f32::from_bits(Hit::MISS.slot); WIDE],
     };
     along_packet::<L, _, true>(tree, packet, stack, &mut closest);
+    write_hits::<L::Wide>(&closest.distances, &closest.slots, hits);
+}
+
+/// All sixteen at once where there are so many: one by one they took a twentieth of the time of camera rays.
+#[inline(always)]
+fn write_hits<W: Wide>(distances: &[f32; WIDE], slots: &[f32; WIDE], hits: &mut [Hit]) {
+    let is_hit = W::load(slots).less_bits(W::splat(f32::from_bits(Hit::MISS.slot)));
+    // Of the two zeros the positive one.
+    let distances = W::load(distances) + W::splat(0.0);
+    let distances = W::select(is_hit, distances, W::splat(Hit::MISS.distance)).store();
+    if let Some(hits) = hits.first_chunk_mut::<WIDE>() {
+        for lane in 0..WIDE {
+            hits[lane] = Hit { distance: distances[lane], slot: slots[lane].to_bits() };
+        }
+        return;
+    }
     for (lane, hit) in hits.iter_mut().enumerate() {
-        let found =
-            Hit { distance: closest.distances[lane] + 0.0, slot: closest.slots[lane].to_bits() };
-        *hit = if found.is_miss() { Hit::MISS } else { found };
+        *hit = Hit { distance: distances[lane], slot: slots[lane].to_bits() };
     }
 }
 
 #[inline(always)]
 fn try_lane<L: Lanes, S: Leaf>(
     block: &S::BeforePacket<L>,
+    lines: &S::Lines<L::Wide>,
     lane: usize,
     slot: u32,
     distances: &mut L::Wide,
     slots: &mut L::Wide,
 ) {
     let slot = L::Wide::splat(f32::from_bits(slot));
-    let (distance, mask) = block.intersect(lane);
+    let (distance, mask) = block.intersect(lines, lane);
     let is_first = distance.less(*distances) | slot.less_bits(*slots);
     let closer = mask & distance.less_equal(*distances) & is_first;
     *slots = L::Wide::select(closer, slot, *slots);
@@ -142,7 +157,7 @@ impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
 
     #[inline(always)]
     fn visit(&mut self, tree: &S::Tree, block_idx: u32) {
-        let block = S::before_packet::<L>(tree, block_idx, self.packet, self.lines);
+        let block = S::before_packet::<L>(tree, block_idx, self.packet);
         let mut distances = L::Wide::load(&self.distances);
         let mut slots = L::Wide::load(&self.slots);
         match block.worth_trying() {
@@ -150,7 +165,7 @@ impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
             Worth::All => {
                 for lane in 0..LANES {
                     let slot = block_idx * LANES as u32 + lane as u32;
-                    try_lane::<L, S>(&block, lane, slot, &mut distances, &mut slots);
+                    try_lane::<L, S>(&block, &self.lines, lane, slot, &mut distances, &mut slots);
                 }
             }
             Worth::These(mut lanes) => {
@@ -158,7 +173,7 @@ impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
                     let lane = lanes.trailing_zeros() as usize % LANES;
                     lanes &= lanes - 1;
                     let slot = block_idx * LANES as u32 + lane as u32;
-                    try_lane::<L, S>(&block, lane, slot, &mut distances, &mut slots);
+                    try_lane::<L, S>(&block, &self.lines, lane, slot, &mut distances, &mut slots);
                 }
             }
         }

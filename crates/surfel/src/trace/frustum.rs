@@ -3,7 +3,7 @@
 use super::node::slack;
 use super::packet::WideRays;
 use crate::bvh::Node;
-use crate::math::{LANES, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
+use crate::math::{LANES, LaneMask, Lanes, Ray, Vec3, WIDE, Wide};
 
 /// Rays whose slopes differ by more than this are no packet.
 const WIDEST: f32 = 0.25;
@@ -35,10 +35,11 @@ pub fn may_be_alike(rays: &[Ray]) -> bool {
 /// `offset.0 + slope.0 x .. offset.1 + slope.1 x` on each of the other two axes.
 pub struct Frustum {
     pub anchor: Vec3,
-    main: usize,
+    /// The main axis, then the others. Boxes are put in this order where they are read: axes looked up in
+    /// registers would go by way of memory, for which the next node waits.
+    pub axes: [usize; 3],
     /// 1 or -1: where the frustum opens to.
     sense: f32,
-    across: [usize; 2],
     slope: [(f32, f32); 2],
     offset: [(f32, f32); 2],
     /// Largest distance of an origin from the anchor plane.
@@ -49,7 +50,8 @@ pub struct Frustum {
     slack: f32,
 }
 
-/// The boxes of a node's children, relative to the frustum's anchor, widened by rounding.
+/// The boxes of a node's children, relative to the frustum's anchor, widened by rounding; axes are in the order
+/// of `Frustum::axes`.
 pub struct Boxes<L> {
     min: [L; 3],
     max: [L; 3],
@@ -116,9 +118,8 @@ impl Frustum {
         let runs_down = is_backward == (0.0 < sense);
         Some(Self {
             anchor,
-            main,
+            axes: [main, across[0], across[1]],
             sense: if runs_down { -1.0 } else { 1.0 },
-            across,
             slope: if runs_down { [flipped(slope[0]), flipped(slope[1])] } else { slope },
             offset,
             depth: distance[main],
@@ -129,33 +130,32 @@ impl Frustum {
 
     #[inline(always)]
     pub fn boxes<L: Lanes>(&self, node: &Node) -> Boxes<L> {
-        let corner = Vec3::from_array(node.origin) - self.anchor;
-        let step = node.step();
-        let (low, high) = (corner - self.slack, corner + self.slack);
-        Boxes {
-            min: [
-                bounds::<L>(&node.lower[0], step.x, low.x),
-                bounds::<L>(&node.lower[1], step.y, low.y),
-                bounds::<L>(&node.lower[2], step.z, low.z),
-            ],
-            max: [
-                bounds::<L>(&node.upper[0], step.x, high.x),
-                bounds::<L>(&node.upper[1], step.y, high.y),
-                bounds::<L>(&node.upper[2], step.z, high.z),
-            ],
-        }
+        let [a, b, c] = self.axes;
+        let (a, b, c) = (self.sides(node, a), self.sides(node, b), self.sides(node, c));
+        Boxes { min: [a.0, b.0, c.0], max: [a.1, b.1, c.1] }
+    }
+
+    /// Lower and upper bounds along an axis.
+    #[inline(always)]
+    fn sides<L: Lanes>(&self, node: &Node, axis: usize) -> (L, L) {
+        let corner = node.origin[axis] - self.anchor[axis];
+        let step = L::splat(node.step_along(axis));
+        (
+            L::from_u8(&node.lower[axis]).times_plus(step, L::splat(corner - self.slack)),
+            L::from_u8(&node.upper[axis]).times_plus(step, L::splat(corner + self.slack)),
+        )
     }
 
     /// The lanes whose boxes reach into the frustum up to `limit` along the main axis, and where they begin.
     #[inline(always)]
     pub fn meets<L: Lanes>(&self, boxes: &Boxes<L>, limit: f32) -> (u32, [f32; LANES]) {
         let zero = L::splat(0.0);
-        let (min, max) = (boxes.min[self.main], boxes.max[self.main]);
+        let (min, max) = (boxes.min[0], boxes.max[0]);
         let (near, far) = if 0.0 < self.sense { (min, max) } else { (zero - max, zero - min) };
         let entry = near.max(zero);
         let mut meets = zero.less_equal(far) & entry.less_equal(L::splat(limit));
         for i in 0..2 {
-            let (min, max) = (boxes.min[self.across[i]], boxes.max[self.across[i]]);
+            let (min, max) = (boxes.min[1 + i], boxes.max[1 + i]);
             let (low, high) = (L::splat(self.slope[i].0), L::splat(self.slope[i].1));
             let upper = L::splat(self.offset[i].1) + (high * entry).max(high * far);
             let lower = L::splat(self.offset[i].0) + (low * entry).min(low * far);
@@ -164,28 +164,31 @@ impl Frustum {
         (meets.bits(), entry.store())
     }
 
-    /// The lanes whose triangles may reach into the frustum, told by the boxes around them.
+    /// The lanes whose triangles, given corner by corner and axis by axis, may reach into the frustum, told by
+    /// the boxes around them.
     #[inline(always)]
-    pub fn meets_triangles<L: Lanes>(&self, [a, b, c]: [Vec3Lanes<L>; 3]) -> u32 {
-        let boxes = Boxes {
-            min: [
-                a.x.min(b.x).min(c.x) - L::splat(self.anchor.x + self.slack),
-                a.y.min(b.y).min(c.y) - L::splat(self.anchor.y + self.slack),
-                a.z.min(b.z).min(c.z) - L::splat(self.anchor.z + self.slack),
-            ],
-            max: [
-                a.x.max(b.x).max(c.x) - L::splat(self.anchor.x - self.slack),
-                a.y.max(b.y).max(c.y) - L::splat(self.anchor.y - self.slack),
-                a.z.max(b.z).max(c.z) - L::splat(self.anchor.z - self.slack),
-            ],
-        };
+    pub fn meets_triangles<L: Lanes>(&self, corners: &[[[f32; LANES]; 3]; 3]) -> u32 {
+        let [a, b, c] = self.axes;
+        let a = self.triangle_sides(corners, a);
+        let (b, c) = (self.triangle_sides(corners, b), self.triangle_sides(corners, c));
+        let boxes = Boxes { min: [a.0, b.0, c.0], max: [a.1, b.1, c.1] };
         self.meets::<L>(&boxes, f32::INFINITY).0
+    }
+
+    #[inline(always)]
+    fn triangle_sides<L: Lanes>(&self, [a, b, c]: &[[[f32; LANES]; 3]; 3], axis: usize) -> (L, L) {
+        let (a, b, c) = (L::load(&a[axis]), L::load(&b[axis]), L::load(&c[axis]));
+        let anchor = self.anchor[axis];
+        (
+            a.min(b).min(c) - L::splat(anchor + self.slack),
+            a.max(b).max(c) - L::splat(anchor - self.slack),
+        )
     }
 
     /// How far along the main axis any ray still looks.
     #[inline(always)]
     pub fn limit<W: Wide>(&self, rays: &WideRays<W>, limits: &[f32; WIDE]) -> f32 {
-        let along = rays.direction[self.main];
+        let along = rays.direction[self.axes[0]];
         let along = along.max(W::splat(0.0) - along);
         let limit = (W::load(limits) * along).max_lane() + self.depth;
         limit.min(self.farthest) + self.slack
@@ -199,11 +202,6 @@ fn main_axis(direction: Vec3) -> usize {
         (_, _, true) => 1,
         _ => 2,
     }
-}
-
-#[inline(always)]
-fn bounds<L: Lanes>(steps: &[u8; LANES], step: f32, corner: f32) -> L {
-    L::from_u8(steps).times_plus(L::splat(step), L::splat(corner))
 }
 
 #[inline(always)]

@@ -123,14 +123,14 @@ impl<L: Lanes> PacketVisitor<L> for GatherInPacket<'_, L> {
 
     #[inline(always)]
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let block =
-            Disc::before_packet::<L>(points, block_idx, self.packet, self.packet.wide.lanes());
+        let block = Disc::before_packet::<L>(points, block_idx, self.packet);
+        let lines = self.packet.wide.lanes();
         let mut limits = L::Wide::load(&self.limits);
         let mut end = self.sightings.len();
         self.sightings.resize(end + LANES, Sighting::NONE);
         // No branch: whether a disc is hit cannot be foretold.
         for lane in 0..LANES {
-            let (distance, mask) = block.intersect(lane);
+            let (distance, mask) = block.intersect(&lines, lane);
             let is_hit = mask & distance.less_equal(limits);
             let limit = gather_limit(distance, L::Wide::splat(block.radius(lane)));
             limits = L::Wide::select(is_hit, limit.min(limits), limits);

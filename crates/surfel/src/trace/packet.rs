@@ -20,9 +20,10 @@ pub struct WideRays<W> {
 pub struct Packet<'r, W> {
     pub rays: &'r [Ray],
     pub wide: WideRays<W>,
-    inverse: [W; 3],
     pub frustum: Frustum,
-    /// Origins relative to the frustum's anchor.
+    /// Of the directions, in the order of the frustum's axes.
+    inverse: [W; 3],
+    /// Origins relative to the frustum's anchor, in the same order.
     from_anchor: [W; 3],
     /// Where all rays start, if that is one place.
     pub common_origin: Option<Vec3>,
@@ -53,20 +54,8 @@ impl<W: Wide> WideRays<W> {
                 &filled
             }
         };
-        let rays: &[[f32; 8]; WIDE] = bytemuck::cast_ref(rays);
-        let mut rows = [[0.0; WIDE]; 8];
-        for (row, values) in rows.iter_mut().enumerate() {
-            for lane in 0..WIDE {
-                values[lane] = rays[lane][row];
-            }
-        }
-        let [x, y, z, t_min, to_x, to_y, to_z, t_max] = rows;
-        Self {
-            origin: [W::load(&x), W::load(&y), W::load(&z)],
-            direction: [W::load(&to_x), W::load(&to_y), W::load(&to_z)],
-            t_min: W::load(&t_min),
-            t_max: W::load(&t_max),
-        }
+        let [x, y, z, t_min, to_x, to_y, to_z, t_max] = W::columns(bytemuck::cast_ref(rays));
+        Self { origin: [x, y, z], direction: [to_x, to_y, to_z], t_min, t_max }
     }
 }
 
@@ -110,16 +99,16 @@ impl<'r, W: Wide> Packet<'r, W> {
         }
         let wide = WideRays::new(rays);
         let frustum = Frustum::new(root, &rays[0], &wide, ends_meet)?;
-        let anchor = frustum.anchor;
-        let [x, y, z] = wide.direction;
+        let [a, b, c] = frustum.axes;
+        let along = [wide.direction[a], wide.direction[b], wide.direction[c]];
         Some(Self {
             common_origin: wide.common_origin(rays[0].origin),
             rays,
-            inverse: [inverse(x), inverse(y), inverse(z)],
+            inverse: [inverse(along[0]), inverse(along[1]), inverse(along[2])],
             from_anchor: [
-                wide.origin[0] - W::splat(anchor.x),
-                wide.origin[1] - W::splat(anchor.y),
-                wide.origin[2] - W::splat(anchor.z),
+                wide.origin[a] - W::splat(frustum.anchor[a]),
+                wide.origin[b] - W::splat(frustum.anchor[b]),
+                wide.origin[c] - W::splat(frustum.anchor[c]),
             ],
             wide,
             frustum,
@@ -148,7 +137,7 @@ impl<'r, W: Wide> Packet<'r, W> {
     }
 }
 
-/// A child on the stack with its box, relative to the frustum's anchor.
+/// A child on the stack with its box, as `Boxes` has it.
 #[derive(Clone, Copy)]
 struct ChildBox {
     /// Packed.

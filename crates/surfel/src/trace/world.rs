@@ -97,25 +97,23 @@ pub fn scene_hits(
     // Beside the hits, which are large: most rays look at theirs only once.
     let mut distances = vec![f32::INFINITY; rays.len()];
     let mut rounds = Rounds::new(scene, simd, which, rays);
+    let mut there = RaysThere::default();
     loop {
         let limit = |ray_idx: u32| distances[ray_idx as usize].min(rays[ray_idx as usize].t_max);
         let Some(batches) = rounds.next(limit) else { break };
         for (instance_idx, ray_indices) in batches.iter().filter(|(_, rays)| !rays.is_empty()) {
             let instance = &scene.instances[*instance_idx as usize];
+            there.enter(instance, ray_indices, rays);
             // Discs behind the nearest are blended with it, whatever other instances are among them.
             let reach = match scene.geometry(instance) {
                 FlatGeometry::Cloud(cloud) => cloud.reach,
                 FlatGeometry::Mesh(_) => 0.0,
             };
-            let mut there = enter(instance, ray_indices, rays);
-            let nearest = ray_indices.iter().map(|&ray_idx| distances[ray_idx as usize]);
-            for ((ray, scale), nearest) in there.rays.iter_mut().zip(&there.scales).zip(nearest) {
-                ray.t_max = ray.t_max.min(nearest * scale + reach);
-            }
+            there.end_at(ray_indices, &distances, reach);
             batch.trace(scene, simd, instance, &there.rays);
-            for (i, &ray_idx) in ray_indices.iter().enumerate() {
+            batch.measure(scene, instance, &there.scales);
+            for (i, (&ray_idx, &distance)) in ray_indices.iter().zip(&batch.distances).enumerate() {
                 let place = ray_idx as usize;
-                let distance = batch.distance(scene, i, instance) / there.scales[i];
                 let is_first = || {
                     let is_tie = distance == distances[place] && distance < f32::INFINITY;
                     is_tie && *instance_idx < hits[place].instance
@@ -149,6 +147,7 @@ pub fn scene_occlusions(
     occluded.fill(false);
     let mut blocked = Vec::new();
     let mut rounds = Rounds::new(scene, simd, which, rays);
+    let mut there = RaysThere::default();
     loop {
         let limit = |ray_idx: u32| match occluded[ray_idx as usize] {
             true => f32::NEG_INFINITY,
@@ -157,7 +156,7 @@ pub fn scene_occlusions(
         let Some(batches) = rounds.next(limit) else { return };
         for (instance_idx, ray_indices) in batches.iter().filter(|(_, rays)| !rays.is_empty()) {
             let instance = &scene.instances[*instance_idx as usize];
-            let there = enter(instance, ray_indices, rays);
+            there.enter(instance, ray_indices, rays);
             blocked.resize(ray_indices.len(), false);
             block(scene, simd, instance, &there.rays, &mut blocked);
             for (&ray_idx, is_blocked) in ray_indices.iter().zip(&blocked) {
@@ -187,8 +186,8 @@ enum Visits {
     /// was there; and the rays still on their way.
     Few { entries: Vec<f32>, open: Vec<u32> },
     /// Of many: all that each ray comes by, sorted by where it enters, one ray's after another's; and what
-    /// is left of that of each ray still on its way.
-    Many { entries: Vec<(f32, u32)>, left: Vec<(u32, Range<u32>)> },
+    /// is left of that of each ray still on its way. `jobs` is room for the next round.
+    Many { entries: Vec<(f32, u32)>, left: Vec<(u32, Range<u32>)>, jobs: Vec<(u32, u32)> },
 }
 
 /// With more instances, the tree over them is asked: their boxes one by one would cost more.
@@ -215,48 +214,78 @@ impl Rounds {
     /// The next visit of each ray that has one within its limit; none if no ray has.
     fn next(&mut self, limit: impl Fn(u32) -> f32) -> Option<&[(u32, Vec<u32>)]> {
         let Self { visits, batches } = self;
-        match visits {
-            Visits::Few { entries, open } => {
-                batches.iter_mut().for_each(|(_, rays)| rays.clear());
-                let n_rays = entries.len() / batches.len().max(1);
-                open.retain(|&ray| {
-                    let (mut nearest, mut entry) = (0, f32::INFINITY);
-                    for i in 0..batches.len() {
-                        let other = entries[i * n_rays + ray as usize];
-                        if other < entry {
-                            (nearest, entry) = (i, other);
-                        }
-                    }
-                    let goes = entry < f32::INFINITY && entry <= limit(ray);
-                    if goes {
-                        entries[nearest * n_rays + ray as usize] = f32::INFINITY;
-                        batches[nearest].1.push(ray);
-                    }
-                    goes
-                });
-                (!open.is_empty()).then_some(batches)
+        let n_batches = match visits {
+            Visits::Few { entries, open } => next_of_few(entries, open, batches, limit),
+            Visits::Many { entries, left, jobs } => {
+                next_of_many(entries, left, jobs, limit);
+                group(jobs, batches)
             }
-            Visits::Many { entries, left } => {
-                let mut jobs = Vec::with_capacity(left.len());
-                left.retain_mut(|(ray, left)| {
-                    let Some(next) = left.next() else { return false };
-                    let (entry, instance) = entries[next as usize];
-                    let goes = entry <= limit(*ray);
-                    if goes {
-                        jobs.push((instance, *ray));
-                    }
-                    goes
-                });
-                jobs.sort_by_key(|(instance, _)| *instance);
-                let groups = jobs.chunk_by(|a, b| a.0 == b.0);
-                batches.clear();
-                batches.extend(
-                    groups.map(|group| (group[0].0, group.iter().map(|(_, ray)| *ray).collect())),
-                );
-                (!batches.is_empty()).then_some(batches)
-            }
-        }
+        };
+        (0 < n_batches).then_some(&batches[..n_batches])
     }
+}
+
+/// Puts each ray into the batch of the instance that it visits next; how many batches there are then.
+fn next_of_few(
+    entries: &mut [f32],
+    open: &mut Vec<u32>,
+    batches: &mut [(u32, Vec<u32>)],
+    limit: impl Fn(u32) -> f32,
+) -> usize {
+    batches.iter_mut().for_each(|(_, rays)| rays.clear());
+    let n_rays = entries.len() / batches.len().max(1);
+    open.retain(|&ray| {
+        let (mut nearest, mut entry) = (0, f32::INFINITY);
+        for i in 0..batches.len() {
+            let other = entries[i * n_rays + ray as usize];
+            // Two choices instead of one branch, which could not be foretold.
+            nearest = if other < entry { i } else { nearest };
+            entry = entry.min(other);
+        }
+        let goes = entry < f32::INFINITY && entry <= limit(ray);
+        if goes {
+            entries[nearest * n_rays + ray as usize] = f32::INFINITY;
+            batches[nearest].1.push(ray);
+        }
+        goes
+    });
+    if open.is_empty() { 0 } else { batches.len() }
+}
+
+/// Lists the instances that rays visit next, each with the ray.
+fn next_of_many(
+    entries: &[(f32, u32)],
+    left: &mut Vec<(u32, Range<u32>)>,
+    jobs: &mut Vec<(u32, u32)>,
+    limit: impl Fn(u32) -> f32,
+) {
+    jobs.clear();
+    left.retain_mut(|(ray, left)| {
+        let Some(next) = left.next() else { return false };
+        let (entry, instance) = entries[next as usize];
+        let goes = entry <= limit(*ray);
+        if goes {
+            jobs.push((instance, *ray));
+        }
+        goes
+    });
+}
+
+/// Makes a batch of all jobs at the same instance, in room that is kept; how many batches there are then.
+fn group(jobs: &mut [(u32, u32)], batches: &mut Vec<(u32, Vec<u32>)>) -> usize {
+    jobs.sort_by_key(|(instance, _)| *instance);
+    let mut n_batches = 0;
+    for group in jobs.chunk_by(|a, b| a.0 == b.0) {
+        if n_batches == batches.len() {
+            batches.push((0, Vec::new()));
+        }
+        let (instance, rays) = &mut batches[n_batches];
+        *instance = group[0].0;
+        rays.clear();
+        rays.extend(group.iter().map(|(_, ray)| *ray));
+        n_batches += 1;
+    }
+    n_batches
 }
 
 fn visits_of_many(scene: &FlatScene, which: Which, rays: &[Ray]) -> Visits {
@@ -269,7 +298,7 @@ fn visits_of_many(scene: &FlatScene, which: Which, rays: &[Ray]) -> Visits {
             left.push((ray_idx as u32, first as u32..entries.len() as u32));
         }
     }
-    Visits::Many { entries, left }
+    Visits::Many { entries, left, jobs: Vec::new() }
 }
 
 /// Adds the instances whose boxes the ray meets, and where it enters them.
@@ -321,17 +350,37 @@ fn box_entry(instance: &Instance, ray: &Ray) -> Option<f32> {
     (near <= far + slack && near < f32::INFINITY).then_some(near - slack)
 }
 
-/// Rays at one instance, in its coordinates.
+/// Rays at one instance, in its coordinates; the room is kept from one to the next.
+#[derive(Default)]
 struct RaysThere {
     rays: Vec<Ray>,
     /// Object lengths that make one of the world along each ray.
     scales: Vec<f32>,
 }
 
-fn enter(instance: &Instance, indices: &[u32], rays: &[Ray]) -> RaysThere {
-    let there = indices.iter().map(|&ray_idx| instance.object_ray(&rays[ray_idx as usize]));
-    let (rays, scales) = there.unzip();
-    RaysThere { rays, scales }
+impl RaysThere {
+    fn enter(&mut self, instance: &Instance, indices: &[u32], rays: &[Ray]) {
+        self.rays.clear();
+        self.scales.clear();
+        if instance.is_in_place {
+            self.rays.extend(indices.iter().map(|&ray_idx| rays[ray_idx as usize]));
+            self.scales.resize(indices.len(), 1.0);
+            return;
+        }
+        for &ray_idx in indices {
+            let (ray, scale) = instance.object_ray(&rays[ray_idx as usize]);
+            self.rays.push(ray);
+            self.scales.push(scale);
+        }
+    }
+
+    /// Nothing is looked for beyond `reach` behind what is known already, at the world's `distances`.
+    fn end_at(&mut self, indices: &[u32], distances: &[f32], reach: f32) {
+        let nearest = indices.iter().map(|&ray_idx| distances[ray_idx as usize]);
+        for ((ray, scale), nearest) in self.rays.iter_mut().zip(&self.scales).zip(nearest) {
+            ray.t_max = ray.t_max.min(nearest * scale + reach);
+        }
+    }
 }
 
 /// What rays find at one instance; its room is kept from one to the next.
@@ -339,6 +388,8 @@ fn enter(instance: &Instance, indices: &[u32], rays: &[Ray]) -> RaysThere {
 struct Batch {
     on_points: Vec<SurfaceHit>,
     on_triangles: Vec<Hit>,
+    /// In the world, infinite where nothing was found.
+    distances: Vec<f32>,
 }
 
 impl Batch {
@@ -355,12 +406,19 @@ impl Batch {
         }
     }
 
-    /// Where the ray at `i` found something, in the object's coordinates; at infinity if it did not.
-    #[inline]
-    fn distance(&self, scene: &FlatScene, i: usize, instance: &Instance) -> f32 {
+    /// Sets the distances of what was found, from rays with these scales.
+    fn measure(&mut self, scene: &FlatScene, instance: &Instance, scales: &[f32]) {
+        let Self { on_points, on_triangles, distances } = self;
+        distances.clear();
         match scene.geometry(instance) {
-            FlatGeometry::Cloud(_) => self.on_points[i].distance,
-            FlatGeometry::Mesh(_) => self.on_triangles[i].distance,
+            FlatGeometry::Cloud(_) => {
+                distances
+                    .extend(on_points.iter().zip(scales).map(|(hit, scale)| hit.distance / scale));
+            }
+            FlatGeometry::Mesh(_) => {
+                let found = on_triangles.iter().zip(scales);
+                distances.extend(found.map(|(hit, scale)| hit.distance / scale));
+            }
         }
     }
 
