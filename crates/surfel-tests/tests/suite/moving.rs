@@ -238,7 +238,9 @@ fn tangents_bend_with_their_mesh() {
 fn a_mesh_is_bent_anew_only_in_a_new_pose() {
     let mut graph = skinned();
     let mut flat = FlatScene::new(&seen(graph.clone()), &Silent).unwrap();
-    let FlatGeometry::Mesh(mesh) = Arc::make_mut(&mut flat.geometries[0]) else { panic!("no mesh") };
+    let FlatGeometry::Mesh(mesh) = Arc::make_mut(&mut flat.geometries[0]) else {
+        panic!("no mesh")
+    };
     // Known again as long as nobody writes them.
     mesh.normals.fill(Vec3::ONE);
     flat.update(&graph, &Silent).unwrap();
