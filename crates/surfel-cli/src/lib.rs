@@ -24,6 +24,7 @@ mod report;
 pub mod scene_file;
 mod sequence;
 mod stats;
+mod view;
 
 use args::{Global, SceneArgs, Usage};
 use clap::{Parser, Subcommand};
@@ -55,6 +56,8 @@ enum Command {
     Render(Box<render::Args>),
     /// Render a film of a scene that moves, or of a turn around anything.
     Animate(Box<animate::Args>),
+    /// Look around in a scene, ray traced, in a browser.
+    View(Box<view::Args>),
     /// Tell what is in a file.
     Info(info::Args),
     /// Clean a cloud, add normals and radii, write it to a file.
@@ -95,6 +98,7 @@ impl Cli {
         match self.command {
             Command::Render(args) => Some(args.scene),
             Command::Animate(args) => Some(args.scene),
+            Command::View(args) => Some(args.with_all_columns()),
             _ => None,
         }
     }
@@ -115,6 +119,7 @@ fn run_command(
     match command {
         Command::Render(args) => render::run(args, line, global, report),
         Command::Animate(args) => animate::run(args, line, global, report),
+        Command::View(args) => view::run(args, line, global, report),
         Command::Info(args) => info::run(args, report),
         Command::Prepare(args) => prepare::run(args, global, report),
         Command::Demo(args) => demo::run(args, global, report),

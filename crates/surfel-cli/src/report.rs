@@ -15,21 +15,34 @@ pub enum Verbosity {
 }
 
 /// Shows bars on a terminal; elsewhere, as in a log, only lines.
-pub struct Report {
+pub struct Report<'l> {
     verbosity: Verbosity,
     cancelled: Arc<AtomicBool>,
     stage: Mutex<Option<(String, Instant)>>,
     bar: RwLock<ProgressBar>,
+    /// Hears all of it, and may cancel, too.
+    pub listener: Option<&'l dyn Progress>,
 }
 
-impl Report {
+impl<'l> Report<'l> {
     pub fn new(verbosity: Verbosity) -> Self {
         Self {
             verbosity,
             cancelled: Arc::default(),
             stage: Mutex::default(),
             bar: RwLock::new(ProgressBar::hidden()),
+            listener: None,
         }
+    }
+
+    /// One that tells nothing but what `listener` hears.
+    pub fn heard_by(listener: &'l dyn Progress) -> Self {
+        Self { listener: Some(listener), ..Self::new(Verbosity::Quiet) }
+    }
+
+    /// The same as this one, for another thread's work.
+    pub fn for_thread<'o>(&self) -> Report<'o> {
+        Report { cancelled: self.cancellation(), ..Report::new(self.verbosity) }
     }
 
     /// Set from outside, it stops the work.
@@ -73,9 +86,10 @@ impl Report {
     }
 }
 
-impl Progress for Report {
+impl Progress for Report<'_> {
     fn begin(&self, stage: &str, total: u64) {
         self.end_stage();
+        self.listener.inspect(|listener| listener.begin(stage, total));
         *self.stage.lock().unwrap_or_else(PoisonError::into_inner) =
             Some((stage.to_owned(), Instant::now()));
         if self.shows_bars() {
@@ -84,6 +98,7 @@ impl Progress for Report {
     }
 
     fn advance(&self, units: u64) {
+        self.listener.inspect(|listener| listener.advance(units));
         self.bar.read().unwrap_or_else(PoisonError::into_inner).inc(units);
     }
 
@@ -96,12 +111,13 @@ impl Progress for Report {
 
     fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
+            || self.listener.is_some_and(|listener| listener.is_cancelled())
     }
 }
 
 /// Adds a flag to each note.
 pub struct WithFlag<'a> {
-    report: &'a Report,
+    report: &'a Report<'a>,
     flag: &'a str,
 }
 

@@ -12,6 +12,8 @@ pub const MOST_PIXELS: u64 = 1 << 21;
 pub const MOST_SAVED_PIXELS: u64 = 1 << 26;
 /// Camera rays of all of a picture to keep, and rays toward lights.
 pub const MOST_RAYS: u64 = 1 << 34;
+/// Camera rays a pixel, and rays toward lights.
+pub const MOST_SAMPLES: u32 = 1024;
 /// Along a side.
 pub const MOST_LENGTH: u32 = 1 << 15;
 /// Bytes of a message or of the body of a request.

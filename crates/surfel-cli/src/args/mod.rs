@@ -37,7 +37,7 @@ impl std::fmt::Display for Usage {
 
 impl std::error::Error for Usage {}
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 #[command(next_help_heading = "Everywhere")]
 pub struct Global {
     /// Tell nothing but errors.

@@ -39,6 +39,9 @@ pub struct PreparationArgs {
     /// Columns of a text file, as in x,y,z,-,r,g,b; found out from the file if not given.
     #[arg(long, value_name = "NAMES")]
     columns: Option<String>,
+    /// Whether columns are kept that no picture needs.
+    #[arg(skip)]
+    pub keeps_all: bool,
 }
 
 impl PreparationArgs {
@@ -65,6 +68,9 @@ impl PreparationArgs {
 
     /// Only the columns that a picture of these colours needs.
     pub fn columns(&self, color: Option<&ColorSource>) -> ColumnChoice {
+        if self.keeps_all {
+            return ColumnChoice::All;
+        }
         let mut columns = self.geometry();
         match color {
             None => columns.extend([Column::Colors, Column::Intensity]),

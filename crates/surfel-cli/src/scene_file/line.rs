@@ -12,19 +12,20 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// The words that were parsed, those of the scene file among them.
+#[derive(Clone)]
 pub struct Line {
-    words: Vec<OsString>,
+    pub(super) words: Vec<OsString>,
     files: Vec<PathBuf>,
     /// Of the scene files named.
     pub scene: SceneFile,
 }
 
 /// Groups of options that an object may have for itself.
-const OF_OBJECTS: [&str; 3] = ["Surface", "Preparation", "Colour"];
+pub(super) const OF_OBJECTS: [&str; 3] = ["Surface", "Preparation", "Colour"];
 /// Commands that show scenes.
-const OF_SCENES: [&str; 2] = ["render", "animate"];
+const OF_SCENES: [&str; 3] = ["render", "animate", "view"];
 /// Those of them that belong to the picture all the same.
-const OF_PICTURES: [&str; 2] = ["background", "no-background"];
+pub(super) const OF_PICTURES: [&str; 2] = ["background", "no-background"];
 
 impl Line {
     /// Parses the program's own words, the first of which is its name. Options of scene files count where
@@ -73,23 +74,10 @@ impl Line {
         Ok(cli.into_scene().ok_or_else(|| wrong("no scene".into()))?)
     }
 
-    /// What was said about surface, preparation and colour, as keys and values.
-    pub fn given(&self) -> Vec<(String, Value)> {
-        let Ok(matches) = command().try_get_matches_from(&self.words) else { return Vec::new() };
-        let Some((name, given)) = matches.subcommand() else { return Vec::new() };
-        let root = Cli::command();
-        let args = root.find_subcommand(name).into_iter().flat_map(Command::get_arguments);
-        let is_of_object =
-            |arg: &&Arg| arg.get_help_heading().is_some_and(|name| OF_OBJECTS.contains(&name));
-        let value = |arg: &Arg| {
-            if matches!(arg.get_action(), ArgAction::SetTrue) {
-                return Some(Value::Bool(true));
-            }
-            let word = given.get_raw(arg.get_id().as_str())?.next_back()?;
-            Some(Value::String(word.to_string_lossy().into_owned()))
-        };
-        let told = args.filter(is_of_object).filter(is_in(given));
-        told.filter_map(|arg| Some((arg.get_long()?.replace('-', "_"), value(arg)?))).collect()
+    /// What is seen, as the words say.
+    pub fn scene_args(&self) -> anyhow::Result<SceneArgs> {
+        let cli = self.parsed(command(), &[]).map_err(|error| Usage(short(&error)))?;
+        Ok(cli.into_scene().ok_or_else(|| Usage("no scene".into()))?)
     }
 
     fn cli(&self) -> anyhow::Result<Cli> {
@@ -149,7 +137,7 @@ fn known_to_objects(command: &Command) -> Known<'_> {
 }
 
 /// The last of several values counts: those of the command line stand behind those of files.
-fn command() -> Command {
+pub(super) fn command() -> Command {
     let overriding = |command: Command| command.args_override_self(true);
     overriding(Cli::command()).mut_subcommands(overriding)
 }

@@ -6,6 +6,7 @@ mod line;
 mod motion;
 mod object;
 mod options;
+mod settings;
 
 pub(crate) use line::Line;
 pub use motion::{CameraMotion, Motion};
@@ -34,7 +35,7 @@ pub struct SceneFile {
 }
 
 /// Of `raw`.
-const TABLES: [&str; 3] = ["object", "lamp", "animation"];
+pub(crate) const TABLES: [&str; 3] = ["object", "lamp", "animation"];
 
 /// Bytes of the largest scene file: it names data, it does not hold them.
 const MOST_BYTES: u64 = 64 << 20;

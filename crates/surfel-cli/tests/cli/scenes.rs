@@ -378,7 +378,9 @@ fn an_environment_gives_light_and_may_be_seen() {
     let dark = folder.path("dark.exr");
     let pixel = |x, y| if (x, y) == (0, 0) { (-1.0, f32::NAN, 0.5) } else { (1.0f32, 1.0, 1.0) };
     exr::prelude::write_rgb_file(&dark, 4, 2, pixel).unwrap();
-    let output = surfel(&[&["render", &cloud, "--environment", &dark], &SMALL[..]].concat());
+    let picture = folder.path("dark.png");
+    let arguments = ["render", &cloud, "--environment", &dark, "-o", &picture];
+    let output = surfel(&[&arguments, &SMALL[..]].concat());
     let text = stderr(&output);
     assert!(text.contains("dark.exr: 1 pixels with values that are no light"), "{text}");
     let broken = folder.write("broken.hdr", "#?RADIANCE\n\n-Y 9");

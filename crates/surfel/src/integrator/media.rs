@@ -67,8 +67,8 @@ pub struct Boundary {
     pub beyond: Media,
     /// Index of refraction here over that beyond.
     pub eta: f32,
-    /// Share of light that the way to it leaves.
-    pub left: Vec3,
+    /// Of the way to it.
+    pub transmittance: Vec3,
 }
 
 impl Way {
@@ -94,8 +94,8 @@ impl Way {
             // Matte surfaces, whose index is 1, are that under water too.
             let is_matte = shading.ior == 1.0;
             let eta = if is_matte { 1.0 } else { self.media.ior(scene) / shading.ior };
-            let left = self.left_at(scene, self.media, hit.distance);
-            return Boundary { here: self.media, beyond: self.media, eta, left };
+            let transmittance = self.transmittance(scene, self.media, hit.distance);
+            return Boundary { here: self.media, beyond: self.media, eta, transmittance };
         }
         let was_entered = self.media.holds(instance);
         let is_inside = if scene.has_outside(instance) { hit.is_inner } else { was_entered };
@@ -107,29 +107,27 @@ impl Way {
         };
         let beyond = if is_inside { here.left(instance) } else { here.entered(instance) };
         let eta = here.ior(scene) / beyond.ior(scene);
-        Boundary { here, beyond, eta, left: self.left_at(scene, here, hit.distance) }
+        let transmittance = self.transmittance(scene, here, hit.distance);
+        Boundary { here, beyond, eta, transmittance }
     }
 
-    /// Share of light that is left after a distance, where the way turns out to be inside of `here`.
-    fn left_at(&self, scene: &FlatScene, here: Media, distance: f32) -> Vec3 {
+    /// Up to a distance, where the way turns out to end in `here`.
+    fn transmittance(&self, scene: &FlatScene, here: Media, distance: f32) -> Vec3 {
         match (self.media.innermost(), here.innermost()) {
-            (Some(medium), _) => absorbed(scene, medium, self.lead + distance),
+            (Some(medium), _) => beer(scene, medium, self.lead + distance),
             // It began somewhere inside, the body no farther away than its box.
-            (None, Some(medium)) => {
-                absorbed(scene, medium, self.length_in(scene, medium, distance))
-            }
+            (None, Some(medium)) => beer(scene, medium, self.length_in(scene, medium, distance)),
             (None, None) => Vec3::ONE,
         }
     }
 
-    /// Share of light that is left where a way ends which meets nothing: a body that it never leaves reaches
-    /// no farther than its box.
-    pub fn left_at_end(&self, scene: &FlatScene) -> Vec3 {
+    /// Of a way that meets nothing: a body that it never leaves reaches no farther than its box.
+    pub fn transmittance_to_end(&self, scene: &FlatScene) -> Vec3 {
         let Some(medium) = self.media.innermost() else { return Vec3::ONE };
         let end = self.ray.t_max;
         let is_endless = end == f32::INFINITY;
         let length = if is_endless { self.length_in(scene, medium, end) } else { self.lead + end };
-        absorbed(scene, medium, length)
+        beer(scene, medium, length)
     }
 
     /// Length up to `end` within the box of an instance.
@@ -139,8 +137,8 @@ impl Way {
     }
 }
 
-/// Beer's law, over a length in world units.
-fn absorbed(scene: &FlatScene, instance: u32, length: f32) -> Vec3 {
+/// Share of light that is left after a length in world units (Beer's law).
+fn beer(scene: &FlatScene, instance: u32, length: f32) -> Vec3 {
     let Material { attenuation_color, attenuation_distance, .. } = material(scene, instance);
     if *attenuation_distance == f32::INFINITY {
         return Vec3::ONE;

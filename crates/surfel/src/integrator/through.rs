@@ -41,13 +41,13 @@ pub fn light_through(
             let ((ray_idx, way), hit) = (passing[i], &hits[i]);
             let share = &mut shares[ray_idx as usize];
             if hit.is_miss() {
-                *share *= way.left_at_end(scene);
+                *share *= way.transmittance_to_end(scene);
                 continue;
             }
             let ray = way.ray;
             let shading = Shading::new(scene, &ray, hit);
             let boundary = way.boundary(scene, &shading, hit);
-            *share *= boundary.left * passed(&shading, ray.direction, boundary.eta);
+            *share *= boundary.transmittance * passed(&shading, ray.direction, boundary.eta);
             if share.max_element() < LEAST {
                 *share = Vec3::ZERO;
                 continue;

@@ -145,7 +145,7 @@ impl<'a> Search<'a> {
         let shading = Shading::new(scene, &path.way.ray, hit);
         let boundary = path.way.boundary(scene, &shading, hit);
         let coverage = shading.alpha * path.weight.max_element();
-        path.weight *= boundary.left;
+        path.weight *= boundary.transmittance;
         if shading.alpha < 1.0 {
             self.pass(&path, &shading);
             path.weight *= shading.alpha;
@@ -187,7 +187,7 @@ impl<'a> Search<'a> {
         let slot = path.slot as usize;
         let behind = self.batch.samples.behind[slot];
         let direction = path.way.ray.direction;
-        let weight = path.weight * path.way.left_at_end(self.batch.scene);
+        let weight = path.weight * path.way.transmittance_to_end(self.batch.scene);
         let with_sun = path.sees == (Sees::Sky { with_sun: true });
         match path.sees {
             Sees::Behind if self.batch.scene.background == Background::Surroundings => {

@@ -86,9 +86,10 @@ pub fn render(
     let mut seen = vec![Seen { instance: NO_ID, slot: 0 }; n_pixels];
     for (instance_idx, instance) in scene.instances.iter().enumerate() {
         project(scene, instance, view, rows, progress, &nearest)?;
-        let keys = nearest.iter().map(|nearest| nearest.swap(EMPTY, Ordering::Relaxed));
+        let keys = nearest.iter().map(|nearest| nearest.load(Ordering::Relaxed));
         for (pixel, key) in keys.enumerate().filter(|(_, key)| *key != EMPTY) {
             let depth = f32::from_bits((key >> 32) as u32);
+            // Those of instances before are no nearer than themselves.
             if depth < depths[pixel] {
                 depths[pixel] = depth;
                 seen[pixel] = Seen { instance: instance_idx as u32, slot: key as u32 };
@@ -98,7 +99,7 @@ pub fn render(
     Ok(Raster { rows, depths, seen }.shade(scene, view, settings, piece))
 }
 
-/// Sets `nearest` to depth and slot, as one number, of the nearest point of one instance in each pixel.
+/// Lowers `nearest` to depth and slot, as one number, of the nearest point of one instance in each pixel.
 fn project(
     scene: &FlatScene,
     instance: &Instance,

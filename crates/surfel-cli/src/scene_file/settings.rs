@@ -1,0 +1,111 @@
+//! The options of a line as settings that may be changed: what a viewer works with.
+
+use super::fields::Fields;
+use super::line::{OF_OBJECTS, OF_PICTURES, command};
+use super::options::{Known, is_in};
+use super::{Line, Options};
+use crate::Cli;
+use crate::args::SceneArgs;
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, CommandFactory};
+use serde_json::{Map, Value};
+use std::ffi::OsString;
+use std::path::Path;
+
+/// Options beside those of surface, preparation and colour that decide what the trees hold.
+const OF_TREES: [&str; 2] = ["material", "light"];
+
+impl Line {
+    /// All that was said about what is seen, as keys and values.
+    pub fn settings(&self) -> Map<String, Value> {
+        let command = scene_command();
+        let is_known = |arg: &Arg| command.get_arguments().any(|known| known == arg);
+        self.said(is_known).into_iter().collect()
+    }
+
+    /// What was said about surface, preparation and colour, as keys and values.
+    pub fn given(&self) -> Vec<(String, Value)> {
+        self.said(|arg| arg.get_help_heading().is_some_and(|name| OF_OBJECTS.contains(&name)))
+    }
+
+    fn said(&self, is_wanted: impl Fn(&Arg) -> bool) -> Vec<(String, Value)> {
+        let Ok(matches) = command().try_get_matches_from(&self.words) else { return Vec::new() };
+        let Some((name, given)) = matches.subcommand() else { return Vec::new() };
+        let root = Cli::command();
+        let args = root.find_subcommand(name).into_iter().flat_map(Command::get_arguments);
+        let said = args.filter(|arg| is_wanted(arg)).filter(is_in(given));
+        let pair = |arg: &Arg| Some((arg.get_long()?.replace('-', "_"), value(arg, given)?));
+        said.filter_map(pair).collect()
+    }
+
+    /// The same files under these settings and no others.
+    pub fn under(&self, settings: &Map<String, Value>) -> Result<(SceneArgs, Self), String> {
+        let options = Options::read(Fields::new(String::new(), settings.clone()), Path::new(""))?;
+        let command = scene_command();
+        let known = Known { command: &command, others: &[], elsewhere: Vec::new() };
+        let mut words: Vec<OsString> = ["surfel", "view"].map(OsString::from).into();
+        words.extend(options.words(&known, None)?.into_iter().map(OsString::from));
+        words.push("--".into());
+        words.extend(self.inputs().map_err(|error| error.to_string())?);
+        let line = Self { words, ..self.clone() };
+        let args = line.scene_args().map_err(|error| format!("{error:#}"))?;
+        Ok((args, line))
+    }
+
+    fn inputs(&self) -> anyhow::Result<impl Iterator<Item = OsString>> {
+        Ok(self.scene_args()?.files.into_iter().map(OsString::from))
+    }
+
+    /// Options of a line made by `under` that differ from what they are by themselves.
+    pub fn told(&self) -> Vec<String> {
+        let command = scene_command();
+        let is_default = |word: &String| {
+            let pair = word.trim_start_matches('-').split_once('=');
+            pair.is_some_and(|(name, value)| {
+                let arg = command.get_arguments().find(|arg| arg.get_long() == Some(name));
+                arg.is_some_and(|arg| arg.get_default_values().iter().any(|known| known == value))
+            })
+        };
+        self.option_words().filter(|word| !is_default(word)).collect()
+    }
+
+    /// What decides what the trees hold; all else can change without building them anew.
+    pub fn tree_key(&self) -> String {
+        let command = scene_command();
+        let is_of_trees = |word: &String| {
+            let name = word.trim_start_matches('-').split('=').next().unwrap_or_default();
+            let arg = command.get_arguments().find(|arg| arg.get_long() == Some(name));
+            let heading = arg.and_then(Arg::get_help_heading).unwrap_or_default();
+            let is_of_objects = OF_OBJECTS.contains(&heading) && !OF_PICTURES.contains(&name);
+            is_of_objects || OF_TREES.contains(&name)
+        };
+        self.option_words().filter(is_of_trees).collect::<Vec<_>>().join("\n")
+    }
+
+    fn option_words(&self) -> impl Iterator<Item = String> {
+        let options = self.words.iter().skip(2).take_while(|word| *word != "--");
+        options.map(|word| word.to_string_lossy().into_owned())
+    }
+}
+
+/// One with the options that say what is seen.
+fn scene_command() -> Command {
+    SceneArgs::augment_args(Command::new("scene"))
+}
+
+/// What was said of an option.
+fn value(arg: &Arg, given: &ArgMatches) -> Option<Value> {
+    if matches!(arg.get_action(), ArgAction::SetTrue) {
+        return Some(Value::Bool(true));
+    }
+    let words: Vec<String> = given
+        .get_raw(arg.get_id().as_str())?
+        .map(|word| word.to_string_lossy().into_owned())
+        .collect();
+    let is_list = matches!(arg.get_action(), ArgAction::Append);
+    match words.last() {
+        // One that may stand without a value.
+        None => Some(Value::Bool(true)),
+        Some(_) if is_list => Some(words.into()),
+        Some(last) => Some(Value::String(last.clone())),
+    }
+}

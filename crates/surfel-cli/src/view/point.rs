@@ -1,0 +1,83 @@
+//! What is told about a place that was clicked at.
+
+use super::made::{INDEX, Made};
+use crate::assemble::Assembly;
+use serde_json::{Value, json};
+use surfel::points::{PointCloud, Values};
+use surfel::scene::Geometry;
+use surfel_web::Place;
+
+/// The point or triangle at a place, with all columns of the file that it came from.
+pub fn describe(base: &Assembly, made: &Made, place: &Place) -> Value {
+    let mut told = json!({
+        "surface": place.position.to_array(),
+        "normal": place.normal.to_array(),
+        "distance": place.depth,
+        "kind": "triangle",
+        "index": place.id,
+        "position": place.position.to_array(),
+        "columns": [],
+    });
+    let Some(instance) = made.flat.instances.get(place.instance as usize) else { return told };
+    let node = &made.graph.nodes[instance.node as usize];
+    told["object"] = json!(name(made, instance.node as usize));
+    let part = node.parts.iter().find(|part| part.material == instance.material as usize);
+    let Some(geometry) = part.map(|part| part.geometry) else { return told };
+    let index = made.indices[geometry].get(place.id as usize);
+    let Some((Geometry::Points(points), &index)) = base.graph.geometries.get(geometry).zip(index)
+    else {
+        return told;
+    };
+    let (cloud, index) = (&points.cloud, index as usize);
+    let world = made.graph.world_from_nodes()[instance.node as usize];
+    told["kind"] = json!("point");
+    told["index"] = json!(index);
+    told["position"] = json!(world.transform_point3(cloud.world_position(index)).to_array());
+    told["columns"] = columns(cloud, index).into();
+    told
+}
+
+/// The nearest name at a node or above it.
+fn name(made: &Made, node: usize) -> &str {
+    let nodes = &made.graph.nodes;
+    let mut above = std::iter::successors(Some(node), |node| nodes[*node].parent);
+    let named = above.find(|node| !nodes[*node].name.is_empty());
+    named.map_or("", |node| &nodes[node].name)
+}
+
+fn columns(cloud: &PointCloud, index: usize) -> Vec<Value> {
+    let column = |name: &str, value: Value| json!({ "name": name, "value": value });
+    let mut columns = Vec::new();
+    if let Some(colors) = &cloud.colors {
+        let names = ["red", "green", "blue"];
+        columns.extend(names.into_iter().zip(colors[index]).map(|(name, c)| column(name, c.into())));
+    }
+    if let Some(intensity) = &cloud.intensity {
+        columns.push(column("intensity", shortest(intensity[index])));
+    }
+    if let Some(classes) = &cloud.classification {
+        let class = classes[index];
+        columns.push(column("classification", class.into()));
+        columns.push(column("class", surfel::image::class_name(class).into()));
+    }
+    if let Some(normals) = &cloud.normals {
+        let names = ["nx", "ny", "nz"].into_iter().zip(normals[index].to_array());
+        columns.extend(names.map(|(name, value)| column(name, shortest(value))));
+    }
+    if let Some(radii) = &cloud.radii {
+        columns.push(column("radius", shortest(radii[index])));
+    }
+    for scalar in cloud.scalars.iter().filter(|scalar| scalar.name != INDEX) {
+        let value = match &scalar.values {
+            Values::F32(values) => shortest(values[index]),
+            values => json!(values.get(index)),
+        };
+        columns.push(column(&scalar.name, value));
+    }
+    columns
+}
+
+/// With the digits that tell it from others of its kind, not those of the double that it becomes.
+fn shortest(value: f32) -> Value {
+    value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
+}

@@ -1,0 +1,280 @@
+//! Scenes of the files that the viewer was started with, by the settings of its pages.
+
+use super::made::{Made, Recent, number_points, preparation_key, prepared};
+use super::settings::{self, Asked, EVERYTHING};
+use super::point;
+use crate::args::{Global, SceneArgs};
+use crate::assemble::{Assembly, file_name, name_files};
+use crate::picture::{self, Choices};
+use crate::report::{Report, Verbosity};
+use crate::scene_file::Line;
+use crate::{dry_run, light};
+use anyhow::Context;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use surfel::flat::FlatScene;
+use surfel::image::colormap;
+use surfel::points::PointCloud;
+use surfel::progress::Progress;
+use surfel::render::{CpuRenderer, Renderer};
+use surfel::scene::color::{Coloring, Legend, choose, legend};
+use surfel::scene::{Graph, usual_bounds};
+use surfel::surface::SurfaceKind;
+use surfel::trace::Simd;
+use surfel_web::limits::{MOST_PIXELS, MOST_SAVED_PIXELS};
+use surfel_web::{Error, Keys, Place, Result, Stage, Studio, Written};
+
+pub struct ScanStudio {
+    line: &'static Line,
+    base: Assembly<'static>,
+    given: Keys,
+    opening: Keys,
+    prepared: Recent<Vec<PointCloud>>,
+    made: Recent<Made>,
+    renderer: CpuRenderer,
+    /// Threads beside those that paint: what one page asks for must not hold up another's picture.
+    workshop: rayon::ThreadPool,
+}
+
+/// Points of a sketch; clouds that are not much larger need none.
+const SKETCH: usize = 150_000;
+
+impl ScanStudio {
+    /// Reads the files that the program was started with.
+    pub fn open(line: Line, global: &Global, report: &Report) -> anyhow::Result<Self> {
+        // Both are held for as long as the program runs.
+        let line: &'static Line = Box::leak(Box::new(line));
+        let args: &'static SceneArgs = Box::leak(Box::new(line.scene_args()?));
+        let mut base = picture::load(args, line, global, report)?;
+        number_points(&mut base.graph);
+        let given = line.settings();
+        let workshop = rayon::ThreadPoolBuilder::new()
+            .num_threads(rayon::current_num_threads())
+            .build()
+            .context("the threads cannot be started; ask for fewer with --threads")?;
+        let mut studio = Self {
+            line,
+            base,
+            given,
+            opening: Keys::new(),
+            prepared: Recent::default(),
+            made: Recent::default(),
+            renderer: CpuRenderer { simd: Simd::detect() },
+            workshop,
+        };
+        let asked = settings::read(line, &studio.given, &studio.given)?;
+        let choices = picture::choose(&studio.base, &asked.args, report)?;
+        studio.opening = studio.complete(&asked, &choices, 0.0);
+        studio.opening.shift_remove("exposure");
+        Ok(studio)
+    }
+
+    fn complete(&self, asked: &Asked, choices: &Choices, stops: f32) -> Keys {
+        let told = dry_run::scene(&self.base, choices, &asked.args, &asked.line);
+        let mut settings = settings::complete(told, asked, stops);
+        if !settings.contains_key("color")
+            && let Some((cloud, ..)) = self.base.clouds().next()
+        {
+            settings.insert("color".into(), json!(choose(cloud).0.to_string()));
+        }
+        settings
+    }
+
+    /// Everything but light and camera, which need no tree to change.
+    fn made(&self, asked: &Asked, choices: &Choices, report: &Report) -> anyhow::Result<Arc<Made>> {
+        let assembly = self.base.under(&asked.args, &asked.line)?;
+        let preparation = preparation_key(&assembly);
+        let geometry = asked.line.tree_key();
+        let key = format!("{preparation}\n{geometry}\n{:?}", choices.up);
+        self.made.get(key, report, || {
+            let clouds = self.prepared.get(preparation, report, || {
+                self.workshop.install(|| prepared(&self.base, &assembly, report))
+            })?;
+            self.workshop.install(|| Made::new(assembly, &clouds, choices.up, report))
+        })
+    }
+
+    fn stage_of(&self, asked: &Asked, report: &Report) -> anyhow::Result<Stage> {
+        let choices = picture::choose(&self.base, &asked.args, report)?;
+        let made = self.made(asked, &choices, report)?;
+        let quality = picture::settings(&asked.args, Path::new(""));
+        let mut flat = made.flat.clone();
+        flat.lights.clone_from(&choices.lights);
+        flat.background = asked.args.color.background();
+        pose(&mut flat, &made.graph, 0.0, &choices, report)?;
+        let stops = self.workshop.install(|| {
+            picture::exposure(&self.renderer, &flat, &quality, &asked.args, report)
+        })?;
+        pose(&mut flat, &made.graph, asked.time, &choices, report)?;
+        light::expose(&mut flat, stops);
+        let settings = self.complete(asked, &choices, stops);
+        let legend = self.legend(asked, &choices);
+        Ok(Stage { settings, flat, quality, legend, source: made })
+    }
+
+    /// What the colours of the first cloud mean.
+    fn legend(&self, asked: &Asked, choices: &Choices) -> Value {
+        let Some((cloud, ..)) = self.base.clouds().next() else { return Value::Null };
+        let coloring: Coloring = asked.args.color.coloring(choices.up);
+        let hex = |[r, g, b]: [u8; 3]| format!("#{r:02x}{g:02x}{b:02x}");
+        match legend(cloud, &coloring) {
+            Ok(Legend::Map { title, low, high, colors }) => json!({
+                "kind": "map",
+                "title": title,
+                "low": low,
+                "high": high,
+                "colors": colors.into_iter().map(hex).collect::<Vec<_>>(),
+            }),
+            Ok(Legend::Classes(classes)) => json!({
+                "kind": "classes",
+                "title": "class",
+                "entries": classes
+                    .into_iter()
+                    .map(|(class, name, color)| {
+                        json!({ "name": format!("{class} {name}"), "color": hex(color) })
+                    })
+                    .collect::<Vec<_>>(),
+            }),
+            Ok(Legend::None) | Err(_) => Value::Null,
+        }
+    }
+
+    fn objects(&self) -> Vec<Value> {
+        let of_files = self.base.files().map(|files| match &files[..] {
+            [only] => json!({ "name": file_name(only), "kind": self.kind_of(only) }),
+            several => {
+                let several: Vec<PathBuf> = several.iter().map(|file| file.to_path_buf()).collect();
+                json!({ "name": EVERYTHING, "label": name_files(&several), "kind": "points" })
+            }
+        });
+        let objects = &self.line.scene.objects;
+        let of_scene = objects.iter().map(|object| json!({ "name": object.name, "kind": "object" }));
+        of_files.chain(of_scene).collect()
+    }
+
+    fn kind_of(&self, file: &Path) -> &'static str {
+        if surfel_formats::is_cloud(file).unwrap_or(true) { "points" } else { "triangles" }
+    }
+
+    /// Files as they were typed.
+    fn typed(&self) -> Vec<String> {
+        self.base.typed().iter().map(|file| file.display().to_string()).collect()
+    }
+}
+
+/// Goes to a time.
+fn pose(
+    flat: &mut FlatScene,
+    graph: &Graph,
+    time: f64,
+    choices: &Choices,
+    report: &Report,
+) -> anyhow::Result<()> {
+    if graph.animation.channels.is_empty() {
+        flat.camera = choices.eye.at(time, graph);
+        return Ok(());
+    }
+    let mut graph = graph.clone();
+    graph.pose(time);
+    flat.update(&graph, report)?;
+    flat.camera = choices.eye.at(time, &graph);
+    Ok(())
+}
+
+impl Studio for ScanStudio {
+    fn info(&self) -> Value {
+        let outline = self.base.outline();
+        let bounds = usual_bounds(&outline);
+        let world = |corner: surfel::math::Vec3| (outline.origin + corner.as_dvec3()).to_array();
+        let (points, triangles) = self.base.graph.counts();
+        let source = self.base.source();
+        let mut colors: Vec<&str> = picture::shown(&source.columns);
+        colors.extend(["elevation", "normal"]);
+        json!({
+            "name": name_files(self.base.typed()),
+            "points": points,
+            "triangles": triangles,
+            "version": env!("CARGO_PKG_VERSION"),
+            "bounds": { "min": world(bounds.min), "max": world(bounds.max) },
+            "up": self.opening.get("up"),
+            "surfaces": SurfaceKind::ALL.map(|(name, _)| name),
+            "colors": colors,
+            "colormaps": colormap::names().collect::<Vec<_>>(),
+            "materials": crate::args::material::NAMES,
+            "objects": self.objects(),
+            "duration_secs": self.base.duration_secs(),
+            "threads": rayon::current_num_threads(),
+            "simd": self.renderer.simd.name(),
+            "coordinate_system": source.coordinate_system,
+            "limits": { "max_pixels": MOST_PIXELS, "max_save_pixels": MOST_SAVED_PIXELS },
+        })
+    }
+
+    fn opening(&self) -> Keys {
+        self.opening.clone()
+    }
+
+    fn given(&self) -> Keys {
+        self.given.clone()
+    }
+
+    fn sketch(&self, settings: &Keys, progress: &dyn Progress) -> Option<Result<Stage>> {
+        let (n_points, _) = self.base.graph.counts();
+        if n_points < 3 * SKETCH || settings.contains_key("select") {
+            return None;
+        }
+        let mut fewer = settings.clone();
+        fewer.insert("select".into(), json!(format!("random:{SKETCH}")));
+        let stage = self.stage(&fewer, progress);
+        Some(stage.map(|stage| {
+            let mut settings = stage.settings;
+            settings.shift_remove("select");
+            // Chosen again from all points.
+            if !fewer.contains_key("exposure") {
+                settings.shift_remove("exposure");
+            }
+            Stage { settings, ..stage }
+        }))
+    }
+
+    fn stage(&self, settings: &Keys, progress: &dyn Progress) -> Result<Stage> {
+        let report = Report::heard_by(progress);
+        let asked = settings::read(self.line, &self.given, settings)?;
+        self.stage_of(&asked, &report).map_err(settings::refusal)
+    }
+
+    fn describe(&self, stage: &Stage, place: &Place) -> Value {
+        stage.source.downcast_ref().map_or(Value::Null, |made| point::describe(&self.base, made, place))
+    }
+
+    fn picture(&self, settings: &Keys, progress: &dyn Progress) -> Result<Vec<u8>> {
+        let report = Report::heard_by(progress);
+        let asked = settings::read(self.line, &self.given, settings)?;
+        settings::check_rays(&asked.args)?;
+        let stage = self.stage_of(&asked, &report).map_err(settings::refusal)?;
+        let rendered = || self.renderer.render(&stage.flat, &stage.quality, &report);
+        let (image, _) = self.workshop.install(rendered)?;
+        let options = picture::image_options(stage.flat.origin, &asked.args);
+        Ok(surfel_formats::png_bytes(&image, &options))
+    }
+
+    fn written(&self, settings: &Keys) -> Result<Written> {
+        let report = Report::new(Verbosity::Quiet);
+        let asked = settings::read(self.line, &self.given, settings)?;
+        let choices = picture::choose(&self.base, &asked.args, &report);
+        let choices = choices.map_err(settings::refusal)?;
+        let mut scene = dry_run::scene(&self.base, &choices, &asked.args, &asked.line);
+        if 0.0 < asked.time {
+            scene["time"] = json!(asked.time);
+        }
+        settings::written(&asked, &self.typed(), &scene)
+    }
+
+    fn read(&self, name: &str, text: &str) -> Result<Keys> {
+        let objects = self.line.scene.objects.iter().flat_map(|object| &object.files);
+        let files = self.base.typed().iter().chain(objects);
+        let served: Vec<String> = files.map(|file| dry_run::in_full(file)).collect();
+        settings::from_file(name, text, &served)
+    }
+}
