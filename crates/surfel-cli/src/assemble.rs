@@ -1,6 +1,6 @@
 //! From files to a graph: what they hold, side by side, prepared, coloured, of the materials asked for.
 
-use crate::args::{LightKind, SceneArgs};
+use crate::args::{LightKind, SceneArgs, Usage};
 use crate::cloud::{dress, graph_of, into_cloud, load, prepare_points};
 use crate::report::Report;
 use crate::scene_file::{CameraMotion, Line, Motion, Object, is_scene_file};
@@ -14,7 +14,7 @@ use surfel::math::Vec3;
 use surfel::points::PointCloud;
 use surfel::progress::Progress;
 use surfel::scene::{
-    Channel, Geometry, Graph, Interpolation, Keys, Material, Node, Points, Track, Transform,
+    Channel, Clip, Geometry, Graph, Interpolation, Keys, Material, Node, Points, Track, Transform,
 };
 use surfel_formats::{Loaded, Source};
 
@@ -318,7 +318,7 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Prepares and colours all clouds, and gives everything its material.
+    /// Prepares and colours all clouds, hides what is clipped, and gives everything its material.
     pub fn make(mut self, up: Vec3, report: &Report) -> anyhow::Result<(Graph, Vec<Sequence<'a>>)> {
         let mut clouds = Vec::new();
         for geometry_idx in 0..self.graph.geometries.len() {
@@ -349,6 +349,7 @@ impl<'a> Assembly<'a> {
             }
         }
         self.graph.geometries = geometries;
+        self.clip()?;
         self.give_materials()?;
         Ok((self.graph, self.sequences))
     }
@@ -380,6 +381,17 @@ impl<'a> Assembly<'a> {
         })
     }
 
+    fn clip(&mut self) -> anyhow::Result<()> {
+        let places = self.graph.world_from_geometries();
+        for sequence in &mut self.sequences {
+            sequence.world_from_points = places[sequence.geometry];
+        }
+        let args = self.args_of.iter().map(|object_args| self.args(*object_args).0);
+        let clips: Vec<Clip> = args.map(|args| args.clip.clip()).collect();
+        clip(&mut self.graph, &clips)?;
+        Ok(())
+    }
+
     fn give_materials(&mut self) -> anyhow::Result<()> {
         let Self { graph, files, args, objects, .. } = self;
         let of_files = files
@@ -404,6 +416,19 @@ impl<'a> Assembly<'a> {
         }
         Ok(())
     }
+}
+
+/// Hides a part of each geometry, as `Graph::clip` does, but not everything.
+pub fn clip(graph: &mut Graph, clips: &[Clip]) -> anyhow::Result<Vec<Option<Vec<u32>>>> {
+    let kept = graph.clip(clips);
+    let with_box = clips.iter().any(|clip| clip.bounds.is_some()).then_some("--clip-box");
+    let with_plane = clips.iter().any(|clip| clip.plane.is_some()).then_some("--clip-plane");
+    let options: Vec<&str> = with_box.into_iter().chain(with_plane).collect();
+    if !options.is_empty() && graph.counts() == (0, 0) {
+        let advice = "nothing is left to be seen; `surfel info` tells where the points lie";
+        return Err(Usage(format!("{}: {advice}", options.join(", "))).into());
+    }
+    Ok(kept)
 }
 
 /// Whether something is black without light: it neither shines nor shows what is around or behind it.

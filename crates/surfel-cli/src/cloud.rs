@@ -66,11 +66,12 @@ pub fn prepare_points(
 
 /// Gives a prepared cloud its surface and colours.
 pub fn dress(
-    cloud: PointCloud,
+    mut cloud: PointCloud,
     args: &SceneArgs,
     up: Vec3,
     report: &Report,
 ) -> anyhow::Result<Points> {
+    args.surface.scale_radii(&mut cloud);
     let report = report.with_flag("--color, --cmap, --range");
     Ok(Points {
         colors: colorize(&cloud, &args.color.coloring(up), &report)?,

@@ -3,9 +3,9 @@
 use crate::args::{SceneArgs, Usage};
 use crate::report::Report;
 use crate::scene_file::CameraMotion;
-use surfel::math::{DVec3, Vec3};
+use surfel::math::{Aabb, DVec3, Vec3};
 use surfel::points::PointCloud;
-use surfel::scene::{Camera, Graph, Projection, usual_bounds};
+use surfel::scene::{Camera, Graph, Projection};
 
 /// A camera, and what moves it.
 pub struct Eye {
@@ -21,18 +21,24 @@ pub struct Eye {
     motion: Option<CameraMotion>,
 }
 
+/// What there is to look at.
+pub struct Sight<'a> {
+    pub outline: &'a PointCloud,
+    /// Of all but stray points, relative to the outline's origin.
+    pub bounds: Aabb,
+    pub up: Vec3,
+}
+
 impl Eye {
-    /// From the options; where nothing is asked of the camera, the first of the files or one that sees all of
-    /// `outline`.
+    /// From the options; where nothing is asked of the camera, the first of the files or one that sees all.
     pub fn choose(
         graph: &Graph,
-        outline: &PointCloud,
-        up: Vec3,
+        sight: &Sight,
         args: &SceneArgs,
         motion: Option<CameraMotion>,
         report: &Report,
     ) -> Self {
-        let bounds = usual_bounds(outline);
+        let Sight { outline, bounds, up } = *sight;
         let middle = outline.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
         let view_angle_deg = args.camera.camera_view_angle;
         let of_file = graph.camera().filter(|_| args.camera.is_automatic());

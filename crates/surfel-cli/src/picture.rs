@@ -2,7 +2,7 @@
 
 use crate::args::{Exposure, Global, SceneArgs, Usage};
 use crate::assemble::{Assembly, name_files};
-use crate::eye::{Eye, keep_camera};
+use crate::eye::{Eye, Sight, keep_camera};
 use crate::light::{self, Lit};
 use crate::memory::{Plan, n_points};
 use crate::playback::{Playback, Prepared};
@@ -203,8 +203,9 @@ pub fn choose(assembly: &Assembly, args: &SceneArgs, report: &Report) -> anyhow:
     let outline = assembly.outline();
     let up = args.camera.up(&outline, &assembly.sources, report);
     let motion = assembly.camera_motion.clone();
-    let eye = Eye::choose(&assembly.graph, &outline, up, args, motion, report);
     let bounds = usual_bounds(&outline);
+    let sight = Sight { outline: &outline, bounds, up };
+    let eye = Eye::choose(&assembly.graph, &sight, args, motion, report);
     let diagonal = (bounds.max - bounds.min).length();
     // Points as pixels are shaded by their depth alone.
     let is_shaded = args.surface.surface != SurfaceKind::Points;

@@ -6,7 +6,7 @@ use crate::report::Report;
 use crate::scene_file::Object;
 use anyhow::{Context, anyhow};
 use std::path::PathBuf;
-use surfel::math::Vec3;
+use surfel::math::{DAffine3, Vec3};
 use surfel::scene::Points;
 use surfel_formats::is_cloud;
 
@@ -30,13 +30,15 @@ pub struct Sequence<'a> {
     args: SceneArgs,
     /// Of the graph, where the one that is seen stands.
     pub geometry: usize,
+    /// From the clouds' coordinates to the world's, where they are clipped.
+    pub world_from_points: DAffine3,
     file_idx: usize,
 }
 
 impl<'a> Sequence<'a> {
     /// One whose first file is in the graph already.
     pub fn new(files: &'a [PathBuf], fps: f64, args: SceneArgs, geometry: usize) -> Self {
-        Self { files, fps, args, geometry, file_idx: 0 }
+        Self { files, fps, args, geometry, world_from_points: DAffine3::IDENTITY, file_idx: 0 }
     }
 
     pub fn duration_secs(&self) -> f64 {
@@ -59,8 +61,10 @@ impl<'a> Sequence<'a> {
         let (graph, _) = load(file, &self.args, report)?;
         let cloud = into_cloud(graph)
             .map_err(|_| anyhow!("{}: is no cloud any more, as it was before", file.display()))?;
-        let points = make_points(cloud, &self.args, up, report);
-        points.map(Some).with_context(|| file.display().to_string())
+        let mut points = make_points(cloud, &self.args, up, report)
+            .with_context(|| file.display().to_string())?;
+        points.clip(&self.args.clip.clip(), &self.world_from_points);
+        Ok(Some(points))
     }
 
     /// The last one stays.

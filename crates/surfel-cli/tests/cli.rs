@@ -8,6 +8,8 @@ mod animate;
 mod bench;
 #[path = "cli/cameras.rs"]
 mod cameras;
+#[path = "cli/clips.rs"]
+mod clips;
 #[path = "cli/commands.rs"]
 mod commands;
 #[path = "cli/pictures.rs"]

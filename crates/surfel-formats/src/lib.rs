@@ -65,5 +65,5 @@ pub use graph::{is_cloud, load_graph, load_graph_bytes};
 pub use load::{common_source, inspect, load, load_all, load_bytes, merge_loaded};
 pub use movie::{Container, Movie, MovieFormat, MovieOptions, check_movie};
 pub use options::{Column, ColumnChoice, LoadOptions, Loaded, Source, TextColumn};
-pub use picture::{Alpha, BitDepth, ImageOptions, save_image};
+pub use picture::{Alpha, BitDepth, ImageOptions, png_bytes, save_image};
 pub use save::{SaveOptions, check_output, save};

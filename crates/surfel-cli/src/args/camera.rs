@@ -93,7 +93,11 @@ impl CameraArgs {
         if self.camera_panorama {
             return self.panorama(cloud, up, report);
         }
-        let framed = frame(cloud, &self.framing(up, aspect));
+        let framing = self.framing(up, aspect);
+        if let Some(camera) = self.given(&framing) {
+            return camera;
+        }
+        let framed = frame(cloud, &framing);
         let focal_point = self.camera_focal_point.unwrap_or(framed.focal_point);
         let beside = framed.position + (focal_point - framed.focal_point);
         let position = self.camera_position.unwrap_or(beside);
@@ -108,6 +112,20 @@ impl CameraArgs {
             report.choice(&line, "--camera-position, --camera-focal-point, --camera-azimuth-angle");
         }
         Camera { position, focal_point, view_up, projection }
+    }
+
+    /// The camera that leaves nothing to be chosen, if it is such a one.
+    fn given(&self, framing: &Framing) -> Option<Camera> {
+        let projection = match self.camera_orthographic {
+            Some(height) => Projection::Orthographic { height: height? },
+            None => Projection::Perspective { view_angle_deg: framing.view_angle_deg },
+        };
+        Some(Camera {
+            position: self.camera_position?,
+            focal_point: self.camera_focal_point?,
+            view_up: self.camera_view_up?,
+            projection,
+        })
     }
 
     fn panorama(&self, cloud: &PointCloud, up: Vec3, report: &Report) -> Camera {

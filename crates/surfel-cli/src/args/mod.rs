@@ -1,6 +1,7 @@
 //! Groups of options that commands share, and their translation into the library's structs.
 
 mod camera;
+mod clip;
 mod color;
 mod light;
 pub mod material;
@@ -9,6 +10,7 @@ mod preparation;
 mod scene;
 
 pub use camera::{CAMERA, CameraArgs, is_georeferenced, short};
+pub use clip::ClipArgs;
 pub use color::ColorArgs;
 pub use light::{Exposure, LightArgs, LightKind};
 pub use material::{Choice, MaterialArgs};
@@ -20,6 +22,7 @@ use anyhow::Context;
 use clap::builder::PossibleValuesParser;
 use clap::builder::TypedValueParser;
 use clap::{Args, ValueEnum};
+use surfel::points::PointCloud;
 use surfel::surface::{Boundary, SurfaceKind};
 
 /// Options that don't fit together: exit code 2.
@@ -92,6 +95,16 @@ pub struct SurfaceArgs {
     /// Whether the surface ends at the outermost points (gap) or at the rims of their discs (off).
     #[arg(long, value_name = "TEST", default_value = "gap", value_parser = boundaries())]
     pub boundary: Boundary,
+    /// Makes the radii of all points this many times as large, those of the file and those estimated.
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = parse::positive)]
+    radius_scale: f64,
+}
+
+impl SurfaceArgs {
+    pub fn scale_radii(&self, cloud: &mut PointCloud) {
+        let factor = self.radius_scale as f32;
+        cloud.radii.iter_mut().flatten().for_each(|radius| *radius *= factor);
+    }
 }
 
 fn surfaces() -> impl TypedValueParser<Value = SurfaceKind> {

@@ -2,8 +2,8 @@
 
 use surfel::image::{Colormap, decode_srgb8};
 use surfel::math::{DVec3, Vec3};
-use surfel::scene::Background;
 use surfel::scene::color::parse_hex;
+use surfel::scene::{Background, ClipBox, ClipPlane};
 
 /// `x,y,z`, finite.
 pub fn vector(text: &str) -> Result<DVec3, String> {
@@ -26,6 +26,45 @@ pub fn direction(text: &str) -> Result<DVec3, String> {
         return Ok(vector);
     }
     vector.try_normalize().ok_or_else(|| "expected a direction other than 0,0,0".into())
+}
+
+/// Bounds as PDAL writes them: `([x0, x1], [y0, y1], [z0, z1])`; two ranges are of any height.
+pub fn clip_box(text: &str) -> Result<ClipBox, String> {
+    let wrong = "expected two or three ranges from low to high as in ([0,10],[0,10],[2,5])";
+    match ranges(text).as_deref() {
+        Some([x, y]) => Ok(box_of([*x, *y, [f64::NEG_INFINITY, f64::INFINITY]])),
+        Some([x, y, z]) => Ok(box_of([*x, *y, *z])),
+        _ => Err(wrong.into()),
+    }
+}
+
+fn box_of(ranges: [[f64; 2]; 3]) -> ClipBox {
+    let [low, high] = [0, 1].map(|end| DVec3::from_array(ranges.map(|range| range[end])));
+    ClipBox { low, high }
+}
+
+/// `([low,high],[low,high])` and so on.
+fn ranges(text: &str) -> Option<Vec<[f64; 2]>> {
+    let inner = text.trim().strip_prefix('(')?.strip_suffix(')')?;
+    let words: Vec<&str> = inner.split(',').map(str::trim).collect();
+    let range = |words: &[&str]| {
+        let [low, high] = words else { return None };
+        let inner = [low.strip_prefix('[')?, high.strip_suffix(']')?].join(",");
+        let range: [f64; 2] = numbers(&inner)?.try_into().ok()?;
+        (range[0] <= range[1]).then_some(range)
+    };
+    words.chunks(2).map(range).collect()
+}
+
+/// `x,y,z,nx,ny,nz`: a point of the plane and the normal.
+pub fn clip_plane(text: &str) -> Result<ClipPlane, String> {
+    let numbers = numbers(text).filter(|numbers| numbers.len() == 6);
+    let numbers = numbers.ok_or("expected a point and a normal as in 0,0,5,0,0,1")?;
+    let [point, normal] = [0, 3].map(|first| DVec3::from_slice(&numbers[first..]));
+    match normal.try_normalize() {
+        Some(normal) => Ok(ClipPlane { point, normal }),
+        None => Err("expected a normal other than 0,0,0".into()),
+    }
 }
 
 /// `+X`, `-Y`, `Z` and so on, or a vector.
@@ -159,6 +198,13 @@ mod tests {
         assert!(matches!(background("transparent"), Ok(Background::Transparent)));
         assert_eq!(background("#fff"), background("#ffffff,#FFFFFF"));
         assert_eq!(range("-1,2"), Ok((-1.0, 2.0)));
+        let (low, high) = (DVec3::new(0.0, -2.0, 4e5), DVec3::new(1.0, 3.5, 5e5));
+        let text = " ( [0, 1],[-2,3.5] , [4e5,5e5] ) ";
+        assert_eq!(clip_box(text), Ok(ClipBox { low, high }));
+        let (low, high) = (low.with_z(f64::NEG_INFINITY), high.with_z(f64::INFINITY));
+        assert_eq!(clip_box("([0,1],[-2,3.5])"), Ok(ClipBox { low, high }));
+        let plane = ClipPlane { point: DVec3::new(1.0, 2.0, 3.0), normal: DVec3::NEG_Z };
+        assert_eq!(clip_plane("1,2,3,0,0,-2"), Ok(plane));
     }
 
     #[test]
@@ -171,6 +217,17 @@ mod tests {
         }
         for text in ["", "G", "-1G", "NaN", "1e400", "8 potatoes"] {
             assert!(memory(text).is_err(), "{text}");
+        }
+        for text in
+            ["", "0,1,0,1", "[0,1],[0,1]", "([0,1])", "([1,0],[0,1])", "([0,1],[0,1],[0,1],[0,1])"]
+        {
+            assert!(clip_box(text).is_err(), "{text}");
+        }
+        for text in ["([0,1],[0,NaN])", "([0 1],[0,1])", "([0,1],0,1])", "([0,1],[0,1],)", "()"] {
+            assert!(clip_box(text).is_err(), "{text}");
+        }
+        for text in ["", "0,0,1", "0,0,0,0,0,0", "0,0,0,0,0,x", "0,0,0,0,0,1,2"] {
+            assert!(clip_plane(text).is_err(), "{text}");
         }
         for text in ["", "#12", "red", "#fff,#fff,#fff"] {
             assert!(background(text).is_err(), "{text}");

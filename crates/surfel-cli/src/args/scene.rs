@@ -1,7 +1,7 @@
 //! All that says what is seen: files or a scene file, and the options of their picture.
 
 use super::{
-    CAMERA, CameraArgs, ColorArgs, LightArgs, MaterialArgs, PictureArgs, PreparationArgs,
+    CAMERA, CameraArgs, ClipArgs, ColorArgs, LightArgs, MaterialArgs, PictureArgs, PreparationArgs,
     SurfaceArgs,
 };
 use clap::Args;
@@ -17,6 +17,8 @@ pub struct SceneArgs {
     pub picture: PictureArgs,
     #[command(flatten)]
     pub surface: SurfaceArgs,
+    #[command(flatten)]
+    pub clip: ClipArgs,
     #[command(flatten)]
     pub camera: CameraArgs,
     /// Look by the camera of this name in a glTF file [default: the first].

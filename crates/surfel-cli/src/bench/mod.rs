@@ -182,8 +182,9 @@ fn describe(args: &Args, file: Option<&CameraFile>, report: &Report) -> anyhow::
     for geometry in &mut graph.geometries {
         let Geometry::Points(points) = geometry else { continue };
         let preparation = args.preparation.preparation(0, None);
-        let (cloud, _) =
+        let (mut cloud, _) =
             prepare(std::mem::take(&mut points.cloud), &preparation, report).with_context(name)?;
+        args.surface.scale_radii(&mut cloud);
         *points = Points {
             colors: vec![[200; 3]; cloud.len()],
             cloud,

@@ -4,6 +4,7 @@ use crate::args::SceneArgs;
 use crate::assemble::Assembly;
 use crate::cloud::prepare_points;
 use crate::report::Report;
+use serde_json::Value;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
@@ -116,12 +117,14 @@ pub struct Made {
     pub flat: FlatScene,
     /// Of each geometry's points, their indices among those that were read; empty for triangles.
     pub indices: Vec<Vec<i32>>,
+    pub legend: Value,
 }
 
 impl Made {
     pub fn new(
         assembly: Assembly,
         clouds: &[PointCloud],
+        legend: Value,
         up: Vec3,
         report: &Report,
     ) -> anyhow::Result<Self> {
@@ -144,7 +147,7 @@ impl Made {
         report.end_stage();
         let mut graph = scene.graph;
         graph.forget_static();
-        Ok(Self { graph, flat, indices })
+        Ok(Self { graph, flat, indices, legend })
     }
 }
 

@@ -1,6 +1,7 @@
 //! `surfel view`: the interactive viewer, in a browser.
 
 mod browser;
+mod legend;
 mod made;
 mod point;
 mod settings;

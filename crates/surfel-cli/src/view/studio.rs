@@ -1,8 +1,9 @@
 //! Scenes of the files that the viewer was started with, by the settings of its pages.
 
+use super::legend::legend;
 use super::made::{Made, Recent, number_points, preparation_key, prepared};
-use super::settings::{self, Asked, EVERYTHING};
 use super::point;
+use super::settings::{self, Asked, EVERYTHING};
 use crate::args::{Global, SceneArgs};
 use crate::assemble::{Assembly, file_name, name_files};
 use crate::picture::{self, Choices};
@@ -18,7 +19,7 @@ use surfel::image::colormap;
 use surfel::points::PointCloud;
 use surfel::progress::Progress;
 use surfel::render::{CpuRenderer, Renderer};
-use surfel::scene::color::{Coloring, Legend, choose, legend};
+use surfel::scene::color::choose;
 use surfel::scene::{Graph, Material, usual_bounds};
 use surfel::surface::SurfaceKind;
 use surfel::trace::Simd;
@@ -91,7 +92,9 @@ impl ScanStudio {
             let clouds = self.prepared.get(preparation, report, || {
                 self.workshop.install(|| prepared(&self.base, &assembly, report))
             })?;
-            self.workshop.install(|| Made::new(assembly, &clouds, choices.up, report))
+            let legend = legend(&clouds, &asked.args.color.coloring(choices.up));
+            let make = || Made::new(assembly, &clouds, legend, choices.up, report);
+            self.workshop.install(make)
         })
     }
 
@@ -103,41 +106,13 @@ impl ScanStudio {
         flat.lights.clone_from(&choices.lights);
         flat.background = asked.args.color.background();
         pose(&mut flat, &made.graph, 0.0, &choices, report)?;
-        let stops = self.workshop.install(|| {
-            picture::exposure(&self.renderer, &flat, &quality, &asked.args, report)
-        })?;
+        let stops = self
+            .workshop
+            .install(|| picture::exposure(&self.renderer, &flat, &quality, &asked.args, report))?;
         pose(&mut flat, &made.graph, asked.time, &choices, report)?;
         light::expose(&mut flat, stops);
         let settings = self.complete(asked, &choices, stops);
-        let legend = self.legend(asked, &choices);
-        Ok(Stage { settings, flat, quality, legend, source: made })
-    }
-
-    /// What the colours of the first cloud mean.
-    fn legend(&self, asked: &Asked, choices: &Choices) -> Value {
-        let Some((cloud, ..)) = self.base.clouds().next() else { return Value::Null };
-        let coloring: Coloring = asked.args.color.coloring(choices.up);
-        let hex = |[r, g, b]: [u8; 3]| format!("#{r:02x}{g:02x}{b:02x}");
-        match legend(cloud, &coloring) {
-            Ok(Legend::Map { title, low, high, colors }) => json!({
-                "kind": "map",
-                "title": title,
-                "low": low,
-                "high": high,
-                "colors": colors.into_iter().map(hex).collect::<Vec<_>>(),
-            }),
-            Ok(Legend::Classes(classes)) => json!({
-                "kind": "classes",
-                "title": "class",
-                "entries": classes
-                    .into_iter()
-                    .map(|(class, name, color)| {
-                        json!({ "name": format!("{class} {name}"), "color": hex(color) })
-                    })
-                    .collect::<Vec<_>>(),
-            }),
-            Ok(Legend::None) | Err(_) => Value::Null,
-        }
+        Ok(Stage { settings, flat, quality, legend: made.legend.clone(), source: made })
     }
 
     fn objects(&self) -> Vec<Value> {
@@ -149,7 +124,8 @@ impl ScanStudio {
             }
         });
         let objects = &self.line.scene.objects;
-        let of_scene = objects.iter().map(|object| json!({ "name": object.name, "kind": "object" }));
+        let of_scene =
+            objects.iter().map(|object| json!({ "name": object.name, "kind": "object" }));
         of_files.chain(of_scene).collect()
     }
 
@@ -245,7 +221,10 @@ impl Studio for ScanStudio {
     }
 
     fn describe(&self, stage: &Stage, place: &Place) -> Value {
-        stage.source.downcast_ref().map_or(Value::Null, |made| point::describe(&self.base, made, place))
+        stage
+            .source
+            .downcast_ref()
+            .map_or(Value::Null, |made| point::describe(&self.base, made, place))
     }
 
     fn picture(&self, settings: &Keys, progress: &dyn Progress) -> Result<Vec<u8>> {
@@ -256,7 +235,7 @@ impl Studio for ScanStudio {
         let rendered = || self.renderer.render(&stage.flat, &stage.quality, &report);
         let (image, _) = self.workshop.install(rendered)?;
         let options = picture::image_options(stage.flat.origin, &asked.args);
-        Ok(surfel_formats::png_bytes(&image, &options))
+        surfel_formats::png_bytes(&image, &options).map_err(|error| settings::refusal(error.into()))
     }
 
     fn written(&self, settings: &Keys) -> Result<Written> {

@@ -1,6 +1,6 @@
 //! Pictures whose pixels are known.
 
-use super::common::{Folder, dome, read_png, square, succeed};
+use super::common::{Folder, dome, read_png, shot, square, succeed};
 use std::fs;
 
 #[test]
@@ -48,6 +48,17 @@ fn any_number_of_threads_gives_the_same_bytes() {
         let bytes = |threads| fs::read(render(threads, extension)).unwrap();
         assert!(bytes("1") == bytes("2"), "{extension}");
     }
+}
+
+#[test]
+fn radii_are_scaled_whatever_they_come_from() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let picture = |options: &[&str]| shot(&folder, &[&[cloud.as_str()][..], options].concat());
+    let fixed = picture(&["--radius", "0.25"]);
+    assert_eq!(picture(&["--radius", "0.125", "--radius-scale", "2"]), fixed);
+    assert_eq!(picture(&["--radius-scale", "1"]), picture(&[]));
+    assert_ne!(picture(&["--radius-scale", "2"]), picture(&[]));
 }
 
 #[test]

@@ -200,6 +200,8 @@ fn a_dry_run_tells_a_scene_that_makes_the_same_picture() {
         &[&cloud, "--color", "rain", "--cmap", "turbo_r", "--range", "5,200"],
         &[&cloud, "--normals-radius", "0.4", "--orient", "up", "--neighbors", "grid"],
         &[&cloud, "--surface", "sphere", "--boundary", "off", "--exposure", "-1"],
+        &[&cloud, "--radius-scale", "1.5", "--clip-box", "([-0.5, 1],[-1,1])"],
+        &[&cloud, "--clip-plane", "0,0,0.5,0,0,1"],
         &[&cloud, "--up", "1,2,3", "--sun-elevation", "33.3", "--sun-angle", "5"],
         &[&cloud, "--camera-azimuth-angle", "17", "--camera-zoom-factor", "1.7"],
         &[&cloud, "--camera-panorama", "--camera-azimuth-angle", "30"],

@@ -10,6 +10,11 @@ fn values_that_are_wrong_by_themselves_are_wrong_use() {
     let wrong = [
         &["--surface", "marble"][..],
         &["--boundary", "maybe"],
+        &["--radius-scale", "0"],
+        &["--clip-box", "0,1,0,1"],
+        &["--clip-box", "([0,1],[1,0])"],
+        &["--clip-plane", "0,0,0"],
+        &["--clip-plane", "1,2,3,0,0,0"],
         &["--resolution", "0x0"],
         &["--resolution", "4000000000x4000000000"],
         &["--resolution", "20000x20000"],

@@ -3,6 +3,8 @@
 mod exr;
 pub(crate) mod png;
 
+pub use self::png::png_bytes;
+
 use std::path::Path;
 
 use surfel::image::Image;

@@ -16,6 +16,14 @@ pub(super) fn write(path: &Path, image: &Image, options: &ImageOptions) -> Resul
     })
 }
 
+/// What `save_image` writes to a .png, in memory.
+pub fn png_bytes(image: &Image, options: &ImageOptions) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    encode(&mut bytes, image, options)
+        .map_err(|source| write_failed(Path::new("a picture in memory"), source))?;
+    Ok(bytes)
+}
+
 pub(super) fn write_to_stdout(image: &Image, options: &ImageOptions) -> Result<()> {
     let mut out = io::BufWriter::new(io::stdout().lock());
     encode(&mut out, image, options)

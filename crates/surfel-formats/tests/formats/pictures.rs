@@ -3,7 +3,7 @@
 use exr::prelude::{FlatSamples, read_first_flat_layer_from_file};
 use surfel::image::{Image, NO_ID, decode_srgb};
 use surfel::math::{DVec3, Vec3};
-use surfel_formats::{Alpha, BitDepth, ImageOptions, save_image};
+use surfel_formats::{Alpha, BitDepth, ImageOptions, png_bytes, save_image};
 
 use crate::common::Folder;
 
@@ -39,6 +39,22 @@ fn eight_bit_colours_survive_and_alpha_is_undone() {
     let (color, depth, bytes) = decode_png(&path);
     assert_eq!((color, depth), (png::ColorType::Rgb, png::BitDepth::Sixteen));
     assert_eq!(bytes[..6], [255, 255, 255, 255, 0, 0]);
+}
+
+#[test]
+fn bytes_in_memory_are_those_of_the_file() {
+    let folder = Folder::new("bytes");
+    let path = folder.path("a.png");
+    let mut image = Image::new(5, 3);
+    for (i, pixel) in image.color.iter_mut().enumerate() {
+        *pixel = [i as f32 / 20.0, 0.25, 0.5, 0.75];
+    }
+    for depth in [BitDepth::Eight, BitDepth::Sixteen] {
+        let options = ImageOptions { depth, ..ImageOptions::default() };
+        save_image(&path, &image, &options).unwrap();
+        assert_eq!(png_bytes(&image, &options).unwrap(), std::fs::read(&path).unwrap());
+    }
+    assert!(png_bytes(&Image::new(0, 3), &ImageOptions::default()).is_err());
 }
 
 #[test]

@@ -158,9 +158,11 @@ fn decoded_points_are_within_a_thousandth_of_their_radius() {
 }
 
 #[test]
-fn an_empty_cloud_is_an_error() {
-    let scene = scenes::lit(Points::default());
-    let result = FlatScene::new(&scene, &surfel::progress::Silent);
-    assert!(matches!(result, Err(surfel::Error::EmptyCloud)));
+fn an_empty_cloud_shows_nothing() {
+    let (normals, radii) = (Some(Vec::new()), Some(Vec::new()));
+    let cloud = PointCloud { normals, radii, ..PointCloud::default() };
+    let scene = scenes::lit(Points { cloud, ..Points::default() });
+    let flat = FlatScene::new(&scene, &surfel::progress::Silent).unwrap();
+    assert!(flat.instances.is_empty());
     assert_eq!(scene.camera.focal_point, DVec3::ZERO);
 }

@@ -6,7 +6,7 @@ use super::instance::{Instance, Placement, TopTree};
 use super::lamp::FlatLamp;
 use super::mesh::FlatMesh;
 use crate::bvh::Node;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::math::{Aabb, DAffine3, DVec3, LANES};
 use crate::progress::Progress;
 use crate::scene::{Background, Camera, Geometry, Graph, Light, Material, Scene, Texture};
@@ -53,7 +53,6 @@ impl FlatGeometry {
     /// Sorts points or triangles into their tree; points have to be prepared.
     pub fn new(geometry: &Geometry, progress: &dyn Progress) -> Result<Self> {
         match geometry {
-            Geometry::Points(points) if points.cloud.is_empty() => Err(Error::EmptyCloud),
             Geometry::Points(points) => Ok(Self::Cloud(FlatCloud::new(points, progress)?)),
             Geometry::Triangles(mesh) => Ok(Self::Mesh(FlatMesh::new(mesh, progress)?)),
         }

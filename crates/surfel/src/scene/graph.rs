@@ -275,6 +275,17 @@ impl Graph {
         is_visible
     }
 
+    /// From each geometry's coordinates to the world's, where the first node that shows it stands.
+    pub fn world_from_geometries(&self) -> Vec<DAffine3> {
+        let mut places = vec![None; self.geometries.len()];
+        for (node, world) in self.nodes.iter().zip(self.world_from_nodes()) {
+            for part in &node.parts {
+                places[part.geometry].get_or_insert(world);
+            }
+        }
+        places.into_iter().map(Option::unwrap_or_default).collect()
+    }
+
     /// From each node's coordinates to the world's.
     pub fn world_from_nodes(&self) -> Vec<DAffine3> {
         let mut world_from_nodes: Vec<DAffine3> = Vec::with_capacity(self.nodes.len());

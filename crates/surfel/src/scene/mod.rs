@@ -2,6 +2,7 @@
 
 mod animation;
 mod camera;
+mod clip;
 pub mod color;
 mod environment;
 mod framing;
@@ -15,6 +16,7 @@ mod validate;
 
 pub use animation::{Animation, Channel, Interpolation, Keys, Track, Value, orbit, smooth_path};
 pub use camera::{Camera, Projection, View};
+pub use clip::{Clip, ClipBox, ClipPlane};
 pub use environment::Environment;
 pub use framing::{Framing, frame, look_around, upright, usual_bounds};
 pub use graph::{Geometry, Graph, Joint, Node, Part, Points, Transform};

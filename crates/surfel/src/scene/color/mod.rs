@@ -1,14 +1,18 @@
 //! Colours of points: from one of a cloud's columns, which is chosen from the data if none is named.
 
 mod choose;
+mod mapping;
+mod legend;
 
 pub use choose::{PLAIN, choose};
+pub use legend::{Legend, legend};
 
 use crate::error::{Error, Result};
-use crate::image::{Colormap, Stretch, class_color};
+use crate::image::{Colormap, class_color};
 use crate::math::Vec3;
 use crate::points::PointCloud;
 use crate::progress::Progress;
+use mapping::Mapping;
 use rayon::prelude::*;
 use std::fmt;
 use std::str::FromStr;
@@ -41,26 +45,17 @@ pub struct Coloring {
     pub up: Vec3,
 }
 
-/// Part of the map that an automatic choice uses: light and shadow cannot show on black.
-const SHADED: (f32, f32) = (0.3, 0.95);
-
 /// One colour a point, sRGB-encoded. `progress` is told the choice and the range.
 pub fn colorize(
     cloud: &PointCloud,
     coloring: &Coloring,
     progress: &dyn Progress,
 ) -> Result<Vec<[u8; 3]>> {
-    let source = match &coloring.source {
-        Some(source) => source.clone(),
-        None => {
-            let (source, reason) = choose(cloud);
-            // Intensity is told with its range.
-            if source != ColorSource::Intensity {
-                progress.note(&format!("color {source}: {reason}"));
-            }
-            source
-        }
-    };
+    let (source, reason) = coloring.source_for(cloud);
+    // Intensity is told with its range.
+    if let Some(reason) = reason.filter(|_| source != ColorSource::Intensity) {
+        progress.note(&format!("color {source}: {reason}"));
+    }
     progress.check()?;
     let missing = || source.missing_from(cloud);
     let all = |color: &(dyn Fn(usize) -> [u8; 3] + Sync)| {
@@ -80,18 +75,10 @@ pub fn colorize(
             Ok(all(&|i| (0.5 * normals[i] + 0.5).to_array().map(|x| (x * 255.0).round() as u8)))
         }
         ColorSource::Constant(color) => Ok(vec![*color; cloud.len()]),
-        ColorSource::Intensity => {
-            let values = cloud.intensity.as_ref().ok_or_else(missing)?;
-            mapped(cloud.len(), &|i| values[i].into(), coloring, &source, progress)
-        }
-        ColorSource::Elevation => {
-            let up = coloring.up.as_dvec3();
-            let height = |i| cloud.world_position(i).dot(up);
-            mapped(cloud.len(), &height, coloring, &source, progress)
-        }
-        ColorSource::Column(name) => {
-            let values = cloud.scalar(name).ok_or_else(missing)?;
-            mapped(cloud.len(), &|i| values.get(i), coloring, &source, progress)
+        ColorSource::Intensity | ColorSource::Elevation | ColorSource::Column(_) => {
+            let mapping = Mapping::new(cloud, coloring, &source)?;
+            progress.note(&format!("color {source} {}", mapping.words()));
+            Ok(all(&|i| mapping.color((mapping.value_at)(i))))
         }
     }
 }
@@ -101,34 +88,17 @@ fn to_8_bits(value: u16) -> u8 {
     ((u32::from(value) + 128) / 257) as u8
 }
 
-fn mapped(
-    n_values: usize,
-    value_at: &(dyn Fn(usize) -> f64 + Sync),
-    coloring: &Coloring,
-    source: &ColorSource,
-    progress: &dyn Progress,
-) -> Result<Vec<[u8; 3]>> {
-    let found = || Stretch::of(n_values, value_at, Stretch::PERCENTILES);
-    let given = coloring.range.map(|(low, high)| Stretch { low, high });
-    let range = given.or_else(found).unwrap_or(Stretch { low: 0.0, high: 1.0 });
-    let map = match coloring.colormap {
-        Some(map) => map,
-        None if *source == ColorSource::Intensity => Colormap::from_name("gray")?,
-        None => Colormap::from_name("viridis")?,
-    };
-    let origin = if given.is_some() { "as given" } else { "2 % to 98 % of the values" };
-    progress.note(&format!("color {source} from {} ({origin}), map {}", words(range), map.name()));
-    let is_automatic = coloring.source.is_none() && coloring.colormap.is_none();
-    let (first, last) = if is_automatic { SHADED } else { (0.0, 1.0) };
-    let color = |i| map.color(first + (last - first) * range.unit(value_at(i)));
-    Ok((0..n_values).into_par_iter().map(color).collect())
-}
-
-/// Both ends, with as many digits as tell a thousandth of the range.
-fn words(Stretch { low, high }: Stretch) -> String {
-    let size = (high - low).abs().log10();
-    let digits = if size.is_finite() { (3.0 - size).clamp(0.0, 12.0) as usize } else { 3 };
-    format!("{low:.digits$} to {high:.digits$}")
+impl Coloring {
+    /// What `cloud` is coloured by, and why, if that was left open.
+    fn source_for(&self, cloud: &PointCloud) -> (ColorSource, Option<&'static str>) {
+        match &self.source {
+            Some(source) => (source.clone(), None),
+            None => {
+                let (source, reason) = choose(cloud);
+                (source, Some(reason))
+            }
+        }
+    }
 }
 
 impl ColorSource {
