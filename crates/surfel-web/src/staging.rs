@@ -112,7 +112,12 @@ impl Staging {
 
     async fn show(&mut self, stage: Stage, wish: &Wish) {
         self.settings = stage.settings.clone();
-        let message = json!({ "type": "scene", "scene": stage.settings, "legend": stage.legend });
+        let message = json!({
+            "type": "scene",
+            "input": wish.input,
+            "scene": stage.settings,
+            "legend": stage.legend,
+        });
         let has_camera = wish.is_anew || wish.patch.contains_key("camera");
         let keys = stage.settings.get("camera").cloned().unwrap_or_default();
         let camera = camera::parse(&keys).ok();
