@@ -53,7 +53,7 @@ async fn greeting(
     stream: &mut SplitStream<WebSocket>,
     out: &mpsc::Sender<Outgoing>,
 ) -> Option<((u32, u32), Keys)> {
-    let first = timeout(PATIENCE, stream.next()).await.ok()??.ok()?;
+    let first = timeout(PATIENCE, first_said(stream)).await.ok()??;
     let greeting = match first {
         Message::Text(text) => Incoming::parse(&text),
         _ => Err("expected hello".into()),
@@ -71,6 +71,16 @@ async fn greeting(
             // Time for the writer to say so.
             tokio::time::sleep(Duration::from_millis(100)).await;
             None
+        }
+    }
+}
+
+/// The first message that is more than a sign of life.
+async fn first_said(stream: &mut SplitStream<WebSocket>) -> Option<Message> {
+    loop {
+        match stream.next().await?.ok()? {
+            Message::Ping(_) | Message::Pong(_) => {}
+            message => return Some(message),
         }
     }
 }

@@ -120,7 +120,7 @@ impl ScanStudio {
             [only] => json!({ "name": file_name(only), "kind": self.kind_of(only) }),
             several => {
                 let several: Vec<PathBuf> = several.iter().map(|file| file.to_path_buf()).collect();
-                json!({ "name": EVERYTHING, "label": name_files(&several), "kind": "points" })
+                json!({ "name": EVERYTHING, "label": name_of(&several), "kind": "points" })
             }
         });
         let objects = &self.line.scene.objects;
@@ -137,6 +137,12 @@ impl ScanStudio {
     fn typed(&self) -> Vec<String> {
         self.base.typed().iter().map(|file| file.display().to_string()).collect()
     }
+}
+
+/// Without folders, which a page need not know.
+fn name_of(files: &[PathBuf]) -> String {
+    let names: Vec<PathBuf> = files.iter().map(|file| file_name(file).into()).collect();
+    name_files(&names)
 }
 
 /// Goes to a time.
@@ -168,7 +174,7 @@ impl Studio for ScanStudio {
         let mut colors: Vec<&str> = picture::shown(&source.columns);
         colors.extend(["elevation", "normal"]);
         json!({
-            "name": name_files(self.base.typed()),
+            "name": name_of(self.base.typed()),
             "points": points,
             "triangles": triangles,
             "version": env!("CARGO_PKG_VERSION"),
@@ -200,18 +206,13 @@ impl Studio for ScanStudio {
         if n_points < 3 * SKETCH || settings.contains_key("select") {
             return None;
         }
-        let mut fewer = settings.clone();
-        fewer.insert("select".into(), json!(format!("random:{SKETCH}")));
-        let stage = self.stage(&fewer, progress);
-        Some(stage.map(|stage| {
-            let mut settings = stage.settings;
-            settings.shift_remove("select");
-            // Chosen again from all points.
-            if !fewer.contains_key("exposure") {
-                settings.shift_remove("exposure");
-            }
-            Stage { settings, ..stage }
-        }))
+        let mut sketched = settings.clone();
+        sketched.insert("select".into(), json!(format!("random:{SKETCH}")));
+        // Fewer points surround less.
+        sketched.insert("boundary".into(), json!("off"));
+        let stage = self.stage(&sketched, progress);
+        // What is asked for is still the same; what was chosen from few points is chosen again.
+        Some(stage.map(|stage| Stage { settings: settings.clone(), ..stage }))
     }
 
     fn stage(&self, settings: &Keys, progress: &dyn Progress) -> Result<Stage> {
