@@ -103,7 +103,7 @@ mod tests {
         let half: DynamicImage = image::RgbaImage::from_pixel(1, 1, image::Rgba([9; 4])).into();
         assert_eq!(
             decode("a.png", &encoded(&half, ImageFormat::Png)).unwrap().texels,
-            vec![[9; 4]]
+            [[9; 4]].into()
         );
         let jpeg = decode("a.png", &encoded(&ramp, ImageFormat::Jpeg)).unwrap();
         assert_eq!((jpeg.width, jpeg.height, jpeg.texels.len()), (5, 3, 15));
