@@ -90,6 +90,11 @@ impl<'a> Assembly<'a> {
         sequences.fold(self.graph.animation.duration_secs().max(camera), f64::max)
     }
 
+    /// Of each sequence that is read in turn, the number of the file of a time.
+    pub fn frames_at(&self, time_secs: f64) -> Vec<usize> {
+        self.sequences.iter().map(|sequence| sequence.file_at(time_secs)).collect()
+    }
+
     /// Whether a node of the graph, or one that it hangs on, moves.
     pub fn moves(&self, node: usize) -> bool {
         let above = successors(Some(node), |node| self.graph.nodes[*node].parent);

@@ -68,7 +68,7 @@ impl<'a> Sequence<'a> {
     }
 
     /// The last one stays.
-    fn file_at(&self, time_secs: f64) -> usize {
+    pub fn file_at(&self, time_secs: f64) -> usize {
         let has_begun = |file_idx: &usize| *file_idx as f64 / self.fps <= time_secs;
         (1..self.files.len()).take_while(has_begun).count()
     }

@@ -125,10 +125,15 @@ impl Made {
         assembly: Assembly,
         clouds: &[PointCloud],
         legend: Value,
-        up: Vec3,
+        (time, up): (f64, Vec3),
         report: &Report,
     ) -> anyhow::Result<Self> {
-        let (graph, _) = assembly.dress(clouds.to_vec(), up, report)?;
+        let (mut graph, mut sequences) = assembly.dress(clouds.to_vec(), up, report)?;
+        for sequence in &mut sequences {
+            if let Some(points) = sequence.seek(time, up, report)? {
+                graph.geometries[sequence.geometry] = Geometry::Points(points);
+            }
+        }
         let indices = graph.geometries.iter().map(|geometry| match geometry {
             Geometry::Points(points) => match points.cloud.scalar(INDEX) {
                 Some(Values::I32(indices)) => indices.clone(),

@@ -87,13 +87,15 @@ impl ScanStudio {
         let assembly = self.base.under(&asked.args, &asked.line)?;
         let preparation = preparation_key(&assembly);
         let geometry = asked.line.tree_key();
-        let key = format!("{preparation}\n{geometry}\n{:?}", choices.up);
+        let frames = assembly.frames_at(asked.time);
+        let key = format!("{preparation}\n{geometry}\n{:?} {frames:?}", choices.up);
         self.made.get(key, report, || {
             let clouds = self.prepared.get(preparation, report, || {
                 self.workshop.install(|| prepared(&self.base, &assembly, report))
             })?;
             let legend = legend(&clouds, &asked.args.color.coloring(choices.up));
-            let make = || Made::new(assembly, &clouds, legend, choices.up, report);
+            let when = (asked.time, choices.up);
+            let make = || Made::new(assembly, &clouds, legend, when, report);
             self.workshop.install(make)
         })
     }

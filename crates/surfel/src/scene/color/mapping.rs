@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::image::{Colormap, Stretch};
 use crate::points::PointCloud;
 
-/// Part of the map that an automatic choice uses: light and shadow cannot show on black.
+/// Part of the grey map that intensity uses where no map is named: light and shadow cannot show on black.
 const SHADED: (f32, f32) = (0.3, 0.95);
 
 /// What shows the values of a cloud's points.
@@ -32,8 +32,8 @@ impl<'c> Mapping<'c> {
             None if *source == ColorSource::Intensity => Colormap::from_name("gray")?,
             None => Colormap::from_name("viridis")?,
         };
-        let is_automatic = coloring.source.is_none() && coloring.colormap.is_none();
-        let part = if is_automatic { SHADED } else { (0.0, 1.0) };
+        let is_grey = *source == ColorSource::Intensity && coloring.colormap.is_none();
+        let part = if is_grey { SHADED } else { (0.0, 1.0) };
         Ok(Self { value_at, range, map, part, is_range_given: given.is_some() })
     }
 

@@ -241,14 +241,17 @@ mod tests {
     }
 
     #[test]
-    fn an_automatic_gray_is_never_black_and_told_in_one_line() {
+    fn intensity_is_never_black_unless_its_map_is_named() {
         let intensity = Some((0..2500).map(|i| i as f32).collect());
         let cloud = PointCloud { intensity, ..lattice() };
         let listener = Listener(Mutex::default());
-        let darkest = colorize(&cloud, &coloring(None), &listener).unwrap()[0][0];
-        assert!(70 < darkest && darkest < 80, "{darkest}");
+        let chosen = colorize(&cloud, &coloring(None), &listener).unwrap();
+        assert!(70 < chosen[0][0] && chosen[0][0] < 80, "{:?}", chosen[0]);
         assert_eq!(listener.0.lock().unwrap().len(), 1);
-        assert_eq!(colorize(&cloud, &coloring(Some("intensity")), &Silent).unwrap()[0], [0; 3]);
+        let named = coloring(Some("intensity"));
+        assert_eq!(colorize(&cloud, &named, &Silent).unwrap(), chosen);
+        let gray = Coloring { colormap: Some(Colormap::from_name("gray").unwrap()), ..named };
+        assert_eq!(colorize(&cloud, &gray, &Silent).unwrap()[0], [0; 3]);
     }
 
     #[test]
