@@ -45,7 +45,7 @@ pub enum Quality {
 }
 
 /// Rays toward the sky a pixel while things move.
-const DRAFT_LIGHT_SAMPLES: u32 = 2;
+const DRAFT_LIGHT_SAMPLES: u32 = 1;
 /// Of JPEG, while things move and while they get better.
 const DRAFT_QUALITY: u8 = 80;
 const BETTER_QUALITY: u8 = 92;

@@ -92,8 +92,12 @@ fn ready(hall: &Hall) -> Result<Arc<dyn Studio>, Failure> {
     })
 }
 
+/// Size of a picture where none is said.
+const USUAL_SIZE: (u32, u32) = (1920, 1080);
+
 async fn scene(State(hall): State<Arc<Hall>>) -> Answer {
-    Ok(Json(ready(&hall)?.opening()).into_response())
+    let (width, height) = USUAL_SIZE;
+    Ok(Json(ready(&hall)?.opening(width, height)).into_response())
 }
 
 async fn stats(State(hall): State<Arc<Hall>>) -> Answer {

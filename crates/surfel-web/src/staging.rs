@@ -24,7 +24,8 @@ pub async fn run(
     out: mpsc::Sender<Outgoing>,
 ) {
     let Some(studio) = loaded(&hall, &out).await else { return };
-    let settings = studio.opening();
+    let (width, height) = client.sight().size;
+    let settings = studio.opening(width, height);
     answer(&out, &json!({ "type": "welcome", "scene": settings, "info": studio.info() })).await;
     let mut staging = Staging { hall, client, wishes, out, studio, settings };
     let first = staging.wishes.take().await;

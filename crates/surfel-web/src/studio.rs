@@ -19,8 +19,8 @@ pub trait Studio: Send + Sync + 'static {
     /// What there is to see, as every page is told it.
     fn info(&self) -> Value;
 
-    /// Complete settings to begin with.
-    fn opening(&self) -> Keys;
+    /// Complete settings to begin with, for a picture of this size.
+    fn opening(&self, width: u32, height: u32) -> Keys;
 
     /// The settings that the program was started with, without what it chose itself.
     fn given(&self) -> Keys;

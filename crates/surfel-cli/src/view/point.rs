@@ -3,6 +3,7 @@
 use super::made::{INDEX, Made};
 use crate::assemble::Assembly;
 use serde_json::{Value, json};
+use surfel::flat::FlatGeometry;
 use surfel::points::{PointCloud, Values};
 use surfel::scene::Geometry;
 use surfel_web::Place;
@@ -13,12 +14,15 @@ pub fn describe(base: &Assembly, made: &Made, place: &Place) -> Value {
         "surface": place.position.to_array(),
         "normal": place.normal.to_array(),
         "distance": place.depth,
-        "kind": "triangle",
         "index": place.id,
         "position": place.position.to_array(),
         "columns": [],
     });
     let Some(instance) = made.flat.instances.get(place.instance as usize) else { return told };
+    told["kind"] = match made.flat.geometry(instance) {
+        FlatGeometry::Cloud(_) => json!("point"),
+        FlatGeometry::Mesh(_) => json!("triangle"),
+    };
     let node = &made.graph.nodes[instance.node as usize];
     told["object"] = json!(name(made, instance.node as usize));
     let part = node.parts.iter().find(|part| part.material == instance.material as usize);
@@ -30,7 +34,6 @@ pub fn describe(base: &Assembly, made: &Made, place: &Place) -> Value {
     };
     let (cloud, index) = (&points.cloud, index as usize);
     let world = made.graph.world_from_nodes()[instance.node as usize];
-    told["kind"] = json!("point");
     told["index"] = json!(index);
     told["position"] = json!(world.transform_point3(cloud.world_position(index)).to_array());
     told["columns"] = columns(cloud, index).into();

@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use surfel::flat::FlatScene;
 use surfel::image::colormap;
+use surfel::math::Vec3;
 use surfel::points::PointCloud;
 use surfel::progress::Progress;
 use surfel::render::{CpuRenderer, Renderer};
@@ -30,7 +31,7 @@ pub struct ScanStudio {
     line: &'static Line,
     base: Assembly<'static>,
     given: Keys,
-    opening: Keys,
+    up: Vec3,
     prepared: Recent<Vec<PointCloud>>,
     made: Recent<Made>,
     renderer: CpuRenderer,
@@ -54,21 +55,20 @@ impl ScanStudio {
             .num_threads(rayon::current_num_threads())
             .build()
             .context("the threads cannot be started; ask for fewer with --threads")?;
-        let mut studio = Self {
+        let studio = Self {
             line,
             base,
             given,
-            opening: Keys::new(),
+            up: Vec3::Z,
             prepared: Recent::default(),
             made: Recent::default(),
             renderer: CpuRenderer { simd: Simd::detect() },
             workshop,
         };
+        // Choices are told once; pages make their own again.
         let asked = settings::read(line, &studio.given, &studio.given)?;
         let choices = picture::choose(&studio.base, &asked.args, report)?;
-        studio.opening = studio.complete(&asked, &choices, 0.0);
-        studio.opening.shift_remove("exposure");
-        Ok(studio)
+        Ok(Self { up: choices.up, ..studio })
     }
 
     fn complete(&self, asked: &Asked, choices: &Choices, stops: f32) -> Keys {
@@ -170,7 +170,7 @@ impl Studio for ScanStudio {
     fn info(&self) -> Value {
         let outline = self.base.outline();
         let bounds = usual_bounds(&outline);
-        let world = |corner: surfel::math::Vec3| (outline.origin + corner.as_dvec3()).to_array();
+        let world = |corner: Vec3| (outline.origin + corner.as_dvec3()).to_array();
         let (points, triangles) = self.base.graph.counts();
         let source = self.base.source();
         let mut colors: Vec<&str> = picture::shown(&source.columns);
@@ -181,7 +181,7 @@ impl Studio for ScanStudio {
             "triangles": triangles,
             "version": env!("CARGO_PKG_VERSION"),
             "bounds": { "min": world(bounds.min), "max": world(bounds.max) },
-            "up": self.opening.get("up"),
+            "up": self.up.to_array(),
             "surfaces": SurfaceKind::ALL.map(|(name, _)| name),
             "colors": colors,
             "colormaps": colormap::names().collect::<Vec<_>>(),
@@ -195,8 +195,22 @@ impl Studio for ScanStudio {
         })
     }
 
-    fn opening(&self) -> Keys {
-        self.opening.clone()
+    fn opening(&self, width: u32, height: u32) -> Keys {
+        let mut settings = self.given.clone();
+        settings.insert("resolution".into(), json!(format!("{width}x{height}")));
+        let chosen = || {
+            let asked = settings::read(self.line, &self.given, &settings).ok()?;
+            let report = Report::new(Verbosity::Quiet);
+            let choices = picture::choose(&self.base, &asked.args, &report).ok()?;
+            let mut opening = self.complete(&asked, &choices, 0.0);
+            // Found out once there is something to see.
+            opening.shift_remove("exposure");
+            let exposure = self.given.get("exposure").cloned();
+            opening.extend(exposure.map(|exposure| ("exposure".to_owned(), exposure)));
+            Some(opening)
+        };
+        // What was right at the start is so for every size.
+        chosen().unwrap_or(settings.clone())
     }
 
     fn given(&self) -> Keys {
