@@ -16,6 +16,8 @@ mod commands;
 mod pictures;
 #[path = "cli/scenes.rs"]
 mod scenes;
+#[path = "cli/viewer.rs"]
+mod viewer;
 #[path = "cli/wrong_input.rs"]
 mod wrong_input;
 #[path = "cli/wrong_scenes.rs"]

@@ -1,0 +1,123 @@
+//! `surfel view`: what the server answers to programs, and how it begins and ends.
+
+use super::common::{Folder, command, dome, fail, succeed};
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A server that ends with the test.
+struct Server {
+    child: Child,
+    host: String,
+}
+
+impl Server {
+    fn start(arguments: &[&str]) -> Self {
+        let arguments: Vec<&str> =
+            ["view", "--port", "0"].iter().chain(arguments).copied().collect();
+        let mut child =
+            command(&arguments).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let mut link = String::new();
+        BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut link).unwrap();
+        let host = link.trim().trim_start_matches("http://").trim_end_matches('/').to_owned();
+        let server = Self { child, host };
+        while !server.get("/healthz").1.windows(5).any(|word| word == b"ready") {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        server
+    }
+
+    /// Status and body.
+    fn get(&self, path: &str) -> (u16, Vec<u8>) {
+        let mut stream = TcpStream::connect(&self.host).unwrap();
+        let request = format!("GET {path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", self.host);
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).unwrap();
+        let end = answer.windows(4).position(|bytes| bytes == b"\r\n\r\n").unwrap();
+        let status = String::from_utf8_lossy(&answer[9..12]).parse().unwrap();
+        (status, answer[end + 4..].to_vec())
+    }
+
+    fn error(&self, path: &str) -> String {
+        let (status, body) = self.get(path);
+        let body = String::from_utf8(body).unwrap();
+        assert_eq!(status, 400, "{path}: {body}");
+        body
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[test]
+fn pictures_of_the_server_are_those_of_the_command_line() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(40));
+    let picture = folder.path("out.png");
+    let server = Server::start(&[&cloud, "--spp", "2"]);
+    for (query, options) in [
+        ("", &[][..]),
+        ("&color=rain&cmap=turbo", &["--color", "rain", "--cmap", "turbo"]),
+        ("&camera-azimuth-angle=40&light=sun", &["--camera-azimuth-angle", "40", "--light", "sun"]),
+        ("&clip-plane=0,0,0.2,0,0,1&spp=1", &["--clip-plane", "0,0,0.2,0,0,1", "--spp", "1"]),
+        ("&material=mirror&radius-scale=1.5", &["--material", "mirror", "--radius-scale", "1.5"]),
+    ] {
+        let (status, served) = server.get(&format!("/render?resolution=60x40{query}"));
+        assert_eq!(status, 200, "{query}: {}", String::from_utf8_lossy(&served));
+        let common = ["render", &cloud, "-o", &picture, "--resolution", "60x40", "--spp", "2"];
+        succeed(&[&common, options].concat());
+        assert!(served == fs::read(&picture).unwrap(), "{query}");
+    }
+}
+
+#[test]
+fn what_a_page_may_not_change_is_refused() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let server = Server::start(&[&cloud]);
+    for (query, expected) in [
+        ("environment=/etc/passwd", "environment"),
+        ("output=/tmp/x.png", "output"),
+        ("object=x", "object"),
+        ("spp=100000", "spp"),
+        ("sharpness=3", "sharpness"),
+        ("camera-view-angle=400", "camera-view-angle"),
+        ("resolution=32768x32768&spp=1024", "rays"),
+    ] {
+        let error = server.error(&format!("/render?{query}"));
+        assert!(error.contains(expected), "{query}: {error}");
+    }
+    assert_eq!(server.get("/../Cargo.toml").0, 404);
+}
+
+#[test]
+fn a_signal_ends_the_server_within_a_second() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let mut server = Server::start(&[&cloud]);
+    let start = Instant::now();
+    let kill = Command::new("kill").args(["-INT", &server.child.id().to_string()]).status();
+    assert!(kill.unwrap().success());
+    let status = server.child.wait().unwrap();
+    assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
+    assert_eq!(status.code(), Some(0));
+}
+
+#[test]
+fn what_cannot_be_served_is_told() {
+    let folder = Folder::new();
+    let missing = folder.path("missing.laz");
+    assert!(fail(&["view", &missing, "--port", "0"], 1).contains("missing.laz"));
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port().to_string();
+    let cloud = folder.write("dome.ply", dome(20));
+    assert!(fail(&["view", &cloud, "--port", &port], 1).contains("--port"));
+    fail(&["view", &cloud, "--camera-view-angle", "400"], 2);
+}
