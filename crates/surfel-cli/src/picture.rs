@@ -182,7 +182,7 @@ fn check_color(assembly: &Assembly) -> anyhow::Result<()> {
 }
 
 /// Columns of a file as `--color` takes them.
-pub fn shown(columns: &[String]) -> Vec<&str> {
+fn shown(columns: &[String]) -> Vec<&str> {
     let mut names: Vec<&str> = Vec::new();
     for column in columns {
         let name = match column.to_ascii_lowercase().as_str() {

@@ -44,14 +44,17 @@ export class Connection {
   open() {
     const socket = new WebSocket(this.address);
     socket.binaryType = 'arraybuffer';
-    socket.onopen = () => this.on.opened();
+    socket.onopen = () => {
+      // Not before: what is sent between opening and this event would come before the greeting.
+      this.#socket = socket;
+      this.on.opened();
+    };
     socket.onmessage = ({ data }) => {
       // Only a server that speaks is there again; one that hangs up at once is waited for ever longer.
       this.#wait_ms = FIRST_WAIT_MS;
       this.#receive(data);
     };
     socket.onclose = () => this.#reopen();
-    this.#socket = socket;
   }
 
   /** Whether the message could be sent. */

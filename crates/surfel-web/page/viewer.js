@@ -64,6 +64,11 @@ export class Viewer {
     this.#connection.open();
   }
 
+  /** Number of the last message about settings or camera; pictures tell which one they obey. */
+  get lastInput() {
+    return this.#input;
+  }
+
   /** The scene with the camera that the hand holds. */
   present() {
     return { ...this.scene, camera: this.camera };

@@ -7,7 +7,7 @@ use super::{Line, Options};
 use crate::Cli;
 use crate::args::SceneArgs;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, CommandFactory};
-use serde_json::{Map, Value};
+use serde_json::{Map, Number, Value};
 use std::ffi::OsString;
 use std::path::Path;
 
@@ -107,6 +107,46 @@ fn value(arg: &Arg, given: &ArgMatches) -> Option<Value> {
         // One that may stand without a value.
         None => Some(Value::Bool(true)),
         Some(_) if is_list => Some(words.into()),
-        Some(last) => Some(Value::String(last.clone())),
+        Some(last) => Some(as_in_a_file(last)),
+    }
+}
+
+/// Numbers and lists of them as a scene file has them; everything else as it was typed.
+fn as_in_a_file(word: &str) -> Value {
+    let numbers: Option<Vec<Value>> = word.split(',').map(number).collect();
+    match numbers {
+        Some(mut only) if only.len() == 1 => only.remove(0),
+        Some(several) => Value::Array(several),
+        None => Value::String(word.to_owned()),
+    }
+}
+
+fn number(text: &str) -> Option<Value> {
+    let text = text.trim();
+    let usual = serde_json::from_str::<Number>(text).ok();
+    // As in `.5`; `inf` and `nan`, which JSON does not know, stay words.
+    let short = || text.parse().ok().and_then(Number::from_f64);
+    usual.or_else(short).map(Value::Number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn words_are_typed_as_in_scene_files() {
+        for (word, value) in [
+            ("2", json!(2)),
+            (".5", json!(0.5)),
+            ("147,152.5", json!([147, 152.5])),
+            ("562316.125,4183187.5,0,0,0,-1", json!([562316.125, 4183187.5, 0, 0, 0, -1])),
+            ("inf", json!("inf")),
+            ("", json!("")),
+            ("#102030", json!("#102030")),
+            ("([0,1],[2,3])", json!("([0,1],[2,3])")),
+        ] {
+            assert_eq!(as_in_a_file(word), value, "{word}");
+        }
     }
 }

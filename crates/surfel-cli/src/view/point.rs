@@ -8,6 +8,11 @@ use surfel::points::{PointCloud, Values};
 use surfel::scene::Geometry;
 use surfel_web::Place;
 
+/// An 8-bit value times this is the same colour with 16 bits.
+const WIDEN: u16 = 257;
+/// Colours that tell how many bits the file has.
+const SAMPLE: usize = 4096;
+
 /// The point or triangle at a place, with all columns of the file that it came from.
 pub fn describe(base: &Assembly, made: &Made, place: &Place) -> Value {
     let mut told = json!({
@@ -53,8 +58,8 @@ fn columns(cloud: &PointCloud, index: usize) -> Vec<Value> {
     let mut columns = Vec::new();
     if let Some(colors) = &cloud.colors {
         let names = ["red", "green", "blue"];
-        columns
-            .extend(names.into_iter().zip(colors[index]).map(|(name, c)| column(name, c.into())));
+        let channels = names.into_iter().zip(channels(colors, index));
+        columns.extend(channels.map(|(name, channel)| column(name, channel.into())));
     }
     if let Some(intensity) = &cloud.intensity {
         columns.push(column("intensity", shortest(intensity[index])));
@@ -81,7 +86,31 @@ fn columns(cloud: &PointCloud, index: usize) -> Vec<Value> {
     columns
 }
 
+/// With 8 bits where that is all that the file seems to hold: of a large cloud not every point is looked at.
+fn channels(colors: &[[u16; 3]], index: usize) -> [u16; 3] {
+    let is_narrow = |color: &[u16; 3]| color.iter().all(|channel| channel % WIDEN == 0);
+    let mut sample = colors.iter().step_by(colors.len().div_ceil(SAMPLE));
+    let color = colors[index];
+    if is_narrow(&color) && sample.all(is_narrow) {
+        color.map(|channel| channel / WIDEN)
+    } else {
+        color
+    }
+}
+
 /// With the digits that tell it from others of its kind, not those of the double that it becomes.
 fn shortest(value: f32) -> Value {
     value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colors_have_as_many_bits_as_in_the_file() {
+        assert_eq!(channels(&[[131 * 257, 0, 65535], [0; 3]], 0), [131, 0, 255]);
+        assert_eq!(channels(&[[131 * 257, 0, 65535], [1, 0, 0]], 0), [131 * 257, 0, 65535]);
+        assert_eq!(channels(&[[131 * 257, 0, 65535], [1, 0, 0]], 1), [1, 0, 0]);
+    }
 }

@@ -1,7 +1,7 @@
 //! Scenes of the files that the viewer was started with, by the settings of its pages.
 
 use super::legend::legend;
-use super::made::{Made, Recent, number_points, preparation_key, prepared};
+use super::made::{INDEX, Made, Recent, number_points, preparation_key, prepared};
 use super::point;
 use super::settings::{self, Asked, EVERYTHING};
 use crate::args::{Global, SceneArgs};
@@ -131,6 +131,15 @@ impl ScanStudio {
         of_files.chain(of_scene).collect()
     }
 
+    /// What all clouds can be coloured by.
+    fn colors(&self) -> Vec<&str> {
+        let mut clouds = self.base.clouds().map(|(cloud, ..)| columns(cloud));
+        let mut names = clouds.next().unwrap_or_default();
+        clouds.for_each(|others| names.retain(|name| others.contains(name)));
+        names.extend(["elevation", "normal"]);
+        names
+    }
+
     fn kind_of(&self, file: &Path) -> &'static str {
         if surfel_formats::is_cloud(file).unwrap_or(true) { "points" } else { "triangles" }
     }
@@ -145,6 +154,18 @@ impl ScanStudio {
 fn name_of(files: &[PathBuf]) -> String {
     let names: Vec<PathBuf> = files.iter().map(|file| file_name(file).into()).collect();
     name_files(&names)
+}
+
+/// Columns that a cloud has, as `--color` takes them.
+fn columns(cloud: &PointCloud) -> Vec<&str> {
+    let usual = [
+        ("rgb", cloud.colors.is_some()),
+        ("intensity", cloud.intensity.is_some()),
+        ("class", cloud.classification.is_some()),
+    ];
+    let usual = usual.into_iter().filter_map(|(name, is_there)| is_there.then_some(name));
+    let others = cloud.scalars.iter().map(|scalar| scalar.name.as_str());
+    usual.chain(others.filter(|name| *name != INDEX)).collect()
 }
 
 /// Goes to a time.
@@ -172,9 +193,6 @@ impl Studio for ScanStudio {
         let bounds = usual_bounds(&outline);
         let world = |corner: Vec3| (outline.origin + corner.as_dvec3()).to_array();
         let (points, triangles) = self.base.graph.counts();
-        let source = self.base.source();
-        let mut colors: Vec<&str> = picture::shown(&source.columns);
-        colors.extend(["elevation", "normal"]);
         json!({
             "name": name_of(self.base.typed()),
             "points": points,
@@ -183,14 +201,14 @@ impl Studio for ScanStudio {
             "bounds": { "min": world(bounds.min), "max": world(bounds.max) },
             "up": self.up.to_array(),
             "surfaces": SurfaceKind::ALL.map(|(name, _)| name),
-            "colors": colors,
+            "colors": self.colors(),
             "colormaps": colormap::names().collect::<Vec<_>>(),
             "materials": Material::NAMED.map(|(name, _)| name),
             "objects": self.objects(),
             "duration_secs": self.base.duration_secs(),
             "threads": rayon::current_num_threads(),
             "simd": self.renderer.simd.name(),
-            "coordinate_system": source.coordinate_system,
+            "coordinate_system": self.base.source().coordinate_system,
             "limits": { "max_pixels": MOST_PIXELS, "max_save_pixels": MOST_SAVED_PIXELS },
         })
     }

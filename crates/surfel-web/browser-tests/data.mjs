@@ -1,0 +1,85 @@
+// What the tests look at: a small town scanned in national coordinates, a house as a mesh, a scene that moves.
+
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+
+const ORIGIN = [562316.125, 4183187.5, 148];
+const SIDE = 142;
+const SPACING = 0.25;
+/** Of the coordinates in the files. */
+export const RESOLUTION = 0.001;
+
+const to = (decimals, value) => Number(value.toFixed(decimals));
+
+/** The same numbers from 0 to 1 at every run (Mulberry32, by T. Ettinger). */
+function numbers(seed) {
+  return () => {
+    seed = (seed + 0x6d2b79f5) | 0;
+    let t = Math.imul(seed ^ (seed >>> 15), 1 | seed);
+    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
+    return ((t ^ (t >>> 14)) >>> 0) / 2 ** 32;
+  };
+}
+
+/** About 20,000 points, each as an object with the columns of the file. */
+function townPoints() {
+  const random = numbers(7);
+  return Array.from({ length: SIDE * SIDE }, (_, i) => {
+    const [east, north] = [i % SIDE, Math.floor(i / SIDE)].map((step) => SPACING * (step + 0.4 * (random() - 0.5)));
+    const isRoof = 8 < east && east < 14 && 12 < north && north < 20;
+    const height = isRoof ? 6 : 2 * Math.sin(east / 5) * Math.cos(north / 7);
+    return {
+      x: to(3, ORIGIN[0] + east), y: to(3, ORIGIN[1] + north), z: to(3, ORIGIN[2] + height),
+      red: isRoof ? 190 : Math.floor(60 + 4 * east), green: isRoof ? 80 : Math.floor(200 - 2 * north), blue: Math.floor(256 * random()),
+      intensity: Math.floor(65536 * random()), classification: isRoof ? 6 : 2, gps_time: to(4, 318000 + i / 1000),
+    };
+  });
+}
+
+const COLUMNS = {
+  x: 'double', y: 'double', z: 'double', red: 'uchar', green: 'uchar', blue: 'uchar',
+  intensity: 'ushort', classification: 'uchar', gps_time: 'double',
+};
+
+function ply(points) {
+  const properties = Object.entries(COLUMNS).map(([name, type]) => `property ${type} ${name}`);
+  const header = ['ply', 'format ascii 1.0', `element vertex ${points.length}`, ...properties, 'end_header'];
+  const rows = points.map((point) => Object.keys(COLUMNS).map((name) => point[name]).join(' '));
+  return [...header, ...rows, ''].join('\n');
+}
+
+/** A box without a floor, beside the roof, its sides facing outward. */
+function houseObj() {
+  const [x, y, z] = ORIGIN;
+  const corners = [[20, 6, -3], [26, 6, -3], [26, 12, -3], [20, 12, -3], [20, 6, 5], [26, 6, 5], [26, 12, 5], [20, 12, 5]];
+  const faces = ['5 6 7 8', '1 2 6 5', '2 3 7 6', '3 4 8 7', '4 1 5 8'];
+  return [...corners.map(([a, b, c]) => `v ${x + a} ${y + b} ${z + c}`), ...faces.map((face) => `f ${face}`), ''].join('\n');
+}
+
+const MOVING_TOML = `
+color = "rgb"
+
+[[object]]
+name = "town"
+file = "town.ply"
+
+[[object]]
+name = "house"
+file = "house.obj"
+material = { kind = "plastic", color = "#c04020" }
+
+[[animation]]
+object = "house"
+times = [0, 2]
+translate = [[0, 0, 0], [-9, 9, 3]]
+`;
+
+/** Writes everything into a new folder. */
+export function makeData() {
+  const folder = mkdtempSync(join(tmpdir(), 'surfel-browser-'));
+  const points = townPoints();
+  const files = { 'town.ply': ply(points), 'house.obj': houseObj(), 'moving.toml': MOVING_TOML };
+  for (const [name, text] of Object.entries(files)) writeFileSync(join(folder, name), text);
+  return { folder, points, remove: () => rmSync(folder, { recursive: true, force: true }) };
+}

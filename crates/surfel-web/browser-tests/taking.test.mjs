@@ -1,0 +1,162 @@
+// Taking it away: pictures, commands and scene files of the page are those of the command line, byte for byte.
+
+import assert from 'node:assert/strict';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { closePage, data, finishedPixels, openPage, QUICK, serve, settled, shell, show, state } from './harness.mjs';
+
+let still;
+let moving;
+before(async () => {
+  const viewport = { width: 700, height: 300 };
+  const open = async (...files) => openPage((await serve(files, ...QUICK)).link, { viewport });
+  [still, moving] = [await open('town.ply', 'house.obj'), await open('moving.toml')];
+});
+after(async () => {
+  await closePage(still);
+  await closePage(moving);
+});
+
+const CENTER = [562334, 4183205, 149];
+const VIEWS = {
+  'as it opens': {},
+  'colours by elevation in a range': { color: 'elevation', cmap: 'magma', range: [147, 152.5] },
+  'a clip box': { clip_box: '([562320,562335.5],[4183190,4183210],[140,160])' },
+  'a clip plane': { clip_plane: [562330, 4183200, 149, 0.6, 0, 0.8], radius_scale: 1.5 },
+  'glass and metal': { material: ['house.obj=glass:ior=1.3,color=#88ccff', 'town.ply=metal:roughness=0.4'], max_depth: 5 },
+  'an orthographic camera': { camera: { position: [562334, 4183150, 190], focal_point: CENTER, view_up: [0, 0, 1], view_angle: null, orthographic: 31.5 } },
+  'a turned camera with other light': {
+    camera: { position: [562380.5, 4183230.25, 170.125], focal_point: CENTER, view_angle: 50 },
+    light: ['sun', 'headlight'], sun: { azimuth: 123.4, elevation: 20, angle: 5, strength: 1.5 }, exposure: 0.7,
+  },
+  'soft light on few discs': { surface: 'disc', select: 'random:8000', sky: { strength: 2, reach: 4 }, spp: 3, samples: 4, background: '#102030' },
+};
+const MOMENTS = {
+  'the beginning': {},
+  'a moment': { time: 0.7, color: 'intensity' },
+  'the end, from elsewhere': { time: 2, camera: { position: [562380.5, 4183230.25, 170.125], focal_point: CENTER } },
+};
+
+async function download(page, start) {
+  const [file] = await Promise.all([page.waitForEvent('download'), start()]);
+  return { name: file.suggestedFilename(), bytes: readFileSync(await file.path()) };
+}
+
+/** The PNG that the dialog saves, in the size of the window. */
+async function saved(page) {
+  await page.locator('[data-action="save"]').click();
+  await page.locator('[data-preset="window"]').click();
+  const { bytes } = await download(page, () => page.locator('#save-start').click());
+  await page.locator('#save-note', { hasText: 'Saved.' }).waitFor();
+  await page.locator('#save-cancel').click();
+  return bytes;
+}
+
+/** What the dialog tells in each form. */
+async function taken(page) {
+  await page.locator('[data-action="take"]').click();
+  await page.waitForFunction(() => document.getElementById('take-text').value.startsWith('surfel'));
+  const texts = {};
+  for (const form of ['command', 'toml', 'json', 'link']) {
+    await page.locator(`[data-form="${form}"]`).click();
+    texts[form] = await page.locator('#take-text').inputValue();
+  }
+  await page.locator('[data-form="command"]').click();
+  await page.locator('#take-close').click();
+  return texts;
+}
+
+/** The pictures that the copied command, TOML and JSON make. */
+function rendered({ command, toml, json }) {
+  writeFileSync(join(data.folder, 'taken.toml'), toml);
+  writeFileSync(join(data.folder, 'taken.json'), json);
+  const commands = { command, toml: 'surfel render taken.toml -o picture.png', json: 'surfel render taken.json -o picture.png' };
+  const run = (line) => shell(`${line.replace(/-o picture.png$/, '-q -o -')}`);
+  return Object.entries(commands).map(([form, line]) => [form, run(line)]);
+}
+
+const pages = [...Object.entries(VIEWS).map((view) => [() => still, ...view]), ...Object.entries(MOMENTS).map((view) => [() => moving, ...view])];
+
+for (const [pageOf, name, patch] of pages) {
+  test(`what is taken shows the same: ${name}`, async () => {
+    const page = pageOf();
+    await show(page, patch);
+    const picture = await saved(page);
+    const texts = await taken(page);
+    for (const [form, bytes] of rendered(texts)) assert.ok(picture.equals(bytes), `${form}\n${texts.command}`);
+    const screen = await finishedPixels(page);
+    const other = await openPage(texts.link, { viewport: page.viewportSize() });
+    assert.equal(await finishedPixels(other), screen, 'the link');
+    await closePage(other);
+  });
+}
+
+test('a saved picture has the size that was asked for', async () => {
+  await still.locator('[data-action="save"]').click();
+  await still.locator('[name="width"]').fill('123');
+  await still.locator('[name="height"]').fill('77');
+  const { name, bytes } = await download(still, () => still.locator('#save-start').click());
+  assert.equal(name, 'town.png');
+  assert.deepEqual([bytes.readUInt32BE(16), bytes.readUInt32BE(20)], [123, 77]);
+  await still.locator('#save-cancel').click();
+});
+
+test('a save is cancelled, and too large a one refused', async () => {
+  await still.locator('[data-action="save"]').click();
+  await still.locator('[name="width"]').fill('8000');
+  await still.locator('[name="height"]').fill('8000');
+  await still.locator('#save-start').click();
+  await still.locator('#save-note', { hasText: 'Rendering' }).waitFor();
+  await still.locator('#save-cancel').click();
+  await still.locator('#save-note', { hasText: 'Cancelled.' }).waitFor();
+  await still.locator('[name="width"]').fill('20000');
+  await still.locator('#save-start').click();
+  await still.locator('#save-note', { hasText: 'up to 67 million pixels' }).waitFor();
+  await still.locator('#save-cancel').click();
+});
+
+test('texts are copied and downloaded', async () => {
+  await still.locator('[data-action="take"]').click();
+  await still.locator('[data-form="toml"]').click();
+  await still.waitForFunction(() => document.getElementById('take-text').value.includes('camera'));
+  const text = await still.locator('#take-text').inputValue();
+  await still.locator('#take-copy').click();
+  await still.locator('#take-copy.is-done').waitFor();
+  assert.equal(await still.evaluate(() => navigator.clipboard.readText()), text);
+  const { name, bytes } = await download(still, () => still.locator('#take-download').click());
+  assert.deepEqual([name, bytes.toString()], ['town.toml', text]);
+  await still.locator('[data-form="command"]').click();
+  await still.locator('#take-close').click();
+});
+
+const load = (page, name, text) => page.setInputFiles('#scene-file', { name, mimeType: 'text/plain', buffer: Buffer.from(text) });
+
+test('a scene file shows what it was taken from', async () => {
+  for (const [form, page, patch] of [['toml', still, VIEWS['a turned camera with other light']], ['json', still, VIEWS['glass and metal']], ['toml', moving, MOMENTS['the end, from elsewhere']]]) {
+    await show(page, patch);
+    const [screen, texts] = [await finishedPixels(page), await taken(page)];
+    await show(page, {});
+    const { frame } = await state(page, 'lastFrame');
+    assert.notEqual(await finishedPixels(page), screen);
+    await load(page, `view.${form}`, texts[form]);
+    await page.waitForFunction((before) => before < window.surfel.state.lastFrame.frame, frame);
+    await page.waitForFunction(() => window.surfel.state.lastFrame.finished);
+    assert.equal(await finishedPixels(page), screen, form);
+    assert.equal((await taken(page)).command, texts.command, form);
+  }
+});
+
+test('a scene file of other things is refused', async () => {
+  const screen = await finishedPixels(still);
+  for (const [name, text, told] of [
+    ['other.toml', '[[object]]\nfile = "other.ply"', 'is not what is viewed here'],
+    ['broken.toml', 'spp =', 'broken.toml'],
+    ['unknown.json', '{"sppp": 3}', 'sppp'],
+    ['town.ply', 'ply', 'is no scene file'],
+  ]) {
+    await load(still, name, text);
+    await still.locator('.toast', { hasText: told }).first().waitFor();
+  }
+  assert.equal(await finishedPixels(still), screen);
+});
