@@ -3,10 +3,12 @@
 use crate::client::Sight;
 use crate::encode::{self, Pixels};
 use crate::frame::Frame;
+use crate::hurry::{Hurry, LONG};
 use crate::pace::Pace;
 use crate::studio::Stage;
 use std::sync::Arc;
 use std::time::Instant;
+use surfel::Result;
 use surfel::flat::FlatScene;
 use surfel::progress::Progress;
 use surfel::render::{Piece, RenderStats, Renderer, Settings};
@@ -51,7 +53,7 @@ const DRAFT_QUALITY: u8 = 80;
 const BETTER_QUALITY: u8 = 92;
 /// What is painted at once while nothing moves.
 const PIECE_SECS: f64 = 0.015;
-/// Least rows of a piece.
+/// Least rows of a piece, unless they take long: each piece has its own cost.
 const LEAST_ROWS: u32 = 8;
 
 impl Canvas {
@@ -59,29 +61,30 @@ impl Canvas {
         self.version
     }
 
-    /// A picture as large as there is time for; none if it was given up.
+    /// A picture as large as there is time for.
     pub fn draft(
         &mut self,
         renderer: &dyn Renderer,
         sight: &Sight,
         secs: f64,
         progress: &dyn Progress,
-    ) -> Option<Frame> {
-        let stage = sight.stage.clone()?;
+    ) -> Result<Option<Frame>> {
+        let Some(stage) = sight.stage.clone() else { return Ok(None) };
+        let of_samples = stage.quality.samples_per_pixel;
         let (width, height) = self.pace.size(sight.size, secs);
         let light_samples = stage.quality.light_samples.min(DRAFT_LIGHT_SAMPLES);
         let settings =
             Settings { width, height, samples_per_pixel: 1, light_samples, ..stage.quality };
         let n_pixels = u64::from(width) * u64::from(height);
-        let scene = self.scene(stage, sight)?;
+        let Some(scene) = self.scene(stage, sight) else { return Ok(None) };
+        let hurry = Hurry::new(progress, Pace::is_least((width, height)));
         let start = Instant::now();
-        let rendered = renderer.render(scene, &settings, progress);
+        let rendered = renderer.render(scene, &settings, &hurry);
         self.pace.learn(n_pixels, start.elapsed().as_secs_f64());
-        let (image, stats) = rendered.ok()?;
+        let (image, stats) = rendered?;
         let pixels =
             Pixels { width: width as u16, height: height as u16, sum: &image.color, weight: 1.0 };
-        let of_samples = sight.stage.as_ref()?.quality.samples_per_pixel;
-        Some(frame(pixels, Quality::Draft, of_samples, Work::of(&stats)))
+        Ok(Some(frame(pixels, Quality::Draft, of_samples, Work::of(&stats))))
     }
 
     /// Starts the finished picture of the sight that a draft was made of.
@@ -97,21 +100,21 @@ impl Canvas {
         renderer: &dyn Renderer,
         sight: &Sight,
         progress: &dyn Progress,
-    ) -> bool {
-        let Some(stage) = sight.stage.clone() else { return false };
+    ) -> Result<bool> {
+        let Some(stage) = sight.stage.clone() else { return Ok(false) };
         let (width, height) = sight.size;
         let settings = Settings { width, height, ..stage.quality };
         if self.n_samples == settings.samples_per_pixel || self.is_due {
-            return false;
+            return Ok(false);
         }
         let piece = self.next_piece(height);
-        let Some(scene) = self.scene(stage, sight) else { return false };
-        let start = Instant::now();
-        let Ok((image, stats)) = renderer.render_piece(scene, &settings, piece, progress) else {
-            return true;
-        };
         let n_rows = piece.rows.1 - piece.rows.0;
+        let Some(scene) = self.scene(stage, sight) else { return Ok(false) };
+        let hurry = Hurry::new(progress, n_rows == 1);
+        let start = Instant::now();
+        let rendered = renderer.render_piece(scene, &settings, piece, &hurry);
         self.secs_per_row = start.elapsed().as_secs_f64() / f64::from(n_rows);
+        let (image, stats) = rendered?;
         self.work += Work::of(&stats);
         self.add(&image.color, piece, width as usize * height as usize);
         if self.n_rows == height {
@@ -120,7 +123,7 @@ impl Canvas {
             let is_last = self.n_samples == settings.samples_per_pixel;
             self.is_due = self.n_samples.is_power_of_two() || is_last;
         }
-        true
+        Ok(true)
     }
 
     /// The picture so far, if it should be seen.
@@ -143,7 +146,8 @@ impl Canvas {
 
     fn next_piece(&self, height: u32) -> Piece {
         let affordable = PIECE_SECS / self.secs_per_row.max(1e-6);
-        let n_rows = (affordable as u32).max(LEAST_ROWS);
+        let is_slow = LONG.as_secs_f64() <= f64::from(LEAST_ROWS) * self.secs_per_row;
+        let n_rows = (affordable as u32).max(if is_slow { 1 } else { LEAST_ROWS });
         let rows = (self.n_rows, height.min(self.n_rows.saturating_add(n_rows)));
         Piece { rows, samples: (self.n_samples, self.n_samples + 1) }
     }

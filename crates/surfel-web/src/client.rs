@@ -2,8 +2,10 @@
 
 use crate::canvas::{Canvas, Quality};
 use crate::frame::Frame;
-use crate::studio::Stage;
+use crate::studio::{Error, Stage};
 use serde_json::{Value, json};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -16,7 +18,8 @@ use tokio::sync::mpsc;
 #[derive(Debug)]
 pub enum Outgoing {
     Text(String),
-    Binary(Vec<u8>),
+    /// With what is let go of once the page has taken it.
+    Binary(Vec<u8>, Arc<dyn Any + Send + Sync>),
 }
 
 /// What a client looks at.
@@ -40,6 +43,8 @@ pub struct Client {
     version: AtomicU64,
     canvas: Mutex<Canvas>,
     flow: Mutex<Flow>,
+    /// Shared with the pictures that have not been written yet, whatever the page says to have seen.
+    unwritten: Arc<()>,
     out: mpsc::Sender<Outgoing>,
 }
 
@@ -78,6 +83,7 @@ impl Client {
             version: AtomicU64::new(1),
             canvas: Mutex::default(),
             flow: Mutex::default(),
+            unwritten: Arc::default(),
             out,
         }
     }
@@ -105,37 +111,58 @@ impl Client {
 
     fn may_send(&self) -> bool {
         let flow = lock(&self.flow);
-        flow.sent - flow.seen < MOST_UNSEEN && ROOM_FOR_ANSWERS < self.out.capacity()
+        flow.sent - flow.seen < MOST_UNSEEN
+            && Arc::strong_count(&self.unwritten) <= MOST_UNSEEN as usize
+            && ROOM_FOR_ANSWERS < self.out.capacity()
     }
 
     /// Paints and sends a draft within about `secs` if something has changed; returns whether it did.
-    pub fn draft(&self, renderer: &dyn Renderer, secs: f64) -> bool {
+    pub fn draft(&self, renderer: &dyn Renderer, secs: f64) -> surfel::Result<bool> {
         let (sight, version) = self.current();
         let mut canvas = lock(&self.canvas);
         if canvas.version() == version || !sight.is_complete() || !self.may_send() {
-            return false;
+            return Ok(false);
         }
-        let watch = Watch { client: self, version, until: Some(Instant::now() + PATIENCE) };
-        if let Some(frame) = canvas.draft(renderer, &sight, secs, &watch) {
+        let watch = self.watch(version, PATIENCE);
+        if let Some(frame) = canvas.draft(renderer, &sight, secs, &watch)? {
             canvas.begin(version);
             self.send(frame, &sight);
         }
-        true
+        Ok(true)
     }
 
     /// Paints a little more of the finished picture; returns whether there was something to do.
-    pub fn refine(&self, renderer: &dyn Renderer) -> bool {
+    pub fn refine(&self, renderer: &dyn Renderer) -> surfel::Result<bool> {
         let (sight, version) = self.current();
         let mut canvas = lock(&self.canvas);
         if canvas.version() != version || !sight.is_complete() {
-            return false;
+            return Ok(false);
         }
-        let watch = Watch { client: self, version, until: None };
-        let has_painted = canvas.refine(renderer, &sight, &watch);
+        let watch = self.watch(version, Duration::ZERO);
+        let has_painted = canvas.refine(renderer, &sight, &watch)?;
         let due = if self.may_send() { canvas.due(&sight) } else { None };
         let is_due = due.is_some();
         due.into_iter().for_each(|frame| self.send(frame, &sight));
-        has_painted || is_due
+        Ok(has_painted || is_due)
+    }
+
+    /// Whether `paint` found something to do. Where it fails or panics, this client is told and sees nothing
+    /// new until its settings change; others are painted for as before.
+    pub fn attempt(&self, paint: impl FnOnce(&Self) -> surfel::Result<bool>) -> bool {
+        let error = match catch_unwind(AssertUnwindSafe(|| paint(self))) {
+            Ok(Ok(has_painted)) => return has_painted,
+            Ok(Err(surfel::Error::Cancelled)) => return true,
+            Ok(Err(error)) => Error::from(error),
+            Err(_) => Error::Panicked,
+        };
+        self.look(|sight| sight.stage = None);
+        let message = json!({ "type": "error", "text": error.to_string() });
+        let _ = self.out.try_send(Outgoing::Text(message.to_string()));
+        true
+    }
+
+    fn watch(&self, version: u64, patience: Duration) -> Watch<'_> {
+        Watch { client: self, version, start: Instant::now(), patience }
     }
 
     fn current(&self) -> (Sight, u64) {
@@ -169,7 +196,7 @@ impl Client {
             });
         let binary = frame.message(flow.sent, sight.input);
         // A page that is gone is told of elsewhere.
-        let _ = self.out.try_send(Outgoing::Binary(binary));
+        let _ = self.out.try_send(Outgoing::Binary(binary, self.unwritten.clone()));
         if let Some(numbers) = numbers {
             let _ = self.out.try_send(Outgoing::Text(numbers.to_string()));
         }
@@ -182,18 +209,19 @@ impl Sight {
     }
 }
 
-/// Stops work for what is no longer looked at.
+/// Stops work for what is no longer looked at, and for those who are gone.
 struct Watch<'c> {
     client: &'c Client,
     version: u64,
-    /// Until when it goes on all the same.
-    until: Option<Instant>,
+    start: Instant,
+    /// For so long it goes on all the same.
+    patience: Duration,
 }
 
 impl Progress for Watch<'_> {
     fn is_cancelled(&self) -> bool {
-        self.client.version.load(Ordering::Relaxed) != self.version
-            && self.until.is_none_or(|until| until < Instant::now())
+        let is_old = self.client.version.load(Ordering::Relaxed) != self.version;
+        self.client.out.is_closed() || is_old && self.patience < self.start.elapsed()
     }
 }
 

@@ -72,9 +72,12 @@ impl Easel {
             // noticed at the mouse, not by who looks on.
             let n_moving = clients.iter().filter(|client| client.is_moving()).count();
             let secs = (DRAFT_SECS / n_moving.max(1) as f64).max(LEAST_DRAFT_SECS);
-            let n_drafts = clients.iter().filter(|client| client.draft(renderer, secs)).count();
+            let draft =
+                |client: &&Arc<Client>| client.attempt(|client| client.draft(renderer, secs));
+            let n_drafts = clients.iter().filter(draft).count();
             let mut in_turn = (0..clients.len()).map(|i| (turn + i) % clients.len());
-            let refined = in_turn.find(|&i| clients[i].refine(renderer));
+            let refine = |&i: &usize| clients[i].attempt(|client| client.refine(renderer));
+            let refined = in_turn.find(refine);
             turn = refined.map_or(turn, |i| i + 1);
             if n_drafts == 0 && refined.is_none() {
                 drop(clients);

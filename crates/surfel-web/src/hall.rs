@@ -3,7 +3,7 @@
 use crate::client::Client;
 use crate::easel::Easel;
 use crate::guard::Guard;
-use crate::limits::{MOST_CLIENTS, MOST_SAVES};
+use crate::limits::{MOST_CLIENTS, MOST_SAVES, MOST_WORK};
 use crate::studio::{self, Error, Studio};
 use crate::telling::Told;
 use std::sync::Arc;
@@ -20,14 +20,16 @@ pub struct Hall {
     pub studio: watch::Sender<Option<Arc<dyn Studio>>>,
     /// Of loading, until it is done.
     pub loading: watch::Sender<Option<Told>>,
+    /// Places for pages.
+    pub places: Arc<Semaphore>,
     /// Turns of those who want pictures to keep.
-    pub saves: Semaphore,
+    pub saves: Arc<Semaphore>,
     /// Set from outside, it ends everything.
     pub is_stopped: Arc<AtomicBool>,
     pub start: Instant,
     pub n_pictures: AtomicU64,
-    /// Threads beside those that paint: preparing points for one client must not hold up another's picture.
-    workshop: rayon::ThreadPool,
+    /// Turns of those who want long work done.
+    turns: Arc<Semaphore>,
 }
 
 impl Hall {
@@ -35,29 +37,25 @@ impl Hall {
         guard: Guard,
         renderer: Arc<dyn Renderer + Send>,
         is_stopped: Arc<AtomicBool>,
-    ) -> studio::Result<Self> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
-        let workshop = pool.build().map_err(|error| Error::Refused(error.to_string()))?;
-        Ok(Self {
+    ) -> Self {
+        let turns = |n| Arc::new(Semaphore::new(n));
+        Self {
             easel: Arc::default(),
             guard,
             renderer,
             studio: watch::Sender::new(None),
             loading: watch::Sender::new(None),
-            saves: Semaphore::new(MOST_SAVES),
+            places: turns(MOST_CLIENTS),
+            saves: turns(MOST_SAVES),
             is_stopped,
             start: Instant::now(),
             n_pictures: AtomicU64::new(0),
-            workshop,
-        })
+            turns: turns(MOST_WORK),
+        }
     }
 
     pub fn is_stopped(&self) -> bool {
         self.is_stopped.load(Ordering::Relaxed)
-    }
-
-    pub fn is_full(&self) -> bool {
-        MOST_CLIENTS <= self.easel.n_clients()
     }
 
     /// Waits until there is something to see.
@@ -69,12 +67,13 @@ impl Hall {
 
     /// Does long work away from the connections. A panic in it is an error of its own.
     pub async fn work<R: Send + 'static>(
-        self: &Arc<Self>,
+        &self,
         work: impl FnOnce() -> R + Send + 'static,
     ) -> studio::Result<R> {
-        let hall = self.clone();
-        let done = tokio::task::spawn_blocking(move || hall.workshop.install(work)).await;
-        done.map_err(|_| Error::Refused("internal error; please report it".into()))
+        let turn = self.turns.clone().acquire_owned().await;
+        // Held until the work ends, even if nobody waits for it any more.
+        let done = tokio::task::spawn_blocking(move || (work(), turn).0).await;
+        done.map_err(|_| Error::Panicked)
     }
 
     /// Lets a client's picture be painted for as long as the result lives.

@@ -12,6 +12,7 @@ mod encode;
 mod frame;
 mod guard;
 mod hall;
+mod hurry;
 pub mod limits;
 mod message;
 mod pace;

@@ -20,6 +20,12 @@ pub const MOST_LENGTH: u32 = 1 << 15;
 pub const MOST_BYTES: usize = 1 << 18;
 /// Pictures to keep that are made at once; others wait their turn.
 pub const MOST_SAVES: usize = 2;
+/// Pieces of long work at once, for all pages; others wait their turn.
+pub const MOST_WORK: usize = 64;
+/// Questions of one page about places in its picture at once.
+pub const MOST_PICKS: usize = 4;
+/// Bytes of the changes of settings that a page has asked for and does not see yet.
+pub const MOST_WISHED_BYTES: usize = 1 << 19;
 /// Within which a connection has to ask something, and a page to answer.
 pub const PATIENCE: Duration = Duration::from_secs(20);
 

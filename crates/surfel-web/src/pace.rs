@@ -36,6 +36,11 @@ impl Pace {
         (scaled(width), scaled(height))
     }
 
+    /// Whether no smaller picture follows one of this size, however long it takes.
+    pub fn is_least((width, height): (u32, u32)) -> bool {
+        f64::from(width.max(height)) < (1.0 + 2.0 * HYSTERESIS) * LEAST
+    }
+
     /// Takes in what a picture took.
     pub fn learn(&mut self, n_pixels: u64, secs: f64) {
         let found = (secs / n_pixels.max(1) as f64).clamp(1e-10, 1e-3);

@@ -73,12 +73,15 @@ async fn with_token(State(hall): State<Arc<Hall>>, request: Request, next: Next)
 }
 
 async fn socket(State(hall): State<Arc<Hall>>, upgrade: WebSocketUpgrade) -> Answer {
-    if hall.is_full() {
+    let Ok(place) = hall.places.clone().try_acquire_owned() else {
         let text = "all places are taken; close another page or try again later";
         return Err(Failure(StatusCode::SERVICE_UNAVAILABLE, text.into()));
-    }
+    };
     let upgrade = upgrade.max_message_size(MOST_BYTES).max_frame_size(MOST_BYTES);
-    Ok(upgrade.on_upgrade(move |socket| session::run(socket, hall)))
+    Ok(upgrade.on_upgrade(async move |socket| {
+        session::run(socket, hall).await;
+        drop(place);
+    }))
 }
 
 async fn health(State(hall): State<Arc<Hall>>) -> Response {
@@ -140,12 +143,13 @@ async fn render(hall: Arc<Hall>, keys: Keys) -> Answer {
     let studio = ready(&hall)?;
     // Ends the work when the one who asked goes away.
     let going = Going(Arc::default());
-    let Ok(_turn) = hall.saves.try_acquire() else {
+    let Ok(turn) = hall.saves.clone().try_acquire_owned() else {
         let text = "enough pictures are being made; try again in a while";
         return Err(Failure(StatusCode::TOO_MANY_REQUESTS, text.into()));
     };
     let until = Until { hall: hall.clone(), is_gone: going.0.clone() };
     let picture = hall.work(move || {
+        let _turn = turn;
         let mut settings = studio.given();
         merge(&mut settings, &keys);
         studio.picture(&settings, &until)

@@ -17,6 +17,7 @@ use std::time::Duration;
 use surfel::progress::Progress;
 use surfel::render::Renderer;
 use tokio::sync::Semaphore;
+use tokio_io_timeout::TimeoutStream;
 
 /// A port that is listened at, for a server that does not answer yet.
 pub struct Server {
@@ -62,7 +63,7 @@ impl Server {
     ) -> Result<()> {
         let place = self.address.to_string();
         let io = |source| Error::Io { place: place.clone(), source };
-        let hall = Arc::new(Hall::new(self.guard, renderer.clone(), is_stopped)?);
+        let hall = Arc::new(Hall::new(self.guard, renderer.clone(), is_stopped));
         let easel = hall.easel.start(renderer).map_err(io)?;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(THREADS)
@@ -120,6 +121,9 @@ async fn accept(listener: tokio::net::TcpListener, app: Router) {
         let Ok(place) = places.clone().try_acquire_owned() else { continue };
         // Without, small messages wait for one another.
         let _ = stream.set_nodelay(true);
+        let mut stream = Box::pin(TimeoutStream::new(stream));
+        // Who asks and does not read the answer would hold its place for ever.
+        stream.as_mut().set_write_timeout_pinned(Some(PATIENCE));
         let service = TowerToHyperService::new(app.clone());
         tokio::spawn(async move {
             let _place = place;

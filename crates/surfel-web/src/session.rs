@@ -4,7 +4,7 @@ use crate::camera;
 use crate::client::{Client, Outgoing};
 use crate::frame;
 use crate::hall::Hall;
-use crate::limits::{MOST_PIXELS, MOST_SAVED_PIXELS, PATIENCE, Rate, check_size};
+use crate::limits::{MOST_PICKS, MOST_PIXELS, MOST_SAVED_PIXELS, PATIENCE, Rate, check_size};
 use crate::message::Incoming;
 use crate::pick;
 use crate::staging;
@@ -19,7 +19,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use tokio::sync::mpsc;
+use tokio::sync::{Semaphore, mpsc};
 use tokio::time::timeout;
 
 /// Messages that wait for a slow page.
@@ -35,12 +35,13 @@ pub async fn run(socket: WebSocket, hall: Arc<Hall>) {
     let writer = tokio::spawn(write(sink, queue));
     if let Some((size, patch)) = greeting(&mut stream, &out).await {
         let wishes: Arc<Wishes> = Arc::default();
-        wishes.add(Wish { patch, ..Wish::default() });
         let client = Arc::new(Client::new(size, out.clone()));
         let _admission = hall.admit(client.clone());
         let staging =
             tokio::spawn(staging::run(hall.clone(), client.clone(), wishes.clone(), out.clone()));
-        let mut session = Session { hall, client, wishes, out, saves: HashMap::new() };
+        let picks = Arc::new(Semaphore::new(MOST_PICKS));
+        let mut session = Session { hall, client, wishes, out, picks, saves: HashMap::new() };
+        session.wish(Wish { patch, ..Wish::default() }).await;
         session.read(stream).await;
         session.saves.values().for_each(|is_cancelled| is_cancelled.store(true, Ordering::Relaxed));
         staging.abort();
@@ -85,19 +86,19 @@ async fn first_said(stream: &mut SplitStream<WebSocket>) -> Option<Message> {
     }
 }
 
-/// Sends what is queued; ends when the page takes nothing for too long.
+/// Sends what is queued; ends when the page takes nothing for too long, as all connections do.
 async fn write(mut sink: SplitSink<WebSocket, Message>, mut queue: mpsc::Receiver<Outgoing>) {
     let mut pings = tokio::time::interval(PING_EVERY);
     loop {
-        let message = tokio::select! {
-            message = queue.recv() => match message {
-                Some(Outgoing::Text(text)) => Message::Text(text.into()),
-                Some(Outgoing::Binary(bytes)) => Message::Binary(bytes.into()),
+        let (message, _held) = tokio::select! {
+            outgoing = queue.recv() => match outgoing {
+                Some(Outgoing::Text(text)) => (Message::Text(text.into()), None),
+                Some(Outgoing::Binary(bytes, held)) => (Message::Binary(bytes.into()), Some(held)),
                 None => return,
             },
-            _ = pings.tick() => Message::Ping(Default::default()),
+            _ = pings.tick() => (Message::Ping(Default::default()), None),
         };
-        if !matches!(timeout(PATIENCE, sink.send(message)).await, Ok(Ok(()))) {
+        if sink.send(message).await.is_err() {
             return;
         }
     }
@@ -105,7 +106,7 @@ async fn write(mut sink: SplitSink<WebSocket, Message>, mut queue: mpsc::Receive
 
 /// Queues a message; waits while the page does not take what was sent.
 pub async fn answer(out: &mpsc::Sender<Outgoing>, message: &Value) {
-    let _ = timeout(PATIENCE, out.send(Outgoing::Text(message.to_string()))).await;
+    let _ = out.send(Outgoing::Text(message.to_string())).await;
 }
 
 struct Session {
@@ -113,7 +114,9 @@ struct Session {
     client: Arc<Client>,
     wishes: Arc<Wishes>,
     out: mpsc::Sender<Outgoing>,
-    /// Pictures to keep under way, with what stops them.
+    /// Turns to ask what is at a place.
+    picks: Arc<Semaphore>,
+    /// Pictures to keep that have not been written to the page yet, with what stops them.
     saves: HashMap<u32, Arc<AtomicBool>>,
 }
 
@@ -121,8 +124,7 @@ impl Session {
     async fn read(&mut self, mut stream: SplitStream<WebSocket>) {
         let mut rate = Rate::new(Instant::now());
         let mut is_flood = false;
-        // Pages answer pings: one that says nothing for longer is gone.
-        while let Ok(Some(Ok(message))) = timeout(PING_EVERY + PATIENCE, stream.next()).await {
+        while let Some(message) = self.next(&mut stream).await {
             if self.out.is_closed() || self.hall.is_stopped() {
                 return;
             }
@@ -145,19 +147,31 @@ impl Session {
         }
     }
 
+    /// Pages answer pings: one that says nothing for longer is gone.
+    async fn next(&self, stream: &mut SplitStream<WebSocket>) -> Option<Message> {
+        loop {
+            match timeout(PING_EVERY + PATIENCE, stream.next()).await {
+                Ok(message) => return message?.ok(),
+                // A ping waits behind a large picture.
+                Err(_) if self.saves.values().any(is_held) => {}
+                Err(_) => return None,
+            }
+        }
+    }
+
     async fn obey(&mut self, message: Incoming) {
         match message {
             Incoming::Hello { .. } => self.refuse(None, None, "hello was said already").await,
             Incoming::Size { width, height } => self.resize(width, height).await,
             Incoming::Camera { input, camera, moving } => self.turn(input, camera, moving).await,
             Incoming::Set { input, scene, moving } => {
-                self.wishes.add(Wish { patch: scene, is_anew: false, input, is_moving: moving });
+                self.wish(Wish { patch: scene, is_anew: false, input, is_moving: moving }).await;
             }
             Incoming::Seen { frame } => {
                 self.client.has_seen(frame);
                 self.hall.easel.call();
             }
-            Incoming::Pick { id, x, y } => self.pick(id, (x, y)),
+            Incoming::Pick { id, x, y } => self.pick(id, (x, y)).await,
             Incoming::Save { id, width, height } => self.save(id, width, height).await,
             Incoming::Cancel { id } => {
                 let save = self.saves.get(&id);
@@ -197,9 +211,20 @@ impl Session {
         self.hall.easel.call();
     }
 
-    fn pick(&self, id: u32, place: (f64, f64)) {
+    async fn wish(&self, wish: Wish) {
+        let input = wish.input;
+        if let Err(text) = self.wishes.add(wish) {
+            self.refuse(None, Some(input), &text).await;
+        }
+    }
+
+    async fn pick(&self, id: u32, place: (f64, f64)) {
+        let Ok(turn) = self.picks.clone().try_acquire_owned() else {
+            return self.refuse(Some(id), None, "several places are being looked at; wait").await;
+        };
         let (hall, client, out) = (self.hall.clone(), self.client.clone(), self.out.clone());
         tokio::spawn(async move {
+            let _turn = turn;
             let Some(studio) = hall.studio().await else { return };
             let renderer = hall.renderer.clone();
             let found = hall.work(move || {
@@ -224,10 +249,11 @@ impl Session {
     }
 
     async fn save(&mut self, id: u32, width: u32, height: u32) {
-        self.saves.retain(|_, is_cancelled| 1 < Arc::strong_count(is_cancelled));
+        self.saves.retain(|_, is_cancelled| is_held(is_cancelled));
         let sized = check_size(width, height, MOST_SAVED_PIXELS);
         let place = match sized {
             Err(text) => Err(text),
+            Ok(()) if self.saves.contains_key(&id) => Err("this picture is being saved".into()),
             Ok(()) if MOST_SAVES <= self.saves.len() => {
                 Err("pictures are being saved; wait for one or cancel it".into())
             }
@@ -241,8 +267,11 @@ impl Session {
         self.saves.insert(id, is_cancelled.clone());
         let (hall, out) = (self.hall.clone(), self.out.clone());
         tokio::spawn(async move {
-            let message = match saved(&hall, id, settings, is_cancelled, &out).await {
-                Ok(png) => Outgoing::Binary(frame::saved(id, (width as u16, height as u16), &png)),
+            let message = match saved(&hall, id, settings, is_cancelled.clone(), &out).await {
+                Ok(png) => {
+                    let bytes = frame::saved(id, (width as u16, height as u16), &png);
+                    Outgoing::Binary(bytes, is_cancelled)
+                }
                 Err(error) => {
                     Outgoing::Text(refusal(Some(id), None, &error.to_string()).to_string())
                 }
@@ -252,11 +281,12 @@ impl Session {
     }
 
     async fn take(&self, id: u32, width: u32, height: u32) {
-        let Some((settings, studio)) = self.settings(width, height).zip(self.hall.studio().await)
-        else {
+        let studio = self.hall.studio.borrow().clone();
+        let Some((settings, studio)) = self.settings(width, height).zip(studio) else {
             return self.refuse(Some(id), None, "nothing to take yet").await;
         };
-        let message = match studio.written(&settings) {
+        let written = self.hall.work(move || studio.written(&settings)).await;
+        let message = match written.and_then(|written| written) {
             Ok(written) => json!({
                 "type": "taken",
                 "id": id,
@@ -270,12 +300,20 @@ impl Session {
     }
 
     async fn load(&self, id: u32, name: String, text: String) {
-        let Some(studio) = self.hall.studio().await else { return };
-        match studio.read(&name, &text) {
-            Ok(patch) => self.wishes.add(Wish { patch, is_anew: true, ..Wish::default() }),
+        let Some(studio) = self.hall.studio.borrow().clone() else {
+            return self.refuse(Some(id), None, "the files are still being loaded").await;
+        };
+        let read = self.hall.work(move || studio.read(&name, &text)).await;
+        match read.and_then(|read| read) {
+            Ok(patch) => self.wish(Wish { patch, is_anew: true, ..Wish::default() }).await,
             Err(error) => self.refuse(Some(id), None, &error.to_string()).await,
         }
     }
+}
+
+/// Whether a picture to keep is still being made or sent.
+fn is_held(is_cancelled: &Arc<AtomicBool>) -> bool {
+    1 < Arc::strong_count(is_cancelled)
 }
 
 pub fn refusal(id: Option<u32>, input: Option<u32>, text: &str) -> Value {

@@ -95,7 +95,7 @@ impl Staging {
                 answer(&self.out, &refusal(None, Some(wish.input), &error.to_string())).await;
                 // A page whose own settings are wrong still sees what it was opened for.
                 if self.client.sight().stage.is_none() && !wish.patch.is_empty() {
-                    self.wishes.add(Wish::default());
+                    let _ = self.wishes.add(Wish::default());
                 }
             }
         }

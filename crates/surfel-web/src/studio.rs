@@ -14,7 +14,8 @@ pub type Keys = Map<String, Value>;
 /// Makes what is seen. All clients share one, each with settings of its own.
 ///
 /// Settings come from strangers: an implementation refuses those that name files, and all else that was not
-/// meant to be changed.
+/// meant to be changed. Each call has a thread of its own, in no pool: a studio that shares its work among
+/// threads has a pool for it beside the one that paints.
 pub trait Studio: Send + Sync + 'static {
     /// What there is to see, as every page is told it.
     fn info(&self) -> Value;
@@ -89,6 +90,8 @@ pub enum Error {
     /// In words for the one who asked.
     #[error("{0}")]
     Refused(String),
+    #[error("internal error; please report it")]
+    Panicked,
     #[error("{place}: {source}")]
     Io { place: String, source: std::io::Error },
 }

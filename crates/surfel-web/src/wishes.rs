@@ -1,5 +1,6 @@
 //! Changes of settings that a page asks for, gathered until there is time to make them.
 
+use crate::limits::MOST_WISHED_BYTES;
 use crate::studio::Keys;
 use serde_json::Value;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -17,6 +18,10 @@ pub struct Wish {
 }
 
 impl Wish {
+    fn n_bytes(&self) -> usize {
+        serde_json::to_string(&self.patch).map_or(0, |text| text.len())
+    }
+
     fn add(&mut self, newer: Self) {
         if newer.is_anew {
             *self = newer;
@@ -34,12 +39,11 @@ pub struct Wishes {
 }
 
 impl Wishes {
-    pub fn add(&self, newer: Wish) {
-        match &mut *self.wish() {
-            Some(wish) => wish.add(newer),
-            none => *none = Some(newer),
-        }
+    /// Says why not if too much is wished for already.
+    pub fn add(&self, newer: Wish) -> Result<(), String> {
+        join(&mut self.wish(), newer)?;
         self.called.notify_one();
+        Ok(())
     }
 
     /// What is wished for now, once there is something.
@@ -53,12 +57,12 @@ impl Wishes {
     }
 
     /// A wish that was taken and given up for what came after it.
-    pub fn put_back(&self, mut older: Wish) {
+    pub fn put_back(&self, older: Wish) {
         let mut wish = self.wish();
-        if let Some(newer) = wish.take() {
-            older.add(newer);
+        if let Some(newer) = wish.replace(older) {
+            // Of too much, the older half stays.
+            let _ = join(&mut wish, newer);
         }
-        *wish = Some(older);
         self.called.notify_one();
     }
 
@@ -69,6 +73,20 @@ impl Wishes {
     fn wish(&self) -> MutexGuard<'_, Option<Wish>> {
         self.wish.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+fn join(wish: &mut Option<Wish>, newer: Wish) -> Result<(), String> {
+    let n_bytes = newer.n_bytes() + wish.as_ref().map_or(0, Wish::n_bytes);
+    if MOST_WISHED_BYTES < n_bytes {
+        return Err(format!(
+            "settings: {n_bytes} bytes wait to be seen, expected at most {MOST_WISHED_BYTES}"
+        ));
+    }
+    match wish {
+        Some(wish) => wish.add(newer),
+        none => *none = Some(newer),
+    }
+    Ok(())
 }
 
 /// Puts one patch over another: unlike settings, patches keep nulls.
@@ -108,14 +126,22 @@ mod tests {
     #[test]
     fn a_wish_put_back_stands_before_newer_ones() {
         let wishes = Wishes::default();
-        wishes.add(wish(json!({ "a": 2 }), 8));
+        wishes.add(wish(json!({ "a": 2 }), 8)).unwrap();
         wishes.put_back(wish(json!({ "a": 1, "b": 1 }), 7));
         let expected = wish(json!({ "a": 2, "b": 1 }), 8);
         assert_eq!(wishes.wish().take(), Some(expected));
         assert!(wishes.is_empty());
         wishes.put_back(wish(json!({ "a": 1 }), 7));
         let anew = Wish { is_anew: true, ..wish(json!({ "c": 3 }), 9) };
-        wishes.add(anew.clone());
+        wishes.add(anew.clone()).unwrap();
         assert_eq!(wishes.wish().take(), Some(anew));
+    }
+
+    #[test]
+    fn wishes_do_not_pile_up() {
+        let wishes = Wishes::default();
+        let large = |i: u32| wish(json!({ i.to_string(): "x".repeat(200_000) }), i);
+        let n_added = (0..100).filter(|&i| wishes.add(large(i)).is_ok()).count();
+        assert_eq!(n_added, MOST_WISHED_BYTES / 200_000);
     }
 }
