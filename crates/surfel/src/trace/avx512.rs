@@ -30,7 +30,7 @@ kernel!(surface::surface_hits(FlatCloud => SurfaceHit));
 kernel!(surface::occlusions(FlatCloud => bool));
 kernel!(closest::closest_triangles(FlatTriangles => Hit));
 kernel!(any::any_triangles(FlatTriangles => bool));
-kernel!(boxes::box_entries([Aabb] => f32));
+kernel!(boxes::box_entries([Aabb] => boxes::Entries));
 
 macro_rules! avx512 {
     ($wrap:ident($($call:tt)*)) => {

@@ -3,17 +3,31 @@
 use super::packet::WideRays;
 use crate::math::{Aabb, Floats, Lanes, Ray, WIDE, Wide};
 
-/// For each ray where it enters each box within its range, box after box; infinity where it does not.
+/// Where the sixteen rays of a group enter a box within their ranges; infinity where they do not.
+#[derive(Clone, Copy)]
+pub struct Entries {
+    pub of_rays: [f32; WIDE],
+    /// The least of them.
+    pub nearest: f32,
+}
+
+impl Entries {
+    pub const NONE: Self = Self { of_rays: [f32::INFINITY; WIDE], nearest: f32::INFINITY };
+}
+
+/// Where each sixteen rays enter each box, all boxes of one group after those of another. The last group
+/// may have fewer rays.
 #[inline(always)]
-pub(super) fn box_entries<L: Lanes>(boxes: &[Aabb], rays: &[Ray], entries: &mut [f32]) {
-    for (first, packet) in rays.chunks(WIDE).enumerate() {
-        let lanes = WideRays::<L::Wide>::new(packet);
+pub(super) fn box_entries<L: Lanes>(boxes: &[Aabb], rays: &[Ray], entries: &mut [Entries]) {
+    let groups = entries.chunks_mut(boxes.len().max(1));
+    for (group, entries) in rays.chunks(WIDE).zip(groups) {
+        let lanes = WideRays::<L::Wide>::new(group);
         let inverse =
             [inverse(lanes.direction[0]), inverse(lanes.direction[1]), inverse(lanes.direction[2])];
-        for (box_idx, bounds) in boxes.iter().enumerate() {
-            let found = entry(&lanes, &inverse, bounds).store();
-            let place = box_idx * rays.len() + first * WIDE;
-            entries[place..place + packet.len()].copy_from_slice(&found[..packet.len()]);
+        for (bounds, entries) in boxes.iter().zip(entries) {
+            let found = entry(&lanes, &inverse, bounds);
+            *entries = Entries { of_rays: found.store(), nearest: found.min_lane() };
+            entries.of_rays[group.len()..].fill(f32::INFINITY);
         }
     }
 }

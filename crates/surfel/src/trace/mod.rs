@@ -32,6 +32,7 @@ pub use world::{SceneHit, Which, scene_hits, scene_occlusions};
 
 use crate::flat::{FlatCloud, FlatTriangles};
 use crate::math::{Aabb, PortableLanes, Ray};
+use boxes::Entries;
 use simd::Level;
 
 /// Runs a batch kernel at a SIMD level; every level gives the same bytes.
@@ -98,8 +99,8 @@ pub fn occlusions(cloud: &FlatCloud, simd: Simd, rays: &[Ray], occluded: &mut [b
     at_level!(simd, surface::occlusions(cloud, rays, occluded));
 }
 
-/// Where each ray enters each box within its range, box after box; infinity where it does not.
-fn box_entries(boxes: &[Aabb], simd: Simd, rays: &[Ray], entries: &mut [f32]) {
+/// Where rays enter boxes, by groups of sixteen rays: all boxes of one group after those of another.
+fn box_entries(boxes: &[Aabb], simd: Simd, rays: &[Ray], entries: &mut [Entries]) {
     at_level!(simd, boxes::box_entries(boxes, rays, entries));
 }
 

@@ -1,13 +1,14 @@
 //! Rays against whole scenes: each ray goes from instance to instance, nearest box first, and all that are
 //! at the same instance are traced there as one batch.
 
+use super::boxes::Entries;
 use super::hit::Hit;
 use super::node::{BoxRay, ray_entries};
 use super::surface::SurfaceHit;
 use super::{Simd, any_triangles, box_entries, closest_triangles, occlusions, surface_hits};
 use crate::bvh::{Child, NO_PRIMITIVE, STACK_SIZE};
 use crate::flat::{FlatCloud, FlatGeometry, FlatMesh, FlatScene, Instance, Slot};
-use crate::math::{Aabb, LaneMask, PortableLanes, Ray, Vec3, Vec4};
+use crate::math::{Aabb, LaneMask, PortableLanes, Ray, Vec3, Vec4, WIDE};
 use crate::surface::triangle;
 use std::ops::Range;
 
@@ -86,45 +87,33 @@ pub fn scene_hits(
     hits: &mut [SceneHit],
 ) {
     let mut batch = Batch::default();
-    if let Some((instance_idx, instance)) = only(scene, which) {
-        batch.trace(scene, simd, instance, rays);
+    if let Some(place) = only(scene, which) {
+        batch.trace(&place, simd, rays);
         for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate() {
-            let found = batch.hit(scene, i, ray, instance);
-            *hit = found.map_or(SceneHit::MISS, |hit| SceneHit { instance: instance_idx, ..hit });
+            let distance = batch.distance(&place, i);
+            let is_miss = distance == f32::INFINITY;
+            *hit = if is_miss { SceneHit::MISS } else { batch.hit(&place, i, ray, distance) };
         }
         return;
     }
     // Beside the hits, which are large: most rays look at theirs only once.
-    let mut distances = vec![f32::INFINITY; rays.len()];
+    let mut distances = unlimited(rays);
     let mut rounds = Rounds::new(scene, simd, which, rays);
     let mut there = RaysThere::default();
-    loop {
-        let limit = |ray_idx: u32| distances[ray_idx as usize].min(rays[ray_idx as usize].t_max);
-        let Some(batches) = rounds.next(limit) else { break };
-        for (instance_idx, ray_indices) in batches.iter().filter(|(_, rays)| !rays.is_empty()) {
-            let instance = &scene.instances[*instance_idx as usize];
-            there.enter(instance, ray_indices, rays);
+    while let Some(batches) = rounds.next(&distances) {
+        for (instance_idx, runs) in batches.iter().filter(|(_, runs)| !runs.is_empty()) {
+            let place = Place::new(scene, *instance_idx);
+            there.enter(place.instance, runs, rays);
             // Discs behind the nearest are blended with it, whatever other instances are among them.
-            let reach = match scene.geometry(instance) {
+            let reach = match place.geometry {
                 FlatGeometry::Cloud(cloud) => cloud.reach,
                 FlatGeometry::Mesh(_) => 0.0,
             };
-            there.end_at(ray_indices, &distances, reach);
-            batch.trace(scene, simd, instance, &there.rays);
-            batch.measure(scene, instance, &there.scales);
-            for (i, (&ray_idx, &distance)) in ray_indices.iter().zip(&batch.distances).enumerate() {
-                let place = ray_idx as usize;
-                let is_first = || {
-                    let is_tie = distance == distances[place] && distance < f32::INFINITY;
-                    is_tie && *instance_idx < hits[place].instance
-                };
-                if !(distance < distances[place] || is_first()) {
-                    continue;
-                }
-                if let Some(hit) = batch.hit(scene, i, &there.rays[i], instance) {
-                    hits[place] = SceneHit { distance, instance: *instance_idx, ..hit };
-                    distances[place] = distance;
-                }
+            there.end_at(runs, &distances, reach);
+            batch.trace(&place, simd, &there.rays);
+            for (run, there_idx) in runs.placed() {
+                let (hits, distances) = (&mut hits[run.clone()], &mut distances[run]);
+                batch.keep_nearer(&place, &there, there_idx, hits, distances);
             }
         }
     }
@@ -141,50 +130,101 @@ pub fn scene_occlusions(
     rays: &[Ray],
     occluded: &mut [bool],
 ) {
-    if let Some((_, instance)) = only(scene, which) {
-        return block(scene, simd, instance, rays, occluded);
+    /// Of rays that look for nothing more.
+    const BLOCKED: f32 = f32::NEG_INFINITY;
+    if let Some(place) = only(scene, which) {
+        return block(&place, simd, rays, occluded);
     }
-    occluded.fill(false);
+    let mut limits = unlimited(rays);
     let mut blocked = Vec::new();
     let mut rounds = Rounds::new(scene, simd, which, rays);
     let mut there = RaysThere::default();
-    loop {
-        let limit = |ray_idx: u32| match occluded[ray_idx as usize] {
-            true => f32::NEG_INFINITY,
-            false => rays[ray_idx as usize].t_max,
-        };
-        let Some(batches) = rounds.next(limit) else { return };
-        for (instance_idx, ray_indices) in batches.iter().filter(|(_, rays)| !rays.is_empty()) {
-            let instance = &scene.instances[*instance_idx as usize];
-            there.enter(instance, ray_indices, rays);
-            blocked.resize(ray_indices.len(), false);
-            block(scene, simd, instance, &there.rays, &mut blocked);
-            for (&ray_idx, is_blocked) in ray_indices.iter().zip(&blocked) {
-                occluded[ray_idx as usize] |= is_blocked;
+    while let Some(batches) = rounds.next(&limits) {
+        for (instance_idx, runs) in batches.iter().filter(|(_, runs)| !runs.is_empty()) {
+            let place = Place::new(scene, *instance_idx);
+            there.enter(place.instance, runs, rays);
+            blocked.resize(there.rays.len(), false);
+            block(&place, simd, &there.rays, &mut blocked);
+            for (run, there_idx) in runs.placed() {
+                let found = limits[run].iter_mut().zip(&blocked[there_idx]);
+                found
+                    .filter(|(_, is_blocked)| **is_blocked)
+                    .for_each(|(limit, _)| *limit = BLOCKED);
             }
         }
+    }
+    for (occluded, limit) in occluded.iter_mut().zip(&limits) {
+        *occluded = *limit == BLOCKED;
+    }
+}
+
+/// How far each ray still looks within its range; there is one for each of sixteen rays in the last group too.
+fn unlimited(rays: &[Ray]) -> Vec<f32> {
+    vec![f32::INFINITY; rays.len().next_multiple_of(WIDE)]
+}
+
+/// An instance with what stands there.
+struct Place<'s> {
+    instance_idx: u32,
+    instance: &'s Instance,
+    geometry: &'s FlatGeometry,
+}
+
+impl<'s> Place<'s> {
+    fn new(scene: &'s FlatScene, instance_idx: u32) -> Self {
+        let instance = &scene.instances[instance_idx as usize];
+        Self { instance_idx, instance, geometry: scene.geometry(instance) }
     }
 }
 
 /// The instance that counts, if there is just one and it is in place: its rays are those of the world.
-fn only(scene: &FlatScene, which: Which) -> Option<(u32, &Instance)> {
+fn only(scene: &FlatScene, which: Which) -> Option<Place<'_>> {
     let instances = scene.instances.iter().enumerate();
     let mut counting = instances.filter(|(_, instance)| which.counts(instance));
     let (first, second) = (counting.next()?, counting.next());
-    (second.is_none() && first.1.is_in_place).then_some((first.0 as u32, first.1))
+    let is_only = second.is_none() && first.1.is_in_place;
+    is_only.then(|| Place::new(scene, first.0 as u32))
 }
 
 /// Where the rays still have to go.
 struct Rounds {
     visits: Visits,
     /// Instances, each with the rays that visit it next, in their order: that is what makes packets.
-    batches: Vec<(u32, Vec<u32>)>,
+    batches: Vec<(u32, Runs)>,
+}
+
+/// Indices of rays, rising, as ranges of neighbours: most rays go where those beside them go, and what
+/// stands together is copied as a whole.
+#[derive(Default)]
+struct Runs(Vec<Range<usize>>);
+
+impl Runs {
+    fn push(&mut self, run: Range<usize>) {
+        match self.0.last_mut() {
+            Some(last) if last.end == run.start => last.end = run.end,
+            _ => self.0.push(run),
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Each run, and where its rays are when all runs are put one after another.
+    fn placed(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
+        let mut end = 0;
+        self.0.iter().map(move |run| {
+            let first = end;
+            end += run.len();
+            (run.clone(), first..end)
+        })
+    }
 }
 
 enum Visits {
-    /// Of few instances: where each ray enters the box of each, instance after instance, at infinity once it
-    /// was there; and the rays still on their way.
-    Few { entries: Vec<f32>, open: Vec<u32> },
+    /// Of few instances: where the sixteen rays of each group enter the box of each, group after group; and
+    /// the groups still on their way.
+    Few { entries: Vec<Entries>, open: Vec<u32> },
     /// Of many: all that each ray comes by, sorted by where it enters, one ray's after another's; and what
     /// is left of that of each ray still on its way. `jobs` is room for the next round.
     Many { entries: Vec<(f32, u32)>, left: Vec<(u32, Range<u32>)>, jobs: Vec<(u32, u32)> },
@@ -203,21 +243,22 @@ impl Rounds {
         }
         let boxes: Vec<Aabb> =
             instances.iter().map(|&i| scene.instances[i as usize].bounds).collect();
-        let mut entries = vec![0.0; boxes.len() * rays.len()];
+        let n_groups = rays.len().div_ceil(WIDE);
+        let mut entries = vec![Entries::NONE; n_groups * boxes.len()];
         box_entries(&boxes, simd, rays, &mut entries);
         Self {
-            visits: Visits::Few { entries, open: (0..rays.len() as u32).collect() },
-            batches: instances.into_iter().map(|instance| (instance, Vec::new())).collect(),
+            visits: Visits::Few { entries, open: (0..n_groups as u32).collect() },
+            batches: instances.into_iter().map(|instance| (instance, Runs::default())).collect(),
         }
     }
 
     /// The next visit of each ray that has one within its limit; none if no ray has.
-    fn next(&mut self, limit: impl Fn(u32) -> f32) -> Option<&[(u32, Vec<u32>)]> {
+    fn next(&mut self, limits: &[f32]) -> Option<&[(u32, Runs)]> {
         let Self { visits, batches } = self;
         let n_batches = match visits {
-            Visits::Few { entries, open } => next_of_few(entries, open, batches, limit),
+            Visits::Few { entries, open } => next_of_few(entries, open, batches, limits),
             Visits::Many { entries, left, jobs } => {
-                next_of_many(entries, left, jobs, limit);
+                next_of_many(entries, left, jobs, limits);
                 group(jobs, batches)
             }
         };
@@ -225,31 +266,56 @@ impl Rounds {
     }
 }
 
-/// Puts each ray into the batch of the instance that it visits next; how many batches there are then.
+/// Puts the rays of each group into the batch of the instance that the group visits next, all of them that
+/// meet its box within their limits; how many batches there are then.
+///
+/// Sixteen rays choose at a time: one by one that cost a twentieth of the search among points.
 fn next_of_few(
-    entries: &mut [f32],
+    entries: &mut [Entries],
     open: &mut Vec<u32>,
-    batches: &mut [(u32, Vec<u32>)],
-    limit: impl Fn(u32) -> f32,
+    batches: &mut [(u32, Runs)],
+    limits: &[f32],
 ) -> usize {
-    batches.iter_mut().for_each(|(_, rays)| rays.clear());
-    let n_rays = entries.len() / batches.len().max(1);
-    open.retain(|&ray| {
-        let (mut nearest, mut entry) = (0, f32::INFINITY);
-        for i in 0..batches.len() {
-            let other = entries[i * n_rays + ray as usize];
-            // Two choices instead of one branch, which could not be foretold.
-            nearest = if other < entry { i } else { nearest };
-            entry = entry.min(other);
+    batches.iter_mut().for_each(|(_, runs)| runs.0.clear());
+    let mut goes_any = false;
+    open.retain(|&group| {
+        let entries = &mut entries[group as usize * batches.len()..][..batches.len()];
+        let first = group as usize * WIDE;
+        let limits = &limits[first..first + WIDE];
+        while let Some(nearest) = nearest(entries) {
+            entries[nearest].nearest = f32::INFINITY;
+            if send(&mut batches[nearest].1, first, &entries[nearest].of_rays, limits) {
+                goes_any = true;
+                return true;
+            }
         }
-        let goes = entry < f32::INFINITY && entry <= limit(ray);
-        if goes {
-            entries[nearest * n_rays + ray as usize] = f32::INFINITY;
-            batches[nearest].1.push(ray);
-        }
-        goes
+        false
     });
-    if open.is_empty() { 0 } else { batches.len() }
+    if goes_any { batches.len() } else { 0 }
+}
+
+/// The box that any ray of the group enters first.
+fn nearest(entries: &[Entries]) -> Option<usize> {
+    let (mut nearest, mut entry) = (0, f32::INFINITY);
+    for (i, other) in entries.iter().enumerate() {
+        // Two choices instead of one branch, which could not be foretold.
+        nearest = if other.nearest < entry { i } else { nearest };
+        entry = entry.min(other.nearest);
+    }
+    (entry < f32::INFINITY).then_some(nearest)
+}
+
+/// Adds the rays of the group that begins with `first` which enter a box within their limits, if any does.
+fn send(runs: &mut Runs, first: usize, entries: &[f32; WIDE], limits: &[f32]) -> bool {
+    let goes = |(entry, limit): (&f32, &f32)| (*entry < f32::INFINITY) & (entry <= limit);
+    let n_going: u32 = entries.iter().zip(limits).map(|pair| u32::from(goes(pair))).sum();
+    if n_going as usize == WIDE {
+        runs.push(first..first + WIDE);
+    } else if 0 < n_going {
+        let going = entries.iter().zip(limits).enumerate().filter(|(_, pair)| goes(*pair));
+        going.for_each(|(lane, _)| runs.push(first + lane..first + lane + 1));
+    }
+    0 < n_going
 }
 
 /// Lists the instances that rays visit next, each with the ray.
@@ -257,13 +323,13 @@ fn next_of_many(
     entries: &[(f32, u32)],
     left: &mut Vec<(u32, Range<u32>)>,
     jobs: &mut Vec<(u32, u32)>,
-    limit: impl Fn(u32) -> f32,
+    limits: &[f32],
 ) {
     jobs.clear();
     left.retain_mut(|(ray, left)| {
         let Some(next) = left.next() else { return false };
         let (entry, instance) = entries[next as usize];
-        let goes = entry <= limit(*ray);
+        let goes = entry <= limits[*ray as usize];
         if goes {
             jobs.push((instance, *ray));
         }
@@ -272,17 +338,17 @@ fn next_of_many(
 }
 
 /// Makes a batch of all jobs at the same instance, in room that is kept; how many batches there are then.
-fn group(jobs: &mut [(u32, u32)], batches: &mut Vec<(u32, Vec<u32>)>) -> usize {
+fn group(jobs: &mut [(u32, u32)], batches: &mut Vec<(u32, Runs)>) -> usize {
     jobs.sort_by_key(|(instance, _)| *instance);
     let mut n_batches = 0;
     for group in jobs.chunk_by(|a, b| a.0 == b.0) {
         if n_batches == batches.len() {
-            batches.push((0, Vec::new()));
+            batches.push((0, Runs::default()));
         }
-        let (instance, rays) = &mut batches[n_batches];
+        let (instance, runs) = &mut batches[n_batches];
         *instance = group[0].0;
-        rays.clear();
-        rays.extend(group.iter().map(|(_, ray)| *ray));
+        runs.0.clear();
+        group.iter().for_each(|(_, ray)| runs.push(*ray as usize..*ray as usize + 1));
         n_batches += 1;
     }
     n_batches
@@ -359,26 +425,32 @@ struct RaysThere {
 }
 
 impl RaysThere {
-    fn enter(&mut self, instance: &Instance, indices: &[u32], rays: &[Ray]) {
+    fn enter(&mut self, instance: &Instance, runs: &Runs, rays: &[Ray]) {
         self.rays.clear();
         self.scales.clear();
-        if instance.is_in_place {
-            self.rays.extend(indices.iter().map(|&ray_idx| rays[ray_idx as usize]));
-            self.scales.resize(indices.len(), 1.0);
-            return;
+        for run in &runs.0 {
+            let rays = &rays[run.clone()];
+            if instance.is_in_place {
+                self.rays.extend_from_slice(rays);
+                continue;
+            }
+            for (ray, scale) in rays.iter().map(|ray| instance.object_ray(ray)) {
+                self.rays.push(ray);
+                self.scales.push(scale);
+            }
         }
-        for &ray_idx in indices {
-            let (ray, scale) = instance.object_ray(&rays[ray_idx as usize]);
-            self.rays.push(ray);
-            self.scales.push(scale);
+        if instance.is_in_place {
+            self.scales.resize(self.rays.len(), 1.0);
         }
     }
 
     /// Nothing is looked for beyond `reach` behind what is known already, at the world's `distances`.
-    fn end_at(&mut self, indices: &[u32], distances: &[f32], reach: f32) {
-        let nearest = indices.iter().map(|&ray_idx| distances[ray_idx as usize]);
-        for ((ray, scale), nearest) in self.rays.iter_mut().zip(&self.scales).zip(nearest) {
-            ray.t_max = ray.t_max.min(nearest * scale + reach);
+    fn end_at(&mut self, runs: &Runs, distances: &[f32], reach: f32) {
+        for (run, there_idx) in runs.placed() {
+            let rays = self.rays[there_idx.clone()].iter_mut().zip(&self.scales[there_idx]);
+            for ((ray, scale), nearest) in rays.zip(&distances[run]) {
+                ray.t_max = ray.t_max.min(nearest * scale + reach);
+            }
         }
     }
 }
@@ -388,13 +460,11 @@ impl RaysThere {
 struct Batch {
     on_points: Vec<SurfaceHit>,
     on_triangles: Vec<Hit>,
-    /// In the world, infinite where nothing was found.
-    distances: Vec<f32>,
 }
 
 impl Batch {
-    fn trace(&mut self, scene: &FlatScene, simd: Simd, instance: &Instance, rays: &[Ray]) {
-        match scene.geometry(instance) {
+    fn trace(&mut self, place: &Place, simd: Simd, rays: &[Ray]) {
+        match place.geometry {
             FlatGeometry::Cloud(cloud) => {
                 self.on_points.resize(rays.len(), SurfaceHit::MISS);
                 surface_hits(cloud, simd, rays, &mut self.on_points);
@@ -406,48 +476,67 @@ impl Batch {
         }
     }
 
-    /// Sets the distances of what was found, from rays with these scales.
-    fn measure(&mut self, scene: &FlatScene, instance: &Instance, scales: &[f32]) {
-        let Self { on_points, on_triangles, distances } = self;
-        distances.clear();
-        match scene.geometry(instance) {
-            FlatGeometry::Cloud(_) => {
-                distances
-                    .extend(on_points.iter().zip(scales).map(|(hit, scale)| hit.distance / scale));
-            }
-            FlatGeometry::Mesh(_) => {
-                let found = on_triangles.iter().zip(scales);
-                distances.extend(found.map(|(hit, scale)| hit.distance / scale));
+    /// Takes over what was found nearer than the `hits` known at these distances; `there_idx` says by
+    /// which rays there.
+    fn keep_nearer(
+        &self,
+        place: &Place,
+        there: &RaysThere,
+        there_idx: Range<usize>,
+        hits: &mut [SceneHit],
+        distances: &mut [f32],
+    ) {
+        for (i, (hit, known)) in there_idx.zip(hits.iter_mut().zip(distances)) {
+            let distance = self.distance(place, i) / there.scales[i];
+            let is_tie = distance == *known && distance < f32::INFINITY;
+            if distance < *known || is_tie && place.instance_idx < hit.instance {
+                *hit = self.hit(place, i, &there.rays[i], distance);
+                *known = distance;
             }
         }
     }
 
-    /// What the ray at `i` found, at its distance in the object's coordinates.
+    /// At which the ray at `i` found something, in the object's coordinates; infinite where it did not.
     #[inline]
-    fn hit(&self, scene: &FlatScene, i: usize, ray: &Ray, instance: &Instance) -> Option<SceneHit> {
-        match scene.geometry(instance) {
-            FlatGeometry::Cloud(cloud) => point_hit(cloud, &self.on_points[i], instance),
-            FlatGeometry::Mesh(mesh) => triangle_hit(mesh, &self.on_triangles[i], ray, instance),
+    fn distance(&self, place: &Place, i: usize) -> f32 {
+        match place.geometry {
+            FlatGeometry::Cloud(_) => self.on_points[i].distance,
+            FlatGeometry::Mesh(_) => self.on_triangles[i].distance,
+        }
+    }
+
+    /// What the ray at `i` found, at this distance in the world.
+    #[inline]
+    fn hit(&self, place: &Place, i: usize, ray: &Ray, distance: f32) -> SceneHit {
+        let Place { instance_idx, instance, geometry } = *place;
+        match geometry {
+            FlatGeometry::Cloud(cloud) => SceneHit {
+                distance,
+                instance: instance_idx,
+                ..point_hit(cloud, &self.on_points[i], instance)
+            },
+            FlatGeometry::Mesh(mesh) => SceneHit {
+                distance,
+                instance: instance_idx,
+                ..triangle_hit(mesh, &self.on_triangles[i], ray, instance)
+            },
         }
     }
 }
 
 /// Whether an instance blocks rays in its coordinates.
-fn block(scene: &FlatScene, simd: Simd, instance: &Instance, rays: &[Ray], occluded: &mut [bool]) {
-    match scene.geometry(instance) {
+fn block(place: &Place, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
+    match place.geometry {
         FlatGeometry::Cloud(cloud) => occlusions(cloud, simd, rays, occluded),
         FlatGeometry::Mesh(mesh) => any_triangles(&mesh.triangles, simd, rays, occluded),
     }
 }
 
+/// All that the cloud knows of a hit.
 #[inline]
-fn point_hit(cloud: &FlatCloud, hit: &SurfaceHit, instance: &Instance) -> Option<SceneHit> {
-    if hit.is_miss() {
-        return None;
-    }
+fn point_hit(cloud: &FlatCloud, hit: &SurfaceHit, instance: &Instance) -> SceneHit {
     let normal = instance.world_normal(hit.normal);
-    Some(SceneHit {
-        distance: hit.distance,
+    SceneHit {
         id: hit.id,
         radius: hit.radius * instance.scale,
         normal,
@@ -456,13 +545,11 @@ fn point_hit(cloud: &FlatCloud, hit: &SurfaceHit, instance: &Instance) -> Option
         alpha: 1.0,
         is_inner: cloud.has_outward_normals && hit.is_inner,
         ..SceneHit::MISS
-    })
+    }
 }
 
-fn triangle_hit(mesh: &FlatMesh, hit: &Hit, ray: &Ray, instance: &Instance) -> Option<SceneHit> {
-    if hit.is_miss() {
-        return None;
-    }
+/// All that the mesh knows of a hit.
+fn triangle_hit(mesh: &FlatMesh, hit: &Hit, ray: &Ray, instance: &Instance) -> SceneHit {
     let corners = mesh.triangles.triangle(hit.slot);
     let shares = triangle::barycentric(corners.map(|corner| corner - ray.origin), ray.direction);
     let [a, b, c] = corners;
@@ -479,8 +566,7 @@ fn triangle_hit(mesh: &FlatMesh, hit: &Hit, ray: &Ray, instance: &Instance) -> O
         None => facet,
     };
     let color = mesh.at(&mesh.colors, hit.slot, shares).unwrap_or(Vec4::ONE);
-    Some(SceneHit {
-        distance: hit.distance,
+    SceneHit {
         id: mesh.triangles.id(hit.slot),
         slot: hit.slot,
         shares: (shares[1], shares[2]),
@@ -490,7 +576,7 @@ fn triangle_hit(mesh: &FlatMesh, hit: &Hit, ray: &Ray, instance: &Instance) -> O
         alpha: color.w,
         is_inner,
         ..SceneHit::MISS
-    })
+    }
 }
 
 /// Unit, even where squares are beyond the range of f32.
