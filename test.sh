@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Everything that must hold: formatting, lints, tests, doc tests, licences, each benchmark once.
+# Everything that must hold: formatting, lints, tests, doc tests, the viewer's page in a browser, licences,
+# each benchmark once.
 # Ends with a line "N passed, N failed, N skipped"; fails if anything failed.
 set -uo pipefail
 cd "$(dirname "$0")" || exit 1
@@ -42,6 +43,34 @@ tests() {
     skipped=$((skipped + silent))
 }
 
+# Runs node's tests and counts them; a file that does not even start counts as a failure.
+page_tests() {
+    local name=$1
+    shift
+    echo "== $name"
+    node --test --test-reporter=tap "$@" 2>&1 | tee "$log" | grep -E '^(not )?ok |^ +error:|^# (tests|duration)'
+    local ok bad
+    ok=$(sed -nE 's/^# pass ([0-9]+)$/\1/p' "$log")
+    bad=$(sed -nE 's/^# (fail|cancelled) ([0-9]+)$/\2/p' "$log" | paste -sd+)
+    passed=$((passed + ${ok:-0}))
+    failed=$((failed + ${bad:-1}))
+}
+
+# Looks for the browser and for what drives it, which goes into a folder outside the repository; `missing`
+# tells what cannot be had.
+prepare_browser() {
+    export PLAYWRIGHT=${PLAYWRIGHT:-${XDG_CACHE_HOME:-$HOME/.cache}/surfel-playwright}
+    if ! command -v chromium >/dev/null && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+        apt-get update >"$log" 2>&1 && apt-get install -y --no-install-recommends chromium >"$log" 2>&1
+    fi
+    missing="chromium is not installed"
+    CHROMIUM=$(command -v chromium) || return
+    export CHROMIUM
+    [ -d "$PLAYWRIGHT/node_modules/playwright-core" ] && return
+    missing="npm cannot install playwright-core into $PLAYWRIGHT"
+    npm install --silent --no-audit --no-fund --prefix "$PLAYWRIGHT" playwright-core >"$log" 2>&1
+}
+
 skip() {
     echo "skipped: $1"
     skipped=$((skipped + 1))
@@ -60,6 +89,17 @@ check "formatting" cargo fmt --all --check
 check "lints" cargo clippy --workspace --all-targets -- -D warnings
 tests "tests" cargo test --workspace --lib --bins --tests --no-fail-fast -- --show-output
 tests "doc tests" cargo test --workspace --doc --no-fail-fast
+if node -e 'process.exit(parseInt(process.versions.node) < 20)' 2>/dev/null; then
+    page_tests "page" crates/surfel-web/page-tests/*.test.mjs
+    if prepare_browser; then
+        check "the program for the browser" cargo build -p surfel-cli
+        page_tests "browser" --test-concurrency=1 crates/surfel-web/browser-tests/*.test.mjs
+    else
+        skip "tests in a browser: $missing"
+    fi
+else
+    skip "tests of the page and in a browser: node 20 or newer is not installed"
+fi
 if cargo deny --version >/dev/null 2>&1; then
     check "licences and sources" cargo deny check bans licenses sources
 else

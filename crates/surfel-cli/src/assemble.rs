@@ -51,7 +51,7 @@ impl<'a> Assembly<'a> {
     /// Reads all files of the command line and of scene files.
     ///
     /// Clouds of the command line that have no material of their own become one, whose points lie among
-    /// each other; everything else stands beside it.
+    /// each other; everything else stands beside it, meshes before clouds: a material changes no order.
     pub fn load(args: &'a SceneArgs, line: &'a Line, report: &Report) -> anyhow::Result<Self> {
         let mut assembly = Self {
             graph: Graph::default(),
@@ -116,17 +116,20 @@ impl<'a> Assembly<'a> {
     }
 
     fn add_files(&mut self, report: &Report) -> anyhow::Result<()> {
-        let (mut merging, mut merged_files) = (Vec::new(), Vec::new());
+        let (mut alone, mut merging) = (Vec::new(), (Vec::new(), Vec::new()));
         let files: Vec<&PathBuf> =
             self.args.files.iter().filter(|file| !is_scene_file(file)).collect();
         for &file in &files {
             let (graph, source) = load(file, self.args, report)?;
             self.sources.push(source.clone());
             let is_alone = self.args.material.of_file(file).is_some();
-            match if is_alone { Err(graph) } else { into_cloud(graph) } {
+            match into_cloud(graph) {
+                Ok(cloud) if is_alone => {
+                    alone.push((vec![Loaded { cloud, source }], vec![file.clone()]));
+                }
                 Ok(cloud) => {
-                    merging.push(Loaded { cloud, source });
-                    merged_files.push(file.clone());
+                    merging.0.push(Loaded { cloud, source });
+                    merging.1.push(file.clone());
                 }
                 Err(graph) => {
                     let nodes = self.append(graph, None);
@@ -134,12 +137,14 @@ impl<'a> Assembly<'a> {
                 }
             }
         }
-        if merging.is_empty() {
-            return Ok(());
+        for (clouds, files) in alone.into_iter().chain([merging]) {
+            if clouds.is_empty() {
+                continue;
+            }
+            let graph = merged(clouds, &files, report)?;
+            let nodes = self.append(graph, None);
+            self.files.extend(files.into_iter().map(|file| (file, nodes.clone())));
         }
-        let graph = merged(merging, &merged_files, report)?;
-        let nodes = self.append(graph, None);
-        self.files.extend(merged_files.into_iter().map(|file| (file, nodes.clone())));
         Ok(())
     }
 

@@ -8,10 +8,11 @@ import { after } from 'node:test';
 import { hashOf } from '../page/link.js';
 import { makeData } from './data.mjs';
 
+const TARGET = process.env.CARGO_TARGET_DIR ?? join(import.meta.dirname, '../../../target');
 /** The program under test. */
-export const SURFEL = process.env.SURFEL ?? join(import.meta.dirname, '../../../target/debug/surfel');
+export const SURFEL = process.env.SURFEL ?? join(TARGET, 'debug/surfel');
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
-const PATIENCE_MS = 20_000;
+const PATIENCE_MS = 60_000;
 const FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-background-networking',
   '--disable-component-update', '--disable-sync'];
 
@@ -33,7 +34,8 @@ after(async () => {
 
 /** A server of these files, as soon as it tells its link. */
 export async function serve(files, ...options) {
-  const words = ['view', ...files, '--port', '0', ...options];
+  const port = options.includes('--port') ? [] : ['--port', '0'];
+  const words = ['view', '--quiet', ...files, ...port, ...options];
   const server = spawn(SURFEL, words, { cwd: data.folder, stdio: ['ignore', 'pipe', 'inherit'] });
   servers.add(server);
   const link = await new Promise((resolve, reject) => {

@@ -130,6 +130,9 @@ test('texts are copied and downloaded', async () => {
   await still.locator('#take-close').click();
 });
 
+/** Numbers of a TOML file come back with a point. */
+const withoutZeros = (text) => text.replaceAll(/(\d)\.0\b/g, '$1');
+
 const load = (page, name, text) => page.setInputFiles('#scene-file', { name, mimeType: 'text/plain', buffer: Buffer.from(text) });
 
 test('a scene file shows what it was taken from', async () => {
@@ -143,7 +146,7 @@ test('a scene file shows what it was taken from', async () => {
     await page.waitForFunction((before) => before < window.surfel.state.lastFrame.frame, frame);
     await page.waitForFunction(() => window.surfel.state.lastFrame.finished);
     assert.equal(await finishedPixels(page), screen, form);
-    assert.equal((await taken(page)).command, texts.command, form);
+    assert.equal(withoutZeros((await taken(page)).command), withoutZeros(texts.command), form);
   }
 });
 

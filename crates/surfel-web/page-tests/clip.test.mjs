@@ -14,6 +14,15 @@ test('boxes come back from their words', () => {
   for (const wrong of [undefined, null, '', '([0,1],[0,1])']) assert.equal(clip.parseBox(wrong), null);
 });
 
+test('the first box holds everything', () => {
+  const held = { min: [562316.0750007629, 4183187.450000763, -2], max: [562351.4230003357, 4183222.7989997864, 8] };
+  const box = clip.parseBox(clip.formatBox(clip.boxAround(held)));
+  for (const axis of [0, 1, 2]) {
+    const [low, high] = [held.min[axis] - box.min[axis], box.max[axis] - held.max[axis]];
+    assert.ok(2e-5 < low && low < 2e-4 && 2e-5 < high && high < 2e-4, `${low} ${high}`);
+  }
+});
+
 test('a face stops at the face across', () => {
   const face = clip.facesOf(bounds).find(({ axis, end }) => axis === 2 && end === 'max');
   assert.deepEqual(face.direction, [0, 0, 1]);

@@ -14,6 +14,12 @@ export function formatBox({ min, max }) {
   return `(${[0, 1, 2].map((axis) => `[${tidy(min[axis])},${tidy(max[axis])}]`).join(',')})`;
 }
 
+/** A box that holds all of `bounds`, though they are rounded, and again when they are written. */
+export function boxAround({ min, max }) {
+  const room = (value) => 1e-6 * distance(min, max) + 1e-11 * Math.abs(value);
+  return { min: min.map((value) => value - room(value)), max: max.map((value) => value + room(value)) };
+}
+
 /** The six faces of a box: middle, the axis it moves along, and which end it is. */
 export function facesOf({ min, max }) {
   const center = mix(min, max, 0.5);

@@ -144,12 +144,12 @@ const axisName = ({ normal }) => ['x', 'y', 'z'].find((_, axis) => 1 - 1e-9 < Ma
 export const clipControls = [
   { key: 'clip_box', label: 'Box', kind: 'toggle', help: 'Shows only what is inside',
     read: (scene) => boxOf(scene) !== null,
-    write: (isOn, scene, { info }) => ({ clip_box: isOn ? clip.formatBox(info.bounds) : null }) },
+    write: (isOn, scene, { info }) => ({ clip_box: isOn ? clip.formatBox(clip.boxAround(info.bounds)) : null }) },
   ...['x', 'y', 'z'].map((label, axis) => ({
     key: `clip_box.${label}`, of: 'clip_box', label, kind: 'numbers', names: ['from', 'to'], shown: (scene) => boxOf(scene) !== null,
     read: (scene) => boxOf(scene) && [boxOf(scene).min[axis], boxOf(scene).max[axis]],
     write: ([low, high], scene, { info }) => {
-      const box = boxOf(scene) ?? { min: [...info.bounds.min], max: [...info.bounds.max] };
+      const box = boxOf(scene) ?? clip.boxAround(info.bounds);
       [box.min[axis], box.max[axis]] = [Math.min(low, high), Math.max(low, high)];
       return { clip_box: clip.formatBox(box) };
     } })),

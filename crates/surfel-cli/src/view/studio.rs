@@ -19,7 +19,7 @@ use surfel::image::colormap;
 use surfel::math::Vec3;
 use surfel::points::PointCloud;
 use surfel::progress::Progress;
-use surfel::render::{CpuRenderer, Renderer};
+use surfel::render::{self, CpuRenderer, Renderer};
 use surfel::scene::color::choose;
 use surfel::scene::{Graph, Material, usual_bounds};
 use surfel::surface::SurfaceKind;
@@ -107,6 +107,8 @@ impl ScanStudio {
         let mut flat = made.flat.clone();
         flat.lights.clone_from(&choices.lights);
         flat.background = asked.args.color.background();
+        // What would fail while it is painted is refused as a whole.
+        render::check(&flat)?;
         pose(&mut flat, &made.graph, 0.0, &choices, report)?;
         let stops = self
             .workshop

@@ -46,6 +46,11 @@ pub struct RenderStats {
     pub frame_secs: f64,
 }
 
+/// Fails for scenes that no picture can be made of.
+pub fn check(scene: &FlatScene) -> Result<()> {
+    raster::is_asked_for(scene).map(drop)
+}
+
 /// Something that makes pictures of flat scenes.
 pub trait Renderer: Sync {
     fn name(&self) -> &'static str;

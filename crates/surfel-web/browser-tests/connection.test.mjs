@@ -1,0 +1,113 @@
+// Connections: lost and found again, several at once, and closed to strangers.
+
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import { blankPage, closePage, drag, finishedPixels, openPage, pixels, placeAt, QUICK, serve, settled, show, state } from './harness.mjs';
+
+const open = [];
+after(() => Promise.all(open.map((page) => page.context().close())));
+
+async function opened(link) {
+  const page = await openPage(link);
+  open.push(page);
+  return page;
+}
+
+test('a page finds its server again, and keeps its view', async () => {
+  const server = await serve(['town.ply'], ...QUICK);
+  const page = await opened(server.link);
+  await show(page, { color: 'elevation', range: [147, 152], sun: { azimuth: 100 } });
+  await drag(page, await placeAt(page, 0.5, 0.5), await placeAt(page, 0.6, 0.5));
+  const [screen, camera] = [await finishedPixels(page), await state(page, 'camera')];
+  await server.stop();
+  await page.locator('#banner', { hasText: 'no connection' }).waitFor();
+  // What is turned meanwhile is not lost, nor what was before.
+  await page.locator('#stage').focus();
+  await page.keyboard.press('5');
+  await page.waitForTimeout(300);
+  const turned = await state(page, 'camera');
+  assert.notDeepEqual(turned, camera);
+  await serve(['town.ply'], '--port', server.port, ...QUICK);
+  await page.locator('#banner').waitFor({ state: 'hidden' });
+  await page.waitForFunction(() => window.surfel.state.lastFrame.finished);
+  await page.keyboard.press('o');
+  await settled(page);
+  const { color, range, sun } = await state(page, 'scene');
+  assert.deepEqual([color, range, sun.azimuth], ['elevation', [147, 152], 100]);
+  const found = await state(page, 'camera');
+  assert.deepEqual(found.view_up.map((value) => Math.round(value * 1e6) / 1e6), turned.view_up.map((value) => Math.round(value * 1e6) / 1e6));
+  await page.keyboard.press('p');
+  await page.evaluate(() => { location.hash = ''; });
+  assert.notEqual(await finishedPixels(page), screen);
+});
+
+test('a page that only waited shows the same picture again', async () => {
+  const server = await serve(['town.ply'], ...QUICK);
+  const page = await opened(server.link);
+  await show(page, { color: 'class', surface: 'sphere' });
+  await drag(page, await placeAt(page, 0.5, 0.5), await placeAt(page, 0.7, 0.4));
+  const screen = await finishedPixels(page);
+  const { shownAt } = await state(page, 'lastFrame');
+  await server.stop();
+  await page.locator('#banner', { hasText: 'no connection' }).waitFor();
+  await serve(['town.ply'], '--port', server.port, ...QUICK);
+  await page.waitForFunction((before) => {
+    const { lastFrame, connected } = window.surfel.state;
+    return connected && lastFrame.finished && before < lastFrame.shownAt;
+  }, shownAt);
+  assert.equal(await pixels(page), screen);
+});
+
+test('two pages look each at their own, and one outlives the other', async () => {
+  const server = await serve(['town.ply'], ...QUICK);
+  const [one, other] = [await opened(server.link), await opened(server.link)];
+  const screen = await finishedPixels(one);
+  await other.keyboard.press('5');
+  await show(other, { color: 'class' });
+  assert.notEqual(await finishedPixels(other), screen);
+  assert.equal(await finishedPixels(one), screen);
+  const { clients } = await (await fetch(new URL('/stats', server.link))).json();
+  assert.equal(clients, 2);
+  await closePage(other);
+  await drag(one, await placeAt(one, 0.5, 0.5), await placeAt(one, 0.6, 0.5));
+  assert.notEqual(await finishedPixels(one), screen);
+  await closePage(one);
+});
+
+test('beyond this machine a token is needed', async () => {
+  const server = await serve(['town.ply'], '--host', '0.0.0.0', ...QUICK);
+  const token = new URL(server.link).searchParams.get('token');
+  assert.match(token, /^[0-9a-f]{32}$/);
+  const address = `http://127.0.0.1:${server.port}/`;
+  for (const query of ['', '?token=', `?token=${token.replace(/^./, (digit) => (digit === '0' ? '1' : '0'))}`]) {
+    const page = await blankPage();
+    await page.goto(address + query);
+    await page.locator('#banner', { hasText: 'no connection' }).waitFor();
+    assert.equal(await state(page, 'lastFrame'), null);
+    await page.context().close();
+    for (const path of ['render', 'scene', 'stats']) assert.equal((await fetch(address + path + query)).status, 401, path);
+  }
+  const page = await openPage(`${address}?token=${token}`);
+  // The token stays in links that are taken from the page.
+  await show(page, { color: 'class' });
+  await page.locator('[data-action="take"]').click();
+  await page.locator('[data-form="link"]').click();
+  const link = await page.locator('#take-text').inputValue();
+  assert.equal(new URL(link).searchParams.get('token'), token);
+  await closePage(page);
+  const picture = await fetch(`${address}render?resolution=20x10&token=${token}`);
+  assert.equal(picture.headers.get('content-type'), 'image/png');
+});
+
+test('pages of other origins and names get nothing', async () => {
+  const server = await serve(['town.ply'], ...QUICK);
+  const foreign = await blankPage();
+  await foreign.goto('about:blank');
+  const isRefused = await foreign.evaluate((address) => new Promise((resolve) => {
+    const socket = new WebSocket(address);
+    socket.onopen = () => resolve(false);
+    socket.onerror = () => resolve(true);
+  }), `ws://127.0.0.1:${server.port}/ws`);
+  assert.ok(isRefused);
+  await foreign.context().close();
+});
