@@ -59,13 +59,13 @@ impl Dice {
         ];
         let mut message = json!({ "type": self.pick(&kinds) });
         for key in keys {
-            if self.roll() % 4 != 0 {
+            if !self.roll().is_multiple_of(4) {
                 message[key] = self.value();
             }
         }
         // Most are of the right shape, so that what they say matters.
         for (key, right) in [("width", 40), ("height", 30), ("input", 7), ("id", 3), ("frame", 1)] {
-            if self.roll() % 2 == 0 {
+            if self.roll().is_multiple_of(2) {
                 message[key] = json!(right);
             }
         }
@@ -119,7 +119,7 @@ async fn messages_of_any_content() {
             }
             let bytes = dice.bytes();
             let text = String::from_utf8_lossy(&bytes).into_owned();
-            if dice.roll() % 2 == 0 { Message::text(text) } else { Message::binary(bytes) }
+            if dice.roll().is_multiple_of(2) { Message::text(text) } else { Message::binary(bytes) }
         });
         let n_sent = send_all(&mut page, messages).await;
         assert_eq!(n_sent, 400, "round {round}");
