@@ -114,6 +114,7 @@ impl Client {
         flow.sent - flow.seen < MOST_UNSEEN
             && Arc::strong_count(&self.unwritten) <= MOST_UNSEEN as usize
             && ROOM_FOR_ANSWERS < self.out.capacity()
+            && !self.out.is_closed()
     }
 
     /// Paints and sends a draft within about `secs` if something has changed; returns whether it did.
@@ -135,7 +136,7 @@ impl Client {
     pub fn refine(&self, renderer: &dyn Renderer) -> surfel::Result<bool> {
         let (sight, version) = self.current();
         let mut canvas = lock(&self.canvas);
-        if canvas.version() != version || !sight.is_complete() {
+        if canvas.version() != version || !sight.is_complete() || self.out.is_closed() {
             return Ok(false);
         }
         let watch = self.watch(version, Duration::ZERO);
