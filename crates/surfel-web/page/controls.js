@@ -163,8 +163,9 @@ export const clipControls = [
       setPlane(clip.planeAt({ normal: AXES[name] ?? scale([1, 1, 1], Math.sqrt(1 / 3)) }, info.bounds, 0)) },
   { key: 'clip_plane.normal', of: 'clip_plane', label: 'Normal', kind: 'numbers', names: ['x', 'y', 'z'],
     shown: (scene) => hasPlane(scene) && axisName(planeOf(scene)) === 'free',
-    read: (scene) => planeOf(scene)?.normal ?? null,
-    write: (normal, scene) => setPlane(clip.parsePlane([...planeOf(scene).point, ...normal])) },
+    // As it is typed: made a unit vector in between, the numbers that stand already would change.
+    read: (scene) => scene.clip_plane?.slice(3) ?? null,
+    write: (normal, scene) => ({ clip_plane: [...scene.clip_plane.slice(0, 3), ...normal] }) },
   { key: 'clip_plane.position', of: 'clip_plane', label: 'Position', ...SLIDING, shown: hasPlane,
     range: (viewer) => {
       const reach = hasPlane(viewer.scene) ? clip.reachOf(planeOf(viewer.scene).normal, viewer.info.bounds) : 1;

@@ -3,6 +3,7 @@
 use crate::args::{SceneArgs, Usage};
 use crate::scene_file::{Line, TABLES};
 use serde_json::{Value, json};
+use std::path::Path;
 use surfel_web::limits::{MOST_RAYS, MOST_SAMPLES};
 use surfel_web::{Error, Keys, Written};
 
@@ -106,24 +107,52 @@ pub fn from_file(name: &str, text: &str, served: &[String]) -> Result<Keys, Erro
     let Value::Object(mut settings) = value else {
         return Err(refused("expected keys and values".into()));
     };
-    let objects = settings.get("object").into_iter().flat_map(|objects| match objects {
-        Value::Array(objects) => objects.iter().collect(),
-        object => vec![object],
-    });
-    let files = objects.flat_map(|object| [object.get("file"), object.get("files")]).flatten();
-    let files = files.flat_map(|files| match files {
-        Value::Array(files) => files.iter().collect(),
-        file => vec![file],
-    });
-    for file in files.filter_map(Value::as_str) {
+    let objects = listed(settings.get("object"));
+    let files = objects.iter().flat_map(|object| [object.get("file"), object.get("files")]);
+    for file in files.flat_map(listed).filter_map(Value::as_str) {
         if !served.iter().any(|known| known == file || known.ends_with(&format!("/{file}"))) {
             return Err(refused(format!("object `{file}` is not what is viewed here")));
         }
+    }
+    if !objects.is_empty() {
+        let of_all = listed(settings.get("material")).into_iter().cloned();
+        let of_objects = objects.iter().filter_map(|object| material_of(object));
+        let materials = of_all.chain(of_objects.map(Value::String)).collect();
+        settings.insert("material".into(), Value::Array(materials));
     }
     for key in TABLES.iter().chain(&TOLD) {
         settings.shift_remove(*key);
     }
     Ok(settings)
+}
+
+/// A list, or the only one in its place.
+fn listed(value: Option<&Value>) -> Vec<&Value> {
+    match value {
+        Some(Value::Array(several)) => several.iter().collect(),
+        only => only.into_iter().collect(),
+    }
+}
+
+/// An object's own material, as `--material` names it.
+fn material_of(object: &Value) -> Option<String> {
+    let file = || Path::new(object.get("file")?.as_str()?).file_name()?.to_str();
+    let name = object.get("name").and_then(Value::as_str).or_else(file).unwrap_or(EVERYTHING);
+    let material = match object.get("material")? {
+        Value::Object(table) => {
+            let kind = table.get("kind").and_then(Value::as_str).unwrap_or("matte");
+            let others = table.iter().filter(|(key, _)| *key != "kind");
+            let pairs: Vec<String> =
+                others.map(|(key, value)| format!("{key}={}", word(value))).collect();
+            if pairs.is_empty() { kind.to_owned() } else { format!("{kind}:{}", pairs.join(",")) }
+        }
+        kind => word(kind),
+    };
+    Some(format!("{name}={material}"))
+}
+
+fn word(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
 /// Settings for use elsewhere: words of a command line, and a scene file's text.
@@ -162,6 +191,25 @@ mod tests {
     use super::*;
 
     #[test]
+    fn materials_of_objects_are_those_of_the_line() {
+        let text = r##"{ "material": "metal", "object": [
+            { "file": "/data/a.ply", "material": { "kind": "glass", "ior": 1.3, "color": "#88ccff" } },
+            { "name": "b", "file": "/data/b.obj", "material": "mirror" },
+            { "files": ["/data/c.ply", "/data/d.ply"], "material": { "roughness": "0.4" } },
+            { "file": "/data/e.ply" } ] }"##;
+        let served =
+            ["a.ply", "b.obj", "c.ply", "d.ply", "e.ply"].map(|name| format!("/data/{name}"));
+        let settings = from_file("a.json", text, &served).unwrap();
+        let expected = json!([
+            "metal",
+            "a.ply=glass:ior=1.3,color=#88ccff",
+            "b=mirror",
+            "*=matte:roughness=0.4"
+        ]);
+        assert_eq!(settings["material"], expected);
+    }
+
+    #[test]
     fn words_come_back_from_a_shell() {
         assert_eq!(quoted("--spp=4"), "--spp=4");
         assert_eq!(quoted("my scan.laz"), "'my scan.laz'");
@@ -172,7 +220,7 @@ mod tests {
     fn a_scene_file_of_other_objects_is_refused() {
         let served = ["/data/scan.laz".to_owned()];
         let settings = from_file("a.toml", "spp = 9\n[[object]]\nfile = \"scan.laz\"", &served);
-        assert_eq!(Value::Object(settings.unwrap()), json!({ "spp": 9 }));
+        assert_eq!(Value::Object(settings.unwrap()), json!({ "spp": 9, "material": [] }));
         for wrong in ["[[object]]\nfile = \"/etc/passwd\"", "object = { files = [\"x\"] }", "spp ="]
         {
             assert!(from_file("a.toml", wrong, &served).is_err(), "{wrong}");
