@@ -18,7 +18,9 @@ use surfel::scene::{Background, Camera, Geometry, Graph, Projection, Scene};
 pub const INDEX: &str = "\u{0}index";
 
 /// The last few things made, by what they were made from.
-pub struct Recent<T>(Mutex<VecDeque<(String, Arc<T>)>>);
+pub struct Recent<T>(Mutex<Known<T>>);
+
+type Known<T> = VecDeque<(String, Arc<T>)>;
 
 /// Two: who compares settings goes back and forth.
 const MOST: usize = 2;
@@ -55,10 +57,7 @@ impl<T> Recent<T> {
     }
 
     /// Unlike `Mutex::lock`, stops waiting when nobody waits for it any more.
-    fn lock(
-        &self,
-        progress: &dyn Progress,
-    ) -> surfel::Result<MutexGuard<'_, VecDeque<(String, Arc<T>)>>> {
+    fn lock(&self, progress: &dyn Progress) -> surfel::Result<MutexGuard<'_, Known<T>>> {
         loop {
             match self.0.try_lock() {
                 Ok(known) => return Ok(known),
