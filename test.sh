@@ -89,7 +89,7 @@ check "formatting" cargo fmt --all --check
 check "lints" cargo clippy --workspace --all-targets -- -D warnings
 tests "tests" cargo test --workspace --lib --bins --tests --no-fail-fast -- --show-output
 tests "doc tests" cargo test --workspace --doc --no-fail-fast
-if node -e 'process.exit(parseInt(process.versions.node) < 20)' 2>/dev/null; then
+if node -e 'process.exit(parseInt(process.versions.node) < 20 ? 1 : 0)' 2>/dev/null; then
     page_tests "page" crates/surfel-web/page-tests/*.test.mjs
     if prepare_browser; then
         check "the program for the browser" cargo build -p surfel-cli

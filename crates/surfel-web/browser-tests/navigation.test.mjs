@@ -12,7 +12,8 @@ let first;
 let opening;
 before(async () => {
   server = await serve(['town.ply'], ...QUICK);
-  page = await openPage(server.link);
+  // Wide enough for places beside the card.
+  page = await openPage(server.link, { viewport: { width: 900, height: 440 } });
   await unfoldPanel(page);
   first = await finishedPixels(page);
   opening = await state(page, 'camera');
