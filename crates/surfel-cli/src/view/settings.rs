@@ -4,7 +4,7 @@ use crate::args::{SceneArgs, Usage};
 use crate::scene_file::{Line, TABLES};
 use serde_json::{Value, json};
 use std::path::Path;
-use surfel_web::limits::{MOST_RAYS, MOST_SAMPLES};
+use surfel_web::limits::{MOST_RAYS, MOST_SAMPLES, MOST_SAVED_PIXELS, check_size};
 use surfel_web::{Error, Keys, Written};
 
 /// Keys that name files: they stay as the program was started.
@@ -69,9 +69,10 @@ fn for_everything(materials: &mut Value) {
     }
 }
 
-/// Fails for pictures that would take days.
-pub fn check_rays(args: &SceneArgs) -> Result<(), Error> {
+/// Fails for pictures that would fill the memory or take days.
+pub fn check_work(args: &SceneArgs) -> Result<(), Error> {
     let (width, height) = args.picture.resolution;
+    check_size(width, height, MOST_SAVED_PIXELS).map_err(Error::Refused)?;
     let rays = u64::from(args.picture.spp) + u64::from(args.picture.samples);
     let rays = u64::from(width) * u64::from(height) * rays;
     if MOST_RAYS < rays {

@@ -267,7 +267,7 @@ impl Studio for ScanStudio {
     fn picture(&self, settings: &Keys, progress: &dyn Progress) -> Result<Vec<u8>> {
         let report = Report::new(Verbosity::Quiet).heard_by(progress);
         let asked = settings::read(self.line, &self.given, settings)?;
-        settings::check_rays(&asked.args)?;
+        settings::check_work(&asked.args)?;
         let stage = self.stage_of(&asked, &report).map_err(settings::refusal)?;
         let rendered = || self.renderer.render(&stage.flat, &stage.quality, &report);
         let (image, _) = self.workshop.install(rendered)?;
