@@ -12,6 +12,8 @@ mod cameras;
 mod clips;
 #[path = "cli/commands.rs"]
 mod commands;
+#[path = "cli/materials.rs"]
+mod materials;
 #[path = "cli/pictures.rs"]
 mod pictures;
 #[path = "cli/scenes.rs"]
@@ -27,3 +29,6 @@ mod wrong_use;
 #[cfg(unix)]
 #[path = "cli/interrupt.rs"]
 mod interrupt;
+#[cfg(unix)]
+#[path = "cli/resume.rs"]
+mod resume;

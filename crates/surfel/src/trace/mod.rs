@@ -13,6 +13,7 @@ mod memory;
 mod node;
 mod packet;
 mod region;
+mod rounds;
 mod sightings;
 mod simd;
 mod splat;
