@@ -10,6 +10,7 @@ use clap::{Arg, ArgAction, ArgMatches, Args, Command, CommandFactory};
 use serde_json::{Map, Number, Value};
 use std::ffi::OsString;
 use std::path::Path;
+use surfel::points::SURFACE_VARIATION;
 
 /// Options beside those of surface, preparation and colour that decide what the trees hold.
 const OF_TREES: [&str; 2] = ["material", "light"];
@@ -69,17 +70,33 @@ impl Line {
         self.option_words().filter(|word| !is_default(word)).collect()
     }
 
+    /// What decides how clouds are prepared.
+    pub fn preparation_key(&self) -> String {
+        self.key(|heading, name, value| {
+            // One column is made by the preparation, and only where it is asked for.
+            let is_made = name == "color" && value == SURFACE_VARIATION;
+            heading == "Preparation" || name == "seed" || is_made
+        })
+    }
+
     /// What decides what the trees hold; all else can change without building them anew.
     pub fn tree_key(&self) -> String {
-        let command = scene_command();
-        let is_of_trees = |word: &String| {
-            let name = word.trim_start_matches('-').split('=').next().unwrap_or_default();
-            let arg = command.get_arguments().find(|arg| arg.get_long() == Some(name));
-            let heading = arg.and_then(Arg::get_help_heading).unwrap_or_default();
+        self.key(|heading, name, _| {
             let is_of_objects = OF_OBJECTS.contains(&heading) && !OF_PICTURES.contains(&name);
             is_of_objects || OF_TREES.contains(&name)
+        })
+    }
+
+    /// The options that decide, by their heading, name and value. What objects say of themselves stays.
+    fn key(&self, decides: impl Fn(&str, &str, &str) -> bool) -> String {
+        let command = scene_command();
+        let is_meant = |word: &String| {
+            let word = word.trim_start_matches('-');
+            let (name, value) = word.split_once('=').unwrap_or((word, ""));
+            let arg = command.get_arguments().find(|arg| arg.get_long() == Some(name));
+            decides(arg.and_then(Arg::get_help_heading).unwrap_or_default(), name, value)
         };
-        self.option_words().filter(is_of_trees).collect::<Vec<_>>().join("\n")
+        self.option_words().filter(is_meant).collect::<Vec<_>>().join("\n")
     }
 
     fn option_words(&self) -> impl Iterator<Item = String> {

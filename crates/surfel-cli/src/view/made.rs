@@ -82,16 +82,6 @@ pub fn number_points(graph: &mut Graph) {
     }
 }
 
-/// What decides how clouds are prepared.
-pub fn preparation_key(assembly: &Assembly) -> String {
-    let of_clouds = assembly.clouds().map(|(_, args, _)| {
-        let preparation =
-            args.preparation.preparation(args.picture.seed, args.color.color.as_ref());
-        format!("{preparation:?} {}", args.preparation.names_normals())
-    });
-    of_clouds.collect::<Vec<_>>().join("\n")
-}
-
 /// The clouds of `base`, prepared as `assembly` asks.
 pub fn prepared(
     base: &Assembly,

@@ -1,7 +1,7 @@
 //! Scenes of the files that the viewer was started with, by the settings of its pages.
 
 use super::legend::legend;
-use super::made::{INDEX, Made, Recent, number_points, preparation_key, prepared};
+use super::made::{INDEX, Made, Recent, number_points, prepared};
 use super::point;
 use super::settings::{self, Asked, EVERYTHING};
 use crate::args::{Global, SceneArgs};
@@ -84,12 +84,12 @@ impl ScanStudio {
 
     /// Everything but light and camera, which need no tree to change.
     fn made(&self, asked: &Asked, choices: &Choices, report: &Report) -> anyhow::Result<Arc<Made>> {
-        let assembly = self.base.under(&asked.args, &asked.line)?;
-        let preparation = preparation_key(&assembly);
-        let geometry = asked.line.tree_key();
-        let frames = assembly.frames_at(asked.time);
-        let key = format!("{preparation}\n{geometry}\n{:?} {frames:?}", choices.up);
+        let preparation = asked.line.preparation_key();
+        let trees = asked.line.tree_key();
+        let frames = self.base.frames_at(asked.time);
+        let key = format!("{preparation}\n{trees}\n{:?} {frames:?}", choices.up);
         self.made.get(key, report, || {
+            let assembly = self.base.under(&asked.args, &asked.line)?;
             let clouds = self.prepared.get(preparation, report, || {
                 self.workshop.install(|| prepared(&self.base, &assembly, report))
             })?;
