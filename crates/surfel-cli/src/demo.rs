@@ -4,6 +4,7 @@ use crate::args::Global;
 use crate::gallery;
 use crate::report::{Report, print};
 use crate::scene_file::Line;
+use crate::shell::quoted;
 use anyhow::Context;
 use std::ffi::OsString;
 use std::fs;
@@ -114,6 +115,7 @@ fn tell(cloud: &Path, words: &[String], n_points: usize, start: Instant) -> anyh
         "A virtual scanner measured a ruin from six stations: {n_points} points, in {cloud}.\n\
          The picture was made from that file, all in {:.0} s, by\n  {}\n\
          Try next:\n  \
+         surfel view {cloud}\n  \
          surfel info {cloud}\n  \
          surfel render {cloud} -o front.png\n  \
          surfel render {cloud} -o map.png --camera-direction 0,0,-1 --camera-orthographic\n  \
@@ -123,26 +125,4 @@ fn tell(cloud: &Path, words: &[String], n_points: usize, start: Instant) -> anyh
         words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" "),
     ))?;
     Ok(())
-}
-
-/// As a shell takes it for one word: `#` would begin a comment, a space another word.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_alphanumeric() || "-_./,:+".contains(c);
-    if word.chars().all(is_plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_are_quoted_where_a_shell_would_change_them() {
-        assert_eq!(quoted("a/demo.laz"), "a/demo.laz");
-        assert_eq!(quoted("#fff,#000"), "'#fff,#000'");
-        assert_eq!(quoted("it's here"), r"'it'\''s here'");
-    }
 }

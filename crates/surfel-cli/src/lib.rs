@@ -23,6 +23,7 @@ mod render;
 mod report;
 pub mod scene_file;
 mod sequence;
+mod shell;
 mod stats;
 mod view;
 

@@ -2,6 +2,7 @@
 
 use crate::args::{SceneArgs, Usage};
 use crate::scene_file::{Line, TABLES};
+use crate::shell::quoted;
 use serde_json::{Value, json};
 use std::path::Path;
 use surfel_web::limits::{MOST_RAYS, MOST_SAMPLES, MOST_SAVED_PIXELS, check_size};
@@ -171,15 +172,6 @@ pub fn written(asked: &Asked, files: &[String], scene: &Value) -> Result<Written
     })
 }
 
-/// As a shell reads it back.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./=,:+%@".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
-}
-
 pub fn refusal(error: anyhow::Error) -> Error {
     match error.downcast_ref::<surfel::Error>() {
         Some(surfel::Error::Cancelled) => Error::Cancelled,
@@ -208,13 +200,6 @@ mod tests {
             "*=matte:roughness=0.4"
         ]);
         assert_eq!(settings["material"], expected);
-    }
-
-    #[test]
-    fn words_come_back_from_a_shell() {
-        assert_eq!(quoted("--spp=4"), "--spp=4");
-        assert_eq!(quoted("my scan.laz"), "'my scan.laz'");
-        assert_eq!(quoted("it's"), r"'it'\''s'");
     }
 
     #[test]
