@@ -2,6 +2,7 @@
 
 use crate::args::{LightKind, SceneArgs, Usage};
 use crate::cloud::{dress, graph_of, into_cloud, load, prepare_points};
+use crate::light;
 use crate::report::Report;
 use crate::scene_file::{CameraMotion, Line, Motion, Object, is_scene_file};
 use crate::sequence::{Sequence, is_read_in_turn};
@@ -14,7 +15,8 @@ use surfel::math::Vec3;
 use surfel::points::PointCloud;
 use surfel::progress::Progress;
 use surfel::scene::{
-    Channel, Clip, Geometry, Graph, Interpolation, Keys, Material, Node, Points, Track, Transform,
+    Channel, Clip, Environment, Geometry, Graph, Interpolation, Keys, Material, Node, Points,
+    Track, Transform,
 };
 use surfel_formats::{Loaded, Source};
 
@@ -24,6 +26,8 @@ pub struct Assembly<'a> {
     /// Of each file.
     pub sources: Vec<Source>,
     pub camera_motion: Option<CameraMotion>,
+    /// The picture that gives light, upright.
+    pub environment: Option<Environment>,
     args: &'a SceneArgs,
     line: &'a Line,
     /// Each file of the command line with the nodes that came from it.
@@ -57,6 +61,7 @@ impl<'a> Assembly<'a> {
             graph: Graph::default(),
             sources: Vec::new(),
             camera_motion: line.scene.camera_motion.clone(),
+            environment: light::environment(&args.light, report)?,
             args,
             line,
             files: Vec::new(),
@@ -381,6 +386,7 @@ impl<'a> Assembly<'a> {
             graph: without_points(&self.graph),
             sources: self.sources.clone(),
             camera_motion: self.camera_motion.clone(),
+            environment: self.environment.clone(),
             args,
             line,
             files: self.files.clone(),

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 use std::path::{Path, absolute};
 use surfel::math::Vec3;
 use surfel::scene::color::{ColorSource, choose};
-use surfel::scene::{Background, Light, Projection};
+use surfel::scene::{Background, Camera, Light, Projection};
 use surfel::trace::Simd;
 
 pub fn resolved(assembly: &Assembly, choices: &Choices, args: &Args, line: &Line) -> String {
@@ -121,11 +121,23 @@ pub fn in_full(file: &Path) -> String {
 
 /// Where it stands, or by its name if it is one of a file that moves.
 fn camera(assembly: &Assembly, choices: &Choices, args: &SceneArgs) -> Value {
-    let camera = &choices.eye.camera;
     if let Some(node) = choices.eye.node.filter(|node| assembly.moves(*node)) {
         let name = &assembly.graph.nodes[node].name;
-        return json!({ "name": name, "view_angle": args.camera.camera_view_angle });
+        let mut keys = json!({ "name": name });
+        if let Some(angle) = args.camera.camera_view_angle {
+            keys["view_angle"] = json!(angle);
+        }
+        return keys;
     }
+    let mut keys = camera_keys(&choices.eye.camera);
+    if args.camera.camera_still {
+        keys["still"] = json!(true);
+    }
+    keys
+}
+
+/// A camera as a scene file has it, with nothing left to be chosen.
+pub fn camera_keys(camera: &Camera) -> Value {
     let (name, value) = match camera.projection {
         Projection::Perspective { view_angle_deg } => ("view_angle", json!(view_angle_deg)),
         Projection::Orthographic { height } => ("orthographic", json!(height)),

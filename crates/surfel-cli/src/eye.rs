@@ -1,6 +1,7 @@
 //! Who looks: the camera that was chosen, and where it is at a time.
 
 use crate::args::{SceneArgs, Usage};
+use crate::assemble::Assembly;
 use crate::report::Report;
 use crate::scene_file::CameraMotion;
 use surfel::math::{Aabb, DVec3, Vec3};
@@ -11,7 +12,7 @@ use surfel::scene::{Camera, Graph, Projection};
 pub struct Eye {
     /// As it was chosen, before it moves.
     pub camera: Camera,
-    /// The node of a file that has the camera, if it is one of a file.
+    /// The node of a file that has the camera, if it is one of a file and goes along with it.
     pub node: Option<usize>,
     up: Vec3,
     /// Of all that is seen.
@@ -56,8 +57,15 @@ impl Eye {
                 args.camera.camera(outline, up, f64::from(width) / f64::from(height), report)
             }
         };
-        let node = of_file.map(|(node, _)| node);
+        let is_still = args.camera.camera_still;
+        let node = of_file.map(|(node, _)| node).filter(|_| !is_still);
+        let motion = motion.filter(|_| !is_still);
         Self { camera, node, up, middle, view_angle_deg, motion }
+    }
+
+    /// Whether the scene moves the camera.
+    pub fn moves(&self, assembly: &Assembly) -> bool {
+        self.motion.is_some() || self.node.is_some_and(|node| assembly.moves(node))
     }
 
     /// The camera as its motion, or that of its node, has it at a time, at which `graph` is posed.

@@ -1,6 +1,7 @@
 //! The program `surfel`: parses the command line, calls the libraries, reports.
 //!
-//! It is a library so that its scene files can be read from outside; `main.rs` only calls [`main`].
+//! It is a library so that its scene files and its viewer can be tried from outside; `main.rs` only calls
+//! [`main`].
 
 mod animate;
 mod args;
@@ -31,7 +32,10 @@ use args::{Global, SceneArgs, Usage};
 use clap::{Parser, Subcommand};
 use report::{Report, Verbosity};
 use scene_file::Line;
+use std::ffi::OsString;
 use std::process::ExitCode;
+use std::sync::Arc;
+use surfel_web::Studio;
 
 /// Turns point clouds into pictures and films by ray tracing the points themselves, as a continuous surface,
 /// together with meshes.
@@ -87,6 +91,12 @@ pub fn main() -> ExitCode {
             exit_code(&error)
         }
     }
+}
+
+/// What `surfel view` with these words, the first of which is the program's name, gives its server.
+pub fn studio(words: Vec<OsString>) -> anyhow::Result<Arc<dyn Studio>> {
+    let (cli, line) = Line::parse(words)?;
+    view::open_studio(line, &cli.global, &Report::new(Verbosity::Quiet))
 }
 
 fn exit_code(error: &anyhow::Error) -> ExitCode {

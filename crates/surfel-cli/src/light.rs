@@ -28,19 +28,30 @@ pub struct Lit {
     pub diagonal: f32,
 }
 
-pub fn lights(args: &LightArgs, lit: &Lit, report: &Report) -> anyhow::Result<Vec<Light>> {
+/// The picture that the options name as light, upright as in files.
+pub fn environment(args: &LightArgs, report: &Report) -> anyhow::Result<Option<Environment>> {
+    let Some(file) = &args.environment else { return Ok(None) };
+    let picture = surfel_formats::load_environment_picture(file, report)?;
+    report.end_stage();
+    let LinearPicture { width, height, pixels } = picture;
+    let environment = Environment::new(width, height, pixels, Vec3::Z, 0.0)
+        .with_context(|| file.display().to_string())?;
+    if 0 < environment.n_repaired() {
+        let what = "pixels with values that are no light (negative, infinite, NaN) mended";
+        report.note(&format!("{}: {} {what}", file.display(), environment.n_repaired()));
+    }
+    Ok(Some(environment))
+}
+
+pub fn lights(
+    args: &LightArgs,
+    environment: Option<&Environment>,
+    lit: &Lit,
+    report: &Report,
+) -> anyhow::Result<Vec<Light>> {
     let mut lights = Vec::new();
-    if let Some(file) = &args.environment {
-        let picture = surfel_formats::load_environment_picture(file, report)?;
-        report.end_stage();
-        let LinearPicture { width, height, pixels } = picture;
-        let rotation_deg = args.environment_rotation as f32;
-        let mut environment = Environment::new(width, height, pixels, lit.up, rotation_deg)
-            .with_context(|| file.display().to_string())?;
-        if 0 < environment.n_repaired() {
-            let what = "pixels with values that are no light (negative, infinite, NaN) mended";
-            report.note(&format!("{}: {} {what}", file.display(), environment.n_repaired()));
-        }
+    if let Some(environment) = environment.filter(|_| args.environment.is_some()) {
+        let mut environment = environment.facing(lit.up, args.environment_rotation as f32)?;
         environment.gain(args.environment_strength as f32);
         lights.push(Light::Environment(environment));
     }

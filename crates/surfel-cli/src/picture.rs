@@ -210,7 +210,11 @@ pub fn choose(assembly: &Assembly, args: &SceneArgs, report: &Report) -> anyhow:
     // Points as pixels are shaded by their depth alone.
     let is_shaded = args.surface.surface != SurfaceKind::Points;
     let lit = Lit { camera: eye.camera, up, diagonal };
-    let lights = if is_shaded { light::lights(&args.light, &lit, report)? } else { Vec::new() };
+    let environment = assembly.environment.as_ref();
+    let lights = match is_shaded {
+        true => light::lights(&args.light, environment, &lit, report)?,
+        false => Vec::new(),
+    };
     let sun_azimuth_deg = light::sun_azimuth_deg(&args.light, &lit);
     Ok(Choices { up, eye, lights, sun_azimuth_deg })
 }

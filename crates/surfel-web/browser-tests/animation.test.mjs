@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
-import { closePage, finishedPixels, openPage, QUICK, serve, settled, state } from './harness.mjs';
+import { closePage, drag, finishedPixels, openPage, placeAt, QUICK, serve, settled, state, unfoldPanel } from './harness.mjs';
 
 const SECONDS = 2;
 let page;
@@ -18,7 +18,7 @@ beforeEach(async () => {
 after(() => closePage(page));
 
 const time = async () => (await state(page, 'scene')).time;
-const scrub = (share) => page.locator('[data-key="time"]').fill(String(1000 * share));
+const scrub = (share, of = page) => of.locator('[data-key="time"]').fill(String(1000 * share));
 const reaches = (least) => page.waitForFunction((wanted) => wanted <= window.surfel.state.scene.time, least);
 
 test('the clock is moved by hand, and back', async () => {
@@ -53,4 +53,32 @@ test('it begins again, or ends, as it is told', async () => {
   await settled(page);
   assert.equal(await time(), SECONDS);
   assert.equal(await page.locator('[data-action="play"]').textContent(), 'Play');
+});
+
+test('a camera that the scene moves is followed until it is moved by hand, and again', async () => {
+  const led = await openPage((await serve(['orbit.toml'], ...QUICK)).link);
+  await unfoldPanel(led);
+  const lead = led.locator('[data-key="camera.still"]');
+  const seen = async (share) => {
+    await scrub(share, led);
+    return { pixels: await finishedPixels(led), ...(await state(led, 'camera')) };
+  };
+  const [start, quarter] = [await seen(0), await seen(0.25)];
+  assert.notEqual(quarter.pixels, start.pixels);
+  const across = (camera) => camera.position.map((x, i) => x - camera.focal_point[i]).slice(0, 2);
+  const [[x, y], [turnedX, turnedY]] = [across(start), across(quarter)];
+  assert.ok(Math.hypot(turnedX + y, turnedY - x) < 1e-6 * Math.hypot(x, y), 'a quarter of a turn');
+  assert.ok(await lead.isChecked());
+
+  await drag(led, await placeAt(led, 0.3, 0.5), await placeAt(led, 0.5, 0.5));
+  await settled(led);
+  const { position } = await state(led, 'camera');
+  assert.notDeepEqual(position, quarter.position);
+  assert.ok(!(await lead.isChecked()));
+  assert.deepEqual((await seen(0.5)).position, position);
+
+  await lead.setChecked(true);
+  await led.waitForFunction(() => !window.surfel.state.camera.still);
+  assert.deepEqual(await seen(0.25), quarter);
+  await closePage(led);
 });

@@ -75,11 +75,42 @@ times = [0, 2]
 translate = [[0, 0, 0], [-9, 9, 3]]
 `;
 
+const ORBIT_TOML = `
+color = "rgb"
+
+[[object]]
+file = "town.ply"
+
+[[animation]]
+object = "camera"
+kind = "orbit"
+seconds = 4
+`;
+
+/** A triangle, and a camera that goes past it: from 6 to 4 away within two seconds. */
+function pastGltf() {
+  const floats = [-1, 0, 0, 1, 0, 0, 0, 2, 0, /* times */ 0, 2, /* places */ 0, 1, 6, 3, 1, 4];
+  const uri = `data:;base64,${Buffer.from(new Float32Array(floats).buffer).toString('base64')}`;
+  const view = (byteOffset, byteLength) => ({ buffer: 0, byteOffset, byteLength });
+  const accessor = (bufferView, count, type, min, max) => ({ bufferView, componentType: 5126, count, type, min, max });
+  return JSON.stringify({
+    asset: { version: '2.0' }, scene: 0, scenes: [{ nodes: [0, 1] }],
+    nodes: [{ mesh: 0 }, { name: 'past', camera: 0, translation: [0, 1, 6] }],
+    meshes: [{ primitives: [{ attributes: { POSITION: 0 } }] }],
+    cameras: [{ type: 'perspective', perspective: { yfov: 0.7, znear: 0.1 } }],
+    animations: [{ channels: [{ sampler: 0, target: { node: 1, path: 'translation' } }], samplers: [{ input: 1, output: 2 }] }],
+    accessors: [accessor(0, 3, 'VEC3', [-1, 0, 0], [1, 2, 0]), accessor(1, 2, 'SCALAR', [0], [2]), accessor(2, 2, 'VEC3')],
+    bufferViews: [view(0, 36), view(36, 8), view(44, 24)], buffers: [{ byteLength: 68, uri }],
+  });
+}
+
 /** Writes everything into a new folder. */
 export function makeData() {
   const folder = mkdtempSync(join(tmpdir(), 'surfel-browser-'));
   const points = townPoints();
-  const files = { 'town.ply': ply(points), 'house.obj': houseObj(), 'moving.toml': MOVING_TOML };
+  const files = {
+    'town.ply': ply(points), 'house.obj': houseObj(), 'moving.toml': MOVING_TOML, 'orbit.toml': ORBIT_TOML, 'past.gltf': pastGltf(),
+  };
   for (const [name, text] of Object.entries(files)) writeFileSync(join(folder, name), text);
   return { folder, points, remove: () => rmSync(folder, { recursive: true, force: true }) };
 }

@@ -8,14 +8,19 @@ import { closePage, data, finishedPixels, openPage, QUICK, serve, settled, shell
 
 let still;
 let moving;
+let orbiting;
+let passing;
 before(async () => {
   const viewport = { width: 700, height: 300 };
   const open = async (...files) => openPage((await serve(files, ...QUICK)).link, { viewport });
   [still, moving] = [await open('town.ply', 'house.obj'), await open('moving.toml')];
+  [orbiting, passing] = [await open('orbit.toml'), await open('past.gltf')];
 });
 after(async () => {
   await closePage(still);
   await closePage(moving);
+  await closePage(orbiting);
+  await closePage(passing);
 });
 
 const CENTER = [562334, 4183205, 149];
@@ -36,6 +41,18 @@ const MOMENTS = {
   'the beginning': {},
   'a moment': { time: 0.7, color: 'intensity' },
   'the end, from elsewhere': { time: 2, camera: { position: [562380.5, 4183230.25, 170.125], focal_point: CENTER } },
+};
+
+const OF_ORBIT = {
+  'where an orbit has the camera': { time: 1 },
+  'where an orbit of another camera has it': { time: 1, camera: { position: [562380.5, 4183230.25, 170.125], focal_point: CENTER } },
+  'a camera that an orbit leaves alone': { time: 1, camera: { position: [562380.5, 4183230.25, 170.125], focal_point: CENTER, still: true } },
+};
+const OF_FILE = {
+  'where a file has its camera': { time: 1.5 },
+  'elsewhere than a file has its camera': {
+    time: 1.5, camera: { name: null, position: [2, -5, 3], focal_point: [0, 0, 1], view_up: [0, 0, 1], view_angle: 40, still: true },
+  },
 };
 
 async function download(page, start) {
@@ -76,7 +93,11 @@ function rendered({ command, toml, json }) {
   return Object.entries(commands).map(([form, line]) => [form, run(line)]);
 }
 
-const pages = [...Object.entries(VIEWS).map((view) => [() => still, ...view]), ...Object.entries(MOMENTS).map((view) => [() => moving, ...view])];
+const pagesOf = (page, views) => Object.entries(views).map((view) => [page, ...view]);
+const pages = [
+  ...pagesOf(() => still, VIEWS), ...pagesOf(() => moving, MOMENTS),
+  ...pagesOf(() => orbiting, OF_ORBIT), ...pagesOf(() => passing, OF_FILE),
+];
 
 for (const [pageOf, name, patch] of pages) {
   test(`what is taken shows the same: ${name}`, async () => {

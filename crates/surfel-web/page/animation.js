@@ -14,6 +14,8 @@ export function animationRows(viewer, section) {
   const clock = element('output', { 'data-output': 'time' });
   const loop = element('input', { type: 'checkbox', role: 'switch', id: 'animation-loop', 'data-key': 'animation.loop', checked: true });
 
+  const lead = element('input', { type: 'checkbox', role: 'switch', id: 'animation-camera', 'data-key': 'camera.still' });
+
   const show = () => {
     scrub.value = (1000 * time()) / duration();
     scrub.style.setProperty('--share', `${scrub.value / 10}%`);
@@ -47,11 +49,23 @@ export function animationRows(viewer, section) {
   });
   scrub.addEventListener('change', () => viewer.set({ time: time() }, false));
 
+  lead.addEventListener('change', () => {
+    if (lead.checked) viewer.follow();
+    else viewer.look(viewer.camera, false);
+  });
+
   play.replaceChildren(icon('play'), 'Play');
-  viewer.infoChanged.listen(() => { section().hidden = !(0 < duration()); });
+  const leadRow = toggleRow(lead, 'Moving camera', 'Off as soon as you move it yourself\ncamera.still');
+  viewer.infoChanged.listen(() => {
+    section().hidden = !(0 < duration());
+    leadRow.hidden = !viewer.info.camera_moves;
+  });
   viewer.sceneChanged.listen(() => { if (0 < duration()) show(); });
-  return [
-    element('div', { class: 'row animation' }, play, scrub, clock),
-    element('div', { class: 'row' }, element('label', { for: loop.id }, 'Loop'), element('div', { class: 'field toggle' }, loop)),
-  ];
+  viewer.cameraChanged.listen(() => { lead.checked = viewer.isLed; });
+  return [element('div', { class: 'row animation' }, play, scrub, clock), toggleRow(loop, 'Loop'), leadRow];
+}
+
+function toggleRow(toggle, label, title = '') {
+  return element('div', { class: 'row' },
+    element('label', { for: toggle.id, title }, label), element('div', { class: 'field toggle' }, toggle));
 }

@@ -119,7 +119,7 @@ export class Navigation {
     const { camera, viewer } = this;
     const other = isOrthographic
       ? cameras.toOrthographic(camera, viewer.info.bounds)
-      : cameras.toPerspective(camera, viewer.opening.camera.view_angle);
+      : cameras.toPerspective(camera, viewer.opening.camera.view_angle ?? undefined);
     viewer.look(other, false);
   }
 

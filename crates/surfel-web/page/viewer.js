@@ -69,9 +69,14 @@ export class Viewer {
     return this.#input;
   }
 
+  /** Whether the camera goes where the scene moves it. */
+  get isLed() {
+    return Boolean(this.info?.camera_moves) && !this.camera?.still;
+  }
+
   /** The scene with the camera that the hand holds. */
   present() {
-    return { ...this.scene, camera: this.camera };
+    return this.isLed ? this.scene : { ...this.scene, camera: this.camera };
   }
 
   /** Tells the server of new settings, in the next animation frame. */
@@ -82,20 +87,31 @@ export class Viewer {
     this.sceneChanged();
   }
 
-  /** Tells the server of a new camera, in the next animation frame. */
+  /** Tells the server of a new camera, in the next animation frame. The scene does not move it any more. */
   look(camera, isMoving) {
-    this.camera = camera;
+    this.camera = this.info.camera_moves ? { ...camera, still: true } : camera;
     this.#isMoving = isMoving;
-    this.#dueCamera = camera;
+    this.#dueCamera = this.camera;
     this.#schedule();
     this.cameraChanged();
+  }
+
+  /** Lets the scene move the camera, as it did at first. */
+  follow() {
+    this.showLink({ ...viewPatch(this.opening, this.present()), camera: {} });
   }
 
   /** Shows the opening scene as `patch` changes it. */
   showLink(patch) {
     const wanted = mergePatch(this.opening, patch);
-    this.set(patchBetween({ ...this.scene, camera: null }, { ...wanted, camera: null }));
-    this.look(wanted.camera, false);
+    this.scene = this.present();
+    if (this.info.camera_moves && !wanted.camera.still) {
+      this.#dueCamera = null;
+      this.set(patchBetween(this.scene, wanted));
+    } else {
+      this.set(patchBetween({ ...this.scene, camera: null }, { ...wanted, camera: null }));
+      this.look(wanted.camera, false);
+    }
   }
 
   resize(size) {
@@ -205,7 +221,8 @@ export class Viewer {
     this.#toldScene = mergePatch(scene, this.#helloPatch);
     this.#patchesUnderway = [];
     this.#mergeUnderway();
-    if (isAnother) this.camera = this.scene.camera;
+    // Where a camera is that the scene moves comes with the first scene.
+    if (isAnother) this.camera = info.camera_moves && !this.scene.camera.still ? null : this.scene.camera;
     this.#camerasByInput.set(this.#input, this.camera);
     this.#takesNextCamera = isAnother;
     this.isConnected = true;
@@ -215,15 +232,15 @@ export class Viewer {
     this.cameraChanged();
   }
 
-  #receiveScene({ scene, legend, input = this.#input }) {
+  #receiveScene({ scene, camera, legend, input = this.#input }) {
     this.legend = legend;
     this.#toldScene = scene;
     this.#patchesUnderway = this.#patchesUnderway.filter((underway) => input < underway.input);
     this.#mergeUnderway();
     const isAtRest = !this.#dueCamera && !this.#isMoving && this.#lastCameraInput <= input;
-    if ((isAtRest || this.#takesNextCamera) && !areEqual(scene.camera, this.camera)) {
-      this.camera = scene.camera;
-      this.#camerasByInput.set(input, scene.camera);
+    if ((isAtRest || this.#takesNextCamera) && !areEqual(camera, this.camera)) {
+      this.camera = camera;
+      this.#camerasByInput.set(input, camera);
       this.cameraChanged();
     }
     this.#takesNextCamera = false;

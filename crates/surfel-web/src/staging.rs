@@ -113,18 +113,22 @@ impl Staging {
 
     async fn show(&mut self, stage: Stage, wish: &Wish) {
         self.settings = stage.settings.clone();
+        let keys = stage.settings.get("camera").cloned().unwrap_or_default();
+        let place = stage.moved_camera.as_ref().unwrap_or(&keys);
         let message = json!({
             "type": "scene",
             "input": wish.input,
             "scene": stage.settings,
+            "camera": place,
             "legend": stage.legend,
         });
-        let has_camera = wish.is_anew || wish.patch.contains_key("camera");
-        let keys = stage.settings.get("camera").cloned().unwrap_or_default();
-        let camera = camera::parse(&keys).ok();
+        let is_led = stage.moved_camera.is_some() || wish.patch.contains_key("camera");
+        let camera = camera::parse(place).ok();
         let stage = Arc::new(stage);
         self.client.look(|sight| {
-            if sight.camera.is_none() || has_camera {
+            // A page may have looked elsewhere while its scene was made.
+            let is_newest = is_led && sight.input <= wish.input;
+            if sight.camera.is_none() || wish.is_anew || is_newest {
                 (sight.camera, sight.camera_keys) = (camera, keys);
             }
             sight.stage = Some(stage);

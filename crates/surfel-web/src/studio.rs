@@ -49,6 +49,8 @@ pub trait Studio: Send + Sync + 'static {
 pub struct Stage {
     /// Complete: with what was chosen.
     pub settings: Keys,
+    /// The camera at the settings' time, where the scene moves it; none where it stands as they say.
+    pub moved_camera: Option<Value>,
     /// But for its camera, which each client moves.
     pub flat: FlatScene,
     /// But for the size, which each client chooses.

@@ -50,6 +50,9 @@ pub struct CameraArgs {
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = parse::positive,
         conflicts_with = "camera_position")]
     camera_zoom_factor: f64,
+    /// The camera stays where it is, even if the scene moves it.
+    #[arg(long)]
+    pub camera_still: bool,
     /// The axis that points up: +Z, -Y, x,y,z; found out from the cloud if not given.
     #[arg(long, value_name = "AXIS", value_parser = parse::up, allow_hyphen_values = true)]
     up: Option<Vec3>,

@@ -65,12 +65,20 @@ pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow
     let (line, global, report_there) = (line.clone(), global.clone(), report.twin());
     let open = move |progress: &dyn Progress| {
         let report = report_there.heard_by(progress);
-        let studio = ScanStudio::open(line, &global, &report).map_err(settings::refusal)?;
-        Ok(Arc::new(studio) as Arc<dyn Studio>)
+        open_studio(line, &global, &report).map_err(settings::refusal)
     };
     let renderer = Arc::new(CpuRenderer { simd: Simd::detect() });
     server.run(renderer, report.cancellation(), open).map_err(|error| match error {
         Error::Cancelled => anyhow!(surfel::Error::Cancelled),
         error => anyhow!(error),
     })
+}
+
+/// Reads what is to be viewed.
+pub fn open_studio(
+    line: Line,
+    global: &Global,
+    report: &Report,
+) -> anyhow::Result<Arc<dyn Studio>> {
+    Ok(Arc::new(ScanStudio::open(line, global, report)?))
 }

@@ -32,6 +32,8 @@ pub struct ScanStudio {
     base: Assembly<'static>,
     given: Keys,
     up: Vec3,
+    /// Whether the scene moves its camera.
+    moves_camera: bool,
     prepared: Recent<Vec<PointCloud>>,
     made: Recent<Made>,
     renderer: CpuRenderer,
@@ -60,6 +62,7 @@ impl ScanStudio {
             base,
             given,
             up: Vec3::Z,
+            moves_camera: false,
             prepared: Recent::default(),
             made: Recent::default(),
             renderer: CpuRenderer { simd: Simd::detect() },
@@ -68,7 +71,8 @@ impl ScanStudio {
         // Choices are told once; pages make their own again.
         let asked = settings::read(line, &studio.given, &studio.given)?;
         let choices = picture::choose(&studio.base, &asked.args, report)?;
-        Ok(Self { up: choices.up, ..studio })
+        let moves_camera = choices.eye.moves(&studio.base);
+        Ok(Self { up: choices.up, moves_camera, ..studio })
     }
 
     fn complete(&self, asked: &Asked, choices: &Choices, stops: f32) -> Keys {
@@ -116,7 +120,10 @@ impl ScanStudio {
         pose(&mut flat, &made.graph, asked.time, &choices, report)?;
         light::expose(&mut flat, stops);
         let settings = self.complete(asked, &choices, stops);
-        Ok(Stage { settings, flat, quality, legend: made.legend.clone(), source: made })
+        let is_moved = choices.eye.moves(&self.base);
+        let moved_camera = is_moved.then(|| dry_run::camera_keys(&flat.camera));
+        let legend = made.legend.clone();
+        Ok(Stage { settings, moved_camera, flat, quality, legend, source: made })
     }
 
     fn objects(&self) -> Vec<Value> {
@@ -208,6 +215,7 @@ impl Studio for ScanStudio {
             "materials": Material::NAMED.map(|(name, _)| name),
             "objects": self.objects(),
             "duration_secs": self.base.duration_secs(),
+            "camera_moves": self.moves_camera,
             "threads": rayon::current_num_threads(),
             "simd": self.renderer.simd.name(),
             "coordinate_system": self.base.source().coordinate_system,

@@ -59,7 +59,7 @@ fn a_turntable_goes_about_what_the_camera_of_the_file_sees() {
 fn a_dry_run_of_a_film_keeps_the_movement_of_the_camera() {
     let (folder, file) = site();
     let name = ["--camera-name", "eye"];
-    assert_eq!(told("animate", &file, &name), json!({ "name": "eye", "view_angle": null }));
+    assert_eq!(told("animate", &file, &name), json!({ "name": "eye" }));
     let (made, again) = (folder.path("made#.png"), folder.path("again#.png"));
     let film = ["animate", &file, "-o", &made, "--fps", "1"];
     succeed(&[&film[..], &name, &SMALL].concat());
@@ -102,4 +102,21 @@ fn a_camera_is_chosen_by_its_name() {
     assert!(text.contains("still, eye"), "{text}");
     let both = ["--camera-name", "eye", "--camera-position", "1,2,3"];
     fail(&[&["render", &file, "-o", "no.png"], &both[..]].concat(), 2);
+}
+
+#[test]
+fn a_camera_that_is_held_stays_where_it_was_when_the_scene_moves_it() {
+    let (folder, file) = site();
+    let orbit = "camera.name = \"eye\"\n[[object]]\nfile = \"eye.gltf\"\n[[animation]]\n\
+        object = \"camera\"\nkind = \"orbit\"\nseconds = 4\n";
+    let orbit = folder.write("orbit.toml", orbit);
+    for scene in [&["--camera-name", "eye", &file][..], &[&orbit]] {
+        let at = |time, more: &[&str]| shot(&folder, &[scene, &["--time", time], more].concat());
+        assert_ne!(at("1", &[]), at("0", &[]));
+        assert_eq!(at("1", &["--camera-still"]), at("0", &[]));
+    }
+    let told = succeed(&["render", &orbit, "--camera-still", "--dry-run"]);
+    let told = folder.write("told.json", told);
+    let held = shot(&folder, &[&orbit, "--camera-still"]);
+    assert_eq!(shot(&folder, &[&told, "--time", "1"]), held);
 }

@@ -1,6 +1,6 @@
 //! Long work on scenes: told, given up, and never in the way of others.
 
-use crate::page::{Page, Told};
+use crate::page::{Page, Told, camera};
 use crate::studio::MoodyRenderer;
 use crate::viewer::Viewer;
 use serde_json::{Value, json};
@@ -30,6 +30,28 @@ async fn long_work_is_told_and_given_up_for_newer_wishes() {
     assert_eq!((&scene["input"], &scene["scene"]["tint"]), (&json!(2), &json!(4)));
     assert_eq!(viewer.studio.n_cancelled.load(Ordering::Relaxed), 1);
     page.told_state(None).await;
+}
+
+#[tokio::test]
+async fn a_scene_moves_the_camera_of_a_page_that_does_not_look_elsewhere_meanwhile() {
+    let viewer = Viewer::start();
+    let mut page = Page::open(&viewer, json!({ "led": 1 })).await;
+    assert_eq!(page.told("scene").await["camera"], camera(1.0));
+    let first = page.finished().await;
+    page.set(1, json!({ "led": 2 })).await;
+    assert_eq!(page.told("scene").await["camera"], camera(2.0));
+    let led = page.picture_that(|picture| picture.is_finished && picture.input == 1).await;
+    assert_ne!(led.file, first.file);
+
+    page.set(2, json!({ "led": 3, "slow": 0.5 })).await;
+    page.turn(3, 1.0, false).await;
+    assert_eq!(page.told("scene").await["input"], 2);
+    let own = page.picture_that(|picture| picture.is_finished && picture.input == 3).await;
+    assert_eq!(own.file, first.file);
+    page.say(json!({ "type": "take", "id": 1, "width": 30, "height": 20 })).await;
+    let taken: Value =
+        serde_json::from_str(page.told("taken").await["json"].as_str().unwrap()).unwrap();
+    assert_eq!(taken["camera"], camera(1.0));
 }
 
 #[tokio::test]

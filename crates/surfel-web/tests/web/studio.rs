@@ -1,5 +1,6 @@
 //! A studio over a small hill, with settings that are slow, wrong or fatal on demand.
 
+use crate::page::camera;
 use serde_json::{Value, json};
 use std::io::Cursor;
 use std::sync::Arc;
@@ -117,7 +118,7 @@ impl Studio for HillStudio {
 
     fn stage(&self, settings: &Keys, progress: &dyn Progress) -> Result<Stage> {
         let mut complete = self.opening(0, 0);
-        let mut seed = 0;
+        let (mut seed, mut moved_camera) = (0, None);
         for (key, value) in settings {
             let secs = Duration::from_secs_f64(value.as_f64().unwrap_or(0.0));
             match key.as_str() {
@@ -129,6 +130,7 @@ impl Studio for HillStudio {
                 }
                 "panics" => panic!("asked for by a test"),
                 "paint" => seed = value.as_u64().unwrap_or(0),
+                "led" => moved_camera = value.as_f64().map(camera),
                 "camera" | "tint" | "sketched" | "resolution" => {}
                 _ => return Err(Error::Refused(format!("{key}: not known"))),
             }
@@ -136,6 +138,7 @@ impl Studio for HillStudio {
         }
         Ok(Stage {
             settings: complete,
+            moved_camera,
             flat: self.flat.clone(),
             quality: quality(seed),
             legend: Value::Null,

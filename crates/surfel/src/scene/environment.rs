@@ -80,6 +80,11 @@ impl Environment {
         self.n_repaired
     }
 
+    /// The same about another `up`, turned by `rotation_deg` as in [`Environment::new`].
+    pub fn facing(&self, up: Vec3, rotation_deg: f32) -> Result<Self> {
+        Ok(Self { axes: axes(up, rotation_deg)?, ..self.clone() })
+    }
+
     /// The same, carried about the scene.
     pub fn turned(&self, turn: DQuat) -> Self {
         let axes = self.axes.map(|axis| (turn * axis.as_dvec3()).as_vec3());
@@ -368,6 +373,16 @@ mod tests {
         assert_eq!(east.radiance(Vec3::X), Vec3::new(23.5, 7.5, 0.0));
         assert_eq!(east.radiance(Vec3::Z).y, 0.0);
         assert_eq!(east.radiance(Vec3::NEG_Z).y, 15.0);
+    }
+
+    #[test]
+    fn an_environment_that_is_turned_later_is_the_same() {
+        let (up, rotation_deg) = (Vec3::new(0.2, -0.5, 1.0), 77.0);
+        let pixel = |x: usize, y: usize| Vec3::new(x as f32, y as f32, 1.0);
+        let upright = turned(8, 4, Vec3::Z, 0.0, pixel);
+        let facing = upright.facing(up, rotation_deg).unwrap();
+        assert_eq!(facing, turned(8, 4, up, rotation_deg, pixel));
+        assert!(upright.facing(Vec3::ZERO, 0.0).is_err());
     }
 
     #[test]
