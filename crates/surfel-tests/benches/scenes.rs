@@ -1,21 +1,24 @@
-//! Whole scenes: what a frame costs in which things move, and what it costs that things stand side by side.
+//! Whole scenes: what a frame costs in which things move, what it costs that things stand side by side, and
+//! how soon work stops.
 //!
 //! `cargo bench -p surfel-tests --bench scenes`; `RAYON_NUM_THREADS` sets the threads, `POINTS` the number
 //! of points that stand still (10 million by default).
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::f32::consts::{PI, TAU};
+use std::time::{Duration, Instant};
 use surfel::flat::{FlatMesh, FlatScene, Refit};
 use surfel::math::{DQuat, DVec3, Ray, Vec3};
-use surfel::progress::Silent;
+use surfel::progress::{Progress, Silent};
+use surfel::render::{CpuRenderer, Renderer, Settings};
 use surfel::scene::{
-    Background, Camera, Geometry, Graph, Material, Mesh, Node, Part, Points, Projection, Scene,
-    Transform,
+    Background, Camera, Geometry, Graph, Light, Material, Mesh, Node, Part, Points, Projection,
+    Scene, Sky, Sun, Transform,
 };
 use surfel::trace::{SceneHit, Simd, Which, scene_hits};
 use surfel_tests::clouds::waves;
 
-criterion_group!(benches, moving, side_by_side);
+criterion_group!(benches, moving, side_by_side, stopping);
 criterion_main!(benches);
 
 fn n_points(usual: usize) -> usize {
@@ -163,6 +166,59 @@ fn side_by_side(criterion: &mut Criterion) {
             for (flat, rays) in &alone {
                 trace(flat, rays, &mut hits[..rays.len()]);
             }
+        });
+    });
+    group.finish();
+}
+
+/// Wants work to end from a time on.
+struct Until(Instant);
+
+impl Progress for Until {
+    fn is_cancelled(&self) -> bool {
+        self.0 < Instant::now()
+    }
+}
+
+/// From the moment when a picture is not wanted any more until nothing works on it.
+fn stopping(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("stopped picture");
+    group.sample_size(50);
+    let points = Geometry::Points(cloud(1_000_000));
+    let sun =
+        Sun { direction: Vec3::new(0.6, 0.0, 0.8), color: Vec3::ONE, angular_diameter_deg: 0.5 };
+    let (zenith, ground) = (Vec3::splat(0.3), Vec3::splat(0.1));
+    let sky = Sky { up: Vec3::Z, zenith, ground, reach: 100.0 };
+    let scene = Scene {
+        lights: vec![Light::Sun(sun), Light::Sky(sky)],
+        ..scene(
+            Graph::of(points, Material::MATTE),
+            camera(DVec3::new(500.0, -300.0, 420.0), DVec3::new(500.0, 350.0, 20.0)),
+        )
+    };
+    let flat = FlatScene::new(&scene, &Silent).unwrap();
+    let settings = Settings {
+        width: 1280,
+        height: 720,
+        samples_per_pixel: 16,
+        light_samples: 64,
+        max_depth: 3,
+        seed: 0,
+        with_layers: false,
+    };
+    let renderer = CpuRenderer { simd: Simd::detect() };
+    group.bench_function("1280 x 720", |bencher| {
+        bencher.iter_custom(|n| {
+            (0..n)
+                .map(|i| {
+                    // At any place of its work.
+                    let until = Instant::now() + Duration::from_micros(20_000 + 7_919 * (i % 10));
+                    let stopped = renderer.render(&flat, &settings, &Until(until));
+                    let late = until.elapsed();
+                    assert!(matches!(stopped, Err(surfel::Error::Cancelled)));
+                    late
+                })
+                .sum()
         });
     });
     group.finish();

@@ -27,6 +27,8 @@ pub struct Canvas {
     /// Rows that have one more.
     n_rows: u32,
     secs_per_row: f64,
+    /// What was painted last took so long.
+    secs: f64,
     /// Whether something worth showing has not been sent.
     is_due: bool,
     work: Work,
@@ -61,6 +63,11 @@ impl Canvas {
         self.version
     }
 
+    /// Whether even the least that can be painted takes long.
+    pub fn is_slow(&self) -> bool {
+        2.0 * LONG.as_secs_f64() < self.secs
+    }
+
     /// A picture as large as there is time for.
     pub fn draft(
         &mut self,
@@ -80,7 +87,8 @@ impl Canvas {
         let hurry = Hurry::new(progress, Pace::is_least((width, height)));
         let start = Instant::now();
         let rendered = renderer.render(scene, &settings, &hurry);
-        self.pace.learn(n_pixels, start.elapsed().as_secs_f64());
+        self.secs = start.elapsed().as_secs_f64();
+        self.pace.learn(n_pixels, self.secs);
         let (image, stats) = rendered?;
         let pixels =
             Pixels { width: width as u16, height: height as u16, sum: &image.color, weight: 1.0 };
@@ -113,7 +121,8 @@ impl Canvas {
         let hurry = Hurry::new(progress, n_rows == 1);
         let start = Instant::now();
         let rendered = renderer.render_piece(scene, &settings, piece, &hurry);
-        self.secs_per_row = start.elapsed().as_secs_f64() / f64::from(n_rows);
+        self.secs = start.elapsed().as_secs_f64();
+        self.secs_per_row = self.secs / f64::from(n_rows);
         let (image, stats) = rendered?;
         self.work += Work::of(&stats);
         self.add(&image.color, piece, width as usize * height as usize);

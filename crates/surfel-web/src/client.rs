@@ -109,6 +109,11 @@ impl Client {
         lock(&self.sight).is_moving
     }
 
+    /// Whether each of its pictures takes long.
+    pub fn is_slow(&self) -> bool {
+        lock(&self.canvas).is_slow()
+    }
+
     fn may_send(&self) -> bool {
         let flow = lock(&self.flow);
         flow.sent - flow.seen < MOST_UNSEEN

@@ -3,12 +3,16 @@
 use crate::client::Client;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 use surfel::render::Renderer;
 
 /// Of a second: a frame while one client moves, without its encoding.
 const DRAFT_SECS: f64 = 0.8 / 30.0;
 /// Less is all overhead.
 const LEAST_DRAFT_SECS: f64 = 0.008;
+/// Those whose pictures take long wait this many times as long in between, if others move.
+const REST: u32 = 9;
+const FOREVER: Duration = Duration::from_secs(3600);
 
 #[derive(Default)]
 pub struct Easel {
@@ -59,7 +63,8 @@ impl Easel {
     }
 
     fn paint(&self, renderer: &dyn Renderer) {
-        let mut turn = 0;
+        let (mut turn, mut slow_turn) = (0, 0);
+        let mut rest_until = Instant::now();
         loop {
             let (clients, n_calls) = {
                 let room = self.room();
@@ -68,32 +73,51 @@ impl Easel {
                 }
                 (room.clients.clone(), room.n_calls)
             };
+            let (slow, quick): (Vec<_>, Vec<_>) =
+                clients.into_iter().partition(|client| client.is_slow());
             // Whoever moves gets a draft in each round, all others together one piece: waiting is
             // noticed at the mouse, not by who looks on.
-            let n_moving = clients.iter().filter(|client| client.is_moving()).count();
+            let n_moving = quick.iter().filter(|client| client.is_moving()).count();
             let secs = (DRAFT_SECS / n_moving.max(1) as f64).max(LEAST_DRAFT_SECS);
             let draft =
-                |client: &&Arc<Client>| client.attempt(|client| client.draft(renderer, secs));
-            let n_drafts = clients.iter().filter(draft).count();
-            let mut in_turn = (0..clients.len()).map(|i| (turn + i) % clients.len());
-            let refine = |&i: &usize| clients[i].attempt(|client| client.refine(renderer));
-            let refined = in_turn.find(refine);
-            turn = refined.map_or(turn, |i| i + 1);
-            if n_drafts == 0 && refined.is_none() {
-                drop(clients);
-                self.wait(n_calls);
+                |client: &Arc<Client>| client.attempt(|client| client.draft(renderer, secs));
+            let refine = |client: &Arc<Client>| client.attempt(|client| client.refine(renderer));
+            let n_drafts = quick.iter().filter(|client| draft(client)).count();
+            let mut has_painted = in_turn(&quick, &mut turn, refine) || 0 < n_drafts;
+            let start = Instant::now();
+            let has_rested = rest_until <= start;
+            if has_rested || n_moving == 0 && !has_painted {
+                let paint = |client: &Arc<Client>| draft(client) || refine(client);
+                has_painted |= in_turn(&slow, &mut slow_turn, paint);
+                rest_until = Instant::now() + REST * start.elapsed();
+            }
+            if !has_painted {
+                drop((slow, quick));
+                self.wait(n_calls, if has_rested { FOREVER } else { rest_until - start });
             }
         }
     }
 
-    /// Sleeps until there was another call than those known.
-    fn wait(&self, n_calls: u64) {
+    /// Sleeps until there was another call than those known, or for so long.
+    fn wait(&self, n_calls: u64, most: Duration) {
         let room = self.room();
         let is_idle = |room: &mut Room| room.n_calls == n_calls && !room.is_closed;
-        drop(self.changed.wait_while(room, is_idle));
+        drop(self.changed.wait_timeout_while(room, most, is_idle));
     }
 
     fn room(&self) -> MutexGuard<'_, Room> {
         self.room.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Goes on with the first one, from `turn`, for whom there is something to paint; returns whether there was.
+fn in_turn(
+    clients: &[Arc<Client>],
+    turn: &mut usize,
+    paint: impl Fn(&Arc<Client>) -> bool,
+) -> bool {
+    let mut from_turn = (0..clients.len()).map(|i| (*turn + i) % clients.len());
+    let found = from_turn.find(|&i| paint(&clients[i]));
+    *turn = found.map_or(*turn, |i| i + 1);
+    found.is_some()
 }

@@ -9,10 +9,10 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
 use surfel::flat::FlatScene;
-use surfel::math::Vec3;
+use surfel::math::{Aabb, Vec3};
 use surfel::points::{PointCloud, Scalar, Values};
 use surfel::progress::Progress;
-use surfel::scene::{Background, Camera, Geometry, Graph, Projection, Scene};
+use surfel::scene::{Background, Camera, Geometry, Graph, Projection, Scene, usual_bounds};
 
 /// Column of a point's index among those that were read. No file's column has a name like it.
 pub const INDEX: &str = "\u{0}index";
@@ -98,6 +98,9 @@ pub fn prepared(
     clouds.map(prepare).collect()
 }
 
+/// Discs of points over each other on average.
+const MOST_LAYERS: f32 = 200.0;
+
 /// Trees, and what tells which point is which.
 pub struct Made {
     /// Without the points.
@@ -123,6 +126,7 @@ impl Made {
                 graph.geometries[sequence.geometry] = Geometry::Points(points);
             }
         }
+        check_layers(&graph)?;
         let indices = graph.geometries.iter().map(|geometry| match geometry {
             Geometry::Points(points) => match points.cloud.scalar(INDEX) {
                 Some(Values::I32(indices)) => indices.clone(),
@@ -143,6 +147,33 @@ impl Made {
         graph.forget_static();
         Ok(Self { graph, flat, indices, legend })
     }
+}
+
+/// Fails for points so large that each ray meets thousands of them: others would wait for this page's
+/// pictures, and nothing could be seen on them.
+fn check_layers(graph: &Graph) -> anyhow::Result<()> {
+    for geometry in &graph.geometries {
+        let Geometry::Points(points) = geometry else { continue };
+        let n_layers = n_layers(&points.cloud);
+        if MOST_LAYERS < n_layers {
+            let advice = "choose a smaller radius or radius_scale";
+            anyhow::bail!(
+                "points lie {n_layers:.0} over each other, at most {MOST_LAYERS} can be viewed; {advice}"
+            );
+        }
+    }
+    Ok(())
+}
+
+/// How many discs lie over each other, about: their area as a share of that of a box around them.
+fn n_layers(cloud: &PointCloud) -> f32 {
+    let radii = cloud.radii.as_deref().unwrap_or_default();
+    let n = radii.len().max(1) as f64;
+    let sum = |power: i32| radii.iter().map(|radius| f64::from(*radius).powi(power)).sum::<f64>();
+    let Aabb { min, max } = usual_bounds(cloud);
+    let size = (max - min).as_dvec3() + 2.0 * sum(1) / n;
+    let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+    (std::f64::consts::PI * sum(2) / area) as f32
 }
 
 /// A camera for a scene that is not looked at yet.

@@ -92,6 +92,8 @@ fn what_a_page_may_not_change_is_refused() {
         ("camera-view-angle=400", "camera-view-angle"),
         ("resolution=8192x8192&spp=1024", "rays"),
         ("resolution=16000x16000&spp=1", "16000x16000"),
+        ("radius-scale=100", "over each other"),
+        ("radius=1e9", "over each other"),
     ] {
         let error = server.error(&format!("/render?{query}"));
         assert!(error.contains(expected), "{query}: {error}");

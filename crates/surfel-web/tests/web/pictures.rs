@@ -4,6 +4,8 @@ use crate::page::{JPEG, PNG, Page, Picture, Told};
 use crate::studio::{MoodyRenderer, PICTURE, SAMPLES};
 use crate::viewer::Viewer;
 use serde_json::json;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 const WHILE: Duration = Duration::from_millis(800);
@@ -129,6 +131,33 @@ async fn who_paints_slowly_leaves_time_to_who_moves() {
         moving.picture_that(|picture| picture.input == input).await;
     }
     assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
+}
+
+/// Pages whose drafts take a second each and that never rest, beside one that moves.
+#[tokio::test]
+async fn whose_drafts_take_long_has_a_small_share_of_the_time() {
+    let viewer = Viewer::start();
+    let n_slow = Arc::new(AtomicU32::new(0));
+    for _ in 0..3 {
+        let mut page = Page::open(&viewer, json!({ "paint": MoodyRenderer::SLOWER })).await;
+        page.picture_that(|_| true).await;
+        let n_slow = n_slow.clone();
+        tokio::spawn(async move {
+            for input in 1.. {
+                page.turn(input, f64::from(input), true).await;
+                page.picture_that(|picture| picture.input == input).await;
+                n_slow.fetch_add(1, Ordering::Relaxed);
+            }
+        });
+    }
+    let mut moving = Page::open(&viewer, json!({})).await;
+    moving.picture_that(|_| true).await;
+    for input in 1..=100 {
+        moving.turn(input, f64::from(input), true).await;
+        moving.picture_that(|picture| picture.input == input).await;
+    }
+    let n_slow = n_slow.load(Ordering::Relaxed);
+    assert!(n_slow < 20, "{n_slow} slow pictures among 100");
 }
 
 #[tokio::test]

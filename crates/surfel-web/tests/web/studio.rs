@@ -24,6 +24,7 @@ pub const SAMPLES: u32 = 4;
 
 /// Seeds that tell the renderer to be slow, to panic, or to fail.
 const SLOW: u64 = 1001;
+const SLOWER: u64 = 1004;
 const PANIC: u64 = 1002;
 const FAIL: u64 = 1003;
 /// Of a slow renderer.
@@ -206,6 +207,8 @@ pub struct MoodyRenderer;
 
 impl MoodyRenderer {
     pub const SLOW: u64 = SLOW;
+    /// Not even a small draft is done soon.
+    pub const SLOWER: u64 = SLOWER;
     pub const PANIC: u64 = PANIC;
     pub const FAIL: u64 = FAIL;
 }
@@ -223,10 +226,12 @@ impl Renderer for MoodyRenderer {
         progress: &dyn Progress,
     ) -> surfel::Result<(Image, RenderStats)> {
         match settings.seed {
-            SLOW => {
+            SLOW | SLOWER => {
                 let n_pixels = settings.width * (piece.rows.1 - piece.rows.0);
+                let factor = if settings.seed == SLOWER { 20.0 } else { 1.0 };
+                let secs = factor * SECS_PER_PIXEL * f64::from(n_pixels);
                 let start = Instant::now();
-                while start.elapsed().as_secs_f64() < SECS_PER_PIXEL * f64::from(n_pixels) {
+                while start.elapsed().as_secs_f64() < secs {
                     progress.check()?;
                     std::thread::sleep(Duration::from_millis(1));
                 }
