@@ -110,10 +110,18 @@ export class Viewer {
     this.toolChanged();
   }
 
-  load(name, text) {
-    this.#takesNextCamera = true;
-    this.#patchesUnderway = [];
-    this.#connection.send({ type: 'load', id: ++this.#question, name, text });
+  /** Shows what a scene file tells, or says why not. */
+  async load(file) {
+    const most = this.info?.limits.max_message_bytes;
+    // A film dropped by mistake is not even read.
+    const text = most < file.size ? null : await file.text();
+    const message = { type: 'load', id: ++this.#question, name: file.name, text };
+    if (text === null || most < byteLength(message)) this.refused(`${file.name} is too large for a scene file`);
+    else if (!this.#connection.send(message)) this.refused(`${file.name}: there is no connection`);
+    else {
+      this.#takesNextCamera = true;
+      this.#patchesUnderway = [];
+    }
   }
 
   /** What the server answers; `abort` (an AbortSignal) cancels, `progress` hears how far it is. */
@@ -272,4 +280,9 @@ export class Viewer {
 
 function forgetBefore(byInput, input) {
   for (const key of byInput.keys()) if (key < input) byInput.delete(key);
+}
+
+/** Of a message as it is sent. */
+function byteLength(message) {
+  return new TextEncoder().encode(JSON.stringify(message)).length;
 }
