@@ -2,9 +2,9 @@
 
 import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
-import { project } from '../page/camera.js';
+import { cornersOf, project } from '../page/camera.js';
 import * as clip from '../page/clip.js';
-import { addScaled, dot } from '../page/vector.js';
+import { addScaled, dot, mix } from '../page/vector.js';
 import { closePage, drag, finishedPixels, openPage, QUICK, serve, settled, show, state } from './harness.mjs';
 
 const BOX = { min: [562322, 4183193, 145], max: [562345, 4183216, 155] };
@@ -80,3 +80,25 @@ test('pictures come while a handle is still being dragged', async () => {
   await page.mouse.up();
   await settled(page);
 });
+
+test('edges are bent as a panorama bends them', async () => {
+  const place = [562334, 4183203, 152];
+  await show(page, { clip_box: clip.formatBox(BOX), camera: { panorama: true, view_angle: null, position: place, focal_point: [562334, 4183213, 152] } });
+  const [camera, size, corners] = [await state(page, 'camera'), await state(page, 'size'), cornersOf(BOX)];
+  const lines = await page.locator('.clip-edge').evaluateAll((all) =>
+    all.map(({ x1, y1, x2, y2 }) => [x1, y1, x2, y2].map(({ baseVal }) => baseVal.value)));
+  assert.deepEqual(lines.filter(([x1, , x2]) => size.width / 4 < Math.abs(x1 - x2)), [], 'none goes across the picture');
+  for (const [a, b] of [[0, 1], [2, 3], [4, 5], [6, 7], [5, 7], [1, 5]]) {
+    for (const share of [0.1, 0.25, 0.4, 0.75]) {
+      const { x, y } = project(camera, size, mix(corners[a], corners[b], share));
+      const off = Math.min(...lines.map(([x1, y1, x2, y2]) => distanceToLine(x, y, x1, y1, x2, y2)));
+      assert.ok(off < 1, `${off} pixels off the edge from ${a} to ${b}`);
+    }
+  }
+});
+
+function distanceToLine(x, y, x1, y1, x2, y2) {
+  const along = ((x - x1) * (x2 - x1) + (y - y1) * (y2 - y1)) / ((x2 - x1) ** 2 + (y2 - y1) ** 2);
+  const share = Math.min(1, Math.max(0, along));
+  return Math.hypot(x - x1 - share * (x2 - x1), y - y1 - share * (y2 - y1));
+}

@@ -114,6 +114,12 @@ test('a panorama turns about its place, and what is taken of it shows the same',
   const picture = await saved(page);
   const texts = await taken(page);
   for (const [form, bytes] of rendered(texts)) assert.ok(picture.equals(bytes), `${form}\n${texts.command}`);
+  await page.locator('#sections summary', { hasText: 'View' }).click();
+  const projection = page.locator('[data-key="camera.projection"]');
+  assert.equal(await projection.inputValue(), 'panorama');
+  await projection.selectOption('perspective');
+  await settled(page);
+  assert.equal((await state(page, 'camera')).panorama, undefined);
   await closePage(page);
 });
 
@@ -192,6 +198,13 @@ test('where nothing may be copied, the text is selected', async () => {
   await page.locator('.toast', { hasText: 'Ctrl + C' }).waitFor();
   assert.equal(await page.evaluate(() => getSelection().toString()), text);
   assert.equal(await page.locator('#take-copy.is-done').count(), 0);
+  const [dialog, toast] = [await page.locator('#take-dialog').boundingBox(), await page.locator('.toast').boundingBox()];
+  // Where both are, without the dialog's round corners.
+  const [x, y] = [Math.max(dialog.x, toast.x) + 20, toast.y + 5];
+  const clip = { x, y, width: toast.x + toast.width - 20 - x, height: Math.min(dialog.y + dialog.height, toast.y + toast.height) - 20 - y };
+  const over = await page.screenshot({ clip });
+  await page.locator('.toast').evaluate((shown) => { shown.hidden = true; });
+  assert.ok(!over.equals(await page.screenshot({ clip })), 'what is told lies over the dialog');
   await closePage(page);
 });
 
