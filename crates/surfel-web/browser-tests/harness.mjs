@@ -98,8 +98,8 @@ export const state = (page, key) => page.evaluate((name) => window.surfel.state[
 export async function settled(page) {
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
   await page.waitForFunction(() => {
-    const { isConnected, lastFrame, lastInput, size, connected } = window.surfel?.state ?? {};
-    return connected && lastFrame?.finished && lastFrame.input === lastInput && lastFrame.width === size.width && lastFrame.height === size.height;
+    const { lastFrame, lastInput, size, connected, agreed } = window.surfel?.state ?? {};
+    return connected && agreed && lastFrame?.finished && lastFrame.input === lastInput && lastFrame.width === size.width && lastFrame.height === size.height;
   }, undefined, { timeout: PATIENCE_MS });
 }
 

@@ -273,7 +273,7 @@ test('what is dropped and is no scene file is told of', async () => {
   const screen = await finishedPixels(still);
   for (const [name, text, told] of [
     ['notes.txt', 'spp = 3', 'notes.txt is no scene file'],
-    ['wrong.toml', 'spp = "many"', 'spp'],
+    ['wrong.toml', 'spp = "many"', 'many'],
     ['lidar.json', JSON.stringify({ points: Array(100_000).fill(1.5) }), 'lidar.json is too large'],
     // Each line break is two letters on its way.
     ['lines.toml', '\n'.repeat(200_000), 'lines.toml is too large'],

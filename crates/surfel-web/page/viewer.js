@@ -43,6 +43,9 @@ export class Viewer {
   /** As the server last told it, and the patches that it did not yet know of. */
   #toldScene = null;
   #patchesUnderway = [];
+  /** The last picture that came, and the last before the scene was told. */
+  #frame = 0;
+  #frameBeforeScene = 0;
   #camerasByInput = new Map();
   #sentAt = new Map();
   #questions = new Map();
@@ -67,6 +70,11 @@ export class Viewer {
   /** Number of the last message about settings or camera; pictures tell which one they obey. */
   get lastInput() {
     return this.#input;
+  }
+
+  /** Whether the picture on the screen is of all settings that were changed here, but for those refused. */
+  get isAgreed() {
+    return !this.#duePatch && this.#patchesUnderway.length === 0 && this.#frameBeforeScene < this.lastFrame?.frame;
   }
 
   /** The scene with the camera that the hand holds. */
@@ -211,6 +219,7 @@ export class Viewer {
     this.info = info;
     this.opening = scene;
     this.#toldScene = mergePatch(scene, this.#helloPatch);
+    [this.#frame, this.#frameBeforeScene] = [0, 0];
     this.#patchesUnderway = [];
     this.#mergeUnderway();
     if (isAnother) this.camera = this.scene.camera;
@@ -226,6 +235,7 @@ export class Viewer {
   #receiveScene({ scene, legend, input = this.#input }) {
     this.legend = legend;
     this.#toldScene = scene;
+    this.#frameBeforeScene = this.#frame;
     this.#patchesUnderway = this.#patchesUnderway.filter((underway) => input < underway.input);
     this.#mergeUnderway();
     const isAtRest = !this.#dueCamera && !this.#isMoving && this.#lastCameraInput <= input;
@@ -245,8 +255,12 @@ export class Viewer {
   }
 
   #receivePicture(header, blob) {
-    if (header.kind === SAVED_PICTURE) this.#answer({ id: header.frame, blob });
-    else this.pictureCame(header, blob);
+    if (header.kind === SAVED_PICTURE) {
+      this.#answer({ id: header.frame, blob });
+      return;
+    }
+    this.#frame = header.frame;
+    this.pictureCame(header, blob);
   }
 
   #receiveError({ id, input, text }) {

@@ -119,6 +119,8 @@ impl Staging {
             "scene": stage.settings,
             "legend": stage.legend,
         });
+        // Before its first picture, whose settings the page then knows.
+        answer(&self.out, &message).await;
         let has_camera = wish.is_anew || wish.patch.contains_key("camera");
         let keys = stage.settings.get("camera").cloned().unwrap_or_default();
         let camera = camera::parse(&keys).ok();
@@ -132,7 +134,6 @@ impl Staging {
             sight.is_moving = wish.is_moving;
         });
         self.hall.easel.call();
-        answer(&self.out, &message).await;
     }
 
     /// Tells the page of long work, which ends for newer wishes or when nobody waits for it any more.
