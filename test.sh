@@ -49,24 +49,28 @@ page_tests() {
     shift
     echo "== $name"
     node --test --test-reporter=tap "$@" 2>&1 | tee "$log" | grep -E '^(not )?ok |^ +error:|^# (tests|duration)'
-    local ok bad
+    local ok bad left_out
     ok=$(sed -nE 's/^# pass ([0-9]+)$/\1/p' "$log")
+    left_out=$(sed -nE 's/^# (skipped|todo) ([0-9]+)$/\2/p' "$log" | paste -sd+)
     bad=$(sed -nE 's/^# (fail|cancelled) ([0-9]+)$/\2/p' "$log" | paste -sd+)
     passed=$((passed + ${ok:-0}))
     failed=$((failed + ${bad:-1}))
+    skipped=$((skipped + ${left_out:-0}))
 }
 
-# Looks for the browser and for what drives it, which goes into a folder outside the repository; `missing`
-# tells what cannot be had.
+# Looks for the browser (CHROMIUM, if it is set) and for what drives it, which goes into a folder outside the
+# repository; `missing` tells what cannot be had.
 prepare_browser() {
-    export PLAYWRIGHT=${PLAYWRIGHT:-${XDG_CACHE_HOME:-$HOME/.cache}/surfel-playwright}
-    if ! command -v chromium >/dev/null && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+    export PLAYWRIGHT=${PLAYWRIGHT:-${XDG_CACHE_HOME:-${HOME:-/tmp}/.cache}/surfel-playwright}
+    export CHROMIUM=${CHROMIUM:-chromium}
+    if ! command -v "$CHROMIUM" >/dev/null && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
         apt-get update >"$log" 2>&1 && apt-get install -y --no-install-recommends chromium >"$log" 2>&1
     fi
-    missing="chromium is not installed"
-    CHROMIUM=$(command -v chromium) || return
-    export CHROMIUM
+    missing="$CHROMIUM is not installed"
+    CHROMIUM=$(command -v "$CHROMIUM") || return
     [ -d "$PLAYWRIGHT/node_modules/playwright-core" ] && return
+    missing="playwright-core is not in $PLAYWRIGHT, and npm is not installed"
+    command -v npm >/dev/null || return
     missing="npm cannot install playwright-core into $PLAYWRIGHT"
     npm install --silent --no-audit --no-fund --prefix "$PLAYWRIGHT" playwright-core >"$log" 2>&1
 }
@@ -89,7 +93,8 @@ check "formatting" cargo fmt --all --check
 check "lints" cargo clippy --workspace --all-targets -- -D warnings
 tests "tests" cargo test --workspace --lib --bins --tests --no-fail-fast -- --show-output
 tests "doc tests" cargo test --workspace --doc --no-fail-fast
-if node -e 'process.exit(parseInt(process.versions.node) < 20 ? 1 : 0)' 2>/dev/null; then
+# `import.meta.dirname` came with 20.11.
+if node -e 'const [a, b] = process.versions.node.split("."); process.exit(+a < 20 || (+a === 20 && +b < 11) ? 1 : 0)' 2>/dev/null; then
     page_tests "page" crates/surfel-web/page-tests/*.test.mjs
     if prepare_browser; then
         check "the program for the browser" cargo build -p surfel-cli
@@ -98,7 +103,7 @@ if node -e 'process.exit(parseInt(process.versions.node) < 20 ? 1 : 0)' 2>/dev/n
         skip "tests in a browser: $missing"
     fi
 else
-    skip "tests of the page and in a browser: node 20 or newer is not installed"
+    skip "tests of the page and in a browser: node 20.11 or newer is not installed"
 fi
 if cargo deny --version >/dev/null 2>&1; then
     check "licences and sources" cargo deny check bans licenses sources

@@ -11,7 +11,8 @@ use surfel_formats::{ImageOptions, SaveOptions, save, save_image};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
-    for target in ["ply", "xyz", "las", "bin", "environment", "obj", "stl", "mtl", "gltf", "scene"]
+    for target in
+        ["ply", "xyz", "las", "bin", "environment", "obj", "stl", "mtl", "gltf", "scene", "viewer"]
     {
         fs::create_dir_all(corpus.join(target))?;
     }
@@ -47,6 +48,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     fs::write(corpus.join("bin/three.bin"), [&record[..], &lost, &record].concat())?;
     write_gltf(&corpus.join("gltf"))?;
     write_scenes(&corpus.join("scene"))?;
+    write_conversations(&corpus.join("viewer"))?;
     pictures(&corpus.join("environment"))
 }
 
@@ -257,6 +259,48 @@ seconds = 4
     fs::write(folder.join("all.json"), format!("\t{json}"))?;
     for (i, table) in toml.split("\n[[").enumerate().skip(1) {
         fs::write(folder.join(format!("{i}.toml")), format!("\n[[{table}"))?;
+    }
+    Ok(())
+}
+
+/// Requests, and what pages say line by line, behind the byte that says which.
+fn write_conversations(folder: &Path) -> std::io::Result<()> {
+    let camera =
+        r#"{"position":[9,-2,3],"focal_point":[2,1,-1],"view_up":[0,0,1],"view_angle":40}"#;
+    let pages = [
+        r#"{"type":"camera","input":1,"camera":CAMERA,"moving":true}
+{"type":"seen","frame":1}
+{"type":"camera","input":2,"camera":CAMERA}
+{"type":"pick","id":1,"x":20.5,"y":15}"#,
+        r##"{"type":"set","input":1,"scene":{"surface":"disc","color":"elevation","cmap":"viridis","range":[0,2],"radius":"knn:6"}}
+{"type":"set","input":2,"scene":{"sun":{"azimuth":120,"elevation":30},"light":["sun","sky"],"exposure":0.5,"background":"#102030"}}
+{"type":"set","input":3,"scene":{"material":"a.ply=glass:ior=1.3","clip_box":"([0,5],[0,3],[-2,2])","clip_plane":[1,1,0,1,0,0]},"moving":true}
+{"type":"set","input":4,"scene":{"surface":null,"material":null,"clip_box":null,"time":0.5,"select":"random:5","spp":2}}"##,
+        r#"{"type":"size","width":64,"height":32}
+{"type":"save","id":1,"width":30,"height":20}
+{"type":"cancel","id":1}
+{"type":"take","id":2,"width":30,"height":20}
+{"type":"load","id":3,"name":"a.toml","text":"spp = 2\n[camera]\nposition = [1, 2, 3]\n[[object]]\nfile = \"a.ply\""}
+{"type":"load","id":4,"name":"a.json","text":"{\"surface\": \"sphere\", \"object\": []}"}"#,
+        r#"{"type":"set","input":1,"scene":{"camera":{"orthographic":9,"view_angle":null},"up":[0,1,0],"boundary":"off"}}
+{"type":"set","input":2,"scene":{"camera":{"panorama":true,"orthographic":null},"environment":"/etc/passwd"}}
+{"type":"hello","width":3,"height":2}"#,
+    ];
+    for (i, page) in pages.iter().enumerate() {
+        let page = page.replace("CAMERA", camera);
+        fs::write(folder.join(format!("page-{i}")), format!("\t{page}"))?;
+    }
+    let body = r#"{"camera":{"direction":[0,0,-1],"orthographic":true},"resolution":[20,10]}"#;
+    let requests = [
+        "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n".to_owned(),
+        "GET /scene HTTP/1.1\r\nHost: 127.0.0.1:80\r\n\r\nGET /stats HTTP/1.0\r\nHost: localhost\r\n\r\n".into(),
+        "GET /render?resolution=20x10&camera-azimuth-angle=30&light=sky HTTP/1.1\r\nHost: [::1]\r\nOrigin: http://[::1]\r\n\r\n".into(),
+        format!("POST /render HTTP/1.1\r\nHost: localhost\r\nContent-Length: {}\r\n\r\n{body}", body.len()),
+        format!("POST /render HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n{:x}\r\n{body}\r\n0\r\n\r\n", body.len()),
+        "GET /ws HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n\u{1}\u{3}abc".into(),
+    ];
+    for (i, request) in requests.iter().enumerate() {
+        fs::write(folder.join(format!("request-{i}")), format!("\n{request}"))?;
     }
     Ok(())
 }

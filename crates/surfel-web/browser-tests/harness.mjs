@@ -13,8 +13,10 @@ const TARGET = process.env.CARGO_TARGET_DIR ?? join(import.meta.dirname, '../../
 export const SURFEL = process.env.SURFEL ?? join(TARGET, 'debug/surfel');
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
 const PATIENCE_MS = 60_000;
-const FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run', '--disable-background-networking',
-  '--disable-component-update', '--disable-sync'];
+/** Leads to this machine, but is no secure context to the browser, as those of other machines are none. */
+export const PLAIN_HOST = 'surfel.test';
+const FLAGS = [`--host-resolver-rules=MAP ${PLAIN_HOST} 127.0.0.1`, '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+  '--disable-background-networking', '--disable-component-update', '--disable-sync'];
 
 /** Few rays a pixel, so that pictures end soon. */
 export const QUICK = ['--spp', '2', '--samples', '2'];
@@ -96,8 +98,8 @@ export const state = (page, key) => page.evaluate((name) => window.surfel.state[
 export async function settled(page) {
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
   await page.waitForFunction(() => {
-    const { isConnected, lastFrame, lastInput, size, connected } = window.surfel?.state ?? {};
-    return connected && lastFrame?.finished && lastFrame.input === lastInput && lastFrame.width === size.width && lastFrame.height === size.height;
+    const { lastFrame, lastInput, size, connected, agreed } = window.surfel?.state ?? {};
+    return connected && agreed && lastFrame?.finished && lastFrame.input === lastInput && lastFrame.width === size.width && lastFrame.height === size.height;
   }, undefined, { timeout: PATIENCE_MS });
 }
 

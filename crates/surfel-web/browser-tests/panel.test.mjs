@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
 import * as tables from '../page/controls.js';
 import { valueAt } from '../page/patch.js';
-import { closePage, finishedPixels, openPage, pixels, QUICK, serve, settled, state, unfoldPanel } from './harness.mjs';
+import { closePage, drag, finishedPixels, openPage, pixels, placeAt, QUICK, serve, settled, state, unfoldPanel } from './harness.mjs';
 
 const { surfaceControls, colorControls, sunControls, skyControls, pictureControls, clipControls, materialControls } = tables;
 const OBJECTS = ['house.obj', 'town.ply'];
@@ -211,6 +211,28 @@ test('what the server refuses is told, and taken back', async () => {
   await page.locator('.toast', { hasText: 'expected at most 1024' }).waitFor();
   await page.waitForFunction(() => window.surfel.state.scene.spp === 2);
   assert.equal(await pixels(page), first);
+});
+
+test('what comes after a refusal is answered as before', async () => {
+  const WAIT_MS = 2500;
+  const before = await state(page, 'scene');
+  await setters.slider('spp', 5000);
+  await page.locator('.toast', { hasText: 'expected at most 1024' }).waitFor();
+  await page.waitForFunction(() => window.surfel.state.scene.spp === 2);
+  assert.deepEqual(await state(page, 'scene'), before);
+  const { lastInput: refused, latencies_ms, lastFrame } = await page.evaluate(() => window.surfel.state);
+  assert.ok(lastFrame.input < refused, 'no picture obeys what was refused');
+  await page.waitForTimeout(WAIT_MS);
+  await setControl('sun.azimuth', 30);
+  await drag(page, await placeAt(page, 0.4, 0.5), await placeAt(page, 0.6, 0.5));
+  await settled(page);
+  const after = await page.evaluate(() => window.surfel.state);
+  assert.deepEqual([after.lastFrame.input, after.scene.spp, after.scene.sun.azimuth], [after.lastInput, 2, 30]);
+  // One for each input that was answered, none for the refusal that never was.
+  const answered = after.latencies_ms.slice(latencies_ms.length);
+  assert.ok(2 <= answered.length && answered.length <= after.lastInput - refused, `${answered}`);
+  assert.ok(answered.every((latency_ms) => 0 < latency_ms && latency_ms < WAIT_MS), `${answered}`);
+  await resetControl('sun.azimuth');
 });
 
 test('the legend tells the colours', async () => {

@@ -4,7 +4,10 @@ import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { closePage, data, finishedPixels, openPage, QUICK, serve, settled, shell, show, state } from './harness.mjs';
+import { pointAtDepth, project } from '../page/camera.js';
+import {
+  closePage, colorCount, data, drag, finishedPixels, openPage, PLAIN_HOST, placeAt, QUICK, serve, settled, shell, show, state,
+} from './harness.mjs';
 
 let still;
 let moving;
@@ -113,6 +116,34 @@ for (const [pageOf, name, patch] of pages) {
   });
 }
 
+test('a panorama turns about its place, and what is taken of it shows the same', async () => {
+  const place = '562334,4183203,152';
+  const server = await serve(['town.ply', 'house.obj'], ...QUICK, '--camera-panorama', '--camera-position', place);
+  const page = await openPage(server.link, { viewport: { width: 900, height: 340 } });
+  assert.ok(await colorCount(page) > 100);
+  const [first, opening, size] = [await finishedPixels(page), await state(page, 'camera'), await state(page, 'size')];
+  assert.deepEqual([opening.panorama, opening.position], [true, place.split(',').map(Number)]);
+  const [from, to] = [await placeAt(page, 0.4, 0.6), await placeAt(page, 0.7, 0.6)];
+  await drag(page, from, to);
+  assert.notEqual(await finishedPixels(page), first);
+  const turned = await state(page, 'camera');
+  assert.deepEqual([turned.panorama, turned.position, turned.view_up], [true, opening.position, opening.view_up]);
+  // What was under the pointer went along.
+  const stage = await page.locator('#stage').boundingBox();
+  const end = project(turned, size, pointAtDepth(opening, size, from.x - stage.x, from.y - stage.y, 5));
+  assert.ok(Math.hypot(end.x - (to.x - stage.x), end.y - (to.y - stage.y)) < 1, JSON.stringify(end));
+  const picture = await saved(page);
+  const texts = await taken(page);
+  for (const [form, bytes] of rendered(texts)) assert.ok(picture.equals(bytes), `${form}\n${texts.command}`);
+  await page.locator('#sections summary', { hasText: 'View' }).click();
+  const projection = page.locator('[data-key="camera.projection"]');
+  assert.equal(await projection.inputValue(), 'panorama');
+  await projection.selectOption('perspective');
+  await settled(page);
+  assert.equal((await state(page, 'camera')).panorama, undefined);
+  await closePage(page);
+});
+
 test('a saved picture has the size that was asked for', async () => {
   await still.locator('[data-action="save"]').click();
   await still.locator('[name="width"]').fill('123');
@@ -151,6 +182,53 @@ test('texts are copied and downloaded', async () => {
   await still.locator('#take-close').click();
 });
 
+/** Opens the dialog at the form of this name, and tells what it shows. */
+async function openForm(page, form) {
+  await page.locator('[data-action="take"]').click();
+  await page.locator('[data-form="command"]').click();
+  await page.waitForFunction(() => document.getElementById('take-text').value.startsWith('surfel'));
+  await page.locator(`[data-form="${form}"]`).click();
+  return page.locator('#take-text').inputValue();
+}
+
+test('texts are copied over plain HTTP from another machine, too', async () => {
+  const { link } = await serve(['town.ply'], ...QUICK, '--host', '0.0.0.0');
+  const page = await openPage(link.replace(/\/\/[^:]+/, `//${PLAIN_HOST}`));
+  assert.equal(await page.evaluate(() => navigator.clipboard), undefined);
+  for (const form of ['command', 'toml', 'json', 'link']) {
+    await page.bringToFront();
+    const text = await openForm(page, form);
+    await page.locator('#take-copy').click();
+    await page.locator('#take-copy.is-done').waitFor();
+    await page.locator('#take-copy:not(.is-done)').waitFor();
+    await page.locator('#take-close').click();
+    await still.bringToFront();
+    assert.equal(await still.evaluate(() => navigator.clipboard.readText()), text, form);
+  }
+  await closePage(page);
+});
+
+test('where nothing may be copied, the text is selected', async () => {
+  const page = await openPage(still.url());
+  await page.evaluate(() => {
+    navigator.clipboard.writeText = () => Promise.reject(new Error('not allowed'));
+    document.execCommand = () => false;
+  });
+  const text = await openForm(page, 'json');
+  await page.locator('#take-copy').click();
+  await page.locator('.toast', { hasText: 'Ctrl + C' }).waitFor();
+  assert.equal(await page.evaluate(() => getSelection().toString()), text);
+  assert.equal(await page.locator('#take-copy.is-done').count(), 0);
+  const [dialog, toast] = [await page.locator('#take-dialog').boundingBox(), await page.locator('.toast').boundingBox()];
+  // Where both are, without the dialog's round corners.
+  const [x, y] = [Math.max(dialog.x, toast.x) + 20, toast.y + 5];
+  const clip = { x, y, width: toast.x + toast.width - 20 - x, height: Math.min(dialog.y + dialog.height, toast.y + toast.height) - 20 - y };
+  const over = await page.screenshot({ clip });
+  await page.locator('.toast').evaluate((shown) => { shown.hidden = true; });
+  assert.ok(!over.equals(await page.screenshot({ clip })), 'what is told lies over the dialog');
+  await closePage(page);
+});
+
 /** Numbers of a TOML file come back with a point. */
 const withoutZeros = (text) => text.replaceAll(/(\d)\.0\b/g, '$1');
 
@@ -184,4 +262,46 @@ test('a scene file of other things is refused', async () => {
     await still.locator('.toast', { hasText: told }).first().waitFor();
   }
   assert.equal(await finishedPixels(still), screen);
+});
+
+/** Drags a file over the page and lets it fall, as far as the page can tell. */
+async function drop(page, name, text) {
+  const files = await page.evaluateHandle(([called, content]) => {
+    const transfer = new DataTransfer();
+    transfer.items.add(new File([content], called));
+    return transfer;
+  }, [name, text]);
+  await page.dispatchEvent('#stage', 'dragover', { dataTransfer: files });
+  await page.locator('body.is-dropping').waitFor();
+  await page.dispatchEvent('#stage', 'drop', { dataTransfer: files });
+  await page.locator('body:not(.is-dropping)').waitFor();
+}
+
+test('a scene file dropped on the page is shown', async () => {
+  await show(still, VIEWS['a clip plane']);
+  const [screen, { toml }] = [await finishedPixels(still), await taken(still)];
+  await show(still, {});
+  const { frame } = await state(still, 'lastFrame');
+  assert.notEqual(await finishedPixels(still), screen);
+  await drop(still, 'view.toml', toml);
+  await still.waitForFunction((before) => before < window.surfel.state.lastFrame.frame, frame);
+  await still.waitForFunction(() => window.surfel.state.lastFrame.finished);
+  assert.equal(await finishedPixels(still), screen);
+  assert.equal((await state(still, 'scene')).radius_scale, 1.5);
+});
+
+test('what is dropped and is no scene file is told of', async () => {
+  const screen = await finishedPixels(still);
+  for (const [name, text, told] of [
+    ['notes.txt', 'spp = 3', 'notes.txt is no scene file'],
+    ['wrong.toml', 'spp = "many"', 'many'],
+    ['lidar.json', JSON.stringify({ points: Array(100_000).fill(1.5) }), 'lidar.json is too large'],
+    // Each line break is two letters on its way.
+    ['lines.toml', '\n'.repeat(200_000), 'lines.toml is too large'],
+  ]) {
+    await drop(still, name, text);
+    await still.locator('.toast', { hasText: told }).waitFor();
+  }
+  assert.equal(await finishedPixels(still), screen);
+  assert.ok(await still.locator('#banner').isHidden(), 'the connection holds');
 });

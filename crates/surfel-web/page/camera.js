@@ -114,6 +114,12 @@ export function orbit(camera, pivot, up, turn_rad, tilt_rad) {
   return { ...moved, view_up: isSteep ? pictureUp : up };
 }
 
+/** A panorama turned about its own up, to the left. */
+export function lookAround(camera, turn_rad) {
+  const offset = rotate(subtract(camera.focal_point, camera.position), axesOf(camera).up, turn_rad);
+  return { ...camera, focal_point: add(camera.position, offset) };
+}
+
 /** Free turning about `pivot`, about the picture's own axes. */
 export function trackball(camera, pivot, turn_rad, tilt_rad) {
   const from = axesOf(camera);

@@ -42,42 +42,41 @@ function handleOf(plane, bounds) {
   return addScaled(mix(bounds.min, bounds.max, 0.5), plane.normal, clip.positionOf(plane, bounds));
 }
 
-/** What dragging the handle under the pointer does, or null where none is. */
-export function grabHandle(viewer, event) {
+/** What dragging the handle under the pointer does, from this place of the picture, or null where none is. */
+export function grabHandle(viewer, event, place) {
   const handle = event.target.closest('[data-handle]')?.dataset.handle;
   if (!handle) return null;
   const [kind, axis, end] = handle.split(' ');
-  return kind === 'plane' ? dragPlane(viewer) : dragFace(viewer, Number(axis), end);
+  return kind === 'plane' ? dragPlane(viewer, place) : dragFace(viewer, place, Number(axis), end);
 }
 
-function dragFace(viewer, axis, end) {
+function dragFace(viewer, place, axis, end) {
   const start = clip.parseBox(viewer.scene.clip_box);
   const { middle } = clip.facesOf(start).find((face) => face.axis === axis && face.end === end);
   const direction = [0, 1, 2].map((i) => (i === axis ? 1 : 0));
-  return dragAlong(viewer, middle, direction, (way) => {
+  return dragAlong(viewer, place, middle, direction, (way) => {
     const box = clip.withFace(start, { axis, end }, middle[axis] + way);
     return { clip_box: clip.formatBox(box) };
   });
 }
 
-function dragPlane(viewer) {
+function dragPlane(viewer, place) {
   const start = clip.parsePlane(viewer.scene.clip_plane);
   const { bounds } = viewer.info;
-  return dragAlong(viewer, handleOf(start, bounds), start.normal, (way) => {
+  return dragAlong(viewer, place, handleOf(start, bounds), start.normal, (way) => {
     const position = clip.positionOf(start, bounds) + way;
     return { clip_plane: clip.formatPlane(clip.planeAt(start, bounds, position)) };
   });
 }
 
-/** Sends `patchFor(way)` while the pointer is taken along a line through `point`. */
-function dragAlong(viewer, point, direction, patchFor) {
-  let grabbed = null;
+/** Sends `patchFor(way)` while the pointer is taken from `place` along a line through `point`. */
+function dragAlong(viewer, place, point, direction, patchFor) {
+  const wayTo = ({ x, y }) => clip.nearestAlong(point, direction, rayThrough(viewer.camera, viewer.size, x, y));
+  const grabbed = wayTo(place);
   let patch = null;
   return {
-    move({ x, y }) {
-      const way = clip.nearestAlong(point, direction, rayThrough(viewer.camera, viewer.size, x, y));
-      grabbed ??= way;
-      patch = patchFor(way - grabbed);
+    move(to) {
+      patch = patchFor(wayTo(to) - grabbed);
       viewer.set(patch, true);
     },
     end() {

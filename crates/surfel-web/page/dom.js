@@ -1,4 +1,4 @@
-// Elements, icons, copying and downloading: what the page does with the browser in many places.
+// Elements, icons and downloading: what the page does with the browser in many places.
 
 const SVG = 'http://www.w3.org/2000/svg';
 
@@ -28,31 +28,6 @@ export function icon(name) {
 export function iconButton(name, label, onclick, attributes = {}) {
   return element('button', { type: 'button', class: 'icon-button', title: label, 'aria-label': label, onclick, ...attributes },
     icon(name));
-}
-
-/** Copies `text`, and shows on `button` that it did. */
-export async function copyText(text, button) {
-  if (window.isSecureContext) await navigator.clipboard.writeText(text);
-  else copyBySelection(text, button);
-  button.classList.add('is-done');
-  setTimeout(() => button.classList.remove('is-done'), 1200);
-}
-
-/** The clipboard is closed to pages that come over plain HTTP from another machine. */
-function copyBySelection(text, button) {
-  const area = element('textarea', { class: 'visually-hidden' });
-  area.value = text;
-  // Beside the button, as an open dialog takes the focus from all that is outside.
-  button.after(area);
-  area.select();
-  document.execCommand('copy');
-  area.remove();
-  button.focus();
-}
-
-export function copyButton(label, text) {
-  const button = iconButton('copy', label, () => copyText(text(), button));
-  return button;
 }
 
 export function download(blob, name) {

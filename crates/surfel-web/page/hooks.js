@@ -10,6 +10,7 @@ export function exposeState(viewer) {
     get size() { return copy(viewer.size); },
     get tool() { return viewer.tool; },
     get lastInput() { return viewer.lastInput; },
+    get agreed() { return viewer.isAgreed; },
     get lastFrame() { return copy(viewer.lastFrame); },
     /** From each input to the first picture that obeys it. */
     get latencies_ms() { return [...viewer.latencies_ms]; },

@@ -50,7 +50,7 @@ fillPanel();
 fillHelp();
 
 followPointer(stage, viewer, navigation, {
-  grab: (event) => grabHandle(viewer, event),
+  grab: (event, place) => grabHandle(viewer, event, place),
   hover: (place) => measureTool.hover(inCssPixels(place)),
   async click(place, event) {
     const { tool } = viewer;

@@ -1,6 +1,7 @@
 // Measuring on the picture: points are clicked, figures drawn, results listed.
 
-import { copyButton, element, iconButton } from './dom.js';
+import { copyButton } from './copy.js';
+import { element, iconButton } from './dom.js';
 import { rounded } from './format.js';
 import { corner, middle, resultsOf } from './measure.js';
 import { mix } from './vector.js';

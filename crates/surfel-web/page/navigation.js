@@ -28,17 +28,24 @@ export class Navigation {
 
   /** By so many pixels of a picture of the viewer's size. */
   orbit(across, along) {
+    const { camera } = this;
+    if (camera.panorama) {
+      this.#lookAround(across);
+      return;
+    }
     const perPixel = RADIANS_PER_HEIGHT / this.viewer.size.height;
     const [turn, tilt] = [-across * perPixel, -along * perPixel];
-    const { camera } = this;
-    // A panorama looks around from where it is.
-    if (camera.panorama) {
-      this.#move(cameras.orbit(camera, camera.position, this.up, turn, tilt));
-    } else if (this.isTrackball) {
+    if (this.isTrackball) {
       this.#move(cameras.trackball(camera, camera.focal_point, turn, tilt));
     } else {
       this.#move(cameras.orbit(camera, camera.focal_point, this.up, turn, tilt));
     }
+  }
+
+  /** A panorama stays where it is: what is under the pointer goes along. Up and down it shows everything. */
+  #lookAround(across) {
+    const turn = (2 * Math.PI * across) / this.viewer.size.width;
+    this.#move(cameras.lookAround(this.camera, turn));
   }
 
   pan(from, to) {

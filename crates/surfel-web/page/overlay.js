@@ -6,6 +6,8 @@ import { mix } from './vector.js';
 
 /** Share of a line's depth at which it is cut off before the camera. */
 const NEAR = 1e-3;
+/** Straight lines are bent in a panorama, which draws so many pieces of each. */
+const BENT_PIECES = 32;
 const LABEL_LINE = 16;
 const LABEL_GAP = 10;
 
@@ -44,24 +46,36 @@ export class Overlay {
 function viewOf(camera, size) {
   const place = (point) => project(camera, size, point);
 
-  const line = (a, b, className) => {
+  const lineBetween = (from, to, className) => svg('line', { class: className, x1: from.x, y1: from.y, x2: to.x, y2: to.y });
+
+  const straight = (a, b, className) => {
     const [depthA, depthB] = [depthOf(camera, a), depthOf(camera, b)];
     const near = NEAR * Math.max(depthA, depthB);
     if (!(0 < near)) return [];
     const cut = () => mix(a, b, (near - depthA) / (depthB - depthA));
     const [from, to] = [place(depthA < near ? cut() : a), place(depthB < near ? cut() : b)];
-    return from && to ? [svg('line', { class: className, x1: from.x, y1: from.y, x2: to.x, y2: to.y })] : [];
+    return from && to ? [lineBetween(from, to, className)] : [];
   };
+
+  /** What leaves a panorama at one side comes back at the other. */
+  const bent = (a, b, className) => {
+    const places = Array.from({ length: BENT_PIECES + 1 }, (_, i) => place(mix(a, b, i / BENT_PIECES)));
+    const isSeen = ([from, to]) => from && to && Math.abs(from.x - to.x) < size.width / 2;
+    const pieces = places.slice(1).map((to, i) => [places[i], to]).filter(isSeen);
+    return pieces.map(([from, to]) => lineBetween(from, to, className));
+  };
+
+  const line = camera.panorama ? bent : straight;
 
   const path = (points, className, isClosed) => points.flatMap((point, i) => {
     const next = points[i + 1] ?? (isClosed ? points[0] : null);
     return next ? line(point, next, className) : [];
   });
 
-  /** A filled polygon; left out where part of it is behind the camera. */
+  /** A filled polygon; left out where part of it is behind the camera, and where its sides are bent. */
   const polygon = (points, className) => {
     const places = points.map(place);
-    if (places.length < 3 || places.some((one) => one === null)) return [];
+    if (camera.panorama || places.length < 3 || places.some((one) => one === null)) return [];
     return [svg('polygon', { class: className, points: places.map(({ x, y }) => `${x},${y}`).join(' ') })];
   };
 
@@ -83,8 +97,7 @@ function viewOf(camera, size) {
     return [svg('g', { class: 'label' }, frame, ...texts)];
   };
 
-  const rubber = (from, to) =>
-    svg('line', { class: 'measure-rubber', x1: from.x, y1: from.y, x2: to.x, y2: to.y });
+  const rubber = (from, to) => lineBetween(from, to, 'measure-rubber');
 
   return { camera, size, place, line, path, polygon, dot, label, rubber };
 }

@@ -1,6 +1,7 @@
 // The card that tells what is at a place in the picture, every value to be copied.
 
-import { copyButton, element, iconButton } from './dom.js';
+import { copyButton } from './copy.js';
+import { element, iconButton } from './dom.js';
 import { exact } from './format.js';
 
 const AXES = ['x', 'y', 'z'];

@@ -8,7 +8,7 @@ const LINE_PIXELS = 16;
 
 /**
  * `act` has `click(place, event)`, `doubleClick(place)` and `hover(place)`, places in pixels of the picture;
- * `grab(event)` may take a drag for itself by returning `{ move(place), end() }`.
+ * `grab(event, place)` may take a drag for itself by returning `{ move(place), end() }`.
  */
 export function followPointer(stage, viewer, navigation, act) {
   const pointers = new Map();
@@ -34,7 +34,7 @@ export function followPointer(stage, viewer, navigation, act) {
     pointers.set(event.pointerId, placeOf(event));
     if (pointers.size === 1) {
       const isPan = event.button === 1 || event.button === 2 || (event.button === 0 && event.shiftKey);
-      const taken = event.button === 0 ? act.grab(event) : null;
+      const taken = event.button === 0 ? act.grab(event, placeOf(event)) : null;
       drag = { isPan, taken, start: event, isClick: !taken, last: placeOf(event) };
     } else if (drag) {
       drag.isClick = false;

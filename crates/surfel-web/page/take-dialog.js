@@ -1,6 +1,7 @@
 // Taking the view away: the command line, the scene file, a link; and loading scene files.
 
-import { copyText, download, element } from './dom.js';
+import { copyText } from './copy.js';
+import { download, element } from './dom.js';
 import { hashOf, patchOfHash, viewPatch } from './link.js';
 import { stemOf } from './save-dialog.js';
 import { showToast } from './toast.js';
@@ -34,7 +35,9 @@ export function prepareTakeDialog(viewer) {
       show();
     },
   }, label)));
-  document.getElementById('take-copy').addEventListener('click', ({ currentTarget }) => copyText(text.value, currentTarget));
+  document.getElementById('take-copy').addEventListener('click', async ({ currentTarget }) => {
+    if (!(await copyText(text.value, currentTarget))) text.select();
+  });
   save.addEventListener('click', () => download(new Blob([text.value]), `${stemOf(viewer.info.name)}.${form}`));
   document.getElementById('take-close').addEventListener('click', () => dialog.close());
 
@@ -55,7 +58,7 @@ export function prepareTakeDialog(viewer) {
 export function followLoading(viewer) {
   const load = async (file) => {
     if (!/\.(toml|json)$/i.test(file.name)) showToast(`${file.name} is no scene file: .toml or .json`);
-    else viewer.load(file.name, await file.text());
+    else await viewer.load(file);
   };
   const input = document.getElementById('scene-file');
   input.addEventListener('change', () => {

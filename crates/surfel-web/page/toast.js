@@ -10,6 +10,9 @@ export function showToast(text) {
   [...toasts.children].find((shown) => shown.textContent === text)?.remove();
   const toast = element('div', { class: 'toast' }, text);
   toasts.append(toast);
+  // What was opened last lies on top: over dialogs, too.
+  toasts.hidePopover?.();
+  toasts.showPopover?.();
   setTimeout(() => toast.remove(), SHOWN_MS);
 }
 

@@ -10,7 +10,8 @@ export function viewRows(viewer, navigation) {
   const projection = fieldRow(viewer, {
     key: 'camera.projection', label: 'Projection', kind: 'select', title: 'O, P\ncamera.orthographic, camera.view_angle',
     options: () => ['perspective', 'orthographic'],
-    read: (camera) => (isOrthographic(camera) ? 'orthographic' : 'perspective'),
+    // No other projection leads to a panorama: it is offered only where it is.
+    read: (camera) => (camera.panorama ? 'panorama' : isOrthographic(camera) ? 'orthographic' : 'perspective'),
     write: (value) => navigation.setOrthographic(value === 'orthographic'),
   });
   const angle = fieldRow(viewer, {

@@ -43,6 +43,9 @@ export class Viewer {
   /** As the server last told it, and the patches that it did not yet know of. */
   #toldScene = null;
   #patchesUnderway = [];
+  /** The last picture that came, and the last before the scene was told. */
+  #frame = 0;
+  #frameBeforeScene = 0;
   #camerasByInput = new Map();
   #sentAt = new Map();
   #questions = new Map();
@@ -72,6 +75,11 @@ export class Viewer {
   /** Whether the camera goes where the scene moves it. */
   get isLed() {
     return Boolean(this.info?.camera_moves) && !this.camera?.still;
+  }
+
+  /** Whether the picture on the screen is of all settings that were changed here, but for those refused. */
+  get isAgreed() {
+    return !this.#duePatch && this.#patchesUnderway.length === 0 && this.#frameBeforeScene < this.lastFrame?.frame;
   }
 
   /** The scene with the camera that the hand holds. */
@@ -126,10 +134,18 @@ export class Viewer {
     this.toolChanged();
   }
 
-  load(name, text) {
-    this.#takesNextCamera = true;
-    this.#patchesUnderway = [];
-    this.#connection.send({ type: 'load', id: ++this.#question, name, text });
+  /** Shows what a scene file tells, or says why not. */
+  async load(file) {
+    const most = this.info?.limits.max_message_bytes;
+    // A film dropped by mistake is not even read.
+    const text = most < file.size ? null : await file.text();
+    const message = { type: 'load', id: ++this.#question, name: file.name, text };
+    if (text === null || most < byteLength(message)) this.refused(`${file.name} is too large for a scene file`);
+    else if (!this.#connection.send(message)) this.refused(`${file.name}: there is no connection`);
+    else {
+      this.#takesNextCamera = true;
+      this.#patchesUnderway = [];
+    }
   }
 
   /** What the server answers; `abort` (an AbortSignal) cancels, `progress` hears how far it is. */
@@ -219,6 +235,7 @@ export class Viewer {
     this.info = info;
     this.opening = scene;
     this.#toldScene = mergePatch(scene, this.#helloPatch);
+    [this.#frame, this.#frameBeforeScene] = [0, 0];
     this.#patchesUnderway = [];
     this.#mergeUnderway();
     // Where a camera is that the scene moves comes with the first scene.
@@ -235,6 +252,7 @@ export class Viewer {
   #receiveScene({ scene, camera, legend, input = this.#input }) {
     this.legend = legend;
     this.#toldScene = scene;
+    this.#frameBeforeScene = this.#frame;
     this.#patchesUnderway = this.#patchesUnderway.filter((underway) => input < underway.input);
     this.#mergeUnderway();
     const isAtRest = !this.#dueCamera && !this.#isMoving && this.#lastCameraInput <= input;
@@ -254,8 +272,12 @@ export class Viewer {
   }
 
   #receivePicture(header, blob) {
-    if (header.kind === SAVED_PICTURE) this.#answer({ id: header.frame, blob });
-    else this.pictureCame(header, blob);
+    if (header.kind === SAVED_PICTURE) {
+      this.#answer({ id: header.frame, blob });
+      return;
+    }
+    this.#frame = header.frame;
+    this.pictureCame(header, blob);
   }
 
   #receiveError({ id, input, text }) {
@@ -289,4 +311,9 @@ export class Viewer {
 
 function forgetBefore(byInput, input) {
   for (const key of byInput.keys()) if (key < input) byInput.delete(key);
+}
+
+/** Of a message as it is sent. */
+function byteLength(message) {
+  return new TextEncoder().encode(JSON.stringify(message)).length;
 }

@@ -95,6 +95,11 @@ impl Client {
         self.version.fetch_add(1, Ordering::Relaxed);
     }
 
+    /// Says whether a hand is still at the mouse, where nothing else has changed.
+    pub fn rest(&self, is_moving: bool) {
+        lock(&self.sight).is_moving = is_moving;
+    }
+
     pub fn sight(&self) -> Sight {
         lock(&self.sight).clone()
     }

@@ -93,6 +93,7 @@ impl Staging {
             Err(Error::Cancelled) => self.wishes.put_back(wish),
             Err(error) => {
                 answer(&self.out, &refusal(None, Some(wish.input), &error.to_string())).await;
+                self.client.rest(wish.is_moving);
                 // A page whose own settings are wrong still sees what it was opened for.
                 if self.client.sight().stage.is_none() && !wish.patch.is_empty() {
                     let _ = self.wishes.add(Wish::default());
@@ -122,6 +123,8 @@ impl Staging {
             "camera": place,
             "legend": stage.legend,
         });
+        // Before its first picture, whose settings the page then knows.
+        answer(&self.out, &message).await;
         let is_led = stage.moved_camera.is_some() || wish.patch.contains_key("camera");
         let camera = camera::parse(place).ok();
         let stage = Arc::new(stage);
@@ -136,7 +139,6 @@ impl Staging {
             sight.is_moving = wish.is_moving;
         });
         self.hall.easel.call();
-        answer(&self.out, &message).await;
     }
 
     /// Tells the page of long work, which ends for newer wishes or when nobody waits for it any more.

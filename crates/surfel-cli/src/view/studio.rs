@@ -24,7 +24,7 @@ use surfel::scene::color::choose;
 use surfel::scene::{Graph, Material, usual_bounds};
 use surfel::surface::SurfaceKind;
 use surfel::trace::Simd;
-use surfel_web::limits::{MOST_PIXELS, MOST_SAVED_PIXELS};
+use surfel_web::limits::{MOST_BYTES, MOST_PIXELS, MOST_SAVED_PIXELS};
 use surfel_web::{Keys, Place, Result, Stage, Studio, Written};
 
 pub struct ScanStudio {
@@ -219,7 +219,11 @@ impl Studio for ScanStudio {
             "threads": rayon::current_num_threads(),
             "simd": self.renderer.simd.name(),
             "coordinate_system": self.base.source().coordinate_system,
-            "limits": { "max_pixels": MOST_PIXELS, "max_save_pixels": MOST_SAVED_PIXELS },
+            "limits": {
+                "max_pixels": MOST_PIXELS,
+                "max_save_pixels": MOST_SAVED_PIXELS,
+                "max_message_bytes": MOST_BYTES,
+            },
         })
     }
 

@@ -82,6 +82,67 @@ async fn who_has_not_seen_gets_two_pictures_and_then_the_newest() {
     assert_eq!(page.picture().await.input, 20);
 }
 
+/// How long after a picture has come a page far away says that it has seen it.
+const LATE: Duration = Duration::from_millis(200);
+
+/// A page far away: each picture that has come, and when it is said to be seen.
+struct Slow {
+    page: Page,
+    pictures: Vec<(Picture, Instant)>,
+    /// For each picture said to be seen, the input that had been sent by then.
+    seen: Vec<u32>,
+}
+
+impl Slow {
+    /// Takes what comes within `time`, and says what is due; `input` is the last that was sent.
+    async fn listen(&mut self, time: Duration, input: u32) {
+        let came = pictures(self.page.all_within(time).await);
+        let now = Instant::now();
+        self.pictures.extend(came.into_iter().map(|picture| (picture, now + LATE)));
+        while let Some((picture, due)) = self.pictures.get(self.seen.len())
+            && *due <= now
+        {
+            self.page.has_seen(picture).await;
+            self.seen.push(input);
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_slow_reader_gets_fewer_pictures_and_the_newest_while_another_gets_all() {
+    let viewer = Viewer::start();
+    let mut quick = Page::open(&viewer, json!({})).await;
+    quick.finished().await;
+    let mut page = Page::open(&viewer, json!({})).await;
+    page.finished().await;
+    let mut slow = Slow { page, pictures: Vec::new(), seen: Vec::new() };
+    let n_inputs = 40;
+    let start = Instant::now();
+    for input in 1..=n_inputs {
+        let (angle, is_moving) = (f64::from(input) / 10.0, input < n_inputs);
+        slow.page.turn(input, angle, is_moving).await;
+        quick.turn(input, angle, is_moving).await;
+        quick.picture_that(|picture| picture.input == input).await;
+        slow.listen(Duration::from_millis(20), input).await;
+    }
+    // Two at first, and one for each that is said to be seen.
+    let n_drafts = slow.pictures.len();
+    let most = 2.0 * (start.elapsed().as_secs_f64() / LATE.as_secs_f64() + 2.0);
+    assert!(2 < n_drafts && (n_drafts as f64) < most, "{n_drafts} pictures, at most {most}");
+    let is_last = |(picture, _): &(Picture, Instant)| picture.is_finished;
+    let still = Instant::now();
+    while !slow.pictures.last().is_some_and(is_last) {
+        assert!(still.elapsed() < Duration::from_secs(60), "no finished picture");
+        slow.listen(Duration::from_millis(20), n_inputs).await;
+    }
+    let inputs: Vec<u32> = slow.pictures.iter().map(|(picture, _)| picture.input).collect();
+    assert!(inputs.is_sorted() && inputs.last() == Some(&n_inputs), "{inputs:?}");
+    // Two may be on their way: each of the others was made room for by the one before the last.
+    for (i, (later, seen)) in inputs[2..].iter().zip(&slow.seen).enumerate() {
+        assert!(seen <= later, "picture {}: {inputs:?}, seen at {:?}", i + 2, slow.seen);
+    }
+}
+
 #[tokio::test]
 async fn pages_have_cameras_of_their_own() {
     let viewer = Viewer::start();

@@ -1,6 +1,6 @@
 //! What page and server say to each other.
 
-use crate::page::{Page, SAVED};
+use crate::page::{Page, SAVED, Told};
 use crate::viewer::Viewer;
 use serde_json::{Value, json};
 
@@ -14,6 +14,31 @@ async fn a_page_is_welcomed_and_told_the_scene() {
     assert_eq!((&scene["input"], &scene["scene"]["tint"]), (&json!(0), &json!(3)));
     let stats = page.told("stats").await;
     assert_eq!(stats["frame"], 1);
+}
+
+#[tokio::test]
+async fn settings_are_told_before_their_first_picture() {
+    let viewer = Viewer::start();
+    let mut page = Page::open(&viewer, json!({})).await;
+    for input in 1..=20 {
+        page.set(input, json!({ "tint": input })).await;
+        let mut told = 0;
+        loop {
+            match page.next().await.expect("the server has gone") {
+                Told::Message(message) if message["type"] == "scene" => {
+                    told = message["input"].as_u64().unwrap()
+                }
+                Told::Message(_) => {}
+                Told::Picture(picture) => {
+                    page.has_seen(&picture).await;
+                    if picture.input == input {
+                        assert_eq!(told, u64::from(input));
+                        break;
+                    }
+                }
+            }
+        }
+    }
 }
 
 #[tokio::test]
