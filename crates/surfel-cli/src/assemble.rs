@@ -5,7 +5,7 @@ use crate::cloud::{dress, graph_of, into_cloud, load, prepare_points};
 use crate::light;
 use crate::report::Report;
 use crate::scene_file::{CameraMotion, Line, Motion, Object, is_scene_file};
-use crate::sequence::{Sequence, is_read_in_turn};
+use crate::sequence::{Sequence, Slots, counts, is_read_in_turn};
 use anyhow::Context;
 use std::borrow::Cow;
 use std::iter::successors;
@@ -226,7 +226,7 @@ impl<'a> Assembly<'a> {
         Ok(())
     }
 
-    /// Puts the first file of a sequence of clouds under an object's node; the others come in its place.
+    /// Puts the first file of a sequence under an object's node; the others come in its place.
     fn add_sequence(
         &mut self,
         node: usize,
@@ -238,9 +238,10 @@ impl<'a> Assembly<'a> {
         let (graph, source) = load(first, &args, report)?;
         self.sources.push(source);
         let above = self.graph.add(Node { parent: Some(node), ..Node::new(file_name(first)) });
+        let before = counts(&self.graph);
         self.append_below(above, graph, self.object_args.len() - 1);
-        let geometry = self.graph.geometries.len() - 1;
-        self.sequences.push(Sequence::new(&object.files, object.fps, args, geometry));
+        let slots = Slots::behind(before, &self.graph);
+        self.sequences.push(Sequence::new(&object.files, object.fps, args, slots));
         Ok(())
     }
 
@@ -376,11 +377,11 @@ impl<'a> Assembly<'a> {
             Ok((line.for_object(&object.name, &object.options)?, *object_idx))
         };
         let sequence = |sequence: &Sequence| {
-            let object_args = self.args_of[sequence.geometry];
+            let object_args = self.args_of[sequence.slots.geometries[0]];
             let object_idx = object_args.map_or(0, |i| self.object_args[i].1);
             let object = &line.scene.objects[object_idx];
             let args = line.for_object(&object.name, &object.options)?;
-            Ok(Sequence::new(&object.files, object.fps, args, sequence.geometry))
+            Ok(Sequence::new(&object.files, object.fps, args, sequence.slots.clone()))
         };
         Ok(Assembly {
             graph: without_points(&self.graph),
@@ -400,7 +401,7 @@ impl<'a> Assembly<'a> {
     fn clip(&mut self) -> anyhow::Result<()> {
         let places = self.graph.world_from_geometries();
         for sequence in &mut self.sequences {
-            sequence.world_from_points = places[sequence.geometry];
+            sequence.world_from_file = places[sequence.slots.geometries[0]];
         }
         let args = self.args_of.iter().map(|object_args| self.args(*object_args).0);
         let clips: Vec<Clip> = args.map(|args| args.clip.clip()).collect();
@@ -409,7 +410,7 @@ impl<'a> Assembly<'a> {
     }
 
     fn give_materials(&mut self) -> anyhow::Result<()> {
-        let Self { graph, files, args, objects, .. } = self;
+        let Self { graph, files, args, objects, sequences, .. } = self;
         let of_files = files
             .iter()
             .map(|(file, nodes)| (nodes, args.material.of(file).map(|choice| &choice.material)));
@@ -425,13 +426,20 @@ impl<'a> Assembly<'a> {
             }
         }
         let has_lamps = graph.nodes.iter().any(|node| node.lamp.is_some());
-        let is_dark = args.light.has(LightKind::None) && args.light.environment.is_none();
-        if is_dark && !has_lamps {
-            let black = graph.materials.iter_mut().filter(|material| needs_light(material));
-            black.for_each(|material| material.is_unlit = true);
+        let is_lit = !args.light.has(LightKind::None) || args.light.environment.is_some();
+        let is_dark = !is_lit && !has_lamps;
+        if is_dark {
+            shine_in_the_dark(&mut graph.materials);
         }
+        sequences.iter_mut().for_each(|sequence| sequence.settle(graph, is_dark));
         Ok(())
     }
+}
+
+/// Lets what would be black without light show its colours as they are.
+pub fn shine_in_the_dark(materials: &mut [Material]) {
+    let black = materials.iter_mut().filter(|material| needs_light(material));
+    black.for_each(|material| material.is_unlit = true);
 }
 
 /// Hides a part of each geometry, as `Graph::clip` does, but not everything.

@@ -144,10 +144,11 @@ fn forget_what_comes_later(
 ) -> anyhow::Result<()> {
     for object in line.scene.objects.iter().filter(|object| 1 < object.files.len()) {
         if is_read_in_turn(object, &line.for_object(&object.name, &object.options)?)? {
-            let n_points = |file: &&PathBuf| {
-                sources.get(file.as_path()).map_or(0, |source| n_points(file, source))
+            let size = |file: &&PathBuf| {
+                let source = sources.get(file.as_path())?;
+                Some(source.n_triangles.unwrap_or_else(|| n_points(file, source)))
             };
-            let largest = object.files.iter().max_by_key(n_points).cloned();
+            let largest = object.files.iter().max_by_key(size).cloned();
             let others = object.files.iter().filter(|file| Some(*file) != largest.as_ref());
             others.for_each(|file| _ = sources.remove(file.as_path()));
         }

@@ -10,7 +10,7 @@ use surfel::image::Image;
 use surfel::math::{DQuat, Vec3};
 use surfel::progress::Progress;
 use surfel::render::{CpuRenderer, RenderStats, Renderer, Settings};
-use surfel::scene::{Geometry, Graph, Light, Scene};
+use surfel::scene::{Graph, Light, Scene};
 use surfel::trace::Simd;
 
 /// A scene as it is at second 0, prepared, and what is to happen in it.
@@ -70,16 +70,20 @@ impl<'a> Playback<'a> {
     /// Goes to a time, forward or back.
     pub fn seek(&mut self, time_secs: f64, report: &Report) -> anyhow::Result<()> {
         for sequence in &mut self.sequences {
-            let Some(points) = sequence.seek(time_secs, self.up, report)? else { continue };
-            let geometry = &mut self.graph.geometries[sequence.geometry];
-            *geometry = Geometry::Points(points);
-            self.flat.replace(sequence.geometry, geometry, report)?;
+            if !sequence.seek(time_secs, &mut self.graph, self.up, report)? {
+                continue;
+            }
+            for geometry_idx in sequence.slots.geometries.iter().copied() {
+                self.flat.replace(geometry_idx, &self.graph.geometries[geometry_idx], report)?;
+            }
+            self.flat.materials.clone_from(&self.graph.materials);
+            self.flat.textures.clone_from(&self.graph.textures);
             report.end_stage();
-            self.graph.forget_static();
         }
         if !self.graph.animation.channels.is_empty() || !self.sequences.is_empty() {
             self.graph.pose(time_secs);
             self.flat.update(&self.graph, report)?;
+            self.graph.forget_static();
             light::expose_lamps(&mut self.flat.lamps, self.stops);
             self.lamps.clone_from(&self.flat.lamps);
         }

@@ -18,6 +18,10 @@ mod materials;
 mod pictures;
 #[path = "cli/scenes.rs"]
 mod scenes;
+#[path = "cli/bending.rs"]
+mod bending;
+#[path = "cli/sequences.rs"]
+mod sequences;
 #[path = "cli/viewer.rs"]
 mod viewer;
 #[path = "cli/wrong_input.rs"]

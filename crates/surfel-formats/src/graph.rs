@@ -34,6 +34,12 @@ pub fn is_cloud(path: &Path) -> Result<bool> {
     Ok(!gltf::is_gltf(&input) && !has_triangles(&input)?)
 }
 
+/// Whether a file holds a whole scene, with places and movement of its own, rather than one cloud or mesh in
+/// its place.
+pub fn is_scene(path: &Path) -> Result<bool> {
+    Ok(gltf::is_gltf(&Input::open(path)?))
+}
+
 /// Reads the bytes of a file to a graph; `name` stands in messages, and its extension counts.
 ///
 /// Files that these name, such as materials and textures, are not read; `progress` is told so.

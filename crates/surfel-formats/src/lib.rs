@@ -61,7 +61,7 @@ pub use atomic::save_text;
 pub use environment::{LinearPicture, load_environment_picture, load_environment_picture_bytes};
 pub use error::{Error, Place, Result};
 pub use gltf::{load_gltf, load_gltf_bytes};
-pub use graph::{is_cloud, load_graph, load_graph_bytes};
+pub use graph::{is_cloud, is_scene, load_graph, load_graph_bytes};
 pub use load::{common_source, inspect, load, load_all, load_bytes, merge_loaded};
 pub use movie::{Container, Movie, MovieFormat, MovieOptions, check_movie};
 pub use options::{Column, ColumnChoice, LoadOptions, Loaded, Source, TextColumn};

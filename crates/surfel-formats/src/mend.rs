@@ -98,7 +98,7 @@ mod tests {
         assert_eq!(mesh.triangles, [[0, 2, 3]]);
         assert!(mesh.positions.iter().all(|position| position.is_finite()));
         let lost = vec![Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, Vec3::INFINITY];
-        mesh.morphs = vec![Morph { positions: lost, normals: None }];
+        mesh.morphs = vec![Morph { positions: lost, ..Morph::default() }];
         assert_eq!(drop_unusable(&mut mesh).n_lost, 1);
         assert!(mesh.triangles.is_empty());
     }
@@ -108,7 +108,7 @@ mod tests {
         let mut mesh = square();
         mesh.triangles.push([0, 1, 1]);
         let mut bending = mesh.clone();
-        bending.morphs = vec![Morph { positions: vec![Vec3::ZERO; 4], normals: None }];
+        bending.morphs = vec![Morph { positions: vec![Vec3::ZERO; 4], ..Morph::default() }];
         assert_eq!(drop_unusable(&mut mesh), Dropped { n_flat: 1, n_lost: 0 });
         assert_eq!(mesh.triangles.len(), 2);
         assert_eq!(drop_unusable(&mut bending), Dropped::default());

@@ -187,7 +187,6 @@ impl Layout {
     pub fn empty_cloud(&self, origin: DVec3) -> PointCloud {
         PointCloud {
             origin,
-            positions: Vec::new(),
             normals: self.normal.map(|_| Vec::new()),
             radii: self.radius.map(|_| Vec::new()),
             colors: self.color.map(|_| Vec::new()),
@@ -198,6 +197,7 @@ impl Layout {
                 .iter()
                 .map(|(name, field)| Scalar { name: name.clone(), values: field.empty_values() })
                 .collect(),
+            ..PointCloud::default()
         }
     }
 

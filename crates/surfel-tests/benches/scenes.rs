@@ -8,17 +8,17 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use std::f32::consts::{PI, TAU};
 use std::time::{Duration, Instant};
 use surfel::flat::{FlatMesh, FlatScene, Refit};
-use surfel::math::{DQuat, DVec3, Ray, Vec3};
+use surfel::math::{DAffine3, DQuat, DVec3, Ray, Vec3};
 use surfel::progress::{Progress, Silent};
 use surfel::render::{CpuRenderer, Renderer, Settings};
 use surfel::scene::{
-    Background, Camera, Geometry, Graph, Light, Material, Mesh, Node, Part, Points, Projection,
-    Scene, Sky, Sun, Transform,
+    Background, Camera, Geometry, Graph, Joint, Light, Material, Mesh, Morph, Node, Part, Points,
+    Projection, Scene, Skin, Sky, Sun, Transform,
 };
 use surfel::trace::{SceneHit, Simd, Which, scene_hits};
 use surfel_tests::clouds::waves;
 
-criterion_group!(benches, moving, side_by_side, stopping);
+criterion_group!(benches, moving, bending, side_by_side, stopping);
 criterion_main!(benches);
 
 fn n_points(usual: usize) -> usize {
@@ -107,6 +107,42 @@ fn moving(criterion: &mut Criterion) {
             assert!(matches!(refit, Refit::Kept { .. }), "{refit:?}");
         });
     });
+    group.finish();
+}
+
+/// Clouds that bend, from weights and joints to boxes.
+fn bending(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("frame");
+    group.sample_size(20);
+    let mut points = cloud(n_points(1_000_000));
+    let n = points.cloud.len();
+    let offsets = points.cloud.positions.iter().map(|place| 0.01 * place.x * Vec3::Z);
+    let morph = Morph { positions: offsets.collect(), ..Morph::default() };
+    let joints = points.cloud.positions.iter().map(|place| (place.x / 1000.0).clamp(0.0, 1.0));
+    let weights = joints.map(|share| [share, 1.0 - share, 0.0, 0.0]).collect();
+    let skin = Skin { joints: vec![[0, 1, 0, 0]; n], weights };
+    let camera = camera(DVec3::new(0.0, 0.0, 300.0), DVec3::ZERO);
+    let mut measure = |name: &str, points: Points| {
+        let mut graph = Graph::of(Geometry::Points(points), Material::MATTE);
+        graph.nodes.extend([Node::new("left"), Node::new("right")]);
+        let joint = |node| Joint { node, joint_from_mesh: DAffine3::IDENTITY };
+        graph.nodes[0].joints = vec![joint(1), joint(2)];
+        let mut flat = FlatScene::new(&scene(graph.clone(), camera), &Silent).unwrap();
+        let mut time = 0.0;
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                time += 0.04f64;
+                graph.nodes[0].morph_weights = vec![time.sin() as f32];
+                graph.nodes[1].transform = Transform::translated(time.sin() * DVec3::Z);
+                flat.update(&graph, &Silent).unwrap();
+            });
+        });
+    };
+    let mut morphed = points.clone();
+    morphed.cloud.morphs = vec![morph];
+    measure("1 million points morphed", morphed);
+    points.cloud.skin = Some(skin);
+    measure("1 million points carried by joints", points);
     group.finish();
 }
 

@@ -103,7 +103,9 @@ pub struct SurfaceArgs {
 impl SurfaceArgs {
     pub fn scale_radii(&self, cloud: &mut PointCloud) {
         let factor = self.radius_scale as f32;
-        cloud.radii.iter_mut().flatten().for_each(|radius| *radius *= factor);
+        let of_morphs = cloud.morphs.iter_mut().filter_map(|morph| morph.radii.as_mut());
+        let all = cloud.radii.iter_mut().chain(of_morphs).flatten();
+        all.for_each(|radius| *radius *= factor);
     }
 }
 

@@ -122,9 +122,7 @@ impl Made {
     ) -> anyhow::Result<Self> {
         let (mut graph, mut sequences) = assembly.dress(clouds.to_vec(), up, report)?;
         for sequence in &mut sequences {
-            if let Some(points) = sequence.seek(time, up, report)? {
-                graph.geometries[sequence.geometry] = Geometry::Points(points);
-            }
+            sequence.seek(time, &mut graph, up, report)?;
         }
         check_layers(&graph)?;
         let indices = graph.geometries.iter().map(|geometry| match geometry {

@@ -11,7 +11,7 @@ pub fn film(arguments: &[&str]) {
 }
 
 /// Frames and the seconds that each is seen.
-fn read_apng(path: &str) -> (Vec<Vec<u8>>, Vec<f64>) {
+pub fn read_apng(path: &str) -> (Vec<Vec<u8>>, Vec<f64>) {
     let file = std::io::BufReader::new(fs::File::open(path).unwrap());
     let mut reader = png::Decoder::new(file).read_info().unwrap();
     let n_frames = reader.info().animation_control().unwrap().num_frames;
@@ -38,7 +38,7 @@ pub fn read_gif(path: &str) -> (usize, u32) {
 }
 
 /// Mean difference of two pictures' samples, of 255.
-fn difference(a: &[u8], b: &[u8]) -> f64 {
+pub fn difference(a: &[u8], b: &[u8]) -> f64 {
     assert_eq!(a.len(), b.len());
     let sum: u64 = a.iter().zip(b).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
     sum as f64 / a.len() as f64
@@ -361,7 +361,7 @@ fn a_sequence_of_clouds_is_read_as_it_comes() {
     assert!(text.contains("gone.xyz") && !text.contains("frames are kept"), "{text}");
 }
 
-fn read_shot(folder: &Folder, arguments: &[&str]) -> Vec<u8> {
+pub fn read_shot(folder: &Folder, arguments: &[&str]) -> Vec<u8> {
     let path = folder.path("shot.png");
     succeed(&[&["render"], arguments, &SMALL, &["-o", &path]].concat());
     read_png(path).3

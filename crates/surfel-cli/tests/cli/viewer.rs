@@ -1,6 +1,7 @@
 //! `surfel view`: what the server answers to programs, and how it begins and ends.
 
 use super::common::{Folder, command, dome, fail, succeed};
+use super::sequences;
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -75,6 +76,22 @@ fn pictures_of_the_server_are_those_of_the_command_line() {
         let common = ["render", &cloud, "-o", &picture, "--resolution", "60x40", "--spp", "2"];
         succeed(&[&common, options].concat());
         assert!(served == fs::read(&picture).unwrap(), "{query}");
+    }
+}
+
+#[test]
+fn a_sequence_is_seen_at_any_time() {
+    let folder = sequences::site();
+    let files = format!("files = {:?}\nfps = 2\n", sequences::FRAMES);
+    let scene = folder.write("scene.toml", sequences::scene("\"sun\"", &files));
+    let picture = folder.path("out.png");
+    let server = Server::start(&[&scene, "--spp", "1"]);
+    for time in ["1", "0", "2", "0.5", "1.5", "0.5"] {
+        let (status, served) = server.get(&format!("/render?resolution=40x30&time={time}"));
+        assert_eq!(status, 200, "{time}: {}", String::from_utf8_lossy(&served));
+        let options = ["--time", time, "--spp", "1", "--resolution", "40x30", "-o", &picture];
+        succeed(&[&["render", &scene], &options[..]].concat());
+        assert!(served == fs::read(&picture).unwrap(), "at {time}");
     }
 }
 

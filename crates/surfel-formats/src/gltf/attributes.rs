@@ -112,7 +112,12 @@ impl<'a> Vertices<'_, 'a> {
             let normals = normals.and_then(|normals| {
                 self.kept(normals, is_whole, "NORMAL of a target", "some are not finite")
             });
-            morphs.push(Morph { positions, normals });
+            let tangents = self.vectors(&target, "TANGENT")?;
+            let is_whole = tangents.iter().flatten().all(|tangent| tangent.is_finite());
+            let tangents = tangents.and_then(|tangents| {
+                self.kept(tangents, is_whole, "TANGENT of a target", "some are not finite")
+            });
+            morphs.push(Morph { positions, normals, tangents, radii: None });
         }
         Ok(morphs)
     }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use surfel::scene::{Geometry, Material, Part};
+use surfel::scene::{Material, Part};
 
 use super::document::Document;
 use super::json::Json;
@@ -80,9 +80,7 @@ impl<'d, 'a> Meshes<'d, 'a> {
             n_targets = Some(targets.len());
             let material = self.material(&primitive)?;
             let Some(geometry) = self.primitives.refer(&primitive)? else { continue };
-            if let Geometry::Triangles(shape) = &self.primitives.geometries[geometry]
-                && let Some(skin) = &shape.skin
-            {
+            if let Some(skin) = self.primitives.geometries[geometry].skin() {
                 let most = skin.joints.as_flattened().iter().max().map_or(0, |joint| *joint);
                 self.n_joints.insert(geometry, usize::from(most) + 1);
             }

@@ -3,9 +3,9 @@
 use std::collections::{BTreeSet, HashMap};
 
 use surfel::image::encode_srgb;
-use surfel::math::Vec4;
+use surfel::math::{Vec3, Vec4};
 use surfel::points::PointCloud;
-use surfel::scene::{Geometry, Mesh, Points};
+use surfel::scene::{Geometry, Mesh, Morph, Points};
 
 use super::accessor::Accessor;
 use super::attributes::Vertices;
@@ -147,22 +147,17 @@ fn read_mesh(vertices: &Vertices, triangles: Vec<[u32; 3]>) -> Result<Option<Mes
         let line = format!("{n_mended} normals without direction follow from the triangles");
         vertices.document.note(line);
     }
-    if mesh.normals.is_none() {
-        // There is nothing that they could be added to.
-        mesh.morphs.iter_mut().for_each(|morph| morph.normals = None);
-    }
+    let (has_normals, has_tangents) = (mesh.normals.is_some(), mesh.tangents.is_some());
+    forget_columns_of_nothing(&mut mesh.morphs, has_normals, has_tangents);
     Ok((!mesh.triangles.is_empty()).then_some(mesh))
 }
 
 fn read_points(vertices: &Vertices) -> Result<Option<Points>> {
     let document = vertices.document;
-    for (key, what) in [("targets", "morph targets"), ("JOINTS_0", "joints")] {
-        if vertices.primitive.get(key).is_some() || vertices.attributes.get(key).is_some() {
-            document.note(format!("{what} of points are left out"));
-        }
-    }
     let mut cloud = PointCloud::from_positions(vertices.positions()?);
     cloud.normals = vertices.normals()?;
+    cloud.morphs = vertices.morphs()?;
+    cloud.skin = vertices.skin()?;
     if cloud.normals.iter().flatten().any(|normal| normal.length_squared() == 0.0) {
         document.note("normals of points are left out: some have no direction");
         cloud.normals = None;
@@ -174,12 +169,24 @@ fn read_points(vertices: &Vertices) -> Result<Option<Points>> {
     };
     cloud.colors = vertices.colors()?.map(|colors| colors.into_iter().map(encode).collect());
     let n_all = cloud.len();
-    if cloud.positions.iter().any(|position| !position.is_finite()) {
-        let is_finite = |i: &u32| cloud.positions[*i as usize].is_finite();
+    forget_columns_of_nothing(&mut cloud.morphs, cloud.normals.is_some(), false);
+    let is_finite = |i: &u32| {
+        let at = [cloud.positions[*i as usize]].into_iter();
+        at.chain(cloud.morphs.iter().map(|morph| morph.positions[*i as usize])).all(Vec3::is_finite)
+    };
+    if !(0..n_all as u32).all(|i| is_finite(&i)) {
         let found: Vec<u32> = (0..n_all as u32).filter(is_finite).collect();
         cloud = cloud.subset(&found);
         let n_lost = n_all - cloud.len();
         document.note(format!("{n_lost} points that are not finite are left out"));
     }
     Ok((!cloud.is_empty()).then(|| Points { cloud, ..Points::default() }))
+}
+
+/// Leaves out of morph targets what there is nothing that it could be added to.
+fn forget_columns_of_nothing(morphs: &mut [Morph], has_normals: bool, has_tangents: bool) {
+    for morph in morphs {
+        morph.normals = morph.normals.take().filter(|_| has_normals);
+        morph.tangents = morph.tangents.take().filter(|_| has_tangents);
+    }
 }

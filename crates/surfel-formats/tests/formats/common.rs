@@ -133,6 +133,7 @@ pub fn full_cloud(n: usize) -> PointCloud {
             scalar("amplitude", Values::F32((0..n).map(|i| f(i, -0.3)).collect())),
             scalar("count", Values::I32((0..n).map(|i| -(i as i32)).collect())),
         ],
+        ..PointCloud::default()
     }
 }
 

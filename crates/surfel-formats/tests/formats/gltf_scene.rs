@@ -3,7 +3,8 @@
 use serde_json::{Value, json};
 use surfel::math::{DAffine3, DQuat, DVec3, Vec2, Vec3};
 use surfel::scene::{
-    AlphaMode, Graph, Interpolation, LampKind, Material, Projection, Track, Transform, Wrap,
+    AlphaMode, Geometry, Graph, Interpolation, LampKind, Material, Projection, Track, Transform,
+    Wrap,
 };
 
 use crate::gltf_asset::{Asset, moving, png, puppet, triangle};
@@ -207,11 +208,19 @@ fn skins_and_morph_targets_are_read() {
     assert_eq!((&tilt.positions, &tilt.normals), (&vec![Vec3::ZERO; 4], &Some(vec![Vec3::X; 4])));
     assert_eq!(graph.nodes[1].morph_weights, [0.25, 0.5]);
     assert_eq!(graph.nodes[4].morph_weights, [1.0, 0.0]);
-    // Without normals, nothing can be added to them.
+    // Without normals or tangents, nothing can be added to them.
     let mut flat = asset.clone();
     let attributes = &mut flat.json["meshes"][0]["primitives"][0]["attributes"];
     attributes.as_object_mut().unwrap().remove("NORMAL");
     assert_eq!(flat.mesh().morphs[1].normals, None);
+    let mut along = asset.clone();
+    let turn = along.numbers("VEC3", &[0.0f32, 0.5, 0.0].repeat(4));
+    along.json["meshes"][0]["primitives"][0]["targets"][1]["TANGENT"] = turn.into();
+    assert_eq!(along.mesh().morphs[1].tangents, None);
+    let tangent = along.numbers("VEC4", &[1i8, 0, 0, -1].repeat(4));
+    along.json["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = tangent.into();
+    assert_eq!(along.mesh().morphs[0].tangents, None);
+    assert_eq!(along.mesh().morphs[1].tangents, Some(vec![0.5 * Vec3::Y; 4]));
     // Node 2 of the file is the second of the scene, and node 1 is below it.
     let [first, second] = &graph.nodes[1].joints[..] else { panic!() };
     assert_eq!((first.node, second.node), (2, 3));
@@ -224,6 +233,32 @@ fn skins_and_morph_targets_are_read() {
     assert!(!graph.nodes[2].is_visible);
     asset.json["skins"][0].as_object_mut().unwrap().remove("inverseBindMatrices");
     assert_eq!(asset.graph().nodes[1].joints[0].joint_from_mesh, DAffine3::IDENTITY);
+}
+
+#[test]
+fn points_bend_as_meshes_do() {
+    let mut asset = puppet();
+    let indices = asset.numbers("SCALAR", &[3u8, 1]);
+    let primitive = &mut asset.json["meshes"][0]["primitives"][0];
+    (primitive["mode"], primitive["indices"]) = (json!(0), json!(indices));
+    let loaded = asset.load().unwrap();
+    let [Geometry::Points(points)] = &loaded.graph.geometries[..] else { panic!() };
+    let cloud = &points.cloud;
+    assert_eq!(cloud.positions, [Vec3::Y, Vec3::X]);
+    let skin = cloud.skin.as_ref().unwrap();
+    assert_eq!((skin.joints.len(), skin.weights[1]), (2, [0.2, 0.8, 0.0, 0.0]));
+    assert_eq!(cloud.morphs[0].positions, [Vec3::Z; 2]);
+    assert_eq!(cloud.morphs[1].normals, Some(vec![Vec3::X; 2]));
+    assert_eq!(loaded.graph.nodes[1].morph_weights, [0.25, 0.5]);
+    assert_eq!(loaded.graph.nodes[1].joints.len(), 2);
+    // A point that a target takes nowhere is left out with all that it has.
+    let lost = asset.numbers("VEC3", &[[0.0; 3], [f32::NAN; 3], [0.0; 3], [2.0; 3]].concat());
+    asset.json["meshes"][0]["primitives"][0]["targets"][1] = json!({ "POSITION": lost });
+    let loaded = asset.load().unwrap();
+    let [Geometry::Points(points)] = &loaded.graph.geometries[..] else { panic!() };
+    assert_eq!(points.cloud.positions, [Vec3::Y]);
+    assert_eq!(points.cloud.morphs[1].positions, [Vec3::splat(2.0)]);
+    assert!(loaded.heard("1 points that are not finite"));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use surfel::flat::{FlatGeometry, FlatScene, Instance};
 use surfel::math::{DAffine3, DQuat, DVec3, Random, Ray, Vec3};
-use surfel::scene::{AlphaMode, Geometry, Graph, Material, Mesh, Node, Transform};
+use surfel::scene::{AlphaMode, Geometry, Graph, Material, Mesh, Node, Points, Transform};
 use surfel::surface::SurfaceKind;
 use surfel::trace::{self, Hit, SceneHit, Simd, SurfaceHit, Which};
 use surfel_tests::{clouds, scenes};
@@ -100,6 +100,44 @@ fn ten_thousand_instances_take_the_room_of_one_and_are_all_hit() {
     assert_eq!(scene.clouds().map(|cloud| cloud.points.bytes()).collect::<Vec<_>>(), [alone]);
     let n_hits = check_plain("ten thousand", &scene, &scenes::random_rays(64, 20.0, 74));
     assert!((20..60).contains(&n_hits), "{n_hits}");
+}
+
+/// What a scene holds for its instances, beside what they are instances of.
+fn bytes_of_instances(scene: &FlatScene) -> usize {
+    let FlatScene { instances, top, .. } = scene;
+    instances.capacity() * size_of::<Instance>()
+        + size_of_val(top.nodes.as_slice())
+        + size_of_val(top.blocks.as_slice())
+}
+
+#[test]
+fn an_instance_of_a_million_points_takes_a_few_hundred_bytes() {
+    /// A record takes 208, in a list that grows by doubling, and its share of the tree over all takes 5.
+    const MOST_EACH: usize = 400;
+    const N_INSTANCES: usize = 10_000;
+    let cloud = clouds::waves(1_000_000, 0.0);
+    let colors = vec![[188; 3]; cloud.len()];
+    let points = Points { cloud, colors, surface: SurfaceKind::Disc, ..Points::default() };
+    let mut graph = Graph::of(Geometry::Points(points), Material::MATTE);
+    let alone: Vec<_> = flat(graph.clone()).clouds().map(|cloud| cloud.points.bytes()).collect();
+    let [(tree, points)] = alone[..] else { panic!("{} clouds", alone.len()) };
+    assert!(20_000_000 < tree + points && tree + points < 24_000_000);
+    let mut random = Random::new(78, 0);
+    let mut along = || 40.0 * random.next_f64() - 20.0;
+    let places = (0..N_INSTANCES).map(|i| {
+        let turn = DQuat::from_rotation_y(i as f64) * DQuat::from_rotation_x(0.3 * i as f64);
+        let place = DVec3::new(along(), along(), along());
+        DAffine3::from_scale_rotation_translation(DVec3::splat(0.002), turn, place)
+    });
+    graph.nodes = places.map(|place| scenes::node(0, 0, place)).collect();
+    let scene = flat(graph);
+    assert_eq!((scene.geometries.len(), scene.instances.len()), (1, N_INSTANCES));
+    let bytes: Vec<_> = scene.clouds().map(|cloud| cloud.points.bytes()).collect();
+    assert_eq!(bytes, alone);
+    let each = bytes_of_instances(&scene) / N_INSTANCES;
+    assert!(each <= MOST_EACH, "{each} bytes an instance");
+    let n_hits = check_plain("a million each", &scene, &scenes::random_rays(64, 20.0, 79));
+    assert!(30 < n_hits, "{n_hits}");
 }
 
 /// Two of each kind where the other is too, and one a hair's breadth away.

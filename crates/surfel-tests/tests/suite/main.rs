@@ -1,6 +1,7 @@
 //! Tests across crates: known answers, fast against plain, the same bytes everywhere.
 
 mod batches;
+mod bending;
 mod build;
 mod crowds;
 mod furnace;

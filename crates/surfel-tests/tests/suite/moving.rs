@@ -146,8 +146,8 @@ fn morph_targets_add_up_by_their_weights() {
     let lean = vec![0.5 * Vec3::X; n];
     let normals = vec![Vec3::Z; n];
     let morphs = vec![
-        Morph { positions: bulge.clone(), normals: Some(normals) },
-        Morph { positions: lean.clone(), normals: None },
+        Morph { positions: bulge.clone(), normals: Some(normals), ..Morph::default() },
+        Morph { positions: lean.clone(), ..Morph::default() },
     ];
     let mut graph =
         Graph::of(Geometry::Triangles(Mesh { morphs, ..plain.clone() }), Material::MATTE);
@@ -161,6 +161,28 @@ fn morph_targets_add_up_by_their_weights() {
             let normal = (weight(0) * Vec3::Z - Vec3::Y).normalize();
             assert!(bent_normals(&scene, 0)[i].distance(normal) < 1e-6, "{weights:?}, vertex {i}");
         }
+    }
+}
+
+#[test]
+fn tangents_morph_and_keep_their_sign() {
+    let plain = strip();
+    let turn = vec![Vec3::X; plain.positions.len()];
+    let target = Morph {
+        positions: vec![Vec3::ZERO; plain.positions.len()],
+        tangents: Some(turn),
+        ..Morph::default()
+    };
+    let mesh = Mesh { morphs: vec![target], ..plain };
+    let mut graph = Graph::of(Geometry::Triangles(mesh), Material::MATTE);
+    graph.nodes[0].morph_weights = vec![0.0];
+    let mut flat = FlatScene::new(&seen(graph.clone()), &Silent).unwrap();
+    for weight in [1.0, 0.5, 0.0] {
+        graph.nodes[0].morph_weights = vec![weight];
+        flat.update(&graph, &Silent).unwrap();
+        let expected = (Vec3::Z + weight * Vec3::X).normalize().extend(-1.0);
+        let tangents = bent_tangents(&flat, 0);
+        assert!(tangents.iter().all(|tangent| tangent.distance(expected) < 1e-6), "{weight}");
     }
 }
 
@@ -262,8 +284,8 @@ fn moving_graph() -> Graph {
     ]);
     let skinned_at = graph.append(skinned());
     let plain = strip();
-    let lean =
-        Morph { positions: plain.positions.iter().map(|p| p.z * Vec3::X).collect(), normals: None };
+    let lean = plain.positions.iter().map(|p| p.z * Vec3::X).collect();
+    let lean = Morph { positions: lean, ..Morph::default() };
     let morphed = Mesh { morphs: vec![lean], ..plain };
     let morphed_at = graph.append(Graph::of(Geometry::Triangles(morphed), painted(0.2, 0.9, 0.3)));
     graph.nodes[morphed_at].morph_weights = vec![0.0];
@@ -389,7 +411,8 @@ mod known {
     #[test]
     fn what_only_an_update_bends_is_bent() {
         let plain = strip();
-        let shift = Morph { positions: vec![Vec3::X; plain.positions.len()], normals: None };
+        let shift = vec![Vec3::X; plain.positions.len()];
+        let shift = Morph { positions: shift, ..Morph::default() };
         let mesh = Geometry::Triangles(Mesh { morphs: vec![shift], ..plain });
         let mut graph = Graph::of(mesh, Material::MATTE);
         let mut flat = FlatScene::new(&seen(graph.clone()), &Silent).unwrap();

@@ -10,8 +10,8 @@ use surfel::math::{DAffine3, DVec3, Vec2, Vec3};
 use surfel::progress::Silent;
 use surfel::render::Settings;
 use surfel::scene::{
-    AlphaMode, Background, Environment, Graph, Lamp, LampKind, Light, Material, Mesh, Node, Scene,
-    Texture, TextureRef, Textures, Transform,
+    AlphaMode, Background, Environment, Graph, Lamp, LampKind, Light, Material, Mesh, Morph, Node,
+    Scene, Texture, TextureRef, Textures, Transform,
 };
 use surfel_tests::scenes::{self, from_above, render};
 
@@ -233,6 +233,51 @@ fn normal_maps_bend_normals_to_their_right_and_up() {
         assert_near(found, lit(sign, 0.0), 0.006, &format!("right, {name}"));
         let found = bumped([128, 255, 255], toward, change);
         assert_near(found, lit(0.0, 1.0), 0.006, &format!("up, {name}"));
+    }
+}
+
+/// Morph targets turn the square by a quarter: with their own tangents if it has some, without them by what
+/// the coordinates of the moved corners say.
+#[test]
+fn normal_maps_turn_with_what_bends() {
+    let toward = Vec3::new(0.6, 0.48, 0.64);
+    let quarter = |place: Vec3| Vec3::new(-place.y, place.x, place.z);
+    let offset = |place: Vec3| quarter(place) - place;
+    let of_coordinates = |_: &mut Mesh, _: &mut f32| {};
+    let of_tangents = |square: &mut Mesh, _: &mut f32| {
+        square.normals = Some(vec![Vec3::Z; 4]);
+        square.tangents = Some(vec![Vec3::X.extend(1.0); 4]);
+    };
+    for (name, change) in [
+        ("coordinates", &of_coordinates as &dyn Fn(&mut Mesh, &mut f32)),
+        ("tangents", &of_tangents),
+    ] {
+        for texel in [[255, 128, 255], [128, 255, 255]] {
+            let at_rest = bumpy(texel, change);
+            let turned = bumpy(texel, |square, scale| {
+                change(square, scale);
+                square.positions.iter_mut().for_each(|place| *place = quarter(*place));
+                for tangent in square.tangents.iter_mut().flatten() {
+                    *tangent = quarter(tangent.truncate()).extend(tangent.w);
+                }
+            });
+            let mut bent = bumpy(texel, |square, scale| {
+                change(square, scale);
+                let along = square.tangents.iter().flatten();
+                let along = along.map(|tangent| offset(tangent.truncate())).collect();
+                let target = Morph {
+                    positions: square.positions.iter().map(|place| offset(*place)).collect(),
+                    tangents: square.tangents.is_some().then_some(along),
+                    ..Morph::default()
+                };
+                square.morphs = vec![target];
+            });
+            bent.nodes[0].morph_weights = vec![1.0];
+            let [at_rest, turned, bent] =
+                [at_rest, turned, bent].map(|graph| color_of(graph, toward));
+            assert!(0.05 < turned.distance(at_rest), "{name}: nothing to tell");
+            assert_near(bent, turned, 1e-6, name);
+        }
     }
 }
 

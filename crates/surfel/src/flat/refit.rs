@@ -40,16 +40,29 @@ impl FlatPoints {
         colors: &[[u8; 3]],
         progress: &dyn Progress,
     ) -> Result<Refit> {
-        let source = Source::new(cloud, kind, colors)?;
-        let is_same_set = self.n_points() == source.n_solid();
-        if is_same_set && self.encode_again(&source) {
-            let cost_ratio = self.fit_boxes(kind) / self.cost;
-            if cost_ratio <= REBUILD_COST {
-                return Ok(Refit::Kept { cost_ratio });
-            }
+        if let Some(cost_ratio) = self.refit_in_place(cloud, kind, colors)? {
+            return Ok(Refit::Kept { cost_ratio });
         }
         *self = Self::new(cloud, kind, colors, progress)?;
         Ok(Refit::Rebuilt)
+    }
+
+    /// The same where the tree can be kept; else it is of use for nothing but to be refitted again.
+    ///
+    /// What comes out depends on the tree and on `cloud` alone, not on where the points were in between.
+    pub(super) fn refit_in_place(
+        &mut self,
+        cloud: &PointCloud,
+        kind: SurfaceKind,
+        colors: &[[u8; 3]],
+    ) -> Result<Option<f64>> {
+        let source = Source::new(cloud, kind, colors)?;
+        let is_same_set = self.n_points() == source.n_solid();
+        if !(is_same_set && self.encode_again(&source)) {
+            return Ok(None);
+        }
+        let cost_ratio = self.fit_boxes(kind) / self.cost;
+        Ok((cost_ratio <= REBUILD_COST).then_some(cost_ratio))
     }
 
     fn n_points(&self) -> usize {

@@ -1,7 +1,7 @@
 //! The whole: geometry once, instances of it, light, camera.
 
 use super::cloud::FlatCloud;
-use super::deform::{Pose, is_deformed};
+use super::deform::{Bent, Pose, is_deformed};
 use super::instance::{Instance, Placement, TopTree};
 use super::lamp::FlatLamp;
 use super::mesh::FlatMesh;
@@ -41,6 +41,9 @@ struct Built {
     geometry: u32,
     /// In which it was last bent.
     pose: Pose,
+    /// Of a cloud that is bent too far for its first tree, that tree. Each pose starts from it, so that a
+    /// frame does not depend on those before: blocks hold points as exactly as their tree lets them.
+    first: Option<Arc<FlatGeometry>>,
 }
 
 #[derive(Clone, Debug)]
@@ -55,6 +58,14 @@ impl FlatGeometry {
         match geometry {
             Geometry::Points(points) => Ok(Self::Cloud(FlatCloud::new(points, progress)?)),
             Geometry::Triangles(mesh) => Ok(Self::Mesh(FlatMesh::new(mesh, progress)?)),
+        }
+    }
+
+    /// `geometry` as it is bent.
+    fn bent(geometry: &Geometry, bent: Bent, progress: &dyn Progress) -> Result<Self> {
+        match geometry {
+            Geometry::Points(points) => Ok(Self::Cloud(FlatCloud::bent(points, bent, progress)?)),
+            Geometry::Triangles(mesh) => Ok(Self::Mesh(FlatMesh::bent(mesh, bent, progress)?)),
         }
     }
 
@@ -110,15 +121,15 @@ impl FlatScene {
             if self.built.contains_key(&source) {
                 continue;
             }
-            let (geometry, pose) = match (&graph.geometries[source.0], source.1) {
-                (Geometry::Triangles(mesh), Some(node)) => {
-                    let pose = Pose::of(graph, node, world);
-                    (FlatGeometry::Mesh(FlatMesh::bent(mesh, pose.bend(mesh), progress)?), pose)
-                }
-                (geometry, _) => (FlatGeometry::new(geometry, progress)?, Pose::default()),
+            let geometry = &graph.geometries[source.0];
+            let pose = source.1.map(|node| Pose::of(graph, node, world));
+            let flat = match &pose {
+                Some(pose) => FlatGeometry::bent(geometry, pose.bend(geometry), progress)?,
+                None => FlatGeometry::new(geometry, progress)?,
             };
-            self.built.insert(source, Built { geometry: self.geometries.len() as u32, pose });
-            self.geometries.push(Arc::new(geometry));
+            let (pose, n_built) = (pose.unwrap_or_default(), self.geometries.len());
+            self.built.insert(source, Built { geometry: n_built as u32, pose, first: None });
+            self.geometries.push(Arc::new(flat));
         }
         Ok(())
     }
@@ -133,13 +144,8 @@ impl FlatScene {
             if pose == built.pose {
                 continue;
             }
-            let flat = Arc::make_mut(&mut self.geometries[built.geometry as usize]);
-            if let (FlatGeometry::Mesh(flat), Geometry::Triangles(mesh)) =
-                (flat, &graph.geometries[*geometry])
-            {
-                flat.refit(mesh, pose.bend(mesh), progress)?;
-                built.pose = pose;
-            }
+            let flat = &mut self.geometries[built.geometry as usize];
+            built.bend(flat, &graph.geometries[*geometry], pose, progress)?;
         }
         self.add_geometry(graph, &world, progress)?;
         self.place(graph, &world)
@@ -228,13 +234,39 @@ impl FlatScene {
     }
 }
 
+impl Built {
+    /// Refits what was built to a pose.
+    fn bend(
+        &mut self,
+        flat: &mut Arc<FlatGeometry>,
+        geometry: &Geometry,
+        pose: Pose,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        if let Some(first) = self.first.take() {
+            *flat = first;
+        }
+        let bent = pose.bend(geometry);
+        let is_kept = match (Arc::make_mut(flat), geometry) {
+            (FlatGeometry::Mesh(flat), Geometry::Triangles(mesh)) => {
+                flat.refit(mesh, bent, progress)?;
+                true
+            }
+            (FlatGeometry::Cloud(flat), Geometry::Points(points)) => flat.refit(points, bent)?,
+            _ => true,
+        };
+        if !is_kept {
+            let anew = FlatGeometry::bent(geometry, pose.bend(geometry), progress)?;
+            self.first = Some(std::mem::replace(flat, Arc::new(anew)));
+        }
+        self.pose = pose;
+        Ok(())
+    }
+}
+
 /// What a part of a node is made from.
 fn source(graph: &Graph, node_idx: usize, geometry: usize) -> Source {
-    let node = &graph.nodes[node_idx];
-    let bends = match &graph.geometries[geometry] {
-        Geometry::Triangles(mesh) => is_deformed(mesh, node),
-        Geometry::Points(_) => false,
-    };
+    let bends = is_deformed(&graph.geometries[geometry], &graph.nodes[node_idx]);
     (geometry, bends.then_some(node_idx))
 }
 

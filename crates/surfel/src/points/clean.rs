@@ -22,12 +22,13 @@ pub struct CleanReport {
     pub n_bad_radii: usize,
 }
 
-/// Drops points that are nowhere or twice at one place (the first stays), and marks unusable entries.
+/// Drops points that are nowhere or twice at one place (the first stays), and marks unusable entries. Points
+/// that bend may part at another time: of these none is dropped for its place.
 ///
 /// A column of normals or radii without a usable entry, as trained splats have, is removed.
 pub fn clean(cloud: PointCloud, progress: &dyn Progress) -> Result<(PointCloud, CleanReport)> {
     let mut report = CleanReport { n_before: cloud.len(), ..CleanReport::default() };
-    let dropped = find_dropped(&cloud.positions, progress, &mut report)?;
+    let dropped = find_dropped(&cloud, progress, &mut report)?;
     let mut cloud = if dropped.is_empty() { cloud } else { without(&cloud, &dropped) };
     clean_normals(&mut cloud, &mut report);
     clean_radii(&mut cloud, &mut report);
@@ -54,10 +55,11 @@ impl CleanReport {
 
 /// Indices of the points to drop, rising.
 fn find_dropped(
-    positions: &[Vec3],
+    cloud: &PointCloud,
     progress: &dyn Progress,
     report: &mut CleanReport,
 ) -> Result<Vec<u32>> {
+    let positions = &cloud.positions;
     let limit = u32::MAX as usize;
     if limit <= positions.len() {
         return Err(Error::TooManyPoints { found: positions.len(), limit: limit - 1 });
@@ -68,7 +70,9 @@ fn find_dropped(
         .filter(|&i| !positions[i as usize].is_finite())
         .collect();
     report.n_not_finite = dropped.len();
-    dropped.extend(find_duplicates(positions, progress)?);
+    if cloud.morphs.is_empty() && cloud.skin.is_none() {
+        dropped.extend(find_duplicates(positions, progress)?);
+    }
     report.n_duplicates = dropped.len() - report.n_not_finite;
     dropped.par_sort_unstable();
     Ok(dropped)

@@ -1,5 +1,6 @@
 //! The point cloud: columns of equal length, positions relative to a double-precision origin.
 
+use super::bend::{Morph, Skin, pick};
 use crate::math::{Aabb, DVec3, Vec3};
 
 /// Points as columns. Every column that is present has one entry for each position.
@@ -23,6 +24,8 @@ pub struct PointCloud {
     pub classification: Option<Vec<u8>>,
     /// Every other column, by name.
     pub scalars: Vec<Scalar>,
+    pub morphs: Vec<Morph>,
+    pub skin: Option<Skin>,
 }
 
 /// A named column.
@@ -76,9 +79,6 @@ impl PointCloud {
 
     /// The points `indices` names, in that order, with all their columns.
     pub fn subset(&self, indices: &[u32]) -> Self {
-        fn pick<T: Copy>(column: &[T], indices: &[u32]) -> Vec<T> {
-            indices.iter().map(|&i| column[i as usize]).collect()
-        }
         Self {
             origin: self.origin,
             positions: pick(&self.positions, indices),
@@ -101,6 +101,8 @@ impl PointCloud {
                     },
                 })
                 .collect(),
+            morphs: self.morphs.iter().map(|morph| morph.subset(indices)).collect(),
+            skin: self.skin.as_ref().map(|skin| skin.subset(indices)),
         }
     }
 

@@ -5,7 +5,7 @@ use super::{PointCloud, Scalar, Values};
 /// The clouds one after another, and the names of the columns that were left out.
 ///
 /// The origin is that of the largest cloud. Points of empty clouds ask for no column. Scalars of
-/// different types meet in f64. Column after column is moved, so that little is held twice.
+/// different types meet in f64. Nothing bends what several make. Column after column is moved, so that little is held twice.
 pub fn merge(mut clouds: Vec<PointCloud>) -> (PointCloud, Vec<String>) {
     clouds.retain(|cloud| !cloud.is_empty());
     if clouds.len() < 2 {
@@ -17,6 +17,9 @@ pub fn merge(mut clouds: Vec<PointCloud>) -> (PointCloud, Vec<String>) {
     }
     let positions = clouds.iter_mut().map(|cloud| std::mem::take(&mut cloud.positions)).collect();
     let mut dropped = Vec::new();
+    if clouds.iter().any(|cloud| !cloud.morphs.is_empty() || cloud.skin.is_some()) {
+        dropped.push("what bends them".to_owned());
+    }
     let merged = PointCloud {
         origin,
         positions: concatenate(positions),
@@ -31,6 +34,8 @@ pub fn merge(mut clouds: Vec<PointCloud>) -> (PointCloud, Vec<String>) {
             &mut dropped,
         ),
         scalars: scalars(&mut clouds, &mut dropped),
+        morphs: Vec::new(),
+        skin: None,
     };
     (merged, dropped)
 }

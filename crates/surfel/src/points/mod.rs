@@ -1,5 +1,6 @@
 //! Point clouds as columns, and the preparation that tracing needs.
 
+mod bend;
 mod clean;
 mod cloud;
 mod merge;
@@ -11,6 +12,7 @@ mod radius;
 mod select;
 mod up;
 
+pub use bend::{Morph, Skin};
 pub use clean::{CleanReport, clean};
 pub use cloud::{PointCloud, Scalar, Values};
 pub use merge::merge;

@@ -66,7 +66,8 @@ pub struct Report {
     pub radii: Option<RadiusReport>,
 }
 
-/// Cleans and selects, then adds the normals and radii that are missing. What a file gives stays.
+/// Cleans and selects, then adds the normals and radii that are missing. What a file gives stays. Columns
+/// that are estimated get their share in each morph target, from the points where it takes them.
 pub fn prepare(
     cloud: PointCloud,
     preparation: &Preparation,
@@ -81,8 +82,9 @@ pub fn prepare(
         return Err(Error::EmptyCloud);
     }
     let missing = Missing::of(&cloud, preparation);
+    let estimated = Missing::wholly(&cloud);
     let mut report = Report { clean, n_points: cloud.len(), ..Report::default() };
-    let local = measure(&cloud, preparation, &missing, progress)?;
+    let local = measure(&cloud.positions, preparation, &missing, progress)?;
     if let Some((fits, query)) = local.fits {
         if preparation.keep_variation {
             add_variation(&mut cloud, &fits);
@@ -98,6 +100,7 @@ pub fn prepare(
         add_radii(&mut cloud, radii);
         report.radii = Some(found);
     }
+    add_to_morphs(&mut cloud, &estimated, preparation, progress)?;
     Ok((cloud, report))
 }
 
@@ -113,6 +116,12 @@ impl Missing {
         let radii = cloud.radii.as_ref().is_none_or(|radii| radii.contains(&0.0));
         Self { normals, fits: normals || preparation.keep_variation, radii }
     }
+
+    /// Columns of which there is nothing at all.
+    fn wholly(cloud: &PointCloud) -> Self {
+        let (normals, radii) = (cloud.normals.is_none(), cloud.radii.is_none());
+        Self { normals, fits: normals, radii }
+    }
 }
 
 /// What neighbourhoods tell, as far as it is missing.
@@ -123,12 +132,11 @@ struct Local {
 }
 
 fn measure(
-    cloud: &PointCloud,
+    positions: &[Vec3],
     preparation: &Preparation,
     missing: &Missing,
     progress: &dyn Progress,
 ) -> Result<Local> {
-    let positions = &cloud.positions;
     if let (Method::Knn, Query::Nearest(k_normal), Radius::Adaptive { k: k_radius }, true, true) = (
         preparation.neighbors,
         preparation.normals,
@@ -229,6 +237,58 @@ fn add_radii(cloud: &mut PointCloud, estimated: Vec<f32>) {
             let missing = radii.iter_mut().zip(estimated).filter(|(radius, _)| **radius == 0.0);
             missing.for_each(|(radius, estimated)| *radius = estimated);
         }
+    }
+}
+
+/// Gives each morph target what it adds to normals and radii that were estimated: what is estimated where it
+/// takes the points, less what is at rest. Between the two both change evenly, as places do.
+fn add_to_morphs(
+    cloud: &mut PointCloud,
+    estimated: &Missing,
+    preparation: &Preparation,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let PointCloud { positions, normals, radii, morphs, .. } = cloud;
+    if !(estimated.normals || estimated.radii) {
+        return Ok(());
+    }
+    for morph in morphs {
+        let moved: Vec<Vec3> = positions.iter().zip(&morph.positions).map(|(a, b)| a + b).collect();
+        if !moved.iter().all(|position| position.is_finite()) {
+            continue;
+        }
+        let local = measure(&moved, preparation, estimated, &Unheard(progress))?;
+        if let (Some((fits, _)), Some(normals)) = (local.fits, &*normals) {
+            let added = |(fit, normal): (&PlaneFit, &Vec3)| match fit.normal {
+                // Without a plane of its own it stays as it is; of the two sides it keeps its own.
+                Vec3::ZERO => Vec3::ZERO,
+                found if found.dot(*normal) < 0.0 => -found - normal,
+                found => found - normal,
+            };
+            morph.normals = Some(fits.iter().zip(normals).map(added).collect());
+        }
+        if let (Some((moved_radii, _)), Some(radii)) = (local.radii, &*radii) {
+            let added = moved_radii.iter().zip(radii).map(|(moved, radius)| moved - radius);
+            morph.radii = Some(added.collect());
+        }
+    }
+    Ok(())
+}
+
+/// Tells nothing of what was found for points that are only thought of.
+struct Unheard<'a>(&'a dyn Progress);
+
+impl Progress for Unheard<'_> {
+    fn begin(&self, stage: &str, total: u64) {
+        self.0.begin(stage, total);
+    }
+
+    fn advance(&self, units: u64) {
+        self.0.advance(units);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.0.is_cancelled()
     }
 }
 

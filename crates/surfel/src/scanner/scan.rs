@@ -134,7 +134,6 @@ impl Scanner {
             origin: self.origin,
             positions: column(returns, |r| r.position),
             normals: self.with_normals.then(|| column(returns, |r| r.normal)),
-            radii: None,
             colors: Some(column(returns, |r| r.color)),
             intensity: Some(column(returns, |r| r.intensity)),
             classification: Some(column(returns, |r| r.class)),
@@ -142,6 +141,7 @@ impl Scanner {
                 name: "point_source_id".to_owned(),
                 values: Values::U16(column(returns, |r| r.station)),
             }],
+            ..PointCloud::default()
         }
     }
 }

@@ -7,7 +7,7 @@ use super::material::Material;
 use super::mesh::Mesh;
 use super::texture::Texture;
 use crate::math::{DAffine3, DQuat, DVec3, Vec3};
-use crate::points::PointCloud;
+use crate::points::{Morph, PointCloud, Skin};
 use crate::surface::{Boundary, SurfaceKind};
 
 /// What several files are put together to. Indices are into the columns here.
@@ -132,6 +132,20 @@ impl Geometry {
             Self::Triangles(mesh) => &mesh.positions,
         }
     }
+
+    pub fn morphs(&self) -> &[Morph] {
+        match self {
+            Self::Points(points) => &points.cloud.morphs,
+            Self::Triangles(mesh) => &mesh.morphs,
+        }
+    }
+
+    pub fn skin(&self) -> Option<&Skin> {
+        match self {
+            Self::Points(points) => points.cloud.skin.as_ref(),
+            Self::Triangles(mesh) => mesh.skin.as_ref(),
+        }
+    }
 }
 
 impl Graph {
@@ -171,18 +185,18 @@ impl Graph {
 
     /// Empties the clouds and meshes that never bend, once their flat form holds all that is needed.
     pub fn forget_static(&mut self) {
-        let bends = |mesh: &Mesh| !mesh.morphs.is_empty() || mesh.skin.is_some();
-        for geometry in &mut self.geometries {
+        let is_static =
+            |geometry: &&mut Geometry| geometry.morphs().is_empty() && geometry.skin().is_none();
+        for geometry in self.geometries.iter_mut().filter(is_static) {
             match geometry {
                 Geometry::Points(points) => {
                     let origin = points.cloud.origin;
                     points.cloud = PointCloud { origin, ..PointCloud::default() };
                     points.colors = Vec::new();
                 }
-                Geometry::Triangles(mesh) if !bends(mesh) => {
+                Geometry::Triangles(mesh) => {
                     *mesh = Mesh { origin: mesh.origin, ..Mesh::default() };
                 }
-                Geometry::Triangles(_) => {}
             }
         }
     }

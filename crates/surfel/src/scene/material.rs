@@ -54,7 +54,7 @@ pub struct Textures {
 
 impl Textures {
     /// Shows `see` each texture that is there.
-    pub(super) fn each_mut(&mut self, see: impl FnMut(&mut TextureRef)) {
+    pub fn each_mut(&mut self, see: impl FnMut(&mut TextureRef)) {
         let Self { base_color, metallic_roughness, normal, emissive, transmission } = self;
         let normal = normal.as_mut().map(|(texture, _)| texture);
         let others = [base_color, metallic_roughness, emissive, transmission];

@@ -1,8 +1,9 @@
-//! Triangles as columns, and what deforms them.
+//! Triangles as columns.
 
 use std::collections::HashMap;
 
 use crate::math::{Aabb, DVec3, Vec2, Vec3, Vec4};
+use crate::points::{Morph, Skin};
 
 /// Triangles over shared vertices. Every column of vertices that is present has one entry for each position.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -23,21 +24,6 @@ pub struct Mesh {
     pub colors: Option<Vec<Vec4>>,
     pub morphs: Vec<Morph>,
     pub skin: Option<Skin>,
-}
-
-/// What a morph target adds to each vertex at weight 1.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Morph {
-    pub positions: Vec<Vec3>,
-    pub normals: Option<Vec<Vec3>>,
-}
-
-/// Up to four joints that carry each vertex; the joints themselves are named by nodes (`Node::joints`).
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Skin {
-    pub joints: Vec<[u16; 4]>,
-    /// They add up to 1.
-    pub weights: Vec<[f32; 4]>,
 }
 
 impl Mesh {

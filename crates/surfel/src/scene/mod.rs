@@ -22,8 +22,10 @@ pub use framing::{Framing, frame, look_around, upright, usual_bounds};
 pub use graph::{Geometry, Graph, Joint, Node, Part, Points, Transform};
 pub use light::{Lamp, LampKind, Light, Sky, Sun};
 pub use material::{AlphaMode, Material, Textures};
-pub use mesh::{Mesh, Morph, Skin};
+pub use mesh::Mesh;
 pub use texture::{Encoding, Texture, TextureRef, Wrap};
+
+pub use crate::points::{Morph, Skin};
 
 use crate::math::Vec3;
 

@@ -4,7 +4,7 @@ use super::animation::{Channel, Interpolation, Keys, Track};
 use super::graph::{Geometry, Graph, Node};
 use super::mesh::Mesh;
 use crate::math::Vec3;
-use crate::points::PointCloud;
+use crate::points::{Morph, PointCloud, Skin};
 
 impl Graph {
     /// Panics unless all indices are in range, all columns of equal length, all positions finite, and parents
@@ -48,9 +48,9 @@ impl Graph {
         for part in &node.parts {
             assert!(part.material < self.materials.len(), "material in {}", node.name);
             assert!(part.geometry < self.geometries.len(), "geometry in {}", node.name);
-            let Geometry::Triangles(mesh) = &self.geometries[part.geometry] else { continue };
-            check_column("morph targets", node.morph_weights.len(), mesh.morphs.len());
-            if let Some(skin) = mesh.skin.as_ref().filter(|_| !node.joints.is_empty()) {
+            let geometry = &self.geometries[part.geometry];
+            check_column("morph targets", node.morph_weights.len(), geometry.morphs().len());
+            if let Some(skin) = geometry.skin().filter(|_| !node.joints.is_empty()) {
                 let used = skin.joints.as_flattened().iter();
                 assert!(used.max().is_none_or(|most| usize::from(*most) < node.joints.len()));
             }
@@ -73,13 +73,23 @@ fn validate_mesh(mesh: &Mesh) {
         assert!(uvs.iter().flatten().all(|uv| uv.is_finite()), "texture coordinates");
     }
     assert!(all_finite(mesh.normals.as_deref().unwrap_or_default()), "normals of a mesh");
-    for morph in &mesh.morphs {
+    validate_bending(&mesh.morphs, mesh.skin.as_ref(), n);
+}
+
+/// Of `n` points or vertices.
+fn validate_bending(morphs: &[Morph], skin: Option<&Skin>, n: usize) {
+    let check =
+        |name: &str, length: Option<usize>| assert!(length.is_none_or(|l| l == n), "{name}");
+    for morph in morphs {
         check("positions of a morph target", Some(morph.positions.len()));
         check("normals of a morph target", morph.normals.as_ref().map(Vec::len));
+        check("tangents of a morph target", morph.tangents.as_ref().map(Vec::len));
+        check("radii of a morph target", morph.radii.as_ref().map(Vec::len));
         assert!(all_finite(&morph.positions), "positions of a morph target");
         assert!(all_finite(morph.normals.as_deref().unwrap_or_default()), "normals of a target");
+        assert!(all_finite(morph.tangents.as_deref().unwrap_or_default()), "tangents of a target");
     }
-    if let Some(skin) = &mesh.skin {
+    if let Some(skin) = skin {
         check("joints", Some(skin.joints.len()));
         check("weights", Some(skin.weights.len()));
         let sums = skin.weights.iter().map(|weights| weights.iter().sum::<f32>());
@@ -100,6 +110,7 @@ fn validate_cloud(cloud: &PointCloud) {
     for length in columns.into_iter().flatten().chain(scalars) {
         assert_eq!(length, cloud.len(), "a column of points");
     }
+    validate_bending(&cloud.morphs, cloud.skin.as_ref(), cloud.len());
 }
 
 fn validate_track(channel: &Channel) {

@@ -1,0 +1,131 @@
+//! Sequences of meshes: each frame is the picture of its file, whatever the parts that files have.
+
+use super::animate::{film, read_apng, read_shot};
+use super::common::{Folder, SMALL, dome, fail, succeed, tile};
+use std::fs;
+
+/// Squares side by side, each of a material of its own, as OBJ.
+fn squares(materials: &[&str], height: f64) -> String {
+    let mut text = "mtllib paint.mtl\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n".to_owned();
+    for (i, material) in materials.iter().enumerate() {
+        let (left, right) = (i as f64 - 1.0, i as f64 - 0.1);
+        for (x, y) in [(left, -1.0), (right, -1.0), (right, 1.0), (left, 1.0)] {
+            text += &format!("v {x} {y} {height}\n");
+        }
+        text += &format!("usemtl {material}\nf -4/1 -3/2 -2/3 -1/4\n");
+    }
+    text
+}
+
+/// One triangle, as STL.
+fn stl() -> String {
+    let corners = ["-1 -1 0.2", "1.5 -1 0.2", "0 1 0.9"].map(|c| format!("vertex {c}\n")).concat();
+    format!("solid\nfacet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\nendsolid\n")
+}
+
+/// Two by two texels.
+fn checkers() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 2, 2);
+    encoder.set_color(png::ColorType::Rgb);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&[255, 255, 0, 0, 0, 99, 0, 255, 0, 255, 0, 255]).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+/// Files of a sequence that have one part, three, one of another format, a cloud, and two.
+pub const FRAMES: [&str; 5] = ["f1.obj", "f2.obj", "f3.stl", "f4.ply", "f5.obj"];
+
+pub fn site() -> Folder {
+    let folder = Folder::new();
+    folder.write("floor.ply", tile(9.0, -1.0, [200; 3]));
+    folder.write(
+        "paint.mtl",
+        "newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\nnewmtl paper\nmap_Kd c.png\n",
+    );
+    folder.write("c.png", checkers());
+    folder.write("f1.obj", squares(&["paper"], 0.0));
+    folder.write("f2.obj", squares(&["red", "paper", "blue"], 0.3));
+    folder.write("f3.stl", stl());
+    folder.write("f4.ply", dome(12));
+    folder.write("f5.obj", squares(&["blue", "red"], 0.1));
+    folder
+}
+
+/// The floor comes first, so that the zero of the scene is the same.
+pub fn scene(light: &str, shown: &str) -> String {
+    format!(
+        "light = {light}\nsun.azimuth = 40\nexposure = 0.2\nup = \"+Z\"\n[camera]\n\
+         position = [3, -6, 9]\nfocal-point = [1, 1, 0]\n\
+         [[object]]\nfile = \"floor.ply\"\n\
+         [[object]]\n{shown}\nclip-plane = [0.9, 0, 0, 1, 0, 0]\n\
+         copies = [{{ translate = [3, 0, 0] }}, {{ rotate = [0, 30, 0], translate = [0, 0, 1] }}]\n\
+         [[object]]\nname = \"twin\"\n{shown}\nclip-plane = [0.9, 0, 0, 1, 0, 0]\n\
+         translate = [0, 3, 0]\nmaterial = {{ kind = \"plastic\", color = \"#20c080\" }}\n\
+         [[object]]\nname = \"other\"\nfile = \"f4.ply\"\ntranslate = [3, 3, 0]\n"
+    )
+}
+
+#[test]
+fn each_frame_of_a_sequence_is_the_picture_of_its_file() {
+    let folder = site();
+    for light in ["\"none\"", "[\"sun\"]"] {
+        let files = format!("files = {FRAMES:?}\nfps = 2\n");
+        let sequence = folder.write("sequence.toml", scene(light, &files));
+        let path = folder.path("film.png");
+        film(&[&sequence, "-o", &path, "--fps", "2"]);
+        let (frames, _) = read_apng(&path);
+        assert_eq!(frames.len(), FRAMES.len());
+        for (i, (frame, file)) in frames.iter().zip(FRAMES).enumerate() {
+            let alone = scene(light, &format!("file = \"{file}\"\n"));
+            let alone = read_shot(&folder, &[&folder.write("alone.toml", alone)]);
+            assert!(*frame == alone, "{file} under {light}");
+            let time = format!("{}", 0.5 * i as f64);
+            assert!(read_shot(&folder, &[&sequence, "--time", &time]) == alone, "{file} at {time}");
+            assert!(i == 0 || *frame != frames[i - 1], "{file}");
+        }
+    }
+}
+
+#[test]
+fn one_mesh_of_a_sequence_is_held_at_a_time() {
+    let folder = site();
+    let scene = "[[object]]\nfiles = [\"f1.obj\", \"f2.obj\", \"f5.obj\"]\nfps = 1\n";
+    let scene = folder.write("scene.toml", scene);
+    let told = succeed(&["animate", &scene, "--dry-run"]);
+    assert!(told.contains("\"triangles\": 2,"), "{told}");
+    // A limit of memory asks for the largest file: a million triangles, which only the header has.
+    let many = tile(1.0, 0.0, [9; 3]).replace("element face 2", "element face 1000000");
+    folder.write("many.ply", many);
+    let files = |names: &str| {
+        folder.write("limited.toml", format!("[[object]]\nfiles = [{names}]\nfps = 1\n"))
+    };
+    let limited = files("\"f1.obj\", \"many.ply\", \"many.ply\", \"f2.obj\"");
+    let limit = ["--memory-limit", "50M", "-o", "no.png"];
+    let told = fail(&[&["render", &limited][..], &limit, &SMALL].concat(), 1);
+    assert!(told.contains("1000000 triangles"), "{told}");
+}
+
+#[test]
+fn a_mesh_of_a_sequence_that_cannot_be_read_is_named() {
+    let folder = site();
+    let path = folder.path("film.png");
+    let scene = |files: &str| folder.write("scene.toml", format!("[[object]]\nfiles = {files}\n"));
+    let missing = scene("[\"f1.obj\", \"f2.obj\", \"gone.obj\"]");
+    let told = fail(&["animate", &missing, "-o", &path], 1);
+    assert!(told.contains("gone.obj") && !told.contains("frames are kept"), "{told}");
+    // Its header is in order: what is wrong is found when its time comes.
+    let broken = tile(1.0, 0.0, [9; 3]).replace("3 0 2 3", "3 0 2 x");
+    folder.write("broken.ply", broken);
+    let broken = scene("[\"f1.obj\", \"f2.obj\", \"broken.ply\"]");
+    let told = fail(&[&["animate", &broken, "-o", &path, "--fps", "10"], &SMALL[..]].concat(), 1);
+    assert!(told.contains("broken.ply") && told.contains("2 of 3 frames are kept"), "{told}");
+    // Mended, it goes on from there.
+    folder.write("broken.ply", tile(1.0, 0.0, [9; 3]));
+    let told = fail(&[&["animate", &broken, "-o", &path, "--resume"], &SMALL[..]].concat(), 1);
+    assert!(told.contains("--resume"), "what frames depend on has changed: {told}");
+    fs::remove_dir_all(folder.path("film.png.frames")).unwrap();
+    film(&[&broken, "-o", &path, "--fps", "10"]);
+    assert_eq!(read_apng(&path).0.len(), 3);
+}
