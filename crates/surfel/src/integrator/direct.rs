@@ -6,11 +6,10 @@ use super::shading::Shading;
 use super::specular::gloss;
 use super::through::light_through;
 use crate::error::Result;
-use crate::flat::{FlatLamp, FlatScene};
+use crate::flat::FlatLamp;
 use crate::math::{Frame, Ray, Vec3, cosine_hemisphere, disk, hash, scrambled_pair, uniform_cone};
-use crate::progress::Progress;
 use crate::scene::{Environment, LampKind, Light, Sky, Sun};
-use crate::trace::Simd;
+use crate::trace::Tracer;
 use std::f32::consts::PI;
 
 /// A place that light falls on.
@@ -35,8 +34,7 @@ pub struct Receiver {
 /// The light of a scene.
 #[derive(Clone, Copy)]
 pub struct DirectLight<'a> {
-    pub scene: &'a FlatScene,
-    pub simd: Simd,
+    pub tracer: &'a Tracer<'a>,
     /// Rays toward each extended light from each receiver.
     pub n_light: u32,
 }
@@ -59,21 +57,14 @@ struct LightRay {
 
 impl DirectLight<'_> {
     /// Adds what falls on `receivers` and goes to the viewer to `light`.
-    pub fn add(
-        &self,
-        receivers: &[Receiver],
-        light: &mut [Vec3],
-        progress: &dyn Progress,
-    ) -> Result<RayCounts> {
+    pub fn add(&self, receivers: &[Receiver], light: &mut [Vec3]) -> Result<RayCounts> {
         let mut counts = RayCounts::default();
-        for source in &self.scene.lights {
+        for source in &self.tracer.scene.lights {
             match source {
-                Light::Sun(sun) => {
-                    counts.shadow += self.add_sun(sun, receivers, light, progress)?
-                }
-                Light::Sky(sky) => counts.sky += self.add_sky(sky, receivers, light, progress)?,
+                Light::Sun(sun) => counts.shadow += self.add_sun(sun, receivers, light)?,
+                Light::Sky(sky) => counts.sky += self.add_sky(sky, receivers, light)?,
                 Light::Environment(environment) => {
-                    counts.sky += self.add_environment(environment, receivers, light, progress)?;
+                    counts.sky += self.add_environment(environment, receivers, light)?;
                 }
                 Light::Headlight(strength) => {
                     for receiver in receivers {
@@ -83,19 +74,13 @@ impl DirectLight<'_> {
                 }
             }
         }
-        for (lamp_idx, lamp) in self.scene.lamps.iter().enumerate() {
-            counts.shadow += self.add_lamp(lamp_idx as u64, lamp, receivers, light, progress)?;
+        for (lamp_idx, lamp) in self.tracer.scene.lamps.iter().enumerate() {
+            counts.shadow += self.add_lamp(lamp_idx as u64, lamp, receivers, light)?;
         }
         Ok(counts)
     }
 
-    fn add_sun(
-        &self,
-        sun: &Sun,
-        receivers: &[Receiver],
-        light: &mut [Vec3],
-        progress: &dyn Progress,
-    ) -> Result<u64> {
+    fn add_sun(&self, sun: &Sun, receivers: &[Receiver], light: &mut [Vec3]) -> Result<u64> {
         let frame = Frame::around(sun.direction);
         let cos_max = (sun.angular_diameter_deg.to_radians() / 2.0).cos();
         let is_point = sun.angular_diameter_deg <= 0.0;
@@ -110,16 +95,10 @@ impl DirectLight<'_> {
             let brings = receiver.throws_back(direction, sun.color)?;
             Some(LightRay { direction, reach: f32::INFINITY, brings })
         };
-        self.add_light(n_light, sample, receivers, light, progress)
+        self.add_light(n_light, sample, receivers, light)
     }
 
-    fn add_sky(
-        &self,
-        sky: &Sky,
-        receivers: &[Receiver],
-        light: &mut [Vec3],
-        progress: &dyn Progress,
-    ) -> Result<u64> {
+    fn add_sky(&self, sky: &Sky, receivers: &[Receiver], light: &mut [Vec3]) -> Result<u64> {
         let sample = |receiver: &Receiver, index: u32| {
             let key = receiver.key;
             let local = cosine_hemisphere(scrambled_pair(index, hash(key ^ SKY_DIRECTION)));
@@ -128,7 +107,7 @@ impl DirectLight<'_> {
             let reach = sky.reach * (1.0 - scrambled_pair(index, hash(key ^ SKY_REACH)).0);
             Some(LightRay { direction, reach, brings: sky.radiance(direction) * receiver.diffuse })
         };
-        self.add_light(self.n_light, sample, receivers, light, progress)
+        self.add_light(self.n_light, sample, receivers, light)
     }
 
     /// Half of the directions are those of the picture's light, half those that the surface favours; each
@@ -138,7 +117,6 @@ impl DirectLight<'_> {
         environment: &Environment,
         receivers: &[Receiver],
         light: &mut [Vec3],
-        progress: &dyn Progress,
     ) -> Result<u64> {
         let sample = |receiver: &Receiver, index: u32| {
             let normal = receiver.shading.normal;
@@ -157,7 +135,7 @@ impl DirectLight<'_> {
             let brings = radiance * (cos / PI / density) * receiver.diffuse;
             Some(LightRay { direction, reach: f32::INFINITY, brings })
         };
-        self.add_light(self.n_light, sample, receivers, light, progress)
+        self.add_light(self.n_light, sample, receivers, light)
     }
 
     fn add_lamp(
@@ -166,7 +144,6 @@ impl DirectLight<'_> {
         lamp: &FlatLamp,
         receivers: &[Receiver],
         light: &mut [Vec3],
-        progress: &dyn Progress,
     ) -> Result<u64> {
         let is_point = lamp.radius <= 0.0 || lamp.kind == LampKind::Directional;
         let n_light = if is_point { 1 } else { self.n_light };
@@ -196,7 +173,7 @@ impl DirectLight<'_> {
             let brings = receiver.throws_back(direction, strength * lamp.color)?;
             Some(LightRay { direction, reach: distance - lamp.radius.min(0.5 * distance), brings })
         };
-        self.add_light(n_light, sample, receivers, light, progress)
+        self.add_light(n_light, sample, receivers, light)
     }
 
     /// Asks `sample(receiver, sample index)` for `n_light` rays from each receiver and adds what arrives to
@@ -207,7 +184,6 @@ impl DirectLight<'_> {
         sample: impl Fn(&Receiver, u32) -> Option<LightRay>,
         receivers: &[Receiver],
         light: &mut [Vec3],
-        progress: &dyn Progress,
     ) -> Result<u64> {
         let mut n_rays = 0;
         let share = 1.0 / n_light as f32;
@@ -216,7 +192,6 @@ impl DirectLight<'_> {
         let (mut rays, mut brings) = (Vec::with_capacity(most), Vec::with_capacity(most));
         let mut shares = Vec::with_capacity(most);
         for receivers in receivers.chunks(receivers_at_once) {
-            progress.check()?;
             rays.clear();
             brings.clear();
             for (i, receiver) in receivers.iter().enumerate() {
@@ -239,7 +214,7 @@ impl DirectLight<'_> {
                 let Receiver { shading, media, .. } = &receivers[brings[ray].0];
                 Way::from_surface(shading, rays[ray], *media)
             };
-            light_through(self.scene, self.simd, &rays, way, &mut shares);
+            light_through(self.tracer, &rays, way, &mut shares)?;
             for ((receiver, brings), share) in brings.iter().zip(&shares) {
                 light[receivers[*receiver].slot as usize] += *share * *brings;
             }

@@ -18,21 +18,19 @@ pub use whitted::Whitted;
 use crate::error::Result;
 use crate::flat::FlatScene;
 use crate::math::{Ray, Vec3, Vec4};
-use crate::progress::Progress;
-use crate::trace::{SceneHit, Simd};
+use crate::trace::{SceneHit, Tracer};
 use shading::Shading;
 
 /// A way to find the light along rays.
 pub trait Integrator: Sync {
     /// The light along each camera ray of a batch, premultiplied by how much of it hides the background.
-    fn radiance(&self, batch: &Batch, progress: &dyn Progress) -> Result<(Vec<Vec4>, RayCounts)>;
+    fn radiance(&self, batch: &Batch) -> Result<(Vec<Vec4>, RayCounts)>;
 }
 
 /// A batch of camera rays and what they hit.
 #[derive(Clone, Copy)]
 pub struct Batch<'a> {
-    pub scene: &'a FlatScene,
-    pub simd: Simd,
+    pub tracer: &'a Tracer<'a>,
     pub rays: &'a [Ray],
     pub hits: &'a [SceneHit],
     pub samples: Samples<'a>,

@@ -3,9 +3,9 @@
 use super::media::Way;
 use super::shading::Shading;
 use super::specular::{fresnel, pane_fresnel};
-use crate::flat::FlatScene;
+use crate::error::Result;
 use crate::math::{Ray, Vec3};
-use crate::trace::{self, SceneHit, Simd, Which};
+use crate::trace::{SceneHit, Tracer, Which};
 
 /// Surfaces that light goes through at most.
 const MOST_SURFACES: usize = 64;
@@ -15,19 +15,19 @@ const LEAST: f32 = 1.0 / 512.0;
 /// The share of light that goes along each ray to its end. It goes straight on: what glass focuses is left
 /// out. `way` has what the ray of an index begins inside of.
 pub fn light_through(
-    scene: &FlatScene,
-    simd: Simd,
+    tracer: &Tracer,
     rays: &[Ray],
     way: impl Fn(usize) -> Way,
     shares: &mut [Vec3],
-) {
+) -> Result<()> {
+    let scene = tracer.scene;
     let mut occluded = vec![false; rays.len()];
-    trace::scene_occlusions(scene, simd, Which::Opaque, rays, &mut occluded);
+    tracer.occlusions(Which::Opaque, rays, &mut occluded)?;
     for (share, is_occluded) in shares.iter_mut().zip(&occluded) {
         *share = if *is_occluded { Vec3::ZERO } else { Vec3::ONE };
     }
     if !scene.is_see_through {
-        return;
+        return Ok(());
     }
     let open = (0..rays.len() as u32).filter(|&i| !occluded[i as usize]);
     let mut passing: Vec<(u32, Way)> = open.map(|i| (i, way(i as usize))).collect();
@@ -35,7 +35,7 @@ pub fn light_through(
     let mut hits = vec![SceneHit::MISS; rays.len()];
     for _ in 0..MOST_SURFACES {
         hits.truncate(rays.len());
-        trace::scene_hits(scene, simd, Which::SeeThrough, &rays, &mut hits);
+        tracer.hits(Which::SeeThrough, &rays, &mut hits)?;
         let mut n_left = 0;
         for i in 0..rays.len() {
             let ((ray_idx, way), hit) = (passing[i], &hits[i]);
@@ -61,12 +61,13 @@ pub fn light_through(
         rays.truncate(n_left);
         passing.truncate(n_left);
         if rays.is_empty() {
-            return;
+            return Ok(());
         }
     }
     for (ray_idx, _) in passing {
         shares[ray_idx as usize] = Vec3::ZERO;
     }
+    Ok(())
 }
 
 /// What a surface lets pass. As nothing bends the light, it meets both sides of a body at the angle that

@@ -11,9 +11,8 @@ use super::surroundings::surroundings;
 use super::{Batch, Integrator, RayCounts};
 use crate::error::Result;
 use crate::math::{Frame, Ray, Vec3, Vec4, hash, scrambled_pair};
-use crate::progress::Progress;
 use crate::scene::Background;
-use crate::trace::{self, SceneHit, Which};
+use crate::trace::{SceneHit, Which};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Whitted {
@@ -62,7 +61,7 @@ enum Sees {
 }
 
 impl Integrator for Whitted {
-    fn radiance(&self, batch: &Batch, progress: &dyn Progress) -> Result<(Vec<Vec4>, RayCounts)> {
+    fn radiance(&self, batch: &Batch) -> Result<(Vec<Vec4>, RayCounts)> {
         let mut search = Search {
             batch,
             max_depth: self.max_depth,
@@ -71,25 +70,23 @@ impl Integrator for Whitted {
             receivers: Vec::with_capacity(batch.rays.len()),
             next: Vec::new(),
         };
-        let direct =
-            DirectLight { scene: batch.scene, simd: batch.simd, n_light: batch.samples.n_light };
+        let direct = DirectLight { tracer: batch.tracer, n_light: batch.samples.n_light };
         let mut counts = RayCounts { primary: batch.rays.len() as u64, ..RayCounts::default() };
         for (path, hit) in search.camera_paths().zip(batch.hits) {
             search.follow(path, hit);
         }
         let (mut wave, mut hits) = (Vec::new(), Vec::new());
         loop {
-            counts += direct.add(&search.receivers, &mut search.light, progress)?;
+            counts += direct.add(&search.receivers, &mut search.light)?;
             search.receivers.clear();
             wave.clear();
             std::mem::swap(&mut wave, &mut search.next);
             if wave.is_empty() {
                 break;
             }
-            progress.check()?;
             let rays: Vec<Ray> = wave.iter().map(|path| path.way.ray).collect();
             hits.resize(rays.len(), SceneHit::MISS);
-            trace::scene_hits(batch.scene, batch.simd, Which::All, &rays, &mut hits);
+            batch.tracer.hits(Which::All, &rays, &mut hits)?;
             counts.secondary += rays.len() as u64;
             for (path, hit) in wave.iter().zip(&hits) {
                 search.follow(*path, hit);
@@ -141,7 +138,7 @@ impl<'a> Search<'a> {
         if hit.is_miss() {
             return self.leave(&path);
         }
-        let scene = self.batch.scene;
+        let scene = self.batch.tracer.scene;
         let shading = Shading::new(scene, &path.way.ray, hit);
         let boundary = path.way.boundary(scene, &shading, hit);
         let coverage = shading.alpha * path.weight.max_element();
@@ -187,11 +184,11 @@ impl<'a> Search<'a> {
         let slot = path.slot as usize;
         let behind = self.batch.samples.behind[slot];
         let direction = path.way.ray.direction;
-        let weight = path.weight * path.way.transmittance_to_end(self.batch.scene);
+        let weight = path.weight * path.way.transmittance_to_end(self.batch.tracer.scene);
         let with_sun = path.sees == (Sees::Sky { with_sun: true });
         match path.sees {
-            Sees::Behind if self.batch.scene.background == Background::Surroundings => {
-                let radiance = surroundings(self.batch.scene, direction, false);
+            Sees::Behind if self.batch.tracer.scene.background == Background::Surroundings => {
+                let radiance = surroundings(self.batch.tracer.scene, direction, false);
                 self.light[slot] += weight * radiance;
                 self.alpha[slot] += path.weight.max_element();
             }
@@ -201,7 +198,7 @@ impl<'a> Search<'a> {
                 self.light[slot] += weight * behind.truncate();
             }
             Sees::BehindGlass | Sees::Sky { .. } => {
-                let radiance = surroundings(self.batch.scene, direction, with_sun);
+                let radiance = surroundings(self.batch.tracer.scene, direction, with_sun);
                 self.light[slot] += weight * radiance;
             }
         }

@@ -8,7 +8,7 @@ use crate::integrator::{self, Batch, Integrator, RayCounts, Samples, Whitted};
 use crate::math::{Ray, Vec3, Vec4, hash, scrambled_pair};
 use crate::progress::Progress;
 use crate::scene::View;
-use crate::trace::{self, SceneHit, Simd, Which};
+use crate::trace::{SceneHit, Simd, Tracer, Which};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -44,7 +44,8 @@ impl Renderer for CpuRenderer {
         let (image, mut stats) = if raster::is_asked_for(scene)? {
             (raster::render(scene, &view, settings, piece, progress)?, RenderStats::default())
         } else {
-            let job = Job { scene, simd: self.simd, view: &view, settings, piece, progress };
+            let tracer = Tracer::new(scene, self.simd, progress);
+            let job = Job { tracer: &tracer, view: &view, settings, piece, progress };
             trace(&job)?
         };
         stats.frame_secs = start.elapsed().as_secs_f64();
@@ -78,8 +79,7 @@ fn trace(job: &Job) -> Result<(Image, RenderStats)> {
 
 /// What all tiles share.
 struct Job<'a> {
-    scene: &'a FlatScene,
-    simd: Simd,
+    tracer: &'a Tracer<'a>,
     view: &'a View,
     settings: &'a Settings,
     piece: Piece,
@@ -89,7 +89,7 @@ struct Job<'a> {
 /// What is behind the scene in a row of pixels, with alpha.
 fn background(job: &Job, y: u32) -> Vec4 {
     let height = (y as f32 + 0.5) / job.settings.height as f32;
-    Vec4::from_array(job.scene.background.at(height))
+    Vec4::from_array(job.tracer.scene.background.at(height))
 }
 
 /// Where a tile lies.
@@ -162,7 +162,6 @@ impl Tile {
         let (first, end) = job.piece.samples;
         let at_once = (BATCH / n as u32).clamp(1, n_samples);
         for first in (first..end).step_by(at_once as usize) {
-            job.progress.check()?;
             tile.add_samples(job, first..end.min(first + at_once))?;
         }
         for (i, (_, y)) in place.pixels().enumerate() {
@@ -172,14 +171,14 @@ impl Tile {
                 tile.color[i] / n_samples + (1.0 - tile.coverage[i]) * background(job, y);
         }
         if settings.with_layers && 1 < settings.samples_per_pixel {
-            tile.trace_layers(job);
+            tile.trace_layers(job)?;
         }
         Ok(tile)
     }
 
     /// Adds up the camera rays of these numbers of all pixels.
     fn add_samples(&mut self, job: &Job, numbers: std::ops::Range<u32>) -> Result<()> {
-        let Job { scene, simd, view, settings, progress, .. } = *job;
+        let Job { tracer, view, settings, .. } = *job;
         let per_pixel = numbers.len();
         let n = self.color.len() * per_pixel;
         let mut rays = Vec::with_capacity(n);
@@ -202,16 +201,16 @@ impl Tile {
         }
         let start = Instant::now();
         let mut hits = vec![SceneHit::MISS; rays.len()];
-        trace::scene_hits(scene, simd, Which::All, &rays, &mut hits);
+        tracer.hits(Which::All, &rays, &mut hits)?;
         self.trace_secs += start.elapsed().as_secs_f64();
         if settings.with_layers && settings.samples_per_pixel == 1 {
             self.keep_layers(job, &rays, &hits);
         }
         let n_light = settings.light_samples.div_ceil(settings.samples_per_pixel);
         let samples = Samples { keys: &keys, indices: &indices, behind: &behind, n_light };
-        let batch = Batch { scene, simd, rays: &rays, hits: &hits, samples };
+        let batch = Batch { tracer, rays: &rays, hits: &hits, samples };
         let integrator = Whitted { max_depth: settings.max_depth };
-        let (colors, counts) = integrator.radiance(&batch, progress)?;
+        let (colors, counts) = integrator.radiance(&batch)?;
         for (i, color) in colors.iter().enumerate() {
             self.color[i / per_pixel] += *color;
             self.coverage[i / per_pixel] += color.w;
@@ -220,16 +219,17 @@ impl Tile {
         Ok(())
     }
 
-    fn trace_layers(&mut self, job: &Job) {
+    fn trace_layers(&mut self, job: &Job) -> Result<()> {
         let rays: Vec<Ray> = self
             .place
             .pixels()
             .map(|(x, y)| job.view.ray(x as f32 + 0.5, y as f32 + 0.5))
             .collect();
         let mut hits = vec![SceneHit::MISS; rays.len()];
-        trace::scene_hits(job.scene, job.simd, Which::All, &rays, &mut hits);
+        job.tracer.hits(Which::All, &rays, &mut hits)?;
         self.counts.primary += rays.len() as u64;
         self.keep_layers(job, &rays, &hits);
+        Ok(())
     }
 
     /// Takes the layers from the rays through the pixels' centres.
@@ -240,7 +240,7 @@ impl Tile {
                 return LayerPixel { depth, position: nothing, albedo: nothing, hit: *hit };
             }
             let position = ray.at(hit.distance);
-            let albedo = integrator::albedo(job.scene, ray, hit);
+            let albedo = integrator::albedo(job.tracer.scene, ray, hit);
             LayerPixel { depth: job.view.depth(position), position, albedo, hit: *hit }
         };
         self.layers = rays.iter().zip(hits).map(layer).collect();

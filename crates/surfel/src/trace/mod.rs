@@ -18,6 +18,7 @@ mod sightings;
 mod simd;
 mod splat;
 mod surface;
+mod tracer;
 mod world;
 
 #[cfg(target_arch = "x86_64")]
@@ -29,6 +30,7 @@ pub use hit::{Gather, Hit};
 pub use simd::Simd;
 pub use splat::Splat;
 pub use surface::SurfaceHit;
+pub use tracer::Tracer;
 pub use world::{SceneHit, Which, scene_hits, scene_occlusions};
 
 use crate::flat::{FlatCloud, FlatTriangles};

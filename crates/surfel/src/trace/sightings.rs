@@ -54,9 +54,10 @@ pub fn settle<W: Wide>(sightings: &mut Vec<Sighting>, limits: &[f32; WIDE]) {
     sort(sightings);
 }
 
-/// Leaves each of these lanes its nearest `MAX_GATHERED`.
+/// Leaves each of these lanes its nearest `MAX_GATHERED`, and no sighting of no ray: what is to be sorted are
+/// few, also of discs that lie thousands over each other.
 #[cold]
-fn thin_out(sightings: &mut [Sighting], mut lanes: u32) {
+fn thin_out(sightings: &mut Vec<Sighting>, mut lanes: u32) {
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize;
         lanes &= lanes - 1;
@@ -64,11 +65,12 @@ fn thin_out(sightings: &mut [Sighting], mut lanes: u32) {
             (Hit { distance: sighting.distances[lane], slot: sighting.slot }, place)
         });
         let mut hits: Vec<_> = hits.filter(|(hit, _)| !hit.distance.is_nan()).collect();
-        hits.sort_unstable_by_key(|(hit, _)| hit.key());
-        for (_, place) in &hits[MAX_GATHERED..] {
+        let (.., farther) = hits.select_nth_unstable_by_key(MAX_GATHERED - 1, |(hit, _)| hit.key());
+        for (_, place) in farther {
             sightings[*place].distances[lane] = f32::NAN;
         }
     }
+    sightings.retain(|sighting| sighting.distances.iter().any(|distance| !distance.is_nan()));
 }
 
 /// Few, and mostly in order: blocks are met from near to far, their points by slot.
@@ -82,5 +84,35 @@ fn sort(sightings: &mut [Sighting]) {
             place -= 1;
         }
         sightings[place] = next;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Lanes, PortableLanes};
+
+    #[test]
+    fn of_thousands_each_ray_keeps_its_nearest_by_slot() {
+        // A lane of rays from the front, one from behind, and one that meets only a few.
+        let sighting = |slot: u32| {
+            let mut distances = [f32::NAN; WIDE];
+            (distances[0], distances[5]) = (slot as f32, 5000.0 - slot as f32);
+            if slot % 1000 == 7 {
+                distances[9] = 3.0;
+            }
+            Sighting { slot, distances }
+        };
+        // In no order: 7919 has no divisor in common with 5000.
+        let mut sightings: Vec<Sighting> = (0..5000).map(|i| sighting(i * 7919 % 5000)).collect();
+        settle::<<PortableLanes as Lanes>::Wide>(&mut sightings, &[f32::MAX; WIDE]);
+        let slots = |lane: usize| -> Vec<u32> {
+            let seen = sightings.iter().filter(|sighting| !sighting.distances[lane].is_nan());
+            seen.map(|sighting| sighting.slot).collect()
+        };
+        assert_eq!(slots(0), (0..MAX_GATHERED as u32).collect::<Vec<_>>());
+        assert_eq!(slots(5), (5000 - MAX_GATHERED as u32..5000).collect::<Vec<_>>());
+        assert_eq!(slots(9), [7, 1007, 2007, 3007, 4007]);
+        assert!(sightings.is_sorted_by_key(|sighting| sighting.slot) && sightings.len() < 40);
     }
 }

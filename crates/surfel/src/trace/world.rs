@@ -101,13 +101,12 @@ pub fn scene_hits(
     while let Some(batches) = rounds.next(&distances) {
         for (instance_idx, runs) in batches.iter().filter(|(_, runs)| !runs.is_empty()) {
             let place = Place::new(scene, *instance_idx);
-            there.enter(place.instance, runs, rays);
             // Discs behind the nearest are blended with it, whatever other instances are among them.
             let reach = match place.geometry {
                 FlatGeometry::Cloud(cloud) => cloud.reach,
                 FlatGeometry::Mesh(_) => 0.0,
             };
-            there.end_at(runs, &distances, reach);
+            there.enter(place.instance, runs, rays, &distances, reach);
             batch.trace(&place, simd, &there.rays);
             for (run, there_idx) in runs.placed() {
                 let (hits, distances) = (&mut hits[run.clone()], &mut distances[run]);
@@ -140,7 +139,7 @@ pub fn scene_occlusions(
     while let Some(batches) = rounds.next(&limits) {
         for (instance_idx, runs) in batches.iter().filter(|(_, runs)| !runs.is_empty()) {
             let place = Place::new(scene, *instance_idx);
-            there.enter(place.instance, runs, rays);
+            there.enter(place.instance, runs, rays, &limits, 0.0);
             blocked.resize(there.rays.len(), false);
             block(&place, simd, &there.rays, &mut blocked);
             for (run, there_idx) in runs.placed() {
@@ -193,32 +192,36 @@ struct RaysThere {
 }
 
 impl RaysThere {
-    fn enter(&mut self, instance: &Instance, runs: &Runs, rays: &[Ray]) {
+    /// Takes the rays of `runs`; nothing is looked for beyond `reach` behind what is known already, at the
+    /// world's `distances`.
+    fn enter(
+        &mut self,
+        instance: &Instance,
+        runs: &Runs,
+        rays: &[Ray],
+        distances: &[f32],
+        reach: f32,
+    ) {
         self.rays.clear();
         self.scales.clear();
         for run in runs.iter() {
-            let rays = &rays[run];
+            let rays = rays[run.clone()].iter().zip(&distances[run]);
+            let ending = |ray: Ray, scale: f32, nearest: f32| Ray {
+                t_max: ray.t_max.min(nearest * scale + reach),
+                ..ray
+            };
             if instance.is_in_place {
-                self.rays.extend_from_slice(rays);
+                self.rays.extend(rays.map(|(ray, nearest)| ending(*ray, 1.0, *nearest)));
                 continue;
             }
-            for (ray, scale) in rays.iter().map(|ray| instance.object_ray(ray)) {
-                self.rays.push(ray);
+            for (ray, nearest) in rays {
+                let (ray, scale) = instance.object_ray(ray);
+                self.rays.push(ending(ray, scale, *nearest));
                 self.scales.push(scale);
             }
         }
         if instance.is_in_place {
             self.scales.resize(self.rays.len(), 1.0);
-        }
-    }
-
-    /// Nothing is looked for beyond `reach` behind what is known already, at the world's `distances`.
-    fn end_at(&mut self, runs: &Runs, distances: &[f32], reach: f32) {
-        for (run, there_idx) in runs.placed() {
-            let rays = self.rays[there_idx.clone()].iter_mut().zip(&self.scales[there_idx]);
-            for ((ray, scale), nearest) in rays.zip(&distances[run]) {
-                ray.t_max = ray.t_max.min(nearest * scale + reach);
-            }
         }
     }
 }
