@@ -196,15 +196,35 @@ fn side_by_side(criterion: &mut Criterion) {
             (flat(graph), own)
         })
         .collect();
-    group.bench_function("together", |bencher| bencher.iter(|| trace(&together, &rays, &mut hits)));
-    group.bench_function("each alone", |bencher| {
-        bencher.iter(|| {
-            for (flat, rays) in &alone {
-                trace(flat, rays, &mut hits[..rays.len()]);
-            }
-        });
-    });
+    let mut others = hits.clone();
+    let mut all = || trace(&together, &rays, &mut hits);
+    let mut each = || {
+        for (flat, rays) in &alone {
+            trace(flat, rays, &mut others[..rays.len()]);
+        }
+    };
+    group.bench_function("together", |bencher| bencher.iter(&mut all));
+    group.bench_function("each alone", |bencher| bencher.iter(&mut each));
     group.finish();
+    if std::env::args().all(|argument| argument != "--test") {
+        let [median, least] = ratio_in_turn(&mut all, &mut each);
+        println!("together : each alone, in turn: {median:.3} (median), {least:.3} (least times)");
+    }
+}
+
+/// How much longer the first takes than the second on a machine that is now faster, now slower: the median
+/// of ratios of neighbours, and the ratio of the least times.
+fn ratio_in_turn(first: &mut dyn FnMut(), second: &mut dyn FnMut()) -> [f64; 2] {
+    let secs = |work: &mut dyn FnMut()| {
+        let start = Instant::now();
+        work();
+        start.elapsed().as_secs_f64()
+    };
+    let times: Vec<[f64; 2]> = (0..40).map(|_| [secs(first), secs(second)]).collect();
+    let mut ratios: Vec<f64> = times.iter().map(|[a, b]| a / b).collect();
+    ratios.sort_by(f64::total_cmp);
+    let least = |i: usize| times.iter().map(|pair| pair[i]).fold(f64::INFINITY, f64::min);
+    [ratios[ratios.len() / 2], least(0) / least(1)]
 }
 
 /// Wants work to end from a time on.

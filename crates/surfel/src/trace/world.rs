@@ -187,7 +187,7 @@ fn only(scene: &FlatScene, which: Which) -> Option<Place<'_>> {
 #[derive(Default)]
 struct RaysThere {
     rays: Vec<Ray>,
-    /// Object lengths that make one of the world along each ray.
+    /// Object lengths that make one of the world along each ray; none where the instance is in place.
     scales: Vec<f32>,
 }
 
@@ -220,9 +220,12 @@ impl RaysThere {
                 self.scales.push(scale);
             }
         }
-        if instance.is_in_place {
-            self.scales.resize(self.rays.len(), 1.0);
-        }
+    }
+
+    /// In the world, a distance that the ray at `i` has here.
+    #[inline]
+    fn in_world(&self, i: usize, distance: f32) -> f32 {
+        self.scales.get(i).map_or(distance, |scale| distance / scale)
     }
 }
 
@@ -258,7 +261,7 @@ impl Batch {
         distances: &mut [f32],
     ) {
         for (i, (hit, known)) in there_idx.zip(hits.iter_mut().zip(distances)) {
-            let distance = self.distance(place, i) / there.scales[i];
+            let distance = there.in_world(i, self.distance(place, i));
             let is_tie = distance == *known && distance < f32::INFINITY;
             if distance < *known || is_tie && place.instance_idx < hit.instance {
                 *hit = self.hit(place, i, &there.rays[i], distance);
