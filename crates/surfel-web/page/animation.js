@@ -55,7 +55,7 @@ export function animationRows(viewer, section) {
   });
 
   play.replaceChildren(icon('play'), 'Play');
-  const leadRow = toggleRow(lead, 'Moving camera', 'Off as soon as you move it yourself\ncamera.still');
+  const leadRow = toggleRow(lead, 'Follow', 'The camera goes where the scene moves it, until you move it yourself\ncamera.still');
   viewer.infoChanged.listen(() => {
     section().hidden = !(0 < duration());
     leadRow.hidden = !viewer.info.camera_moves;
