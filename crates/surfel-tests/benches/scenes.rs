@@ -208,7 +208,7 @@ fn side_by_side(criterion: &mut Criterion) {
     group.finish();
     if std::env::args().all(|argument| argument != "--test") {
         let [median, least] = ratio_in_turn(&mut all, &mut each);
-        println!("together : each alone, in turn: {median:.3} (median), {least:.3} (least times)");
+        eprintln!("together : each alone, in turn: {median:.3} (median), {least:.3} (least times)");
     }
 }
 
