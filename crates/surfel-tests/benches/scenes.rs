@@ -3,6 +3,7 @@
 //!
 //! `cargo bench -p surfel-tests --bench scenes`; `RAYON_NUM_THREADS` sets the threads, `POINTS` the number
 //! of points that stand still (10 million by default).
+#![expect(clippy::print_stdout, reason = "a benchmark prints its figures")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::f32::consts::{PI, TAU};
@@ -208,7 +209,7 @@ fn side_by_side(criterion: &mut Criterion) {
     group.finish();
     if std::env::args().all(|argument| argument != "--test") {
         let [median, least] = ratio_in_turn(&mut all, &mut each);
-        eprintln!("together : each alone, in turn: {median:.3} (median), {least:.3} (least times)");
+        println!("together : each alone, in turn: {median:.3} (median), {least:.3} (least times)");
     }
 }
 
