@@ -85,7 +85,8 @@ fn send(port: u16, bytes: &[u8]) {
 
 fn talk(port: u16, lines: &[u8]) {
     let mut page = open(port);
-    for line in lines.split(|byte| *byte == b'\n') {
+    // Of more at once some would be left out, the last one perhaps.
+    for line in lines.split(|byte| *byte == b'\n').take(700) {
         let message = match String::from_utf8(line.to_vec()) {
             Ok(text) => Message::text(text),
             Err(error) => Message::binary(error.into_bytes()),

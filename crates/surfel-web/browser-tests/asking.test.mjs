@@ -20,12 +20,12 @@ beforeEach(async () => {
 after(() => closePage(page));
 
 /** The card's rows after Alt + click. */
-async function ask(place) {
-  const card = page.locator('#pick-card');
+async function ask(place, of = page) {
+  const card = of.locator('#pick-card');
   await card.evaluate((element) => element.replaceChildren());
-  await page.keyboard.down('Alt');
-  await page.mouse.click(place.x, place.y);
-  await page.keyboard.up('Alt');
+  await of.keyboard.down('Alt');
+  await of.mouse.click(place.x, place.y);
+  await of.keyboard.up('Alt');
   await card.locator('dl').waitFor();
   return card.evaluate((element) => Object.fromEntries(
     [...element.querySelectorAll('dt')].map((name) => [name.textContent, name.nextSibling.querySelector('span').textContent])));
@@ -52,6 +52,14 @@ test('a point is told as the file has it', async () => {
     const place = await placeAt(page, ...shares);
     await isOfTheFile(await ask(place), place);
   }
+});
+
+test('a point that moves is told where it is at the time', async () => {
+  const rising = await openPage((await serve(['rising.toml'], ...QUICK)).link);
+  await show(rising, { time: 1 });
+  const row = await ask(await placeAt(rising, 0.5, 0.25), rising);
+  assert.ok(Math.abs(Number(row.z) - data.points[Number(row.index)].z - 10) < RESOLUTION, row.z);
+  await closePage(rising);
 });
 
 const VIEWS = {

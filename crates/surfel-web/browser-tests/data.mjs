@@ -87,6 +87,18 @@ kind = "orbit"
 seconds = 4
 `;
 
+/** The town goes up by 20 within two seconds. */
+const RISING_TOML = `
+[[object]]
+name = "town"
+file = "town.ply"
+
+[[animation]]
+object = "town"
+times = [0, 2]
+translate = [[0, 0, 0], [0, 0, 20]]
+`;
+
 /** A triangle, and a camera that goes past it: from 6 to 4 away within two seconds. */
 function pastGltf() {
   const floats = [-1, 0, 0, 1, 0, 0, 0, 2, 0, /* times */ 0, 2, /* places */ 0, 1, 6, 3, 1, 4];
@@ -109,7 +121,7 @@ export function makeData() {
   const folder = mkdtempSync(join(tmpdir(), 'surfel-browser-'));
   const points = townPoints();
   const files = {
-    'town.ply': ply(points), 'house.obj': houseObj(), 'moving.toml': MOVING_TOML, 'orbit.toml': ORBIT_TOML, 'past.gltf': pastGltf(),
+    'town.ply': ply(points), 'house.obj': houseObj(), 'moving.toml': MOVING_TOML, 'orbit.toml': ORBIT_TOML, 'rising.toml': RISING_TOML, 'past.gltf': pastGltf(),
   };
   for (const [name, text] of Object.entries(files)) writeFileSync(join(folder, name), text);
   return { folder, points, remove: () => rmSync(folder, { recursive: true, force: true }) };

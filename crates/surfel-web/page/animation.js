@@ -51,7 +51,7 @@ export function animationRows(viewer, section) {
 
   lead.addEventListener('change', () => {
     if (lead.checked) viewer.follow();
-    else viewer.look(viewer.camera, false);
+    else if (viewer.camera) viewer.look(viewer.camera, false);
   });
 
   play.replaceChildren(icon('play'), 'Play');

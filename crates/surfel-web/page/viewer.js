@@ -281,7 +281,7 @@ export class Viewer {
   }
 
   #receiveError({ id, input, text }) {
-    this.#takesNextCamera = false;
+    if (this.camera) this.#takesNextCamera = false;
     if (input !== undefined) {
       this.#patchesUnderway = this.#patchesUnderway.filter((underway) => input < underway.input);
       this.#mergeUnderway();

@@ -68,6 +68,11 @@ impl Canvas {
         2.0 * LONG.as_secs_f64() < self.secs
     }
 
+    /// What was given up would have taken longer: it does not make one quick who was slow.
+    fn took(&mut self, secs: f64, is_done: bool) {
+        self.secs = if is_done { secs } else { secs.max(self.secs) };
+    }
+
     /// A picture as large as there is time for.
     pub fn draft(
         &mut self,
@@ -87,7 +92,7 @@ impl Canvas {
         let hurry = Hurry::new(progress, Pace::is_least((width, height)));
         let start = Instant::now();
         let rendered = renderer.render(scene, &settings, &hurry);
-        self.secs = start.elapsed().as_secs_f64();
+        self.took(start.elapsed().as_secs_f64(), rendered.is_ok());
         self.pace.learn(n_pixels, self.secs);
         let (image, stats) = rendered?;
         let pixels =
@@ -121,7 +126,7 @@ impl Canvas {
         let hurry = Hurry::new(progress, n_rows == 1);
         let start = Instant::now();
         let rendered = renderer.render_piece(scene, &settings, piece, &hurry);
-        self.secs = start.elapsed().as_secs_f64();
+        self.took(start.elapsed().as_secs_f64(), rendered.is_ok());
         self.secs_per_row = self.secs / f64::from(n_rows);
         let (image, stats) = rendered?;
         self.work += Work::of(&stats);

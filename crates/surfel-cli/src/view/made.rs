@@ -13,6 +13,7 @@ use surfel::math::{Aabb, Vec3};
 use surfel::points::{PointCloud, Scalar, Values};
 use surfel::progress::Progress;
 use surfel::scene::{Background, Camera, Geometry, Graph, Projection, Scene, usual_bounds};
+use surfel::surface::SurfaceKind;
 
 /// Column of a point's index among those that were read. No file's column has a name like it.
 pub const INDEX: &str = "\u{0}index";
@@ -152,6 +153,10 @@ impl Made {
 fn check_layers(graph: &Graph) -> anyhow::Result<()> {
     for geometry in &graph.geometries {
         let Geometry::Points(points) = geometry else { continue };
+        // Pixels are drawn, not traced.
+        if points.surface == SurfaceKind::Points {
+            continue;
+        }
         let n_layers = n_layers(&points.cloud);
         if MOST_LAYERS < n_layers {
             let advice = "choose a smaller radius or radius_scale";

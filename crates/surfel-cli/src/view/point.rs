@@ -3,9 +3,9 @@
 use super::made::{INDEX, Made};
 use crate::assemble::Assembly;
 use serde_json::{Value, json};
-use surfel::flat::FlatGeometry;
+use surfel::flat::{FlatGeometry, FlatScene};
 use surfel::points::{PointCloud, Values};
-use surfel::scene::Geometry;
+use surfel::scene::{Geometry, Graph};
 use surfel_web::Place;
 
 /// An 8-bit value times this is the same colour with 16 bits.
@@ -14,7 +14,15 @@ const WIDEN: u16 = 257;
 const SAMPLE: usize = 4096;
 
 /// The point or triangle at a place, with all columns of the file that it came from.
-pub fn describe(base: &Assembly, made: &Made, place: &Place) -> Value {
+///
+/// `flat` and `graph` are those of `made`, at the time at which it was looked at.
+pub fn describe(
+    base: &Assembly,
+    made: &Made,
+    flat: &FlatScene,
+    graph: &Graph,
+    place: &Place,
+) -> Value {
     let mut told = json!({
         "surface": place.position.to_array(),
         "normal": place.normal.to_array(),
@@ -23,13 +31,13 @@ pub fn describe(base: &Assembly, made: &Made, place: &Place) -> Value {
         "position": place.position.to_array(),
         "columns": [],
     });
-    let Some(instance) = made.flat.instances.get(place.instance as usize) else { return told };
-    told["kind"] = match made.flat.geometry(instance) {
+    let Some(instance) = flat.instances.get(place.instance as usize) else { return told };
+    told["kind"] = match flat.geometry(instance) {
         FlatGeometry::Cloud(_) => json!("point"),
         FlatGeometry::Mesh(_) => json!("triangle"),
     };
-    let node = &made.graph.nodes[instance.node as usize];
-    told["object"] = json!(name(made, instance.node as usize));
+    let node = &graph.nodes[instance.node as usize];
+    told["object"] = json!(name(graph, instance.node as usize));
     let part = node.parts.iter().find(|part| part.material == instance.material as usize);
     let Some(geometry) = part.map(|part| part.geometry) else { return told };
     let index = made.indices[geometry].get(place.id as usize);
@@ -38,16 +46,19 @@ pub fn describe(base: &Assembly, made: &Made, place: &Place) -> Value {
         return told;
     };
     let (cloud, index) = (&points.cloud, index as usize);
-    let world = made.graph.world_from_nodes()[instance.node as usize];
     told["index"] = json!(index);
-    told["position"] = json!(world.transform_point3(cloud.world_position(index)).to_array());
+    // A point that bends is where it was met.
+    if cloud.morphs.is_empty() && cloud.skin.is_none() {
+        let world = graph.world_from_nodes()[instance.node as usize];
+        told["position"] = json!(world.transform_point3(cloud.world_position(index)).to_array());
+    }
     told["columns"] = columns(cloud, index).into();
     told
 }
 
 /// The nearest name at a node or above it.
-fn name(made: &Made, node: usize) -> &str {
-    let nodes = &made.graph.nodes;
+fn name(graph: &Graph, node: usize) -> &str {
+    let nodes = &graph.nodes;
     let mut above = std::iter::successors(Some(node), |node| nodes[*node].parent);
     let named = above.find(|node| !nodes[*node].name.is_empty());
     named.map_or("", |node| &nodes[node].name)

@@ -12,6 +12,7 @@ use crate::scene_file::Line;
 use crate::{dry_run, light};
 use anyhow::Context;
 use serde_json::{Value, json};
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use surfel::flat::FlatScene;
@@ -270,10 +271,13 @@ impl Studio for ScanStudio {
     }
 
     fn describe(&self, stage: &Stage, place: &Place) -> Value {
-        stage
-            .source
-            .downcast_ref()
-            .map_or(Value::Null, |made| point::describe(&self.base, made, place))
+        let Some(made) = stage.source.downcast_ref::<Made>() else { return Value::Null };
+        let mut graph = Cow::Borrowed(&made.graph);
+        if !graph.animation.channels.is_empty() {
+            let time = stage.settings.get("time").and_then(Value::as_f64);
+            graph.to_mut().pose(time.unwrap_or(0.0));
+        }
+        point::describe(&self.base, made, &stage.flat, &graph, place)
     }
 
     fn picture(&self, settings: &Keys, progress: &dyn Progress) -> Result<Vec<u8>> {

@@ -114,6 +114,8 @@ fn what_a_page_may_not_change_is_refused() {
         let error = server.error(&format!("/render?{query}"));
         assert!(error.contains(expected), "{query}: {error}");
     }
+    let pixels = "/render?surface=points&radius-scale=100&resolution=20x10";
+    assert_eq!(server.get(pixels).0, 200);
     assert_eq!(server.get("/../Cargo.toml").0, 404);
 }
 
