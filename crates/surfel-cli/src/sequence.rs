@@ -126,10 +126,7 @@ impl<'a> Sequence<'a> {
         };
         let clip = self.args.clip.clip();
         for geometry in &mut content.geometries {
-            match geometry {
-                Geometry::Points(points) => _ = points.clip(&clip, &self.world_from_file),
-                Geometry::Triangles(mesh) => mesh.clip(&clip, &self.world_from_file),
-            }
+            geometry.clip(&clip, &self.world_from_file);
         }
         if self.is_dark {
             shine_in_the_dark(&mut content.materials);

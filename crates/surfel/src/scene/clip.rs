@@ -75,22 +75,28 @@ impl Mesh {
     }
 }
 
+impl Geometry {
+    /// Hides a part of it; returns which points stay: none for meshes, and for clouds that are whole.
+    pub fn clip(&mut self, clip: &Clip, world_from_geometry: &DAffine3) -> Option<Vec<u32>> {
+        match self {
+            Self::Points(points) => points.clip(clip, world_from_geometry),
+            Self::Triangles(mesh) => {
+                mesh.clip(clip, world_from_geometry);
+                None
+            }
+        }
+    }
+}
+
 impl Graph {
     /// Hides a part of each geometry, by a clip for each. What several nodes show is cut where the first of
     /// them stands, and what moves takes its cut along.
     ///
-    /// Returns which points stay of each geometry: none for meshes, and for clouds that are whole.
+    /// Returns which points stay of each geometry, as [`Geometry::clip`].
     pub fn clip(&mut self, clips: &[Clip]) -> Vec<Option<Vec<u32>>> {
         let places = self.world_from_geometries();
         let geometries = self.geometries.iter_mut().zip(clips).zip(&places);
-        let kept = geometries.map(|((geometry, clip), place)| match geometry {
-            Geometry::Points(points) => points.clip(clip, place),
-            Geometry::Triangles(mesh) => {
-                mesh.clip(clip, place);
-                None
-            }
-        });
-        kept.collect()
+        geometries.map(|((geometry, clip), place)| geometry.clip(clip, place)).collect()
     }
 }
 
