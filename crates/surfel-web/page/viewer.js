@@ -235,7 +235,7 @@ export class Viewer {
     this.info = info;
     this.opening = scene;
     this.#toldScene = mergePatch(scene, this.#helloPatch);
-    [this.#frame, this.#frameBeforeScene] = [0, 0];
+    [this.#frame, this.#frameBeforeScene, this.lastFrame] = [0, 0, null];
     this.#patchesUnderway = [];
     this.#mergeUnderway();
     // Where a camera is that the scene moves comes with the first scene.

@@ -10,7 +10,8 @@ use surfel::render::Renderer;
 const DRAFT_SECS: f64 = 0.8 / 30.0;
 /// Less is all overhead.
 const LEAST_DRAFT_SECS: f64 = 0.008;
-/// Those whose pictures take long wait this many times as long in between, if others move.
+/// Those whose pictures take long wait this many times as long in between, if there is something to
+/// paint for others.
 const REST: u32 = 9;
 const FOREVER: Duration = Duration::from_secs(3600);
 

@@ -5,7 +5,7 @@ use crate::studio::{Place, Stage};
 use std::sync::Arc;
 use surfel::image::NO_ID;
 use surfel::math::DVec3;
-use surfel::progress::Silent;
+use surfel::progress::Progress;
 use surfel::render::{Piece, Renderer, Settings};
 
 /// The surface at a place in the page's picture, in pixels from its top left corner.
@@ -15,6 +15,7 @@ pub fn pick(
     renderer: &dyn Renderer,
     sight: &Sight,
     (x, y): (f64, f64),
+    progress: &dyn Progress,
 ) -> Option<(Arc<Stage>, Place)> {
     let (stage, camera) = (sight.stage.clone()?, sight.camera?);
     let (width, height) = sight.size;
@@ -35,7 +36,7 @@ pub fn pick(
     let piece = Piece { rows: (row, row + 1), samples: (0, 1) };
     let mut scene = stage.flat.clone();
     scene.camera = camera;
-    let (image, _) = renderer.render_piece(&scene, &settings, piece, &Silent).ok()?;
+    let (image, _) = renderer.render_piece(&scene, &settings, piece, progress).ok()?;
     let layers = image.layers?;
     let place = Place {
         instance: layers.instance_id[column],

@@ -226,9 +226,11 @@ impl Session {
         tokio::spawn(async move {
             let _turn = turn;
             let Some(studio) = hall.studio().await else { return };
+            let (gone, watched) = (out.clone(), hall.clone());
+            let progress = Telling::new(|_| {}, move || gone.is_closed() || watched.is_stopped());
             let renderer = hall.renderer.clone();
             let found = hall.work(move || {
-                let (stage, place) = pick::pick(&*renderer, &client.sight(), place)?;
+                let (stage, place) = pick::pick(&*renderer, &client.sight(), place, &progress)?;
                 Some(studio.describe(&stage, &place))
             });
             let message = match found.await {

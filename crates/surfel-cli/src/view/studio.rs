@@ -4,7 +4,7 @@ use super::legend::legend;
 use super::made::{INDEX, Made, Recent, number_points, prepared};
 use super::point;
 use super::settings::{self, Asked, EVERYTHING};
-use crate::args::{Global, SceneArgs};
+use crate::args::{Exposure, Global, SceneArgs};
 use crate::assemble::{Assembly, file_name, name_files};
 use crate::picture::{self, Choices};
 use crate::report::{Report, Verbosity};
@@ -88,10 +88,16 @@ impl ScanStudio {
     }
 
     /// Everything but light and camera, which need no tree to change.
-    fn made(&self, asked: &Asked, choices: &Choices, report: &Report) -> anyhow::Result<Arc<Made>> {
+    fn made(
+        &self,
+        asked: &Asked,
+        time: f64,
+        choices: &Choices,
+        report: &Report,
+    ) -> anyhow::Result<Arc<Made>> {
         let preparation = asked.line.preparation_key();
         let trees = asked.line.tree_key();
-        let frames = self.base.frames_at(asked.time);
+        let frames = self.base.frames_at(time);
         let key = format!("{preparation}\n{trees}\n{:?} {frames:?}", choices.up);
         self.made.get(key, report, || {
             let assembly = self.base.under(&asked.args, &asked.line)?;
@@ -99,7 +105,7 @@ impl ScanStudio {
                 self.workshop.install(|| prepared(&self.base, &assembly, report))
             })?;
             let legend = legend(&clouds, &asked.args.color.coloring(choices.up));
-            let when = (asked.time, choices.up);
+            let when = (time, choices.up);
             let make = || Made::new(assembly, &clouds, legend, when, report);
             self.workshop.install(make)
         })
@@ -107,18 +113,24 @@ impl ScanStudio {
 
     fn stage_of(&self, asked: &Asked, report: &Report) -> anyhow::Result<Stage> {
         let choices = picture::choose(&self.base, &asked.args, report)?;
-        let made = self.made(asked, &choices, report)?;
         let quality = picture::settings(&asked.args, Path::new(""));
-        let mut flat = made.flat.clone();
-        flat.lights.clone_from(&choices.lights);
-        flat.background = asked.args.color.background();
-        // What would fail while it is painted is refused as a whole.
-        render::check(&flat)?;
-        pose(&mut flat, &made.graph, 0.0, &choices, report)?;
-        let stops = self
-            .workshop
-            .install(|| picture::exposure(&self.renderer, &flat, &quality, &asked.args, report))?;
-        pose(&mut flat, &made.graph, asked.time, &choices, report)?;
+        let flat_at = |time| {
+            let made = self.made(asked, time, &choices, report)?;
+            let mut flat = made.flat.clone();
+            flat.lights.clone_from(&choices.lights);
+            flat.background = asked.args.color.background();
+            // What would fail while it is painted is refused as a whole.
+            render::check(&flat)?;
+            pose(&mut flat, &made.graph, time, &choices, report)?;
+            anyhow::Ok((made, flat))
+        };
+        // As the command line does. Without need, the first file of a sequence is not read.
+        let judged_at = if asked.args.light.exposure == Exposure::Auto { 0.0 } else { asked.time };
+        let (_, judged) = flat_at(judged_at)?;
+        let stops = self.workshop.install(|| {
+            picture::exposure(&self.renderer, &judged, &quality, &asked.args, report)
+        })?;
+        let (made, mut flat) = flat_at(asked.time)?;
         light::expose(&mut flat, stops);
         let settings = self.complete(asked, &choices, stops);
         let is_moved = choices.eye.moves(&self.base);

@@ -85,12 +85,15 @@ fn a_sequence_is_seen_at_any_time() {
     let scene = folder.write("scene.toml", sequences::scene("\"sun\"", &files));
     let picture = folder.path("out.png");
     let server = Server::start(&[&scene, "--spp", "1"]);
-    for time in ["1", "0", "2", "0.5", "1.5", "0.5"] {
-        let (status, served) = server.get(&format!("/render?resolution=40x30&time={time}"));
-        assert_eq!(status, 200, "{time}: {}", String::from_utf8_lossy(&served));
-        let options = ["--time", time, "--spp", "1", "--resolution", "40x30", "-o", &picture];
-        succeed(&[&["render", &scene], &options[..]].concat());
-        assert!(served == fs::read(&picture).unwrap(), "at {time}");
+    let times = ["1", "0", "2", "0.5", "1.5", "0.5"].map(|time| (time, "0.2"));
+    for (time, exposure) in times.into_iter().chain([("1", "auto"), ("2", "auto")]) {
+        let query = format!("/render?resolution=40x30&time={time}&exposure={exposure}");
+        let (status, served) = server.get(&query);
+        assert_eq!(status, 200, "{query}: {}", String::from_utf8_lossy(&served));
+        let options = ["--time", time, "--exposure", exposure, "--spp", "1"];
+        let size = ["--resolution", "40x30", "-o", &picture];
+        succeed(&[&["render", &scene][..], &options, &size].concat());
+        assert!(served == fs::read(&picture).unwrap(), "{query}");
     }
 }
 

@@ -45,13 +45,18 @@ impl FlatCloud {
         Ok(flat)
     }
 
-    /// Moves the points to where they are bent to now, in the tree that they have. False if that would not
-    /// do: then it is good for nothing but to be refitted again.
-    pub(super) fn refit(&mut self, points: &Points, bent: Bent) -> Result<bool> {
+    /// Moves the points to where they are bent to now, in the tree that they have. If that does not do, gives
+    /// them in a tree of their own; this one is then good for nothing but to be refitted again.
+    pub(super) fn refit(
+        &mut self,
+        points: &Points,
+        bent: Bent,
+        progress: &dyn Progress,
+    ) -> Result<Option<Self>> {
         let cloud = cloud_of(bent);
         let kept = self.points.refit_in_place(&cloud, self.surface, &points.colors)?;
         self.set_reach();
-        Ok(kept.is_some())
+        kept.is_none().then(|| Self::of(&cloud, points, progress)).transpose()
     }
 
     fn set_reach(&mut self) {

@@ -136,6 +136,7 @@ impl FlatScene {
 
     /// Follows the graph, of which only nodes may have changed, to where they now are: what bends is
     /// refitted, or built where nothing bent it before, instances and lamps are placed anew, all else stays.
+    /// After an error the scene is of no use.
     pub fn update(&mut self, graph: &Graph, progress: &dyn Progress) -> Result<()> {
         let world = graph.world_from_nodes();
         for ((geometry, node), built) in &mut self.built {
@@ -247,17 +248,19 @@ impl Built {
             *flat = first;
         }
         let bent = pose.bend(geometry);
-        let is_kept = match (Arc::make_mut(flat), geometry) {
+        let anew = match (Arc::make_mut(flat), geometry) {
             (FlatGeometry::Mesh(flat), Geometry::Triangles(mesh)) => {
                 flat.refit(mesh, bent, progress)?;
-                true
+                None
             }
-            (FlatGeometry::Cloud(flat), Geometry::Points(points)) => flat.refit(points, bent)?,
-            _ => true,
+            (FlatGeometry::Cloud(flat), Geometry::Points(points)) => {
+                flat.refit(points, bent, progress)?
+            }
+            _ => None,
         };
-        if !is_kept {
-            let anew = FlatGeometry::bent(geometry, pose.bend(geometry), progress)?;
-            self.first = Some(std::mem::replace(flat, Arc::new(anew)));
+        if let Some(anew) = anew {
+            let anew = Arc::new(FlatGeometry::Cloud(anew));
+            self.first = Some(std::mem::replace(flat, anew));
         }
         self.pose = pose;
         Ok(())

@@ -45,7 +45,7 @@ impl Renderer for CpuRenderer {
             (raster::render(scene, &view, settings, piece, progress)?, RenderStats::default())
         } else {
             let tracer = Tracer::new(scene, self.simd, progress);
-            let job = Job { tracer: &tracer, view: &view, settings, piece, progress };
+            let job = Job { tracer: &tracer, view: &view, settings, piece };
             trace(&job)?
         };
         stats.frame_secs = start.elapsed().as_secs_f64();
@@ -54,7 +54,7 @@ impl Renderer for CpuRenderer {
 }
 
 fn trace(job: &Job) -> Result<(Image, RenderStats)> {
-    let Job { settings, piece, progress, .. } = *job;
+    let Job { tracer: Tracer { progress, .. }, settings, piece, .. } = *job;
     progress.begin("render", u64::from(settings.width) * u64::from(piece.n_rows()));
     let mut image = settings.blank(piece);
     let bands: Vec<_> = image.bands_mut(TILE as usize).into_iter().enumerate().collect();
@@ -83,7 +83,6 @@ struct Job<'a> {
     view: &'a View,
     settings: &'a Settings,
     piece: Piece,
-    progress: &'a dyn Progress,
 }
 
 /// What is behind the scene in a row of pixels, with alpha.

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 pub struct Tracer<'a> {
     pub scene: &'a FlatScene,
     pub simd: Simd,
-    progress: &'a dyn Progress,
+    pub progress: &'a dyn Progress,
     /// Rays so far, by all threads.
     n_traced: AtomicUsize,
     /// As many rays as take a `MOMENT`, judged by the last piece of any thread.
@@ -33,11 +33,6 @@ impl<'a> Tracer<'a> {
     pub fn new(scene: &'a FlatScene, simd: Simd, progress: &'a dyn Progress) -> Self {
         let (n_traced, n_affordable) = (AtomicUsize::new(0), AtomicUsize::new(MOST));
         Self { scene, simd, progress, n_traced, n_affordable }
-    }
-
-    /// `Err(Error::Cancelled)` once nobody waits any more.
-    pub fn check(&self) -> Result<()> {
-        self.progress.check()
     }
 
     /// As [`scene_hits`].
@@ -58,7 +53,7 @@ impl<'a> Tracer<'a> {
     fn in_pieces(&self, n_rays: usize, mut trace: impl FnMut(Range<usize>)) -> Result<()> {
         let mut first = 0;
         while first < n_rays {
-            self.check()?;
+            self.progress.check()?;
             let end = n_rays.min(first + self.n_at_once());
             let start = Instant::now();
             trace(first..end);
