@@ -53,8 +53,8 @@ pub struct Frustum {
 /// The boxes of a node's children, relative to the frustum's anchor, widened by rounding; axes are in the order
 /// of `Frustum::axes`.
 pub struct Boxes<L> {
-    min: [L; 3],
-    max: [L; 3],
+    pub min: [L; 3],
+    pub max: [L; 3],
 }
 
 impl<L: Lanes> Boxes<L> {

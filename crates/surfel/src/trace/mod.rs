@@ -16,6 +16,7 @@ mod region;
 mod rounds;
 mod sightings;
 mod simd;
+mod sparse;
 mod splat;
 mod surface;
 mod tracer;

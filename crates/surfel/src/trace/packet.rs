@@ -3,6 +3,7 @@
 use super::boxes::inverse;
 use super::frustum::{self, Frustum};
 use super::memory::Memory;
+use super::sparse::{self, Density};
 use crate::bvh::{Child, Node, STACK_SIZE};
 use crate::flat::BlockTree;
 use crate::math::{LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
@@ -22,9 +23,9 @@ pub struct Packet<'r, W> {
     pub wide: WideRays<W>,
     pub frustum: Frustum,
     /// Of the directions, in the order of the frustum's axes.
-    inverse: [W; 3],
+    pub inverse: [W; 3],
     /// Origins relative to the frustum's anchor, in the same order.
-    from_anchor: [W; 3],
+    pub from_anchor: [W; 3],
     /// Where all rays start, if that is one place.
     pub common_origin: Option<Vec3>,
 }
@@ -151,12 +152,13 @@ struct ChildBox {
 pub struct PacketStack {
     boxes: [ChildBox; STACK_SIZE],
     size: usize,
+    density: Density,
 }
 
 impl PacketStack {
     pub fn new() -> Self {
         let nothing = ChildBox { child: 0, entry: 0.0, min: [0.0; 3], max: [0.0; 3] };
-        Self { boxes: [nothing; STACK_SIZE], size: 0 }
+        Self { boxes: [nothing; STACK_SIZE], size: 0, density: Density::new() }
     }
 
     /// Begins with the root, whose box holds all.
@@ -165,6 +167,7 @@ impl PacketStack {
         let (min, max) = ([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
         self.boxes[0] = ChildBox { child: Child::Node(0).pack(), entry: 0.0, min, max };
         self.size = 1;
+        self.density.forget_old();
     }
 
     #[inline(always)]
@@ -222,29 +225,45 @@ pub fn along_packet<L: Lanes, V: PacketVisitor<L>, const IS_ORDERED: bool>(
 ) {
     let memory = Memory::new(tree);
     let mut limit = packet.frustum.limit(&packet.wide, visitor.limits());
+    // Only nodes need it: worked out after each block, it took a tenth of the time of dense clouds.
+    let mut is_limit_old = false;
     stack.start();
     while let Some(next) = stack.pop() {
         if IS_ORDERED && limit < next.entry {
             continue;
         }
         let lanes = packet.passing(&next, visitor.limits());
+        let child = Child::unpack(next.child);
+        if let Child::Block(block_idx) = child
+            && lanes != 0
+        {
+            if lanes.is_power_of_two() {
+                visitor.visit_alone(tree, block_idx, lanes.trailing_zeros() as usize);
+            } else {
+                visitor.visit(tree, block_idx);
+            }
+            stack.density.add(lanes.count_ones(), 1);
+            is_limit_old = true;
+            continue;
+        }
+        if is_limit_old {
+            limit = packet.frustum.limit(&packet.wide, visitor.limits());
+            if limit == f32::NEG_INFINITY {
+                return;
+            }
+            is_limit_old = false;
+        }
+        let Child::Node(node_idx) = child else { continue };
         if lanes == 0 {
             continue;
         }
-        match Child::unpack(next.child) {
-            Child::Node(node_idx) => {
-                let node = &tree.nodes()[node_idx as usize];
-                stack.push_children::<L, IS_ORDERED>(node, &memory, &packet.frustum, limit);
-                continue;
-            }
-            Child::Block(block_idx) if lanes.is_power_of_two() => {
-                visitor.visit_alone(tree, block_idx, lanes.trailing_zeros() as usize);
-            }
-            Child::Block(block_idx) => visitor.visit(tree, block_idx),
-        }
-        limit = packet.frustum.limit(&packet.wide, visitor.limits());
-        if limit == f32::NEG_INFINITY {
-            return;
+        let node = &tree.nodes()[node_idx as usize];
+        if node.has_only_blocks() && stack.density.is_low() {
+            let density = &mut stack.density;
+            sparse::show_each::<L, V>(tree, node, packet, lanes, &memory, density, visitor);
+            is_limit_old = true;
+        } else {
+            stack.push_children::<L, IS_ORDERED>(node, &memory, &packet.frustum, limit);
         }
     }
 }
