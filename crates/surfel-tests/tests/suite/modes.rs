@@ -20,7 +20,11 @@ const TILE: usize = 16;
 
 #[test]
 fn all_modes_find_the_same_in_sound_clouds() {
-    let more = [("cube", clouds::cube(12, 0.3, 5)), ("even cube", clouds::cube(8, 0.0, 5))];
+    let more = [
+        ("cube", clouds::cube(12, 0.3, 5)),
+        ("even cube", clouds::cube(8, 0.0, 5)),
+        ("sphere of more discs than rays", clouds::sphere(20_000, 1.0)),
+    ];
     for (name, cloud) in trace::test_clouds().into_iter().chain(more) {
         for kind in [SurfaceKind::Sphere, SurfaceKind::SplatFit] {
             check_modes(name, &scenes::flat(cloud.clone(), kind), 8);

@@ -40,9 +40,11 @@ impl Density {
         }
     }
 
+    /// Not before the first block: in crowds, the blocks of one node shown to each ray cost as much as a
+    /// whole packet.
     #[inline(always)]
     pub fn is_low(&self) -> bool {
-        self.n_rays as f32 <= FEW * self.n_blocks as f32
+        (self.n_rays as f32) < FEW * self.n_blocks as f32
     }
 }
 
