@@ -2,7 +2,8 @@
 //!
 //! Where many points lie behind a pixel, hardly two rays of a packet meet the same discs. To put the blocks of
 //! a node on the stack one by one, and to try each of their discs on all rays, then costs more than to find out
-//! which ray enters which block.
+//! which ray enters which block. Rays that look for any hit go without: shadow rays of clouds of a million
+//! points were a tenth slower.
 
 use super::frustum::Boxes;
 use super::memory::Memory;
