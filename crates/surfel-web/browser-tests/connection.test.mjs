@@ -29,7 +29,7 @@ test('a page finds its server again, and keeps its view', async () => {
   assert.notDeepEqual(turned, camera);
   await serve(['town.ply'], '--port', server.port, ...QUICK);
   await page.locator('#banner').waitFor({ state: 'hidden' });
-  await page.waitForFunction(() => window.surfel.state.lastFrame.finished);
+  await page.waitForFunction(() => window.surfel.state.lastFrame?.finished);
   await page.keyboard.press('o');
   await settled(page);
   const { color, range, sun } = await state(page, 'scene');
@@ -53,7 +53,7 @@ test('a page that only waited shows the same picture again', async () => {
   await serve(['town.ply'], '--port', server.port, ...QUICK);
   await page.waitForFunction((before) => {
     const { lastFrame, connected } = window.surfel.state;
-    return connected && lastFrame.finished && before < lastFrame.shownAt;
+    return connected && lastFrame?.finished && before < lastFrame.shownAt;
   }, shownAt);
   assert.equal(await pixels(page), screen);
 });
