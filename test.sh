@@ -97,7 +97,7 @@ tests "doc tests" cargo test --workspace --doc --no-fail-fast
 if node -e 'const [a, b] = process.versions.node.split("."); process.exit(+a < 20 || (+a === 20 && +b < 11) ? 1 : 0)' 2>/dev/null; then
     page_tests "page" crates/surfel-web/page-tests/*.test.mjs
     if prepare_browser; then
-        check "the program for the browser" cargo build -p surfel-cli
+        # With the program that the tests above have built.
         page_tests "browser" --test-concurrency=1 crates/surfel-web/browser-tests/*.test.mjs
     else
         skip "tests in a browser: $missing"
@@ -110,11 +110,8 @@ if cargo deny --version >/dev/null 2>&1; then
 else
     skip "cargo deny is not installed (cargo install cargo-deny)"
 fi
-# Criterion's --test runs each benchmark once, untimed.
-for bench in crates/surfel-tests/benches/*.rs; do
-    name=$(basename "$bench" .rs)
-    check "benchmark $name, once" cargo bench -p surfel-tests --bench "$name" -- --test
-done
+# Under cargo test, Criterion runs each benchmark once, untimed.
+check "benchmarks, once" cargo test --workspace --bench '*'
 
 echo "$passed passed, $failed failed, $skipped skipped"
 [ "$failed" -eq 0 ]

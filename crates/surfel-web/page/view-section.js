@@ -29,7 +29,12 @@ export function viewRows(viewer, navigation) {
   const sides = element('div', { class: 'sides' }, ...SIDES.map((side, i) => element('button', {
     type: 'button', class: 'button', title: `${side} (${i + 1})`, 'data-side': side, onclick: () => navigation.lookFrom(side),
   }, side)));
-  return [projection, angle, trackball, sides, turntable(viewer, navigation)];
+  const rows = [projection, angle, trackball, sides, turntable(viewer, navigation)];
+  // Where a camera is that the scene moves is not known at once.
+  const follow = () => rows.forEach((row) => { row.inert = !viewer.camera; });
+  viewer.cameraChanged.listen(follow);
+  follow();
+  return rows;
 }
 
 /** A row that follows the camera instead of the scene. */
