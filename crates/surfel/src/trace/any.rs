@@ -110,7 +110,8 @@ impl<S: Leaf, J: Judge> RayVisitor for Any<'_, S, J> {
 
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, tree: &S::Tree, block_idx: u32) -> ControlFlow<()> {
-        let hits = S::hits::<L>(tree, block_idx, self.ray);
+        let seen = S::seen_from::<L>(tree, block_idx, self.ray.origin);
+        let hits = S::hits(&seen, block_idx, self.ray);
         if J::IS_LENIENT {
             self.is_hit = hits.lanes(self.ray.t_max) != 0;
         } else {
@@ -142,7 +143,7 @@ fn any_in_packet<L: Lanes, S: Leaf, J: Judge>(
     let limits = packet.limits();
     let mut any =
         AnyInPacket::<L, S, J> { packet, judge, lines: S::lines(&packet.wide), limits, is_hit: 0 };
-    along_packet::<L, _, false>(tree, packet, stack, &mut any);
+    along_packet::<L, _>(tree, packet, stack, &mut any);
     for (lane, occluded) in occluded.iter_mut().enumerate() {
         *occluded = any.is_hit >> lane & 1 == 1;
     }
@@ -206,6 +207,8 @@ impl<L: Lanes, S: Leaf, J: Judge> AnyInPacket<'_, L, S, J> {
 
 impl<L: Lanes, S: Leaf, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> {
     type Tree = S::Tree;
+    const IS_ORDERED: bool = false;
+    const MAY_BE_SPARSE: bool = false;
 
     #[inline(always)]
     fn limits(&self) -> &[f32; WIDE] {
@@ -237,11 +240,16 @@ impl<L: Lanes, S: Leaf, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> 
     }
 
     #[inline(always)]
-    fn visit_alone(&mut self, tree: &S::Tree, block_idx: u32, lane: usize) {
-        let (ray, limit) = (&self.packet.rays[lane], self.limits[lane]);
-        let hits = S::hits::<L>(tree, block_idx, ray);
-        if has_counting::<L, J>(&hits, ray, limit, self.judge) {
-            self.block(1 << lane);
+    fn visit_each(&mut self, tree: &S::Tree, block_idx: u32, mut lanes: u32) {
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % WIDE;
+            lanes &= lanes - 1;
+            let (ray, limit) = (&self.packet.rays[lane], self.limits[lane]);
+            let seen = S::seen_from::<L>(tree, block_idx, ray.origin);
+            let hits = S::hits(&seen, block_idx, ray);
+            if has_counting::<L, J>(&hits, ray, limit, self.judge) {
+                self.block(1 << lane);
+            }
         }
     }
 }

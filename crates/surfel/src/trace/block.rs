@@ -16,11 +16,16 @@ pub trait Leaf {
     /// Rays of a packet as the shapes meet them.
     type Lines<W: Wide>: Copy;
     type BeforePacket<L: Lanes>: BeforePacket<L, Lines = Self::Lines<L::Wide>>;
+    /// Eight shapes as rays from one place meet them.
+    type Seen<L: Lanes>;
 
     fn lines<W: Wide>(rays: &WideRays<W>) -> Self::Lines<W>;
 
-    /// A block's shapes before one ray.
-    fn hits<L: Lanes>(tree: &Self::Tree, block_idx: u32, ray: &Ray) -> BlockHits<L>;
+    /// A block's shapes, decoded for rays from `origin`.
+    fn seen_from<L: Lanes>(tree: &Self::Tree, block_idx: u32, origin: Vec3) -> Self::Seen<L>;
+
+    /// Where a ray from there meets the shapes of the block.
+    fn hits<L: Lanes>(seen: &Self::Seen<L>, block_idx: u32, ray: &Ray) -> BlockHits<L>;
 
     /// A block made ready for the rays of a packet.
     fn before_packet<L: Lanes>(
@@ -113,6 +118,7 @@ impl<S: Shape> Leaf for S {
     type Tree = FlatPoints;
     type Lines<W: Wide> = RayLanes<W>;
     type BeforePacket<L: Lanes> = PointsBeforePacket<L, S>;
+    type Seen<L: Lanes> = PointLanes<L>;
 
     #[inline(always)]
     fn lines<W: Wide>(rays: &WideRays<W>) -> RayLanes<W> {
@@ -120,10 +126,14 @@ impl<S: Shape> Leaf for S {
     }
 
     #[inline(always)]
-    fn hits<L: Lanes>(points: &FlatPoints, block_idx: u32, ray: &Ray) -> BlockHits<L> {
-        let lanes = points.blocks[block_idx as usize].points::<L>(ray.origin);
-        let (distances, is_hit) = S::intersect(&lanes, &RayLanes::<L>::new(ray));
-        BlockHits { first_slot: block_idx * LANES as u32, distances, radii: lanes.radius, is_hit }
+    fn seen_from<L: Lanes>(points: &FlatPoints, block_idx: u32, origin: Vec3) -> PointLanes<L> {
+        points.blocks[block_idx as usize].points(origin)
+    }
+
+    #[inline(always)]
+    fn hits<L: Lanes>(seen: &PointLanes<L>, block_idx: u32, ray: &Ray) -> BlockHits<L> {
+        let (distances, is_hit) = S::intersect(seen, &RayLanes::new(ray));
+        BlockHits { first_slot: block_idx * LANES as u32, distances, radii: seen.radius, is_hit }
     }
 
     #[inline(always)]
@@ -190,6 +200,7 @@ impl Leaf for Triangle {
     type Tree = FlatTriangles;
     type Lines<W: Wide> = LineLanes<W>;
     type BeforePacket<L: Lanes> = TrianglesBeforePacket<L>;
+    type Seen<L: Lanes> = TrianglesSeen<Vec3Lanes<L>, L>;
 
     #[inline(always)]
     fn lines<W: Wide>(rays: &WideRays<W>) -> LineLanes<W> {
@@ -197,10 +208,22 @@ impl Leaf for Triangle {
     }
 
     #[inline(always)]
-    fn hits<L: Lanes>(triangles: &FlatTriangles, block_idx: u32, ray: &Ray) -> BlockHits<L> {
+    fn seen_from<L: Lanes>(
+        triangles: &FlatTriangles,
+        block_idx: u32,
+        origin: Vec3,
+    ) -> TrianglesSeen<Vec3Lanes<L>, L> {
         let corners = triangles.blocks[block_idx as usize].corners::<L>();
-        let seen = TriangleLanes::new(corners).seen_from(Vec3Lanes::splat(ray.origin));
-        let (distances, is_hit) = seen.intersect(&LineLanes::new(RayLanes::<L>::new(ray)));
+        TriangleLanes::new(corners).seen_from(Vec3Lanes::splat(origin))
+    }
+
+    #[inline(always)]
+    fn hits<L: Lanes>(
+        seen: &TrianglesSeen<Vec3Lanes<L>, L>,
+        block_idx: u32,
+        ray: &Ray,
+    ) -> BlockHits<L> {
+        let (distances, is_hit) = seen.intersect(&LineLanes::new(RayLanes::new(ray)));
         let first_slot = block_idx * LANES as u32;
         BlockHits { first_slot, distances, radii: L::splat(0.0), is_hit }
     }

@@ -81,7 +81,8 @@ impl<S: Leaf> RayVisitor for Closest<'_, S> {
 
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, tree: &S::Tree, block_idx: u32) -> ControlFlow<()> {
-        let hit = S::hits::<L>(tree, block_idx, self.ray).nearest();
+        let seen = S::seen_from::<L>(tree, block_idx, self.ray.origin);
+        let hit = S::hits(&seen, block_idx, self.ray).nearest();
         self.hit = hit.nearer(self.hit);
         ControlFlow::Continue(())
     }
@@ -100,7 +101,7 @@ fn closest_in_packet<L: Lanes, S: Leaf>(
         distances: packet.limits(),
         slots: [f32::from_bits(Hit::MISS.slot); WIDE],
     };
-    along_packet::<L, _, true>(tree, packet, stack, &mut closest);
+    along_packet::<L, _>(tree, packet, stack, &mut closest);
     write_hits::<L::Wide>(&closest.distances, &closest.slots, hits);
 }
 
@@ -149,6 +150,8 @@ struct ClosestInPacket<'p, L: Lanes, S: Leaf> {
 
 impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
     type Tree = S::Tree;
+    const IS_ORDERED: bool = true;
+    const MAY_BE_SPARSE: bool = true;
 
     #[inline(always)]
     fn limits(&self) -> &[f32; WIDE] {
@@ -182,11 +185,21 @@ impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
     }
 
     #[inline(always)]
-    fn visit_alone(&mut self, tree: &S::Tree, block_idx: u32, lane: usize) {
-        let ray = &self.packet.rays[lane];
-        let hit = Hit { distance: self.distances[lane] + 0.0, slot: self.slots[lane].to_bits() };
-        let hit = S::hits::<L>(tree, block_idx, ray).nearest().nearer(hit);
-        self.distances[lane] = hit.distance;
-        self.slots[lane] = f32::from_bits(hit.slot);
+    fn visit_each(&mut self, tree: &S::Tree, block_idx: u32, mut lanes: u32) {
+        // Decoded once if all rays start in one place.
+        let common_origin = self.packet.common_origin;
+        let mut seen = S::seen_from::<L>(tree, block_idx, common_origin.unwrap_or_default());
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % WIDE;
+            lanes &= lanes - 1;
+            let (distance, slot) = (self.distances[lane] + 0.0, self.slots[lane].to_bits());
+            let ray = &self.packet.rays[lane];
+            if common_origin.is_none() {
+                seen = S::seen_from::<L>(tree, block_idx, ray.origin);
+            }
+            let hit = S::hits(&seen, block_idx, ray).nearest().nearer(Hit { distance, slot });
+            self.distances[lane] = hit.distance;
+            self.slots[lane] = f32::from_bits(hit.slot);
+        }
     }
 }

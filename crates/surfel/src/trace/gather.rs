@@ -36,7 +36,7 @@ pub(super) fn gather<L: Lanes>(
     if let Some(packet) = Packet::new(&points.nodes[0], rays, false) {
         let mut gathering =
             GatherInPacket::<L> { packet: &packet, limits: packet.limits(), sightings };
-        along_packet::<L, _, true>(points, &packet, stack, &mut gathering);
+        along_packet::<L, _>(points, &packet, stack, &mut gathering);
         return gathering.limits;
     }
     let mut gatherings = [Gathering::new(&rays[0]); WIDE];
@@ -93,7 +93,8 @@ impl RayVisitor for Gathering<'_> {
 
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let hits = Disc::hits::<L>(points, block_idx, self.ray);
+        let seen = Disc::seen_from::<L>(points, block_idx, self.ray.origin);
+        let hits = Disc::hits(&seen, block_idx, self.ray);
         let mut hits = hits.up_to(self.limit());
         while let Some((hit, radius)) = hits.next() {
             if hit.distance <= self.limit {
@@ -115,6 +116,8 @@ struct GatherInPacket<'p, L: Lanes> {
 
 impl<L: Lanes> PacketVisitor<L> for GatherInPacket<'_, L> {
     type Tree = FlatPoints;
+    const IS_ORDERED: bool = true;
+    const MAY_BE_SPARSE: bool = false;
 
     #[inline(always)]
     fn limits(&self) -> &[f32; WIDE] {
@@ -146,13 +149,17 @@ impl<L: Lanes> PacketVisitor<L> for GatherInPacket<'_, L> {
     }
 
     #[inline(always)]
-    fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
-        let ray = &self.packet.rays[lane];
-        let hits = Disc::hits::<L>(points, block_idx, ray);
-        let mut hits = hits.up_to(self.limits[lane]);
-        while let Some((hit, radius)) = hits.next() {
-            self.limits[lane] = self.limits[lane].min(gather_limit(hit.distance, radius));
-            self.sightings.push(Sighting::by_one(lane, hit));
+    fn visit_each(&mut self, points: &FlatPoints, block_idx: u32, mut lanes: u32) {
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % WIDE;
+            lanes &= lanes - 1;
+            let ray = &self.packet.rays[lane];
+            let seen = Disc::seen_from::<L>(points, block_idx, ray.origin);
+            let mut hits = Disc::hits(&seen, block_idx, ray).up_to(self.limits[lane]);
+            while let Some((hit, radius)) = hits.next() {
+                self.limits[lane] = self.limits[lane].min(gather_limit(hit.distance, radius));
+                self.sightings.push(Sighting::by_one(lane, hit));
+            }
         }
     }
 }

@@ -1,12 +1,12 @@
 //! Sixteen rays that go much the same way, walked through the tree together.
 
 use super::boxes::inverse;
-use super::frustum::{self, Frustum};
+use super::frustum::{self, Boxes, Frustum};
 use super::memory::Memory;
 use super::sparse::{self, Density};
 use crate::bvh::{Child, Node, STACK_SIZE};
 use crate::flat::BlockTree;
-use crate::math::{LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
+use crate::math::{LANES, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
 use crate::surface::RayLanes;
 
 /// Sixteen rays in lanes.
@@ -33,14 +33,18 @@ pub struct Packet<'r, W> {
 /// What is looked for along the rays of a packet.
 pub trait PacketVisitor<L: Lanes> {
     type Tree: BlockTree;
+    /// Whether near boxes come first.
+    const IS_ORDERED: bool;
+    /// Whether blocks that few rays enter may be shown to these alone, a node's all at once (`sparse`).
+    const MAY_BE_SPARSE: bool;
 
     /// A box entered beyond this is left out; below any distance where the ray needs nothing more.
     fn limits(&self) -> &[f32; WIDE];
 
     fn visit(&mut self, tree: &Self::Tree, block_idx: u32);
 
-    /// Shows the block to the ray in this lane alone.
-    fn visit_alone(&mut self, tree: &Self::Tree, block_idx: u32, lane: usize);
+    /// Shows the block to the rays in these lanes, one after the other.
+    fn visit_each(&mut self, tree: &Self::Tree, block_idx: u32, lanes: u32);
 }
 
 impl<W: Wide> WideRays<W> {
@@ -148,6 +152,23 @@ struct ChildBox {
     max: [f32; 3],
 }
 
+/// The children of a node that a packet's frustum meets.
+pub struct Met<'n, L> {
+    pub node: &'n Node,
+    pub boxes: Boxes<L>,
+    entries: [f32; LANES],
+    pub lanes: u32,
+}
+
+impl<'n, L: Lanes> Met<'n, L> {
+    #[inline(always)]
+    fn new(node: &'n Node, frustum: &Frustum, limit: f32) -> Self {
+        let boxes = frustum.boxes::<L>(node);
+        let (lanes, entries) = frustum.meets::<L>(&boxes, limit);
+        Self { node, boxes, entries, lanes: lanes & node.occupied() }
+    }
+}
+
 /// What a search of a packet has still to look at. Kept from packet to packet.
 pub struct PacketStack {
     boxes: [ChildBox; STACK_SIZE],
@@ -176,18 +197,11 @@ impl PacketStack {
         Some(self.boxes[self.size])
     }
 
-    /// Pushes the children of a node that the frustum meets up to `limit`, and asks for their memory.
+    /// Pushes children and asks for their memory.
     #[inline(always)]
-    fn push_children<L: Lanes, const IS_ORDERED: bool>(
-        &mut self,
-        node: &Node,
-        memory: &Memory,
-        frustum: &Frustum,
-        limit: f32,
-    ) {
-        let boxes = frustum.boxes::<L>(node);
-        let (mut lanes, entries) = frustum.meets::<L>(&boxes, limit);
-        lanes &= node.occupied();
+    fn push<L: Lanes>(&mut self, met: &Met<L>, memory: &Memory, is_ordered: bool) {
+        let Met { node, boxes, entries, .. } = met;
+        let mut lanes = met.lanes;
         let (min, max) = boxes.store();
         let children = node.packed_children::<L>().store();
         let first = self.size;
@@ -197,7 +211,7 @@ impl PacketStack {
             let child = children[lane].to_bits();
             memory.prefetch::<L>(child);
             let mut place = self.size;
-            if IS_ORDERED {
+            if is_ordered {
                 while first < place && self.boxes[place - 1].entry < entries[lane] {
                     self.boxes[place] = self.boxes[place - 1];
                     place -= 1;
@@ -214,10 +228,9 @@ impl PacketStack {
     }
 }
 
-/// Shows `visitor` every block whose box a ray of the packet enters before its limit, near boxes first
-/// if `IS_ORDERED`.
+/// Shows `visitor` every block whose box a ray of the packet enters before its limit.
 #[inline(always)]
-pub fn along_packet<L: Lanes, V: PacketVisitor<L>, const IS_ORDERED: bool>(
+pub fn along_packet<L: Lanes, V: PacketVisitor<L>>(
     tree: &V::Tree,
     packet: &Packet<L::Wide>,
     stack: &mut PacketStack,
@@ -225,48 +238,51 @@ pub fn along_packet<L: Lanes, V: PacketVisitor<L>, const IS_ORDERED: bool>(
 ) {
     let memory = Memory::new(tree);
     let mut limit = packet.frustum.limit(&packet.wide, visitor.limits());
-    // Only nodes need it: worked out after each block, it took a tenth of the time of dense clouds. Rays that
-    // look for any hit ask each time, as they may all be done.
     let mut is_limit_old = false;
     stack.start();
     while let Some(next) = stack.pop() {
-        if IS_ORDERED && limit < next.entry {
+        if V::IS_ORDERED && limit < next.entry {
             continue;
         }
         let lanes = packet.passing(&next, visitor.limits());
-        let child = Child::unpack(next.child);
-        if let Child::Block(block_idx) = child
-            && lanes != 0
-        {
-            if lanes.is_power_of_two() {
-                visitor.visit_alone(tree, block_idx, lanes.trailing_zeros() as usize);
-            } else {
-                visitor.visit(tree, block_idx);
-            }
-            stack.density.add(lanes.count_ones(), 1);
-            is_limit_old = true;
-            if IS_ORDERED {
-                continue;
-            }
-        }
-        if is_limit_old {
-            limit = packet.frustum.limit(&packet.wide, visitor.limits());
-            if limit == f32::NEG_INFINITY {
-                return;
-            }
-            is_limit_old = false;
-        }
-        let Child::Node(node_idx) = child else { continue };
         if lanes == 0 {
             continue;
         }
-        let node = &tree.nodes()[node_idx as usize];
-        if IS_ORDERED && node.has_only_blocks() && stack.density.is_low() {
-            let density = &mut stack.density;
-            sparse::show_each::<L, V>(tree, node, packet, lanes, &memory, density, visitor);
-            is_limit_old = true;
-        } else {
-            stack.push_children::<L, IS_ORDERED>(node, &memory, &packet.frustum, limit);
+        match Child::unpack(next.child) {
+            Child::Node(node_idx) => {
+                // Not after each block: so it took a tenth of the time of dense clouds.
+                if is_limit_old {
+                    limit = packet.frustum.limit(&packet.wide, visitor.limits());
+                    is_limit_old = false;
+                }
+                let node = &tree.nodes()[node_idx as usize];
+                let met = Met::<L>::new(node, &packet.frustum, limit);
+                if V::MAY_BE_SPARSE && node.has_only_blocks() && stack.density.is_low() {
+                    let density = &mut stack.density;
+                    sparse::show_each::<L, V>(tree, &met, packet, lanes, &memory, density, visitor);
+                    is_limit_old = true;
+                } else {
+                    stack.push(&met, &memory, V::IS_ORDERED);
+                }
+            }
+            Child::Block(block_idx) => {
+                if lanes.is_power_of_two() {
+                    visitor.visit_each(tree, block_idx, lanes);
+                } else {
+                    visitor.visit(tree, block_idx);
+                }
+                if V::MAY_BE_SPARSE {
+                    stack.density.add(lanes.count_ones(), 1);
+                }
+                if V::IS_ORDERED {
+                    is_limit_old = true;
+                    continue;
+                }
+                limit = packet.frustum.limit(&packet.wide, visitor.limits());
+                if limit == f32::NEG_INFINITY {
+                    return;
+                }
+            }
         }
     }
 }
