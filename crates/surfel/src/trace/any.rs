@@ -2,9 +2,10 @@
 
 use super::block::{BeforePacket, BlockHits, Leaf, Worth};
 use super::flight::{RayVisitor, fly};
+use super::group::{GROUP, Group};
 use super::hit::Hit;
 use super::packet::{Packet, PacketStack, PacketVisitor, WideRays, along_packet};
-use crate::flat::{BlockTree, FlatCloud, FlatTriangles, Slot};
+use crate::flat::{FlatCloud, FlatTriangles, Slot};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, WIDE, Wide};
 use crate::surface::{Disc, Sphere, Triangle};
 use std::marker::PhantomData;
@@ -70,15 +71,20 @@ pub(super) fn any_that_counts<L: Lanes, S: Leaf, J: Judge>(
     let mut stack = PacketStack::new();
     let mut loose = Vec::with_capacity(rays.len());
     let mut indices = Vec::with_capacity(rays.len());
-    for (first, rays) in rays.chunks(WIDE).enumerate() {
-        if let Some(packet) = Packet::new(&tree.nodes()[0], rays, true) {
-            let occluded = &mut occluded[first * WIDE..][..rays.len()];
-            any_in_packet::<L, S, J>(tree, &packet, judge, &mut stack, occluded);
-            continue;
-        }
-        for (lane, ray) in rays.iter().enumerate() {
-            loose.push(Any { ray, judge, shape: PhantomData::<S>, is_hit: false });
-            indices.push(first * WIDE + lane);
+    let mut group = Group::new(true);
+    for (group_idx, rays) in rays.chunks(GROUP).enumerate() {
+        group.take::<L, _>(tree, rays);
+        for (place, rays) in rays.chunks(WIDE).enumerate() {
+            let first = group_idx * GROUP + place * WIDE;
+            if let Some(packet) = group.packet(tree, place, rays) {
+                let occluded = &mut occluded[first..][..rays.len()];
+                any_in_packet::<L, S, J>(tree, &packet, judge, &mut stack, occluded);
+                continue;
+            }
+            for (lane, ray) in rays.iter().enumerate() {
+                loose.push(Any { ray, judge, shape: PhantomData::<S>, is_hit: false });
+                indices.push(first + lane);
+            }
         }
     }
     fly::<L, _>(tree, &mut loose);
@@ -240,16 +246,12 @@ impl<L: Lanes, S: Leaf, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> 
     }
 
     #[inline(always)]
-    fn visit_each(&mut self, tree: &S::Tree, block_idx: u32, mut lanes: u32) {
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % WIDE;
-            lanes &= lanes - 1;
-            let (ray, limit) = (&self.packet.rays[lane], self.limits[lane]);
-            let seen = S::seen_from::<L>(tree, block_idx, ray.origin);
-            let hits = S::hits(&seen, block_idx, ray);
-            if has_counting::<L, J>(&hits, ray, limit, self.judge) {
-                self.block(1 << lane);
-            }
+    fn visit_alone(&mut self, tree: &S::Tree, block_idx: u32, lane: usize) {
+        let (ray, limit) = (&self.packet.rays[lane], self.limits[lane]);
+        let seen = S::seen_from::<L>(tree, block_idx, ray.origin);
+        let hits = S::hits(&seen, block_idx, ray);
+        if has_counting::<L, J>(&hits, ray, limit, self.judge) {
+            self.block(1 << lane);
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use super::block::{BeforePacket, Leaf, Worth};
 use super::flight::{RayVisitor, fly};
+use super::group::{GROUP, Group};
 use super::hit::Hit;
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
-use crate::flat::{BlockTree, FlatCloud, FlatTriangles};
+use crate::flat::{FlatCloud, FlatTriangles};
 use crate::math::{Floats, LANES, Lanes, Ray, WIDE, Wide};
 use crate::surface::{Disc, Sphere, Triangle};
 use std::marker::PhantomData;
@@ -34,16 +35,21 @@ fn closest_of_shape<L: Lanes, S: Leaf>(tree: &S::Tree, rays: &[Ray], hits: &mut 
     let mut stack = PacketStack::new();
     let mut loose = Vec::with_capacity(rays.len());
     let mut indices = Vec::with_capacity(rays.len());
-    for (first, rays) in rays.chunks(WIDE).enumerate() {
-        if let Some(packet) = Packet::new(&tree.nodes()[0], rays, false) {
-            let hits = &mut hits[first * WIDE..][..rays.len()];
-            closest_in_packet::<L, S>(tree, &packet, &mut stack, hits);
-            continue;
-        }
-        for (lane, ray) in rays.iter().enumerate() {
-            let hit = Hit { distance: ray.t_max + 0.0, ..Hit::MISS };
-            loose.push(Closest::<S>::new(ray, hit));
-            indices.push(first * WIDE + lane);
+    let mut group = Group::new(false);
+    for (group_idx, rays) in rays.chunks(GROUP).enumerate() {
+        group.take::<L, _>(tree, rays);
+        for (place, rays) in rays.chunks(WIDE).enumerate() {
+            let first = group_idx * GROUP + place * WIDE;
+            if let Some(packet) = group.packet(tree, place, rays) {
+                let hits = &mut hits[first..][..rays.len()];
+                closest_in_packet::<L, S>(tree, &packet, &mut stack, hits);
+                continue;
+            }
+            for (lane, ray) in rays.iter().enumerate() {
+                let hit = Hit { distance: ray.t_max + 0.0, ..Hit::MISS };
+                loose.push(Closest::<S>::new(ray, hit));
+                indices.push(first + lane);
+            }
         }
     }
     fly::<L, _>(tree, &mut loose);
@@ -148,6 +154,17 @@ struct ClosestInPacket<'p, L: Lanes, S: Leaf> {
     slots: [f32; WIDE],
 }
 
+impl<L: Lanes, S: Leaf> ClosestInPacket<'_, L, S> {
+    /// Keeps what the ray in `lane` meets of a block, if it is nearer.
+    #[inline(always)]
+    fn meet(&mut self, seen: &S::Seen<L>, block_idx: u32, lane: usize) {
+        let hit = Hit { distance: self.distances[lane] + 0.0, slot: self.slots[lane].to_bits() };
+        let hit = S::hits(seen, block_idx, &self.packet.rays[lane]).nearest().nearer(hit);
+        self.distances[lane] = hit.distance;
+        self.slots[lane] = f32::from_bits(hit.slot);
+    }
+}
+
 impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
     type Tree = S::Tree;
     const IS_ORDERED: bool = true;
@@ -185,21 +202,25 @@ impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
     }
 
     #[inline(always)]
+    fn visit_alone(&mut self, tree: &S::Tree, block_idx: u32, lane: usize) {
+        let seen = S::seen_from::<L>(tree, block_idx, self.packet.rays[lane].origin);
+        self.meet(&seen, block_idx, lane);
+    }
+
+    #[inline(always)]
     fn visit_each(&mut self, tree: &S::Tree, block_idx: u32, mut lanes: u32) {
         // Decoded once if all rays start in one place.
-        let common_origin = self.packet.common_origin;
-        let mut seen = S::seen_from::<L>(tree, block_idx, common_origin.unwrap_or_default());
+        let seen = match self.packet.common_origin {
+            Some(origin) => Some(S::seen_from::<L>(tree, block_idx, origin)),
+            None => None,
+        };
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % WIDE;
             lanes &= lanes - 1;
-            let (distance, slot) = (self.distances[lane] + 0.0, self.slots[lane].to_bits());
-            let ray = &self.packet.rays[lane];
-            if common_origin.is_none() {
-                seen = S::seen_from::<L>(tree, block_idx, ray.origin);
+            match &seen {
+                Some(seen) => self.meet(seen, block_idx, lane),
+                None => self.visit_alone(tree, block_idx, lane),
             }
-            let hit = S::hits(&seen, block_idx, ray).nearest().nearer(Hit { distance, slot });
-            self.distances[lane] = hit.distance;
-            self.slots[lane] = f32::from_bits(hit.slot);
         }
     }
 }

@@ -23,12 +23,59 @@ pub fn may_be_alike(rays: &[Ray]) -> bool {
     let first = rays[0].direction;
     let least = COSINE * COSINE * first.length_squared();
     let mut are_alike = true;
-    for ray_idx in [5, 10, 15] {
-        let other = rays[ray_idx.min(rays.len() - 1)].direction;
+    let last = rays.len() - 1;
+    for ray_idx in [last / 3, 2 * last / 3, last] {
+        let other = rays[ray_idx].direction;
         let along = first.dot(other);
         are_alike &= least * other.length_squared() <= along * along.max(0.0);
     }
     are_alike
+}
+
+/// The place and the axis by which the rays of a frustum are counted, the same for packets side by side.
+#[derive(Clone, Copy)]
+pub struct Anchor {
+    place: Vec3,
+    main: usize,
+    /// 1 or -1, as the rays go along the main axis.
+    sense: f32,
+    /// Whether `place` is where the rays end.
+    is_end: bool,
+}
+
+impl Anchor {
+    /// For rays in lanes, of which `first` is one, if all go the same way along the axis that it follows.
+    /// `ends_meet` says that their far ends may be closer to each other than their origins, as at a light.
+    #[inline(always)]
+    pub fn new<W: Wide>(first: &Ray, rays: &[WideRays<W>], ends_meet: bool) -> Option<Self> {
+        let main = main_axis(first.direction);
+        let sense = 1f32.copysign(first.direction[main]);
+        let (mut ahead, mut ending) = (ALL, ALL);
+        for rays in rays {
+            ahead &= W::splat(0.0).less(rays.direction[main] * W::splat(sense)).bits();
+            ending &= rays.t_max.less(W::splat(FAR)).bits();
+        }
+        if ahead != ALL {
+            return None;
+        }
+        let is_end = ends_meet && ending == ALL;
+        let mut place = if is_end { first.at(first.t_max) } else { first.origin };
+        // The plane from which x counts lies before all starts, or behind all ends.
+        let mut starts = Range::none();
+        for rays in rays {
+            let start = if is_end {
+                rays.origin[main] + rays.direction[main] * rays.t_max
+            } else {
+                rays.origin[main]
+            };
+            starts.take(start);
+        }
+        place[main] = match is_end == (0.0 < sense) {
+            true => starts.1.max_lane(),
+            false => starts.0.min_lane(),
+        };
+        Some(Self { place, main, sense, is_end })
+    }
 }
 
 /// Along the main axis, at `x` in the rays' sense from the anchor, the rays lie in
@@ -66,66 +113,74 @@ impl<L: Lanes> Boxes<L> {
 }
 
 impl Frustum {
-    /// Around rays in lanes, of which `first` is one, unless they go too different ways.
+    /// Around rays in lanes, unless they go too different ways.
     #[inline(always)]
-    pub fn new<W: Wide>(
-        root: &Node,
-        first: &Ray,
-        rays: &WideRays<W>,
-        ends_meet: bool,
-    ) -> Option<Self> {
-        let main = main_axis(first.direction);
-        let sense = 1f32.copysign(first.direction[main]);
-        let along = rays.direction[main] * W::splat(sense);
-        if W::splat(0.0).less(along).bits() != ALL {
-            return None;
-        }
+    pub fn new<W: Wide>(root: &Node, anchor: &Anchor, rays: &[WideRays<W>]) -> Option<Self> {
+        let Anchor { place, main, sense, is_end } = *anchor;
         let across = [(main + 1) % 3, (main + 2) % 3];
-        let inverse = W::splat(1.0) / rays.direction[main];
-        let slopes = [rays.direction[across[0]] * inverse, rays.direction[across[1]] * inverse];
-        let slope = [range(slopes[0]), range(slopes[1])];
-        if !(slope[0].1 - slope[0].0 < WIDEST && slope[1].1 - slope[1].0 < WIDEST) {
+        let mut slope = [Range::<W>::none(); 2];
+        let mut offset = [Range::<W>::none(); 2];
+        let mut distance = [W::splat(0.0); 3];
+        let mut finite = ALL;
+        for rays in rays {
+            let inverse = W::splat(1.0) / rays.direction[main];
+            let start = [
+                rays.origin[0] - W::splat(place.x),
+                rays.origin[1] - W::splat(place.y),
+                rays.origin[2] - W::splat(place.z),
+            ];
+            let mut all = start[main];
+            for i in 0..2 {
+                let slopes = rays.direction[across[i]] * inverse;
+                let start = (start[main], start[across[i]]);
+                slope[i].take(slopes);
+                offset[i].take(start.1 - start.0 * slopes);
+                all = all + start.1 + slopes;
+            }
+            for (distance, start) in distance.iter_mut().zip(start) {
+                *distance = start.abs().max(*distance);
+            }
+            // Lowest and highest of lanes, one of which is not a number, may be those of only some.
+            let is_finite =
+                all.less(W::splat(f32::INFINITY)) & W::splat(f32::NEG_INFINITY).less(all);
+            finite &= is_finite.bits();
+        }
+        let slope = [slope[0].ends(), slope[1].ends()];
+        if !(slope[0].1 - slope[0].0 < WIDEST && slope[1].1 - slope[1].0 < WIDEST) || finite != ALL
+        {
             return None;
         }
-        let is_backward = ends_meet && rays.t_max.less(W::splat(FAR)).bits() == ALL;
-        let mut anchor = if is_backward { first.at(first.t_max) } else { first.origin };
-        // The plane from which x counts lies before all starts, or behind all ends.
-        let starts = if is_backward {
-            rays.origin[main] + rays.direction[main] * rays.t_max
-        } else {
-            rays.origin[main]
-        };
-        anchor[main] = match is_backward == (0.0 < sense) {
-            true => starts.max_lane(),
-            false => starts.min_lane(),
-        };
-        let start = [
-            rays.origin[0] - W::splat(anchor.x),
-            rays.origin[1] - W::splat(anchor.y),
-            rays.origin[2] - W::splat(anchor.z),
-        ];
-        // Lowest and highest of lanes, one of which is not a number, may be those of only some.
-        let all = start[0] + start[1] + start[2] + slopes[0] + slopes[1];
-        let is_finite = all.less(W::splat(f32::INFINITY)) & W::splat(f32::NEG_INFINITY).less(all);
-        if is_finite.bits() != ALL {
-            return None;
-        }
-        let distance = Vec3::new(largest(start[0]), largest(start[1]), largest(start[2]));
-        let offset = [
-            range(start[across[0]] - start[main] * slopes[0]),
-            range(start[across[1]] - start[main] * slopes[1]),
-        ];
-        let runs_down = is_backward == (0.0 < sense);
+        let [x, y, z] = distance;
+        let distance = Vec3::new(x.max_lane(), y.max_lane(), z.max_lane());
+        let runs_down = is_end == (0.0 < sense);
         Some(Self {
-            anchor,
+            anchor: place,
             axes: [main, across[0], across[1]],
             sense: if runs_down { -1.0 } else { 1.0 },
             slope: if runs_down { [flipped(slope[0]), flipped(slope[1])] } else { slope },
-            offset,
+            offset: [offset[0].ends(), offset[1].ends()],
             depth: distance[main],
-            farthest: if is_backward { distance[main] } else { f32::INFINITY },
-            slack: slack(root, anchor.into()) + 1e-6 * distance.max_element(),
+            farthest: if is_end { distance[main] } else { f32::INFINITY },
+            slack: slack(root, place.into()) + 1e-6 * distance.max_element(),
         })
+    }
+
+    /// How far along the main axis any ray goes.
+    pub fn reach(&self) -> f32 {
+        self.farthest + self.slack
+    }
+
+    /// Whether a box, as in `Boxes`, is wider than the frustum is there.
+    #[inline(always)]
+    pub fn is_narrower(&self, min: &[f32; 3], max: &[f32; 3]) -> bool {
+        let x = min[0].abs().max(max[0].abs());
+        let mut is_narrower = false;
+        for i in 0..2 {
+            let (slope, offset) = (self.slope[i], self.offset[i]);
+            let width = (slope.1 - slope.0) * x + (offset.1 - offset.0);
+            is_narrower |= width < max[1 + i] - min[1 + i];
+        }
+        is_narrower
     }
 
     #[inline(always)]
@@ -204,14 +259,26 @@ fn main_axis(direction: Vec3) -> usize {
     }
 }
 
-#[inline(always)]
-fn range<W: Wide>(values: W) -> (f32, f32) {
-    (values.min_lane(), values.max_lane())
-}
+/// The lowest and the highest values in each lane.
+#[derive(Clone, Copy)]
+struct Range<W>(W, W);
 
-#[inline(always)]
-fn largest<W: Wide>(values: W) -> f32 {
-    values.max(W::splat(0.0) - values).max_lane()
+impl<W: Wide> Range<W> {
+    #[inline(always)]
+    fn none() -> Self {
+        Self(W::splat(f32::INFINITY), W::splat(f32::NEG_INFINITY))
+    }
+
+    #[inline(always)]
+    fn take(&mut self, values: W) {
+        *self = Self(values.min(self.0), values.max(self.1));
+    }
+
+    /// Of all lanes.
+    #[inline(always)]
+    fn ends(&self) -> (f32, f32) {
+        (self.0.min_lane(), self.1.max_lane())
+    }
 }
 
 fn flipped((low, high): (f32, f32)) -> (f32, f32) {

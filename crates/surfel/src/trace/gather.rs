@@ -2,6 +2,7 @@
 
 use super::block::{BeforePacket, Leaf};
 use super::flight::{RayVisitor, fly};
+use super::group::{GROUP, Group};
 use super::hit::{Gather, Hit};
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
 use super::sightings::{Sighting, settle};
@@ -15,25 +16,32 @@ use std::ops::ControlFlow;
 pub(super) fn gathers<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], gathers: &mut [Gather]) {
     let mut stack = PacketStack::new();
     let mut sightings = Vec::new();
-    for (rays, gathers) in rays.chunks(WIDE).zip(gathers.chunks_mut(WIDE)) {
-        sightings.clear();
-        let limits = gather::<L>(&cloud.points, rays, &mut stack, &mut sightings);
-        settle::<L::Wide>(&mut sightings, &limits);
-        for (lane, gather) in gathers.iter_mut().enumerate() {
-            *gather = gather_of_lane(&sightings, lane);
+    let (points, mut group) = (&cloud.points, Group::new(false));
+    for (rays, gathers) in rays.chunks(GROUP).zip(gathers.chunks_mut(GROUP)) {
+        group.take::<L, _>(points, rays);
+        let packets = rays.chunks(WIDE).zip(gathers.chunks_mut(WIDE));
+        for (place, (rays, gathers)) in packets.enumerate() {
+            sightings.clear();
+            let limits = gather::<L>(points, &group, place, rays, &mut stack, &mut sightings);
+            settle::<L::Wide>(&mut sightings, &limits);
+            for (lane, gather) in gathers.iter_mut().enumerate() {
+                *gather = gather_of_lane(&sightings, lane);
+            }
         }
     }
 }
 
-/// Adds to `sightings` all discs of one to sixteen rays within limits that it returns, and some beyond.
+/// Adds to `sightings` all discs of one to sixteen rays, one after `place` others of a group, within limits that it returns, and some beyond.
 #[inline(always)]
 pub(super) fn gather<L: Lanes>(
     points: &FlatPoints,
+    group: &Group<L::Wide>,
+    place: usize,
     rays: &[Ray],
     stack: &mut PacketStack,
     sightings: &mut Vec<Sighting>,
 ) -> [f32; WIDE] {
-    if let Some(packet) = Packet::new(&points.nodes[0], rays, false) {
+    if let Some(packet) = group.packet(points, place, rays) {
         let mut gathering =
             GatherInPacket::<L> { packet: &packet, limits: packet.limits(), sightings };
         along_packet::<L, _>(points, &packet, stack, &mut gathering);
@@ -149,17 +157,13 @@ impl<L: Lanes> PacketVisitor<L> for GatherInPacket<'_, L> {
     }
 
     #[inline(always)]
-    fn visit_each(&mut self, points: &FlatPoints, block_idx: u32, mut lanes: u32) {
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % WIDE;
-            lanes &= lanes - 1;
-            let ray = &self.packet.rays[lane];
-            let seen = Disc::seen_from::<L>(points, block_idx, ray.origin);
-            let mut hits = Disc::hits(&seen, block_idx, ray).up_to(self.limits[lane]);
-            while let Some((hit, radius)) = hits.next() {
-                self.limits[lane] = self.limits[lane].min(gather_limit(hit.distance, radius));
-                self.sightings.push(Sighting::by_one(lane, hit));
-            }
+    fn visit_alone(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
+        let ray = &self.packet.rays[lane];
+        let seen = Disc::seen_from::<L>(points, block_idx, ray.origin);
+        let mut hits = Disc::hits(&seen, block_idx, ray).up_to(self.limits[lane]);
+        while let Some((hit, radius)) = hits.next() {
+            self.limits[lane] = self.limits[lane].min(gather_limit(hit.distance, radius));
+            self.sightings.push(Sighting::by_one(lane, hit));
         }
     }
 }

@@ -8,6 +8,7 @@ mod closest;
 mod flight;
 mod frustum;
 mod gather;
+mod group;
 mod hit;
 mod memory;
 mod node;

@@ -1,7 +1,8 @@
 //! Sixteen rays that go much the same way, walked through the tree together.
 
 use super::boxes::inverse;
-use super::frustum::{self, Boxes, Frustum};
+use super::frustum::{Anchor, Boxes, Frustum};
+use super::group::MOST_STARTS;
 use super::memory::Memory;
 use super::sparse::{self, Density};
 use crate::bvh::{Child, Node, STACK_SIZE};
@@ -10,6 +11,7 @@ use crate::math::{LANES, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
 use crate::surface::RayLanes;
 
 /// Sixteen rays in lanes.
+#[derive(Clone, Copy)]
 pub struct WideRays<W> {
     pub origin: [W; 3],
     pub direction: [W; 3],
@@ -20,6 +22,8 @@ pub struct WideRays<W> {
 /// Up to sixteen rays that are alike.
 pub struct Packet<'r, W> {
     pub rays: &'r [Ray],
+    /// Where the search begins.
+    starts: &'r [ChildBox],
     pub wide: WideRays<W>,
     pub frustum: Frustum,
     /// Of the directions, in the order of the frustum's axes.
@@ -43,8 +47,17 @@ pub trait PacketVisitor<L: Lanes> {
 
     fn visit(&mut self, tree: &Self::Tree, block_idx: u32);
 
-    /// Shows the block to the rays in these lanes, one after the other.
-    fn visit_each(&mut self, tree: &Self::Tree, block_idx: u32, lanes: u32);
+    /// Shows the block to the ray in this lane alone.
+    fn visit_alone(&mut self, tree: &Self::Tree, block_idx: u32, lane: usize);
+
+    /// Shows the block to each of the rays in these lanes alone.
+    #[inline(always)]
+    fn visit_each(&mut self, tree: &Self::Tree, block_idx: u32, mut lanes: u32) {
+        while lanes != 0 {
+            self.visit_alone(tree, block_idx, lanes.trailing_zeros() as usize % WIDE);
+            lanes &= lanes - 1;
+        }
+    }
 }
 
 impl<W: Wide> WideRays<W> {
@@ -95,20 +108,22 @@ impl<W: Wide> WideRays<W> {
 }
 
 impl<'r, W: Wide> Packet<'r, W> {
-    /// One to sixteen rays, if they are alike enough. `ends_meet` says that the rays' far ends may be
-    /// closer to each other than their origins, as at a light.
+    /// One to sixteen rays, which stand in the lanes of `wide`, if they are alike enough.
     #[inline(always)]
-    pub fn new(root: &Node, rays: &'r [Ray], ends_meet: bool) -> Option<Self> {
-        if !frustum::may_be_alike(rays) {
-            return None;
-        }
-        let wide = WideRays::new(rays);
-        let frustum = Frustum::new(root, &rays[0], &wide, ends_meet)?;
+    pub fn new(
+        root: &Node,
+        rays: &'r [Ray],
+        wide: WideRays<W>,
+        anchor: &Anchor,
+        starts: &'r [ChildBox],
+    ) -> Option<Self> {
+        let frustum = Frustum::new(root, anchor, std::slice::from_ref(&wide))?;
         let [a, b, c] = frustum.axes;
         let along = [wide.direction[a], wide.direction[b], wide.direction[c]];
         Some(Self {
             common_origin: wide.common_origin(rays[0].origin),
             rays,
+            starts,
             inverse: [inverse(along[0]), inverse(along[1]), inverse(along[2])],
             from_anchor: [
                 wide.origin[a] - W::splat(frustum.anchor[a]),
@@ -142,14 +157,20 @@ impl<'r, W: Wide> Packet<'r, W> {
     }
 }
 
-/// A child on the stack with its box, as `Boxes` has it.
+/// A node or block that is still to be looked at, with its box as `Boxes` has it.
 #[derive(Clone, Copy)]
-struct ChildBox {
+pub struct ChildBox {
     /// Packed.
-    child: u32,
-    entry: f32,
-    min: [f32; 3],
-    max: [f32; 3],
+    pub child: u32,
+    pub entry: f32,
+    pub min: [f32; 3],
+    pub max: [f32; 3],
+}
+
+impl ChildBox {
+    /// The root's box holds all.
+    pub const ROOT: Self =
+        Self { child: 0, entry: 0.0, min: [f32::NEG_INFINITY; 3], max: [f32::INFINITY; 3] };
 }
 
 /// The children of a node that a packet's frustum meets.
@@ -162,32 +183,63 @@ pub struct Met<'n, L> {
 
 impl<'n, L: Lanes> Met<'n, L> {
     #[inline(always)]
-    fn new(node: &'n Node, frustum: &Frustum, limit: f32) -> Self {
+    pub fn new(node: &'n Node, frustum: &Frustum, limit: f32) -> Self {
         let boxes = frustum.boxes::<L>(node);
         let (lanes, entries) = frustum.meets::<L>(&boxes, limit);
         Self { node, boxes, entries, lanes: lanes & node.occupied() }
+    }
+
+    #[inline(always)]
+    pub fn children(&self) -> MetChildren {
+        let (min, max) = self.boxes.store();
+        let children = self.node.packed_children::<L>().store();
+        MetChildren { children, entries: self.entries, min, max, lanes: self.lanes }
+    }
+}
+
+/// The same one by one: a list to loop over, as `HitList` is.
+pub struct MetChildren {
+    children: [f32; LANES],
+    entries: [f32; LANES],
+    min: [[f32; LANES]; 3],
+    max: [[f32; LANES]; 3],
+    lanes: u32,
+}
+
+impl MetChildren {
+    #[inline(always)]
+    pub fn next(&mut self) -> Option<ChildBox> {
+        if self.lanes == 0 {
+            return None;
+        }
+        let lane = self.lanes.trailing_zeros() as usize % LANES;
+        self.lanes &= self.lanes - 1;
+        let (min, max) = (&self.min, &self.max);
+        Some(ChildBox {
+            child: self.children[lane].to_bits(),
+            entry: self.entries[lane],
+            min: [min[0][lane], min[1][lane], min[2][lane]],
+            max: [max[0][lane], max[1][lane], max[2][lane]],
+        })
     }
 }
 
 /// What a search of a packet has still to look at. Kept from packet to packet.
 pub struct PacketStack {
-    boxes: [ChildBox; STACK_SIZE],
+    boxes: [ChildBox; STACK_SIZE + MOST_STARTS],
     size: usize,
     density: Density,
 }
 
 impl PacketStack {
     pub fn new() -> Self {
-        let nothing = ChildBox { child: 0, entry: 0.0, min: [0.0; 3], max: [0.0; 3] };
-        Self { boxes: [nothing; STACK_SIZE], size: 0, density: Density::new() }
+        Self { boxes: [ChildBox::ROOT; STACK_SIZE + MOST_STARTS], size: 0, density: Density::new() }
     }
 
-    /// Begins with the root, whose box holds all.
     #[inline(always)]
-    fn start(&mut self) {
-        let (min, max) = ([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
-        self.boxes[0] = ChildBox { child: Child::Node(0).pack(), entry: 0.0, min, max };
-        self.size = 1;
+    fn start(&mut self, starts: &[ChildBox]) {
+        self.boxes[..starts.len()].copy_from_slice(starts);
+        self.size = starts.len();
         self.density.forget_old();
     }
 
@@ -200,29 +252,18 @@ impl PacketStack {
     /// Pushes children and asks for their memory.
     #[inline(always)]
     fn push<L: Lanes>(&mut self, met: &Met<L>, memory: &Memory, is_ordered: bool) {
-        let Met { node, boxes, entries, .. } = met;
-        let mut lanes = met.lanes;
-        let (min, max) = boxes.store();
-        let children = node.packed_children::<L>().store();
         let first = self.size;
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            let child = children[lane].to_bits();
-            memory.prefetch::<L>(child);
+        let mut children = met.children();
+        while let Some(next) = children.next() {
+            memory.prefetch::<L>(next.child);
             let mut place = self.size;
             if is_ordered {
-                while first < place && self.boxes[place - 1].entry < entries[lane] {
+                while first < place && self.boxes[place - 1].entry < next.entry {
                     self.boxes[place] = self.boxes[place - 1];
                     place -= 1;
                 }
             }
-            self.boxes[place] = ChildBox {
-                child,
-                entry: entries[lane],
-                min: [min[0][lane], min[1][lane], min[2][lane]],
-                max: [max[0][lane], max[1][lane], max[2][lane]],
-            };
+            self.boxes[place] = next;
             self.size += 1;
         }
     }
@@ -239,7 +280,7 @@ pub fn along_packet<L: Lanes, V: PacketVisitor<L>>(
     let memory = Memory::new(tree);
     let mut limit = packet.frustum.limit(&packet.wide, visitor.limits());
     let mut is_limit_old = false;
-    stack.start();
+    stack.start(packet.starts);
     while let Some(next) = stack.pop() {
         if V::IS_ORDERED && limit < next.entry {
             continue;
@@ -267,7 +308,7 @@ pub fn along_packet<L: Lanes, V: PacketVisitor<L>>(
             }
             Child::Block(block_idx) => {
                 if lanes.is_power_of_two() {
-                    visitor.visit_each(tree, block_idx, lanes);
+                    visitor.visit_alone(tree, block_idx, lanes.trailing_zeros() as usize);
                 } else {
                     visitor.visit(tree, block_idx);
                 }

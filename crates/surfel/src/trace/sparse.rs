@@ -11,8 +11,8 @@ use super::packet::{Met, Packet, PacketVisitor};
 use crate::bvh::Child;
 use crate::math::{LANES, LaneMask, Lanes, WIDE, Wide};
 
-/// Up to as many rays, on average, are quicker shown a block one by one. Between 4.5 and 6.5 it makes no
-/// difference.
+/// Up to as many rays, on average, are quicker shown a block one by one. Between 4.5 and 6.5 it hardly
+/// makes a difference.
 const FEW: f32 = 5.5;
 /// Blocks after which those before count half.
 const LONG_AGO: u32 = 256;

@@ -3,6 +3,7 @@
 use super::boundary::{WideHits, enclosed, enclosed_by_blocks};
 use super::closest::closest_hits;
 use super::gather::gather;
+use super::group::{GROUP, Group};
 use super::hit::Hit;
 use super::packet::{PacketStack, WideRays};
 use super::sightings::{Sighting, settle};
@@ -66,13 +67,20 @@ impl<'s> Finder<'s> {
     #[inline(always)]
     pub fn find<L: Lanes>(&mut self, rays: &[Ray], splats: &mut [Splat]) {
         let Self { stack, mixer, .. } = self;
-        for (rays, splats) in rays.chunks(WIDE).zip(splats.chunks_mut(WIDE)) {
-            let limits = if mixer.kind.is_gathered() {
-                gather::<L>(&mixer.cloud.points, rays, stack, &mut mixer.sightings)
-            } else {
-                find_closest::<L>(mixer.cloud, rays, &mut mixer.sightings)
-            };
-            mixer.mix::<L>(&WideRays::new(rays), &limits, splats);
+        let (points, mut group) = (&mixer.cloud.points, Group::new(false));
+        for (rays, splats) in rays.chunks(GROUP).zip(splats.chunks_mut(GROUP)) {
+            if mixer.kind.is_gathered() {
+                group.take::<L, _>(points, rays);
+            }
+            let packets = rays.chunks(WIDE).zip(splats.chunks_mut(WIDE));
+            for (place, (rays, splats)) in packets.enumerate() {
+                let limits = if mixer.kind.is_gathered() {
+                    gather::<L>(points, &group, place, rays, stack, &mut mixer.sightings)
+                } else {
+                    find_closest::<L>(mixer.cloud, rays, &mut mixer.sightings)
+                };
+                mixer.mix::<L>(&WideRays::new(rays), &limits, splats);
+            }
         }
         if mixer.judges {
             self.judge::<L>(rays, splats);
