@@ -24,12 +24,11 @@ test('a page finds its server again, and keeps its view', async () => {
   // What is turned meanwhile is not lost, nor what was before.
   await page.locator('#stage').focus();
   await page.keyboard.press('5');
-  await page.waitForTimeout(300);
   const turned = await state(page, 'camera');
   assert.notDeepEqual(turned, camera);
   await serve(['town.ply'], '--port', server.port, ...QUICK);
   await page.locator('#banner').waitFor({ state: 'hidden' });
-  await page.waitForFunction(() => window.surfel.state.lastFrame?.finished);
+  assert.notEqual(await finishedPixels(page), screen, 'what was turned meanwhile is shown');
   await page.keyboard.press('o');
   await settled(page);
   const { color, range, sun } = await state(page, 'scene');
@@ -37,7 +36,7 @@ test('a page finds its server again, and keeps its view', async () => {
   const found = await state(page, 'camera');
   assert.deepEqual(found.view_up.map((value) => Math.round(value * 1e6) / 1e6), turned.view_up.map((value) => Math.round(value * 1e6) / 1e6));
   await page.keyboard.press('p');
-  await page.evaluate(() => { location.hash = ''; });
+  await show(page, {});
   assert.notEqual(await finishedPixels(page), screen);
 });
 

@@ -44,7 +44,7 @@ export async function serve(files, ...options) {
     let told = '';
     server.stdout.on('data', (text) => {
       told += text;
-      const found = told.match(/http:\S+/);
+      const found = told.match(/http:\S+(?=\s)/);
       if (found) resolve(found[0]);
     });
     server.on('exit', (status) => reject(new Error(`surfel ${words.join(' ')} ended with ${status}`)));
@@ -68,6 +68,7 @@ export async function blankPage(options = {}) {
   const context = await browser.newContext({ viewport: VIEWPORT, reducedMotion: 'reduce', ...options });
   if (!options.isMobile) await context.grantPermissions(['clipboard-read', 'clipboard-write']);
   await context.addInitScript(defineReadPixels);
+  await context.addInitScript(defineHeard);
   const page = await context.newPage();
   page.setDefaultTimeout(PATIENCE_MS);
   page.faults = [];
@@ -94,14 +95,48 @@ export async function closePage(page, faults = []) {
 
 export const state = (page, key) => page.evaluate((name) => window.surfel.state[name], key);
 
-/** Waits until the finished picture of all that was done is on the screen. */
+/** Waits until the finished picture of all that was done is on the screen, with all that is drawn over it. */
 export async function settled(page) {
-  await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
-  await page.waitForFunction(() => {
+  const calm = await page.evaluateHandle(() => ({ frame: 0, n_checks: 0 }));
+  await page.waitForFunction((seen) => {
     const { lastFrame, lastInput, size, connected, agreed } = window.surfel?.state ?? {};
-    return connected && agreed && lastFrame?.finished && lastFrame.input === lastInput && lastFrame.width === size.width && lastFrame.height === size.height;
-  }, undefined, { timeout: PATIENCE_MS });
+    const isFinished = connected && agreed && lastFrame?.finished && lastFrame.input === lastInput
+      && lastFrame.width === size.width && lastFrame.height === size.height;
+    // While the pivot is shown, the page has still to tell that the hand rests, and gets another picture for it.
+    const isAtRest = !document.querySelector('.pivot');
+    seen.n_checks = isFinished && isAtRest && (seen.n_checks === 0 || seen.frame === lastFrame.frame) ? seen.n_checks + 1 : 0;
+    seen.frame = lastFrame?.frame;
+    // What is done is sent in the next animation frame, and what comes is drawn over in the next.
+    return seen.n_checks === 3;
+  }, calm, { timeout: PATIENCE_MS });
 }
+
+/** In the page: counts what the server answers to picks, in `heard.n_picks`; the next ones wait for `heard.delays_ms`. */
+function defineHeard() {
+  const heard = { n_picks: 0, delays_ms: [] };
+  window.heard = heard;
+  window.WebSocket = class extends WebSocket {
+    constructor(...words) {
+      super(...words);
+      this.addEventListener('message', (event) => {
+        if (typeof event.data !== 'string' || JSON.parse(event.data).type !== 'picked') return;
+        event.stopImmediatePropagation();
+        setTimeout(() => {
+          this.onmessage({ data: event.data });
+          heard.n_picks += 1;
+        }, heard.delays_ms.shift() ?? 0);
+      });
+    }
+  };
+}
+
+/** From now on, `window.pictures` are all that the page has shown, each as `lastFrame` was. */
+export const watchPictures = (page) => page.evaluate(() => {
+  window.pictures = [];
+  // The status line tells of each.
+  const watch = new MutationObserver(() => window.pictures.push(window.surfel.state.lastFrame));
+  watch.observe(document.getElementById('numbers'), { childList: true });
+});
 
 /** In the page: the bytes of the picture on the screen, read from a copy that leaves the page's canvas alone. */
 function defineReadPixels() {
@@ -145,10 +180,23 @@ export async function drag(page, from, to, { button = 'left', steps = 8 } = {}) 
   await page.mouse.up({ button });
 }
 
+/** Presses a button that copies. That it did, it shows only for a moment, which a slow machine might miss. */
+export async function copyBy(button) {
+  await button.evaluate((element) => {
+    delete element.dataset.copied;
+    const look = () => { if (element.matches('.is-done')) element.dataset.copied = ''; };
+    new MutationObserver(look).observe(element, { attributeFilter: ['class'] });
+  });
+  await button.click();
+  await button.and(button.page().locator('[data-copied]')).waitFor();
+}
+
 /** Shows the opening view as `patch` changes it, as a link typed into the address bar does. */
 export async function show(page, patch) {
-  const hash = hashOf(patch);
-  await page.evaluate((to) => { location.hash = to; }, hash);
-  await page.waitForTimeout(50);
+  await page.evaluate((to) => new Promise((resolve) => {
+    if (location.hash === to) resolve();
+    window.addEventListener('hashchange', () => resolve(), { once: true });
+    location.hash = to;
+  }), hashOf(patch));
   await settled(page);
 }

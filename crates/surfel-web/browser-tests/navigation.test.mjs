@@ -81,14 +81,22 @@ async function pick(place) {
   return (await values.allTextContents()).slice(0, 3).map(Number);
 }
 
+/** To the page, all that is done from now on is done at once, however slow the machine is. */
+const stopClock = () => page.evaluate(() => {
+  const now = performance.now();
+  Object.defineProperty(Event.prototype, 'timeStamp', { get: () => now });
+});
+
 for (const projection of ['perspective', 'orthographic']) {
   test(`the wheel goes nearer to what is under the pointer (${projection})`, async () => {
     await page.selectOption('[data-key="camera.projection"]', projection);
     await settled(page);
     const place = await placeAt(page, 0.65, 0.6);
     const [start, point] = [await state(page, 'camera'), await pick(place)];
+    const n_picks = await page.evaluate(() => window.heard.n_picks);
+    await stopClock();
     await page.mouse.wheel(0, -100);
-    // By now the server has told what is there.
+    await page.waitForFunction((before) => before < window.heard.n_picks, n_picks);
     await settled(page);
     const [size, between] = [await state(page, 'size'), await state(page, 'camera')];
     const before = cameras.project(between, size, point);
@@ -104,6 +112,7 @@ for (const projection of ['perspective', 'orthographic']) {
 test('a double click makes a point the pivot', async () => {
   const place = await placeAt(page, 0.7, 0.6);
   const point = await pick(place);
+  await stopClock();
   await page.mouse.dblclick(place.x, place.y);
   await another(opening);
   const camera = await moved();

@@ -2,7 +2,9 @@
 
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { blankPage, closePage, colorCount, drag, finishedPixels, openPage, pixels, placeAt, QUICK, serve, settled, state } from './harness.mjs';
+import {
+  blankPage, closePage, colorCount, drag, finishedPixels, openPage, pixels, placeAt, QUICK, serve, settled, state, watchPictures,
+} from './harness.mjs';
 
 const PNG = 2;
 let server;
@@ -33,12 +35,14 @@ test('a still picture ends lossless, in the size of the screen', async () => {
 test('pictures come while the hand is still moving', async () => {
   const [first, begin] = [await finishedPixels(page), await state(page, 'lastFrame')];
   const place = await placeAt(page, 0.5, 0.5);
+  await watchPictures(page);
   await page.mouse.move(place.x, place.y);
   await page.mouse.down();
   await page.mouse.move(place.x + 60, place.y + 10, { steps: 4 });
   await page.waitForFunction((input) => input < window.surfel.state.lastFrame.input, begin.input);
-  assert.equal((await state(page, 'lastFrame')).finished, false);
   assert.notEqual(await pixels(page), first);
+  const pictures = await page.evaluate(() => window.pictures);
+  assert.equal(pictures.find(({ input }) => begin.input < input).finished, false);
   await page.mouse.up();
   await settled(page);
   assert.ok((await state(page, 'latencies_ms')).length > 0);
@@ -56,8 +60,8 @@ test('the same view is the same picture', async () => {
 });
 
 test('another size of the window is another size of the picture', async () => {
-  const first = await finishedPixels(page);
+  const [first, before] = [await finishedPixels(page), await state(page, 'size')];
   await page.setViewportSize({ width: 700, height: 400 });
-  await page.waitForFunction((height) => window.surfel.state.size.height < height, (await state(page, 'lastFrame')).height);
+  await page.waitForFunction((height) => window.surfel.state.size.height < height, before.height);
   assert.notEqual(await finishedPixels(page), first);
 });

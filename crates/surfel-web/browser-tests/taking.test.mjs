@@ -6,7 +6,7 @@ import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { pointAtDepth, project } from '../page/camera.js';
 import {
-  closePage, colorCount, data, drag, finishedPixels, openPage, PLAIN_HOST, placeAt, QUICK, serve, settled, shell, show, state,
+  closePage, colorCount, copyBy, data, drag, finishedPixels, openPage, PLAIN_HOST, placeAt, QUICK, serve, settled, shell, show, state,
 } from './harness.mjs';
 
 let still;
@@ -173,8 +173,7 @@ test('texts are copied and downloaded', async () => {
   await still.locator('[data-form="toml"]').click();
   await still.waitForFunction(() => document.getElementById('take-text').value.includes('camera'));
   const text = await still.locator('#take-text').inputValue();
-  await still.locator('#take-copy').click();
-  await still.locator('#take-copy.is-done').waitFor();
+  await copyBy(still.locator('#take-copy'));
   assert.equal(await still.evaluate(() => navigator.clipboard.readText()), text);
   const { name, bytes } = await download(still, () => still.locator('#take-download').click());
   assert.deepEqual([name, bytes.toString()], ['town.toml', text]);
@@ -198,8 +197,7 @@ test('texts are copied over plain HTTP from another machine, too', async () => {
   for (const form of ['command', 'toml', 'json', 'link']) {
     await page.bringToFront();
     const text = await openForm(page, form);
-    await page.locator('#take-copy').click();
-    await page.locator('#take-copy.is-done').waitFor();
+    await copyBy(page.locator('#take-copy'));
     await page.locator('#take-copy:not(.is-done)').waitFor();
     await page.locator('#take-close').click();
     await still.bringToFront();
@@ -215,6 +213,8 @@ test('where nothing may be copied, the text is selected', async () => {
     document.execCommand = () => false;
   });
   const text = await openForm(page, 'json');
+  // What is told stays until it has been looked at.
+  await page.evaluate(() => { window.setTimeout = () => 0; });
   await page.locator('#take-copy').click();
   await page.locator('.toast', { hasText: 'Ctrl + C' }).waitFor();
   assert.equal(await page.evaluate(() => getSelection().toString()), text);
@@ -245,6 +245,7 @@ test('a scene file shows what it was taken from', async () => {
     await page.waitForFunction((before) => before < window.surfel.state.lastFrame.frame, frame);
     await page.waitForFunction(() => window.surfel.state.lastFrame.finished);
     assert.equal(await finishedPixels(page), screen, form);
+    assert.deepEqual(await state(page, 'shownCamera'), await state(page, 'camera'), 'what is drawn over it lies where it belongs');
     // What a scene's object has of its own is told twice then.
     if (page === still) assert.equal(withoutZeros((await taken(page)).command), withoutZeros(texts.command), form);
   }

@@ -57,11 +57,12 @@ test('the header of a picture is read as it is written', () => {
   const bytes = new DataView(new ArrayBuffer(20));
   bytes.setUint8(0, 2);
   bytes.setUint8(1, 1);
+  bytes.setUint16(2, 3, true);
   bytes.setUint32(4, 70000, true);
   bytes.setUint32(8, 12, true);
   [1280, 720, 4, 16].forEach((value, i) => bytes.setUint16(12 + 2 * i, value, true));
   assert.deepEqual(readHeader(bytes.buffer), {
-    kind: 2, finished: true, frame: 70000, input: 12, width: 1280, height: 720, samples: 4, of_samples: 16, type: 'image/png',
+    kind: 2, finished: true, scene: 3, frame: 70000, input: 12, width: 1280, height: 720, samples: 4, of_samples: 16, type: 'image/png',
   });
 });
 

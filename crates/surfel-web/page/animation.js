@@ -34,13 +34,17 @@ export function animationRows(viewer, section) {
   };
   const step = () => {
     if (!isPlaying) return;
-    const now = startTime + (performance.now() - startedAt) / 1000;
-    if (duration() <= now && !loop.checked) {
-      viewer.set({ time: duration() }, false);
-      setPlaying(false);
-      return;
+    let now = startTime + (performance.now() - startedAt) / 1000;
+    if (duration() <= now) {
+      if (!loop.checked) {
+        viewer.set({ time: duration() }, false);
+        setPlaying(false);
+        return;
+      }
+      now %= duration();
+      [startTime, startedAt] = [now, performance.now()];
     }
-    viewer.set({ time: now % duration() }, true);
+    viewer.set({ time: now }, true);
     requestAnimationFrame(step);
   };
   scrub.addEventListener('input', () => {

@@ -14,6 +14,7 @@ export function readHeader(buffer) {
   return {
     kind,
     finished: (view.getUint8(1) & 1) === 1,
+    scene: view.getUint16(2, true),
     frame: view.getUint32(4, true),
     input: view.getUint32(8, true),
     width: view.getUint16(12, true),

@@ -5,6 +5,7 @@ export function exposeState(viewer) {
   const state = {
     get connected() { return viewer.isConnected; },
     get camera() { return copy(viewer.camera); },
+    get shownCamera() { return copy(viewer.shownCamera); },
     get scene() { return copy(viewer.scene); },
     get info() { return copy(viewer.info); },
     get size() { return copy(viewer.size); },

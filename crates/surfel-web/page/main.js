@@ -56,7 +56,7 @@ followPointer(stage, viewer, navigation, {
     const { tool } = viewer;
     const isMeasuring = MEASURE_TOOLS.includes(tool) && !event.altKey;
     if (!isMeasuring && tool !== 'pick' && !event.altKey) return;
-    lastPick = viewer.pick(place);
+    lastPick = pickAfter(lastPick, place);
     const point = await lastPick;
     if (viewer.tool !== tool) return;
     if (!point) showToast('Nothing is there.');
@@ -87,6 +87,13 @@ followKeys(viewer, navigation, {
 new Picture(document.getElementById('picture'), viewer);
 exposeState(viewer);
 viewer.connect();
+
+/** Asked for at once, told in the order of the clicks. */
+async function pickAfter(before, place) {
+  const asked = viewer.pick(place);
+  await before;
+  return asked;
+}
 
 /** The last corner may still be on its way. */
 async function finishArea() {

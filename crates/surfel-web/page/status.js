@@ -22,12 +22,15 @@ export function followStatus(viewer) {
     if (typeof done === 'number') bar.value = done;
     else bar.removeAttribute('value');
   };
+  const showRest = () => {
+    work.textContent = viewer.isConnected && viewer.lastFrame?.finished ? 'finished' : '';
+  };
   const endWork = () => {
     clearTimeout(waiting);
     waiting = 0;
     isWorking = false;
-    work.textContent = '';
     bar.hidden = true;
+    showRest();
   };
   viewer.workChanged.listen((message) => {
     news = message;
@@ -38,7 +41,7 @@ export function followStatus(viewer) {
   });
   viewer.connectionChanged.listen(({ isConnected }) => isConnected || endWork());
   viewer.frameShown.listen(() => {
-    if (!isWorking) work.textContent = viewer.lastFrame.finished ? 'finished' : '';
+    if (!isWorking) showRest();
     const { width, height, samples, of_samples } = viewer.lastFrame;
     numbers.textContent = `${width} × ${height}   ${samples} of ${of_samples} samples`;
   });

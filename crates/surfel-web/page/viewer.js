@@ -42,10 +42,8 @@ export class Viewer {
   #lastCameraInput = 0;
   /** As the server last told it, and the patches that it did not yet know of. */
   #toldScene = null;
+  #sceneNumber = null;
   #patchesUnderway = [];
-  /** The last picture that came, and the last before the scene was told. */
-  #frame = 0;
-  #frameBeforeScene = 0;
   #camerasByInput = new Map();
   #sentAt = new Map();
   #questions = new Map();
@@ -79,7 +77,7 @@ export class Viewer {
 
   /** Whether the picture on the screen is of all settings that were changed here, but for those refused. */
   get isAgreed() {
-    return !this.#duePatch && this.#patchesUnderway.length === 0 && this.#frameBeforeScene < this.lastFrame?.frame;
+    return !this.#duePatch && this.#patchesUnderway.length === 0 && this.lastFrame?.scene === this.#sceneNumber;
   }
 
   /** The scene with the camera that the hand holds. */
@@ -174,8 +172,8 @@ export class Viewer {
   shown(header) {
     this.#connection.send({ type: 'seen', frame: header.frame });
     const now = performance.now();
-    const { frame, input, width, height, kind, finished, samples, of_samples } = header;
-    this.lastFrame = { frame, input, width, height, kind, finished, samples, of_samples, shownAt: now };
+    const { frame, scene, input, width, height, kind, finished, samples, of_samples } = header;
+    this.lastFrame = { frame, scene, input, width, height, kind, finished, samples, of_samples, shownAt: now };
     // Only the first picture of an input answers it; those that follow refine.
     if (this.#sentAt.has(input)) this.latencies_ms.push(now - this.#sentAt.get(input));
     this.latencies_ms.splice(0, this.latencies_ms.length - KEPT_LATENCIES);
@@ -235,30 +233,34 @@ export class Viewer {
     this.info = info;
     this.opening = scene;
     this.#toldScene = mergePatch(scene, this.#helloPatch);
-    [this.#frame, this.#frameBeforeScene, this.lastFrame] = [0, 0, null];
+    [this.#sceneNumber, this.lastFrame] = [null, null];
     this.#patchesUnderway = [];
     this.#mergeUnderway();
     // Where a camera is that the scene moves comes with the first scene.
     if (isAnother) this.camera = info.camera_moves && !this.scene.camera.still ? null : this.scene.camera;
     this.#camerasByInput.set(this.#input, this.camera);
     this.#takesNextCamera = isAnother;
+    if (isAnother) [this.#duePatch, this.#dueCamera] = [null, null];
     this.isConnected = true;
     this.connectionChanged({ isConnected: true });
+    // What was changed meanwhile.
+    this.#schedule();
     this.infoChanged();
     this.sceneChanged();
     this.cameraChanged();
   }
 
-  #receiveScene({ scene, camera, legend, input = this.#input }) {
+  #receiveScene({ number, scene, camera, legend, input }) {
     this.legend = legend;
     this.#toldScene = scene;
-    this.#frameBeforeScene = this.#frame;
+    this.#sceneNumber = number;
     this.#patchesUnderway = this.#patchesUnderway.filter((underway) => input < underway.input);
     this.#mergeUnderway();
     const isAtRest = !this.#dueCamera && !this.#isMoving && this.#lastCameraInput <= input;
     if ((isAtRest || this.#takesNextCamera) && !areEqual(camera, this.camera)) {
       this.camera = camera;
-      this.#camerasByInput.set(input, camera);
+      // Pictures after `load` obey it and all messages before.
+      for (const obeyed of [input, ...this.#camerasByInput.keys()]) this.#camerasByInput.set(obeyed, camera);
       this.cameraChanged();
     }
     this.#takesNextCamera = false;
@@ -276,7 +278,6 @@ export class Viewer {
       this.#answer({ id: header.frame, blob });
       return;
     }
-    this.#frame = header.frame;
     this.pictureCame(header, blob);
   }
 

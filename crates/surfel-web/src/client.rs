@@ -26,6 +26,8 @@ pub enum Outgoing {
 #[derive(Clone)]
 pub struct Sight {
     pub stage: Option<Arc<Stage>>,
+    /// Number of the stage, which pictures of it carry.
+    pub stage_number: u16,
     pub camera: Option<Camera>,
     /// The same as it was said.
     pub camera_keys: Value,
@@ -72,6 +74,7 @@ impl Client {
     pub fn new(size: (u32, u32), out: mpsc::Sender<Outgoing>) -> Self {
         let sight = Sight {
             stage: None,
+            stage_number: 0,
             camera: None,
             camera_keys: Value::Null,
             size,
@@ -205,7 +208,7 @@ impl Client {
                     "of_samples": frame.of_samples,
                 })
             });
-        let binary = frame.message(flow.sent, sight.input);
+        let binary = frame.message(flow.sent, sight.stage_number, sight.input);
         // A page that is gone is told of elsewhere.
         let _ = self.out.try_send(Outgoing::Binary(binary, self.unwritten.clone()));
         if let Some(numbers) = numbers {

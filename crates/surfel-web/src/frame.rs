@@ -21,11 +21,12 @@ const PNG: u8 = 2;
 const SAVED: u8 = 3;
 
 impl Frame {
-    /// With the number of the picture and that of the last message it obeys.
-    pub fn message(&self, number: u32, input: u32) -> Vec<u8> {
+    /// With the number of the picture, of what it shows and of the last message it obeys.
+    pub fn message(&self, number: u32, stage_number: u16, input: u32) -> Vec<u8> {
         let is_finished = self.quality == Quality::Finished;
         let mut message = Vec::with_capacity(20 + self.file.len());
-        message.extend([if is_finished { PNG } else { JPEG }, u8::from(is_finished), 0, 0]);
+        message.extend([if is_finished { PNG } else { JPEG }, u8::from(is_finished)]);
+        message.extend(stage_number.to_le_bytes());
         message.extend(number.to_le_bytes());
         message.extend(input.to_le_bytes());
         let samples = [self.samples, self.of_samples].map(|n| n.min(0xffff) as u16);

@@ -116,8 +116,11 @@ impl Staging {
         self.settings = stage.settings.clone();
         let keys = stage.settings.get("camera").cloned().unwrap_or_default();
         let place = stage.moved_camera.as_ref().unwrap_or(&keys);
+        // Pictures of what was seen before may still be on their way.
+        let stage_number = self.client.sight().stage_number.wrapping_add(1);
         let message = json!({
             "type": "scene",
+            "number": stage_number,
             "input": wish.input,
             "scene": stage.settings,
             "camera": place,
@@ -134,7 +137,7 @@ impl Staging {
             if sight.camera.is_none() || wish.is_anew || is_newest {
                 (sight.camera, sight.camera_keys) = (camera, keys);
             }
-            sight.stage = Some(stage);
+            (sight.stage, sight.stage_number) = (Some(stage), stage_number);
             sight.input = sight.input.max(wish.input);
             sight.is_moving = wish.is_moving;
         });

@@ -25,6 +25,8 @@ pub enum Told {
 pub struct Picture {
     pub kind: u8,
     pub is_finished: bool,
+    /// Of what it shows.
+    pub stage_number: u16,
     pub number: u32,
     pub input: u32,
     pub size: (u16, u16),
@@ -46,6 +48,7 @@ impl Picture {
         Self {
             kind: bytes[0],
             is_finished: bytes[1] == 1,
+            stage_number: short(2),
             number: long(4),
             input: long(8),
             size: (short(12), short(14)),

@@ -1,6 +1,6 @@
 //! Long work on scenes: told, given up, and never in the way of others.
 
-use crate::page::{Page, Told, camera};
+use crate::page::{Page, Picture, Told, camera};
 use crate::studio::MoodyRenderer;
 use crate::viewer::Viewer;
 use serde_json::{Value, json};
@@ -14,6 +14,22 @@ async fn a_sketch_is_shown_before_everything_is_ready() {
     let mut page = Page::open(&viewer, json!({ "sketched": true, "slow": 0.5 })).await;
     assert_eq!(page.told("scene").await["legend"], "sketch");
     assert_eq!(page.told("scene").await["legend"], Value::Null);
+}
+
+#[tokio::test]
+async fn pictures_tell_which_scene_they_show() {
+    let viewer = Viewer::start();
+    let mut page = Page::open(&viewer, json!({})).await;
+    let first = page.told("scene").await["number"].clone();
+    assert_eq!(json!(page.finished().await.stage_number), first);
+    page.set(1, json!({ "tint": 4 })).await;
+    let second = page.told("scene").await["number"].clone();
+    assert_ne!(second, first);
+    // None of the first scene comes any more once this one has.
+    let of_second = |picture: &Picture| json!(picture.stage_number) == second;
+    assert_eq!(page.picture_that(of_second).await.input, 1);
+    let rest = page.picture_that(|picture| !of_second(picture) || picture.is_finished).await;
+    assert!(of_second(&rest));
 }
 
 #[tokio::test]
