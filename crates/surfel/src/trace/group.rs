@@ -5,7 +5,7 @@
 //! nodes about as wide as itself, and the search of each packet begins with these.
 
 use super::frustum::{self, Anchor, Frustum};
-use super::packet::{ChildBox, Met, Packet, WideRays};
+use super::packet::{ChildBox, ChildRows, Met, Packet, WideRays};
 use crate::bvh::{Child, Node};
 use crate::flat::BlockTree;
 use crate::math::{LANES, Lanes, Ray, WIDE, Wide};
@@ -21,21 +21,24 @@ pub struct Group<W> {
     /// Empty unless all are alike, as `anchor` is.
     wide: Vec<WideRays<W>>,
     anchor: Option<Anchor>,
-    starts: Starts,
+    starts: [ChildRows; MOST_STARTS / LANES],
+    /// Of `starts`, in use.
+    n_rows: usize,
 }
 
 impl<W: Wide> Group<W> {
     /// `ends_meet` says that rays' far ends may be closer to each other than their origins, as at a light.
     pub fn new(ends_meet: bool) -> Self {
         let wide = Vec::with_capacity(GROUP / WIDE);
-        Self { ends_meet, wide, anchor: None, starts: Starts::at_root() }
+        let starts = [ChildRows::NONE; MOST_STARTS / LANES];
+        Self { ends_meet, wide, anchor: None, starts, n_rows: 0 }
     }
 
     /// Takes one to `GROUP` rays instead of those before.
     #[inline(always)]
     pub fn take<L: Lanes<Wide = W>, T: BlockTree>(&mut self, tree: &T, rays: &[Ray]) {
         self.wide.clear();
-        (self.anchor, self.starts) = (None, Starts::at_root());
+        self.anchor = None;
         if rays.len() <= WIDE || !frustum::may_be_alike(rays) {
             return;
         }
@@ -46,9 +49,15 @@ impl<W: Wide> Group<W> {
         let Some(anchor) = Anchor::new(&rays[0], &self.wide, self.ends_meet) else { return };
         let Some(frustum) = Frustum::new(&nodes[0], &anchor, &self.wide) else { return };
         self.anchor = Some(anchor);
-        self.starts.go_down::<L>(nodes, &frustum);
+        let mut starts = Starts::at_root();
+        starts.go_down::<L>(nodes, &frustum);
         if !self.ends_meet {
-            self.starts.sort();
+            starts.sort();
+        }
+        self.n_rows = 0;
+        for boxes in starts.boxes().chunks(LANES) {
+            self.starts[self.n_rows] = ChildRows::new(boxes);
+            self.n_rows += 1;
         }
     }
 
@@ -60,8 +69,9 @@ impl<W: Wide> Group<W> {
         place: usize,
         rays: &'p [Ray],
     ) -> Option<Packet<'p, W>> {
-        let (root, starts) = (&tree.nodes()[0], self.starts.boxes());
+        let root = &tree.nodes()[0];
         if let Some(anchor) = &self.anchor {
+            let starts = Some(&self.starts[..self.n_rows]);
             return Packet::new(root, rays, self.wide[place], anchor, starts);
         }
         if !frustum::may_be_alike(rays) {
@@ -69,7 +79,7 @@ impl<W: Wide> Group<W> {
         }
         let wide = WideRays::new(rays);
         let anchor = Anchor::new(&rays[0], std::slice::from_ref(&wide), self.ends_meet)?;
-        Packet::new(root, rays, wide, &anchor, starts)
+        Packet::new(root, rays, wide, &anchor, None)
     }
 }
 

@@ -22,8 +22,8 @@ pub struct WideRays<W> {
 /// Up to sixteen rays that are alike.
 pub struct Packet<'r, W> {
     pub rays: &'r [Ray],
-    /// Where the search begins.
-    starts: &'r [ChildBox],
+    /// Where the search begins, if not at the root.
+    starts: Option<&'r [ChildRows]>,
     pub wide: WideRays<W>,
     pub frustum: Frustum,
     /// Of the directions, in the order of the frustum's axes.
@@ -115,7 +115,7 @@ impl<'r, W: Wide> Packet<'r, W> {
         rays: &'r [Ray],
         wide: WideRays<W>,
         anchor: &Anchor,
-        starts: &'r [ChildBox],
+        starts: Option<&'r [ChildRows]>,
     ) -> Option<Self> {
         let frustum = Frustum::new(root, anchor, std::slice::from_ref(&wide))?;
         let [a, b, c] = frustum.axes;
@@ -193,16 +193,65 @@ impl<'n, L: Lanes> Met<'n, L> {
     pub fn children(&self) -> MetChildren {
         let (min, max) = self.boxes.store();
         let children = self.node.packed_children::<L>().store();
-        MetChildren { children, entries: self.entries, min, max, lanes: self.lanes }
+        let rows = ChildRows { children, min, max };
+        MetChildren { rows, entries: self.entries, lanes: self.lanes }
     }
 }
 
-/// The same one by one: a list to loop over, as `HitList` is.
-pub struct MetChildren {
+/// Eight children side by side.
+#[derive(Clone, Copy)]
+pub struct ChildRows {
+    /// Packed, as the bits of floats.
     children: [f32; LANES],
-    entries: [f32; LANES],
     min: [[f32; LANES]; 3],
     max: [[f32; LANES]; 3],
+}
+
+impl ChildRows {
+    /// No ray meets them.
+    pub const NONE: Self = Self {
+        children: [0.0; LANES],
+        min: [[f32::INFINITY; LANES]; 3],
+        max: [[f32::NEG_INFINITY; LANES]; 3],
+    };
+
+    pub fn new(children: &[ChildBox]) -> Self {
+        let mut rows = Self::NONE;
+        for (lane, child) in children.iter().enumerate() {
+            rows.children[lane] = f32::from_bits(child.child);
+            for axis in 0..3 {
+                rows.min[axis][lane] = child.min[axis];
+                rows.max[axis][lane] = child.max[axis];
+            }
+        }
+        rows
+    }
+
+    #[inline(always)]
+    fn boxes<L: Lanes>(&self) -> Boxes<L> {
+        let ([a, b, c], [d, e, f]) = (&self.min, &self.max);
+        Boxes {
+            min: [L::load(a), L::load(b), L::load(c)],
+            max: [L::load(d), L::load(e), L::load(f)],
+        }
+    }
+
+    #[inline(always)]
+    fn child(&self, lane: usize, entry: f32) -> ChildBox {
+        let (min, max) = (&self.min, &self.max);
+        ChildBox {
+            child: self.children[lane].to_bits(),
+            entry,
+            min: [min[0][lane], min[1][lane], min[2][lane]],
+            max: [max[0][lane], max[1][lane], max[2][lane]],
+        }
+    }
+}
+
+/// Children that are met, one by one: a list to loop over, as `HitList` is.
+pub struct MetChildren {
+    rows: ChildRows,
+    entries: [f32; LANES],
     lanes: u32,
 }
 
@@ -214,13 +263,7 @@ impl MetChildren {
         }
         let lane = self.lanes.trailing_zeros() as usize % LANES;
         self.lanes &= self.lanes - 1;
-        let (min, max) = (&self.min, &self.max);
-        Some(ChildBox {
-            child: self.children[lane].to_bits(),
-            entry: self.entries[lane],
-            min: [min[0][lane], min[1][lane], min[2][lane]],
-            max: [max[0][lane], max[1][lane], max[2][lane]],
-        })
+        Some(self.rows.child(lane, self.entries[lane]))
     }
 }
 
@@ -237,10 +280,21 @@ impl PacketStack {
     }
 
     #[inline(always)]
-    fn start(&mut self, starts: &[ChildBox]) {
-        self.boxes[..starts.len()].copy_from_slice(starts);
-        self.size = starts.len();
+    fn start<L: Lanes>(&mut self, packet: &Packet<L::Wide>, limit: f32) {
         self.density.forget_old();
+        self.boxes[0] = ChildBox::ROOT;
+        self.size = 1;
+        let Some(starts) = packet.starts else { return };
+        self.size = 0;
+        for rows in starts {
+            let (mut lanes, entries) = packet.frustum.meets::<L>(&rows.boxes(), limit);
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize % LANES;
+                lanes &= lanes - 1;
+                self.boxes[self.size] = rows.child(lane, entries[lane]);
+                self.size += 1;
+            }
+        }
     }
 
     #[inline(always)]
@@ -280,7 +334,7 @@ pub fn along_packet<L: Lanes, V: PacketVisitor<L>>(
     let memory = Memory::new(tree);
     let mut limit = packet.frustum.limit(&packet.wide, visitor.limits());
     let mut is_limit_old = false;
-    stack.start(packet.starts);
+    stack.start::<L>(packet, limit);
     while let Some(next) = stack.pop() {
         if V::IS_ORDERED && limit < next.entry {
             continue;
