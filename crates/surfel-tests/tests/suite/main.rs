@@ -6,6 +6,7 @@ mod build;
 mod crowds;
 mod furnace;
 mod glass;
+mod groups;
 mod instances;
 mod lamps;
 mod light;

@@ -31,7 +31,8 @@ pub(super) fn gathers<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], gathers: &mut [
     }
 }
 
-/// Adds to `sightings` all discs of one to sixteen rays, one after `place` others of a group, within limits that it returns, and some beyond.
+/// Adds to `sightings` all discs of one to sixteen rays, which stand at `place` in a group, within limits
+/// that it returns, and some beyond.
 #[inline(always)]
 pub(super) fn gather<L: Lanes>(
     points: &FlatPoints,

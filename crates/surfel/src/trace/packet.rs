@@ -279,6 +279,7 @@ impl PacketStack {
         Self { boxes: [ChildBox::ROOT; STACK_SIZE + MOST_STARTS], size: 0, density: Density::new() }
     }
 
+    /// Begins with what the packet's frustum meets of its starts, or with the root.
     #[inline(always)]
     fn start<L: Lanes>(&mut self, packet: &Packet<L::Wide>, limit: f32) {
         self.density.forget_old();
