@@ -15,7 +15,7 @@ pub const TO_INTEGER: f32 = 12_582_912.0;
 /// Floats in lanes, each operation rounded on its own (IEEE 754, nothing fused), so that every
 /// implementation gives the same bits.
 pub trait Floats:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+    Copy + 'static + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     type Mask: LaneMask;
 

@@ -1,10 +1,10 @@
 //! Whether any shape lies in each ray's range, each point on its own.
 
+use super::batch::{Query, ask};
 use super::block::{BeforePacket, BlockHits, Leaf, Worth};
-use super::flight::{RayVisitor, fly};
-use super::group::{GROUP, Group};
+use super::flight::RayVisitor;
 use super::hit::Hit;
-use super::packet::{Packet, PacketStack, PacketVisitor, WideRays, along_packet};
+use super::packet::{Packet, PacketVisitor, WideRays};
 use crate::flat::{FlatCloud, FlatTriangles, Slot};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, WIDE, Wide};
 use crate::surface::{Disc, Sphere, Triangle};
@@ -68,39 +68,54 @@ pub(super) fn any_that_counts<L: Lanes, S: Leaf, J: Judge>(
     judge: J,
     occluded: &mut [bool],
 ) {
-    let mut stack = PacketStack::new();
-    let mut loose = Vec::with_capacity(rays.len());
-    let mut indices = Vec::with_capacity(rays.len());
-    let mut group = Group::new(true);
-    for (group_idx, rays) in rays.chunks(GROUP).enumerate() {
-        group.take::<L, _>(tree, rays);
-        for (place, rays) in rays.chunks(WIDE).enumerate() {
-            let first = group_idx * GROUP + place * WIDE;
-            if let Some(packet) = group.packet(tree, place, rays) {
-                let occluded = &mut occluded[first..][..rays.len()];
-                any_in_packet::<L, S, J>(tree, &packet, judge, &mut stack, occluded);
-                continue;
-            }
-            for (lane, ray) in rays.iter().enumerate() {
-                loose.push(Any { ray, judge, shape: PhantomData::<S>, is_hit: false });
-                indices.push(first + lane);
-            }
-        }
+    ask::<L, _>(Any { judge, shape: PhantomData::<S> }, tree, rays, occluded);
+}
+
+/// Asks whether anything that counts is hit.
+struct Any<S, J> {
+    judge: J,
+    shape: PhantomData<S>,
+}
+
+impl<L: Lanes, S: Leaf, J: Judge> Query<L> for Any<S, J> {
+    type Tree = S::Tree;
+    type Answer = bool;
+    type Alone<'r> = AnyAlone<'r, S, J>;
+    type InPacket<'p> = AnyInPacket<'p, L, S, J>;
+    const ENDS_MEET: bool = true;
+
+    #[inline(always)]
+    fn alone<'r>(&self, ray: &'r Ray) -> AnyAlone<'r, S, J> {
+        AnyAlone { ray, judge: self.judge, shape: PhantomData, is_hit: false }
     }
-    fly::<L, _>(tree, &mut loose);
-    for (ray_idx, any) in indices.into_iter().zip(loose) {
-        occluded[ray_idx] = any.is_hit;
+
+    #[inline(always)]
+    fn in_packet<'p>(&self, packet: &'p Packet<'p, L::Wide>) -> AnyInPacket<'p, L, S, J> {
+        let (lines, limits) = (S::lines(&packet.wide), packet.limits());
+        AnyInPacket { packet, judge: self.judge, lines, limits, is_hit: 0 }
+    }
+
+    #[inline(always)]
+    fn answer(found: &AnyAlone<S, J>) -> bool {
+        found.is_hit
+    }
+
+    #[inline(always)]
+    fn answer_all(found: &AnyInPacket<L, S, J>, occluded: &mut [bool]) {
+        for (lane, occluded) in occluded.iter_mut().enumerate() {
+            *occluded = found.is_hit >> lane & 1 == 1;
+        }
     }
 }
 
-struct Any<'r, S, J> {
+struct AnyAlone<'r, S, J> {
     ray: &'r Ray,
     judge: J,
     shape: PhantomData<S>,
     is_hit: bool,
 }
 
-impl<S: Leaf, J: Judge> RayVisitor for Any<'_, S, J> {
+impl<S: Leaf, J: Judge> RayVisitor for AnyAlone<'_, S, J> {
     type Tree = S::Tree;
     const IS_ORDERED: bool = false;
 
@@ -136,23 +151,6 @@ fn has_counting<L: Lanes, J: Judge>(hits: &BlockHits<L>, ray: &Ray, limit: f32, 
         }
     }
     false
-}
-
-#[inline(always)]
-fn any_in_packet<L: Lanes, S: Leaf, J: Judge>(
-    tree: &S::Tree,
-    packet: &Packet<L::Wide>,
-    judge: J,
-    stack: &mut PacketStack,
-    occluded: &mut [bool],
-) {
-    let limits = packet.limits();
-    let mut any =
-        AnyInPacket::<L, S, J> { packet, judge, lines: S::lines(&packet.wide), limits, is_hit: 0 };
-    along_packet::<L, _>(tree, packet, stack, &mut any);
-    for (lane, occluded) in occluded.iter_mut().enumerate() {
-        *occluded = any.is_hit >> lane & 1 == 1;
-    }
 }
 
 struct AnyInPacket<'p, L: Lanes, S: Leaf, J> {

@@ -47,7 +47,7 @@ macro_rules! mask {
 }
 
 /// What differs between levels that have registers of eight floats.
-pub(super) trait Level: Copy {
+pub(super) trait Level: Copy + 'static {
     /// Sixteen lanes.
     type Wide: Wide;
     type Mask: LaneMask;

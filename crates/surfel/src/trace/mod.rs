@@ -1,6 +1,7 @@
 //! Rays in batches against a cloud, a mesh or a whole scene: closest hit, any hit, gather; SIMD lives here.
 
 mod any;
+mod batch;
 mod block;
 mod boxes;
 mod boundary;

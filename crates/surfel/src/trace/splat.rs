@@ -8,10 +8,11 @@ use super::hit::Hit;
 use super::packet::{PacketStack, WideRays};
 use super::sightings::{Sighting, settle};
 use crate::flat::FlatCloud;
-use crate::math::{Floats, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
+use crate::math::{Floats, LaneMask, Lanes, Ray, Task, Vec3, Vec3Lanes, WIDE, Wide};
 use crate::surface::{
     Blend, Boundary, Candidate, Gathered, MAX_GATHERED, SurfaceKind, plane_normal,
 };
+use std::marker::PhantomData;
 
 /// The blended discs of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,26 +65,32 @@ impl<'s> Finder<'s> {
         Self { stack: PacketStack::new(), mixer, open: Vec::new(), open_hits: Vec::new() }
     }
 
+    /// Finds the splats of `rays`, in a function of its own.
     #[inline(always)]
     pub fn find<L: Lanes>(&mut self, rays: &[Ray], splats: &mut [Splat]) {
+        L::call(Find { finder: self, rays, splats, lanes: PhantomData::<L> });
+    }
+
+    #[inline(always)]
+    fn blend<L: Lanes>(&mut self, rays: &[Ray], splats: &mut [Splat]) {
         let Self { stack, mixer, .. } = self;
         let (points, mut group) = (&mixer.cloud.points, Group::new(false));
+        let (is_gathered, mut hits) = (mixer.kind.is_gathered(), [Hit::MISS; GROUP]);
         for (rays, splats) in rays.chunks(GROUP).zip(splats.chunks_mut(GROUP)) {
-            if mixer.kind.is_gathered() {
+            if is_gathered {
                 group.take::<L, _>(points, rays);
+            } else {
+                closest_hits::<L>(mixer.cloud, rays, &mut hits[..rays.len()]);
             }
-            let packets = rays.chunks(WIDE).zip(splats.chunks_mut(WIDE));
-            for (place, (rays, splats)) in packets.enumerate() {
-                let limits = if mixer.kind.is_gathered() {
+            let packets = rays.chunks(WIDE).zip(splats.chunks_mut(WIDE)).zip(hits.chunks(WIDE));
+            for (place, ((rays, splats), hits)) in packets.enumerate() {
+                let limits = if is_gathered {
                     gather::<L>(points, &group, place, rays, stack, &mut mixer.sightings)
                 } else {
-                    find_closest::<L>(mixer.cloud, rays, &mut mixer.sightings)
+                    mixer.take(&hits[..rays.len()])
                 };
                 mixer.mix::<L>(&WideRays::new(rays), &limits, splats);
             }
-        }
-        if mixer.judges {
-            self.judge::<L>(rays, splats);
         }
     }
 
@@ -112,19 +119,24 @@ impl<'s> Finder<'s> {
     }
 }
 
-/// The nearest disc of each ray, alone.
-#[inline(always)]
-fn find_closest<L: Lanes>(
-    cloud: &FlatCloud,
-    rays: &[Ray],
-    sightings: &mut Vec<Sighting>,
-) -> [f32; WIDE] {
-    let mut hits = [Hit::MISS; WIDE];
-    closest_hits::<L>(cloud, rays, &mut hits[..rays.len()]);
-    for (lane, hit) in hits.iter().enumerate().filter(|(_, hit)| !hit.is_miss()) {
-        sightings.push(Sighting::by_one(lane, *hit));
+struct Find<'f, 's, L> {
+    finder: &'f mut Finder<'s>,
+    rays: &'f [Ray],
+    splats: &'f mut [Splat],
+    lanes: PhantomData<L>,
+}
+
+impl<L: Lanes> Task for Find<'_, '_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { finder, rays, splats, .. } = self;
+        finder.blend::<L>(rays, splats);
+        if finder.mixer.judges {
+            finder.judge::<L>(rays, splats);
+        }
     }
-    [f32::MAX; WIDE]
 }
 
 /// Blends sightings into splats.
@@ -147,6 +159,14 @@ struct Nearest<W> {
 }
 
 impl Mixer<'_> {
+    /// Takes each ray's nearest disc alone.
+    fn take(&mut self, hits: &[Hit]) -> [f32; WIDE] {
+        for (lane, hit) in hits.iter().enumerate().filter(|(_, hit)| !hit.is_miss()) {
+            self.sightings.push(Sighting::by_one(lane, *hit));
+        }
+        [f32::MAX; WIDE]
+    }
+
     /// Blends what was seen by one to sixteen rays up to their limits, and forgets it.
     #[inline(always)]
     fn mix<L: Lanes>(
