@@ -27,9 +27,9 @@ pub struct Packet<'r, W> {
     pub wide: WideRays<W>,
     pub frustum: Frustum,
     /// Of the directions, in the order of the frustum's axes.
-    pub inverse: [W; 3],
+    inverse: [W; 3],
     /// Origins relative to the frustum's anchor, in the same order.
-    pub from_anchor: [W; 3],
+    from_anchor: [W; 3],
     /// Where all rays start, if that is one place.
     pub common_origin: Option<Vec3>,
 }
@@ -145,7 +145,7 @@ impl<'r, W: Wide> Packet<'r, W> {
 
     /// The lanes whose rays pass the box before `limits`.
     #[inline(always)]
-    fn passing(&self, bounds: &ChildBox, limits: &[f32; WIDE]) -> u32 {
+    pub fn passing(&self, bounds: &ChildBox, limits: &[f32; WIDE]) -> u32 {
         let (mut enter, mut leave) = (self.wide.t_min, W::load(limits));
         for axis in 0..3 {
             let low = (W::splat(bounds.min[axis]) - self.from_anchor[axis]) * self.inverse[axis];
@@ -176,7 +176,7 @@ impl ChildBox {
 /// The children of a node that a packet's frustum meets.
 pub struct Met<'n, L> {
     pub node: &'n Node,
-    pub boxes: Boxes<L>,
+    boxes: Boxes<L>,
     entries: [f32; LANES],
     pub lanes: u32,
 }
