@@ -8,9 +8,11 @@ Beside NAME.bin or NAME.ply lies NAME.cam, and beside a mesh also NAME.tri, the 
 trace the same rays, on one thread and on two; rates are million rays a second of processor time over threads.
 In each round every program runs once, in turn. Embree counts with the better of single rays and packets of 16,
 and on points of its two set-ups, for each kind of ray; triangles without and with its flag for robust scenes.
-Printed are the medians over the rounds and that of the ratios; in brackets the least and the greatest.
+Printed are the medians over the rounds and that of the ratios; in brackets the least and the greatest. Last
+stands the ratio of the best rates of either program: on a machine that others slow down at times, what it would
+be on a quiet one.
 """
-import argparse, json, re, statistics, subprocess
+import argparse, json, re, statistics, subprocess, sys
 from pathlib import Path
 
 KINDS = {"primary-isect": "primary", "shadow-occl": "shadow", "bounce-occl": "bounce-any",
@@ -21,7 +23,10 @@ THREADS = (1, 2)
 
 
 def run(command):
-    return subprocess.run([str(word) for word in command], check=True, capture_output=True, text=True).stdout
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(map(str, command))}\n{done.stderr}")
+    return done.stdout
 
 
 def embree_points(program, cloud, surface):
@@ -77,7 +82,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--surfaces")
     args = parser.parse_args()
-    print("| file | surface | threads | rays | surfel | Embree | ratio |\n|---|---|---|---|---|---|---|")
+    print("| file | surface | threads | rays | surfel | Embree | ratio | of the best |\n|---|---|---|---|---|---|---|---|")
     for file in args.files:
         usual = "disc,sphere" if file.suffix == ".bin" else "triangle,triangle-robust"
         for surface in (args.surfaces or usual).split(","):
@@ -94,8 +99,9 @@ def compare(args, file, surface):
         found, other = ours[threads, kind], theirs[threads, kind]
         ratios = [b / a if kind == BUILD else a / b for a, b in zip(found, other)]
         middle = statistics.median
+        best = min(other) / min(found) if kind == BUILD else max(found) / max(other)
         print(f"| {file.stem} | {surface} | {threads} | {kind} | {middle(found):.3g} | {middle(other):.3g} "
-              f"| {middle(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f}) |", flush=True)
+              f"| {middle(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f}) | {best:.2f} |", flush=True)
 
 
 def add(rounds_rates, rates):

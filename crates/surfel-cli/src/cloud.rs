@@ -1,6 +1,6 @@
 //! Clouds from the file to a surface: read, prepared, coloured.
 
-use crate::args::SceneArgs;
+use crate::args::{PreparationArgs, SceneArgs};
 use crate::report::Report;
 use std::path::Path;
 use surfel::math::Vec3;
@@ -60,7 +60,7 @@ pub fn prepare_points(
     let preparation = args.preparation.preparation(args.picture.seed, args.color.color.as_ref());
     let (cloud, prepared) = prepare(cloud, &preparation, report)?;
     report.end_stage();
-    tell_prepared(&prepared, args, report);
+    tell_prepared(&prepared, &args.preparation, report);
     Ok(cloud)
 }
 
@@ -82,13 +82,14 @@ pub fn dress(
     })
 }
 
-fn tell_prepared(prepared: &points::Report, args: &SceneArgs, report: &Report) {
+/// Tells where normals and radii come from.
+pub fn tell_prepared(prepared: &points::Report, args: &PreparationArgs, report: &Report) {
     if prepared.normals.is_none() {
         report.choice("normals as in the file", "--normals-k");
     }
-    args.preparation.tell_normals(prepared, report);
+    args.tell_normals(prepared, report);
     if prepared.radii.is_none() {
         report.choice("radii as in the file", "--radius");
     }
-    args.preparation.tell_radii(prepared, report);
+    args.tell_radii(prepared, report);
 }

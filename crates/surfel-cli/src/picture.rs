@@ -43,6 +43,9 @@ pub fn make(
 ) -> anyhow::Result<()> {
     let start = Instant::now();
     check_output(output)?;
+    if let Some(stats) = &args.stats {
+        check_stats(stats, output, &args.scene.files)?;
+    }
     let mut seconds = Seconds::default();
     let assembly = timed(&mut seconds.load, || load(&args.scene, line, global, report))?;
     let choices = choose(&assembly, &args.scene, report)?;
@@ -83,6 +86,36 @@ pub fn check_output(path: &Path) -> anyhow::Result<()> {
         surfel_formats::Error::Unsupported { .. } => Usage(error.to_string()).into(),
         other => anyhow::Error::from(other),
     })?;
+    check_kind(path)
+}
+
+/// Fails where the numbers would take the place of the picture, or of what it is made from.
+fn check_stats(stats: &Path, output: &Path, inputs: &[PathBuf]) -> anyhow::Result<()> {
+    if stats == Path::new("-") {
+        return Ok(());
+    }
+    surfel_formats::check_place(stats)?;
+    check_kind(stats)?;
+    let is_stats = |path: &&PathBuf| is_same_file(path, stats);
+    let taken = std::iter::once(&output.to_owned()).chain(inputs).find(is_stats).cloned();
+    taken.map_or(Ok(()), |path| {
+        let text =
+            format!("--stats {}: would take the place of that file; name another", path.display());
+        Err(Usage(text).into())
+    })
+}
+
+/// By any name; a file that is not there yet by its folder.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let place = |path: &Path| {
+        let parent = path.parent().filter(|parent| *parent != Path::new(""));
+        let folder = parent.unwrap_or(Path::new(".")).canonicalize().ok()?;
+        Some(path.canonicalize().unwrap_or(folder.join(path.file_name()?)))
+    };
+    a == b || place(a).is_some_and(|a| Some(a) == place(b))
+}
+
+fn check_kind(path: &Path) -> anyhow::Result<()> {
     // A finished file takes the place of its name, and would end a pipe or a device there.
     if path.metadata().is_ok_and(|found| !found.is_file()) {
         bail!("{}: a device or a pipe stands there; name a file", path.display());

@@ -81,10 +81,10 @@ fn prepared(cloud: PointCloud, args: &Args, report: &Report) -> anyhow::Result<P
     let wanted = wanted(args);
     if !wanted.normals && !wanted.radii && !wanted.variation {
         let (cloud, _) = clean(cloud, report)?;
-        let choice = args.preparation.select;
-        return Ok(
-            choice.map_or(Ok(cloud.clone()), |choice| select(&cloud, choice, args.seed, report))?
-        );
+        return Ok(match args.preparation.select {
+            Some(choice) => select(&cloud, choice, args.seed, report)?,
+            None => cloud,
+        });
     }
     let mut preparation = args.preparation.preparation(args.seed, None);
     preparation.keep_variation = wanted.variation;

@@ -8,6 +8,19 @@ use std::path::Path;
 
 use crate::error::{Error, Place, Result};
 
+/// Reads a text file of at most `most_bytes` bytes.
+pub fn load_text(path: &Path, most_bytes: usize) -> Result<String> {
+    let input = Input::open(path)?;
+    if most_bytes < input.len() {
+        let found = format!("{} bytes where at most {most_bytes} are expected", input.len());
+        return Err(input.unsupported(found, "check that it is the file you mean"));
+    }
+    let text = str::from_utf8(&input).map(str::to_owned);
+    text.map_err(|_| {
+        input.unsupported("bytes that are no text", "check that it is the file you mean")
+    })
+}
+
 /// The bytes of one input.
 pub(crate) struct Input<'a> {
     pub name: Cow<'a, str>,

@@ -62,8 +62,9 @@ pub use environment::{LinearPicture, load_environment_picture, load_environment_
 pub use error::{Error, Place, Result};
 pub use gltf::{load_gltf, load_gltf_bytes};
 pub use graph::{is_cloud, is_scene, load_graph, load_graph_bytes};
+pub use input::load_text;
 pub use load::{common_source, inspect, load, load_all, load_bytes, merge_loaded};
 pub use movie::{Container, Movie, MovieFormat, MovieOptions, check_movie};
 pub use options::{Column, ColumnChoice, LoadOptions, Loaded, Source, TextColumn};
 pub use picture::{Alpha, BitDepth, ImageOptions, png_bytes, save_image};
-pub use save::{SaveOptions, check_output, save};
+pub use save::{SaveOptions, check_output, check_place, save};

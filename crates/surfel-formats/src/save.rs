@@ -50,7 +50,7 @@ pub fn check_output(path: &Path) -> Result<()> {
 }
 
 /// Tells whether a file can stand at `path`: its folder exists, and no folder has its name.
-pub(crate) fn check_place(path: &Path) -> Result<()> {
+pub fn check_place(path: &Path) -> Result<()> {
     let folder = folder_of(path);
     let problem = if path.is_dir() {
         std::io::ErrorKind::IsADirectory

@@ -29,7 +29,7 @@ fn building(criterion: &mut Criterion) {
     group.bench_function("refit", |bencher| {
         bencher.iter(|| {
             let cloud = moving.next().unwrap();
-            let refit = points.refit(cloud, KIND, &colors, &Silent).unwrap();
+            let refit = points.refit(cloud, KIND, &colors).unwrap();
             assert!(matches!(refit, Refit::Kept { .. }), "{refit:?}");
         });
     });

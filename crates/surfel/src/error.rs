@@ -8,6 +8,8 @@ pub enum Error {
     EmptyCloud,
     #[error("the cloud has {found} points; at most {limit} can be told apart")]
     TooManyPoints { found: usize, limit: usize },
+    #[error("the tree has {found} blocks of eight; at most {limit} can be told apart")]
+    TooManyBlocks { found: usize, limit: usize },
     #[error("{name} must be {expected}, found {found}")]
     Setting { name: &'static str, found: String, expected: &'static str },
     #[error("unknown {kind} '{found}'; known: {known}")]

@@ -1,8 +1,6 @@
 //! Cameras as files: one line `ex,ey,ez,tx,ty,tz,fovy_deg,lx,ly,lz`, with Z up.
 
 use anyhow::Context;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 use surfel::math::DVec3;
 use surfel::scene::{Camera, Projection};
@@ -18,20 +16,21 @@ pub struct CameraFile {
     pub light: DVec3,
 }
 
-const FORM: &str = "one line of ten numbers: eye x,y,z, target x,y,z, vertical angle of view in \
-    degrees, light x,y,z";
-/// A line is far shorter; a file that is longer is another one, and is not read to its end.
-const MOST_BYTES: u64 = 4096;
+const FORM: &str = "one line of ten numbers separated by commas: eye x,y,z, target x,y,z, vertical angle \
+    of view in degrees, light x,y,z";
+/// A line is far shorter; a file that is longer is another one.
+const MOST_BYTES: usize = 4096;
 
 impl CameraFile {
     pub fn read(path: &Path) -> anyhow::Result<Self> {
-        let text = text(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+        let text = surfel_formats::load_text(path, MOST_BYTES)?;
         let camera = Self::parse(text.trim()).map_err(anyhow::Error::msg);
         camera.with_context(|| path.display().to_string())
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let numbers = text.split(',').map(number).collect::<Result<Vec<f64>, String>>()?;
+        let numbers = text.split(',').enumerate().map(|(i, text)| number(text, i + 1));
+        let numbers = numbers.collect::<Result<Vec<f64>, String>>()?;
         let &[ex, ey, ez, tx, ty, tz, view_angle_deg, lx, ly, lz] = &numbers[..] else {
             return Err(format!("found {} numbers, expected {FORM}", numbers.len()));
         };
@@ -59,18 +58,12 @@ impl CameraFile {
     }
 }
 
-fn text(path: &Path) -> std::io::Result<String> {
-    let mut bytes = Vec::new();
-    File::open(path)?.take(MOST_BYTES).read_to_end(&mut bytes)?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
-}
-
-fn number(text: &str) -> Result<f64, String> {
+fn number(text: &str, place: usize) -> Result<f64, String> {
     let number = text.trim().parse::<f64>().ok();
     // Beyond this the squares of lengths are no longer finite in f32.
     number.filter(|number| number.abs() < 1e15).ok_or_else(|| {
         let found: String = text.trim().chars().take(40).collect();
-        format!("found `{}`, expected {FORM}", found.escape_debug())
+        format!("number {place}: found `{}`, expected {FORM}", found.escape_debug())
     })
 }
 
@@ -89,13 +82,14 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told() {
         let wrong = [
-            ("", "found ``, expected one line of ten numbers"),
+            ("", "number 1: found ``, expected one line of ten numbers separated by commas"),
+            ("1 2 3 4 5 6 40 8 9 10", "number 1: found `1 2 3 4 5 6 40 8 9 10`"),
             ("1,2,3", "found 3 numbers, expected one line of ten numbers"),
             ("1,2,3,4,5,6,40,8,9,10,11", "found 11 numbers"),
-            ("1,2,3,4,5,6,40,8,9,10\n1,2,3,4,5,6,40,8,9,10", "found `10\\n1`"),
+            ("1,2,3,4,5,6,40,8,9,10\n1,2,3,4,5,6,40,8,9,10", "number 10: found `10\\n1`"),
             ("1,2,3,4,5,6,40,8,9,nan", "found `nan`"),
             ("1,2,3,4,5,6,40,8,9,1e300", "found `1e300`"),
-            ("1,2,x,4,5,6,40,8,9,10", "found `x`"),
+            ("1,2,x,4,5,6,40,8,9,10", "number 3: found `x`"),
             ("1,2,3,4,5,6,180,8,9,10", "found an angle of view of 180, expected 0 to 180"),
             ("1,2,3,1,2,3,40,8,9,10", "found eye and target at one place"),
             ("1,2,3,1,2,9,40,8,9,10", "found a view straight up or down"),

@@ -8,6 +8,7 @@ mod search;
 mod table;
 
 use crate::args::{CameraArgs, Global, PreparationArgs, SurfaceArgs, Usage, parse, short};
+use crate::cloud::tell_prepared;
 use crate::memory::Plan;
 use crate::report::{Report, print};
 use crate::stats;
@@ -20,12 +21,13 @@ use measure::{Bench, Rays, closest_hits};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use surfel::flat::FlatGeometry;
-use surfel::math::{DVec3, Vec3};
+use surfel::math::{DAffine3, DVec3, Vec3};
 use surfel::points::{PointCloud, prepare};
-use surfel::scene::{Camera, Geometry, Graph, Points};
+use surfel::progress::Progress;
+use surfel::scene::{Camera, Geometry, Graph, Material, Mesh, Points};
 use surfel::surface::SurfaceKind;
-use surfel::trace::Simd;
-use surfel_formats::{ColumnChoice, Source};
+use surfel::trace::{Hit, Simd};
+use surfel_formats::{ColumnChoice, Loaded, Source};
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -130,6 +132,9 @@ fn measure(
 ) -> surfel::Result<Map<String, Value>> {
     let primary = rays::camera_rays(stage, file, args.resolution);
     let hits = closest_hits(stage, simd, &primary);
+    if hits.iter().all(Hit::is_miss) {
+        report.note("no camera ray hits anything; see --camera-position and --camera-file");
+    }
     let light = light(stage, file, report);
     let bench = Bench { stage, simd, runs: args.runs, light, primary, hits, report };
     let name = |kind: &Rays| kind.to_possible_value().map(|value| value.get_name().to_owned());
@@ -172,18 +177,15 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
 }
 
 fn describe(args: &Args, file: Option<&CameraFile>, report: &Report) -> anyhow::Result<Described> {
-    let options = args.preparation.load_options(ColumnChoice::Only(args.preparation.geometry()));
-    let (mut graph, source) = surfel_formats::load_graph(&args.cloud, &options, report)?;
-    let name = || args.cloud.display().to_string();
-    if graph.geometries.len() != 1 {
-        let n = graph.geometries.len();
-        anyhow::bail!("{}: holds {n} things; one cloud or mesh is measured at a time", name());
-    }
-    for geometry in &mut graph.geometries {
-        let Geometry::Points(points) = geometry else { continue };
+    let (mut geometry, source) = load(args, report)?;
+    report.end_stage();
+    if let Geometry::Points(points) = &mut geometry {
         let preparation = args.preparation.preparation(0, None);
-        let (mut cloud, _) =
-            prepare(std::mem::take(&mut points.cloud), &preparation, report).with_context(name)?;
+        let (mut cloud, prepared) =
+            prepare(std::mem::take(&mut points.cloud), &preparation, report)
+                .with_context(|| args.cloud.display().to_string())?;
+        report.end_stage();
+        tell_prepared(&prepared, &args.preparation, report);
         args.surface.scale_radii(&mut cloud);
         *points = Points {
             colors: vec![[200; 3]; cloud.len()],
@@ -193,11 +195,50 @@ fn describe(args: &Args, file: Option<&CameraFile>, report: &Report) -> anyhow::
             has_outward_normals: false,
         };
     }
+    let graph = Graph::of(geometry, Material::MATTE);
     let camera = match file {
         Some(file) => file.camera(),
         None => camera(args, &graph.outline(), &source, report),
     };
     Ok(Described { graph, camera })
+}
+
+/// The one thing that the file holds, where it stands in the world.
+fn load(args: &Args, report: &Report) -> anyhow::Result<(Geometry, Source)> {
+    let options = args.preparation.load_options(ColumnChoice::Only(args.preparation.geometry()));
+    let vertices = || -> anyhow::Result<(Geometry, Source)> {
+        let Loaded { cloud, source } = surfel_formats::load(&args.cloud, &options, report)?;
+        Ok((Geometry::Points(Points { cloud, ..Points::default() }), source))
+    };
+    if args.preparation.vertices {
+        return vertices();
+    }
+    let (mut graph, source) = surfel_formats::load_graph(&args.cloud, &options, report)?;
+    let world = graph.world_from_nodes();
+    let shown = graph
+        .nodes
+        .iter()
+        .zip(&world)
+        .flat_map(|(node, world)| node.parts.iter().map(move |_| *world));
+    let shown: Vec<DAffine3> = shown.collect();
+    let ([place], 1) = (&shown[..], graph.geometries.len()) else {
+        let (name, n) = (args.cloud.display(), shown.len());
+        anyhow::bail!("{name}: holds {n} things; one cloud or mesh is measured at a time");
+    };
+    match graph.geometries.remove(0) {
+        geometry if *place == DAffine3::IDENTITY => Ok((geometry, source)),
+        Geometry::Points(_) => vertices(),
+        Geometry::Triangles(mesh) => Ok((Geometry::Triangles(moved(mesh, *place)), source)),
+    }
+}
+
+/// Where `place` takes the corners; of what else they carry no ray asks.
+fn moved(mesh: Mesh, place: DAffine3) -> Mesh {
+    let in_world = |position: &Vec3| place.transform_point3(mesh.origin + position.as_dvec3());
+    let places: Vec<DVec3> = mesh.positions.iter().map(in_world).collect();
+    let origin = PointCloud::choose_origin(&places);
+    let positions = places.iter().map(|place| (*place - origin).as_vec3()).collect();
+    Mesh { origin, positions, triangles: mesh.triangles, ..Mesh::default() }
 }
 
 fn camera(args: &Args, outline: &PointCloud, source: &Source, report: &Report) -> Camera {
@@ -232,8 +273,9 @@ fn light(stage: &Stage, file: Option<&CameraFile>, report: &Report) -> Vec3 {
     if let Some(file) = file {
         return (file.light - stage.origin).as_vec3();
     }
-    let eye = stage.camera.position - stage.origin;
-    let light = eye + DVec3::new(-0.6, 0.3, 0.5) * eye.length();
+    let Camera { position, focal_point, .. } = stage.camera;
+    let away = position.distance(focal_point);
+    let light = position - stage.origin + DVec3::new(-0.6, 0.3, 0.5) * away;
     let line = format!("point light at {}", short(light + stage.origin));
     report.choice(&line, "--camera-file");
     light.as_vec3()

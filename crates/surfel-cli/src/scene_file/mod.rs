@@ -14,11 +14,8 @@ pub use object::Object;
 pub use options::Options;
 
 use crate::args::Usage;
-use anyhow::{Context, anyhow, bail};
 use fields::Fields;
 use serde_json::Value;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use surfel::scene::Node;
 
@@ -38,7 +35,7 @@ pub struct SceneFile {
 pub(crate) const TABLES: [&str; 3] = ["object", "lamp", "animation"];
 
 /// Bytes of the largest scene file: it names data, it does not hold them.
-const MOST_BYTES: u64 = 64 << 20;
+const MOST_BYTES: usize = 64 << 20;
 
 /// Whether a file is a scene file, by its name.
 pub fn is_scene_file(path: &Path) -> bool {
@@ -48,21 +45,11 @@ pub fn is_scene_file(path: &Path) -> bool {
 
 impl SceneFile {
     pub fn read(path: &Path) -> anyhow::Result<Self> {
-        let name = path.display();
-        let file = File::open(path).with_context(|| format!("{name}: cannot be read"))?;
-        let mut bytes = Vec::new();
-        file.take(MOST_BYTES + 1)
-            .read_to_end(&mut bytes)
-            .with_context(|| format!("{name}: cannot be read"))?;
-        if MOST_BYTES < bytes.len() as u64 {
-            bail!("{name}: too large, expected a scene file of at most {MOST_BYTES} bytes");
-        }
-        let text = String::from_utf8(bytes)
-            .map_err(|_| anyhow!("{name}: is not text; check that it is a scene file"))?;
+        let text = surfel_formats::load_text(path, MOST_BYTES)?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         Self::parse(&text, is_json, &folder)
-            .map_err(|error| Usage(format!("{name}: {error}")).into())
+            .map_err(|error| Usage(format!("{}: {error}", path.display())).into())
     }
 
     /// `folder` is where the files lie that the scene names.

@@ -11,6 +11,7 @@ use crate::args::{Global, SceneArgs};
 use crate::report::Report;
 use crate::scene_file::Line;
 use anyhow::anyhow;
+use std::io::ErrorKind;
 use std::net::IpAddr;
 use std::sync::Arc;
 use studio::ScanStudio;
@@ -55,6 +56,9 @@ Examples:
 pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow::Result<()> {
     args.scene.check()?;
     let server = Server::bind(args.host, args.port).map_err(|error| match error {
+        Error::Io { ref source, .. } if source.kind() == ErrorKind::AddrNotAvailable => {
+            anyhow!("{error}; choose an address of this machine with --host, or 0.0.0.0 for all")
+        }
         Error::Io { .. } => anyhow!("{error}; choose another port with --port, or 0 for any"),
         error => anyhow!(error),
     })?;

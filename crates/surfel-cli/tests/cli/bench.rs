@@ -1,6 +1,6 @@
 //! `surfel bench`: the same rays and answers as Embree's, and the form in which they are told.
 
-use super::common::{Folder, dome, fail, stderr, succeed, surfel, tile};
+use super::common::{Folder, dome, fail, gltf, stderr, succeed, surfel, tile};
 use serde_json::Value;
 use surfel::progress::Silent;
 use surfel_formats::{LoadOptions, load, load_bytes};
@@ -114,6 +114,63 @@ fn radii_and_normals_of_a_file_are_taken_as_they_are() {
     assert_eq!(found[0], found[1]);
 }
 
+/// Hits of the camera's rays, and of those to the light.
+fn hits(arguments: &[&str]) -> [Value; 2] {
+    let result = bench(&[arguments, &["--resolution", "64x64"]].concat());
+    ["primary", "shadow"].map(|kind| result["rays"][kind]["hits"].clone())
+}
+
+#[test]
+fn things_of_gltf_files_are_measured_where_they_stand() {
+    let folder = Folder::new();
+    let plain = folder.write("plain.gltf", gltf());
+    let expected = hits(&[&plain]);
+    assert!(600 < expected[0].as_i64().unwrap(), "{expected:?}");
+    for (name, place) in [
+        ("moved.gltf", r#""translation":[100,20,-7]"#),
+        ("small.gltf", r#""scale":[0.01,0.01,0.01]"#),
+        ("turned.gltf", r#""rotation":[0,0,0,-1],"translation":[5e6,0,0]"#),
+    ] {
+        let text = gltf().replace(r#"{"mesh":0}"#, &format!(r#"{{"mesh":0,{place}}}"#));
+        // Corners near 5e6 are rounded to halves as the file is read, but stand in doubles here.
+        assert_eq!(hits(&[&folder.write(name, text)]), expected, "{name}");
+    }
+    let twice = gltf().replace(r#""nodes":[{"mesh":0}]"#, r#""nodes":[{"mesh":0},{"mesh":0}]"#);
+    let twice = twice.replace(r#"[{"nodes":[0]}]"#, r#"[{"nodes":[0,1]}]"#);
+    let error = fail(&["bench", &folder.write("twice.gltf", twice)], 1);
+    assert!(error.contains("holds 2 things"), "{error}");
+}
+
+#[test]
+fn vertices_of_a_mesh_are_measured_as_points() {
+    let folder = Folder::new();
+    let scene = folder.write("plain.gltf", gltf());
+    assert_eq!(bench(&[&scene])["surface"], "triangle");
+    let result = bench(&[&scene, "--vertices", "--surface", "disc", "--radius", "0.5"]);
+    assert_eq!((&result["surface"], &result["points"]), (&"disc".into(), &3.into()));
+}
+
+#[test]
+fn a_thing_out_of_sight_is_told() {
+    let folder = Folder::new();
+    let cloud = folder.write("ball.bin", bin(&ball()));
+    let camera = folder.write("ball.cam", "3,-4,1.5,6,-9,1.5,40,-2,-5,6");
+    let told = stderr(&surfel(&["bench", &cloud, "--camera-file", &camera, "--runs", "1"]));
+    assert!(told.contains("no camera ray hits anything"), "{told}");
+    assert!(told.contains("radii as in the file"), "{told}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_refused_as_camera_file() {
+    let folder = Folder::new();
+    let cloud = folder.write("ball.bin", bin(&ball()));
+    let pipe = folder.path("pipe.cam");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let error = fail(&["bench", &cloud, "--camera-file", &pipe], 1);
+    assert!(error.contains("a pipe or device"), "{error}");
+}
+
 #[test]
 fn every_kind_can_be_asked_for() {
     let folder = Folder::new();
@@ -170,8 +227,10 @@ fn cameras_that_make_no_sense_are_told() {
     let text = with(&short);
     assert!(text.contains(&format!("{short}: found 3 numbers, expected one line of ten numbers")));
     let binary = folder.write("binary.cam", [0xff; 9000]);
-    assert!(with(&binary).contains("binary.cam: found `"));
-    assert!(with(&folder.path("absent.cam")).contains("absent.cam: cannot be read"));
+    assert!(with(&binary).contains("binary.cam: found 9000 bytes where at most 4096 are expected"));
+    let binary = folder.write("binary.cam", [0xff; 90]);
+    assert!(with(&binary).contains("binary.cam: found bytes that are no text"));
+    assert!(with(&folder.path("absent.cam")).contains("check the name and the folder"));
     let camera = folder.write("good.cam", CAMERA);
     for other in [&["--camera-position", "1,2,3"][..], &["--up", "+Y"]] {
         fail(&[&["bench", &cloud, "--camera-file", &camera][..], other].concat(), 2);

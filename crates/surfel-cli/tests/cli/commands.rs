@@ -1,8 +1,24 @@
 //! Every command end to end.
 
-use super::common::{Folder, dome, read_png, succeed, surfel, tile};
+use super::common::{Folder, dome, fail, read_png, succeed, surfel, tile};
 use serde_json::Value;
 use std::fs;
+
+#[test]
+fn stats_take_no_other_files_place() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let bytes = fs::read(&cloud).unwrap();
+    let picture = folder.path("dome.png");
+    let by_another_name = format!("{}/./dome.png", folder.path(""));
+    for stats in [&cloud, &picture, &by_another_name] {
+        let error = fail(&["render", &cloud, "-o", &picture, "--stats", stats], 2);
+        assert!(error.contains("would take the place of that file"), "{error}");
+    }
+    let nowhere = folder.path("nowhere/stats.json");
+    fail(&["render", &cloud, "-o", &picture, "--stats", &nowhere], 1);
+    assert!(fs::read(&cloud).unwrap() == bytes && !std::path::Path::new(&picture).exists());
+}
 
 #[test]
 fn render_makes_a_picture_and_stats() {

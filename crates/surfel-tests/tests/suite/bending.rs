@@ -196,6 +196,35 @@ fn a_frame_does_not_depend_on_those_before() {
 }
 
 #[test]
+fn a_bent_mesh_does_not_depend_on_frames_before() {
+    let mut mesh = scenes::uv_sphere(16, 32, 1.0);
+    let mut random = Random::new(78, 0);
+    let mut gaussian = || random.next_gaussian() as f32;
+    let offsets = mesh.positions.iter().map(|_| Vec3::new(gaussian(), gaussian(), gaussian()));
+    mesh.morphs = vec![Morph { positions: offsets.collect(), ..Morph::default() }];
+    let mut graph = Graph::of(Geometry::Triangles(mesh), Material::MATTE);
+    graph.nodes[0].morph_weights = vec![0.0];
+    let scene = scene(scenes::points(at_rest(), SurfaceKind::Disc));
+    let first = flat(&Scene { graph: graph.clone(), ..scene });
+    let tree = |scene: &FlatScene| {
+        let FlatGeometry::Mesh(mesh) = &*scene.geometries[0] else { panic!("no mesh") };
+        mesh.triangles.clone()
+    };
+    let mut played = first.clone();
+    let mut n_built = 0;
+    for weight in [0.02, 1.0, 0.04, 1.0, 0.9, 0.02, 0.0] {
+        graph.nodes[0].morph_weights = vec![weight];
+        played.update(&graph, &Silent).unwrap();
+        let mut straight = first.clone();
+        straight.update(&graph, &Silent).unwrap();
+        let (played, straight) = (tree(&played), tree(&straight));
+        assert!(played.nodes == straight.nodes && played.blocks == straight.blocks, "at {weight}");
+        n_built += usize::from(played.cost != tree(&first).cost);
+    }
+    assert_eq!(n_built, 3);
+}
+
+#[test]
 fn points_that_part_are_not_taken_for_one() {
     let grid = clouds::plane(60, 0.0, 1);
     let heap = PointCloud::from_positions(vec![Vec3::ZERO; grid.len()]);

@@ -1,7 +1,8 @@
 //! Trees over bad input: building ends, memory is bounded, and every hit is found.
 
 use crate::plain::Plain;
-use surfel::flat::{FlatCloud, NO_POINT};
+use surfel::bvh::NO_PRIMITIVE;
+use surfel::flat::FlatCloud;
 use surfel::math::{Aabb, Random, Ray, Vec3};
 use surfel::points::PointCloud;
 use surfel::progress::Silent;
@@ -69,7 +70,7 @@ fn bad_clouds_have_sound_trees_of_bounded_size() {
             let flat = flat(cloud.clone(), kind);
             flat.points.validate(kind);
             let mut ids: Vec<u32> =
-                flat.points.ids.iter().copied().filter(|&id| id != NO_POINT).collect();
+                flat.points.ids.iter().copied().filter(|&id| id != NO_PRIMITIVE).collect();
             ids.sort_unstable();
             assert!(ids.into_iter().eq(0..cloud.len() as u32), "{name}, {kind:?}");
             let (tree, points) = flat.points.bytes();

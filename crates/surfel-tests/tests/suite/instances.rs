@@ -132,6 +132,48 @@ fn compare(
     n_hits
 }
 
+/// A triangle that is seen from above.
+fn triangle() -> Mesh {
+    let positions = vec![Vec3::new(-1.0, -0.7, 0.1), Vec3::new(1.0, -0.6, -0.2), Vec3::Y];
+    Mesh { positions, triangles: vec![[0, 1, 2]], ..Mesh::default() }
+}
+
+#[test]
+fn of_equal_surfaces_the_first_is_seen_at_any_scale() {
+    // As near as the other, but in a box that rays enter earlier.
+    let mut taller = triangle();
+    taller.positions.extend([0.0, 0.1, 0.2].map(|x| Vec3::new(9.0 + x, x * x, 3.0)));
+    taller.triangles.push([3, 4, 5]);
+    for scale in [1.0, 2.5, 0.3, 3.0, 10.0, 0.01, 1.7] {
+        let place = DAffine3::from_scale(DVec3::splat(scale));
+        let meshes = [triangle(), taller.clone()].map(Geometry::Triangles);
+        let mut graph = scenes::graph(meshes.map(|mesh| (mesh, Material::MATTE)).into());
+        graph.nodes = vec![scenes::node(0, 0, place), scenes::node(1, 1, place)];
+        let scene = flat(graph);
+        let rays = rays_about(place, scene.origin, 4000);
+        let found = hits(&scene, Which::All, &rays);
+        let found = found.iter().filter(|hit| !hit.is_miss() && hit.id == 0);
+        let first: Vec<bool> = found.map(|hit| hit.instance == 0).collect();
+        assert!(200 < first.len());
+        assert!(first.iter().all(|is_first| *is_first), "at {scale}");
+    }
+}
+
+#[test]
+fn rays_along_a_side_of_an_instance_meet_its_edges() {
+    let cube = || Geometry::Triangles(scenes::cuboid(-Vec3::ONE, Vec3::ONE));
+    let alone = flat(Graph::of(cube(), Material::MATTE));
+    let mut graph = Graph::of(cube(), Material::MATTE);
+    graph.nodes.push(scenes::node(0, 0, at(DVec3::splat(50.0))));
+    let beside_another = flat(graph);
+    assert_eq!(alone.origin, beside_another.origin);
+    let along = |x: f32, z: f32| Ray::new(Vec3::new(x, -5.0, z), Vec3::Y);
+    let rays = [along(1.0, 0.3), along(-1.0, 0.3), along(0.3, 1.0), along(0.3, -1.0)];
+    let expected = hits(&alone, Which::All, &rays);
+    assert!(expected.iter().all(|hit| hit.distance == 4.0));
+    assert_eq!(hits(&beside_another, Which::All, &rays), expected);
+}
+
 fn prepared(kind: SurfaceKind) -> Points {
     Points { has_outward_normals: true, ..scenes::points(clouds::sphere(2000, 1.0), kind) }
 }

@@ -36,7 +36,7 @@ pub fn build(
     let builder = Builder { fits, progress };
     let root = builder.branch(builder.part(&mut primitives, 0, extent), 0);
     progress.check()?;
-    let bvh = emit(&root, &primitives);
+    let bvh = emit(&root, &primitives)?;
     if cfg!(debug_assertions) {
         bvh.validate(&primitives);
     }

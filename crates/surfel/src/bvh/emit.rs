@@ -2,6 +2,7 @@
 
 use super::build::{Branch, Subtree};
 use super::{Bvh, NO_PRIMITIVE, Node, Primitive};
+use crate::error::{Error, Result};
 use crate::math::LANES;
 use rayon::prelude::*;
 
@@ -12,13 +13,20 @@ type Block = [u32; LANES];
 
 /// Puts the children of a node beside each other and then what is below each of them, depth first:
 /// a subtree is one range of nodes and one of blocks.
-pub(super) fn emit(root: &Branch, primitives: &[Primitive]) -> Bvh {
+pub(super) fn emit(root: &Branch, primitives: &[Primitive]) -> Result<Bvh> {
+    check_n_blocks(root.n_blocks)?;
     let mut nodes = vec![Node::default(); 1 + root.n_nodes];
     let mut blocks = vec![[NO_PRIMITIVE; LANES]; root.n_blocks];
     let (first, below) = nodes.split_at_mut(1);
     let place = Place { nodes: below, first_node: 1, blocks: &mut blocks, first_block: 0 };
     emit_branch(root, primitives, &mut first[0], place);
-    Bvh { nodes, blocks }
+    Ok(Bvh { nodes, blocks })
+}
+
+/// Every lane of every block has a number of its own.
+fn check_n_blocks(found: usize) -> Result<()> {
+    let limit = u32::MAX as usize / LANES;
+    if limit < found { Err(Error::TooManyBlocks { found, limit }) } else { Ok(()) }
 }
 
 /// Where everything below a node goes.
@@ -75,5 +83,18 @@ fn emit_branch(branch: &Branch, primitives: &[Primitive], node: &mut Node, mut p
         branches.into_iter().for_each(finish);
     } else {
         branches.into_par_iter().for_each(finish);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_blocks_than_there_are_numbers_are_refused() {
+        let limit = (1 << 29) - 1;
+        assert_eq!(check_n_blocks(limit), Ok(()));
+        let error = check_n_blocks(limit + 1).unwrap_err();
+        assert_eq!(error, Error::TooManyBlocks { found: 1 << 29, limit });
     }
 }

@@ -2,6 +2,7 @@
 
 use super::deform::Bent;
 use super::points::FlatPoints;
+use super::refit::Refit;
 use crate::error::Result;
 use crate::points::PointCloud;
 use crate::progress::Progress;
@@ -45,8 +46,8 @@ impl FlatCloud {
         Ok(flat)
     }
 
-    /// Moves the points to where they are bent to now, in the tree that they have. If that does not do, gives
-    /// them in a tree of their own; this one is then good for nothing but to be refitted again.
+    /// Moves the points to where they are bent to now, in the tree that they have. If that is unfit, gives them
+    /// in a tree of their own.
     pub(super) fn refit(
         &mut self,
         points: &Points,
@@ -54,9 +55,9 @@ impl FlatCloud {
         progress: &dyn Progress,
     ) -> Result<Option<Self>> {
         let cloud = cloud_of(bent);
-        let kept = self.points.refit_in_place(&cloud, self.surface, &points.colors)?;
+        let refit = self.points.refit(&cloud, self.surface, &points.colors)?;
         self.set_reach();
-        kept.is_none().then(|| Self::of(&cloud, points, progress)).transpose()
+        (refit == Refit::Unfit).then(|| Self::of(&cloud, points, progress)).transpose()
     }
 
     fn set_reach(&mut self) {

@@ -1,8 +1,8 @@
 //! Geometry where it stands in the world, and the tree over all of it.
 
-use crate::bvh::{self, NO_PRIMITIVE, Node, Primitive};
+use crate::bvh::{self, Bvh, NO_PRIMITIVE, Primitive};
 use crate::error::Result;
-use crate::math::{Aabb, Affine3A, DAffine3, DVec3, LANES, Mat3, Ray, Vec3};
+use crate::math::{Aabb, Affine3A, DAffine3, DVec3, Mat3, Ray, Vec3};
 use crate::progress::Silent;
 
 /// Geometry seen at one place. Coordinates of the world are relative to the scene's origin here.
@@ -57,11 +57,7 @@ impl Instance {
             world_from_normal: inverse.matrix3.transpose().as_mat3(),
             scale: lengths.into_iter().fold(0.0, f64::max) as f32,
             is_in_place,
-            bounds: if is_in_place {
-                object_bounds
-            } else {
-                moved(object_bounds, world_from_object)
-            },
+            bounds: moved(object_bounds, &world_from_object),
             geometry: 0,
             material: 0,
             node: 0,
@@ -96,15 +92,18 @@ impl Instance {
     }
 }
 
-/// Around the corners of a box, a little widened for rounding.
-fn moved(object: Aabb, world_from_object: Affine3A) -> Aabb {
+/// Around a box where it stands, widened by more than the rounding there, and of rays that are taken back.
+fn moved(object: Aabb, world_from_object: &Affine3A) -> Aabb {
     let corner = |i: usize| {
         let pick = |axis: usize| [object.min, object.max][i >> axis & 1][axis];
         world_from_object.transform_point3(Vec3::new(pick(0), pick(1), pick(2)))
     };
     let bounds = Aabb::of_points((0..8).map(corner));
-    let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
-    let rounding = Vec3::splat(8.0 * f32::EPSILON * reach);
+    // Of what is added up: the sum may be small beside it.
+    let Affine3A { matrix3, translation } = world_from_object;
+    let farthest = matrix3.abs() * object.min.abs().max(object.max.abs());
+    let farthest = farthest + Vec3::from(translation.abs());
+    let rounding = Vec3::splat(8.0 * f32::EPSILON * farthest.max_element());
     Aabb { min: bounds.min - rounding, max: bounds.max + rounding }
 }
 
@@ -112,25 +111,42 @@ fn affine(place: DAffine3) -> Affine3A {
     Affine3A::from_mat3_translation(place.matrix3.as_mat3(), place.translation.as_vec3())
 }
 
-/// The tree over instances; blocks hold their indices.
-#[derive(Clone, Debug, Default)]
-pub struct TopTree {
-    pub nodes: Vec<Node>,
-    pub blocks: Vec<[u32; LANES]>,
+pub(super) fn tree_over(instances: &[Instance]) -> Result<Bvh> {
+    let primitive =
+        |(i, instance): (usize, &Instance)| Primitive::new(instance.bounds, i as u32, 0.0);
+    let mut top =
+        bvh::build(instances.iter().enumerate().map(primitive).collect(), |_| true, &Silent)?;
+    let Bvh { nodes, blocks } = &mut top;
+    bvh::fit_boxes(nodes, |block| {
+        let members = blocks[block as usize].iter().filter(|&&i| i != NO_PRIMITIVE);
+        members.map(|&i| instances[i as usize].bounds).fold(Aabb::EMPTY, Aabb::union)
+    });
+    Ok(top)
 }
 
-impl TopTree {
-    pub(super) fn new(instances: &[Instance]) -> Result<Self> {
-        let primitive =
-            |(i, instance): (usize, &Instance)| Primitive::new(instance.bounds, i as u32, 0.0);
-        let tree =
-            bvh::build(instances.iter().enumerate().map(primitive).collect(), |_| true, &Silent)?;
-        let mut top = Self { nodes: tree.nodes, blocks: tree.blocks };
-        let Self { nodes, blocks } = &mut top;
-        bvh::fit_boxes(nodes, |block| {
-            let members = blocks[block as usize].iter().filter(|&&i| i != NO_PRIMITIVE);
-            members.map(|&i| instances[i as usize].bounds).fold(Aabb::EMPTY, Aabb::union)
-        });
-        Ok(top)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_holds_its_corners_though_they_cancel() {
+        let object_bounds =
+            Aabb { min: Vec3::splat(5e6), max: Vec3::splat(5e6) + Vec3::splat(9.0) };
+        let turn = DAffine3::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 1.1);
+        let middle = turn.transform_point3(DVec3::splat(5e6 + 4.5));
+        let world_from_object = DAffine3::from_translation(-middle) * turn;
+        let placement = Placement {
+            world_from_object,
+            object_origin: DVec3::ZERO,
+            object_bounds,
+            scene_origin: DVec3::ZERO,
+        };
+        let bounds = Instance::new(placement).unwrap().bounds;
+        for i in 0..8 {
+            let pick = |axis: usize| [object_bounds.min, object_bounds.max][i >> axis & 1][axis];
+            let corner = DVec3::new(pick(0).into(), pick(1).into(), pick(2).into());
+            let corner = world_from_object.transform_point3(corner).as_vec3();
+            assert!(bounds.contains(Aabb { min: corner, max: corner }), "{bounds:?} {corner}");
+        }
     }
 }

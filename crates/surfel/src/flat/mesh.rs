@@ -1,8 +1,9 @@
 //! A mesh as kernels and shading read it: its triangles, and what their corners carry.
 
 use super::deform::Bent;
+use super::points::Slot;
+use super::refit::Refit;
 use super::triangles::FlatTriangles;
-use super::{Refit, points::Slot};
 use crate::error::Result;
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::progress::Progress;
@@ -52,15 +53,19 @@ impl FlatMesh {
         }
     }
 
-    /// Moves the vertices to where the same mesh is bent to now.
+    /// Moves the vertices to where they are bent to now, in the tree that they have. If that is unfit, gives
+    /// them in a tree of their own.
     pub(super) fn refit(
         &mut self,
         mesh: &Mesh,
         bent: Bent,
         progress: &dyn Progress,
-    ) -> Result<Refit> {
+    ) -> Result<Option<Self>> {
+        if self.triangles.refit(&bent.positions, &mesh.triangles) == Refit::Unfit {
+            return Self::bent(mesh, bent, progress).map(Some);
+        }
         (self.normals, self.tangents) = (bent.normals, bent.tangents);
-        self.triangles.refit(&bent.positions, &mesh.triangles, progress)
+        Ok(None)
     }
 
     /// What a column of vertices has at a place in the triangle at `slot`; none if it is empty.

@@ -16,10 +16,10 @@ mod triangles;
 
 pub use block::{BlockPoint, PointBlock};
 pub use cloud::FlatCloud;
-pub use instance::{Instance, TopTree};
+pub use instance::Instance;
 pub use lamp::FlatLamp;
 pub use mesh::FlatMesh;
-pub use points::{FlatPoints, NO_POINT, Slot};
+pub use points::{FlatPoints, Slot};
 pub use refit::{REBUILD_COST, Refit};
 pub use scene::{FlatGeometry, FlatScene};
 pub use tree::BlockTree;

@@ -4,7 +4,7 @@ use super::block::PointBlock;
 use super::bounds::block_bounds;
 use super::source::{Source, fits};
 use super::tree::BlockTree;
-use crate::bvh::{self, Node, Primitive};
+use crate::bvh::{self, NO_PRIMITIVE, Node, Primitive};
 use crate::error::Result;
 use crate::image::decode_srgb8;
 use crate::math::{LANES, Vec3};
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 pub struct FlatPoints {
     pub nodes: Vec<Node>,
     pub blocks: Vec<PointBlock>,
-    /// Index in the cloud of the point at each slot; `NO_POINT` where there is none.
+    /// Index in the cloud of the point at each slot; `NO_PRIMITIVE` where there is none.
     pub ids: Vec<u32>,
     /// Of the tree when it was built: the nodes and blocks that a random ray is expected to visit.
     pub cost: f64,
@@ -37,9 +37,6 @@ impl BlockTree for FlatPoints {
         &self.blocks
     }
 }
-
-/// Marks a slot without a point.
-pub const NO_POINT: u32 = u32::MAX;
 
 /// A point's place: eight times its block, plus its lane.
 pub type Slot = u32;
@@ -130,6 +127,6 @@ impl FlatPoints {
 
     /// Slots that hold points.
     pub fn slots(&self) -> impl Iterator<Item = Slot> {
-        (0..self.ids.len() as Slot).filter(|&slot| self.id(slot) != NO_POINT)
+        (0..self.ids.len() as Slot).filter(|&slot| self.id(slot) != NO_PRIMITIVE)
     }
 }

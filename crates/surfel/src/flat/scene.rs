@@ -2,10 +2,10 @@
 
 use super::cloud::FlatCloud;
 use super::deform::{Bent, Pose, is_deformed};
-use super::instance::{Instance, Placement, TopTree};
+use super::instance::{Instance, Placement, tree_over};
 use super::lamp::FlatLamp;
 use super::mesh::FlatMesh;
-use crate::bvh::Node;
+use crate::bvh::{Bvh, Node};
 use crate::error::Result;
 use crate::math::{Aabb, DAffine3, DVec3, LANES};
 use crate::progress::Progress;
@@ -20,7 +20,8 @@ pub struct FlatScene {
     /// Shared by the clones of a scene: one geometry in other light costs no memory.
     pub geometries: Vec<Arc<FlatGeometry>>,
     pub instances: Vec<Instance>,
-    pub top: TopTree,
+    /// Over the instances; blocks hold their indices.
+    pub top: Bvh,
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
     pub lights: Vec<Light>,
@@ -29,11 +30,11 @@ pub struct FlatScene {
     pub camera: Camera,
     /// Whether light may go through any instance.
     pub is_see_through: bool,
-    built: BTreeMap<Source, Built>,
+    built: BTreeMap<MadeFrom, Built>,
 }
 
 /// What a geometry is made from: that of the graph, and the node that bends it.
-type Source = (usize, Option<usize>);
+type MadeFrom = (usize, Option<usize>);
 
 #[derive(Clone, Debug)]
 struct Built {
@@ -41,8 +42,9 @@ struct Built {
     geometry: u32,
     /// In which it was last bent.
     pose: Pose,
-    /// Of a cloud that is bent too far for its first tree, that tree. Each pose starts from it, so that a
-    /// frame does not depend on those before: blocks hold points as exactly as their tree lets them.
+    /// Of what is bent too far for its first tree, that tree. Each pose starts from it, so that a frame does
+    /// not depend on those before: blocks hold points as exactly as their tree lets them, and of surfaces
+    /// equally near the first in the tree is seen.
     first: Option<Arc<FlatGeometry>>,
 }
 
@@ -92,7 +94,7 @@ impl FlatScene {
             origin: origin(&scene.graph, &world),
             geometries: Vec::new(),
             instances: Vec::new(),
-            top: TopTree::default(),
+            top: Bvh::default(),
             materials: scene.graph.materials.clone(),
             textures: scene.graph.textures.clone(),
             lights: scene.lights.clone(),
@@ -117,18 +119,18 @@ impl FlatScene {
         let shown = graph.nodes.iter().enumerate();
         let shown = shown.flat_map(|(i, node)| node.parts.iter().map(move |part| (i, part)));
         for (node_idx, part) in shown {
-            let source = source(graph, node_idx, part.geometry);
-            if self.built.contains_key(&source) {
+            let made_from = made_from(graph, node_idx, part.geometry);
+            if self.built.contains_key(&made_from) {
                 continue;
             }
-            let geometry = &graph.geometries[source.0];
-            let pose = source.1.map(|node| Pose::of(graph, node, world));
+            let geometry = &graph.geometries[made_from.0];
+            let pose = made_from.1.map(|node| Pose::of(graph, node, world));
             let flat = match &pose {
                 Some(pose) => FlatGeometry::bent(geometry, pose.bend(geometry), progress)?,
                 None => FlatGeometry::new(geometry, progress)?,
             };
             let (pose, n_built) = (pose.unwrap_or_default(), self.geometries.len());
-            self.built.insert(source, Built { geometry: n_built as u32, pose, first: None });
+            self.built.insert(made_from, Built { geometry: n_built as u32, pose, first: None });
             self.geometries.push(Arc::new(flat));
         }
         Ok(())
@@ -179,8 +181,8 @@ impl FlatScene {
                 self.lamps.extend(FlatLamp::place(lamp, world[node_idx], self.origin));
             }
             for part in &node.parts {
-                let source = source(graph, node_idx, part.geometry);
-                let Some(&Built { geometry, .. }) = self.built.get(&source) else { continue };
+                let made_from = made_from(graph, node_idx, part.geometry);
+                let Some(&Built { geometry, .. }) = self.built.get(&made_from) else { continue };
                 let object_bounds = bounds[geometry as usize];
                 if object_bounds.is_empty() {
                     continue;
@@ -202,7 +204,7 @@ impl FlatScene {
             }
         }
         self.is_see_through = self.instances.iter().any(|instance| instance.is_see_through);
-        self.top = TopTree::new(&self.instances)?;
+        self.top = tree_over(&self.instances)?;
         Ok(())
     }
 
@@ -250,17 +252,15 @@ impl Built {
         let bent = pose.bend(geometry);
         let anew = match (Arc::make_mut(flat), geometry) {
             (FlatGeometry::Mesh(flat), Geometry::Triangles(mesh)) => {
-                flat.refit(mesh, bent, progress)?;
-                None
+                flat.refit(mesh, bent, progress)?.map(FlatGeometry::Mesh)
             }
             (FlatGeometry::Cloud(flat), Geometry::Points(points)) => {
-                flat.refit(points, bent, progress)?
+                flat.refit(points, bent, progress)?.map(FlatGeometry::Cloud)
             }
             _ => None,
         };
         if let Some(anew) = anew {
-            let anew = Arc::new(FlatGeometry::Cloud(anew));
-            self.first = Some(std::mem::replace(flat, anew));
+            self.first = Some(std::mem::replace(flat, Arc::new(anew)));
         }
         self.pose = pose;
         Ok(())
@@ -268,7 +268,7 @@ impl Built {
 }
 
 /// What a part of a node is made from.
-fn source(graph: &Graph, node_idx: usize, geometry: usize) -> Source {
+fn made_from(graph: &Graph, node_idx: usize, geometry: usize) -> MadeFrom {
     let bends = is_deformed(&graph.geometries[geometry], &graph.nodes[node_idx]);
     (geometry, bends.then_some(node_idx))
 }

@@ -1,7 +1,7 @@
 //! Triangles in the form that kernels read: tree nodes and leaf blocks.
 
 use super::points::Slot;
-use super::refit::{REBUILD_COST, Refit};
+use super::refit::Refit;
 use super::tree::BlockTree;
 use crate::bvh::{self, NO_PRIMITIVE, Node, Primitive};
 use crate::error::Result;
@@ -112,14 +112,8 @@ impl FlatTriangles {
 
     /// Moves the corners to where `positions` now has them, of as many vertices under the same triangles.
     ///
-    /// The tree is built again if its cost exceeds `REBUILD_COST`, or if other triangles than before can be
-    /// hit. After an error the triangles are of no use.
-    pub fn refit(
-        &mut self,
-        positions: &[Vec3],
-        triangles: &[[u32; 3]],
-        progress: &dyn Progress,
-    ) -> Result<Refit> {
+    /// The tree is unfit if its cost exceeds `REBUILD_COST`, or if other triangles than before can be hit.
+    pub fn refit(&mut self, positions: &[Vec3], triangles: &[[u32; 3]]) -> Refit {
         let corners = |id: u32| triangles[id as usize].map(|vertex| positions[vertex as usize]);
         let ids = 0..triangles.len() as u32;
         let n_solid = ids.into_par_iter().filter(|&id| is_solid(corners(id))).count();
@@ -129,14 +123,10 @@ impl FlatTriangles {
             used.filter(|&&id| is_solid(corners(id))).count()
         };
         let n_kept: usize = self.blocks.par_iter_mut().map(encode).sum();
-        if n_kept == n_solid && self.slots().count() == n_solid {
-            let cost_ratio = self.fit_boxes() / self.cost;
-            if cost_ratio <= REBUILD_COST {
-                return Ok(Refit::Kept { cost_ratio });
-            }
+        if n_kept != n_solid || self.slots().count() != n_solid {
+            return Refit::Unfit;
         }
-        *self = Self::new(positions, triangles, progress)?;
-        Ok(Refit::Rebuilt)
+        Refit::of(self.fit_boxes() / self.cost)
     }
 
     fn fit_boxes(&mut self) -> f64 {

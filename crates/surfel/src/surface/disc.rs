@@ -16,7 +16,7 @@ impl Shape for Disc {
     fn intersect<F: Floats>(points: &PointLanes<F>, ray: &RayLanes<F>) -> (F, F::Mask) {
         let distance = points.normal.dot(points.center) / points.normal.dot(ray.direction);
         let offset = points.center.minus(ray.direction.scaled(distance));
-        // A ray in the disc's plane gives NaN or infinity here, and fails both tests.
+        // A ray in the disc's plane gives NaN or infinity here, and fails the first test.
         let hit =
             offset.dot(offset).less(points.radius * points.radius) & ray.t_min.less_equal(distance);
         (distance, hit)

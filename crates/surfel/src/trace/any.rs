@@ -165,7 +165,7 @@ struct AnyInPacket<'p, L: Lanes, S: Leaf, J> {
 impl<L: Lanes, S: Leaf, J: Judge> AnyInPacket<'_, L, S, J> {
     /// The rays in these lanes need nothing more.
     #[inline(always)]
-    fn block(&mut self, mut lanes: u32) {
+    fn finish(&mut self, mut lanes: u32) {
         self.is_hit |= lanes;
         while lanes != 0 {
             self.limits[lanes.trailing_zeros() as usize % WIDE] = f32::NEG_INFINITY;
@@ -203,7 +203,7 @@ impl<L: Lanes, S: Leaf, J: Judge> AnyInPacket<'_, L, S, J> {
             }
             let distances = L::Wide::load(&distances);
             let counting = self.judge.counting::<L>(&self.packet.wide, judged, distances, &slots);
-            self.block(counting);
+            self.finish(counting);
             open = judged & !counting;
         }
     }
@@ -249,7 +249,7 @@ impl<L: Lanes, S: Leaf, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> 
         let seen = S::seen_from::<L>(tree, block_idx, ray.origin);
         let hits = S::hits(&seen, block_idx, ray);
         if has_counting::<L, J>(&hits, ray, limit, self.judge) {
-            self.block(1 << lane);
+            self.finish(1 << lane);
         }
     }
 }

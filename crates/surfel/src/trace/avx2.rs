@@ -1,6 +1,6 @@
 //! Eight floats in one AVX register, and the batch kernels compiled for AVX2.
 //!
-//! Without fused multiply-add: results must equal the portable ones bit for bit.
+//! Without fused multiply-add but for bounds: results must equal the portable ones bit for bit.
 
 use super::hit::{Gather, Hit};
 use super::splat::{self, Splat};
@@ -47,7 +47,7 @@ macro_rules! mask {
 }
 
 /// What differs between levels that have registers of eight floats.
-pub(super) trait Level: Copy + 'static {
+pub(super) trait Registers: Copy + 'static {
     /// Sixteen lanes.
     type Wide: Wide;
     type Mask: LaneMask;
@@ -64,7 +64,7 @@ pub(super) trait Level: Copy + 'static {
 #[derive(Clone, Copy)]
 struct Avx2;
 
-impl Level for Avx2 {
+impl Registers for Avx2 {
     type Wide = Pair<Eight<Self>>;
     type Mask = EightMask;
 
@@ -139,7 +139,7 @@ pub(super) struct Eight<L>(__m256, PhantomData<L>);
 #[derive(Clone, Copy)]
 pub(super) struct EightMask(__m256);
 
-impl<L: Level> Floats for Eight<L> {
+impl<L: Registers> Floats for Eight<L> {
     type Mask = L::Mask;
 
     #[inline(always)]
@@ -178,7 +178,7 @@ impl<L: Level> Floats for Eight<L> {
     }
 }
 
-impl<L: Level> Lanes for Eight<L> {
+impl<L: Registers> Lanes for Eight<L> {
     type Wide = L::Wide;
 
     #[inline(always)]
@@ -398,7 +398,7 @@ impl LaneMask for EightMask {
 
 macro_rules! operator {
     ($trait:ident, $method:ident, $intrinsic:ident) => {
-        impl<L: Level> $trait for Eight<L> {
+        impl<L: Registers> $trait for Eight<L> {
             type Output = Self;
 
             #[inline(always)]

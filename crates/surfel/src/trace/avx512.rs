@@ -1,6 +1,6 @@
 //! Sixteen floats in one AVX-512 register, and the batch kernels compiled for AVX-512.
 
-use super::avx2::{Eight, Level};
+use super::avx2::{Eight, Registers};
 use super::hit::{Gather, Hit};
 use super::splat::{self, Splat};
 use super::surface::{self, SurfaceHit};
@@ -42,7 +42,7 @@ macro_rules! avx512 {
 #[derive(Clone, Copy)]
 struct Avx512;
 
-impl Level for Avx512 {
+impl Registers for Avx512 {
     type Wide = Sixteen;
     type Mask = EightMask;
 

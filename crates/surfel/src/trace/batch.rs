@@ -1,6 +1,6 @@
 //! Rays in a batch: those that go much the same way in packets, the others each alone, in flight.
 
-use super::flight::{RayVisitor, fly};
+use super::flight::{Flight, RayVisitor, fly};
 use super::group::{GROUP, Group};
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
 use crate::flat::BlockTree;
@@ -70,7 +70,7 @@ impl<L: Lanes, Q: Query<L>> Task for Batch<'_, L, Q> {
                 }
             }
         }
-        fly::<L, _>(tree, &mut loose);
+        fly::<L, _>(&mut Flight::default(), tree, &mut loose);
         for (ray_idx, found) in indices.into_iter().zip(&loose) {
             answers[ray_idx] = Q::answer(found);
         }

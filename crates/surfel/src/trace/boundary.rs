@@ -74,12 +74,6 @@ impl<L: Lanes> RegionVisitor for Neighborhood<L> {
     }
 }
 
-/// A vector from one lane, in all lanes.
-#[inline(always)]
-fn in_lane<F: Floats>([x, y, z]: &[[f32; LANES]; 3], lane: usize) -> Vec3Lanes<F> {
-    Vec3Lanes { x: F::splat(x[lane]), y: F::splat(y[lane]), z: F::splat(z[lane]) }
-}
-
 /// Hits of up to sixteen rays that are judged at once.
 #[derive(Clone, Copy)]
 pub struct WideHits<W> {
@@ -208,10 +202,10 @@ fn show_block<L: Lanes>(
     while points != 0 {
         let lane = points.trailing_zeros() as usize % LANES;
         points &= points - 1;
-        let offset = corner.plus(in_lane(&offsets, lane));
+        let offset = corner.plus(Vec3Lanes::splat_lane(&offsets, lane));
         let is_near = lanes & found.near(offset);
         if is_near.bits() != 0 {
-            found.add(offset, in_lane(&normals, lane), is_near);
+            found.add(offset, Vec3Lanes::splat_lane(&normals, lane), is_near);
         }
     }
 }

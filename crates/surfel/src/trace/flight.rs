@@ -36,6 +36,11 @@ const FEW: u32 = 16;
 /// Of a stack that is read and written by whole lanes.
 const ROOM: usize = STACK_SIZE + LANES;
 
+/// Room for rays on their way, made when it is first needed. Kept from search to search: to fill it takes as long
+/// as several rays.
+#[derive(Default)]
+pub struct Flight(Option<Box<[Flyer; IN_FLIGHT]>>);
+
 /// A ray on its way.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
@@ -92,18 +97,11 @@ fn pop(flyers: &mut u32) -> Option<usize> {
 /// Lets each of `visitors` see every block whose box its ray enters before its limit, near boxes first if
 /// they ask for that.
 #[inline(always)]
-pub fn fly<L: Lanes, V: RayVisitor>(tree: &V::Tree, visitors: &mut [V]) {
-    let Some(first) = visitors.first() else { return };
-    let root = f32::from_bits(ROOT);
-    let waiting = Waiting { children: [root; ROOM], entries: [0.0; ROOM] };
-    let mut flyers = [Flyer {
-        ray: BoxRay::new(&tree.nodes()[0], first.ray()),
-        visitor_idx: 0,
-        limit: 0.0,
-        next: ROOT,
-        n_waiting: 0,
-        waiting,
-    }; IN_FLIGHT];
+pub fn fly<L: Lanes, V: RayVisitor>(flight: &mut Flight, tree: &V::Tree, visitors: &mut [V]) {
+    if visitors.is_empty() {
+        return;
+    }
+    let flyers = flight.0.get_or_insert_with(|| Box::new([Flyer::idle(); IN_FLIGHT]));
     let memory = Memory::new(tree);
     let mut n_started = 0;
     let mut steps = Steps { at_blocks: 0, done: u32::MAX };
@@ -152,6 +150,13 @@ pub fn fly<L: Lanes, V: RayVisitor>(tree: &V::Tree, visitors: &mut [V]) {
 const ROOT: u32 = 0;
 
 impl Flyer {
+    fn idle() -> Self {
+        let root = f32::from_bits(ROOT);
+        let waiting = Waiting { children: [root; ROOM], entries: [0.0; ROOM] };
+        let ray = BoxRay::default();
+        Self { ray, visitor_idx: 0, limit: 0.0, next: ROOT, n_waiting: 0, waiting }
+    }
+
     #[inline(always)]
     fn start<V: RayVisitor>(&mut self, tree: &V::Tree, visitor_idx: usize, visitor: &V) {
         self.ray = BoxRay::new(&tree.nodes()[0], visitor.ray());

@@ -1,7 +1,7 @@
 //! The nearest shapes on each ray, all within a radius of each other.
 
 use super::block::{BeforePacket, Leaf};
-use super::flight::{RayVisitor, fly};
+use super::flight::{Flight, RayVisitor, fly};
 use super::group::{GROUP, Group};
 use super::hit::{Gather, Hit};
 use super::packet::{Packet, PacketStack, PacketVisitor, along_packet};
@@ -14,7 +14,7 @@ use std::ops::ControlFlow;
 /// Discs only: spheres do not blend.
 #[inline(always)]
 pub(super) fn gathers<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], gathers: &mut [Gather]) {
-    let mut stack = PacketStack::new();
+    let (mut stack, mut flight) = (PacketStack::new(), Flight::default());
     let mut sightings = Vec::new();
     let (points, mut group) = (&cloud.points, Group::new(false));
     for (rays, gathers) in rays.chunks(GROUP).zip(gathers.chunks_mut(GROUP)) {
@@ -22,7 +22,8 @@ pub(super) fn gathers<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], gathers: &mut [
         let packets = rays.chunks(WIDE).zip(gathers.chunks_mut(WIDE));
         for (place, (rays, gathers)) in packets.enumerate() {
             sightings.clear();
-            let limits = gather::<L>(points, &group, place, rays, &mut stack, &mut sightings);
+            let (stack, flight) = (&mut stack, &mut flight);
+            let limits = gather::<L>(points, &group, place, rays, stack, flight, &mut sightings);
             settle::<L::Wide>(&mut sightings, &limits);
             for (lane, gather) in gathers.iter_mut().enumerate() {
                 *gather = gather_of_lane(&sightings, lane);
@@ -40,6 +41,7 @@ pub(super) fn gather<L: Lanes>(
     place: usize,
     rays: &[Ray],
     stack: &mut PacketStack,
+    flight: &mut Flight,
     sightings: &mut Vec<Sighting>,
 ) -> [f32; WIDE] {
     if let Some(packet) = group.packet(points, place, rays) {
@@ -52,7 +54,7 @@ pub(super) fn gather<L: Lanes>(
     for lane in 0..rays.len() {
         gatherings[lane] = Gathering::new(&rays[lane]);
     }
-    fly::<L, _>(points, &mut gatherings[..rays.len()]);
+    fly::<L, _>(flight, points, &mut gatherings[..rays.len()]);
     for (lane, Gathering { gather, .. }) in gatherings[..rays.len()].iter().enumerate() {
         for hit in gather.hits() {
             sightings.push(Sighting::by_one(lane, *hit));

@@ -18,7 +18,7 @@ pub const MOST_STARTS: usize = 32;
 /// Rays of which packets are made.
 pub struct Group<W> {
     ends_meet: bool,
-    /// Empty unless all are alike, as `anchor` is.
+    /// Of use where there is an `anchor`: then all are alike.
     wide: Vec<WideRays<W>>,
     anchor: Option<Anchor>,
     starts: [ChildRows; MOST_STARTS / LANES],

@@ -8,7 +8,7 @@ use crate::surface::MAX_GATHERED;
 pub struct Hit {
     /// Infinite if nothing was hit.
     pub distance: f32,
-    /// Where the point lies; `FlatPoints::id` tells its index in the cloud.
+    /// Where the point or triangle lies; `id` of `FlatPoints` or `FlatTriangles` tells its index.
     pub slot: Slot,
 }
 

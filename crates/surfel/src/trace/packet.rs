@@ -9,6 +9,7 @@ use crate::bvh::{Child, Node, STACK_SIZE};
 use crate::flat::BlockTree;
 use crate::math::{LANES, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, WIDE, Wide};
 use crate::surface::RayLanes;
+use std::borrow::Borrow;
 
 /// Sixteen rays in lanes.
 #[derive(Clone, Copy)]
@@ -190,7 +191,7 @@ impl<'n, L: Lanes> Met<'n, L> {
     }
 
     #[inline(always)]
-    pub fn children(&self) -> MetChildren {
+    pub fn children(&self) -> MetChildren<ChildRows> {
         let (min, max) = self.boxes.store();
         let children = self.node.packed_children::<L>().store();
         let rows = ChildRows { children, min, max };
@@ -249,13 +250,13 @@ impl ChildRows {
 }
 
 /// Children that are met, one by one: a list to loop over, as `HitList` is.
-pub struct MetChildren {
-    rows: ChildRows,
+pub struct MetChildren<R> {
+    rows: R,
     entries: [f32; LANES],
     lanes: u32,
 }
 
-impl MetChildren {
+impl<R: Borrow<ChildRows>> MetChildren<R> {
     #[inline(always)]
     pub fn next(&mut self) -> Option<ChildBox> {
         if self.lanes == 0 {
@@ -263,7 +264,7 @@ impl MetChildren {
         }
         let lane = self.lanes.trailing_zeros() as usize % LANES;
         self.lanes &= self.lanes - 1;
-        Some(self.rows.child(lane, self.entries[lane]))
+        Some(self.rows.borrow().child(lane, self.entries[lane]))
     }
 }
 
@@ -288,11 +289,10 @@ impl PacketStack {
         let Some(starts) = packet.starts else { return };
         self.size = 0;
         for rows in starts {
-            let (mut lanes, entries) = packet.frustum.meets::<L>(&rows.boxes(), limit);
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize % LANES;
-                lanes &= lanes - 1;
-                self.boxes[self.size] = rows.child(lane, entries[lane]);
+            let (lanes, entries) = packet.frustum.meets::<L>(&rows.boxes(), limit);
+            let mut children = MetChildren { rows, entries, lanes };
+            while let Some(child) = children.next() {
+                self.boxes[self.size] = child;
                 self.size += 1;
             }
         }

@@ -9,10 +9,10 @@ pub struct Simd(Level);
 pub(super) enum Level {
     Portable,
     #[cfg(target_arch = "x86_64")]
-    /// AVX2 and FMA.
+    /// AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
     Avx2,
     #[cfg(target_arch = "x86_64")]
-    /// AVX-512 F, VL, DQ and BW.
+    /// These, and AVX-512 F, VL, DQ and BW.
     Avx512,
 }
 
@@ -33,7 +33,13 @@ impl Simd {
         )]
         let mut levels = vec![Self::PORTABLE];
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        if is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt")
+        {
             levels.push(Self(Level::Avx2));
             if is_x86_feature_detected!("avx512f")
                 && is_x86_feature_detected!("avx512vl")

@@ -2,6 +2,7 @@
 
 use super::boundary::{WideHits, enclosed, enclosed_by_blocks};
 use super::closest::closest_hits;
+use super::flight::Flight;
 use super::gather::gather;
 use super::group::{GROUP, Group};
 use super::hit::Hit;
@@ -51,6 +52,7 @@ pub(super) fn splats<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], splats: &mut [Sp
 /// Finds splats, and keeps the room it needs from search to search.
 pub(super) struct Finder<'s> {
     stack: PacketStack,
+    flight: Flight,
     mixer: Mixer<'s>,
     /// Splats that are still in question, and their hits.
     open: Vec<u32>,
@@ -62,7 +64,8 @@ impl<'s> Finder<'s> {
     pub fn new(cloud: &'s FlatCloud, kind: SurfaceKind, boundary: Boundary) -> Self {
         let (sightings, discs) = (Vec::new(), Vec::new());
         let mixer = Mixer { cloud, kind, judges: boundary == Boundary::Gap, sightings, discs };
-        Self { stack: PacketStack::new(), mixer, open: Vec::new(), open_hits: Vec::new() }
+        let (stack, flight) = (PacketStack::new(), Flight::default());
+        Self { stack, flight, mixer, open: Vec::new(), open_hits: Vec::new() }
     }
 
     /// Finds the splats of `rays`, in a function of its own.
@@ -73,7 +76,7 @@ impl<'s> Finder<'s> {
 
     #[inline(always)]
     fn blend<L: Lanes>(&mut self, rays: &[Ray], splats: &mut [Splat]) {
-        let Self { stack, mixer, .. } = self;
+        let Self { stack, flight, mixer, .. } = self;
         let (points, mut group) = (&mixer.cloud.points, Group::new(false));
         let (is_gathered, mut hits) = (mixer.kind.is_gathered(), [Hit::MISS; GROUP]);
         for (rays, splats) in rays.chunks(GROUP).zip(splats.chunks_mut(GROUP)) {
@@ -85,7 +88,7 @@ impl<'s> Finder<'s> {
             let packets = rays.chunks(WIDE).zip(splats.chunks_mut(WIDE)).zip(hits.chunks(WIDE));
             for (place, ((rays, splats), hits)) in packets.enumerate() {
                 let limits = if is_gathered {
-                    gather::<L>(points, &group, place, rays, stack, &mut mixer.sightings)
+                    gather::<L>(points, &group, place, rays, stack, flight, &mut mixer.sightings)
                 } else {
                     mixer.take(&hits[..rays.len()])
                 };

@@ -130,7 +130,7 @@ pub fn scene_occlusions(
     /// Of rays that look for nothing more.
     const BLOCKED: f32 = f32::NEG_INFINITY;
     if let Some(place) = only(scene, which) {
-        return block(&place, simd, rays, occluded);
+        return occlude(&place, simd, rays, occluded);
     }
     let mut limits = unlimited(rays);
     let mut blocked = Vec::new();
@@ -141,7 +141,7 @@ pub fn scene_occlusions(
             let place = Place::new(scene, *instance_idx);
             there.enter(place.instance, runs, rays, &limits, 0.0);
             blocked.resize(there.rays.len(), false);
-            block(&place, simd, &there.rays, &mut blocked);
+            occlude(&place, simd, &there.rays, &mut blocked);
             for (run, there_idx) in runs.placed() {
                 let found = limits[run].iter_mut().zip(&blocked[there_idx]);
                 found
@@ -206,8 +206,9 @@ impl RaysThere {
         self.scales.clear();
         for run in runs.iter() {
             let rays = rays[run.clone()].iter().zip(&distances[run]);
+            // Hits as near as the nearest stay, though it was rounded in the world's lengths and is so again.
             let ending = |ray: Ray, scale: f32, nearest: f32| Ray {
-                t_max: ray.t_max.min(nearest * scale + reach),
+                t_max: ray.t_max.min(nearest * scale * (1.0 + 2.0 * f32::EPSILON) + reach),
                 ..ray
             };
             if instance.is_in_place {
@@ -298,8 +299,8 @@ impl Batch {
     }
 }
 
-/// Whether an instance blocks rays in its coordinates.
-fn block(place: &Place, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
+/// Whether an instance occludes rays in its coordinates.
+fn occlude(place: &Place, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
     match place.geometry {
         FlatGeometry::Cloud(cloud) => occlusions(cloud, simd, rays, occluded),
         FlatGeometry::Mesh(mesh) => any_triangles(&mesh.triangles, simd, rays, occluded),
