@@ -23,6 +23,8 @@ pub struct Plan {
 const COLUMNS: u64 = 12 + 12 + 4 + 6 + 4;
 /// Corners of a triangle, with position, normal and texture coordinates of about a vertex, as loaded.
 const TRIANGLE: u64 = 12 + 12 + 12 + 8;
+/// Tree, block and index of a point.
+const FLAT_POINT: u64 = (size_of::<PointBlock>() / LANES + size_of::<u32>()) as u64 + 5;
 /// Tree and corners of a triangle.
 const FLAT_TRIANGLE: u64 = 42;
 const TEXEL: u64 = 4;
@@ -53,10 +55,9 @@ impl Plan {
 
     /// What was read, flat form and what building it takes beside, picture.
     fn bytes(&self) -> [u64; 3] {
-        let point = (size_of::<PointBlock>() / LANES + size_of::<u32>()) as u64 + 5;
         let meshes = sum([(self.n_triangles, TRIANGLE), (self.n_texels, TEXEL)]);
         let read = sum([(self.n_points, COLUMNS), (meshes, 1)]);
-        let trees = sum([(self.n_selected, point), (self.n_triangles, FLAT_TRIANGLE)]);
+        let trees = sum([(self.n_selected, FLAT_POINT), (self.n_triangles, FLAT_TRIANGLE)]);
         // Vertices and textures stand in the flat form as they were read.
         let flat = sum([(trees / 2, 5), (meshes, 1)]);
         [read, flat, sum([(self.n_pixels, PIXEL)])]
@@ -64,29 +65,43 @@ impl Plan {
 
     pub fn check(&self, global: &Global) -> anyhow::Result<()> {
         let Some(limit) = global.memory_limit else { return Ok(()) };
-        let [read, flat, picture] = self.bytes();
-        let all = sum([(read, 1), (flat, 1), (picture, 1)]);
+        let ([read, flat, picture], all) = (self.bytes(), self.total());
         if limit < all {
             let things = [(self.n_points, "points"), (self.n_triangles, "triangles")];
             let there = things.iter().filter(|(count, _)| 0 < *count);
             let things: Vec<String> =
                 there.map(|(count, name)| format!("{count} {name}")).collect();
-            let fewer = match self.n_points / 4 {
-                0 => String::new(),
-                fewer => format!("take fewer points with --select random:{fewer} or "),
-            };
             bail!(
                 "{} need about {} of memory ({} as read, {} tree, {} picture), and \
-                 --memory-limit is {}; {fewer}raise the limit",
+                 --memory-limit is {}; {}raise the limit",
                 things.join(" and "),
                 readable(all),
                 readable(read),
                 readable(flat),
                 readable(picture),
                 readable(limit),
+                self.advice(limit),
             );
         }
         Ok(())
+    }
+
+    fn total(&self) -> u64 {
+        sum(self.bytes().map(|bytes| (bytes, 1)))
+    }
+
+    /// What helps beside a higher limit, if anything does.
+    fn advice(&self, limit: u64) -> String {
+        let least = Self { n_selected: 0, ..*self }.total();
+        let fitting = limit.saturating_sub(least) / 5 * 2 / FLAT_POINT;
+        let [.., picture] = self.bytes();
+        if 0 < fitting && fitting < self.n_selected {
+            return format!("take fewer points with --select random:{fitting} or ");
+        }
+        if self.total() / 2 < picture {
+            return "make a smaller picture with --resolution or ".into();
+        }
+        String::new()
     }
 }
 
@@ -117,4 +132,29 @@ pub fn readable(bytes: u64) -> String {
     let value = bytes as f64 / 1024f64.powi(power as i32);
     let digits = usize::from(0 < power);
     format!("{value:.digits$} {}", units[power as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn advice(n_points: u64, n_selected: u64, n_pixels: u64, limit: u64) -> String {
+        let plan = Plan { n_points, n_selected, n_triangles: 0, n_texels: 0, n_pixels };
+        assert!(limit < plan.total());
+        plan.advice(limit)
+    }
+
+    #[test]
+    fn what_is_advised_helps() {
+        let (n_points, limit) = (1_000_000, 60_000_000);
+        let told = advice(n_points, n_points, 10_000, limit);
+        let n_selected = told.split(|c: char| !c.is_ascii_digit()).find(|word| !word.is_empty());
+        let n_selected = n_selected.unwrap().parse().unwrap();
+        let plan = Plan { n_points, n_selected, n_triangles: 0, n_texels: 0, n_pixels: 10_000 };
+        assert!(limit - 1000 < plan.total() && plan.total() <= limit, "{told}");
+        // What is read stays, however few are selected of it.
+        assert_eq!(advice(n_points, n_points, 10_000, 30_000_000), "");
+        assert_eq!(advice(n_points, 16, 10_000, 30_000_000), "");
+        assert!(advice(64, 64, 250, 10_000).contains("--resolution"));
+    }
 }

@@ -107,7 +107,7 @@ fn memory_is_refused_before_it_is_taken() {
     let picture = folder.path("out.png");
     let arguments = ["render", &cloud, "-o", &picture, "--memory-limit", "1M"];
     let text = fail(&arguments, 1);
-    assert!(text.contains("--select") && text.contains("1.0 MB"), "{text}");
+    assert!(text.contains("--resolution") && text.contains("1.0 MB"), "{text}");
     let text = fail(&["prepare", &cloud, "-o", &folder.path("a.ply"), "--memory-limit", "9K"], 1);
     assert!(text.contains("--memory-limit"), "{text}");
 }
