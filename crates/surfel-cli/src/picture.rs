@@ -44,7 +44,7 @@ pub fn make(
     let start = Instant::now();
     check_output(output)?;
     if let Some(stats) = &args.stats {
-        check_stats(stats, output, &args.scene.files)?;
+        check_stats(stats, output, &args.scene, line)?;
     }
     let mut seconds = Seconds::default();
     let assembly = timed(&mut seconds.load, || load(&args.scene, line, global, report))?;
@@ -90,19 +90,22 @@ pub fn check_output(path: &Path) -> anyhow::Result<()> {
 }
 
 /// Fails where the numbers would take the place of the picture, or of what it is made from.
-fn check_stats(stats: &Path, output: &Path, inputs: &[PathBuf]) -> anyhow::Result<()> {
+fn check_stats(stats: &Path, output: &Path, args: &SceneArgs, line: &Line) -> anyhow::Result<()> {
     if stats == Path::new("-") {
         return Ok(());
     }
     surfel_formats::check_place(stats)?;
     check_kind(stats)?;
-    let is_stats = |path: &&PathBuf| is_same_file(path, stats);
-    let taken = std::iter::once(&output.to_owned()).chain(inputs).find(is_stats).cloned();
-    taken.map_or(Ok(()), |path| {
-        let text =
-            format!("--stats {}: would take the place of that file; name another", path.display());
-        Err(Usage(text).into())
-    })
+    let scenes = args.files.iter().map(PathBuf::as_path);
+    let mut taken = files(args, line).into_iter().chain(scenes).chain([output]);
+    match taken.find(|path| is_same_file(path, stats)) {
+        Some(path) => {
+            let name = path.display();
+            let text = format!("--stats {name}: would take the place of that file; name another");
+            Err(Usage(text).into())
+        }
+        None => Ok(()),
+    }
 }
 
 /// By any name; a file that is not there yet by its folder.
@@ -137,8 +140,20 @@ pub fn load<'a>(
     global: &Global,
     report: &Report,
 ) -> anyhow::Result<Assembly<'a>> {
-    let (width, height) = args.picture.resolution;
-    let n_pixels = u64::from(width) * u64::from(height);
+    check_files(args, line, global)?;
+    let mut assembly = Assembly::load(args, line, report)?;
+    Plan::of(&assembly.graph, args.preparation.select, n_pixels(args)).check(global)?;
+    check_color(&assembly)?;
+    assembly.graph.pose(0.0);
+    if let Some(name) = &args.camera_name {
+        keep_camera(&mut assembly.graph, name)?;
+    }
+    Ok(assembly)
+}
+
+/// Fails where a file is missing or no file of its kind, and where all need more memory than they may take: before
+/// the work.
+pub fn check_files(args: &SceneArgs, line: &Line, global: &Global) -> anyhow::Result<()> {
     let files = files(args, line);
     if files.is_empty() {
         let scenes = name_files(&args.files);
@@ -147,20 +162,15 @@ pub fn load<'a>(
     let names = line.scene.objects.iter().flat_map(|object| object.names());
     let names: Vec<&Path> = args.files.iter().map(PathBuf::as_path).chain(names).collect();
     args.material.check_names(&names)?;
-    // All of them: what is missing or no file of its kind is told before the work.
     let inspected = files.into_iter().map(|file| Ok((file, surfel_formats::inspect(file)?)));
     let mut sources = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, Source>>>()?;
     forget_what_comes_later(&mut sources, line)?;
-    let select = args.preparation.select;
-    Plan::new(&sources, select, n_pixels).check(global)?;
-    let mut assembly = Assembly::load(args, line, report)?;
-    Plan::of(&assembly.graph, select, n_pixels).check(global)?;
-    check_color(&assembly)?;
-    assembly.graph.pose(0.0);
-    if let Some(name) = &args.camera_name {
-        keep_camera(&mut assembly.graph, name)?;
-    }
-    Ok(assembly)
+    Plan::new(&sources, args.preparation.select, n_pixels(args)).check(global)
+}
+
+fn n_pixels(args: &SceneArgs) -> u64 {
+    let (width, height) = args.picture.resolution;
+    u64::from(width) * u64::from(height)
 }
 
 /// Those of the command line and of objects, each once: objects of the same file share what it holds.

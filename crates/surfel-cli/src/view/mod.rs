@@ -8,6 +8,7 @@ mod settings;
 mod studio;
 
 use crate::args::{Global, SceneArgs};
+use crate::picture::check_files;
 use crate::report::Report;
 use crate::scene_file::Line;
 use anyhow::anyhow;
@@ -55,6 +56,7 @@ Examples:
 
 pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow::Result<()> {
     args.scene.check()?;
+    check_files(&args.scene, line, global)?;
     let server = Server::bind(args.host, args.port).map_err(|error| match error {
         Error::Io { ref source, .. } if source.kind() == ErrorKind::AddrNotAvailable => {
             anyhow!("{error}; choose an address of this machine with --host, or 0.0.0.0 for all")

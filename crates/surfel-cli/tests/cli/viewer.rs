@@ -1,6 +1,6 @@
 //! `surfel view`: what the server answers to programs, and how it begins and ends.
 
-use super::common::{Folder, command, dome, fail, succeed};
+use super::common::{Folder, command, dome, fail, succeed, surfel};
 use super::sequences;
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -140,9 +140,13 @@ fn what_cannot_be_served_is_told() {
     let folder = Folder::new();
     let missing = folder.path("missing.laz");
     assert!(fail(&["view", &missing, "--port", "0"], 1).contains("missing.laz"));
+    assert!(surfel(&["view", &missing, "--port", "0"]).stdout.is_empty(), "a link to nothing");
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port().to_string();
     let cloud = folder.write("dome.ply", dome(20));
+    // An address that is kept for examples.
+    let told = fail(&["view", &cloud, "--host", "192.0.2.1", "--port", "0"], 1);
+    assert!(told.contains("--host"), "{told}");
     assert!(fail(&["view", &cloud, "--port", &port], 1).contains("--port"));
     fail(&["view", &cloud, "--camera-view-angle", "400"], 2);
 }
