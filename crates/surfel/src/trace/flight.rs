@@ -36,13 +36,13 @@ const FEW: u32 = 16;
 /// Of a stack that is read and written by whole lanes.
 const ROOM: usize = STACK_SIZE + LANES;
 
-/// Room for rays on their way, made when it is first needed. Kept from search to search: to fill it takes as long
-/// as several rays.
+/// Room for rays on their way, made when it is first needed, and kept from search to search: to clear it takes as
+/// long as several rays.
 #[derive(Default)]
 pub struct Flight(Option<Box<[Flyer; IN_FLIGHT]>>);
 
 /// A ray on its way.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, bytemuck::Zeroable)]
 #[repr(align(64))]
 struct Flyer {
     ray: BoxRay,
@@ -57,7 +57,7 @@ struct Flyer {
 
 /// Children to look at later: packed, and where their boxes are entered. The root lies at the bottom:
 /// who comes back to it is done. Whole lanes are stored on top, of which the last ones may hold nothing.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, bytemuck::Zeroable)]
 struct Waiting {
     children: [f32; ROOM],
     entries: [f32; ROOM],
@@ -101,7 +101,8 @@ pub fn fly<L: Lanes, V: RayVisitor>(flight: &mut Flight, tree: &V::Tree, visitor
     if visitors.is_empty() {
         return;
     }
-    let flyers = flight.0.get_or_insert_with(|| Box::new([Flyer::idle(); IN_FLIGHT]));
+    // Of zeros, so that the root lies at the bottom of each stack.
+    let flyers = flight.0.get_or_insert_with(bytemuck::zeroed_box);
     let memory = Memory::new(tree);
     let mut n_started = 0;
     let mut steps = Steps { at_blocks: 0, done: u32::MAX };
@@ -150,13 +151,6 @@ pub fn fly<L: Lanes, V: RayVisitor>(flight: &mut Flight, tree: &V::Tree, visitor
 const ROOT: u32 = 0;
 
 impl Flyer {
-    fn idle() -> Self {
-        let root = f32::from_bits(ROOT);
-        let waiting = Waiting { children: [root; ROOM], entries: [0.0; ROOM] };
-        let ray = BoxRay::default();
-        Self { ray, visitor_idx: 0, limit: 0.0, next: ROOT, n_waiting: 0, waiting }
-    }
-
     #[inline(always)]
     fn start<V: RayVisitor>(&mut self, tree: &V::Tree, visitor_idx: usize, visitor: &V) {
         self.ray = BoxRay::new(&tree.nodes()[0], visitor.ray());

@@ -15,7 +15,7 @@ pub fn slack(root: &Node, origin: Vec3A) -> f32 {
 }
 
 /// A ray prepared for many boxes: it meets the plane x at x `inverse` - `at_origin`.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, bytemuck::Zeroable)]
 pub struct BoxRay {
     inverse: [f32; 3],
     /// For lower and for upper bounds, moved apart by the slack.
