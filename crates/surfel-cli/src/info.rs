@@ -1,11 +1,12 @@
 //! `surfel info`: what is in a file, as a table or as JSON.
 
-use crate::args::is_georeferenced;
+use crate::args::{Global, is_georeferenced};
+use crate::memory::Plan;
 use crate::report::{Report, print};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use surfel::math::Vec3;
-use surfel::points::{PointCloud, guess_up, spacing};
+use surfel::points::{PointCloud, Select, guess_up, spacing};
 use surfel_formats::{LoadOptions, Loaded, TextColumn};
 
 #[derive(clap::Args)]
@@ -27,11 +28,14 @@ Examples:
   surfel info scan.laz
   surfel info --json scan.laz | jq .bounds";
 
-pub fn run(args: &Args, report: &Report) -> anyhow::Result<()> {
+pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
     let text_columns = args.columns.as_deref().map(TextColumn::parse_list);
     let options = LoadOptions { text_columns, ..LoadOptions::default() };
     let mut all = Vec::new();
     for file in &args.files {
+        let sources = [(file.as_path(), surfel_formats::inspect(file)?)].into();
+        // Points are only looked at.
+        Plan::new(&sources, Some(Select::First(0)), 0).check(global)?;
         let loaded = surfel_formats::load(file, &options, report)?;
         let info = describe(file, &loaded, report)?;
         report.end_stage();

@@ -131,7 +131,7 @@ fn run_command(
         Command::Render(args) => render::run(args, line, global, report),
         Command::Animate(args) => animate::run(args, line, global, report),
         Command::View(args) => view::run(args, line, global, report),
-        Command::Info(args) => info::run(args, report),
+        Command::Info(args) => info::run(args, global, report),
         Command::Prepare(args) => prepare::run(args, global, report),
         Command::Demo(args) => demo::run(args, global, report),
         Command::Bench(args) => bench::run(args, global, report),

@@ -39,12 +39,10 @@ pub struct CameraArgs {
         conflicts_with_all = ["camera_azimuth_angle", "camera_elevation_angle"])]
     camera_direction: Option<DVec3>,
     /// Turns the chosen camera about the cloud, or a panorama from north, in degrees, clockwise from above.
-    #[arg(long, value_name = "DEG", default_value = "0", value_parser = parse::number_in::<-360, 360>,
-        allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", default_value = "0", value_parser = parse::number_in::<-360, 360>)]
     camera_azimuth_angle: f64,
     /// Height of the chosen camera over the horizon in degrees.
-    #[arg(long, value_name = "DEG", value_parser = parse::number_in::<-90, 90>,
-        allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", value_parser = parse::number_in::<-90, 90>)]
     camera_elevation_angle: Option<f64>,
     /// Values above 1 bring the chosen camera nearer.
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = parse::positive,

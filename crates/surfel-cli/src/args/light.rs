@@ -12,12 +12,10 @@ pub struct LightArgs {
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     light: Option<Vec<LightKind>>,
     /// Direction of the sun, clockwise from north; behind the camera to the left if not given.
-    #[arg(long, value_name = "DEG", value_parser = parse::number_in::<-360, 360>,
-        allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", value_parser = parse::number_in::<-360, 360>)]
     pub sun_azimuth: Option<f64>,
     /// Height of the sun over the horizon.
-    #[arg(long, value_name = "DEG", default_value = "40", value_parser = parse::number_in::<-90, 90>,
-        allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", default_value = "40", value_parser = parse::number_in::<-90, 90>)]
     pub sun_elevation: f64,
     /// Angular diameter of the sun; 0 gives hard shadows.
     #[arg(long, value_name = "DEG", default_value = "0.53", value_parser = parse::number_in::<0, 180>)]
@@ -35,15 +33,13 @@ pub struct LightArgs {
     #[arg(long, value_name = "FILE")]
     pub environment: Option<PathBuf>,
     /// Turns it, clockwise from above; its middle looks north if not given.
-    #[arg(long, value_name = "DEG", default_value = "0", value_parser = parse::number_in::<-360, 360>,
-        allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", default_value = "0", value_parser = parse::number_in::<-360, 360>)]
     pub environment_rotation: f64,
     /// Multiplies its light.
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = parse::number_in::<0, 1000>)]
     pub environment_strength: f64,
     /// In stops; auto makes the brightest parts of the cloud nearly white.
-    #[arg(long, value_name = "EV", default_value = "auto", value_parser = exposure,
-        allow_negative_numbers = true)]
+    #[arg(long, value_name = "EV", default_value = "auto", value_parser = exposure)]
     pub exposure: Exposure,
 }
 

@@ -144,28 +144,38 @@ fn measure(
 }
 
 fn check_surface(args: &Args) -> Result<(), Usage> {
-    if args.surface.surface == SurfaceKind::Points {
-        return Err(Usage("--surface points meets no rays; name another kind".into()));
+    match (args.surface.surface, &args.rays) {
+        (SurfaceKind::Points, _) => {
+            Err(Usage("--surface points meets no rays; name another kind".into()))
+        }
+        (SurfaceKind::Sphere, Some(kinds)) => gathers_not(kinds, "--surface sphere"),
+        _ => Ok(()),
+    }
+}
+
+/// Fails if rays are asked for that gather on what has no discs.
+fn gathers_not(kinds: &[Rays], why: &str) -> Result<(), Usage> {
+    if kinds.contains(&Rays::Gather) {
+        return Err(Usage(format!("--rays gather blends discs, which {why} has not")));
     }
     Ok(())
 }
 
 /// The kinds of rays that the geometry can be traced with.
 fn kinds(args: &Args, stage: &Stage, report: &Report) -> Result<Vec<Rays>, Usage> {
-    let kinds = args.rays.clone().unwrap_or(USUAL.to_vec());
     let (unblended, why) = match &stage.geometry {
-        FlatGeometry::Cloud(cloud) if cloud.surface.is_oriented() => return Ok(kinds),
+        FlatGeometry::Cloud(cloud) if cloud.surface.is_oriented() => {
+            return Ok(args.rays.clone().unwrap_or(USUAL.to_vec()));
+        }
         FlatGeometry::Cloud(_) => ("spheres", "--surface sphere"),
         FlatGeometry::Mesh(_) => ("triangles", "a mesh"),
     };
-    if !kinds.contains(&Rays::Gather) {
-        return Ok(kinds);
-    }
-    if args.rays.is_some() {
-        return Err(Usage(format!("--rays gather blends discs, which {why} has not")));
+    if let Some(kinds) = &args.rays {
+        gathers_not(kinds, why)?;
+        return Ok(kinds.clone());
     }
     report.choice(&format!("gather left out: {unblended} do not blend"), "--rays");
-    Ok(kinds.into_iter().filter(|kind| *kind != Rays::Gather).collect())
+    Ok(USUAL.into_iter().filter(|kind| *kind != Rays::Gather).collect())
 }
 
 fn plan(args: &Args) -> anyhow::Result<Plan> {

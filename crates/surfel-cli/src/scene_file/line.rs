@@ -135,10 +135,15 @@ fn known_to_objects(command: &Command) -> Known<'_> {
     Known { command, others: &object::KEYS, elsewhere: Vec::new() }
 }
 
-/// The last of several values counts: those of the command line stand behind those of files.
+/// The last of several values counts: those of the command line stand behind those of files. Numbers below zero
+/// are values, not options: who does not want any says what is expected.
 pub(super) fn command() -> Command {
-    let overriding = |command: Command| command.args_override_self(true);
-    overriding(Cli::command()).mut_subcommands(overriding)
+    let taking_numbers = |arg: Arg| {
+        let takes_values = arg.get_action().takes_values();
+        arg.allow_negative_numbers(takes_values)
+    };
+    let ruled = |command: Command| command.args_override_self(true).mut_args(taking_numbers);
+    ruled(Cli::command()).mut_subcommands(ruled)
 }
 
 /// One in which of options that do not go together the last one counts, if objects may have them.
@@ -156,7 +161,7 @@ fn overruled_by(of_objects: &Command, command: Command) -> Command {
 
 /// One with the options that objects may have.
 fn of_objects() -> Command {
-    let render = Cli::command().find_subcommand("render").cloned().unwrap_or_default();
+    let render = command().find_subcommand("render").cloned().unwrap_or_default();
     let is_of_object = |arg: &&Arg| {
         arg.get_help_heading().is_some_and(|heading| OF_OBJECTS.contains(&heading))
             && arg.get_long().is_some_and(|long| !OF_PICTURES.contains(&long))
@@ -166,7 +171,7 @@ fn of_objects() -> Command {
 }
 
 fn option_words(options: &Options, name: &str, given: &ArgMatches) -> Result<Vec<String>, String> {
-    let root = Cli::command();
+    let root = command();
     let Some(command) = root.find_subcommand(name) else { return Ok(Vec::new()) };
     // Threads and the like are the whole program's.
     let global: Vec<Arg> = root.get_arguments().cloned().collect();

@@ -1,6 +1,6 @@
 //! Files that are broken, absent or not what they say: a clear error, no old output destroyed.
 
-use super::common::{Folder, dome, fail, square, succeed};
+use super::common::{Folder, dome, fail, read_png, square, stderr, succeed, surfel};
 use std::fs;
 
 /// The header of a LAS 1.2 file that claims four billion points in 200 bytes.
@@ -110,6 +110,31 @@ fn memory_is_refused_before_it_is_taken() {
     assert!(text.contains("--resolution") && text.contains("1.0 MB"), "{text}");
     let text = fail(&["prepare", &cloud, "-o", &folder.path("a.ply"), "--memory-limit", "9K"], 1);
     assert!(text.contains("--memory-limit"), "{text}");
+    assert!(fail(&["info", &cloud, "--memory-limit", "9K"], 1).contains("--memory-limit"));
+    succeed(&["info", &cloud, "--memory-limit", "1M"]);
+}
+
+/// Scanners and programs write largest numbers where nothing was measured.
+#[test]
+fn points_without_a_measurement_do_not_change_the_picture() {
+    let folder = Folder::new();
+    let points = square(40, 9);
+    let unmeasured = "3.4e38 3.4e38 3.4e38 0 0 0\n1e30 0 0 0 0 0\n0 0 -1e20 0 0 0\n";
+    let (clean, picture) = (folder.write("clean.xyz", &points), folder.path("clean.png"));
+    let (dirty, other) = (folder.write("dirty.xyz", points + unmeasured), folder.path("dirty.png"));
+    let view = ["--camera-position", "-30,10,40", "--camera-focal-point", "20,20,0"];
+    let options = [&view[..], &["--resolution", "64x48", "--spp", "1", "-o"]].concat();
+    succeed(&[&["render", &clean], &options[..], &[&picture]].concat());
+    let output = surfel(&[&["render", &dirty], &options[..], &[&other]].concat());
+    let told = stderr(&output);
+    assert!(output.status.success() && told.contains("3 points without a position"), "{told}");
+    let ((.., expected), (.., found)) = (read_png(picture), read_png(other));
+    let farthest = expected.iter().zip(&found).map(|(a, b)| a.abs_diff(*b)).max();
+    // Coordinates are relative to another zero.
+    assert!(expected.len() == found.len() && farthest <= Some(1), "{farthest:?}");
+    let nowhere = folder.write("nowhere.xyz", unmeasured);
+    let text = fail(&["render", &nowhere, "-o", &folder.path("nowhere.png")], 1);
+    assert!(text.contains("nowhere.xyz") && text.contains("no points"), "{text}");
 }
 
 #[test]
@@ -149,11 +174,11 @@ fn a_full_disk_is_an_error() {
     let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let arguments = ["render", &cloud, "-o", "-", "--resolution", "64x36"];
     let output = super::common::command(&arguments).stdout(full()).output().unwrap();
-    assert_eq!(output.status.code(), Some(1), "{}", super::common::stderr(&output));
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     fail(&["render", &cloud, "-o", "/dev/full"], 2);
     let arguments = ["info", &cloud];
     let output = super::common::command(&arguments).stdout(full()).output().unwrap();
-    assert_eq!(output.status.code(), Some(1), "{}", super::common::stderr(&output));
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
 }
 
 #[cfg(target_os = "linux")]
@@ -186,7 +211,7 @@ fn an_output_that_cannot_be_written_to_the_end_leaves_the_old_one() {
             .args(arguments)
             .output()
             .unwrap();
-        let text = super::common::stderr(&shell);
+        let text = stderr(&shell);
         assert_eq!(shell.status.code(), Some(1), "{text}");
         assert!(text.contains(&format!("error: {old}")), "{text}");
         assert_eq!(fs::read_to_string(&old).unwrap(), "an old file");

@@ -70,6 +70,23 @@ fn values_that_are_wrong_by_themselves_are_wrong_use() {
 }
 
 #[test]
+fn a_number_below_zero_is_told_what_is_expected() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let picture = folder.path("out.png");
+    for (option, expected) in [
+        ("--radius", "a positive number in world units"),
+        ("--normals-radius", "a positive number"),
+        ("--camera-zoom-factor", "a positive number"),
+        ("--sun-strength", "a number from 0 to 1000"),
+        ("--threads", "-1 is not in 1..=1024"),
+    ] {
+        let text = fail(&["render", &cloud, "-o", &picture, option, "-1"], 2);
+        assert!(text.contains(expected) && text.contains(option), "{option}: {text}");
+    }
+}
+
+#[test]
 fn a_command_without_what_it_needs_is_wrong_use() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(10));

@@ -1,6 +1,7 @@
 //! Cleaning: what no later step could use is dropped or marked, and counted.
 
 use super::PointCloud;
+use super::cloud::NOWHERE;
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -10,8 +11,8 @@ use rayon::prelude::*;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CleanReport {
     pub n_before: usize,
-    /// Positions with NaN or infinity: dropped.
-    pub n_not_finite: usize,
+    /// Positions that are not finite, or beyond 1e15 from the cloud's origin: dropped.
+    pub n_nowhere: usize,
     /// Points at the position of an earlier one: dropped.
     pub n_duplicates: usize,
     /// Normals that are zero or not finite: set to zero, which `prepare` takes as missing.
@@ -42,7 +43,7 @@ impl CleanReport {
     /// One line for each kind of repair that was needed.
     fn lines(&self) -> Vec<String> {
         let counts = [
-            (self.n_not_finite, "points without a finite position: dropped"),
+            (self.n_nowhere, "points without a position, or beyond 1e15: dropped"),
             (self.n_duplicates, "exact duplicates: dropped"),
             (self.n_bad_normals, "normals that are zero or not finite: taken as missing"),
             (self.n_scaled_normals, "normals of another length than one: scaled"),
@@ -67,23 +68,27 @@ fn find_dropped(
     progress.check()?;
     let mut dropped: Vec<u32> = (0..positions.len() as u32)
         .into_par_iter()
-        .filter(|&i| !positions[i as usize].is_finite())
+        .filter(|&i| !is_somewhere(positions[i as usize]))
         .collect();
-    report.n_not_finite = dropped.len();
+    report.n_nowhere = dropped.len();
     if cloud.morphs.is_empty() && cloud.skin.is_none() {
         dropped.extend(find_duplicates(positions, progress)?);
     }
-    report.n_duplicates = dropped.len() - report.n_not_finite;
+    report.n_duplicates = dropped.len() - report.n_nowhere;
     dropped.par_sort_unstable();
     Ok(dropped)
 }
 
-/// All but the first of each group of equal finite positions: 8 bytes a point while it runs.
+fn is_somewhere(position: Vec3) -> bool {
+    position.abs().cmplt(Vec3::splat(NOWHERE)).all()
+}
+
+/// All but the first of each group of equal positions, of points that are somewhere: 8 bytes a point while it runs.
 fn find_duplicates(positions: &[Vec3], progress: &dyn Progress) -> Result<Vec<u32>> {
     let mut keys: Vec<u64> = positions
         .par_iter()
         .enumerate()
-        .filter(|(_, position)| position.is_finite())
+        .filter(|(_, position)| is_somewhere(**position))
         .map(|(i, &position)| u64::from(position_hash(position)) << 32 | i as u64)
         .collect();
     progress.check()?;
@@ -167,7 +172,15 @@ mod tests {
         cloud.intensity = Some((0..7).map(|i| i as f32).collect());
         let (cloud, report) = cleaned(cloud);
         assert_eq!(cloud.intensity, Some(vec![0.0, 1.0, 3.0]));
-        assert_eq!((report.n_not_finite, report.n_duplicates), (1, 3));
+        assert_eq!((report.n_nowhere, report.n_duplicates), (1, 3));
+    }
+
+    #[test]
+    fn points_too_far_for_squares_go() {
+        let far = [f32::MAX, -1e30, 1e15, f32::NEG_INFINITY].map(|x| Vec3::new(0.0, x, 1.0));
+        let near = [Vec3::X, Vec3::new(-9e14, 0.0, 9e14)];
+        let (cloud, report) = cleaned(PointCloud::from_positions([&far[..], &near].concat()));
+        assert_eq!((cloud.positions, report.n_nowhere), (near.to_vec(), 4));
     }
 
     #[test]

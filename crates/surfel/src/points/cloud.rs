@@ -3,6 +3,10 @@
 use super::bend::{Morph, Skin, pick};
 use crate::math::{Aabb, DVec3, Vec3};
 
+/// As far from zero along an axis, squares of lengths are no longer sure to be finite. Files mark points without
+/// a measurement by such numbers.
+pub(super) const NOWHERE: f32 = 1e15;
+
 /// Points as columns. Every column that is present has one entry for each position.
 ///
 /// World is right-handed and Z up; lengths are in the file's unit, metres unless it says otherwise.
@@ -112,7 +116,7 @@ impl PointCloud {
     pub fn choose_origin(sample: &[DVec3]) -> DVec3 {
         let median = |axis: usize| {
             let mut values: Vec<f64> =
-                sample.iter().map(|p| p[axis]).filter(|x| x.is_finite()).collect();
+                sample.iter().map(|p| p[axis]).filter(|x| x.abs() < f64::from(NOWHERE)).collect();
             let middle = values.len() / 2;
             if values.is_empty() {
                 0.0
@@ -169,6 +173,9 @@ mod tests {
         sample.push(DVec3::splat(1e12));
         assert_eq!(PointCloud::choose_origin(&sample), DVec3::new(500_000.0, 4_900_001.0, 100.0));
         assert_eq!(PointCloud::choose_origin(&[]), DVec3::ZERO);
+        sample.extend([DVec3::splat(3.4e38); 20]);
+        assert_eq!(PointCloud::choose_origin(&sample), DVec3::new(500_000.0, 4_900_001.0, 100.0));
+        assert_eq!(PointCloud::choose_origin(&sample[10..]), DVec3::ZERO);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::packet::WideRays;
 use crate::math::{Aabb, Floats, Lanes, Ray, WIDE, Wide};
 
-/// Where the sixteen rays of a group enter a box within their ranges; infinity where they do not.
+/// Where the sixteen rays of a row enter a box within their ranges; infinity where they do not.
 #[derive(Clone, Copy)]
 pub struct Entries {
     pub of_rays: [f32; WIDE],
@@ -15,19 +15,19 @@ impl Entries {
     pub const NONE: Self = Self { of_rays: [f32::INFINITY; WIDE], nearest: f32::INFINITY };
 }
 
-/// Where each sixteen rays enter each box, all boxes of one group after those of another. The last group
+/// Where each row of sixteen rays enters each box, all boxes of one row after those of another. The last row
 /// may have fewer rays.
 #[inline(always)]
 pub(super) fn box_entries<L: Lanes>(boxes: &[Aabb], rays: &[Ray], entries: &mut [Entries]) {
-    let groups = entries.chunks_mut(boxes.len().max(1));
-    for (group, entries) in rays.chunks(WIDE).zip(groups) {
-        let lanes = WideRays::<L::Wide>::new(group);
+    let rows = entries.chunks_mut(boxes.len().max(1));
+    for (row, entries) in rays.chunks(WIDE).zip(rows) {
+        let lanes = WideRays::<L::Wide>::new(row);
         let inverse =
             [inverse(lanes.direction[0]), inverse(lanes.direction[1]), inverse(lanes.direction[2])];
         for (bounds, entries) in boxes.iter().zip(entries) {
             let found = entry(&lanes, &inverse, bounds);
             *entries = Entries { of_rays: found.store(), nearest: found.min_lane() };
-            entries.of_rays[group.len()..].fill(f32::INFINITY);
+            entries.of_rays[row.len()..].fill(f32::INFINITY);
         }
     }
 }

@@ -105,7 +105,7 @@ pub fn occlusions(cloud: &FlatCloud, simd: Simd, rays: &[Ray], occluded: &mut [b
     at_level!(simd, surface::occlusions(cloud, rays, occluded));
 }
 
-/// Where rays enter boxes, by groups of sixteen rays: all boxes of one group after those of another.
+/// Where rays enter boxes, by rows of sixteen rays: all boxes of one row after those of another.
 fn box_entries(boxes: &[Aabb], simd: Simd, rays: &[Ray], entries: &mut [Entries]) {
     at_level!(simd, boxes::box_entries(boxes, rays, entries));
 }

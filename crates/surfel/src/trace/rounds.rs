@@ -50,8 +50,8 @@ impl Runs {
 }
 
 enum Visits {
-    /// Of few instances: where the sixteen rays of each group enter the box of each, group after group; and
-    /// the groups still on their way.
+    /// Of few instances: where the sixteen rays of each row enter the box of each, row after row; and the rows
+    /// still on their way.
     Few { entries: Vec<Entries>, open: Vec<u32> },
     /// Of many: all that each ray comes by, sorted by where it enters, one ray's after another's; and what
     /// is left of that of each ray still on its way. `jobs` is room for the next round.
@@ -71,11 +71,11 @@ impl Rounds {
         }
         let boxes: Vec<Aabb> =
             instances.iter().map(|&i| scene.instances[i as usize].bounds).collect();
-        let n_groups = rays.len().div_ceil(WIDE);
-        let mut entries = vec![Entries::NONE; n_groups * boxes.len()];
+        let n_rows = rays.len().div_ceil(WIDE);
+        let mut entries = vec![Entries::NONE; n_rows * boxes.len()];
         box_entries(&boxes, simd, rays, &mut entries);
         Self {
-            visits: Visits::Few { entries, open: (0..n_groups as u32).collect() },
+            visits: Visits::Few { entries, open: (0..n_rows as u32).collect() },
             batches: instances.into_iter().map(|instance| (instance, Runs::default())).collect(),
         }
     }
@@ -94,7 +94,7 @@ impl Rounds {
     }
 }
 
-/// Puts the rays of each group into the batch of the instance that the group visits next, all of them that
+/// Puts the rays of each row into the batch of the instance that the row visits next, all of them that
 /// meet its box within their limits; how many batches there are then.
 ///
 /// Sixteen rays choose at a time: one by one that cost a twentieth of the search among points.
@@ -106,9 +106,9 @@ fn next_of_few(
 ) -> usize {
     batches.iter_mut().for_each(|(_, runs)| runs.0.clear());
     let mut goes_any = false;
-    open.retain(|&group| {
-        let entries = &mut entries[group as usize * batches.len()..][..batches.len()];
-        let first = group as usize * WIDE;
+    open.retain(|&row| {
+        let entries = &mut entries[row as usize * batches.len()..][..batches.len()];
+        let first = row as usize * WIDE;
         let limits = &limits[first..first + WIDE];
         while let Some(nearest) = nearest(entries) {
             entries[nearest].nearest = f32::INFINITY;
@@ -122,7 +122,7 @@ fn next_of_few(
     if goes_any { batches.len() } else { 0 }
 }
 
-/// The box that any ray of the group enters first.
+/// The box that any ray of the row enters first.
 fn nearest(entries: &[Entries]) -> Option<usize> {
     let (mut nearest, mut entry) = (0, f32::INFINITY);
     for (i, other) in entries.iter().enumerate() {
@@ -133,7 +133,7 @@ fn nearest(entries: &[Entries]) -> Option<usize> {
     (entry < f32::INFINITY).then_some(nearest)
 }
 
-/// Adds the rays of the group that begins with `first` which enter a box within their limits, if any does.
+/// Adds the rays of the row that begins with `first` which enter a box within their limits, if any does.
 fn send(runs: &mut Runs, first: usize, entries: &[f32; WIDE], limits: &[f32]) -> bool {
     let goes = |(entry, limit): (&f32, &f32)| (*entry < f32::INFINITY) & (entry <= limit);
     let n_going: u32 = entries.iter().zip(limits).map(|pair| u32::from(goes(pair))).sum();

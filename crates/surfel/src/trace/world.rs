@@ -155,7 +155,7 @@ pub fn scene_occlusions(
     }
 }
 
-/// How far each ray still looks within its range; there is one for each of sixteen rays in the last group too.
+/// How far each ray still looks within its range; there is one for each of sixteen rays in the last row too.
 fn unlimited(rays: &[Ray]) -> Vec<f32> {
     vec![f32::INFINITY; rays.len().next_multiple_of(WIDE)]
 }
