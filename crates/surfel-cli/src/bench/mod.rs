@@ -163,15 +163,16 @@ fn gathers_not(kinds: &[Rays], why: &str) -> Result<(), Usage> {
 
 /// The kinds of rays that the geometry can be traced with.
 fn kinds(args: &Args, stage: &Stage, report: &Report) -> Result<Vec<Rays>, Usage> {
-    let (unblended, why) = match &stage.geometry {
+    let unblended = match &stage.geometry {
         FlatGeometry::Cloud(cloud) if cloud.surface.is_oriented() => {
             return Ok(args.rays.clone().unwrap_or(USUAL.to_vec()));
         }
-        FlatGeometry::Cloud(_) => ("spheres", "--surface sphere"),
-        FlatGeometry::Mesh(_) => ("triangles", "a mesh"),
+        FlatGeometry::Cloud(_) => "spheres",
+        FlatGeometry::Mesh(_) => "triangles",
     };
     if let Some(kinds) = &args.rays {
-        gathers_not(kinds, why)?;
+        // Spheres were refused before the file was read.
+        gathers_not(kinds, "a mesh")?;
         return Ok(kinds.clone());
     }
     report.choice(&format!("gather left out: {unblended} do not blend"), "--rays");

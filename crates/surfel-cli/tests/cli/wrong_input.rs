@@ -137,6 +137,25 @@ fn points_without_a_measurement_do_not_change_the_picture() {
     assert!(text.contains("nowhere.xyz") && text.contains("no points"), "{text}");
 }
 
+/// So many that they are no outliers do not count for the camera either.
+#[test]
+fn a_fifth_of_the_points_without_a_measurement_leave_the_camera_where_it_is() {
+    let folder = Folder::new();
+    let points = (0..1600).map(|n| (n % 40, n / 40));
+    let bowl: String = points.map(|(x, y)| format!("{x} {y} {}\n", x * x / 40)).collect();
+    let picture = folder.path("out.png");
+    let camera = |unmeasured: &str| {
+        let many: String = (0..400).map(|i| format!("{} {unmeasured}\n", i % 40)).collect();
+        let cloud = folder.write("cloud.xyz", format!("{bowl}{many}"));
+        let output = surfel(&["render", &cloud, "-o", &picture, "--resolution", "32x24"]);
+        let told = stderr(&output);
+        let line = told.lines().find(|line| line.starts_with("camera at"));
+        assert!(told.contains("400 points without a position"), "{told}");
+        line.unwrap().to_owned()
+    };
+    assert_eq!(camera("3.4e38 -1e30"), camera("NaN NaN"));
+}
+
 #[test]
 fn triangles_and_textures_count_against_the_limit_of_memory() {
     let folder = Folder::new();

@@ -1,7 +1,7 @@
 //! Cleaning: what no later step could use is dropped or marked, and counted.
 
 use super::PointCloud;
-use super::cloud::NOWHERE;
+use super::cloud::is_somewhere;
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -77,10 +77,6 @@ fn find_dropped(
     report.n_duplicates = dropped.len() - report.n_nowhere;
     dropped.par_sort_unstable();
     Ok(dropped)
-}
-
-fn is_somewhere(position: Vec3) -> bool {
-    position.abs().cmplt(Vec3::splat(NOWHERE)).all()
 }
 
 /// All but the first of each group of equal positions, of points that are somewhere: 8 bytes a point while it runs.

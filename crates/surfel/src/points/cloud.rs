@@ -5,7 +5,12 @@ use crate::math::{Aabb, DVec3, Vec3};
 
 /// As far from zero along an axis, squares of lengths are no longer sure to be finite. Files mark points without
 /// a measurement by such numbers.
-pub(super) const NOWHERE: f32 = 1e15;
+const NOWHERE: f32 = 1e15;
+
+/// Whether something may be there.
+pub(crate) fn is_somewhere(position: Vec3) -> bool {
+    position.abs().cmplt(Vec3::splat(NOWHERE)).all()
+}
 
 /// Points as columns. Every column that is present has one entry for each position.
 ///

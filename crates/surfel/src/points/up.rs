@@ -1,6 +1,7 @@
 //! Up: which axis a cloud without a word about it probably stands on.
 
 use super::PointCloud;
+use super::cloud::is_somewhere;
 use crate::math::Vec3;
 
 /// The axis that points up, and why, in one line.
@@ -52,7 +53,7 @@ struct Ends {
 fn ends(positions: &[Vec3]) -> [Ends; 3] {
     let step = positions.len().div_ceil(200_000).max(1);
     let sample: Vec<Vec3> =
-        positions.iter().step_by(step).copied().filter(|p| p.is_finite()).collect();
+        positions.iter().step_by(step).copied().filter(|p| is_somewhere(*p)).collect();
     if sample.is_empty() {
         return [Ends::default(); 3];
     }

@@ -4,7 +4,7 @@ use super::light::ground_axes;
 use super::prospect::automatic_direction;
 use super::{Camera, Projection};
 use crate::math::{Aabb, DVec3, Vec3};
-use crate::points::PointCloud;
+use crate::points::{PointCloud, is_somewhere};
 
 /// What is known of the wanted camera; the rest follows from the cloud.
 #[derive(Clone, Copy, Debug)]
@@ -153,7 +153,7 @@ fn without_outliers(points: &[Vec3]) -> Vec<Vec3> {
 
 fn sample(cloud: &PointCloud) -> Vec<Vec3> {
     let stride = cloud.len().div_ceil(MAX_SAMPLES).max(1);
-    cloud.positions.iter().step_by(stride).copied().filter(|p| p.is_finite()).collect()
+    cloud.positions.iter().step_by(stride).copied().filter(|p| is_somewhere(*p)).collect()
 }
 
 /// Eye, focal point and projection in the camera's own axes, so that all `points` are seen.
