@@ -27,6 +27,8 @@ pub trait Floats:
     fn sqrt(self) -> Self;
     fn less(self, other: Self) -> Self::Mask;
     fn less_equal(self, other: Self) -> Self::Mask;
+    /// Compares the lanes' bits as unsigned numbers: lanes may hold those as well.
+    fn less_bits(self, other: Self) -> Self::Mask;
     fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self;
 
     #[inline(always)]
@@ -80,8 +82,6 @@ pub trait Lanes: Floats {
     fn power_of_two<const BYTE: usize>(exponents: u32) -> Self;
     /// The greatest of the lanes, none of which may be NaN.
     fn max_lane(self) -> f32;
-    /// Compares the lanes' bits as unsigned numbers: lanes may hold those as well.
-    fn less_bits(self, other: Self) -> Self::Mask;
     /// The least of the lanes, none of which may be NaN.
     #[inline(always)]
     fn min_lane(self) -> f32 {
@@ -114,8 +114,6 @@ pub trait Wide: Floats {
     fn store(self) -> [f32; WIDE];
     /// The greatest of the lanes, none of which may be NaN.
     fn max_lane(self) -> f32;
-    /// Compares the lanes' bits as unsigned numbers: lanes may hold those as well.
-    fn less_bits(self, other: Self) -> Self::Mask;
 
     /// The least of the lanes, none of which may be NaN.
     #[inline(always)]

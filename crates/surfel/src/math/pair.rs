@@ -27,11 +27,6 @@ impl<L: Lanes> Wide for Pair<L> {
     fn max_lane(self) -> f32 {
         self.0.max(self.1).max_lane()
     }
-
-    #[inline(always)]
-    fn less_bits(self, other: Self) -> Self::Mask {
-        Pair(self.0.less_bits(other.0), self.1.less_bits(other.1))
-    }
 }
 
 impl<L: Lanes> Floats for Pair<L> {
@@ -65,6 +60,11 @@ impl<L: Lanes> Floats for Pair<L> {
     #[inline(always)]
     fn less_equal(self, other: Self) -> Self::Mask {
         Pair(self.0.less_equal(other.0), self.1.less_equal(other.1))
+    }
+
+    #[inline(always)]
+    fn less_bits(self, other: Self) -> Self::Mask {
+        Pair(self.0.less_bits(other.0), self.1.less_bits(other.1))
     }
 
     #[inline(always)]

@@ -51,6 +51,11 @@ impl Floats for PortableLanes {
     }
 
     #[inline(always)]
+    fn less_bits(self, other: Self) -> PortableMask {
+        PortableMask(std::array::from_fn(|i| self.0[i].to_bits() < other.0[i].to_bits()))
+    }
+
+    #[inline(always)]
     fn select(mask: PortableMask, if_true: Self, if_false: Self) -> Self {
         Self(std::array::from_fn(|i| if mask.0[i] { if_true.0[i] } else { if_false.0[i] }))
     }
@@ -158,11 +163,6 @@ impl Lanes for PortableLanes {
     #[inline(always)]
     fn power_of_two<const BYTE: usize>(exponents: u32) -> Self {
         Self::splat(f32::from_bits((exponents >> (8 * BYTE) & 0xff) << 23))
-    }
-
-    #[inline(always)]
-    fn less_bits(self, other: Self) -> PortableMask {
-        PortableMask(std::array::from_fn(|i| self.0[i].to_bits() < other.0[i].to_bits()))
     }
 
     #[inline(never)]

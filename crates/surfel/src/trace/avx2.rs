@@ -173,6 +173,11 @@ impl<L: Registers> Floats for Eight<L> {
     }
 
     #[inline(always)]
+    fn less_bits(self, other: Self) -> L::Mask {
+        L::less_bits(self.0, other.0)
+    }
+
+    #[inline(always)]
     fn select(mask: L::Mask, if_true: Self, if_false: Self) -> Self {
         Self(L::select(mask, if_true.0, if_false.0), PhantomData)
     }
@@ -232,11 +237,6 @@ impl<L: Registers> Lanes for Eight<L> {
             let pair = _mm_max_ps(half, _mm_movehl_ps(half, half));
             _mm_cvtss_f32(_mm_max_ss(pair, _mm_movehdup_ps(pair)))
         }
-    }
-
-    #[inline(always)]
-    fn less_bits(self, other: Self) -> L::Mask {
-        L::less_bits(self.0, other.0)
     }
 
     #[inline(always)]

@@ -148,6 +148,14 @@ impl Floats for Sixteen {
     }
 
     #[inline(always)]
+    fn less_bits(self, other: Self) -> SixteenMask {
+        avx512!(SixteenMask(_mm512_cmplt_epu32_mask(
+            _mm512_castps_si512(self.0),
+            _mm512_castps_si512(other.0)
+        )))
+    }
+
+    #[inline(always)]
     fn select(mask: SixteenMask, if_true: Self, if_false: Self) -> Self {
         avx512!(Self(_mm512_mask_blend_ps(mask.0, if_false.0, if_true.0)))
     }
@@ -178,14 +186,6 @@ impl Wide for Sixteen {
     fn max_lane(self) -> f32 {
         // SAFETY: as for `avx512!`.
         unsafe { _mm512_reduce_max_ps(self.0) }
-    }
-
-    #[inline(always)]
-    fn less_bits(self, other: Self) -> SixteenMask {
-        avx512!(SixteenMask(_mm512_cmplt_epu32_mask(
-            _mm512_castps_si512(self.0),
-            _mm512_castps_si512(other.0)
-        )))
     }
 }
 

@@ -1,6 +1,6 @@
 //! The shapes of a block: eight before one ray, or one after the other before sixteen rays.
 
-use super::hit::Hit;
+use super::hit::{Hit, NearestHits};
 use super::packet::{Packet, WideRays};
 use crate::flat::{BlockTree, FlatPoints, FlatTriangles, PointBlock, Slot};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, Wide};
@@ -79,6 +79,13 @@ impl<L: Lanes> BlockHits<L> {
         let lane = distances.less_equal(L::splat(distance)).bits().trailing_zeros();
         let is_hit = distance < f32::INFINITY;
         Hit { distance, slot: if is_hit { self.first_slot + lane } else { Hit::MISS.slot } }
+    }
+
+    /// Takes into `nearest` what is nearer in its lane.
+    #[inline(always)]
+    pub fn add_to(&self, nearest: &mut NearestHits<L>) {
+        let slots = L::numbered(self.is_hit, self.first_slot, self.first_slot);
+        nearest.take(self.is_hit, self.distances, slots);
     }
 
     /// All up to `t_max`, each with the radius of what was hit. A list to loop over rather than a function

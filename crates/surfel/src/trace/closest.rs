@@ -1,9 +1,9 @@
 //! The nearest shape on each ray, each point on its own.
 
 use super::batch::{Query, ask};
-use super::block::{BeforePacket, Leaf, Worth};
+use super::block::{BeforePacket, BlockHits, Leaf, Worth};
 use super::flight::RayVisitor;
-use super::hit::Hit;
+use super::hit::{Hit, NearestHits};
 use super::packet::{Packet, PacketVisitor};
 use crate::flat::{FlatCloud, FlatTriangles};
 use crate::math::{Floats, LANES, Lanes, Ray, WIDE, Wide};
@@ -52,7 +52,8 @@ impl<L: Lanes, S: Leaf> Query<L> for Closest<S> {
             packet,
             lines: S::lines(&packet.wide),
             distances: packet.limits(),
-            slots: [f32::from_bits(Hit::MISS.slot); WIDE],
+            slots: [NO_SLOT; WIDE],
+            apart: None,
         }
     }
 
@@ -65,10 +66,11 @@ impl<L: Lanes, S: Leaf> Query<L> for Closest<S> {
     /// rays.
     #[inline(always)]
     fn answer_all(found: &ClosestInPacket<L, S>, hits: &mut [Hit]) {
-        let ClosestInPacket { distances, slots, .. } = found;
-        let is_hit = L::Wide::load(slots).less_bits(L::Wide::splat(f32::from_bits(Hit::MISS.slot)));
+        let NearestHits { distances, slots } = found.nearest();
+        let is_hit = slots.less_bits(L::Wide::splat(NO_SLOT));
+        let slots = slots.store();
         // Of the two zeros the positive one.
-        let distances = L::Wide::load(distances) + L::Wide::splat(0.0);
+        let distances = distances + L::Wide::splat(0.0);
         let miss = L::Wide::splat(Hit::MISS.distance);
         let distances = L::Wide::select(is_hit, distances, miss).store();
         if let Some(hits) = hits.first_chunk_mut::<WIDE>() {
@@ -112,39 +114,65 @@ impl<S: Leaf> RayVisitor for ClosestAlone<'_, S> {
     }
 }
 
-#[inline(always)]
-fn try_lane<L: Lanes, S: Leaf>(
-    block: &S::BeforePacket<L>,
-    lines: &S::Lines<L::Wide>,
-    lane: usize,
-    slot: u32,
-    distances: &mut L::Wide,
-    slots: &mut L::Wide,
-) {
-    let slot = L::Wide::splat(f32::from_bits(slot));
-    let (distance, mask) = block.intersect(lines, lane);
-    let is_first = distance.less(*distances) | slot.less_bits(*slots);
-    let closer = mask & distance.less_equal(*distances) & is_first;
-    *slots = L::Wide::select(closer, slot, *slots);
-    *distances = L::Wide::select(closer, distance, *distances);
-}
+/// The slot of `Hit::MISS`, as lanes hold it.
+const NO_SLOT: f32 = f32::from_bits(Hit::MISS.slot);
 
 struct ClosestInPacket<'p, L: Lanes, S: Leaf> {
     packet: &'p Packet<'p, L::Wide>,
     lines: S::Lines<L::Wide>,
     distances: [f32; WIDE],
-    /// As the bits of floats, which is how lanes hold them.
+    /// As bits; none where `apart` has what is at that distance.
     slots: [f32; WIDE],
+    apart: Option<HitsApart>,
+}
+
+/// The nearest hits of rays that are shown blocks alone, in each lane of their blocks. Which of its eight is a
+/// ray's nearest is asked of all rays at once, after each node: asked of each ray after each block, that took
+/// a fifth of the time of dense clouds.
+struct HitsApart {
+    distances: [[f32; LANES]; WIDE],
+    slots: [[f32; LANES]; WIDE],
+}
+
+impl HitsApart {
+    const NONE: Self =
+        Self { distances: [[f32::INFINITY; LANES]; WIDE], slots: [[NO_SLOT; LANES]; WIDE] };
+
+    #[inline(always)]
+    fn add<L: Lanes>(&mut self, hits: &BlockHits<L>, ray: usize) {
+        let (distances, slots) = (&mut self.distances[ray], &mut self.slots[ray]);
+        let mut nearest = NearestHits { distances: L::load(distances), slots: L::load(slots) };
+        hits.add_to(&mut nearest);
+        *distances = nearest.distances.store();
+        *slots = nearest.slots.store();
+    }
+
+    /// The distance of each ray's nearest.
+    #[inline(always)]
+    fn least<W: Wide>(&self) -> W {
+        let [a, b, c, d, e, f, g, h] = W::columns(&self.distances);
+        a.min(b).min(c.min(d)).min(e.min(f).min(g.min(h)))
+    }
+
+    #[inline(always)]
+    fn add_to<W: Wide>(&self, nearest: &mut NearestHits<W>) {
+        let (distances, slots) = (W::columns(&self.distances), W::columns(&self.slots));
+        for lane in 0..LANES {
+            let is_hit = slots[lane].less_bits(W::splat(NO_SLOT));
+            nearest.take(is_hit, distances[lane], slots[lane]);
+        }
+    }
 }
 
 impl<L: Lanes, S: Leaf> ClosestInPacket<'_, L, S> {
-    /// Keeps what the ray in `lane` meets of a block, if it is nearer.
     #[inline(always)]
-    fn meet(&mut self, seen: &S::Seen<L>, block_idx: u32, lane: usize) {
-        let hit = Hit { distance: self.distances[lane] + 0.0, slot: self.slots[lane].to_bits() };
-        let hit = S::hits(seen, block_idx, &self.packet.rays[lane]).nearest().nearer(hit);
-        self.distances[lane] = hit.distance;
-        self.slots[lane] = f32::from_bits(hit.slot);
+    fn nearest(&self) -> NearestHits<L::Wide> {
+        let (distances, slots) = (L::Wide::load(&self.distances), L::Wide::load(&self.slots));
+        let mut nearest = NearestHits { distances, slots };
+        if let Some(apart) = &self.apart {
+            apart.add_to(&mut nearest);
+        }
+        nearest
     }
 }
 
@@ -161,49 +189,75 @@ impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
     #[inline(always)]
     fn visit(&mut self, tree: &S::Tree, block_idx: u32) {
         let block = S::before_packet::<L>(tree, block_idx, self.packet);
-        let mut distances = L::Wide::load(&self.distances);
-        let mut slots = L::Wide::load(&self.slots);
+        let (distances, slots) = (L::Wide::load(&self.distances), L::Wide::load(&self.slots));
+        let mut nearest = NearestHits { distances, slots };
+        let first_slot = block_idx * LANES as u32;
         match block.worth_trying() {
             // No branch: whether a disc is hit cannot be foretold, and on a plane all are equally near.
             Worth::All => {
                 for lane in 0..LANES {
-                    let slot = block_idx * LANES as u32 + lane as u32;
-                    try_lane::<L, S>(&block, &self.lines, lane, slot, &mut distances, &mut slots);
+                    try_lane::<L, S>(&block, &self.lines, lane, first_slot, &mut nearest);
                 }
             }
             Worth::These(mut lanes) => {
                 while lanes != 0 {
                     let lane = lanes.trailing_zeros() as usize % LANES;
                     lanes &= lanes - 1;
-                    let slot = block_idx * LANES as u32 + lane as u32;
-                    try_lane::<L, S>(&block, &self.lines, lane, slot, &mut distances, &mut slots);
+                    try_lane::<L, S>(&block, &self.lines, lane, first_slot, &mut nearest);
                 }
             }
         }
-        self.slots = slots.store();
-        self.distances = distances.store();
+        self.slots = nearest.slots.store();
+        self.distances = nearest.distances.store();
     }
 
     #[inline(always)]
     fn visit_alone(&mut self, tree: &S::Tree, block_idx: u32, lane: usize) {
-        let seen = S::seen_from::<L>(tree, block_idx, self.packet.rays[lane].origin);
-        self.meet(&seen, block_idx, lane);
+        let ray = &self.packet.rays[lane];
+        let seen = S::seen_from::<L>(tree, block_idx, ray.origin);
+        let hit = Hit { distance: self.distances[lane] + 0.0, slot: self.slots[lane].to_bits() };
+        let hit = S::hits(&seen, block_idx, ray).nearest().nearer(hit);
+        self.distances[lane] = hit.distance;
+        self.slots[lane] = f32::from_bits(hit.slot);
     }
 
     #[inline(always)]
-    fn visit_each(&mut self, tree: &S::Tree, block_idx: u32, mut lanes: u32) {
-        // Decoded once if all rays start in one place.
-        let seen = match self.packet.common_origin {
-            Some(origin) => Some(S::seen_from::<L>(tree, block_idx, origin)),
-            None => None,
-        };
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % WIDE;
-            lanes &= lanes - 1;
-            match &seen {
-                Some(seen) => self.meet(seen, block_idx, lane),
-                None => self.visit_alone(tree, block_idx, lane),
+    fn visit_each(&mut self, tree: &S::Tree, blocks: &[(u32, u32)]) {
+        let apart = self.apart.get_or_insert(HitsApart::NONE);
+        for &(block_idx, mut lanes) in blocks {
+            // Decoded once if all rays start in one place.
+            let seen = match self.packet.common_origin {
+                Some(origin) => Some(S::seen_from::<L>(tree, block_idx, origin)),
+                None => None,
+            };
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize % WIDE;
+                lanes &= lanes - 1;
+                let ray = &self.packet.rays[lane];
+                let hits = match &seen {
+                    Some(seen) => S::hits(seen, block_idx, ray),
+                    None => S::hits(&S::seen_from(tree, block_idx, ray.origin), block_idx, ray),
+                };
+                apart.add(&hits, lane);
             }
         }
+        let least: L::Wide = apart.least();
+        let (distances, slots) = (L::Wide::load(&self.distances), L::Wide::load(&self.slots));
+        let slots = L::Wide::select(least.less(distances), L::Wide::splat(NO_SLOT), slots);
+        self.slots = slots.store();
+        self.distances = least.min(distances).store();
     }
+}
+
+#[inline(always)]
+fn try_lane<L: Lanes, S: Leaf>(
+    block: &S::BeforePacket<L>,
+    lines: &S::Lines<L::Wide>,
+    lane: usize,
+    first_slot: u32,
+    nearest: &mut NearestHits<L::Wide>,
+) {
+    let slot = L::Wide::splat(f32::from_bits(first_slot + lane as u32));
+    let (distance, mask) = block.intersect(lines, lane);
+    nearest.take(mask, distance, slot);
 }

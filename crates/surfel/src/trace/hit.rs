@@ -1,6 +1,7 @@
 //! What the searches find.
 
 use crate::flat::Slot;
+use crate::math::Floats;
 use crate::surface::MAX_GATHERED;
 
 /// The nearest shape on a ray: the one in the lower slot where two are equally near.
@@ -35,6 +36,25 @@ impl Hit {
     #[inline(always)]
     pub(super) fn key(&self) -> u64 {
         u64::from(self.distance.to_bits()) << 32 | u64::from(self.slot)
+    }
+}
+
+/// The nearest hits in lanes: of sixteen rays, or of one ray in each lane of its blocks.
+#[derive(Clone, Copy)]
+pub(super) struct NearestHits<F> {
+    pub distances: F,
+    /// As bits.
+    pub slots: F,
+}
+
+impl<F: Floats> NearestHits<F> {
+    /// Takes what is nearer among `lanes`, or as near and in a lower slot.
+    #[inline(always)]
+    pub fn take(&mut self, lanes: F::Mask, distances: F, slots: F) {
+        let is_first = distances.less(self.distances) | slots.less_bits(self.slots);
+        let nearer = lanes & distances.less_equal(self.distances) & is_first;
+        self.distances = F::select(nearer, distances, self.distances);
+        self.slots = F::select(nearer, slots, self.slots);
     }
 }
 

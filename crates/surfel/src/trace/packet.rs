@@ -51,12 +51,14 @@ pub trait PacketVisitor<L: Lanes> {
     /// Shows the block to the ray in this lane alone.
     fn visit_alone(&mut self, tree: &Self::Tree, block_idx: u32, lane: usize);
 
-    /// Shows the block to each of the rays in these lanes alone.
+    /// Shows blocks, each to some lanes' rays alone.
     #[inline(always)]
-    fn visit_each(&mut self, tree: &Self::Tree, block_idx: u32, mut lanes: u32) {
-        while lanes != 0 {
-            self.visit_alone(tree, block_idx, lanes.trailing_zeros() as usize % WIDE);
-            lanes &= lanes - 1;
+    fn visit_each(&mut self, tree: &Self::Tree, blocks: &[(u32, u32)]) {
+        for &(block_idx, mut lanes) in blocks {
+            while lanes != 0 {
+                self.visit_alone(tree, block_idx, lanes.trailing_zeros() as usize % WIDE);
+                lanes &= lanes - 1;
+            }
         }
     }
 }
