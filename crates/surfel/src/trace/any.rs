@@ -212,7 +212,7 @@ impl<L: Lanes, S: Leaf, J: Judge> AnyInPacket<'_, L, S, J> {
 impl<L: Lanes, S: Leaf, J: Judge> PacketVisitor<L> for AnyInPacket<'_, L, S, J> {
     type Tree = S::Tree;
     const IS_ORDERED: bool = false;
-    const MAY_BE_SPARSE: bool = false;
+    const FEW_RAYS: f32 = 0.0;
 
     #[inline(always)]
     fn limits(&self) -> &[f32; WIDE] {

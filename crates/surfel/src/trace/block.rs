@@ -18,6 +18,8 @@ pub trait Leaf {
     type BeforePacket<L: Lanes>: BeforePacket<L, Lines = Self::Lines<L::Wide>>;
     /// Eight shapes as rays from one place meet them.
     type Seen<L: Lanes>;
+    /// Blocks that fewer rays of a packet enter, on average, are quicker shown to these alone.
+    const FEW_RAYS: f32;
 
     fn lines<W: Wide>(rays: &WideRays<W>) -> Self::Lines<W>;
 
@@ -126,6 +128,9 @@ impl<S: Shape> Leaf for S {
     type Lines<W: Wide> = RayLanes<W>;
     type BeforePacket<L: Lanes> = PointsBeforePacket<L, S>;
     type Seen<L: Lanes> = PointLanes<L>;
+    /// Between 9 and 13 it hardly makes a difference where many points lie behind a pixel; more than 9 are
+    /// slower in small clouds.
+    const FEW_RAYS: f32 = 9.0;
 
     #[inline(always)]
     fn lines<W: Wide>(rays: &WideRays<W>) -> RayLanes<W> {
@@ -208,6 +213,8 @@ impl Leaf for Triangle {
     type Lines<W: Wide> = LineLanes<W>;
     type BeforePacket<L: Lanes> = TrianglesBeforePacket<L>;
     type Seen<L: Lanes> = TrianglesSeen<Vec3Lanes<L>, L>;
+    /// With 9, a million triangles take an eighth longer.
+    const FEW_RAYS: f32 = 4.0;
 
     #[inline(always)]
     fn lines<W: Wide>(rays: &WideRays<W>) -> LineLanes<W> {

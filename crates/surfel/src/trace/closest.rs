@@ -121,7 +121,7 @@ struct ClosestInPacket<'p, L: Lanes, S: Leaf> {
     packet: &'p Packet<'p, L::Wide>,
     lines: S::Lines<L::Wide>,
     distances: [f32; WIDE],
-    /// As bits; none where `apart` has what is at that distance.
+    /// As bits; none for a ray whose nearest is in `apart`.
     slots: [f32; WIDE],
     apart: Option<HitsApart>,
 }
@@ -179,7 +179,7 @@ impl<L: Lanes, S: Leaf> ClosestInPacket<'_, L, S> {
 impl<L: Lanes, S: Leaf> PacketVisitor<L> for ClosestInPacket<'_, L, S> {
     type Tree = S::Tree;
     const IS_ORDERED: bool = true;
-    const MAY_BE_SPARSE: bool = true;
+    const FEW_RAYS: f32 = S::FEW_RAYS;
 
     #[inline(always)]
     fn limits(&self) -> &[f32; WIDE] {

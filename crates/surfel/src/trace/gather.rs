@@ -128,7 +128,7 @@ struct GatherInPacket<'p, L: Lanes> {
 impl<L: Lanes> PacketVisitor<L> for GatherInPacket<'_, L> {
     type Tree = FlatPoints;
     const IS_ORDERED: bool = true;
-    const MAY_BE_SPARSE: bool = false;
+    const FEW_RAYS: f32 = 0.0;
 
     #[inline(always)]
     fn limits(&self) -> &[f32; WIDE] {

@@ -40,8 +40,9 @@ pub trait PacketVisitor<L: Lanes> {
     type Tree: BlockTree;
     /// Whether near boxes come first.
     const IS_ORDERED: bool;
-    /// Whether blocks that few rays enter may be shown to these alone, a node's all at once (`sparse`).
-    const MAY_BE_SPARSE: bool;
+    /// Blocks that fewer rays enter, on average, are shown to these alone, a node's all at once (`sparse`); none
+    /// of them if this is 0.
+    const FEW_RAYS: f32;
 
     /// A box entered beyond this is left out; below any distance where the ray needs nothing more.
     fn limits(&self) -> &[f32; WIDE];
@@ -355,7 +356,10 @@ pub fn along_packet<L: Lanes, V: PacketVisitor<L>>(
                 }
                 let node = &tree.nodes()[node_idx as usize];
                 let met = Met::<L>::new(node, &packet.frustum, limit);
-                if V::MAY_BE_SPARSE && node.has_only_blocks() && stack.density.is_low() {
+                if 0.0 < V::FEW_RAYS
+                    && node.has_only_blocks()
+                    && stack.density.is_below(V::FEW_RAYS)
+                {
                     let density = &mut stack.density;
                     sparse::show_each::<L, V>(tree, &met, packet, lanes, &memory, density, visitor);
                     is_limit_old = true;
@@ -369,7 +373,7 @@ pub fn along_packet<L: Lanes, V: PacketVisitor<L>>(
                 } else {
                     visitor.visit(tree, block_idx);
                 }
-                if V::MAY_BE_SPARSE {
+                if 0.0 < V::FEW_RAYS {
                     stack.density.add(lanes.count_ones(), 1);
                 }
                 if V::IS_ORDERED {

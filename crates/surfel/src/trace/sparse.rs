@@ -10,9 +10,6 @@ use super::packet::{Met, Packet, PacketVisitor};
 use crate::bvh::Child;
 use crate::math::{LANES, Lanes};
 
-/// Up to as many rays, on average, are quicker shown a block one by one. Between 9 and 13 it hardly makes a
-/// difference where many points lie behind a pixel; more than 9 are slower in small clouds.
-const FEW: f32 = 9.0;
 /// Blocks after which those before count half.
 const LONG_AGO: u32 = 256;
 
@@ -44,8 +41,8 @@ impl Density {
     /// Not before the first block: in crowds, the blocks of one node shown to each ray cost as much as a
     /// whole packet.
     #[inline(always)]
-    pub fn is_low(&self) -> bool {
-        (self.n_rays as f32) < FEW * self.n_blocks as f32
+    pub fn is_below(&self, n_rays: f32) -> bool {
+        (self.n_rays as f32) < n_rays * self.n_blocks as f32
     }
 }
 
