@@ -1,6 +1,7 @@
 //! Repairs of meshes that are wrong in places: the rest of them shall be seen.
 
 use surfel::math::{DVec3, Vec3};
+use surfel::points;
 use surfel::scene::Mesh;
 
 /// Triangles that were left out.
@@ -17,7 +18,7 @@ pub(crate) struct Dropped {
 pub(crate) fn drop_unusable(mesh: &mut Mesh) -> Dropped {
     let is_somewhere = |i: usize| {
         let at = [mesh.positions[i]].into_iter();
-        at.chain(mesh.morphs.iter().map(|morph| morph.positions[i])).all(Vec3::is_finite)
+        at.chain(mesh.morphs.iter().map(|morph| morph.positions[i])).all(points::is_somewhere)
     };
     let is_lost: Vec<bool> = (0..mesh.positions.len()).map(|i| !is_somewhere(i)).collect();
     // What bends may have an area at another time.
@@ -97,6 +98,10 @@ mod tests {
         assert_eq!(drop_unusable(&mut mesh), Dropped { n_flat: 0, n_lost: 1 });
         assert_eq!(mesh.triangles, [[0, 2, 3]]);
         assert!(mesh.positions.iter().all(|position| position.is_finite()));
+        // As files write where nothing was measured.
+        let mut mesh = Mesh { triangles: square().triangles, ..mesh };
+        mesh.positions[1] = Vec3::splat(1e30);
+        assert_eq!(drop_unusable(&mut mesh), Dropped { n_flat: 0, n_lost: 1 });
         let lost = vec![Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, Vec3::INFINITY];
         mesh.morphs = vec![Morph { positions: lost, ..Morph::default() }];
         assert_eq!(drop_unusable(&mut mesh).n_lost, 1);

@@ -57,7 +57,7 @@ pub(crate) fn finish(
 fn words(dropped: Dropped, n_short: u64) -> String {
     let kinds = [
         (dropped.n_flat, "without an area"),
-        (dropped.n_lost, "with a corner that is not finite"),
+        (dropped.n_lost, "with a corner that is not finite or beyond 1e15"),
         (n_short, "of fewer than three corners"),
     ];
     let there = kinds.iter().filter(|(count, _)| 0 < *count);

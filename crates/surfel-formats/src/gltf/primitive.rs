@@ -139,7 +139,9 @@ fn read_mesh(vertices: &Vertices, triangles: Vec<[u32; 3]>) -> Result<Option<Mes
     // Those without an area are left out untold: programs write many, and nobody misses them.
     let n_lost = drop_unusable(&mut mesh).n_lost;
     if 0 < n_lost {
-        let line = format!("{n_lost} triangles with a corner that is not finite are left out");
+        let line = format!(
+            "{n_lost} triangles with a corner that is not finite or beyond 1e15 are left out"
+        );
         vertices.document.note(line);
     }
     let n_mended = mend_normals(&mut mesh);

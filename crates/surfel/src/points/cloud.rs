@@ -7,8 +7,8 @@ use crate::math::{Aabb, DVec3, Vec3};
 /// a measurement by such numbers.
 const NOWHERE: f32 = 1e15;
 
-/// Whether something may be there.
-pub(crate) fn is_somewhere(position: Vec3) -> bool {
+/// Whether something may be there: neither NaN nor farther away than anything is measured.
+pub fn is_somewhere(position: Vec3) -> bool {
     position.abs().cmplt(Vec3::splat(NOWHERE)).all()
 }
 

@@ -14,8 +14,7 @@ mod up;
 
 pub use bend::{Morph, Skin};
 pub use clean::{CleanReport, clean};
-pub(crate) use cloud::is_somewhere;
-pub use cloud::{PointCloud, Scalar, Values};
+pub use cloud::{PointCloud, Scalar, Values, is_somewhere};
 pub use merge::merge;
 pub use normals::{NormalReport, PlaneFit, fill_missing, fit_plane};
 pub use orient::{Orientation, orient};
