@@ -96,12 +96,6 @@ impl Node {
         self.n_child_nodes() == 0
     }
 
-    /// Index of the block in lane 0, if there are only blocks; the others follow it in the next lanes.
-    #[inline(always)]
-    pub fn first_block(&self) -> u32 {
-        self.lane_zero_as_block & !Child::BLOCK_BIT
-    }
-
     /// What stands in `lane`, if anything.
     #[inline(always)]
     pub fn child(&self, lane: usize) -> Option<Child> {

@@ -275,18 +275,22 @@ impl<R: Borrow<ChildRows>> MetChildren<R> {
 pub struct PacketStack {
     boxes: [ChildBox; STACK_SIZE + MOST_STARTS],
     size: usize,
+    /// The node whose children have been asked for ahead of time, packed.
+    asked: Option<u32>,
     density: Density,
 }
 
 impl PacketStack {
     pub fn new() -> Self {
-        Self { boxes: [ChildBox::ROOT; STACK_SIZE + MOST_STARTS], size: 0, density: Density::new() }
+        let boxes = [ChildBox::ROOT; STACK_SIZE + MOST_STARTS];
+        Self { boxes, size: 0, asked: None, density: Density::new() }
     }
 
     /// Begins with what the packet's frustum meets of its starts, or with the root.
     #[inline(always)]
     fn start<L: Lanes>(&mut self, packet: &Packet<L::Wide>, limit: f32) {
         self.density.forget_old();
+        self.asked = None;
         self.boxes[0] = ChildBox::ROOT;
         self.size = 1;
         let Some(starts) = packet.starts else { return };
@@ -305,6 +309,20 @@ impl PacketStack {
     fn pop(&mut self) -> Option<ChildBox> {
         self.size = self.size.checked_sub(1)?;
         Some(self.boxes[self.size])
+    }
+
+    /// Asks for the children of the node that is looked at next, if it is one: they take longer to come than
+    /// the node before it takes to look at.
+    #[inline(always)]
+    fn ask_ahead<L: Lanes>(&mut self, nodes: &[Node], memory: &Memory, limit: f32) {
+        let Some(next) = self.boxes[..self.size].last() else { return };
+        if let Child::Node(node_idx) = Child::unpack(next.child)
+            && next.entry <= limit
+        {
+            let node = &nodes[node_idx as usize];
+            memory.prefetch_children::<L>(node, node.occupied());
+            self.asked = Some(next.child);
+        }
     }
 
     /// Pushes children and asks for their memory.
@@ -354,14 +372,20 @@ pub fn along_packet<L: Lanes, V: PacketVisitor<L>>(
                     limit = packet.frustum.limit(&packet.wide, visitor.limits());
                     is_limit_old = false;
                 }
+                let is_asked = stack.asked == Some(next.child);
+                stack.ask_ahead::<L>(tree.nodes(), &memory, limit);
                 let node = &tree.nodes()[node_idx as usize];
                 let met = Met::<L>::new(node, &packet.frustum, limit);
                 if 0.0 < V::FEW_RAYS
                     && node.has_only_blocks()
                     && stack.density.is_below(V::FEW_RAYS)
                 {
+                    // Before it is known which rays enter: until then the memory is on its way.
+                    if !is_asked {
+                        memory.prefetch_children::<L>(node, met.lanes);
+                    }
                     let density = &mut stack.density;
-                    sparse::show_each::<L, V>(tree, &met, packet, lanes, &memory, density, visitor);
+                    sparse::show_each::<L, V>(tree, &met, packet, lanes, density, visitor);
                     is_limit_old = true;
                 } else {
                     stack.push(&met, &memory, V::IS_ORDERED);

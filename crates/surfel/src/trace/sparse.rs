@@ -5,7 +5,6 @@
 //! which ray enters which block. Rays that look for any hit go without, and those that gather: they were a
 //! tenth slower.
 
-use super::memory::Memory;
 use super::packet::{Met, Packet, PacketVisitor};
 use crate::bvh::Child;
 use crate::math::{LANES, Lanes};
@@ -53,16 +52,9 @@ pub fn show_each<L: Lanes, V: PacketVisitor<L>>(
     met: &Met<L>,
     packet: &Packet<L::Wide>,
     rays: u32,
-    memory: &Memory,
     density: &mut Density,
     visitor: &mut V,
 ) {
-    // Before it is known which rays enter: until then the memory is on its way.
-    let (first_block, mut blocks) = (met.node.first_block(), met.lanes);
-    while blocks != 0 {
-        memory.prefetch::<L>(Child::Block(first_block + blocks.trailing_zeros()).pack());
-        blocks &= blocks - 1;
-    }
     // All of them before the first block, so that no branch waits for a hit: limits asked for in between cost
     // all that is gained.
     let mut children = met.children();
