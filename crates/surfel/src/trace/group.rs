@@ -5,6 +5,7 @@
 //! nodes about as wide as itself, and the search of each packet begins with these.
 
 use super::frustum::{self, Anchor, Frustum};
+use super::memory::Memory;
 use super::packet::{ChildBox, ChildRows, Met, Packet, WideRays};
 use crate::bvh::{Child, Node};
 use crate::flat::BlockTree;
@@ -45,12 +46,11 @@ impl<W: Wide> Group<W> {
         for rays in rays.chunks(WIDE) {
             self.wide.push(WideRays::new(rays));
         }
-        let nodes = tree.nodes();
         let Some(anchor) = Anchor::new(&rays[0], &self.wide, self.ends_meet) else { return };
-        let Some(frustum) = Frustum::new(&nodes[0], &anchor, &self.wide) else { return };
+        let Some(frustum) = Frustum::new(&tree.nodes()[0], &anchor, &self.wide) else { return };
         self.anchor = Some(anchor);
         let mut starts = Starts::at_root();
-        starts.go_down::<L>(nodes, &frustum);
+        starts.go_down::<L, T>(tree, &frustum);
         if !self.ends_meet {
             starts.sort();
         }
@@ -101,14 +101,15 @@ impl Starts {
     /// Puts in the place of the root, and of nodes wider than the frustum, those of their children that it
     /// meets.
     #[inline(always)]
-    fn go_down<L: Lanes>(&mut self, nodes: &[Node], frustum: &Frustum) {
-        self.open::<L>(0, &nodes[0], frustum);
+    fn go_down<L: Lanes, T: BlockTree>(&mut self, tree: &T, frustum: &Frustum) {
+        let (nodes, memory) = (tree.nodes(), Memory::new(tree));
+        self.open::<L>(0, &nodes[0], frustum, &memory);
         let mut place = 0;
         while place < self.n && self.n + LANES <= MOST_STARTS {
             let next = &self.boxes[place];
             match Child::unpack(next.child) {
                 Child::Node(node_idx) if frustum.is_narrower(&next.min, &next.max) => {
-                    self.open::<L>(place, &nodes[node_idx as usize], frustum);
+                    self.open::<L>(place, &nodes[node_idx as usize], frustum, &memory);
                 }
                 _ => place += 1,
             }
@@ -116,11 +117,12 @@ impl Starts {
     }
 
     #[inline(always)]
-    fn open<L: Lanes>(&mut self, place: usize, node: &Node, frustum: &Frustum) {
+    fn open<L: Lanes>(&mut self, place: usize, node: &Node, frustum: &Frustum, memory: &Memory) {
         self.n -= 1;
         self.boxes[place] = self.boxes[self.n];
         let mut children = Met::<L>::new(node, frustum, frustum.reach()).children();
         while let Some(child) = children.next() {
+            memory.prefetch::<L>(child.child);
             self.boxes[self.n] = child;
             self.n += 1;
         }
