@@ -7,7 +7,7 @@ use super::Stage;
 use super::camera_file::CameraFile;
 use std::f32::consts::TAU;
 use surfel::flat::FlatGeometry;
-use surfel::math::{DVec3, Ray, Vec3};
+use surfel::math::{DVec3, Ray, Vec3, morton_place};
 use surfel::trace::Hit;
 
 /// Pixels along the side of a tile.
@@ -43,17 +43,11 @@ pub fn bounce_rays(stage: &Stage, rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
 fn pixels((width, height): (u32, u32)) -> impl Iterator<Item = (u32, u32)> {
     let corners = |size: u32| (0..size).step_by(TILE as usize);
     let tiles = corners(height).flat_map(move |y| corners(width).map(move |x| (x, y)));
-    let in_tile = |place: u32| (even_bits(place), even_bits(place >> 1));
     tiles
         .flat_map(move |(x, y)| {
-            (0..TILE * TILE).map(in_tile).map(move |(column, row)| (x + column, y + row))
+            (0..TILE * TILE).map(morton_place).map(move |(column, row)| (x + column, y + row))
         })
         .filter(move |&(x, y)| x < width && y < height)
-}
-
-/// Bits 0, 2, 4 and 6 side by side.
-fn even_bits(place: u32) -> u32 {
-    (0..4).map(|bit| (place >> (2 * bit) & 1) << bit).sum()
 }
 
 /// A camera relative to a stage's origin.

@@ -5,6 +5,7 @@ mod distribution;
 mod eigen;
 mod frame;
 mod lanes;
+mod morton;
 mod pair;
 mod portable;
 mod random;
@@ -19,6 +20,7 @@ pub use glam::{
     Affine3A, DAffine3, DMat3, DQuat, DVec2, DVec3, Mat3, Quat, Vec2, Vec3, Vec3A, Vec4,
 };
 pub use lanes::{Floats, LANES, LaneMask, Lanes, TO_INTEGER, Task, Vec3Lanes, WIDE, Wide};
+pub use morton::morton_place;
 pub use pair::Pair;
 pub use portable::{PortableLanes, PortableMask};
 pub use random::{Random, hash};

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::flat::FlatScene;
 use crate::image::{Band, Image};
 use crate::integrator::{self, Batch, Integrator, RayCounts, Samples, Whitted};
-use crate::math::{Ray, Vec3, Vec4, hash, scrambled_pair};
+use crate::math::{Ray, Vec3, Vec4, hash, morton_place, scrambled_pair};
 use crate::progress::Progress;
 use crate::scene::View;
 use crate::trace::{SceneHit, Simd, Tracer, Which};
@@ -20,8 +20,6 @@ pub struct CpuRenderer {
 
 /// Pixels along a tile's side.
 const TILE: u32 = 32;
-/// Pixels along the side of a cell, whose rays make a packet.
-const CELL: u32 = 4;
 /// Rays of a batch, about: enough to fill tiles of few samples, little enough for the caches.
 const BATCH: u32 = 4096;
 
@@ -113,15 +111,10 @@ impl TilePlace {
         (self.width * self.height) as usize
     }
 
-    /// Coordinates in the picture of the tile's pixels: cell by cell, as rays of a packet should be close.
+    /// Coordinates in the picture of the tile's pixels, in Morton order: rays of a packet should be close, and
+    /// packets of a group.
     fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
-        const CELLS: u32 = TILE / CELL;
-        let place = |i: u32| {
-            let (cell, pixel) = (i / CELL.pow(2), i % CELL.pow(2));
-            let (cell_x, cell_y) = (cell % CELLS, cell / CELLS);
-            (cell_x * CELL + pixel % CELL, cell_y * CELL + pixel / CELL)
-        };
-        let places = (0..TILE.pow(2)).map(place);
+        let places = (0..TILE.pow(2)).map(morton_place);
         let places = places.filter(move |&(x, y)| x < self.width && y < self.height);
         places.map(move |(x, y)| (self.x + x, self.y + y))
     }
