@@ -1,4 +1,4 @@
-//! Boxes, rays, frames, sampling maps, weighted draws, eigenvectors and counter-based random numbers.
+//! Boxes, rays, frames, Morton order, sampling maps, weighted draws, eigenvectors and counter-based random numbers.
 
 mod aabb;
 mod distribution;
