@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Everything that must hold: formatting, lints, tests, doc tests, the viewer's page in a browser, licences,
-# each benchmark once.
-# Ends with a line "N passed, N failed, N skipped"; fails if anything failed.
+# Runs every check: formatting, lints, tests, doc tests, tests of the viewer's page and in a browser, licences, and
+# each benchmark once. Prints the time of each step and ends with a line "N passed, N failed, N skipped"; the exit
+# status is 0 if nothing failed.
 set -uo pipefail
 cd "$(dirname "$0")" || exit 1
 
@@ -11,24 +11,30 @@ skipped=0
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 
-# Runs a command as one check.
+# Prints the name of a step, and the time that the step before took.
+begin() {
+    [ -z "${step:-}" ] || echo "-- $step: $((SECONDS - step_start)) s"
+    step=$1
+    step_start=$SECONDS
+    [ -z "$step" ] || echo "== $step"
+}
+
+# Runs a command that counts as one check.
 check() {
-    local name=$1
+    begin "$1"
     shift
-    echo "== $name"
     if "$@"; then
         passed=$((passed + 1))
     else
-        echo "FAILED: $name"
+        echo "FAILED: $step"
         failed=$((failed + 1))
     fi
 }
 
-# Runs cargo test and counts its tests; one that does not even build counts as a failure.
+# Runs cargo test and counts its tests. A build that fails counts as one failure.
 tests() {
-    local name=$1
+    begin "$1"
     shift
-    echo "== $name"
     if ! "$@" 2>&1 | tee "$log"; then
         grep -q '^test result: FAILED' "$log" || failed=$((failed + 1))
     fi
@@ -36,18 +42,17 @@ tests() {
         passed=$((passed + ok))
         failed=$((failed + bad))
     done < <(sed -nE 's/^test result: [a-zA-Z]+\. ([0-9]+) passed; ([0-9]+) failed;.*/\1 \2/p' "$log")
-    # Tests that lack what they need pass, and say so; they count as skipped instead.
-    local silent
-    silent=$(grep -c '^skipped: ' "$log")
-    passed=$((passed - silent))
-    skipped=$((skipped + silent))
+    # A test whose data or program is absent prints "skipped: " and passes; it counts as skipped.
+    local absent
+    absent=$(grep -c '^skipped: ' "$log")
+    passed=$((passed - absent))
+    skipped=$((skipped + absent))
 }
 
-# Runs node's tests and counts them; a file that does not even start counts as a failure.
+# Runs tests of Node.js and counts them. A file that fails to start counts as one failure.
 page_tests() {
-    local name=$1
+    begin "$1"
     shift
-    echo "== $name"
     node --test --test-reporter=tap "$@" 2>&1 | tee "$log" | grep -E '^(not )?ok |^ +error:|^# (tests|duration)'
     local ok bad left_out
     ok=$(sed -nE 's/^# pass ([0-9]+)$/\1/p' "$log")
@@ -58,8 +63,8 @@ page_tests() {
     skipped=$((skipped + ${left_out:-0}))
 }
 
-# Looks for the browser (CHROMIUM, if it is set) and for what drives it, which goes into a folder outside the
-# repository; `missing` tells what cannot be had.
+# Finds the browser (CHROMIUM if it is set) and playwright-core, which drives it and is installed outside of the
+# repository. Fails with a reason in `missing` if one of them is unavailable.
 prepare_browser() {
     export PLAYWRIGHT=${PLAYWRIGHT:-${XDG_CACHE_HOME:-${HOME:-/tmp}/.cache}/surfel-playwright}
     export CHROMIUM=${CHROMIUM:-chromium}
@@ -75,6 +80,7 @@ prepare_browser() {
     npm install --silent --no-audit --no-fund --prefix "$PLAYWRIGHT" playwright-core >"$log" 2>&1
 }
 
+# Counts a check that cannot run, and prints why.
 skip() {
     echo "skipped: $1"
     skipped=$((skipped + 1))
@@ -93,11 +99,11 @@ check "formatting" cargo fmt --all --check
 check "lints" cargo clippy --workspace --all-targets -- -D warnings
 tests "tests" cargo test --workspace --lib --bins --tests --no-fail-fast -- --show-output
 tests "doc tests" cargo test --workspace --doc --no-fail-fast
-# `import.meta.dirname` came with 20.11.
+# The page's tests use `import.meta.dirname`, which Node.js has since 20.11.
 if node -e 'const [a, b] = process.versions.node.split("."); process.exit(+a < 20 || (+a === 20 && +b < 11) ? 1 : 0)' 2>/dev/null; then
     page_tests "page" crates/surfel-web/page-tests/*.test.mjs
     if prepare_browser; then
-        # With the program that the tests above have built.
+        # The browser tests use the program that the Rust tests have built.
         page_tests "browser" --test-concurrency=1 crates/surfel-web/browser-tests/*.test.mjs
     else
         skip "tests in a browser: $missing"
@@ -110,8 +116,9 @@ if cargo deny --version >/dev/null 2>&1; then
 else
     skip "cargo deny is not installed (cargo install cargo-deny)"
 fi
-# Under cargo test, Criterion runs each benchmark once, untimed.
-check "benchmarks, once" cargo test --workspace --bench '*'
+# In test mode Criterion runs each benchmark once without timing it; 100,000 points are enough for that.
+check "benchmarks, once" env POINTS=100000 cargo test --workspace --bench '*'
+begin ""
 
 echo "$passed passed, $failed failed, $skipped skipped"
 [ "$failed" -eq 0 ]

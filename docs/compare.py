@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
-"""Runs `surfel bench` and the same on Embree in turn and prints the ratios as a table.
+"""Compares `surfel bench` with a program on Embree that traces the same rays, and prints a table.
 
   compare.py SURFEL EMBREE_POINTS CLOUD.bin... [--rounds 7] [--surfaces disc,sphere]
   compare.py SURFEL EMBREE_TRIANGLES MESH.ply... [--rounds 7] [--surfaces triangle,triangle-robust]
 
-Beside NAME.bin or NAME.ply lies NAME.cam, and beside a mesh also NAME.tri, the same for Embree. Both programs
-trace the same rays, on one thread and on two; rates are million rays a second of processor time over threads.
-In each round every program runs once, in turn. Embree counts with the better of single rays and packets of 16,
-and on points of its two set-ups, for each kind of ray; triangles without and with its flag for robust scenes.
-Printed are the medians over the rounds and that of the ratios; in brackets the least and the greatest. Last
-stands the ratio of the best rates of either program: on a machine that others slow down at times, what it would
-be on a quiet one.
+Each file NAME.bin or NAME.ply needs a camera NAME.cam in its folder; each mesh needs NAME.tri, too, which holds
+the mesh for Embree. Both programs run on one thread and on two. In each round every program runs once, in turn.
+Rates are million rays a second: rays over the processor time of the process divided by its threads. For each
+kind of ray Embree counts with the better of single rays and packets of 16, and for points with the better of its
+own geometry and user geometry. The surface `triangle-robust` sets Embree's flag for robust scenes.
+
+The table has the median rates of both programs over the rounds, the median of the ratios with their least and
+greatest, and the ratio of the best rates. On a machine that is slowed down by others at times, the last column
+shows what the ratio would be on a quiet one.
 """
 import argparse, json, re, statistics, subprocess, sys
 from pathlib import Path
@@ -30,7 +32,7 @@ def run(command):
 
 
 def embree_points(program, cloud, surface):
-    """The best rate of each kind over both set-ups, by threads and kind."""
+    """Returns the best rate over both set-ups of Embree, by number of threads and kind of ray."""
     camera = cloud.with_suffix(".cam").read_text().strip()
     rates = {}
     for mode in ["disc", "multi"] if surface == "disc" else [surface]:
@@ -64,7 +66,7 @@ def surfel(program, file, surface):
 
 
 def by_threads(command):
-    """What both programs print as JSON, by threads and kind."""
+    """Returns the rates that a program prints as JSON, by number of threads and kind of ray."""
     rates = {}
     for threads in THREADS:
         result = json.loads(run([*command, "--threads", threads, "--runs", 1]))
@@ -82,7 +84,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--surfaces")
     args = parser.parse_args()
-    print("| file | surface | threads | rays | surfel | Embree | ratio | of the best |\n|---|---|---|---|---|---|---|---|")
+    print("| file | surface | threads | rays | surfel | Embree | ratio | ratio of the best |\n|---|---|---|---|---|---|---|---|")
     for file in args.files:
         usual = "disc,sphere" if file.suffix == ".bin" else "triangle,triangle-robust"
         for surface in (args.surfaces or usual).split(","):
@@ -98,10 +100,10 @@ def compare(args, file, surface):
     for threads, kind in sorted(ours):
         found, other = ours[threads, kind], theirs[threads, kind]
         ratios = [b / a if kind == BUILD else a / b for a, b in zip(found, other)]
-        middle = statistics.median
+        median = statistics.median
         best = min(other) / min(found) if kind == BUILD else max(found) / max(other)
-        print(f"| {file.stem} | {surface} | {threads} | {kind} | {middle(found):.3g} | {middle(other):.3g} "
-              f"| {middle(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f}) | {best:.2f} |", flush=True)
+        print(f"| {file.stem} | {surface} | {threads} | {kind} | {median(found):.3g} | {median(other):.3g} "
+              f"| {median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f}) | {best:.2f} |", flush=True)
 
 
 def add(rounds_rates, rates):

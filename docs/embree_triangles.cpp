@@ -1,14 +1,15 @@
-// Traces the rays of `surfel bench` through a triangle mesh with Embree 4, to compare both.
+// Traces the rays of `surfel bench` through a triangle mesh with Embree 4, so that both can be compared.
 //
 //   embree_triangles MESH.tri CAMERA.cam [--threads 1] [--runs 7] [--rays primary,shadow,bounce-any,bounce]
 //                    [--width 1,16] [--quality low|medium|high] [--robust]
 //
-// MESH.tri: little-endian u32 number of vertices, u32 number of triangles, then x y z of each vertex as f32 and
-// three vertices of each triangle as u32. CAMERA.cam: one line, as for `surfel bench --camera-file`. Rays are
-// traced singly and in packets (--width: 1, 4, 8, 16), and of each kind the fastest width counts.
+// MESH.tri holds little-endian numbers: the number of vertices and the number of triangles as u32, then x y z of
+// each vertex as f32 and the three vertices of each triangle as u32. CAMERA.cam holds one line, the same as for
+// `surfel bench --camera-file`. Rays are traced singly and in packets (--width: 1, 4, 8, 16), and for each kind of
+// ray the fastest width counts.
 //
-// Prints JSON with the names of `surfel bench --json`. Rays, order and formulas are those of surfel, in f32:
-// compile without fused multiply-add, so that they are the same to the last bit.
+// The program prints JSON with the names of `surfel bench --json`. Rays, their order and the formulas are those of
+// surfel, in f32. Compile without fused multiply-add, so that the rays are equal to the last bit.
 //
 //   g++ -std=c++17 -O3 -march=native -ffp-contract=off embree_triangles.cpp -o embree_triangles -lembree4 -pthread
 #include <algorithm>
@@ -29,7 +30,8 @@
 #include <vector>
 #include <xmmintrin.h>
 
-// What is used of Embree's C interface, declared here because Python wheels bring the library without headers.
+// The part of Embree's C interface that is used, declared here because Python wheels ship the library without
+// headers.
 extern "C" {
 typedef struct RTCDeviceTy* RTCDevice;
 typedef struct RTCSceneTy* RTCScene;
@@ -62,7 +64,7 @@ const int VERSION = 0, TRIANGLES = 0, INDICES = 0, VERTICES = 1, UINT3 = 0x5003,
 const int ROBUST = 1 << 2, COHERENT = 1 << 16;
 const unsigned NOTHING = ~0u;
 
-// ---- Places and rays
+// ---- Vectors and rays
 
 struct Vec { float x, y, z; };
 Vec operator+(Vec a, Vec b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
@@ -75,15 +77,15 @@ Vec cross(Vec a, Vec b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, 
 
 struct Ray { Vec origin; float t_min; Vec direction; float t_max; };
 const Ray NO_RAY = {{0, 0, 0}, 0, {0, 0, 1}, -INFINITY};
-const int WIDEST = 16, SIZE = 1024, TILE = 16;
+const int MAX_WIDTH = 16, SIZE = 1024, TILE = 16;
 const size_t CHUNK = 1024;
 
-/// Rays up to a full packet, which makes packing a loop of fixed length.
+/// Rays padded to full packets, so that filling a packet is a loop of fixed length.
 struct Rays {
     std::vector<Ray> padded;
     size_t count;
     explicit Rays(std::vector<Ray> rays) : padded(std::move(rays)), count(padded.size()) {
-        padded.resize((count + WIDEST - 1) / WIDEST * WIDEST, NO_RAY);
+        padded.resize((count + MAX_WIDTH - 1) / MAX_WIDTH * MAX_WIDTH, NO_RAY);
     }
 };
 
@@ -92,7 +94,7 @@ struct Any { bool is_hit; };
 
 // ---- Embree
 
-/// K rays and hits, field by field: the layout of RTCRayHit, RTCRayHit4, RTCRayHit8 and RTCRayHit16.
+/// K rays and hits in the layout of RTCRayHit, RTCRayHit4, RTCRayHit8 and RTCRayHit16.
 template <int K> struct alignas(64) Packet {
     float origin[3][K], t_min[K], direction[3][K], time[K], t_max[K];
     unsigned mask[K], id[K], flags[K];
@@ -126,7 +128,7 @@ template <int K> void keep(const Packet<K>& packet, int lane, Any& found) {
 
 struct Setup { RTCScene scene; int width; bool is_coherent; };
 
-/// Loads, traces and stores `n` rays, a multiple of K.
+/// Traces `n` rays, a multiple of K, and stores their hits.
 template <int K, class Found>
 void trace_chunk(const Setup& setup, const Ray* rays, size_t n, Found* found) {
     RTCIntersectArguments how = {setup.is_coherent ? COHERENT : 0, NOTHING, nullptr, nullptr, nullptr};
@@ -152,7 +154,7 @@ void trace_chunk(const Setup& setup, const Ray* rays, size_t n, Found* found) {
     }
 }
 
-/// All threads claim chunks until none is left.
+/// Traces all rays: each thread claims chunks until none is left.
 template <class Found>
 void trace(const Setup& setup, int n_threads, const Rays& rays, std::vector<Found>& found) {
     const auto chunk = setup.width == 1   ? trace_chunk<1, Found>
@@ -174,27 +176,27 @@ void trace(const Setup& setup, int n_threads, const Rays& rays, std::vector<Foun
 
 // ---- Time
 
-/// Seconds, of the processor by all threads together and of the wall.
-struct Spent { double cpu, wall; };
+/// Seconds of processor time, summed over all threads, and of wall time.
+struct Elapsed { double cpu, wall; };
 
-Spent now() {
+Elapsed now() {
     timespec cpu;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &cpu);
     const auto wall = std::chrono::steady_clock::now().time_since_epoch();
     return {cpu.tv_sec + 1e-9 * cpu.tv_nsec, std::chrono::duration<double>(wall).count()};
 }
 
-Spent timed(const std::function<void()>& work) {
-    const Spent start = now();
+Elapsed timed(const std::function<void()>& work) {
+    const Elapsed start = now();
     work();
-    const Spent end = now();
+    const Elapsed end = now();
     return {end.cpu - start.cpu, end.wall - start.wall};
 }
 
 // ---- Mesh
 
 struct Mesh {
-    std::vector<Vec> vertices; // And one more: Embree reads 16 bytes of the last.
+    std::vector<Vec> vertices; // One more than the mesh has: Embree reads 16 bytes of the last.
     std::vector<std::array<uint32_t, 3>> triangles;
     std::array<Vec, 3> corners(unsigned id) const {
         const auto& [a, b, c] = triangles[id];
@@ -207,7 +209,7 @@ Mesh read_mesh(const std::string& path) {
     if (!file) throw std::runtime_error(path + ": cannot be opened");
     const auto read = [&](void* data, size_t size, size_t count) {
         const bool is_whole = std::fread(data, size, count, file) == count;
-        if (!is_whole) throw std::runtime_error(path + ": ends too early");
+        if (!is_whole) throw std::runtime_error(path + ": the file is truncated");
     };
     uint32_t counts[2];
     read(counts, sizeof counts, 1);
@@ -219,7 +221,7 @@ Mesh read_mesh(const std::string& path) {
     std::fclose(file);
     for (const auto& triangle : mesh.triangles)
         for (const uint32_t vertex : triangle)
-            if (vertex >= counts[0]) throw std::runtime_error(path + ": a triangle without its vertex");
+            if (vertex >= counts[0]) throw std::runtime_error(path + ": a triangle has a vertex that does not exist");
     return mesh;
 }
 
@@ -236,11 +238,11 @@ RTCScene build(RTCDevice device, const Mesh& mesh, int quality, bool is_robust) 
     rtcReleaseGeometry(geometry);
     rtcCommitScene(scene);
     const int error = rtcGetDeviceError(device);
-    if (error) throw std::runtime_error("Embree's error " + std::to_string(error));
+    if (error) throw std::runtime_error("Embree reports error " + std::to_string(error));
     return scene;
 }
 
-// ---- The sets of rays
+// ---- Kinds of rays
 
 struct Camera { Vec eye, target; float view_angle_deg; Vec light; };
 
@@ -249,16 +251,16 @@ Camera read_camera(const std::string& path) {
     if (!file) throw std::runtime_error(path + ": cannot be opened");
     double n[10];
     for (double& number : n)
-        if (std::fscanf(file, "%lf ,", &number) != 1) throw std::runtime_error(path + ": not ten numbers");
+        if (std::fscanf(file, "%lf ,", &number) != 1) throw std::runtime_error(path + ": expected ten numbers");
     std::fclose(file);
     const auto vec = [&](int i) { return Vec{float(n[i]), float(n[i + 1]), float(n[i + 2])}; };
     return {vec(0), vec(3), float(n[6]), vec(7)};
 }
 
-/// Bits 0, 2, 4 and 6 side by side.
-int even_bits(int place) { return (place & 1) | (place >> 1 & 2) | (place >> 2 & 4) | (place >> 3 & 8); }
+/// Returns bits 0, 2, 4 and 6 next to each other: one coordinate of a Morton code.
+int even_bits(int code) { return (code & 1) | (code >> 1 & 2) | (code >> 2 & 4) | (code >> 3 & 8); }
 
-/// Through the centres of all pixels, in tiles row by row, inside a tile in Morton order.
+/// Returns rays through the centres of all pixels: tiles row by row, in Morton order inside a tile.
 Rays camera_rays(const Camera& camera) {
     const float pi = 3.14159265f, size = SIZE;
     const Vec forward = unit(camera.target - camera.eye);
@@ -266,9 +268,9 @@ Rays camera_rays(const Camera& camera) {
     const float half_height = std::tan(camera.view_angle_deg / 2 * (pi / 180));
     std::vector<Ray> rays;
     for (int tile = 0; tile < SIZE / TILE * (SIZE / TILE); tile++) {
-        for (int place = 0; place < TILE * TILE; place++) {
-            const float x = float(tile % (SIZE / TILE) * TILE + even_bits(place));
-            const float y = float(tile / (SIZE / TILE) * TILE + even_bits(place >> 1));
+        for (int code = 0; code < TILE * TILE; code++) {
+            const float x = float(tile % (SIZE / TILE) * TILE + even_bits(code));
+            const float y = float(tile / (SIZE / TILE) * TILE + even_bits(code >> 1));
             const float across = (2 * (x + 0.5f) / size - 1) * half_height * size / size;
             const float along = (1 - 2 * (y + 0.5f) / size) * half_height;
             rays.push_back({camera.eye, 0, unit(forward + right * across + up * along), INFINITY});
@@ -277,7 +279,7 @@ Rays camera_rays(const Camera& camera) {
     return Rays(rays);
 }
 
-/// From 0 up to 1, and the next state: Wellons' `lowbias32` (2018).
+/// Returns a number in [0, 1) and advances the state by Wellons' `lowbias32` (2018).
 float random_number(uint32_t& state) {
     uint32_t x = state + 0x9e3779b9;
     x = (x ^ x >> 16) * 0x7feb352d;
@@ -295,7 +297,7 @@ Vec cosine_direction(Vec normal, uint32_t seed) {
     return unit(tangent * across + bitangent * along + normal * std::sqrt(std::max(1 - height, 0.0f)));
 }
 
-/// Just off what a ray hit, on the side that it came from; `seed` is the index of that ray.
+/// A point just off a hit surface, on the side that the ray came from; `seed` is the index of that ray.
 struct Start { Vec origin, normal; uint32_t seed; };
 
 std::vector<Start> starts(const Mesh& mesh, const Rays& rays, const std::vector<Nearest>& hits) {
@@ -339,7 +341,8 @@ struct Options {
 
 struct Times { int width; double median, best, best_wall; };
 
-/// Of the width with the best median: once untimed, so that all memory is there, then as often as asked for.
+/// Measures each width: one untimed run, which touches all memory, then `n_runs` timed ones. Returns the times of
+/// the width with the best median.
 template <class Found>
 Times measure(const Options& options, Setup setup, const Rays& rays, std::vector<Found>& found) {
     Times fastest = {0, INFINITY, INFINITY, INFINITY};
@@ -351,9 +354,9 @@ Times measure(const Options& options, Setup setup, const Rays& rays, std::vector
         std::vector<double> cpu;
         double best_wall = INFINITY;
         for (int run = 0; run < options.n_runs; run++) {
-            const Spent spent = timed(work);
-            cpu.push_back(spent.cpu / options.n_threads);
-            best_wall = std::min(best_wall, spent.wall);
+            const Elapsed elapsed = timed(work);
+            cpu.push_back(elapsed.cpu / options.n_threads);
+            best_wall = std::min(best_wall, elapsed.wall);
         }
         std::sort(cpu.begin(), cpu.end());
         const double median = cpu[cpu.size() / 2];
@@ -395,17 +398,17 @@ std::string measure_any(const Options& options, Setup setup, const Rays& rays) {
     return json(times, rays.count, std::count_if(found.begin(), found.begin() + rays.count, is_hit));
 }
 
-std::vector<std::string> words(const std::string& list) {
+std::vector<std::string> split_list(const std::string& list) {
     std::vector<std::string> words;
     std::istringstream stream(list);
     for (std::string word; std::getline(stream, word, ',');) words.push_back(word);
     return words;
 }
 
-/// What `known` has under a name.
+/// Returns the value of a name, or throws if the name is unknown.
 template <class Value> Value choose(const std::map<std::string, Value>& known, const std::string& name) {
     const auto found = known.find(name);
-    if (found == known.end()) throw std::runtime_error("`" + name + "` is not known here");
+    if (found == known.end()) throw std::runtime_error("`" + name + "` is unknown");
     return found->second;
 }
 
@@ -416,16 +419,16 @@ Options parse(const std::vector<std::string>& args) {
     for (size_t i = 2; i < args.size(); i++) {
         const std::string& name = args[i];
         if (name == "--robust") { options.is_robust = true; continue; }
-        if (i + 1 == args.size()) throw std::runtime_error(name + ": unknown, or without a value");
+        if (i + 1 == args.size()) throw std::runtime_error(name + ": unknown option, or its value is missing");
         const std::string& value = args[++i];
         if (name == "--threads") options.n_threads = std::max(1, std::stoi(value));
         else if (name == "--runs") options.n_runs = std::max(1, std::stoi(value));
-        else if (name == "--rays") options.kinds = words(value);
+        else if (name == "--rays") options.kinds = split_list(value);
         else if (name == "--quality") options.quality = choose(qualities, value);
         else if (name == "--width") {
             options.widths.clear();
-            for (const std::string& word : words(value)) options.widths.push_back(choose(widths, word));
-        } else throw std::runtime_error(name + ": unknown");
+            for (const std::string& word : split_list(value)) options.widths.push_back(choose(widths, word));
+        } else throw std::runtime_error(name + ": unknown option");
     }
     return options;
 }
@@ -437,18 +440,18 @@ void run(const std::vector<std::string>& args) {
     const RTCDevice device = rtcNewDevice(("threads=" + std::to_string(options.n_threads)).c_str());
 
     RTCScene scene = nullptr;
-    Spent least = {INFINITY, INFINITY};
+    Elapsed least = {INFINITY, INFINITY};
     const size_t n_vertices = mesh.vertices.size() - 1;
     const int n_builds = n_vertices <= 2'000'000 ? 5 : n_vertices <= 20'000'000 ? 2 : 1;
     for (int i = 0; i < n_builds; i++) {
         if (scene) rtcReleaseScene(scene);
-        const Spent spent = timed([&] { scene = build(device, mesh, options.quality, options.is_robust); });
-        least = {std::min(least.cpu, spent.cpu), std::min(least.wall, spent.wall)};
+        const Elapsed elapsed = timed([&] { scene = build(device, mesh, options.quality, options.is_robust); });
+        least = {std::min(least.cpu, elapsed.cpu), std::min(least.wall, elapsed.wall)};
     }
 
     const Rays primary = camera_rays(camera);
     std::vector<Nearest> hits(primary.padded.size());
-    trace({scene, WIDEST, true}, options.n_threads, primary, hits);
+    trace({scene, MAX_WIDTH, true}, options.n_threads, primary, hits);
     const std::vector<Start> starts = ::starts(mesh, primary, hits);
 
     std::string rays;
@@ -459,7 +462,7 @@ void run(const std::vector<std::string>& args) {
         else if (kind == "shadow") row = measure_any(options, coherent, shadow_rays(starts, camera.light));
         else if (kind == "bounce-any") row = measure_any(options, incoherent, bounce_rays(starts));
         else if (kind == "bounce") row = measure_nearest(options, incoherent, bounce_rays(starts));
-        else throw std::runtime_error(kind + ": unknown rays");
+        else throw std::runtime_error(kind + ": unknown kind of rays");
         rays += (rays.empty() ? "\n    \"" : ",\n    \"") + kind + "\": {" + row + "}";
     }
     std::printf("{\n  \"rays\": {%s\n  },\n  \"build_s\": %.6f,\n  \"build_cpu_s\": %.6f,\n  \"threads\": %d,\n"
@@ -470,7 +473,7 @@ void run(const std::vector<std::string>& args) {
 
 int main(int n_args, char** args) {
     if (n_args < 3) {
-        std::fprintf(stderr, "embree_triangles MESH.tri CAMERA.cam [options]; see the head of its source\n");
+        std::fprintf(stderr, "embree_triangles MESH.tri CAMERA.cam [options]; see the beginning of its source\n");
         return 2;
     }
     try {

@@ -1,17 +1,18 @@
 #!/usr/bin/env python3
-"""Writes the meshes that `compare.py` measures, each as NAME.ply for surfel, NAME.tri for Embree, and NAME.cam.
+"""Writes the meshes that `compare.py` measures: each as NAME.ply for surfel and NAME.tri for Embree, with its
+camera NAME.cam.
 
   make_meshes.py FOLDER [--bunny bun_zipper.ply]
 
-`bunny` is the Stanford bunny, from the PLY file in text that Stanford gives away, turned to have Z up.
-`knot_1m` is made here: the tube of a torus knot under five octaves of bumps, 1,036,800 triangles.
+`bunny` is the Stanford bunny, read from the ascii PLY file of the Stanford 3D Scanning Repository and turned to
+have Z up. `knot_1m` is generated: the tube of a torus knot with five octaves of bumps, 1,036,800 triangles.
 """
 import argparse
 from pathlib import Path
 
 import numpy as np
 
-# Eye, target, vertical angle of view in degrees, light; all with Z up.
+# Each camera: eye, target, vertical angle of view in degrees, point light; Z is up.
 CAMERAS = {
     "bunny": "0.05,-0.42,0.2,-0.017,0.0015,0.1,18,0.35,-0.45,0.5",
     "knot_1m": "0.6,-5.4,3.4,0,-0.3,-0.35,50,5,-6,9",
@@ -19,7 +20,7 @@ CAMERAS = {
 
 
 def bunny(path):
-    """The file names its columns in a header; the first three are x, y and z, with Y up."""
+    """Reads vertices and triangles of the bunny. The first three columns of a vertex are x, y and z, with Y up."""
     header, body = path.read_text().split("end_header\n")
     counts = [int(line.split()[2]) for line in header.splitlines() if line.startswith("element")]
     lines = body.splitlines()
@@ -30,29 +31,31 @@ def bunny(path):
 
 
 def knot(n_along=2160, n_around=240, radius=0.55):
+    """Returns vertices and triangles of the tube, a grid of quads along and around the knot."""
     along = np.linspace(0, 2 * np.pi, n_along, endpoint=False)
     around = np.linspace(0, 2 * np.pi, n_around, endpoint=False)[None, :, None]
     center = on_knot(along)
     tangent = unit(on_knot(along + 1e-4) - on_knot(along - 1e-4))
-    # Away from the circle that the knot winds around: nowhere along the knot itself.
+    # The normal points away from the circle that the knot winds around, and is never parallel to the tangent.
     axis = np.stack([2 * np.cos(2 * along), 2 * np.sin(2 * along), 0 * along], axis=1)
     normal = unit(np.cross(tangent, np.cross(center - axis, tangent)))
     binormal = np.cross(tangent, normal)
     outward = np.cos(around) * normal[:, None] + np.sin(around) * binormal[:, None]
-    place = center[:, None] + radius * outward
-    height = sum(0.16 / octave * bumps(4 * octave * place + octave) for octave in (1, 2, 4, 8, 16))
-    vertices = place + 0.6 * height[..., None] * outward
+    position = center[:, None] + radius * outward
+    height = sum(0.16 / octave * bumps(4 * octave * position + octave) for octave in (1, 2, 4, 8, 16))
+    vertices = position + 0.6 * height[..., None] * outward
     return vertices.reshape(-1, 3).astype(np.float32), grid(n_along, n_around)
 
 
 def on_knot(angle):
-    reach = 2 + np.cos(3 * angle)
-    return np.stack([reach * np.cos(2 * angle), reach * np.sin(2 * angle), np.sin(3 * angle)], axis=1)
+    """Returns the points of the knot's centre line at angles."""
+    distance = 2 + np.cos(3 * angle)
+    return np.stack([distance * np.cos(2 * angle), distance * np.sin(2 * angle), np.sin(3 * angle)], axis=1)
 
 
-def bumps(place):
-    """From -1.5 to 1.5: Schoen's gyroid."""
-    x, y, z = np.moveaxis(place, -1, 0)
+def bumps(position):
+    """Returns Schoen's gyroid function, from -1.5 to 1.5."""
+    x, y, z = np.moveaxis(position, -1, 0)
     return np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
 
 
@@ -61,7 +64,7 @@ def unit(vectors):
 
 
 def grid(n_rows, n_columns):
-    """Two triangles for each place of a grid that closes in both directions."""
+    """Returns two triangles for each cell of a grid that closes in both directions."""
     row, column = np.divmod(np.arange(n_rows * n_columns), n_columns)
     vertex = lambda down, right: (row + down) % n_rows * n_columns + (column + right) % n_columns
     corners = [vertex(0, 0), vertex(1, 0), vertex(1, 1), vertex(0, 0), vertex(1, 1), vertex(0, 1)]
@@ -69,6 +72,7 @@ def grid(n_rows, n_columns):
 
 
 def write(folder, name, vertices, triangles):
+    """Writes one mesh in both formats, with its camera."""
     n_vertices, n_triangles = len(vertices), len(triangles)
     vertices, triangles = vertices.astype("<f4"), triangles.astype("<u4")
     counts = np.array([n_vertices, n_triangles], "<u4")

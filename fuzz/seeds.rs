@@ -1,13 +1,13 @@
-//! Writes small valid files for the fuzzer to begin with, to the folder `corpus` beside this file.
+//! Writes the initial corpus of the fuzzer: small valid files in the folder `corpus` next to this file.
 
 use std::fs;
 use std::path::Path;
 
-use surfel::image::Image;
-use surfel::math::{DVec3, Vec3};
-use surfel::points::{PointCloud, Scalar, Values};
-use surfel::progress::Silent;
-use surfel_formats::{ImageOptions, SaveOptions, save, save_image};
+use surfel_core::image::Image;
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::{PointCloud, Scalar, Values};
+use surfel_core::progress::NoProgress;
+use surfel_formats::{ImageOptions, SaveOptions, encode_png, save, save_image};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
@@ -16,10 +16,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     {
         fs::create_dir_all(corpus.join(target))?;
     }
-    for (name, cloud) in [("bare", bare(7)), ("full", full(7))] {
+    for (name, cloud) in [("bare", bare_cloud(7)), ("full", full_cloud(7))] {
         for (target, extension) in [("ply", "ply"), ("las", "las"), ("las", "laz")] {
             let path = corpus.join(target).join(format!("{name}.{extension}"));
-            save(&path, &cloud, &SaveOptions::default(), &Silent)?;
+            save(&path, &cloud, &SaveOptions::default(), &NoProgress)?;
         }
     }
     let ply = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int i\n\
@@ -43,17 +43,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         fs::write(corpus.join(format!("xyz/{i}")), text)?;
     }
     let record = [1.0f32, 2.0, 3.0, 0.5, 0.0, 0.0, 1.0].map(f32::to_le_bytes).concat();
-    let lost = [f32::NAN, 1e30, -0.0, -1.0, 0.0, f32::INFINITY, 2.0].map(f32::to_le_bytes).concat();
+    let non_finite =
+        [f32::NAN, 1e30, -0.0, -1.0, 0.0, f32::INFINITY, 2.0].map(f32::to_le_bytes).concat();
     fs::write(corpus.join("bin/one.bin"), &record)?;
-    fs::write(corpus.join("bin/three.bin"), [&record[..], &lost, &record].concat())?;
+    fs::write(corpus.join("bin/three.bin"), [&record[..], &non_finite, &record].concat())?;
     write_gltf(&corpus.join("gltf"))?;
     write_scenes(&corpus.join("scene"))?;
-    write_conversations(&corpus.join("viewer"))?;
-    pictures(&corpus.join("environment"))
+    write_viewer_input(&corpus.join("viewer"))?;
+    write_environment_maps(&corpus.join("environment"))
 }
 
-/// HDR in each of its encodings, and an EXR.
-fn pictures(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
+/// Writes an HDR file in each encoding, and an EXR file.
+fn write_environment_maps(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
     let head = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\nCOLORCORR=1 1 2\n\n";
     let channels = [&[2, 2, 0, 9, 137, 50, 3, 1, 2, 3, 134, 9][..], &[137, 0, 137, 136]].concat();
     let hdrs = [
@@ -67,7 +68,7 @@ fn pictures(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
     Ok(save_image(&folder.join("light.exr"), &Image::new(9, 3), &ImageOptions::default())?)
 }
 
-/// Triangles of every format, and materials.
+/// Writes meshes in every format, and materials.
 fn write_meshes(corpus: &Path) -> std::io::Result<()> {
     let ply = "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement tristrips 1\n\
         property list int int vertex_indices\nelement vertex 4\nproperty float x\nproperty double y\n\
@@ -103,14 +104,10 @@ fn write_meshes(corpus: &Path) -> std::io::Result<()> {
     fs::write(corpus.join("mtl/mirror.mtl"), "newmtl m\nKs 1 1 0.5\nillum 3\n")
 }
 
-/// A scene of a bit of everything, as GLB and as JSON.
+/// Writes a scene with all supported features, as GLB and as JSON.
 fn write_gltf(folder: &Path) -> std::io::Result<()> {
-    let picture = surfel::image::Image::new(2, 2);
-    let png = folder.join("../picture.png");
-    surfel_formats::save_image(&png, &picture, &surfel_formats::ImageOptions::default())
-        .map_err(std::io::Error::other)?;
-    let picture = fs::read(&png)?;
-    fs::remove_file(png)?;
+    let png = encode_png(&Image::new(2, 2), &ImageOptions::default());
+    let png = png.map_err(std::io::Error::other)?;
     let floats = |floats: &[f32]| -> Vec<u8> {
         floats.iter().flat_map(|value| value.to_le_bytes()).collect()
     };
@@ -118,11 +115,11 @@ fn write_gltf(folder: &Path) -> std::io::Result<()> {
     let identity = floats(&[1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.]);
     let times = floats(&[0.0, 1.0]);
     let bytes = [0, 1, 2, 0, 2, 3, 0, 0, 127, 0, 0, 127, 255, 0, 0, 127];
-    let buffer = [&square[..], &identity, &times, &bytes, &picture].concat();
+    let buffer = [&square[..], &identity, &times, &bytes, &png].concat();
     let view = |offset: usize, length: usize| {
         format!(r#"{{"buffer":0,"byteOffset":{offset},"byteLength":{length}}}"#)
     };
-    let views = [view(0, 48), view(48, 64), view(112, 8), view(120, 16), view(136, picture.len())];
+    let views = [view(0, 48), view(48, 64), view(112, 8), view(120, 16), view(136, png.len())];
     let accessor = |view: usize, offset: usize, component: usize, kind: &str, count: usize| {
         format!(
             r#"{{"bufferView":{view},"byteOffset":{offset},"componentType":{component},"type":"{kind}","count":{count}}}"#
@@ -158,7 +155,7 @@ fn write_gltf(folder: &Path) -> std::io::Result<()> {
         let start = format!(
             r#"{{"asset":{{"version":"2.0"}},"buffers":[{buffer}],"bufferViews":[{views}],"accessors":[{accessors}],"#
         );
-        // Joint 0 alone is there, and 127 weighs nothing where it stands.
+        // The skin has only joint 0, so the joints come from a separate accessor of zeros.
         (start + rest + "}").replace(r#""JOINTS_0":3"#, r#""JOINTS_0":10"#).replace(
             r#"],"scene":0"#,
             r#",{"componentType":5121,"type":"VEC4","count":4}],"scene":0"#,
@@ -174,11 +171,12 @@ fn write_gltf(folder: &Path) -> std::io::Result<()> {
     let header =
         [&b"glTF"[..], &word(2), &word(28 + json.len() + length), &word(json.len()), b"JSON"];
     let glb = [&header.concat()[..], &json, &word(length), b"BIN\0", &buffer].concat();
-    surfel_formats::load_gltf_bytes("scene.glb", &glb, &Silent).map_err(std::io::Error::other)?;
+    surfel_formats::load_gltf_bytes("scene.glb", &glb, &NoProgress)
+        .map_err(std::io::Error::other)?;
     fs::write(folder.join("scene.glb"), glb)
 }
 
-/// A scene of everything as TOML and as JSON, behind the byte that says which.
+/// Writes a scene with all features as TOML and as JSON, after a byte that selects the format.
 fn write_scenes(folder: &Path) -> std::io::Result<()> {
     let toml = r##"# A scene
 resolution = [64, 48]
@@ -201,7 +199,7 @@ rotate = [0, 0, 90]
 scale = 2
 visible = true
 material = { kind = "glass", ior = 1.3, attenuation_color = "#88ccff", thin = true }
-copies = [{ translate = [5, 0, 0] }, { rotate = { axis = [0, 0, 1], angle = 30 }, scale = [1, 2, 3] }]
+instances = [{ translate = [5, 0, 0] }, { rotate = { axis = [0, 0, 1], angle = 30 }, scale = [1, 2, 3] }]
 [[object]]
 files = ["b.obj", "c.glb"]
 fps = 5
@@ -251,7 +249,7 @@ kind = "orbit"
 seconds = 4
 "##;
     let json = r##"{"spp": 2, "output": null, "camera": {"position": [1, 2, 3], "view-angle": 40.5},
-"object": [{"file": "a.ply", "copies": {"scale": 0.5}, "material": {"color": "#fff", "alpha": "0.5"}}],
+"object": [{"file": "a.ply", "instances": {"scale": 0.5}, "material": {"color": "#fff", "alpha": "0.5"}}],
 "lamp": [{"position": [0, 0, 1], "kind": "directional"}],
 "animation": {"object": "a", "kind": "keys", "times": [0, 1], "interpolation": "step", "rotate": [[0, 0, 0], [0, 0, 9]]},
 "info": {"points": 7}}"##;
@@ -263,27 +261,27 @@ seconds = 4
     Ok(())
 }
 
-/// Requests, and what pages say line by line, behind the byte that says which.
-fn write_conversations(folder: &Path) -> std::io::Result<()> {
+/// Writes HTTP requests and page messages, after a byte that selects the kind.
+fn write_viewer_input(folder: &Path) -> std::io::Result<()> {
     let camera =
         r#"{"position":[9,-2,3],"focal_point":[2,1,-1],"view_up":[0,0,1],"view_angle":40}"#;
     let pages = [
-        r#"{"type":"camera","input":1,"camera":CAMERA,"moving":true}
-{"type":"seen","frame":1}
-{"type":"camera","input":2,"camera":CAMERA}
+        r#"{"type":"camera","seq":1,"camera":CAMERA,"moving":true}
+{"type":"ack","frame":1}
+{"type":"camera","seq":2,"camera":CAMERA}
 {"type":"pick","id":1,"x":20.5,"y":15}"#,
-        r##"{"type":"set","input":1,"scene":{"surface":"disc","color":"elevation","cmap":"viridis","range":[0,2],"radius":"knn:6"}}
-{"type":"set","input":2,"scene":{"sun":{"azimuth":120,"elevation":30},"light":["sun","sky"],"exposure":0.5,"background":"#102030"}}
-{"type":"set","input":3,"scene":{"material":"a.ply=glass:ior=1.3","clip_box":"([0,5],[0,3],[-2,2])","clip_plane":[1,1,0,1,0,0]},"moving":true}
-{"type":"set","input":4,"scene":{"surface":null,"material":null,"clip_box":null,"time":0.5,"select":"random:5","spp":2}}"##,
+        r##"{"type":"set","seq":1,"scene":{"surface":"disc","color":"elevation","cmap":"viridis","range":[0,2],"radius":"knn:6"}}
+{"type":"set","seq":2,"scene":{"sun":{"azimuth":120,"elevation":30},"light":["sun","sky"],"exposure":0.5,"background":"#102030"}}
+{"type":"set","seq":3,"scene":{"material":"a.ply=glass:ior=1.3","clip_box":"([0,5],[0,3],[-2,2])","clip_plane":[1,1,0,1,0,0]},"moving":true}
+{"type":"set","seq":4,"scene":{"surface":null,"material":null,"clip_box":null,"time":0.5,"subsample":"random:5","spp":2}}"##,
         r#"{"type":"size","width":64,"height":32}
 {"type":"save","id":1,"width":30,"height":20}
 {"type":"cancel","id":1}
-{"type":"take","id":2,"width":30,"height":20}
-{"type":"load","id":3,"name":"a.toml","text":"spp = 2\n[camera]\nposition = [1, 2, 3]\n[[object]]\nfile = \"a.ply\""}
-{"type":"load","id":4,"name":"a.json","text":"{\"surface\": \"sphere\", \"object\": []}"}"#,
-        r#"{"type":"set","input":1,"scene":{"camera":{"orthographic":9,"view_angle":null},"up":[0,1,0],"boundary":"off"}}
-{"type":"set","input":2,"scene":{"camera":{"panorama":true,"orthographic":null},"environment":"/etc/passwd"}}
+{"type":"export","id":2,"width":30,"height":20}
+{"type":"loadScene","id":3,"name":"a.toml","text":"spp = 2\n[camera]\nposition = [1, 2, 3]\n[[object]]\nfile = \"a.ply\""}
+{"type":"loadScene","id":4,"name":"a.json","text":"{\"surface\": \"sphere\", \"object\": []}"}"#,
+        r#"{"type":"set","seq":1,"scene":{"camera":{"orthographic":9,"view_angle":null},"up":[0,1,0],"edge_test":"off"}}
+{"type":"set","seq":2,"scene":{"camera":{"panorama":true,"orthographic":null},"environment":"/etc/passwd"}}
 {"type":"hello","width":3,"height":2}"#,
     ];
     for (i, page) in pages.iter().enumerate() {
@@ -305,12 +303,14 @@ fn write_conversations(folder: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-fn bare(n: u16) -> PointCloud {
+/// Returns a cloud with positions only.
+fn bare_cloud(n: u16) -> PointCloud {
     let position = |i| Vec3::new(f32::from(i), 0.5 * f32::from(i * i % 5), -1.0);
     PointCloud::from_positions((0..n).map(position).collect())
 }
 
-fn full(n: u16) -> PointCloud {
+/// Returns a cloud with all columns.
+fn full_cloud(n: u16) -> PointCloud {
     let scalar = |name: &str, values| Scalar { name: name.into(), values };
     PointCloud {
         origin: DVec3::new(500_000.0, 4_900_000.0, 0.0),
@@ -323,6 +323,6 @@ fn full(n: u16) -> PointCloud {
             scalar("nir", Values::U16((0..n).collect())),
             scalar("other", Values::U8((0..n).map(|i| i as u8).collect())),
         ],
-        ..bare(n)
+        ..bare_cloud(n)
     }
 }

@@ -1,19 +1,19 @@
-//! Any bytes as glTF, and as the JSON of one: what is read is whole.
+//! Fuzzes the glTF reader: each graph that it returns must be valid.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use surfel::progress::Silent;
-use surfel::scene::Geometry;
+use surfel_core::progress::NoProgress;
+use surfel_core::scene::Geometry;
 use surfel_formats::load_gltf_bytes;
 
 fuzz_target!(|bytes: &[u8]| {
-    if let Ok((graph, _)) = load_gltf_bytes("fuzz.glb", bytes, &Silent) {
+    if let Ok((graph, _)) = load_gltf_bytes("fuzz.glb", bytes, &NoProgress) {
         graph.validate();
         let n_vertices = graph.geometries.iter().map(|geometry| match geometry {
-            Geometry::Points(points) => points.cloud.len(),
+            Geometry::Points(cloud) => cloud.len(),
             Geometry::Triangles(mesh) => mesh.positions.len(),
         });
-        // What a file of any size may ask for, and what its bytes allow.
+        // The memory budget of the reader: a constant and a multiple of the file size.
         assert!(12 * n_vertices.sum::<usize>() <= (64 << 20) + 64 * bytes.len());
     }
 });

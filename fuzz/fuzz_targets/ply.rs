@@ -1,9 +1,9 @@
-//! Any bytes behind the magic of PLY, as points and as triangles.
+//! Fuzzes the PLY reader for points and for triangles.
 #![no_main]
 
-#[path = "../triangles.rs"]
-mod triangles;
+#[path = "../mesh_checks.rs"]
+mod mesh_checks;
 
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| triangles::read("fuzz.ply", bytes));
+fuzz_target!(|bytes: &[u8]| mesh_checks::check_file("fuzz.ply", bytes));

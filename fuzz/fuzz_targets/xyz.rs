@@ -1,8 +1,8 @@
-//! Any bytes as text, with and without stated columns, and as OBJ.
+//! Fuzzes the text reader with and without stated columns, and the OBJ reader for points.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use surfel::progress::Silent;
+use surfel_core::progress::NoProgress;
 use surfel_formats::{LoadOptions, TextColumn, load_bytes};
 
 fuzz_target!(|bytes: &[u8]| {
@@ -11,7 +11,7 @@ fuzz_target!(|bytes: &[u8]| {
     for (name, options) in
         [("fuzz.xyz", &LoadOptions::default()), ("fuzz.csv", &stated), ("fuzz.obj", &stated)]
     {
-        if let Ok(loaded) = load_bytes(name, bytes, options, &Silent) {
+        if let Ok(loaded) = load_bytes(name, bytes, options, &NoProgress) {
             assert!(loaded.cloud.len() <= bytes.len());
         }
     }

@@ -1,30 +1,36 @@
 //! `surfel demo`: scans a ruin, writes the cloud, and renders it as a user would.
 
-use crate::args::Global;
+use crate::animate::animate_description;
 use crate::gallery;
+use crate::global::Global;
+use crate::options::words;
+use crate::render::render_to_file;
 use crate::report::{Report, print};
-use crate::scene_file::Line;
 use crate::shell::quoted;
 use anyhow::Context;
-use std::ffi::OsString;
+use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use surfel::math::DVec3;
-use surfel::scanner::ruin;
+use surfel::SceneDescription;
+use surfel::description::RunSettings;
+use surfel_core::math::DVec3;
+use surfel_core::progress::Progress;
+use surfel_core::scanner::ruin;
 use surfel_formats::SaveOptions;
 
-#[derive(clap::Args)]
+/// Arguments of `surfel demo`.
+#[derive(clap::Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Folder for demo.laz and demo.png; made if it does not exist.
+    /// Folder for demo.laz and demo.png; it is created if it does not exist.
     #[arg(short, long, value_name = "FOLDER", default_value = ".")]
     output: PathBuf,
-    /// Points of the scan, about.
+    /// Approximate number of points of the scan.
     #[arg(long, value_name = "N", default_value_t = 2_500_000,
         value_parser = clap::value_parser!(u64).range(1000..=100_000_000))]
     points: u64,
-    /// Then put glass, a mirror and a mesh into the ruin, and make a picture and a film of that, too.
+    /// Also puts glass, a mirror and a mesh into the ruin, and makes a picture and a movie of it.
     #[arg(long)]
     gallery: bool,
 }
@@ -33,17 +39,19 @@ const EXAMPLES: &str = "\
 Examples:
   surfel demo                                   demo.laz and demo.png in this folder
   surfel demo -o /tmp/ruin --points 5000000     twice the points, elsewhere
-  surfel demo --gallery                         also glass, a mirror, a mesh, and a film of them";
+  surfel demo --gallery                         also glass, a mirror, a mesh, and a movie of them";
 
 /// A clear sky, and a sun that lights the front and throws the columns' shadows over the floor.
-const LIGHT: [&str; 6] =
-    ["--sun-azimuth", "190", "--sun-elevation", "32", "--background", "#4f7fb8,#d5e2ee"];
+const LIGHT: [(&str, &str); 3] =
+    [("sun.azimuth", "190"), ("sun.elevation", "32"), ("background", "#4f7fb8,#d5e2ee")];
 
+/// Scans the ruin and renders it.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
     let start = Instant::now();
+    let run = global.start()?;
     let folder = &args.output;
     fs::create_dir_all(folder)
-        .with_context(|| format!("{}: the folder cannot be made", folder.display()))?;
+        .with_context(|| format!("{}: the folder cannot be created", folder.display()))?;
     let (cloud_path, picture_path) = (folder.join("demo.laz"), folder.join("demo.png"));
     let cloud = ruin::scan(args.points as usize, report)?;
     let options = SaveOptions {
@@ -51,69 +59,86 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         coordinate_system: Some("EPSG:32634".into()),
     };
     surfel_formats::save(&cloud_path, &cloud, &options, report)?;
-    report.end_stage();
+    report.end();
     let n_points = cloud.len();
     drop(cloud);
 
-    let mut words = ["surfel", "render"].map(str::to_owned).to_vec();
-    words.extend([
-        cloud_path.display().to_string(),
-        "-o".into(),
-        picture_path.display().to_string(),
-    ]);
-    words.extend(camera_words());
-    words.extend(LIGHT.map(str::to_owned));
-    let (cli, line) = Line::parse(words.iter().map(OsString::from).collect())?;
-    crate::run_command(&cli.command, &line, global, report)?;
-    tell(&cloud_path, &words, n_points, start)?;
+    let mut description = SceneDescription::of_files([&cloud_path]);
+    set_view(&mut description)?;
+    description.run = run.clone();
+    description.output.output = Some(picture_path.clone());
+    render_to_file(&description, &picture_path, None, report)?;
+    description.run = RunSettings::default();
+    let command = command_line("render", &cloud_path, &description);
+    print_summary(&cloud_path, &command, n_points, start)?;
     if args.gallery {
-        make_gallery(folder, global, report)?;
+        make_gallery(folder, &run, report)?;
     }
     Ok(())
 }
 
-/// gallery.png and gallery.gif, each as a user would make it.
-fn make_gallery(folder: &Path, global: &Global, report: &Report) -> anyhow::Result<()> {
+/// The ruin's own view and light.
+fn set_view(description: &mut SceneDescription) -> anyhow::Result<()> {
+    let ruin::RuinView { position, focal_point, view_angle_deg } = ruin::view();
+    let camera = &mut description.camera;
+    camera.position = Some(ruin::UTM_ORIGIN + position);
+    camera.focal_point = Some(ruin::UTM_ORIGIN + focal_point);
+    camera.view_angle = Some(view_angle_deg);
+    description.picture.resolution = Some((1280, 720));
+    for (path, value) in LIGHT {
+        description.set(path, &json!(value), Path::new(""))?;
+    }
+    Ok(())
+}
+
+/// Renders gallery.png and gallery.gif.
+fn make_gallery(folder: &Path, run: &RunSettings, report: &Report) -> anyhow::Result<()> {
     gallery::write(folder, report)?;
-    let scene = folder.join("gallery.toml").display().to_string();
-    let picture = folder.join("gallery.png").display().to_string();
-    let film = folder.join("gallery.gif").display().to_string();
+    let scene = folder.join("gallery.toml");
     let mut lines = Vec::new();
     for (command, output, options) in [
-        ("render", &picture, &["--spp", "16"][..]),
-        ("animate", &film, &["--fps", "10", "--resolution", "480x270", "--spp", "2"]),
+        ("render", "gallery.png", &[("spp", "16")][..]),
+        ("animate", "gallery.gif", &[("fps", "10"), ("resolution", "480x270"), ("spp", "2")]),
     ] {
-        let mut words = vec!["surfel", command, &scene, "-o", output];
-        words.extend(options);
-        lines.push(words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" "));
-        let (cli, line) = Line::parse(words.into_iter().map(OsString::from).collect())?;
-        crate::run_command(&cli.command, &line, global, report)?;
+        let mut typed = SceneDescription::default();
+        for (path, value) in options {
+            typed.set(path, &json!(value), Path::new(""))?;
+        }
+        let output = folder.join(output);
+        typed.output.output = Some(output.clone());
+        lines.push(command_line(command, &scene, &typed));
+        let mut description = SceneDescription::read(&scene)?;
+        description.overlay(typed);
+        description.run = run.clone();
+        match command {
+            "render" => render_to_file(&description, &output, None, report)?,
+            _ => animate_description(&description, false, false, report)?,
+        }
     }
     print(&format!("The gallery was made by\n  {}", lines.join("\n  ")))?;
     Ok(())
 }
 
-/// The ruin's own view as options.
-fn camera_words() -> Vec<String> {
-    let ruin::View { eye, target, vertical_fov_deg } = ruin::view();
-    let vector = |p: DVec3| (ruin::UTM_ORIGIN + p).to_array().map(|x| x.to_string()).join(",");
-    vec![
-        "--resolution".into(),
-        "1280x720".into(),
-        "--camera-position".into(),
-        vector(eye),
-        "--camera-focal-point".into(),
-        vector(target),
-        "--camera-view-angle".into(),
-        vertical_fov_deg.to_string(),
-    ]
+/// Writes the command that renders a file with these settings.
+fn command_line(command: &str, file: &Path, description: &SceneDescription) -> String {
+    let output = description.output.output.as_deref().unwrap_or(Path::new("-"));
+    let options = description.non_default().into_iter().filter(|(path, _)| path != "output");
+    let mut all = vec!["surfel".to_owned(), command.to_owned(), file.display().to_string()];
+    all.extend(["-o".to_owned(), output.display().to_string()]);
+    all.extend(words(&options.collect::<Vec<_>>()));
+    all.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
 }
 
-fn tell(cloud: &Path, words: &[String], n_points: usize, start: Instant) -> anyhow::Result<()> {
+fn print_summary(
+    cloud: &Path,
+    command: &str,
+    n_points: usize,
+    start: Instant,
+) -> anyhow::Result<()> {
     let cloud = quoted(&cloud.display().to_string());
     print(&format!(
         "A virtual scanner measured a ruin from six stations: {n_points} points, in {cloud}.\n\
-         The picture was made from that file, all in {:.0} s, by\n  {}\n\
+         The picture was made from that file, all in {:.0} s, by\n  {command}\n\
          Try next:\n  \
          surfel view {cloud}\n  \
          surfel info {cloud}\n  \
@@ -122,7 +147,6 @@ fn tell(cloud: &Path, words: &[String], n_points: usize, start: Instant) -> anyh
          surfel render {cloud} -o classes.png --color class --light sky\n  \
          surfel render {cloud} -o points.png --surface points",
         start.elapsed().as_secs_f64(),
-        words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" "),
     ))?;
     Ok(())
 }

@@ -1,23 +1,23 @@
-//! What `surfel demo --gallery` adds to the ruin: a ball of points, a knot of triangles, and a scene file
+//! The objects that `surfel demo --gallery` adds to the ruin: a ball of points, a knot of triangles, and a scene file
 //! that makes glass, a mirror and gold of them.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 use std::path::Path;
-use surfel::math::{DVec3, Vec3};
-use surfel::points::PointCloud;
-use surfel::progress::Progress;
-use surfel::scanner::ruin::UTM_ORIGIN;
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::PointCloud;
+use surfel_core::progress::Progress;
+use surfel_core::scanner::ruin::UTM_ORIGIN;
 use surfel_formats::SaveOptions;
 
-/// Where things stand on the site.
+/// Positions on the site.
 const GLASS: DVec3 = DVec3::new(-6.4, -9.6, 1.62);
 const MIRROR: DVec3 = DVec3::new(-1.5, -10.2, 1.32);
 const KNOT: DVec3 = DVec3::new(-9.8, -8.2, 1.75);
 const EYE: DVec3 = DVec3::new(-13.2, -21.0, 4.2);
 const TARGET: DVec3 = DVec3::new(-2.6, -3.0, 2.6);
 
-/// Writes ball.ply, knot.obj and gallery.toml beside demo.laz.
+/// Writes ball.ply, knot.obj and gallery.toml next to demo.laz.
 pub fn write(folder: &Path, progress: &dyn Progress) -> anyhow::Result<()> {
     surfel_formats::save(
         &folder.join("ball.ply"),
@@ -31,7 +31,7 @@ pub fn write(folder: &Path, progress: &dyn Progress) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Points of the unit sphere, on a spiral that keeps them evenly apart (Swinbank and Purser 2006).
+/// Returns points of the unit sphere, on a spiral that keeps them evenly apart (Swinbank and Purser 2006).
 fn ball(n: usize) -> PointCloud {
     let golden = PI * (3.0 - 5f64.sqrt());
     let place = |i: usize| {
@@ -44,7 +44,7 @@ fn ball(n: usize) -> PointCloud {
     PointCloud { normals: Some(positions.clone()), ..PointCloud::from_positions(positions) }
 }
 
-/// A trefoil of a round tube as OBJ, with normals.
+/// Returns a trefoil knot of a round tube as OBJ, with normals.
 fn knot() -> String {
     const N_ALONG: usize = 600;
     const N_AROUND: usize = 80;
@@ -88,7 +88,7 @@ fn scene() -> String {
     let (eye, target) = (world(EYE), world(TARGET));
     let (glass, mirror, knot) = (world(GLASS), world(MIRROR), world(KNOT));
     format!(
-        r##"# A ruin as it was scanned, and three things put into it. docs/scenes.md explains the keys.
+        r##"# A scanned ruin with three objects in it. docs/scenes.md explains the keys.
 resolution = "1280x720"
 background = "#4f7fb8,#d5e2ee"
 
@@ -145,21 +145,23 @@ seconds = 6
 
 #[cfg(test)]
 mod tests {
+    //! Old files are replaced as a whole.
+
     use super::*;
     use std::fs;
-    use surfel::progress::Silent;
+    use surfel_core::progress::NoProgress;
 
     #[test]
-    fn files_are_written_aside_and_take_the_place_of_old_ones() {
+    fn files_are_replaced_not_overwritten() {
         let folder = std::env::temp_dir().join(format!("surfel-gallery-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let names = ["ball.ply", "knot.obj", "gallery.toml"];
         for name in names {
             fs::write(folder.join(name), "old").unwrap();
-            // Another name of the old file, which would change if that were written over.
+            // Another name of the old file, which would change if that were overwritten.
             fs::hard_link(folder.join(name), folder.join(format!("{name}.old"))).unwrap();
         }
-        write(&folder, &Silent).unwrap();
+        write(&folder, &NoProgress).unwrap();
         for name in names {
             assert_eq!(fs::read(folder.join(format!("{name}.old"))).unwrap(), b"old", "{name}");
             assert!(3 < fs::metadata(folder.join(name)).unwrap().len(), "{name}");

@@ -1,12 +1,14 @@
 //! `surfel info`: what is in a file, as a table or as JSON.
 
-use crate::args::{Global, is_georeferenced};
-use crate::memory::Plan;
+use crate::global::Global;
+use crate::inputs::expand;
 use crate::report::{Report, print};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
-use surfel::math::Vec3;
-use surfel::points::{PointCloud, Select, guess_up, spacing};
+use surfel::resolve::{MemoryEstimate, is_georeferenced};
+use surfel_core::math::Vec3;
+use surfel_core::points::{PointCloud, Subsample, infer_up, spacing};
+use surfel_core::progress::Progress;
 use surfel_formats::{LoadOptions, Loaded, TextColumn};
 
 #[derive(clap::Args)]
@@ -28,17 +30,19 @@ Examples:
   surfel info scan.laz
   surfel info --json scan.laz | jq .bounds";
 
+/// Shows what each file holds.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
     let text_columns = args.columns.as_deref().map(TextColumn::parse_list);
     let options = LoadOptions { text_columns, ..LoadOptions::default() };
+    let limit = global.start()?.memory_limit;
     let mut all = Vec::new();
-    for file in &args.files {
-        let sources = [(file.as_path(), surfel_formats::inspect(file)?)].into();
+    for file in &expand(&args.files)? {
+        let infos = [(file.as_path(), surfel_formats::inspect(file)?)].into();
         // Points are only looked at.
-        Plan::new(&sources, Some(Select::First(0)), 0).check(global)?;
+        MemoryEstimate::from_files(&infos, Some(Subsample::First(0)), 0).check(limit)?;
         let loaded = surfel_formats::load(file, &options, report)?;
         let info = describe(file, &loaded, report)?;
-        report.end_stage();
+        report.end();
         if args.json {
             all.push(info);
         } else {
@@ -52,13 +56,13 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     }
 }
 
-fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel::Result<Value> {
-    let Loaded { cloud, source } = loaded;
+fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Result<Value> {
+    let Loaded { cloud, info: source } = loaded;
     let bounds = cloud.bounds();
     let corner =
         |corner: Vec3| (!cloud.is_empty()).then(|| (cloud.origin + corner.as_dvec3()).to_array());
     let distance = if cloud.is_empty() { 0.0 } else { spacing(&cloud.positions, report)? };
-    let up = guess_up(cloud, is_georeferenced(cloud, std::slice::from_ref(source)));
+    let up = infer_up(cloud, is_georeferenced(cloud, std::slice::from_ref(source)));
     Ok(json!({
         "file": file.display().to_string(),
         "format": source.format,
@@ -158,6 +162,8 @@ fn short(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    //! Numbers are short.
+
     use super::*;
 
     #[test]

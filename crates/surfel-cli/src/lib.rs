@@ -1,46 +1,42 @@
-//! The program `surfel`: parses the command line, calls the libraries, reports.
+//! The program `surfel`: turns command lines into scene descriptions, calls the libraries, reports.
 //!
-//! It is a library so that its scene files and its viewer can be tried from outside; `main.rs` only calls
-//! [`main`].
+//! It is a library so that its options and its viewer can be fuzzed; `main.rs` only calls [`main`].
 
-mod animate;
-mod args;
-mod assemble;
-mod bench;
-mod cloud;
-mod demo;
-mod dry_run;
-mod exposure;
-mod eye;
-mod gallery;
-mod info;
-mod interrupt;
-mod light;
-mod memory;
-mod picture;
-mod playback;
-mod prepare;
-mod render;
+mod usage;
 mod report;
-pub mod scene_file;
-mod sequence;
+mod interrupt;
+mod cleanup;
 mod shell;
 mod stats;
+pub mod options;
+mod inputs;
+mod scene_args;
+mod global;
+mod output;
+mod render;
+mod animate;
 mod view;
+mod info;
+mod prepare;
+mod gallery;
+mod demo;
+mod bench;
+mod completions;
 
-use args::{Global, SceneArgs, Usage};
-use clap::{Parser, Subcommand};
+use clap::builder::Styles;
+use clap::{Arg, Command as ClapCommand, CommandFactory, FromArgMatches, Parser, Subcommand};
+use global::Global;
 use report::{Report, Verbosity};
-use scene_file::Line;
 use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::Arc;
-use surfel_web::Studio;
+use surfel_web::SceneProvider;
+use usage::Usage;
 
-/// Turns point clouds into pictures and films by ray tracing the points themselves, as a continuous surface,
+/// Turns point clouds into pictures and movies by ray tracing the points themselves, as a continuous surface,
 /// together with meshes.
 #[derive(Parser)]
-#[command(name = "surfel", version, after_help = EXAMPLES, max_term_width = 100)]
+#[command(name = "surfel", version, after_help = EXAMPLES, max_term_width = 100, styles = Styles::plain())]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -50,41 +46,43 @@ struct Cli {
 
 const EXAMPLES: &str = "\
 Examples:
-  surfel demo                            a ruin to play with: demo.laz and demo.png, here
-  surfel render scan.laz -o scan.png     a finished picture; every choice is told and is a flag
-  surfel info scan.laz                   what is in a file
-  surfel COMMAND --help                  all options of a command, with examples";
+  surfel demo                            a ruin to try things on: demo.laz and demo.png, here
+  surfel render scan.laz -o scan.png     a finished picture; every choice is shown and is an option
+  surfel info scan.laz                   what a file holds
+  surfel COMMAND -h                      the most used options of a command
+  surfel COMMAND --help                  all options of a command";
 
 #[derive(Subcommand)]
 enum Command {
-    /// Render point clouds, meshes and scenes to a picture.
+    /// Renders point clouds, meshes and scenes to a picture.
     Render(Box<render::Args>),
-    /// Render a film of a scene that moves, or of a turn around anything.
+    /// Renders a movie of an animated scene, or of a turn around anything.
     Animate(Box<animate::Args>),
-    /// Look around in a scene, ray traced, in a browser.
+    /// Shows a scene, ray traced, in a browser.
     View(Box<view::Args>),
-    /// Tell what is in a file.
+    /// Shows what a file holds.
     Info(info::Args),
-    /// Clean a cloud, add normals and radii, write it to a file.
+    /// Cleans a cloud, adds normals and radii, and writes it to a file.
     Prepare(prepare::Args),
-    /// Scan a ruin with a virtual scanner and render it: something to begin with.
+    /// Scans a ruin with a virtual scanner and renders it: something to begin with.
     Demo(demo::Args),
-    /// Measure how many rays a second are traced.
+    /// Measures how many rays per second are traced.
     Bench(Box<bench::Args>),
+    /// Prints completions for a shell.
+    Completions(completions::Args),
+    /// Prints the manual page.
+    #[command(hide = true)]
+    Man,
 }
 
-/// Runs the program by the words of its command line.
+/// Runs the program by its command line.
 pub fn main() -> ExitCode {
-    quiet_decoder();
-    let (cli, line) = match Line::parse(std::env::args_os().collect()) {
-        Ok(parsed) => parsed,
-        Err(error) => {
-            Report::new(Verbosity::Normal).error(&error);
-            return exit_code(&error);
-        }
-    };
+    silence_decoder_panics();
+    let cli = parse(std::env::args_os()).unwrap_or_else(|error| error.exit());
     let report = Report::new(cli.global.verbosity());
-    match run(&cli, &line, &report) {
+    let result = run(&cli, &report);
+    cleanup::remove_files();
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             report.error(&error);
@@ -93,58 +91,80 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// What `surfel view` with these words, the first of which is the program's name, gives its server.
-pub fn studio(words: Vec<OsString>) -> anyhow::Result<Arc<dyn Studio>> {
-    let (cli, line) = Line::parse(words)?;
-    view::open_studio(line, &cli.global, &Report::new(Verbosity::Quiet))
+/// Returns the scene provider that `surfel view` with these words, the first of which is the program's name, gives to
+/// its server.
+///
+/// # Errors
+///
+/// Fails for wrong options and for files that cannot be read.
+pub fn scene_provider(words: Vec<OsString>) -> anyhow::Result<Arc<dyn SceneProvider>> {
+    let cli = parse(words)?;
+    let Command::View(args) = &cli.command else { anyhow::bail!("expected `surfel view`") };
+    let description = args.scene.description(&cli.global.run)?;
+    Ok(view::open_scene_provider(
+        description,
+        args.scene.files.clone(),
+        &Report::new(Verbosity::Quiet),
+    )?)
 }
+
+fn parse(words: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {
+    Cli::from_arg_matches(&command().try_get_matches_from(words)?)
+}
+
+/// The last of several values counts, and numbers below zero are values, not options.
+fn command() -> ClapCommand {
+    let takes_numbers = |arg: Arg| {
+        let takes_values = arg.get_action().takes_values();
+        arg.allow_negative_numbers(takes_values)
+    };
+    let lenient = |command: ClapCommand| command.args_override_self(true).mut_args(takes_numbers);
+    lenient(Cli::command()).mut_subcommands(lenient)
+}
+
+/// Exit code of a cancelled run, as of programs that Ctrl-C ends.
+const CANCELLED: u8 = 130;
 
 fn exit_code(error: &anyhow::Error) -> ExitCode {
-    ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
-}
-
-impl Cli {
-    /// What is seen, of commands that show a scene.
-    fn into_scene(self) -> Option<SceneArgs> {
-        match self.command {
-            Command::Render(args) => Some(args.scene),
-            Command::Animate(args) => Some(args.scene),
-            Command::View(args) => Some(args.with_all_columns()),
-            _ => None,
-        }
+    let is_cancelled = error.chain().any(|cause| {
+        let by_library =
+            cause.downcast_ref::<surfel::Error>().is_some_and(surfel::Error::is_cancelled);
+        by_library || cause.downcast_ref() == Some(&surfel_core::Error::Cancelled)
+    });
+    if is_cancelled {
+        return ExitCode::from(CANCELLED);
     }
+    let is_invalid = |cause: &(dyn std::error::Error + 'static)| {
+        cause.is::<Usage>()
+            || cause.is::<surfel::description::Invalid>()
+            || matches!(cause.downcast_ref(), Some(surfel::Error::Invalid(_)))
+    };
+    ExitCode::from(if error.chain().any(is_invalid) { 2 } else { 1 })
 }
 
-fn run(cli: &Cli, line: &Line, report: &Report) -> anyhow::Result<()> {
+fn run(cli: &Cli, report: &Report) -> anyhow::Result<()> {
     interrupt::listen(&report.cancellation())?;
-    cli.global.start_threads()?;
-    run_command(&cli.command, line, &cli.global, report)
-}
-
-fn run_command(
-    command: &Command,
-    line: &Line,
-    global: &Global,
-    report: &Report,
-) -> anyhow::Result<()> {
-    match command {
-        Command::Render(args) => render::run(args, line, global, report),
-        Command::Animate(args) => animate::run(args, line, global, report),
-        Command::View(args) => view::run(args, line, global, report),
+    let global = &cli.global;
+    match &cli.command {
+        Command::Render(args) => render::run(args, global, report),
+        Command::Animate(args) => animate::run(args, global, report),
+        Command::View(args) => view::run(args, global, report),
         Command::Info(args) => info::run(args, global, report),
         Command::Prepare(args) => prepare::run(args, global, report),
         Command::Demo(args) => demo::run(args, global, report),
         Command::Bench(args) => bench::run(args, global, report),
+        Command::Completions(args) => completions::run(args, command()),
+        Command::Man => completions::man(command()),
     }
 }
 
-/// The decoders of LAZ and EXR panic on bytes that no encoder writes. `surfel_formats` catches that and
-/// returns an error that names the file; the panic's own message would only frighten.
-fn quiet_decoder() {
+/// Silences panics of the decoders of LAZ and EXR, which panic on bytes that no encoder writes. `surfel_formats`
+/// returns an error that names the file instead.
+fn silence_decoder_panics() {
     let default = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         let is_decoder = |file: &str| file.contains("laz-") || file.contains("exr-");
-        if !panic.location().is_some_and(|place| is_decoder(place.file())) {
+        if !panic.location().is_some_and(|location| is_decoder(location.file())) {
             default(panic);
         }
     }));

@@ -1,124 +1,144 @@
-//! `surfel prepare`: select, clean, normals, orientation, radius, each alone or all.
+//! `surfel prepare`: subsample, clean, normals, orientation, radius, each alone or all.
 
-use crate::args::{Global, PreparationArgs, Usage};
-use crate::memory::Plan;
-use crate::picture::check_output;
+use crate::global::Global;
+use crate::inputs::expand;
+use crate::options::{KeyOptions, PrepareScope};
+use crate::output::check_output;
 use crate::report::Report;
+use crate::usage::Usage;
 use anyhow::Context;
 use std::path::PathBuf;
-use surfel::points::{Orientation, PointCloud, clean, prepare, select};
-use surfel::progress::Progress;
+use surfel::description::ObjectSettings;
+use surfel::resolve::{MemoryEstimate, report_normals, report_radii};
+use surfel_core::points::{Orientation, PointCloud, clean, prepare, subsample};
+use surfel_core::progress::Progress;
 use surfel_formats::{ColumnChoice, Loaded, SaveOptions};
 
-#[derive(clap::Args)]
+/// Arguments of `surfel prepare`.
+#[derive(clap::Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Point clouds, or meshes and glTF scenes, of which the vertices are taken; several make one.
+    /// Point clouds, or meshes and glTF scenes, whose vertices are taken; several become one. A folder stands
+    /// for its files, `*` for any part of a name, - for standard input.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// The prepared cloud: .ply (all columns), .las or .laz.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    #[command(flatten)]
-    preparation: PreparationArgs,
-    /// Add normals; without this, --radius, --orient, --select or --keep-variation: normals and radii.
+    /// Adds normals. Without this, --radius, --orient, --subsample and --keep-variation: normals and radii.
     #[arg(long, help_heading = "Preparation")]
     normals: bool,
-    /// Add the column surface_variation: 0 on a plane, up to 1/3 where points fill space.
+    /// Adds the column surface_variation: 0 on a plane, up to 1/3 where points fill space.
     #[arg(long, help_heading = "Preparation")]
     keep_variation: bool,
-    /// Another number selects others with --select random.
-    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Preparation")]
-    seed: u64,
+    #[command(flatten)]
+    options: KeyOptions<PrepareScope>,
 }
 
 const EXAMPLES: &str = "\
 Examples:
-  surfel prepare scan.laz -o ready.ply                      normals and radii
-  surfel prepare scan.laz -o thin.laz --select spacing:0.1  fewer points, nothing else
+  surfel prepare scan.laz -o ready.ply                          normals and radii
+  surfel prepare scan.laz -o thin.laz --subsample spacing:0.1   fewer points, nothing else
   surfel prepare scan.laz -o ready.ply --normals-k 24 --orient mst
   surfel prepare east.laz west.laz -o both.ply --radius median:6";
 
-/// Which columns the result is to have beside the file's.
-struct Wanted {
+/// The columns that the result has besides the file's.
+struct Columns {
     normals: bool,
     radii: bool,
     variation: bool,
 }
 
+/// Prepares a cloud and writes it.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
+    let limit = global.start()?.memory_limit;
+    let description = args.options.description()?;
+    let settings = &description.objects_default;
     check_output(&args.output)?;
     let extension = args.output.extension().unwrap_or_default().to_ascii_lowercase();
     if !["ply", "las", "laz"].iter().any(|known| extension == *known) {
         let text = format!("{}: clouds are written as .ply, .las or .laz", args.output.display());
         return Err(Usage(text).into());
     }
-    let Loaded { cloud, source } = load(args, global, report)?;
-    let cloud =
-        prepared(cloud, args, report).with_context(|| args.files[0].display().to_string())?;
+    let files = expand(&args.files)?;
+    let Loaded { cloud, info } = load(&files, settings, limit, report)?;
+    let columns = columns(args, settings);
+    let cloud = prepared(cloud, &columns, settings, description.picture.seed(), report)
+        .with_context(|| files[0].display().to_string())?;
     let options =
-        SaveOptions { resolution: source.resolution, coordinate_system: source.coordinate_system };
+        SaveOptions { resolution: info.resolution, coordinate_system: info.coordinate_system };
     surfel_formats::save(&args.output, &cloud, &options, report)?;
-    report.end_stage();
+    report.end();
     report.note(&format!("{}: {} points", args.output.display(), cloud.len()));
     Ok(())
 }
 
-fn load(args: &Args, global: &Global, report: &Report) -> anyhow::Result<Loaded> {
-    let inspected =
-        args.files.iter().map(|file| Ok((file.as_path(), surfel_formats::inspect(file)?)));
-    let sources = inspected.collect::<surfel_formats::Result<_>>()?;
-    Plan::new(&sources, args.preparation.select, 0).check(global)?;
-    let options = args.preparation.load_options(ColumnChoice::All);
-    let (mut loaded, _) = surfel_formats::load_all(&args.files, &options, report)?;
-    report.end_stage();
-    report.note(&format!("{} points, {}", loaded.cloud.len(), loaded.source.format));
-    args.preparation.forget(&mut loaded.cloud);
+fn load(
+    files: &[PathBuf],
+    settings: &ObjectSettings,
+    limit: Option<u64>,
+    report: &Report,
+) -> anyhow::Result<Loaded> {
+    let inspected = files.iter().map(|file| Ok((file.as_path(), surfel_formats::inspect(file)?)));
+    let infos = inspected.collect::<surfel_formats::Result<_>>()?;
+    let preparation = &settings.preparation;
+    MemoryEstimate::from_files(&infos, preparation.subsample, 0).check(limit)?;
+    let options = preparation.load_options(ColumnChoice::All);
+    let (mut loaded, _) = surfel_formats::load_all(files, &options, report)?;
+    report.end();
+    report.note(&format!("{} points, {}", loaded.cloud.len(), loaded.info.format));
+    preparation.drop_estimated(&mut loaded.cloud);
     Ok(loaded)
 }
 
-fn prepared(cloud: PointCloud, args: &Args, report: &Report) -> anyhow::Result<PointCloud> {
-    let wanted = wanted(args);
-    if !wanted.normals && !wanted.radii && !wanted.variation {
+fn prepared(
+    cloud: PointCloud,
+    columns: &Columns,
+    settings: &ObjectSettings,
+    seed: u64,
+    report: &Report,
+) -> anyhow::Result<PointCloud> {
+    if !columns.normals && !columns.radii && !columns.variation {
         let (cloud, _) = clean(cloud, report)?;
-        return Ok(match args.preparation.select {
-            Some(choice) => select(&cloud, choice, args.seed, report)?,
+        return Ok(match settings.preparation.subsample {
+            Some(choice) => subsample(&cloud, choice, seed, report)?,
             None => cloud,
         });
     }
-    let mut preparation = args.preparation.preparation(args.seed, None);
-    preparation.keep_variation = wanted.variation;
-    let had = (cloud.normals.is_some(), cloud.radii.is_some());
-    let (mut cloud, found) = prepare(cloud, &preparation, report)?;
-    report.end_stage();
-    if !wanted.normals && !had.0 {
+    let mut preparation = settings.preparation(seed);
+    preparation.keep_variation = columns.variation;
+    let (had_normals, had_radii) = (cloud.normals.is_some(), cloud.radii.is_some());
+    let (cloud, prepared) = prepare(cloud, &preparation, report)?;
+    let mut cloud = cloud.into_inner();
+    report.end();
+    if !columns.normals && !had_normals {
         cloud.normals = None;
     }
-    if !wanted.radii && !had.1 {
+    if !columns.radii && !had_radii {
         cloud.radii = None;
     }
-    if wanted.normals {
-        args.preparation.tell_normals(&found, report);
+    if columns.normals {
+        report_normals(&prepared, report);
     }
-    if wanted.radii {
-        args.preparation.tell_radii(&found, report);
+    if columns.radii {
+        report_radii(&prepared, settings, report);
     }
     Ok(cloud)
 }
 
-/// What was asked for; normals and radii if nothing was.
-fn wanted(args: &Args) -> Wanted {
-    let preparation = &args.preparation;
-    let wanted = Wanted {
+/// The columns that were asked for; normals and radii if nothing was.
+fn columns(args: &Args, settings: &ObjectSettings) -> Columns {
+    let preparation = &settings.preparation;
+    let columns = Columns {
         normals: args.normals
-            || preparation.names_normals()
-            || preparation.orient != Orientation::None,
+            || preparation.estimates_normals()
+            || preparation.orient() != Orientation::None,
         radii: preparation.radius.is_some(),
         variation: args.keep_variation,
     };
-    let nothing = !wanted.normals && !wanted.radii && !wanted.variation;
-    if nothing && preparation.select.is_none() {
-        return Wanted { normals: true, radii: true, variation: false };
+    let is_empty = !columns.normals && !columns.radii && !columns.variation;
+    if is_empty && preparation.subsample.is_none() {
+        return Columns { normals: true, radii: true, variation: false };
     }
-    wanted
+    columns
 }

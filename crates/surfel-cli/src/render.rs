@@ -1,29 +1,35 @@
-//! `surfel render`: options, and the resolved choices as JSON.
+//! `surfel render`: from files to a picture.
 
-use crate::args::{Global, SceneArgs, Usage};
-use crate::picture;
-use crate::report::Report;
-use crate::scene_file::Line;
+use crate::global::{Global, start_threads};
+use crate::options::RenderScope;
+use crate::output::{check_output, check_stats};
+use crate::report::{Report, print};
+use crate::scene_args::SceneArgs;
+use crate::stats::{self, RunStats, Seconds};
+use crate::usage::Usage;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
+use surfel::SceneDescription;
+use surfel::resolve::{AutoSettings, KeepOptions, LoadedScene};
+use surfel_core::progress::Progress;
+use surfel_core::trace::Simd;
 
-#[derive(clap::Args)]
+/// Arguments of `surfel render`.
+#[derive(clap::Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// The picture: .png, .exr (linear, with all layers) or - for PNG on stdout.
     #[arg(short, long, value_name = "FILE")]
-    pub output: Option<PathBuf>,
-    /// Write numbers about the run as JSON; - for stdout.
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    pub stats: Option<PathBuf>,
-    /// Print what would be done as a scene file on stdout, and render nothing.
-    #[arg(long, help_heading = "Output")]
-    pub dry_run: bool,
-    /// The instant of a scene that moves.
-    #[arg(long, value_name = "SECONDS", default_value = "0", help_heading = "Output",
-        value_parser = crate::args::parse::number_in::<0, 1_000_000>)]
-    pub time: f64,
+    output: Option<PathBuf>,
+    /// Writes numbers about the run as JSON; - for stdout.
+    #[arg(long, value_name = "FILE", help_heading = "Output", hide_short_help = true)]
+    stats: Option<PathBuf>,
+    /// Prints what would be done as a scene file on stdout, and renders nothing.
+    #[arg(long, help_heading = "Output", hide_short_help = true)]
+    dry_run: bool,
     #[command(flatten)]
-    pub scene: SceneArgs,
+    scene: SceneArgs<RenderScope>,
 }
 
 const EXAMPLES: &str = "\
@@ -33,23 +39,108 @@ Examples:
   surfel render scan.laz -o map.png --camera-direction 0,0,-1 --camera-orthographic
   surfel render scan.laz -o classes.png --color class --light sky
   surfel render north.las south.las -o heights.png --color elevation --cmap terrain
+  surfel render 'tiles/*.laz' -o tiles.png
   surfel render site.laz house.glb statue.ply -o plan.png --material statue.ply=glass
   surfel render scene.toml -o scene.png
   surfel render statue.ply -o statue.exr --up +Y --spp 64 --no-background
-  surfel render huge.laz -o quick.png --select random:2000000 --spp 1 --stats -";
+  surfel render huge.laz -o quick.png --subsample random:2000000 --spp 1 --stats -
 
-pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow::Result<()> {
-    args.scene.check()?;
+Not the picture you expected? docs/troubleshooting.md lists problems and the options that help.";
+
+/// Renders a picture.
+pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
+    let mut description = args.scene.description(&global.run)?;
+    if args.output.is_some() {
+        description.output.output.clone_from(&args.output);
+    }
+    start_threads(&description.run)?;
     if args.dry_run {
-        return picture::tell(args, line, global, report);
+        return print_dry_run(&description, report);
     }
     let stdout = Path::new("-");
-    let Some(output) = &args.output else {
+    let Some(output) = description.output.output.clone() else {
         return Err(Usage("name the picture with -o, as in -o picture.png".into()).into());
     };
     if output == stdout && args.stats.as_deref() == Some(stdout) {
         let text = "picture and stats cannot both go to stdout; name a file for one";
         return Err(Usage(text.into()).into());
     }
-    picture::make(args, output, line, global, report)
+    check_output(&output)?;
+    if let Some(stats) = &args.stats {
+        check_stats(stats, &output, &args.scene.files, &description)?;
+    }
+    render_to_file(&description, &output, args.stats.as_deref(), report)
+}
+
+/// Renders a description to a file, and writes numbers about the run to another.
+pub fn render_to_file(
+    description: &SceneDescription,
+    output: &Path,
+    stats: Option<&Path>,
+    report: &Report,
+) -> anyhow::Result<()> {
+    let start = Instant::now();
+    let mut seconds = Seconds::default();
+    let read = || LoadedScene::read(description, KeepOptions::default(), report);
+    let loaded = timed(&mut seconds.load, read)?;
+    let auto = AutoSettings::choose(&loaded, description, report)?;
+    let resolved = timed(&mut seconds.prepare, || loaded.into_resolved(auto, report))?;
+    let counts = resolved.scene.graph.n_points_and_triangles();
+    let mut scene = timed(&mut seconds.build, || resolved.build_trees(report))?;
+    scene.choose_exposure(report)?;
+    report_threads(scene.simd(), report);
+    scene.seek(description.output.time(), report)?;
+    let (image, rendered) = scene.render_with(report)?;
+    report.end();
+    report.check()?;
+    image.save(output)?;
+    if let Some(path) = stats {
+        seconds.total = start.elapsed().as_secs_f64();
+        let resolution = description.picture.resolution();
+        let (flat, simd) = (scene.flat(), scene.simd());
+        let run = RunStats { flat, counts, seconds, rendered, resolution, simd };
+        stats::write(path, &run.json())?;
+    }
+    Ok(())
+}
+
+/// Reports the threads and the SIMD level.
+pub fn report_threads(simd: Simd, progress: &dyn Progress) {
+    let line = format!("{} threads, {}", rayon::current_num_threads(), simd.name());
+    progress.choice(&line, &["threads"]);
+}
+
+fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> surfel::Result<T>) -> surfel::Result<T> {
+    let start = Instant::now();
+    let result = work();
+    *seconds = start.elapsed().as_secs_f64();
+    result
+}
+
+fn print_dry_run(description: &SceneDescription, report: &Report) -> anyhow::Result<()> {
+    description.output.output.as_deref().map_or(Ok(()), check_output)?;
+    let loaded = LoadedScene::read(description, KeepOptions::default(), report)?;
+    let auto = AutoSettings::choose(&loaded, description, report)?;
+    let mut complete = auto.complete_description(&loaded);
+    complete.output.time = Some(description.output.time());
+    Ok(print(&format!("{:#}", with_info(&complete, &loaded)))?)
+}
+
+/// Returns a complete description as a scene file, with facts about the data and the machine.
+pub fn with_info(complete: &SceneDescription, loaded: &LoadedScene) -> Value {
+    let (n_points, n_triangles) = loaded.graph.n_points_and_triangles();
+    let preparation = complete.objects_default.preparation(complete.picture.seed());
+    let mut table = complete.to_table();
+    table.insert(
+        "info".into(),
+        json!({
+            "points": n_points,
+            "triangles": n_triangles,
+            "preparation": format!("{preparation:?}"),
+            "threads": rayon::current_num_threads(),
+            "simd": Simd::detect().name(),
+            "backend": "cpu",
+        }),
+    );
+    Value::Object(table)
 }

@@ -1,16 +1,22 @@
-//! What the user sees of the work: progress, notes and errors, all on stderr.
+//! Progress, choices, notes and errors on stderr.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::Instant;
-use surfel::progress::Progress;
+use surfel::SceneDescription;
+use surfel::description::{Invalid, option_name};
+use surfel_core::progress::Progress;
 
+/// The amount of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verbosity {
+    /// Errors alone.
     Quiet,
+    /// Progress and choices too.
     Normal,
+    /// The time of each stage too.
     Verbose,
 }
 
@@ -20,11 +26,12 @@ pub struct Report<'l> {
     cancelled: Arc<AtomicBool>,
     stage: Mutex<Option<(String, Instant)>>,
     bar: RwLock<ProgressBar>,
-    /// Hears all of it, and may cancel, too.
+    /// Receives everything too, and may cancel too.
     listener: Option<&'l dyn Progress>,
 }
 
 impl<'l> Report<'l> {
+    /// A report that nothing has happened in yet.
     pub fn new(verbosity: Verbosity) -> Self {
         Self {
             verbosity,
@@ -35,8 +42,8 @@ impl<'l> Report<'l> {
         }
     }
 
-    /// One that `listener` hears, too.
-    pub fn heard_by(self, listener: &dyn Progress) -> Report<'_> {
+    /// Passes everything on to `listener` too.
+    pub fn with_listener(self, listener: &dyn Progress) -> Report<'_> {
         Report {
             listener: Some(listener),
             cancelled: self.cancelled,
@@ -44,45 +51,24 @@ impl<'l> Report<'l> {
         }
     }
 
-    /// Another of the same kind, for another thread; both are cancelled together.
-    pub fn twin<'o>(&self) -> Report<'o> {
+    /// Another report of the same kind, for another thread; both are cancelled together.
+    pub fn for_thread<'o>(&self) -> Report<'o> {
         Report { cancelled: self.cancellation(), ..Report::new(self.verbosity) }
     }
 
-    /// Set from outside, it stops the work.
+    /// The flag that stops the work once it is set.
     pub fn cancellation(&self) -> Arc<AtomicBool> {
         self.cancelled.clone()
     }
 
-    /// One that tells nothing, for work that the user need not know of; both are cancelled together.
-    pub fn muted(&self) -> Self {
-        Self { cancelled: self.cancellation(), ..Self::new(Verbosity::Quiet) }
-    }
-
-    /// An automatic choice with the flag that makes it.
-    pub fn choice(&self, line: &str, flag: &str) {
-        self.note(&format!("{line} [{flag}]"));
-    }
-
-    /// Passes notes on with the flag that changes what they tell.
-    pub fn with_flag<'a>(&'a self, flag: &'a str) -> WithFlag<'a> {
-        WithFlag { report: self, flag }
-    }
-
+    /// Reports an error as the last line.
     pub fn error(&self, error: &anyhow::Error) {
-        self.end_stage();
-        let text = format!("{error:#}").replace('\n', " ");
-        say(&format!("error: {text}"));
-    }
-
-    /// Takes the bar away and, if asked for, tells how long the last stage took.
-    pub fn end_stage(&self) {
-        let bar = self.bar.read().unwrap_or_else(PoisonError::into_inner);
-        bar.finish_and_clear();
-        let ended = self.stage.lock().unwrap_or_else(PoisonError::into_inner).take();
-        if let (Some((stage, start)), Verbosity::Verbose) = (ended, self.verbosity) {
-            say(&format!("{stage}: {:.2} s", start.elapsed().as_secs_f64()));
-        }
+        self.end();
+        let text = match invalid_option(error) {
+            Some(text) => text,
+            None => format!("{error:#}"),
+        };
+        say(&format!("error: {}", text.replace('\n', " ")));
     }
 
     fn shows_bars(&self) -> bool {
@@ -92,7 +78,7 @@ impl<'l> Report<'l> {
 
 impl Progress for Report<'_> {
     fn begin(&self, stage: &str, total: u64) {
-        self.end_stage();
+        self.end();
         self.listener.inspect(|listener| listener.begin(stage, total));
         *self.stage.lock().unwrap_or_else(PoisonError::into_inner) =
             Some((stage.to_owned(), Instant::now()));
@@ -113,34 +99,52 @@ impl Progress for Report<'_> {
         self.bar.read().unwrap_or_else(PoisonError::into_inner).suspend(|| say(line));
     }
 
+    fn choice(&self, line: &str, keys: &[&str]) {
+        let options: Vec<String> =
+            keys.iter().map(|key| format!("--{}", option_name(key))).collect();
+        self.note(&format!("{line} [{}]", options.join(", ")));
+    }
+
+    /// Takes the bar away and, if asked for, shows how long the stage took.
+    fn end(&self) {
+        let bar = self.bar.read().unwrap_or_else(PoisonError::into_inner);
+        bar.finish_and_clear();
+        let ended = self.stage.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let (Some((stage, start)), Verbosity::Verbose) = (ended, self.verbosity) {
+            say(&format!("{stage}: {:.2} s", start.elapsed().as_secs_f64()));
+        }
+    }
+
     fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
             || self.listener.is_some_and(|listener| listener.is_cancelled())
     }
 }
 
-/// Adds a flag to each note.
-pub struct WithFlag<'a> {
-    report: &'a Report<'a>,
-    flag: &'a str,
-}
-
-impl Progress for WithFlag<'_> {
-    fn begin(&self, stage: &str, total: u64) {
-        self.report.begin(stage, total);
+/// Names the option of a value that is not valid, unless a scene file has it.
+fn invalid_option(error: &anyhow::Error) -> Option<String> {
+    let invalid = match error.downcast_ref() {
+        Some(surfel::Error::Invalid(invalid)) => invalid,
+        _ => error.downcast_ref()?,
+    };
+    let Invalid { file: None, path, .. } = invalid else { return None };
+    let (path, property) = match path.strip_prefix("material.") {
+        Some(property) => ("material", format!("{property}: ")),
+        None => (path.as_str(), String::new()),
+    };
+    let known = SceneDescription::paths();
+    let keys: Vec<&str> = path.split(", ").collect();
+    if !keys.iter().all(|key| known.iter().any(|known| known == key)) {
+        return None;
     }
-
-    fn advance(&self, units: u64) {
-        self.report.advance(units);
-    }
-
-    fn note(&self, line: &str) {
-        self.report.choice(line, self.flag);
-    }
-
-    fn is_cancelled(&self) -> bool {
-        self.report.is_cancelled()
-    }
+    let options: Vec<String> = keys.iter().map(|key| format!("--{}", option_name(key))).collect();
+    let reason = invalid.reason();
+    let excluded = reason.strip_prefix("excludes ").and_then(|rest| rest.split_once(';'));
+    let reason = match excluded {
+        Some((other, advice)) => format!("excludes --{};{advice}", option_name(other)),
+        None => reason,
+    };
+    Some(format!("{}: {property}{reason}", options.join(", ")))
 }
 
 fn new_bar(stage: &str, total: u64) -> ProgressBar {

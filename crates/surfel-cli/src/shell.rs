@@ -1,6 +1,6 @@
-//! Words for command lines that are told to users.
+//! Words of command lines that are shown to users.
 
-/// As a shell takes it for one word: `#` would begin a comment, a space another word.
+/// Quotes a word so that a shell reads it as one: `#` would begin a comment, a space another word.
 pub fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_./=,:+%@".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {
@@ -11,6 +11,8 @@ pub fn quoted(word: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    //! Words are quoted for a shell.
+
     use super::*;
 
     #[test]

@@ -5,31 +5,41 @@ use anyhow::Context;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
-use surfel::flat::{FlatCloud, FlatMesh, FlatScene};
-use surfel::render::RenderStats;
-use surfel::trace::Simd;
+use surfel_core::flat::{FlatCloud, FlatMesh, FlatScene};
+use surfel_core::render::RenderStats;
+use surfel_core::trace::Simd;
 
 /// Seconds that the steps took.
 #[derive(Clone, Copy, Default)]
 pub struct Seconds {
+    /// Reading of all files.
     pub load: f64,
+    /// Preparation and colouring of points.
     pub prepare: f64,
+    /// Building of the trees.
     pub build: f64,
+    /// The whole run.
     pub total: f64,
 }
 
 /// A finished run of `render`.
-pub struct Run<'a> {
+pub struct RunStats<'a> {
+    /// The scene as it was traced.
     pub flat: &'a FlatScene,
     /// Points and triangles of the graph.
     pub counts: (usize, usize),
+    /// Durations of the steps.
     pub seconds: Seconds,
+    /// Rays and times of the renderer.
     pub rendered: RenderStats,
+    /// Width and height of the picture.
     pub resolution: (u32, u32),
+    /// The SIMD level of the kernels.
     pub simd: Simd,
 }
 
-impl Run<'_> {
+impl RunStats<'_> {
+    /// Returns the numbers as JSON.
     pub fn json(&self) -> Value {
         let Seconds { load, prepare, build, total } = self.seconds;
         let (n_points, n_triangles) = self.counts;
@@ -48,7 +58,7 @@ impl Run<'_> {
             },
             "mrays_per_s": {
                 "primary": mrays_per_s(rays.primary, trace_secs),
-                "all": mrays_per_s(rays.all(), frame_secs),
+                "all": mrays_per_s(rays.total(), frame_secs),
             },
             "bytes_per_point": bytes_per_point(self.flat.clouds(), n_points),
             "bytes_per_triangle": bytes_per_triangle(self.flat.meshes(), n_triangles),
@@ -104,7 +114,7 @@ pub fn mrays_per_s(n_rays: u64, secs: f64) -> Option<f64> {
     (0.0 < secs && 0 < n_rays).then(|| n_rays as f64 / secs / 1e6)
 }
 
-/// To a file, or to stdout for `-`.
+/// Writes numbers to a file, or to stdout for `-`.
 pub fn write(path: &Path, stats: &Value) -> anyhow::Result<()> {
     let text = serde_json::to_string_pretty(stats)?;
     if path == Path::new("-") {

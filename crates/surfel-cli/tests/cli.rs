@@ -12,24 +12,28 @@ mod cameras;
 mod clips;
 #[path = "cli/commands.rs"]
 mod commands;
+#[path = "cli/help.rs"]
+mod help;
+#[path = "cli/inputs.rs"]
+mod inputs;
 #[path = "cli/materials.rs"]
 mod materials;
 #[path = "cli/pictures.rs"]
 mod pictures;
 #[path = "cli/scenes.rs"]
 mod scenes;
-#[path = "cli/bending.rs"]
-mod bending;
+#[path = "cli/deformation.rs"]
+mod deformation;
 #[path = "cli/sequences.rs"]
 mod sequences;
 #[path = "cli/viewer.rs"]
 mod viewer;
-#[path = "cli/wrong_input.rs"]
-mod wrong_input;
-#[path = "cli/wrong_scenes.rs"]
-mod wrong_scenes;
-#[path = "cli/wrong_use.rs"]
-mod wrong_use;
+#[path = "cli/invalid_input.rs"]
+mod invalid_input;
+#[path = "cli/invalid_scenes.rs"]
+mod invalid_scenes;
+#[path = "cli/invalid_options.rs"]
+mod invalid_options;
 #[cfg(unix)]
 #[path = "cli/interrupt.rs"]
 mod interrupt;

@@ -1,64 +1,166 @@
-//! What can go wrong with a file.
+//! Errors of reading and writing files.
 
 use std::fmt;
 use std::io;
 
+/// The error of an operation on a file; its message names the file and gives advice.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
+    /// The system reports an error on a file.
     // Not named `source`: programs that print the chain of sources would print it a second time.
     #[error("{file}: cannot be {action}: {cause}; {advice}")]
-    Io { file: String, action: &'static str, cause: io::Error, advice: &'static str },
+    Io {
+        /// Name of the file.
+        file: String,
+        /// Attempted action, as in "read" or "written".
+        action: &'static str,
+        /// The system's error.
+        cause: io::Error,
+        /// Advice to the user.
+        advice: &'static str,
+    },
+    /// The folder of an output does not exist.
     #[error("{file}: cannot be written: there is no folder `{folder}`; create it first")]
-    NoFolder { file: String, folder: String },
-    #[error("{file}: {place}: found {found}, expected {expected}; {advice}")]
-    Malformed { file: String, place: Place, found: String, expected: String, advice: &'static str },
+    FolderNotFound {
+        /// Name of the file.
+        file: String,
+        /// Folder that does not exist.
+        folder: String,
+    },
+    /// The content of a file breaks the rules of its format.
+    #[error("{file}: {location}: found {found}, expected {expected}; {advice}")]
+    Malformed {
+        /// Name of the file.
+        file: String,
+        /// Position of the wrong content.
+        location: Location,
+        /// The wrong content.
+        found: String,
+        /// The content that the format asks for.
+        expected: String,
+        /// Advice to the user.
+        advice: &'static str,
+    },
+    /// A file ends before its last point.
     #[error(
-        "{file}: the file ends early, at {place}: {readable} of {claimed} points are complete; \
+        "{file}: the file ends early, at {location}: {readable} of {claimed} points are complete; \
          copy the file again from its source, or write it again"
     )]
-    Truncated { file: String, place: Place, readable: u64, claimed: u64 },
+    Truncated {
+        /// Name of the file.
+        file: String,
+        /// Position of the end.
+        location: Location,
+        /// Number of points that are complete.
+        readable: u64,
+        /// Number of points that the file claims to hold.
+        claimed: u64,
+    },
+    /// surfel cannot read or write such a file.
     #[error("{file}: found {found}, which surfel cannot {action}; {advice}")]
-    Unsupported { file: String, action: &'static str, found: String, advice: &'static str },
+    Unsupported {
+        /// Name of the file.
+        file: String,
+        /// Attempted action: "read" or "write".
+        action: &'static str,
+        /// The unsupported content or name.
+        found: String,
+        /// Advice to the user.
+        advice: &'static str,
+    },
+    /// The frames of a movie do not fit its options or one another.
     #[error("{file}: found {found}, expected {expected}; {advice}")]
-    Frames { file: String, found: String, expected: String, advice: &'static str },
+    InvalidFrames {
+        /// Name of the movie.
+        file: String,
+        /// The frames or options given.
+        found: String,
+        /// The frames or options that the movie needs.
+        expected: String,
+        /// Advice to the user.
+        advice: &'static str,
+    },
+    /// The frames of an unfinished movie were rendered with other settings.
     #[error(
-        "{file}: its frames were begun as `{found}`, and are now asked for as `{expected}`; \
-         ask for the same again, or run without --resume to start again"
+        "{file}: its frames were begun as `{found}`, and are now requested as `{expected}`; \
+         request the same again, or run without --resume to start again"
     )]
-    OtherSettings { file: String, found: String, expected: String },
+    ResumeMismatch {
+        /// Name of the movie.
+        file: String,
+        /// Settings of the frames that are there.
+        found: String,
+        /// Settings of this run.
+        expected: String,
+    },
+    /// The program that encodes video is not installed.
     #[error(
-        "{file}: video is made by the program `{program}`, which was not found; install it \
+        "{file}: video is encoded by the program `{program}`, which was not found; install it \
          (https://ffmpeg.org, or from your system's packages), or write .gif, .png or \
          frame_####.png, which need no other program"
     )]
-    NoEncoder { file: String, program: String },
+    EncoderNotFound {
+        /// Name of the movie.
+        file: String,
+        /// Name of the program.
+        program: String,
+    },
+    /// The program that encodes video failed.
     #[error("{file}: the program `{program}` failed: {message}; {advice}")]
-    Encoder { file: String, program: String, message: String, advice: &'static str },
+    EncoderFailed {
+        /// Name of the movie.
+        file: String,
+        /// Name of the program.
+        program: String,
+        /// Message of the program.
+        message: String,
+        /// Advice to the user.
+        advice: &'static str,
+    },
+    /// The columns of a cloud do not fit in memory.
     #[error("{file}: {n_points} points do not fit in memory; load fewer columns or a smaller part")]
-    OutOfMemory { file: String, n_points: u64 },
-    #[error("{file}: has no animation `{wanted}`; there is {known}")]
-    NoAnimation { file: String, wanted: String, known: String },
+    OutOfMemory {
+        /// Name of the file.
+        file: String,
+        /// Number of points in the file.
+        n_points: u64,
+    },
+    /// A glTF file has no animation of the requested name.
+    #[error("{file}: has no animation `{requested}`; there is {known}")]
+    UnknownAnimation {
+        /// Name of the file.
+        file: String,
+        /// Name of the requested animation.
+        requested: String,
+        /// Names of the animations in the file, in words.
+        known: String,
+    },
+    /// No file was named.
     #[error("no input file was named; name at least one")]
     NoInput,
+    /// The renderer reports an error, or the work was cancelled.
     #[error(transparent)]
-    Surfel(#[from] surfel::Error),
+    Core(#[from] surfel_core::Error),
 }
 
-/// Where in a file something was found.
+/// A position in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum Location {
+    /// Byte, counted from 0.
     Byte(u64),
-    /// Counted from 1, as editors do.
+    /// Line, counted from 1 as editors do.
     Line(u64),
-    /// Counted from 0.
+    /// Point, counted from 0.
     Point(u64),
-    /// A JSON pointer, as in `/accessors/3/count`.
+    /// JSON pointer, as in `/accessors/3/count`.
     Json(String),
 }
 
+/// The result of an operation on a file.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-impl fmt::Display for Place {
+impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Byte(byte) => write!(f, "byte {byte}"),

@@ -1,99 +1,108 @@
-//! Files as graphs of scenes: meshes as triangles, clouds as points.
+//! Reads files as scene graphs: meshes as triangles, clouds as points.
 
 use std::path::Path;
 
-use surfel::progress::Progress;
-use surfel::scene::{Geometry, Graph, Material, Node, Part, Points, Texture};
+use surfel_core::points::PointCloud;
+use surfel_core::progress::Progress;
+use surfel_core::scene::{Geometry, Graph, Material, Node, Primitive, Texture};
 
-use crate::beside::Beside;
 use crate::error::Result;
-use crate::input::Input;
-use crate::load::{Format, format_of, read as read_points};
-use crate::options::{LoadOptions, Loaded, Source};
-use crate::{gltf, obj, ply, stl};
+use crate::file::{Input, ResourceResolver};
+use crate::format::{self, Reader, detect};
+use crate::options::{FileInfo, LoadOptions, Loaded};
 
-/// Reads a file to a graph: triangles with their materials if it has some, its points if not.
+/// Reads a file to a scene graph: a glTF scene as it is, else triangles with their materials if the file has any, else
+/// its points.
 ///
-/// Geometry stands under one node, named after the file. Points are as they stand in the file, not
-/// prepared and without `Points::colors`. Of `options`, the columns are a matter of points only.
+/// Clouds and meshes belong to one node, which has the name of the file. Points are those of the file, not
+/// prepared. The columns of `options` apply to points only.
+///
+/// # Errors
+/// Fails if the file cannot be read, if its format is not supported or broken, if it does not fit in memory, or if the
+/// work is cancelled. Missing materials and textures are notes of `progress`.
 pub fn load_graph(
     path: &Path,
     options: &LoadOptions,
     progress: &dyn Progress,
-) -> Result<(Graph, Source)> {
-    let input = Input::open(path)?;
-    if gltf::is_gltf(&input) {
-        return gltf::read(&input, Beside::file(path), options.animation.as_deref(), progress);
-    }
-    read(&input, Beside::file(path), options, progress)
+) -> Result<(Graph<PointCloud>, FileInfo)> {
+    read(&Input::open(path)?, ResourceResolver::for_file(path), options, progress)
 }
 
-/// Whether [`load_graph`] reads nothing but points from a file, which become one cloud in its place.
+/// Returns true if [`load_graph`] reads one untransformed cloud from a file, and nothing else.
+///
+/// # Errors
+/// Fails if the file cannot be read, or if its format is not supported or its header broken.
 pub fn is_cloud(path: &Path) -> Result<bool> {
     let input = Input::open(path)?;
-    Ok(!gltf::is_gltf(&input) && !has_triangles(&input)?)
+    Ok(match &detect(&input)?.read {
+        Reader::Points(_) => true,
+        Reader::Mesh { has_triangles, .. } => !has_triangles(&input)?,
+        Reader::Scene(_) => false,
+    })
 }
 
-/// Whether a file holds a whole scene, with places and movement of its own, rather than one cloud or mesh in
-/// its place.
-pub fn is_scene(path: &Path) -> Result<bool> {
-    Ok(gltf::is_gltf(&Input::open(path)?))
-}
-
-/// Reads the bytes of a file to a graph; `name` stands in messages, and its extension counts.
+/// Returns true if a file holds a scene with transforms and animation, rather than one cloud or mesh.
 ///
-/// Files that these name, such as materials and textures, are not read; `progress` is told so.
+/// # Errors
+/// Fails if the file cannot be read.
+pub fn is_scene(path: &Path) -> Result<bool> {
+    Ok(format::is_scene(&Input::open(path)?))
+}
+
+/// Reads the bytes of a file to a scene graph. `name` is its name in messages, and its extension gives the format of
+/// bytes without a signature.
+///
+/// Materials and textures in further files are not read; `progress` gets a note of them.
+///
+/// # Errors
+/// Fails for the reasons of [`load_graph`], and if a glTF scene has buffers in further files.
 pub fn load_graph_bytes(
     name: &str,
     bytes: &[u8],
     options: &LoadOptions,
     progress: &dyn Progress,
-) -> Result<(Graph, Source)> {
-    let input = Input::of_bytes(name, bytes);
-    if gltf::is_gltf(&input) {
-        return gltf::read(&input, Beside::nowhere(), options.animation.as_deref(), progress);
-    }
-    read(&input, Beside::nowhere(), options, progress)
+) -> Result<(Graph<PointCloud>, FileInfo)> {
+    read(&Input::from_bytes(name, bytes), ResourceResolver::none(), options, progress)
 }
 
 fn read(
     input: &Input,
-    beside: Beside,
+    resolver: ResourceResolver,
     options: &LoadOptions,
     progress: &dyn Progress,
-) -> Result<(Graph, Source)> {
+) -> Result<(Graph<PointCloud>, FileInfo)> {
     progress.check()?;
-    if !has_triangles(input)? {
-        let Loaded { cloud, source } = read_points(input, options, progress)?;
-        let points = Geometry::Points(Points { cloud, ..Points::default() });
-        return Ok((graph_of(input, vec![(points, Material::MATTE)], Vec::new()), source));
-    }
-    let (model, mut source) = match format_of(input)? {
-        Format::Ply => ply::read_mesh(input, &beside, options, progress)?,
-        Format::Obj => obj::read_mesh(input, &beside, options, progress)?,
-        _ => stl::read_mesh(input, options, progress)?,
+    let read_points = match &detect(input)?.read {
+        Reader::Scene(read) => {
+            return read(input, resolver, options.animation.as_deref(), progress);
+        }
+        Reader::Mesh { has_triangles, read_mesh, .. } if has_triangles(input)? => {
+            let (model, mut info) = read_mesh(input, &resolver, options, progress)?;
+            info.external_files = resolver.into_requested();
+            let parts = model.parts.into_iter();
+            let parts =
+                parts.map(|(mesh, material)| (Geometry::Triangles(mesh), material)).collect();
+            return Ok((graph_of(input, parts, model.textures), info));
+        }
+        Reader::Points(read_points) | Reader::Mesh { read_points, .. } => read_points,
     };
-    source.beside = beside.into_wanted();
-    let parts = model.parts.into_iter();
-    let parts = parts.map(|(mesh, material)| (Geometry::Triangles(mesh), material)).collect();
-    Ok((graph_of(input, parts, model.textures), source))
+    let Loaded { cloud, info } = read_points(input, options, progress)?;
+    let points = Geometry::Points(cloud);
+    Ok((graph_of(input, vec![(points, Material::MATTE)], Vec::new()), info))
 }
 
-fn has_triangles(input: &Input) -> Result<bool> {
-    Ok(match format_of(input)? {
-        Format::Ply => ply::has_faces(input)?,
-        Format::Obj => obj::has_faces(input),
-        Format::Stl => true,
-        Format::Las | Format::Text | Format::Bin => false,
-    })
-}
-
-/// All parts under one node, each with a material of its own.
-fn graph_of(input: &Input, parts: Vec<(Geometry, Material)>, textures: Vec<Texture>) -> Graph {
+/// Returns a graph of one node that has all geometries, each with its material.
+fn graph_of(
+    input: &Input,
+    parts: Vec<(Geometry<PointCloud>, Material)>,
+    textures: Vec<Texture>,
+) -> Graph<PointCloud> {
     let name = Path::new(input.name.as_ref()).file_stem().unwrap_or_default();
-    let part = |i| Part { geometry: i, material: i };
-    let node =
-        Node { parts: (0..parts.len()).map(part).collect(), ..Node::new(name.to_string_lossy()) };
+    let part = |i| Primitive { geometry: i, material: i };
+    let node = Node {
+        primitives: (0..parts.len()).map(part).collect(),
+        ..Node::new(name.to_string_lossy())
+    };
     let (geometries, materials) = parts.into_iter().unzip();
     Graph { geometries, materials, textures, nodes: vec![node], ..Graph::default() }
 }

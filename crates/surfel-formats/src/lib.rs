@@ -1,23 +1,22 @@
-//! Files: point clouds, meshes and scenes in, pictures of light in; clouds, pictures and movies out.
+//! Reads point clouds, meshes, scenes and environment maps; writes clouds, pictures and movies.
 //!
-//! A file becomes a [`surfel::points::PointCloud`] by [`load`], whatever its format; [`save`] goes
-//! the other way. [`load_graph`] keeps triangles, materials and movement too, as a
-//! [`surfel::scene::Graph`]. [`save_image`] writes what was rendered, and a [`Movie`] many such
-//! pictures. Light for a scene comes from [`load_environment_picture`].
+//! [`load`] reads a file of any of the [`FORMATS`] to a [`surfel_core::points::PointCloud`], and [`save`] writes one.
+//! [`load_graph`] keeps triangles, materials and animation too, as a [`surfel_core::scene::Graph`]. [`save_image`]
+//! writes a rendered picture, a [`Movie`] many of them. [`load_environment_map`] reads light for a scene.
 //!
 //! ```
-//! use surfel::progress::Silent;
+//! use surfel_core::progress::NoProgress;
 //! use surfel_formats::{LoadOptions, SaveOptions, load, load_bytes, save};
 //!
 //! # fn main() -> Result<(), surfel_formats::Error> {
 //! let text = b"x,y,z,intensity\n500000.25,4900000.5,12.0,7\n500001.25,4900001.5,13.0,8\n";
-//! let loaded = load_bytes("site.csv", text, &LoadOptions::default(), &Silent)?;
+//! let loaded = load_bytes("site.csv", text, &LoadOptions::default(), &NoProgress)?;
 //! assert_eq!(loaded.cloud.intensity, Some(vec![7.0, 8.0]));
 //!
 //! let path = std::env::temp_dir().join(format!("site-{}.laz", std::process::id()));
-//! save(&path, &loaded.cloud, &SaveOptions::default(), &Silent)?;
-//! let again = load(&path, &LoadOptions::default(), &Silent)?;
-//! assert_eq!(again.source.format, "LAZ 1.4, point format 6");
+//! save(&path, &loaded.cloud, &SaveOptions::default(), &NoProgress)?;
+//! let again = load(&path, &LoadOptions::default(), &NoProgress)?;
+//! assert_eq!(again.info.format, "LAZ 1.4, point format 6");
 //! assert_eq!(again.cloud.world_position(1), loaded.cloud.world_position(1));
 //! # std::fs::remove_file(&path).unwrap();
 //! # Ok(())
@@ -25,46 +24,37 @@
 //! ```
 
 mod error;
-mod number;
-mod input;
-mod atomic;
-mod role;
-mod range;
+mod display;
+mod file;
+mod table;
 mod options;
-mod block;
-mod record;
-mod records;
-mod lines;
-mod pieces;
-mod weld;
-mod mend;
 mod mesh;
-mod encode;
 mod ply;
 mod las;
 mod text;
-mod beside;
-mod texture;
 mod obj;
 mod stl;
 mod bin;
-mod extent;
+mod gltf;
+mod merge;
+mod format;
 mod load;
 mod graph;
 mod save;
-mod picture;
+mod image_file;
 mod movie;
 mod environment;
-mod gltf;
 
-pub use atomic::save_text;
-pub use environment::{LinearPicture, load_environment_picture, load_environment_picture_bytes};
-pub use error::{Error, Place, Result};
+pub use environment::{HdrImage, load_environment_map, load_environment_map_bytes};
+pub use error::{Error, Location, Result};
+pub use file::{check_output, check_output_path, load_text, save_text};
+pub use format::{FORMATS, Format, detect_bytes};
 pub use gltf::{load_gltf, load_gltf_bytes};
 pub use graph::{is_cloud, is_scene, load_graph, load_graph_bytes};
-pub use input::load_text;
-pub use load::{common_source, inspect, load, load_all, load_bytes, merge_loaded};
-pub use movie::{Container, Movie, MovieFormat, MovieOptions, check_movie};
-pub use options::{Column, ColumnChoice, LoadOptions, Loaded, Source, TextColumn};
-pub use picture::{Alpha, BitDepth, ImageOptions, png_bytes, save_image};
-pub use save::{SaveOptions, check_output, check_place, save};
+pub use image_file::{Alpha, BitDepth, ImageOptions, encode_png, save_image};
+pub use load::{inspect, load, load_all, load_bytes};
+pub use merge::{common_file_info, merge_loaded};
+pub use movie::{Movie, MovieOptions, check_movie};
+pub use options::{FileInfo, LoadOptions, Loaded, SaveOptions};
+pub use save::save;
+pub use table::{Column, ColumnChoice, TextColumn};

@@ -1,61 +1,62 @@
-//! STL: triangles one by one, binary or as text; corners at the same place become one vertex.
+//! STL: separate triangles, binary or as text. Corners with equal coordinates are welded to one vertex.
 
 use rayon::prelude::*;
-use surfel::math::{DVec3, Vec3};
-use surfel::points::PointCloud;
-use surfel::progress::Progress;
-use surfel::scene::{Material, Mesh};
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::PointCloud;
+use surfel_core::progress::Progress;
+use surfel_core::scene::{Material, Mesh};
 
-use crate::error::{Place, Result};
-use crate::input::Input;
-use crate::lines::{LineError, parse_number};
-use crate::mesh::{Model, about_origin, finish};
-use crate::options::{LoadOptions, Loaded, Source};
-use crate::pieces::{Fault, Piece, parse_pieces};
-use crate::records::Tolerance;
-use crate::weld::weld;
+use crate::error::{Location, Result};
+use crate::file::{Input, ResourceResolver};
+use crate::mesh::{Model, relative_to_origin, repair_model, weld};
+use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::table::{LineError, ParseFault, TextChunk, Tolerance, parse_chunks, parse_number};
 
-/// Free text, and the number of triangles behind it.
+/// Bytes of free text at the start of a binary file; the number of triangles follows.
 const HEADER: usize = 80;
+/// First byte of the triangles in a binary file.
 const BODY: usize = HEADER + 4;
-/// A normal and three corners of f32, and two bytes of no agreed meaning.
+/// Bytes of a triangle in a binary file: a normal and three corners of f32, and two bytes without agreed meaning.
 const STRIDE: usize = 50;
 
-pub(crate) fn inspect(input: &Input) -> Result<Source> {
+/// Reads the number of triangles of a binary file.
+pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
     let n_triangles = if is_ascii(input) { None } else { Some(count(input)? as u64) };
-    Ok(source(input, n_triangles))
+    Ok(file_info(input, n_triangles))
 }
 
-/// The corners as points.
+/// Reads the corners as points.
 pub(crate) fn read(
     input: &Input,
     options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<Loaded> {
-    let (mesh, source) = read_triangles(input, options, progress)?;
+    let (mesh, info) = read_triangles(input, options, progress)?;
     let cloud = PointCloud { origin: mesh.origin, ..PointCloud::from_positions(mesh.positions) };
-    Ok(Loaded { cloud, source })
+    Ok(Loaded { cloud, info })
 }
 
+/// Reads the triangles as a mesh.
 pub(crate) fn read_mesh(
     input: &Input,
+    _: &ResourceResolver,
     options: &LoadOptions,
     progress: &dyn Progress,
-) -> Result<(Model, Source)> {
-    let (mesh, source) = read_triangles(input, options, progress)?;
+) -> Result<(Model, FileInfo)> {
+    let (mesh, info) = read_triangles(input, options, progress)?;
     let model = Model { parts: vec![(mesh, Material::MATTE)], textures: Vec::new() };
-    let place = if is_ascii(input) { Place::Line(1) } else { Place::Byte(BODY as u64) };
-    let (model, n_triangles) = finish(input, model, 0, place, progress)?;
-    Ok((model, Source { n_triangles: Some(n_triangles), ..source }))
+    let location = if is_ascii(input) { Location::Line(1) } else { Location::Byte(BODY as u64) };
+    let (model, n_triangles) = repair_model(input, model, 0, location, progress)?;
+    Ok((model, FileInfo { n_triangles: Some(n_triangles), ..info }))
 }
 
-fn source(input: &Input, n_triangles: Option<u64>) -> Source {
+fn file_info(input: &Input, n_triangles: Option<u64>) -> FileInfo {
     let encoding = if is_ascii(input) { "ascii" } else { "binary" };
-    Source {
+    FileInfo {
         format: format!("STL, {encoding}"),
         n_triangles,
         columns: ["x", "y", "z"].map(String::from).into(),
-        ..Source::default()
+        ..FileInfo::default()
     }
 }
 
@@ -63,18 +64,20 @@ fn read_triangles(
     input: &Input,
     options: &LoadOptions,
     progress: &dyn Progress,
-) -> Result<(Mesh, Source)> {
+) -> Result<(Mesh, FileInfo)> {
     progress.begin(&format!("read {}", input.name), input.len() as u64);
     let (origin, corners) = match is_ascii(input) {
-        true => about_origin(&read_ascii(input, progress)?, Tolerance::UNSTATED, options),
-        false => about_origin(&read_binary(input, progress)?, Tolerance::SINGLE, options),
+        true => relative_to_origin(&read_ascii(input, progress)?, Tolerance::UNSTATED, options),
+        false => {
+            relative_to_origin(&read_binary(input, progress)?, Tolerance::F32_COORDINATES, options)
+        }
     };
     if u32::MAX as usize <= corners.len() {
         let found = format!("{} triangles", corners.len() / 3);
         return Err(input.unsupported(found, "cut the mesh into several files"));
     }
     progress.check()?;
-    // Adding zero makes one zero of the two.
+    // Adding zero turns -0 into 0.
     let key = |corner: &Vec3| (*corner + 0.0).to_array().map(f32::to_bits);
     let keys: Vec<[u32; 3]> = corners.par_iter().map(key).collect();
     let welded = weld(&keys);
@@ -87,10 +90,11 @@ fn read_triangles(
     };
     let n_triangles = Some(mesh.triangles.len() as u64);
     let n_points = Some(mesh.positions.len() as u64);
-    Ok((mesh, Source { n_points, ..source(input, n_triangles) }))
+    Ok((mesh, FileInfo { n_points, ..file_info(input, n_triangles) }))
 }
 
-/// Binary files may begin with `solid` too: those have the length that their number of triangles asks for.
+/// Returns true if the file is text. A binary file may begin with `solid` too, but has the length that follows from its
+/// number of triangles.
 fn is_ascii(input: &Input) -> bool {
     let is_solid =
         input.trim_ascii_start().get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
@@ -98,14 +102,15 @@ fn is_ascii(input: &Input) -> bool {
     is_solid && expected != Some(input.len() as u64) && !input[..input.len().min(BODY)].contains(&0)
 }
 
+/// Returns the number of triangles that the header of a binary file claims.
 fn claimed(input: &Input) -> Option<u64> {
     let count = input.get(HEADER..)?.first_chunk()?;
     Some(u64::from(u32::from_le_bytes(*count)))
 }
 
-/// The number of triangles in a binary file, which has room for them.
+/// Returns the number of triangles in a binary file, after checking that the file is long enough for them.
 fn count(input: &Input) -> Result<usize> {
-    let end = Place::Byte(input.len() as u64);
+    let end = Location::Byte(input.len() as u64);
     let advice = "copy the file again from its source";
     let Some(claimed) = claimed(input) else {
         let expected = "a header of 84 bytes, or `solid` at the start";
@@ -113,7 +118,7 @@ fn count(input: &Input) -> Result<usize> {
     };
     let readable = (input.len() - BODY) / STRIDE;
     if (readable as u64) < claimed {
-        let found = format!("the end of the file behind {readable} triangles");
+        let found = format!("the end of the file after {readable} triangles");
         return Err(input.malformed(end, found, format!("{claimed}"), advice));
     }
     Ok(claimed as usize)
@@ -132,8 +137,8 @@ fn read_binary(input: &Input, progress: &dyn Progress) -> Result<Vec<Vec3>> {
 }
 
 fn read_ascii(input: &Input, progress: &dyn Progress) -> Result<Vec<DVec3>> {
-    let pieces = Piece { text: input, start: 0 }.cut(end_of_facet);
-    let corners = parse_pieces(input, &pieces, |_, piece| parse_facets(piece), progress)?;
+    let chunks = TextChunk { text: input, start: 0 }.split(end_of_facet);
+    let corners = parse_chunks(input, &chunks, |_, chunk| parse_facets(chunk), progress)?;
     Ok(corners.into_iter().flatten().collect())
 }
 
@@ -142,13 +147,13 @@ fn end_of_facet(text: &[u8]) -> Option<usize> {
     memchr::memmem::find(text, END).map(|at| at + END.len())
 }
 
-/// Three corners for each facet of a piece that ends with one, or with the file.
-fn parse_facets(piece: Piece) -> std::result::Result<Vec<DVec3>, Fault> {
+/// Parses the corners of the facets of a chunk, which ends with a facet or with the file.
+fn parse_facets(chunk: TextChunk) -> std::result::Result<Vec<DVec3>, ParseFault> {
     let mut corners = Vec::new();
-    let mut words = Words { text: piece.text, at: 0 };
+    let mut words = Words { text: chunk.text, at: 0 };
     let fault = |at: usize, found: &[u8], expected: &str| {
         let found = format!("`{}`", found[..found.len().min(40)].escape_ascii());
-        Fault::new(piece.start + at, LineError { found, expected: expected.into() })
+        ParseFault::new(chunk.start + at, LineError { found, expected: expected.into() })
     };
     let mut n_corners = 0;
     loop {
@@ -161,7 +166,7 @@ fn parse_facets(piece: Piece) -> std::result::Result<Vec<DVec3>, Fault> {
             for axis in 0..3 {
                 let at = words.skip_space();
                 let number = parse_number(words.next());
-                corner[axis] = number.map_err(|error| Fault::new(piece.start + at, error))?;
+                corner[axis] = number.map_err(|error| ParseFault::new(chunk.start + at, error))?;
             }
             corners.push(corner);
         } else if is("endloop") {
@@ -172,12 +177,12 @@ fn parse_facets(piece: Piece) -> std::result::Result<Vec<DVec3>, Fault> {
         } else if n_corners != 0 {
             return Err(fault(at, word, "`vertex` or `endloop`"));
         } else if is("facet") {
-            // The normal behind it is that of the corners, if it is any.
+            // The normal is skipped, because it follows from the corners.
             for _ in 0..4 {
                 words.next();
             }
         } else if is("solid") || is("endsolid") {
-            // Names may be anything.
+            // A name may contain any words.
             words.skip_line();
         } else if is("") {
             return Ok(corners);
@@ -187,21 +192,21 @@ fn parse_facets(piece: Piece) -> std::result::Result<Vec<DVec3>, Fault> {
     }
 }
 
-/// The words of a text.
+/// A cursor over the words of a text.
 struct Words<'a> {
     text: &'a [u8],
     at: usize,
 }
 
 impl<'a> Words<'a> {
-    /// Returns where the next word begins.
+    /// Skips whitespace; returns the position of the next word.
     fn skip_space(&mut self) -> usize {
         let space = self.text[self.at..].iter().take_while(|byte| byte.is_ascii_whitespace());
         self.at += space.count();
         self.at
     }
 
-    /// Empty at the end.
+    /// Returns the next word, which is empty at the end.
     fn next(&mut self) -> &'a [u8] {
         let start = self.skip_space();
         let word = self.text[start..].iter().take_while(|byte| !byte.is_ascii_whitespace());

@@ -1,13 +1,14 @@
-//! Points a second of building a tree and of refitting it to points that have moved, on all threads.
+//! Points a second of building a tree and of refitting the tree to moved points, on all threads.
 //!
 //! `cargo bench -p surfel-tests --bench building`; `RAYON_NUM_THREADS` sets the threads, `POINTS` the
 //! number of points (1 million by default).
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use surfel::flat::{FlatPoints, Refit};
-use surfel::progress::Silent;
-use surfel::surface::SurfaceKind;
+use surfel_core::flat::{FlatPoints, Refit};
+use surfel_core::progress::NoProgress;
+use surfel_core::surface::SurfaceKind;
 use surfel_tests::clouds::waves;
+use surfel_tests::scenes::columns;
 
 criterion_group!(benches, building);
 criterion_main!(benches);
@@ -21,7 +22,7 @@ fn building(criterion: &mut Criterion) {
     group.sample_size(20).throughput(Throughput::Elements(n_points as u64));
     let colors = vec![[188; 3]; n_points];
     let still = waves(n_points, 0.0);
-    let build = || FlatPoints::new(&still, KIND, &colors, &Silent).unwrap();
+    let build = || FlatPoints::new(columns(&still, KIND, &colors), &NoProgress).unwrap();
     group.bench_function("build", |bencher| bencher.iter(build));
     let moving = [0.1, 0.2].map(|phase| waves(n_points, phase));
     let mut moving = moving.iter().cycle();
@@ -29,7 +30,7 @@ fn building(criterion: &mut Criterion) {
     group.bench_function("refit", |bencher| {
         bencher.iter(|| {
             let cloud = moving.next().unwrap();
-            let refit = points.refit(cloud, KIND, &colors).unwrap();
+            let refit = points.refit(columns(cloud, KIND, &colors));
             assert!(matches!(refit, Refit::Kept { .. }), "{refit:?}");
         });
     });

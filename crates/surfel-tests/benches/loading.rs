@@ -1,4 +1,7 @@
-//! Loading: binary PLY by points a second, LAZ against what its decoder alone does with the same bytes.
+//! Loading: points a second of binary PLY, and of LAZ relative to its decoder alone on the same bytes.
+//!
+//! `cargo bench -p surfel-tests --bench loading`; `POINTS` sets the number of points (by default 12 million of PLY
+//! and 5 million of LAZ).
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -6,39 +9,49 @@ use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use laz::{LazVlr, ParLasZipDecompressor};
-use surfel::math::{DVec3, Vec3};
-use surfel::points::PointCloud;
-use surfel::progress::Silent;
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::PointCloud;
+use surfel_core::progress::NoProgress;
 use surfel_formats::{LoadOptions, SaveOptions, load, load_bytes, save};
 
 criterion_group!(benches, ply, laz);
 criterion_main!(benches);
 
+/// Whether `cargo bench` runs this program; `cargo test` only checks that it works.
+fn is_timed() -> bool {
+    std::env::args().any(|argument| argument == "--bench")
+}
+
+fn n_points(usual: usize) -> usize {
+    std::env::var("POINTS").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
+}
+
 fn ply(criterion: &mut Criterion) {
-    let cloud = PointCloud { intensity: None, origin: DVec3::ZERO, ..survey(12_000_000) };
+    let n_points = n_points(12_000_000);
+    let cloud = PointCloud { intensity: None, origin: DVec3::ZERO, ..survey(n_points) };
     let path = file(&cloud, "ply");
     drop(cloud);
     let mut group = criterion.benchmark_group("ply");
-    group.throughput(Throughput::Elements(12_000_000)).sample_size(10);
+    group.throughput(Throughput::Elements(n_points as u64)).sample_size(10);
     group.bench_function("xyz float, rgb uchar", |bencher| {
-        bencher.iter(|| load(&path, &LoadOptions::default(), &Silent).unwrap());
+        bencher.iter(|| load(&path, &LoadOptions::default(), &NoProgress).unwrap());
     });
     group.finish();
     std::fs::remove_file(path).unwrap();
 }
 
 fn laz(criterion: &mut Criterion) {
-    let generated = file(&survey(5_000_000), "laz");
+    let generated = file(&survey(n_points(5_000_000)), "laz");
     let scan = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../../../shared/data/clouds/ign_lidar_697k.laz");
     for path in [&scan, &generated] {
         let Ok(bytes) = std::fs::read(path) else {
-            say(&format!("skipped: {} is absent", path.display()));
+            report(&format!("skipped: {} is absent", path.display()));
             continue;
         };
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut decoder = Decoder::new(&bytes);
-        let read = || load_bytes("a.laz", &bytes, &LoadOptions::default(), &Silent).unwrap();
+        let read = || load_bytes("a.laz", &bytes, &LoadOptions::default(), &NoProgress).unwrap();
 
         let mut group = criterion.benchmark_group("laz");
         group.throughput(Throughput::Elements(decoder.n_points)).sample_size(10);
@@ -48,13 +61,15 @@ fn laz(criterion: &mut Criterion) {
         group.bench_function(BenchmarkId::new("load", &name), |bencher| bencher.iter(read));
         group.finish();
 
-        let ratio = median_ratio(|| decoder.decode(&bytes), read);
-        say(&format!("{name}: load has {:.0} % of the decoder's throughput", 100.0 * ratio));
+        if is_timed() {
+            let ratio = median_ratio(|| decoder.decode(&bytes), read);
+            report(&format!("{name}: load has {:.0} % of the decoder's throughput", 100.0 * ratio));
+        }
     }
     std::fs::remove_file(generated).unwrap();
 }
 
-/// All points to one buffer by the decoder's own threads; the buffer is there before.
+/// The decoder of the crate `laz`, which decodes all points with its own threads to a buffer allocated before.
 struct Decoder {
     vlr: LazVlr,
     data_start: u64,
@@ -81,13 +96,13 @@ impl Decoder {
     }
 }
 
-/// Seconds of `a` by those of `b`: the median over pairs of runs, so that both see the same machine.
+/// Returns the median of the time of `a` over that of `b` in pairs of runs, so that load on the machine cancels.
 fn median_ratio<A, B>(mut a: impl FnMut() -> A, mut b: impl FnMut() -> B) -> f64 {
     fn seconds<T>(run: &mut impl FnMut() -> T) -> f64 {
         let start = Instant::now();
         let result = run();
         let seconds = start.elapsed().as_secs_f64();
-        // What was read is given back outside the time: whoever loads a cloud keeps it.
+        // The result is dropped outside of the measured time, because programs that load a cloud keep it.
         drop(result);
         seconds
     }
@@ -96,7 +111,7 @@ fn median_ratio<A, B>(mut a: impl FnMut() -> A, mut b: impl FnMut() -> B) -> f64
     ratios[ratios.len() / 2]
 }
 
-/// A hilly site scanned line by line, with noise, colours and intensities.
+/// Returns a hilly site scanned line by line, with noise, colours and intensities.
 fn survey(n: usize) -> PointCloud {
     let noise = |i: usize| ((i as u32).wrapping_mul(2_654_435_761) >> 16) as f32 / 65536.0;
     let position = |i: usize| {
@@ -118,11 +133,11 @@ fn file(cloud: &PointCloud, extension: &str) -> PathBuf {
     let name = format!("surfel-loading-{}.{extension}", std::process::id());
     let path = std::env::temp_dir().join(name);
     let options = SaveOptions { resolution: Some(DVec3::splat(0.001)), ..SaveOptions::default() };
-    save(&path, cloud, &options, &Silent).unwrap();
+    save(&path, cloud, &options, &NoProgress).unwrap();
     path
 }
 
-#[expect(clippy::print_stderr, reason = "a benchmark speaks to whoever runs it")]
-fn say(line: &str) {
+#[expect(clippy::print_stderr, reason = "a benchmark prints its results")]
+fn report(line: &str) {
     eprintln!("{line}");
 }

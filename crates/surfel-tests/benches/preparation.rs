@@ -1,15 +1,15 @@
-//! Points a second of everything between a file and a cloud that can be traced.
+//! Points a second of each step of preparation, from bare positions to a cloud that can be traced.
 //!
 //! `cargo bench -p surfel-tests --bench preparation`; `RAYON_NUM_THREADS` sets the threads, `POINTS` the
 //! number of points (1 million by default).
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
-use surfel::math::{Random, Vec3};
-use surfel::points::neighbors::{Method, Query, map_neighborhoods};
-use surfel::points::{Orientation, PointCloud, Preparation, Select};
-use surfel::points::{clean, fit_plane, orient, prepare, select};
-use surfel::progress::Silent;
+use surfel_core::math::{Random, Vec3};
+use surfel_core::points::neighbors::{NeighborMethod, Neighborhood, map_neighborhoods};
+use surfel_core::points::{Orientation, PointCloud, Preparation, Subsample};
+use surfel_core::points::{clean, fit_plane, orient, prepare, subsample};
+use surfel_core::progress::NoProgress;
 
 criterion_group!(benches, normals, steps);
 criterion_main!(benches);
@@ -18,7 +18,7 @@ fn n_points() -> usize {
     std::env::var("POINTS").ok().and_then(|text| text.parse().ok()).unwrap_or(1_000_000)
 }
 
-/// Waves sampled row by row, one point at a random place in each unit square, as a scanner would.
+/// Returns points of a wavy surface in the order of a scanner: row by row, at random positions in unit squares.
 fn in_scan_order() -> Vec<Vec3> {
     let n_points = n_points();
     let row_length = n_points.isqrt();
@@ -39,26 +39,26 @@ fn shuffled(mut positions: Vec<Vec3>) -> Vec<Vec3> {
     positions
 }
 
-/// Index, search and plane fit together.
+/// Measures index, search and plane fit as one.
 fn normals(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("normals");
     group.sample_size(10).throughput(Throughput::Elements(n_points() as u64));
     let orders = [("scan order", in_scan_order()), ("shuffled", shuffled(in_scan_order()))];
-    // About sixteen points are within 2.26.
-    let ways = [
-        (Method::Knn, Query::Nearest(16)),
-        (Method::Knn, Query::Within(2.26)),
-        (Method::Grid, Query::Within(2.26)),
-        (Method::ScanLine, Query::Within(2.26)),
+    // About sixteen points are within a distance of 2.26.
+    let searches = [
+        (NeighborMethod::Knn, Neighborhood::Nearest(16)),
+        (NeighborMethod::Knn, Neighborhood::Within(2.26)),
+        (NeighborMethod::Grid, Neighborhood::Within(2.26)),
+        (NeighborMethod::ScanLine, Neighborhood::Within(2.26)),
     ];
     for (order, positions) in &orders {
-        for (method, query) in ways {
+        for (method, query) in searches {
             let id = BenchmarkId::new(format!("{method} {query:?}"), order);
             group.bench_function(id, |bencher| {
                 bencher.iter(|| {
                     let fit =
                         |point: usize, neighbors: &[_]| fit_plane(positions, point, neighbors);
-                    map_neighborhoods(positions, method, query, &Silent, fit)
+                    map_neighborhoods(positions, method, query, &NoProgress, fit)
                 });
             });
         }
@@ -69,17 +69,17 @@ fn steps(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("steps");
     group.sample_size(10).throughput(Throughput::Elements(n_points() as u64));
     let cloud = PointCloud::from_positions(in_scan_order());
-    group.bench_function("clean", |bencher| bencher.iter(|| clean(cloud.clone(), &Silent)));
-    group.bench_function("select spacing", |bencher| {
-        bencher.iter(|| select(black_box(&cloud), Select::Spacing(2.0), 0, &Silent));
+    group.bench_function("clean", |bencher| bencher.iter(|| clean(cloud.clone(), &NoProgress)));
+    group.bench_function("subsample spacing", |bencher| {
+        bencher.iter(|| subsample(black_box(&cloud), Subsample::Spacing(2.0), 0, &NoProgress));
     });
     let preparation = Preparation::default();
     group.bench_function("prepare", |bencher| {
-        bencher.iter(|| prepare(cloud.clone(), &preparation, &Silent));
+        bencher.iter(|| prepare(cloud.clone(), &preparation, &NoProgress));
     });
-    let prepared = prepare(cloud.clone(), &preparation, &Silent).unwrap().0;
-    let normals = prepared.normals.clone().unwrap();
+    let prepared = prepare(cloud.clone(), &preparation, &NoProgress).unwrap().0;
+    let normals = prepared.normals().to_vec();
     group.bench_function("orient by spanning tree", |bencher| {
-        bencher.iter(|| orient(&prepared, normals.clone(), Orientation::SpanningTree, &Silent));
+        bencher.iter(|| orient(&prepared, normals.clone(), Orientation::SpanningTree, &NoProgress));
     });
 }

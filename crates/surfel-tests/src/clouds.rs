@@ -1,10 +1,10 @@
-//! Point clouds with closed forms, their true normals beside them.
+//! Point clouds of shapes with closed forms, with their exact normals.
 
 use std::f32::consts::PI;
-use surfel::math::{DVec3, Random, Vec3};
-use surfel::points::PointCloud;
+use surfel_core::math::{DVec3, Random, Vec3};
+use surfel_core::points::PointCloud;
 
-/// `n` points of a sphere about the origin on a Fibonacci lattice: each stands for the same area.
+/// Returns `n` points of a sphere about the origin on a Fibonacci lattice: each represents the same area.
 pub fn sphere(n: usize, radius: f32) -> PointCloud {
     let golden_angle = f64::from(PI) * (3.0 - 5f64.sqrt());
     let direction = |i: usize| {
@@ -17,7 +17,7 @@ pub fn sphere(n: usize, radius: f32) -> PointCloud {
     with_normals(normals.iter().map(|&normal| radius * normal).collect(), normals)
 }
 
-/// `n_side` * `n_side` points of the square |x|, |y| <= 1 at z = 0, each moved by up to `jitter` cells.
+/// Returns `n_side` * `n_side` points of the square |x|, |y| <= 1 at z = 0, each moved by up to `jitter` cells.
 pub fn plane(n_side: usize, jitter: f32, seed: u64) -> PointCloud {
     let cell = 2.0 / n_side as f32;
     let mut random = Random::new(seed, 0);
@@ -30,7 +30,7 @@ pub fn plane(n_side: usize, jitter: f32, seed: u64) -> PointCloud {
     with_normals(positions, normals)
 }
 
-/// The plane z = 0 and the plane x = 0, which cross along the Y axis.
+/// Returns points of the planes z = 0 and x = 0, which cross along the Y axis.
 pub fn crossing_planes(n_side: usize, jitter: f32, seed: u64) -> PointCloud {
     let level = plane(n_side, jitter, seed);
     let upright =
@@ -40,12 +40,12 @@ pub fn crossing_planes(n_side: usize, jitter: f32, seed: u64) -> PointCloud {
     with_normals(positions, [vec![Vec3::Z; n], vec![Vec3::X; n]].concat())
 }
 
-/// The faces of the box |x|, |y|, |z| <= 1, `n_side` * `n_side` points each.
+/// Returns points of the faces of the box |x|, |y|, |z| <= 1, `n_side` * `n_side` points each.
 pub fn cube(n_side: usize, jitter: f32, seed: u64) -> PointCloud {
     let (mut positions, mut normals) = (Vec::new(), Vec::new());
     for face in 0..6u8 {
         let sign = if face < 3 { 1.0 } else { -1.0 };
-        // Turning the axes about the diagonal takes one pair of faces to the next.
+        // A rotation about the diagonal maps one pair of faces to the next.
         let turn = |p: Vec3| match face % 3 {
             0 => p,
             1 => Vec3::new(p.z, p.x, p.y),
@@ -59,18 +59,18 @@ pub fn cube(n_side: usize, jitter: f32, seed: u64) -> PointCloud {
     with_normals(positions, normals)
 }
 
-/// `n` points of the X axis from -1 to 1: no surface, no normals.
+/// Returns `n` points of the X axis from -1 to 1, without normals.
 pub fn line(n: usize) -> PointCloud {
     let step = 2.0 / (n.max(2) - 1) as f32;
     PointCloud::from_positions((0..n).map(|i| Vec3::X * (i as f32 * step - 1.0)).collect())
 }
 
-/// The same point `n` times.
+/// Returns one point `n` times.
 pub fn equal_points(n: usize) -> PointCloud {
     PointCloud::from_positions(vec![Vec3::new(1.0, 2.0, 3.0); n])
 }
 
-/// Waves with one point at a random place in each unit square, row by row.
+/// Returns points of a wavy surface, row by row, at a random position in each unit square.
 pub fn waves(n_points: usize, phase: f32) -> PointCloud {
     let row_length = n_points.isqrt();
     let mut random = Random::new(1, 0);
@@ -87,7 +87,7 @@ pub fn waves(n_points: usize, phase: f32) -> PointCloud {
     PointCloud { normals: Some(normals), radii: Some(radii), ..cloud }
 }
 
-/// The same cloud as a survey would deliver it: far from the origin of a national grid.
+/// Returns a copy of a cloud far from the origin, like a survey in the coordinates of a national grid.
 pub fn georeferenced(cloud: &PointCloud) -> PointCloud {
     let origin = cloud.origin + DVec3::new(562_340.25, 4_183_210.5, 148.125);
     PointCloud { origin, ..cloud.clone() }
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_runs_from_end_to_end() {
+    fn a_line_includes_both_ends() {
         let cloud = line(11);
         assert_eq!((cloud.positions[0].x, cloud.positions[10].x), (-1.0, 1.0));
     }

@@ -1,6 +1,6 @@
-//! Scenes with known answers, shared by the tests and the benchmarks.
+//! Scenes with known answers, shared by the tests and the benchmarks of all crates.
 
 pub mod clouds;
 pub mod scenes;
-pub mod mesh;
-pub mod quality;
+pub mod ground_truth;
+pub mod deviation;

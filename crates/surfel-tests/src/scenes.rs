@@ -1,34 +1,79 @@
-//! Scenes for tests and benchmarks: clouds from `clouds` and meshes of closed forms, made ready to trace.
+//! Scenes for tests and benchmarks: prepared clouds, meshes of closed forms, cameras and rays.
 
 use std::f32::consts::{PI, TAU};
-use surfel::flat::{FlatCloud, FlatScene};
-use surfel::image::Image;
-use surfel::math::{DAffine3, DVec3, Random, Ray, Vec2, Vec3};
-use surfel::points::{PointCloud, Preparation, prepare};
-use surfel::progress::Silent;
-use surfel::render::{CpuRenderer, Renderer, Settings};
-use surfel::scene::{
-    Background, Camera, Geometry, Graph, Light, Material, Mesh, Node, Part, Points, Projection,
-    Scene, Transform,
+use surfel_core::flat::{FlatCloud, FlatScene, PointColumns};
+use surfel_core::image::Image;
+use surfel_core::math::{DAffine3, DVec3, Random, Ray, Vec2, Vec3};
+use surfel_core::points::{PointCloud, Preparation, PreparedCloud, prepare};
+use surfel_core::progress::NoProgress;
+use surfel_core::render::{CpuRenderer, Renderer, Settings};
+use surfel_core::scene::{
+    Background, Camera, CloudGeometry, Geometry, Graph, Light, Material, Mesh, Node, Primitive,
+    Projection, Scene, Transform,
 };
-use surfel::surface::{Boundary, SurfaceKind};
-use surfel::trace::Simd;
+use surfel_core::surface::{EdgeTest, SurfaceKind};
+use surfel_core::trace::Simd;
 
-/// `cloud` with the radii and normals it lacks, grey.
-pub fn points(cloud: PointCloud, surface: SurfaceKind) -> Points {
-    let (cloud, _) = prepare(cloud, &Preparation::default(), &Silent).unwrap();
-    let colors = vec![[188; 3]; cloud.len()];
-    Points { cloud, colors, surface, boundary: Boundary::Gap, has_outward_normals: false }
+/// Prepares a cloud, which adds missing normals and radii, and makes it grey.
+pub fn points(cloud: PointCloud, surface: SurfaceKind) -> CloudGeometry {
+    let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+    let mut points = grey(cloud.into_inner());
+    points.surface = surface;
+    points.edge_test = EdgeTest::AngularGap;
+    points
 }
 
-/// `cloud` made ready, matte, lit from the camera, seen from +X.
+/// Makes a cloud grey that has normals and radii, with default settings otherwise.
+pub fn grey(cloud: PointCloud) -> CloudGeometry {
+    CloudGeometry::with_uniform_color(PreparedCloud::new(cloud).unwrap(), [188; 3])
+}
+
+/// Returns the columns that the flat form of a cloud keeps.
+pub fn columns<'a>(
+    cloud: &'a PointCloud,
+    kind: SurfaceKind,
+    colors: &'a [[u8; 3]],
+) -> PointColumns<'a> {
+    let normals = cloud.normals.as_deref().unwrap();
+    let radii = cloud.radii.as_deref().unwrap();
+    PointColumns::new(kind, &cloud.positions, normals, radii, colors).unwrap()
+}
+
+/// Returns `points` with other colours.
+pub fn colored(points: &CloudGeometry, colors: Vec<[u8; 3]>) -> CloudGeometry {
+    let mut colored = CloudGeometry::new(points.cloud().clone(), colors).unwrap();
+    colored.surface = points.surface;
+    colored.edge_test = points.edge_test;
+    colored.has_outward_normals = points.has_outward_normals;
+    colored
+}
+
+/// Returns `points` with a changed cloud of the same number of points.
+pub fn changed(points: &CloudGeometry, change: impl FnOnce(&mut PointCloud)) -> CloudGeometry {
+    let mut cloud = points.cloud().clone().into_inner();
+    change(&mut cloud);
+    let mut changed = grey(cloud);
+    changed.surface = points.surface;
+    changed.edge_test = points.edge_test;
+    changed.has_outward_normals = points.has_outward_normals;
+    colored(&changed, points.colors().to_vec())
+}
+
+/// `points` with normals that point out of what they enclose.
+pub fn outward(points: &CloudGeometry) -> CloudGeometry {
+    let mut outward = points.clone();
+    outward.has_outward_normals = true;
+    outward
+}
+
+/// Prepares a cloud and returns a scene of it: matte, lit from the camera, seen from +X.
 pub fn scene(cloud: PointCloud, surface: SurfaceKind) -> Scene {
     lit(points(cloud, surface))
 }
 
-/// Points, matte, lit from the camera, seen from +X.
-pub fn lit(points: Points) -> Scene {
-    let cloud = &points.cloud;
+/// Returns a scene of matte points that are lit from the camera and seen from +X.
+pub fn lit(points: CloudGeometry) -> Scene {
+    let cloud = points.cloud();
     let camera = Camera {
         position: cloud.origin + DVec3::new(6.0, 0.0, 0.0),
         focal_point: cloud.origin,
@@ -36,27 +81,27 @@ pub fn lit(points: Points) -> Scene {
         projection: Projection::Perspective { view_angle_deg: 30.0 },
     };
     Scene {
-        graph: Graph::of(Geometry::Points(points), Material::MATTE),
+        graph: Graph::from_geometry(Geometry::Points(points), Material::MATTE),
         lights: vec![Light::Headlight(1.0)],
         background: Background::Transparent,
         camera,
     }
 }
 
-/// The flat form of [`points`].
+/// Prepares a cloud and returns its flat form.
 pub fn flat(cloud: PointCloud, surface: SurfaceKind) -> FlatCloud {
-    FlatCloud::new(&points(cloud, surface), &Silent).unwrap()
+    FlatCloud::new(&points(cloud, surface), &NoProgress).unwrap()
 }
 
-/// The only cloud of a scene.
-pub fn cloud(scene: &Scene) -> &Points {
+/// Returns the only cloud of a scene.
+pub fn cloud(scene: &Scene) -> &CloudGeometry {
     match &scene.graph.geometries[..] {
         [Geometry::Points(points)] => points,
         _ => panic!("not one cloud"),
     }
 }
 
-/// Rays from around a ball of `radius` about the origin toward places within it, some of bounded range.
+/// Returns rays from around a ball of `radius` about the origin toward points within it, some of bounded range.
 pub fn random_rays(n: usize, radius: f32, seed: u64) -> Vec<Ray> {
     let mut random = Random::new(seed, 0);
     let mut ball = || loop {
@@ -80,8 +125,8 @@ pub fn random_rays(n: usize, radius: f32, seed: u64) -> Vec<Ray> {
         .collect()
 }
 
-/// The parallelogram about `center` that reaches so far to the right and up, seen from its front; its
-/// texture coordinates are those of a picture's corners.
+/// Returns the parallelogram about `center` with half sides `right` and `up` as seen from its front; its texture
+/// coordinates are those of the corners of a picture.
 pub fn quad(center: Vec3, right: Vec3, up: Vec3) -> Mesh {
     let corner = |x: f32, y: f32| center + x * right + y * up;
     Mesh {
@@ -92,12 +137,12 @@ pub fn quad(center: Vec3, right: Vec3, up: Vec3) -> Mesh {
     }
 }
 
-/// The square |x|, |y| <= `half` at z = `height`, its front up.
+/// Returns the square |x|, |y| <= `half` at z = `height`; its front faces up.
 pub fn floor(height: f32, half: f32) -> Mesh {
     quad(height * Vec3::Z, half * Vec3::X, half * Vec3::Y)
 }
 
-/// The box between two corners, with vertices that its sides share.
+/// Returns the box between two corners, with vertices that its sides share.
 pub fn cuboid(min: Vec3, max: Vec3) -> Mesh {
     let corner = |i: usize| {
         let pick = |axis: usize| [min, max][i >> axis & 1][axis];
@@ -112,14 +157,14 @@ pub fn cuboid(min: Vec3, max: Vec3) -> Mesh {
     }
 }
 
-/// A closed ball about the origin of `n_rings` bands of `n_segments` quads, with vertex normals.
+/// Returns a closed ball about the origin of `n_rings` bands of `n_segments` quads, with vertex normals.
 pub fn uv_sphere(n_rings: u32, n_segments: u32, radius: f32) -> Mesh {
     let direction = |ring: u32, segment: u32| {
         let (sin, cos) = (PI * ring as f32 / n_rings as f32).sin_cos();
         let (sin_around, cos_around) = (TAU * segment as f32 / n_segments as f32).sin_cos();
         Vec3::new(sin * cos_around, sin * sin_around, cos)
     };
-    // The poles stand first and last.
+    // The poles are the first and last vertices.
     let between = (1..n_rings).flat_map(|ring| (0..n_segments).map(move |s| direction(ring, s)));
     let normals: Vec<Vec3> = [Vec3::Z].into_iter().chain(between).chain([-Vec3::Z]).collect();
     let south = normals.len() as u32 - 1;
@@ -135,7 +180,7 @@ pub fn uv_sphere(n_rings: u32, n_segments: u32, radius: f32) -> Mesh {
         let [c, d] = [vertex(lower, segment + 1), vertex(upper, segment + 1)];
         [[a, b, c], [a, c, d]]
     });
-    // At a pole two corners of the quad are one.
+    // At a pole two corners of a quad coincide.
     let triangles = triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect();
     Mesh {
         positions: normals.iter().map(|normal| radius * normal).collect(),
@@ -145,7 +190,7 @@ pub fn uv_sphere(n_rings: u32, n_segments: u32, radius: f32) -> Mesh {
     }
 }
 
-/// `mesh` with its vertices where `transform` takes them, front and back as they were.
+/// Returns `mesh` with transformed vertices; fronts of triangles stay fronts.
 pub fn baked(mesh: &Mesh, transform: DAffine3) -> Mesh {
     let origin = transform.transform_point3(mesh.origin);
     let for_normals = transform.matrix3.inverse().transpose();
@@ -162,22 +207,22 @@ pub fn baked(mesh: &Mesh, transform: DAffine3) -> Mesh {
     moved
 }
 
-/// A graph of several things, each of a material of its own, where they are.
+/// Returns a graph of several objects with materials of their own, without transforms.
 pub fn graph(things: Vec<(Geometry, Material)>) -> Graph {
     let mut graph = Graph::default();
     for (geometry, material) in things {
-        graph.append(Graph::of(geometry, material));
+        graph.append(Graph::from_geometry(geometry, material));
     }
     graph
 }
 
-/// A node that shows a geometry in a material, placed by a matrix.
-pub fn node(geometry: usize, material: usize, place: DAffine3) -> Node {
-    let parts = vec![Part { geometry, material }];
-    Node { parts, transform: Transform::Matrix(place), ..Node::new("") }
+/// Returns a node that shows a geometry with a material and has a matrix as its transform.
+pub fn node(geometry: usize, material: usize, matrix: DAffine3) -> Node {
+    let parts = vec![Primitive { geometry, material }];
+    Node { primitives: parts, transform: Transform::Matrix(matrix), ..Node::new("") }
 }
 
-/// Looks straight down at the middle of the world, +X to the right and +Y up.
+/// Returns an orthographic camera that looks straight down at the origin, with +X to the right and +Y up.
 pub fn from_above(height: f64) -> Camera {
     Camera {
         position: DVec3::new(0.0, 0.0, 10.0),
@@ -187,17 +232,17 @@ pub fn from_above(height: f64) -> Camera {
     }
 }
 
-/// The picture of `scene`.
+/// Renders a scene at the best SIMD level of this machine.
 pub fn render(scene: &Scene, settings: &Settings) -> Image {
-    let flat = FlatScene::new(scene, &Silent).unwrap();
-    CpuRenderer { simd: Simd::detect() }.render(&flat, settings, &Silent).unwrap().0
+    let flat = FlatScene::new(scene, &NoProgress).unwrap();
+    CpuRenderer { simd: Simd::detect() }.render(&flat, settings, &NoProgress).unwrap().0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Each edge of a closed surface is gone along once each way, and the volume within is positive.
+    /// Panics unless each edge is part of two triangles in opposite directions, and the volume is as expected.
     fn check_closed(mesh: &Mesh, volume: f32) {
         let edges = |triangle: &[u32; 3]| [0, 1, 2].map(|i| (triangle[i], triangle[(i + 1) % 3]));
         let mut all: Vec<(u32, u32)> = mesh.triangles.iter().flat_map(edges).collect();

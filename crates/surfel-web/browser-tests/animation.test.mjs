@@ -1,10 +1,10 @@
-// Scenes that move: the clock is scrubbed, played and looped.
+// Animated scenes: scrubbing, playing, looping, and the camera that an animation moves.
 
 import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
-import { closePage, drag, finishedPixels, openPage, placeAt, QUICK, serve, settled, state, unfoldPanel } from './harness.mjs';
+import { closePage, drag, finishedPixels, openPage, pixelAt, QUICK, serve, settled, state, unfoldPanel } from './harness.mjs';
 
-const SECONDS = 2;
+const DURATION_SECS = 2;
 let page;
 let first;
 before(async () => {
@@ -18,67 +18,73 @@ beforeEach(async () => {
 after(() => closePage(page));
 
 const time = async () => (await state(page, 'scene')).time;
-const scrub = (share, of = page) => of.locator('[data-key="time"]').fill(String(1000 * share));
-const reaches = (least) => page.waitForFunction((wanted) => wanted <= window.surfel.state.scene.time, least);
+const scrub = (fraction, target = page) => target.locator('[data-key="time"]').fill(String(1000 * fraction));
+const waitForTime = (time_secs) => page.waitForFunction((min) => min <= window.surfel.state.scene.time, time_secs);
 
-test('the clock is moved by hand, and back', async () => {
-  assert.equal((await state(page, 'info')).duration_secs, SECONDS);
+/** Waits for this many animation frames of the page. */
+const waitForFrames = (count) => page.evaluate((n) => new Promise((resolve) => {
+  const step = () => (0 < n-- ? requestAnimationFrame(step) : resolve());
+  step();
+}), count);
+
+test('the time slider shows the scene at its time', async () => {
+  assert.equal((await state(page, 'info')).duration_secs, DURATION_SECS);
   await scrub(0.5);
   assert.notEqual(await finishedPixels(page), first);
-  assert.equal(await time(), SECONDS / 2);
+  assert.equal(await time(), DURATION_SECS / 2);
   assert.equal(await page.locator('[data-output="time"]').textContent(), '1.00 s');
   await scrub(0);
   assert.equal(await finishedPixels(page), first);
 });
 
-test('a movement is played and paused', async () => {
+test('the animation plays and pauses', async () => {
   const button = page.locator('[data-action="play"]');
   const { frame } = await state(page, 'lastFrame');
   await button.click();
-  await reaches(0.3);
+  await waitForTime(0.3);
   await page.waitForFunction((before) => before + 2 < window.surfel.state.lastFrame.frame, frame);
   await button.click();
   assert.notEqual(await finishedPixels(page), first);
   const stopped = await time();
-  await page.waitForTimeout(200);
+  await waitForFrames(10);
   assert.equal(await time(), stopped);
 });
 
-test('it begins again, or ends, as it is told', async () => {
+test('the animation loops, or stops at its end', async () => {
   await scrub(0.9);
   await page.locator('[data-action="play"]').click();
   await page.waitForFunction(() => window.surfel.state.scene.time < 1.5);
   await page.locator('[data-key="animation.loop"]').setChecked(false);
-  await reaches(SECONDS);
+  await waitForTime(DURATION_SECS);
   await settled(page);
-  assert.equal(await time(), SECONDS);
+  assert.equal(await time(), DURATION_SECS);
   assert.equal(await page.locator('[data-action="play"]').textContent(), 'Play');
 });
 
-test('a camera that the scene moves is followed until it is moved by hand, and again', async () => {
-  const led = await openPage((await serve(['orbit.toml'], ...QUICK)).link);
-  await unfoldPanel(led);
-  const lead = led.locator('[data-key="camera.still"]');
-  const seen = async (share) => {
-    await scrub(share, led);
-    return { pixels: await finishedPixels(led), ...(await state(led, 'camera')) };
+test('the animation moves the camera until the user does, and again on request', async () => {
+  const orbiting = await openPage((await serve(['orbit.toml'], ...QUICK)).link);
+  await unfoldPanel(orbiting);
+  const follow = orbiting.locator('[data-key="camera.lock"]');
+  const viewAt = async (fraction) => {
+    await scrub(fraction, orbiting);
+    return { pixels: await finishedPixels(orbiting), ...(await state(orbiting, 'camera')) };
   };
-  const [start, quarter] = [await seen(0), await seen(0.25)];
+  const [start, quarter] = [await viewAt(0), await viewAt(0.25)];
   assert.notEqual(quarter.pixels, start.pixels);
-  const across = (camera) => camera.position.map((x, i) => x - camera.focal_point[i]).slice(0, 2);
-  const [[x, y], [turnedX, turnedY]] = [across(start), across(quarter)];
-  assert.ok(Math.hypot(turnedX + y, turnedY - x) < 1e-6 * Math.hypot(x, y), 'a quarter of a turn');
-  assert.ok(await lead.isChecked());
+  const horizontalOffset = (camera) => camera.position.map((x, i) => x - camera.focal_point[i]).slice(0, 2);
+  const [[x, y], [rotatedX, rotatedY]] = [horizontalOffset(start), horizontalOffset(quarter)];
+  assert.ok(Math.hypot(rotatedX + y, rotatedY - x) < 1e-6 * Math.hypot(x, y), 'a quarter of a turn');
+  assert.ok(await follow.isChecked());
 
-  await drag(led, await placeAt(led, 0.3, 0.5), await placeAt(led, 0.5, 0.5));
-  await settled(led);
-  const { position } = await state(led, 'camera');
+  await drag(orbiting, await pixelAt(orbiting, 0.3, 0.5), await pixelAt(orbiting, 0.5, 0.5));
+  await settled(orbiting);
+  const { position } = await state(orbiting, 'camera');
   assert.notDeepEqual(position, quarter.position);
-  assert.ok(!(await lead.isChecked()));
-  assert.deepEqual((await seen(0.5)).position, position);
+  assert.ok(!(await follow.isChecked()));
+  assert.deepEqual((await viewAt(0.5)).position, position);
 
-  await lead.setChecked(true);
-  await led.waitForFunction(() => !window.surfel.state.camera.still);
-  assert.deepEqual(await seen(0.25), quarter);
-  await closePage(led);
+  await follow.setChecked(true);
+  await orbiting.waitForFunction(() => !window.surfel.state.camera.lock);
+  assert.deepEqual(await viewAt(0.25), quarter);
+  await closePage(orbiting);
 });

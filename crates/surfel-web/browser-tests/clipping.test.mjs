@@ -1,4 +1,4 @@
-// Clipping by hand: handles on the picture move the faces of the box and the plane.
+// Clipping on the picture: handles move the faces of the box and the plane.
 
 import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
@@ -9,8 +9,8 @@ import { closePage, drag, finishedPixels, openPage, QUICK, serve, settled, show,
 
 const BOX = { min: [562322, 4183193, 145], max: [562345, 4183216, 155] };
 const PLANES = { 'level plane': [562334, 4183205, 149, 0, 0, 1], 'slanting plane': [562334, 4183205, 149, 0.6, 0, 0.8] };
-/** In world units; a pixel spans less than a tenth of them. */
-const WAY = 2;
+/** Length of a drag in world units; a pixel is smaller than `TOLERANCE`. */
+const DRAG_LENGTH = 2;
 const TOLERANCE = 0.1;
 
 let page;
@@ -28,16 +28,16 @@ async function middleOf(locator) {
   return { x: x + width / 2, y: y + height / 2 };
 }
 
-/** Where a point of the world is in the window. */
+/** Position of a point of the world in the window. */
 async function inWindow(point) {
-  const [stage, place] = [await page.locator('#stage').boundingBox(), project(await state(page, 'camera'), await state(page, 'size'), point)];
-  return { x: stage.x + place.x, y: stage.y + place.y };
+  const [viewport, pixel] = [await page.locator('#viewport').boundingBox(), project(await state(page, 'camera'), await state(page, 'size'), point)];
+  return { x: viewport.x + pixel.x, y: viewport.y + pixel.y };
 }
 
-/** Takes a handle to a point of the world; the picture is another then, of the same camera, and the handle is there. */
-async function pull(name, goal) {
+/** Drags a handle to a point of the world; checks that picture and handle follow, and that the camera does not. */
+async function dragHandle(name, target) {
   const [before, camera] = [await finishedPixels(page), await state(page, 'camera')];
-  const end = await inWindow(goal);
+  const end = await inWindow(target);
   await drag(page, await middleOf(handle(name)), end, { steps: 3 });
   assert.notEqual(await finishedPixels(page), before);
   assert.deepEqual(await state(page, 'camera'), camera);
@@ -48,10 +48,10 @@ async function pull(name, goal) {
 for (const { axis, end, middle, direction } of clip.facesOf(BOX)) {
   test(`the box's face at the ${end} of ${'xyz'[axis]} is dragged`, async () => {
     await show(page, { clip_box: clip.formatBox(BOX) });
-    const goal = addScaled(middle, direction, -WAY);
-    await pull(`box ${axis} ${end}`, goal);
+    const target = addScaled(middle, direction, -DRAG_LENGTH);
+    await dragHandle(`box ${axis} ${end}`, target);
     const found = clip.parseBox((await state(page, 'scene')).clip_box);
-    assert.ok(Math.abs(found[end][axis] - goal[axis]) < TOLERANCE, `${found[end][axis]}, not ${goal[axis]}`);
+    assert.ok(Math.abs(found[end][axis] - target[axis]) < TOLERANCE, `${found[end][axis]}, not ${target[axis]}`);
     assert.deepEqual(clip.withFace(found, { axis, end }, middle[axis]), BOX, 'the other faces stay');
   });
 }
@@ -61,36 +61,36 @@ for (const [name, plane] of Object.entries(PLANES)) {
     await show(page, { clip_plane: plane });
     const { bounds } = await state(page, 'info');
     const start = clip.parsePlane(plane);
-    const position = clip.positionOf(start, bounds) + WAY;
-    await pull('plane', clip.planeAt(start, bounds, position).point);
+    const position = clip.positionOf(start, bounds) + DRAG_LENGTH;
+    await dragHandle('plane', clip.planeAt(start, bounds, position).point);
     const found = clip.parsePlane((await state(page, 'scene')).clip_plane);
     assert.ok(Math.abs(clip.positionOf(found, bounds) - position) < TOLERANCE, `${found.point}`);
     assert.ok(1 - 1e-9 < dot(found.normal, start.normal), `${found.normal}`);
   });
 }
 
-test('pictures come while a handle is still being dragged', async () => {
+test('pictures follow while a handle is dragged', async () => {
   await show(page, { clip_box: clip.formatBox(BOX) });
-  const [from, { input }] = [await middleOf(handle('box 0 max')), await state(page, 'lastFrame')];
+  const [from, { seq }] = [await middleOf(handle('box 0 max')), await state(page, 'lastFrame')];
   await page.mouse.move(from.x, from.y);
   await page.mouse.down();
   await page.mouse.move(from.x - 40, from.y);
-  await page.waitForFunction((before) => before < window.surfel.state.lastFrame.input, input);
+  await page.waitForFunction((before) => before < window.surfel.state.lastFrame.seq, seq);
   assert.notEqual((await state(page, 'scene')).clip_box, clip.formatBox(BOX));
   await page.mouse.up();
   await settled(page);
 });
 
-test('edges are bent as a panorama bends them', async () => {
-  const place = [562334, 4183203, 152];
-  await show(page, { clip_box: clip.formatBox(BOX), camera: { panorama: true, view_angle: null, position: place, focal_point: [562334, 4183213, 152] } });
+test('edges are curved in a panorama', async () => {
+  const position = [562334, 4183203, 152];
+  await show(page, { clip_box: clip.formatBox(BOX), camera: { panorama: true, view_angle: null, position, focal_point: [562334, 4183213, 152] } });
   const [camera, size, corners] = [await state(page, 'camera'), await state(page, 'size'), cornersOf(BOX)];
   const lines = await page.locator('.clip-edge').evaluateAll((all) =>
     all.map(({ x1, y1, x2, y2 }) => [x1, y1, x2, y2].map(({ baseVal }) => baseVal.value)));
-  assert.deepEqual(lines.filter(([x1, , x2]) => size.width / 4 < Math.abs(x1 - x2)), [], 'none goes across the picture');
+  assert.deepEqual(lines.filter(([x1, , x2]) => size.width / 4 < Math.abs(x1 - x2)), [], 'no edge crosses the whole picture');
   for (const [a, b] of [[0, 1], [2, 3], [4, 5], [6, 7], [5, 7], [1, 5]]) {
-    for (const share of [0.1, 0.25, 0.4, 0.75]) {
-      const { x, y } = project(camera, size, mix(corners[a], corners[b], share));
+    for (const fraction of [0.1, 0.25, 0.4, 0.75]) {
+      const { x, y } = project(camera, size, mix(corners[a], corners[b], fraction));
       const off = Math.min(...lines.map(([x1, y1, x2, y2]) => distanceToLine(x, y, x1, y1, x2, y2)));
       assert.ok(off < 1, `${off} pixels off the edge from ${a} to ${b}`);
     }
@@ -99,6 +99,6 @@ test('edges are bent as a panorama bends them', async () => {
 
 function distanceToLine(x, y, x1, y1, x2, y2) {
   const along = ((x - x1) * (x2 - x1) + (y - y1) * (y2 - y1)) / ((x2 - x1) ** 2 + (y2 - y1) ** 2);
-  const share = Math.min(1, Math.max(0, along));
-  return Math.hypot(x - x1 - share * (x2 - x1), y - y1 - share * (y2 - y1));
+  const fraction = Math.min(1, Math.max(0, along));
+  return Math.hypot(x - x1 - fraction * (x2 - x1), y - y1 - fraction * (y2 - y1));
 }

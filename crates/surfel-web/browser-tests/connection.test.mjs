@@ -1,50 +1,50 @@
-// Connections: lost and found again, several at once, and closed to strangers.
+// Connections: reconnecting, several pages at once, and access control.
 
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import { blankPage, closePage, drag, finishedPixels, openPage, pixels, placeAt, QUICK, serve, settled, show, state } from './harness.mjs';
+import { blankPage, closePage, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, serve, settled, show, state } from './harness.mjs';
 
 const open = [];
 after(() => Promise.all(open.map((page) => page.context().close())));
 
-async function opened(link) {
+async function openTracked(link) {
   const page = await openPage(link);
   open.push(page);
   return page;
 }
 
-test('a page finds its server again, and keeps its view', async () => {
+test('a page reconnects and keeps its view', async () => {
   const server = await serve(['town.ply'], ...QUICK);
-  const page = await opened(server.link);
+  const page = await openTracked(server.link);
   await show(page, { color: 'elevation', range: [147, 152], sun: { azimuth: 100 } });
-  await drag(page, await placeAt(page, 0.5, 0.5), await placeAt(page, 0.6, 0.5));
+  await drag(page, await pixelAt(page, 0.5, 0.5), await pixelAt(page, 0.6, 0.5));
   const [screen, camera] = [await finishedPixels(page), await state(page, 'camera')];
   await server.stop();
   await page.locator('#banner', { hasText: 'no connection' }).waitFor();
-  // What is turned meanwhile is not lost, nor what was before.
-  await page.locator('#stage').focus();
+  // Changes made while there is no connection are kept, and so are those before.
+  await page.locator('#viewport').focus();
   await page.keyboard.press('5');
-  const turned = await state(page, 'camera');
-  assert.notDeepEqual(turned, camera);
+  const rotated = await state(page, 'camera');
+  assert.notDeepEqual(rotated, camera);
   await serve(['town.ply'], '--port', server.port, ...QUICK);
   await page.locator('#banner').waitFor({ state: 'hidden' });
-  assert.notEqual(await finishedPixels(page), screen, 'what was turned meanwhile is shown');
+  assert.notEqual(await finishedPixels(page), screen, 'the change made meanwhile is shown');
   await page.keyboard.press('o');
   await settled(page);
   const { color, range, sun } = await state(page, 'scene');
   assert.deepEqual([color, range, sun.azimuth], ['elevation', [147, 152], 100]);
   const found = await state(page, 'camera');
-  assert.deepEqual(found.view_up.map((value) => Math.round(value * 1e6) / 1e6), turned.view_up.map((value) => Math.round(value * 1e6) / 1e6));
+  assert.deepEqual(found.view_up.map((value) => Math.round(value * 1e6) / 1e6), rotated.view_up.map((value) => Math.round(value * 1e6) / 1e6));
   await page.keyboard.press('p');
   await show(page, {});
   assert.notEqual(await finishedPixels(page), screen);
 });
 
-test('a page that only waited shows the same picture again', async () => {
+test('a page without changes shows the same picture after reconnecting', async () => {
   const server = await serve(['town.ply'], ...QUICK);
-  const page = await opened(server.link);
+  const page = await openTracked(server.link);
   await show(page, { color: 'class', surface: 'sphere' });
-  await drag(page, await placeAt(page, 0.5, 0.5), await placeAt(page, 0.7, 0.4));
+  await drag(page, await pixelAt(page, 0.5, 0.5), await pixelAt(page, 0.7, 0.4));
   const screen = await finishedPixels(page);
   const { shownAt } = await state(page, 'lastFrame');
   await server.stop();
@@ -57,9 +57,9 @@ test('a page that only waited shows the same picture again', async () => {
   assert.equal(await pixels(page), screen);
 });
 
-test('two pages look each at their own, and one outlives the other', async () => {
+test('two pages have views of their own, and one survives the other', async () => {
   const server = await serve(['town.ply'], ...QUICK);
-  const [one, other] = [await opened(server.link), await opened(server.link)];
+  const [one, other] = [await openTracked(server.link), await openTracked(server.link)];
   const screen = await finishedPixels(one);
   await other.keyboard.press('5');
   await show(other, { color: 'class' });
@@ -68,12 +68,12 @@ test('two pages look each at their own, and one outlives the other', async () =>
   const { clients } = await (await fetch(new URL('/stats', server.link))).json();
   assert.equal(clients, 2);
   await closePage(other);
-  await drag(one, await placeAt(one, 0.5, 0.5), await placeAt(one, 0.6, 0.5));
+  await drag(one, await pixelAt(one, 0.5, 0.5), await pixelAt(one, 0.6, 0.5));
   assert.notEqual(await finishedPixels(one), screen);
   await closePage(one);
 });
 
-test('beyond this machine a token is needed', async () => {
+test('beyond loopback a token is required', async () => {
   const server = await serve(['town.ply'], '--host', '0.0.0.0', ...QUICK);
   const token = new URL(server.link).searchParams.get('token');
   assert.match(token, /^[0-9a-f]{32}$/);
@@ -87,26 +87,26 @@ test('beyond this machine a token is needed', async () => {
     for (const path of ['render', 'scene', 'stats']) assert.equal((await fetch(address + path + query)).status, 401, path);
   }
   const page = await openPage(`${address}?token=${token}`);
-  // The token stays in links that are taken from the page.
+  // Exported links contain the token.
   await show(page, { color: 'class' });
-  await page.locator('[data-action="take"]').click();
-  await page.locator('[data-form="link"]').click();
-  const link = await page.locator('#take-text').inputValue();
+  await page.locator('[data-action="export"]').click();
+  await page.locator('[data-format="link"]').click();
+  const link = await page.locator('#export-text').inputValue();
   assert.equal(new URL(link).searchParams.get('token'), token);
   await closePage(page);
   const picture = await fetch(`${address}render?resolution=20x10&token=${token}`);
   assert.equal(picture.headers.get('content-type'), 'image/png');
 });
 
-test('pages of other origins and names get nothing', async () => {
+test('pages of other origins are denied', async () => {
   const server = await serve(['town.ply'], ...QUICK);
   const foreign = await blankPage();
   await foreign.goto('about:blank');
-  const isRefused = await foreign.evaluate((address) => new Promise((resolve) => {
+  const isDenied = await foreign.evaluate((address) => new Promise((resolve) => {
     const socket = new WebSocket(address);
     socket.onopen = () => resolve(false);
     socket.onerror = () => resolve(true);
   }), `ws://127.0.0.1:${server.port}/ws`);
-  assert.ok(isRefused);
+  assert.ok(isDenied);
   await foreign.context().close();
 });

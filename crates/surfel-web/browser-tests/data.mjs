@@ -1,4 +1,4 @@
-// What the tests look at: a small town scanned in national coordinates, a house as a mesh, a scene that moves.
+// Test data: a small town scanned in national-grid coordinates, a house as a mesh, and animated scenes.
 
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -7,13 +7,13 @@ import { join } from 'node:path';
 const ORIGIN = [562316.125, 4183187.5, 148];
 const SIDE = 142;
 const SPACING = 0.25;
-/** Of the coordinates in the files. */
+/** Resolution of the coordinates in the files. */
 export const RESOLUTION = 0.001;
 
-const to = (decimals, value) => Number(value.toFixed(decimals));
+const roundTo = (decimals, value) => Number(value.toFixed(decimals));
 
-/** The same numbers from 0 to 1 at every run (Mulberry32, by T. Ettinger). */
-function numbers(seed) {
+/** A generator of reproducible numbers from 0 to 1 (Mulberry32, by T. Ettinger). */
+function randomNumbers(seed) {
   return () => {
     seed = (seed + 0x6d2b79f5) | 0;
     let t = Math.imul(seed ^ (seed >>> 15), 1 | seed);
@@ -24,15 +24,15 @@ function numbers(seed) {
 
 /** About 20,000 points, each as an object with the columns of the file. */
 function townPoints() {
-  const random = numbers(7);
+  const random = randomNumbers(7);
   return Array.from({ length: SIDE * SIDE }, (_, i) => {
     const [east, north] = [i % SIDE, Math.floor(i / SIDE)].map((step) => SPACING * (step + 0.4 * (random() - 0.5)));
     const isRoof = 8 < east && east < 14 && 12 < north && north < 20;
     const height = isRoof ? 6 : 2 * Math.sin(east / 5) * Math.cos(north / 7);
     return {
-      x: to(3, ORIGIN[0] + east), y: to(3, ORIGIN[1] + north), z: to(3, ORIGIN[2] + height),
+      x: roundTo(3, ORIGIN[0] + east), y: roundTo(3, ORIGIN[1] + north), z: roundTo(3, ORIGIN[2] + height),
       red: isRoof ? 190 : Math.floor(60 + 4 * east), green: isRoof ? 80 : Math.floor(200 - 2 * north), blue: Math.floor(256 * random()),
-      intensity: Math.floor(65536 * random()), classification: isRoof ? 6 : 2, gps_time: to(4, 318000 + i / 1000),
+      intensity: Math.floor(65536 * random()), classification: isRoof ? 6 : 2, gps_time: roundTo(4, 318000 + i / 1000),
     };
   });
 }
@@ -49,7 +49,7 @@ function ply(points) {
   return [...header, ...rows, ''].join('\n');
 }
 
-/** A box without a floor, beside the roof, its sides facing outward. */
+/** A box without a floor next to the roof; its faces point outward. */
 function houseObj() {
   const [x, y, z] = ORIGIN;
   const corners = [[20, 6, -3], [26, 6, -3], [26, 12, -3], [20, 12, -3], [20, 6, 5], [26, 6, 5], [26, 12, 5], [20, 12, 5]];
@@ -87,7 +87,7 @@ kind = "orbit"
 seconds = 4
 `;
 
-/** The town goes up by 20 within two seconds. */
+/** The town rises by 20 within two seconds. */
 const RISING_TOML = `
 [[object]]
 name = "town"
@@ -99,9 +99,9 @@ times = [0, 2]
 translate = [[0, 0, 0], [0, 0, 20]]
 `;
 
-/** A triangle, and a camera that goes past it: from 6 to 4 away within two seconds. */
+/** A triangle, and a camera that passes it: its distance goes from 6 to 4 within two seconds. */
 function pastGltf() {
-  const floats = [-1, 0, 0, 1, 0, 0, 0, 2, 0, /* times */ 0, 2, /* places */ 0, 1, 6, 3, 1, 4];
+  const floats = [-1, 0, 0, 1, 0, 0, 0, 2, 0, /* times */ 0, 2, /* positions */ 0, 1, 6, 3, 1, 4];
   const uri = `data:;base64,${Buffer.from(new Float32Array(floats).buffer).toString('base64')}`;
   const view = (byteOffset, byteLength) => ({ buffer: 0, byteOffset, byteLength });
   const accessor = (bufferView, count, type, min, max) => ({ bufferView, componentType: 5126, count, type, min, max });
@@ -116,7 +116,7 @@ function pastGltf() {
   });
 }
 
-/** Writes everything into a new folder. */
+/** Writes all files into a new folder. */
 export function makeData() {
   const folder = mkdtempSync(join(tmpdir(), 'surfel-browser-'));
   const points = townPoints();

@@ -1,28 +1,28 @@
-// What all tests use: a server of its own for each file of tests, pages on it, and what their pictures show.
+// Shared by all tests: servers, pages on them, and the pictures that they show.
 
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import { createRequire } from 'node:module';
 import { join } from 'node:path';
 import { after } from 'node:test';
-import { hashOf } from '../page/link.js';
+import { encodeHash } from '../page/link.js';
 import { makeData } from './data.mjs';
 
 const TARGET = process.env.CARGO_TARGET_DIR ?? join(import.meta.dirname, '../../../target');
 /** The program under test. */
 export const SURFEL = process.env.SURFEL ?? join(TARGET, 'debug/surfel');
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
-const PATIENCE_MS = 60_000;
-/** Leads to this machine, but is no secure context to the browser, as those of other machines are none. */
+const TIMEOUT_MS = 60_000;
+/** A host name of this machine that is no secure context to the browser, like the names of other machines. */
 export const PLAIN_HOST = 'surfel.test';
 const FLAGS = [`--host-resolver-rules=MAP ${PLAIN_HOST} 127.0.0.1`, '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
   '--disable-background-networking', '--disable-component-update', '--disable-sync'];
 
-/** Few rays a pixel, so that pictures end soon. */
-export const QUICK = ['--spp', '2', '--samples', '2'];
+/** Options with few rays a pixel, so that pictures are soon finished. */
+export const QUICK = ['--spp', '2', '--light-samples', '2'];
 const VIEWPORT = { width: 760, height: 420 };
 
-/** `PLAYWRIGHT` is the folder into which `npm install playwright-core` was told to put it. */
+/** `PLAYWRIGHT` is the folder into which npm installed playwright-core. */
 const { chromium } = createRequire(join(process.env.PLAYWRIGHT ?? import.meta.dirname, 'x.js'))('playwright-core');
 
 export const data = makeData();
@@ -34,17 +34,17 @@ after(async () => {
   data.remove();
 });
 
-/** A server of these files, as soon as it tells its link. */
+/** Starts a server of these files; resolves once it has printed its link. */
 export async function serve(files, ...options) {
   const port = options.includes('--port') ? [] : ['--port', '0'];
   const words = ['view', '--quiet', ...files, ...port, ...options];
   const server = spawn(SURFEL, words, { cwd: data.folder, stdio: ['ignore', 'pipe', 'inherit'] });
   servers.add(server);
   const link = await new Promise((resolve, reject) => {
-    let told = '';
+    let output = '';
     server.stdout.on('data', (text) => {
-      told += text;
-      const found = told.match(/http:\S+(?=\s)/);
+      output += text;
+      const found = output.match(/http:\S+(?=\s)/);
       if (found) resolve(found[0]);
     });
     server.on('exit', (status) => reject(new Error(`surfel ${words.join(' ')} ended with ${status}`)));
@@ -57,20 +57,20 @@ export async function serve(files, ...options) {
   return { link, port: new URL(link).port, stop };
 }
 
-/** Runs the program as a shell would, in the folder of the data. */
+/** Runs a command line of the program in a shell, in the folder of the data. */
 export function shell(command) {
   const words = `surfel() { "$SURFEL" "$@"; }\n${command}`;
   return execFileSync('bash', ['-c', words], { cwd: data.folder, env: { ...process.env, SURFEL }, stdio: ['ignore', 'pipe', 'inherit'] });
 }
 
-/** An empty page that takes notes of what goes wrong in it. */
+/** An empty page that records its errors and warnings in `faults`. */
 export async function blankPage(options = {}) {
   const context = await browser.newContext({ viewport: VIEWPORT, reducedMotion: 'reduce', ...options });
   if (!options.isMobile) await context.grantPermissions(['clipboard-read', 'clipboard-write']);
   await context.addInitScript(defineReadPixels);
-  await context.addInitScript(defineHeard);
+  await context.addInitScript(definePicks);
   const page = await context.newPage();
-  page.setDefaultTimeout(PATIENCE_MS);
+  page.setDefaultTimeout(TIMEOUT_MS);
   page.faults = [];
   page.on('pageerror', (error) => page.faults.push(error.stack));
   page.on('console', (message) => {
@@ -79,7 +79,7 @@ export async function blankPage(options = {}) {
   return page;
 }
 
-/** A page that shows a finished picture. */
+/** Opens a page and waits for its finished picture. */
 export async function openPage(link, options) {
   const page = await blankPage(options);
   await page.goto(link);
@@ -87,7 +87,7 @@ export async function openPage(link, options) {
   return page;
 }
 
-/** Closes a page after its tests; nothing may have gone wrong in it. */
+/** Closes a page after its tests; asserts that it has recorded only these faults. */
 export async function closePage(page, faults = []) {
   await page.context().close();
   assert.deepEqual(page.faults, faults);
@@ -95,26 +95,26 @@ export async function closePage(page, faults = []) {
 
 export const state = (page, key) => page.evaluate((name) => window.surfel.state[name], key);
 
-/** Waits until the finished picture of all that was done is on the screen, with all that is drawn over it. */
+/** Waits until the screen shows the finished picture of all changes, with its overlay. */
 export async function settled(page) {
-  const calm = await page.evaluateHandle(() => ({ frame: 0, n_checks: 0 }));
+  const progress = await page.evaluateHandle(() => ({ frame: 0, n_checks: 0 }));
   await page.waitForFunction((seen) => {
-    const { lastFrame, lastInput, size, connected, agreed } = window.surfel?.state ?? {};
-    const isFinished = connected && agreed && lastFrame?.finished && lastFrame.input === lastInput
+    const { lastFrame, lastSeq, size, connected, synced } = window.surfel?.state ?? {};
+    const isFinished = connected && synced && lastFrame?.finished && lastFrame.seq === lastSeq
       && lastFrame.width === size.width && lastFrame.height === size.height;
-    // While the pivot is shown, the page has still to tell that the hand rests, and gets another picture for it.
-    const isAtRest = !document.querySelector('.pivot');
-    seen.n_checks = isFinished && isAtRest && (seen.n_checks === 0 || seen.frame === lastFrame.frame) ? seen.n_checks + 1 : 0;
+    // While the pivot is shown, the interaction has not ended, and its end requests another picture.
+    const isIdle = !document.querySelector('.pivot');
+    seen.n_checks = isFinished && isIdle && (seen.n_checks === 0 || seen.frame === lastFrame.frame) ? seen.n_checks + 1 : 0;
     seen.frame = lastFrame?.frame;
-    // What is done is sent in the next animation frame, and what comes is drawn over in the next.
+    // Changes are sent in the next animation frame, and the overlay is drawn in the one after a picture.
     return seen.n_checks === 3;
-  }, calm, { timeout: PATIENCE_MS });
+  }, progress, { timeout: TIMEOUT_MS });
 }
 
-/** In the page: counts what the server answers to picks, in `heard.n_picks`; the next ones wait for `heard.delays_ms`. */
-function defineHeard() {
-  const heard = { n_picks: 0, delays_ms: [] };
-  window.heard = heard;
+/** Runs in the page: counts the answers to picks in `picks.n_answered`, and delays the next ones by `picks.delays_ms`. */
+function definePicks() {
+  const picks = { n_answered: 0, delays_ms: [] };
+  window.picks = picks;
   window.WebSocket = class extends WebSocket {
     constructor(...words) {
       super(...words);
@@ -123,22 +123,22 @@ function defineHeard() {
         event.stopImmediatePropagation();
         setTimeout(() => {
           this.onmessage({ data: event.data });
-          heard.n_picks += 1;
-        }, heard.delays_ms.shift() ?? 0);
+          picks.n_answered += 1;
+        }, picks.delays_ms.shift() ?? 0);
       });
     }
   };
 }
 
-/** From now on, `window.pictures` are all that the page has shown, each as `lastFrame` was. */
-export const watchPictures = (page) => page.evaluate(() => {
+/** Records each picture that the page shows from now on in `window.pictures`, as `lastFrame`. */
+export const recordPictures = (page) => page.evaluate(() => {
   window.pictures = [];
-  // The status line tells of each.
+  // The status line changes with each picture.
   const watch = new MutationObserver(() => window.pictures.push(window.surfel.state.lastFrame));
   watch.observe(document.getElementById('numbers'), { childList: true });
 });
 
-/** In the page: the bytes of the picture on the screen, read from a copy that leaves the page's canvas alone. */
+/** Runs in the page: reads the bytes of the picture from a copy, which leaves the page's canvas unchanged. */
 function defineReadPixels() {
   window.readPixels = () => {
     const picture = document.getElementById('picture');
@@ -159,18 +159,18 @@ export async function finishedPixels(page) {
   return pixels(page);
 }
 
-/** How many colours the picture has. */
+/** Number of different colours in the picture. */
 export const colorCount = (page) => page.evaluate(() => new Set(new Uint32Array(window.readPixels().buffer)).size);
 
-/** Opens all parts of the panel. */
+/** Opens all sections of the panel. */
 export const unfoldPanel = (page) => page.evaluate(() => {
   for (const part of document.querySelectorAll('#panel details')) part.open = true;
 });
 
-/** A place of the window, in CSS pixels, by shares of the picture's width and height. */
-export async function placeAt(page, across, along) {
-  const stage = await page.locator('#stage').boundingBox();
-  return { x: Math.round(stage.x + across * stage.width), y: Math.round(stage.y + along * stage.height) };
+/** A position in the window in CSS pixels, given as fractions of the picture's width and height. */
+export async function pixelAt(page, x, y) {
+  const viewport = await page.locator('#viewport').boundingBox();
+  return { x: Math.round(viewport.x + x * viewport.width), y: Math.round(viewport.y + y * viewport.height) };
 }
 
 export async function drag(page, from, to, { button = 'left', steps = 8 } = {}) {
@@ -180,23 +180,23 @@ export async function drag(page, from, to, { button = 'left', steps = 8 } = {}) 
   await page.mouse.up({ button });
 }
 
-/** Presses a button that copies. That it did, it shows only for a moment, which a slow machine might miss. */
+/** Clicks on a copy button, and waits for its confirmation, which is recorded, as it is shown only for a moment. */
 export async function copyBy(button) {
   await button.evaluate((element) => {
     delete element.dataset.copied;
-    const look = () => { if (element.matches('.is-done')) element.dataset.copied = ''; };
-    new MutationObserver(look).observe(element, { attributeFilter: ['class'] });
+    const record = () => { if (element.matches('.is-done')) element.dataset.copied = ''; };
+    new MutationObserver(record).observe(element, { attributeFilter: ['class'] });
   });
   await button.click();
   await button.and(button.page().locator('[data-copied]')).waitFor();
 }
 
-/** Shows the opening view as `patch` changes it, as a link typed into the address bar does. */
+/** Shows the initial scene with `patch`, as a link typed into the address bar does. */
 export async function show(page, patch) {
   await page.evaluate((to) => new Promise((resolve) => {
     if (location.hash === to) resolve();
     window.addEventListener('hashchange', () => resolve(), { once: true });
     location.hash = to;
-  }), hashOf(patch));
+  }), encodeHash(patch));
   await settled(page);
 }

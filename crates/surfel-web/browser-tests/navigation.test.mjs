@@ -1,10 +1,10 @@
-// Moving about: mouse, fingers and keys do what the help says.
+// Navigation: mouse, touch and keys do what the help says.
 
 import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
 import * as cameras from '../page/camera.js';
 import { distance, dot } from '../page/vector.js';
-import { closePage, drag, finishedPixels, openPage, pixels, placeAt, QUICK, serve, settled, state, unfoldPanel } from './harness.mjs';
+import { closePage, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, serve, settled, state, unfoldPanel } from './harness.mjs';
 
 let server;
 let page;
@@ -12,7 +12,7 @@ let first;
 let opening;
 before(async () => {
   server = await serve(['town.ply'], ...QUICK);
-  // Wide enough for places beside the card.
+  // Wide enough to click next to the card.
   page = await openPage(server.link, { viewport: { width: 900, height: 440 } });
   await unfoldPanel(page);
   first = await finishedPixels(page);
@@ -22,86 +22,86 @@ beforeEach(async () => {
   await page.reload();
   await settled(page);
   await unfoldPanel(page);
-  await page.locator('#stage').focus();
+  await page.locator('#viewport').focus();
 });
 after(() => closePage(page));
 
 const { axesOf, focalDistance, isOrthographic } = cameras;
 const isNear = (a, b, tolerance, what) => assert.ok(distance(a, b) <= tolerance, `${what}: ${a} and ${b}`);
 
-/** The camera when all is still, of a picture that is another than at the start. */
-async function moved() {
+/** Waits for a finished picture, which differs from the first one; returns its camera. */
+async function movedCamera() {
   assert.notEqual(await finishedPixels(page), first);
   return state(page, 'camera');
 }
 
-/** Waits for a camera that still has to be asked for, as after a pick. */
-const another = (camera) => page.waitForFunction(
+/** Waits until the camera differs from this one. */
+const cameraChange = (camera) => page.waitForFunction(
   (before) => JSON.stringify(window.surfel.state.camera) !== before, JSON.stringify(camera));
 
-/** A place of the window in pixels of the picture. */
+/** Converts a position in the window to pixels of the picture. */
 async function inPicture({ x, y }) {
-  const stage = await page.locator('#stage').boundingBox();
-  return { x: x - stage.x, y: y - stage.y };
+  const viewport = await page.locator('#viewport').boundingBox();
+  return { x: x - viewport.x, y: y - viewport.y };
 }
 
-test('the left button orbits about the pivot', async () => {
-  await drag(page, await placeAt(page, 0.5, 0.5), await placeAt(page, 0.7, 0.6));
-  const camera = await moved();
+test('dragging with the left button orbits about the pivot', async () => {
+  await drag(page, await pixelAt(page, 0.5, 0.5), await pixelAt(page, 0.7, 0.6));
+  const camera = await movedCamera();
   isNear(camera.focal_point, opening.focal_point, 1e-6, 'pivot');
   assert.ok(Math.abs(focalDistance(camera) - focalDistance(opening)) < 1e-6);
   assert.ok(Math.abs(dot(axesOf(camera).right, [0, 0, 1])) < 1e-9, 'the horizon is level');
-  // Down is over the top: the camera rises.
+  // Dragging down raises the camera.
   assert.ok(opening.position[2] < camera.position[2]);
 });
 
 for (const [name, button, key] of [['right', 'right'], ['middle', 'middle'], ['left with shift', 'left', 'Shift']]) {
-  test(`the ${name} button moves what is under it along`, async () => {
-    const [from, to] = [await placeAt(page, 0.5, 0.5), await placeAt(page, 0.6, 0.4)];
+  test(`dragging with the ${name} button pans`, async () => {
+    const [from, to] = [await pixelAt(page, 0.5, 0.5), await pixelAt(page, 0.6, 0.4)];
     if (key) await page.keyboard.down(key);
     await drag(page, from, to, { button });
     if (key) await page.keyboard.up(key);
-    const camera = await moved();
+    const camera = await movedCamera();
     isNear(axesOf(camera).forward, axesOf(opening).forward, 1e-9, 'direction');
     const [size, start] = [await state(page, 'size'), await inPicture(from)];
-    const taken = cameras.pointAtDepth(opening, size, start.x, start.y, focalDistance(opening));
-    const place = cameras.project(camera, size, taken);
+    const grabbed = cameras.pointAtDepth(opening, size, start.x, start.y, focalDistance(opening));
+    const pixel = cameras.project(camera, size, grabbed);
     const end = await inPicture(to);
-    assert.ok(Math.hypot(place.x - end.x, place.y - end.y) < 1, `${place.x}, ${place.y}`);
+    assert.ok(Math.hypot(pixel.x - end.x, pixel.y - end.y) < 1, `${pixel.x}, ${pixel.y}`);
   });
 }
 
-/** What Alt + click finds at a place. */
-async function pick(place) {
+/** The position of the point that Alt + click picks. */
+async function pick(pixel) {
   await page.keyboard.down('Alt');
-  await page.mouse.click(place.x, place.y);
+  await page.mouse.click(pixel.x, pixel.y);
   await page.keyboard.up('Alt');
   const values = page.locator('#pick-card dd span');
   await values.first().waitFor();
   return (await values.allTextContents()).slice(0, 3).map(Number);
 }
 
-/** To the page, all that is done from now on is done at once, however slow the machine is. */
+/** Freezes the time of events, so that a slow machine does not split a wheel movement or a double click. */
 const stopClock = () => page.evaluate(() => {
   const now = performance.now();
   Object.defineProperty(Event.prototype, 'timeStamp', { get: () => now });
 });
 
 for (const projection of ['perspective', 'orthographic']) {
-  test(`the wheel goes nearer to what is under the pointer (${projection})`, async () => {
+  test(`the wheel zooms toward the point under the pointer (${projection})`, async () => {
     await page.selectOption('[data-key="camera.projection"]', projection);
     await settled(page);
-    const place = await placeAt(page, 0.65, 0.6);
-    const [start, point] = [await state(page, 'camera'), await pick(place)];
-    const n_picks = await page.evaluate(() => window.heard.n_picks);
+    const pixel = await pixelAt(page, 0.65, 0.6);
+    const [start, point] = [await state(page, 'camera'), await pick(pixel)];
+    const n_answered = await page.evaluate(() => window.picks.n_answered);
     await stopClock();
     await page.mouse.wheel(0, -100);
-    await page.waitForFunction((before) => before < window.heard.n_picks, n_picks);
+    await page.waitForFunction((before) => before < window.picks.n_answered, n_answered);
     await settled(page);
     const [size, between] = [await state(page, 'size'), await state(page, 'camera')];
     const before = cameras.project(between, size, point);
     for (let i = 0; i < 3; i++) await page.mouse.wheel(0, -100);
-    const camera = await moved();
+    const camera = await movedCamera();
     const after = cameras.project(camera, size, point);
     assert.ok(Math.hypot(after.x - before.x, after.y - before.y) < 6, `${JSON.stringify([before, after])}`);
     if (projection === 'orthographic') assert.ok(camera.orthographic < 0.7 * start.orthographic);
@@ -109,13 +109,13 @@ for (const projection of ['perspective', 'orthographic']) {
   });
 }
 
-test('a double click makes a point the pivot', async () => {
-  const place = await placeAt(page, 0.7, 0.6);
-  const point = await pick(place);
+test('a double click sets the pivot', async () => {
+  const pixel = await pixelAt(page, 0.7, 0.6);
+  const point = await pick(pixel);
   await stopClock();
-  await page.mouse.dblclick(place.x, place.y);
-  await another(opening);
-  const camera = await moved();
+  await page.mouse.dblclick(pixel.x, pixel.y);
+  await cameraChange(opening);
+  const camera = await movedCamera();
   isNear(camera.focal_point, point, 0.3, 'pivot');
   isNear(axesOf(camera).forward, axesOf(opening).forward, 1e-9, 'direction');
 });
@@ -123,20 +123,20 @@ test('a double click makes a point the pivot', async () => {
 for (const [key, axis, sign] of [['w', 'forward', 1], ['s', 'forward', -1], ['a', 'right', -1], ['d', 'right', 1], ['q', 'up', -1], ['e', 'up', 1]]) {
   test(`${key} flies ${0 < sign ? '' : 'against '}${axis}`, async () => {
     await page.keyboard.down(key);
-    await another(opening);
-    await page.waitForTimeout(150);
+    await cameraChange(opening);
+    await cameraChange(await state(page, 'camera'));
     await page.keyboard.up(key);
-    const camera = await moved();
-    const way = camera.position.map((value, i) => value - opening.position[i]);
-    const along = sign * dot(way, axesOf(opening)[axis]);
-    assert.ok(0 < along && Math.abs(along - Math.hypot(...way)) < 1e-6, `${way}`);
+    const camera = await movedCamera();
+    const offset = camera.position.map((value, i) => value - opening.position[i]);
+    const along = sign * dot(offset, axesOf(opening)[axis]);
+    assert.ok(0 < along && Math.abs(along - Math.hypot(...offset)) < 1e-6, `${offset}`);
   });
 }
 
 for (const [key, factor] of [['+', 0.8], ['=', 0.8], ['-', 1.25]]) {
-  test(`${key} changes the distance`, async () => {
+  test(`${key} zooms`, async () => {
     await page.keyboard.press(key);
-    const camera = await moved();
+    const camera = await movedCamera();
     assert.ok(Math.abs(focalDistance(camera) / focalDistance(opening) - factor) < 1e-9);
     isNear(camera.focal_point, opening.focal_point, 1e-6, 'pivot');
   });
@@ -144,12 +144,12 @@ for (const [key, factor] of [['+', 0.8], ['=', 0.8], ['-', 1.25]]) {
 
 const SIDES = { front: [0, 1, 0], back: [0, -1, 0], left: [1, 0, 0], right: [-1, 0, 0], top: [0, 0, -1], bottom: [0, 0, 1] };
 
-test('1 to 6 and the buttons look from the sides', async () => {
+test('1 to 6 and the buttons show the six sides', async () => {
   const pictures = new Set();
   for (const [i, [side, forward]] of Object.entries(SIDES).entries()) {
-    await page.locator('#stage').focus();
+    await page.locator('#viewport').focus();
     await page.keyboard.press(String(i + 1));
-    const camera = await moved();
+    const camera = await movedCamera();
     isNear(axesOf(camera).forward, forward, 1e-6, side);
     const picture = await pixels(page);
     pictures.add(picture);
@@ -160,15 +160,15 @@ test('1 to 6 and the buttons look from the sides', async () => {
   assert.equal(pictures.size, 6);
 });
 
-test('smooth ways end where they should', async () => {
+test('transitions end at their target', async () => {
   await page.emulateMedia({ reducedMotion: 'no-preference' });
   await page.keyboard.press('5');
   await page.waitForFunction(() => window.surfel.state.camera.view_up[2] < 0.5);
-  isNear(axesOf(await moved()).forward, SIDES.top, 1e-6, 'direction');
+  isNear(axesOf(await movedCamera()).forward, SIDES.top, 1e-6, 'direction');
   await page.emulateMedia({ reducedMotion: 'reduce' });
 });
 
-test('F shows everything', async () => {
+test('F fits the scene to the view', async () => {
   for (let i = 0; i < 6; i++) await page.keyboard.press('+');
   await page.keyboard.press('f');
   await settled(page);
@@ -176,35 +176,35 @@ test('F shows everything', async () => {
   const places = cameras.cornersOf(bounds).map((corner) => cameras.project(camera, size, corner));
   assert.ok(places.every(({ x, y }) => 0 <= x && x <= size.width && 0 <= y && y <= size.height), JSON.stringify(places));
   const span = Math.max(...['x', 'y'].map((axis, i) => {
-    const values = places.map((place) => place[axis]);
+    const values = places.map((pixel) => pixel[axis]);
     return (Math.max(...values) - Math.min(...values)) / [size.width, size.height][i];
   }));
   assert.ok(0.7 < span, `${span} of the picture`);
 });
 
-test('O and P keep what is at the pivot as large as it was', async () => {
+test('O and P keep the size at the pivot', async () => {
   await page.keyboard.press('o');
-  const flat = await moved();
+  const flat = await movedCamera();
   const size = await state(page, 'size');
   const pixelSize = (camera) => cameras.pixelSizeAt(camera, size, focalDistance(camera));
   assert.ok(isOrthographic(flat) && Math.abs(pixelSize(flat) / pixelSize(opening) - 1) < 1e-6);
   await page.keyboard.press('p');
   assert.equal(await finishedPixels(page), first);
   await page.locator('[data-action="projection"]').click();
-  assert.ok(isOrthographic(await moved()));
+  assert.ok(isOrthographic(await movedCamera()));
 });
 
 for (const [key, axis, sign] of [['ArrowLeft', 'right', -1], ['ArrowRight', 'right', 1], ['ArrowUp', 'up', 1], ['ArrowDown', 'up', -1]]) {
-  test(`${key} goes there about the pivot`, async () => {
+  test(`${key} orbits about the pivot`, async () => {
     await page.keyboard.press(key);
-    const camera = await moved();
-    const way = camera.position.map((value, i) => value - opening.position[i]);
-    assert.ok(0 < sign * dot(way, axesOf(opening)[axis]), `${way}`);
+    const camera = await movedCamera();
+    const offset = camera.position.map((value, i) => value - opening.position[i]);
+    assert.ok(0 < sign * dot(offset, axesOf(opening)[axis]), `${offset}`);
     assert.ok(Math.abs(focalDistance(camera) - focalDistance(opening)) < 1e-6);
   });
 }
 
-test('letters choose colours, but not while they are typed', async () => {
+test('letters choose colours, but not while a field has the focus', async () => {
   for (const [key, color] of [['z', 'elevation'], ['i', 'intensity'], ['c', 'class'], ['r', 'rgb']]) {
     await page.keyboard.press(key);
     await page.waitForFunction((wanted) => window.surfel.state.scene.color === wanted, color);
@@ -216,38 +216,38 @@ test('letters choose colours, but not while they are typed', async () => {
   assert.deepEqual(await state(page, 'camera'), opening);
 });
 
-test('the angle of view keeps what is at the pivot', async () => {
+test('the angle of view keeps the pivot', async () => {
   await page.locator('[data-number="camera.view_angle"]').fill('70');
   await page.keyboard.press('Enter');
-  const camera = await moved();
+  const camera = await movedCamera();
   assert.equal(camera.view_angle, 70);
   isNear(camera.focal_point, opening.focal_point, 1e-6, 'pivot');
   assert.ok(focalDistance(camera) < focalDistance(opening));
 });
 
-test('free turning may tilt the horizon', async () => {
+test('the trackball may tilt the horizon', async () => {
   await page.locator('[data-key="camera.trackball"]').setChecked(true);
   for (const [from, to] of [[[0.5, 0.4], [0.7, 0.6]], [[0.5, 0.4], [0.5, 0.7]], [[0.4, 0.5], [0.8, 0.5]]]) {
-    await drag(page, await placeAt(page, ...from), await placeAt(page, ...to));
+    await drag(page, await pixelAt(page, ...from), await pixelAt(page, ...to));
   }
-  assert.ok(0.01 < Math.abs(dot(axesOf(await moved()).right, [0, 0, 1])));
+  assert.ok(0.01 < Math.abs(dot(axesOf(await movedCamera()).right, [0, 0, 1])));
 });
 
 test('the turntable turns until it is stopped', async () => {
   const button = page.locator('[data-action="turntable"]');
   await button.click();
-  await another(opening);
+  await cameraChange(opening);
   assert.equal(await button.textContent(), 'Stop');
   const { frame } = await state(page, 'lastFrame');
   await page.waitForFunction((shown) => shown + 2 < window.surfel.state.lastFrame.frame, frame);
-  await page.locator('#stage').focus();
+  await page.locator('#viewport').focus();
   await page.keyboard.press('Escape');
-  const camera = await moved();
+  const camera = await movedCamera();
   assert.equal(await button.textContent(), 'Turn');
   assert.ok(Math.abs(camera.position[2] - opening.position[2]) < 1e-6);
 });
 
-/** Fingers on the screen, as the browser's own protocol moves them. */
+/** Touches the screen with fingers, by the browser's debugging protocol. */
 async function touch(touched, ...steps) {
   const session = await touched.context().newCDPSession(touched);
   for (const [i, fingers] of steps.entries()) {
@@ -259,18 +259,18 @@ async function touch(touched, ...steps) {
   return state(touched, 'camera');
 }
 
-test('one finger orbits, two fingers move and zoom', async () => {
+test('one finger orbits, two fingers pan and zoom', async () => {
   const phone = await openPage(server.link, { viewport: { width: 390, height: 700 }, hasTouch: true, isMobile: true });
   const start = await state(phone, 'camera');
-  const place = (across, along) => placeAt(phone, across, along);
-  const turned = await touch(phone, [await place(0.5, 0.5)], [await place(0.6, 0.5)], [await place(0.7, 0.5)]);
+  const pixel = (across, along) => pixelAt(phone, across, along);
+  const turned = await touch(phone, [await pixel(0.5, 0.5)], [await pixel(0.6, 0.5)], [await pixel(0.7, 0.5)]);
   assert.ok(Math.abs(focalDistance(turned) - focalDistance(start)) < 1e-6);
   assert.ok(1 < distance(turned.position, start.position));
-  const near = await touch(phone, [await place(0.4, 0.5), await place(0.6, 0.5)], [await place(0.3, 0.5), await place(0.7, 0.5)], [await place(0.2, 0.5), await place(0.8, 0.5)]);
+  const near = await touch(phone, [await pixel(0.4, 0.5), await pixel(0.6, 0.5)], [await pixel(0.3, 0.5), await pixel(0.7, 0.5)], [await pixel(0.2, 0.5), await pixel(0.8, 0.5)]);
   assert.ok(Math.abs(focalDistance(near) / focalDistance(turned) - 1 / 3) < 0.05, 'three times as near');
   isNear(axesOf(near).forward, axesOf(turned).forward, 1e-6, 'direction');
-  const aside = await touch(phone, [await place(0.4, 0.5), await place(0.6, 0.5)], [await place(0.4, 0.6), await place(0.6, 0.6)], [await place(0.4, 0.7), await place(0.6, 0.7)]);
-  assert.ok(Math.abs(focalDistance(aside) / focalDistance(near) - 1) < 0.05);
-  assert.ok(0 < dot(aside.position.map((value, i) => value - near.position[i]), axesOf(near).up));
+  const panned = await touch(phone, [await pixel(0.4, 0.5), await pixel(0.6, 0.5)], [await pixel(0.4, 0.6), await pixel(0.6, 0.6)], [await pixel(0.4, 0.7), await pixel(0.6, 0.7)]);
+  assert.ok(Math.abs(focalDistance(panned) / focalDistance(near) - 1) < 0.05);
+  assert.ok(0 < dot(panned.position.map((value, i) => value - near.position[i]), axesOf(near).up));
   await closePage(phone);
 });

@@ -1,11 +1,11 @@
-// The panel: every control changes the picture and the scene, and goes back.
+// The panel: each control changes the picture and the scene, and can be reset.
 
 import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
 import * as tables from '../page/controls.js';
 import { valueAt } from '../page/patch.js';
 import {
-  closePage, drag, finishedPixels, openPage, pixels, placeAt, QUICK, serve, settled, state, unfoldPanel, watchPictures,
+  closePage, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, serve, settled, state, unfoldPanel, recordPictures,
 } from './harness.mjs';
 
 const { surfaceControls, colorControls, sunControls, skyControls, pictureControls, clipControls, materialControls } = tables;
@@ -13,19 +13,19 @@ const OBJECTS = ['house.obj', 'town.ply'];
 const CONTROLS = [surfaceControls, colorControls, sunControls, skyControls, pictureControls, clipControls,
   ...OBJECTS.map((name) => materialControls({ name }))].flat();
 
-const BY_HEIGHT = [['color', 'elevation']];
+const BY_ELEVATION = [['color', 'elevation']];
 const IN_BOX = [['clip_box', true]];
 const ON_PLANE = [['clip_plane', true]];
 const GLASS = [['material.house.obj', 'glass']];
 
-// What each control is set to, after what is `given`; `unseen` says why that cannot change this picture.
+// The value that each control is set to, after the controls in `given`; `unseen` is the reason why the picture stays the same.
 const CASES = {
   surface: { value: 'sphere' },
   radius_scale: { value: 2 },
-  boundary: { value: 'off' },
+  edge_test: { value: 'off' },
   color: { value: 'intensity' },
-  cmap: { given: BY_HEIGHT, value: 'magma' },
-  range: { given: BY_HEIGHT, value: [147, 152.5] },
+  cmap: { given: BY_ELEVATION, value: 'magma' },
+  range: { given: BY_ELEVATION, value: [147, 152.5] },
   'light.sun': { value: false },
   'sun.azimuth': { value: 30 },
   'sun.elevation': { value: 75.5 },
@@ -33,16 +33,16 @@ const CASES = {
   'sun.strength': { value: 2 },
   'light.sky': { value: false },
   'sky.strength': { value: 2 },
-  'sky.reach': { value: 0.5 },
+  'sky.ao_distance': { value: 0.5 },
   'light.headlight': { value: true },
   exposure: { value: 1 },
   background: { value: 'transparent' },
   'background.top': { given: [['background', 'colors']], value: '#102030' },
   'background.bottom': { given: [['background', 'colors']], value: '#a08010' },
   spp: { value: 3 },
-  samples: { value: 5 },
+  light_samples: { value: 5 },
   max_depth: { given: [['material.house.obj', 'mirror']], value: 0 },
-  clip_box: { value: true, unseen: 'the box holds everything until it is made smaller' },
+  clip_box: { value: true, unseen: 'the initial box contains the whole scene' },
   'clip_box.x': { given: IN_BOX, value: [562320, 562335] },
   'clip_box.y': { given: IN_BOX, value: [4183190, 4183205] },
   'clip_box.z': { given: IN_BOX, value: [148, 152] },
@@ -55,12 +55,12 @@ const CASES = {
   'material.town.ply.color': { given: [['material.town.ply', 'matte']], value: '#3060a0' },
   'material.town.ply.roughness': { given: [['material.town.ply', 'metal']], value: 0.7 },
   'material.town.ply.ior': { given: [['material.town.ply', 'glass']], value: 1.2 },
-  'material.town.ply.glow': { given: [['material.town.ply', 'emissive']], value: 3 },
+  'material.town.ply.emissive_strength': { given: [['material.town.ply', 'emissive']], value: 3 },
   'material.house.obj': { value: 'mirror' },
   'material.house.obj.color': { given: GLASS, value: '#a03060' },
   'material.house.obj.roughness': { given: GLASS, value: 0.4 },
   'material.house.obj.ior': { given: GLASS, value: 1.3 },
-  'material.house.obj.glow': { given: [['material.house.obj', 'emissive']], value: 2 },
+  'material.house.obj.emissive_strength': { given: [['material.house.obj', 'emissive']], value: 2 },
 };
 
 let page;
@@ -72,8 +72,8 @@ before(async () => {
   first = await finishedPixels(page);
 });
 beforeEach(async () => {
-  if (await pixels(page) === first && (await state(page, 'lastFrame')).input === await state(page, 'lastInput')) return;
-  // A test before this one failed on its way, or asked for what no picture shows.
+  if (await pixels(page) === first && (await state(page, 'lastFrame')).seq === await state(page, 'lastSeq')) return;
+  // The test before this one failed, or its last message has no picture.
   await page.reload();
   await settled(page);
   await unfoldPanel(page);
@@ -83,7 +83,7 @@ after(() => closePage(page));
 const controlOf = (key) => CONTROLS.find((control) => control.key === key);
 const field = (key) => page.locator(`[data-key="${key}"]`);
 
-/** Sets a control as a hand does, by its kind. */
+/** Sets a control as a user does, by its kind. */
 const setters = {
   select: (key, value) => field(key).selectOption(value),
   toggle: (key, value) => field(key).setChecked(value),
@@ -107,20 +107,20 @@ async function setControl(key, value) {
   await settled(page);
 }
 
-/** Parts of what was not there at first go back with the whole, which stands among what was given. */
+/** Resets a control that has a reset button; others are reset with the controls in `given`. */
 async function resetControl(key) {
   const button = page.locator(`[data-reset="${key}"]`);
   if (await button.isVisible()) await button.click();
   await settled(page);
 }
 
-/** What the scene says of a control. */
+/** The value of a control in the scene. */
 async function sceneValue({ key, read }) {
   const [scene, info] = [await state(page, 'scene'), await state(page, 'info')];
   return read ? read(scene, { scene, info, legend: null }) : valueAt(scene, key);
 }
 
-test('there is a case for every control', async () => {
+test('each control has a case', async () => {
   const { objects } = await state(page, 'info');
   assert.deepEqual(objects.map(({ name }) => name), OBJECTS);
   assert.deepEqual(Object.keys(CASES).sort(), CONTROLS.map(({ key }) => key).sort());
@@ -138,16 +138,16 @@ for (const control of CONTROLS) {
     if (value !== undefined) assert.deepEqual(rounded(await sceneValue(control)), rounded(value));
     if (value !== undefined) await resetControl(control.key);
     for (const [key] of given.toReversed()) await resetControl(key);
-    assert.equal(await finishedPixels(page), first, 'everything goes back');
+    assert.equal(await finishedPixels(page), first, 'the controls are reset');
   });
 }
 
-/** A clip plane's normal and position come back through its point, not to the last digit. */
+/** Rounds numbers: a clip plane's normal and position are computed from its point. */
 const rounded = (value) => JSON.parse(JSON.stringify(value), (_, part) => (typeof part === 'number' ? Number(part.toPrecision(6)) : part));
 
-test('every choice of kind and colour is another picture', async () => {
+test('each surface, colour and material gives another picture', async () => {
   const { surfaces, colors, materials } = await state(page, 'info');
-  // `points` is not for scenes with meshes; all normals point to the viewer, so that `splat` is as `splat-mean`.
+  // `points` does not work with meshes. As all normals point to the camera, `splat` equals `splat-mean`.
   const traced = surfaces.filter((surface) => surface !== 'points' && surface !== 'splat-mean');
   for (const [key, choices] of [['surface', traced], ['color', colors], ['material.house.obj', materials]]) {
     const pictures = [];
@@ -160,7 +160,7 @@ test('every choice of kind and colour is another picture', async () => {
   }
 });
 
-test('what cannot be rendered is told, and taken back', async () => {
+test('a setting that cannot be rendered is rejected and reverted', async () => {
   await setters.select('surface', 'points');
   await page.locator('.toast', { hasText: 'points for all of the scene' }).waitFor();
   await page.waitForFunction(() => window.surfel.state.scene.surface === 'splat');
@@ -169,8 +169,8 @@ test('what cannot be rendered is told, and taken back', async () => {
   await resetControl('light.sky');
 });
 
-test('what is chosen automatically is chosen again', async () => {
-  for (const [key, value] of [['exposure', 2], ['sky.reach', 3]]) {
+test('automatic values can be restored', async () => {
+  for (const [key, value] of [['exposure', 2], ['sky.ao_distance', 3]]) {
     const chosen = valueAt(await state(page, 'scene'), key);
     await setControl(key, value);
     await page.locator(`[data-automatic="${key}"]`).click();
@@ -179,16 +179,16 @@ test('what is chosen automatically is chosen again', async () => {
   }
 });
 
-test('a slider is dragged', async () => {
+test('dragging a slider changes the value', async () => {
   const slider = field('sun.azimuth');
   await slider.scrollIntoViewIfNeeded();
   const box = await slider.boundingBox();
-  const along = (share) => [box.x + share * box.width, box.y + box.height / 2];
-  const { input } = await state(page, 'lastFrame');
-  await page.mouse.move(...along(0.3));
+  const pixelOf = (fraction) => [box.x + fraction * box.width, box.y + box.height / 2];
+  const { seq } = await state(page, 'lastFrame');
+  await page.mouse.move(...pixelOf(0.3));
   await page.mouse.down();
-  for (const share of [0.4, 0.5, 0.6, 0.7, 0.75]) await page.mouse.move(...along(share));
-  await page.waitForFunction((before) => before < window.surfel.state.lastFrame.input, input);
+  for (const fraction of [0.4, 0.5, 0.6, 0.7, 0.75]) await page.mouse.move(...pixelOf(fraction));
+  await page.waitForFunction((before) => before < window.surfel.state.lastFrame.seq, seq);
   await page.mouse.up();
   assert.notEqual(await finishedPixels(page), first);
   const { azimuth } = (await state(page, 'scene')).sun;
@@ -196,7 +196,7 @@ test('a slider is dragged', async () => {
   await resetControl('sun.azimuth');
 });
 
-test('the sun stands where day and hour put it', async () => {
+test('the sun has the position of date and hour', async () => {
   await page.fill('#sun-day', '2024-06-20');
   await page.fill('#sun-latitude', '50');
   await page.locator('#sun-latitude').blur();
@@ -208,39 +208,46 @@ test('the sun stands where day and hour put it', async () => {
   assert.equal(await finishedPixels(page), first);
 });
 
-test('what the server refuses is told, and taken back', async () => {
+test('a rejected value is reverted, and the reason is shown beside its control', async () => {
   await setters.slider('spp', 5000);
-  await page.locator('.toast', { hasText: 'expected at most 1024' }).waitFor();
+  await page.locator('.toast', { hasText: 'spp: found 5000, expected at most 1024' }).waitFor();
   await page.waitForFunction(() => window.surfel.state.scene.spp === 2);
   assert.equal(await pixels(page), first);
+  const error = page.locator('[data-row="spp"] .row-error');
+  assert.equal(await error.textContent(), 'found 5000, expected at most 1024');
+  assert.ok(await error.isVisible());
+  assert.equal(await page.locator('.row-error:visible').count(), 1);
+  await setControl('spp', 3);
+  assert.ok(await error.isHidden(), 'another value removes the error');
+  await resetControl('spp');
 });
 
-test('what comes after a refusal is answered as before', async () => {
+test('messages after a rejection are answered', async () => {
   const before = await state(page, 'scene');
   await setters.slider('spp', 5000);
   await page.locator('.toast', { hasText: 'expected at most 1024' }).waitFor();
   await page.waitForFunction(() => window.surfel.state.scene.spp === 2);
   assert.deepEqual(await state(page, 'scene'), before);
-  const { lastInput: refused, latencies_ms, lastFrame } = await page.evaluate(() => window.surfel.state);
-  assert.ok(lastFrame.input < refused, 'no picture obeys what was refused');
-  await watchPictures(page);
-  const asked_ms = await page.evaluate(() => performance.now());
+  const { lastSeq: rejectedSeq, latencies_ms, lastFrame } = await page.evaluate(() => window.surfel.state);
+  assert.ok(lastFrame.seq < rejectedSeq, 'no picture has the rejected value');
+  await recordPictures(page);
+  const start_ms = await page.evaluate(() => performance.now());
   await setControl('sun.azimuth', 30);
-  await drag(page, await placeAt(page, 0.4, 0.5), await placeAt(page, 0.6, 0.5));
+  await drag(page, await pixelAt(page, 0.4, 0.5), await pixelAt(page, 0.6, 0.5));
   await settled(page);
   const after = await page.evaluate(() => window.surfel.state);
-  assert.deepEqual([after.lastFrame.input, after.scene.spp, after.scene.sun.azimuth], [after.lastInput, 2, 30]);
-  // One for each input that was answered, none for the refusal that never was.
+  assert.deepEqual([after.lastFrame.seq, after.scene.spp, after.scene.sun.azimuth], [after.lastSeq, 2, 30]);
+  // One latency for each message that was answered, none for the rejected one.
   const answered = after.latencies_ms.slice(latencies_ms.length);
-  assert.ok(2 <= answered.length && answered.length <= after.lastInput - refused, `${answered}`);
+  assert.ok(2 <= answered.length && answered.length <= after.lastSeq - rejectedSeq, `${answered}`);
   const pictures = await page.evaluate(() => window.pictures);
-  const answers = pictures.filter(({ input }, i) => input !== pictures[i - 1]?.input);
+  const answers = pictures.filter(({ seq }, i) => seq !== pictures[i - 1]?.seq);
   assert.equal(answered.length, answers.length);
-  assert.ok(answered.every((latency_ms, i) => 0 < latency_ms && latency_ms <= answers[i].shownAt - asked_ms), `${answered}`);
+  assert.ok(answered.every((latency_ms, i) => 0 < latency_ms && latency_ms <= answers[i].shownAt - start_ms), `${answered}`);
   await resetControl('sun.azimuth');
 });
 
-test('the legend tells the colours', async () => {
+test('the legend shows the colours', async () => {
   await setControl('color', 'elevation');
   const ticks = await page.locator('.legend-tick').allTextContents();
   assert.ok(ticks.length >= 2 && ticks.every((tick) => 145 <= Number(tick) && Number(tick) <= 155), `${ticks}`);

@@ -1,4 +1,4 @@
-// Cameras: places in picture and world agree, and movements keep still what they should.
+// Camera mathematics: projection is consistent, and each movement keeps its invariants.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -19,10 +19,10 @@ const close = (a, b, tolerance = 1e-6) => assert.ok(Math.abs(a - b) < tolerance,
 test('points on a ray project to its pixel', () => {
   for (const camera of [perspective, orthographic, panorama]) {
     for (const [x, y] of [[0.5, 0.5], [32, 24], [63.5, 10.25]]) {
-      const place = cameras.project(camera, size, cameras.pointAtDepth(camera, size, x, y, 5));
-      close(place.x, x);
-      close(place.y, y);
-      close(place.depth, 5);
+      const pixel = cameras.project(camera, size, cameras.pointAtDepth(camera, size, x, y, 5));
+      close(pixel.x, x);
+      close(pixel.y, y);
+      close(pixel.depth, 5);
     }
   }
 });
@@ -37,18 +37,18 @@ test('axes are unit, orthogonal and right-handed', () => {
   }
 });
 
-test('nothing behind the camera is in the picture', () => {
+test('points behind the camera are not in the picture', () => {
   assert.equal(cameras.project(perspective, size, [500006, -9, 3.5]), null);
 });
 
-test('an orbit keeps the pivot in its place and the horizon level', () => {
+test('an orbit keeps the pivot in place and the horizon level', () => {
   const moved = cameras.orbit(perspective, perspective.focal_point, up, 0.7, -0.2);
   near(moved.focal_point, perspective.focal_point);
   close(cameras.focalDistance(moved), cameras.focalDistance(perspective));
   close(dot(cameras.axesOf(moved).right, up), 0);
-  const aside = [500001, 2, 0];
-  const orbited = cameras.orbit(perspective, aside, up, 0.4, 0);
-  const [before, after] = [perspective, orbited].map((camera) => cameras.project(camera, size, aside));
+  const pivot = [500001, 2, 0];
+  const orbited = cameras.orbit(perspective, pivot, up, 0.4, 0);
+  const [before, after] = [perspective, orbited].map((camera) => cameras.project(camera, size, pivot));
   close(before.x, after.x);
   close(before.y, after.y);
 });
@@ -62,28 +62,28 @@ test('an orbit stops at the zenith and comes back', () => {
   near(back.view_up, up);
 });
 
-test('a trackball turns freely', () => {
+test('a trackball rotates freely', () => {
   const moved = cameras.trackball(perspective, perspective.focal_point, 0, 4);
   close(cameras.focalDistance(moved), cameras.focalDistance(perspective));
   near(cameras.axesOf(moved).right, cameras.axesOf(perspective).right);
 });
 
-test('what is grabbed stays under the pointer', () => {
+test('panning keeps the grabbed point under the pointer', () => {
   for (const camera of [perspective, orthographic]) {
     const grabbed = cameras.pointAtDepth(camera, size, 10, 40, 6);
     const moved = cameras.pan(camera, size, { x: 10, y: 40 }, { x: 50, y: 5 }, 6);
-    const place = cameras.project(moved, size, grabbed);
-    close(place.x, 50);
-    close(place.y, 5);
+    const pixel = cameras.project(moved, size, grabbed);
+    close(pixel.x, 50);
+    close(pixel.y, 5);
   }
 });
 
-test('the target of a zoom stays where it is and grows', () => {
+test('zooming keeps the pixel of its target', () => {
   for (const camera of [perspective, orthographic]) {
     const target = cameras.pointAtDepth(camera, size, 12, 9, 5);
-    const place = cameras.project(cameras.zoomTo(camera, target, 0.5), size, target);
-    close(place.x, 12);
-    close(place.y, 9);
+    const pixel = cameras.project(cameras.zoomTo(camera, target, 0.5), size, target);
+    close(pixel.x, 12);
+    close(pixel.y, 9);
   }
   const nearer = cameras.zoomTo(perspective, perspective.focal_point, 0.5);
   close(cameras.focalDistance(nearer), cameras.focalDistance(perspective) / 2);
@@ -101,21 +101,21 @@ test('changing the projection keeps the size at the pivot', () => {
   assert.deepEqual(Object.keys(flat).sort(), ['focal_point', 'orthographic', 'position', 'view_up']);
 });
 
-test('fit shows every corner, and one of them near the rim', () => {
+test('fit shows all corners, one of them near the edge of the picture', () => {
   for (const camera of [perspective, orthographic]) {
     for (const wide of [size, { width: 30, height: 90 }]) {
       const fitted = cameras.fit(camera, wide, bounds);
-      const rims = cameras.cornersOf(bounds).map((corner) => {
+      const edges = cameras.cornersOf(bounds).map((corner) => {
         const { x, y } = cameras.project(fitted, wide, corner);
         return Math.max(Math.abs(2 * x - wide.width) / wide.width, Math.abs(2 * y - wide.height) / wide.height);
       });
-      const rim = Math.max(...rims);
-      assert.ok(0.85 < rim && rim <= 1, `${rim}`);
+      const edge = Math.max(...edges);
+      assert.ok(0.85 < edge && edge <= 1, `${edge}`);
     }
   }
 });
 
-test('the sides look at the focal point with their own up', () => {
+test('views from the six sides have their own up', () => {
   near(cameras.axesOf(cameras.fromSide(perspective, 'front', up)).forward, [0, 1, 0]);
   near(cameras.axesOf(cameras.fromSide(perspective, 'right', up)).forward, [-1, 0, 0]);
   const top = cameras.axesOf(cameras.fromSide(perspective, 'top', up));
@@ -144,7 +144,7 @@ test('a blend starts and ends at its cameras', () => {
   }
 });
 
-test('a panorama looks north in its middle and east to the right', () => {
+test('a panorama shows north at its centre and east to the right', () => {
   const north = { position: [1, 2, 3], focal_point: [1, 5, 4], view_up: up, panorama: true };
   const wide = { width: 80, height: 40 };
   near(cameras.rayThrough(north, wide, 40, 20).direction, [0, 1, 0]);

@@ -1,4 +1,4 @@
-// Clip boxes and planes: their words, their handles, their outlines.
+// Clip boxes and planes: their text, handles and outlines.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -6,24 +6,24 @@ import * as clip from '../page/clip.js';
 
 const bounds = { min: [562316, 4183187, -2], max: [562363.25, 4183232, 8] };
 
-test('boxes come back from their words', () => {
-  const words = '([562316,562363.25],[4183187,4183232],[-2,8])';
-  assert.equal(clip.formatBox(bounds), words);
-  assert.deepEqual(clip.parseBox(words), bounds);
+test('boxes survive formatting and parsing', () => {
+  const text = '([562316,562363.25],[4183187,4183232],[-2,8])';
+  assert.equal(clip.formatBox(bounds), text);
+  assert.deepEqual(clip.parseBox(text), bounds);
   assert.deepEqual(clip.parseBox('( [1e3, 2.5E3], [-1,-0.5], [0,1] )').min, [1000, -1, 0]);
-  for (const wrong of [undefined, null, '', '([0,1],[0,1])']) assert.equal(clip.parseBox(wrong), null);
+  for (const invalid of [undefined, null, '', '([0,1],[0,1])']) assert.equal(clip.parseBox(invalid), null);
 });
 
-test('the first box holds everything', () => {
-  const held = { min: [562316.0750007629, 4183187.450000763, -2], max: [562351.4230003357, 4183222.7989997864, 8] };
-  const box = clip.parseBox(clip.formatBox(clip.boxAround(held)));
+test('the initial box contains the bounds with a margin', () => {
+  const inner = { min: [562316.0750007629, 4183187.450000763, -2], max: [562351.4230003357, 4183222.7989997864, 8] };
+  const box = clip.parseBox(clip.formatBox(clip.boxAround(inner)));
   for (const axis of [0, 1, 2]) {
-    const [low, high] = [held.min[axis] - box.min[axis], box.max[axis] - held.max[axis]];
+    const [low, high] = [inner.min[axis] - box.min[axis], box.max[axis] - inner.max[axis]];
     assert.ok(2e-5 < low && low < 2e-4 && 2e-5 < high && high < 2e-4, `${low} ${high}`);
   }
 });
 
-test('a face stops at the face across', () => {
+test('a face stops at the opposite face', () => {
   const face = clip.facesOf(bounds).find(({ axis, end }) => axis === 2 && end === 'max');
   assert.deepEqual(face.direction, [0, 0, 1]);
   assert.equal(clip.withFace(bounds, face, 3).max[2], 3);
@@ -37,11 +37,11 @@ test('a handle follows the ray', () => {
   assert.equal(clip.nearestAlong([0, 0, 0], [0, 1, 0], ray), 0);
 });
 
-test('a plane keeps its place along its normal', () => {
+test('a plane keeps its position along its normal', () => {
   const plane = clip.planeAt({ normal: [0, 0, 1] }, bounds, 1.5);
   assert.equal(plane.point[2], 4.5);
   assert.ok(Math.abs(clip.positionOf(plane, bounds) - 1.5) < 1e-9);
-  assert.equal(clip.reachOf([0, 0, -1], bounds), 5);
+  assert.equal(clip.maxPosition([0, 0, -1], bounds), 5);
   assert.deepEqual(clip.parsePlane(clip.formatPlane(plane)).normal, [0, 0, 1]);
   assert.equal(clip.parsePlane(undefined), null);
 });

@@ -1,4 +1,4 @@
-// The clock of scenes that move: play, pause, scrub and loop.
+// Controls of animated scenes: play, pause, scrub, loop, and whether the animation moves the camera.
 
 import { element, icon } from './dom.js';
 
@@ -14,18 +14,18 @@ export function animationRows(viewer, section) {
   const clock = element('output', { 'data-output': 'time' });
   const loop = element('input', { type: 'checkbox', role: 'switch', id: 'animation-loop', 'data-key': 'animation.loop', checked: true });
 
-  const lead = element('input', { type: 'checkbox', role: 'switch', id: 'animation-camera', 'data-key': 'camera.still' });
+  const follow = element('input', { type: 'checkbox', role: 'switch', id: 'animation-camera', 'data-key': 'camera.lock' });
 
   const show = () => {
     scrub.value = (1000 * time()) / duration();
-    scrub.style.setProperty('--share', `${scrub.value / 10}%`);
+    scrub.style.setProperty('--fraction', `${scrub.value / 10}%`);
     clock.value = `${time().toFixed(2)} s`;
   };
   const setPlaying = (isOn) => {
     isPlaying = isOn;
     play.replaceChildren(icon(isOn ? 'pause' : 'play'), isOn ? 'Pause' : 'Play');
     if (!isOn) {
-      viewer.set({ time: time() }, false);
+      viewer.changeSettings({ time: time() }, false);
       return;
     }
     startedAt = performance.now();
@@ -37,36 +37,36 @@ export function animationRows(viewer, section) {
     let now = startTime + (performance.now() - startedAt) / 1000;
     if (duration() <= now) {
       if (!loop.checked) {
-        viewer.set({ time: duration() }, false);
+        viewer.changeSettings({ time: duration() }, false);
         setPlaying(false);
         return;
       }
       now %= duration();
       [startTime, startedAt] = [now, performance.now()];
     }
-    viewer.set({ time: now }, true);
+    viewer.changeSettings({ time: now }, true);
     requestAnimationFrame(step);
   };
   scrub.addEventListener('input', () => {
     if (isPlaying) setPlaying(false);
-    viewer.set({ time: (scrub.value / 1000) * duration() }, true);
+    viewer.changeSettings({ time: (scrub.value / 1000) * duration() }, true);
   });
-  scrub.addEventListener('change', () => viewer.set({ time: time() }, false));
+  scrub.addEventListener('change', () => viewer.changeSettings({ time: time() }, false));
 
-  lead.addEventListener('change', () => {
-    if (lead.checked) viewer.follow();
-    else if (viewer.camera) viewer.look(viewer.camera, false);
+  follow.addEventListener('change', () => {
+    if (follow.checked) viewer.resumeAnimation();
+    else if (viewer.camera) viewer.setCamera(viewer.camera, false);
   });
 
   play.replaceChildren(icon('play'), 'Play');
-  const leadRow = toggleRow(lead, 'Follow', 'The camera goes where the scene moves it, until you move it yourself\ncamera.still');
+  const followRow = toggleRow(follow, 'Follow', 'The animation moves the camera until you move it yourself\ncamera.lock');
   viewer.infoChanged.listen(() => {
     section().hidden = !(0 < duration());
-    leadRow.hidden = !viewer.info.camera_moves;
+    followRow.hidden = !viewer.info.camera_moves;
   });
   viewer.sceneChanged.listen(() => { if (0 < duration()) show(); });
-  viewer.cameraChanged.listen(() => { lead.checked = viewer.isLed; });
-  return [element('div', { class: 'row animation' }, play, scrub, clock), toggleRow(loop, 'Loop'), leadRow];
+  viewer.cameraChanged.listen(() => { follow.checked = viewer.isCameraAnimated; });
+  return [element('div', { class: 'row animation' }, play, scrub, clock), toggleRow(loop, 'Loop'), followRow];
 }
 
 function toggleRow(toggle, label, title = '') {

@@ -1,12 +1,13 @@
-// Clip box and clip plane on the picture: their outlines, and handles that are dragged along their axes.
+// Clip box and clip plane on the picture: their outlines, and handles that the user drags along their axes.
 
 import { cornersOf, rayThrough } from './camera.js';
 import * as clip from './clip.js';
 import { addScaled, mix } from './vector.js';
 
 const HANDLE_RADIUS = 7;
-const ARROW = 0.06;
-/** Pairs of corners, as `cornersOf` counts them, that differ in one axis. */
+/** Length of the plane's normal, as a fraction of the diagonal of the bounds. */
+const ARROW_FRACTION = 0.06;
+/** Edges as pairs of indices of `cornersOf` that differ in one axis. */
 const EDGES = [0, 1, 2, 3, 4, 5, 6, 7].flatMap((i) => [1, 2, 4].filter((bit) => !(i & bit)).map((bit) => [i, i | bit]));
 
 export function clipPainter(viewer) {
@@ -27,8 +28,8 @@ function paintBox(view, box) {
 
 function paintPlane(view, plane, bounds) {
   const outline = clip.planeOutline(plane, bounds);
-  const foot = handleOf(plane, bounds);
-  const tip = addScaled(foot, plane.normal, ARROW * clip.sizeOf(bounds));
+  const foot = handlePosition(plane, bounds);
+  const tip = addScaled(foot, plane.normal, ARROW_FRACTION * clip.sizeOf(bounds));
   return [
     ...view.polygon(outline, 'clip-plane'),
     ...view.path(outline, 'clip-edge', true),
@@ -37,50 +38,50 @@ function paintPlane(view, plane, bounds) {
   ];
 }
 
-/** Where the plane is nearest to the middle of the world. */
-function handleOf(plane, bounds) {
+/** The point of the plane that is nearest to the centre of `bounds`. */
+function handlePosition(plane, bounds) {
   return addScaled(mix(bounds.min, bounds.max, 0.5), plane.normal, clip.positionOf(plane, bounds));
 }
 
-/** What dragging the handle under the pointer does, from this place of the picture, or null where none is. */
-export function grabHandle(viewer, event, place) {
+/** The drag of the handle under the pointer, which is at this pixel; null if there is no handle. */
+export function grabHandle(viewer, event, pixel) {
   const handle = event.target.closest('[data-handle]')?.dataset.handle;
   if (!handle) return null;
   const [kind, axis, end] = handle.split(' ');
-  return kind === 'plane' ? dragPlane(viewer, place) : dragFace(viewer, place, Number(axis), end);
+  return kind === 'plane' ? dragPlane(viewer, pixel) : dragFace(viewer, pixel, Number(axis), end);
 }
 
-function dragFace(viewer, place, axis, end) {
+function dragFace(viewer, pixel, axis, end) {
   const start = clip.parseBox(viewer.scene.clip_box);
   const { middle } = clip.facesOf(start).find((face) => face.axis === axis && face.end === end);
   const direction = [0, 1, 2].map((i) => (i === axis ? 1 : 0));
-  return dragAlong(viewer, place, middle, direction, (way) => {
-    const box = clip.withFace(start, { axis, end }, middle[axis] + way);
+  return dragAlong(viewer, pixel, middle, direction, (offset) => {
+    const box = clip.withFace(start, { axis, end }, middle[axis] + offset);
     return { clip_box: clip.formatBox(box) };
   });
 }
 
-function dragPlane(viewer, place) {
+function dragPlane(viewer, pixel) {
   const start = clip.parsePlane(viewer.scene.clip_plane);
   const { bounds } = viewer.info;
-  return dragAlong(viewer, place, handleOf(start, bounds), start.normal, (way) => {
-    const position = clip.positionOf(start, bounds) + way;
+  return dragAlong(viewer, pixel, handlePosition(start, bounds), start.normal, (offset) => {
+    const position = clip.positionOf(start, bounds) + offset;
     return { clip_plane: clip.formatPlane(clip.planeAt(start, bounds, position)) };
   });
 }
 
-/** Sends `patchFor(way)` while the pointer is taken from `place` along a line through `point`. */
-function dragAlong(viewer, place, point, direction, patchFor) {
-  const wayTo = ({ x, y }) => clip.nearestAlong(point, direction, rayThrough(viewer.camera, viewer.size, x, y));
-  const grabbed = wayTo(place);
+/** Sends `patchFor(offset)` while the pointer is dragged from `pixel` along a line through `point`. */
+function dragAlong(viewer, pixel, point, direction, patchFor) {
+  const offsetAt = ({ x, y }) => clip.nearestAlong(point, direction, rayThrough(viewer.camera, viewer.size, x, y));
+  const start = offsetAt(pixel);
   let patch = null;
   return {
     move(to) {
-      patch = patchFor(wayTo(to) - grabbed);
-      viewer.set(patch, true);
+      patch = patchFor(offsetAt(to) - start);
+      viewer.changeSettings(patch, true);
     },
     end() {
-      if (patch) viewer.set(patch, false);
+      if (patch) viewer.changeSettings(patch, false);
     },
   };
 }

@@ -1,13 +1,13 @@
-// The WebSocket to the server: opened again when it is lost, pictures told from messages.
+// The WebSocket to the server: reconnects when it is lost, and decodes messages and pictures.
 
-const FIRST_WAIT_MS = 500;
-const LONGEST_WAIT_MS = 5000;
+const MIN_RECONNECT_DELAY_MS = 500;
+const MAX_RECONNECT_DELAY_MS = 5000;
 const HEADER_BYTES = 20;
 const PICTURE_TYPES = { 1: 'image/jpeg', 2: 'image/png', 3: 'image/png' };
 
 export const SAVED_PICTURE = 3;
 
-/** What stands before the file in a binary message. */
+/** The header before the file in a binary message. */
 export function readHeader(buffer) {
   const view = new DataView(buffer);
   const kind = view.getUint8(0);
@@ -16,7 +16,7 @@ export function readHeader(buffer) {
     finished: (view.getUint8(1) & 1) === 1,
     scene: view.getUint16(2, true),
     frame: view.getUint32(4, true),
-    input: view.getUint32(8, true),
+    seq: view.getUint32(8, true),
     width: view.getUint16(12, true),
     height: view.getUint16(14, true),
     samples: view.getUint16(16, true),
@@ -34,9 +34,9 @@ export function socketAddress(location) {
 
 export class Connection {
   #socket = null;
-  #wait_ms = FIRST_WAIT_MS;
+  #reconnectDelay_ms = MIN_RECONNECT_DELAY_MS;
 
-  /** `on` has `opened`, `message(object)`, `picture(header, blob)` and `lost(wait_ms)`. */
+  /** `on` has `opened()`, `message(object)`, `picture(header, blob)` and `lost(wait_ms)`. */
   constructor(address, on) {
     this.address = address;
     this.on = on;
@@ -46,19 +46,20 @@ export class Connection {
     const socket = new WebSocket(this.address);
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => {
-      // Not before: what is sent between opening and this event would come before the greeting.
+      // Set here and not earlier: a message sent before this event would arrive before hello.
       this.#socket = socket;
       this.on.opened();
     };
     socket.onmessage = ({ data }) => {
-      // Only a server that speaks is there again; one that hangs up at once is waited for ever longer.
-      this.#wait_ms = FIRST_WAIT_MS;
+      // The delay is reset by a message, not by opening: a server that closes each connection at once must not be
+      // asked twice a second.
+      this.#reconnectDelay_ms = MIN_RECONNECT_DELAY_MS;
       this.#receive(data);
     };
-    socket.onclose = () => this.#reopen();
+    socket.onclose = () => this.#reconnect();
   }
 
-  /** Whether the message could be sent. */
+  /** Sends a message; returns whether the connection is open. */
   send(message) {
     const isOpen = this.#socket?.readyState === WebSocket.OPEN;
     if (isOpen) this.#socket.send(JSON.stringify(message));
@@ -74,9 +75,9 @@ export class Connection {
     this.on.picture(header, new Blob([new Uint8Array(data, HEADER_BYTES)], { type: header.type }));
   }
 
-  #reopen() {
-    this.on.lost(this.#wait_ms);
-    setTimeout(() => this.open(), this.#wait_ms);
-    this.#wait_ms = Math.min(LONGEST_WAIT_MS, 2 * this.#wait_ms);
+  #reconnect() {
+    this.on.lost(this.#reconnectDelay_ms);
+    setTimeout(() => this.open(), this.#reconnectDelay_ms);
+    this.#reconnectDelay_ms = Math.min(MAX_RECONNECT_DELAY_MS, 2 * this.#reconnectDelay_ms);
   }
 }

@@ -1,11 +1,11 @@
-// Copying texts, also where the page may not use the clipboard.
+// Copies texts, with a fallback for pages that may not use the clipboard.
 
 import { element, iconButton } from './dom.js';
 import { showToast } from './toast.js';
 
-const SHOWN_MS = 1200;
+const CONFIRMATION_MS = 1200;
 
-/** Copies `text`, and shows on `button` that it did; returns whether it could. */
+/** Copies `text` and confirms it on `button`; returns whether it was copied. */
 export async function copyText(text, button) {
   const isCopied = (await copyByClipboard(text)) || copyBySelection(text, button);
   if (!isCopied) {
@@ -13,7 +13,7 @@ export async function copyText(text, button) {
     return false;
   }
   button.classList.add('is-done');
-  setTimeout(() => button.classList.remove('is-done'), SHOWN_MS);
+  setTimeout(() => button.classList.remove('is-done'), CONFIRMATION_MS);
   return true;
 }
 
@@ -22,7 +22,7 @@ export function copyButton(label, text) {
   return button;
 }
 
-/** Closed to pages that come over plain HTTP from another machine, and to those that may not by the user's will. */
+/** Copies by the clipboard API, which is closed to pages over plain HTTP from another machine and by user settings. */
 async function copyByClipboard(text) {
   try {
     await navigator.clipboard.writeText(text);
@@ -35,7 +35,7 @@ async function copyByClipboard(text) {
 function copyBySelection(text, button) {
   const area = element('textarea', { class: 'visually-hidden' });
   area.value = text;
-  // Beside the button, as an open dialog takes the focus from all that is outside.
+  // Inserted next to the button: an open dialog keeps the focus inside itself.
   button.after(area);
   area.select();
   const isCopied = document.execCommand('copy');

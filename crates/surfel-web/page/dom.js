@@ -1,26 +1,26 @@
-// Elements, icons and downloading: what the page does with the browser in many places.
+// Helpers for elements, icons and downloads.
 
 const SVG = 'http://www.w3.org/2000/svg';
 
-/** An HTML element; attributes whose names begin with `on` are listeners, false ones are left out. */
+/** Creates an HTML element. Attributes that begin with `on` are listeners; false and undefined ones are left out. */
 export function element(tag, attributes = {}, ...children) {
-  return filled(document.createElement(tag), attributes, children);
+  return populate(document.createElement(tag), attributes, children);
 }
 
 export function svg(tag, attributes = {}, ...children) {
-  return filled(document.createElementNS(SVG, tag), attributes, children);
+  return populate(document.createElementNS(SVG, tag), attributes, children);
 }
 
-function filled(made, attributes, children) {
+function populate(created, attributes, children) {
   for (const [name, value] of Object.entries(attributes)) {
-    if (name.startsWith('on')) made.addEventListener(name.slice(2), value);
-    else if (value !== false && value !== undefined) made.setAttribute(name, value === true ? '' : value);
+    if (name.startsWith('on')) created.addEventListener(name.slice(2), value);
+    else if (value !== false && value !== undefined) created.setAttribute(name, value === true ? '' : value);
   }
-  made.append(...children.filter((child) => child !== null && child !== undefined));
-  return made;
+  created.append(...children.filter((child) => child !== null && child !== undefined));
+  return created;
 }
 
-/** One of the icons that index.html defines. */
+/** An icon that index.html defines. */
 export function icon(name) {
   return svg('svg', { class: 'icon', 'aria-hidden': 'true' }, svg('use', { href: `#icon-${name}` }));
 }

@@ -1,12 +1,12 @@
-// Fields of the panel, a maker for each kind: an element that shows a value, and tells when it is changed.
+// Fields of the panel, a factory for each kind: an element that shows a value and reports changes.
 
 import { element, icon } from './dom.js';
 
 const SLIDER_STEPS = 1000;
 
-// Every maker takes the control's row of the table (see controls.js), `change(value, isMoving)`, and the id of
-// the field that the label names; it returns { element, show(value, viewer) }.
-export const makers = { slider, select, toggle, color, numbers, button };
+// Each factory takes a control (see controls.js), a callback `change(value, isMoving)`, and the id of the field that
+// the label refers to; it returns { element, show(value, viewer) }.
+export const fieldFactories = { slider, select, toggle, color, numbers, button };
 
 function slider(control, change, id) {
   let ends = Array.isArray(control.range) ? control.range : [0, 1];
@@ -14,7 +14,7 @@ function slider(control, change, id) {
   const number = numberInput(control.label);
   number.dataset.number = control.key;
   const value = () => rounded(control, valueOf(control, ends, range.value / SLIDER_STEPS));
-  const paint = () => range.style.setProperty('--share', `${(100 * range.value) / SLIDER_STEPS}%`);
+  const paint = () => range.style.setProperty('--fraction', `${(100 * range.value) / SLIDER_STEPS}%`);
   range.addEventListener('input', () => {
     number.value = value();
     paint();
@@ -22,30 +22,30 @@ function slider(control, change, id) {
   });
   range.addEventListener('change', () => change(value(), false));
   number.addEventListener('change', () => {
-    if (Number.isFinite(number.valueAsNumber)) change(limited(control, number.valueAsNumber), false);
+    if (Number.isFinite(number.valueAsNumber)) change(clamp(control, number.valueAsNumber), false);
   });
   const show = (shown, viewer) => {
     if (typeof control.range === 'function') ends = control.range(viewer);
     const isNumber = typeof shown === 'number';
-    // A choice such as `auto` stands in the place of the number.
+    // A value such as `auto` is shown as the placeholder.
     number.placeholder = isNumber ? '' : shown ?? '–';
     if (document.activeElement !== number) number.value = isNumber ? rounded(control, shown) : '';
     if (!isNumber) return;
-    range.value = Math.round(shareOf(control, ends, shown) * SLIDER_STEPS);
+    range.value = Math.round(fractionOf(control, ends, shown) * SLIDER_STEPS);
     range.setAttribute('aria-valuetext', rounded(control, shown));
     paint();
   };
   return { element: element('div', { class: 'field slider' }, range, number), show };
 }
 
-/** Where a value lies between the ends of its slider. */
-function shareOf({ scale }, [low, high], value) {
-  const share = scale === 'logarithmic' ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
-  return Math.min(1, Math.max(0, share));
+/** Position of a value between the ends of its slider, from 0 to 1. */
+function fractionOf({ scale }, [low, high], value) {
+  const fraction = scale === 'logarithmic' ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+  return Math.min(1, Math.max(0, fraction));
 }
 
-function valueOf({ scale }, [low, high], share) {
-  return scale === 'logarithmic' ? low * Math.pow(high / low, share) : low + share * (high - low);
+function valueOf({ scale }, [low, high], fraction) {
+  return scale === 'logarithmic' ? low * Math.pow(high / low, fraction) : low + fraction * (high - low);
 }
 
 function rounded(control, value) {
@@ -53,7 +53,7 @@ function rounded(control, value) {
   return Number(value.toPrecision(3));
 }
 
-function limited({ limits: [low, high] = [-Infinity, Infinity] }, value) {
+function clamp({ limits: [low, high] = [-Infinity, Infinity] }, value) {
   return Math.min(high, Math.max(low, value));
 }
 
@@ -67,7 +67,7 @@ function select(control, change, id) {
     const options = control.options(viewer);
     const known = options.map(optionOf);
     if (value !== undefined && !known.some((option) => option.value === value)) known.unshift(optionOf(value));
-    const texts = known.map(({ value: of, label }) => `${of}\n${label}`).join('\n\n');
+    const texts = known.map((option) => `${option.value}\n${option.label}`).join('\n\n');
     if (field.dataset.options !== texts) {
       field.dataset.options = texts;
       field.replaceChildren(...known.map((option) => element('option', { value: option.value }, option.label)));
@@ -100,7 +100,7 @@ function color(control, change, id) {
   return { element: element('div', { class: 'field color' }, field, text), show };
 }
 
-/** Several numbers side by side, as `names` tells. */
+/** Number inputs side by side, one for each of the control's `names`. */
 function numbers(control, change, id) {
   const inputs = control.names.map((name, i) => {
     const input = numberInput(`${control.label}: ${name}`);

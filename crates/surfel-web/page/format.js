@@ -1,24 +1,24 @@
-// Numbers as text: coordinates with all their digits, lengths with as many as help.
+// Numbers as text: coordinates with all significant digits, other numbers rounded.
 
-/** Six decimals, or seven digits of what is small: all that files hold, and nothing of a number's own error. */
+/** Six decimals, or seven digits of small values: the precision of files, without the rounding error of doubles. */
 export function exact(value) {
   if (typeof value !== 'number' || Number.isInteger(value) || !Number.isFinite(value)) return String(value);
   const whole = Math.max(1, Math.floor(Math.log10(Math.abs(value))) + 1);
   return String(Number(value.toPrecision(Math.min(15, whole + 6))));
 }
 
-/** About five digits, thousands apart. */
+/** About five digits, with thousands separators. */
 export function rounded(value, digits = 5) {
   const whole = Math.abs(value) < 1 ? 0 : Math.floor(Math.log10(Math.abs(value))) + 1;
   const maximumFractionDigits = Math.min(8, Math.max(0, digits - Math.max(whole, 1)));
-  return spaced(value, { maximumFractionDigits });
+  return withSeparators(value, { maximumFractionDigits });
 }
 
 export function count(value) {
-  return spaced(value, { maximumFractionDigits: 0 });
+  return withSeparators(value, { maximumFractionDigits: 0 });
 }
 
-/** Seconds in words: `2.4 s`, `3 min 20 s`. */
+/** A duration in seconds as text: `2.4 s`, `3 min 20 s`. */
 export function duration(seconds) {
   if (seconds < 10) return `${seconds.toFixed(1)} s`;
   const whole = Math.round(seconds);
@@ -27,9 +27,9 @@ export function duration(seconds) {
   return `${Math.floor(whole / 3600)} h ${Math.floor((whole % 3600) / 60)} min`;
 }
 
-/** Steps of a scale between two ends: about `wanted` of them, at round numbers. */
-export function ticks(low, high, wanted) {
-  const raw = (high - low) / wanted;
+/** About `nTicks` round numbers between two ends, for a scale. */
+export function ticks(low, high, nTicks) {
+  const raw = (high - low) / nTicks;
   if (!(0 < raw) || !Number.isFinite(raw)) return [];
   const power = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map((factor) => factor * power).find((size) => raw <= size * 1.0001);
@@ -38,7 +38,7 @@ export function ticks(low, high, wanted) {
   return Array.from({ length: last - first + 1 }, (_, i) => Number(((first + i) * step).toPrecision(12)));
 }
 
-function spaced(value, options) {
-  // Thin spaces, as commas would be decimal signs to half of the readers.
+function withSeparators(value, options) {
+  // Thin spaces: many readers take commas for decimal signs.
   return value.toLocaleString('en-US', options).replaceAll(',', '\u202f');
 }

@@ -1,46 +1,46 @@
-// Keys: flying while they are held, and everything that one press does.
+// Keyboard: flying while keys are held, and commands of single keys.
 
-const FLIGHT = {
+const FLY_DIRECTIONS = {
   w: [0, 0, 1], s: [0, 0, -1], a: [-1, 0, 0], d: [1, 0, 0], q: [0, -1, 0], e: [0, 1, 0],
 };
-const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-/** The camera goes where the arrow points, as by a drag the other way: this share of the picture's height. */
-const ARROW_STEP = 1 / 36;
+const ORBIT_DIRECTIONS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+/** Length of the drag that an arrow key stands for, as a fraction of the picture's height. */
+const ORBIT_STEP = 1 / 36;
 const SIDES = ['front', 'back', 'left', 'right', 'top', 'bottom'];
-const HASTE = 4;
+const FAST_FLY_SPEED = 4;
 const ZOOM_STEP = 0.8;
 
-/** Rows of the help: keys, and what they do. */
+/** Rows of the help dialog: keys, and their action. */
 export const KEY_HELP = [
   ['W A S D', 'fly forward, left, back, right'],
   ['Q E', 'fly down, up'],
   ['Shift', 'fly faster'],
   ['← ↑ → ↓', 'orbit'],
-  ['+ −', 'nearer, farther'],
-  ['1 … 6', 'front, back, left, right, top, bottom'],
-  ['F', 'show everything'],
+  ['+ −', 'zoom in, zoom out'],
+  ['1 … 6', 'view from the front, back, left, right, top, bottom'],
+  ['F', 'fit to view'],
   ['O / P', 'orthographic / perspective'],
-  ['R G B', 'colours of the scan'],
+  ['R G B', 'colour by RGB'],
   ['Z', 'colour by elevation'],
   ['I', 'colour by intensity'],
   ['C', 'colour by class'],
-  ['Enter', 'close the area that is being measured'],
-  ['Esc', 'cancel, close'],
-  ['?', 'this help'],
+  ['Enter', 'close the measured area'],
+  ['Esc', 'cancel or close'],
+  ['?', 'show this help'],
 ];
 
 export const MOUSE_HELP = [
   ['Left drag', 'orbit about the pivot'],
-  ['Right or middle drag, Shift + left drag', 'move the picture'],
-  ['Wheel', 'zoom to what is under the pointer'],
-  ['Double click', 'make what is there the pivot'],
-  ['Alt + click', 'ask what is there'],
+  ['Right or middle drag, Shift + left drag', 'pan'],
+  ['Wheel', 'zoom toward the point under the pointer'],
+  ['Double click', 'set the pivot to this point'],
+  ['Alt + click', 'pick point'],
   ['One finger', 'orbit'],
-  ['Two fingers', 'move and zoom'],
+  ['Two fingers', 'pan and zoom'],
 ];
 
-/** `act` has `escape()`, `enter()`, `help()`. */
-export function followKeys(viewer, navigation, act) {
+/** `actions` has `escape()`, `enter()` and `help()`. */
+export function setUpKeyboard(viewer, navigation, actions) {
   const held = new Set();
   let last = 0;
 
@@ -50,10 +50,10 @@ export function followKeys(viewer, navigation, act) {
       return;
     }
     const isFast = held.has('shift');
-    const flown = [...held].map((key) => FLIGHT[key]).filter(Boolean);
-    const direction = flown.reduce((sum, way) => sum.map((value, i) => value + way[i]), [0, 0, 0]);
-    if (flown.length && last) {
-      navigation.fly(direction, Math.min(0.1, (now - last) / 1000), isFast ? HASTE : 1);
+    const directions = [...held].map((key) => FLY_DIRECTIONS[key]).filter(Boolean);
+    const direction = directions.reduce((sum, one) => sum.map((value, i) => value + one[i]), [0, 0, 0]);
+    if (directions.length && last) {
+      navigation.fly(direction, Math.min(0.1, (now - last) / 1000), isFast ? FAST_FLY_SPEED : 1);
       navigation.settle();
     }
     last = now;
@@ -61,10 +61,10 @@ export function followKeys(viewer, navigation, act) {
   };
 
   const colorBy = (source) => {
-    if (viewer.info.colors.includes(source)) viewer.set({ color: source });
+    if (viewer.info.colors.includes(source)) viewer.changeSettings({ color: source });
   };
 
-  const presses = {
+  const commands = {
     f: () => navigation.fit(),
     o: () => navigation.setOrthographic(true),
     p: () => navigation.setOrthographic(false),
@@ -74,7 +74,7 @@ export function followKeys(viewer, navigation, act) {
     z: () => colorBy('elevation'),
     i: () => colorBy('intensity'),
     c: () => colorBy('class'),
-    '?': () => act.help(),
+    '?': () => actions.help(),
     '+': () => zoom(ZOOM_STEP),
     '=': () => zoom(ZOOM_STEP),
     '-': () => zoom(1 / ZOOM_STEP),
@@ -86,29 +86,29 @@ export function followKeys(viewer, navigation, act) {
 
   window.addEventListener('keydown', (event) => {
     if (document.querySelector('dialog[open]')) return;
-    if (event.key === 'Escape') act.escape();
-    if (!viewer.camera || event.ctrlKey || event.metaKey || event.altKey || keepsItsKeys(event.target)) return;
-    if (event.key === 'Enter' && !event.target.closest('button, summary, a')) act.enter();
-    if (ARROWS[event.key]) {
+    if (event.key === 'Escape') actions.escape();
+    if (!viewer.camera || event.ctrlKey || event.metaKey || event.altKey || usesKeys(event.target)) return;
+    if (event.key === 'Enter' && !event.target.closest('button, summary, a')) actions.enter();
+    if (ORBIT_DIRECTIONS[event.key]) {
       if (event.target.closest('#panel')) return;
-      const [across, along] = ARROWS[event.key].map((step) => step * ARROW_STEP * viewer.size.height);
-      navigation.orbit(across, along);
+      const [dx, dy] = ORBIT_DIRECTIONS[event.key].map((step) => step * ORBIT_STEP * viewer.size.height);
+      navigation.orbit(dx, dy);
       navigation.settle();
       event.preventDefault();
       return;
     }
     const key = event.key.toLowerCase();
-    if (SIDES[key - 1]) navigation.lookFrom(SIDES[key - 1]);
-    else if (FLIGHT[key] || key === 'shift') {
+    if (SIDES[key - 1]) navigation.viewFromSide(SIDES[key - 1]);
+    else if (FLY_DIRECTIONS[key] || key === 'shift') {
       if (held.size === 0) requestAnimationFrame(fly);
       held.add(key);
-    } else presses[key]?.();
+    } else commands[key]?.();
   });
   window.addEventListener('keyup', (event) => held.delete(event.key.toLowerCase()));
   window.addEventListener('blur', () => held.clear());
 }
 
-/** Whether the element under the focus takes letters, digits and arrows itself. */
-function keepsItsKeys(target) {
+/** Whether the focused element handles letters, digits and arrows itself. */
+function usesKeys(target) {
   return target.matches('select, textarea, input:not([type=checkbox], [type=button], [type=range])');
 }

@@ -1,21 +1,21 @@
-// The legend on the picture: the colours of a map with its scale, or of classes with their names.
+// The legend on the picture: a colour map with its scale, or classes with their colours.
 
 import { element } from './dom.js';
 import { rounded, ticks } from './format.js';
 import { areEqual } from './patch.js';
 
-const TICKS = 4;
+const N_TICKS = 4;
 
-export function followLegend(viewer) {
-  const place = document.getElementById('legend');
+export function setUpLegend(viewer) {
+  const card = document.getElementById('legend');
   let shown = null;
   viewer.sceneChanged.listen(() => {
     const { legend } = viewer;
     if (areEqual(legend, shown)) return;
     shown = legend;
-    place.hidden = !legend;
+    card.hidden = !legend;
     if (!legend) return;
-    place.replaceChildren(element('h2', {}, legend.title), legend.kind === 'map' ? mapScale(legend) : classList(legend));
+    card.replaceChildren(element('h2', {}, legend.title), legend.kind === 'map' ? mapScale(legend) : classList(legend));
   });
 }
 
@@ -23,7 +23,7 @@ function mapScale({ low, high, colors }) {
   const bar = element('div', { class: 'legend-bar' });
   bar.style.backgroundImage = gradient(colors, 'to top');
   const digits = Math.max(4, Math.ceil(Math.log10(Math.max(Math.abs(low), Math.abs(high)) / (high - low))) + 3);
-  const marks = ticks(low, high, TICKS).map((value) => {
+  const marks = ticks(low, high, N_TICKS).map((value) => {
     const mark = element('span', { class: 'legend-tick' }, rounded(value, digits));
     mark.style.bottom = `${(100 * (value - low)) / (high - low)}%`;
     return mark;
@@ -41,7 +41,7 @@ function classList({ entries }) {
 
 export const gradient = (colors, direction) => `linear-gradient(${direction}, ${colors.join(', ')})`;
 
-/** A stripe of the colour map in use. */
+/** A stripe with the current colour map. */
 export function colormapPreview(viewer) {
   const stripe = element('div', { class: 'colormap-preview', 'aria-hidden': 'true' });
   viewer.sceneChanged.listen(() => {

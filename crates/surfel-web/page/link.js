@@ -1,20 +1,20 @@
-// Links: a whole view, as the patch that makes it of the opening scene, in the address after `#`.
+// Links: the address of a view holds, after `#`, the patch between the initial scene and the view.
 
-import { patchBetween } from './patch.js';
+import { createPatch } from './patch.js';
 
 const PREFIX = '#view=';
-/** Keys that belong to the window or the files, not to the view. */
-const NOT_OF_THE_VIEW = ['resolution', 'object', 'info', 'output'];
+/** Keys of the window and the files, which are not part of a view. */
+const KEYS_OUTSIDE_VIEW = ['resolution', 'object', 'info', 'output'];
 
-/** The patch that shows `scene` to whoever opens `opening`. */
-export function viewPatch(opening, scene) {
-  const patch = patchBetween(opening, scene);
-  for (const key of NOT_OF_THE_VIEW) delete patch[key];
+/** The patch that changes `initialScene` into `scene`. */
+export function viewPatch(initialScene, scene) {
+  const patch = createPatch(initialScene, scene);
+  for (const key of KEYS_OUTSIDE_VIEW) delete patch[key];
   return patch;
 }
 
-/** The part of an address from `#` on; empty for the opening view itself. */
-export function hashOf(patch) {
+/** The hash of an address for a patch; empty for an empty patch. */
+export function encodeHash(patch) {
   if (Object.keys(patch).length === 0) return '';
   const text = JSON.stringify(patch, (_, value) => (typeof value === 'number' ? rounded(value) : value));
   const bytes = new TextEncoder().encode(text);
@@ -22,8 +22,8 @@ export function hashOf(patch) {
   return PREFIX + base64.replaceAll('+', '-').replaceAll('/', '_').replace(/=+$/, '');
 }
 
-/** The patch in the `#…` of an address; null where there is none that can be read. */
-export function patchOfHash(hash) {
+/** The patch in the hash of an address; null if there is no valid one. */
+export function decodeHash(hash) {
   if (!hash.startsWith(PREFIX)) return null;
   const base64 = hash.slice(PREFIX.length).replaceAll('-', '+').replaceAll('_', '/');
   try {
@@ -35,7 +35,7 @@ export function patchOfHash(hash) {
   }
 }
 
-/** Thirteen digits: a micrometre on a national grid, and short links. */
+/** Rounds to thirteen digits: micrometres on a national grid, and short links. */
 function rounded(value) {
   return Number(value.toPrecision(13));
 }

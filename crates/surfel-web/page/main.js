@@ -1,85 +1,86 @@
-// The page's beginning: makes the parts and joins them.
+// Entry point: creates the parts of the page and connects them.
 
 import { animationRows } from './animation.js';
 import { clipPainter, grabHandle } from './clip-handles.js';
 import * as controls from './controls.js';
 import { element } from './dom.js';
-import { exposeState } from './hooks.js';
-import { followKeys, KEY_HELP, MOUSE_HELP } from './keyboard.js';
-import { colormapPreview, followLegend } from './legend.js';
-import { patchOfHash } from './link.js';
+import { setUpExportDialog, setUpSceneLoading } from './export-dialog.js';
+import { KEY_HELP, MOUSE_HELP, setUpKeyboard } from './keyboard.js';
+import { colormapPreview, setUpLegend } from './legend.js';
+import { decodeHash } from './link.js';
 import { MEASURE_TOOLS, MeasureTool } from './measure-tool.js';
 import { Navigation } from './navigation.js';
 import { Overlay, pivotPainter } from './overlay.js';
-import { controlRows, section } from './panel.js';
+import { Panel, section } from './panel.js';
 import { PickCard } from './pick-card.js';
 import { Picture } from './picture.js';
-import { followPointer } from './pointer.js';
-import { prepareSaveDialog } from './save-dialog.js';
-import { followStatus, statisticsTable } from './status.js';
+import { setUpPointer } from './pointer.js';
+import { setUpSaveDialog } from './save-dialog.js';
+import { setUpStatusLine, statisticsTable } from './status.js';
 import { sunClock } from './sun-clock.js';
-import { followLoading, prepareTakeDialog } from './take-dialog.js';
-import { followConnection, showToast } from './toast.js';
-import { followToolbar } from './toolbar.js';
+import { exposeState } from './test-hooks.js';
+import { setUpNotifications, showToast } from './toast.js';
+import { setUpToolbar } from './toolbar.js';
 import { Viewer } from './viewer.js';
 import { viewRows } from './view-section.js';
 
-const viewer = new Viewer(patchOfHash(location.hash) ?? {});
+const viewer = new Viewer(decodeHash(location.hash) ?? {});
 const navigation = new Navigation(viewer);
-const stage = document.getElementById('stage');
+const panel = new Panel(viewer);
+const viewport = document.getElementById('viewport');
 const overlay = new Overlay(document.getElementById('overlay'), viewer);
 const pickCard = new PickCard(viewer, overlay);
 const measureTool = new MeasureTool(viewer, overlay);
 overlay.add(clipPainter(viewer));
 overlay.add(pivotPainter(navigation));
 
-/** What was last asked of the picture. */
+/** The promise of the last pick's point. */
 let lastPick = null;
 
 const helpDialog = document.getElementById('help-dialog');
 const showHelp = () => helpDialog.showModal();
-const saveDialog = prepareSaveDialog(viewer);
-const takeDialog = prepareTakeDialog(viewer);
+const openSaveDialog = setUpSaveDialog(viewer);
+const openExportDialog = setUpExportDialog(viewer);
 
-followConnection(viewer);
-followStatus(viewer);
-followLegend(viewer);
-followLoading(viewer);
-followToolbar(viewer, navigation, { save: saveDialog, take: takeDialog, help: showHelp });
+setUpNotifications(viewer);
+setUpStatusLine(viewer);
+setUpLegend(viewer);
+setUpSceneLoading(viewer);
+setUpToolbar(viewer, navigation, { save: openSaveDialog, export: openExportDialog, help: showHelp });
 fillPanel();
 fillHelp();
 
-followPointer(stage, viewer, navigation, {
-  grab: (event, place) => grabHandle(viewer, event, place),
-  hover: (place) => measureTool.hover(inCssPixels(place)),
-  async click(place, event) {
+setUpPointer(viewport, viewer, navigation, {
+  grab: (event, pixel) => grabHandle(viewer, event, pixel),
+  hover: (pixel) => measureTool.hover(inCssPixels(pixel)),
+  async click(pixel, event) {
     const { tool } = viewer;
     const isMeasuring = MEASURE_TOOLS.includes(tool) && !event.altKey;
     if (!isMeasuring && tool !== 'pick' && !event.altKey) return;
-    lastPick = pickAfter(lastPick, place);
+    lastPick = pickAfter(lastPick, pixel);
     const point = await lastPick;
     if (viewer.tool !== tool) return;
-    if (!point) showToast('Nothing is there.');
+    if (!point) showToast('There is no point here.');
     else if (isMeasuring) measureTool.add(point.kind === 'point' ? point.position : point.surface);
     else pickCard.show(point);
   },
-  async doubleClick(place) {
+  async doubleClick(pixel) {
     if (viewer.tool === 'area') {
       await finishArea();
       return;
     }
-    const point = await viewer.pick(place);
+    const point = await viewer.pick(pixel);
     if (point) navigation.centerOn(point.surface);
   },
 });
 
-followKeys(viewer, navigation, {
+setUpKeyboard(viewer, navigation, {
   help: showHelp,
   enter: finishArea,
   escape() {
     if (navigation.turntable_secs) navigation.stop();
-    else if (measureTool.isUnderway) measureTool.cancel();
-    else if (viewer.tool !== 'look') viewer.use('look');
+    else if (measureTool.isActive) measureTool.cancel();
+    else if (viewer.tool !== 'navigate') viewer.selectTool('navigate');
     else if (pickCard.isOpen) pickCard.close();
   },
 });
@@ -88,33 +89,34 @@ new Picture(document.getElementById('picture'), viewer);
 exposeState(viewer);
 viewer.connect();
 
-/** Asked for at once, told in the order of the clicks. */
-async function pickAfter(before, place) {
-  const asked = viewer.pick(place);
-  await before;
-  return asked;
+/** Sends a pick at once; resolves after the pick before it, so that points come in the order of the clicks. */
+async function pickAfter(previous, pixel) {
+  const point = viewer.pick(pixel);
+  await previous;
+  return point;
 }
 
-/** The last corner may still be on its way. */
+/** Closes the area after the answer to the last pick, which adds its last corner. */
 async function finishArea() {
   await lastPick;
   measureTool.finish();
 }
 
 function inCssPixels({ x, y }) {
-  const factor = stage.clientWidth / viewer.size.width;
+  const factor = viewport.clientWidth / viewer.size.width;
   return { x: x * factor, y: y * factor };
 }
 
 function fillPanel() {
-  const rows = (table) => controlRows(table, viewer);
+  const rows = (table) => panel.addRows(table);
   const materials = section('Materials', false);
   viewer.infoChanged.listen(() => {
-    const isFilled = materials.dataset.of === viewer.info.name;
-    materials.dataset.of = viewer.info.name;
+    const isFilled = materials.dataset.dataName === viewer.info.name;
+    materials.dataset.dataName = viewer.info.name;
     if (isFilled) return;
-    const tables = viewer.info.objects.map((object) => controls.materialControls(object));
-    materials.querySelector('.section-body').replaceChildren(...tables.flatMap(rows));
+    const body = materials.querySelector('.section-body');
+    panel.removeRows([...body.children]);
+    body.append(...viewer.info.objects.flatMap((object) => rows(controls.materialControls(object))));
   });
   const animation = section('Animation', true, ...animationRows(viewer, () => animation));
   document.getElementById('sections').append(
@@ -130,14 +132,14 @@ function fillPanel() {
     section('Statistics', false, statisticsTable(viewer)));
 }
 
-/** The stripe of the colour map stands under its choice. */
-function withPreview([source, map, ...others]) {
-  return [source, map, colormapPreview(viewer), ...others];
+/** Puts the preview of the colour map under its control. */
+function withPreview([source, colormap, ...others]) {
+  return [source, colormap, colormapPreview(viewer), ...others];
 }
 
 function fillHelp() {
   const table = (title, rows) => element('section', {}, element('h3', {}, title), element('dl', { class: 'keys' },
-    ...rows.flatMap(([keys, what]) => [element('dt', {}, keys), element('dd', {}, what)])));
-  document.getElementById('help-tables').append(table('Mouse and fingers', MOUSE_HELP), table('Keys', KEY_HELP));
+    ...rows.flatMap(([keys, action]) => [element('dt', {}, keys), element('dd', {}, action)])));
+  document.getElementById('help-tables').append(table('Mouse and touch', MOUSE_HELP), table('Keyboard', KEY_HELP));
   document.getElementById('help-close').addEventListener('click', () => helpDialog.close());
 }

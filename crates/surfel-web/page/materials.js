@@ -1,6 +1,6 @@
-// Materials of objects: the list `NAME=kind:property=value,…` of a scene file, taken apart and put together.
+// Materials of objects: parses and formats the list `NAME=kind:property=value,…` of a scene file.
 
-/** One entry as { name (null for all objects), kind, properties }. */
+/** Parses one entry to { name, kind, properties }; the name is null for all objects. */
 export function parseMaterial(text) {
   const colon = text.lastIndexOf(':');
   const hasProperties = 0 <= colon && text.slice(colon).includes('=');
@@ -20,14 +20,14 @@ export function formatMaterial({ name, kind, properties }) {
   return (name === null ? '' : `${name}=`) + kind + (tail ? `:${tail}` : '');
 }
 
-/** The material of an object: its own before that of all, the last one given; null for the file's own. */
+/** The material of an object: the last entry with its name, else the last one for all objects; null if the file decides. */
 export function materialOf(list, name) {
   const entries = (list ?? []).map(parseMaterial);
-  const last = (wanted) => entries.findLast((entry) => entry.name === wanted);
-  return last(name) ?? last(null) ?? null;
+  const lastOf = (entryName) => entries.findLast((entry) => entry.name === entryName);
+  return lastOf(name) ?? lastOf(null) ?? null;
 }
 
-/** The list with this material for one object; kind null takes its own entry out. */
+/** The list with this material for one object; a kind of null removes the object's entry. */
 export function withMaterial(list, name, kind, properties) {
   const others = (list ?? []).filter((text) => parseMaterial(text).name !== name);
   return kind === null ? others : [...others, formatMaterial({ name, kind, properties })];

@@ -1,4 +1,4 @@
-// Measuring on the picture: points are clicked, figures drawn, results listed.
+// Measuring tools: the user clicks on points, the overlay draws the figure, a card lists the results.
 
 import { copyButton } from './copy.js';
 import { element, iconButton } from './dom.js';
@@ -8,12 +8,12 @@ import { mix } from './vector.js';
 
 export const MEASURE_TOOLS = ['distance', 'height', 'area'];
 const DOT_RADIUS = 4;
-/** Figures are in the unit of the file. */
+/** Formats a length or area in the unit of the file. */
 const text = (value) => rounded(value, 6);
 
 export class MeasureTool {
   #finished = [];
-  /** Of the figure that is being made. */
+  /** The points of the unfinished figure. */
   #points = [];
   #hover = null;
   #lastNumber = 0;
@@ -21,12 +21,12 @@ export class MeasureTool {
   constructor(viewer, overlay) {
     this.viewer = viewer;
     this.overlay = overlay;
-    this.place = document.getElementById('measure-card');
+    this.card = document.getElementById('measure-card');
     overlay.add((view) => this.#paint(view));
     viewer.toolChanged.listen(() => this.cancel());
   }
 
-  get isUnderway() {
+  get isActive() {
     return 0 < this.#points.length;
   }
 
@@ -36,7 +36,7 @@ export class MeasureTool {
     this.overlay.redraw();
   }
 
-  /** Closes an area, if it has three corners. */
+  /** Finishes the figure if it has enough points. */
   finish() {
     const kind = this.viewer.tool;
     if (this.#points.length < (kind === 'area' ? 3 : 2)) return;
@@ -52,10 +52,10 @@ export class MeasureTool {
     this.overlay.redraw();
   }
 
-  /** The pointer's place in CSS pixels, to which a line reaches from the last point. */
-  hover(place) {
-    if (!this.isUnderway) return;
-    this.#hover = place;
+  /** Draws a line from the last point to the pointer, which is at these CSS pixels. */
+  hover(pixel) {
+    if (!this.isActive) return;
+    this.#hover = pixel;
     this.overlay.redraw();
   }
 
@@ -64,20 +64,20 @@ export class MeasureTool {
   }
 
   #list() {
-    this.place.hidden = this.#finished.length === 0;
-    const all = () => this.#finished.map((figure) => this.#wordsOf(figure)).join('\n');
+    this.card.hidden = this.#finished.length === 0;
+    const all = () => this.#finished.map((figure) => this.#textOf(figure)).join('\n');
     const clear = () => {
       this.#finished = [];
       this.#list();
     };
-    this.place.replaceChildren(
+    this.card.replaceChildren(
       element('header', {}, element('h2', {}, 'Measurements'), copyButton('Copy all', all),
         iconButton('close', 'Delete all', clear)),
-      ...this.#finished.map((figure) => this.#listed(figure)));
+      ...this.#finished.map((figure) => this.#item(figure)));
     this.overlay.redraw();
   }
 
-  #listed(figure) {
+  #item(figure) {
     const remove = () => {
       this.#finished = this.#finished.filter((other) => other !== figure);
       this.#list();
@@ -86,13 +86,13 @@ export class MeasureTool {
       [element('dt', {}, name), element('dd', {}, element('span', {}, text(value)))]);
     return element('section', { class: 'measurement' },
       element('header', {}, element('h3', {}, figure.name),
-        copyButton(`Copy ${figure.name}`, () => this.#wordsOf(figure)),
+        copyButton(`Copy ${figure.name}`, () => this.#textOf(figure)),
         iconButton('delete', `Delete ${figure.name}`, remove)),
       element('dl', { class: 'values' }, ...rows));
   }
 
-  /** For the clipboard: full numbers, tabs between them. */
-  #wordsOf(figure) {
+  /** The text for the clipboard: full precision, separated by tabs. */
+  #textOf(figure) {
     const results = this.#results(figure).map(({ name, value }) => `${name}\t${value}`);
     const points = figure.points.map((point, i) => `point ${i + 1}\t${point.join('\t')}`);
     return [figure.name, ...results, ...points].join('\n');
@@ -100,14 +100,14 @@ export class MeasureTool {
 
   #paint(view) {
     const figures = this.#finished.flatMap((figure) => this.#paintFigure(view, figure));
-    if (!this.isUnderway) return figures;
-    return [...figures, ...view.path(this.#points, 'measure', false), ...this.#rubber(view), ...dots(view, this.#points)];
+    if (!this.isActive) return figures;
+    return [...figures, ...view.path(this.#points, 'measure', false), ...this.#rubberBand(view), ...dots(view, this.#points)];
   }
 
-  #rubber(view) {
-    const from = view.place(this.#points.at(-1));
+  #rubberBand(view) {
+    const from = view.toPixel(this.#points.at(-1));
     if (!from || !this.#hover) return [];
-    return [view.rubber(from, this.#hover)];
+    return [view.rubberBand(from, this.#hover)];
   }
 
   #paintFigure(view, figure) {
@@ -119,10 +119,10 @@ export class MeasureTool {
         ...view.label(middle(points), lines)];
     }
     const [a, b] = points;
-    const turn = corner(a, b, up);
-    const legs = [...view.line(a, turn, kind === 'height' ? 'measure' : 'measure-leg'), ...view.line(turn, b, 'measure-leg')];
+    const elbow = corner(a, b, up);
+    const legs = [...view.line(a, elbow, kind === 'height' ? 'measure' : 'measure-leg'), ...view.line(elbow, b, 'measure-leg')];
     const straight = kind === 'distance' ? view.line(a, b, 'measure') : [];
-    const at = kind === 'height' ? mix(a, turn, 0.5) : mix(a, b, 0.5);
+    const at = kind === 'height' ? mix(a, elbow, 0.5) : mix(a, b, 0.5);
     return [...legs, ...straight, ...dots(view, points), ...view.label(at, lines)];
   }
 }

@@ -1,43 +1,43 @@
-// What measurements say: lengths, heights and areas of points in the world.
+// Measurements: lengths, heights and areas of points in the world.
 
 import { add, addScaled, cross, distance, dot, length, scale, subtract } from './vector.js';
 
-const withoutHeight = (offset, up) => addScaled(offset, up, -dot(offset, up));
+const horizontalPart = (offset, up) => addScaled(offset, up, -dot(offset, up));
 
-/** Straight, horizontal and vertical distance of two points; vertical is positive upward from `a` to `b`. */
+/** Straight, horizontal and vertical distance of two points; vertical is positive if `b` is above `a`. */
 export function distances(a, b, up) {
   const offset = subtract(b, a);
-  return { straight: length(offset), horizontal: length(withoutHeight(offset, up)), vertical: dot(offset, up) };
+  return { straight: length(offset), horizontal: length(horizontalPart(offset, up)), vertical: dot(offset, up) };
 }
 
-/** Area of a polygon in space, by Newell's normal: exact where it is flat. */
+/** Area of a polygon in space, by Newell's normal; exact for flat polygons. */
 export function area(points) {
   return length(newell(points));
 }
 
-/** Area of its shadow on level ground. */
+/** Area of a polygon's projection onto level ground. */
 export function levelArea(points, up) {
   return Math.abs(dot(newell(points), up));
 }
 
-/** Length of its rim, from the last point back to the first. */
+/** Length of a polygon's outline, from the last point back to the first. */
 export function perimeter(points) {
   return points.reduce((sum, point, i) => sum + distance(point, points[(i + 1) % points.length]), 0);
 }
 
-/** Middle of its corners, where a label may stand. */
+/** Mean of a polygon's corners, for a label. */
 export function middle(points) {
   const first = points[0];
   const sum = points.reduce((total, point) => add(total, subtract(point, first)), [0, 0, 0]);
   return addScaled(first, sum, 1 / points.length);
 }
 
-/** Right angle of a height: over (or under) `a`, as high as `b`. */
+/** The point above or below `a` at the height of `b`. */
 export function corner(a, b, up) {
   return addScaled(a, up, dot(subtract(b, a), up));
 }
 
-/** Normal whose length is the area, relative to the first point so that large coordinates lose nothing. */
+/** Newell's normal, whose length is the area; computed relative to the first point, so that large coordinates keep their precision. */
 function newell(points) {
   const offsets = points.map((point) => subtract(point, points[0]));
   const sum = offsets.reduce(
@@ -45,7 +45,7 @@ function newell(points) {
   return scale(sum, 0.5);
 }
 
-/** A finished measurement as rows of name and number. */
+/** The results of a measurement as rows of name and value. */
 export function resultsOf({ kind, points }, up) {
   if (kind === 'area') {
     return [

@@ -1,22 +1,22 @@
-// Moving the camera: by hand, along smooth ways, and round and round on a turntable.
+// Navigation: moves the camera by hand, in smooth transitions, and on a turntable.
 
 import * as cameras from './camera.js';
 import { addScaled, scale } from './vector.js';
 
-const SMOOTH_MS = 350;
+const TRANSITION_MS = 350;
 const SETTLE_MS = 150;
-/** Half a turn for a drag over the height of the window. */
+/** Angle for a drag over the height of the window. */
 const RADIANS_PER_HEIGHT = Math.PI;
-/** Share of the distance to the focal point flown in a second. */
+/** Fraction of the distance to the focal point flown in a second. */
 const FLY_SPEED = 0.8;
 
 export class Navigation {
   isTrackball = false;
-  /** Whether the hand (or a turntable) is at it: the pivot is shown then. */
+  /** Whether the user is moving the camera; the pivot is shown meanwhile. */
   isActive = false;
   turntable_secs = 0;
-  #way = 0;
-  #settling = 0;
+  #animationRequest = 0;
+  #settleTimer = 0;
 
   constructor(viewer) {
     this.viewer = viewer;
@@ -26,26 +26,26 @@ export class Navigation {
     return this.viewer.camera;
   }
 
-  /** By so many pixels of a picture of the viewer's size. */
-  orbit(across, along) {
+  /** Orbits for a drag by this many pixels of the picture. */
+  orbit(dx, dy) {
     const { camera } = this;
     if (camera.panorama) {
-      this.#lookAround(across);
+      this.#panPanorama(dx);
       return;
     }
     const perPixel = RADIANS_PER_HEIGHT / this.viewer.size.height;
-    const [turn, tilt] = [-across * perPixel, -along * perPixel];
+    const [yaw, pitch] = [-dx * perPixel, -dy * perPixel];
     if (this.isTrackball) {
-      this.#move(cameras.trackball(camera, camera.focal_point, turn, tilt));
+      this.#move(cameras.trackball(camera, camera.focal_point, yaw, pitch));
     } else {
-      this.#move(cameras.orbit(camera, camera.focal_point, this.up, turn, tilt));
+      this.#move(cameras.orbit(camera, camera.focal_point, this.up, yaw, pitch));
     }
   }
 
-  /** A panorama stays where it is: what is under the pointer goes along. Up and down it shows everything. */
-  #lookAround(across) {
-    const turn = (2 * Math.PI * across) / this.viewer.size.width;
-    this.#move(cameras.lookAround(this.camera, turn));
+  /** Turns a panorama so that the surface under the pointer follows it. A panorama shows all elevations at once. */
+  #panPanorama(dx) {
+    const yaw = (2 * Math.PI * dx) / this.viewer.size.width;
+    this.#move(cameras.turnPanorama(this.camera, yaw));
   }
 
   pan(from, to) {
@@ -53,11 +53,11 @@ export class Navigation {
     this.#move(cameras.pan(this.camera, this.viewer.size, from, to, depth));
   }
 
-  /** Toward `target`, or toward what is at the pivot's depth under `place`. */
-  zoom(factor, place, target) {
+  /** Zooms toward `target`, or toward the point at the pivot's depth behind `pixel`. */
+  zoom(factor, pixel, target) {
     const { camera, viewer } = this;
     const depth = cameras.focalDistance(camera);
-    const aim = target ?? cameras.pointAtDepth(camera, viewer.size, place.x, place.y, depth);
+    const aim = target ?? cameras.pointAtDepth(camera, viewer.size, pixel.x, pixel.y, depth);
     this.#move(cameras.zoomTo(camera, aim, factor));
   }
 
@@ -65,98 +65,99 @@ export class Navigation {
     this.zoom(factor, null, this.camera.focal_point);
   }
 
-  /** To the right, up and forward, for so many seconds. */
-  fly([across, along, ahead], seconds, haste) {
+  /** Flies to the right, up and forward for this many seconds. */
+  fly([x, y, z], seconds, speed) {
     const { camera } = this;
     const { right, up, forward } = cameras.axesOf(camera);
-    const way = seconds * haste * FLY_SPEED * cameras.focalDistance(camera);
-    const aside = addScaled(scale(right, across * way), up, along * way);
+    const distance = seconds * speed * FLY_SPEED * cameras.focalDistance(camera);
+    const sideways = addScaled(scale(right, x * distance), up, y * distance);
     if (cameras.isOrthographic(camera)) {
-      const nearer = cameras.zoomTo(camera, camera.focal_point, Math.exp(-ahead * seconds * haste * FLY_SPEED));
-      this.#move(cameras.translate(nearer, aside));
+      const nearer = cameras.zoomTo(camera, camera.focal_point, Math.exp(-z * seconds * speed * FLY_SPEED));
+      this.#move(cameras.translate(nearer, sideways));
     } else {
-      this.#move(cameras.translate(camera, addScaled(aside, forward, ahead * way)));
+      this.#move(cameras.translate(camera, addScaled(sideways, forward, z * distance)));
     }
   }
 
-  /** The picture is refined once nothing has moved for a moment. */
+  /** Ends the interaction after a pause, so that the picture is refined. */
   settle(wait_ms = SETTLE_MS) {
-    clearTimeout(this.#settling);
-    this.#settling = setTimeout(() => this.rest(), wait_ms);
+    clearTimeout(this.#settleTimer);
+    this.#settleTimer = setTimeout(() => this.endInteraction(), wait_ms);
   }
 
-  /** The hand lets go. */
-  rest() {
-    clearTimeout(this.#settling);
+  /** Ends the interaction: the picture is refined. */
+  endInteraction() {
+    clearTimeout(this.#settleTimer);
     this.isActive = false;
-    this.viewer.look(this.camera, false);
+    this.viewer.setCamera(this.camera, false);
   }
 
-  goTo(camera) {
+  /** Moves the camera there in a smooth transition. */
+  transitionTo(camera) {
     this.stop();
     const from = this.camera;
-    const isOfAKind = cameras.isOrthographic(from) === cameras.isOrthographic(camera) && !from.panorama;
-    if (!isOfAKind || matchMedia('(prefers-reduced-motion: reduce)').matches) {
-      this.viewer.look(camera, false);
+    const isSameProjection = cameras.isOrthographic(from) === cameras.isOrthographic(camera) && !from.panorama;
+    if (!isSameProjection || matchMedia('(prefers-reduced-motion: reduce)').matches) {
+      this.viewer.setCamera(camera, false);
       return;
     }
     const start = performance.now();
     const step = () => {
-      const share = Math.min(1, (performance.now() - start) / SMOOTH_MS);
-      this.viewer.look(cameras.blend(from, camera, share * share * (3 - 2 * share)), share < 1);
-      this.#way = share < 1 ? requestAnimationFrame(step) : 0;
+      const t = Math.min(1, (performance.now() - start) / TRANSITION_MS);
+      this.viewer.setCamera(cameras.blend(from, camera, t * t * (3 - 2 * t)), t < 1);
+      this.#animationRequest = t < 1 ? requestAnimationFrame(step) : 0;
     };
     step();
   }
 
-  lookFrom(side) {
-    this.goTo(cameras.fromSide(this.camera, side, this.up));
+  viewFromSide(side) {
+    this.transitionTo(cameras.fromSide(this.camera, side, this.up));
   }
 
   fit() {
-    this.goTo(cameras.fit(this.camera, this.viewer.size, this.viewer.info.bounds));
+    this.transitionTo(cameras.fit(this.camera, this.viewer.size, this.viewer.info.bounds));
   }
 
   centerOn(point) {
-    this.goTo(cameras.centeredOn(this.camera, point));
+    this.transitionTo(cameras.centeredOn(this.camera, point));
   }
 
   setOrthographic(isOrthographic) {
     this.stop();
     const { camera, viewer } = this;
-    const other = isOrthographic
+    const changed = isOrthographic
       ? cameras.toOrthographic(camera, viewer.info.bounds)
-      : cameras.toPerspective(camera, viewer.opening.camera.view_angle ?? undefined);
-    viewer.look(other, false);
+      : cameras.toPerspective(camera, viewer.initialScene.camera.view_angle ?? undefined);
+    viewer.setCamera(changed, false);
   }
 
   setViewAngle(angle_deg, isMoving) {
     this.stop();
-    this.viewer.look(cameras.withViewAngle(this.camera, angle_deg), isMoving);
+    this.viewer.setCamera(cameras.withViewAngle(this.camera, angle_deg), isMoving);
   }
 
-  /** Round the focal point once in so many seconds, until something else moves the camera. */
+  /** Turns about the focal point once in this many seconds, until the camera is moved otherwise. */
   startTurntable(seconds) {
     this.stop();
     this.turntable_secs = seconds;
     let last = performance.now();
     const step = (now) => {
-      const turn = (2 * Math.PI * Math.max(0, now - last)) / (1000 * seconds);
+      const yaw = (2 * Math.PI * Math.max(0, now - last)) / (1000 * seconds);
       last = now;
-      const turned = cameras.orbit(this.camera, this.camera.focal_point, this.up, turn, 0);
-      this.viewer.look(turned, true);
-      this.#way = requestAnimationFrame(step);
+      const turned = cameras.orbit(this.camera, this.camera.focal_point, this.up, yaw, 0);
+      this.viewer.setCamera(turned, true);
+      this.#animationRequest = requestAnimationFrame(step);
     };
-    this.#way = requestAnimationFrame(step);
+    this.#animationRequest = requestAnimationFrame(step);
   }
 
-  /** Ends a smooth way or a turntable where it is. */
+  /** Stops a transition or the turntable at the current camera. */
   stop() {
-    if (!this.#way) return;
-    cancelAnimationFrame(this.#way);
-    this.#way = 0;
+    if (!this.#animationRequest) return;
+    cancelAnimationFrame(this.#animationRequest);
+    this.#animationRequest = 0;
     this.turntable_secs = 0;
-    this.viewer.look(this.camera, false);
+    this.viewer.setCamera(this.camera, false);
   }
 
   get up() {
@@ -166,6 +167,6 @@ export class Navigation {
   #move(camera) {
     this.stop();
     this.isActive = true;
-    this.viewer.look(camera, true);
+    this.viewer.setCamera(camera, true);
   }
 }

@@ -1,19 +1,19 @@
-// The drawing over the picture: lines, labels and handles in the world, as the camera of the picture sees them.
+// The overlay over the picture: lines, labels and handles in the world, projected with the camera of the picture.
 
 import { depthOf, project } from './camera.js';
 import { svg } from './dom.js';
 import { mix } from './vector.js';
 
-/** Share of a line's depth at which it is cut off before the camera. */
-const NEAR = 1e-3;
-/** Straight lines are bent in a panorama, which draws so many pieces of each. */
-const BENT_PIECES = 32;
-const LABEL_LINE = 16;
+/** Depth at which lines are clipped in front of the camera, as a fraction of the line's own depth. */
+const NEAR_FRACTION = 1e-3;
+/** Number of segments of a line in a panorama, where straight lines are curved. */
+const N_CURVE_SEGMENTS = 32;
+const LABEL_LINE_HEIGHT = 16;
 const LABEL_GAP = 10;
 
 export class Overlay {
   #painters = [];
-  #isDue = false;
+  #isScheduled = false;
 
   constructor(root, viewer) {
     this.root = root;
@@ -24,16 +24,16 @@ export class Overlay {
     new ResizeObserver(() => this.redraw()).observe(root);
   }
 
-  /** `paint(view)` returns elements, made with the functions of a view. */
+  /** Adds a painter: `paint(view)` returns SVG elements, created with the functions of the view. */
   add(paint) {
     this.#painters.push(paint);
   }
 
   redraw() {
-    if (this.#isDue) return;
-    this.#isDue = true;
+    if (this.#isScheduled) return;
+    this.#isScheduled = true;
     requestAnimationFrame(() => {
-      this.#isDue = false;
+      this.#isScheduled = false;
       const camera = this.viewer.shownCamera;
       if (!camera) return;
       const view = viewOf(camera, { width: this.root.clientWidth, height: this.root.clientHeight });
@@ -42,70 +42,70 @@ export class Overlay {
   }
 }
 
-/** What painters draw with; places are CSS pixels, points are in the world. */
+/** The functions that painters draw with. Points are in the world, their positions on the overlay in CSS pixels. */
 function viewOf(camera, size) {
-  const place = (point) => project(camera, size, point);
+  const toPixel = (point) => project(camera, size, point);
 
   const lineBetween = (from, to, className) => svg('line', { class: className, x1: from.x, y1: from.y, x2: to.x, y2: to.y });
 
   const straight = (a, b, className) => {
     const [depthA, depthB] = [depthOf(camera, a), depthOf(camera, b)];
-    const near = NEAR * Math.max(depthA, depthB);
+    const near = NEAR_FRACTION * Math.max(depthA, depthB);
     if (!(0 < near)) return [];
     const cut = () => mix(a, b, (near - depthA) / (depthB - depthA));
-    const [from, to] = [place(depthA < near ? cut() : a), place(depthB < near ? cut() : b)];
+    const [from, to] = [toPixel(depthA < near ? cut() : a), toPixel(depthB < near ? cut() : b)];
     return from && to ? [lineBetween(from, to, className)] : [];
   };
 
-  /** What leaves a panorama at one side comes back at the other. */
-  const bent = (a, b, className) => {
-    const places = Array.from({ length: BENT_PIECES + 1 }, (_, i) => place(mix(a, b, i / BENT_PIECES)));
-    const isSeen = ([from, to]) => from && to && Math.abs(from.x - to.x) < size.width / 2;
-    const pieces = places.slice(1).map((to, i) => [places[i], to]).filter(isSeen);
-    return pieces.map(([from, to]) => lineBetween(from, to, className));
+  /** Draws a line in a panorama; segments that cross from one side of the picture to the other are left out. */
+  const curved = (a, b, className) => {
+    const pixels = Array.from({ length: N_CURVE_SEGMENTS + 1 }, (_, i) => toPixel(mix(a, b, i / N_CURVE_SEGMENTS)));
+    const isVisible = ([from, to]) => from && to && Math.abs(from.x - to.x) < size.width / 2;
+    const segments = pixels.slice(1).map((to, i) => [pixels[i], to]).filter(isVisible);
+    return segments.map(([from, to]) => lineBetween(from, to, className));
   };
 
-  const line = camera.panorama ? bent : straight;
+  const line = camera.panorama ? curved : straight;
 
   const path = (points, className, isClosed) => points.flatMap((point, i) => {
     const next = points[i + 1] ?? (isClosed ? points[0] : null);
     return next ? line(point, next, className) : [];
   });
 
-  /** A filled polygon; left out where part of it is behind the camera, and where its sides are bent. */
+  /** A filled polygon; none if part of it is behind the camera, or in a panorama. */
   const polygon = (points, className) => {
-    const places = points.map(place);
-    if (camera.panorama || places.length < 3 || places.some((one) => one === null)) return [];
-    return [svg('polygon', { class: className, points: places.map(({ x, y }) => `${x},${y}`).join(' ') })];
+    const pixels = points.map(toPixel);
+    if (camera.panorama || pixels.length < 3 || pixels.some((one) => one === null)) return [];
+    return [svg('polygon', { class: className, points: pixels.map(({ x, y }) => `${x},${y}`).join(' ') })];
   };
 
   const dot = (point, radius, className, attributes = {}) => {
-    const at = place(point);
-    return at ? [svg('circle', { class: className, cx: at.x, cy: at.y, r: radius, ...attributes })] : [];
+    const pixel = toPixel(point);
+    return pixel ? [svg('circle', { class: className, cx: pixel.x, cy: pixel.y, r: radius, ...attributes })] : [];
   };
 
-  /** Lines of text over a point. */
+  /** A label with lines of text above a point. */
   const label = (point, lines) => {
-    const foot = place(point);
+    const foot = toPixel(point);
     if (!foot) return [];
     const width = 14 + 6.7 * Math.max(...lines.map((text) => text.length));
-    const height = 8 + LABEL_LINE * lines.length;
+    const height = 8 + LABEL_LINE_HEIGHT * lines.length;
     const at = { x: foot.x, y: foot.y - height / 2 - LABEL_GAP };
     const texts = lines.map((text, i) =>
-      svg('text', { x: at.x, y: at.y - height / 2 + LABEL_LINE * (i + 1) }, text));
+      svg('text', { x: at.x, y: at.y - height / 2 + LABEL_LINE_HEIGHT * (i + 1) }, text));
     const frame = svg('rect', { x: at.x - width / 2, y: at.y - height / 2, width, height, rx: 6 });
     return [svg('g', { class: 'label' }, frame, ...texts)];
   };
 
-  const rubber = (from, to) => lineBetween(from, to, 'measure-rubber');
+  const rubberBand = (from, to) => lineBetween(from, to, 'measure-rubber-band');
 
-  return { camera, size, place, line, path, polygon, dot, label, rubber };
+  return { camera, size, toPixel, line, path, polygon, dot, label, rubberBand };
 }
 
-/** The cross at the pivot while the camera is moved by hand. */
+/** Paints a cross at the pivot while the user moves the camera. */
 export function pivotPainter(navigation) {
-  return ({ camera, place }) => {
-    const at = navigation.isActive && !camera.panorama ? place(camera.focal_point) : null;
+  return ({ camera, toPixel }) => {
+    const at = navigation.isActive && !camera.panorama ? toPixel(camera.focal_point) : null;
     if (!at) return [];
     const shape = `M${at.x - 9} ${at.y}h6m6 0h6M${at.x} ${at.y - 9}v6m0 6v6`;
     return [svg('path', { class: 'pivot-halo', d: shape }), svg('path', { class: 'pivot', d: shape })];

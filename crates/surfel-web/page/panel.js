@@ -1,57 +1,99 @@
 // The panel: sections of controls made from their table, kept in step with the scene.
 
 import { element, icon, iconButton } from './dom.js';
-import { makers } from './fields.js';
-import { areEqual, patchOf, valueAt } from './patch.js';
+import { fieldFactories } from './fields.js';
+import { areEqual, patchAt, valueAt } from './patch.js';
+import { findControl } from './rejections.js';
 
-/** A part of the panel that folds; `badge` may show what it holds. */
+/** A section of the panel that folds. */
 export function section(title, isOpen, ...children) {
   return element('details', { class: 'section', open: isOpen, 'data-section': title.toLowerCase() },
     element('summary', {}, element('span', {}, title), icon('chevron')),
     element('div', { class: 'section-body' }, ...children));
 }
 
-/** Rows for these controls, which follow the scene. */
-export function controlRows(controls, viewer) {
-  const rows = controls.map((control) => row(control, viewer));
-  const update = () => viewer.scene && rows.forEach((one) => one.update());
-  viewer.sceneChanged.listen(update);
-  return rows.map((one) => one.element);
+/** The rows of the panel, which show the scene's values and the server's rejections of them. */
+export class Panel {
+  #rows = [];
+  #lastChanged = null;
+
+  constructor(viewer) {
+    this.viewer = viewer;
+    viewer.sceneChanged.listen(() => viewer.scene && this.#rows.forEach((row) => row.update()));
+    viewer.rejected.listen((rejection) => this.#showRejection(rejection));
+  }
+
+  /** Adds rows for these controls; returns their elements. */
+  addRows(controls) {
+    return controls.map((control) => {
+      const row = createRow(control, this.viewer, () => { this.#lastChanged = row; });
+      this.#rows.push(row);
+      return row.element;
+    });
+  }
+
+  /** Removes rows, given by their elements. */
+  removeRows(elements) {
+    this.#rows = this.#rows.filter((row) => !elements.includes(row.element));
+    for (const removed of elements) removed.remove();
+  }
+
+  #showRejection({ key, text }) {
+    const rows = this.#rows.filter((row) => !row.element.hidden);
+    const controls = rows.map((row) => row.control);
+    if (key) rows[findControl(controls, key, rows.indexOf(this.#lastChanged))]?.showError(text);
+  }
 }
 
-function row(control, viewer) {
+function createRow(control, viewer, onChange) {
   const id = `field-${control.key.replaceAll(/[^\w-]/g, '_')}`;
   const read = (scene) => (control.read ? control.read(scene, viewer) : valueAt(scene, control.key));
-  const patchFor = (value) => (control.write ? control.write(value, viewer.scene, viewer) : patchOf(control.key, value));
-  let isHeld = false;
-  const change = (value, isMoving) => {
-    isHeld = isMoving;
-    viewer.set(patchFor(value), isMoving);
+  const patchFor = (value) => (control.write ? control.write(value, viewer.scene, viewer) : patchAt(control.key, value));
+  const error = element('p', { class: 'row-error', role: 'alert', id: `${id}-error`, hidden: true });
+  let rejectedValue;
+  let isDragging = false;
+  const send = (patch, isMoving) => {
+    error.hidden = true;
+    onChange();
+    viewer.changeSettings(patch, isMoving);
   };
-  const field = makers[control.kind](control, change, id);
-  const key = control.of ?? control.key;
-  // A key of the scene file goes back as it stands there; a part of one by what it reads.
-  const opening = () => (control.of ? read(viewer.opening) : valueAt(viewer.opening, control.key));
-  const present = () => (control.of ? read(viewer.scene) : valueAt(viewer.scene, control.key));
-  const goBack = () => viewer.set(control.of ? patchFor(opening()) : patchOf(control.key, opening() ?? null));
-  const canGoBack = () => !(control.of && opening() === null) && control.kind !== 'button' && !areEqual(opening(), present());
+  const change = (value, isMoving) => {
+    isDragging = isMoving;
+    send(patchFor(value), isMoving);
+  };
+  const field = fieldFactories[control.kind](control, change, id);
+  const sceneKey = control.sceneKey ?? control.key;
+  // A control of a whole scene key resets that key; a control of a part resets the value that it reads.
+  const valueToCompare = (scene) => (control.sceneKey ? read(scene) : valueAt(scene, control.key));
+  const initialValue = () => valueToCompare(viewer.initialScene);
+  const reset = () => send(control.sceneKey ? patchFor(initialValue()) : patchAt(control.key, initialValue() ?? null));
+  const canReset = () => !(control.sceneKey && initialValue() === null) && control.kind !== 'button'
+    && !areEqual(initialValue(), valueToCompare(viewer.scene));
 
-  const reset = iconButton('reset', `${control.label}: as it was`, goBack, { class: 'icon-button reset', 'data-reset': control.key });
+  const resetButton = iconButton('reset', `${control.label}: reset`, reset, { class: 'icon-button reset', 'data-reset': control.key });
   const automatic = control.automatic ? element('button', {
-    type: 'button', class: 'chip', title: 'Chosen automatically', 'data-automatic': control.key,
-    onclick: () => viewer.set(patchOf(control.key, null)),
+    type: 'button', class: 'chip', title: 'Choose automatically', 'data-automatic': control.key,
+    onclick: () => send(patchAt(control.key, null)),
   }, 'auto') : null;
-  const title = control.help ? `${control.help}\n${key}` : key;
-  const made = element('div', { class: 'row', 'data-row': control.key },
+  const title = control.help ? `${control.help}\n${sceneKey}` : sceneKey;
+  const row = element('div', { class: 'row', 'data-row': control.key },
     element('label', { for: id, title }, control.label, control.unit && element('small', {}, control.unit)),
-    field.element, automatic, reset);
+    field.element, automatic, resetButton, error);
 
   const update = () => {
-    made.hidden = control.shown ? !control.shown(viewer.scene, viewer) : false;
-    if (made.hidden) return;
-    // What is being dragged knows better than a scene that is underway.
-    if (!isHeld) field.show(read(viewer.scene), viewer);
-    reset.classList.toggle('is-idle', !canGoBack());
+    row.hidden = control.isVisible ? !control.isVisible(viewer.scene, viewer) : false;
+    if (row.hidden) return;
+    const value = read(viewer.scene);
+    // While the user drags, the field is ahead of the scene.
+    if (!isDragging) field.show(value, viewer);
+    if (!areEqual(value, rejectedValue)) error.hidden = true;
+    resetButton.classList.toggle('is-idle', !canReset());
   };
-  return { element: made, update };
+  const showError = (text) => {
+    // The rejected value is taken back before; the error stays until the value changes.
+    rejectedValue = read(viewer.scene);
+    error.textContent = text;
+    error.hidden = false;
+  };
+  return { control, element: row, update, showError };
 }

@@ -1,8 +1,8 @@
-// JSON merge patches (RFC 7386): what changes one scene into another.
+// JSON merge patches (RFC 7386) between scenes.
 
 const isObject = (value) => typeof value === 'object' && value !== null && !Array.isArray(value);
 
-/** `target` as `patch` makes it; null in a patch removes a key. */
+/** `target` with `patch` applied; null in a patch removes a key. */
 export function mergePatch(target, patch) {
   if (!isObject(patch)) return patch;
   const merged = isObject(target) ? { ...target } : {};
@@ -13,23 +13,23 @@ export function mergePatch(target, patch) {
   return merged;
 }
 
-/** One patch that does what `first` and then `second` do. */
-export function joinPatches(first, second) {
+/** One patch with the effect of `first`, then `second`. */
+export function combinePatches(first, second) {
   if (!isObject(first) || !isObject(second)) return second;
-  const joined = { ...first };
+  const combined = { ...first };
   for (const [key, value] of Object.entries(second)) {
-    joined[key] = key in joined ? joinPatches(joined[key], value) : value;
+    combined[key] = key in combined ? combinePatches(combined[key], value) : value;
   }
-  return joined;
+  return combined;
 }
 
-/** The patch that makes `to` of `from`. */
-export function patchBetween(from, to) {
+/** The patch that changes `from` into `to`. */
+export function createPatch(from, to) {
   const patch = {};
   for (const key of new Set([...Object.keys(from), ...Object.keys(to)])) {
     if (!(key in to)) patch[key] = null;
     else if (isObject(from[key]) && isObject(to[key])) {
-      const inner = patchBetween(from[key], to[key]);
+      const inner = createPatch(from[key], to[key]);
       if (Object.keys(inner).length) patch[key] = inner;
     } else if (!areEqual(from[key], to[key])) patch[key] = to[key];
   }
@@ -44,12 +44,12 @@ export function areEqual(a, b) {
   return keys.length === Object.keys(b).length && keys.every((key) => key in b && areEqual(a[key], b[key]));
 }
 
-/** Value at a dotted path such as `sun.azimuth`. */
+/** The value at a dotted path such as `sun.azimuth`. */
 export function valueAt(scene, path) {
   return path.split('.').reduce((value, key) => value?.[key], scene);
 }
 
-/** A patch that sets only what is at a dotted path. */
-export function patchOf(path, value) {
+/** A patch that sets only the value at a dotted path. */
+export function patchAt(path, value) {
   return path.split('.').reduceRight((inner, key) => ({ [key]: inner }), value);
 }

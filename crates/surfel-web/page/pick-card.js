@@ -1,4 +1,4 @@
-// The card that tells what is at a place in the picture, every value to be copied.
+// The card with the attributes of a picked point, each of which can be copied.
 
 import { copyButton } from './copy.js';
 import { element, iconButton } from './dom.js';
@@ -6,7 +6,7 @@ import { exact } from './format.js';
 
 const AXES = ['x', 'y', 'z'];
 
-/** Names and values of all that is known of a point. */
+/** Names and values of a point's attributes. */
 function rowsOf(point) {
   return [
     ...AXES.map((name, i) => [name, exact(point.position[i])]),
@@ -22,7 +22,7 @@ export class PickCard {
   #point = null;
 
   constructor(viewer, overlay) {
-    this.place = document.getElementById('pick-card');
+    this.card = document.getElementById('pick-card');
     this.overlay = overlay;
     overlay.add((view) => (this.#point
       ? [...view.dot(this.#point.position, 6, 'pick-halo'), ...view.dot(this.#point.position, 6, 'pick')] : []));
@@ -37,20 +37,20 @@ export class PickCard {
     this.#point = point;
     const rows = rowsOf(point);
     const all = () => rows.map(([name, value]) => `${name}\t${value}`).join('\n');
-    this.place.replaceChildren(
+    this.card.replaceChildren(
       element('header', {},
         element('h2', {}, point.kind === 'triangle' ? 'Triangle' : 'Point'),
         copyButton('Copy all', all),
         iconButton('close', 'Close', () => this.close())),
       element('dl', { class: 'values' }, ...rows.flatMap(([name, value]) => [
         element('dt', {}, name), element('dd', {}, element('span', {}, value), copyButton(`Copy ${name}`, () => value))])));
-    this.place.hidden = false;
+    this.card.hidden = false;
     this.overlay.redraw();
   }
 
   close() {
     this.#point = null;
-    this.place.hidden = true;
+    this.card.hidden = true;
     this.overlay.redraw();
   }
 }

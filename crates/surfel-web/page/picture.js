@@ -1,7 +1,7 @@
-// The picture on the screen: decodes what comes, draws the newest, asks for the size that the window has.
+// The picture on the screen: decodes received pictures, draws the newest, and requests pictures of the window's size.
 
-/** Until the server tells its own limit: a larger picture might be refused. */
-const CAUTIOUS_PIXELS = 2_000_000;
+/** Maximum number of pixels until the server sends its own limit. */
+const DEFAULT_MAX_PIXELS = 2_000_000;
 
 export class Picture {
   #context;
@@ -12,19 +12,19 @@ export class Picture {
     this.canvas = canvas;
     this.viewer = viewer;
     this.#context = canvas.getContext('2d');
-    viewer.pictureCame.listen((header, blob) => this.#receive(header, blob));
+    viewer.pictureReceived.listen((header, blob) => this.#receive(header, blob));
     viewer.infoChanged.listen(() => this.resize());
     new ResizeObserver(() => this.resize()).observe(canvas);
-    // Another screen may have other pixels.
+    // The pixel ratio changes when the window moves to another screen.
     window.addEventListener('resize', () => this.resize());
     this.resize();
   }
 
-  /** Asks for as many pixels as the screen has, or as the server allows. */
+  /** Requests as many pixels as the screen has, up to the server's limit. */
   resize() {
     const { clientWidth, clientHeight } = this.canvas;
-    const most = this.viewer.info?.limits.max_pixels ?? CAUTIOUS_PIXELS;
-    const size = pictureSize(clientWidth, clientHeight, window.devicePixelRatio, most);
+    const maxPixels = this.viewer.info?.limits.max_pixels ?? DEFAULT_MAX_PIXELS;
+    const size = pictureSize(clientWidth, clientHeight, window.devicePixelRatio, maxPixels);
     const { canvas } = this;
     if (size.width !== canvas.width || size.height !== canvas.height) {
       const old = canvas.width && canvas.height ? copyOf(canvas) : null;
@@ -34,7 +34,7 @@ export class Picture {
     this.viewer.resize(size);
   }
 
-  /** A picture that comes while another is being decoded takes the place of those that wait. */
+  /** Draws a picture. While one is being decoded, only the newest of those that arrive is kept. */
   async #receive(header, blob) {
     this.#next = { header, blob };
     if (this.#isDecoding) return;
@@ -48,14 +48,14 @@ export class Picture {
         this.canvas.classList.add('is-drawn');
         bitmap.close();
       } catch {
-        // A broken picture is passed over; the server still waits to hear that it was seen.
+        // A broken picture is skipped, and acknowledged, as the server waits for it.
       }
-      this.viewer.shown(shown);
+      this.viewer.acknowledge(shown);
     }
     this.#isDecoding = false;
   }
 
-  /** Fills the height, as the vertical angle of view does; a picture of another shape is centred. */
+  /** Draws an image over the full height, which the vertical angle of view covers; other aspect ratios are centred. */
   #draw(image) {
     const { width, height } = this.canvas;
     const drawnWidth = Math.abs(image.width / image.height - width / height) < 0.01
@@ -66,10 +66,10 @@ export class Picture {
   }
 }
 
-/** Size in device pixels of a picture that covers so many CSS pixels, scaled down to the limit. */
-export function pictureSize(cssWidth, cssHeight, pixelRatio, most) {
+/** Size in device pixels of a picture that covers this many CSS pixels, scaled down to the limit. */
+export function pictureSize(cssWidth, cssHeight, pixelRatio, maxPixels) {
   const wanted = cssWidth * cssHeight * pixelRatio * pixelRatio;
-  const factor = pixelRatio * Math.min(1, Math.sqrt(most / Math.max(1, wanted)));
+  const factor = pixelRatio * Math.min(1, Math.sqrt(maxPixels / Math.max(1, wanted)));
   const whole = (length) => Math.max(1, Math.floor(length * factor + 1e-6));
   return { width: whole(cssWidth), height: whole(cssHeight) };
 }

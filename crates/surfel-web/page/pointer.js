@@ -1,4 +1,4 @@
-// Mouse, pen and touch on the picture: drags, wheels, clicks and pinches become moves and places.
+// Pointers on the picture: drags, wheels, clicks and pinches of mouse, pen and touch.
 
 const CLICK_PIXELS = 4;
 const DOUBLE_CLICK_MS = 350;
@@ -7,51 +7,51 @@ const WHEEL_PAUSE_MS = 300;
 const LINE_PIXELS = 16;
 
 /**
- * `act` has `click(place, event)`, `doubleClick(place)` and `hover(place)`, places in pixels of the picture;
- * `grab(event, place)` may take a drag for itself by returning `{ move(place), end() }`.
+ * `actions` has `click(pixel, event)`, `doubleClick(pixel)` and `hover(pixel)`, in pixels of the picture.
+ * `grab(event, pixel)` may take over a drag by returning `{ move(pixel), end() }`.
  */
-export function followPointer(stage, viewer, navigation, act) {
+export function setUpPointer(viewport, viewer, navigation, actions) {
   const pointers = new Map();
   let drag = null;
   let lastClick = null;
   let wheel = null;
 
-  const placeOf = (event) => {
-    const frame = stage.getBoundingClientRect();
+  const pixelOf = (event) => {
+    const frame = viewport.getBoundingClientRect();
     return {
       x: ((event.clientX - frame.left) * viewer.size.width) / frame.width,
       y: ((event.clientY - frame.top) * viewer.size.height) / frame.height,
     };
   };
 
-  stage.addEventListener('contextmenu', (event) => event.preventDefault());
+  viewport.addEventListener('contextmenu', (event) => event.preventDefault());
 
-  stage.addEventListener('pointerdown', (event) => {
+  viewport.addEventListener('pointerdown', (event) => {
     if (!viewer.camera || event.target.closest('[data-ui]')) return;
-    stage.focus({ preventScroll: true });
+    viewport.focus({ preventScroll: true });
     navigation.stop();
-    stage.setPointerCapture(event.pointerId);
-    pointers.set(event.pointerId, placeOf(event));
+    viewport.setPointerCapture(event.pointerId);
+    pointers.set(event.pointerId, pixelOf(event));
     if (pointers.size === 1) {
       const isPan = event.button === 1 || event.button === 2 || (event.button === 0 && event.shiftKey);
-      const taken = event.button === 0 ? act.grab(event, placeOf(event)) : null;
-      drag = { isPan, taken, start: event, isClick: !taken, last: placeOf(event) };
+      const grabbed = event.button === 0 ? actions.grab(event, pixelOf(event)) : null;
+      drag = { isPan, grabbed, start: event, isClick: !grabbed, last: pixelOf(event) };
     } else if (drag) {
       drag.isClick = false;
     }
     event.preventDefault();
   });
 
-  stage.addEventListener('pointermove', (event) => {
-    const place = placeOf(event);
+  viewport.addEventListener('pointermove', (event) => {
+    const pixel = pixelOf(event);
     if (!pointers.has(event.pointerId)) {
       if (wheel && CLICK_PIXELS < distance(wheel.client, clientOf(event))) wheel = null;
-      act.hover(place);
+      actions.hover(pixel);
       return;
     }
-    if (pointers.size === 2) pinch(event.pointerId, place);
-    else if (pointers.size === 1) dragTo(place, event);
-    pointers.set(event.pointerId, place);
+    if (pointers.size === 2) pinch(event.pointerId, pixel);
+    else if (pointers.size === 1) dragTo(pixel, event);
+    pointers.set(event.pointerId, pixel);
   });
 
   const release = (event) => {
@@ -59,62 +59,62 @@ export function followPointer(stage, viewer, navigation, act) {
       if (drag) drag.last = [...pointers.values()][0] ?? drag.last;
       return;
     }
-    const { taken, isClick, start } = drag;
+    const { grabbed, isClick, start } = drag;
     drag = null;
-    if (taken) taken.end();
-    else if (isClick && event.type === 'pointerup' && start.button === 0) clicked(placeOf(event), start);
-    else if (navigation.isActive) navigation.rest();
+    if (grabbed) grabbed.end();
+    else if (isClick && event.type === 'pointerup' && start.button === 0) handleClick(pixelOf(event), start);
+    else if (navigation.isActive) navigation.endInteraction();
   };
-  stage.addEventListener('pointerup', release);
-  stage.addEventListener('pointercancel', release);
+  viewport.addEventListener('pointerup', release);
+  viewport.addEventListener('pointercancel', release);
 
-  stage.addEventListener('wheel', (event) => {
+  viewport.addEventListener('wheel', (event) => {
     if (!viewer.camera || event.target.closest('[data-ui]')) return;
     event.preventDefault();
-    const place = placeOf(event);
+    const pixel = pixelOf(event);
     const now = event.timeStamp;
     if (!wheel || WHEEL_PAUSE_MS < now - wheel.at) {
       wheel = { client: clientOf(event), target: null };
       const started = wheel;
-      viewer.pick(place).then((point) => { started.target = point?.surface ?? null; });
+      viewer.pick(pixel).then((point) => { started.target = point?.surface ?? null; });
     }
     wheel.at = now;
     const pixels = event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY : event.deltaY * LINE_PIXELS;
     // Trackpads report a pinch as a wheel with the control key held, in small steps.
     const factor = Math.exp(Math.max(-1, Math.min(1, pixels * (event.ctrlKey ? 0.01 : 0.0015))));
-    navigation.zoom(factor, place, wheel.target);
+    navigation.zoom(factor, pixel, wheel.target);
     navigation.settle();
   }, { passive: false });
 
-  function dragTo(place, event) {
+  function dragTo(pixel, event) {
     if (drag.isClick && distance(clientOf(drag.start), clientOf(event)) < CLICK_PIXELS) return;
     drag.isClick = false;
-    if (drag.taken) drag.taken.move(place);
-    else if (drag.isPan) navigation.pan(drag.last, place);
-    else navigation.orbit(place.x - drag.last.x, place.y - drag.last.y);
-    drag.last = place;
+    if (drag.grabbed) drag.grabbed.move(pixel);
+    else if (drag.isPan) navigation.pan(drag.last, pixel);
+    else navigation.orbit(pixel.x - drag.last.x, pixel.y - drag.last.y);
+    drag.last = pixel;
   }
 
-  /** Two fingers: what is between them stays there. */
-  function pinch(movedId, place) {
-    const [other] = [...pointers].filter(([id]) => id !== movedId).map(([, at]) => at);
+  /** Pans and zooms with two fingers, so that the surface between them stays there. */
+  function pinch(movedId, pixel) {
+    const [other] = [...pointers].filter(([id]) => id !== movedId).map(([, position]) => position);
     const before = pointers.get(movedId);
-    const [from, to] = [between(before, other), between(place, other)];
+    const [from, to] = [midpoint(before, other), midpoint(pixel, other)];
     navigation.pan(from, to);
-    navigation.zoom(distance(before, other) / Math.max(1, distance(place, other)), to, null);
+    navigation.zoom(distance(before, other) / Math.max(1, distance(pixel, other)), to, null);
   }
 
-  /** By the time of the press, not that at which a busy page hears of it. */
-  function clicked(place, event) {
+  /** Tells clicks from double clicks by the time of the press; a busy page handles the event later. */
+  function handleClick(pixel, event) {
     const now = event.timeStamp;
     const isDouble = lastClick && now - lastClick.at < DOUBLE_CLICK_MS &&
       distance(lastClick.client, clientOf(event)) < DOUBLE_CLICK_PIXELS;
     lastClick = isDouble ? null : { at: now, client: clientOf(event) };
-    if (isDouble) act.doubleClick(place);
-    else act.click(place, event);
+    if (isDouble) actions.doubleClick(pixel);
+    else actions.click(pixel, event);
   }
 }
 
 const clientOf = (event) => ({ x: event.clientX, y: event.clientY });
 const distance = (a, b) => Math.hypot(a.x - b.x, a.y - b.y);
-const between = (a, b) => ({ x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 });
+const midpoint = (a, b) => ({ x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 });

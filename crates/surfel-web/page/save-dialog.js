@@ -1,4 +1,4 @@
-// Saving the finished picture: its size, how far it is, and the file.
+// The dialog that saves a finished picture: its size, progress and file.
 
 import { download, element } from './dom.js';
 import { duration } from './format.js';
@@ -10,7 +10,7 @@ const PRESETS = {
   '3840 × 2160': () => [3840, 2160],
 };
 
-export function prepareSaveDialog(viewer) {
+export function setUpSaveDialog(viewer) {
   const dialog = document.getElementById('save-dialog');
   const form = dialog.querySelector('form');
   const { width, height } = form.elements;
@@ -35,9 +35,9 @@ export function prepareSaveDialog(viewer) {
   form.addEventListener('submit', async (event) => {
     event.preventDefault();
     const size = { width: width.valueAsNumber, height: height.valueAsNumber };
-    const most = viewer.info.limits.max_save_pixels;
-    if (most < size.width * size.height) {
-      show(false, `The server saves pictures of up to ${Math.round(most / 1e6)} million pixels.`);
+    const maxPixels = viewer.info.limits.max_save_pixels;
+    if (maxPixels < size.width * size.height) {
+      show(false, `The server saves pictures of up to ${Math.round(maxPixels / 1e6)} million pixels.`);
       return;
     }
     bar.removeAttribute('value');
@@ -48,7 +48,7 @@ export function prepareSaveDialog(viewer) {
       note.textContent = typeof left_secs === 'number' ? `Rendering, ${duration(left_secs)} left` : 'Rendering';
     };
     try {
-      const { blob } = await viewer.ask({ type: 'save', ...size }, { progress, abort: abort.signal });
+      const { blob } = await viewer.request({ type: 'save', ...size }, { progress, abort: abort.signal });
       download(blob, `${stemOf(viewer.info.name)}.png`);
       show(false, 'Saved.');
     } catch (error) {
@@ -70,5 +70,5 @@ export function prepareSaveDialog(viewer) {
   };
 }
 
-/** A file's name without folder and endings. */
+/** A file's name without folder and extensions. */
 export const stemOf = (name) => name.replace(/^.*[/\\]/, '').replace(/\..*$/, '') || 'picture';

@@ -1,8 +1,8 @@
-// Signals: functions that pass what they are called with to all who listen.
+// Signals: functions that pass their arguments to all listeners.
 
 export function signal() {
   const listeners = [];
-  const tell = (...values) => listeners.forEach((listener) => listener(...values));
-  tell.listen = (listener) => listeners.push(listener);
-  return tell;
+  const emit = (...values) => listeners.forEach((listener) => listener(...values));
+  emit.listen = (listener) => listeners.push(listener);
+  return emit;
 }

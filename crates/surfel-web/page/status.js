@@ -1,52 +1,52 @@
-// The status line: work under way with its time left, and how fast and how fine pictures come.
+// The status line: progress of long work, frame rate, size and samples of the picture.
 
 import { element } from './dom.js';
 import { count, duration, rounded } from './format.js';
 
-/** Work that is done so soon is not worth a word. */
-const SHORT_WORK_MS = 150;
+/** Work shorter than this is not shown. */
+const MIN_WORK_MS = 150;
 
-export function followStatus(viewer) {
+export function setUpStatusLine(viewer) {
   const bar = document.getElementById('work-bar');
   const work = document.getElementById('work-text');
   const numbers = document.getElementById('numbers');
   let isWorking = false;
-  let waiting = 0;
-  let news = null;
+  let showTimer = 0;
+  let progress = null;
 
   const showWork = () => {
-    waiting = 0;
-    const { text, done, left_secs } = news;
+    showTimer = 0;
+    const { text, done, left_secs } = progress;
     work.textContent = typeof left_secs === 'number' ? `${text}, ${duration(left_secs)} left` : text;
     bar.hidden = false;
     if (typeof done === 'number') bar.value = done;
     else bar.removeAttribute('value');
   };
-  const showRest = () => {
+  const showIdle = () => {
     work.textContent = viewer.isConnected && viewer.lastFrame?.finished ? 'finished' : '';
   };
   const endWork = () => {
-    clearTimeout(waiting);
-    waiting = 0;
+    clearTimeout(showTimer);
+    showTimer = 0;
     isWorking = false;
     bar.hidden = true;
-    showRest();
+    showIdle();
   };
-  viewer.workChanged.listen((message) => {
-    news = message;
+  viewer.progressChanged.listen((message) => {
+    progress = message;
     if (message.text === null) endWork();
-    else if (!isWorking) waiting = setTimeout(showWork, SHORT_WORK_MS);
-    else if (!waiting) showWork();
+    else if (!isWorking) showTimer = setTimeout(showWork, MIN_WORK_MS);
+    else if (!showTimer) showWork();
     isWorking = message.text !== null;
   });
   viewer.connectionChanged.listen(({ isConnected }) => isConnected || endWork());
   viewer.frameShown.listen(() => {
-    if (!isWorking) showRest();
+    if (!isWorking) showIdle();
     const { width, height, samples, of_samples } = viewer.lastFrame;
     numbers.textContent = `${width} × ${height}   ${samples} of ${of_samples} samples`;
   });
   const rate = document.getElementById('rate');
-  viewer.statisticsCame.listen(({ frames_per_s }) => { rate.textContent = `${rounded(frames_per_s, 2)} frames/s`; });
+  viewer.statsReceived.listen(({ frames_per_s }) => { rate.textContent = `${rounded(frames_per_s, 2)} frames/s`; });
 }
 
 /** The table of statistics in the panel. */
@@ -54,7 +54,7 @@ export function statisticsTable(viewer) {
   const table = element('dl', { class: 'statistics' });
   const fill = (rows) => table.replaceChildren(
     ...rows.flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)]));
-  viewer.statisticsCame.listen((stats) => {
+  viewer.statsReceived.listen((stats) => {
     const { info } = viewer;
     const latencies = viewer.latencies_ms.slice(-100).sort((a, b) => a - b);
     const median = latencies[Math.floor(latencies.length / 2)];
@@ -62,7 +62,7 @@ export function statisticsTable(viewer) {
       ['Frames', `${rounded(stats.frames_per_s, 3)} /s`],
       ['Tracing', `${rounded(stats.trace_ms, 3)} ms`],
       ['Encoding', `${rounded(stats.encode_ms, 3)} ms`],
-      ...(median === undefined ? [] : [['From input to picture', `${rounded(median, 3)} ms`]]),
+      ...(median === undefined ? [] : [['Latency', `${rounded(median, 3)} ms`]]),
       ['Rays', `${rounded(stats.mrays_per_s, 3)} million/s`],
       ['Picture', `${stats.width} × ${stats.height}`],
       ['Samples', `${stats.samples} of ${stats.of_samples}`],

@@ -1,8 +1,8 @@
-// The sun by day, hour and latitude, in the panel under the sun's own controls.
+// Sun position by date, hour and latitude, under the sun's controls.
 
 import { element, icon } from './dom.js';
-import { patchOf } from './patch.js';
-import { sunByHour } from './sun.js';
+import { patchAt } from './patch.js';
+import { sunAtHour } from './sun.js';
 
 export function sunClock(viewer) {
   const day = element('input', { type: 'date', id: 'sun-day', 'data-key': 'sun.day' });
@@ -14,15 +14,15 @@ export function sunClock(viewer) {
   const show = () => {
     const minutes = Math.round(hour.value * 60);
     clock.value = `${Math.floor(minutes / 60)}:${String(minutes % 60).padStart(2, '0')}`;
-    hour.style.setProperty('--share', `${(100 * hour.value) / 24}%`);
+    hour.style.setProperty('--fraction', `${(100 * hour.value) / 24}%`);
   };
   const change = (isMoving) => {
     show();
     const degrees = Math.min(90, Math.max(-90, latitude.valueAsNumber));
     if (!day.value || !Number.isFinite(degrees)) return;
-    const { azimuth, elevation } = sunByHour(day.value, Number(hour.value), degrees);
+    const { azimuth, elevation } = sunAtHour(day.value, Number(hour.value), degrees);
     const rounded = (value) => Math.round(value * 100) / 100;
-    viewer.set(patchOf('sun', { azimuth: rounded(azimuth), elevation: rounded(elevation) }), isMoving);
+    viewer.changeSettings(patchAt('sun', { azimuth: rounded(azimuth), elevation: rounded(elevation) }), isMoving);
   };
   hour.addEventListener('input', () => change(true));
   for (const field of [hour, day, latitude]) field.addEventListener('change', () => change(false));
@@ -30,10 +30,10 @@ export function sunClock(viewer) {
 
   const row = (label, ...fields) => element('div', { class: 'row' },
     element('label', { for: fields[0].id }, label), element('div', { class: 'field slider' }, ...fields));
-  const made = element('details', { class: 'inner', 'data-section': 'sun by hour' },
-    element('summary', {}, icon('chevron'), 'By day and hour'),
-    row('Day', day), row('Hour', hour, clock), row('Latitude', latitude),
-    element('p', { class: 'note' }, 'Hours by the sun: noon is when it stands highest, give or take a quarter.'));
+  const made = element('details', { class: 'inner', 'data-section': 'sun position by date' },
+    element('summary', {}, icon('chevron'), 'Sun position by date'),
+    row('Date', day), row('Hour', hour, clock), row('Latitude', latitude),
+    element('p', { class: 'note' }, 'Solar time: the sun is highest about noon.'));
   viewer.sceneChanged.listen(() => { made.hidden = !viewer.scene.light?.includes('sun'); });
   return made;
 }

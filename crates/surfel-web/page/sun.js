@@ -1,4 +1,4 @@
-// Where the sun stands: the approximation of NOAA's solar calculator (after Meeus), good to about 0.01 degrees.
+// Sun positions by the approximation of NOAA's solar calculator (after Meeus), accurate to about 0.01 degrees.
 
 const RADIANS = Math.PI / 180;
 const sine = (angle_deg) => Math.sin(angle_deg * RADIANS);
@@ -25,12 +25,12 @@ export function sunPosition(time_ms, latitude, longitude) {
   };
 }
 
-/** The same for a day (`yyyy-mm-dd`) and an hour by the mean sun of the place itself: noon is about 12. */
-export function sunByHour(day, hour, latitude) {
+/** Azimuth and elevation of the sun on a day (`yyyy-mm-dd`) at an hour of local mean solar time: noon is about 12. */
+export function sunAtHour(day, hour, latitude) {
   return sunPosition(Date.parse(`${day}T00:00:00Z`) + hour * 3600000, latitude, 0);
 }
 
-/** Declination in degrees, and by how much the true sun is ahead of the mean one. */
+/** Declination in degrees, and the equation of time (apparent minus mean solar time) in minutes. */
 function sunOf(time_ms) {
   const century = (time_ms / 86400000 + 2440587.5 - 2451545) / 36525;
   const meanLongitude = wrapped(280.46646 + century * (36000.76983 + century * 0.0003032));
@@ -54,7 +54,7 @@ function sunOf(time_ms) {
   };
 }
 
-/** By how much the air lifts the sun, in degrees. */
+/** Atmospheric refraction at an elevation, in degrees. */
 function refraction(elevation) {
   if (85 < elevation) return 0;
   const tangent = Math.tan(elevation * RADIANS);

@@ -1,16 +1,16 @@
-// The toolbar over the picture, and the button that folds the panel away.
+// The toolbar over the picture, and the button that folds the panel.
 
 import { isOrthographic } from './camera.js';
 
 const HINTS = {
-  pick: 'Click on a point to ask what it is.',
-  distance: 'Click on two points.',
-  height: 'Click on two points: their difference in height.',
-  area: 'Click on the corners; double click or Enter closes the area.',
+  pick: 'Click on a point to show its attributes.',
+  distance: 'Click on two points to measure their distance.',
+  height: 'Click on two points to measure their difference in height.',
+  area: 'Click on the corners. Double click or Enter closes the area.',
 };
 
-/** `open` has `save()`, `take()` and `help()`. */
-export function followToolbar(viewer, navigation, open) {
+/** `open` has `save()`, `export()` and `help()`. */
+export function setUpToolbar(viewer, navigation, open) {
   const actions = {
     fit: () => navigation.fit(),
     projection: () => navigation.setOrthographic(!isOrthographic(viewer.camera)),
@@ -22,14 +22,14 @@ export function followToolbar(viewer, navigation, open) {
   const hint = document.getElementById('hint');
   toolbar.addEventListener('click', (event) => {
     const { tool, action } = event.target.closest('button')?.dataset ?? {};
-    if (tool) viewer.use(viewer.tool === tool ? 'look' : tool);
+    if (tool) viewer.selectTool(viewer.tool === tool ? 'navigate' : tool);
     if (action && viewer.camera) actions[action]();
   });
   viewer.toolChanged.listen(() => {
     for (const button of tools) button.setAttribute('aria-pressed', button.dataset.tool === viewer.tool);
     hint.textContent = HINTS[viewer.tool] ?? '';
     hint.hidden = !hint.textContent;
-    document.getElementById('stage').dataset.tool = viewer.tool;
+    document.getElementById('viewport').dataset.tool = viewer.tool;
   });
 
   const fold = document.getElementById('panel-fold');
@@ -37,7 +37,7 @@ export function followToolbar(viewer, navigation, open) {
     const isFolded = document.body.classList.toggle('is-folded');
     fold.setAttribute('aria-expanded', !isFolded);
   });
-  // A sheet that covers half of a phone waits until it is asked for.
+  // On a phone the panel covers half of the picture, so it starts folded.
   if (matchMedia('(max-width: 640px)').matches) fold.click();
 
   viewer.infoChanged.listen(() => {

@@ -1,8 +1,8 @@
-// The panel's part for the camera: projection, angle of view, sides, and the turntable.
+// The panel's section for the camera: projection, angle of view, sides, and turntable.
 
 import { isOrthographic } from './camera.js';
 import { element, icon } from './dom.js';
-import { makers } from './fields.js';
+import { fieldFactories } from './fields.js';
 
 const SIDES = ['front', 'back', 'left', 'right', 'top', 'bottom'];
 
@@ -10,7 +10,7 @@ export function viewRows(viewer, navigation) {
   const projection = fieldRow(viewer, {
     key: 'camera.projection', label: 'Projection', kind: 'select', title: 'O, P\ncamera.orthographic, camera.view_angle',
     options: () => ['perspective', 'orthographic'],
-    // No other projection leads to a panorama: it is offered only where it is.
+    // A panorama cannot be chosen; it is listed only while it is the projection.
     read: (camera) => (camera.panorama ? 'panorama' : isOrthographic(camera) ? 'orthographic' : 'perspective'),
     write: (value) => navigation.setOrthographic(value === 'orthographic'),
   });
@@ -19,36 +19,36 @@ export function viewRows(viewer, navigation) {
     title: 'Vertical angle of view in degrees\ncamera.view_angle',
     read: (camera) => camera.view_angle,
     write: (value, isMoving) => navigation.setViewAngle(value, isMoving),
-    shown: (camera) => !isOrthographic(camera) && !camera.panorama,
+    isVisible: (camera) => !isOrthographic(camera) && !camera.panorama,
   });
   const trackball = fieldRow(viewer, {
-    key: 'camera.trackball', label: 'Free turning', kind: 'toggle', title: 'The horizon need not stay level',
+    key: 'camera.trackball', label: 'Trackball', kind: 'toggle', title: 'Rotates freely; the horizon may tilt',
     read: () => navigation.isTrackball,
     write: (isOn) => { navigation.isTrackball = isOn; },
   });
   const sides = element('div', { class: 'sides' }, ...SIDES.map((side, i) => element('button', {
-    type: 'button', class: 'button', title: `${side} (${i + 1})`, 'data-side': side, onclick: () => navigation.lookFrom(side),
+    type: 'button', class: 'button', title: `${side} (${i + 1})`, 'data-side': side, onclick: () => navigation.viewFromSide(side),
   }, side)));
   const rows = [projection, angle, trackball, sides, turntable(viewer, navigation)];
-  // Where a camera is that the scene moves is not known at once.
-  const follow = () => rows.forEach((row) => { row.inert = !viewer.camera; });
-  viewer.cameraChanged.listen(follow);
-  follow();
+  // The position of an animated camera arrives with the first scene.
+  const update = () => rows.forEach((row) => { row.inert = !viewer.camera; });
+  viewer.cameraChanged.listen(update);
+  update();
   return rows;
 }
 
-/** A row that follows the camera instead of the scene. */
+/** A row that shows a value of the camera instead of the scene. */
 function fieldRow(viewer, control) {
   const id = `field-${control.key.replaceAll('.', '_')}`;
-  const field = makers[control.kind](control, control.write, id);
-  const made = element('div', { class: 'row', 'data-row': control.key },
+  const field = fieldFactories[control.kind](control, control.write, id);
+  const row = element('div', { class: 'row', 'data-row': control.key },
     element('label', { for: id, title: control.title }, control.label), field.element);
   viewer.cameraChanged.listen(() => {
     if (!viewer.camera) return;
-    made.hidden = control.shown ? !control.shown(viewer.camera) : false;
+    row.hidden = control.isVisible ? !control.isVisible(viewer.camera) : false;
     field.show(control.read(viewer.camera), viewer);
   });
-  return made;
+  return row;
 }
 
 function turntable(viewer, navigation) {
@@ -68,6 +68,6 @@ function turntable(viewer, navigation) {
   viewer.cameraChanged.listen(show);
   show();
   return element('div', { class: 'row' },
-    element('label', { for: seconds.id, title: 'Seconds for a turn about the pivot' }, 'Turntable', element('small', {}, 's')),
+    element('label', { for: seconds.id, title: 'Seconds for one turn about the pivot' }, 'Turntable', element('small', {}, 's')),
     element('div', { class: 'field turntable' }, seconds, start));
 }

@@ -1,23 +1,24 @@
-// The view that is shown: scene, camera and size, what the server says of them, and what it is told.
+// The state of the view: scene, camera and size, as the user changes them and as the server confirms them.
 
 import { Connection, SAVED_PICTURE, socketAddress } from './connection.js';
 import { viewPatch } from './link.js';
-import { areEqual, joinPatches, mergePatch, patchBetween } from './patch.js';
+import { areEqual, combinePatches, createPatch, mergePatch } from './patch.js';
+import { rejectionText } from './rejections.js';
 import { signal } from './signal.js';
 
-const KEPT_LATENCIES = 600;
+const MAX_LATENCIES = 600;
 
 export class Viewer {
   info = null;
-  /** The scene as the server was started with, before any link's patch. */
-  opening = null;
+  /** The scene as the server was started with, without the patch of a link. */
+  initialScene = null;
   scene = null;
   camera = null;
-  /** The camera of the picture on the screen, a moment behind `camera`. */
+  /** The camera of the picture on the screen, which lags behind `camera`. */
   shownCamera = null;
   legend = null;
   size = { width: 1, height: 1 };
-  tool = 'look';
+  tool = 'navigate';
   isConnected = false;
   lastFrame = null;
   latencies_ms = [];
@@ -27,37 +28,39 @@ export class Viewer {
   cameraChanged = signal();
   frameShown = signal();
   toolChanged = signal();
-  statisticsCame = signal();
-  workChanged = signal();
+  statsReceived = signal();
+  progressChanged = signal();
   connectionChanged = signal();
-  pictureCame = signal();
-  refused = signal();
+  pictureReceived = signal();
+  /** Emits `{ key, text }`: the reason of a rejection, and the setting at fault if the server names one. */
+  rejected = signal();
 
   #connection;
-  #input = 0;
-  #dueFlush = 0;
-  #duePatch = null;
-  #dueCamera = null;
+  #seq = 0;
+  #flushRequest = 0;
+  #queuedPatch = null;
+  #queuedCamera = null;
   #isMoving = false;
-  #lastCameraInput = 0;
-  /** As the server last told it, and the patches that it did not yet know of. */
-  #toldScene = null;
+  #lastCameraSeq = 0;
+  /** The scene that the server confirmed last. */
+  #confirmedScene = null;
   #sceneNumber = null;
-  #patchesUnderway = [];
-  #camerasByInput = new Map();
-  #sentAt = new Map();
-  #questions = new Map();
-  #question = 0;
+  /** The patches that were sent and are not part of the confirmed scene yet. */
+  #pendingPatches = [];
+  #cameraBySeq = new Map();
+  #sendTimeBySeq = new Map();
+  #requests = new Map();
+  #lastRequestId = 0;
   #helloPatch;
   #takesNextCamera = false;
 
   constructor(linkPatch) {
     this.#helloPatch = linkPatch;
     this.#connection = new Connection(socketAddress(location), {
-      opened: () => this.#hello(),
+      opened: () => this.#sendHello(),
       message: (message) => this.#receive(message),
       picture: (header, blob) => this.#receivePicture(header, blob),
-      lost: (wait_ms) => this.#lost(wait_ms),
+      lost: (wait_ms) => this.#handleLoss(wait_ms),
     });
   }
 
@@ -65,58 +68,58 @@ export class Viewer {
     this.#connection.open();
   }
 
-  /** Number of the last message about settings or camera; pictures tell which one they obey. */
-  get lastInput() {
-    return this.#input;
+  /** Sequence number of the last message about settings or camera; each picture carries that of the last one it obeys. */
+  get lastSeq() {
+    return this.#seq;
   }
 
-  /** Whether the camera goes where the scene moves it. */
-  get isLed() {
-    return Boolean(this.info?.camera_moves) && !this.camera?.still;
+  /** Whether the scene's animation moves the camera. */
+  get isCameraAnimated() {
+    return Boolean(this.info?.camera_moves) && !this.camera?.lock;
   }
 
-  /** Whether the picture on the screen is of all settings that were changed here, but for those refused. */
-  get isAgreed() {
-    return !this.#duePatch && this.#patchesUnderway.length === 0 && this.lastFrame?.scene === this.#sceneNumber;
+  /** Whether the picture on the screen shows all settings that were changed here, rejected ones aside. */
+  get isSynced() {
+    return !this.#queuedPatch && this.#pendingPatches.length === 0 && this.lastFrame?.scene === this.#sceneNumber;
   }
 
-  /** The scene with the camera that the hand holds. */
-  present() {
-    return this.isLed ? this.scene : { ...this.scene, camera: this.camera };
+  /** The scene with the user's camera. */
+  currentScene() {
+    return this.isCameraAnimated ? this.scene : { ...this.scene, camera: this.camera };
   }
 
-  /** Tells the server of new settings, in the next animation frame. */
-  set(patch, isMoving = false) {
+  /** Changes settings, and sends them in the next animation frame. */
+  changeSettings(patch, isMoving = false) {
     this.scene = mergePatch(this.scene, patch);
-    this.#duePatch = { patch: joinPatches(this.#duePatch?.patch ?? {}, patch), isMoving };
-    this.#schedule();
+    this.#queuedPatch = { patch: combinePatches(this.#queuedPatch?.patch ?? {}, patch), isMoving };
+    this.#scheduleFlush();
     this.sceneChanged();
   }
 
-  /** Tells the server of a new camera, in the next animation frame. The scene does not move it any more. */
-  look(camera, isMoving) {
-    this.camera = this.info.camera_moves ? { ...camera, still: true } : camera;
+  /** Changes the camera, and sends it in the next animation frame. The scene's animation no longer moves it. */
+  setCamera(camera, isMoving) {
+    this.camera = this.info.camera_moves ? { ...camera, lock: true } : camera;
     this.#isMoving = isMoving;
-    this.#dueCamera = this.camera;
-    this.#schedule();
+    this.#queuedCamera = this.camera;
+    this.#scheduleFlush();
     this.cameraChanged();
   }
 
-  /** Lets the scene move the camera, as it did at first. */
-  follow() {
-    this.showLink({ ...viewPatch(this.opening, this.present()), camera: {} });
+  /** Lets the scene's animation move the camera again. */
+  resumeAnimation() {
+    this.showLink({ ...viewPatch(this.initialScene, this.currentScene()), camera: {} });
   }
 
-  /** Shows the opening scene as `patch` changes it. */
+  /** Shows the initial scene with `patch` applied. */
   showLink(patch) {
-    const wanted = mergePatch(this.opening, patch);
-    this.scene = this.present();
-    if (this.info.camera_moves && !wanted.camera.still) {
-      this.#dueCamera = null;
-      this.set(patchBetween(this.scene, wanted));
+    const target = mergePatch(this.initialScene, patch);
+    this.scene = this.currentScene();
+    if (this.info.camera_moves && !target.camera.lock) {
+      this.#queuedCamera = null;
+      this.changeSettings(createPatch(this.scene, target));
     } else {
-      this.set(patchBetween({ ...this.scene, camera: null }, { ...wanted, camera: null }));
-      this.look(wanted.camera, false);
+      this.changeSettings(createPatch({ ...this.scene, camera: null }, { ...target, camera: null }));
+      this.setCamera(target.camera, false);
     }
   }
 
@@ -127,194 +130,194 @@ export class Viewer {
     this.cameraChanged();
   }
 
-  use(tool) {
+  selectTool(tool) {
     this.tool = tool;
     this.toolChanged();
   }
 
-  /** Shows what a scene file tells, or says why not. */
-  async load(file) {
-    const most = this.info?.limits.max_message_bytes;
-    // A film dropped by mistake is not even read.
-    const text = most < file.size ? null : await file.text();
-    const message = { type: 'load', id: ++this.#question, name: file.name, text };
-    if (text === null || most < byteLength(message)) this.refused(`${file.name} is too large for a scene file`);
-    else if (!this.#connection.send(message)) this.refused(`${file.name}: there is no connection`);
+  /** Sends a scene file to the server, which shows its settings or rejects it. */
+  async loadScene(file) {
+    const maxBytes = this.info?.limits.max_message_bytes;
+    // A large file dropped by mistake is not even read.
+    const text = maxBytes < file.size ? null : await file.text();
+    const message = { type: 'loadScene', id: ++this.#lastRequestId, name: file.name, text };
+    if (text === null || maxBytes < byteLength(message)) this.rejected({ text: `${file.name} is too large for a scene file` });
+    else if (!this.#connection.send(message)) this.rejected({ text: `${file.name}: there is no connection` });
     else {
       this.#takesNextCamera = true;
-      this.#patchesUnderway = [];
+      this.#pendingPatches = [];
     }
   }
 
-  /** What the server answers; `abort` (an AbortSignal) cancels, `progress` hears how far it is. */
-  ask(message, { progress, abort } = {}) {
-    const id = ++this.#question;
+  /** Resolves to the server's answer. The AbortSignal `abort` cancels; `progress` is called with progress messages. */
+  request(message, { progress, abort } = {}) {
+    const id = ++this.#lastRequestId;
     return new Promise((resolve, reject) => {
-      this.#questions.set(id, { resolve, reject, progress });
-      if (!this.#connection.send({ ...message, id })) this.#fail(id, 'there is no connection');
+      this.#requests.set(id, { resolve, reject, progress });
+      if (!this.#connection.send({ ...message, id })) this.#rejectRequest(id, 'there is no connection');
       abort?.addEventListener('abort', () => {
         this.#connection.send({ type: 'cancel', id });
-        this.#fail(id, 'cancelled');
+        this.#rejectRequest(id, 'cancelled');
       });
     });
   }
 
-  /** What is at a place in the picture; null where nothing is, or where the question could not be asked. */
+  /** The point behind a pixel; null if there is no surface, or if the server did not answer. */
   async pick({ x, y }) {
     try {
-      return (await this.ask({ type: 'pick', x, y })).point;
+      return (await this.request({ type: 'pick', x, y })).point;
     } catch {
       return null;
     }
   }
 
-  /** A picture has been drawn. */
-  shown(header) {
-    this.#connection.send({ type: 'seen', frame: header.frame });
+  /** Records that a picture was drawn, and acknowledges it. */
+  acknowledge(header) {
+    this.#connection.send({ type: 'ack', frame: header.frame });
     const now = performance.now();
-    const { frame, scene, input, width, height, kind, finished, samples, of_samples } = header;
-    this.lastFrame = { frame, scene, input, width, height, kind, finished, samples, of_samples, shownAt: now };
-    // Only the first picture of an input answers it; those that follow refine.
-    if (this.#sentAt.has(input)) this.latencies_ms.push(now - this.#sentAt.get(input));
-    this.latencies_ms.splice(0, this.latencies_ms.length - KEPT_LATENCIES);
-    forgetBefore(this.#sentAt, input + 1);
-    this.shownCamera = this.#camerasByInput.get(input) ?? this.camera;
-    forgetBefore(this.#camerasByInput, input);
+    const { frame, scene, seq, width, height, kind, finished, samples, of_samples } = header;
+    this.lastFrame = { frame, scene, seq, width, height, kind, finished, samples, of_samples, shownAt: now };
+    // Only the first picture of a message counts as its answer; later ones refine it.
+    if (this.#sendTimeBySeq.has(seq)) this.latencies_ms.push(now - this.#sendTimeBySeq.get(seq));
+    this.latencies_ms.splice(0, this.latencies_ms.length - MAX_LATENCIES);
+    deleteBefore(this.#sendTimeBySeq, seq + 1);
+    this.shownCamera = this.#cameraBySeq.get(seq) ?? this.camera;
+    deleteBefore(this.#cameraBySeq, seq);
     this.frameShown();
   }
 
-  #hello() {
+  #sendHello() {
     this.#connection.send({ type: 'hello', ...this.size, scene: this.#helloPatch });
   }
 
-  #schedule() {
-    this.#dueFlush ||= requestAnimationFrame(() => this.#flush());
+  #scheduleFlush() {
+    this.#flushRequest ||= requestAnimationFrame(() => this.#flush());
   }
 
   #flush() {
-    this.#dueFlush = 0;
+    this.#flushRequest = 0;
     if (!this.isConnected) return;
-    if (this.#duePatch) {
-      const { patch, isMoving } = this.#duePatch;
-      this.#duePatch = null;
+    if (this.#queuedPatch) {
+      const { patch, isMoving } = this.#queuedPatch;
+      this.#queuedPatch = null;
       this.#send({ type: 'set', scene: patch, moving: isMoving });
-      this.#patchesUnderway.push({ input: this.#input, patch });
+      this.#pendingPatches.push({ seq: this.#seq, patch });
     }
-    if (this.#dueCamera) {
-      this.#send({ type: 'camera', camera: this.#dueCamera, moving: this.#isMoving });
-      this.#dueCamera = null;
-      this.#lastCameraInput = this.#input;
+    if (this.#queuedCamera) {
+      this.#send({ type: 'camera', camera: this.#queuedCamera, moving: this.#isMoving });
+      this.#queuedCamera = null;
+      this.#lastCameraSeq = this.#seq;
     }
   }
 
   #send(message) {
-    const input = ++this.#input;
-    this.#camerasByInput.set(input, this.camera);
-    this.#sentAt.set(input, performance.now());
-    this.#connection.send({ ...message, input });
+    const seq = ++this.#seq;
+    this.#cameraBySeq.set(seq, this.camera);
+    this.#sendTimeBySeq.set(seq, performance.now());
+    this.#connection.send({ ...message, seq });
   }
 
   #receive(message) {
-    const receivers = {
-      welcome: () => this.#welcome(message),
+    const handlers = {
+      welcome: () => this.#receiveWelcome(message),
       scene: () => this.#receiveScene(message),
-      stats: () => this.statisticsCame(message),
-      state: () => this.workChanged(message),
-      picked: () => this.#answer(message),
-      taken: () => this.#answer(message),
-      progress: () => this.#questions.get(message.id)?.progress?.(message),
+      stats: () => this.statsReceived(message),
+      state: () => this.progressChanged(message),
+      picked: () => this.#resolveRequest(message),
+      exported: () => this.#resolveRequest(message),
+      progress: () => this.#requests.get(message.id)?.progress?.(message),
       error: () => this.#receiveError(message),
     };
-    receivers[message.type]?.();
+    handlers[message.type]?.();
   }
 
-  #welcome({ scene, info }) {
-    const isAnother = this.info?.name !== info.name;
+  #receiveWelcome({ scene, info }) {
+    const isOtherData = this.info?.name !== info.name;
     this.info = info;
-    this.opening = scene;
-    this.#toldScene = mergePatch(scene, this.#helloPatch);
+    this.initialScene = scene;
+    this.#confirmedScene = mergePatch(scene, this.#helloPatch);
     [this.#sceneNumber, this.lastFrame] = [null, null];
-    this.#patchesUnderway = [];
-    this.#mergeUnderway();
-    // Where a camera is that the scene moves comes with the first scene.
-    if (isAnother) this.camera = info.camera_moves && !this.scene.camera.still ? null : this.scene.camera;
-    this.#camerasByInput.set(this.#input, this.camera);
-    this.#takesNextCamera = isAnother;
-    if (isAnother) [this.#duePatch, this.#dueCamera] = [null, null];
+    this.#pendingPatches = [];
+    this.#applyPendingPatches();
+    // The first scene message carries the position of an animated camera.
+    if (isOtherData) this.camera = info.camera_moves && !this.scene.camera.lock ? null : this.scene.camera;
+    this.#cameraBySeq.set(this.#seq, this.camera);
+    this.#takesNextCamera = isOtherData;
+    if (isOtherData) [this.#queuedPatch, this.#queuedCamera] = [null, null];
     this.isConnected = true;
     this.connectionChanged({ isConnected: true });
-    // What was changed meanwhile.
-    this.#schedule();
+    // Sends the changes made while there was no connection.
+    this.#scheduleFlush();
     this.infoChanged();
     this.sceneChanged();
     this.cameraChanged();
   }
 
-  #receiveScene({ number, scene, camera, legend, input }) {
+  #receiveScene({ number, scene, camera, legend, seq }) {
     this.legend = legend;
-    this.#toldScene = scene;
+    this.#confirmedScene = scene;
     this.#sceneNumber = number;
-    this.#patchesUnderway = this.#patchesUnderway.filter((underway) => input < underway.input);
-    this.#mergeUnderway();
-    const isAtRest = !this.#dueCamera && !this.#isMoving && this.#lastCameraInput <= input;
-    if ((isAtRest || this.#takesNextCamera) && !areEqual(camera, this.camera)) {
+    this.#pendingPatches = this.#pendingPatches.filter((pending) => seq < pending.seq);
+    this.#applyPendingPatches();
+    const isIdle = !this.#queuedCamera && !this.#isMoving && this.#lastCameraSeq <= seq;
+    if ((isIdle || this.#takesNextCamera) && !areEqual(camera, this.camera)) {
       this.camera = camera;
-      // Pictures after `load` obey it and all messages before.
-      for (const obeyed of [input, ...this.#camerasByInput.keys()]) this.#camerasByInput.set(obeyed, camera);
+      // Pictures after `loadScene` show this camera for all earlier messages, too.
+      for (const earlier of [seq, ...this.#cameraBySeq.keys()]) this.#cameraBySeq.set(earlier, camera);
       this.cameraChanged();
     }
     this.#takesNextCamera = false;
     this.sceneChanged();
   }
 
-  #mergeUnderway() {
-    const patches = this.#patchesUnderway.map(({ patch }) => patch);
-    if (this.#duePatch) patches.push(this.#duePatch.patch);
-    this.scene = patches.reduce(mergePatch, this.#toldScene);
+  #applyPendingPatches() {
+    const patches = this.#pendingPatches.map(({ patch }) => patch);
+    if (this.#queuedPatch) patches.push(this.#queuedPatch.patch);
+    this.scene = patches.reduce(mergePatch, this.#confirmedScene);
   }
 
   #receivePicture(header, blob) {
     if (header.kind === SAVED_PICTURE) {
-      this.#answer({ id: header.frame, blob });
+      this.#resolveRequest({ id: header.frame, blob });
       return;
     }
-    this.pictureCame(header, blob);
+    this.pictureReceived(header, blob);
   }
 
-  #receiveError({ id, input, text }) {
+  #receiveError({ id, seq, key, text }) {
     if (this.camera) this.#takesNextCamera = false;
-    if (input !== undefined) {
-      this.#patchesUnderway = this.#patchesUnderway.filter((underway) => input < underway.input);
-      this.#mergeUnderway();
+    if (seq !== undefined) {
+      this.#pendingPatches = this.#pendingPatches.filter((pending) => seq < pending.seq);
+      this.#applyPendingPatches();
       this.sceneChanged();
     }
-    if (this.#questions.has(id)) this.#fail(id, text);
-    else if (text !== 'cancelled') this.refused(text);
+    if (this.#requests.has(id)) this.#rejectRequest(id, rejectionText({ key, text }));
+    else if (text !== 'cancelled') this.rejected({ key, text });
   }
 
-  #answer(message) {
-    this.#questions.get(message.id)?.resolve(message);
-    this.#questions.delete(message.id);
+  #resolveRequest(message) {
+    this.#requests.get(message.id)?.resolve(message);
+    this.#requests.delete(message.id);
   }
 
-  #fail(id, text) {
-    this.#questions.get(id)?.reject(new Error(text));
-    this.#questions.delete(id);
+  #rejectRequest(id, text) {
+    this.#requests.get(id)?.reject(new Error(text));
+    this.#requests.delete(id);
   }
 
-  #lost(wait_ms) {
-    if (this.isConnected) this.#helloPatch = viewPatch(this.opening, this.present());
+  #handleLoss(wait_ms) {
+    if (this.isConnected) this.#helloPatch = viewPatch(this.initialScene, this.currentScene());
     this.isConnected = false;
-    for (const id of [...this.#questions.keys()]) this.#fail(id, 'the connection was lost');
+    for (const id of [...this.#requests.keys()]) this.#rejectRequest(id, 'the connection was lost');
     this.connectionChanged({ isConnected: false, wait_ms });
   }
 }
 
-function forgetBefore(byInput, input) {
-  for (const key of byInput.keys()) if (key < input) byInput.delete(key);
+function deleteBefore(bySeq, seq) {
+  for (const key of bySeq.keys()) if (key < seq) bySeq.delete(key);
 }
 
-/** Of a message as it is sent. */
+/** Size in bytes of a message as it is sent. */
 function byteLength(message) {
   return new TextEncoder().encode(JSON.stringify(message)).length;
 }

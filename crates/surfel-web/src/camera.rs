@@ -1,10 +1,10 @@
-//! Cameras as pages send them: checked, as a scene file's.
+//! Cameras in the form in which pages send them, checked like those of a scene file.
 
-use crate::studio::{Error, Result};
+use crate::scene_provider::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
-use surfel::math::DVec3;
-use surfel::scene::{Camera, Projection};
+use surfel_core::math::DVec3;
+use surfel_core::scene::{Camera, Projection};
 
 #[derive(Deserialize)]
 struct CameraKeys {
@@ -17,51 +17,58 @@ struct CameraKeys {
     panorama: bool,
 }
 
-/// Farthest coordinate: beyond it, not even doubles tell millimetres apart.
-const FAR: f64 = 1e12;
+/// Bound of coordinates and heights: beyond it, even doubles do not resolve millimetres.
+const MAX_COORDINATE: f64 = 1e12;
+/// Vertical view angle of a camera that gives none, in degrees.
+const DEFAULT_VIEW_ANGLE_DEG: f64 = 35.0;
 
-/// The camera of a scene's `camera` key with all of its places.
-pub fn parse(keys: &Value) -> Result<Camera> {
-    let keys = CameraKeys::deserialize(keys);
-    let keys = keys.map_err(|error| Error::Refused(format!("camera: {error}")))?;
+/// Reads a complete `camera` setting.
+///
+/// # Errors
+/// Fails if a key is missing, or if its value makes no camera.
+pub fn parse(settings: &Value) -> Result<Camera> {
+    let keys = CameraKeys::deserialize(settings);
+    let keys = keys.map_err(|error| Error::invalid_value("camera", error.to_string()))?;
     let camera = Camera {
-        position: place("position", keys.position)?,
-        focal_point: place("focal_point", keys.focal_point)?,
-        view_up: place("view_up", keys.view_up)?,
+        position: point("position", keys.position)?,
+        focal_point: point("focal_point", keys.focal_point)?,
+        view_up: point("view_up", keys.view_up)?,
         projection: projection(&keys)?,
     };
     if camera.position == camera.focal_point {
-        return Err(Error::Refused("camera: position and focal_point are the same".into()));
+        return Err(Error::invalid_value("camera", "position and focal_point are the same"));
     }
     if camera.view_up == DVec3::ZERO {
-        return Err(Error::Refused("camera.view_up: found 0,0,0, expected a direction".into()));
+        return Err(Error::invalid_value("camera.view_up", "found 0,0,0, expected a direction"));
     }
     Ok(camera)
 }
 
-fn place(name: &str, coordinates: [f64; 3]) -> Result<DVec3> {
-    let place = DVec3::from_array(coordinates);
-    if place.abs().max_element() < FAR {
-        return Ok(place);
+fn point(name: &str, coordinates: [f64; 3]) -> Result<DVec3> {
+    let point = DVec3::from_array(coordinates);
+    if point.abs().max_element() < MAX_COORDINATE {
+        return Ok(point);
     }
-    Err(Error::Refused(format!("camera.{name}: found {place}, expected numbers below {FAR:e}")))
+    let text = format!("found {point}, expected numbers below {MAX_COORDINATE:e}");
+    Err(Error::invalid_value(format!("camera.{name}"), text))
 }
 
 fn projection(keys: &CameraKeys) -> Result<Projection> {
-    let refused = |name: &str, found: f64, expected: &str| {
-        Err(Error::Refused(format!("camera.{name}: found {found}, expected {expected}")))
+    let invalid = |name: &str, found: f64, expected: &str| {
+        let text = format!("found {found}, expected {expected}");
+        Err(Error::invalid_value(format!("camera.{name}"), text))
     };
     match (keys.orthographic, keys.view_angle) {
         _ if keys.panorama => Ok(Projection::Panorama),
-        (Some(height), _) if 0.0 < height && height < FAR => {
+        (Some(height), _) if 0.0 < height && height < MAX_COORDINATE => {
             Ok(Projection::Orthographic { height })
         }
-        (Some(height), _) => refused("orthographic", height, "a height"),
+        (Some(height), _) => invalid("orthographic", height, "a height"),
         (None, Some(angle)) if 0.1 < angle && angle < 179.0 => {
             Ok(Projection::Perspective { view_angle_deg: angle })
         }
-        (None, Some(angle)) => refused("view_angle", angle, "0.1 to 179 degrees"),
-        (None, None) => Ok(Projection::Perspective { view_angle_deg: 35.0 }),
+        (None, Some(angle)) => invalid("view_angle", angle, "0.1 to 179 degrees"),
+        (None, None) => Ok(Projection::Perspective { view_angle_deg: DEFAULT_VIEW_ANGLE_DEG }),
     }
 }
 
@@ -80,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_is_read_in_each_projection() {
+    fn cameras_of_each_projection_are_read() {
         let found = |change| parse(&keys(change)).unwrap().projection;
         let perspective = Projection::Perspective { view_angle_deg: 50.0 };
         assert_eq!(found(json!({ "view_angle": 50 })), perspective);
@@ -89,8 +96,8 @@ mod tests {
     }
 
     #[test]
-    fn impossible_cameras_are_refused() {
-        for wrong in [
+    fn invalid_cameras_are_rejected() {
+        for invalid in [
             json!({ "position": [0, 0, 0] }),
             json!({ "position": [1e300, 0, 0] }),
             json!({ "position": [null, 0, 0] }),
@@ -100,7 +107,7 @@ mod tests {
             json!({ "view_angle": 180 }),
             json!({ "orthographic": -1 }),
         ] {
-            assert!(parse(&keys(wrong.clone())).is_err(), "{wrong}");
+            assert!(parse(&keys(invalid.clone())).is_err(), "{invalid}");
         }
         assert!(parse(&json!(7)).is_err());
     }

@@ -1,46 +1,51 @@
-//! From linear pictures to what a browser shows: JPEG while things move, PNG when they stand still.
+//! Encodes linear pictures for a browser: JPEG while the view changes or is refined, PNG for finished pictures.
 
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 use rayon::prelude::*;
-use surfel::image::{decode_srgb8, encode_srgb8};
+use surfel_core::image::{decode_srgb8, encode_srgb8};
 
-/// What the page has behind a transparent picture, sRGB.
-const BEHIND: [u8; 3] = [48, 50, 54];
-/// Pixels that are encoded by a thread at once.
-const CHUNK: usize = 16_384;
+/// Background of the page behind a transparent picture, as sRGB codes.
+const PAGE_BACKGROUND: [u8; 3] = [48, 50, 54];
+/// Number of pixels that a thread converts at a time.
+const CHUNK_SIZE: usize = 16_384;
 
 /// Linear pixels, premultiplied by alpha, each the sum of `weight` samples.
 #[derive(Clone, Copy)]
 pub struct Pixels<'p> {
+    /// Width in pixels.
     pub width: u16,
+    /// Height in pixels.
     pub height: u16,
+    /// The sums of the samples, row by row from the top.
     pub sum: &'p [[f32; 4]],
+    /// Number of samples in each sum.
     pub weight: f32,
 }
 
-/// With alpha laid over the page's own grey.
+/// Encodes a JPEG file of the picture over the page's background; `quality` is from 1 to 100.
 pub fn jpeg(pixels: Pixels, quality: u8) -> Vec<u8> {
-    let behind = BEHIND.map(decode_srgb8);
+    let background = PAGE_BACKGROUND.map(decode_srgb8);
     let opaque = |[r, g, b, a]: [f32; 4]| {
-        let over = |channel: f32, behind: f32| encode_srgb8(channel + (1.0 - a) * behind);
-        [over(r, behind[0]), over(g, behind[1]), over(b, behind[2])]
+        let over = |channel: f32, background: f32| encode_srgb8(channel + (1.0 - a) * background);
+        [over(r, background[0]), over(g, background[1]), over(b, background[2])]
     };
     let bytes = bytes(pixels, opaque);
     let mut out = Vec::with_capacity(bytes.len() / 8);
     let mut encoder = Encoder::new(&mut out, quality);
     encoder.set_sampling_factor(SamplingFactor::F_2_2);
-    // Fails only for pictures without pixels, which are never made.
+    // Encoding fails only for pictures without pixels, and there are none.
     let encoded = encoder.encode(&bytes, pixels.width, pixels.height, ColorType::Rgb);
     debug_assert!(encoded.is_ok(), "{encoded:?}");
     out
 }
 
+/// Encodes a PNG file with 8 bits a channel, and with alpha only if some pixel is not opaque.
 pub fn png(pixels: Pixels) -> Vec<u8> {
     let is_opaque = pixels.sum.iter().all(|[.., a]| pixels.weight <= *a + 1e-3);
     let (color, bytes) = if is_opaque {
         (png::ColorType::Rgb, bytes(pixels, |[r, g, b, _]| [r, g, b].map(encode_srgb8)))
     } else {
-        (png::ColorType::Rgba, bytes(pixels, straight))
+        (png::ColorType::Rgba, bytes(pixels, unpremultiply))
     };
     let mut out = Vec::with_capacity(bytes.len() / 2);
     let mut encoder =
@@ -49,24 +54,24 @@ pub fn png(pixels: Pixels) -> Vec<u8> {
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Fast);
     let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(&bytes));
-    // Memory takes all that is written.
+    // Writing to memory does not fail.
     debug_assert!(written.is_ok(), "{written:?}");
     out
 }
 
-fn straight([r, g, b, a]: [f32; 4]) -> [u8; 4] {
+fn unpremultiply([r, g, b, a]: [f32; 4]) -> [u8; 4] {
     let opacity = if 0.0 < a { a.min(1.0) } else { 1.0 };
     let [r, g, b] = [r, g, b].map(|channel| encode_srgb8(channel / opacity));
     [r, g, b, (255.0 * a.clamp(0.0, 1.0)).round() as u8]
 }
 
 fn bytes<const N: usize>(pixels: Pixels, encode: impl Fn([f32; 4]) -> [u8; N] + Sync) -> Vec<u8> {
-    let share = 1.0 / pixels.weight;
+    let scale = 1.0 / pixels.weight;
     let mut bytes = vec![0; N * pixels.sum.len()];
-    let chunks = bytes.par_chunks_mut(N * CHUNK).zip(pixels.sum.par_chunks(CHUNK));
+    let chunks = bytes.par_chunks_mut(N * CHUNK_SIZE).zip(pixels.sum.par_chunks(CHUNK_SIZE));
     chunks.for_each(|(bytes, sums)| {
         for (bytes, sum) in bytes.chunks_exact_mut(N).zip(sums) {
-            bytes.copy_from_slice(&encode(sum.map(|channel| share * channel)));
+            bytes.copy_from_slice(&encode(sum.map(|channel| scale * channel)));
         }
     });
     bytes
@@ -92,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jpeg_lies_over_the_grey_of_the_page() {
+    fn a_transparent_jpeg_shows_the_background_of_the_page() {
         let sum = vec![[0.0; 4]; 64];
         let image = image::load_from_memory(&jpeg(pixels(&sum), 90)).unwrap().into_rgb8();
         let [r, g, b] = image.get_pixel(30, 0).0;

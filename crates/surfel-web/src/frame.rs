@@ -1,34 +1,55 @@
-//! A picture on its way to a page: twenty bytes that say what it is, then the file.
+//! Binary messages to a page: a header of twenty bytes, then a picture file. docs/server.md has the layout.
 
-use crate::canvas::Quality;
+/// The quality of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quality {
+    /// A small picture with one sample a pixel, while the view changes.
+    Draft,
+    /// A picture of full size with some of its samples.
+    Refined,
+    /// A picture of full size with all samples.
+    Finished,
+}
 
+/// An encoded picture, and facts about how it was rendered.
 pub struct Frame {
+    /// The quality of the picture.
     pub quality: Quality,
+    /// Width in pixels.
     pub width: u16,
+    /// Height in pixels.
     pub height: u16,
-    /// Camera rays a pixel, of so many that the finished picture has.
+    /// Number of camera rays a pixel so far.
     pub samples: u32,
+    /// Number of camera rays a pixel of the finished picture.
     pub of_samples: u32,
+    /// The JPEG or PNG file.
     pub file: Vec<u8>,
+    /// Time spent tracing, in seconds.
     pub trace_secs: f64,
+    /// Time spent encoding, in seconds.
     pub encode_secs: f64,
+    /// Million rays a second.
     pub mrays_per_s: f64,
 }
 
-/// First byte of a binary message.
+/// First byte of a message with a JPEG file.
 const JPEG: u8 = 1;
+/// First byte of a message with a PNG file.
 const PNG: u8 = 2;
+/// First byte of a message with a saved picture.
 const SAVED: u8 = 3;
 
 impl Frame {
-    /// With the number of the picture, of what it shows and of the last message it obeys.
-    pub fn message(&self, number: u32, stage_number: u16, input: u32) -> Vec<u8> {
+    /// The message with this picture: `number` counts pictures, `scene_number` is that of the scene it shows,
+    /// `seq` that of the last message that took effect.
+    pub fn message(&self, number: u32, scene_number: u16, seq: u32) -> Vec<u8> {
         let is_finished = self.quality == Quality::Finished;
         let mut message = Vec::with_capacity(20 + self.file.len());
         message.extend([if is_finished { PNG } else { JPEG }, u8::from(is_finished)]);
-        message.extend(stage_number.to_le_bytes());
+        message.extend(scene_number.to_le_bytes());
         message.extend(number.to_le_bytes());
-        message.extend(input.to_le_bytes());
+        message.extend(seq.to_le_bytes());
         let samples = [self.samples, self.of_samples].map(|n| n.min(0xffff) as u16);
         for number in [self.width, self.height, samples[0], samples[1]] {
             message.extend(number.to_le_bytes());
@@ -38,8 +59,8 @@ impl Frame {
     }
 }
 
-/// A picture to keep, for the request of this number.
-pub fn saved(id: u32, (width, height): (u16, u16), file: &[u8]) -> Vec<u8> {
+/// The message with a saved picture, which answers the request `id`.
+pub fn saved_message(id: u32, (width, height): (u16, u16), file: &[u8]) -> Vec<u8> {
     let mut message = vec![SAVED, 1, 0, 0];
     message.extend(id.to_le_bytes());
     message.extend([0; 4]);

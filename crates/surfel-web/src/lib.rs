@@ -1,30 +1,35 @@
-//! The interactive viewer: a server, and the page in which a scene is ray traced as one moves in it.
+//! The interactive viewer: a server, and the page on which a scene is ray traced while the user moves in it.
 //!
-//! A [`Server`] paints through a [`Renderer`](surfel::render::Renderer) what a [`Studio`] makes of the
-//! settings that pages send: the program that starts the server implements it. docs/server.md gives the
-//! messages between page and server, and what programs may ask.
+//! A [`Server`] renders, through a [`Renderer`](surfel_core::render::Renderer), the scenes that a
+//! [`SceneProvider`] prepares from the settings that pages send. The program that starts the server implements
+//! the provider. docs/server.md describes the messages between page and server, and the requests for programs.
 
+mod scene_provider;
+mod limits;
+mod message;
 mod camera;
-mod canvas;
-mod client;
-mod easel;
+mod access;
+mod page;
+mod deadline;
+mod dynamic_resolution;
 mod encode;
 mod frame;
-mod guard;
-mod hall;
-mod hurry;
-pub mod limits;
-mod message;
-mod pace;
-mod page;
+mod view;
+mod accumulator;
+mod outgoing;
+mod client;
+mod render_loop;
 mod pick;
+mod progress_reporter;
+mod pending_changes;
+mod server_state;
+mod scene_update;
+mod session;
 mod routes;
 mod server;
-mod session;
-mod staging;
-pub mod studio;
-mod telling;
-mod wishes;
 
+pub use limits::{Limits, Timeouts};
+pub use scene_provider::{
+    Error, Export, PickedPoint, PointDescriber, PreparedScene, Result, SceneProvider, SettingsMap,
+};
 pub use server::Server;
-pub use studio::{Error, Keys, Place, Result, Stage, Studio, Written};

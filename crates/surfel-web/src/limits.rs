@@ -1,69 +1,151 @@
-//! What one server bears: each limit answers with an error that names it.
+//! The limits of a server: how much it does at once, how large requests may be, how long it waits.
 
+use crate::scene_provider::{Error, Result};
 use std::time::{Duration, Instant};
 
-/// Pages at once.
-pub const MOST_CLIENTS: usize = 32;
-/// Connections at once, pages among them.
-pub const MOST_CONNECTIONS: usize = 256;
-/// Pixels of the picture that a page looks at: its sums take 16 bytes each.
-pub const MOST_PIXELS: u64 = 1 << 21;
-/// Pixels of a picture to keep.
-pub const MOST_SAVED_PIXELS: u64 = 1 << 26;
-/// Camera rays of all of a picture to keep, and rays toward lights.
-pub const MOST_RAYS: u64 = 1 << 34;
-/// Camera rays a pixel, and rays toward lights.
-pub const MOST_SAMPLES: u32 = 1024;
-/// Along a side.
-pub const MOST_LENGTH: u32 = 1 << 15;
-/// Bytes of a message or of the body of a request.
-pub const MOST_BYTES: usize = 1 << 18;
-/// Pictures to keep that are made at once; others wait their turn.
-pub const MOST_SAVES: usize = 2;
-/// Pieces of long work at once, for all pages; others wait their turn.
-pub const MOST_WORK: usize = 64;
-/// Questions of one page about places in its picture at once.
-pub const MOST_PICKS: usize = 4;
-/// Bytes of the changes of settings that a page has asked for and does not see yet.
-pub const MOST_WISHED_BYTES: usize = 1 << 19;
-/// Within which a connection has to ask something, and a page to answer.
-pub const PATIENCE: Duration = Duration::from_secs(20);
-
-/// Whether a picture of this size is made, else why not.
-pub fn check_size(width: u32, height: u32, most_pixels: u64) -> Result<(), String> {
-    let n_pixels = u64::from(width) * u64::from(height);
-    let is_long = MOST_LENGTH < width.max(height);
-    if n_pixels == 0 || is_long || most_pixels < n_pixels {
-        return Err(format!(
-            "picture of {width}x{height}: expected 1 to {most_pixels} pixels, \
-             at most {MOST_LENGTH} along a side"
-        ));
-    }
-    Ok(())
+/// Limits on sizes, rates and numbers of simultaneous operations.
+///
+/// A request beyond a limit is answered with an error that names the limit.
+#[derive(Clone, Debug)]
+pub struct Limits {
+    /// Maximum number of pages that are connected at once.
+    pub max_pages: usize,
+    /// Maximum number of connections at once, pages included.
+    pub max_connections: usize,
+    /// Maximum number of pixels of a page's interactive picture, whose accumulation buffer takes 16 bytes a pixel.
+    pub max_view_pixels: u64,
+    /// Maximum number of pixels of a saved picture.
+    pub max_save_pixels: u64,
+    /// Maximum number of camera rays and light samples of a saved picture together.
+    pub max_rays: u64,
+    /// Maximum number of camera rays a pixel, and of light samples.
+    pub max_samples: u32,
+    /// Maximum width and height of any picture, in pixels.
+    pub max_side_length: u32,
+    /// Maximum size of a page's message or a request's body, in bytes.
+    pub max_message_bytes: usize,
+    /// Maximum number of saved pictures that are rendered at once, for all clients.
+    pub max_renders: usize,
+    /// Maximum number of blocking tasks at once, for all clients; further tasks wait.
+    pub max_tasks: usize,
+    /// Maximum number of one page's saved pictures that are rendered or on their way.
+    pub max_page_saves: usize,
+    /// Maximum number of one page's picks at once.
+    pub max_page_picks: usize,
+    /// Maximum size of one page's settings changes that have not taken effect, in bytes.
+    pub max_pending_bytes: usize,
+    /// Maximum number of messages a second that a page may send in the long run.
+    pub max_message_rate: f64,
+    /// Maximum number of messages that a page may send at once.
+    pub max_message_burst: f64,
+    /// Durations after which the server stops waiting.
+    pub timeouts: Timeouts,
 }
 
-/// How many messages a client may send: so many a second in the long run, a few more at once.
-pub struct Rate {
-    left: f64,
-    last: Instant,
+/// Durations after which the server stops waiting for a client.
+#[derive(Clone, Copy, Debug)]
+pub struct Timeouts {
+    /// Maximum duration until a request's head, its body, or a page's first message has arrived.
+    pub request: Duration,
+    /// Maximum duration for which a client may not read what is sent to it.
+    pub write: Duration,
+    /// Interval between two pings of a page.
+    pub ping_interval: Duration,
+    /// Maximum duration without any message or pong from a page.
+    pub idle: Duration,
+    /// Duration for which a scene is prepared on although newer settings wait. Less would show nothing while
+    /// a slider is dragged.
+    pub stale_update: Duration,
 }
 
-const MESSAGES_PER_S: f64 = 400.0;
-const MESSAGES_AT_ONCE: f64 = 800.0;
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            max_pages: 32,
+            max_connections: 256,
+            max_view_pixels: 1 << 21,
+            max_save_pixels: 1 << 26,
+            max_rays: 1 << 34,
+            max_samples: 1024,
+            max_side_length: 1 << 15,
+            max_message_bytes: 1 << 18,
+            max_renders: 2,
+            max_tasks: 64,
+            max_page_saves: 2,
+            max_page_picks: 4,
+            max_pending_bytes: 1 << 19,
+            max_message_rate: 400.0,
+            max_message_burst: 800.0,
+            timeouts: Timeouts::default(),
+        }
+    }
+}
 
-impl Rate {
-    pub fn new(now: Instant) -> Self {
-        Self { left: MESSAGES_AT_ONCE, last: now }
+impl Default for Timeouts {
+    fn default() -> Self {
+        Self {
+            request: Duration::from_secs(20),
+            write: Duration::from_secs(20),
+            ping_interval: Duration::from_secs(10),
+            idle: Duration::from_secs(30),
+            stale_update: Duration::from_secs(1),
+        }
+    }
+}
+
+impl Limits {
+    /// Checks the size of a page's interactive picture.
+    ///
+    /// # Errors
+    /// Fails if the picture has no pixels, too many, or too long a side.
+    pub fn check_view_size(&self, width: u32, height: u32) -> Result<()> {
+        self.check_size(width, height, self.max_view_pixels)
     }
 
-    /// Counts a message; false if it is one too many.
+    /// Checks the size of a saved picture.
+    ///
+    /// # Errors
+    /// Fails if the picture has no pixels, too many, or too long a side.
+    pub fn check_save_size(&self, width: u32, height: u32) -> Result<()> {
+        self.check_size(width, height, self.max_save_pixels)
+    }
+
+    fn check_size(&self, width: u32, height: u32, max_pixels: u64) -> Result<()> {
+        let n_pixels = u64::from(width) * u64::from(height);
+        let max_side = self.max_side_length;
+        if n_pixels == 0 || max_side < width.max(height) || max_pixels < n_pixels {
+            return Err(Error::invalid_request(format!(
+                "picture of {width}x{height}: expected 1 to {max_pixels} pixels, \
+                 at most {max_side} along a side"
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// A token bucket that limits the rate of a client's messages.
+pub struct RateLimiter {
+    max_rate: f64,
+    max_burst: f64,
+    n_tokens: f64,
+    last_refill: Instant,
+}
+
+impl RateLimiter {
+    /// A full bucket at the time `now`.
+    pub fn new(limits: &Limits, now: Instant) -> Self {
+        let (max_rate, max_burst) = (limits.max_message_rate, limits.max_message_burst);
+        Self { max_rate, max_burst, n_tokens: max_burst, last_refill: now }
+    }
+
+    /// Counts a message at the time `now`; returns false if it exceeds the rate.
     pub fn allows(&mut self, now: Instant) -> bool {
-        let secs = now.saturating_duration_since(self.last).as_secs_f64();
-        self.last = now;
-        self.left = (self.left + secs * MESSAGES_PER_S).min(MESSAGES_AT_ONCE);
-        let is_allowed = 1.0 <= self.left;
+        let secs = now.saturating_duration_since(self.last_refill).as_secs_f64();
+        self.last_refill = now;
+        self.n_tokens = (self.n_tokens + secs * self.max_rate).min(self.max_burst);
+        let is_allowed = 1.0 <= self.n_tokens;
         if is_allowed {
-            self.left -= 1.0;
+            self.n_tokens -= 1.0;
         }
         is_allowed
     }
@@ -74,20 +156,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_flood_is_cut_and_a_stream_is_not() {
-        let start = Instant::now();
-        let mut rate = Rate::new(start);
-        let n_allowed = (0..10_000).filter(|_| rate.allows(start)).count();
-        assert_eq!(n_allowed, MESSAGES_AT_ONCE as usize);
+    fn a_flood_is_cut_and_a_steady_stream_is_not() {
+        let (limits, start) = (Limits::default(), Instant::now());
+        let mut limiter = RateLimiter::new(&limits, start);
+        let n_allowed = (0..10_000).filter(|_| limiter.allows(start)).count();
+        assert_eq!(n_allowed, limits.max_message_burst as usize);
         let later = |ms: u64| start + Duration::from_millis(ms);
-        assert!((100..3000).step_by(8).all(|ms| rate.allows(later(ms))));
+        assert!((100..3000).step_by(8).all(|ms| limiter.allows(later(ms))));
     }
 
     #[test]
-    fn sizes_have_bounds() {
-        assert!(check_size(1920, 1080, MOST_PIXELS).is_ok());
+    fn picture_sizes_are_checked() {
+        let limits = Limits::default();
+        assert!(limits.check_view_size(1920, 1080).is_ok());
         for (width, height) in [(0, 5), (5, 0), (4096, 4096), (u32::MAX, u32::MAX), (40_000, 1)] {
-            assert!(check_size(width, height, MOST_PIXELS).is_err(), "{width}x{height}");
+            assert!(limits.check_view_size(width, height).is_err(), "{width}x{height}");
         }
+        assert!(limits.check_save_size(4096, 4096).is_ok());
+        assert!(limits.check_save_size(9000, 9000).is_err());
     }
 }

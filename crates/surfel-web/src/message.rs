@@ -1,65 +1,58 @@
-//! What pages say: docs/server.md lists the messages both ways.
+//! Messages from pages. docs/server.md lists the messages in both directions.
 
-use crate::studio::Keys;
+use crate::scene_provider::{Error, Result, SettingsMap};
 use serde::Deserialize;
 use serde_json::Value;
 
+/// A message from a page.
 #[derive(Debug, Deserialize)]
-#[serde(tag = "type", rename_all = "lowercase")]
+#[serde(tag = "type", rename_all = "camelCase")]
 pub enum Incoming {
+    /// The first message: the picture's size in pixels, and a patch of the initial settings.
     Hello {
         width: u32,
         height: u32,
         #[serde(default)]
-        scene: Keys,
+        scene: SettingsMap,
     },
-    Size {
-        width: u32,
-        height: u32,
-    },
+    /// A new size of the picture in pixels.
+    Size { width: u32, height: u32 },
+    /// A new camera.
     Camera {
-        input: u32,
+        seq: u32,
         camera: Value,
         #[serde(default)]
         moving: bool,
     },
+    /// A patch of the settings.
     Set {
-        input: u32,
-        scene: Keys,
+        seq: u32,
+        scene: SettingsMap,
         #[serde(default)]
         moving: bool,
     },
-    Seen {
-        frame: u32,
-    },
-    Pick {
-        id: u32,
-        x: f64,
-        y: f64,
-    },
-    Save {
-        id: u32,
-        width: u32,
-        height: u32,
-    },
-    Cancel {
-        id: u32,
-    },
-    Take {
-        id: u32,
-        width: u32,
-        height: u32,
-    },
-    Load {
-        id: u32,
-        name: String,
-        text: String,
-    },
+    /// The page has shown this picture, and all before it.
+    Ack { frame: u32 },
+    /// A request for the point behind a pixel.
+    Pick { id: u32, x: f64, y: f64 },
+    /// A request for a finished picture of this size.
+    Save { id: u32, width: u32, height: u32 },
+    /// Cancels a `Save`.
+    Cancel { id: u32 },
+    /// A request for the settings as command line and scene files.
+    Export { id: u32, width: u32, height: u32 },
+    /// The text of a scene file whose settings are to be shown.
+    LoadScene { id: u32, name: String, text: String },
 }
 
 impl Incoming {
-    pub fn parse(text: &str) -> Result<Self, String> {
-        serde_json::from_str(text).map_err(|error| format!("message not understood: {error}"))
+    /// Reads a message.
+    ///
+    /// # Errors
+    /// Fails if the text is not JSON, or not a known message.
+    pub fn parse(text: &str) -> Result<Self> {
+        serde_json::from_str(text)
+            .map_err(|error| Error::invalid_request(format!("invalid message: {error}")))
     }
 }
 
@@ -68,19 +61,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn messages_are_understood_or_refused() {
+    fn messages_are_parsed_or_rejected() {
         let hello = Incoming::parse(r#"{"type":"hello","width":3,"height":2}"#);
         assert!(matches!(hello, Ok(Incoming::Hello { width: 3, height: 2, .. })));
-        for wrong in [
+        let load = Incoming::parse(r#"{"type":"loadScene","id":1,"name":"a","text":"b"}"#);
+        assert!(matches!(load, Ok(Incoming::LoadScene { id: 1, .. })));
+        for invalid in [
             "",
             "7",
             "{}",
             r#"{"type":"format"}"#,
             r#"{"type":"size","width":-1,"height":2}"#,
             r#"{"type":"size","width":1e99,"height":2}"#,
-            r#"{"type":"set","input":1,"scene":[]}"#,
+            r#"{"type":"set","seq":1,"scene":[]}"#,
         ] {
-            assert!(Incoming::parse(wrong).is_err(), "{wrong}");
+            assert!(Incoming::parse(invalid).is_err(), "{invalid}");
         }
     }
 }

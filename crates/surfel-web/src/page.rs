@@ -1,4 +1,4 @@
-//! The page, embedded: no request ever leads to the file system.
+//! The page's files, embedded in the program: no request reaches the file system.
 
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -8,19 +8,19 @@ use rust_embed::RustEmbed;
 #[folder = "page/"]
 struct Page;
 
-/// Nothing from elsewhere, and nothing framed by others.
+/// The page loads nothing from other origins, and no other page may frame it.
 const POLICY: &str = "default-src 'self'; connect-src 'self' ws: wss:; img-src 'self' blob: data:; \
     style-src 'self' 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
 const HEADERS: [(HeaderName, HeaderValue); 4] = [
     (header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY)),
     (header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
-    // The address holds the token.
+    // The address contains the token.
     (header::REFERRER_POLICY, HeaderValue::from_static("no-referrer")),
     (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
 ];
 
-/// A file of the page by its name; the page itself by none.
+/// The response with a file of the page; an empty name stands for `index.html`.
 pub fn file(name: &str) -> Response {
     let name = if name.is_empty() { "index.html" } else { name };
     let Some(found) = Page::get(name) else {

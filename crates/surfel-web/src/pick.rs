@@ -1,26 +1,27 @@
-//! What is behind a pixel.
+//! Picking: the point of the scene behind a pixel.
 
-use crate::client::Sight;
-use crate::studio::{Place, Stage};
+use crate::scene_provider::{PickedPoint, PreparedScene};
+use crate::view::ViewState;
 use std::sync::Arc;
-use surfel::image::NO_ID;
-use surfel::math::DVec3;
-use surfel::progress::Progress;
-use surfel::render::{Piece, Renderer, Settings};
+use surfel_core::image::NO_ID;
+use surfel_core::math::DVec3;
+use surfel_core::progress::Progress;
+use surfel_core::render::{RenderRegion, Renderer, Settings};
 
-/// The surface at a place in the page's picture, in pixels from its top left corner.
+/// The scene and the point behind a pixel of the page's picture, given in pixels from its top left corner; none
+/// if there is no surface or if rendering is cancelled.
 ///
-/// Paints the row of that pixel alone: what is found is what is seen, whatever paints it.
+/// The row of that pixel is rendered, so that the result agrees with the picture for every renderer.
 pub fn pick(
     renderer: &dyn Renderer,
-    sight: &Sight,
+    view: &ViewState,
     (x, y): (f64, f64),
     progress: &dyn Progress,
-) -> Option<(Arc<Stage>, Place)> {
-    let (stage, camera) = (sight.stage.clone()?, sight.camera?);
-    let (width, height) = sight.size;
-    let is_in = (0.0..f64::from(width)).contains(&x) && (0.0..f64::from(height)).contains(&y);
-    if !is_in {
+) -> Option<(Arc<PreparedScene>, PickedPoint)> {
+    let (prepared, camera) = (view.scene.clone()?, view.camera?);
+    let (width, height) = view.size;
+    let is_inside = (0.0..f64::from(width)).contains(&x) && (0.0..f64::from(height)).contains(&y);
+    if !is_inside {
         return None;
     }
     let settings = Settings {
@@ -29,21 +30,21 @@ pub fn pick(
         samples_per_pixel: 1,
         light_samples: 1,
         max_depth: 0,
-        with_layers: true,
-        ..stage.quality
+        with_aovs: true,
+        ..prepared.render_settings
     };
     let (column, row) = (x as usize, y as u32);
-    let piece = Piece { rows: (row, row + 1), samples: (0, 1) };
-    let mut scene = stage.flat.clone();
+    let region = RenderRegion { rows: (row, row + 1), samples: (0, 1) };
+    let mut scene = prepared.flat.clone();
     scene.camera = camera;
-    let (image, _) = renderer.render_piece(&scene, &settings, piece, progress).ok()?;
-    let layers = image.layers?;
-    let place = Place {
-        instance: layers.instance_id[column],
-        id: layers.point_id[column],
-        position: stage.flat.origin + DVec3::from(layers.position[column]),
-        normal: layers.normal[column],
-        depth: f64::from(layers.depth[column]),
+    let (image, _) = renderer.render_region(&scene, &settings, region, progress).ok()?;
+    let aovs = image.aovs?;
+    let point = PickedPoint {
+        instance_idx: aovs.instance_id[column],
+        primitive_idx: aovs.point_id[column],
+        position: prepared.flat.origin + DVec3::from(aovs.position[column]),
+        normal: aovs.normal[column],
+        depth: f64::from(aovs.depth[column]),
     };
-    (place.instance != NO_ID).then_some((stage, place))
+    (point.instance_idx != NO_ID).then_some((prepared, point))
 }

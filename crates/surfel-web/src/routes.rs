@@ -1,11 +1,10 @@
-//! What the server answers: the page, the socket, and pictures for programs.
+//! The server's HTTP routes: the page, its WebSocket, and pictures and facts for programs.
 
-use crate::guard::Refusal;
-use crate::hall::Hall;
-use crate::limits::{MOST_BYTES, PATIENCE};
+use crate::access::AccessDenied;
 use crate::page;
+use crate::scene_provider::{Error, SceneProvider, SettingsMap, apply_merge_patch};
+use crate::server_state::ServerState;
 use crate::session;
-use crate::studio::{Error, Keys, Studio, merge};
 use axum::body::{Body, to_bytes};
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{Path, Query, Request, State};
@@ -17,25 +16,26 @@ use axum::{Json, Router};
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use surfel::progress::Progress;
+use surfel_core::progress::Progress;
 
-pub fn router(hall: Arc<Hall>) -> Router {
+/// All routes. Each checks host and origin; all but the page's files and `/healthz` need the token, too.
+pub fn router(state: Arc<ServerState>) -> Router {
     let guarded = Router::new()
         .route("/ws", any(socket))
         .route("/scene", get(scene))
         .route("/stats", get(stats))
         .route("/render", get(render_query).post(render_body))
-        .route_layer(from_fn_with_state(hall.clone(), with_token));
+        .route_layer(from_fn_with_state(state.clone(), check_token));
     Router::new()
         .route("/", get(|| async { page::file("") }))
         .route("/{file}", get(|Path(file): Path<String>| async move { page::file(&file) }))
         .route("/healthz", get(health))
         .merge(guarded)
-        .layer(from_fn_with_state(hall.clone(), from_here))
-        .with_state(hall)
+        .layer(from_fn_with_state(state.clone(), check_origin))
+        .with_state(state)
 }
 
-/// An answer that says why there is no other.
+/// A response that gives the reason of a failure as JSON.
 struct Failure(StatusCode, String);
 
 impl IntoResponse for Failure {
@@ -44,13 +44,13 @@ impl IntoResponse for Failure {
     }
 }
 
-impl From<Refusal> for Failure {
-    fn from(refusal: Refusal) -> Self {
-        let status = match refusal {
-            Refusal::Token => StatusCode::UNAUTHORIZED,
-            Refusal::Host | Refusal::Origin => StatusCode::FORBIDDEN,
+impl From<AccessDenied> for Failure {
+    fn from(denied: AccessDenied) -> Self {
+        let status = match denied {
+            AccessDenied::Token => StatusCode::UNAUTHORIZED,
+            AccessDenied::Host | AccessDenied::Origin => StatusCode::FORBIDDEN,
         };
-        Self(status, refusal.text().into())
+        Self(status, denied.message().into())
     }
 }
 
@@ -60,120 +60,135 @@ impl From<Error> for Failure {
     }
 }
 
-type Answer = Result<Response, Failure>;
+type RouteResult = Result<Response, Failure>;
 
-async fn from_here(State(hall): State<Arc<Hall>>, request: Request, next: Next) -> Answer {
-    hall.guard.check(request.headers())?;
+async fn check_origin(
+    State(state): State<Arc<ServerState>>,
+    request: Request,
+    next: Next,
+) -> RouteResult {
+    state.guard.check_origin(request.headers())?;
     Ok(next.run(request).await)
 }
 
-async fn with_token(State(hall): State<Arc<Hall>>, request: Request, next: Next) -> Answer {
-    hall.guard.check_token(request.headers(), request.uri())?;
+async fn check_token(
+    State(state): State<Arc<ServerState>>,
+    request: Request,
+    next: Next,
+) -> RouteResult {
+    state.guard.check_token(request.headers(), request.uri())?;
     Ok(next.run(request).await)
 }
 
-async fn socket(State(hall): State<Arc<Hall>>, upgrade: WebSocketUpgrade) -> Answer {
-    let Ok(place) = hall.places.clone().try_acquire_owned() else {
-        let text = "all places are taken; close another page or try again later";
+async fn socket(State(state): State<Arc<ServerState>>, upgrade: WebSocketUpgrade) -> RouteResult {
+    let Ok(permit) = state.page_permits.clone().try_acquire_owned() else {
+        let text = "too many pages are open; close another one or try again later";
         return Err(Failure(StatusCode::SERVICE_UNAVAILABLE, text.into()));
     };
-    let upgrade = upgrade.max_message_size(MOST_BYTES).max_frame_size(MOST_BYTES);
+    let max_bytes = state.limits.max_message_bytes;
+    let upgrade = upgrade.max_message_size(max_bytes).max_frame_size(max_bytes);
     Ok(upgrade.on_upgrade(async move |socket| {
-        session::run(socket, hall).await;
-        drop(place);
+        session::run(socket, state).await;
+        drop(permit);
     }))
 }
 
-async fn health(State(hall): State<Arc<Hall>>) -> Response {
-    let is_ready = hall.studio.borrow().is_some();
+async fn health(State(state): State<Arc<ServerState>>) -> Response {
+    let is_ready = state.provider.borrow().is_some();
     Json(json!({ "status": if is_ready { "ready" } else { "loading" } })).into_response()
 }
 
-fn ready(hall: &Hall) -> Result<Arc<dyn Studio>, Failure> {
-    hall.studio.borrow().clone().ok_or_else(|| {
+fn loaded_provider(state: &ServerState) -> Result<Arc<dyn SceneProvider>, Failure> {
+    state.provider.borrow().clone().ok_or_else(|| {
         Failure(StatusCode::SERVICE_UNAVAILABLE, "the files are still being loaded".into())
     })
 }
 
-/// Size of a picture where none is said.
-const USUAL_SIZE: (u32, u32) = (1920, 1080);
+/// The picture size for which `/scene` makes automatic choices.
+const DEFAULT_SIZE: (u32, u32) = (1920, 1080);
 
-async fn scene(State(hall): State<Arc<Hall>>) -> Answer {
-    let (width, height) = USUAL_SIZE;
-    Ok(Json(ready(&hall)?.opening(width, height)).into_response())
+async fn scene(State(state): State<Arc<ServerState>>) -> RouteResult {
+    let (width, height) = DEFAULT_SIZE;
+    Ok(Json(loaded_provider(&state)?.initial_settings(width, height)).into_response())
 }
 
-async fn stats(State(hall): State<Arc<Hall>>) -> Answer {
-    let info = hall.studio.borrow().as_ref().map(|studio| studio.info());
+async fn stats(State(state): State<Arc<ServerState>>) -> RouteResult {
+    let info = state.provider.borrow().as_ref().map(|provider| state.info(&**provider));
     Ok(Json(json!({
-        "clients": hall.easel.n_clients(),
-        "uptime_secs": hall.start.elapsed().as_secs_f64(),
-        "pictures": hall.n_pictures.load(Ordering::Relaxed),
+        "clients": state.render_loop.n_clients(),
+        "uptime_secs": state.start.elapsed().as_secs_f64(),
+        "pictures": state.n_pictures.load(Ordering::Relaxed),
         "info": info,
     }))
     .into_response())
 }
 
-/// Keys in the address, as they are typed on a command line: `?resolution=640x480&camera-azimuth-angle=30`.
+/// Renders with settings from the query, as on a command line: `?resolution=640x480&camera-azimuth-angle=30`.
 async fn render_query(
-    State(hall): State<Arc<Hall>>,
+    State(state): State<Arc<ServerState>>,
     Query(pairs): Query<Vec<(String, String)>>,
-) -> Answer {
+) -> RouteResult {
     let pairs = pairs.into_iter().filter(|(key, _)| key != "token");
-    render(hall, pairs.map(|(key, value)| (key, Value::String(value))).collect()).await
+    render(state, pairs.map(|(key, value)| (key, Value::String(value))).collect()).await
 }
 
-/// Keys as JSON, as in a scene file.
-async fn render_body(State(hall): State<Arc<Hall>>, body: Body) -> Answer {
-    let bytes = tokio::time::timeout(PATIENCE, to_bytes(body, MOST_BYTES)).await;
-    let bytes = match bytes {
+/// Renders with settings from a JSON body, as in a scene file.
+async fn render_body(State(state): State<Arc<ServerState>>, body: Body) -> RouteResult {
+    let max_bytes = state.limits.max_message_bytes;
+    let bytes = tokio::time::timeout(state.limits.timeouts.request, to_bytes(body, max_bytes));
+    let bytes = match bytes.await {
         Ok(Ok(bytes)) => bytes,
         Ok(Err(_)) => {
-            let text = format!("body: expected at most {MOST_BYTES} bytes");
+            let text = format!("body: expected at most {max_bytes} bytes");
             return Err(Failure(StatusCode::PAYLOAD_TOO_LARGE, text));
         }
-        Err(_) => return Err(Failure(StatusCode::REQUEST_TIMEOUT, "body: came too slowly".into())),
+        Err(_) => {
+            let text = "body: did not arrive in time".into();
+            return Err(Failure(StatusCode::REQUEST_TIMEOUT, text));
+        }
     };
-    let keys = serde_json::from_slice(&bytes)
+    let patch = serde_json::from_slice(&bytes)
         .map_err(|error| Failure(StatusCode::BAD_REQUEST, format!("body: {error}")))?;
-    render(hall, keys).await
+    render(state, patch).await
 }
 
-async fn render(hall: Arc<Hall>, keys: Keys) -> Answer {
-    let studio = ready(&hall)?;
-    // Ends the work when the one who asked goes away.
-    let going = Going(Arc::default());
-    let Ok(turn) = hall.saves.clone().try_acquire_owned() else {
-        let text = "enough pictures are being made; try again in a while";
+async fn render(state: Arc<ServerState>, patch: SettingsMap) -> RouteResult {
+    let provider = loaded_provider(&state)?;
+    // Dropped, with this future, when the client disconnects.
+    let cancel_on_drop = CancelOnDrop(Arc::default());
+    let Ok(permit) = state.render_permits.clone().try_acquire_owned() else {
+        let text = "too many pictures are being rendered; try again later";
         return Err(Failure(StatusCode::TOO_MANY_REQUESTS, text.into()));
     };
-    let until = Until { hall: hall.clone(), is_gone: going.0.clone() };
-    let picture = hall.work(move || {
-        let _turn = turn;
-        let mut settings = studio.given();
-        merge(&mut settings, &keys);
-        studio.picture(&settings, &until)
+    let progress = RequestProgress { state: state.clone(), is_gone: cancel_on_drop.0.clone() };
+    let png = state.run_blocking(move || {
+        let _permit = permit;
+        let mut settings = provider.startup_settings();
+        apply_merge_patch(&mut settings, &patch);
+        provider.render_png(&settings, &progress)
     });
-    let png = picture.await??;
-    hall.n_pictures.fetch_add(1, Ordering::Relaxed);
+    let png = png.await??;
+    state.n_pictures.fetch_add(1, Ordering::Relaxed);
     Ok(([(header::CONTENT_TYPE, "image/png")], png).into_response())
 }
 
-struct Going(Arc<AtomicBool>);
+/// Sets a flag when dropped.
+struct CancelOnDrop(Arc<AtomicBool>);
 
-impl Drop for Going {
+impl Drop for CancelOnDrop {
     fn drop(&mut self) {
         self.0.store(true, Ordering::Relaxed);
     }
 }
 
-struct Until {
-    hall: Arc<Hall>,
+/// Cancels a request's work when its client disconnects or the server stops.
+struct RequestProgress {
+    state: Arc<ServerState>,
     is_gone: Arc<AtomicBool>,
 }
 
-impl Progress for Until {
+impl Progress for RequestProgress {
     fn is_cancelled(&self) -> bool {
-        self.is_gone.load(Ordering::Relaxed) || self.hall.is_stopped()
+        self.is_gone.load(Ordering::Relaxed) || self.state.is_stopped()
     }
 }

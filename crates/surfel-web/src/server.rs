@@ -1,11 +1,11 @@
-//! Listens, and answers until it is told to stop.
+//! The server: listens at a port, accepts connections, and stops on request.
 
-use crate::guard::Guard;
-use crate::hall::Hall;
-use crate::limits::{MOST_CONNECTIONS, PATIENCE};
+use crate::access::AccessGuard;
+use crate::limits::{Limits, Timeouts};
+use crate::progress_reporter::ProgressReporter;
 use crate::routes;
-use crate::studio::{Error, Result, Studio};
-use crate::telling::Telling;
+use crate::scene_provider::{Error, Result, SceneProvider};
+use crate::server_state::ServerState;
 use axum::Router;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
@@ -14,35 +14,49 @@ use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-use surfel::progress::Progress;
-use surfel::render::Renderer;
+use surfel_core::progress::Progress;
+use surfel_core::render::Renderer;
 use tokio::sync::Semaphore;
 use tokio_io_timeout::TimeoutStream;
 
-/// A port that is listened at, for a server that does not answer yet.
+/// A server that is bound to a port and does not answer until it runs.
 pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
-    guard: Guard,
+    guard: AccessGuard,
+    limits: Limits,
 }
 
-/// Threads that read and write; those that paint are others.
-const THREADS: usize = 2;
-/// Between two looks whether to stop.
-const STOP_EVERY: Duration = Duration::from_millis(50);
+/// Number of threads for network input and output; rendering has threads of its own.
+const N_IO_THREADS: usize = 2;
+/// Interval between two checks of the stop flag.
+const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
+/// Duration after a failed `accept`, such as for lack of file handles, before the next one.
+const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(50);
+/// Duration for which running tasks may delay the server's end.
+const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(500);
 
 impl Server {
-    /// Port 0 takes any that is free.
+    /// Binds to a port; port 0 takes any free one.
+    ///
+    /// # Errors
+    /// Fails if the system refuses the address or the port, or has no random numbers for a token.
     pub fn bind(host: IpAddr, port: u16) -> Result<Self> {
-        let place = SocketAddr::new(host, port);
-        let io = |source| Error::Io { place: place.to_string(), source };
-        let listener = TcpListener::bind(place).map_err(io)?;
-        let address = listener.local_addr().map_err(io)?;
-        let guard = Guard::new(host).map_err(|error| Error::Refused(format!("token: {error}")))?;
-        Ok(Self { listener, address, guard })
+        let address = SocketAddr::new(host, port);
+        let io = |source| Error::Io { address: address.to_string(), source };
+        let listener = TcpListener::bind(address).map_err(io)?;
+        let bound = listener.local_addr().map_err(io)?;
+        let guard = AccessGuard::new(host)
+            .map_err(|error| Error::invalid_request(format!("token: {error}")))?;
+        Ok(Self { listener, address: bound, guard, limits: Limits::default() })
     }
 
-    /// Where the page is, with the token if one is needed.
+    /// Replaces the default limits.
+    pub fn with_limits(self, limits: Limits) -> Self {
+        Self { limits, ..self }
+    }
+
+    /// The link to the page, with the token if one is needed.
     pub fn link(&self) -> String {
         let host = match self.address.ip() {
             ip if ip.is_unspecified() => "localhost".to_owned(),
@@ -53,84 +67,93 @@ impl Server {
         format!("http://{host}:{}/{token}", self.address.port())
     }
 
-    /// Answers until `is_stopped`. Pages may come while `open` still loads the files; where that fails, the
-    /// server ends with its error.
+    /// Answers requests until `is_stopped` is set. Pages may connect while `open` still loads the files.
+    ///
+    /// # Errors
+    /// Fails if `open` fails, or if the system denies threads or the listener.
     pub fn run(
         self,
         renderer: Arc<dyn Renderer + Send>,
         is_stopped: Arc<AtomicBool>,
-        open: impl FnOnce(&dyn Progress) -> Result<Arc<dyn Studio>> + Send + 'static,
+        open: impl FnOnce(&dyn Progress) -> Result<Arc<dyn SceneProvider>> + Send + 'static,
     ) -> Result<()> {
-        let place = self.address.to_string();
-        let io = |source| Error::Io { place: place.clone(), source };
-        let hall = Arc::new(Hall::new(self.guard, renderer.clone(), is_stopped));
-        let easel = hall.easel.start(renderer).map_err(io)?;
+        let address = self.address.to_string();
+        let io = |source| Error::Io { address: address.clone(), source };
+        let state =
+            Arc::new(ServerState::new(self.guard, renderer.clone(), self.limits, is_stopped));
+        let render_thread = state.render_loop.start(renderer).map_err(io)?;
         let runtime = tokio::runtime::Builder::new_multi_thread()
-            .worker_threads(THREADS)
+            .worker_threads(N_IO_THREADS)
             .enable_all()
             .build()
             .map_err(io)?;
         let ended = runtime.block_on(async {
             self.listener.set_nonblocking(true).map_err(io)?;
             let listener = tokio::net::TcpListener::from_std(self.listener).map_err(io)?;
-            let accepting = tokio::spawn(accept(listener, routes::router(hall.clone())));
-            let opened = load(hall.clone(), open).await;
-            if opened.is_ok() {
-                stopped(&hall).await;
+            let accepting = tokio::spawn(accept(listener, state.clone()));
+            let loaded = load(state.clone(), open).await;
+            if loaded.is_ok() {
+                wait_until_stopped(&state).await;
             }
             accepting.abort();
-            opened
+            loaded
         });
-        hall.is_stopped.store(true, Ordering::Relaxed);
-        hall.easel.close();
-        runtime.shutdown_timeout(Duration::from_millis(500));
-        drop(easel.join());
+        state.is_stopped.store(true, Ordering::Relaxed);
+        state.render_loop.close();
+        runtime.shutdown_timeout(SHUTDOWN_TIMEOUT);
+        drop(render_thread.join());
         ended
     }
 }
 
 async fn load(
-    hall: Arc<Hall>,
-    open: impl FnOnce(&dyn Progress) -> Result<Arc<dyn Studio>> + Send + 'static,
+    state: Arc<ServerState>,
+    open: impl FnOnce(&dyn Progress) -> Result<Arc<dyn SceneProvider>> + Send + 'static,
 ) -> Result<()> {
-    let (told, watched) = (hall.clone(), hall.clone());
-    let telling = Telling::new(
-        move |line| drop(told.loading.send_replace(Some(line))),
-        move || watched.is_stopped(),
+    let (for_updates, for_cancel) = (state.clone(), state.clone());
+    let reporter = ProgressReporter::new(
+        move |update| drop(for_updates.loading.send_replace(Some(update))),
+        move || for_cancel.is_stopped(),
     );
-    let studio = hall.work(move || open(&telling)).await??;
-    hall.studio.send_replace(Some(studio));
-    hall.loading.send_replace(None);
+    let provider = state.run_blocking(move || open(&reporter)).await??;
+    state.provider.send_replace(Some(provider));
+    state.loading.send_replace(None);
     Ok(())
 }
 
-async fn stopped(hall: &Hall) {
-    while !hall.is_stopped() {
-        tokio::time::sleep(STOP_EVERY).await;
+async fn wait_until_stopped(state: &ServerState) {
+    while !state.is_stopped() {
+        tokio::time::sleep(STOP_POLL_INTERVAL).await;
     }
 }
 
-async fn accept(listener: tokio::net::TcpListener, app: Router) {
-    let places = Arc::new(Semaphore::new(MOST_CONNECTIONS));
+async fn accept(listener: tokio::net::TcpListener, state: Arc<ServerState>) {
+    let permits = Arc::new(Semaphore::new(state.limits.max_connections));
+    let timeouts = state.limits.timeouts;
+    let app = routes::router(state);
     loop {
-        // Out of file handles, say: others may be free soon.
         let Ok((stream, _)) = listener.accept().await else {
-            tokio::time::sleep(STOP_EVERY).await;
+            tokio::time::sleep(ACCEPT_RETRY_DELAY).await;
             continue;
         };
-        let Ok(place) = places.clone().try_acquire_owned() else { continue };
-        // Without, small messages wait for one another.
-        let _ = stream.set_nodelay(true);
-        let mut stream = Box::pin(TimeoutStream::new(stream));
-        // Who asks and does not read the answer would hold its place for ever.
-        stream.as_mut().set_write_timeout_pinned(Some(PATIENCE));
-        let service = TowerToHyperService::new(app.clone());
+        let Ok(permit) = permits.clone().try_acquire_owned() else { continue };
+        let app = app.clone();
         tokio::spawn(async move {
-            let _place = place;
-            let mut http = http1::Builder::new();
-            http.timer(TokioTimer::new()).header_read_timeout(PATIENCE);
-            // Of a client that breaks off there is nothing to tell.
-            let _ = http.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
+            let _permit = permit;
+            serve(stream, app, timeouts).await;
         });
     }
+}
+
+async fn serve(stream: tokio::net::TcpStream, app: Router, timeouts: Timeouts) {
+    // Otherwise small messages wait for one another.
+    let _ = stream.set_nodelay(true);
+    let mut stream = Box::pin(TimeoutStream::new(stream));
+    // A client that sends requests and does not read the answers would hold its permit for ever.
+    stream.as_mut().set_write_timeout_pinned(Some(timeouts.write));
+    let mut http = http1::Builder::new();
+    http.timer(TokioTimer::new()).header_read_timeout(timeouts.request);
+    // An error means that the client broke off: there is nobody to report it to.
+    let service = TowerToHyperService::new(app);
+    let _ = http.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
 }

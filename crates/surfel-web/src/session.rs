@@ -1,16 +1,17 @@
-//! One page's connection: its messages in, pictures and answers out.
+//! One page's connection: reads its messages, and writes pictures and answers.
 
 use crate::camera;
-use crate::client::{Client, Outgoing};
+use crate::client::Client;
 use crate::frame;
-use crate::hall::Hall;
-use crate::limits::{MOST_PICKS, MOST_PIXELS, MOST_SAVED_PIXELS, PATIENCE, Rate, check_size};
+use crate::limits::{Limits, RateLimiter};
 use crate::message::Incoming;
+use crate::outgoing::{Outgoing, RequestRef, rejection, send_json};
+use crate::pending_changes::{PendingChanges, SettingsChange};
 use crate::pick;
-use crate::staging;
-use crate::studio::{Error, Keys};
-use crate::telling::{Telling, Told};
-use crate::wishes::{Wish, Wishes};
+use crate::progress_reporter::{ProgressReporter, ProgressUpdate};
+use crate::scene_provider::{Error, Result, SettingsMap};
+use crate::scene_update;
+use crate::server_state::ServerState;
 use axum::extract::ws::{Message, WebSocket};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt, StreamExt};
@@ -22,62 +23,63 @@ use std::time::{Duration, Instant};
 use tokio::sync::{Semaphore, mpsc};
 use tokio::time::timeout;
 
-/// Messages that wait for a slow page.
-const QUEUE: usize = 64;
-/// Between two questions whether the page is still there.
-const PING_EVERY: Duration = Duration::from_secs(10);
-/// Saves of one page at once.
-const MOST_SAVES: usize = 2;
+/// Maximum number of messages that wait for a slow page.
+const OUTGOING_CAPACITY: usize = 64;
 
-pub async fn run(socket: WebSocket, hall: Arc<Hall>) {
+/// Serves a page until its connection ends.
+pub async fn run(socket: WebSocket, state: Arc<ServerState>) {
     let (sink, mut stream) = socket.split();
-    let (out, queue) = mpsc::channel(QUEUE);
-    let writer = tokio::spawn(write(sink, queue));
-    if let Some((size, patch)) = greeting(&mut stream, &out).await {
-        let wishes: Arc<Wishes> = Arc::default();
-        let client = Arc::new(Client::new(size, out.clone()));
-        let _admission = hall.admit(client.clone());
-        let staging =
-            tokio::spawn(staging::run(hall.clone(), client.clone(), wishes.clone(), out.clone()));
-        let picks = Arc::new(Semaphore::new(MOST_PICKS));
-        let mut session = Session { hall, client, wishes, out, picks, saves: HashMap::new() };
-        session.wish(Wish { patch, ..Wish::default() }).await;
-        session.read(stream).await;
-        session.saves.values().for_each(|is_cancelled| is_cancelled.store(true, Ordering::Relaxed));
-        staging.abort();
+    let (out, queue) = mpsc::channel(OUTGOING_CAPACITY);
+    let timeouts = state.limits.timeouts;
+    let mut writer = tokio::spawn(write(sink, queue, timeouts.ping_interval));
+    match handshake(&mut stream, &state.limits).await {
+        Some(Ok((size, patch))) => {
+            let pending = Arc::new(PendingChanges::new(state.limits.max_pending_bytes));
+            let client = Arc::new(Client::new(size, out.clone()));
+            let _guard = state.register(client.clone());
+            let updates = tokio::spawn(scene_update::run(
+                state.clone(),
+                client.clone(),
+                pending.clone(),
+                out.clone(),
+            ));
+            let picks = Arc::new(Semaphore::new(state.limits.max_page_picks));
+            let mut session = Session { state, client, pending, out, picks, saves: HashMap::new() };
+            session.change(SettingsChange { patch, ..SettingsChange::default() }).await;
+            session.read(stream).await;
+            session.saves.values().for_each(cancel);
+            updates.abort();
+        }
+        Some(Err(error)) => {
+            send_json(&out, &rejection(RequestRef::Unnumbered, &error)).await;
+            // The writer ends once it has sent the error.
+            drop(out);
+            let _ = timeout(timeouts.write, &mut writer).await;
+        }
+        None => {}
     }
     writer.abort();
 }
 
-/// The size and settings that a page begins with.
-async fn greeting(
+/// The picture size and the settings in a page's first message; none if the page goes away or sends nothing.
+async fn handshake(
     stream: &mut SplitStream<WebSocket>,
-    out: &mpsc::Sender<Outgoing>,
-) -> Option<((u32, u32), Keys)> {
-    let first = timeout(PATIENCE, first_said(stream)).await.ok()??;
-    let greeting = match first {
-        Message::Text(text) => Incoming::parse(&text),
-        _ => Err("expected hello".into()),
+    limits: &Limits,
+) -> Option<Result<((u32, u32), SettingsMap)>> {
+    let first = timeout(limits.timeouts.request, first_message(stream)).await.ok()??;
+    let Message::Text(text) = first else {
+        return Some(Err(Error::invalid_request("expected hello")));
     };
-    let greeting = greeting.and_then(|message| match message {
+    Some(Incoming::parse(&text).and_then(|message| match message {
         Incoming::Hello { width, height, scene } => {
-            check_size(width, height, MOST_PIXELS).map(|()| ((width, height), scene))
+            limits.check_view_size(width, height).map(|()| ((width, height), scene))
         }
-        _ => Err("expected hello first".into()),
-    });
-    match greeting {
-        Ok(greeting) => Some(greeting),
-        Err(text) => {
-            answer(out, &json!({ "type": "error", "text": text })).await;
-            // Time for the writer to say so.
-            tokio::time::sleep(Duration::from_millis(100)).await;
-            None
-        }
-    }
+        _ => Err(Error::invalid_request("expected hello first")),
+    }))
 }
 
-/// The first message that is more than a sign of life.
-async fn first_said(stream: &mut SplitStream<WebSocket>) -> Option<Message> {
+/// The first message that is not a ping or pong.
+async fn first_message(stream: &mut SplitStream<WebSocket>) -> Option<Message> {
     loop {
         match stream.next().await?.ok()? {
             Message::Ping(_) | Message::Pong(_) => {}
@@ -86,9 +88,13 @@ async fn first_said(stream: &mut SplitStream<WebSocket>) -> Option<Message> {
     }
 }
 
-/// Sends what is queued; ends when the page takes nothing for too long, as all connections do.
-async fn write(mut sink: SplitSink<WebSocket, Message>, mut queue: mpsc::Receiver<Outgoing>) {
-    let mut pings = tokio::time::interval(PING_EVERY);
+/// Sends what is queued. Ends if the connection's write timeout passes, or once all senders are gone.
+async fn write(
+    mut sink: SplitSink<WebSocket, Message>,
+    mut queue: mpsc::Receiver<Outgoing>,
+    ping_interval: Duration,
+) {
+    let mut pings = tokio::time::interval(ping_interval);
     loop {
         let (message, _held) = tokio::select! {
             outgoing = queue.recv() => match outgoing {
@@ -104,247 +110,250 @@ async fn write(mut sink: SplitSink<WebSocket, Message>, mut queue: mpsc::Receive
     }
 }
 
-/// Queues a message; waits while the page does not take what was sent.
-pub async fn answer(out: &mpsc::Sender<Outgoing>, message: &Value) {
-    let _ = out.send(Outgoing::Text(message.to_string())).await;
-}
-
 struct Session {
-    hall: Arc<Hall>,
+    state: Arc<ServerState>,
     client: Arc<Client>,
-    wishes: Arc<Wishes>,
+    pending: Arc<PendingChanges>,
     out: mpsc::Sender<Outgoing>,
-    /// Turns to ask what is at a place.
+    /// One permit for each pick that is being answered.
     picks: Arc<Semaphore>,
-    /// Pictures to keep that have not been written to the page yet, with what stops them.
+    /// The cancellation flags of saved pictures that have not been sent completely, by request id.
     saves: HashMap<u32, Arc<AtomicBool>>,
 }
 
 impl Session {
     async fn read(&mut self, mut stream: SplitStream<WebSocket>) {
-        let mut rate = Rate::new(Instant::now());
-        let mut is_flood = false;
+        let mut limiter = RateLimiter::new(&self.state.limits, Instant::now());
+        let mut is_flooding = false;
         while let Some(message) = self.next(&mut stream).await {
-            if self.out.is_closed() || self.hall.is_stopped() {
+            if self.out.is_closed() || self.state.is_stopped() {
                 return;
             }
-            if !rate.allows(Instant::now()) {
-                if !std::mem::replace(&mut is_flood, true) {
-                    self.refuse(None, None, "too many messages; some are not obeyed").await;
+            if !limiter.allows(Instant::now()) {
+                if !std::mem::replace(&mut is_flooding, true) {
+                    self.reject_text("too many messages; some are ignored").await;
                 }
                 continue;
             }
-            is_flood = false;
+            is_flooding = false;
             match message {
                 Message::Text(text) => match Incoming::parse(&text) {
-                    Ok(message) => self.obey(message).await,
-                    Err(error) => self.refuse(None, None, &error).await,
+                    Ok(message) => self.handle(message).await,
+                    Err(error) => self.reject(RequestRef::Unnumbered, &error).await,
                 },
-                Message::Binary(_) => self.refuse(None, None, "expected text, found bytes").await,
+                Message::Binary(_) => self.reject_text("expected text, found bytes").await,
                 Message::Close(_) => return,
                 Message::Ping(_) | Message::Pong(_) => {}
             }
         }
     }
 
-    /// Pages answer pings: one that says nothing for longer is gone.
+    /// The next message; none if the page has gone. Pages answer pings, so a silent page has gone.
     async fn next(&self, stream: &mut SplitStream<WebSocket>) -> Option<Message> {
         loop {
-            match timeout(PING_EVERY + PATIENCE, stream.next()).await {
+            match timeout(self.state.limits.timeouts.idle, stream.next()).await {
                 Ok(message) => return message?.ok(),
-                // A ping waits behind a large picture.
+                // A ping may be queued behind a large picture.
                 Err(_) if self.saves.values().any(is_held) => {}
                 Err(_) => return None,
             }
         }
     }
 
-    async fn obey(&mut self, message: Incoming) {
+    async fn handle(&mut self, message: Incoming) {
         match message {
-            Incoming::Hello { .. } => self.refuse(None, None, "hello was said already").await,
+            Incoming::Hello { .. } => self.reject_text("hello was sent already").await,
             Incoming::Size { width, height } => self.resize(width, height).await,
-            Incoming::Camera { input, camera, moving } => self.turn(input, camera, moving).await,
-            Incoming::Set { input, scene, moving } => {
-                self.wish(Wish { patch: scene, is_anew: false, input, is_moving: moving }).await;
+            Incoming::Camera { seq, camera, moving } => {
+                self.set_camera(seq, camera, moving).await;
             }
-            Incoming::Seen { frame } => {
-                self.client.has_seen(frame);
-                self.hall.easel.call();
+            Incoming::Set { seq, scene, moving } => {
+                let (patch, from_startup, is_moving) = (scene, false, moving);
+                self.change(SettingsChange { patch, from_startup, seq, is_moving }).await;
+            }
+            Incoming::Ack { frame } => {
+                self.client.acknowledge(frame);
+                self.state.render_loop.notify();
             }
             Incoming::Pick { id, x, y } => self.pick(id, (x, y)).await,
             Incoming::Save { id, width, height } => self.save(id, width, height).await,
-            Incoming::Cancel { id } => {
-                let save = self.saves.get(&id);
-                save.inspect(|is_cancelled| is_cancelled.store(true, Ordering::Relaxed));
-            }
-            Incoming::Take { id, width, height } => self.take(id, width, height).await,
-            Incoming::Load { id, name, text } => self.load(id, name, text).await,
+            Incoming::Cancel { id } => self.saves.get(&id).into_iter().for_each(cancel),
+            Incoming::Export { id, width, height } => self.export(id, width, height).await,
+            Incoming::LoadScene { id, name, text } => self.load_scene(id, name, text).await,
         }
     }
 
-    async fn refuse(&self, id: Option<u32>, input: Option<u32>, text: &str) {
-        answer(&self.out, &refusal(id, input, text)).await;
+    async fn reject(&self, request: RequestRef, error: &Error) {
+        send_json(&self.out, &rejection(request, error)).await;
+    }
+
+    async fn reject_text(&self, text: &str) {
+        self.reject(RequestRef::Unnumbered, &Error::invalid_request(text)).await;
     }
 
     async fn resize(&self, width: u32, height: u32) {
-        match check_size(width, height, MOST_PIXELS) {
-            Ok(()) => self.look(|client| client.look(|sight| sight.size = (width, height))),
-            Err(text) => self.refuse(None, None, &text).await,
+        match self.state.limits.check_view_size(width, height) {
+            Ok(()) => {
+                self.client.update_view(|view| view.size = (width, height));
+                self.state.render_loop.notify();
+            }
+            Err(error) => self.reject(RequestRef::Unnumbered, &error).await,
         }
     }
 
-    async fn turn(&self, input: u32, keys: Value, is_moving: bool) {
-        match camera::parse(&keys) {
-            Ok(camera) => self.look(|client| {
-                client.look(|sight| {
-                    sight.camera = Some(camera);
-                    sight.camera_keys = keys;
-                    (sight.input, sight.is_moving) = (input, is_moving);
+    async fn set_camera(&self, seq: u32, camera_settings: Value, is_moving: bool) {
+        match camera::parse(&camera_settings) {
+            Ok(camera) => {
+                self.client.update_view(|view| {
+                    view.camera = Some(camera);
+                    view.camera_settings = camera_settings;
+                    (view.seq, view.is_moving) = (seq, is_moving);
                 });
-            }),
-            Err(error) => self.refuse(None, Some(input), &error.to_string()).await,
+                self.state.render_loop.notify();
+            }
+            Err(error) => self.reject(RequestRef::Seq(seq), &error).await,
         }
     }
 
-    fn look(&self, change: impl FnOnce(&Client)) {
-        change(&self.client);
-        self.hall.easel.call();
-    }
-
-    async fn wish(&self, wish: Wish) {
-        let input = wish.input;
-        if let Err(text) = self.wishes.add(wish) {
-            self.refuse(None, Some(input), &text).await;
+    async fn change(&self, change: SettingsChange) {
+        let seq = change.seq;
+        if let Err(error) = self.pending.add(change) {
+            self.reject(RequestRef::Seq(seq), &error).await;
         }
     }
 
-    async fn pick(&self, id: u32, place: (f64, f64)) {
-        let Ok(turn) = self.picks.clone().try_acquire_owned() else {
-            return self.refuse(Some(id), None, "several places are being looked at; wait").await;
+    async fn pick(&self, id: u32, pixel: (f64, f64)) {
+        let Ok(permit) = self.picks.clone().try_acquire_owned() else {
+            let error =
+                Error::invalid_request("too many picks at once; wait for one to be answered");
+            return self.reject(RequestRef::Id(id), &error).await;
         };
-        let (hall, client, out) = (self.hall.clone(), self.client.clone(), self.out.clone());
+        let (state, client, out) = (self.state.clone(), self.client.clone(), self.out.clone());
         tokio::spawn(async move {
-            let _turn = turn;
-            let Some(studio) = hall.studio().await else { return };
-            let (gone, watched) = (out.clone(), hall.clone());
-            let progress = Telling::new(|_| {}, move || gone.is_closed() || watched.is_stopped());
-            let renderer = hall.renderer.clone();
-            let found = hall.work(move || {
-                let (stage, place) = pick::pick(&*renderer, &client.sight(), place, &progress)?;
-                Some(studio.describe(&stage, &place))
+            let _permit = permit;
+            let (renderer, for_cancel, page) = (state.renderer.clone(), state.clone(), out.clone());
+            let is_cancelled = move || page.is_closed() || for_cancel.is_stopped();
+            let progress = ProgressReporter::new(|_| {}, is_cancelled);
+            let picked = state.run_blocking(move || {
+                let (scene, point) = pick::pick(&*renderer, &client.view(), pixel, &progress)?;
+                Some((scene.describe)(&scene.flat, &point))
             });
-            let message = match found.await {
+            let message = match picked.await {
                 Ok(point) => json!({ "type": "picked", "id": id, "point": point }),
-                Err(error) => refusal(Some(id), None, &error.to_string()),
+                Err(error) => rejection(RequestRef::Id(id), &error),
             };
-            answer(&out, &message).await;
+            send_json(&out, &message).await;
         });
     }
 
-    /// Settings of what is seen, with the camera and this size.
-    fn settings(&self, width: u32, height: u32) -> Option<Keys> {
-        let sight = self.client.sight();
-        let mut settings = sight.stage?.settings.clone();
-        settings.insert("camera".into(), sight.camera_keys);
+    /// The current settings with the page's camera, for a picture of this size; none before the first scene.
+    fn settings(&self, width: u32, height: u32) -> Option<SettingsMap> {
+        let view = self.client.view();
+        let mut settings = view.scene?.settings.clone();
+        settings.insert("camera".into(), view.camera_settings);
         settings.insert("resolution".into(), json!(format!("{width}x{height}")));
         Some(settings)
     }
 
-    async fn save(&mut self, id: u32, width: u32, height: u32) {
+    fn settings_to_save(&mut self, id: u32, width: u32, height: u32) -> Result<SettingsMap> {
         self.saves.retain(|_, is_cancelled| is_held(is_cancelled));
-        let sized = check_size(width, height, MOST_SAVED_PIXELS);
-        let place = match sized {
-            Err(text) => Err(text),
-            Ok(()) if self.saves.contains_key(&id) => Err("this picture is being saved".into()),
-            Ok(()) if MOST_SAVES <= self.saves.len() => {
-                Err("pictures are being saved; wait for one or cancel it".into())
-            }
-            Ok(()) => self.settings(width, height).ok_or_else(|| "nothing to save yet".to_owned()),
-        };
-        let settings = match place {
+        self.state.limits.check_save_size(width, height)?;
+        if self.saves.contains_key(&id) {
+            return Err(Error::invalid_request("this picture is being saved"));
+        }
+        if self.state.limits.max_page_saves <= self.saves.len() {
+            let text = "pictures are being saved; wait for one or cancel it";
+            return Err(Error::invalid_request(text));
+        }
+        let settings = self.settings(width, height);
+        settings.ok_or_else(|| Error::invalid_request("there is nothing to save yet"))
+    }
+
+    async fn save(&mut self, id: u32, width: u32, height: u32) {
+        let settings = match self.settings_to_save(id, width, height) {
             Ok(settings) => settings,
-            Err(text) => return self.refuse(Some(id), None, &text).await,
+            Err(error) => return self.reject(RequestRef::Id(id), &error).await,
         };
         let is_cancelled: Arc<AtomicBool> = Arc::default();
         self.saves.insert(id, is_cancelled.clone());
-        let (hall, out) = (self.hall.clone(), self.out.clone());
+        let (state, out) = (self.state.clone(), self.out.clone());
         tokio::spawn(async move {
-            let message = match saved(&hall, id, settings, is_cancelled.clone(), &out).await {
+            let message = match render_png(&state, id, settings, is_cancelled.clone(), &out).await {
                 Ok(png) => {
-                    let bytes = frame::saved(id, (width as u16, height as u16), &png);
+                    let bytes = frame::saved_message(id, (width as u16, height as u16), &png);
                     Outgoing::Binary(bytes, is_cancelled)
                 }
-                Err(error) => {
-                    Outgoing::Text(refusal(Some(id), None, &error.to_string()).to_string())
-                }
+                Err(error) => Outgoing::Text(rejection(RequestRef::Id(id), &error).to_string()),
             };
             let _ = out.send(message).await;
         });
     }
 
-    async fn take(&self, id: u32, width: u32, height: u32) {
-        let studio = self.hall.studio.borrow().clone();
-        let Some((settings, studio)) = self.settings(width, height).zip(studio) else {
-            return self.refuse(Some(id), None, "nothing to take yet").await;
+    async fn export(&self, id: u32, width: u32, height: u32) {
+        let provider = self.state.provider.borrow().clone();
+        let Some((settings, provider)) = self.settings(width, height).zip(provider) else {
+            let error = Error::invalid_request("there is nothing to export yet");
+            return self.reject(RequestRef::Id(id), &error).await;
         };
-        let written = self.hall.work(move || studio.written(&settings)).await;
-        let message = match written.and_then(|written| written) {
-            Ok(written) => json!({
-                "type": "taken",
+        let export = self.state.run_blocking(move || provider.export(&settings)).await;
+        let message = match export.flatten() {
+            Ok(export) => json!({
+                "type": "exported",
                 "id": id,
-                "command": written.command,
-                "toml": written.toml,
-                "json": written.json,
+                "command": export.command,
+                "toml": export.toml,
+                "json": export.json,
             }),
-            Err(error) => refusal(Some(id), None, &error.to_string()),
+            Err(error) => rejection(RequestRef::Id(id), &error),
         };
-        answer(&self.out, &message).await;
+        send_json(&self.out, &message).await;
     }
 
-    async fn load(&self, id: u32, name: String, text: String) {
-        let Some(studio) = self.hall.studio.borrow().clone() else {
-            return self.refuse(Some(id), None, "the files are still being loaded").await;
+    async fn load_scene(&self, id: u32, name: String, text: String) {
+        let Some(provider) = self.state.provider.borrow().clone() else {
+            let error = Error::invalid_request("the files are still being loaded");
+            return self.reject(RequestRef::Id(id), &error).await;
         };
-        let read = self.hall.work(move || studio.read(&name, &text)).await;
-        match read.and_then(|read| read) {
-            Ok(patch) => self.wish(Wish { patch, is_anew: true, ..Wish::default() }).await,
-            Err(error) => self.refuse(Some(id), None, &error.to_string()).await,
+        let read = self.state.run_blocking(move || provider.read_scene_file(&name, &text)).await;
+        match read.flatten() {
+            Ok(patch) => {
+                let from_startup = true;
+                self.change(SettingsChange { patch, from_startup, ..SettingsChange::default() })
+                    .await;
+            }
+            Err(error) => self.reject(RequestRef::Id(id), &error).await,
         }
     }
 }
 
-/// Whether a picture to keep is still being made or sent.
+fn cancel(is_cancelled: &Arc<AtomicBool>) {
+    is_cancelled.store(true, Ordering::Relaxed);
+}
+
+/// Returns whether a saved picture is still being rendered or sent.
 fn is_held(is_cancelled: &Arc<AtomicBool>) -> bool {
     1 < Arc::strong_count(is_cancelled)
 }
 
-pub fn refusal(id: Option<u32>, input: Option<u32>, text: &str) -> Value {
-    let mut message = json!({ "type": "error", "text": text });
-    id.into_iter().for_each(|id| message["id"] = json!(id));
-    input.into_iter().for_each(|input| message["input"] = json!(input));
-    message
-}
-
-/// A finished picture, once it is its turn.
-async fn saved(
-    hall: &Arc<Hall>,
+/// Renders a saved picture once a permit is free, and reports its progress to the page.
+async fn render_png(
+    state: &Arc<ServerState>,
     id: u32,
-    settings: Keys,
+    settings: SettingsMap,
     is_cancelled: Arc<AtomicBool>,
     out: &mpsc::Sender<Outgoing>,
-) -> Result<Vec<u8>, Error> {
-    let _turn = hall.saves.acquire().await.map_err(|_| Error::Cancelled)?;
-    let studio = hall.studio().await.ok_or(Error::Cancelled)?;
-    let (told, watched) = (out.clone(), hall.clone());
-    let tell = move |told_now: Told| {
-        let Told { done, left_secs, .. } = told_now;
+) -> Result<Vec<u8>> {
+    let _permit = state.render_permits.acquire().await.map_err(|_| Error::Cancelled)?;
+    let provider = state.provider().await.ok_or(Error::Cancelled)?;
+    let (page, for_cancel, queue) = (out.clone(), state.clone(), out.clone());
+    let report = move |update: ProgressUpdate| {
+        let ProgressUpdate { done, left_secs, .. } = update;
         let message = json!({ "type": "progress", "id": id, "done": done, "left_secs": left_secs });
-        // Progress that finds no room is not missed.
-        let _ = told.try_send(Outgoing::Text(message.to_string()));
+        // Dropped if the queue is full.
+        let _ = queue.try_send(Outgoing::Text(message.to_string()));
     };
-    let gone = out.clone();
     let is_cancelled =
-        move || is_cancelled.load(Ordering::Relaxed) || watched.is_stopped() || gone.is_closed();
-    let telling = Telling::new(tell, is_cancelled);
-    hall.work(move || studio.picture(&settings, &telling)).await?
+        move || is_cancelled.load(Ordering::Relaxed) || for_cancel.is_stopped() || page.is_closed();
+    let reporter = ProgressReporter::new(report, is_cancelled);
+    state.run_blocking(move || provider.render_png(&settings, &reporter)).await?
 }

@@ -1,65 +1,99 @@
-//! Ray tracing of point clouds as continuous surfaces.
+//! Pictures of point clouds, meshes and glTF scenes, ray traced from the points themselves.
 //!
-//! From bare points to a lit picture:
+//! [`load`] opens a file and makes every choice from the data: up axis, camera, normals, radii, colours, light, exposure.
 //!
-//! ```
-//! use surfel::flat::FlatScene;
-//! use surfel::math::Vec3;
-//! use surfel::points::{PointCloud, Preparation, prepare};
-//! use surfel::progress::Silent;
-//! use surfel::render::{CpuRenderer, Renderer, Settings};
-//! use surfel::scene::{
-//!     Background, Framing, Geometry, Graph, Light, Material, Points, Scene, frame,
-//! };
-//! use surfel::trace::Simd;
+//! ```no_run
+//! let scene = surfel::load("scan.laz")?;
+//! scene.render()?.save("scan.png")?;
 //!
-//! // A hill of 50 by 50 points; files are read by the crate `surfel-formats`.
-//! let hill = |i: usize| {
-//!     let (x, y) = ((i % 50) as f32 / 25.0 - 1.0, (i / 50) as f32 / 25.0 - 1.0);
-//!     Vec3::new(x, y, 0.5 * (-2.0 * (x * x + y * y)).exp())
-//! };
-//! let cloud = PointCloud::from_positions((0..2500).map(hill).collect());
-//!
-//! // Normals and radii are added where they are missing.
-//! let (cloud, _) = prepare(cloud, &Preparation::default(), &Silent)?;
-//! let camera = frame(&cloud, &Framing::automatic(Vec3::Z, 4.0 / 3.0));
-//! let colors = vec![[200, 180, 150]; cloud.len()];
-//! let hill = Points { cloud, colors, ..Points::default() };
-//! let scene = Scene {
-//!     graph: Graph::of(Geometry::Points(hill), Material::PLASTIC),
-//!     lights: vec![Light::Headlight(1.0)],
-//!     background: Background::Transparent,
-//!     camera,
-//! };
-//!
-//! let settings = Settings {
-//!     width: 64,
-//!     height: 48,
-//!     samples_per_pixel: 1,
-//!     light_samples: 1,
-//!     max_depth: 8,
-//!     seed: 0,
-//!     with_layers: false,
-//! };
-//! let flat = FlatScene::new(&scene, &Silent)?;
-//! let (image, _) = CpuRenderer { simd: Simd::detect() }.render(&flat, &settings, &Silent)?;
-//! assert_eq!(image.coverage[24 * 64 + 32], 1.0);
+//! // Rays are [x, y, z, dx, dy, dz] in the coordinates of the file.
+//! let rays = [[562330.0, 4183200.0, 160.0, 0.0, 0.0, -1.0]];
+//! for hit in scene.cast_rays(&rays).into_iter().flatten() {
+//!     println!("point {:?} at {:?}", hit.point, hit.position);
+//! }
 //! # Ok::<(), surfel::Error>(())
 //! ```
+//!
+//! A [`SceneDescription`] says what the choices leave open. Its fields are the keys of scene files and the options of the
+//! program `surfel`; `None` is a default or an automatic choice. [`resolve`] opens the files, [`Resolved::build`] builds
+//! the trees:
+//!
+//! ```
+//! use surfel::description::{MaterialDescription, ObjectDescription};
+//! use surfel::{SceneDescription, resolve};
+//! use surfel_core::progress::NoProgress;
+//!
+//! # let folder = std::env::temp_dir().join(format!("surfel-tutorial-{}", std::process::id()));
+//! # std::fs::create_dir_all(&folder)?;
+//! # let file = folder.join("hill.xyz");
+//! let hill = |i: i32| {
+//!     let (x, y) = (f64::from(i % 50) / 25.0 - 1.0, f64::from(i / 50) / 25.0 - 1.0);
+//!     format!("{x} {y} {}\n", 0.5 * (-2.0 * (x * x + y * y)).exp())
+//! };
+//! std::fs::write(&file, (0..2500).map(hill).collect::<String>())?;
+//!
+//! let mut description = SceneDescription::default();
+//! description.objects.push(ObjectDescription {
+//!     material: Some(MaterialDescription {
+//!         kind: Some("plastic".into()),
+//!         ..MaterialDescription::default()
+//!     }),
+//!     ..ObjectDescription::new(&file)
+//! });
+//! description.picture.resolution = Some((64, 48));
+//! description.sun.elevation = Some(25.0);
+//!
+//! let scene = resolve(&description, &NoProgress)?.build(&NoProgress)?;
+//! for choice in scene.choices() {
+//!     println!("{} [{}]", choice.reason, choice.keys.join(", "));
+//! }
+//! let image = scene.render()?;
+//! assert_eq!(image.coverage[24 * 64 + 32], 1.0);
+//! image.save(folder.join("hill.png"))?;
+//! # std::fs::remove_dir_all(&folder)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The renderer itself is the crate [`surfel_core`], the readers and writers are [`surfel_formats`].
 
-pub mod math;
-pub mod progress;
-pub mod image;
-pub mod points;
-pub mod scanner;
-pub mod bvh;
-pub mod surface;
-pub mod scene;
-pub mod flat;
-pub mod trace;
-pub mod integrator;
-pub mod render;
-
+pub mod names;
+mod troubleshooting;
+pub mod description;
 mod error;
+mod scene_file;
+pub mod choices;
+pub mod resolve;
+pub mod picture;
+mod cache;
+mod built;
+mod raycast;
+pub mod animate;
+pub mod live;
 
+pub use built::BuiltScene;
+pub use choices::Choice;
+pub use description::SceneDescription;
 pub use error::{Error, Result};
+pub use picture::RenderedImage;
+pub use raycast::RayHit;
+pub use resolve::{Resolved, resolve};
+
+/// The crates that this one stands on.
+pub use {surfel_core, surfel_formats};
+
+use std::path::Path;
+use surfel_core::progress::NoProgress;
+
+/// Loads a file with every choice made from the data: a point cloud, a mesh, a glTF scene, or a scene file.
+///
+/// # Errors
+///
+/// Fails for missing and broken files and for scene files with wrong values.
+pub fn load(path: impl AsRef<Path>) -> Result<BuiltScene> {
+    let path = path.as_ref();
+    let description = match description::is_scene_file(path) {
+        true => SceneDescription::read(path)?,
+        false => SceneDescription::of_files([path]),
+    };
+    resolve(&description, &NoProgress)?.build(&NoProgress)
+}

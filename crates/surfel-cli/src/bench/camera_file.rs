@@ -2,28 +2,32 @@
 
 use anyhow::Context;
 use std::path::Path;
-use surfel::math::DVec3;
-use surfel::scene::{Camera, Projection};
+use surfel_core::math::DVec3;
+use surfel_core::scene::{Camera, Projection};
 
-/// In world coordinates.
+/// A camera and a point light in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraFile {
+    /// Position of the camera.
     pub eye: DVec3,
-    /// The middle of the picture.
+    /// Point in the middle of the picture.
     pub target: DVec3,
-    /// Vertical.
+    /// Vertical field of view in degrees.
     pub view_angle_deg: f64,
+    /// Position of the point light.
     pub light: DVec3,
 }
 
 const FORM: &str = "one line of ten numbers separated by commas: eye x,y,z, target x,y,z, vertical angle \
     of view in degrees, light x,y,z";
-/// A line is far shorter; a file that is longer is another one.
-const MOST_BYTES: usize = 4096;
+
+/// Bytes of the largest camera file: a line is far shorter, so that a longer file is none.
+const MAX_BYTES: usize = 4096;
 
 impl CameraFile {
+    /// Reads a camera file.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
-        let text = surfel_formats::load_text(path, MOST_BYTES)?;
+        let text = surfel_formats::load_text(path, MAX_BYTES)?;
         let camera = Self::parse(text.trim()).map_err(anyhow::Error::msg);
         camera.with_context(|| path.display().to_string())
     }
@@ -52,6 +56,7 @@ impl CameraFile {
         Ok(())
     }
 
+    /// Returns the camera, with Z up.
     pub fn camera(&self) -> Camera {
         let projection = Projection::Perspective { view_angle_deg: self.view_angle_deg };
         Camera { position: self.eye, focal_point: self.target, view_up: DVec3::Z, projection }
@@ -69,10 +74,12 @@ fn number(text: &str, place: usize) -> Result<f64, String> {
 
 #[cfg(test)]
 mod tests {
+    //! Camera files are parsed, and errors name the number.
+
     use super::*;
 
     #[test]
-    fn a_line_is_read() {
+    fn a_camera_file_is_parsed() {
         let camera = CameraFile::parse("-11,-25, 4.5,1.5,0,6.2,42,14,-3e1,22").unwrap();
         assert_eq!(camera.eye, DVec3::new(-11.0, -25.0, 4.5));
         assert_eq!(camera.target, DVec3::new(1.5, 0.0, 6.2));
@@ -80,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told() {
+    fn invalid_camera_files_are_errors() {
         let wrong = [
             ("", "number 1: found ``, expected one line of ten numbers separated by commas"),
             ("1 2 3 4 5 6 40 8 9 10", "number 1: found `1 2 3 4 5 6 40 8 9 10`"),

@@ -1,25 +1,28 @@
-//! Time as benchmarks count it: of the processor, which other programs do not disturb, and of the wall.
+//! Time as benchmarks count it: processor time, which other programs do not disturb, and wall time.
 
 use cpu_time::ProcessTime;
 use std::time::Instant;
 
-/// Seconds.
+/// A duration in seconds.
 #[derive(Clone, Copy, Debug)]
-pub struct Spent {
-    /// Of the processor, all threads together.
+pub struct Elapsed {
+    /// Processor time of all threads together.
     pub cpu: f64,
+    /// Wall time.
     pub wall: f64,
 }
 
-impl Spent {
+impl Elapsed {
+    /// Returns the least of both times.
     pub fn least(self, other: Self) -> Self {
         Self { cpu: self.cpu.min(other.cpu), wall: self.wall.min(other.wall) }
     }
 }
 
-pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Spent) {
+/// Returns the result of `work` and its duration.
+pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Elapsed) {
     let (wall, cpu) = (Instant::now(), ProcessTime::now());
     let result = work();
-    let spent = Spent { cpu: cpu.elapsed().as_secs_f64(), wall: wall.elapsed().as_secs_f64() };
-    (result, spent)
+    let elapsed = Elapsed { cpu: cpu.elapsed().as_secs_f64(), wall: wall.elapsed().as_secs_f64() };
+    (result, elapsed)
 }

@@ -1,7 +1,7 @@
 //! Measures a kind of ray: all rays traced several times by all threads, chunk by chunk.
 
-use super::Stage;
-use super::clock::{Spent, timed};
+use super::BenchScene;
+use super::clock::{Elapsed, timed};
 use super::rays::{bounce_rays, shadow_rays};
 use super::search::{self, CHUNK, Nearest, Shaded};
 use crate::report::Report;
@@ -9,64 +9,70 @@ use crate::stats::mrays_per_s;
 use clap::ValueEnum;
 use serde_json::{Value, json};
 use std::sync::{Mutex, PoisonError};
-use surfel::flat::FlatGeometry;
-use surfel::math::{Ray, Vec3};
-use surfel::progress::Progress;
-use surfel::trace::{Hit, Simd};
+use surfel_core::flat::FlatGeometry;
+use surfel_core::math::{Ray, Vec3};
+use surfel_core::progress::Progress;
+use surfel_core::trace::{Hit, Simd};
 
+/// A kind of rays, and the question about them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Rays {
-    /// Camera rays, nearest disc, sphere or triangle.
+    /// Camera rays: the nearest disc, sphere or triangle.
     Primary,
-    /// From each hit to a light at one point: is anything between?
+    /// Rays from each hit to a point light: is anything between?
     Shadow,
-    /// From each hit in one random direction: is anything there?
+    /// Rays from each hit in one random direction: is anything there?
     BounceAny,
-    /// The same, nearest disc, sphere or triangle.
+    /// Rays from each hit in one random direction: the nearest disc, sphere or triangle.
     Bounce,
-    /// Camera rays, up to 16 discs within a radius behind the nearest, and the mean of their normals.
+    /// Camera rays: up to 16 discs within a radius behind the nearest, and the mean of their normals.
     Gather,
-    /// Camera rays, the finished surface with its boundary.
+    /// Camera rays: the finished surface, with its edge test.
     Surface,
 }
 
-/// What all measurements share.
+/// Data that all measurements share.
 pub struct Bench<'a> {
-    pub stage: &'a Stage,
+    /// The scene.
+    pub scene: &'a BenchScene,
+    /// The SIMD level of the kernels.
     pub simd: Simd,
+    /// Number of timed runs.
     pub runs: u32,
-    /// Relative to the stage's origin, as all rays are.
+    /// Position of the light relative to the scene's origin, as all rays are.
     pub light: Vec3,
+    /// Camera rays.
     pub primary: Vec<Ray>,
-    /// Of the primary rays, where all others start.
+    /// Hits of the camera rays, where all other rays start.
     pub hits: Vec<Hit>,
+    /// Cancels the work.
     pub report: &'a Report<'a>,
 }
 
-/// The nearest hits, untimed.
-pub fn closest_hits(stage: &Stage, simd: Simd, rays: &[Ray]) -> Vec<Hit> {
+/// Returns the nearest hits, untimed.
+pub fn closest_hits(scene: &BenchScene, simd: Simd, rays: &[Ray]) -> Vec<Hit> {
     let mut hits = vec![Hit::MISS; rays.len()];
-    let find = |rays: &[Ray], hits: &mut [Hit]| search::closest(&stage.geometry, simd, rays, hits);
+    let find = |rays: &[Ray], hits: &mut [Hit]| search::closest(&scene.geometry, simd, rays, hits);
     for_each_chunk(rays, &mut hits, &find);
     hits
 }
 
 impl Bench<'_> {
-    /// Rays, hits and rates of a kind, as JSON.
-    pub fn measure(&self, kind: Rays) -> surfel::Result<Value> {
+    /// Measures a kind of rays; returns rays, hits and rates as JSON.
+    pub fn measure(&self, kind: Rays) -> surfel_core::Result<Value> {
         let (primary, hits) = (&self.primary, &self.hits);
-        let bounces = || bounce_rays(self.stage, primary, hits);
+        let bounces = || bounce_rays(self.scene, primary, hits);
         match kind {
             Rays::Primary => self.nearest(primary, search::nearest),
             Rays::Surface => self.nearest(primary, search::surface),
             Rays::Bounce => self.nearest(&bounces(), search::nearest),
             Rays::BounceAny => self.any(&bounces()),
-            Rays::Shadow => self.any(&shadow_rays(self.stage, primary, hits, self.light)),
+            Rays::Shadow => self.any(&shadow_rays(self.scene, primary, hits, self.light)),
             Rays::Gather => self.gather(primary),
         }
     }
 
-    fn nearest(&self, rays: &[Ray], search: Search<Nearest>) -> surfel::Result<Value> {
+    fn nearest(&self, rays: &[Ray], search: Search<Nearest>) -> surfel_core::Result<Value> {
         let (times, found) = self.time(rays, Nearest::MISS, search)?;
         let distances = found.iter().filter(|found| !found.is_miss()).map(|found| found.distance);
         let n_hits = distances.clone().count();
@@ -76,12 +82,12 @@ impl Bench<'_> {
         Ok(result)
     }
 
-    fn any(&self, rays: &[Ray]) -> surfel::Result<Value> {
+    fn any(&self, rays: &[Ray]) -> surfel_core::Result<Value> {
         let (times, found) = self.time(rays, false, search::any)?;
         Ok(times.json(rays.len(), found.iter().filter(|is_hit| **is_hit).count()))
     }
 
-    fn gather(&self, rays: &[Ray]) -> surfel::Result<Value> {
+    fn gather(&self, rays: &[Ray]) -> surfel_core::Result<Value> {
         let (times, found) = self.time(rays, Shaded::EMPTY, search::gather)?;
         let n_discs: f64 = found.iter().map(|found| f64::from(found.n_discs)).sum();
         let n_hits = found.iter().filter(|found| 0.0 < found.n_discs).count();
@@ -90,16 +96,16 @@ impl Bench<'_> {
         Ok(result)
     }
 
-    /// Once untimed, so that all memory is there, then as often as asked for; what was found last.
+    /// Searches once untimed, so that all memory is mapped, then in timed runs; returns the results of the last.
     fn time<T: Copy + Send>(
         &self,
         rays: &[Ray],
         nothing: T,
         search: Search<T>,
-    ) -> surfel::Result<(Times, Vec<T>)> {
+    ) -> surfel_core::Result<(Times, Vec<T>)> {
         let mut found = vec![nothing; rays.len()];
         let work =
-            |rays: &[Ray], found: &mut [T]| search(&self.stage.geometry, self.simd, rays, found);
+            |rays: &[Ray], found: &mut [T]| search(&self.scene.geometry, self.simd, rays, found);
         for_each_chunk(rays, &mut found, &work);
         let mut runs = Vec::new();
         for _ in 0..self.runs {
@@ -110,10 +116,10 @@ impl Bench<'_> {
     }
 }
 
-/// Answers a chunk of rays.
+/// Searches along a chunk of rays.
 type Search<T> = fn(&FlatGeometry, Simd, &[Ray], &mut [T]);
 
-/// All threads claim chunks until none is left.
+/// Searches along all rays: threads claim chunks until none is left.
 fn for_each_chunk<T: Send>(
     rays: &[Ray],
     found: &mut [T],
@@ -128,16 +134,17 @@ fn for_each_chunk<T: Send>(
     });
 }
 
-/// Seconds a run.
+/// Seconds of a run.
 struct Times {
-    /// Of the processor, shared among the threads: equal to those of the wall on idle cores.
+    /// Median of processor time divided by the number of threads, which equals wall time on idle cores.
     median: f64,
+    /// Least of the same.
     best: f64,
     best_wall: f64,
 }
 
 impl Times {
-    fn of(runs: &[Spent]) -> Self {
+    fn of(runs: &[Elapsed]) -> Self {
         let n_threads = rayon::current_num_threads() as f64;
         let mut cpu: Vec<f64> = runs.iter().map(|run| run.cpu / n_threads).collect();
         cpu.sort_unstable_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! `surfel bench`: how many rays a second are traced, by kind of ray, from rays stored beforehand.
+//! `surfel bench`: the number of rays traced per second, by kind, from rays stored beforehand.
 
 mod camera_file;
 mod clock;
@@ -7,29 +7,49 @@ mod rays;
 mod search;
 mod table;
 
-use crate::args::{CameraArgs, Global, PreparationArgs, SurfaceArgs, Usage, parse, short};
-use crate::cloud::tell_prepared;
-use crate::memory::Plan;
+use crate::global::Global;
+use crate::options::{BenchScope, KeyOptions};
 use crate::report::{Report, print};
 use crate::stats;
+use crate::usage::Usage;
 use anyhow::Context;
 use camera_file::CameraFile;
 use clap::ValueEnum;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clock::{Spent, timed};
+use clock::{Elapsed, timed};
 use measure::{Bench, Rays, closest_hits};
 use serde_json::{Map, Value, json};
-use std::path::PathBuf;
-use surfel::flat::FlatGeometry;
-use surfel::math::{DAffine3, DVec3, Vec3};
-use surfel::points::{PointCloud, prepare};
-use surfel::progress::Progress;
-use surfel::scene::{Camera, Geometry, Graph, Material, Mesh, Points};
-use surfel::surface::SurfaceKind;
-use surfel::trace::{Hit, Simd};
-use surfel_formats::{ColumnChoice, Loaded, Source};
+use std::path::{Path, PathBuf};
+use surfel::SceneDescription;
+use surfel::description::ObjectSettings;
+use surfel::description::rule::{Resolution, Rule};
+use surfel::resolve::{MemoryEstimate, choose_camera, choose_up, prepare_cloud, short_position};
+use surfel_core::flat::FlatGeometry;
+use surfel_core::math::{DAffine3, DVec3, Vec3};
+use surfel_core::points::PointCloud;
+use surfel_core::progress::Progress;
+use surfel_core::scene::{Camera, CloudGeometry, Geometry, Graph, Material, Mesh};
+use surfel_core::surface::SurfaceKind;
+use surfel_core::trace::{Hit, Simd};
+use surfel_formats::{ColumnChoice, FileInfo, Loaded};
 
-#[derive(clap::Args)]
+/// Options that a file with a camera excludes.
+const CAMERA_OPTIONS: [&str; 11] = [
+    "up",
+    "camera.position",
+    "camera.focal_point",
+    "camera.view_up",
+    "camera.view_angle",
+    "camera.orthographic",
+    "camera.panorama",
+    "camera.direction",
+    "camera.azimuth_angle",
+    "camera.elevation_angle",
+    "camera.zoom_factor",
+];
+
+/// Arguments of `surfel bench`.
+#[derive(clap::Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// A point cloud or a mesh.
@@ -39,27 +59,23 @@ pub struct Args {
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     rays: Option<Vec<Rays>>,
     /// Width and height of the picture whose rays are traced.
-    #[arg(long, value_name = "WxH", default_value = "1024x1024", value_parser = parse::resolution)]
+    #[arg(long, value_name = "WxH", default_value = "1024x1024", value_parser = resolution)]
     resolution: (u32, u32),
-    /// Times that all rays are traced; the median and the best count.
+    /// Number of times that all rays are traced; the median and the best are reported.
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
     runs: u32,
-    /// SIMD level, the fastest by default.
+    /// SIMD level [default: the fastest].
     #[arg(long, value_name = "LEVEL", value_parser = simd_levels())]
     simd: Option<Simd>,
-    /// JSON instead of a table.
+    /// Prints JSON instead of a table.
     #[arg(long)]
     json: bool,
     /// Camera and light from a file of one line: ex,ey,ez,tx,ty,tz,fovy_deg,lx,ly,lz (eye, target,
     /// vertical angle of view, point light; Z up).
-    #[arg(long, value_name = "FILE", conflicts_with = "CameraArgs")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = CAMERA_OPTIONS)]
     camera_file: Option<PathBuf>,
     #[command(flatten)]
-    camera: CameraArgs,
-    #[command(flatten)]
-    surface: SurfaceArgs,
-    #[command(flatten)]
-    preparation: PreparationArgs,
+    options: KeyOptions<BenchScope>,
 }
 
 const EXAMPLES: &str = "\
@@ -68,22 +84,25 @@ Examples:
   surfel bench scan.laz --threads 1 --surface sphere --rays primary,shadow --json
   surfel bench cloud.bin --camera-file cloud.cam --simd portable";
 
-/// What is traced if nothing else is asked for.
-const USUAL: [Rays; 5] = [Rays::Primary, Rays::Shadow, Rays::BounceAny, Rays::Bounce, Rays::Gather];
+/// Kinds of rays that are traced unless others are asked for.
+const DEFAULT_RAYS: [Rays; 5] =
+    [Rays::Primary, Rays::Shadow, Rays::BounceAny, Rays::Bounce, Rays::Gather];
 
+/// Measures rates and prints them.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    check_surface(args)?;
-    args.camera.check()?;
+    let limit = global.start()?.memory_limit;
+    let description = args.options.description()?;
+    check_surface(args, &description)?;
     let file = args.camera_file.as_deref().map(CameraFile::read).transpose()?;
-    plan(args)?.check(global)?;
-    let described = describe(args, file.as_ref(), report)?;
-    let (n_points, n_triangles) = described.graph.counts();
-    let (stage, build) = build(described, report)?;
-    report.end_stage();
+    estimate_memory(args, &description)?.check(limit)?;
+    let unbuilt = load_unbuilt(args, &description, file.as_ref(), report)?;
+    let (n_points, n_triangles) = unbuilt.graph.n_points_and_triangles();
+    let (scene, build) = build(unbuilt, report)?;
+    report.end();
 
     let simd = args.simd.unwrap_or_else(Simd::detect);
-    let kinds = kinds(args, &stage, report)?;
-    let (bytes_of, bytes, count_of, count, surface) = match &stage.geometry {
+    let kinds = kinds(args, &scene, report)?;
+    let (bytes_of, bytes, count_of, count, surface) = match &scene.geometry {
         FlatGeometry::Cloud(cloud) => {
             let bytes = stats::bytes_per_point(std::iter::once(cloud), n_points);
             ("bytes_per_point", bytes, "points", n_points, cloud.surface.name())
@@ -94,7 +113,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         }
     };
     let result = json!({
-        "rays": measure(args, &kinds, &stage, simd, file.as_ref(), report)?,
+        "rays": measure(args, &kinds, &scene, simd, file.as_ref(), report)?,
         "build_s": build.wall,
         bytes_of: bytes,
         "peak_rss_bytes": stats::peak_rss_bytes(),
@@ -107,160 +126,166 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     Ok(print(&if args.json { format!("{result:#}") } else { table::table(&result) })?)
 }
 
-/// What is measured: one geometry, and who looks at it.
-pub struct Stage {
+/// One geometry and a camera: what is measured.
+pub struct BenchScene {
     /// World coordinates of the geometry's zero, to which all rays are relative.
     pub origin: DVec3,
+    /// The geometry with its tree.
     pub geometry: FlatGeometry,
+    /// The camera of the primary rays.
     pub camera: Camera,
 }
 
-/// A stage before its tree is built.
-struct Described {
+/// A scene before its tree is built.
+struct Unbuilt {
     graph: Graph,
     camera: Camera,
 }
 
-/// Each kind of ray by its name.
+/// Measures each kind of rays; returns the results by name.
 fn measure(
     args: &Args,
     kinds: &[Rays],
-    stage: &Stage,
+    scene: &BenchScene,
     simd: Simd,
     file: Option<&CameraFile>,
     report: &Report,
-) -> surfel::Result<Map<String, Value>> {
-    let primary = rays::camera_rays(stage, file, args.resolution);
-    let hits = closest_hits(stage, simd, &primary);
+) -> surfel_core::Result<Map<String, Value>> {
+    let primary = rays::camera_rays(scene, file, args.resolution);
+    let hits = closest_hits(scene, simd, &primary);
     if hits.iter().all(Hit::is_miss) {
         report.note("no camera ray hits anything; see --camera-position and --camera-file");
     }
-    let light = light(stage, file, report);
-    let bench = Bench { stage, simd, runs: args.runs, light, primary, hits, report };
+    let light = light(scene, file, report);
+    let bench = Bench { scene, simd, runs: args.runs, light, primary, hits, report };
     let name = |kind: &Rays| kind.to_possible_value().map(|value| value.get_name().to_owned());
     let named =
         kinds.iter().map(|kind| Ok((name(kind).unwrap_or_default(), bench.measure(*kind)?)));
     named.collect()
 }
 
-fn check_surface(args: &Args) -> Result<(), Usage> {
-    match (args.surface.surface, &args.rays) {
+fn check_surface(args: &Args, description: &SceneDescription) -> Result<(), Usage> {
+    match (description.objects_default.surface.surface(), &args.rays) {
         (SurfaceKind::Points, _) => {
-            Err(Usage("--surface points meets no rays; name another kind".into()))
+            Err(Usage("--surface points is not hit by rays; choose another kind".into()))
         }
-        (SurfaceKind::Sphere, Some(kinds)) => gathers_not(kinds, "--surface sphere"),
+        (SurfaceKind::Sphere, Some(kinds)) => reject_gather(kinds, "--surface sphere"),
         _ => Ok(()),
     }
 }
 
-/// Fails if rays are asked for that gather on what has no discs.
-fn gathers_not(kinds: &[Rays], why: &str) -> Result<(), Usage> {
+/// Fails if gather rays are asked for on geometry without discs.
+fn reject_gather(kinds: &[Rays], why: &str) -> Result<(), Usage> {
     if kinds.contains(&Rays::Gather) {
-        return Err(Usage(format!("--rays gather blends discs, which {why} has not")));
+        return Err(Usage(format!("--rays gather blends discs, and {why} has none")));
     }
     Ok(())
 }
 
-/// The kinds of rays that the geometry can be traced with.
-fn kinds(args: &Args, stage: &Stage, report: &Report) -> Result<Vec<Rays>, Usage> {
-    let unblended = match &stage.geometry {
-        FlatGeometry::Cloud(cloud) if cloud.surface.is_oriented() => {
-            return Ok(args.rays.clone().unwrap_or(USUAL.to_vec()));
+/// Returns the kinds of rays that fit the geometry.
+fn kinds(args: &Args, scene: &BenchScene, report: &Report) -> Result<Vec<Rays>, Usage> {
+    let unblended = match &scene.geometry {
+        FlatGeometry::Cloud(cloud) if cloud.surface.uses_discs() => {
+            return Ok(args.rays.clone().unwrap_or(DEFAULT_RAYS.to_vec()));
         }
         FlatGeometry::Cloud(_) => "spheres",
         FlatGeometry::Mesh(_) => "triangles",
     };
     if let Some(kinds) = &args.rays {
         // Spheres were refused before the file was read.
-        gathers_not(kinds, "a mesh")?;
+        reject_gather(kinds, "a mesh")?;
         return Ok(kinds.clone());
     }
-    report.choice(&format!("gather left out: {unblended} do not blend"), "--rays");
-    Ok(USUAL.into_iter().filter(|kind| *kind != Rays::Gather).collect())
+    report.choice(&format!("gather left out: {unblended} do not blend"), &["rays"]);
+    Ok(DEFAULT_RAYS.into_iter().filter(|kind| *kind != Rays::Gather).collect())
 }
 
-fn plan(args: &Args) -> anyhow::Result<Plan> {
-    let source = surfel_formats::inspect(&args.cloud)?;
+fn estimate_memory(args: &Args, description: &SceneDescription) -> anyhow::Result<MemoryEstimate> {
+    let info = surfel_formats::inspect(&args.cloud)?;
     // Two rays and what is found along them take a little more than a pixel with its layers.
     let n_pixels = 2 * u64::from(args.resolution.0) * u64::from(args.resolution.1);
-    let sources = [(args.cloud.as_path(), source)].into();
-    Ok(Plan::new(&sources, args.preparation.select, n_pixels))
+    let infos = [(args.cloud.as_path(), info)].into();
+    let subsample = description.objects_default.preparation.subsample;
+    Ok(MemoryEstimate::from_files(&infos, subsample, n_pixels))
 }
 
-fn describe(args: &Args, file: Option<&CameraFile>, report: &Report) -> anyhow::Result<Described> {
-    let (mut geometry, source) = load(args, report)?;
-    report.end_stage();
-    if let Geometry::Points(points) = &mut geometry {
-        let preparation = args.preparation.preparation(0, None);
-        let (mut cloud, prepared) =
-            prepare(std::mem::take(&mut points.cloud), &preparation, report)
-                .with_context(|| args.cloud.display().to_string())?;
-        report.end_stage();
-        tell_prepared(&prepared, &args.preparation, report);
-        args.surface.scale_radii(&mut cloud);
-        *points = Points {
-            colors: vec![[200; 3]; cloud.len()],
-            cloud,
-            surface: args.surface.surface,
-            boundary: args.surface.boundary,
-            has_outward_normals: false,
-        };
-    }
-    let graph = Graph::of(geometry, Material::MATTE);
+fn load_unbuilt(
+    args: &Args,
+    description: &SceneDescription,
+    file: Option<&CameraFile>,
+    report: &Report,
+) -> anyhow::Result<Unbuilt> {
+    let settings = &description.objects_default;
+    let (geometry, info) = load(args, settings, report)?;
+    report.end();
+    let graph = Graph::from_geometry(geometry, Material::MATTE).try_map_clouds(|cloud| {
+        let mut cloud = prepare_cloud(cloud, settings, 0, report)
+            .with_context(|| args.cloud.display().to_string())?;
+        cloud.scale_radii(settings.surface.radius_scale() as f32);
+        let mut geometry = CloudGeometry::with_uniform_color(cloud, [200; 3]);
+        geometry.surface = settings.surface.surface();
+        geometry.edge_test = settings.surface.edge_test();
+        anyhow::Ok(geometry)
+    })?;
     let camera = match file {
         Some(file) => file.camera(),
-        None => camera(args, &graph.outline(), &source, report),
+        None => {
+            let points = graph.sample_points();
+            let (width, height) = args.resolution;
+            let up = choose_up(description.world.up, &points, &[info], report);
+            let aspect = f64::from(width) / f64::from(height);
+            choose_camera(&description.camera, &points, up, aspect, report)
+        }
     };
-    Ok(Described { graph, camera })
+    Ok(Unbuilt { graph, camera })
 }
 
-/// The one thing that the file holds, where it stands in the world.
-fn load(args: &Args, report: &Report) -> anyhow::Result<(Geometry, Source)> {
-    let options = args.preparation.load_options(ColumnChoice::Only(args.preparation.geometry()));
-    let vertices = || -> anyhow::Result<(Geometry, Source)> {
-        let Loaded { cloud, source } = surfel_formats::load(&args.cloud, &options, report)?;
-        Ok((Geometry::Points(Points { cloud, ..Points::default() }), source))
+/// Reads the only geometry of the file, in world coordinates.
+fn load(
+    args: &Args,
+    settings: &ObjectSettings,
+    report: &Report,
+) -> anyhow::Result<(Geometry<PointCloud>, FileInfo)> {
+    let options =
+        settings.preparation.load_options(ColumnChoice::Only(settings.preparation.kept_columns()));
+    let vertices = || -> anyhow::Result<(Geometry<PointCloud>, FileInfo)> {
+        let Loaded { cloud, info: source } = surfel_formats::load(&args.cloud, &options, report)?;
+        Ok((Geometry::Points(cloud), source))
     };
-    if args.preparation.vertices {
+    if settings.preparation.vertices() {
         return vertices();
     }
     let (mut graph, source) = surfel_formats::load_graph(&args.cloud, &options, report)?;
-    let world = graph.world_from_nodes();
+    let world_from_nodes = graph.world_from_nodes();
     let shown = graph
         .nodes
         .iter()
-        .zip(&world)
-        .flat_map(|(node, world)| node.parts.iter().map(move |_| *world));
+        .zip(&world_from_nodes)
+        .flat_map(|(node, world)| node.primitives.iter().map(move |_| *world));
     let shown: Vec<DAffine3> = shown.collect();
-    let ([place], 1) = (&shown[..], graph.geometries.len()) else {
+    let ([world], 1) = (&shown[..], graph.geometries.len()) else {
         let (name, n) = (args.cloud.display(), shown.len());
-        anyhow::bail!("{name}: holds {n} things; one cloud or mesh is measured at a time");
+        anyhow::bail!("{name}: holds {n} objects; bench measures one cloud or mesh at a time");
     };
     match graph.geometries.remove(0) {
-        geometry if *place == DAffine3::IDENTITY => Ok((geometry, source)),
+        geometry if *world == DAffine3::IDENTITY => Ok((geometry, source)),
         Geometry::Points(_) => vertices(),
-        Geometry::Triangles(mesh) => Ok((Geometry::Triangles(moved(mesh, *place)), source)),
+        Geometry::Triangles(mesh) => Ok((Geometry::Triangles(in_world(mesh, *world)), source)),
     }
 }
 
-/// Where `place` takes the corners; of what else they carry no ray asks.
-fn moved(mesh: Mesh, place: DAffine3) -> Mesh {
-    let in_world = |position: &Vec3| place.transform_point3(mesh.origin + position.as_dvec3());
-    let places: Vec<DVec3> = mesh.positions.iter().map(in_world).collect();
-    let origin = PointCloud::choose_origin(&places);
-    let positions = places.iter().map(|place| (*place - origin).as_vec3()).collect();
+/// Returns a mesh in world coordinates, with its corners alone: rays need nothing else.
+fn in_world(mesh: Mesh, world: DAffine3) -> Mesh {
+    let transformed = |position: &Vec3| world.transform_point3(mesh.origin + position.as_dvec3());
+    let positions: Vec<DVec3> = mesh.positions.iter().map(transformed).collect();
+    let origin = PointCloud::choose_origin(&positions);
+    let positions = positions.iter().map(|position| (*position - origin).as_vec3()).collect();
     Mesh { origin, positions, triangles: mesh.triangles, ..Mesh::default() }
 }
 
-fn camera(args: &Args, outline: &PointCloud, source: &Source, report: &Report) -> Camera {
-    let (width, height) = args.resolution;
-    let up = args.camera.up(outline, std::slice::from_ref(source), report);
-    args.camera.camera(outline, up, f64::from(width) / f64::from(height), report)
-}
-
-/// Builds the tree, a small one several times; the last stage and the least time.
-fn build(described: Described, report: &Report) -> anyhow::Result<(Stage, Spent)> {
-    let Described { graph, camera } = described;
+/// Builds the tree, a small one several times; the last scene and the least time.
+fn build(unbuilt: Unbuilt, report: &Report) -> anyhow::Result<(BenchScene, Elapsed)> {
+    let Unbuilt { graph, camera } = unbuilt;
     let source = &graph.geometries[0];
     let n_builds = match source.positions().len() {
         0..=2_000_000 => 5,
@@ -276,19 +301,19 @@ fn build(described: Described, report: &Report) -> anyhow::Result<(Stage, Spent)
         (geometry, spent) = timed(flat);
         least = least.least(spent);
     }
-    Ok((Stage { origin: source.origin(), geometry: geometry?, camera }, least))
+    Ok((BenchScene { origin: source.origin(), geometry: geometry?, camera }, least))
 }
 
-/// Where shadow rays end, relative to the stage's origin.
-fn light(stage: &Stage, file: Option<&CameraFile>, report: &Report) -> Vec3 {
+/// Returns the position of the light relative to the scene's origin.
+fn light(scene: &BenchScene, file: Option<&CameraFile>, report: &Report) -> Vec3 {
     if let Some(file) = file {
-        return (file.light - stage.origin).as_vec3();
+        return (file.light - scene.origin).as_vec3();
     }
-    let Camera { position, focal_point, .. } = stage.camera;
+    let Camera { position, focal_point, .. } = scene.camera;
     let away = position.distance(focal_point);
-    let light = position - stage.origin + DVec3::new(-0.6, 0.3, 0.5) * away;
-    let line = format!("point light at {}", short(light + stage.origin));
-    report.choice(&line, "--camera-file");
+    let light = position - scene.origin + DVec3::new(-0.6, 0.3, 0.5) * away;
+    let line = format!("point light at {}", short_position(light + scene.origin));
+    report.choice(&line, &["camera_file"]);
     light.as_vec3()
 }
 
@@ -296,4 +321,8 @@ fn simd_levels() -> impl TypedValueParser<Value = Simd> {
     let of_name = |name: String| Simd::available().into_iter().find(|simd| simd.name() == name);
     PossibleValuesParser::new(Simd::available().into_iter().map(Simd::name))
         .map(move |name| of_name(name).unwrap_or_else(Simd::detect))
+}
+
+fn resolution(text: &str) -> Result<(u32, u32), String> {
+    Resolution.read(&json!(text), Path::new("")).map_err(|error| error.message)
 }

@@ -1,68 +1,68 @@
-//! The sets of rays: camera rays in tiles, and rays that start where those hit.
+//! The sets of rays: camera rays in tiles, and rays that start at their hits.
 //!
-//! Order and formulas are those of the program that measures Embree (docs/benchmarks.md), in f32 as
-//! there, so that both trace the same rays.
+//! Order and formulas equal those of the program that measures Embree (docs/benchmarks.md), in f32 too, so that
+//! both trace the same rays.
 
-use super::Stage;
+use super::BenchScene;
 use super::camera_file::CameraFile;
 use std::f32::consts::TAU;
-use surfel::flat::FlatGeometry;
-use surfel::math::{DVec3, Ray, Vec3, morton_place};
-use surfel::trace::Hit;
+use surfel_core::flat::FlatGeometry;
+use surfel_core::math::{DVec3, Ray, Vec3, morton_decode};
+use surfel_core::trace::Hit;
 
 /// Pixels along the side of a tile.
 const TILE: u32 = 16;
 
-/// Rays through the centres of all pixels: of the file's camera, or else of the stage's.
-pub fn camera_rays(stage: &Stage, file: Option<&CameraFile>, size: (u32, u32)) -> Vec<Ray> {
+/// Returns rays through the centres of all pixels, of the file's camera or else of the scene's.
+pub fn camera_rays(scene: &BenchScene, file: Option<&CameraFile>, size: (u32, u32)) -> Vec<Ray> {
     if let Some(file) = file {
-        let pinhole = Pinhole::new(file, stage.origin);
+        let pinhole = Pinhole::new(file, scene.origin);
         return pixels(size).map(|pixel| pinhole.ray(pixel, size)).collect();
     }
-    let view = stage.camera.view(stage.origin, size.0, size.1);
+    let view = scene.camera.view(scene.origin, size.0, size.1);
     pixels(size).map(|(x, y)| view.ray(x as f32 + 0.5, y as f32 + 0.5)).collect()
 }
 
-/// From each hit to `light`, and no farther.
-pub fn shadow_rays(stage: &Stage, rays: &[Ray], hits: &[Hit], light: Vec3) -> Vec<Ray> {
+/// Returns rays from each hit that end at `light`.
+pub fn shadow_rays(scene: &BenchScene, rays: &[Ray], hits: &[Hit], light: Vec3) -> Vec<Ray> {
     let shadow_ray = |start: Start| {
         let toward = light - start.origin;
         let direction = toward.normalize_or(start.normal);
         Ray { t_max: toward.length(), ..Ray::new(start.origin, direction) }
     };
-    starts(stage, rays, hits).map(shadow_ray).collect()
+    starts(scene, rays, hits).map(shadow_ray).collect()
 }
 
-/// From each hit in one direction, cosine-distributed around the normal.
-pub fn bounce_rays(stage: &Stage, rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
+/// Returns a ray from each hit, cosine-distributed around the normal.
+pub fn bounce_rays(scene: &BenchScene, rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
     let direction = |start: &Start| cosine_direction(start.normal, start.ray_idx as u32);
-    starts(stage, rays, hits).map(|start| Ray::new(start.origin, direction(&start))).collect()
+    starts(scene, rays, hits).map(|start| Ray::new(start.origin, direction(&start))).collect()
 }
 
-/// All pixels in tiles, the tiles row by row; inside a tile in Morton order.
+/// Returns all pixels in tiles, the tiles row by row; inside a tile in Morton order.
 fn pixels((width, height): (u32, u32)) -> impl Iterator<Item = (u32, u32)> {
     let corners = |size: u32| (0..size).step_by(TILE as usize);
     let tiles = corners(height).flat_map(move |y| corners(width).map(move |x| (x, y)));
     tiles
         .flat_map(move |(x, y)| {
-            (0..TILE * TILE).map(morton_place).map(move |(column, row)| (x + column, y + row))
+            (0..TILE * TILE).map(morton_decode).map(move |(column, row)| (x + column, y + row))
         })
         .filter(move |&(x, y)| x < width && y < height)
 }
 
-/// A camera relative to a stage's origin.
+/// A camera relative to a scene's origin.
 struct Pinhole {
     eye: Vec3,
     forward: Vec3,
     right: Vec3,
     up: Vec3,
-    /// Of the picture at distance 1.
+    /// Half of the picture's height at distance 1.
     half_height: f32,
 }
 
 impl Pinhole {
     fn new(file: &CameraFile, origin: DVec3) -> Self {
-        let [eye, target] = [file.eye, file.target].map(|place| (place - origin).as_vec3());
+        let [eye, target] = [file.eye, file.target].map(|position| (position - origin).as_vec3());
         let forward = (target - eye).normalize();
         let right = forward.cross(Vec3::Z).normalize();
         let half_height = (file.view_angle_deg as f32 / 2.0).to_radians().tan();
@@ -78,22 +78,22 @@ impl Pinhole {
     }
 }
 
-/// Where rays start: just off what a ray hit, on the side that it came from.
+/// The start of a ray: just off a hit, on the side that the hitting ray came from.
 struct Start {
-    /// Of the ray that hit.
+    /// Index of the ray that hit.
     ray_idx: usize,
     origin: Vec3,
     normal: Vec3,
 }
 
-fn starts(stage: &Stage, rays: &[Ray], hits: &[Hit]) -> impl Iterator<Item = Start> {
+fn starts(scene: &BenchScene, rays: &[Ray], hits: &[Hit]) -> impl Iterator<Item = Start> {
     let hit = rays.iter().zip(hits).enumerate().filter(|(_, (_, hit))| **hit != Hit::MISS);
-    hit.map(|(ray_idx, (ray, hit))| start(stage, ray_idx, ray, hit))
+    hit.map(|(ray_idx, (ray, hit))| start(scene, ray_idx, ray, hit))
 }
 
-fn start(stage: &Stage, ray_idx: usize, ray: &Ray, hit: &Hit) -> Start {
+fn start(scene: &BenchScene, ray_idx: usize, ray: &Ray, hit: &Hit) -> Start {
     let position = ray.at(hit.distance);
-    let cloud = match &stage.geometry {
+    let cloud = match &scene.geometry {
         FlatGeometry::Cloud(cloud) => cloud,
         FlatGeometry::Mesh(mesh) => {
             let [a, b, c] = mesh.triangles.triangle(hit.slot);
@@ -106,7 +106,7 @@ fn start(stage: &Stage, ray_idx: usize, ray: &Ray, hit: &Hit) -> Start {
     };
     let points = &cloud.points;
     // Discs overlap, spheres are solid: half a radius lifts a ray out of the discs around its own.
-    let (normal, offset) = if cloud.surface.is_oriented() {
+    let (normal, offset) = if cloud.surface.uses_discs() {
         (points.normal(hit.slot), 0.5)
     } else {
         ((position - points.center(hit.slot)).normalize_or(-ray.direction), 1e-3)
@@ -119,15 +119,16 @@ fn cosine_direction(normal: Vec3, seed: u32) -> Vec3 {
     let mut state = seed.wrapping_mul(2_654_435_761);
     let (height, turn) = (random(&mut state), random(&mut state));
     let (sin, cos) = (TAU * turn).sin_cos();
-    let beside = if 0.5 < normal.x.abs() { Vec3::Y } else { Vec3::X };
-    let tangent = normal.cross(beside).normalize();
+    let helper = if 0.5 < normal.x.abs() { Vec3::Y } else { Vec3::X };
+    let tangent = normal.cross(helper).normalize();
     let bitangent = normal.cross(tangent);
     let (across, along) = (height.sqrt() * cos, height.sqrt() * sin);
     let direction = tangent * across + bitangent * along + normal * (1.0 - height).max(0.0).sqrt();
     direction.normalize()
 }
 
-/// From 0 up to 1, and the next state: Wellons' `lowbias32` (2018), not `math::Random`, which draws others.
+/// Returns a number from 0 up to 1 and advances the state, by Wellons' `lowbias32` (2018). `math::Random` gives other
+/// numbers than the program that measures Embree.
 fn random(state: &mut u32) -> f32 {
     let mut x = state.wrapping_add(0x9e37_79b9);
     x = (x ^ x >> 16).wrapping_mul(0x7feb_352d);
@@ -138,6 +139,8 @@ fn random(state: &mut u32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    //! Rays and directions equal those of the program that measures Embree.
+
     use super::*;
 
     const FILE: CameraFile = CameraFile {
@@ -160,7 +163,7 @@ mod tests {
     ];
 
     #[test]
-    fn camera_rays_are_those_of_the_other_program() {
+    fn camera_rays_equal_those_of_the_embree_benchmark() {
         let size = (20, 18);
         let pinhole = Pinhole::new(&FILE, DVec3::ZERO);
         let rays: Vec<Ray> = pixels(size).map(|pixel| pinhole.ray(pixel, size)).collect();
@@ -184,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn every_pixel_comes_once_and_tiles_come_row_by_row() {
+    fn each_pixel_appears_once_and_tiles_go_row_by_row() {
         let found: Vec<(u32, u32)> = pixels((40, 20)).collect();
         let mut sorted = found.clone();
         sorted.sort_unstable();
@@ -195,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn bounce_directions_are_those_of_the_other_program() {
+    fn bounce_directions_equal_those_of_the_embree_benchmark() {
         let expected = [
             (0, Vec3::Z, [0.062_414_516, -0.062_205_646, 0.996_109_9]),
             (1, Vec3::new(0.8, 0.0, 0.6), [0.642_629_6, 0.435_660_66, 0.630_259_4]),

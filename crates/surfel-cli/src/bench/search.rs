@@ -1,40 +1,46 @@
-//! What is timed: a chunk of rays in, what a renderer would keep of each out.
+//! The timed searches: a chunk of rays in, the data that a renderer would keep of each out.
 
-use surfel::flat::FlatGeometry;
-use surfel::math::{Ray, Vec3};
-use surfel::trace::{self, Hit, Simd, Splat, SurfaceHit};
+use surfel_core::flat::FlatGeometry;
+use surfel_core::math::{Ray, Vec3};
+use surfel_core::trace::{self, Hit, Simd, Splat, SurfaceHit};
 
-/// Rays that a thread claims at a time, at most.
+/// Maximum number of rays that a thread claims at a time.
 pub const CHUNK: usize = 1024;
 
-/// Of a ray's nearest hit.
+/// The nearest hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
+    /// Distance from the ray's origin; infinite without a hit.
     pub distance: f32,
-    /// Index of the point in its cloud.
+    /// Index of the point in its cloud, or of the triangle in its mesh.
     id: u32,
 }
 
 impl Nearest {
+    /// No hit.
     pub const MISS: Self = Self { distance: f32::INFINITY, id: u32::MAX };
 
+    /// Returns true without a hit.
     pub fn is_miss(&self) -> bool {
         self.id == Self::MISS.id
     }
 }
 
-/// Of all discs near a ray's first one.
+/// The blend of all discs near the first disc that a ray hits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shaded {
-    /// Averaged, unit; zero if nothing was hit.
+    /// Mean of the discs' normals, unit length; zero without a hit.
     normal: Vec3,
+    /// Number of discs.
     pub n_discs: f32,
 }
 
 impl Shaded {
+    /// No disc.
     pub const EMPTY: Self = Self { normal: Vec3::ZERO, n_discs: 0.0 };
 }
 
+/// Finds the nearest hits, with everything that shading needs.
 pub fn closest(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], hits: &mut [Hit]) {
     match geometry {
         FlatGeometry::Cloud(cloud) => trace::closest_hits(cloud, simd, rays, hits),
@@ -42,6 +48,7 @@ pub fn closest(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], hits: &mut [Hi
     }
 }
 
+/// Finds out whether rays hit anything.
 pub fn any(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
     match geometry {
         FlatGeometry::Cloud(cloud) => trace::any_hits(cloud, simd, rays, occluded),
@@ -49,6 +56,7 @@ pub fn any(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], occluded: &mut [bo
     }
 }
 
+/// Finds distance and index of the nearest hits.
 pub fn nearest(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], found: &mut [Nearest]) {
     let mut hits = [Hit::MISS; CHUNK];
     let hits = &mut hits[..rays.len()];
@@ -63,6 +71,7 @@ pub fn nearest(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], found: &mut [N
     }
 }
 
+/// Finds distance and index of the finished surface, with its edge test.
 pub fn surface(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], found: &mut [Nearest]) {
     let FlatGeometry::Cloud(cloud) = geometry else { return nearest(geometry, simd, rays, found) };
     let mut hits = [SurfaceHit::MISS; CHUNK];
@@ -73,8 +82,8 @@ pub fn surface(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], found: &mut [N
     }
 }
 
-/// The discs' normals are averaged as `splat` does: each turned with the nearest one, by their nearness to
-/// the ray.
+/// Gathers discs and averages their normals as `splat` does: each flipped to the side of the nearest one, weighted by
+/// the distance from the ray.
 pub fn gather(geometry: &FlatGeometry, simd: Simd, rays: &[Ray], found: &mut [Shaded]) {
     let FlatGeometry::Cloud(cloud) = geometry else { return found.fill(Shaded::EMPTY) };
     let mut splats = [Splat::MISS; CHUNK];

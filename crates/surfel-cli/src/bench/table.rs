@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+/// Returns the results as a table for people.
 pub fn table(result: &Value) -> String {
     let mut text = "rays          number      hits  median M/s  best M/s  wall M/s\n".to_owned();
     for (name, row) in result["rays"].as_object().into_iter().flatten() {

@@ -1,23 +1,21 @@
-//! What the colours on the page mean.
+//! The meaning of the colours, as the page shows it.
 
 use serde_json::{Value, json};
-use surfel::points::PointCloud;
-use surfel::scene::color::{self, Coloring, Legend};
+use surfel_core::scene::color::Legend;
 
-/// Of the first cloud, as the page shows it; null where the colours speak for themselves.
-pub fn legend(clouds: &[PointCloud], coloring: &Coloring) -> Value {
-    let Some(Ok(found)) = clouds.first().map(|cloud| color::legend(cloud, coloring)) else {
-        return Value::Null;
-    };
-    match found {
+/// Returns a legend as the page shows it; null where the colours need none.
+pub fn legend_json(legend: &Legend) -> Value {
+    match legend {
         Legend::None => Value::Null,
         Legend::Map { title, low, high, colors } => {
-            let colors: Vec<String> = colors.into_iter().map(hex).collect();
+            let colors: Vec<String> = colors.iter().copied().map(hex).collect();
             json!({ "kind": "map", "title": title, "low": low, "high": high, "colors": colors })
         }
         Legend::Classes(classes) => {
-            let entry = |(class, name, color)| json!({ "name": format!("{class} {name}"), "color": hex(color) });
-            let entries: Vec<Value> = classes.into_iter().map(entry).collect();
+            let entries = classes.iter().map(|(class, name, color)| {
+                json!({ "name": format!("{class} {name}"), "color": hex(*color) })
+            });
+            let entries: Vec<Value> = entries.collect();
             json!({ "kind": "classes", "title": "class", "entries": entries })
         }
     }

@@ -2,48 +2,50 @@
 
 mod browser;
 mod legend;
-mod made;
 mod point;
-mod settings;
-mod studio;
+mod page_settings;
+mod scene_provider;
 
-use crate::args::{Global, SceneArgs};
-use crate::picture::check_files;
-use crate::report::Report;
-use crate::scene_file::Line;
+use crate::global::{Global, start_threads};
+use crate::options::ViewScope;
+use crate::report::{Report, print};
+use crate::scene_args::SceneArgs;
 use anyhow::anyhow;
+use scene_provider::FileSceneProvider;
 use std::io::ErrorKind;
 use std::net::IpAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
-use studio::ScanStudio;
-use surfel::progress::Progress;
-use surfel::render::CpuRenderer;
-use surfel::trace::Simd;
-use surfel_web::{Error, Server, Studio};
+use surfel::SceneDescription;
+use surfel::resolve::check_files;
+use surfel_core::progress::Progress;
+use surfel_core::render::CpuRenderer;
+use surfel_core::trace::Simd;
+use surfel_web::{Error, SceneProvider, Server};
 
-#[derive(clap::Args)]
+/// Arguments of `surfel view`.
+#[derive(clap::Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Where the page is served; 0 takes any port that is free.
+    /// Port of the page; 0 takes any free one.
     #[arg(long, value_name = "PORT", default_value_t = 8080, help_heading = "Server")]
     port: u16,
-    /// The address to listen at; beyond this machine, as with 0.0.0.0, the link holds a token that is
-    /// needed.
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1", help_heading = "Server")]
+    /// Address to listen at. Beyond this machine, as with 0.0.0.0, the link contains a token, without which
+    /// nobody is let in.
+    #[arg(
+        long,
+        value_name = "ADDRESS",
+        default_value = "127.0.0.1",
+        help_heading = "Server",
+        hide_short_help = true
+    )]
     host: IpAddr,
-    /// Open the page in a browser.
+    /// Opens the page in a browser.
     #[arg(long, help_heading = "Server")]
     open: bool,
+    /// Files and options of the scene.
     #[command(flatten)]
-    pub scene: SceneArgs,
-}
-
-impl Args {
-    /// What is seen; of clouds all columns are kept, as any point may be asked for them.
-    pub fn with_all_columns(mut self) -> SceneArgs {
-        self.scene.preparation.keeps_all = true;
-        self.scene
-    }
+    pub scene: SceneArgs<ViewScope>,
 }
 
 const EXAMPLES: &str = "\
@@ -54,9 +56,11 @@ Examples:
   surfel view scan.laz --host 0.0.0.0    for other machines: the link holds a token
   ssh -L 8080:localhost:8080 server      on your own machine, to look at what a server views";
 
-pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow::Result<()> {
-    args.scene.check()?;
-    check_files(&args.scene, line, global)?;
+/// Serves the viewer until it is interrupted.
+pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
+    let description = args.scene.description(&global.run)?;
+    start_threads(&description.run)?;
+    check_files(&description)?;
     let server = Server::bind(args.host, args.port).map_err(|error| match error {
         Error::Io { ref source, .. } if source.kind() == ErrorKind::AddrNotAvailable => {
             anyhow!("{error}; choose an address of this machine with --host, or 0.0.0.0 for all")
@@ -64,27 +68,28 @@ pub fn run(args: &Args, line: &Line, global: &Global, report: &Report) -> anyhow
         Error::Io { .. } => anyhow!("{error}; choose another port with --port, or 0 for any"),
         error => anyhow!(error),
     })?;
-    crate::report::print(&server.link())?;
+    print(&server.link())?;
     if args.open && !browser::open(&server.link()) {
         report.note("no browser could be started; open the link yourself");
     }
-    let (line, global, report_there) = (line.clone(), global.clone(), report.twin());
+    let typed = args.scene.files.clone();
+    let report_for_loading = report.for_thread();
     let open = move |progress: &dyn Progress| {
-        let report = report_there.heard_by(progress);
-        open_studio(line, &global, &report).map_err(settings::refusal)
+        let report = report_for_loading.with_listener(progress);
+        open_scene_provider(description, typed, &report).map_err(page_settings::rejection)
     };
     let renderer = Arc::new(CpuRenderer { simd: Simd::detect() });
     server.run(renderer, report.cancellation(), open).map_err(|error| match error {
-        Error::Cancelled => anyhow!(surfel::Error::Cancelled),
+        Error::Cancelled => anyhow!(surfel_core::Error::Cancelled),
         error => anyhow!(error),
     })
 }
 
-/// Reads what is to be viewed.
-pub fn open_studio(
-    line: Line,
-    global: &Global,
+/// Reads the files of a description for the viewer.
+pub fn open_scene_provider(
+    description: SceneDescription,
+    typed: Vec<PathBuf>,
     report: &Report,
-) -> anyhow::Result<Arc<dyn Studio>> {
-    Ok(Arc::new(ScanStudio::open(line, global, report)?))
+) -> surfel::Result<Arc<dyn SceneProvider>> {
+    Ok(Arc::new(FileSceneProvider::open(description, typed, report)?))
 }

@@ -1,62 +1,61 @@
-//! What is told about a place that was clicked at.
+//! Facts about a picked point, as the page shows them.
 
-use super::made::{INDEX, Made};
-use crate::assemble::Assembly;
 use serde_json::{Value, json};
-use surfel::flat::{FlatGeometry, FlatScene};
-use surfel::points::{PointCloud, Values};
-use surfel::scene::{Geometry, Graph};
-use surfel_web::Place;
+use surfel::live::SceneTrees;
+use surfel::resolve::LoadedScene;
+use surfel_core::flat::{FlatGeometry, FlatScene};
+use surfel_core::points::{PointCloud, Values};
+use surfel_core::scene::{Geometry, Graph};
+use surfel_web::PickedPoint;
 
 /// An 8-bit value times this is the same colour with 16 bits.
-const WIDEN: u16 = 257;
-/// Colours that tell how many bits the file has.
-const SAMPLE: usize = 4096;
+const COLOR_8_TO_16: u16 = 257;
 
-/// The point or triangle at a place, with all columns of the file that it came from.
-///
-/// `flat` and `graph` are those of `made`, at the time at which it was looked at.
+/// Number of colours from which the number of bits in the file is judged.
+const COLOR_SAMPLE: usize = 4096;
+
+/// Returns the picked point or triangle with all columns of its file. `flat` and `graph` are those of `trees` at the
+/// time of the picture.
 pub fn describe(
-    base: &Assembly,
-    made: &Made,
+    loaded: &LoadedScene,
+    trees: &SceneTrees,
     flat: &FlatScene,
     graph: &Graph,
-    place: &Place,
+    picked: &PickedPoint,
 ) -> Value {
-    let mut told = json!({
-        "surface": place.position.to_array(),
-        "normal": place.normal.to_array(),
-        "distance": place.depth,
-        "index": place.id,
-        "position": place.position.to_array(),
+    let mut facts = json!({
+        "surface": picked.position.to_array(),
+        "normal": picked.normal.to_array(),
+        "distance": picked.depth,
+        "index": picked.primitive_idx,
+        "position": picked.position.to_array(),
         "columns": [],
     });
-    let Some(instance) = flat.instances.get(place.instance as usize) else { return told };
-    told["kind"] = match flat.geometry(instance) {
+    let Some(instance) = flat.instances.get(picked.instance_idx as usize) else { return facts };
+    facts["kind"] = match flat.geometry(instance) {
         FlatGeometry::Cloud(_) => json!("point"),
         FlatGeometry::Mesh(_) => json!("triangle"),
     };
-    let node = &graph.nodes[instance.node as usize];
-    told["object"] = json!(name(graph, instance.node as usize));
-    let part = node.parts.iter().find(|part| part.material == instance.material as usize);
-    let Some(geometry) = part.map(|part| part.geometry) else { return told };
-    let index = made.indices[geometry].get(place.id as usize);
-    let Some((Geometry::Points(points), &index)) = base.graph.geometries.get(geometry).zip(index)
-    else {
-        return told;
-    };
-    let (cloud, index) = (&points.cloud, index as usize);
-    told["index"] = json!(index);
-    // A point that bends is where it was met.
+    let node = &graph.nodes[instance.node_idx as usize];
+    facts["object"] = json!(name(graph, instance.node_idx as usize));
+    let is_shown = |material: usize| material == instance.material_idx as usize;
+    let primitive = node.primitives.iter().find(|primitive| is_shown(primitive.material));
+    let Some(geometry) = primitive.map(|primitive| primitive.geometry) else { return facts };
+    let index = trees.source_indices[geometry].get(picked.primitive_idx as usize);
+    let source = loaded.graph.geometries.get(geometry).zip(index);
+    let Some((Geometry::Points(cloud), &index)) = source else { return facts };
+    let index = index as usize;
+    facts["index"] = json!(index);
+    // A deformed point is where it was hit.
     if cloud.morphs.is_empty() && cloud.skin.is_none() {
-        let world = graph.world_from_nodes()[instance.node as usize];
-        told["position"] = json!(world.transform_point3(cloud.world_position(index)).to_array());
+        let world = graph.world_from_nodes()[instance.node_idx as usize];
+        facts["position"] = json!(world.transform_point3(cloud.world_position(index)).to_array());
     }
-    told["columns"] = columns(cloud, index).into();
-    told
+    facts["columns"] = columns(cloud, index).into();
+    facts
 }
 
-/// The nearest name at a node or above it.
+/// Returns the nearest name at a node or above it.
 fn name(graph: &Graph, node: usize) -> &str {
     let nodes = &graph.nodes;
     let mut above = std::iter::successors(Some(node), |node| nodes[*node].parent);
@@ -78,7 +77,7 @@ fn columns(cloud: &PointCloud, index: usize) -> Vec<Value> {
     if let Some(classes) = &cloud.classification {
         let class = classes[index];
         columns.push(column("classification", class.into()));
-        columns.push(column("class", surfel::image::class_name(class).into()));
+        columns.push(column("class", surfel_core::image::class_name(class).into()));
     }
     if let Some(normals) = &cloud.normals {
         let names = ["nx", "ny", "nz"].into_iter().zip(normals[index].to_array());
@@ -87,7 +86,7 @@ fn columns(cloud: &PointCloud, index: usize) -> Vec<Value> {
     if let Some(radii) = &cloud.radii {
         columns.push(column("radius", shortest(radii[index])));
     }
-    for scalar in cloud.scalars.iter().filter(|scalar| scalar.name != INDEX) {
+    for scalar in &cloud.scalars {
         let value = match &scalar.values {
             Values::F32(values) => shortest(values[index]),
             values => json!(values.get(index)),
@@ -97,25 +96,27 @@ fn columns(cloud: &PointCloud, index: usize) -> Vec<Value> {
     columns
 }
 
-/// With 8 bits where that is all that the file seems to hold: of a large cloud not every point is looked at.
+/// Returns a colour with 8 bits per channel if the file seems to have no more; a sample of its points decides.
 fn channels(colors: &[[u16; 3]], index: usize) -> [u16; 3] {
-    let is_narrow = |color: &[u16; 3]| color.iter().all(|channel| channel % WIDEN == 0);
-    let mut sample = colors.iter().step_by(colors.len().div_ceil(SAMPLE));
+    let is_narrow = |color: &[u16; 3]| color.iter().all(|channel| channel % COLOR_8_TO_16 == 0);
+    let mut sample = colors.iter().step_by(colors.len().div_ceil(COLOR_SAMPLE));
     let color = colors[index];
     if is_narrow(&color) && sample.all(is_narrow) {
-        color.map(|channel| channel / WIDEN)
+        color.map(|channel| channel / COLOR_8_TO_16)
     } else {
         color
     }
 }
 
-/// With the digits that tell it from others of its kind, not those of the double that it becomes.
+/// Returns the shortest number that is still this f32, instead of the digits of the f64 that it becomes.
 fn shortest(value: f32) -> Value {
     value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
 }
 
 #[cfg(test)]
 mod tests {
+    //! The number of bits of colours.
+
     use super::*;
 
     #[test]

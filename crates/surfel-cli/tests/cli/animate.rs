@@ -1,4 +1,4 @@
-//! Films: their frames, and what moves in them.
+//! Movies: their frames, and the animations in them.
 
 use super::common::{
     Folder, SMALL, command, dome, fail, gltf, read_png, square, stderr, succeed, tile,
@@ -6,11 +6,11 @@ use super::common::{
 use std::fs;
 use std::process::Command;
 
-pub fn film(arguments: &[&str]) {
+pub fn movie(arguments: &[&str]) {
     succeed(&[&["animate"], arguments, &SMALL].concat());
 }
 
-/// Frames and the seconds that each is seen.
+/// Returns the frames of an animated PNG, and the duration of each in seconds.
 pub fn read_apng(path: &str) -> (Vec<Vec<u8>>, Vec<f64>) {
     let file = std::io::BufReader::new(fs::File::open(path).unwrap());
     let mut reader = png::Decoder::new(file).read_info().unwrap();
@@ -26,7 +26,7 @@ pub fn read_apng(path: &str) -> (Vec<Vec<u8>>, Vec<f64>) {
         .unzip()
 }
 
-/// Sums of the hundredths of a second and the number of frames.
+/// Returns the number of frames of a GIF, and their duration in hundredths of a second.
 pub fn read_gif(path: &str) -> (usize, u32) {
     let mut reader = gif::DecodeOptions::new().read_info(fs::File::open(path).unwrap()).unwrap();
     let (mut n_frames, mut hundredths) = (0, 0);
@@ -37,7 +37,7 @@ pub fn read_gif(path: &str) -> (usize, u32) {
     (n_frames, hundredths)
 }
 
-/// Mean difference of two pictures' samples, of 255.
+/// Returns the mean difference of two pictures' samples, from 0 to 255.
 pub fn difference(a: &[u8], b: &[u8]) -> f64 {
     assert_eq!(a.len(), b.len());
     let sum: u64 = a.iter().zip(b).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
@@ -45,14 +45,14 @@ pub fn difference(a: &[u8], b: &[u8]) -> f64 {
 }
 
 #[test]
-fn a_turntable_makes_every_kind_of_film() {
+fn a_turntable_writes_every_kind_of_movie() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(20));
     let turn = ["--turntable", "2", "--fps", "4"];
     let make = |name: &str| {
-        let film_path = folder.path(name);
-        film(&[&[&cloud, "-o", &film_path], &turn[..]].concat());
-        film_path
+        let movie_path = folder.path(name);
+        movie(&[&[&cloud, "-o", &movie_path], &turn[..]].concat());
+        movie_path
     };
     let (frames, secs) = read_apng(&make("turn.png"));
     assert_eq!((frames.len(), secs), (8, vec![0.25; 8]));
@@ -76,15 +76,15 @@ fn a_whole_turn_ends_where_it_began() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(20));
     let path = folder.path("turn.png");
-    film(&[&cloud, "-o", &path, "--turntable", "1", "--fps", "8", "--frames", "9"]);
+    movie(&[&cloud, "-o", &path, "--turntable", "1", "--fps", "8", "--frames", "9"]);
     let (frames, _) = read_apng(&path);
-    // Only what rounding moves over a pixel's edge.
+    // Rounding moves a few samples over a pixel's edge.
     assert!(difference(&frames[0], &frames[8]) < 0.5, "{}", difference(&frames[0], &frames[8]));
     assert!(1.0 < difference(&frames[0], &frames[2]));
 }
 
 #[test]
-fn video_is_made_where_ffmpeg_is() {
+fn video_is_written_if_ffmpeg_is_installed() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(20));
     let video = folder.path("turn.mp4");
@@ -100,23 +100,23 @@ fn video_is_made_where_ffmpeg_is() {
             println!("skipped: ffmpeg is absent");
         }
     }
-    // Without ffmpeg a film is refused before the work, with other kinds to choose from.
+    // Without ffmpeg the error comes before the work and names other formats.
     let nowhere = folder.path("");
     let output = command(&[&arguments[..], &SMALL].concat()).env("PATH", nowhere).output().unwrap();
-    let told = stderr(&output);
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains("ffmpeg") && told.contains(".gif"), "{told}");
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("ffmpeg") && message.contains(".gif"), "{message}");
 }
 
 #[test]
-fn as_many_frames_as_the_movement_lasts() {
+fn a_movie_lasts_as_long_as_its_animation() {
     let folder = Folder::new();
     folder.write("dome.ply", dome(10));
     let object = "[[object]]\nname = \"dome\"\nfile = \"dome.ply\"\n";
     let n_frames = |movement: &str, options: &[&str]| {
         let scene = folder.write("scene.toml", format!("{object}{movement}"));
-        let path = folder.path("film.png");
-        film(&[&[scene.as_str(), "-o", &path, "--fps", "4"], options].concat());
+        let path = folder.path("movie.png");
+        movie(&[&[scene.as_str(), "-o", &path, "--fps", "4"], options].concat());
         read_apng(&path).0.len()
     };
     let keys = "[[animation]]\nobject = \"dome\"\ntimes = [0, 1.5]\nscale = [1, 2]\n";
@@ -128,10 +128,10 @@ fn as_many_frames_as_the_movement_lasts() {
     let path = "[[animation]]\nobject = \"dome\"\nkind = \"path\"\nseconds = 1\n\
         points = [[0, 0, 0], [1, 0, 0]]\n";
     assert_eq!(n_frames(path, &[]), 4);
-    assert_eq!(n_frames("", &["--frames", "2"]), 2, "a still film");
+    assert_eq!(n_frames("", &["--frames", "2"]), 2, "a still movie");
 }
 
-/// Pictures of a scene at times, seen from above by a camera that stays.
+/// Renders a scene at several times, from above, with a fixed camera.
 fn at_times(folder: &Folder, text: &str, times: &[&str]) -> Vec<Vec<u8>> {
     let scene = folder.write("scene.toml", text);
     let picture = |time: &&str| {
@@ -150,7 +150,7 @@ fn tile_at(place: [f64; 2], more: &str) -> String {
 }
 
 #[test]
-fn orbits_keys_and_paths_move_things_to_where_they_are_told() {
+fn orbits_keys_and_paths_move_objects_to_the_expected_positions() {
     let folder = Folder::new();
     folder.write("tile.ply", tile(1.0, 0.0, [250, 10, 10]));
     let still = |x, y| at_times(&folder, &tile_at([x, y], ""), &["0"]).remove(0);
@@ -189,7 +189,7 @@ fn orbits_keys_and_paths_move_things_to_where_they_are_told() {
 }
 
 #[test]
-fn an_orbit_goes_on_top_of_keys() {
+fn an_orbit_is_applied_after_keys() {
     let folder = Folder::new();
     folder.write("tile.ply", tile(1.0, 0.0, [250, 10, 10]));
     let still = |x, y| at_times(&folder, &tile_at([x, y], ""), &["0"]).remove(0);
@@ -197,21 +197,21 @@ fn an_orbit_goes_on_top_of_keys() {
         seconds = 4\n[[animation]]\nobject = \"t\"\ntimes = [0, 2]\n\
         translate = [[3, 0, 0], [5, 0, 0]]";
     let shown = at_times(&folder, &tile_at([3.0, 0.0], movement), &["0", "1", "2"]);
-    // Where keys have it, turned about the middle: a quarter, then half.
+    // The position of the keys, turned about the center: by a quarter, then by half.
     for (frame, (x, y)) in shown.iter().zip([(3.0, 0.0), (1.0, 3.0), (-3.0, 0.0)]) {
         assert!(difference(frame, &still(x, y)) < 1.0, "{x}, {y}");
     }
 }
 
 #[test]
-fn the_camera_and_lamps_move_too() {
+fn the_camera_and_lamps_can_be_animated() {
     let folder = Folder::new();
     folder.write("dome.ply", dome(20));
     let object = "light = [\"sun\"]\n[[object]]\nfile = \"dome.ply\"\n";
     let frames = |movement: &str| {
         let scene = folder.write("scene.toml", format!("{object}{movement}"));
-        let path = folder.path("film.png");
-        film(&[&scene, "-o", &path, "--fps", "4", "--frames", "5"]);
+        let path = folder.path("movie.png");
+        movie(&[&scene, "-o", &path, "--fps", "4", "--frames", "5"]);
         read_apng(&path).0
     };
     for movement in [
@@ -228,7 +228,7 @@ fn the_camera_and_lamps_move_too() {
 }
 
 #[test]
-fn frames_are_the_pictures_at_their_times() {
+fn a_frame_equals_the_picture_at_its_time() {
     let folder = Folder::new();
     folder.write("dome.ply", dome(20));
     let scene = "light = [\"sun\"]\nexposure = 0.5\nup = \"+Z\"\nsun.azimuth = 40\n\
@@ -239,8 +239,8 @@ fn frames_are_the_pictures_at_their_times() {
         [[animation]]\nobject = \"l\"\nkind = \"orbit\"\ncenter = [0, 0, 1]\nseconds = 2\n\
         [[animation]]\nobject = \"dome\"\ntimes = [0, 1]\ntranslate = [[0, 0, 0], [0.5, 0, 0]]\n";
     let scene = folder.write("scene.toml", scene);
-    let path = folder.path("film.png");
-    film(&[&scene, "-o", &path, "--fps", "2"]);
+    let path = folder.path("movie.png");
+    movie(&[&scene, "-o", &path, "--fps", "2"]);
     let (frames, _) = read_apng(&path);
     assert_eq!(frames.len(), 4);
     for (time, frame) in ["0", "0.5", "1", "1.5"].iter().zip(&frames) {
@@ -251,16 +251,16 @@ fn frames_are_the_pictures_at_their_times() {
 }
 
 #[test]
-fn a_picture_at_a_time_is_chosen_as_the_film_is() {
+fn a_picture_at_a_time_has_the_automatic_settings_of_the_movie() {
     let folder = Folder::new();
     folder.write("dome.ply", dome(20));
-    // It goes away, shrinks and gets dark: camera, sun and exposure are those of the beginning.
+    // The object moves away and shrinks; camera, sun and exposure stay those of second 0.
     let scene = "[[object]]\nfile = \"dome.ply\"\n[[animation]]\nobject = \"dome\"\ntimes = [0, 1]\n\
         translate = [[0, 0, 0], [0.5, 2, 1]]\nscale = [1, 0.2]\n\
         [[animation]]\nobject = \"camera\"\nkind = \"orbit\"\nseconds = 3\n";
     let scene = folder.write("scene.toml", scene);
-    let path = folder.path("film.png");
-    film(&[&scene, "-o", &path, "--fps", "2", "--frames", "3"]);
+    let path = folder.path("movie.png");
+    movie(&[&scene, "-o", &path, "--fps", "2", "--frames", "3"]);
     let (frames, _) = read_apng(&path);
     for (time, frame) in ["0", "0.5", "1"].iter().zip(&frames) {
         let picture = folder.path("at.png");
@@ -273,19 +273,19 @@ fn a_picture_at_a_time_is_chosen_as_the_film_is() {
 fn the_animation_of_a_gltf_file_plays() {
     let folder = Folder::new();
     let scene = folder.write("triangle.gltf", gltf());
-    let path = folder.path("film.png");
-    film(&[&scene, "-o", &path, "--fps", "2"]);
+    let path = folder.path("movie.png");
+    movie(&[&scene, "-o", &path, "--fps", "2"]);
     let (frames, _) = read_apng(&path);
     assert_eq!(frames.len(), 4, "two seconds");
     assert!(1.0 < difference(&frames[0], &frames[3]));
-    // The same through a scene file that adds nothing.
+    // A scene file that adds nothing gives the same movie.
     let scene = folder.write("scene.toml", "[[object]]\nfile = \"triangle.gltf\"\n");
-    film(&[&scene, "-o", &path, "--fps", "2"]);
+    movie(&[&scene, "-o", &path, "--fps", "2"]);
     assert!(read_apng(&path).0 == frames);
 }
 
 #[test]
-fn an_animation_of_a_gltf_file_is_chosen_by_its_name() {
+fn animation_name_selects_an_animation_of_a_gltf_file() {
     let folder = Folder::new();
     let rest = r#"{"name":"rest","samplers":[],"channels":[]}"#;
     let text =
@@ -296,17 +296,17 @@ fn an_animation_of_a_gltf_file_is_chosen_by_its_name() {
     let rest = at_end(&[]);
     assert!(rest == at_end(&["--animation-name", "rest"]));
     assert!(rest != at_end(&["--animation-name", "walk"]));
-    let told = fail(&["render", &file, "-o", "no.png", "--animation-name", "fly"], 1);
-    assert!(told.contains("`rest`, `walk`"), "{told}");
-    // Two of one file, each in its own way.
+    let message = fail(&["render", &file, "-o", "no.png", "--animation-name", "fly"], 1);
+    assert!(message.contains("`rest`, `walk`"), "{message}");
+    // Two objects of one file play different animations.
     let object = |name: &str| {
         format!(
             "[[object]]\nname = \"{name}\"\nfile = \"walker.gltf\"\nanimation-name = \"{name}\"\n"
         )
     };
     let scene = folder.write("scene.toml", object("rest") + &object("walk"));
-    let path = folder.path("film.png");
-    film(&[&scene, "-o", &path, "--fps", "2"]);
+    let path = folder.path("movie.png");
+    movie(&[&scene, "-o", &path, "--fps", "2"]);
     let (frames, _) = read_apng(&path);
     assert!(frames.len() == 4 && frames[0] != frames[3]);
 }
@@ -320,8 +320,8 @@ fn a_sequence_shows_one_file_after_the_other() {
     let scene = "light = \"none\"\n[camera]\ndirection = [0, 0, -1]\northographic = 2\n\
         [[object]]\nfiles = \"f*.ply\"\nfps = 2\n";
     let scene = folder.write("scene.toml", scene);
-    let path = folder.path("film.png");
-    film(&[&scene, "-o", &path, "--fps", "4"]);
+    let path = folder.path("movie.png");
+    movie(&[&scene, "-o", &path, "--fps", "4"]);
     let (frames, _) = read_apng(&path);
     let colors: Vec<[u8; 3]> = frames.iter().map(|frame| frame[..3].try_into().unwrap()).collect();
     let [r, g, b] = [[250, 0, 0], [0, 250, 0], [0, 0, 250]];
@@ -329,7 +329,7 @@ fn a_sequence_shows_one_file_after_the_other() {
 }
 
 #[test]
-fn a_sequence_of_clouds_is_read_as_it_comes() {
+fn a_sequence_of_clouds_is_streamed() {
     let folder = Folder::new();
     let n_files = 24;
     for number in 0..n_files {
@@ -338,21 +338,21 @@ fn a_sequence_of_clouds_is_read_as_it_comes() {
     let view = "light = \"none\"\nradius = 1\n[camera]\ndirection = [0, 0, -1]\northographic = 4\n";
     let sequence = "[[object]]\nfiles = \"f*.xyz\"\nfps = 4\n";
     let scene = folder.write("scene.toml", format!("{view}{sequence}"));
-    let path = folder.path("film.png");
-    film(&[&scene, "-o", &path, "--fps", "4"]);
+    let path = folder.path("movie.png");
+    movie(&[&scene, "-o", &path, "--fps", "4"]);
     let (frames, _) = read_apng(&path);
     assert_eq!(frames.len(), n_files);
-    // Each frame is what a picture of its file alone shows; so is a picture at a time.
+    // Each frame, and each picture at a time, equals a picture of its file alone.
     for (number, time) in [(0, "0"), (7, "1.75"), (23, "5.75"), (23, "99")] {
         let alone = format!("{view}[[object]]\nfile = \"f{number}.xyz\"\n");
         let alone = read_shot(&folder, &[&folder.write("alone.toml", alone)]);
         assert!(frames[number] == alone, "{number}");
         assert!(read_shot(&folder, &[&scene, "--time", time]) == alone, "{time}");
     }
-    // What is held is one cloud, whatever the number of files.
-    let told = succeed(&["animate", &scene, "--dry-run"]);
-    assert!(told.contains("\"points\": 81,"), "{told}");
-    // A file that is missing or no cloud is told before the first frame.
+    // One cloud is in memory, whatever the number of files.
+    let dry_run = succeed(&["animate", &scene, "--dry-run"]);
+    assert!(dry_run.contains("\"points\": 81,"), "{dry_run}");
+    // The error for a missing file comes before the first frame.
     let files: Vec<String> = (0..9).map(|number| format!("\"f{number}.xyz\"")).collect();
     let missing =
         format!("{view}[[object]]\nfiles = [{}, \"gone.xyz\"]\nfps = 4\n", files.join(","));
@@ -368,21 +368,21 @@ pub fn read_shot(folder: &Folder, arguments: &[&str]) -> Vec<u8> {
 }
 
 #[test]
-fn what_cannot_be_a_film_is_refused_before_the_work() {
+fn invalid_movies_are_rejected_before_the_work() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(10));
-    let gif = folder.path("film.gif");
-    let told = fail(&["animate", &cloud, "-o", &gif], 2);
-    assert!(told.contains("nothing moves") && told.contains("--turntable"), "{told}");
-    let told = fail(&["animate", &cloud, "--turntable", "1"], 2);
-    assert!(told.contains("-o"), "{told}");
-    for name in ["film.doc", "film", "film.jpg"] {
-        let told = fail(&["animate", &cloud, "-o", &folder.path(name), "--turntable", "1"], 2);
-        assert!(told.contains(name) && told.contains(".gif"), "{told}");
+    let gif = folder.path("movie.gif");
+    let message = fail(&["animate", &cloud, "-o", &gif], 2);
+    assert!(message.contains("nothing moves") && message.contains("--turntable"), "{message}");
+    let message = fail(&["animate", &cloud, "--turntable", "1"], 2);
+    assert!(message.contains("-o"), "{message}");
+    for name in ["movie.doc", "movie", "movie.jpg"] {
+        let message = fail(&["animate", &cloud, "-o", &folder.path(name), "--turntable", "1"], 2);
+        assert!(message.contains(name) && message.contains(".gif"), "{message}");
     }
-    let nowhere = folder.path("no/such/film.gif");
-    let told = fail(&["animate", &cloud, "-o", &nowhere, "--turntable", "1"], 1);
-    assert!(told.contains("film.gif"), "{told}");
+    let nowhere = folder.path("no/such/movie.gif");
+    let message = fail(&["animate", &cloud, "-o", &nowhere, "--turntable", "1"], 1);
+    assert!(message.contains("movie.gif"), "{message}");
     for options in [
         &["--turntable", "0"][..],
         &["--turntable", "NaN"],
@@ -397,23 +397,23 @@ fn what_cannot_be_a_film_is_refused_before_the_work() {
 }
 
 #[test]
-fn a_dry_run_of_a_film_makes_the_same_film() {
+fn the_dry_run_of_a_movie_renders_the_same_movie() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(10));
-    let path = folder.path("film.png");
+    let path = folder.path("movie.png");
     let arguments = [&cloud, "-o", &path, "--turntable", "1.5", "--fps", "3", "--color", "rain"];
     let arguments = [&["animate"], &arguments[..], &SMALL].concat();
-    let told = succeed(&[&arguments[..], &["--dry-run"]].concat());
+    let dry_run = succeed(&[&arguments[..], &["--dry-run"]].concat());
     assert_eq!(folder.names(), ["dome.ply"]);
     assert!(succeed(&["animate", &cloud, "--frames", "3", "--dry-run"]).contains("\"frames\": 3"));
     succeed(&arguments);
     let made = fs::read(&path).unwrap();
     fs::remove_file(&path).unwrap();
-    let told = folder.write("told.json", told);
-    succeed(&["animate", &told]);
+    let dry_run = folder.write("dry_run.json", dry_run);
+    succeed(&["animate", &dry_run]);
     assert!(fs::read(&path).unwrap() == made);
-    // The same file is a picture of the first frame.
+    // `surfel render` of the same file gives the first frame.
     let picture = folder.path("first.png");
-    succeed(&["render", &told, "-o", &picture]);
+    succeed(&["render", &dry_run, "-o", &picture]);
     assert!(read_png(&picture).3 == read_apng(&path).0[0]);
 }

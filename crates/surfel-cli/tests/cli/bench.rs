@@ -1,11 +1,11 @@
-//! `surfel bench`: the same rays and answers as Embree's, and the form in which they are told.
+//! `surfel bench`: rays and hits equal Embree's; tables and JSON have their documented form.
 
 use super::common::{Folder, dome, fail, gltf, stderr, succeed, surfel, tile};
 use serde_json::Value;
-use surfel::progress::Silent;
+use surfel_core::progress::NoProgress;
 use surfel_formats::{LoadOptions, load, load_bytes};
 
-/// Points of a ball: x y z radius nx ny nz.
+/// Returns the points of a ball as x y z radius nx ny nz.
 fn ball() -> Vec<[f32; 7]> {
     let n = 4000;
     let golden_angle = std::f64::consts::PI * (3.0 - 5f64.sqrt());
@@ -44,7 +44,8 @@ fn keys(object: &Value) -> Vec<&str> {
     object.as_object().unwrap().keys().map(String::as_str).collect()
 }
 
-/// What Embree 4.4 finds along the same rays: hits of primary, shadow and bounce rays, and their mean distance.
+/// The expected numbers are those of Embree 4.4 along the same rays: hits of primary and shadow rays, and the mean
+/// distance of primary hits.
 #[test]
 fn hits_are_those_of_embree() {
     let folder = Folder::new();
@@ -93,9 +94,9 @@ fn json_has_its_keys_in_order() {
 }
 
 #[test]
-fn radii_and_normals_of_a_file_are_taken_as_they_are() {
+fn radii_and_normals_of_a_file_are_not_changed() {
     let folder = Folder::new();
-    // Turned inward, at which any step that orients normals would turn them again.
+    // The normals point inward: a step that orients normals would flip them.
     let inward = ball().into_iter().map(|[x, y, z, r, ..]| [x, y, z, r + 0.01 * x, -x, -y, -z]);
     let points: Vec<[f32; 7]> = inward.collect();
     let camera = folder.write("ball.cam", CAMERA);
@@ -103,8 +104,8 @@ fn radii_and_normals_of_a_file_are_taken_as_they_are() {
         let cloud = folder.write(name, &bytes);
         let prepared = folder.path("prepared.ply");
         succeed(&["prepare", &cloud, "-o", &prepared]);
-        let there = load(prepared.as_ref(), &LoadOptions::default(), &Silent).unwrap().cloud;
-        let here = load_bytes(name, &bytes, &LoadOptions::default(), &Silent).unwrap().cloud;
+        let there = load(prepared.as_ref(), &LoadOptions::default(), &NoProgress).unwrap().cloud;
+        let here = load_bytes(name, &bytes, &LoadOptions::default(), &NoProgress).unwrap().cloud;
         assert_eq!((&there.positions, &there.radii), (&here.positions, &here.radii), "{name}");
         let normals = there.normals.unwrap().into_iter().zip(here.normals.unwrap());
         assert!(normals.into_iter().all(|(a, b)| a.distance(b) < 1e-6), "{name}");
@@ -114,14 +115,14 @@ fn radii_and_normals_of_a_file_are_taken_as_they_are() {
     assert_eq!(found[0], found[1]);
 }
 
-/// Hits of the camera's rays, and of those to the light.
+/// Returns the hits of camera rays and of shadow rays.
 fn hits(arguments: &[&str]) -> [Value; 2] {
     let result = bench(&[arguments, &["--resolution", "64x64"]].concat());
     ["primary", "shadow"].map(|kind| result["rays"][kind]["hits"].clone())
 }
 
 #[test]
-fn things_of_gltf_files_are_measured_where_they_stand() {
+fn bench_applies_the_transforms_of_gltf_nodes() {
     let folder = Folder::new();
     let plain = folder.write("plain.gltf", gltf());
     let expected = hits(&[&plain]);
@@ -132,13 +133,13 @@ fn things_of_gltf_files_are_measured_where_they_stand() {
         ("turned.gltf", r#""rotation":[0,0,0,-1],"translation":[5e6,0,0]"#),
     ] {
         let text = gltf().replace(r#"{"mesh":0}"#, &format!(r#"{{"mesh":0,{place}}}"#));
-        // Corners near 5e6 are rounded to halves as the file is read, but stand in doubles here.
+        // Positions near 5e6 have a precision of 0.5 in f32; node transforms are f64.
         assert_eq!(hits(&[&folder.write(name, text)]), expected, "{name}");
     }
     let twice = gltf().replace(r#""nodes":[{"mesh":0}]"#, r#""nodes":[{"mesh":0},{"mesh":0}]"#);
     let twice = twice.replace(r#"[{"nodes":[0]}]"#, r#"[{"nodes":[0,1]}]"#);
     let error = fail(&["bench", &folder.write("twice.gltf", twice)], 1);
-    assert!(error.contains("holds 2 things"), "{error}");
+    assert!(error.contains("holds 2 objects"), "{error}");
 }
 
 #[test]
@@ -151,13 +152,13 @@ fn vertices_of_a_mesh_are_measured_as_points() {
 }
 
 #[test]
-fn a_thing_out_of_sight_is_told() {
+fn bench_warns_if_no_camera_ray_hits() {
     let folder = Folder::new();
     let cloud = folder.write("ball.bin", bin(&ball()));
     let camera = folder.write("ball.cam", "3,-4,1.5,6,-9,1.5,40,-2,-5,6");
-    let told = stderr(&surfel(&["bench", &cloud, "--camera-file", &camera, "--runs", "1"]));
-    assert!(told.contains("no camera ray hits anything"), "{told}");
-    assert!(told.contains("radii as in the file"), "{told}");
+    let message = stderr(&surfel(&["bench", &cloud, "--camera-file", &camera, "--runs", "1"]));
+    assert!(message.contains("no camera ray hits anything"), "{message}");
+    assert!(message.contains("radii as in the file"), "{message}");
 }
 
 #[cfg(unix)]
@@ -172,7 +173,7 @@ fn a_pipe_is_refused_as_camera_file() {
 }
 
 #[test]
-fn every_kind_can_be_asked_for() {
+fn rays_selects_the_kinds_that_are_measured() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(30));
     let kinds = "surface,primary,gather";
@@ -191,7 +192,7 @@ fn every_kind_can_be_asked_for() {
 }
 
 #[test]
-fn spheres_are_not_gathered() {
+fn gather_rays_are_left_out_for_spheres() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(20));
     let spheres = ["bench", &cloud, "--runs", "1", "--resolution", "32x32", "--surface", "sphere"];
@@ -200,11 +201,11 @@ fn spheres_are_not_gathered() {
     assert!(!String::from_utf8_lossy(&output.stdout).contains("gather"));
     let text = fail(&[&spheres[..], &["--rays", "primary,gather"]].concat(), 2);
     assert!(text.contains("--surface sphere"), "{text}");
-    assert!(fail(&["bench", &cloud, "--surface", "points"], 2).contains("name another kind"));
+    assert!(fail(&["bench", &cloud, "--surface", "points"], 2).contains("choose another kind"));
 }
 
 #[test]
-fn a_mesh_is_measured_in_triangles() {
+fn a_mesh_is_measured_per_triangle() {
     let folder = Folder::new();
     let mesh = folder.write("tile.ply", tile(2.0, 1.0, [9; 3]));
     let result = bench(&[&mesh, "--resolution", "32x32"]);
@@ -213,13 +214,13 @@ fn a_mesh_is_measured_in_triangles() {
     assert_eq!(keys(&result["bytes_per_triangle"]), ["tree", "triangles", "total"]);
     assert!(100 < result["rays"]["primary"]["hits"].as_u64().unwrap());
     assert_eq!(keys(&result["rays"]), ["primary", "shadow", "bounce-any", "bounce"]);
-    let told = fail(&["bench", &mesh, "--runs", "1", "--rays", "gather"], 2);
-    assert!(told.contains("a mesh"), "{told}");
+    let message = fail(&["bench", &mesh, "--runs", "1", "--rays", "gather"], 2);
+    assert!(message.contains("a mesh"), "{message}");
     assert!(succeed(&["bench", &mesh, "--runs", "1", "--resolution", "9x9"]).contains("triangle"));
 }
 
 #[test]
-fn cameras_that_make_no_sense_are_told() {
+fn invalid_camera_files_are_errors() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(20));
     let with = |name: &str| fail(&["bench", &cloud, "--camera-file", name], 1);

@@ -1,8 +1,8 @@
-//! What `--clip-box` and `--clip-plane` hide.
+//! `--clip-box` and `--clip-plane` hide points and triangles.
 
 use super::common::{Folder, dome, fail, shot, tile};
 
-/// Points a unit apart on a level square about (4, 4), from `first` to `last` in both directions, as text.
+/// Returns the points of a level grid of spacing 1, from `first` to `last` along x and y, relative to `zero`, as text.
 fn level(first: i32, last: i32, zero: [f64; 2]) -> String {
     let side = first..=last;
     let places = side.clone().flat_map(|x| side.clone().map(move |y| [x, y]));
@@ -17,11 +17,11 @@ fn level(first: i32, last: i32, zero: [f64; 2]) -> String {
     places.map(line).collect()
 }
 
-/// Options by which a picture depends on nothing but the points that are seen.
+/// Options with which a picture depends on the visible points alone.
 const PLAIN: [&str; 6] = ["--light", "none", "--radius", "0.8", "--camera-view-up", "0,1,0"];
 
 #[test]
-fn what_stays_is_seen_as_if_there_were_nothing_else() {
+fn a_clip_box_shows_the_same_picture_as_a_cloud_of_the_points_inside() {
     let folder = Folder::new();
     for zero in [[0.0, 0.0], [562_300.0, 4_183_100.0]] {
         let all = folder.write("all.xyz", level(0, 8, zero));
@@ -33,7 +33,10 @@ fn what_stays_is_seen_as_if_there_were_nothing_else() {
         let plain = [&PLAIN[..], &view].concat();
         let expected = shot(&folder, &[&[middle.as_str()][..], &plain].concat());
         assert_ne!(shot(&folder, &[&[all.as_str()][..], &plain].concat()), expected);
-        for bounds in [format!("({x},{y})"), format!("( {x}, {y}, [6, 8] )")] {
+        let [x0, y0] = zero.map(|zero| zero + 1.5);
+        let [x1, y1] = zero.map(|zero| zero + 6.0);
+        let six = format!("{x0},{y0},-6,{x1},{y1},8");
+        for bounds in [format!("({x},{y})"), format!("( {x}, {y}, [6, 8] )"), six] {
             let clipped = [&[all.as_str(), "--clip-box", &bounds][..], &plain].concat();
             assert!(shot(&folder, &clipped) == expected, "{bounds}");
         }
@@ -41,7 +44,7 @@ fn what_stays_is_seen_as_if_there_were_nothing_else() {
 }
 
 #[test]
-fn triangles_are_hidden_too() {
+fn a_clip_plane_hides_triangles() {
     let folder = Folder::new();
     let both = tile(1.0, 0.0, [200, 100, 50]);
     let lower = both.replace("face 2", "face 1").replace("3 0 2 3\n", "");
@@ -54,7 +57,19 @@ fn triangles_are_hidden_too() {
 }
 
 #[test]
-fn objects_are_cut_where_they_stand_and_by_their_own_options() {
+fn a_box_of_six_numbers_may_begin_with_a_negative_one() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let view = ["--camera-position", "3,-3,3", "--camera-focal-point", "0,0,0"];
+    let clipped = |bounds: &str| {
+        shot(&folder, &[&[cloud.as_str(), "--clip-box", bounds][..], &view, &PLAIN].concat())
+    };
+    assert!(clipped("-1,-1,-1,0.5,0.5,1") == clipped("([-1,0.5],[-1,0.5],[-1,1])"));
+    assert!(clipped("-1,-1,-1,0.5,0.5,1") != clipped("-2,-2,-2,2,2,2"));
+}
+
+#[test]
+fn objects_are_clipped_in_world_coordinates_and_by_their_own_settings() {
     let folder = Folder::new();
     folder.write("first.xyz", level(0, 3, [0.0, 0.0]));
     folder.write("second.xyz", level(0, 8, [0.0, 0.0]));
@@ -72,7 +87,7 @@ fn objects_are_cut_where_they_stand_and_by_their_own_options() {
     assert!(clipped == picture(sequence, "1", &left));
     let own = format!("{second}clip_plane = [102.5, 0, 0, 1, 0, 0]");
     assert!(clipped == picture(&own, "0", &["--clip-plane", "0,0,0,1,0,0"]));
-    // A cloud of a sequence may be hidden, if that which is seen first is not.
+    // A later cloud of a sequence may be hidden entirely.
     let beyond = ["--clip-box", "([100,103],[0,8])"];
     let elsewhere = "files = [\"first.xyz\", \"far.xyz\"]\nfps = 1\n";
     folder.write("far.xyz", level(0, 3, [50.0, 0.0]));
@@ -80,19 +95,22 @@ fn objects_are_cut_where_they_stand_and_by_their_own_options() {
 }
 
 #[test]
-fn to_hide_everything_is_an_error() {
+fn clipping_everything_is_an_error() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(10));
     let mesh = folder.write("tile.ply", tile(1.0, 0.0, [200; 3]));
     let (outside, below) = ("([5,6],[5,6])", "0,0,-1,0,0,1");
-    for (options, told) in [
-        (&["--clip-box", outside][..], "--clip-box: nothing"),
-        (&["--clip-plane", below], "--clip-plane: nothing"),
-        (&["--clip-box", outside, "--clip-plane", below], "--clip-box, --clip-plane: nothing"),
+    for (options, message) in [
+        (&["--clip-box", outside][..], "--clip-box: everything is hidden"),
+        (&["--clip-plane", below], "--clip-plane: everything is hidden"),
+        (
+            &["--clip-box", outside, "--clip-plane", below],
+            "--clip-box, --clip-plane: everything is hidden",
+        ),
     ] {
         let text = fail(&[&["render", &cloud, &mesh, "-o", "no.png"], options].concat(), 2);
-        assert!(text.contains(told), "{text}");
+        assert!(text.contains(message), "{text}");
     }
-    // One of two may go.
+    // One of two files may be hidden entirely.
     shot(&folder, &[&cloud, &mesh, "--clip-plane", "0,0,0.1,0,0,-1"]);
 }

@@ -1,11 +1,11 @@
-//! Every command end to end.
+//! Each command, end to end.
 
 use super::common::{Folder, dome, fail, read_png, succeed, surfel, tile};
 use serde_json::Value;
 use std::fs;
 
 #[test]
-fn stats_take_no_other_files_place() {
+fn stats_do_not_replace_other_files() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(10));
     let bytes = fs::read(&cloud).unwrap();
@@ -13,7 +13,7 @@ fn stats_take_no_other_files_place() {
     let by_another_name = format!("{}/./dome.png", folder.path(""));
     for stats in [&cloud, &picture, &by_another_name] {
         let error = fail(&["render", &cloud, "-o", &picture, "--stats", stats], 2);
-        assert!(error.contains("would take the place of that file"), "{error}");
+        assert!(error.contains("would replace that file"), "{error}");
     }
     let nowhere = folder.path("nowhere/stats.json");
     fail(&["render", &cloud, "-o", &picture, "--stats", &nowhere], 1);
@@ -41,7 +41,7 @@ fn render_makes_a_picture_and_stats() {
 }
 
 #[test]
-fn render_takes_all_surfaces_and_colors() {
+fn render_accepts_all_surfaces_and_colors() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(30));
     let picture = folder.path("dome.png");
@@ -65,12 +65,12 @@ fn render_takes_all_surfaces_and_colors() {
     render(&["--camera-panorama"]);
     render(&["--camera-panorama", "--camera-position", "0,0,0.2", "--camera-azimuth-angle", "30"]);
     render(&["--camera-position", "-3,-3,2", "--camera-focal-point", "0,0,0"]);
-    render(&["--select", "random:200", "--radius", "0.1", "--normals-k", "8", "--orient", "up"]);
+    render(&["--subsample", "random:200", "--radius", "0.1", "--normals-k", "8", "--orient", "up"]);
     render(&["--neighbors", "grid", "--normals-radius", "0.2", "--radius", "median:6"]);
 }
 
 #[test]
-fn dry_run_tells_the_choices_and_renders_nothing() {
+fn a_dry_run_prints_the_choices_and_renders_nothing() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(20));
     let choices = succeed(&["render", &cloud, "-o", &folder.path("no.png"), "--dry-run"]);
@@ -80,7 +80,7 @@ fn dry_run_tells_the_choices_and_renders_nothing() {
 }
 
 #[test]
-fn a_panorama_looks_north_from_where_it_is_told() {
+fn a_panorama_looks_north_from_its_position() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(20));
     let common = ["render", &cloud, "-o", &folder.path("no.png"), "--dry-run", "--camera-panorama"];
@@ -91,12 +91,12 @@ fn a_panorama_looks_north_from_where_it_is_told() {
     let north = camera(&["--camera-position", "1,2,3", "--up", "+Z"]);
     assert_eq!(north["panorama"], true);
     assert_eq!(north["focal_point"], serde_json::json!([1.0, 3.0, 3.0]));
-    let told = camera(&["--camera-position", "1,2,3", "--camera-focal-point", "4,5,6"]);
-    assert_eq!(told["focal_point"], serde_json::json!([4.0, 5.0, 6.0]));
+    let camera_there = camera(&["--camera-position", "1,2,3", "--camera-focal-point", "4,5,6"]);
+    assert_eq!(camera_there["focal_point"], serde_json::json!([4.0, 5.0, 6.0]));
 }
 
 #[test]
-fn the_picture_may_go_to_stdout() {
+fn a_picture_can_be_written_to_stdout() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(20));
     let output = surfel(&["render", &cloud, "-o", "-", "--resolution", "16x9"]);
@@ -104,26 +104,26 @@ fn the_picture_may_go_to_stdout() {
 }
 
 #[test]
-fn quiet_says_nothing_and_choices_name_their_flags() {
+fn quiet_prints_nothing_and_choices_name_their_options() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(20));
     let picture = folder.path("dome.png");
     let arguments = ["render", &cloud, "-o", &picture, "--resolution", "16x9"];
-    let told = String::from_utf8(surfel(&arguments).stderr).unwrap();
-    let flags = ["--up", "--camera-position", "--sun-azimuth", "--sky-reach", "--normals-k"];
+    let message = String::from_utf8(surfel(&arguments).stderr).unwrap();
+    let flags = ["--up", "--camera-position", "--sun-azimuth", "--sky-ao-distance", "--normals-k"];
     for flag in flags.iter().chain(&["--radius", "--color", "--exposure", "--threads"]) {
-        assert!(told.contains(&format!("[{flag}")), "{flag}: {told}");
+        assert!(message.contains(&format!("[{flag}")), "{flag}: {message}");
     }
     for what in ["normals of 400 points from 16 neighbours [", "radii 0.", "color rgb"] {
-        assert_eq!(told.matches(what).count(), 1, "{what}: {told}");
+        assert_eq!(message.matches(what).count(), 1, "{what}: {message}");
     }
-    assert_eq!(told.matches("normals").count(), 2, "once in words, once as a flag: {told}");
+    assert_eq!(message.matches("normals").count(), 2, "once in words, once as a flag: {message}");
     let quiet = surfel(&[&arguments[..], &["--quiet"]].concat());
     assert!(quiet.stderr.is_empty() && quiet.stdout.is_empty());
 }
 
 #[test]
-fn prepare_does_what_is_asked_for_alone_or_all() {
+fn prepare_adds_the_requested_columns_or_all() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(30));
     let prepared = folder.path("out.ply");
@@ -140,11 +140,11 @@ fn prepare_does_what_is_asked_for_alone_or_all() {
     assert_eq!(columns(&["--radius", "0.1"]), (900, [false, true, false]));
     assert_eq!(columns(&["--orient", "mst"]), (900, [true, false, false]));
     assert_eq!(columns(&["--keep-variation"]), (900, [false, false, true]));
-    assert_eq!(columns(&["--select", "first:10"]), (10, [false, false, false]));
+    assert_eq!(columns(&["--subsample", "first:10"]), (10, [false, false, false]));
 }
 
 #[test]
-fn info_tells_a_person_and_a_program() {
+fn info_prints_a_table_or_json() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(20));
     let table = succeed(&["info", &cloud]);
@@ -155,7 +155,7 @@ fn info_tells_a_person_and_a_program() {
 }
 
 #[test]
-fn info_and_prepare_take_a_mesh() {
+fn info_and_prepare_accept_meshes() {
     let folder = Folder::new();
     let mesh = folder.write("tile.ply", tile(2.0, 1.0, [10, 20, 30]));
     let info: Value = serde_json::from_str(&succeed(&["info", "--json", &mesh])).unwrap();
@@ -172,19 +172,11 @@ fn info_and_prepare_take_a_mesh() {
 fn demo_scans_and_renders() {
     let folder = Folder::new();
     let output = folder.path("demo");
-    let told = succeed(&["demo", "-o", &output, "--points", "3000"]);
-    assert!(told.contains("surfel render") && told.contains("demo.laz"), "{told}");
-    // What it prints can be typed again.
-    assert!(told.contains("--background '#4f7fb8,#d5e2ee'"), "{told}");
+    let summary = succeed(&["demo", "-o", &output, "--points", "3000"]);
+    assert!(summary.contains("surfel render") && summary.contains("demo.laz"), "{summary}");
+    // The printed command is quoted for a shell.
+    assert!(summary.contains("'--background=#4f7fb8,#d5e2ee'"), "{summary}");
     let (width, height, ..) = read_png(folder.0.join("demo/demo.png"));
     assert_eq!((width, height), (1280, 720));
     assert!(fs::metadata(folder.0.join("demo/demo.laz")).unwrap().len() > 10_000);
-}
-
-#[test]
-fn help_has_examples() {
-    for command in ["render", "animate", "info", "prepare", "demo", "bench"] {
-        let help = succeed(&[command, "--help"]);
-        assert!(help.contains("Examples:") && help.contains("--threads"), "{help}");
-    }
 }

@@ -1,11 +1,15 @@
-//! Folders, clouds and runs of the program for the tests.
+//! Temporary folders, sample files and runs of the program, which the tests share.
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, ExitStatus, Output};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
 
-/// A folder of its own for each test, removed at the end.
+/// Maximum time in which a process must end after a signal: far longer than a busy machine needs.
+const END_TIMEOUT: Duration = Duration::from_secs(60);
+
+/// A temporary folder for one test, removed at its end.
 pub struct Folder(pub PathBuf);
 
 impl Folder {
@@ -27,7 +31,7 @@ impl Folder {
         self.path(name)
     }
 
-    /// Names of the files in it, sorted.
+    /// Returns the sorted names of its files.
     pub fn names(&self) -> Vec<String> {
         let entries = fs::read_dir(&self.0).unwrap();
         let name = |entry: std::io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string();
@@ -39,7 +43,7 @@ impl Folder {
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        // What stays behind in the system's temporary folder harms nobody.
+        // The system cleans its temporary folder.
         let _ = fs::remove_dir_all(&self.0);
     }
 }
@@ -54,14 +58,14 @@ pub fn surfel(arguments: &[&str]) -> Output {
     command(arguments).output().unwrap()
 }
 
-/// A run that must succeed; its stdout.
+/// Runs the program, which must succeed; returns its stdout.
 pub fn succeed(arguments: &[&str]) -> String {
     let output = surfel(arguments);
     assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// A run that must fail with this code, in one line of its own; its stderr.
+/// Runs the program, which must fail with this code and a line that starts with `error: `; returns its stderr.
 pub fn fail(arguments: &[&str], code: i32) -> String {
     let output = surfel(arguments);
     let text = stderr(&output);
@@ -71,11 +75,24 @@ pub fn fail(arguments: &[&str], code: i32) -> String {
     text
 }
 
+/// Waits for a process to end; kills it and panics after a timeout.
+pub fn wait(child: &mut Child) -> ExitStatus {
+    let start = Instant::now();
+    while start.elapsed() < END_TIMEOUT {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    panic!("the process was still running after {END_TIMEOUT:?}");
+}
+
 pub fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// A hemisphere on a floor, coloured, with a class and a column of its own, as PLY.
+/// Returns a coloured hemisphere on a floor as PLY, with classes and the column `rain`.
 pub fn dome(n_side: usize) -> String {
     let place = |i: usize| 2.0 * i as f64 / (n_side - 1) as f64 - 1.0;
     let mut body = String::new();
@@ -90,13 +107,13 @@ pub fn dome(n_side: usize) -> String {
     format!("ply\nformat ascii 1.0\nelement vertex {}\n{header}{body}", n_side * n_side)
 }
 
-/// A level square of points in one colour, as text.
+/// Returns a level square of points of one grey as text.
 pub fn square(n_side: usize, color: u8) -> String {
     let points = (0..n_side * n_side).map(|n| (n % n_side, n / n_side));
     points.map(|(x, y)| format!("{x} {y} 0 {color} {color} {color}\n")).collect()
 }
 
-/// Width, height, channels and samples of an 8-bit PNG.
+/// Returns width, height, channels and samples of an 8-bit PNG.
 pub fn read_png(path: impl AsRef<Path>) -> (u32, u32, usize, Vec<u8>) {
     let file = std::io::BufReader::new(fs::File::open(path).unwrap());
     let mut reader = png::Decoder::new(file).read_info().unwrap();
@@ -106,7 +123,7 @@ pub fn read_png(path: impl AsRef<Path>) -> (u32, u32, usize, Vec<u8>) {
     (info.width, info.height, info.color_type.samples(), samples)
 }
 
-/// Two triangles that make a square at a height, in one colour, as PLY.
+/// Returns a square of two triangles at height `z` in one colour as PLY.
 pub fn tile(size: f64, z: f64, color: [u8; 3]) -> String {
     let [r, g, b] = color;
     let corners = [(-size, -size), (size, -size), (size, size), (-size, size)];
@@ -117,7 +134,7 @@ pub fn tile(size: f64, z: f64, color: [u8; 3]) -> String {
     format!("ply\nformat ascii 1.0\nelement vertex 4\n{header}{corners}3 0 1 2\n3 0 2 3\n")
 }
 
-/// A triangle that moves three to the right within two seconds and stays there, as glTF.
+/// Returns a triangle that moves by 3 along x within two seconds as glTF.
 pub fn gltf() -> String {
     let triangle = [-1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.0, 0.0f32];
     let (times, places) = ([0.0, 2.0f32], [0.0, 0.0, 0.0, 3.0, 0.0, 0.0f32]);
@@ -142,8 +159,8 @@ pub fn gltf() -> String {
     )
 }
 
-/// The same triangle before two cameras: `still` at rest, which sees 0.5 rad, and `eye`, which goes three to
-/// the right.
+/// Returns the triangle of [`gltf`] at rest with two cameras: `still` with a view angle of 0.5 rad, and `eye`, which
+/// moves by 3 along x.
 pub fn gltf_with_cameras() -> String {
     let nodes = r#"{"mesh":0,"name":"triangle"},
 {"name":"still","camera":0,"translation":[0,1,7]},{"name":"eye","camera":1,"translation":[0,1,9]}"#;
@@ -157,14 +174,14 @@ pub fn gltf_with_cameras() -> String {
         .replace(r#""target":{"node":0"#, r#""target":{"node":2"#)
 }
 
-/// A picture of light, twice as wide as high: bright where the east is.
+/// Returns an environment map as HDR, twice as wide as high and brightest in the east.
 pub fn light_picture() -> Vec<u8> {
     let head = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n";
     let row = [[40, 60, 90, 128], [60, 60, 60, 128], [250, 200, 90, 130], [60, 60, 60, 128]];
     [&head[..], row.as_flattened(), row.as_flattened()].concat()
 }
 
-/// The bytes of a small picture.
+/// Renders a small picture and returns the bytes of its file.
 pub fn shot(folder: &Folder, arguments: &[&str]) -> Vec<u8> {
     let picture = folder.path("shot.png");
     succeed(&[&["render"], arguments, &SMALL, &["-o", &picture]].concat());
@@ -173,5 +190,5 @@ pub fn shot(folder: &Folder, arguments: &[&str]) -> Vec<u8> {
     bytes
 }
 
-/// Options of a picture that takes no time.
-pub const SMALL: [&str; 6] = ["--resolution", "32x24", "--spp", "1", "--samples", "1"];
+/// Options of a picture that renders quickly.
+pub const SMALL: [&str; 6] = ["--resolution", "32x24", "--spp", "1", "--light-samples", "1"];

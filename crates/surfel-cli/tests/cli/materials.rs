@@ -1,12 +1,12 @@
-//! What things are made of, and what lights them.
+//! Materials, and the light of environment maps.
 
 use super::common::{
     Folder, SMALL, fail, light_picture, read_png, shot, stderr, succeed, surfel, tile,
 };
-use super::scenes::{site, told_and_made};
+use super::scenes::{picture_and_replay, site};
 
 #[test]
-fn materials_are_for_all_or_for_one() {
+fn materials_apply_to_everything_or_to_one_file() {
     let folder = site();
     let (cloud, mesh) = (folder.path("dome.ply"), folder.path("tile.ply"));
     let with = |materials: &[&str]| {
@@ -31,7 +31,7 @@ fn materials_are_for_all_or_for_one() {
 }
 
 #[test]
-fn materials_of_the_command_line_reach_objects() {
+fn materials_of_the_command_line_apply_to_objects() {
     let folder = site();
     let objects = |material: &str| {
         format!(
@@ -45,7 +45,7 @@ fn materials_of_the_command_line_reach_objects() {
     assert_ne!(shot(&folder, &[&plain]), own);
     assert_eq!(shot(&folder, &[&plain, "--material", "tile.ply=unlit"]), own);
     assert_eq!(shot(&folder, &[&plain, "--material", "tile=unlit"]), own);
-    // For all: an object's own stays. Named, it is the object's.
+    // A material for everything leaves an object's own; one for the object replaces it.
     assert_eq!(shot(&folder, &[&unlit, "--material", "matte"]), own);
     let mirror = shot(&folder, &[&unlit, "--material", "house=mirror"]);
     assert_ne!(mirror, own);
@@ -57,12 +57,12 @@ fn materials_of_the_command_line_reach_objects() {
     assert_ne!(shot(&folder, &[&top]), shot(&folder, &[&plain]));
     let text = fail(&["render", &plain, "-o", "no.png", "--material", "hous=glass"], 2);
     assert!(text.contains("house"), "{text}");
-    let (made, again) = told_and_made(&folder, &[&unlit, "--material", "house=glass"]);
+    let (made, again) = picture_and_replay(&folder, &[&unlit, "--material", "house=glass"]);
     assert!(made == again);
 }
 
 #[test]
-fn without_light_colours_of_meshes_are_as_they_are() {
+fn meshes_without_light_show_their_colours() {
     let folder = Folder::new();
     let mesh = folder.write("tile.ply", tile(1.0, 0.0, [128, 64, 200]));
     let view = ["--camera-direction", "0,0,-1", "--camera-orthographic", "1"];
@@ -74,7 +74,7 @@ fn without_light_colours_of_meshes_are_as_they_are() {
 }
 
 #[test]
-fn without_light_materials_that_need_it_are_as_they_are() {
+fn materials_without_light_show_their_colours() {
     let folder = Folder::new();
     let mesh = folder.write("tile.ply", tile(1.0, 0.0, [255, 255, 255]));
     let light = folder.write("light.hdr", light_picture());
@@ -90,17 +90,17 @@ fn without_light_materials_that_need_it_are_as_they_are() {
         let material = format!("{kind}color=#8040c8");
         assert!(is_all([128, 64, 200], &["--material", &material]), "{kind}");
     }
-    // What mirrors, shines or lets light through shows just that.
+    // Mirrors, metals and glass are black without light.
     for kind in ["mirror", "metal", "glass"] {
         assert!(is_all([0; 3], &["--material", kind]), "{kind}");
     }
-    // An environment gives light.
+    // An environment map lights the scene.
     let lit = ["--material", "matte:color=#8040c8", "--environment", &light];
     assert!(!is_all([128, 64, 200], &lit));
 }
 
 #[test]
-fn an_environment_gives_light_and_may_be_seen() {
+fn an_environment_lights_the_scene_and_can_be_the_background() {
     let folder = site();
     let cloud = folder.path("dome.ply");
     let light = folder.write("light.hdr", light_picture());
@@ -110,8 +110,8 @@ fn an_environment_gives_light_and_may_be_seen() {
     assert_ne!(plain, shot(&folder, &[&cloud]));
     assert_ne!(plain, lit(&["--environment-rotation", "180"]));
     assert_ne!(plain, lit(&["--light", "sun"]));
-    // Behind a dome seen from above is nothing but the picture.
-    let around = ["--background", "surroundings", "--camera-elevation-angle", "10"];
+    // The camera is low enough to see the environment behind the dome.
+    let around = ["--background", "environment", "--camera-elevation-angle", "10"];
     let (black, seen) = (["--background", "#000", around[2], around[3]], lit(&around));
     assert_ne!(lit(&black), seen);
     let dark = folder.path("dark.exr");
@@ -121,7 +121,7 @@ fn an_environment_gives_light_and_may_be_seen() {
     let arguments = ["render", &cloud, "--environment", &dark, "-o", &picture];
     let output = surfel(&[&arguments, &SMALL[..]].concat());
     let text = stderr(&output);
-    assert!(text.contains("dark.exr: 1 pixels with values that are no light"), "{text}");
+    assert!(text.contains("dark.exr: 1 pixels repaired that are no light"), "{text}");
     let broken = folder.write("broken.hdr", "#?RADIANCE\n\n-Y 9");
     let text = fail(&["render", &cloud, "-o", "no.png", "--environment", &broken], 1);
     assert!(text.contains("broken.hdr"), "{text}");

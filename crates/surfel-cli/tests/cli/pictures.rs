@@ -1,10 +1,10 @@
-//! Pictures whose pixels are known.
+//! Pixels, layers and bytes of pictures.
 
 use super::common::{Folder, dome, read_png, shot, square, succeed};
 use std::fs;
 
 #[test]
-fn unlit_128_in_is_128_out() {
+fn an_unlit_grey_of_128_is_128_in_the_picture() {
     let folder = Folder::new();
     let cloud = folder.write("grey.xyz", square(30, 128));
     let picture = folder.path("grey.png");
@@ -18,7 +18,7 @@ fn unlit_128_in_is_128_out() {
 }
 
 #[test]
-fn a_transparent_background_has_no_alpha_and_the_cloud_has() {
+fn a_transparent_background_has_alpha_0_and_the_cloud_255() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(30));
     let picture = folder.path("dome.png");
@@ -36,7 +36,25 @@ fn a_transparent_background_has_no_alpha_and_the_cloud_has() {
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_bytes() {
+fn colours_may_be_css_names_and_height_is_elevation() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let picture = |options: &[&str]| shot(&folder, &[&[cloud.as_str()][..], options].concat());
+    for (name, digits) in [("red", "#ff0000"), ("SteelBlue", "#4682b4"), ("#fa0", "#ffaa00")] {
+        let constant = picture(&["--color", name]);
+        assert!(constant == picture(&["--color", digits]), "{name}");
+        let background = picture(&["--background", name]);
+        assert!(background == picture(&["--background", digits]), "{name}");
+        assert!(background != constant, "{name}");
+    }
+    assert!(picture(&["--background", "white,navy"]) == picture(&["--background", "#fff,#000080"]));
+    let elevation = picture(&["--color", "elevation", "--cmap", "turbo"]);
+    assert!(picture(&["--color", "height", "--cmap", "turbo"]) == elevation);
+    assert!(picture(&["--color", "rain", "--cmap", "turbo"]) != elevation);
+}
+
+#[test]
+fn pictures_are_independent_of_the_number_of_threads() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(60));
     let render = |threads: &str, extension: &str| {
@@ -51,7 +69,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
 }
 
 #[test]
-fn radii_are_scaled_whatever_they_come_from() {
+fn radius_scale_applies_to_fixed_and_estimated_radii() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(20));
     let picture = |options: &[&str]| shot(&folder, &[&[cloud.as_str()][..], options].concat());
@@ -76,7 +94,7 @@ fn an_exr_has_all_layers() {
 }
 
 #[test]
-fn one_point_and_a_line_make_a_picture() {
+fn one_point_and_a_line_can_be_rendered() {
     let folder = Folder::new();
     let line: String = (0..50).map(|i| format!("{i} 0 0\n")).collect();
     let clouds = [("one.xyz", "1 2 3\n"), ("equal.xyz", &"1 2 3\n".repeat(9)), ("line.xyz", &line)];

@@ -1,12 +1,12 @@
-//! Films that were stopped and are taken up again.
+//! Interrupted movies continue with `--resume`.
 
-use super::animate::{film, read_gif};
+use super::animate::{movie, read_gif};
 use super::common::{Folder, command, dome, fail, stderr, succeed};
 use std::fs;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Stops a film by Ctrl-C when so many frames of it are kept in a folder.
+/// Runs the program and sends SIGINT as soon as the folder has this file.
 fn interrupt(arguments: &[&str], folder: &str, pattern: &str) {
     let mut child = command(arguments).stderr(Stdio::piped()).spawn().unwrap();
     let start = Instant::now();
@@ -22,16 +22,16 @@ fn interrupt(arguments: &[&str], folder: &str, pattern: &str) {
     let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(kill.unwrap().success());
     let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
     assert!(stderr(&output).contains("--resume"), "{}", stderr(&output));
 }
 
-/// Long enough that it is stopped on its way.
+/// Options of a movie that takes long enough to be interrupted.
 const LONG: [&str; 8] =
     ["--turntable", "4", "--fps", "10", "--resolution", "160x120", "--spp", "4"];
 
 #[test]
-fn a_film_that_was_stopped_is_taken_up_where_it_was() {
+fn an_interrupted_movie_continues_with_the_missing_frames() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(40));
     let whole = folder.path("whole.gif");
@@ -43,23 +43,23 @@ fn a_film_that_was_stopped_is_taken_up_where_it_was() {
     assert!(!folder.names().contains(&"part.gif".to_owned()));
     let first = fs::metadata(format!("{frames}/000001.png")).unwrap().modified().unwrap();
 
-    // Other settings, another file: refused, and what is there stays.
+    // Other settings are rejected, and the finished frames stay.
     let resume = [&arguments[..], &["--resume"]].concat();
     for other in [&["--seed", "3"][..], &["--cmap", "turbo"], &["--radius", "0.3"]] {
-        let told = fail(&[&resume[..], other].concat(), 1);
-        assert!(told.contains("part.gif") && told.contains("ask for the same"), "{told}");
+        let message = fail(&[&resume[..], other].concat(), 1);
+        assert!(message.contains("part.gif") && message.contains("request the same"), "{message}");
     }
     let again = fs::metadata(format!("{frames}/000001.png")).unwrap().modified().unwrap();
     assert_eq!(first, again);
 
-    let told = stderr(&command(&resume).output().unwrap());
-    assert!(told.contains("of 40 frames are there already"), "{told}");
+    let message = stderr(&command(&resume).output().unwrap());
+    assert!(message.contains("of 40 frames are there already"), "{message}");
     assert!(fs::read(&part).unwrap() == fs::read(&whole).unwrap());
     assert_eq!(folder.names(), ["dome.ply", "part.gif", "whole.gif"]);
 }
 
 #[test]
-fn a_film_is_not_taken_up_with_other_materials() {
+fn a_movie_with_changed_materials_is_not_resumed() {
     let folder = Folder::new();
     let grid = (0..400).map(|i| format!("v {} {} {}\n", i % 20, i / 20, (i * i) % 5));
     let faces = (1..379).map(|i| format!("f {i} {} {}\n", i + 1, i + 20));
@@ -70,12 +70,12 @@ fn a_film_is_not_taken_up_with_other_materials() {
     let arguments = [&["animate", &mesh, "-o", &part], &LONG[..]].concat();
     interrupt(&arguments, &folder.path("part.gif.frames"), "000002.png");
     folder.write("m.mtl", "newmtl m\nKd 0 0.5 0\n");
-    let told = fail(&[&arguments[..], &["--resume"]].concat(), 1);
-    assert!(told.contains("ask for the same"), "{told}");
+    let message = fail(&[&arguments[..], &["--resume"]].concat(), 1);
+    assert!(message.contains("request the same"), "{message}");
 }
 
 #[test]
-fn numbered_pictures_are_taken_up_too() {
+fn numbered_pictures_can_be_resumed() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(40));
     let part = folder.path("f##.png");
@@ -91,10 +91,10 @@ fn numbered_pictures_are_taken_up_too() {
 }
 
 #[test]
-fn nothing_to_take_up_is_a_film_from_the_start() {
+fn resume_without_frames_starts_a_new_movie() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(10));
-    let path = folder.path("film.gif");
-    film(&[&cloud, "-o", &path, "--turntable", "1", "--fps", "3", "--resume"]);
+    let path = folder.path("movie.gif");
+    movie(&[&cloud, "-o", &path, "--turntable", "1", "--fps", "3", "--resume"]);
     assert_eq!(read_gif(&path).0, 3);
 }

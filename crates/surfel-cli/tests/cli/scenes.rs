@@ -1,15 +1,15 @@
-//! Scene files, and several files at once: what they show, and how options go together.
+//! Scene files, several inputs, and how their keys combine with options.
 
 use super::common::{Folder, SMALL, command, dome, gltf, light_picture, shot, tile};
 use super::common::{fail, square, stderr, succeed};
 use serde_json::{Value, json};
 use std::fs;
 
-/// Objects, lamps, copies, materials and movement.
+/// A scene with objects, lamps, instances, materials and animations.
 const SCENE: &str = r##"
 spp = 1
 resolution = [32, 24]
-samples = 1
+light_samples = 1
 light = ["sun"]
 
 [camera]
@@ -20,7 +20,7 @@ focal_point = [0.5, 0, 0]
 name = "dome"
 file = "dome.ply"
 material = { kind = "plastic", roughness = 0.4 }
-copies = [{ translate = [2.5, 0, 0] }, { translate = [0, 2.5, 0], rotate = [0, 0, 45], scale = 0.5 }]
+instances = [{ translate = [2.5, 0, 0] }, { translate = [0, 2.5, 0], rotate = [0, 0, 45], scale = 0.5 }]
 
 [[object]]
 name = "roof"
@@ -46,17 +46,17 @@ center = [0, 0, 3]
 seconds = 4
 "##;
 
-/// The same, with the other spelling of keys.
+/// Returns the same scene as JSON, with other spellings of its keys.
 fn scene_json() -> String {
     let scene = json!({
-        "spp": 1, "samples": 1, "resolution": "32x24", "light": "sun",
+        "spp": 1, "light_samples": 1, "resolution": "32x24", "light": "sun",
         "camera-position": [4, -7, 5],
         "camera": { "focal-point": "0.5,0,0" },
         "object": [
             {
                 "name": "dome", "file": "dome.ply",
                 "material": { "kind": "plastic", "roughness": 0.4 },
-                "copies": [
+                "instances": [
                     { "translate": [2.5, 0, 0] },
                     { "translate": [0, 2.5, 0], "rotate": [0, 0, 45], "scale": 0.5 },
                 ],
@@ -83,7 +83,7 @@ pub fn site() -> Folder {
 }
 
 #[test]
-fn toml_and_json_make_the_same_picture() {
+fn toml_and_json_describe_the_same_picture() {
     let folder = site();
     let toml = folder.write("scene.toml", SCENE);
     let json = folder.write("scene.json", scene_json());
@@ -94,7 +94,7 @@ fn toml_and_json_make_the_same_picture() {
 }
 
 #[test]
-fn the_command_line_wins_over_the_scene_file() {
+fn the_command_line_overrides_the_scene_file() {
     let folder = site();
     let scene = |name: &str, options: &str| {
         folder.write(name, format!("{options}\n[[object]]\nfile = \"dome.ply\"\n"))
@@ -108,7 +108,7 @@ fn the_command_line_wins_over_the_scene_file() {
 }
 
 #[test]
-fn what_does_not_go_with_the_command_line_is_left_out() {
+fn keys_that_options_exclude_are_ignored() {
     let folder = site();
     let object = "[[object]]\nfile = \"dome.ply\"\n";
     let plain = folder.write("plain.toml", object);
@@ -119,12 +119,10 @@ fn what_does_not_go_with_the_command_line_is_left_out() {
         ("camera.position = [3, 3, 3]", &["--camera-zoom-factor", "2"]),
         ("camera.view_angle = 60", &["--camera-panorama"]),
         ("camera.panorama = true", &["--camera-orthographic"]),
-        ("no_background = true", &["--background", "#123456"]),
+        ("background = \"transparent\"", &["--background", "#123456"]),
         ("background = \"#123456\"", &["--no-background"]),
         ("normals_k = 8", &["--normals-radius", "0.4"]),
         ("normals_radius = 0.4", &["--normals-k", "8"]),
-        ("quiet = true", &["--verbose"]),
-        ("verbose = true", &["--quiet"]),
     ] {
         let scene = folder.write("scene.toml", format!("{options}\n{object}"));
         let with = |file: &str| shot(&folder, &[&[file], line].concat());
@@ -133,7 +131,7 @@ fn what_does_not_go_with_the_command_line_is_left_out() {
 }
 
 #[test]
-fn a_flag_of_a_scene_file_does_not_take_the_file_for_its_value() {
+fn a_flag_does_not_consume_the_file_after_it() {
     let folder = site();
     let scene = |name: &str, options: &str| {
         folder.write(name, format!("{options}\n[[object]]\nfile = \"dome.ply\"\n"))
@@ -145,21 +143,21 @@ fn a_flag_of_a_scene_file_does_not_take_the_file_for_its_value() {
     for words in [&["render", &flag, "-o", &output][..], &["render", "-o", &output, "--", &flag]] {
         succeed(&[&["-q"], words].concat());
     }
-    let off = scene("off.toml", "camera.orthographic = false\nno_background = false");
+    let off = scene("off.toml", "camera.orthographic = false");
     assert_ne!(shot(&folder, &[&off]), plain);
 }
 
 #[test]
-fn files_are_found_from_where_the_scene_lies_and_the_output_from_where_one_is() {
+fn inputs_are_relative_to_the_scene_file_and_outputs_to_the_working_directory() {
     let folder = site();
     fs::create_dir_all(folder.0.join("data")).unwrap();
     fs::create_dir_all(folder.0.join("work")).unwrap();
     fs::rename(folder.path("dome.ply"), folder.path("data/dome.ply")).unwrap();
     folder.write("data/light.hdr", light_picture());
-    let scene = "output = \"picture.png\"\nresolution = [32, 24]\nspp = 1\nsamples = 1\n\
+    let scene = "output = \"picture.png\"\nresolution = [32, 24]\nspp = 1\nlight_samples = 1\n\
         [environment]\nrotation = 90\n[[object]]\nfile = \"dome.ply\"\n";
     let scene = scene.replace("[environment]", "environment = \"light.hdr\"\n[environment]");
-    // A key cannot be both a value and a table in TOML; the long name says it.
+    // TOML does not allow a key to be a value and a table, hence `environment-rotation`.
     let scene = scene.replace("[environment]\nrotation", "environment-rotation");
     folder.write("data/scene.toml", scene);
     let status = command(&["render", "../data/scene.toml"])
@@ -172,21 +170,22 @@ fn files_are_found_from_where_the_scene_lies_and_the_output_from_where_one_is() 
     assert_eq!(fs::read_dir(folder.0.join("data")).unwrap().count(), 3);
 }
 
-/// The picture of a run, and that of what its dry run tells.
-pub fn told_and_made(folder: &Folder, arguments: &[&str]) -> (Vec<u8>, Vec<u8>) {
+/// Returns the picture of a run, and the picture of the scene file that its dry run prints.
+pub fn picture_and_replay(folder: &Folder, arguments: &[&str]) -> (Vec<u8>, Vec<u8>) {
     let made = shot(folder, arguments);
     let output = folder.path("again.png");
-    let told = succeed(&[&["render"], arguments, &SMALL, &["-o", &output, "--dry-run"]].concat());
-    // Elsewhere, as all that it names is named in full.
+    let dry_run =
+        succeed(&[&["render"], arguments, &SMALL, &["-o", &output, "--dry-run"]].concat());
+    // The folder differs, as all paths are absolute.
     fs::create_dir_all(folder.0.join("elsewhere")).unwrap();
-    let told = folder.write("elsewhere/told.json", told);
-    succeed(&["render", &told]);
+    let dry_run = folder.write("elsewhere/dry_run.json", dry_run);
+    succeed(&["render", &dry_run]);
     let again = fs::read(&output).unwrap();
     (made, again)
 }
 
 #[test]
-fn a_dry_run_tells_a_scene_that_makes_the_same_picture() {
+fn a_dry_run_renders_to_the_same_picture() {
     let folder = site();
     let scene = folder.write("scene.toml", SCENE);
     let (cloud, mesh) = (folder.path("dome.ply"), folder.path("tile.ply"));
@@ -196,10 +195,10 @@ fn a_dry_run_tells_a_scene_that_makes_the_same_picture() {
         &[scene.as_str(), "--time", "0.7"][..],
         &[&scene, &far, "--light", "sky,headlight"],
         &[&cloud, &mesh, "--material", "dome=glass:ior=1.3"],
-        &[&cloud, "--select", "random:150", "--radius", "0.3", "--seed", "7"],
+        &[&cloud, "--subsample", "random:150", "--radius", "0.3", "--seed", "7"],
         &[&cloud, "--color", "rain", "--cmap", "turbo_r", "--range", "5,200"],
         &[&cloud, "--normals-radius", "0.4", "--orient", "up", "--neighbors", "grid"],
-        &[&cloud, "--surface", "sphere", "--boundary", "off", "--exposure", "-1"],
+        &[&cloud, "--surface", "sphere", "--edge-test", "off", "--exposure", "-1"],
         &[&cloud, "--radius-scale", "1.5", "--clip-box", "([-0.5, 1],[-1,1])"],
         &[&cloud, "--clip-plane", "0,0,0.5,0,0,1"],
         &[&cloud, "--up", "1,2,3", "--sun-elevation", "33.3", "--sun-angle", "5"],
@@ -207,28 +206,37 @@ fn a_dry_run_tells_a_scene_that_makes_the_same_picture() {
         &[&cloud, "--camera-panorama", "--camera-azimuth-angle", "30"],
         &[&cloud, "--camera-orthographic", "--camera-direction", "0.1,0.2,-1"],
         &[&cloud, "--environment", &light, "--environment-rotation", "40"],
-        &[&cloud, "--environment", &light, "--background", "surroundings", "--light", "sun"],
+        &[&cloud, "--environment", &light, "--background", "environment", "--light", "sun"],
         &[&mesh, "--light", "none"],
         &[&mesh, "--light", "none", "--environment", &light],
         &[&mesh, &cloud, "--vertices", "--surface", "points", "--no-background"],
         &[&mesh, "--vertices", "--radius", "1", "--background", "#102030,#fedcba"],
-        &[&mesh, "--material", "emissive:glow=2,color=#ffcc00", "--max-depth", "1"],
-        &[&far, "--columns", "x,y,z,intensity,-,-", "--sky-reach", "0.123", "--bit-depth", "16"],
+        &[&mesh, "--material", "emissive:emissive-strength=2,color=#ffcc00", "--max-depth", "1"],
+        &[
+            &far,
+            "--columns",
+            "x,y,z,intensity,-,-",
+            "--sky-ao-distance",
+            "0.123",
+            "--bit-depth",
+            "16",
+        ],
     ] {
-        let (made, again) = told_and_made(&folder, arguments);
+        let (made, again) = picture_and_replay(&folder, arguments);
         assert!(made == again, "{arguments:?}");
     }
 }
 
 #[test]
-fn a_dry_run_keeps_clouds_together_that_were_one() {
+fn a_dry_run_keeps_clouds_merged() {
     let folder = site();
     let near = folder.write("near.xyz", square(5, 90));
     let far = folder.write("far.xyz", square(9, 200));
     let mesh = folder.path("tile.ply");
-    let (made, again) = told_and_made(&folder, &[&near, &mesh, &far, "--radius", "adaptive:3"]);
+    let (made, again) =
+        picture_and_replay(&folder, &[&near, &mesh, &far, "--radius", "adaptive:3"]);
     assert!(made == again);
-    let (made, again) = told_and_made(&folder, &[&near, &far, "--material", "far=mirror"]);
+    let (made, again) = picture_and_replay(&folder, &[&near, &far, "--material", "far=mirror"]);
     assert!(made == again);
 }
 
@@ -238,21 +246,21 @@ fn a_dry_run_of_clouds_with_other_columns_can_be_rendered() {
     let bare = folder.write("bare.xyz", "0 0 3\n1 0 3\n0 1 3\n1 1 3.5\n");
     let scene = "[[object]]\nfile = \"dome.ply\"\n[[object]]\nfile = \"bare.xyz\"\n";
     let scene = folder.write("scene.toml", scene);
-    let (made, again) = told_and_made(&folder, &[&scene, "--radius", "0.5"]);
+    let (made, again) = picture_and_replay(&folder, &[&scene, "--radius", "0.5"]);
     assert!(made == again);
     let own =
         "[[object]]\nfile = \"dome.ply\"\ncolor = \"rain\"\n[[object]]\nfile = \"bare.xyz\"\n";
-    let (made, again) = told_and_made(&folder, &[&folder.write("own.toml", own), &bare]);
+    let (made, again) = picture_and_replay(&folder, &[&folder.write("own.toml", own), &bare]);
     assert!(made == again);
 }
 
 fn dry(arguments: &[&str]) -> Value {
-    let told = succeed(&[&["render"], arguments, &["--dry-run"]].concat());
-    serde_json::from_str(&told).unwrap()
+    let dry_run = succeed(&[&["render"], arguments, &["--dry-run"]].concat());
+    serde_json::from_str(&dry_run).unwrap()
 }
 
 #[test]
-fn cloud_mesh_and_gltf_are_one_scene() {
+fn clouds_meshes_and_gltf_files_form_one_scene() {
     let folder = site();
     let scene = folder.write("triangle.gltf", gltf());
     let (cloud, mesh) = (folder.path("dome.ply"), folder.path("tile.ply"));
@@ -267,10 +275,10 @@ fn cloud_mesh_and_gltf_are_one_scene() {
 }
 
 #[test]
-fn objects_of_the_same_name_as_their_file_or_as_others_keep_apart() {
+fn objects_named_like_files_do_not_clash() {
     let folder = site();
     folder.write("triangle.gltf", gltf());
-    // What is shown twice is held once, also where an object is named as its file is.
+    // Content that is shown twice is stored once, also if an object is named like its file.
     let twice = "[[object]]\nname = \"tile.ply\"\nfile = \"tile.ply\"\n\
         [[object]]\nname = \"b\"\nfile = \"tile.ply\"\ntranslate = [9, 0, 0]\n";
     let apart = twice.replace("name = \"tile.ply\"", "name = \"a\"");
@@ -291,7 +299,7 @@ fn objects_of_the_same_name_as_their_file_or_as_others_keep_apart() {
 }
 
 #[test]
-fn a_parent_is_an_object_and_not_a_node_in_a_file() {
+fn a_parent_is_an_object_and_not_a_node_of_a_file() {
     let folder = site();
     folder.write("triangle.gltf", gltf().replace("{\"mesh\":0}", "{\"mesh\":0,\"name\":\"b\"}"));
     let scene = |name: &str| {
@@ -306,7 +314,7 @@ fn a_parent_is_an_object_and_not_a_node_in_a_file() {
 }
 
 #[test]
-fn options_of_an_object_win_over_those_of_the_scene() {
+fn settings_of_an_object_override_those_of_the_scene() {
     let folder = site();
     let scene = |options: &str, own: &str| {
         let text = format!("{options}\n[[object]]\nfile = \"dome.ply\"\n{own}\n");
@@ -315,7 +323,7 @@ fn options_of_an_object_win_over_those_of_the_scene() {
     let own = shot(&folder, &[&scene("", "normals_radius = 0.4")]);
     let plain = shot(&folder, &[&scene("", "")]);
     assert_ne!(own, plain);
-    // Also where the two do not go together, and where what follows `--` is files.
+    // The keys may exclude each other, and files may follow `--`.
     assert_eq!(shot(&folder, &[&scene("normals_k = 8", "normals_radius = 0.4")]), own);
     let nearest = shot(&folder, &[&scene("", "normals_k = 8")]);
     assert_eq!(shot(&folder, &[&scene("normals_radius = 0.4", "normals_k = 8")]), nearest);
@@ -325,16 +333,19 @@ fn options_of_an_object_win_over_those_of_the_scene() {
     assert_eq!(fs::read(&output).unwrap(), own);
     let text =
         fail(&["render", &scene("", "normals_radius = 0.4\nnormals_k = 8"), "-o", "no.png"], 2);
-    assert!(text.contains("`dome`") && text.contains("--normals-k"), "{text}");
+    assert!(
+        text.contains("object[0].normals_k: excludes normals_radius; leave out one of them"),
+        "{text}"
+    );
 }
 
 #[test]
-fn an_object_switches_a_flag_of_the_scene_off() {
+fn an_object_can_unset_a_flag_of_the_scene() {
     let folder = site();
     let scene = |options: &str, own: &str| {
         let text = format!("{options}\nradius = 1\n[[object]]\nfile = \"tile.ply\"\n{own}\n");
-        let told = dry(&[&folder.write("scene.toml", text)])["info"].take();
-        (told["points"].as_u64().unwrap(), told["triangles"].as_u64().unwrap())
+        let dry_run = dry(&[&folder.write("scene.toml", text)])["info"].take();
+        (dry_run["points"].as_u64().unwrap(), dry_run["triangles"].as_u64().unwrap())
     };
     assert_eq!(scene("vertices = true", ""), (4, 0));
     assert_eq!(scene("vertices = true", "vertices = false"), (0, 2));
@@ -342,7 +353,7 @@ fn an_object_switches_a_flag_of_the_scene_off() {
 }
 
 #[test]
-fn objects_may_share_a_name_that_nothing_refers_to() {
+fn a_name_must_be_unique_only_if_it_is_referenced() {
     let folder = site();
     let twice =
         "[[object]]\nfile = \"tile.ply\"\n[[object]]\nfile = \"tile.ply\"\ntranslate = [9, 0, 0]\n";
@@ -353,14 +364,14 @@ fn objects_may_share_a_name_that_nothing_refers_to() {
     ] {
         let scene = folder.write("scene.toml", format!("{twice}{more}\n"));
         let text = fail(&["render", &scene, "-o", "no.png"], 2);
-        assert!(text.contains("`tile`") && text.contains("object 1 and object 2"), "{text}");
+        assert!(text.contains("`tile`") && text.contains("object[0] and object[1]"), "{text}");
     }
-    // Nor may a second file add one of that name.
+    // A second scene file that adds an object of that name is an error too.
     let orbit = "[[object]]\nfile = \"tile.ply\"\n[[animation]]\nobject = \"tile\"\nkind = \"orbit\"\nseconds = 1\n";
     let (a, b) = (folder.write("a.toml", orbit), "[[object]]\nfile = \"tile.ply\"\n");
     let b = folder.write("b.toml", b);
     let text = fail(&["render", &a, &b, "-o", "no.png"], 2);
-    assert!(text.contains("object 1 and object 2"), "{text}");
+    assert!(text.contains("object[0] and object[1]"), "{text}");
 }
 
 #[test]
@@ -378,7 +389,7 @@ fn up_does_not_depend_on_the_order_of_files() {
 }
 
 #[test]
-fn sequences_at_other_rates_keep_them() {
+fn sequences_of_different_rates_keep_them() {
     let folder = site();
     let text = |rate: &str, place: &str| {
         format!("[[object]]\nfiles = [\"dome.ply\", \"tile.ply\"]\nfps = {rate}\n{place}\n")
@@ -386,7 +397,7 @@ fn sequences_at_other_rates_keep_them() {
     let place = "name = \"second\"\ntranslate = [4, 0, 0]";
     let both = folder.write("both.toml", text("10", "") + &text("1", place));
     let slow = folder.write("slow.toml", text("1", "") + &text("1", place));
-    // At half a second the first shows its last file, the slow one its first.
+    // After half a second the fast sequence shows its last file, the slow one its first.
     assert_ne!(shot(&folder, &[&both, "--time", "0.5"]), shot(&folder, &[&slow, "--time", "0.5"]));
     assert_eq!(
         shot(&folder, &[&both, "--time", "0.05"]),
@@ -395,26 +406,26 @@ fn sequences_at_other_rates_keep_them() {
 }
 
 #[test]
-fn keys_for_another_command_are_no_mistake() {
+fn keys_of_other_commands_are_accepted() {
     let folder = site();
     let options = "time = 0.5\nframes = 2\nfps = 10\nturntable = 3\n";
     let scene = format!("{options}[[object]]\nfile = \"dome.ply\"\n");
     let scene = folder.write("scene.toml", scene);
     shot(&folder, &[&scene]);
-    let film = folder.path("film.png");
-    succeed(&[&["animate", &scene, "-o", &film], &SMALL[..]].concat());
+    let movie = folder.path("movie.png");
+    succeed(&[&["animate", &scene, "-o", &movie], &SMALL[..]].concat());
     let text = fail(&["render", &scene, "-o", "no.png", "--frames", "2"], 2);
     assert!(text.contains("--frames"), "{text}");
 }
 
 #[test]
-fn two_scene_files_are_one_scene() {
+fn two_scene_files_form_one_scene() {
     let folder = site();
     let a = folder.write("a.toml", "spp = 2\nseed = 4\n[[object]]\nfile = \"dome.ply\"\n");
     let b = folder.write("b.json", r#"{"seed": 5, "object": {"file": "tile.ply"}}"#);
-    let told = dry(&[&a, &b]);
-    assert_eq!(told["object"].as_array().unwrap().len(), 2);
-    // Of options that both have, the last file's count.
-    assert_eq!((&told["spp"], &told["seed"]), (&json!(2), &json!(5)));
+    let dry_run = dry(&[&a, &b]);
+    assert_eq!(dry_run["object"].as_array().unwrap().len(), 2);
+    // The last file overrides the keys that both have.
+    assert_eq!((&dry_run["spp"], &dry_run["seed"]), (&json!(2), &json!(5)));
     assert_eq!(dry(&[&b, &a])["seed"], 4);
 }

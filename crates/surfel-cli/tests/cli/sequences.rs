@@ -1,10 +1,10 @@
-//! Sequences of meshes: each frame is the picture of its file, whatever the parts that files have.
+//! Sequences of meshes: each frame equals the picture of its file, whatever the parts of the files.
 
-use super::animate::{film, read_apng, read_shot};
+use super::animate::{movie, read_apng, read_shot};
 use super::common::{Folder, SMALL, dome, fail, succeed, tile};
 use std::fs;
 
-/// Squares side by side, each of a material of its own, as OBJ.
+/// Returns squares side by side as OBJ, each with its own material.
 fn squares(materials: &[&str], height: f64) -> String {
     let mut text = "mtllib paint.mtl\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n".to_owned();
     for (i, material) in materials.iter().enumerate() {
@@ -17,13 +17,13 @@ fn squares(materials: &[&str], height: f64) -> String {
     text
 }
 
-/// One triangle, as STL.
+/// Returns one triangle as STL.
 fn stl() -> String {
     let corners = ["-1 -1 0.2", "1.5 -1 0.2", "0 1 0.9"].map(|c| format!("vertex {c}\n")).concat();
     format!("solid\nfacet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\nendsolid\n")
 }
 
-/// Two by two texels.
+/// Returns a PNG of two by two texels.
 fn checkers() -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, 2, 2);
@@ -34,7 +34,7 @@ fn checkers() -> Vec<u8> {
     bytes
 }
 
-/// Files of a sequence that have one part, three, one of another format, a cloud, and two.
+/// Files of a sequence: OBJ of one part, of three parts, STL, a cloud, and OBJ of two parts.
 pub const FRAMES: [&str; 5] = ["f1.obj", "f2.obj", "f3.stl", "f4.ply", "f5.obj"];
 
 pub fn site() -> Folder {
@@ -53,14 +53,14 @@ pub fn site() -> Folder {
     folder
 }
 
-/// The floor comes first, so that the zero of the scene is the same.
+/// Returns a scene file. The floor is its first object, so that all scenes have one origin.
 pub fn scene(light: &str, shown: &str) -> String {
     format!(
         "light = {light}\nsun.azimuth = 40\nexposure = 0.2\nup = \"+Z\"\n[camera]\n\
          position = [3, -6, 9]\nfocal-point = [1, 1, 0]\n\
          [[object]]\nfile = \"floor.ply\"\n\
          [[object]]\n{shown}\nclip-plane = [0.9, 0, 0, 1, 0, 0]\n\
-         copies = [{{ translate = [3, 0, 0] }}, {{ rotate = [0, 30, 0], translate = [0, 0, 1] }}]\n\
+         instances = [{{ translate = [3, 0, 0] }}, {{ rotate = [0, 30, 0], translate = [0, 0, 1] }}]\n\
          [[object]]\nname = \"twin\"\n{shown}\nclip-plane = [0.9, 0, 0, 1, 0, 0]\n\
          translate = [0, 3, 0]\nmaterial = {{ kind = \"plastic\", color = \"#20c080\" }}\n\
          [[object]]\nname = \"other\"\nfile = \"f4.ply\"\ntranslate = [3, 3, 0]\n"
@@ -73,8 +73,8 @@ fn each_frame_of_a_sequence_is_the_picture_of_its_file() {
     for light in ["\"none\"", "[\"sun\"]"] {
         let files = format!("files = {FRAMES:?}\nfps = 2\n");
         let sequence = folder.write("sequence.toml", scene(light, &files));
-        let path = folder.path("film.png");
-        film(&[&sequence, "-o", &path, "--fps", "2"]);
+        let path = folder.path("movie.png");
+        movie(&[&sequence, "-o", &path, "--fps", "2"]);
         let (frames, _) = read_apng(&path);
         assert_eq!(frames.len(), FRAMES.len());
         for (i, (frame, file)) in frames.iter().zip(FRAMES).enumerate() {
@@ -89,13 +89,13 @@ fn each_frame_of_a_sequence_is_the_picture_of_its_file() {
 }
 
 #[test]
-fn one_mesh_of_a_sequence_is_held_at_a_time() {
+fn one_mesh_of_a_sequence_is_in_memory_at_a_time() {
     let folder = site();
     let scene = "[[object]]\nfiles = [\"f1.obj\", \"f2.obj\", \"f5.obj\"]\nfps = 1\n";
     let scene = folder.write("scene.toml", scene);
-    let told = succeed(&["animate", &scene, "--dry-run"]);
-    assert!(told.contains("\"triangles\": 2,"), "{told}");
-    // A limit of memory asks for the largest file: a million triangles, which only the header has.
+    let dry_run = succeed(&["animate", &scene, "--dry-run"]);
+    assert!(dry_run.contains("\"triangles\": 2,"), "{dry_run}");
+    // The memory limit counts the largest file; this header claims a million triangles.
     let many = tile(1.0, 0.0, [9; 3]).replace("element face 2", "element face 1000000");
     folder.write("many.ply", many);
     let files = |names: &str| {
@@ -103,29 +103,33 @@ fn one_mesh_of_a_sequence_is_held_at_a_time() {
     };
     let limited = files("\"f1.obj\", \"many.ply\", \"many.ply\", \"f2.obj\"");
     let limit = ["--memory-limit", "50M", "-o", "no.png"];
-    let told = fail(&[&["render", &limited][..], &limit, &SMALL].concat(), 1);
-    assert!(told.contains("1000000 triangles"), "{told}");
+    let message = fail(&[&["render", &limited][..], &limit, &SMALL].concat(), 1);
+    assert!(message.contains("1000000 triangles"), "{message}");
 }
 
 #[test]
-fn a_mesh_of_a_sequence_that_cannot_be_read_is_named() {
+fn an_unreadable_mesh_of_a_sequence_is_named() {
     let folder = site();
-    let path = folder.path("film.png");
+    let path = folder.path("movie.png");
     let scene = |files: &str| folder.write("scene.toml", format!("[[object]]\nfiles = {files}\n"));
     let missing = scene("[\"f1.obj\", \"f2.obj\", \"gone.obj\"]");
-    let told = fail(&["animate", &missing, "-o", &path], 1);
-    assert!(told.contains("gone.obj") && !told.contains("frames are kept"), "{told}");
-    // Its header is in order: what is wrong is found when its time comes.
+    let message = fail(&["animate", &missing, "-o", &path], 1);
+    assert!(message.contains("gone.obj") && !message.contains("frames are kept"), "{message}");
+    // The header is valid: the error occurs when the frame is read.
     let broken = tile(1.0, 0.0, [9; 3]).replace("3 0 2 3", "3 0 2 x");
     folder.write("broken.ply", broken);
     let broken = scene("[\"f1.obj\", \"f2.obj\", \"broken.ply\"]");
-    let told = fail(&[&["animate", &broken, "-o", &path, "--fps", "10"], &SMALL[..]].concat(), 1);
-    assert!(told.contains("broken.ply") && told.contains("2 of 3 frames are kept"), "{told}");
-    // Mended, it goes on from there.
+    let message =
+        fail(&[&["animate", &broken, "-o", &path, "--fps", "10"], &SMALL[..]].concat(), 1);
+    assert!(
+        message.contains("broken.ply") && message.contains("2 of 3 frames are kept"),
+        "{message}"
+    );
+    // The repaired file is another input, so that --resume is rejected.
     folder.write("broken.ply", tile(1.0, 0.0, [9; 3]));
-    let told = fail(&[&["animate", &broken, "-o", &path, "--resume"], &SMALL[..]].concat(), 1);
-    assert!(told.contains("--resume"), "what frames depend on has changed: {told}");
-    fs::remove_dir_all(folder.path("film.png.frames")).unwrap();
-    film(&[&broken, "-o", &path, "--fps", "10"]);
+    let message = fail(&[&["animate", &broken, "-o", &path, "--resume"], &SMALL[..]].concat(), 1);
+    assert!(message.contains("--resume"), "what frames depend on has changed: {message}");
+    fs::remove_dir_all(folder.path("movie.png.frames")).unwrap();
+    movie(&[&broken, "-o", &path, "--fps", "10"]);
     assert_eq!(read_apng(&path).0.len(), 3);
 }

@@ -1,4 +1,4 @@
-//! Accessors: columns of numbers in buffers. All that one claims is checked before a byte is read.
+//! Accessors: typed columns of numbers in buffers. All claims of an accessor are checked before it is read.
 
 use std::array;
 
@@ -6,31 +6,34 @@ use super::document::Document;
 use super::json::Json;
 use crate::error::{Error, Result};
 
-/// A column of `count` elements.
+/// A checked accessor.
 pub(super) struct Accessor<'a> {
+    /// The accessor's JSON.
     pub json: Json<'a>,
+    /// Number of elements.
     pub count: usize,
-    kind: &'a str,
-    component: Component,
+    element_type: &'a str,
+    component_type: ComponentType,
     is_normalized: bool,
-    base: Option<Elements<'a>>,
+    base: Option<StridedElements<'a>>,
     sparse: Option<Sparse<'a>>,
 }
 
-/// Which numbers a use allows, and what integers mean in it.
+/// Conversion of integer components to floats.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Meaning {
-    /// 32-bit floats alone.
-    Float,
-    /// Integers of 8 and 16 bits too: as they are, or shares of 1 if the accessor says so.
-    Quantized,
-    /// The same, but always shares of 1: as colours or weights they would mean nothing otherwise, and some
-    /// programs forget to say so.
-    Share,
+pub(super) enum IntegerPolicy {
+    /// Only 32-bit floats are allowed.
+    Reject,
+    /// 8- and 16-bit integers are allowed, and normalised if the accessor declares it.
+    AsDeclared,
+    /// 8- and 16-bit integers are allowed and always normalised, as colours and weights must be. Some exporters
+    /// omit the declaration.
+    Normalize,
 }
 
+/// The storage type of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Component {
+enum ComponentType {
     I8,
     U8,
     I16,
@@ -39,139 +42,146 @@ enum Component {
     F32,
 }
 
-/// Elements at equal distances.
+/// Elements in a buffer at a constant stride.
 #[derive(Clone, Copy)]
-struct Elements<'a> {
+struct StridedElements<'a> {
     bytes: &'a [u8],
+    /// Distance in bytes between consecutive elements.
     stride: usize,
+    /// Size of an element in bytes.
     size: usize,
 }
 
-/// Elements that stand in for some of the others.
+/// Replacements of single elements of an accessor.
 struct Sparse<'a> {
-    /// Rising.
+    /// Indices of the replaced elements, strictly increasing.
     indices: Vec<u32>,
-    values: Elements<'a>,
+    values: StridedElements<'a>,
 }
 
-/// The largest element is a matrix of 16 floats.
+/// An element of an accessor without data. The largest element is a matrix of 16 floats.
 static ZEROS: [u8; 64] = [0; 64];
 
 impl<'a> Accessor<'a> {
-    /// The accessor that `reference` names.
+    /// Opens the accessor at the index `reference`.
     pub fn open(document: &Document<'a>, reference: &Json<'a>) -> Result<Self> {
-        let json = document.referred("accessors", reference)?;
-        let component = Component::of(&json.need("componentType")?)?;
-        let kind = json.need("type")?;
-        let n_components = match kind.text()? {
+        let json = document.resolve("accessors", reference)?;
+        let component_type = ComponentType::from_json(&json.require("componentType")?)?;
+        let element_type = json.require("type")?;
+        let n_components = match element_type.string()? {
             "SCALAR" => 1,
             "VEC2" => 2,
             "VEC3" => 3,
             "VEC4" | "MAT2" => 4,
             "MAT3" => 9,
             "MAT4" => 16,
-            _ => return Err(kind.unlike("SCALAR, VEC2, VEC3, VEC4, MAT2, MAT3 or MAT4")),
+            _ => {
+                return Err(element_type.type_error("SCALAR, VEC2, VEC3, VEC4, MAT2, MAT3 or MAT4"));
+            }
         };
-        let size = n_components * component.size();
-        let count = json.need("count")?.index()?;
+        let size = n_components * component_type.size();
+        let count = json.require("count")?.index()?;
         let base = json.get("bufferView");
-        let base = base.map(|view| Elements::open(document, &json, &view, count, size));
+        let base = base.map(|view| StridedElements::open(document, &json, &view, count, size));
         let sparse = json.get("sparse");
         let sparse = sparse.map(|sparse| Sparse::open(document, &sparse, count, size));
         Ok(Self {
             count,
-            kind: kind.text()?,
-            component,
-            is_normalized: json.flag_or("normalized", false)?,
+            element_type: element_type.string()?,
+            component_type,
+            is_normalized: json.boolean_or("normalized", false)?,
             base: base.transpose()?,
             sparse: sparse.transpose()?,
             json,
         })
     }
 
-    pub fn kind(&self) -> &'a str {
-        self.kind
+    /// Returns the element type, such as `VEC3`.
+    pub fn element_type(&self) -> &'a str {
+        self.element_type
     }
 
-    /// Whether no buffer has its elements, as where an extension was to bring them.
-    pub fn is_absent(&self) -> bool {
+    /// Returns true if no buffer holds the elements, for example because an extension would provide them.
+    pub fn has_no_data(&self) -> bool {
         self.base.is_none() && self.sparse.is_none()
     }
 
-    /// The elements as floats: all of them, or those `picked`, which has to name elements that there are.
+    /// Reads all elements as floats, or the elements at the valid indices `selected`.
     pub fn floats<const N: usize>(
         &self,
         document: &Document,
-        meaning: Meaning,
-        picked: Option<&[u32]>,
+        integers: IntegerPolicy,
+        selected: Option<&[u32]>,
     ) -> Result<Vec<[f32; N]>> {
-        self.check_kind::<N>()?;
-        let share =
-            meaning == Meaning::Share || meaning == Meaning::Quantized && self.is_normalized;
-        let unit = |largest: f32| if share { largest } else { 1.0 };
-        let (i8s, i16s) = (unit(127.0), unit(32767.0));
-        let (u8s, u16s) = (unit(255.0), unit(65535.0));
-        // The most negative integer has no positive twin.
-        let lowest = if share { -1.0 } else { f32::NEG_INFINITY };
-        match (self.component, meaning) {
-            (Component::F32, _) => self.read(document, picked, f32::from_le_bytes),
-            (Component::U32, _) | (_, Meaning::Float) => Err(self.unfit_component(match meaning {
-                Meaning::Float => "5126 (float)",
-                _ => "5126 (float) or integers of 8 or 16 bits",
-            })),
-            (Component::I8, _) => self.read(document, picked, |bytes| {
-                (f32::from(i8::from_le_bytes(bytes)) / i8s).max(lowest)
-            }),
-            (Component::I16, _) => self.read(document, picked, |bytes| {
-                (f32::from(i16::from_le_bytes(bytes)) / i16s).max(lowest)
-            }),
-            (Component::U8, _) => {
-                self.read(document, picked, |bytes| f32::from(u8::from_le_bytes(bytes)) / u8s)
+        self.check_element_type::<N>()?;
+        let is_normalized = integers == IntegerPolicy::Normalize
+            || integers == IntegerPolicy::AsDeclared && self.is_normalized;
+        let divisor = |largest: f32| if is_normalized { largest } else { 1.0 };
+        let (i8s, i16s) = (divisor(127.0), divisor(32767.0));
+        let (u8s, u16s) = (divisor(255.0), divisor(65535.0));
+        // The most negative integer would otherwise become less than -1.
+        let min = if is_normalized { -1.0 } else { f32::NEG_INFINITY };
+        match (self.component_type, integers) {
+            (ComponentType::F32, _) => self.read(document, selected, f32::from_le_bytes),
+            (ComponentType::U32, _) | (_, IntegerPolicy::Reject) => {
+                Err(self.component_error(match integers {
+                    IntegerPolicy::Reject => "5126 (float)",
+                    _ => "5126 (float) or integers of 8 or 16 bits",
+                }))
             }
-            (Component::U16, _) => {
-                self.read(document, picked, |bytes| f32::from(u16::from_le_bytes(bytes)) / u16s)
+            (ComponentType::I8, _) => self.read(document, selected, |bytes| {
+                (f32::from(i8::from_le_bytes(bytes)) / i8s).max(min)
+            }),
+            (ComponentType::I16, _) => self.read(document, selected, |bytes| {
+                (f32::from(i16::from_le_bytes(bytes)) / i16s).max(min)
+            }),
+            (ComponentType::U8, _) => {
+                self.read(document, selected, |bytes| f32::from(u8::from_le_bytes(bytes)) / u8s)
+            }
+            (ComponentType::U16, _) => {
+                self.read(document, selected, |bytes| f32::from(u16::from_le_bytes(bytes)) / u16s)
             }
         }
     }
 
-    /// The elements as unsigned integers, likewise.
+    /// Reads all elements as unsigned integers, or the elements at the valid indices `selected`.
     pub fn integers<const N: usize>(
         &self,
         document: &Document,
-        picked: Option<&[u32]>,
+        selected: Option<&[u32]>,
     ) -> Result<Vec<[u32; N]>> {
-        self.check_kind::<N>()?;
-        match self.component {
-            Component::U8 => {
-                self.read(document, picked, |bytes| u32::from(u8::from_le_bytes(bytes)))
+        self.check_element_type::<N>()?;
+        match self.component_type {
+            ComponentType::U8 => {
+                self.read(document, selected, |bytes| u32::from(u8::from_le_bytes(bytes)))
             }
-            Component::U16 => {
-                self.read(document, picked, |bytes| u32::from(u16::from_le_bytes(bytes)))
+            ComponentType::U16 => {
+                self.read(document, selected, |bytes| u32::from(u16::from_le_bytes(bytes)))
             }
-            Component::U32 => self.read(document, picked, u32::from_le_bytes),
-            _ => Err(self.unfit_component("5121, 5123 or 5125 (unsigned integers)")),
+            ComponentType::U32 => self.read(document, selected, u32::from_le_bytes),
+            _ => Err(self.component_error("5121, 5123 or 5125 (unsigned integers)")),
         }
     }
 
     fn read<T, const SIZE: usize, const N: usize>(
         &self,
         document: &Document,
-        picked: Option<&[u32]>,
+        selected: Option<&[u32]>,
         decode: impl Fn([u8; SIZE]) -> T,
     ) -> Result<Vec<[T; N]>> {
-        let n = picked.map_or(self.count, <[u32]>::len);
-        document.charge(&self.json, n, size_of::<[T; N]>())?;
+        let n = selected.map_or(self.count, <[u32]>::len);
+        document.reserve(&self.json, n, size_of::<[T; N]>())?;
         let element = |i: usize| {
             let bytes = self.element(i);
             array::from_fn(|k| decode(array::from_fn(|byte| bytes[SIZE * k + byte])))
         };
-        Ok(match picked {
-            Some(picked) => picked.iter().map(|&i| element(i as usize)).collect(),
+        Ok(match selected {
+            Some(selected) => selected.iter().map(|&i| element(i as usize)).collect(),
             None => (0..self.count).map(element).collect(),
         })
     }
 
-    /// The bytes of an element.
+    /// Returns the bytes of an element.
     fn element(&self, i: usize) -> &[u8] {
         if let Some(Sparse { indices, values }) = &self.sparse
             && let Ok(at) = indices.binary_search(&(i as u32))
@@ -181,7 +191,7 @@ impl<'a> Accessor<'a> {
         self.base.as_ref().map_or(&ZEROS, |base| base.element(i))
     }
 
-    fn check_kind<const N: usize>(&self) -> Result<()> {
+    fn check_element_type<const N: usize>(&self) -> Result<()> {
         let expected = match N {
             1 => "SCALAR",
             2 => "VEC2",
@@ -189,44 +199,44 @@ impl<'a> Accessor<'a> {
             4 => "VEC4",
             _ => "MAT4",
         };
-        if self.kind == expected {
+        if self.element_type == expected {
             return Ok(());
         }
-        let found = format!("type {}", self.kind);
-        Err(self.json.error(found, format!("{expected} for what refers to it")))
+        let found = format!("type {}", self.element_type);
+        Err(self.json.error(found, format!("{expected} for this use")))
     }
 
-    fn unfit_component(&self, expected: &str) -> Error {
-        let found = format!("components of kind {:?}", self.component);
-        self.json.error(found, format!("{expected} for what refers to it"))
+    fn component_error(&self, expected: &str) -> Error {
+        let found = format!("components of type {:?}", self.component_type);
+        self.json.error(found, format!("{expected} for this use"))
     }
 }
 
-impl<'a> Elements<'a> {
-    /// `count` elements of `size` bytes from the offset that `json` names in a view.
+impl<'a> StridedElements<'a> {
+    /// Opens `count` elements of `size` bytes at the offset in `json` of a buffer view.
     fn open(
         document: &Document<'a>,
         json: &Json<'a>,
-        view: &Json<'a>,
+        view_ref: &Json<'a>,
         count: usize,
         size: usize,
     ) -> Result<Self> {
-        let bytes = document.view(view)?;
-        let stride = bytes.stride.unwrap_or(size);
+        let view = document.view(view_ref)?;
+        let stride = view.stride.unwrap_or(size);
         if stride < size {
-            let found = format!("a byteStride of {stride} in bufferView {}", view.index()?);
+            let found = format!("a byteStride of {stride} in bufferView {}", view_ref.index()?);
             return Err(json.error(found, format!("at least the {size} bytes of an element")));
         }
         let offset = json.unsigned_or("byteOffset", 0)?;
-        // In 128 bits nothing overflows.
+        // 128 bits cannot overflow.
         let last = count.saturating_sub(1) as u128 * stride as u128;
         let needed = if count == 0 { 0 } else { u128::from(offset) + last + size as u128 };
-        let n_bytes = bytes.bytes.len();
+        let n_bytes = view.bytes.len();
         if (n_bytes as u128) < needed {
             let found = format!("{count} elements of {size} bytes, {stride} apart, from {offset}");
             return Err(json.error(found, format!("{n_bytes} bytes at most, as the view has")));
         }
-        let bytes = if count == 0 { &[] } else { &bytes.bytes[offset as usize..] };
+        let bytes = if count == 0 { &[] } else { &view.bytes[offset as usize..] };
         Ok(Self { bytes, stride, size })
     }
 
@@ -236,34 +246,47 @@ impl<'a> Elements<'a> {
 }
 
 impl<'a> Sparse<'a> {
-    fn open(document: &Document<'a>, json: &Json<'a>, n: usize, size: usize) -> Result<Self> {
-        let count = json.need("count")?.index()?;
-        let (at, values) = (json.need("indices")?, json.need("values")?);
-        let component = Component::of(&at.need("componentType")?)?;
-        let read: fn(&[u8]) -> u32 = match component {
-            Component::U8 => |bytes| bytes[0].into(),
-            Component::U16 => |bytes| u16::from_le_bytes([bytes[0], bytes[1]]).into(),
-            Component::U32 => |bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
-            _ => return Err(at.need("componentType")?.unlike("5121, 5123 or 5125")),
+    fn open(
+        document: &Document<'a>,
+        json: &Json<'a>,
+        n_elements: usize,
+        size: usize,
+    ) -> Result<Self> {
+        let count = json.require("count")?.index()?;
+        let (indices_json, values) = (json.require("indices")?, json.require("values")?);
+        let component_type = ComponentType::from_json(&indices_json.require("componentType")?)?;
+        let read: fn(&[u8]) -> u32 = match component_type {
+            ComponentType::U8 => |bytes| bytes[0].into(),
+            ComponentType::U16 => |bytes| u16::from_le_bytes([bytes[0], bytes[1]]).into(),
+            ComponentType::U32 => {
+                |bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
+            }
+            _ => {
+                return Err(indices_json
+                    .require("componentType")?
+                    .type_error("5121, 5123 or 5125"));
+            }
         };
-        let view = at.need("bufferView")?;
-        let elements = Elements::open(document, &at, &view, count, component.size())?;
-        document.charge(json, count, size_of::<u32>())?;
+        let view = indices_json.require("bufferView")?;
+        let elements =
+            StridedElements::open(document, &indices_json, &view, count, component_type.size())?;
+        document.reserve(json, count, size_of::<u32>())?;
         let indices: Vec<u32> = (0..count).map(|i| read(elements.element(i))).collect();
         if let Some(i) = (1..count).find(|&i| indices[i] <= indices[i - 1]) {
             let found = format!("{} after {}", indices[i], indices[i - 1]);
-            return Err(at.error(found, "indices that rise"));
+            return Err(indices_json.error(found, "increasing indices"));
         }
-        if let Some(last) = indices.last().filter(|last| n <= **last as usize) {
-            return Err(at.error(format!("index {last}"), format!("less than the count of {n}")));
+        if let Some(last) = indices.last().filter(|last| n_elements <= **last as usize) {
+            return Err(indices_json
+                .error(format!("index {last}"), format!("less than the count of {n_elements}")));
         }
-        let view = values.need("bufferView")?;
-        Ok(Self { indices, values: Elements::open(document, &values, &view, count, size)? })
+        let view = values.require("bufferView")?;
+        Ok(Self { indices, values: StridedElements::open(document, &values, &view, count, size)? })
     }
 }
 
-impl Component {
-    fn of(json: &Json) -> Result<Self> {
+impl ComponentType {
+    fn from_json(json: &Json) -> Result<Self> {
         Ok(match json.unsigned()? {
             5120 => Self::I8,
             5121 => Self::U8,
@@ -271,7 +294,7 @@ impl Component {
             5123 => Self::U16,
             5125 => Self::U32,
             5126 => Self::F32,
-            _ => return Err(json.unlike("5120, 5121, 5122, 5123, 5125 or 5126")),
+            _ => return Err(json.type_error("5120, 5121, 5122, 5123, 5125 or 5126")),
         })
     }
 

@@ -1,14 +1,14 @@
-//! Which extensions are read, and what becomes of files that need others.
+//! Supported extensions, and errors and warnings for the others.
 
 use std::collections::BTreeSet;
 
 use super::accessor::Accessor;
 use super::document::Document;
-use super::json::{Json, shortened};
+use super::json::{Json, shorten};
 use crate::error::{Error, Result};
 
-/// Those that are read.
-const KNOWN: [&str; 10] = [
+/// Extensions that are read.
+const SUPPORTED: [&str; 10] = [
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
@@ -21,42 +21,45 @@ const KNOWN: [&str; 10] = [
     "KHR_texture_transform",
 ];
 
-/// Those that change nothing in a picture.
-const HARMLESS: [&str; 3] = ["KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld"];
+/// Extensions that do not change the image.
+const IGNORABLE: [&str; 3] = ["KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld"];
 
 const DRACO: &str = "KHR_draco_mesh_compression";
 
-/// Refuses a file that needs what surfel lacks, and tells what else it uses.
+/// Rejects a file that requires an unsupported extension, and warns about the unsupported extensions that it
+/// merely uses.
 pub(super) fn check(document: &Document) -> Result<()> {
-    for required in document.root.list("extensionsRequired")? {
-        let name = required.text()?;
-        if !KNOWN.contains(&name) && !HARMLESS.contains(&name) {
+    for required in document.root.array_or_empty("extensionsRequired")? {
+        let name = required.string()?;
+        if !SUPPORTED.contains(&name) && !IGNORABLE.contains(&name) {
             return Err(unsupported(&required, name));
         }
     }
-    let mut lacking = BTreeSet::new();
-    for used in document.root.list("extensionsUsed")? {
-        let name = used.text()?;
-        if !KNOWN.contains(&name) && !HARMLESS.contains(&name) {
-            lacking.insert(name);
+    let mut unsupported_names = BTreeSet::new();
+    for used in document.root.array_or_empty("extensionsUsed")? {
+        let name = used.string()?;
+        if !SUPPORTED.contains(&name) && !IGNORABLE.contains(&name) {
+            unsupported_names.insert(name);
         }
     }
-    if !lacking.is_empty() {
-        let names: Vec<String> = lacking.into_iter().take(20).map(shortened).collect();
+    if !unsupported_names.is_empty() {
+        let names: Vec<String> = unsupported_names.into_iter().take(20).map(shorten).collect();
         let names = names.join(", ");
-        document.note(format!("drawn without {names}, which surfel does not read"));
+        document.warn(format!("drawn without {names}, which surfel does not read"));
     }
     Ok(())
 }
 
-/// Refuses vertices that an extension was to decode: some files use it without requiring it.
-pub(super) fn refuse_compressed(primitive: &Json, position: &Accessor) -> Result<()> {
+/// Rejects vertices that only Draco decompression could provide. Some files use that extension without
+/// requiring it.
+pub(super) fn reject_compressed(primitive: &Json, position: &Accessor) -> Result<()> {
     match primitive.extension(DRACO) {
-        Some(compressed) if position.is_absent() => Err(unsupported(&compressed, DRACO)),
+        Some(compressed) if position.has_no_data() => Err(unsupported(&compressed, DRACO)),
         _ => Ok(()),
     }
 }
 
+/// Returns the error for an unsupported extension, with advice on how to remove it.
 fn unsupported(json: &Json, name: &str) -> Error {
     let advice = match name {
         DRACO | "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
@@ -69,14 +72,14 @@ fn unsupported(json: &Json, name: &str) -> Error {
             "write its textures as PNG: `gltf-transform png in.glb out.glb`"
         }
         "KHR_materials_pbrSpecularGlossiness" => {
-            "write its materials anew: `gltf-transform metalrough in.glb out.glb`"
+            "convert its materials: `gltf-transform metalrough in.glb out.glb`"
         }
         _ => "export it again without this extension",
     };
     Error::Unsupported {
         file: json.file().into(),
         action: "read",
-        found: format!("the extension {}, which the file requires", shortened(name)),
+        found: format!("the extension {}, which the file requires", shorten(name)),
         advice,
     }
 }

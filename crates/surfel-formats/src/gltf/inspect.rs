@@ -1,41 +1,43 @@
-//! What a glTF file says about itself, without its numbers.
+//! Summary of a glTF file from its JSON alone.
 
+use super::container;
 use super::json::Json;
-use super::{check_version, container, format_name};
 use crate::error::Result;
-use crate::input::Input;
-use crate::options::Source;
+use crate::file::Input;
+use crate::options::FileInfo;
 
-/// Points and triangles of all meshes, each once. What is wrong with them is told when they are read.
-pub(crate) fn inspect(input: &Input) -> Result<Source> {
+/// Counts the points and triangles of all meshes, independent of their instances. Defects are reported only
+/// when the file is read.
+pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
     let container = container::open(input)?;
     let root = Json::root(&input.name, &container.json);
-    check_version(&root)?;
+    container::check_version(&root)?;
     let (mut n_points, mut n_triangles) = (0, 0);
-    for mesh in root.list("meshes")? {
-        for primitive in mesh.list("primitives")? {
-            let n_corners = n_corners(&root, &primitive).unwrap_or(0);
+    for mesh in root.array_or_empty("meshes")? {
+        for primitive in mesh.array_or_empty("primitives")? {
+            let n_vertices = count_vertices(&root, &primitive).unwrap_or(0);
             match primitive.unsigned_or("mode", 4)? {
-                0 => n_points += n_corners,
-                4 => n_triangles += n_corners / 3,
-                // Strips and fans.
-                5 | 6 => n_triangles += n_corners.saturating_sub(2),
+                0 => n_points += n_vertices,
+                4 => n_triangles += n_vertices / 3,
+                // A strip or fan.
+                5 | 6 => n_triangles += n_vertices.saturating_sub(2),
                 _ => {}
             }
         }
     }
-    Ok(Source {
-        format: format_name(&container),
+    Ok(FileInfo {
+        format: container.format_name(),
         n_points: (0 < n_points).then_some(n_points),
         n_triangles: (0 < n_triangles).then_some(n_triangles),
-        ..Source::default()
+        ..FileInfo::default()
     })
 }
 
-fn n_corners(root: &Json, primitive: &Json) -> Option<u64> {
+/// Returns the number of indices of a primitive, or of its positions if it has none.
+fn count_vertices(root: &Json, primitive: &Json) -> Option<u64> {
     let position = || primitive.get("attributes")?.get("POSITION");
     let accessor = primitive.get("indices").or_else(position)?;
-    let count = root.referred("accessors", &accessor).ok()?.get("count")?.unsigned().ok()?;
-    // No file has more.
+    let count = root.resolve("accessors", &accessor).ok()?.get("count")?.unsigned().ok()?;
+    // The limit keeps the sums from overflowing.
     Some(count.min(u64::from(u32::MAX)))
 }

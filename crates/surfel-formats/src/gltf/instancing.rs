@@ -1,22 +1,23 @@
-//! EXT_mesh_gpu_instancing: a mesh at many places, each a node of its own.
+//! EXT_mesh_gpu_instancing: each instance of a mesh becomes a node.
 
-use surfel::math::{DQuat, DVec3};
-use surfel::scene::{Node, Transform};
+use surfel_core::math::{DQuat, DVec3};
+use surfel_core::scene::{Node, Transform};
 
-use super::accessor::{Accessor, Meaning};
+use super::accessor::{Accessor, IntegerPolicy};
 use super::document::Document;
 use super::json::Json;
-use super::transform::rotation;
+use super::transform::unit_quaternion;
 use crate::error::Result;
 
-/// Children of `node`, which stands at `parent` in the graph; they show its parts in its place.
+/// Returns the instances as children of `node`, which has index `parent` in the graph, and moves its parts to
+/// them.
 pub(super) fn read<'a>(
     document: &Document<'a>,
     json: &Json<'a>,
     parent: usize,
     node: &mut Node,
 ) -> Result<Vec<Node>> {
-    let attributes = json.need("attributes")?;
+    let attributes = json.require("attributes")?;
     let mut count = None;
     let mut open = |key: &str| -> Result<Option<Accessor<'a>>> {
         let Some(reference) = attributes.get(key) else { return Ok(None) };
@@ -38,21 +39,21 @@ pub(super) fn read<'a>(
     let rotations = rotations.as_ref().map(|accessor| quaternions(document, accessor));
     let rotations = rotations.transpose()?;
     let n = count.unwrap_or(0);
-    let parts = std::mem::take(&mut node.parts);
-    let own = size_of_val(&parts[..]) + size_of_val(&node.morph_weights[..]);
-    let each = size_of::<Node>() + 32 + own;
-    document.charge(json, n, each)?;
-    let at = |column: &Option<Vec<DVec3>>, i: usize, default: DVec3| {
+    let parts = std::mem::take(&mut node.primitives);
+    let bytes_per_copy = size_of_val(&parts[..]) + size_of_val(&node.morph_weights[..]);
+    let bytes_each = size_of::<Node>() + 32 + bytes_per_copy;
+    document.reserve(json, n, bytes_each)?;
+    let value = |column: &Option<Vec<DVec3>>, i: usize, default: DVec3| {
         column.as_ref().map_or(default, |column| column[i])
     };
     let instances = (0..n).map(|i| Node {
         parent: Some(parent),
-        transform: Transform::Parts {
-            translation: at(&translations, i, DVec3::ZERO),
+        transform: Transform::Trs {
+            translation: value(&translations, i, DVec3::ZERO),
             rotation: rotations.as_ref().map_or(DQuat::IDENTITY, |column| column[i]),
-            scale: at(&scales, i, DVec3::ONE),
+            scale: value(&scales, i, DVec3::ONE),
         },
-        parts: parts.clone(),
+        primitives: parts.clone(),
         is_visible: node.is_visible,
         morph_weights: node.morph_weights.clone(),
         ..Node::new(format!("{} {i}", node.name))
@@ -61,7 +62,7 @@ pub(super) fn read<'a>(
 }
 
 fn vectors(document: &Document, accessor: &Accessor) -> Result<Vec<DVec3>> {
-    let column = accessor.floats::<3>(document, Meaning::Float, None)?;
+    let column = accessor.floats::<3>(document, IntegerPolicy::Reject, None)?;
     let column = column.into_iter().map(|vector| DVec3::from_array(vector.map(f64::from)));
     let column: Vec<DVec3> = column.collect();
     match column.iter().position(|vector| !vector.is_finite()) {
@@ -71,10 +72,10 @@ fn vectors(document: &Document, accessor: &Accessor) -> Result<Vec<DVec3>> {
 }
 
 fn quaternions(document: &Document, accessor: &Accessor) -> Result<Vec<DQuat>> {
-    let column = accessor.floats::<4>(document, Meaning::Share, None)?;
+    let column = accessor.floats::<4>(document, IntegerPolicy::Normalize, None)?;
     let column = column.into_iter().map(|numbers| {
-        let unfit = || accessor.json.error(format!("{numbers:?}"), "quaternions of length 1");
-        rotation(numbers.map(f64::from)).ok_or_else(unfit)
+        let error = || accessor.json.error(format!("{numbers:?}"), "quaternions of length 1");
+        unit_quaternion(numbers.map(f64::from)).ok_or_else(error)
     });
     column.collect()
 }

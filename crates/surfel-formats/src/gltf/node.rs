@@ -1,36 +1,36 @@
-//! Nodes: what stands where. Cameras and lamps hang on them.
+//! Nodes with their meshes, skins, cameras and lights.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use surfel::math::{DAffine3, DQuat, DVec3, Vec3};
-use surfel::scene::{Joint, Lamp, LampKind, Node, Projection, Transform};
+use surfel_core::math::{DAffine3, DQuat, DVec3, Vec3};
+use surfel_core::scene::{Joint, Node, Projection, PunctualLight, PunctualLightKind, Transform};
 
-use super::accessor::{Accessor, Meaning};
+use super::accessor::{Accessor, IntegerPolicy};
 use super::document::Document;
 use super::hierarchy::{Entry, Hierarchy, ROOT};
 use super::instancing;
-use super::json::{Json, shortened};
-use super::mesh::Meshes;
+use super::json::{Json, shorten};
+use super::mesh::MeshCache;
 use super::transform;
 use crate::error::Result;
 
-/// The nodes of the scene, below one called `name` that turns +Y up to Z up.
+/// Reads the nodes of the scene below a root called `name`, which rotates +Y to +Z.
 pub(super) fn read_all<'a>(
     document: &Document<'a>,
     hierarchy: &Hierarchy<'a>,
-    meshes: &mut Meshes<'_, 'a>,
+    meshes: &mut MeshCache<'_, 'a>,
     name: String,
 ) -> Result<Vec<Node>> {
     let mut root = Node::new(name);
     let rotation = DQuat::from_rotation_x(FRAC_PI_2);
-    root.transform = Transform::Parts { translation: DVec3::ZERO, rotation, scale: DVec3::ONE };
+    root.transform = Transform::Trs { translation: DVec3::ZERO, rotation, scale: DVec3::ONE };
     let mut nodes = vec![root];
     for entry in &hierarchy.entries {
         nodes.push(read(document, hierarchy, meshes, entry)?);
     }
-    for (place, entry) in hierarchy.entries.iter().enumerate() {
+    for (entry_idx, entry) in hierarchy.entries.iter().enumerate() {
         if let Some(instancing) = entry.json.extension("EXT_mesh_gpu_instancing") {
-            let parent = ROOT + 1 + place;
+            let parent = ROOT + 1 + entry_idx;
             let instances = instancing::read(document, &instancing, parent, &mut nodes[parent])?;
             nodes.extend(instances);
         }
@@ -41,7 +41,7 @@ pub(super) fn read_all<'a>(
 fn read<'a>(
     document: &Document<'a>,
     hierarchy: &Hierarchy<'a>,
-    meshes: &mut Meshes<'_, 'a>,
+    meshes: &mut MeshCache<'_, 'a>,
     entry: &Entry<'a>,
 ) -> Result<Node> {
     let json = &entry.json;
@@ -54,30 +54,33 @@ fn read<'a>(
     }
     if let Some(mesh) = json.get("mesh") {
         let weights = json.get("weights");
-        (node.parts, node.morph_weights) = meshes.refer(&mesh, weights.as_ref())?;
+        (node.primitives, node.morph_weights) = meshes.load(&mesh, weights.as_ref())?;
         if let Some(skin) = json.get("skin") {
-            node.joints = read_joints(document, hierarchy, &skin, meshes.most_joints(&node.parts))?;
+            node.joints =
+                read_joints(document, hierarchy, &skin, meshes.n_joints_used(&node.primitives))?;
         }
     }
     if let Some(camera) = json.get("camera") {
-        node.camera = read_camera(document, &document.referred("cameras", &camera)?)?;
+        node.camera = read_camera(document, &document.resolve("cameras", &camera)?)?;
     }
     const LIGHTS: &str = "KHR_lights_punctual";
     if let Some(reference) = json.extension(LIGHTS).and_then(|light| light.get("light")) {
         let Some(lights) = document.root.extension(LIGHTS) else {
-            return Err(reference.error("a light", "lights in the extension of the whole file"));
+            return Err(
+                reference.error("a light", "lights in the extension at the top level of the file")
+            );
         };
-        node.lamp = read_lamp(document, &lights.referred("lights", &reference)?)?;
+        node.light = read_lamp(document, &lights.resolve("lights", &reference)?)?;
     }
     Ok(node)
 }
 
-/// A node's own name, or that of its mesh or camera, or its number.
+/// Returns the name of a node, of its mesh or of its camera, or else its number.
 fn name<'a>(document: &Document<'a>, json: &Json<'a>) -> String {
-    let name_of = |json: &Json<'a>| json.get("name")?.text().ok();
+    let name_of = |json: &Json<'a>| json.get("name")?.string().ok();
     let name_of_its = |key: &str, list: &str| {
         let reference = json.get(key)?;
-        name_of(&document.referred(list, &reference).ok()?)
+        name_of(&document.resolve(list, &reference).ok()?)
     };
     let number = json.pointer().trim_start_matches("/nodes/");
     let name = name_of(json)
@@ -86,33 +89,33 @@ fn name<'a>(document: &Document<'a>, json: &Json<'a>) -> String {
     name.map_or_else(|| format!("node {number}"), str::to_owned)
 }
 
-/// The joints of a skin for meshes that use `n_used` of them; none for what is not bound to joints.
+/// Reads the joints of a skin for meshes that use `n_used` of them.
 fn read_joints<'a>(
     document: &Document<'a>,
     hierarchy: &Hierarchy<'a>,
     reference: &Json<'a>,
     n_used: usize,
 ) -> Result<Vec<Joint>> {
-    let skin = document.referred("skins", reference)?;
+    let skin = document.resolve("skins", reference)?;
     if n_used == 0 {
-        document.note("a skin whose mesh is not bound to joints is left out");
+        document.warn("a skin whose mesh has no joint attributes is skipped");
         return Ok(Vec::new());
     }
-    let list = skin.need("joints")?;
-    let n_joints = list.items()?.len();
+    let list = skin.require("joints")?;
+    let n_joints = list.array()?.len();
     if n_joints < n_used {
         let found = format!("a skin of {n_joints} joints");
         return Err(reference.error(found, format!("the {n_used} that its mesh uses")));
     }
-    document.charge(&skin, n_joints, size_of::<Joint>())?;
+    document.reserve(&skin, n_joints, size_of::<Joint>())?;
     let mut binds = Vec::new();
     if let Some(matrices) = skin.get("inverseBindMatrices") {
         let accessor = Accessor::open(document, &matrices)?;
         if accessor.count < n_joints {
             let found = format!("{} matrices for {n_joints} joints", accessor.count);
-            return Err(matrices.error(found, "one a joint"));
+            return Err(matrices.error(found, "one per joint"));
         }
-        for matrix in accessor.floats::<16>(document, Meaning::Float, None)? {
+        for matrix in accessor.floats::<16>(document, IntegerPolicy::Reject, None)? {
             if !matrix.iter().all(|number| number.is_finite()) {
                 return Err(matrices.error("a matrix that is not finite", "finite numbers"));
             }
@@ -122,9 +125,9 @@ fn read_joints<'a>(
         }
     }
     let mut joints = Vec::with_capacity(n_joints);
-    for (i, joint) in list.items()?.enumerate() {
-        let Some(node) = hierarchy.node(document, &joint)? else {
-            return Err(joint.unlike("a node of the scene"));
+    for (i, joint) in list.array()?.enumerate() {
+        let Some(node) = hierarchy.graph_idx(document, &joint)? else {
+            return Err(joint.type_error("a node of the scene"));
         };
         let joint_from_mesh = binds.get(i).copied().unwrap_or(DAffine3::IDENTITY);
         joints.push(Joint { node, joint_from_mesh });
@@ -133,38 +136,38 @@ fn read_joints<'a>(
 }
 
 fn read_camera(document: &Document, camera: &Json) -> Result<Option<Projection>> {
-    let kind = camera.need("type")?;
-    match kind.text()? {
+    let kind = camera.require("type")?;
+    match kind.string()? {
         "perspective" => {
-            let angle = camera.need("perspective")?.need("yfov")?;
+            let angle = camera.require("perspective")?.require("yfov")?;
             let view_angle = angle.number()?;
             if !(0.0 < view_angle && view_angle < PI) {
-                return Err(angle.unlike("an angle above 0 and below pi"));
+                return Err(angle.type_error("an angle above 0 and below pi"));
             }
             Ok(Some(Projection::Perspective { view_angle_deg: view_angle.to_degrees() }))
         }
         "orthographic" => {
-            let half = camera.need("orthographic")?.need("ymag")?;
+            let half = camera.require("orthographic")?.require("ymag")?;
             let height = 2.0 * half.number()?.abs();
             if !(0.0 < height && height.is_finite()) {
-                return Err(half.unlike("a height other than 0"));
+                return Err(half.type_error("a height other than 0"));
             }
             Ok(Some(Projection::Orthographic { height }))
         }
         other => {
-            document.note(format!("a camera of type `{}` is left out", shortened(other)));
+            document.warn(format!("a camera of type `{}` is skipped", shorten(other)));
             Ok(None)
         }
     }
 }
 
-fn read_lamp(document: &Document, light: &Json) -> Result<Option<Lamp>> {
-    let kind = match light.need("type")?.text()? {
-        "directional" => LampKind::Directional,
-        "point" => LampKind::Point,
+fn read_lamp(document: &Document, light: &Json) -> Result<Option<PunctualLight>> {
+    let kind = match light.require("type")?.string()? {
+        "directional" => PunctualLightKind::Directional,
+        "point" => PunctualLightKind::Point,
         "spot" => read_spot(light)?,
         other => {
-            document.note(format!("a light of type `{}` is left out", shortened(other)));
+            document.warn(format!("a light of type `{}` is skipped", shorten(other)));
             return Ok(None);
         }
     };
@@ -172,25 +175,25 @@ fn read_lamp(document: &Document, light: &Json) -> Result<Option<Lamp>> {
     let intensity = light.float_or("intensity", 1.0)?.max(0.0);
     let range = light.float_or("range", f32::INFINITY)?;
     if range <= 0.0 {
-        return Err(light.need("range")?.unlike("a distance above 0"));
+        return Err(light.require("range")?.type_error("a distance above 0"));
     }
-    // The largest finite light still adds up with others.
+    // The limit keeps sums of several lights finite.
     let color = (intensity * color).min(Vec3::splat(1e30));
-    Ok(Some(Lamp { kind, color, range, radius: 0.0 }))
+    Ok(Some(PunctualLight { kind, color, range, radius: 0.0 }))
 }
 
-fn read_spot(light: &Json) -> Result<LampKind> {
+fn read_spot(light: &Json) -> Result<PunctualLightKind> {
     use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
     let Some(spot) = light.get("spot") else {
-        return Ok(LampKind::Spot { inner_rad: 0.0, outer_rad: FRAC_PI_4 });
+        return Ok(PunctualLightKind::Spot { inner_rad: 0.0, outer_rad: FRAC_PI_4 });
     };
     let outer_rad = spot.float_or("outerConeAngle", FRAC_PI_4)?;
     let inner_rad = spot.float_or("innerConeAngle", 0.0)?;
-    // Some programs write angles that are a rounding too large, or the same twice.
+    // Some exporters write angles that are slightly too large, or equal angles.
     if !(0.0 < outer_rad && outer_rad < FRAC_PI_2 + 1e-3 && 0.0 <= inner_rad) {
         let found = format!("cones of {inner_rad} and {outer_rad}");
         return Err(spot.error(found, "0 <= inner < outer <= pi / 2"));
     }
     let outer_rad = outer_rad.min(FRAC_PI_2);
-    Ok(LampKind::Spot { inner_rad: inner_rad.min(outer_rad), outer_rad })
+    Ok(PunctualLightKind::Spot { inner_rad: inner_rad.min(outer_rad), outer_rad })
 }

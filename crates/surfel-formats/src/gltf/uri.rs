@@ -1,71 +1,78 @@
-//! References to bytes: other files beside this one, and data written into the JSON.
+//! URIs of buffers and images: external files and `data:` URIs.
 
 use std::ops::Deref;
 use std::path::PathBuf;
 
-use super::json::{Json, shortened};
-use crate::beside::Beside;
+use super::json::{Json, shorten};
 use crate::error::{Error, Result};
-use crate::input::Input;
+use crate::file::{Input, ResourceResolver};
 
-/// Bytes from wherever they came.
-pub(super) enum Bytes<'a> {
+/// Bytes of a buffer or image and their storage.
+pub(super) enum BufferData<'a> {
+    /// An external file.
     File(Input<'static>),
-    Decoded(Vec<u8>),
-    Chunk(&'a [u8]),
+    /// Bytes decoded from a `data:` URI.
+    DataUri(Vec<u8>),
+    /// The buffer inside a GLB.
+    BinChunk(&'a [u8]),
 }
 
-impl Deref for Bytes<'_> {
+impl Deref for BufferData<'_> {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
         match self {
             Self::File(input) => input,
-            Self::Decoded(bytes) => bytes,
-            Self::Chunk(bytes) => bytes,
+            Self::DataUri(bytes) => bytes,
+            Self::BinChunk(bytes) => bytes,
         }
     }
 }
 
-/// Whether a reference has its bytes in itself.
-pub(super) fn is_data(uri: &str) -> bool {
+/// Returns true for a `data:` URI.
+pub(super) fn is_data_uri(uri: &str) -> bool {
     strip_prefix_ignoring_case(uri, "data:").is_some()
 }
 
-/// What `reference` names: `data:` followed by the bytes, or a file beside that.
+/// Loads the bytes that the URI `reference` refers to: a `data:` URI or a file relative to the glTF file.
 ///
-/// A path may lead up by `..`, as users lay out their folders; an absolute one or an address in a network
-/// would make the picture depend on the machine, and is refused.
-pub(super) fn fetch<'a>(beside: &Beside, reference: &Json<'a>) -> Result<Bytes<'a>> {
-    let uri = reference.text()?;
+/// Relative paths may contain `..`. Absolute paths and network addresses are rejected, because they would
+/// make the image depend on the machine.
+pub(super) fn load_uri<'a>(
+    resolver: &ResourceResolver,
+    reference: &Json<'a>,
+) -> Result<BufferData<'a>> {
+    let uri = reference.string()?;
     if let Some(data) = strip_prefix_ignoring_case(uri, "data:") {
-        return decode_data(data).map(Bytes::Decoded).ok_or_else(|| {
-            reference.error(format!("`{}`", shortened(uri)), "`data:` and bytes in Base64")
+        return decode_data_uri(data).map(BufferData::DataUri).ok_or_else(|| {
+            reference.error(format!("`{}`", shorten(uri)), "`data:` and bytes in Base64")
         });
     }
-    let unfit = |advice| Error::Unsupported {
+    let unsupported = |advice| Error::Unsupported {
         file: reference.file().into(),
         action: "read",
-        found: format!("the reference `{}` at {}", shortened(uri), reference.pointer()),
+        found: format!("the reference `{}` at {}", shorten(uri), reference.pointer()),
         advice,
     };
-    let Some(folder) = beside.folder else {
-        return Err(unfit("only a file on disk can have others beside it; pack all into one .glb"));
+    let Some(folder) = resolver.folder else {
+        return Err(unsupported(
+            "only a file on disk can have others beside it; pack all into one .glb",
+        ));
     };
     if is_absolute(uri) {
-        return Err(unfit("copy what it names into the folder and write its relative path"));
+        return Err(unsupported("copy the file into the folder and write its relative path"));
     }
-    let paths = candidates(uri).map(|path| folder.join(path));
-    Input::open(beside.choose(&paths)).map(Bytes::File).map_err(|error| match error {
+    let paths = candidate_paths(uri).map(|path| folder.join(path));
+    Input::open(resolver.choose(&paths)).map(BufferData::File).map_err(|error| match error {
         Error::Io { file, cause, .. } => {
-            let found = format!("`{}`, and {file} cannot be read ({cause})", shortened(uri));
+            let found = format!("`{}`, and {file} cannot be read ({cause})", shorten(uri));
             reference.error(found, "a file beside this one, copied along with it")
         }
         other => other,
     })
 }
 
-/// Whether a reference begins with a scheme (`https:`), a drive (`C:`) or the root.
+/// Returns true if a URI begins with a scheme (`https:`), a drive (`C:`) or the root.
 fn is_absolute(uri: &str) -> bool {
     let scheme = uri.split(['/', '\\', '?', '#']).next().unwrap_or_default();
     let scheme = scheme.split_once(':').map_or("", |(scheme, _)| scheme);
@@ -74,16 +81,16 @@ fn is_absolute(uri: &str) -> bool {
     is_scheme || uri.starts_with(['/', '\\']) || decode_percent(uri).starts_with(b"/")
 }
 
-/// The paths that a reference may mean, the likeliest first: escaped as it should be, written as it is,
-/// and as a program on Windows has it.
-fn candidates(uri: &str) -> [PathBuf; 3] {
+/// Returns the paths that a URI may mean, most likely first: percent-decoded as the standard requires,
+/// verbatim, and with the backslashes of Windows converted.
+fn candidate_paths(uri: &str) -> [PathBuf; 3] {
     let decoded = String::from_utf8(decode_percent(uri)).unwrap_or_else(|_| uri.into());
     let slashes = decoded.replace('\\', "/");
     [decoded.into(), uri.into(), slashes.into()]
 }
 
-/// What follows `data:`.
-fn decode_data(data: &str) -> Option<Vec<u8>> {
+/// Decodes the part of a `data:` URI after the scheme.
+fn decode_data_uri(data: &str) -> Option<Vec<u8>> {
     let (kind, payload) = data.split_once(',')?;
     if kind.to_ascii_lowercase().ends_with(";base64") {
         decode_base64(payload)
@@ -92,7 +99,7 @@ fn decode_data(data: &str) -> Option<Vec<u8>> {
     }
 }
 
-/// `%20` and the like as the bytes that they stand for; what is no such escape stays as it is.
+/// Decodes percent escapes such as `%20`. A percent sign that begins no escape stays.
 fn decode_percent(text: &str) -> Vec<u8> {
     let bytes = text.as_bytes();
     let digit = |at: usize| bytes.get(at).and_then(|byte| char::from(*byte).to_digit(16));
@@ -113,7 +120,7 @@ fn decode_percent(text: &str) -> Vec<u8> {
     decoded
 }
 
-/// Base64 in either alphabet, with or without padding.
+/// Decodes Base64 in the standard or URL-safe alphabet, with or without padding.
 fn decode_base64(text: &str) -> Option<Vec<u8>> {
     let mut decoded = Vec::with_capacity(text.len() / 4 * 3);
     let (mut bits, mut n_bits) = (0_u32, 0);
@@ -133,7 +140,7 @@ fn decode_base64(text: &str) -> Option<Vec<u8>> {
             decoded.push((bits >> n_bits) as u8);
         }
     }
-    // Six bits alone are no byte.
+    // A single remaining character has only six bits: the input is incomplete.
     (n_bits < 6).then_some(decoded)
 }
 
@@ -144,10 +151,12 @@ fn strip_prefix_ignoring_case<'a>(text: &'a str, prefix: &str) -> Option<&'a str
 
 #[cfg(test)]
 mod tests {
+    //! Tests of URI decoding.
+
     use super::*;
 
     #[test]
-    fn base64_is_decoded() {
+    fn base64_is_decoded_in_both_alphabets() {
         for (text, bytes) in
             [("", ""), ("Zg==", "f"), ("Zm8=", "fo"), ("Zm9v", "foo"), ("Zm9vYg", "foob")]
         {
@@ -159,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn escapes_are_decoded_and_other_percents_kept() {
+    fn percent_escapes_are_decoded_and_other_percent_signs_stay() {
         assert_eq!(decode_percent("a%20b%2fc"), b"a b/c");
         assert_eq!(decode_percent("100%"), b"100%");
         assert_eq!(decode_percent("%4"), b"%4");
@@ -167,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn absolute_references_are_told_from_relative_ones() {
+    fn absolute_uris_are_distinguished_from_relative_ones() {
         for uri in ["/a", "\\\\server\\a", "C:\\a.bin", "http://a/b", "file:a", "%2Fetc/a"] {
             assert!(is_absolute(uri), "{uri}");
         }

@@ -1,18 +1,20 @@
-//! Where the columns stand in the records of each point format, extra bytes included.
+//! The fields of the columns in the records of each point format, extra bytes included.
 
 use super::header::{Header, RECORD_LENGTHS, read_f64, text};
-use crate::input::Input;
-use crate::record::{ColumnField, Field, Kind};
-use crate::role::Role;
+use crate::file::Input;
+use crate::table::{ColumnField, ColumnRole, Field, NumberType};
 
+/// User id of the record that describes the extra bytes.
 pub(super) const EXTRA_BYTES_USER_ID: &str = "LASF_Spec";
+/// Id of the record that describes the extra bytes.
 pub(super) const EXTRA_BYTES_RECORD_ID: u16 = 4;
 /// Bytes of the description of one extra column.
-pub(super) const DESCRIPTION: usize = 192;
-/// Degrees a step of the scan angle, from point format 6 on.
+pub(super) const DESCRIPTION_SIZE: usize = 192;
+/// Unit of the scan angle in degrees, from point format 6 on.
 pub(super) const SCAN_ANGLE_STEP: f64 = 0.006;
 
-/// The columns of the file; an extra one that repeats a standard one is there for its better values.
+/// Returns the columns of the file. An extra column takes precedence over a standard one of the same role, since it is
+/// written for its better values.
 pub(super) fn columns(input: &Input, header: &Header) -> Vec<ColumnField> {
     let extras = extra_columns(input, header);
     let mut columns = standard_columns(header);
@@ -21,39 +23,41 @@ pub(super) fn columns(input: &Input, header: &Header) -> Vec<ColumnField> {
     columns
 }
 
-/// Where a point's withheld flag stands: byte and mask.
+/// Returns the byte and the mask of a point's withheld flag.
 pub(super) fn withheld_flag(point_format: u8) -> (usize, u8) {
     if point_format < 6 { (15, 0x80) } else { (15, 0x04) }
 }
 
+/// Returns the columns of the point format.
 fn standard_columns(header: &Header) -> Vec<ColumnField> {
     let mut columns = Vec::new();
-    let mut add = |role: Role, field: Field| columns.push(ColumnField { role, field });
-    let scalar = |name: &str| Role::Scalar(name.into());
-    let bits = |byte, lowest, n| Field { bits: Some((lowest, n)), ..Field::new(byte, Kind::U8) };
+    let mut add = |role: ColumnRole, field: Field| columns.push(ColumnField { role, field });
+    let scalar = |name: &str| ColumnRole::Scalar(name.into());
+    let bits =
+        |byte, lowest, n| Field { bits: Some((lowest, n)), ..Field::new(byte, NumberType::U8) };
     for axis in 0..3 {
-        let coordinate = Field::new(4 * axis, Kind::I32);
+        let coordinate = Field::new(4 * axis, NumberType::I32);
         let (scale, offset) = (header.scale[axis], header.offset[axis]);
-        add(Role::Position(axis), Field { scale, offset, ..coordinate });
+        add(ColumnRole::Position(axis), Field { scale, offset, ..coordinate });
     }
-    add(Role::Intensity, Field::new(12, Kind::U16));
+    add(ColumnRole::Intensity, Field::new(12, NumberType::U16));
     let format = header.point_format;
     if format < 6 {
         add(scalar("return_number"), bits(14, 0, 3));
         add(scalar("number_of_returns"), bits(14, 3, 3));
         // The upper three bits are flags.
-        add(Role::Classification, bits(15, 0, 5));
-        add(scalar("scan_angle"), Field::new(16, Kind::I8));
-        add(scalar("user_data"), Field::new(17, Kind::U8));
-        add(scalar("point_source_id"), Field::new(18, Kind::U16));
+        add(ColumnRole::Classification, bits(15, 0, 5));
+        add(scalar("scan_angle"), Field::new(16, NumberType::I8));
+        add(scalar("user_data"), Field::new(17, NumberType::U8));
+        add(scalar("point_source_id"), Field::new(18, NumberType::U16));
     } else {
         add(scalar("return_number"), bits(14, 0, 4));
         add(scalar("number_of_returns"), bits(14, 4, 4));
-        add(Role::Classification, Field::new(16, Kind::U8));
-        add(scalar("user_data"), Field::new(17, Kind::U8));
-        let angle = Field::new(18, Kind::I16);
+        add(ColumnRole::Classification, Field::new(16, NumberType::U8));
+        add(scalar("user_data"), Field::new(17, NumberType::U8));
+        let angle = Field::new(18, NumberType::I16);
         add(scalar("scan_angle"), Field { scale: SCAN_ANGLE_STEP, ..angle });
-        add(scalar("point_source_id"), Field::new(20, Kind::U16));
+        add(scalar("point_source_id"), Field::new(20, NumberType::U16));
     }
     let gps_time = match format {
         1 | 3 | 4 | 5 => Some(20),
@@ -61,7 +65,7 @@ fn standard_columns(header: &Header) -> Vec<ColumnField> {
         _ => None,
     };
     if let Some(byte) = gps_time {
-        add(scalar("gps_time"), Field::new(byte, Kind::F64));
+        add(scalar("gps_time"), Field::new(byte, NumberType::F64));
     }
     let color = match format {
         2 => Some(20),
@@ -71,29 +75,30 @@ fn standard_columns(header: &Header) -> Vec<ColumnField> {
     };
     for channel in 0..3 {
         if let Some(byte) = color {
-            add(Role::Color(channel), Field::new(byte + 2 * channel, Kind::U16));
+            add(ColumnRole::Color(channel), Field::new(byte + 2 * channel, NumberType::U16));
         }
     }
     if matches!(format, 8 | 10) {
-        add(scalar("nir"), Field::new(36, Kind::U16));
+        add(scalar("nir"), Field::new(36, NumberType::U16));
     }
     columns
 }
 
+/// Returns the columns in the extra bytes.
 fn extra_columns(input: &Input, header: &Header) -> Vec<ColumnField> {
     let descriptions = header.record(input, EXTRA_BYTES_USER_ID, EXTRA_BYTES_RECORD_ID);
     let mut byte = RECORD_LENGTHS[usize::from(header.point_format)];
     let mut columns = Vec::new();
-    for description in descriptions.into_iter().flat_map(|all| all.chunks_exact(DESCRIPTION)) {
+    for description in descriptions.into_iter().flat_map(|all| all.chunks_exact(DESCRIPTION_SIZE)) {
         let (data_type, options) = (description[2], description[3]);
-        let Some((kind, n_values)) = extra_kind(data_type) else {
-            // Type 0 is a number of bytes without meaning.
+        let Some((number_type, n_values)) = extra_type(data_type) else {
+            // Type 0 marks bytes without a meaning, whose number the options hold.
             byte += usize::from(options);
             continue;
         };
         let name = text(&description[4..36]);
         for value in 0..n_values {
-            if header.record_length < byte + kind.size() {
+            if header.record_length < byte + number_type.size() {
                 return columns;
             }
             let has_scale = options & 0x08 != 0;
@@ -101,34 +106,37 @@ fn extra_columns(input: &Input, header: &Header) -> Vec<ColumnField> {
             let field = Field {
                 scale: if has_scale { read_f64(description, 112 + 8 * value) } else { 1.0 },
                 offset: if has_offset { read_f64(description, 136 + 8 * value) } else { 0.0 },
-                ..Field::new(byte, kind)
+                ..Field::new(byte, number_type)
             };
             let name = if n_values == 1 { name.clone() } else { format!("{name}[{value}]") };
-            let role = match Role::of_name(&name) {
-                Some(role @ (Role::Normal(_) | Role::Radius | Role::Intensity)) => role,
-                _ => Role::Scalar(name),
+            let role = match ColumnRole::from_name(&name) {
+                Some(
+                    role @ (ColumnRole::Normal(_) | ColumnRole::Radius | ColumnRole::Intensity),
+                ) => role,
+                _ => ColumnRole::Scalar(name),
             };
             columns.push(ColumnField { role, field });
-            byte += kind.size();
+            byte += number_type.size();
         }
     }
     columns
 }
 
-/// The kind and number of the values of an extra column; types above 10 are the retired pairs and triples.
-fn extra_kind(data_type: u8) -> Option<(Kind, usize)> {
-    const KINDS: [Kind; 10] = [
-        Kind::U8,
-        Kind::I8,
-        Kind::U16,
-        Kind::I16,
-        Kind::U32,
-        Kind::I32,
-        Kind::U64,
-        Kind::I64,
-        Kind::F32,
-        Kind::F64,
+/// Returns the type and the number of the values of an extra column; types above 10 are the deprecated pairs and
+/// triples.
+fn extra_type(data_type: u8) -> Option<(NumberType, usize)> {
+    const TYPES: [NumberType; 10] = [
+        NumberType::U8,
+        NumberType::I8,
+        NumberType::U16,
+        NumberType::I16,
+        NumberType::U32,
+        NumberType::I32,
+        NumberType::U64,
+        NumberType::I64,
+        NumberType::F32,
+        NumberType::F64,
     ];
     let index = usize::from(data_type).checked_sub(1)?;
-    (index < 30).then(|| (KINDS[index % 10], index / 10 + 1))
+    (index < 30).then(|| (TYPES[index % 10], index / 10 + 1))
 }

@@ -1,4 +1,4 @@
-//! GPS times of LAZ files, decoded with a bound on how often one value may change between time sequences.
+//! Decodes the GPS times of LAZ files, with a limit on the changes between time sequences for one value.
 
 use std::io::{Error, ErrorKind, Read, Result};
 
@@ -7,21 +7,22 @@ use laz::decompressors::{IntegerDecompressor, IntegerDecompressorBuilder};
 use laz::models::{ArithmeticModel, ArithmeticModelBuilder};
 use laz::record::FieldDecompressor;
 
-/// Multiples of the last difference that have a symbol of their own.
-const MOST: i32 = 500;
-const LEAST: i32 = -10;
-/// Symbols of multiples; behind them, the first one says that the whole time follows.
-const WHOLE: i32 = MOST - LEAST + 1;
-/// An encoder changes the sequence once a value at most. The decoder of the `laz` crate has no limit
-/// and recurses: 1.6 KB of broken data overflow its stack, which nothing can catch.
-const MOST_CHANGES: usize = 8;
+/// Largest multiple of the last difference with a symbol of its own.
+const MAX_MULTIPLE: i32 = 500;
+/// Smallest multiple of the last difference with a symbol of its own.
+const MIN_MULTIPLE: i32 = -10;
+/// Symbol, the first after those of multiples, that announces a complete time.
+const FULL_TIME: i32 = MAX_MULTIPLE - MIN_MULTIPLE + 1;
+/// Maximum number of changes between sequences for one value; an encoder writes at most one. The decoder of the `laz`
+/// crate has no limit and recurses: 1.6 KB of broken data overflow its stack, which nothing can catch.
+const MAX_SEQUENCE_CHANGES: usize = 8;
 
-/// The two generations of the code differ in a symbol for a time that stays the same.
+/// The two generations of the code; only the older one has a symbol for an unchanged time.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Generation {
     /// LAZ of point formats up to 5.
     Pointwise,
-    /// LAZ of point formats from 6 on, where another layer says it.
+    /// LAZ of point formats from 6 on, in which another layer marks unchanged times.
     Layered,
 }
 
@@ -36,15 +37,19 @@ pub(super) struct GpsTimes {
     newest: usize,
 }
 
+/// A sequence of times.
 #[derive(Clone, Copy, Default)]
 struct Sequence {
-    /// The bits of an f64.
+    /// Bits of the last time, an f64.
     time: i64,
+    /// Difference from which the next time is predicted.
     difference: i32,
+    /// Number of recent multiples for which the difference was a bad prediction.
     n_extremes: u32,
 }
 
 impl GpsTimes {
+    /// A decoder of the times after `first`.
     pub fn new(first: i64, generation: Generation) -> Self {
         let n_unchanged = u32::from(generation == Generation::Pointwise);
         let mut sequences = [Sequence::default(); 4];
@@ -52,7 +57,7 @@ impl GpsTimes {
         Self {
             generation,
             first_symbols: ArithmeticModelBuilder::new(5 + n_unchanged).build(),
-            multiples: ArithmeticModelBuilder::new(WHOLE as u32 + 4 + n_unchanged).build(),
+            multiples: ArithmeticModelBuilder::new(FULL_TIME as u32 + 4 + n_unchanged).build(),
             integers: IntegerDecompressorBuilder::new().bits(32).contexts(9).build_initialized(),
             sequences,
             current: 0,
@@ -60,16 +65,16 @@ impl GpsTimes {
         }
     }
 
-    /// The bits of the next time.
+    /// Decodes the next time; returns its bits.
     pub fn next<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> Result<i64> {
-        for _ in 0..=MOST_CHANGES {
+        for _ in 0..=MAX_SEQUENCE_CHANGES {
             let has_difference = self.sequences[self.current].difference != 0;
             let step = if has_difference {
                 self.next_by_multiple(decoder)?
             } else {
                 self.next_by_difference(decoder)?
             };
-            // The step is that to another sequence, which has the time.
+            // A step leads to another sequence, which continues with the time.
             if step == 0 {
                 return Ok(self.sequences[self.current].time);
             }
@@ -78,6 +83,7 @@ impl GpsTimes {
         Err(Error::new(ErrorKind::InvalidData, "times that change between sequences endlessly"))
     }
 
+    /// Decodes a difference; returns the step to another sequence, or 0 if the current one has the time.
     fn next_by_difference<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> Result<usize> {
         let mut symbol = decoder.decode_symbol(&mut self.first_symbols)? as usize;
         if self.generation == Generation::Pointwise {
@@ -100,29 +106,31 @@ impl GpsTimes {
         Ok(0)
     }
 
+    /// Decodes a multiple of the last difference; returns the step to another sequence, or 0 if the current one has the
+    /// time.
     fn next_by_multiple<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> Result<usize> {
         let mut symbol = decoder.decode_symbol(&mut self.multiples)? as i32;
         if self.generation == Generation::Pointwise {
-            if symbol == WHOLE {
+            if symbol == FULL_TIME {
                 return Ok(0);
             }
-            symbol -= i32::from(WHOLE < symbol);
+            symbol -= i32::from(FULL_TIME < symbol);
         }
-        if symbol == WHOLE {
+        if symbol == FULL_TIME {
             self.begin_sequence(decoder)?;
             return Ok(0);
         }
-        if WHOLE < symbol {
-            return Ok((symbol - WHOLE) as usize);
+        if FULL_TIME < symbol {
+            return Ok((symbol - FULL_TIME) as usize);
         }
-        let multiple = if symbol <= MOST { symbol } else { MOST - symbol };
+        let multiple = if symbol <= MAX_MULTIPLE { symbol } else { MAX_MULTIPLE - symbol };
         let context = match multiple {
             0 => 7,
             1 => 1,
             2..10 => 2,
-            MOST => 4,
+            MAX_MULTIPLE => 4,
             10.. => 3,
-            ..=LEAST => 6,
+            ..=MIN_MULTIPLE => 6,
             _ => 5,
         };
         let expected = self.sequences[self.current].difference.wrapping_mul(multiple);
@@ -131,9 +139,9 @@ impl GpsTimes {
         sequence.time = sequence.time.wrapping_add(difference.into());
         if multiple == 1 {
             sequence.n_extremes = 0;
-        } else if matches!(multiple, 0 | MOST | LEAST) {
+        } else if matches!(multiple, 0 | MAX_MULTIPLE | MIN_MULTIPLE) {
             sequence.n_extremes += 1;
-            // The old difference has ceased to be a good measure.
+            // The old difference no longer predicts well.
             if 3 < sequence.n_extremes {
                 sequence.difference = difference;
                 sequence.n_extremes = 0;
@@ -142,7 +150,7 @@ impl GpsTimes {
         Ok(0)
     }
 
-    /// A time without relation to the others takes the place of the oldest sequence.
+    /// Decodes a complete time, which replaces the oldest sequence.
     fn begin_sequence<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> Result<()> {
         let last = self.sequences[self.current].time;
         let upper = self.integers.decompress(decoder, (last >> 32) as i32, 8)?;
@@ -154,7 +162,7 @@ impl GpsTimes {
     }
 }
 
-/// The GPS time as a part of pointwise records.
+/// The decoder of the GPS times in pointwise records.
 pub(super) struct GpsTimeField(GpsTimes);
 
 impl Default for GpsTimeField {

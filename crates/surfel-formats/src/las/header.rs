@@ -1,40 +1,55 @@
-//! The header and the variable length records of LAS files.
+//! Reads the header and the variable length records of LAS files.
 
 use std::ops::Range;
 
-use surfel::math::DVec3;
+use laz::LazVlr;
+use surfel_core::math::DVec3;
 
-use crate::error::{Place, Result};
-use crate::input::Input;
-use crate::number::numbers;
+use crate::display::format_vector;
+use crate::error::{Location, Result};
+use crate::file::Input;
 
+/// The header of a file.
 pub(super) struct Header {
+    /// Minor version of LAS 1.
     pub minor_version: u8,
+    /// Point data record format.
     pub point_format: u8,
+    /// True for LAZ.
     pub is_compressed: bool,
+    /// Bytes of a point.
     pub record_length: usize,
+    /// Number of points that the header states.
     pub n_points: u64,
+    /// Unit of the integer coordinates.
     pub scale: DVec3,
+    /// World coordinates of the integer coordinates 0.
     pub offset: DVec3,
-    /// The bytes from the first point to what follows the last.
+    /// Bytes of the points, from the first to the end of the file or the extended records.
     pub data: Range<usize>,
+    /// Variable length records.
     pub records: Vec<Vlr>,
 }
 
 /// A variable length record, extended or not.
 pub(super) struct Vlr {
+    /// User ID of the record.
     pub user_id: String,
+    /// Record ID.
     pub record_id: u16,
+    /// Bytes of its data in the file.
     pub data: Range<usize>,
 }
 
-pub(super) const VLR_HEADER: usize = 54;
-const EXTENDED_VLR_HEADER: usize = 60;
+/// Bytes of the header of a variable length record.
+pub(super) const VLR_HEADER_SIZE: usize = 54;
+/// Bytes of the header of an extended variable length record.
+const EXTENDED_VLR_HEADER_SIZE: usize = 60;
 /// Bytes of a point of each format without extra bytes (LAS 1.4 R15, tables 7 to 19).
 pub(super) const RECORD_LENGTHS: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 
 impl Header {
-    /// The first record with this name.
+    /// Returns the data of the first record with these ids.
     pub fn record<'a>(&self, input: &'a Input, user_id: &str, record_id: u16) -> Option<&'a [u8]> {
         let mut records = self.records.iter();
         let record =
@@ -42,7 +57,7 @@ impl Header {
         Some(&input[record.data.clone()])
     }
 
-    /// Bytes of a point behind those of its format.
+    /// Returns the extra bytes of a point, after those of its format.
     pub fn n_extra_bytes(&self) -> usize {
         self.record_length - RECORD_LENGTHS[usize::from(self.point_format)]
     }
@@ -51,9 +66,9 @@ impl Header {
 /// Reads and checks the header of a LAS or LAZ file.
 pub(super) fn read_header(input: &Input) -> Result<Header> {
     let ends_early = |expected: &str| {
-        let place = Place::Byte(input.len() as u64);
+        let location = Location::Byte(input.len() as u64);
         input.malformed(
-            place,
+            location,
             "the end of the file",
             expected,
             "copy the file again from its source",
@@ -64,7 +79,7 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
     }
     let malformed = |byte: u64, found: String, expected: &str| {
         let advice = "the header is broken; copy the file again from its source";
-        input.malformed(Place::Byte(byte), found, expected, advice)
+        input.malformed(Location::Byte(byte), found, expected, advice)
     };
     let (major, minor_version) = (input[24], input[25]);
     if major != 1 || 5 < minor_version {
@@ -81,11 +96,11 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
     }
     let point_format = input[104] & 0x3f;
     let record_length = usize::from(read_u16(input, 105));
-    let Some(&least) = RECORD_LENGTHS.get(usize::from(point_format)) else {
+    let Some(&min_length) = RECORD_LENGTHS.get(usize::from(point_format)) else {
         return Err(malformed(104, format!("point format {point_format}"), "0 to 10"));
     };
-    if record_length < least {
-        let expected = format!("at least {least} for point format {point_format}");
+    if record_length < min_length {
+        let expected = format!("at least {min_length} for point format {point_format}");
         return Err(malformed(105, format!("records of {record_length} bytes"), &expected));
     }
     let vector = |byte| {
@@ -93,7 +108,7 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
     };
     let (scale, offset) = (vector(131), vector(155));
     if !scale.is_finite() || scale.cmpeq(DVec3::ZERO).any() || !offset.is_finite() {
-        let found = format!("scale {} and offset {}", numbers(scale), numbers(offset));
+        let found = format!("scale {} and offset {}", format_vector(scale), format_vector(offset));
         return Err(malformed(131, found, "finite numbers, and scales other than 0"));
     }
     let legacy_count = u64::from(read_u32(input, 107));
@@ -114,13 +129,13 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
         data.end = extended_start as usize;
         let mut at = data.end;
         for _ in 0..n_extended {
-            // They come last: a file cut off here still has all its points.
+            // These records come last, so a file cut off here still has all its points.
             let Some(record) = read_extended_vlr(input, at) else { break };
             at = record.data.end;
             records.push(record);
         }
     }
-    let has_laszip = records.iter().any(|record| record.user_id == super::laz::USER_ID);
+    let has_laszip = records.iter().any(|record| record.user_id == LazVlr::USER_ID);
     Ok(Header {
         minor_version,
         point_format,
@@ -135,14 +150,14 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
 }
 
 fn read_vlr(bytes: &[u8], at: usize) -> Option<Vlr> {
-    let header = bytes.get(at..)?.get(..VLR_HEADER)?;
-    let start = at + VLR_HEADER;
+    let header = bytes.get(at..)?.get(..VLR_HEADER_SIZE)?;
+    let start = at + VLR_HEADER_SIZE;
     vlr(bytes, header, start, u64::from(read_u16(header, 20)))
 }
 
 fn read_extended_vlr(bytes: &[u8], at: usize) -> Option<Vlr> {
-    let header = bytes.get(at..)?.get(..EXTENDED_VLR_HEADER)?;
-    vlr(bytes, header, at + EXTENDED_VLR_HEADER, read_u64(header, 20))
+    let header = bytes.get(at..)?.get(..EXTENDED_VLR_HEADER_SIZE)?;
+    vlr(bytes, header, at + EXTENDED_VLR_HEADER_SIZE, read_u64(header, 20))
 }
 
 fn vlr(bytes: &[u8], header: &[u8], start: usize, length: u64) -> Option<Vlr> {
@@ -154,29 +169,33 @@ fn vlr(bytes: &[u8], header: &[u8], start: usize, length: u64) -> Option<Vlr> {
     })
 }
 
-/// Text up to its first zero.
+/// Returns the text up to its first zero.
 pub(super) fn text(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
     String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
 }
 
+/// Returns the number at a byte that is known to be there.
 pub(super) fn read_u16(bytes: &[u8], at: usize) -> u16 {
     u16::from_le_bytes(array(bytes, at))
 }
 
+/// Returns the number at a byte that is known to be there.
 pub(super) fn read_u32(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(array(bytes, at))
 }
 
+/// Returns the number at a byte that is known to be there.
 pub(super) fn read_u64(bytes: &[u8], at: usize) -> u64 {
     u64::from_le_bytes(array(bytes, at))
 }
 
+/// Returns the number at a byte that is known to be there.
 pub(super) fn read_f64(bytes: &[u8], at: usize) -> f64 {
     f64::from_le_bytes(array(bytes, at))
 }
 
-/// Bytes from `at`, zeros where there are none.
+/// Returns the bytes from `at`, or zeros beyond the end.
 fn array<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
     bytes.get(at..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0; N])
 }

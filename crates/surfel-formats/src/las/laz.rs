@@ -1,4 +1,4 @@
-//! The compressed chunks of LAZ files, checked before the decoder sees them.
+//! Finds and decodes the compressed chunks of LAZ files, which are checked before the decoder reads them.
 
 use std::io::Cursor;
 use std::ops::Range;
@@ -9,36 +9,40 @@ use laz::record::{
     LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
 };
 use laz::{DecompressionSelection, LazItem, LazItemType, LazVlr};
-use surfel::progress::Progress;
+use surfel_core::progress::Progress;
 
 use super::gps::GpsTimeField;
 use super::header::{Header, read_u16, read_u32, read_u64};
 use super::point14::Point14;
-use crate::error::{Error, Place, Result};
-use crate::input::Input;
+use crate::error::{Error, Location, Result};
+use crate::file::Input;
 
-pub(super) const USER_ID: &str = LazVlr::USER_ID;
+/// Number of points decoded at a time, whose raw records stay in the processor's cache.
+const POINTS_PER_BATCH: usize = 1024;
+/// Maximum number of points per byte of a chunk: an arithmetic coder with models of 15 bits spends at least 0.007 bits
+/// on a point.
+const MAX_POINTS_PER_BYTE: u64 = 2048;
+/// Number of points per byte beyond which a chunk is suspicious and decoded on trial; chunks of scans hold far fewer.
+const SUSPICIOUS_POINTS_PER_BYTE: u64 = 64;
+/// Maximum number of extra bytes of a point; the decoder needs 16 KiB of tables for each.
+pub(super) const MAX_EXTRA_BYTES: usize = 1024;
 
-/// Points decoded at a time: their raw records stay in the processor's cache.
-const POINTS_PER_PIECE: usize = 1024;
-/// No chunk holds more points a byte: an arithmetic coder with models of 15 bits spends 0.007 bits a point at least.
-const MOST_POINTS_PER_BYTE: u64 = 2048;
-/// Chunks of scans hold far fewer points a byte; one that claims more is decoded on trial first.
-const USUAL_POINTS_PER_BYTE: u64 = 64;
-/// The decoder needs 16 KiB of tables for each.
-pub(super) const MOST_EXTRA_BYTES: usize = 1024;
-
-/// The chunks of a file, and how they are compressed.
+/// The chunks of a file and their compression.
 pub(super) struct Chunks {
+    /// Chunks of the file, in order.
     pub chunks: Vec<Chunk>,
+    /// Parts of a record that are compressed separately.
     items: Vec<LazItem>,
     record_length: usize,
+    /// True for point formats from 6 on, which compress each part of a chunk's points in a layer of its own.
     is_layered: bool,
 }
 
-/// A run of points that is decoded on its own.
+/// A run of points that is decoded independently of others.
 pub(super) struct Chunk {
+    /// Bytes of the chunk in the file.
     pub bytes: Range<usize>,
+    /// Number of points in the chunk.
     pub n_points: usize,
 }
 
@@ -56,59 +60,59 @@ pub(super) fn find_chunks(
     if header.n_points == 0 {
         return Ok(found);
     }
-    let record = header.record(input, USER_ID, LazVlr::RECORD_ID).unwrap_or_default();
-    // Compressor 1 has one run of all points and no table.
+    let record = header.record(input, LazVlr::USER_ID, LazVlr::RECORD_ID).unwrap_or_default();
+    // Compressor 1 writes all points in one run, without a table.
     let (data_start, table) = if read_u16(record, 0) == 1 {
         (header.data.start, vec![(header.n_points, header.data.len() as u64)])
     } else {
         (header.data.start + ChunkTable::OFFSET_SIZE, read_chunk_table(input, header, &vlr)?)
     };
-    let mut left = header.n_points;
+    let mut n_left = header.n_points;
     let mut start = data_start;
     for (point_count, byte_count) in table {
-        let n_points = point_count.min(left);
+        let n_points = point_count.min(n_left);
         if n_points == 0 {
             continue;
         }
-        let point = Place::Point(header.n_points - left);
+        let point = Location::Point(header.n_points - n_left);
         let end = usize::try_from(byte_count).ok().and_then(|count| start.checked_add(count));
         let Some(end) = end.filter(|end| *end <= header.data.end) else {
             return Err(Error::Truncated {
                 file: input.name.to_string(),
-                place: point,
-                readable: header.n_points - left,
+                location: point,
+                readable: header.n_points - n_left,
                 claimed: header.n_points,
             });
         };
         let chunk = Chunk { bytes: start..end, n_points: n_points as usize };
-        if MOST_POINTS_PER_BYTE * byte_count < n_points {
+        if MAX_POINTS_PER_BYTE * byte_count < n_points {
             let found = format!("a chunk of {n_points} points in {byte_count} bytes");
             return Err(broken(input, point, found, "a count that the bytes can hold"));
         }
         found.check_layers(input, &chunk, point)?;
         start = end;
-        left -= n_points;
+        n_left -= n_points;
         found.chunks.push(chunk);
     }
-    if 0 < left {
+    if 0 < n_left {
         return Err(Error::Truncated {
             file: input.name.to_string(),
-            place: Place::Byte(start as u64),
-            readable: header.n_points - left,
+            location: Location::Byte(start as u64),
+            readable: header.n_points - n_left,
             claimed: header.n_points,
         });
     }
-    found.try_unusual(input, progress)?;
+    found.probe_suspicious_chunks(input, progress)?;
     Ok(found)
 }
 
 impl Chunks {
-    /// The first record of each chunk, which is stored uncompressed.
+    /// Yields the first record of each chunk, which is stored uncompressed.
     pub fn first_records<'a>(&self, input: &'a Input) -> impl Iterator<Item = &'a [u8]> {
         self.chunks.iter().map(|chunk| &input[chunk.bytes.start..][..self.record_length])
     }
 
-    /// Decodes a chunk and hands `take` its records piece by piece.
+    /// Decodes a chunk, and passes its records to `take` in batches.
     pub fn decode(
         &self,
         input: &Input,
@@ -116,29 +120,29 @@ impl Chunks {
         selection: DecompressionSelection,
         mut take: impl FnMut(&[u8]) -> Result<()>,
     ) -> Result<()> {
-        let place = Place::Byte(chunk.bytes.start as u64);
+        let location = Location::Byte(chunk.bytes.start as u64);
         let broken_chunk =
-            |found: String| broken(input, place.clone(), found, "a chunk that decodes");
+            |found: String| broken(input, location.clone(), found, "a chunk that decodes");
         let bytes = Cursor::new(&input[chunk.bytes.clone()]);
         let mut decoder = self.decoder(bytes).map_err(|error| broken_chunk(error.to_string()))?;
         decoder.set_selection(selection);
-        let mut piece = vec![0; POINTS_PER_PIECE.min(chunk.n_points) * self.record_length];
-        let mut left = chunk.n_points;
-        while 0 < left {
-            let n = left.min(POINTS_PER_PIECE);
-            let records = &mut piece[..n * self.record_length];
-            // Broken bytes can take the decoder's state outside its tables, where it panics; there is
-            // no way to tell beforehand. The decoder is not used again after that.
+        let mut batch = vec![0; POINTS_PER_BATCH.min(chunk.n_points) * self.record_length];
+        let mut n_left = chunk.n_points;
+        while 0 < n_left {
+            let n = n_left.min(POINTS_PER_BATCH);
+            let records = &mut batch[..n * self.record_length];
+            // Broken bytes can take the decoder's state outside its tables, where it panics; this cannot be
+            // detected beforehand. The decoder is not used again after that.
             catch_unwind(AssertUnwindSafe(|| decoder.decompress_many(records)))
                 .map_err(|_| broken_chunk("bytes that no encoder writes".into()))?
                 .map_err(|error| broken_chunk(error.to_string()))?;
             take(records)?;
-            left -= n;
+            n_left -= n;
         }
         Ok(())
     }
 
-    /// The decoder for a chunk, our own for the parts that hold GPS times.
+    /// Returns the decoder of a chunk, with decoders of this crate for the parts that hold GPS times.
     fn decoder<'a>(
         &self,
         bytes: Cursor<&'a [u8]>,
@@ -167,8 +171,8 @@ impl Chunks {
         Ok(Box::new(decoder))
     }
 
-    /// Checks that the first record and the layers that a chunk announces lie in it.
-    fn check_layers(&self, input: &Input, chunk: &Chunk, place: Place) -> Result<()> {
+    /// Checks that the first record and the announced layers of a chunk lie in it.
+    fn check_layers(&self, input: &Input, chunk: &Chunk, location: Location) -> Result<()> {
         let bytes = &input[chunk.bytes.clone()];
         let n_layers: usize = self.items.iter().map(n_layers).sum();
         let fixed = self.record_length + if self.is_layered { 4 + 4 * n_layers } else { 4 };
@@ -179,13 +183,13 @@ impl Chunks {
             return Ok(());
         }
         let found = format!("a chunk of {} bytes", bytes.len());
-        Err(broken(input, place, found, &format!("{needed} bytes, as its layers announce")))
+        Err(broken(input, location, found, &format!("{needed} bytes, as its layers announce")))
     }
 
-    /// Decodes chunks with an unusual number of points once, so that no memory is taken for a false claim.
-    fn try_unusual(&self, input: &Input, progress: &dyn Progress) -> Result<()> {
+    /// Decodes chunks that claim suspiciously many points once, so that no memory is allocated for a false claim.
+    fn probe_suspicious_chunks(&self, input: &Input, progress: &dyn Progress) -> Result<()> {
         for chunk in &self.chunks {
-            if USUAL_POINTS_PER_BYTE * (chunk.bytes.len() as u64) < chunk.n_points as u64 {
+            if SUSPICIOUS_POINTS_PER_BYTE * (chunk.bytes.len() as u64) < chunk.n_points as u64 {
                 self.decode(
                     input,
                     chunk,
@@ -198,6 +202,7 @@ impl Chunks {
     }
 }
 
+/// Returns the number of layers of a part.
 fn n_layers(item: &LazItem) -> usize {
     match item.item_type() {
         LazItemType::Point14 => 9,
@@ -207,19 +212,19 @@ fn n_layers(item: &LazItem) -> usize {
     }
 }
 
-/// Reads the record that says how points are compressed, and checks that it fits the header.
+/// Reads the record that describes the compression, and checks that it fits the header.
 fn read_laszip_record(input: &Input, header: &Header) -> Result<LazVlr> {
-    let place = Place::Byte(header.data.start as u64);
-    let Some(record) = header.record(input, USER_ID, LazVlr::RECORD_ID) else {
+    let location = Location::Byte(header.data.start as u64);
+    let Some(record) = header.record(input, LazVlr::USER_ID, LazVlr::RECORD_ID) else {
         return Err(broken(
             input,
-            place,
+            location,
             "no laszip record",
             "one, since the points are compressed",
         ));
     };
     let vlr = LazVlr::from_buffer(record)
-        .map_err(|error| broken(input, place.clone(), error.to_string(), "a laszip record"))?;
+        .map_err(|error| broken(input, location.clone(), error.to_string(), "a laszip record"))?;
     let items = vlr.items();
     let is_layered = items.first().is_some_and(|item| item.item_type() == LazItemType::Point14);
     let versions = if is_layered { 3..=4 } else { 1..=2 };
@@ -251,28 +256,28 @@ fn read_laszip_record(input: &Input, header: &Header) -> Result<LazVlr> {
             "the parts of point format {} in {} bytes",
             header.point_format, header.record_length
         );
-        return Err(broken(input, place, found, &expected));
+        return Err(broken(input, location, found, &expected));
     }
-    if MOST_EXTRA_BYTES < header.n_extra_bytes() {
+    if MAX_EXTRA_BYTES < header.n_extra_bytes() {
         let found = format!("{} compressed extra bytes a point", header.n_extra_bytes());
         return Err(input.unsupported(found, "at most 1024 are read; convert the file to LAS"));
     }
     Ok(vlr)
 }
 
-/// Points and bytes of each chunk.
+/// Reads the numbers of points and bytes of each chunk.
 fn read_chunk_table(input: &Input, header: &Header, vlr: &LazVlr) -> Result<Vec<(u64, u64)>> {
     let start = header.data.start;
     let missing = |found: String| {
         let advice = "the file was cut off or never closed; copy or write it again";
         let expected = "the offset of a chunk table inside the file";
-        input.malformed(Place::Byte(start as u64), found, expected, advice)
+        input.malformed(Location::Byte(start as u64), found, expected, advice)
     };
     if header.data.len() < ChunkTable::OFFSET_SIZE {
         return Err(missing("the end of the file".into()));
     }
     let mut offset = read_u64(input, start);
-    // A writer that could not seek back puts the offset at the end instead.
+    // A writer that cannot seek puts the offset at the end.
     if offset == u64::MAX {
         offset = read_u64(input, input.len() - 8);
     }
@@ -286,14 +291,14 @@ fn read_chunk_table(input: &Input, header: &Header, vlr: &LazVlr) -> Result<Vec<
         let found = format!("{n_chunks} chunks");
         return Err(broken(
             input,
-            Place::Byte(at as u64 + 4),
+            Location::Byte(at as u64 + 4),
             found,
             "at most one a record's length of bytes",
         ));
     }
     let is_variable = vlr.uses_variable_size_chunks();
     let mut table_bytes = Cursor::new(&input[at..]);
-    // As in `Chunks::decode`: the table is coded arithmetically too.
+    // The table is coded arithmetically too, so decoding it can panic as in `Chunks::decode`.
     let table = catch_unwind(AssertUnwindSafe(|| ChunkTable::read(&mut table_bytes, is_variable)))
         .map_err(|_| missing("a broken chunk table".into()))?
         .map_err(|error| missing(error.to_string()))?;
@@ -302,6 +307,6 @@ fn read_chunk_table(input: &Input, header: &Header, vlr: &LazVlr) -> Result<Vec<
     Ok(table.into_iter().map(|entry| (count(entry.point_count), entry.byte_count)).collect())
 }
 
-fn broken(input: &Input, place: Place, found: impl Into<String>, expected: &str) -> Error {
-    input.malformed(place, found, expected, "the file is damaged; copy it again from its source")
+fn broken(input: &Input, location: Location, found: impl Into<String>, expected: &str) -> Error {
+    input.malformed(location, found, expected, "the file is damaged; copy it again from its source")
 }

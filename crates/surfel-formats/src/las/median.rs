@@ -1,30 +1,32 @@
-//! The running median that predicts the steps between points of LAZ files.
+//! The streaming median that predicts the steps between points of LAZ files.
 
-/// A running guess at the median: of five values, the farthest out makes room for each new one.
+/// An estimate of the median of a stream from five values, of which each new one replaces the largest or the smallest.
 #[derive(Clone, Copy)]
-pub(super) struct Median {
-    /// In ascending order.
+pub(super) struct StreamingMedian5 {
+    /// Values in ascending order.
     values: [i32; 5],
-    /// True if the largest value goes next, false if the smallest.
+    /// True if the next value replaces the largest, false if the smallest.
     drops_largest: bool,
 }
 
-impl Default for Median {
+impl Default for StreamingMedian5 {
     fn default() -> Self {
         Self { values: [0; 5], drops_largest: true }
     }
 }
 
-impl Median {
+impl StreamingMedian5 {
+    /// Returns the estimate.
     pub fn get(&self) -> i32 {
         self.values[2]
     }
 
+    /// Adds a value of the stream.
     pub fn add(&mut self, value: i32) {
         let values = &mut self.values;
         let middle = values[2];
         if self.drops_largest {
-            // The place is found from below, so that equal values come behind.
+            // The search from below puts a new value after equal ones.
             let at = values[..4].iter().position(|v| value < *v).unwrap_or(4);
             values[at..].rotate_right(1);
             values[at] = value;
@@ -43,8 +45,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_settles_on_the_middle_and_stays_in_order() {
-        let mut median = Median::default();
+    fn values_stay_sorted_and_the_estimate_converges() {
+        let mut median = StreamingMedian5::default();
         for value in [5, 5, 7, 5, -100, 5, 900, 5, 6, 5] {
             median.add(value);
             assert!(median.values.is_sorted());

@@ -8,11 +8,9 @@ mod gps;
 mod median;
 mod point14;
 mod laz;
-mod plan;
+mod write_plan;
 mod read;
 mod write;
 
 pub(crate) use read::{inspect, read};
 pub(crate) use write::write;
-
-pub(crate) const MAGIC: &[u8] = b"LASF";

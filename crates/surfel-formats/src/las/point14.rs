@@ -1,4 +1,4 @@
-//! The base of points of formats from 6 on, decoded from its nine layers.
+//! Decodes the base of points of formats from 6 on from its nine layers.
 
 use std::io::{Cursor, Read, Result, Seek, SeekFrom};
 
@@ -10,11 +10,12 @@ use laz::record::LayeredFieldDecompressor;
 
 use super::gps::{Generation, GpsTimes};
 use super::header::{read_u16, read_u32, read_u64};
-use super::median::Median;
+use super::median::StreamingMedian5;
 
+/// Bytes of the base of a point.
 const SIZE: usize = 30;
 
-/// In the order in which they are stored.
+/// The layers, in the order in which they are stored.
 #[derive(Clone, Copy)]
 enum Layer {
     Position,
@@ -28,9 +29,9 @@ enum Layer {
     GpsTime,
 }
 
-/// Decodes the base of points. It is our own because of the times, see `gps`.
+/// The decoder of the base of points, which replaces that of the `laz` crate because of the times (see `gps`).
 pub(super) struct Point14 {
-    /// From compression version 4 on, the other parts follow every scanner channel.
+    /// True from compression version 4 on, in which the other parts keep a context for each scanner channel.
     follows_channel: bool,
     layers: [LayerDecoder; 9],
     channels: [Option<Box<Channel>>; 4],
@@ -39,15 +40,17 @@ pub(super) struct Point14 {
 
 type Decoder = ArithmeticDecoder<Cursor<Vec<u8>>>;
 
+/// The decoder of one layer of a chunk.
 struct LayerDecoder {
     decoder: Decoder,
+    /// Bytes of the layer.
     size: u32,
     is_wanted: bool,
-    /// A layer without bytes says that no value changes.
+    /// True if the layer is wanted and has bytes; a layer without bytes means that no value changes.
     is_coded: bool,
 }
 
-/// A point as it stands in a record.
+/// The values in the base of a record.
 #[derive(Clone, Copy, Default)]
 struct Point {
     x: i32,
@@ -64,14 +67,16 @@ struct Point {
     gps_time: i64,
 }
 
-/// What is known of the points of a scanner channel so far.
+/// The state of the decoder for one scanner channel.
 struct Channel {
+    /// Last point of the channel.
     last: Point,
+    /// True if the time of the last point differs from that of the one before.
     has_new_time: bool,
     last_intensity: [u16; 8],
     last_z: [i32; 8],
-    x_steps: [Median; 12],
-    y_steps: [Median; 12],
+    x_steps: [StreamingMedian5; 12],
+    y_steps: [StreamingMedian5; 12],
     times: GpsTimes,
     changes: [Option<ArithmeticModel>; 8],
     channel: ArithmeticModel,
@@ -90,6 +95,7 @@ struct Channel {
 }
 
 impl Point14 {
+    /// A decoder for this version of the compression.
     pub fn new(version: u16) -> Self {
         let layer = |_| LayerDecoder {
             decoder: ArithmeticDecoder::new(Cursor::new(Vec::new())),
@@ -135,7 +141,7 @@ impl<R: Read + Seek> LayeredFieldDecompressor<R> for Point14 {
         context: &mut usize,
     ) -> Result<()> {
         source.read_exact(first_point)?;
-        let point = Point::of_bytes(first_point);
+        let point = Point::from_bytes(first_point);
         self.current = usize::from(point.flags >> 4 & 3);
         self.channels = [const { None }; 4];
         self.channels[self.current] = Some(Box::new(Channel::new(point)));
@@ -152,10 +158,10 @@ impl<R: Read + Seek> LayeredFieldDecompressor<R> for Point14 {
             let last = &last_channel.last;
             let is_first = last.return_number == 1;
             let is_last = last.number_of_returns <= last.return_number;
-            let place = usize::from(is_first)
+            let context = usize::from(is_first)
                 | usize::from(is_last) << 1
                 | usize::from(last_channel.has_new_time) << 2;
-            decoder.decode_symbol(model(&mut last_channel.changes[place], 128))?
+            decoder.decode_symbol(model(&mut last_channel.changes[context], 128))?
         };
         if changes & 1 << 6 != 0 {
             let step = decoder.decode_symbol(&mut last_channel.channel)? as usize;
@@ -168,7 +174,8 @@ impl<R: Read + Seek> LayeredFieldDecompressor<R> for Point14 {
         if self.follows_channel {
             *context = *current;
         }
-        let channel = channels[*current].as_mut().expect("it was there or has just been made");
+        let channel =
+            channels[*current].as_mut().expect("the channel was there or was created above");
         channel.decode(layers, changes)?;
         channel.last.write(out);
         Ok(())
@@ -190,7 +197,7 @@ impl<R: Read + Seek> LayeredFieldDecompressor<R> for Point14 {
                 source.seek(SeekFrom::Current(layer.size.into()))?;
                 continue;
             }
-            // The sizes were checked against the chunk's before.
+            // `Chunks::check_layers` has compared the sizes with that of the chunk.
             let mut bytes = vec![0; layer.size as usize];
             source.read_exact(&mut bytes)?;
             layer.decoder = ArithmeticDecoder::new(Cursor::new(bytes));
@@ -210,8 +217,8 @@ impl Channel {
             has_new_time: false,
             last_intensity: [last.intensity; 8],
             last_z: [last.z; 8],
-            x_steps: [Median::default(); 12],
-            y_steps: [Median::default(); 12],
+            x_steps: [StreamingMedian5::default(); 12],
+            y_steps: [StreamingMedian5::default(); 12],
             times: GpsTimes::new(last.gps_time, Generation::Layered),
             changes: [const { None }; 8],
             channel: ArithmeticModelBuilder::new(3).build(),
@@ -230,7 +237,7 @@ impl Channel {
         }
     }
 
-    /// Makes `last` the next point; `changes` says which parts of it differ.
+    /// Replaces `last` by the next point; the bits of `changes` mark the parts that differ.
     fn decode(&mut self, layers: &mut [LayerDecoder; 9], changes: u32) -> Result<()> {
         let last = &mut self.last;
         let has_new_time = changes & 1 << 4 != 0;
@@ -255,7 +262,7 @@ impl Channel {
         };
         let (n, r) = (last.number_of_returns, last.return_number);
         // 3: the only return, 2: the first, 1: the last, 0: between.
-        let place = u32::from(r == 1) << 1 | u32::from(n <= r);
+        let position_in_pulse = u32::from(r == 1) << 1 | u32::from(n <= r);
         let is_single = u32::from(n == 1);
 
         let kind = usize::from(RETURN_KINDS[usize::from(n)][usize::from(r)] - b'0');
@@ -275,7 +282,7 @@ impl Channel {
             self.last_z[level] = last.z;
         }
         if let Some(decoder) = coded(layers, Layer::Class) {
-            let context = usize::from(last.class & 0x1f) << 1 | usize::from(place == 3);
+            let context = usize::from(last.class & 0x1f) << 1 | usize::from(position_in_pulse == 3);
             last.class = decoder.decode_symbol(model(&mut self.class[context], 256))? as u8;
         }
         if let Some(decoder) = coded(layers, Layer::Flags) {
@@ -285,9 +292,10 @@ impl Channel {
             last.flags = flags & 15 | last.flags & 0x30 | (flags & 0x30) << 2;
         }
         if let Some(decoder) = coded(layers, Layer::Intensity) {
-            let at = (place << 1 | u32::from(has_new_time)) as usize;
+            let at = (position_in_pulse << 1 | u32::from(has_new_time)) as usize;
             let expected = i32::from(self.last_intensity[at]);
-            last.intensity = self.intensity.decompress(decoder, expected, place)? as u16;
+            last.intensity =
+                self.intensity.decompress(decoder, expected, position_in_pulse)? as u16;
             self.last_intensity[at] = last.intensity;
         }
         if let (true, Some(decoder)) = (changes & 1 << 3 != 0, coded(layers, Layer::ScanAngle)) {
@@ -312,7 +320,8 @@ impl Channel {
 }
 
 impl Point {
-    fn of_bytes(bytes: &[u8]) -> Self {
+    /// Reads a point from its record.
+    fn from_bytes(bytes: &[u8]) -> Self {
         let number = |at| read_u32(bytes, at) as i32;
         Self {
             x: number(0),
@@ -330,6 +339,7 @@ impl Point {
         }
     }
 
+    /// Writes the point to its record.
     fn write(&self, out: &mut [u8]) {
         out[0..4].copy_from_slice(&self.x.to_le_bytes());
         out[4..8].copy_from_slice(&self.y.to_le_bytes());
@@ -345,18 +355,19 @@ impl Point {
     }
 }
 
-/// The decoder of a layer that has something to say.
+/// Returns the decoder of a layer, if the layer is coded.
 fn coded(layers: &mut [LayerDecoder; 9], layer: Layer) -> Option<&mut Decoder> {
     let layer = &mut layers[layer as usize];
     layer.is_coded.then_some(&mut layer.decoder)
 }
 
-/// A model of so many symbols, made at its first use.
+/// Returns a model of `n_symbols` symbols, which is created at its first use.
 fn model(model: &mut Option<ArithmeticModel>, n_symbols: u32) -> &mut ArithmeticModel {
     model.get_or_insert_with(|| ArithmeticModelBuilder::new(n_symbols).build())
 }
 
-/// Kinds of returns that the format's authors found to lie alike: a row by number of returns, a digit by return.
+/// Kinds of returns with similar steps, from the specification of the format: a row for each number of returns, a digit
+/// for each return.
 const RETURN_KINDS: [&[u8; 16]; 16] = [
     b"0123453445555555",
     b"1013333333333333",

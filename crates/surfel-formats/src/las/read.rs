@@ -4,27 +4,29 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use laz::DecompressionSelection;
 use rayon::prelude::*;
-use surfel::math::DVec3;
-use surfel::points::PointCloud;
-use surfel::progress::Progress;
+use surfel_core::math::DVec3;
+use surfel_core::points::PointCloud;
+use surfel_core::progress::Progress;
 
 use super::crs::coordinate_system;
 use super::fields::{columns, withheld_flag};
 use super::header::{Header, read_header};
 use super::laz::{Chunk, Chunks, find_chunks};
-use crate::block::Block;
-use crate::error::{Error, Place, Result};
-use crate::input::Input;
-use crate::options::{ColumnChoice, LoadOptions, Loaded, Source};
-use crate::record::Layout;
-use crate::records::{choose_origin, grow_checked, read_records, sample_positions};
-use crate::role::Role;
+use crate::error::{Error, Location, Result};
+use crate::file::Input;
+use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::table::{
+    ColumnChoice, ColumnRole, ColumnSlices, RecordLayout, choose_origin, grow_checked,
+    read_records, sample_positions,
+};
 
-pub(crate) fn inspect(input: &Input) -> Result<Source> {
+/// Reads the header.
+pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
     let header = read_header(input)?;
-    Ok(source(input, &header))
+    Ok(file_info(input, &header))
 }
 
+/// Reads the points.
 pub(crate) fn read(
     input: &Input,
     options: &LoadOptions,
@@ -32,7 +34,7 @@ pub(crate) fn read(
 ) -> Result<Loaded> {
     let header = read_header(input)?;
     let columns = columns(input, &header);
-    let layout = Layout::new(header.record_length, false, columns, &options.columns)
+    let layout = RecordLayout::new(header.record_length, false, columns, &options.columns)
         .expect("every point format has x, y and z");
     let tolerance = header.scale.abs() / 4.0;
     let origin_of =
@@ -42,11 +44,16 @@ pub(crate) fn read(
         let chunks = find_chunks(input, &header, progress)?;
         let sample = chunks.first_records(input).map(|record| layout.world_position(record));
         let origin = origin_of(sample.collect());
-        let task =
-            Task { input, header: &header, layout: &layout, origin, n_withheld: &n_withheld };
-        task.read_chunks(&chunks, selection(&options.columns), progress)?
+        let reader = ChunkReader {
+            input,
+            header: &header,
+            layout: &layout,
+            origin,
+            n_withheld: &n_withheld,
+        };
+        reader.read_chunks(&chunks, selection(&options.columns), progress)?
     } else {
-        let records = plain_records(input, &header)?;
+        let records = uncompressed_records(input, &header)?;
         let origin = origin_of(sample_positions(records, &layout));
         progress.begin(&format!("read {}", input.name), header.n_points);
         n_withheld.store(count_withheld(records, &header), Ordering::Relaxed);
@@ -57,38 +64,39 @@ pub(crate) fn read(
         progress.note(&format!("{}: {n_withheld} points are flagged withheld; kept", input.name));
     }
     if !cloud.is_empty() {
-        mend_colors(input, &mut cloud, progress);
-        drop_unset(input, &mut cloud, progress);
+        normalize_colors(input, &mut cloud, progress);
+        drop_zero_columns(input, &mut cloud, progress);
     }
-    Ok(Loaded { cloud, source: source(input, &header) })
+    Ok(Loaded { cloud, info: file_info(input, &header) })
 }
 
-fn source(input: &Input, header: &Header) -> Source {
+/// Returns the information in a header.
+fn file_info(input: &Input, header: &Header) -> FileInfo {
     let name = match header.is_compressed {
         true if header.record(input, "copc", 1).is_some() => "COPC, LAZ",
         true => "LAZ",
         false => "LAS",
     };
     let columns = columns(input, header);
-    Source {
+    FileInfo {
         format: format!("{name} 1.{}, point format {}", header.minor_version, header.point_format),
         n_points: Some(header.n_points),
         n_triangles: None,
-        beside: Vec::new(),
+        external_files: Vec::new(),
         resolution: Some(header.scale.abs()),
         coordinate_system: coordinate_system(input, header),
         columns: columns.iter().map(|column| column.role.name().to_owned()).collect(),
     }
 }
 
-/// The records of an uncompressed file.
-fn plain_records<'a>(input: &'a Input, header: &Header) -> Result<&'a [u8]> {
+/// Returns the records of an uncompressed file.
+fn uncompressed_records<'a>(input: &'a Input, header: &Header) -> Result<&'a [u8]> {
     let data = &input[header.data.clone()];
     let readable = (data.len() / header.record_length) as u64;
     if readable < header.n_points {
         return Err(Error::Truncated {
             file: input.name.to_string(),
-            place: Place::Byte(header.data.end as u64),
+            location: Location::Byte(header.data.end as u64),
             readable,
             claimed: header.n_points,
         });
@@ -96,16 +104,16 @@ fn plain_records<'a>(input: &'a Input, header: &Header) -> Result<&'a [u8]> {
     Ok(&data[..header.n_points as usize * header.record_length])
 }
 
-/// What the threads that decode chunks share.
-struct Task<'a> {
+/// Reads the chunks of a compressed file in parallel.
+struct ChunkReader<'a> {
     input: &'a Input<'a>,
     header: &'a Header,
-    layout: &'a Layout,
+    layout: &'a RecordLayout,
     origin: DVec3,
     n_withheld: &'a AtomicU64,
 }
 
-impl Task<'_> {
+impl ChunkReader<'_> {
     fn read_chunks(
         &self,
         chunks: &Chunks,
@@ -115,18 +123,18 @@ impl Task<'_> {
         progress.begin(&format!("read {}", self.input.name), self.header.n_points);
         let mut cloud = self.layout.empty_cloud(self.origin);
         grow_checked(&mut cloud, self.header.n_points as usize, self.input)?;
-        let mut rest = Block::of_cloud(&mut cloud, 0);
-        let parts: Vec<(&Chunk, Block)> = chunks
+        let mut rest = ColumnSlices::from_cloud(&mut cloud, 0);
+        let tasks: Vec<(&Chunk, ColumnSlices)> = chunks
             .chunks
             .iter()
             .map(|chunk| (chunk, rest.split_off_front(chunk.n_points)))
             .collect();
-        parts.into_par_iter().with_max_len(1).try_for_each(|(chunk, mut block)| {
+        tasks.into_par_iter().with_max_len(1).try_for_each(|(chunk, mut slices)| {
             chunks.decode(self.input, chunk, selection, |records| {
                 progress.check()?;
                 let n_points = records.len() / self.header.record_length;
-                let mut piece = block.split_off_front(n_points);
-                self.layout.decode(records, self.origin, &mut piece);
+                let mut batch = slices.split_off_front(n_points);
+                self.layout.decode(records, self.origin, &mut batch);
                 self.n_withheld.fetch_add(count_withheld(records, self.header), Ordering::Relaxed);
                 progress.advance(n_points as u64);
                 Ok(())
@@ -136,26 +144,27 @@ impl Task<'_> {
     }
 }
 
+/// Returns the number of points that are flagged withheld.
 fn count_withheld(records: &[u8], header: &Header) -> u64 {
     let (byte, mask) = withheld_flag(header.point_format);
     let is_withheld = |record: &&[u8]| record[byte] & mask != 0;
     records.chunks_exact(header.record_length).filter(is_withheld).count() as u64
 }
 
-/// What the decoder is to decode, for formats whose parts are compressed apart from each other.
+/// Returns the parts to decode, for point formats whose parts are compressed separately.
 fn selection(choice: &ColumnChoice) -> DecompressionSelection {
     let base = DecompressionSelection::base().decompress_z().decompress_flags();
     let ColumnChoice::Only(_) = choice else { return DecompressionSelection::all() };
-    let wants = |name: &str| choice.wants(&Role::Scalar(name.into()));
-    // Which columns the extra bytes are is decided elsewhere; they come with any of them.
+    let wants = |name: &str| choice.wants(&ColumnRole::Scalar(name.into()));
+    // The extra bytes are decoded for any choice, since other code decides which columns they hold.
     let mut selection = base.decompress_extra_bytes();
-    if choice.wants(&Role::Intensity) {
+    if choice.wants(&ColumnRole::Intensity) {
         selection = selection.decompress_intensity();
     }
-    if choice.wants(&Role::Classification) {
+    if choice.wants(&ColumnRole::Classification) {
         selection = selection.decompress_classification();
     }
-    if choice.wants(&Role::Color(0)) {
+    if choice.wants(&ColumnRole::Color(0)) {
         selection = selection.decompress_rgb();
     }
     if wants("scan_angle") {
@@ -176,23 +185,24 @@ fn selection(choice: &ColumnChoice) -> DecompressionSelection {
     selection
 }
 
-/// Brings colours of 8 bits to 16, and drops those that were never set.
-fn mend_colors(input: &Input, cloud: &mut PointCloud, progress: &dyn Progress) {
+/// Scales colours of 8 bits to 16, and drops those that were never set.
+fn normalize_colors(input: &Input, cloud: &mut PointCloud, progress: &dyn Progress) {
     let Some(colors) = &mut cloud.colors else { return };
     let largest = colors.par_iter().flatten_iter().copied().max().unwrap_or(0);
     if largest == 0 {
-        progress.note(&format!("{}: all colours are zero; taken as absent", input.name));
+        progress.note(&format!("{}: all colours are zero; treated as absent", input.name));
         cloud.colors = None;
     } else if largest <= 255 {
-        progress.note(&format!("{}: colours have 8 bits, brought to 16", input.name));
+        progress.note(&format!("{}: colours have 8 bits, scaled to 16", input.name));
         colors.par_iter_mut().for_each(|color| *color = color.map(|channel| channel * 257));
     }
 }
 
-/// The formats always have room for these; zeros everywhere mean that nobody filled it.
-fn drop_unset(input: &Input, cloud: &mut PointCloud, progress: &dyn Progress) {
+/// Drops intensities and classes that are all zero: every point format has fields for them, so zeros mean that they
+/// were never set.
+fn drop_zero_columns(input: &Input, cloud: &mut PointCloud, progress: &dyn Progress) {
     let note = |what: &str| {
-        progress.note(&format!("{}: all {what} are zero; taken as absent", input.name));
+        progress.note(&format!("{}: all {what} are zero; treated as absent", input.name));
     };
     if cloud.intensity.as_ref().is_some_and(|column| column.par_iter().all(|v| *v == 0.0)) {
         note("intensities");

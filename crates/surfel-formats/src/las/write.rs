@@ -1,4 +1,4 @@
-//! Writes clouds as LAS 1.4, plain or compressed.
+//! Writes clouds as LAS 1.4, compressed or not.
 
 use std::io::{self, Seek, SeekFrom, Write};
 use std::ops::Range;
@@ -7,17 +7,18 @@ use std::path::Path;
 use laz::laszip::{ChunkTable, ChunkTableEntry};
 use laz::record::{LayeredPointRecordCompressor, RecordCompressor};
 use laz::{LazItemRecordBuilder, LazVlr, LazVlrBuilder};
-use surfel::points::PointCloud;
-use surfel::progress::Progress;
+use surfel_core::points::PointCloud;
+use surfel_core::progress::Progress;
 
-use super::laz::MOST_EXTRA_BYTES;
-use super::plan::{MOST_EXTRAS, Plan};
-use crate::atomic::{write_failed, write_file};
-use crate::encode::{POINTS_PER_PART, encode_points};
+use super::laz::MAX_EXTRA_BYTES;
+use super::write_plan::{MAX_EXTRA_COLUMNS, WritePlan};
+use crate::display::format_vector;
 use crate::error::{Error, Result};
-use crate::number::numbers;
-use crate::save::{SaveOptions, extension};
+use crate::file::{extension, write_error, write_file};
+use crate::options::SaveOptions;
+use crate::table::{POINTS_PER_CHUNK, encode_points};
 
+/// Writes `cloud` to `path`; the extension `laz` asks for compression.
 pub(crate) fn write(
     path: &Path,
     cloud: &PointCloud,
@@ -28,24 +29,26 @@ pub(crate) fn write(
         return Err(Error::Unsupported {
             file: path.display().to_string(),
             action: "write",
-            found: format!("point {point} at {}", numbers(cloud.positions[point].as_dvec3())),
+            found: format!("point {point} at {}", format_vector(cloud.positions[point].as_dvec3())),
             advice: "LAS holds finite positions only; remove such points or write PLY",
         });
     }
     progress.begin(&format!("write {}", path.display()), cloud.len() as u64);
-    let plan = Plan::new(cloud, options);
+    let plan = WritePlan::new(cloud, options);
     if options.coordinate_system.is_some() && !plan.has_coordinate_system {
         let line = "the coordinate system is neither WKT nor an EPSG code, and is left out";
         progress.note(&format!("{}: {line}", path.display()));
     }
-    let failed = |source: io::Error| write_failed(path, source);
+    let failed = |cause: io::Error| write_error(path, cause);
     let is_compressed = extension(path) == "laz";
     let n_extra_bytes = plan.n_extra_bytes();
-    if MOST_EXTRAS < plan.n_extras() || is_compressed && MOST_EXTRA_BYTES < n_extra_bytes {
+    if MAX_EXTRA_COLUMNS < plan.n_extra_columns()
+        || is_compressed && MAX_EXTRA_BYTES < n_extra_bytes
+    {
         return Err(Error::Unsupported {
             file: path.display().to_string(),
             action: "write",
-            found: format!("{} extra columns of {n_extra_bytes} bytes", plan.n_extras()),
+            found: format!("{} extra columns of {n_extra_bytes} bytes", plan.n_extra_columns()),
             advice: "LAS holds 341 and LAZ 1024 bytes of them; load fewer columns or write PLY",
         });
     }
@@ -58,14 +61,14 @@ pub(crate) fn write(
             let put = |bytes: &[u8]| writer.write_all(bytes).map_err(failed);
             return encode_points(cloud.len(), encode, progress, put);
         };
-        // The offset of the chunk table is known once the chunks are written.
+        // The offset of the chunk table is filled in when the chunks are written.
         writer.write_all(&[0; ChunkTable::OFFSET_SIZE]).map_err(failed)?;
         let mut table = ChunkTable::default();
         let compress = |points| compress(vlr, &plan.encode(cloud, points)).map_err(failed);
         encode_points(cloud.len(), compress, progress, |bytes| {
-            // The number of points of chunks of fixed size is not stored.
+            // The number of points is not stored for chunks of fixed size.
             let byte_count = bytes.len() as u64;
-            table.push(ChunkTableEntry { point_count: POINTS_PER_PART as u64, byte_count });
+            table.push(ChunkTableEntry { point_count: POINTS_PER_CHUNK as u64, byte_count });
             writer.write_all(bytes).map_err(failed)
         })?;
         let mut finish = || {
@@ -78,21 +81,23 @@ pub(crate) fn write(
     })
 }
 
-fn laszip_record(plan: &Plan) -> io::Result<LazVlr> {
+/// Returns the record that describes the compression.
+fn laszip_record(plan: &WritePlan) -> io::Result<LazVlr> {
     let items = LazItemRecordBuilder::default_for_point_format_id(
         plan.point_format,
         plan.n_extra_bytes() as u16,
     );
     let items = items.map_err(|error| io::Error::other(error.to_string()))?;
-    Ok(LazVlrBuilder::new(items).with_fixed_chunk_size(POINTS_PER_PART as u32).build())
+    Ok(LazVlrBuilder::new(items).with_fixed_chunk_size(POINTS_PER_CHUNK as u32).build())
 }
 
 fn laszip_bytes(vlr: &LazVlr) -> Vec<u8> {
     let mut bytes = Vec::new();
-    vlr.write_to(&mut bytes).expect("memory takes all that is written");
+    vlr.write_to(&mut bytes).expect("writing to memory does not fail");
     bytes
 }
 
+/// Compresses the records of a chunk.
 fn compress(vlr: &LazVlr, records: &[u8]) -> io::Result<Vec<u8>> {
     let mut compressor = LayeredPointRecordCompressor::new(io::Cursor::new(Vec::new()));
     compressor.set_fields_from(vlr.items()).map_err(|error| io::Error::other(error.to_string()))?;

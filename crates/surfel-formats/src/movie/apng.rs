@@ -1,27 +1,28 @@
-//! Animated PNG: every frame whole and without loss.
+//! Animated PNG writer: every frame is stored whole and lossless.
 
-use surfel::progress::Progress;
+use surfel_core::progress::Progress;
 
-use crate::atomic::{write_failed, write_file};
 use crate::error::Result;
-use crate::picture::png;
+use crate::file::{write_error, write_file};
+use crate::image_file::png;
 
-use super::plan::Plan;
+use super::spec::MovieSpec;
 
-pub(super) fn write(plan: &Plan, progress: &dyn Progress) -> Result<()> {
-    let n_frames = plan.options.n_frames;
-    progress.begin(&format!("write {}", plan.file()), n_frames.into());
-    let failed = |error: ::png::EncodingError| write_failed(&plan.path, error.into());
-    write_file(&plan.path, |writer| {
-        let mut encoder = png::encoder(writer, plan.size(), &plan.options.image);
-        // Played 0 times: forever.
+/// Writes an animated PNG from the finished frames.
+pub(super) fn write(spec: &MovieSpec, progress: &dyn Progress) -> Result<()> {
+    let n_frames = spec.options.n_frames;
+    progress.begin(&format!("write {}", spec.file()), n_frames.into());
+    let failed = |error: ::png::EncodingError| write_error(&spec.path, error.into());
+    write_file(&spec.path, |writer| {
+        let mut encoder = png::encoder(writer, spec.size(), &spec.options.image);
+        // 0 plays means an endless loop.
         encoder.set_animated(n_frames, 0).map_err(failed)?;
-        encoder.set_frame_delay(plan.rate.seconds, plan.rate.frames).map_err(failed)?;
+        encoder.set_frame_delay(spec.rate.seconds, spec.rate.frames).map_err(failed)?;
         encoder.validate_sequence(true);
         let mut writer = encoder.write_header().map_err(failed)?;
         for frame in 0..n_frames {
             progress.check()?;
-            writer.write_image_data(&plan.read_frame(frame)?).map_err(failed)?;
+            writer.write_image_data(&spec.read_frame(frame)?).map_err(failed)?;
             progress.advance(1);
         }
         writer.finish().map_err(failed)

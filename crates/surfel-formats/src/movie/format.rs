@@ -1,55 +1,77 @@
-//! The kinds of movies, as told by their names.
+//! Movie formats, derived from file names.
 
 use std::path::Path;
 
 use crate::error::Result;
-use crate::save::{extension, unsupported};
+use crate::file::{extension, unsupported_extension};
 
+/// A kind of movie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MovieFormat {
-    /// Made by the program ffmpeg. Sides are even: an odd one repeats its last column or row.
-    Video(Container),
-    /// 256 colours a frame; repeats forever.
+pub(super) enum MovieFormat {
+    /// A video that the program ffmpeg encodes. Its sides are even: an odd side repeats its last column or
+    /// row.
+    Video(VideoContainer),
+    /// An animated GIF with 256 colours per frame that loops forever.
     Gif,
-    /// An animated PNG without loss; repeats forever.
+    /// A lossless animated PNG that loops forever.
     Apng,
-    /// A PNG or EXR file a frame, numbered from 1.
-    Pictures,
+    /// One PNG or EXR file per frame, numbered from 1.
+    ImageSequence,
 }
 
-/// The file format of a video.
+/// A video file format with the codec used in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Container {
-    /// H.264.
+pub(super) enum VideoContainer {
+    /// MP4 with H.264.
     Mp4,
-    /// H.264.
+    /// QuickTime with H.264.
     Mov,
-    /// H.264.
+    /// Matroska with H.264.
     Mkv,
-    /// VP9.
+    /// WebM with VP9.
     Webm,
-    /// MPEG-4 part 2, since players do not expect H.264 in it.
+    /// AVI with MPEG-4 part 2, because players do not expect H.264 in AVI.
     Avi,
 }
 
-const MOVIES: &str = "surfel writes movies as .mp4, .mov, .mkv, .webm and .avi (by ffmpeg), .gif, \
-    .png (animated), and as numbered pictures, frame_####.png or frame_####.exr";
+const SUPPORTED: &str = "surfel writes movies as .mp4, .mov, .mkv, .webm and .avi (by ffmpeg), .gif, \
+    .png (animated), and as numbered images, frame_####.png or frame_####.exr";
 
 impl MovieFormat {
-    /// The format that a name asks for: by its extension, or numbered pictures if the name of a .png
-    /// or .exr file has a run of `#`, one for each digit.
-    pub fn of(path: &Path) -> Result<Self> {
+    /// Returns the format for the extension of `path`. A .png or .exr file whose name contains `#` is an
+    /// image sequence.
+    ///
+    /// # Errors
+    ///
+    /// Fails if no movie format has this extension.
+    pub fn from_path(path: &Path) -> Result<Self> {
         let is_numbered = path.file_name().is_some_and(|name| name.to_string_lossy().contains('#'));
         Ok(match extension(path).as_str() {
-            "mp4" => Self::Video(Container::Mp4),
-            "mov" => Self::Video(Container::Mov),
-            "mkv" => Self::Video(Container::Mkv),
-            "webm" => Self::Video(Container::Webm),
-            "avi" => Self::Video(Container::Avi),
+            "mp4" => Self::Video(VideoContainer::Mp4),
+            "mov" => Self::Video(VideoContainer::Mov),
+            "mkv" => Self::Video(VideoContainer::Mkv),
+            "webm" => Self::Video(VideoContainer::Webm),
+            "avi" => Self::Video(VideoContainer::Avi),
             "gif" => Self::Gif,
-            "png" | "exr" if is_numbered => Self::Pictures,
+            "png" | "exr" if is_numbered => Self::ImageSequence,
             "png" => Self::Apng,
-            _ => return Err(unsupported(path, MOVIES)),
+            _ => return Err(unsupported_extension(path, SUPPORTED)),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Tests of the choice of a format by file name.
+
+    use super::*;
+
+    #[test]
+    fn extensions_are_case_insensitive_and_number_signs_only_count_for_images() {
+        let format = |name: &str| MovieFormat::from_path(Path::new(name)).unwrap();
+        assert_eq!(format("a.MP4"), MovieFormat::Video(VideoContainer::Mp4));
+        assert_eq!(format("a#1.mp4"), format("a.MP4"));
+        assert_eq!(format("a.png"), MovieFormat::Apng);
+        assert_eq!(format("a#.png"), MovieFormat::ImageSequence);
     }
 }

@@ -1,37 +1,39 @@
-//! Animated GIF: a palette of 256 colours a frame.
+//! Animated GIF writer with a palette of 256 colours per frame.
 
 use std::io;
 
 use gif::{Encoder, EncodingError, Frame, Repeat};
 use rayon::prelude::*;
-use surfel::progress::Progress;
+use surfel_core::progress::Progress;
 
-use crate::atomic::{write_failed, write_file};
 use crate::error::Result;
+use crate::file::{write_error, write_file};
 
-use super::plan::Plan;
+use super::spec::MovieSpec;
 
-/// A palette is learnt from every pixel of a small frame, and from about so many of a large one.
+/// Approximate number of samples that the palette of a large frame is fitted to; a small frame uses all its
+/// pixels.
 const N_PALETTE_SAMPLES: usize = 100_000;
 
-pub(super) fn write(plan: &Plan, progress: &dyn Progress) -> Result<()> {
-    let n_frames = plan.options.n_frames;
-    progress.begin(&format!("write {}", plan.file()), n_frames.into());
+/// Writes a GIF from the finished frames.
+pub(super) fn write(spec: &MovieSpec, progress: &dyn Progress) -> Result<()> {
+    let n_frames = spec.options.n_frames;
+    progress.begin(&format!("write {}", spec.file()), n_frames.into());
     let failed = |error: EncodingError| match error {
-        EncodingError::Io(cause) => write_failed(&plan.path, cause),
-        other => write_failed(&plan.path, io::Error::other(other.to_string())),
+        EncodingError::Io(cause) => write_error(&spec.path, cause),
+        other => write_error(&spec.path, io::Error::other(other.to_string())),
     };
-    write_file(&plan.path, |writer| {
-        let (width, height) = size(plan);
+    write_file(&spec.path, |writer| {
+        let (width, height) = size(spec);
         let mut encoder = Encoder::new(writer, width, height, &[]).map_err(failed)?;
         encoder.set_repeat(Repeat::Infinite).map_err(failed)?;
-        // Palettes take the time, so threads find them; no more frames are held than there are threads.
-        let n_batch = rayon::current_num_threads() as u32;
-        for first in (0..n_frames).step_by(n_batch as usize) {
-            let batch = first..n_frames.min(first.saturating_add(n_batch));
+        // Finding palettes dominates the run time, so frames are encoded in parallel, one per thread.
+        let batch_size = rayon::current_num_threads() as u32;
+        for first in (0..n_frames).step_by(batch_size as usize) {
+            let batch = first..n_frames.min(first.saturating_add(batch_size));
             let encode = |frame| {
                 progress.check()?;
-                encode(plan, frame)
+                encode(spec, frame)
             };
             let batch = batch.into_par_iter().map(encode).collect::<Result<Vec<_>>>()?;
             for frame in &batch {
@@ -44,19 +46,19 @@ pub(super) fn write(plan: &Plan, progress: &dyn Progress) -> Result<()> {
     })
 }
 
-fn encode(plan: &Plan, number: u32) -> Result<Frame<'static>> {
-    let (width, height) = size(plan);
-    let samples = plan.read_frame(number)?;
-    // Learns from one pixel of so many; the crate takes up to 30.
+fn encode(spec: &MovieSpec, frame_idx: u32) -> Result<Frame<'static>> {
+    let (width, height) = size(spec);
+    let samples = spec.read_frame(frame_idx)?;
+    // The palette is fitted to every n-th pixel; the `gif` crate accepts n up to 30.
     let speed = (samples.len() / 3 / N_PALETTE_SAMPLES).clamp(1, 30) as i32;
     let mut frame = Frame::from_rgb_speed(width, height, &samples, speed);
-    // From rounded times, so that the rounding does not add up.
-    frame.delay = (plan.rate.start_cs(number + 1) - plan.rate.start_cs(number)) as u16;
+    // The difference of rounded start times keeps rounding errors from accumulating.
+    frame.delay = (spec.rate.start_cs(frame_idx + 1) - spec.rate.start_cs(frame_idx)) as u16;
     frame.make_lzw_pre_encoded();
     Ok(frame)
 }
 
-/// No side is longer than the format allows: the plan refuses such.
-fn size(plan: &Plan) -> (u16, u16) {
-    (plan.options.width as u16, plan.options.height as u16)
+/// The size as 16-bit numbers; [`MovieSpec::new`] rejects larger sizes.
+fn size(spec: &MovieSpec) -> (u16, u16) {
+    (spec.options.width as u16, spec.options.height as u16)
 }

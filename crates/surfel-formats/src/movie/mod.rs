@@ -1,59 +1,44 @@
-//! Movies, frame by frame: video by ffmpeg, animated GIF and PNG, or a picture a frame.
+//! Movies, written frame by frame: video through ffmpeg, animated GIF and PNG, or an image sequence.
 //!
-//! Each frame is kept as a picture from the moment it is done, and the film is put together from
-//! these pictures at the end. So a run that was stopped is taken up where it ended, whatever the kind.
+//! Each finished frame is stored as an image, and the movie is encoded from these images at the end. An
+//! interrupted run can therefore be resumed, whatever the format.
 
+mod options;
 mod format;
-mod rate;
-mod names;
-mod plan;
-mod kept;
+mod frame_rate;
+mod frame_names;
+mod spec;
+mod frame_log;
 mod apng;
 mod gif;
+mod ffmpeg;
 mod video;
 
 use std::ffi::OsStr;
 use std::path::Path;
 
-use surfel::image::Image;
-use surfel::progress::Progress;
+use surfel_core::image::Image;
+use surfel_core::progress::Progress;
 
 use crate::error::{Error, Result};
-use crate::picture::{ImageOptions, save_image};
+use crate::image_file::save_image;
 
-use kept::Kept;
-use plan::Plan;
+use format::MovieFormat;
+use frame_log::FrameLog;
+use spec::MovieSpec;
 
-pub use format::{Container, MovieFormat};
+pub use options::MovieOptions;
 
-/// What a movie is made of, and how.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MovieOptions {
-    /// Pixels.
-    pub width: u32,
-    /// Pixels.
-    pub height: u32,
-    /// Frames a second, from 0.01 to 1000; at most 50 for GIF. Numbered pictures do not hold it.
-    pub fps: f64,
-    /// At least 1.
-    pub n_frames: u32,
-    /// How frames are stored. Video and GIF are always of eight bits, shown over black.
-    pub image: ImageOptions,
-    /// All else that a frame's content depends on, in any words: frames are taken over from an
-    /// earlier run only if its fingerprint, size, number of frames, depth and alpha were the same.
-    pub fingerprint: String,
-}
-
-/// A movie in the making.
+/// A movie that is being written.
 ///
-/// Until it is finished, its frames are kept as `000001.png`, `000002.png` and so on in a folder
-/// beside it, `film.mp4.frames`, with a file `settings` that says how they were made and which are
-/// done. Numbered pictures are written under their own names, and that file is `.frame_####.png.surfel`.
-/// Dropped unfinished, a movie leaves these for a later run, if any frame was done.
+/// Until [`Movie::finish`], the frames are stored as `000001.png`, `000002.png` and so on in a folder next to
+/// the movie, `turn.mp4.frames`, with a file `settings` that records the settings and the finished frames. An
+/// image sequence is written under its final names, and that file is `.frame_####.png.surfel`. A movie that
+/// is dropped unfinished leaves these files for a later run if at least one frame is done.
 ///
 /// ```
-/// use surfel::image::Image;
-/// use surfel::progress::Silent;
+/// use surfel_core::image::Image;
+/// use surfel_core::progress::NoProgress;
 /// use surfel_formats::{ImageOptions, Movie, MovieOptions};
 ///
 /// # fn main() -> Result<(), surfel_formats::Error> {
@@ -64,67 +49,73 @@ pub struct MovieOptions {
 ///     fps: 25.0,
 ///     n_frames: 3,
 ///     image: ImageOptions::default(),
-///     fingerprint: "church.laz, once around".into(),
+///     fingerprint: "church.laz, turntable".into(),
 /// };
 /// let mut movie = Movie::open(&path, &options, false)?;
 /// for frame in 0..options.n_frames {
-///     if !movie.has(frame) {
-///         movie.add(frame, &Image::new(options.width, options.height))?;
+///     if !movie.has_frame(frame) {
+///         movie.add_frame(frame, &Image::new(options.width, options.height))?;
 ///     }
 /// }
-/// movie.finish(&Silent)?;
+/// movie.finish(&NoProgress)?;
 /// assert!(path.exists());
 /// # std::fs::remove_file(&path).unwrap();
 /// # Ok(())
 /// # }
 /// ```
 pub struct Movie {
-    plan: Plan,
-    kept: Kept,
+    spec: MovieSpec,
+    log: FrameLog,
 }
 
-/// The program that makes video, as found by the system.
-const FFMPEG: &str = "ffmpeg";
-
-/// Tells early whether such a movie can be written to `path`.
+/// Checks that a movie with these options can be written to `path`, without writing anything.
 ///
-/// Fails if the format is not known or cannot hold such frames, or if the folder does not exist;
-/// for video also if ffmpeg is missing or refuses a first frame of this size. Writes nothing.
+/// # Errors
+///
+/// Fails if the format is unknown or does not support such frames, or if the folder does not exist; for video
+/// also if ffmpeg is missing or rejects a test frame of this size.
 pub fn check_movie(path: &Path, options: &MovieOptions) -> Result<()> {
-    check(&Plan::new(path, options)?)
+    check_encoder(&MovieSpec::new(path, options)?)
 }
 
 impl Movie {
-    /// Begins a movie, or with `resume` goes on with one that was begun before.
+    /// Starts a movie. With `resume` it continues one that an earlier run left unfinished, if there is one.
     ///
-    /// Fails as [`check_movie`] does, and if the frames to resume from were made with other settings.
-    /// Where none were begun, `resume` changes nothing. Without it, frames that a run left unfinished
-    /// are forgotten; numbered pictures of an earlier run stay until new ones take their places.
+    /// If `resume` is false, unfinished frames of an earlier run are discarded; an older image sequence stays
+    /// until new images replace it.
+    ///
+    /// # Errors
+    ///
+    /// Fails like [`check_movie`], and if the frames to resume from were made with other settings.
     pub fn open(path: &Path, options: &MovieOptions, resume: bool) -> Result<Self> {
-        let plan = Plan::new(path, options)?;
-        check(&plan)?;
-        let kept = Kept::open(&plan, resume)?;
-        Ok(Self { plan, kept })
+        let spec = MovieSpec::new(path, options)?;
+        check_encoder(&spec)?;
+        let log = FrameLog::open(&spec, resume)?;
+        Ok(Self { spec, log })
     }
 
-    /// Whether a frame, counted from 0, is done and need not be made again.
-    pub fn has(&self, frame: u32) -> bool {
-        self.kept.done.contains(&frame)
+    /// Returns true if the frame is already done. Frames are counted from 0.
+    pub fn has_frame(&self, frame: u32) -> bool {
+        self.log.done.contains(&frame)
     }
 
+    /// Returns the number of finished frames.
     pub fn n_done(&self) -> u32 {
-        self.kept.done.len() as u32
+        self.log.done.len() as u32
     }
 
-    /// Keeps `image` as a frame, counted from 0, in any order; one that is there already is replaced.
+    /// Stores `image` as a frame, counted from 0. Frames may come in any order and replace earlier versions.
     ///
-    /// Fails if there is no such frame, if the image has another size, or if it cannot be written.
-    pub fn add(&mut self, frame: u32, image: &Image) -> Result<()> {
-        let options = &self.plan.options;
+    /// # Errors
+    ///
+    /// Fails if the index or the size of the image does not match the options, or if a file cannot be
+    /// written.
+    pub fn add_frame(&mut self, frame: u32, image: &Image) -> Result<()> {
+        let options = &self.spec.options;
         let expected = (options.width, options.height);
         if options.n_frames <= frame || (image.width, image.height) != expected {
-            return Err(Error::Frames {
-                file: self.plan.file(),
+            return Err(Error::InvalidFrames {
+                file: self.spec.file(),
                 found: format!("frame {frame} of {}x{} pixels", image.width, image.height),
                 expected: format!(
                     "frames 0 to {} of {}x{}",
@@ -132,44 +123,47 @@ impl Movie {
                     expected.0,
                     expected.1
                 ),
-                advice: "render what was announced",
+                advice: "render the announced size and number of frames",
             });
         }
-        save_image(&self.plan.names.path(frame), image, &options.image)?;
-        self.kept.note(frame)
+        save_image(&self.spec.names.path(frame), image, &options.image)?;
+        self.log.record(frame)
     }
 
-    /// Puts the film together and removes what was kept for it.
+    /// Encodes the movie and removes its temporary files.
     ///
-    /// Fails if frames are missing, if one cannot be read back, if the film cannot be written, or if
-    /// ffmpeg fails; an old film and the frames then stay, as they do if the work is cancelled.
+    /// # Errors
+    ///
+    /// Fails if frames are missing or cannot be read back, if the movie cannot be written, if ffmpeg fails, or
+    /// if `progress` cancels. The stored frames and an existing file at the path then stay.
     pub fn finish(mut self, progress: &dyn Progress) -> Result<()> {
-        let n_frames = self.plan.options.n_frames;
+        let n_frames = self.spec.options.n_frames;
         if self.n_done() < n_frames {
-            return Err(Error::Frames {
-                file: self.plan.file(),
+            return Err(Error::InvalidFrames {
+                file: self.spec.file(),
                 found: format!("{} of {n_frames} frames", self.n_done()),
                 expected: "all".into(),
                 advice: "run again with --resume to make the others",
             });
         }
         progress.check()?;
-        match self.plan.format {
+        match self.spec.format {
             MovieFormat::Video(container) => {
-                video::write(&self.plan, container, OsStr::new(FFMPEG), progress)?;
+                video::write(&self.spec, container, OsStr::new(ffmpeg::PROGRAM), progress)?;
             }
-            MovieFormat::Gif => gif::write(&self.plan, progress)?,
-            MovieFormat::Apng => apng::write(&self.plan, progress)?,
-            MovieFormat::Pictures => {}
+            MovieFormat::Gif => gif::write(&self.spec, progress)?,
+            MovieFormat::Apng => apng::write(&self.spec, progress)?,
+            MovieFormat::ImageSequence => {}
         }
-        self.kept.done.clear();
+        self.log.done.clear();
         Ok(())
     }
 }
 
-fn check(plan: &Plan) -> Result<()> {
-    match plan.format {
-        MovieFormat::Video(container) => video::check(plan, container, OsStr::new(FFMPEG)),
+/// Checks that ffmpeg accepts the movie, if its format needs ffmpeg.
+fn check_encoder(spec: &MovieSpec) -> Result<()> {
+    match spec.format {
+        MovieFormat::Video(container) => video::check(spec, container, OsStr::new(ffmpeg::PROGRAM)),
         _ => Ok(()),
     }
 }

@@ -2,22 +2,20 @@
 
 use std::ops::Range;
 
-use surfel::image::decode_srgb;
-use surfel::math::{DVec3, Vec2, Vec3, Vec4};
-use surfel::scene::Mesh;
+use surfel_core::image::decode_srgb;
+use surfel_core::math::{DVec3, Vec2, Vec3, Vec4};
+use surfel_core::scene::Mesh;
 
 use super::parse::{ABSENT, Corner, Parsed};
-use crate::mesh::about_origin;
+use crate::mesh::{relative_to_origin, weld};
 use crate::options::LoadOptions;
-use crate::range::ColorRange;
-use crate::records::Tolerance;
-use crate::weld::weld;
+use crate::table::{ColorRange, Tolerance};
 
-/// A file's columns as meshes have them.
+/// The columns of a file, converted to those of meshes.
 pub(super) struct Columns {
     origin: DVec3,
     positions: Vec<Vec3>,
-    /// Linear; empty if there are none.
+    /// Linear colours; empty if there are none.
     colors: Vec<Vec4>,
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
@@ -26,13 +24,15 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    pub fn of(parsed: Parsed, options: &LoadOptions) -> Self {
-        let (origin, positions) = about_origin(&parsed.positions, Tolerance::UNSTATED, options);
+    /// Converts the columns of a parsed file.
+    pub fn new(parsed: Parsed, options: &LoadOptions) -> Self {
+        let (origin, positions) =
+            relative_to_origin(&parsed.positions, Tolerance::UNSTATED, options);
         let Parsed { colors, uvs, normals, corners, polygon_ends, .. } = parsed;
         let channels = colors.iter().flat_map(|color| color.to_array());
-        let range = ColorRange::of_floats(channels.map(f64::from));
+        let range = ColorRange::from_floats(channels.map(f64::from));
         let scale = (range.scale() / 65535.0) as f32;
-        // What has no colour is white beside the others.
+        // A vertex without colour is white if others have one.
         let linear = |channel: f32| if channel.is_nan() { 1.0 } else { decode(scale * channel) };
         let colors =
             colors.iter().map(|color| Vec3::from(color.to_array().map(linear)).extend(1.0));
@@ -40,9 +40,9 @@ impl Columns {
         Self { origin, positions, colors, uvs, normals, corners, polygon_ends }
     }
 
-    /// The polygons in these ranges as a mesh with vertices of its own.
+    /// Builds a mesh of the polygons in these ranges, with vertices of its own.
     ///
-    /// Returns also how many had fewer than three corners.
+    /// Returns also the number of polygons with fewer than three corners.
     pub fn mesh(&self, polygons: &[Range<usize>]) -> (Mesh, u64) {
         let ends = || polygons.iter().flat_map(|range| self.corner_ranges(range.clone()));
         let corners: Vec<Corner> = ends().flat_map(|range| &self.corners[range]).copied().collect();
@@ -51,8 +51,8 @@ impl Columns {
         let mut n_short = 0;
         let mut rest = welded.vertex_of_corner.as_slice();
         for range in ends() {
-            let (polygon, behind) = rest.split_at(range.len());
-            rest = behind;
+            let (polygon, after) = rest.split_at(range.len());
+            rest = after;
             if let [first, others @ ..] = polygon {
                 triangles.extend(others.array_windows().map(|[a, b]| [*first, *a, *b]));
             }
@@ -72,7 +72,7 @@ impl Columns {
         (mesh, n_short)
     }
 
-    /// Corners of each polygon.
+    /// Yields the range of the corners of each polygon.
     fn corner_ranges(&self, polygons: Range<usize>) -> impl Iterator<Item = Range<usize>> {
         polygons.map(|i| {
             let start = i.checked_sub(1).map_or(0, |before| self.polygon_ends[before]);
@@ -81,7 +81,7 @@ impl Columns {
     }
 }
 
-/// What vertices have of a column, if any has something; zeros where one has nothing.
+/// Gathers the values of a column for these vertices, zero for a vertex without; `None` if no vertex has a value.
 fn column<T: Copy + Default>(vertices: &[Corner], kind: usize, values: &[T]) -> Option<Vec<T>> {
     let has_values = !values.is_empty() && vertices.iter().any(|vertex| vertex[kind] != ABSENT);
     let value = |vertex: &Corner| values.get(vertex[kind] as usize).copied().unwrap_or_default();

@@ -1,8 +1,8 @@
-//! The lines of OBJ and MTL files: a keyword and what follows it.
+//! The lines of OBJ and MTL files: a keyword and its arguments.
 
-use crate::lines::{LineError, parse_number};
+use crate::table::{LineError, parse_number};
 
-/// A line ends where no backslash says that it goes on behind.
+/// Returns the length of the line at the start of `text`, which a backslash continues; `None` if it does not end.
 pub(super) fn line_end(text: &[u8]) -> Option<usize> {
     memchr::memchr_iter(b'\n', text).map(|at| at + 1).find(|end| {
         let line = &text[..end - 1];
@@ -10,36 +10,36 @@ pub(super) fn line_end(text: &[u8]) -> Option<usize> {
     })
 }
 
-/// The keyword of a trimmed line, and the rest.
-pub(super) fn keyword(line: &[u8]) -> (&[u8], &[u8]) {
+/// Splits a trimmed line into its keyword and the rest.
+pub(super) fn split_keyword(line: &[u8]) -> (&[u8], &[u8]) {
     let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
     (&line[..end], line[end..].trim_ascii())
 }
 
-/// The words of a rest; a comment may stand behind them.
+/// Returns the words of `rest` up to a comment.
 pub(super) fn words(rest: &[u8]) -> impl Iterator<Item = &[u8]> {
     let words = rest.split(|byte| byte.is_ascii_whitespace() || *byte == b'\\');
     words.filter(|word| !word.is_empty()).take_while(|word| word[0] != b'#')
 }
 
-/// As many numbers as there are, at least `LEAST` of them, at most `MOST`.
-pub(super) fn numbers<const LEAST: usize, const MOST: usize>(
+/// Parses the numbers in `rest`, from `MIN` to `MAX` of them; returns them and their count.
+pub(super) fn numbers<const MIN: usize, const MAX: usize>(
     rest: &[u8],
-) -> Result<([f64; MOST], usize), LineError> {
-    let mut numbers = [0.0; MOST];
+) -> Result<([f64; MAX], usize), LineError> {
+    let mut numbers = [0.0; MAX];
     let mut count = 0;
     for (slot, word) in numbers.iter_mut().zip(words(rest)) {
         *slot = parse_number(word)?;
         count += 1;
     }
-    if count < LEAST {
-        let expected = format!("at least {LEAST}");
+    if count < MIN {
+        let expected = format!("at least {MIN}");
         return Err(LineError { found: format!("{count} numbers"), expected });
     }
     Ok((numbers, count))
 }
 
-/// A name, which may have spaces in it.
+/// Returns `rest` as a name, which may contain spaces.
 pub(super) fn name(rest: &[u8]) -> String {
     String::from_utf8_lossy(rest).into_owned()
 }

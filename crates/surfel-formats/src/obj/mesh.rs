@@ -1,58 +1,61 @@
-//! Meshes of OBJ files, one for each material.
+//! Reads the meshes of OBJ files, one for each material.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
-use surfel::progress::Progress;
-use surfel::scene::Material;
+use surfel_core::progress::Progress;
+use surfel_core::scene::Material;
 
 use super::build::Columns;
-use super::lines::{keyword, line_end, words};
+use super::lines::{line_end, split_keyword, words};
 use super::mtl::{self, Mtl};
 use super::parse::{Parsed, parse};
-use super::textures::textured;
-use crate::beside::{Beside, Missing, Textures};
-use crate::error::{Place, Result};
-use crate::input::Input;
-use crate::mesh::{Model, finish};
-use crate::options::{LoadOptions, Source};
-use crate::pieces::{Piece, line_of};
+use super::textures::material_with_textures;
+use crate::error::{Location, Result};
+use crate::file::{Input, MissingFiles, ResourceResolver};
+use crate::mesh::{Model, TextureLoader, repair_model};
+use crate::options::{FileInfo, LoadOptions};
+use crate::table::{TextChunk, line_at};
 
+/// Returns true if the file has a face.
 pub(crate) fn has_faces(input: &Input) -> bool {
-    let mut lines = Piece { text: input, start: 0 }.lines(line_end);
-    lines.any(|(_, line)| matches!(keyword(line).0, b"f" | b"fo"))
+    let mut lines = TextChunk { text: input, start: 0 }.lines(line_end);
+    lines.any(|(_, line)| matches!(split_keyword(line).0, b"f" | b"fo"))
 }
 
+/// Reads the faces as meshes of triangles.
 pub(crate) fn read_mesh(
     input: &Input,
-    beside: &Beside,
+    resolver: &ResourceResolver,
     options: &LoadOptions,
     progress: &dyn Progress,
-) -> Result<(Model, Source)> {
+) -> Result<(Model, FileInfo)> {
     let parsed = parse(input, progress)?;
-    let place = parsed.first_polygon.map_or(Place::Byte(0), |at| line_of(input, at));
-    let materials = read_libraries(&parsed.libraries, beside, progress);
+    let location = parsed.first_polygon.map_or(Location::Byte(0), |at| line_at(input, at));
+    let materials = read_libraries(&parsed.libraries, resolver, progress);
     let groups = polygons_by_material(input, &parsed, &materials, progress);
-    let source = source(&parsed);
+    let info = file_info(&parsed);
 
-    let columns = Columns::of(parsed, options);
-    let mut textures = Textures::new(beside);
+    let columns = Columns::new(parsed, options);
+    let mut textures = TextureLoader::new(resolver);
     let mut model = Model::default();
     let mut n_short = 0;
     for (material, polygons) in groups {
         progress.check()?;
         let (mesh, n_short_here) = columns.mesh(&polygons);
         n_short += n_short_here;
-        let material = material.map_or(Material::MATTE, |mtl| textured(mtl, &mut textures));
+        let material =
+            material.map_or(Material::MATTE, |mtl| material_with_textures(mtl, &mut textures));
         model.parts.push((mesh, material));
     }
-    textures.missing.tell("a texture is left out", progress);
-    model.textures = textures.all;
-    let (model, n_triangles) = finish(input, model, n_short, place, progress)?;
-    Ok((model, Source { n_triangles: Some(n_triangles), ..source }))
+    textures.missing.report("a texture is left out", progress);
+    model.textures = textures.textures;
+    let (model, n_triangles) = repair_model(input, model, n_short, location, progress)?;
+    Ok((model, FileInfo { n_triangles: Some(n_triangles), ..info }))
 }
 
-fn source(parsed: &Parsed) -> Source {
+/// Returns the information that parsing has found.
+fn file_info(parsed: &Parsed) -> FileInfo {
     let present = [
         (true, &["x", "y", "z"][..]),
         (!parsed.colors.is_empty(), &["red", "green", "blue"]),
@@ -60,27 +63,27 @@ fn source(parsed: &Parsed) -> Source {
         (!parsed.uvs.is_empty(), &["u", "v"]),
     ];
     let columns = present.iter().filter(|(is_present, _)| *is_present);
-    Source {
+    FileInfo {
         format: "OBJ, mesh".into(),
         n_points: Some(parsed.positions.len() as u64),
         columns: columns.flat_map(|(_, names)| *names).map(|name| (*name).into()).collect(),
-        ..Source::default()
+        ..FileInfo::default()
     }
 }
 
-/// The materials of all MTL files by their names; of two with one name the first counts.
+/// Reads the materials of all MTL files, by name; the first of a name takes precedence.
 fn read_libraries(
     libraries: &[String],
-    beside: &Beside,
+    resolver: &ResourceResolver,
     progress: &dyn Progress,
 ) -> HashMap<String, Mtl> {
     let mut materials = HashMap::new();
-    let mut missing = Missing::default();
+    let mut missing = MissingFiles::default();
     let mut read = |name: &str| {
-        let library = beside.open(name)?;
+        let library = resolver.open(name)?;
         let (read, fault) = mtl::parse(&library);
         if let Some(fault) = fault {
-            progress.note(&format!("{}; left out", fault.told_of(&library)));
+            progress.note(&format!("{}; left out", fault.into_error(&library)));
         }
         for mtl in read {
             materials.entry(mtl.name.clone()).or_insert(mtl);
@@ -89,7 +92,7 @@ fn read_libraries(
     };
     let mut seen = HashSet::new();
     for library in libraries.iter().filter(|library| seen.insert(*library)) {
-        // Several names in a line, or one with spaces in it.
+        // The line may have several names, or one that contains spaces.
         let Err(reason) = read(library) else { continue };
         let names: Vec<&[u8]> = words(library.as_bytes()).collect();
         let n_read =
@@ -98,11 +101,11 @@ fn read_libraries(
             missing.add(reason);
         }
     }
-    missing.tell("materials are plain", progress);
+    missing.report("materials are plain", progress);
     materials
 }
 
-/// Which polygons have which material, in the order of first use; `None` is a plain one.
+/// Groups polygons by material, in the order of first use; `None` is the default material.
 fn polygons_by_material<'a>(
     input: &Input,
     parsed: &Parsed,
@@ -112,7 +115,7 @@ fn polygons_by_material<'a>(
     let mut groups: Vec<(Option<&Mtl>, Vec<Range<usize>>)> = Vec::new();
     let mut group_of_name: HashMap<Option<&str>, usize> = HashMap::new();
     let mut unknown = HashSet::new();
-    let mut missing = Missing::default();
+    let mut missing = MissingFiles::default();
     let n_polygons = parsed.polygon_ends.len();
     let mut start = 0;
     let mut name = None;
@@ -131,6 +134,6 @@ fn polygons_by_material<'a>(
         }
         (start, name) = (end, next);
     }
-    missing.tell("a material is plain", progress);
+    missing.report("a material is plain", progress);
     groups
 }

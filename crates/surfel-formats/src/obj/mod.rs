@@ -1,4 +1,4 @@
-//! OBJ: meshes as text with their materials in MTL files, or the vertices alone as points.
+//! OBJ: meshes as text, with their materials in MTL files, read as meshes or as points (their vertices).
 
 mod lines;
 mod points;

@@ -1,67 +1,76 @@
-//! MTL: the materials of OBJ files, brought to metallic and roughness.
+//! MTL: the materials of OBJ files, converted to metallic and roughness.
 
-use surfel::math::{Vec2, Vec3};
-use surfel::scene::{AlphaMode, Material};
+use surfel_core::math::{Vec2, Vec3};
+use surfel_core::scene::{AlphaMode, Material};
 
-use super::lines::{keyword, line_end, name, numbers, words};
-use crate::input::Input;
-use crate::lines::LineError;
-use crate::pieces::{Fault, Piece};
+use super::lines::{line_end, name, numbers, split_keyword, words};
+use crate::file::Input;
+use crate::table::{LineError, ParseFault, TextChunk};
 
-/// A material as the file describes it. Colours are linear, as renderers have always taken them.
+/// A material as the file describes it. Colours are linear, which is how renderers read them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Mtl {
+    /// Name of the material.
     pub name: String,
     diffuse: Option<Vec3>,
     specular: Option<Vec3>,
-    /// Of Phong's highlight.
+    /// Exponent of Phong's highlight.
     exponent: f32,
+    /// Emitted colour, linear.
     pub emissive: Vec3,
-    /// Colour of what goes through.
+    /// Transmission filter colour.
     filter: Option<Vec3>,
-    /// 1 if nothing is seen through.
+    /// Opacity, 1 if opaque.
     dissolve: Option<f32>,
     ior: Option<f32>,
-    /// Number of the model of illumination.
+    /// Number of the illumination model.
     model: u32,
-    /// Roughness and metallic, which newer programs add.
+    /// Roughness, which newer programs add.
     roughness: Option<f32>,
+    /// Metallic, which newer programs add.
     metallic: Option<f32>,
+    /// Texture of the colour.
     pub diffuse_map: Option<Map>,
+    /// Texture of the emitted colour.
     pub emissive_map: Option<Map>,
+    /// Texture of the normals.
     pub normal_map: Option<Map>,
 }
 
-/// A picture and how it lies.
+/// A texture with its options.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Map {
+    /// Name of the file.
     pub file: String,
-    /// In the file's coordinates, of which v goes up.
+    /// Offset of texture coordinates, with v up as in the file.
     pub offset: Vec2,
+    /// Scale of the texture coordinates.
     pub scale: Vec2,
+    /// True if the texture does not repeat.
     pub is_clamped: bool,
-    /// Of normals.
+    /// Strength of a normal map.
     pub strength: f32,
 }
 
-/// The materials of a file; lines that say nothing sensible are left out, and the first is returned too.
-pub(super) fn parse(input: &Input) -> (Vec<Mtl>, Option<Fault>) {
+/// Parses the materials of a file. Broken lines are skipped; the error of the first is returned too.
+pub(super) fn parse(input: &Input) -> (Vec<Mtl>, Option<ParseFault>) {
     let mut materials: Vec<Mtl> = Vec::new();
     let mut fault = None;
-    for (at, line) in (Piece { text: input, start: 0 }).lines(line_end) {
-        let (keyword, rest) = keyword(line);
+    for (byte, line) in (TextChunk { text: input, start: 0 }).lines(line_end) {
+        let (keyword, rest) = split_keyword(line);
         if keyword == b"newmtl" {
             materials.push(Mtl { name: name(rest), ..Mtl::default() });
         } else if let Some(material) = materials.last_mut()
             && let Err(error) = material.add(keyword, rest)
         {
-            fault.get_or_insert(Fault::new(at, error));
+            fault.get_or_insert(ParseFault::new(byte, error));
         }
     }
     (materials, fault)
 }
 
 impl Mtl {
+    /// Applies the line with this keyword.
     fn add(&mut self, keyword: &[u8], rest: &[u8]) -> Result<(), LineError> {
         match keyword {
             b"Kd" => self.diffuse = Some(color(rest)?.min(Vec3::ONE)),
@@ -71,7 +80,7 @@ impl Mtl {
             b"Ns" => self.exponent = number(rest)?.max(0.0),
             b"Ni" => self.ior = Some(number(rest)?),
             b"d" => self.dissolve = Some(number(rest.strip_prefix(b"-halo").unwrap_or(rest))?),
-            // What `d` says counts.
+            // `d` takes precedence.
             b"Tr" => self.dissolve = self.dissolve.or(Some(1.0 - number(rest)?)),
             b"illum" => self.model = number(rest)? as u32,
             b"Pr" => self.roughness = Some(number(rest)?.clamp(0.0, 1.0)),
@@ -84,47 +93,41 @@ impl Mtl {
         Ok(())
     }
 
-    /// Whether it reflects like a mirror, in its specular colour.
+    /// Returns true for a mirror, which reflects in its specular colour.
     pub fn is_mirror(&self) -> bool {
         let is_new = self.roughness.is_some() || self.metallic.is_some();
         let is_specular = self.specular.is_some_and(|specular| specular != Vec3::ZERO);
         matches!(self.model, 3 | 5) && is_specular && !is_new
     }
 
-    /// All but the textures.
+    /// Returns the material without textures.
     pub fn material(&self) -> Material {
         let specular = self.specular.unwrap_or_default();
         let alpha = self.dissolve.map_or(1.0, |dissolve| dissolve.clamp(0.0, 1.0));
         let dense = self.ior.filter(|ior| 1.0 < *ior);
-        // A picture on black would be black.
+        // A texture is multiplied by the colour, and black would hide it.
         let diffuse = match (self.diffuse, &self.diffuse_map) {
             (None | Some(Vec3::ZERO), Some(_)) | (None, None) => Vec3::ONE,
             (Some(diffuse), _) => diffuse,
         };
-        let glow = match self.emissive_map {
+        let emissive = match self.emissive_map {
             Some(_) if self.emissive == Vec3::ZERO => Vec3::ONE,
             _ => self.emissive,
         };
-        let matte = Material { base_color: diffuse, emissive: glow, ..Material::MATTE };
-        // Some programs give model 4 to all they write: glass is what bends light or lets it through.
+        let matte = Material { base_color: diffuse, emissive, ..Material::MATTE };
+        // Some programs write model 4 for every material, so glass must also have an index of refraction or opacity.
         if matches!(self.model, 4 | 6 | 7) && (dense.is_some() || alpha < 1.0) {
             let tint = self.filter.filter(|filter| *filter != Vec3::ZERO).unwrap_or(Vec3::ONE);
             let roughness = self.roughness.unwrap_or(0.0);
             let ior = dense.unwrap_or(Material::GLASS.ior);
-            return Material {
-                base_color: tint,
-                emissive: glow,
-                roughness,
-                ior,
-                ..Material::GLASS
-            };
+            return Material { base_color: tint, emissive, roughness, ior, ..Material::GLASS };
         }
         let alpha_mode = if alpha < 1.0 { AlphaMode::Blend } else { AlphaMode::Opaque };
         let opaque = Material { alpha, alpha_mode, ..matte };
         if self.roughness.is_some() || self.metallic.is_some() {
             return Material {
                 metallic: self.metallic.unwrap_or(0.0),
-                roughness: self.roughness.unwrap_or(self.highlight()),
+                roughness: self.roughness.unwrap_or(self.phong_roughness()),
                 ior: dense.unwrap_or(1.5),
                 ..opaque
             };
@@ -133,26 +136,31 @@ impl Mtl {
             return Material { base_color: specular, metallic: 1.0, roughness: 0.0, ..opaque };
         }
         if specular != Vec3::ZERO {
-            return Material { roughness: self.highlight(), ior: dense.unwrap_or(1.5), ..opaque };
+            return Material {
+                roughness: self.phong_roughness(),
+                ior: dense.unwrap_or(1.5),
+                ..opaque
+            };
         }
         opaque
     }
 
-    /// The roughness, a square root of the width of microfacets, whose highlight is as wide as Phong's
-    /// (Walter et al. 2007, Karis 2013).
-    fn highlight(&self) -> f32 {
+    /// Returns the roughness whose GGX highlight is as wide as Phong's: alpha = sqrt(2 / (exponent + 2)) (Walter et al.
+    /// 2007), and roughness = sqrt(alpha) (Karis 2013).
+    fn phong_roughness(&self) -> f32 {
         (2.0 / (self.exponent + 2.0)).sqrt().sqrt()
     }
 }
 
+/// Parses a finite number.
 fn number(rest: &[u8]) -> Result<f32, LineError> {
     let ([number], _) = numbers::<1, 1>(rest)?;
-    let is_sensible = (number as f32).is_finite();
+    let is_finite = (number as f32).is_finite();
     let found = || LineError { found: format!("{number}"), expected: "a finite number".into() };
-    is_sensible.then_some(number as f32).ok_or_else(found)
+    is_finite.then_some(number as f32).ok_or_else(found)
 }
 
-/// Not negative; one number stands for three.
+/// Parses a colour, whose negative channels become 0; a single number is a grey.
 fn color(rest: &[u8]) -> Result<Vec3, LineError> {
     let ([red, green, blue], count) = numbers::<1, 3>(rest)?;
     let color = Vec3::new(red as f32, green as f32, blue as f32);
@@ -161,7 +169,7 @@ fn color(rest: &[u8]) -> Result<Vec3, LineError> {
     color.is_finite().then_some(color.max(Vec3::ZERO)).ok_or_else(found)
 }
 
-/// A file's name behind options, each with numbers or a word.
+/// Parses options, each with numbers or a word, and the name of a file after them.
 fn map(rest: &[u8]) -> Result<Map, LineError> {
     let mut map = Map {
         file: String::new(),
@@ -172,23 +180,23 @@ fn map(rest: &[u8]) -> Result<Map, LineError> {
     };
     let mut rest = rest;
     while rest.starts_with(b"-") {
-        let (option, behind) = keyword(rest);
+        let (option, after) = split_keyword(rest);
         rest = match option {
-            b"-o" => up_to_three(behind, &mut map.offset),
-            b"-s" => up_to_three(behind, &mut map.scale),
-            b"-t" => up_to_three(behind, &mut Vec2::default()),
-            b"-mm" => keyword(keyword(behind).1).1,
+            b"-o" => up_to_three(after, &mut map.offset),
+            b"-s" => up_to_three(after, &mut map.scale),
+            b"-t" => up_to_three(after, &mut Vec2::default()),
+            b"-mm" => split_keyword(split_keyword(after).1).1,
             b"-clamp" => {
-                let (word, behind) = keyword(behind);
+                let (word, after) = split_keyword(after);
                 map.is_clamped = word == b"on";
-                behind
+                after
             }
             b"-bm" => {
-                let (word, behind) = keyword(behind);
+                let (word, after) = split_keyword(after);
                 map.strength = number(word)?;
-                behind
+                after
             }
-            _ => keyword(behind).1,
+            _ => split_keyword(after).1,
         };
     }
     if words(rest).next().is_none() {
@@ -201,16 +209,16 @@ fn map(rest: &[u8]) -> Result<Map, LineError> {
     Ok(map)
 }
 
-/// Takes one to three numbers, of which the first two matter.
+/// Parses one to three numbers, the first two of them into `pair`; returns the rest.
 fn up_to_three<'a>(rest: &'a [u8], pair: &mut Vec2) -> &'a [u8] {
     let mut rest = rest;
     for axis in 0..3 {
-        let (word, behind) = keyword(rest);
+        let (word, after) = split_keyword(rest);
         let Ok(value) = number(word) else { break };
         if axis < 2 {
             pair[axis] = value;
         }
-        rest = behind;
+        rest = after;
     }
     rest
 }

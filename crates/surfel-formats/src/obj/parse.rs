@@ -1,48 +1,54 @@
-//! Parses OBJ files: columns of what is numbered, and polygons of these numbers.
+//! Parses OBJ files: columns of positions, texture coordinates and normals, and polygons that index them.
 
-use surfel::math::{DVec3, Vec2, Vec3};
-use surfel::progress::Progress;
+use surfel_core::math::{DVec3, Vec2, Vec3};
+use surfel_core::progress::Progress;
 
-use super::lines::{keyword, line_end, name, numbers, words};
+use super::lines::{line_end, name, numbers, split_keyword, words};
 use crate::error::Result;
-use crate::input::Input;
-use crate::lines::LineError;
-use crate::pieces::{Fault, Piece, parse_pieces};
+use crate::file::Input;
+use crate::table::{LineError, ParseFault, TextChunk, parse_chunks};
 
-/// Of a corner that has no texture coordinates or no normal.
+/// Index of absent texture coordinates, or of an absent normal.
 pub(super) const ABSENT: u32 = u32::MAX;
 
-/// Indices of a position, of texture coordinates and of a normal.
+/// Indices of the position, the texture coordinates and the normal of a corner.
 pub(super) type Corner = [u32; 3];
 
+/// The content of a file.
 #[derive(Default)]
 pub(super) struct Parsed {
+    /// Positions of the vertices.
     pub positions: Vec<DVec3>,
-    /// sRGB-encoded, in the range that the file has; for all positions or for none. NaN where a vertex has none.
+    /// sRGB-encoded colours of the positions in the range of the file, NaN for a vertex without; empty if none has one.
     pub colors: Vec<Vec3>,
+    /// Texture coordinates.
     pub uvs: Vec<Vec2>,
+    /// Normals.
     pub normals: Vec<Vec3>,
+    /// Corners of all triangles.
     pub corners: Vec<Corner>,
-    /// For each polygon the first corner behind it.
+    /// Index of the corner after the last of each polygon.
     pub polygon_ends: Vec<usize>,
-    /// Where polygons begin to have another material, and its name.
+    /// Index of the first polygon with another material, and the name of that material.
     pub materials: Vec<(usize, String)>,
+    /// Names of MTL files.
     pub libraries: Vec<String>,
     /// First byte of the first polygon.
     pub first_polygon: Option<usize>,
 }
 
-/// How many positions, texture coordinates and normals there are.
+/// Numbers of positions, texture coordinates and normals.
 #[derive(Clone, Copy, Default)]
 struct Counts([usize; 3]);
 
 const KEYWORDS: [&[u8]; 3] = [b"v", b"vt", b"vn"];
 
+/// Parses the lines of a file.
 pub(super) fn parse(input: &Input, progress: &dyn Progress) -> Result<Parsed> {
-    let pieces = Piece { text: input, start: 0 }.cut(line_end);
+    let chunks = TextChunk { text: input, start: 0 }.split(line_end);
     progress.begin(&format!("read {}", input.name), 2 * input.len() as u64);
-    // Polygons may count back from where they stand, so what stands before has to be known.
-    let counts = parse_pieces(input, &pieces, |_, piece| Ok(count(piece)), progress)?;
+    // Polygons may count back from their own line, so the counts before each chunk are needed.
+    let counts = parse_chunks(input, &chunks, |_, chunk| Ok(count(chunk)), progress)?;
     let mut total = Counts::default();
     let befores: Vec<Counts> = counts
         .into_iter()
@@ -59,18 +65,19 @@ pub(super) fn parse(input: &Input, progress: &dyn Progress) -> Result<Parsed> {
     if total.0.iter().any(|count| ABSENT as usize <= *count) {
         return Err(too_many("vertices"));
     }
-    let parse = |i: usize, piece| parse_piece(piece, befores[i], total);
-    let parsed = joined(parse_pieces(input, &pieces, parse, progress)?);
+    let parse = |i: usize, chunk| parse_chunk(chunk, befores[i], total);
+    let parsed = join(parse_chunks(input, &chunks, parse, progress)?);
     if ABSENT as usize <= parsed.corners.len() {
         return Err(too_many("corners"));
     }
     Ok(parsed)
 }
 
-fn count(piece: Piece) -> Counts {
+/// Counts the numbered lines of a chunk.
+fn count(chunk: TextChunk) -> Counts {
     let mut counts = Counts::default();
-    for (_, line) in piece.lines(line_end) {
-        let (keyword, _) = keyword(line);
+    for (_, line) in chunk.lines(line_end) {
+        let (keyword, _) = split_keyword(line);
         if let Some(kind) = KEYWORDS.iter().position(|known| *known == keyword) {
             counts.0[kind] += 1;
         }
@@ -78,15 +85,18 @@ fn count(piece: Piece) -> Counts {
     counts
 }
 
-fn parse_piece(
-    piece: Piece,
+/// Parses a chunk, with `counts` before it and `total` in the file.
+fn parse_chunk(
+    chunk: TextChunk,
     mut counts: Counts,
     total: Counts,
-) -> std::result::Result<Parsed, Fault> {
+) -> std::result::Result<Parsed, ParseFault> {
     let mut parsed = Parsed::default();
-    for (at, line) in piece.lines(line_end) {
-        let (keyword, rest) = keyword(line);
-        parsed.add(at, keyword, rest, counts, total).map_err(|error| Fault::new(at, error))?;
+    for (byte, line) in chunk.lines(line_end) {
+        let (keyword, rest) = split_keyword(line);
+        parsed
+            .add(byte, keyword, rest, counts, total)
+            .map_err(|error| ParseFault::new(byte, error))?;
         if let Some(kind) = KEYWORDS.iter().position(|known| *known == keyword) {
             counts.0[kind] += 1;
         }
@@ -95,10 +105,10 @@ fn parse_piece(
 }
 
 impl Parsed {
-    /// Adds what a line says; lines of unknown keywords say nothing.
+    /// Adds the content of a line; lines with unknown keywords are skipped.
     fn add(
         &mut self,
-        at: usize,
+        byte: usize,
         keyword: &[u8],
         rest: &[u8],
         before: Counts,
@@ -108,7 +118,7 @@ impl Parsed {
             b"v" => self.add_vertex(rest)?,
             b"vt" => {
                 let ([u, v], _) = numbers::<1, 2>(rest)?;
-                // In the file v goes up.
+                // In the file v points up.
                 self.uvs.push(Vec2::new(u as f32, (1.0 - v) as f32));
             }
             b"vn" => {
@@ -120,7 +130,7 @@ impl Parsed {
                     self.corners.push(corner(word, before, total)?);
                 }
                 self.polygon_ends.push(self.corners.len());
-                self.first_polygon.get_or_insert(at);
+                self.first_polygon.get_or_insert(byte);
             }
             b"usemtl" => self.materials.push((self.polygon_ends.len(), name(rest))),
             b"mtllib" => self.libraries.push(name(rest)),
@@ -132,7 +142,7 @@ impl Parsed {
     fn add_vertex(&mut self, rest: &[u8]) -> std::result::Result<(), LineError> {
         let ([x, y, z, rest @ ..], count) = numbers::<3, 7>(rest)?;
         self.positions.push(DVec3::new(x, y, z));
-        // A weight stands between position and colour, or at the end.
+        // A weight may stand between position and colour, or at the end.
         let color = match count {
             6 => Some([rest[0], rest[1], rest[2]]),
             7 => Some([rest[1], rest[2], rest[3]]),
@@ -146,7 +156,7 @@ impl Parsed {
     }
 }
 
-/// A corner as `v`, `v/vt`, `v//vn` or `v/vt/vn`.
+/// Parses a corner of the form `v`, `v/vt`, `v//vn` or `v/vt/vn`.
 fn corner(word: &[u8], before: Counts, total: Counts) -> std::result::Result<Corner, LineError> {
     let mut corner = [ABSENT; 3];
     for (kind, number) in word.split(|byte| *byte == b'/').enumerate() {
@@ -164,23 +174,23 @@ fn corner(word: &[u8], before: Counts, total: Counts) -> std::result::Result<Cor
     Ok(corner)
 }
 
-/// Counts from 1, or backward from -1, which is the last before the line.
+/// Parses an index, which counts from 1, or backward from -1 for the last before the line.
 fn index(
     number: &[u8],
     kind: usize,
     Counts(before): Counts,
     Counts(total): Counts,
 ) -> std::result::Result<u32, LineError> {
-    let given = std::str::from_utf8(number).ok().and_then(|text| text.parse::<i64>().ok());
-    let index = given.and_then(|given| match given {
+    let value = std::str::from_utf8(number).ok().and_then(|text| text.parse::<i64>().ok());
+    let index = value.and_then(|value| match value {
         0 => None,
-        1.. => usize::try_from(given - 1).ok(),
-        _ => before[kind].checked_sub(usize::try_from(given.unsigned_abs()).ok()?),
+        1.. => usize::try_from(value - 1).ok(),
+        _ => before[kind].checked_sub(usize::try_from(value.unsigned_abs()).ok()?),
     });
     index.filter(|index| *index < total[kind]).map(|index| index as u32).ok_or_else(|| {
-        let what = ["vertex", "texture coordinates", "normal"][kind];
+        let column = ["vertex", "texture coordinates", "normal"][kind];
         LineError {
-            found: format!("{what} `{}`", number[..number.len().min(40)].escape_ascii()),
+            found: format!("{column} `{}`", number[..number.len().min(40)].escape_ascii()),
             expected: match (total[kind], before[kind]) {
                 (0, _) => "none, since the file has none".into(),
                 (n_all, 0) => format!("1 to {n_all}"),
@@ -190,25 +200,25 @@ fn index(
     })
 }
 
-/// The pieces as one.
-fn joined(pieces: Vec<Parsed>) -> Parsed {
+/// Joins the content of all chunks.
+fn join(chunks: Vec<Parsed>) -> Parsed {
     let mut all = Parsed::default();
-    let has_colors = pieces.iter().any(|piece| !piece.colors.is_empty());
-    for mut piece in pieces {
+    let has_colors = chunks.iter().any(|chunk| !chunk.colors.is_empty());
+    for mut chunk in chunks {
         let (n_corners, n_polygons) = (all.corners.len(), all.polygon_ends.len());
         if has_colors {
-            piece.colors.resize(piece.positions.len(), Vec3::NAN);
+            chunk.colors.resize(chunk.positions.len(), Vec3::NAN);
         }
-        all.positions.append(&mut piece.positions);
-        all.colors.append(&mut piece.colors);
-        all.uvs.append(&mut piece.uvs);
-        all.normals.append(&mut piece.normals);
-        all.corners.append(&mut piece.corners);
-        all.polygon_ends.extend(piece.polygon_ends.iter().map(|end| end + n_corners));
-        let materials = piece.materials.into_iter();
+        all.positions.append(&mut chunk.positions);
+        all.colors.append(&mut chunk.colors);
+        all.uvs.append(&mut chunk.uvs);
+        all.normals.append(&mut chunk.normals);
+        all.corners.append(&mut chunk.corners);
+        all.polygon_ends.extend(chunk.polygon_ends.iter().map(|end| end + n_corners));
+        let materials = chunk.materials.into_iter();
         all.materials.extend(materials.map(|(polygon, name)| (polygon + n_polygons, name)));
-        all.libraries.append(&mut piece.libraries);
-        all.first_polygon = all.first_polygon.or(piece.first_polygon);
+        all.libraries.append(&mut chunk.libraries);
+        all.first_polygon = all.first_polygon.or(chunk.first_polygon);
     }
     all
 }

@@ -1,37 +1,39 @@
-//! Faces of PLY files: polygons and strips become triangles.
+//! Reads the faces of PLY files: polygons and strips, as triangles.
 
-use surfel::math::Vec2;
-use surfel::progress::Progress;
+use surfel_core::math::Vec2;
+use surfel_core::progress::Progress;
 
+use super::element_lines::end_of_lines;
 use super::header::{Element, Encoding, Header};
-use super::lines::end_of_lines;
-use super::walk::{ends_early, property_end, skip_elements};
-use crate::error::{Place, Result};
-use crate::input::Input;
-use crate::lines::{LineError, parse_number};
-use crate::pieces::{Fault, Piece, line_of, parse_pieces, plain_line};
-use crate::record::{Field, Kind};
+use super::skip::{property_end, skip_elements};
+use crate::error::{Location, Result};
+use crate::file::Input;
+use crate::table::{
+    Field, LineError, NumberType, ParseFault, TextChunk, find_line_end, line_at, parse_chunks,
+    parse_number,
+};
 
-/// What the elements of faces hold.
+/// The faces of a file.
 #[derive(Default)]
 pub(super) struct Faces {
+    /// Triangles as indices of vertices.
     pub triangles: Vec<[u32; 3]>,
-    /// Texture coordinates of their corners, v up as in the file; as many, or none.
+    /// Texture coordinates of their corners, with v up as in the file; as many as triangles, or none.
     pub uvs: Vec<[Vec2; 3]>,
-    /// Faces of fewer than three corners.
+    /// Number of faces with fewer than three corners.
     pub n_short: u64,
-    /// Where the first face stands.
-    pub place: Option<Place>,
+    /// Location of the first face.
+    pub location: Option<Location>,
 }
 
-/// An element of faces.
+/// An element whose items are faces.
 struct FaceElement<'a> {
     element: &'a Element,
-    /// Which of its properties lists the vertices.
+    /// Index of the property that lists the vertices.
     indices: usize,
-    /// Which lists texture coordinates, two numbers a corner, as MeshLab writes them.
+    /// Index of the property that lists texture coordinates, two numbers a corner, as MeshLab writes them.
     texcoords: Option<usize>,
-    /// Whether the list is of strips, with negative numbers between them, not of a polygon.
+    /// True if the list holds triangle strips, separated by negative numbers, instead of a polygon.
     is_strips: bool,
     n_vertices: u64,
 }
@@ -43,13 +45,14 @@ struct Lists {
     texcoords: Vec<f64>,
 }
 
-/// Number of faces in the file; a strip counts as one.
+/// Returns the number of faces in the file; a list of strips counts as one.
 pub(super) fn count_faces(header: &Header) -> u64 {
     let elements = header.elements.iter();
-    let faces = elements.filter(|element| FaceElement::of(element, 0).is_some());
+    let faces = elements.filter(|element| FaceElement::new(element, 0).is_some());
     faces.fold(0, |sum, element| sum.saturating_add(element.count))
 }
 
+/// Reads all faces, whose corners are indices of `n_vertices` vertices.
 pub(super) fn read_faces(
     input: &Input,
     header: &Header,
@@ -62,15 +65,15 @@ pub(super) fn read_faces(
     let mut faces = Faces::default();
     let mut at = header.body;
     for element in &header.elements {
-        let Some(face_element) = FaceElement::of(element, n_vertices) else {
+        let Some(face_element) = FaceElement::new(element, n_vertices) else {
             at = match is_ascii {
                 true => end_of_lines(input, at, element, progress)?,
                 false => skip_elements(input, at, element, big_endian, progress)?,
             };
             continue;
         };
-        let place = if is_ascii { line_of(input, at) } else { Place::Byte(at as u64) };
-        faces.place.get_or_insert(place);
+        let location = if is_ascii { line_at(input, at) } else { Location::Byte(at as u64) };
+        faces.location.get_or_insert(location);
         at = match is_ascii {
             true => face_element.read_ascii(input, at, &mut faces, progress)?,
             false => face_element.read_binary(input, at, big_endian, &mut faces, progress)?,
@@ -80,11 +83,12 @@ pub(super) fn read_faces(
 }
 
 impl<'a> FaceElement<'a> {
-    fn of(element: &'a Element, n_vertices: u64) -> Option<Self> {
+    /// The faces of `element`; `None` if it holds none.
+    fn new(element: &'a Element, n_vertices: u64) -> Option<Self> {
         let is_strips = element.name == "tristrips";
         let list = |names: [&str; 2]| {
             let mut properties = element.properties.iter();
-            properties.position(|p| p.list.is_some() && names.contains(&p.name.as_str()))
+            properties.position(|p| p.length_type.is_some() && names.contains(&p.name.as_str()))
         };
         let indices = list(["vertex_indices", "vertex_index"])?;
         let texcoords = list(["texcoord", "texcoords"]).filter(|_| !is_strips);
@@ -92,7 +96,7 @@ impl<'a> FaceElement<'a> {
         has_faces.then_some(Self { element, indices, texcoords, is_strips, n_vertices })
     }
 
-    /// Returns the first byte behind the element.
+    /// Reads binary faces from `start`; returns the first byte after them.
     fn read_binary(
         &self,
         input: &Input,
@@ -111,11 +115,11 @@ impl<'a> FaceElement<'a> {
             let first = at;
             for (i, property) in self.element.properties.iter().enumerate() {
                 let end = property_end(input, at, property, big_endian)
-                    .ok_or_else(|| ends_early(input, self.element))?;
+                    .ok_or_else(|| self.element.ends_early(input))?;
                 if let Some(list) = self.list(i, &mut lists) {
-                    let items = &input[at + property.list.map_or(0, Kind::size)..end];
-                    let item = Field::new(0, property.kind);
-                    let items = items.chunks_exact(property.kind.size());
+                    let items = &input[at + property.length_type.map_or(0, NumberType::size)..end];
+                    let item = Field::new(0, property.number_type);
+                    let items = items.chunks_exact(property.number_type.size());
                     list.clear();
                     list.extend(items.map(|bytes| item.value(bytes, big_endian)));
                 }
@@ -123,12 +127,13 @@ impl<'a> FaceElement<'a> {
             }
             self.add(&lists, faces).map_err(|LineError { found, expected }| {
                 let advice = "the face is broken: write the file again from its source";
-                input.malformed(Place::Byte(first as u64), found, expected, advice)
+                input.malformed(Location::Byte(first as u64), found, expected, advice)
             })?;
         }
         Ok(at)
     }
 
+    /// Reads ascii faces from `start`; returns the first byte after them.
     fn read_ascii(
         &self,
         input: &Input,
@@ -137,18 +142,18 @@ impl<'a> FaceElement<'a> {
         progress: &dyn Progress,
     ) -> Result<usize> {
         let end = end_of_lines(input, start, self.element, progress)?;
-        let pieces = Piece { text: &input[start..end], start }.cut(plain_line);
-        let parse = |_: usize, piece: Piece| {
+        let chunks = TextChunk { text: &input[start..end], start }.split(find_line_end);
+        let parse = |_: usize, chunk: TextChunk| {
             let mut faces = Faces::default();
             let mut lists = Lists::default();
-            for (at, line) in piece.lines(plain_line) {
+            for (at, line) in chunk.lines(find_line_end) {
                 let parsed = self.parse_line(line, &mut lists);
                 let added = parsed.and_then(|()| self.add(&lists, &mut faces));
-                added.map_err(|error| Fault::new(at, error))?;
+                added.map_err(|error| ParseFault::new(at, error))?;
             }
             Ok(faces)
         };
-        for parsed in parse_pieces(input, &pieces, parse, progress)? {
+        for parsed in parse_chunks(input, &chunks, parse, progress)? {
             faces.triangles.extend(parsed.triangles);
             faces.uvs.extend(parsed.uvs);
             faces.n_short += parsed.n_short;
@@ -156,7 +161,7 @@ impl<'a> FaceElement<'a> {
         Ok(end)
     }
 
-    /// The lists in a line.
+    /// Parses the lists in a line.
     fn parse_line(&self, line: &[u8], lists: &mut Lists) -> std::result::Result<(), LineError> {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         let mut number = || {
@@ -166,13 +171,13 @@ impl<'a> FaceElement<'a> {
             })?;
             parse_number(word)
         };
-        // What stands behind the lists is of no use here.
+        // The properties after the last list are not needed.
         let last = self.texcoords.map_or(self.indices, |texcoords| texcoords.max(self.indices));
         for (i, property) in self.element.properties[..=last].iter().enumerate() {
-            let n_items = if property.list.is_some() { number()? as u64 } else { 1 };
+            let n_items = if property.length_type.is_some() { number()? as u64 } else { 1 };
             let mut list = self.list(i, lists);
             list.iter_mut().for_each(|list| list.clear());
-            // A length beyond the line ends at its last word with an error.
+            // A list longer than the line is an error at the end of the line.
             for _ in 0..n_items {
                 let item = number()?;
                 list.iter_mut().for_each(|list| list.push(item));
@@ -181,7 +186,7 @@ impl<'a> FaceElement<'a> {
         Ok(())
     }
 
-    /// Where the items of a property go, if they are wanted.
+    /// Returns the list that takes the items of a property, if they are needed.
     fn list<'b>(&self, property: usize, lists: &'b mut Lists) -> Option<&'b mut Vec<f64>> {
         match property {
             _ if property == self.indices => Some(&mut lists.corners),
@@ -190,7 +195,7 @@ impl<'a> FaceElement<'a> {
         }
     }
 
-    /// Adds the triangles of a polygon, or of strips.
+    /// Adds the triangles of a polygon or of strips.
     fn add(&self, lists: &Lists, faces: &mut Faces) -> std::result::Result<(), LineError> {
         let vertex = |corner: f64| {
             let is_vertex =
@@ -205,7 +210,7 @@ impl<'a> FaceElement<'a> {
                 for (i, three) in strip.array_windows().enumerate() {
                     let [a, b, c] = *three;
                     let [a, b, c] = [vertex(a)?, vertex(b)?, vertex(c)?];
-                    // Every other triangle of a strip goes round the other way.
+                    // Every other triangle of a strip has the opposite winding.
                     faces.triangles.push(if i % 2 == 0 { [a, b, c] } else { [b, a, c] });
                 }
             }

@@ -1,20 +1,24 @@
 //! The header of a PLY file: elements and their properties.
 
-use crate::error::{Place, Result};
-use crate::input::Input;
-use crate::lines::{LONGEST_LINE, MOST_FIELDS};
-use crate::record::Kind;
+use crate::error::{Error, Location, Result};
+use crate::file::Input;
+use crate::table::{MAX_FIELDS, MAX_LINE_LENGTH, NumberType};
 
+/// The header of a file.
 pub(super) struct Header {
+    /// Encoding of the elements.
     pub encoding: Encoding,
+    /// Elements in the order of the file.
     pub elements: Vec<Element>,
-    /// Files of textures, as MeshLab names them in comments.
+    /// Names of texture files, which MeshLab writes in comments.
     pub textures: Vec<String>,
-    /// First byte behind the header, and the number of its line.
+    /// First byte after the header.
     pub body: usize,
+    /// Number of the line that begins there.
     pub body_line: u64,
 }
 
+/// The encoding of the numbers after the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Ascii,
@@ -22,27 +26,54 @@ pub(super) enum Encoding {
     BigEndian,
 }
 
+/// A kind of element, such as vertices or faces.
 pub(super) struct Element {
+    /// Name, as in the header.
     pub name: String,
+    /// Number of the elements.
     pub count: u64,
+    /// Properties in the order of the file.
     pub properties: Vec<Property>,
 }
 
+/// A property of an element: a number, or a list of them.
 pub(super) struct Property {
+    /// Name, as in the header.
     pub name: String,
-    pub kind: Kind,
-    /// The kind of the length of a list.
-    pub list: Option<Kind>,
+    /// Type of the number, or of the items of a list.
+    pub number_type: NumberType,
+    /// Type of the length of a list; `None` if the property is one number.
+    pub length_type: Option<NumberType>,
 }
 
 impl Element {
-    /// Bytes of one binary element, if all are the same.
+    /// Returns the bytes of one binary element; `None` if a list makes them vary.
     pub fn stride(&self) -> Option<usize> {
-        let sizes = self.properties.iter().map(|property| match property.list {
+        let sizes = self.properties.iter().map(|property| match property.length_type {
             Some(_) => None,
-            None => Some(property.kind.size()),
+            None => Some(property.number_type.size()),
         });
         sizes.sum()
+    }
+
+    /// Returns the error of a file that ends within these elements.
+    pub fn ends_early(&self, input: &Input) -> Error {
+        input.malformed(
+            Location::Byte(input.len() as u64),
+            "the end of the file",
+            format!("{} elements `{}`", self.count, self.name),
+            "copy the file again from its source",
+        )
+    }
+
+    /// Returns the error of a file that ends after `readable` of these elements, which are its points.
+    pub fn truncated(&self, input: &Input, readable: u64) -> Error {
+        Error::Truncated {
+            file: input.name.to_string(),
+            location: Location::Byte(input.len() as u64),
+            readable,
+            claimed: self.count,
+        }
     }
 }
 
@@ -56,14 +87,14 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
         let number = lines.number;
         let malformed = |found: &str, expected: &str| {
             let found = format!("`{}`", found.chars().take(80).collect::<String>());
-            input.malformed(Place::Line(number), found, expected, "the header is broken")
+            input.malformed(Location::Line(number), found, expected, "the header is broken")
         };
         let Some(line) = lines.next() else {
             return Err(malformed("the end of the file", "`end_header`"));
         };
-        if LONGEST_LINE < line.len() {
+        if MAX_LINE_LENGTH < line.len() {
             let start = String::from_utf8_lossy(&line[..80]);
-            return Err(malformed(&start, &format!("at most {LONGEST_LINE} bytes in a line")));
+            return Err(malformed(&start, &format!("at most {MAX_LINE_LENGTH} bytes in a line")));
         }
         let line = String::from_utf8_lossy(line);
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
@@ -92,15 +123,15 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
                 };
                 elements.push(Element { name: (*name).into(), count, properties: Vec::new() });
             }
-            ["property", kind, .., name] => {
+            ["property", type_name, .., name] => {
                 let property = match words.as_slice() {
-                    [_, _, _] => kind_of_name(kind).map(|kind| (kind, None)),
-                    [_, "list", length, item, _] => kind_of_name(item)
-                        .zip(kind_of_name(length).filter(|kind| !kind.is_float()))
+                    [_, _, _] => parse_type(type_name).map(|number_type| (number_type, None)),
+                    [_, "list", length, item, _] => parse_type(item)
+                        .zip(parse_type(length).filter(|length| !length.is_float()))
                         .map(|(item, length)| (item, Some(length))),
                     _ => None,
                 };
-                let Some((kind, list)) = property else {
+                let Some((number_type, length_type)) = property else {
                     return Err(malformed(
                         &line,
                         "`property TYPE NAME` or `property list TYPE TYPE NAME` with types such as float and uchar",
@@ -109,11 +140,15 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
                 let Some(element) = elements.last_mut() else {
                     return Err(malformed(&line, "an element before its properties"));
                 };
-                if element.properties.len() == MOST_FIELDS {
-                    let expected = format!("at most {MOST_FIELDS} properties an element");
+                if element.properties.len() == MAX_FIELDS {
+                    let expected = format!("at most {MAX_FIELDS} properties an element");
                     return Err(malformed(&line, &expected));
                 }
-                element.properties.push(Property { name: (*name).into(), kind, list });
+                element.properties.push(Property {
+                    name: (*name).into(),
+                    number_type,
+                    length_type,
+                });
             }
             ["end_header"] => {
                 let Some(encoding) = encoding else {
@@ -132,23 +167,24 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
     }
 }
 
-fn kind_of_name(name: &str) -> Option<Kind> {
+/// Returns the type of a name, old or new.
+fn parse_type(name: &str) -> Option<NumberType> {
     Some(match name {
-        "char" | "int8" => Kind::I8,
-        "uchar" | "uint8" => Kind::U8,
-        "short" | "int16" => Kind::I16,
-        "ushort" | "uint16" => Kind::U16,
-        "int" | "int32" => Kind::I32,
-        "uint" | "uint32" => Kind::U32,
-        "float" | "float32" => Kind::F32,
-        "double" | "float64" => Kind::F64,
-        "int64" => Kind::I64,
-        "uint64" => Kind::U64,
+        "char" | "int8" => NumberType::I8,
+        "uchar" | "uint8" => NumberType::U8,
+        "short" | "int16" => NumberType::I16,
+        "ushort" | "uint16" => NumberType::U16,
+        "int" | "int32" => NumberType::I32,
+        "uint" | "uint32" => NumberType::U32,
+        "float" | "float32" => NumberType::F32,
+        "double" | "float64" => NumberType::F64,
+        "int64" => NumberType::I64,
+        "uint64" => NumberType::U64,
         _ => return None,
     })
 }
 
-/// The lines of the header, whichever line ending its first line has.
+/// The lines of the header; the first line shows their line ending.
 struct Lines<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -159,7 +195,7 @@ struct Lines<'a> {
 impl<'a> Lines<'a> {
     fn new(bytes: &'a [u8]) -> Self {
         let first_end = memchr::memchr2(b'\r', b'\n', bytes).unwrap_or(0);
-        // A lone CR cannot be told from CR LF at the last line, where binary data may begin with LF.
+        // The last line cannot show it: after a lone CR, binary data may begin with LF.
         let end: &[u8] = match &bytes[first_end..] {
             [b'\r', b'\n', ..] => b"\r\n",
             [b'\r', ..] => b"\r",

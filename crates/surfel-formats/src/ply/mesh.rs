@@ -1,35 +1,36 @@
-//! Meshes of PLY files: vertices with normals, colours and texture coordinates, and their faces.
+//! Reads the meshes of PLY files: vertices with normals, colours and texture coordinates, and their faces.
 
-use surfel::image::{decode_srgb, decode_srgb8};
-use surfel::math::{Vec2, Vec4};
-use surfel::points::{PointCloud, Values};
-use surfel::progress::Progress;
-use surfel::scene::{Material, Mesh, TextureRef};
+use surfel_core::image::{decode_srgb, decode_srgb8};
+use surfel_core::math::{Vec2, Vec4};
+use surfel_core::points::{PointCloud, Values};
+use surfel_core::progress::Progress;
+use surfel_core::scene::{Material, Mesh, TextureRef};
 
 use super::faces::{count_faces, read_faces};
 use super::header::read_header;
-use super::read::{find_vertex, read_cloud, source};
-use crate::beside::{Beside, Textures};
-use crate::error::{Place, Result};
-use crate::input::Input;
-use crate::mesh::{Model, finish};
-use crate::options::{Column, ColumnChoice, LoadOptions, Source};
-use crate::weld::weld;
+use super::read::{file_info, find_vertex, read_cloud};
+use crate::error::{Location, Result};
+use crate::file::{Input, ResourceResolver};
+use crate::mesh::{Model, TextureLoader, repair_model, weld};
+use crate::options::{FileInfo, LoadOptions};
+use crate::table::{Column, ColumnChoice};
 
 /// Names of texture coordinates, as Blender and MeshLab write them.
 const UV_NAMES: [[&str; 2]; 4] =
     [["s", "t"], ["u", "v"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
 
+/// Returns true if the header announces faces.
 pub(crate) fn has_faces(input: &Input) -> Result<bool> {
     Ok(0 < count_faces(&read_header(input)?))
 }
 
+/// Reads the faces as a mesh of triangles.
 pub(crate) fn read_mesh(
     input: &Input,
-    beside: &Beside,
+    resolver: &ResourceResolver,
     options: &LoadOptions,
     progress: &dyn Progress,
-) -> Result<(Model, Source)> {
+) -> Result<(Model, FileInfo)> {
     let header = read_header(input)?;
     let (_, vertex) = find_vertex(input, &header)?;
     if vertex.count > u64::from(u32::MAX) {
@@ -51,7 +52,7 @@ pub(crate) fn read_mesh(
         normals: cloud.normals,
         ..Mesh::default()
     };
-    // Of several elements of faces, one may have texture coordinates and another none.
+    // Elements of faces without texture coordinates leave too few for all triangles.
     if !faces.uvs.is_empty() && faces.uvs.len() == mesh.triangles.len() {
         if u32::MAX as usize / 3 <= faces.uvs.len() {
             let found = format!("{} triangles", faces.uvs.len());
@@ -59,62 +60,66 @@ pub(crate) fn read_mesh(
         }
         mesh = with_corner_uvs(&mesh, &faces.uvs);
     }
-    let mut textures = Textures::new(beside);
+    let mut textures = TextureLoader::new(resolver);
     let mut material = Material::MATTE;
     if let (Some(_), [name, others @ ..]) = (&mesh.uvs[0], header.textures.as_slice()) {
-        material.textures.base_color = textures.read(name).map(TextureRef::new);
+        material.textures.base_color = textures.load(name).map(TextureRef::new);
         if !others.is_empty() {
             let n_textures = header.textures.len();
-            progress.note(&format!("{}: the first of {n_textures} textures is on all", input.name));
+            progress.note(&format!(
+                "{}: the first of {n_textures} textures is used for all faces",
+                input.name
+            ));
         }
     }
-    textures.missing.tell("a texture is left out", progress);
-    let model = Model { parts: vec![(mesh, material)], textures: textures.all };
-    let place = faces.place.unwrap_or(Place::Byte(header.body as u64));
-    let (model, n_triangles) = finish(input, model, faces.n_short, place, progress)?;
-    Ok((model, Source { n_triangles: Some(n_triangles), ..source(&header, vertex) }))
+    textures.missing.report("a texture is left out", progress);
+    let model = Model { parts: vec![(mesh, material)], textures: textures.textures };
+    let location = faces.location.unwrap_or(Location::Byte(header.body as u64));
+    let (model, n_triangles) = repair_model(input, model, faces.n_short, location, progress)?;
+    Ok((model, FileInfo { n_triangles: Some(n_triangles), ..file_info(&header, vertex) }))
 }
 
-/// The mesh with a vertex for each pair of a vertex and texture coordinates.
+/// Returns the mesh with a vertex for each pair of a vertex and its texture coordinates.
 fn with_corner_uvs(mesh: &Mesh, uvs: &[[Vec2; 3]]) -> Mesh {
     let (vertices, uvs) = (mesh.triangles.as_flattened(), uvs.as_flattened());
     let key = |(vertex, uv): (&u32, &Vec2)| [*vertex, uv.x.to_bits(), uv.y.to_bits()];
     let welded = weld(&vertices.iter().zip(uvs).map(key).collect::<Vec<_>>());
     let corners = || welded.first_corners.iter().map(|corner| *corner as usize);
-    fn of<T: Copy>(column: &[T], vertices: impl Iterator<Item = u32>) -> Vec<T> {
+    fn gather<T: Copy>(column: &[T], vertices: impl Iterator<Item = u32>) -> Vec<T> {
         vertices.map(|vertex| column[vertex as usize]).collect()
     }
     let vertices = || corners().map(|corner| vertices[corner]);
     Mesh {
         origin: mesh.origin,
-        positions: of(&mesh.positions, vertices()),
-        normals: mesh.normals.as_ref().map(|normals| of(normals, vertices())),
-        colors: mesh.colors.as_ref().map(|colors| of(colors, vertices())),
-        uvs: [Some(corners().map(|corner| downward(uvs[corner])).collect()), None],
+        positions: gather(&mesh.positions, vertices()),
+        normals: mesh.normals.as_ref().map(|normals| gather(normals, vertices())),
+        colors: mesh.colors.as_ref().map(|colors| gather(colors, vertices())),
+        uvs: [Some(corners().map(|corner| flip_v(uvs[corner])).collect()), None],
         triangles: welded.vertex_of_corner.as_chunks().0.to_vec(),
         ..Mesh::default()
     }
 }
 
-/// In the file v goes up.
-fn downward(uv: Vec2) -> Vec2 {
+/// Flips v, which points up in the file and down in a texture.
+fn flip_v(uv: Vec2) -> Vec2 {
     Vec2::new(uv.x, 1.0 - uv.y)
 }
 
-/// Texture coordinates of vertices.
+/// Returns the texture coordinates of the vertices, if the file has them.
 fn uvs(cloud: &PointCloud) -> Option<Vec<Vec2>> {
     UV_NAMES.iter().find_map(|[u, v]| {
         let (u, v) = (cloud.scalar(u)?, cloud.scalar(v)?);
-        let uv = |i| downward(Vec2::new(u.get(i) as f32, v.get(i) as f32));
+        let uv = |i| flip_v(Vec2::new(u.get(i) as f32, v.get(i) as f32));
         Some((0..cloud.len()).map(uv).collect())
     })
 }
 
+/// Returns the colours of the vertices, linear and with alpha.
 fn linear_colors(cloud: &PointCloud) -> Option<Vec<Vec4>> {
     let colors = cloud.colors.as_ref()?;
     let alpha = cloud.scalar("alpha");
     let linear = |channel: u16| match (channel / 257, channel % 257) {
-        // Most files have 8 bits, which are looked up.
+        // Most files have 8 bits, for which there is a table.
         (byte, 0) => decode_srgb8(byte as u8),
         _ => decode_srgb(f32::from(channel) / 65535.0),
     };

@@ -1,8 +1,8 @@
-//! PLY: polygon files, read as points by their vertices alone or as meshes.
+//! PLY: polygon files, read as points (their vertices) or as meshes.
 
 mod header;
-mod walk;
-mod lines;
+mod skip;
+mod element_lines;
 mod faces;
 mod read;
 mod mesh;
@@ -11,5 +11,3 @@ mod write;
 pub(crate) use mesh::{has_faces, read_mesh};
 pub(crate) use read::{inspect, read};
 pub(crate) use write::write;
-
-pub(crate) const MAGIC: &[u8] = b"ply";

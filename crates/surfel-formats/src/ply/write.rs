@@ -4,33 +4,35 @@ use std::io::Write;
 use std::ops::Range;
 use std::path::Path;
 
-use surfel::math::DVec3;
-use surfel::points::{PointCloud, Values};
-use surfel::progress::Progress;
+use surfel_core::math::DVec3;
+use surfel_core::points::{PointCloud, Values};
+use surfel_core::progress::Progress;
 
-use crate::atomic::{write_failed, write_file};
-use crate::encode::encode_points;
 use crate::error::Result;
-use crate::role::Role;
+use crate::file::{write_error, write_file};
+use crate::table::{ColumnRole, encode_points};
 
+/// Writes `cloud` to `path`.
 pub(crate) fn write(path: &Path, cloud: &PointCloud, progress: &dyn Progress) -> Result<()> {
-    let form = Form::of(cloud);
+    let types = Types::new(cloud);
     progress.begin(&format!("write {}", path.display()), cloud.len() as u64);
     write_file(path, |writer| {
-        let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(|e| write_failed(path, e));
-        put(header(cloud, &form).as_bytes())?;
-        encode_points(cloud.len(), |points| Ok(encode(cloud, &form, points)), progress, put)
+        let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(|e| write_error(path, e));
+        put(header(cloud, &types).as_bytes())?;
+        encode_points(cloud.len(), |points| Ok(encode(cloud, &types, points)), progress, put)
     })
 }
 
 /// The types that hold the cloud's values without loss.
-struct Form {
+struct Types {
+    /// True for f64 positions, false for f32.
     has_wide_positions: bool,
+    /// True for colours of 16 bits, false for 8.
     has_wide_colors: bool,
 }
 
-impl Form {
-    fn of(cloud: &PointCloud) -> Self {
+impl Types {
+    fn new(cloud: &PointCloud) -> Self {
         let is_wide = |color: &[u16; 3]| color.iter().any(|channel| channel % 257 != 0);
         Self {
             has_wide_positions: cloud.origin != DVec3::ZERO,
@@ -39,20 +41,21 @@ impl Form {
     }
 }
 
-fn header(cloud: &PointCloud, form: &Form) -> String {
+fn header(cloud: &PointCloud, types: &Types) -> String {
     let mut header =
         String::from("ply\nformat binary_little_endian 1.0\ncomment written by surfel\n");
     header += &format!("element vertex {}\n", cloud.len());
-    let mut property = |kind: &str, name: &str| header += &format!("property {kind} {name}\n");
+    let mut property =
+        |type_name: &str, name: &str| header += &format!("property {type_name} {name}\n");
     for name in ["x", "y", "z"] {
-        property(if form.has_wide_positions { "double" } else { "float" }, name);
+        property(if types.has_wide_positions { "double" } else { "float" }, name);
     }
     if cloud.normals.is_some() {
         ["nx", "ny", "nz"].iter().for_each(|name| property("float", name));
     }
     if cloud.colors.is_some() {
-        let kind = if form.has_wide_colors { "ushort" } else { "uchar" };
-        ["red", "green", "blue"].iter().for_each(|name| property(kind, name));
+        let type_name = if types.has_wide_colors { "ushort" } else { "uchar" };
+        ["red", "green", "blue"].iter().for_each(|name| property(type_name, name));
     }
     if cloud.radii.is_some() {
         property("float", "radius");
@@ -64,32 +67,32 @@ fn header(cloud: &PointCloud, form: &Form) -> String {
         property("uchar", "classification");
     }
     for scalar in &cloud.scalars {
-        let kind = match scalar.values {
+        let type_name = match scalar.values {
             Values::U8(_) => "uchar",
             Values::U16(_) => "ushort",
             Values::I32(_) => "int",
             Values::F32(_) => "float",
             Values::F64(_) => "double",
         };
-        property(kind, &property_name(&scalar.name));
+        property(type_name, &property_name(&scalar.name));
     }
     header + "end_header\n"
 }
 
-/// A scalar's name as one word that is not taken for another column.
+/// Returns a scalar's name as one word that no reader takes for another column.
 fn property_name(name: &str) -> String {
     let name: String =
         name.chars().map(|c| if c.is_whitespace() || c.is_control() { '_' } else { c }).collect();
-    if name.is_empty() || Role::of_name(&name).is_some() || Role::is_alpha(&name) {
+    if name.is_empty() || ColumnRole::from_name(&name).is_some() || ColumnRole::is_alpha(&name) {
         return format!("column_{name}");
     }
     name
 }
 
-fn encode(cloud: &PointCloud, form: &Form, points: Range<usize>) -> Vec<u8> {
+fn encode(cloud: &PointCloud, types: &Types, points: Range<usize>) -> Vec<u8> {
     let mut bytes = Vec::new();
     for i in points {
-        if form.has_wide_positions {
+        if types.has_wide_positions {
             let position = cloud.world_position(i).to_array();
             position.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
         } else {
@@ -100,7 +103,7 @@ fn encode(cloud: &PointCloud, form: &Form, points: Range<usize>) -> Vec<u8> {
         }
         if let Some(colors) = &cloud.colors {
             for channel in colors[i] {
-                if form.has_wide_colors {
+                if types.has_wide_colors {
                     bytes.extend(channel.to_le_bytes());
                 } else {
                     bytes.push((channel / 257) as u8);

@@ -1,25 +1,27 @@
 //! Points as lines of text: XYZ, TXT, CSV, ASC and PTS.
 
-mod guess;
+mod infer_columns;
 mod preamble;
 
-use surfel::progress::Progress;
+use surfel_core::progress::Progress;
 
-use crate::error::{Place, Result};
-use crate::input::Input;
-use crate::lines::{LONGEST_LINE, LineError, Rows, parse_number, read_rows};
-use crate::options::{LoadOptions, Loaded, Source, TextColumn};
-use crate::range::ColorRange;
-use crate::record::{ColumnField, Field, Kind, Layout};
-use crate::role::Role;
-use guess::{color_range, guess_columns, holds_classes};
+use crate::error::{Location, Result};
+use crate::file::Input;
+use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::table::{
+    ColorRange, ColumnField, ColumnRole, Field, LineError, MAX_LINE_LENGTH, NumberType,
+    RecordLayout, RowRange, TextColumn, parse_number, read_rows,
+};
+use infer_columns::{color_range, has_class_values, infer_columns};
 use preamble::{Preamble, Separator, comment, read_preamble};
 
-pub(crate) fn inspect(input: &Input) -> Result<Source> {
+/// Reads the lines before the points.
+pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
     let preamble = read_preamble(input)?;
-    Ok(source(&preamble))
+    Ok(file_info(&preamble))
 }
 
+/// Reads the points.
 pub(crate) fn read(
     input: &Input,
     options: &LoadOptions,
@@ -31,7 +33,7 @@ pub(crate) fn read(
         (Some(stated), _) => stated.iter().map(|TextColumn(role)| role.clone()).collect(),
         (None, Some(names)) => roles_of_header(names),
         (None, None) => {
-            let (columns, description) = guess_columns(&sample, preamble.n_fields);
+            let (columns, description) = infer_columns(&sample, preamble.n_fields);
             progress.note(&format!(
                 "{}: no header; columns taken as {description} (state them with --columns)",
                 input.name
@@ -40,16 +42,21 @@ pub(crate) fn read(
         }
     };
     check_columns(input, &columns, &preamble)?;
-    let kept: Vec<(usize, &Role)> =
+    let kept: Vec<(usize, &ColumnRole)> =
         columns.iter().enumerate().filter_map(|(i, role)| Some((i, role.as_ref()?))).collect();
     let fields = column_fields(&kept, &sample, input, progress);
     let stride = 8 * kept.len();
     let layout_of = |_: &[u8]| {
-        Layout::new(stride, false, fields.clone(), &options.columns).expect("x, y and z were found")
+        RecordLayout::new(stride, false, fields.clone(), &options.columns)
+            .expect("x, y and z were found")
     };
     let parse = |line: &[u8], row: &mut Vec<f64>| parse_line(line, &preamble, &columns, row);
-    let rows =
-        Rows { start: preamble.data, line: preamble.data_line, n_columns: kept.len(), limit: None };
+    let rows = RowRange {
+        start: preamble.data,
+        line: preamble.data_line,
+        n_columns: kept.len(),
+        limit: None,
+    };
     progress.begin(&format!("read {}", input.name), (input.len() - preamble.data) as u64);
     let cloud = read_rows(input, rows, &parse, layout_of, options.origin, progress)?;
     if let Some(count) = preamble.count {
@@ -57,70 +64,76 @@ pub(crate) fn read(
         let line = format!("a line before the points says {count} points, {n_points} were read");
         progress.note(&format!("{}: {line}", input.name));
     }
-    let mut source = source(&preamble);
-    source.n_points = Some(cloud.len() as u64);
-    source.columns = kept.iter().map(|(_, role)| role.name().to_owned()).collect();
-    Ok(Loaded { cloud, source })
+    let mut info = file_info(&preamble);
+    info.n_points = Some(cloud.len() as u64);
+    info.columns = kept.iter().map(|(_, role)| role.name().to_owned()).collect();
+    Ok(Loaded { cloud, info })
 }
 
-fn roles_of_header(names: &[String]) -> Vec<Option<Role>> {
+/// Returns the roles of named columns, `None` for opacity.
+fn roles_of_header(names: &[String]) -> Vec<Option<ColumnRole>> {
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let roles = Role::of_names(&names).into_iter().zip(names);
-    roles.map(|(role, name)| (!Role::is_alpha(name)).then_some(role)).collect()
+    let roles = ColumnRole::from_names(&names).into_iter().zip(names);
+    roles.map(|(role, name)| (!ColumnRole::is_alpha(name)).then_some(role)).collect()
 }
 
-fn check_columns(input: &Input, columns: &[Option<Role>], preamble: &Preamble) -> Result<()> {
-    let place = Place::Line(preamble.data_line);
+/// Checks that there is a column for each field, and that x, y and z are among them.
+fn check_columns(input: &Input, columns: &[Option<ColumnRole>], preamble: &Preamble) -> Result<()> {
+    let location = Location::Line(preamble.data_line);
     if columns.len() != preamble.n_fields {
         return Err(input.malformed(
-            place,
+            location,
             format!("{} columns", preamble.n_fields),
             format!("{}", columns.len()),
             "state all columns with --columns, `-` for one to skip",
         ));
     }
     for axis in 0..3 {
-        if !columns.contains(&Some(Role::Position(axis))) {
+        if !columns.contains(&Some(ColumnRole::Position(axis))) {
             let found = format!("{} columns without {}", columns.len(), ["x", "y", "z"][axis]);
             let advice = "state the columns with --columns, as in x,y,z,-,r,g,b";
-            return Err(input.malformed(place, found, "columns x, y and z", advice));
+            return Err(input.malformed(location, found, "columns x, y and z", advice));
         }
     }
     Ok(())
 }
 
-/// Where the kept columns stand in a parsed row, and how their values are to be taken.
+/// Returns the fields of the kept columns in a parsed row, with the range of colours and the check of classes applied.
 fn column_fields(
-    kept: &[(usize, &Role)],
+    kept: &[(usize, &ColumnRole)],
     sample: &[Vec<f64>],
     input: &Input,
     progress: &dyn Progress,
 ) -> Vec<ColumnField> {
-    let colors: Vec<usize> =
-        kept.iter().filter(|(_, role)| matches!(role, Role::Color(_))).map(|(i, _)| *i).collect();
+    let colors: Vec<usize> = kept
+        .iter()
+        .filter(|(_, role)| matches!(role, ColumnRole::Color(_)))
+        .map(|(i, _)| *i)
+        .collect();
     let range = color_range(sample, &colors);
     if !colors.is_empty() && range != ColorRange::Bits8 {
-        progress.note(&format!("{}: colours taken as {}", input.name, range.words()));
+        progress.note(&format!("{}: colours taken as {}", input.name, range.describe()));
     }
     let mut fields: Vec<ColumnField> = Vec::new();
-    for (place, (column, role)) in kept.iter().enumerate() {
-        let mut field = Field::new(8 * place, Kind::F64);
+    for (i, (column, role)) in kept.iter().enumerate() {
+        let mut field = Field::new(8 * i, NumberType::F64);
         let mut role = (*role).clone();
-        if let Role::Color(_) = role {
+        if let ColumnRole::Color(_) = role {
             field.scale = range.scale();
         }
-        if role == Role::Classification && !holds_classes(sample, *column) {
-            role = Role::Scalar("classification".into());
+        if role == ColumnRole::Classification && !has_class_values(sample, *column) {
+            role = ColumnRole::Scalar("classification".into());
         }
         fields.push(ColumnField { role, field });
     }
     fields
 }
 
+/// Appends the kept fields of a line to `row`.
 fn parse_line(
     line: &[u8],
     preamble: &Preamble,
-    columns: &[Option<Role>],
+    columns: &[Option<ColumnRole>],
     row: &mut Vec<f64>,
 ) -> std::result::Result<(), LineError> {
     if comment(line).is_some() {
@@ -148,20 +161,21 @@ fn parse_line(
     Ok(())
 }
 
-/// All fields of some lines spread over the file; what is wrong with lines is told when they are read.
+/// Parses some lines spread over the file, with all their fields. Broken lines are skipped, and become errors when the
+/// file is read.
 fn sample_rows(input: &Input, preamble: &Preamble) -> Vec<Vec<f64>> {
-    const PLACES: usize = 64;
-    const LINES: usize = 16;
+    const N_POSITIONS: usize = 64;
+    const LINES_PER_POSITION: usize = 16;
     let data = &input[preamble.data..];
     let mut rows = Vec::new();
-    for place in 0..PLACES {
-        let from = data.len() * place / PLACES;
-        let near = &data[from..data.len().min(from + LONGEST_LINE)];
-        let is_cut = from + near.len() < data.len();
+    for i in 0..N_POSITIONS {
+        let start = data.len() * i / N_POSITIONS;
+        let near = &data[start..data.len().min(start + MAX_LINE_LENGTH)];
+        let is_cut = start + near.len() < data.len();
         let end = if is_cut { memchr::memrchr(b'\n', near).unwrap_or(0) } else { near.len() };
-        // A line is begun at its start, not where the place happens to fall into it.
-        let lines = near[..end].split(|byte| *byte == b'\n').skip(usize::from(0 < place));
-        for line in lines.take(LINES) {
+        // The position falls inside a line, so the next line is the first whole one.
+        let lines = near[..end].split(|byte| *byte == b'\n').skip(usize::from(0 < i));
+        for line in lines.take(LINES_PER_POSITION) {
             let line = line.trim_ascii();
             let fields = preamble.separator.fields(line).take(preamble.n_fields);
             let row: Vec<f64> =
@@ -174,16 +188,17 @@ fn sample_rows(input: &Input, preamble: &Preamble) -> Vec<Vec<f64>> {
     rows
 }
 
-fn source(preamble: &Preamble) -> Source {
+/// Returns the information in the lines before the points.
+fn file_info(preamble: &Preamble) -> FileInfo {
     let separator = match preamble.separator {
         Separator::Whitespace => "spaces",
         Separator::Comma => "commas",
         Separator::Semicolon => "semicolons",
     };
-    Source {
+    FileInfo {
         format: format!("text, {} columns separated by {separator}", preamble.n_fields),
         n_points: preamble.count,
         columns: preamble.names.clone().unwrap_or_default(),
-        ..Source::default()
+        ..FileInfo::default()
     }
 }

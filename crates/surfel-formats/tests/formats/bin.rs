@@ -1,7 +1,7 @@
-//! BIN: bare records of position, radius and normal.
+//! BIN files: records of position, radius and normal without a header.
 
-use surfel::math::{DVec3, Vec3};
-use surfel::progress::Silent;
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::progress::NoProgress;
 use surfel_formats::{Column, ColumnChoice, LoadOptions, inspect, load, load_bytes};
 
 use crate::common::{Folder, read};
@@ -11,7 +11,7 @@ fn file(records: &[[f32; 7]]) -> Vec<u8> {
 }
 
 #[test]
-fn records_are_read_to_the_bit() {
+fn records_are_read_bit_exactly() {
     let n = 70_000;
     let normal = |i: usize| Vec3::new(i as f32, 1.0, -3.0).normalize();
     let record = |i: usize| {
@@ -29,34 +29,34 @@ fn records_are_read_to_the_bit() {
 }
 
 #[test]
-fn a_file_tells_its_points_and_columns_without_being_read() {
+fn inspect_reports_points_and_columns() {
     let folder = Folder::new("bin");
     let path = folder.path("A.BIN");
     std::fs::write(&path, file(&[[1.0, 2.0, 3.0, 0.5, 0.0, 0.0, 1.0]; 3])).unwrap();
-    let source = inspect(&path).unwrap();
-    assert_eq!((source.format.as_str(), source.n_points), ("BIN, records of 7 f32", Some(3)));
-    assert_eq!(source.columns, ["x", "y", "z", "radius", "nx", "ny", "nz"]);
-    assert_eq!(load(&path, &LoadOptions::default(), &Silent).unwrap().source, source);
+    let info = inspect(&path).unwrap();
+    assert_eq!((info.format.as_str(), info.n_points), ("BIN, records of 7 f32", Some(3)));
+    assert_eq!(info.columns, ["x", "y", "z", "radius", "nx", "ny", "nz"]);
+    assert_eq!(load(&path, &LoadOptions::default(), &NoProgress).unwrap().info, info);
 }
 
 #[test]
-fn only_the_columns_asked_for_are_kept() {
+fn only_requested_columns_are_loaded() {
     let columns = ColumnChoice::Only(vec![Column::Radii]);
     let options = LoadOptions { columns, ..LoadOptions::default() };
     let bytes = file(&[[1.0, 2.0, 3.0, 0.5, 0.0, 0.0, 1.0]]);
-    let cloud = load_bytes("a.bin", &bytes, &options, &Silent).unwrap().cloud;
+    let cloud = load_bytes("a.bin", &bytes, &options, &NoProgress).unwrap().cloud;
     assert_eq!((cloud.normals, cloud.radii), (None, Some(vec![0.5])));
 }
 
 #[test]
-fn far_coordinates_get_an_origin() {
+fn large_coordinates_get_an_origin() {
     let cloud = read("a.bin", file(&[[5e6, 1e7, 2.5, 1.0, 0.0, 0.0, 1.0]; 2])).unwrap().cloud;
     assert_eq!(cloud.world_position(0), DVec3::new(5e6, 1e7, 2.5));
     assert_eq!(cloud.origin, DVec3::new(5e6, 1e7, 0.0));
 }
 
 #[test]
-fn values_that_are_no_numbers_are_kept_for_cleaning() {
+fn non_finite_values_are_kept_for_cleaning() {
     let records = [[f32::NAN, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 2.0, 0.0, 3.0, 0.0]];
     let cloud = read("a.bin", file(&records)).unwrap().cloud;
     assert!(cloud.positions[0].is_nan() && cloud.positions[1] == Vec3::ONE);
@@ -65,16 +65,16 @@ fn values_that_are_no_numbers_are_kept_for_cleaning() {
 }
 
 #[test]
-fn a_length_of_broken_records_is_told() {
+fn a_partial_record_is_an_error() {
     let bytes = file(&[[1.0; 7]; 2]);
     let error = read("a.bin", &bytes[..47]).unwrap_err().to_string();
     assert_eq!(
         error,
         "a.bin: byte 28: found a record of 19 bytes, expected 28: x y z radius nx ny nz as \
-         little-endian f32; copy the file again from its source, or convert it if its records are others"
+         little-endian f32; copy the file again from its source, or convert it if it has other records"
     );
     assert!(read("a.bin", "").unwrap_err().to_string().contains("an empty file"));
-    // The first two bytes of a gzip archive, as the end of a coordinate's fraction.
+    // These coordinate bits begin with the magic bytes of gzip.
     let coordinate = f32::from_bits(0x3f00_8b1f);
     assert_eq!(read("a.bin", file(&[[coordinate; 7]])).unwrap().cloud.positions[0].x, coordinate);
 }

@@ -1,18 +1,18 @@
-//! What the tests share: scans if they are there, a folder to write to, small clouds.
+//! Helpers for all tests: shared scans, temporary folders, recorded notes and small clouds.
 
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use surfel::math::{DVec3, Vec3};
-use surfel::points::{PointCloud, Scalar, Values};
-use surfel::progress::{Progress, Silent};
-use surfel::scene::{Geometry, Graph, Mesh};
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::{PointCloud, Scalar, Values};
+use surfel_core::progress::{NoProgress, Progress};
+use surfel_core::scene::{Geometry, Graph, Mesh};
 use surfel_formats::{
-    Error, LoadOptions, Loaded, SaveOptions, Source, load, load_bytes, load_graph_bytes, save,
+    Error, FileInfo, LoadOptions, Loaded, SaveOptions, load, load_bytes, load_graph_bytes, save,
 };
 
-/// A file of the shared test data; without them a line is printed and the test has nothing to do.
+/// Returns the path of a shared test file, or prints a note and returns `None` if the shared data is absent.
 pub fn shared(name: &str) -> Option<PathBuf> {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     if !data.is_dir() {
@@ -25,7 +25,7 @@ pub fn shared(name: &str) -> Option<PathBuf> {
     Some(data.join(name))
 }
 
-/// A folder of its own for a test, removed at its end.
+/// A temporary folder that is removed when dropped.
 pub struct Folder(PathBuf);
 
 impl Folder {
@@ -51,7 +51,7 @@ impl Drop for Folder {
     }
 }
 
-/// Keeps the notes; cancelled if asked for.
+/// Records all notes, and cancels if `cancelled` is set.
 #[derive(Default)]
 pub struct Listener {
     pub notes: Mutex<Vec<String>>,
@@ -59,7 +59,7 @@ pub struct Listener {
 }
 
 impl Listener {
-    pub fn heard(&self, words: &str) -> bool {
+    pub fn has_note(&self, words: &str) -> bool {
         self.notes.lock().unwrap().iter().any(|note| note.contains(words))
     }
 }
@@ -75,18 +75,20 @@ impl Progress for Listener {
 }
 
 pub fn read(name: &str, bytes: impl AsRef<[u8]>) -> Result<Loaded, Error> {
-    load_bytes(name, bytes.as_ref(), &LoadOptions::default(), &Silent)
+    load_bytes(name, bytes.as_ref(), &LoadOptions::default(), &NoProgress)
 }
 
-/// The file as a graph, with what was noted.
-pub fn read_graph(name: &str, bytes: impl AsRef<[u8]>) -> Result<(Graph, Source, Listener), Error> {
+/// Reads a file as a graph and records the notes.
+pub fn read_graph(
+    name: &str,
+    bytes: impl AsRef<[u8]>,
+) -> Result<(Graph<PointCloud>, FileInfo, Listener), Error> {
     let listener = Listener::default();
-    let (graph, source) =
-        load_graph_bytes(name, bytes.as_ref(), &LoadOptions::default(), &listener)?;
-    Ok((graph, source, listener))
+    let (graph, info) = load_graph_bytes(name, bytes.as_ref(), &LoadOptions::default(), &listener)?;
+    Ok((graph, info, listener))
 }
 
-/// The only mesh of a file.
+/// Reads a file with a single mesh.
 pub fn read_mesh(name: &str, bytes: impl AsRef<[u8]>) -> Mesh {
     let (mut graph, ..) = read_graph(name, bytes).unwrap();
     assert_eq!(graph.geometries.len(), 1, "{name}");
@@ -96,25 +98,25 @@ pub fn read_mesh(name: &str, bytes: impl AsRef<[u8]>) -> Mesh {
     }
 }
 
-/// The cloud after it was written to a file of this extension and read again.
-pub fn there_and_back(cloud: &PointCloud, extension: &str, options: &SaveOptions) -> Loaded {
+/// Writes a cloud to a file with this extension and reads it back.
+pub fn round_trip(cloud: &PointCloud, extension: &str, options: &SaveOptions) -> Loaded {
     static COUNT: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
     let folder = Folder::new(&format!("there-and-back-{count}"));
     let path = folder.path(&format!("cloud.{extension}"));
-    save(&path, cloud, options, &Silent).unwrap();
-    load(&path, &LoadOptions::default(), &Silent).unwrap()
+    save(&path, cloud, options, &NoProgress).unwrap();
+    load(&path, &LoadOptions::default(), &NoProgress).unwrap()
 }
 
-/// The bytes of the file that the cloud becomes.
-pub fn file_of(cloud: &PointCloud, extension: &str) -> Vec<u8> {
+/// Returns the bytes of the file that `save` writes for the cloud.
+pub fn encode_cloud(cloud: &PointCloud, extension: &str) -> Vec<u8> {
     let folder = Folder::new(&format!("file-of-{extension}-{:p}", cloud));
     let path = folder.path(&format!("cloud.{extension}"));
-    save(&path, cloud, &SaveOptions::default(), &Silent).unwrap();
+    save(&path, cloud, &SaveOptions::default(), &NoProgress).unwrap();
     std::fs::read(&path).unwrap()
 }
 
-/// Points with every column.
+/// Returns a cloud with every kind of column.
 pub fn full_cloud(n: usize) -> PointCloud {
     let f = |i: usize, step: f32| ((i * 7919) % 1000) as f32 * step;
     let scalar = |name: &str, values| Scalar { name: name.into(), values };
@@ -137,7 +139,7 @@ pub fn full_cloud(n: usize) -> PointCloud {
     }
 }
 
-/// The largest distance on an axis between the same points of two clouds.
+/// Returns the largest distance per axis between corresponding points.
 pub fn largest_difference(a: &PointCloud, b: &PointCloud) -> DVec3 {
     assert_eq!(a.len(), b.len());
     (0..a.len())

@@ -1,17 +1,18 @@
-//! glTF: where its data may be, what is refused, and real files.
+//! glTF: storage of buffers, extensions, selection of animations, and real files.
 
 use serde_json::json;
-use surfel::math::DVec3;
-use surfel::progress::Silent;
-use surfel::scene::{Geometry, Graph, Mesh};
+use surfel_core::math::DVec3;
+use surfel_core::points::PointCloud;
+use surfel_core::progress::NoProgress;
+use surfel_core::scene::{Geometry, Graph, Mesh};
 use surfel_formats::{
     LoadOptions, Loaded, inspect, load, load_gltf, load_gltf_bytes, load_graph_bytes,
 };
 
 use crate::common::{Folder, Listener, shared};
-use crate::gltf_asset::{Asset, moving, triangle};
+use crate::gltf_asset::{Asset, animated_asset, triangle};
 
-/// The asset as plain JSON that has its buffer as Base64.
+/// Returns the asset as JSON with its buffer in a Base64 `data:` URI.
 fn embedded(asset: &Asset) -> Vec<u8> {
     const LETTERS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::new();
@@ -30,15 +31,15 @@ fn embedded(asset: &Asset) -> Vec<u8> {
 }
 
 #[test]
-fn data_may_be_inside_beside_or_above() {
+fn buffers_may_be_embedded_or_in_relative_files() {
     let asset = triangle();
     let mesh = asset.mesh();
-    let mesh_of = |graph: Graph| -> Mesh {
+    let mesh_of = |graph: Graph<PointCloud>| -> Mesh {
         let [Geometry::Triangles(mesh)] = &graph.geometries[..] else { panic!() };
         mesh.clone()
     };
-    let (graph, source) = load_gltf_bytes("a.gltf", &embedded(&asset), &Silent).unwrap();
-    assert_eq!((mesh_of(graph), &source.format[..]), (mesh.clone(), "glTF 2.0"));
+    let (graph, info) = load_gltf_bytes("a.gltf", &embedded(&asset), &NoProgress).unwrap();
+    assert_eq!((mesh_of(graph), &info.format[..]), (mesh.clone(), "glTF 2.0"));
     let folder = Folder::new("gltf-beside");
     std::fs::create_dir(folder.path("in side")).unwrap();
     std::fs::create_dir(folder.path("in side/deep")).unwrap();
@@ -55,20 +56,20 @@ fn data_may_be_inside_beside_or_above() {
         json["buffers"] = json!([{"byteLength": asset.buffer.len(), "uri": uri}]);
         let file = folder.path("in side/scene.gltf");
         std::fs::write(&file, json.to_string()).unwrap();
-        let (graph, source) = load_gltf(&file, &Silent).unwrap();
+        let (graph, info) = load_gltf(&file, &NoProgress).unwrap();
         assert_eq!(graph.nodes[0].name, "scene");
-        let [buffer] = &source.beside[..] else { panic!("{:?}", source.beside) };
+        let [buffer] = &info.external_files[..] else { panic!("{:?}", info.external_files) };
         assert_eq!(buffer.canonicalize().unwrap(), folder.path(path).canonicalize().unwrap());
         assert_eq!(mesh_of(graph), mesh, "{uri}");
         std::fs::remove_file(folder.path(path)).unwrap();
     }
-    // A mark in front of the JSON, as some editors leave it.
+    // Some editors write a byte order mark before the JSON.
     let marked = ["\u{feff}".as_bytes(), &embedded(&asset)].concat();
-    assert!(load_gltf_bytes("a.gltf", &marked, &Silent).is_ok());
+    assert!(load_gltf_bytes("a.gltf", &marked, &NoProgress).is_ok());
 }
 
 #[test]
-fn what_a_file_holds_is_known_before_it_is_read() {
+fn inspect_counts_points_and_triangles() {
     let mut asset = triangle();
     let attributes = asset.json["meshes"][0]["primitives"][0]["attributes"].clone();
     let indices = asset.numbers("SCALAR", &[0u8, 1, 2, 0]);
@@ -80,29 +81,29 @@ fn what_a_file_holds_is_known_before_it_is_read() {
     let folder = Folder::new("gltf-inspect");
     let file = folder.path("a.glb");
     std::fs::write(&file, asset.glb()).unwrap();
-    let source = inspect(&file).unwrap();
-    assert_eq!((source.n_points, source.n_triangles), (Some(3), Some(3)));
-    assert_eq!(source.format, "glTF 2.0, binary");
+    let info = inspect(&file).unwrap();
+    assert_eq!((info.n_points, info.n_triangles), (Some(3), Some(3)));
+    assert_eq!(info.format, "glTF 2.0, binary");
 }
 
 #[test]
-fn an_animation_is_chosen_by_its_name() {
-    let bytes = moving().glb();
+fn an_animation_is_selected_by_name() {
+    let bytes = animated_asset().glb();
     let n_channels = |name: &str| {
         let options = LoadOptions { animation: Some(name.into()), ..LoadOptions::default() };
-        let loaded = load_graph_bytes("a.glb", &bytes, &options, &Silent);
+        let loaded = load_graph_bytes("a.glb", &bytes, &options, &NoProgress);
         loaded.map(|(graph, _)| graph.animation.channels.len())
     };
     assert_eq!((n_channels("walk").unwrap(), n_channels("run").unwrap()), (4, 0));
     let message = n_channels("fly").unwrap_err().to_string();
     assert_eq!(message, "a.glb: has no animation `fly`; there is `walk`, `run`");
-    // What does not move is none the worse for it.
+    // A file without animations ignores the requested name.
     let options = LoadOptions { animation: Some("fly".into()), ..LoadOptions::default() };
-    assert!(load_graph_bytes("a.glb", &triangle().glb(), &options, &Silent).is_ok());
+    assert!(load_graph_bytes("a.glb", &triangle().glb(), &options, &NoProgress).is_ok());
 }
 
 #[test]
-fn unknown_extensions_are_told_once_and_refused_where_required() {
+fn unknown_extensions_are_reported_once_and_rejected_if_required() {
     let mut asset = triangle();
     asset.json["extensionsUsed"] = json!([
         "KHR_materials_sheen",
@@ -132,9 +133,9 @@ fn unknown_extensions_are_told_once_and_refused_where_required() {
 fn a_truck_has_meshes_a_texture_and_wheels_that_turn() {
     let Some(path) = shared("gltf/CesiumMilkTruck/CesiumMilkTruck.gltf") else { return };
     let listener = Listener::default();
-    let (mut graph, source) = load_gltf(&path, &listener).unwrap();
+    let (mut graph, info) = load_gltf(&path, &listener).unwrap();
     graph.validate();
-    assert_eq!((&source.format[..], source.n_points), ("glTF 2.0", None));
+    assert_eq!((&info.format[..], info.n_points), ("glTF 2.0", None));
     assert!(listener.notes.lock().unwrap().is_empty());
     assert_eq!((graph.geometries.len(), graph.materials.len(), graph.textures.len()), (4, 4, 1));
     assert_eq!((graph.textures[0].width, graph.textures[0].height), (2048, 2048));
@@ -142,13 +143,16 @@ fn a_truck_has_meshes_a_texture_and_wheels_that_turn() {
     assert_eq!(graph.nodes[0].name, "CesiumMilkTruck");
     let Geometry::Triangles(body) = &graph.geometries[0] else { panic!() };
     assert_eq!((body.positions.len(), body.triangles.len()), (1856, 1744));
-    // As long as it stands in the file, and upright.
+    // The mesh has the size stated in the file.
     assert!((body.bounds().max.y - 2.584_37).abs() < 1e-5);
-    let wheels: Vec<_> = graph.nodes.iter().filter(|node| node.parts.len() == 1).collect();
-    assert_eq!((wheels.len(), wheels[0].parts[0].geometry), (2, wheels[1].parts[0].geometry));
+    let wheels: Vec<_> = graph.nodes.iter().filter(|node| node.primitives.len() == 1).collect();
+    assert_eq!(
+        (wheels.len(), wheels[0].primitives[0].geometry),
+        (2, wheels[1].primitives[0].geometry)
+    );
     assert_eq!(graph.animation.duration_secs(), 1.25);
     let before = graph.world_from_nodes();
-    graph.pose(0.6);
+    graph.evaluate_at(0.6);
     let after = graph.world_from_nodes();
     let moved = before.iter().zip(&after).filter(|(a, b)| !a.abs_diff_eq(**b, 1e-3)).count();
     assert_eq!(moved, 2);
@@ -160,35 +164,37 @@ fn a_sphere_has_glass_with_a_volume() {
     let listener = Listener::default();
     let (graph, _) = load_gltf(&path, &listener).unwrap();
     graph.validate();
-    assert!(listener.heard("KHR_materials_clearcoat, KHR_materials_sheen, KHR_materials_specular"));
+    assert!(
+        listener.has_note("KHR_materials_clearcoat, KHR_materials_sheen, KHR_materials_specular")
+    );
     let [material] = &graph.materials[..] else { panic!() };
     assert_eq!((material.transmission, material.ior, material.is_thin), (0.75, 1.55, false));
     assert_eq!((material.metallic, material.attenuation_distance), (0.0, 0.155));
-    // Those of clearcoat, sheen, specular and thickness are not decoded.
+    // Textures of clearcoat, sheen, specular and thickness are not decoded.
     assert_eq!(graph.textures.len(), 3);
     let Geometry::Triangles(mesh) = &graph.geometries[0] else { panic!() };
     assert!(mesh.tangents.is_some() && mesh.uvs[0].is_some() && mesh.normals.is_some());
 }
 
 #[test]
-fn clouds_of_points_are_read_whole() {
+fn point_primitives_become_clouds() {
     let facts = [
         ("gltf/Mesh_PrimitiveMode_00.gltf", 1024, false),
         ("gltf/pumpA_points.glb", 155_201, true),
     ];
     for (name, n_points, has_colors) in facts {
         let Some(path) = shared(name) else { return };
-        let (graph, source) = load_gltf(&path, &Silent).unwrap();
+        let (graph, info) = load_gltf(&path, &NoProgress).unwrap();
         graph.validate();
-        assert_eq!(source.n_points, Some(n_points as u64));
+        assert_eq!(info.n_points, Some(n_points as u64));
         let [Geometry::Points(points)] = &graph.geometries[..] else { panic!() };
-        assert_eq!(points.cloud.len(), n_points);
-        assert_eq!(points.cloud.colors.is_some(), has_colors);
-        // As a cloud the same points, where the scene has them: turned to have Z up.
-        let Loaded { cloud, source } = load(&path, &LoadOptions::default(), &Silent).unwrap();
-        assert_eq!((cloud.len(), source.n_points), (n_points, Some(n_points as u64)));
-        assert_eq!(cloud.colors, points.cloud.colors);
-        let [p, q] = [points.cloud.world_position(7), cloud.world_position(7)];
+        assert_eq!(points.len(), n_points);
+        assert_eq!(points.colors.is_some(), has_colors);
+        // Loaded as a cloud, the same points are rotated to Z up.
+        let Loaded { cloud, info } = load(&path, &LoadOptions::default(), &NoProgress).unwrap();
+        assert_eq!((cloud.len(), info.n_points), (n_points, Some(n_points as u64)));
+        assert_eq!(cloud.colors, points.colors);
+        let [p, q] = [points.world_position(7), cloud.world_position(7)];
         assert!(q.distance(DVec3::new(p.x, -p.z, p.y)) < 1e-5, "{p} {q}");
     }
 }

@@ -1,9 +1,10 @@
-//! Builds small glTF files: JSON and one buffer.
+//! Builder of small glTF files from JSON and one buffer.
 
 use serde_json::{Value, json};
-use surfel::math::{DAffine3, DVec3};
-use surfel::scene::{Geometry, Graph, Mesh};
-use surfel_formats::{Error, Source, load_gltf_bytes};
+use surfel_core::math::{DAffine3, DVec3};
+use surfel_core::points::PointCloud;
+use surfel_core::scene::{Geometry, Graph, Mesh};
+use surfel_formats::{Error, FileInfo, load_gltf_bytes};
 
 use crate::common::Listener;
 
@@ -13,7 +14,7 @@ pub struct Asset {
     pub buffer: Vec<u8>,
 }
 
-/// A number as accessors have it.
+/// A component type of accessors.
 pub trait Component: Copy {
     const CODE: u32;
     fn put(self, bytes: &mut Vec<u8>);
@@ -37,15 +38,15 @@ impl Asset {
         Self { json: json!({"asset": {"version": "2.0"}}), buffer: Vec::new() }
     }
 
-    /// One node that shows one mesh of one primitive with these members.
-    pub fn of_primitive(mut self, primitive: Value) -> Self {
+    /// Adds a scene of one node with one mesh of one primitive.
+    pub fn with_primitive(mut self, primitive: Value) -> Self {
         let mesh = self.push("meshes", json!({"primitives": [primitive]}));
         let node = self.push("nodes", json!({ "mesh": mesh }));
         self.json["scenes"] = json!([{"nodes": [node]}]);
         self
     }
 
-    /// Adds to a list of the whole file; returns the index.
+    /// Appends to a top-level array and returns the index.
     pub fn push(&mut self, list: &str, value: Value) -> usize {
         let root = self.json.as_object_mut().unwrap();
         let list = root.entry(list).or_insert(json!([])).as_array_mut().unwrap();
@@ -53,7 +54,7 @@ impl Asset {
         list.len() - 1
     }
 
-    /// Adds bytes as a view; returns its index.
+    /// Adds a buffer view with these bytes and returns its index.
     pub fn view(&mut self, bytes: &[u8]) -> usize {
         let offset = self.buffer.len().next_multiple_of(4);
         self.buffer.resize(offset, 0);
@@ -62,7 +63,7 @@ impl Asset {
         self.push("bufferViews", view)
     }
 
-    /// Adds numbers as a view and an accessor of type SCALAR, VEC2 and so on; returns its index.
+    /// Adds an accessor of type SCALAR, VEC2 and so on with these numbers and returns its index.
     pub fn numbers<T: Component>(&mut self, kind: &str, numbers: &[T]) -> usize {
         let mut bytes = Vec::new();
         numbers.iter().for_each(|number| number.put(&mut bytes));
@@ -99,12 +100,12 @@ impl Asset {
         load_bytes("asset.glb", &self.glb())
     }
 
-    /// What is read, which has to be whole.
-    pub fn graph(&self) -> Graph {
+    /// Loads the asset, which must be valid.
+    pub fn graph(&self) -> Graph<PointCloud> {
         self.load().unwrap().graph
     }
 
-    /// The mesh of the only primitive.
+    /// Loads the mesh of the only primitive.
     pub fn mesh(&self) -> Mesh {
         match &self.graph().geometries[..] {
             [Geometry::Triangles(mesh)] => mesh.clone(),
@@ -112,7 +113,7 @@ impl Asset {
         }
     }
 
-    /// The message of the error that reading ends with.
+    /// Returns the message of the error on loading.
     pub fn message(&self) -> String {
         match self.load() {
             Ok(_) => panic!("reads, but should not: {}", self.json),
@@ -122,46 +123,46 @@ impl Asset {
 }
 
 pub struct Loaded {
-    pub graph: Graph,
-    pub source: Source,
+    pub graph: Graph<PointCloud>,
+    pub info: FileInfo,
     pub notes: Vec<String>,
 }
 
 impl Loaded {
-    pub fn heard(&self, words: &str) -> bool {
+    pub fn has_note(&self, words: &str) -> bool {
         self.notes.iter().any(|note| note.contains(words))
     }
 }
 
 pub fn load_bytes(name: &str, bytes: &[u8]) -> Result<Loaded, Error> {
     let listener = Listener::default();
-    let (graph, source) = load_gltf_bytes(name, bytes, &listener)?;
+    let (graph, info) = load_gltf_bytes(name, bytes, &listener)?;
     graph.validate();
     let notes = listener.notes.into_inner().unwrap();
-    Ok(Loaded { graph, source, notes })
+    Ok(Loaded { graph, info, notes })
 }
 
-/// Four corners of a square, counter-clockwise.
+/// The corners of a square, counter-clockwise.
 pub const SQUARE: [f32; 12] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0];
 
-/// One triangle of positions alone.
+/// Returns a triangle with positions only.
 pub fn triangle() -> Asset {
     let mut asset = Asset::new();
     let position = asset.numbers("VEC3", &SQUARE[..9]);
-    asset.of_primitive(json!({"attributes": {"POSITION": position}}))
+    asset.with_primitive(json!({"attributes": {"POSITION": position}}))
 }
 
-/// A square with attributes.
+/// Returns a square, to which `more` can add attributes.
 pub fn square(more: impl FnOnce(&mut Asset, &mut Value)) -> Asset {
     let mut asset = Asset::new();
     let position = asset.numbers("VEC3", &SQUARE);
     let indices = asset.numbers("SCALAR", &[0u8, 1, 2, 0, 2, 3]);
     let mut primitive = json!({"attributes": {"POSITION": position}, "indices": indices});
     more(&mut asset, &mut primitive);
-    asset.of_primitive(primitive)
+    asset.with_primitive(primitive)
 }
 
-/// A picture of one red texel.
+/// Returns a PNG image of one red texel.
 pub fn png() -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
@@ -172,8 +173,8 @@ pub fn png() -> Vec<u8> {
     bytes
 }
 
-/// A square bound to two joints, moved by two morph targets.
-pub fn puppet() -> Asset {
+/// Returns a square with two joints and two morph targets.
+pub fn skinned_asset() -> Asset {
     let mut asset = square(|asset, primitive| {
         let joints = [0u8, 1, 0, 200].repeat(4);
         primitive["attributes"]["JOINTS_0"] = asset.numbers("VEC4", &joints).into();
@@ -203,9 +204,9 @@ pub fn puppet() -> Asset {
     asset
 }
 
-/// A triangle that moves in all ways, with splines for its scale.
-pub fn moving() -> Asset {
-    let mut asset = puppet();
+/// Returns an asset with all kinds of channels and interpolations.
+pub fn animated_asset() -> Asset {
+    let mut asset = skinned_asset();
     let times = asset.numbers("SCALAR", &[0.0f32, 0.5, 2.0]);
     let places = asset.numbers("VEC3", &[0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 4.0, 0.0]);
     let turns = asset.numbers("VEC4", &[0i8, 0, 0, 127, 0, 0, 127, 0, 0, 127, 0, 0]);
@@ -230,9 +231,9 @@ pub fn moving() -> Asset {
     asset
 }
 
-/// A file with something of everything.
-pub fn everything() -> Asset {
-    let mut asset = moving();
+/// Returns an asset with every supported feature.
+pub fn full_asset() -> Asset {
+    let mut asset = animated_asset();
     let view = asset.view(&png());
     asset.push("images", json!({"bufferView": view}));
     asset.push("samplers", json!({"wrapS": 33071}));
@@ -262,7 +263,7 @@ pub fn everything() -> Asset {
     asset
 }
 
-/// Puts a value at a pointer, over what is there.
+/// Replaces the value at a JSON pointer.
 pub fn set(json: &mut Value, pointer: &str, value: Value) {
     let (parent, key) = pointer.rsplit_once('/').unwrap();
     let parent = json.pointer_mut(parent).unwrap_or_else(|| panic!("no {pointer}"));

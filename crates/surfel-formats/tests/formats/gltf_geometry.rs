@@ -1,8 +1,8 @@
-//! glTF: meshes and points, whatever their accessors are made of.
+//! glTF meshes and points with all kinds of accessors.
 
 use serde_json::json;
-use surfel::math::{DVec3, Vec2, Vec3, Vec4};
-use surfel::scene::{Geometry, Part};
+use surfel_core::math::{DVec3, Vec2, Vec3, Vec4};
+use surfel_core::scene::{Geometry, Primitive};
 
 use crate::gltf_asset::{Asset, SQUARE, square, triangle};
 
@@ -11,18 +11,18 @@ fn vectors(values: &[f32]) -> Vec<Vec3> {
 }
 
 #[test]
-fn a_triangle_stands_upright_below_the_root() {
+fn the_root_node_rotates_a_triangle_to_z_up() {
     let loaded = triangle().load().unwrap();
-    assert_eq!(loaded.source.format, "glTF 2.0, binary");
-    assert_eq!((loaded.source.n_points, loaded.source.n_triangles), (None, Some(1)));
-    assert_eq!(loaded.source.columns, ["POSITION"]);
+    assert_eq!(loaded.info.format, "glTF 2.0, binary");
+    assert_eq!((loaded.info.n_points, loaded.info.n_triangles), (None, Some(1)));
+    assert_eq!(loaded.info.columns, ["POSITION"]);
     let graph = loaded.graph;
     assert_eq!((&graph.nodes[0].name[..], graph.nodes[0].parent), ("asset", None));
     assert_eq!((&graph.nodes[1].name[..], graph.nodes[1].parent), ("node 0", Some(0)));
     let world_from_node = graph.world_from_nodes()[1];
     assert!(world_from_node.transform_vector3(DVec3::Y).distance(DVec3::Z) < 1e-12);
     assert!(world_from_node.transform_vector3(DVec3::Z).distance(DVec3::NEG_Y) < 1e-12);
-    assert_eq!(graph.nodes[1].parts, [Part { geometry: 0, material: 0 }]);
+    assert_eq!(graph.nodes[1].primitives, [Primitive { geometry: 0, material: 0 }]);
     assert_eq!(graph.materials[0].metallic, 1.0);
     let Geometry::Triangles(mesh) = &graph.geometries[0] else { panic!() };
     assert_eq!((&mesh.positions, &mesh.triangles[..]), (&vectors(&SQUARE[..9]), &[[0, 1, 2]][..]));
@@ -30,7 +30,7 @@ fn a_triangle_stands_upright_below_the_root() {
 }
 
 #[test]
-fn indices_of_each_width_strips_and_fans_make_the_same_square() {
+fn indices_strips_and_fans_become_triangles() {
     let read = |mode: u32, put: &dyn Fn(&mut Asset) -> Option<usize>| {
         let mut asset = Asset::new();
         let position = asset.numbers("VEC3", &SQUARE);
@@ -38,7 +38,7 @@ fn indices_of_each_width_strips_and_fans_make_the_same_square() {
         if let Some(indices) = put(&mut asset) {
             primitive["indices"] = json!(indices);
         }
-        asset.of_primitive(primitive).mesh().triangles
+        asset.with_primitive(primitive).mesh().triangles
     };
     assert_eq!(read(4, &|a| Some(a.numbers("SCALAR", &[0u8, 1, 2]))), [[0, 1, 2]]);
     assert_eq!(read(4, &|a| Some(a.numbers("SCALAR", &[0u16, 1, 2, 3]))), [[0, 1, 2]]);
@@ -49,7 +49,7 @@ fn indices_of_each_width_strips_and_fans_make_the_same_square() {
 }
 
 #[test]
-fn vertices_that_few_triangles_use_are_left_behind() {
+fn unused_vertices_are_dropped() {
     let mut asset = Asset::new();
     let positions: Vec<f32> = (0..300).map(|i| (i * i) as f32).collect();
     let position = asset.numbers("VEC3", &positions);
@@ -57,7 +57,7 @@ fn vertices_that_few_triangles_use_are_left_behind() {
     let color = asset.numbers("VEC4", &colors);
     let indices = asset.numbers("SCALAR", &[90u8, 10, 50]);
     let attributes = json!({"POSITION": position, "COLOR_0": color});
-    let mesh = asset.of_primitive(json!({"attributes": attributes, "indices": indices})).mesh();
+    let mesh = asset.with_primitive(json!({"attributes": attributes, "indices": indices})).mesh();
     assert_eq!(mesh.triangles, [[2, 0, 1]]);
     assert_eq!(mesh.positions[2], Vec3::new(72900.0, 73441.0, 73984.0));
     assert_eq!(mesh.colors.unwrap()[1].x, 50.0 / 255.0);
@@ -82,7 +82,7 @@ fn all_attributes_are_read() {
 }
 
 #[test]
-fn quantised_attributes_are_scaled_as_they_say() {
+fn quantised_attributes_are_normalised_as_declared() {
     let read = |kind: &str, put: &dyn Fn(&mut Asset) -> usize, is_normalized: bool| {
         let mut asset = Asset::new();
         let accessor = put(&mut asset);
@@ -93,7 +93,7 @@ fn quantised_attributes_are_scaled_as_they_say() {
         };
         let attributes = json!({"POSITION": position, kind: accessor});
         asset.json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
-        asset.of_primitive(json!({ "attributes": attributes })).mesh()
+        asset.with_primitive(json!({ "attributes": attributes })).mesh()
     };
     let corners = |a: &mut Asset| a.numbers("VEC3", &[0i8, 0, 0, 127, -128, 0, 0, 127, 64]);
     let mesh = read("POSITION", &corners, true);
@@ -120,21 +120,21 @@ fn quantised_attributes_are_scaled_as_they_say() {
 }
 
 #[test]
-fn strides_and_offsets_are_heeded() {
+fn strides_and_offsets_are_applied() {
     let mut asset = Asset::new();
     let mut bytes = vec![9; 4];
     for corner in SQUARE[..9].as_chunks::<3>().0 {
         corner.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
         bytes.extend([7; 8]);
     }
-    // The last element needs no room behind it.
+    // The stride does not apply after the last element.
     bytes.truncate(bytes.len() - 8);
     let view = asset.view(&bytes);
     asset.json["bufferViews"][view]["byteStride"] = json!(20);
     let accessor = json!({"bufferView": view, "byteOffset": 4, "componentType": 5126,
         "type": "VEC3", "count": 3});
     let position = asset.push("accessors", accessor);
-    let mesh = asset.of_primitive(json!({"attributes": {"POSITION": position}})).mesh();
+    let mesh = asset.with_primitive(json!({"attributes": {"POSITION": position}})).mesh();
     assert_eq!(mesh.positions, vectors(&SQUARE[..9]));
 }
 
@@ -162,7 +162,7 @@ fn sparse_accessors_replace_some_elements() {
 }
 
 #[test]
-fn points_keep_their_colours_and_lines_are_told() {
+fn points_keep_their_colours_and_lines_are_skipped() {
     let mut asset = Asset::new();
     let corners = [&SQUARE[..9], &[f32::NAN, 0.0, 0.0]].concat();
     let position = asset.numbers("VEC3", &corners);
@@ -180,21 +180,20 @@ fn points_keep_their_colours_and_lines_are_told() {
     let [Geometry::Points(whole), Geometry::Points(part)] = &loaded.graph.geometries[..] else {
         panic!("{:?}", loaded.graph.geometries)
     };
-    assert_eq!(whole.cloud.positions, vectors(&SQUARE[..9]));
-    assert_eq!(whole.cloud.normals, Some(vec![Vec3::Y; 3]));
-    // 14047 of 65535 is half as bright as 8 bits can say.
-    let [red, green, blue] = whole.cloud.colors.as_ref().unwrap()[0];
+    assert_eq!(whole.positions, vectors(&SQUARE[..9]));
+    assert_eq!(whole.normals, Some(vec![Vec3::Y; 3]));
+    // 14047 of 65535 is linear 0.214, which is sRGB 128 of 255.
+    let [red, green, blue] = whole.colors.as_ref().unwrap()[0];
     assert_eq!((red, green, (f32::from(blue) / 257.0).round()), (65535, 0, 128.0));
-    assert!(whole.colors.is_empty());
-    assert_eq!(part.cloud.positions, vec![Vec3::new(1.0, 1.0, 0.0), Vec3::ZERO]);
-    assert_eq!(loaded.source.n_points, Some(5));
-    assert!(loaded.heard("lines, which surfel does not draw, are left out (3 times)"));
-    assert!(loaded.heard("1 points that are not finite"));
-    assert_eq!(loaded.graph.nodes[1].parts.len(), 2);
+    assert_eq!(part.positions, vec![Vec3::new(1.0, 1.0, 0.0), Vec3::ZERO]);
+    assert_eq!(loaded.info.n_points, Some(5));
+    assert!(loaded.has_note("lines, which surfel does not draw, are skipped (3 times)"));
+    assert!(loaded.has_note("1 points that are not finite"));
+    assert_eq!(loaded.graph.nodes[1].primitives.len(), 2);
 }
 
 #[test]
-fn geometry_is_held_once() {
+fn equal_primitives_share_one_geometry() {
     let mut asset = triangle();
     let red = asset.push("materials", json!({}));
     asset.json["meshes"][0]["primitives"][0]["material"] = json!(red);
@@ -207,13 +206,13 @@ fn geometry_is_held_once() {
     asset.json["scenes"][0]["nodes"] = json!([0, 1, 2]);
     let graph = asset.graph();
     assert_eq!((graph.geometries.len(), graph.materials.len()), (1, 2));
-    let part = |material| Part { geometry: 0, material };
-    assert_eq!(graph.nodes[2].parts, [part(0)]);
-    assert_eq!(graph.nodes[3].parts, [part(0), part(1)]);
+    let part = |material| Primitive { geometry: 0, material };
+    assert_eq!(graph.nodes[2].primitives, [part(0)]);
+    assert_eq!(graph.nodes[3].primitives, [part(0), part(1)]);
 }
 
 #[test]
-fn wrong_places_in_meshes_are_mended_and_told() {
+fn local_mesh_defects_are_repaired_and_reported() {
     let mut asset = square(|asset, primitive| {
         let normals = [0.0f32, 0.0, 1.0].repeat(3);
         let normals = [&normals[..], &[0.0; 3]].concat();
@@ -226,12 +225,15 @@ fn wrong_places_in_meshes_are_mended_and_told() {
     let mesh = asset.mesh();
     assert_eq!(mesh.normals, Some(vec![Vec3::Z; 4]));
     assert_eq!((mesh.tangents, mesh.uvs, mesh.colors), (None, [None, None], None));
-    for words in ["1 normals without direction", "TANGENT", "TEXCOORD_0", "COLOR_0"] {
-        assert!(loaded.heard(words), "{words}");
+    for words in ["1 normals of length zero", "TANGENT", "TEXCOORD_0", "COLOR_0"] {
+        assert!(loaded.has_note(words), "{words}");
     }
     asset.buffer[12..16].copy_from_slice(&f32::NAN.to_le_bytes());
     assert_eq!(asset.mesh().triangles, [[0, 2, 3]]);
     assert!(
-        asset.load().unwrap().heard("1 triangles with a corner that is not finite or beyond 1e15")
+        asset
+            .load()
+            .unwrap()
+            .has_note("1 triangles with a corner that is not finite or beyond 1e15")
     );
 }

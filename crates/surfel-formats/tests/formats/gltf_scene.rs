@@ -1,13 +1,14 @@
-//! glTF: materials, nodes, cameras, lamps, skins, morph targets, animations.
+//! glTF materials, nodes, cameras, lights, skins, morph targets and animations.
 
 use serde_json::{Value, json};
-use surfel::math::{DAffine3, DQuat, DVec3, Vec2, Vec3};
-use surfel::scene::{
-    AlphaMode, Geometry, Graph, Interpolation, LampKind, Material, Projection, Track, Transform,
-    Wrap,
+use surfel_core::math::{DAffine3, DQuat, DVec3, Vec2, Vec3};
+use surfel_core::points::PointCloud;
+use surfel_core::scene::{
+    AlphaMode, Geometry, Graph, Interpolation, Material, Projection, PunctualLightKind, Track,
+    Transform, Wrap,
 };
 
-use crate::gltf_asset::{Asset, moving, png, puppet, triangle};
+use crate::gltf_asset::{Asset, animated_asset, png, skinned_asset, triangle};
 
 fn material(json: Value) -> Material {
     let mut asset = triangle();
@@ -66,7 +67,7 @@ fn glass_is_thin_unless_it_has_a_volume() {
 }
 
 #[test]
-fn textures_come_with_their_samplers_and_transforms() {
+fn textures_have_samplers_and_transforms() {
     let mut asset = triangle();
     let view = asset.view(&png());
     asset.push("images", json!({"bufferView": view, "mimeType": "image/png"}));
@@ -104,11 +105,11 @@ fn textures_come_with_their_samplers_and_transforms() {
     assert_eq!(textures.normal.unwrap().1, 0.5);
     assert!(textures.transmission.is_some());
     assert_eq!(textures.emissive, None);
-    assert!(loaded.heard("/materials/0/emissiveTexture uses TEXCOORD_2"));
+    assert!(loaded.has_note("/materials/0/emissiveTexture is skipped: it uses TEXCOORD_2"));
 }
 
 #[test]
-fn nodes_have_parts_or_matrices_and_follow_their_parents() {
+fn nodes_have_trs_or_matrix_transforms_and_parents() {
     let mut asset = triangle();
     asset.json["nodes"] = json!([
         {"name": "leaf", "mesh": 0, "translation": [0, 0, 1], "rotation": [0, 0, 2, 0],
@@ -124,7 +125,7 @@ fn nodes_have_parts_or_matrices_and_follow_their_parents() {
     let names: Vec<_> = graph.nodes.iter().map(|node| (&node.name[..], node.parent)).collect();
     let expected = [("asset", None), ("trunk", Some(0)), ("bark", Some(1)), ("leaf", Some(1))];
     assert_eq!(names, expected);
-    let Transform::Parts { translation, rotation, scale } = graph.nodes[3].transform else {
+    let Transform::Trs { translation, rotation, scale } = graph.nodes[3].transform else {
         panic!()
     };
     assert_eq!((translation, scale), (DVec3::Z, DVec3::new(1.0, 2.0, 3.0)));
@@ -138,7 +139,7 @@ fn nodes_have_parts_or_matrices_and_follow_their_parents() {
 }
 
 #[test]
-fn what_is_scaled_to_nothing_is_not_shown_unless_it_grows() {
+fn nodes_scaled_to_zero_are_hidden_unless_animated() {
     let mut asset = triangle();
     asset.json["nodes"] = json!([
         {"name": "gone", "scale": [0, 0, 0], "children": [1]},
@@ -147,11 +148,12 @@ fn what_is_scaled_to_nothing_is_not_shown_unless_it_grows() {
         {"name": "hidden", "mesh": 0, "extensions": {"KHR_node_visibility": {"visible": false}}},
     ]);
     asset.json["scenes"][0]["nodes"] = json!([0, 2, 3]);
-    let is_visible =
-        |graph: &Graph| graph.nodes.iter().map(|node| node.is_visible).collect::<Vec<_>>();
+    let is_visible = |graph: &Graph<PointCloud>| {
+        graph.nodes.iter().map(|node| node.is_visible).collect::<Vec<_>>()
+    };
     let loaded = asset.load().unwrap();
     assert_eq!(is_visible(&loaded.graph), [true, false, false, true, false]);
-    assert!(loaded.heard("scaled to 0: `below`, 1 nodes in all"), "{:?}", loaded.notes);
+    assert!(loaded.has_note("scaled to 0: `below`, 1 nodes in all"), "{:?}", loaded.notes);
     let times = asset.numbers("SCALAR", &[0.0f32, 1.0]);
     let scales = asset.numbers("VEC3", &[0.0f32, 0.0, 0.0, 1.0, 1.0, 1.0]);
     asset.push(
@@ -163,7 +165,7 @@ fn what_is_scaled_to_nothing_is_not_shown_unless_it_grows() {
 }
 
 #[test]
-fn cameras_and_lamps_hang_on_nodes() {
+fn cameras_and_lights_belong_to_nodes() {
     let mut asset = Asset::new();
     asset.json["cameras"] = json!([
         {"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}},
@@ -184,20 +186,26 @@ fn cameras_and_lamps_hang_on_nodes() {
     let Some(Projection::Perspective { view_angle_deg }) = nodes[1].camera else { panic!() };
     assert!((view_angle_deg - 0.5f64.to_degrees()).abs() < 1e-9);
     assert_eq!(nodes[2].camera, Some(Projection::Orthographic { height: 4.0 }));
-    let lamp = |i: usize| nodes[i + 1].lamp.unwrap();
-    assert_eq!((lamp(0).kind, lamp(0).color), (LampKind::Directional, Vec3::new(3.0, 1.5, 0.0)));
-    assert_eq!((lamp(1).kind, lamp(1).color, lamp(1).range), (LampKind::Point, Vec3::ONE, 7.0));
-    assert_eq!((lamp(0).range, lamp(0).radius), (f32::INFINITY, 0.0));
+    let light = |i: usize| nodes[i + 1].light.unwrap();
+    assert_eq!(
+        (light(0).kind, light(0).color),
+        (PunctualLightKind::Directional, Vec3::new(3.0, 1.5, 0.0))
+    );
+    assert_eq!(
+        (light(1).kind, light(1).color, light(1).range),
+        (PunctualLightKind::Point, Vec3::ONE, 7.0)
+    );
+    assert_eq!((light(0).range, light(0).radius), (f32::INFINITY, 0.0));
     let outer_rad = std::f32::consts::FRAC_PI_4;
-    assert_eq!(lamp(2).kind, LampKind::Spot { inner_rad: 0.0, outer_rad });
-    assert_eq!(lamp(3).kind, LampKind::Spot { inner_rad: 0.25, outer_rad: 0.5 });
-    assert_eq!(nodes[5].lamp, None);
-    assert!(loaded.heard("a light of type `area`"));
+    assert_eq!(light(2).kind, PunctualLightKind::Spot { inner_rad: 0.0, outer_rad });
+    assert_eq!(light(3).kind, PunctualLightKind::Spot { inner_rad: 0.25, outer_rad: 0.5 });
+    assert_eq!(nodes[5].light, None);
+    assert!(loaded.has_note("a light of type `area`"));
 }
 
 #[test]
 fn skins_and_morph_targets_are_read() {
-    let mut asset = puppet();
+    let mut asset = skinned_asset();
     let graph = asset.graph();
     let mesh = asset.mesh();
     let skin = mesh.skin.unwrap();
@@ -208,7 +216,7 @@ fn skins_and_morph_targets_are_read() {
     assert_eq!((&tilt.positions, &tilt.normals), (&vec![Vec3::ZERO; 4], &Some(vec![Vec3::X; 4])));
     assert_eq!(graph.nodes[1].morph_weights, [0.25, 0.5]);
     assert_eq!(graph.nodes[4].morph_weights, [1.0, 0.0]);
-    // Without normals or tangents, nothing can be added to them.
+    // Targets lose their normals and tangents if the mesh has none.
     let mut flat = asset.clone();
     let attributes = &mut flat.json["meshes"][0]["primitives"][0]["attributes"];
     attributes.as_object_mut().unwrap().remove("NORMAL");
@@ -221,12 +229,12 @@ fn skins_and_morph_targets_are_read() {
     along.json["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = tangent.into();
     assert_eq!(along.mesh().morphs[0].tangents, None);
     assert_eq!(along.mesh().morphs[1].tangents, Some(vec![0.5 * Vec3::Y; 4]));
-    // Node 2 of the file is the second of the scene, and node 1 is below it.
+    // Node 2 of the file is the second node of the scene, and node 1 is its child.
     let [first, second] = &graph.nodes[1].joints[..] else { panic!() };
     assert_eq!((first.node, second.node), (2, 3));
     assert_eq!(first.joint_from_mesh.translation, DVec3::new(1.0, 2.0, 3.0));
     assert!(graph.nodes[4].joints.is_empty());
-    // A skeleton in no scene comes along, unseen.
+    // A skeleton outside the scene is loaded as invisible.
     asset.json["scenes"] = json!([{"nodes": [0]}]);
     let graph = asset.graph();
     assert_eq!((graph.nodes.len(), graph.nodes[1].joints[0].node), (4, 2));
@@ -236,14 +244,14 @@ fn skins_and_morph_targets_are_read() {
 }
 
 #[test]
-fn points_bend_as_meshes_do() {
-    let mut asset = puppet();
+fn points_deform_like_meshes() {
+    let mut asset = skinned_asset();
     let indices = asset.numbers("SCALAR", &[3u8, 1]);
     let primitive = &mut asset.json["meshes"][0]["primitives"][0];
     (primitive["mode"], primitive["indices"]) = (json!(0), json!(indices));
     let loaded = asset.load().unwrap();
     let [Geometry::Points(points)] = &loaded.graph.geometries[..] else { panic!() };
-    let cloud = &points.cloud;
+    let cloud = points;
     assert_eq!(cloud.positions, [Vec3::Y, Vec3::X]);
     let skin = cloud.skin.as_ref().unwrap();
     assert_eq!((skin.joints.len(), skin.weights[1]), (2, [0.2, 0.8, 0.0, 0.0]));
@@ -251,19 +259,19 @@ fn points_bend_as_meshes_do() {
     assert_eq!(cloud.morphs[1].normals, Some(vec![Vec3::X; 2]));
     assert_eq!(loaded.graph.nodes[1].morph_weights, [0.25, 0.5]);
     assert_eq!(loaded.graph.nodes[1].joints.len(), 2);
-    // A point that a target takes nowhere is left out with all that it has.
+    // A point whose target is not finite is dropped from all columns.
     let lost = asset.numbers("VEC3", &[[0.0; 3], [f32::NAN; 3], [0.0; 3], [2.0; 3]].concat());
     asset.json["meshes"][0]["primitives"][0]["targets"][1] = json!({ "POSITION": lost });
     let loaded = asset.load().unwrap();
     let [Geometry::Points(points)] = &loaded.graph.geometries[..] else { panic!() };
-    assert_eq!(points.cloud.positions, [Vec3::Y]);
-    assert_eq!(points.cloud.morphs[1].positions, [Vec3::splat(2.0)]);
-    assert!(loaded.heard("1 points that are not finite"));
+    assert_eq!(points.positions, [Vec3::Y]);
+    assert_eq!(points.morphs[1].positions, [Vec3::splat(2.0)]);
+    assert!(loaded.has_note("1 points that are not finite"));
 }
 
 #[test]
-fn the_first_animation_is_read_and_the_others_told() {
-    let loaded = moving().load().unwrap();
+fn the_first_animation_is_read_and_the_others_are_listed() {
+    let loaded = animated_asset().load().unwrap();
     let channels = &loaded.graph.animation.channels;
     assert_eq!(channels.len(), 4);
     assert!(channels.iter().all(|channel| channel.node == 4));
@@ -279,8 +287,8 @@ fn the_first_animation_is_read_and_the_others_told() {
     assert_eq!((sizes.interpolation, sizes.values.len()), (Interpolation::Cubic, 9));
     let Track::MorphWeights(weights) = &channels[3].track else { panic!() };
     assert_eq!(weights.values, [[0.0, 1.0], [0.2, 0.0], [0.0, 0.0]]);
-    assert!(loaded.heard("the first of 2 animations plays; they are `walk`, `run`"));
-    assert!(loaded.heard("an animation of morph weights of a node without any"));
+    assert!(loaded.has_note("the first of 2 animations plays; the file has `walk`, `run`"));
+    assert!(loaded.has_note("an animation of morph weights is skipped"));
 }
 
 #[test]
@@ -294,9 +302,12 @@ fn instances_become_nodes() {
         json!({"EXT_mesh_gpu_instancing": {"attributes": attributes}});
     let graph = asset.graph();
     let [_, bush, _, second] = &graph.nodes[..] else { panic!() };
-    assert!(bush.parts.is_empty());
-    assert_eq!((second.parent, second.parts.len(), &second.name[..]), (Some(1), 1, "node 0 1"));
-    let Transform::Parts { translation, rotation, scale } = second.transform else { panic!() };
+    assert!(bush.primitives.is_empty());
+    assert_eq!(
+        (second.parent, second.primitives.len(), &second.name[..]),
+        (Some(1), 1, "node 0 1")
+    );
+    let Transform::Trs { translation, rotation, scale } = second.transform else { panic!() };
     assert_eq!((translation, scale), (DVec3::new(1.0, 2.0, 3.0), DVec3::ONE));
     assert_eq!(rotation, DQuat::from_xyzw(0.0, 1.0, 0.0, 0.0));
 }

@@ -1,13 +1,14 @@
-//! Meshes of every format as triangles: small files by hand, and real ones against each other.
+//! Triangle meshes in PLY, OBJ and STL: small handmade files and real ones compared across formats.
 
-use surfel::math::{DVec3, Vec2, Vec3, Vec4};
-use surfel::progress::Silent;
-use surfel::scene::{Geometry, Graph, Material, Mesh};
-use surfel_formats::{LoadOptions, Source, inspect, load, load_graph};
+use surfel_core::math::{DVec3, Vec2, Vec3, Vec4};
+use surfel_core::points::PointCloud;
+use surfel_core::progress::NoProgress;
+use surfel_core::scene::{Geometry, Graph, Material, Mesh};
+use surfel_formats::{FileInfo, LoadOptions, inspect, load, load_graph};
 
 use crate::common::{Folder, read, read_graph, read_mesh, shared};
 
-/// An ascii PLY file of four vertices, the corners of a square, with more lines in its header and body.
+/// Returns an ASCII PLY file with the corners of a square and additional header and body lines.
 fn ply(faces: &str, body: &str) -> String {
     format!(
         "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
@@ -15,7 +16,7 @@ fn ply(faces: &str, body: &str) -> String {
     )
 }
 
-/// Area of all triangles.
+/// Returns the total area of the triangles.
 fn area(mesh: &Mesh) -> f64 {
     let areas = (0..mesh.triangles.len()).map(|i| {
         let [a, b, c] = mesh.corners(i).map(Vec3::as_dvec3);
@@ -25,7 +26,7 @@ fn area(mesh: &Mesh) -> f64 {
 }
 
 #[test]
-fn polygons_become_fans() {
+fn polygons_become_triangle_fans() {
     let list = "element face 3\nproperty list uchar int vertex_indices\n";
     let mesh = read_mesh("a.ply", ply(list, "4 0 1 2 3\n3 0 1 2\n3 2 3 0\n"));
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 2], [2, 3, 0]]);
@@ -36,14 +37,14 @@ fn polygons_become_fans() {
 }
 
 #[test]
-fn strips_turn_every_other_triangle() {
+fn strips_flip_every_other_triangle() {
     let list = "element tristrips 2\nproperty list int int vertex_indices\n";
     let mesh = read_mesh("a.ply", ply(list, "8 0 1 3 2 -1 0 1 2\n2 0 1\n"));
     assert_eq!(mesh.triangles, [[0, 1, 3], [3, 1, 2], [0, 1, 2]]);
 }
 
 #[test]
-fn faces_stand_anywhere_between_other_elements_in_all_encodings() {
+fn ply_faces_may_come_anywhere_among_other_elements() {
     let header = |encoding: &str, order: [&str; 4]| {
         format!("ply\nformat {encoding} 1.0\n{}end_header\n", order.concat())
     };
@@ -95,10 +96,10 @@ fn faces_stand_anywhere_between_other_elements_in_all_encodings() {
             let body = order.map(|i| parts[i].clone()).concat();
             let header = header(encoding, order.map(|i| headers[i]));
             let file = [header.as_bytes(), &body].concat();
-            let (_, source, listener) = read_graph("a.ply", &file).unwrap();
-            assert_eq!((source.n_points, source.n_triangles), (Some(3), Some(2)), "{encoding}");
-            assert!(source.format.ends_with(", mesh"), "{}", source.format);
-            assert!(listener.heard("1 without an area"));
+            let (_, info, listener) = read_graph("a.ply", &file).unwrap();
+            assert_eq!((info.n_points, info.n_triangles), (Some(3), Some(2)), "{encoding}");
+            assert!(info.format.ends_with(", mesh"), "{}", info.format);
+            assert!(listener.has_note("1 without an area"));
             meshes.push(read_mesh("a.ply", &file));
         }
     }
@@ -109,7 +110,7 @@ fn faces_stand_anywhere_between_other_elements_in_all_encodings() {
 }
 
 #[test]
-fn vertices_of_ply_have_normals_colours_and_texture_coordinates() {
+fn ply_vertices_have_normals_colours_and_texture_coordinates() {
     let file = |color: &str, uv: [&str; 2], values: [&str; 3]| {
         format!(
             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
@@ -145,7 +146,7 @@ fn vertices_of_ply_have_normals_colours_and_texture_coordinates() {
 }
 
 #[test]
-fn corners_of_obj_with_the_same_numbers_are_one_vertex() {
+fn obj_corners_with_equal_indices_share_a_vertex() {
     let obj = "mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 9 9 9\nvt 0 0\nvt 1 0.25\n\
         vn 0 0 2\nvn 0 1 0\ng a\nf 1/1/1 2/2/1 3/1/1\ns 1\nf 1/1/1 3/1/1 -2//2\n";
     let mesh = read_mesh("a.obj", obj);
@@ -158,7 +159,7 @@ fn corners_of_obj_with_the_same_numbers_are_one_vertex() {
 }
 
 #[test]
-fn lines_of_obj_may_go_on_and_have_comments_and_colours() {
+fn obj_lines_may_have_continuations_comments_and_colours() {
     let obj = "# c\r\nv 0 0 0 1 0 0\r\nv 1 0 0 1 0.5 0 1\r\n  v 0 1 0 # none\r\nf 1 2 \\\r\n 3 # c\r\nl 1 2\r\n";
     let mesh = read_mesh("a.obj", obj);
     assert_eq!(mesh.triangles, [[0, 1, 2]]);
@@ -169,7 +170,7 @@ fn lines_of_obj_may_go_on_and_have_comments_and_colours() {
 }
 
 #[test]
-fn lines_of_obj_go_on_wherever_the_file_is_cut_for_threads() {
+fn obj_continuations_may_cross_parallel_chunks() {
     let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n#";
     let face = "f 1 \\\r\n\\\n2 3\r\n";
     for shift in 0..face.len() {
@@ -178,7 +179,7 @@ fn lines_of_obj_go_on_wherever_the_file_is_cut_for_threads() {
     }
 }
 
-/// A tetrahedron as one format after the other has it.
+/// Returns a tetrahedron in every variant of STL.
 fn stl_files() -> [(&'static str, Vec<u8>); 4] {
     let corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
     let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
@@ -214,12 +215,12 @@ fn stl_files() -> [(&'static str, Vec<u8>); 4] {
 }
 
 #[test]
-fn stl_is_told_by_its_length_and_its_corners_are_merged() {
+fn stl_encoding_is_detected_by_length_and_vertices_are_welded() {
     for (kind, file) in stl_files() {
-        let (_, source, _) = read_graph("a.stl", &file).unwrap();
+        let (_, info, _) = read_graph("a.stl", &file).unwrap();
         let encoding = if kind.contains("binary") { "STL, binary" } else { "STL, ascii" };
-        assert_eq!(source.format, encoding, "{kind}");
-        assert_eq!((source.n_points, source.n_triangles), (Some(4), Some(4)), "{kind}");
+        assert_eq!(info.format, encoding, "{kind}");
+        assert_eq!((info.n_points, info.n_triangles), (Some(4), Some(4)), "{kind}");
         let mesh = read_mesh("a.stl", &file);
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [2, 1, 3], [1, 0, 3]], "{kind}");
         assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::Y, Vec3::X, Vec3::Z], "{kind}");
@@ -230,7 +231,7 @@ fn stl_is_told_by_its_length_and_its_corners_are_merged() {
 }
 
 #[test]
-fn far_coordinates_keep_their_digits() {
+fn large_coordinates_keep_their_precision() {
     let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\n\
         property double z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n\
         500000.001 4900000.002 1\n500001.001 4900000.002 1\n500000.001 4900001.002 1\n3 0 1 2\n";
@@ -246,59 +247,62 @@ fn far_coordinates_keep_their_digits() {
 }
 
 #[test]
-fn clouds_become_points_under_a_node() {
+fn point_clouds_become_one_node() {
     let cloud = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
         property float z\nelement face 0\nproperty list uchar int vertex_index\nend_header\n1 2 3\n";
     for (name, file) in [("b.ply", cloud), ("b.obj", "v 1 2 3\n"), ("b.xyz", "1 2 3\n")] {
-        let (graph, source, _) = read_graph(name, file).unwrap();
+        let (graph, info, _) = read_graph(name, file).unwrap();
         let Geometry::Points(points) = &graph.geometries[0] else { panic!("{name}") };
-        assert_eq!(points.cloud.positions, [Vec3::new(1.0, 2.0, 3.0)]);
-        assert!(points.colors.is_empty());
+        assert_eq!(points.positions, [Vec3::new(1.0, 2.0, 3.0)]);
         assert_eq!(graph.materials, [Material::MATTE]);
-        assert_eq!((graph.nodes[0].name.as_str(), graph.nodes[0].parts.len()), ("b", 1));
-        assert_eq!(source.n_triangles, None, "{name}");
+        assert_eq!((graph.nodes[0].name.as_str(), graph.nodes[0].primitives.len()), ("b", 1));
+        assert_eq!(info.n_triangles, None, "{name}");
     }
 }
 
 #[test]
-fn what_no_ray_can_hit_is_dropped_and_told() {
+fn degenerate_triangles_are_dropped_and_reported() {
     let faces = "element face 6\nproperty list uchar int vertex_indices\n";
     let body = "3 0 1 2\n3 0 1 1\n2 0 1\n0\n1 3\n3 0 0 2\n";
-    let (graph, source, listener) = read_graph("a.ply", ply(faces, body)).unwrap();
-    assert_eq!(source.n_triangles, Some(1));
-    assert!(listener.heard("a.ply: triangles dropped: 2 without an area, 3 of fewer than three"));
+    let (graph, info, listener) = read_graph("a.ply", ply(faces, body)).unwrap();
+    assert_eq!(info.n_triangles, Some(1));
+    assert!(
+        listener.has_note("a.ply: triangles dropped: 2 without an area, 3 of fewer than three")
+    );
     assert_eq!(graph.geometries.len(), 1);
-    let (_, source, listener) =
+    let (_, info, listener) =
         read_graph("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nv 2 0 0\nf 1 2 3 4\nf 1 2 5\n")
             .unwrap();
-    assert_eq!(source.n_triangles, Some(1));
-    assert!(listener.heard("1 without an area, 1 with a corner that is not finite or beyond 1e15"));
+    assert_eq!(info.n_triangles, Some(1));
+    assert!(
+        listener.has_note("1 without an area, 1 with a corner that is not finite or beyond 1e15")
+    );
 }
 
 #[test]
-fn normals_without_a_direction_are_made_anew() {
+fn normals_of_length_zero_are_recomputed() {
     let file = |normals: [&str; 3]| {
         let [a, b, c] = normals;
         format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn {a}\nvn {b}\nvn {c}\nf 1//1 2//2 3//3\n")
     };
     let (_, _, listener) = read_graph("a.obj", file(["0 1 0", "0 0 0", "nan 0 0"])).unwrap();
-    assert!(listener.heard("2 normals without a direction made anew"));
+    assert!(listener.has_note("2 normals without a direction replaced"));
     let mesh = read_mesh("a.obj", file(["0 1e30 0", "0 0 0", "nan 0 0"]));
     assert_eq!(mesh.normals, Some(vec![Vec3::Y, Vec3::Z, Vec3::Z]));
     assert_eq!(read_mesh("a.obj", file(["0 0 0"; 3])).normals, None);
 }
 
 #[test]
-fn points_are_read_of_meshes_as_before() {
+fn meshes_can_be_read_as_point_clouds() {
     let faces = "element face 1\nproperty list uchar int vertex_indices\n";
     let loaded = read("a.ply", ply(faces, "4 0 1 2 3\n")).unwrap();
     assert_eq!(loaded.cloud.len(), 4);
-    assert_eq!(loaded.source.n_triangles, Some(1));
+    assert_eq!(loaded.info.n_triangles, Some(1));
     assert_eq!(read("a.obj", "v 0 0 0\nv 1 0 0\nf 1 2 1\n").unwrap().cloud.len(), 2);
 }
 
 #[test]
-fn files_say_how_many_triangles_they_have() {
+fn inspect_reports_triangle_counts() {
     let folder = Folder::new("inspect-meshes");
     let faces = "element face 1\nproperty list uchar int vertex_indices\n";
     let [(_, ascii), _, (_, binary), _] = stl_files();
@@ -309,17 +313,17 @@ fn files_say_how_many_triangles_they_have() {
     ];
     for (name, bytes, format, n_triangles) in files {
         std::fs::write(folder.path(name), bytes).unwrap();
-        let source = inspect(&folder.path(name)).unwrap();
-        assert_eq!((source.format.as_str(), source.n_triangles), (format, n_triangles));
+        let info = inspect(&folder.path(name)).unwrap();
+        assert_eq!((info.format.as_str(), info.n_triangles), (format, n_triangles));
     }
 }
 
-fn load_shared(name: &str) -> Option<(Graph, Source)> {
+fn load_shared(name: &str) -> Option<(Graph<PointCloud>, FileInfo)> {
     let path = shared(&format!("meshes/{name}"))?;
-    Some(load_graph(&path, &LoadOptions::default(), &Silent).unwrap())
+    Some(load_graph(&path, &LoadOptions::default(), &NoProgress).unwrap())
 }
 
-fn only_mesh(graph: &Graph) -> &Mesh {
+fn only_mesh(graph: &Graph<PointCloud>) -> &Mesh {
     match graph.geometries.as_slice() {
         [Geometry::Triangles(mesh)] => mesh,
         other => panic!("{} geometries", other.len()),
@@ -330,9 +334,9 @@ fn only_mesh(graph: &Graph) -> &Mesh {
 fn the_bunny_is_the_same_in_every_format() {
     let mut areas = Vec::new();
     for name in ["bun_zipper.ply", "stanford-bunny.obj", "bunny.stl"] {
-        let Some((graph, source)) = load_shared(name) else { return };
+        let Some((graph, info)) = load_shared(name) else { return };
         let mesh = only_mesh(&graph);
-        assert_eq!((mesh.triangles.len(), source.n_triangles), (69_451, Some(69_451)), "{name}");
+        assert_eq!((mesh.triangles.len(), info.n_triangles), (69_451, Some(69_451)), "{name}");
         areas.push(area(mesh));
         assert_eq!(format!("{name} 1"), format!("{name} {}", graph.nodes.len()));
         let used = 35_947 - 1_113;
@@ -344,11 +348,11 @@ fn the_bunny_is_the_same_in_every_format() {
 
 #[test]
 fn the_armadillo_is_closed() {
-    let Some((graph, source)) = load_shared("armadillo_26k.ply") else { return };
+    let Some((graph, info)) = load_shared("armadillo_26k.ply") else { return };
     let mesh = only_mesh(&graph);
-    assert_eq!((source.n_points, source.n_triangles), (Some(26_002), Some(52_000)));
-    assert_eq!(source.format, "PLY, binary little endian, mesh");
-    // Every edge is there once in each direction.
+    assert_eq!((info.n_points, info.n_triangles), (Some(26_002), Some(52_000)));
+    assert_eq!(info.format, "PLY, binary little endian, mesh");
+    // Every edge occurs once in each direction.
     let edges = |flip: bool| {
         let sides = mesh.triangles.iter().flat_map(|[a, b, c]| [(*a, *b), (*b, *c), (*c, *a)]);
         let mut sides: Vec<_> = sides.map(|(a, b)| if flip { (b, a) } else { (a, b) }).collect();
@@ -357,5 +361,5 @@ fn the_armadillo_is_closed() {
     };
     assert_eq!(edges(false), edges(true));
     let path = shared("meshes/armadillo_26k.ply").unwrap();
-    assert_eq!(load(&path, &LoadOptions::default(), &Silent).unwrap().cloud.len(), 26_002);
+    assert_eq!(load(&path, &LoadOptions::default(), &NoProgress).unwrap().cloud.len(), 26_002);
 }

@@ -1,19 +1,19 @@
-//! Movies, read back by the crates of their formats and by ffmpeg, after runs whole and interrupted.
+//! Movies from complete and interrupted runs, read back by format crates and by ffmpeg.
 
 use std::fs;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use surfel::image::{Image, decode_srgb};
-use surfel::progress::Silent;
+use surfel_core::image::{Image, decode_srgb};
+use surfel_core::progress::NoProgress;
 use surfel_formats::{
-    Alpha, BitDepth, Error, ImageOptions, Movie, MovieFormat, MovieOptions, check_movie, save_image,
+    Alpha, BitDepth, Error, ImageOptions, Movie, MovieOptions, check_movie, save_image,
 };
 
 use crate::common::{Folder, Listener};
 
-/// Eight-bit sRGB of a pixel: smooth, of more than 256 colours, another in each frame.
+/// Returns the 8-bit sRGB colour of a pixel: a smooth gradient of more than 256 colours that changes per frame.
 fn color_at(frame: u32, x: u32, y: u32) -> [u8; 3] {
     [(40 + x) as u8, (60 + y * 2) as u8, (30 + frame * 40) as u8]
 }
@@ -36,27 +36,27 @@ fn options() -> MovieOptions {
         fps: 30.0,
         n_frames: 5,
         image: ImageOptions::default(),
-        fingerprint: "a church\nonce around".into(),
+        fingerprint: "church\nturntable".into(),
     }
 }
 
-/// Adds the frames that are missing, at most so many, and tells which.
-fn add_missing(movie: &mut Movie, options: &MovieOptions, most: usize) -> Vec<u32> {
-    let missing = (0..options.n_frames).filter(|&frame| !movie.has(frame));
-    let missing: Vec<u32> = missing.take(most).collect();
+/// Adds at most `max` missing frames and returns their indices.
+fn add_missing(movie: &mut Movie, options: &MovieOptions, max: usize) -> Vec<u32> {
+    let missing = (0..options.n_frames).filter(|&frame| !movie.has_frame(frame));
+    let missing: Vec<u32> = missing.take(max).collect();
     for &frame in &missing {
-        movie.add(frame, &picture(options, frame)).unwrap();
+        movie.add_frame(frame, &picture(options, frame)).unwrap();
     }
     missing
 }
 
-fn make(path: &Path, options: &MovieOptions) {
+fn write_movie(path: &Path, options: &MovieOptions) {
     let mut movie = Movie::open(path, options, false).unwrap();
     add_missing(&mut movie, options, usize::MAX);
-    movie.finish(&Silent).unwrap();
+    movie.finish(&NoProgress).unwrap();
 }
 
-/// Without the program a line is printed, and the test has nothing to do.
+/// Returns true if ffmpeg is installed; otherwise prints that the test is skipped.
 fn has_ffmpeg() -> bool {
     let found = Command::new("ffmpeg").arg("-version").stdout(Stdio::null()).status().is_ok();
     if !found {
@@ -75,7 +75,7 @@ fn bytes_of(folder: &Folder) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
-fn an_animated_png_has_every_frame_without_loss() {
+fn animated_png_is_lossless() {
     let folder = Folder::new("apng");
     for (depth, alpha, fps, delay) in [
         (BitDepth::Eight, Alpha::Keep, 30.0, (1, 30)),
@@ -85,7 +85,7 @@ fn an_animated_png_has_every_frame_without_loss() {
         let path = folder.path("film.png");
         let image = ImageOptions { depth, alpha, ..Default::default() };
         let options = MovieOptions { image, fps, ..options() };
-        make(&path, &options);
+        write_movie(&path, &options);
 
         let decoder = png::Decoder::new(BufReader::new(fs::File::open(&path).unwrap()));
         let mut reader = decoder.read_info().unwrap();
@@ -102,7 +102,7 @@ fn an_animated_png_has_every_frame_without_loss() {
     assert_eq!(folder.names().len(), 2);
 }
 
-/// The samples of a frame as a picture of its own.
+/// Returns the samples of a frame that is saved as a single image.
 fn still_samples(path: &Path, options: &MovieOptions, frame: u32) -> Vec<u8> {
     save_image(path, &picture(options, frame), &options.image).unwrap();
     let mut reader =
@@ -113,11 +113,11 @@ fn still_samples(path: &Path, options: &MovieOptions, frame: u32) -> Vec<u8> {
 }
 
 #[test]
-fn a_gif_has_every_frame_at_its_time_and_nearly_its_colors() {
+fn gif_frames_have_accurate_times_and_colours() {
     let folder = Folder::new("gif");
     let path = folder.path("film.GIF");
     let options = MovieOptions { width: 128, height: 96, n_frames: 6, ..options() };
-    make(&path, &options);
+    write_movie(&path, &options);
 
     let mut decoding = gif::DecodeOptions::new();
     decoding.set_color_output(gif::ColorOutput::RGBA);
@@ -136,21 +136,21 @@ fn a_gif_has_every_frame_at_its_time_and_nearly_its_colors() {
         }
         delays.push(frame.delay);
     }
-    // Some ten thousand colours share 256 places.
+    // About ten thousand colours share a palette of 256.
     let mean = sum as f64 / (delays.len() * 128 * 96 * 3) as f64;
     assert!(mean < 4.0, "{mean}");
-    // Six thirtieths are a fifth of a second, though a thirtieth is no whole number of hundredths.
+    // The delays sum to exactly 0.2 s, although 1/30 s is not a multiple of 0.01 s.
     assert_eq!(delays, [3, 4, 3, 3, 4, 3]);
     assert_eq!(decoder.repeat(), gif::Repeat::Infinite);
     assert_eq!(folder.names(), ["film.GIF"]);
 }
 
 #[test]
-fn numbered_pictures_have_as_many_digits_as_the_name_has_signs() {
+fn frame_numbers_have_as_many_digits_as_the_pattern() {
     let folder = Folder::new("numbered");
     let options = MovieOptions { n_frames: 11, ..options() };
-    make(&folder.path("shot#2_###.png"), &options);
-    make(&folder.path("#.exr"), &options);
+    write_movie(&folder.path("shot#2_###.png"), &options);
+    write_movie(&folder.path("#.exr"), &options);
     let mut expected: Vec<String> = (1..=11).map(|i| format!("shot#2_{i:03}.png")).collect();
     expected.extend((1..=11).map(|i| format!("{i}.exr")));
     expected.sort();
@@ -163,22 +163,22 @@ fn numbered_pictures_have_as_many_digits_as_the_name_has_signs() {
 }
 
 #[test]
-fn a_resumed_run_ends_with_the_same_bytes() {
-    resumed_is_whole(&["film.png", "film.gif", "frame_####.png", "frame_##.exr"]);
+fn a_resumed_run_gives_the_same_bytes() {
+    check_resumed_movies(&["film.png", "film.gif", "frame_####.png", "frame_##.exr"]);
 }
 
 #[test]
-fn a_resumed_video_ends_with_the_same_bytes() {
+fn a_resumed_video_gives_the_same_bytes() {
     if has_ffmpeg() {
-        resumed_is_whole(&["film.mp4", "film.mov", "film.mkv", "film.webm", "film.avi"]);
+        check_resumed_movies(&["film.mp4", "film.mov", "film.mkv", "film.webm", "film.avi"]);
     }
 }
 
-fn resumed_is_whole(names: &[&str]) {
+fn check_resumed_movies(names: &[&str]) {
     for name in names {
         let (whole, resumed) = (Folder::new(&format!("whole-{name}")), Folder::new(name));
         let options = options();
-        make(&whole.path(name), &options);
+        write_movie(&whole.path(name), &options);
 
         let path = resumed.path(name);
         let mut movie = Movie::open(&path, &options, true).unwrap();
@@ -186,18 +186,18 @@ fn resumed_is_whole(names: &[&str]) {
         drop(movie);
         let mut movie = Movie::open(&path, &options, true).unwrap();
         assert_eq!(movie.n_done(), 2);
-        movie.add(4, &picture(&options, 4)).unwrap();
-        let error = movie.finish(&Silent).unwrap_err().to_string();
+        movie.add_frame(4, &picture(&options, 4)).unwrap();
+        let error = movie.finish(&NoProgress).unwrap_err().to_string();
         assert!(error.contains("3 of 5 frames"), "{error}");
         let mut movie = Movie::open(&path, &options, true).unwrap();
         assert_eq!(add_missing(&mut movie, &options, 9), [2, 3]);
-        movie.finish(&Silent).unwrap();
+        movie.finish(&NoProgress).unwrap();
         assert_eq!(bytes_of(&resumed), bytes_of(&whole), "{name}");
     }
 }
 
 #[test]
-fn frames_of_other_settings_are_not_mixed_in() {
+fn frames_with_other_settings_are_not_reused() {
     for name in ["film.gif", "frame_####.png"] {
         let folder = Folder::new(&format!("settings-{name}"));
         let (path, first) = (folder.path(name), options());
@@ -205,17 +205,17 @@ fn frames_of_other_settings_are_not_mixed_in() {
         add_missing(&mut movie, &first, 2);
         drop(movie);
 
-        let (other, larger) = ("another church".into(), 64);
+        let (other, larger) = ("other church".into(), 64);
         for changed in [
             MovieOptions { fingerprint: other, ..options() },
             MovieOptions { width: larger, ..options() },
             MovieOptions { n_frames: 6, ..options() },
         ] {
-            let Err(error) = Movie::open(&path, &changed, true) else { panic!("{name}: mixed") };
-            assert!(matches!(error, Error::OtherSettings { .. }), "{error}");
+            let Err(error) = Movie::open(&path, &changed, true) else { panic!("{name}: reused") };
+            assert!(matches!(error, Error::ResumeMismatch { .. }), "{error}");
             assert!(error.to_string().contains("without --resume"), "{error}");
         }
-        // The refusals cost nothing; the film's speed is not a matter of its frames.
+        // The rejected attempts keep the frames, and the frame rate does not affect frames.
         let faster = MovieOptions { fps: 50.0, ..options() };
         assert_eq!(Movie::open(&path, &faster, true).unwrap().n_done(), 2);
         assert_eq!(Movie::open(&path, &first, false).unwrap().n_done(), 0);
@@ -224,25 +224,25 @@ fn frames_of_other_settings_are_not_mixed_in() {
 }
 
 #[test]
-fn pictures_of_an_older_movie_are_not_taken_for_done() {
+fn images_of_an_older_movie_do_not_count_as_done() {
     let folder = Folder::new("stale");
     let (path, older) = (folder.path("frame_##.png"), options());
-    make(&path, &older);
+    write_movie(&path, &older);
     let newer = MovieOptions { fingerprint: "later".into(), ..options() };
     let mut movie = Movie::open(&path, &newer, false).unwrap();
     add_missing(&mut movie, &newer, 1);
     drop(movie);
     assert_eq!(folder.names().len(), 6);
     let movie = Movie::open(&path, &newer, true).unwrap();
-    assert!(movie.has(0) && !movie.has(1));
+    assert!(movie.has_frame(0) && !movie.has_frame(1));
     drop(movie);
-    // Nor is one that was removed since.
+    // A frame whose image was removed does not count either.
     fs::remove_file(folder.path("frame_01.png")).unwrap();
     assert_eq!(Movie::open(&path, &newer, true).unwrap().n_done(), 0);
 }
 
 #[test]
-fn a_line_that_was_cut_short_counts_no_frame() {
+fn a_truncated_log_line_does_not_count() {
     let folder = Folder::new("torn");
     let (path, options) = (folder.path("film.gif"), options());
     let mut movie = Movie::open(&path, &options, false).unwrap();
@@ -255,13 +255,13 @@ fn a_line_that_was_cut_short_counts_no_frame() {
         fs::write(&note, format!("{settings}\n{frames}")).unwrap();
         let movie = Movie::open(&path, &options, true).unwrap();
         assert_eq!(movie.n_done(), n_done);
-        // Keeps the frames in spite of the last, empty note.
+        // Without `drop`, the files survive the empty log of the last case.
         std::mem::forget(movie);
     }
 }
 
 #[test]
-fn a_movie_without_frames_leaves_nothing() {
+fn a_movie_without_frames_leaves_no_files() {
     for name in ["film.png", "frame_####.exr"] {
         let folder = Folder::new(&format!("nothing-{name}"));
         drop(Movie::open(&folder.path(name), &options(), false).unwrap());
@@ -270,14 +270,14 @@ fn a_movie_without_frames_leaves_nothing() {
 }
 
 #[test]
-fn files_of_others_stay_where_they_are() {
+fn foreign_files_are_never_removed() {
     let folder = Folder::new("foreign");
     let (path, options) = (folder.path("film.gif"), options());
     let frames = folder.path("film.gif.frames");
     let refused = || match Movie::open(&path, &options, false) {
-        Err(Error::Frames { found, .. }) => found,
+        Err(Error::InvalidFrames { found, .. }) => found,
         Err(other) => panic!("{other}"),
-        Ok(_) => panic!("took what is not its own"),
+        Ok(_) => panic!("accepted a foreign folder"),
     };
     fs::write(&frames, "a file").unwrap();
     assert_eq!(refused(), "a file");
@@ -290,14 +290,14 @@ fn files_of_others_stay_where_they_are() {
     let mut movie = Movie::open(&path, &options, false).unwrap();
     fs::write(frames.join("remarks.txt"), "mine").unwrap();
     add_missing(&mut movie, &options, 9);
-    movie.finish(&Silent).unwrap();
+    movie.finish(&NoProgress).unwrap();
     let left: Vec<PathBuf> =
         fs::read_dir(&frames).unwrap().map(|entry| entry.unwrap().path()).collect();
     assert_eq!(left, [frames.join("remarks.txt")]);
 }
 
 #[test]
-fn a_broken_frame_is_named_and_can_be_made_again() {
+fn a_malformed_frame_is_reported_and_can_be_rendered_again() {
     for name in ["film.gif", "film.png"] {
         let folder = Folder::new(&format!("broken-{name}"));
         let (path, options) = (folder.path(name), options());
@@ -307,25 +307,25 @@ fn a_broken_frame_is_named_and_can_be_made_again() {
         save_image(&small, &Image::new(3, 3), &options.image).unwrap();
         let small_bytes = fs::read(&small).unwrap();
         fs::remove_file(&small).unwrap();
-        // Cut short, empty, of another size.
+        // Truncated, empty, and of another size.
         for bytes in [&small_bytes[..small_bytes.len() / 2], &[], &small_bytes] {
             let mut movie = Movie::open(&path, &options, true).unwrap();
             add_missing(&mut movie, &options, 9);
             fs::write(&broken, bytes).unwrap();
-            let error = movie.finish(&Silent).unwrap_err().to_string();
+            let error = movie.finish(&NoProgress).unwrap_err().to_string();
             assert!(error.contains("000003.png: found"), "{error}");
             assert_eq!(fs::read_to_string(&path).unwrap(), "old");
             fs::remove_file(&broken).unwrap();
         }
         let mut movie = Movie::open(&path, &options, true).unwrap();
         assert_eq!(add_missing(&mut movie, &options, 9), [2]);
-        movie.finish(&Silent).unwrap();
+        movie.finish(&NoProgress).unwrap();
         assert_eq!(folder.names(), [name]);
     }
 }
 
 #[test]
-fn a_cancelled_end_keeps_the_frames_and_the_old_film() {
+fn cancelling_finish_keeps_the_frames_and_the_old_movie() {
     let folder = Folder::new("cancelled");
     let (path, options) = (folder.path("film.gif"), options());
     fs::write(&path, "old").unwrap();
@@ -333,28 +333,28 @@ fn a_cancelled_end_keeps_the_frames_and_the_old_film() {
     add_missing(&mut movie, &options, 9);
     let listener = Listener { cancelled: true.into(), ..Default::default() };
     let error = movie.finish(&listener).unwrap_err();
-    assert!(matches!(error, Error::Surfel(surfel::Error::Cancelled)));
+    assert!(matches!(error, Error::Core(surfel_core::Error::Cancelled)));
     assert_eq!(fs::read_to_string(&path).unwrap(), "old");
     let movie = Movie::open(&path, &options, true).unwrap();
     assert_eq!(movie.n_done(), 5);
-    movie.finish(&Silent).unwrap();
+    movie.finish(&NoProgress).unwrap();
     assert_eq!(folder.names(), ["film.gif"]);
 }
 
 #[test]
-fn frames_that_were_not_announced_are_refused() {
+fn frames_of_another_index_or_size_are_rejected() {
     let folder = Folder::new("unannounced");
     let options = options();
     let mut movie = Movie::open(&folder.path("film.gif"), &options, false).unwrap();
     for (frame, width) in [(5, 48), (0, 47)] {
-        let error = movie.add(frame, &Image::new(width, 32)).unwrap_err().to_string();
+        let error = movie.add_frame(frame, &Image::new(width, 32)).unwrap_err().to_string();
         assert!(error.contains("expected frames 0 to 4 of 48x32"), "{error}");
     }
     assert_eq!(movie.n_done(), 0);
 }
 
 #[test]
-fn movies_that_cannot_be_written_are_told_before_the_work() {
+fn check_movie_rejects_unwritable_movies() {
     let folder = Folder::new("movies-early");
     let message = |name: &str, options: &MovieOptions| {
         check_movie(&folder.path(name), options).unwrap_err().to_string()
@@ -382,25 +382,22 @@ fn movies_that_cannot_be_written_are_told_before_the_work() {
         let options = MovieOptions { width, n_frames, ..options() };
         assert!(message(name, &options).contains("choose"));
     }
-    assert_eq!(MovieFormat::of(Path::new("a#1.mp4")).unwrap(), {
-        MovieFormat::of(Path::new("a.MP4")).unwrap()
-    });
     assert_eq!(folder.names(), ["folder.gif"]);
 }
 
 #[test]
-fn ffmpeg_makes_videos_of_every_kind() {
+fn ffmpeg_encodes_every_video_format() {
     if !has_ffmpeg() {
         return;
     }
     let folder = Folder::new("ffmpeg");
-    // A colon is part of a protocol's name to ffmpeg, a percent sign of a number's place.
+    // ffmpeg interprets a colon as a protocol separator and a percent sign as a number placeholder.
     let odd = if cfg!(windows) { "a%d.mov" } else { "a:%d.mov" };
     for name in ["film.mp4", odd, "-film.mkv", "film.webm", "film.avi"] {
         for (width, height) in [(48, 32), (47, 31)] {
             let path = folder.path(name);
             let options = MovieOptions { width, height, fps: 29.97, ..options() };
-            make(&path, &options);
+            write_movie(&path, &options);
             let found = decode(&path);
             assert_eq!(found.len(), 5 * 48 * 32 * 3, "{name}");
             for (index, (found, pixel)) in found.chunks_exact(3).zip(0..).enumerate() {
@@ -415,7 +412,7 @@ fn ffmpeg_makes_videos_of_every_kind() {
     assert_eq!(folder.names().len(), 5);
 }
 
-/// The frames as ffmpeg decodes them, eight bits a channel, by the colours that the file claims.
+/// Decodes the frames with ffmpeg to 8-bit RGB, using the colour space that the file declares.
 fn decode(path: &Path) -> Vec<u8> {
     let mut input = std::ffi::OsString::from("file:");
     input.push(path);
@@ -431,13 +428,13 @@ fn decode(path: &Path) -> Vec<u8> {
 }
 
 #[test]
-fn a_size_that_ffmpeg_refuses_is_told_before_the_work() {
+fn check_movie_rejects_sizes_that_ffmpeg_does_not_support() {
     if !has_ffmpeg() {
         return;
     }
     let folder = Folder::new("refused-size");
     let options = MovieOptions { width: 20_000, height: 2, ..options() };
     let error = check_movie(&folder.path("film.mp4"), &options).unwrap_err();
-    assert!(matches!(error, Error::Encoder { .. }), "{error}");
+    assert!(matches!(error, Error::EncoderFailed { .. }), "{error}");
     assert_eq!(folder.names(), [""; 0]);
 }

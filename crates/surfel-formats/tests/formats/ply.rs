@@ -1,8 +1,8 @@
-//! PLY: every type, byte order and kind of header.
+//! PLY: all types, byte orders and header variants.
 
-use surfel::math::{DVec3, Vec3};
-use surfel::points::Values;
-use surfel::progress::Silent;
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::Values;
+use surfel_core::progress::NoProgress;
 use surfel_formats::{Column, ColumnChoice, LoadOptions, load_bytes};
 
 use crate::common::read;
@@ -12,7 +12,7 @@ fn binary(header: &str, body: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn lists_comments_crlf_and_other_elements_are_passed_over() {
+fn lists_comments_crlf_and_other_elements_are_skipped() {
     let text = "ply\r\nformat ascii 1.0\r\ncomment a\r\nobj_info b c\r\nelement camera 2\r\n\
         property float fov\r\nelement vertex 2\r\nproperty list uchar int near\r\nproperty float x\r\n\
         property float y\r\nproperty list uchar float far\r\nproperty double z\r\n\
@@ -68,7 +68,7 @@ fn every_type_is_read_in_both_byte_orders_and_spellings() {
 }
 
 #[test]
-fn binary_lists_before_and_between_numbers_are_passed_over() {
+fn binary_lists_are_skipped() {
     let header = "ply\nformat binary_little_endian 1.0\nelement strip 2\n\
         property list uchar ushort i\nelement vertex 2\nproperty uchar x\n\
         property list ushort uchar l\nproperty uchar y\nproperty uchar z\nend_header\n";
@@ -78,7 +78,7 @@ fn binary_lists_before_and_between_numbers_are_passed_over() {
 }
 
 #[test]
-fn colours_of_any_type_come_to_16_bits() {
+fn colours_of_any_type_become_16_bit() {
     let file = |kind: &str, values: &str| {
         format!(
             "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
@@ -94,7 +94,7 @@ fn colours_of_any_type_come_to_16_bits() {
 }
 
 #[test]
-fn classes_are_classes_only_if_they_are_whole_and_small() {
+fn classifications_must_be_small_integers() {
     let file = |value: &str| {
         format!(
             "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
@@ -111,7 +111,7 @@ fn classes_are_classes_only_if_they_are_whole_and_small() {
 }
 
 #[test]
-fn wide_coordinates_keep_their_digits_and_nan_spoils_no_origin() {
+fn large_coordinates_keep_their_precision_despite_nan() {
     let header = "ply\nformat binary_little_endian 1.0\nelement vertex 3\n\
         property double x\nproperty double y\nproperty double z\nend_header\n";
     let rows = [[589_500.01, 231_300.02, 500.03], [f64::NAN; 3], [589_501.01, 231_301.02, 501.03]];
@@ -123,14 +123,14 @@ fn wide_coordinates_keep_their_digits_and_nan_spoils_no_origin() {
 }
 
 #[test]
-fn only_the_chosen_columns_are_kept() {
+fn only_requested_columns_are_loaded() {
     let text = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
         property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
         property float intensity\nproperty float time\nproperty float other\nend_header\n\
         0 0 0 1 2 3 4 5 6\n";
     let wanted = vec![Column::Colors, Column::Scalar("Time".into())];
     let options = LoadOptions { columns: ColumnChoice::Only(wanted), ..LoadOptions::default() };
-    let cloud = load_bytes("a.ply", text.as_bytes(), &options, &Silent).unwrap().cloud;
+    let cloud = load_bytes("a.ply", text.as_bytes(), &options, &NoProgress).unwrap().cloud;
     assert_eq!(cloud.colors, Some(vec![[257, 514, 771]]));
     assert_eq!(cloud.intensity, None);
     assert_eq!(cloud.scalars.len(), 1);

@@ -1,20 +1,20 @@
-//! What is written is read back the same, to the resolution of the format.
+//! Clouds that are written and read back within the resolution of the format.
 
-use surfel::math::{DVec3, Vec3};
-use surfel::points::{PointCloud, Values};
-use surfel::progress::Silent;
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::{PointCloud, Values};
+use surfel_core::progress::NoProgress;
 use surfel_formats::{Error, LoadOptions, Loaded, SaveOptions, load, load_all, save};
 
-use crate::common::{Folder, Listener, full_cloud, largest_difference, shared, there_and_back};
+use crate::common::{Folder, Listener, full_cloud, largest_difference, round_trip, shared};
 
 #[test]
-fn every_column_comes_back() {
+fn every_column_round_trips() {
     for n in [0, 1, 2, 120_000] {
         for extension in ["ply", "las", "laz"] {
             let cloud = full_cloud(n);
             let options =
                 SaveOptions { resolution: Some(DVec3::splat(0.001)), ..Default::default() };
-            let back = there_and_back(&cloud, extension, &options).cloud;
+            let back = round_trip(&cloud, extension, &options).cloud;
             let allowed = if extension == "ply" { 0.0 } else { 1e-3 };
             assert!(largest_difference(&cloud, &back).max_element() <= allowed, "{extension} {n}");
             assert!(back.normals == cloud.normals, "{extension} {n}");
@@ -30,13 +30,10 @@ fn every_column_comes_back() {
 }
 
 #[test]
-fn positions_about_zero_come_back_bit_by_bit_from_ply() {
+fn ply_positions_round_trip_bit_exactly() {
     let positions = vec![Vec3::new(0.1, 1e-20, -3e7), Vec3::new(f32::NAN, f32::INFINITY, 0.0)];
-    let back = there_and_back(
-        &PointCloud::from_positions(positions.clone()),
-        "ply",
-        &SaveOptions::default(),
-    );
+    let back =
+        round_trip(&PointCloud::from_positions(positions.clone()), "ply", &SaveOptions::default());
     let bits = |positions: &[Vec3]| -> Vec<[u32; 3]> {
         positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
     };
@@ -44,52 +41,52 @@ fn positions_about_zero_come_back_bit_by_bit_from_ply() {
 }
 
 #[test]
-fn las_steps_are_fine_enough_for_the_cloud() {
+fn las_scale_fits_the_extent_of_the_cloud() {
     for size in [1e-3f32, 1.0, 50.0, 3e4, 1e9] {
         let positions =
             (0..100).map(|i| Vec3::splat(size * i as f32 / 99.0 - size / 3.0)).collect();
         let cloud = PointCloud::from_positions(positions);
-        let back = there_and_back(&cloud, "laz", &SaveOptions::default()).cloud;
+        let back = round_trip(&cloud, "laz", &SaveOptions::default()).cloud;
         let error = largest_difference(&cloud, &back).max_element();
         assert!(error <= f64::from(size) * 1e-6, "{size} {error}");
     }
 }
 
 #[test]
-fn las_refuses_points_at_infinity_and_an_old_file_stays() {
+fn failed_las_writes_keep_the_old_file() {
     let folder = Folder::new("infinite");
     let path = folder.path("a.las");
     std::fs::write(&path, "old").unwrap();
     let cloud = PointCloud::from_positions(vec![Vec3::ZERO, Vec3::splat(f32::INFINITY)]);
-    let error = save(&path, &cloud, &SaveOptions::default(), &Silent).unwrap_err().to_string();
+    let error = save(&path, &cloud, &SaveOptions::default(), &NoProgress).unwrap_err().to_string();
     assert!(error.contains("point 1"), "{error}");
     let listener = Listener::default();
     listener.cancelled.store(true, std::sync::atomic::Ordering::Relaxed);
     let cancelled = save(&path, &full_cloud(10), &SaveOptions::default(), &listener);
-    assert!(matches!(cancelled, Err(Error::Surfel(surfel::Error::Cancelled))));
+    assert!(matches!(cancelled, Err(Error::Core(surfel_core::Error::Cancelled))));
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
     assert_eq!(folder.names(), ["a.las"]);
 }
 
 #[test]
-fn coordinate_systems_are_carried_over() {
+fn coordinate_systems_round_trip() {
     for system in ["EPSG:2154", "EPSG:4326", "PROJCS[\"somewhere\"]"] {
         for extension in ["las", "laz"] {
             let options =
                 SaveOptions { coordinate_system: Some(system.into()), ..Default::default() };
-            let back = there_and_back(&full_cloud(3), extension, &options);
-            assert_eq!(back.source.coordinate_system.as_deref(), Some(system));
+            let back = round_trip(&full_cloud(3), extension, &options);
+            assert_eq!(back.info.coordinate_system.as_deref(), Some(system));
         }
     }
 }
 
 #[test]
-fn another_reader_reads_what_is_written() {
+fn the_las_crate_reads_written_files() {
     let folder = Folder::new("oracle");
     let cloud = full_cloud(60_000);
     for extension in ["las", "laz"] {
         let path = folder.path(&format!("a.{extension}"));
-        save(&path, &cloud, &SaveOptions::default(), &Silent).unwrap();
+        save(&path, &cloud, &SaveOptions::default(), &NoProgress).unwrap();
         let mut reader = las::Reader::from_path(&path).unwrap();
         assert_eq!(reader.header().number_of_points(), 60_000);
         let bounds = reader.header().bounds();
@@ -111,24 +108,24 @@ fn another_reader_reads_what_is_written() {
 }
 
 #[test]
-fn scans_come_back_to_their_resolution() {
+fn scans_round_trip_within_their_resolution() {
     for name in ["lone-star.copc.laz", "ign_lidar_697k.laz", "sample_c.las", "vol_total.ply"] {
         let Some(path) = shared(&format!("clouds/{name}")) else { return };
-        let Loaded { cloud, source } = load(&path, &LoadOptions::default(), &Silent).unwrap();
+        let Loaded { cloud, info } = load(&path, &LoadOptions::default(), &NoProgress).unwrap();
         let options = SaveOptions {
-            resolution: source.resolution,
-            coordinate_system: source.coordinate_system.clone(),
+            resolution: info.resolution,
+            coordinate_system: info.coordinate_system.clone(),
         };
         for extension in ["ply", "laz"] {
-            let back = there_and_back(&cloud, extension, &options);
-            let step = source.resolution.unwrap_or(DVec3::splat(1e-3));
+            let back = round_trip(&cloud, extension, &options);
+            let step = info.resolution.unwrap_or(DVec3::splat(1e-3));
             let error = largest_difference(&cloud, &back.cloud) / step;
             assert!(error.max_element() <= 0.51, "{name} {extension}: {error} steps");
             assert!(back.cloud.colors == cloud.colors, "{name} {extension}");
             assert!(back.cloud.intensity == cloud.intensity, "{name} {extension}");
             assert!(back.cloud.classification == cloud.classification, "{name} {extension}");
             for scalar in &cloud.scalars {
-                // LAS 1.4 keeps scan angles in steps of 0.006 degrees.
+                // LAS 1.4 stores scan angles in steps of 0.006 degrees.
                 let allowed = if scalar.name == "scan_angle" { 0.0031 } else { 0.0 };
                 let other =
                     back.cloud.scalar(&scalar.name).unwrap_or_else(|| panic!("{}", scalar.name));
@@ -138,33 +135,33 @@ fn scans_come_back_to_their_resolution() {
                 }
             }
             if extension == "laz" {
-                assert_eq!(back.source.coordinate_system, source.coordinate_system, "{name}");
+                assert_eq!(back.info.coordinate_system, info.coordinate_system, "{name}");
             }
         }
     }
 }
 
 #[test]
-fn several_files_make_one_cloud_of_their_common_columns() {
+fn several_files_merge_with_their_common_columns() {
     let folder = Folder::new("several");
     let mut other = full_cloud(4);
     other.origin += DVec3::new(100.0, 0.0, 0.0);
     other.radii = None;
     let paths = [folder.path("a.laz"), folder.path("b.ply")];
-    save(&paths[0], &full_cloud(3), &SaveOptions::default(), &Silent).unwrap();
-    save(&paths[1], &other, &SaveOptions::default(), &Silent).unwrap();
+    save(&paths[0], &full_cloud(3), &SaveOptions::default(), &NoProgress).unwrap();
+    save(&paths[1], &other, &SaveOptions::default(), &NoProgress).unwrap();
 
     let listener = Listener::default();
-    let (all, sources) = load_all(&paths, &LoadOptions::default(), &listener).unwrap();
-    assert_eq!((all.cloud.len(), sources.len()), (7, 2));
-    assert!(listener.heard("dropped: radii"));
+    let (all, infos) = load_all(&paths, &LoadOptions::default(), &listener).unwrap();
+    assert_eq!((all.cloud.len(), infos.len()), (7, 2));
+    assert!(listener.has_note("dropped: radii"));
     assert!((all.cloud.world_position(3) - other.world_position(0)).length() < 1e-3);
     assert!(matches!(all.cloud.scalar("gps_time"), Some(Values::F64(_))));
-    assert!(matches!(load_all(&[], &LoadOptions::default(), &Silent), Err(Error::NoInput)));
+    assert!(matches!(load_all(&[], &LoadOptions::default(), &NoProgress), Err(Error::NoInput)));
 }
 
 #[test]
-fn files_far_apart_are_each_read_in_full_and_the_loss_is_told() {
+fn distant_files_keep_their_precision_and_rounding_is_reported() {
     let folder = Folder::new("far-apart");
     let n = 1000;
     let (near, far) = (folder.path("near.xyz"), folder.path("far.xyz"));
@@ -174,7 +171,7 @@ fn files_far_apart_are_each_read_in_full_and_the_loss_is_told() {
     std::fs::write(&near, lines(0.0, n)).unwrap();
     std::fs::write(&far, lines(4_900_000.0, 10)).unwrap();
 
-    // Whatever the order, the larger file keeps its positions and the smaller is told about.
+    // In either order, the larger file keeps its positions, and the rounding of the smaller one is reported.
     for paths in [[far.clone(), near.clone()], [near.clone(), far.clone()]] {
         let listener = Listener::default();
         let (all, _) = load_all(&paths, &LoadOptions::default(), &listener).unwrap();
@@ -182,13 +179,15 @@ fn files_far_apart_are_each_read_in_full_and_the_loss_is_told() {
         places.sort_unstable();
         places.dedup();
         assert!(n <= places.len(), "{} places", places.len());
-        assert!(listener.heard("far.xyz: far from the common origin [0, 0, 0]: its x is rounded"));
-        assert!(!listener.heard("near.xyz: far"));
+        assert!(
+            listener.has_note("far.xyz: far from the common origin [0, 0, 0]: its x is rounded")
+        );
+        assert!(!listener.has_note("near.xyz: far"));
     }
 
     let listener = Listener::default();
-    let (single, sources) = load_all(&[far], &LoadOptions::default(), &listener).unwrap();
-    assert_eq!(sources, [single.source]);
+    let (single, infos) = load_all(&[far], &LoadOptions::default(), &listener).unwrap();
+    assert_eq!(infos, [single.info]);
     assert!((single.cloud.world_position(9).x - 4_900_000.09).abs() < 1e-6);
-    assert!(!listener.heard("common origin"));
+    assert!(!listener.has_note("common origin"));
 }

@@ -1,6 +1,6 @@
-//! Text: separators, headers, guesses and their limits.
+//! Text files: separators, headers, inferred columns and limits.
 
-use surfel::math::{DVec3, Vec3};
+use surfel_core::math::{DVec3, Vec3};
 use surfel_formats::{LoadOptions, TextColumn, load_bytes};
 
 use crate::common::{Listener, read};
@@ -37,7 +37,7 @@ fn headers_name_columns() {
 }
 
 #[test]
-fn a_second_column_of_a_role_is_kept_by_its_name() {
+fn a_second_column_of_a_role_becomes_a_scalar() {
     for file in ["x,y,z,height\n1,2,3,4\n", "x,y,height,z\n1,2,4,3\n"] {
         let cloud = read("a.csv", file).unwrap().cloud;
         assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0)], "{file}");
@@ -66,12 +66,12 @@ fn comments_are_headers_only_if_they_fit_the_data() {
 }
 
 #[test]
-fn columns_are_guessed_by_number_and_range_and_told() {
+fn columns_are_inferred_and_reported() {
     let guess = |line: &str| {
         let listener = Listener::default();
         let options = LoadOptions::default();
         let cloud = load_bytes("a.xyz", line.as_bytes(), &options, &listener).unwrap().cloud;
-        assert!(listener.heard("columns taken as x y z"), "{line}");
+        assert!(listener.has_note("columns taken as x y z"), "{line}");
         cloud
     };
     assert_eq!(guess("1 2 3 0.5").intensity, Some(vec![0.5]));
@@ -85,11 +85,11 @@ fn columns_are_guessed_by_number_and_range_and_told() {
 }
 
 #[test]
-fn stated_columns_go_before_guesses() {
+fn stated_columns_override_inference() {
     let columns = TextColumn::parse_list("intensity,-,x,y,z,quality");
     let options = LoadOptions { text_columns: Some(columns), ..LoadOptions::default() };
     let file = b"7 what 1 2 3 0.5\n8 ever 4 5 6 0.25\n";
-    // The first line is not all numbers, so a header has to say so.
+    // The first line needs a header because the later lines are not all numeric.
     let file = [b"# intensity word x y z quality\n".as_slice(), b"7 0 1 2 3 0.5\n", file].concat();
     let cloud = load_bytes("a.txt", &file, &options, &Listener::default()).unwrap().cloud;
     assert_eq!(cloud.len(), 3);
@@ -98,7 +98,7 @@ fn stated_columns_go_before_guesses() {
 }
 
 #[test]
-fn wide_coordinates_keep_their_digits() {
+fn large_coordinates_keep_their_precision() {
     let file = "500000.123 4900000.456 100.5\n500010.123 4900010.456 101.5\n";
     let cloud = read("a.xyz", file).unwrap().cloud;
     let expected = DVec3::new(500_010.123, 4_900_010.456, 101.5);
@@ -106,11 +106,11 @@ fn wide_coordinates_keep_their_digits() {
 }
 
 #[test]
-fn broken_lines_are_named() {
+fn invalid_lines_are_errors_with_a_line_number() {
     let message = |file: &str| read("a.xyz", file).unwrap_err().to_string();
     assert_eq!(
         message("1 2 3\n4 5\n"),
-        "a.xyz: line 2: found 2 fields, expected 3 as in the lines before; mend or remove the line"
+        "a.xyz: line 2: found 2 fields, expected 3 as in the lines before; repair or remove the line"
     );
     assert!(message("1 2 3\n# c\n\n4 x 6\n").contains("line 4: found `x`, expected a number"));
     assert!(message("1,5;2,5;3,5\n").contains("not a comma"));

@@ -1,17 +1,20 @@
-//! The surface before many rays at once: each sees what it would see alone.
+//! Batches of rays: each ray finds the same surface whatever other rays its batch holds.
 
-use crate::build;
-use crate::modes::{camera_rays, degenerate_rays, loose_rays, shadow_rays, shuffled};
-use crate::plain::Plain;
-use surfel::flat::FlatCloud;
-use surfel::math::{Ray, Vec3};
-use surfel::surface::{Boundary, SurfaceKind};
-use surfel::trace::{Simd, SurfaceHit, occlusions, surface_hits};
-use surfel_tests::{clouds, scenes};
+use crate::bad_clouds;
+use crate::brute_force::BruteForce;
+use crate::rays::{self, camera_rays, degenerate_rays, incoherent_rays, shadow_rays};
+use surfel_core::flat::FlatCloud;
+use surfel_core::math::{Ray, Vec3};
+use surfel_core::surface::{EdgeTest, SurfaceKind};
+use surfel_core::trace::{Simd, SurfaceHit, occlusions, surface_hits};
+use surfel_tests::clouds;
+use surfel_tests::scenes;
 
-pub type Seen = (SurfaceHit, bool);
+/// The hit of a ray and whether anything occludes the ray.
+pub type SurfaceAnswer = (SurfaceHit, bool);
 
-pub fn surface(scene: &FlatCloud, simd: Simd, rays: &[Ray]) -> Vec<Seen> {
+/// Searches the surface along all rays in one batch.
+pub fn trace_surface(scene: &FlatCloud, simd: Simd, rays: &[Ray]) -> Vec<SurfaceAnswer> {
     let mut hits = vec![SurfaceHit::MISS; rays.len()];
     let mut occluded = vec![false; rays.len()];
     surface_hits(scene, simd, rays, &mut hits);
@@ -20,7 +23,7 @@ pub fn surface(scene: &FlatCloud, simd: Simd, rays: &[Ray]) -> Vec<Seen> {
 }
 
 #[test]
-fn the_surface_is_the_same_whatever_rays_are_beside() {
+fn the_surface_does_not_depend_on_other_rays_of_the_batch() {
     for (name, cloud) in [
         ("one point", clouds::sphere(1, 1.0)),
         ("sphere", clouds::sphere(500, 1.0)),
@@ -30,14 +33,14 @@ fn the_surface_is_the_same_whatever_rays_are_beside() {
     ] {
         for (_, kind) in SurfaceKind::ALL {
             let flat = scenes::flat(cloud.clone(), kind);
-            let camera = Plain::new(&flat, camera_rays(&flat, 8));
+            let camera = BruteForce::new(&flat, camera_rays(&flat, 8));
             let shadow = shadow_rays(&flat, &camera);
             let odd = degenerate_rays(&flat).into_iter().step_by(7).collect();
-            let rays = [camera.rays, shadow, loose_rays(&flat, 100), odd].concat();
+            let rays = [camera.rays, shadow, incoherent_rays(&flat, 100), odd].concat();
             let (ending, endless): (Vec<Ray>, Vec<Ray>) =
                 rays.into_iter().partition(|ray| ray.t_max.is_finite());
-            for boundary in [Boundary::Gap, Boundary::Off] {
-                let scene = FlatCloud { boundary, ..flat.clone() };
+            for edge_test in [EdgeTest::AngularGap, EdgeTest::Off] {
+                let scene = FlatCloud { edge_test, ..flat.clone() };
                 check_surface(name, &scene, &ending);
                 check_surface(name, &scene, &endless);
             }
@@ -45,23 +48,23 @@ fn the_surface_is_the_same_whatever_rays_are_beside() {
     }
 }
 
-/// In order, shuffled, in small batches and one by one.
+/// Compares batches of rays in order, shuffled, and of several sizes, with rays traced one by one.
 fn check_surface(name: &str, scene: &FlatCloud, rays: &[Ray]) {
-    let one_by_one: Vec<Seen> =
-        rays.iter().flat_map(|&ray| surface(scene, Simd::PORTABLE, &[ray])).collect();
+    let one_by_one: Vec<SurfaceAnswer> =
+        rays.iter().flat_map(|&ray| trace_surface(scene, Simd::PORTABLE, &[ray])).collect();
     let in_order: Vec<usize> = (0..rays.len()).collect();
-    let shuffled = shuffled(in_order.clone());
+    let shuffled = rays::shuffled(in_order.clone());
     for simd in Simd::available() {
         for (order, batch_len) in
             [(&in_order, 1000), (&shuffled, 1000), (&shuffled, 17), (&in_order, 1)]
         {
             for batch in order.chunks(batch_len) {
                 let batch_rays: Vec<Ray> = batch.iter().map(|&i| rays[i]).collect();
-                let seen = surface(scene, simd, &batch_rays);
-                for ((seen, &i), ray) in seen.iter().zip(batch).zip(&batch_rays) {
-                    let (kind, boundary, simd) = (scene.surface, scene.boundary, simd.name());
-                    let context = format!("{name}, {kind:?}, {boundary:?}, {simd}, {ray:?}");
-                    assert_eq!(*seen, one_by_one[i], "{context}, batches of {batch_len}");
+                let found = trace_surface(scene, simd, &batch_rays);
+                for ((found, &i), ray) in found.iter().zip(batch).zip(&batch_rays) {
+                    let (kind, edge_test, simd) = (scene.surface, scene.edge_test, simd.name());
+                    let context = format!("{name}, {kind:?}, {edge_test:?}, {simd}, {ray:?}");
+                    assert_eq!(*found, one_by_one[i], "{context}, batches of {batch_len}");
                 }
             }
         }
@@ -69,12 +72,13 @@ fn check_surface(name: &str, scene: &FlatCloud, rays: &[Ray]) {
 }
 
 #[test]
-fn nothing_is_hit_where_no_point_can_be() {
-    let mut cloud = scenes::points(clouds::sphere(20, 1.0), SurfaceKind::Disc).cloud;
+fn a_cloud_of_nan_positions_is_not_hit() {
+    let mut cloud =
+        scenes::points(clouds::sphere(20, 1.0), SurfaceKind::Disc).cloud().clone().into_inner();
     cloud.positions.fill(Vec3::NAN);
-    let scene = build::flat(cloud, SurfaceKind::Disc);
+    let scene = bad_clouds::flat(cloud, SurfaceKind::Disc);
     let rays = scenes::random_rays(40, 1.0, 54);
-    Plain::new(&scene, rays.clone()).check_in_order("no points");
-    let seen = surface(&scene, Simd::detect(), &rays);
-    assert!(seen.iter().all(|(hit, is_occluded)| hit.is_miss() && !is_occluded));
+    BruteForce::new(&scene, rays.clone()).check_in_order("no points");
+    let found = trace_surface(&scene, Simd::detect(), &rays);
+    assert!(found.iter().all(|(hit, is_occluded)| hit.is_miss() && !is_occluded));
 }

@@ -1,16 +1,18 @@
-//! Furnaces: a surface that absorbs nothing cannot be told from the uniform light around it.
+//! White furnaces: a surface that absorbs nothing is indistinguishable from the uniform light around it.
 
 use crate::materials::{SETTINGS, WHITE_SKY, assert_near, mesh, rgb, scene, with_positions};
-use surfel::image::Image;
-use surfel::math::Vec3;
-use surfel::render::Settings;
-use surfel::scene::{AlphaMode, Environment, Geometry, Graph, Light, Material, Mesh, Points};
-use surfel::surface::SurfaceKind;
+use surfel_core::image::Image;
+use surfel_core::math::Vec3;
+use surfel_core::render::Settings;
+use surfel_core::scene::{
+    AlphaMode, CloudGeometry, Environment, Geometry, Graph, Light, Material, Mesh,
+};
+use surfel_core::surface::SurfaceKind;
 use surfel_tests::clouds;
 use surfel_tests::scenes::{self, from_above, render};
 
-/// A material, and how far the mean over a ball of points, over a ball of triangles, and any one pixel of
-/// the latter may be from white.
+/// A material with the greatest allowed differences from white: of the mean over a ball of points, of the mean over
+/// a ball of triangles, and of any pixel of a ball of facets.
 struct InFurnace {
     name: &'static str,
     material: Material,
@@ -19,21 +21,21 @@ struct InFurnace {
     each: f32,
 }
 
-/// Discs shade each other's rims a little where light is gathered from all sides.
+/// Difference because discs shade each other's rims a little when light comes from all sides.
 const DENTS: f32 = 0.015;
-/// Facets hide what lies below them from the hemisphere about a normal that leans by up to 3 degrees; and
-/// the mean of 5000 samples toward an environment, each off by 0.4, is uncertain by 0.006.
+/// Difference of triangles: facets block a part of the hemisphere about a vertex normal that differs from theirs by
+/// up to 3 degrees, and the mean of 5000 samples of an environment, each off by 0.4, is uncertain by 0.006.
 const LEANING: f32 = 0.015;
-/// Four times what the mean of 32 such samples is off by.
+/// Four standard errors of the mean of 32 such samples.
 const NOISE: f32 = 0.3;
-/// Rays that count for little are traced seldom. (Without facets 16 bounces would do. Among facets some light
-/// goes round a thousand times: after 64 bounces 0.009 of it is still within.)
+/// Difference because rays of small weight are traced at random. (Without facets 16 bounces would be enough. Between
+/// facets some light is reflected a thousand times: after 64 bounces 0.009 of it is still inside.)
 const WITHIN: f32 = 0.005;
-/// Samples of rough reflections are off by up to 0.4, and so the mean of 2800 of them by 0.0075.
+/// Four standard errors of the mean of 2800 samples of rough reflections, each off by up to 0.4: 0.0075 is one.
 const ROUGH: f32 = 0.03;
 
 fn in_furnace() -> Vec<InFurnace> {
-    let rough = |roughness| Material { ignores_colors: true, roughness, ..Material::METAL };
+    let rough = |roughness| Material { ignores_vertex_colors: true, roughness, ..Material::METAL };
     let entry = |name, material, mean_on_points, mean_on_triangles, each| InFurnace {
         name,
         material,
@@ -60,7 +62,7 @@ fn in_furnace() -> Vec<InFurnace> {
         entry("pane", pane, 1e-3, 1e-3, 0.1),
         entry("frosted glass", frosted, ROUGH, ROUGH, any),
         entry(
-            "not there",
+            "masked out",
             Material { alpha: 0.2, alpha_mode: AlphaMode::Mask(0.5), ..half },
             0.0,
             0.0,
@@ -74,22 +76,22 @@ fn white_lights() -> [(&'static str, Light); 2] {
     [("sky", Light::Sky(WHITE_SKY)), ("environment", Light::Environment(picture))]
 }
 
-/// Mean of what covers the picture, the farthest from white of any pixel, and the number of pixels.
+/// Returns the mean over the covered pixels, the greatest difference of one of them from white, and their number.
 fn whiteness(image: &Image) -> (f32, f32, usize) {
     let covered = image.color.iter().filter(|pixel| 0.4 < pixel[3]);
-    let shares: Vec<f32> = covered.map(|pixel| rgb(*pixel).y / pixel[3]).collect();
-    let farthest = shares.iter().fold(0.0, |most: f32, share| most.max((share - 1.0).abs()));
-    (shares.iter().sum::<f32>() / shares.len() as f32, farthest, shares.len())
+    let values: Vec<f32> = covered.map(|pixel| rgb(*pixel).y / pixel[3]).collect();
+    let farthest = values.iter().fold(0.0, |max: f32, value| max.max((value - 1.0).abs()));
+    (values.iter().sum::<f32>() / values.len() as f32, farthest, values.len())
 }
 
-fn white(points: Points) -> Points {
-    Points { colors: vec![[255; 3]; points.cloud.len()], ..points }
+fn white(points: CloudGeometry) -> CloudGeometry {
+    scenes::colored(&points, vec![[255; 3]; points.cloud().len()])
 }
 
 #[test]
-fn what_absorbs_nothing_is_white_in_a_furnace() {
+fn materials_without_absorption_are_white_in_a_furnace() {
     let points = white(scenes::points(clouds::sphere(8000, 1.0), SurfaceKind::Splat));
-    let outward = Points { has_outward_normals: true, ..points.clone() };
+    let outward = scenes::outward(&points);
     let smooth = scenes::uv_sphere(32, 64, 1.0);
     let facets = Mesh { normals: None, ..smooth.clone() };
     let settings = Settings {
@@ -112,9 +114,9 @@ fn what_absorbs_nothing_is_white_in_a_furnace() {
                     continue;
                 }
                 let camera = scenes::lit(points.clone()).camera;
-                let graph = Graph::of(geometry, material.clone());
+                let graph = Graph::from_geometry(geometry, material.clone());
                 let image = render(&scene(graph, vec![light.clone()], camera), &settings);
-                if name == "not there" {
+                if name == "masked out" {
                     assert!(image.color.iter().all(|pixel| *pixel == [0.0; 4]));
                     continue;
                 }
@@ -129,14 +131,18 @@ fn what_absorbs_nothing_is_white_in_a_furnace() {
     }
 }
 
-/// A shell that is half there shows half of its outside, and of the rest half of its inside, which only half
-/// of the light around reaches.
+/// A shell with an alpha of 0.5 shows half of its outside and a quarter of its inside, which half of the light
+/// reaches.
 #[test]
-fn a_shell_that_is_half_there_is_dimmer_within() {
+fn the_inside_of_a_half_transparent_shell_is_dimmer() {
     let half = Material { alpha: 0.5, alpha_mode: AlphaMode::Blend, ..Material::MATTE };
     let shell = Mesh { normals: None, ..scenes::uv_sphere(32, 64, 1.0) };
     let image = render(
-        &scene(Graph::of(mesh(shell), half), vec![Light::Sky(WHITE_SKY)], from_above(1.2)),
+        &scene(
+            Graph::from_geometry(mesh(shell), half),
+            vec![Light::Sky(WHITE_SKY)],
+            from_above(1.2),
+        ),
         &SETTINGS,
     );
     for pixel in image.color {
@@ -145,10 +151,10 @@ fn a_shell_that_is_half_there_is_dimmer_within() {
     }
 }
 
-/// No light that comes straight from somewhere is made up or lost where it only goes by.
+/// A dome that does not refract neither adds nor removes light.
 #[test]
-fn a_floor_under_a_clear_sky_of_glass_is_white() {
-    // Without a boundary there is nothing at all.
+fn a_floor_under_a_clear_dome_is_white() {
+    // An index of refraction of 1 makes no interface.
     let nothing = Material { ior: 1.0, ..Material::GLASS };
     let pane = Material { is_thin: true, ..nothing.clone() };
     for material in [nothing, pane] {

@@ -1,17 +1,18 @@
-//! Light with known answers: furnace, shadow, unlit colour.
+//! Light on points with known answers: furnaces, shadows, unlit colours, layers and backgrounds.
 
-use surfel::flat::FlatScene;
-use surfel::image::{Image, Tone};
-use surfel::math::{DVec3, Vec3};
-use surfel::points::PointCloud;
-use surfel::progress::Silent;
-use surfel::render::{CpuRenderer, Renderer, Settings};
-use surfel::scene::{
-    Background, Camera, Geometry, Light, Material, Points, Projection, Scene, Sky, Sun,
+use surfel_core::flat::FlatScene;
+use surfel_core::image::{Image, encode_srgb8};
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::PointCloud;
+use surfel_core::progress::NoProgress;
+use surfel_core::render::{CpuRenderer, Renderer, Settings};
+use surfel_core::scene::{
+    Background, Camera, Geometry, Light, Material, Projection, Scene, Sky, Sun,
 };
-use surfel::surface::SurfaceKind;
-use surfel::trace::Simd;
-use surfel_tests::{clouds, scenes};
+use surfel_core::surface::SurfaceKind;
+use surfel_core::trace::Simd;
+use surfel_tests::clouds;
+use surfel_tests::scenes;
 
 const SETTINGS: Settings = Settings {
     width: 64,
@@ -20,41 +21,37 @@ const SETTINGS: Settings = Settings {
     light_samples: 16,
     max_depth: 8,
     seed: 1,
-    with_layers: true,
+    with_aovs: true,
 };
 
 fn render(scene: &Scene, settings: &Settings) -> Image {
-    let flat = FlatScene::new(scene, &Silent).unwrap();
+    let flat = FlatScene::new(scene, &NoProgress).unwrap();
     let renderer = CpuRenderer { simd: Simd::detect() };
-    renderer.render(&flat, settings, &Silent).unwrap().0
+    renderer.render(&flat, settings, &NoProgress).unwrap().0
 }
 
 const FURNACE: Sky =
-    Sky { up: Vec3::Z, zenith: Vec3::ONE, ground: Vec3::ONE, reach: f32::INFINITY };
+    Sky { up: Vec3::Z, zenith: Vec3::ONE, ground: Vec3::ONE, ao_distance: f32::INFINITY };
 
 #[test]
 fn a_white_sphere_in_a_furnace_is_white() {
     for kind in [SurfaceKind::Sphere, SurfaceKind::Disc, SurfaceKind::Splat, SurfaceKind::SplatFit]
     {
         let points = scenes::points(clouds::sphere(20_000, 1.0), kind);
-        let colors = vec![[255; 3]; points.cloud.len()];
-        let scene = scenes::lit(Points { colors, ..points });
+        let colors = vec![[255; 3]; points.cloud().len()];
+        let scene = scenes::lit(scenes::colored(&points, colors));
         let scene = Scene { lights: vec![Light::Sky(FURNACE)], ..scene };
         let image = render(&scene, &SETTINGS);
         let covered = image.color.iter().filter(|pixel| pixel[3] == 1.0);
         let (sum, count) = covered.fold((0.0, 0), |(sum, n), pixel| (sum + pixel[0], n + 1));
         let mean = sum / count as f32;
-        // Balls shade each other in the dents between them; a convex surface of discs hardly does.
-        let least = if kind == SurfaceKind::Sphere { 0.70 } else { 0.985 };
-        assert!(
-            600 < count && (least..=1.0).contains(&mean),
-            "{}: {mean} over {count}",
-            kind.name()
-        );
+        // Spheres shade the dents between them; discs on a convex surface hardly shade each other.
+        let min = if kind == SurfaceKind::Sphere { 0.70 } else { 0.985 };
+        assert!(600 < count && (min..=1.0).contains(&mean), "{}: {mean} over {count}", kind.name());
     }
 }
 
-/// A ball above a floor, the sun straight above or at 45 degrees.
+/// Returns a scene of a ball above a floor under a sun.
 fn ball_over_floor(sun: Sun) -> Scene {
     let floor = clouds::plane(150, 0.4, 8).positions.into_iter().map(|p| 3.0 * p);
     let ball = clouds::sphere(6000, 0.5).positions.into_iter().map(|p| p + Vec3::Z);
@@ -65,13 +62,13 @@ fn ball_over_floor(sun: Sun) -> Scene {
         view_up: DVec3::Y,
         projection: Projection::Orthographic { height: 4.0 },
     };
-    // Seen from below, so that the ball does not hide its shadow: the floor is one sheet of points.
+    // The camera is below, so that the ball does not hide its shadow: the floor is one sheet of points.
     Scene { lights: vec![Light::Sun(sun)], camera, ..scenes::scene(cloud, SurfaceKind::Splat) }
 }
 
 #[test]
 fn a_shadow_lies_where_the_sun_casts_it() {
-    // From below the floor faces away from a sun above: use one that shines from below on a ball under it.
+    // Seen from below the floor faces away from the sun, so this camera is above.
     let sun = Sun { direction: Vec3::Z, color: Vec3::ONE, angular_diameter_deg: 0.0 };
     let mut scene = ball_over_floor(sun);
     scene.camera.position = DVec3::new(0.0, 0.0, 10.0);
@@ -81,12 +78,12 @@ fn a_shadow_lies_where_the_sun_casts_it() {
         scene.lights = vec![Light::Sun(Sun { direction, ..sun })];
         let image = render(&scene, &SETTINGS);
         let mut n_checked = 0;
-        for (pixel, position) in image.color.iter().zip(&image.layers.as_ref().unwrap().position) {
-            // On the floor, and not hidden by the ball.
+        for (pixel, position) in image.color.iter().zip(&image.aovs.as_ref().unwrap().position) {
+            // Only pixels of the floor that the ball does not hide are tested.
             if 0.2 < position.z || 1.9 < position.abs().max_element() {
                 continue;
             }
-            // The shadow is the ball's shadow along the sun's direction: within 0.5 of its axis.
+            // The shadow is within 0.5 of the axis through the ball along the sun's direction.
             let from_center = *position - center.with_z(0.0);
             let across = from_center - from_center.dot(direction) * direction;
             let is_dark = pixel[0] < 0.1;
@@ -100,7 +97,7 @@ fn a_shadow_lies_where_the_sun_casts_it() {
 }
 
 #[test]
-fn a_wide_sun_has_a_half_shadow() {
+fn a_wide_sun_casts_a_penumbra() {
     let sun = Sun { direction: Vec3::Z, color: Vec3::ONE, angular_diameter_deg: 30.0 };
     let mut scene = ball_over_floor(sun);
     scene.camera.position = DVec3::new(0.0, 0.0, 10.0);
@@ -109,19 +106,19 @@ fn a_wide_sun_has_a_half_shadow() {
     let grey = image
         .color
         .iter()
-        .zip(&image.layers.as_ref().unwrap().position)
+        .zip(&image.aovs.as_ref().unwrap().position)
         .filter(|(pixel, position)| position.z < 0.2 && (0.1..0.4).contains(&pixel[0]))
         .count();
-    assert!(100 < grey, "{grey} pixels in half shadow");
+    assert!(100 < grey, "{grey} pixels in the penumbra");
 }
 
 #[test]
-fn unlit_colors_come_out_as_they_went_in() {
+fn unlit_colors_are_exact() {
     for (name, kind) in SurfaceKind::ALL {
         for value in [0u8, 1, 64, 128, 200, 255] {
             let points = scenes::points(clouds::sphere(8000, 1.0), kind);
-            let colors = vec![[value, 128, value]; points.cloud.len()];
-            let mut scene = scenes::lit(Points { colors, ..points });
+            let colors = vec![[value, 128, value]; points.cloud().len()];
+            let mut scene = scenes::lit(scenes::colored(&points, colors));
             scene.graph.materials[0] = Material::UNLIT;
             let settings = Settings { samples_per_pixel: 4, ..SETTINGS };
             let image = render(&scene, &settings);
@@ -131,40 +128,37 @@ fn unlit_colors_come_out_as_they_went_in() {
             } else {
                 center
             };
-            assert_eq!(Tone::default().rgba8(full), [value, 128, value, 255], "{name}");
+            assert_eq!(full.map(encode_srgb8), [value, 128, value, 255], "{name}");
         }
     }
 }
 
 #[test]
-fn layers_tell_what_the_pixel_centres_meet() {
+fn layers_hold_the_hits_of_the_pixel_centres() {
     let scene =
         scenes::scene(clouds::georeferenced(&clouds::sphere(20_000, 1.0)), SurfaceKind::Splat);
     let image = render(&scene, &SETTINGS);
-    let layers = image.layers.as_ref().unwrap();
+    let aovs = image.aovs.as_ref().unwrap();
     let center = 32 * 64 + 32;
-    assert!((layers.depth[center] - 5.0).abs() < 0.01, "{}", layers.depth[center]);
-    assert!(layers.position[center].distance(Vec3::X) < 0.06);
-    assert!(0.99 < layers.normal[center].x);
-    assert_eq!((layers.instance_id[center], image.coverage[center]), (0, 1.0));
-    let point = scenes::cloud(&scene).cloud.positions[layers.point_id[center] as usize];
-    assert!(point.distance(layers.position[center]) < 0.06);
-    assert_eq!((layers.point_id[0], layers.instance_id[0]), (u32::MAX, u32::MAX));
-    assert_eq!(
-        (layers.depth[0], image.coverage[0], image.color[0]),
-        (f32::INFINITY, 0.0, [0.0; 4])
-    );
+    assert!((aovs.depth[center] - 5.0).abs() < 0.01, "{}", aovs.depth[center]);
+    assert!(aovs.position[center].distance(Vec3::X) < 0.06);
+    assert!(0.99 < aovs.normal[center].x);
+    assert_eq!((aovs.instance_id[center], image.coverage[center]), (0, 1.0));
+    let point = scenes::cloud(&scene).cloud().positions()[aovs.point_id[center] as usize];
+    assert!(point.distance(aovs.position[center]) < 0.06);
+    assert_eq!((aovs.point_id[0], aovs.instance_id[0]), (u32::MAX, u32::MAX));
+    assert_eq!((aovs.depth[0], image.coverage[0], image.color[0]), (f32::INFINITY, 0.0, [0.0; 4]));
 }
 
-/// Points as pixels stand before what traced ones stand before.
+/// Rasterised points and traced splats have the same background.
 #[test]
-fn surroundings_are_seen_behind_points() {
+fn the_environment_is_seen_behind_points() {
     for camera_direction in [DVec3::X, DVec3::new(0.5, 1.0, 2.0), -DVec3::Z] {
         let picture = |kind: SurfaceKind| {
             let mut scene = scenes::scene(clouds::sphere(2000, 1.0), kind);
             scene.camera.position = 8.0 * camera_direction.normalize();
             scene.camera.view_up = DVec3::Y;
-            scene.background = Background::Surroundings;
+            scene.background = Background::Environment;
             let ground = Vec3::new(0.1, 0.2, 0.3);
             scene.lights = vec![Light::Sky(Sky { ground, ..FURNACE })];
             render(&scene, &SETTINGS)
@@ -177,15 +171,15 @@ fn surroundings_are_seen_behind_points() {
     }
 }
 
-/// Two clouds as pixels are what one of all their points is.
+/// Two rasterised clouds look like one cloud of all their points.
 #[test]
-fn of_the_points_of_several_clouds_the_nearest_are_seen() {
+fn the_nearest_points_of_several_clouds_are_seen() {
     let (a, b) = (clouds::sphere(4000, 1.0), clouds::plane(60, 0.3, 4));
     let both = a.positions.iter().chain(&b.positions).copied().collect();
     let points = |cloud: PointCloud| scenes::points(cloud, SurfaceKind::Points);
-    let together = scenes::lit(points(PointCloud::from_positions(both)));
-    let mut apart = together.clone();
-    apart.graph = scenes::graph(vec![
+    let merged = scenes::lit(points(PointCloud::from_positions(both)));
+    let mut separate = merged.clone();
+    separate.graph = scenes::graph(vec![
         (Geometry::Points(points(a)), Material::MATTE),
         (Geometry::Points(points(b)), Material::MATTE),
     ]);
@@ -194,21 +188,21 @@ fn of_the_points_of_several_clouds_the_nearest_are_seen() {
             let camera = Camera { position, ..scene.camera };
             render(&Scene { camera, ..scene.clone() }, &SETTINGS)
         };
-        let (together, apart) = (picture(&together), picture(&apart));
-        let [a, b] = [&together, &apart].map(|image| &image.layers.as_ref().unwrap().depth);
-        // Positions are stored with 16 bits: some points fall into the pixel beside.
+        let (merged, separate) = (picture(&merged), picture(&separate));
+        let [a, b] = [&merged, &separate].map(|image| &image.aovs.as_ref().unwrap().depth);
+        // Positions are stored with 16 bits: some points fall into a neighbouring pixel.
         let is_same = |(a, b): &(&f32, &f32)| a == b || (*a - *b).abs() < 1e-3;
         let n_same = a.iter().zip(b).filter(is_same).count();
         assert!(64 * 64 - 40 < n_same, "{n_same}");
-        let instances = &apart.layers.as_ref().unwrap().instance_id;
+        let instances = &separate.aovs.as_ref().unwrap().instance_id;
         assert!([0, 1].iter().all(|i| 100 < instances.iter().filter(|found| *found == i).count()));
     }
 }
 
 #[test]
-fn impossible_settings_are_errors() {
+fn invalid_settings_are_errors() {
     let scene = scenes::scene(clouds::sphere(50, 1.0), SurfaceKind::Splat);
-    let flat = FlatScene::new(&scene, &Silent).unwrap();
+    let flat = FlatScene::new(&scene, &NoProgress).unwrap();
     let renderer = CpuRenderer { simd: Simd::detect() };
     for settings in [
         Settings { width: 0, ..SETTINGS },
@@ -216,7 +210,7 @@ fn impossible_settings_are_errors() {
         Settings { samples_per_pixel: 0, ..SETTINGS },
         Settings { light_samples: 0, ..SETTINGS },
     ] {
-        let result = renderer.render(&flat, &settings, &Silent);
-        assert!(matches!(result, Err(surfel::Error::Setting { .. })), "{settings:?}");
+        let result = renderer.render(&flat, &settings, &NoProgress);
+        assert!(matches!(result, Err(surfel_core::Error::Setting { .. })), "{settings:?}");
     }
 }

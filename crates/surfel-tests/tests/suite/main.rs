@@ -1,25 +1,27 @@
-//! Tests across crates: known answers, fast against plain, the same bytes everywhere.
+//! Integration tests across crates: scenes with known answers, fast searches against brute force, and output
+//! that is the same on every machine.
 
+mod animation;
+mod bad_clouds;
 mod batches;
-mod bending;
-mod build;
-mod crowds;
+mod brute_force;
+mod deformation;
+mod determinism;
 mod furnace;
 mod glass;
-mod groups;
 mod instances;
-mod lamps;
 mod light;
+mod many_instances;
 mod materials;
-mod modes;
-mod moving;
-mod plain;
+mod packet_groups;
+mod punctual_lights;
 mod quality;
+mod rays;
 mod reference;
 mod refit;
-mod repeatable;
+mod searches;
 mod shapes;
 mod statistics;
 mod textures;
-mod trace;
+mod traversal_paths;
 mod triangles;

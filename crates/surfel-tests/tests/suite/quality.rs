@@ -1,18 +1,18 @@
 //! The Stanford bunny's vertices against its mesh, for every surface kind.
 
-use surfel::points::{PointCloud, spacing};
-use surfel::progress::Silent;
-use surfel::surface::{Boundary, SurfaceKind};
-use surfel_tests::mesh::{Mesh, shared_data};
-use surfel_tests::quality::compare;
+use surfel_core::points::{PointCloud, spacing};
+use surfel_core::progress::NoProgress;
+use surfel_core::surface::{EdgeTest, SurfaceKind};
+use surfel_tests::deviation::compare;
+use surfel_tests::ground_truth::{GroundTruth, shared_data};
 
 #[test]
 fn the_bunny_of_points_looks_like_its_mesh() {
     let Some(data) = shared_data() else { return };
-    let mesh = Mesh::from_ascii_ply(&data.join("meshes/bun_zipper.ply"));
+    let mesh = GroundTruth::from_ascii_ply(&data.join("meshes/bun_zipper.ply"));
     let cloud = PointCloud::from_positions(mesh.vertices.clone());
-    let spacing = spacing(&cloud.positions, &Silent).unwrap();
-    // Measured values are in docs/quality.md; these leave a tenth for other machines' rounding.
+    let spacing = spacing(&cloud.positions, &NoProgress).unwrap();
+    // Measured values are in docs/quality.md; these limits allow a tenth more for rounding on other machines.
     let bounds = [
         (SurfaceKind::Sphere, 0.130, 20.4),
         (SurfaceKind::Disc, 0.025, 13.6),
@@ -21,10 +21,10 @@ fn the_bunny_of_points_looks_like_its_mesh() {
         (SurfaceKind::SplatFit, 0.063, 10.1),
     ];
     for (kind, silhouette, normal_deg) in bounds {
-        let quality = compare(&cloud, &mesh, kind, Boundary::Gap, spacing);
-        let differing = quality.false_hits + quality.misses;
-        assert!(differing < silhouette, "{}: {quality:?}", kind.name());
-        assert!(quality.normal_deg < normal_deg, "{}: {quality:?}", kind.name());
-        assert!(quality.misses < 0.001, "{}: {quality:?}", kind.name());
+        let deviation = compare(&cloud, &mesh, kind, EdgeTest::AngularGap, spacing);
+        let differing = deviation.false_hits + deviation.misses;
+        assert!(differing < silhouette, "{}: {deviation:?}", kind.name());
+        assert!(deviation.normal_deg < normal_deg, "{}: {deviation:?}", kind.name());
+        assert!(deviation.misses < 0.001, "{}: {deviation:?}", kind.name());
     }
 }

@@ -1,21 +1,22 @@
-//! Moved points in the tree they had: the same bytes if they have not moved, the same hits if they have;
-//! and a word where it does not serve.
+//! Refitting trees to moved points: the bytes are the same if no point has moved, the hits are right if some
+//! have, and a tree that no longer suits its points is reported.
 
-use crate::build::flat;
-use crate::plain::Plain;
-use surfel::flat::{FlatCloud, REBUILD_COST, Refit};
-use surfel::math::{Quat, Random, Vec3};
-use surfel::points::PointCloud;
-use surfel::surface::SurfaceKind;
-use surfel_tests::{clouds, scenes};
+use crate::bad_clouds::flat;
+use crate::brute_force::BruteForce;
+use surfel_core::flat::{FlatCloud, MAX_COST_RATIO, Refit};
+use surfel_core::math::{Quat, Random, Vec3};
+use surfel_core::points::PointCloud;
+use surfel_core::surface::SurfaceKind;
+use surfel_tests::clouds;
+use surfel_tests::scenes;
 
 const KINDS: [SurfaceKind; 3] = [SurfaceKind::Sphere, SurfaceKind::Disc, SurfaceKind::SplatFit];
 
 fn cloud() -> PointCloud {
-    scenes::points(clouds::sphere(5000, 1.0), SurfaceKind::Disc).cloud
+    scenes::points(clouds::sphere(5000, 1.0), SurfaceKind::Disc).cloud().clone().into_inner()
 }
 
-/// Turned about Z by so much for each unit of height.
+/// Turns each point about Z by an angle that grows with its height.
 fn twisted(mut cloud: PointCloud, turn_rad: f32) -> PointCloud {
     let normals = cloud.normals.iter_mut().flatten();
     for (position, normal) in cloud.positions.iter_mut().zip(normals) {
@@ -25,7 +26,7 @@ fn twisted(mut cloud: PointCloud, turn_rad: f32) -> PointCloud {
     cloud
 }
 
-/// Moved by so many radii at random.
+/// Moves each point at random, by a Gaussian in units of its radius.
 fn scattered(mut cloud: PointCloud, by_radii: f32) -> PointCloud {
     let mut random = Random::new(31, 0);
     let mut gaussian = || random.next_gaussian() as f32;
@@ -37,7 +38,7 @@ fn scattered(mut cloud: PointCloud, by_radii: f32) -> PointCloud {
 
 fn refit(scene: &mut FlatCloud, cloud: &PointCloud) -> Refit {
     let colors = vec![[188; 3]; cloud.len()];
-    scene.points.refit(cloud, scene.surface, &colors).unwrap()
+    scene.points.refit(scenes::columns(cloud, scene.surface, &colors))
 }
 
 fn same_bytes(a: &FlatCloud, b: &FlatCloud) -> bool {
@@ -63,47 +64,47 @@ fn moved_points_are_hit_where_they_are() {
         let moved = twisted(cloud(), 0.4);
         assert!(matches!(refit(&mut scene, &moved), Refit::Kept { .. }), "{kind:?}");
         scene.points.validate(kind);
-        Plain::new(&scene, rays.clone()).check_in_order("twisted");
-        // And back.
+        BruteForce::new(&scene, rays.clone()).check_in_order("twisted");
+        // Moving the points back restores every byte.
         refit(&mut scene, &cloud());
         assert!(same_bytes(&scene, &flat(cloud(), kind)));
     }
 }
 
 #[test]
-fn cost_grows_with_scatter_until_the_tree_is_unfit() {
+fn cost_grows_with_scatter_until_a_rebuild_is_needed() {
     let built = flat(cloud(), SurfaceKind::Disc);
     let mut last = 1.0;
     for by_radii in [0.1, 0.2, 0.3, 0.4] {
         let Refit::Kept { cost_ratio } = refit(&mut built.clone(), &scattered(cloud(), by_radii))
         else {
-            panic!("unfit at {by_radii}");
+            panic!("a rebuild is needed at {by_radii}");
         };
-        assert!(last < cost_ratio && cost_ratio <= REBUILD_COST, "{cost_ratio} at {by_radii}");
+        assert!(last < cost_ratio && cost_ratio <= MAX_COST_RATIO, "{cost_ratio} at {by_radii}");
         last = cost_ratio;
     }
     let mut scene = built.clone();
-    assert_eq!(refit(&mut scene, &scattered(cloud(), 3.0)), Refit::Unfit);
-    // And back.
+    assert_eq!(refit(&mut scene, &scattered(cloud(), 3.0)), Refit::NeedsRebuild);
+    // Moving the points back restores every byte.
     assert_eq!(refit(&mut scene, &cloud()), Refit::Kept { cost_ratio: 1.0 });
     assert!(same_bytes(&scene, &built));
 }
 
 #[test]
-fn a_block_that_has_lost_its_precision_is_unfit() {
+fn a_block_that_loses_its_precision_needs_a_rebuild() {
     let mut scene = flat(cloud(), SurfaceKind::Disc);
     let mut moved = cloud();
     moved.radii.as_mut().unwrap()[7] *= 0.01;
-    assert_eq!(refit(&mut scene, &moved), Refit::Unfit);
+    assert_eq!(refit(&mut scene, &moved), Refit::NeedsRebuild);
 }
 
 #[test]
-fn where_points_come_or_go_the_tree_is_unfit() {
+fn points_that_appear_or_vanish_need_a_rebuild() {
     let mut gone = cloud();
     gone.positions[7].x = f32::NAN;
     let mut scene = flat(cloud(), SurfaceKind::Disc);
-    assert_eq!(refit(&mut scene, &gone), Refit::Unfit);
+    assert_eq!(refit(&mut scene, &gone), Refit::NeedsRebuild);
     let mut scene = flat(gone.clone(), SurfaceKind::Disc);
     assert_eq!(refit(&mut scene, &gone), Refit::Kept { cost_ratio: 1.0 });
-    assert_eq!(refit(&mut scene, &cloud()), Refit::Unfit);
+    assert_eq!(refit(&mut scene, &cloud()), Refit::NeedsRebuild);
 }

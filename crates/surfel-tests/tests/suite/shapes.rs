@@ -1,11 +1,12 @@
-//! Shapes with closed forms: where the surface lies and how it faces.
+//! Shapes with closed forms: the position, normals and edges of the surface that points of them make.
 
-use surfel::flat::FlatCloud;
-use surfel::math::{Ray, Vec3};
-use surfel::points::PointCloud;
-use surfel::surface::{Boundary, SurfaceKind};
-use surfel::trace::{self, Simd, SurfaceHit};
-use surfel_tests::{clouds, scenes};
+use surfel_core::flat::FlatCloud;
+use surfel_core::math::{Ray, Vec3};
+use surfel_core::points::PointCloud;
+use surfel_core::surface::{EdgeTest, SurfaceKind};
+use surfel_core::trace::{self, Simd, SurfaceHit};
+use surfel_tests::clouds;
+use surfel_tests::scenes;
 
 fn hits(scene: &FlatCloud, rays: &[Ray]) -> Vec<SurfaceHit> {
     let mut hits = vec![SurfaceHit::MISS; rays.len()];
@@ -13,18 +14,19 @@ fn hits(scene: &FlatCloud, rays: &[Ray]) -> Vec<SurfaceHit> {
     hits
 }
 
-/// Parallel rays along -Z through the places of a square grid.
+/// Returns parallel rays along -Z through the points of a square grid.
 fn rays_from_above(half_side: f32, n_side: usize) -> Vec<Ray> {
     let at = |i: usize| half_side * ((2 * i + 1) as f32 / n_side as f32 - 1.0);
-    let places = (0..n_side * n_side).map(|i| Vec3::new(at(i % n_side), at(i / n_side), 5.0));
-    places.map(|origin| Ray::new(origin, Vec3::NEG_Z)).collect()
+    let origins = (0..n_side * n_side).map(|i| Vec3::new(at(i % n_side), at(i / n_side), 5.0));
+    origins.map(|origin| Ray::new(origin, Vec3::NEG_Z)).collect()
 }
 
 /// A sphere of 20,000 points of radius 1 has spacing 0.025 and disc radius 0.05.
 #[test]
 fn a_sphere_of_points_has_the_depth_and_normals_of_a_sphere() {
-    // Depth in units and angle in degrees, mean and most. A ball of radius r stands out by r, a disc by
-    // r^2 / 2 at its rim, where it leans by r: 2.9 degrees; splats of twice the radius by four times that; rays come in at up to 45 degrees.
+    // Mean and greatest error of depth in units and of angle in degrees. A ball of radius r stands out by r, a
+    // disc by r^2 / 2 at its rim, where its normal is off by r: 2.9 degrees. Splats of twice the radius stand out
+    // by four times that. Rays are up to 45 degrees from the normal.
     let (r, slant) = (0.05, 1.0 / 0.7);
     let rim = slant * r * r / 2.0;
     let bounds = [
@@ -36,7 +38,7 @@ fn a_sphere_of_points_has_the_depth_and_normals_of_a_sphere() {
     ];
     for (kind, depth_bounds, angle_bounds) in bounds {
         let scene = scenes::flat(clouds::sphere(20_000, 1.0), kind);
-        // Up to 0.7 of the radius: all rays come in within 45 degrees of the normal.
+        // Rays up to 0.7 of the radius are within 45 degrees of the normal.
         let rays: Vec<Ray> = rays_from_above(0.7, 100)
             .into_iter()
             .filter(|ray| ray.origin.truncate().length() < 0.7)
@@ -53,12 +55,12 @@ fn a_sphere_of_points_has_the_depth_and_normals_of_a_sphere() {
     }
 }
 
-fn check(kind: SurfaceKind, what: &str, values: &[f32], [mean_bound, most_bound]: [f32; 2]) {
+fn check(kind: SurfaceKind, quantity: &str, values: &[f32], [mean_bound, max_bound]: [f32; 2]) {
     let mean = values.iter().sum::<f32>() / values.len() as f32;
-    let most = values.iter().copied().fold(0.0, f32::max);
+    let max = values.iter().copied().fold(0.0, f32::max);
     assert!(
-        mean <= mean_bound && most <= most_bound,
-        "{}: {what} {mean} (most {most})",
+        mean <= mean_bound && max <= max_bound,
+        "{}: {quantity} {mean} (at most {max})",
         kind.name()
     );
 }
@@ -75,22 +77,25 @@ fn a_plane_is_flat_and_ends_at_its_outermost_points() {
             assert!((hit.distance - 5.0).abs() < 1e-5, "{kind:?} {ray:?} {hit:?}");
             assert!(1.0 - 1e-6 < hit.normal.z, "{kind:?} {hit:?}");
         }
-        // The outermost points are 0.02 from the rim at ±1, give or take their jitter.
+        // The outermost points are 0.02 from the rim at ±1, plus or minus their jitter.
         let beyond: Vec<Ray> = rays_from_above(1.2, 120)
             .into_iter()
             .filter(|ray| 1.0 < ray.origin.truncate().abs().max_element())
             .collect();
         let n_false = hits(&scene, &beyond).iter().filter(|hit| !hit.is_miss()).count();
         assert_eq!(n_false, 0, "{kind:?}: of {} rays past the rim", beyond.len());
-        let open = FlatCloud { boundary: Boundary::Off, ..scene };
+        let open = FlatCloud { edge_test: EdgeTest::Off, ..scene };
         let n_false = hits(&open, &beyond).iter().filter(|hit| !hit.is_miss()).count();
-        assert!(100 < n_false, "{kind:?}: without the test discs stick out ({n_false})");
+        assert!(
+            100 < n_false,
+            "{kind:?}: without the edge test discs extend past the rim ({n_false})"
+        );
     }
 }
 
-/// Level discs near the crossing stick out through the upright plane and the other way round; the
-/// points around such a place lie on the disc's own plane, so the gap test accepts them: what it must
-/// refuse are discs past the ends of the planes.
+/// Horizontal discs near the crossing extend through the vertical plane, and vertical ones through the horizontal
+/// plane. The points around such a hit lie in the disc's own plane, so the edge test accepts it. It must reject
+/// discs past the ends of the planes.
 #[test]
 fn crossing_planes_end_where_their_points_end() {
     let scene = scenes::flat(clouds::crossing_planes(50, 0.3, 5), SurfaceKind::Splat);
@@ -102,7 +107,7 @@ fn crossing_planes_end_where_their_points_end() {
             assert!(!hit.is_miss(), "a hole beside the crossing: {ray:?}");
         }
     }
-    // Rays along X just above the upright plane's upper end meet nothing; just below they meet it.
+    // Rays along X just above the upper end of the vertical plane miss it, and rays just below hit it.
     let along_x = |height: f32| -> Vec<Ray> {
         let ys = (0..50).map(|i| -0.9 + 1.8 * i as f32 / 49.0);
         ys.map(|y| Ray::new(Vec3::new(5.0, y, height), Vec3::NEG_X)).collect()
@@ -114,8 +119,8 @@ fn crossing_planes_end_where_their_points_end() {
 }
 
 #[test]
-fn the_search_goes_on_behind_a_refused_hit() {
-    // Beyond the end of the upper sheet its discs are refused, and the lower sheet is found.
+fn the_search_continues_behind_a_rejected_hit() {
+    // Past the end of the upper sheet its discs are rejected, and the lower sheet is hit.
     let upper = clouds::plane(40, 0.3, 6);
     let lower = clouds::plane(80, 0.3, 7).positions.into_iter().map(|p| 2.0 * p - Vec3::Z);
     let positions: Vec<Vec3> = upper.positions.iter().copied().chain(lower).collect();
@@ -130,11 +135,11 @@ fn the_search_goes_on_behind_a_refused_hit() {
 }
 
 #[test]
-fn aligned_normals_survive_where_plain_means_cancel() {
-    // Normals of random sign: the mean is worthless, the aligned one is not.
+fn aligned_normals_are_exact_where_means_cancel() {
+    // The signs of the normals are random: their mean is useless, the mean of aligned normals is exact.
     let mut cloud = clouds::sphere(20_000, 1.0);
     for (i, normal) in cloud.normals.as_mut().unwrap().iter_mut().enumerate() {
-        if surfel::math::hash(i as u64) & 1 == 1 {
+        if surfel_core::math::hash(i as u64) & 1 == 1 {
             *normal = -*normal;
         }
     }
@@ -147,30 +152,30 @@ fn aligned_normals_survive_where_plain_means_cancel() {
         });
         angles.sum::<f32>() / rays.len() as f32
     };
-    let (plain, aligned) = (mean_angle(SurfaceKind::SplatMean), mean_angle(SurfaceKind::Splat));
-    assert!(aligned < 0.6 && 4.0 * aligned < plain, "mean {plain}, aligned {aligned}");
+    let (mean, aligned) = (mean_angle(SurfaceKind::SplatMean), mean_angle(SurfaceKind::Splat));
+    assert!(aligned < 0.6 && 4.0 * aligned < mean, "mean {mean}, aligned {aligned}");
 }
 
 #[test]
 fn a_regular_lattice_has_no_holes() {
     let lattice = (0..900).map(|i| Vec3::new((i % 30) as f32, (i / 30) as f32, 0.0)).collect();
     let scene = scenes::flat(PointCloud::from_positions(lattice), SurfaceKind::Splat);
-    // From straight above and aslant, in line with the rows and not.
+    // The eyes are straight above, and at a slant, one of them in line with the rows.
     for eye in
         [Vec3::new(14.5, 14.5, 30.0), Vec3::new(14.5, -10.0, 12.0), Vec3::new(40.0, -7.0, 9.0)]
     {
-        let places =
+        let targets =
             (0..200 * 200).map(|i| Vec3::new((i % 200) as f32, (i / 200) as f32, 0.0) * 0.14 + 0.5);
         let rays: Vec<Ray> =
-            places.map(|p| Ray::new(eye, (p.with_z(0.0) - eye).normalize())).collect();
+            targets.map(|p| Ray::new(eye, (p.with_z(0.0) - eye).normalize())).collect();
         let holes = hits(&scene, &rays).iter().filter(|hit| hit.is_miss()).count();
         assert_eq!(holes, 0, "seen from {eye}, of {}", rays.len());
     }
 }
 
 #[test]
-fn small_radii_leave_no_holes_where_discs_still_overlap() {
-    // Radii of 0.85 spacings: a hit has fewer than four points in reach, too few to judge by.
+fn small_radii_leave_no_holes_if_discs_overlap() {
+    // With radii of 0.85 spacings fewer than four points are near a hit, too few for the edge test.
     let mut cloud = clouds::plane(50, 0.1, 12);
     cloud.radii = Some(vec![0.85 * 0.04; cloud.len()]);
     let scene = scenes::flat(cloud, SurfaceKind::Splat);

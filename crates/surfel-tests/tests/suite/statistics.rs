@@ -1,28 +1,29 @@
-//! Noisy light has the right mean: many pictures of different seeds against plain integration.
+//! Unbiased noise: the mean of many pictures of different seeds against numerical integration.
 //!
-//! A z-test for each pixel, corrected for their number, and one for the whole picture, as the tests of
-//! mitsuba3 have it (`src/render/tests/test_renders.py`). What light a place gets is worked out here from
-//! the formulas alone, in double precision, with what blocks it as geometry.
+//! There is a z-test for each pixel, corrected for the number of pixels, and one for the whole picture, like the
+//! tests of mitsuba3 (`src/render/tests/test_renders.py`). The expected light is computed here from the formulas
+//! alone, in double precision, with the geometry that blocks it.
 
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
-use surfel::flat::FlatScene;
-use surfel::math::{DAffine3, DVec3, Random, Vec3};
-use surfel::progress::Silent;
-use surfel::render::{CpuRenderer, Renderer, Settings};
-use surfel::scene::{
-    Background, Camera, Environment, Geometry, Graph, Lamp, LampKind, Light, Material, Node,
-    Projection, Scene, Sun, Transform,
+use surfel_core::flat::FlatScene;
+use surfel_core::math::{DAffine3, DVec3, Random, Vec3};
+use surfel_core::progress::NoProgress;
+use surfel_core::render::{CpuRenderer, Renderer, Settings};
+use surfel_core::scene::{
+    Background, Camera, Environment, Geometry, Graph, Light, Material, Node, Projection,
+    PunctualLight, PunctualLightKind, Scene, Sun, Transform,
 };
-use surfel::trace::Simd;
+use surfel_core::trace::Simd;
 use surfel_tests::scenes::{self, from_above};
 
 const SIDE: u32 = 12;
-/// Pictures where each has several samples a pixel, and where it has one.
+/// The number of pictures where each has several light samples a pixel.
 const N_RUNS: u64 = 64;
+/// The number of pictures where each has one sample a pixel.
 const N_LONG_RUNS: u64 = 1024;
 
-/// Samples a run; more let the stratification within a run count.
+/// Several light samples a run include the stratification within a run in the test.
 const SETTINGS: Settings = Settings {
     width: SIDE,
     height: SIDE,
@@ -30,17 +31,19 @@ const SETTINGS: Settings = Settings {
     light_samples: 4,
     max_depth: 2,
     seed: 0,
-    with_layers: true,
+    with_aovs: true,
 };
 
-/// Two-sided: one false alarm in a hundred pictures, shared among their pixels (Sidak 1967), is 3.98 for a
-/// normal distribution. That of a mean of 64 runs has heavier tails: 4.3 (Student's).
-const MOST_Z: f64 = 4.3;
-/// The same for one number.
-const MOST_Z_OF_ALL: f64 = 3.5;
+/// The greatest number of standard errors that a pixel may be off by.
+///
+/// One false alarm in a hundred pictures, two-sided and distributed over their pixels (Sidak 1967), gives 3.98 for a
+/// normal distribution. The mean of 64 runs has heavier tails: 4.3 (Student's distribution).
+const MAX_Z: f64 = 4.3;
+/// The greatest number of standard errors that the mean of a picture may be off by.
+const MAX_Z_OF_MEAN: f64 = 3.5;
 
-/// Panics unless the mean of all runs is what `expected` says of each pixel's place and the direction
-/// toward the viewer. `inexact` is the share of it that the formulas of the renderer leave open.
+/// Panics unless the mean of all runs equals `expected` of each pixel's position and direction toward the viewer.
+/// `inexact` is the relative error that the renderer's own formulas allow.
 fn check(
     name: &str,
     scene: &Scene,
@@ -48,20 +51,20 @@ fn check(
     inexact: f64,
     expected: impl Fn(DVec3, DVec3) -> f64 + Sync,
 ) {
-    let flat = FlatScene::new(scene, &Silent).unwrap();
+    let flat = FlatScene::new(scene, &NoProgress).unwrap();
     let renderer = CpuRenderer { simd: Simd::detect() };
     let runs: Vec<_> = (0..n_runs)
-        .map(|seed| renderer.render(&flat, &Settings { seed, ..SETTINGS }, &Silent).unwrap().0)
+        .map(|seed| renderer.render(&flat, &Settings { seed, ..SETTINGS }, &NoProgress).unwrap().0)
         .collect();
-    let positions = &runs[0].layers.as_ref().unwrap().position;
+    let positions = &runs[0].aovs.as_ref().unwrap().position;
     let view = scene.camera.view(flat.origin, SIDE, SIDE);
     let answers: Vec<f64> = positions
         .par_iter()
         .map(|position| expected(position.as_dvec3(), view.toward_camera(*position).as_dvec3()))
         .collect();
     let brightest = answers.iter().copied().fold(0.0, f64::max);
-    // What one sample of all runs brings. That none is found of ten expected ones, which the variance of
-    // the others does not tell, happens once in 20 thousand times.
+    // The contribution of one sample of all runs. With a probability of 1 in 20 thousand none of ten expected
+    // samples is found, which the variance of the others does not show.
     let one = brightest / (n_runs as f64 * f64::from(SETTINGS.light_samples));
     let n = n_runs as f64;
     let (mut sum, mut sum_expected, mut sum_variance) = (0.0, 0.0, 0.0);
@@ -72,7 +75,7 @@ fn check(
         let off = ((mean - answer).abs() - inexact * answer).max(0.0);
         let z = off / variance.sqrt();
         assert!(
-            z < MOST_Z || off < 10.0 * one,
+            z < MAX_Z || off < 10.0 * one,
             "{name}, pixel {i}: {mean} for {answer}, {z} standard errors"
         );
         sum += mean;
@@ -82,22 +85,22 @@ fn check(
     let off = ((sum - sum_expected).abs() - (inexact + INTEGRATION) * sum_expected).max(0.0);
     let z = off / sum_variance.sqrt();
     let (mean, answer) = (sum / answers.len() as f64, sum_expected / answers.len() as f64);
-    assert!(z < MOST_Z_OF_ALL, "{name}: mean {mean} for {answer}, {z} standard errors");
-    // The test tells something: the whole picture is known to within 2 percent.
+    assert!(z < MAX_Z_OF_MEAN, "{name}: mean {mean} for {answer}, {z} standard errors");
+    // The test is strict enough: the mean of the picture is known to within 2 percent.
     assert!(sum_variance.sqrt() < 0.02 * sum, "{name}: too noisy");
 }
 
-/// What the plain integrations here are off by, as a share.
+/// The relative error of the numerical integrations in this file.
 const INTEGRATION: f64 = 5e-4;
 
-/// A white floor, lit as `lights` say, beside what blocks them.
+/// Returns a scene of a white floor with a sheet that blocks a part of the light.
 fn floor_scene(lights: Vec<Light>) -> Scene {
     let graph = scenes::graph(vec![
         (Geometry::Triangles(scenes::floor(0.0, 10.0)), Material::MATTE),
         (Geometry::Triangles(blocker()), Material::MATTE),
     ]);
     let camera = Camera {
-        // From the side and below the blocker.
+        // The camera is at the side, below the sheet.
         position: DVec3::new(0.0, -6.0, 2.0),
         focal_point: DVec3::ZERO,
         view_up: DVec3::Z,
@@ -106,12 +109,12 @@ fn floor_scene(lights: Vec<Light>) -> Scene {
     Scene { graph, lights, background: Background::Transparent, camera }
 }
 
-/// A sheet at z = 2.
-fn blocker() -> surfel::scene::Mesh {
+/// Returns the sheet at z = 2 that blocks light.
+fn blocker() -> surfel_core::scene::Mesh {
     scenes::quad(2.0 * Vec3::Z, 0.5 * Vec3::X, 0.3 * Vec3::Y)
 }
 
-/// Whether nothing blocks the way from `position` up to a height.
+/// Returns whether nothing blocks the path from `position` up to a height.
 fn is_open(position: DVec3, direction: DVec3, height: f64) -> bool {
     if height < 2.0 || direction.z <= 0.0 {
         return true;
@@ -120,19 +123,19 @@ fn is_open(position: DVec3, direction: DVec3, height: f64) -> bool {
     0.5 < at_sheet.x.abs() || 0.3 < at_sheet.y.abs()
 }
 
-/// Middles of `n` by `n` cells of the unit square.
+/// Returns the centres of `n` by `n` cells of the unit square.
 fn cells(n: u32) -> impl Iterator<Item = (f64, f64)> {
     let middle = move |i: u32| (f64::from(i) + 0.5) / f64::from(n);
     (0..n * n).map(move |i| (middle(i % n), middle(i / n)))
 }
 
-/// An orthonormal frame around a direction.
+/// Returns an orthonormal frame whose third axis is a direction.
 fn frame(direction: DVec3) -> [DVec3; 3] {
     let [tangent, bitangent] = direction.any_orthonormal_pair().into();
     [tangent, bitangent, direction]
 }
 
-/// Direction at a height above the plane across a frame's third axis, and at an angle around it.
+/// Returns the direction with a cosine to a frame's third axis, at an angle around that axis.
 fn direction(frame: &[DVec3; 3], height: f64, angle: f64) -> DVec3 {
     let level = (1.0 - height * height).max(0.0).sqrt();
     level * angle.cos() * frame[0] + level * angle.sin() * frame[1] + height * frame[2]
@@ -155,35 +158,35 @@ fn soft_shadows_of_the_sun_have_their_mean() {
 
 #[test]
 fn soft_shadows_of_a_lamp_have_their_mean() {
-    let place = DVec3::new(0.4, 0.2, 4.0);
+    let position_of_lamp = DVec3::new(0.4, 0.2, 4.0);
     let radius = 0.5;
-    let lamp = Lamp {
-        kind: LampKind::Point,
+    let light = PunctualLight {
+        kind: PunctualLightKind::Point,
         color: 16.0 * std::f32::consts::PI * Vec3::ONE,
         range: f32::INFINITY,
         radius: radius as f32,
     };
     let mut scene = floor_scene(Vec::new());
-    let transform = Transform::Matrix(DAffine3::from_translation(place));
-    scene.graph.nodes.push(Node { lamp: Some(lamp), transform, ..Node::new("lamp") });
-    // A disc that faces the receiver, every place of which shines to all sides alike.
-    check("lamp", &scene, N_RUNS, 0.0, |position, _| {
-        let frame = frame((place - position).normalize());
+    let transform = Transform::Matrix(DAffine3::from_translation(position_of_lamp));
+    scene.graph.nodes.push(Node { light: Some(light), transform, ..Node::new("light") });
+    // The light is a disc that faces the shaded point and emits the same radiance everywhere.
+    check("punctual light", &scene, N_RUNS, 0.0, |position, _| {
+        let frame = frame((position_of_lamp - position).normalize());
         let light = |(u, v): (f64, f64)| {
             let (x, y) = (u.sqrt() * (TAU * v).cos(), u.sqrt() * (TAU * v).sin());
-            let way = place + radius * (x * frame[0] + y * frame[1]) - position;
-            let is_open = is_open(position, way.normalize(), way.z);
-            if is_open { 16.0 * way.z / way.length().powi(3) } else { 0.0 }
+            let to_light = position_of_lamp + radius * (x * frame[0] + y * frame[1]) - position;
+            let is_open = is_open(position, to_light.normalize(), to_light.z);
+            if is_open { 16.0 * to_light.z / to_light.length().powi(3) } else { 0.0 }
         };
         cells(200).map(light).sum::<f64>() / 200f64.powi(2)
     });
 }
 
-/// A picture of pixels some of which are bright.
-fn structured(width: u32, share_bright: f32) -> Environment {
+/// Returns an environment of random pixels, some of them bright.
+fn structured(width: u32, bright_fraction: f32) -> Environment {
     let mut random = Random::new(91, 0);
     let mut pixel = || {
-        let is_bright = random.next_f32() < share_bright;
+        let is_bright = random.next_f32() < bright_fraction;
         (if is_bright { 4.0 } else { 0.5 } * random.next_f32()) * Vec3::ONE
     };
     let pixels = (0..width * width / 2).map(|_| pixel()).collect();
@@ -196,7 +199,7 @@ fn an_environment_over_a_floor_has_its_mean() {
     let scene = floor_scene(vec![Light::Environment(environment.clone())]);
     check("environment", &scene, N_RUNS, 0.0, |position, _| {
         let light = |(u, v): (f64, f64)| {
-            // Even in the square of the height: in proportion to the cosine.
+            // Directions are uniform in the square of their height: in proportion to the cosine.
             let toward = direction(&[DVec3::X, DVec3::Y, DVec3::Z], u.sqrt(), TAU * v);
             if !is_open(position, toward, f64::INFINITY) {
                 return 0.0;
@@ -207,10 +210,10 @@ fn an_environment_over_a_floor_has_its_mean() {
     });
 }
 
-/// A plane of rough metal seen from aslant.
+/// Returns a scene of a plane of rough metal, seen at a slant.
 fn metal(roughness: f32, lights: Vec<Light>) -> Scene {
-    let rough = Material { ignores_colors: true, roughness, ..Material::METAL };
-    let graph = Graph::of(Geometry::Triangles(scenes::floor(0.0, 10.0)), rough);
+    let rough = Material { ignores_vertex_colors: true, roughness, ..Material::METAL };
+    let graph = Graph::from_geometry(Geometry::Triangles(scenes::floor(0.0, 10.0)), rough);
     let camera = Camera {
         position: DVec3::new(1.0, -4.0, 3.0),
         focal_point: DVec3::ZERO,
@@ -220,9 +223,9 @@ fn metal(roughness: f32, lights: Vec<Light>) -> Scene {
     Scene { graph, lights, background: Background::Transparent, camera }
 }
 
-/// Radiance times cosine that a rough metal sends to the viewer for a unit of radiance from `toward`, but
-/// for the share that is lost between its facets: GGX (Walter et al. 2007) with the height-correlated
-/// masking of Smith (Heitz 2014), alpha the square of the roughness.
+/// Returns the radiance times cosine that rough metal reflects to the viewer for a unit of radiance from `toward`,
+/// without light that is reflected more than once: GGX (Walter et al. 2007) with Smith's height-correlated masking
+/// (Heitz 2014), and alpha the square of the roughness.
 fn single_bounce(viewer: DVec3, toward: DVec3, roughness: f64) -> f64 {
     let alpha_squared = roughness.powi(4);
     let half = (viewer + toward).normalize();
@@ -230,17 +233,17 @@ fn single_bounce(viewer: DVec3, toward: DVec3, roughness: f64) -> f64 {
     let facets =
         alpha_squared / (PI * half.z.powi(4) * (alpha_squared + tan_squared(half)).powi(2));
     let lambda = |d: DVec3| 0.5 * ((1.0 + alpha_squared * tan_squared(d)).sqrt() - 1.0);
-    let unmasked = 1.0 / (1.0 + lambda(viewer) + lambda(toward));
-    facets * unmasked / (4.0 * viewer.z)
+    let visible = 1.0 / (1.0 + lambda(viewer) + lambda(toward));
+    facets * visible / (4.0 * viewer.z)
 }
 
-/// The integral of `single_bounce` and of its product with `radiance` over the hemisphere. Facets' normals
-/// are gone through rather than directions, evenly in what they make of the lobe.
+/// Returns the integral of `single_bounce` over the hemisphere, and that of its product with `radiance`. It
+/// iterates over normals of facets rather than over directions, uniformly in their distribution.
 fn over_hemisphere(viewer: DVec3, roughness: f64, radiance: impl Fn(DVec3) -> f64) -> (f64, f64) {
     let n = 160;
     let (mut all, mut lit) = (0.0, 0.0);
     for (u, v) in cells(n) {
-        // Tangent of the facet's angle such that cells have equal shares of the distribution's area.
+        // The tangent of the facet's angle is such that all cells have the same probability.
         let tan_squared = roughness.powi(4) * u / (1.0 - u);
         let cos = 1.0 / (1.0 + tan_squared).sqrt();
         let half = direction(&[DVec3::X, DVec3::Y, DVec3::Z], cos, TAU * v);
@@ -248,7 +251,7 @@ fn over_hemisphere(viewer: DVec3, roughness: f64, radiance: impl Fn(DVec3) -> f6
         if toward.z <= 0.0 || viewer.dot(half) <= 0.0 {
             continue;
         }
-        // The density of such facets times that of directions per facet.
+        // The density of these facets times that of directions per facet.
         let alpha_squared = roughness.powi(4);
         let density = alpha_squared
             / (PI * cos.powi(3) * (alpha_squared + tan_squared).powi(2))
@@ -261,7 +264,7 @@ fn over_hemisphere(viewer: DVec3, roughness: f64, radiance: impl Fn(DVec3) -> f6
     (all / n_cells, lit / n_cells)
 }
 
-/// The table of shares lost between facets is interpolated: off by up to this.
+/// The relative error of the interpolated table of light lost between facets.
 const TABLE: f64 = 0.01;
 
 #[test]
@@ -289,7 +292,7 @@ fn highlights_of_the_sun_on_rough_metal_have_their_mean() {
             let (all, _) = over_hemisphere(viewer, f64::from(roughness), |_| 0.0);
             let light = |(u, v): (f64, f64)| {
                 let toward = direction(&around_sun, 1.0 - u * (1.0 - cos_max), TAU * v);
-                // A sun of strength 1 sends pi to what faces it.
+                // A sun of strength 1 has an irradiance of π at normal incidence.
                 if toward.z <= 0.0 {
                     0.0
                 } else {
@@ -301,20 +304,20 @@ fn highlights_of_the_sun_on_rough_metal_have_their_mean() {
     }
 }
 
-/// The test itself: a light a little stronger than said is noticed.
+/// The test fails if a light is slightly stronger than expected.
 #[test]
-fn the_test_would_notice_two_percent() {
+fn the_test_detects_an_error_of_two_percent() {
     let sun = |strength: f32| {
         let color = strength * Vec3::ONE;
         Light::Sun(Sun { direction: Vec3::Z, color, angular_diameter_deg: 25.0 })
     };
     let cos_max = (12.5f64).to_radians().cos();
-    let is_noticed = |strength: f32| {
+    let is_detected = |strength: f32| {
         let mut scene = floor_scene(vec![sun(strength)]);
         scene.camera = from_above(0.5);
         scene.graph.nodes[1].is_visible = false;
         let check = || check("strong sun", &scene, N_RUNS, 0.0, |_, _| 0.5 * (1.0 + cos_max));
         std::panic::catch_unwind(std::panic::AssertUnwindSafe(check)).is_err()
     };
-    assert_eq!([1.0, 1.02].map(is_noticed), [false, true]);
+    assert_eq!([1.0, 1.02].map(is_detected), [false, true]);
 }

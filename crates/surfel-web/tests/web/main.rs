@@ -1,11 +1,11 @@
-//! The server as pages, programs and strangers meet it.
+//! The server in the view of pages, of programs and of misbehaving clients.
 
-mod hostile;
-mod http;
-mod page;
-mod pictures;
+mod abuse;
+mod frame_delivery;
+mod hill_provider;
+mod http_client;
+mod http_routes;
 mod protocol;
-mod requests;
-mod stages;
-mod studio;
-mod viewer;
+mod scene_updates;
+mod test_page;
+mod test_server;

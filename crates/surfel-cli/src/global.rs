@@ -1,0 +1,52 @@
+//! Options of all commands: messages, threads, memory, device.
+
+use crate::options::{KeyOptions, RunScope};
+use crate::report::Verbosity;
+use crate::usage::Usage;
+use anyhow::Context;
+use clap::Args;
+use surfel::description::{Backend, RunSettings};
+
+/// Options of all commands.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Everywhere")]
+pub struct Global {
+    /// Shows nothing but errors.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Also shows how long each stage takes.
+    #[arg(short, long, global = true, hide_short_help = true)]
+    verbose: bool,
+    /// Options of threads, memory and device.
+    #[command(flatten)]
+    pub run: KeyOptions<RunScope>,
+}
+
+impl Global {
+    /// Returns how much is shown.
+    pub fn verbosity(&self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (_, true) => Verbosity::Verbose,
+            _ => Verbosity::Normal,
+        }
+    }
+
+    /// Starts the threads that the options ask for; returns the settings.
+    pub fn start(&self) -> anyhow::Result<RunSettings> {
+        let settings = self.run.description()?.run;
+        start_threads(&settings)?;
+        Ok(settings)
+    }
+}
+
+/// Starts the threads of all work to come.
+pub fn start_threads(settings: &RunSettings) -> anyhow::Result<()> {
+    if settings.backend() == Backend::Gpu {
+        return Err(Usage("--backend gpu: is not in this build; use cpu".into()).into());
+    }
+    let pool = rayon::ThreadPoolBuilder::new();
+    pool.num_threads(settings.threads.unwrap_or(0) as usize)
+        .build_global()
+        .context("the threads cannot be started; ask for fewer with --threads")
+}

@@ -1,0 +1,60 @@
+//! The arguments that say what is seen: files, scene files, and the options of their picture.
+
+use crate::inputs::expand;
+use crate::options::{KeyOptions, RunScope, Scope};
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use surfel::SceneDescription;
+use surfel::description::{Invalid, is_scene_file};
+
+/// Files and options of a scene.
+#[derive(Args, Clone, Debug)]
+pub struct SceneArgs<S: Scope + Clone + Send + Sync + 'static> {
+    /// Point clouds (.ply, .las, .laz, .copc.laz, .xyz, .txt, .csv, .asc, .pts, .bin), meshes (.ply, .obj,
+    /// .stl), glTF scenes (.gltf, .glb) and scene files (.toml, .json); several make one scene. A folder
+    /// stands for its files, `*` for any part of a name, - for standard input.
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
+    /// Short for --background transparent.
+    #[arg(long, conflicts_with = "background", help_heading = "Picture", hide_short_help = true)]
+    no_background: bool,
+    #[command(flatten)]
+    options: KeyOptions<S>,
+}
+
+impl<S: Scope + Clone + Send + Sync> SceneArgs<S> {
+    /// Returns the description of scene files and options: later scene files lie over earlier ones, the command line
+    /// over all of them.
+    ///
+    /// # Errors
+    ///
+    /// Fails for files that cannot be read, and for keys and values that are not valid.
+    pub fn description(&self, run: &KeyOptions<RunScope>) -> anyhow::Result<SceneDescription> {
+        let mut description = SceneDescription::default();
+        let mut layer = self.options.description()?;
+        for file in expand(&self.files)? {
+            if is_scene_file(&file) {
+                description.overlay(SceneDescription::read(&file)?);
+            } else {
+                layer.files.push(file);
+            }
+        }
+        if self.no_background {
+            layer.set("background", &json!("transparent"), Path::new(""))?;
+        }
+        layer.run = run.description()?.run;
+        description.overlay(layer);
+        // Names may clash between scene files, and keys between a file and the command line.
+        let checked = description.check().and_then(|()| description.check_is_not_empty());
+        checked.map_err(|error| self.name_file(error))?;
+        Ok(description)
+    }
+
+    fn name_file(&self, error: Invalid) -> Invalid {
+        match self.files.iter().find(|file| is_scene_file(file)) {
+            Some(file) => error.in_file(file),
+            None => error,
+        }
+    }
+}

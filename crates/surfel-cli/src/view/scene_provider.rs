@@ -1,0 +1,256 @@
+//! Scenes of the files that the viewer was started with, by the settings of its pages.
+
+use super::legend::legend_json;
+use super::page_settings::{self, EVERYTHING};
+use super::point::describe;
+use crate::render::with_info;
+use crate::report::Report;
+use serde_json::{Value, json};
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use surfel::SceneDescription;
+use surfel::description::rule::absolute_text;
+use surfel::description::{CameraSettings, ObjectDescription, write_table};
+use surfel::live::{LiveScene, LiveView};
+use surfel::names::{file_name, list_files};
+use surfel::picture::image_options;
+use surfel::resolve::AutoSettings;
+use surfel_core::image::colormap;
+use surfel_core::math::Vec3;
+use surfel_core::points::PointCloud;
+use surfel_core::progress::{NoProgress, Progress};
+use surfel_core::scene::color::choose_source;
+use surfel_core::scene::{Material, inlier_bounds};
+use surfel_core::surface::SurfaceKind;
+use surfel_web::{
+    Export, Limits, PickedPoint, PointDescriber, PreparedScene, Result, SceneProvider, SettingsMap,
+};
+
+/// The scenes of one set of files.
+pub struct FileSceneProvider {
+    startup: SceneDescription,
+    startup_settings: SettingsMap,
+    /// Files as they were typed, scene files among them.
+    typed: Vec<PathBuf>,
+    scene: Arc<LiveScene>,
+    up: Vec3,
+    /// True if the scene moves its camera.
+    moves_camera: bool,
+}
+
+/// Number of points of a preview; clouds that are not much larger need none.
+const PREVIEW_POINTS: usize = 150_000;
+
+impl FileSceneProvider {
+    /// Reads the files that the program was started with. Choices are reported once; pages make their own again.
+    pub fn open(
+        startup: SceneDescription,
+        typed: Vec<PathBuf>,
+        report: &Report,
+    ) -> surfel::Result<Self> {
+        let scene = LiveScene::open(&startup, report)?;
+        let auto = AutoSettings::choose(scene.loaded(), &startup, report)?;
+        let moves_camera = auto.moves_camera(scene.loaded());
+        let startup_settings = page_settings::startup_settings(&startup);
+        let (scene, up) = (Arc::new(scene), auto.up);
+        Ok(Self { startup, startup_settings, typed, scene, up, moves_camera })
+    }
+
+    fn read(&self, settings: &SettingsMap) -> Result<SceneDescription> {
+        page_settings::read(&self.startup, &self.startup_settings, settings)
+    }
+
+    fn view(&self, description: &SceneDescription, progress: &dyn Progress) -> Result<LiveView> {
+        self.scene.view(description, progress).map_err(page_settings::rejection)
+    }
+
+    fn complete_settings(
+        &self,
+        complete: &SceneDescription,
+        requested: &SceneDescription,
+    ) -> SettingsMap {
+        let mut settings = page_settings::complete_settings(complete, requested);
+        if !settings.contains_key("color")
+            && let Some((_, cloud)) = self.scene.loaded().clouds().next()
+        {
+            settings.insert("color".into(), json!(choose_source(cloud).0.to_string()));
+        }
+        settings
+    }
+
+    fn objects(&self) -> Vec<Value> {
+        let of_files = self.scene.loaded().file_groups().map(|files| match &files[..] {
+            [only] => json!({ "name": file_name(only), "kind": kind_of(only) }),
+            several => {
+                let several: Vec<PathBuf> = several.iter().map(|file| file.to_path_buf()).collect();
+                json!({ "name": EVERYTHING, "label": name_of(&several), "kind": "points" })
+            }
+        });
+        let of_files: Vec<Value> = of_files.collect();
+        let objects = self.startup.objects.iter().map(ObjectDescription::name);
+        let of_scene = objects.map(|name| json!({ "name": name, "kind": "object" }));
+        of_files.into_iter().chain(of_scene).collect()
+    }
+
+    /// Columns by which all clouds can be coloured.
+    fn colors(&self) -> Vec<&str> {
+        let mut clouds = self.scene.loaded().clouds().map(|(_, cloud)| columns(cloud));
+        let mut names = clouds.next().unwrap_or_default();
+        clouds.for_each(|others| names.retain(|name| others.contains(name)));
+        names.extend(["elevation", "normal"]);
+        names
+    }
+
+    /// The files of the command line and of objects.
+    fn all_files(&self) -> Vec<PathBuf> {
+        let objects = self.startup.objects.iter().flat_map(|object| &object.files);
+        self.startup.files.iter().chain(objects).cloned().collect()
+    }
+
+    fn describer(&self, view: &LiveView, time_secs: f64) -> PointDescriber {
+        let (scene, trees) = (self.scene.clone(), view.trees.clone());
+        Arc::new(move |flat, picked: &PickedPoint| {
+            let mut graph = Cow::Borrowed(&trees.graph);
+            if !graph.animation.channels.is_empty() {
+                graph.to_mut().evaluate_at(time_secs);
+            }
+            describe(scene.loaded(), &trees, flat, &graph, picked)
+        })
+    }
+}
+
+fn kind_of(file: &Path) -> &'static str {
+    if surfel_formats::is_cloud(file).unwrap_or(true) { "points" } else { "triangles" }
+}
+
+/// Names of files without their folders, which a page need not know.
+fn name_of(files: &[PathBuf]) -> String {
+    let names: Vec<PathBuf> = files.iter().map(|file| file_name(file).into()).collect();
+    list_files(&names)
+}
+
+/// Columns of a cloud as `--color` takes them.
+fn columns(cloud: &PointCloud) -> Vec<&str> {
+    let usual = [
+        ("rgb", cloud.colors.is_some()),
+        ("intensity", cloud.intensity.is_some()),
+        ("class", cloud.classification.is_some()),
+    ];
+    let usual = usual.into_iter().filter_map(|(name, is_there)| is_there.then_some(name));
+    usual.chain(cloud.scalars.iter().map(|scalar| scalar.name.as_str())).collect()
+}
+
+impl SceneProvider for FileSceneProvider {
+    fn info(&self) -> Value {
+        let loaded = self.scene.loaded();
+        let points = loaded.sample_points();
+        let bounds = inlier_bounds(&points);
+        let world = |corner: Vec3| (points.origin + corner.as_dvec3()).to_array();
+        let (n_points, n_triangles) = loaded.graph.n_points_and_triangles();
+        let limits = Limits::default();
+        json!({
+            "name": name_of(&self.typed),
+            "points": n_points,
+            "triangles": n_triangles,
+            "version": env!("CARGO_PKG_VERSION"),
+            "bounds": { "min": world(bounds.min), "max": world(bounds.max) },
+            "up": self.up.to_array(),
+            "surfaces": SurfaceKind::ALL.map(|(name, _)| name),
+            "colors": self.colors(),
+            "colormaps": colormap::names().collect::<Vec<_>>(),
+            "materials": Material::NAMED.map(|(name, _)| name),
+            "objects": self.objects(),
+            "duration_secs": loaded.duration_secs(),
+            "camera_moves": self.moves_camera,
+            "threads": rayon::current_num_threads(),
+            "simd": self.scene.simd().name(),
+            "coordinate_system": loaded.file_info().coordinate_system,
+            "limits": {
+                "max_pixels": limits.max_view_pixels,
+                "max_save_pixels": limits.max_save_pixels,
+                "max_message_bytes": limits.max_message_bytes,
+            },
+        })
+    }
+
+    fn initial_settings(&self, width: u32, height: u32) -> SettingsMap {
+        let mut settings = self.startup_settings.clone();
+        settings.insert("resolution".into(), json!(format!("{width}x{height}")));
+        let complete = || {
+            let description = self.read(&settings).ok()?;
+            let loaded = self.scene.loaded();
+            let auto = AutoSettings::choose(loaded, &description, &NoProgress).ok()?;
+            let complete = auto.complete_description(loaded);
+            let mut initial = self.complete_settings(&complete, &description);
+            // Chosen once there is something to see.
+            initial.shift_remove("exposure");
+            let exposure = self.startup_settings.get("exposure").cloned();
+            initial.extend(exposure.map(|exposure| ("exposure".to_owned(), exposure)));
+            Some(initial)
+        };
+        // What was valid at the start is so for every size.
+        complete().unwrap_or(settings.clone())
+    }
+
+    fn startup_settings(&self) -> SettingsMap {
+        self.startup_settings.clone()
+    }
+
+    fn preview(
+        &self,
+        settings: &SettingsMap,
+        progress: &dyn Progress,
+    ) -> Option<Result<PreparedScene>> {
+        let (n_points, _) = self.scene.loaded().graph.n_points_and_triangles();
+        if n_points < 3 * PREVIEW_POINTS || settings.contains_key("subsample") {
+            return None;
+        }
+        let mut reduced = settings.clone();
+        reduced.insert("subsample".into(), json!(format!("random:{PREVIEW_POINTS}")));
+        // Fewer points surround less.
+        reduced.insert("edge_test".into(), json!("off"));
+        let scene = self.prepare(&reduced, progress);
+        // The page keeps its settings; what was chosen from few points is chosen again from all.
+        Some(scene.map(|scene| PreparedScene { settings: settings.clone(), ..scene }))
+    }
+
+    fn prepare(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<PreparedScene> {
+        let description = self.read(settings)?;
+        let view = self.view(&description, progress)?;
+        let camera = || Value::Object(write_table(&CameraSettings::of(&view.flat.camera)));
+        Ok(PreparedScene {
+            settings: self.complete_settings(&view.description, &description),
+            animated_camera: view.moves_camera.then(camera),
+            render_settings: view.settings,
+            legend: legend_json(&view.trees.legend),
+            describe: self.describer(&view, description.output.time()),
+            flat: view.flat,
+        })
+    }
+
+    fn render_png(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<Vec<u8>> {
+        let description = self.read(settings)?;
+        page_settings::check_work(&description)?;
+        let view = self.view(&description, progress)?;
+        let image = self.scene.render(&view, progress).map_err(page_settings::rejection)?;
+        let options = image_options(&description, view.flat.origin);
+        surfel_formats::encode_png(&image, &options)
+            .map_err(|error| page_settings::rejection(error.into()))
+    }
+
+    fn export(&self, settings: &SettingsMap) -> Result<Export> {
+        let description = self.read(settings)?;
+        let loaded = self.scene.loaded();
+        let auto = AutoSettings::choose(loaded, &description, &NoProgress);
+        let complete = auto.map_err(page_settings::rejection)?.complete_description(loaded);
+        let files: Vec<String> = self.typed.iter().map(|file| file.display().to_string()).collect();
+        page_settings::export(&description, &files, &complete, &with_info(&complete, loaded))
+    }
+
+    fn read_scene_file(&self, name: &str, text: &str) -> Result<SettingsMap> {
+        let served: Vec<String> =
+            self.all_files().iter().chain(&self.typed).map(|file| absolute_text(file)).collect();
+        page_settings::from_file(name, text, &served)
+    }
+}

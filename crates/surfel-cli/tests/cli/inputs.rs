@@ -1,0 +1,104 @@
+//! Ways to name inputs: standard input, folders and patterns.
+
+use super::common::{Folder, SMALL, command, dome, fail, shot, square, stderr, succeed};
+use std::fs;
+use std::io::Write;
+use std::process::{Output, Stdio};
+
+/// Runs the program with these bytes as standard input; fails if it leaves a temporary file behind.
+fn pipe(arguments: &[&str], input: &[u8]) -> Output {
+    let mut command = command(arguments);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let prefix = format!("surfel-stdin-{}.", child.id());
+    // A program that fails early reads nothing.
+    let _ = child.stdin.take().unwrap().write_all(input);
+    let output = child.wait_with_output().unwrap();
+    let entries = fs::read_dir(std::env::temp_dir()).unwrap().flatten();
+    let mut names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    assert!(!names.any(|name| name.starts_with(&prefix)), "{prefix} was left behind");
+    output
+}
+
+#[test]
+fn standard_input_shows_the_same_picture_as_its_file() {
+    let folder = Folder::new();
+    for (name, content) in [("dome.ply", dome(20)), ("square.xyz", square(12, 90))] {
+        let expected = shot(&folder, &[&folder.write(name, &content)]);
+        let picture = folder.path("piped.png");
+        let arguments = [&["render", "-", "-o", &picture], &SMALL[..]].concat();
+        let output = pipe(&arguments, content.as_bytes());
+        assert!(output.status.success(), "{name}: {}", stderr(&output));
+        assert!(fs::read(&picture).unwrap() == expected, "{name}");
+    }
+}
+
+#[test]
+fn info_and_prepare_read_standard_input() {
+    let folder = Folder::new();
+    let info = pipe(&["info", "--json", "-"], dome(20).as_bytes());
+    assert!(String::from_utf8_lossy(&info.stdout).contains("\"points\": 400"), "{info:?}");
+    let prepared = folder.path("out.ply");
+    let output = pipe(&["prepare", "-", "-o", &prepared], square(9, 5).as_bytes());
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(succeed(&["info", &prepared]).contains("normal"));
+}
+
+#[test]
+fn invalid_standard_input_is_an_error() {
+    let folder = Folder::new();
+    let picture = folder.path("no.png");
+    for input in [&b""[..], b"these are no points", b"ply\nformat ascii 1.0\n"] {
+        let output = pipe(&["render", "-", "-o", &picture], input);
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{text}");
+        assert!(text.starts_with("error: ") && !text.contains("panicked"), "{text}");
+    }
+    let output = pipe(&["render", "-", "-", "-o", &picture], dome(10).as_bytes());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("name it once"), "{}", stderr(&output));
+    assert!(folder.names().is_empty());
+}
+
+#[test]
+fn a_folder_stands_for_its_clouds_and_meshes() {
+    let folder = Folder::new();
+    fs::create_dir(folder.path("tiles")).unwrap();
+    let near = folder.write("tiles/near.ply", dome(20));
+    let far = folder.write("tiles/far.xyz", square(6, 200));
+    folder.write("tiles/notes.md", "no points");
+    fs::create_dir(folder.path("tiles/more.ply")).unwrap();
+    let expected = shot(&folder, &[&far, &near]);
+    assert!(shot(&folder, &[&folder.path("tiles")]) == expected);
+    assert!(shot(&folder, &[&near]) != expected);
+    fs::remove_file(near).unwrap();
+    fs::remove_file(far).unwrap();
+    let text = fail(&["render", &folder.path("tiles"), "-o", "no.png"], 1);
+    assert!(text.contains("tiles: holds no point cloud, mesh or glTF scene"), "{text}");
+}
+
+#[test]
+fn a_pattern_stands_for_the_files_that_match_it() {
+    let folder = Folder::new();
+    let tiles: Vec<String> = ["tile_1.xyz", "tile_2.xyz", "tile_10.xyz"]
+        .iter()
+        .enumerate()
+        .map(|(i, name)| folder.write(name, square(5 + 2 * i, 60 + 60 * i as u8)))
+        .collect();
+    folder.write("other.xyz", square(30, 9));
+    let tiles: Vec<&str> = tiles.iter().map(String::as_str).collect();
+    let expected = shot(&folder, &tiles);
+    assert!(shot(&folder, &[&folder.path("tile_*.xyz")]) == expected);
+    assert!(shot(&folder, &[&folder.path("*.xyz")]) != expected);
+    let text = fail(&["render", &folder.path("tile_*.laz"), "-o", "no.png"], 1);
+    assert!(text.contains("no file matches") && text.contains("tile_*.laz"), "{text}");
+}
+
+#[test]
+fn a_file_whose_name_has_a_star_is_not_a_pattern() {
+    let folder = Folder::new();
+    let star = folder.write("a*.xyz", square(9, 100));
+    folder.write("ab.xyz", square(20, 3));
+    let plain = folder.write("plain.xyz", square(9, 100));
+    assert!(shot(&folder, &[&star]) == shot(&folder, &[&plain]));
+}

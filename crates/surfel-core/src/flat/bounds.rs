@@ -1,0 +1,33 @@
+//! Bounding boxes of blocks, computed from the points as kernels decode them.
+
+use super::block::PointBlock;
+use crate::math::{Aabb, Floats, Lanes, PortableLanes, Vec3};
+use crate::surface::SurfaceKind;
+
+/// Relative margin of radii for rounding here and in the kernels.
+const RADIUS_ROUNDING: f32 = 4e-6;
+/// Relative margin of coordinates for rounding here and in the kernels.
+const POSITION_ROUNDING: f32 = 4.0 * f32::EPSILON;
+
+/// Returns a box that contains the shapes of all points of `block`.
+pub(super) fn block_bounds(kind: SurfaceKind, block: &PointBlock) -> Aabb {
+    let points = block.points::<PortableLanes>(Vec3::ZERO);
+    let radius = points.radius * PortableLanes::splat(1.0 + RADIUS_ROUNDING);
+    let center = [points.center.x, points.center.y, points.center.z];
+    // The squares are integers below 2^20, so that sums and differences are exact. Normals of unused lanes are zero.
+    let squares = [points.normal.x, points.normal.y, points.normal.z].map(|n| n * n);
+    let length_squared = squares[0] + squares[1] + squares[2];
+    let length_squared = length_squared.max(PortableLanes::splat(1.0));
+    let mut bounds = Aabb::EMPTY;
+    for axis in 0..3 {
+        let across = ((length_squared - squares[axis]) / length_squared).sqrt();
+        let extent = if kind.uses_discs() { radius * across } else { radius };
+        let extent = extent + radius * PortableLanes::splat(RADIUS_ROUNDING);
+        bounds.min[axis] =
+            (center[axis] - extent).store().into_iter().fold(f32::INFINITY, f32::min);
+        bounds.max[axis] =
+            (center[axis] + extent).store().into_iter().fold(f32::NEG_INFINITY, f32::max);
+    }
+    let padding = POSITION_ROUNDING * bounds.min.abs().max(bounds.max.abs());
+    Aabb { min: bounds.min - padding, max: bounds.max + padding }
+}

@@ -1,0 +1,27 @@
+//! One instant of a scene as plain arrays, the only scene data that kernels read.
+
+mod block;
+mod block_tree;
+mod bounds;
+mod cloud;
+mod deform;
+mod instance;
+mod mesh;
+mod point_columns;
+mod points;
+mod punctual_light;
+mod refit;
+mod scene;
+mod triangles;
+
+pub use block::{BlockPoint, PointBlock};
+pub use block_tree::{BlockTree, Slot};
+pub use cloud::FlatCloud;
+pub use instance::Instance;
+pub use mesh::FlatMesh;
+pub use point_columns::PointColumns;
+pub use points::FlatPoints;
+pub use punctual_light::FlatPunctualLight;
+pub use refit::{MAX_COST_RATIO, Refit};
+pub use scene::{FlatGeometry, FlatScene};
+pub use triangles::{FlatTriangles, TriangleBlock};

@@ -1,0 +1,347 @@
+//! Whitted ray tracing: mirrors reflect and glass splits rays (Whitted 1980), one wavefront of rays a bounce.
+
+use super::background::background_radiance;
+use super::batch::{CameraRayBatch, Integrator, RayCounts};
+use super::direct::{DirectLight, ShadingPoint};
+use super::media::{Interface, MediumRay};
+use super::shading::Shading;
+use super::specular::{
+    MIN_ROUGHNESS, directional_albedo, fresnel, reflect, refract, sample_ggx_vndf, schlick_fresnel,
+    smith_g2_over_g1, thin_slab_fresnel,
+};
+use crate::error::Result;
+use crate::math::{Basis, Ray, Vec3, Vec4, hash, owen_sobol_2d};
+use crate::scene::Background;
+use crate::trace::{InstanceFilter, SceneHit};
+
+/// An integrator for direct light, mirrors and glass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Whitted {
+    /// Maximum number of reflections and refractions along a path.
+    pub max_depth: u32,
+}
+
+/// Maximum number of alpha-blended layers along a path.
+const MAX_ALPHA_LAYERS: u32 = 64;
+/// Path weight below which Russian roulette ends paths, with the mean preserved.
+const MIN_WEIGHT: f32 = 0.01;
+
+// Random dimensions besides those of direct light.
+const LOBE_DIRECTION: u64 = 11;
+const ROULETTE: u64 = 12;
+const REFLECTED: u64 = 13;
+const REFRACTED: u64 = 14;
+const ALPHA_LAYER: u64 = 15;
+
+/// A path from the camera up to its next ray.
+#[derive(Clone, Copy)]
+struct Path {
+    /// The next ray.
+    ray: MediumRay,
+    /// Throughput from the ray's end to the camera.
+    weight: Vec3,
+    /// Index of the camera ray.
+    ray_idx: u32,
+    /// Random key of this branch.
+    key: u64,
+    /// Index of the path among those with the same random key.
+    index: u32,
+    /// Number of reflections and refractions so far.
+    depth: u32,
+    /// Number of alpha-blended layers passed so far.
+    n_alpha_layers: u32,
+    /// The radiance that the path finds if its ray leaves the scene.
+    on_miss: MissBehavior,
+}
+
+/// The radiance that a ray finds when it leaves the scene.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum MissBehavior {
+    /// The pixel's background: the path has never changed its direction.
+    Background,
+    /// The pixel's background, or the sky where it is transparent: the path went through glass.
+    BackgroundThroughGlass,
+    /// The environment or sky: the path was reflected.
+    Sky { with_sun: bool },
+}
+
+impl Integrator for Whitted {
+    fn radiance(&self, batch: &CameraRayBatch) -> Result<(Vec<Vec4>, RayCounts)> {
+        let mut state = WavefrontState {
+            batch,
+            max_depth: self.max_depth,
+            radiance: vec![Vec3::ZERO; batch.rays.len()],
+            alpha: vec![0.0; batch.rays.len()],
+            shading_points: Vec::with_capacity(batch.rays.len()),
+            queue: Vec::new(),
+        };
+        let n_light_samples = batch.samples.n_light_samples;
+        let direct = DirectLight { tracer: batch.tracer, n_light_samples };
+        let mut counts = RayCounts { primary: batch.rays.len() as u64, ..RayCounts::default() };
+        for (path, hit) in state.camera_paths().zip(batch.hits) {
+            state.shade_hit(path, hit);
+        }
+        let (mut wave, mut hits) = (Vec::new(), Vec::new());
+        loop {
+            counts += direct.add(&state.shading_points, &mut state.radiance)?;
+            state.shading_points.clear();
+            wave.clear();
+            std::mem::swap(&mut wave, &mut state.queue);
+            if wave.is_empty() {
+                break;
+            }
+            let rays: Vec<Ray> = wave.iter().map(|path| path.ray.ray).collect();
+            hits.resize(rays.len(), SceneHit::MISS);
+            batch.tracer.hits(InstanceFilter::All, &rays, &mut hits)?;
+            counts.secondary += rays.len() as u64;
+            for (path, hit) in wave.iter().zip(&hits) {
+                state.shade_hit(*path, hit);
+            }
+        }
+        let colors = state.radiance.iter().zip(&state.alpha);
+        Ok((colors.map(|(radiance, alpha)| radiance.extend(*alpha)).collect(), counts))
+    }
+}
+
+/// The radiance found so far, and the rays of the next wavefront.
+struct WavefrontState<'a> {
+    batch: &'a CameraRayBatch<'a>,
+    max_depth: u32,
+    radiance: Vec<Vec3>,
+    alpha: Vec<f32>,
+    /// Hits of this wavefront that receive direct light.
+    shading_points: Vec<ShadingPoint>,
+    /// Paths of the next wavefront.
+    queue: Vec<Path>,
+}
+
+/// Fractions of light that a surface reflects, refracts and scatters toward the viewer.
+struct Lobes {
+    reflected: Vec3,
+    refracted: Vec3,
+    diffuse: Vec3,
+}
+
+impl<'a> WavefrontState<'a> {
+    fn camera_paths(&self) -> impl Iterator<Item = Path> + use<'a> {
+        let CameraRayBatch { rays, samples, .. } = self.batch;
+        let path = move |(i, ray): (usize, &Ray)| Path {
+            ray: MediumRay::from_camera(*ray),
+            weight: Vec3::ONE,
+            ray_idx: i as u32,
+            key: samples.keys[i],
+            index: samples.indices[i],
+            depth: 0,
+            n_alpha_layers: 0,
+            on_miss: MissBehavior::Background,
+        };
+        rays.iter().enumerate().map(path)
+    }
+
+    /// Adds the radiance emitted at the end of a path's ray, records the point for direct light, and
+    /// enqueues the rays that continue the path.
+    #[inline]
+    fn shade_hit(&mut self, mut path: Path, hit: &SceneHit) {
+        let ray_idx = path.ray_idx as usize;
+        if hit.is_miss() {
+            return self.shade_miss(&path);
+        }
+        let scene = self.batch.tracer.scene;
+        let shading = Shading::new(scene, &path.ray.ray, hit);
+        let interface = path.ray.interface(scene, &shading, hit);
+        let coverage = shading.alpha * path.weight.max_element();
+        path.weight *= interface.transmittance;
+        if shading.alpha < 1.0 {
+            self.continue_through_alpha(&path, &shading);
+            path.weight *= shading.alpha;
+            if shading.alpha <= 0.0 {
+                return;
+            }
+        }
+        if path.on_miss == MissBehavior::Background {
+            self.alpha[ray_idx] += coverage;
+        }
+        if shading.is_unlit {
+            self.radiance[ray_idx] += path.weight * shading.base_color;
+            return;
+        }
+        self.radiance[ray_idx] += path.weight * shading.emission;
+        let direction = path.ray.ray.direction;
+        let lobes = Lobes::new(&shading, direction, interface.eta);
+        let is_rough = MIN_ROUGHNESS <= shading.roughness;
+        let glossy = if is_rough { lobes.reflected } else { Vec3::ZERO };
+        if lobes.diffuse != Vec3::ZERO || glossy != Vec3::ZERO {
+            self.shading_points.push(ShadingPoint {
+                shading,
+                media: interface.near,
+                to_viewer: -direction,
+                diffuse: path.weight * lobes.diffuse,
+                glossy: path.weight * glossy,
+                ray_idx: path.ray_idx,
+                key: path.key,
+                index: path.index,
+            });
+        }
+        if path.depth < self.max_depth {
+            self.reflect(&path, &shading, &lobes, &interface);
+            self.refract(&path, &shading, &lobes, &interface);
+        }
+    }
+
+    /// Adds the radiance that a path finds where its ray leaves the scene.
+    fn shade_miss(&mut self, path: &Path) {
+        let ray_idx = path.ray_idx as usize;
+        let background = self.batch.samples.background[ray_idx];
+        let direction = path.ray.ray.direction;
+        let weight = path.weight * path.ray.transmittance_to_end(self.batch.tracer.scene);
+        let with_sun = path.on_miss == (MissBehavior::Sky { with_sun: true });
+        match path.on_miss {
+            MissBehavior::Background
+                if self.batch.tracer.scene.background == Background::Environment =>
+            {
+                let radiance = background_radiance(self.batch.tracer.scene, direction, false);
+                self.radiance[ray_idx] += weight * radiance;
+                self.alpha[ray_idx] += path.weight.max_element();
+            }
+            // The renderer composites the background.
+            MissBehavior::Background => {}
+            MissBehavior::BackgroundThroughGlass if 0.0 < background.w => {
+                self.radiance[ray_idx] += weight * background.truncate();
+            }
+            MissBehavior::BackgroundThroughGlass | MissBehavior::Sky { .. } => {
+                let radiance = background_radiance(self.batch.tracer.scene, direction, with_sun);
+                self.radiance[ray_idx] += weight * radiance;
+            }
+        }
+    }
+
+    /// Enqueues the part of a path that an alpha-blended surface lets pass.
+    fn continue_through_alpha(&mut self, path: &Path, shading: &Shading) {
+        if MAX_ALPHA_LAYERS <= path.n_alpha_layers {
+            return;
+        }
+        let ray = shading.spawn(path.ray.ray.direction);
+        self.enqueue(Path {
+            ray: MediumRay::from_surface(shading, ray, path.ray.media),
+            weight: path.weight * (1.0 - shading.alpha),
+            key: hash(path.key ^ ALPHA_LAYER),
+            n_alpha_layers: path.n_alpha_layers + 1,
+            ..*path
+        });
+    }
+
+    fn reflect(&mut self, path: &Path, shading: &Shading, lobes: &Lobes, interface: &Interface) {
+        if lobes.reflected == Vec3::ZERO {
+            return;
+        }
+        let direction = path.ray.ray.direction;
+        let (normal, cos_view) = sample_microfacet_normal(path, shading);
+        let mut reflected = reflect(direction, normal);
+        if reflected.dot(shading.geometric_normal) <= 0.0 {
+            // The reflection points into the surface: a rough one is lost, one about a shading normal is
+            // reflected at the geometric surface.
+            if cos_view.is_some() {
+                return;
+            }
+            reflected = reflect(reflected, shading.geometric_normal);
+        }
+        let lobe_weight = cos_view.map_or(1.0, |cos_view| {
+            let cos_light = shading.normal.dot(reflected).max(1e-3);
+            smith_g2_over_g1(cos_view, cos_light, shading.roughness)
+                / directional_albedo(cos_view, shading.roughness)
+        });
+        let is_sharp = shading.roughness < MIN_ROUGHNESS;
+        self.enqueue(Path {
+            ray: MediumRay::from_surface(shading, shading.spawn(reflected), interface.near),
+            weight: path.weight * lobes.reflected * lobe_weight,
+            key: hash(path.key ^ REFLECTED),
+            depth: path.depth + 1,
+            on_miss: MissBehavior::Sky { with_sun: is_sharp },
+            ..*path
+        });
+    }
+
+    fn refract(&mut self, path: &Path, shading: &Shading, lobes: &Lobes, interface: &Interface) {
+        if lobes.refracted == Vec3::ZERO {
+            return;
+        }
+        let direction = path.ray.ray.direction;
+        let (normal, _) = sample_microfacet_normal(path, shading);
+        let refracted = if shading.is_thin {
+            // A thin slab transmits straight on, as blurred as its reflection.
+            let mirrored = reflect(direction, normal);
+            Some(mirrored - 2.0 * mirrored.dot(shading.normal) * shading.normal)
+        } else {
+            // A microfacet can reflect totally where the surface as a whole does not.
+            refract(direction, normal, interface.eta)
+                .or_else(|| refract(direction, shading.normal, interface.eta))
+        };
+        let Some(refracted) = refracted else { return };
+        let is_behind = refracted.dot(shading.geometric_normal) < 0.0;
+        let refracted = if is_behind { refracted } else { direction };
+        self.enqueue(Path {
+            ray: MediumRay::from_surface(shading, shading.spawn(refracted), interface.far),
+            weight: path.weight * lobes.refracted,
+            key: hash(path.key ^ REFRACTED),
+            depth: path.depth + 1,
+            on_miss: match path.on_miss {
+                MissBehavior::Background => MissBehavior::BackgroundThroughGlass,
+                other => other,
+            },
+            ..*path
+        });
+    }
+
+    /// Adds a path to the next wavefront, subject to Russian roulette.
+    fn enqueue(&mut self, mut path: Path) {
+        let survival = path.weight.max_element() / MIN_WEIGHT;
+        if survival < 1.0 {
+            let random = owen_sobol_2d(path.index, hash(path.key ^ ROULETTE)).0;
+            if survival <= random {
+                return;
+            }
+            path.weight /= survival;
+        }
+        self.queue.push(path);
+    }
+}
+
+impl Lobes {
+    /// `eta` is the index of refraction on the viewer's side over that on the far side.
+    fn new(shading: &Shading, direction: Vec3, eta: f32) -> Self {
+        let Shading { metallic, transmission, base_color, is_thin, .. } = *shading;
+        let cos = -shading.normal.dot(direction);
+        if metallic == 0.0 && eta == 1.0 {
+            // A matte surface reflects nothing specularly; the general case below gives the same.
+            let (refracted, diffuse) =
+                (transmission * base_color, (1.0 - transmission) * base_color);
+            return Self { reflected: Vec3::ZERO, refracted, diffuse };
+        }
+        let dielectric = if is_thin { thin_slab_fresnel(cos, eta) } else { fresnel(cos, eta) };
+        let entering = (1.0 - metallic) * (1.0 - dielectric);
+        Self {
+            reflected: (1.0 - metallic) * Vec3::splat(dielectric)
+                + metallic * schlick_fresnel(cos, base_color),
+            refracted: entering * transmission * base_color,
+            diffuse: entering * (1.0 - transmission) * base_color,
+        }
+    }
+}
+
+/// Samples the normal that a ray is reflected about: a visible microfacet normal of a rough surface, with
+/// the cosine between view and shading normal, or the shading normal of a smooth one.
+fn sample_microfacet_normal(path: &Path, shading: &Shading) -> (Vec3, Option<f32>) {
+    if shading.roughness < MIN_ROUGHNESS {
+        return (shading.normal, None);
+    }
+    let basis = Basis::around(shading.normal);
+    let to_viewer = -path.ray.ray.direction;
+    let view = Vec3::new(
+        to_viewer.dot(basis.tangent),
+        to_viewer.dot(basis.bitangent),
+        to_viewer.dot(basis.normal).max(1e-3),
+    );
+    let uv = owen_sobol_2d(path.index, hash(path.key ^ LOBE_DIRECTION));
+    let normal = basis.to_world(sample_ggx_vndf(view.normalize(), shading.roughness, uv));
+    (normal, Some(view.z))
+}

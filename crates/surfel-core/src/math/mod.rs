@@ -1,0 +1,36 @@
+//! Boxes, rays, bases, Morton order, sampling maps, distributions, eigenvectors, counter-based random
+//! numbers, and the lanes in which kernels compute.
+
+mod aabb;
+mod basis;
+mod distribution;
+mod doubled_lanes;
+mod eigen;
+mod lanes;
+mod morton;
+mod portable;
+mod random;
+mod ray;
+mod sampling;
+mod set_bits;
+mod slab;
+
+pub use aabb::Aabb;
+pub use basis::{Basis, tangents};
+pub use distribution::Distribution2d;
+pub use doubled_lanes::DoubledLanes;
+pub use eigen::{SymmetricMatrix, smallest_eigenvector};
+pub use glam::{
+    Affine3A, DAffine3, DMat3, DQuat, DVec2, DVec3, Mat3, Quat, Vec2, Vec3, Vec3A, Vec4,
+};
+pub use lanes::{
+    Floats, LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, ROUND_TO_INTEGER, SimdTask,
+    Vec3Lanes,
+};
+pub use morton::morton_decode;
+pub use portable::{PortableLanes, PortableMask};
+pub use random::{Random, hash};
+pub use ray::Ray;
+pub use sampling::{cosine_hemisphere, disk, owen_sobol_2d, uniform_cone};
+pub use set_bits::{SetBits, set_bits};
+pub use slab::{clip_to_box, clip_to_slab, finite_inverse, finite_inverse_vec3};

@@ -1,0 +1,247 @@
+//! Point clouds as columns of equal length, with positions relative to a double-precision origin.
+
+use super::deformation::{Morph, Skin, pick};
+use crate::math::{Aabb, DVec3, Vec3};
+
+/// Maximum magnitude of a coordinate whose squares are sure to be finite. Files mark points without a measurement
+/// by larger numbers.
+const MAX_COORDINATE: f32 = 1e15;
+
+/// Returns true if all coordinates are numbers below 1e15 in magnitude.
+pub fn is_valid_position(position: Vec3) -> bool {
+    position.abs().cmplt(Vec3::splat(MAX_COORDINATE)).all()
+}
+
+/// A point cloud as columns. Every column that is present has one entry for each position.
+///
+/// World coordinates are right-handed with Z up; lengths are in the file's unit, metres unless it says otherwise.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PointCloud {
+    /// World coordinates of the zero of `positions`, which lets f32 keep the full resolution of a georeferenced
+    /// scan.
+    pub origin: DVec3,
+    /// Positions relative to `origin`.
+    pub positions: Vec<Vec3>,
+    /// Unit normals.
+    pub normals: Option<Vec<Vec3>>,
+    /// Radii in world units.
+    pub radii: Option<Vec<f32>>,
+    /// sRGB-encoded colours of 16 bits per channel; an 8-bit value v is stored as 257 v.
+    pub colors: Option<Vec<[u16; 3]>>,
+    /// Intensities in the file's own range.
+    pub intensity: Option<Vec<f32>>,
+    /// ASPRS classes.
+    pub classification: Option<Vec<u8>>,
+    /// Index of each point among those that were read, kept by all steps that drop or reorder points.
+    pub source_indices: Option<Vec<u32>>,
+    /// All other columns, which have names.
+    pub scalars: Vec<Scalar>,
+    /// Morph targets.
+    pub morphs: Vec<Morph>,
+    /// Joints that move the points.
+    pub skin: Option<Skin>,
+}
+
+/// A named column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scalar {
+    /// Name of the column, as in its file.
+    pub name: String,
+    /// Values of the column.
+    pub values: Values,
+}
+
+/// The values of a named column in the narrowest type that holds the file's.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Values {
+    /// Unsigned 8-bit integers.
+    U8(Vec<u8>),
+    /// Unsigned 16-bit integers.
+    U16(Vec<u16>),
+    /// Signed 32-bit integers.
+    I32(Vec<i32>),
+    /// Single-precision numbers.
+    F32(Vec<f32>),
+    /// Double-precision numbers.
+    F64(Vec<f64>),
+}
+
+impl PointCloud {
+    /// Creates a cloud of positions about the origin (0, 0, 0), without other columns.
+    pub fn from_positions(positions: Vec<Vec3>) -> Self {
+        Self { positions, ..Self::default() }
+    }
+
+    /// Returns the number of points.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Returns true if the cloud has no points.
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// Returns the world coordinates of a point.
+    pub fn world_position(&self, point_idx: usize) -> DVec3 {
+        self.origin + self.positions[point_idx].as_dvec3()
+    }
+
+    /// Returns the bounds of the positions, relative to `origin`.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::of_points(self.positions.iter().copied())
+    }
+
+    /// Returns the name and the length of each column that is present.
+    pub(crate) fn column_lengths(&self) -> impl Iterator<Item = (&'static str, usize)> {
+        let columns = [
+            ("normals", self.normals.as_ref().map(Vec::len)),
+            ("radii", self.radii.as_ref().map(Vec::len)),
+            ("colours", self.colors.as_ref().map(Vec::len)),
+            ("intensities", self.intensity.as_ref().map(Vec::len)),
+            ("classes", self.classification.as_ref().map(Vec::len)),
+            ("source indices", self.source_indices.as_ref().map(Vec::len)),
+            ("joints", self.skin.as_ref().map(|skin| skin.joints.len())),
+            ("joint weights", self.skin.as_ref().map(|skin| skin.weights.len())),
+        ];
+        let scalars = self.scalars.iter().map(|scalar| ("scalars", Some(scalar.values.len())));
+        let morphs = self.morphs.iter().flat_map(|morph| {
+            [
+                ("morph target positions", Some(morph.positions.len())),
+                ("morph target normals", morph.normals.as_ref().map(Vec::len)),
+                ("morph target radii", morph.radii.as_ref().map(Vec::len)),
+            ]
+        });
+        let all = columns.into_iter().chain(scalars).chain(morphs);
+        all.filter_map(|(column, length)| Some((column, length?)))
+    }
+
+    /// Returns the scalar column of this name in any case, if the cloud has it.
+    pub fn scalar(&self, name: &str) -> Option<&Values> {
+        self.scalars
+            .iter()
+            .find(|scalar| scalar.name.eq_ignore_ascii_case(name))
+            .map(|scalar| &scalar.values)
+    }
+
+    /// Returns the points at `indices`, in that order, with all their columns.
+    pub fn subset(&self, indices: &[u32]) -> Self {
+        Self {
+            origin: self.origin,
+            positions: pick(&self.positions, indices),
+            normals: self.normals.as_ref().map(|column| pick(column, indices)),
+            radii: self.radii.as_ref().map(|column| pick(column, indices)),
+            colors: self.colors.as_ref().map(|column| pick(column, indices)),
+            intensity: self.intensity.as_ref().map(|column| pick(column, indices)),
+            classification: self.classification.as_ref().map(|column| pick(column, indices)),
+            source_indices: self.source_indices.as_ref().map(|column| pick(column, indices)),
+            scalars: self
+                .scalars
+                .iter()
+                .map(|Scalar { name, values }| Scalar {
+                    name: name.clone(),
+                    values: match values {
+                        Values::U8(v) => Values::U8(pick(v, indices)),
+                        Values::U16(v) => Values::U16(pick(v, indices)),
+                        Values::I32(v) => Values::I32(pick(v, indices)),
+                        Values::F32(v) => Values::F32(pick(v, indices)),
+                        Values::F64(v) => Values::F64(pick(v, indices)),
+                    },
+                })
+                .collect(),
+            morphs: self.morphs.iter().map(|morph| morph.subset(indices)).collect(),
+            skin: self.skin.as_ref().map(|skin| skin.subset(indices)),
+        }
+    }
+
+    /// Returns an origin for points at these world positions: their median, rounded to whole units.
+    ///
+    /// An outlier does not move the median, as it does the middle of the bounds.
+    pub fn choose_origin(sample: &[DVec3]) -> DVec3 {
+        let median = |axis: usize| {
+            let mut values: Vec<f64> = sample
+                .iter()
+                .map(|p| p[axis])
+                .filter(|x| x.abs() < f64::from(MAX_COORDINATE))
+                .collect();
+            let middle = values.len() / 2;
+            if values.is_empty() {
+                0.0
+            } else {
+                values.select_nth_unstable_by(middle, f64::total_cmp).1.round()
+            }
+        };
+        DVec3::new(median(0), median(1), median(2))
+    }
+
+    /// Moves the zero of `positions` to `origin`; world coordinates stay.
+    pub fn rebase(&mut self, origin: DVec3) {
+        let shift = self.origin - origin;
+        for position in &mut self.positions {
+            *position = (position.as_dvec3() + shift).as_vec3();
+        }
+        self.origin = origin;
+    }
+}
+
+impl AsRef<PointCloud> for PointCloud {
+    fn as_ref(&self) -> &PointCloud {
+        self
+    }
+}
+
+impl Values {
+    /// Returns the number of values.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::U8(v) => v.len(),
+            Self::U16(v) => v.len(),
+            Self::I32(v) => v.len(),
+            Self::F32(v) => v.len(),
+            Self::F64(v) => v.len(),
+        }
+    }
+
+    /// Returns true if there are no values.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Returns the value of a point.
+    pub fn get(&self, point_idx: usize) -> f64 {
+        match self {
+            Self::U8(v) => v[point_idx].into(),
+            Self::U16(v) => v[point_idx].into(),
+            Self::I32(v) => v[point_idx].into(),
+            Self::F32(v) => v[point_idx].into(),
+            Self::F64(v) => v[point_idx],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Origins of clouds.
+
+    use super::*;
+
+    #[test]
+    fn an_outlier_does_not_move_the_origin() {
+        let mut sample = vec![DVec3::new(500_000.25, 4_900_000.5, 100.0); 9];
+        sample.push(DVec3::splat(1e12));
+        assert_eq!(PointCloud::choose_origin(&sample), DVec3::new(500_000.0, 4_900_001.0, 100.0));
+        assert_eq!(PointCloud::choose_origin(&[]), DVec3::ZERO);
+        sample.extend([DVec3::splat(3.4e38); 20]);
+        assert_eq!(PointCloud::choose_origin(&sample), DVec3::new(500_000.0, 4_900_001.0, 100.0));
+        assert_eq!(PointCloud::choose_origin(&sample[10..]), DVec3::ZERO);
+    }
+
+    #[test]
+    fn rebasing_keeps_world_positions() {
+        let mut cloud = PointCloud::from_positions(vec![Vec3::new(1.5, -2.25, 3.0)]);
+        cloud.origin = DVec3::new(500_000.0, 0.0, 0.0);
+        let before = cloud.world_position(0);
+        cloud.rebase(DVec3::new(500_010.0, 7.0, 0.0));
+        assert_eq!(cloud.world_position(0), before);
+    }
+}

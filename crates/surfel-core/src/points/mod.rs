@@ -1,0 +1,27 @@
+//! Point clouds as columns, and the preparation that tracing needs.
+
+mod deformation;
+mod clean;
+mod cloud;
+mod merge;
+pub mod neighbors;
+mod normals;
+mod orient;
+mod prepare;
+mod prepared_cloud;
+mod radius;
+mod subsample;
+mod up;
+
+pub use clean::{CleanReport, clean};
+pub use cloud::{PointCloud, Scalar, Values, is_valid_position};
+pub use deformation::{Morph, Skin};
+pub use merge::merge;
+pub use normals::{NormalReport, PlaneFit, fill_missing, fit_plane};
+pub use orient::{Orientation, orient};
+pub use prepare::{Preparation, PreparationReport, SURFACE_VARIATION, prepare};
+pub use prepared_cloud::PreparedCloud;
+pub(crate) use prepared_cloud::check_length;
+pub use radius::{DistanceSample, Radius, RadiusReport, estimate_radii, median_distance, spacing};
+pub use subsample::{Subsample, subsample};
+pub use up::{InferredUp, infer_up};

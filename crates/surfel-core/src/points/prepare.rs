@@ -1,0 +1,481 @@
+//! Preparation: cleans and subsamples a cloud, and adds the normals and radii that it lacks.
+
+use super::neighbors::{KdTree, Neighbor, NeighborMethod, Neighborhood, map_neighborhoods};
+use super::normals::{NormalReport, PlaneFit, fill_missing, fit_plane};
+use super::orient::{Orientation, orient};
+use super::radius::{DistanceSample, Radius, RadiusReport, median_distance};
+use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
+use super::{CleanReport, PointCloud, PreparedCloud, Scalar, Subsample, Values, clean, subsample};
+use crate::error::{Error, Result};
+use crate::math::Vec3;
+use crate::progress::Progress;
+
+/// Name of the scalar column that `Preparation::keep_variation` adds.
+pub const SURFACE_VARIATION: &str = "surface_variation";
+
+/// Settings of [`prepare`]. The default suits raw scans.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Preparation {
+    /// The points to keep; none keeps all.
+    pub subsample: Option<Subsample>,
+    /// The method that finds neighbours.
+    pub neighbors: NeighborMethod,
+    /// The neighbours whose plane gives a normal. Methods that know only distances use the median distance to k.
+    pub normals: Neighborhood,
+    /// The signs of normals. Applies if all normals are estimated.
+    pub orientation: Orientation,
+    /// The choice of radii.
+    pub radius: Radius,
+    /// True to add the column `SURFACE_VARIATION`: 0 on a plane, up to 1/3.
+    pub keep_variation: bool,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+impl Default for Preparation {
+    fn default() -> Self {
+        Self {
+            subsample: None,
+            neighbors: NeighborMethod::Knn,
+            normals: Neighborhood::Nearest(16),
+            orientation: Orientation::None,
+            radius: Radius::default(),
+            keep_variation: false,
+            seed: 0,
+        }
+    }
+}
+
+impl Preparation {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Error::Setting`] for a value out of range, as [`prepare`] does.
+    pub fn check(&self) -> Result<()> {
+        self.radius.check()?;
+        if let Neighborhood::Nearest(k @ 0..2) = self.normals {
+            let expected = "at least 2, to span a plane";
+            let name = "number of neighbours for normals";
+            return Err(Error::Setting { name, found: k.to_string(), expected });
+        }
+        Ok(())
+    }
+}
+
+/// Report of [`prepare`]. A field is none if the cloud already had the column.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PreparationReport {
+    /// Repairs of the cloud.
+    pub clean: CleanReport,
+    /// Number of points after cleaning and subsampling.
+    pub n_points: usize,
+    /// Origin of the estimated normals.
+    pub normals: Option<NormalReport>,
+    /// The neighbourhood that normals were estimated from: `Preparation::normals`, or the distance used in its place.
+    pub normals_from: Option<Neighborhood>,
+    /// Statistics of the estimated radii.
+    pub radii: Option<RadiusReport>,
+}
+
+/// Cleans and subsamples a cloud, then adds the normals and radii that are missing. Those of the file stay. Columns
+/// that are estimated get offsets in each morph target, estimated from the points where the target moves them.
+///
+/// # Errors
+///
+/// Returns [`Error::Setting`] for a setting out of range, [`Error::EmptyCloud`] if no point is left,
+/// [`Error::TooManyPoints`] beyond 32-bit indices, and [`Error::Cancelled`] if `progress` is cancelled.
+pub fn prepare(
+    cloud: PointCloud,
+    preparation: &Preparation,
+    progress: &dyn Progress,
+) -> Result<(PreparedCloud, PreparationReport)> {
+    preparation.check()?;
+    let (mut cloud, clean) = clean(cloud, progress)?;
+    if let Some(choice) = preparation.subsample {
+        cloud = subsample(&cloud, choice, preparation.seed, progress)?;
+    }
+    if cloud.is_empty() {
+        return Err(Error::EmptyCloud);
+    }
+    let missing = Missing::any(&cloud, preparation);
+    let estimated = Missing::all(&cloud);
+    let mut report =
+        PreparationReport { clean, n_points: cloud.len(), ..PreparationReport::default() };
+    let estimates = estimate(&cloud.positions, preparation, &missing, progress)?;
+    if let Some((fits, neighborhood)) = estimates.fits {
+        if preparation.keep_variation {
+            add_variation(&mut cloud, &fits);
+        }
+        if missing.normals {
+            let found = add_normals(&mut cloud, &fits, preparation, progress)?;
+            found.repairs().iter().for_each(|line| progress.note(line));
+            report.normals = Some(found);
+            report.normals_from = Some(neighborhood);
+        }
+    }
+    if let Some((radii, found)) = estimates.radii {
+        add_radii(&mut cloud, radii);
+        report.radii = Some(found);
+    }
+    add_to_morphs(&mut cloud, &estimated, preparation, progress)?;
+    Ok((PreparedCloud::new(cloud)?, report))
+}
+
+/// The columns to estimate.
+struct Missing {
+    normals: bool,
+    fits: bool,
+    radii: bool,
+}
+
+impl Missing {
+    /// Columns with missing entries.
+    fn any(cloud: &PointCloud, preparation: &Preparation) -> Self {
+        let normals = cloud.normals.as_ref().is_none_or(|normals| normals.contains(&Vec3::ZERO));
+        let radii = cloud.radii.as_ref().is_none_or(|radii| radii.contains(&0.0));
+        Self { normals, fits: normals || preparation.keep_variation, radii }
+    }
+
+    /// Columns that the cloud lacks altogether.
+    fn all(cloud: &PointCloud) -> Self {
+        let (normals, radii) = (cloud.normals.is_none(), cloud.radii.is_none());
+        Self { normals, fits: normals, radii }
+    }
+}
+
+/// Estimates from neighbourhoods, none where nothing is missing.
+#[derive(Default)]
+struct Estimates {
+    fits: Option<(Vec<PlaneFit>, Neighborhood)>,
+    radii: Option<(Vec<f32>, RadiusReport)>,
+}
+
+/// Fits planes and estimates radii as far as they are missing.
+fn estimate(
+    positions: &[Vec3],
+    preparation: &Preparation,
+    missing: &Missing,
+    progress: &dyn Progress,
+) -> Result<Estimates> {
+    if let (
+        NeighborMethod::Knn,
+        Neighborhood::Nearest(k_normal),
+        Radius::Adaptive { k: k_radius },
+        true,
+        true,
+    ) = (
+        preparation.neighbors,
+        preparation.normals,
+        preparation.radius,
+        missing.fits,
+        missing.radii,
+    ) {
+        return estimate_together(positions, k_normal, k_radius, progress);
+    }
+    let mut estimates = Estimates::default();
+    if missing.fits {
+        estimates.fits = Some(fit_planes(positions, preparation, progress)?);
+    }
+    if missing.radii {
+        let Preparation { radius, seed, .. } = *preparation;
+        estimates.radii = Some(estimate_radii(positions, radius, seed, progress)?);
+    }
+    Ok(estimates)
+}
+
+/// Fits planes and estimates radii with one search for neighbours.
+fn estimate_together(
+    positions: &[Vec3],
+    k_normal: usize,
+    k_radius: usize,
+    progress: &dyn Progress,
+) -> Result<Estimates> {
+    let tree = KdTree::new(positions, progress)?;
+    let visit = |point: usize, neighbors: &[Neighbor]| {
+        let fit = fit_plane(positions, point, &neighbors[..k_normal.min(neighbors.len())]);
+        (fit, kth_distance(neighbors, k_radius))
+    };
+    let both = tree.map(Neighborhood::Nearest(k_normal.max(k_radius)), progress, visit)?;
+    // The fits reuse the memory of the pairs, which `unzip` would not.
+    let distances = both.iter().map(|(_, distance)| *distance).collect();
+    let fits = both.into_iter().map(|(fit, _)| fit).collect();
+    let radii = clamp_outlier_radii(&tree, k_radius, distances, progress)?;
+    Ok(Estimates { fits: Some((fits, Neighborhood::Nearest(k_normal))), radii: Some(radii) })
+}
+
+fn fit_planes(
+    positions: &[Vec3],
+    preparation: &Preparation,
+    progress: &dyn Progress,
+) -> Result<(Vec<PlaneFit>, Neighborhood)> {
+    let Preparation { neighbors: method, normals: mut neighborhood, seed, .. } = *preparation;
+    if let (Neighborhood::Nearest(k), NeighborMethod::Grid | NeighborMethod::ScanLine) =
+        (neighborhood, method)
+    {
+        // Half of the k nearest points lie within the median distance, all k within about sqrt(2) times it.
+        let sample = DistanceSample { k: k.min(positions.len()), samples: 100, seed };
+        let distance = std::f32::consts::SQRT_2 * median_distance(positions, &sample, progress)?;
+        neighborhood = Neighborhood::Within(distance);
+    }
+    let fit = |point: usize, neighbors: &[Neighbor]| fit_plane(positions, point, neighbors);
+    Ok((map_neighborhoods(positions, method, neighborhood, progress, fit)?, neighborhood))
+}
+
+fn add_variation(cloud: &mut PointCloud, fits: &[PlaneFit]) {
+    let values = Values::F32(fits.iter().map(|fit| fit.variation).collect());
+    cloud.scalars.retain(|scalar| scalar.name != SURFACE_VARIATION);
+    cloud.scalars.push(Scalar { name: SURFACE_VARIATION.to_owned(), values });
+}
+
+fn add_normals(
+    cloud: &mut PointCloud,
+    fits: &[PlaneFit],
+    preparation: &Preparation,
+    progress: &dyn Progress,
+) -> Result<NormalReport> {
+    let Some(given) = cloud.normals.take() else {
+        let mut normals = fits.iter().map(|fit| fit.normal).collect::<Vec<_>>();
+        let report = fill_missing(&cloud.positions, &mut normals, progress)?;
+        cloud.normals = Some(orient(cloud, normals, preparation.orientation, progress)?);
+        return Ok(report);
+    };
+    // Each takes its sign from the nearest normal of the file; `clean` leaves at least one.
+    let mut normals = given.clone();
+    fill_missing(&cloud.positions, &mut normals, progress)?;
+    let mut report = NormalReport::default();
+    for ((normal, given), fit) in normals.iter_mut().zip(&given).zip(fits) {
+        if *given != Vec3::ZERO {
+            continue;
+        }
+        if fit.normal == Vec3::ZERO {
+            report.n_from_nearest += 1;
+        } else {
+            *normal = if normal.dot(fit.normal) < 0.0 { -fit.normal } else { fit.normal };
+            report.n_estimated += 1;
+        }
+    }
+    cloud.normals = Some(normals);
+    Ok(report)
+}
+
+fn add_radii(cloud: &mut PointCloud, estimated: Vec<f32>) {
+    match &mut cloud.radii {
+        None => cloud.radii = Some(estimated),
+        Some(radii) => {
+            let missing = radii.iter_mut().zip(estimated).filter(|(radius, _)| **radius == 0.0);
+            missing.for_each(|(radius, estimated)| *radius = estimated);
+        }
+    }
+}
+
+/// Adds offsets of the estimated normals and radii to each morph target: the estimates from the positions of the
+/// target minus those at rest. In between both change linearly, as positions do.
+fn add_to_morphs(
+    cloud: &mut PointCloud,
+    estimated: &Missing,
+    preparation: &Preparation,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let PointCloud { positions, normals, radii, morphs, .. } = cloud;
+    if !(estimated.normals || estimated.radii) {
+        return Ok(());
+    }
+    for morph in morphs {
+        let moved: Vec<Vec3> = positions.iter().zip(&morph.positions).map(|(a, b)| a + b).collect();
+        if !moved.iter().all(|position| position.is_finite()) {
+            continue;
+        }
+        let estimates = estimate(&moved, preparation, estimated, &WithoutNotes(progress))?;
+        if let (Some((fits, _)), Some(normals)) = (estimates.fits, &*normals) {
+            let added = |(fit, normal): (&PlaneFit, &Vec3)| match fit.normal {
+                // Without a plane at the target, the normal stays; otherwise it keeps its side.
+                Vec3::ZERO => Vec3::ZERO,
+                found if found.dot(*normal) < 0.0 => -found - normal,
+                found => found - normal,
+            };
+            morph.normals = Some(fits.iter().zip(normals).map(added).collect());
+        }
+        if let (Some((moved_radii, _)), Some(radii)) = (estimates.radii, &*radii) {
+            let added = moved_radii.iter().zip(radii).map(|(moved, radius)| moved - radius);
+            morph.radii = Some(added.collect());
+        }
+    }
+    Ok(())
+}
+
+/// Drops the notes about points of morph targets.
+struct WithoutNotes<'a>(&'a dyn Progress);
+
+impl Progress for WithoutNotes<'_> {
+    fn begin(&self, stage: &str, total: u64) {
+        self.0.begin(stage, total);
+    }
+
+    fn advance(&self, units: u64) {
+        self.0.advance(units);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.0.is_cancelled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Prepared columns, reports and errors.
+
+    use super::*;
+    use crate::math::Random;
+    use crate::progress::NoProgress;
+
+    fn ball(n_points: usize) -> PointCloud {
+        let mut random = Random::new(1, 0);
+        let mut direction =
+            || Vec3::from_array(std::array::from_fn(|_| random.next_gaussian() as f32));
+        PointCloud::from_positions((0..n_points).map(|_| direction().normalize()).collect())
+    }
+
+    fn preparations() -> Vec<Preparation> {
+        let with = |neighbors| Preparation { neighbors, ..Preparation::default() };
+        vec![
+            Preparation::default(),
+            with(NeighborMethod::Grid),
+            with(NeighborMethod::ScanLine),
+            Preparation {
+                normals: Neighborhood::Within(0.1),
+                keep_variation: true,
+                ..with(NeighborMethod::Knn)
+            },
+            Preparation {
+                orientation: Orientation::SpanningTree,
+                radius: Radius::Median { n: 6, samples: 20 },
+                subsample: Some(Subsample::Random(3000)),
+                ..Preparation::default()
+            },
+        ]
+    }
+
+    #[test]
+    fn output_is_independent_of_thread_count() {
+        let cloud = ball(5000);
+        for preparation in preparations() {
+            let with_threads = |n_threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+                pool.install(|| prepare(cloud.clone(), &preparation, &NoProgress).unwrap())
+            };
+            let (one, two) = (with_threads(1), with_threads(2));
+            assert!(one == two && one == with_threads(5), "{preparation:?}");
+        }
+    }
+
+    #[test]
+    fn degenerate_clouds_are_filled_or_rejected() {
+        let line = (0..40).map(|i| Vec3::X * i as f32).collect();
+        // Each cloud with the number of its distinct points.
+        let clouds = [
+            (vec![Vec3::ONE], 1),
+            (vec![Vec3::X, Vec3::Y], 2),
+            (vec![Vec3::ONE; 50], 1),
+            (line, 40),
+        ];
+        for preparation in preparations() {
+            for (positions, n_distinct) in &clouds {
+                let cloud = PointCloud::from_positions(positions.clone());
+                let (cloud, report) = prepare(cloud, &preparation, &NoProgress).unwrap();
+                assert!(cloud.normals().iter().all(|normal| normal.is_normalized()));
+                assert!(cloud.radii().iter().all(|&radius| 0.0 < radius && radius < 1e3));
+                assert_eq!(report.n_points, *n_distinct);
+                let lens = [cloud.len(), cloud.normals().len(), cloud.radii().len()];
+                assert_eq!(lens, [*n_distinct; 3]);
+            }
+            for positions in [vec![], vec![Vec3::NAN; 3]] {
+                let cloud = PointCloud::from_positions(positions);
+                assert_eq!(prepare(cloud, &preparation, &NoProgress), Err(Error::EmptyCloud));
+            }
+        }
+    }
+
+    #[test]
+    fn columns_of_the_file_stay_and_missing_entries_are_estimated() {
+        let mut cloud = ball(3000);
+        let mut normals: Vec<Vec3> = cloud.positions.iter().map(|&p| -p).collect();
+        normals[10] = Vec3::ZERO;
+        let mut radii = vec![0.25; 3000];
+        radii[20] = f32::NAN;
+        (cloud.normals, cloud.radii) = (Some(normals.clone()), Some(radii));
+        let (prepared, report) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+        let found = prepared.normals();
+        assert!(
+            found[10].dot(-prepared.positions[10]) > 0.99,
+            "the sign is that of the neighbours"
+        );
+        assert_eq!(report.normals.unwrap().n_estimated, 1);
+        assert_eq!(report.normals.unwrap().repairs(), None);
+        assert!(found[11].dot(normals[11]) > 0.999_999);
+        let radii = prepared.radii();
+        assert!(radii[19] == 0.25 && radii[20] != 0.25 && 0.0 < radii[20]);
+    }
+
+    #[test]
+    fn the_report_has_the_estimates_and_notes_have_only_repairs() {
+        struct Listener(std::sync::Mutex<Vec<String>>);
+        impl Progress for Listener {
+            fn note(&self, line: &str) {
+                self.0.lock().unwrap().push(line.to_owned());
+            }
+        }
+        let listener = Listener(Default::default());
+        let mut cloud = ball(3000);
+        let (_, report) = prepare(cloud.clone(), &Preparation::default(), &listener).unwrap();
+        let line = report.normals.unwrap().line(report.normals_from.unwrap());
+        assert_eq!(line, "normals of 3000 points from 16 neighbours");
+        // A line of points far away has no planes.
+        cloud.positions.extend((0..40).map(|i| Vec3::X * (1000.0 + i as f32)));
+        let grid = Preparation { neighbors: NeighborMethod::Grid, ..Preparation::default() };
+        let (_, report) = prepare(cloud, &grid, &listener).unwrap();
+        let line = report.normals.unwrap().line(report.normals_from.unwrap());
+        assert!(line.starts_with("normals of 3040 points from all points within 0."), "{line}");
+        let notes = listener.0.lock().unwrap();
+        assert_eq!(notes.iter().filter(|note| note.contains("without a plane")).count(), 1);
+        assert!(notes.iter().all(|note| !note.starts_with("normals")), "{notes:?}");
+    }
+
+    #[test]
+    fn variation_is_kept_on_request() {
+        let preparation = Preparation { keep_variation: true, ..Preparation::default() };
+        let (cloud, _) = prepare(ball(500), &preparation, &NoProgress).unwrap();
+        let (cloud, report) = prepare(cloud.into_inner(), &preparation, &NoProgress).unwrap();
+        assert_eq!((report.normals, report.radii), (None, None));
+        assert_eq!(cloud.scalars.len(), 1);
+        assert_eq!(cloud.scalar(SURFACE_VARIATION).unwrap().len(), 500);
+    }
+
+    #[test]
+    fn invalid_settings_are_errors() {
+        for preparation in [
+            Preparation { normals: Neighborhood::Nearest(1), ..Preparation::default() },
+            Preparation { normals: Neighborhood::Within(0.0), ..Preparation::default() },
+            Preparation { radius: Radius::Fixed(-1.0), ..Preparation::default() },
+            Preparation { subsample: Some(Subsample::Stride(0.5)), ..Preparation::default() },
+        ] {
+            assert!(matches!(
+                prepare(ball(9), &preparation, &NoProgress),
+                Err(Error::Setting { .. })
+            ));
+        }
+    }
+
+    #[test]
+    fn cancellation_is_an_error() {
+        struct Cancelled;
+        impl Progress for Cancelled {
+            fn is_cancelled(&self) -> bool {
+                true
+            }
+        }
+        for preparation in preparations() {
+            assert_eq!(prepare(ball(100), &preparation, &Cancelled), Err(Error::Cancelled));
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Prepared clouds, whose type guarantees that they can be traced.
+
+use super::cloud::{PointCloud, is_valid_position};
+use crate::error::{Error, Result};
+use crate::math::{DVec3, Vec3};
+use rayon::prelude::*;
+use std::ops::Deref;
+
+/// A point cloud that can be traced. [`prepare`](super::prepare) returns one, and [`PreparedCloud::new`] makes one
+/// of a cloud that needs no preparation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PreparedCloud {
+    /// Invariant: the cloud has normals and radii, one entry for each point in every column, and only valid
+    /// positions.
+    cloud: PointCloud,
+}
+
+impl PreparedCloud {
+    /// Wraps a cloud that can be traced as it is.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Error::MissingColumn`] for a cloud without normals or radii, [`Error::ColumnLength`] for a
+    /// column that does not have one entry for each point, and [`Error::InvalidPosition`] for a position
+    /// that is NaN, infinite or too far from the origin (see [`is_valid_position`]).
+    pub fn new(cloud: PointCloud) -> Result<Self> {
+        if cloud.normals.is_none() {
+            return Err(Error::MissingColumn { column: "normals" });
+        }
+        if cloud.radii.is_none() {
+            return Err(Error::MissingColumn { column: "radii" });
+        }
+        for (column, found) in cloud.column_lengths() {
+            check_length(column, found, cloud.len())?;
+        }
+        match cloud.positions.par_iter().position_first(|p| !is_valid_position(*p)) {
+            Some(point_idx) => Err(Error::InvalidPosition { point_idx }),
+            None => Ok(Self { cloud }),
+        }
+    }
+
+    /// Creates a cloud without points about an origin.
+    pub fn empty(origin: DVec3) -> Self {
+        let (normals, radii) = (Some(Vec::new()), Some(Vec::new()));
+        Self { cloud: PointCloud { origin, normals, radii, ..PointCloud::default() } }
+    }
+
+    /// Returns the positions relative to the cloud's origin.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.cloud.positions
+    }
+
+    /// Returns the unit normals, one for each position.
+    pub fn normals(&self) -> &[Vec3] {
+        self.cloud.normals.as_deref().unwrap_or_default()
+    }
+
+    /// Returns the radii in world units, one for each position.
+    pub fn radii(&self) -> &[f32] {
+        self.cloud.radii.as_deref().unwrap_or_default()
+    }
+
+    /// Multiplies all radii by a factor, those of morph targets included.
+    pub fn scale_radii(&mut self, factor: f32) {
+        let morphs = self.cloud.morphs.iter_mut().filter_map(|morph| morph.radii.as_mut());
+        let radii = self.cloud.radii.iter_mut().chain(morphs).flatten();
+        radii.for_each(|radius| *radius *= factor);
+    }
+
+    /// Returns the points at `indices`, in that order, with all their columns.
+    pub fn subset(&self, indices: &[u32]) -> Self {
+        Self { cloud: self.cloud.subset(indices) }
+    }
+
+    /// Unwraps the cloud, for changes that [`PreparedCloud::new`] checks again.
+    pub fn into_inner(self) -> PointCloud {
+        self.cloud
+    }
+}
+
+/// Fails unless a column has one entry for each point.
+pub(crate) fn check_length(column: &'static str, found: usize, expected: usize) -> Result<()> {
+    if found == expected { Ok(()) } else { Err(Error::ColumnLength { column, found, expected }) }
+}
+
+impl Default for PreparedCloud {
+    fn default() -> Self {
+        Self::empty(DVec3::ZERO)
+    }
+}
+
+impl Deref for PreparedCloud {
+    type Target = PointCloud;
+
+    fn deref(&self) -> &PointCloud {
+        &self.cloud
+    }
+}
+
+impl AsRef<PointCloud> for PreparedCloud {
+    fn as_ref(&self) -> &PointCloud {
+        &self.cloud
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Checks of the columns that tracing needs.
+
+    use super::*;
+    use crate::points::Skin;
+
+    fn cloud() -> PointCloud {
+        PointCloud {
+            normals: Some(vec![Vec3::Z; 2]),
+            radii: Some(vec![0.5; 2]),
+            ..PointCloud::from_positions(vec![Vec3::ZERO, Vec3::X])
+        }
+    }
+
+    #[test]
+    fn complete_clouds_are_accepted() {
+        let prepared = PreparedCloud::new(cloud()).unwrap();
+        assert_eq!(prepared.positions(), [Vec3::ZERO, Vec3::X]);
+        assert_eq!((prepared.normals(), prepared.radii()), (&[Vec3::Z; 2][..], &[0.5; 2][..]));
+        assert_eq!(prepared.subset(&[1]).positions(), [Vec3::X]);
+        assert_eq!(prepared.into_inner(), cloud());
+        assert!(PreparedCloud::new(PreparedCloud::default().into_inner()).is_ok());
+    }
+
+    #[test]
+    fn incomplete_clouds_are_rejected_with_the_name_of_the_column() {
+        let error = |change: fn(&mut PointCloud)| {
+            let mut cloud = cloud();
+            change(&mut cloud);
+            PreparedCloud::new(cloud).unwrap_err().to_string()
+        };
+        assert_eq!(error(|cloud| cloud.normals = None), "the cloud has no normals");
+        assert_eq!(error(|cloud| cloud.radii = None), "the cloud has no radii");
+        let expected = "the column of radii has 1 entries, one for each of 2 points expected";
+        assert_eq!(error(|cloud| cloud.radii = Some(vec![0.5])), expected);
+        let expected = "the column of joints has 0 entries, one for each of 2 points expected";
+        assert_eq!(error(|cloud| cloud.skin = Some(Skin::default())), expected);
+        let expected = "point 1 has no valid position";
+        assert_eq!(error(|cloud| cloud.positions[1].y = f32::NAN), expected);
+    }
+}

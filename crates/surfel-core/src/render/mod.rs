@@ -1,0 +1,24 @@
+//! Renderers: from a flat scene to a picture.
+
+mod cpu;
+mod raster;
+mod region;
+mod renderer;
+mod settings;
+
+pub use cpu::CpuRenderer;
+pub use region::RenderRegion;
+pub use renderer::{RenderStats, Renderer};
+pub use settings::{MAX_PIXELS, Settings};
+
+use crate::error::Result;
+use crate::flat::FlatScene;
+
+/// Checks that a picture can be rendered of `scene`.
+///
+/// # Errors
+/// Fails if only some of the scene's surfaces are rasterised points: the rasterizer draws all of a scene
+/// or none of it.
+pub fn check(scene: &FlatScene) -> Result<()> {
+    raster::uses_rasterizer(scene).map(drop)
+}

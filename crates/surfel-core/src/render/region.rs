@@ -1,0 +1,50 @@
+//! Regions of a picture: some of its rows and some of the samples of their pixels.
+
+use super::settings::Settings;
+use crate::error::{Error, Result};
+use crate::image::Image;
+
+/// A part of a picture's rows and samples, rendered at once.
+///
+/// An interactive viewer renders region by region, so that it shows a result early and can stop in time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RenderRegion {
+    /// Range of pixel rows: the first one, and the one after the last.
+    pub rows: (u32, u32),
+    /// Range of sample indices of each pixel: the first one, and the one after the last.
+    pub samples: (u32, u32),
+}
+
+impl RenderRegion {
+    /// Returns the region of all rows and samples.
+    pub fn whole(settings: &Settings) -> Self {
+        Self { rows: (0, settings.height), samples: (0, settings.samples_per_pixel) }
+    }
+
+    /// Returns the number of rows.
+    pub(super) fn n_rows(&self) -> u32 {
+        self.rows.1 - self.rows.0
+    }
+
+    /// Returns the number of samples per pixel.
+    pub(super) fn n_samples(&self) -> u32 {
+        self.samples.1 - self.samples.0
+    }
+
+    /// Returns an empty image of the region's rows, with AOVs if the settings ask for them.
+    pub(super) fn blank_image(&self, settings: &Settings) -> Image {
+        let new = if settings.with_aovs { Image::with_aovs } else { Image::new };
+        new(settings.width, self.n_rows())
+    }
+
+    /// Fails if the region is empty or extends beyond the picture.
+    pub(super) fn check(&self, settings: &Settings) -> Result<()> {
+        let whole = Self::whole(settings);
+        let is_within = |part: (u32, u32), whole: (u32, u32)| part.0 < part.1 && part.1 <= whole.1;
+        if is_within(self.rows, whole.rows) && is_within(self.samples, whole.samples) {
+            return Ok(());
+        }
+        let found = format!("rows {:?}, samples {:?}", self.rows, self.samples);
+        Err(Error::Setting { name: "region", found, expected: "a part of the picture" })
+    }
+}

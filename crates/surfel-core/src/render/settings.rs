@@ -1,0 +1,71 @@
+//! Settings of a picture, and their limits.
+
+use crate::error::{Error, Result};
+
+/// Size and quality of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Number of camera rays per pixel.
+    pub samples_per_pixel: u32,
+    /// Number of rays per pixel toward each light with soft shadows: sky, environment, suns and punctual
+    /// lights.
+    pub light_samples: u32,
+    /// Maximum number of reflections and refractions along a path.
+    pub max_depth: u32,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// True if the image gets AOVs besides colour and coverage.
+    pub with_aovs: bool,
+}
+
+/// Maximum number of pixels of a picture.
+pub const MAX_PIXELS: u64 = 1 << 28;
+/// Maximum number of camera or light samples per pixel.
+const MAX_SAMPLES: u32 = 1 << 16;
+
+impl Default for Settings {
+    /// Returns 1920 x 1080 pixels, 4 camera rays and 16 light samples per pixel, 8 bounces, seed 0 and no
+    /// AOVs.
+    fn default() -> Self {
+        Self {
+            width: 1920,
+            height: 1080,
+            samples_per_pixel: 4,
+            light_samples: 16,
+            max_depth: 8,
+            seed: 0,
+            with_aovs: false,
+        }
+    }
+}
+
+impl Settings {
+    /// Checks that all settings are within their limits.
+    ///
+    /// # Errors
+    /// Fails if the picture has no pixels or more than [`MAX_PIXELS`], or if a number of samples is 0 or
+    /// above 65,536.
+    pub fn check(&self) -> Result<()> {
+        let n_pixels = u64::from(self.width) * u64::from(self.height);
+        if n_pixels == 0 || MAX_PIXELS < n_pixels {
+            let found = format!("{}x{}", self.width, self.height);
+            return Err(Error::Setting { name: "resolution", found, expected: "1 to 2^28 pixels" });
+        }
+        for (name, value) in
+            [("samples per pixel", self.samples_per_pixel), ("light samples", self.light_samples)]
+        {
+            if !(1..=MAX_SAMPLES).contains(&value) {
+                return Err(Error::Setting {
+                    name,
+                    found: value.to_string(),
+                    expected: "1 to 65536",
+                });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,151 @@
+//! Automatic viewpoints: the direction of view for a cloud of unknown content.
+
+use super::camera::{Camera, Projection};
+use super::camera_fit::{CameraFit, fit_along};
+use super::ground::ground_axes;
+use super::inliers::range_along;
+use crate::math::{DVec3, Vec3};
+
+/// Azimuth of the viewpoint if no other is clearly better: south, a little to the east.
+const FRONT_AZIMUTH_DEG: f64 = 155.0;
+/// Height over width below which a cloud counts as terrain.
+const MAX_TERRAIN_FLATNESS: f64 = 0.25;
+
+/// Returns the direction of view toward `points`: the flatter the cloud, the higher the viewpoint.
+///
+/// Terrain has no front, so it is viewed from where it fills the picture best. Anything else is viewed from
+/// the side from which most points are visible.
+pub(super) fn automatic_direction(points: &[Vec3], fit: &CameraFit) -> DVec3 {
+    let (east, north) = ground_axes(fit.up);
+    let extent = |axis: Vec3| {
+        let (low, high) = range_along(points, axis);
+        high - low
+    };
+    let flatness = f64::from(extent(fit.up) / extent(east).max(extent(north)).max(1e-9));
+    let elevation_deg =
+        fit.elevation_deg.unwrap_or_else(|| 40.0 - 25.0 * (flatness / 0.6).min(1.0));
+    let azimuth_deg = if flatness < MAX_TERRAIN_FLATNESS {
+        best_fit_azimuth_deg(points, elevation_deg, fit)
+    } else {
+        most_visible_azimuth_deg(points, elevation_deg, fit)
+    };
+    direction_from(azimuth_deg + fit.azimuth_deg, elevation_deg, fit.up)
+}
+
+/// Returns the azimuth in the south from which the nearest camera shows the whole cloud.
+fn best_fit_azimuth_deg(points: &[Vec3], elevation_deg: f64, fit: &CameraFit) -> f64 {
+    let sample: Vec<Vec3> = points.iter().step_by(points.len().div_ceil(10_000)).copied().collect();
+    let distance = |azimuth_deg: f64| {
+        let forward = direction_from(azimuth_deg, elevation_deg, fit.up);
+        let camera = fit_along(forward, &sample, fit);
+        match camera.projection {
+            Projection::Orthographic { height } => height,
+            _ => camera.position.distance(camera.focal_point),
+        }
+    };
+    let azimuths = (0..12).map(|step| FRONT_AZIMUTH_DEG + 15.0 * f64::from(step) - 60.0);
+    let nearest = azimuths.min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+    nearest.unwrap_or(FRONT_AZIMUTH_DEG)
+}
+
+/// Returns the azimuth from which the most points are visible.
+///
+/// A scan from one side shows all points from where the scanner stood, and hollow backs from behind.
+fn most_visible_azimuth_deg(points: &[Vec3], elevation_deg: f64, fit: &CameraFit) -> f64 {
+    /// Another azimuth must show this much more than the front: closed objects look alike from all sides.
+    const MIN_GAIN: f64 = 0.1;
+    let visible = |azimuth_deg: f64| {
+        let forward = direction_from(azimuth_deg, elevation_deg, fit.up);
+        visible_fraction(points, &fit_along(forward, points, fit), fit.aspect)
+    };
+    let azimuths = (1..12).map(|step| FRONT_AZIMUTH_DEG + 30.0 * f64::from(step));
+    let fractions = azimuths.map(|azimuth_deg| (visible(azimuth_deg), azimuth_deg));
+    let best = fractions.max_by(|a, b| a.0.total_cmp(&b.0));
+    match best {
+        Some((fraction, azimuth_deg)) if visible(FRONT_AZIMUTH_DEG) + MIN_GAIN < fraction => {
+            azimuth_deg
+        }
+        _ => FRONT_AZIMUTH_DEG,
+    }
+}
+
+/// Returns the fraction of the points that no other point hides in a small picture.
+fn visible_fraction(points: &[Vec3], camera: &Camera, aspect: f64) -> f64 {
+    // About ten points per covered pixel are enough to hide the points behind them.
+    let height = (points.len() as f64 / 10.0 / aspect).sqrt().clamp(4.0, 128.0) as u32;
+    let width = (f64::from(height) * aspect) as u32;
+    let view = camera.view(DVec3::ZERO, width, height);
+    let mut nearest = vec![f32::INFINITY; width as usize * height as usize];
+    let pixel_and_depth = |point: &Vec3| {
+        let (x, y, depth) = view.project(*point)?;
+        let inside = (0.0..width as f32).contains(&x) && (0.0..height as f32).contains(&y);
+        inside.then(|| (y as usize * width as usize + x as usize, depth))
+    };
+    for (pixel, depth) in points.iter().filter_map(pixel_and_depth) {
+        nearest[pixel] = nearest[pixel].min(depth);
+    }
+    // A surface that is slanted within a pixel must not hide itself.
+    let span = match camera.projection {
+        Projection::Orthographic { .. } => 1.0,
+        _ => camera.position.distance(camera.focal_point) as f32,
+    };
+    let slack = 4.0 * span * view.pixel_size();
+    let is_visible = |point: &&Vec3| {
+        pixel_and_depth(point).is_some_and(|(pixel, depth)| depth <= nearest[pixel] + slack)
+    };
+    points.iter().filter(is_visible).count() as f64 / points.len() as f64
+}
+
+/// Returns the direction of view from a viewpoint at this azimuth and elevation.
+fn direction_from(azimuth_deg: f64, elevation_deg: f64, up: Vec3) -> DVec3 {
+    let (east, north) = ground_axes(up);
+    let (sin_azimuth, cos_azimuth) = azimuth_deg.to_radians().sin_cos();
+    let (sin_elevation, cos_elevation) = elevation_deg.to_radians().sin_cos();
+    let (east, north, up) = (east.as_dvec3(), north.as_dvec3(), up.as_dvec3());
+    -(cos_elevation * (sin_azimuth * east + cos_azimuth * north) + sin_elevation * up)
+}
+
+#[cfg(test)]
+mod tests {
+    //! Scans are viewed from the scanner's side, closed objects from the front.
+
+    use super::*;
+
+    /// Two vertical sheets, one behind the other seen from `front`; the nearer one is half as wide.
+    fn sheets(front: Vec3) -> Vec<Vec3> {
+        let side = front.cross(Vec3::Z);
+        let sheet = |depth: f32, width: f32| {
+            (0..10_000).map(move |i| {
+                let (u, v) = ((i % 100) as f32 / 99.0 - 0.5, (i / 100) as f32 / 99.0 - 0.5);
+                depth * front + 2.0 * width * u * side + 2.0 * v * Vec3::Z
+            })
+        };
+        // The scanner sees the rear sheet only where the front one does not hide it.
+        let rear = sheet(-1.0, 1.0).filter(|p| 0.5 < p.dot(side).abs());
+        sheet(1.0, 0.5).chain(rear).collect()
+    }
+
+    #[test]
+    fn a_scan_is_viewed_from_the_side_of_the_scanner() {
+        for front in [Vec3::X, Vec3::NEG_X, Vec3::Y] {
+            let fit = CameraFit { aspect: 1.5, ..CameraFit::default() };
+            let forward = automatic_direction(&sheets(front), &fit);
+            // The sheets hide each other a little from every side but the front and the back.
+            assert!(0.4 < forward.dot(front.as_dvec3()).abs(), "{front}: {forward}");
+        }
+    }
+
+    #[test]
+    fn a_closed_object_is_viewed_from_the_front() {
+        let ball = (0..20_000).map(|i| {
+            let z = 1.0 - (2.0 * i as f32 + 1.0) / 20_000.0;
+            let (sin, cos) = (2.399_963 * i as f32).sin_cos();
+            Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+        });
+        let points: Vec<Vec3> = ball.collect();
+        let fit = CameraFit { aspect: 1.5, ..CameraFit::default() };
+        let forward = automatic_direction(&points, &fit);
+        let expected = direction_from(FRONT_AZIMUTH_DEG, 15.0, Vec3::Z);
+        assert!(forward.distance(expected) < 1e-6, "{forward}");
+    }
+}

@@ -1,0 +1,82 @@
+//! A cloud as a geometry of a scene: prepared, coloured, and given a surface.
+
+use crate::error::Result;
+use crate::points::{PointCloud, PreparedCloud, check_length};
+use crate::surface::{EdgeTest, SurfaceKind};
+
+/// A prepared cloud with one colour for each point, and the surface that its points describe.
+#[derive(Clone, Debug, Default)]
+pub struct CloudGeometry {
+    cloud: PreparedCloud,
+    /// sRGB-encoded, one for each point.
+    colors: Vec<[u8; 3]>,
+    /// The surface that the points describe.
+    pub surface: SurfaceKind,
+    /// The test that rejects hits beyond the edge of the surface.
+    pub edge_test: EdgeTest,
+    /// True if normals point out of the body that the points enclose, which gives glass an interior. If not,
+    /// every other hit of a ray enters the body (Schaufler and Jensen 2000).
+    pub has_outward_normals: bool,
+}
+
+impl CloudGeometry {
+    /// Makes a geometry of the default surface with sRGB-encoded `colors`.
+    ///
+    /// # Errors
+    /// Fails with [`Error::ColumnLength`](crate::Error::ColumnLength) unless there is one colour for each
+    /// point.
+    pub fn new(cloud: PreparedCloud, colors: Vec<[u8; 3]>) -> Result<Self> {
+        check_length("colours", colors.len(), cloud.len())?;
+        Ok(Self { cloud, colors, ..Self::default() })
+    }
+
+    /// Makes a geometry of the default surface with one sRGB-encoded colour for all points.
+    pub fn with_uniform_color(cloud: PreparedCloud, color: [u8; 3]) -> Self {
+        let colors = vec![color; cloud.len()];
+        Self { cloud, colors, ..Self::default() }
+    }
+
+    /// Returns the points.
+    pub fn cloud(&self) -> &PreparedCloud {
+        &self.cloud
+    }
+
+    /// Returns the sRGB-encoded colours, one for each point.
+    pub fn colors(&self) -> &[[u8; 3]] {
+        &self.colors
+    }
+
+    /// Keeps the points at `indices`, in that order.
+    pub(super) fn retain(&mut self, indices: &[u32]) {
+        self.cloud = self.cloud.subset(indices);
+        self.colors = indices.iter().map(|i| self.colors[*i as usize]).collect();
+    }
+
+    /// Frees the points; the origin and the surface stay.
+    pub(super) fn clear(&mut self) {
+        self.cloud = PreparedCloud::empty(self.cloud.origin);
+        self.colors = Vec::new();
+    }
+}
+
+impl AsRef<PointCloud> for CloudGeometry {
+    fn as_ref(&self) -> &PointCloud {
+        &self.cloud
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Clouds and colours of different lengths are rejected.
+
+    use super::*;
+    use crate::error::Error;
+
+    #[test]
+    fn a_cloud_needs_one_color_for_each_point() {
+        let cloud = PreparedCloud::default();
+        assert!(CloudGeometry::new(cloud.clone(), Vec::new()).is_ok());
+        let error = CloudGeometry::new(cloud, vec![[0; 3]]).unwrap_err();
+        assert_eq!(error, Error::ColumnLength { column: "colours", found: 1, expected: 0 });
+    }
+}

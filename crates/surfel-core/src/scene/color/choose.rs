@@ -1,0 +1,113 @@
+//! The automatic choice of a source of colours: one that shows the surface, not noise.
+
+use super::source::ColorSource;
+use crate::math::Random;
+use crate::math::Vec3;
+use crate::points::PointCloud;
+use crate::points::neighbors::nearest_by_brute_force;
+use rayon::prelude::*;
+
+/// sRGB-encoded colour of clouds without colours: light stone, for white objects glare and a cold grey looks
+/// lifeless.
+const DEFAULT_COLOR: [u8; 3] = [0xd6, 0xd2, 0xca];
+
+/// Returns the source of colours that suits `cloud`, and the reason for the choice.
+pub fn choose_source(cloud: &PointCloud) -> (ColorSource, &'static str) {
+    if cloud.colors.as_ref().is_some_and(|colors| are_measured(colors)) {
+        return (ColorSource::Rgb, "the colours of the file");
+    }
+    match &cloud.intensity {
+        Some(values) if shows_surface(&cloud.positions, values) => {
+            (ColorSource::Intensity, "no colours in the file")
+        }
+        Some(_) => (
+            ColorSource::Constant(DEFAULT_COLOR),
+            "no colours in the file; its intensity looks like noise",
+        ),
+        None => (ColorSource::Constant(DEFAULT_COLOR), "no colours and no intensity in the file"),
+    }
+}
+
+/// True unless all colours are black or all are white, as programs write them without a measurement.
+fn are_measured(colors: &[[u16; 3]]) -> bool {
+    let filler = [[0; 3], [u16::MAX; 3]].into_iter().find(|filler| Some(filler) == colors.first());
+    colors.iter().any(|color| Some(*color) != filler)
+}
+
+/// Number of patches that are examined.
+const N_PATCHES: usize = 64;
+/// Number of points in a patch.
+const PATCH_SIZE: usize = 24;
+/// Minimum intraclass correlation of the patches. It is 0.76 in a laser scan of a pump, and 0.11 in the
+/// Stanford bunny, whose reconstruction left intensities that appear as spots.
+const MIN_CORRELATION: f64 = 0.3;
+
+/// True if neighbouring points have similar values, as they do if the values show the surface.
+///
+/// The measure is the intraclass correlation: the fraction of the variance that lies between patches, not
+/// within them.
+fn shows_surface(positions: &[Vec3], values: &[f32]) -> bool {
+    if positions.is_empty() {
+        return false;
+    }
+    // Equal steps could fall in with the regular pattern of a scan, random ones cannot.
+    let mut random = Random::new(0, 0);
+    let centers: Vec<usize> =
+        (0..N_PATCHES).map(|_| random.below(positions.len() as u64) as usize).collect();
+    let patches: Vec<(f64, f64)> = centers
+        .into_par_iter()
+        .map(|center| {
+            let neighbors = nearest_by_brute_force(positions, center, PATCH_SIZE - 1);
+            let others = neighbors.iter().map(|neighbor| neighbor.index as usize);
+            mean_and_variance(others.chain([center]).map(|i| f64::from(values[i])))
+        })
+        .filter(|(mean, variance)| mean.is_finite() && variance.is_finite())
+        .collect();
+    let (_, between) = mean_and_variance(patches.iter().map(|(mean, _)| *mean));
+    let (within, _) = mean_and_variance(patches.iter().map(|(_, variance)| *variance));
+    MIN_CORRELATION * (between + within) < between
+}
+
+fn mean_and_variance(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for value in values {
+        n += 1.0;
+        sum += value;
+        squares += value * value;
+    }
+    let mean = sum / n;
+    (mean, (squares / n - mean * mean).max(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    //! The chosen source is one that shows the surface.
+
+    use super::*;
+
+    fn lattice() -> PointCloud {
+        let position = |i: usize| Vec3::new((i % 50) as f32, (i / 50) as f32, 0.0);
+        PointCloud::from_positions((0..2500).map(position).collect())
+    }
+
+    #[test]
+    fn the_chosen_source_shows_the_surface() {
+        let mut cloud = lattice();
+        assert_eq!(choose_source(&cloud).0, ColorSource::Constant(DEFAULT_COLOR));
+        let mut random = Random::new(1, 0);
+        cloud.intensity = Some((0..2500).map(|_| random.next_f32()).collect());
+        assert_eq!(choose_source(&cloud).0, ColorSource::Constant(DEFAULT_COLOR));
+        cloud.intensity = Some((0..2500).map(|i| ((i % 50) / 10 % 2) as f32).collect());
+        assert_eq!(choose_source(&cloud).0, ColorSource::Intensity);
+        cloud.colors = Some(vec![[0; 3]; 2500]);
+        assert_eq!(choose_source(&cloud).0, ColorSource::Intensity);
+        cloud.colors = Some(vec![[0x8080; 3]; 2500]);
+        assert_eq!(choose_source(&cloud).0, ColorSource::Rgb);
+        cloud.colors = Some((0..2500).map(|i| [i, 0, 0]).collect());
+        assert_eq!(choose_source(&cloud).0, ColorSource::Rgb);
+        cloud.intensity = Some(vec![0.5; 2500]);
+        cloud.colors = None;
+        assert_eq!(choose_source(&cloud).0, ColorSource::Constant(DEFAULT_COLOR));
+        assert_eq!(choose_source(&PointCloud::default()).0, ColorSource::Constant(DEFAULT_COLOR));
+    }
+}

@@ -1,0 +1,40 @@
+//! Settings of point colours.
+
+use super::choose::choose_source;
+use super::source::ColorSource;
+use crate::image::Colormap;
+use crate::math::Vec3;
+use crate::points::PointCloud;
+
+/// Settings of point colours.
+#[derive(Clone, Debug)]
+pub struct Coloring {
+    /// Source of the colours; `None` takes [`choose_source`]'s.
+    pub source: Option<ColorSource>,
+    /// Colour map; `None` is gray for intensity and viridis for everything else.
+    pub colormap: Option<Colormap>,
+    /// Values of the first and last colour of the map; `None` takes the 2nd and 98th percentile.
+    pub range: Option<(f64, f64)>,
+    /// Unit vector along which elevation is measured.
+    pub up: Vec3,
+}
+
+impl Default for Coloring {
+    /// Returns a chosen source, colour map and range, with Z up.
+    fn default() -> Self {
+        Self { source: None, colormap: None, range: None, up: Vec3::Z }
+    }
+}
+
+impl Coloring {
+    /// Returns the source for `cloud`, and the reason if it was chosen automatically.
+    pub(super) fn source_for(&self, cloud: &PointCloud) -> (ColorSource, Option<&'static str>) {
+        match &self.source {
+            Some(source) => (source.clone(), None),
+            None => {
+                let (source, reason) = choose_source(cloud);
+                (source, Some(reason))
+            }
+        }
+    }
+}

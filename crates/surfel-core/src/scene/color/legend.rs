@@ -1,0 +1,134 @@
+//! Legends: the meaning of the points' colours.
+
+use super::coloring::Coloring;
+use super::mapping::Mapping;
+use super::source::ColorSource;
+use crate::error::Result;
+use crate::image::{class_color, class_name};
+use crate::points::PointCloud;
+
+/// A legend of point colours.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Legend {
+    /// The colours need no legend.
+    None,
+    /// A colour map.
+    Map {
+        /// Name of the column.
+        title: String,
+        /// Value of the first colour.
+        low: f64,
+        /// Value of the last colour.
+        high: f64,
+        /// sRGB-encoded colours of values in equal steps from `low` to `high`.
+        colors: Vec<[u8; 3]>,
+    },
+    /// The classes of the cloud in ascending order, each with its name and sRGB-encoded colour.
+    Classes(Vec<(u8, &'static str, [u8; 3])>),
+}
+
+/// Number of colours in the legend of a map.
+const N_STEPS: usize = 32;
+
+/// Returns the legend of the colours that [`colorize`](super::colorize) gives to the same cloud.
+///
+/// # Errors
+/// Fails if `cloud` lacks the column that the colours show.
+pub fn legend(cloud: &PointCloud, coloring: &Coloring) -> Result<Legend> {
+    let (source, _) = coloring.source_for(cloud);
+    match &source {
+        ColorSource::Rgb | ColorSource::Normal | ColorSource::Constant(_) => Ok(Legend::None),
+        ColorSource::Class => {
+            let classes = cloud.classification.as_ref();
+            Ok(classes_of(classes.ok_or_else(|| source.missing_from(cloud))?))
+        }
+        ColorSource::Intensity | ColorSource::Elevation | ColorSource::Column(_) => {
+            Ok(steps_of(&Mapping::new(cloud, coloring, &source)?, source.to_string()))
+        }
+    }
+}
+
+fn classes_of(classes: &[u8]) -> Legend {
+    let mut is_present = [false; 256];
+    classes.iter().for_each(|class| is_present[usize::from(*class)] = true);
+    let present = (0..=u8::MAX).filter(|class| is_present[usize::from(*class)]);
+    Legend::Classes(present.map(|class| (class, class_name(class), class_color(class))).collect())
+}
+
+fn steps_of(mapping: &Mapping, title: String) -> Legend {
+    let (low, high) = (mapping.range.low, mapping.range.high);
+    let value = |step: usize| {
+        let weight = step as f64 / (N_STEPS - 1) as f64;
+        (1.0 - weight) * low + weight * high
+    };
+    let colors = (0..N_STEPS).map(|step| mapping.color(value(step))).collect();
+    Legend::Map { title, low, high, colors }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Legends show the colours that points of the same values get.
+
+    use super::*;
+    use crate::math::Vec3;
+    use crate::points::{Scalar, Values};
+    use crate::progress::NoProgress;
+    use crate::scene::color::colorize;
+
+    /// Points with heights and values from 0 to 1000.
+    fn ladder() -> PointCloud {
+        let positions = (0..=1000).map(|i| Vec3::new(0.0, 0.0, i as f32)).collect();
+        let values = Values::F64((0..=1000).map(f64::from).collect());
+        PointCloud {
+            intensity: Some((0..=1000).map(|i| i as f32).collect()),
+            classification: Some((0..=1000).map(|i| [2, 200, 6][i % 3]).collect()),
+            scalars: vec![Scalar { name: "rain".to_owned(), values }],
+            ..PointCloud::from_positions(positions)
+        }
+    }
+
+    fn coloring(source: &str) -> Coloring {
+        let source = Some(source.parse().unwrap());
+        Coloring { source, ..Coloring::default() }
+    }
+
+    #[test]
+    fn the_first_and_last_color_are_those_of_points_with_these_values() {
+        let cloud = ladder();
+        let automatic = Coloring { source: None, ..coloring("rgb") };
+        let reversed = Coloring { range: Some((900.0, 100.0)), ..coloring("rain") };
+        for (coloring, expected) in [
+            (coloring("rain"), "rain"),
+            (coloring("intensity"), "intensity"),
+            (coloring("elevation"), "elevation"),
+            (automatic, "intensity"),
+            (reversed, "rain"),
+        ] {
+            let points = colorize(&cloud, &coloring, &NoProgress).unwrap();
+            let Legend::Map { title, low, high, colors } = legend(&cloud, &coloring).unwrap()
+            else {
+                panic!("no map for {expected}");
+            };
+            assert_eq!((title.as_str(), colors.len()), (expected, N_STEPS));
+            assert_eq!(colors[0], points[low as usize], "{title}");
+            assert_eq!(colors[N_STEPS - 1], points[high as usize], "{title}");
+            assert!(colors.windows(2).all(|pair| pair[0] != pair[1]), "{title}");
+        }
+    }
+
+    #[test]
+    fn the_legend_of_classes_has_their_names_and_colors() {
+        let expected = [2, 6, 200].map(|class| (class, class_name(class), class_color(class)));
+        let found = legend(&ladder(), &coloring("class")).unwrap();
+        assert_eq!(found, Legend::Classes(expected.to_vec()));
+    }
+
+    #[test]
+    fn colors_without_values_have_no_legend() {
+        for source in ["rgb", "normal", "#fff"] {
+            assert_eq!(legend(&ladder(), &coloring(source)), Ok(Legend::None));
+        }
+        assert!(legend(&ladder(), &coloring("height")).is_err());
+        assert!(legend(&PointCloud::default(), &coloring("class")).is_err());
+    }
+}

@@ -1,0 +1,93 @@
+//! The mapping from values of points to colours.
+
+use super::coloring::Coloring;
+use super::source::ColorSource;
+use crate::error::Result;
+use crate::image::{Colormap, PercentileRange};
+use crate::points::PointCloud;
+
+/// Range of the gray map that intensity uses if no map is named: shading is invisible on black.
+const INTENSITY_GRAY_RANGE: (f32, f32) = (0.3, 0.95);
+
+/// A mapping from the values of a cloud's points to colours.
+pub(super) struct Mapping<'c> {
+    /// Returns the value of a point.
+    pub value_at: Box<dyn Fn(usize) -> f64 + Sync + 'c>,
+    /// Values of the first and last colour.
+    pub range: PercentileRange,
+    map: Colormap,
+    /// Positions of the first and last colour in the map, from 0 to 1.
+    map_range: (f32, f32),
+    is_range_given: bool,
+}
+
+impl<'c> Mapping<'c> {
+    /// Makes the mapping for a source that has values.
+    ///
+    /// # Errors
+    /// Fails if `cloud` lacks the source's column.
+    pub fn new(cloud: &'c PointCloud, coloring: &Coloring, source: &ColorSource) -> Result<Self> {
+        let value_at = source.values(cloud, coloring).ok_or_else(|| source.missing_from(cloud))?;
+        let found = || {
+            PercentileRange::from_values(
+                cloud.len(),
+                &value_at,
+                PercentileRange::DEFAULT_PERCENTILES,
+            )
+        };
+        let given = coloring.range.map(|(low, high)| PercentileRange { low, high });
+        let range = given.or_else(found).unwrap_or(PercentileRange { low: 0.0, high: 1.0 });
+        let map = match coloring.colormap {
+            Some(map) => map,
+            None if *source == ColorSource::Intensity => Colormap::from_name("gray")?,
+            None => Colormap::from_name("viridis")?,
+        };
+        let is_gray = *source == ColorSource::Intensity && coloring.colormap.is_none();
+        let map_range = if is_gray { INTENSITY_GRAY_RANGE } else { (0.0, 1.0) };
+        Ok(Self { value_at, range, map, map_range, is_range_given: given.is_some() })
+    }
+
+    /// Returns the sRGB-encoded colour of a value.
+    pub fn color(&self, value: f64) -> [u8; 3] {
+        let (first, last) = self.map_range;
+        self.map.color(first + (last - first) * self.range.normalize(value))
+    }
+
+    /// Returns the range and the name of the map, for a note to the user.
+    pub fn description(&self) -> String {
+        let origin = if self.is_range_given { "as given" } else { "2 % to 98 % of the values" };
+        format!("from {} ({origin}), map {}", format_range(self.range), self.map.name())
+    }
+}
+
+/// Formats both ends with enough digits to resolve a thousandth of the range.
+fn format_range(PercentileRange { low, high }: PercentileRange) -> String {
+    let size = (high - low).abs().log10();
+    let digits = if size.is_finite() { (3.0 - size).clamp(0.0, 12.0) as usize } else { 3 };
+    format!("{low:.digits$} to {high:.digits$}")
+}
+
+impl ColorSource {
+    /// Returns the value of each point, or `None` if the source has no values or `cloud` lacks its column.
+    fn values<'c>(
+        &self,
+        cloud: &'c PointCloud,
+        coloring: &Coloring,
+    ) -> Option<Box<dyn Fn(usize) -> f64 + Sync + 'c>> {
+        match self {
+            Self::Intensity => {
+                let values = cloud.intensity.as_ref()?;
+                Some(Box::new(|i| values[i].into()))
+            }
+            Self::Elevation => {
+                let up = coloring.up.as_dvec3();
+                Some(Box::new(move |i| cloud.world_position(i).dot(up)))
+            }
+            Self::Column(name) => {
+                let values = cloud.scalar(name)?;
+                Some(Box::new(|i| values.get(i)))
+            }
+            Self::Rgb | Self::Class | Self::Normal | Self::Constant(_) => None,
+        }
+    }
+}

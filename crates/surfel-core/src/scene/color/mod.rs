@@ -1,0 +1,152 @@
+//! Colours of points from one of the cloud's columns, which is chosen from the data if none is named.
+
+mod source;
+mod choose;
+mod coloring;
+mod mapping;
+mod legend;
+
+pub use choose::choose_source;
+pub use coloring::Coloring;
+pub use legend::{Legend, legend};
+pub use source::{ColorSource, parse_hex};
+
+use crate::error::Result;
+use crate::image::class_color;
+use crate::points::PointCloud;
+use crate::progress::Progress;
+use mapping::Mapping;
+use rayon::prelude::*;
+
+/// Returns one sRGB-encoded colour for each point. `progress` receives a note about the chosen source and
+/// range.
+///
+/// # Errors
+/// Fails if `cloud` lacks the column that the colours show, or once the work is cancelled.
+pub fn colorize(
+    cloud: &PointCloud,
+    coloring: &Coloring,
+    progress: &dyn Progress,
+) -> Result<Vec<[u8; 3]>> {
+    let (source, reason) = coloring.source_for(cloud);
+    // The note about intensity comes with its range below.
+    if let Some(reason) = reason.filter(|_| source != ColorSource::Intensity) {
+        progress.note(&format!("color {source}: {reason}"));
+    }
+    progress.check()?;
+    let missing = || source.missing_from(cloud);
+    let for_all = |color: &(dyn Fn(usize) -> [u8; 3] + Sync)| {
+        (0..cloud.len()).into_par_iter().map(color).collect()
+    };
+    match &source {
+        ColorSource::Rgb => {
+            let colors = cloud.colors.as_ref().ok_or_else(missing)?;
+            Ok(for_all(&|i| colors[i].map(to_8_bits)))
+        }
+        ColorSource::Class => {
+            let classes = cloud.classification.as_ref().ok_or_else(missing)?;
+            Ok(for_all(&|i| class_color(classes[i])))
+        }
+        ColorSource::Normal => {
+            let normals = cloud.normals.as_ref().ok_or_else(missing)?;
+            Ok(for_all(&|i| (0.5 * normals[i] + 0.5).to_array().map(|x| (x * 255.0).round() as u8)))
+        }
+        ColorSource::Constant(color) => Ok(vec![*color; cloud.len()]),
+        ColorSource::Intensity | ColorSource::Elevation | ColorSource::Column(_) => {
+            let mapping = Mapping::new(cloud, coloring, &source)?;
+            progress.note(&format!("color {source} {}", mapping.description()));
+            Ok(for_all(&|i| mapping.color((mapping.value_at)(i))))
+        }
+    }
+}
+
+/// Returns the 8-bit value nearest to a 16-bit channel.
+fn to_8_bits(value: u16) -> u8 {
+    ((u32::from(value) + 128) / 257) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    //! Colours come from the right column, through the right map.
+
+    use super::*;
+    use crate::image::Colormap;
+    use crate::math::Vec3;
+    use crate::points::{Scalar, Values};
+    use crate::progress::NoProgress;
+    use std::sync::Mutex;
+
+    struct Listener(Mutex<Vec<String>>);
+
+    impl Progress for Listener {
+        fn note(&self, line: &str) {
+            self.0.lock().unwrap().push(line.to_owned());
+        }
+    }
+
+    fn coloring(source: Option<&str>) -> Coloring {
+        Coloring { source: source.map(|text| text.parse().unwrap()), ..Coloring::default() }
+    }
+
+    fn lattice() -> PointCloud {
+        let position = |i: usize| Vec3::new((i % 50) as f32, (i / 50) as f32, i as f32);
+        PointCloud::from_positions((0..2500).map(position).collect())
+    }
+
+    #[test]
+    fn eight_bit_colors_survive_16_bit_columns() {
+        let colors = (0..=255u16).map(|v| [257 * v; 3]).collect();
+        let cloud = PointCloud {
+            colors: Some(colors),
+            ..PointCloud::from_positions(vec![Vec3::ZERO; 256])
+        };
+        let found = colorize(&cloud, &coloring(None), &NoProgress).unwrap();
+        assert!(found.iter().enumerate().all(|(v, color)| *color == [v as u8; 3]));
+    }
+
+    #[test]
+    fn columns_are_mapped_from_their_percentiles() {
+        let mut cloud = lattice();
+        let values = Values::U16((0..2500).collect());
+        cloud.scalars.push(Scalar { name: "Deviation".to_owned(), values });
+        let listener = Listener(Mutex::default());
+        let found = colorize(&cloud, &coloring(Some("deviation")), &listener).unwrap();
+        let viridis = Colormap::from_name("viridis").unwrap();
+        assert_eq!((found[0], found[2499]), (viridis.color(0.0), viridis.color(1.0)));
+        assert!(listener.0.lock().unwrap()[0].contains("50 to 2449 ("));
+        assert_eq!(found, colorize(&cloud, &coloring(Some("elevation")), &NoProgress).unwrap());
+        let range = Coloring {
+            range: Some((0.0, 10_000.0)),
+            colormap: Some(Colormap::from_name("gray").unwrap()),
+            ..coloring(Some("deviation"))
+        };
+        assert_eq!(colorize(&cloud, &range, &NoProgress).unwrap()[2000], [51; 3]);
+    }
+
+    #[test]
+    fn intensity_is_never_black_unless_its_map_is_named() {
+        let intensity = Some((0..2500).map(|i| i as f32).collect());
+        let cloud = PointCloud { intensity, ..lattice() };
+        let listener = Listener(Mutex::default());
+        let chosen = colorize(&cloud, &coloring(None), &listener).unwrap();
+        assert!(70 < chosen[0][0] && chosen[0][0] < 80, "{:?}", chosen[0]);
+        assert_eq!(listener.0.lock().unwrap().len(), 1);
+        let named = coloring(Some("intensity"));
+        assert_eq!(colorize(&cloud, &named, &NoProgress).unwrap(), chosen);
+        let gray = Coloring { colormap: Some(Colormap::from_name("gray").unwrap()), ..named };
+        assert_eq!(colorize(&cloud, &gray, &NoProgress).unwrap()[0], [0; 3]);
+    }
+
+    #[test]
+    fn the_error_for_a_missing_column_lists_the_known_ones() {
+        let mut cloud = lattice();
+        cloud
+            .scalars
+            .push(Scalar { name: "GpsTime".to_owned(), values: Values::U8(vec![1; 2500]) });
+        for source in ["rgb", "intensity", "class", "normal", "height"] {
+            let error =
+                colorize(&cloud, &coloring(Some(source)), &NoProgress).unwrap_err().to_string();
+            assert!(error.contains(source) && error.contains("GpsTime"), "{error}");
+        }
+    }
+}

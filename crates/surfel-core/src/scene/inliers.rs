@@ -1,0 +1,45 @@
+//! The points of a cloud without its outliers.
+
+use crate::math::{Aabb, Vec3};
+use crate::points::{PointCloud, is_valid_position};
+
+/// Fraction of points at each end of an axis that can be outliers.
+const OUTLIER_FRACTION: f64 = 0.005;
+/// Maximum number of points that are looked at.
+const MAX_SAMPLES: usize = 200_000;
+
+/// Returns the bounds of all points but the outliers, relative to the cloud's origin.
+pub fn inlier_bounds(cloud: &PointCloud) -> Aabb {
+    Aabb::of_points(sample_inliers(cloud))
+}
+
+/// Returns a sample of the points without outliers, relative to the cloud's origin; a single zero if the
+/// cloud is empty.
+pub(super) fn sample_inliers(cloud: &PointCloud) -> Vec<Vec3> {
+    let stride = cloud.len().div_ceil(MAX_SAMPLES).max(1);
+    let valid = cloud.positions.iter().step_by(stride).copied().filter(|p| is_valid_position(*p));
+    without_outliers(&valid.collect::<Vec<Vec3>>())
+}
+
+/// Returns the points within the inner quantiles of all axes, widened by a quarter of their range.
+fn without_outliers(points: &[Vec3]) -> Vec<Vec3> {
+    if points.is_empty() {
+        return vec![Vec3::ZERO];
+    }
+    let (mut low, mut high) = (Vec3::ZERO, Vec3::ZERO);
+    for axis in 0..3 {
+        let mut values: Vec<f32> = points.iter().map(|p| p[axis]).collect();
+        values.sort_unstable_by(f32::total_cmp);
+        let n_outliers = (OUTLIER_FRACTION * values.len() as f64) as usize;
+        let (first, last) = (values[n_outliers], values[values.len() - 1 - n_outliers]);
+        let margin = 0.25 * (last - first);
+        (low[axis], high[axis]) = (first - margin, last + margin);
+    }
+    points.iter().copied().filter(|p| low.cmple(*p).all() && p.cmple(high).all()).collect()
+}
+
+/// Returns the smallest and largest coordinate of `points` along an axis.
+pub(super) fn range_along(points: &[Vec3], axis: Vec3) -> (f32, f32) {
+    let along = points.iter().map(|p| p.dot(axis));
+    (along.clone().fold(f32::MAX, f32::min), along.fold(f32::MIN, f32::max))
+}

@@ -1,0 +1,96 @@
+//! The surface kinds of a point cloud.
+
+use super::disc;
+use super::sphere;
+use crate::error::Error;
+use crate::math::{Aabb, Ray, Vec3};
+
+/// The shape given to the points of a cloud (Wiesmeier, Ray Tracing Point Clouds, 2011).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum SurfaceKind {
+    /// Each point is rasterised as one pixel.
+    Points,
+    /// Each point is a sphere of its radius.
+    Sphere,
+    /// Each point is a flat disc.
+    Disc,
+    /// All discs within one radius behind the nearest are blended, with normals as stored.
+    SplatMean,
+    /// All discs within one radius behind the nearest are blended, with normals first turned toward the ray's
+    /// origin.
+    #[default]
+    Splat,
+    /// All discs within two radii behind the nearest are blended; the normal is that of a plane fitted to
+    /// their centres.
+    SplatFit,
+}
+
+impl SurfaceKind {
+    /// Every kind with its name.
+    pub const ALL: [(&'static str, Self); 6] = [
+        ("points", Self::Points),
+        ("sphere", Self::Sphere),
+        ("disc", Self::Disc),
+        ("splat-mean", Self::SplatMean),
+        ("splat", Self::Splat),
+        ("splat-fit", Self::SplatFit),
+    ];
+
+    /// Returns the name that `from_str` parses.
+    pub fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
+    }
+
+    /// Returns the factor that multiplies the points' radii before tracing.
+    pub fn radius_factor(self) -> f32 {
+        if self == Self::SplatFit { 2.0 } else { 1.0 }
+    }
+
+    /// Returns true if points are discs with normals rather than spheres.
+    pub fn uses_discs(self) -> bool {
+        !matches!(self, Self::Points | Self::Sphere)
+    }
+
+    /// Returns true if all discs near the nearest one contribute to a hit.
+    pub fn blends_discs(self) -> bool {
+        matches!(self, Self::SplatMean | Self::Splat | Self::SplatFit)
+    }
+
+    /// Returns the bounding box of a point of this kind. `normal` has unit length.
+    pub fn bounds(self, center: Vec3, normal: Vec3, radius: f32) -> Aabb {
+        if self.uses_discs() {
+            disc::bounds(center, normal, radius)
+        } else {
+            sphere::bounds(center, radius)
+        }
+    }
+
+    /// Returns a ray that leaves the surface at `position` on the side of `normal` without hitting it again
+    /// at once.
+    ///
+    /// Discs overlap within about a radius of each other, so the ray skips their own neighbourhood
+    /// (Schaufler and Jensen 2000). Spheres are solid and need an offset for the rounding of f32 only.
+    pub fn spawn_ray(self, position: Vec3, normal: Vec3, radius: f32, direction: Vec3) -> Ray {
+        let rounding = 4.0 * f32::EPSILON * position.abs().max_element();
+        let (offset, t_min) = if self.uses_discs() {
+            (disc::SPAWN_OFFSET * radius, disc::SPAWN_T_MIN * radius)
+        } else {
+            (1e-3 * radius, 0.0)
+        };
+        let origin = position + (offset + rounding) * normal;
+        Ray { origin, t_min, direction, t_max: f32::INFINITY }
+    }
+}
+
+impl std::str::FromStr for SurfaceKind {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let known = Self::ALL.iter().find(|(name, _)| *name == text);
+        known.map(|(_, kind)| *kind).ok_or_else(|| Error::UnknownName {
+            kind: "surface",
+            found: text.to_owned(),
+            known: Self::ALL.map(|(name, _)| name).join(", "),
+        })
+    }
+}

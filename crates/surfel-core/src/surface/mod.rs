@@ -1,0 +1,20 @@
+//! Surface kinds: the shape that a ray intersects at each point or triangle, one file per shape.
+
+mod disc;
+mod edge_test;
+mod kind;
+mod shape;
+mod sphere;
+mod splat;
+pub mod triangle;
+
+pub use disc::Disc;
+pub use edge_test::{
+    CandidateHit, CandidateHitLanes, EdgeTest, EdgeTestResult, NEIGHBORHOOD_RADIUS_FACTOR,
+    NeighborhoodStats,
+};
+pub use kind::SurfaceKind;
+pub use shape::{MAX_NORMAL_COMPONENT, PointLanes, RayLanes, Shape};
+pub use sphere::Sphere;
+pub use splat::{MAX_GATHERED, SplatAccumulator, Surfel, fit_plane_normal, gather_limit};
+pub use triangle::{RayFrame, RayRelativeTriangles, Triangle, TriangleLanes};

@@ -1,0 +1,249 @@
+//! The gathered discs of each ray: the nearest ones, all within a radius of each other.
+
+use crate::flat::{FlatCloud, FlatPoints};
+use crate::math::{Floats, LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Ray};
+use crate::surface::{Disc, gather_limit};
+use crate::trace::query::hit::{Gather, Hit};
+use crate::trace::query::leaf::{LeafGeometry, PacketBlock};
+use crate::trace::query::packet_disc_hits::{PacketDiscHit, cull_and_sort};
+use crate::trace::simd::{Simd, dispatch_simd};
+use crate::trace::traversal::batch::{RayQuery, trace_batch};
+use crate::trace::traversal::interleaved::{RayPool, RayVisitor};
+use crate::trace::traversal::packet::{Packet, PacketVisitor};
+use crate::trace::traversal::stack::PacketStack;
+use std::ops::ControlFlow;
+
+/// Gathers the nearest discs on each ray, all within a radius of each other. Points count as discs, whatever
+/// the cloud's surface kind is.
+pub fn gathers(cloud: &FlatCloud, simd: Simd, rays: &[Ray], gathers: &mut [Gather]) {
+    if cloud.points.nodes.is_empty() {
+        return gathers.fill(Gather::EMPTY);
+    }
+    dispatch_simd!(simd, gathers_kernel(cloud: &FlatCloud, rays: &[Ray], gathers: &mut [Gather]));
+}
+
+#[inline(always)]
+fn gathers_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], gathers: &mut [Gather]) {
+    let (mut stack, mut pool) = (PacketStack::new(), RayPool::default());
+    let mut discs = PacketDiscs::new();
+    let mut query = GatherQuery { discs: &mut discs, consumer: &mut CollectGathers };
+    trace_batch::<L, _>(&mut stack, &mut pool, &mut query, &cloud.points, rays, gathers);
+}
+
+/// Receives the discs of one to sixteen rays.
+pub trait DiscConsumer {
+    /// The result for one ray.
+    type Result;
+
+    /// Turns discs to results. Each ray's discs count up to its limit.
+    fn consume<L: Lanes>(
+        &mut self,
+        discs: &mut PacketDiscs,
+        rays: &[Ray],
+        results: &mut [Self::Result],
+    );
+}
+
+/// The discs that one to sixteen rays hit, within the rays' limits and some beyond.
+pub struct PacketDiscs {
+    /// The discs.
+    pub hits: Vec<PacketDiscHit>,
+    /// The distance on each ray up to which hits count.
+    limits: [f32; PACKET_WIDTH],
+}
+
+impl PacketDiscs {
+    /// Returns no discs.
+    pub fn new() -> Self {
+        Self { hits: Vec::new(), limits: [f32::MAX; PACKET_WIDTH] }
+    }
+
+    /// Adds the hits of rays, one per lane.
+    #[inline(always)]
+    pub fn add_closest(&mut self, hits: &[Hit]) {
+        for (lane, hit) in hits.iter().enumerate() {
+            if !hit.is_miss() {
+                self.hits.push(PacketDiscHit::single(lane, *hit));
+            }
+        }
+        self.limits = [f32::MAX; PACKET_WIDTH];
+    }
+
+    /// Drops what lies beyond the limits and what is not among the nearest of a ray, and sorts by slot.
+    #[inline(always)]
+    pub fn cull_and_sort<W: PacketLanes>(&mut self) {
+        cull_and_sort::<W>(&mut self.hits, &self.limits);
+    }
+}
+
+/// Collects the discs of each ray.
+struct CollectGathers;
+
+impl DiscConsumer for CollectGathers {
+    type Result = Gather;
+
+    #[inline(always)]
+    fn consume<L: Lanes>(
+        &mut self,
+        discs: &mut PacketDiscs,
+        _rays: &[Ray],
+        gathers: &mut [Gather],
+    ) {
+        discs.cull_and_sort::<L::PacketLanes>();
+        for (lane, gather) in gathers.iter_mut().enumerate() {
+            *gather = gather_of_lane(&discs.hits, lane);
+        }
+    }
+}
+
+fn gather_of_lane(hits: &[PacketDiscHit], lane: usize) -> Gather {
+    let mut gather = Gather::EMPTY;
+    for PacketDiscHit { slot, distances } in hits {
+        if !distances[lane].is_nan() {
+            gather.insert(Hit { distance: distances[lane], slot: *slot });
+        }
+    }
+    gather
+}
+
+/// The query for the discs of each ray, which `consumer` receives packet by packet.
+pub struct GatherQuery<'q, C> {
+    /// The discs of the current packet.
+    pub discs: &'q mut PacketDiscs,
+    /// The receiver.
+    pub consumer: &'q mut C,
+}
+
+impl<L: Lanes, C: DiscConsumer> RayQuery<L> for GatherQuery<'_, C> {
+    type Tree = FlatPoints;
+    type Result = C::Result;
+    type RayVisitor<'r> = GatherRayVisitor<'r>;
+    type PacketVisitor<'p> = GatherPacketVisitor<'p, L>;
+    const CONVERGES_AT_END: bool = false;
+    const IS_PACKETWISE: bool = true;
+
+    #[inline(always)]
+    fn ray_visitor<'r>(&mut self, ray: &'r Ray) -> GatherRayVisitor<'r> {
+        GatherRayVisitor { ray, gather: Gather::EMPTY, limit: ray.t_max }
+    }
+
+    #[inline(always)]
+    fn packet_visitor<'p>(
+        &mut self,
+        packet: &'p Packet<'p, L::PacketLanes>,
+    ) -> GatherPacketVisitor<'p, L> {
+        let hits = std::mem::take(&mut self.discs.hits);
+        GatherPacketVisitor { packet, limits: packet.initial_limits(), hits }
+    }
+
+    #[inline(always)]
+    fn ray_results(&mut self, visitors: &[GatherRayVisitor], _results: &mut [C::Result]) {
+        for (lane, visitor) in visitors.iter().enumerate() {
+            for hit in visitor.gather.hits() {
+                self.discs.hits.push(PacketDiscHit::single(lane, *hit));
+            }
+        }
+        self.discs.limits = [f32::MAX; PACKET_WIDTH];
+    }
+
+    #[inline(always)]
+    fn packet_results(&mut self, visitor: &mut GatherPacketVisitor<L>, _results: &mut [C::Result]) {
+        self.discs.hits = std::mem::take(&mut visitor.hits);
+        self.discs.limits = visitor.limits;
+    }
+
+    #[inline(always)]
+    fn finish_packet(&mut self, rays: &[Ray], results: &mut [C::Result]) {
+        self.consumer.consume::<L>(self.discs, rays, results);
+        self.discs.hits.clear();
+    }
+}
+
+/// The search for the discs that a ray hits.
+pub struct GatherRayVisitor<'r> {
+    ray: &'r Ray,
+    gather: Gather,
+    limit: f32,
+}
+
+impl RayVisitor for GatherRayVisitor<'_> {
+    type Tree = FlatPoints;
+    const IS_ORDERED: bool = true;
+
+    #[inline(always)]
+    fn ray(&self) -> &Ray {
+        self.ray
+    }
+
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.gather.bound().min(self.limit)
+    }
+
+    #[inline(always)]
+    fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
+        let block = Disc::decode_relative_to::<L>(points, block_idx, self.ray.origin);
+        for (hit, radius) in Disc::block_hits(&block, block_idx, self.ray).up_to(self.limit()) {
+            if hit.distance <= self.limit {
+                self.limit = self.limit.min(gather_limit(hit.distance, radius));
+                self.gather.insert(hit);
+                self.gather.drop_beyond(self.limit);
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// The search for the discs that the rays of a packet hit. Which of them each ray keeps is known only at the
+/// end.
+pub struct GatherPacketVisitor<'p, L: Lanes> {
+    packet: &'p Packet<'p, L::PacketLanes>,
+    limits: [f32; PACKET_WIDTH],
+    hits: Vec<PacketDiscHit>,
+}
+
+impl<L: Lanes> PacketVisitor<L> for GatherPacketVisitor<'_, L> {
+    type Tree = FlatPoints;
+    const IS_ORDERED: bool = true;
+    const SPARSE_THRESHOLD: f32 = 0.0;
+
+    #[inline(always)]
+    fn limits(&self) -> &[f32; PACKET_WIDTH] {
+        &self.limits
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        let block = Disc::packet_block::<L>(points, block_idx, self.packet);
+        let rays = self.packet.lanes.lanes();
+        let mut limits = L::PacketLanes::load(&self.limits);
+        let mut end = self.hits.len();
+        self.hits.resize(end + LANES, PacketDiscHit::NONE);
+        // There is no branch: a disc's hit is unpredictable.
+        for lane in 0..LANES {
+            let (distance, mask) = block.intersect(&rays, lane);
+            let is_hit = mask & distance.le(limits);
+            let limit = gather_limit(distance, L::PacketLanes::splat(block.radius(lane)));
+            limits = L::PacketLanes::select(is_hit, limit.min(limits), limits);
+            let slot = block_idx * LANES as u32 + lane as u32;
+            // The sum turns a negative zero into a positive one.
+            let distance = distance + L::PacketLanes::splat(0.0);
+            let missed = L::PacketLanes::splat(f32::NAN);
+            let distances = L::PacketLanes::select(is_hit, distance, missed).store();
+            self.hits[end] = PacketDiscHit { slot, distances };
+            end += usize::from(is_hit.bits() != 0);
+        }
+        self.hits.truncate(end);
+        self.limits = limits.store();
+    }
+
+    #[inline(always)]
+    fn visit_single(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
+        let ray = &self.packet.rays[lane];
+        let block = Disc::decode_relative_to::<L>(points, block_idx, ray.origin);
+        for (hit, radius) in Disc::block_hits(&block, block_idx, ray).up_to(self.limits[lane]) {
+            self.limits[lane] = self.limits[lane].min(gather_limit(hit.distance, radius));
+            self.hits.push(PacketDiscHit::single(lane, hit));
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! Queries of rays against one cloud or one mesh: closest hit, any hit, gathered discs, and the blended
+//! surface.
+//!
+//! A file uses only those above it.
+
+pub mod hit;
+pub mod leaf;
+pub mod closest;
+pub mod any;
+pub mod packet_disc_hits;
+pub mod gather;
+pub mod edge_test;
+pub mod edge_filter;
+pub mod splat_query;
+pub mod surface;

@@ -1,0 +1,328 @@
+//! The splat of each ray: its gathered discs, blended.
+
+use crate::flat::FlatCloud;
+use crate::math::{
+    Floats, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Ray, SimdTask, Vec3, Vec3Lanes,
+};
+use crate::surface::{
+    CandidateHit, EdgeTest, MAX_GATHERED, SplatAccumulator, SurfaceKind, Surfel, fit_plane_normal,
+};
+use crate::trace::query::closest::closest_hits_kernel;
+use crate::trace::query::edge_test::{PacketCandidates, enclosed_by_blocks, enclosed_lanes};
+use crate::trace::query::gather::{DiscConsumer, GatherQuery, PacketDiscs};
+use crate::trace::query::hit::Hit;
+use crate::trace::query::packet_disc_hits::PacketDiscHit;
+use crate::trace::simd::packet_rays::PacketRays;
+use crate::trace::simd::{Simd, dispatch_simd};
+use crate::trace::traversal::batch::trace_batch;
+use crate::trace::traversal::group::GROUP_SIZE;
+use crate::trace::traversal::interleaved::RayPool;
+use crate::trace::traversal::stack::PacketStack;
+use std::marker::PhantomData;
+
+/// The blended discs of a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Splat {
+    /// The nearest disc.
+    pub hit: Hit,
+    /// Number of discs.
+    pub n_discs: u32,
+    /// Radius of the nearest disc.
+    pub radius: f32,
+    /// Unit normal, facing the ray's origin.
+    pub normal: Vec3,
+    /// Linear colour.
+    pub color: Vec3,
+    /// True if the points around the hit are known to enclose it, which is found out only for the edge test.
+    pub(in crate::trace) is_enclosed: bool,
+}
+
+impl Splat {
+    /// The result of a ray that hits nothing.
+    pub const MISS: Self = Self {
+        hit: Hit::MISS,
+        n_discs: 0,
+        radius: 0.0,
+        normal: Vec3::ZERO,
+        color: Vec3::ZERO,
+        is_enclosed: false,
+    };
+}
+
+/// Blends the discs that `gathers` finds by the cloud's surface kind, or by `SurfaceKind::Splat` if that kind
+/// blends none. The edge test is not applied.
+pub fn splats(cloud: &FlatCloud, simd: Simd, rays: &[Ray], splats: &mut [Splat]) {
+    if cloud.points.nodes.is_empty() {
+        return splats.fill(Splat::MISS);
+    }
+    dispatch_simd!(simd, splats_kernel(cloud: &FlatCloud, rays: &[Ray], splats: &mut [Splat]));
+}
+
+#[inline(always)]
+fn splats_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], splats: &mut [Splat]) {
+    let kind = cloud.surface;
+    let kind = if kind.blends_discs() { kind } else { SurfaceKind::Splat };
+    SplatTracer::new(cloud, kind, EdgeTest::Off).trace::<L>(rays, splats);
+}
+
+/// Traces splats, and reuses its memory from batch to batch.
+pub struct SplatTracer<'s> {
+    stack: PacketStack,
+    pool: RayPool,
+    discs: PacketDiscs,
+    blender: DiscBlender<'s>,
+    /// Splats whose edge test is open, and their hits.
+    open: Vec<u32>,
+    open_hits: Vec<(Vec3, CandidateHit)>,
+}
+
+impl<'s> SplatTracer<'s> {
+    /// Returns a tracer that finds out whether hits are enclosed if `edge_test` asks for that.
+    pub fn new(cloud: &'s FlatCloud, kind: SurfaceKind, edge_test: EdgeTest) -> Self {
+        let tests_edge = edge_test == EdgeTest::AngularGap;
+        Self {
+            stack: PacketStack::new(),
+            pool: RayPool::default(),
+            discs: PacketDiscs::new(),
+            blender: DiscBlender { cloud, kind, tests_edge, surfels: Vec::new() },
+            open: Vec::new(),
+            open_hits: Vec::new(),
+        }
+    }
+
+    /// Traces the splats of `rays`, in a function of its own.
+    #[inline(always)]
+    pub fn trace<L: Lanes>(&mut self, rays: &[Ray], splats: &mut [Splat]) {
+        L::dispatch(TraceSplats { tracer: self, rays, splats, lanes: PhantomData::<L> });
+    }
+
+    #[inline(always)]
+    fn blend<L: Lanes>(&mut self, rays: &[Ray], splats: &mut [Splat]) {
+        let Self { stack, pool, discs, blender, .. } = self;
+        let cloud = blender.cloud;
+        let mut query = GatherQuery { discs, consumer: blender };
+        trace_batch::<L, _>(stack, pool, &mut query, &cloud.points, rays, splats);
+    }
+
+    /// Makes a splat of the closest disc alone, in a function of its own.
+    #[inline(always)]
+    fn take_closest<L: Lanes>(&mut self, rays: &[Ray], splats: &mut [Splat]) {
+        L::dispatch(TakeClosest { tracer: self, rays, splats, lanes: PhantomData::<L> });
+    }
+
+    /// Tests the hits that are not known to be enclosed, those of many packets together.
+    #[inline(always)]
+    fn test_edges<L: Lanes>(&mut self, rays: &[Ray], splats: &mut [Splat]) {
+        let Self { blender, open, open_hits, .. } = self;
+        open.clear();
+        open_hits.clear();
+        for (splat_idx, (splat, ray)) in splats.iter().zip(rays).enumerate() {
+            if splat.hit.is_miss() || splat.is_enclosed {
+                continue;
+            }
+            let radius = splat.radius / blender.cloud.surface.radius_factor();
+            let candidate = CandidateHit { normal: splat.normal, direction: ray.direction, radius };
+            open.push(splat_idx as u32);
+            open_hits.push((ray.at(splat.hit.distance), candidate));
+        }
+        for (open, hits) in open.chunks(PACKET_WIDTH).zip(open_hits.chunks(PACKET_WIDTH)) {
+            let lanes = (1 << open.len()) - 1;
+            let candidates = PacketCandidates::new(hits);
+            let enclosed = enclosed_lanes::<L>(&blender.cloud.points, lanes, &candidates);
+            for (lane, splat_idx) in open.iter().enumerate() {
+                splats[*splat_idx as usize].is_enclosed = enclosed >> lane & 1 == 1;
+            }
+        }
+    }
+}
+
+struct TraceSplats<'t, 's, L> {
+    tracer: &'t mut SplatTracer<'s>,
+    rays: &'t [Ray],
+    splats: &'t mut [Splat],
+    lanes: PhantomData<L>,
+}
+
+impl<L: Lanes> SimdTask for TraceSplats<'_, '_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { tracer, rays, splats, .. } = self;
+        if tracer.blender.kind.blends_discs() {
+            tracer.blend::<L>(rays, splats);
+        } else {
+            tracer.take_closest::<L>(rays, splats);
+        }
+        if tracer.blender.tests_edge {
+            tracer.test_edges::<L>(rays, splats);
+        }
+    }
+}
+
+struct TakeClosest<'t, 's, L> {
+    tracer: &'t mut SplatTracer<'s>,
+    rays: &'t [Ray],
+    splats: &'t mut [Splat],
+    lanes: PhantomData<L>,
+}
+
+impl<L: Lanes> SimdTask for TakeClosest<'_, '_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let SplatTracer { discs, blender, .. } = self.tracer;
+        let mut hits = [Hit::MISS; GROUP_SIZE];
+        let groups = self.rays.chunks(GROUP_SIZE).zip(self.splats.chunks_mut(GROUP_SIZE));
+        for (rays, splats) in groups {
+            let hits = &mut hits[..rays.len()];
+            closest_hits_kernel::<L>(blender.cloud, rays, hits);
+            let packets = rays.chunks(PACKET_WIDTH).zip(splats.chunks_mut(PACKET_WIDTH));
+            for ((rays, splats), hits) in packets.zip(hits.chunks(PACKET_WIDTH)) {
+                discs.add_closest(hits);
+                blender.consume::<L>(discs, rays, splats);
+                discs.hits.clear();
+            }
+        }
+    }
+}
+
+/// Blends the discs of packets to splats.
+struct DiscBlender<'s> {
+    cloud: &'s FlatCloud,
+    kind: SurfaceKind,
+    tests_edge: bool,
+    /// The discs of the current packet.
+    surfels: Vec<Surfel>,
+}
+
+/// The nearest disc of each ray.
+struct NearestDiscs<W> {
+    distances: W,
+    /// Slots, as the bits of floats.
+    slots: W,
+    normals: Vec3Lanes<W>,
+    radii: W,
+    n_discs: W,
+}
+
+impl DiscConsumer for DiscBlender<'_> {
+    type Result = Splat;
+
+    /// Blends the discs of one to sixteen rays up to their limits.
+    #[inline(always)]
+    fn consume<L: Lanes>(&mut self, discs: &mut PacketDiscs, rays: &[Ray], splats: &mut [Splat]) {
+        let rays = PacketRays::<L::PacketLanes>::new(rays);
+        discs.cull_and_sort::<L::PacketLanes>();
+        let hits = &discs.hits;
+        if hits.is_empty() {
+            splats.fill(Splat::MISS);
+            return;
+        }
+        let nearest = self.find_nearest::<L::PacketLanes>(hits);
+        let (origin, direction) = (rays.origin(), rays.direction());
+        let mut accumulator = SplatAccumulator::new(self.kind, nearest.normals, direction);
+        for (surfel, hit) in self.surfels.iter().zip(hits) {
+            let distances = L::PacketLanes::load(&hit.distances);
+            let position = origin.plus(direction.scaled(distances));
+            let offset = position.minus(Vec3Lanes::splat(surfel.center));
+            accumulator.add(surfel, offset, hit.hit_mask::<L::PacketLanes>());
+        }
+        let (mut normals, colors) = accumulator.finish();
+        if self.kind == SurfaceKind::SplatFit {
+            normals = self.fit_planes(hits, normals, splats.len());
+        }
+        let n_discs = nearest.n_discs.store();
+        let mut is_enclosed = 0;
+        if self.tests_edge {
+            let factor = L::PacketLanes::splat(self.cloud.surface.radius_factor());
+            let candidates = PacketCandidates {
+                position: origin.plus(direction.scaled(nearest.distances)),
+                normal: normals,
+                direction,
+                radius: nearest.radii / factor,
+            };
+            let is_hit = L::PacketLanes::splat(0.0).lt(nearest.n_discs).bits();
+            let lanes = is_hit & ((1 << splats.len()) - 1);
+            is_enclosed = enclosed_by_blocks::<L>(&self.cloud.points, hits, lanes, &candidates);
+        }
+        let (distances, slots) = (nearest.distances.store(), nearest.slots.store());
+        let radii = nearest.radii.store();
+        let (normals, colors) = (normals.store_packet(), colors.store_packet());
+        for lane in 0..splats.len() {
+            splats[lane] = Splat::MISS;
+            if 0.0 < n_discs[lane] {
+                let vector = |rows: &[[f32; PACKET_WIDTH]; 3]| {
+                    Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane])
+                };
+                splats[lane] = Splat {
+                    hit: Hit { distance: distances[lane], slot: slots[lane].to_bits() },
+                    n_discs: n_discs[lane] as u32,
+                    radius: radii[lane],
+                    normal: vector(&normals),
+                    color: vector(&colors),
+                    is_enclosed: is_enclosed >> lane & 1 == 1,
+                };
+            }
+        }
+    }
+}
+
+impl DiscBlender<'_> {
+    /// Fills `surfels` with the discs that were hit, and returns the nearest one of each ray.
+    #[inline(always)]
+    fn find_nearest<W: PacketLanes>(&mut self, hits: &[PacketDiscHit]) -> NearestDiscs<W> {
+        let zero = W::splat(0.0);
+        let mut nearest = NearestDiscs {
+            distances: W::splat(f32::INFINITY),
+            slots: W::splat(f32::from_bits(Hit::MISS.slot)),
+            normals: Vec3Lanes::splat(Vec3::Z),
+            radii: zero,
+            n_discs: zero,
+        };
+        self.surfels.clear();
+        for hit in hits {
+            let surfel = self.cloud.points.surfel(hit.slot);
+            let distances = W::load(&hit.distances);
+            // The discs are sorted by slot, so the first of equally near ones counts.
+            let is_nearer = distances.lt(nearest.distances);
+            let slot = W::splat(f32::from_bits(hit.slot));
+            let normal = Vec3Lanes::splat(surfel.normal);
+            nearest.distances = W::select(is_nearer, distances, nearest.distances);
+            nearest.slots = W::select(is_nearer, slot, nearest.slots);
+            nearest.normals = Vec3Lanes::select(is_nearer, normal, nearest.normals);
+            nearest.radii = W::select(is_nearer, W::splat(surfel.radius), nearest.radii);
+            nearest.n_discs = nearest.n_discs + W::select(hit.hit_mask::<W>(), W::splat(1.0), zero);
+            self.surfels.push(surfel);
+        }
+        nearest
+    }
+
+    /// Replaces normals by those of planes through the discs' centres, where these span one.
+    #[inline(always)]
+    fn fit_planes<W: PacketLanes>(
+        &self,
+        hits: &[PacketDiscHit],
+        normals: Vec3Lanes<W>,
+        n_rays: usize,
+    ) -> Vec3Lanes<W> {
+        let [mut x, mut y, mut z] = normals.store_packet();
+        for lane in 0..n_rays {
+            let mut centers = [Vec3::ZERO; MAX_GATHERED];
+            let mut n = 0;
+            for (surfel, hit) in self.surfels.iter().zip(hits) {
+                if !hit.distances[lane].is_nan() {
+                    centers[n] = surfel.center;
+                    n += 1;
+                }
+            }
+            let facing = Vec3::new(x[lane], y[lane], z[lane]);
+            if let Some(normal) = (0 < n).then(|| fit_plane_normal(&centers[..n])).flatten() {
+                let normal = if normal.dot(facing) < 0.0 { -normal } else { normal };
+                [x[lane], y[lane], z[lane]] = normal.to_array();
+            }
+        }
+        Vec3Lanes::load_packet(&[x, y, z])
+    }
+}

@@ -1,0 +1,123 @@
+//! Writes each output to a temporary file in its folder and renames it: a failed run leaves no half file and destroys
+//! no old one.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// Writes a text to a file, which replaces an old one once it is complete.
+///
+/// # Errors
+/// Fails if the file cannot be written; an old file then stays.
+pub fn save_text(path: &Path, text: &str) -> Result<()> {
+    write_file(path, |writer| {
+        writer.write_all(text.as_bytes()).map_err(|cause| write_error(path, cause))
+    })
+}
+
+/// Lets `write` fill a new file, which then replaces `path`.
+///
+/// If anything fails, the new file is removed and an old one stays.
+pub(crate) fn write_file(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
+) -> Result<()> {
+    write_temp(path, |_, file| {
+        let mut writer = BufWriter::with_capacity(1 << 20, file);
+        write(&mut writer)?;
+        writer.into_inner().map_err(|e| write_error(path, e.into_error()))?;
+        Ok(())
+    })
+}
+
+/// Lets `write` fill a new file, which it gets by path and opened, so that other programs can write to it; the file
+/// then replaces `path`.
+///
+/// If anything fails, the new file is removed and an old one stays.
+pub(crate) fn write_temp(path: &Path, write: impl FnOnce(&Path, File) -> Result<()>) -> Result<()> {
+    let (temp, file) = create_temp(path)?;
+    let guard = TempGuard(temp);
+    write(&guard.0, file)?;
+    fs::rename(&guard.0, path).map_err(|cause| write_error(path, cause))?;
+    Ok(())
+}
+
+/// Returns the error of a write to `path` that failed.
+pub(crate) fn write_error(path: &Path, cause: io::Error) -> Error {
+    let file = path.display().to_string();
+    let advice = match cause.kind() {
+        io::ErrorKind::NotFound => {
+            let folder = parent_folder(path).display().to_string();
+            return Error::FolderNotFound { file, folder };
+        }
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            "choose a folder you may write to"
+        }
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            "free space there or write elsewhere"
+        }
+        io::ErrorKind::IsADirectory => "name a file, not a folder",
+        io::ErrorKind::NotADirectory => "name a file in a folder, not in a file",
+        _ => "check the disk and the connection to it",
+    };
+    Error::Io { file, action: "written", cause, advice }
+}
+
+/// Returns the folder that contains `path`.
+pub(crate) fn parent_folder(path: &Path) -> &Path {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    folder.unwrap_or(Path::new("."))
+}
+
+/// Removes a temporary file when dropped; after the rename there is none left to remove.
+struct TempGuard(PathBuf);
+
+impl Drop for TempGuard {
+    fn drop(&mut self) {
+        // A failure cannot be reported from here.
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+fn create_temp(path: &Path) -> Result<(PathBuf, File)> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let process = std::process::id();
+    // Several threads, or a run that was killed, may have left a file of the same name.
+    let mut attempt = 0;
+    loop {
+        let temp = path.with_file_name(format!(".{name}.{process}-{attempt}.part"));
+        match File::create_new(&temp) {
+            Ok(file) => return Ok((temp, file)),
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists && attempt < 1000 => attempt += 1,
+            Err(cause) => return Err(write_error(path, cause)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn old_file_survives_a_failure_and_no_temporary_file_stays() {
+        let folder = std::env::temp_dir().join(format!("surfel-atomic-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("out.ply");
+        fs::write(&path, "old").unwrap();
+
+        let failed = write_file(&path, |writer| {
+            writer.write_all(b"half").unwrap();
+            Err(surfel_core::Error::Cancelled.into())
+        });
+        assert!(matches!(failed, Err(Error::Core(surfel_core::Error::Cancelled))));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+
+        write_file(&path, |writer| writer.write_all(b"new").map_err(|e| write_error(&path, e)))
+            .unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+        fs::remove_dir_all(&folder).unwrap();
+    }
+}

@@ -1,0 +1,54 @@
+//! Checks of the paths that outputs are written to.
+
+use std::path::Path;
+
+use super::atomic_write::{parent_folder, write_error};
+use crate::error::{Error, Result};
+
+const SUPPORTED: &str = "surfel writes pictures as .png and .exr, clouds as .ply, .las and .laz";
+
+/// Checks before any work that a picture or cloud can be written to `path`; `-` is standard output.
+///
+/// # Errors
+/// Fails if the extension belongs to no format that surfel writes, or for the reasons of [`check_output_path`].
+pub fn check_output(path: &Path) -> Result<()> {
+    if path == Path::new("-") {
+        return Ok(());
+    }
+    if !["png", "exr", "ply", "las", "laz"].contains(&extension(path).as_str()) {
+        return Err(unsupported_extension(path, SUPPORTED));
+    }
+    check_output_path(path)
+}
+
+/// Checks that a file of any format can be written to `path`.
+///
+/// # Errors
+/// Fails if the folder of `path` does not exist, or if `path` is a folder itself.
+pub fn check_output_path(path: &Path) -> Result<()> {
+    let folder = parent_folder(path);
+    let problem = if path.is_dir() {
+        std::io::ErrorKind::IsADirectory
+    } else if !folder.exists() {
+        std::io::ErrorKind::NotFound
+    } else if !folder.is_dir() {
+        std::io::ErrorKind::NotADirectory
+    } else {
+        return Ok(());
+    };
+    Err(write_error(path, problem.into()))
+}
+
+/// Returns the lower-case extension, without the dot.
+pub(crate) fn extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+/// Returns the error of an output whose extension belongs to no format.
+pub(crate) fn unsupported_extension(path: &Path, advice: &'static str) -> Error {
+    let found = match extension(path).as_str() {
+        "" => "a name without extension".into(),
+        extension => format!("the extension `.{extension}`"),
+    };
+    Error::Unsupported { file: path.display().to_string(), action: "write", found, advice }
+}

@@ -1,0 +1,222 @@
+//! The file formats that surfel reads: one table, with a row for each.
+
+use std::sync::LazyLock;
+
+use surfel_core::points::PointCloud;
+use surfel_core::progress::Progress;
+use surfel_core::scene::Graph;
+
+use crate::bin;
+use crate::error::{Location, Result};
+use crate::file::{Input, ResourceResolver};
+use crate::gltf;
+use crate::las;
+use crate::mesh::Model;
+use crate::obj;
+use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::ply;
+use crate::stl;
+use crate::text;
+
+/// A file format that surfel reads.
+pub struct Format {
+    /// Name of the format, as in "PLY".
+    pub name: &'static str,
+    /// Extensions of its files, in lower case and without the dot.
+    pub extensions: &'static [&'static str],
+    /// First bytes of each of its files, in words; `None` if files of this format begin in no particular way.
+    signature: Option<&'static str>,
+    /// Returns true if the first bytes of an input show this format, or its name alone decides.
+    probe: fn(&Input) -> bool,
+    /// Reads what the file states about itself, without its points and triangles.
+    pub(crate) inspect: fn(&Input) -> Result<FileInfo>,
+    /// Functions that read the content.
+    pub(crate) read: Reader,
+}
+
+/// The functions that read the content of a format, by what it can contain.
+pub(crate) enum Reader {
+    /// The format has points only.
+    Points(ReadPoints),
+    /// The format has one mesh; `has_triangles` is false for files whose points are without faces.
+    Mesh { has_triangles: fn(&Input) -> Result<bool>, read_points: ReadPoints, read_mesh: ReadMesh },
+    /// The format has a whole scene, read with the animation of the given name or else the first.
+    Scene(ReadScene),
+}
+
+type ReadPoints = fn(&Input, &LoadOptions, &dyn Progress) -> Result<Loaded>;
+type ReadMesh =
+    fn(&Input, &ResourceResolver, &LoadOptions, &dyn Progress) -> Result<(Model, FileInfo)>;
+type ReadScene = fn(
+    &Input,
+    ResourceResolver,
+    Option<&str>,
+    &dyn Progress,
+) -> Result<(Graph<PointCloud>, FileInfo)>;
+
+/// All formats that surfel reads. An input is of the first format whose probe accepts it, else of the one that
+/// has its extension.
+pub const FORMATS: &[Format] = &[
+    Format {
+        name: "glTF",
+        extensions: &["gltf", "glb"],
+        signature: None,
+        probe: gltf::is_gltf,
+        inspect: gltf::inspect,
+        read: Reader::Scene(gltf::read),
+    },
+    Format {
+        name: "PLY",
+        extensions: &["ply"],
+        signature: Some("`ply` and the end of the line"),
+        probe: |input| {
+            input.starts_with(b"ply") && input.get(3).is_some_and(u8::is_ascii_whitespace)
+        },
+        inspect: ply::inspect,
+        read: Reader::Mesh {
+            has_triangles: ply::has_faces,
+            read_points: ply::read,
+            read_mesh: ply::read_mesh,
+        },
+    },
+    Format {
+        name: "LAS",
+        extensions: &["las", "laz"],
+        signature: Some("`LASF`"),
+        probe: |input| input.starts_with(b"LASF"),
+        inspect: las::inspect,
+        read: Reader::Points(las::read),
+    },
+    Format {
+        name: "BIN",
+        extensions: &["bin"],
+        signature: None,
+        // The extension decides before foreign signatures do: a coordinate may begin with the bytes of one.
+        probe: |input| !input.is_empty() && input.extension() == "bin",
+        inspect: bin::inspect,
+        read: Reader::Points(bin::read),
+    },
+    Format {
+        name: "text",
+        extensions: &["xyz", "txt", "csv", "asc", "pts", "xyzrgb", "xyzn"],
+        signature: None,
+        probe: |_| false,
+        inspect: text::inspect,
+        read: Reader::Points(text::read),
+    },
+    Format {
+        name: "OBJ",
+        extensions: &["obj"],
+        signature: None,
+        probe: |_| false,
+        inspect: obj::inspect,
+        read: Reader::Mesh {
+            has_triangles: |input| Ok(obj::has_faces(input)),
+            read_points: obj::read,
+            read_mesh: obj::read_mesh,
+        },
+    },
+    Format {
+        name: "STL",
+        extensions: &["stl"],
+        signature: None,
+        probe: |_| false,
+        inspect: stl::inspect,
+        read: Reader::Mesh {
+            has_triangles: |_| Ok(true),
+            read_points: stl::read,
+            read_mesh: stl::read_mesh,
+        },
+    },
+];
+
+/// First bytes of formats that surfel does not read, and their names.
+const FOREIGN_SIGNATURES: [(&[u8], &str); 5] = [
+    (b"ASTM-E57", "an E57 file"),
+    (b"# .PCD", "a PCD file"),
+    (b"\x89HDF", "an HDF5 file"),
+    (b"PK\x03\x04", "a zip archive"),
+    (b"\x1f\x8b", "a gzip archive"),
+];
+
+static ADVICE: LazyLock<String> = LazyLock::new(|| {
+    let extensions = FORMATS.iter().flat_map(|format| format.extensions);
+    let extensions: Vec<String> = extensions.map(|extension| format!(".{extension}")).collect();
+    let (last, others) = extensions.split_last().expect("there are formats");
+    format!("surfel reads {} and {last}; convert the file to one of them", others.join(", "))
+});
+
+/// Returns the format of an input, by its first bytes or else by its extension.
+pub(crate) fn detect(input: &Input) -> Result<&'static Format> {
+    if let Some(format) = probe(input) {
+        return Ok(format);
+    }
+    if input.is_empty() {
+        let advice = "write the file again or copy it again from its source";
+        return Err(input.malformed(Location::Byte(0), "an empty file", "points", advice));
+    }
+    let mut foreign = FOREIGN_SIGNATURES.iter();
+    if let Some((_, name)) = foreign.find(|(signature, _)| input.starts_with(signature)) {
+        return Err(input.unsupported(*name, &ADVICE));
+    }
+    let extension = input.extension();
+    let Some(format) = FORMATS.iter().find(|format| format.extensions.contains(&&*extension))
+    else {
+        let found = match extension.as_str() {
+            "" => "a name without extension and unknown content".into(),
+            extension => format!("the extension `.{extension}`"),
+        };
+        return Err(input.unsupported(found, &ADVICE));
+    };
+    if let Some(signature) = format.signature {
+        let found = format!("`{}`", input[..input.len().min(4)].escape_ascii());
+        let advice = "the extension does not fit the content; give the file its right one";
+        return Err(input.malformed(Location::Byte(0), found, signature, advice));
+    }
+    Ok(format)
+}
+
+/// Returns true if an input holds a whole scene, with transforms and animation of its own.
+pub(crate) fn is_scene(input: &Input) -> bool {
+    probe(input).is_some_and(|format| matches!(format.read, Reader::Scene(_)))
+}
+
+/// Returns the format that the first bytes of a file show, if they show one.
+pub fn detect_bytes(bytes: &[u8]) -> Option<&'static Format> {
+    probe(&Input::from_bytes("-", bytes))
+}
+
+fn probe(input: &Input) -> Option<&'static Format> {
+    FORMATS.iter().find(|format| (format.probe)(input))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn detected(name: &str, bytes: &[u8]) -> Result<&'static str> {
+        detect(&Input::from_bytes(name, bytes)).map(|format| format.name)
+    }
+
+    #[test]
+    fn signatures_take_precedence_over_extensions() {
+        assert_eq!(detected("a.txt", b"ply\nformat").unwrap(), "PLY");
+        assert_eq!(detected("a", b"LASF").unwrap(), "LAS");
+        assert_eq!(detected("a.bin", b"glTF").unwrap(), "glTF");
+        assert_eq!(detected("a.bin", b"PK\x03\x04").unwrap(), "BIN");
+        assert_eq!(detected("A.XYZ", b"1 2 3").unwrap(), "text");
+        assert!(detected("a.xyz", b"PK\x03\x04").is_err());
+    }
+
+    #[test]
+    fn every_extension_belongs_to_one_format_and_is_listed_in_messages() {
+        let mut extensions: Vec<&str> =
+            FORMATS.iter().flat_map(|f| f.extensions).copied().collect();
+        let message = detected("a.what", b"1 2 3").unwrap_err().to_string();
+        assert!(extensions.iter().all(|extension| message.contains(&format!(".{extension}"))));
+        let n_extensions = extensions.len();
+        extensions.sort_unstable();
+        extensions.dedup();
+        assert_eq!(extensions.len(), n_extensions);
+    }
+}

@@ -1,0 +1,34 @@
+//! Settings of image files.
+
+use surfel_core::math::DVec3;
+
+/// Encoding of an image file.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImageOptions {
+    /// Bits per channel of PNG files; EXR files are always 32-bit.
+    pub depth: BitDepth,
+    /// Alpha mode of PNG files; EXR files always have an alpha channel.
+    pub alpha: Alpha,
+    /// World coordinates of the origin of the position layer, written to the header of EXR files.
+    pub origin: DVec3,
+}
+
+/// Bits per channel of a PNG file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BitDepth {
+    /// 8 bits per channel.
+    #[default]
+    Eight,
+    /// 16 bits per channel.
+    Sixteen,
+}
+
+/// Alpha mode of a PNG file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Alpha {
+    /// The file has an alpha channel.
+    #[default]
+    Keep,
+    /// The image is composited over black.
+    Drop,
+}

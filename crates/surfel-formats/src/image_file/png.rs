@@ -1,0 +1,123 @@
+//! PNG writer with 8 or 16 bits per channel, sRGB-encoded, and a reader for files it wrote.
+
+use std::fs::File;
+use std::io::{self, BufReader, Write};
+use std::path::Path;
+
+use surfel_core::image::{Image, encode_srgb, encode_srgb8};
+
+use super::options::{Alpha, BitDepth, ImageOptions};
+use crate::error::Result;
+use crate::file::{write_error, write_file};
+
+/// Writes a PNG.
+pub(super) fn write(path: &Path, image: &Image, options: &ImageOptions) -> Result<()> {
+    write_file(path, |writer| {
+        encode(writer, image, options).map_err(|source| write_error(path, source))
+    })
+}
+
+/// Returns the bytes of the PNG file that [`save_image`](crate::save_image) writes.
+///
+/// # Errors
+///
+/// Fails if PNG cannot represent the size of the image.
+pub fn encode_png(image: &Image, options: &ImageOptions) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    encode(&mut bytes, image, options)
+        .map_err(|source| write_error(Path::new("an image in memory"), source))?;
+    Ok(bytes)
+}
+
+/// Writes a PNG to standard output.
+pub(super) fn write_to_stdout(image: &Image, options: &ImageOptions) -> Result<()> {
+    let mut out = io::BufWriter::new(io::stdout().lock());
+    encode(&mut out, image, options)
+        .and_then(|()| out.flush())
+        .map_err(|source| write_error(Path::new("-"), source))
+}
+
+/// Reads the samples of an image of this size that was written with the same options.
+///
+/// # Errors
+///
+/// Returns a description of the file if it cannot be read or has another size or encoding.
+pub(crate) fn read(
+    path: &Path,
+    (width, height): (u32, u32),
+    options: &ImageOptions,
+) -> Result<Vec<u8>, String> {
+    let file = File::open(path).map_err(|error| error.to_string())?;
+    let decoder = png::Decoder::new(BufReader::new(file));
+    let mut reader = decoder.read_info().map_err(|error| error.to_string())?;
+    let info = reader.info();
+    let found = (info.width, info.height, info.color_type, info.bit_depth);
+    let (color, depth) = sample_type(options);
+    // The size is compared before memory is allocated for it.
+    if found != (width, height, color, depth) {
+        return Err(format!("{}x{} pixels of {:?} {:?}", found.0, found.1, found.2, found.3));
+    }
+    let mut samples = vec![0; reader.output_buffer_size().ok_or("too many pixels")?];
+    reader.next_frame(&mut samples).map_err(|error| error.to_string())?;
+    Ok(samples)
+}
+
+/// Returns an encoder for images with these options, before its header is written.
+pub(crate) fn encoder<W: Write>(
+    writer: W,
+    (width, height): (u32, u32),
+    options: &ImageOptions,
+) -> png::Encoder<'static, W> {
+    let mut encoder = png::Encoder::new(writer, width, height);
+    let (color, depth) = sample_type(options);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    encoder
+}
+
+fn sample_type(options: &ImageOptions) -> (png::ColorType, png::BitDepth) {
+    let color = match options.alpha {
+        Alpha::Keep => png::ColorType::Rgba,
+        Alpha::Drop => png::ColorType::Rgb,
+    };
+    let depth = match options.depth {
+        BitDepth::Eight => png::BitDepth::Eight,
+        BitDepth::Sixteen => png::BitDepth::Sixteen,
+    };
+    (color, depth)
+}
+
+fn encode(writer: impl Write, image: &Image, options: &ImageOptions) -> io::Result<()> {
+    let mut writer = encoder(writer, (image.width, image.height), options).write_header()?;
+    writer.write_image_data(&samples(image, options))?;
+    writer.finish()?;
+    Ok(())
+}
+
+/// Returns the sRGB-encoded samples, with premultiplied alpha undone if the file has an alpha channel.
+fn samples(image: &Image, options: &ImageOptions) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let quantize16 = |encoded: f32| ((encoded * 65535.0 + 0.5) as u16).to_be_bytes();
+    for &[r, g, b, a] in &image.color {
+        let a = a.clamp(0.0, 1.0);
+        let opacity = match options.alpha {
+            Alpha::Keep if 0.0 < a => a,
+            _ => 1.0,
+        };
+        for channel in [r, g, b] {
+            let linear = channel / opacity;
+            match options.depth {
+                BitDepth::Eight => bytes.push(encode_srgb8(linear)),
+                // The cast maps NaN to 0.
+                BitDepth::Sixteen => bytes.extend(quantize16(encode_srgb(linear.clamp(0.0, 1.0)))),
+            }
+        }
+        match (options.alpha, options.depth) {
+            (Alpha::Drop, _) => {}
+            (Alpha::Keep, BitDepth::Eight) => bytes.push((a * 255.0 + 0.5) as u8),
+            (Alpha::Keep, BitDepth::Sixteen) => bytes.extend(quantize16(a)),
+        }
+    }
+    bytes
+}

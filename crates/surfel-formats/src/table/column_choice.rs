@@ -1,0 +1,80 @@
+//! The columns to read from a file, chosen by the caller.
+
+use super::column_role::ColumnRole;
+
+/// The columns to keep in memory; positions are always kept.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum ColumnChoice {
+    /// All columns of the file.
+    #[default]
+    All,
+    /// These columns, if the file has them.
+    Only(Vec<Column>),
+}
+
+/// A column of a cloud besides its positions.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Column {
+    /// Unit normals.
+    Normals,
+    /// Radii of the points.
+    Radii,
+    /// RGB colours.
+    Colors,
+    /// Intensity of the return.
+    Intensity,
+    /// Class of each point.
+    Classification,
+    /// The scalar column of this name, whose case does not matter.
+    Scalar(String),
+}
+
+/// The meaning of one column of a text file, from [`TextColumn::parse`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextColumn(pub(crate) Option<ColumnRole>);
+
+impl ColumnChoice {
+    /// Returns true if a column of this role is to be kept.
+    pub(crate) fn wants(&self, role: &ColumnRole) -> bool {
+        let Self::Only(columns) = self else { return true };
+        if let ColumnRole::Position(_) = role {
+            return true;
+        }
+        columns.iter().any(|column| match (column, role) {
+            (Column::Normals, ColumnRole::Normal(_))
+            | (Column::Radii, ColumnRole::Radius)
+            | (Column::Colors, ColumnRole::Color(_))
+            | (Column::Intensity, ColumnRole::Intensity)
+            | (Column::Classification, ColumnRole::Classification) => true,
+            (Column::Scalar(wanted), ColumnRole::Scalar(name)) => wanted.eq_ignore_ascii_case(name),
+            _ => false,
+        })
+    }
+
+    /// Returns true if the choice names this scalar column.
+    pub(crate) fn names(&self, scalar: &str) -> bool {
+        *self != Self::All && self.wants(&ColumnRole::Scalar(scalar.into()))
+    }
+}
+
+impl TextColumn {
+    /// Returns the column of this name; `-` and `skip` name one that is not read.
+    pub fn parse(name: &str) -> Self {
+        match name.trim() {
+            "-" | "skip" => Self(None),
+            name => Self(ColumnRole::from_names(&[name]).pop()),
+        }
+    }
+
+    /// Returns the columns of a list separated by commas, as in `x,y,z,-,r,g,b`.
+    pub fn parse_list(list: &str) -> Vec<Self> {
+        let mut columns: Vec<Self> = list.split(',').map(Self::parse).collect();
+        let names = list.split(',').map(str::trim).zip(&columns);
+        let names: Vec<&str> =
+            names.filter(|(_, column)| column.0.is_some()).map(|(name, _)| name).collect();
+        // If several names have one role, all of them together decide which gets it.
+        let kept = columns.iter_mut().filter_map(|column| column.0.as_mut());
+        kept.zip(ColumnRole::from_names(&names)).for_each(|(role, assigned)| *role = assigned);
+        columns
+    }
+}

@@ -1,0 +1,122 @@
+//! The meaning of a file's columns, from the names that programs give them.
+
+/// The meaning of a column.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum ColumnRole {
+    /// Coordinate on an axis; 0, 1, 2 are x, y, z.
+    Position(usize),
+    /// Component of the normal on an axis.
+    Normal(usize),
+    /// Colour channel; 0, 1, 2 are red, green, blue.
+    Color(usize),
+    /// Radius of the point.
+    Radius,
+    /// Intensity of the return.
+    Intensity,
+    /// Class of the point.
+    Classification,
+    /// Any other number, with its name.
+    Scalar(String),
+}
+
+impl ColumnRole {
+    /// Returns the role of a column with one of the usual names; case and separators do not matter.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let plain: String =
+            name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
+        Some(match plain.as_str() {
+            "x" | "px" | "posx" | "xcoordinate" | "easting" => Self::Position(0),
+            "y" | "py" | "posy" | "ycoordinate" | "northing" => Self::Position(1),
+            "z" | "pz" | "posz" | "zcoordinate" | "elevation" | "height" => Self::Position(2),
+            "nx" | "normalx" => Self::Normal(0),
+            "ny" | "normaly" => Self::Normal(1),
+            "nz" | "normalz" => Self::Normal(2),
+            "r" | "red" | "diffusered" => Self::Color(0),
+            "g" | "green" | "diffusegreen" => Self::Color(1),
+            "b" | "blue" | "diffuseblue" => Self::Color(2),
+            "i" => Self::Intensity,
+            // CloudCompare writes `scalar_` before the names of its scalar fields.
+            _ => match plain.strip_prefix("scalar").unwrap_or(&plain) {
+                "radius" | "radii" => Self::Radius,
+                "intensity" | "reflectance" => Self::Intensity,
+                "class" | "classification" | "label" => Self::Classification,
+                _ => return None,
+            },
+        })
+    }
+
+    /// Returns the roles of columns with these names. Each role goes to one column, and further columns of the role are
+    /// scalars.
+    ///
+    /// The role's own name, such as `z`, takes precedence over synonyms, such as `height`, and an earlier synonym over
+    /// a later one.
+    pub fn from_names(names: &[&str]) -> Vec<Self> {
+        let scalar = |name: &str| Self::Scalar(name.into());
+        let candidates: Vec<Self> = names
+            .iter()
+            .map(|name| Self::from_name(name).unwrap_or_else(|| scalar(name)))
+            .collect();
+        let column_with_role = |role: &Self| {
+            let mut columns = (0..names.len()).filter(|i| candidates[*i] == *role);
+            let first = columns.clone().next();
+            columns.find(|i| names[*i].trim().eq_ignore_ascii_case(role.name())).or(first)
+        };
+        let columns = candidates.iter().zip(names).enumerate();
+        let assigned = columns.map(|(i, (role, name))| {
+            if column_with_role(role) == Some(i) { role.clone() } else { scalar(name) }
+        });
+        assigned.collect()
+    }
+
+    /// Returns the name that users see.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Position(axis) => ["x", "y", "z"][*axis],
+            Self::Normal(axis) => ["nx", "ny", "nz"][*axis],
+            Self::Color(channel) => ["red", "green", "blue"][*channel],
+            Self::Radius => "radius",
+            Self::Intensity => "intensity",
+            Self::Classification => "classification",
+            Self::Scalar(name) => name,
+        }
+    }
+
+    /// Returns true for the names of a colour's opacity, which a cloud does not keep.
+    pub fn is_alpha(name: &str) -> bool {
+        ["alpha", "a", "diffuse_alpha"].contains(&name.to_lowercase().as_str())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usual_names_have_a_role() {
+        assert_eq!(ColumnRole::from_name("//X"), Some(ColumnRole::Position(0)));
+        assert_eq!(ColumnRole::from_name("normal_z"), Some(ColumnRole::Normal(2)));
+        assert_eq!(ColumnRole::from_name("diffuse_green"), Some(ColumnRole::Color(1)));
+        assert_eq!(ColumnRole::from_name("scalar_Intensity"), Some(ColumnRole::Intensity));
+        assert_eq!(ColumnRole::from_name("Scalar field"), None);
+        assert_eq!(ColumnRole::from_name("f_rest_0"), None);
+    }
+
+    #[test]
+    fn role_goes_to_its_own_name_and_synonyms_become_scalars() {
+        let names = ["x", "y", "height", "Z", "elevation", "time"];
+        let scalar = |name: &str| ColumnRole::Scalar(name.into());
+        let expected = [
+            ColumnRole::Position(0),
+            ColumnRole::Position(1),
+            scalar("height"),
+            ColumnRole::Position(2),
+            scalar("elevation"),
+            scalar("time"),
+        ];
+        assert_eq!(ColumnRole::from_names(&names), expected);
+        assert_eq!(
+            ColumnRole::from_names(&["label", "class"]),
+            [ColumnRole::Classification, scalar("class")]
+        );
+    }
+}

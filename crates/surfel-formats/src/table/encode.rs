@@ -1,0 +1,40 @@
+//! Encodes points to bytes in parallel, and writes them in order.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+use surfel_core::progress::Progress;
+
+use crate::error::Result;
+
+/// Number of points that a task encodes; the usual size of a LAZ chunk.
+pub(crate) const POINTS_PER_CHUNK: usize = 50_000;
+/// Number of chunks that are in memory at a time.
+const CHUNKS_PER_BATCH: usize = 16;
+
+/// Encodes points 0 to `n_points` in chunks by `encode`, and passes the bytes to `sink` in order.
+pub(crate) fn encode_points(
+    n_points: usize,
+    encode: impl Fn(Range<usize>) -> Result<Vec<u8>> + Sync,
+    progress: &dyn Progress,
+    mut sink: impl FnMut(&[u8]) -> Result<()>,
+) -> Result<()> {
+    let chunks: Vec<Range<usize>> = (0..n_points)
+        .step_by(POINTS_PER_CHUNK)
+        .map(|start| start..n_points.min(start + POINTS_PER_CHUNK))
+        .collect();
+    for batch in chunks.chunks(CHUNKS_PER_BATCH) {
+        let encoded: Result<Vec<Vec<u8>>> = batch
+            .par_iter()
+            .map(|chunk| {
+                progress.check()?;
+                encode(chunk.clone())
+            })
+            .collect();
+        for (bytes, chunk) in encoded?.iter().zip(batch) {
+            sink(bytes)?;
+            progress.advance(chunk.len() as u64);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,290 @@
+//! The layout of records of fixed length, which PLY, LAS and parsed text share, and their decoding into columns.
+
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::{PointCloud, Scalar, Values};
+
+use super::column_choice::ColumnChoice;
+use super::column_role::ColumnRole;
+use super::column_slices::{ColumnSlices, ValuesMut};
+
+/// The type of a number in a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NumberType {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+/// A number in a record, and its conversion to a value: `((bits >> shift) & mask) * scale + offset`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Field {
+    /// Byte of the record at which the number begins.
+    pub byte: usize,
+    /// Type of the number in the record.
+    pub number_type: NumberType,
+    /// Lowest bit and number of bits of an unsigned field that shares its byte with others.
+    pub bits: Option<(u32, u32)>,
+    /// Factor of the number.
+    pub scale: f64,
+    /// Summand after the factor.
+    pub offset: f64,
+}
+
+/// A column of a file: its role in the cloud, and its field in the records.
+#[derive(Clone, Debug)]
+pub(crate) struct ColumnField {
+    /// Meaning of the column.
+    pub role: ColumnRole,
+    /// The column's field in a record.
+    pub field: Field,
+}
+
+/// The fields of a file's records that become columns of a cloud.
+#[derive(Clone, Debug)]
+pub(crate) struct RecordLayout {
+    /// Bytes from one record to the next.
+    pub stride: usize,
+    /// True if numbers have their most significant byte first.
+    pub big_endian: bool,
+    /// Fields of x, y and z.
+    pub position: [Field; 3],
+    normal: Option<[Field; 3]>,
+    color: Option<[Field; 3]>,
+    radius: Option<Field>,
+    intensity: Option<Field>,
+    classification: Option<Field>,
+    scalars: Vec<(String, Field)>,
+}
+
+impl NumberType {
+    /// Returns the size in bytes.
+    pub fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+
+    /// Returns true for floats.
+    pub fn is_float(self) -> bool {
+        matches!(self, Self::F32 | Self::F64)
+    }
+}
+
+impl Field {
+    /// An unscaled number at `byte`.
+    pub fn new(byte: usize, number_type: NumberType) -> Self {
+        Self { byte, number_type, bits: None, scale: 1.0, offset: 0.0 }
+    }
+
+    /// Returns the field's value in the record that `record` starts with.
+    pub fn value(&self, record: &[u8], big_endian: bool) -> f64 {
+        let mut value = [0.0];
+        self.fill(record, record.len(), big_endian, &mut value, |slot, v| *slot = v);
+        value[0]
+    }
+
+    /// Calls `set` with each element of `out` and the field's value in the record of the same index.
+    fn fill<T>(
+        &self,
+        records: &[u8],
+        stride: usize,
+        big_endian: bool,
+        out: &mut [T],
+        set: impl Fn(&mut T, f64),
+    ) {
+        let records = records.chunks_exact(stride).zip(out);
+        if let Some((lowest, n_bits)) = self.bits {
+            let mask = ((1u16 << n_bits) - 1) as u8;
+            for (record, slot) in records {
+                set(slot, f64::from((record[self.byte] >> lowest) & mask));
+            }
+            return;
+        }
+        // Each arm is a loop of its own, so that the type is examined once, not once a record.
+        macro_rules! fill {
+            ($number:ty) => {
+                for (record, slot) in records {
+                    let bytes = record[self.byte..].first_chunk().copied().unwrap_or_default();
+                    let number = if big_endian {
+                        <$number>::from_be_bytes(bytes)
+                    } else {
+                        <$number>::from_le_bytes(bytes)
+                    };
+                    set(slot, number as f64 * self.scale + self.offset);
+                }
+            };
+        }
+        match self.number_type {
+            NumberType::I8 => fill!(i8),
+            NumberType::U8 => fill!(u8),
+            NumberType::I16 => fill!(i16),
+            NumberType::U16 => fill!(u16),
+            NumberType::I32 => fill!(i32),
+            NumberType::U32 => fill!(u32),
+            NumberType::I64 => fill!(i64),
+            NumberType::U64 => fill!(u64),
+            NumberType::F32 => fill!(f32),
+            NumberType::F64 => fill!(f64),
+        }
+    }
+
+    /// Returns an empty column of the narrowest type that holds the field's values.
+    fn empty_values(&self) -> Values {
+        let is_scaled = self.scale != 1.0 || self.offset != 0.0;
+        match self.number_type {
+            NumberType::F64 | NumberType::U32 | NumberType::I64 | NumberType::U64 => {
+                Values::F64(Vec::new())
+            }
+            NumberType::I32 if is_scaled => Values::F64(Vec::new()),
+            NumberType::F32 => Values::F32(Vec::new()),
+            _ if is_scaled => Values::F32(Vec::new()),
+            NumberType::U8 => Values::U8(Vec::new()),
+            NumberType::U16 => Values::U16(Vec::new()),
+            NumberType::I8 | NumberType::I16 | NumberType::I32 => Values::I32(Vec::new()),
+        }
+    }
+}
+
+impl RecordLayout {
+    /// The layout of records with these columns, of which those of `choice` are kept; `None` without x, y and z.
+    ///
+    /// Colours must be scaled to 0..65535. If two columns have one role, the first is used.
+    pub fn new(
+        stride: usize,
+        big_endian: bool,
+        columns: Vec<ColumnField>,
+        choice: &ColumnChoice,
+    ) -> Option<Self> {
+        let find = |role: ColumnRole| {
+            columns.iter().find(|column| column.role == role).map(|column| column.field)
+        };
+        let triple = |role: fn(usize) -> ColumnRole| {
+            choice
+                .wants(&role(0))
+                .then(|| Some([find(role(0))?, find(role(1))?, find(role(2))?]))
+                .flatten()
+        };
+        let single = |role: ColumnRole| choice.wants(&role).then(|| find(role)).flatten();
+        let mut scalars: Vec<(String, Field)> = Vec::new();
+        for column in &columns {
+            if let ColumnRole::Scalar(name) = &column.role
+                && choice.wants(&column.role)
+                && !scalars.iter().any(|(other, _)| other.eq_ignore_ascii_case(name))
+            {
+                scalars.push((name.clone(), column.field));
+            }
+        }
+        Some(Self {
+            stride,
+            big_endian,
+            position: triple(ColumnRole::Position)?,
+            normal: triple(ColumnRole::Normal),
+            color: triple(ColumnRole::Color),
+            radius: single(ColumnRole::Radius),
+            intensity: single(ColumnRole::Intensity),
+            classification: single(ColumnRole::Classification),
+            scalars,
+        })
+    }
+
+    /// Returns a cloud without points that has the layout's columns.
+    pub fn empty_cloud(&self, origin: DVec3) -> PointCloud {
+        PointCloud {
+            origin,
+            normals: self.normal.map(|_| Vec::new()),
+            radii: self.radius.map(|_| Vec::new()),
+            colors: self.color.map(|_| Vec::new()),
+            intensity: self.intensity.map(|_| Vec::new()),
+            classification: self.classification.map(|_| Vec::new()),
+            scalars: self
+                .scalars
+                .iter()
+                .map(|(name, field)| Scalar { name: name.clone(), values: field.empty_values() })
+                .collect(),
+            ..PointCloud::default()
+        }
+    }
+
+    /// Returns the world position of a single record.
+    pub fn world_position(&self, record: &[u8]) -> DVec3 {
+        DVec3::from_array(self.position.map(|field| field.value(record, self.big_endian)))
+    }
+
+    /// Decodes records into `slices`, which has as many points; positions are relative to `origin`.
+    pub fn decode(&self, records: &[u8], origin: DVec3, slices: &mut ColumnSlices) {
+        for axis in 0..3 {
+            let zero = origin[axis];
+            let set = |position: &mut Vec3, v: f64| position[axis] = (v - zero) as f32;
+            self.fill(&self.position[axis], records, slices.positions, set);
+        }
+        if let (Some(fields), Some(normals)) = (&self.normal, &mut slices.normals) {
+            for (axis, field) in fields.iter().enumerate() {
+                self.fill(field, records, normals, |normal, v| normal[axis] = v as f32);
+            }
+            normals.iter_mut().for_each(|normal| *normal = unit(*normal));
+        }
+        if let (Some(fields), Some(colors)) = (&self.color, &mut slices.colors) {
+            for (channel, field) in fields.iter().enumerate() {
+                // The cast clamps, and turns NaN to black.
+                self.fill(field, records, colors, |color, v| color[channel] = (v + 0.5) as u16);
+            }
+        }
+        if let (Some(field), Some(radii)) = (&self.radius, &mut slices.radii) {
+            self.fill(field, records, radii, |radius, v| *radius = v as f32);
+        }
+        if let (Some(field), Some(intensity)) = (&self.intensity, &mut slices.intensity) {
+            self.fill(field, records, intensity, |slot, v| *slot = v as f32);
+        }
+        if let (Some(field), Some(classes)) = (&self.classification, &mut slices.classification) {
+            self.fill(field, records, classes, |class, v| *class = v as u8);
+        }
+        for ((_, field), values) in self.scalars.iter().zip(&mut slices.scalars) {
+            match values {
+                ValuesMut::U8(out) => self.fill(field, records, out, |slot, v| *slot = v as u8),
+                ValuesMut::U16(out) => self.fill(field, records, out, |slot, v| *slot = v as u16),
+                ValuesMut::I32(out) => self.fill(field, records, out, |slot, v| *slot = v as i32),
+                ValuesMut::F32(out) => self.fill(field, records, out, |slot, v| *slot = v as f32),
+                ValuesMut::F64(out) => self.fill(field, records, out, |slot, v| *slot = v),
+            }
+        }
+    }
+
+    fn fill<T>(&self, field: &Field, records: &[u8], out: &mut [T], set: impl Fn(&mut T, f64)) {
+        field.fill(records, self.stride, self.big_endian, out, set);
+    }
+}
+
+/// Returns `normal` at unit length; one without a direction stays as it is.
+fn unit(normal: Vec3) -> Vec3 {
+    let length = normal.length();
+    // Division would change the last bits of a vector that is normalized already.
+    if (length - 1.0).abs() < 1e-6 || !(0.0 < length && length < f32::INFINITY) {
+        return normal;
+    }
+    normal / length
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn field_values_respect_bits_scale_and_byte_order() {
+        let record = [0b1010_0110, 0x01, 0x02];
+        let bits = Field { bits: Some((5, 3)), ..Field::new(0, NumberType::U8) };
+        assert_eq!(bits.value(&record, false), 5.0);
+        let number = Field { scale: 0.5, offset: 1.0, ..Field::new(1, NumberType::U16) };
+        assert_eq!(number.value(&record, true), 130.0);
+        assert_eq!(number.value(&record, false), 257.5);
+    }
+}

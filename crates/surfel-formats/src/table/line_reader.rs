@@ -1,0 +1,191 @@
+//! Reads lines of numbers in parallel, as records of f64.
+
+use rayon::prelude::*;
+use surfel_core::math::DVec3;
+use surfel_core::points::PointCloud;
+use surfel_core::progress::Progress;
+
+use super::column_slices::{ColumnSlices, shrink};
+use super::layout::RecordLayout;
+use super::reader::{Tolerance, grow_checked, origin_of_records};
+use crate::error::{Location, Result};
+use crate::file::Input;
+
+/// Bytes of text that a task parses.
+const BYTES_PER_TASK: usize = 1 << 18;
+/// Number of tasks whose rows are in memory at a time.
+const TASKS_PER_BATCH: usize = 32;
+
+/// Maximum bytes of a line. Longer ones are rejected before memory is allocated for them: they are no text that holds
+/// points.
+pub(crate) const MAX_LINE_LENGTH: usize = 1 << 20;
+/// Maximum number of fields in a line.
+pub(crate) const MAX_FIELDS: usize = 1000;
+
+/// The lines of a file to read.
+pub(crate) struct RowRange {
+    /// First byte.
+    pub start: usize,
+    /// Number of the line that begins there, for messages.
+    pub line: u64,
+    /// Number of values in each row.
+    pub n_columns: usize,
+    /// Maximum number of rows; the lines after them are ignored.
+    pub limit: Option<u64>,
+}
+
+/// The error of a line.
+pub(crate) struct LineError {
+    /// Text that was found.
+    pub found: String,
+    /// Text that was expected.
+    pub expected: String,
+}
+
+/// Appends the values of a line to a row; a line without values is no row.
+pub(crate) type ParseLine<'a> =
+    &'a (dyn Fn(&[u8], &mut Vec<f64>) -> std::result::Result<(), LineError> + Sync);
+
+/// Reads lines to a cloud. `layout_of` is called once, with the first rows as records of f64.
+pub(crate) fn read_rows(
+    input: &Input,
+    rows: RowRange,
+    parse: ParseLine,
+    layout_of: impl Fn(&[u8]) -> RecordLayout,
+    origin: Option<DVec3>,
+    progress: &dyn Progress,
+) -> Result<PointCloud> {
+    let mut rest = &input[rows.start..];
+    let mut line = rows.line;
+    let mut left = rows.limit.unwrap_or(u64::MAX);
+    let mut started: Option<(RecordLayout, PointCloud)> = None;
+    while !rest.is_empty() && 0 < left {
+        progress.check()?;
+        let tasks = take_tasks(&mut rest);
+        let n_bytes: usize = tasks.iter().map(|task| task.len()).sum();
+        let parsed: Vec<Parsed> =
+            tasks.into_par_iter().map(|text| parse_text(text, parse, rows.n_columns)).collect();
+
+        let mut batch: Vec<Vec<u8>> = Vec::new();
+        for mut parsed in parsed {
+            let n_rows = (parsed.records.len() / (8 * rows.n_columns)) as u64;
+            if left <= n_rows {
+                parsed.records.truncate(left as usize * 8 * rows.n_columns);
+            } else if let Some(LineError { found, expected }) = parsed.error {
+                let location = Location::Line(line + parsed.n_lines - 1);
+                return Err(input.malformed(
+                    location,
+                    found,
+                    expected,
+                    "repair or remove the line",
+                ));
+            }
+            left = left.saturating_sub(n_rows);
+            line += parsed.n_lines;
+            if !parsed.records.is_empty() {
+                batch.push(parsed.records);
+            }
+        }
+        progress.advance(n_bytes as u64);
+        let Some(sample) = batch.first() else { continue };
+        let (layout, cloud) = started.get_or_insert_with(|| {
+            let layout = layout_of(sample);
+            let origin =
+                origin.unwrap_or_else(|| origin_of_records(sample, &layout, Tolerance::UNSTATED));
+            let cloud = layout.empty_cloud(origin);
+            (layout, cloud)
+        });
+        append_records(input, layout, cloud, &batch)?;
+    }
+    let (_, mut cloud) = started.unwrap_or_else(|| {
+        let layout = layout_of(&[]);
+        let cloud = layout.empty_cloud(origin.unwrap_or_default());
+        (layout, cloud)
+    });
+    shrink(&mut cloud);
+    Ok(cloud)
+}
+
+/// Parses a number in any of the usual spellings, `nan` and `inf` among them.
+pub(crate) fn parse_number(word: &[u8]) -> std::result::Result<f64, LineError> {
+    fast_float2::parse(word).map_err(|_| {
+        let text = word[..word.len().min(40)].escape_ascii();
+        let has_comma = word.contains(&b',');
+        let expected =
+            if has_comma { "a number with a decimal point, not a comma" } else { "a number" };
+        LineError { found: format!("`{text}`"), expected: expected.into() }
+    })
+}
+
+fn check_length(line: &[u8]) -> std::result::Result<(), LineError> {
+    if line.len() <= MAX_LINE_LENGTH {
+        return Ok(());
+    }
+    let expected = format!("lines of at most {MAX_LINE_LENGTH} bytes");
+    Err(LineError { found: format!("a line of {} bytes", line.len()), expected })
+}
+
+struct Parsed {
+    /// Rows of little-endian f64.
+    records: Vec<u8>,
+    /// Number of lines parsed, the broken one included.
+    n_lines: u64,
+    error: Option<LineError>,
+}
+
+/// Takes whole lines from the front of `rest`, one part for each task.
+fn take_tasks<'a>(rest: &mut &'a [u8]) -> Vec<&'a [u8]> {
+    let mut tasks = Vec::new();
+    while !rest.is_empty() && tasks.len() < TASKS_PER_BATCH {
+        let near = rest.len().min(BYTES_PER_TASK);
+        let end = memchr::memchr(b'\n', &rest[near..]).map_or(rest.len(), |at| near + at + 1);
+        let (task, after) = rest.split_at(end);
+        tasks.push(task);
+        *rest = after;
+    }
+    tasks
+}
+
+fn parse_text(text: &[u8], parse: ParseLine, n_columns: usize) -> Parsed {
+    let mut parsed = Parsed { records: Vec::new(), n_lines: 0, error: None };
+    let mut row = Vec::new();
+    let mut rest = text;
+    while !rest.is_empty() {
+        let end = memchr::memchr(b'\n', rest);
+        let line = rest[..end.unwrap_or(rest.len())].trim_ascii();
+        rest = &rest[end.map_or(rest.len(), |end| end + 1)..];
+        parsed.n_lines += 1;
+        if line.is_empty() {
+            continue;
+        }
+        row.clear();
+        if let Err(error) = check_length(line).and_then(|()| parse(line, &mut row)) {
+            parsed.error = Some(error);
+            break;
+        }
+        debug_assert!(row.is_empty() || row.len() == n_columns, "a row is complete or empty");
+        parsed.records.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+    }
+    parsed
+}
+
+fn append_records(
+    input: &Input,
+    layout: &RecordLayout,
+    cloud: &mut PointCloud,
+    batch: &[Vec<u8>],
+) -> Result<()> {
+    let n_before = cloud.len();
+    let n_new: usize = batch.iter().map(|records| records.len() / layout.stride).sum();
+    grow_checked(cloud, n_before + n_new, input)?;
+    let origin = cloud.origin;
+    let mut rest = ColumnSlices::from_cloud(cloud, n_before);
+    let tasks: Vec<(&Vec<u8>, ColumnSlices)> = batch
+        .iter()
+        .map(|records| (records, rest.split_off_front(records.len() / layout.stride)))
+        .collect();
+    tasks.into_par_iter().for_each(|(records, mut slices)| {
+        layout.decode(records, origin, &mut slices);
+    });
+    Ok(())
+}

@@ -1,0 +1,137 @@
+//! Triangle meshes as ground truth for point clouds of the same shape.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use surfel_core::bvh::{self, Bvh, BvhPrimitive, Child, NO_PRIMITIVE};
+use surfel_core::math::{Aabb, LANES, Ray, Vec3};
+use surfel_core::progress::NoProgress;
+
+/// Triangles and a tree over them.
+pub struct GroundTruth {
+    /// The positions of the vertices.
+    pub vertices: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    tree: Bvh,
+}
+
+/// A hit of a triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct GroundTruthHit {
+    /// The distance along the ray.
+    pub distance: f32,
+    /// The unit normal of the triangle, turned toward the ray's origin.
+    pub normal: Vec3,
+}
+
+/// Returns the folder of test data beside the checkout, or prints that it is absent and returns `None`.
+pub fn shared_data() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    #[expect(clippy::print_stdout, reason = "a skipped test reports itself")]
+    {
+        println!("skipped: ../shared/data is absent");
+    }
+    None
+}
+
+impl GroundTruth {
+    /// Reads an ascii PLY file whose vertices begin with x y z and whose faces are triangles.
+    ///
+    /// # Panics
+    ///
+    /// Panics if there is no such file.
+    pub fn from_ascii_ply(path: &Path) -> Self {
+        let text = fs::read_to_string(path).unwrap();
+        let (header, body) = text.split_once("end_header").unwrap();
+        let count = |element: &str| -> usize {
+            let line = header.lines().find_map(|line| line.strip_prefix(element)).unwrap();
+            line.trim().parse().unwrap()
+        };
+        let (n_vertices, n_faces) = (count("element vertex"), count("element face"));
+        let mut lines = body.trim_start().lines();
+        let vertices: Vec<Vec3> = lines.by_ref().take(n_vertices).map(vertex).collect();
+        let triangles = lines.take(n_faces).map(triangle).collect();
+        Self::new(vertices, triangles)
+    }
+
+    /// Builds the tree over triangles, each three indices of vertices.
+    pub fn new(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
+        let corners = |triangle: &[u32; 3]| triangle.map(|i| vertices[i as usize]);
+        let boxes = triangles.iter().map(|triangle| Aabb::of_points(corners(triangle)));
+        let boxes: Vec<Aabb> = boxes.collect();
+        let primitives = (0u32..).zip(&boxes).map(|(i, bounds)| BvhPrimitive::new(*bounds, i, 0.0));
+        let mut tree = bvh::build(primitives.collect(), |_| true, &NoProgress).unwrap();
+        bvh::refit_boxes(&mut tree.nodes, |block| {
+            let members = tree.blocks[block as usize].iter().filter(|&&i| i != NO_PRIMITIVE);
+            members.fold(Aabb::EMPTY, |all, &i| all.union(boxes[i as usize]))
+        });
+        Self { vertices, triangles, tree }
+    }
+
+    /// Returns the nearest hit by a traversal that is slow but short.
+    pub fn closest_hit(&self, ray: &Ray) -> Option<GroundTruthHit> {
+        let mut nearest: Option<GroundTruthHit> = None;
+        let mut open = vec![0u32];
+        while let Some(node_idx) = open.pop() {
+            let node = &self.tree.nodes[node_idx as usize];
+            for lane in 0..LANES {
+                let Some(child) = node.child(lane) else { continue };
+                let limit = nearest.map_or(f32::INFINITY, |hit| hit.distance);
+                if !intersects_box(ray, node.bounds(lane), limit) {
+                    continue;
+                }
+                match child {
+                    Child::Node(child) => open.push(child),
+                    Child::Block(block) => {
+                        for &index in &self.tree.blocks[block as usize] {
+                            let hit = (index != NO_PRIMITIVE).then(|| self.intersect(index, ray));
+                            let limit = nearest.map_or(f32::INFINITY, |hit| hit.distance);
+                            nearest = hit.flatten().filter(|hit| hit.distance < limit).or(nearest);
+                        }
+                    }
+                }
+            }
+        }
+        nearest
+    }
+
+    /// Intersects a ray and a triangle by the method of Möller and Trumbore (1997).
+    fn intersect(&self, index: u32, ray: &Ray) -> Option<GroundTruthHit> {
+        let [a, b, c] = self.triangles[index as usize].map(|i| self.vertices[i as usize]);
+        let (ab, ac) = (b - a, c - a);
+        let p = ray.direction.cross(ac);
+        let determinant = ab.dot(p);
+        let from_a = ray.origin - a;
+        let u = from_a.dot(p) / determinant;
+        let q = from_a.cross(ab);
+        let v = ray.direction.dot(q) / determinant;
+        let distance = ac.dot(q) / determinant;
+        let inside = 0.0 <= u && 0.0 <= v && u + v <= 1.0 && ray.t_min < distance;
+        let normal = ab.cross(ac).normalize_or(-ray.direction);
+        let normal = if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
+        inside.then_some(GroundTruthHit { distance, normal })
+    }
+}
+
+fn vertex(line: &str) -> Vec3 {
+    let mut numbers = line.split_whitespace().map(|word| word.parse::<f32>().unwrap());
+    let mut next = || numbers.next().unwrap();
+    Vec3::new(next(), next(), next())
+}
+
+fn triangle(line: &str) -> [u32; 3] {
+    let numbers: Vec<u32> = line.split_whitespace().map(|word| word.parse().unwrap()).collect();
+    assert_eq!(numbers[0], 3, "only triangles");
+    [numbers[1], numbers[2], numbers[3]]
+}
+
+fn intersects_box(ray: &Ray, bounds: Aabb, limit: f32) -> bool {
+    let (low, high) =
+        ((bounds.min - ray.origin) / ray.direction, (bounds.max - ray.origin) / ray.direction);
+    let enter = low.min(high).max_element().max(ray.t_min);
+    let leave = low.max(high).min_element().min(limit);
+    // The interval is widened by more than any rounding error.
+    enter <= leave * (1.0 + 1e-5) + 1e-6
+}

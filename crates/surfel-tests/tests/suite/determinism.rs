@@ -1,0 +1,139 @@
+//! Determinism: pictures, trees and regions have the same bytes whatever the number of threads and the SIMD level;
+//! and every stage of the work can be cancelled.
+
+use rayon::ThreadPoolBuilder;
+use std::sync::atomic::{AtomicU64, Ordering};
+use surfel_core::flat::FlatScene;
+use surfel_core::image::Image;
+use surfel_core::math::{Vec3, Vec4};
+use surfel_core::progress::{NoProgress, Progress};
+use surfel_core::render::{CpuRenderer, RenderRegion, Renderer, Settings};
+use surfel_core::scene::{Light, Scene, Sky, Sun};
+use surfel_core::surface::SurfaceKind;
+use surfel_core::trace::Simd;
+use surfel_tests::clouds;
+use surfel_tests::scenes;
+
+const SETTINGS: Settings = Settings {
+    width: 70,
+    height: 50,
+    samples_per_pixel: 4,
+    light_samples: 8,
+    max_depth: 8,
+    seed: 3,
+    with_aovs: true,
+};
+
+fn scene(kind: SurfaceKind) -> Scene {
+    let mut cloud = clouds::cube(40, 0.4, 9);
+    cloud.normals = None;
+    let sun = Sun {
+        direction: Vec3::new(1.0, 1.0, 1.0).normalize(),
+        color: Vec3::ONE,
+        angular_diameter_deg: 2.0,
+    };
+    let sky =
+        Sky { up: Vec3::Z, zenith: Vec3::splat(0.5), ground: Vec3::splat(0.2), ao_distance: 2.0 };
+    Scene { lights: vec![Light::Sun(sun), Light::Sky(sky)], ..scenes::scene(cloud, kind) }
+}
+
+/// Prepares bare points, builds the scene and renders it, on `n_threads`.
+fn picture(kind: SurfaceKind, n_threads: usize, simd: Simd) -> Image {
+    let pool = ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+    pool.install(|| {
+        let flat = FlatScene::new(&scene(kind), &NoProgress).unwrap();
+        CpuRenderer { simd }.render(&flat, &SETTINGS, &NoProgress).unwrap().0
+    })
+}
+
+#[test]
+fn pictures_do_not_depend_on_threads_or_simd_level() {
+    for (name, kind) in SurfaceKind::ALL {
+        let reference = picture(kind, 1, Simd::PORTABLE);
+        for n_threads in [1, 2, 3] {
+            for simd in Simd::available() {
+                assert!(
+                    picture(kind, n_threads, simd) == reference,
+                    "{name}, {n_threads} threads, {}",
+                    simd.name()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn preparation_and_tree_do_not_depend_on_threads() {
+    let build = |n_threads: usize| {
+        let pool = ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+        pool.install(|| {
+            let mut cloud = clouds::sphere(60_000, 1.0);
+            cloud.normals = None;
+            let flat = scenes::flat(cloud, SurfaceKind::Splat);
+            (flat.points.nodes, flat.points.blocks, flat.points.ids)
+        })
+    };
+    assert!(build(1) == build(2));
+}
+
+/// Cancels the work when it has been asked a number of times whether to cancel.
+struct CancelAt {
+    left: AtomicU64,
+}
+
+impl Progress for CancelAt {
+    fn is_cancelled(&self) -> bool {
+        self.left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1)).is_err()
+    }
+}
+
+#[test]
+fn every_stage_can_be_cancelled() {
+    for left in [0, 1, 5, 20] {
+        let progress = CancelAt { left: AtomicU64::new(left) };
+        let result = FlatScene::new(&scene(SurfaceKind::Splat), &progress).and_then(|flat| {
+            CpuRenderer { simd: Simd::detect() }.render(&flat, &SETTINGS, &progress)
+        });
+        assert!(matches!(result, Err(surfel_core::Error::Cancelled)), "after {left}");
+    }
+}
+
+#[test]
+fn regions_make_the_whole_picture() {
+    for (name, kind) in SurfaceKind::ALL {
+        let flat = FlatScene::new(&scene(kind), &NoProgress).unwrap();
+        let renderer = CpuRenderer { simd: Simd::detect() };
+        let whole = renderer.render(&flat, &SETTINGS, &NoProgress).unwrap().0;
+        let piece = |rows, samples| {
+            let region = RenderRegion { rows, samples };
+            renderer.render_region(&flat, &SETTINGS, region, &NoProgress).unwrap().0
+        };
+        let rows = [(0, 7), (7, 40), (40, 50)].map(|rows| piece(rows, (0, 4)));
+        assert_eq!(rows.each_ref().map(|image| image.height), [7, 33, 10]);
+        let stacked: Vec<[f32; 4]> = rows.iter().flat_map(|image| image.color.clone()).collect();
+        assert!(stacked == whole.color, "{name}");
+        if kind == SurfaceKind::Points {
+            continue;
+        }
+        let samples = [(0, 1), (1, 2), (2, 4)].map(|samples| piece((0, 50), samples));
+        for (pixel, expected) in whole.color.iter().enumerate() {
+            let weighted = samples.iter().zip([0.25, 0.25, 0.5]);
+            let mean: Vec4 = weighted.map(|(s, w)| w * Vec4::from_array(s.color[pixel])).sum();
+            let difference = (mean - Vec4::from_array(*expected)).abs().max_element();
+            assert!(difference < 1e-5, "{name}, pixel {pixel}");
+        }
+    }
+}
+
+#[test]
+fn a_region_outside_the_picture_is_an_error() {
+    let flat = FlatScene::new(&scene(SurfaceKind::Disc), &NoProgress).unwrap();
+    let renderer = CpuRenderer { simd: Simd::detect() };
+    for (rows, samples) in
+        [((0, 51), (0, 4)), ((9, 9), (0, 4)), ((0, 50), (3, 5)), ((5, 4), (0, 1))]
+    {
+        let region = RenderRegion { rows, samples };
+        let error = renderer.render_region(&flat, &SETTINGS, region, &NoProgress).unwrap_err();
+        assert!(error.to_string().contains("region"), "{error}");
+    }
+}

@@ -1,0 +1,183 @@
+// Picking and measuring: the page shows the attributes that are in the file.
+
+import assert from 'node:assert/strict';
+import { after, before, beforeEach, test } from 'node:test';
+import { project } from '../page/camera.js';
+import { RESOLUTION } from './data.mjs';
+import { closePage, copyBy, data, openPage, pixelAt, QUICK, serve, settled, show, state } from './harness.mjs';
+
+const AXES = ['x', 'y', 'z'];
+let page;
+before(async () => {
+  const server = await serve(['town.ply', 'house.obj'], ...QUICK);
+  page = await openPage(server.link, { viewport: { width: 1300, height: 640 } });
+});
+beforeEach(async () => {
+  await page.goto(page.url().replace(/#.*/, ''));
+  await page.reload();
+  await settled(page);
+});
+after(() => closePage(page));
+
+/** The card's rows after Alt + click. */
+async function pick(pixel, target = page) {
+  const card = target.locator('#pick-card');
+  await card.evaluate((element) => element.replaceChildren());
+  await target.keyboard.down('Alt');
+  await target.mouse.click(pixel.x, pixel.y);
+  await target.keyboard.up('Alt');
+  await card.locator('dl').waitFor();
+  return card.evaluate((element) => Object.fromEntries(
+    [...element.querySelectorAll('dt')].map((name) => [name.textContent, name.nextSibling.querySelector('span').textContent])));
+}
+
+const positionOf = (row) => AXES.map((name) => Number(row[name]));
+
+/** Asserts that the card shows a point of the file that is near the clicked pixel. */
+async function assertIsInFile(row, pixel, maxDistance = 30) {
+  const point = data.points[Number(row.index)];
+  for (const axis of AXES) assert.ok(Math.abs(Number(row[axis]) - point[axis]) < RESOLUTION / 10, `${axis}: ${row[axis]} ${point[axis]}`);
+  for (const name of ['red', 'green', 'blue', 'intensity', 'classification', 'gps_time']) assert.equal(Number(row[name]), point[name], name);
+  assert.equal(row.class, { 2: 'ground', 6: 'building' }[point.classification]);
+  const found = project(await state(page, 'camera'), await state(page, 'size'), positionOf(row));
+  const viewport = await page.locator('#viewport').boundingBox();
+  const distance = Math.hypot(found.x - (pixel.x - viewport.x), found.y - (pixel.y - viewport.y));
+  assert.ok(distance < maxDistance, `${distance} pixels away`);
+}
+
+const POSITIONS = [[0.45, 0.6], [0.6, 0.75], [0.9, 0.7], [0.47, 0.13], [0.9, 0.4]];
+
+test('a picked point has the attributes in the file', async () => {
+  for (const fractions of POSITIONS) {
+    const pixel = await pixelAt(page, ...fractions);
+    await assertIsInFile(await pick(pixel), pixel);
+  }
+});
+
+test('an animated point has its position at the current time', async () => {
+  const rising = await openPage((await serve(['rising.toml'], ...QUICK)).link);
+  await show(rising, { time: 1 });
+  const row = await pick(await pixelAt(rising, 0.5, 0.25), rising);
+  assert.ok(Math.abs(Number(row.z) - data.points[Number(row.index)].z - 10) < RESOLUTION, row.z);
+  await closePage(rising);
+});
+
+const VIEWS = {
+  'other radii': { radius_scale: 0.8, surface: 'disc' },
+  'half of the points': { subsample: 'random:10000' },
+  'a clip box': { clip_box: '([562316,562340],[4183187,4183215],[140,160])' },
+};
+
+for (const [name, patch] of Object.entries(VIEWS)) {
+  test(`a picked point is correct with ${name}`, async () => {
+    await show(page, patch);
+    const pixel = await pixelAt(page, 0.45, 0.6);
+    await assertIsInFile(await pick(pixel), pixel, 40);
+  });
+}
+
+test('a picked point is correct on an orthographic map', async () => {
+  await page.locator('#viewport').focus();
+  for (const key of ['5', 'o', 'f']) await page.keyboard.press(key);
+  await settled(page);
+  const pixel = await pixelAt(page, 0.45, 0.4);
+  await assertIsInFile(await pick(pixel), pixel);
+});
+
+test('a picked triangle has the attributes of its mesh', async () => {
+  const camera = await state(page, 'camera');
+  const roof = project(camera, await state(page, 'size'), [562339.125, 4183196.5, 153]);
+  const viewport = await page.locator('#viewport').boundingBox();
+  const row = await pick({ x: viewport.x + roof.x, y: viewport.y + roof.y });
+  assert.match(await page.locator('#pick-card h2').textContent(), /Triangle/);
+  assert.equal(row.object, 'house');
+  assert.ok(Math.abs(Number(row.z) - 153) < RESOLUTION && Number(row.index) < 2, JSON.stringify(row));
+  assert.equal(row.normal.replaceAll('-0.0000', '0.0000'), '0.0000, 0.0000, 1.0000');
+});
+
+test('a pick without a point shows a toast', async () => {
+  await page.locator('[data-tool="pick"]').click();
+  const corner = await pixelAt(page, 0.98, 0.03);
+  await page.mouse.click(corner.x, corner.y);
+  await page.locator('.toast', { hasText: 'There is no point here.' }).waitFor();
+  assert.ok(await page.locator('#pick-card').isHidden());
+});
+
+test('values can be copied', async () => {
+  const row = await pick(await pixelAt(page, 0.6, 0.75));
+  await copyBy(page.locator('[aria-label="Copy x"]'));
+  assert.equal(await page.evaluate(() => navigator.clipboard.readText()), row.x);
+  await copyBy(page.locator('#pick-card [aria-label="Copy all"]'));
+  const lines = (await page.evaluate(() => navigator.clipboard.readText())).split('\n').map((line) => line.split('\t'));
+  assert.deepEqual(Object.fromEntries(lines), row);
+});
+
+/** The points of the file behind these pixels. */
+async function pointsAt(pixels) {
+  const points = [];
+  for (const pixel of pixels) points.push(data.points[Number((await pick(pixel)).index)]);
+  await page.keyboard.press('Escape');
+  return points;
+}
+
+/** The values of a measurement with full precision, from the clipboard. */
+async function measuredValues(name) {
+  await copyBy(page.locator(`[aria-label="Copy ${name}"]`));
+  const lines = (await page.evaluate(() => navigator.clipboard.readText())).split('\n').map((line) => line.split('\t'));
+  return Object.fromEntries(lines.slice(1).map(([label, ...numbers]) => [label, numbers.length === 1 ? Number(numbers[0]) : numbers.map(Number)]));
+}
+
+/** Measures with a tool; the pixels must be too far apart for a double click. */
+async function measure(tool, pixels) {
+  await page.locator(`[data-tool="${tool}"]`).click();
+  for (const pixel of pixels) await page.mouse.click(pixel.x, pixel.y);
+}
+
+const isClose = (found, expected) => assert.ok(Math.abs(found - expected) < RESOLUTION, `${found} ${expected}`);
+
+test('distance and height agree with the points of the file', async () => {
+  const pixels = [await pixelAt(page, 0.6, 0.75), await pixelAt(page, 0.9, 0.4)];
+  const [a, b] = await pointsAt(pixels);
+  await measure('distance', pixels);
+  const found = await measuredValues('distance 1');
+  isClose(found.Distance, Math.hypot(b.x - a.x, b.y - a.y, b.z - a.z));
+  isClose(found.Horizontal, Math.hypot(b.x - a.x, b.y - a.y));
+  isClose(found.Vertical, b.z - a.z);
+  await measure('height', pixels);
+  isClose((await measuredValues('height 2')).Height, Math.abs(b.z - a.z));
+  await page.locator('[aria-label="Delete distance 1"]').click();
+  assert.equal(await page.locator('.measurement').count(), 1);
+});
+
+test('points are measured in the order of the clicks, even if answers arrive in another order', async () => {
+  const pixels = [await pixelAt(page, 0.6, 0.75), await pixelAt(page, 0.9, 0.4)];
+  const [a, b] = await pointsAt(pixels);
+  await page.evaluate(() => { window.picks.delays_ms = [500, 0]; });
+  await measure('distance', pixels);
+  isClose((await measuredValues('distance 1')).Vertical, b.z - a.z);
+});
+
+test('an area agrees with its corners', async () => {
+  const pixels = [await pixelAt(page, 0.6, 0.75), await pixelAt(page, 0.9, 0.7), await pixelAt(page, 0.9, 0.45)];
+  const corners = await pointsAt(pixels);
+  await measure('area', pixels);
+  await page.keyboard.press('Enter');
+  const found = await measuredValues('area 1');
+  const shoelace = corners.reduce((sum, { x, y }, i) => {
+    const next = corners[(i + 1) % 3];
+    return sum + (x - corners[0].x) * (next.y - corners[0].y) - (next.x - corners[0].x) * (y - corners[0].y);
+  }, 0);
+  assert.ok(Math.abs(found['Level area'] - Math.abs(shoelace) / 2) < 0.01, `${found['Level area']}`);
+  assert.ok(found['Level area'] <= found.Area + 1e-9);
+});
+
+test('Escape cancels the unfinished measurement, then the tool', async () => {
+  const pixel = await pixelAt(page, 0.6, 0.6);
+  await measure('distance', [pixel]);
+  await page.locator('.measure-dot').first().waitFor();
+  await page.keyboard.press('Escape');
+  await page.locator('.measure-dot').first().waitFor({ state: 'detached' });
+  assert.equal(await state(page, 'tool'), 'distance');
+  await page.keyboard.press('Escape');
+  assert.equal(await state(page, 'tool'), 'navigate');
+});

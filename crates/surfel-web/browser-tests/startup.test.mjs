@@ -1,0 +1,67 @@
+// Startup: the first picture arrives, follows the mouse, and is finished when the view is at rest.
+
+import assert from 'node:assert/strict';
+import { after, before, test } from 'node:test';
+import {
+  blankPage, closePage, colorCount, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, serve, settled, state, recordPictures,
+} from './harness.mjs';
+
+const PNG = 2;
+let server;
+let page;
+before(async () => {
+  server = await serve(['town.ply'], ...QUICK);
+  page = await openPage(server.link);
+});
+after(() => closePage(page));
+
+test('a first picture arrives and is not blank', async () => {
+  const fresh = await blankPage();
+  await fresh.goto(server.link);
+  await fresh.waitForFunction(() => window.surfel?.state.lastFrame);
+  assert.ok(await colorCount(fresh) > 100);
+  assert.equal(await fresh.title(), 'town.ply – surfel');
+  await closePage(fresh);
+});
+
+test('the finished picture is lossless and has the size of the screen', async () => {
+  const { kind, finished, width, height, samples, of_samples } = await state(page, 'lastFrame');
+  assert.deepEqual({ kind, finished, samples }, { kind: PNG, finished: true, samples: of_samples });
+  const viewport = await page.locator('#viewport').boundingBox();
+  assert.deepEqual({ width, height }, { width: viewport.width, height: viewport.height });
+  assert.equal(await page.locator('#work-text').textContent(), 'finished');
+});
+
+test('pictures arrive while the mouse is dragged', async () => {
+  const [first, start] = [await finishedPixels(page), await state(page, 'lastFrame')];
+  const pixel = await pixelAt(page, 0.5, 0.5);
+  await recordPictures(page);
+  await page.mouse.move(pixel.x, pixel.y);
+  await page.mouse.down();
+  await page.mouse.move(pixel.x + 60, pixel.y + 10, { steps: 4 });
+  await page.waitForFunction((seq) => seq < window.surfel.state.lastFrame.seq, start.seq);
+  assert.notEqual(await pixels(page), first);
+  const pictures = await page.evaluate(() => window.pictures);
+  assert.equal(pictures.find(({ seq }) => start.seq < seq).finished, false);
+  await page.mouse.up();
+  await settled(page);
+  assert.ok((await state(page, 'latencies_ms')).length > 0);
+});
+
+test('the same view is the same picture', async () => {
+  const [camera, first] = [await state(page, 'camera'), await finishedPixels(page)];
+  const [from, to] = [await pixelAt(page, 0.5, 0.5), await pixelAt(page, 0.6, 0.55)];
+  await drag(page, from, to);
+  assert.notEqual(await finishedPixels(page), first);
+  await drag(page, to, from);
+  const back = await state(page, 'camera');
+  const distance = Math.hypot(...camera.position.map((value, i) => value - back.position[i]));
+  assert.ok(distance < 1e-6, `${distance}`);
+});
+
+test('the picture has the size of a resized window', async () => {
+  const [first, before] = [await finishedPixels(page), await state(page, 'size')];
+  await page.setViewportSize({ width: 700, height: 400 });
+  await page.waitForFunction((height) => window.surfel.state.size.height < height, before.height);
+  assert.notEqual(await finishedPixels(page), first);
+});

@@ -1,0 +1,73 @@
+// Formatting of numbers and materials, sizes of pictures, and headers of messages.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { count, duration, exact, rounded, ticks } from '../page/format.js';
+import { formatMaterial, materialOf, parseMaterial, withMaterial } from '../page/materials.js';
+import { readHeader, socketAddress } from '../page/connection.js';
+import { pictureSize } from '../page/picture.js';
+
+test('coordinates keep their digits and lose rounding errors', () => {
+  assert.equal(exact(562339.8540000001), '562339.854');
+  assert.equal(exact(4183203.123456), '4183203.123456');
+  assert.equal(exact(0.1 + 0.2), '0.3');
+  assert.equal(exact(0.031234567), '0.03123457');
+  assert.equal(exact(-12), '-12');
+  assert.equal(exact('ground'), 'ground');
+});
+
+test('other numbers are rounded', () => {
+  assert.equal(rounded(1234.5678), '1\u202f234.6');
+  assert.equal(rounded(0.00123456), '0.0012');
+  assert.equal(count(2499578), '2\u202f499\u202f578');
+  assert.equal(duration(2.44), '2.4 s');
+  assert.equal(duration(200), '3 min 20 s');
+  assert.equal(duration(7380), '2 h 3 min');
+});
+
+test('scales have round ticks', () => {
+  assert.deepEqual(ticks(147.21, 156.04, 4), [150, 155]);
+  assert.deepEqual(ticks(0, 1, 5), [0, 0.2, 0.4, 0.6, 0.8, 1]);
+  assert.deepEqual(ticks(3, 3, 4), []);
+});
+
+test('materials survive parsing and formatting', () => {
+  for (const text of ['glass', 'statue.ply=glass', 'a=glass:ior=1.33,color=#88ccff', 'glass:ior=1.5']) {
+    assert.equal(formatMaterial(parseMaterial(text)), text);
+  }
+  assert.deepEqual(parseMaterial('a=glass:ior=1.33').properties, { ior: '1.33' });
+});
+
+test('an object uses its own last material before that of all objects', () => {
+  const list = ['a=metal', 'glass', 'a=mirror'];
+  assert.equal(materialOf(list, 'a').kind, 'mirror');
+  assert.equal(materialOf(list, 'b').kind, 'glass');
+  assert.equal(materialOf(undefined, 'b'), null);
+  assert.deepEqual(withMaterial(list, 'a', 'plastic', { roughness: 0.1 }), ['glass', 'a=plastic:roughness=0.1']);
+  assert.deepEqual(withMaterial(list, 'a', null, {}), ['glass']);
+});
+
+test('pictures have the pixels of the screen, up to the server\'s limit', () => {
+  assert.deepEqual(pictureSize(800, 600, 2, Infinity), { width: 1600, height: 1200 });
+  const limited = pictureSize(1600, 900, 2, 1_000_000);
+  assert.ok(limited.width * limited.height <= 1_000_000 && 990_000 < limited.width * limited.height);
+});
+
+test('the header of a picture is decoded', () => {
+  const bytes = new DataView(new ArrayBuffer(20));
+  bytes.setUint8(0, 2);
+  bytes.setUint8(1, 1);
+  bytes.setUint16(2, 3, true);
+  bytes.setUint32(4, 70000, true);
+  bytes.setUint32(8, 12, true);
+  [1280, 720, 4, 16].forEach((value, i) => bytes.setUint16(12 + 2 * i, value, true));
+  assert.deepEqual(readHeader(bytes.buffer), {
+    kind: 2, finished: true, scene: 3, frame: 70000, seq: 12, width: 1280, height: 720, samples: 4, of_samples: 16, type: 'image/png',
+  });
+});
+
+test('the socket address has the host and token of the page', () => {
+  const at = (protocol, search) => socketAddress({ protocol, host: 'host:8000', search });
+  assert.equal(at('http:', ''), 'ws://host:8000/ws');
+  assert.equal(at('https:', '?token=a%20b'), 'wss://host:8000/ws?token=a%20b');
+});

@@ -1,0 +1,229 @@
+//! A client's picture: a draft while the view changes, then samples accumulated a few rows at a time.
+
+use crate::deadline::{Deadline, SLICE_TIMEOUT};
+use crate::dynamic_resolution::ResolutionController;
+use crate::encode::{self, Pixels};
+use crate::frame::{Frame, Quality};
+use crate::scene_provider::PreparedScene;
+use crate::view::ViewState;
+use std::sync::Arc;
+use std::time::Instant;
+use surfel_core::Result;
+use surfel_core::flat::FlatScene;
+use surfel_core::progress::Progress;
+use surfel_core::render::{RenderRegion, RenderStats, Renderer, Settings};
+
+/// The samples of a client's picture so far.
+#[derive(Default)]
+pub struct Accumulator {
+    /// Version of the view that the last draft showed.
+    version: u64,
+    /// The prepared scene, and a copy of its flat scene with the client's camera.
+    scene: Option<(Arc<PreparedScene>, FlatScene)>,
+    resolution: ResolutionController,
+    /// Linear colours, summed over the samples that each row has.
+    sum: Vec<[f32; 4]>,
+    /// Number of samples that all rows have.
+    n_samples: u32,
+    /// Number of rows, from the top, that have one sample more.
+    n_rows: u32,
+    secs_per_row: f64,
+    /// Duration of the last slice in seconds; a lower bound if it was cancelled.
+    slice_secs: f64,
+    /// True if there is a picture worth showing that has not been sent.
+    has_frame: bool,
+    work: Work,
+}
+
+/// Rendering work since the last picture was sent.
+#[derive(Clone, Copy, Default)]
+struct Work {
+    trace_secs: f64,
+    n_rays: u64,
+}
+
+/// Light samples a hit in drafts.
+const DRAFT_LIGHT_SAMPLES: u32 = 1;
+/// JPEG quality of drafts, from 1 to 100.
+const DRAFT_JPEG_QUALITY: u8 = 80;
+/// JPEG quality of refined pictures, from 1 to 100.
+const REFINED_JPEG_QUALITY: u8 = 92;
+/// Intended duration of a slice of the finished picture, in seconds.
+const SLICE_SECS: f64 = 0.015;
+/// Minimum number of rows of a slice, unless rows take long: each slice has a fixed cost.
+const MIN_SLICE_ROWS: u32 = 8;
+
+impl Accumulator {
+    /// Version of the view that the last draft showed.
+    pub fn version(&self) -> u64 {
+        self.version
+    }
+
+    /// Returns whether even the smallest slice takes long.
+    pub fn is_slow(&self) -> bool {
+        2.0 * SLICE_TIMEOUT.as_secs_f64() < self.slice_secs
+    }
+
+    /// Records the duration of a slice. One that was cancelled would have taken longer, so it does not make a slow
+    /// client a quick one.
+    fn record_time(&mut self, secs: f64, is_done: bool) {
+        self.slice_secs = if is_done { secs } else { secs.max(self.slice_secs) };
+    }
+
+    /// Renders a draft as large as `secs` allow; none without a scene.
+    ///
+    /// # Errors
+    /// Fails if rendering fails or is cancelled.
+    pub fn draft(
+        &mut self,
+        renderer: &dyn Renderer,
+        view: &ViewState,
+        secs: f64,
+        progress: &dyn Progress,
+    ) -> Result<Option<Frame>> {
+        let Some(prepared) = view.scene.clone() else { return Ok(None) };
+        let full = prepared.render_settings;
+        let (width, height) = self.resolution.size(view.size, secs);
+        let light_samples = full.light_samples.min(DRAFT_LIGHT_SAMPLES);
+        let settings = Settings { width, height, samples_per_pixel: 1, light_samples, ..full };
+        let n_pixels = u64::from(width) * u64::from(height);
+        let Some(scene) = self.scene(prepared, view) else { return Ok(None) };
+        let deadline = Deadline::new(progress, ResolutionController::is_min_size((width, height)));
+        let start = Instant::now();
+        let rendered = renderer.render(scene, &settings, &deadline);
+        self.record_time(start.elapsed().as_secs_f64(), rendered.is_ok());
+        self.resolution.record(n_pixels, self.slice_secs);
+        let (image, stats) = rendered?;
+        let pixels =
+            Pixels { width: width as u16, height: height as u16, sum: &image.color, weight: 1.0 };
+        Ok(Some(frame(pixels, Quality::Draft, full.samples_per_pixel, Work::of(&stats))))
+    }
+
+    /// Starts the finished picture of the view that a draft showed.
+    pub fn begin(&mut self, version: u64) {
+        self.version = version;
+        (self.n_samples, self.n_rows, self.has_frame) = (0, 0, false);
+        self.work = Work::default();
+    }
+
+    /// Renders one slice and adds it; returns whether there was one to render.
+    ///
+    /// # Errors
+    /// Fails if rendering fails or is cancelled.
+    pub fn refine(
+        &mut self,
+        renderer: &dyn Renderer,
+        view: &ViewState,
+        progress: &dyn Progress,
+    ) -> Result<bool> {
+        let Some(prepared) = view.scene.clone() else { return Ok(false) };
+        let (width, height) = view.size;
+        let settings = Settings { width, height, ..prepared.render_settings };
+        if self.n_samples == settings.samples_per_pixel || self.has_frame {
+            return Ok(false);
+        }
+        let slice = self.next_slice(height);
+        let n_rows = slice.rows.1 - slice.rows.0;
+        let Some(scene) = self.scene(prepared, view) else { return Ok(false) };
+        let deadline = Deadline::new(progress, n_rows == 1);
+        let start = Instant::now();
+        let rendered = renderer.render_region(scene, &settings, slice, &deadline);
+        self.record_time(start.elapsed().as_secs_f64(), rendered.is_ok());
+        self.secs_per_row = self.slice_secs / f64::from(n_rows);
+        let (image, stats) = rendered?;
+        self.work += Work::of(&stats);
+        self.add(&image.color, slice, width as usize * height as usize);
+        if self.n_rows == height {
+            (self.n_samples, self.n_rows) = (self.n_samples + 1, 0);
+            // Each picture that is sent has twice as many samples as the one before.
+            let is_last = self.n_samples == settings.samples_per_pixel;
+            self.has_frame = self.n_samples.is_power_of_two() || is_last;
+        }
+        Ok(true)
+    }
+
+    /// Takes the picture so far, if it is worth showing and has not been taken.
+    pub fn take_frame(&mut self, view: &ViewState) -> Option<Frame> {
+        if !std::mem::take(&mut self.has_frame) {
+            return None;
+        }
+        let of_samples = view.scene.as_ref()?.render_settings.samples_per_pixel;
+        let (width, height) = view.size;
+        let is_finished = self.n_samples == of_samples;
+        let quality = if is_finished { Quality::Finished } else { Quality::Refined };
+        let pixels = Pixels {
+            width: width as u16,
+            height: height as u16,
+            sum: &self.sum,
+            weight: self.n_samples as f32,
+        };
+        Some(frame(pixels, quality, of_samples, std::mem::take(&mut self.work)))
+    }
+
+    fn next_slice(&self, height: u32) -> RenderRegion {
+        let affordable = SLICE_SECS / self.secs_per_row.max(1e-6);
+        let is_slow = SLICE_TIMEOUT.as_secs_f64() <= f64::from(MIN_SLICE_ROWS) * self.secs_per_row;
+        let n_rows = (affordable as u32).max(if is_slow { 1 } else { MIN_SLICE_ROWS });
+        let rows = (self.n_rows, height.min(self.n_rows.saturating_add(n_rows)));
+        RenderRegion { rows, samples: (self.n_samples, self.n_samples + 1) }
+    }
+
+    fn add(&mut self, color: &[[f32; 4]], slice: RenderRegion, n_pixels: usize) {
+        if slice.rows.0 == 0 && slice.samples.0 == 0 {
+            self.sum.clear();
+            self.sum.resize(n_pixels, [0.0; 4]);
+        }
+        let width = color.len() / (slice.rows.1 - slice.rows.0) as usize;
+        let sums = &mut self.sum[slice.rows.0 as usize * width..];
+        for (sum, color) in sums.iter_mut().zip(color) {
+            for (sum, channel) in sum.iter_mut().zip(color) {
+                *sum += channel;
+            }
+        }
+        self.n_rows = slice.rows.1;
+    }
+
+    /// The flat scene with the client's camera; none without a camera.
+    fn scene(&mut self, prepared: Arc<PreparedScene>, view: &ViewState) -> Option<&FlatScene> {
+        if !self.scene.as_ref().is_some_and(|(known, _)| Arc::ptr_eq(known, &prepared)) {
+            let flat = prepared.flat.clone();
+            self.scene = Some((prepared, flat));
+        }
+        let (_, scene) = self.scene.as_mut()?;
+        scene.camera = view.camera?;
+        Some(scene)
+    }
+}
+
+fn frame(pixels: Pixels, quality: Quality, of_samples: u32, work: Work) -> Frame {
+    let start = Instant::now();
+    let file = match quality {
+        Quality::Draft => encode::jpeg(pixels, DRAFT_JPEG_QUALITY),
+        Quality::Refined => encode::jpeg(pixels, REFINED_JPEG_QUALITY),
+        Quality::Finished => encode::png(pixels),
+    };
+    Frame {
+        quality,
+        width: pixels.width,
+        height: pixels.height,
+        samples: pixels.weight as u32,
+        of_samples,
+        file,
+        trace_secs: work.trace_secs,
+        encode_secs: start.elapsed().as_secs_f64(),
+        mrays_per_s: work.n_rays as f64 / work.trace_secs.max(1e-9) / 1e6,
+    }
+}
+
+impl Work {
+    fn of(stats: &RenderStats) -> Self {
+        Self { trace_secs: stats.frame_secs, n_rays: stats.rays.total() }
+    }
+}
+
+impl std::ops::AddAssign for Work {
+    fn add_assign(&mut self, other: Self) {
+        self.trace_secs += other.trace_secs;
+        self.n_rays += other.n_rays;
+    }
+}

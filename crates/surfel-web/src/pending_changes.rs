@@ -1,0 +1,164 @@
+//! Settings changes of a page that wait until the scene before them is prepared; they wait merged into one.
+
+use crate::scene_provider::{Error, Result, SettingsMap};
+use serde_json::Value;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use tokio::sync::Notify;
+
+/// A change of the settings; several changes are merged into one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SettingsChange {
+    /// A JSON merge patch.
+    pub patch: SettingsMap,
+    /// True if the patch applies to the startup settings, false if to the current ones.
+    pub from_startup: bool,
+    /// Sequence number of the last message that is part of the change.
+    pub seq: u32,
+    /// True if the user is still dragging.
+    pub is_moving: bool,
+}
+
+impl SettingsChange {
+    fn n_bytes(&self) -> usize {
+        serde_json::to_string(&self.patch).map_or(0, |text| text.len())
+    }
+
+    fn append(&mut self, newer: Self) {
+        if newer.from_startup {
+            *self = newer;
+            return;
+        }
+        merge_patches(&mut self.patch, &newer.patch);
+        (self.seq, self.is_moving) = (newer.seq, newer.is_moving);
+    }
+}
+
+/// The changes that wait, merged into one, up to a number of bytes.
+pub struct PendingChanges {
+    change: Mutex<Option<SettingsChange>>,
+    added: Notify,
+    max_bytes: usize,
+}
+
+impl PendingChanges {
+    /// No changes; at most `max_bytes` may wait.
+    pub fn new(max_bytes: usize) -> Self {
+        Self { change: Mutex::default(), added: Notify::new(), max_bytes }
+    }
+
+    /// Merges a newer change into those that wait.
+    ///
+    /// # Errors
+    /// Fails if more bytes would wait than the limit allows; the change is then dropped.
+    pub fn add(&self, newer: SettingsChange) -> Result<()> {
+        self.append(&mut self.lock(), newer)?;
+        self.added.notify_one();
+        Ok(())
+    }
+
+    /// Takes the changes that wait, once there are any.
+    pub async fn take(&self) -> SettingsChange {
+        loop {
+            if let Some(change) = self.lock().take() {
+                return change;
+            }
+            self.added.notified().await;
+        }
+    }
+
+    /// Puts back a change that was taken and then cancelled; it applies before newer ones.
+    pub fn requeue(&self, older: SettingsChange) {
+        let mut pending = self.lock();
+        if let Some(newer) = pending.replace(older) {
+            // Beyond the limit, the older change stays and the newer ones are dropped.
+            let _ = self.append(&mut pending, newer);
+        }
+        self.added.notify_one();
+    }
+
+    /// Returns whether no change waits.
+    pub fn is_empty(&self) -> bool {
+        self.lock().is_none()
+    }
+
+    fn append(&self, pending: &mut Option<SettingsChange>, newer: SettingsChange) -> Result<()> {
+        let n_bytes = newer.n_bytes() + pending.as_ref().map_or(0, SettingsChange::n_bytes);
+        if self.max_bytes < n_bytes {
+            return Err(Error::invalid_request(format!(
+                "settings: {n_bytes} bytes of changes are pending, expected at most {}",
+                self.max_bytes
+            )));
+        }
+        match pending {
+            Some(change) => change.append(newer),
+            none => *none = Some(newer),
+        }
+        Ok(())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Option<SettingsChange>> {
+        self.change.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Merges a newer patch into `patch`. Patches keep nulls, unlike settings, so that a removal is not lost.
+fn merge_patches(patch: &mut SettingsMap, newer: &SettingsMap) {
+    for (key, value) in newer {
+        match (value, patch.get_mut(key)) {
+            (Value::Object(inner), Some(Value::Object(table))) => merge_patches(table, inner),
+            (value, _) => drop(patch.insert(key.clone(), value.clone())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::Limits;
+    use crate::scene_provider::apply_merge_patch;
+    use serde_json::json;
+
+    fn settings(value: Value) -> SettingsMap {
+        value.as_object().unwrap().clone()
+    }
+
+    fn change(patch: Value, seq: u32) -> SettingsChange {
+        SettingsChange { patch: settings(patch), seq, ..SettingsChange::default() }
+    }
+
+    fn no_changes() -> PendingChanges {
+        PendingChanges::new(Limits::default().max_pending_bytes)
+    }
+
+    #[test]
+    fn merged_patches_keep_removals() {
+        let mut patch = settings(json!({ "a": 1, "b": { "c": null } }));
+        merge_patches(&mut patch, &settings(json!({ "a": null, "b": { "d": 2 } })));
+        assert_eq!(Value::Object(patch.clone()), json!({ "a": null, "b": { "c": null, "d": 2 } }));
+        let mut patched = settings(json!({ "a": 5, "b": { "c": 6 } }));
+        apply_merge_patch(&mut patched, &patch);
+        assert_eq!(Value::Object(patched), json!({ "b": { "d": 2 } }));
+    }
+
+    #[test]
+    fn a_requeued_change_applies_before_newer_ones() {
+        let pending = no_changes();
+        pending.add(change(json!({ "a": 2 }), 8)).unwrap();
+        pending.requeue(change(json!({ "a": 1, "b": 1 }), 7));
+        let expected = change(json!({ "a": 2, "b": 1 }), 8);
+        assert_eq!(pending.lock().take(), Some(expected));
+        assert!(pending.is_empty());
+        pending.requeue(change(json!({ "a": 1 }), 7));
+        let from_startup = SettingsChange { from_startup: true, ..change(json!({ "c": 3 }), 9) };
+        pending.add(from_startup.clone()).unwrap();
+        assert_eq!(pending.lock().take(), Some(from_startup));
+    }
+
+    #[test]
+    fn changes_beyond_the_limit_are_rejected() {
+        let pending = no_changes();
+        let large = |i: u32| change(json!({ i.to_string(): "x".repeat(200_000) }), i);
+        let n_added = (0..100).filter(|&i| pending.add(large(i)).is_ok()).count();
+        assert_eq!(n_added, pending.max_bytes / 200_000);
+    }
+}

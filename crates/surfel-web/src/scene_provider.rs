@@ -1,0 +1,212 @@
+//! The interface between the viewer and the program that starts it: scenes from settings, facts about points.
+
+use serde_json::{Map, Value};
+use std::sync::Arc;
+use surfel_core::flat::FlatScene;
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::progress::Progress;
+use surfel_core::render::Settings;
+
+/// Settings as the keys and values of a scene file.
+pub type SettingsMap = Map<String, Value>;
+
+/// Makes scenes from settings. All clients share one provider; each client has its own settings.
+///
+/// Settings come from untrusted clients: an implementation rejects keys that name files, and every other key
+/// that a client must not change. The server calls each method on a thread that belongs to no pool. A provider
+/// that works in parallel needs a thread pool of its own, or its work would delay rendering.
+pub trait SceneProvider: Send + Sync + 'static {
+    /// Facts about the loaded data that do not depend on settings, as a JSON object. The server adds its limits and
+    /// sends them to every page.
+    fn info(&self) -> Value;
+
+    /// Complete settings for the first picture of a page, whose size in pixels is given.
+    fn initial_settings(&self, width: u32, height: u32) -> SettingsMap;
+
+    /// The settings that the user gave at startup, without automatic choices.
+    fn startup_settings(&self) -> SettingsMap;
+
+    /// A scene of a subset of the points, to show until `prepare` is done; none if it would not be faster.
+    fn preview(
+        &self,
+        settings: &SettingsMap,
+        progress: &dyn Progress,
+    ) -> Option<Result<PreparedScene>>;
+
+    /// The scene of these settings; the provider chooses missing settings from the data.
+    ///
+    /// # Errors
+    /// Fails if a setting is invalid, if the data cannot be prepared with it, or if `progress` cancels.
+    fn prepare(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<PreparedScene>;
+
+    /// The finished picture of these settings as a PNG file, byte for byte as the command line writes it.
+    ///
+    /// # Errors
+    /// Fails if a setting is invalid, if the picture exceeds the limits, or if `progress` cancels.
+    fn render_png(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<Vec<u8>>;
+
+    /// These settings as a command line and as scene files.
+    ///
+    /// # Errors
+    /// Fails if a setting is invalid.
+    fn export(&self, settings: &SettingsMap) -> Result<Export>;
+
+    /// The settings in the text of a scene file that a page sends; `name` is the file's name.
+    ///
+    /// # Errors
+    /// Fails if the text is no scene file, or if its objects are not those that are viewed.
+    fn read_scene_file(&self, name: &str, text: &str) -> Result<SettingsMap>;
+}
+
+/// Returns facts about a picked point of a flat scene, as the page shows them.
+pub type PointDescriber = Arc<dyn Fn(&FlatScene, &PickedPoint) -> Value + Send + Sync>;
+
+/// A scene that is ready to be rendered.
+pub struct PreparedScene {
+    /// The complete settings, automatic choices included.
+    pub settings: SettingsMap,
+    /// The `camera` setting at the scene's time, if the scene animates its camera.
+    pub animated_camera: Option<Value>,
+    /// The scene to render; each client replaces its camera.
+    pub flat: FlatScene,
+    /// The render settings; each client replaces the size.
+    pub render_settings: Settings,
+    /// The meaning of the colours, as the page shows it; null if they need no legend.
+    pub legend: Value,
+    /// Describes picked points.
+    pub describe: PointDescriber,
+}
+
+/// The point at which the ray through a pixel hits a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PickedPoint {
+    /// Index of the instance in the flat scene.
+    pub instance_idx: u32,
+    /// Index of the point in its cloud, or of the triangle in its mesh.
+    pub primitive_idx: u32,
+    /// Position in world coordinates.
+    pub position: DVec3,
+    /// Unit normal of the surface in world coordinates.
+    pub normal: Vec3,
+    /// Distance from the camera along its view axis.
+    pub depth: f64,
+}
+
+/// Settings in the forms in which they are used outside the viewer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Export {
+    /// A command line that renders the picture.
+    pub command: String,
+    /// A scene file in TOML.
+    pub toml: String,
+    /// A scene file in JSON.
+    pub json: String,
+}
+
+/// A result with the viewer's error.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// The reason why the server or its provider could not do something.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The work was cancelled.
+    #[error("cancelled")]
+    Cancelled,
+    /// A client asked for something that is invalid or not allowed.
+    #[error("{}{text}", prefix(key))]
+    InvalidRequest {
+        /// The key of the setting with the invalid value, such as `camera.view_angle`, if a single one is at fault.
+        key: Option<String>,
+        /// The reason, without the key.
+        text: String,
+    },
+    /// The work panicked.
+    #[error("internal error; please report it")]
+    Panicked,
+    /// The operating system reported an error about a network address.
+    #[error("{address}: {source}")]
+    Io {
+        /// Host and port.
+        address: String,
+        /// The system's error.
+        source: std::io::Error,
+    },
+}
+
+impl Error {
+    /// An invalid request for which no single setting is at fault.
+    pub fn invalid_request(text: impl Into<String>) -> Self {
+        Self::InvalidRequest { key: None, text: text.into() }
+    }
+
+    /// An invalid value of the setting `key`.
+    pub fn invalid_value(key: impl Into<String>, text: impl Into<String>) -> Self {
+        Self::InvalidRequest { key: Some(key.into()), text: text.into() }
+    }
+
+    /// The key of the setting with the invalid value, if a single one is at fault.
+    pub fn key(&self) -> Option<&str> {
+        match self {
+            Self::InvalidRequest { key, .. } => key.as_deref(),
+            _ => None,
+        }
+    }
+}
+
+fn prefix(key: &Option<String>) -> String {
+    key.as_ref().map_or(String::new(), |key| format!("{key}: "))
+}
+
+impl From<surfel_core::Error> for Error {
+    fn from(error: surfel_core::Error) -> Self {
+        match error {
+            surfel_core::Error::Cancelled => Self::Cancelled,
+            other => Self::invalid_request(other.to_string()),
+        }
+    }
+}
+
+/// Applies a JSON merge patch (RFC 7396) to settings: null removes a key.
+pub fn apply_merge_patch(settings: &mut SettingsMap, patch: &SettingsMap) {
+    for (key, value) in patch {
+        match (value, settings.get_mut(key)) {
+            (Value::Null, _) => drop(settings.shift_remove(key)),
+            (Value::Object(inner), Some(Value::Object(table))) => apply_merge_patch(table, inner),
+            (Value::Object(inner), _) => {
+                let mut table = SettingsMap::new();
+                apply_merge_patch(&mut table, inner);
+                settings.insert(key.clone(), Value::Object(table));
+            }
+            (value, _) => drop(settings.insert(key.clone(), value.clone())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn a_patch_changes_adds_and_removes_keys() {
+        let Value::Object(mut settings) = json!({ "a": 1, "b": { "c": 2, "d": 3 } }) else {
+            panic!()
+        };
+        let Value::Object(patch) =
+            json!({ "a": null, "b": { "c": 4, "d": null }, "e": { "f": null } })
+        else {
+            panic!()
+        };
+        apply_merge_patch(&mut settings, &patch);
+        assert_eq!(Value::Object(settings), json!({ "b": { "c": 4 }, "e": {} }));
+    }
+
+    #[test]
+    fn an_error_message_begins_with_the_key_at_fault() {
+        let error = Error::invalid_value("camera.view_angle", "found 0");
+        assert_eq!(error.to_string(), "camera.view_angle: found 0");
+        assert_eq!(error.key(), Some("camera.view_angle"));
+        let error = Error::invalid_request("nothing to save yet");
+        assert_eq!((error.to_string().as_str(), error.key()), ("nothing to save yet", None));
+    }
+}

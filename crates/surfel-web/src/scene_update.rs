@@ -1,0 +1,172 @@
+//! Applies a page's settings changes: prepares one scene at a time, from all changes that wait.
+
+use crate::camera;
+use crate::client::Client;
+use crate::outgoing::{Outgoing, RequestRef, rejection, send_json};
+use crate::pending_changes::{PendingChanges, SettingsChange};
+use crate::progress_reporter::{ProgressReporter, ProgressUpdate};
+use crate::scene_provider::{Error, PreparedScene, SceneProvider, SettingsMap, apply_merge_patch};
+use crate::server_state::ServerState;
+use serde_json::{Value, json};
+use std::sync::Arc;
+use std::time::Instant;
+use surfel_core::progress::Progress;
+use tokio::sync::mpsc;
+
+/// Prepares scenes for a page until the task is aborted.
+pub async fn run(
+    state: Arc<ServerState>,
+    client: Arc<Client>,
+    pending: Arc<PendingChanges>,
+    out: mpsc::Sender<Outgoing>,
+) {
+    let Some(provider) = wait_for_provider(&state, &out).await else { return };
+    let (width, height) = client.view().size;
+    let settings = provider.initial_settings(width, height);
+    let info = state.info(&*provider);
+    let welcome = json!({ "type": "welcome", "scene": settings, "info": info });
+    send_json(&out, &welcome).await;
+    let mut updater = SceneUpdater { state, client, pending, out, provider, settings };
+    let first = updater.pending.take().await;
+    updater.show_preview(&first).await;
+    updater.apply(first).await;
+    loop {
+        let change = updater.pending.take().await;
+        updater.apply(change).await;
+    }
+}
+
+/// Waits until the files are loaded, and reports the progress of loading to the page.
+async fn wait_for_provider(
+    state: &ServerState,
+    out: &mpsc::Sender<Outgoing>,
+) -> Option<Arc<dyn SceneProvider>> {
+    let mut loading = state.loading.subscribe();
+    loading.mark_changed();
+    loop {
+        tokio::select! {
+            provider = state.provider() => return provider,
+            changed = loading.changed() => {
+                changed.ok()?;
+                let update = loading.borrow_and_update().clone();
+                send_json(out, &progress_message(update.as_ref())).await;
+            }
+        }
+    }
+}
+
+/// The message about long work under way; none means that it has ended.
+fn progress_message(update: Option<&ProgressUpdate>) -> Value {
+    json!({
+        "type": "state",
+        "text": update.map(|update| &update.stage),
+        "done": update.and_then(|update| update.done),
+        "left_secs": update.and_then(|update| update.left_secs),
+    })
+}
+
+struct SceneUpdater {
+    state: Arc<ServerState>,
+    client: Arc<Client>,
+    pending: Arc<PendingChanges>,
+    out: mpsc::Sender<Outgoing>,
+    provider: Arc<dyn SceneProvider>,
+    /// The settings of the scene that the page shows.
+    settings: SettingsMap,
+}
+
+impl SceneUpdater {
+    /// Shows a subset of the points before the whole scene is prepared.
+    async fn show_preview(&mut self, change: &SettingsChange) {
+        let (provider, settings) = (self.provider.clone(), self.settings_with(change));
+        let reporter = self.reporter();
+        let task = move || provider.preview(&settings, &reporter);
+        if let Ok(Some(Ok(scene))) = self.state.run_blocking(task).await {
+            self.show(scene, change).await;
+        }
+    }
+
+    /// Prepares and shows the scene with this change, or reports the reason why it cannot.
+    async fn apply(&mut self, change: SettingsChange) {
+        let (provider, settings) = (self.provider.clone(), self.settings_with(&change));
+        let reporter = self.reporter();
+        let prepared =
+            self.state.run_blocking(move || provider.prepare(&settings, &reporter)).await;
+        match prepared.flatten() {
+            Ok(scene) => self.show(scene, &change).await,
+            Err(Error::Cancelled) => self.pending.requeue(change),
+            Err(error) => {
+                send_json(&self.out, &rejection(RequestRef::Seq(change.seq), &error)).await;
+                self.client.set_moving(change.is_moving);
+                // A page whose first settings are invalid shows the initial scene.
+                if self.client.view().scene.is_none() && !change.patch.is_empty() {
+                    let _ = self.pending.add(SettingsChange::default());
+                }
+            }
+        }
+        send_json(&self.out, &progress_message(None)).await;
+    }
+
+    fn settings_with(&self, change: &SettingsChange) -> SettingsMap {
+        let mut settings = if change.from_startup {
+            self.provider.startup_settings()
+        } else {
+            self.settings.clone()
+        };
+        let camera_settings = self.client.view().camera_settings;
+        if !change.from_startup && !camera_settings.is_null() {
+            settings.insert("camera".into(), camera_settings);
+        }
+        apply_merge_patch(&mut settings, &change.patch);
+        settings
+    }
+
+    async fn show(&mut self, scene: PreparedScene, change: &SettingsChange) {
+        self.settings = scene.settings.clone();
+        let camera_settings = scene.settings.get("camera").cloned().unwrap_or_default();
+        let shown_camera = scene.animated_camera.as_ref().unwrap_or(&camera_settings);
+        // Pictures of the previous scene may still be on their way; the number tells them apart.
+        let scene_number = self.client.view().scene_number.wrapping_add(1);
+        let message = json!({
+            "type": "scene",
+            "number": scene_number,
+            "seq": change.seq,
+            "scene": scene.settings,
+            "camera": shown_camera,
+            "legend": scene.legend,
+        });
+        // The page must know the settings before it gets the first picture of them.
+        send_json(&self.out, &message).await;
+        let sets_camera = scene.animated_camera.is_some() || change.patch.contains_key("camera");
+        let camera = camera::parse(shown_camera).ok();
+        let scene = Arc::new(scene);
+        self.client.update_view(|view| {
+            // The user may have moved the camera while the scene was prepared.
+            let is_newest = sets_camera && view.seq <= change.seq;
+            if view.camera.is_none() || change.from_startup || is_newest {
+                (view.camera, view.camera_settings) = (camera, camera_settings);
+            }
+            (view.scene, view.scene_number) = (Some(scene), scene_number);
+            view.seq = view.seq.max(change.seq);
+            view.is_moving = change.is_moving;
+        });
+        self.state.render_loop.notify();
+    }
+
+    /// Reports progress to the page. Cancels work once newer settings have waited long enough, or once nobody
+    /// waits for the result any more.
+    fn reporter(&self) -> impl Progress + Send + 'static {
+        let (queue, page) = (self.out.clone(), self.out.clone());
+        let (state, pending, start) = (self.state.clone(), self.pending.clone(), Instant::now());
+        let report = move |update: ProgressUpdate| {
+            // Dropped if the queue is full.
+            let _ = queue.try_send(Outgoing::Text(progress_message(Some(&update)).to_string()));
+        };
+        let stale_update = self.state.limits.timeouts.stale_update;
+        let is_cancelled = move || {
+            let is_stale = stale_update < start.elapsed() && !pending.is_empty();
+            is_stale || state.is_stopped() || page.is_closed()
+        };
+        ProgressReporter::new(report, is_cancelled)
+    }
+}

@@ -1,0 +1,284 @@
+//! A provider of a small hill, whose settings make it slow, blocked or faulty on demand.
+
+use crate::test_page::camera;
+use serde_json::{Value, json};
+use std::io::Cursor;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Condvar, Mutex};
+use std::time::{Duration, Instant};
+use surfel_core::flat::FlatScene;
+use surfel_core::image::{Image, encode_srgb8};
+use surfel_core::math::Vec3;
+use surfel_core::points::{PointCloud, Preparation, prepare};
+use surfel_core::progress::{NoProgress, Progress};
+use surfel_core::render::{CpuRenderer, RenderRegion, RenderStats, Renderer, Settings};
+use surfel_core::scene::{
+    Background, Camera, CameraFit, CloudGeometry, Geometry, Graph, Light, Material, Projection,
+    Scene, fit_camera,
+};
+use surfel_core::trace::Simd;
+use surfel_web::{Error, Export, PreparedScene, Result, SceneProvider, SettingsMap};
+
+/// Size of a page's picture in pixels.
+pub const PICTURE_SIZE: (u32, u32) = (64, 48);
+/// Samples per pixel of a finished picture.
+pub const N_SAMPLES: u32 = 4;
+
+/// A gate that tasks wait at until the test opens it.
+#[derive(Default)]
+pub struct Gate {
+    is_open: Mutex<bool>,
+    opened: Condvar,
+}
+
+impl Gate {
+    pub fn open(&self) {
+        *self.is_open.lock().unwrap() = true;
+        self.opened.notify_all();
+    }
+
+    pub fn wait(&self) {
+        let is_open = self.is_open.lock().unwrap();
+        drop(self.opened.wait_while(is_open, |is_open| !*is_open).unwrap());
+    }
+}
+
+/// The provider. Each key of the settings has an effect of its own:
+///
+/// | key | effect |
+/// |---|---|
+/// | `slow` | preparation takes this many seconds, unless it is cancelled |
+/// | `slow_render` | rendering for `/render` and saves takes this many seconds, unless it is cancelled |
+/// | `gated` | preparation waits for the gate and cannot be cancelled |
+/// | `locked` | preparation takes this many seconds in a thread pool, with a lock held |
+/// | `panic` | preparation panics |
+/// | `fault` | the seed of the render settings, which tells the `FaultyRenderer` its fault |
+/// | `camera_angle` | the scene animates its camera, which is at this angle |
+/// | `preview` | there is a preview |
+/// | `tint` | none |
+pub struct HillProvider {
+    flat: FlatScene,
+    pool: rayon::ThreadPool,
+    lock: Mutex<()>,
+    /// The gate at which preparation with `gated` waits.
+    pub gate: Gate,
+    /// Number of slow tasks that were started.
+    pub n_started: AtomicU32,
+    /// Number of slow tasks that were cancelled.
+    pub n_cancelled: AtomicU32,
+}
+
+impl HillProvider {
+    pub fn new() -> Self {
+        let hill = |i: u32| {
+            let (x, y) = ((i % 50) as f32 / 25.0 - 1.0, (i / 50) as f32 / 25.0 - 1.0);
+            Vec3::new(x, y, 0.5 * (-2.0 * (x * x + y * y)).exp())
+        };
+        let cloud = PointCloud::from_positions((0..2500).map(hill).collect());
+        let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+        let camera = fit_camera(&cloud, &CameraFit { aspect: 4.0 / 3.0, ..CameraFit::default() });
+        let colors = vec![[200, 180, 150]; cloud.len()];
+        let hill = CloudGeometry::new(cloud, colors).unwrap();
+        let scene = Scene {
+            graph: Graph::from_geometry(Geometry::Points(hill), Material::PLASTIC),
+            lights: vec![Light::Headlight(1.0)],
+            background: Background::Transparent,
+            camera,
+        };
+        Self {
+            flat: FlatScene::new(&scene, &NoProgress).unwrap(),
+            pool: rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap(),
+            lock: Mutex::default(),
+            gate: Gate::default(),
+            n_started: AtomicU32::new(0),
+            n_cancelled: AtomicU32::new(0),
+        }
+    }
+
+    /// The finished picture of this size, as a page or a program should get it.
+    pub fn finished_picture(&self, (width, height): (u32, u32)) -> image::RgbaImage {
+        let settings = Settings { width, height, ..render_settings(0) };
+        let (image, _) = cpu_renderer().render(&self.flat, &settings, &NoProgress).unwrap();
+        to_rgba8(&image)
+    }
+
+    /// Works for this many seconds, in steps, unless it is cancelled.
+    fn work(&self, secs: f64, progress: &dyn Progress) -> Result<()> {
+        self.n_started.fetch_add(1, Ordering::Relaxed);
+        progress.begin("slow", 100);
+        for _ in 0..100 {
+            if progress.is_cancelled() {
+                self.n_cancelled.fetch_add(1, Ordering::Relaxed);
+                return Err(Error::Cancelled);
+            }
+            std::thread::sleep(Duration::from_secs_f64(secs / 100.0));
+            progress.advance(1);
+        }
+        Ok(())
+    }
+}
+
+impl SceneProvider for HillProvider {
+    fn info(&self) -> Value {
+        json!({ "name": "hill" })
+    }
+
+    fn initial_settings(&self, _width: u32, _height: u32) -> SettingsMap {
+        let Camera { position, focal_point, view_up, projection } = self.flat.camera;
+        let Projection::Perspective { view_angle_deg } = projection else { unreachable!() };
+        settings_map(json!({
+            "tint": 0,
+            "camera": {
+                "position": position.to_array(),
+                "focal_point": focal_point.to_array(),
+                "view_up": view_up.to_array(),
+                "view_angle": view_angle_deg,
+            },
+        }))
+    }
+
+    fn startup_settings(&self) -> SettingsMap {
+        settings_map(json!({ "tint": 7 }))
+    }
+
+    fn preview(
+        &self,
+        settings: &SettingsMap,
+        _progress: &dyn Progress,
+    ) -> Option<Result<PreparedScene>> {
+        settings.contains_key("preview").then(|| {
+            let mut scene = self.prepare(&SettingsMap::new(), &NoProgress)?;
+            scene.legend = "preview".into();
+            Ok(scene)
+        })
+    }
+
+    fn prepare(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<PreparedScene> {
+        let mut complete = self.initial_settings(0, 0);
+        let (mut seed, mut animated_camera) = (0, None);
+        for (key, value) in settings {
+            let secs = value.as_f64().unwrap_or(0.0);
+            match key.as_str() {
+                "slow" => self.work(secs, progress)?,
+                "gated" => self.gate.wait(),
+                "locked" => {
+                    let _guard = self.lock.lock().unwrap();
+                    self.pool.install(|| std::thread::sleep(Duration::from_secs_f64(secs)));
+                }
+                "panic" => panic!("requested by a test"),
+                "fault" => seed = value.as_u64().unwrap_or(0),
+                "camera_angle" => animated_camera = value.as_f64().map(camera),
+                "camera" | "tint" | "preview" | "resolution" | "slow_render" => {}
+                _ => return Err(Error::invalid_value(key, "unknown key")),
+            }
+            complete.insert(key.clone(), value.clone());
+        }
+        Ok(PreparedScene {
+            settings: complete,
+            animated_camera,
+            flat: self.flat.clone(),
+            render_settings: render_settings(seed),
+            legend: Value::Null,
+            describe: Arc::new(
+                |_, point| json!({ "index": point.primitive_idx, "position": point.position.to_array() }),
+            ),
+        })
+    }
+
+    fn render_png(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<Vec<u8>> {
+        let scene = self.prepare(settings, progress)?;
+        if let Some(secs) = settings.get("slow_render").and_then(Value::as_f64) {
+            self.work(secs, progress)?;
+        }
+        let resolution = settings.get("resolution").and_then(Value::as_str).unwrap_or("64x48");
+        let (width, height) = resolution.split_once('x').unwrap();
+        let (width, height) = (width.parse().unwrap(), height.parse().unwrap());
+        let settings = Settings { width, height, ..scene.render_settings };
+        let (image, _) = cpu_renderer().render(&scene.flat, &settings, progress)?;
+        let mut png = Cursor::new(Vec::new());
+        to_rgba8(&image).write_to(&mut png, image::ImageFormat::Png).unwrap();
+        Ok(png.into_inner())
+    }
+
+    fn export(&self, settings: &SettingsMap) -> Result<Export> {
+        let json = Value::Object(settings.clone()).to_string();
+        Ok(Export { command: "surfel render hill".into(), toml: String::new(), json })
+    }
+
+    fn read_scene_file(&self, name: &str, text: &str) -> Result<SettingsMap> {
+        serde_json::from_str(text)
+            .map_err(|error| Error::invalid_request(format!("{name}: {error}")))
+    }
+}
+
+fn render_settings(seed: u64) -> Settings {
+    Settings {
+        width: PICTURE_SIZE.0,
+        height: PICTURE_SIZE.1,
+        samples_per_pixel: N_SAMPLES,
+        light_samples: 1,
+        max_depth: 2,
+        seed,
+        with_aovs: false,
+    }
+}
+
+fn settings_map(value: Value) -> SettingsMap {
+    value.as_object().unwrap().clone()
+}
+
+fn to_rgba8(image: &Image) -> image::RgbaImage {
+    image::RgbaImage::from_fn(image.width, image.height, |x, y| {
+        let [r, g, b, a] = image.color[(y * image.width + x) as usize];
+        let opacity = if 0.0 < a { a } else { 1.0 };
+        let [r, g, b] = [r, g, b].map(|channel| encode_srgb8(channel / opacity));
+        image::Rgba([r, g, b, (255.0 * a).round() as u8])
+    })
+}
+
+fn cpu_renderer() -> CpuRenderer {
+    CpuRenderer { simd: Simd::detect() }
+}
+
+/// A renderer whose faults the seed of the render settings selects; otherwise the renderer of the CPU.
+pub struct FaultyRenderer;
+
+impl FaultyRenderer {
+    /// Rendering takes 20 microseconds a pixel.
+    pub const SLOW: u64 = 1001;
+    /// Even the smallest draft takes longer than a slice may.
+    pub const VERY_SLOW: u64 = 1004;
+    /// Rendering panics.
+    pub const PANIC: u64 = 1002;
+    /// Rendering fails.
+    pub const FAIL: u64 = 1003;
+
+    const SECS_PER_PIXEL: f64 = 2e-5;
+}
+
+impl Renderer for FaultyRenderer {
+    fn render_region(
+        &self,
+        scene: &FlatScene,
+        settings: &Settings,
+        region: RenderRegion,
+        progress: &dyn Progress,
+    ) -> surfel_core::Result<(Image, RenderStats)> {
+        match settings.seed {
+            Self::SLOW | Self::VERY_SLOW => {
+                let n_pixels = settings.width * (region.rows.1 - region.rows.0);
+                let factor = if settings.seed == Self::VERY_SLOW { 20.0 } else { 1.0 };
+                let secs = factor * Self::SECS_PER_PIXEL * f64::from(n_pixels);
+                let start = Instant::now();
+                while start.elapsed().as_secs_f64() < secs {
+                    progress.check()?;
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+            }
+            Self::PANIC => panic!("requested by a test"),
+            Self::FAIL => return Err(surfel_core::Error::EmptyCloud),
+            _ => {}
+        }
+        cpu_renderer().render_region(scene, settings, region, progress)
+    }
+}

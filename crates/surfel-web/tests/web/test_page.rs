@@ -1,0 +1,227 @@
+//! The page's side of a connection.
+
+use crate::hill_provider::PICTURE_SIZE;
+use crate::test_server::{TIMEOUT, TestServer};
+use futures_util::{SinkExt, StreamExt};
+use serde_json::{Value, json};
+use std::time::{Duration, Instant};
+use tokio::net::{TcpSocket, TcpStream};
+use tokio::time::timeout;
+use tokio_tungstenite::tungstenite::{Error, Message};
+use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, client_async, connect_async};
+
+pub struct TestPage {
+    socket: WebSocketStream<MaybeTlsStream<TcpStream>>,
+}
+
+/// A message from the server.
+#[derive(Debug)]
+pub enum Received {
+    Message(Value),
+    Picture(Picture),
+}
+
+/// A picture, with the fields of its header.
+#[derive(Debug)]
+pub struct Picture {
+    pub kind: u8,
+    pub is_finished: bool,
+    pub scene_number: u16,
+    pub number: u32,
+    pub seq: u32,
+    pub size: (u16, u16),
+    pub samples: u16,
+    pub of_samples: u16,
+    pub file: Vec<u8>,
+}
+
+pub const JPEG: u8 = 1;
+pub const PNG: u8 = 2;
+pub const SAVED: u8 = 3;
+/// Id of the requests that `sync` sends.
+const SYNC_ID: u32 = u32::MAX;
+
+impl Picture {
+    fn parse(bytes: &[u8]) -> Self {
+        let read_u16 = |offset: usize| u16::from_le_bytes([bytes[offset], bytes[offset + 1]]);
+        let read_u32 =
+            |offset: usize| u32::from(read_u16(offset)) | u32::from(read_u16(offset + 2)) << 16;
+        Self {
+            kind: bytes[0],
+            is_finished: bytes[1] == 1,
+            scene_number: read_u16(2),
+            number: read_u32(4),
+            seq: read_u32(8),
+            size: (read_u16(12), read_u16(14)),
+            samples: read_u16(16),
+            of_samples: read_u16(18),
+            file: bytes[20..].to_vec(),
+        }
+    }
+
+    pub fn decode(&self) -> image::DynamicImage {
+        image::load_from_memory(&self.file).unwrap()
+    }
+}
+
+impl TestPage {
+    /// A connection on which nothing has been sent.
+    pub async fn connect(server: &TestServer) -> Result<Self, Error> {
+        let link = server.link.replacen("http", "ws", 1);
+        let (base, query) = link.rsplit_once('/').unwrap();
+        let (socket, _) = connect_async(format!("{base}/ws{query}")).await?;
+        Ok(Self { socket })
+    }
+
+    /// A connection whose receive buffer takes a few kilobytes, so that the server soon waits for the reader.
+    pub async fn connect_with_small_buffer(server: &TestServer) -> Self {
+        let socket = TcpSocket::new_v4().unwrap();
+        socket.set_recv_buffer_size(4096).unwrap();
+        let stream = socket.connect(server.address().parse().unwrap()).await.unwrap();
+        let address = format!("ws://{}/ws", server.address());
+        let (socket, _) = client_async(address, MaybeTlsStream::Plain(stream)).await.unwrap();
+        Self { socket }
+    }
+
+    /// A connection, as soon as the server has a permit for it.
+    pub async fn connect_when_possible(server: &TestServer) -> Self {
+        let start = Instant::now();
+        loop {
+            match Self::connect(server).await {
+                Ok(page) => return page,
+                Err(error) => assert!(start.elapsed() < TIMEOUT, "{error}"),
+            }
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    }
+
+    /// A page that shows the initial scene with this patch.
+    pub async fn open(server: &TestServer, scene: Value) -> Self {
+        let mut page = Self::connect(server).await.unwrap();
+        page.send_hello(scene).await;
+        page
+    }
+
+    pub async fn send_hello(&mut self, scene: Value) {
+        let (width, height) = PICTURE_SIZE;
+        let hello = json!({ "type": "hello", "width": width, "height": height, "scene": scene });
+        self.send_json(hello).await;
+    }
+
+    pub async fn send_json(&mut self, message: Value) {
+        self.send(Message::text(message.to_string())).await.unwrap();
+    }
+
+    pub async fn send(&mut self, message: Message) -> Result<(), Error> {
+        self.socket.send(message).await
+    }
+
+    /// The next message; none if the server closed the connection.
+    pub async fn next(&mut self) -> Option<Received> {
+        timeout(TIMEOUT, self.receive()).await.expect("the server is silent")
+    }
+
+    async fn receive(&mut self) -> Option<Received> {
+        loop {
+            match self.socket.next().await?.ok()? {
+                Message::Text(text) => {
+                    return Some(Received::Message(serde_json::from_str(&text).unwrap()));
+                }
+                Message::Binary(bytes) => return Some(Received::Picture(Picture::parse(&bytes))),
+                Message::Close(_) => return None,
+                _ => {}
+            }
+        }
+    }
+
+    /// The next message of this type; pictures before it are acknowledged.
+    pub async fn message(&mut self, kind: &str) -> Value {
+        loop {
+            match self.next().await.expect("the server closed the connection") {
+                Received::Message(message) if message["type"] == kind => return message,
+                Received::Message(_) => {}
+                Received::Picture(picture) => self.acknowledge(&picture).await,
+            }
+        }
+    }
+
+    /// Waits for progress of work with this name; for none, until work has ended.
+    pub async fn progress_state(&mut self, text: Option<&str>) -> Value {
+        loop {
+            let state = self.message("state").await;
+            if state["text"].as_str() == text {
+                return state;
+            }
+        }
+    }
+
+    /// The next picture, which is not acknowledged.
+    pub async fn picture(&mut self) -> Picture {
+        loop {
+            let received = self.next().await.expect("the server closed the connection");
+            if let Received::Picture(picture) = received {
+                return picture;
+            }
+        }
+    }
+
+    /// The first picture for which the condition holds; all pictures are acknowledged.
+    pub async fn wait_for_picture(&mut self, condition: impl Fn(&Picture) -> bool) -> Picture {
+        loop {
+            let picture = self.picture().await;
+            self.acknowledge(&picture).await;
+            if condition(&picture) {
+                return picture;
+            }
+        }
+    }
+
+    pub async fn finished_picture(&mut self) -> Picture {
+        self.wait_for_picture(|picture| picture.is_finished).await
+    }
+
+    pub async fn acknowledge(&mut self, picture: &Picture) {
+        self.send_json(json!({ "type": "ack", "frame": picture.number })).await;
+    }
+
+    /// Waits until the server has handled all messages sent so far; returns the pictures received meanwhile, which
+    /// are not acknowledged.
+    pub async fn sync(&mut self) -> Vec<Picture> {
+        self.send_json(json!({ "type": "export", "id": SYNC_ID, "width": 3, "height": 2 })).await;
+        let mut pictures = Vec::new();
+        loop {
+            match self.next().await.expect("the server closed the connection") {
+                Received::Message(message) if message["id"] == SYNC_ID => return pictures,
+                Received::Message(_) => {}
+                Received::Picture(picture) => pictures.push(picture),
+            }
+        }
+    }
+
+    /// Drops all messages received within this duration.
+    pub async fn drain(&mut self, duration: Duration) {
+        let _ = timeout(duration, async { while self.next().await.is_some() {} }).await;
+    }
+
+    /// Drops all messages until the server closes the connection.
+    pub async fn wait_until_closed(&mut self) {
+        while self.next().await.is_some() {}
+    }
+
+    pub async fn set_camera(&mut self, seq: u32, angle_rad: f64, is_moving: bool) {
+        let camera = camera(angle_rad);
+        let message =
+            json!({ "type": "camera", "seq": seq, "camera": camera, "moving": is_moving });
+        self.send_json(message).await;
+    }
+
+    pub async fn change_settings(&mut self, seq: u32, patch: Value) {
+        self.send_json(json!({ "type": "set", "seq": seq, "scene": patch })).await;
+    }
+}
+
+/// A camera on a circle around the hill.
+pub fn camera(angle_rad: f64) -> Value {
+    let position = [5.0 * angle_rad.sin(), -5.0 * angle_rad.cos(), 3.0];
+    json!({ "position": position, "focal_point": [0, 0, 0], "view_up": [0, 0, 1] })
+}

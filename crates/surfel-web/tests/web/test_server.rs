@@ -1,0 +1,94 @@
+//! A server on a thread of its own, for one test.
+
+use crate::hill_provider::{FaultyRenderer, HillProvider};
+use crate::test_page::TestPage;
+use serde_json::json;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use surfel_core::progress::Progress;
+use surfel_web::{Limits, Result, SceneProvider, Server};
+
+/// Duration after which a test that waits for the server fails; generous, for busy machines.
+pub const TIMEOUT: Duration = Duration::from_secs(60);
+
+/// Waits until a condition holds.
+pub async fn wait_until(condition: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !condition() {
+        assert!(start.elapsed() < TIMEOUT, "the condition never held");
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+}
+
+pub struct TestServer {
+    /// The link to the page, with the token if there is one.
+    pub link: String,
+    pub provider: Arc<HillProvider>,
+    is_stopped: Arc<AtomicBool>,
+    server: Option<JoinHandle<Result<()>>>,
+}
+
+impl TestServer {
+    /// A server with the default limits on loopback.
+    pub fn start() -> Self {
+        Self::start_with_limits(Limits::default())
+    }
+
+    /// A server with these limits on loopback.
+    pub fn start_with_limits(limits: Limits) -> Self {
+        Self::start_at("127.0.0.1", limits, |_| Ok(()))
+    }
+
+    /// A server whose files are loaded once `load` returns.
+    pub fn start_at(
+        host: &str,
+        limits: Limits,
+        load: impl FnOnce(&dyn Progress) -> Result<()> + Send + 'static,
+    ) -> Self {
+        let server = Server::bind(host.parse().unwrap(), 0).unwrap().with_limits(limits);
+        let (link, provider) = (server.link(), Arc::new(HillProvider::new()));
+        let is_stopped: Arc<AtomicBool> = Arc::default();
+        let (loaded, stop) = (provider.clone(), is_stopped.clone());
+        let open = move |progress: &dyn Progress| {
+            load(progress)?;
+            Ok(loaded as Arc<dyn SceneProvider>)
+        };
+        let run = move || server.run(Arc::new(FaultyRenderer), stop, open);
+        Self { link, provider, is_stopped, server: Some(std::thread::spawn(run)) }
+    }
+
+    /// Host and port.
+    pub fn address(&self) -> &str {
+        self.link["http://".len()..].split_once('/').unwrap().0
+    }
+
+    /// Waits until the server ends, by itself or because it was stopped.
+    pub fn join(&mut self) -> Result<()> {
+        self.server.take().unwrap().join().unwrap()
+    }
+
+    /// Stops the server.
+    pub fn stop(&mut self) -> Result<()> {
+        self.is_stopped.store(true, Ordering::Relaxed);
+        self.join()
+    }
+
+    /// Asserts that a new page gets a finished picture, once there is a permit for it.
+    pub async fn assert_serves_pictures(&self) {
+        let mut page = TestPage::connect_when_possible(self).await;
+        page.send_hello(json!({})).await;
+        page.finished_picture().await;
+    }
+}
+
+impl Drop for TestServer {
+    fn drop(&mut self) {
+        self.provider.gate.open();
+        self.is_stopped.store(true, Ordering::Relaxed);
+        if let Some(server) = self.server.take() {
+            let _ = server.join();
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Movies: one frame after another, with a turntable if one is asked for.
+
+use crate::built::BuiltScene;
+use crate::choices::CancelOnly;
+use crate::description::{Invalid, SceneDescription};
+use crate::error::{Error, Result};
+use crate::picture::{RenderedImage, image_options};
+use crate::resolve::LoadedScene;
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+use surfel_core::math::DVec3;
+use surfel_core::progress::Progress;
+use surfel_formats::{Movie, MovieOptions};
+
+/// Returns the number of frames of a description's movie.
+///
+/// # Errors
+///
+/// Fails if nothing moves and no number is given.
+pub fn frame_count(description: &SceneDescription, animated_secs: f64) -> Result<u32, Invalid> {
+    let output = &description.output;
+    if let Some(frames) = output.frames {
+        return Ok(frames);
+    }
+    let duration = animated_secs.max(output.turntable.unwrap_or(0.0));
+    if duration <= 0.0 {
+        let text = "nothing moves; set turntable, or frames for a still movie";
+        return Err(Invalid::at("frames", text));
+    }
+    Ok((duration * output.fps()).round().clamp(1.0, 1e6) as u32)
+}
+
+/// Returns how a description's movie becomes a file; the number of frames and the fingerprint follow later.
+pub fn movie_options(description: &SceneDescription) -> MovieOptions {
+    let (width, height) = description.picture.resolution();
+    MovieOptions {
+        width,
+        height,
+        fps: description.output.fps(),
+        n_frames: 1,
+        image: image_options(description, DVec3::ZERO),
+        fingerprint: String::new(),
+    }
+}
+
+/// Returns a text that changes with everything that frames depend on: the complete description, and the sizes and times
+/// of all files.
+pub fn fingerprint(
+    complete: &SceneDescription,
+    description: &SceneDescription,
+    loaded: &LoadedScene,
+) -> String {
+    let objects = description.objects.iter().flat_map(|object| &object.files);
+    let external = loaded.file_infos.iter().flat_map(|info| &info.external_files);
+    let named = objects.chain(&description.light.environment).chain(external);
+    let stamp = |file: &PathBuf| {
+        let data = std::fs::metadata(file).ok()?;
+        Some((file.clone(), data.len(), data.modified().ok()?))
+    };
+    let files: Vec<_> = description.files.iter().chain(named).map(stamp).collect();
+    let table = serde_json::Value::Object(complete.to_table());
+    let text = format!("{} {table} {files:?}", env!("CARGO_PKG_VERSION"));
+    let hash = text.bytes().fold(0, |hash, byte| surfel_core::math::hash(hash ^ u64::from(byte)));
+    format!("{hash:016x}")
+}
+
+/// Renders the frames that a movie lacks, and finishes it.
+///
+/// # Errors
+///
+/// Fails if a frame cannot be rendered or written, and if cancelled; the message says how many frames are kept.
+pub fn animate(
+    scene: &mut BuiltScene,
+    output: &Path,
+    options: &MovieOptions,
+    resumes: bool,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let mut movie = Movie::open(output, options, resumes)?;
+    let n_frames = options.n_frames;
+    if 0 < movie.n_done() {
+        progress.note(&format!("{} of {n_frames} frames are there already", movie.n_done()));
+    }
+    progress.begin("animate", u64::from(n_frames));
+    for frame in 0..n_frames {
+        if !movie.has_frame(frame) {
+            let image = render_frame(scene, f64::from(frame) / options.fps, progress);
+            let added = image.and_then(|image| Ok(movie.add_frame(frame, &image)?));
+            added.map_err(|error| unfinished(error, movie.n_done(), n_frames))?;
+        }
+        progress.advance(1);
+    }
+    progress.end();
+    let n_done = movie.n_done();
+    let finished = movie.finish(progress).map_err(Error::from);
+    finished.map_err(|error| unfinished(error, n_done, n_frames))?;
+    progress.end();
+    Ok(())
+}
+
+fn render_frame(
+    scene: &mut BuiltScene,
+    time_secs: f64,
+    progress: &dyn Progress,
+) -> Result<RenderedImage> {
+    let quiet = CancelOnly(progress);
+    scene.seek(time_secs, &quiet)?;
+    if let Some(seconds) = scene.description().output.turntable {
+        scene.turn(TAU * time_secs / seconds);
+    }
+    Ok(scene.render_with(&quiet)?.0)
+}
+
+/// Says that the finished frames are not lost.
+fn unfinished(error: Error, n_done: u32, n_frames: u32) -> Error {
+    if n_done == 0 {
+        return error;
+    }
+    Error::Unfinished { cause: Box::new(error), n_done, n_frames }
+}

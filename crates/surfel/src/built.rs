@@ -1,0 +1,217 @@
+//! A scene with its trees, shown at one time after another: what moves is moved, everything else stays.
+
+use crate::choices::{CancelOnly, Choice};
+use crate::description::{Exposure, SceneDescription};
+use crate::error::Result;
+use crate::picture::RenderedImage;
+use crate::resolve::{Resolved, SceneCamera, Sequence, automatic_exposure, expose, expose_lamps};
+use surfel_core::flat::{FlatPunctualLight, FlatScene};
+use surfel_core::math::{DQuat, Vec3};
+use surfel_core::progress::{NoProgress, Progress};
+use surfel_core::render::{CpuRenderer, RenderStats, Renderer, Settings};
+use surfel_core::scene::{Geometry, Graph, Light};
+use surfel_core::trace::Simd;
+
+/// A scene with its trees: it renders, casts rays, and moves to any time.
+#[derive(Debug)]
+pub struct BuiltScene {
+    flat: FlatScene,
+    renderer: CpuRenderer,
+    graph: Graph,
+    sequences: Vec<Sequence>,
+    camera: SceneCamera,
+    up: Vec3,
+    /// Lights before a turntable turns them.
+    lights: Vec<Light>,
+    /// Lamps before a turntable turns them.
+    lamps: Vec<FlatPunctualLight>,
+    /// Stops by which all lights were made brighter.
+    stops: f32,
+    /// Size and quality of pictures.
+    pub settings: Settings,
+    description: SceneDescription,
+    choices: Vec<Choice>,
+    /// For each geometry, the index that each point had when it was read; empty where none is kept.
+    source_indices: Vec<Vec<u32>>,
+}
+
+impl Resolved {
+    /// Builds the trees, and chooses the exposure from a preview unless the description gives it.
+    ///
+    /// # Errors
+    ///
+    /// Fails for scenes that no picture can be made of, and if cancelled.
+    pub fn build(self, progress: &dyn Progress) -> Result<BuiltScene> {
+        let mut scene = self.build_trees(progress)?;
+        scene.choose_exposure(progress)?;
+        Ok(scene)
+    }
+
+    /// Builds the trees, after which the graph's own points are freed.
+    ///
+    /// # Errors
+    ///
+    /// Fails for scenes that no picture can be made of, and if cancelled.
+    pub fn build_trees(self, progress: &dyn Progress) -> Result<BuiltScene> {
+        let Self { scene, settings, description, choices, sequences, camera, up } = self;
+        let flat = FlatScene::new(&scene, progress)?;
+        progress.end();
+        let mut graph = scene.graph;
+        let source_indices = source_indices(&graph);
+        graph.release_static();
+        let renderer = CpuRenderer { simd: Simd::detect() };
+        let (lights, lamps) = (flat.lights.clone(), flat.punctual_lights.clone());
+        Ok(BuiltScene {
+            flat,
+            renderer,
+            graph,
+            sequences,
+            camera,
+            up,
+            lights,
+            lamps,
+            stops: 0.0,
+            settings,
+            description,
+            choices,
+            source_indices,
+        })
+    }
+}
+
+/// Returns for each geometry the index that each of its points had when it was read.
+pub(crate) fn source_indices(graph: &Graph) -> Vec<Vec<u32>> {
+    let indices = graph.geometries.iter().map(|geometry| match geometry {
+        Geometry::Points(points) => points.cloud().source_indices.clone().unwrap_or_default(),
+        Geometry::Triangles(_) => Vec::new(),
+    });
+    indices.collect()
+}
+
+impl BuiltScene {
+    /// Sets the brightness of all lights: by the description, or from a preview of second 0.
+    ///
+    /// # Errors
+    ///
+    /// Fails if cancelled.
+    pub fn choose_exposure(&mut self, progress: &dyn Progress) -> Result<()> {
+        let exposure = self.description.light.exposure();
+        let stops = exposure_stops(exposure, &self.renderer, &self.flat, &self.settings, progress)?;
+        if exposure == Exposure::Auto {
+            let reason = format!("exposure {stops:+.2} stops");
+            self.choices.push(Choice { reason, keys: vec!["exposure".into()] });
+        }
+        expose(&mut self.flat, stops);
+        self.stops = stops;
+        self.lights.clone_from(&self.flat.lights);
+        self.lamps.clone_from(&self.flat.punctual_lights);
+        Ok(())
+    }
+
+    /// Returns the arrays that rays are traced against.
+    pub fn flat(&self) -> &FlatScene {
+        &self.flat
+    }
+
+    /// Returns the complete description: with everything that was chosen from the data.
+    pub fn description(&self) -> &SceneDescription {
+        &self.description
+    }
+
+    /// Returns what was chosen from the data, in the order of the work.
+    pub fn choices(&self) -> &[Choice] {
+        &self.choices
+    }
+
+    /// Returns the SIMD level of the kernels.
+    pub fn simd(&self) -> Simd {
+        self.renderer.simd
+    }
+
+    /// Returns the index that a point of an instance had when it was read.
+    pub(crate) fn source_index(&self, instance: usize, point: u32) -> Option<u32> {
+        let instance = self.flat.instances.get(instance)?;
+        let node = self.graph.nodes.get(instance.node_idx as usize)?;
+        let is_shown = |material: usize| material == instance.material_idx as usize;
+        let primitive = node.primitives.iter().find(|primitive| is_shown(primitive.material))?;
+        self.source_indices.get(primitive.geometry)?.get(point as usize).copied()
+    }
+
+    /// Moves everything to a time in seconds, forward or back.
+    ///
+    /// # Errors
+    ///
+    /// Fails if a file of a sequence cannot be read, and if cancelled.
+    pub fn seek(&mut self, time_secs: f64, progress: &dyn Progress) -> Result<()> {
+        for sequence in &mut self.sequences {
+            if !sequence.seek(time_secs, &mut self.graph, self.up, progress)? {
+                continue;
+            }
+            for geometry_idx in sequence.slots.geometries.iter().copied() {
+                self.flat.replace(geometry_idx, &self.graph.geometries[geometry_idx], progress)?;
+            }
+            self.flat.materials.clone_from(&self.graph.materials);
+            self.flat.textures.clone_from(&self.graph.textures);
+            progress.end();
+        }
+        if !self.graph.animation.channels.is_empty() || !self.sequences.is_empty() {
+            self.graph.evaluate_at(time_secs);
+            self.flat.update(&self.graph, progress)?;
+            self.graph.release_static();
+            expose_lamps(&mut self.flat.punctual_lights, self.stops);
+            self.lamps.clone_from(&self.flat.punctual_lights);
+        }
+        self.flat.camera = self.camera.at(time_secs, &self.graph);
+        Ok(())
+    }
+
+    /// Turns everything in front of the camera, under lights that stay, from where the last [`BuiltScene::seek`] left it.
+    pub fn turn(&mut self, turn_rad: f64) {
+        // Camera and lights go round together: turning everything else would move every tree.
+        let turn = DQuat::from_axis_angle(self.up.as_dvec3(), turn_rad);
+        let camera = self.flat.camera;
+        let center = (camera.focal_point - self.flat.origin).as_vec3();
+        self.flat.camera = camera.rotated_about_focal_point(turn);
+        self.flat.lights = self.lights.iter().map(|light| light.rotated(turn)).collect();
+        let lamps = self.lamps.iter().map(|lamp| lamp.rotated_about(turn, center));
+        self.flat.punctual_lights = lamps.collect();
+    }
+
+    /// Renders the picture of the current time.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the settings make no picture.
+    pub fn render(&self) -> Result<RenderedImage> {
+        Ok(self.render_with(&NoProgress)?.0)
+    }
+
+    /// Renders with progress and cancellation; returns the picture and what it took.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the settings make no picture, and if cancelled.
+    pub fn render_with(&self, progress: &dyn Progress) -> Result<(RenderedImage, RenderStats)> {
+        let (image, stats) = self.renderer.render(&self.flat, &self.settings, progress)?;
+        Ok((RenderedImage::new(image, &self.description, self.flat.origin), stats))
+    }
+}
+
+/// Returns the stops of an exposure; an automatic one is chosen from a preview and reported.
+pub(crate) fn exposure_stops(
+    exposure: Exposure,
+    renderer: &CpuRenderer,
+    flat: &FlatScene,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<f32> {
+    match exposure {
+        Exposure::Stops(stops) => Ok(stops as f32),
+        Exposure::Auto if flat.lights.is_empty() && flat.punctual_lights.is_empty() => Ok(0.0),
+        Exposure::Auto => {
+            let stops = automatic_exposure(renderer, flat, settings, &CancelOnly(progress))?;
+            progress.choice(&format!("exposure {stops:+.2} stops"), &["exposure"]);
+            Ok(stops)
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! The camera, in world coordinates: those of the files.
+
+use super::Invalid;
+use super::keys::settings;
+use super::rule::{
+    Axis, Checked, Direction, Flag, POSITIVE, Rule, Text, VIEW_ANGLE, Vector, number,
+};
+use serde_json::{Value, json};
+use std::path::Path;
+use surfel_core::math::{DVec3, Vec3};
+
+/// The height of an orthographic picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum OrthographicHeight {
+    /// All of the scene is seen.
+    Fit,
+    /// The height of the picture in world units.
+    Fixed(f64),
+}
+
+settings! {
+    /// The camera; whatever is not set is chosen so that the whole scene is seen.
+    pub struct CameraSettings {
+        /// Position of the camera [default: so that the whole scene is seen].
+        position: DVec3, Vector, "X,Y,Z";
+        /// Point in the middle of the picture.
+        focal_point: DVec3, Vector, "X,Y,Z";
+        /// Direction that points up in the picture.
+        view_up: DVec3, Direction, "X,Y,Z";
+        /// Vertical field of view in degrees [default: 35, or that of the file's camera].
+        view_angle: f64, VIEW_ANGLE, "DEG";
+        /// Projects without perspective; HEIGHT is the height of the picture in world units [default: all of the
+        /// scene].
+        orthographic: OrthographicHeight, OrthographicRule, "HEIGHT";
+        /// Looks all around (equirectangular): the width is a full turn, the height reaches from straight up to
+        /// straight down. Stands at a free spot inside the scene unless a position is given. Best twice as wide as
+        /// high.
+        panorama: bool, Flag, "";
+        /// Direction in which the camera looks at the whole scene: 0,0,-1 for a map.
+        direction: DVec3, Direction, "X,Y,Z";
+        /// Rotates the chosen camera about the scene, or a panorama from north, in degrees clockwise from above.
+        azimuth_angle: f64 = 0.0, number(-360.0, 360.0), "DEG";
+        /// Height of the chosen camera above the horizon in degrees.
+        elevation_angle: f64, number(-90.0, 90.0), "DEG";
+        /// Moves the chosen camera nearer (above 1) or farther away.
+        zoom_factor: f64 = 1.0, POSITIVE, "FACTOR";
+        /// Keeps the camera where it is, even if the scene animates it.
+        lock: bool = false, Flag, "";
+        /// Looks through the camera of this name in a glTF file [default: the first].
+        name: String, Text, "NAME";
+    }
+}
+
+settings! {
+    /// Directions of the world.
+    pub struct WorldSettings {
+        /// Axis that points up: +Z, -Y or x,y,z [default: found from the data].
+        up: Vec3, Axis, "AXIS";
+    }
+}
+
+/// True, or the height of the picture.
+struct OrthographicRule;
+
+const HEIGHT: Checked = Checked { allows: POSITIVE.allows, expected: "true or a positive height" };
+
+impl Rule<OrthographicHeight> for OrthographicRule {
+    fn read(&self, value: &Value, folder: &Path) -> Result<OrthographicHeight, Invalid> {
+        match value {
+            Value::Bool(true) => Ok(OrthographicHeight::Fit),
+            value => Ok(OrthographicHeight::Fixed(HEIGHT.read(value, folder)?)),
+        }
+    }
+
+    fn write(&self, value: &OrthographicHeight) -> Value {
+        match value {
+            OrthographicHeight::Fit => json!(true),
+            OrthographicHeight::Fixed(height) => json!(height),
+        }
+    }
+}
+
+impl CameraSettings {
+    /// Returns true if nothing is asked of the camera but its field of view.
+    pub fn is_automatic(&self) -> bool {
+        let free = Self {
+            view_angle: self.view_angle,
+            lock: self.lock,
+            name: self.name.clone(),
+            ..Self::default()
+        };
+        let is_neutral = self.azimuth_angle() == 0.0 && self.zoom_factor() == 1.0;
+        let set = Self { azimuth_angle: None, zoom_factor: None, panorama: None, ..self.clone() };
+        is_neutral && set == free && !self.is_panorama()
+    }
+
+    /// Returns true for an equirectangular picture all around.
+    pub fn is_panorama(&self) -> bool {
+        self.panorama == Some(true)
+    }
+}

@@ -1,0 +1,60 @@
+//! Keys that exclude each other.
+
+use super::keys::KeyedSettings;
+use super::{Invalid, Part};
+
+/// Each key with those that it excludes.
+const EXCLUSIVE: &[(&str, &[&str])] = &[
+    (
+        "camera.panorama",
+        &[
+            "camera.orthographic",
+            "camera.direction",
+            "camera.elevation_angle",
+            "camera.zoom_factor",
+            "camera.view_angle",
+        ],
+    ),
+    ("camera.direction", &["camera.azimuth_angle", "camera.elevation_angle"]),
+    ("camera.position", &["camera.zoom_factor"]),
+    (
+        "camera.name",
+        &[
+            "camera.position",
+            "camera.focal_point",
+            "camera.view_up",
+            "camera.orthographic",
+            "camera.panorama",
+            "camera.direction",
+            "camera.azimuth_angle",
+            "camera.elevation_angle",
+            "camera.zoom_factor",
+        ],
+    ),
+    ("normals_k", &["normals_radius"]),
+];
+
+/// Returns the keys that cannot be set together with `path`.
+pub fn excluded_by(path: &str) -> impl Iterator<Item = &'static str> {
+    EXCLUSIVE.iter().flat_map(move |(key, others)| {
+        let excluded = others.iter().filter(move |_| *key == path).copied();
+        excluded.chain(others.contains(&path).then_some(*key))
+    })
+}
+
+/// Fails at the first two keys that exclude each other.
+pub fn check(parts: &[Part<&dyn KeyedSettings>]) -> Result<(), Invalid> {
+    let is_set = |path: &str| {
+        let (prefix, name) = path.split_once('.').map_or(("", path), |(table, name)| (table, name));
+        parts.iter().any(|part| {
+            part.prefix.trim_end_matches('.') == prefix
+                && part.settings.get(name).is_some_and(|value| value != serde_json::json!(false))
+        })
+    };
+    for (key, others) in EXCLUSIVE.iter().filter(|(key, _)| is_set(key)) {
+        if let Some(other) = others.iter().find(|other| is_set(other)) {
+            return Err(Invalid::at(*key, format!("excludes {other}; leave out one of them")));
+        }
+    }
+    Ok(())
+}

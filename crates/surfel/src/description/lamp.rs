@@ -1,0 +1,115 @@
+//! Lamps: lights at places, which may move.
+
+use super::keys::settings;
+use super::rule::{Checked, Color, OneOf, Text, Vector, number};
+use super::{Invalid, read_table};
+use serde_json::{Map, Value};
+use std::f64::consts::PI;
+use std::path::Path;
+use surfel_core::math::{DQuat, DVec3, Vec3};
+use surfel_core::scene::{Node, PunctualLight, PunctualLightKind, Transform};
+
+/// The shape of a lamp's light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LampShape {
+    /// Light to all sides.
+    Point,
+    /// A cone.
+    Spot,
+    /// Parallel light from infinitely far away.
+    Directional,
+}
+
+const SHAPES: OneOf<LampShape> = OneOf(&[
+    ("point", LampShape::Point),
+    ("spot", LampShape::Spot),
+    ("directional", LampShape::Directional),
+]);
+
+settings! {
+    /// A lamp.
+    pub struct LampDescription {
+        /// Name for animations [default: lamp and its number].
+        name: String, Text, "NAME";
+        /// point, spot, or directional: parallel light from infinitely far away.
+        kind: LampShape = LampShape::Point, SHAPES, "KIND";
+        /// Position; of a directional lamp only the direction to the target counts.
+        position: DVec3, Vector, "X,Y,Z";
+        /// Point that spots and directional lamps shine at.
+        target: DVec3 = DVec3::ZERO, Vector, "X,Y,Z";
+        /// Colour.
+        color: Vec3 = Vec3::ONE, Color, "COLOR";
+        /// Strength: 1 makes a white surface that faces the lamp at distance 1 appear white.
+        strength: f64 = 1.0, NOT_NEGATIVE, "FACTOR";
+        /// Radius of the shining sphere in world units; above 0 shadows are soft.
+        radius: f64 = 0.0, NOT_NEGATIVE, "LENGTH";
+        /// Distance in world units at which the light has faded to nothing [default: infinite].
+        range: f64, ABOVE_ZERO, "LENGTH";
+        /// Angle of the whole cone of a spot in degrees.
+        angle: f64 = 45.0, ANGLE, "DEG";
+        /// Fraction of the cone over which a spot fades.
+        blend: f64 = 0.15, number(0.0, 1.0), "FRACTION";
+    }
+}
+
+const NOT_NEGATIVE: super::rule::Number = number(0.0, f64::INFINITY);
+const ABOVE_ZERO: Checked = Checked { allows: |x| 0.0 < x, expected: "a number above 0" };
+const ANGLE: Checked =
+    Checked { allows: |x| 0.0 < x && x <= 180.0, expected: "degrees above 0, 180 at most" };
+
+impl LampDescription {
+    /// Reads a lamp from a table; without a name it is called by its number.
+    pub(super) fn read(table: &Map<String, Value>, number: usize) -> Result<Self, Invalid> {
+        let mut lamp = Self::default();
+        read_table(&mut lamp, table, Path::new(""))?;
+        lamp.name.get_or_insert_with(|| format!("lamp {number}"));
+        lamp.node()?;
+        Ok(lamp)
+    }
+
+    /// Returns a node at the lamp's position that shines toward its target.
+    ///
+    /// # Errors
+    ///
+    /// Fails without a position, unless the lamp is directional.
+    pub fn node(&self) -> Result<Node, Invalid> {
+        let outer_rad = (self.angle().to_radians() / 2.0) as f32;
+        let kind = match self.kind() {
+            LampShape::Point => PunctualLightKind::Point,
+            LampShape::Spot => PunctualLightKind::Spot {
+                inner_rad: outer_rad * (1.0 - self.blend() as f32),
+                outer_rad,
+            },
+            LampShape::Directional => PunctualLightKind::Directional,
+        };
+        let target = self.target();
+        let position = match (self.position, kind) {
+            (Some(position), _) => position,
+            // Parallel light comes from above unless a position says otherwise.
+            (None, PunctualLightKind::Directional) => target + DVec3::Z,
+            (None, _) => return Err(Invalid::at("position", "is missing; expected [x, y, z]")),
+        };
+        let toward = (target - position).try_normalize().unwrap_or(-DVec3::Z);
+        // Strength 1 at distance 1 gives a white matte surface the radiance 1, as a sun of strength 1 does.
+        let lamp = PunctualLight {
+            kind,
+            color: (self.strength() * PI) as f32 * self.color(),
+            range: self.range.map_or(f32::INFINITY, |range| range as f32),
+            radius: self.radius() as f32,
+        };
+        Ok(Node {
+            transform: Transform::Trs {
+                translation: position,
+                rotation: DQuat::from_rotation_arc(-DVec3::Z, toward),
+                scale: DVec3::ONE,
+            },
+            light: Some(lamp),
+            ..Node::new(self.name.clone().unwrap_or_default())
+        })
+    }
+
+    /// Writes the lamp as a table.
+    pub(super) fn write(&self) -> Value {
+        Value::Object(super::write_table(self))
+    }
+}

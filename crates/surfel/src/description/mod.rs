@@ -1,0 +1,509 @@
+//! The description of a picture as plain structs: objects with their files, camera, light, quality.
+//!
+//! A command line, a scene file, a page's message, a Python keyword and a Rust caller are ways to fill a
+//! [`SceneDescription`]. Each field of its parts is a key of scene files and an option of the program; what is `None`
+//! is a default, or is chosen from the data by [`crate::resolve`].
+
+mod animation;
+mod camera;
+mod exclusive;
+mod file;
+mod invalid;
+mod keys;
+mod lamp;
+mod light;
+mod material;
+mod nearest;
+mod object;
+mod object_settings;
+pub mod pattern;
+mod picture;
+pub mod rule;
+
+pub use animation::{AnimationDescription, AnimationKind, CameraMotion, ObjectMotion, Orbit};
+pub use camera::{CameraSettings, OrthographicHeight, WorldSettings};
+pub use file::{is_scene_file, parse_table};
+pub use invalid::Invalid;
+pub use keys::{Key, KeyedSettings};
+pub use lamp::{LampDescription, LampShape};
+pub use light::{LIGHT_KINDS, LightKind, LightSettings, SkySettings, SunSettings};
+pub use material::{MaterialChoice, MaterialDescription};
+pub use nearest::nearest;
+pub use object::{ObjectDescription, Placement, Rotation};
+pub use object_settings::{ColorSettings, ObjectSettings, PreparationSettings, SurfaceSettings};
+pub use picture::{Backend, Exposure, OutputSettings, PictureSettings, RunSettings};
+
+use material::MaterialChoices;
+use rule::Rule;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Map, Value};
+use std::path::{Path, PathBuf};
+
+/// Everything that decides what a picture shows. The default is an empty scene under automatic light.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SceneDescription {
+    /// Files without an object of their own, shown where their coordinates say. Clouds among them become one cloud.
+    pub files: Vec<PathBuf>,
+    /// Objects; parents stand before their children.
+    pub objects: Vec<ObjectDescription>,
+    /// Lights at places.
+    pub lamps: Vec<LampDescription>,
+    /// Movements of objects, lamps and the camera.
+    pub animations: Vec<AnimationDescription>,
+    /// Materials for everything, or for files and objects by their names. The last one that fits counts.
+    pub materials: Vec<MaterialChoice>,
+    /// File of the picture or movie, and the time that it shows.
+    pub output: OutputSettings,
+    /// Size, quality and background of the picture.
+    pub picture: PictureSettings,
+    /// The camera.
+    pub camera: CameraSettings,
+    /// Directions of the world.
+    pub world: WorldSettings,
+    /// Lights of the whole scene, and the exposure.
+    pub light: LightSettings,
+    /// The sun.
+    pub sun: SunSettings,
+    /// The sky.
+    pub sky: SkySettings,
+    /// Surface, preparation and colour of everything that has no settings of its own.
+    pub objects_default: ObjectSettings,
+    /// Threads, memory and device.
+    pub run: RunSettings,
+}
+
+/// A part of a description: a heading for help texts, the table that its keys stand in, and the settings.
+#[derive(Clone, Copy, Debug)]
+pub struct Part<S> {
+    /// Heading of its options.
+    pub heading: &'static str,
+    /// Name of its table with a dot, as in `camera.`, or empty.
+    pub prefix: &'static str,
+    /// The settings.
+    pub settings: S,
+}
+
+impl std::fmt::Debug for dyn KeyedSettings + '_ {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_map().entries(write_table(self)).finish()
+    }
+}
+
+/// Tables of scene files that may stand there several times.
+pub const TABLES: [&str; 3] = ["object", "lamp", "animation"];
+
+/// The table of `--dry-run` that describes the data and changes nothing.
+const INFO: &str = "info";
+
+/// Returns the name of the option for the path of a key: `camera-view-angle` for `camera.view_angle`.
+pub fn option_name(path: &str) -> String {
+    path.replace(['.', '_'], "-")
+}
+
+impl SceneDescription {
+    /// Describes a scene of these files.
+    pub fn of_files(files: impl IntoIterator<Item = impl Into<PathBuf>>) -> Self {
+        Self { files: files.into_iter().map(Into::into).collect(), ..Self::default() }
+    }
+
+    /// Returns the parts with their keys.
+    pub fn parts(&self) -> [Part<&dyn KeyedSettings>; 11] {
+        let [surface, preparation, color] = self.objects_default.parts();
+        let part = |heading, prefix, settings| Part { heading, prefix, settings };
+        [
+            part("Output", "", &self.output as &dyn KeyedSettings),
+            part("Picture", "", &self.picture),
+            surface,
+            part("Camera (in the file's own coordinates)", "camera.", &self.camera),
+            part("World", "", &self.world),
+            part("Light", "", &self.light),
+            part("Light", "sun.", &self.sun),
+            part("Light", "sky.", &self.sky),
+            color,
+            preparation,
+            part("Everywhere", "", &self.run),
+        ]
+    }
+
+    fn parts_mut(&mut self) -> [(&'static str, &mut dyn KeyedSettings); 11] {
+        let ObjectSettings { surface, preparation, color } = &mut self.objects_default;
+        [
+            ("", &mut self.output),
+            ("", &mut self.picture),
+            ("", surface),
+            ("camera.", &mut self.camera),
+            ("", &mut self.world),
+            ("", &mut self.light),
+            ("sun.", &mut self.sun),
+            ("sky.", &mut self.sky),
+            ("", color),
+            ("", preparation),
+            ("", &mut self.run),
+        ]
+    }
+
+    /// Returns the paths of all keys outside of objects, lamps and animations.
+    pub fn paths() -> Vec<String> {
+        let description = Self::default();
+        let parts = description.parts().into_iter();
+        let paths = parts.flat_map(|Part { prefix, settings, .. }| {
+            settings.keys().into_iter().map(move |key| format!("{prefix}{}", key.name))
+        });
+        paths.chain(["material".to_owned()]).collect()
+    }
+
+    /// Sets the value of a key, named by its path or its option, from a value as a scene file has it.
+    ///
+    /// Paths in the value start at `folder`. `null` makes the key automatic again. Keys that exclude this one are unset.
+    ///
+    /// # Errors
+    ///
+    /// Fails for an unknown key and a value that is not valid.
+    pub fn set(&mut self, path: &str, value: &Value, folder: &Path) -> Result<(), Invalid> {
+        let option = option_name(path);
+        if option == "material" {
+            let read = |value| MaterialChoices.read(value, folder);
+            self.materials = match value {
+                Value::Null => Vec::new(),
+                value => read(value).map_err(|error| error.within("material"))?,
+            };
+            return Ok(());
+        }
+        for (prefix, settings) in self.parts_mut() {
+            let Some(key) = settings
+                .keys()
+                .into_iter()
+                .find(|key| option_name(&format!("{prefix}{}", key.name)) == option)
+            else {
+                continue;
+            };
+            let path = format!("{prefix}{}", key.name);
+            // False where a length could stand says that there is none.
+            let is_unset =
+                value.is_null() || (*value == Value::Bool(false) && path == "camera.orthographic");
+            if is_unset {
+                settings.unset(key.name);
+                return Ok(());
+            }
+            settings.set(key.name, value, folder).map_err(|error| error.within(&path))?;
+            return Ok(());
+        }
+        let paths = Self::paths();
+        Err(unknown_key(path, paths.iter().map(String::as_str).chain(TABLES)))
+    }
+
+    /// Returns the value of a key by its path, or `None` if it is not set.
+    pub fn get(&self, path: &str) -> Option<Value> {
+        if path == "material" {
+            return (!self.materials.is_empty()).then(|| MaterialChoices.write(&self.materials));
+        }
+        self.parts().iter().find_map(|part| part.settings.get(path.strip_prefix(part.prefix)?))
+    }
+
+    /// Reads a table of keys, as of a scene file. Files that it names start at `folder`.
+    ///
+    /// # Errors
+    ///
+    /// Fails for unknown keys, values that are not valid, keys that exclude each other, and names without an object.
+    pub fn from_table(table: &Map<String, Value>, folder: &Path) -> Result<Self, Invalid> {
+        let mut description = Self::default();
+        let mut table = table.clone();
+        table.shift_remove(INFO);
+        for (i, object) in take_tables(&mut table, "object")?.iter().enumerate() {
+            let object = ObjectDescription::read(object, folder);
+            description
+                .objects
+                .push(object.map_err(|error| error.within(&format!("object[{i}]")))?);
+        }
+        for (i, lamp) in take_tables(&mut table, "lamp")?.iter().enumerate() {
+            let lamp = LampDescription::read(lamp, i + 1);
+            description.lamps.push(lamp.map_err(|error| error.within(&format!("lamp[{i}]")))?);
+        }
+        for (i, animation) in take_tables(&mut table, "animation")?.iter().enumerate() {
+            let animation = AnimationDescription::read(animation);
+            description
+                .animations
+                .push(animation.map_err(|error| error.within(&format!("animation[{i}]")))?);
+        }
+        let mut values = Vec::new();
+        flatten("", &table, &mut values);
+        for (path, value) in values {
+            description.set(&path, value, folder)?;
+        }
+        description.check()?;
+        Ok(description)
+    }
+
+    /// Lays another description over this one: its keys count, its objects, lamps and animations are added.
+    ///
+    /// Keys of this one that exclude a key of the other are unset.
+    pub fn overlay(&mut self, over: Self) {
+        for part in over.parts() {
+            for key in
+                part.settings.keys().iter().filter(|key| part.settings.get(key.name).is_some())
+            {
+                for excluded in exclusive::excluded_by(&format!("{}{}", part.prefix, key.name)) {
+                    self.unset(excluded);
+                }
+            }
+        }
+        self.output.overlay(&over.output);
+        self.picture.overlay(&over.picture);
+        self.camera.overlay(&over.camera);
+        self.world.overlay(&over.world);
+        self.light.overlay(&over.light);
+        self.sun.overlay(&over.sun);
+        self.sky.overlay(&over.sky);
+        self.objects_default = over.objects_default.over(&self.objects_default);
+        self.run.overlay(&over.run);
+        if !over.materials.is_empty() {
+            self.materials = over.materials;
+        }
+        self.files.extend(over.files);
+        self.objects.extend(over.objects);
+        self.lamps.extend(over.lamps);
+        self.animations.extend(over.animations);
+    }
+
+    fn unset(&mut self, path: &str) {
+        for (prefix, settings) in self.parts_mut() {
+            if let Some(name) = path.strip_prefix(prefix) {
+                settings.unset(name);
+            }
+        }
+    }
+
+    /// Changes keys by a merge patch (RFC 7396) with paths as keys: `null` makes a key automatic again.
+    ///
+    /// # Errors
+    ///
+    /// Fails for unknown keys, values that are not valid, and keys that exclude each other; then nothing is changed.
+    pub fn merge(&mut self, patch: &Map<String, Value>) -> Result<(), Invalid> {
+        let mut merged = self.clone();
+        let mut values = Vec::new();
+        flatten("", patch, &mut values);
+        for (path, value) in values {
+            merged.set(&path, value, Path::new(""))?;
+        }
+        merged.check()?;
+        *self = merged;
+        Ok(())
+    }
+
+    /// Checks what no single value shows: keys that exclude each other, and names without an object.
+    ///
+    /// # Errors
+    ///
+    /// Fails with the path of the first such key.
+    pub fn check(&self) -> Result<(), Invalid> {
+        exclusive::check(&self.parts())?;
+        if self.camera.position.is_some() && self.camera.position == self.camera.focal_point {
+            return Err(Invalid::at("camera.position", "is the focal point too; move one of them"));
+        }
+        let has_others = self.light.light.as_ref().is_some_and(|kinds| 1 < kinds.len());
+        if self.light.has(LightKind::None) && has_others {
+            return Err(Invalid::at("light", "none excludes all other lights; leave them out"));
+        }
+        self.check_names()
+    }
+
+    /// Checks that there is something to show.
+    ///
+    /// # Errors
+    ///
+    /// Fails without a file and without an object.
+    pub fn check_is_not_empty(&self) -> Result<(), Invalid> {
+        if self.files.is_empty() && self.objects.is_empty() {
+            return Err(Invalid::at("object", "no objects; add an [[object]] with a file"));
+        }
+        Ok(())
+    }
+
+    /// Fails where a parent or an animation names nothing, or several things.
+    fn check_names(&self) -> Result<(), Invalid> {
+        let objects: Vec<(String, String)> =
+            numbered("object", self.objects.iter().map(ObjectDescription::name));
+        for (i, object) in self.objects.iter().enumerate() {
+            let Some(parent) = &object.parent else { continue };
+            let path = format!("object[{i}].parent");
+            if !is_unique(&objects[..i], parent, &path)? {
+                return Err(Invalid::at(
+                    path,
+                    format!("no object `{parent}` stands before this one"),
+                ));
+            }
+        }
+        let lamps = self.lamps.iter().map(|lamp| lamp.name.clone().unwrap_or_default());
+        let all: Vec<(String, String)> =
+            objects.into_iter().chain(numbered("lamp", lamps)).collect();
+        for (i, animation) in self.animations.iter().enumerate().filter(|(_, a)| !a.is_of_camera())
+        {
+            let path = format!("animation[{i}].object");
+            let object = animation.object.as_deref().unwrap_or_default();
+            if !is_unique(&all, object, &path)? {
+                let advice = nearest(object, all.iter().map(|(_, name)| name.as_str()));
+                return Err(Invalid::at(path, format!("no object `{object}`{advice}")));
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the keys that are set, with objects, lamps and animations, as a scene file has them.
+    pub fn to_table(&self) -> Map<String, Value> {
+        let mut table = write_parts(&self.parts());
+        if let Some(materials) = self.get("material") {
+            table.insert("material".into(), materials);
+        }
+        let objects: Vec<Value> = self.objects.iter().map(ObjectDescription::write).collect();
+        let lamps: Vec<Value> = self.lamps.iter().map(LampDescription::write).collect();
+        let animations: Vec<Value> =
+            self.animations.iter().map(AnimationDescription::write).collect();
+        for (name, tables) in TABLES.into_iter().zip([objects, lamps, animations]) {
+            if !tables.is_empty() {
+                table.insert(name.into(), Value::Array(tables));
+            }
+        }
+        table
+    }
+
+    /// Returns the paths and values of the keys that are set and differ from their defaults.
+    pub fn non_default(&self) -> Vec<(String, Value)> {
+        let mut values = Vec::new();
+        for Part { prefix, settings, .. } in self.parts() {
+            for key in settings.keys() {
+                let value =
+                    settings.get(key.name).filter(|value| Some(value) != key.default.as_ref());
+                values.extend(value.map(|value| (format!("{prefix}{}", key.name), value)));
+            }
+        }
+        values.extend(self.get("material").map(|value| ("material".to_owned(), value)));
+        values
+    }
+}
+
+impl Serialize for SceneDescription {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.to_table().serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for SceneDescription {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let table = Map::deserialize(deserializer)?;
+        Self::from_table(&table, Path::new("")).map_err(serde::de::Error::custom)
+    }
+}
+
+/// Sets a key of a part if the part has it.
+fn read_value(
+    settings: &mut dyn KeyedSettings,
+    key: &str,
+    value: &Value,
+    folder: &Path,
+) -> Result<bool, Invalid> {
+    if !settings.keys().iter().any(|known| known.name == key) {
+        return Ok(false);
+    }
+    if value.is_null() {
+        settings.unset(key);
+    } else {
+        settings.set(key, value, folder).map_err(|error| error.within(key))?;
+    }
+    Ok(true)
+}
+
+/// Sets all keys of a table.
+fn read_table(
+    settings: &mut dyn KeyedSettings,
+    table: &Map<String, Value>,
+    folder: &Path,
+) -> Result<(), Invalid> {
+    for (key, value) in &take_normalized(table) {
+        if !read_value(settings, key, value, folder)? {
+            let known = settings.keys();
+            return Err(unknown_key(key, known.iter().map(|key| key.name)));
+        }
+    }
+    Ok(())
+}
+
+/// Writes the keys of a part that are set.
+pub fn write_table<S: KeyedSettings + ?Sized>(settings: &S) -> Map<String, Value> {
+    let keys = settings.keys().into_iter();
+    keys.filter_map(|key| Some((key.name.to_owned(), settings.get(key.name)?))).collect()
+}
+
+/// Writes the keys of parts that are set, in tables by their prefixes.
+pub(crate) fn write_parts(parts: &[Part<&dyn KeyedSettings>]) -> Map<String, Value> {
+    let mut table = Map::new();
+    for Part { prefix, settings, .. } in parts {
+        let values = write_table(*settings);
+        match prefix.trim_end_matches('.') {
+            "" => table.extend(values),
+            _ if values.is_empty() => {}
+            name => _ = table.insert(name.to_owned(), Value::Object(values)),
+        }
+    }
+    table
+}
+
+/// Both spellings are known: `focal-point` as on the command line, `focal_point` as in programs.
+fn take_normalized(table: &Map<String, Value>) -> Map<String, Value> {
+    table.iter().map(|(key, value)| (key.replace('-', "_"), value.clone())).collect()
+}
+
+fn unknown_key(key: &str, known: impl IntoIterator<Item = impl AsRef<str>>) -> Invalid {
+    let known: Vec<String> = known.into_iter().map(|name| name.as_ref().to_owned()).collect();
+    let advice = nearest(&key.replace('-', "_"), known.iter().map(String::as_str));
+    Invalid::at(key, format!("unknown key{advice}"))
+}
+
+/// Takes the tables of `[[name]]` out of a table.
+fn take_tables(
+    table: &mut Map<String, Value>,
+    name: &str,
+) -> Result<Vec<Map<String, Value>>, Invalid> {
+    let tables = match table.shift_remove(name) {
+        None => return Ok(Vec::new()),
+        Some(Value::Array(tables)) => tables,
+        Some(table @ Value::Object(_)) => vec![table],
+        Some(other) => return Err(Invalid::at(name, "expected tables").found(&other)),
+    };
+    let tables = tables.into_iter().enumerate().map(|(i, table)| match table {
+        Value::Object(table) => Ok(table),
+        other => Err(Invalid::at(format!("{name}[{i}]"), "expected a table").found(&other)),
+    });
+    tables.collect()
+}
+
+/// Lists values by their paths: tables in tables are one path. A material is a value itself.
+fn flatten<'v>(prefix: &str, table: &'v Map<String, Value>, values: &mut Vec<(String, &'v Value)>) {
+    for (key, value) in table {
+        let path = format!("{prefix}{key}");
+        match value {
+            Value::Object(inner) if path != "material" => {
+                flatten(&format!("{path}."), inner, values)
+            }
+            value => values.push((path, value)),
+        }
+    }
+}
+
+/// Names with the tables that have them: `object[0]` and so on.
+fn numbered(table: &str, names: impl Iterator<Item = String>) -> Vec<(String, String)> {
+    names.enumerate().map(|(i, name)| (format!("{table}[{i}]"), name)).collect()
+}
+
+/// Returns true if a name is there; fails if several tables have it.
+fn is_unique(named: &[(String, String)], wanted: &str, path: &str) -> Result<bool, Invalid> {
+    let bearers = named.iter().filter(|(_, name)| name == wanted);
+    let bearers: Vec<&str> = bearers.map(|(bearer, _)| bearer.as_str()).collect();
+    if bearers.len() < 2 {
+        return Ok(!bearers.is_empty());
+    }
+    let bearers = bearers.join(" and ");
+    Err(Invalid::at(path, format!("`{wanted}` is the name of {bearers}; give each its own")))
+}
+
+#[cfg(test)]
+mod tests;

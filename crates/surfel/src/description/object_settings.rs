@@ -1,0 +1,258 @@
+//! Settings that an object may have for itself: surface, preparation, colour.
+
+use super::keys::{KeyedSettings, settings};
+use super::rule::{
+    Checked, ClipBoxRule, ClipPlaneRule, ColorSourceRule, ColormapRule, Flag, Interval, POSITIVE,
+    Rule, Text, count, parsed,
+};
+use super::{Invalid, Part};
+use serde_json::Value;
+use std::path::Path;
+use surfel_core::image::Colormap;
+use surfel_core::math::Vec3;
+use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
+use surfel_core::points::{Orientation, Preparation, Radius, SURFACE_VARIATION, Subsample};
+use surfel_core::scene::color::{ColorSource, Coloring};
+use surfel_core::scene::{Clip, ClipBox, ClipPlane};
+use surfel_core::surface::{EdgeTest, SurfaceKind};
+use surfel_formats::{Column, ColumnChoice, LoadOptions, TextColumn};
+
+settings! {
+    /// The shape that is given to points, and the part of an object that is shown.
+    pub struct SurfaceSettings {
+        /// Surface of the points: points, sphere, disc, splat-mean, splat or splat-fit.
+        surface: SurfaceKind = SurfaceKind::default(), parsed(|kind: &SurfaceKind| kind.name().to_owned()), "KIND";
+        /// Edge of the surface: at the outermost points (angular-gap) or at the rims of their discs (off).
+        edge_test: EdgeTest = EdgeTest::default(), parsed(|test: &EdgeTest| test.name().to_owned()), "TEST";
+        /// Multiplies the radii of all points, those of the file and those estimated.
+        radius_scale: f64 = 1.0, POSITIVE, "FACTOR";
+        /// Hides what lies outside: ([x0,x1],[y0,y1],[z0,z1]) or x0,y0,z0,x1,y1,z1 in the file's own coordinates; two
+        /// ranges have any height. What stays is prepared, coloured and framed as if nothing was hidden.
+        clip_box: ClipBox, ClipBoxRule, "BOUNDS";
+        /// Hides what lies beyond a plane, on the side to which its normal points.
+        clip_plane: ClipPlane, ClipPlaneRule, "X,Y,Z,NX,NY,NZ";
+    }
+}
+
+settings! {
+    /// The reduction and completion of points before they become a surface.
+    pub struct PreparationSettings {
+        /// Keeps fewer points: first:N, random:N, stride:S or spacing:LENGTH.
+        subsample: Subsample, SubsampleRule, "CHOICE";
+        /// Search for neighbours: knn, grid or scan-line.
+        neighbors: NeighborMethod = NeighborMethod::default(), parsed(method_name), "METHOD";
+        /// Number of neighbours that a normal is estimated from [default: 16].
+        normals_k: u32, count(2, 10_000), "K";
+        /// Estimates normals from all neighbours within this distance in world units.
+        normals_radius: f64, POSITIVE, "LENGTH";
+        /// Front side of the surface: none, up, mst or viewpoint:X,Y,Z.
+        orient: Orientation = Orientation::default(), parsed(orientation_text), "RULE";
+        /// Radius of each point's surface: a length, adaptive[:K] or median[:N] [default: that of the file, or
+        /// adaptive:12].
+        radius: Radius, RadiusRule, "RADIUS";
+        /// Takes the vertices of meshes as points.
+        vertices: bool = false, Flag, "BOOL";
+        /// Columns of a text file, as in x,y,z,-,r,g,b [default: found from the file].
+        columns: String, Text, "NAMES";
+        /// Plays the animation of this name of glTF files that have any [default: the first].
+        animation_name: String, Text, "NAME";
+    }
+}
+
+settings! {
+    /// Colours of points.
+    pub struct ColorSettings {
+        /// Colour: rgb, intensity, elevation, class, normal, the name of a column, #RRGGBB or a CSS colour name
+        /// [default: chosen from the data].
+        color: ColorSource, ColorSourceRule, "SOURCE";
+        /// Colour map by its matplotlib name: viridis, turbo, gray, coolwarm_r ...
+        /// [default: gray for intensity, viridis for everything else].
+        cmap: Colormap, ColormapRule, "NAME";
+        /// Values of the first and last colour of the map [default: the 2nd and 98th percentile].
+        range: (f64, f64), Interval, "LOW,HIGH";
+    }
+}
+
+/// Settings of an object that take the place of the scene's.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ObjectSettings {
+    /// Shape of points, and the part that is shown.
+    pub surface: SurfaceSettings,
+    /// Preparation of points.
+    pub preparation: PreparationSettings,
+    /// Colours of points.
+    pub color: ColorSettings,
+}
+
+impl ObjectSettings {
+    /// Returns the settings as parts with their keys.
+    pub fn parts(&self) -> [Part<&dyn KeyedSettings>; 3] {
+        [
+            Part { heading: "Surface", prefix: "", settings: &self.surface },
+            Part { heading: "Preparation", prefix: "", settings: &self.preparation },
+            Part { heading: "Colour", prefix: "", settings: &self.color },
+        ]
+    }
+
+    /// Returns these settings, and those of `base` where they leave something open.
+    #[must_use]
+    pub fn over(&self, base: &Self) -> Self {
+        let mut merged = base.clone();
+        let own = &self.preparation;
+        if own.normals_k.is_some() || own.normals_radius.is_some() {
+            (merged.preparation.normals_k, merged.preparation.normals_radius) = (None, None);
+        }
+        merged.surface.overlay(&self.surface);
+        merged.preparation.overlay(&self.preparation);
+        merged.color.overlay(&self.color);
+        merged
+    }
+
+    /// Returns the preparation of the library. `seed` decides what a random subsample keeps.
+    pub fn preparation(&self, seed: u64) -> Preparation {
+        let default = Preparation::default();
+        let settings = &self.preparation;
+        let within = settings.normals_radius.map(|radius| Neighborhood::Within(radius as f32));
+        let nearest = settings.normals_k.map(|k| Neighborhood::Nearest(k as usize));
+        Preparation {
+            subsample: settings.subsample,
+            neighbors: settings.neighbors(),
+            normals: within.or(nearest).unwrap_or(default.normals),
+            orientation: settings.orient(),
+            radius: settings.radius.unwrap_or(default.radius),
+            // A colour may ask for a column that only the preparation computes.
+            keep_variation: matches!(&self.color.color, Some(ColorSource::Column(name)) if name == SURFACE_VARIATION),
+            seed,
+        }
+    }
+
+    /// Returns the colouring of the library; elevations count along `up`.
+    pub fn coloring(&self, up: Vec3) -> Coloring {
+        let ColorSettings { color, cmap, range } = self.color.clone();
+        Coloring { source: color, colormap: cmap, range, up }
+    }
+
+    /// Returns the columns that a picture with these settings needs.
+    pub fn columns(&self) -> ColumnChoice {
+        let mut columns = self.preparation.kept_columns();
+        match &self.color.color {
+            None => columns.extend([Column::Colors, Column::Intensity]),
+            Some(ColorSource::Rgb) => columns.push(Column::Colors),
+            Some(ColorSource::Intensity) => columns.push(Column::Intensity),
+            Some(ColorSource::Class) => columns.push(Column::Classification),
+            Some(ColorSource::Column(name)) => columns.push(Column::Scalar(name.clone())),
+            Some(ColorSource::Elevation | ColorSource::Normal | ColorSource::Constant(_)) => {}
+        }
+        ColumnChoice::Only(columns)
+    }
+}
+
+impl SurfaceSettings {
+    /// Returns the part of the scene that is shown.
+    pub fn clip(&self) -> Clip {
+        Clip { bounds: self.clip_box, plane: self.clip_plane }
+    }
+}
+
+impl PreparationSettings {
+    /// Returns options of a reader that keeps these columns.
+    pub fn load_options(&self, columns: ColumnChoice) -> LoadOptions {
+        let text_columns = self.columns.as_deref().map(TextColumn::parse_list);
+        let animation = self.animation_name.clone();
+        LoadOptions { columns, text_columns, animation, ..LoadOptions::default() }
+    }
+
+    /// Returns true if the settings say how normals are estimated.
+    pub fn estimates_normals(&self) -> bool {
+        self.normals_k.is_some() || self.normals_radius.is_some()
+    }
+
+    /// Returns true if normals point out of what the points enclose.
+    pub fn orients_outward(&self) -> bool {
+        self.orient() == Orientation::SpanningTree
+    }
+
+    /// Returns the columns of a surface that are not to be estimated.
+    pub fn kept_columns(&self) -> Vec<Column> {
+        let normals = (!self.estimates_normals()).then_some(Column::Normals);
+        let radii = self.radius.is_none().then_some(Column::Radii);
+        normals.into_iter().chain(radii).collect()
+    }
+
+    /// Drops the normals and radii that are to be estimated.
+    pub fn drop_estimated(&self, cloud: &mut surfel_core::points::PointCloud) {
+        if self.estimates_normals() {
+            cloud.normals = None;
+        }
+        if self.radius.is_some() {
+            cloud.radii = None;
+        }
+    }
+}
+
+/// A subsample of at least one point; the library itself also takes 0.
+struct SubsampleRule;
+
+impl Rule<Subsample> for SubsampleRule {
+    fn read(&self, value: &Value, folder: &Path) -> Result<Subsample, Invalid> {
+        match parsed(Subsample::to_string).read(value, folder)? {
+            Subsample::First(0) | Subsample::Random(0) => {
+                Err(Invalid::new("expected at least one point"))
+            }
+            choice => Ok(choice),
+        }
+    }
+
+    fn write(&self, value: &Subsample) -> Value {
+        Value::String(value.to_string())
+    }
+}
+
+/// A length, which may be a number, or a rule.
+struct RadiusRule;
+
+const LENGTH: Checked = Checked { expected: "a positive length", ..POSITIVE };
+
+impl Rule<Radius> for RadiusRule {
+    fn read(&self, value: &Value, folder: &Path) -> Result<Radius, Invalid> {
+        if value.is_number() {
+            LENGTH.read(value, folder)?;
+        }
+        parsed(radius_text).read(value, folder)
+    }
+
+    fn write(&self, value: &Radius) -> Value {
+        match value {
+            // The shortest digits of the f32, not those of the f64 that it becomes.
+            Radius::Fixed(length) => {
+                serde_json::json!(length.to_string().parse::<f64>().unwrap_or(0.0))
+            }
+            other => Value::String(radius_text(other)),
+        }
+    }
+}
+
+fn radius_text(radius: &Radius) -> String {
+    match radius {
+        Radius::Fixed(length) => length.to_string(),
+        Radius::Median { n, .. } => format!("median:{n}"),
+        Radius::Adaptive { k } => format!("adaptive:{k}"),
+    }
+}
+
+fn method_name(method: &NeighborMethod) -> String {
+    match method {
+        NeighborMethod::Grid => "grid".into(),
+        NeighborMethod::ScanLine => "scan-line".into(),
+        NeighborMethod::Knn => "knn".into(),
+    }
+}
+
+fn orientation_text(orientation: &Orientation) -> String {
+    match orientation {
+        Orientation::None => "none".into(),
+        Orientation::Up => "up".into(),
+        Orientation::SpanningTree => "mst".into(),
+        Orientation::Viewpoint(point) => format!("viewpoint:{},{},{}", point.x, point.y, point.z),
+    }
+}

@@ -1,0 +1,188 @@
+//! The picture: its size, quality and background, and the instant that it shows.
+
+use super::Invalid;
+use super::keys::settings;
+use super::rule::{
+    BackgroundRule, Checked, OneOf, Resolution, as_number, count, default_background, number,
+};
+use super::rule::{POSITIVE, Rule};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use surfel_core::scene::Background;
+use surfel_formats::BitDepth;
+
+settings! {
+    /// Size, quality and background of a picture.
+    pub struct PictureSettings {
+        /// Width and height in pixels.
+        resolution: (u32, u32) = (1920, 1080), Resolution, "WxH";
+        /// Camera rays per pixel.
+        spp: u32 = 4, count(1, 65_536), "N";
+        /// Rays per pixel toward the sky or environment, and toward each light with soft shadows.
+        light_samples: u32 = 16, count(1, 65_536), "N";
+        /// Maximum number of reflections and refractions of a ray.
+        max_depth: u32 = 8, count(0, 64), "N";
+        /// Background: a colour, two colours (top, bottom), gradient, transparent, or environment (the sky or
+        /// environment map that lights the scene).
+        background: Background = default_background(), BackgroundRule, "COLOR";
+        /// Seed of the random numbers; another seed gives other noise.
+        seed: u64 = 0, count(0, u64::MAX), "N";
+        /// Bits per channel of a PNG.
+        bit_depth: BitDepth = BitDepth::Eight, BIT_DEPTH, "BITS";
+    }
+}
+
+/// A number of bits, also as text.
+struct BitDepthRule;
+const BIT_DEPTH: BitDepthRule = BitDepthRule;
+
+impl Rule<BitDepth> for BitDepthRule {
+    fn read(&self, value: &Value, _: &Path) -> Result<BitDepth, Invalid> {
+        match as_number(value) {
+            Some(8.0) => Ok(BitDepth::Eight),
+            Some(16.0) => Ok(BitDepth::Sixteen),
+            _ => Err(Invalid::new("expected 8 or 16")),
+        }
+    }
+
+    fn write(&self, value: &BitDepth) -> Value {
+        json!(if *value == BitDepth::Sixteen { 16 } else { 8 })
+    }
+}
+
+settings! {
+    /// File of the picture or movie, and the time that it shows.
+    pub struct OutputSettings {
+        /// File of the picture (.png, .exr) or movie, from the folder where the program runs.
+        output: PathBuf, OutputPath, "PATH";
+        /// Second of the animation that a picture shows.
+        time: f64 = 0.0, number(0.0, 1e6), "SECONDS";
+        /// Number of frames of a movie [default: as many as the animation lasts].
+        frames: u32, count(1, 1_000_000), "N";
+        /// Frames per second of a movie.
+        fps: f64 = 25.0, number(1.0, 240.0), "N";
+        /// Turns everything in front of the camera once in this many seconds, under lights that stay.
+        turntable: f64, POSITIVE, "SECONDS";
+    }
+}
+
+/// A path that starts where the program runs, not where the scene file lies.
+struct OutputPath;
+
+impl Rule<PathBuf> for OutputPath {
+    fn read(&self, value: &Value, _: &Path) -> Result<PathBuf, Invalid> {
+        let name = value.as_str().filter(|name| !name.is_empty());
+        name.map(PathBuf::from).ok_or_else(|| Invalid::new("expected the name of a file"))
+    }
+
+    fn write(&self, value: &PathBuf) -> Value {
+        json!(value.display().to_string())
+    }
+}
+
+/// The processor or device that does the work.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Backend {
+    /// The fastest that this build and this machine have.
+    #[default]
+    Auto,
+    /// All cores of the processor.
+    Cpu,
+    /// A graphics processor.
+    Gpu,
+}
+
+settings! {
+    /// The machine's resources that the work may take.
+    pub struct RunSettings {
+        /// Number of threads [default: one for each core].
+        threads: u32, count(1, 1024), "N";
+        /// Refuse work that needs more memory than this, as in 8G.
+        memory_limit: u64, MemorySize, "SIZE";
+        /// Device that does the work: auto, cpu or gpu.
+        backend: Backend = Backend::Auto,
+            OneOf(&[("auto", Backend::Auto), ("cpu", Backend::Cpu), ("gpu", Backend::Gpu)]), "NAME";
+    }
+}
+
+/// Bytes: a number with K, M, G or T of 1024 each, or without.
+struct MemorySize;
+
+impl Rule<u64> for MemorySize {
+    fn read(&self, value: &Value, _: &Path) -> Result<u64, Invalid> {
+        let text = match value {
+            Value::String(text) => text.to_uppercase(),
+            other => other.to_string(),
+        };
+        let short = text.trim_end_matches('B').trim_end_matches('I');
+        let (number, power) = match short.char_indices().last() {
+            Some((last, unit)) => match "KMGT".find(unit) {
+                Some(power) => (&short[..last], power + 1),
+                None => (short, 0),
+            },
+            None => (short, 0),
+        };
+        let number: Option<f64> = number.trim().parse().ok();
+        let bytes = number.map(|number| number * 1024f64.powi(power as i32));
+        match bytes {
+            Some(bytes) if 1.0 <= bytes && bytes.is_finite() => Ok(bytes as u64),
+            _ => Err(Invalid::new("expected a size as in 800M or 8G")),
+        }
+    }
+
+    fn write(&self, value: &u64) -> Value {
+        json!(value)
+    }
+}
+
+/// Exposure in stops, or the choice from the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Exposure {
+    /// Makes the brightest parts of the scene nearly white.
+    #[default]
+    Auto,
+    /// Multiplies all light by 2 to this power.
+    Stops(f64),
+}
+
+/// `auto` or stops.
+pub(super) struct ExposureRule;
+
+impl Rule<Exposure> for ExposureRule {
+    fn read(&self, value: &Value, folder: &Path) -> Result<Exposure, Invalid> {
+        if value.as_str() == Some("auto") {
+            return Ok(Exposure::Auto);
+        }
+        let stops = number(-20.0, 20.0).read(value, folder);
+        stops
+            .map(Exposure::Stops)
+            .map_err(|_| Invalid::new("expected auto or a number from -20 to 20"))
+    }
+
+    fn write(&self, value: &Exposure) -> Value {
+        match value {
+            Exposure::Auto => json!("auto"),
+            Exposure::Stops(stops) => json!(stops),
+        }
+    }
+}
+
+/// A number from 0 to 1000 that multiplies light.
+pub(super) const GAIN: Checked =
+    Checked { allows: |x| (0.0..=1000.0).contains(&x), expected: "a number from 0 to 1000" };
+
+#[cfg(test)]
+mod tests {
+    //! Sizes of memory in all spellings.
+
+    use super::*;
+
+    #[test]
+    fn memory_sizes_take_binary_units() {
+        let read = |text: &str| MemorySize.read(&json!(text), Path::new("")).ok();
+        assert_eq!((read("8G"), read("1.5KiB"), read("70")), (Some(8 << 30), Some(1536), Some(70)));
+        for text in ["", "G", "-1G", "NaN", "1e400", "8 potatoes"] {
+            assert_eq!(read(text), None, "{text}");
+        }
+    }
+}

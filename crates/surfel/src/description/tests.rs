@@ -1,0 +1,203 @@
+//! Descriptions from tables: layers, patches, paths of errors, and that what is written reads back equal.
+
+use super::*;
+use serde_json::json;
+use surfel_core::surface::SurfaceKind;
+
+fn parse(text: &str) -> Result<SceneDescription, Invalid> {
+    SceneDescription::parse(text, false, Path::new("/data"))
+}
+
+fn error(text: &str) -> String {
+    parse(text).unwrap_err().to_string()
+}
+
+const SCENE: &str = r##"
+resolution = "720x405"
+background = "#4f7fb8,white"
+material = ["matte", "ball=glass:ior=1.33"]
+cmap = "viridis_r"
+camera-position = [1, 2, 3.5]
+
+[camera]
+focal-point = "4,5,6"
+orthographic = true
+
+[sun]
+azimuth = 190
+
+[[object]]
+file = "ball.ply"
+name = "ball"
+orient = "mst"
+radius = 0.25
+material = { kind = "glass", attenuation-color = "#bfe8d8", attenuation-distance = 2 }
+translate = [562333.6, 4183200.4, 149.62]
+rotate = { axis = [0, 0, 1], angle = 30 }
+scale = 1.6
+instances = [{ translate = [1, 0, 0] }, { rotate = [0, 0, 90], scale = [1, 2, 3] }]
+
+[[lamp]]
+position = [0, 0, 5]
+color = "orange"
+
+[[animation]]
+object = "ball"
+times = [0, 1.5]
+rotate = [[0, 0, 0], { axis = [0, 1, 0], angle = 45 }]
+
+[[animation]]
+object = "camera"
+kind = "orbit"
+seconds = 6
+"##;
+
+#[test]
+fn keys_are_read_in_all_spellings() {
+    let scene = parse(SCENE).unwrap();
+    assert_eq!(scene.picture.resolution, Some((720, 405)));
+    assert_eq!(scene.camera.position.map(|p| p.to_array()), Some([1.0, 2.0, 3.5]));
+    assert_eq!(scene.camera.focal_point.map(|p| p.to_array()), Some([4.0, 5.0, 6.0]));
+    assert_eq!(scene.camera.orthographic, Some(OrthographicHeight::Fit));
+    assert_eq!((scene.sun.azimuth, scene.sun.elevation()), (Some(190.0), 40.0));
+    assert_eq!(scene.objects[0].files, [Path::new("/data/ball.ply")]);
+    assert_eq!(scene.objects[0].instances.len(), 2);
+    assert_eq!(scene.lamps[0].name.as_deref(), Some("lamp 1"));
+    assert_eq!(scene.materials.len(), 2);
+}
+
+#[test]
+fn a_written_description_reads_back_equal() {
+    let scene = parse(SCENE).unwrap();
+    let table = scene.to_table();
+    assert_eq!(SceneDescription::from_table(&table, Path::new("")).unwrap(), scene);
+    let json = serde_json::to_string(&scene).unwrap();
+    assert_eq!(serde_json::from_str::<SceneDescription>(&json).unwrap(), scene);
+    let toml = toml::to_string(&scene).unwrap();
+    assert_eq!(SceneDescription::parse(&toml, false, Path::new("")).unwrap(), scene);
+}
+
+#[test]
+fn the_empty_description_writes_nothing() {
+    assert!(SceneDescription::default().to_table().is_empty());
+    assert!(SceneDescription::default().non_default().is_empty());
+}
+
+#[test]
+fn keys_that_repeat_their_default_are_not_listed() {
+    let scene = parse("spp = 4\nsurface = \"disc\"\n[sun]\nelevation = 41").unwrap();
+    let listed = scene.non_default();
+    assert_eq!(listed, [("surface".into(), json!("disc")), ("sun.elevation".into(), json!(41.0))]);
+}
+
+#[test]
+fn an_overlay_overrides_keys_and_unsets_excluded_ones() {
+    let mut scene =
+        parse("spp = 9\nnormals-k = 12\n[camera]\ndirection = [0, 0, -1]\nposition = [1, 2, 3]")
+            .unwrap();
+    scene.overlay(
+        parse("normals-radius = 0.5\n[camera]\nelevation-angle = 20\nzoom-factor = 2").unwrap(),
+    );
+    assert_eq!(scene.picture.spp(), 9);
+    assert_eq!((scene.camera.direction, scene.camera.position), (None, None));
+    let preparation = &scene.objects_default.preparation;
+    assert_eq!((preparation.normals_k, preparation.normals_radius), (None, Some(0.5)));
+}
+
+#[test]
+fn settings_of_an_object_override_those_of_the_scene() {
+    let scene = parse("surface = \"sphere\"\nnormals-k = 12\n[[object]]\nfile = \"a.ply\"\nsurface = \"disc\"\nnormals-radius = 1").unwrap();
+    let own = scene.objects[0].settings.over(&scene.objects_default);
+    assert_eq!(own.surface.surface(), SurfaceKind::Disc);
+    assert_eq!((own.preparation.normals_k, own.preparation.normals_radius), (None, Some(1.0)));
+}
+
+#[test]
+fn a_patch_sets_and_unsets_and_changes_nothing_when_it_fails() {
+    let mut scene = parse("spp = 9\nsurface = \"disc\"").unwrap();
+    let patch = json!({ "spp": null, "surface": "sphere", "sun": { "azimuth": 12 } });
+    scene.merge(patch.as_object().unwrap()).unwrap();
+    assert_eq!((scene.picture.spp, scene.sun.azimuth), (None, Some(12.0)));
+    let before = scene.clone();
+    let wrong = json!({ "spp": 3, "sun.elevation": "high" });
+    let error = scene.merge(wrong.as_object().unwrap()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "sun.elevation: found \"high\", expected a number from -90 to 90"
+    );
+    assert_eq!(scene, before);
+}
+
+#[test]
+fn errors_name_the_path_what_was_found_and_what_was_expected() {
+    assert_eq!(
+        error("[[object]]\nfile = \"a\"\n[[object]]\nfile = \"b\"\nmaterial = { ior = 9 }"),
+        "object[1].material.ior: found 9, expected a number from 1 to 4"
+    );
+    assert_eq!(
+        error("[camera]\nfocal-pont = [1, 2, 3]"),
+        "camera.focal-pont: unknown key; the nearest known one is `camera.focal_point`"
+    );
+    assert_eq!(
+        error("[[object]]\nfile = \"a\"\ntranslat = [1, 2, 3]"),
+        "object[0].translat: unknown key; the nearest known one is `translate`"
+    );
+    assert_eq!(
+        error("[[object]]\nfile = \"a\"\ninstances = [{}, { scale = 0 }]"),
+        "object[0].instances[1].scale: the object would be flat, empty or infinite"
+    );
+    assert_eq!(
+        error("surface = \"splatt\""),
+        "surface: found \"splatt\", expected one of points, sphere, disc, splat-mean, splat, splat-fit; the nearest known one is `splat`"
+    );
+    assert_eq!(error("spp = 0"), "spp: found 0, expected a whole number from 1 to 65536");
+    assert_eq!(error("spp = nan"), "spp: found nan or inf, expected a number");
+    assert_eq!(
+        error("[[object]]\nfile = \"a\"\ntranslate = [1, 2, inf]"),
+        "object[0].translate[2]: found nan or inf, expected a number"
+    );
+    assert_eq!(
+        error("[[object]]\nfile = \"a\"\nmaterial = { kind = \"glass\", iro = 1.3 }"),
+        "object[0].material.iro: unknown key; the nearest known one is `ior`"
+    );
+    assert_eq!(
+        error("spp = "),
+        "line 1, column 7: string values must be quoted, expected literal string"
+    );
+    assert_eq!(
+        error("[camera]\npanorama = true\nview-angle = 30"),
+        "camera.panorama: excludes camera.view_angle; leave out one of them"
+    );
+    assert_eq!(
+        error("[[object]]\nname = \"x\""),
+        "object[0].file: expected `file = \"name\"`, or `files` with several names or a `*`"
+    );
+    assert_eq!(
+        error(
+            "[[animation]]\nobject = \"bal\"\nkind = \"orbit\"\nseconds = 1\n[[object]]\nfile = \"ball.ply\""
+        ),
+        "animation[0].object: no object `bal`; the nearest known one is `ball`"
+    );
+    assert_eq!(
+        error("[[animation]]\nobject = \"camera\"\nkind = \"orbit\""),
+        "animation[0].seconds: is missing; expected a duration"
+    );
+    assert_eq!(
+        error("[[lamp]]\nkind = \"spot\""),
+        "lamp[0].position: is missing; expected [x, y, z]"
+    );
+}
+
+#[test]
+fn every_key_has_a_unique_option_and_a_sentence_of_help() {
+    let scene = SceneDescription::default();
+    let mut options: Vec<String> =
+        SceneDescription::paths().iter().map(|path| option_name(path)).collect();
+    let n_options = options.len();
+    options.sort();
+    options.dedup();
+    assert_eq!(options.len(), n_options);
+    for key in scene.parts().iter().flat_map(|part| part.settings.keys()) {
+        assert!(key.doc.ends_with(['.', ']']) && 10 < key.doc.len(), "{}: {}", key.name, key.doc);
+    }
+}

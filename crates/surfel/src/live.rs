@@ -1,0 +1,279 @@
+//! A scene whose settings change: after a change only what it touches is made again.
+
+use crate::built::{exposure_stops, source_indices};
+use crate::cache::{Lru2, hash_of};
+use crate::description::{Exposure, Invalid, LightKind, SceneDescription, write_parts};
+use crate::error::{Error, Result};
+use crate::resolve::{
+    AutoSettings, KeepOptions, LoadedScene, expose, finish_graph, render_settings,
+};
+use serde_json::{Value, json};
+use std::sync::Arc;
+use surfel_core::flat::FlatScene;
+use surfel_core::image::Image;
+use surfel_core::math::{Aabb, DVec3, Vec3};
+use surfel_core::points::PreparedCloud;
+use surfel_core::progress::Progress;
+use surfel_core::render::{self, CpuRenderer, Renderer, Settings};
+use surfel_core::scene::color::{Legend, legend};
+use surfel_core::scene::{Background, Camera, Geometry, Graph, Projection, Scene, inlier_bounds};
+use surfel_core::surface::SurfaceKind;
+use surfel_core::trace::Simd;
+
+/// A loaded scene that is shown under one description after another. Threads share it.
+#[derive(Debug)]
+pub struct LiveScene {
+    loaded: LoadedScene,
+    prepared: Lru2<Vec<PreparedCloud>>,
+    trees: Lru2<SceneTrees>,
+    renderer: CpuRenderer,
+    /// Threads beside those that draw: preparation for one viewer must not hold up another's picture.
+    pool: rayon::ThreadPool,
+}
+
+/// Trees over the points of a scene, and what shows which point is which.
+#[derive(Debug)]
+pub struct SceneTrees {
+    /// The graph without the points.
+    pub graph: Graph,
+    /// The flat scene without lights.
+    pub flat: FlatScene,
+    /// For each geometry, the index that each point had when it was read; empty for triangles.
+    pub source_indices: Vec<Vec<u32>>,
+    /// The meaning of the colours of the first cloud.
+    pub legend: Legend,
+}
+
+/// A scene under one description, at one time.
+#[derive(Clone, Debug)]
+pub struct LiveView {
+    /// The arrays that rays are traced against, with camera and exposed lights.
+    pub flat: FlatScene,
+    /// Size and quality of pictures.
+    pub settings: Settings,
+    /// The complete description, with everything that was chosen and the exposure.
+    pub description: SceneDescription,
+    /// True if the scene moves the camera.
+    pub moves_camera: bool,
+    /// The trees, which several views share.
+    pub trees: Arc<SceneTrees>,
+}
+
+impl LiveScene {
+    /// Reads the files of a description. All later descriptions have the same files, objects, lamps and animations.
+    ///
+    /// # Errors
+    ///
+    /// Fails as reading does, and if threads cannot be started.
+    pub fn open(description: &SceneDescription, progress: &dyn Progress) -> Result<Self> {
+        let keep = KeepOptions { all_columns: true, source_indices: true };
+        let loaded = LoadedScene::read(description, keep, progress)?;
+        let pool =
+            rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).build();
+        let advice = "the threads cannot be started; ask for fewer with --threads";
+        let pool = pool.map_err(|error| Error::Unfit(format!("{advice}: {error}")))?;
+        Ok(Self {
+            loaded,
+            prepared: Lru2::default(),
+            trees: Lru2::default(),
+            renderer: CpuRenderer { simd: Simd::detect() },
+            pool,
+        })
+    }
+
+    /// Returns the content of the files.
+    pub fn loaded(&self) -> &LoadedScene {
+        &self.loaded
+    }
+
+    /// Returns the SIMD level of the kernels.
+    pub fn simd(&self) -> Simd {
+        self.renderer.simd
+    }
+
+    /// Returns the scene under a description at the description's time.
+    ///
+    /// # Errors
+    ///
+    /// Fails for settings that do not fit the data, and if cancelled.
+    pub fn view(
+        &self,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<LiveView> {
+        let auto = AutoSettings::choose(&self.loaded, description, progress)?;
+        let settings = Settings { with_aovs: false, ..render_settings(description) };
+        let time_secs = description.output.time();
+        let exposure = description.light.exposure();
+        // An automatic exposure is chosen at second 0, as for a movie. Otherwise the first file of a sequence is not read.
+        let metered_at = if exposure == Exposure::Auto { 0.0 } else { time_secs };
+        let (_, metered) = self.flat_at(metered_at, description, &auto, progress)?;
+        let stops = self
+            .pool
+            .install(|| exposure_stops(exposure, &self.renderer, &metered, &settings, progress))?;
+        let (trees, mut flat) = self.flat_at(time_secs, description, &auto, progress)?;
+        expose(&mut flat, stops);
+        let mut complete = auto.complete_description(&self.loaded);
+        complete.light.exposure = Some(Exposure::Stops(stops.into()));
+        let moves_camera = auto.moves_camera(&self.loaded);
+        Ok(LiveView { flat, settings, description: complete, moves_camera, trees })
+    }
+
+    /// Renders a view on the threads of the preparation.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the settings make no picture, and if cancelled.
+    pub fn render(&self, view: &LiveView, progress: &dyn Progress) -> Result<Image> {
+        let rendered = || self.renderer.render(&view.flat, &view.settings, progress);
+        Ok(self.pool.install(rendered)?.0)
+    }
+
+    fn flat_at(
+        &self,
+        time_secs: f64,
+        description: &SceneDescription,
+        auto: &AutoSettings,
+        progress: &dyn Progress,
+    ) -> Result<(Arc<SceneTrees>, FlatScene)> {
+        let trees = self.trees_at(time_secs, description, auto.up, progress)?;
+        let mut flat = trees.flat.clone();
+        flat.lights.clone_from(&auto.lights);
+        flat.background = description.picture.background();
+        // What would fail while it is drawn is refused as a whole.
+        render::check(&flat)?;
+        if trees.graph.animation.channels.is_empty() {
+            flat.camera = auto.camera.at(time_secs, &trees.graph);
+        } else {
+            let mut graph = trees.graph.clone();
+            graph.evaluate_at(time_secs);
+            flat.update(&graph, progress)?;
+            flat.camera = auto.camera.at(time_secs, &graph);
+        }
+        Ok((trees, flat))
+    }
+
+    /// Everything but lights and camera, which change without any tree.
+    fn trees_at(
+        &self,
+        time_secs: f64,
+        description: &SceneDescription,
+        up: Vec3,
+        progress: &dyn Progress,
+    ) -> Result<Arc<SceneTrees>> {
+        let preparation = preparation_key(description);
+        let frames = self.loaded.sequence_frames_at(time_secs);
+        let trees = tree_key(description, preparation, up, &frames);
+        self.trees.get_or_make(trees, progress, || {
+            let clouds = self.prepared.get_or_make(preparation, progress, || {
+                self.pool.install(|| self.loaded.prepared(description, progress))
+            })?;
+            self.pool.install(|| self.build(time_secs, description, &clouds, up, progress))
+        })
+    }
+
+    fn build(
+        &self,
+        time_secs: f64,
+        description: &SceneDescription,
+        clouds: &[PreparedCloud],
+        up: Vec3,
+        progress: &dyn Progress,
+    ) -> Result<SceneTrees> {
+        let coloring = description.objects_default.coloring(up);
+        let first = clouds.first().map(|cloud| legend(cloud, &coloring));
+        let legend = first.and_then(|legend| legend.ok()).unwrap_or(Legend::None);
+        let raw = self.loaded.graph_without_points();
+        let (mut graph, mut sequences) =
+            finish_graph(&self.loaded, raw, clouds.to_vec(), description, up, progress)?;
+        for sequence in &mut sequences {
+            sequence.seek(time_secs, &mut graph, up, progress)?;
+        }
+        let source_indices = source_indices(&graph);
+        let (lights, background) = (Vec::new(), Background::Transparent);
+        let scene = Scene { graph, lights, background, camera: PLACEHOLDER_CAMERA };
+        check_overlap(&scene.graph)?;
+        let flat = FlatScene::new(&scene, progress)?;
+        progress.end();
+        let mut graph = scene.graph;
+        graph.release_static();
+        Ok(SceneTrees { graph, flat, source_indices, legend })
+    }
+}
+
+/// A camera for trees that nobody looks at yet.
+const PLACEHOLDER_CAMERA: Camera = Camera {
+    position: DVec3::ZERO,
+    focal_point: DVec3::Y,
+    view_up: DVec3::Z,
+    projection: Projection::Panorama,
+};
+
+/// A hash of everything that decides how clouds are prepared.
+fn preparation_key(description: &SceneDescription) -> u64 {
+    let settings = &description.objects_default;
+    let keeps_variation = settings.preparation(0).keep_variation;
+    let [_, preparation, _] = settings.parts();
+    let parts = json!([
+        write_parts(&[preparation]),
+        description.picture.seed(),
+        keeps_variation,
+        object_settings(description),
+    ]);
+    hash_of(&parts)
+}
+
+/// A hash of everything that decides what the trees hold.
+fn tree_key(description: &SceneDescription, preparation: u64, up: Vec3, frames: &[usize]) -> u64 {
+    let light = &description.light;
+    let is_lit = !light.has(LightKind::None) || light.environment.is_some();
+    let parts = json!([
+        preparation,
+        write_parts(&description.objects_default.parts()),
+        description.get("material"),
+        is_lit,
+        up.to_array(),
+        frames,
+    ]);
+    hash_of(&parts)
+}
+
+fn object_settings(description: &SceneDescription) -> Vec<Value> {
+    let settings = description.objects.iter().map(|object| &object.settings);
+    settings.map(|settings| Value::Object(write_parts(&settings.parts()))).collect()
+}
+
+/// Maximum number of discs of points over each other, on average.
+const MAX_OVERLAP: f32 = 200.0;
+
+/// Fails for points so large that each ray meets thousands of them: other viewers would wait for this one's pictures,
+/// and nothing could be seen on them.
+fn check_overlap(graph: &Graph) -> Result<()> {
+    for geometry in &graph.geometries {
+        let Geometry::Points(points) = geometry else { continue };
+        // Pixels are drawn, not traced.
+        if points.surface == SurfaceKind::Points {
+            continue;
+        }
+        let overlap = mean_overlap(points.cloud());
+        if MAX_OVERLAP < overlap {
+            let message = format!(
+                "found {overlap:.0} points over each other, expected at most {MAX_OVERLAP}; \
+                 choose a smaller radius or radius_scale"
+            );
+            return Err(Invalid::at("radius_scale", message).into());
+        }
+    }
+    Ok(())
+}
+
+/// The number of discs over each other, about: their area as a fraction of that of a box around them.
+fn mean_overlap(cloud: &PreparedCloud) -> f32 {
+    let radii = cloud.radii();
+    let n = radii.len().max(1) as f64;
+    let sum = |power: i32| radii.iter().map(|radius| f64::from(*radius).powi(power)).sum::<f64>();
+    let Aabb { min, max } = inlier_bounds(cloud);
+    let size = (max - min).as_dvec3() + 2.0 * sum(1) / n;
+    let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+    (std::f64::consts::PI * sum(2) / area) as f32
+}

@@ -1,0 +1,60 @@
+//! Rendered pictures and the files that they are saved to.
+
+use crate::description::SceneDescription;
+use crate::error::Result;
+use std::ops::Deref;
+use std::path::Path;
+use surfel_core::image::Image;
+use surfel_core::math::DVec3;
+use surfel_core::scene::Background;
+use surfel_formats::{Alpha, ImageOptions};
+
+/// A rendered picture: linear colours and layers, and how they become a file.
+#[derive(Clone, Debug)]
+pub struct RenderedImage {
+    image: Image,
+    options: ImageOptions,
+}
+
+impl RenderedImage {
+    /// A picture that is saved as its description says.
+    pub(crate) fn new(image: Image, description: &SceneDescription, origin: DVec3) -> Self {
+        Self { image, options: image_options(description, origin) }
+    }
+
+    /// Writes the picture: PNG for `.png`, all layers for `.exr`. The file is replaced once it is complete.
+    ///
+    /// # Errors
+    ///
+    /// Fails for other extensions, and if the file cannot be written.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+        Ok(surfel_formats::save_image(path.as_ref(), &self.image, &self.options)?)
+    }
+
+    /// Returns the bytes of a PNG.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the picture is too large for the format.
+    pub fn png_bytes(&self) -> Result<Vec<u8>> {
+        Ok(surfel_formats::encode_png(&self.image, &self.options)?)
+    }
+}
+
+impl Deref for RenderedImage {
+    type Target = Image;
+
+    fn deref(&self) -> &Image {
+        &self.image
+    }
+}
+
+/// Returns how a description's pictures become files; `origin` is the zero of their positions.
+pub fn image_options(description: &SceneDescription, origin: DVec3) -> ImageOptions {
+    let is_opaque = description.picture.background() != Background::Transparent;
+    ImageOptions {
+        depth: description.picture.bit_depth(),
+        alpha: if is_opaque { Alpha::Drop } else { Alpha::Keep },
+        origin,
+    }
+}

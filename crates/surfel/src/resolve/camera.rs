@@ -1,0 +1,244 @@
+//! The camera: as the description says, of a file, or chosen so that the whole scene is seen.
+
+use crate::description::{
+    CameraMotion, CameraSettings, Invalid, OrthographicHeight, SceneDescription,
+};
+use surfel_core::math::{Aabb, DVec3, Vec3};
+use surfel_core::points::{PointCloud, infer_up};
+use surfel_core::progress::Progress;
+use surfel_core::scene::{
+    Camera, CameraFit, Graph, Projection, default_view_up, fit_camera, panorama_camera,
+};
+use surfel_formats::FileInfo;
+
+/// A camera, and what moves it.
+#[derive(Clone, Debug)]
+pub struct SceneCamera {
+    /// The camera before it moves.
+    pub camera: Camera,
+    /// The node of a file that has the camera, if the camera goes along with it.
+    pub node: Option<usize>,
+    up: Vec3,
+    /// Middle of the scene.
+    middle: DVec3,
+    /// Field of view in place of that of a file's camera.
+    view_angle_deg: Option<f64>,
+    motion: Option<CameraMotion>,
+}
+
+/// Position and size of the scene, as a camera needs to know them.
+pub struct SceneExtent<'a> {
+    /// Points of the scene.
+    pub points: &'a PointCloud,
+    /// Bounds of all but stray points, relative to the points' origin.
+    pub bounds: Aabb,
+    /// The world's up.
+    pub up: Vec3,
+}
+
+impl SceneCamera {
+    /// The camera of the description; where it asks for none, the first of the files or one that sees everything.
+    pub fn choose<C: AsRef<PointCloud>>(
+        graph: &Graph<C>,
+        extent: &SceneExtent,
+        description: &SceneDescription,
+        motion: Option<CameraMotion>,
+        progress: &dyn Progress,
+    ) -> Self {
+        let SceneExtent { points, bounds, up } = *extent;
+        let settings = &description.camera;
+        let middle = points.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
+        let view_angle_deg = settings.view_angle;
+        let of_file = graph.camera().filter(|_| settings.is_automatic());
+        let camera = match of_file {
+            Some((node, camera)) => {
+                let name = &graph.nodes[node].name;
+                let line = format!("camera `{name}` of the file");
+                progress.choice(&line, &["camera.name", "camera.position"]);
+                adjusted_file_camera(camera, middle, view_angle_deg)
+            }
+            None => {
+                let (width, height) = description.picture.resolution();
+                let aspect = f64::from(width) / f64::from(height);
+                choose_camera(settings, points, up, aspect, progress)
+            }
+        };
+        let is_locked = settings.lock();
+        let node = of_file.map(|(node, _)| node).filter(|_| !is_locked);
+        let motion = motion.filter(|_| !is_locked);
+        Self { camera, node, up, middle, view_angle_deg, motion }
+    }
+
+    /// Returns true if the description moves the camera, whatever its node does.
+    pub fn has_motion(&self) -> bool {
+        self.motion.is_some()
+    }
+
+    /// Returns the camera at a time, at which `graph` is posed.
+    pub fn at<C: AsRef<PointCloud>>(&self, time_secs: f64, graph: &Graph<C>) -> Camera {
+        let of_file = graph.camera().filter(|_| self.node.is_some());
+        let camera = of_file.map_or(self.camera, |(_, camera)| {
+            adjusted_file_camera(camera, self.middle, self.view_angle_deg)
+        });
+        self.motion.as_ref().map_or(camera, |motion| motion.at(time_secs, camera, self.up))
+    }
+}
+
+/// A file's camera has a direction, but no distance of what it looks at, about which orbits go: as far as the middle of
+/// the scene, unless that is behind it.
+fn adjusted_file_camera(camera: Camera, middle: DVec3, view_angle_deg: Option<f64>) -> Camera {
+    let [.., forward] = camera.axes();
+    let depth = forward.dot(middle - camera.position);
+    let focal_point = camera.position + depth * forward;
+    let perspective =
+        view_angle_deg.map(|view_angle_deg| Projection::Perspective { view_angle_deg });
+    Camera {
+        focal_point: if 0.0 < depth { focal_point } else { camera.focal_point },
+        projection: perspective.unwrap_or(camera.projection),
+        ..camera
+    }
+}
+
+/// Leaves only the camera of this name in the graph.
+pub fn keep_named_camera<C: AsRef<PointCloud>>(
+    graph: &mut Graph<C>,
+    name: &str,
+) -> Result<(), Invalid> {
+    let is_visible = graph.visible_nodes();
+    let nodes = graph.nodes.iter().enumerate();
+    let cameras = nodes.filter(|(i, node)| node.camera.is_some() && is_visible[*i]);
+    let cameras: Vec<(usize, &str)> = cameras.map(|(i, node)| (i, node.name.as_str())).collect();
+    let Some((kept, _)) = cameras.iter().find(|(_, known)| *known == name) else {
+        let names: Vec<&str> = cameras.iter().map(|(_, name)| *name).collect();
+        let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        return Err(Invalid::at("camera.name", format!("no camera `{name}`; there is {known}")));
+    };
+    let kept = *kept;
+    let others = graph.nodes.iter_mut().enumerate().filter(|(i, _)| *i != kept);
+    others.for_each(|(_, node)| node.camera = None);
+    Ok(())
+}
+
+/// Returns the world's up: of the description, or found from the files and points.
+pub fn choose_up(
+    up: Option<Vec3>,
+    cloud: &PointCloud,
+    files: &[FileInfo],
+    progress: &dyn Progress,
+) -> Vec3 {
+    up.unwrap_or_else(|| {
+        if files.iter().all(|file| file.format.starts_with("glTF")) {
+            progress.choice("up is +Z, to which glTF files are rotated", &["up"]);
+            return Vec3::Z;
+        }
+        let inferred = infer_up(cloud, is_georeferenced(cloud, files));
+        progress.choice(&inferred.reason, &["up"]);
+        inferred.up
+    })
+}
+
+/// Returns true for survey formats and for coordinates far from zero, as those of national grids: they have Z up.
+pub fn is_georeferenced(cloud: &PointCloud, files: &[FileInfo]) -> bool {
+    let is_survey = |file: &FileInfo| {
+        let formats = ["LAS", "LAZ", "COPC", "E57"];
+        let is_survey_format = formats.iter().any(|name| file.format.starts_with(name));
+        is_survey_format || file.coordinate_system.is_some()
+    };
+    let size = cloud.bounds().max - cloud.bounds().min;
+    let is_far = 1e4 < cloud.origin.length() && f64::from(size.length()) < cloud.origin.length();
+    is_far || files.iter().any(is_survey)
+}
+
+/// Returns a camera from settings; what they leave open is chosen so that the whole cloud is seen.
+pub fn choose_camera(
+    settings: &CameraSettings,
+    cloud: &PointCloud,
+    up: Vec3,
+    aspect: f64,
+    progress: &dyn Progress,
+) -> Camera {
+    if settings.is_panorama() {
+        return panorama(settings, cloud, up, progress);
+    }
+    let fit = fit(settings, up, aspect);
+    if let Some(camera) = complete_camera(settings, &fit) {
+        return camera;
+    }
+    let fitted = fit_camera(cloud, &fit);
+    let focal_point = settings.focal_point.unwrap_or(fitted.focal_point);
+    let shifted = fitted.position + (focal_point - fitted.focal_point);
+    let position = settings.position.unwrap_or(shifted);
+    // A given position or focal point may look elsewhere than the fitted camera did.
+    let view_up = settings.view_up.unwrap_or_else(|| default_view_up(up, focal_point - position));
+    let projection = match settings.orthographic {
+        Some(OrthographicHeight::Fixed(height)) => Projection::Orthographic { height },
+        _ => fitted.projection,
+    };
+    if settings.position.is_none() {
+        let line = format!(
+            "camera at {} looks at {}",
+            short_position(position),
+            short_position(focal_point)
+        );
+        let keys = ["camera.position", "camera.focal_point", "camera.azimuth_angle"];
+        progress.choice(&line, &keys);
+    }
+    Camera { position, focal_point, view_up, projection }
+}
+
+/// The camera of settings that leave nothing open.
+fn complete_camera(settings: &CameraSettings, fit: &CameraFit) -> Option<Camera> {
+    let projection = match settings.orthographic {
+        Some(OrthographicHeight::Fixed(height)) => Projection::Orthographic { height },
+        Some(OrthographicHeight::Fit) => return None,
+        None => Projection::Perspective { view_angle_deg: fit.view_angle_deg },
+    };
+    Some(Camera {
+        position: settings.position?,
+        focal_point: settings.focal_point?,
+        view_up: settings.view_up?,
+        projection,
+    })
+}
+
+fn panorama(
+    settings: &CameraSettings,
+    cloud: &PointCloud,
+    up: Vec3,
+    progress: &dyn Progress,
+) -> Camera {
+    let found = panorama_camera(cloud, up, settings.azimuth_angle());
+    let position = settings.position.unwrap_or(found.position);
+    let ahead = position + (found.focal_point - found.position);
+    if settings.position.is_none() {
+        let line = format!("camera at {} looks all around", short_position(position));
+        progress.choice(&line, &["camera.position", "camera.azimuth_angle"]);
+    }
+    Camera {
+        position,
+        focal_point: settings.focal_point.unwrap_or(ahead),
+        view_up: settings.view_up.unwrap_or(found.view_up),
+        projection: found.projection,
+    }
+}
+
+fn fit(settings: &CameraSettings, up: Vec3, aspect: f64) -> CameraFit {
+    let automatic = CameraFit::default();
+    CameraFit {
+        up,
+        aspect,
+        is_orthographic: settings.orthographic.is_some(),
+        view_angle_deg: settings.view_angle.unwrap_or(automatic.view_angle_deg),
+        direction: settings.direction,
+        view_up: settings.view_up,
+        azimuth_deg: settings.azimuth_angle(),
+        elevation_deg: settings.elevation_angle,
+        zoom: settings.zoom_factor(),
+    }
+}
+
+/// Writes a position with few digits, for people.
+pub fn short_position(position: DVec3) -> String {
+    let digits = if 1000.0 < position.abs().max_element() { 1 } else { 4 };
+    position.to_array().map(|x| format!("{x:.digits$}")).join(",")
+}

@@ -1,0 +1,134 @@
+//! A cloud on its way from the file to a surface: read, prepared, coloured.
+
+use crate::choices::NotesAsChoices;
+use crate::description::ObjectSettings;
+use crate::error::Result;
+use std::path::Path;
+use surfel_core::math::Vec3;
+use surfel_core::points::neighbors::Neighborhood;
+use surfel_core::points::{PointCloud, PreparationReport, PreparedCloud, Radius, prepare};
+use surfel_core::progress::Progress;
+use surfel_core::scene::color::colorize;
+use surfel_core::scene::{CloudGeometry, Geometry, Graph, Material, Transform};
+use surfel_formats::{ColumnChoice, FileInfo, Loaded};
+
+/// Options of reading besides an object's settings.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ImportOptions {
+    /// Keeps all columns of clouds; otherwise only those that the picture needs.
+    pub keeps_all_columns: bool,
+    /// Decides what a random subsample keeps.
+    pub seed: u64,
+}
+
+/// Reads what a file holds.
+pub fn import(
+    file: &Path,
+    settings: &ObjectSettings,
+    options: &ImportOptions,
+    progress: &dyn Progress,
+) -> Result<(Graph<PointCloud>, FileInfo)> {
+    let columns = if options.keeps_all_columns { ColumnChoice::All } else { settings.columns() };
+    let load_options = settings.preparation.load_options(columns);
+    let loaded = if settings.preparation.vertices() {
+        let Loaded { cloud, info } = surfel_formats::load(file, &load_options, progress)?;
+        (graph_of(cloud), info)
+    } else {
+        surfel_formats::load_graph(file, &load_options, progress)?
+    };
+    progress.end();
+    Ok(loaded)
+}
+
+/// A graph of one cloud.
+pub fn graph_of(cloud: PointCloud) -> Graph<PointCloud> {
+    Graph::from_geometry(Geometry::Points(cloud), Material::MATTE)
+}
+
+/// Returns the cloud of a graph that holds nothing else, or the graph.
+pub fn into_cloud(
+    mut graph: Graph<PointCloud>,
+) -> std::result::Result<PointCloud, Box<Graph<PointCloud>>> {
+    let is_in_place = matches!(&graph.nodes[..], [node] if node.transform == Transform::IDENTITY);
+    let is_cloud = matches!(graph.geometries[..], [Geometry::Points(_)]);
+    if !is_cloud || !is_in_place {
+        return Err(Box::new(graph));
+    }
+    match graph.geometries.pop() {
+        Some(Geometry::Points(cloud)) => Ok(cloud),
+        _ => Err(Box::new(graph)),
+    }
+}
+
+/// Cleans a cloud, and adds the normals and radii that are missing.
+///
+/// # Errors
+///
+/// Fails for a cloud without points, and if cancelled.
+pub fn prepare_cloud(
+    cloud: PointCloud,
+    settings: &ObjectSettings,
+    seed: u64,
+    progress: &dyn Progress,
+) -> surfel_core::Result<PreparedCloud> {
+    let (cloud, report) = prepare(cloud, &settings.preparation(seed), progress)?;
+    progress.end();
+    report_prepared(&report, settings, progress);
+    Ok(cloud)
+}
+
+/// Gives a prepared cloud its surface and colours. Elevations count along `up`.
+pub fn apply_surface_and_color(
+    mut cloud: PreparedCloud,
+    settings: &ObjectSettings,
+    up: Vec3,
+    progress: &dyn Progress,
+) -> surfel_core::Result<CloudGeometry> {
+    cloud.scale_radii(settings.surface.radius_scale() as f32);
+    let notes = NotesAsChoices { progress, keys: &["color", "cmap", "range"] };
+    let colors = colorize(&cloud, &settings.coloring(up), &notes)?;
+    let mut geometry = CloudGeometry::new(cloud, colors)?;
+    geometry.surface = settings.surface.surface();
+    geometry.edge_test = settings.surface.edge_test();
+    geometry.has_outward_normals = settings.preparation.orients_outward();
+    Ok(geometry)
+}
+
+/// Reports where normals and radii come from.
+pub fn report_prepared(
+    report: &PreparationReport,
+    settings: &ObjectSettings,
+    progress: &dyn Progress,
+) {
+    if report.normals.is_none() {
+        progress.choice("normals as in the file", &["normals_k"]);
+    }
+    report_normals(report, progress);
+    if report.radii.is_none() {
+        progress.choice("radii as in the file", &["radius"]);
+    }
+    report_radii(report, settings, progress);
+}
+
+/// Reports how normals were estimated.
+pub fn report_normals(report: &PreparationReport, progress: &dyn Progress) {
+    if let (Some(normals), Some(neighborhood)) = (&report.normals, report.normals_from) {
+        let key = match neighborhood {
+            Neighborhood::Nearest(_) => "normals_k",
+            Neighborhood::Within(_) => "normals_radius",
+        };
+        progress.choice(&normals.line(neighborhood), &[key]);
+    }
+}
+
+/// Reports how radii were chosen, unless the settings give a number.
+pub fn report_radii(
+    report: &PreparationReport,
+    settings: &ObjectSettings,
+    progress: &dyn Progress,
+) {
+    let radius = settings.preparation.radius.unwrap_or_default();
+    if let (Some(radii), false) = (&report.radii, matches!(radius, Radius::Fixed(_))) {
+        progress.choice(&radii.line(radius), &["radius"]);
+    }
+}

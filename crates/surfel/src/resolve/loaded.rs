@@ -1,0 +1,632 @@
+//! The content of all files of a description, side by side in one graph, before it is prepared.
+
+use super::camera::keep_named_camera;
+use super::cloud::{ImportOptions, graph_of, import, into_cloud, prepare_cloud};
+use super::environment::load_environment;
+use super::memory::{MemoryEstimate, n_points};
+use super::sequence::{GeometrySlots, Sequence, element_counts, is_streamed};
+use crate::description::{
+    CameraMotion, Invalid, ObjectDescription, ObjectMotion, ObjectSettings, SceneDescription,
+};
+use crate::error::{Error, Result};
+use crate::names::{file_name, list_files};
+use crate::troubleshooting::TroubleshootingSection;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+use std::iter::successors;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use surfel_core::points::{PointCloud, PreparedCloud, SURFACE_VARIATION};
+use surfel_core::progress::Progress;
+use surfel_core::scene::color::ColorSource;
+use surfel_core::scene::{
+    Channel, Environment, Geometry, Graph, Interpolation, Keyframes, Node, Track, Transform,
+};
+use surfel_formats::{FileInfo, Loaded};
+
+/// The content of the files of a description, before it is prepared.
+///
+/// Further descriptions of the same files and objects, with other settings, can be resolved from it.
+#[derive(Debug)]
+pub struct LoadedScene {
+    /// All geometries, as they were read.
+    pub graph: Graph<PointCloud>,
+    /// Facts that each file states about itself.
+    pub file_infos: Vec<FileInfo>,
+    /// Movement of the camera.
+    pub(super) camera_motion: Option<CameraMotion>,
+    /// The environment map, upright.
+    pub(super) environment: Option<Environment>,
+    /// Each file without an object, with the nodes that came from it.
+    pub(super) files: Vec<(PathBuf, Range<usize>)>,
+    /// Objects of the description, in their order.
+    pub(super) objects: Vec<ObjectNodes>,
+    /// Index of the object of each geometry; none for files without an object.
+    owners: Vec<Option<usize>>,
+    /// Sequences whose files are read one by one.
+    pub(super) sequences: Vec<Sequence>,
+    keeps_all_columns: bool,
+}
+
+/// Data of the files that are kept besides those that a picture needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct KeepOptions {
+    /// Keeps all columns of clouds; otherwise only those that the picture needs.
+    pub all_columns: bool,
+    /// Keeps the index that each point has among those that were read.
+    pub source_indices: bool,
+}
+
+/// The nodes of an object.
+#[derive(Clone, Debug)]
+pub(super) struct ObjectNodes {
+    node: usize,
+    /// Nodes of its files, without those of its instances.
+    content: Range<usize>,
+    /// Nodes of its files and instances.
+    pub all: Range<usize>,
+}
+
+impl LoadedScene {
+    /// Reads all files of a description, if memory suffices and they have what is asked for, and moves everything to
+    /// where it is at second 0.
+    ///
+    /// Clouds without an object and a material of their own become one, whose points lie among each other; everything
+    /// else stands beside it, meshes before clouds: a material changes no order.
+    ///
+    /// # Errors
+    ///
+    /// Fails for missing and broken files, for columns that are not there, and past the memory limit.
+    pub fn read(
+        description: &SceneDescription,
+        keep: KeepOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        check_files(description)?;
+        let mut scene = Self {
+            graph: Graph::default(),
+            file_infos: Vec::new(),
+            camera_motion: camera_motion(description)?,
+            environment: load_environment(description, progress)?,
+            files: Vec::new(),
+            objects: Vec::new(),
+            owners: Vec::new(),
+            sequences: Vec::new(),
+            keeps_all_columns: keep.all_columns,
+        };
+        let motions = object_motions(description)?;
+        scene.add_files(description, progress)?;
+        for object in &description.objects {
+            scene.add_object(object, description, &motions, progress)?;
+        }
+        for lamp in &description.lamps {
+            scene.add_animated(lamp.node()?, &motions);
+        }
+        let summary = content_summary(&scene.graph);
+        let names = list_files(&scene.all_files(description));
+        progress.note(&format!("{names}: {summary}, {}", scene.file_info().format));
+        let subsample = description.objects_default.preparation.subsample;
+        let n_pixels = n_pixels(description);
+        MemoryEstimate::from_graph(&scene.graph, subsample, n_pixels)
+            .check(description.run.memory_limit)?;
+        scene.check_colors(description)?;
+        if keep.source_indices {
+            scene.number_points();
+        }
+        scene.graph.evaluate_at(0.0);
+        if let Some(name) = &description.camera.name {
+            keep_named_camera(&mut scene.graph, name)?;
+        }
+        Ok(scene)
+    }
+
+    fn number_points(&mut self) {
+        for geometry in &mut self.graph.geometries {
+            if let Geometry::Points(cloud) = geometry {
+                cloud.source_indices = Some((0..cloud.len() as u32).collect());
+            }
+        }
+    }
+
+    /// Returns what all files together say about themselves.
+    pub fn file_info(&self) -> FileInfo {
+        surfel_formats::common_file_info(&self.file_infos)
+    }
+
+    /// Returns the time of the last movement in seconds.
+    pub fn duration_secs(&self) -> f64 {
+        let camera = self.camera_motion.as_ref().map_or(0.0, CameraMotion::duration_secs);
+        let sequences = self.sequences.iter().map(Sequence::duration_secs);
+        sequences.fold(self.graph.animation.duration_secs().max(camera), f64::max)
+    }
+
+    /// Returns the index of the file that each streamed sequence shows at a time.
+    pub fn sequence_frames_at(&self, time_secs: f64) -> Vec<usize> {
+        self.sequences.iter().map(|sequence| sequence.file_at(time_secs)).collect()
+    }
+
+    /// Returns true if a node of the graph, or one of its parents, moves.
+    pub fn is_animated(&self, node: usize) -> bool {
+        let above = successors(Some(node), |node| self.graph.nodes[*node].parent);
+        let channels = &self.graph.animation.channels;
+        above.into_iter().any(|node| channels.iter().any(|channel| channel.node == node))
+    }
+
+    fn all_files(&self, description: &SceneDescription) -> Vec<PathBuf> {
+        let files = self.files.iter().map(|(file, _)| file);
+        files.chain(description.objects.iter().flat_map(|object| &object.files)).cloned().collect()
+    }
+
+    /// Returns the files without an object; those together that became one cloud.
+    pub fn file_groups(&self) -> impl Iterator<Item = Vec<&Path>> {
+        let groups = self.files.chunk_by(|(_, a), (_, b)| a == b);
+        groups.map(|group| group.iter().map(|(file, _)| file.as_path()).collect())
+    }
+
+    /// Returns points that show where everything is.
+    pub fn sample_points(&self) -> Cow<'_, PointCloud> {
+        match (&self.graph.geometries[..], &self.graph.nodes[..]) {
+            ([Geometry::Points(cloud)], [node]) if node.transform == Transform::IDENTITY => {
+                Cow::Borrowed(cloud)
+            }
+            _ => Cow::Owned(self.graph.sample_points()),
+        }
+    }
+
+    /// Returns the clouds with the index of their geometry.
+    pub fn clouds(&self) -> impl Iterator<Item = (usize, &PointCloud)> {
+        let geometries = self.graph.geometries.iter().enumerate();
+        geometries.filter_map(|(i, geometry)| match geometry {
+            Geometry::Points(cloud) => Some((i, cloud)),
+            Geometry::Triangles(_) => None,
+        })
+    }
+
+    /// Returns the settings of a geometry: those of its object over those of the scene.
+    pub fn settings_of(&self, geometry: usize, description: &SceneDescription) -> ObjectSettings {
+        let scene = &description.objects_default;
+        match self.owners[geometry] {
+            Some(object) => description.objects[object].settings.over(scene),
+            None => scene.clone(),
+        }
+    }
+
+    /// Returns the files that a geometry came from.
+    pub(super) fn files_of<'d>(
+        &self,
+        geometry: usize,
+        description: &'d SceneDescription,
+    ) -> &'d [PathBuf] {
+        match self.owners[geometry] {
+            Some(object) => &description.objects[object].files,
+            None => &description.files,
+        }
+    }
+
+    /// Returns the number of geometries.
+    pub(super) fn n_geometries(&self) -> usize {
+        self.owners.len()
+    }
+
+    /// Prepares all clouds; the points that were read are freed as it goes on.
+    pub(super) fn take_prepared(
+        &mut self,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<Vec<PreparedCloud>> {
+        let mut clouds = Vec::new();
+        for i in 0..self.n_geometries() {
+            if let Geometry::Points(cloud) = &mut self.graph.geometries[i] {
+                let cloud = std::mem::take(cloud);
+                clouds.push(self.prepare(i, cloud, description, progress)?);
+            }
+        }
+        Ok(clouds)
+    }
+
+    /// Prepares copies of all clouds.
+    pub(crate) fn prepared(
+        &self,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<Vec<PreparedCloud>> {
+        let prepared = self.clouds().map(|(i, cloud)| {
+            let mut cloud = cloud.clone();
+            self.settings_of(i, description).preparation.drop_estimated(&mut cloud);
+            self.prepare(i, cloud, description, progress)
+        });
+        prepared.collect()
+    }
+
+    fn prepare(
+        &self,
+        geometry: usize,
+        cloud: PointCloud,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<PreparedCloud> {
+        let settings = self.settings_of(geometry, description);
+        let prepared = prepare_cloud(cloud, &settings, description.picture.seed(), progress);
+        prepared.map_err(|cause| self.content_error(geometry, description, cause))
+    }
+
+    /// Adds the files of a geometry to an error of the renderer.
+    pub(super) fn content_error(
+        &self,
+        geometry: usize,
+        description: &SceneDescription,
+        cause: surfel_core::Error,
+    ) -> Error {
+        Error::Content { files: self.files_of(geometry, description).to_vec(), cause }
+    }
+
+    fn import_options(&self, description: &SceneDescription) -> ImportOptions {
+        ImportOptions {
+            keeps_all_columns: self.keeps_all_columns,
+            seed: description.picture.seed(),
+        }
+    }
+
+    /// Adds the files without an object.
+    fn add_files(&mut self, description: &SceneDescription, progress: &dyn Progress) -> Result<()> {
+        let options = self.import_options(description);
+        let (mut separate, mut merging) = (Vec::new(), (Vec::new(), Vec::new()));
+        for file in &description.files {
+            let (graph, info) = import(file, &description.objects_default, &options, progress)?;
+            self.file_infos.push(info.clone());
+            let has_material = description.materials.iter().any(|choice| choice.names(file));
+            match into_cloud(graph) {
+                Ok(cloud) if has_material => {
+                    separate.push((vec![Loaded { cloud, info }], vec![file.clone()]));
+                }
+                Ok(cloud) => {
+                    merging.0.push(Loaded { cloud, info });
+                    merging.1.push(file.clone());
+                }
+                Err(graph) => {
+                    let nodes = self.append(*graph, None);
+                    self.files.push((file.clone(), nodes));
+                }
+            }
+        }
+        for (clouds, files) in separate.into_iter().chain([merging]) {
+            if clouds.is_empty() {
+                continue;
+            }
+            let graph = merged(clouds, &files, progress)?;
+            let nodes = self.append(graph, None);
+            self.files.extend(files.into_iter().map(|file| (file, nodes.clone())));
+        }
+        Ok(())
+    }
+
+    /// Adds a graph to what is here; returns its nodes.
+    fn append(&mut self, graph: Graph<PointCloud>, owner: Option<usize>) -> Range<usize> {
+        let first = self.graph.append(graph);
+        self.owners.resize(self.graph.geometries.len(), owner);
+        first..self.graph.nodes.len()
+    }
+
+    /// Adds an object with its instances.
+    fn add_object(
+        &mut self,
+        object: &ObjectDescription,
+        description: &SceneDescription,
+        motions: &[ObjectMotion],
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let object_idx = self.objects.len();
+        let before = &description.objects[..object_idx];
+        let parent = object.parent.as_ref();
+        let parent = parent.and_then(|name| before.iter().position(|other| other.name() == *name));
+        let node = Node {
+            parent: parent.map(|object_idx| self.objects[object_idx].node),
+            transform: object.placement.transform()?,
+            is_visible: object.visible(),
+            ..Node::new(object.name())
+        };
+        let node = self.add_animated(node, motions);
+        let first = self.graph.nodes.len();
+        if let Some(twin) = before.iter().position(|other| other.has_same_content(object)) {
+            // The same files with the same settings are held once.
+            self.graph.add_instance(self.objects[twin].content.clone(), node);
+        } else {
+            self.add_content(node, object, description, progress)?;
+        }
+        let content = first..self.graph.nodes.len();
+        for instance in &object.instances {
+            let instance = Node {
+                parent: Some(node),
+                transform: instance.transform()?,
+                ..Node::new(object.name())
+            };
+            let instance = self.graph.add_node(instance);
+            self.graph.add_instance(content.clone(), instance);
+        }
+        self.objects.push(ObjectNodes { node, content, all: first..self.graph.nodes.len() });
+        Ok(())
+    }
+
+    /// Puts what an object's files hold under its node.
+    fn add_content(
+        &mut self,
+        node: usize,
+        object: &ObjectDescription,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let owner = self.objects.len();
+        let settings = object.settings.over(&description.objects_default);
+        let options = self.import_options(description);
+        if is_streamed(object, &settings)? {
+            return self.add_sequence(node, object, settings, options, progress);
+        }
+        let mut merging = Vec::new();
+        for (file_idx, file) in object.files.iter().enumerate() {
+            let (graph, info) = import(file, &settings, &options, progress)?;
+            self.file_infos.push(info.clone());
+            if object.merge() {
+                let cloud = into_cloud(graph).map_err(|_| {
+                    Error::Unfit(format!(
+                        "{}: is not a point cloud; `merge` is for point clouds",
+                        file.display()
+                    ))
+                })?;
+                merging.push(Loaded { cloud, info });
+                continue;
+            }
+            let above = Node { parent: Some(node), ..Node::new(file_name(file)) };
+            let above = self.graph.add_node(above);
+            if 1 < object.files.len() {
+                self.show_in_turn(above, file_idx, object);
+            }
+            self.append_below(above, graph, owner);
+        }
+        if object.merge() {
+            let graph = merged(merging, &object.files, progress)?;
+            self.append_below(node, graph, owner);
+        }
+        Ok(())
+    }
+
+    /// Puts the first file of a sequence under an object's node; the others take its place.
+    fn add_sequence(
+        &mut self,
+        node: usize,
+        object: &ObjectDescription,
+        settings: ObjectSettings,
+        options: ImportOptions,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let first = &object.files[0];
+        let (graph, info) = import(first, &settings, &options, progress)?;
+        self.file_infos.push(info);
+        let above = Node { parent: Some(node), ..Node::new(file_name(first)) };
+        let above = self.graph.add_node(above);
+        let before = element_counts(&self.graph);
+        self.append_below(above, graph, self.objects.len());
+        let slots = GeometrySlots::behind(before, &self.graph);
+        let sequence = Sequence::new(object.files.clone(), object.fps(), settings, options, slots);
+        self.sequences.push(sequence);
+        Ok(())
+    }
+
+    fn append_below(&mut self, above: usize, graph: Graph<PointCloud>, owner: usize) {
+        let nodes = self.append(graph, Some(owner));
+        for node in &mut self.graph.nodes[nodes] {
+            node.parent.get_or_insert(above);
+        }
+    }
+
+    /// Shows a file of a sequence for its time; the last one stays.
+    fn show_in_turn(&mut self, node: usize, file_idx: usize, object: &ObjectDescription) {
+        let fps = object.fps();
+        let (start, end) = (file_idx as f64 / fps, (file_idx + 1) as f64 / fps);
+        let is_last = file_idx + 1 == object.files.len();
+        let mut keys = vec![(start, true), (end, is_last)];
+        if 0 < file_idx {
+            keys.insert(0, (0.0, false));
+        }
+        let keys = Keyframes {
+            times_secs: keys.iter().map(|(time, _)| *time).collect(),
+            values: keys.iter().map(|(_, visible)| *visible).collect(),
+            interpolation: Interpolation::Step,
+        };
+        self.graph.animation.channels.push(Channel { node, track: Track::Visible(keys) });
+    }
+
+    /// Adds a node with its movements. One that orbits hangs on another that stands in the middle.
+    fn add_animated(&mut self, mut node: Node, motions: &[ObjectMotion]) -> usize {
+        let name = node.name.clone();
+        let motions = motions.iter().filter(|motion| motion.object == name);
+        for motion in motions.clone().filter(|motion| motion.is_orbit) {
+            let center = motion.pivot.unwrap_or(node.transform.matrix().translation);
+            let mut middle = Node { parent: node.parent, ..Node::new("") };
+            middle.transform = Transform::from_translation(center);
+            let middle = self.graph.add_node(middle);
+            self.add_tracks(middle, motion);
+            // Back again, so that the node's own keys count from where they always do.
+            let mut back = Node { parent: Some(middle), ..Node::new("") };
+            back.transform = Transform::from_translation(-center);
+            node.parent = Some(self.graph.add_node(back));
+        }
+        let node = self.graph.add_node(node);
+        for motion in motions.filter(|motion| !motion.is_orbit) {
+            self.add_tracks(node, motion);
+        }
+        node
+    }
+
+    fn add_tracks(&mut self, node: usize, motion: &ObjectMotion) {
+        let channels = motion.tracks.iter().map(|track| Channel { node, track: track.clone() });
+        self.graph.animation.channels.extend(channels);
+    }
+
+    /// Fails before the preparation if no file has the column asked for. The library knows only the columns that were
+    /// loaded, which are those asked for.
+    pub(crate) fn check_colors(&self, description: &SceneDescription) -> Result<()> {
+        for (i, cloud) in self.clouds() {
+            let Some(color) = self.settings_of(i, description).color.color else { continue };
+            let is_computed = match &color {
+                ColorSource::Normal => true,
+                ColorSource::Column(name) => name == SURFACE_VARIATION,
+                _ => false,
+            };
+            if is_computed || color.is_available_in(cloud) {
+                continue;
+            }
+            return Err(Error::Unfit(format!(
+                "{}: no column {color}; --color takes elevation, normal, {SURFACE_VARIATION}, \
+                 #RRGGBB, a CSS colour name and what the file has: {}; {}",
+                list_files(self.files_of(i, description)),
+                match colorable_columns(&self.file_info().columns) {
+                    none if none.is_empty() => "only positions".to_owned(),
+                    columns => columns.join(", "),
+                },
+                TroubleshootingSection::WrongColors,
+            )));
+        }
+        Ok(())
+    }
+
+    /// Returns the graph with clouds that have no points.
+    pub(crate) fn graph_without_points(&self) -> Graph<PointCloud> {
+        let geometries = self.graph.geometries.iter().map(|geometry| match geometry {
+            Geometry::Points(cloud) => {
+                Geometry::Points(PointCloud { origin: cloud.origin, ..PointCloud::default() })
+            }
+            Geometry::Triangles(mesh) => Geometry::Triangles(mesh.clone()),
+        });
+        Graph {
+            geometries: geometries.collect(),
+            nodes: self.graph.nodes.clone(),
+            materials: self.graph.materials.clone(),
+            textures: self.graph.textures.clone(),
+            animation: self.graph.animation.clone(),
+        }
+    }
+
+    /// Returns the streamed sequences under the settings of another description of the same objects.
+    pub(super) fn sequences_under(&self, description: &SceneDescription) -> Vec<Sequence> {
+        let under = |sequence: &Sequence| {
+            let geometry = sequence.slots.geometries[0];
+            let settings = self.settings_of(geometry, description);
+            sequence.under(settings, self.import_options(description))
+        };
+        self.sequences.iter().map(under).collect()
+    }
+}
+
+/// Fails where a file is missing or not of its kind, and where all need more memory than they may take: before the
+/// work.
+///
+/// # Errors
+///
+/// Fails for an empty scene, for materials of files that are not there, and as reading would.
+pub fn check_files(description: &SceneDescription) -> Result<()> {
+    description.check_is_not_empty()?;
+    let objects = description.objects.iter();
+    let files: BTreeSet<&Path> = objects
+        .clone()
+        .flat_map(|object| &object.files)
+        .chain(&description.files)
+        .map(PathBuf::as_path)
+        .collect();
+    check_materials(description)?;
+    let inspected = files.into_iter().map(|file| Ok((file, surfel_formats::inspect(file)?)));
+    let mut infos = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, FileInfo>>>()?;
+    for object in objects.filter(|object| 1 < object.files.len()) {
+        let settings = object.settings.over(&description.objects_default);
+        if is_streamed(object, &settings)? {
+            keep_largest_frame(&mut infos, object);
+        }
+    }
+    let subsample = description.objects_default.preparation.subsample;
+    MemoryEstimate::from_files(&infos, subsample, n_pixels(description))
+        .check(description.run.memory_limit)
+}
+
+/// Leaves the largest file of a streamed sequence.
+fn keep_largest_frame(infos: &mut BTreeMap<&Path, FileInfo>, object: &ObjectDescription) {
+    let size = |file: &&PathBuf| {
+        let info = infos.get(file.as_path())?;
+        Some(info.n_triangles.unwrap_or_else(|| n_points(file, info)))
+    };
+    let largest = object.files.iter().max_by_key(size).cloned();
+    let others = object.files.iter().filter(|file| Some(*file) != largest.as_ref());
+    others.for_each(|file| _ = infos.remove(file.as_path()));
+}
+
+/// Fails if a material is for a file or an object that is not there.
+fn check_materials(description: &SceneDescription) -> Result<(), Invalid> {
+    let names = description.objects.iter().flat_map(ObjectDescription::names);
+    let known: Vec<PathBuf> = description.files.iter().cloned().chain(names).collect();
+    for choice in &description.materials {
+        let Some(target) = &choice.target else { continue };
+        if !known.iter().any(|file| choice.names(file)) {
+            let known: Vec<String> = known.iter().map(|file| file.display().to_string()).collect();
+            let message = format!("no file or object `{target}`; there is {}", known.join(", "));
+            return Err(Invalid::at("material", message));
+        }
+    }
+    Ok(())
+}
+
+fn n_pixels(description: &SceneDescription) -> u64 {
+    let (width, height) = description.picture.resolution();
+    u64::from(width) * u64::from(height)
+}
+
+fn object_motions(description: &SceneDescription) -> Result<Vec<ObjectMotion>, Invalid> {
+    let of_objects = description.animations.iter().filter(|animation| !animation.is_of_camera());
+    of_objects.map(|animation| animation.object_motion()).collect()
+}
+
+fn camera_motion(description: &SceneDescription) -> Result<Option<CameraMotion>, Invalid> {
+    let mut motion = None;
+    for animation in description.animations.iter().filter(|animation| animation.is_of_camera()) {
+        animation.camera_motion(motion.get_or_insert_default())?;
+    }
+    Ok(motion)
+}
+
+/// Clouds as one, whose points lie among each other.
+fn merged(
+    clouds: Vec<Loaded>,
+    files: &[PathBuf],
+    progress: &dyn Progress,
+) -> Result<Graph<PointCloud>> {
+    let cloud = surfel_formats::merge_loaded(clouds, files, progress).cloud;
+    if cloud.is_empty() {
+        let cause = surfel_core::Error::EmptyCloud;
+        return Err(Error::Content { files: files.to_vec(), cause });
+    }
+    let mut graph = graph_of(cloud);
+    graph.nodes[0].name = file_name(&files[0]);
+    Ok(graph)
+}
+
+fn content_summary(graph: &Graph<PointCloud>) -> String {
+    match graph.n_points_and_triangles() {
+        (points, 0) => format!("{points} points"),
+        (0, triangles) => format!("{triangles} triangles"),
+        (points, triangles) => format!("{points} points and {triangles} triangles"),
+    }
+}
+
+/// Returns the columns of a file as `color` takes them.
+fn colorable_columns(columns: &[String]) -> Vec<&str> {
+    let mut names: Vec<&str> = Vec::new();
+    for column in columns {
+        let name = match column.to_ascii_lowercase().as_str() {
+            "x" | "y" | "z" | "nx" | "ny" | "nz" | "normal" | "radius" => continue,
+            "red" | "green" | "blue" | "r" | "g" | "b" | "rgb" => "rgb",
+            "classification" => "class",
+            _ => column,
+        };
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}

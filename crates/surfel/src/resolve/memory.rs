@@ -1,0 +1,189 @@
+//! The memory that a picture takes, and the limit that the user may set.
+
+use crate::error::{Error, Result};
+use crate::troubleshooting::TroubleshootingSection;
+use std::collections::BTreeMap;
+use std::path::Path;
+use surfel_core::flat::PointBlock;
+use surfel_core::math::LANES;
+use surfel_core::points::{PointCloud, Subsample};
+use surfel_core::scene::Graph;
+use surfel_formats::FileInfo;
+
+/// Counts from which the memory of a picture follows, known before it is rendered.
+#[derive(Clone, Copy, Debug)]
+pub struct MemoryEstimate {
+    n_points: u64,
+    n_kept_points: u64,
+    n_triangles: u64,
+    n_texels: u64,
+    n_pixels: u64,
+}
+
+/// Bytes of a point as it is loaded: position, normal, radius, colour and intensity.
+const COLUMNS: u64 = 12 + 12 + 4 + 6 + 4;
+
+/// Bytes of a triangle as it is loaded: corners, and position, normal and texture coordinates of about a vertex.
+const TRIANGLE: u64 = 12 + 12 + 12 + 8;
+
+/// Bytes of a point's tree, block and index.
+const FLAT_POINT: u64 = (size_of::<PointBlock>() / LANES + size_of::<u32>()) as u64 + 5;
+
+/// Bytes of a triangle's tree and corners.
+const FLAT_TRIANGLE: u64 = 42;
+
+const TEXEL: u64 = 4;
+
+/// Bytes of a pixel with all its layers.
+const PIXEL: u64 = 16 + 52;
+
+/// Bytes of an average line of text, where a file does not say how many there are.
+const LINE: u64 = 30;
+
+impl MemoryEstimate {
+    /// Estimates from the headers of files, without reading their points.
+    pub fn from_files(
+        files: &BTreeMap<&Path, FileInfo>,
+        subsample: Option<Subsample>,
+        n_pixels: u64,
+    ) -> Self {
+        let clouds = files.iter().filter(|(_, info)| info.n_triangles.is_none());
+        let n_points = sum(clouds.map(|(file, info)| (n_points(file, info), 1)));
+        let triangles = files.values().filter_map(|info| info.n_triangles);
+        let n_triangles = sum(triangles.map(|n| (n, 1)));
+        let n_kept_points = kept(n_points, subsample);
+        Self { n_points, n_kept_points, n_triangles, n_texels: 0, n_pixels }
+    }
+
+    /// Estimates from what was read, where textures are known too.
+    pub fn from_graph(
+        graph: &Graph<PointCloud>,
+        subsample: Option<Subsample>,
+        n_pixels: u64,
+    ) -> Self {
+        let (n_points, n_triangles) = graph.n_points_and_triangles();
+        let (n_points, n_triangles) = (n_points as u64, n_triangles as u64);
+        let n_texels = graph.textures.iter().map(|texture| texture.texels.len() as u64).sum();
+        let n_kept_points = kept(n_points, subsample);
+        Self { n_points, n_kept_points, n_triangles, n_texels, n_pixels }
+    }
+
+    /// Bytes of the input as read, of the flat form with what building it takes, and of the picture.
+    fn bytes(&self) -> [u64; 3] {
+        let meshes = sum([(self.n_triangles, TRIANGLE), (self.n_texels, TEXEL)]);
+        let read = sum([(self.n_points, COLUMNS), (meshes, 1)]);
+        let trees = sum([(self.n_kept_points, FLAT_POINT), (self.n_triangles, FLAT_TRIANGLE)]);
+        // Vertices and textures stand in the flat form as they were read.
+        let flat = sum([(trees / 2, 5), (meshes, 1)]);
+        [read, flat, sum([(self.n_pixels, PIXEL)])]
+    }
+
+    /// Checks the estimate against a limit in bytes.
+    ///
+    /// # Errors
+    ///
+    /// Fails with [`Error::OutOfMemory`], which says what would fit.
+    pub fn check(&self, limit: Option<u64>) -> Result<()> {
+        let Some(limit) = limit else { return Ok(()) };
+        let ([read, flat, picture], all) = (self.bytes(), self.total());
+        if all <= limit {
+            return Ok(());
+        }
+        let things = [(self.n_points, "points"), (self.n_triangles, "triangles")];
+        let there = things.iter().filter(|(count, _)| 0 < *count);
+        let things: Vec<String> = there.map(|(count, name)| format!("{count} {name}")).collect();
+        Err(Error::OutOfMemory(format!(
+            "{} need about {} of memory ({} as read, {} tree, {} picture), and \
+             --memory-limit is {}; {}raise the limit; {}",
+            things.join(" and "),
+            readable(all),
+            readable(read),
+            readable(flat),
+            readable(picture),
+            readable(limit),
+            self.advice(limit),
+            TroubleshootingSection::OutOfMemory,
+        )))
+    }
+
+    fn total(&self) -> u64 {
+        sum(self.bytes().map(|bytes| (bytes, 1)))
+    }
+
+    /// Advice that helps besides a higher limit, if there is any.
+    fn advice(&self, limit: u64) -> String {
+        let least = Self { n_kept_points: 0, ..*self }.total();
+        let fitting = limit.saturating_sub(least) / 5 * 2 / FLAT_POINT;
+        let [.., picture] = self.bytes();
+        if 0 < fitting && fitting < self.n_kept_points {
+            return format!("keep fewer points with --subsample random:{fitting} or ");
+        }
+        if self.total() / 2 < picture {
+            return "make a smaller picture with --resolution or ".into();
+        }
+        String::new()
+    }
+}
+
+/// Sum of counts times bytes; headers may claim any number.
+fn sum(things: impl IntoIterator<Item = (u64, u64)>) -> u64 {
+    let bytes = things.into_iter().map(|(count, each)| count.saturating_mul(each));
+    bytes.fold(0, u64::saturating_add)
+}
+
+/// Returns the number of points that a file states, or that one of its size has about.
+pub fn n_points(file: &Path, info: &FileInfo) -> u64 {
+    let by_size = || std::fs::metadata(file).map_or(0, |data| data.len() / LINE);
+    info.n_points.unwrap_or_else(by_size)
+}
+
+fn kept(n_points: u64, subsample: Option<Subsample>) -> u64 {
+    match subsample {
+        Some(Subsample::First(count) | Subsample::Random(count)) => n_points.min(count as u64),
+        Some(Subsample::Stride(stride)) => (n_points as f64 / stride.max(1.0)) as u64,
+        Some(Subsample::Spacing(_)) | None => n_points,
+    }
+}
+
+/// Bytes in the largest unit that leaves a number above one.
+pub fn readable(bytes: u64) -> String {
+    let units = ["B", "KB", "MB", "GB", "TB"];
+    let power = (bytes.max(1).ilog2() / 10).min(4);
+    let value = bytes as f64 / 1024f64.powi(power as i32);
+    let digits = usize::from(0 < power);
+    format!("{value:.digits$} {}", units[power as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    //! The advice fits the limit.
+
+    use super::*;
+
+    fn advice(n_points: u64, n_kept_points: u64, n_pixels: u64, limit: u64) -> String {
+        let estimate =
+            MemoryEstimate { n_points, n_kept_points, n_triangles: 0, n_texels: 0, n_pixels };
+        assert!(limit < estimate.total());
+        estimate.advice(limit)
+    }
+
+    #[test]
+    fn the_advice_fits_the_limit() {
+        let (n_points, limit) = (1_000_000, 60_000_000);
+        let text = advice(n_points, n_points, 10_000, limit);
+        let n_kept_points = text.split(|c: char| !c.is_ascii_digit()).find(|word| !word.is_empty());
+        let n_kept_points = n_kept_points.unwrap().parse().unwrap();
+        let estimate = MemoryEstimate {
+            n_points,
+            n_kept_points,
+            n_triangles: 0,
+            n_texels: 0,
+            n_pixels: 10_000,
+        };
+        assert!(limit - 1000 < estimate.total() && estimate.total() <= limit, "{text}");
+        // Fewer points do not reduce what is read.
+        assert_eq!(advice(n_points, n_points, 10_000, 30_000_000), "");
+        assert_eq!(advice(n_points, 16, 10_000, 30_000_000), "");
+        assert!(advice(64, 64, 250, 10_000).contains("--resolution"));
+    }
+}

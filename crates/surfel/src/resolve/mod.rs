@@ -1,0 +1,204 @@
+//! Turns a description into a scene that can be rendered: opens files and makes every automatic choice.
+
+mod cloud;
+mod camera;
+mod environment;
+mod sun_and_sky;
+mod exposure;
+mod memory;
+mod unlit;
+mod appearance;
+mod sequence;
+mod loaded;
+mod complete;
+
+pub(crate) use appearance::finish_graph;
+pub use camera::{SceneCamera, choose_camera, choose_up, is_georeferenced, short_position};
+pub use cloud::{prepare_cloud, report_normals, report_prepared, report_radii};
+pub(crate) use exposure::automatic_exposure;
+pub use loaded::{KeepOptions, LoadedScene, check_files};
+pub use memory::{MemoryEstimate, n_points, readable};
+pub(crate) use sequence::Sequence;
+pub(crate) use sun_and_sky::{expose, expose_lamps};
+
+use crate::choices::{Choice, ChoiceLog};
+use crate::description::{CameraSettings, OrthographicHeight, SceneDescription};
+use crate::error::Result;
+use camera::SceneExtent;
+use sun_and_sky::{LightingContext, choose_lights, sun_azimuth_deg};
+use surfel_core::math::Vec3;
+use surfel_core::progress::Progress;
+use surfel_core::render::Settings;
+use surfel_core::scene::{Camera, Light, Projection, Scene, inlier_bounds};
+use surfel_core::surface::SurfaceKind;
+
+/// A scene that is ready for its trees: everything is read, chosen and prepared, at second 0.
+#[derive(Debug)]
+pub struct Resolved {
+    /// The scene of the renderer.
+    pub scene: Scene,
+    /// Size and quality of its picture.
+    pub settings: Settings,
+    /// The description with everything that was chosen written into it.
+    pub description: SceneDescription,
+    /// The choices that were made, in the order of the work.
+    pub choices: Vec<Choice>,
+    /// Sequences whose files are read one by one.
+    pub(crate) sequences: Vec<Sequence>,
+    /// The camera with its movement.
+    pub(crate) camera: SceneCamera,
+    /// The world's up.
+    pub(crate) up: Vec3,
+}
+
+/// Opens the files of a description and makes every choice that it leaves open.
+///
+/// # Errors
+///
+/// Fails for keys and values that are not valid, for missing and broken files, past the memory limit, and with
+/// [`surfel_core::Error::Cancelled`].
+pub fn resolve(description: &SceneDescription, progress: &dyn Progress) -> Result<Resolved> {
+    description.check()?;
+    let log = ChoiceLog::new(progress);
+    let keep = KeepOptions { source_indices: true, ..KeepOptions::default() };
+    let scene = LoadedScene::read(description, keep, &log)?;
+    let auto = AutoSettings::choose(&scene, description, &log)?;
+    let mut resolved = scene.into_resolved(auto, &log)?;
+    resolved.choices = log.into_choices();
+    Ok(resolved)
+}
+
+/// Settings that were chosen from the data: up, camera and lights.
+#[derive(Clone, Debug)]
+pub struct AutoSettings {
+    /// The world's up.
+    pub up: Vec3,
+    /// The camera with its movement.
+    pub camera: SceneCamera,
+    /// Lights of the whole scene.
+    pub lights: Vec<Light>,
+    /// Direction of the sun in degrees clockwise from north.
+    pub sun_azimuth_deg: f64,
+    description: SceneDescription,
+}
+
+impl AutoSettings {
+    /// Chooses up, camera and lights where the description leaves them open.
+    ///
+    /// # Errors
+    ///
+    /// Fails for an environment map that cannot light the scene.
+    pub fn choose(
+        scene: &LoadedScene,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let points = scene.sample_points();
+        let up = choose_up(description.world.up, &points, &scene.file_infos, progress);
+        let bounds = inlier_bounds(&points);
+        let extent = SceneExtent { points: &points, bounds, up };
+        let motion = scene.camera_motion.clone();
+        let camera = SceneCamera::choose(&scene.graph, &extent, description, motion, progress);
+        let diagonal = (bounds.max - bounds.min).length();
+        let context = LightingContext { camera: camera.camera, up, diagonal };
+        // Points as pixels are shaded by their depth alone.
+        let is_shaded = description.objects_default.surface.surface() != SurfaceKind::Points;
+        let lights = match is_shaded {
+            true => choose_lights(description, scene.environment.as_ref(), &context, progress)?,
+            false => Vec::new(),
+        };
+        let sun_azimuth_deg = sun_azimuth_deg(description, &context);
+        Ok(Self { up, camera, lights, sun_azimuth_deg, description: description.clone() })
+    }
+
+    /// Returns the description with everything that was chosen written into it.
+    pub fn complete_description(&self, scene: &LoadedScene) -> SceneDescription {
+        complete::complete_description(scene, self, &self.description)
+    }
+
+    /// Returns true if the scene moves the camera.
+    pub fn moves_camera(&self, scene: &LoadedScene) -> bool {
+        self.camera.has_motion() || self.camera.node.is_some_and(|node| scene.is_animated(node))
+    }
+}
+
+impl LoadedScene {
+    /// Prepares all clouds, colours them and gives everything its material.
+    ///
+    /// # Errors
+    ///
+    /// Fails for clouds that cannot be prepared or coloured, and if nothing is left to be seen.
+    pub fn into_resolved(
+        mut self,
+        auto: AutoSettings,
+        progress: &dyn Progress,
+    ) -> Result<Resolved> {
+        let complete = auto.complete_description(&self);
+        let AutoSettings { up, camera, lights, description, .. } = auto;
+        let clouds = self.take_prepared(&description, progress)?;
+        let raw = std::mem::take(&mut self.graph);
+        let (graph, sequences) = finish_graph(&self, raw, clouds, &description, up, progress)?;
+        let background = description.picture.background();
+        let scene = Scene { camera: camera.at(0.0, &graph), graph, lights, background };
+        let settings = render_settings(&description);
+        let choices = Vec::new();
+        Ok(Resolved { scene, settings, description: complete, choices, sequences, camera, up })
+    }
+}
+
+/// Returns size and quality of a description's picture. A file that is not EXR takes no layers beside the colour.
+pub fn render_settings(description: &SceneDescription) -> Settings {
+    let picture = &description.picture;
+    let (width, height) = picture.resolution();
+    let output = description.output.output.as_ref();
+    Settings {
+        width,
+        height,
+        samples_per_pixel: picture.spp(),
+        light_samples: picture.light_samples(),
+        max_depth: picture.max_depth(),
+        seed: picture.seed(),
+        with_aovs: output.is_none_or(|path| {
+            path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
+        }),
+    }
+}
+
+/// The camera as keys: where it stands, or its name if it is one of a file that moves.
+fn description_camera(
+    scene: &LoadedScene,
+    auto: &AutoSettings,
+    description: &SceneDescription,
+) -> CameraSettings {
+    if let Some(node) = auto.camera.node.filter(|node| scene.is_animated(*node)) {
+        let name = Some(scene.graph.nodes[node].name.clone());
+        return CameraSettings {
+            name,
+            view_angle: description.camera.view_angle,
+            ..CameraSettings::default()
+        };
+    }
+    CameraSettings { lock: description.camera.lock, ..CameraSettings::of(&auto.camera.camera) }
+}
+
+impl CameraSettings {
+    /// Returns settings of a camera that leave nothing to be chosen.
+    pub fn of(camera: &Camera) -> Self {
+        let mut settings = Self {
+            position: Some(camera.position),
+            focal_point: Some(camera.focal_point),
+            view_up: Some(camera.view_up),
+            ..Self::default()
+        };
+        match camera.projection {
+            Projection::Perspective { view_angle_deg } => {
+                settings.view_angle = Some(view_angle_deg)
+            }
+            Projection::Orthographic { height } => {
+                settings.orthographic = Some(OrthographicHeight::Fixed(height));
+            }
+            Projection::Panorama => settings.panorama = Some(true),
+        }
+        settings
+    }
+}

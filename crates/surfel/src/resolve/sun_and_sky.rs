@@ -1,0 +1,170 @@
+//! Lights from settings: a sun behind the camera, a sky, and their colours.
+
+use crate::description::{LightKind, SceneDescription};
+use crate::error::Result;
+use surfel_core::flat::{FlatPunctualLight, FlatScene};
+use surfel_core::math::Vec3;
+use surfel_core::progress::Progress;
+use surfel_core::scene::{Camera, Environment, Light, Sky, Sun};
+
+/// Warm sun and bluish sky, which on level ground under the usual sun add up to white. The sky gives a third of the
+/// light, more than outdoors: with a quarter, shadows of dark scans were black.
+const SUN_COLOR: Vec3 = Vec3::new(1.06, 1.01, 0.94);
+const SKY_COLOR: Vec3 = Vec3::new(0.325, 0.355, 0.405);
+
+/// Light that the ground reflects: a third of what it receives, coloured by stone and soil.
+const GROUND_COLOR: Vec3 = Vec3::new(0.16, 0.145, 0.125);
+
+/// Degrees by which the sun stands to the left of straight behind the camera: shadows show, but do not dominate.
+const SUN_OFFSET_DEG: f64 = 60.0;
+
+/// Fraction of the scene's diagonal up to which things darken the sky.
+const AO_FRACTION: f32 = 0.15;
+
+/// Radiance of the headlight on a surface that faces it.
+const HEADLIGHT: f32 = 0.8;
+
+/// The scene as its lights need to know it.
+pub struct LightingContext {
+    /// The camera, behind which the sun stands.
+    pub camera: Camera,
+    /// The world's up.
+    pub up: Vec3,
+    /// Diagonal of the scene's bounds without stray points.
+    pub diagonal: f32,
+}
+
+/// Returns the lights of the whole scene.
+pub fn choose_lights(
+    description: &SceneDescription,
+    environment: Option<&Environment>,
+    context: &LightingContext,
+    progress: &dyn Progress,
+) -> Result<Vec<Light>> {
+    let settings = &description.light;
+    let mut lights = Vec::new();
+    if let Some(environment) = environment.filter(|_| settings.environment.is_some()) {
+        let rotation_deg = settings.environment_rotation() as f32;
+        let mut environment = environment.with_orientation(context.up, rotation_deg)?;
+        environment.scale(settings.environment_strength() as f32);
+        lights.push(Light::Environment(environment));
+    }
+    if settings.has(LightKind::Sun) {
+        lights.push(Light::Sun(sun(description, context, progress)));
+    }
+    if settings.has(LightKind::Sky) {
+        lights.push(Light::Sky(sky(description, context, progress)));
+    }
+    if settings.has(LightKind::Headlight) {
+        lights.push(Light::Headlight(HEADLIGHT));
+    }
+    Ok(lights)
+}
+
+/// Makes all lights brighter by stops; the background stays.
+pub fn expose(scene: &mut FlatScene, stops: f32) {
+    let gain = stops.exp2();
+    for light in &mut scene.lights {
+        match light {
+            Light::Sun(sun) => sun.color *= gain,
+            Light::Sky(sky) => {
+                sky.zenith *= gain;
+                sky.ground *= gain;
+            }
+            Light::Environment(environment) => environment.scale(gain),
+            Light::Headlight(strength) => *strength *= gain,
+        }
+    }
+    expose_lamps(&mut scene.punctual_lights, stops);
+    scene.materials.iter_mut().for_each(|material| {
+        material.emissive *= gain;
+        material.emissive_strength *= gain;
+    });
+}
+
+/// Makes lamps brighter by stops, after the animation has set them again.
+pub fn expose_lamps(lamps: &mut [FlatPunctualLight], stops: f32) {
+    lamps.iter_mut().for_each(|lamp| lamp.color *= stops.exp2());
+}
+
+/// Returns the direction of the sun in degrees clockwise from north.
+pub fn sun_azimuth_deg(description: &SceneDescription, context: &LightingContext) -> f64 {
+    description.sun.azimuth.unwrap_or_else(|| automatic_azimuth_deg(context))
+}
+
+fn sun(description: &SceneDescription, context: &LightingContext, progress: &dyn Progress) -> Sun {
+    let settings = &description.sun;
+    let azimuth_deg = sun_azimuth_deg(description, context);
+    let elevation_deg = settings.elevation();
+    if settings.azimuth.is_none() {
+        let line = format!(
+            "sun from {azimuth_deg:.0} degrees (0 = north, 90 = east), {elevation_deg:.0} high"
+        );
+        progress.choice(&line, &["sun.azimuth", "sun.elevation"]);
+    }
+    Sun {
+        direction: Sun::direction_from_angles(azimuth_deg as f32, elevation_deg as f32, context.up),
+        color: settings.strength() as f32 * SUN_COLOR,
+        angular_diameter_deg: settings.angle() as f32,
+    }
+}
+
+fn sky(description: &SceneDescription, context: &LightingContext, progress: &dyn Progress) -> Sky {
+    let settings = &description.sky;
+    let ao_distance = settings.ao_distance.map(|distance| distance as f32).unwrap_or_else(|| {
+        let distance = (AO_FRACTION * context.diagonal).max(f32::MIN_POSITIVE);
+        let line = format!("things up to {distance:.3} away darken the sky");
+        progress.choice(&line, &["sky.ao_distance"]);
+        distance
+    });
+    let strength = settings.strength() as f32;
+    let (zenith, ground) = (strength * SKY_COLOR, strength * GROUND_COLOR);
+    Sky { up: context.up, zenith, ground, ao_distance }
+}
+
+/// Behind the camera and to its left; from the upper left of a map, as cartographers shade hills.
+fn automatic_azimuth_deg(context: &LightingContext) -> f64 {
+    let [_, camera_up, forward] = context.camera.axes();
+    let up = context.up.as_dvec3();
+    let looks_down = forward.dot(up) < -0.8;
+    let (ahead, turn_deg) =
+        if looks_down { (camera_up, -45.0) } else { (forward, 180.0 + SUN_OFFSET_DEG) };
+    let north = Sun::direction_from_angles(0.0, 0.0, context.up).as_dvec3();
+    let east = Sun::direction_from_angles(90.0, 0.0, context.up).as_dvec3();
+    let ahead_deg = ahead.dot(east).atan2(ahead.dot(north)).to_degrees();
+    (ahead_deg + turn_deg).rem_euclid(360.0)
+}
+
+#[cfg(test)]
+mod tests {
+    //! The direction of the sun, and the brightness of level ground.
+
+    use super::*;
+    use surfel_core::math::DVec3;
+    use surfel_core::scene::Projection;
+
+    fn context(forward: DVec3) -> LightingContext {
+        let camera = Camera {
+            position: -forward,
+            focal_point: DVec3::ZERO,
+            view_up: DVec3::new(0.0, 0.1, 1.0),
+            projection: Projection::Perspective { view_angle_deg: 35.0 },
+        };
+        LightingContext { camera, up: Vec3::Z, diagonal: 1.0 }
+    }
+
+    #[test]
+    fn the_sun_is_behind_the_camera_or_at_the_upper_left_of_a_map() {
+        assert!((automatic_azimuth_deg(&context(DVec3::Y)) - 240.0).abs() < 1e-4);
+        assert!((automatic_azimuth_deg(&context(DVec3::X)) - 330.0).abs() < 1e-4);
+        assert!((automatic_azimuth_deg(&context(-DVec3::Z)) - 315.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn sun_and_sky_add_up_to_white_on_level_ground() {
+        let sun = Sun::direction_from_angles(10.0, 40.0, Vec3::Z).z * SUN_COLOR;
+        // 96 % of the cosine-weighted sky is as bright as the zenith, the rest half way to the ground.
+        let level = sun + 0.97 * SKY_COLOR + 0.03 * GROUND_COLOR;
+        assert!((level - Vec3::ONE).abs().max_element() < 0.02, "{level}");
+    }
+}
