@@ -20,7 +20,7 @@ pub struct Args {
     /// JSON instead of a table: one object a file, in an array if there are several.
     #[arg(long)]
     json: bool,
-    /// Columns of a text file, as in x,y,z,-,r,g,b; found out from the file if not given.
+    /// Columns of a text file, as in x,y,z,-,r,g,b; by default they are inferred from the file.
     #[arg(long, value_name = "NAMES")]
     columns: Option<String>,
 }

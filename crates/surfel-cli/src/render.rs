@@ -129,14 +129,12 @@ fn print_dry_run(description: &SceneDescription, report: &Report) -> anyhow::Res
 /// Returns a complete description as a scene file, with facts about the data and the machine.
 pub fn with_info(complete: &SceneDescription, loaded: &LoadedScene) -> Value {
     let (n_points, n_triangles) = loaded.graph.n_points_and_triangles();
-    let preparation = complete.objects_default.preparation(complete.picture.seed());
     let mut table = complete.to_table();
     table.insert(
         "info".into(),
         json!({
             "points": n_points,
             "triangles": n_triangles,
-            "preparation": format!("{preparation:?}"),
             "threads": rayon::current_num_threads(),
             "simd": Simd::detect().name(),
             "backend": "cpu",

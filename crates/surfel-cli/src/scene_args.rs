@@ -7,20 +7,29 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use surfel::SceneDescription;
 use surfel::description::{Invalid, is_scene_file};
+use surfel_formats::FORMATS;
 
 /// Files and options of a scene.
 #[derive(Args, Clone, Debug)]
 pub struct SceneArgs<S: Scope + Clone + Send + Sync + 'static> {
-    /// Point clouds (.ply, .las, .laz, .copc.laz, .xyz, .txt, .csv, .asc, .pts, .bin), meshes (.ply, .obj,
-    /// .stl), glTF scenes (.gltf, .glb) and scene files (.toml, .json); several make one scene. A folder
-    /// stands for its files, `*` for any part of a name, - for standard input.
-    #[arg(value_name = "FILE", required = true)]
+    #[arg(value_name = "FILE", required = true, help = files_help())]
     pub files: Vec<PathBuf>,
     /// Short for --background transparent.
     #[arg(long, conflicts_with = "background", help_heading = "Picture", hide_short_help = true)]
     no_background: bool,
     #[command(flatten)]
     options: KeyOptions<S>,
+}
+
+/// Describes the argument `files`.
+fn files_help() -> String {
+    let extensions = FORMATS.iter().flat_map(|format| format.extensions);
+    let extensions: Vec<String> = extensions.map(|extension| format!(".{extension}")).collect();
+    format!(
+        "Point clouds, meshes and glTF scenes ({}) and scene files (.toml, .json); several make one scene. \
+         A folder stands for its files, `*` for any part of a name, - for standard input",
+        extensions.join(", ")
+    )
 }
 
 impl<S: Scope + Clone + Send + Sync> SceneArgs<S> {

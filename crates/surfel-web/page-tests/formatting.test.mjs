@@ -36,6 +36,7 @@ test('materials survive parsing and formatting', () => {
     assert.equal(formatMaterial(parseMaterial(text)), text);
   }
   assert.deepEqual(parseMaterial('a=glass:ior=1.33').properties, { ior: '1.33' });
+  assert.deepEqual(parseMaterial('emissive:emissive-strength=2').properties, { emissive_strength: '2' });
 });
 
 test('an object uses its own last material before that of all objects', () => {

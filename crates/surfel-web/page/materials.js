@@ -8,10 +8,12 @@ export function parseMaterial(text) {
   const tail = hasProperties ? text.slice(colon + 1) : '';
   const equals = head.lastIndexOf('=');
   const pairs = tail ? tail.split(',').map((pair) => pair.split('=').map((word) => word.trim())) : [];
+  // The server writes `emissive-strength`, as a command line does.
+  const properties = pairs.map(([property, value]) => [property.replaceAll('-', '_'), value]);
   return {
     name: equals < 0 ? null : head.slice(0, equals),
     kind: head.slice(equals + 1),
-    properties: Object.fromEntries(pairs),
+    properties: Object.fromEntries(properties),
   };
 }
 
