@@ -20,8 +20,10 @@ pub struct FlatCloud {
     pub edge_test: EdgeTest,
     /// True if normals point out of the body that the points enclose.
     pub has_outward_normals: bool,
-    /// Maximum distance between a ray's nearest disc and the discs blended with it: the largest radius, or 0 if
-    /// the surface does not blend discs.
+    /// True if colours may be blended; false if each belongs to one point, as those of classes do.
+    pub blends_colors: bool,
+    /// Maximum distance between a ray's nearest disc and the discs that decide about its hit: the largest radius,
+    /// or 0 if the disc itself is the surface.
     pub max_blend_distance: f32,
 }
 
@@ -59,6 +61,7 @@ impl FlatCloud {
             surface: geometry.surface,
             edge_test: geometry.edge_test,
             has_outward_normals: geometry.has_outward_normals,
+            blends_colors: geometry.blends_colors,
             max_blend_distance: 0.0,
         };
         flat.set_max_blend_distance();
@@ -82,8 +85,8 @@ impl FlatCloud {
     }
 
     fn set_max_blend_distance(&mut self) {
-        let blends_discs = self.surface.blends_discs();
-        self.max_blend_distance = if blends_discs { self.points.max_radius() } else { 0.0 };
+        let looks_behind = self.surface.blends_discs() || self.surface == SurfaceKind::Smooth;
+        self.max_blend_distance = if looks_behind { self.points.max_radius() } else { 0.0 };
     }
 }
 

@@ -5,7 +5,7 @@ use crate::points::{PointCloud, PreparedCloud, check_length};
 use crate::surface::{EdgeTest, SurfaceKind};
 
 /// A prepared cloud with one colour for each point, and the surface that its points describe.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct CloudGeometry {
     cloud: PreparedCloud,
     /// sRGB-encoded, one for each point.
@@ -14,9 +14,25 @@ pub struct CloudGeometry {
     pub surface: SurfaceKind,
     /// The test that rejects hits beyond the edge of the surface.
     pub edge_test: EdgeTest,
+    /// True if colours of neighbouring points may be blended; false if each belongs to one point, as those of
+    /// classes do.
+    pub blends_colors: bool,
     /// True if normals point out of the body that the points enclose, which gives glass an interior. If not,
     /// every other hit of a ray enters the body (Schaufler and Jensen 2000).
     pub has_outward_normals: bool,
+}
+
+impl Default for CloudGeometry {
+    fn default() -> Self {
+        Self {
+            cloud: PreparedCloud::default(),
+            colors: Vec::new(),
+            surface: SurfaceKind::default(),
+            edge_test: EdgeTest::default(),
+            blends_colors: true,
+            has_outward_normals: false,
+        }
+    }
 }
 
 impl CloudGeometry {

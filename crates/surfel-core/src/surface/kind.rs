@@ -1,6 +1,7 @@
 //! The surface kinds of a point cloud.
 
 use super::disc;
+use super::smooth;
 use super::sphere;
 use crate::error::Error;
 use crate::math::{Aabb, Ray, Vec3};
@@ -18,22 +19,26 @@ pub enum SurfaceKind {
     SplatMean,
     /// All discs within one radius behind the nearest are blended, with normals first turned toward the ray's
     /// origin.
-    #[default]
     Splat,
     /// All discs within two radii behind the nearest are blended; the normal is that of a plane fitted to
     /// their centres.
     SplatFit,
+    /// Spheres are fitted to the points around each position (Guennebaud and Gross, Algebraic Point Set Surfaces,
+    /// 2007): one smooth surface for rays of all kinds.
+    #[default]
+    Smooth,
 }
 
 impl SurfaceKind {
     /// Every kind with its name.
-    pub const ALL: [(&'static str, Self); 6] = [
+    pub const ALL: [(&'static str, Self); 7] = [
         ("points", Self::Points),
         ("sphere", Self::Sphere),
         ("disc", Self::Disc),
         ("splat-mean", Self::SplatMean),
         ("splat", Self::Splat),
         ("splat-fit", Self::SplatFit),
+        ("smooth", Self::Smooth),
     ];
 
     /// Returns the name that `from_str` parses.
@@ -72,10 +77,10 @@ impl SurfaceKind {
     /// (Schaufler and Jensen 2000). Spheres are solid and need an offset for the rounding of f32 only.
     pub fn spawn_ray(self, position: Vec3, normal: Vec3, radius: f32, direction: Vec3) -> Ray {
         let rounding = 4.0 * f32::EPSILON * position.abs().max_element();
-        let (offset, t_min) = if self.uses_discs() {
-            (disc::SPAWN_OFFSET * radius, disc::SPAWN_T_MIN * radius)
-        } else {
-            (1e-3 * radius, 0.0)
+        let (offset, t_min) = match self {
+            Self::Smooth => (smooth::SPAWN_OFFSET * radius, smooth::SPAWN_T_MIN * radius),
+            _ if self.uses_discs() => (disc::SPAWN_OFFSET * radius, disc::SPAWN_T_MIN * radius),
+            _ => (1e-3 * radius, 0.0),
         };
         let origin = position + (offset + rounding) * normal;
         Ray { origin, t_min, direction, t_max: f32::INFINITY }

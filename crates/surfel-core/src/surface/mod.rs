@@ -4,6 +4,7 @@ mod disc;
 mod edge_test;
 mod kind;
 mod shape;
+mod smooth;
 mod sphere;
 mod splat;
 pub mod triangle;
@@ -15,6 +16,7 @@ pub use edge_test::{
 };
 pub use kind::SurfaceKind;
 pub use shape::{MAX_NORMAL_COMPONENT, PointLanes, RayLanes, Shape};
+pub use smooth::{ColorSums, FIT_REACH, FitPoint, SUPPORT_FACTOR, SphereHit, SphereSums};
 pub use sphere::Sphere;
 pub use splat::{MAX_GATHERED, SplatAccumulator, Surfel, fit_plane_normal, gather_limit};
 pub use triangle::{RayFrame, RayRelativeTriangles, Triangle, TriangleLanes};

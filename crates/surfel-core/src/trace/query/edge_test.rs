@@ -184,9 +184,7 @@ fn evaluate_in_groups<L: Lanes>(
     let stored = hits.store();
     let mut result = EdgeTestResult { enclosed: 0, sparse: 0 };
     while lanes != 0 {
-        let first = lanes.trailing_zeros() as usize % PACKET_WIDTH;
-        let (center, CandidateHit { radius, .. }) = stored.in_lane(first);
-        let group = 1 << first | lanes & hits.near(center, MAX_GROUP_SPREAD * radius);
+        let group = hits.group_of_first(lanes, MAX_GROUP_SPREAD);
         lanes &= !group;
         if MIN_GROUP_SIZE <= group.count_ones() {
             let EdgeTestResult { enclosed, sparse } = evaluate_group::<L>(points, group, hits);
@@ -230,7 +228,7 @@ fn evaluate_group<L: Lanes>(
     group: u32,
     hits: &PacketCandidates<L::PacketLanes>,
 ) -> EdgeTestResult {
-    let region = hits.region(group);
+    let region = hits.region(group, NEIGHBORHOOD_RADIUS_FACTOR);
     let mut found = GroupVisitor::<L> {
         position: hits.position,
         region,
@@ -281,19 +279,34 @@ impl<W: PacketLanes> PacketCandidates<W> {
         offset.le(W::splat(distance)).bits()
     }
 
-    /// Returns the box around the neighbourhoods of the hits in `lanes`.
+    /// Returns the lanes of the first hit of `lanes` and of those within `spread` of its radii along each axis.
     #[inline(always)]
-    fn region(&self, lanes: u32) -> Aabb {
-        let mut is_member = [0.0; PACKET_WIDTH];
-        for (lane, is_member) in is_member.iter_mut().enumerate() {
-            *is_member = (lanes >> lane & 1) as f32;
-        }
-        let lanes = W::splat(0.0).lt(W::load(&is_member));
-        let reach = W::splat(NEIGHBORHOOD_RADIUS_FACTOR) * self.radius;
+    pub fn group_of_first(&self, lanes: u32, spread: f32) -> u32 {
+        let first = lanes.trailing_zeros() as usize % PACKET_WIDTH;
+        let [x, y, z] = self.position.store_packet();
+        let center = Vec3::new(x[first], y[first], z[first]);
+        1 << first | lanes & self.near(center, spread * self.radius.store()[first])
+    }
+
+    /// Returns the box around the neighbourhoods of the hits in `lanes`, which reach `reach` radii far.
+    #[inline(always)]
+    pub fn region(&self, lanes: u32, reach: f32) -> Aabb {
+        self.region_along_rays(lanes, reach, 0.0)
+    }
+
+    /// Returns the box around all neighbourhoods of `reach` radii about positions on the rays in `lanes`, up to
+    /// `distance` radii before and behind the hits.
+    #[inline(always)]
+    pub fn region_along_rays(&self, lanes: u32, reach: f32, distance: f32) -> Aabb {
+        let lanes = lane_mask::<W>(lanes);
         let (none_low, none_high) = (W::splat(f32::INFINITY), W::splat(f32::NEG_INFINITY));
         let Vec3Lanes { x, y, z } = self.position;
+        let Vec3Lanes { x: to_x, y: to_y, z: to_z } = self.direction;
         let mut region = Aabb::EMPTY;
-        for (axis, position) in [x, y, z].into_iter().enumerate() {
+        for (axis, (position, direction)) in
+            [(x, to_x), (y, to_y), (z, to_z)].into_iter().enumerate()
+        {
+            let reach = (W::splat(reach) + W::splat(distance) * direction.abs()) * self.radius;
             region.min[axis] = W::select(lanes, position - reach, none_low).reduce_min();
             region.max[axis] = W::select(lanes, position + reach, none_high).reduce_max();
         }
@@ -310,6 +323,16 @@ impl<W: PacketLanes> PacketCandidates<W> {
             radius: self.radius.store(),
         }
     }
+}
+
+/// Returns the mask of these lanes.
+#[inline(always)]
+pub fn lane_mask<W: PacketLanes>(lanes: u32) -> W::Mask {
+    let mut is_set = [0.0; PACKET_WIDTH];
+    for (lane, is_set) in is_set.iter_mut().enumerate() {
+        *is_set = (lanes >> lane & 1) as f32;
+    }
+    W::splat(0.0).lt(W::load(&is_set))
 }
 
 /// The hits of up to sixteen rays, from which single ones can be read.

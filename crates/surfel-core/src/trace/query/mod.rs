@@ -11,5 +11,6 @@ pub mod packet_disc_hits;
 pub mod gather;
 pub mod edge_test;
 pub mod edge_filter;
+pub mod smooth_query;
 pub mod splat_query;
 pub mod surface;

@@ -1,13 +1,15 @@
 //! The continuous surface of a cloud: blended discs without the hits that the edge test rejects, or spheres.
 
 use crate::flat::FlatCloud;
-use crate::math::{Lanes, Ray, Vec3};
-use crate::surface::{Disc, EdgeTest};
+use crate::math::{Lanes, PACKET_WIDTH, PacketLanes, Ray, Vec3};
+use crate::surface::{Disc, EdgeTest, SurfaceKind};
 use crate::trace::query::any::{any_accepted_hit, any_hits_kernel};
 use crate::trace::query::closest::closest_hits_kernel;
 use crate::trace::query::edge_filter::EdgeFilter;
 use crate::trace::query::hit::Hit;
+use crate::trace::query::smooth_query::{SmoothFilter, SmoothTracer};
 use crate::trace::query::splat_query::{Splat, SplatTracer};
+use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::simd::{Simd, dispatch_simd};
 
 /// The hit of a ray on the surface.
@@ -49,6 +51,8 @@ impl SurfaceHit {
 const MAX_REJECTED_HITS: usize = 24;
 /// Distance behind a rejected hit at which the search restarts, in radii.
 const RESTART_OFFSET: f32 = 0.05;
+/// Distance behind a disc without a smooth surface nearby at which the search restarts, in radii.
+const SMOOTH_RESTART_OFFSET: f32 = 0.3;
 
 /// Finds the closest hit of each ray on the continuous surface.
 pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
@@ -63,10 +67,10 @@ pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [Sur
 
 #[inline(always)]
 fn surface_hits_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
-    if cloud.surface.uses_discs() {
-        splat_hits::<L>(cloud, rays, hits);
-    } else {
-        sphere_hits::<L>(cloud, rays, hits);
+    match cloud.surface {
+        SurfaceKind::Smooth => trace_smooth::<L>(cloud, rays, hits),
+        kind if kind.uses_discs() => splat_hits::<L>(cloud, rays, hits),
+        _ => sphere_hits::<L>(cloud, rays, hits),
     }
 }
 
@@ -80,7 +84,9 @@ pub fn occlusions(cloud: &FlatCloud, simd: Simd, rays: &[Ray], occluded: &mut [b
 
 #[inline(always)]
 fn occlusions_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [bool]) {
-    if !cloud.surface.uses_discs() || cloud.edge_test == EdgeTest::Off {
+    if cloud.surface == SurfaceKind::Smooth {
+        any_accepted_hit::<L, Disc, _>(&cloud.points, rays, SmoothFilter(cloud), occluded);
+    } else if !cloud.surface.uses_discs() || cloud.edge_test == EdgeTest::Off {
         any_hits_kernel::<L>(cloud, rays, occluded);
     } else {
         any_accepted_hit::<L, Disc, _>(&cloud.points, rays, EdgeFilter(cloud), occluded);
@@ -107,6 +113,74 @@ fn sphere_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit
             color: sphere.color,
             is_backface: 0.0 < outward.dot(ray.direction),
         };
+    }
+}
+
+/// Traces all rays together until each hits the smooth surface, or hits no more discs.
+#[inline(always)]
+fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    hits.fill(SurfaceHit::MISS);
+    let mut searching: Vec<u32> = (0..rays.len() as u32).collect();
+    let all_rays = rays;
+    let mut rays = rays.to_vec();
+    let mut nearest = vec![Hit::MISS; rays.len()];
+    let mut tracer = SmoothTracer::new(cloud);
+    for _ in 0..MAX_REJECTED_HITS {
+        let nearest = &mut nearest[..rays.len()];
+        closest_hits_kernel::<L>(cloud, &rays, nearest);
+        let mut n_candidates = 0;
+        for i in 0..nearest.len() {
+            if !nearest[i].is_miss() {
+                (rays[n_candidates], nearest[n_candidates]) = (rays[i], nearest[i]);
+                searching[n_candidates] = searching[i];
+                n_candidates += 1;
+            }
+        }
+        let mut n_left = 0;
+        for first in (0..n_candidates).step_by(PACKET_WIDTH) {
+            let packet = first..n_candidates.min(first + PACKET_WIDTH);
+            let (mut slots, mut distances) = ([0; PACKET_WIDTH], [0.0; PACKET_WIDTH]);
+            for (lane, hit) in nearest[packet.clone()].iter().enumerate() {
+                (slots[lane], distances[lane]) = (hit.slot, hit.distance);
+            }
+            // The surface may lie before a disc, and even before the discs that were rejected.
+            let mut whole_rays = [all_rays[0]; PACKET_WIDTH];
+            for (ray, ray_idx) in whole_rays.iter_mut().zip(&searching[packet.clone()]) {
+                *ray = all_rays[*ray_idx as usize];
+            }
+            let packet_rays = PacketRays::<L::PacketLanes>::new(&whole_rays);
+            let lanes = (1 << packet.len()) - 1;
+            let disc_distances = L::PacketLanes::load(&distances);
+            let found = tracer.trace::<L>(&packet_rays, lanes, disc_distances, &slots);
+            let (found_distances, [r, g, b]) =
+                (found.distances.store(), found.colors.store_packet());
+            let [x, y, z] = found.normals.store_packet();
+            let nearest_slots = found.slots.store().map(f32::to_bits);
+            for lane in 0..packet.len() {
+                let (ray, ray_idx) = (rays[first + lane], searching[first + lane]);
+                let radius = cloud.points.radius(slots[lane]);
+                if found.lanes >> lane & 1 == 1 {
+                    let slot = nearest_slots[lane];
+                    hits[ray_idx as usize] = SurfaceHit {
+                        distance: found_distances[lane],
+                        id: cloud.points.id(slot),
+                        radius,
+                        normal: Vec3::new(x[lane], y[lane], z[lane]),
+                        color: Vec3::new(r[lane], g[lane], b[lane]),
+                        is_backface: 0.0 < cloud.points.normal(slot).dot(ray.direction),
+                    };
+                    continue;
+                }
+                let behind = distances[lane] + SMOOTH_RESTART_OFFSET * radius;
+                let t_min = behind.max(distances[lane] * (1.0 + 2.0 * f32::EPSILON));
+                (rays[n_left], searching[n_left]) = (Ray { t_min, ..ray }, ray_idx);
+                n_left += 1;
+            }
+        }
+        rays.truncate(n_left);
+        if rays.is_empty() {
+            return;
+        }
     }
 }
 

@@ -1,0 +1,232 @@
+//! Smooth surfaces: at each position a sphere is fitted to the weighted points around it (algebraic point set
+//! surfaces, Guennebaud and Gross 2007). Weights also fall with the angle between normals, which keeps edges
+//! (robust implicit moving least squares, Öztireli, Guennebaud and Gross 2009).
+
+use crate::math::{Floats, Lanes, ROUND_TO_INTEGER, Vec3, Vec3Lanes};
+
+/// Radius of a point's weight function, in radii of the point.
+pub const SUPPORT_FACTOR: f32 = 1.2;
+/// Maximum distance of a point from the position of a fit, in radii of the disc that was hit.
+pub const FIT_REACH: f32 = 1.4;
+/// The height of the origin of secondary rays above the surface, in radii.
+pub(super) const SPAWN_OFFSET: f32 = 0.2;
+/// The distance before which secondary rays ignore hits, in radii.
+pub(super) const SPAWN_T_MIN: f32 = 0.5;
+/// Steps per unit to which the terms of sums are rounded. f32 adds a thousand terms of up to 1 exactly, so that
+/// sums do not depend on the order of points.
+const STEPS: f32 = 16_384.0;
+/// Exponent of the weight of normals at an angle of 90 degrees: 2 / 0.75^2.
+const NORMAL_FALLOFF: f32 = 3.6;
+/// Maximum curvature of a fitted sphere's equation, in 1 / radius: its radius is at least half a disc's radius.
+const MAX_CURVATURE: f32 = 1.0;
+/// Distance of a point's plane from the position, in radii, beyond which the point belongs to another sheet.
+const MAX_PLANE_DISTANCE: f32 = 0.8;
+/// Maximum distance along the ray from the position of a fit to the sphere, in radii.
+const MAX_STEP: f32 = 1.5;
+
+/// Weighted sums over the points around positions, one position or one point per lane.
+#[derive(Clone, Copy)]
+pub struct SphereSums<F> {
+    /// Unit normals to which the points' normals are compared.
+    guide: Vec3Lanes<F>,
+    /// Reciprocal of the radius of the disc that was hit: offsets are in radii.
+    per_radius: F,
+    weight: F,
+    offset: Vec3Lanes<F>,
+    normal: Vec3Lanes<F>,
+    offset_dot_normal: F,
+    offset_squared: F,
+}
+
+/// A point near the position of a fit.
+#[derive(Clone, Copy)]
+pub struct FitPoint<F> {
+    /// The point relative to the position.
+    pub offset: Vec3Lanes<F>,
+    /// Unit normal.
+    pub normal: Vec3Lanes<F>,
+    /// Reciprocal of the square of the support's radius.
+    pub inverse_support: F,
+}
+
+impl<F: Floats> FitPoint<F> {
+    /// Returns the weight of the point, which falls from 1 at the position to 0 at the support's radius.
+    #[inline(always)]
+    pub fn weight(&self) -> F {
+        let one = F::splat(1.0);
+        let inside = (one - self.offset.dot(self.offset) * self.inverse_support).max(F::splat(0.0));
+        let squared = inside * inside;
+        squared * squared
+    }
+}
+
+/// Rounds to a multiple of `1 / STEPS`, scaled by `STEPS`.
+#[inline(always)]
+fn in_steps<F: Floats>(value: F) -> F {
+    let to_integer = F::splat(ROUND_TO_INTEGER);
+    value * F::splat(STEPS) + to_integer - to_integer
+}
+
+#[inline(always)]
+fn in_steps_vector<F: Floats>(vector: Vec3Lanes<F>) -> Vec3Lanes<F> {
+    Vec3Lanes { x: in_steps(vector.x), y: in_steps(vector.y), z: in_steps(vector.z) }
+}
+
+impl<F: Floats> SphereSums<F> {
+    /// Returns the sums over no points, for discs of `radius` whose unit normals are `guide`.
+    #[inline(always)]
+    pub fn new(guide: Vec3Lanes<F>, radius: F) -> Self {
+        let (zero, none) = (F::splat(0.0), Vec3Lanes::splat(Vec3::ZERO));
+        Self {
+            guide,
+            per_radius: F::splat(1.0) / radius,
+            weight: zero,
+            offset: none,
+            normal: none,
+            offset_dot_normal: zero,
+            offset_squared: zero,
+        }
+    }
+
+    /// Returns the lanes in which a point at `offset` may take part in the fit.
+    #[inline(always)]
+    pub fn is_near(&self, offset: Vec3Lanes<F>) -> F::Mask {
+        let squared = offset.dot(offset) * self.per_radius * self.per_radius;
+        squared.lt(F::splat(FIT_REACH * FIT_REACH))
+    }
+
+    /// Adds a point in `lanes`, to which it is near. Its normal is turned to the side of the guide.
+    #[inline(always)]
+    pub fn add(&mut self, point: &FitPoint<F>, lanes: F::Mask) {
+        let (zero, one) = (F::splat(0.0), F::splat(1.0));
+        let offset = point.offset.scaled(self.per_radius);
+        let cosine = point.normal.dot(self.guide);
+        let height = point.normal.dot(offset) * F::splat(1.0 / MAX_PLANE_DISTANCE);
+        let closeness = (one - height * height).max(zero);
+        let weight = point.weight() * alignment(cosine.abs()) * closeness * closeness;
+        let weight = F::select(lanes, weight, zero);
+        let side = F::select(cosine.lt(zero), zero - one, one);
+        let normal = point.normal.scaled(weight * side);
+        let weighted_offset = offset.scaled(weight);
+        self.weight = self.weight + in_steps(weight);
+        self.offset = self.offset.plus(in_steps_vector(weighted_offset));
+        self.normal = self.normal.plus(in_steps_vector(normal));
+        self.offset_dot_normal = self.offset_dot_normal + in_steps(offset.dot(normal));
+        self.offset_squared = self.offset_squared + in_steps(offset.dot(weighted_offset));
+    }
+
+    /// Fits a sphere to the points and intersects it with rays through the positions along unit vectors
+    /// `direction`.
+    #[inline(always)]
+    pub fn intersect(&self, direction: Vec3Lanes<F>) -> SphereHit<F> {
+        let (zero, one) = (F::splat(0.0), F::splat(1.0));
+        let per_weight = one / self.weight;
+        // The squared spread of the points is never far below zero, and zero for a single point.
+        let spread = self.offset_squared - self.offset.dot(self.offset) * per_weight;
+        let bend = self.offset_dot_normal - self.offset.dot(self.normal) * per_weight;
+        let curvature = F::splat(0.5) * bend / spread;
+        let (least, most) = (F::splat(-MAX_CURVATURE), F::splat(MAX_CURVATURE));
+        let has_spread = F::splat(1e-4).lt(spread * per_weight);
+        let curvature = F::select(has_spread, curvature.max(least).min(most), zero);
+        let twice = curvature + curvature;
+        let gradient = self.normal.minus(self.offset.scaled(twice)).scaled(per_weight);
+        let value =
+            zero - (gradient.dot(self.offset) + curvature * self.offset_squared) * per_weight;
+        // The root of value + slope t + curvature t^2 that is nearest to zero, in a form without cancellation.
+        let slope = gradient.dot(direction);
+        let discriminant = slope * slope - F::splat(4.0) * curvature * value;
+        let root = discriminant.max(zero).sqrt();
+        let denominator = slope + F::select(slope.lt(zero), zero - root, root);
+        let step = (zero - (value + value)) / denominator;
+        let normal = gradient.plus(direction.scaled(twice * step));
+        let length = normal.dot(normal).sqrt();
+        let is_near = step.abs().le(F::splat(MAX_STEP));
+        let is_hit =
+            zero.lt(self.weight) & zero.le(discriminant) & is_near & F::splat(1e-3).lt(length);
+        SphereHit { step: step / self.per_radius, normal: normal.scaled(one / length), is_hit }
+    }
+}
+
+/// Returns the weight of a normal by the cosine of its angle to the guide: about exp(-|a - b|^2 / 0.75^2).
+#[inline(always)]
+fn alignment<F: Floats>(cosine: F) -> F {
+    let one = F::splat(1.0);
+    let eighth = one - (one - cosine) * F::splat(NORMAL_FALLOFF / 8.0);
+    let (squared, zero) = (eighth * eighth, F::splat(0.0));
+    let fourth = squared * squared;
+    F::select(zero.lt(eighth), fourth * fourth, zero)
+}
+
+/// The intersection of rays with fitted spheres.
+#[derive(Clone, Copy)]
+pub struct SphereHit<F: Floats> {
+    /// Distance along the ray from the position of the fit.
+    pub step: F,
+    /// Unit normal on the side of the guide.
+    pub normal: Vec3Lanes<F>,
+    /// Lanes in which the sphere is hit near the position.
+    pub is_hit: F::Mask,
+}
+
+impl<L: Lanes> SphereSums<L> {
+    /// Sums up all lanes, whose position must be the same.
+    #[inline(always)]
+    pub fn reduce_lanes(self) -> SphereSums<f32> {
+        let vector = |vector: Vec3Lanes<L>| Vec3Lanes {
+            x: sum(vector.x),
+            y: sum(vector.y),
+            z: sum(vector.z),
+        };
+        let Vec3Lanes { x, y, z } = self.guide;
+        SphereSums {
+            guide: Vec3Lanes { x: x.store()[0], y: y.store()[0], z: z.store()[0] },
+            per_radius: self.per_radius.store()[0],
+            weight: sum(self.weight),
+            offset: vector(self.offset),
+            normal: vector(self.normal),
+            offset_dot_normal: sum(self.offset_dot_normal),
+            offset_squared: sum(self.offset_squared),
+        }
+    }
+}
+
+/// Returns the sum of all lanes, which is exact for the terms of `SphereSums`.
+#[inline(always)]
+fn sum<L: Lanes>(lanes: L) -> f32 {
+    let lanes = lanes + lanes.rotate_lanes::<4>();
+    let lanes = lanes + lanes.rotate_lanes::<2>();
+    (lanes + lanes.rotate_lanes::<1>()).store()[0]
+}
+
+/// The colour at a position: the mean of the points' colours, with weights that fall off more steeply than those
+/// of the fit, and the nearest point.
+#[derive(Clone, Copy)]
+pub struct ColorSums<F> {
+    weight: F,
+    color: Vec3Lanes<F>,
+}
+
+impl<F: Floats> ColorSums<F> {
+    /// Returns the sums over no points.
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self { weight: F::splat(0.0), color: Vec3Lanes::splat(Vec3::ZERO) }
+    }
+
+    /// Adds a point of a linear colour in `lanes`.
+    #[inline(always)]
+    pub fn add(&mut self, point: &FitPoint<F>, color: Vec3Lanes<F>, lanes: F::Mask) {
+        let weight = point.weight();
+        let weight = F::select(lanes, weight * weight * weight, F::splat(0.0));
+        self.weight = self.weight + in_steps(weight);
+        self.color = self.color.plus(in_steps_vector(color.scaled(weight)));
+    }
+
+    /// Returns the mean colour, or `otherwise` where no point has a weight.
+    #[inline(always)]
+    pub fn mean(&self, otherwise: Vec3Lanes<F>) -> Vec3Lanes<F> {
+        let has_weight = F::splat(0.0).lt(self.weight);
+        let mean = self.color.scaled(F::splat(1.0) / self.weight);
+        Vec3Lanes::select(has_weight, mean, otherwise)
+    }
+}

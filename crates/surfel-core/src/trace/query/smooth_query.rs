@@ -1,0 +1,442 @@
+//! The smooth surface along rays: from the disc that a ray hits to the sphere fitted to the points around.
+
+use crate::flat::{FlatCloud, FlatPoints, PointBlock, Slot};
+use crate::math::{
+    Aabb, Floats, LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Ray, SimdTask, Vec3,
+    Vec3Lanes, set_bits,
+};
+use crate::surface::{
+    CandidateHit, CandidateHitLanes, ColorSums, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint,
+    NeighborhoodStats, SUPPORT_FACTOR, SphereSums,
+};
+use crate::trace::query::any::HitFilter;
+use crate::trace::query::edge_test::{PacketCandidates, enclosed_lanes, is_enclosed, lane_mask};
+use crate::trace::query::hit::{Hit, NearestHits};
+use crate::trace::simd::packet_rays::PacketRays;
+use crate::trace::traversal::region::{BoxVisitor, query_box};
+use std::marker::PhantomData;
+
+/// Maximum number of fits along a ray, each at the intersection with the sphere before.
+const MAX_FITS: usize = 4;
+/// Distance between a fit's position and its intersection, in radii, at which the intersection is the surface.
+const TOLERANCE: f32 = 0.01;
+/// Maximum distance of the last fit from its intersection, in radii: a ray with a longer one has found no surface.
+const MAX_LAST_STEP: f32 = 0.2;
+/// Maximum distance along the ray between the disc that was hit and the surface, in radii.
+const MAX_DISTANCE_FROM_DISC: f32 = 1.0;
+/// Maximum distance of hits that share a traversal of the tree from the first one along any axis, in radii.
+const MAX_GROUP_SPREAD: f32 = 2.0;
+
+/// Surface points of up to sixteen rays.
+#[derive(Clone, Copy)]
+pub struct SmoothHits<W> {
+    /// Lanes of the rays that hit the surface.
+    pub lanes: u32,
+    /// Distances along the rays.
+    pub distances: W,
+    /// Unit normals, facing the rays' origins.
+    pub normals: Vec3Lanes<W>,
+    /// Linear colours.
+    pub colors: Vec3Lanes<W>,
+    /// Slots of the points nearest to the hits, as bits.
+    pub slots: W,
+}
+
+/// Finds where rays hit the surface near the discs that they hit. The memory is reused from packet to packet.
+pub struct SmoothTracer<'s> {
+    cloud: &'s FlatCloud,
+    blocks: Vec<StoredBlock>,
+}
+
+impl<'s> SmoothTracer<'s> {
+    /// Returns a tracer of the cloud's smooth surface.
+    pub fn new(cloud: &'s FlatCloud) -> Self {
+        Self { cloud, blocks: Vec::new() }
+    }
+
+    /// Finds for those `lanes` whose rays hit the discs in `slots` at `distances` where they hit the surface, with
+    /// the colours there.
+    #[inline(always)]
+    pub fn trace<L: Lanes>(
+        &mut self,
+        rays: &PacketRays<L::PacketLanes>,
+        lanes: u32,
+        distances: L::PacketLanes,
+        slots: &[Slot; PACKET_WIDTH],
+    ) -> SmoothHits<L::PacketLanes> {
+        let Self { cloud, blocks } = self;
+        L::dispatch(FindSurface::<L, true> { cloud, blocks, rays, lanes, distances, slots })
+    }
+}
+
+/// The search for the surface along the rays of a packet, with colours or without.
+struct FindSurface<'a, L: Lanes, const HAS_COLORS: bool> {
+    cloud: &'a FlatCloud,
+    blocks: &'a mut Vec<StoredBlock>,
+    rays: &'a PacketRays<L::PacketLanes>,
+    lanes: u32,
+    distances: L::PacketLanes,
+    slots: &'a [Slot; PACKET_WIDTH],
+}
+
+impl<L: Lanes, const HAS_COLORS: bool> SimdTask for FindSurface<'_, L, HAS_COLORS> {
+    type Output = SmoothHits<L::PacketLanes>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self { cloud, blocks, rays, lanes, distances, slots } = self;
+        let candidates = candidates(&cloud.points, rays, lanes, distances, slots);
+        let mut hits = SmoothHits {
+            lanes: 0,
+            distances,
+            normals: candidates.normal,
+            colors: Vec3Lanes::splat(Vec3::ZERO),
+            slots: L::PacketLanes::splat(f32::from_bits(Hit::MISS.slot)),
+        };
+        let mut left = lanes;
+        while left != 0 {
+            let group = candidates.group_of_first(left, MAX_GROUP_SPREAD);
+            left &= !group;
+            let region = candidates.region_along_rays(group, FIT_REACH, MAX_DISTANCE_FROM_DISC);
+            collect_blocks::<L>(&cloud.points, &region, blocks);
+            let found = approach(blocks, rays, &candidates, group, &mut hits);
+            finish::<L, HAS_COLORS>(cloud, blocks, rays, &candidates, found, &mut hits);
+        }
+        hits
+    }
+}
+
+/// Returns the hits of rays on discs.
+#[inline(always)]
+fn candidates<W: PacketLanes>(
+    points: &FlatPoints,
+    rays: &PacketRays<W>,
+    lanes: u32,
+    distances: W,
+    slots: &[Slot; PACKET_WIDTH],
+) -> PacketCandidates<W> {
+    let (mut normals, mut radii) = ([[0.0; PACKET_WIDTH]; 3], [1.0; PACKET_WIDTH]);
+    for lane in set_bits::<PACKET_WIDTH>(lanes) {
+        let normal = points.normal(slots[lane]);
+        [normals[0][lane], normals[1][lane], normals[2][lane]] = normal.to_array();
+        radii[lane] = points.radius(slots[lane]);
+    }
+    let direction = rays.direction();
+    PacketCandidates {
+        position: rays.origin().plus(direction.scaled(distances)),
+        normal: facing(Vec3Lanes::load_packet(&normals), direction),
+        direction,
+        radius: W::load(&radii),
+    }
+}
+
+/// Moves hits of a group along their rays to the surface, and returns the lanes that reach it.
+#[inline(always)]
+fn approach<W: PacketLanes>(
+    blocks: &[StoredBlock],
+    rays: &PacketRays<W>,
+    candidates: &PacketCandidates<W>,
+    group: u32,
+    hits: &mut SmoothHits<W>,
+) -> u32 {
+    let PacketCandidates { direction, radius, .. } = *candidates;
+    let start = hits.distances;
+    let (mut open, mut found) = (group, 0);
+    let mut position = candidates.position;
+    for fit in 1..=MAX_FITS {
+        let lanes = lane_mask::<W>(open);
+        let mut sums = SphereSums::new(hits.normals, radius);
+        for block in blocks {
+            let corner = block.corner_from(&position);
+            for lane in set_bits::<LANES>(block.lanes) {
+                let point = block.point(&corner, lane);
+                let near = lanes & sums.is_near(point.offset);
+                if near.bits() != 0 {
+                    sums.add(&point, near);
+                }
+            }
+        }
+        let sphere = sums.intersect(direction);
+        let distance = hits.distances + sphere.step;
+        let is_near = (distance - start).abs().le(W::splat(MAX_DISTANCE_FROM_DISC) * radius);
+        let moved = lanes & sphere.is_hit & is_near;
+        hits.distances = W::select(moved, distance, hits.distances);
+        hits.normals = Vec3Lanes::select(moved, facing(sphere.normal, direction), hits.normals);
+        position = rays.origin().plus(direction.scaled(hits.distances));
+        let tolerance = if fit == MAX_FITS { MAX_LAST_STEP } else { TOLERANCE };
+        let converged = moved & sphere.step.abs().le(W::splat(tolerance) * radius);
+        found |= converged.bits();
+        open &= moved.bits() & !converged.bits();
+        if open == 0 {
+            break;
+        }
+    }
+    let in_range = rays.t_min.le(hits.distances) & hits.distances.le(rays.t_max);
+    found & in_range.bits()
+}
+
+/// Adds the hits in `lanes` that the points enclose, with their nearest points and colours.
+#[inline(always)]
+fn finish<L: Lanes, const HAS_COLORS: bool>(
+    cloud: &FlatCloud,
+    blocks: &[StoredBlock],
+    rays: &PacketRays<L::PacketLanes>,
+    candidates: &PacketCandidates<L::PacketLanes>,
+    lanes: u32,
+    hits: &mut SmoothHits<L::PacketLanes>,
+) {
+    if lanes == 0 {
+        return;
+    }
+    let PacketCandidates { direction, radius, .. } = *candidates;
+    let position = rays.origin().plus(direction.scaled(hits.distances));
+    let mask = lane_mask::<L::PacketLanes>(lanes);
+    let mut neighborhood =
+        NeighborhoodStats::new(CandidateHitLanes::new(hits.normals, direction, radius));
+    let reach = L::PacketLanes::splat(FIT_REACH) * radius;
+    let max_squared = reach * reach;
+    let mut colors = ColorSums::new();
+    let mut nearest =
+        NearestHits { distances: L::PacketLanes::splat(f32::INFINITY), slots: hits.slots };
+    for block in blocks {
+        let corner = block.corner_from(&position);
+        for lane in set_bits::<LANES>(block.lanes) {
+            let point = block.point(&corner, lane);
+            let is_neighbor = mask & neighborhood.is_neighbor(point.offset);
+            if is_neighbor.bits() != 0 {
+                let normal = Vec3Lanes::splat_lane(&block.normals, lane);
+                neighborhood.add(point.offset, normal, is_neighbor);
+            }
+            if HAS_COLORS {
+                let slot = block.first_slot + lane as u32;
+                let squared = point.offset.dot(point.offset);
+                let is_near = mask & squared.lt(max_squared);
+                if is_near.bits() == 0 {
+                    continue;
+                }
+                if cloud.blends_colors {
+                    let color = cloud.points.surfel(slot).color;
+                    colors.add(&point, Vec3Lanes::splat(color), is_near);
+                }
+                let slot = L::PacketLanes::splat(f32::from_bits(slot));
+                nearest.merge(is_near, squared, slot);
+            }
+        }
+    }
+    let mut accepted = lanes;
+    if cloud.edge_test != EdgeTest::Off {
+        let EdgeTestResult { enclosed, sparse } = neighborhood.evaluate();
+        accepted &= enclosed & !sparse;
+        let sparse = lanes & sparse;
+        if sparse != 0 {
+            let hits = PacketCandidates { position, normal: hits.normals, direction, radius };
+            accepted |= enclosed_lanes::<L>(&cloud.points, sparse, &hits);
+        }
+    }
+    hits.lanes |= accepted;
+    if HAS_COLORS {
+        hits.slots = L::PacketLanes::select(mask, nearest.slots, hits.slots);
+        let slots = nearest.slots.store().map(f32::to_bits);
+        let mut of_nearest = [[0.0; PACKET_WIDTH]; 3];
+        for lane in set_bits::<PACKET_WIDTH>(accepted) {
+            let color = cloud.points.surfel(slots[lane]).color;
+            [of_nearest[0][lane], of_nearest[1][lane], of_nearest[2][lane]] = color.to_array();
+        }
+        let mean = colors.mean(Vec3Lanes::load_packet(&of_nearest));
+        hits.colors = Vec3Lanes::select(mask, mean, hits.colors);
+    }
+}
+
+/// Returns the normals turned against the directions.
+#[inline(always)]
+fn facing<F: Floats>(normal: Vec3Lanes<F>, direction: Vec3Lanes<F>) -> Vec3Lanes<F> {
+    let is_away = F::splat(0.0).lt(normal.dot(direction));
+    normal.scaled(F::select(is_away, F::splat(-1.0), F::splat(1.0)))
+}
+
+/// A decoded block, whose points are read one by one.
+struct StoredBlock {
+    /// Lanes of the points in the region.
+    lanes: u32,
+    first_slot: Slot,
+    corner: Vec3,
+    offsets: [[f32; LANES]; 3],
+    /// Normals with integer components.
+    normals: [[f32; LANES]; 3],
+    unit_normals: [[f32; LANES]; 3],
+    inverse_supports: [f32; LANES],
+}
+
+impl StoredBlock {
+    #[inline(always)]
+    fn new<L: Lanes>(block: &PointBlock, block_idx: u32, lanes: u32) -> Self {
+        let normals = block.normals::<L>();
+        Self {
+            lanes,
+            first_slot: block_idx * LANES as u32,
+            corner: block.corner(),
+            offsets: block.offsets::<L>().store(),
+            normals: normals.store(),
+            unit_normals: unit(normals).store(),
+            inverse_supports: inverse_support(block.radii::<L>()).store(),
+        }
+    }
+
+    #[inline(always)]
+    fn corner_from<F: Floats>(&self, position: &Vec3Lanes<F>) -> Vec3Lanes<F> {
+        Vec3Lanes::splat(self.corner).minus(*position)
+    }
+
+    #[inline(always)]
+    fn point<F: Floats>(&self, corner: &Vec3Lanes<F>, lane: usize) -> FitPoint<F> {
+        FitPoint {
+            offset: corner.plus(Vec3Lanes::splat_lane(&self.offsets, lane)),
+            normal: Vec3Lanes::splat_lane(&self.unit_normals, lane),
+            inverse_support: F::splat(self.inverse_supports[lane]),
+        }
+    }
+}
+
+#[inline(always)]
+fn unit<F: Floats>(normal: Vec3Lanes<F>) -> Vec3Lanes<F> {
+    normal.scaled(F::splat(1.0) / normal.dot(normal).sqrt())
+}
+
+#[inline(always)]
+fn inverse_support<F: Floats>(radius: F) -> F {
+    let support = F::splat(SUPPORT_FACTOR) * radius;
+    F::splat(1.0) / (support * support)
+}
+
+/// Replaces `blocks` by those with points in a region.
+#[inline(always)]
+fn collect_blocks<L: Lanes>(points: &FlatPoints, region: &Aabb, blocks: &mut Vec<StoredBlock>) {
+    blocks.clear();
+    query_box::<L>(points, region, &mut BlockCollector::<L> { region, blocks, lanes: PhantomData });
+}
+
+struct BlockCollector<'a, L> {
+    region: &'a Aabb,
+    blocks: &'a mut Vec<StoredBlock>,
+    lanes: PhantomData<L>,
+}
+
+impl<L: Lanes> BoxVisitor for BlockCollector<'_, L> {
+    #[inline(always)]
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        let block = &points.blocks[block_idx as usize];
+        let inside = block.lanes_within::<L>(self.region);
+        if inside != 0 {
+            self.blocks.push(StoredBlock::new::<L>(block, block_idx, inside));
+        }
+    }
+}
+
+/// Accepts discs near which the ray hits the smooth surface.
+#[derive(Clone, Copy)]
+pub struct SmoothFilter<'s>(pub &'s FlatCloud);
+
+impl HitFilter for SmoothFilter<'_> {
+    const ACCEPTS_ALL: bool = false;
+
+    #[inline(always)]
+    fn accepts<L: Lanes>(&self, ray: &Ray, hit: &Hit) -> bool {
+        L::dispatch(TestSurface::<L> { cloud: self.0, ray, hit, lanes: PhantomData })
+    }
+
+    #[inline(always)]
+    fn accepts_packet<L: Lanes>(
+        &self,
+        rays: &PacketRays<L::PacketLanes>,
+        lanes: u32,
+        distances: L::PacketLanes,
+        slots: &[Slot; PACKET_WIDTH],
+    ) -> u32 {
+        let blocks = &mut Vec::new();
+        let found =
+            FindSurface::<L, false> { cloud: self.0, blocks, rays, lanes, distances, slots };
+        L::dispatch(found).lanes
+    }
+}
+
+/// The test whether a ray hits the surface near the disc that it hits.
+struct TestSurface<'a, L> {
+    cloud: &'a FlatCloud,
+    ray: &'a Ray,
+    hit: &'a Hit,
+    lanes: PhantomData<L>,
+}
+
+impl<L: Lanes> SimdTask for TestSurface<'_, L> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let Self { cloud, ray, hit, .. } = self;
+        let points = &cloud.points;
+        let radius = points.radius(hit.slot);
+        let toward = |normal: Vec3| if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
+        let mut normal = toward(points.normal(hit.slot));
+        let mut distance = hit.distance;
+        for fit in 1..=MAX_FITS {
+            let sums = fit_one::<L>(points, ray.at(distance), normal, radius);
+            let sphere = sums.intersect(Vec3Lanes::splat(ray.direction));
+            let moved = distance + sphere.step;
+            if !sphere.is_hit || MAX_DISTANCE_FROM_DISC * radius < (moved - hit.distance).abs() {
+                return false;
+            }
+            distance = moved;
+            normal = toward(Vec3::new(sphere.normal.x, sphere.normal.y, sphere.normal.z));
+            if sphere.step.abs() <= TOLERANCE * radius {
+                break;
+            }
+            if fit == MAX_FITS && MAX_LAST_STEP * radius < sphere.step.abs() {
+                return false;
+            }
+        }
+        let candidate = CandidateHit { normal, direction: ray.direction, radius };
+        ray.t_min <= distance
+            && distance <= ray.t_max
+            && (cloud.edge_test == EdgeTest::Off
+                || is_enclosed::<L>(points, ray.at(distance), candidate))
+    }
+}
+
+/// Sums up the points around one position.
+#[inline(always)]
+fn fit_one<L: Lanes>(
+    points: &FlatPoints,
+    position: Vec3,
+    guide: Vec3,
+    radius: f32,
+) -> SphereSums<f32> {
+    let sums = SphereSums::<L>::new(Vec3Lanes::splat(guide), L::splat(radius));
+    let mut visitor = SingleFit { position, sums };
+    let reach = Vec3::splat(FIT_REACH * radius);
+    let region = Aabb { min: position - reach, max: position + reach };
+    query_box::<L>(points, &region, &mut visitor);
+    visitor.sums.reduce_lanes()
+}
+
+/// Adds points to the sums of one hit, eight at a time, one per lane.
+struct SingleFit<L> {
+    position: Vec3,
+    sums: SphereSums<L>,
+}
+
+impl<L: Lanes> BoxVisitor for SingleFit<L> {
+    #[inline(always)]
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        let points = points.blocks[block_idx as usize].points::<L>(self.position);
+        let is_used = L::splat(0.0).lt(points.radius);
+        let point = FitPoint {
+            offset: points.center,
+            normal: unit(points.normal),
+            inverse_support: inverse_support(points.radius),
+        };
+        let near = is_used & self.sums.is_near(point.offset);
+        if near.bits() != 0 {
+            self.sums.add(&point, near);
+        }
+    }
+}
