@@ -74,7 +74,7 @@ impl RunStats<'_> {
 
 /// Bytes that tree and points take in the flat form, for each of `n_points`.
 pub fn bytes_per_point<'c>(clouds: impl Iterator<Item = &'c FlatCloud>, n_points: usize) -> Value {
-    let (tree, points) = sum(clouds.map(|cloud| cloud.points.bytes()));
+    let (tree, points) = sum(clouds.map(|cloud| cloud.bytes()));
     let [tree, points] = [tree, points].map(|bytes| bytes as f64 / n_points.max(1) as f64);
     json!({ "tree": tree, "points": points, "total": tree + points })
 }

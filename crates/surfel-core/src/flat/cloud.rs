@@ -4,7 +4,10 @@ use super::deform::Deformed;
 use super::point_columns::PointColumns;
 use super::points::FlatPoints;
 use super::refit::Refit;
+use crate::bvh::BvhNode;
 use crate::error::Result;
+use crate::math::{Aabb, LANES};
+use crate::points::Structure;
 use crate::progress::Progress;
 use crate::scene::CloudGeometry;
 use crate::surface::{EdgeTest, SurfaceKind};
@@ -12,8 +15,12 @@ use crate::surface::{EdgeTest, SurfaceKind};
 /// A point cloud with the surface that its points describe.
 #[derive(Clone, Debug, Default)]
 pub struct FlatCloud {
-    /// Points relative to the cloud's origin.
+    /// Points of the surface, relative to the cloud's origin.
     pub points: FlatPoints,
+    /// Points of lines, as capsules.
+    pub lines: FlatPoints,
+    /// Points that stand for themselves, as spheres.
+    pub scatter: FlatPoints,
     /// The shape of the points.
     pub surface: SurfaceKind,
     /// The test that decides where the surface ends.
@@ -56,8 +63,17 @@ impl FlatCloud {
         geometry: &CloudGeometry,
         progress: &dyn Progress,
     ) -> Result<Self> {
+        let (mut lines, mut scatter) = (FlatPoints::default(), FlatPoints::default());
+        let mut surface_columns = columns;
+        if let Some(parts) = parts(columns, geometry) {
+            surface_columns = parts.surface;
+            lines = FlatPoints::new(parts.lines, progress)?;
+            scatter = FlatPoints::new(parts.scatter, progress)?;
+        }
         let mut flat = Self {
-            points: FlatPoints::new(columns, progress)?,
+            points: FlatPoints::new(surface_columns, progress)?,
+            lines,
+            scatter,
             surface: geometry.surface,
             edge_test: geometry.edge_test,
             has_outward_normals: geometry.has_outward_normals,
@@ -77,17 +93,62 @@ impl FlatCloud {
         progress: &dyn Progress,
     ) -> Result<Option<Self>> {
         let columns = deformed_columns(deformed, geometry)?;
-        let refit = self.points.refit(columns);
+        let needs_rebuild = match parts(columns, geometry) {
+            None => self.points.refit(columns) == Refit::NeedsRebuild,
+            Some(parts) => {
+                let refits = [
+                    self.points.refit(parts.surface),
+                    self.lines.refit(parts.lines),
+                    self.scatter.refit(parts.scatter),
+                ];
+                refits.contains(&Refit::NeedsRebuild)
+            }
+        };
         self.set_max_blend_distance();
-        (refit == Refit::NeedsRebuild)
-            .then(|| Self::from_columns(columns, geometry, progress))
-            .transpose()
+        needs_rebuild.then(|| Self::from_columns(columns, geometry, progress)).transpose()
+    }
+
+    /// Returns the sizes of the trees and of the points in bytes.
+    pub fn bytes(&self) -> (usize, usize) {
+        let parts = [&self.points, &self.lines, &self.scatter].map(FlatPoints::bytes);
+        (parts.iter().map(|part| part.0).sum(), parts.iter().map(|part| part.1).sum())
+    }
+
+    /// Returns the bounding box of all points, which is empty if no point is traceable.
+    pub fn bounds(&self) -> Aabb {
+        let parts = [&self.points, &self.lines, &self.scatter];
+        parts.iter().fold(Aabb::EMPTY, |bounds, part| bounds.union(root_bounds(&part.nodes)))
     }
 
     fn set_max_blend_distance(&mut self) {
         let looks_behind = self.surface.blends_discs() || self.surface == SurfaceKind::Smooth;
         self.max_blend_distance = if looks_behind { self.points.max_radius() } else { 0.0 };
     }
+}
+
+/// The columns of a cloud by structure.
+struct Parts<'a> {
+    surface: PointColumns<'a>,
+    lines: PointColumns<'a>,
+    scatter: PointColumns<'a>,
+}
+
+/// Splits columns by structure; none if all points are part of the surface.
+fn parts<'a>(columns: PointColumns<'a>, geometry: &'a CloudGeometry) -> Option<Parts<'a>> {
+    let structures = geometry.structures()?;
+    let part = |kind, structure| columns.only(structures, kind, structure);
+    Some(Parts {
+        surface: part(geometry.surface, Structure::Surface),
+        lines: part(SurfaceKind::Capsule, Structure::Line),
+        scatter: part(SurfaceKind::Sphere, Structure::Scatter),
+    })
+}
+
+/// Returns the bounding box of a tree.
+pub(super) fn root_bounds(nodes: &[BvhNode]) -> Aabb {
+    let Some(root) = nodes.first() else { return Aabb::EMPTY };
+    let children = (0..LANES).filter(|&lane| root.child(lane).is_some());
+    children.map(|lane| root.bounds(lane)).fold(Aabb::EMPTY, Aabb::union)
 }
 
 fn deformed_columns<'a>(

@@ -4,7 +4,7 @@ use super::block::{self, BlockPoint};
 use crate::bvh::{BvhPrimitive, NO_PRIMITIVE};
 use crate::error::Result;
 use crate::math::{Aabb, LANES, Vec3};
-use crate::points::check_length;
+use crate::points::{Structure, check_length};
 use crate::surface::SurfaceKind;
 use rayon::prelude::*;
 
@@ -16,6 +16,8 @@ pub struct PointColumns<'a> {
     normals: &'a [Vec3],
     radii: &'a [f32],
     colors: &'a [[u8; 3]],
+    /// The structure of each point, and the one whose points count; none if all do.
+    part: Option<(&'a [Structure], Structure)>,
 }
 
 impl<'a> PointColumns<'a> {
@@ -34,7 +36,17 @@ impl<'a> PointColumns<'a> {
         check_length("normals", normals.len(), positions.len())?;
         check_length("radii", radii.len(), positions.len())?;
         check_length("colours", colors.len(), positions.len())?;
-        Ok(Self { kind, positions, normals, radii, colors })
+        Ok(Self { kind, positions, normals, radii, colors, part: None })
+    }
+
+    /// Leaves out all points but those of one structure, which get this kind.
+    pub(super) fn only(
+        self,
+        structures: &'a [Structure],
+        kind: SurfaceKind,
+        part: Structure,
+    ) -> Self {
+        Self { kind, part: Some((structures, part)), ..self }
     }
 
     /// Returns the shape of the points.
@@ -72,7 +84,7 @@ impl<'a> PointColumns<'a> {
     /// it out of the tree.
     pub(super) fn primitive(&self, id: u32) -> BvhPrimitive {
         let point = self.point(id);
-        let bounds = if self.is_traceable(&point) {
+        let bounds = if self.has_part(id) && self.is_traceable(&point) {
             self.kind.bounds(point.position, point.normal, point.radius)
         } else {
             Aabb::EMPTY
@@ -83,7 +95,11 @@ impl<'a> PointColumns<'a> {
     /// Returns the number of traceable points.
     pub(super) fn n_traceable(&self) -> usize {
         let ids = (0..self.len() as u32).into_par_iter();
-        ids.filter(|&id| self.is_traceable(&self.point(id))).count()
+        ids.filter(|&id| self.has_part(id) && self.is_traceable(&self.point(id))).count()
+    }
+
+    fn has_part(&self, id: u32) -> bool {
+        self.part.is_none_or(|(structures, part)| structures[id as usize] == part)
     }
 
     /// Returns true if a ray can hit `point`: its position and radius are finite, and its radius is positive.

@@ -1,13 +1,13 @@
 //! The flat scene: geometries, instances of them, lights and camera.
 
-use super::cloud::FlatCloud;
+use super::cloud::{FlatCloud, root_bounds};
 use super::deform::{Deformed, Pose, is_deformed};
 use super::instance::{Instance, Placement, build_tlas};
 use super::mesh::FlatMesh;
 use super::punctual_light::FlatPunctualLight;
-use crate::bvh::{Bvh, BvhNode};
+use crate::bvh::Bvh;
 use crate::error::Result;
-use crate::math::{Aabb, DAffine3, DVec3, LANES};
+use crate::math::{Aabb, DAffine3, DVec3};
 use crate::progress::Progress;
 use crate::scene::{Background, Camera, Geometry, Graph, Light, Material, Scene, Texture};
 use std::collections::BTreeMap;
@@ -91,18 +91,12 @@ impl FlatGeometry {
         }
     }
 
-    fn nodes(&self) -> &[BvhNode] {
-        match self {
-            Self::Cloud(cloud) => &cloud.points.nodes,
-            Self::Mesh(mesh) => &mesh.triangles.nodes,
-        }
-    }
-
     /// Returns the bounding box of the geometry, which is empty if no primitive is traceable.
     pub fn bounds(&self) -> Aabb {
-        let Some(root) = self.nodes().first() else { return Aabb::EMPTY };
-        let children = (0..LANES).filter(|&lane| root.child(lane).is_some());
-        children.map(|lane| root.bounds(lane)).fold(Aabb::EMPTY, Aabb::union)
+        match self {
+            Self::Cloud(cloud) => cloud.bounds(),
+            Self::Mesh(mesh) => root_bounds(&mesh.triangles.nodes),
+        }
     }
 }
 

@@ -68,14 +68,11 @@ impl Shading {
             emission: material.emissive,
             is_unlit: material.is_unlit,
             radius: hit.radius,
-            surface: None,
+            surface: hit.surface,
             coordinate_magnitude: position.abs().max(ray.origin.abs()).max_element(),
         };
-        match scene.geometry(instance) {
-            FlatGeometry::Cloud(cloud) => shading.surface = Some(cloud.surface),
-            FlatGeometry::Mesh(mesh) => {
-                shading.apply_textures(scene, &TrianglePoint { mesh, hit, instance });
-            }
+        if let FlatGeometry::Mesh(mesh) = scene.geometry(instance) {
+            shading.apply_textures(scene, &TrianglePoint { mesh, hit, instance });
         }
         shading.emission += material.emissive_strength * shading.base_color;
         shading.alpha = match material.alpha_mode {

@@ -7,10 +7,11 @@ mod merge;
 pub mod neighbors;
 mod normals;
 mod orient;
-mod prepare;
 mod prepared_cloud;
 mod radius;
 mod subsample;
+mod structure;
+mod prepare;
 mod up;
 
 pub use clean::{CleanReport, clean};
@@ -23,5 +24,9 @@ pub use prepare::{Preparation, PreparationReport, SURFACE_VARIATION, prepare};
 pub use prepared_cloud::PreparedCloud;
 pub(crate) use prepared_cloud::check_length;
 pub use radius::{DistanceSample, Radius, RadiusReport, estimate_radii, median_distance, spacing};
+pub use structure::{
+    PointShape, STRUCTURE, Structure, StructureChoice, StructureReport, all_scattered,
+    find_structures,
+};
 pub use subsample::{Subsample, subsample};
 pub use up::{InferredUp, infer_up};

@@ -18,6 +18,8 @@ pub struct PlaneFit {
     pub normal: Vec3,
     /// Surface variation, the smallest eigenvalue divided by the sum of all: 0 on a plane, 1/3 in an isotropic cloud.
     pub variation: f32,
+    /// Ratio of the middle to the largest eigenvalue: 0 on a line, 1 in a round neighbourhood.
+    pub width: f32,
 }
 
 /// Numbers of normals by their origin.
@@ -40,11 +42,16 @@ pub fn fit_plane(positions: &[Vec3], point_idx: usize, neighbors: &[Neighbor]) -
     let (normal, [smallest, middle, largest]) = smallest_eigenvector(&covariance);
     // NaN fails this test too.
     let is_plane = MIN_PLANARITY * largest < middle;
+    let width = (middle.max(0.0) / largest.max(f64::MIN_POSITIVE)) as f32;
     if !is_plane {
         return PlaneFit::default();
     }
     let variation = smallest.max(0.0) / (smallest + middle + largest);
-    PlaneFit { normal: canonical_sign(normal.as_vec3().normalize()), variation: variation as f32 }
+    PlaneFit {
+        normal: canonical_sign(normal.as_vec3().normalize()),
+        variation: variation as f32,
+        width,
+    }
 }
 
 /// Returns the scatter matrix about the mean, computed in f64 relative to the point, so that coordinates far from

@@ -5,6 +5,9 @@ use super::normals::{NormalReport, PlaneFit, fill_missing, fit_plane};
 use super::orient::{Orientation, orient};
 use super::radius::{DistanceSample, Radius, RadiusReport, median_distance};
 use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
+use super::structure::{
+    PointShape, Structure, StructureChoice, StructureReport, all_scattered, find_structures,
+};
 use super::{CleanReport, PointCloud, PreparedCloud, Scalar, Subsample, Values, clean, subsample};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
@@ -26,6 +29,8 @@ pub struct Preparation {
     pub orientation: Orientation,
     /// The choice of radii.
     pub radius: Radius,
+    /// The choice of structures. Applies if all radii are estimated by `Radius::Adaptive`.
+    pub structure: StructureChoice,
     /// True to add the column `SURFACE_VARIATION`: 0 on a plane, up to 1/3.
     pub keep_variation: bool,
     /// Seed of all random choices.
@@ -40,6 +45,7 @@ impl Default for Preparation {
             normals: Neighborhood::Nearest(16),
             orientation: Orientation::None,
             radius: Radius::default(),
+            structure: StructureChoice::default(),
             keep_variation: false,
             seed: 0,
         }
@@ -76,6 +82,8 @@ pub struct PreparationReport {
     pub normals_from: Option<Neighborhood>,
     /// Statistics of the estimated radii.
     pub radii: Option<RadiusReport>,
+    /// Numbers of points by structure.
+    pub structure: Option<StructureReport>,
 }
 
 /// Cleans and subsamples a cloud, then adds the normals and radii that are missing. Those of the file stay. Columns
@@ -102,7 +110,11 @@ pub fn prepare(
     let estimated = Missing::all(&cloud);
     let mut report =
         PreparationReport { clean, n_points: cloud.len(), ..PreparationReport::default() };
-    let estimates = estimate(&cloud.positions, preparation, &missing, progress)?;
+    let mut estimates = estimate(&cloud.positions, preparation, &missing, progress)?;
+    let shapes = match missing.structure {
+        true => find_shapes(&cloud.positions, &mut estimates, preparation.structure, progress)?,
+        false => None,
+    };
     if let Some((fits, neighborhood)) = estimates.fits {
         if preparation.keep_variation {
             add_variation(&mut cloud, &fits);
@@ -118,6 +130,10 @@ pub fn prepare(
         add_radii(&mut cloud, radii);
         report.radii = Some(found);
     }
+    if let Some((shapes, found)) = shapes {
+        add_structures(&mut cloud, &shapes);
+        report.structure = Some(found);
+    }
     add_to_morphs(&mut cloud, &estimated, preparation, progress)?;
     Ok((PreparedCloud::new(cloud)?, report))
 }
@@ -127,6 +143,7 @@ struct Missing {
     normals: bool,
     fits: bool,
     radii: bool,
+    structure: bool,
 }
 
 impl Missing {
@@ -134,13 +151,21 @@ impl Missing {
     fn any(cloud: &PointCloud, preparation: &Preparation) -> Self {
         let normals = cloud.normals.as_ref().is_none_or(|normals| normals.contains(&Vec3::ZERO));
         let radii = cloud.radii.as_ref().is_none_or(|radii| radii.contains(&0.0));
-        Self { normals, fits: normals || preparation.keep_variation, radii }
+        // Points that move may change their structure.
+        let structure = cloud.radii.is_none()
+            && cloud.morphs.is_empty()
+            && cloud.structures().is_none()
+            && preparation.structure != StructureChoice::Surface
+            && matches!(preparation.radius, Radius::Adaptive { .. });
+        let is_searched = structure && preparation.structure == StructureChoice::Auto;
+        let fits = normals || preparation.keep_variation || is_searched;
+        Self { normals, fits, radii, structure }
     }
 
     /// Columns that the cloud lacks altogether.
     fn all(cloud: &PointCloud) -> Self {
         let (normals, radii) = (cloud.normals.is_none(), cloud.radii.is_none());
-        Self { normals, fits: normals, radii }
+        Self { normals, fits: normals, radii, structure: false }
     }
 }
 
@@ -202,6 +227,47 @@ fn estimate_together(
     let fits = both.into_iter().map(|(fit, _)| fit).collect();
     let radii = clamp_outlier_radii(&tree, k_radius, distances, progress)?;
     Ok(Estimates { fits: Some((fits, Neighborhood::Nearest(k_normal))), radii: Some(radii) })
+}
+
+/// Finds the structures of points, and replaces the estimates by those of their structure.
+fn find_shapes(
+    positions: &[Vec3],
+    estimates: &mut Estimates,
+    choice: StructureChoice,
+    progress: &dyn Progress,
+) -> Result<Option<(Vec<PointShape>, StructureReport)>> {
+    let Some((radii, report)) = &mut estimates.radii else { return Ok(None) };
+    let tree = KdTree::new(positions, progress)?;
+    let found = match (choice, &mut estimates.fits) {
+        (StructureChoice::Auto, Some((fits, _))) => {
+            let found = find_structures(&tree, fits, radii, progress)?;
+            for (fit, shape) in fits.iter_mut().zip(&found.0) {
+                if shape.structure == Structure::Surface {
+                    fit.normal = shape.normal;
+                }
+            }
+            found
+        }
+        _ => all_scattered(&tree, radii, progress)?,
+    };
+    *radii = found.0.iter().map(|shape| shape.radius).collect();
+    report.update(radii);
+    Ok(Some(found))
+}
+
+/// Adds the column of structures, and gives the points of lines the direction of the line in place of a normal.
+fn add_structures(cloud: &mut PointCloud, shapes: &[PointShape]) {
+    let structures: Vec<Structure> = shapes.iter().map(|shape| shape.structure).collect();
+    if let Some(normals) = &mut cloud.normals {
+        for (normal, shape) in normals.iter_mut().zip(shapes) {
+            if shape.structure == Structure::Line {
+                *normal = shape.normal;
+            }
+        }
+    }
+    if structures.iter().any(|structure| *structure != Structure::Surface) {
+        cloud.set_structures(&structures);
+    }
 }
 
 fn fit_planes(

@@ -169,6 +169,12 @@ impl RadiusReport {
         }
     }
 
+    /// Recomputes the statistics of radii that have changed.
+    pub(super) fn update(&mut self, radii: &[f32]) {
+        let (_, Self { min, median, max, .. }) = with_report(radii.to_vec());
+        *self = Self { min, median, max, ..*self };
+    }
+
     fn lines(&self) -> Vec<String> {
         let clamped = format!(
             "{} radii of outliers clamped to {MAX_OUTLIER_RATIO} times their neighbours'",

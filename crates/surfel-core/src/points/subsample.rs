@@ -80,7 +80,7 @@ fn random_indices(n_points: usize, count: usize, seed: u64) -> Vec<u32> {
 
 /// Keeps points in a hashed grid. Cells are twice as wide as the spacing, so the points near any position lie in eight
 /// of them.
-fn indices_by_spacing(
+pub(super) fn indices_by_spacing(
     positions: &[Vec3],
     distance: f32,
     progress: &dyn Progress,

@@ -1,7 +1,7 @@
 //! A cloud as a geometry of a scene: prepared, coloured, and given a surface.
 
 use crate::error::Result;
-use crate::points::{PointCloud, PreparedCloud, check_length};
+use crate::points::{PointCloud, PreparedCloud, Structure, check_length};
 use crate::surface::{EdgeTest, SurfaceKind};
 
 /// A prepared cloud with one colour for each point, and the surface that its points describe.
@@ -10,6 +10,8 @@ pub struct CloudGeometry {
     cloud: PreparedCloud,
     /// sRGB-encoded, one for each point.
     colors: Vec<[u8; 3]>,
+    /// The structure of each point; none if all are part of a surface.
+    structures: Option<Vec<Structure>>,
     /// The surface that the points describe.
     pub surface: SurfaceKind,
     /// The test that rejects hits beyond the edge of the surface.
@@ -27,6 +29,7 @@ impl Default for CloudGeometry {
         Self {
             cloud: PreparedCloud::default(),
             colors: Vec::new(),
+            structures: None,
             surface: SurfaceKind::default(),
             edge_test: EdgeTest::default(),
             blends_colors: true,
@@ -43,13 +46,19 @@ impl CloudGeometry {
     /// point.
     pub fn new(cloud: PreparedCloud, colors: Vec<[u8; 3]>) -> Result<Self> {
         check_length("colours", colors.len(), cloud.len())?;
-        Ok(Self { cloud, colors, ..Self::default() })
+        Ok(Self { structures: structures(&cloud), cloud, colors, ..Self::default() })
     }
 
     /// Makes a geometry of the default surface with one sRGB-encoded colour for all points.
     pub fn with_uniform_color(cloud: PreparedCloud, color: [u8; 3]) -> Self {
         let colors = vec![color; cloud.len()];
-        Self { cloud, colors, ..Self::default() }
+        Self { structures: structures(&cloud), cloud, colors, ..Self::default() }
+    }
+
+    /// Returns the structure of each point, or none if all points are part of the surface.
+    pub fn structures(&self) -> Option<&[Structure]> {
+        let is_split = self.surface.uses_discs();
+        self.structures.as_deref().filter(|_| is_split)
     }
 
     /// Returns the points.
@@ -65,6 +74,7 @@ impl CloudGeometry {
     /// Keeps the points at `indices`, in that order.
     pub(super) fn retain(&mut self, indices: &[u32]) {
         self.cloud = self.cloud.subset(indices);
+        self.structures = structures(&self.cloud);
         self.colors = indices.iter().map(|i| self.colors[*i as usize]).collect();
     }
 
@@ -72,7 +82,13 @@ impl CloudGeometry {
     pub(super) fn clear(&mut self) {
         self.cloud = PreparedCloud::empty(self.cloud.origin);
         self.colors = Vec::new();
+        self.structures = None;
     }
+}
+
+/// Returns the structures of a cloud, unless all of its points are part of a surface.
+fn structures(cloud: &PointCloud) -> Option<Vec<Structure>> {
+    cloud.structures().filter(|all| all.iter().any(|own| *own != Structure::Surface))
 }
 
 impl AsRef<PointCloud> for CloudGeometry {

@@ -1,5 +1,6 @@
 //! The surface kinds of a point cloud.
 
+use super::capsule;
 use super::disc;
 use super::smooth;
 use super::sphere;
@@ -27,10 +28,13 @@ pub enum SurfaceKind {
     /// 2007): one smooth surface for rays of all kinds.
     #[default]
     Smooth,
+    /// Each point is a short thick line along its normal. The points of lines have this kind, whatever the kind of
+    /// their cloud's surface is.
+    Capsule,
 }
 
 impl SurfaceKind {
-    /// Every kind with its name.
+    /// The kinds of surface that a cloud can be given, with their names.
     pub const ALL: [(&'static str, Self); 7] = [
         ("points", Self::Points),
         ("sphere", Self::Sphere),
@@ -43,7 +47,7 @@ impl SurfaceKind {
 
     /// Returns the name that `from_str` parses.
     pub fn name(self) -> &'static str {
-        Self::ALL.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
+        Self::ALL.iter().find(|(_, kind)| *kind == self).map_or("capsule", |(name, _)| name)
     }
 
     /// Returns the factor that multiplies the points' radii before tracing.
@@ -53,7 +57,7 @@ impl SurfaceKind {
 
     /// Returns true if points are discs with normals rather than spheres.
     pub fn uses_discs(self) -> bool {
-        !matches!(self, Self::Points | Self::Sphere)
+        !matches!(self, Self::Points | Self::Sphere | Self::Capsule)
     }
 
     /// Returns true if all discs near the nearest one contribute to a hit.
@@ -63,10 +67,10 @@ impl SurfaceKind {
 
     /// Returns the bounding box of a point of this kind. `normal` has unit length.
     pub fn bounds(self, center: Vec3, normal: Vec3, radius: f32) -> Aabb {
-        if self.uses_discs() {
-            disc::bounds(center, normal, radius)
-        } else {
-            sphere::bounds(center, radius)
+        match self {
+            Self::Points | Self::Sphere => sphere::bounds(center, radius),
+            Self::Capsule => capsule::bounds(center, normal, radius),
+            _ => disc::bounds(center, normal, radius),
         }
     }
 

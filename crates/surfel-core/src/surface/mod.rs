@@ -1,5 +1,6 @@
 //! Surface kinds: the shape that a ray intersects at each point or triangle, one file per shape.
 
+pub mod capsule;
 mod disc;
 mod edge_test;
 mod kind;
@@ -9,6 +10,7 @@ mod sphere;
 mod splat;
 pub mod triangle;
 
+pub use capsule::Capsule;
 pub use disc::Disc;
 pub use edge_test::{
     CandidateHit, CandidateHitLanes, EdgeTest, EdgeTestResult, NEIGHBORHOOD_RADIUS_FACTOR,

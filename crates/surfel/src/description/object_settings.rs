@@ -11,7 +11,9 @@ use std::path::Path;
 use surfel_core::image::Colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
-use surfel_core::points::{Orientation, Preparation, Radius, SURFACE_VARIATION, Subsample};
+use surfel_core::points::{
+    Orientation, Preparation, Radius, STRUCTURE, SURFACE_VARIATION, StructureChoice, Subsample,
+};
 use surfel_core::scene::color::{ColorSource, Coloring};
 use surfel_core::scene::{Clip, ClipBox, ClipPlane};
 use surfel_core::surface::{EdgeTest, SurfaceKind};
@@ -20,7 +22,7 @@ use surfel_formats::{Column, ColumnChoice, LoadOptions, TextColumn};
 settings! {
     /// The shape that is given to points, and the part of an object that is shown.
     pub struct SurfaceSettings {
-        /// Surface of the points: points, sphere, disc, splat-mean, splat or splat-fit.
+        /// Surface of the points: smooth, points, sphere, disc, splat-mean, splat or splat-fit.
         surface: SurfaceKind = SurfaceKind::default(), parsed(|kind: &SurfaceKind| kind.name().to_owned()), "KIND";
         /// Edge of the surface: at the outermost points (angular-gap) or at the rims of their discs (off).
         edge_test: EdgeTest = EdgeTest::default(), parsed(|test: &EdgeTest| test.name().to_owned()), "TEST";
@@ -50,6 +52,9 @@ settings! {
         /// Radius of each point's surface: a length, adaptive[:K] or median[:N] [default: that of the file, or
         /// adaptive:12].
         radius: Radius, RadiusRule, "RADIUS";
+        /// Shape of each point by its neighbours: auto tells surfaces, lines (wires, poles) and scattered points
+        /// (leaves) apart; surface and scatter take all points for one.
+        structure: StructureChoice = StructureChoice::default(), parsed(StructureChoice::to_string), "CHOICE";
         /// Takes the vertices of meshes as points.
         vertices: bool = false, Flag, "BOOL";
         /// Columns of a text file, as in x,y,z,-,r,g,b [default: found from the file].
@@ -120,6 +125,7 @@ impl ObjectSettings {
             normals: within.or(nearest).unwrap_or(default.normals),
             orientation: settings.orient(),
             radius: settings.radius.unwrap_or(default.radius),
+            structure: settings.structure(),
             // A colour may ask for a column that only the preparation computes.
             keep_variation: matches!(&self.color.color, Some(ColorSource::Column(name)) if name == SURFACE_VARIATION),
             seed,
@@ -176,7 +182,8 @@ impl PreparationSettings {
     pub fn kept_columns(&self) -> Vec<Column> {
         let normals = (!self.estimates_normals()).then_some(Column::Normals);
         let radii = self.radius.is_none().then_some(Column::Radii);
-        normals.into_iter().chain(radii).collect()
+        let structure = self.radius.is_none().then(|| Column::Scalar(STRUCTURE.to_owned()));
+        normals.into_iter().chain(radii).chain(structure).collect()
     }
 
     /// Drops the normals and radii that are to be estimated.

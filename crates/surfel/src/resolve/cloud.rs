@@ -8,7 +8,7 @@ use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::Neighborhood;
 use surfel_core::points::{PointCloud, PreparationReport, PreparedCloud, Radius, prepare};
 use surfel_core::progress::Progress;
-use surfel_core::scene::color::colorize;
+use surfel_core::scene::color::{choose_source, colorize};
 use surfel_core::scene::{CloudGeometry, Geometry, Graph, Material, Transform};
 use surfel_formats::{ColumnChoice, FileInfo, Loaded};
 
@@ -87,8 +87,11 @@ pub fn apply_surface_and_color(
     cloud.scale_radii(settings.surface.radius_scale() as f32);
     let notes = NotesAsChoices { progress, keys: &["color", "cmap", "range"] };
     let colors = colorize(&cloud, &settings.coloring(up), &notes)?;
+    let source = settings.color.color.clone().unwrap_or_else(|| choose_source(&cloud).0);
+    let blends_colors = !source.is_categorical(&cloud);
     let mut geometry = CloudGeometry::new(cloud, colors)?;
     geometry.surface = settings.surface.surface();
+    geometry.blends_colors = blends_colors;
     geometry.edge_test = settings.surface.edge_test();
     geometry.has_outward_normals = settings.preparation.orients_outward();
     Ok(geometry)
@@ -108,6 +111,9 @@ pub fn report_prepared(
         progress.choice("radii as in the file", &["radius"]);
     }
     report_radii(report, settings, progress);
+    if let Some(structure) = &report.structure {
+        progress.choice(&structure.line(), &["structure"]);
+    }
 }
 
 /// Reports how normals were estimated.

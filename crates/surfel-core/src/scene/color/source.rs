@@ -1,7 +1,7 @@
 //! Sources of point colours, their names and their colours in hexadecimal.
 
 use crate::error::{Error, Result};
-use crate::points::PointCloud;
+use crate::points::{PointCloud, Values};
 use std::fmt;
 use std::str::FromStr;
 
@@ -25,6 +25,18 @@ pub enum ColorSource {
 }
 
 impl ColorSource {
+    /// True if the values of the source are names of things rather than amounts, so that no value lies between two
+    /// others: classes and whole numbers.
+    pub fn is_categorical(&self, cloud: &PointCloud) -> bool {
+        match self {
+            Self::Class => true,
+            Self::Column(name) => {
+                matches!(cloud.scalar(name), Some(Values::U8(_) | Values::U16(_) | Values::I32(_)))
+            }
+            _ => false,
+        }
+    }
+
     /// True if `cloud` has the column that the source needs.
     pub fn is_available_in(&self, cloud: &PointCloud) -> bool {
         match self {

@@ -24,10 +24,16 @@ pub fn closest_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [Hit
 #[inline(always)]
 pub fn closest_hits_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [Hit]) {
     if cloud.surface.uses_discs() {
-        run_query::<L, _>(Closest::<Disc>(PhantomData), &cloud.points, rays, hits);
+        closest_shapes::<L, Disc>(&cloud.points, rays, hits);
     } else {
-        run_query::<L, _>(Closest::<Sphere>(PhantomData), &cloud.points, rays, hits);
+        closest_shapes::<L, Sphere>(&cloud.points, rays, hits);
     }
+}
+
+/// Finds the closest shape of one kind on each ray.
+#[inline(always)]
+pub fn closest_shapes<L: Lanes, S: LeafGeometry>(tree: &S::Tree, rays: &[Ray], hits: &mut [Hit]) {
+    run_query::<L, _>(Closest::<S>(PhantomData), tree, rays, hits);
 }
 
 /// Finds the closest triangle on each ray.

@@ -1,12 +1,13 @@
 //! The continuous surface of a cloud: blended discs without the hits that the edge test rejects, or spheres.
 
-use crate::flat::FlatCloud;
+use crate::flat::{FlatCloud, FlatPoints};
 use crate::math::{Lanes, PACKET_WIDTH, PacketLanes, Ray, Vec3};
-use crate::surface::{Disc, EdgeTest, SurfaceKind};
-use crate::trace::query::any::{any_accepted_hit, any_hits_kernel};
-use crate::trace::query::closest::closest_hits_kernel;
+use crate::surface::{Capsule, Disc, EdgeTest, Sphere, SurfaceKind, Surfel, capsule};
+use crate::trace::query::any::{AcceptAll, any_accepted_hit, any_hits_kernel};
+use crate::trace::query::closest::{closest_hits_kernel, closest_shapes};
 use crate::trace::query::edge_filter::EdgeFilter;
 use crate::trace::query::hit::Hit;
+use crate::trace::query::leaf::LeafGeometry;
 use crate::trace::query::smooth_query::{SmoothFilter, SmoothTracer};
 use crate::trace::query::splat_query::{Splat, SplatTracer};
 use crate::trace::simd::packet_rays::PacketRays;
@@ -25,6 +26,8 @@ pub struct SurfaceHit {
     pub normal: Vec3,
     /// Linear colour.
     pub color: Vec3,
+    /// The kind of the surface there.
+    pub surface: SurfaceKind,
     /// True if that point's own normal faces away from the ray's origin: the ray hits its back.
     pub is_backface: bool,
 }
@@ -37,6 +40,7 @@ impl SurfaceHit {
         radius: 0.0,
         normal: Vec3::ZERO,
         color: Vec3::ZERO,
+        surface: SurfaceKind::Points,
         is_backface: false,
     };
 
@@ -56,9 +60,6 @@ const SMOOTH_RESTART_OFFSET: f32 = 0.3;
 
 /// Finds the closest hit of each ray on the continuous surface.
 pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
-    if cloud.points.nodes.is_empty() {
-        return hits.fill(SurfaceHit::MISS);
-    }
     dispatch_simd!(
         simd,
         surface_hits_kernel(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit])
@@ -67,59 +68,99 @@ pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [Sur
 
 #[inline(always)]
 fn surface_hits_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
-    match cloud.surface {
-        SurfaceKind::Smooth => trace_smooth::<L>(cloud, rays, hits),
-        kind if kind.uses_discs() => splat_hits::<L>(cloud, rays, hits),
-        _ => sphere_hits::<L>(cloud, rays, hits),
+    hits.fill(SurfaceHit::MISS);
+    if !cloud.points.nodes.is_empty() {
+        match cloud.surface {
+            SurfaceKind::Smooth => trace_smooth::<L>(cloud, rays, hits),
+            kind if kind.uses_discs() => splat_hits::<L>(cloud, rays, hits),
+            _ => merge_solids::<L, Sphere>(&cloud.points, SurfaceKind::Sphere, rays, hits),
+        }
     }
+    merge_solids::<L, Capsule>(&cloud.lines, SurfaceKind::Capsule, rays, hits);
+    merge_solids::<L, Sphere>(&cloud.scatter, SurfaceKind::Sphere, rays, hits);
 }
 
 /// Finds out for each ray whether the continuous surface lies in its range.
 pub fn occlusions(cloud: &FlatCloud, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
-    if cloud.points.nodes.is_empty() {
-        return occluded.fill(false);
-    }
     dispatch_simd!(simd, occlusions_kernel(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [bool]));
 }
 
 #[inline(always)]
 fn occlusions_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [bool]) {
-    if cloud.surface == SurfaceKind::Smooth {
+    if cloud.points.nodes.is_empty() {
+        occluded.fill(false);
+    } else if cloud.surface == SurfaceKind::Smooth {
         any_accepted_hit::<L, Disc, _>(&cloud.points, rays, SmoothFilter(cloud), occluded);
     } else if !cloud.surface.uses_discs() || cloud.edge_test == EdgeTest::Off {
         any_hits_kernel::<L>(cloud, rays, occluded);
     } else {
         any_accepted_hit::<L, Disc, _>(&cloud.points, rays, EdgeFilter(cloud), occluded);
     }
+    merge_occlusions::<L, Capsule>(&cloud.lines, rays, occluded);
+    merge_occlusions::<L, Sphere>(&cloud.scatter, rays, occluded);
 }
 
+/// Replaces hits by nearer ones on the spheres or capsules of `points`.
 #[inline(always)]
-fn sphere_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
+fn merge_solids<L: Lanes, S: LeafGeometry<Tree = FlatPoints>>(
+    points: &FlatPoints,
+    surface: SurfaceKind,
+    rays: &[Ray],
+    hits: &mut [SurfaceHit],
+) {
+    if points.nodes.is_empty() {
+        return;
+    }
+    let limited =
+        |(ray, hit): (&Ray, &SurfaceHit)| Ray { t_max: ray.t_max.min(hit.distance), ..*ray };
+    let limited: Vec<Ray> = rays.iter().zip(&*hits).map(limited).collect();
     let mut nearest = vec![Hit::MISS; rays.len()];
-    closest_hits_kernel::<L>(cloud, rays, &mut nearest);
+    closest_shapes::<L, S>(points, &limited, &mut nearest);
     for ((ray, nearest), hit) in rays.iter().zip(nearest).zip(hits) {
-        *hit = SurfaceHit::MISS;
         if nearest.is_miss() {
             continue;
         }
-        let sphere = cloud.points.surfel(nearest.slot);
-        let outward = (ray.at(nearest.distance) - sphere.center) / sphere.radius;
-        let normal = if outward.dot(ray.direction) < 0.0 { outward } else { -outward };
+        let Surfel { center, normal, radius, color } = points.surfel(nearest.slot);
+        let position = ray.at(nearest.distance);
+        let outward = match surface {
+            SurfaceKind::Capsule => capsule::normal(position, center, normal, radius),
+            _ => position - center,
+        };
+        let outward = outward.normalize_or(-ray.direction);
         *hit = SurfaceHit {
             distance: nearest.distance,
-            id: cloud.points.id(nearest.slot),
-            radius: sphere.radius,
-            normal: normal.normalize_or(-ray.direction),
-            color: sphere.color,
+            id: points.id(nearest.slot),
+            radius,
+            normal: if outward.dot(ray.direction) < 0.0 { outward } else { -outward },
+            color,
+            surface,
             is_backface: 0.0 < outward.dot(ray.direction),
         };
+    }
+}
+
+/// Marks the rays that the spheres or capsules of `points` occlude.
+#[inline(always)]
+fn merge_occlusions<L: Lanes, S: LeafGeometry<Tree = FlatPoints>>(
+    points: &FlatPoints,
+    rays: &[Ray],
+    occluded: &mut [bool],
+) {
+    if points.nodes.is_empty() {
+        return;
+    }
+    let open: Vec<usize> = (0..rays.len()).filter(|i| !occluded[*i]).collect();
+    let rays: Vec<Ray> = open.iter().map(|i| rays[*i]).collect();
+    let mut by_solids = vec![false; rays.len()];
+    any_accepted_hit::<L, S, _>(points, &rays, AcceptAll, &mut by_solids);
+    for (i, is_occluded) in open.into_iter().zip(by_solids) {
+        occluded[i] = is_occluded;
     }
 }
 
 /// Traces all rays together until each hits the smooth surface, or hits no more discs.
 #[inline(always)]
 fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
-    hits.fill(SurfaceHit::MISS);
     let mut searching: Vec<u32> = (0..rays.len() as u32).collect();
     let all_rays = rays;
     let mut rays = rays.to_vec();
@@ -167,6 +208,7 @@ fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHi
                         radius,
                         normal: Vec3::new(x[lane], y[lane], z[lane]),
                         color: Vec3::new(r[lane], g[lane], b[lane]),
+                        surface: cloud.surface,
                         is_backface: 0.0 < cloud.points.normal(slot).dot(ray.direction),
                     };
                     continue;
@@ -237,6 +279,7 @@ fn surface_hit(cloud: &FlatCloud, ray: &Ray, splat: &Splat) -> SurfaceHit {
         radius: splat.radius / cloud.surface.radius_factor(),
         normal: splat.normal,
         color: splat.color,
+        surface: cloud.surface,
         is_backface: 0.0 < cloud.points.normal(splat.hit.slot).dot(ray.direction),
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::flat::{FlatCloud, FlatMesh, Instance, Slot};
 use crate::math::{Ray, Vec3, Vec4};
-use crate::surface::triangle;
+use crate::surface::{SurfaceKind, triangle};
 use crate::trace::query::hit::Hit;
 use crate::trace::query::surface::SurfaceHit;
 
@@ -30,6 +30,8 @@ pub struct SceneHit {
     pub color: Vec3,
     /// Alpha of the geometry.
     pub alpha: f32,
+    /// The kind of the surface that was hit; `None` for triangles.
+    pub surface: Option<SurfaceKind>,
     /// True if the ray hits the back of the surface, as far as its orientation is known.
     pub is_backface: bool,
 }
@@ -47,6 +49,7 @@ impl SceneHit {
         geometric_normal: Vec3::ZERO,
         color: Vec3::ZERO,
         alpha: 0.0,
+        surface: None,
         is_backface: false,
     };
 
@@ -67,6 +70,7 @@ pub fn point_hit(cloud: &FlatCloud, hit: &SurfaceHit, instance: &Instance) -> Sc
         geometric_normal: normal,
         color: hit.color,
         alpha: 1.0,
+        surface: Some(hit.surface),
         is_backface: cloud.has_outward_normals && hit.is_backface,
         ..SceneHit::MISS
     }

@@ -1,0 +1,498 @@
+//! Structure: which points form a surface, which a line, and which neither, as leaves do.
+//!
+//! Most points are decided by the plane through their nearest neighbours. Where these lie on a line, as along the
+//! rings of a spinning scanner, the neighbours that decide are found among fewer and fewer points, until they
+//! surround the point. Where they lie in no plane, a plane through at least half of them still makes a surface: an
+//! edge (after Demantké et al., Dimensionality Based Scale Selection in 3D Lidar Point Clouds, 2011).
+
+use super::neighbors::{KdTree, Neighbor, Neighborhood};
+use super::normals::{PlaneFit, fit_plane};
+use super::radius::kth_distance;
+use super::subsample::indices_by_spacing;
+use super::{PointCloud, Scalar, Values};
+use crate::error::{Error, Result};
+use crate::math::{DVec3, SymmetricMatrix, Vec3, hash, smallest_eigenvector};
+use crate::progress::Progress;
+use rayon::prelude::*;
+use std::str::FromStr;
+
+/// Name of the scalar column of structures: 0 surface, 1 line, 2 scatter, 3 redundant.
+pub const STRUCTURE: &str = "structure";
+
+/// Maximum surface variation of a surface's neighbourhood.
+const MAX_SURFACE_VARIATION: f32 = 0.05;
+/// Minimum width of a surface's neighbourhood, as the ratio of its eigenvalues. Below it, it is a line.
+const MIN_SURFACE_WIDTH: f32 = 0.25;
+/// Maximum ratio of the radius of a point on a scan line to the reach of its neighbours on the line. Gaps between scan
+/// lines that are wider are not closed.
+const MAX_WIDENING: f32 = 12.0;
+/// Maximum ratio of the radius of a ball to the median of all.
+const MAX_BALL_RATIO: f32 = 1.5;
+/// Number of neighbours for a second look at points that lie in no plane.
+const N_MANY_NEIGHBORS: usize = 48;
+/// Number of neighbours among thinned points.
+const N_THINNED_NEIGHBORS: usize = 12;
+/// Ratio of the spacings of successive sets of thinned points.
+const THINNING: f32 = 2.0;
+/// Minimum number of thinned points; fewer say nothing about structure.
+const MIN_THINNED: usize = 256;
+/// Number of neighbours that vote on the structure of a point.
+const N_VOTERS: usize = 8;
+/// Number of scattered neighbours that make a point of a surface a scattered one.
+const N_SCATTERING: usize = 4;
+/// Number of neighbours on a surface that make a scattered point one of the surface.
+const N_JOINING: usize = 6;
+/// Number of planes tried at a point that lies near an edge.
+const N_PLANES: u64 = 24;
+/// Distance from a plane of the points on it, in radii of the neighbourhood.
+const PLANE_THICKNESS: f32 = 0.08;
+/// Minimum fraction of the neighbours on the plane of an edge's side.
+const MIN_PLANE_FRACTION: f32 = 0.5;
+
+/// The shape that a point is part of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[repr(u8)]
+pub enum Structure {
+    /// The point is part of a surface.
+    #[default]
+    Surface = 0,
+    /// The point is part of a line: a wire, a pole, a rail.
+    Line = 1,
+    /// The point stands for itself: a leaf, a stray point.
+    Scatter = 2,
+    /// The point lies on a densely sampled scan line of a surface that fewer of its points describe as well.
+    Redundant = 3,
+}
+
+/// The choice of structures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum StructureChoice {
+    /// Each point's structure is found from its neighbours.
+    #[default]
+    Auto,
+    /// All points form a surface.
+    Surface,
+    /// All points stand for themselves.
+    Scatter,
+}
+
+impl FromStr for StructureChoice {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "surface" => Ok(Self::Surface),
+            "scatter" => Ok(Self::Scatter),
+            _ => Err(Error::Setting {
+                name: "structure",
+                found: text.to_owned(),
+                expected: "auto, surface or scatter",
+            }),
+        }
+    }
+}
+
+impl std::fmt::Display for StructureChoice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Auto => "auto",
+            Self::Surface => "surface",
+            Self::Scatter => "scatter",
+        })
+    }
+}
+
+/// Numbers of points by their structure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StructureReport {
+    /// Number of points of surfaces.
+    pub n_surface: usize,
+    /// Number of points of lines.
+    pub n_lines: usize,
+    /// Number of points that stand for themselves.
+    pub n_scatter: usize,
+    /// Number of points of surfaces that are left out, as others on their scan line suffice.
+    pub n_redundant: usize,
+}
+
+impl StructureReport {
+    fn of(structures: &[Structure]) -> Self {
+        let count = |kind| structures.par_iter().filter(|s| **s == kind).count();
+        Self {
+            n_surface: count(Structure::Surface),
+            n_lines: count(Structure::Line),
+            n_scatter: count(Structure::Scatter),
+            n_redundant: count(Structure::Redundant),
+        }
+    }
+
+    /// Returns a line about the structures for the user.
+    pub fn line(&self) -> String {
+        let Self { n_surface, n_lines, n_scatter, n_redundant } = *self;
+        let n_points = (n_surface + n_lines + n_scatter + n_redundant).max(1);
+        let percent = |count: usize| 100.0 * count as f64 / n_points as f64;
+        let line = format!(
+            "structure: {:.1} % surface, {:.1} % lines, {:.1} % scattered points",
+            percent(n_surface + n_redundant),
+            percent(n_lines),
+            percent(n_scatter)
+        );
+        match n_redundant {
+            0 => line,
+            _ => format!("{line}; {n_redundant} points of dense scan lines are left out"),
+        }
+    }
+}
+
+/// The shape of a point: the normal of a surface or the direction of a line, and the reach.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointShape {
+    /// The structure.
+    pub structure: Structure,
+    /// Unit normal of a surface, unit direction of a line; zero if unknown.
+    pub normal: Vec3,
+    /// Radius of a disc, half the length of a capsule, or radius of a ball.
+    pub radius: f32,
+}
+
+impl PointCloud {
+    /// Returns the structure of a point, as far as the cloud has a column of structures.
+    pub fn structures(&self) -> Option<Vec<Structure>> {
+        let of_code = |code: &u8| match code {
+            1 => Structure::Line,
+            2 => Structure::Scatter,
+            3 => Structure::Redundant,
+            _ => Structure::Surface,
+        };
+        match self.scalar(STRUCTURE)? {
+            Values::U8(codes) => Some(codes.iter().map(of_code).collect()),
+            _ => None,
+        }
+    }
+
+    /// Adds or replaces the column of structures.
+    pub fn set_structures(&mut self, structures: &[Structure]) {
+        let values = Values::U8(structures.iter().map(|structure| *structure as u8).collect());
+        self.scalars.retain(|scalar| !scalar.name.eq_ignore_ascii_case(STRUCTURE));
+        self.scalars.push(Scalar { name: STRUCTURE.to_owned(), values });
+    }
+}
+
+/// Finds the structure of each point from the planes through its neighbours and the distances to the most distant
+/// of them.
+///
+/// # Errors
+///
+/// Returns [`Error::Cancelled`] if `progress` is cancelled.
+pub fn find_structures(
+    tree: &KdTree,
+    fits: &[PlaneFit],
+    radii: &[f32],
+    progress: &dyn Progress,
+) -> Result<(Vec<PointShape>, StructureReport)> {
+    let positions = tree.positions();
+    progress.begin("structure", positions.len() as u64);
+    let typical_variation = median_variation(fits);
+    let decide = |point: usize| {
+        if point.is_multiple_of(4096) {
+            progress.check()?;
+            progress.advance(4096.min(positions.len() - point) as u64);
+        }
+        Ok(decide(tree, point, &fits[point], radii[point], typical_variation))
+    };
+    let mut shapes: Vec<PointShape> =
+        (0..positions.len()).into_par_iter().map(decide).collect::<Result<_>>()?;
+    widen_lines(positions, &mut shapes, progress)?;
+    let structures = smoothed(tree, &shapes, progress)?;
+    let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
+        settle(tree, point, &fits[point], radii[point], *structure, shape);
+    };
+    shapes.par_iter_mut().zip(&structures).enumerate().for_each(finish);
+    clamp_balls(&mut shapes);
+    Ok((shapes, StructureReport::of(&structures)))
+}
+
+/// Makes each point stand for itself.
+///
+/// # Errors
+///
+/// Returns [`Error::Cancelled`] if `progress` is cancelled.
+pub fn all_scattered(
+    tree: &KdTree,
+    radii: &[f32],
+    progress: &dyn Progress,
+) -> Result<(Vec<PointShape>, StructureReport)> {
+    let distance = |_: usize, neighbors: &[Neighbor]| kth_distance(neighbors, 2);
+    let distances = tree.map(Neighborhood::Nearest(2), progress, distance)?;
+    let shape = |(distance, radius): (&f32, &f32)| PointShape {
+        structure: Structure::Scatter,
+        normal: Vec3::Z,
+        radius: ball_radius(*distance, *radius),
+    };
+    let mut shapes: Vec<PointShape> = distances.iter().zip(radii).map(shape).collect();
+    clamp_balls(&mut shapes);
+    let report = StructureReport { n_scatter: shapes.len(), ..StructureReport::default() };
+    Ok((shapes, report))
+}
+
+/// Returns the radius of a ball by the distance to the second neighbour; `radius` is that of a disc, which a stray
+/// point's ball does not exceed.
+fn ball_radius(distance: f32, radius: f32) -> f32 {
+    let half = 0.5 * distance;
+    if 0.0 < half { half.min(radius) } else { radius }
+}
+
+/// Clamps the balls of stray points, which would be as large as the empty space around them.
+fn clamp_balls(shapes: &mut [PointShape]) {
+    let balls = shapes.iter().filter(|shape| shape.structure == Structure::Scatter);
+    let mut radii: Vec<f32> = balls.map(|shape| shape.radius).collect();
+    if radii.is_empty() {
+        return;
+    }
+    let middle = radii.len() / 2;
+    let (_, median, _) = radii.select_nth_unstable_by(middle, f32::total_cmp);
+    let limit = MAX_BALL_RATIO * *median;
+    for shape in shapes.iter_mut().filter(|shape| shape.structure == Structure::Scatter) {
+        shape.radius = shape.radius.min(limit);
+    }
+}
+
+fn median_variation(fits: &[PlaneFit]) -> f32 {
+    let mut sample: Vec<f32> =
+        fits.iter().step_by(fits.len() / 10_000 + 1).map(|fit| fit.variation).collect();
+    sample.sort_unstable_by(f32::total_cmp);
+    sample.get(sample.len() / 2).copied().unwrap_or(0.0)
+}
+
+fn is_surface(fit: &PlaneFit) -> bool {
+    fit.normal != Vec3::ZERO
+        && fit.variation < MAX_SURFACE_VARIATION
+        && MIN_SURFACE_WIDTH < fit.width
+}
+
+/// Decides about a point by its nearest neighbours alone.
+fn decide(
+    tree: &KdTree,
+    point: usize,
+    fit: &PlaneFit,
+    radius: f32,
+    typical_variation: f32,
+) -> PointShape {
+    /// Below this variation the mean plane is as good as that of an edge's side.
+    const MIN_EDGE_VARIATION: f32 = 0.012;
+    let shape = |structure, normal| PointShape { structure, normal, radius };
+    if fit.width <= MIN_SURFACE_WIDTH {
+        return shape(Structure::Line, fit.normal);
+    }
+    let is_surface = is_surface(fit);
+    if is_surface && fit.variation < MIN_EDGE_VARIATION.max(2.5 * typical_variation) {
+        return shape(Structure::Surface, fit.normal);
+    }
+    let positions = tree.positions();
+    let neighbors = tree.nearest(positions[point], N_MANY_NEIGHBORS, Some(point as u32));
+    let nearest = &neighbors[..neighbors.len().min(N_MANY_NEIGHBORS / 2)];
+    if let Some(normal) = plane_of_side(positions, point, nearest) {
+        return shape(Structure::Surface, normal);
+    }
+    if is_surface {
+        return shape(Structure::Surface, fit.normal);
+    }
+    let wide = fit_plane(positions, point, &neighbors);
+    if wide.width <= MIN_SURFACE_WIDTH {
+        return shape(Structure::Line, wide.normal);
+    }
+    if self::is_surface(&wide) {
+        return shape(Structure::Surface, wide.normal);
+    }
+    shape(Structure::Scatter, fit.normal)
+}
+
+/// Returns the normal of the plane through the point on which the most neighbours lie, if they are at least half: near
+/// an edge that is the plane of the point's own side.
+fn plane_of_side(positions: &[Vec3], point: usize, neighbors: &[Neighbor]) -> Option<Vec3> {
+    let center = positions[point];
+    let offsets: Vec<Vec3> =
+        neighbors.iter().map(|neighbor| positions[neighbor.index as usize] - center).collect();
+    let reach = offsets.last()?.length();
+    let thickness = PLANE_THICKNESS * reach;
+    let score = |normal: Vec3| -> f32 {
+        let closeness = |offset: &Vec3| {
+            let height = normal.dot(*offset) / thickness;
+            (1.0 - height * height).max(0.0)
+        };
+        offsets.iter().map(closeness).sum()
+    };
+    let n_neighbors = offsets.len() as u64;
+    let candidates = (0..N_PLANES).filter_map(|plane| {
+        let bits = hash((point as u64) << 8 | plane);
+        let (a, b) = (bits % n_neighbors, (bits >> 32) % n_neighbors);
+        let cross = offsets[a as usize].cross(offsets[b as usize]);
+        // Nearly parallel offsets give a plane of any tilt.
+        (0.05 * reach * reach < cross.length()).then(|| cross.normalize())
+    });
+    let scored = candidates.map(|normal| (score(normal), normal));
+    let (_, normal) = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let on_plane = offsets.iter().filter(|offset| normal.dot(**offset).abs() < thickness);
+    let (mut covariance, mut n_on_plane) = (SymmetricMatrix::default(), 0);
+    for offset in on_plane {
+        covariance.add_outer(offset.as_dvec3(), 1.0);
+        n_on_plane += 1;
+    }
+    if (n_on_plane as f32) < MIN_PLANE_FRACTION * offsets.len() as f32 {
+        return None;
+    }
+    let (refined, [_, middle, largest]) = smallest_eigenvector(&covariance);
+    (0.1 * largest < middle).then(|| refined.as_vec3().normalize())
+}
+
+/// Looks at points on lines again, among fewer and fewer points: on a surface that is sampled densely along lines
+/// only, their neighbours come to surround them.
+fn widen_lines(
+    positions: &[Vec3],
+    shapes: &mut [PointShape],
+    progress: &dyn Progress,
+) -> Result<()> {
+    let lines = shapes.iter().enumerate().filter(|(_, shape)| shape.structure == Structure::Line);
+    let mut open: Vec<u32> = lines.map(|(point, _)| point as u32).collect();
+    let mut radii: Vec<f32> = open.iter().map(|point| shapes[*point as usize].radius).collect();
+    if open.is_empty() {
+        return Ok(());
+    }
+    let middle = radii.len() / 4;
+    let (_, typical, _) = radii.select_nth_unstable_by(middle, f32::total_cmp);
+    let mut spacing = 0.5 * *typical;
+    let mut kept: Vec<u32> = (0..positions.len() as u32).collect();
+    let mut thinned = positions.to_vec();
+    while !open.is_empty() && 0.0 < spacing && spacing.is_finite() {
+        let indices = indices_by_spacing(&thinned, spacing, progress)?;
+        kept = indices.iter().map(|index| kept[*index as usize]).collect();
+        thinned = kept.iter().map(|index| positions[*index as usize]).collect();
+        if thinned.len() < MIN_THINNED {
+            break;
+        }
+        let tree = KdTree::new(&thinned, progress)?;
+        let found = |point: &u32| -> Result<Option<PointShape>> {
+            progress.check()?;
+            let position = positions[*point as usize];
+            // A point that is among the thinned ones is not its own neighbour.
+            let mut neighbors = tree.nearest(position, N_THINNED_NEIGHBORS + 1, None);
+            neighbors.retain(|neighbor| 0.0 < neighbor.distance_squared);
+            neighbors.truncate(N_THINNED_NEIGHBORS);
+            let fit = fit_around(&thinned, position, &neighbors);
+            let radius = kth_distance(&neighbors, N_THINNED_NEIGHBORS);
+            if fit.width <= MIN_SURFACE_WIDTH {
+                return Ok(None);
+            }
+            let own = shapes[*point as usize];
+            let is_close = radius <= MAX_WIDENING * own.radius;
+            let structure = match is_surface(&fit) && is_close {
+                true if kept.binary_search(point).is_ok() => Structure::Surface,
+                true => Structure::Redundant,
+                false => return Ok(Some(own)),
+            };
+            Ok(Some(PointShape { structure, normal: fit.normal, radius }))
+        };
+        let decided = open.par_iter().map(found).collect::<Result<Vec<_>>>()?;
+        let mut left = Vec::new();
+        for (point, shape) in open.into_iter().zip(decided) {
+            match shape {
+                Some(shape) => shapes[point as usize] = shape,
+                None => left.push(point),
+            }
+        }
+        open = left;
+        spacing *= THINNING;
+    }
+    Ok(())
+}
+
+/// Fits a plane to a position and points around it.
+fn fit_around(positions: &[Vec3], position: Vec3, neighbors: &[Neighbor]) -> PlaneFit {
+    let mut around: Vec<Vec3> = vec![position];
+    around.extend(neighbors.iter().map(|neighbor| positions[neighbor.index as usize]));
+    let of_others = |index: usize| Neighbor { index: index as u32, distance_squared: 0.0 };
+    let others: Vec<Neighbor> = (1..around.len()).map(of_others).collect();
+    fit_plane(&around, 0, &others)
+}
+
+/// Lets neighbours overrule points, twice, so that structures do not flicker.
+fn smoothed(
+    tree: &KdTree,
+    shapes: &[PointShape],
+    progress: &dyn Progress,
+) -> Result<Vec<Structure>> {
+    let mut structures: Vec<Structure> = shapes.iter().map(|shape| shape.structure).collect();
+    if structures.iter().all(|structure| *structure == Structure::Surface) {
+        return Ok(structures);
+    }
+    let voters = |_: usize, neighbors: &[Neighbor]| {
+        let mut indices = [u32::MAX; N_VOTERS];
+        for (index, neighbor) in indices.iter_mut().zip(neighbors) {
+            *index = neighbor.index;
+        }
+        indices
+    };
+    let voters = tree.map(Neighborhood::Nearest(N_VOTERS), progress, voters)?;
+    for _ in 0..2 {
+        let vote = |(own, voters): (&Structure, &[u32; N_VOTERS])| {
+            let of_voters = voters.iter().filter(|voter| **voter != u32::MAX);
+            let of_voters = of_voters.map(|voter| structures[*voter as usize]);
+            let (mut n_surface, mut n_scatter) = (0, 0);
+            for structure in of_voters {
+                n_surface +=
+                    usize::from(matches!(structure, Structure::Surface | Structure::Redundant));
+                n_scatter += usize::from(structure == Structure::Scatter);
+            }
+            match own {
+                Structure::Surface if N_SCATTERING <= n_scatter => Structure::Scatter,
+                Structure::Scatter if N_JOINING <= n_surface => Structure::Surface,
+                own => *own,
+            }
+        };
+        structures = structures.par_iter().zip(&voters).map(vote).collect();
+    }
+    Ok(structures)
+}
+
+/// Gives a point the normal and the radius of its final structure.
+fn settle(
+    tree: &KdTree,
+    point: usize,
+    fit: &PlaneFit,
+    radius: f32,
+    structure: Structure,
+    shape: &mut PointShape,
+) {
+    let position = tree.positions()[point];
+    match structure {
+        Structure::Surface | Structure::Redundant => {
+            if shape.structure != structure {
+                (shape.normal, shape.radius) = (fit.normal, radius);
+            }
+        }
+        Structure::Line => {
+            let neighbors = tree.nearest(position, N_VOTERS, Some(point as u32));
+            shape.normal = line_direction(tree.positions(), point, &neighbors);
+            let reach = kth_distance(&neighbors, 2);
+            shape.radius = if 0.0 < reach { reach } else { radius };
+        }
+        Structure::Scatter => {
+            let neighbors = tree.nearest(position, 2, Some(point as u32));
+            shape.radius = ball_radius(kth_distance(&neighbors, 2), radius);
+        }
+    }
+    shape.structure = structure;
+}
+
+/// Returns the direction in which the neighbours extend most.
+fn line_direction(positions: &[Vec3], point: usize, neighbors: &[Neighbor]) -> Vec3 {
+    let center = positions[point].as_dvec3();
+    let mut scatter = SymmetricMatrix::default();
+    for neighbor in neighbors {
+        let offset: DVec3 = positions[neighbor.index as usize].as_dvec3() - center;
+        scatter.add_outer(offset, 1.0);
+    }
+    let (_, vectors) = scatter.eigen();
+    vectors[2].as_vec3().normalize_or(Vec3::Z)
+}
