@@ -4,7 +4,7 @@ use std::f32::consts::{PI, TAU};
 use surfel_core::flat::{FlatCloud, FlatScene, PointColumns};
 use surfel_core::image::Image;
 use surfel_core::math::{DAffine3, DVec3, Random, Ray, Vec2, Vec3};
-use surfel_core::points::{PointCloud, Preparation, PreparedCloud, prepare};
+use surfel_core::points::{PointCloud, Preparation, PreparedCloud, StructureChoice, prepare};
 use surfel_core::progress::NoProgress;
 use surfel_core::render::{CpuRenderer, Renderer, Settings};
 use surfel_core::scene::{
@@ -14,18 +14,21 @@ use surfel_core::scene::{
 use surfel_core::surface::{EdgeTest, SurfaceKind};
 use surfel_core::trace::Simd;
 
-/// Prepares a cloud, which adds missing normals and radii, and makes it grey.
+/// Prepares a cloud as one surface, which adds missing normals and radii, and makes it grey.
 pub fn points(cloud: PointCloud, surface: SurfaceKind) -> CloudGeometry {
-    let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+    let preparation = Preparation { structure: StructureChoice::Surface, ..Preparation::default() };
+    let (cloud, _) = prepare(cloud, &preparation, &NoProgress).unwrap();
     let mut points = grey(cloud.into_inner());
     points.surface = surface;
     points.edge_test = EdgeTest::AngularGap;
     points
 }
 
-/// Makes a cloud grey that has normals and radii, with default settings otherwise.
+/// Makes a cloud grey that has normals and radii, and gives it a surface of splats.
 pub fn grey(cloud: PointCloud) -> CloudGeometry {
-    CloudGeometry::with_uniform_color(PreparedCloud::new(cloud).unwrap(), [188; 3])
+    let mut grey = CloudGeometry::with_uniform_color(PreparedCloud::new(cloud).unwrap(), [188; 3]);
+    grey.surface = SurfaceKind::Splat;
+    grey
 }
 
 /// Returns the columns that the flat form of a cloud keeps.

@@ -265,9 +265,7 @@ fn add_structures(cloud: &mut PointCloud, shapes: &[PointShape]) {
             }
         }
     }
-    if structures.iter().any(|structure| *structure != Structure::Surface) {
-        cloud.set_structures(&structures);
-    }
+    cloud.set_structures(&structures);
 }
 
 fn fit_planes(

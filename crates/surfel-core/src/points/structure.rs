@@ -26,8 +26,10 @@ const MIN_SURFACE_WIDTH: f32 = 0.25;
 /// Maximum ratio of the radius of a point on a scan line to the reach of its neighbours on the line. Gaps between scan
 /// lines that are wider are not closed.
 const MAX_WIDENING: f32 = 12.0;
-/// Maximum ratio of the radius of a ball to the median of all.
-const MAX_BALL_RATIO: f32 = 1.5;
+/// Maximum width of the neighbourhood of a line.
+const MAX_LINE_WIDTH: f32 = 0.04;
+/// Maximum ratio of the radius of a ball or capsule to the median of its structure.
+const MAX_SOLID_RATIO: f32 = 1.5;
 /// Number of neighbours for a second look at points that lie in no plane.
 const N_MANY_NEIGHBORS: usize = 48;
 /// Number of neighbours among thinned points.
@@ -204,12 +206,18 @@ pub fn find_structures(
     let mut shapes: Vec<PointShape> =
         (0..positions.len()).into_par_iter().map(decide).collect::<Result<_>>()?;
     widen_lines(positions, &mut shapes, progress)?;
+    for (shape, fit) in shapes.iter_mut().zip(fits) {
+        if shape.structure == Structure::Line && MAX_LINE_WIDTH < fit.width {
+            shape.structure = Structure::Scatter;
+        }
+    }
     let structures = smoothed(tree, &shapes, progress)?;
     let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
         settle(tree, point, &fits[point], radii[point], *structure, shape);
     };
     shapes.par_iter_mut().zip(&structures).enumerate().for_each(finish);
-    clamp_balls(&mut shapes);
+    clamp_solids(&mut shapes, Structure::Line);
+    clamp_solids(&mut shapes, Structure::Scatter);
     Ok((shapes, StructureReport::of(&structures)))
 }
 
@@ -231,7 +239,7 @@ pub fn all_scattered(
         radius: ball_radius(*distance, *radius),
     };
     let mut shapes: Vec<PointShape> = distances.iter().zip(radii).map(shape).collect();
-    clamp_balls(&mut shapes);
+    clamp_solids(&mut shapes, Structure::Scatter);
     let report = StructureReport { n_scatter: shapes.len(), ..StructureReport::default() };
     Ok((shapes, report))
 }
@@ -243,17 +251,17 @@ fn ball_radius(distance: f32, radius: f32) -> f32 {
     if 0.0 < half { half.min(radius) } else { radius }
 }
 
-/// Clamps the balls of stray points, which would be as large as the empty space around them.
-fn clamp_balls(shapes: &mut [PointShape]) {
-    let balls = shapes.iter().filter(|shape| shape.structure == Structure::Scatter);
-    let mut radii: Vec<f32> = balls.map(|shape| shape.radius).collect();
+/// Clamps the radii of stray points, which would be as large as the empty space around them.
+fn clamp_solids(shapes: &mut [PointShape], structure: Structure) {
+    let solids = shapes.iter().filter(|shape| shape.structure == structure);
+    let mut radii: Vec<f32> = solids.map(|shape| shape.radius).collect();
     if radii.is_empty() {
         return;
     }
     let middle = radii.len() / 2;
     let (_, median, _) = radii.select_nth_unstable_by(middle, f32::total_cmp);
-    let limit = MAX_BALL_RATIO * *median;
-    for shape in shapes.iter_mut().filter(|shape| shape.structure == Structure::Scatter) {
+    let limit = MAX_SOLID_RATIO * *median;
+    for shape in shapes.iter_mut().filter(|shape| shape.structure == structure) {
         shape.radius = shape.radius.min(limit);
     }
 }

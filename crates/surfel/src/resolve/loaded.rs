@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::iter::successors;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use surfel_core::points::{PointCloud, PreparedCloud, SURFACE_VARIATION};
+use surfel_core::points::{PointCloud, PreparedCloud, STRUCTURE, SURFACE_VARIATION};
 use surfel_core::progress::Progress;
 use surfel_core::scene::color::ColorSource;
 use surfel_core::scene::{
@@ -469,14 +469,16 @@ impl LoadedScene {
             let Some(color) = self.settings_of(i, description).color.color else { continue };
             let is_computed = match &color {
                 ColorSource::Normal => true,
-                ColorSource::Column(name) => name == SURFACE_VARIATION,
+                ColorSource::Column(name) => {
+                    [SURFACE_VARIATION, STRUCTURE].contains(&name.as_str())
+                }
                 _ => false,
             };
             if is_computed || color.is_available_in(cloud) {
                 continue;
             }
             return Err(Error::Unfit(format!(
-                "{}: no column {color}; --color takes elevation, normal, {SURFACE_VARIATION}, \
+                "{}: no column {color}; --color takes elevation, normal, {SURFACE_VARIATION}, {STRUCTURE}, \
                  #RRGGBB, a CSS colour name and what the file has: {}; {}",
                 list_files(self.files_of(i, description)),
                 match colorable_columns(&self.file_info().columns) {

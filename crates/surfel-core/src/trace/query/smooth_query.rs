@@ -91,7 +91,7 @@ impl<L: Lanes, const HAS_COLORS: bool> SimdTask for FindSurface<'_, L, HAS_COLOR
             distances,
             normals: candidates.normal,
             colors: Vec3Lanes::splat(Vec3::ZERO),
-            slots: L::PacketLanes::splat(f32::from_bits(Hit::MISS.slot)),
+            slots: L::PacketLanes::load(&slots.map(f32::from_bits)),
         };
         let mut left = lanes;
         while left != 0 {
