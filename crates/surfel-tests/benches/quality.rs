@@ -1,88 +1,183 @@
-//! The figures of docs/quality.md: every surface kind compared with the mesh that its points were taken from.
+//! The figures of docs/quality.md: surfaces of points compared with the shapes that the points were taken from.
+//!
+//! `cargo bench -p surfel-tests --bench quality -- WORDS`: a word that names a surface kind selects this kind, any
+//! other word selects the clouds whose name contains it.
 #![expect(clippy::print_stdout, reason = "a benchmark prints its table")]
 
-use surfel_core::math::{Mat3, Vec3};
-use surfel_core::points::{PointCloud, Preparation, Radius, prepare, spacing};
-use surfel_core::progress::NoProgress;
-use surfel_core::surface::{EdgeTest, SurfaceKind};
-use surfel_tests::clouds;
-use surfel_tests::deviation::{Deviation, compare};
+use rayon::prelude::*;
+use std::path::Path;
+use std::time::Instant;
+use surfel_core::math::{DVec3, Random, Ray, Vec3};
+use surfel_core::points::PointCloud;
+use surfel_core::surface::SurfaceKind;
+use surfel_core::trace::{self, Simd, SurfaceHit};
+use surfel_tests::deviation::TrueViews;
 use surfel_tests::ground_truth::{GroundTruth, shared_data};
+use surfel_tests::sampling::{Sampling, mean_spacing};
+use surfel_tests::{scenes, shapes};
+
+/// Words of the command line.
+struct Selection {
+    kinds: Vec<(&'static str, SurfaceKind)>,
+    filters: Vec<String>,
+}
+
+/// A shape and the number of points that it is sampled with.
+struct Shape {
+    name: &'static str,
+    n_points: usize,
+    mesh: fn(&Path) -> GroundTruth,
+    /// True if the mesh comes from a file.
+    is_file: bool,
+}
 
 fn main() {
-    cube();
+    let selection = Selection::from_args();
     // `cargo test` only checks that the program works.
-    if is_complete() {
-        bunny();
+    if !std::env::args().any(|argument| argument == "--bench") {
+        let (name, kind) = ("splat", SurfaceKind::Splat);
+        let mesh = GroundTruth::from_mesh(&shapes::low_poly_blob());
+        let views = TrueViews::new(&mesh, 64);
+        let points = Sampling::Uniform.sample(&mesh, 1000, 1);
+        compare_cloud("blob", points, &views, mean_spacing(&mesh, 1000), &[(name, kind)]);
+        assert!(n_uncovered_pixels(kind, 2000, 100) < 500);
+        return;
+    }
+    compare_shapes(&selection);
+    cover_plane(&selection);
+}
+
+impl Selection {
+    fn from_args() -> Self {
+        let words = || std::env::args().skip(1).filter(|word| !word.starts_with('-'));
+        let named = |word: &String| SurfaceKind::ALL.iter().any(|(name, _)| name == word);
+        let kinds = SurfaceKind::ALL.into_iter().filter(|(name, _)| {
+            let is_default = matches!(*name, "splat" | "smooth");
+            if words().any(|word| named(&word)) {
+                words().any(|word| word == *name)
+            } else {
+                is_default
+            }
+        });
+        Self { kinds: kinds.collect(), filters: words().filter(|word| !named(word)).collect() }
+    }
+
+    fn includes(&self, cloud: &str) -> bool {
+        self.filters.is_empty() || self.filters.iter().any(|filter| cloud.contains(filter))
     }
 }
 
-/// Whether `cargo bench` runs this program.
-fn is_complete() -> bool {
-    std::env::args().any(|argument| argument == "--bench")
+fn all_shapes() -> [Shape; 6] {
+    let built_in = |name, n_points, mesh| Shape { name, n_points, mesh, is_file: false };
+    let file = |name, n_points, mesh| Shape { name, n_points, mesh, is_file: true };
+    [
+        built_in("cube", 20_000, |_| GroundTruth::from_mesh(&shapes::cube())),
+        built_in("blob", 20_000, |_| GroundTruth::from_mesh(&shapes::blob())),
+        built_in("low-poly", 20_000, |_| GroundTruth::from_mesh(&shapes::low_poly_blob())),
+        built_in("head", 60_000, |_| GroundTruth::from_mesh(&shapes::head())),
+        file("bunny", 40_000, |data| GroundTruth::from_file(&data.join("meshes/bun_zipper.ply"))),
+        file("armadillo", 60_000, |data| {
+            GroundTruth::from_file(&data.join("meshes/armadillo_26k.ply"))
+        }),
+    ]
 }
 
-/// Compares a rotated cube of exact normals, whose sharp edges need the angular-gap test.
-fn cube() {
-    let turn = Mat3::from_axis_angle(Vec3::new(1.0, 2.0, 0.5).normalize(), 0.8);
-    let corner = |i: u32| {
-        turn * (Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * 2.0 - 1.0)
-    };
-    let side = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
-    let sides =
-        [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
-    let mesh = GroundTruth::new((0..8).map(corner).collect(), sides.map(side).concat());
-    let mut cloud = clouds::cube(58, 0.45, 1);
-    cloud.positions.iter_mut().for_each(|position| *position = turn * *position);
-    cloud.normals.iter_mut().flatten().for_each(|normal| *normal = turn * *normal);
-    println!("a cube's {} points", cloud.len());
-    table(&cloud, &mesh);
+fn compare_shapes(selection: &Selection) {
+    const RESOLUTION: u32 = 512;
+    println!(
+        "| cloud | surface | missing % | false % | depth, s | over 5 s, % | normals: mean, 95 % | \
+         prepare, s | trace, s |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    let data = shared_data();
+    for shape in all_shapes() {
+        let names = Sampling::ALL.map(|(name, sampling)| {
+            let name = format!("{}-{name}", shape.name);
+            (name, Some(sampling))
+        });
+        // The vertices of the bunny are a merged scan.
+        let vertices = (format!("{}-vertices", shape.name), None);
+        let names = names.into_iter().chain((shape.name == "bunny").then_some(vertices));
+        let names: Vec<_> = names.filter(|(name, _)| selection.includes(name)).collect();
+        let folder = match &data {
+            _ if names.is_empty() => continue,
+            None if shape.is_file => continue,
+            folder => folder.as_deref().unwrap_or(Path::new("")),
+        };
+        let mesh = (shape.mesh)(folder);
+        let views = TrueViews::new(&mesh, RESOLUTION);
+        for (name, sampling) in names {
+            let points = match sampling {
+                Some(sampling) => sampling.sample(&mesh, shape.n_points, 1),
+                None => mesh.vertices.clone(),
+            };
+            let spacing = mean_spacing(&mesh, points.len());
+            compare_cloud(&name, points, &views, spacing, &selection.kinds);
+        }
+    }
 }
 
-fn bunny() {
-    let Some(data) = shared_data() else { return };
-    let mesh = GroundTruth::from_ascii_ply(&data.join("meshes/bun_zipper.ply"));
-    let cloud = PointCloud::from_positions(mesh.vertices.clone());
-    println!("the bunny's {} vertices against its mesh", cloud.len());
-    table(&cloud, &mesh);
-    radii(&cloud, &mesh);
-}
-
-/// Compares radii of several sizes.
-fn radii(cloud: &PointCloud, mesh: &GroundTruth) {
-    let spacing = spacing(&cloud.positions, &NoProgress).unwrap();
-    println!("| `splat`, angular-gap | false hits | misses | normals |");
-    println!("| --- | --- | --- | --- |");
-    for k in [6, 8, 10, 12] {
-        let preparation = Preparation { radius: Radius::Adaptive { k }, ..Preparation::default() };
-        let (cloud, _) = prepare(cloud.clone(), &preparation, &NoProgress).unwrap();
-        let Deviation { false_hits, misses, normal_deg, .. } =
-            compare(&cloud, mesh, SurfaceKind::Splat, EdgeTest::AngularGap, spacing);
+fn compare_cloud(
+    name: &str,
+    points: Vec<Vec3>,
+    views: &TrueViews,
+    spacing: f32,
+    kinds: &[(&'static str, SurfaceKind)],
+) {
+    let cloud = PointCloud::from_positions(points);
+    for (surface, kind) in kinds {
+        let begin = Instant::now();
+        let flat = scenes::flat(cloud.clone(), *kind);
+        let prepare_secs = begin.elapsed().as_secs_f64();
+        let begin = Instant::now();
+        let hits = views.trace(&flat);
+        let trace_secs = begin.elapsed().as_secs_f64();
+        let figures = views.compare(&hits, spacing);
         println!(
-            "| `--radius adaptive:{k}` | {:.2} % | {:.2} % | {normal_deg:.2} deg |",
-            100.0 * false_hits,
-            100.0 * misses,
+            "| {name} | `{surface}` | {:.3} | {:.3} | {:.3} | {:.2} | {:.1}°, {:.1}° | \
+             {prepare_secs:.2} | {trace_secs:.2} |",
+            100.0 * figures.misses,
+            100.0 * figures.false_hits,
+            figures.depth_rms,
+            100.0 * figures.far_off,
+            figures.normal_deg,
+            figures.normal_p95_deg,
         );
     }
 }
 
-fn table(cloud: &PointCloud, mesh: &GroundTruth) {
-    let spacing = spacing(&cloud.positions, &NoProgress).unwrap();
-    println!("spacing {spacing:.5}");
-    println!("| surface | edge test | false hits | misses | normals | depth rms |");
-    println!("| --- | --- | --- | --- | --- | --- |");
-    for (name, kind) in SurfaceKind::ALL {
-        if kind == SurfaceKind::Points || (kind != SurfaceKind::Disc && !is_complete()) {
-            continue;
-        }
-        for (test, edge_test) in [("angular-gap", EdgeTest::AngularGap), ("off", EdgeTest::Off)] {
-            let Deviation { false_hits, misses, normal_deg, depth_rms } =
-                compare(cloud, mesh, kind, edge_test, spacing);
-            println!(
-                "| `{name}` | {test} | {:.2} % | {:.2} % | {normal_deg:.2} deg | {depth_rms:.2} spacings |",
-                100.0 * false_hits,
-                100.0 * misses,
-            );
-        }
+fn cover_plane(selection: &Selection) {
+    const N_POINTS: usize = 20_000;
+    const RESOLUTION: u32 = 720;
+    if !selection.includes("plane-random") {
+        return;
     }
+    println!("\n| cloud | surface | pixels | not fully covered |\n| --- | --- | --- | --- |");
+    for (surface, kind) in &selection.kinds {
+        let n_uncovered = n_uncovered_pixels(*kind, N_POINTS, RESOLUTION);
+        let n_pixels = RESOLUTION * RESOLUTION;
+        println!("| plane-random | `{surface}` | {n_pixels} | {n_uncovered} |");
+    }
+}
+
+/// Counts the pixels of a flat square of random points, seen from above inside of its border, in which one of four
+/// rays passes between the points.
+fn n_uncovered_pixels(kind: SurfaceKind, n_points: usize, resolution: u32) -> usize {
+    let mut random = Random::new(1, 0);
+    let mut coordinate = || 2.0 * random.next_f32() - 1.0;
+    let points = (0..n_points).map(|_| Vec3::new(coordinate(), coordinate(), 0.0)).collect();
+    let flat = scenes::flat(PointCloud::from_positions(points), kind);
+    // A margin of four spacings is left out.
+    let height = 2.0 * (1.0 - 4.0 * 2.0 / (n_points as f64).sqrt());
+    let view = scenes::from_above(height).view(DVec3::ZERO, resolution, resolution);
+    let subpixels = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)];
+    let row_count = |y: u32| {
+        let rays: Vec<Ray> = (0..resolution)
+            .flat_map(|x| subpixels.map(|(dx, dy)| view.ray(x as f32 + dx, y as f32 + dy)))
+            .collect();
+        let mut hits = vec![SurfaceHit::MISS; rays.len()];
+        trace::surface_hits(&flat, Simd::detect(), &rays, &mut hits);
+        hits.chunks(4).filter(|hits| hits.iter().any(SurfaceHit::is_miss)).count()
+    };
+    (0..resolution).into_par_iter().map(row_count).sum()
 }

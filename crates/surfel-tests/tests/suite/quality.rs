@@ -1,18 +1,26 @@
-//! The Stanford bunny's vertices against its mesh, for every surface kind.
+//! Surfaces of points compared with the meshes that the points were taken from, in a short form of the benchmark.
 
-use surfel_core::points::{PointCloud, spacing};
-use surfel_core::progress::NoProgress;
-use surfel_core::surface::{EdgeTest, SurfaceKind};
-use surfel_tests::deviation::compare;
+use surfel_core::points::PointCloud;
+use surfel_core::surface::SurfaceKind;
+use surfel_tests::deviation::{Deviation, TrueViews};
 use surfel_tests::ground_truth::{GroundTruth, shared_data};
+use surfel_tests::sampling::{Sampling, mean_spacing};
+use surfel_tests::{scenes, shapes};
+
+const RESOLUTION: u32 = 128;
+
+fn deviation(points: &PointCloud, mesh: &GroundTruth, kind: SurfaceKind) -> Deviation {
+    let views = TrueViews::new(mesh, RESOLUTION);
+    let hits = views.trace(&scenes::flat(points.clone(), kind));
+    views.compare(&hits, mean_spacing(mesh, points.len()))
+}
 
 #[test]
 fn the_bunny_of_points_looks_like_its_mesh() {
     let Some(data) = shared_data() else { return };
-    let mesh = GroundTruth::from_ascii_ply(&data.join("meshes/bun_zipper.ply"));
+    let mesh = GroundTruth::from_file(&data.join("meshes/bun_zipper.ply"));
     let cloud = PointCloud::from_positions(mesh.vertices.clone());
-    let spacing = spacing(&cloud.positions, &NoProgress).unwrap();
-    // Measured values are in docs/quality.md; these limits allow a tenth more for rounding on other machines.
+    // These limits allow a tenth more than measured for rounding on other machines.
     let bounds = [
         (SurfaceKind::Sphere, 0.130, 20.4),
         (SurfaceKind::Disc, 0.025, 13.6),
@@ -21,10 +29,37 @@ fn the_bunny_of_points_looks_like_its_mesh() {
         (SurfaceKind::SplatFit, 0.063, 10.1),
     ];
     for (kind, silhouette, normal_deg) in bounds {
-        let deviation = compare(&cloud, &mesh, kind, EdgeTest::AngularGap, spacing);
+        let deviation = deviation(&cloud, &mesh, kind);
         let differing = deviation.false_hits + deviation.misses;
         assert!(differing < silhouette, "{}: {deviation:?}", kind.name());
         assert!(deviation.normal_deg < normal_deg, "{}: {deviation:?}", kind.name());
         assert!(deviation.misses < 0.001, "{}: {deviation:?}", kind.name());
+    }
+}
+
+#[test]
+fn sampled_shapes_look_like_their_meshes() {
+    let cube = GroundTruth::from_mesh(&shapes::cube());
+    let head = GroundTruth::from_mesh(&shapes::head());
+    // Upper limits of false hits and misses in percent, depth in spacings, normals in degrees (mean and 95 %).
+    let cases = [
+        ("cube, uniform", &cube, Sampling::Uniform, [0.0; 5]),
+        ("cube, random", &cube, Sampling::Random, [0.0; 5]),
+        ("head, uniform", &head, Sampling::Uniform, [0.0; 5]),
+        ("head, noise", &head, Sampling::Noisy(0.3), [0.0; 5]),
+        ("head, falling", &head, Sampling::Falling, [0.0; 5]),
+    ];
+    for (name, mesh, sampling, limits) in cases {
+        let cloud = PointCloud::from_positions(sampling.sample(mesh, 6000, 1));
+        let found = deviation(&cloud, mesh, SurfaceKind::Splat);
+        let figures = [
+            100.0 * found.false_hits,
+            100.0 * found.misses,
+            found.depth_rms,
+            found.normal_deg,
+            found.normal_p95_deg,
+        ];
+        let is_within = figures.iter().zip(limits).all(|(figure, limit)| *figure <= limit);
+        assert!(is_within, "{name}: {figures:?} exceeds {limits:?}");
     }
 }
