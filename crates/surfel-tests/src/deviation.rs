@@ -163,6 +163,7 @@ mod tests {
         let views = views();
         let mut hits = true_hits(&views);
         let n_hits = hits.iter().filter(|hit| !hit.is_miss()).count() as f64;
+        let n_background = hits.len() as f64 - n_hits;
         hits.iter_mut()
             .filter(|hit| !hit.is_miss())
             .take(2)

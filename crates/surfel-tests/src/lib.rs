@@ -6,3 +6,4 @@ pub mod ground_truth;
 pub mod shapes;
 pub mod sampling;
 pub mod deviation;
+pub mod scan_quality;

@@ -1,9 +1,6 @@
-//! The figures of docs/quality.md: surfaces of points compared with the shapes that the points were taken from.
-//!
-//! `cargo bench -p surfel-tests --bench quality -- WORDS`: a word that names a surface kind selects this kind, any
-//! other word selects the clouds whose name contains it.
-#![expect(clippy::print_stdout, reason = "a benchmark prints its table")]
+//! Sampled shapes compared with their meshes.
 
+use crate::selection::Selection;
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
@@ -14,13 +11,8 @@ use surfel_core::trace::{self, Simd, SurfaceHit};
 use surfel_tests::deviation::TrueViews;
 use surfel_tests::ground_truth::{GroundTruth, shared_data};
 use surfel_tests::sampling::{Sampling, mean_spacing};
-use surfel_tests::{scenes, shapes};
-
-/// Words of the command line.
-struct Selection {
-    kinds: Vec<(&'static str, SurfaceKind)>,
-    filters: Vec<String>,
-}
+use surfel_tests::scenes;
+use surfel_tests::shapes;
 
 /// A shape and the number of points that it is sampled with.
 struct Shape {
@@ -31,40 +23,15 @@ struct Shape {
     is_file: bool,
 }
 
-fn main() {
-    let selection = Selection::from_args();
-    // `cargo test` only checks that the program works.
-    if !std::env::args().any(|argument| argument == "--bench") {
-        let (name, kind) = ("splat", SurfaceKind::Splat);
-        let mesh = GroundTruth::from_mesh(&shapes::low_poly_blob());
-        let views = TrueViews::new(&mesh, 64);
-        let points = Sampling::Uniform.sample(&mesh, 1000, 1);
-        compare_cloud("blob", points, &views, mean_spacing(&mesh, 1000), &[(name, kind)]);
-        assert!(n_uncovered_pixels(kind, 2000, 100) < 500);
-        return;
-    }
-    compare_shapes(&selection);
-    cover_plane(&selection);
-}
-
-impl Selection {
-    fn from_args() -> Self {
-        let words = || std::env::args().skip(1).filter(|word| !word.starts_with('-'));
-        let named = |word: &String| SurfaceKind::ALL.iter().any(|(name, _)| name == word);
-        let kinds = SurfaceKind::ALL.into_iter().filter(|(name, _)| {
-            let is_default = matches!(*name, "splat" | "smooth");
-            if words().any(|word| named(&word)) {
-                words().any(|word| word == *name)
-            } else {
-                is_default
-            }
-        });
-        Self { kinds: kinds.collect(), filters: words().filter(|word| !named(word)).collect() }
-    }
-
-    fn includes(&self, cloud: &str) -> bool {
-        self.filters.is_empty() || self.filters.iter().any(|filter| cloud.contains(filter))
-    }
+/// Runs small clouds and asserts their figures.
+pub fn check() {
+    let kind = SurfaceKind::Splat;
+    let mesh = GroundTruth::from_mesh(&shapes::low_poly_blob());
+    let views = TrueViews::new(&mesh, 64);
+    let points = Sampling::Uniform.sample(&mesh, 1000, 1);
+    compare_cloud("blob", points, &views, mean_spacing(&mesh, 1000), &[("splat", kind)]);
+    let n_uncovered = n_uncovered_pixels(kind, 2000, 100);
+    assert!(n_uncovered < 500, "{n_uncovered} of 10,000 pixels are not covered");
 }
 
 fn all_shapes() -> [Shape; 6] {
@@ -82,7 +49,8 @@ fn all_shapes() -> [Shape; 6] {
     ]
 }
 
-fn compare_shapes(selection: &Selection) {
+/// Prints the table of all shapes.
+pub fn compare_shapes(selection: &Selection) {
     const RESOLUTION: u32 = 512;
     println!(
         "| cloud | surface | missing % | false % | depth, s | over 5 s, % | normals: mean, 95 % | \
@@ -146,7 +114,8 @@ fn compare_cloud(
     }
 }
 
-fn cover_plane(selection: &Selection) {
+/// Prints how many pixels of a flat cloud show gaps.
+pub fn cover_plane(selection: &Selection) {
     const N_POINTS: usize = 20_000;
     const RESOLUTION: u32 = 720;
     if !selection.includes("plane-random") {

@@ -5,7 +5,8 @@ use surfel_core::surface::SurfaceKind;
 use surfel_tests::deviation::{Deviation, TrueViews};
 use surfel_tests::ground_truth::{GroundTruth, shared_data};
 use surfel_tests::sampling::{Sampling, mean_spacing};
-use surfel_tests::{scenes, shapes};
+use surfel_tests::scenes;
+use surfel_tests::shapes;
 
 const RESOLUTION: u32 = 128;
 
