@@ -130,6 +130,7 @@ mod tests {
             truth.map_or(SurfaceHit::MISS, |GroundTruthHit { distance, normal }| SurfaceHit {
                 distance,
                 normal,
+                id: 0,
                 ..SurfaceHit::MISS
             })
         };
@@ -168,7 +169,7 @@ mod tests {
             .filter(|hit| !hit.is_miss())
             .take(2)
             .for_each(|hit| *hit = SurfaceHit::MISS);
-        let false_hit = SurfaceHit { distance: 1.0, normal: Vec3::Z, ..SurfaceHit::MISS };
+        let false_hit = SurfaceHit { distance: 1.0, normal: Vec3::Z, id: 0, ..SurfaceHit::MISS };
         // The first pixel of a view shows the background.
         hits[0] = false_hit;
         let figures = views.compare(&hits, 0.1);

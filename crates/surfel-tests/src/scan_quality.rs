@@ -13,7 +13,7 @@ use surfel_core::scene::{
 };
 use surfel_core::trace::Simd;
 
-/// What one pixel of a scene shows, and whether an instrument measured it.
+/// The surface that one pixel of a scene shows, and whether an instrument measured it.
 #[derive(Clone, Copy, Debug)]
 pub struct TruePixel {
     /// Index into the scene's kinds of objects.
