@@ -1,10 +1,11 @@
 //! Triangle meshes as ground truth for point clouds of the same shape.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use surfel_core::bvh::{self, Bvh, BvhPrimitive, Child, NO_PRIMITIVE};
 use surfel_core::math::{Aabb, LANES, Ray, Vec3};
 use surfel_core::progress::NoProgress;
+use surfel_core::scene::{Geometry, Mesh};
+use surfel_formats::{LoadOptions, load_graph};
 
 /// Triangles and a tree over them.
 pub struct GroundTruth {
@@ -23,37 +24,45 @@ pub struct GroundTruthHit {
     pub normal: Vec3,
 }
 
-/// Returns the folder of test data beside the checkout, or prints that it is absent and returns `None`.
+/// Returns the folder of test data beside the checkout or above it, or prints that it is absent and returns `None`.
 pub fn shared_data() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    if folder.is_dir() {
-        return Some(folder);
-    }
+    let ancestors = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+    let mut folders = ancestors.map(|ancestor| ancestor.join("shared/data"));
+    let found = folders.find(|folder| folder.is_dir());
     #[expect(clippy::print_stdout, reason = "a skipped test reports itself")]
-    {
+    if found.is_none() {
         println!("skipped: ../shared/data is absent");
     }
-    None
+    found
 }
 
 impl GroundTruth {
-    /// Reads an ascii PLY file whose vertices begin with x y z and whose faces are triangles.
+    /// Reads a file with one mesh.
     ///
     /// # Panics
     ///
-    /// Panics if there is no such file.
-    pub fn from_ascii_ply(path: &Path) -> Self {
-        let text = fs::read_to_string(path).unwrap();
-        let (header, body) = text.split_once("end_header").unwrap();
-        let count = |element: &str| -> usize {
-            let line = header.lines().find_map(|line| line.strip_prefix(element)).unwrap();
-            line.trim().parse().unwrap()
-        };
-        let (n_vertices, n_faces) = (count("element vertex"), count("element face"));
-        let mut lines = body.trim_start().lines();
-        let vertices: Vec<Vec3> = lines.by_ref().take(n_vertices).map(vertex).collect();
-        let triangles = lines.take(n_faces).map(triangle).collect();
-        Self::new(vertices, triangles)
+    /// Panics if there is no such file or it has no mesh or several.
+    pub fn from_file(path: &Path) -> Self {
+        let (graph, _) = load_graph(path, &LoadOptions::default(), &NoProgress).unwrap();
+        match &graph.geometries[..] {
+            [Geometry::Triangles(mesh)] => Self::from_mesh(mesh),
+            _ => panic!("{}: not one mesh", path.display()),
+        }
+    }
+
+    /// Builds the tree over the triangles of a mesh.
+    pub fn from_mesh(mesh: &Mesh) -> Self {
+        Self::new(mesh.positions.clone(), mesh.triangles.clone())
+    }
+
+    /// Returns the corners of every triangle.
+    pub fn triangles(&self) -> impl Iterator<Item = [Vec3; 3]> {
+        self.triangles.iter().map(|triangle| triangle.map(|i| self.vertices[i as usize]))
+    }
+
+    /// Returns the bounds of the triangles.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::of_points(self.triangles().flatten())
     }
 
     /// Builds the tree over triangles, each three indices of vertices.
@@ -113,18 +122,6 @@ impl GroundTruth {
         let normal = if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
         inside.then_some(GroundTruthHit { distance, normal })
     }
-}
-
-fn vertex(line: &str) -> Vec3 {
-    let mut numbers = line.split_whitespace().map(|word| word.parse::<f32>().unwrap());
-    let mut next = || numbers.next().unwrap();
-    Vec3::new(next(), next(), next())
-}
-
-fn triangle(line: &str) -> [u32; 3] {
-    let numbers: Vec<u32> = line.split_whitespace().map(|word| word.parse().unwrap()).collect();
-    assert_eq!(numbers[0], 3, "only triangles");
-    [numbers[1], numbers[2], numbers[3]]
 }
 
 fn intersects_box(ray: &Ray, bounds: Aabb, limit: f32) -> bool {

@@ -1,6 +1,9 @@
-//! Scenes with known answers, shared by the tests and the benchmarks of all crates.
+//! Scenes, clouds and ground truth that the tests and benchmarks of all crates share.
 
 pub mod clouds;
 pub mod scenes;
 pub mod ground_truth;
+pub mod shapes;
+pub mod sampling;
 pub mod deviation;
+pub mod scan_quality;

@@ -65,6 +65,11 @@ impl SdfScene {
         self
     }
 
+    /// Returns the number of SDFs.
+    pub fn n_parts(&self) -> usize {
+        self.parts.len()
+    }
+
     /// Returns an SDF by its index.
     pub fn part(&self, part_idx: usize) -> &dyn Sdf {
         &*self.parts[part_idx].1
@@ -87,6 +92,15 @@ impl SdfScene {
             }
         }
         nearest
+    }
+
+    /// Returns true if no surface lies between `viewpoint` and `point` on a surface.
+    pub fn is_visible_from(&self, viewpoint: DVec3, point: DVec3) -> bool {
+        const TOLERANCE: f64 = 0.02;
+        let offset = point - viewpoint;
+        let distance = offset.length();
+        let ray = DRay { origin: viewpoint, direction: offset / distance };
+        self.first_hit(&ray, distance - TOLERANCE).is_none()
     }
 
     /// Returns the unit normal of an SDF's surface: the gradient of the distance, by differences over 2 mm.
@@ -122,6 +136,11 @@ impl DAabb {
                 pick(4, self.min.z, self.max.z),
             )
         })
+    }
+
+    /// Returns the distance from `point` to the box, 0 inside.
+    pub fn distance(self, point: DVec3) -> f64 {
+        (self.min - point).max(point - self.max).max(DVec3::ZERO).length()
     }
 
     /// Returns the distances from 0 to `limit` at which `ray` enters and leaves the box, if it does.

@@ -69,7 +69,7 @@ fn searches_end_where_numbers_overflow() {
 #[test]
 fn all_paths_find_the_same_hits_in_real_clouds() {
     let Some(data) = shared_data() else { return };
-    let bunny = GroundTruth::from_ascii_ply(&data.join("meshes/bun_zipper.ply")).vertices;
+    let bunny = GroundTruth::from_file(&data.join("meshes/bun_zipper.ply")).vertices;
     let scan = loaded(&data.join("clouds/sample_c.las"));
     for (name, cloud) in [("bunny", PointCloud::from_positions(bunny)), ("scan", scan)] {
         for kind in [SurfaceKind::Sphere, SurfaceKind::Splat] {

@@ -1,30 +1,22 @@
 //! The demo scene: a temple in ruins, 30 metres across.
 
-use super::column::{ColumnSdf, Drum};
-use super::foliage::Foliage;
-use super::masonry::{Arch, Ashlar, MarbleBall};
-use super::noise::unit;
-use super::scan::Scanner;
-use super::sdf::SdfScene;
-use super::station::Station;
-use super::terrain::Terrain;
-use super::weathered::{Break, LocalFrame, Weathered};
+use super::named_scene::{NamedScene, SceneView};
 use crate::error::Result;
 use crate::math::DVec3;
 use crate::math::hash;
 use crate::points::PointCloud;
 use crate::progress::Progress;
+use crate::scanner::instruments::{Scanner, Station, TerrestrialSurvey};
+use crate::scanner::noise::unit;
+use crate::scanner::parts::column::{ColumnSdf, Drum};
+use crate::scanner::parts::foliage::Foliage;
+use crate::scanner::parts::masonry::{Arch, Ashlar, MarbleBall};
+use crate::scanner::parts::terrain::Terrain;
+use crate::scanner::parts::weathered::{Break, LocalFrame, Weathered};
+use crate::scanner::sdf::SdfScene;
 
-/// A camera for the ruin.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RuinView {
-    /// Position of the camera in the scene.
-    pub position: DVec3,
-    /// Position that the camera looks at.
-    pub focal_point: DVec3,
-    /// Vertical field of view in degrees.
-    pub view_angle_deg: f64,
-}
+/// The camera of the ruin.
+pub type RuinView = SceneView;
 
 /// Height of the platform that the columns stand on.
 pub const FLOOR: f64 = 1.05;
@@ -82,6 +74,27 @@ pub fn stations() -> [Station; 6] {
         toward(-17.5, 5.5, 5.0, 170.0, -45.0, 20.0),
         inside,
     ]
+}
+
+/// Returns the scene with names for its objects by their ASPRS class, with the view of the demo and one from behind.
+pub fn named_scene() -> NamedScene {
+    let sdf = scene();
+    let name = |part_idx: usize| match sdf.part(part_idx).class() {
+        2 => "ground",
+        4 => "plants",
+        6 => "masonry",
+        _ => "ball",
+    };
+    let object_names = (0..sdf.n_parts()).map(name).collect();
+    let mut scene = NamedScene { object_names, sdf, views: vec![view()] };
+    scene.look([9.0, 17.0, 5.0], [0.0, 0.0, 3.0]);
+    scene
+}
+
+/// Returns the demo's survey with an angle of `step_deg` between rays.
+pub fn terrestrial(step_deg: f64) -> TerrestrialSurvey {
+    let scanner = Scanner { step_rad: step_deg.to_radians(), ..Scanner::default() };
+    TerrestrialSurvey { scanner, stations: stations().to_vec() }
 }
 
 /// Scans the ruin with about `n_points` points.
@@ -297,6 +310,15 @@ mod tests {
             // Five deviations of the noise plus the tolerance of sphere tracing.
             assert!(distance.abs() < 0.011, "{position}: {distance}");
         }
+    }
+
+    #[test]
+    fn the_named_scene_has_a_name_for_every_part() {
+        let named = named_scene();
+        assert_eq!(named.object_names.len(), named.sdf.n_parts());
+        let mut kinds = named.object_kinds();
+        kinds.sort_unstable();
+        assert_eq!(kinds, ["ball", "ground", "masonry", "plants"]);
     }
 
     #[test]

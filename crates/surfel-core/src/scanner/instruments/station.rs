@@ -1,8 +1,8 @@
 //! Scanner stations and their rays.
 
-use super::sdf::DRay;
 use crate::math::DVec3;
-use std::f64::consts::TAU;
+use crate::scanner::sdf::DRay;
+use std::f64::consts::{PI, TAU};
 
 /// A position of the scanner and the window that it scans from there.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,5 +60,39 @@ impl Station {
         let direction =
             DVec3::new(horizontal * azimuth.cos(), horizontal * azimuth.sin(), elevation.sin());
         DRay { origin: self.position, direction }
+    }
+
+    /// Returns true if `point` lies in the direction of the window.
+    pub fn covers(&self, point: DVec3) -> bool {
+        let offset = point - self.position;
+        let elevation = offset.z.atan2(offset.truncate().length());
+        let turn = (offset.y.atan2(offset.x) - self.azimuth_rad + PI).rem_euclid(TAU) - PI;
+        let (lowest, highest) = self.elevation_rad;
+        (lowest..=highest).contains(&elevation) && turn.abs() <= 0.5 * self.azimuth_span_rad
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! The window of a station.
+
+    use super::*;
+
+    #[test]
+    fn a_window_covers_the_ends_of_its_rays() {
+        let station = Station::toward(
+            DVec3::new(1.0, 2.0, 3.0),
+            DVec3::new(-5.0, 1.9, 0.0),
+            1.0,
+            (-0.5, 0.2),
+        );
+        let step_rad = 0.1;
+        for column in 0..station.n_columns(step_rad) {
+            for row in 0..station.n_rows(step_rad) {
+                let ray = station.ray(column, row, step_rad);
+                assert!(station.covers(ray.origin + 7.0 * ray.direction));
+                assert!(!station.covers(ray.origin - 7.0 * ray.direction));
+            }
+        }
     }
 }

@@ -1,11 +1,11 @@
 //! Walls and arches of blocks, which stand on z = 0 of their own frame, and a polished ball.
 
-use super::noise::{noise, unit};
-use super::sdf::{DAabb, Sdf};
 use super::stone;
 use crate::math::DVec3;
 use crate::math::Vec3;
 use crate::math::hash;
+use crate::scanner::noise::{noise, unit};
+use crate::scanner::sdf::{DAabb, Sdf};
 use std::f64::consts::PI;
 
 /// The ASPRS class 'building'.

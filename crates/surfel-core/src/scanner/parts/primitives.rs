@@ -1,8 +1,8 @@
 //! Shapes with closed forms, for tests.
 
-use super::sdf::{DAabb, Sdf};
 use crate::math::DVec3;
 use crate::math::Vec3;
+use crate::scanner::sdf::{DAabb, Sdf};
 
 /// A ball.
 #[derive(Clone, Copy, Debug)]

@@ -1,10 +1,10 @@
 //! A placed stone shape, worn by weather and perhaps broken.
 
-use super::noise::{fbm, noise, smoothstep, unit};
-use super::sdf::{DAabb, Sdf};
 use super::stone;
 use crate::math::DVec3;
 use crate::math::Vec3;
+use crate::scanner::noise::{fbm, noise, smoothstep, unit};
+use crate::scanner::sdf::{DAabb, Sdf};
 
 /// The rigid transform of a shape's own frame.
 #[derive(Clone, Copy, Debug)]

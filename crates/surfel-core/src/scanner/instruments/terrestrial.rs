@@ -1,14 +1,15 @@
-//! The scanner: rays from stations, each of which gives at most one point.
+//! Terrestrial laser scanners: rays from stations, each of which gives at most one point.
 
-use super::sdf::{DRay, SdfScene};
+use super::instrument::Instrument;
+use super::returns::{Return, into_cloud};
 use super::station::Station;
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 use crate::math::Random;
-use crate::math::Vec3;
 use crate::math::hash;
-use crate::points::{PointCloud, Scalar, Values};
+use crate::points::PointCloud;
 use crate::progress::Progress;
+use crate::scanner::sdf::{DRay, SdfScene};
 use rayon::prelude::*;
 
 /// The properties of a scanner, the same at every station.
@@ -72,7 +73,7 @@ impl Scanner {
                 .collect::<Result<_>>()?;
             returns.extend(columns.into_iter().flatten());
         }
-        Ok(self.cloud(&returns))
+        Ok(into_cloud(&returns, self.origin, self.with_normals))
     }
 
     fn validate(&self) -> Result<()> {
@@ -116,58 +117,32 @@ impl Scanner {
         random: &mut Random,
     ) -> Option<Return> {
         let hit = scene.first_hit(ray, self.max_range)?;
-        let point = ray.origin + hit.distance * ray.direction;
-        let normal = scene.normal(hit.part_idx, point);
-        let sdf = scene.part(hit.part_idx);
-        let color = sdf.color(point, normal).clamp(Vec3::ZERO, Vec3::ONE);
-        let incidence = normal.dot(-ray.direction).max(0.0);
         let range = hit.distance + self.range_noise * random.next_gaussian();
-        Some(Return {
-            position: (ray.origin + range * ray.direction).as_vec3(),
-            normal: normal.as_vec3(),
-            color: color.to_array().map(|c| (c * 255.0).round() as u16 * 257),
-            intensity: intensity(f64::from(color.element_sum()) / 3.0, incidence, hit.distance),
-            class: sdf.class(),
-            station: station_idx as u16 + 1,
-        })
-    }
-
-    fn cloud(&self, returns: &[Return]) -> PointCloud {
-        fn column<T>(returns: &[Return], value: impl Fn(&Return) -> T) -> Vec<T> {
-            returns.iter().map(value).collect()
-        }
-        PointCloud {
-            origin: self.origin,
-            positions: column(returns, |r| r.position),
-            normals: self.with_normals.then(|| column(returns, |r| r.normal)),
-            colors: Some(column(returns, |r| r.color)),
-            intensity: Some(column(returns, |r| r.intensity)),
-            classification: Some(column(returns, |r| r.class)),
-            scalars: vec![Scalar {
-                name: "point_source_id".to_owned(),
-                values: Values::U16(column(returns, |r| r.station)),
-            }],
-            ..PointCloud::default()
-        }
+        Some(Return::new(scene, ray, hit, range, station_idx as u16 + 1))
     }
 }
 
-/// The return of one ray.
-struct Return {
-    position: Vec3,
-    normal: Vec3,
-    color: [u16; 3],
-    intensity: f32,
-    class: u8,
-    station: u16,
+/// A scanner with the stations that it scans from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TerrestrialSurvey {
+    /// The scanner.
+    pub scanner: Scanner,
+    /// The stations.
+    pub stations: Vec<Station>,
 }
 
-/// Returns the intensity from 0 to 65535 by Lambert's cosine law and an inverse square law that levels off near the
-/// scanner.
-fn intensity(reflectance: f64, incidence_cos: f64, distance: f64) -> f32 {
-    const HALF_RANGE: f64 = 15.0;
-    let falloff = 1.0 / (1.0 + (distance / HALF_RANGE).powi(2));
-    (65535.0 * reflectance * incidence_cos * falloff).round() as f32
+impl Instrument for TerrestrialSurvey {
+    fn scan(&self, scene: &SdfScene, progress: &dyn Progress) -> Result<PointCloud> {
+        self.scanner.scan(scene, &self.stations, progress)
+    }
+
+    fn viewpoints(&self, point: DVec3) -> Vec<DVec3> {
+        let max_range = self.scanner.max_range;
+        let is_in_range = |station: &&Station| {
+            point.distance(station.position) < max_range && station.covers(point)
+        };
+        self.stations.iter().filter(is_in_range).map(|station| station.position).collect()
+    }
 }
 
 #[cfg(test)]
@@ -176,8 +151,10 @@ mod tests {
 
     use super::*;
     use crate::math::DVec2;
+    use crate::math::Vec3;
+    use crate::points::Values;
     use crate::progress::NoProgress;
-    use crate::scanner::shapes::{Plane, SphereSdf};
+    use crate::scanner::parts::primitives::{Plane, SphereSdf};
 
     const WHITE: Vec3 = Vec3::ONE;
 

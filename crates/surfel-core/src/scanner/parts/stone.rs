@@ -1,8 +1,8 @@
 //! Colours of stone, earth and leaves, sRGB-encoded.
 
-use super::noise::{fbm, noise, smoothstep, unit};
 use crate::math::DVec3;
 use crate::math::Vec3;
+use crate::scanner::noise::{fbm, noise, smoothstep, unit};
 
 const OCHRE: Vec3 = Vec3::new(0.82, 0.69, 0.50);
 const CREAM: Vec3 = Vec3::new(0.88, 0.79, 0.63);

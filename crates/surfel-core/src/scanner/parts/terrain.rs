@@ -1,10 +1,10 @@
 //! Rough ground around the ruin.
 
-use super::noise::{fbm, mix, noise, smoothstep};
-use super::sdf::{DAabb, Sdf};
 use super::stone;
 use crate::math::DVec3;
 use crate::math::Vec3;
+use crate::scanner::noise::{fbm, mix, noise, smoothstep};
+use crate::scanner::sdf::{DAabb, Sdf};
 
 /// Gently rolling ground within a ragged circle about the origin, heaped against a platform.
 pub struct Terrain {

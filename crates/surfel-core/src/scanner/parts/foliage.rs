@@ -1,10 +1,10 @@
 //! Shrubs and cypresses: ellipsoids with a rough surface.
 
-use super::noise::{fbm, unit};
-use super::sdf::{DAabb, Sdf};
 use super::stone;
 use crate::math::DVec3;
 use crate::math::Vec3;
+use crate::scanner::noise::{fbm, unit};
+use crate::scanner::sdf::{DAabb, Sdf};
 
 /// The crown of a plant.
 pub struct Foliage {

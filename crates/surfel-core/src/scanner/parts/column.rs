@@ -1,12 +1,12 @@
 //! Fluted columns and their drums, which stand on z = 0 of their own frame.
 
 use super::masonry::{BUILDING, box_distance, groove, joint_shade};
-use super::noise::mix;
-use super::sdf::{DAabb, Sdf};
 use super::stone;
 use crate::math::DVec3;
 use crate::math::Vec3;
 use crate::math::hash;
+use crate::scanner::noise::mix;
+use crate::scanner::sdf::{DAabb, Sdf};
 use std::f64::consts::PI;
 
 /// A fluted column on a plinth, under a capital.

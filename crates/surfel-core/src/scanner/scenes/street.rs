@@ -1,0 +1,103 @@
+//! A street: ground, a house with recesses, a head, a cow, poles with a wire, and a tree.
+
+use super::named_scene::NamedScene;
+use crate::math::DVec3;
+use crate::math::Vec3;
+use crate::scanner::instruments::TerrestrialSurvey;
+use crate::scanner::instruments::{AirborneLidar, FlightLine, Scanner, SpinningLidar, Station};
+use crate::scanner::parts::assembly::{Assembly, Solid};
+use crate::scanner::parts::body::{Cow, Head};
+use crate::scanner::parts::house::House;
+use crate::scanner::parts::masonry::BUILDING;
+use crate::scanner::parts::street_ground::StreetGround;
+use crate::scanner::parts::tree::{Crown, CrownShape};
+use crate::scanner::parts::wire::Wire;
+
+const POLE_HEIGHT: f64 = 6.5;
+const POLES: [DVec3; 2] = [DVec3::new(-13.0, -4.2, 0.0), DVec3::new(11.0, -4.2, 0.0)];
+const TREE: DVec3 = DVec3::new(9.5, 5.5, 0.0);
+
+/// Returns the scene. The street runs along X.
+pub fn scene() -> NamedScene {
+    let mut scene = NamedScene::default();
+    let base = DVec3::new(-3.0, 10.0, -0.3);
+    let house = House { base, half: (5.5, 4.0), wall_height: 5.9, roof_height: 2.6 };
+    scene.add("house", house);
+    let block = |center, half| vec![Solid::block(center, half)];
+    let stone = |solids| Assembly { solids, blend: 0.0, color: Vec3::splat(0.6), class: BUILDING };
+    scene.add("plinth", stone(block([-6.0, -5.0, 0.5], [0.4, 0.4, 0.55])));
+    scene.add("head", Head::new(DVec3::new(-6.0, -5.0, 1.05)));
+    scene.add("cow", Cow::new(DVec3::new(4.0, -5.5, 0.02)));
+    for foot in POLES {
+        let top = foot + POLE_HEIGHT * DVec3::Z;
+        let solids = vec![Solid::capsule(foot.into(), top.into(), 0.11)];
+        scene.add("pole", Assembly { solids, blend: 0.0, color: Vec3::splat(0.45), class: 15 });
+    }
+    for side in [-0.25, 0.25] {
+        let [from, to] = POLES.map(|foot| foot + DVec3::new(0.0, side, POLE_HEIGHT - 0.1));
+        scene.add("wire", Wire::new(from, to, 0.5, 0.012));
+    }
+    let trunk = vec![
+        Solid::capsule(TREE.into(), (TREE + 3.2 * DVec3::Z).into(), 0.17),
+        Solid::capsule([9.5, 5.5, 2.0], [10.5, 5.9, 4.2], 0.08),
+        Solid::capsule([9.5, 5.5, 2.3], [8.6, 5.0, 4.4], 0.08),
+        Solid::capsule([9.5, 5.5, 2.6], [9.4, 6.4, 4.6], 0.07),
+    ];
+    let bark = Vec3::new(0.36, 0.29, 0.22);
+    scene.add("trunk", Assembly { solids: trunk, blend: 0.1, color: bark, class: 5 });
+    let center = TREE + 4.4 * DVec3::Z;
+    let half = DVec3::new(2.1, 2.1, 1.9);
+    let crown =
+        Crown { shape: CrownShape::Ellipsoid, center, half, cell: 0.2, fill: 0.35, seed: 4 };
+    scene.add("tree", crown);
+    scene.add("ground", StreetGround { half_road: 3.0, radius: 32.0 });
+    scene.look([-9.0, -14.0, 3.2], [0.0, 2.0, 2.2]);
+    scene.look([14.0, -9.0, 1.8], [2.0, 2.0, 2.6]);
+    scene.look([-16.0, 1.5, 2.0], [4.0, 2.0, 2.4]);
+    scene
+}
+
+/// Returns a survey from three stations with an angle of `step_deg` between rays.
+pub fn terrestrial(step_deg: f64) -> TerrestrialSurvey {
+    let scanner = Scanner { step_rad: step_deg.to_radians(), ..Scanner::default() };
+    let positions = [[-10.0, -1.0, 1.6], [6.5, 1.0, 1.6], [-1.0, -9.5, 1.7]];
+    let stations = positions.map(|position| Station::full_dome(position.into()));
+    TerrestrialSurvey { scanner, stations: stations.to_vec() }
+}
+
+/// Returns a spinning scanner on a car that drives along the road.
+pub fn spinning() -> SpinningLidar {
+    let path = vec![DVec3::new(-12.0, -1.2, 1.8), DVec3::new(12.0, -1.2, 1.8)];
+    SpinningLidar { path, speed: 12.0, ..SpinningLidar::default() }
+}
+
+/// Returns two flight lines across the street.
+pub fn airborne() -> AirborneLidar {
+    let line =
+        |x: f64| FlightLine { from: DVec3::new(x, -35.0, 300.0), to: DVec3::new(x, 35.0, 300.0) };
+    AirborneLidar { lines: vec![line(-60.0), line(55.0)], ..AirborneLidar::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    //! The street and its scans.
+
+    use super::*;
+    use crate::progress::NoProgress;
+    use crate::scanner::instruments::Instrument;
+    use crate::scanner::scenes::named_scene::checks;
+
+    #[test]
+    fn every_kind_of_object_is_seen_and_distances_are_never_too_long() {
+        checks::check(&scene());
+    }
+
+    #[test]
+    fn a_scan_has_every_class() {
+        let cloud = terrestrial(0.5).scan(&scene().sdf, &NoProgress).unwrap();
+        let classes = cloud.classification.unwrap();
+        for class in [1, 2, 5, 6, 14, 15] {
+            assert!(classes.contains(&class), "class {class}");
+        }
+    }
+}
