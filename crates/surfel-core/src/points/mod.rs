@@ -24,4 +24,4 @@ pub use prepared_cloud::PreparedCloud;
 pub(crate) use prepared_cloud::check_length;
 pub use radius::{DistanceSample, Radius, RadiusReport, estimate_radii, median_distance, spacing};
 pub use subsample::{Subsample, subsample};
-pub use up::{InferredUp, infer_up};
+pub use up::{InferredUp, UpConvention, infer_up};

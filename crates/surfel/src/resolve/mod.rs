@@ -13,7 +13,7 @@ mod loaded;
 mod complete;
 
 pub(crate) use appearance::finish_graph;
-pub use camera::{SceneCamera, choose_camera, choose_up, is_georeferenced, short_position};
+pub use camera::{SceneCamera, choose_camera, choose_up, short_position, up_convention};
 pub use cloud::{prepare_cloud, report_normals, report_prepared, report_radii};
 pub(crate) use exposure::automatic_exposure;
 pub use loaded::{KeepOptions, LoadedScene, check_files};
