@@ -202,7 +202,7 @@ mod tests {
             let column = (0..40_000).map(|i| {
                 let height = i as f32 / 20_000.0;
                 let (sin, cos) = (2.399_963 * i as f32).sin_cos();
-                let radius = if cos < 0.0 { 0.5 } else { 0.5 + 0.08 * (40.0 * height).sin() };
+                let radius = if cos < 0.0 { 0.5 } else { 0.5 + 0.03 * (40.0 * height).sin() };
                 radius * cos * toward + radius * sin * Vec3::X + height * Vec3::Z
             });
             let fit = CameraFit { aspect: 1.5, ..CameraFit::default() };

@@ -7,7 +7,7 @@ use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::{PointCloud, UpConvention, infer_up};
 use surfel_core::progress::Progress;
 use surfel_core::scene::{
-    Camera, CameraFit, Graph, Projection, default_view_up, fit_camera, panorama_camera,
+    Camera, CameraFit, Graph, Projection, Room, default_view_up, fit_camera, panorama_camera,
 };
 use surfel_formats::FileInfo;
 
@@ -34,6 +34,8 @@ pub struct SceneExtent<'a> {
     pub bounds: Aabb,
     /// The world's up.
     pub up: Vec3,
+    /// The room that the points show, if its inside is to be seen.
+    pub room: Option<&'a Room>,
 }
 
 impl SceneCamera {
@@ -45,7 +47,7 @@ impl SceneCamera {
         motion: Option<CameraMotion>,
         progress: &dyn Progress,
     ) -> Self {
-        let SceneExtent { points, bounds, up } = *extent;
+        let SceneExtent { points, bounds, up, room } = *extent;
         let settings = &description.camera;
         let middle = points.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
         let view_angle_deg = settings.view_angle;
@@ -60,7 +62,7 @@ impl SceneCamera {
             None => {
                 let (width, height) = description.picture.resolution();
                 let aspect = f64::from(width) / f64::from(height);
-                choose_camera(settings, points, up, aspect, progress)
+                choose_camera(settings, points, up, room, aspect, progress)
             }
         };
         let is_locked = settings.lock();
@@ -168,18 +170,23 @@ fn format_convention(file: &FileInfo) -> UpConvention {
     }
 }
 
-/// Returns a camera from settings; what they leave open is chosen so that the whole cloud is seen.
+/// Returns a camera from settings; what they leave open is chosen so that the whole cloud is seen, or the inside of
+/// `room`.
 pub fn choose_camera(
     settings: &CameraSettings,
     cloud: &PointCloud,
     up: Vec3,
+    room: Option<&Room>,
     aspect: f64,
     progress: &dyn Progress,
 ) -> Camera {
     if settings.is_panorama() {
         return panorama(settings, cloud, up, progress);
     }
-    let fit = fit(settings, up, aspect);
+    let mut fit = fit(settings, up, aspect);
+    let into_room =
+        |room: &Room| room.view_direction(settings.azimuth_angle(), settings.elevation_angle);
+    fit.direction = fit.direction.or_else(|| room.map(into_room));
     if let Some(camera) = complete_camera(settings, &fit) {
         return camera;
     }
