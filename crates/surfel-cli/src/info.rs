@@ -5,7 +5,7 @@ use crate::inputs::expand;
 use crate::report::{Report, print};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
-use surfel::resolve::{MemoryEstimate, is_georeferenced};
+use surfel::resolve::{MemoryEstimate, up_convention};
 use surfel_core::math::Vec3;
 use surfel_core::points::{PointCloud, Subsample, infer_up, spacing};
 use surfel_core::progress::Progress;
@@ -62,7 +62,7 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
     let corner =
         |corner: Vec3| (!cloud.is_empty()).then(|| (cloud.origin + corner.as_dvec3()).to_array());
     let distance = if cloud.is_empty() { 0.0 } else { spacing(&cloud.positions, report)? };
-    let up = infer_up(cloud, is_georeferenced(cloud, std::slice::from_ref(source)));
+    let up = infer_up(cloud, &up_convention(cloud, std::slice::from_ref(source)));
     Ok(json!({
         "file": file.display().to_string(),
         "format": source.format,

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use surfel::SceneDescription;
-use surfel::resolve::{AutoSettings, KeepOptions, LoadedScene};
+use surfel::resolve::{AutoSettings, KeepOptions, LoadedScene, report_coverage};
 use surfel_core::progress::Progress;
 use surfel_core::trace::Simd;
 
@@ -93,6 +93,7 @@ pub fn render_to_file(
     let (image, rendered) = scene.render_with(report)?;
     report.end();
     report.check()?;
+    report_coverage(&image, report);
     image.save(output)?;
     if let Some(path) = stats {
         seconds.total = start.elapsed().as_secs_f64();

@@ -2,21 +2,23 @@
 
 use crate::built::{exposure_stops, source_indices};
 use crate::cache::{Lru2, hash_of};
-use crate::description::{Exposure, Invalid, LightKind, SceneDescription, write_parts};
+use crate::description::{Exposure, Interior, Invalid, LightKind, SceneDescription, write_parts};
 use crate::error::{Error, Result};
 use crate::resolve::{
-    AutoSettings, KeepOptions, LoadedScene, expose, finish_graph, render_settings,
+    AutoSettings, KeepOptions, LoadedScene, expose, finish_graph, hide_walls, render_settings,
 };
 use serde_json::{Value, json};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
-use surfel_core::math::{Aabb, DVec3, Vec3};
+use surfel_core::math::{Aabb, DVec3};
 use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
 use surfel_core::render::{self, CpuRenderer, Renderer, Settings};
 use surfel_core::scene::color::{Legend, legend};
-use surfel_core::scene::{Background, Camera, Geometry, Graph, Projection, Scene, inlier_bounds};
+use surfel_core::scene::{
+    Background, Camera, ClipPlane, Geometry, Graph, Projection, Scene, inlier_bounds,
+};
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
 
@@ -27,6 +29,8 @@ pub struct LiveScene {
     prepared: Lru2<Vec<PreparedCloud>>,
     trees: Lru2<SceneTrees>,
     renderer: CpuRenderer,
+    /// Walls that the first camera hides; they stay hidden while it moves, so that no tree is built again.
+    hidden_walls: OnceLock<Vec<ClipPlane>>,
     /// Threads beside those that draw: preparation for one viewer must not hold up another's picture.
     pool: rayon::ThreadPool,
 }
@@ -77,6 +81,7 @@ impl LiveScene {
             prepared: Lru2::default(),
             trees: Lru2::default(),
             renderer: CpuRenderer { simd: Simd::detect() },
+            hidden_walls: OnceLock::new(),
             pool,
         })
     }
@@ -102,6 +107,10 @@ impl LiveScene {
         progress: &dyn Progress,
     ) -> Result<LiveView> {
         let auto = AutoSettings::choose(&self.loaded, description, progress)?;
+        let first = self.hidden_walls.get_or_init(|| auto.hidden_walls.clone());
+        let is_open = description.camera.interior() != Interior::Off;
+        let hidden_walls = if is_open { first.clone() } else { Vec::new() };
+        let auto = AutoSettings { hidden_walls, ..auto };
         let settings = Settings { with_aovs: false, ..render_settings(description) };
         let time_secs = description.output.time();
         let exposure = description.light.exposure();
@@ -136,7 +145,7 @@ impl LiveScene {
         auto: &AutoSettings,
         progress: &dyn Progress,
     ) -> Result<(Arc<SceneTrees>, FlatScene)> {
-        let trees = self.trees_at(time_secs, description, auto.up, progress)?;
+        let trees = self.trees_at(time_secs, description, auto, progress)?;
         let mut flat = trees.flat.clone();
         flat.lights.clone_from(&auto.lights);
         flat.background = description.picture.background();
@@ -158,17 +167,17 @@ impl LiveScene {
         &self,
         time_secs: f64,
         description: &SceneDescription,
-        up: Vec3,
+        auto: &AutoSettings,
         progress: &dyn Progress,
     ) -> Result<Arc<SceneTrees>> {
         let preparation = preparation_key(description);
         let frames = self.loaded.sequence_frames_at(time_secs);
-        let trees = tree_key(description, preparation, up, &frames);
+        let trees = tree_key(description, preparation, auto, &frames);
         self.trees.get_or_make(trees, progress, || {
             let clouds = self.prepared.get_or_make(preparation, progress, || {
                 self.pool.install(|| self.loaded.prepared(description, progress))
             })?;
-            self.pool.install(|| self.build(time_secs, description, &clouds, up, progress))
+            self.pool.install(|| self.build(time_secs, description, &clouds, auto, progress))
         })
     }
 
@@ -177,15 +186,17 @@ impl LiveScene {
         time_secs: f64,
         description: &SceneDescription,
         clouds: &[PreparedCloud],
-        up: Vec3,
+        auto: &AutoSettings,
         progress: &dyn Progress,
     ) -> Result<SceneTrees> {
+        let up = auto.up;
         let coloring = description.objects_default.coloring(up);
         let first = clouds.first().map(|cloud| legend(cloud, &coloring));
         let legend = first.and_then(|legend| legend.ok()).unwrap_or(Legend::None);
         let raw = self.loaded.graph_without_points();
         let (mut graph, mut sequences) =
             finish_graph(&self.loaded, raw, clouds.to_vec(), description, up, progress)?;
+        hide_walls(&mut graph, &auto.hidden_walls);
         for sequence in &mut sequences {
             sequence.seek(time_secs, &mut graph, up, progress)?;
         }
@@ -224,15 +235,24 @@ fn preparation_key(description: &SceneDescription) -> u64 {
 }
 
 /// A hash of everything that decides what the trees hold.
-fn tree_key(description: &SceneDescription, preparation: u64, up: Vec3, frames: &[usize]) -> u64 {
+fn tree_key(
+    description: &SceneDescription,
+    preparation: u64,
+    auto: &AutoSettings,
+    frames: &[usize],
+) -> u64 {
     let light = &description.light;
     let is_lit = !light.has(LightKind::None) || light.environment.is_some();
+    let planes = auto.hidden_walls.iter();
+    let walls: Vec<[[f64; 3]; 2]> =
+        planes.map(|plane| [plane.point.to_array(), plane.normal.to_array()]).collect();
     let parts = json!([
         preparation,
         write_parts(&description.objects_default.parts()),
         description.get("material"),
         is_lit,
-        up.to_array(),
+        auto.up.to_array(),
+        walls,
         frames,
     ]);
     hash_of(&parts)

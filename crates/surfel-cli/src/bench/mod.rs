@@ -234,7 +234,7 @@ fn load_unbuilt(
             let (width, height) = args.resolution;
             let up = choose_up(description.world.up, &points, &[info], report);
             let aspect = f64::from(width) / f64::from(height);
-            choose_camera(&description.camera, &points, up, aspect, report)
+            choose_camera(&description.camera, &points, up, None, aspect, report)
         }
     };
     Ok(Unbuilt { graph, camera })

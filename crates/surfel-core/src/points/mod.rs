@@ -29,4 +29,4 @@ pub use structure::{
     find_structures,
 };
 pub use subsample::{Subsample, subsample};
-pub use up::{InferredUp, infer_up};
+pub use up::{InferredUp, UpConvention, infer_up};

@@ -23,26 +23,82 @@ const MIN_FLOOR_FRACTION: f64 = 0.02;
 /// armadillo. A room whose walls are scanned as well as its floor has a lower ratio.
 const MIN_FLOOR_RATIO: f64 = 2.5;
 
-/// Infers the up axis: +Z, unless the cloud stands on a floor or a flat base at the low end of Y alone.
+/// Minimum ratio of each horizontal side to the height of a cloud that counts as flat, as terrain and cities do.
+const MIN_FLAT_RATIO: f64 = 4.0;
+
+/// Minimum side of terrain in the unit of the file: reliefs and paintings are as flat, but smaller.
+const MIN_TERRAIN_SIDE: f64 = 50.0;
+
+/// Maximum tangent of the angle between the optical axis of a depth camera and a point that it sees.
+const MAX_CAMERA_SLOPE: f32 = 1.2;
+
+/// Minimum fraction of the points within the field of view of a depth camera.
+const MIN_FRACTION_IN_VIEW: f64 = 0.99;
+
+/// The up axis that a file's format implies.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum UpConvention {
+    /// The format has no convention, as PLY and text.
+    #[default]
+    Unknown,
+    /// Survey data: +Z, whatever the points show.
+    Georeferenced,
+    /// Programs that write the named format mostly have +Z up.
+    ZUp(String),
+    /// Programs that write the named format mostly have +Y up.
+    YUp(String),
+}
+
+/// Infers the up axis of a cloud from its format and from its points.
 ///
 /// Objects stand on something flat, so many points share the lowest height and few the highest: the Stanford bunny
-/// (Y up) has 4.9 % of its points in the lowest hundredth, and below 1 % at every other end. Only Y and Z are
-/// compared, as no common program exports with X up. A single wall perpendicular to Y misleads.
-pub fn infer_up(cloud: &PointCloud, is_georeferenced: bool) -> InferredUp {
-    if is_georeferenced {
-        let reason = "up is +Z, as in every georeferenced file".to_owned();
-        return InferredUp { up: Vec3::Z, reason };
+/// (Y up) has 4.9 % of its points in the lowest hundredth, and below 1 % at every other end. Terrain and cities are
+/// wide and flat. Such evidence overrides a convention. X is no candidate, as no common program exports with X up,
+/// and neither is -Z, as the tops of tables and roofs are as flat as floors. A single wall perpendicular to Y
+/// misleads.
+pub fn infer_up(cloud: &PointCloud, convention: &UpConvention) -> InferredUp {
+    let choice = |up: Vec3, reason: String| InferredUp { up, reason };
+    if *convention == UpConvention::Georeferenced {
+        return choice(Vec3::Z, "up is +Z, the convention of survey data".to_owned());
     }
-    let [x, y, z] = ends(&cloud.positions);
-    let other = x.low.max(x.high).max(y.high).max(z.low).max(z.high);
-    if MIN_FLOOR_FRACTION <= y.low && MIN_FLOOR_RATIO * other < y.low {
-        let percent = 100.0 * y.low;
-        let reason = format!(
-            "up is +Y: {percent:.1} % of the points lie on a flat base at the low end of Y"
-        );
-        return InferredUp { up: Vec3::Y, reason };
+    let shape = AxisStatistics::of(&cloud.positions);
+    let evidence = shape.flat_base().or_else(|| shape.terrain());
+    match convention {
+        UpConvention::YUp(format) => match evidence {
+            Some(found) if found.up == Vec3::Z => found,
+            _ => choice(Vec3::Y, format!("up is +Y, the convention of {format}")),
+        },
+        UpConvention::ZUp(format) => match evidence {
+            Some(found) if found.up == Vec3::Y => found,
+            _ => choice(Vec3::Z, format!("up is +Z, the convention of {format}")),
+        },
+        _ if is_camera_frame(&cloud.positions) => {
+            let reason =
+                "up is -Y: all points lie in the field of view of a depth camera at the origin";
+            choice(Vec3::NEG_Y, reason.to_owned())
+        }
+        _ => evidence.unwrap_or_else(|| choice(Vec3::Z, "up is +Z, the default".to_owned())),
     }
-    InferredUp { up: Vec3::Z, reason: "up is +Z, the default".to_owned() }
+}
+
+/// Returns true if all points lie before a depth camera at the origin, whose X points right, Y down and Z ahead.
+fn is_camera_frame(positions: &[Vec3]) -> bool {
+    let sample = sample(positions);
+    let in_view = |p: &&Vec3| p.x.abs().max(p.y.abs()) < MAX_CAMERA_SLOPE * p.z;
+    let n_in_view = sample.iter().filter(in_view).count() as f64;
+    let fills_view = |axis: usize| {
+        let slopes = sample.iter().map(|p| p[axis] / p.z).filter(|slope| slope.is_finite());
+        let (low, high) = slopes.fold((0.0f32, 0.0f32), |(low, high), s| (low.min(s), high.max(s)));
+        // The field of view is at least 20 degrees wide on both sides of the axis together.
+        low < -0.05 && 0.05 < high && 0.35 < high - low
+    };
+    MIN_FRACTION_IN_VIEW * sample.len() as f64 <= n_in_view && fills_view(0) && fills_view(1)
+}
+
+/// Returns at most 200,000 valid positions, evenly spread over the cloud's order.
+fn sample(positions: &[Vec3]) -> Vec<Vec3> {
+    let step = positions.len().div_ceil(200_000).max(1);
+    positions.iter().step_by(step).copied().filter(|p| is_valid_position(*p)).collect()
 }
 
 /// Fraction of the points near each end of an axis.
@@ -52,30 +108,70 @@ struct Ends {
     high: f64,
 }
 
-fn ends(positions: &[Vec3]) -> [Ends; 3] {
-    let step = positions.len().div_ceil(200_000).max(1);
-    let sample: Vec<Vec3> =
-        positions.iter().step_by(step).copied().filter(|p| is_valid_position(*p)).collect();
-    if sample.is_empty() {
-        return [Ends::default(); 3];
+/// Sides of a cloud along the axes without outliers, and the points near their ends.
+struct AxisStatistics {
+    sides: [f64; 3],
+    ends: [Ends; 3],
+}
+
+impl AxisStatistics {
+    fn of(positions: &[Vec3]) -> Self {
+        let sample = sample(positions);
+        if sample.is_empty() {
+            return Self { sides: [0.0; 3], ends: [Ends::default(); 3] };
+        }
+        let sorted = [0, 1, 2].map(|axis| {
+            let mut values: Vec<f64> = sample.iter().map(|p| f64::from(p[axis])).collect();
+            values.sort_unstable_by(f64::total_cmp);
+            values
+        });
+        // A few outliers may lie below the floor.
+        let n_outliers = sample.len() / 1000;
+        let range = |values: &[f64]| (values[n_outliers], values[values.len() - 1 - n_outliers]);
+        let sides = sorted.each_ref().map(|values| range(values).1 - range(values).0);
+        let slab = SLAB_THICKNESS * sides.into_iter().fold(0.0, f64::max);
+        let ends = sorted.each_ref().map(|values| {
+            let (low, high) = range(values);
+            let n_low = values.partition_point(|&value| value <= low + slab);
+            let n_below_high = values.partition_point(|&value| value < high - slab);
+            let fraction = |count: usize| count as f64 / values.len() as f64;
+            Ends { low: fraction(n_low), high: fraction(values.len() - n_below_high) }
+        });
+        Self { sides, ends }
     }
-    let sorted = [0, 1, 2].map(|axis| {
-        let mut values: Vec<f64> = sample.iter().map(|p| f64::from(p[axis])).collect();
-        values.sort_unstable_by(f64::total_cmp);
-        values
-    });
-    // A few outliers may lie below the floor.
-    let n_outliers = sample.len() / 1000;
-    let range = |values: &[f64]| (values[n_outliers], values[values.len() - 1 - n_outliers]);
-    let sides = sorted.each_ref().map(|values| range(values).1 - range(values).0);
-    let slab = SLAB_THICKNESS * sides.into_iter().fold(0.0, f64::max);
-    sorted.each_ref().map(|values| {
-        let (low, high) = range(values);
-        let n_low = values.partition_point(|&value| value <= low + slab);
-        let n_below_high = values.partition_point(|&value| value < high - slab);
-        let fraction = |count: usize| count as f64 / values.len() as f64;
-        Ends { low: fraction(n_low), high: fraction(values.len() - n_below_high) }
-    })
+
+    /// Returns the axis whose one end has far more points than any other end: a floor or a flat base.
+    fn flat_base(&self) -> Option<InferredUp> {
+        let [x, y, z] = self.ends;
+        let stands_on = |base: f64, others: [f64; 5]| {
+            MIN_FLOOR_FRACTION <= base
+                && others.into_iter().all(|other| MIN_FLOOR_RATIO * other < base)
+        };
+        let (up, name, end, base) = if stands_on(y.low, [x.low, x.high, y.high, z.low, z.high]) {
+            (Vec3::Y, "+Y", "low end of Y", y.low)
+        } else if stands_on(z.low, [x.low, x.high, y.low, y.high, z.high]) {
+            (Vec3::Z, "+Z", "low end of Z", z.low)
+        } else if stands_on(y.high, [x.low, x.high, y.low, z.low, z.high]) {
+            (Vec3::NEG_Y, "-Y", "high end of Y", y.high)
+        } else {
+            return None;
+        };
+        let percent = 100.0 * base;
+        let reason =
+            format!("up is {name}: {percent:.1} % of the points lie on a flat base at the {end}");
+        Some(InferredUp { up, reason })
+    }
+
+    /// Returns +Z if the cloud is large, wide and flat in X and Y, as terrain and cities are.
+    ///
+    /// There is no such rule for Y: a wall in the plane of X and Z is as flat.
+    fn terrain(&self) -> Option<InferredUp> {
+        let [x, y, z] = self.sides;
+        let side = x.min(y);
+        let is_terrain = MIN_TERRAIN_SIDE <= side && MIN_FLAT_RATIO * z < side;
+        let reason = "up is +Z: the points spread wide over X and Y, as terrain does".to_owned();
+        is_terrain.then_some(InferredUp { up: Vec3::Z, reason })
+    }
 }
 
 #[cfg(test)]
@@ -99,7 +195,66 @@ mod tests {
     }
 
     fn inferred(points: impl IntoIterator<Item = Vec3>) -> Vec3 {
-        infer_up(&PointCloud::from_positions(points.into_iter().collect()), false).up
+        inferred_with(points, &UpConvention::Unknown)
+    }
+
+    fn inferred_with(points: impl IntoIterator<Item = Vec3>, convention: &UpConvention) -> Vec3 {
+        infer_up(&PointCloud::from_positions(points.into_iter().collect()), convention).up
+    }
+
+    /// Points on a ball.
+    fn ball() -> Vec<Vec3> {
+        let mut random = Random::new(4, 0);
+        let mut gaussian = || random.next_gaussian() as f32;
+        let directions = (0..5000).map(|_| Vec3::new(gaussian(), gaussian(), gaussian()));
+        directions.map(|v| v.normalize_or(Vec3::X)).collect()
+    }
+
+    #[test]
+    fn a_convention_decides_without_evidence() {
+        let (obj, stl) = (UpConvention::YUp("OBJ".into()), UpConvention::ZUp("STL".into()));
+        assert_eq!(inferred_with(ball(), &obj), Vec3::Y);
+        assert_eq!(inferred_with(ball(), &stl), Vec3::Z);
+        assert_eq!(inferred_with(vec![], &obj), Vec3::Y);
+    }
+
+    #[test]
+    fn a_floor_overrides_a_convention() {
+        let (obj, stl) = (UpConvention::YUp("OBJ".into()), UpConvention::ZUp("STL".into()));
+        let z_up = things_on_the_ground();
+        let y_up = z_up.iter().map(|p| Vec3::new(p.x, p.z, -p.y));
+        assert_eq!(inferred_with(z_up.iter().copied(), &obj), Vec3::Z);
+        assert_eq!(inferred_with(y_up.clone(), &obj), Vec3::Y);
+        assert_eq!(inferred_with(y_up.clone(), &stl), Vec3::Y);
+        assert_eq!(inferred_with(y_up, &UpConvention::Georeferenced), Vec3::Z);
+    }
+
+    #[test]
+    fn terrain_overrides_a_convention() {
+        let mut random = Random::new(5, 0);
+        let mut next = || random.next_f32();
+        let hills = (0..5000).map(|_| {
+            let (x, y) = (100.0 * next(), 100.0 * next());
+            Vec3::new(x, y, 5.0 * (0.1 * x).sin() + 5.0 * (0.13 * y).cos())
+        });
+        let z_up: Vec<Vec3> = hills.collect();
+        assert_eq!(inferred_with(z_up.iter().copied(), &UpConvention::YUp("OBJ".into())), Vec3::Z);
+        let relief = z_up.iter().map(|p| 0.01 * *p);
+        assert_eq!(inferred_with(relief, &UpConvention::YUp("OBJ".into())), Vec3::Y);
+    }
+
+    #[test]
+    fn a_depth_camera_at_the_origin_has_y_down() {
+        let mut random = Random::new(6, 0);
+        let mut next = || random.next_f32();
+        let frame = (0..5000).map(|_| {
+            let depth = 1.0 + 2.0 * next();
+            Vec3::new(depth * (next() - 0.5), depth * (next() - 0.5), depth)
+        });
+        let frame: Vec<Vec3> = frame.collect();
+        assert_eq!(inferred(frame.iter().copied()), Vec3::NEG_Y);
+        let elsewhere = frame.iter().map(|p| *p - Vec3::new(0.0, 0.0, 2.0));
+        assert_eq!(inferred(elsewhere), Vec3::Z);
     }
 
     #[test]
@@ -110,8 +265,8 @@ mod tests {
         assert_eq!(inferred(y_up.clone()), Vec3::Y);
         let outliers = (0..5).map(|i| Vec3::splat(-100.0 * i as f32));
         assert_eq!(inferred(y_up.clone().chain(outliers)), Vec3::Y);
-        let cloud = PointCloud::from_positions(y_up.collect());
-        assert_eq!(infer_up(&cloud, true).up, Vec3::Z);
+        let y_down = points.iter().map(|p| Vec3::new(p.x, -p.z, p.y));
+        assert_eq!(inferred(y_down), Vec3::NEG_Y);
     }
 
     #[test]

@@ -8,13 +8,16 @@ use crate::math::{DVec3, Vec3};
 
 /// Azimuth of the viewpoint if no other is clearly better: south, a little to the east.
 const FRONT_AZIMUTH_DEG: f64 = 155.0;
+/// Height over width from which an object counts as upright: it has a front and a back.
+const MIN_UPRIGHT_FLATNESS: f64 = 0.6;
 /// Height over width below which a cloud counts as terrain.
 const MAX_TERRAIN_FLATNESS: f64 = 0.25;
 
 /// Returns the direction of view toward `points`: the flatter the cloud, the higher the viewpoint.
 ///
 /// Terrain has no front, so it is viewed from where it fills the picture best. Anything else is viewed from
-/// the side from which most points are visible.
+/// the side from which most points are visible. Objects that are visible equally well from all sides are viewed
+/// from the side that models face by convention, or from behind it if that side has more relief.
 pub(super) fn automatic_direction(points: &[Vec3], fit: &CameraFit) -> DVec3 {
     let (east, north) = ground_axes(fit.up);
     let extent = |axis: Vec3| {
@@ -27,7 +30,10 @@ pub(super) fn automatic_direction(points: &[Vec3], fit: &CameraFit) -> DVec3 {
     let azimuth_deg = if flatness < MAX_TERRAIN_FLATNESS {
         best_fit_azimuth_deg(points, elevation_deg, fit)
     } else {
-        most_visible_azimuth_deg(points, elevation_deg, fit)
+        match most_visible_azimuth_deg(points, elevation_deg, fit) {
+            FRONT_AZIMUTH_DEG if MIN_UPRIGHT_FLATNESS <= flatness => front_azimuth_deg(points, fit),
+            azimuth_deg => azimuth_deg,
+        }
     };
     direction_from(azimuth_deg + fit.azimuth_deg, elevation_deg, fit.up)
 }
@@ -67,6 +73,60 @@ fn most_visible_azimuth_deg(points: &[Vec3], elevation_deg: f64, fit: &CameraFit
         }
         _ => FRONT_AZIMUTH_DEG,
     }
+}
+
+/// Returns the azimuth of an upright object's front: the usual one, or the opposite if that has more relief.
+///
+/// Models face +Z if up is +Y and -Y if up is +Z, which is south in both cases. Faces, hands and feet give the front of
+/// a figure more relief than its back: the back of the Stanford armadillo, which faces north, has 0.77 times as much;
+/// the two sides of the bunny, which faces west, differ by 4 %.
+fn front_azimuth_deg(points: &[Vec3], fit: &CameraFit) -> f64 {
+    /// Relief of the opposite side over that of the usual front from which the opposite side is shown.
+    const MIN_RELIEF_RATIO: f64 = 1.15;
+    let around = |middle_deg: f64| {
+        let sides = [-30.0, 0.0, 30.0].map(|turn_deg| middle_deg + turn_deg);
+        sides.map(|azimuth_deg| relief(points, azimuth_deg, fit.up)).iter().sum::<f64>()
+    };
+    if MIN_RELIEF_RATIO * around(180.0) < around(0.0) {
+        FRONT_AZIMUTH_DEG + 180.0
+    } else {
+        FRONT_AZIMUTH_DEG
+    }
+}
+
+/// Returns the mean unevenness of the surface that is visible horizontally from an azimuth: the absolute Laplacian of
+/// a small orthographic depth map, in pixels.
+fn relief(points: &[Vec3], azimuth_deg: f64, up: Vec3) -> f64 {
+    /// Limit of the Laplacian: silhouettes of limbs count, but not by their depth.
+    const MAX_UNEVENNESS: f32 = 4.0;
+    let forward = direction_from(azimuth_deg, 0.0, up).as_vec3();
+    let right = forward.cross(up);
+    // Each pixel has some ten points on each side of the object.
+    let n_across = ((points.len() as f64 / 10.0).sqrt() as usize).clamp(8, 64);
+    let (left, end) = range_along(points, right);
+    let (bottom, top) = range_along(points, up);
+    let pixel_size = ((end - left).max(top - bottom) / n_across as f32).max(f32::MIN_POSITIVE);
+    let stride = n_across + 3;
+    // A border of one empty pixel surrounds the picture.
+    let mut nearest = vec![f32::INFINITY; stride * stride];
+    for point in points {
+        let column = ((point.dot(right) - left) / pixel_size) as usize;
+        let row = ((point.dot(up) - bottom) / pixel_size) as usize;
+        let depth = &mut nearest[(row.min(n_across) + 1) * stride + column.min(n_across) + 1];
+        *depth = depth.min(point.dot(forward) / pixel_size);
+    }
+    let inner =
+        (1..=n_across + 1).flat_map(|row| (1..=n_across + 1).map(move |column| (row, column)));
+    let laplacians = inner.map(|(row, column)| {
+        let pixel = row * stride + column;
+        let around = [pixel - 1, pixel + 1, pixel - stride, pixel + stride];
+        around.iter().map(|neighbor| nearest[*neighbor] - nearest[pixel]).sum::<f32>()
+    });
+    let covered = laplacians.filter(|laplacian| laplacian.is_finite());
+    let (sum, count) = covered.fold((0.0, 0usize), |(sum, count), laplacian| {
+        (sum + f64::from(laplacian.abs().min(MAX_UNEVENNESS)), count + 1)
+    });
+    sum / count.max(1) as f64
 }
 
 /// Returns the fraction of the points that no other point hides in a small picture.
@@ -132,6 +192,22 @@ mod tests {
             let forward = automatic_direction(&sheets(front), &fit);
             // The sheets hide each other a little from every side but the front and the back.
             assert!(0.4 < forward.dot(front.as_dvec3()).abs(), "{front}: {forward}");
+        }
+    }
+
+    #[test]
+    fn a_figure_is_viewed_from_the_side_with_more_relief() {
+        // A column with a smooth back and a front of horizontal ridges.
+        for toward in [Vec3::NEG_Y, Vec3::Y] {
+            let column = (0..40_000).map(|i| {
+                let height = i as f32 / 20_000.0;
+                let (sin, cos) = (2.399_963 * i as f32).sin_cos();
+                let radius = if cos < 0.0 { 0.5 } else { 0.5 + 0.03 * (40.0 * height).sin() };
+                radius * cos * toward + radius * sin * Vec3::X + height * Vec3::Z
+            });
+            let fit = CameraFit { aspect: 1.5, ..CameraFit::default() };
+            let forward = automatic_direction(&column.collect::<Vec<Vec3>>(), &fit);
+            assert!(forward.dot(toward.as_dvec3()) < -0.5, "{toward}: {forward}");
         }
     }
 

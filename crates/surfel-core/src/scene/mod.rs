@@ -17,6 +17,7 @@ mod animation;
 mod graph;
 mod evaluate;
 mod clip;
+mod interior;
 mod validate;
 pub mod color;
 
@@ -32,6 +33,7 @@ pub use cloud_geometry::CloudGeometry;
 pub use environment::Environment;
 pub use graph::{Geometry, Graph, Joint, Node, Primitive, Transform};
 pub use inliers::inlier_bounds;
+pub use interior::{Room, find_room};
 pub use light::{Light, PunctualLight, PunctualLightKind, Sky, Sun};
 pub use material::{AlphaMode, Material, MaterialTextures};
 pub use mesh::Mesh;

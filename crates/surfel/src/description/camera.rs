@@ -3,11 +3,25 @@
 use super::Invalid;
 use super::keys::settings;
 use super::rule::{
-    Axis, Checked, Direction, Flag, POSITIVE, Rule, Text, VIEW_ANGLE, Vector, number,
+    Axis, Checked, Direction, Flag, OneOf, POSITIVE, Rule, Text, VIEW_ANGLE, Vector, number,
 };
 use serde_json::{Value, json};
 use std::path::Path;
 use surfel_core::math::{DVec3, Vec3};
+
+/// Whether rooms are shown from inside, without the walls and the ceiling between them and the camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interior {
+    /// Rooms with content are.
+    Auto,
+    /// Empty rooms are too.
+    On,
+    /// All walls stay.
+    Off,
+}
+
+const INTERIORS: &[(&str, Interior)] =
+    &[("auto", Interior::Auto), ("on", Interior::On), ("off", Interior::Off)];
 
 /// The height of an orthographic picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +58,9 @@ settings! {
         elevation_angle: f64, number(-90.0, 90.0), "DEG";
         /// Moves the chosen camera nearer (above 1) or farther away.
         zoom_factor: f64 = 1.0, POSITIVE, "FACTOR";
+        /// Hides the walls and the ceiling of a room that stand between its inside and the camera: auto (rooms with
+        /// furniture or other content), on (empty rooms too) or off.
+        interior: Interior = Interior::Auto, OneOf(INTERIORS), "WHEN";
         /// Keeps the camera where it is, even if the scene animates it.
         lock: bool = false, Flag, "";
         /// Looks through the camera of this name in a glTF file [default: the first].
@@ -86,6 +103,7 @@ impl CameraSettings {
         let free = Self {
             view_angle: self.view_angle,
             lock: self.lock,
+            interior: self.interior,
             name: self.name.clone(),
             ..Self::default()
         };

@@ -38,7 +38,7 @@ settings! {
         environment_rotation: f64 = 0.0, number(-360.0, 360.0), "DEG";
         /// Multiplies the light of the environment map.
         environment_strength: f64 = 1.0, GAIN, "FACTOR";
-        /// Exposure in stops, or auto: the brightest parts of the scene become nearly white.
+        /// Exposure in stops, or auto: the brightest hundredth of the scene comes just below white.
         exposure: Exposure = Exposure::Auto, ExposureRule, "EV";
     }
 }

@@ -21,7 +21,7 @@ mod picture;
 pub mod rule;
 
 pub use animation::{AnimationDescription, AnimationKind, CameraMotion, ObjectMotion, Orbit};
-pub use camera::{CameraSettings, OrthographicHeight, WorldSettings};
+pub use camera::{CameraSettings, Interior, OrthographicHeight, WorldSettings};
 pub use file::{is_scene_file, parse_table};
 pub use invalid::Invalid;
 pub use keys::{Key, KeyedSettings};

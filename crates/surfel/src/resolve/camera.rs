@@ -4,10 +4,10 @@ use crate::description::{
     CameraMotion, CameraSettings, Invalid, OrthographicHeight, SceneDescription,
 };
 use surfel_core::math::{Aabb, DVec3, Vec3};
-use surfel_core::points::{PointCloud, infer_up};
+use surfel_core::points::{PointCloud, UpConvention, infer_up};
 use surfel_core::progress::Progress;
 use surfel_core::scene::{
-    Camera, CameraFit, Graph, Projection, default_view_up, fit_camera, panorama_camera,
+    Camera, CameraFit, Graph, Projection, Room, default_view_up, fit_camera, panorama_camera,
 };
 use surfel_formats::FileInfo;
 
@@ -34,6 +34,8 @@ pub struct SceneExtent<'a> {
     pub bounds: Aabb,
     /// The world's up.
     pub up: Vec3,
+    /// The room that the points show, if its inside is to be seen.
+    pub room: Option<&'a Room>,
 }
 
 impl SceneCamera {
@@ -45,7 +47,7 @@ impl SceneCamera {
         motion: Option<CameraMotion>,
         progress: &dyn Progress,
     ) -> Self {
-        let SceneExtent { points, bounds, up } = *extent;
+        let SceneExtent { points, bounds, up, room } = *extent;
         let settings = &description.camera;
         let middle = points.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
         let view_angle_deg = settings.view_angle;
@@ -60,7 +62,7 @@ impl SceneCamera {
             None => {
                 let (width, height) = description.picture.resolution();
                 let aspect = f64::from(width) / f64::from(height);
-                choose_camera(settings, points, up, aspect, progress)
+                choose_camera(settings, points, up, room, aspect, progress)
             }
         };
         let is_locked = settings.lock();
@@ -131,36 +133,60 @@ pub fn choose_up(
             progress.choice("up is +Z, to which glTF files are rotated", &["up"]);
             return Vec3::Z;
         }
-        let inferred = infer_up(cloud, is_georeferenced(cloud, files));
+        let inferred = infer_up(cloud, &up_convention(cloud, files));
         progress.choice(&inferred.reason, &["up"]);
         inferred.up
     })
 }
 
-/// Returns true for survey formats and for coordinates far from zero, as those of national grids: they have Z up.
-pub fn is_georeferenced(cloud: &PointCloud, files: &[FileInfo]) -> bool {
-    let is_survey = |file: &FileInfo| {
-        let formats = ["LAS", "LAZ", "COPC", "E57"];
-        let is_survey_format = formats.iter().any(|name| file.format.starts_with(name));
-        is_survey_format || file.coordinate_system.is_some()
-    };
+/// Returns the up axis that the formats of all files imply.
+pub fn up_convention(cloud: &PointCloud, files: &[FileInfo]) -> UpConvention {
+    let has_crs = files.iter().any(|file| file.coordinate_system.is_some());
     let size = cloud.bounds().max - cloud.bounds().min;
+    // National grids lie far from zero.
     let is_far = 1e4 < cloud.origin.length() && f64::from(size.length()) < cloud.origin.length();
-    is_far || files.iter().any(is_survey)
+    if has_crs || is_far {
+        return UpConvention::Georeferenced;
+    }
+    let mut conventions = files.iter().map(format_convention);
+    let first = conventions.next().unwrap_or_default();
+    if conventions.all(|other| other == first) { first } else { UpConvention::Unknown }
 }
 
-/// Returns a camera from settings; what they leave open is chosen so that the whole cloud is seen.
+/// Returns the up axis that a file's format implies.
+fn format_convention(file: &FileInfo) -> UpConvention {
+    let is_any = |names: &[&str]| names.iter().any(|name| file.format.starts_with(name));
+    let has_column = |name: &str| file.columns.iter().any(|column| column == name);
+    if is_any(&["LAS", "LAZ", "COPC", "E57", "PTX"]) {
+        UpConvention::Georeferenced
+    } else if is_any(&["STL"]) {
+        UpConvention::ZUp("STL files".into())
+    } else if is_any(&["OBJ"]) {
+        UpConvention::YUp("OBJ files".into())
+    } else if has_column("f_dc_0") && has_column("rot_0") {
+        UpConvention::YUp("trained splats".into())
+    } else {
+        UpConvention::Unknown
+    }
+}
+
+/// Returns a camera from settings; what they leave open is chosen so that the whole cloud is seen, or the inside of
+/// `room`.
 pub fn choose_camera(
     settings: &CameraSettings,
     cloud: &PointCloud,
     up: Vec3,
+    room: Option<&Room>,
     aspect: f64,
     progress: &dyn Progress,
 ) -> Camera {
     if settings.is_panorama() {
         return panorama(settings, cloud, up, progress);
     }
-    let fit = fit(settings, up, aspect);
+    let mut fit = fit(settings, up, aspect);
+    let into_room =
+        |room: &Room| room.view_direction(settings.azimuth_angle(), settings.elevation_angle);
+    fit.direction = fit.direction.or_else(|| room.map(into_room));
     if let Some(camera) = complete_camera(settings, &fit) {
         return camera;
     }

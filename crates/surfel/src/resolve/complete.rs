@@ -3,7 +3,7 @@
 use super::appearance::{material_of_file, material_of_object};
 use super::loaded::LoadedScene;
 use super::{AutoSettings, description_camera};
-use crate::description::{KeyedSettings, ObjectDescription, SceneDescription};
+use crate::description::{KeyedSettings, LightKind, ObjectDescription, SceneDescription};
 use std::path::Path;
 use surfel_core::scene::Light;
 use surfel_core::scene::color::{ColorSource, choose_source};
@@ -49,6 +49,9 @@ fn complete_lights(complete: &mut SceneDescription, auto: &AutoSettings) {
     (complete.sun, complete.sky) = Default::default();
     (complete.light.environment_rotation, complete.light.environment_strength) = (None, None);
     let original = &auto.description;
+    if let ([Light::Headlight(_)], None) = (&auto.lights[..], &original.light.light) {
+        complete.light.light = Some(vec![LightKind::Headlight]);
+    }
     for light in &auto.lights {
         match light {
             Light::Sun(_) => {

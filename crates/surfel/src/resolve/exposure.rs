@@ -1,14 +1,20 @@
-//! Automatic exposure: a small preview shows how bright the brightest parts of the scene are.
+//! Automatic exposure: a small preview shows how bright the median and the highlights of the scene are.
 
 use surfel_core::flat::FlatScene;
 use surfel_core::progress::Progress;
 use surfel_core::render::{Renderer, Settings};
 
-/// Linear value that the brightest parts get: below white, which leaves highlights their shape.
-const TARGET: f32 = 0.74;
+/// Linear value of the highlights: sRGB 91 %, which leaves white roofs and foreheads their shape.
+const HIGHLIGHT_TARGET: f32 = 0.8;
 
-/// Fraction of the covered pixels that are darker.
-const PERCENTILE: f32 = 0.95;
+/// Linear value below which the median is too dark: sRGB 42 %.
+const MIN_MEDIAN: f32 = 0.15;
+
+/// Greatest factor by which highlights exceed their target to brighten a dark median.
+const MAX_EXCESS: f32 = 1.4;
+
+/// Fraction of the covered pixels that are darker than the highlights.
+const HIGHLIGHT_PERCENTILE: f32 = 0.99;
 
 /// Least and greatest number of stops: a black object must not turn white.
 const LIMITS: (f32, f32) = (-1.0, 1.5);
@@ -38,12 +44,17 @@ pub fn automatic_exposure(
 }
 
 fn stops(mut values: Vec<f32>) -> f32 {
-    let rank = (PERCENTILE * values.len() as f32) as usize;
-    if values.len() <= rank {
+    if values.is_empty() {
         return 0.0;
     }
-    let bright = *values.select_nth_unstable_by(rank, f32::total_cmp).1;
-    (TARGET / bright.max(1e-6)).log2().clamp(LIMITS.0, LIMITS.1)
+    let mut percentile = |fraction: f32| {
+        let rank = ((fraction * values.len() as f32) as usize).min(values.len() - 1);
+        values.select_nth_unstable_by(rank, f32::total_cmp).1.max(1e-6)
+    };
+    let for_highlights = HIGHLIGHT_TARGET / percentile(HIGHLIGHT_PERCENTILE);
+    let for_median = MIN_MEDIAN / percentile(0.5);
+    let gain = for_highlights.max(for_median.min(MAX_EXCESS * for_highlights));
+    gain.log2().clamp(LIMITS.0, LIMITS.1)
 }
 
 #[cfg(test)]
@@ -53,12 +64,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stops_bring_the_bright_parts_to_the_target() {
+    fn stops_bring_the_highlights_to_the_target() {
         assert_eq!(stops(vec![]), 0.0);
-        assert_eq!(stops(vec![TARGET / 2.0; 50]), 1.0);
+        assert_eq!(stops(vec![HIGHLIGHT_TARGET / 2.0; 50]), 1.0);
         assert_eq!((stops(vec![0.0; 50]), stops(vec![9.0; 50])), (LIMITS.1, LIMITS.0));
-        let mut mostly_dark = vec![TARGET / 2.0; 99];
-        mostly_dark.push(100.0);
-        assert_eq!(stops(mostly_dark), 1.0);
+        let mut with_glint = vec![HIGHLIGHT_TARGET / 2.0; 199];
+        with_glint.push(100.0);
+        assert_eq!(stops(with_glint), 1.0);
+    }
+
+    #[test]
+    fn a_dark_median_brightens_the_picture_by_half_a_stop_at_most() {
+        let stops_of = |median: f32| {
+            let mut values = vec![median; 900];
+            values.extend([HIGHLIGHT_TARGET; 100]);
+            stops(values)
+        };
+        assert_eq!(stops_of(MIN_MEDIAN), 0.0);
+        assert!((stops_of(MIN_MEDIAN / 1.2) - 1.2f32.log2()).abs() < 1e-4);
+        assert!((stops_of(0.01) - MAX_EXCESS.log2()).abs() < 1e-4);
     }
 }

@@ -2,6 +2,8 @@
 
 mod cloud;
 mod camera;
+mod interior;
+mod spread;
 mod environment;
 mod sun_and_sky;
 mod exposure;
@@ -13,23 +15,27 @@ mod loaded;
 mod complete;
 
 pub(crate) use appearance::finish_graph;
-pub use camera::{SceneCamera, choose_camera, choose_up, is_georeferenced, short_position};
+pub use camera::{SceneCamera, choose_camera, choose_up, short_position, up_convention};
 pub use cloud::{prepare_cloud, report_normals, report_prepared, report_radii};
 pub(crate) use exposure::automatic_exposure;
+pub(crate) use interior::hide_walls;
 pub use loaded::{KeepOptions, LoadedScene, check_files};
 pub use memory::{MemoryEstimate, n_points, readable};
 pub(crate) use sequence::Sequence;
+pub use spread::report_coverage;
 pub(crate) use sun_and_sky::{expose, expose_lamps};
 
 use crate::choices::{Choice, ChoiceLog};
 use crate::description::{CameraSettings, OrthographicHeight, SceneDescription};
 use crate::error::Result;
 use camera::SceneExtent;
+use interior::{choose_room, hidden_walls};
+use spread::report_gaps;
 use sun_and_sky::{LightingContext, choose_lights, sun_azimuth_deg};
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
 use surfel_core::render::Settings;
-use surfel_core::scene::{Camera, Light, Projection, Scene, inlier_bounds};
+use surfel_core::scene::{Camera, ClipPlane, Light, Projection, Scene, inlier_bounds};
 use surfel_core::surface::SurfaceKind;
 
 /// A scene that is ready for its trees: everything is read, chosen and prepared, at second 0.
@@ -79,6 +85,8 @@ pub struct AutoSettings {
     pub lights: Vec<Light>,
     /// Direction of the sun in degrees clockwise from north.
     pub sun_azimuth_deg: f64,
+    /// Planes beyond which the walls and the ceiling of a room are hidden.
+    pub hidden_walls: Vec<ClipPlane>,
     description: SceneDescription,
 }
 
@@ -96,11 +104,15 @@ impl AutoSettings {
         let points = scene.sample_points();
         let up = choose_up(description.world.up, &points, &scene.file_infos, progress);
         let bounds = inlier_bounds(&points);
-        let extent = SceneExtent { points: &points, bounds, up };
+        report_gaps(&points, progress);
+        let room = choose_room(scene, description, &points, up);
+        let extent = SceneExtent { points: &points, bounds, up, room: room.as_ref() };
         let motion = scene.camera_motion.clone();
         let camera = SceneCamera::choose(&scene.graph, &extent, description, motion, progress);
         let diagonal = (bounds.max - bounds.min).length();
-        let context = LightingContext { camera: camera.camera, up, diagonal };
+        let hidden_walls = hidden_walls(room.as_ref(), &camera.camera, progress);
+        let is_inside = room.is_some_and(|room| room.contains(camera.camera.position));
+        let context = LightingContext { camera: camera.camera, up, diagonal, is_inside };
         // Points as pixels are shaded by their depth alone.
         let is_shaded = description.objects_default.surface.surface() != SurfaceKind::Points;
         let lights = match is_shaded {
@@ -108,7 +120,8 @@ impl AutoSettings {
             false => Vec::new(),
         };
         let sun_azimuth_deg = sun_azimuth_deg(description, &context);
-        Ok(Self { up, camera, lights, sun_azimuth_deg, description: description.clone() })
+        let description = description.clone();
+        Ok(Self { up, camera, lights, sun_azimuth_deg, hidden_walls, description })
     }
 
     /// Returns the description with everything that was chosen written into it.
@@ -134,10 +147,11 @@ impl LoadedScene {
         progress: &dyn Progress,
     ) -> Result<Resolved> {
         let complete = auto.complete_description(&self);
-        let AutoSettings { up, camera, lights, description, .. } = auto;
+        let AutoSettings { up, camera, lights, description, hidden_walls, .. } = auto;
         let clouds = self.take_prepared(&description, progress)?;
         let raw = std::mem::take(&mut self.graph);
-        let (graph, sequences) = finish_graph(&self, raw, clouds, &description, up, progress)?;
+        let (mut graph, sequences) = finish_graph(&self, raw, clouds, &description, up, progress)?;
+        hide_walls(&mut graph, &hidden_walls);
         let background = description.picture.background();
         let scene = Scene { camera: camera.at(0.0, &graph), graph, lights, background };
         let settings = render_settings(&description);
@@ -178,7 +192,8 @@ fn description_camera(
             ..CameraSettings::default()
         };
     }
-    CameraSettings { lock: description.camera.lock, ..CameraSettings::of(&auto.camera.camera) }
+    let CameraSettings { lock, interior, .. } = description.camera;
+    CameraSettings { lock, interior, ..CameraSettings::of(&auto.camera.camera) }
 }
 
 impl CameraSettings {

@@ -32,6 +32,8 @@ pub struct LightingContext {
     pub up: Vec3,
     /// Diagonal of the scene's bounds without stray points.
     pub diagonal: f32,
+    /// True if the camera stands in a closed room, which neither sun nor sky lights.
+    pub is_inside: bool,
 }
 
 /// Returns the lights of the whole scene.
@@ -48,6 +50,10 @@ pub fn choose_lights(
         let mut environment = environment.with_orientation(context.up, rotation_deg)?;
         environment.scale(settings.environment_strength() as f32);
         lights.push(Light::Environment(environment));
+    }
+    if context.is_inside && settings.light.is_none() && settings.environment.is_none() {
+        progress.choice("headlight: the camera stands in a closed room", &["light"]);
+        return Ok(vec![Light::Headlight(HEADLIGHT)]);
     }
     if settings.has(LightKind::Sun) {
         lights.push(Light::Sun(sun(description, context, progress)));
@@ -150,7 +156,7 @@ mod tests {
             view_up: DVec3::new(0.0, 0.1, 1.0),
             projection: Projection::Perspective { view_angle_deg: 35.0 },
         };
-        LightingContext { camera, up: Vec3::Z, diagonal: 1.0 }
+        LightingContext { camera, up: Vec3::Z, diagonal: 1.0, is_inside: false }
     }
 
     #[test]

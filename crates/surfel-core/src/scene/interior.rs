@@ -1,0 +1,274 @@
+//! Rooms: the walls and the ceiling that hide the inside of a scanned room from a camera.
+
+use super::camera::Camera;
+use super::clip::ClipPlane;
+use super::ground::ground_axes;
+use super::inliers::sample_inliers;
+use crate::math::{DVec3, Vec3};
+use crate::points::PointCloud;
+
+/// Number of layers along each axis in which walls are searched.
+const N_LAYERS: usize = 120;
+/// Fraction of the layers at each end of an axis in which its wall can lie: scans through windows reach beyond walls.
+const WALL_RANGE: f32 = 0.3;
+/// Number of cells across a wall that are tested for points.
+const N_CELLS: usize = 10;
+/// Minimum fraction of the cells of a wall, floor or ceiling that contain points.
+const MIN_COVERAGE: f64 = 0.5;
+/// Minimum fraction of the points that lie well within a room: furniture, people, the other side of a wall. Boxes and
+/// houses that were scanned from outside have none.
+const MIN_CONTENT: f64 = 0.004;
+/// Thickness of the layer that is removed with a wall, as a fraction of the room's longest side.
+const WALL_THICKNESS: f32 = 0.02;
+/// Azimuth from the room's own axes and elevation of the viewpoint: two walls are seen, and most of the floor.
+const VIEW_AZIMUTH_DEG: f64 = 35.0;
+const VIEW_ELEVATION_DEG: f64 = 42.0;
+
+/// A room: a box with a vertical axis whose sides are covered by points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Room {
+    /// Origin of the cloud; the other fields are relative to it.
+    origin: DVec3,
+    /// Two horizontal axes, and up.
+    axes: [Vec3; 3],
+    /// Lowest coordinates along the axes.
+    low: [f32; 3],
+    /// Highest coordinates along the axes.
+    high: [f32; 3],
+}
+
+/// Returns the room that a cloud shows, or `None` if its points do not cover a floor, a ceiling and three walls, or if
+/// `needs_content` is set and the box is empty.
+pub fn find_room(cloud: &PointCloud, up: Vec3, needs_content: bool) -> Option<Room> {
+    const MIN_POINTS: usize = 1000;
+    let points = sample_inliers(cloud);
+    if points.len() < MIN_POINTS {
+        return None;
+    }
+    let step = points.len().div_ceil(20_000);
+    let few: Vec<Vec3> = points.iter().step_by(step).copied().collect();
+    let rooms = (0..45).map(|step| box_at(&few, up, 2.0 * step as f32));
+    let (room, _) = rooms.max_by(|(_, a), (_, b)| a.cmp(b))?;
+    let room = Room { origin: cloud.origin, ..room };
+    let is_filled = !needs_content || MIN_CONTENT <= room.content(&points);
+    (is_filled && room.is_enclosed(&points)).then_some(room)
+}
+
+/// Returns the box of the densest layers for an azimuth, and the number of points in the layers of its walls.
+fn box_at(points: &[Vec3], up: Vec3, azimuth_deg: f32) -> (Room, usize) {
+    let (east, north) = ground_axes(up);
+    let (sin, cos) = azimuth_deg.to_radians().sin_cos();
+    let axes = [cos * east + sin * north, cos * north - sin * east, up];
+    let sides = axes.map(|axis| densest_layers(points, axis));
+    let n_in_walls = sides[..2].iter().map(|side| side.2).sum();
+    let (low, high) = (sides.map(|side| side.0), sides.map(|side| side.1));
+    (Room { origin: DVec3::ZERO, axes, low, high }, n_in_walls)
+}
+
+/// Returns the coordinates of the densest layer near each end of an axis, and the number of points in both.
+fn densest_layers(points: &[Vec3], axis: Vec3) -> (f32, f32, usize) {
+    let (low, high) = super::inliers::range_along(points, axis);
+    let thickness = ((high - low) / N_LAYERS as f32).max(f32::MIN_POSITIVE);
+    let mut counts = [0usize; N_LAYERS];
+    for point in points {
+        let layer = ((point.dot(axis) - low) / thickness) as usize;
+        counts[layer.min(N_LAYERS - 1)] += 1;
+    }
+    let n_searched = (WALL_RANGE * N_LAYERS as f32) as usize;
+    // Of equally dense layers the outermost is the wall.
+    let first = (0..n_searched).rev().max_by_key(|layer| counts[*layer]).unwrap_or(0);
+    let searched = N_LAYERS - n_searched..N_LAYERS;
+    let last = searched.max_by_key(|layer| counts[*layer]).unwrap_or(N_LAYERS - 1);
+    let middle = |layer: usize| low + (layer as f32 + 0.5) * thickness;
+    (middle(first), middle(last), counts[first] + counts[last])
+}
+
+impl Room {
+    /// Returns the coordinates of a position along the room's axes.
+    fn local(&self, point: Vec3) -> [f32; 3] {
+        self.axes.map(|axis| point.dot(axis))
+    }
+
+    fn size(&self, axis: usize) -> f32 {
+        self.high[axis] - self.low[axis]
+    }
+
+    fn wall_thickness(&self) -> f32 {
+        WALL_THICKNESS * (0..3).map(|axis| self.size(axis)).fold(0.0, f32::max)
+    }
+
+    /// Returns the fraction of the points that lie well within the box.
+    fn content(&self, points: &[Vec3]) -> f64 {
+        let is_within = |point: &&Vec3| {
+            let local = self.local(**point);
+            (0..3).all(|axis| {
+                let margin = 0.15 * self.size(axis);
+                self.low[axis] + margin < local[axis] && local[axis] < self.high[axis] - margin
+            })
+        };
+        points.iter().filter(is_within).count() as f64 / points.len() as f64
+    }
+
+    /// Returns true if points cover the floor, the ceiling and at least three walls.
+    fn is_enclosed(&self, points: &[Vec3]) -> bool {
+        let mut is_covered = [[[false; N_CELLS * N_CELLS]; 2]; 3];
+        let thickness = self.wall_thickness();
+        for point in points {
+            let local = self.local(*point);
+            let cell = |axis: usize| {
+                let along = (local[axis] - self.low[axis]) / self.size(axis).max(f32::MIN_POSITIVE);
+                (0.0..1.0).contains(&along).then_some((N_CELLS as f32 * along) as usize)
+            };
+            for axis in 0..3 {
+                let (Some(a), Some(b)) = (cell((axis + 1) % 3), cell((axis + 2) % 3)) else {
+                    continue;
+                };
+                for (side, wall) in [self.low[axis], self.high[axis]].into_iter().enumerate() {
+                    if (local[axis] - wall).abs() < thickness {
+                        is_covered[axis][side][a * N_CELLS + b] = true;
+                    }
+                }
+            }
+        }
+        let is_closed = |cells: &[bool; N_CELLS * N_CELLS]| {
+            let n_covered = cells.iter().filter(|covered| **covered).count();
+            MIN_COVERAGE * cells.len() as f64 <= n_covered as f64
+        };
+        let [first, second, vertical] = is_covered;
+        let n_walls = first.iter().chain(&second).filter(|wall| is_closed(wall)).count();
+        3 <= n_walls && vertical.iter().all(is_closed)
+    }
+
+    /// Returns true if a world position lies within the room.
+    pub fn contains(&self, position: DVec3) -> bool {
+        let local = self.local((position - self.origin).as_vec3());
+        (0..3).all(|axis| (self.low[axis]..self.high[axis]).contains(&local[axis]))
+    }
+
+    /// Returns the direction of view into the room over its lowest corner in the south, or over the next corner for
+    /// each quarter of `azimuth_deg`.
+    pub fn view_direction(&self, azimuth_deg: f64, elevation_deg: Option<f64>) -> DVec3 {
+        let [first, second, up] = self.axes.map(Vec3::as_dvec3);
+        let (_, north) = ground_axes(self.axes[2]);
+        let turns = (0..4).map(|quarter| 90.0 * f64::from(quarter) + VIEW_AZIMUTH_DEG);
+        let ahead = |turn_deg: f64| {
+            let (sin, cos) = turn_deg.to_radians().sin_cos();
+            cos * first + sin * second
+        };
+        let northward = |turn_deg: &f64| ahead(*turn_deg).dot(north.as_dvec3());
+        let turn_deg = turns.max_by(|a, b| northward(a).total_cmp(&northward(b))).unwrap_or(0.0);
+        let elevation_deg = elevation_deg.unwrap_or(VIEW_ELEVATION_DEG);
+        let (sin, cos) = elevation_deg.to_radians().sin_cos();
+        // Azimuths count clockwise seen from above.
+        cos * ahead(turn_deg - azimuth_deg) - sin * up
+    }
+
+    /// Returns the planes that hide the walls and the ceiling beyond which the camera stands.
+    ///
+    /// A camera within the room hides nothing, and the floor always stays.
+    pub fn planes_before(&self, camera: &Camera) -> Vec<ClipPlane> {
+        let position = self.local((camera.position - self.origin).as_vec3());
+        let thickness = self.wall_thickness();
+        let mut planes = Vec::new();
+        for (axis, position) in position.into_iter().enumerate() {
+            let normal = self.axes[axis];
+            let (low, high) = (self.low[axis] + thickness, self.high[axis] - thickness);
+            let mut hide = |normal: Vec3, coordinate: f32| {
+                let point = self.origin + (coordinate * self.axes[axis]).as_dvec3();
+                planes.push(ClipPlane { point, normal: normal.as_dvec3() });
+            };
+            if self.high[axis] < position {
+                hide(normal, high);
+            } else if position < self.low[axis] && axis < 2 {
+                hide(-normal, low);
+            }
+        }
+        planes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Rooms are found by their six sides and content, and opened toward the camera.
+
+    use super::*;
+    use crate::math::Random;
+    use crate::scene::Projection;
+
+    /// A room of 6 x 4 x 2.5 m, rotated about the vertical, with a table if it is furnished.
+    fn room(azimuth_deg: f32, is_furnished: bool) -> PointCloud {
+        let mut random = Random::new(8, 0);
+        let mut points = Vec::new();
+        let size = Vec3::new(6.0, 4.0, 2.5);
+        for i in 0..30_000 {
+            let mut p = size * Vec3::from_array(std::array::from_fn(|_| random.next_f32()));
+            let axis = i % 3;
+            p[axis] = if random.next_f32() < 0.5 { 0.0 } else { size[axis] };
+            points.push(p);
+        }
+        if is_furnished {
+            let table = (0..1000)
+                .map(|_| Vec3::new(2.0 + 2.0 * random.next_f32(), 1.5 + random.next_f32(), 0.8));
+            points.extend(table);
+        }
+        let (sin, cos) = azimuth_deg.to_radians().sin_cos();
+        let rotated = |p: Vec3| Vec3::new(cos * p.x - sin * p.y, sin * p.x + cos * p.y, p.z);
+        let cloud = PointCloud::from_positions(points.into_iter().map(rotated).collect());
+        PointCloud { origin: DVec3::new(500.0, 600.0, 70.0), ..cloud }
+    }
+
+    fn camera_at(position: DVec3) -> Camera {
+        Camera {
+            position,
+            focal_point: DVec3::new(500.0, 600.0, 70.0),
+            view_up: DVec3::Z,
+            projection: Projection::Perspective { view_angle_deg: 35.0 },
+        }
+    }
+
+    #[test]
+    fn a_furnished_room_is_found_at_any_azimuth() {
+        for azimuth_deg in [0.0, 20.0, 75.0] {
+            assert!(find_room(&room(azimuth_deg, true), Vec3::Z, true).is_some(), "{azimuth_deg}");
+        }
+    }
+
+    #[test]
+    fn an_empty_box_is_a_room_only_on_request() {
+        assert_eq!(find_room(&room(0.0, false), Vec3::Z, true), None);
+        assert!(find_room(&room(0.0, false), Vec3::Z, false).is_some());
+    }
+
+    #[test]
+    fn a_ball_and_a_room_without_ceiling_are_no_rooms() {
+        let cloud = room(0.0, true);
+        let open = cloud.positions.iter().copied().filter(|p| p.z < 2.4).collect();
+        let open = PointCloud { positions: open, ..PointCloud::default() };
+        assert_eq!(find_room(&open, Vec3::Z, true), None);
+        let ball = (0..20_000).map(|i| {
+            let z = 1.0 - (2.0 * i as f32 + 1.0) / 20_000.0;
+            let (sin, cos) = (2.399_963 * i as f32).sin_cos();
+            Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+        });
+        let ball = PointCloud::from_positions(ball.collect());
+        assert_eq!(find_room(&ball, Vec3::Z, false), None);
+        assert_eq!(find_room(&PointCloud::default(), Vec3::Z, false), None);
+    }
+
+    #[test]
+    fn the_ceiling_and_two_near_walls_are_hidden_from_above_a_corner() {
+        let cloud = room(20.0, true);
+        let room = find_room(&cloud, Vec3::Z, true).unwrap();
+        let center = cloud.origin + DVec3::new(2.2, 2.9, 1.25);
+        assert!(room.contains(center));
+        let forward = room.view_direction(0.0, None);
+        assert!(0.0 < forward.y && forward.z < 0.0, "{forward}");
+        let planes = room.planes_before(&camera_at(center - 20.0 * forward));
+        assert_eq!(planes.len(), 3);
+        for plane in &planes {
+            assert!(plane.normal.dot(forward) < 0.0, "{plane:?}");
+            assert!((center - plane.point).dot(plane.normal) < 0.0, "{plane:?}");
+        }
+        assert_eq!(room.planes_before(&camera_at(center)), []);
+    }
+}

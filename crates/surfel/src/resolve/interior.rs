@@ -1,0 +1,50 @@
+//! The inside of scanned rooms: the walls and the ceiling before the camera are hidden.
+
+use super::loaded::LoadedScene;
+use crate::description::{Interior, SceneDescription};
+use surfel_core::math::Vec3;
+use surfel_core::points::PointCloud;
+use surfel_core::progress::Progress;
+use surfel_core::scene::{Camera, Clip, ClipPlane, Graph, Room, find_room};
+
+/// Returns the room whose inside is to be seen, if the points show one.
+///
+/// Scenes that move keep their walls, as those before the camera change with time.
+pub fn choose_room(
+    scene: &LoadedScene,
+    description: &SceneDescription,
+    points: &PointCloud,
+    up: Vec3,
+) -> Option<Room> {
+    let is_static = scene.sequences.is_empty()
+        && scene.camera_motion.is_none()
+        && scene.graph.animation.channels.is_empty();
+    match description.camera.interior() {
+        Interior::Auto if is_static => find_room(points, up, true),
+        Interior::On => find_room(points, up, false),
+        _ => None,
+    }
+}
+
+/// Returns the planes that hide the walls and the ceiling before the camera, and reports how many there are.
+pub fn hidden_walls(
+    room: Option<&Room>,
+    camera: &Camera,
+    progress: &dyn Progress,
+) -> Vec<ClipPlane> {
+    let planes = room.map_or(Vec::new(), |room| room.planes_before(camera));
+    if !planes.is_empty() {
+        let line =
+            format!("room: {} sides between its inside and the camera are hidden", planes.len());
+        progress.choice(&line, &["camera.interior"]);
+    }
+    planes
+}
+
+/// Removes everything beyond the planes.
+pub fn hide_walls(graph: &mut Graph, planes: &[ClipPlane]) {
+    for plane in planes {
+        let clip = Clip { plane: Some(*plane), ..Clip::default() };
+        graph.clip(&vec![clip; graph.geometries.len()]);
+    }
+}
