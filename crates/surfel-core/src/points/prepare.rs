@@ -391,6 +391,7 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
+    use crate::points::STRUCTURE;
     use crate::progress::NoProgress;
 
     fn ball(n_points: usize) -> PointCloud {
@@ -511,7 +512,8 @@ mod tests {
         let (cloud, _) = prepare(ball(500), &preparation, &NoProgress).unwrap();
         let (cloud, report) = prepare(cloud.into_inner(), &preparation, &NoProgress).unwrap();
         assert_eq!((report.normals, report.radii), (None, None));
-        assert_eq!(cloud.scalars.len(), 1);
+        let names: Vec<&str> = cloud.scalars.iter().map(|scalar| scalar.name.as_str()).collect();
+        assert_eq!(names, [SURFACE_VARIATION, STRUCTURE]);
         assert_eq!(cloud.scalar(SURFACE_VARIATION).unwrap().len(), 500);
     }
 
