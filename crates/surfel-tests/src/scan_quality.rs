@@ -239,7 +239,7 @@ impl Tally {
             block_coverage_error: tally.block_errors / tally.n_blocks as f64,
         };
         ScanQuality {
-            false_hits: self.n_false as f64 / self.n_background as f64,
+            false_hits: self.n_false as f64 / self.n_background.max(1) as f64,
             kinds: names.iter().zip(&self.kinds).map(quality).collect(),
         }
     }
@@ -289,7 +289,7 @@ mod tests {
     #[test]
     fn every_second_row_missing_is_half_the_coverage() {
         let quality = compare(&aovs(|i| {
-            let is_shown = i / RESOLUTION % 2 == 0 && i % RESOLUTION < RESOLUTION / 2;
+            let is_shown = (i / RESOLUTION).is_multiple_of(2) && i % RESOLUTION < RESOLUTION / 2;
             if is_shown { 10.0 } else { f32::INFINITY }
         }));
         let wall = &quality.kinds[0];
