@@ -106,11 +106,10 @@ impl LiveScene {
         description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<LiveView> {
-        let auto = AutoSettings::choose(&self.loaded, description, progress)?;
+        let mut auto = AutoSettings::choose(&self.loaded, description, progress)?;
         let first = self.hidden_walls.get_or_init(|| auto.hidden_walls.clone());
         let is_open = description.camera.interior() != Interior::Off;
-        let hidden_walls = if is_open { first.clone() } else { Vec::new() };
-        let auto = AutoSettings { hidden_walls, ..auto };
+        auto.hidden_walls = if is_open { first.clone() } else { Vec::new() };
         let settings = Settings { with_aovs: false, ..render_settings(description) };
         let time_secs = description.output.time();
         let exposure = description.light.exposure();

@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn an_almost_empty_picture_is_reported() {
         let lines = |coverage: f32| {
-            let image = Image { coverage: vec![coverage; 100], ..Image::default() };
+            let image = Image { coverage: vec![coverage; 100], ..Image::new(10, 10) };
             let log = ChoiceLog::new(&NoProgress);
             report_coverage(&image, &log);
             log.into_choices().len()
