@@ -14,6 +14,8 @@ pub struct CleanReport {
     pub n_points_before: usize,
     /// Number of points dropped because their position is not finite or beyond 1e15 from the cloud's origin.
     pub n_invalid_positions: usize,
+    /// Number of points dropped because they are of a class of noise.
+    pub n_noise: usize,
     /// Number of points dropped because an earlier point has the same position.
     pub n_duplicates: usize,
     /// Number of zero or non-finite normals, set to zero, which `prepare` takes as missing.
@@ -24,7 +26,10 @@ pub struct CleanReport {
     pub n_invalid_radii: usize,
 }
 
-/// Drops points with invalid positions and all but the first of duplicate points, and marks unusable normals and
+/// ASPRS classes of noise: low points and high noise.
+const NOISE_CLASSES: [u8; 2] = [7, 18];
+
+/// Drops points with invalid positions, those of classes of noise unless there are no others, and all but the first of duplicate points, and marks unusable normals and
 /// radii. Duplicates of a cloud that deforms are kept, as they may part at another time.
 ///
 /// A column of normals or radii without a usable entry, as trained splats have, is removed.
@@ -49,6 +54,7 @@ impl CleanReport {
     fn lines(&self) -> Vec<String> {
         let counts = [
             (self.n_invalid_positions, "points dropped: no position, or beyond 1e15"),
+            (self.n_noise, "points dropped: classes of noise (7, 18)"),
             (self.n_duplicates, "points dropped: exact duplicates"),
             (self.n_invalid_normals, "normals treated as missing: zero or not finite"),
             (self.n_scaled_normals, "normals scaled to unit length"),
@@ -71,25 +77,39 @@ fn find_dropped(
         return Err(Error::TooManyPoints { found: positions.len(), limit: limit - 1 });
     }
     progress.check()?;
-    let mut dropped: Vec<u32> = (0..positions.len() as u32)
-        .into_par_iter()
-        .filter(|&i| !is_valid_position(positions[i as usize]))
-        .collect();
+    let is_invalid = |i: u32| !is_valid_position(positions[i as usize]);
+    let noise = cloud.classification.as_deref().filter(|classes| !classes.iter().all(is_noise));
+    let is_noise = |i: u32| noise.is_some_and(|classes| is_noise(&classes[i as usize]));
+    let indices = 0..positions.len() as u32;
+    let mut dropped: Vec<u32> = indices.into_par_iter().filter(|i| is_invalid(*i)).collect();
     report.n_invalid_positions = dropped.len();
+    let indices = 0..positions.len() as u32;
+    dropped.par_extend(indices.into_par_iter().filter(|i| !is_invalid(*i) && is_noise(*i)));
+    report.n_noise = dropped.len() - report.n_invalid_positions;
     if cloud.morphs.is_empty() && cloud.skin.is_none() {
-        dropped.extend(find_duplicates(positions, progress)?);
+        let is_candidate = |i: u32| !is_invalid(i) && !is_noise(i);
+        dropped.extend(find_duplicates(positions, is_candidate, progress)?);
     }
-    report.n_duplicates = dropped.len() - report.n_invalid_positions;
+    report.n_duplicates = dropped.len() - report.n_invalid_positions - report.n_noise;
     dropped.par_sort_unstable();
     Ok(dropped)
 }
 
-/// Returns all but the first index of each group of equal valid positions. Takes 8 bytes per point while it runs.
-fn find_duplicates(positions: &[Vec3], progress: &dyn Progress) -> Result<Vec<u32>> {
+fn is_noise(class: &u8) -> bool {
+    NOISE_CLASSES.contains(class)
+}
+
+/// Returns all but the first index of each group of candidates at equal positions. Takes 8 bytes per point while it
+/// runs.
+fn find_duplicates(
+    positions: &[Vec3],
+    is_candidate: impl Fn(u32) -> bool + Sync,
+    progress: &dyn Progress,
+) -> Result<Vec<u32>> {
     let mut keys: Vec<u64> = positions
         .par_iter()
         .enumerate()
-        .filter(|(_, position)| is_valid_position(**position))
+        .filter(|(i, _)| is_candidate(*i as u32))
         .map(|(i, &position)| u64::from(position_hash(position)) << 32 | i as u64)
         .collect();
     progress.check()?;
@@ -236,5 +256,19 @@ mod tests {
         assert!(cloud.normals.is_none() && cloud.radii.is_none());
         assert_eq!((report.n_invalid_normals, report.n_invalid_radii), (2, 2));
         assert!(cleaned(PointCloud::default()).0.is_empty());
+    }
+
+    #[test]
+    fn points_of_noise_are_dropped_unless_there_are_no_others() {
+        let positions: Vec<Vec3> = [0.0, 1.0, 1.0, 2.0].map(|x| x * Vec3::X).to_vec();
+        let classified = |classes: [u8; 4]| PointCloud {
+            classification: Some(classes.to_vec()),
+            ..PointCloud::from_positions(positions.clone())
+        };
+        let (cloud, report) = clean(classified([2, 7, 2, 18]), &NoProgress).unwrap();
+        assert_eq!(cloud.positions, [Vec3::ZERO, Vec3::X]);
+        assert_eq!((report.n_noise, report.n_duplicates), (2, 0));
+        let (cloud, report) = clean(classified([7, 7, 7, 18]), &NoProgress).unwrap();
+        assert_eq!((cloud.len(), report.n_noise, report.n_duplicates), (3, 0, 1));
     }
 }

@@ -504,3 +504,123 @@ fn line_direction(positions: &[Vec3], point: usize, neighbors: &[Neighbor]) -> V
     let (_, vectors) = scatter.eigen();
     vectors[2].as_vec3().normalize_or(Vec3::Z)
 }
+
+#[cfg(test)]
+mod tests {
+    //! Structures of sampled shapes.
+
+    use super::*;
+    use crate::math::Random;
+    use crate::points::{Preparation, PreparedCloud, prepare};
+    use crate::progress::NoProgress;
+
+    fn prepared(positions: Vec<Vec3>) -> (PreparedCloud, Vec<Structure>) {
+        let cloud = PointCloud::from_positions(positions);
+        let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+        let structures = cloud.structures().unwrap();
+        (cloud, structures)
+    }
+
+    fn fraction(structures: &[Structure], kind: Structure) -> f64 {
+        let n = structures.iter().filter(|structure| **structure == kind).count();
+        n as f64 / structures.len() as f64
+    }
+
+    fn random_points(n: usize, seed: u64, point: impl Fn([f32; 3]) -> Vec3) -> Vec<Vec3> {
+        let mut random = Random::new(seed, 0);
+        (0..n).map(|_| point(std::array::from_fn(|_| random.next_f32()))).collect()
+    }
+
+    #[test]
+    fn points_of_a_plane_form_a_surface() {
+        for noise in [0.0, 0.3] {
+            // The spacing is 0.01.
+            let height = |z: f32| noise * 0.01 * (z - 0.5) * 12f32.sqrt();
+            let plane = random_points(10_000, 1, |[x, y, z]| Vec3::new(x, y, height(z)));
+            let (_, structures) = prepared(plane);
+            let n_surface = fraction(&structures, Structure::Surface)
+                + fraction(&structures, Structure::Redundant);
+            assert!(0.995 < n_surface, "noise {noise}: {n_surface}");
+        }
+    }
+
+    #[test]
+    fn sides_of_an_edge_keep_their_normals() {
+        let mut points = random_points(5000, 2, |[x, y, _]| Vec3::new(x, y, 0.0));
+        points.extend(random_points(5000, 3, |[x, _, z]| Vec3::new(x, 0.0, z)));
+        let (cloud, structures) = prepared(points);
+        assert!(0.98 < fraction(&structures, Structure::Surface));
+        let tilt = |normal: &Vec3| normal.y.abs().max(normal.z.abs()).min(1.0).acos().to_degrees();
+        let mut tilts: Vec<f32> = cloud.normals().iter().map(tilt).collect();
+        tilts.sort_unstable_by(f32::total_cmp);
+        assert!(tilts[tilts.len() * 95 / 100] < 5.0, "{}", tilts[tilts.len() * 95 / 100]);
+    }
+
+    #[test]
+    fn points_that_fill_a_volume_are_scattered_with_balls_that_do_not_overlap_much() {
+        let crown = random_points(5000, 4, |xyz| Vec3::from_array(xyz));
+        let (cloud, structures) = prepared(crown);
+        let n_scatter = fraction(&structures, Structure::Scatter);
+        assert!(0.85 < n_scatter, "{n_scatter}");
+        let spacing = 1.0 / (5000f32).cbrt();
+        let balls = cloud.radii().iter().zip(&structures);
+        let balls = balls.filter(|(_, structure)| **structure == Structure::Scatter);
+        assert!(balls.into_iter().all(|(radius, _)| *radius < spacing));
+    }
+
+    #[test]
+    fn points_of_a_wire_form_a_line_along_it() {
+        let direction = Vec3::new(1.0, 2.0, 0.5).normalize();
+        let wire = (0..1000).map(|i| 0.01 * i as f32 * direction).collect();
+        let (cloud, structures) = prepared(wire);
+        assert_eq!(fraction(&structures, Structure::Line), 1.0);
+        assert!(cloud.normals().iter().all(|axis| 0.999 < axis.dot(direction).abs()));
+    }
+
+    #[test]
+    fn rings_on_the_ground_form_a_surface_across_their_gaps() {
+        // Twenty rings, 0.4 apart, of points that are 0.02 apart.
+        let ring = |ring: usize| {
+            let radius = 3.0 + 0.4 * ring as f32;
+            let n = (std::f32::consts::TAU * radius / 0.02) as usize;
+            (0..n).map(move |i| {
+                let (sin, cos) = (std::f32::consts::TAU * i as f32 / n as f32).sin_cos();
+                Vec3::new(radius * cos, radius * sin, 0.0)
+            })
+        };
+        let (cloud, structures) = prepared((0..20).flat_map(ring).collect());
+        let n_lines = fraction(&structures, Structure::Line);
+        assert!(n_lines < 0.01, "{n_lines}");
+        let discs = cloud.radii().iter().zip(cloud.normals()).zip(&structures);
+        let discs = discs.filter(|(_, structure)| **structure == Structure::Surface);
+        let mut n_wide = 0;
+        for ((radius, normal), _) in discs {
+            n_wide += usize::from(0.4 < *radius);
+            assert!(0.999 < normal.z.abs());
+        }
+        assert!(1000 < n_wide, "{n_wide}");
+        assert!(0.5 < fraction(&structures, Structure::Redundant));
+    }
+
+    #[test]
+    fn a_choice_takes_all_points_for_one_structure() {
+        let points = random_points(500, 5, |[x, y, _]| Vec3::new(x, y, 0.0));
+        for (choice, expected) in [
+            (StructureChoice::Surface, None),
+            (StructureChoice::Scatter, Some(vec![Structure::Scatter; 500])),
+        ] {
+            let cloud = PointCloud::from_positions(points.clone());
+            let preparation = Preparation { structure: choice, ..Preparation::default() };
+            let (cloud, _) = prepare(cloud, &preparation, &NoProgress).unwrap();
+            assert_eq!(cloud.structures(), expected);
+        }
+    }
+
+    #[test]
+    fn choices_are_parsed() {
+        for choice in [StructureChoice::Auto, StructureChoice::Surface, StructureChoice::Scatter] {
+            assert_eq!(choice.to_string().parse::<StructureChoice>().unwrap(), choice);
+        }
+        assert!("line".parse::<StructureChoice>().is_err());
+    }
+}

@@ -4,13 +4,13 @@ use super::auto_viewpoint::automatic_direction;
 use super::camera::{Camera, Projection};
 use super::camera_fit::{CameraFit, fit_along};
 use super::ground::ground_axes;
-use super::inliers::{range_along, sample_inliers};
+use super::inliers::{range_along, sample_inliers, without_fringe};
 use crate::math::{DVec3, Vec3};
 use crate::points::PointCloud;
 
-/// Returns a camera that shows all of `cloud` but its outliers.
+/// Returns a camera that shows all of `cloud` but its outliers and a thin fringe far away from its middle.
 pub fn fit_camera(cloud: &PointCloud, fit: &CameraFit) -> Camera {
-    let points = sample_inliers(cloud);
+    let points = without_fringe(sample_inliers(cloud));
     let direction = fit.direction.and_then(DVec3::try_normalize);
     let forward = direction.unwrap_or_else(|| automatic_direction(&points, fit));
     let camera = fit_along(forward, &points, fit);

@@ -15,6 +15,9 @@ const WALL_RANGE: f32 = 0.3;
 const N_CELLS: usize = 10;
 /// Minimum fraction of the cells of a wall, floor or ceiling that contain points.
 const MIN_COVERAGE: f64 = 0.5;
+/// Minimum fraction of the points that lie on the walls, the floor and the ceiling. The points of a forest fill a box as
+/// well, but few lie at its sides.
+const MIN_ON_SIDES: f64 = 0.5;
 /// Minimum fraction of the points that lie well within a room: furniture, people, the other side of a wall. Boxes and
 /// houses that were scanned from outside have none.
 const MIN_CONTENT: f64 = 0.004;
@@ -113,8 +116,13 @@ impl Room {
     fn is_enclosed(&self, points: &[Vec3]) -> bool {
         let mut is_covered = [[[false; N_CELLS * N_CELLS]; 2]; 3];
         let thickness = self.wall_thickness();
+        let mut n_on_sides = 0;
         for point in points {
             let local = self.local(*point);
+            let is_at = |axis: usize, side: f32| (local[axis] - side).abs() < thickness;
+            let is_on_side =
+                |axis: usize| is_at(axis, self.low[axis]) || is_at(axis, self.high[axis]);
+            n_on_sides += usize::from((0..3).any(is_on_side));
             let cell = |axis: usize| {
                 let along = (local[axis] - self.low[axis]) / self.size(axis).max(f32::MIN_POSITIVE);
                 (0.0..1.0).contains(&along).then_some((N_CELLS as f32 * along) as usize)
@@ -124,7 +132,7 @@ impl Room {
                     continue;
                 };
                 for (side, wall) in [self.low[axis], self.high[axis]].into_iter().enumerate() {
-                    if (local[axis] - wall).abs() < thickness {
+                    if is_at(axis, wall) {
                         is_covered[axis][side][a * N_CELLS + b] = true;
                     }
                 }
@@ -136,7 +144,8 @@ impl Room {
         };
         let [first, second, vertical] = is_covered;
         let n_walls = first.iter().chain(&second).filter(|wall| is_closed(wall)).count();
-        3 <= n_walls && vertical.iter().all(is_closed)
+        let is_hollow = MIN_ON_SIDES * points.len() as f64 <= n_on_sides as f64;
+        is_hollow && 3 <= n_walls && vertical.iter().all(is_closed)
     }
 
     /// Returns true if a world position lies within the room.

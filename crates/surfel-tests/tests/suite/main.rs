@@ -21,6 +21,7 @@ mod reference;
 mod refit;
 mod searches;
 mod shapes;
+mod smooth;
 mod statistics;
 mod textures;
 mod traversal_paths;

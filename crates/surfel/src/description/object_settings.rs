@@ -183,7 +183,9 @@ impl PreparationSettings {
         let normals = (!self.estimates_normals()).then_some(Column::Normals);
         let radii = self.radius.is_none().then_some(Column::Radii);
         let structure = self.radius.is_none().then(|| Column::Scalar(STRUCTURE.to_owned()));
-        normals.into_iter().chain(radii).chain(structure).collect()
+        // Points of classes of noise are left out.
+        let classes = Some(Column::Classification);
+        normals.into_iter().chain(radii).chain(structure).chain(classes).collect()
     }
 
     /// Drops the normals and radii that are to be estimated.

@@ -1,0 +1,98 @@
+//! The smooth surface: its depth and normals where these are known, and one surface for rays of all kinds.
+
+use surfel_core::flat::FlatCloud;
+use surfel_core::math::{Ray, Vec3};
+use surfel_core::points::{PointCloud, Preparation, prepare};
+use surfel_core::progress::NoProgress;
+use surfel_core::scene::CloudGeometry;
+use surfel_core::surface::SurfaceKind;
+use surfel_core::trace::{Simd, SurfaceHit, occlusions, surface_hits};
+use surfel_tests::clouds;
+use surfel_tests::scenes;
+
+fn hits(flat: &FlatCloud, rays: &[Ray]) -> Vec<SurfaceHit> {
+    let mut hits = vec![SurfaceHit::MISS; rays.len()];
+    surface_hits(flat, Simd::detect(), rays, &mut hits);
+    hits
+}
+
+#[test]
+fn a_sphere_of_points_has_the_depth_and_the_normals_of_a_sphere() {
+    let n = 5000;
+    let spacing = (4.0 * std::f32::consts::PI / n as f32).sqrt();
+    let flat = scenes::flat(clouds::sphere(n, 1.0), SurfaceKind::Smooth);
+    let rays: Vec<Ray> = scenes::random_rays(3000, 1.0, 3)
+        .into_iter()
+        .filter(|ray| 2.0 < ray.origin.length() && ray.t_max == f32::INFINITY)
+        .collect();
+    let (mut n_hits, mut n_misses) = (0, 0);
+    for (ray, hit) in rays.iter().zip(hits(&flat, &rays)) {
+        // The distance of the ray from the centre.
+        let across = ray.origin.cross(ray.direction).length();
+        if 0.98 < across {
+            continue;
+        }
+        if hit.is_miss() {
+            n_misses += 1;
+            continue;
+        }
+        n_hits += 1;
+        let position = ray.at(hit.distance);
+        assert!((position.length() - 1.0).abs() < 0.02 * spacing, "{}", position.length());
+        assert!(hit.normal.angle_between(position.normalize()).to_degrees() < 1.0);
+    }
+    assert!(1000 < n_hits && n_misses == 0, "{n_hits} {n_misses}");
+}
+
+#[test]
+fn what_a_camera_ray_hits_also_occludes_it() {
+    let mut cloud = clouds::cube(24, 0.4, 11);
+    cloud.normals = None;
+    let flat = scenes::flat(cloud, SurfaceKind::Smooth);
+    let rays = scenes::random_rays(4000, 1.5, 8);
+    let mut occluded = vec![false; rays.len()];
+    occlusions(&flat, Simd::detect(), &rays, &mut occluded);
+    let found = hits(&flat, &rays);
+    let n_hits = found.iter().filter(|hit| !hit.is_miss()).count();
+    let differs = |(hit, occluded): &(&SurfaceHit, &bool)| hit.is_miss() == **occluded;
+    let n_different = found.iter().zip(&occluded).filter(differs).count();
+    // A camera ray skips discs close behind a rejected one, which an occlusion test may judge.
+    assert!(1000 < n_hits && n_different * 200 < rays.len(), "{n_different} of {n_hits}");
+}
+
+#[test]
+fn lines_and_scattered_points_are_seen_and_occlude() {
+    let wire: Vec<Vec3> = (0..400).map(|i| Vec3::new(0.0, 0.01 * i as f32 - 2.0, 1.0)).collect();
+    let mut positions = clouds::plane(60, 0.4, 1).positions;
+    positions.extend(wire);
+    let cloud = PointCloud::from_positions(positions);
+    let (cloud, report) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+    assert!(350 < report.structure.unwrap().n_lines);
+    let flat =
+        FlatCloud::new(&CloudGeometry::with_uniform_color(cloud, [200; 3]), &NoProgress).unwrap();
+    let rays: Vec<Ray> =
+        (0..100).map(|i| Ray::new(Vec3::new(3.0, 0.017 * i as f32 - 0.8, 1.0), -Vec3::X)).collect();
+    let found = hits(&flat, &rays);
+    assert!(found.iter().all(|hit| hit.surface == SurfaceKind::Capsule), "{:?}", found[0]);
+    assert!(found.iter().all(|hit| (hit.distance - 3.0).abs() < 0.02));
+    let mut occluded = vec![false; rays.len()];
+    occlusions(&flat, Simd::detect(), &rays, &mut occluded);
+    assert!(occluded.iter().all(|occluded| *occluded));
+}
+
+#[test]
+fn classes_are_not_blended() {
+    let cloud = clouds::plane(40, 0.4, 1);
+    let mut points = scenes::points(cloud, SurfaceKind::Smooth);
+    let colors = points.cloud().positions().iter();
+    let colors = colors.map(|p| if p.x < 0.0 { [255, 0, 0] } else { [0, 0, 255] }).collect();
+    points = scenes::colored(&points, colors);
+    points.blends_colors = false;
+    let flat = FlatCloud::new(&points, &NoProgress).unwrap();
+    let bounds = points.cloud().bounds();
+    let across = |i: usize| Vec3::new(0.002 * i as f32 - 0.2, 0.1, bounds.max.z + 3.0);
+    let rays: Vec<Ray> = (0..200).map(|i| Ray::new(across(i), -Vec3::Z)).collect();
+    let found = hits(&flat, &rays);
+    assert!(found.iter().all(|hit| !hit.is_miss()));
+    assert!(found.iter().all(|hit| hit.color == Vec3::X || hit.color == Vec3::Z));
+}
