@@ -75,7 +75,7 @@ fn a_dry_run_prints_the_choices_and_renders_nothing() {
     let cloud = folder.write("dome.ply", dome(20));
     let choices = succeed(&["render", &cloud, "-o", &folder.path("no.png"), "--dry-run"]);
     let choices: Value = serde_json::from_str(&choices).unwrap();
-    assert_eq!((&choices["surface"], &choices["color"]), (&"splat".into(), &"rgb".into()));
+    assert_eq!((&choices["surface"], &choices["color"]), (&"smooth".into(), &"rgb".into()));
     assert_eq!(folder.names(), ["dome.ply"]);
 }
 

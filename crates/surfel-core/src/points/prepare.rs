@@ -154,6 +154,7 @@ impl Missing {
         // Points that move may change their structure.
         let structure = cloud.radii.is_none()
             && cloud.morphs.is_empty()
+            && cloud.skin.is_none()
             && cloud.structures().is_none()
             && preparation.structure != StructureChoice::Surface
             && matches!(preparation.radius, Radius::Adaptive { .. });
@@ -513,7 +514,7 @@ mod tests {
         let (cloud, report) = prepare(cloud.into_inner(), &preparation, &NoProgress).unwrap();
         assert_eq!((report.normals, report.radii), (None, None));
         let names: Vec<&str> = cloud.scalars.iter().map(|scalar| scalar.name.as_str()).collect();
-        assert_eq!(names, [SURFACE_VARIATION, STRUCTURE]);
+        assert_eq!(names, [STRUCTURE, SURFACE_VARIATION]);
         assert_eq!(cloud.scalar(SURFACE_VARIATION).unwrap().len(), 500);
     }
 

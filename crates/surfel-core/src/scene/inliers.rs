@@ -86,7 +86,7 @@ mod tests {
     #[test]
     fn only_a_thin_fringe_is_left_out() {
         assert_eq!(without_fringe(disk(1)).len(), 5000);
-        let core = without_fringe(disk(12));
+        let core = without_fringe(disk(40));
         assert!((4700..4995).contains(&core.len()), "{}", core.len());
         assert!(without_fringe(Vec::new()).is_empty());
     }

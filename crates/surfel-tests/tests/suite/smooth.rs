@@ -29,7 +29,7 @@ fn a_sphere_of_points_has_the_depth_and_the_normals_of_a_sphere() {
     for (ray, hit) in rays.iter().zip(hits(&flat, &rays)) {
         // The distance of the ray from the centre.
         let across = ray.origin.cross(ray.direction).length();
-        if 0.98 < across {
+        if 0.98 < across || 0.0 < ray.origin.dot(ray.direction) {
             continue;
         }
         if hit.is_miss() {

@@ -297,9 +297,11 @@ impl StoredBlock {
     }
 }
 
+/// Returns normals of unit length. Those of unused lanes are zero and stay so.
 #[inline(always)]
 fn unit<F: Floats>(normal: Vec3Lanes<F>) -> Vec3Lanes<F> {
-    normal.scaled(F::splat(1.0) / normal.dot(normal).sqrt())
+    let squared = normal.dot(normal).max(F::splat(1.0));
+    normal.scaled(F::splat(1.0) / squared.sqrt())
 }
 
 #[inline(always)]
