@@ -20,7 +20,7 @@ use std::str::FromStr;
 pub const STRUCTURE: &str = "structure";
 
 /// Maximum surface variation of a surface's neighbourhood.
-const MAX_SURFACE_VARIATION: f32 = 0.05;
+const MAX_SURFACE_VARIATION: f32 = 0.06;
 /// Minimum width of a surface's neighbourhood, as the ratio of its eigenvalues. Below it, it is a line.
 const MIN_SURFACE_WIDTH: f32 = 0.25;
 /// Maximum ratio of the radius of a point on a scan line to the reach of its neighbours on the line. Gaps between scan
@@ -28,6 +28,8 @@ const MIN_SURFACE_WIDTH: f32 = 0.25;
 const MAX_WIDENING: f32 = 12.0;
 /// Maximum width of the neighbourhood of a line.
 const MAX_LINE_WIDTH: f32 = 0.04;
+/// Radius of a ball in distances to the second neighbour: balls of neighbours overlap a little.
+const BALL_REACH: f32 = 0.6;
 /// Maximum ratio of the radius of a ball or capsule to the median of its structure.
 const MAX_SOLID_RATIO: f32 = 1.5;
 /// Number of neighbours for a second look at points that lie in no plane.
@@ -40,10 +42,10 @@ const THINNING: f32 = 2.0;
 const MIN_THINNED: usize = 256;
 /// Number of neighbours that vote on the structure of a point.
 const N_VOTERS: usize = 8;
-/// Number of scattered neighbours that make a point of a surface a scattered one.
-const N_SCATTERING: usize = 4;
-/// Number of neighbours on a surface that make a scattered point one of the surface.
-const N_JOINING: usize = 6;
+/// Number of rounds in which points take over half of their neighbours' mean.
+const N_ROUNDS: usize = 4;
+/// Share of scattered points around a point, after all rounds, that makes it a scattered one.
+const MIN_SCATTERED: f32 = 0.5;
 /// Number of planes tried at a point that lies near an edge.
 const N_PLANES: u64 = 24;
 /// Distance from a plane of the points on it, in radii of the neighbourhood.
@@ -247,8 +249,8 @@ pub fn all_scattered(
 /// Returns the radius of a ball by the distance to the second neighbour; `radius` is that of a disc, which a stray
 /// point's ball does not exceed.
 fn ball_radius(distance: f32, radius: f32) -> f32 {
-    let half = 0.5 * distance;
-    if 0.0 < half { half.min(radius) } else { radius }
+    let reach = BALL_REACH * distance;
+    if 0.0 < reach { reach.min(radius) } else { radius }
 }
 
 /// Clamps the radii of stray points, which would be as large as the empty space around them.
@@ -424,15 +426,16 @@ fn fit_around(positions: &[Vec3], position: Vec3, neighbors: &[Neighbor]) -> Pla
     fit_plane(&around, 0, &others)
 }
 
-/// Lets neighbours overrule points, twice, so that structures do not flicker.
+/// Lets the region around a point decide whether it is scattered, so that structures do not flicker: a rough point of a
+/// surface stays on the surface, and a flat spot of a crown becomes leaves.
 fn smoothed(
     tree: &KdTree,
     shapes: &[PointShape],
     progress: &dyn Progress,
 ) -> Result<Vec<Structure>> {
-    let mut structures: Vec<Structure> = shapes.iter().map(|shape| shape.structure).collect();
-    if structures.iter().all(|structure| *structure == Structure::Surface) {
-        return Ok(structures);
+    let own = shapes.par_iter().map(|shape| shape.structure);
+    if own.clone().all(|structure| structure != Structure::Scatter) {
+        return Ok(own.collect());
     }
     let voters = |_: usize, neighbors: &[Neighbor]| {
         let mut indices = [u32::MAX; N_VOTERS];
@@ -442,25 +445,24 @@ fn smoothed(
         indices
     };
     let voters = tree.map(Neighborhood::Nearest(N_VOTERS), progress, voters)?;
-    for _ in 0..2 {
-        let vote = |(own, voters): (&Structure, &[u32; N_VOTERS])| {
+    let mut shares: Vec<f32> =
+        own.clone().map(|structure| f32::from(u8::from(structure == Structure::Scatter))).collect();
+    for _ in 0..N_ROUNDS {
+        let mixed = |(own, voters): (&f32, &[u32; N_VOTERS])| {
             let of_voters = voters.iter().filter(|voter| **voter != u32::MAX);
-            let of_voters = of_voters.map(|voter| structures[*voter as usize]);
-            let (mut n_surface, mut n_scatter) = (0, 0);
-            for structure in of_voters {
-                n_surface +=
-                    usize::from(matches!(structure, Structure::Surface | Structure::Redundant));
-                n_scatter += usize::from(structure == Structure::Scatter);
-            }
-            match own {
-                Structure::Surface if N_SCATTERING <= n_scatter => Structure::Scatter,
-                Structure::Scatter if N_JOINING <= n_surface => Structure::Surface,
-                own => *own,
-            }
+            let n_voters = of_voters.clone().count().max(1) as f32;
+            let sum: f32 = of_voters.map(|voter| shares[*voter as usize]).sum();
+            0.5 * (own + sum / n_voters)
         };
-        structures = structures.par_iter().zip(&voters).map(vote).collect();
+        shares = shares.par_iter().zip(&voters).map(mixed).collect();
     }
-    Ok(structures)
+    let decided = |(own, share): (Structure, &f32)| match own {
+        Structure::Line => Structure::Line,
+        _ if MIN_SCATTERED <= *share => Structure::Scatter,
+        Structure::Scatter => Structure::Surface,
+        own => own,
+    };
+    Ok(own.zip(&shares).map(decided).collect())
 }
 
 /// Gives a point the normal and the radius of its final structure.

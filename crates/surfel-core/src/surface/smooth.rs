@@ -88,11 +88,13 @@ impl<F: Floats> SphereSums<F> {
         }
     }
 
-    /// Returns the lanes in which a point at `offset` may take part in the fit.
+    /// Returns the lanes in which a point may take part in the fit.
     #[inline(always)]
-    pub fn is_near(&self, offset: Vec3Lanes<F>) -> F::Mask {
-        let squared = offset.dot(offset) * self.per_radius * self.per_radius;
-        squared.lt(F::splat(FIT_REACH * FIT_REACH))
+    pub fn is_near(&self, point: &FitPoint<F>) -> F::Mask {
+        let squared = point.offset.dot(point.offset);
+        let is_within_reach =
+            (squared * self.per_radius * self.per_radius).lt(F::splat(FIT_REACH * FIT_REACH));
+        is_within_reach & (squared * point.inverse_support).lt(F::splat(1.0))
     }
 
     /// Adds a point in `lanes`, to which it is near. Its normal is turned to the side of the guide.

@@ -150,7 +150,7 @@ fn approach<W: PacketLanes>(
             let corner = block.corner_from(&position);
             for lane in set_bits::<LANES>(block.lanes) {
                 let point = block.point(&corner, lane);
-                let near = lanes & sums.is_near(point.offset);
+                let near = lanes & sums.is_near(&point);
                 if near.bits() != 0 {
                     sums.add(&point, near);
                 }
@@ -436,7 +436,7 @@ impl<L: Lanes> BoxVisitor for SingleFit<L> {
             normal: unit(points.normal),
             inverse_support: inverse_support(points.radius),
         };
-        let near = is_used & self.sums.is_near(point.offset);
+        let near = is_used & self.sums.is_near(&point);
         if near.bits() != 0 {
             self.sums.add(&point, near);
         }
