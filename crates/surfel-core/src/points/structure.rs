@@ -49,7 +49,7 @@ const MIN_SCATTERED: f32 = 0.5;
 /// Number of planes tried at a point that lies near an edge.
 const N_PLANES: u64 = 24;
 /// Distance from a plane of the points on it, in radii of the neighbourhood.
-const PLANE_THICKNESS: f32 = 0.08;
+const PLANE_THICKNESS: f32 = 0.04;
 /// Minimum fraction of the neighbours on the plane of an edge's side.
 const MIN_PLANE_FRACTION: f32 = 0.5;
 
@@ -302,7 +302,7 @@ fn decide(
     let positions = tree.positions();
     let neighbors = tree.nearest(positions[point], N_MANY_NEIGHBORS, Some(point as u32));
     let nearest = &neighbors[..neighbors.len().min(N_MANY_NEIGHBORS / 2)];
-    if let Some(normal) = plane_of_side(positions, point, nearest) {
+    if let Some(normal) = plane_of_side(positions, point, nearest, fit.normal) {
         return shape(Structure::Surface, normal);
     }
     if is_surface {
@@ -320,7 +320,15 @@ fn decide(
 
 /// Returns the normal of the plane through the point on which the most neighbours lie, if they are at least half: near
 /// an edge that is the plane of the point's own side.
-fn plane_of_side(positions: &[Vec3], point: usize, neighbors: &[Neighbor]) -> Option<Vec3> {
+/// `mean` is the normal of the plane through all of them, which another plane has to excel.
+fn plane_of_side(
+    positions: &[Vec3],
+    point: usize,
+    neighbors: &[Neighbor],
+    mean: Vec3,
+) -> Option<Vec3> {
+    /// Ratio by which the plane of a side has to be better than the mean plane.
+    const MIN_GAIN: f32 = 1.2;
     let center = positions[point];
     let offsets: Vec<Vec3> =
         neighbors.iter().map(|neighbor| positions[neighbor.index as usize] - center).collect();
@@ -342,6 +350,7 @@ fn plane_of_side(positions: &[Vec3], point: usize, neighbors: &[Neighbor]) -> Op
         (0.05 * reach * reach < cross.length()).then(|| cross.normalize())
     });
     let scored = candidates.map(|normal| (score(normal), normal));
+    let scored = scored.chain([(MIN_GAIN * score(mean), mean)]);
     let (_, normal) = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
     let on_plane = offsets.iter().filter(|offset| normal.dot(**offset).abs() < thickness);
     let (mut covariance, mut n_on_plane) = (SymmetricMatrix::default(), 0);
@@ -351,6 +360,9 @@ fn plane_of_side(positions: &[Vec3], point: usize, neighbors: &[Neighbor]) -> Op
     }
     if (n_on_plane as f32) < MIN_PLANE_FRACTION * offsets.len() as f32 {
         return None;
+    }
+    if normal == mean {
+        return Some(mean);
     }
     let (refined, [_, middle, largest]) = smallest_eigenvector(&covariance);
     (0.1 * largest < middle).then(|| refined.as_vec3().normalize())
