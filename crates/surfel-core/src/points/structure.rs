@@ -572,7 +572,7 @@ mod tests {
 
     #[test]
     fn points_that_fill_a_volume_are_scattered_with_balls_that_do_not_overlap_much() {
-        let crown = random_points(5000, 4, |xyz| Vec3::from_array(xyz));
+        let crown = random_points(5000, 4, Vec3::from_array);
         let (cloud, structures) = prepared(crown);
         let n_scatter = fraction(&structures, Structure::Scatter);
         assert!(0.85 < n_scatter, "{n_scatter}");

@@ -127,13 +127,13 @@ impl Room {
                 let along = (local[axis] - self.low[axis]) / self.size(axis).max(f32::MIN_POSITIVE);
                 (0.0..1.0).contains(&along).then_some((N_CELLS as f32 * along) as usize)
             };
-            for axis in 0..3 {
+            for (axis, is_covered) in is_covered.iter_mut().enumerate() {
                 let (Some(a), Some(b)) = (cell((axis + 1) % 3), cell((axis + 2) % 3)) else {
                     continue;
                 };
                 for (side, wall) in [self.low[axis], self.high[axis]].into_iter().enumerate() {
                     if is_at(axis, wall) {
-                        is_covered[axis][side][a * N_CELLS + b] = true;
+                        is_covered[side][a * N_CELLS + b] = true;
                     }
                 }
             }

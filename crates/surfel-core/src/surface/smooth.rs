@@ -208,13 +208,15 @@ pub struct ColorSums<F> {
     color: Vec3Lanes<F>,
 }
 
-impl<F: Floats> ColorSums<F> {
+impl<F: Floats> Default for ColorSums<F> {
     /// Returns the sums over no points.
     #[inline(always)]
-    pub fn new() -> Self {
+    fn default() -> Self {
         Self { weight: F::splat(0.0), color: Vec3Lanes::splat(Vec3::ZERO) }
     }
+}
 
+impl<F: Floats> ColorSums<F> {
     /// Adds a point of a linear colour in `lanes`.
     #[inline(always)]
     pub fn add(&mut self, point: &FitPoint<F>, color: Vec3Lanes<F>, lanes: F::Mask) {

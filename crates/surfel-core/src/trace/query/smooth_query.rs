@@ -195,7 +195,7 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
         NeighborhoodStats::new(CandidateHitLanes::new(hits.normals, direction, radius));
     let reach = L::PacketLanes::splat(FIT_REACH) * radius;
     let max_squared = reach * reach;
-    let mut colors = ColorSums::new();
+    let mut colors = ColorSums::default();
     let mut nearest =
         NearestHits { distances: L::PacketLanes::splat(f32::INFINITY), slots: hits.slots };
     for block in blocks {
