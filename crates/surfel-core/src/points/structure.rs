@@ -43,7 +43,7 @@ const MIN_THINNED: usize = 256;
 /// Number of neighbours that vote on the structure of a point.
 const N_VOTERS: usize = 8;
 /// Number of rounds in which points take over half of their neighbours' mean.
-const N_ROUNDS: usize = 4;
+const N_ROUNDS: usize = 12;
 /// Share of scattered points around a point, after all rounds, that makes it a scattered one.
 const MIN_SCATTERED: f32 = 0.5;
 /// Number of planes tried at a point that lies near an edge.
