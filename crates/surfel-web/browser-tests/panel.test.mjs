@@ -163,7 +163,7 @@ test('each surface, colour and material gives another picture', async () => {
 test('a setting that cannot be rendered is rejected and reverted', async () => {
   await setters.select('surface', 'points');
   await page.locator('.toast', { hasText: 'points for all of the scene' }).waitFor();
-  await page.waitForFunction(() => window.surfel.state.scene.surface === 'splat');
+  await page.waitForFunction(() => window.surfel.state.scene.surface === 'smooth');
   await field('light.sky').click();
   assert.notEqual(await finishedPixels(page), first);
   await resetControl('light.sky');
