@@ -17,7 +17,16 @@ use surfel_core::trace::Simd;
 /// Prepares a cloud as one surface, which adds missing normals and radii, and makes it grey.
 pub fn points(cloud: PointCloud, surface: SurfaceKind) -> CloudGeometry {
     let preparation = Preparation { structure: StructureChoice::Surface, ..Preparation::default() };
-    let (cloud, _) = prepare(cloud, &preparation, &NoProgress).unwrap();
+    prepared(cloud, &preparation, surface)
+}
+
+/// Prepares a cloud and makes it grey.
+pub fn prepared(
+    cloud: PointCloud,
+    preparation: &Preparation,
+    surface: SurfaceKind,
+) -> CloudGeometry {
+    let (cloud, _) = prepare(cloud, preparation, &NoProgress).unwrap();
     let mut points = grey(cloud.into_inner());
     points.surface = surface;
     points.edge_test = EdgeTest::AngularGap;

@@ -52,6 +52,8 @@ const N_PLANES: u64 = 24;
 const PLANE_THICKNESS: f32 = 0.04;
 /// Minimum fraction of the neighbours on the plane of an edge's side.
 const MIN_PLANE_FRACTION: f32 = 0.5;
+/// Minimum fraction of the neighbours on the plane of one side of a sharp edge or corner.
+const MIN_SIDE_FRACTION: f32 = 0.25;
 
 /// The shape that a point is part of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -302,11 +304,15 @@ fn decide(
     let positions = tree.positions();
     let neighbors = tree.nearest(positions[point], N_MANY_NEIGHBORS, Some(point as u32));
     let nearest = &neighbors[..neighbors.len().min(N_MANY_NEIGHBORS / 2)];
-    if let Some(normal) = plane_of_side(positions, point, nearest, fit.normal) {
+    let side = plane_of_side(positions, point, nearest, fit.normal);
+    if let Some((normal, fraction)) = side
+        && MIN_PLANE_FRACTION <= fraction
+    {
         return shape(Structure::Surface, normal);
     }
+    let normal = side.map_or(fit.normal, |(normal, _)| normal);
     if is_surface {
-        return shape(Structure::Surface, fit.normal);
+        return shape(Structure::Surface, normal);
     }
     let wide = fit_plane(positions, point, &neighbors);
     if wide.width <= MIN_SURFACE_WIDTH {
@@ -315,20 +321,23 @@ fn decide(
     if self::is_surface(&wide) {
         return shape(Structure::Surface, wide.normal);
     }
-    shape(Structure::Scatter, fit.normal)
+    shape(Structure::Scatter, normal)
 }
 
-/// Returns the normal of the plane through the point on which the most neighbours lie, if they are at least half: near
-/// an edge that is the plane of the point's own side.
-/// `mean` is the normal of the plane through all of them, which another plane has to excel.
+/// Returns the normal of the plane through the point on which the most neighbours lie, and their fraction: near an edge
+/// that is the plane of the point's own side. `mean` is the normal of the plane through all of them, which another
+/// plane has to excel. Returns none if too few lie on the plane.
 fn plane_of_side(
     positions: &[Vec3],
     point: usize,
     neighbors: &[Neighbor],
     mean: Vec3,
-) -> Option<Vec3> {
+) -> Option<(Vec3, f32)> {
     /// Ratio by which the plane of a side has to be better than the mean plane.
     const MIN_GAIN: f32 = 1.2;
+    /// Ratio by which the plane of one side of a sharp edge is better than the mean plane. With 2, rough surfaces
+    /// broke into facets.
+    const MIN_SHARP_GAIN: f32 = 4.0;
     let center = positions[point];
     let offsets: Vec<Vec3> =
         neighbors.iter().map(|neighbor| positions[neighbor.index as usize] - center).collect();
@@ -351,21 +360,24 @@ fn plane_of_side(
     });
     let scored = candidates.map(|normal| (score(normal), normal));
     let scored = scored.chain([(MIN_GAIN * score(mean), mean)]);
-    let (_, normal) = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (best_score, normal) = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
     let on_plane = offsets.iter().filter(|offset| normal.dot(**offset).abs() < thickness);
     let (mut covariance, mut n_on_plane) = (SymmetricMatrix::default(), 0);
     for offset in on_plane {
         covariance.add_outer(offset.as_dvec3(), 1.0);
         n_on_plane += 1;
     }
-    if (n_on_plane as f32) < MIN_PLANE_FRACTION * offsets.len() as f32 {
+    let fraction = n_on_plane as f32 / offsets.len() as f32;
+    let is_sharp = MIN_SHARP_GAIN * score(mean) < best_score;
+    let min_fraction = if is_sharp { MIN_SIDE_FRACTION } else { MIN_PLANE_FRACTION };
+    if fraction < min_fraction {
         return None;
     }
     if normal == mean {
-        return Some(mean);
+        return Some((mean, fraction));
     }
     let (refined, [_, middle, largest]) = smallest_eigenvector(&covariance);
-    (0.1 * largest < middle).then(|| refined.as_vec3().normalize())
+    (0.1 * largest < middle).then(|| (refined.as_vec3().normalize(), fraction))
 }
 
 /// Looks at points on lines again, among fewer and fewer points: on a surface that is sampled densely along lines
@@ -489,7 +501,7 @@ fn settle(
     let position = tree.positions()[point];
     match structure {
         Structure::Surface | Structure::Redundant => {
-            if shape.structure != structure {
+            if shape.structure == Structure::Line {
                 (shape.normal, shape.radius) = (fit.normal, radius);
             }
         }

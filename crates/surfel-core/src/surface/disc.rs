@@ -31,6 +31,8 @@ pub(super) fn bounds(center: Vec3, normal: Vec3, radius: f32) -> Aabb {
 
 #[cfg(test)]
 mod tests {
+    //! Bounds of a disc contain its rim and touch it.
+
     use super::*;
     use crate::math::Random;
 

@@ -141,8 +141,9 @@ impl<F: Floats> CandidateHitLanes<F> {
     }
 }
 
-/// Statistics of the points around hits, accumulated one point per lane at a time.
-pub struct NeighborhoodStats<F: Floats> {
+/// Statistics of the points around hits, accumulated one point per lane at a time. `BACKFACES` says whether hits on
+/// back faces are rejected too.
+pub struct NeighborhoodStats<F: Floats, const BACKFACES: bool> {
     hit: CandidateHitLanes<F>,
     n_neighbors: F,
     interval: AngularInterval<F>,
@@ -163,7 +164,7 @@ pub struct EdgeTestResult {
     pub sparse: u32,
 }
 
-impl<F: Floats> NeighborhoodStats<F> {
+impl<F: Floats, const BACKFACES: bool> NeighborhoodStats<F, BACKFACES> {
     /// Returns the statistics of no points.
     #[inline(always)]
     pub fn new(hit: CandidateHitLanes<F>) -> Self {
@@ -178,11 +179,14 @@ impl<F: Floats> NeighborhoodStats<F> {
     pub fn add(&mut self, offset: Vec3Lanes<F>, normal: Vec3Lanes<F>, is_neighbor: F::Mask) {
         let (zero, one) = (F::splat(0.0), F::splat(1.0));
         self.n_neighbors = self.n_neighbors + F::select(is_neighbor, one, zero);
-        let is_passed = is_neighbor & self.hit.is_passed(offset);
-        self.n_passed = self.n_passed + F::select(is_passed, one, zero);
-        let weighted_normal = self.hit.height_weighted_normal(offset, normal);
-        let none = Vec3Lanes::splat(Vec3::ZERO);
-        self.free_side = self.free_side.plus(Vec3Lanes::select(is_passed, weighted_normal, none));
+        if BACKFACES {
+            let is_passed = is_neighbor & self.hit.is_passed(offset);
+            self.n_passed = self.n_passed + F::select(is_passed, one, zero);
+            let weighted_normal = self.hit.height_weighted_normal(offset, normal);
+            let none = Vec3Lanes::splat(Vec3::ZERO);
+            let weighted_normal = Vec3Lanes::select(is_passed, weighted_normal, none);
+            self.free_side = self.free_side.plus(weighted_normal);
+        }
         let (projected, has_direction) = self.hit.project_to_tangent_plane(offset);
         self.interval.add(projected, is_neighbor & has_direction);
     }
@@ -199,7 +203,7 @@ impl<F: Floats> NeighborhoodStats<F> {
         let has_surface = F::splat(MIN_NEIGHBORS as f32).le(self.n_neighbors);
         let enclosed = (self.interval.is_full & has_surface).bits();
         EdgeTestResult {
-            enclosed: enclosed & !self.backfaces(),
+            enclosed: if BACKFACES { enclosed & !self.backfaces() } else { enclosed },
             sparse: self.n_neighbors.lt(F::splat(MIN_DENSE as f32)).bits(),
         }
     }
@@ -219,7 +223,7 @@ impl<F: Floats> NeighborhoodStats<F> {
     }
 }
 
-impl<L: Lanes> NeighborhoodStats<L> {
+impl<L: Lanes, const BACKFACES: bool> NeighborhoodStats<L, BACKFACES> {
     /// Combines the statistics of all lanes, whose hits must be the same.
     #[inline(always)]
     pub fn reduce_lanes(self) -> Self {
@@ -300,9 +304,13 @@ impl<L: Lanes> AngularInterval<L> {
 
 #[cfg(test)]
 mod tests {
+    //! Gaps between the directions of neighbours, the points that count, and back faces beyond a bend.
+
     use super::*;
     use crate::math::{LANES, Mat3, PortableLanes};
     use crate::surface::MAX_NORMAL_COMPONENT;
+
+    type Stats = NeighborhoodStats<PortableLanes, true>;
 
     /// A point's offset from the hit, and its normal.
     type Point = (Vec3, Vec3);
@@ -318,7 +326,7 @@ mod tests {
 
     /// Evaluates the test with each point added in the lane given with it.
     fn evaluate_in_lanes(hit: &CandidateHit, points: &[(usize, Point)]) -> EdgeTestResult {
-        let mut stats = NeighborhoodStats::new(CandidateHitLanes::<PortableLanes>::splat(hit));
+        let mut stats = Stats::new(CandidateHitLanes::<PortableLanes>::splat(hit));
         for &(lane, (offset, normal)) in points {
             let mut is_point = [0.0; LANES];
             is_point[lane] = 1.0;

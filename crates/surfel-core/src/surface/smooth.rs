@@ -15,8 +15,8 @@ pub(super) const SPAWN_T_MIN: f32 = 0.5;
 /// Steps per unit to which the terms of sums are rounded. f32 adds a thousand terms of up to 1 exactly, so that
 /// sums do not depend on the order of points.
 const STEPS: f32 = 16_384.0;
-/// Exponent of the weight of normals at an angle of 90 degrees: 2 / 0.75^2.
-const NORMAL_FALLOFF: f32 = 3.6;
+/// Exponent of the weight of normals at an angle of 90 degrees: 2 / (2/3)^2.
+const NORMAL_FALLOFF: f32 = 4.5;
 /// Maximum curvature of a fitted sphere's equation, in 1 / radius: its radius is at least half a disc's radius.
 const MAX_CURVATURE: f32 = 1.0;
 /// Distance of a point's plane from the position, in radii, beyond which the point belongs to another sheet.
@@ -149,7 +149,7 @@ impl<F: Floats> SphereSums<F> {
     }
 }
 
-/// Returns the weight of a normal by the cosine of its angle to the guide: about exp(-|a - b|^2 / 0.75^2).
+/// Returns the weight of a normal by the cosine of its angle to the guide: about exp(-|a - b|^2 / (2/3)^2).
 #[inline(always)]
 fn alignment<F: Floats>(cosine: F) -> F {
     let one = F::splat(1.0);

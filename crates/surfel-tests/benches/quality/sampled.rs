@@ -4,8 +4,10 @@ use crate::selection::Selection;
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
+use surfel_core::flat::FlatCloud;
 use surfel_core::math::{DVec3, Random, Ray, Vec3};
-use surfel_core::points::PointCloud;
+use surfel_core::points::{PointCloud, Preparation};
+use surfel_core::progress::NoProgress;
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::{self, Simd, SurfaceHit};
 use surfel_tests::deviation::TrueViews;
@@ -85,6 +87,12 @@ pub fn compare_shapes(selection: &Selection) {
     }
 }
 
+/// Returns a cloud prepared by default, as users see it.
+fn flat(cloud: PointCloud, kind: SurfaceKind) -> FlatCloud {
+    let points = scenes::prepared(cloud, &Preparation::default(), kind);
+    FlatCloud::new(&points, &NoProgress).unwrap()
+}
+
 fn compare_cloud(
     name: &str,
     points: Vec<Vec3>,
@@ -95,7 +103,7 @@ fn compare_cloud(
     let cloud = PointCloud::from_positions(points);
     for (surface, kind) in kinds {
         let begin = Instant::now();
-        let flat = scenes::flat(cloud.clone(), *kind);
+        let flat = flat(cloud.clone(), *kind);
         let prepare_secs = begin.elapsed().as_secs_f64();
         let begin = Instant::now();
         let hits = views.trace(&flat);
@@ -135,7 +143,7 @@ fn n_uncovered_pixels(kind: SurfaceKind, n_points: usize, resolution: u32) -> us
     let mut random = Random::new(1, 0);
     let mut coordinate = || 2.0 * random.next_f32() - 1.0;
     let points = (0..n_points).map(|_| Vec3::new(coordinate(), coordinate(), 0.0)).collect();
-    let flat = scenes::flat(PointCloud::from_positions(points), kind);
+    let flat = flat(PointCloud::from_positions(points), kind);
     // A margin of four spacings is left out.
     let height = 2.0 * (1.0 - 4.0 * 2.0 / (n_points as f64).sqrt());
     let view = scenes::from_above(height).view(DVec3::ZERO, resolution, resolution);

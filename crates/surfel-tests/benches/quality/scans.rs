@@ -2,7 +2,7 @@
 
 use crate::selection::Selection;
 use std::time::Instant;
-use surfel_core::points::{Preparation, prepare};
+use surfel_core::points::Preparation;
 use surfel_core::progress::NoProgress;
 use surfel_core::scanner::Instrument;
 use surfel_core::scanner::scenes::NamedScene;
@@ -72,10 +72,7 @@ pub fn compare_scans(selection: &Selection) {
         );
         for (surface, kind) in &selection.kinds {
             let begin = Instant::now();
-            let (prepared, _) =
-                prepare(cloud.clone(), &Preparation::default(), &NoProgress).unwrap();
-            let mut points = scenes::grey(prepared.into_inner());
-            points.surface = *kind;
+            let points = scenes::prepared(cloud.clone(), &Preparation::default(), *kind);
             let prepare_secs = begin.elapsed().as_secs_f64();
             let begin = Instant::now();
             let quality = views.compare(&points);

@@ -29,7 +29,7 @@ impl HitFilter for EdgeFilter<'_> {
             direction: ray.direction,
             radius: self.radius(hit.slot),
         };
-        is_enclosed::<L>(&self.0.points, ray.at(hit.distance), candidate)
+        is_enclosed::<L, true>(&self.0.points, ray.at(hit.distance), candidate)
     }
 
     #[inline(always)]
@@ -56,6 +56,6 @@ impl HitFilter for EdgeFilter<'_> {
             direction,
             radius: L::PacketLanes::load(&radii),
         };
-        enclosed_lanes::<L>(&self.0.points, lanes, &candidates)
+        enclosed_lanes::<L, true>(&self.0.points, lanes, &candidates)
     }
 }

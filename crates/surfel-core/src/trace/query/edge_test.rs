@@ -23,38 +23,43 @@ const ROUNDING: f32 = 1e-6;
 
 /// True if the points around a hit at `position` enclose it.
 #[inline(always)]
-pub fn is_enclosed<L: Lanes>(points: &FlatPoints, position: Vec3, hit: CandidateHit) -> bool {
-    let mut result = evaluate_one::<L>(points, position, hit);
+pub fn is_enclosed<L: Lanes, const BACKFACES: bool>(
+    points: &FlatPoints,
+    position: Vec3,
+    hit: CandidateHit,
+) -> bool {
+    let mut result = evaluate_one::<L, BACKFACES>(points, position, hit);
     if result.sparse != 0 {
         let hit = CandidateHit { radius: RETRY_RADIUS_FACTOR * hit.radius, ..hit };
-        result = evaluate_one::<L>(points, position, hit);
+        result = evaluate_one::<L, BACKFACES>(points, position, hit);
     }
     result.enclosed != 0
 }
 
+/// Evaluates the points around a single hit. Its results are bit 0.
 #[inline(always)]
-fn evaluate_one<L: Lanes>(
+pub fn evaluate_one<L: Lanes, const BACKFACES: bool>(
     points: &FlatPoints,
     position: Vec3,
     hit: CandidateHit,
 ) -> EdgeTestResult {
-    L::dispatch(EvaluateOne { points, position, hit, lanes: PhantomData::<L> })
+    L::dispatch(EvaluateOne::<L, BACKFACES> { points, position, hit, lanes: PhantomData })
 }
 
-struct EvaluateOne<'p, L> {
+struct EvaluateOne<'p, L, const BACKFACES: bool> {
     points: &'p FlatPoints,
     position: Vec3,
     hit: CandidateHit,
     lanes: PhantomData<L>,
 }
 
-impl<L: Lanes> SimdTask for EvaluateOne<'_, L> {
+impl<L: Lanes, const BACKFACES: bool> SimdTask for EvaluateOne<'_, L, BACKFACES> {
     type Output = EdgeTestResult;
 
     #[inline(always)]
     fn run(self) -> EdgeTestResult {
         let Self { points, position, hit, .. } = self;
-        let mut found = SingleHitVisitor::<L> {
+        let mut found = SingleHitVisitor::<L, BACKFACES> {
             position,
             stats: NeighborhoodStats::new(CandidateHitLanes::splat(&hit)),
         };
@@ -67,12 +72,12 @@ impl<L: Lanes> SimdTask for EvaluateOne<'_, L> {
 }
 
 /// Adds points to the statistics of one hit, eight at a time, one per lane.
-struct SingleHitVisitor<L: Lanes> {
+struct SingleHitVisitor<L: Lanes, const BACKFACES: bool> {
     position: Vec3,
-    stats: NeighborhoodStats<L>,
+    stats: NeighborhoodStats<L, BACKFACES>,
 }
 
-impl<L: Lanes> BoxVisitor for SingleHitVisitor<L> {
+impl<L: Lanes, const BACKFACES: bool> BoxVisitor for SingleHitVisitor<L, BACKFACES> {
     #[inline(always)]
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
         let points = points.blocks[block_idx as usize].points::<L>(self.position);
@@ -120,7 +125,7 @@ impl<L: Lanes> SimdTask for EvaluateByBlocks<'_, L> {
     #[inline(always)]
     fn run(self) -> u32 {
         let Self { points, discs, hits } = self;
-        let mut found = NeighborhoodStats::new(hits.candidates());
+        let mut found = NeighborhoodStats::<_, true>::new(hits.candidates());
         let block_of = |i: usize| discs[i].slot / LANES as u32;
         let mut first = 0;
         while first < discs.len() {
@@ -133,7 +138,7 @@ impl<L: Lanes> SimdTask for EvaluateByBlocks<'_, L> {
             }
             let block = &points.blocks[block_idx as usize];
             let all = L::splat(0.0).lt(block.radii()).bits();
-            add_block::<L>(block, all, &hits.position, lanes, &mut found);
+            add_block::<L, _>(block, all, &hits.position, lanes, &mut found);
         }
         let EdgeTestResult { enclosed, sparse } = found.evaluate();
         enclosed & !sparse
@@ -142,33 +147,34 @@ impl<L: Lanes> SimdTask for EvaluateByBlocks<'_, L> {
 
 /// Returns those `lanes` whose hits are enclosed. Hits close to each other share a traversal of the tree.
 #[inline(always)]
-pub fn enclosed_lanes<L: Lanes>(
+pub fn enclosed_lanes<L: Lanes, const BACKFACES: bool>(
     points: &FlatPoints,
     lanes: u32,
     hits: &PacketCandidates<L::PacketLanes>,
 ) -> u32 {
-    L::dispatch(EvaluatePacket::<L> { points, lanes, hits })
+    L::dispatch(EvaluatePacket::<L, BACKFACES> { points, lanes, hits })
 }
 
-struct EvaluatePacket<'p, L: Lanes> {
+struct EvaluatePacket<'p, L: Lanes, const BACKFACES: bool> {
     points: &'p FlatPoints,
     lanes: u32,
     hits: &'p PacketCandidates<L::PacketLanes>,
 }
 
-impl<L: Lanes> SimdTask for EvaluatePacket<'_, L> {
+impl<L: Lanes, const BACKFACES: bool> SimdTask for EvaluatePacket<'_, L, BACKFACES> {
     type Output = u32;
 
     #[inline(always)]
     fn run(self) -> u32 {
         let Self { points, lanes, hits } = self;
-        let EdgeTestResult { mut enclosed, sparse } = evaluate_in_groups::<L>(points, lanes, hits);
+        let EdgeTestResult { mut enclosed, sparse } =
+            evaluate_in_groups::<L, BACKFACES>(points, lanes, hits);
         if sparse != 0 {
             let hits = PacketCandidates {
                 radius: L::PacketLanes::splat(RETRY_RADIUS_FACTOR) * hits.radius,
                 ..*hits
             };
-            let wider = evaluate_in_groups::<L>(points, sparse, &hits);
+            let wider = evaluate_in_groups::<L, BACKFACES>(points, sparse, &hits);
             enclosed = enclosed & !sparse | wider.enclosed;
         }
         enclosed
@@ -176,7 +182,7 @@ impl<L: Lanes> SimdTask for EvaluatePacket<'_, L> {
 }
 
 #[inline(always)]
-fn evaluate_in_groups<L: Lanes>(
+fn evaluate_in_groups<L: Lanes, const BACKFACES: bool>(
     points: &FlatPoints,
     mut lanes: u32,
     hits: &PacketCandidates<L::PacketLanes>,
@@ -187,14 +193,16 @@ fn evaluate_in_groups<L: Lanes>(
         let group = hits.group_of_first(lanes, MAX_GROUP_SPREAD);
         lanes &= !group;
         if MIN_GROUP_SIZE <= group.count_ones() {
-            let EdgeTestResult { enclosed, sparse } = evaluate_group::<L>(points, group, hits);
+            let EdgeTestResult { enclosed, sparse } =
+                evaluate_group::<L, BACKFACES>(points, group, hits);
             result.enclosed |= group & enclosed;
             result.sparse |= group & sparse;
             continue;
         }
         for lane in set_bits::<PACKET_WIDTH>(group) {
             let (position, hit) = stored.in_lane(lane);
-            let EdgeTestResult { enclosed, sparse } = evaluate_one::<L>(points, position, hit);
+            let EdgeTestResult { enclosed, sparse } =
+                evaluate_one::<L, BACKFACES>(points, position, hit);
             result.enclosed |= enclosed << lane;
             result.sparse |= sparse << lane;
         }
@@ -204,12 +212,12 @@ fn evaluate_in_groups<L: Lanes>(
 
 /// Adds the points of a block, given by a mask, to the statistics of the hits in `lanes`.
 #[inline(always)]
-fn add_block<L: Lanes>(
+fn add_block<L: Lanes, const BACKFACES: bool>(
     block: &PointBlock,
     points: u32,
     position: &Vec3Lanes<L::PacketLanes>,
     lanes: <L::PacketLanes as Floats>::Mask,
-    found: &mut NeighborhoodStats<L::PacketLanes>,
+    found: &mut NeighborhoodStats<L::PacketLanes, BACKFACES>,
 ) {
     let corner = Vec3Lanes::splat(block.corner()).minus(*position);
     let (offsets, normals) = (block.offsets::<L>().store(), block.normals::<L>().store());
@@ -223,13 +231,13 @@ fn add_block<L: Lanes>(
 }
 
 #[inline(always)]
-fn evaluate_group<L: Lanes>(
+fn evaluate_group<L: Lanes, const BACKFACES: bool>(
     points: &FlatPoints,
     group: u32,
     hits: &PacketCandidates<L::PacketLanes>,
 ) -> EdgeTestResult {
     let region = hits.region(group, NEIGHBORHOOD_RADIUS_FACTOR);
-    let mut found = GroupVisitor::<L> {
+    let mut found = GroupVisitor::<L, BACKFACES> {
         position: hits.position,
         region,
         stats: NeighborhoodStats::new(hits.candidates()),
@@ -360,20 +368,20 @@ impl StoredCandidates {
 }
 
 /// Adds points to the statistics of up to sixteen hits, one point at a time.
-struct GroupVisitor<L: Lanes> {
+struct GroupVisitor<L: Lanes, const BACKFACES: bool> {
     position: Vec3Lanes<L::PacketLanes>,
     region: Aabb,
-    stats: NeighborhoodStats<L::PacketLanes>,
+    stats: NeighborhoodStats<L::PacketLanes, BACKFACES>,
 }
 
-impl<L: Lanes> BoxVisitor for GroupVisitor<L> {
+impl<L: Lanes, const BACKFACES: bool> BoxVisitor for GroupVisitor<L, BACKFACES> {
     #[inline(always)]
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
         let block = &points.blocks[block_idx as usize];
         let inside = block.lanes_within::<L>(&self.region);
         if inside != 0 {
             let all = L::PacketLanes::splat(0.0).le(L::PacketLanes::splat(0.0));
-            add_block::<L>(block, inside, &self.position, all, &mut self.stats);
+            add_block::<L, _>(block, inside, &self.position, all, &mut self.stats);
         }
     }
 }

@@ -10,7 +10,9 @@ use crate::surface::{
     NeighborhoodStats, SUPPORT_FACTOR, SphereSums,
 };
 use crate::trace::query::any::HitFilter;
-use crate::trace::query::edge_test::{PacketCandidates, enclosed_lanes, is_enclosed, lane_mask};
+use crate::trace::query::edge_test::{
+    PacketCandidates, enclosed_lanes, evaluate_one, is_enclosed, lane_mask,
+};
 use crate::trace::query::hit::{Hit, NearestHits};
 use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::traversal::region::{BoxVisitor, query_box};
@@ -24,6 +26,9 @@ const TOLERANCE: f32 = 0.01;
 const MAX_LAST_STEP: f32 = 0.2;
 /// Maximum distance along the ray between the disc that was hit and the surface, in radii.
 const MAX_DISTANCE_FROM_DISC: f32 = 1.0;
+/// Factor on the radius of the neighbourhood that decides about a hit which the points around do not enclose: between
+/// unevenly placed points a wider one closes the gap, beyond the edge of the surface none does.
+const WIDER: f32 = 1.3;
 /// Maximum distance of hits that share a traversal of the tree from the first one along any axis, in radii.
 const MAX_GROUP_SPREAD: f32 = 2.0;
 
@@ -191,8 +196,9 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
     let PacketCandidates { direction, radius, .. } = *candidates;
     let position = rays.origin().plus(direction.scaled(hits.distances));
     let mask = lane_mask::<L::PacketLanes>(lanes);
-    let mut neighborhood =
-        NeighborhoodStats::new(CandidateHitLanes::new(hits.normals, direction, radius));
+    // A fitted sphere has no rim that sticks out beyond a bend and shows its back.
+    let candidates = CandidateHitLanes::new(hits.normals, direction, radius);
+    let mut neighborhood = NeighborhoodStats::<_, false>::new(candidates);
     let reach = L::PacketLanes::splat(FIT_REACH) * radius;
     let max_squared = reach * reach;
     let mut colors = ColorSums::default();
@@ -227,10 +233,11 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
     if cloud.edge_test != EdgeTest::Off {
         let EdgeTestResult { enclosed, sparse } = neighborhood.evaluate();
         accepted &= enclosed & !sparse;
-        let sparse = lanes & sparse;
-        if sparse != 0 {
+        let open = lanes & !accepted;
+        if open != 0 {
+            let radius = L::PacketLanes::splat(WIDER) * radius;
             let hits = PacketCandidates { position, normal: hits.normals, direction, radius };
-            accepted |= enclosed_lanes::<L>(&cloud.points, sparse, &hits);
+            accepted |= enclosed_lanes::<L, false>(&cloud.points, open, &hits);
         }
     }
     hits.lanes |= accepted;
@@ -400,8 +407,16 @@ impl<L: Lanes> SimdTask for TestSurface<'_, L> {
         ray.t_min <= distance
             && distance <= ray.t_max
             && (cloud.edge_test == EdgeTest::Off
-                || is_enclosed::<L>(points, ray.at(distance), candidate))
+                || is_within_edge::<L>(points, ray.at(distance), candidate))
     }
+}
+
+/// True if the points around a hit enclose it, or those of a wider neighbourhood.
+#[inline(always)]
+fn is_within_edge<L: Lanes>(points: &FlatPoints, position: Vec3, hit: CandidateHit) -> bool {
+    let EdgeTestResult { enclosed, sparse } = evaluate_one::<L, false>(points, position, hit);
+    let wider = CandidateHit { radius: WIDER * hit.radius, ..hit };
+    enclosed & !sparse != 0 || is_enclosed::<L, false>(points, position, wider)
 }
 
 /// Sums up the points around one position.

@@ -128,7 +128,7 @@ impl<'s> SplatTracer<'s> {
         for (open, hits) in open.chunks(PACKET_WIDTH).zip(open_hits.chunks(PACKET_WIDTH)) {
             let lanes = (1 << open.len()) - 1;
             let candidates = PacketCandidates::new(hits);
-            let enclosed = enclosed_lanes::<L>(&blender.cloud.points, lanes, &candidates);
+            let enclosed = enclosed_lanes::<L, true>(&blender.cloud.points, lanes, &candidates);
             for (lane, splat_idx) in open.iter().enumerate() {
                 splats[*splat_idx as usize].is_enclosed = enclosed >> lane & 1 == 1;
             }
