@@ -1,7 +1,7 @@
 //! `surfel animate`: a movie of an animated scene, frame by frame, or of a turn around anything.
 
 use crate::global::{Global, start_threads};
-use crate::options::AnimateScope;
+use crate::options::{EVERYWHERE, Scope};
 use crate::render::{report_threads, with_info};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
@@ -28,7 +28,13 @@ pub struct Args {
     #[arg(long, help_heading = "Output", hide_short_help = true)]
     dry_run: bool,
     #[command(flatten)]
-    scene: SceneArgs<AnimateScope>,
+    scene: SceneArgs<Args>,
+}
+
+impl Scope for Args {
+    fn has(heading: &str, path: &str) -> bool {
+        heading != EVERYWHERE && !["output", "time"].contains(&path)
+    }
 }
 
 const EXAMPLES: &str = "\
@@ -40,7 +46,7 @@ Examples:
 
 /// Renders a movie.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    let mut description = args.scene.description(&global.run)?;
+    let mut description = args.scene.description(global)?;
     if args.output.is_some() {
         description.output.output.clone_from(&args.output);
     }

@@ -3,10 +3,9 @@
 use crate::animate::animate_description;
 use crate::gallery;
 use crate::global::Global;
-use crate::options::words;
 use crate::render::render_to_file;
 use crate::report::{Report, print};
-use crate::shell::quoted;
+use crate::shell::{command_line, quoted};
 use anyhow::Context;
 use serde_json::json;
 use std::fs;
@@ -69,7 +68,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     description.output.output = Some(picture_path.clone());
     render_to_file(&description, &picture_path, None, report)?;
     description.run = RunSettings::default();
-    let command = command_line("render", &cloud_path, &description);
+    let command = render_command("render", &cloud_path, description);
     print_summary(&cloud_path, &command, n_points, start)?;
     if args.gallery {
         make_gallery(folder, &run, report)?;
@@ -106,7 +105,7 @@ fn make_gallery(folder: &Path, run: &RunSettings, report: &Report) -> anyhow::Re
         }
         let output = folder.join(output);
         typed.output.output = Some(output.clone());
-        lines.push(command_line(command, &scene, &typed));
+        lines.push(render_command(command, &scene, typed.clone()));
         let mut description = SceneDescription::read(&scene)?;
         description.overlay(typed);
         description.run = run.clone();
@@ -120,13 +119,12 @@ fn make_gallery(folder: &Path, run: &RunSettings, report: &Report) -> anyhow::Re
 }
 
 /// Writes the command that renders a file with these settings.
-fn command_line(command: &str, file: &Path, description: &SceneDescription) -> String {
-    let output = description.output.output.as_deref().unwrap_or(Path::new("-"));
-    let options = description.non_default().into_iter().filter(|(path, _)| path != "output");
-    let mut all = vec!["surfel".to_owned(), command.to_owned(), file.display().to_string()];
-    all.extend(["-o".to_owned(), output.display().to_string()]);
-    all.extend(words(&options.collect::<Vec<_>>()));
-    all.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
+fn render_command(command: &str, file: &Path, mut description: SceneDescription) -> String {
+    let output = description.output.output.take().unwrap_or("-".into());
+    let mut words = vec!["surfel".to_owned(), command.to_owned(), file.display().to_string()];
+    words.extend(["-o".to_owned(), output.display().to_string()]);
+    words.extend(description.to_options());
+    command_line(&words)
 }
 
 fn print_summary(

@@ -1,6 +1,6 @@
 //! Options of all commands: messages, threads, memory, device.
 
-use crate::options::{KeyOptions, RunScope};
+use crate::options::{EVERYWHERE, KeyOptions, Scope};
 use crate::report::Verbosity;
 use crate::usage::Usage;
 use anyhow::Context;
@@ -9,7 +9,7 @@ use surfel::description::{Backend, RunSettings};
 
 /// Options of all commands.
 #[derive(Args, Clone, Debug)]
-#[command(next_help_heading = "Everywhere")]
+#[command(next_help_heading = EVERYWHERE)]
 pub struct Global {
     /// Shows nothing but errors.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
@@ -19,7 +19,13 @@ pub struct Global {
     verbose: bool,
     /// Options of threads, memory and device.
     #[command(flatten)]
-    pub run: KeyOptions<RunScope>,
+    pub run: KeyOptions<Self>,
+}
+
+impl Scope for Global {
+    fn has(heading: &str, _: &str) -> bool {
+        heading == EVERYWHERE
+    }
 }
 
 impl Global {
@@ -34,7 +40,7 @@ impl Global {
 
     /// Starts the threads that the options ask for; returns the settings.
     pub fn start(&self) -> anyhow::Result<RunSettings> {
-        let settings = self.run.description()?.run;
+        let settings = self.run.description.clone()?.run;
         start_threads(&settings)?;
         Ok(settings)
     }

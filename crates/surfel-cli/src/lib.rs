@@ -10,8 +10,8 @@ mod shell;
 mod stats;
 pub mod options;
 mod inputs;
-mod scene_args;
 mod global;
+mod scene_args;
 mod output;
 mod render;
 mod animate;
@@ -63,7 +63,7 @@ enum Command {
     /// Shows what a file holds.
     Info(info::Args),
     /// Cleans a cloud, adds normals and radii, and writes it to a file.
-    Prepare(prepare::Args),
+    Prepare(Box<prepare::Args>),
     /// Scans a ruin with a virtual scanner and renders it: something to begin with.
     Demo(demo::Args),
     /// Measures how many rays per second are traced.
@@ -100,7 +100,7 @@ pub fn main() -> ExitCode {
 pub fn scene_provider(words: Vec<OsString>) -> anyhow::Result<Arc<dyn SceneProvider>> {
     let cli = parse(words)?;
     let Command::View(args) = &cli.command else { anyhow::bail!("expected `surfel view`") };
-    let description = args.scene.description(&cli.global.run)?;
+    let description = args.scene.description(&cli.global)?;
     Ok(view::open_scene_provider(
         description,
         args.scene.files.clone(),

@@ -2,7 +2,7 @@
 
 use crate::global::Global;
 use crate::inputs::expand;
-use crate::options::{KeyOptions, PrepareScope};
+use crate::options::{KeyOptions, Scope};
 use crate::output::check_output;
 use crate::report::Report;
 use crate::usage::Usage;
@@ -32,7 +32,14 @@ pub struct Args {
     #[arg(long, help_heading = "Preparation")]
     keep_variation: bool,
     #[command(flatten)]
-    options: KeyOptions<PrepareScope>,
+    options: KeyOptions<Args>,
+}
+
+impl Scope for Args {
+    fn has(heading: &str, path: &str) -> bool {
+        let is_of_points = heading == "Preparation";
+        path == "seed" || (is_of_points && !["vertices", "animation_name"].contains(&path))
+    }
 }
 
 const EXAMPLES: &str = "\
@@ -52,7 +59,7 @@ struct Columns {
 /// Prepares a cloud and writes it.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
     let limit = global.start()?.memory_limit;
-    let description = args.options.description()?;
+    let description = args.options.description.clone()?;
     let settings = &description.objects_default;
     check_output(&args.output)?;
     let extension = args.output.extension().unwrap_or_default().to_ascii_lowercase();

@@ -1,7 +1,7 @@
 //! `surfel render`: from files to a picture.
 
 use crate::global::{Global, start_threads};
-use crate::options::RenderScope;
+use crate::options::{EVERYWHERE, Scope};
 use crate::output::{check_output, check_stats};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
@@ -29,7 +29,13 @@ pub struct Args {
     #[arg(long, help_heading = "Output", hide_short_help = true)]
     dry_run: bool,
     #[command(flatten)]
-    scene: SceneArgs<RenderScope>,
+    scene: SceneArgs<Args>,
+}
+
+impl Scope for Args {
+    fn has(heading: &str, path: &str) -> bool {
+        heading != EVERYWHERE && !["output", "frames", "fps", "turntable"].contains(&path)
+    }
 }
 
 const EXAMPLES: &str = "\
@@ -49,7 +55,7 @@ Not the picture you expected? docs/troubleshooting.md lists problems and the opt
 
 /// Renders a picture.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    let mut description = args.scene.description(&global.run)?;
+    let mut description = args.scene.description(global)?;
     if args.output.is_some() {
         description.output.output.clone_from(&args.output);
     }

@@ -132,9 +132,9 @@ fn invalid_option(error: &anyhow::Error) -> Option<String> {
         Some(property) => ("material", format!("{property}: ")),
         None => (path.as_str(), String::new()),
     };
-    let known = SceneDescription::paths();
+    let known = SceneDescription::keys();
     let keys: Vec<&str> = path.split(", ").collect();
-    if !keys.iter().all(|key| known.iter().any(|known| known == key)) {
+    if !keys.iter().all(|key| known.iter().any(|(path, ..)| path == key)) {
         return None;
     }
     let options: Vec<String> = keys.iter().map(|key| format!("--{}", option_name(key))).collect();

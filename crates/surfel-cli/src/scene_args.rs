@@ -1,17 +1,18 @@
 //! The arguments that say what is seen: files, scene files, and the options of their picture.
 
+use crate::global::Global;
 use crate::inputs::expand;
-use crate::options::{KeyOptions, RunScope, Scope};
+use crate::options::{KeyOptions, Scope};
 use clap::Args;
-use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use surfel::SceneDescription;
-use surfel::description::{Invalid, is_scene_file};
+use surfel::description::is_scene_file;
+use surfel_core::scene::Background;
 use surfel_formats::FORMATS;
 
 /// Files and options of a scene.
-#[derive(Args, Clone, Debug)]
-pub struct SceneArgs<S: Scope + Clone + Send + Sync + 'static> {
+#[derive(Args, Debug)]
+pub struct SceneArgs<S: Scope> {
     #[arg(value_name = "FILE", required = true, help = files_help())]
     pub files: Vec<PathBuf>,
     /// Short for --background transparent.
@@ -32,16 +33,16 @@ fn files_help() -> String {
     )
 }
 
-impl<S: Scope + Clone + Send + Sync> SceneArgs<S> {
+impl<S: Scope> SceneArgs<S> {
     /// Returns the description of scene files and options: later scene files lie over earlier ones, the command line
     /// over all of them.
     ///
     /// # Errors
     ///
     /// Fails for files that cannot be read, and for keys and values that are not valid.
-    pub fn description(&self, run: &KeyOptions<RunScope>) -> anyhow::Result<SceneDescription> {
+    pub fn description(&self, global: &Global) -> anyhow::Result<SceneDescription> {
         let mut description = SceneDescription::default();
-        let mut layer = self.options.description()?;
+        let mut layer = self.options.description.clone()?;
         for file in expand(&self.files)? {
             if is_scene_file(&file) {
                 description.overlay(SceneDescription::read(&file)?);
@@ -50,20 +51,14 @@ impl<S: Scope + Clone + Send + Sync> SceneArgs<S> {
             }
         }
         if self.no_background {
-            layer.set("background", &json!("transparent"), Path::new(""))?;
+            layer.picture.background = Some(Background::Transparent);
         }
-        layer.run = run.description()?.run;
+        layer.run = global.run.description.clone()?.run;
         description.overlay(layer);
         // Names may clash between scene files, and keys between a file and the command line.
         let checked = description.check().and_then(|()| description.check_is_not_empty());
-        checked.map_err(|error| self.name_file(error))?;
+        let scene_file = self.files.iter().find(|file| is_scene_file(file));
+        checked.map_err(|error| scene_file.into_iter().fold(error, |e, file| e.in_file(file)))?;
         Ok(description)
-    }
-
-    fn name_file(&self, error: Invalid) -> Invalid {
-        match self.files.iter().find(|file| is_scene_file(file)) {
-            Some(file) => error.in_file(file),
-            None => error,
-        }
     }
 }

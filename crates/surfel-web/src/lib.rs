@@ -5,6 +5,7 @@
 //! the provider. docs/server.md describes the messages between page and server, and the requests for programs.
 
 mod scene_provider;
+mod merge_patch;
 mod limits;
 mod message;
 mod camera;

@@ -110,6 +110,36 @@ impl Limits {
         self.check_size(width, height, self.max_save_pixels)
     }
 
+    /// Checks the numbers of camera rays and light samples a pixel.
+    ///
+    /// # Errors
+    /// Fails with the key of the number that is too large.
+    pub fn check_samples(&self, spp: u32, light_samples: u32) -> Result<()> {
+        let max_samples = self.max_samples;
+        for (key, found) in [("spp", spp), ("light_samples", light_samples)] {
+            if max_samples < found {
+                let text = format!("found {found}, expected at most {max_samples}");
+                return Err(Error::invalid_value(key, text));
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks the size of a saved picture, and the work that it takes with a number of rays a pixel.
+    ///
+    /// # Errors
+    /// Fails for pictures that would fill the memory or take days.
+    pub fn check_save(&self, (width, height): (u32, u32), rays_per_pixel: u64) -> Result<()> {
+        self.check_save_size(width, height)?;
+        let (n_rays, max_rays) =
+            (u64::from(width) * u64::from(height) * rays_per_pixel, self.max_rays);
+        if max_rays < n_rays {
+            let text = format!("{n_rays} rays, expected at most {max_rays}; choose fewer samples");
+            return Err(Error::invalid_value("resolution", text));
+        }
+        Ok(())
+    }
+
     fn check_size(&self, width: u32, height: u32, max_pixels: u64) -> Result<()> {
         let n_pixels = u64::from(width) * u64::from(height);
         let max_side = self.max_side_length;
@@ -174,5 +204,15 @@ mod tests {
         }
         assert!(limits.check_save_size(4096, 4096).is_ok());
         assert!(limits.check_save_size(9000, 9000).is_err());
+        assert!(limits.check_save((4096, 4096), 1024).is_ok());
+        assert!(limits.check_save((4096, 4096), 1025).is_err());
+    }
+
+    #[test]
+    fn too_many_samples_are_named_by_their_key() {
+        let limits = Limits::default();
+        assert!(limits.check_samples(1024, 1024).is_ok());
+        assert_eq!(limits.check_samples(1025, 1).unwrap_err().key(), Some("spp"));
+        assert_eq!(limits.check_samples(1, 1025).unwrap_err().key(), Some("light_samples"));
     }
 }

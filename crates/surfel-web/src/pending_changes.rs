@@ -1,7 +1,7 @@
 //! Settings changes of a page that wait until the scene before them is prepared; they wait merged into one.
 
+use crate::merge_patch::combine_patches;
 use crate::scene_provider::{Error, Result, SettingsMap};
-use serde_json::Value;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tokio::sync::Notify;
 
@@ -28,7 +28,7 @@ impl SettingsChange {
             *self = newer;
             return;
         }
-        merge_patches(&mut self.patch, &newer.patch);
+        combine_patches(&mut self.patch, &newer.patch);
         (self.seq, self.is_moving) = (newer.seq, newer.is_moving);
     }
 }
@@ -101,22 +101,13 @@ impl PendingChanges {
     }
 }
 
-/// Merges a newer patch into `patch`. Patches keep nulls, unlike settings, so that a removal is not lost.
-fn merge_patches(patch: &mut SettingsMap, newer: &SettingsMap) {
-    for (key, value) in newer {
-        match (value, patch.get_mut(key)) {
-            (Value::Object(inner), Some(Value::Object(table))) => merge_patches(table, inner),
-            (value, _) => drop(patch.insert(key.clone(), value.clone())),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    //! The order in which changes that wait are merged, and how many bytes of them may wait.
+
     use super::*;
     use crate::limits::Limits;
-    use crate::scene_provider::apply_merge_patch;
-    use serde_json::json;
+    use serde_json::{Value, json};
 
     fn settings(value: Value) -> SettingsMap {
         value.as_object().unwrap().clone()
@@ -128,16 +119,6 @@ mod tests {
 
     fn no_changes() -> PendingChanges {
         PendingChanges::new(Limits::default().max_pending_bytes)
-    }
-
-    #[test]
-    fn merged_patches_keep_removals() {
-        let mut patch = settings(json!({ "a": 1, "b": { "c": null } }));
-        merge_patches(&mut patch, &settings(json!({ "a": null, "b": { "d": 2 } })));
-        assert_eq!(Value::Object(patch.clone()), json!({ "a": null, "b": { "c": null, "d": 2 } }));
-        let mut patched = settings(json!({ "a": 5, "b": { "c": 6 } }));
-        apply_merge_patch(&mut patched, &patch);
-        assert_eq!(Value::Object(patched), json!({ "b": { "d": 2 } }));
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! The server's HTTP routes: the page, its WebSocket, and pictures and facts for programs.
 
 use crate::access::AccessDenied;
+use crate::merge_patch::apply_merge_patch;
 use crate::page;
-use crate::scene_provider::{Error, SceneProvider, SettingsMap, apply_merge_patch};
+use crate::scene_provider::{Error, SceneProvider, SettingsMap};
 use crate::server_state::ServerState;
 use crate::session;
 use axum::body::{Body, to_bytes};

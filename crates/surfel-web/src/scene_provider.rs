@@ -166,40 +166,11 @@ impl From<surfel_core::Error> for Error {
     }
 }
 
-/// Applies a JSON merge patch (RFC 7396) to settings: null removes a key.
-pub fn apply_merge_patch(settings: &mut SettingsMap, patch: &SettingsMap) {
-    for (key, value) in patch {
-        match (value, settings.get_mut(key)) {
-            (Value::Null, _) => drop(settings.shift_remove(key)),
-            (Value::Object(inner), Some(Value::Object(table))) => apply_merge_patch(table, inner),
-            (Value::Object(inner), _) => {
-                let mut table = SettingsMap::new();
-                apply_merge_patch(&mut table, inner);
-                settings.insert(key.clone(), Value::Object(table));
-            }
-            (value, _) => drop(settings.insert(key.clone(), value.clone())),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use serde_json::json;
+    //! Messages of errors.
 
-    #[test]
-    fn a_patch_changes_adds_and_removes_keys() {
-        let Value::Object(mut settings) = json!({ "a": 1, "b": { "c": 2, "d": 3 } }) else {
-            panic!()
-        };
-        let Value::Object(patch) =
-            json!({ "a": null, "b": { "c": 4, "d": null }, "e": { "f": null } })
-        else {
-            panic!()
-        };
-        apply_merge_patch(&mut settings, &patch);
-        assert_eq!(Value::Object(settings), json!({ "b": { "c": 4 }, "e": {} }));
-    }
+    use super::*;
 
     #[test]
     fn an_error_message_begins_with_the_key_at_fault() {

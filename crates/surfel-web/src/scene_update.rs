@@ -2,10 +2,11 @@
 
 use crate::camera;
 use crate::client::Client;
+use crate::merge_patch::apply_merge_patch;
 use crate::outgoing::{Outgoing, RequestRef, rejection, send_json};
 use crate::pending_changes::{PendingChanges, SettingsChange};
 use crate::progress_reporter::{ProgressReporter, ProgressUpdate};
-use crate::scene_provider::{Error, PreparedScene, SceneProvider, SettingsMap, apply_merge_patch};
+use crate::scene_provider::{Error, PreparedScene, SceneProvider, SettingsMap};
 use crate::server_state::ServerState;
 use serde_json::{Value, json};
 use std::sync::Arc;

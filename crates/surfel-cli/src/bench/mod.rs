@@ -8,7 +8,7 @@ mod search;
 mod table;
 
 use crate::global::Global;
-use crate::options::{BenchScope, KeyOptions};
+use crate::options::{KeyOptions, Scope};
 use crate::report::{Report, print};
 use crate::stats;
 use crate::usage::Usage;
@@ -75,7 +75,19 @@ pub struct Args {
     #[arg(long, value_name = "FILE", conflicts_with_all = CAMERA_OPTIONS)]
     camera_file: Option<PathBuf>,
     #[command(flatten)]
-    options: KeyOptions<BenchScope>,
+    options: KeyOptions<Args>,
+}
+
+impl Scope for Args {
+    fn has(heading: &str, path: &str) -> bool {
+        let is_of_camera =
+            path.starts_with("camera.") && !["camera.name", "camera.lock"].contains(&path);
+        match heading {
+            "Preparation" => path != "animation_name",
+            "Surface" => !path.starts_with("clip"),
+            _ => is_of_camera || path == "up",
+        }
+    }
 }
 
 const EXAMPLES: &str = "\
@@ -91,7 +103,7 @@ const DEFAULT_RAYS: [Rays; 5] =
 /// Measures rates and prints them.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
     let limit = global.start()?.memory_limit;
-    let description = args.options.description()?;
+    let description = args.options.description.clone()?;
     check_surface(args, &description)?;
     let file = args.camera_file.as_deref().map(CameraFile::read).transpose()?;
     estimate_memory(args, &description)?.check(limit)?;

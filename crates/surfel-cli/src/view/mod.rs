@@ -3,14 +3,16 @@
 mod browser;
 mod legend;
 mod point;
+mod rejection;
 mod page_settings;
 mod scene_provider;
 
 use crate::global::{Global, start_threads};
-use crate::options::ViewScope;
+use crate::options::{EVERYWHERE, Scope};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
 use anyhow::anyhow;
+use rejection::rejection;
 use scene_provider::FileSceneProvider;
 use std::io::ErrorKind;
 use std::net::IpAddr;
@@ -45,7 +47,13 @@ pub struct Args {
     open: bool,
     /// Files and options of the scene.
     #[command(flatten)]
-    pub scene: SceneArgs<ViewScope>,
+    pub scene: SceneArgs<Args>,
+}
+
+impl Scope for Args {
+    fn has(heading: &str, _: &str) -> bool {
+        ![EVERYWHERE, "Output"].contains(&heading)
+    }
 }
 
 const EXAMPLES: &str = "\
@@ -58,7 +66,7 @@ Examples:
 
 /// Serves the viewer until it is interrupted.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    let description = args.scene.description(&global.run)?;
+    let description = args.scene.description(global)?;
     start_threads(&description.run)?;
     check_files(&description)?;
     let server = Server::bind(args.host, args.port).map_err(|error| match error {
@@ -76,7 +84,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let report_for_loading = report.for_thread();
     let open = move |progress: &dyn Progress| {
         let report = report_for_loading.with_listener(progress);
-        open_scene_provider(description, typed, &report).map_err(page_settings::rejection)
+        open_scene_provider(description, typed, &report).map_err(rejection)
     };
     let renderer = Arc::new(CpuRenderer { simd: Simd::detect() });
     server.run(renderer, report.cancellation(), open).map_err(|error| match error {

@@ -3,8 +3,10 @@
 use super::legend::legend_json;
 use super::page_settings::{self, EVERYTHING};
 use super::point::describe;
+use super::rejection::rejection;
 use crate::render::with_info;
 use crate::report::Report;
+use crate::shell::command_line;
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -24,7 +26,8 @@ use surfel_core::scene::color::choose_source;
 use surfel_core::scene::{Material, inlier_bounds};
 use surfel_core::surface::SurfaceKind;
 use surfel_web::{
-    Export, Limits, PickedPoint, PointDescriber, PreparedScene, Result, SceneProvider, SettingsMap,
+    Error, Export, Limits, PickedPoint, PointDescriber, PreparedScene, Result, SceneProvider,
+    SettingsMap,
 };
 
 /// The scenes of one set of files.
@@ -52,22 +55,23 @@ impl FileSceneProvider {
         let scene = LiveScene::open(&startup, report)?;
         let auto = AutoSettings::choose(scene.loaded(), &startup, report)?;
         let moves_camera = auto.moves_camera(scene.loaded());
-        let startup_settings = page_settings::startup_settings(&startup);
+        let mut startup_settings = page_settings::shown(startup.clone());
+        startup_settings.shift_remove("time");
         let (scene, up) = (Arc::new(scene), auto.up);
         Ok(Self { startup, startup_settings, typed, scene, up, moves_camera })
     }
 
     fn read(&self, settings: &SettingsMap) -> Result<SceneDescription> {
-        page_settings::read(&self.startup, &self.startup_settings, settings)
+        page_settings::read(&self.startup, settings)
     }
 
     fn view(&self, description: &SceneDescription, progress: &dyn Progress) -> Result<LiveView> {
-        self.scene.view(description, progress).map_err(page_settings::rejection)
+        self.scene.view(description, progress).map_err(rejection)
     }
 
     fn complete_settings(
         &self,
-        complete: &SceneDescription,
+        complete: SceneDescription,
         requested: &SceneDescription,
     ) -> SettingsMap {
         let mut settings = page_settings::complete_settings(complete, requested);
@@ -182,7 +186,7 @@ impl SceneProvider for FileSceneProvider {
             let loaded = self.scene.loaded();
             let auto = AutoSettings::choose(loaded, &description, &NoProgress).ok()?;
             let complete = auto.complete_description(loaded);
-            let mut initial = self.complete_settings(&complete, &description);
+            let mut initial = self.complete_settings(complete, &description);
             // Chosen once there is something to see.
             initial.shift_remove("exposure");
             let exposure = self.startup_settings.get("exposure").cloned();
@@ -220,32 +224,41 @@ impl SceneProvider for FileSceneProvider {
         let view = self.view(&description, progress)?;
         let camera = || Value::Object(write_table(&CameraSettings::of(&view.flat.camera)));
         Ok(PreparedScene {
-            settings: self.complete_settings(&view.description, &description),
             animated_camera: view.moves_camera.then(camera),
             render_settings: view.settings,
             legend: legend_json(&view.trees.legend),
             describe: self.describer(&view, description.output.time()),
+            settings: self.complete_settings(view.description, &description),
             flat: view.flat,
         })
     }
 
     fn render_png(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<Vec<u8>> {
         let description = self.read(settings)?;
-        page_settings::check_work(&description)?;
+        let picture = &description.picture;
+        let rays_per_pixel = u64::from(picture.spp()) + u64::from(picture.light_samples());
+        Limits::default().check_save(picture.resolution(), rays_per_pixel)?;
         let view = self.view(&description, progress)?;
-        let image = self.scene.render(&view, progress).map_err(page_settings::rejection)?;
+        let image = self.scene.render(&view, progress).map_err(rejection)?;
         let options = image_options(&description, view.flat.origin);
-        surfel_formats::encode_png(&image, &options)
-            .map_err(|error| page_settings::rejection(error.into()))
+        surfel_formats::encode_png(&image, &options).map_err(rejection)
     }
 
     fn export(&self, settings: &SettingsMap) -> Result<Export> {
         let description = self.read(settings)?;
         let loaded = self.scene.loaded();
         let auto = AutoSettings::choose(loaded, &description, &NoProgress);
-        let complete = auto.map_err(page_settings::rejection)?.complete_description(loaded);
-        let files: Vec<String> = self.typed.iter().map(|file| file.display().to_string()).collect();
-        page_settings::export(&description, &files, &complete, &with_info(&complete, loaded))
+        let complete = auto.map_err(rejection)?.complete_description(loaded);
+        let mut words: Vec<String> = ["surfel", "render"].map(str::to_owned).into();
+        words.extend(self.typed.iter().map(|file| file.display().to_string()));
+        words.extend(description.to_options());
+        words.extend(["-o", "picture.png"].map(str::to_owned));
+        let toml = toml::to_string_pretty(&complete);
+        Ok(Export {
+            command: command_line(&words),
+            toml: toml.map_err(|error| Error::invalid_request(error.to_string()))?,
+            json: format!("{:#}", with_info(&complete, loaded)),
+        })
     }
 
     fn read_scene_file(&self, name: &str, text: &str) -> Result<SettingsMap> {

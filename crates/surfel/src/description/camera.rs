@@ -36,9 +36,9 @@ settings! {
     /// The camera; whatever is not set is chosen so that the whole scene is seen.
     pub struct CameraSettings {
         /// Position of the camera [default: so that the whole scene is seen].
-        position: DVec3, Vector, "X,Y,Z";
+        position: DVec3, Vector, "X,Y,Z", common;
         /// Point in the middle of the picture.
-        focal_point: DVec3, Vector, "X,Y,Z";
+        focal_point: DVec3, Vector, "X,Y,Z", common;
         /// Direction that points up in the picture.
         view_up: DVec3, Direction, "X,Y,Z";
         /// Vertical field of view in degrees [default: 35, or that of the file's camera].
@@ -53,7 +53,7 @@ settings! {
         /// Direction in which the camera looks at the whole scene: 0,0,-1 for a map.
         direction: DVec3, Direction, "X,Y,Z";
         /// Rotates the chosen camera about the scene, or a panorama from north, in degrees clockwise from above.
-        azimuth_angle: f64 = 0.0, number(-360.0, 360.0), "DEG";
+        azimuth_angle: f64 = 0.0, number(-360.0, 360.0), "DEG", common;
         /// Height of the chosen camera above the horizon in degrees.
         elevation_angle: f64, number(-90.0, 90.0), "DEG";
         /// Moves the chosen camera nearer (above 1) or farther away.
@@ -72,7 +72,7 @@ settings! {
     /// Directions of the world.
     pub struct WorldSettings {
         /// Axis that points up: +Z, -Y or x,y,z [default: found from the data].
-        up: Vec3, Axis, "AXIS";
+        up: Vec3, Axis, "AXIS", common;
     }
 }
 
@@ -85,6 +85,7 @@ impl Rule<OrthographicHeight> for OrthographicRule {
     fn read(&self, value: &Value, folder: &Path) -> Result<OrthographicHeight, Invalid> {
         match value {
             Value::Bool(true) => Ok(OrthographicHeight::Fit),
+            Value::String(text) if text == "true" => Ok(OrthographicHeight::Fit),
             value => Ok(OrthographicHeight::Fixed(HEIGHT.read(value, folder)?)),
         }
     }

@@ -15,6 +15,8 @@ pub struct Key {
     pub value_name: &'static str,
     /// The value that counts if none is set; `None` if it is chosen from the data.
     pub default: Option<Value>,
+    /// True for the keys that are used most; short help texts list no others.
+    pub is_common: bool,
 }
 
 /// A struct of optional settings whose fields are keys of a scene file.
@@ -34,18 +36,28 @@ pub trait KeyedSettings {
 
     /// Makes a key automatic again.
     fn unset(&mut self, name: &str);
+
+    /// Sets each key that is not set to its default, if it has one.
+    fn fill_defaults(&mut self) {
+        for Key { name, default, .. } in self.keys() {
+            if let (None, Some(default)) = (self.get(name), default) {
+                // A default is valid by its own rule.
+                let _ = self.set(name, &default, Path::new(""));
+            }
+        }
+    }
 }
 
 /// Declares a struct of settings.
 ///
-/// Each field reads `/// doc`, `name: Type [= default], rule, "VALUE_NAME";`. The struct holds an `Option` for each
-/// field; a field with a default also gets a method of its name that returns the value or the default. Fields after
-/// `with` are plain and are no keys.
+/// Each field reads `/// doc`, `name: Type [= default], rule, "VALUE_NAME"[, common];`. The struct holds an `Option` for
+/// each field; a field with a default also gets a method of its name that returns the value or the default. Fields
+/// after `with` are plain and are no keys.
 macro_rules! settings {
     (
         $(#[$meta:meta])*
         pub struct $name:ident {
-            $( $(#[doc = $doc:literal])+ $field:ident : $type:ty $(= $default:expr)?, $rule:expr, $value_name:literal; )*
+            $( $(#[doc = $doc:literal])+ $field:ident : $type:ty $(= $default:expr)?, $rule:expr, $value_name:literal $(, $common:ident)?; )*
         }
         $( with { $( $(#[$plain_meta:meta])* $plain:ident : $plain_type:ty, )* } )?
     ) => {
@@ -72,6 +84,7 @@ macro_rules! settings {
                     doc: concat!($($doc, "\n"),+).trim_ascii(),
                     value_name: $value_name,
                     default: settings!(@default $rule, $type $(, $default)?),
+                    is_common: settings!(@is_common $($common)?),
                 } ),* ]
             }
 
@@ -116,6 +129,8 @@ macro_rules! settings {
             self.$field.clone().unwrap_or($default)
         }
     };
+    (@is_common) => { false };
+    (@is_common common) => { true };
     (@default $rule:expr, $type:ty) => { None };
     (@default $rule:expr, $type:ty, $default:expr) => {
         Some($crate::description::rule::Rule::<$type>::write(&$rule, &$default))

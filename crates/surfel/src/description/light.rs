@@ -31,7 +31,7 @@ settings! {
     pub struct LightSettings {
         /// Lights: sun, sky, headlight, several separated by commas, or none, which shows the colours as they are
         /// [default: sun,sky, or none but the environment map where there is one].
-        light: Vec<LightKind>, SeveralOf(OneOf(LIGHT_KINDS)), "KINDS";
+        light: Vec<LightKind>, SeveralOf(OneOf(LIGHT_KINDS)), "KINDS", common;
         /// Environment map that lights the scene: .hdr or .exr, equirectangular.
         environment: PathBuf, FilePath, "FILE";
         /// Rotates the environment map, in degrees clockwise from above; its middle is north.
@@ -47,7 +47,7 @@ settings! {
     /// The sun.
     pub struct SunSettings {
         /// Direction of the sun in degrees clockwise from north [default: behind the camera, to the left].
-        azimuth: f64, number(-360.0, 360.0), "DEG";
+        azimuth: f64, number(-360.0, 360.0), "DEG", common;
         /// Height of the sun above the horizon in degrees.
         elevation: f64 = 40.0, number(-90.0, 90.0), "DEG";
         /// Angular diameter of the sun in degrees; 0 gives hard shadows.

@@ -106,6 +106,22 @@ impl MaterialDescription {
     }
 }
 
+settings! {
+    /// Materials for everything, or for files and objects by their names.
+    pub struct MaterialSettings {
+        /// Material: matte, metal, mirror, glass, plastic, emissive or unlit, for everything or for one file or object,
+        /// as in statue.ply=glass. Properties may follow: glass:ior=1.33,color=#88ccff. May be given several times.
+        material: Vec<MaterialChoice>, MaterialChoices, "[FILE=]NAME", common;
+    }
+}
+
+impl MaterialSettings {
+    /// Returns the choices in their order; the last one that fits counts.
+    pub fn choices(&self) -> &[MaterialChoice] {
+        self.material.as_deref().unwrap_or_default()
+    }
+}
+
 /// A name, text with properties, or a table.
 pub(super) struct MaterialRule;
 
@@ -155,7 +171,7 @@ impl MaterialChoice {
 }
 
 /// Text, a table, or a list of both.
-pub(super) struct MaterialChoices;
+struct MaterialChoices;
 
 impl Rule<Vec<MaterialChoice>> for MaterialChoices {
     fn read(&self, value: &Value, folder: &Path) -> Result<Vec<MaterialChoice>, Invalid> {

@@ -16,6 +16,7 @@ mod material;
 mod nearest;
 mod object;
 mod object_settings;
+mod option;
 pub mod pattern;
 mod picture;
 pub mod rule;
@@ -27,14 +28,13 @@ pub use invalid::Invalid;
 pub use keys::{Key, KeyedSettings};
 pub use lamp::{LampDescription, LampShape};
 pub use light::{LIGHT_KINDS, LightKind, LightSettings, SkySettings, SunSettings};
-pub use material::{MaterialChoice, MaterialDescription};
+pub use material::{MaterialChoice, MaterialDescription, MaterialSettings};
 pub use nearest::nearest;
 pub use object::{ObjectDescription, Placement, Rotation};
 pub use object_settings::{ColorSettings, ObjectSettings, PreparationSettings, SurfaceSettings};
+pub use option::{option_name, value_text};
 pub use picture::{Backend, Exposure, OutputSettings, PictureSettings, RunSettings};
 
-use material::MaterialChoices;
-use rule::Rule;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
@@ -50,8 +50,6 @@ pub struct SceneDescription {
     pub lamps: Vec<LampDescription>,
     /// Movements of objects, lamps and the camera.
     pub animations: Vec<AnimationDescription>,
-    /// Materials for everything, or for files and objects by their names. The last one that fits counts.
-    pub materials: Vec<MaterialChoice>,
     /// File of the picture or movie, and the time that it shows.
     pub output: OutputSettings,
     /// Size, quality and background of the picture.
@@ -70,6 +68,8 @@ pub struct SceneDescription {
     pub objects_default: ObjectSettings,
     /// Threads, memory and device.
     pub run: RunSettings,
+    /// Materials for everything, or for files and objects by their names.
+    pub materials: MaterialSettings,
 }
 
 /// A part of a description: a heading for help texts, the table that its keys stand in, and the settings.
@@ -95,19 +95,26 @@ pub const TABLES: [&str; 3] = ["object", "lamp", "animation"];
 /// The table of `--dry-run` that describes the data and changes nothing.
 const INFO: &str = "info";
 
-/// Returns the name of the option for the path of a key: `camera-view-angle` for `camera.view_angle`.
-pub fn option_name(path: &str) -> String {
-    path.replace(['.', '_'], "-")
-}
-
 impl SceneDescription {
     /// Describes a scene of these files.
     pub fn of_files(files: impl IntoIterator<Item = impl Into<PathBuf>>) -> Self {
         Self { files: files.into_iter().map(Into::into).collect(), ..Self::default() }
     }
 
+    /// Returns this description about the files, objects, lamps and animations of another.
+    #[must_use]
+    pub fn with_content_of(self, other: &Self) -> Self {
+        Self {
+            files: other.files.clone(),
+            objects: other.objects.clone(),
+            lamps: other.lamps.clone(),
+            animations: other.animations.clone(),
+            ..self
+        }
+    }
+
     /// Returns the parts with their keys.
-    pub fn parts(&self) -> [Part<&dyn KeyedSettings>; 11] {
+    pub fn parts(&self) -> [Part<&dyn KeyedSettings>; 12] {
         let [surface, preparation, color] = self.objects_default.parts();
         let part = |heading, prefix, settings| Part { heading, prefix, settings };
         [
@@ -122,10 +129,11 @@ impl SceneDescription {
             color,
             preparation,
             part("Everywhere", "", &self.run),
+            part("Materials", "", &self.materials),
         ]
     }
 
-    fn parts_mut(&mut self) -> [(&'static str, &mut dyn KeyedSettings); 11] {
+    fn parts_mut(&mut self) -> [(&'static str, &mut dyn KeyedSettings); 12] {
         let ObjectSettings { surface, preparation, color } = &mut self.objects_default;
         [
             ("", &mut self.output),
@@ -139,17 +147,19 @@ impl SceneDescription {
             ("", color),
             ("", preparation),
             ("", &mut self.run),
+            ("", &mut self.materials),
         ]
     }
 
-    /// Returns the paths of all keys outside of objects, lamps and animations.
-    pub fn paths() -> Vec<String> {
+    /// Returns all keys outside of objects, lamps and animations, with their paths and the headings of their parts.
+    pub fn keys() -> Vec<(String, &'static str, Key)> {
         let description = Self::default();
         let parts = description.parts().into_iter();
-        let paths = parts.flat_map(|Part { prefix, settings, .. }| {
-            settings.keys().into_iter().map(move |key| format!("{prefix}{}", key.name))
+        let keys = parts.flat_map(|Part { prefix, heading, settings }| {
+            let keys = settings.keys().into_iter();
+            keys.map(move |key| (format!("{prefix}{}", key.name), heading, key))
         });
-        paths.chain(["material".to_owned()]).collect()
+        keys.collect()
     }
 
     /// Sets the value of a key, named by its path or its option, from a value as a scene file has it.
@@ -161,14 +171,6 @@ impl SceneDescription {
     /// Fails for an unknown key and a value that is not valid.
     pub fn set(&mut self, path: &str, value: &Value, folder: &Path) -> Result<(), Invalid> {
         let option = option_name(path);
-        if option == "material" {
-            let read = |value| MaterialChoices.read(value, folder);
-            self.materials = match value {
-                Value::Null => Vec::new(),
-                value => read(value).map_err(|error| error.within("material"))?,
-            };
-            return Ok(());
-        }
         for (prefix, settings) in self.parts_mut() {
             let Some(key) = settings
                 .keys()
@@ -178,25 +180,19 @@ impl SceneDescription {
                 continue;
             };
             let path = format!("{prefix}{}", key.name);
-            // False where a length could stand says that there is none.
-            let is_unset =
-                value.is_null() || (*value == Value::Bool(false) && path == "camera.orthographic");
-            if is_unset {
+            if value.is_null() || is_none(&path, value) {
                 settings.unset(key.name);
                 return Ok(());
             }
             settings.set(key.name, value, folder).map_err(|error| error.within(&path))?;
             return Ok(());
         }
-        let paths = Self::paths();
-        Err(unknown_key(path, paths.iter().map(String::as_str).chain(TABLES)))
+        let keys = Self::keys();
+        Err(unknown_key(path, keys.iter().map(|(path, ..)| path.as_str()).chain(TABLES)))
     }
 
     /// Returns the value of a key by its path, or `None` if it is not set.
     pub fn get(&self, path: &str) -> Option<Value> {
-        if path == "material" {
-            return (!self.materials.is_empty()).then(|| MaterialChoices.write(&self.materials));
-        }
         self.parts().iter().find_map(|part| part.settings.get(path.strip_prefix(part.prefix)?))
     }
 
@@ -256,9 +252,7 @@ impl SceneDescription {
         self.sky.overlay(&over.sky);
         self.objects_default = over.objects_default.over(&self.objects_default);
         self.run.overlay(&over.run);
-        if !over.materials.is_empty() {
-            self.materials = over.materials;
-        }
+        self.materials.overlay(&over.materials);
         self.files.extend(over.files);
         self.objects.extend(over.objects);
         self.lamps.extend(over.lamps);
@@ -351,9 +345,6 @@ impl SceneDescription {
     /// Writes the keys that are set, with objects, lamps and animations, as a scene file has them.
     pub fn to_table(&self) -> Map<String, Value> {
         let mut table = write_parts(&self.parts());
-        if let Some(materials) = self.get("material") {
-            table.insert("material".into(), materials);
-        }
         let objects: Vec<Value> = self.objects.iter().map(ObjectDescription::write).collect();
         let lamps: Vec<Value> = self.lamps.iter().map(LampDescription::write).collect();
         let animations: Vec<Value> =
@@ -376,7 +367,6 @@ impl SceneDescription {
                 values.extend(value.map(|value| (format!("{prefix}{}", key.name), value)));
             }
         }
-        values.extend(self.get("material").map(|value| ("material".to_owned(), value)));
         values
     }
 }
@@ -391,6 +381,15 @@ impl<'de> Deserialize<'de> for SceneDescription {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let table = Map::deserialize(deserializer)?;
         Self::from_table(&table, Path::new("")).map_err(serde::de::Error::custom)
+    }
+}
+
+/// Returns true for values that say that there is none: false where a length could stand, and no materials.
+fn is_none(path: &str, value: &Value) -> bool {
+    match path {
+        "camera.orthographic" => *value == Value::Bool(false) || value.as_str() == Some("false"),
+        "material" => value.as_array().is_some_and(Vec::is_empty),
+        _ => false,
     }
 }
 

@@ -23,7 +23,7 @@ settings! {
     /// The shape that is given to points, and the part of an object that is shown.
     pub struct SurfaceSettings {
         /// Surface of the points: smooth, points, sphere, disc, splat-mean, splat or splat-fit.
-        surface: SurfaceKind = SurfaceKind::default(), parsed(|kind: &SurfaceKind| kind.name().to_owned()), "KIND";
+        surface: SurfaceKind = SurfaceKind::default(), parsed(|kind: &SurfaceKind| kind.name().to_owned()), "KIND", common;
         /// Edge of the surface: at the outermost points (angular-gap) or at the rims of their discs (off).
         edge_test: EdgeTest = EdgeTest::default(), parsed(|test: &EdgeTest| test.name().to_owned()), "TEST";
         /// Multiplies the radii of all points, those of the file and those estimated.
@@ -51,7 +51,7 @@ settings! {
         orient: Orientation = Orientation::default(), parsed(orientation_text), "RULE";
         /// Radius of each point's surface: a length, adaptive[:K] or median[:N] [default: that of the file, or
         /// adaptive:12].
-        radius: Radius, RadiusRule, "RADIUS";
+        radius: Radius, RadiusRule, "RADIUS", common;
         /// Shape of each point by its neighbours: auto tells surfaces, lines (wires, poles) and scattered points
         /// (leaves) apart; surface and scatter take all points for one.
         structure: StructureChoice = StructureChoice::default(), parsed(StructureChoice::to_string), "CHOICE";
@@ -69,7 +69,7 @@ settings! {
     pub struct ColorSettings {
         /// Colour: rgb, intensity, elevation, class, normal, the name of a column, #RRGGBB or a CSS colour name
         /// [default: chosen from the data].
-        color: ColorSource, ColorSourceRule, "SOURCE";
+        color: ColorSource, ColorSourceRule, "SOURCE", common;
         /// Colour map by its matplotlib name: viridis, turbo, gray, coolwarm_r ...
         /// [default: gray for intensity, viridis for everything else].
         cmap: Colormap, ColormapRule, "NAME";

@@ -15,16 +15,16 @@ settings! {
     /// Size, quality and background of a picture.
     pub struct PictureSettings {
         /// Width and height in pixels.
-        resolution: (u32, u32) = (1920, 1080), Resolution, "WxH";
+        resolution: (u32, u32) = (1920, 1080), Resolution, "WxH", common;
         /// Camera rays per pixel.
-        spp: u32 = 4, count(1, 65_536), "N";
+        spp: u32 = 4, count(1, 65_536), "N", common;
         /// Rays per pixel toward the sky or environment, and toward each light with soft shadows.
         light_samples: u32 = 16, count(1, 65_536), "N";
         /// Maximum number of reflections and refractions of a ray.
         max_depth: u32 = 8, count(0, 64), "N";
         /// Background: a colour, two colours (top, bottom), gradient, transparent, or environment (the sky or
         /// environment map that lights the scene).
-        background: Background = default_background(), BackgroundRule, "COLOR";
+        background: Background = default_background(), BackgroundRule, "COLOR", common;
         /// Seed of the random numbers; another seed gives other noise.
         seed: u64 = 0, count(0, u64::MAX), "N";
         /// Bits per channel of a PNG.

@@ -100,7 +100,7 @@ pub fn material_of_file<'d>(
     description: &'d SceneDescription,
     file: &Path,
 ) -> Option<&'d MaterialChoice> {
-    let mut choices = description.materials.iter().rev();
+    let mut choices = description.materials.choices().iter().rev();
     choices.find(|choice| choice.names(file)).or_else(|| material_of_everything(description))
 }
 
@@ -110,7 +110,8 @@ pub fn material_of_object<'d>(
     object: &'d ObjectDescription,
 ) -> Option<&'d MaterialDescription> {
     let names = object.names();
-    let by_name = |name| description.materials.iter().rev().find(|choice| choice.names(name));
+    let by_name =
+        |name| description.materials.choices().iter().rev().find(|choice| choice.names(name));
     let named = names.iter().find_map(|name| by_name(name.as_path()));
     let chosen =
         named.or_else(|| material_of_everything(description).filter(|_| object.material.is_none()));
@@ -118,5 +119,5 @@ pub fn material_of_object<'d>(
 }
 
 fn material_of_everything(description: &SceneDescription) -> Option<&MaterialChoice> {
-    description.materials.iter().rev().find(|choice| choice.target.is_none())
+    description.materials.choices().iter().rev().find(|choice| choice.target.is_none())
 }

@@ -274,7 +274,8 @@ impl LoadedScene {
         for file in &description.files {
             let (graph, info) = import(file, &description.objects_default, &options, progress)?;
             self.file_infos.push(info.clone());
-            let has_material = description.materials.iter().any(|choice| choice.names(file));
+            let has_material =
+                description.materials.choices().iter().any(|choice| choice.names(file));
             match into_cloud(graph) {
                 Ok(cloud) if has_material => {
                     separate.push((vec![Loaded { cloud, info }], vec![file.clone()]));
@@ -563,7 +564,7 @@ fn keep_largest_frame(infos: &mut BTreeMap<&Path, FileInfo>, object: &ObjectDesc
 fn check_materials(description: &SceneDescription) -> Result<(), Invalid> {
     let names = description.objects.iter().flat_map(ObjectDescription::names);
     let known: Vec<PathBuf> = description.files.iter().cloned().chain(names).collect();
-    for choice in &description.materials {
+    for choice in description.materials.choices() {
         let Some(target) = &choice.target else { continue };
         if !known.iter().any(|file| choice.names(file)) {
             let known: Vec<String> = known.iter().map(|file| file.display().to_string()).collect();

@@ -12,7 +12,7 @@ mod unlit;
 mod appearance;
 mod sequence;
 mod loaded;
-mod complete;
+mod complete_description;
 
 pub(crate) use appearance::finish_graph;
 pub use camera::{SceneCamera, choose_camera, choose_up, short_position, up_convention};
@@ -29,14 +29,14 @@ use crate::choices::{Choice, ChoiceLog};
 use crate::description::{CameraSettings, OrthographicHeight, SceneDescription};
 use crate::error::Result;
 use camera::SceneExtent;
+use complete_description::complete_description;
 use interior::{choose_room, hidden_walls};
 use spread::report_gaps;
-use sun_and_sky::{LightingContext, choose_lights, sun_azimuth_deg};
+use sun_and_sky::{LightingContext, choose_lights, lights};
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
 use surfel_core::render::Settings;
 use surfel_core::scene::{Camera, ClipPlane, Light, Projection, Scene, inlier_bounds};
-use surfel_core::surface::SurfaceKind;
 
 /// A scene that is ready for its trees: everything is read, chosen and prepared, at second 0.
 #[derive(Debug)]
@@ -83,10 +83,9 @@ pub struct AutoSettings {
     pub camera: SceneCamera,
     /// Lights of the whole scene.
     pub lights: Vec<Light>,
-    /// Direction of the sun in degrees clockwise from north.
-    pub sun_azimuth_deg: f64,
     /// Planes beyond which the walls and the ceiling of a room are hidden.
     pub hidden_walls: Vec<ClipPlane>,
+    /// The description, with the chosen lights written into it.
     description: SceneDescription,
 }
 
@@ -113,20 +112,14 @@ impl AutoSettings {
         let hidden_walls = hidden_walls(room.as_ref(), &camera.camera, progress);
         let is_inside = room.is_some_and(|room| room.contains(camera.camera.position));
         let context = LightingContext { camera: camera.camera, up, diagonal, is_inside };
-        // Points as pixels are shaded by their depth alone.
-        let is_shaded = description.objects_default.surface.surface() != SurfaceKind::Points;
-        let lights = match is_shaded {
-            true => choose_lights(description, scene.environment.as_ref(), &context, progress)?,
-            false => Vec::new(),
-        };
-        let sun_azimuth_deg = sun_azimuth_deg(description, &context);
-        let description = description.clone();
-        Ok(Self { up, camera, lights, sun_azimuth_deg, hidden_walls, description })
+        let description = choose_lights(description, &context, progress);
+        let lights = lights(&description, scene.environment.as_ref(), up)?;
+        Ok(Self { up, camera, lights, hidden_walls, description })
     }
 
     /// Returns the description with everything that was chosen written into it.
     pub fn complete_description(&self, scene: &LoadedScene) -> SceneDescription {
-        complete::complete_description(scene, self, &self.description)
+        complete_description(scene, self, &self.description)
     }
 
     /// Returns true if the scene moves the camera.

@@ -1,11 +1,12 @@
 //! Lights from settings: a sun behind the camera, a sky, and their colours.
 
-use crate::description::{LightKind, SceneDescription};
+use crate::description::{KeyedSettings, LightKind, SceneDescription, SkySettings, SunSettings};
 use crate::error::Result;
 use surfel_core::flat::{FlatPunctualLight, FlatScene};
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Camera, Environment, Light, Sky, Sun};
+use surfel_core::surface::SurfaceKind;
 
 /// Warm sun and bluish sky, which on level ground under the usual sun add up to white. The sky gives a third of the
 /// light, more than outdoors: with a quarter, shadows of dark scans were black.
@@ -36,30 +37,64 @@ pub struct LightingContext {
     pub is_inside: bool,
 }
 
-/// Returns the lights of the whole scene.
+/// Returns the description with everything written into it that it leaves open about the lights of the whole scene.
+/// Settings of lights that the scene does not have are dropped.
 pub fn choose_lights(
     description: &SceneDescription,
-    environment: Option<&Environment>,
     context: &LightingContext,
     progress: &dyn Progress,
+) -> SceneDescription {
+    let is_lit = is_lit(description);
+    let mut chosen = description.clone();
+    let SceneDescription { light, sun, sky, .. } = &mut chosen;
+    if is_lit && context.is_inside && light.light.is_none() && light.environment.is_none() {
+        progress.choice("headlight: the camera stands in a closed room", &["light"]);
+        light.light = Some(vec![LightKind::Headlight]);
+    }
+    light.light = Some(light.kinds()).filter(|kinds| !kinds.is_empty());
+    if is_lit && light.has(LightKind::Sun) {
+        choose_sun(sun, context, progress);
+    } else {
+        *sun = SunSettings::default();
+    }
+    if is_lit && light.has(LightKind::Sky) {
+        choose_sky(sky, context, progress);
+    } else {
+        *sky = SkySettings::default();
+    }
+    let has_environment = is_lit && light.environment.is_some();
+    light.environment_rotation = has_environment.then(|| light.environment_rotation());
+    light.environment_strength = has_environment.then(|| light.environment_strength());
+    chosen
+}
+
+/// Points as pixels are shaded by their depth alone.
+fn is_lit(description: &SceneDescription) -> bool {
+    description.objects_default.surface.surface() != SurfaceKind::Points
+}
+
+/// Returns the lights of the whole scene by a description whose lights are chosen.
+pub fn lights(
+    chosen: &SceneDescription,
+    environment: Option<&Environment>,
+    up: Vec3,
 ) -> Result<Vec<Light>> {
-    let settings = &description.light;
+    let settings = &chosen.light;
     let mut lights = Vec::new();
+    if !is_lit(chosen) {
+        return Ok(lights);
+    }
     if let Some(environment) = environment.filter(|_| settings.environment.is_some()) {
         let rotation_deg = settings.environment_rotation() as f32;
-        let mut environment = environment.with_orientation(context.up, rotation_deg)?;
+        let mut environment = environment.with_orientation(up, rotation_deg)?;
         environment.scale(settings.environment_strength() as f32);
         lights.push(Light::Environment(environment));
     }
-    if context.is_inside && settings.light.is_none() && settings.environment.is_none() {
-        progress.choice("headlight: the camera stands in a closed room", &["light"]);
-        return Ok(vec![Light::Headlight(HEADLIGHT)]);
-    }
     if settings.has(LightKind::Sun) {
-        lights.push(Light::Sun(sun(description, context, progress)));
+        lights.push(Light::Sun(sun(&chosen.sun, up)));
     }
     if settings.has(LightKind::Sky) {
-        lights.push(Light::Sky(sky(description, context, progress)));
+        lights.push(Light::Sky(sky(&chosen.sky, up)));
     }
     if settings.has(LightKind::Headlight) {
         lights.push(Light::Headlight(HEADLIGHT));
@@ -93,39 +128,42 @@ pub fn expose_lamps(lamps: &mut [FlatPunctualLight], stops: f32) {
     lamps.iter_mut().for_each(|lamp| lamp.color *= stops.exp2());
 }
 
-/// Returns the direction of the sun in degrees clockwise from north.
-pub fn sun_azimuth_deg(description: &SceneDescription, context: &LightingContext) -> f64 {
-    description.sun.azimuth.unwrap_or_else(|| automatic_azimuth_deg(context))
-}
-
-fn sun(description: &SceneDescription, context: &LightingContext, progress: &dyn Progress) -> Sun {
-    let settings = &description.sun;
-    let azimuth_deg = sun_azimuth_deg(description, context);
-    let elevation_deg = settings.elevation();
+fn choose_sun(settings: &mut SunSettings, context: &LightingContext, progress: &dyn Progress) {
+    settings.fill_defaults();
     if settings.azimuth.is_none() {
+        let (azimuth_deg, elevation_deg) = (automatic_azimuth_deg(context), settings.elevation());
         let line = format!(
             "sun from {azimuth_deg:.0} degrees (0 = north, 90 = east), {elevation_deg:.0} high"
         );
         progress.choice(&line, &["sun.azimuth", "sun.elevation"]);
+        settings.azimuth = Some(azimuth_deg);
     }
+}
+
+fn choose_sky(settings: &mut SkySettings, context: &LightingContext, progress: &dyn Progress) {
+    settings.fill_defaults();
+    if settings.ao_distance.is_none() {
+        let distance = (AO_FRACTION * context.diagonal).max(f32::MIN_POSITIVE);
+        let line = format!("things up to {distance:.3} away darken the sky");
+        progress.choice(&line, &["sky.ao_distance"]);
+        settings.ao_distance = Some(distance.into());
+    }
+}
+
+fn sun(settings: &SunSettings, up: Vec3) -> Sun {
+    let azimuth_deg = settings.azimuth.unwrap_or_default() as f32;
     Sun {
-        direction: Sun::direction_from_angles(azimuth_deg as f32, elevation_deg as f32, context.up),
+        direction: Sun::direction_from_angles(azimuth_deg, settings.elevation() as f32, up),
         color: settings.strength() as f32 * SUN_COLOR,
         angular_diameter_deg: settings.angle() as f32,
     }
 }
 
-fn sky(description: &SceneDescription, context: &LightingContext, progress: &dyn Progress) -> Sky {
-    let settings = &description.sky;
-    let ao_distance = settings.ao_distance.map(|distance| distance as f32).unwrap_or_else(|| {
-        let distance = (AO_FRACTION * context.diagonal).max(f32::MIN_POSITIVE);
-        let line = format!("things up to {distance:.3} away darken the sky");
-        progress.choice(&line, &["sky.ao_distance"]);
-        distance
-    });
+fn sky(settings: &SkySettings, up: Vec3) -> Sky {
     let strength = settings.strength() as f32;
     let (zenith, ground) = (strength * SKY_COLOR, strength * GROUND_COLOR);
-    Sky { up: context.up, zenith, ground, ao_distance }
+    let ao_distance = settings.ao_distance.unwrap_or(f64::INFINITY) as f32;
+    Sky { up, zenith, ground, ao_distance }
 }
 
 /// Behind the camera and to its left; from the upper left of a map, as cartographers shade hills.

@@ -1,0 +1,15 @@
+//! Errors as a page shows them: beside the control of the setting that they are about.
+
+use surfel_web::Error;
+
+/// Returns an error as a page shows it, with the key of the control that it belongs to.
+pub fn rejection(error: impl Into<surfel::Error>) -> Error {
+    match error.into() {
+        error if error.is_cancelled() => Error::Cancelled,
+        surfel::Error::Invalid(error) => {
+            let text = error.reason();
+            Error::InvalidRequest { key: Some(error.path).filter(|path| !path.is_empty()), text }
+        }
+        error => Error::invalid_request(error.to_string().replace('\n', " ")),
+    }
+}

@@ -1,0 +1,40 @@
+//! Options of the program: the name of a key's option, and a description as words of a command line.
+
+use super::SceneDescription;
+use serde_json::Value;
+
+/// Returns the name of the option for the path of a key: `camera-view-angle` for `camera.view_angle`.
+pub fn option_name(path: &str) -> String {
+    path.replace(['.', '_'], "-")
+}
+
+/// Writes a value as it is typed.
+pub fn value_text(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Array(values) => values.iter().map(value_text).collect::<Vec<_>>().join(","),
+        Value::Number(number) => number
+            .as_f64()
+            .filter(|x| x.fract() == 0.0 && x.abs() < 1e15)
+            .map_or_else(|| number.to_string(), |x| format!("{x:.0}")),
+        other => other.to_string(),
+    }
+}
+
+impl SceneDescription {
+    /// Writes the keys that differ from their defaults as words of a command line, without files and objects.
+    pub fn to_options(&self) -> Vec<String> {
+        let options = self.non_default().into_iter().flat_map(|(path, value)| {
+            let option = option_name(&path);
+            match value {
+                Value::Bool(true) => vec![format!("--{option}")],
+                Value::Array(choices) if path == "material" => choices
+                    .iter()
+                    .map(|value| format!("--{option}={}", value_text(value)))
+                    .collect(),
+                value => vec![format!("--{option}={}", value_text(&value))],
+            }
+        });
+        options.collect()
+    }
+}

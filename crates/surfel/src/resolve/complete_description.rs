@@ -1,0 +1,59 @@
+//! The complete description of a picture: nothing is left to be chosen from the data.
+
+use super::appearance::{material_of_file, material_of_object};
+use super::loaded::LoadedScene;
+use super::{AutoSettings, description_camera};
+use crate::description::{KeyedSettings, MaterialSettings, ObjectDescription, SceneDescription};
+use surfel_core::scene::color::{ColorSource, choose_source};
+
+/// Returns the description with everything that was chosen written into it. It makes the same picture, byte for byte.
+/// The lights of `description` are chosen already.
+pub fn complete_description(
+    scene: &LoadedScene,
+    auto: &AutoSettings,
+    description: &SceneDescription,
+) -> SceneDescription {
+    let mut complete = description.clone();
+    complete.picture.fill_defaults();
+    complete.objects_default.surface.surface.get_or_insert_default();
+    complete.objects_default.surface.edge_test.get_or_insert_default();
+    complete.light.exposure.get_or_insert_default();
+    complete.world.up = Some(auto.up);
+    complete.camera = description_camera(scene, auto, description);
+    let color = &mut complete.objects_default.color.color;
+    *color = color.take().or_else(|| common_color(scene, description));
+    let of_files = file_objects(scene, description);
+    let of_scene = description.objects.iter().map(|object| ObjectDescription {
+        material: material_of_object(description, object).cloned(),
+        ..object.clone()
+    });
+    complete.objects = of_files.chain(of_scene).collect();
+    complete.files.clear();
+    complete.materials = MaterialSettings::default();
+    complete
+}
+
+/// The colour of all clouds that leave it open, if it is the same.
+fn common_color(scene: &LoadedScene, description: &SceneDescription) -> Option<ColorSource> {
+    let open =
+        scene.clouds().filter(|(i, _)| scene.settings_of(*i, description).color.color.is_none());
+    let mut chosen = open.map(|(_, cloud)| choose_source(cloud).0);
+    let first = chosen.next()?;
+    chosen.all(|other| other == first).then_some(first)
+}
+
+/// The files without an object, as objects.
+fn file_objects(
+    scene: &LoadedScene,
+    description: &SceneDescription,
+) -> impl Iterator<Item = ObjectDescription> {
+    scene.file_groups().map(|files| {
+        let material = files.last().and_then(|file| material_of_file(description, file));
+        ObjectDescription {
+            files: files.iter().map(|file| file.to_path_buf()).collect(),
+            merge: (1 < files.len()).then_some(true),
+            material: material.map(|choice| choice.material.clone()),
+            ..ObjectDescription::default()
+        }
+    })
+}
