@@ -15,6 +15,8 @@ pub(crate) fn format_vector(v: DVec3) -> String {
 
 #[cfg(test)]
 mod tests {
+    //! Very large and very small numbers as text.
+
     use super::*;
 
     #[test]

@@ -192,6 +192,8 @@ fn probe(input: &Input) -> Option<&'static Format> {
 
 #[cfg(test)]
 mod tests {
+    //! Formats are found by first bytes and by extension, and messages list every extension.
+
     use super::*;
 
     fn detected(name: &str, bytes: &[u8]) -> Result<&'static str> {

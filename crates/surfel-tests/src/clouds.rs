@@ -99,6 +99,8 @@ fn with_normals(positions: Vec<Vec3>, normals: Vec<Vec3>) -> PointCloud {
 
 #[cfg(test)]
 mod tests {
+    //! Positions and normals of the clouds that tests use.
+
     use super::*;
 
     fn normals(cloud: &PointCloud) -> &[Vec3] {

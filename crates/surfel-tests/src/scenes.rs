@@ -252,6 +252,8 @@ pub fn render(scene: &Scene, settings: &Settings) -> Image {
 
 #[cfg(test)]
 mod tests {
+    //! Closed meshes have no open edge, and their triangles face outward.
+
     use super::*;
 
     /// Panics unless each edge is part of two triangles in opposite directions, and the volume is as expected.

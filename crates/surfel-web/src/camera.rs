@@ -74,6 +74,8 @@ fn projection(keys: &CameraKeys) -> Result<Projection> {
 
 #[cfg(test)]
 mod tests {
+    //! Cameras from settings: every projection, and invalid values.
+
     use super::*;
     use serde_json::json;
 

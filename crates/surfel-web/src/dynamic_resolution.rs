@@ -61,6 +61,8 @@ impl ResolutionController {
 
 #[cfg(test)]
 mod tests {
+    //! Sizes of drafts for a given cost of a pixel.
+
     use super::*;
 
     #[test]

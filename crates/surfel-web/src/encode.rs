@@ -79,6 +79,8 @@ fn bytes<const N: usize>(pixels: Pixels, encode: impl Fn([f32; 4]) -> [u8; N] + 
 
 #[cfg(test)]
 mod tests {
+    //! Pixels that are encoded as PNG and JPEG and decoded again.
+
     use super::*;
 
     fn pixels(sum: &[[f32; 4]]) -> Pixels<'_> {

@@ -183,6 +183,8 @@ impl RateLimiter {
 
 #[cfg(test)]
 mod tests {
+    //! Limits on the rate of messages, on the sizes of pictures and on samples.
+
     use super::*;
 
     #[test]

@@ -58,6 +58,8 @@ impl Incoming {
 
 #[cfg(test)]
 mod tests {
+    //! Valid and invalid messages of a page.
+
     use super::*;
 
     #[test]

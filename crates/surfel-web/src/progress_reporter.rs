@@ -94,6 +94,8 @@ impl Stage {
 
 #[cfg(test)]
 mod tests {
+    //! The content of progress updates, and the interval between them.
+
     use super::*;
 
     #[test]

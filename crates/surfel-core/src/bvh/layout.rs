@@ -97,6 +97,8 @@ fn layout_branch(
 
 #[cfg(test)]
 mod tests {
+    //! Trees with more blocks than 32-bit indices can count.
+
     use super::*;
 
     #[test]

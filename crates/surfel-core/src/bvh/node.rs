@@ -224,6 +224,9 @@ fn step_exponent(min: f32, max: f32) -> u8 {
 
 #[cfg(test)]
 mod tests {
+    //! Boxes that a node stores as bytes contain those that they were made from; the order of
+    //! children; the size of a node.
+
     use super::*;
     use crate::math::{LaneMask, PortableLanes, Random};
 

@@ -111,6 +111,8 @@ fn pair_slices<'p>(
 
 #[cfg(test)]
 mod tests {
+    //! A partition moves every primitive to its side and loses none.
+
     use super::*;
     use crate::math::{Aabb, Random, Vec3};
 

@@ -219,6 +219,8 @@ fn pack_normal(normal: Vec3) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    //! Positions, radii and normals that a block stores in few bits, decoded in lanes and one by one.
+
     use super::*;
     use crate::math::{PortableLanes, Random};
 

@@ -136,6 +136,8 @@ pub(super) fn build_tlas(instances: &[Instance]) -> Result<Bvh> {
 
 #[cfg(test)]
 mod tests {
+    //! Bounds of instances far from the origin.
+
     use super::*;
 
     #[test]

@@ -98,6 +98,8 @@ fn create_temp(path: &Path) -> Result<(PathBuf, File)> {
 
 #[cfg(test)]
 mod tests {
+    //! A write that fails keeps the old file and leaves no temporary one.
+
     use super::*;
 
     #[test]

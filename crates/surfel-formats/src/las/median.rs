@@ -42,6 +42,8 @@ impl StreamingMedian5 {
 
 #[cfg(test)]
 mod tests {
+    //! The streaming median: its five values stay sorted, and its estimate converges.
+
     use super::*;
 
     #[test]

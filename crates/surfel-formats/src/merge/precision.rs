@@ -58,6 +58,8 @@ fn step_about(origin: DVec3, lower: DVec3, upper: DVec3) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
+    //! The resolution that positions lose when clouds far from each other are merged.
+
     use super::*;
 
     fn cloud(origin: f64) -> PointCloud {

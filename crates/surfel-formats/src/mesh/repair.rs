@@ -78,6 +78,8 @@ pub(crate) fn repair_normals(mesh: &mut Mesh) -> usize {
 
 #[cfg(test)]
 mod tests {
+    //! Triangles that a repair drops, and normals that it replaces.
+
     use super::*;
     use surfel_core::math::Vec4;
     use surfel_core::scene::Morph;

@@ -71,6 +71,8 @@ fn unsupported(name: &str, found: String) -> Error {
 
 #[cfg(test)]
 mod tests {
+    //! Pictures of every pixel format as RGBA with 8 bits a channel, and errors of broken ones.
+
     use super::*;
 
     fn encoded(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {

@@ -40,6 +40,8 @@ pub(crate) fn weld(keys: &[[u32; 3]]) -> Welded {
 
 #[cfg(test)]
 mod tests {
+    //! Corners with equal keys become one vertex.
+
     use super::*;
 
     #[test]

@@ -103,6 +103,8 @@ pub(crate) fn find_line_end(text: &[u8]) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
+    //! Chunks of a text end with whole lines and together are all of it.
+
     use super::*;
 
     #[test]

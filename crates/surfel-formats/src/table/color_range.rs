@@ -57,6 +57,8 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    //! The range of colours by their largest value, and the numbers that count as bytes.
+
     use super::*;
 
     #[test]

@@ -89,6 +89,8 @@ impl ColumnRole {
 
 #[cfg(test)]
 mod tests {
+    //! Column names that mean coordinates, normals, colours and so on, and several columns of one meaning.
+
     use super::*;
 
     #[test]

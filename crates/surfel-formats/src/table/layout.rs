@@ -276,6 +276,8 @@ fn unit(normal: Vec3) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
+    //! Values of binary fields of all types, bit widths, scales and byte orders.
+
     use super::*;
 
     #[test]

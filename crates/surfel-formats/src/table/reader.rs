@@ -87,6 +87,8 @@ pub(crate) fn choose_origin(sample: &[DVec3], tolerance: DVec3) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
+    //! The origin that is subtracted from coordinates.
+
     use super::*;
 
     #[test]

@@ -1,4 +1,4 @@
-//! Documentation: it begins each file, and none of its lines opens like a fragment.
+//! Documentation: it begins each file and each module of tests, and none of its lines opens like a fragment.
 
 use crate::source::Crate;
 use crate::source::ident;
@@ -26,12 +26,33 @@ pub fn fragments(crates: &[Crate]) -> Vec<String> {
 /// Lists files that do not say in a `//!` line what they hold.
 pub fn files_without_docs(crates: &[Crate]) -> Vec<String> {
     let files = crates.iter().flat_map(|source| &source.files);
-    let bare = files.filter(|file| {
-        let starts_with_doc = matches!(&file.tokens[..], [hash, bang, TokenTree::Group(group), ..]
-            if is_punct(hash, '#') && is_punct(bang, '!') && doc_text(group).is_some());
-        !starts_with_doc
-    });
+    let bare = files.filter(|file| !starts_with_doc(&file.tokens));
     bare.map(|file| format!("{}:1: the file does not begin with a `//!` line", file.path)).collect()
+}
+
+/// Lists modules `tests` inside files that do not say in a `//!` line what they cover.
+pub fn tests_without_docs(crates: &[Crate]) -> Vec<String> {
+    let mut found = Vec::new();
+    for file in crates.iter().flat_map(|source| &source.files) {
+        for tokens in file.tokens.windows(3) {
+            let [keyword, name, TokenTree::Group(body)] = tokens else { continue };
+            let is_tests =
+                ident(keyword).as_deref() == Some("mod") && ident(name).as_deref() == Some("tests");
+            let body: Vec<TokenTree> = body.stream().into_iter().collect();
+            if is_tests && !starts_with_doc(&body) {
+                let line = line(keyword);
+                let text = "the tests do not begin with a `//!` line that says what they cover";
+                found.push(format!("{}:{line}: {text}", file.path));
+            }
+        }
+    }
+    found
+}
+
+/// Returns true if the first token is a `//!` comment.
+fn starts_with_doc(tokens: &[TokenTree]) -> bool {
+    matches!(tokens, [hash, bang, TokenTree::Group(group), ..]
+        if is_punct(hash, '#') && is_punct(bang, '!') && doc_text(group).is_some())
 }
 
 fn fragment_opening(text: &str) -> Option<&'static str> {
@@ -68,6 +89,8 @@ fn doc_text(group: &proc_macro2::Group) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    //! Violations of each rule for documentation are found in made-up files, and sentences are not reported.
+
     use super::*;
     use crate::source::crate_of;
 
@@ -105,5 +128,20 @@ mod tests {
         assert_eq!(found.len(), 2);
         assert!(found[0].starts_with("crates/demo/tests/b.rs:1"), "{found:?}");
         assert!(found[1].starts_with("crates/demo/tests/c.rs:1"), "{found:?}");
+    }
+
+    #[test]
+    fn tests_without_a_first_doc_line_are_found() {
+        let files = [
+            (
+                "src/a.rs",
+                "//! A.\n#[cfg(test)]\nmod tests {\n    //! Tests of a.\n    use super::*;\n}",
+            ),
+            ("src/b.rs", "//! B.\n#[cfg(test)]\nmod tests {\n    use super::*;\n}"),
+            ("src/c.rs", "//! C.\n#[cfg(test)]\nmod tests;"),
+        ];
+        let found = tests_without_docs(&[crate_of("demo", files)]);
+        assert_eq!(found.len(), 1);
+        assert!(found[0].starts_with("crates/demo/src/b.rs:3"), "{found:?}");
     }
 }

@@ -25,6 +25,11 @@ fn each_file_says_what_it_holds() {
 }
 
 #[test]
+fn tests_say_what_they_cover() {
+    check(docs::tests_without_docs);
+}
+
+#[test]
 fn limits_have_standard_names() {
     check(names::unusual_limits);
 }

@@ -373,6 +373,8 @@ fn add_leaves(tokens: &[TokenTree], prefix: &[String], item: &mut UseItem) {
 
 #[cfg(test)]
 mod tests {
+    //! Upward uses, cycles and imports of several modules are found in made-up crates.
+
     use super::*;
     use crate::source::crate_of;
 

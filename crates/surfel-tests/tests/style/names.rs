@@ -89,6 +89,8 @@ fn public_types(tokens: &[TokenTree]) -> Vec<(String, usize)> {
 
 #[cfg(test)]
 mod tests {
+    //! Unusual names of limits and shared names of types are found in made-up crates.
+
     use super::*;
     use crate::source::crate_of;
 

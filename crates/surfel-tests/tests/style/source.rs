@@ -134,6 +134,8 @@ pub fn line(token: &TokenTree) -> usize {
 
 #[cfg(test)]
 mod tests {
+    //! Module paths of files, and tokens without test code.
+
     use super::*;
 
     #[test]
