@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
 import * as tables from '../page/controls.js';
-import { valueAt } from '../page/patch.js';
+import { valueAt } from '../page/merge-patch.js';
 import {
   closePage, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, serve, settled, state, unfoldPanel, recordPictures,
 } from './harness.mjs';

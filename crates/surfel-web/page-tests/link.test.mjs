@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { encodeHash, decodeHash, viewPatch } from '../page/link.js';
-import { combinePatches, mergePatch, createPatch, patchAt, valueAt } from '../page/patch.js';
+import { combinePatches, mergePatch, createPatch, patchAt, valueAt } from '../page/merge-patch.js';
 
 const initialScene = {
   resolution: '1280x720', color: 'rgb', sun: { azimuth: 230, elevation: 40 }, light: ['sun', 'sky'],

@@ -2,7 +2,7 @@
 
 import { element } from './dom.js';
 import { rounded, ticks } from './format.js';
-import { areEqual } from './patch.js';
+import { areEqual } from './merge-patch.js';
 
 const N_TICKS = 4;
 

@@ -1,6 +1,6 @@
 // Links: the address of a view holds, after `#`, the patch between the initial scene and the view.
 
-import { createPatch } from './patch.js';
+import { createPatch } from './merge-patch.js';
 
 const PREFIX = '#view=';
 /** Keys of the window and the files, which are not part of a view. */

@@ -2,7 +2,7 @@
 
 import { element, icon, iconButton } from './dom.js';
 import { fieldFactories } from './fields.js';
-import { areEqual, patchAt, valueAt } from './patch.js';
+import { areEqual, patchAt, valueAt } from './merge-patch.js';
 import { findControl } from './rejections.js';
 
 /** A section of the panel that folds. */

@@ -1,7 +1,7 @@
 // Sun position by date, hour and latitude, under the sun's controls.
 
 import { element, icon } from './dom.js';
-import { patchAt } from './patch.js';
+import { patchAt } from './merge-patch.js';
 import { sunAtHour } from './sun.js';
 
 export function sunClock(viewer) {

@@ -2,7 +2,7 @@
 
 import { Connection, SAVED_PICTURE, socketAddress } from './connection.js';
 import { viewPatch } from './link.js';
-import { areEqual, combinePatches, createPatch, mergePatch } from './patch.js';
+import { areEqual, combinePatches, createPatch, mergePatch } from './merge-patch.js';
 import { rejectionText } from './rejections.js';
 import { signal } from './signal.js';
 

@@ -1,7 +1,7 @@
 //! Movies: one frame after another, with a turntable if one is asked for.
 
-use crate::built::BuiltScene;
-use crate::choices::CancelOnly;
+use crate::built_scene::BuiltScene;
+use crate::choice_log::CancelOnly;
 use crate::description::{Invalid, SceneDescription};
 use crate::error::{Error, Result};
 use crate::picture::{RenderedImage, image_options};

@@ -1,6 +1,6 @@
 //! Rays in world coordinates against a built scene, after Open3D's `RaycastingScene`.
 
-use crate::built::BuiltScene;
+use crate::built_scene::BuiltScene;
 use surfel_core::flat::FlatGeometry;
 use surfel_core::math::{Aabb, DVec3, Ray, Vec3};
 use surfel_core::trace::{InstanceFilter, SceneHit, scene_hits, scene_occlusions};

@@ -1,7 +1,7 @@
 //! Facts about a picked point, as the page shows them.
 
 use serde_json::{Value, json};
-use surfel::live::SceneTrees;
+use surfel::live_scene::SceneTrees;
 use surfel::resolve::LoadedScene;
 use surfel_core::flat::{FlatGeometry, FlatScene};
 use surfel_core::points::{PointCloud, Values};

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use surfel::SceneDescription;
 use surfel::description::rule::absolute_text;
 use surfel::description::{CameraSettings, ObjectDescription, write_table};
-use surfel::live::{LiveScene, LiveView};
+use surfel::live_scene::{LiveScene, LiveView};
 use surfel::names::{file_name, list_files};
 use surfel::picture::image_options;
 use surfel::resolve::AutoSettings;

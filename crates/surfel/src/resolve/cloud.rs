@@ -1,6 +1,6 @@
 //! A cloud on its way from the file to a surface: read, prepared, coloured.
 
-use crate::choices::NotesAsChoices;
+use crate::choice_log::NotesAsChoices;
 use crate::description::ObjectSettings;
 use crate::error::Result;
 use std::path::Path;

@@ -25,7 +25,7 @@ pub(crate) use sequence::Sequence;
 pub use spread::report_coverage;
 pub(crate) use sun_and_sky::{expose, expose_lamps};
 
-use crate::choices::{Choice, ChoiceLog};
+use crate::choice_log::{Choice, ChoiceLog};
 use crate::description::{CameraSettings, OrthographicHeight, SceneDescription};
 use crate::error::Result;
 use camera::SceneExtent;

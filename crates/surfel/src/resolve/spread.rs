@@ -57,7 +57,7 @@ mod tests {
     //! Gaps and empty pictures are reported, others are not.
 
     use super::*;
-    use crate::choices::ChoiceLog;
+    use crate::choice_log::ChoiceLog;
     use surfel_core::math::Vec3;
     use surfel_core::progress::NoProgress;
 

@@ -1,4 +1,4 @@
-// JSON merge patches (RFC 7386) between scenes.
+// JSON merge patches (RFC 7396) between scenes.
 
 const isObject = (value) => typeof value === 'object' && value !== null && !Array.isArray(value);
 

@@ -1,6 +1,6 @@
 //! A scene with its trees, shown at one time after another: what moves is moved, everything else stays.
 
-use crate::choices::{CancelOnly, Choice};
+use crate::choice_log::{CancelOnly, Choice};
 use crate::description::{Exposure, SceneDescription};
 use crate::error::Result;
 use crate::picture::RenderedImage;

@@ -1,6 +1,6 @@
 //! A scene whose settings change: after a change only what it touches is made again.
 
-use crate::built::{exposure_stops, source_indices};
+use crate::built_scene::{exposure_stops, source_indices};
 use crate::cache::{Lru2, hash_of};
 use crate::description::{Exposure, Interior, Invalid, LightKind, SceneDescription, write_parts};
 use crate::error::{Error, Result};
