@@ -122,9 +122,6 @@ fn command() -> ClapCommand {
     lenient(Cli::command()).mut_subcommands(lenient)
 }
 
-/// Exit code of a cancelled run, as of programs that Ctrl-C ends.
-const CANCELLED: u8 = 130;
-
 fn exit_code(error: &anyhow::Error) -> ExitCode {
     let is_cancelled = error.chain().any(|cause| {
         let by_library =
@@ -132,7 +129,7 @@ fn exit_code(error: &anyhow::Error) -> ExitCode {
         by_library || cause.downcast_ref() == Some(&surfel_core::Error::Cancelled)
     });
     if is_cancelled {
-        return ExitCode::from(CANCELLED);
+        return ExitCode::from(interrupt::exit_code());
     }
     let is_invalid = |cause: &(dyn std::error::Error + 'static)| {
         cause.is::<Usage>()
