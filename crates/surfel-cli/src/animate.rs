@@ -76,6 +76,7 @@ pub fn animate_description(
     complete.output.frames = Some(options.n_frames);
     complete.output.fps = Some(options.fps);
     let (Some(output), false) = (output, is_dry_run) else {
+        loaded.check_surfaces(description, 0.0)?;
         return Ok(print(&format!("{:#}", with_info(&complete, &loaded)))?);
     };
     options.fingerprint = fingerprint(&complete, description, &loaded);

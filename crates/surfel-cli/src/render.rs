@@ -127,6 +127,7 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> surfel::Result<T>) -> surf
 fn print_dry_run(description: &SceneDescription, report: &Report) -> anyhow::Result<()> {
     description.output.output.as_deref().map_or(Ok(()), check_output)?;
     let loaded = LoadedScene::read(description, KeepOptions::default(), report)?;
+    loaded.check_surfaces(description, description.output.time())?;
     let auto = AutoSettings::choose(&loaded, description, report)?;
     let mut complete = auto.complete_description(&loaded);
     complete.output.time = Some(description.output.time());

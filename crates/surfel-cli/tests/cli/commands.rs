@@ -180,3 +180,21 @@ fn demo_scans_and_renders() {
     assert_eq!((width, height), (1280, 720));
     assert!(fs::metadata(folder.0.join("demo/demo.laz")).unwrap().len() > 10_000);
 }
+
+#[test]
+fn a_dry_run_refuses_pixels_beside_a_mesh_as_rendering_does() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let mesh = folder.write("tile.ply", tile(1.0, 0.0, [255; 3]));
+    let picture = folder.path("out.png");
+    let scene = [cloud.as_str(), &mesh, "--surface", "points", "--quiet"];
+    let refusal = fail(&[&["render", "-o", &picture][..], &scene].concat(), 1);
+    assert!(refusal.contains("points for all of the scene"), "{refusal}");
+    for command in [&["render", "--dry-run"][..], &["animate", "--dry-run", "--frames", "2"]] {
+        assert_eq!(fail(&[command, &scene].concat(), 1), refusal);
+        succeed(&[command, &scene, &["--vertices"]].concat());
+    }
+    let object = |file: &str, rest: &str| format!("[[object]]\nfile = {file:?}\n{rest}\n");
+    let text = object(&cloud, "surface = \"points\"") + &object(&mesh, "visible = false");
+    succeed(&["render", "--dry-run", &folder.write("scene.toml", text)]);
+}

@@ -22,3 +22,11 @@ use crate::flat::FlatScene;
 pub fn check(scene: &FlatScene) -> Result<()> {
     raster::uses_rasterizer(scene).map(drop)
 }
+
+/// Checks surfaces before their trees are built; each is true if it is rasterised points.
+///
+/// # Errors
+/// Fails where [`check`] would.
+pub fn check_surfaces(are_raster: impl Iterator<Item = bool>) -> Result<()> {
+    raster::all_or_none(are_raster).map(drop)
+}

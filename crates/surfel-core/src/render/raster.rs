@@ -25,15 +25,23 @@ pub fn uses_rasterizer(scene: &FlatScene) -> Result<bool> {
         FlatGeometry::Cloud(cloud) => cloud.surface == SurfaceKind::Points,
         FlatGeometry::Mesh(_) => false,
     };
-    let n = scene.instances.iter().filter(|instance| is_raster(instance)).count();
-    if n != 0 && n != scene.instances.len() {
+    all_or_none(scene.instances.iter().map(is_raster))
+}
+
+/// Returns true if all surfaces are rasterised points, false if none is.
+///
+/// # Errors
+/// Fails if only some of them are.
+pub fn all_or_none(are_raster: impl Iterator<Item = bool>) -> Result<bool> {
+    let (raster, traced): (Vec<bool>, Vec<bool>) = are_raster.partition(|is_raster| *is_raster);
+    if !raster.is_empty() && !traced.is_empty() {
         return Err(Error::Setting {
             name: "surface",
             found: "points in a scene with traced surfaces".into(),
             expected: "points for all of the scene or for none of it",
         });
     }
-    Ok(n != 0)
+    Ok(!raster.is_empty())
 }
 
 /// The nearest point in a pixel.

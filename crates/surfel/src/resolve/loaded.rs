@@ -18,10 +18,12 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use surfel_core::points::{PointCloud, PreparedCloud, STRUCTURE, SURFACE_VARIATION};
 use surfel_core::progress::Progress;
+use surfel_core::render::check_surfaces;
 use surfel_core::scene::color::ColorSource;
 use surfel_core::scene::{
     Channel, Environment, Geometry, Graph, Interpolation, Keyframes, Node, Track, Transform,
 };
+use surfel_core::surface::SurfaceKind;
 use surfel_formats::{FileInfo, Loaded};
 
 /// The content of the files of a description, before it is prepared.
@@ -180,6 +182,25 @@ impl LoadedScene {
             Geometry::Points(cloud) => Some((i, cloud)),
             Geometry::Triangles(_) => None,
         })
+    }
+
+    /// Checks what the renderer would refuse at a time: points as pixels together with traced surfaces.
+    ///
+    /// # Errors
+    ///
+    /// Fails as rendering does.
+    pub fn check_surfaces(&self, description: &SceneDescription, time_secs: f64) -> Result<()> {
+        let mut graph = self.graph_without_points();
+        graph.evaluate_at(time_secs);
+        let nodes = graph.nodes.iter().zip(graph.visible_nodes());
+        let shown =
+            nodes.filter(|(_, is_visible)| *is_visible).flat_map(|(node, _)| &node.primitives);
+        let is_raster = |geometry: usize| {
+            let surface = self.settings_of(geometry, description).surface.surface();
+            let is_cloud = matches!(graph.geometries[geometry], Geometry::Points(_));
+            is_cloud && surface == SurfaceKind::Points
+        };
+        Ok(check_surfaces(shown.map(|primitive| is_raster(primitive.geometry)))?)
     }
 
     /// Returns the settings of a geometry: those of its object over those of the scene.
