@@ -15,8 +15,8 @@
 //! ```
 //!
 //! A [`SceneDescription`] says what the choices leave open. Its fields are the keys of scene files and the options of the
-//! program `surfel`; `None` is a default or an automatic choice. [`resolve`] opens the files, [`Resolved::build`] builds
-//! the trees:
+//! program `surfel`; `None` is a default or an automatic choice. [`resolve()`] opens the files, [`Resolved::build`]
+//! builds the trees:
 //!
 //! ```
 //! use surfel::description::{MaterialDescription, ObjectDescription};

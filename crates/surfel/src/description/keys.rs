@@ -62,6 +62,7 @@ macro_rules! settings {
         $( with { $( $(#[$plain_meta:meta])* $plain:ident : $plain_type:ty, )* } )?
     ) => {
         $(#[$meta])*
+        #[allow(rustdoc::broken_intra_doc_links, reason = "brackets stand for what may be left out")]
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct $name {
             $( $(#[doc = $doc])+ pub $field: Option<$type>, )*

@@ -2,7 +2,7 @@
 //!
 //! A command line, a scene file, a page's message, a Python keyword and a Rust caller are ways to fill a
 //! [`SceneDescription`]. Each field of its parts is a key of scene files and an option of the program; what is `None`
-//! is a default, or is chosen from the data by [`crate::resolve`].
+//! is a default, or is chosen from the data by [`crate::resolve()`].
 
 mod animation;
 mod camera;
