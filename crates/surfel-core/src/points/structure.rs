@@ -46,6 +46,13 @@ const N_VOTERS: usize = 8;
 const N_ROUNDS: usize = 12;
 /// Share of scattered points around a point, after all rounds, that makes it a scattered one.
 const MIN_SCATTERED: f32 = 0.5;
+/// Ratio of a radius to the typical one from which the neighbourhood is sparse.
+const SPARSE: f32 = 2.0;
+/// Maximum number of rounds in which islands of a surface shrink.
+const N_ISLAND_ROUNDS: usize = 8;
+/// Share of scattered points from which a surface point is looked at again: small islands of a surface among scattered
+/// points, as where branches happen to lie in a plane, are scattered too.
+const MIN_SHARE_NEAR_SCATTER: f32 = 0.02;
 /// Number of planes tried at a point that lies near an edge.
 const N_PLANES: u64 = 24;
 /// Distance from a plane of the points on it, in radii of the neighbourhood.
@@ -199,13 +206,13 @@ pub fn find_structures(
 ) -> Result<(Vec<PointShape>, StructureReport)> {
     let positions = tree.positions();
     progress.begin("structure", positions.len() as u64);
-    let typical_variation = median_variation(fits);
+    let typical = Typical { variation: median_variation(fits), radius: median_radius(radii) };
     let decide = |point: usize| {
         if point.is_multiple_of(4096) {
             progress.check()?;
             progress.advance(4096.min(positions.len() - point) as u64);
         }
-        Ok(decide(tree, point, &fits[point], radii[point], typical_variation))
+        Ok(decide(tree, point, &fits[point], radii[point], &typical))
     };
     let mut shapes: Vec<PointShape> =
         (0..positions.len()).into_par_iter().map(decide).collect::<Result<_>>()?;
@@ -215,7 +222,7 @@ pub fn find_structures(
             shape.structure = Structure::Scatter;
         }
     }
-    let structures = smoothed(tree, &shapes, progress)?;
+    let structures = smoothed(tree, &shapes, SPARSE * typical.radius, progress)?;
     let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
         settle(tree, point, &fits[point], radii[point], *structure, shape);
     };
@@ -277,6 +284,29 @@ fn median_variation(fits: &[PlaneFit]) -> f32 {
     sample.get(sample.len() / 2).copied().unwrap_or(0.0)
 }
 
+fn median_radius(radii: &[f32]) -> f32 {
+    let mut sample: Vec<f32> = radii.iter().step_by(radii.len() / 10_000 + 1).copied().collect();
+    sample.sort_unstable_by(f32::total_cmp);
+    sample.get(sample.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Properties of the point in the middle of a cloud.
+struct Typical {
+    /// Surface variation of its neighbourhood.
+    variation: f32,
+    /// Radius of its neighbourhood.
+    radius: f32,
+}
+
+impl Typical {
+    /// True if a plane fits the neighbourhood of a radius. The variation that noise causes falls with the square of the
+    /// radius: where points are sparse, as between the branches of a crown, a plane has to fit better.
+    fn is_surface(&self, fit: &PlaneFit, radius: f32) -> bool {
+        let sparseness = (radius / (SPARSE * self.radius)).max(1.0);
+        is_surface(fit) && fit.variation * sparseness * sparseness < MAX_SURFACE_VARIATION
+    }
+}
+
 fn is_surface(fit: &PlaneFit) -> bool {
     fit.normal != Vec3::ZERO
         && fit.variation < MAX_SURFACE_VARIATION
@@ -289,7 +319,7 @@ fn decide(
     point: usize,
     fit: &PlaneFit,
     radius: f32,
-    typical_variation: f32,
+    typical: &Typical,
 ) -> PointShape {
     /// Below this variation the mean plane is as good as that of an edge's side.
     const MIN_EDGE_VARIATION: f32 = 0.012;
@@ -297,8 +327,8 @@ fn decide(
     if fit.width <= MIN_SURFACE_WIDTH {
         return shape(Structure::Line, fit.normal);
     }
-    let is_surface = is_surface(fit);
-    if is_surface && fit.variation < MIN_EDGE_VARIATION.max(2.5 * typical_variation) {
+    let is_surface = typical.is_surface(fit, radius);
+    if is_surface && fit.variation < MIN_EDGE_VARIATION.max(2.5 * typical.variation) {
         return shape(Structure::Surface, fit.normal);
     }
     let positions = tree.positions();
@@ -318,7 +348,7 @@ fn decide(
     if wide.width <= MIN_SURFACE_WIDTH {
         return shape(Structure::Line, wide.normal);
     }
-    if self::is_surface(&wide) {
+    if typical.is_surface(&wide, radius) {
         return shape(Structure::Surface, wide.normal);
     }
     shape(Structure::Scatter, normal)
@@ -452,9 +482,12 @@ fn fit_around(positions: &[Vec3], position: Vec3, neighbors: &[Neighbor]) -> Pla
 
 /// Lets the region around a point decide whether it is scattered, so that structures do not flicker: a rough point of a
 /// surface stays on the surface, and a flat spot of a crown becomes leaves.
+///
+/// A scattered point beyond `max_radius` stays one: its disc would be wide.
 fn smoothed(
     tree: &KdTree,
     shapes: &[PointShape],
+    max_radius: f32,
     progress: &dyn Progress,
 ) -> Result<Vec<Structure>> {
     let own = shapes.par_iter().map(|shape| shape.structure);
@@ -480,13 +513,43 @@ fn smoothed(
         };
         shares = shares.par_iter().zip(&voters).map(mixed).collect();
     }
-    let decided = |(own, share): (Structure, &f32)| match own {
+    let decided = |((own, shape), share): ((Structure, &PointShape), &f32)| match own {
         Structure::Line => Structure::Line,
         _ if MIN_SCATTERED <= *share => Structure::Scatter,
-        Structure::Scatter => Structure::Surface,
+        Structure::Scatter if shape.radius <= max_radius => Structure::Surface,
         own => own,
     };
-    Ok(own.zip(&shares).map(decided).collect())
+    let mut structures: Vec<Structure> = own.zip(shapes).zip(&shares).map(decided).collect();
+    for _ in 0..N_ISLAND_ROUNDS {
+        let (next, n_changed) = without_islands(tree, &structures, &shares);
+        structures = next;
+        if n_changed == 0 {
+            break;
+        }
+    }
+    Ok(structures)
+}
+
+/// Scatters the surface points most of whose neighbours are scattered, and returns their number too.
+fn without_islands(
+    tree: &KdTree,
+    structures: &[Structure],
+    shares: &[f32],
+) -> (Vec<Structure>, usize) {
+    let is_island = |(point, (structure, share)): (usize, (&Structure, &f32))| {
+        if *structure != Structure::Surface || *share < MIN_SHARE_NEAR_SCATTER {
+            return false;
+        }
+        let around = tree.nearest(tree.positions()[point], N_MANY_NEIGHBORS, Some(point as u32));
+        let of_neighbor = |neighbor: &Neighbor| structures[neighbor.index as usize];
+        let is_scattered = |neighbor: &&Neighbor| of_neighbor(neighbor) == Structure::Scatter;
+        around.len() <= 2 * around.iter().filter(is_scattered).count()
+    };
+    let is_island: Vec<bool> =
+        structures.par_iter().zip(shares).enumerate().map(is_island).collect();
+    let next = structures.iter().zip(&is_island);
+    let next = next.map(|(own, is_island)| if *is_island { Structure::Scatter } else { *own });
+    (next.collect(), is_island.iter().filter(|is_island| **is_island).count())
 }
 
 /// Gives a point the normal and the radius of its final structure.

@@ -1,8 +1,7 @@
 //! The automatic choice of a source of colours: one that shows the surface, not noise.
 
 use super::source::ColorSource;
-use crate::math::Random;
-use crate::math::Vec3;
+use crate::math::{Aabb, Random, Vec3};
 use crate::points::PointCloud;
 use crate::points::neighbors::nearest_by_brute_force;
 use rayon::prelude::*;
@@ -15,6 +14,9 @@ const DEFAULT_COLOR: [u8; 3] = [0xd6, 0xd2, 0xca];
 pub fn choose_source(cloud: &PointCloud) -> (ColorSource, &'static str) {
     if cloud.colors.as_ref().is_some_and(|colors| are_measured(colors)) {
         return (ColorSource::Rgb, "the colours of the file");
+    }
+    if is_terrain(cloud) {
+        return (ColorSource::Elevation, "no colours in the file; wide, flat and georeferenced");
     }
     match &cloud.intensity {
         Some(values) if shows_surface(&cloud.positions, values) => {
@@ -32,6 +34,19 @@ pub fn choose_source(cloud: &PointCloud) -> (ColorSource, &'static str) {
 fn are_measured(colors: &[[u16; 3]]) -> bool {
     let filler = [[0; 3], [u16::MAX; 3]].into_iter().find(|filler| Some(filler) == colors.first());
     colors.iter().any(|color| Some(*color) != filler)
+}
+
+/// True if the cloud is a georeferenced piece of land, whose forms elevation shows better than intensity does: a good
+/// deal wider than it is high, and with coordinates far from zero.
+fn is_terrain(cloud: &PointCloud) -> bool {
+    /// Coordinates of maps are larger; those of scanners and objects are not.
+    const MIN_MAP_COORDINATE: f64 = 10_000.0;
+    const MIN_WIDTH_PER_HEIGHT: f32 = 2.5;
+    if cloud.origin.abs().max_element() < MIN_MAP_COORDINATE {
+        return false;
+    }
+    let size = Aabb::of_points(cloud.positions.iter().copied()).size();
+    MIN_WIDTH_PER_HEIGHT * size.z <= size.x.min(size.y)
 }
 
 /// Number of patches that are examined.
@@ -84,6 +99,7 @@ mod tests {
     //! The chosen source is one that shows the surface.
 
     use super::*;
+    use crate::math::DVec3;
 
     fn lattice() -> PointCloud {
         let position = |i: usize| Vec3::new((i % 50) as f32, (i / 50) as f32, 0.0);
@@ -109,5 +125,17 @@ mod tests {
         cloud.colors = None;
         assert_eq!(choose_source(&cloud).0, ColorSource::Constant(DEFAULT_COLOR));
         assert_eq!(choose_source(&PointCloud::default()).0, ColorSource::Constant(DEFAULT_COLOR));
+    }
+
+    #[test]
+    fn georeferenced_land_shows_elevation() {
+        let mut cloud = lattice();
+        cloud.intensity = Some((0..2500).map(|i| ((i % 50) / 10 % 2) as f32).collect());
+        cloud.origin = DVec3::new(562_000.0, 4_183_000.0, 150.0);
+        assert_eq!(choose_source(&cloud).0, ColorSource::Elevation);
+        cloud.positions[0].z = 40.0;
+        assert_eq!(choose_source(&cloud).0, ColorSource::Intensity);
+        cloud.colors = Some(vec![[0x8080; 3]; 2500]);
+        assert_eq!(choose_source(&cloud).0, ColorSource::Rgb);
     }
 }
