@@ -52,11 +52,11 @@ impl SurfaceHit {
 
 /// Maximum number of rejected hits of a ray. A ray with more runs along a rim, where each step is tiny, and
 /// is taken to miss.
-const MAX_REJECTED_HITS: usize = 24;
+const MAX_REJECTED_HITS: usize = 48;
 /// Distance behind a rejected hit at which the search restarts, in radii.
 const RESTART_OFFSET: f32 = 0.05;
 /// Distance behind a disc without a smooth surface nearby at which the search restarts, in radii.
-const SMOOTH_RESTART_OFFSET: f32 = 0.3;
+const SMOOTH_RESTART_OFFSET: f32 = 0.002;
 
 /// Finds the closest hit of each ray on the continuous surface.
 pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
