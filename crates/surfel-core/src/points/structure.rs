@@ -40,6 +40,8 @@ const N_THINNED_NEIGHBORS: usize = 12;
 const THINNING: f32 = 2.0;
 /// Minimum number of thinned points; fewer say nothing about structure.
 const MIN_THINNED: usize = 256;
+/// Maximum number of surface points within a disc that was widened to close the gaps between scan lines.
+const MAX_POINTS_OF_DISC: usize = 64;
 /// Number of neighbours that vote on the structure of a point.
 const N_VOTERS: usize = 8;
 /// Number of rounds in which points take over half of their neighbours' mean.
@@ -227,6 +229,7 @@ pub fn find_structures(
         settle(tree, point, &fits[point], radii[point], *structure, shape);
     };
     shapes.par_iter_mut().zip(&structures).enumerate().for_each(finish);
+    limit_wide_discs(positions, radii, &mut shapes, progress)?;
     clamp_solids(&mut shapes, Structure::Line);
     clamp_solids(&mut shapes, Structure::Scatter);
     Ok((shapes, StructureReport::of(&structures)))
@@ -260,6 +263,37 @@ pub fn all_scattered(
 fn ball_radius(distance: f32, radius: f32) -> f32 {
     let reach = BALL_REACH * distance;
     if 0.0 < reach { reach.min(radius) } else { radius }
+}
+
+/// Narrows the widened discs that reach over densely sampled surfaces, where the points at hand describe the surface
+/// better than a wide disc does.
+fn limit_wide_discs(
+    positions: &[Vec3],
+    radii: &[f32],
+    shapes: &mut [PointShape],
+    progress: &dyn Progress,
+) -> Result<()> {
+    let is_surface = |point: &usize| shapes[*point].structure == Structure::Surface;
+    let is_wide = |point: &usize| is_surface(point) && radii[*point] < shapes[*point].radius;
+    let wide: Vec<usize> = (0..shapes.len()).filter(is_wide).collect();
+    if wide.is_empty() {
+        return Ok(());
+    }
+    let surface: Vec<Vec3> =
+        (0..shapes.len()).filter(is_surface).map(|point| positions[point]).collect();
+    let tree = KdTree::new(&surface, progress)?;
+    let limited = |point: &usize| -> Result<f32> {
+        progress.check()?;
+        let neighbors = tree.nearest(positions[*point], MAX_POINTS_OF_DISC, None);
+        let reach = kth_distance(&neighbors, MAX_POINTS_OF_DISC);
+        let is_crowded = neighbors.len() == MAX_POINTS_OF_DISC && reach < shapes[*point].radius;
+        Ok(if is_crowded { reach.max(radii[*point]) } else { shapes[*point].radius })
+    };
+    let limits = wide.par_iter().map(limited).collect::<Result<Vec<_>>>()?;
+    for (point, radius) in wide.into_iter().zip(limits) {
+        shapes[point].radius = radius;
+    }
+    Ok(())
 }
 
 /// Clamps the radii of stray points, which would be as large as the empty space around them.

@@ -19,7 +19,7 @@ use crate::trace::traversal::region::{BoxVisitor, query_box};
 use std::marker::PhantomData;
 
 /// Maximum number of fits along a ray, each at the intersection with the sphere before.
-const MAX_FITS: usize = 4;
+const MAX_FITS: usize = 5;
 /// Distance between a fit's position and its intersection, in radii, at which the intersection is the surface.
 const TOLERANCE: f32 = 0.01;
 /// Maximum distance of the last fit from its intersection, in radii: a ray with a longer one has found no surface.
@@ -148,6 +148,7 @@ fn approach<W: PacketLanes>(
     let start = hits.distances;
     let (mut open, mut found) = (group, 0);
     let mut position = candidates.position;
+    let mut last_step = W::splat(0.0);
     for fit in 1..=MAX_FITS {
         let lanes = lane_mask::<W>(open);
         let mut sums = SphereSums::new(hits.normals, radius);
@@ -162,7 +163,9 @@ fn approach<W: PacketLanes>(
             }
         }
         let sphere = sums.intersect(direction);
-        let distance = hits.distances + sphere.step;
+        let step = damped(sphere.step, last_step);
+        last_step = step;
+        let distance = hits.distances + step;
         let is_near = (distance - start).abs().le(W::splat(MAX_DISTANCE_FROM_DISC) * radius);
         let moved = lanes & sphere.is_hit & is_near;
         hits.distances = W::select(moved, distance, hits.distances);
@@ -252,6 +255,14 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
         let mean = colors.mean(Vec3Lanes::load_packet(&of_nearest));
         hits.colors = Vec3Lanes::select(mask, mean, hits.colors);
     }
+}
+
+/// Returns a step along the ray after another one. Where it would turn back, steps could go to and fro around a bend:
+/// then it ends at the root of the line through both (the secant method).
+#[inline(always)]
+fn damped<F: Floats>(step: F, last_step: F) -> F {
+    let turns_back = (step * last_step).lt(F::splat(0.0));
+    F::select(turns_back, step * last_step / (last_step - step), step)
 }
 
 /// Returns the normals turned against the directions.
@@ -387,10 +398,13 @@ impl<L: Lanes> SimdTask for TestSurface<'_, L> {
         let toward = |normal: Vec3| if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
         let mut normal = toward(points.normal(hit.slot));
         let mut distance = hit.distance;
+        let mut last_step = 0.0;
         for fit in 1..=MAX_FITS {
             let sums = fit_one::<L>(points, ray.at(distance), normal, radius);
             let sphere = sums.intersect(Vec3Lanes::splat(ray.direction));
-            let moved = distance + sphere.step;
+            let step = damped(sphere.step, last_step);
+            last_step = step;
+            let moved = distance + step;
             if !sphere.is_hit || MAX_DISTANCE_FROM_DISC * radius < (moved - hit.distance).abs() {
                 return false;
             }
