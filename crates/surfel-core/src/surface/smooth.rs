@@ -15,6 +15,9 @@ pub(super) const SPAWN_T_MIN: f32 = 0.5;
 /// Steps per unit to which the terms of sums are rounded. f32 adds a thousand terms of up to 1 exactly, so that
 /// sums do not depend on the order of points.
 const STEPS: f32 = 16_384.0;
+/// Minimum weight of all points of a fit. With less, beyond the reach of all points but one or two, rounding showed as
+/// noise.
+const MIN_WEIGHT: f32 = 0.1;
 /// Exponent of the weight of normals at an angle of 90 degrees: 2 / (2/3)^2.
 const NORMAL_FALLOFF: f32 = 4.5;
 /// Maximum curvature of a fitted sphere's equation, in 1 / radius: its radius is at least half a disc's radius.
@@ -143,8 +146,10 @@ impl<F: Floats> SphereSums<F> {
         let normal = gradient.plus(direction.scaled(twice * step));
         let length = normal.dot(normal).sqrt();
         let is_near = step.abs().le(F::splat(MAX_STEP));
-        let is_hit =
-            zero.lt(self.weight) & zero.le(discriminant) & is_near & F::splat(1e-3).lt(length);
+        let is_hit = F::splat(MIN_WEIGHT * STEPS).le(self.weight)
+            & zero.le(discriminant)
+            & is_near
+            & F::splat(1e-3).lt(length);
         SphereHit { step: step / self.per_radius, normal: normal.scaled(one / length), is_hit }
     }
 }
