@@ -50,6 +50,8 @@ const N_ROUNDS: usize = 12;
 const MIN_SCATTERED: f32 = 0.5;
 /// Ratio of a radius to the typical one from which the neighbourhood is sparse.
 const SPARSE: f32 = 2.0;
+/// Minimum share of scattered points in a cloud with much vegetation.
+const MIN_VEGETATION: f32 = 0.2;
 /// Maximum number of rounds in which islands of a surface shrink.
 const N_ISLAND_ROUNDS: usize = 8;
 /// Share of scattered points from which a surface point is looked at again: small islands of a surface among scattered
@@ -224,7 +226,7 @@ pub fn find_structures(
             shape.structure = Structure::Scatter;
         }
     }
-    let structures = smoothed(tree, &shapes, SPARSE * typical.radius, progress)?;
+    let structures = smoothed(tree, &shapes, typical.radius, progress)?;
     let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
         settle(tree, point, &fits[point], radii[point], *structure, shape);
     };
@@ -517,17 +519,20 @@ fn fit_around(positions: &[Vec3], position: Vec3, neighbors: &[Neighbor]) -> Pla
 /// Lets the region around a point decide whether it is scattered, so that structures do not flicker: a rough point of a
 /// surface stays on the surface, and a flat spot of a crown becomes leaves.
 ///
-/// A scattered point beyond `max_radius` stays one: its disc would be wide.
+/// Where much is scattered, as in a forest, a sparse scattered point by a surface stays one, for its disc would be wide.
 fn smoothed(
     tree: &KdTree,
     shapes: &[PointShape],
-    max_radius: f32,
+    typical_radius: f32,
     progress: &dyn Progress,
 ) -> Result<Vec<Structure>> {
     let own = shapes.par_iter().map(|shape| shape.structure);
     if own.clone().all(|structure| structure != Structure::Scatter) {
         return Ok(own.collect());
     }
+    let n_scattered = own.clone().filter(|structure| *structure == Structure::Scatter).count();
+    let is_vegetated = MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32;
+    let max_radius = if is_vegetated { SPARSE * typical_radius } else { f32::INFINITY };
     let voters = |_: usize, neighbors: &[Neighbor]| {
         let mut indices = [u32::MAX; N_VOTERS];
         for (index, neighbor) in indices.iter_mut().zip(neighbors) {
