@@ -1,13 +1,12 @@
 //! Preparation: cleans and subsamples a cloud, and adds the normals and radii that it lacks.
 
+use super::find_structures::{all_scattered, find_structures};
 use super::neighbors::{KdTree, Neighbor, NeighborMethod, Neighborhood, map_neighborhoods};
 use super::normals::{NormalReport, PlaneFit, fill_missing, fit_plane};
 use super::orient::{Orientation, orient};
 use super::radius::{DistanceSample, Radius, RadiusReport, median_distance};
 use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
-use super::structure::{
-    PointShape, Structure, StructureChoice, StructureReport, all_scattered, find_structures,
-};
+use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
 use super::{CleanReport, PointCloud, PreparedCloud, Scalar, Subsample, Values, clean, subsample};
 use crate::error::{Error, Result};
 use crate::math::Vec3;

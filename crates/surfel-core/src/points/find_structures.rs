@@ -1,0 +1,429 @@
+//! The search for the structure of each point.
+//!
+//! Most points are decided by the plane through their nearest neighbours. Where these lie on a line, as along the
+//! rings of a spinning scanner, the neighbours that decide are found among fewer and fewer points, until they
+//! surround the point. Where they lie in no plane, a plane through at least half of them still makes a surface: an
+//! edge (after Demantké et al., Dimensionality Based Scale Selection in 3D Lidar Point Clouds, 2011).
+
+use super::edge_planes::{MIN_PLANE_FRACTION, plane_of_side};
+use super::neighbors::{KdTree, Neighbor, Neighborhood};
+use super::normals::{PlaneFit, fit_plane};
+use super::radius::kth_distance;
+use super::scan_lines::{limit_wide_discs, widen_lines};
+use super::structure::{PointShape, Structure, StructureReport, is_line, is_surface};
+use crate::error::Result;
+use crate::math::{DVec3, SymmetricMatrix, Vec3};
+use crate::progress::Progress;
+use rayon::prelude::*;
+
+/// Maximum width of the neighbourhood of a line.
+const MAX_LINE_WIDTH: f32 = 0.04;
+/// Radius of a ball in distances to the second neighbour: balls of neighbours overlap a little.
+const BALL_REACH: f32 = 0.6;
+/// Maximum ratio of the radius of a ball or capsule to the median of its structure.
+const MAX_SOLID_RATIO: f32 = 1.5;
+/// Number of neighbours for a second look at points that lie in no plane.
+const N_MANY_NEIGHBORS: usize = 48;
+/// Number of neighbours that vote on the structure of a point.
+const N_VOTERS: usize = 8;
+/// Number of rounds in which points take over half of their neighbours' mean.
+const N_ROUNDS: usize = 12;
+/// Share of scattered points around a point, after all rounds, that makes it a scattered one.
+const MIN_SCATTERED: f32 = 0.5;
+/// Ratio of a radius to the typical one from which the neighbourhood is sparse.
+const SPARSE: f32 = 2.0;
+/// Minimum share of scattered points in a cloud with much vegetation.
+const MIN_VEGETATION: f32 = 0.2;
+/// Maximum number of rounds in which islands of a surface shrink.
+const N_ISLAND_ROUNDS: usize = 8;
+/// Share of scattered points from which a surface point is looked at again: small islands of a surface among scattered
+/// points, as where branches happen to lie in a plane, are scattered too.
+const MIN_SHARE_NEAR_SCATTER: f32 = 0.02;
+
+/// Finds the structure of each point from the planes through its neighbours and the distances to the most distant
+/// of them.
+///
+/// # Errors
+///
+/// Returns [`Error::Cancelled`] if `progress` is cancelled.
+pub fn find_structures(
+    tree: &KdTree,
+    fits: &[PlaneFit],
+    radii: &[f32],
+    progress: &dyn Progress,
+) -> Result<(Vec<PointShape>, StructureReport)> {
+    let positions = tree.positions();
+    progress.begin("structure", positions.len() as u64);
+    let typical = Typical { variation: median_variation(fits), radius: median_radius(radii) };
+    let decide = |point: usize| {
+        if point.is_multiple_of(4096) {
+            progress.check()?;
+            progress.advance(4096.min(positions.len() - point) as u64);
+        }
+        Ok(decide(tree, point, &fits[point], radii[point], &typical))
+    };
+    let mut shapes: Vec<PointShape> =
+        (0..positions.len()).into_par_iter().map(decide).collect::<Result<_>>()?;
+    widen_lines(positions, &mut shapes, progress)?;
+    for (shape, fit) in shapes.iter_mut().zip(fits) {
+        if shape.structure == Structure::Line && MAX_LINE_WIDTH < fit.width {
+            shape.structure = Structure::Scatter;
+        }
+    }
+    let structures = smoothed(tree, &shapes, typical.radius, progress)?;
+    let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
+        settle(tree, point, &fits[point], radii[point], *structure, shape);
+    };
+    shapes.par_iter_mut().zip(&structures).enumerate().for_each(finish);
+    limit_wide_discs(positions, radii, &mut shapes, progress)?;
+    clamp_solids(&mut shapes, Structure::Line);
+    clamp_solids(&mut shapes, Structure::Scatter);
+    Ok((shapes, StructureReport::of(&structures)))
+}
+
+/// Makes each point stand for itself.
+///
+/// # Errors
+///
+/// Returns [`Error::Cancelled`] if `progress` is cancelled.
+pub fn all_scattered(
+    tree: &KdTree,
+    radii: &[f32],
+    progress: &dyn Progress,
+) -> Result<(Vec<PointShape>, StructureReport)> {
+    let distance = |_: usize, neighbors: &[Neighbor]| kth_distance(neighbors, 2);
+    let distances = tree.map(Neighborhood::Nearest(2), progress, distance)?;
+    let shape = |(distance, radius): (&f32, &f32)| PointShape {
+        structure: Structure::Scatter,
+        normal: Vec3::Z,
+        radius: ball_radius(*distance, *radius),
+    };
+    let mut shapes: Vec<PointShape> = distances.iter().zip(radii).map(shape).collect();
+    clamp_solids(&mut shapes, Structure::Scatter);
+    let report = StructureReport { n_scatter: shapes.len(), ..StructureReport::default() };
+    Ok((shapes, report))
+}
+
+/// Returns the radius of a ball by the distance to the second neighbour; `radius` is that of a disc, which a stray
+/// point's ball does not exceed.
+fn ball_radius(distance: f32, radius: f32) -> f32 {
+    let reach = BALL_REACH * distance;
+    if 0.0 < reach { reach.min(radius) } else { radius }
+}
+
+/// Clamps the radii of stray points, which would be as large as the empty space around them.
+fn clamp_solids(shapes: &mut [PointShape], structure: Structure) {
+    let solids = shapes.iter().filter(|shape| shape.structure == structure);
+    let mut radii: Vec<f32> = solids.map(|shape| shape.radius).collect();
+    if radii.is_empty() {
+        return;
+    }
+    let middle = radii.len() / 2;
+    let (_, median, _) = radii.select_nth_unstable_by(middle, f32::total_cmp);
+    let limit = MAX_SOLID_RATIO * *median;
+    for shape in shapes.iter_mut().filter(|shape| shape.structure == structure) {
+        shape.radius = shape.radius.min(limit);
+    }
+}
+
+fn median_variation(fits: &[PlaneFit]) -> f32 {
+    let mut sample: Vec<f32> =
+        fits.iter().step_by(fits.len() / 10_000 + 1).map(|fit| fit.variation).collect();
+    sample.sort_unstable_by(f32::total_cmp);
+    sample.get(sample.len() / 2).copied().unwrap_or(0.0)
+}
+
+fn median_radius(radii: &[f32]) -> f32 {
+    let mut sample: Vec<f32> = radii.iter().step_by(radii.len() / 10_000 + 1).copied().collect();
+    sample.sort_unstable_by(f32::total_cmp);
+    sample.get(sample.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Properties of the point in the middle of a cloud.
+struct Typical {
+    /// Surface variation of its neighbourhood.
+    variation: f32,
+    /// Radius of its neighbourhood.
+    radius: f32,
+}
+
+impl Typical {
+    /// True if a plane fits the neighbourhood of a radius. The variation that noise causes falls with the square of the
+    /// radius: where points are sparse, as between the branches of a crown, a plane has to fit better.
+    fn is_surface(&self, fit: &PlaneFit, radius: f32) -> bool {
+        let sparseness = (radius / (SPARSE * self.radius)).max(1.0);
+        let expected = PlaneFit { variation: fit.variation * sparseness * sparseness, ..*fit };
+        is_surface(&expected)
+    }
+}
+
+/// Decides about a point by its nearest neighbours alone.
+fn decide(
+    tree: &KdTree,
+    point: usize,
+    fit: &PlaneFit,
+    radius: f32,
+    typical: &Typical,
+) -> PointShape {
+    /// Below this variation the mean plane is as good as that of an edge's side.
+    const MIN_EDGE_VARIATION: f32 = 0.012;
+    let shape = |structure, normal| PointShape { structure, normal, radius };
+    if is_line(fit) {
+        return shape(Structure::Line, fit.normal);
+    }
+    let is_surface = typical.is_surface(fit, radius);
+    if is_surface && fit.variation < MIN_EDGE_VARIATION.max(2.5 * typical.variation) {
+        return shape(Structure::Surface, fit.normal);
+    }
+    let positions = tree.positions();
+    let neighbors = tree.nearest(positions[point], N_MANY_NEIGHBORS, Some(point as u32));
+    let nearest = &neighbors[..neighbors.len().min(N_MANY_NEIGHBORS / 2)];
+    let side = plane_of_side(positions, point, nearest, fit.normal);
+    if let Some((normal, fraction)) = side
+        && MIN_PLANE_FRACTION <= fraction
+    {
+        return shape(Structure::Surface, normal);
+    }
+    let normal = side.map_or(fit.normal, |(normal, _)| normal);
+    if is_surface {
+        return shape(Structure::Surface, normal);
+    }
+    let wide = fit_plane(positions, point, &neighbors);
+    if is_line(&wide) {
+        return shape(Structure::Line, wide.normal);
+    }
+    if typical.is_surface(&wide, radius) {
+        return shape(Structure::Surface, wide.normal);
+    }
+    shape(Structure::Scatter, normal)
+}
+
+/// Lets the region around a point decide whether it is scattered, so that structures do not flicker: a rough point of a
+/// surface stays on the surface, and a flat spot of a crown becomes leaves.
+///
+/// A sparse scattered point by a surface stays one if much is scattered, as in a forest: its disc would be wide.
+fn smoothed(
+    tree: &KdTree,
+    shapes: &[PointShape],
+    typical_radius: f32,
+    progress: &dyn Progress,
+) -> Result<Vec<Structure>> {
+    let own = shapes.par_iter().map(|shape| shape.structure);
+    if own.clone().all(|structure| structure != Structure::Scatter) {
+        return Ok(own.collect());
+    }
+    let n_scattered = own.clone().filter(|structure| *structure == Structure::Scatter).count();
+    let is_vegetated = MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32;
+    let max_radius = if is_vegetated { SPARSE * typical_radius } else { f32::INFINITY };
+    let voters = |_: usize, neighbors: &[Neighbor]| {
+        let mut indices = [u32::MAX; N_VOTERS];
+        for (index, neighbor) in indices.iter_mut().zip(neighbors) {
+            *index = neighbor.index;
+        }
+        indices
+    };
+    let voters = tree.map(Neighborhood::Nearest(N_VOTERS), progress, voters)?;
+    let mut shares: Vec<f32> =
+        own.clone().map(|structure| f32::from(u8::from(structure == Structure::Scatter))).collect();
+    for _ in 0..N_ROUNDS {
+        let mixed = |(own, voters): (&f32, &[u32; N_VOTERS])| {
+            let of_voters = voters.iter().filter(|voter| **voter != u32::MAX);
+            let n_voters = of_voters.clone().count().max(1) as f32;
+            let sum: f32 = of_voters.map(|voter| shares[*voter as usize]).sum();
+            0.5 * (own + sum / n_voters)
+        };
+        shares = shares.par_iter().zip(&voters).map(mixed).collect();
+    }
+    let decided = |((own, shape), share): ((Structure, &PointShape), &f32)| match own {
+        Structure::Line => Structure::Line,
+        _ if MIN_SCATTERED <= *share => Structure::Scatter,
+        Structure::Scatter if shape.radius <= max_radius => Structure::Surface,
+        own => own,
+    };
+    let mut structures: Vec<Structure> = own.zip(shapes).zip(&shares).map(decided).collect();
+    for _ in 0..N_ISLAND_ROUNDS {
+        let (next, n_changed) = without_islands(tree, &structures, &shares);
+        structures = next;
+        if n_changed == 0 {
+            break;
+        }
+    }
+    Ok(structures)
+}
+
+/// Scatters the surface points most of whose neighbours are scattered, and returns their number too.
+fn without_islands(
+    tree: &KdTree,
+    structures: &[Structure],
+    shares: &[f32],
+) -> (Vec<Structure>, usize) {
+    let is_island = |(point, (structure, share)): (usize, (&Structure, &f32))| {
+        if *structure != Structure::Surface || *share < MIN_SHARE_NEAR_SCATTER {
+            return false;
+        }
+        let around = tree.nearest(tree.positions()[point], N_MANY_NEIGHBORS, Some(point as u32));
+        let of_neighbor = |neighbor: &Neighbor| structures[neighbor.index as usize];
+        let is_scattered = |neighbor: &&Neighbor| of_neighbor(neighbor) == Structure::Scatter;
+        around.len() <= 2 * around.iter().filter(is_scattered).count()
+    };
+    let is_island: Vec<bool> =
+        structures.par_iter().zip(shares).enumerate().map(is_island).collect();
+    let next = structures.iter().zip(&is_island);
+    let next = next.map(|(own, is_island)| if *is_island { Structure::Scatter } else { *own });
+    (next.collect(), is_island.iter().filter(|is_island| **is_island).count())
+}
+
+/// Gives a point the normal and the radius of its final structure.
+fn settle(
+    tree: &KdTree,
+    point: usize,
+    fit: &PlaneFit,
+    radius: f32,
+    structure: Structure,
+    shape: &mut PointShape,
+) {
+    let position = tree.positions()[point];
+    match structure {
+        Structure::Surface | Structure::Redundant => {
+            if shape.structure == Structure::Line {
+                (shape.normal, shape.radius) = (fit.normal, radius);
+            }
+        }
+        Structure::Line => {
+            let neighbors = tree.nearest(position, N_VOTERS, Some(point as u32));
+            shape.normal = line_direction(tree.positions(), point, &neighbors);
+            let reach = kth_distance(&neighbors, 2);
+            shape.radius = if 0.0 < reach { reach } else { radius };
+        }
+        Structure::Scatter => {
+            let neighbors = tree.nearest(position, 2, Some(point as u32));
+            shape.radius = ball_radius(kth_distance(&neighbors, 2), radius);
+        }
+    }
+    shape.structure = structure;
+}
+
+/// Returns the direction in which the neighbours extend most.
+fn line_direction(positions: &[Vec3], point: usize, neighbors: &[Neighbor]) -> Vec3 {
+    let center = positions[point].as_dvec3();
+    let mut scatter = SymmetricMatrix::default();
+    for neighbor in neighbors {
+        let offset: DVec3 = positions[neighbor.index as usize].as_dvec3() - center;
+        scatter.add_outer(offset, 1.0);
+    }
+    let (_, vectors) = scatter.eigen();
+    vectors[2].as_vec3().normalize_or(Vec3::Z)
+}
+
+#[cfg(test)]
+mod tests {
+    //! Structures of sampled shapes.
+
+    use super::*;
+    use crate::math::Random;
+    use crate::points::{PointCloud, StructureChoice};
+    use crate::points::{Preparation, PreparedCloud, prepare};
+    use crate::progress::NoProgress;
+
+    fn prepared(positions: Vec<Vec3>) -> (PreparedCloud, Vec<Structure>) {
+        let cloud = PointCloud::from_positions(positions);
+        let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+        let structures = cloud.structures().unwrap();
+        (cloud, structures)
+    }
+
+    fn fraction(structures: &[Structure], kind: Structure) -> f64 {
+        let n = structures.iter().filter(|structure| **structure == kind).count();
+        n as f64 / structures.len() as f64
+    }
+
+    fn random_points(n: usize, seed: u64, point: impl Fn([f32; 3]) -> Vec3) -> Vec<Vec3> {
+        let mut random = Random::new(seed, 0);
+        (0..n).map(|_| point(std::array::from_fn(|_| random.next_f32()))).collect()
+    }
+
+    #[test]
+    fn points_of_a_plane_form_a_surface() {
+        for noise in [0.0, 0.3] {
+            // The spacing is 0.01.
+            let height = |z: f32| noise * 0.01 * (z - 0.5) * 12f32.sqrt();
+            let plane = random_points(10_000, 1, |[x, y, z]| Vec3::new(x, y, height(z)));
+            let (_, structures) = prepared(plane);
+            let n_surface = fraction(&structures, Structure::Surface)
+                + fraction(&structures, Structure::Redundant);
+            assert!(0.995 < n_surface, "noise {noise}: {n_surface}");
+        }
+    }
+
+    #[test]
+    fn sides_of_an_edge_keep_their_normals() {
+        let mut points = random_points(5000, 2, |[x, y, _]| Vec3::new(x, y, 0.0));
+        points.extend(random_points(5000, 3, |[x, _, z]| Vec3::new(x, 0.0, z)));
+        let (cloud, structures) = prepared(points);
+        assert!(0.98 < fraction(&structures, Structure::Surface));
+        let tilt = |normal: &Vec3| normal.y.abs().max(normal.z.abs()).min(1.0).acos().to_degrees();
+        let mut tilts: Vec<f32> = cloud.normals().iter().map(tilt).collect();
+        tilts.sort_unstable_by(f32::total_cmp);
+        assert!(tilts[tilts.len() * 95 / 100] < 5.0, "{}", tilts[tilts.len() * 95 / 100]);
+    }
+
+    #[test]
+    fn points_that_fill_a_volume_are_scattered_with_balls_that_do_not_overlap_much() {
+        let crown = random_points(5000, 4, Vec3::from_array);
+        let (cloud, structures) = prepared(crown);
+        let n_scatter = fraction(&structures, Structure::Scatter);
+        assert!(0.85 < n_scatter, "{n_scatter}");
+        let spacing = 1.0 / (5000f32).cbrt();
+        let balls = cloud.radii().iter().zip(&structures);
+        let balls = balls.filter(|(_, structure)| **structure == Structure::Scatter);
+        assert!(balls.into_iter().all(|(radius, _)| *radius < spacing));
+    }
+
+    #[test]
+    fn points_of_a_wire_form_a_line_along_it() {
+        let direction = Vec3::new(1.0, 2.0, 0.5).normalize();
+        let wire = (0..1000).map(|i| 0.01 * i as f32 * direction).collect();
+        let (cloud, structures) = prepared(wire);
+        assert_eq!(fraction(&structures, Structure::Line), 1.0);
+        assert!(cloud.normals().iter().all(|axis| 0.999 < axis.dot(direction).abs()));
+    }
+
+    #[test]
+    fn rings_on_the_ground_form_a_surface_across_their_gaps() {
+        // Twenty rings, 0.4 apart, of points that are 0.02 apart.
+        let ring = |ring: usize| {
+            let radius = 3.0 + 0.4 * ring as f32;
+            let n = (std::f32::consts::TAU * radius / 0.02) as usize;
+            (0..n).map(move |i| {
+                let (sin, cos) = (std::f32::consts::TAU * i as f32 / n as f32).sin_cos();
+                Vec3::new(radius * cos, radius * sin, 0.0)
+            })
+        };
+        let (cloud, structures) = prepared((0..20).flat_map(ring).collect());
+        let n_lines = fraction(&structures, Structure::Line);
+        assert!(n_lines < 0.01, "{n_lines}");
+        let discs = cloud.radii().iter().zip(cloud.normals()).zip(&structures);
+        let discs = discs.filter(|(_, structure)| **structure == Structure::Surface);
+        let mut n_wide = 0;
+        for ((radius, normal), _) in discs {
+            n_wide += usize::from(0.4 < *radius);
+            assert!(0.999 < normal.z.abs());
+        }
+        assert!(1000 < n_wide, "{n_wide}");
+        assert!(0.5 < fraction(&structures, Structure::Redundant));
+    }
+
+    #[test]
+    fn a_choice_takes_all_points_for_one_structure() {
+        let points = random_points(500, 5, |[x, y, _]| Vec3::new(x, y, 0.0));
+        for (choice, expected) in [
+            (StructureChoice::Surface, None),
+            (StructureChoice::Scatter, Some(vec![Structure::Scatter; 500])),
+        ] {
+            let cloud = PointCloud::from_positions(points.clone());
+            let preparation = Preparation { structure: choice, ..Preparation::default() };
+            let (cloud, _) = prepare(cloud, &preparation, &NoProgress).unwrap();
+            assert_eq!(cloud.structures(), expected);
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Surfaces that are sampled densely along scan lines only, as by the rings of a spinning scanner.
+
+use super::neighbors::{KdTree, Neighbor};
+use super::normals::{PlaneFit, fit_plane};
+use super::radius::kth_distance;
+use super::structure::{PointShape, Structure, is_line, is_surface};
+use super::subsample::indices_by_spacing;
+use crate::error::Result;
+use crate::math::Vec3;
+use crate::progress::Progress;
+use rayon::prelude::*;
+
+/// Maximum ratio of the radius of a point on a scan line to the reach of its neighbours on the line. Gaps between scan
+/// lines that are wider are not closed.
+const MAX_WIDENING: f32 = 12.0;
+/// Number of neighbours among thinned points.
+const N_THINNED_NEIGHBORS: usize = 12;
+/// Ratio of the spacings of successive sets of thinned points.
+const THINNING: f32 = 2.0;
+/// Minimum number of thinned points; fewer say nothing about structure.
+const MIN_THINNED: usize = 256;
+/// Maximum number of surface points within a disc that was widened to close the gaps between scan lines.
+const MAX_POINTS_OF_DISC: usize = 64;
+
+/// Looks at points on lines again, among fewer and fewer points: on a surface that is sampled densely along lines
+/// only, their neighbours come to surround them.
+pub fn widen_lines(
+    positions: &[Vec3],
+    shapes: &mut [PointShape],
+    progress: &dyn Progress,
+) -> Result<()> {
+    let lines = shapes.iter().enumerate().filter(|(_, shape)| shape.structure == Structure::Line);
+    let mut open: Vec<u32> = lines.map(|(point, _)| point as u32).collect();
+    let mut radii: Vec<f32> = open.iter().map(|point| shapes[*point as usize].radius).collect();
+    if open.is_empty() {
+        return Ok(());
+    }
+    let middle = radii.len() / 4;
+    let (_, typical, _) = radii.select_nth_unstable_by(middle, f32::total_cmp);
+    let mut spacing = 0.5 * *typical;
+    let mut kept: Vec<u32> = (0..positions.len() as u32).collect();
+    let mut thinned = positions.to_vec();
+    while !open.is_empty() && 0.0 < spacing && spacing.is_finite() {
+        let indices = indices_by_spacing(&thinned, spacing, progress)?;
+        kept = indices.iter().map(|index| kept[*index as usize]).collect();
+        thinned = kept.iter().map(|index| positions[*index as usize]).collect();
+        if thinned.len() < MIN_THINNED {
+            break;
+        }
+        let tree = KdTree::new(&thinned, progress)?;
+        let found = |point: &u32| -> Result<Option<PointShape>> {
+            progress.check()?;
+            let position = positions[*point as usize];
+            // A point that is among the thinned ones is not its own neighbour.
+            let mut neighbors = tree.nearest(position, N_THINNED_NEIGHBORS + 1, None);
+            neighbors.retain(|neighbor| 0.0 < neighbor.distance_squared);
+            neighbors.truncate(N_THINNED_NEIGHBORS);
+            let fit = fit_around(&thinned, position, &neighbors);
+            let radius = kth_distance(&neighbors, N_THINNED_NEIGHBORS);
+            if is_line(&fit) {
+                return Ok(None);
+            }
+            let own = shapes[*point as usize];
+            let is_close = radius <= MAX_WIDENING * own.radius;
+            let structure = match is_surface(&fit) && is_close {
+                true if kept.binary_search(point).is_ok() => Structure::Surface,
+                true => Structure::Redundant,
+                false => return Ok(Some(own)),
+            };
+            Ok(Some(PointShape { structure, normal: fit.normal, radius }))
+        };
+        let decided = open.par_iter().map(found).collect::<Result<Vec<_>>>()?;
+        let mut left = Vec::new();
+        for (point, shape) in open.into_iter().zip(decided) {
+            match shape {
+                Some(shape) => shapes[point as usize] = shape,
+                None => left.push(point),
+            }
+        }
+        open = left;
+        spacing *= THINNING;
+    }
+    Ok(())
+}
+
+/// Narrows the widened discs that reach over densely sampled surfaces, where the points at hand describe the surface
+/// better than a wide disc does.
+pub fn limit_wide_discs(
+    positions: &[Vec3],
+    radii: &[f32],
+    shapes: &mut [PointShape],
+    progress: &dyn Progress,
+) -> Result<()> {
+    let is_surface = |point: &usize| shapes[*point].structure == Structure::Surface;
+    let is_wide = |point: &usize| is_surface(point) && radii[*point] < shapes[*point].radius;
+    let wide: Vec<usize> = (0..shapes.len()).filter(is_wide).collect();
+    if wide.is_empty() {
+        return Ok(());
+    }
+    let surface: Vec<Vec3> =
+        (0..shapes.len()).filter(is_surface).map(|point| positions[point]).collect();
+    let tree = KdTree::new(&surface, progress)?;
+    let limited = |point: &usize| -> Result<f32> {
+        progress.check()?;
+        let neighbors = tree.nearest(positions[*point], MAX_POINTS_OF_DISC, None);
+        let reach = kth_distance(&neighbors, MAX_POINTS_OF_DISC);
+        let is_crowded = neighbors.len() == MAX_POINTS_OF_DISC && reach < shapes[*point].radius;
+        Ok(if is_crowded { reach.max(radii[*point]) } else { shapes[*point].radius })
+    };
+    let limits = wide.par_iter().map(limited).collect::<Result<Vec<_>>>()?;
+    for (point, radius) in wide.into_iter().zip(limits) {
+        shapes[point].radius = radius;
+    }
+    Ok(())
+}
+
+/// Fits a plane to a position and points around it.
+fn fit_around(positions: &[Vec3], position: Vec3, neighbors: &[Neighbor]) -> PlaneFit {
+    let mut around: Vec<Vec3> = vec![position];
+    around.extend(neighbors.iter().map(|neighbor| positions[neighbor.index as usize]));
+    let of_others = |index: usize| Neighbor { index: index as u32, distance_squared: 0.0 };
+    let others: Vec<Neighbor> = (1..around.len()).map(of_others).collect();
+    fit_plane(&around, 0, &others)
+}
