@@ -6,11 +6,11 @@ use crate::math::{SymmetricMatrix, Vec3, hash, smallest_eigenvector};
 /// Number of planes tried at a point that lies near an edge.
 const N_PLANES: u64 = 24;
 /// Distance from a plane of the points on it, in radii of the neighbourhood.
-const PLANE_THICKNESS: f32 = 0.04;
+pub const PLANE_THICKNESS: f32 = 0.04;
 /// Minimum fraction of the neighbours on the plane of an edge's side.
 pub const MIN_PLANE_FRACTION: f32 = 0.5;
 /// Minimum fraction of the neighbours on the plane of one side of a sharp edge or corner.
-const MIN_SIDE_FRACTION: f32 = 0.25;
+const MIN_SIDE_FRACTION: f32 = 0.4;
 
 /// Returns the normal of the plane through the point on which the most neighbours lie, and their fraction: near an edge
 /// that is the plane of the point's own side. `mean` is the normal of the plane through all of them, which another

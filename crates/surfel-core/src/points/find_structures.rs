@@ -5,7 +5,7 @@
 //! surround the point. Where they lie in no plane, a plane through at least half of them still makes a surface: an
 //! edge (after Demantké et al., Dimensionality Based Scale Selection in 3D Lidar Point Clouds, 2011).
 
-use super::edge_planes::{MIN_PLANE_FRACTION, plane_of_side};
+use super::edge_planes::{MIN_PLANE_FRACTION, PLANE_THICKNESS, plane_of_side};
 use super::neighbors::{KdTree, Neighbor, Neighborhood};
 use super::normals::{PlaneFit, fit_plane};
 use super::radius::kth_distance;
@@ -24,14 +24,22 @@ const BALL_REACH: f32 = 0.6;
 const MAX_SOLID_RATIO: f32 = 1.5;
 /// Number of neighbours for a second look at points that lie in no plane.
 const N_MANY_NEIGHBORS: usize = 48;
+/// Number of neighbours for a third look: a surface whose noise is as large as its spacing shows only from afar.
+const N_WIDEST_NEIGHBORS: usize = 144;
+/// Maximum surface variation of so many neighbours of a surface. Crowns have more.
+const MAX_WIDEST_VARIATION: f32 = 0.03;
 /// Number of neighbours that vote on the structure of a point.
 const N_VOTERS: usize = 8;
 /// Number of rounds in which points take over half of their neighbours' mean.
 const N_ROUNDS: usize = 12;
 /// Share of scattered points around a point, after all rounds, that makes it a scattered one.
 const MIN_SCATTERED: f32 = 0.5;
+/// The same in a noisy cloud.
+const MIN_SCATTERED_IN_NOISE: f32 = 0.9;
 /// Ratio of a radius to the typical one from which the neighbourhood is sparse.
 const SPARSE: f32 = 2.0;
+/// Minimum share of scattered points among the rough ones of a cloud that is leafy, not noisy.
+const MIN_SCATTERED_ROUGH: f32 = 0.5;
 /// Minimum share of scattered points in a cloud with much vegetation.
 const MIN_VEGETATION: f32 = 0.2;
 /// Maximum number of rounds in which islands of a surface shrink.
@@ -54,7 +62,12 @@ pub fn find_structures(
 ) -> Result<(Vec<PointShape>, StructureReport)> {
     let positions = tree.positions();
     progress.begin("structure", positions.len() as u64);
-    let typical = Typical { variation: median_variation(fits), radius: median_radius(radii) };
+    let variations: Vec<f32> = fits.iter().map(|fit| fit.variation).collect();
+    let typical = Typical {
+        variation: quantile(&variations, 0.5),
+        low_variation: quantile(&variations, 0.25),
+        radius: quantile(radii, 0.5),
+    };
     let decide = |point: usize| {
         if point.is_multiple_of(4096) {
             progress.check()?;
@@ -70,7 +83,8 @@ pub fn find_structures(
             shape.structure = Structure::Scatter;
         }
     }
-    let structures = smoothed(tree, &shapes, typical.radius, progress)?;
+    let n_rough = fits.par_iter().filter(|fit| !is_line(fit) && !is_surface(fit)).count();
+    let structures = smoothed(tree, &shapes, n_rough, typical.radius, progress)?;
     let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
         settle(tree, point, &fits[point], radii[point], *structure, shape);
     };
@@ -126,28 +140,31 @@ fn clamp_solids(shapes: &mut [PointShape], structure: Structure) {
     }
 }
 
-fn median_variation(fits: &[PlaneFit]) -> f32 {
-    let mut sample: Vec<f32> =
-        fits.iter().step_by(fits.len() / 10_000 + 1).map(|fit| fit.variation).collect();
+/// Returns a quantile of some ten thousand of the values, or zero if there are none.
+fn quantile(values: &[f32], fraction: f32) -> f32 {
+    let mut sample: Vec<f32> = values.iter().step_by(values.len() / 10_000 + 1).copied().collect();
     sample.sort_unstable_by(f32::total_cmp);
-    sample.get(sample.len() / 2).copied().unwrap_or(0.0)
+    sample.get((fraction * sample.len() as f32) as usize).copied().unwrap_or(0.0)
 }
 
-fn median_radius(radii: &[f32]) -> f32 {
-    let mut sample: Vec<f32> = radii.iter().step_by(radii.len() / 10_000 + 1).copied().collect();
-    sample.sort_unstable_by(f32::total_cmp);
-    sample.get(sample.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// Properties of the point in the middle of a cloud.
+/// Typical properties of the neighbourhoods of a cloud's points.
 struct Typical {
-    /// Surface variation of its neighbourhood.
+    /// Median of the surface variations.
     variation: f32,
-    /// Radius of its neighbourhood.
+    /// First quartile of the surface variations: that of the even parts, which noise causes.
+    low_variation: f32,
+    /// Median of the radii.
     radius: f32,
 }
 
 impl Typical {
+    /// True if the noise is low enough for the two sides of an edge to be told apart. The points of a round, even
+    /// neighbourhood of radius 1 have a variance of 1/4 along each axis, so that noise is the root of half the
+    /// variation.
+    fn has_edges(&self) -> bool {
+        (0.5 * self.low_variation).sqrt() < PLANE_THICKNESS
+    }
+
     /// True if a plane fits the neighbourhood of a radius. The variation that noise causes falls with the square of the
     /// radius: where points are sparse, as between the branches of a crown, a plane has to fit better.
     fn is_surface(&self, fit: &PlaneFit, radius: f32) -> bool {
@@ -178,7 +195,11 @@ fn decide(
     let positions = tree.positions();
     let neighbors = tree.nearest(positions[point], N_MANY_NEIGHBORS, Some(point as u32));
     let nearest = &neighbors[..neighbors.len().min(N_MANY_NEIGHBORS / 2)];
-    let side = plane_of_side(positions, point, nearest, fit.normal);
+    let side = if typical.has_edges() {
+        plane_of_side(positions, point, nearest, fit.normal)
+    } else {
+        None
+    };
     if let Some((normal, fraction)) = side
         && MIN_PLANE_FRACTION <= fraction
     {
@@ -195,16 +216,25 @@ fn decide(
     if typical.is_surface(&wide, radius) {
         return shape(Structure::Surface, wide.normal);
     }
+    let neighbors = tree.nearest(positions[point], N_WIDEST_NEIGHBORS, Some(point as u32));
+    let widest = fit_plane(positions, point, &neighbors);
+    if self::is_surface(&widest) && widest.variation < MAX_WIDEST_VARIATION {
+        return shape(Structure::Surface, widest.normal);
+    }
     shape(Structure::Scatter, normal)
 }
 
 /// Lets the region around a point decide whether it is scattered, so that structures do not flicker: a rough point of a
 /// surface stays on the surface, and a flat spot of a crown becomes leaves.
 ///
+/// `n_rough` is the number of points whose nearest neighbours lie in no plane. If most of them lie in a plane of more
+/// neighbours, the cloud is noisy rather than leafy, and points are scattered only amid others.
+///
 /// A sparse scattered point by a surface stays one if much is scattered, as in a forest: its disc would be wide.
 fn smoothed(
     tree: &KdTree,
     shapes: &[PointShape],
+    n_rough: usize,
     typical_radius: f32,
     progress: &dyn Progress,
 ) -> Result<Vec<Structure>> {
@@ -213,7 +243,9 @@ fn smoothed(
         return Ok(own.collect());
     }
     let n_scattered = own.clone().filter(|structure| *structure == Structure::Scatter).count();
-    let is_vegetated = MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32;
+    let is_noisy = (n_scattered as f32) < MIN_SCATTERED_ROUGH * n_rough as f32;
+    let is_vegetated = !is_noisy && MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32;
+    let min_scattered = if is_noisy { MIN_SCATTERED_IN_NOISE } else { MIN_SCATTERED };
     let max_radius = if is_vegetated { SPARSE * typical_radius } else { f32::INFINITY };
     let voters = |_: usize, neighbors: &[Neighbor]| {
         let mut indices = [u32::MAX; N_VOTERS];
@@ -236,12 +268,13 @@ fn smoothed(
     }
     let decided = |((own, shape), share): ((Structure, &PointShape), &f32)| match own {
         Structure::Line => Structure::Line,
-        _ if MIN_SCATTERED <= *share => Structure::Scatter,
+        _ if min_scattered <= *share => Structure::Scatter,
         Structure::Scatter if shape.radius <= max_radius => Structure::Surface,
         own => own,
     };
     let mut structures: Vec<Structure> = own.zip(shapes).zip(&shares).map(decided).collect();
-    for _ in 0..N_ISLAND_ROUNDS {
+    let n_island_rounds = if is_noisy { 0 } else { N_ISLAND_ROUNDS };
+    for _ in 0..n_island_rounds {
         let (next, n_changed) = without_islands(tree, &structures, &shares);
         structures = next;
         if n_changed == 0 {
