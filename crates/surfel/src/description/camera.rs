@@ -35,13 +35,14 @@ pub enum OrthographicHeight {
 settings! {
     /// The camera; whatever is not set is chosen so that the whole scene is seen.
     pub struct CameraSettings {
-        /// Position of the camera [default: so that the whole scene is seen].
+        /// Position of the camera [default: so that the whole scene is seen, or the station of a single
+        /// scan].
         position: DVec3, Vector, "X,Y,Z", common;
         /// Point in the middle of the picture.
         focal_point: DVec3, Vector, "X,Y,Z", common;
         /// Direction that points up in the picture.
         view_up: DVec3, Direction, "X,Y,Z";
-        /// Vertical field of view in degrees [default: 35, or that of the file's camera].
+        /// Vertical field of view in degrees [default: 35, 60 at a station, or that of the file's camera].
         view_angle: f64, VIEW_ANGLE, "DEG";
         /// Projects without perspective; HEIGHT is the height of the picture in world units [default: all of the
         /// scene].
@@ -59,7 +60,7 @@ settings! {
         /// Moves the chosen camera nearer (above 1) or farther away.
         zoom_factor: f64 = 1.0, POSITIVE, "FACTOR";
         /// Hides the walls and the ceiling of a room that stand between its inside and the camera: auto (rooms with
-        /// furniture or other content), on (empty rooms too) or off.
+        /// furniture or other content), on (empty rooms too) or off. Only auto shows single scans from their station.
         interior: Interior = Interior::Auto, OneOf(INTERIORS), "WHEN";
         /// Keeps the camera where it is, even if the scene animates it.
         lock: bool = false, Flag, "";

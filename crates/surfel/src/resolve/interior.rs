@@ -16,11 +16,8 @@ pub fn choose_room(
     points: &PointCloud,
     up: Vec3,
 ) -> Option<Room> {
-    let is_static = scene.sequences.is_empty()
-        && scene.camera_motion.is_none()
-        && scene.graph.animation.channels.is_empty();
     match description.camera.interior() {
-        Interior::Auto if is_static => find_room(points, up, true),
+        Interior::Auto if !scene.moves() => find_room(points, up, true),
         Interior::On => find_room(points, up, false),
         _ => None,
     }

@@ -147,6 +147,13 @@ impl LoadedScene {
         self.sequences.iter().map(|sequence| sequence.file_at(time_secs)).collect()
     }
 
+    /// Returns true if anything in the scene moves, or the camera.
+    pub(super) fn moves(&self) -> bool {
+        !self.sequences.is_empty()
+            || self.camera_motion.is_some()
+            || !self.graph.animation.channels.is_empty()
+    }
+
     /// Returns true if a node of the graph, or one of its parents, moves.
     pub fn is_animated(&self, node: usize) -> bool {
         let above = successors(Some(node), |node| self.graph.nodes[*node].parent);
@@ -167,11 +174,17 @@ impl LoadedScene {
 
     /// Returns points that show where everything is.
     pub fn sample_points(&self) -> Cow<'_, PointCloud> {
+        let single = self.single_cloud().map(Cow::Borrowed);
+        single.unwrap_or_else(|| Cow::Owned(self.graph.sample_points()))
+    }
+
+    /// Returns the cloud of a scene that has nothing else, if it is in the coordinates of its files.
+    pub(super) fn single_cloud(&self) -> Option<&PointCloud> {
         match (&self.graph.geometries[..], &self.graph.nodes[..]) {
             ([Geometry::Points(cloud)], [node]) if node.transform == Transform::IDENTITY => {
-                Cow::Borrowed(cloud)
+                Some(cloud)
             }
-            _ => Cow::Owned(self.graph.sample_points()),
+            _ => None,
         }
     }
 

@@ -3,6 +3,7 @@
 mod cloud;
 mod camera;
 mod interior;
+mod station;
 mod spread;
 mod environment;
 mod sun_and_sky;
@@ -32,6 +33,7 @@ use camera::SceneExtent;
 use complete_description::complete_description;
 use interior::{choose_room, hidden_walls};
 use spread::report_gaps;
+use station::choose_station;
 use sun_and_sky::{LightingContext, choose_lights, lights};
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
@@ -105,7 +107,9 @@ impl AutoSettings {
         let bounds = inlier_bounds(&points);
         report_gaps(&points, progress);
         let room = choose_room(scene, description, &points, up);
-        let extent = SceneExtent { points: &points, bounds, up, room: room.as_ref() };
+        let station = choose_station(scene, description, up, room.as_ref());
+        let (room_seen, station) = (room.as_ref(), station.as_ref());
+        let extent = SceneExtent { points: &points, bounds, up, room: room_seen, station };
         let motion = scene.camera_motion.clone();
         let camera = SceneCamera::choose(&scene.graph, &extent, description, motion, progress);
         let diagonal = (bounds.max - bounds.min).length();

@@ -1,0 +1,301 @@
+//! Stations: the place from which one scanner measured a cloud in its own coordinates, all around.
+
+use super::camera::{Camera, Projection};
+use super::ground::ground_axes;
+use crate::math::{DVec3, Vec3};
+use crate::points::{PointCloud, is_valid_position};
+use std::collections::BTreeMap;
+use std::f32::consts::{PI, TAU};
+
+/// Maximum number of points that are looked at: enough for some 40 in each cell of directions.
+const MAX_SAMPLES: usize = 100_000;
+/// Minimum number of points: fewer do not fill the cells of directions.
+const MIN_POINTS: usize = 1000;
+/// Number of sectors about the vertical in which points are counted: one is as wide as a near obstacle.
+const N_SECTORS: usize = 16;
+/// Minimum number of sectors with points: a vehicle or a wall at the scanner's back hides up to a quarter.
+const MIN_SECTORS: usize = 12;
+/// Minimum fraction of the points in a sector with points: stray points fill no sector.
+const MIN_SECTOR_FRACTION: f64 = 0.005;
+/// Minimum ratio of the 90th to the 10th percentile of the distances: the middle of an object that was scanned from
+/// outside is about equally far from all of its surface.
+const MIN_DISTANCE_RATIO: f32 = 3.0;
+/// Width and height of the cells of directions: many rays of a scanner, and about one distance.
+const CELL_DEG: f32 = 5.0;
+/// Minimum number of points in a cell that counts: the logarithm of fewer is mostly noise.
+const MIN_CELL_POINTS: usize = 4;
+/// Maximum slope of the logarithm of the points in a cell over that of its squared distance. It is 0 for points that are
+/// dense in angle and 1 for points that are dense in area: scanners had -0.26 to 0.03, vertices of meshes 0.68, evenly
+/// sampled boxes and terrain 1.0 to 1.4.
+const MAX_DENSITY_SLOPE: f64 = 0.4;
+/// Horizontal angle that should have most of the far points: that of a picture of 16:9.
+const WINDOW_DEG: usize = 90;
+/// Vertical angle of view in degrees: wider than for objects, as things all around are near.
+const VIEW_ANGLE_DEG: f64 = 60.0;
+
+/// The view from the station of a scan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Station {
+    /// World position of the scanner.
+    pub position: DVec3,
+    /// Horizontal unit vector into the longest view.
+    pub direction: DVec3,
+    /// Median distance of the points.
+    pub distance: f64,
+}
+
+impl Station {
+    /// Returns the camera at the station, with a wide view unless `view_angle_deg` is given.
+    pub fn camera(&self, up: Vec3, view_angle_deg: Option<f64>) -> Camera {
+        Camera {
+            position: self.position,
+            focal_point: self.position + self.distance * self.direction,
+            view_up: up.as_dvec3(),
+            projection: Projection::Perspective {
+                view_angle_deg: view_angle_deg.unwrap_or(VIEW_ANGLE_DEG),
+            },
+        }
+    }
+}
+
+/// A point as the scanner measured it.
+struct Sighting {
+    distance: f32,
+    /// Clockwise from north seen from above, from 0 to 2 pi.
+    azimuth_rad: f32,
+    elevation_rad: f32,
+}
+
+/// Returns the station of `cloud` at the zero of its world coordinates, or `None` if its points are not those of a
+/// scanner that stood there: they surround it, at many distances, and are dense in angle rather than in area.
+pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<Station> {
+    let zero = (-cloud.origin).as_vec3();
+    let points = sample(cloud);
+    let (low, high) = points
+        .iter()
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
+    let is_within = low.cmplt(zero).all() && zero.cmplt(high).all();
+    if !is_within || points.len() < MIN_POINTS {
+        return None;
+    }
+    let sightings = sightings_from(zero, &points, up);
+    let mut distances: Vec<f32> = sightings.iter().map(|sighting| sighting.distance).collect();
+    distances.sort_unstable_by(f32::total_cmp);
+    let percentile = |percent: usize| distances.get(distances.len() * percent / 100).copied();
+    let (near, median, far) = (percentile(10)?, percentile(50)?, percentile(90)?);
+    let is_scan = MIN_DISTANCE_RATIO * near <= far
+        && MIN_SECTORS <= n_filled_sectors(&sightings)
+        && density_slope(&sightings)? < MAX_DENSITY_SLOPE;
+    is_scan.then(|| Station {
+        position: DVec3::ZERO,
+        direction: longest_view(&sightings, median, up),
+        distance: median.into(),
+    })
+}
+
+/// Returns points at about equal steps. The steps vary a little, so that they do not follow the rings or columns in
+/// which scanners order their points.
+fn sample(cloud: &PointCloud) -> Vec<Vec3> {
+    let step = cloud.len().div_ceil(MAX_SAMPLES).max(1);
+    let starts = (0..cloud.len()).step_by(step).enumerate();
+    let jittered = starts.map(|(i, start)| {
+        let golden = (i as u32).wrapping_mul(0x9e37_79b9);
+        start + ((u64::from(golden) * step as u64) >> 32) as usize
+    });
+    let positions = jittered.filter_map(|i| cloud.positions.get(i));
+    positions.copied().filter(|p| is_valid_position(*p)).collect()
+}
+
+/// Returns the points as measured from `station`, without missing measurements, which lie at the station itself.
+fn sightings_from(station: Vec3, points: &[Vec3], up: Vec3) -> Vec<Sighting> {
+    let (east, north) = ground_axes(up);
+    let sighting = |point: &Vec3| {
+        let offset = *point - station;
+        let distance = offset.length();
+        let azimuth_rad = offset.dot(east).atan2(offset.dot(north)).rem_euclid(TAU);
+        let elevation_rad = (offset.dot(up) / distance).clamp(-1.0, 1.0).asin();
+        (0.0 < distance).then_some(Sighting { distance, azimuth_rad, elevation_rad })
+    };
+    points.iter().filter_map(sighting).collect()
+}
+
+fn n_filled_sectors(sightings: &[Sighting]) -> usize {
+    let mut counts = [0usize; N_SECTORS];
+    for sighting in sightings {
+        let sector = (sighting.azimuth_rad / TAU * N_SECTORS as f32) as usize;
+        counts[sector.min(N_SECTORS - 1)] += 1;
+    }
+    let min_count = MIN_SECTOR_FRACTION * sightings.len() as f64;
+    counts.into_iter().filter(|count| min_count <= *count as f64).count()
+}
+
+/// Returns the slope of the line of least squares through ln(points) over ln(median distance squared) of the cells of
+/// directions, or `None` if all cells are equally far.
+fn density_slope(sightings: &[Sighting]) -> Option<f64> {
+    let cell_rad = CELL_DEG.to_radians();
+    let mut cells: BTreeMap<(u32, u32), Vec<f32>> = BTreeMap::new();
+    for sighting in sightings {
+        let row = ((sighting.elevation_rad + PI / 2.0) / cell_rad) as u32;
+        let column = (sighting.azimuth_rad / cell_rad) as u32;
+        cells.entry((row, column)).or_default().push(sighting.distance);
+    }
+    let full = cells.into_values().filter(|distances| MIN_CELL_POINTS <= distances.len());
+    let logarithms = full.map(|mut distances| {
+        let middle = distances.len() / 2;
+        let median = *distances.select_nth_unstable_by(middle, f32::total_cmp).1;
+        (2.0 * f64::from(median).ln(), (distances.len() as f64).ln())
+    });
+    let logarithms: Vec<(f64, f64)> = logarithms.collect();
+    let n = logarithms.len() as f64;
+    let (sum_x, sum_y) = logarithms.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0, y + p.1));
+    let (mean_x, mean_y) = (sum_x / n, sum_y / n);
+    let (variance, covariance) = logarithms.iter().fold((0.0, 0.0), |(xx, xy), (x, y)| {
+        (xx + (x - mean_x) * (x - mean_x), xy + (x - mean_x) * (y - mean_y))
+    });
+    (0.0 < variance).then(|| covariance / variance)
+}
+
+/// Returns the horizontal direction about which most points lie beyond `distance`.
+fn longest_view(sightings: &[Sighting], distance: f32, up: Vec3) -> DVec3 {
+    /// Width of the steps in which directions are tried.
+    const STEP_DEG: usize = 5;
+    const N_STEPS: usize = 360 / STEP_DEG;
+    const N_IN_WINDOW: usize = WINDOW_DEG / STEP_DEG;
+    let mut counts = [0usize; N_STEPS];
+    for sighting in sightings.iter().filter(|sighting| distance < sighting.distance) {
+        let step = (sighting.azimuth_rad / TAU * N_STEPS as f32) as usize;
+        counts[step.min(N_STEPS - 1)] += 1;
+    }
+    let n_far =
+        |first: usize| (first..first + N_IN_WINDOW).map(|i| counts[i % N_STEPS]).sum::<usize>();
+    // Of equally long views the northernmost comes first.
+    let first = (0..N_STEPS).rev().max_by_key(|first| n_far(*first)).unwrap_or(0);
+    let azimuth_rad = ((STEP_DEG * first) as f64 + WINDOW_DEG as f64 / 2.0).to_radians();
+    let (east, north) = ground_axes(up);
+    azimuth_rad.sin() * east.as_dvec3() + azimuth_rad.cos() * north.as_dvec3()
+}
+
+#[cfg(test)]
+mod tests {
+    //! Scans in their scanner's coordinates have a station; evenly sampled and georeferenced clouds have none.
+
+    use super::*;
+    use crate::math::Random;
+    use crate::progress::NoProgress;
+    use crate::scanner::scenes::street;
+    use crate::scanner::{Instrument, SpinningLidar, TerrestrialSurvey};
+
+    /// A sweep of a street along `azimuth_deg`, 8 m wide, from 2 m above the ground: every 2 degrees of elevation.
+    fn street_sweep(azimuth_deg: f32) -> PointCloud {
+        let rings = (-15..=10).map(|ring| (2.0 * ring as f32 + 0.5).to_radians());
+        let rays = rings.flat_map(|elevation| (0..720).map(move |i| (elevation, i)));
+        let hit = |(elevation, i): (f32, i32)| {
+            let (sin, cos) = (0.5 * i as f32).to_radians().sin_cos();
+            let direction =
+                Vec3::new(elevation.cos() * sin, elevation.cos() * cos, elevation.sin());
+            let to_wall = 4.0 / direction.x.abs();
+            let to_ground = if direction.z < 0.0 { -2.0 / direction.z } else { f32::INFINITY };
+            let point = to_wall.min(to_ground) * direction;
+            (point.length() < 80.0 && point.z < 12.0).then_some(point)
+        };
+        let (sin, cos) = azimuth_deg.to_radians().sin_cos();
+        let rotated = |p: Vec3| Vec3::new(cos * p.x + sin * p.y, cos * p.y - sin * p.x, p.z);
+        PointCloud::from_positions(rays.filter_map(hit).map(rotated).collect())
+    }
+
+    /// A box of this size about zero whose six sides are sampled evenly.
+    fn even_box(size: Vec3) -> PointCloud {
+        let mut random = Random::new(3, 0);
+        let areas = Vec3::new(size.y * size.z, size.x * size.z, size.x * size.y);
+        let total = areas.x + areas.y + areas.z;
+        let mut side = |_| {
+            let mut p = Vec3::from_array(std::array::from_fn(|_| random.next_f32() - 0.5));
+            let place = total * random.next_f32();
+            let axis = usize::from(areas.x < place) + usize::from(areas.x + areas.y < place);
+            p[axis] = if p[axis] < 0.0 { -0.5 } else { 0.5 };
+            size * p
+        };
+        PointCloud::from_positions((0..50_000).map(&mut side).collect())
+    }
+
+    #[test]
+    fn a_sweep_of_a_street_looks_along_the_street() {
+        for azimuth_deg in [0.0f32, 30.0, 90.0] {
+            let station = find_station(&street_sweep(azimuth_deg), Vec3::Z).unwrap();
+            let (sin, cos) = f64::from(azimuth_deg).to_radians().sin_cos();
+            let along = station.direction.dot(DVec3::new(sin, cos, 0.0)).abs();
+            assert!(0.85 < along, "{azimuth_deg}: {station:?}");
+            let camera = station.camera(Vec3::Z, None);
+            assert_eq!((camera.position, camera.focal_point.z), (DVec3::ZERO, 0.0));
+        }
+    }
+
+    #[test]
+    fn the_zero_of_the_file_decides_and_not_that_of_the_cloud() {
+        let mut cloud = street_sweep(0.0);
+        let station = find_station(&cloud, Vec3::Z).unwrap();
+        cloud.rebase(DVec3::new(5.0, -7.0, 1.0));
+        let rebased = find_station(&cloud, Vec3::Z).unwrap();
+        assert!(rebased.direction.distance(station.direction) < 1e-6);
+        assert_eq!(rebased.position, DVec3::ZERO);
+        // The same scan in a national grid, about its own origin.
+        cloud.rebase(DVec3::ZERO);
+        cloud.origin = DVec3::new(500_000.0, 5_400_000.0, 300.0);
+        assert_eq!(find_station(&cloud, Vec3::Z), None);
+    }
+
+    #[test]
+    fn scanners_have_a_station() {
+        let scene = street::scene().sdf;
+        let standing = street::spinning().path[0];
+        let spinning = SpinningLidar { path: vec![standing], ..SpinningLidar::default() };
+        let survey = street::terrestrial(0.5);
+        let positions = survey.stations.iter().map(|station| station.position);
+        let surveys = survey.stations.iter().map(|station| {
+            let stations = vec![station.clone()];
+            TerrestrialSurvey { stations, scanner: survey.scanner.clone() }
+        });
+        let swept = (spinning.scan(&scene, &NoProgress).unwrap(), standing);
+        let scans = surveys.map(|survey| survey.scan(&scene, &NoProgress).unwrap()).zip(positions);
+        for (mut scan, position) in scans.chain([swept]) {
+            scan.origin -= position;
+            assert!(find_station(&scan, Vec3::Z).is_some(), "{position}");
+        }
+    }
+
+    #[test]
+    fn even_clouds_have_no_station() {
+        for size in [Vec3::new(6.0, 4.0, 2.5), Vec3::new(60.0, 8.0, 4.0)] {
+            assert_eq!(find_station(&even_box(size), Vec3::Z), None, "{size}");
+        }
+        let ball = (0..20_000).map(|i| {
+            let z = 1.0 - (2.0 * i as f32 + 1.0) / 20_000.0;
+            let (sin, cos) = (2.399_963 * i as f32).sin_cos();
+            Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+        });
+        assert_eq!(find_station(&PointCloud::from_positions(ball.collect()), Vec3::Z), None);
+        assert_eq!(find_station(&PointCloud::default(), Vec3::Z), None);
+    }
+
+    #[test]
+    fn terrain_has_no_station() {
+        let height = |x: f32, y: f32| 6.0 * (0.05 * x).sin() + 4.0 * (0.08 * y).cos();
+        let terrain = (0..90_000).map(|i| {
+            let (x, y) = ((i % 300) as f32 - 150.0, (i / 300) as f32 - 150.0);
+            Vec3::new(x, y, height(x, y))
+        });
+        let mut cloud = PointCloud::from_positions(terrain.collect());
+        assert_eq!(find_station(&cloud, Vec3::Z), None);
+        cloud.origin = DVec3::new(500_000.0, 5_400_000.0, 300.0);
+        assert_eq!(find_station(&cloud, Vec3::Z), None);
+    }
+
+    #[test]
+    fn a_long_cloud_is_sampled_over_its_length() {
+        let n = 5 * MAX_SAMPLES + 1;
+        let cloud = PointCloud::from_positions((0..n).map(|i| Vec3::X * i as f32).collect());
+        let points = sample(&cloud);
+        assert!(points.len() <= MAX_SAMPLES && points.is_sorted_by(|a, b| a.x < b.x));
+        assert!((0.99 * n as f32) < points[points.len() - 1].x);
+    }
+}
