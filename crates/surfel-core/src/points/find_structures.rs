@@ -34,7 +34,7 @@ const N_VOTERS: usize = 8;
 const N_ROUNDS: usize = 12;
 /// Share of scattered points around a point, after all rounds, that makes it a scattered one.
 const MIN_SCATTERED: f32 = 0.5;
-/// The same in a noisy cloud.
+/// Minimum share of scattered points around a scattered point of a noisy cloud.
 const MIN_SCATTERED_IN_NOISE: f32 = 0.9;
 /// Ratio of a radius to the typical one from which the neighbourhood is sparse.
 const SPARSE: f32 = 2.0;

@@ -35,7 +35,7 @@ const VIEW_ANGLE_DEG: f64 = 60.0;
 
 /// The view from the station of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Station {
+pub struct StationView {
     /// World position of the scanner.
     pub position: DVec3,
     /// Horizontal unit vector into the longest view.
@@ -44,7 +44,7 @@ pub struct Station {
     pub distance: f64,
 }
 
-impl Station {
+impl StationView {
     /// Returns the camera at the station, with a wide view unless `view_angle_deg` is given.
     pub fn camera(&self, up: Vec3, view_angle_deg: Option<f64>) -> Camera {
         Camera {
@@ -68,7 +68,7 @@ struct Sighting {
 
 /// Returns the station of `cloud` at the zero of its world coordinates, or `None` if its points are not those of a
 /// scanner that stood there: they surround it, at many distances, and are dense in angle rather than in area.
-pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<Station> {
+pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
     let zero = (-cloud.origin).as_vec3();
     let points = sample(cloud);
     let (low, high) = points
@@ -86,7 +86,7 @@ pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<Station> {
     let is_scan = MIN_DISTANCE_RATIO * near <= far
         && MIN_SECTORS <= n_filled_sectors(&sightings)
         && density_slope(&sightings)? < MAX_DENSITY_SLOPE;
-    is_scan.then(|| Station {
+    is_scan.then(|| StationView {
         position: DVec3::ZERO,
         direction: longest_view(&sightings, median, up),
         distance: median.into(),

@@ -7,7 +7,7 @@ use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::{PointCloud, UpConvention, infer_up};
 use surfel_core::progress::Progress;
 use surfel_core::scene::{
-    Camera, CameraFit, Graph, Projection, Room, Station, default_view_up, fit_camera,
+    Camera, CameraFit, Graph, Projection, Room, StationView, default_view_up, fit_camera,
     panorama_camera,
 };
 use surfel_formats::FileInfo;
@@ -38,7 +38,7 @@ pub struct SceneExtent<'a> {
     /// The room that the points show, if its inside is to be seen.
     pub room: Option<&'a Room>,
     /// The station from which the scene is shown.
-    pub station: Option<&'a Station>,
+    pub station: Option<&'a StationView>,
 }
 
 impl SceneCamera {

@@ -3,7 +3,7 @@
 use super::loaded::LoadedScene;
 use crate::description::{Interior, SceneDescription};
 use surfel_core::math::Vec3;
-use surfel_core::scene::{Room, Station, find_station};
+use surfel_core::scene::{Room, StationView, find_station};
 
 /// Returns the station from which the scene is shown: that of a single cloud that stands still, if nothing is asked of
 /// the camera.
@@ -14,7 +14,7 @@ pub fn choose_station(
     description: &SceneDescription,
     up: Vec3,
     room: Option<&Room>,
-) -> Option<Station> {
+) -> Option<StationView> {
     let camera = &description.camera;
     let is_open = camera.is_automatic() && camera.interior() == Interior::Auto;
     let is_merged = scene.file_infos.len() != 1;
