@@ -86,7 +86,7 @@ pub fn find_structures(
     let n_rough = fits.par_iter().filter(|fit| !is_line(fit) && !is_surface(fit)).count();
     let structures = smoothed(tree, &shapes, n_rough, typical.radius, progress)?;
     let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
-        settle(tree, point, &fits[point], radii[point], *structure, shape);
+        settle(tree, point, radii[point], *structure, shape);
     };
     shapes.par_iter_mut().zip(&structures).enumerate().for_each(finish);
     limit_wide_discs(positions, radii, &mut shapes, progress)?;
@@ -275,7 +275,7 @@ fn smoothed(
     let mut structures: Vec<Structure> = own.zip(shapes).zip(&shares).map(decided).collect();
     let n_island_rounds = if is_noisy { 0 } else { N_ISLAND_ROUNDS };
     for _ in 0..n_island_rounds {
-        let (next, n_changed) = without_islands(tree, &structures, &shares);
+        let (next, n_changed) = without_islands(tree, &structures, &shares, progress)?;
         structures = next;
         if n_changed == 0 {
             break;
@@ -289,39 +289,31 @@ fn without_islands(
     tree: &KdTree,
     structures: &[Structure],
     shares: &[f32],
-) -> (Vec<Structure>, usize) {
+    progress: &dyn Progress,
+) -> Result<(Vec<Structure>, usize)> {
     let is_island = |(point, (structure, share)): (usize, (&Structure, &f32))| {
         if *structure != Structure::Surface || *share < MIN_SHARE_NEAR_SCATTER {
-            return false;
+            return Ok(false);
         }
+        progress.check()?;
         let around = tree.nearest(tree.positions()[point], N_MANY_NEIGHBORS, Some(point as u32));
         let of_neighbor = |neighbor: &Neighbor| structures[neighbor.index as usize];
         let is_scattered = |neighbor: &&Neighbor| of_neighbor(neighbor) == Structure::Scatter;
-        around.len() <= 2 * around.iter().filter(is_scattered).count()
+        Ok(around.len() <= 2 * around.iter().filter(is_scattered).count())
     };
-    let is_island: Vec<bool> =
-        structures.par_iter().zip(shares).enumerate().map(is_island).collect();
+    let points = structures.par_iter().zip(shares).enumerate();
+    let is_island = points.map(is_island).collect::<Result<Vec<bool>>>()?;
     let next = structures.iter().zip(&is_island);
     let next = next.map(|(own, is_island)| if *is_island { Structure::Scatter } else { *own });
-    (next.collect(), is_island.iter().filter(|is_island| **is_island).count())
+    let n_islands = is_island.iter().filter(|is_island| **is_island).count();
+    Ok((next.collect(), n_islands))
 }
 
-/// Gives a point the normal and the radius of its final structure.
-fn settle(
-    tree: &KdTree,
-    point: usize,
-    fit: &PlaneFit,
-    radius: f32,
-    structure: Structure,
-    shape: &mut PointShape,
-) {
+/// Gives a point the direction and the radius of its final structure. Surface points keep what was decided.
+fn settle(tree: &KdTree, point: usize, radius: f32, structure: Structure, shape: &mut PointShape) {
     let position = tree.positions()[point];
     match structure {
-        Structure::Surface | Structure::Redundant => {
-            if shape.structure == Structure::Line {
-                (shape.normal, shape.radius) = (fit.normal, radius);
-            }
-        }
+        Structure::Surface | Structure::Redundant => {}
         Structure::Line => {
             let neighbors = tree.nearest(position, N_VOTERS, Some(point as u32));
             shape.normal = line_direction(tree.positions(), point, &neighbors);
@@ -354,8 +346,7 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
-    use crate::points::{PointCloud, StructureChoice};
-    use crate::points::{Preparation, PreparedCloud, prepare};
+    use crate::points::{PointCloud, Preparation, PreparedCloud, StructureChoice, prepare};
     use crate::progress::NoProgress;
 
     fn prepared(positions: Vec<Vec3>) -> (PreparedCloud, Vec<Structure>) {

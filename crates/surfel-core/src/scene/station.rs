@@ -2,7 +2,7 @@
 
 use super::camera::{Camera, Projection};
 use super::ground::ground_axes;
-use crate::math::{DVec3, Vec3};
+use crate::math::{Aabb, DVec3, Vec3};
 use crate::points::{PointCloud, is_valid_position};
 use std::collections::BTreeMap;
 use std::f32::consts::{PI, TAU};
@@ -59,7 +59,7 @@ impl StationView {
 }
 
 /// A point as the scanner measured it.
-struct Sighting {
+struct PolarPoint {
     distance: f32,
     /// Clockwise from north seen from above, from 0 to 2 pi.
     azimuth_rad: f32,
@@ -71,24 +71,22 @@ struct Sighting {
 pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
     let zero = (-cloud.origin).as_vec3();
     let points = sample(cloud);
-    let (low, high) = points
-        .iter()
-        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
-    let is_within = low.cmplt(zero).all() && zero.cmplt(high).all();
+    let bounds = Aabb::of_points(points.iter().copied());
+    let is_within = bounds.min.cmplt(zero).all() && zero.cmplt(bounds.max).all();
     if !is_within || points.len() < MIN_POINTS {
         return None;
     }
-    let sightings = sightings_from(zero, &points, up);
-    let mut distances: Vec<f32> = sightings.iter().map(|sighting| sighting.distance).collect();
+    let points = polar_points(zero, &points, up);
+    let mut distances: Vec<f32> = points.iter().map(|point| point.distance).collect();
     distances.sort_unstable_by(f32::total_cmp);
     let percentile = |percent: usize| distances.get(distances.len() * percent / 100).copied();
     let (near, median, far) = (percentile(10)?, percentile(50)?, percentile(90)?);
     let is_scan = MIN_DISTANCE_RATIO * near <= far
-        && MIN_SECTORS <= n_filled_sectors(&sightings)
-        && density_slope(&sightings)? < MAX_DENSITY_SLOPE;
+        && MIN_SECTORS <= n_filled_sectors(&points)
+        && density_slope(&points)? < MAX_DENSITY_SLOPE;
     is_scan.then(|| StationView {
         position: DVec3::ZERO,
-        direction: longest_view(&sightings, median, up),
+        direction: longest_view(&points, median, up),
         distance: median.into(),
     })
 }
@@ -107,37 +105,37 @@ fn sample(cloud: &PointCloud) -> Vec<Vec3> {
 }
 
 /// Returns the points as measured from `station`, without missing measurements, which lie at the station itself.
-fn sightings_from(station: Vec3, points: &[Vec3], up: Vec3) -> Vec<Sighting> {
+fn polar_points(station: Vec3, points: &[Vec3], up: Vec3) -> Vec<PolarPoint> {
     let (east, north) = ground_axes(up);
-    let sighting = |point: &Vec3| {
+    let polar = |point: &Vec3| {
         let offset = *point - station;
         let distance = offset.length();
         let azimuth_rad = offset.dot(east).atan2(offset.dot(north)).rem_euclid(TAU);
         let elevation_rad = (offset.dot(up) / distance).clamp(-1.0, 1.0).asin();
-        (0.0 < distance).then_some(Sighting { distance, azimuth_rad, elevation_rad })
+        (0.0 < distance).then_some(PolarPoint { distance, azimuth_rad, elevation_rad })
     };
-    points.iter().filter_map(sighting).collect()
+    points.iter().filter_map(polar).collect()
 }
 
-fn n_filled_sectors(sightings: &[Sighting]) -> usize {
+fn n_filled_sectors(points: &[PolarPoint]) -> usize {
     let mut counts = [0usize; N_SECTORS];
-    for sighting in sightings {
-        let sector = (sighting.azimuth_rad / TAU * N_SECTORS as f32) as usize;
+    for point in points {
+        let sector = (point.azimuth_rad / TAU * N_SECTORS as f32) as usize;
         counts[sector.min(N_SECTORS - 1)] += 1;
     }
-    let min_count = MIN_SECTOR_FRACTION * sightings.len() as f64;
+    let min_count = MIN_SECTOR_FRACTION * points.len() as f64;
     counts.into_iter().filter(|count| min_count <= *count as f64).count()
 }
 
 /// Returns the slope of the line of least squares through ln(points) over ln(median distance squared) of the cells of
 /// directions, or `None` if all cells are equally far.
-fn density_slope(sightings: &[Sighting]) -> Option<f64> {
+fn density_slope(points: &[PolarPoint]) -> Option<f64> {
     let cell_rad = CELL_DEG.to_radians();
     let mut cells: BTreeMap<(u32, u32), Vec<f32>> = BTreeMap::new();
-    for sighting in sightings {
-        let row = ((sighting.elevation_rad + PI / 2.0) / cell_rad) as u32;
-        let column = (sighting.azimuth_rad / cell_rad) as u32;
-        cells.entry((row, column)).or_default().push(sighting.distance);
+    for point in points {
+        let row = ((point.elevation_rad + PI / 2.0) / cell_rad) as u32;
+        let column = (point.azimuth_rad / cell_rad) as u32;
+        cells.entry((row, column)).or_default().push(point.distance);
     }
     let full = cells.into_values().filter(|distances| MIN_CELL_POINTS <= distances.len());
     let logarithms = full.map(|mut distances| {
@@ -156,14 +154,14 @@ fn density_slope(sightings: &[Sighting]) -> Option<f64> {
 }
 
 /// Returns the horizontal direction about which most points lie beyond `distance`.
-fn longest_view(sightings: &[Sighting], distance: f32, up: Vec3) -> DVec3 {
+fn longest_view(points: &[PolarPoint], distance: f32, up: Vec3) -> DVec3 {
     /// Width of the steps in which directions are tried.
     const STEP_DEG: usize = 5;
     const N_STEPS: usize = 360 / STEP_DEG;
     const N_IN_WINDOW: usize = WINDOW_DEG / STEP_DEG;
     let mut counts = [0usize; N_STEPS];
-    for sighting in sightings.iter().filter(|sighting| distance < sighting.distance) {
-        let step = (sighting.azimuth_rad / TAU * N_STEPS as f32) as usize;
+    for point in points.iter().filter(|point| distance < point.distance) {
+        let step = (point.azimuth_rad / TAU * N_STEPS as f32) as usize;
         counts[step.min(N_STEPS - 1)] += 1;
     }
     let n_far =
