@@ -9,8 +9,10 @@ use crate::usage::Usage;
 use anyhow::Context;
 use std::path::PathBuf;
 use surfel::description::ObjectSettings;
-use surfel::resolve::{MemoryEstimate, report_normals, report_radii};
-use surfel_core::points::{Orientation, PointCloud, clean, prepare, subsample};
+use surfel::resolve::{MemoryEstimate, report_denoise, report_normals, report_radii};
+use surfel_core::points::{
+    Denoise, Orientation, PointCloud, Preparation, clean, denoise, prepare, subsample,
+};
 use surfel_core::progress::Progress;
 use surfel_formats::{ColumnChoice, Loaded, SaveOptions};
 
@@ -25,7 +27,7 @@ pub struct Args {
     /// The prepared cloud: .ply (all columns), .las or .laz.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Adds normals. Without this, --radius, --orient, --subsample and --keep-variation: normals and radii.
+    /// Adds normals. Without this, --radius, --orient, --subsample, --denoise and --keep-variation: normals and radii.
     #[arg(long, help_heading = "Preparation")]
     normals: bool,
     /// Adds the column surface_variation: 0 on a plane, up to 1/3 where points fill space.
@@ -46,6 +48,7 @@ const EXAMPLES: &str = "\
 Examples:
   surfel prepare scan.laz -o ready.ply                          normals and radii
   surfel prepare scan.laz -o thin.laz --subsample spacing:0.1   fewer points, nothing else
+  surfel prepare scan.laz -o calm.laz --denoise on              points moved onto their surface, nothing else
   surfel prepare scan.laz -o ready.ply --normals-k 24 --orient mst
   surfel prepare east.laz west.laz -o both.ply --radius median:6";
 
@@ -105,14 +108,20 @@ fn prepared(
     seed: u64,
     report: &Report,
 ) -> anyhow::Result<PointCloud> {
+    // A file keeps its points where they are unless asked.
+    let mode = settings.preparation.denoise.unwrap_or(Denoise::Off);
     if !columns.normals && !columns.radii && !columns.variation {
         let (cloud, _) = clean(cloud, report)?;
-        return Ok(match settings.preparation.subsample {
+        let mut cloud = match settings.preparation.subsample {
             Some(choice) => subsample(&cloud, choice, seed, report)?,
             None => cloud,
-        });
+        };
+        if let Some(moved) = denoise(&mut cloud.positions, mode, report)? {
+            report.choice(&moved.line(), &["denoise"]);
+        }
+        return Ok(cloud);
     }
-    let mut preparation = settings.preparation(seed);
+    let mut preparation = Preparation { denoise: mode, ..settings.preparation(seed) };
     preparation.keep_variation = columns.variation;
     let (had_normals, had_radii) = (cloud.normals.is_some(), cloud.radii.is_some());
     let (cloud, prepared) = prepare(cloud, &preparation, report)?;
@@ -124,6 +133,7 @@ fn prepared(
     if !columns.radii && !had_radii {
         cloud.radii = None;
     }
+    report_denoise(&prepared, report);
     if columns.normals {
         report_normals(&prepared, report);
     }
@@ -144,7 +154,7 @@ fn columns(args: &Args, settings: &ObjectSettings) -> Columns {
         variation: args.keep_variation,
     };
     let is_empty = !columns.normals && !columns.radii && !columns.variation;
-    if is_empty && preparation.subsample.is_none() {
+    if is_empty && preparation.subsample.is_none() && preparation.denoise.is_none() {
         return Columns { normals: true, radii: true, variation: false };
     }
     columns

@@ -1,5 +1,6 @@
-//! Preparation: cleans and subsamples a cloud, and adds the normals and radii that it lacks.
+//! Preparation: cleans, subsamples and denoises a cloud, and adds the normals and radii that it lacks.
 
+use super::denoise::{Denoise, DenoiseReport, denoise};
 use super::find_structures::{all_scattered, find_structures};
 use super::neighbors::{KdTree, Neighbor, NeighborMethod, Neighborhood, map_neighborhoods};
 use super::normals::{NormalReport, PlaneFit, fill_missing, fit_plane};
@@ -20,6 +21,8 @@ pub const SURFACE_VARIATION: &str = "surface_variation";
 pub struct Preparation {
     /// The points to keep; none keeps all.
     pub subsample: Option<Subsample>,
+    /// The choice whether noisy points are moved onto their surface.
+    pub denoise: Denoise,
     /// The method that finds neighbours.
     pub neighbors: NeighborMethod,
     /// The neighbours whose plane gives a normal. Methods that know only distances use the median distance to k.
@@ -40,6 +43,7 @@ impl Default for Preparation {
     fn default() -> Self {
         Self {
             subsample: None,
+            denoise: Denoise::default(),
             neighbors: NeighborMethod::Knn,
             normals: Neighborhood::Nearest(16),
             orientation: Orientation::None,
@@ -73,6 +77,8 @@ impl Preparation {
 pub struct PreparationReport {
     /// Repairs of the cloud.
     pub clean: CleanReport,
+    /// What denoising did, if points were moved.
+    pub denoise: Option<DenoiseReport>,
     /// Number of points after cleaning and subsampling.
     pub n_points: usize,
     /// Origin of the estimated normals.
@@ -85,7 +91,7 @@ pub struct PreparationReport {
     pub structure: Option<StructureReport>,
 }
 
-/// Cleans and subsamples a cloud, then adds the normals and radii that are missing. Those of the file stay. Columns
+/// Cleans, subsamples and denoises a cloud, then adds the normals and radii that are missing. Those of the file stay. Columns
 /// that are estimated get offsets in each morph target, estimated from the points where the target moves them.
 ///
 /// # Errors
@@ -105,10 +111,11 @@ pub fn prepare(
     if cloud.is_empty() {
         return Err(Error::EmptyCloud);
     }
+    let denoise = denoise_points(&mut cloud, preparation.denoise, progress)?;
     let missing = Missing::any(&cloud, preparation);
     let estimated = Missing::all(&cloud);
     let mut report =
-        PreparationReport { clean, n_points: cloud.len(), ..PreparationReport::default() };
+        PreparationReport { clean, denoise, n_points: cloud.len(), ..Default::default() };
     let mut estimates = estimate(&cloud.positions, preparation, &missing, progress)?;
     let shapes = match missing.structure {
         true => find_shapes(&cloud.positions, &mut estimates, preparation.structure, progress)?,
@@ -135,6 +142,20 @@ pub fn prepare(
     }
     add_to_morphs(&mut cloud, &estimated, preparation, progress)?;
     Ok((PreparedCloud::new(cloud)?, report))
+}
+
+/// Moves the points of a cloud at rest onto their surface, if `choice` says so.
+fn denoise_points(
+    cloud: &mut PointCloud,
+    choice: Denoise,
+    progress: &dyn Progress,
+) -> Result<Option<DenoiseReport>> {
+    let is_animated = !cloud.morphs.is_empty() || cloud.skin.is_some();
+    match choice {
+        Denoise::Auto if cloud.normals.is_some() => Ok(None),
+        _ if is_animated => Ok(None),
+        _ => denoise(&mut cloud.positions, choice, progress),
+    }
 }
 
 /// The columns to estimate.

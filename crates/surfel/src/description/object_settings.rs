@@ -12,7 +12,8 @@ use surfel_core::image::Colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
 use surfel_core::points::{
-    Orientation, Preparation, Radius, STRUCTURE, SURFACE_VARIATION, StructureChoice, Subsample,
+    Denoise, Orientation, Preparation, Radius, STRUCTURE, SURFACE_VARIATION, StructureChoice,
+    Subsample,
 };
 use surfel_core::scene::color::{ColorSource, Coloring};
 use surfel_core::scene::{Clip, ClipBox, ClipPlane};
@@ -41,6 +42,9 @@ settings! {
     pub struct PreparationSettings {
         /// Keeps fewer points: first:N, random:N, stride:S or spacing:LENGTH.
         subsample: Subsample, SubsampleRule, "CHOICE";
+        /// Moves noisy points onto their surface: auto (surfaces whose noise is at least 0.15 of the spacing), on or
+        /// off [default: auto, off for surfel prepare].
+        denoise: Denoise, parsed(Denoise::to_string), "WHEN";
         /// Search for neighbours: knn, grid or scan-line.
         neighbors: NeighborMethod = NeighborMethod::default(), parsed(method_name), "METHOD";
         /// Number of neighbours that a normal is estimated from [default: 16].
@@ -121,6 +125,7 @@ impl ObjectSettings {
         let nearest = settings.normals_k.map(|k| Neighborhood::Nearest(k as usize));
         Preparation {
             subsample: settings.subsample,
+            denoise: settings.denoise.unwrap_or(default.denoise),
             neighbors: settings.neighbors(),
             normals: within.or(nearest).unwrap_or(default.normals),
             orientation: settings.orient(),

@@ -103,6 +103,7 @@ pub fn report_prepared(
     settings: &ObjectSettings,
     progress: &dyn Progress,
 ) {
+    report_denoise(report, progress);
     if report.normals.is_none() {
         progress.choice("normals as in the file", &["normals_k"]);
     }
@@ -113,6 +114,13 @@ pub fn report_prepared(
     report_radii(report, settings, progress);
     if let Some(structure) = &report.structure {
         progress.choice(&structure.line(), &["structure"]);
+    }
+}
+
+/// Reports how far points were moved onto their surface.
+pub fn report_denoise(report: &PreparationReport, progress: &dyn Progress) {
+    if let Some(denoise) = &report.denoise {
+        progress.choice(&denoise.line(), &["denoise"]);
     }
 }
 

@@ -17,7 +17,7 @@ mod complete_description;
 
 pub(crate) use appearance::finish_graph;
 pub use camera::{SceneCamera, choose_camera, choose_up, short_position, up_convention};
-pub use cloud::{prepare_cloud, report_normals, report_prepared, report_radii};
+pub use cloud::{prepare_cloud, report_denoise, report_normals, report_prepared, report_radii};
 pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;
 pub use loaded::{KeepOptions, LoadedScene, check_files};

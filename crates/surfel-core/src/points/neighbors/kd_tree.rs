@@ -104,6 +104,12 @@ impl<'a> KdTree<'a> {
         self.positions
     }
 
+    /// Returns the indices of all finite points so that points near each other follow each other.
+    pub fn order(&self) -> Vec<u32> {
+        let indices = self.leaves.iter().flat_map(|leaf| leaf.index.as_flattened());
+        indices.take(self.n_points).copied().collect()
+    }
+
     /// Returns the whole tree.
     pub(super) fn root(&self) -> Subtree {
         Subtree { node: 0, first_leaf: 0, n_leaves: self.leaves.len() as u32 }
