@@ -1,6 +1,6 @@
 //! Pixels, layers and bytes of pictures.
 
-use super::common::{Folder, dome, read_png, shot, square, succeed};
+use super::common::{Folder, dome, read_png, shot, square, stderr, succeed, surfel};
 use std::fs;
 
 #[test]
@@ -77,6 +77,56 @@ fn radius_scale_applies_to_fixed_and_estimated_radii() {
     assert_eq!(picture(&["--radius", "0.125", "--radius-scale", "2"]), fixed);
     assert_eq!(picture(&["--radius-scale", "1"]), picture(&[]));
     assert_ne!(picture(&["--radius-scale", "2"]), picture(&[]));
+}
+
+#[test]
+fn points_have_the_size_that_is_given_or_chosen() {
+    let folder = Folder::new();
+    let cloud = folder.write("two.xyz", "0 0 0 255 0 0\n10 0 0 0 255 0\n");
+    let picture = folder.path("two.png");
+    let camera = ["--camera-position", "5,-20,0", "--camera-focal-point", "5,0,0"];
+    let points = ["--surface", "points", "--background", "white", "--resolution", "96x64"];
+    let covered = |options: &[&str]| {
+        let arguments = [&["render", &cloud, "-o", &picture][..], &points, &camera, options];
+        let report = stderr(&surfel(&arguments.concat()));
+        let (_, _, channels, samples) = read_png(&picture);
+        let pixels = samples.chunks_exact(channels as usize);
+        let red = pixels.clone().filter(|pixel| pixel[..3] == [255, 0, 0]).count();
+        let green = pixels.filter(|pixel| pixel[..3] == [0, 255, 0]).count();
+        (red, green, report)
+    };
+    let (red, green, report) = covered(&["--point-size", "1"]);
+    assert_eq!((red, green), (1, 1), "{report}");
+    assert!(!report.contains("--point-size"), "{report}");
+    // Round points of ten pixels cover about 79 pixels, and neither point shades the other.
+    let (red, green, _) = covered(&["--point-size", "10"]);
+    assert!((70..90).contains(&red) && (70..90).contains(&green), "{red} {green}");
+    let (chosen, _, report) = covered(&[]);
+    assert!(
+        report.contains("point size 8 pixels") && report.contains("[--point-size]"),
+        "{report}"
+    );
+    assert_eq!(chosen, covered(&["--point-size", "8"]).0);
+    let (.., orthographic) = covered(&["--point-size", "4", "--camera-orthographic", "20"]);
+    assert!(!orthographic.contains("error"), "{orthographic}");
+}
+
+#[test]
+fn point_size_is_a_key_of_scene_files_and_of_the_dry_run() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let scene = format!("surface = \"points\"\npoint-size = 5.5\n[[object]]\nfile = {cloud:?}\n");
+    let scene = folder.write("scene.toml", scene);
+    let typed = shot(&folder, &[&cloud, "--surface", "points", "--point-size", "5.5"]);
+    assert!(shot(&folder, &[&scene]) == typed);
+    assert!(shot(&folder, &[&scene, "--point-size", "2"]) != typed);
+    let dry = succeed(&["render", &cloud, "--surface", "points", "--dry-run"]);
+    let dry: serde_json::Value = serde_json::from_str(&dry).unwrap();
+    assert!(dry["point_size"].is_number(), "{dry}");
+    // No other surface has a size in pixels.
+    let dry = succeed(&["render", &cloud, "--dry-run"]);
+    let dry: serde_json::Value = serde_json::from_str(&dry).unwrap();
+    assert!(dry["point_size"].is_null(), "{dry}");
 }
 
 #[test]
