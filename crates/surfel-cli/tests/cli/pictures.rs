@@ -138,9 +138,40 @@ fn an_exr_has_all_layers() {
     let meta = exr::meta::MetaData::read_from_file(&picture, false).unwrap();
     let channels = &meta.headers[0].channels.list;
     let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
-    for name in ["R", "A", "Z", "N.X", "P.Z", "id", "instance", "coverage"] {
+    for name in [
+        "R",
+        "A",
+        "Z",
+        "N.X",
+        "P.Z",
+        "id",
+        "instance",
+        "coverage",
+        "support.count",
+        "support.distance",
+    ] {
         assert!(names.iter().any(|known| known == name), "{name}: {names:?}");
     }
+}
+
+#[test]
+fn support_is_a_colour_source_with_a_map_and_a_range() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let picture = |options: &[&str]| shot(&folder, &[&[cloud.as_str()][..], options].concat());
+    let support = picture(&["--color", "support"]);
+    assert!(support != picture(&[]));
+    assert!(support == picture(&["--color", "support", "--cmap", "viridis", "--range", "0,1"]));
+    assert!(support != picture(&["--color", "support", "--cmap", "coolwarm"]));
+    assert!(support != picture(&["--color", "support", "--range", "0,0.5"]));
+    for surface in ["disc", "splat", "sphere", "points"] {
+        assert!(picture(&["--color", "support", "--surface", surface]) != support, "{surface}");
+    }
+    let file = folder.path("told.png");
+    let report = stderr(&surfel(&["render", &cloud, "-o", &file, "--color", "support"]));
+    let expected = "color support from 0.000 to 1.000 (at a point to one radius away from all points), map \
+                    viridis [--color, --cmap, --range]";
+    assert!(report.contains(expected), "{report}");
 }
 
 #[test]

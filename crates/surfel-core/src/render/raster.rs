@@ -11,6 +11,7 @@ use crate::math::LANES;
 use crate::progress::Progress;
 use crate::scene::{Background, View};
 use crate::surface::SurfaceKind;
+use crate::trace::Support;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -193,6 +194,8 @@ impl Raster {
             aovs.point_id[pixel] = points.id(slot);
             aovs.instance_id[pixel] = instance_idx;
             aovs.albedo[pixel] = albedo;
+            aovs.support_count[pixel] = Support::POINT.n_points;
+            aovs.support_distance[pixel] = Support::POINT.distance;
         }
         image
     }
