@@ -130,8 +130,11 @@ test('each control has a case', async () => {
 });
 
 test('the size of points is chosen, and can be changed and chosen again', async () => {
-  const other = await openPage((await serve('town.ply', ...QUICK, '--surface', 'points')).link);
+  const other = await openPage((await serve(['town.ply'], ...QUICK)).link);
   await unfoldPanel(other);
+  assert.ok(await other.locator('[data-number="point_size"]').isHidden());
+  await other.locator('[data-key="surface"]').selectOption('points');
+  await settled(other);
   const start = await finishedPixels(other);
   const { point_size: chosen } = await state(other, 'scene');
   assert.ok(1 <= chosen && chosen <= 8, `${chosen}`);

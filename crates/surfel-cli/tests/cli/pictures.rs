@@ -90,7 +90,7 @@ fn points_have_the_size_that_is_given_or_chosen() {
         let arguments = [&["render", &cloud, "-o", &picture][..], &points, &camera, options];
         let report = stderr(&surfel(&arguments.concat()));
         let (_, _, channels, samples) = read_png(&picture);
-        let pixels = samples.chunks_exact(channels as usize);
+        let pixels = samples.chunks_exact(channels);
         let red = pixels.clone().filter(|pixel| pixel[..3] == [255, 0, 0]).count();
         let green = pixels.filter(|pixel| pixel[..3] == [0, 255, 0]).count();
         (red, green, report)

@@ -10,7 +10,8 @@ use surfel_core::scene::color::SupportColors;
 use surfel_core::scene::{CloudGeometry, Geometry, Material, Scene};
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::{self, InstanceFilter, SceneHit, Simd, Support};
-use surfel_tests::{clouds, scenes};
+use surfel_tests::clouds;
+use surfel_tests::scenes;
 
 const SETTINGS: Settings = Settings {
     width: 48,
