@@ -267,6 +267,7 @@ fn cancelling(criterion: &mut Criterion) {
         light_samples: 64,
         max_depth: 3,
         seed: 0,
+        point_size: 1.0,
         with_aovs: false,
     };
     let renderer = CpuRenderer { simd: Simd::detect() };

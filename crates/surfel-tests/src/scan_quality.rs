@@ -105,6 +105,7 @@ impl TrueScene {
             height: self.resolution,
             samples_per_pixel: 1,
             light_samples: 1,
+            point_size: 1.0,
             with_aovs: true,
             ..Settings::default()
         };

@@ -63,6 +63,9 @@ const CASES = {
   'material.house.obj.emissive_strength': { given: [['material.house.obj', 'emissive']], value: 2 },
 };
 
+// Controls of pictures without meshes have a test of their own.
+const FOR_CLOUDS = ['point_size'];
+
 let page;
 let first;
 before(async () => {
@@ -123,10 +126,32 @@ async function sceneValue({ key, read }) {
 test('each control has a case', async () => {
   const { objects } = await state(page, 'info');
   assert.deepEqual(objects.map(({ name }) => name), OBJECTS);
-  assert.deepEqual(Object.keys(CASES).sort(), CONTROLS.map(({ key }) => key).sort());
+  assert.deepEqual([...Object.keys(CASES), ...FOR_CLOUDS].sort(), CONTROLS.map(({ key }) => key).sort());
 });
 
-for (const control of CONTROLS) {
+test('the size of points is chosen, and can be changed and chosen again', async () => {
+  const other = await openPage((await serve(['town.ply'], ...QUICK)).link);
+  await unfoldPanel(other);
+  assert.ok(await other.locator('[data-number="point_size"]').isHidden());
+  await other.locator('[data-key="surface"]').selectOption('points');
+  await settled(other);
+  const start = await finishedPixels(other);
+  const { point_size: chosen } = await state(other, 'scene');
+  assert.ok(1 <= chosen && chosen <= 8, `${chosen}`);
+  const number = other.locator('[data-number="point_size"]');
+  await number.fill('12');
+  await number.blur();
+  await settled(other);
+  assert.equal((await state(other, 'scene')).point_size, 12);
+  assert.notEqual(await finishedPixels(other), start);
+  await other.locator('[data-automatic="point_size"]').click();
+  await settled(other);
+  assert.equal((await state(other, 'scene')).point_size, chosen);
+  assert.equal(await finishedPixels(other), start);
+  await closePage(other);
+});
+
+for (const control of CONTROLS.filter(({ key }) => !FOR_CLOUDS.includes(key))) {
   const { given = [], value, unseen } = CASES[control.key];
   test(`${control.key} changes the picture`, async () => {
     for (const [key, needed] of given) await setControl(key, needed);

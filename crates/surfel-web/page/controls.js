@@ -15,6 +15,8 @@ const SLIDER = { kind: 'slider' };
 
 export const surfaceControls = [
   { key: 'surface', label: 'Kind', kind: 'select', options: ({ info }) => info.surfaces, help: 'Kind of surface' },
+  { key: 'point_size', label: 'Point size', ...SLIDER, range: [1, 16], limits: [1, 64], step: 0.5, unit: ' px', automatic: true,
+    isVisible: ({ surface }) => surface === 'points', help: 'Diameter of each point in pixels' },
   { key: 'radius_scale', label: 'Radius', ...SLIDER, range: [0.25, 4], limits: [0.01, 100], scale: 'logarithmic',
     read: (scene) => scene.radius_scale ?? 1, help: 'Factor of the radius of each point' },
   { key: 'edge_test', label: 'Edge test', kind: 'select', help: 'How the edge of the surface is found',

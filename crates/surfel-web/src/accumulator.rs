@@ -11,7 +11,7 @@ use std::time::Instant;
 use surfel_core::Result;
 use surfel_core::flat::FlatScene;
 use surfel_core::progress::Progress;
-use surfel_core::render::{RenderRegion, RenderStats, Renderer, Settings};
+use surfel_core::render::{POINT_SIZE_RANGE, RenderRegion, RenderStats, Renderer, Settings};
 
 /// The samples of a client's picture so far.
 #[derive(Default)]
@@ -85,7 +85,17 @@ impl Accumulator {
         let full = prepared.render_settings;
         let (width, height) = self.resolution.size(view.size, secs);
         let light_samples = full.light_samples.min(DRAFT_LIGHT_SAMPLES);
-        let settings = Settings { width, height, samples_per_pixel: 1, light_samples, ..full };
+        // The page enlarges a draft to its own size, and the points with it.
+        let point_size = full.point_size * width as f32 / view.size.0.max(1) as f32;
+        let (min, max) = POINT_SIZE_RANGE;
+        let settings = Settings {
+            width,
+            height,
+            samples_per_pixel: 1,
+            light_samples,
+            point_size: point_size.clamp(min, max),
+            ..full
+        };
         let n_pixels = u64::from(width) * u64::from(height);
         let Some(scene) = self.scene(prepared, view) else { return Ok(None) };
         let deadline = Deadline::new(progress, ResolutionController::is_min_size((width, height)));

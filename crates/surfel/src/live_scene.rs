@@ -110,7 +110,8 @@ impl LiveScene {
         let first = self.hidden_walls.get_or_init(|| auto.hidden_walls.clone());
         let is_open = description.camera.interior() != Interior::Off;
         auto.hidden_walls = if is_open { first.clone() } else { Vec::new() };
-        let settings = Settings { with_aovs: false, ..render_settings(description) };
+        let mut complete = auto.complete_description(&self.loaded);
+        let settings = Settings { with_aovs: false, ..render_settings(&complete) };
         let time_secs = description.output.time();
         let exposure = description.light.exposure();
         // An automatic exposure is chosen at second 0, as for a movie. Otherwise the first file of a sequence is not read.
@@ -121,7 +122,6 @@ impl LiveScene {
             .install(|| exposure_stops(exposure, &self.renderer, &metered, &settings, progress))?;
         let (trees, mut flat) = self.flat_at(time_secs, description, &auto, progress)?;
         expose(&mut flat, stops);
-        let mut complete = auto.complete_description(&self.loaded);
         complete.light.exposure = Some(Exposure::Stops(stops.into()));
         let moves_camera = auto.moves_camera(&self.loaded);
         Ok(LiveView { flat, settings, description: complete, moves_camera, trees })

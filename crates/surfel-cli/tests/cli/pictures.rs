@@ -1,6 +1,6 @@
 //! Pixels, layers and bytes of pictures.
 
-use super::common::{Folder, dome, read_png, shot, square, succeed};
+use super::common::{Folder, dome, read_png, shot, square, stderr, succeed, surfel};
 use std::fs;
 
 #[test]
@@ -80,6 +80,56 @@ fn radius_scale_applies_to_fixed_and_estimated_radii() {
 }
 
 #[test]
+fn points_have_the_size_that_is_given_or_chosen() {
+    let folder = Folder::new();
+    let cloud = folder.write("two.xyz", "0 0 0 255 0 0\n10 0 0 0 255 0\n");
+    let picture = folder.path("two.png");
+    let camera = ["--camera-position", "5,-20,0", "--camera-focal-point", "5,0,0"];
+    let points = ["--surface", "points", "--background", "white", "--resolution", "96x64"];
+    let covered = |options: &[&str]| {
+        let arguments = [&["render", &cloud, "-o", &picture][..], &points, &camera, options];
+        let report = stderr(&surfel(&arguments.concat()));
+        let (_, _, channels, samples) = read_png(&picture);
+        let pixels = samples.chunks_exact(channels);
+        let red = pixels.clone().filter(|pixel| pixel[..3] == [255, 0, 0]).count();
+        let green = pixels.filter(|pixel| pixel[..3] == [0, 255, 0]).count();
+        (red, green, report)
+    };
+    let (red, green, report) = covered(&["--point-size", "1"]);
+    assert_eq!((red, green), (1, 1), "{report}");
+    assert!(!report.contains("--point-size"), "{report}");
+    // Round points of ten pixels cover about 79 pixels, and neither point shades the other.
+    let (red, green, _) = covered(&["--point-size", "10"]);
+    assert!((70..90).contains(&red) && (70..90).contains(&green), "{red} {green}");
+    let (chosen, _, report) = covered(&[]);
+    assert!(
+        report.contains("point size 8 pixels") && report.contains("[--point-size]"),
+        "{report}"
+    );
+    assert_eq!(chosen, covered(&["--point-size", "8"]).0);
+    let (.., orthographic) = covered(&["--point-size", "4", "--camera-orthographic", "20"]);
+    assert!(!orthographic.contains("error"), "{orthographic}");
+}
+
+#[test]
+fn point_size_is_a_key_of_scene_files_and_of_the_dry_run() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let scene = format!("surface = \"points\"\npoint-size = 5.5\n[[object]]\nfile = {cloud:?}\n");
+    let scene = folder.write("scene.toml", scene);
+    let typed = shot(&folder, &[&cloud, "--surface", "points", "--point-size", "5.5"]);
+    assert!(shot(&folder, &[&scene]) == typed);
+    assert!(shot(&folder, &[&scene, "--point-size", "2"]) != typed);
+    let dry = succeed(&["render", &cloud, "--surface", "points", "--dry-run"]);
+    let dry: serde_json::Value = serde_json::from_str(&dry).unwrap();
+    assert!(dry["point_size"].is_number(), "{dry}");
+    // No other surface has a size in pixels.
+    let dry = succeed(&["render", &cloud, "--dry-run"]);
+    let dry: serde_json::Value = serde_json::from_str(&dry).unwrap();
+    assert!(dry["point_size"].is_null(), "{dry}");
+}
+
+#[test]
 fn an_exr_has_all_layers() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(30));
@@ -88,9 +138,40 @@ fn an_exr_has_all_layers() {
     let meta = exr::meta::MetaData::read_from_file(&picture, false).unwrap();
     let channels = &meta.headers[0].channels.list;
     let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
-    for name in ["R", "A", "Z", "N.X", "P.Z", "id", "instance", "coverage"] {
+    for name in [
+        "R",
+        "A",
+        "Z",
+        "N.X",
+        "P.Z",
+        "id",
+        "instance",
+        "coverage",
+        "support.count",
+        "support.distance",
+    ] {
         assert!(names.iter().any(|known| known == name), "{name}: {names:?}");
     }
+}
+
+#[test]
+fn support_is_a_colour_source_with_a_map_and_a_range() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let picture = |options: &[&str]| shot(&folder, &[&[cloud.as_str()][..], options].concat());
+    let support = picture(&["--color", "support"]);
+    assert!(support != picture(&[]));
+    assert!(support == picture(&["--color", "support", "--cmap", "viridis", "--range", "0,1"]));
+    assert!(support != picture(&["--color", "support", "--cmap", "coolwarm"]));
+    assert!(support != picture(&["--color", "support", "--range", "0,0.5"]));
+    for surface in ["disc", "splat", "sphere", "points"] {
+        assert!(picture(&["--color", "support", "--surface", surface]) != support, "{surface}");
+    }
+    let file = folder.path("told.png");
+    let report = stderr(&surfel(&["render", &cloud, "-o", &file, "--color", "support"]));
+    let expected = "color support from 0.000 to 1.000 (at a point to one radius away from all points), map \
+                    viridis [--color, --cmap, --range]";
+    assert!(report.contains(expected), "{report}");
 }
 
 #[test]

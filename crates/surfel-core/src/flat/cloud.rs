@@ -10,6 +10,7 @@ use crate::math::{Aabb, LANES};
 use crate::points::Structure;
 use crate::progress::Progress;
 use crate::scene::CloudGeometry;
+use crate::scene::color::SupportColors;
 use crate::surface::{EdgeTest, SurfaceKind};
 
 /// A point cloud with the surface that its points describe.
@@ -29,6 +30,8 @@ pub struct FlatCloud {
     pub has_outward_normals: bool,
     /// True if colours may be blended; false if each belongs to one point, as those of classes do.
     pub blends_colors: bool,
+    /// Colours of hits by their support, instead of the points' own.
+    pub support_colors: Option<SupportColors>,
     /// Maximum distance between a ray's nearest disc and the discs that decide about its hit: the largest radius,
     /// or 0 if the disc itself is the surface.
     pub max_blend_distance: f32,
@@ -78,6 +81,7 @@ impl FlatCloud {
             edge_test: geometry.edge_test,
             has_outward_normals: geometry.has_outward_normals,
             blends_colors: geometry.blends_colors,
+            support_colors: geometry.support_colors,
             max_blend_distance: 0.0,
         };
         flat.set_max_blend_distance();
@@ -106,6 +110,15 @@ impl FlatCloud {
         };
         self.set_max_blend_distance();
         needs_rebuild.then(|| Self::from_columns(columns, geometry, progress)).transpose()
+    }
+
+    /// Returns the tree of the points that a hit on a surface of this kind belongs to.
+    pub fn points_of(&self, surface: SurfaceKind) -> &FlatPoints {
+        match surface {
+            SurfaceKind::Capsule => &self.lines,
+            SurfaceKind::Sphere if self.surface != SurfaceKind::Sphere => &self.scatter,
+            _ => &self.points,
+        }
     }
 
     /// Returns the sizes of the trees and of the points in bytes.

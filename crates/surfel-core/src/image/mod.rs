@@ -42,6 +42,11 @@ pub struct Aovs {
     pub instance_id: Vec<u32>,
     /// Linear surface colour; zero without a hit.
     pub albedo: Vec<Vec3>,
+    /// Number of points within one radius of the hit; 0 on triangles and without a hit.
+    pub support_count: Vec<u32>,
+    /// Distance from the hit to the nearest point, in radii of the point that was hit; infinite on triangles and without
+    /// a hit.
+    pub support_distance: Vec<f32>,
 }
 
 /// The ID of pixels without a hit.
@@ -64,6 +69,8 @@ impl Image {
             point_id: vec![NO_ID; n],
             instance_id: vec![NO_ID; n],
             albedo: vec![Vec3::ZERO; n],
+            support_count: vec![0; n],
+            support_distance: vec![f32::INFINITY; n],
         };
         Self { aovs: Some(aovs), ..Self::new(width, height) }
     }
@@ -105,6 +112,10 @@ pub struct AovBand<'i> {
     pub instance_id: &'i mut [u32],
     /// Surface colour.
     pub albedo: &'i mut [Vec3],
+    /// Number of points near the hit.
+    pub support_count: &'i mut [u32],
+    /// Distance to the nearest point.
+    pub support_distance: &'i mut [f32],
 }
 
 impl Aovs {
@@ -116,6 +127,8 @@ impl Aovs {
         let mut point_id = self.point_id.chunks_mut(n);
         let mut instance_id = self.instance_id.chunks_mut(n);
         let mut albedo = self.albedo.chunks_mut(n);
+        let mut support_count = self.support_count.chunks_mut(n);
+        let mut support_distance = self.support_distance.chunks_mut(n);
         let next = || {
             Some(AovBand {
                 depth: depth.next()?,
@@ -124,6 +137,8 @@ impl Aovs {
                 point_id: point_id.next()?,
                 instance_id: instance_id.next()?,
                 albedo: albedo.next()?,
+                support_count: support_count.next()?,
+                support_distance: support_distance.next()?,
             })
         };
         std::iter::from_fn(next).collect()

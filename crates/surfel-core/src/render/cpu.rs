@@ -11,7 +11,7 @@ use crate::integrator::{CameraRayBatch, Integrator, PixelSamples, RayCounts, Whi
 use crate::math::{Ray, Vec3, Vec4, hash, morton_decode, owen_sobol_2d};
 use crate::progress::Progress;
 use crate::scene::View;
-use crate::trace::{InstanceFilter, SceneHit, Simd, Tracer};
+use crate::trace::{InstanceFilter, SceneHit, Simd, Support, Tracer};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -137,6 +137,7 @@ struct PixelAovs {
     position: Vec3,
     albedo: Vec3,
     hit: SceneHit,
+    support: Support,
 }
 
 impl Tile {
@@ -197,7 +198,7 @@ impl Tile {
         tracer.hits(InstanceFilter::All, &rays, &mut hits)?;
         self.trace_secs += start.elapsed().as_secs_f64();
         if settings.with_aovs && settings.samples_per_pixel == 1 {
-            self.set_aovs(job, &rays, &hits);
+            self.set_aovs(job, &rays, &hits)?;
         }
         let n_light_samples = settings.light_samples.div_ceil(settings.samples_per_pixel);
         let samples = PixelSamples {
@@ -224,22 +225,23 @@ impl Tile {
         let mut hits = vec![SceneHit::MISS; rays.len()];
         job.tracer.hits(InstanceFilter::All, &rays, &mut hits)?;
         self.counts.primary += rays.len() as u64;
-        self.set_aovs(job, &rays, &hits);
-        Ok(())
+        self.set_aovs(job, &rays, &hits)
     }
 
     /// Sets the AOVs from the rays through the pixels' centres.
-    fn set_aovs(&mut self, job: &Job, rays: &[Ray], hits: &[SceneHit]) {
-        let aovs = |(ray, hit): (&Ray, &SceneHit)| {
+    fn set_aovs(&mut self, job: &Job, rays: &[Ray], hits: &[SceneHit]) -> Result<()> {
+        let supports = job.tracer.supports(rays, hits)?;
+        let aovs = |((ray, hit), support): ((&Ray, &SceneHit), Support)| {
             if hit.is_miss() {
                 let (depth, zero) = (f32::INFINITY, Vec3::ZERO);
-                return PixelAovs { depth, position: zero, albedo: zero, hit: *hit };
+                return PixelAovs { depth, position: zero, albedo: zero, hit: *hit, support };
             }
             let position = ray.at(hit.distance);
             let albedo = albedo(job.tracer.scene, ray, hit);
-            PixelAovs { depth: job.view.depth(position), position, albedo, hit: *hit }
+            PixelAovs { depth: job.view.depth(position), position, albedo, hit: *hit, support }
         };
-        self.aovs = rays.iter().zip(hits).map(aovs).collect();
+        self.aovs = rays.iter().zip(hits).zip(supports).map(aovs).collect();
+        Ok(())
     }
 
     /// Copies the tile to its row of tiles in a picture of `width` pixels.
@@ -249,13 +251,15 @@ impl Tile {
             band.color[pixel] = self.color[i].to_array();
             band.coverage[pixel] = self.coverage[i];
             if let Some(aovs) = &mut band.aovs {
-                let PixelAovs { depth, position, albedo, hit } = &self.aovs[i];
+                let PixelAovs { depth, position, albedo, hit, support } = &self.aovs[i];
                 aovs.depth[pixel] = *depth;
                 aovs.position[pixel] = *position;
                 aovs.normal[pixel] = hit.normal;
                 aovs.point_id[pixel] = hit.id;
                 aovs.instance_id[pixel] = hit.instance;
                 aovs.albedo[pixel] = *albedo;
+                aovs.support_count[pixel] = support.n_points;
+                aovs.support_distance[pixel] = support.distance;
             }
         }
     }

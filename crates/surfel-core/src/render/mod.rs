@@ -1,12 +1,14 @@
 //! Renderers: from a flat scene to a picture.
 
 mod cpu;
+mod footprint;
 mod raster;
 mod region;
 mod renderer;
 mod settings;
 
 pub use cpu::CpuRenderer;
+pub use footprint::POINT_SIZE_RANGE;
 pub use region::RenderRegion;
 pub use renderer::{RenderStats, Renderer};
 pub use settings::{MAX_PIXELS, Settings};

@@ -1,5 +1,6 @@
-//! Rasterised points: one pixel per point with a z-buffer, shaded by eye-dome lighting.
+//! Rasterised points: round and of one size in pixels, with a z-buffer, shaded by eye-dome lighting.
 
+use super::footprint::RowRange;
 use super::region::RenderRegion;
 use super::settings::Settings;
 use crate::error::{Error, Result};
@@ -10,6 +11,7 @@ use crate::math::LANES;
 use crate::progress::Progress;
 use crate::scene::{Background, View};
 use crate::surface::SurfaceKind;
+use crate::trace::Support;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -53,33 +55,14 @@ struct VisiblePoint {
     slot: u32,
 }
 
-/// A range of pixel rows, from `first` to before `end`.
-#[derive(Clone, Copy)]
-struct RowRange {
-    width: usize,
-    first: usize,
-    end: usize,
-}
-
-impl RowRange {
-    /// Returns the rows of a region and one row on each side, which eye-dome lighting reads.
-    fn around(region: RenderRegion, settings: &Settings) -> Self {
-        Self {
-            width: settings.width as usize,
-            first: region.rows.0.saturating_sub(1) as usize,
-            end: settings.height.min(region.rows.1 + 1) as usize,
-        }
-    }
-
-    fn n_pixels(self) -> usize {
-        self.width * (self.end - self.first)
-    }
-
-    /// Returns the buffer index of a pixel of the picture, or `None` if it is outside of the rows.
-    fn index(self, x: i64, y: i64) -> Option<usize> {
-        let is_within = (0..self.width as i64).contains(&x)
-            && (self.first as i64..self.end as i64).contains(&y);
-        is_within.then(|| (y as usize - self.first) * self.width + x as usize)
+/// Returns the rows of a region and those around it that eye-dome lighting reads.
+fn rows_around(region: RenderRegion, view: &View, settings: &Settings) -> RowRange {
+    let margin = EyeDome::new(settings.point_size).step;
+    RowRange {
+        width: settings.width as usize,
+        first: region.rows.0.saturating_sub(margin) as usize,
+        end: settings.height.min(region.rows.1 + margin) as usize,
+        wraps: view.is_panorama(),
     }
 }
 
@@ -91,7 +74,7 @@ pub fn render(
     region: RenderRegion,
     progress: &dyn Progress,
 ) -> Result<Image> {
-    let rows = RowRange::around(region, settings);
+    let rows = rows_around(region, view, settings);
     let n_pixels = rows.n_pixels();
     let n_blocks = |instance: &Instance| cloud(scene, instance).points.blocks.len() as u64;
     progress.begin("render", scene.instances.iter().map(n_blocks).sum());
@@ -99,7 +82,8 @@ pub fn render(
     let mut depths = vec![f32::INFINITY; n_pixels];
     let mut visible = vec![VisiblePoint { instance: NO_ID, slot: 0 }; n_pixels];
     for (instance_idx, instance) in scene.instances.iter().enumerate() {
-        project(scene, instance, view, rows, progress, &z_buffer)?;
+        let target = Target { rows, radius: settings.point_size / 2.0, z_buffer: &z_buffer };
+        project(scene, instance, view, progress, target)?;
         let keys = z_buffer.iter().map(|key| key.load(Ordering::Relaxed));
         for (pixel, key) in keys.enumerate().filter(|(_, key)| *key != EMPTY) {
             let depth = f32::from_bits((key >> 32) as u32);
@@ -110,19 +94,29 @@ pub fn render(
             }
         }
     }
-    Ok(Raster { rows, depths, visible }.shade(scene, view, settings, region))
+    let eye_dome = EyeDome::new(settings.point_size);
+    Ok(Raster { rows, depths, visible, eye_dome }.shade(scene, view, settings, region))
 }
 
-/// Lowers each pixel of `z_buffer` to the nearest point of one instance: its depth in the upper 32 bits, its
-/// slot in the lower ones.
+/// The buffer that points are drawn to.
+#[derive(Clone, Copy)]
+struct Target<'b> {
+    rows: RowRange,
+    /// Radius of the points in pixels.
+    radius: f32,
+    /// The nearest point of each pixel: its depth in the upper 32 bits, its slot in the lower ones.
+    z_buffer: &'b [AtomicU64],
+}
+
+/// Draws the points of one instance. All pixels of a point have its depth.
 fn project(
     scene: &FlatScene,
     instance: &Instance,
     view: &View,
-    rows: RowRange,
     progress: &dyn Progress,
-    z_buffer: &[AtomicU64],
+    target: Target,
 ) -> Result<()> {
+    let Target { rows, radius, z_buffer } = target;
     let blocks = &cloud(scene, instance).points.blocks;
     blocks.par_iter().enumerate().with_min_len(1024).try_for_each(|(block_idx, block)| {
         if block_idx % 1024 == 0 {
@@ -133,11 +127,15 @@ fn project(
         for lane in (0..LANES).filter(|lane| occupied >> lane & 1 == 1) {
             let position = instance.world_position(block.position(lane));
             let Some((x, y, depth)) = view.project(position) else { continue };
-            let Some(pixel) = rows.index(x.floor() as i64, y.floor() as i64) else { continue };
             // Positive floats order as their bits do.
             let slot = (block_idx * LANES + lane) as u64;
             let key = u64::from(depth.to_bits()) << 32 | slot;
-            z_buffer[pixel].fetch_min(key, Ordering::Relaxed);
+            rows.for_each_covered((x, y), radius, |pixel| {
+                // Most pixels of large points are covered by nearer ones, and reading is cheaper than exchanging.
+                if key < z_buffer[pixel].load(Ordering::Relaxed) {
+                    z_buffer[pixel].fetch_min(key, Ordering::Relaxed);
+                }
+            });
         }
         Ok(())
     })
@@ -155,6 +153,7 @@ struct Raster {
     rows: RowRange,
     depths: Vec<f32>,
     visible: Vec<VisiblePoint>,
+    eye_dome: EyeDome,
 }
 
 impl Raster {
@@ -195,20 +194,103 @@ impl Raster {
             aovs.point_id[pixel] = points.id(slot);
             aovs.instance_id[pixel] = instance_idx;
             aovs.albedo[pixel] = albedo;
+            aovs.support_count[pixel] = Support::POINT.n_points;
+            aovs.support_distance[pixel] = Support::POINT.distance;
         }
         image
     }
 
-    /// Returns the eye-dome lighting of a pixel (Boucheny 2009): the farther it lies behind its neighbours,
-    /// the darker it is.
+    /// Returns the light of a pixel, from 0 to 1.
     fn eye_dome(&self, (x, y): (u32, u32), index: usize) -> f32 {
-        const STRENGTH: f32 = 300.0 * 0.4;
-        let log_depth = self.depths[index].log2();
+        let step = i64::from(self.eye_dome.step);
         let ring = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
-        let neighbors = ring.map(|(dx, dy)| self.rows.index(i64::from(x) + dx, i64::from(y) + dy));
-        // An empty neighbour is infinitely far away and does not darken.
-        let darkening = |neighbor: usize| (log_depth - self.depths[neighbor].log2()).max(0.0);
-        let sum: f32 = neighbors.into_iter().flatten().map(darkening).sum();
-        (-STRENGTH * sum / 8.0).exp()
+        let neighbors = ring
+            .map(|(dx, dy)| self.rows.index(i64::from(x) + step * dx, i64::from(y) + step * dy));
+        let depths = neighbors.into_iter().flatten().map(|neighbor| self.depths[neighbor]);
+        self.eye_dome.light(self.depths[index], depths)
+    }
+}
+
+/// Eye-dome lighting (Boucheny 2009): the farther a pixel lies behind its neighbours, the darker it is.
+///
+/// The darkening by each neighbour is bounded. Without a bound, a single near point blackened all that showed beside it
+/// through a thin cloud, and the far side of such a cloud was full of black pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct EyeDome {
+    /// Distance of the neighbours in pixels, so that they belong to other points.
+    step: u32,
+}
+
+impl EyeDome {
+    /// Darkening for a difference of 1 of the logarithms of two depths, one pixel apart.
+    const STRENGTH: f32 = 300.0 * 0.4;
+    /// Darkening by neighbours that are all far nearer.
+    const MAX_DARKENING: f32 = 2.0;
+
+    fn new(point_size: f32) -> Self {
+        Self { step: (point_size / 2.0).round().max(1.0) as u32 }
+    }
+
+    /// Returns the light of a pixel at `depth` with up to eight neighbours. An empty neighbour is infinitely far away and
+    /// does not darken.
+    fn light(self, depth: f32, neighbors: impl Iterator<Item = f32>) -> f32 {
+        let (log_depth, per_step) = (depth.log2(), Self::STRENGTH / self.step as f32);
+        let darkening = |neighbor: f32| {
+            let difference = per_step * (log_depth - neighbor.log2()).max(0.0);
+            difference / (1.0 + difference / Self::MAX_DARKENING)
+        };
+        let sum: f32 = neighbors.map(darkening).sum();
+        (-sum / 8.0).exp()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Eye-dome lighting shows forms, and leaves the points of thin clouds their colours.
+
+    use super::*;
+
+    fn light(depth: f32, neighbors: [f32; 8]) -> f32 {
+        EyeDome::new(1.0).light(depth, neighbors.into_iter())
+    }
+
+    #[test]
+    fn empty_and_farther_neighbors_do_not_darken() {
+        assert_eq!(light(5.0, [f32::INFINITY; 8]), 1.0);
+        assert_eq!(light(5.0, [5.0, 6.0, 7.0, 50.0, f32::INFINITY, 5.0, 5.0, 1e9]), 1.0);
+        assert_eq!(EyeDome::new(1.0).light(5.0, std::iter::empty()), 1.0);
+    }
+
+    #[test]
+    fn one_near_neighbor_shades_and_all_darken() {
+        let mut neighbors = [f32::INFINITY; 8];
+        neighbors[3] = 0.1;
+        let beside_one = light(5.0, neighbors);
+        assert!((0.75..0.85).contains(&beside_one), "{beside_one}");
+        let enclosed = light(5.0, [0.1; 8]);
+        assert!((0.1..0.2).contains(&enclosed), "{enclosed}");
+    }
+
+    #[test]
+    fn small_steps_darken_in_proportion() {
+        // A step of a thousandth of the depth at half of the neighbours.
+        let mut neighbors = [5.0; 8];
+        neighbors[..4].fill(5.0 / 1.001);
+        let expected = (-EyeDome::STRENGTH * 1.001f32.log2() / 2.0).exp();
+        assert!((light(5.0, neighbors) - expected).abs() < 0.01);
+    }
+
+    #[test]
+    fn slopes_are_shaded_alike_at_all_sizes() {
+        // A slope that rises by a ten-thousandth of the depth a pixel.
+        let of_size = |size: f32| {
+            let eye_dome = EyeDome::new(size);
+            let rise = 1.0 + 1e-4 * eye_dome.step as f32;
+            let ring = [rise, 1.0 / rise, 1.0, 1.0, rise, rise, 1.0 / rise, 1.0 / rise];
+            eye_dome.light(5.0, ring.into_iter().map(|factor| 5.0 * factor))
+        };
+        for size in [2.0, 4.0, 9.0, 30.0] {
+            assert!((of_size(size) - of_size(1.0)).abs() < 1e-3, "{size}");
+        }
     }
 }

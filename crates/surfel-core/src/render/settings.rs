@@ -1,5 +1,6 @@
 //! Settings of a picture, and their limits.
 
+use super::footprint::POINT_SIZE_RANGE;
 use crate::error::{Error, Result};
 
 /// Size and quality of a picture.
@@ -18,6 +19,8 @@ pub struct Settings {
     pub max_depth: u32,
     /// Seed of all random numbers.
     pub seed: u64,
+    /// Diameter of rasterised points in pixels.
+    pub point_size: f32,
     /// True if the image gets AOVs besides colour and coverage.
     pub with_aovs: bool,
 }
@@ -28,8 +31,8 @@ pub const MAX_PIXELS: u64 = 1 << 28;
 const MAX_SAMPLES: u32 = 1 << 16;
 
 impl Default for Settings {
-    /// Returns 1920 x 1080 pixels, 4 camera rays and 16 light samples per pixel, 8 bounces, seed 0 and no
-    /// AOVs.
+    /// Returns 1920 x 1080 pixels, 4 camera rays and 16 light samples per pixel, 8 bounces, seed 0, points of
+    /// one pixel and no AOVs.
     fn default() -> Self {
         Self {
             width: 1920,
@@ -38,6 +41,7 @@ impl Default for Settings {
             light_samples: 16,
             max_depth: 8,
             seed: 0,
+            point_size: 1.0,
             with_aovs: false,
         }
     }
@@ -47,8 +51,8 @@ impl Settings {
     /// Checks that all settings are within their limits.
     ///
     /// # Errors
-    /// Fails if the picture has no pixels or more than [`MAX_PIXELS`], or if a number of samples is 0 or
-    /// above 65,536.
+    /// Fails if the picture has no pixels or more than [`MAX_PIXELS`], if a number of samples is 0 or
+    /// above 65,536, or if points are smaller than 1 or larger than 64 pixels.
     pub fn check(&self) -> Result<()> {
         let n_pixels = u64::from(self.width) * u64::from(self.height);
         if n_pixels == 0 || MAX_PIXELS < n_pixels {
@@ -65,6 +69,12 @@ impl Settings {
                     expected: "1 to 65536",
                 });
             }
+        }
+        let (min, max) = POINT_SIZE_RANGE;
+        if !(min..=max).contains(&self.point_size) {
+            let found = self.point_size.to_string();
+            let expected = "1 to 64 pixels";
+            return Err(Error::Setting { name: "point size", found, expected });
         }
         Ok(())
     }

@@ -147,6 +147,11 @@ impl View {
         (0.0 < depth).then_some((self.center.0 + across, self.center.1 - along, depth))
     }
 
+    /// True if the picture shows all directions, so that its right edge continues at its left one.
+    pub fn is_panorama(&self) -> bool {
+        matches!(self.lens, Lens::Panorama { .. })
+    }
+
     /// Returns the size of a pixel in the middle of the picture in world units: at distance 1, or at any
     /// distance in an orthographic picture.
     pub fn pixel_size(&self) -> f32 {

@@ -1,5 +1,6 @@
 //! A cloud as a geometry of a scene: prepared, coloured, and given a surface.
 
+use super::color::SupportColors;
 use crate::error::Result;
 use crate::points::{PointCloud, PreparedCloud, Structure, check_length};
 use crate::surface::{EdgeTest, SurfaceKind};
@@ -19,6 +20,8 @@ pub struct CloudGeometry {
     /// True if colours of neighbouring points may be blended; false if each belongs to one point, as those of
     /// classes do.
     pub blends_colors: bool,
+    /// Colours of hits by their support, instead of the points' own.
+    pub support_colors: Option<SupportColors>,
     /// True if normals point out of the body that the points enclose, which gives glass an interior. If not,
     /// every other hit of a ray enters the body (Schaufler and Jensen 2000).
     pub has_outward_normals: bool,
@@ -33,6 +36,7 @@ impl Default for CloudGeometry {
             surface: SurfaceKind::default(),
             edge_test: EdgeTest::default(),
             blends_colors: true,
+            support_colors: None,
             has_outward_normals: false,
         }
     }

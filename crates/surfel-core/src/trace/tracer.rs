@@ -4,9 +4,11 @@ use crate::error::Result;
 use crate::flat::FlatScene;
 use crate::math::{PACKET_WIDTH, Ray};
 use crate::progress::Progress;
+use crate::trace::query::support::Support;
 use crate::trace::scene::instance_filter::InstanceFilter;
 use crate::trace::scene::scene_hit::SceneHit;
 use crate::trace::scene::scene_query::{scene_hits, scene_occlusions};
+use crate::trace::scene::scene_support::scene_supports;
 use crate::trace::simd::Simd;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -49,6 +51,19 @@ impl<'a> Tracer<'a> {
         self.in_chunks(rays.len(), |chunk| {
             scene_hits(self.scene, self.simd, filter, &rays[chunk.clone()], &mut hits[chunk]);
         })
+    }
+
+    /// Runs [`scene_supports`] for hits that [`Tracer::hits`] found.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels the job.
+    pub fn supports(&self, rays: &[Ray], hits: &[SceneHit]) -> Result<Vec<Support>> {
+        let mut supports = vec![Support::NONE; rays.len()];
+        self.in_chunks(rays.len(), |chunk| {
+            let (rays, hits) = (&rays[chunk.clone()], &hits[chunk.clone()]);
+            scene_supports(self.scene, self.simd, rays, hits, &mut supports[chunk]);
+        })?;
+        Ok(supports)
     }
 
     /// Runs [`scene_occlusions`].

@@ -57,6 +57,8 @@ fn channels(image: &Image) -> Vec<AnyChannel<FlatSamples>> {
     add_triple(["albedo.R", "albedo.G", "albedo.B"], &aovs.albedo);
     add("Z", FlatSamples::F32(aovs.depth.clone()));
     add("id", FlatSamples::U32(aovs.point_id.clone()));
+    add("support.count", FlatSamples::U32(aovs.support_count.clone()));
+    add("support.distance", FlatSamples::F32(aovs.support_distance.clone()));
     add("instance", FlatSamples::U32(aovs.instance_id.clone()));
     channels
 }

@@ -71,6 +71,8 @@ fn exr_keeps_every_layer_and_the_origin() {
     aovs.point_id[4] = 0xfeed_beef;
     aovs.instance_id[4] = 7;
     aovs.albedo[4] = Vec3::splat(0.5);
+    aovs.support_count[4] = 9;
+    aovs.support_distance[4] = 0.25;
     let origin = DVec3::new(484_800.123_456, 6_632_800.0, 100.0);
     save_image(&path, &image, &ImageOptions { origin, ..Default::default() }).unwrap();
 
@@ -86,7 +88,7 @@ fn exr_keeps_every_layer_and_the_origin() {
             FlatSamples::F16(_) => panic!("{name} has half precision"),
         }
     };
-    assert_eq!(names.len(), 17);
+    assert_eq!(names.len(), 19);
     assert_eq!(sample("B").0, 2.0);
     assert_eq!(sample("Z"), (12.5, f64::INFINITY));
     assert_eq!(sample("N.Z").0, 1.0);
@@ -95,6 +97,8 @@ fn exr_keeps_every_layer_and_the_origin() {
     assert_eq!(sample("instance").0, 7.0);
     assert_eq!(sample("albedo.G").0, 0.5);
     assert_eq!(sample("coverage").0, 0.75);
+    assert_eq!(sample("support.count"), (9.0, 0.0));
+    assert_eq!(sample("support.distance"), (0.25, f64::INFINITY));
     let text = exr::meta::attribute::AttributeValue::Text("484800.123456 6632800 100".into());
     let origin = layer.attributes.other.iter().find(|(name, _)| **name == *"origin");
     assert_eq!(origin.map(|(_, value)| value), Some(&text));

@@ -24,6 +24,7 @@ const SETTINGS: Settings = Settings {
     light_samples: 4,
     max_depth: 6,
     seed: 5,
+    point_size: 1.0,
     with_aovs: true,
 };
 

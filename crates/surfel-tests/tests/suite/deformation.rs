@@ -22,6 +22,7 @@ const SETTINGS: Settings = Settings {
     light_samples: 1,
     max_depth: 2,
     seed: 9,
+    point_size: 1.0,
     with_aovs: true,
 };
 

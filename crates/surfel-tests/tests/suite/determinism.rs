@@ -21,6 +21,7 @@ const SETTINGS: Settings = Settings {
     light_samples: 8,
     max_depth: 8,
     seed: 3,
+    point_size: 5.0,
     with_aovs: true,
 };
 

@@ -21,6 +21,7 @@ const SETTINGS: Settings = Settings {
     light_samples: 16,
     max_depth: 8,
     seed: 1,
+    point_size: 1.0,
     with_aovs: true,
 };
 
@@ -169,6 +170,24 @@ fn the_environment_is_seen_behind_points() {
             assert_eq!(points.color[corner][3], 1.0);
         }
     }
+}
+
+/// A round point behind a panorama's camera continues from one edge of the picture to the other.
+#[test]
+fn points_wrap_around_panoramas() {
+    let cloud = PointCloud::from_positions(vec![-3.0 * Vec3::Y, 3.0 * Vec3::Y]);
+    let mut scene = scenes::scene(cloud, SurfaceKind::Points);
+    scene.camera = Camera {
+        position: DVec3::ZERO,
+        focal_point: DVec3::Y,
+        view_up: DVec3::Z,
+        projection: Projection::Panorama,
+    };
+    let image = render(&scene, &Settings { point_size: 9.0, ..SETTINGS });
+    let is_covered = |x: usize| image.coverage[32 * 64 + x] == 1.0;
+    let columns: Vec<usize> = (0..64).filter(|x| is_covered(*x)).collect();
+    let expected = (0..4).chain(28..36).chain(60..64);
+    assert_eq!(columns, expected.collect::<Vec<_>>());
 }
 
 /// Two rasterised clouds look like one cloud of all their points.

@@ -23,6 +23,7 @@ mod searches;
 mod shapes;
 mod smooth;
 mod statistics;
+mod support;
 mod textures;
 mod traversal_paths;
 mod triangles;

@@ -19,6 +19,7 @@ pub const SETTINGS: Settings = Settings {
     light_samples: 16,
     max_depth: 8,
     seed: 1,
+    point_size: 1.0,
     with_aovs: true,
 };
 

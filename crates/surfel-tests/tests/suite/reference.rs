@@ -64,6 +64,7 @@ fn picture(kind: SurfaceKind) -> Image {
         light_samples: 16,
         max_depth: 8,
         seed: 0,
+        point_size: 1.0,
         with_aovs: false,
     };
     let flat = FlatScene::new(&scene, &NoProgress).unwrap();

@@ -31,6 +31,7 @@ const SETTINGS: Settings = Settings {
     light_samples: 4,
     max_depth: 2,
     seed: 0,
+    point_size: 1.0,
     with_aovs: true,
 };
 

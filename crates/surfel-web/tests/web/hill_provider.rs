@@ -219,6 +219,7 @@ fn render_settings(seed: u64) -> Settings {
         light_samples: 1,
         max_depth: 2,
         seed,
+        point_size: 1.0,
         with_aovs: false,
     }
 }

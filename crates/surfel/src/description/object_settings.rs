@@ -71,13 +71,14 @@ settings! {
 settings! {
     /// Colours of points.
     pub struct ColorSettings {
-        /// Colour: rgb, intensity, elevation, class, normal, the name of a column, #RRGGBB or a CSS colour name
-        /// [default: chosen from the data].
+        /// Colour: rgb, intensity, elevation, class, normal, support (how near measured points are), the name of a
+        /// column, #RRGGBB or a CSS colour name [default: chosen from the data].
         color: ColorSource, ColorSourceRule, "SOURCE", common;
         /// Colour map by its matplotlib name: viridis, turbo, gray, coolwarm_r ...
         /// [default: gray for intensity, viridis for everything else].
         cmap: Colormap, ColormapRule, "NAME";
-        /// Values of the first and last colour of the map [default: the 2nd and 98th percentile].
+        /// Values of the first and last colour of the map [default: the 2nd and 98th percentile, or 0,1 radii
+        /// for support].
         range: (f64, f64), Interval, "LOW,HIGH";
     }
 }
@@ -152,7 +153,12 @@ impl ObjectSettings {
             Some(ColorSource::Intensity) => columns.push(Column::Intensity),
             Some(ColorSource::Class) => columns.push(Column::Classification),
             Some(ColorSource::Column(name)) => columns.push(Column::Scalar(name.clone())),
-            Some(ColorSource::Elevation | ColorSource::Normal | ColorSource::Constant(_)) => {}
+            Some(
+                ColorSource::Elevation
+                | ColorSource::Normal
+                | ColorSource::Support
+                | ColorSource::Constant(_),
+            ) => {}
         }
         ColumnChoice::Only(columns)
     }

@@ -8,6 +8,7 @@ use super::rule::{
 use super::rule::{POSITIVE, Rule};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use surfel_core::render::POINT_SIZE_RANGE;
 use surfel_core::scene::Background;
 use surfel_formats::BitDepth;
 
@@ -22,6 +23,8 @@ settings! {
         light_samples: u32 = 16, count(1, 65_536), "N";
         /// Maximum number of reflections and refractions of a ray.
         max_depth: u32 = 8, count(0, 64), "N";
+        /// Diameter of the points of `--surface points` in pixels [default: chosen so that most of them touch].
+        point_size: f64, number(POINT_SIZE_RANGE.0 as f64, POINT_SIZE_RANGE.1 as f64), "PX";
         /// Background: a colour, two colours (top, bottom), gradient, transparent, or environment (the sky or
         /// environment map that lights the scene).
         background: Background = default_background(), BackgroundRule, "COLOR", common;

@@ -460,7 +460,7 @@ impl Rule<ColorSource> for ColorSourceRule {
             None if text == "height" => Ok(ColorSource::Elevation),
             None => text.parse().map_err(|_| {
                 expected(
-                    "rgb, intensity, elevation, class, normal, the name of a column, #RRGGBB or a colour's CSS name",
+                    "rgb, intensity, elevation, class, normal, support, the name of a column, #RRGGBB or a colour's CSS name",
                 )
             }),
         }

@@ -86,12 +86,14 @@ pub fn apply_surface_and_color(
 ) -> surfel_core::Result<CloudGeometry> {
     cloud.scale_radii(settings.surface.radius_scale() as f32);
     let notes = NotesAsChoices { progress, keys: &["color", "cmap", "range"] };
-    let colors = colorize(&cloud, &settings.coloring(up), &notes)?;
+    let coloring = settings.coloring(up);
+    let colors = colorize(&cloud, &coloring, &notes)?;
     let source = settings.color.color.clone().unwrap_or_else(|| choose_source(&cloud).0);
     let blends_colors = !source.is_categorical(&cloud);
     let mut geometry = CloudGeometry::new(cloud, colors)?;
     geometry.surface = settings.surface.surface();
     geometry.blends_colors = blends_colors;
+    geometry.support_colors = coloring.support_colors()?;
     geometry.edge_test = settings.surface.edge_test();
     geometry.has_outward_normals = settings.preparation.orients_outward();
     Ok(geometry)

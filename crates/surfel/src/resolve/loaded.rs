@@ -513,7 +513,7 @@ impl LoadedScene {
                 continue;
             }
             return Err(Error::Unfit(format!(
-                "{}: no column {color}; --color takes elevation, normal, {SURFACE_VARIATION}, {STRUCTURE}, \
+                "{}: no column {color}; --color takes elevation, normal, support, {SURFACE_VARIATION}, {STRUCTURE}, \
                  #RRGGBB, a CSS colour name and what the file has: {}; {}",
                 list_files(self.files_of(i, description)),
                 match colorable_columns(&self.file_info().columns) {

@@ -35,7 +35,7 @@ const FLAT_TRIANGLE: u64 = 42;
 const TEXEL: u64 = 4;
 
 /// Bytes of a pixel with all its layers.
-const PIXEL: u64 = 16 + 52;
+const PIXEL: u64 = 16 + 60;
 
 /// Bytes of an average line of text, where a file does not say how many there are.
 const LINE: u64 = 30;

@@ -6,6 +6,7 @@ mod interior;
 mod station;
 mod spread;
 mod environment;
+mod point_size;
 mod sun_and_sky;
 mod exposure;
 mod memory;
@@ -32,6 +33,7 @@ use crate::error::Result;
 use camera::SceneExtent;
 use complete_description::complete_description;
 use interior::{choose_room, hidden_walls};
+use point_size::choose_point_size;
 use spread::report_gaps;
 use station::choose_station;
 use sun_and_sky::{LightingContext, choose_lights, lights};
@@ -116,7 +118,8 @@ impl AutoSettings {
         let hidden_walls = hidden_walls(room.as_ref(), &camera.camera, progress);
         let is_inside = room.is_some_and(|room| room.contains(camera.camera.position));
         let context = LightingContext { camera: camera.camera, up, diagonal, is_inside };
-        let description = choose_lights(description, &context, progress);
+        let mut description = choose_lights(description, &context, progress);
+        choose_point_size(scene, &mut description, &points, &camera.camera, progress);
         let lights = lights(&description, scene.environment.as_ref(), up)?;
         Ok(Self { up, camera, lights, hidden_walls, description })
     }
@@ -169,6 +172,7 @@ pub fn render_settings(description: &SceneDescription) -> Settings {
         light_samples: picture.light_samples(),
         max_depth: picture.max_depth(),
         seed: picture.seed(),
+        point_size: picture.point_size.map_or(Settings::default().point_size, |size| size as f32),
         with_aovs: output.is_none_or(|path| {
             path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
         }),

@@ -42,7 +42,10 @@ pub fn legend(cloud: &PointCloud, coloring: &Coloring) -> Result<Legend> {
             let classes = cloud.classification.as_ref();
             Ok(classes_of(classes.ok_or_else(|| source.missing_from(cloud))?))
         }
-        ColorSource::Intensity | ColorSource::Elevation | ColorSource::Column(_) => {
+        ColorSource::Intensity
+        | ColorSource::Elevation
+        | ColorSource::Support
+        | ColorSource::Column(_) => {
             Ok(steps_of(&Mapping::new(cloud, coloring, &source)?, source.to_string()))
         }
     }

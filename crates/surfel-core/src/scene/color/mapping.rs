@@ -2,6 +2,7 @@
 
 use super::coloring::Coloring;
 use super::source::ColorSource;
+use super::support::DEFAULT_RANGE;
 use crate::error::Result;
 use crate::image::{Colormap, PercentileRange};
 use crate::points::PointCloud;
@@ -18,7 +19,8 @@ pub(super) struct Mapping<'c> {
     map: Colormap,
     /// Positions of the first and last colour in the map, from 0 to 1.
     map_range: (f32, f32),
-    is_range_given: bool,
+    /// The origin of the range, for a note to the user.
+    range_origin: &'static str,
 }
 
 impl<'c> Mapping<'c> {
@@ -29,6 +31,9 @@ impl<'c> Mapping<'c> {
     pub fn new(cloud: &'c PointCloud, coloring: &Coloring, source: &ColorSource) -> Result<Self> {
         let value_at = source.values(cloud, coloring).ok_or_else(|| source.missing_from(cloud))?;
         let found = || {
+            if *source == ColorSource::Support {
+                return Some(DEFAULT_RANGE);
+            }
             PercentileRange::from_values(
                 cloud.len(),
                 &value_at,
@@ -39,12 +44,16 @@ impl<'c> Mapping<'c> {
         let range = given.or_else(found).unwrap_or(PercentileRange { low: 0.0, high: 1.0 });
         let map = match coloring.colormap {
             Some(map) => map,
-            None if *source == ColorSource::Intensity => Colormap::from_name("gray")?,
-            None => Colormap::from_name("viridis")?,
+            None => Colormap::from_name(source.default_colormap())?,
         };
         let is_gray = *source == ColorSource::Intensity && coloring.colormap.is_none();
         let map_range = if is_gray { INTENSITY_GRAY_RANGE } else { (0.0, 1.0) };
-        Ok(Self { value_at, range, map, map_range, is_range_given: given.is_some() })
+        let range_origin = match source {
+            _ if given.is_some() => "as given",
+            ColorSource::Support => "at a point to one radius away from all points",
+            _ => "2 % to 98 % of the values",
+        };
+        Ok(Self { value_at, range, map, map_range, range_origin })
     }
 
     /// Returns the sRGB-encoded colour of a value.
@@ -55,8 +64,8 @@ impl<'c> Mapping<'c> {
 
     /// Returns the range and the name of the map, for a note to the user.
     pub fn description(&self) -> String {
-        let origin = if self.is_range_given { "as given" } else { "2 % to 98 % of the values" };
-        format!("from {} ({origin}), map {}", format_range(self.range), self.map.name())
+        let Self { range, range_origin, map, .. } = self;
+        format!("from {} ({range_origin}), map {}", format_range(*range), map.name())
     }
 }
 
@@ -68,6 +77,11 @@ fn format_range(PercentileRange { low, high }: PercentileRange) -> String {
 }
 
 impl ColorSource {
+    /// Returns the name of the map that is used if none is named.
+    pub(super) fn default_colormap(&self) -> &'static str {
+        if *self == Self::Intensity { "gray" } else { "viridis" }
+    }
+
     /// Returns the value of each point, or `None` if the source has no values or `cloud` lacks its column.
     fn values<'c>(
         &self,
@@ -87,6 +101,7 @@ impl ColorSource {
                 let values = cloud.scalar(name)?;
                 Some(Box::new(|i| values.get(i)))
             }
+            Self::Support => Some(Box::new(|_| 0.0)),
             Self::Rgb | Self::Class | Self::Normal | Self::Constant(_) => None,
         }
     }

@@ -2,6 +2,7 @@
 
 mod source;
 mod choose;
+mod support;
 mod coloring;
 mod mapping;
 mod legend;
@@ -10,6 +11,7 @@ pub use choose::choose_source;
 pub use coloring::Coloring;
 pub use legend::{Legend, legend};
 pub use source::{ColorSource, parse_hex};
+pub use support::SupportColors;
 
 use crate::error::Result;
 use crate::image::class_color;
@@ -52,7 +54,10 @@ pub fn colorize(
             Ok(for_all(&|i| (0.5 * normals[i] + 0.5).to_array().map(|x| (x * 255.0).round() as u8)))
         }
         ColorSource::Constant(color) => Ok(vec![*color; cloud.len()]),
-        ColorSource::Intensity | ColorSource::Elevation | ColorSource::Column(_) => {
+        ColorSource::Intensity
+        | ColorSource::Elevation
+        | ColorSource::Support
+        | ColorSource::Column(_) => {
             let mapping = Mapping::new(cloud, coloring, &source)?;
             progress.note(&format!("color {source} {}", mapping.description()));
             Ok(for_all(&|i| mapping.color((mapping.value_at)(i))))

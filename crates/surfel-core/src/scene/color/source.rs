@@ -18,6 +18,8 @@ pub enum ColorSource {
     Class,
     /// Direction of the normal as (n + 1) / 2.
     Normal,
+    /// Distance from each hit to the nearest point, mapped to colours. A point itself has the first colour.
+    Support,
     /// One sRGB-encoded colour.
     Constant([u8; 3]),
     /// Another column, by its name, mapped to colours.
@@ -44,14 +46,14 @@ impl ColorSource {
             Self::Intensity => cloud.intensity.is_some(),
             Self::Class => cloud.classification.is_some(),
             Self::Normal => cloud.normals.is_some(),
-            Self::Elevation | Self::Constant(_) => true,
+            Self::Elevation | Self::Support | Self::Constant(_) => true,
             Self::Column(name) => cloud.scalar(name).is_some(),
         }
     }
 
     /// Returns the error for a cloud without the column that the source needs.
     pub(super) fn missing_from(&self, cloud: &PointCloud) -> Error {
-        let mut known: Vec<&str> = vec!["elevation", "#RRGGBB"];
+        let mut known: Vec<&str> = vec!["elevation", "support", "#RRGGBB"];
         let columns = [
             ("rgb", Self::Rgb),
             ("intensity", Self::Intensity),
@@ -75,6 +77,7 @@ impl fmt::Display for ColorSource {
             Self::Elevation => f.write_str("elevation"),
             Self::Class => f.write_str("class"),
             Self::Normal => f.write_str("normal"),
+            Self::Support => f.write_str("support"),
             Self::Constant([r, g, b]) => write!(f, "#{r:02x}{g:02x}{b:02x}"),
             Self::Column(name) => f.write_str(name),
         }
@@ -88,7 +91,7 @@ impl FromStr for ColorSource {
         let invalid = || Error::Setting {
             name: "color",
             found: text.to_owned(),
-            expected: "rgb, intensity, elevation, class, normal, #RRGGBB or the name of a column",
+            expected: "rgb, intensity, elevation, class, normal, support, #RRGGBB or the name of a column",
         };
         match text.trim() {
             "" => Err(invalid()),
@@ -97,6 +100,7 @@ impl FromStr for ColorSource {
             "elevation" => Ok(Self::Elevation),
             "class" | "classification" => Ok(Self::Class),
             "normal" | "normals" => Ok(Self::Normal),
+            "support" => Ok(Self::Support),
             color if color.starts_with('#') => {
                 parse_hex(color).map(Self::Constant).ok_or_else(invalid)
             }
@@ -127,7 +131,9 @@ mod tests {
 
     #[test]
     fn sources_are_parsed_and_displayed_by_name() {
-        for text in ["rgb", "intensity", "elevation", "class", "normal", "#0a141e", "gps_time"] {
+        for text in
+            ["rgb", "intensity", "elevation", "class", "normal", "support", "#0a141e", "gps_time"]
+        {
             assert_eq!(text.parse::<ColorSource>().unwrap().to_string(), text);
         }
         assert_eq!("#fff".parse::<ColorSource>().unwrap(), ColorSource::Constant([255; 3]));

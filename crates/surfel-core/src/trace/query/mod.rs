@@ -1,5 +1,5 @@
-//! Queries of rays against one cloud or one mesh: closest hit, any hit, gathered discs, and the blended
-//! surface.
+//! Queries of rays against one cloud or one mesh: closest hit, any hit, gathered discs, the blended
+//! surface, and the points that support its hits.
 //!
 //! A file uses only those above it.
 
@@ -13,4 +13,5 @@ pub mod edge_test;
 pub mod edge_filter;
 pub mod smooth_query;
 pub mod splat_query;
+pub mod support;
 pub mod surface;

@@ -1,6 +1,6 @@
 //! The continuous surface of a cloud: blended discs without the hits that the edge test rejects, or spheres.
 
-use crate::flat::{FlatCloud, FlatPoints};
+use crate::flat::{FlatCloud, FlatPoints, Slot};
 use crate::math::{Lanes, PACKET_WIDTH, PacketLanes, Ray, Vec3};
 use crate::surface::{Capsule, Disc, EdgeTest, Sphere, SurfaceKind, Surfel, capsule};
 use crate::trace::query::any::{AcceptAll, any_accepted_hit, any_hits_kernel};
@@ -10,6 +10,7 @@ use crate::trace::query::hit::Hit;
 use crate::trace::query::leaf::LeafGeometry;
 use crate::trace::query::smooth_query::{SmoothFilter, SmoothTracer};
 use crate::trace::query::splat_query::{Splat, SplatTracer};
+use crate::trace::query::support::support;
 use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::simd::{Simd, dispatch_simd};
 
@@ -20,6 +21,8 @@ pub struct SurfaceHit {
     pub distance: f32,
     /// Index of the nearest point in its cloud.
     pub id: u32,
+    /// Slot of that point in the tree of its kind of surface.
+    pub slot: Slot,
     /// Radius of that point, in object space.
     pub radius: f32,
     /// Unit normal, facing the ray's origin.
@@ -37,6 +40,7 @@ impl SurfaceHit {
     pub const MISS: Self = Self {
         distance: f32::INFINITY,
         id: u32::MAX,
+        slot: 0,
         radius: 0.0,
         normal: Vec3::ZERO,
         color: Vec3::ZERO,
@@ -78,6 +82,12 @@ fn surface_hits_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [Su
     }
     merge_solids::<L, Capsule>(&cloud.lines, SurfaceKind::Capsule, rays, hits);
     merge_solids::<L, Sphere>(&cloud.scatter, SurfaceKind::Sphere, rays, hits);
+    if let Some(colors) = &cloud.support_colors {
+        for (ray, hit) in rays.iter().zip(hits).filter(|(_, hit)| !hit.is_miss()) {
+            let nearest = Hit { distance: hit.distance, slot: hit.slot };
+            hit.color = colors.color(support::<L>(cloud, ray, &nearest, hit.surface).distance);
+        }
+    }
 }
 
 /// Finds out for each ray whether the continuous surface lies in its range.
@@ -130,6 +140,7 @@ fn merge_solids<L: Lanes, S: LeafGeometry<Tree = FlatPoints>>(
         *hit = SurfaceHit {
             distance: nearest.distance,
             id: points.id(nearest.slot),
+            slot: nearest.slot,
             radius,
             normal: if outward.dot(ray.direction) < 0.0 { outward } else { -outward },
             color,
@@ -205,6 +216,7 @@ fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHi
                     hits[ray_idx as usize] = SurfaceHit {
                         distance: found_distances[lane],
                         id: cloud.points.id(slot),
+                        slot,
                         radius,
                         normal: Vec3::new(x[lane], y[lane], z[lane]),
                         color: Vec3::new(r[lane], g[lane], b[lane]),
@@ -276,6 +288,7 @@ fn surface_hit(cloud: &FlatCloud, ray: &Ray, splat: &Splat) -> SurfaceHit {
     SurfaceHit {
         distance: splat.hit.distance,
         id: cloud.points.id(splat.hit.slot),
+        slot: splat.hit.slot,
         radius: splat.radius / cloud.surface.radius_factor(),
         normal: splat.normal,
         color: splat.color,

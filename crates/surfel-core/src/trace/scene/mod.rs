@@ -8,3 +8,4 @@ pub mod tlas;
 pub mod scheduler;
 pub mod scene_hit;
 pub mod scene_query;
+pub mod scene_support;

@@ -15,7 +15,7 @@ pub struct SceneHit {
     pub instance: u32,
     /// Index of the nearest point in its cloud, or of the triangle in its mesh.
     pub id: u32,
-    /// Slot of the triangle, 0 for points.
+    /// Slot of the triangle, or of the point in the tree of its kind of surface.
     pub slot: Slot,
     /// Barycentric coordinates of the triangle's second and third corners.
     pub barycentrics: (f32, f32),
@@ -65,6 +65,7 @@ pub fn point_hit(cloud: &FlatCloud, hit: &SurfaceHit, instance: &Instance) -> Sc
     let normal = instance.world_normal(hit.normal);
     SceneHit {
         id: hit.id,
+        slot: hit.slot,
         radius: hit.radius * instance.max_scale,
         normal,
         geometric_normal: normal,
