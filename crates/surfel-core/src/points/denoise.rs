@@ -99,7 +99,7 @@ impl std::fmt::Display for Denoise {
     }
 }
 
-/// What denoising did.
+/// Effect of denoising.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DenoiseReport {
     /// Median noise over the regions of surfaces: the standard deviation of points from their surface, in spacings.

@@ -77,7 +77,7 @@ impl Preparation {
 pub struct PreparationReport {
     /// Repairs of the cloud.
     pub clean: CleanReport,
-    /// What denoising did, if points were moved.
+    /// Effect of denoising, if points were moved.
     pub denoise: Option<DenoiseReport>,
     /// Number of points after cleaning and subsampling.
     pub n_points: usize,
