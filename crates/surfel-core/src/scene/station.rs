@@ -1,4 +1,4 @@
-//! Stations: the place from which one scanner measured a cloud in its own coordinates, all around.
+//! Stations: the place from which one scanner or depth camera measured a cloud in its own coordinates.
 
 use super::camera::{Camera, Projection};
 use super::ground::ground_axes;
@@ -20,6 +20,10 @@ const MIN_SECTOR_FRACTION: f64 = 0.005;
 /// Minimum ratio of the 90th to the 10th percentile of the distances: the middle of an object that was scanned from
 /// outside is about equally far from all of its surface.
 const MIN_DISTANCE_RATIO: f32 = 3.0;
+/// Minimum ratio of these distances from a depth camera: an object alone is shown as any other.
+const MIN_CAMERA_DISTANCE_RATIO: f32 = 1.5;
+/// Maximum tangent of the angle between the optical axis of a depth camera and a point that it sees.
+const MAX_CAMERA_SLOPE: f32 = 1.2;
 /// Width and height of the cells of directions: many rays of a scanner, and about one distance.
 const CELL_DEG: f32 = 5.0;
 /// Minimum number of points in a cell that counts: the logarithm of fewer is mostly noise.
@@ -42,17 +46,19 @@ pub struct StationView {
     pub direction: DVec3,
     /// Median distance of the points.
     pub distance: f64,
+    /// Vertical angle of view in degrees.
+    pub view_angle_deg: f64,
 }
 
 impl StationView {
-    /// Returns the camera at the station, with a wide view unless `view_angle_deg` is given.
+    /// Returns the camera at the station, with its own view unless `view_angle_deg` is given.
     pub fn camera(&self, up: Vec3, view_angle_deg: Option<f64>) -> Camera {
         Camera {
             position: self.position,
             focal_point: self.position + self.distance * self.direction,
             view_up: up.as_dvec3(),
             projection: Projection::Perspective {
-                view_angle_deg: view_angle_deg.unwrap_or(VIEW_ANGLE_DEG),
+                view_angle_deg: view_angle_deg.unwrap_or(self.view_angle_deg),
             },
         }
     }
@@ -88,6 +94,39 @@ pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
         position: DVec3::ZERO,
         direction: longest_view(&points, median, up),
         distance: median.into(),
+        view_angle_deg: VIEW_ANGLE_DEG,
+    })
+}
+
+/// Returns the view of the depth camera at the zero of the world coordinates of `cloud`, which looks along +Z with -Y
+/// up, or `None` if its points are not those that such a camera measured.
+pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
+    let zero = (-cloud.origin).as_vec3();
+    let points = sample(cloud);
+    if up != Vec3::NEG_Y || points.len() < MIN_POINTS {
+        return None;
+    }
+    let is_in_view = |point: &Vec3| {
+        let offset = *point - zero;
+        offset.x.abs().max(offset.y.abs()) < MAX_CAMERA_SLOPE * offset.z
+    };
+    if !points.iter().all(is_in_view) {
+        return None;
+    }
+    let slope_of = |point: &Vec3| ((point.y - zero.y) / (point.z - zero.z)).abs();
+    let slope = points.iter().map(slope_of).fold(0.0, f32::max);
+    let points = polar_points(zero, &points, up);
+    let mut distances: Vec<f32> = points.iter().map(|point| point.distance).collect();
+    distances.sort_unstable_by(f32::total_cmp);
+    let percentile = |percent: usize| distances.get(distances.len() * percent / 100).copied();
+    let (near, median, far) = (percentile(10)?, percentile(50)?, percentile(90)?);
+    let is_scan =
+        MIN_CAMERA_DISTANCE_RATIO * near <= far && density_slope(&points)? < MAX_DENSITY_SLOPE;
+    is_scan.then(|| StationView {
+        position: DVec3::ZERO,
+        direction: DVec3::Z,
+        distance: median.into(),
+        view_angle_deg: 2.0 * f64::from(slope).atan().to_degrees(),
     })
 }
 
@@ -259,6 +298,36 @@ mod tests {
             scan.origin -= position;
             assert!(find_station(&scan, Vec3::Z).is_some(), "{position}");
         }
+    }
+
+    /// A floor 1 m below a depth camera and a wall 8 m ahead, seen by a grid of rays; or an even part of the floor.
+    fn depth_image(is_even: bool) -> PointCloud {
+        let grid =
+            (0..40_000).map(|i| ((i % 200) as f32 / 199.0 - 0.5, (i / 200) as f32 / 199.0 - 0.5));
+        let of_ray = |(x, y): (f32, f32)| {
+            let direction = Vec3::new(x, 0.8 * y, 1.0);
+            let to_floor = if 0.0 < direction.y { 1.0 / direction.y } else { f32::INFINITY };
+            direction * to_floor.min(8.0)
+        };
+        let of_surface = |(x, y): (f32, f32)| Vec3::new(3.0 * x, 1.0, 4.5 + 2.0 * y);
+        let points = match is_even {
+            true => grid.map(of_surface).collect(),
+            false => grid.map(of_ray).collect(),
+        };
+        PointCloud::from_positions(points)
+    }
+
+    #[test]
+    fn depth_images_are_seen_from_their_camera() {
+        let cloud = depth_image(false);
+        let station = find_depth_camera(&cloud, Vec3::NEG_Y).unwrap();
+        assert_eq!((station.position, station.direction), (DVec3::ZERO, DVec3::Z));
+        assert!((station.view_angle_deg - 2.0 * 0.4f64.atan().to_degrees()).abs() < 0.1);
+        assert_eq!(find_depth_camera(&cloud, Vec3::Y), None);
+        assert_eq!(find_depth_camera(&depth_image(true), Vec3::NEG_Y), None);
+        let mut moved = cloud;
+        moved.origin = DVec3::new(0.0, 0.0, -20.0);
+        assert_eq!(find_depth_camera(&moved, Vec3::NEG_Y), None);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::loaded::LoadedScene;
 use crate::description::{Interior, SceneDescription};
 use surfel_core::math::Vec3;
-use surfel_core::scene::{Room, StationView, find_station};
+use surfel_core::scene::{Room, StationView, find_depth_camera, find_station};
 
 /// Returns the station from which the scene is shown: that of a single cloud that stands still, if nothing is asked of
 /// the camera.
@@ -22,6 +22,7 @@ pub fn choose_station(
     if !is_open || is_merged || is_turned || scene.moves() || scene.graph.camera().is_some() {
         return None;
     }
-    let station = find_station(scene.single_cloud()?, up)?;
+    let cloud = scene.single_cloud()?;
+    let station = find_station(cloud, up).or_else(|| find_depth_camera(cloud, up))?;
     room.is_none_or(|room| room.contains(station.position)).then_some(station)
 }
