@@ -64,8 +64,9 @@ impl SceneCamera {
             }
             (None, Some(station)) => {
                 let [x, y, z] = station.position.to_array();
-                let line =
-                    format!("camera at the scanner's station {x},{y},{z}: the points were measured from there");
+                let line = format!(
+                    "camera at the scanner's station {x},{y},{z}: the points were measured from there"
+                );
                 progress.choice(&line, &["camera.position", "camera.interior"]);
                 station.camera(up, view_angle_deg)
             }
