@@ -32,6 +32,9 @@ const MIN_CELL_POINTS: usize = 4;
 /// dense in angle and 1 for points that are dense in area: scanners had -0.26 to 0.03, vertices of meshes 0.68, evenly
 /// sampled boxes and terrain 1.0 to 1.4.
 const MAX_DENSITY_SLOPE: f64 = 0.4;
+/// Maximum spread of the distances within cells, as a fraction of that of all: most rays of a scanner end at the first
+/// surface.
+const MAX_SPREAD_WITHIN_CELLS: f64 = 0.7;
 /// Horizontal angle that should have most of the far points: that of a picture of 16:9.
 const WINDOW_DEG: usize = 90;
 /// Vertical angle of view in degrees: wider than for objects, as things all around are near.
@@ -89,7 +92,8 @@ pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
     let (near, median, far) = (percentile(10)?, percentile(50)?, percentile(90)?);
     let is_scan = MIN_DISTANCE_RATIO * near <= far
         && MIN_SECTORS <= n_filled_sectors(&points)
-        && density_slope(&points)? < MAX_DENSITY_SLOPE;
+        && density_slope(&points)? < MAX_DENSITY_SLOPE
+        && spread_within_cells(&points) < MAX_SPREAD_WITHIN_CELLS;
     is_scan.then(|| StationView {
         position: DVec3::ZERO,
         direction: longest_view(&points, median, up),
@@ -166,9 +170,8 @@ fn n_filled_sectors(points: &[PolarPoint]) -> usize {
     counts.into_iter().filter(|count| min_count <= *count as f64).count()
 }
 
-/// Returns the slope of the line of least squares through ln(points) over ln(median distance squared) of the cells of
-/// directions, or `None` if all cells are equally far.
-fn density_slope(points: &[PolarPoint]) -> Option<f64> {
+/// Returns the distances of the points by cells of directions.
+fn cells(points: &[PolarPoint]) -> BTreeMap<(u32, u32), Vec<f32>> {
     let cell_rad = CELL_DEG.to_radians();
     let mut cells: BTreeMap<(u32, u32), Vec<f32>> = BTreeMap::new();
     for point in points {
@@ -176,7 +179,26 @@ fn density_slope(points: &[PolarPoint]) -> Option<f64> {
         let column = (point.azimuth_rad / cell_rad) as u32;
         cells.entry((row, column)).or_default().push(point.distance);
     }
-    let full = cells.into_values().filter(|distances| MIN_CELL_POINTS <= distances.len());
+    cells
+}
+
+/// Returns the variance of the logarithms of distances within cells of directions, as a fraction of that of all: 1 for
+/// points that fill space.
+fn spread_within_cells(points: &[PolarPoint]) -> f64 {
+    let sum_of_squares = |distances: &[f32]| {
+        let logarithms = distances.iter().map(|distance| f64::from(*distance).ln());
+        let mean = logarithms.clone().sum::<f64>() / distances.len() as f64;
+        logarithms.map(|logarithm| (logarithm - mean).powi(2)).sum::<f64>()
+    };
+    let all: Vec<f32> = points.iter().map(|point| point.distance).collect();
+    let within: f64 = cells(points).values().map(|cell| sum_of_squares(cell)).sum();
+    within / sum_of_squares(&all).max(f64::MIN_POSITIVE)
+}
+
+/// Returns the slope of the line of least squares through ln(points) over ln(median distance squared) of the cells of
+/// directions, or `None` if all cells are equally far.
+fn density_slope(points: &[PolarPoint]) -> Option<f64> {
+    let full = cells(points).into_values().filter(|distances| MIN_CELL_POINTS <= distances.len());
     let logarithms = full.map(|mut distances| {
         let middle = distances.len() / 2;
         let median = *distances.select_nth_unstable_by(middle, f32::total_cmp).1;
@@ -342,6 +364,15 @@ mod tests {
         });
         assert_eq!(find_station(&PointCloud::from_positions(ball.collect()), Vec3::Z), None);
         assert_eq!(find_station(&PointCloud::default(), Vec3::Z), None);
+    }
+
+    #[test]
+    fn points_that_fill_space_have_no_station() {
+        let mut random = Random::new(5, 0);
+        let mut point =
+            |_| Vec3::from_array(std::array::from_fn(|_| random.next_gaussian() as f32));
+        let filled = PointCloud::from_positions((0..50_000).map(&mut point).collect());
+        assert_eq!(find_station(&filled, Vec3::Z), None);
     }
 
     #[test]
