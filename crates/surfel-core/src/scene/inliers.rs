@@ -2,6 +2,7 @@
 
 use crate::math::{Aabb, Vec3};
 use crate::points::{PointCloud, is_valid_position};
+use std::collections::HashSet;
 
 /// Fraction of points at each end of an axis that can be outliers.
 const OUTLIER_FRACTION: f64 = 0.005;
@@ -18,7 +19,10 @@ pub fn inlier_bounds(cloud: &PointCloud) -> Aabb {
 pub(super) fn sample_inliers(cloud: &PointCloud) -> Vec<Vec3> {
     let stride = cloud.len().div_ceil(MAX_SAMPLES).max(1);
     let valid = cloud.positions.iter().step_by(stride).copied().filter(|p| is_valid_position(*p));
-    without_outliers(&valid.collect::<Vec<Vec3>>())
+    // A place counts once, however many points lie there.
+    let mut seen = HashSet::new();
+    let places = valid.filter(|p| seen.insert(p.to_array().map(f32::to_bits)));
+    without_outliers(&places.collect::<Vec<Vec3>>())
 }
 
 /// Returns the points within the inner quantiles of all axes, widened by a quarter of their range.
@@ -81,6 +85,14 @@ mod tests {
             40.0 * distance.powi(power) * Vec3::new(angle.cos(), angle.sin(), 0.0)
         };
         (0..5000).map(|_| point(&mut random)).collect()
+    }
+
+    #[test]
+    fn many_points_in_one_place_do_not_make_outliers_of_the_others() {
+        let mut points = vec![Vec3::ONE; 100_000];
+        points.extend(disk(1));
+        let bounds = inlier_bounds(&PointCloud::from_positions(points));
+        assert!(39.0 < bounds.max.x && bounds.min.y < -39.0, "{bounds:?}");
     }
 
     #[test]
