@@ -116,7 +116,7 @@ fn prepared(
             Some(choice) => subsample(&cloud, choice, seed, report)?,
             None => cloud,
         };
-        if let Some(moved) = denoise(&mut cloud.positions, mode, report)? {
+        if let Some(moved) = denoise(&mut cloud, mode, report)? {
             report.choice(&moved.line(), &["denoise"]);
         }
         return Ok(cloud);

@@ -111,7 +111,7 @@ pub fn prepare(
     if cloud.is_empty() {
         return Err(Error::EmptyCloud);
     }
-    let denoise = denoise_points(&mut cloud, preparation.denoise, progress)?;
+    let denoise = denoise(&mut cloud, preparation.denoise, progress)?;
     let missing = Missing::any(&cloud, preparation);
     let estimated = Missing::all(&cloud);
     let mut report =
@@ -142,20 +142,6 @@ pub fn prepare(
     }
     add_to_morphs(&mut cloud, &estimated, preparation, progress)?;
     Ok((PreparedCloud::new(cloud)?, report))
-}
-
-/// Moves the points of a cloud at rest onto their surface, if `choice` says so.
-fn denoise_points(
-    cloud: &mut PointCloud,
-    choice: Denoise,
-    progress: &dyn Progress,
-) -> Result<Option<DenoiseReport>> {
-    let is_animated = !cloud.morphs.is_empty() || cloud.skin.is_some();
-    match choice {
-        Denoise::Auto if cloud.normals.is_some() => Ok(None),
-        _ if is_animated => Ok(None),
-        _ => denoise(&mut cloud.positions, choice, progress),
-    }
 }
 
 /// The columns to estimate.

@@ -55,14 +55,16 @@ pub fn widen_lines(
             let mut neighbors = tree.nearest(position, N_THINNED_NEIGHBORS + 1, None);
             neighbors.retain(|neighbor| 0.0 < neighbor.distance_squared);
             neighbors.truncate(N_THINNED_NEIGHBORS);
-            let fit = fit_around(&thinned, position, &neighbors);
+            let own = shapes[*point as usize];
             let radius = kth_distance(&neighbors, N_THINNED_NEIGHBORS);
+            if MAX_WIDENING * own.radius < radius {
+                return Ok(Some(own));
+            }
+            let fit = fit_around(&thinned, position, &neighbors);
             if is_line(&fit) {
                 return Ok(None);
             }
-            let own = shapes[*point as usize];
-            let is_close = radius <= MAX_WIDENING * own.radius;
-            let structure = match is_surface(&fit) && is_close {
+            let structure = match is_surface(&fit) {
                 true if kept.binary_search(point).is_ok() => Structure::Surface,
                 true => Structure::Redundant,
                 false => return Ok(Some(own)),

@@ -30,7 +30,7 @@ const MIN_FLAT_RATIO: f64 = 4.0;
 const MIN_TERRAIN_SIDE: f64 = 50.0;
 
 /// Maximum tangent of the angle between the optical axis of a depth camera and a point that it sees.
-const MAX_CAMERA_SLOPE: f32 = 1.2;
+pub(crate) const MAX_CAMERA_SLOPE: f32 = 1.2;
 
 /// Minimum fraction of the points within the field of view of a depth camera.
 const MIN_FRACTION_IN_VIEW: f64 = 0.99;

@@ -3,7 +3,7 @@
 use super::camera::{Camera, Projection};
 use super::ground::ground_axes;
 use crate::math::{Aabb, DVec3, Vec3};
-use crate::points::{PointCloud, is_valid_position};
+use crate::points::{MAX_CAMERA_SLOPE, PointCloud, is_valid_position};
 use std::collections::BTreeMap;
 use std::f32::consts::{PI, TAU};
 
@@ -22,8 +22,6 @@ const MIN_SECTOR_FRACTION: f64 = 0.005;
 const MIN_DISTANCE_RATIO: f32 = 3.0;
 /// Minimum ratio of these distances from a depth camera: an object alone is shown as any other.
 const MIN_CAMERA_DISTANCE_RATIO: f32 = 1.5;
-/// Maximum tangent of the angle between the optical axis of a depth camera and a point that it sees.
-const MAX_CAMERA_SLOPE: f32 = 1.2;
 /// Width and height of the cells of directions: many rays of a scanner, and about one distance.
 const CELL_DEG: f32 = 5.0;
 /// Minimum number of points in a cell that counts: the logarithm of fewer is mostly noise.
@@ -86,10 +84,7 @@ pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
         return None;
     }
     let points = polar_points(zero, &points, up);
-    let mut distances: Vec<f32> = points.iter().map(|point| point.distance).collect();
-    distances.sort_unstable_by(f32::total_cmp);
-    let percentile = |percent: usize| distances.get(distances.len() * percent / 100).copied();
-    let (near, median, far) = (percentile(10)?, percentile(50)?, percentile(90)?);
+    let [near, median, far] = distances(&points)?;
     let is_scan = MIN_DISTANCE_RATIO * near <= far
         && MIN_SECTORS <= n_filled_sectors(&points)
         && density_slope(&points)? < MAX_DENSITY_SLOPE
@@ -120,10 +115,7 @@ pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
     let slope_of = |point: &Vec3| ((point.y - zero.y) / (point.z - zero.z)).abs();
     let slope = points.iter().map(slope_of).fold(0.0, f32::max);
     let points = polar_points(zero, &points, up);
-    let mut distances: Vec<f32> = points.iter().map(|point| point.distance).collect();
-    distances.sort_unstable_by(f32::total_cmp);
-    let percentile = |percent: usize| distances.get(distances.len() * percent / 100).copied();
-    let (near, median, far) = (percentile(10)?, percentile(50)?, percentile(90)?);
+    let [near, median, far] = distances(&points)?;
     let is_scan =
         MIN_CAMERA_DISTANCE_RATIO * near <= far && density_slope(&points)? < MAX_DENSITY_SLOPE;
     is_scan.then(|| StationView {
@@ -158,6 +150,14 @@ fn polar_points(station: Vec3, points: &[Vec3], up: Vec3) -> Vec<PolarPoint> {
         (0.0 < distance).then_some(PolarPoint { distance, azimuth_rad, elevation_rad })
     };
     points.iter().filter_map(polar).collect()
+}
+
+/// Returns the 10th, 50th and 90th percentile of the distances.
+fn distances(points: &[PolarPoint]) -> Option<[f32; 3]> {
+    let mut distances: Vec<f32> = points.iter().map(|point| point.distance).collect();
+    distances.sort_unstable_by(f32::total_cmp);
+    let percentile = |percent: usize| distances.get(distances.len() * percent / 100).copied();
+    Some([percentile(10)?, percentile(50)?, percentile(90)?])
 }
 
 fn n_filled_sectors(points: &[PolarPoint]) -> usize {

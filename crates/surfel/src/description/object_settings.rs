@@ -2,8 +2,8 @@
 
 use super::keys::{KeyedSettings, settings};
 use super::rule::{
-    Checked, ClipBoxRule, ClipPlaneRule, ColorSourceRule, ColormapRule, Flag, Interval, POSITIVE,
-    Rule, Text, count, parsed,
+    Checked, ClipBoxRule, ClipPlaneRule, ColorSourceRule, ColormapRule, Flag, Interval, OneOf,
+    POSITIVE, Rule, Text, count, parsed,
 };
 use super::{Invalid, Part};
 use serde_json::Value;
@@ -37,6 +37,9 @@ settings! {
     }
 }
 
+const DENOISE: &[(&str, Denoise)] =
+    &[("auto", Denoise::Auto), ("on", Denoise::On), ("off", Denoise::Off)];
+
 settings! {
     /// The reduction and completion of points before they become a surface.
     pub struct PreparationSettings {
@@ -44,7 +47,7 @@ settings! {
         subsample: Subsample, SubsampleRule, "CHOICE";
         /// Moves noisy points onto their surface: auto (surfaces whose noise is at least 0.15 of the spacing), on or
         /// off [default: auto, off for surfel prepare].
-        denoise: Denoise, parsed(Denoise::to_string), "WHEN";
+        denoise: Denoise, OneOf(DENOISE), "WHEN";
         /// Search for neighbours: knn, grid or scan-line.
         neighbors: NeighborMethod = NeighborMethod::default(), parsed(method_name), "METHOD";
         /// Number of neighbours that a normal is estimated from [default: 16].
