@@ -273,40 +273,61 @@ fn smoothed(
         own => own,
     };
     let mut structures: Vec<Structure> = own.zip(shapes).zip(&shares).map(decided).collect();
-    let n_island_rounds = if is_noisy { 0 } else { N_ISLAND_ROUNDS };
-    for _ in 0..n_island_rounds {
-        let (next, n_changed) = without_islands(tree, &structures, &shares, progress)?;
-        structures = next;
-        if n_changed == 0 {
-            break;
-        }
+    if !is_noisy {
+        scatter_islands(tree, &mut structures, &shares, progress)?;
     }
     Ok(structures)
 }
 
-/// Scatters the surface points most of whose neighbours are scattered, and returns their number too.
-fn without_islands(
+/// Scatters the surface points most of whose neighbours are scattered. In each round after the first, only points near
+/// those that the last one scattered are looked at.
+fn scatter_islands(
     tree: &KdTree,
-    structures: &[Structure],
+    structures: &mut [Structure],
     shares: &[f32],
     progress: &dyn Progress,
-) -> Result<(Vec<Structure>, usize)> {
-    let is_island = |(point, (structure, share)): (usize, (&Structure, &f32))| {
-        if *structure != Structure::Surface || *share < MIN_SHARE_NEAR_SCATTER {
-            return Ok(false);
-        }
-        progress.check()?;
-        let around = tree.nearest(tree.positions()[point], N_MANY_NEIGHBORS, Some(point as u32));
-        let of_neighbor = |neighbor: &Neighbor| structures[neighbor.index as usize];
-        let is_scattered = |neighbor: &&Neighbor| of_neighbor(neighbor) == Structure::Scatter;
-        Ok(around.len() <= 2 * around.iter().filter(is_scattered).count())
+) -> Result<()> {
+    let positions = tree.positions();
+    let is_near_scatter = |point: &u32| {
+        let (structure, share) = (structures[*point as usize], shares[*point as usize]);
+        structure == Structure::Surface && MIN_SHARE_NEAR_SCATTER <= share
     };
-    let points = structures.par_iter().zip(shares).enumerate();
-    let is_island = points.map(is_island).collect::<Result<Vec<bool>>>()?;
-    let next = structures.iter().zip(&is_island);
-    let next = next.map(|(own, is_island)| if *is_island { Structure::Scatter } else { *own });
-    let n_islands = is_island.iter().filter(|is_island| **is_island).count();
-    Ok((next.collect(), n_islands))
+    let near_scatter = (0..positions.len() as u32).filter(is_near_scatter);
+    let mut candidates: Vec<IslandCandidate> =
+        near_scatter.map(|point| IslandCandidate { point, reach_squared: f32::INFINITY }).collect();
+    let position = |candidate: &IslandCandidate| positions[candidate.point as usize];
+    let mut scattered: Vec<Vec3> = candidates.iter().map(position).collect();
+    for _ in 0..N_ISLAND_ROUNDS {
+        let last_scattered = KdTree::new(&scattered, progress)?;
+        let look = |candidate: &mut IslandCandidate| {
+            progress.check()?;
+            let nearest = last_scattered.nearest(position(candidate), 1, None);
+            let is_far = |nearest: &Neighbor| candidate.reach_squared < nearest.distance_squared;
+            if nearest.first().is_none_or(is_far) {
+                return Ok(false);
+            }
+            let around = tree.nearest(position(candidate), N_MANY_NEIGHBORS, Some(candidate.point));
+            candidate.reach_squared = around.last().map_or(0.0, |last| last.distance_squared);
+            let of_neighbor = |neighbor: &Neighbor| structures[neighbor.index as usize];
+            let is_scattered = |neighbor: &&Neighbor| of_neighbor(neighbor) == Structure::Scatter;
+            Ok(around.len() <= 2 * around.iter().filter(is_scattered).count())
+        };
+        let is_island = candidates.par_iter_mut().map(look).collect::<Result<Vec<bool>>>()?;
+        let mut is_island = is_island.into_iter();
+        let (islands, others): (Vec<_>, Vec<_>) =
+            candidates.into_iter().partition(|_| is_island.next() == Some(true));
+        islands.iter().for_each(|island| structures[island.point as usize] = Structure::Scatter);
+        scattered = islands.iter().map(position).collect();
+        candidates = others;
+    }
+    Ok(())
+}
+
+/// A surface point near scattered ones.
+struct IslandCandidate {
+    point: u32,
+    /// Squared distance to the farthest of its neighbours, infinite if these are not known.
+    reach_squared: f32,
 }
 
 /// Gives a point the direction and the radius of its final structure. Surface points keep what was decided.

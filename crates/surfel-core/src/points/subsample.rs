@@ -86,8 +86,10 @@ pub(super) fn indices_by_spacing(
     progress: &dyn Progress,
 ) -> Result<Vec<u32>> {
     progress.begin("spacing", positions.len() as u64);
-    let mut cells: HashMap<[i64; 3], Vec<u32>, CellHash> = HashMap::default();
-    let mut kept = Vec::new();
+    // The place in `kept` of the last point of each cell, and of the point of the same cell before each point.
+    let mut cells: HashMap<[i64; 3], usize, CellHash> = HashMap::default();
+    let mut before: Vec<Option<usize>> = Vec::new();
+    let mut kept: Vec<u32> = Vec::new();
     // Distances in f32 may round down; cells wider by a millionth still find such points.
     let cells_per_unit = 0.5 / (f64::from(distance) * (1.0 + 1e-6));
     for (point, &position) in positions.iter().enumerate() {
@@ -103,12 +105,12 @@ pub(super) fn indices_by_spacing(
         let is_too_close = (0..8).any(|corner| {
             let step = |axis: usize| if corner >> axis & 1 == 1 { side[axis] } else { 0 };
             let cell = std::array::from_fn(|axis| own[axis].saturating_add(step(axis)));
-            let others = cells.get(&cell).map_or(&[][..], Vec::as_slice);
-            let squared = |other: u32| positions[other as usize].distance_squared(position);
-            others.iter().any(|&other| squared(other) < distance * distance)
+            let squared = |place: usize| positions[kept[place] as usize].distance_squared(position);
+            std::iter::successors(cells.get(&cell).copied(), |place| before[*place])
+                .any(|place| squared(place) < distance * distance)
         });
         if !is_too_close {
-            cells.entry(own).or_default().push(point as u32);
+            before.push(cells.insert(own, kept.len()));
             kept.push(point as u32);
         }
     }
@@ -123,13 +125,11 @@ type CellHash = std::hash::BuildHasherDefault<CellHasher>;
 
 impl std::hash::Hasher for CellHasher {
     fn write(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.0 = hash(self.0 ^ u64::from(byte));
+        for chunk in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..chunk.len()].copy_from_slice(chunk);
+            self.0 = hash(self.0 ^ u64::from_le_bytes(word));
         }
-    }
-
-    fn write_i64(&mut self, cell: i64) {
-        self.0 = hash(self.0 ^ cell as u64);
     }
 
     fn finish(&self) -> u64 {
