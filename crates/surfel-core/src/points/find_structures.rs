@@ -367,7 +367,9 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
-    use crate::points::{PointCloud, Preparation, PreparedCloud, StructureChoice, prepare};
+    use crate::points::{
+        Denoise, PointCloud, Preparation, PreparedCloud, StructureChoice, prepare,
+    };
     use crate::progress::NoProgress;
 
     fn prepared(positions: Vec<Vec3>) -> (PreparedCloud, Vec<Structure>) {
@@ -422,6 +424,69 @@ mod tests {
         let balls = cloud.radii().iter().zip(&structures);
         let balls = balls.filter(|(_, structure)| **structure == Structure::Scatter);
         assert!(balls.into_iter().all(|(radius, _)| *radius < spacing));
+    }
+
+    #[test]
+    fn noise_of_a_surface_is_not_foliage() {
+        for noise in [0.3, 0.6] {
+            let mut random = Random::new(5, 0);
+            // The spacing is 0.01.
+            let mut point = |_| {
+                let height = 0.01 * noise * random.next_gaussian() as f32;
+                Vec3::new(random.next_f32(), random.next_f32(), height)
+            };
+            let cloud = PointCloud::from_positions((0..10_000).map(&mut point).collect());
+            let preparation = Preparation { denoise: Denoise::Off, ..Preparation::default() };
+            let (cloud, _) = prepare(cloud, &preparation, &NoProgress).unwrap();
+            let n_scatter = fraction(&cloud.structures().unwrap(), Structure::Scatter);
+            assert!(n_scatter < 0.01, "{noise}: {n_scatter}");
+        }
+    }
+
+    /// Points that fill a cube. The surface is those in the middle whose distance from it is below `radius`.
+    fn island_in_a_cube(radius: f32) -> (Vec<Vec3>, Vec<Structure>) {
+        let points = random_points(8000, 6, Vec3::from_array);
+        let structure = |point: &Vec3| match point.distance(Vec3::splat(0.5)) < radius {
+            true => Structure::Surface,
+            false => Structure::Scatter,
+        };
+        let structures = points.iter().map(structure).collect();
+        (points, structures)
+    }
+
+    #[test]
+    fn small_islands_of_a_surface_amid_leaves_vanish() {
+        // A sphere of the smaller radius has 33 points, one of the larger has 2100.
+        for (radius, stays) in [(0.1, false), (0.4, true)] {
+            let (points, mut structures) = island_in_a_cube(radius);
+            let tree = KdTree::new(&points, &NoProgress).unwrap();
+            let shares = vec![1.0; points.len()];
+            scatter_islands(&tree, &mut structures, &shares, &NoProgress).unwrap();
+            assert_eq!(structures.contains(&Structure::Surface), stays, "{radius}");
+        }
+    }
+
+    #[test]
+    fn islands_equal_a_look_at_all_points_in_each_round() {
+        let (points, mut structures) = island_in_a_cube(0.3);
+        let tree = KdTree::new(&points, &NoProgress).unwrap();
+        let mut expected = structures.clone();
+        for _ in 0..N_ISLAND_ROUNDS {
+            let last = expected.clone();
+            let is_scattered = |point: u32| last[point as usize] == Structure::Scatter;
+            for (point, structure) in expected.iter_mut().enumerate() {
+                let around = tree.nearest(points[point], N_MANY_NEIGHBORS, Some(point as u32));
+                let n_scattered = around.iter().filter(|other| is_scattered(other.index)).count();
+                if around.len() <= 2 * n_scattered {
+                    *structure = Structure::Scatter;
+                }
+            }
+        }
+        let n_before = structures.iter().filter(|own| **own == Structure::Surface).count();
+        scatter_islands(&tree, &mut structures, &vec![1.0; points.len()], &NoProgress).unwrap();
+        let n_after = structures.iter().filter(|own| **own == Structure::Surface).count();
+        assert!(0 < n_after && n_after < n_before, "{n_after} of {n_before}");
+        assert_eq!(structures, expected);
     }
 
     #[test]
