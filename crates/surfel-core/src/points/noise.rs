@@ -1,7 +1,7 @@
 //! The noise of a cloud: the standard deviation of points from their surface, in spacings.
 //!
-//! Where a plane fits better the more neighbours it is fitted to, the distances from it are noise, not shape. The noise
-//! is measured at some points of each region.
+//! If a plane fits better the more neighbours it is fitted to, the distances from it are noise, not shape. The noise is
+//! measured at some points of each region.
 
 use super::neighbors::KdTree;
 use super::normals::fit_plane;
