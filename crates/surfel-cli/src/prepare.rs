@@ -1,4 +1,4 @@
-//! `surfel prepare`: subsample, clean, normals, orientation, radius, each alone or all.
+//! `surfel prepare`: clean, subsample, outliers, noise, normals, orientation, radius, each alone or all.
 
 use crate::global::Global;
 use crate::inputs::expand;
@@ -11,7 +11,8 @@ use std::path::PathBuf;
 use surfel::description::ObjectSettings;
 use surfel::resolve::{MemoryEstimate, report_denoise, report_normals, report_radii};
 use surfel_core::points::{
-    Denoise, Orientation, PointCloud, Preparation, clean, denoise, prepare, subsample,
+    Denoise, Orientation, PointCloud, Preparation, clean, denoise, prepare, remove_outliers,
+    subsample,
 };
 use surfel_core::progress::Progress;
 use surfel_formats::{ColumnChoice, Loaded, SaveOptions};
@@ -27,7 +28,8 @@ pub struct Args {
     /// The prepared cloud: .ply (all columns), .las or .laz.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Adds normals. Without this, --radius, --orient, --subsample, --denoise and --keep-variation: normals and radii.
+    /// Adds normals. Without this, --radius, --orient, --subsample, --remove-outliers, --denoise and
+    /// --keep-variation: normals and radii.
     #[arg(long, help_heading = "Preparation")]
     normals: bool,
     /// Adds the column surface_variation: 0 on a plane, up to 1/3 where points fill space.
@@ -46,9 +48,10 @@ impl Scope for Args {
 
 const EXAMPLES: &str = "\
 Examples:
-  surfel prepare scan.laz -o ready.ply                          normals and radii
-  surfel prepare scan.laz -o thin.laz --subsample spacing:0.1   fewer points, nothing else
-  surfel prepare scan.laz -o calm.laz --denoise on              points moved onto their surface, nothing else
+  surfel prepare scan.laz -o ready.ply                                normals and radii
+  surfel prepare scan.laz -o thin.laz --subsample spacing:0.1         fewer points, nothing else
+  surfel prepare scan.laz -o kept.laz --remove-outliers statistical   without points that stand alone
+  surfel prepare scan.laz -o calm.laz --denoise on                    points moved onto their surface
   surfel prepare scan.laz -o ready.ply --normals-k 24 --orient mst
   surfel prepare east.laz west.laz -o both.ply --radius median:6";
 
@@ -116,6 +119,9 @@ fn prepared(
             Some(choice) => subsample(&cloud, choice, seed, report)?,
             None => cloud,
         };
+        if let Some(choice) = settings.preparation.remove_outliers {
+            cloud = remove_outliers(&cloud, choice, report)?;
+        }
         if let Some(moved) = denoise(&mut cloud, mode, report)? {
             report.choice(&moved.line(), &["denoise"]);
         }
@@ -154,7 +160,10 @@ fn columns(args: &Args, settings: &ObjectSettings) -> Columns {
         variation: args.keep_variation,
     };
     let is_empty = !columns.normals && !columns.radii && !columns.variation;
-    if is_empty && preparation.subsample.is_none() && preparation.denoise.is_none() {
+    let has_other_steps = preparation.subsample.is_some()
+        || preparation.remove_outliers.is_some()
+        || preparation.denoise.is_some();
+    if is_empty && !has_other_steps {
         return Columns { normals: true, radii: true, variation: false };
     }
     columns

@@ -141,6 +141,7 @@ fn prepare_adds_the_requested_columns_or_all() {
     assert_eq!(columns(&["--orient", "mst"]), (900, [true, false, false]));
     assert_eq!(columns(&["--keep-variation"]), (900, [false, false, true]));
     assert_eq!(columns(&["--subsample", "first:10"]), (10, [false, false, false]));
+    assert_eq!(columns(&["--remove-outliers", "radius:1e9,1"]), (900, [false, false, false]));
     assert_eq!(columns(&["--denoise", "on"]), (900, [false, false, false]));
 }
 

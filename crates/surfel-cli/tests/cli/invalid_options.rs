@@ -57,6 +57,8 @@ fn invalid_values_end_with_code_2() {
         &["--subsample", "random:0"],
         &["--subsample", "stride:0"],
         &["--subsample", "half"],
+        &["--remove-outliers", "statistical:0"],
+        &["--remove-outliers", "radius"],
         &["--normals-k", "0"],
         &["--normals-radius", "NaN"],
         &["--orient", "viewpoint:1,2"],

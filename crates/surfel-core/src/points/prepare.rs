@@ -1,10 +1,11 @@
-//! Preparation: cleans, subsamples and denoises a cloud, and adds the normals and radii that it lacks.
+//! Preparation: cleans a cloud, thins and denoises it, and adds the normals and radii that it lacks.
 
 use super::denoise::{Denoise, DenoiseReport, denoise};
 use super::find_structures::{all_scattered, find_structures};
 use super::neighbors::{KdTree, Neighbor, NeighborMethod, Neighborhood, map_neighborhoods};
 use super::normals::{NormalReport, PlaneFit, fill_missing, fit_plane};
 use super::orient::{Orientation, orient};
+use super::outliers::{OutlierRemoval, remove_outliers};
 use super::radius::{DistanceSample, Radius, RadiusReport, median_distance};
 use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
 use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
@@ -21,6 +22,8 @@ pub const SURFACE_VARIATION: &str = "surface_variation";
 pub struct Preparation {
     /// The points to keep; none keeps all.
     pub subsample: Option<Subsample>,
+    /// The outliers to remove; none keeps all points.
+    pub remove_outliers: Option<OutlierRemoval>,
     /// The choice whether noisy points are moved onto their surface.
     pub denoise: Denoise,
     /// The method that finds neighbours.
@@ -43,6 +46,7 @@ impl Default for Preparation {
     fn default() -> Self {
         Self {
             subsample: None,
+            remove_outliers: None,
             denoise: Denoise::default(),
             neighbors: NeighborMethod::Knn,
             normals: Neighborhood::Nearest(16),
@@ -91,8 +95,8 @@ pub struct PreparationReport {
     pub structure: Option<StructureReport>,
 }
 
-/// Cleans, subsamples and denoises a cloud, then adds the normals and radii that are missing. Those of the file stay. Columns
-/// that are estimated get offsets in each morph target, estimated from the points where the target moves them.
+/// Cleans a cloud, thins it, removes outliers and noise, then adds the normals and radii that are missing. Those of the
+/// file stay. Columns that are estimated get offsets in each morph target, estimated from the points where the target moves them.
 ///
 /// # Errors
 ///
@@ -107,6 +111,9 @@ pub fn prepare(
     let (mut cloud, clean) = clean(cloud, progress)?;
     if let Some(choice) = preparation.subsample {
         cloud = subsample(&cloud, choice, preparation.seed, progress)?;
+    }
+    if let Some(choice) = preparation.remove_outliers {
+        cloud = remove_outliers(&cloud, choice, progress)?;
     }
     if cloud.is_empty() {
         return Err(Error::EmptyCloud);

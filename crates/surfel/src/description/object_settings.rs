@@ -12,8 +12,8 @@ use surfel_core::image::Colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
 use surfel_core::points::{
-    Denoise, Orientation, Preparation, Radius, STRUCTURE, SURFACE_VARIATION, StructureChoice,
-    Subsample,
+    Denoise, Orientation, OutlierRemoval, Preparation, Radius, STRUCTURE, SURFACE_VARIATION,
+    StructureChoice, Subsample,
 };
 use surfel_core::scene::color::{ColorSource, Coloring};
 use surfel_core::scene::{Clip, ClipBox, ClipPlane};
@@ -45,6 +45,10 @@ settings! {
     pub struct PreparationSettings {
         /// Keeps fewer points: first:N, random:N, stride:S or spacing:LENGTH.
         subsample: Subsample, SubsampleRule, "CHOICE";
+        /// Drops points that stand alone: statistical:K,RATIO, whose mean distance to K neighbours exceeds the mean of
+        /// all by RATIO standard deviations (statistical alone: 16,2), or radius:DISTANCE,COUNT, with fewer than COUNT
+        /// others (16) within DISTANCE.
+        remove_outliers: OutlierRemoval, parsed(OutlierRemoval::to_string), "CHOICE";
         /// Moves noisy points onto their surface: auto (surfaces whose noise is at least 0.15 of the spacing), on or
         /// off [default: auto, off for surfel prepare].
         denoise: Denoise, OneOf(DENOISE), "WHEN";
@@ -129,6 +133,7 @@ impl ObjectSettings {
         let nearest = settings.normals_k.map(|k| Neighborhood::Nearest(k as usize));
         Preparation {
             subsample: settings.subsample,
+            remove_outliers: settings.remove_outliers,
             denoise: settings.denoise.unwrap_or(default.denoise),
             neighbors: settings.neighbors(),
             normals: within.or(nearest).unwrap_or(default.normals),
