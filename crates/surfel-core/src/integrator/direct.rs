@@ -31,6 +31,8 @@ pub struct ShadingPoint {
     pub key: u64,
     /// Index of the path among those with the same random key.
     pub index: u32,
+    /// Number of rays toward each extended light.
+    pub n_light_samples: u32,
 }
 
 /// Computes direct light from all lights of a scene.
@@ -38,8 +40,8 @@ pub struct ShadingPoint {
 pub struct DirectLight<'a> {
     /// Traces the shadow rays.
     pub tracer: &'a Tracer<'a>,
-    /// Number of rays toward each extended light from each shading point.
-    pub n_light_samples: u32,
+    /// Largest number of rays toward each extended light from a shading point.
+    pub max_light_samples: u32,
 }
 
 // Random dimensions: no two uses share random numbers.
@@ -95,7 +97,7 @@ impl DirectLight<'_> {
         let basis = Basis::around(sun.direction);
         let cos_max = (sun.angular_diameter_deg.to_radians() / 2.0).cos();
         let is_point = sun.angular_diameter_deg <= 0.0;
-        let n_samples = if is_point { 1 } else { self.n_light_samples };
+        let max_samples = if is_point { 1 } else { self.max_light_samples };
         let sample = |point: &ShadingPoint, index: u32| {
             let direction = if is_point {
                 sun.direction
@@ -106,7 +108,7 @@ impl DirectLight<'_> {
             let contribution = point.reflected_radiance(direction, sun.color)?;
             Some(ShadowRay { direction, t_max: f32::INFINITY, contribution })
         };
-        self.add_light(n_samples, sample, points, radiance)
+        self.add_light(max_samples, sample, points, radiance)
     }
 
     fn add_sky(&self, sky: &Sky, points: &[ShadingPoint], radiance: &mut [Vec3]) -> Result<u64> {
@@ -119,7 +121,7 @@ impl DirectLight<'_> {
             let contribution = sky.radiance(direction) * point.diffuse;
             Some(ShadowRay { direction, t_max, contribution })
         };
-        self.add_light(self.n_light_samples, sample, points, radiance)
+        self.add_light(self.max_light_samples, sample, points, radiance)
     }
 
     /// Adds the light of an environment by multiple importance sampling: half of the directions follow the
@@ -147,7 +149,7 @@ impl DirectLight<'_> {
             let contribution = incident * (cos / PI / density) * point.diffuse;
             Some(ShadowRay { direction, t_max: f32::INFINITY, contribution })
         };
-        self.add_light(self.n_light_samples, sample, points, radiance)
+        self.add_light(self.max_light_samples, sample, points, radiance)
     }
 
     fn add_punctual_light(
@@ -158,7 +160,7 @@ impl DirectLight<'_> {
         radiance: &mut [Vec3],
     ) -> Result<u64> {
         let is_point = light.radius <= 0.0 || light.kind == PunctualLightKind::Directional;
-        let n_samples = if is_point { 1 } else { self.n_light_samples };
+        let max_samples = if is_point { 1 } else { self.max_light_samples };
         let sample = |point: &ShadingPoint, index: u32| {
             let position = point.shading.position;
             if light.kind == PunctualLightKind::Directional {
@@ -186,22 +188,21 @@ impl DirectLight<'_> {
             let t_max = distance - light.radius.min(0.5 * distance);
             Some(ShadowRay { direction, t_max, contribution })
         };
-        self.add_light(n_samples, sample, points, radiance)
+        self.add_light(max_samples, sample, points, radiance)
     }
 
-    /// Traces the rays that `sample(point, sample index)` returns, `n_samples` for each point, and adds
+    /// Traces the rays that `sample(point, sample index)` returns, at most `max_samples` for each point, and adds
     /// their contributions to `radiance`. Returns the number of rays traced.
     fn add_light(
         &self,
-        n_samples: u32,
+        max_samples: u32,
         sample: impl Fn(&ShadingPoint, u32) -> Option<ShadowRay>,
         points: &[ShadingPoint],
         radiance: &mut [Vec3],
     ) -> Result<u64> {
         let mut n_rays = 0;
-        let weight = 1.0 / n_samples as f32;
-        let chunk_size = (SHADOW_RAY_CHUNK_SIZE / n_samples).max(1) as usize;
-        let max_rays = points.len().min(chunk_size) * n_samples as usize;
+        let chunk_size = (SHADOW_RAY_CHUNK_SIZE / max_samples).max(1) as usize;
+        let max_rays = points.len().min(chunk_size) * max_samples as usize;
         let mut rays = Vec::with_capacity(max_rays);
         let mut contributions = Vec::with_capacity(max_rays);
         let mut transmittances = Vec::with_capacity(max_rays);
@@ -209,6 +210,8 @@ impl DirectLight<'_> {
             rays.clear();
             contributions.clear();
             for (point_idx, point) in points.iter().enumerate() {
+                let n_samples = point.n_light_samples.min(max_samples);
+                let weight = 1.0 / n_samples as f32;
                 for sample_idx in 0..n_samples {
                     let index = point.index * n_samples + sample_idx;
                     let Some(sampled) = sample(point, index) else { continue };

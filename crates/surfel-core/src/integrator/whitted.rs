@@ -75,8 +75,8 @@ impl Integrator for Whitted {
             shading_points: Vec::with_capacity(batch.rays.len()),
             queue: Vec::new(),
         };
-        let n_light_samples = batch.samples.n_light_samples;
-        let direct = DirectLight { tracer: batch.tracer, n_light_samples };
+        let max_light_samples = batch.samples.n_light_samples;
+        let direct = DirectLight { tracer: batch.tracer, max_light_samples };
         let mut counts = RayCounts { primary: batch.rays.len() as u64, ..RayCounts::default() };
         for (path, hit) in state.camera_paths().zip(batch.hits) {
             state.shade_hit(path, hit);
@@ -180,12 +180,49 @@ impl<'a> WavefrontState<'a> {
                 ray_idx: path.ray_idx,
                 key: path.key,
                 index: path.index,
+                n_light_samples: self.n_samples_of(path.weight),
             });
         }
         if path.depth < self.max_depth {
-            self.reflect(&path, &shading, &lobes, &interface);
-            self.refract(&path, &shading, &lobes, &interface);
+            for branch in self.branches(&path, lobes.reflected, REFLECTED, is_rough) {
+                self.reflect(branch, &shading, &interface);
+            }
+            for branch in self.branches(&path, lobes.refracted, REFRACTED, is_rough) {
+                self.refract(branch, &shading, &interface);
+            }
         }
+    }
+
+    /// Returns the number of light samples of a path with this weight: all branches of a camera ray share its
+    /// samples in proportion to their weights.
+    fn n_samples_of(&self, weight: Vec3) -> u32 {
+        let n_light_samples = self.batch.samples.n_light_samples;
+        let share = n_light_samples as f32 * weight.max_element();
+        (share.ceil() as u32).clamp(1, n_light_samples)
+    }
+
+    /// Returns the branches of a path into a lobe that receives `fraction` of its weight, without their new rays: one
+    /// into a mirror's lobe, one for each light sample into a rough lobe.
+    fn branches(
+        &self,
+        path: &Path,
+        fraction: Vec3,
+        lobe: u64,
+        is_rough: bool,
+    ) -> impl Iterator<Item = Path> + use<> {
+        let weight = path.weight * fraction;
+        let n_branches = match weight == Vec3::ZERO {
+            true => 0,
+            false if is_rough => self.n_samples_of(weight),
+            false => 1,
+        };
+        let path = Path {
+            weight: weight / n_branches.max(1) as f32,
+            key: hash(path.key ^ lobe),
+            depth: path.depth + 1,
+            ..*path
+        };
+        (0..n_branches).map(move |i| Path { index: path.index * n_branches + i, ..path })
     }
 
     /// Adds the radiance that a path finds where its ray leaves the scene.
@@ -230,12 +267,10 @@ impl<'a> WavefrontState<'a> {
         });
     }
 
-    fn reflect(&mut self, path: &Path, shading: &Shading, lobes: &Lobes, interface: &Interface) {
-        if lobes.reflected == Vec3::ZERO {
-            return;
-        }
-        let direction = path.ray.ray.direction;
-        let (normal, cos_view) = sample_microfacet_normal(path, shading);
+    /// Enqueues a branch of a path in the direction of the reflection.
+    fn reflect(&mut self, branch: Path, shading: &Shading, interface: &Interface) {
+        let direction = branch.ray.ray.direction;
+        let (normal, cos_view) = sample_microfacet_normal(&branch, shading);
         let mut reflected = reflect(direction, normal);
         if reflected.dot(shading.geometric_normal) <= 0.0 {
             // The reflection points into the surface: a rough one is lost, one about a shading normal is
@@ -253,20 +288,16 @@ impl<'a> WavefrontState<'a> {
         let is_sharp = shading.roughness < MIN_ROUGHNESS;
         self.enqueue(Path {
             ray: MediumRay::from_surface(shading, shading.spawn(reflected), interface.near),
-            weight: path.weight * lobes.reflected * lobe_weight,
-            key: hash(path.key ^ REFLECTED),
-            depth: path.depth + 1,
+            weight: branch.weight * lobe_weight,
             on_miss: MissBehavior::Sky { with_sun: is_sharp },
-            ..*path
+            ..branch
         });
     }
 
-    fn refract(&mut self, path: &Path, shading: &Shading, lobes: &Lobes, interface: &Interface) {
-        if lobes.refracted == Vec3::ZERO {
-            return;
-        }
-        let direction = path.ray.ray.direction;
-        let (normal, _) = sample_microfacet_normal(path, shading);
+    /// Enqueues a branch of a path in the direction of the refraction.
+    fn refract(&mut self, branch: Path, shading: &Shading, interface: &Interface) {
+        let direction = branch.ray.ray.direction;
+        let (normal, _) = sample_microfacet_normal(&branch, shading);
         let refracted = if shading.is_thin {
             // A thin slab transmits straight on, as blurred as its reflection.
             let mirrored = reflect(direction, normal);
@@ -281,14 +312,11 @@ impl<'a> WavefrontState<'a> {
         let refracted = if is_behind { refracted } else { direction };
         self.enqueue(Path {
             ray: MediumRay::from_surface(shading, shading.spawn(refracted), interface.far),
-            weight: path.weight * lobes.refracted,
-            key: hash(path.key ^ REFRACTED),
-            depth: path.depth + 1,
-            on_miss: match path.on_miss {
+            on_miss: match branch.on_miss {
                 MissBehavior::Background => MissBehavior::BackgroundThroughGlass,
                 other => other,
             },
-            ..*path
+            ..branch
         });
     }
 
