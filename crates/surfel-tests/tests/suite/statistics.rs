@@ -4,6 +4,7 @@
 //! tests of mitsuba3 (`src/render/tests/test_renders.py`). The expected light is computed here from the formulas
 //! alone, in double precision, with the geometry that blocks it.
 
+use crate::materials::gentle_light;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 use surfel_core::flat::FlatScene;
@@ -321,4 +322,22 @@ fn the_test_detects_an_error_of_two_percent() {
         std::panic::catch_unwind(std::panic::AssertUnwindSafe(check)).is_err()
     };
     assert_eq!([1.0, 1.02].map(is_detected), [false, true]);
+}
+
+#[test]
+fn light_samples_remove_the_grain_of_rough_reflections() {
+    let scene = metal(0.7, vec![Light::Environment(gentle_light())]);
+    let flat = FlatScene::new(&scene, &NoProgress).unwrap();
+    let renderer = CpuRenderer { simd: Simd::detect() };
+    let variance = |light_samples| {
+        let values = (0..N_RUNS).map(|seed| {
+            let settings = Settings { seed, light_samples, ..SETTINGS };
+            f64::from(renderer.render(&flat, &settings, &NoProgress).unwrap().0.color[0][1])
+        });
+        let values: Vec<f64> = values.collect();
+        let mean = values.iter().sum::<f64>() / N_RUNS as f64;
+        values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (N_RUNS - 1) as f64
+    };
+    let (one, many) = (variance(1), variance(16));
+    assert!(0.0 < one && 8.0 * many < one, "{one} with 1 sample, {many} with 16");
 }
