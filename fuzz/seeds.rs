@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};
 use surfel_core::image::Image;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::{PointCloud, Scalar, Values};
@@ -11,9 +12,22 @@ use surfel_formats::{ImageOptions, SaveOptions, encode_png, save, save_image};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
-    for target in
-        ["ply", "xyz", "las", "bin", "environment", "obj", "stl", "mtl", "gltf", "scene", "viewer"]
-    {
+    for target in [
+        "ply",
+        "xyz",
+        "las",
+        "bin",
+        "pcd",
+        "ptx",
+        "e57",
+        "environment",
+        "obj",
+        "stl",
+        "mtl",
+        "gltf",
+        "scene",
+        "viewer",
+    ] {
         fs::create_dir_all(corpus.join(target))?;
     }
     for (name, cloud) in [("bare", bare_cloud(7)), ("full", full_cloud(7))] {
@@ -47,10 +61,50 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         [f32::NAN, 1e30, -0.0, -1.0, 0.0, f32::INFINITY, 2.0].map(f32::to_le_bytes).concat();
     fs::write(corpus.join("bin/one.bin"), &record)?;
     fs::write(corpus.join("bin/three.bin"), [&record[..], &non_finite, &record].concat())?;
+    write_scans(&corpus)?;
     write_gltf(&corpus.join("gltf"))?;
     write_scenes(&corpus.join("scene"))?;
     write_viewer_input(&corpus.join("viewer"))?;
     write_environment_maps(&corpus.join("environment"))
+}
+
+/// Writes the formats of scanners: PCD in each encoding, PTX, and E57 with floats and with scaled integers.
+fn write_scans(corpus: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let header = "# .PCD v.7\nVERSION .7\nFIELDS x y z rgb _\nSIZE 4 4 4 4 1\nTYPE F F F U U\n\
+        COUNT 1 1 1 1 2\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ";
+    let ascii = format!("{header}ascii\n1 2 3 255 0 0\nnan 5 6 4.2e6 0 0\n");
+    fs::write(corpus.join("pcd/ascii.pcd"), ascii)?;
+    fs::write(corpus.join("pcd/binary.pcd"), [header.as_bytes(), b"binary\n", &[7; 36]].concat())?;
+    // A run of one byte, then 35 repetitions of it.
+    let compressed = [5, 0, 0, 0, 36, 0, 0, 0, 0, 7, 0xe0, 26, 0];
+    let compressed = [header.as_bytes(), b"binary_compressed\n", &compressed].concat();
+    fs::write(corpus.join("pcd/compressed.pcd"), compressed)?;
+    let pose = "2\n1\n1 2 3\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n5e5 4e6 10 1\n";
+    let scans = format!("{pose}1 2 3 0.5 1 2 3\n0 0 0 0.5 0 0 0\n{pose}1 2 3 1\n4 5 6 1\n");
+    fs::write(corpus.join("ptx/scans.ptx"), scans)?;
+
+    let mut file = std::io::Cursor::new(Vec::new());
+    let mut writer = E57Writer::new(&mut file, "file")?;
+    let axes = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
+    let data_type = RecordDataType::ScaledInteger { min: -9, max: 600, scale: 0.01, offset: 1.0 };
+    let axes = axes.map(|name| Record { name, data_type: data_type.clone() }).to_vec();
+    let mut scan = writer.add_pointcloud("integers", axes)?;
+    scan.add_point(vec![RecordValue::ScaledInteger(7); 3])?;
+    scan.add_point(vec![RecordValue::ScaledInteger(-3); 3])?;
+    scan.finalize()?;
+    let sphere = vec![
+        Record::SPHERICAL_RANGE_F32,
+        Record::SPHERICAL_AZIMUTH_F32,
+        Record::SPHERICAL_ELEVATION_F32,
+        Record::SPHERICAL_INVALID_STATE,
+    ];
+    let mut scan = writer.add_pointcloud("angles", sphere)?;
+    let angles = [1.0, 0.5, 0.25].map(RecordValue::Single).to_vec();
+    scan.add_point([angles, vec![RecordValue::Integer(0)]].concat())?;
+    scan.finalize()?;
+    writer.finalize()?;
+    drop(writer);
+    Ok(fs::write(corpus.join("e57/scans.e57"), file.into_inner())?)
 }
 
 /// Writes an HDR file in each encoding, and an EXR file.

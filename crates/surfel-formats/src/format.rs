@@ -7,6 +7,7 @@ use surfel_core::progress::Progress;
 use surfel_core::scene::Graph;
 
 use crate::bin;
+use crate::e57;
 use crate::error::{Location, Result};
 use crate::file::{Input, ResourceResolver};
 use crate::gltf;
@@ -14,7 +15,9 @@ use crate::las;
 use crate::mesh::Model;
 use crate::obj;
 use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::pcd;
 use crate::ply;
+use crate::ptx;
 use crate::stl;
 use crate::text;
 
@@ -88,11 +91,38 @@ pub const FORMATS: &[Format] = &[
         read: Reader::Points(las::read),
     },
     Format {
+        name: "E57",
+        extensions: &["e57"],
+        signature: Some("`ASTM-E57`"),
+        probe: |input| input.starts_with(b"ASTM-E57"),
+        inspect: e57::inspect,
+        read: Reader::Points(e57::read),
+    },
+    Format {
+        name: "PCD",
+        extensions: &["pcd"],
+        signature: None,
+        probe: |input| input.starts_with(b"# .PCD"),
+        inspect: pcd::inspect,
+        read: Reader::Points(pcd::read),
+    },
+    Format {
+        name: "PTX",
+        extensions: &["ptx"],
+        signature: None,
+        probe: |_| false,
+        inspect: ptx::inspect,
+        read: Reader::Points(ptx::read),
+    },
+    Format {
         name: "BIN",
         extensions: &["bin"],
         signature: None,
         // The extension decides before foreign signatures do: a coordinate may begin with the bytes of one.
-        probe: |input| !input.is_empty() && input.extension() == "bin",
+        probe: |input| {
+            let is_bin = !input.is_empty() && input.extension() == "bin";
+            is_bin && !input.starts_with(CLOUD_COMPARE)
+        },
         inspect: bin::inspect,
         read: Reader::Points(bin::read),
     },
@@ -130,10 +160,12 @@ pub const FORMATS: &[Format] = &[
     },
 ];
 
+/// First bytes of CloudCompare's BIN files, which have nothing but the extension in common with BIN.
+const CLOUD_COMPARE: &[u8] = b"CCB2";
+
 /// First bytes of formats that surfel does not read, and their names.
-const FOREIGN_SIGNATURES: [(&[u8], &str); 5] = [
-    (b"ASTM-E57", "an E57 file"),
-    (b"# .PCD", "a PCD file"),
+const FOREIGN_SIGNATURES: [(&[u8], &str); 4] = [
+    (CLOUD_COMPARE, "a BIN file of CloudCompare"),
     (b"\x89HDF", "an HDF5 file"),
     (b"PK\x03\x04", "a zip archive"),
     (b"\x1f\x8b", "a gzip archive"),

@@ -6,6 +6,14 @@ mod common;
 mod bin;
 #[path = "formats/ply.rs"]
 mod ply;
+#[path = "formats/pcd.rs"]
+mod pcd;
+#[path = "formats/ptx.rs"]
+mod ptx;
+#[path = "formats/e57_writer.rs"]
+mod e57_writer;
+#[path = "formats/e57_scans.rs"]
+mod e57_scans;
 #[path = "formats/text.rs"]
 mod text;
 #[path = "formats/las_point_formats.rs"]

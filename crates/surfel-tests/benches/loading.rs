@@ -1,20 +1,22 @@
-//! Loading: points a second of binary PLY, and of LAZ relative to its decoder alone on the same bytes.
+//! Loading: points a second of binary PLY and PCD, PTX and E57, and of LAZ relative to its decoder alone on the same
+//! bytes.
 //!
 //! `cargo bench -p surfel-tests --bench loading`; `POINTS` sets the number of points (by default 12 million of PLY
-//! and 5 million of LAZ).
+//! and PCD, 5 million of LAZ and 3 million of PTX and E57).
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};
 use laz::{LazVlr, ParLasZipDecompressor};
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::NoProgress;
 use surfel_formats::{LoadOptions, SaveOptions, load, load_bytes, save};
 
-criterion_group!(benches, ply, laz);
+criterion_group!(benches, ply, laz, pcd, ptx, e57);
 criterion_main!(benches);
 
 /// Whether `cargo bench` runs this program; `cargo test` only checks that it works.
@@ -67,6 +69,77 @@ fn laz(criterion: &mut Criterion) {
         }
     }
     std::fs::remove_file(generated).unwrap();
+}
+
+fn pcd(criterion: &mut Criterion) {
+    let cloud = survey(n_points(12_000_000));
+    let header = format!(
+        "VERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH {0}\n\
+        HEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {0}\nDATA binary\n",
+        cloud.len()
+    );
+    let mut bytes = header.into_bytes();
+    for (position, [r, g, b]) in cloud.positions.iter().zip(cloud.colors.iter().flatten()) {
+        bytes.extend(position.to_array().map(f32::to_le_bytes).concat());
+        bytes.extend([*b, *g, *r, 65535].map(|channel| (channel >> 8) as u8));
+    }
+    time_format(criterion, "pcd", "xyz float, rgb packed", cloud.len(), &bytes);
+}
+
+fn ptx(criterion: &mut Criterion) {
+    let cloud = survey(n_points(3_000_000));
+    let mut text = format!("{}\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n", cloud.len());
+    text += "1 0 0 0\n0 1 0 0\n0 0 1 0\n484800 6632800 100 1\n";
+    for (position, [r, g, b]) in cloud.positions.iter().zip(cloud.colors.iter().flatten()) {
+        let Vec3 { x, y, z } = position;
+        let [r, g, b] = [r, g, b].map(|channel| channel >> 8);
+        text += &format!("{x:.6} {y:.6} {z:.6} 0.512345 {r} {g} {b}\n");
+    }
+    time_format(criterion, "ptx", "xyz intensity rgb", cloud.len(), text.as_bytes());
+}
+
+fn e57(criterion: &mut Criterion) {
+    let cloud = survey(n_points(3_000_000));
+    let mut file = Cursor::new(Vec::new());
+    let mut writer = E57Writer::new(&mut file, "benchmark").unwrap();
+    let axis = |name| Record {
+        name,
+        data_type: RecordDataType::ScaledInteger {
+            min: -(1 << 24),
+            max: 1 << 24,
+            scale: 1e-3,
+            offset: 0.0,
+        },
+    };
+    let mut prototype: Vec<Record> =
+        [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ].map(axis).to_vec();
+    prototype.extend([Record::COLOR_RED_U8, Record::COLOR_GREEN_U8, Record::COLOR_BLUE_U8]);
+    prototype.push(Record::INTENSITY_U16);
+    let mut scan = writer.add_pointcloud("scan", prototype).unwrap();
+    let intensity = cloud.intensity.iter().flatten();
+    let points = cloud.positions.iter().zip(cloud.colors.iter().flatten()).zip(intensity);
+    for ((position, color), intensity) in points {
+        let position = position.to_array().map(|v| RecordValue::ScaledInteger((v * 1e3) as i64));
+        let color = color.map(|channel| RecordValue::Integer(i64::from(channel >> 8)));
+        let intensity = RecordValue::Integer(*intensity as i64);
+        scan.add_point([&position[..], &color, &[intensity]].concat()).unwrap();
+    }
+    scan.finalize().unwrap();
+    writer.finalize().unwrap();
+    drop(writer);
+    let bytes = file.into_inner();
+    time_format(criterion, "e57", "25-bit xyz, rgb, intensity", cloud.len(), &bytes);
+}
+
+/// Times loading of a file with this extension.
+fn time_format(criterion: &mut Criterion, extension: &str, columns: &str, n: usize, bytes: &[u8]) {
+    let name = format!("a.{extension}");
+    let mut group = criterion.benchmark_group(extension);
+    group.throughput(Throughput::Elements(n as u64)).sample_size(10);
+    group.bench_function(columns, |bencher| {
+        bencher.iter(|| load_bytes(&name, bytes, &LoadOptions::default(), &NoProgress).unwrap());
+    });
+    group.finish();
 }
 
 /// The decoder of the crate `laz`, which decodes all points with its own threads to a buffer allocated before.

@@ -1,6 +1,7 @@
 //! Point clouds as columns of equal length, with positions relative to a double-precision origin.
 
 use super::deformation::{Morph, Skin, pick};
+use super::scan_station::{STATION, ScanStation};
 use crate::math::{Aabb, DVec3, Vec3};
 
 /// Maximum magnitude of a coordinate whose squares are sure to be finite. Files mark points without a measurement
@@ -36,6 +37,9 @@ pub struct PointCloud {
     pub source_indices: Option<Vec<u32>>,
     /// All other columns, which have names.
     pub scalars: Vec<Scalar>,
+    /// Places from which the points were measured. If there are several, the scalar column [`STATION`] says which is
+    /// whose.
+    pub stations: Vec<ScanStation>,
     /// Morph targets.
     pub morphs: Vec<Morph>,
     /// Joints that move the points.
@@ -87,9 +91,9 @@ impl PointCloud {
         self.origin + self.positions[point_idx].as_dvec3()
     }
 
-    /// Returns the bounds of the positions, relative to `origin`.
+    /// Returns the bounds of the valid positions, relative to `origin`.
     pub fn bounds(&self) -> Aabb {
-        Aabb::of_points(self.positions.iter().copied())
+        Aabb::of_points(self.positions.iter().copied().filter(|p| is_valid_position(*p)))
     }
 
     /// Returns the name and the length of each column that is present.
@@ -124,6 +128,15 @@ impl PointCloud {
             .map(|scalar| &scalar.values)
     }
 
+    /// Returns the station of a point, if it is known.
+    pub fn station_of(&self, point_idx: usize) -> Option<&ScanStation> {
+        match (&self.stations[..], self.scalar(STATION)) {
+            ([station], None) => Some(station),
+            (stations, Some(Values::U16(indices))) => stations.get(usize::from(indices[point_idx])),
+            _ => None,
+        }
+    }
+
     /// Returns the points at `indices`, in that order, with all their columns.
     pub fn subset(&self, indices: &[u32]) -> Self {
         Self {
@@ -149,6 +162,7 @@ impl PointCloud {
                     },
                 })
                 .collect(),
+            stations: self.stations.clone(),
             morphs: self.morphs.iter().map(|morph| morph.subset(indices)).collect(),
             skin: self.skin.as_ref().map(|skin| skin.subset(indices)),
         }

@@ -1,6 +1,6 @@
 //! Merging of clouds: a common origin, and the columns that all of them have.
 
-use super::{PointCloud, Scalar, Values};
+use super::{PointCloud, STATION, Scalar, ScanStation, Values};
 
 /// Merges clouds in their order. Returns the merged cloud and the names of the columns that were left out.
 ///
@@ -15,8 +15,12 @@ pub fn merge(mut clouds: Vec<PointCloud>) -> (PointCloud, Vec<String>) {
     for cloud in clouds.iter_mut().filter(|cloud| cloud.origin != origin) {
         cloud.rebase(origin);
     }
-    let positions = clouds.iter_mut().map(|cloud| std::mem::take(&mut cloud.positions)).collect();
     let mut dropped = Vec::new();
+    let (stations, has_dropped_stations) = merge_stations(&mut clouds);
+    if has_dropped_stations {
+        dropped.push("stations".to_owned());
+    }
+    let positions = clouds.iter_mut().map(|cloud| std::mem::take(&mut cloud.positions)).collect();
     if clouds.iter().any(|cloud| !cloud.morphs.is_empty() || cloud.skin.is_some()) {
         dropped.push("morph targets and joints".to_owned());
     }
@@ -35,6 +39,7 @@ pub fn merge(mut clouds: Vec<PointCloud>) -> (PointCloud, Vec<String>) {
         ),
         source_indices: None,
         scalars: scalars(&mut clouds, &mut dropped),
+        stations,
         morphs: Vec::new(),
         skin: None,
     };
@@ -45,6 +50,40 @@ pub fn merge(mut clouds: Vec<PointCloud>) -> (PointCloud, Vec<String>) {
 fn common_origin(clouds: &[PointCloud]) -> crate::math::DVec3 {
     let largest = clouds.iter().rev().max_by_key(|cloud| cloud.len());
     largest.map(|cloud| cloud.origin).unwrap_or_default()
+}
+
+/// Merges the stations of clouds, and renumbers those of their points. If one of the clouds has none, all are dropped.
+///
+/// Returns the stations and true if any were dropped.
+fn merge_stations(clouds: &mut [PointCloud]) -> (Vec<ScanStation>, bool) {
+    let n_stations: usize = clouds.iter().map(|cloud| cloud.stations.len()).sum();
+    let has_none = |cloud: &PointCloud| cloud.stations.is_empty();
+    if clouds.iter().any(has_none) || usize::from(u16::MAX) < n_stations {
+        clouds.iter_mut().for_each(|cloud| cloud.stations.clear());
+        return (Vec::new(), 0 < n_stations);
+    }
+    let mut stations = Vec::new();
+    for cloud in clouds {
+        let first = stations.len() as u16;
+        let n_points = cloud.len();
+        let is_station = |scalar: &Scalar| scalar.name.eq_ignore_ascii_case(STATION);
+        let indices = match cloud.scalars.iter_mut().find(|scalar| is_station(scalar)) {
+            Some(Scalar { values: Values::U16(indices), .. }) => indices,
+            _ => {
+                cloud.scalars.retain(|scalar| !is_station(scalar));
+                let values = Values::U16(vec![0; n_points]);
+                cloud.scalars.push(Scalar { name: STATION.into(), values });
+                let Some(Scalar { values: Values::U16(indices), .. }) = cloud.scalars.last_mut()
+                else {
+                    unreachable!("the column was just added")
+                };
+                indices
+            }
+        };
+        indices.iter_mut().for_each(|index| *index += first);
+        stations.append(&mut cloud.stations);
+    }
+    (stations, false)
 }
 
 fn column<T>(
@@ -175,5 +214,41 @@ mod tests {
         let several = vec![cloud(0.0, None), cloud(0.0, None), cloud(0.0, None)];
         let (merged, _) = merge(several);
         assert_eq!((merged.len(), merged.positions.capacity()), (6, 6));
+    }
+
+    fn scan(names: &[&str], indices: Option<Vec<u16>>) -> PointCloud {
+        let stations = names.iter().enumerate().map(|(i, name)| ScanStation {
+            name: (*name).into(),
+            position: Some(DVec3::splat(i as f64)),
+        });
+        let column =
+            indices.map(|indices| Scalar { name: STATION.into(), values: Values::U16(indices) });
+        PointCloud {
+            stations: stations.collect(),
+            scalars: column.into_iter().collect(),
+            ..PointCloud::from_positions(vec![Vec3::ZERO; 2])
+        }
+    }
+
+    fn names(cloud: &PointCloud) -> Vec<Option<&str>> {
+        (0..cloud.len()).map(|i| Some(cloud.station_of(i)?.name.as_str())).collect()
+    }
+
+    #[test]
+    fn points_know_their_station() {
+        assert_eq!(names(&scan(&["a"], None)), [Some("a"); 2]);
+        assert_eq!(names(&scan(&["a", "b"], Some(vec![1, 0]))), [Some("b"), Some("a")]);
+        assert_eq!(names(&scan(&[], None)), [None; 2]);
+        assert_eq!(names(&scan(&["a", "b"], None)), [None; 2]);
+    }
+
+    #[test]
+    fn merging_keeps_the_station_of_each_point() {
+        let (merged, dropped) =
+            merge(vec![scan(&["a", "b"], Some(vec![1, 0])), scan(&["c"], None)]);
+        assert_eq!(names(&merged), [Some("b"), Some("a"), Some("c"), Some("c")]);
+        assert!(dropped.is_empty());
+        let (merged, dropped) = merge(vec![scan(&["a"], None), scan(&[], None)]);
+        assert_eq!((names(&merged), dropped), (vec![None; 4], vec!["stations".to_owned()]));
     }
 }

@@ -2,6 +2,7 @@
 
 mod deformation;
 mod clean;
+mod scan_station;
 mod cloud;
 mod merge;
 pub mod neighbors;
@@ -33,6 +34,7 @@ pub use prepare::{Preparation, PreparationReport, SURFACE_VARIATION, prepare};
 pub use prepared_cloud::PreparedCloud;
 pub(crate) use prepared_cloud::check_length;
 pub use radius::{DistanceSample, Radius, RadiusReport, estimate_radii, median_distance, spacing};
+pub use scan_station::{STATION, ScanStation};
 pub use structure::{PointShape, STRUCTURE, Structure, StructureChoice, StructureReport};
 pub use subsample::{Subsample, subsample};
 pub(crate) use up::MAX_CAMERA_SLOPE;

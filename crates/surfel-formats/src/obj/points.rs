@@ -37,7 +37,7 @@ pub(crate) fn read(
             .expect("the first three columns are x, y and z")
     };
     let parse = |line: &[u8], row: &mut Vec<f64>| parse_vertex(line, n_columns, row);
-    let rows = RowRange { start: 0, line: 1, n_columns, limit: None };
+    let rows = RowRange { start: 0, end: None, line: 1, n_columns, limit: None };
     progress.begin(&format!("read {}", input.name), input.len() as u64);
     let cloud = read_rows(input, rows, &parse, layout_of, options.origin, progress)?;
     let info = FileInfo { n_points: Some(cloud.len() as u64), ..file_info(n_columns) };

@@ -11,8 +11,8 @@ use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::table::{
-    ColorRange, ColumnChoice, ColumnField, ColumnRole, Field, LineError, NumberType, RecordLayout,
-    RowRange, Tolerance, is_byte, origin_of_records, parse_number, read_records, read_rows,
+    ColumnRole, Field, LineError, NumberType, RecordLayout, RowRange, Tolerance, named_columns,
+    origin_of_records, parse_number, read_records, read_rows,
 };
 
 /// Reads the header.
@@ -153,12 +153,12 @@ fn read_ascii(
     let columns: Vec<(&str, NumberType)> =
         numbers.map(|p| (p.name.as_str(), p.number_type)).collect();
     let n_columns = columns.len();
-    let rows = RowRange { start, line, n_columns, limit: Some(vertex.count) };
+    let rows = RowRange { start, end: None, line, n_columns, limit: Some(vertex.count) };
     let parse = |line: &[u8], row: &mut Vec<f64>| parse_vertex(line, vertex, row);
     let layout_of = |sample: &[u8]| {
-        let fields = columns.iter().enumerate().map(|(i, (name, number_type))| {
-            (*name, Field { scale: 1.0, ..Field::new(8 * i, NumberType::F64) }, *number_type)
-        });
+        let fields = columns.iter().enumerate();
+        let fields =
+            fields.map(|(i, (name, number_type))| (*name, Field::parsed(8 * i, *number_type)));
         let columns = named_columns(fields, 8 * n_columns, false, sample, &options.columns);
         RecordLayout::new(8 * n_columns, false, columns, &options.columns)
             .expect("x, y and z were found")
@@ -207,53 +207,6 @@ fn layout(
     sample: &[u8],
     options: &LoadOptions,
 ) -> RecordLayout {
-    let fields = columns.into_iter().map(|(name, field)| (name, field, field.number_type));
-    let columns = named_columns(fields, stride, big_endian, sample, &options.columns);
+    let columns = named_columns(columns.into_iter(), stride, big_endian, sample, &options.columns);
     RecordLayout::new(stride, big_endian, columns, &options.columns).expect("x, y and z were found")
-}
-
-/// Returns the roles of properties by their names and types, and those of classes also by the values in a sample of the
-/// records.
-fn named_columns<'a>(
-    fields: impl Iterator<Item = (&'a str, Field, NumberType)>,
-    stride: usize,
-    big_endian: bool,
-    sample: &[u8],
-    choice: &ColumnChoice,
-) -> Vec<ColumnField> {
-    let keeps_alpha = choice.names("alpha");
-    let fields: Vec<(&str, Field, NumberType)> =
-        fields.filter(|(name, ..)| keeps_alpha || !ColumnRole::is_alpha(name)).collect();
-    let colors = fields
-        .iter()
-        .filter(|(name, ..)| matches!(ColumnRole::from_name(name), Some(ColumnRole::Color(_))));
-    let float_range = ColorRange::from_floats(colors.flat_map(|(_, field, _)| {
-        sample.chunks_exact(stride).map(|record| field.value(record, big_endian))
-    }));
-    let names: Vec<&str> = fields.iter().map(|(name, ..)| *name).collect();
-    let mut columns: Vec<ColumnField> = Vec::new();
-    for (mut role, (name, mut field, number_type)) in
-        ColumnRole::from_names(&names).into_iter().zip(fields)
-    {
-        let holds_classes = || {
-            let records = sample.chunks_exact(stride);
-            records.into_iter().all(|record| is_byte(field.value(record, big_endian)))
-        };
-        if role == ColumnRole::Classification && number_type != NumberType::U8 && !holds_classes() {
-            role = ColumnRole::Scalar(name.into());
-        }
-        let range = match number_type {
-            NumberType::F32 | NumberType::F64 => float_range,
-            NumberType::U16 => ColorRange::Bits16,
-            _ => ColorRange::Bits8,
-        };
-        if let ColumnRole::Color(_) = role {
-            field.scale = range.scale();
-        } else if ColumnRole::is_alpha(name) {
-            role = ColumnRole::Scalar("alpha".into());
-            field.scale = range.scale() / 65535.0;
-        }
-        columns.push(ColumnField { role, field });
-    }
-    columns
 }

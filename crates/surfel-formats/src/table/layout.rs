@@ -29,6 +29,9 @@ pub(crate) struct Field {
     pub byte: usize,
     /// Type of the number in the record.
     pub number_type: NumberType,
+    /// Type of the number in the file, which differs from that in a record that was parsed. Scalar columns have the
+    /// narrowest type that holds it.
+    pub file_type: NumberType,
     /// Lowest bit and number of bits of an unsigned field that shares its byte with others.
     pub bits: Option<(u32, u32)>,
     /// Factor of the number.
@@ -83,7 +86,12 @@ impl NumberType {
 impl Field {
     /// An unscaled number at `byte`.
     pub fn new(byte: usize, number_type: NumberType) -> Self {
-        Self { byte, number_type, bits: None, scale: 1.0, offset: 0.0 }
+        Self { byte, number_type, file_type: number_type, bits: None, scale: 1.0, offset: 0.0 }
+    }
+
+    /// A number of `file_type` that was parsed to f64 at `byte`.
+    pub fn parsed(byte: usize, file_type: NumberType) -> Self {
+        Self { file_type, ..Self::new(byte, NumberType::F64) }
     }
 
     /// Returns the field's value in the record that `record` starts with.
@@ -141,7 +149,7 @@ impl Field {
     /// Returns an empty column of the narrowest type that holds the field's values.
     fn empty_values(&self) -> Values {
         let is_scaled = self.scale != 1.0 || self.offset != 0.0;
-        match self.number_type {
+        match self.file_type {
             NumberType::F64 | NumberType::U32 | NumberType::I64 | NumberType::U64 => {
                 Values::F64(Vec::new())
             }

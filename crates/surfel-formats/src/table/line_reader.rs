@@ -5,9 +5,8 @@ use surfel_core::math::DVec3;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 
-use super::column_slices::{ColumnSlices, shrink};
+use super::cloud_builder::CloudBuilder;
 use super::layout::RecordLayout;
-use super::reader::{Tolerance, grow_checked, origin_of_records};
 use crate::error::{Location, Result};
 use crate::file::Input;
 
@@ -26,6 +25,8 @@ pub(crate) const MAX_FIELDS: usize = 1000;
 pub(crate) struct RowRange {
     /// First byte.
     pub start: usize,
+    /// First byte after them; the end of the file if absent.
+    pub end: Option<usize>,
     /// Number of the line that begins there, for messages.
     pub line: u64,
     /// Number of values in each row.
@@ -55,10 +56,22 @@ pub(crate) fn read_rows(
     origin: Option<DVec3>,
     progress: &dyn Progress,
 ) -> Result<PointCloud> {
-    let mut rest = &input[rows.start..];
+    let mut builder = CloudBuilder::new(input, layout_of, origin);
+    append_rows(&mut builder, rows, parse, progress)?;
+    Ok(builder.finish())
+}
+
+/// Reads lines to the end of a cloud.
+pub(crate) fn append_rows(
+    builder: &mut CloudBuilder<impl Fn(&[u8]) -> RecordLayout>,
+    rows: RowRange,
+    parse: ParseLine,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let input = builder.input;
+    let mut rest = &input[rows.start..rows.end.unwrap_or(input.len())];
     let mut line = rows.line;
     let mut left = rows.limit.unwrap_or(u64::MAX);
-    let mut started: Option<(RecordLayout, PointCloud)> = None;
     while !rest.is_empty() && 0 < left {
         progress.check()?;
         let tasks = take_tasks(&mut rest);
@@ -82,28 +95,12 @@ pub(crate) fn read_rows(
             }
             left = left.saturating_sub(n_rows);
             line += parsed.n_lines;
-            if !parsed.records.is_empty() {
-                batch.push(parsed.records);
-            }
+            batch.push(parsed.records);
         }
+        builder.append(&batch)?;
         progress.advance(n_bytes as u64);
-        let Some(sample) = batch.first() else { continue };
-        let (layout, cloud) = started.get_or_insert_with(|| {
-            let layout = layout_of(sample);
-            let origin =
-                origin.unwrap_or_else(|| origin_of_records(sample, &layout, Tolerance::UNSTATED));
-            let cloud = layout.empty_cloud(origin);
-            (layout, cloud)
-        });
-        append_records(input, layout, cloud, &batch)?;
     }
-    let (_, mut cloud) = started.unwrap_or_else(|| {
-        let layout = layout_of(&[]);
-        let cloud = layout.empty_cloud(origin.unwrap_or_default());
-        (layout, cloud)
-    });
-    shrink(&mut cloud);
-    Ok(cloud)
+    Ok(())
 }
 
 /// Parses a number in any of the usual spellings, `nan` and `inf` among them.
@@ -167,25 +164,4 @@ fn parse_text(text: &[u8], parse: ParseLine, n_columns: usize) -> Parsed {
         parsed.records.extend(row.iter().flat_map(|value| value.to_le_bytes()));
     }
     parsed
-}
-
-fn append_records(
-    input: &Input,
-    layout: &RecordLayout,
-    cloud: &mut PointCloud,
-    batch: &[Vec<u8>],
-) -> Result<()> {
-    let n_before = cloud.len();
-    let n_new: usize = batch.iter().map(|records| records.len() / layout.stride).sum();
-    grow_checked(cloud, n_before + n_new, input)?;
-    let origin = cloud.origin;
-    let mut rest = ColumnSlices::from_cloud(cloud, n_before);
-    let tasks: Vec<(&Vec<u8>, ColumnSlices)> = batch
-        .iter()
-        .map(|records| (records, rest.split_off_front(records.len() / layout.stride)))
-        .collect();
-    tasks.into_par_iter().for_each(|(records, mut slices)| {
-        layout.decode(records, origin, &mut slices);
-    });
-    Ok(())
 }

@@ -5,7 +5,9 @@ mod column_choice;
 mod color_range;
 mod column_slices;
 mod layout;
+mod named_columns;
 mod reader;
+mod cloud_builder;
 mod line_reader;
 mod chunks;
 mod encode;
@@ -13,14 +15,16 @@ mod encode;
 pub use column_choice::{Column, ColumnChoice, TextColumn};
 
 pub(crate) use chunks::{ParseFault, TextChunk, find_line_end, line_at, parse_chunks};
+pub(crate) use cloud_builder::CloudBuilder;
 pub(crate) use color_range::{ColorRange, is_byte};
 pub(crate) use column_role::ColumnRole;
 pub(crate) use column_slices::ColumnSlices;
 pub(crate) use encode::{POINTS_PER_CHUNK, encode_points};
 pub(crate) use layout::{ColumnField, Field, NumberType, RecordLayout};
 pub(crate) use line_reader::{
-    LineError, MAX_FIELDS, MAX_LINE_LENGTH, RowRange, parse_number, read_rows,
+    LineError, MAX_FIELDS, MAX_LINE_LENGTH, RowRange, append_rows, parse_number, read_rows,
 };
+pub(crate) use named_columns::named_columns;
 pub(crate) use reader::{
     Tolerance, choose_origin, grow_checked, origin_of_records, read_records, sample_positions,
 };

@@ -53,6 +53,7 @@ pub(crate) fn read(
     let parse = |line: &[u8], row: &mut Vec<f64>| parse_line(line, &preamble, &columns, row);
     let rows = RowRange {
         start: preamble.data,
+        end: None,
         line: preamble.data_line,
         n_columns: kept.len(),
         limit: None,

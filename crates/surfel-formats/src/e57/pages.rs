@@ -1,0 +1,106 @@
+//! The pages of a file, each of which ends with a checksum.
+
+use rayon::prelude::*;
+use surfel_core::progress::Progress;
+
+use crate::error::{Error, Location, Result};
+use crate::file::Input;
+
+/// Bytes of a page with its checksum; the standard allows no other size.
+pub(super) const PAGE_LENGTH: usize = 1024;
+/// Bytes of a page without its checksum.
+const CONTENT_LENGTH: usize = PAGE_LENGTH - 4;
+/// Number of pages that a task checks between two checks for cancellation.
+const PAGES_PER_TASK: usize = 1 << 12;
+
+/// The content of whole pages, without their checksums.
+#[derive(Clone, Copy)]
+pub(super) struct Pages<'a> {
+    pages: &'a [[u8; PAGE_LENGTH]],
+}
+
+impl<'a> Pages<'a> {
+    /// The whole pages of `bytes`.
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self { pages: bytes.as_chunks().0 }
+    }
+
+    /// Checks all checksums.
+    pub fn check(&self, input: &Input, progress: &dyn Progress) -> Result<()> {
+        let tasks = self.pages.par_chunks(PAGES_PER_TASK).enumerate();
+        tasks.try_for_each(|(task, pages)| {
+            progress.check()?;
+            let is_broken = |page: &[u8; PAGE_LENGTH]| {
+                let (content, checksum) = page.split_at(CONTENT_LENGTH);
+                // The standard's library writes the checksum with its most significant byte first.
+                crc32c::crc32c(content).to_be_bytes() != *checksum
+            };
+            let Some(broken) = pages.iter().position(is_broken) else { return Ok(()) };
+            let page = task * PAGES_PER_TASK + broken;
+            Err::<(), Error>(input.malformed(
+                Location::Byte((page * PAGE_LENGTH) as u64),
+                "a page whose checksum is wrong",
+                "the bytes that were written",
+                "copy the file again from its source",
+            ))
+        })
+    }
+
+    /// Returns the position in the content of a byte of the file.
+    pub fn content_position(byte: u64) -> u64 {
+        let (page, rest) = (byte / PAGE_LENGTH as u64, byte % PAGE_LENGTH as u64);
+        page * CONTENT_LENGTH as u64 + rest.min(CONTENT_LENGTH as u64)
+    }
+
+    /// Returns the byte of the file at a position in the content.
+    pub fn file_position(at: u64) -> u64 {
+        at / CONTENT_LENGTH as u64 * PAGE_LENGTH as u64 + at % CONTENT_LENGTH as u64
+    }
+
+    /// Returns the bytes of the content.
+    pub fn len(&self) -> u64 {
+        (self.pages.len() * CONTENT_LENGTH) as u64
+    }
+
+    /// Copies the content from position `at` on; returns `None` if it ends before `out` is full.
+    pub fn copy(&self, at: u64, mut out: &mut [u8]) -> Option<()> {
+        if self.len() < at.checked_add(out.len() as u64)? {
+            return None;
+        }
+        let (mut page, mut start) = (at as usize / CONTENT_LENGTH, at as usize % CONTENT_LENGTH);
+        while !out.is_empty() {
+            let length = out.len().min(CONTENT_LENGTH - start);
+            let (front, rest) = out.split_at_mut(length);
+            front.copy_from_slice(&self.pages[page][start..start + length]);
+            (out, page, start) = (rest, page + 1, 0);
+        }
+        Some(())
+    }
+
+    /// Returns the next `N` bytes of the content at `at`, if there are as many.
+    pub fn bytes<const N: usize>(&self, at: u64) -> Option<[u8; N]> {
+        let mut bytes = [0; N];
+        self.copy(at, &mut bytes)?;
+        Some(bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Content that continues over page ends.
+
+    use super::*;
+
+    #[test]
+    fn content_continues_over_page_ends() {
+        let bytes: Vec<u8> = (0..3 * PAGE_LENGTH).map(|i| (i / 4) as u8).collect();
+        let pages = Pages::new(&bytes);
+        assert_eq!(pages.len(), 3 * 1020);
+        // The last bytes of the first page's content, then the first of the second page.
+        assert_eq!(pages.bytes::<4>(1018), Some([254, 254, 0, 0]));
+        assert_eq!(Pages::file_position(1020), 1024);
+        assert_eq!(Pages::content_position(1026), 1022);
+        assert_eq!(pages.bytes::<2>(3 * 1020 - 1), None);
+        assert_eq!(pages.bytes::<2>(u64::MAX), None);
+    }
+}

@@ -1,0 +1,166 @@
+//! Reads the points of all scans of a file.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
+use surfel_core::progress::Progress;
+
+use super::document::{Document, check_header, read_document};
+use super::pages::Pages;
+use super::scan::Scan;
+use super::streams::find_streams;
+use crate::error::{Error, Location, Result};
+use crate::file::Input;
+use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::stations::{MAX_STATIONS, set_stations};
+use crate::table::{
+    CloudBuilder, ColumnField, ColumnRole, Field, MAX_FIELDS, NumberType, RecordLayout,
+};
+
+/// Number of points of a block, which a thread decodes.
+const POINTS_PER_BLOCK: u64 = 1 << 14;
+/// Number of blocks whose records are in memory at a time.
+const BLOCKS_PER_BATCH: usize = 32;
+
+/// Reads header and XML.
+pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
+    let document = read_document(input, check_header(input)?)?;
+    let scans = scans(input, &document)?;
+    let columns = columns(&scans);
+    Ok(file_info(&document, &columns))
+}
+
+/// Reads the points.
+pub(crate) fn read(
+    input: &Input,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<Loaded> {
+    let length = check_header(input)?;
+    let pages = Pages::new(&input[..length]);
+    pages.check(input, progress)?;
+    let document = read_document(input, length)?;
+    let scans = scans(input, &document)?;
+    let mut columns = columns(&scans);
+    let info = file_info(&document, &columns);
+    columns.retain(|(role, _)| options.columns.wants(role));
+    let roles: Vec<ColumnRole> = columns.iter().map(|(role, _)| role.clone()).collect();
+
+    let layout_of = |_: &[u8]| layout(&columns, options);
+    let mut builder = CloudBuilder::new(input, layout_of, options.origin);
+    let mut n_scan_points = Vec::new();
+    let n_invalid = AtomicU64::new(0);
+    let n_points = document.scans.iter().fold(0, |sum: u64, scan| sum.saturating_add(scan.records));
+    progress.begin(&format!("read {}", input.name), n_points);
+    for (scan, description) in scans.iter().zip(&document.scans) {
+        let n_before = builder.n_points();
+        if 0 < scan.n_points {
+            let lengths = scan.stream_lengths();
+            let section = description.file_offset;
+            let streams = find_streams(input, pages, section, &lengths, progress)?;
+            let n_readable = scan.n_readable(&streams);
+            if n_readable < scan.n_points {
+                return Err(Error::Truncated {
+                    file: input.name.to_string(),
+                    location: Location::Byte(section),
+                    readable: n_readable,
+                    claimed: scan.n_points,
+                });
+            }
+            let firsts: Vec<u64> = (0..scan.n_points).step_by(POINTS_PER_BLOCK as usize).collect();
+            for batch in firsts.chunks(BLOCKS_PER_BATCH) {
+                let decode = |first: &u64| {
+                    progress.check()?;
+                    let n_points = POINTS_PER_BLOCK.min(scan.n_points - first);
+                    let records = scan.decode(&streams, pages, *first, n_points as usize, &roles);
+                    let n_valid = (records.len() / (8 * (3 + roles.len()))) as u64;
+                    n_invalid.fetch_add(n_points - n_valid, Ordering::Relaxed);
+                    progress.advance(n_points);
+                    Ok::<_, Error>(records)
+                };
+                builder.append(&batch.par_iter().map(decode).collect::<Result<Vec<_>>>()?)?;
+            }
+        }
+        n_scan_points.push(builder.n_points() - n_before);
+    }
+    let n_invalid = n_invalid.into_inner();
+    if 0 < n_invalid {
+        let line = format!("{n_invalid} of {n_points} points have no valid position; skipped");
+        progress.note(&format!("{}: {line}", input.name));
+    }
+    let mut cloud = builder.finish();
+    let stations = scans.iter().zip(&document.scans).enumerate();
+    let stations = stations.map(|(i, (scan, description))| scan.station(i, description));
+    set_stations(&mut cloud, stations.collect(), &n_scan_points);
+    Ok(Loaded { cloud, info })
+}
+
+/// Returns the scans; fails if one has no coordinates or too many fields.
+fn scans(input: &Input, document: &Document) -> Result<Vec<Scan>> {
+    const ADVICE: &str = "write the file again";
+    let malformed = |found: String, expected: String| {
+        input.malformed(Location::Byte(0), found, expected, ADVICE)
+    };
+    if document.scans.is_empty() {
+        return Err(malformed("no scans".into(), "points".into()));
+    }
+    if MAX_STATIONS < document.scans.len() {
+        let found = format!("{} scans", document.scans.len());
+        return Err(malformed(found, format!("at most {MAX_STATIONS}")));
+    }
+    let checked = document.scans.iter().enumerate().map(|(i, description)| {
+        let n_fields = description.prototype.len();
+        if MAX_FIELDS < n_fields {
+            let found = format!("{n_fields} fields in scan {i}");
+            return Err(malformed(found, format!("at most {MAX_FIELDS}")));
+        }
+        Scan::new(description).ok_or_else(|| {
+            let expected = "cartesianX, Y and Z, or sphericalRange, Azimuth and Elevation";
+            malformed(format!("scan {i} without coordinates"), expected.into())
+        })
+    });
+    checked.collect()
+}
+
+/// Returns the columns of all scans and their types.
+fn columns(scans: &[Scan]) -> Vec<(ColumnRole, NumberType)> {
+    let mut columns: Vec<(ColumnRole, NumberType)> = Vec::new();
+    for column in scans.iter().flat_map(|scan| &scan.columns) {
+        match columns.iter_mut().find(|(role, _)| *role == column.role) {
+            // Scans that store a column in different ways have it as f64.
+            Some((_, number_type)) if *number_type != column.number_type => {
+                *number_type = NumberType::F64;
+            }
+            Some(_) => {}
+            None => columns.push((column.role.clone(), column.number_type)),
+        }
+    }
+    columns
+}
+
+/// Returns the layout of decoded records.
+fn layout(columns: &[(ColumnRole, NumberType)], options: &LoadOptions) -> RecordLayout {
+    let axes = (0..3).map(|axis| (ColumnRole::Position(axis), NumberType::F64));
+    let columns = axes.chain(columns.iter().cloned()).enumerate();
+    let fields = columns.map(|(i, (role, number_type))| ColumnField {
+        role,
+        field: Field::parsed(8 * i, number_type),
+    });
+    let fields: Vec<ColumnField> = fields.collect();
+    RecordLayout::new(8 * fields.len(), false, fields, &options.columns)
+        .expect("the first three columns are x, y and z")
+}
+
+/// Returns the information in header and XML.
+fn file_info(document: &Document, columns: &[(ColumnRole, NumberType)]) -> FileInfo {
+    let n_scans = document.scans.len();
+    let scans = if n_scans == 1 { "1 scan".into() } else { format!("{n_scans} scans") };
+    let names = columns.iter().map(|(role, _)| role.name().to_owned());
+    FileInfo {
+        format: format!("E57 1.0, {scans}"),
+        n_points: Some(document.scans.iter().fold(0, |sum, scan| sum.saturating_add(scan.records))),
+        coordinate_system: document.coordinate_system.clone(),
+        columns: ["x", "y", "z"].into_iter().map(str::to_owned).chain(names).collect(),
+        ..FileInfo::default()
+    }
+}

@@ -1,0 +1,212 @@
+//! Decodes blocks of a scan's points to world coordinates.
+
+use e57::{PointCloud, RecordName};
+use surfel_core::math::{DQuat, DVec3};
+
+use surfel_core::points::ScanStation;
+
+use super::columns::{ScanColumn, scan_columns};
+use super::pages::Pages;
+use super::streams::Stream;
+use super::values::Encoding;
+use crate::table::ColumnRole;
+
+/// A scan: its fields and its pose.
+pub(super) struct Scan {
+    /// Number of points that the file claims.
+    pub n_points: u64,
+    /// Encodings of all fields.
+    pub encodings: Vec<Encoding>,
+    /// Columns besides the position.
+    pub columns: Vec<ScanColumn>,
+    cartesian: Option<Coordinates>,
+    spherical: Option<Coordinates>,
+    /// True if cells of a grid without measurement are at the scanner.
+    has_empty_cells: bool,
+    rotation: DQuat,
+    translation: DVec3,
+}
+
+/// The fields of three coordinates, and of the number that is not 0 if they are invalid.
+#[derive(Clone, Copy)]
+struct Coordinates {
+    fields: [usize; 3],
+    invalid_state: Option<usize>,
+}
+
+/// The values of a block of points, which are decoded as they are needed.
+struct Block<'a> {
+    scan: &'a Scan,
+    streams: &'a [Stream],
+    pages: Pages<'a>,
+    first: u64,
+    n_points: usize,
+}
+
+impl Scan {
+    /// The scan of a description; `None` if its points have no coordinates.
+    pub fn new(description: &PointCloud) -> Option<Self> {
+        let find =
+            |name: RecordName| description.prototype.iter().position(|record| record.name == name);
+        let coordinates = |names: [RecordName; 3], invalid_state| {
+            let [x, y, z] = names.map(find);
+            Some(Coordinates { fields: [x?, y?, z?], invalid_state: find(invalid_state) })
+        };
+        let cartesian = coordinates(
+            [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ],
+            RecordName::CartesianInvalidState,
+        );
+        let spherical = coordinates(
+            [
+                RecordName::SphericalRange,
+                RecordName::SphericalAzimuth,
+                RecordName::SphericalElevation,
+            ],
+            RecordName::SphericalInvalidState,
+        );
+        if cartesian.is_none() && spherical.is_none() {
+            return None;
+        }
+        let pose = description.transform.clone().unwrap_or_default();
+        let (r, t) = (pose.rotation, pose.translation);
+        let rotation = DQuat::from_xyzw(r.x, r.y, r.z, r.w);
+        // Some programs write zeros for a pose that they do not know.
+        let is_rotation = 0.0 < rotation.length() && rotation.is_finite();
+        let encodings: Vec<Encoding> =
+            description.prototype.iter().map(|record| Encoding::new(&record.data_type)).collect();
+        let mut columns = scan_columns(description);
+        columns.retain(|column| {
+            // Numbers that are the same for all points take no bytes, however many columns there are.
+            !matches!(column.role, ColumnRole::Scalar(_)) || 0 < encodings[column.field].n_bits()
+        });
+        Some(Self {
+            n_points: description.records,
+            encodings,
+            columns,
+            cartesian,
+            spherical,
+            has_empty_cells: description.has_row_column(),
+            rotation: if is_rotation { rotation.normalize() } else { DQuat::IDENTITY },
+            translation: DVec3::new(t.x, t.y, t.z),
+        })
+    }
+
+    /// Returns the station of the scan, which is the `index`-th of the file.
+    pub fn station(&self, index: usize, description: &PointCloud) -> ScanStation {
+        let name = description.name.clone().filter(|name| !name.trim().is_empty());
+        ScanStation {
+            name: name.unwrap_or_else(|| format!("scan {}", index + 1)),
+            position: description.transform.is_some().then_some(self.translation),
+        }
+    }
+
+    /// Returns the bytes that the stream of each field must have.
+    pub fn stream_lengths(&self) -> Vec<u64> {
+        let lengths = self.encodings.iter().map(|encoding| {
+            let n_bits = u128::from(self.n_points) * u128::from(encoding.n_bits());
+            u64::try_from(n_bits.div_ceil(8)).unwrap_or(u64::MAX)
+        });
+        lengths.collect()
+    }
+
+    /// Returns the number of points whose values are all in the streams.
+    pub fn n_readable(&self, streams: &[Stream]) -> u64 {
+        let fields =
+            self.encodings.iter().zip(streams).filter(|(encoding, _)| 0 < encoding.n_bits());
+        let n_values = fields.map(|(encoding, stream)| stream.len() * 8 / encoding.n_bits());
+        // A point all of whose numbers are known beforehand can be there once.
+        n_values.min().unwrap_or(1).min(self.n_points)
+    }
+
+    /// Decodes the valid ones of `n_points` points from `first` on to records of f64: world coordinates, then a number
+    /// for each of `roles`, NaN where the scan has none.
+    pub fn decode(
+        &self,
+        streams: &[Stream],
+        pages: Pages,
+        first: u64,
+        n_points: usize,
+        roles: &[ColumnRole],
+    ) -> Vec<u8> {
+        let block = Block { scan: self, streams, pages, first, n_points };
+        let positions = block.positions();
+        let columns: Vec<Option<Vec<f64>>> = roles.iter().map(|role| block.column(role)).collect();
+        let normal_of = |axis| roles.iter().position(|role| *role == ColumnRole::Normal(axis));
+        let normals = [normal_of(0), normal_of(1), normal_of(2)];
+        let stride = 3 + roles.len();
+        let mut records = Vec::with_capacity(8 * stride * n_points);
+        let mut row = vec![0.0; stride];
+        for (i, measured) in positions.into_iter().enumerate() {
+            let Some(measured) = measured else { continue };
+            let world = self.rotation * measured + self.translation;
+            row[..3].copy_from_slice(&world.to_array());
+            for (slot, column) in row[3..].iter_mut().zip(&columns) {
+                *slot = column.as_ref().map_or(f64::NAN, |column| column[i]);
+            }
+            if let [Some(x), Some(y), Some(z)] = normals.map(|at| at.map(|at| at + 3)) {
+                let normal = self.rotation * DVec3::new(row[x], row[y], row[z]);
+                [row[x], row[y], row[z]] = normal.to_array();
+            }
+            records.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+        }
+        records
+    }
+}
+
+impl Block<'_> {
+    fn values(&self, field: usize) -> Vec<f64> {
+        let mut values = vec![0.0; self.n_points];
+        let encoding = self.scan.encodings[field];
+        encoding.decode(&self.streams[field], self.pages, self.first, &mut values);
+        values
+    }
+
+    /// Returns the values of a column, colours scaled; `None` if the scan has no such column.
+    fn column(&self, role: &ColumnRole) -> Option<Vec<f64>> {
+        let column = self.scan.columns.iter().find(|column| column.role == *role)?;
+        let mut values = self.values(column.field);
+        let [factor, summand] = column.scale;
+        if (factor, summand) != (1.0, 0.0) {
+            values.iter_mut().for_each(|value| *value = *value * factor + summand);
+        }
+        Some(values)
+    }
+
+    /// Returns the positions relative to the scanner, `None` for points that were not measured.
+    fn positions(&self) -> Vec<Option<DVec3>> {
+        let mut positions = vec![None; self.n_points];
+        let scan = self.scan;
+        if let Some(cartesian) = scan.cartesian {
+            self.fill(cartesian, &mut positions, DVec3::new);
+        }
+        if let Some(spherical) = scan.spherical
+            && positions.iter().any(Option::is_none)
+        {
+            self.fill(spherical, &mut positions, |range, azimuth, elevation| {
+                let ((sin, cos), (up, level)) = (azimuth.sin_cos(), elevation.sin_cos());
+                range * DVec3::new(level * cos, level * sin, up)
+            });
+        }
+        positions
+    }
+
+    /// Fills the positions that are still absent.
+    fn fill(
+        &self,
+        Coordinates { fields, invalid_state }: Coordinates,
+        positions: &mut [Option<DVec3>],
+        position_of: impl Fn(f64, f64, f64) -> DVec3,
+    ) {
+        let [a, b, c] = fields.map(|field| self.values(field));
+        let states = invalid_state.map(|field| self.values(field));
+        for (i, position) in positions.iter_mut().enumerate() {
+            let is_valid = states.as_ref().is_none_or(|states| states[i] == 0.0);
+            if position.is_some() || !is_valid {
+                continue;
+            }
+            let measured = position_of(a[i], b[i], c[i]);
+            let is_empty = self.scan.has_empty_cells && measured == DVec3::ZERO;
+            *position = (measured.is_finite() && !is_empty).then_some(measured);
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! The bytes of a scan's values: a stream for each field, cut into packets.
+
+use surfel_core::progress::Progress;
+
+use super::pages::Pages;
+use crate::error::{Error, Location, Result};
+use crate::file::Input;
+
+/// First byte of the section that holds a scan's packets.
+const SECTION_ID: u8 = 1;
+/// First bytes of packets: an index of packets, values, or nothing of use.
+const INDEX_PACKET: u8 = 0;
+const DATA_PACKET: u8 = 1;
+const IGNORED_PACKET: u8 = 2;
+/// Bytes of a data packet before the lengths of its streams' parts.
+const DATA_HEADER_LENGTH: u64 = 6;
+
+/// The stream of a field.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Stream {
+    segments: Vec<Segment>,
+    length: u64,
+}
+
+/// A part of a stream that lies in one packet.
+#[derive(Clone, Copy, Debug)]
+struct Segment {
+    /// Byte of the stream at which the part begins.
+    start: u64,
+    /// Position in the pages' content.
+    at: u64,
+}
+
+impl Stream {
+    /// Returns the number of bytes.
+    pub fn len(&self) -> u64 {
+        self.length
+    }
+
+    /// Copies the bytes from `start` on; the stream must have them.
+    pub fn copy(&self, pages: Pages, start: u64, mut out: &mut [u8]) {
+        let first = self.segments.partition_point(|segment| segment.start <= start) - 1;
+        let mut from = start;
+        for (i, segment) in self.segments.iter().enumerate().skip(first) {
+            if out.is_empty() {
+                return;
+            }
+            let end = self.segments.get(i + 1).map_or(self.length, |next| next.start);
+            let (front, rest) = out.split_at_mut(out.len().min((end - from) as usize));
+            let copied = pages.copy(segment.at + (from - segment.start), front);
+            copied.expect("segments lie within the pages");
+            (from, out) = (end, rest);
+        }
+    }
+
+    fn push(&mut self, at: u64, length: u64) {
+        if 0 < length {
+            self.segments.push(Segment { start: self.length, at });
+            self.length += length;
+        }
+    }
+}
+
+/// Finds the streams of `n_fields` fields in the section at byte `section` of the file. Packets are read until every
+/// stream has as many bytes as `needed` says, or the section ends.
+pub(super) fn find_streams(
+    input: &Input,
+    pages: Pages,
+    section: u64,
+    needed: &[u64],
+    progress: &dyn Progress,
+) -> Result<Vec<Stream>> {
+    let mut streams = vec![Stream::default(); needed.len()];
+    let start = Pages::content_position(section);
+    let malformed = |at: u64, found: String, expected: &str| {
+        let location = Location::Byte(Pages::file_position(at));
+        Err::<Vec<Stream>, Error>(input.malformed(
+            location,
+            found,
+            expected,
+            "copy the file again from its source",
+        ))
+    };
+    let Some(header) = pages.bytes::<32>(start) else {
+        return malformed(start, "the end of the file".into(), "a section of points");
+    };
+    if header[0] != SECTION_ID {
+        return malformed(start, format!("section {}", header[0]), "a section of points, 1");
+    }
+    let number = |at: usize| u64::from_le_bytes(header[at..at + 8].try_into().expect("8 bytes"));
+    let end = start.saturating_add(number(8)).min(pages.len());
+    let mut at = Pages::content_position(number(16));
+    let is_complete = |streams: &[Stream]| {
+        streams.iter().zip(needed).all(|(stream, needed)| *needed <= stream.length)
+    };
+    let mut n_packets = 0u64;
+    while at < end && !is_complete(&streams) {
+        if n_packets.is_multiple_of(256) {
+            progress.check()?;
+        }
+        n_packets += 1;
+        let Some([kind, _, low, high]) = pages.bytes(at) else { break };
+        let length = u64::from(u16::from_le_bytes([low, high])) + 1;
+        if pages.len() < at + length {
+            break;
+        }
+        match kind {
+            DATA_PACKET => {
+                if let Err((found, expected)) = add_packet(&mut streams, pages, at, length) {
+                    return malformed(at, found, &expected);
+                }
+            }
+            INDEX_PACKET | IGNORED_PACKET => {}
+            _ => return malformed(at, format!("packet type {kind}"), "type 0, 1 or 2"),
+        }
+        at += length.next_multiple_of(4);
+    }
+    Ok(streams)
+}
+
+/// Adds the parts of the streams in a data packet; fails with what was found and what was expected.
+fn add_packet(
+    streams: &mut [Stream],
+    pages: Pages,
+    at: u64,
+    length: u64,
+) -> std::result::Result<(), (String, String)> {
+    let n_found = pages.bytes::<2>(at + 4).map_or(0, u16::from_le_bytes);
+    if usize::from(n_found) != streams.len() {
+        let expected = format!("{}, one for each field", streams.len());
+        return Err((format!("a packet of {n_found} streams"), expected));
+    }
+    let mut part = DATA_HEADER_LENGTH + 2 * streams.len() as u64;
+    for (i, stream) in streams.iter_mut().enumerate() {
+        let size = pages.bytes::<2>(at + DATA_HEADER_LENGTH + 2 * i as u64);
+        let size = u64::from(size.map_or(0, u16::from_le_bytes));
+        if length < part + size {
+            let found = format!("a stream up to byte {} of a packet", part + size);
+            return Err((found, format!("at most {length} bytes")));
+        }
+        stream.push(at + part, size);
+        part += size;
+    }
+    Ok(())
+}

@@ -1,0 +1,202 @@
+//! The scans of a PTX file: their grids, poses and lines.
+
+use surfel_core::math::{DMat3, DVec3};
+use surfel_core::progress::Progress;
+
+use crate::error::{Error, Location, Result};
+use crate::file::Input;
+use crate::stations::MAX_STATIONS;
+use crate::table::{MAX_LINE_LENGTH, parse_number};
+
+/// Number of lines before the points of a scan: columns, rows, scanner position, its three axes, and the four rows of
+/// the transform.
+const N_HEADER_LINES: usize = 10;
+
+/// A scan: a grid of cells, one to a line.
+#[derive(Clone, Debug)]
+pub(super) struct Scan {
+    /// Number of columns and rows of the grid.
+    pub grid: [u64; 2],
+    /// World position of the scanner.
+    pub position: DVec3,
+    /// Linear part of the transform to world coordinates.
+    pub rotation: DMat3,
+    /// Translation of the transform.
+    pub translation: DVec3,
+    /// First byte of the cells.
+    pub start: usize,
+    /// First byte after them.
+    pub end: usize,
+    /// Number of the line at `start`.
+    pub line: u64,
+    /// Number of fields in the first cell's line.
+    pub n_fields: usize,
+}
+
+impl Scan {
+    /// Returns the number of cells.
+    pub fn n_cells(&self) -> u64 {
+        self.grid[0] * self.grid[1]
+    }
+}
+
+/// Reads the headers of all scans and finds their lines.
+pub(super) fn find_scans(input: &Input, progress: &dyn Progress) -> Result<Vec<Scan>> {
+    let mut scans: Vec<Scan> = Vec::new();
+    let mut lines = Lines { input, at: 0, number: 0 };
+    loop {
+        lines.skip_empty();
+        if lines.at == input.len() && !scans.is_empty() {
+            return Ok(scans);
+        }
+        if scans.len() == MAX_STATIONS {
+            let location = Location::Line(lines.number + 1);
+            let advice = "divide the file into several";
+            return Err(input.malformed(
+                location,
+                "a further scan",
+                format!("at most {MAX_STATIONS}"),
+                advice,
+            ));
+        }
+        let mut scan = read_scan_header(&mut lines)?;
+        scan.end = end_of_cells(&lines, &scan, progress)?;
+        let first = input[scan.start..scan.end].split(|byte| *byte == b'\n').next();
+        scan.n_fields = first
+            .unwrap_or_default()
+            .trim_ascii()
+            .split(u8::is_ascii_whitespace)
+            .filter(|word| !word.is_empty())
+            .count();
+        lines.at = scan.end;
+        lines.number += scan.n_cells();
+        scans.push(scan);
+    }
+}
+
+/// Reads the header of the first scan.
+pub(super) fn first_header(input: &Input) -> Result<Scan> {
+    read_scan_header(&mut Lines { input, at: 0, number: 0 })
+}
+
+/// Reads the lines before the cells of a scan.
+fn read_scan_header(lines: &mut Lines) -> Result<Scan> {
+    let mut grid = [0; 2];
+    for (count, name) in grid.iter_mut().zip(["columns", "rows"]) {
+        let line = lines.next()?;
+        let parsed = str::from_utf8(line).ok().and_then(|line| line.parse::<u64>().ok());
+        *count = parsed.ok_or_else(|| {
+            lines.malformed(line, &format!("the number of {name} of a scan's grid"))
+        })?;
+    }
+    if grid[0].checked_mul(grid[1]).is_none() {
+        return Err(lines.malformed(b"a grid beyond counting", "rows and columns of a scan"));
+    }
+    let position = DVec3::from_array(lines.numbers("the position of the scanner, x y z")?);
+    for axis in ["x", "y", "z"] {
+        lines.numbers::<3>(&format!("the {axis} axis of the scanner, x y z"))?;
+    }
+    // Each line is the image of an axis, since the file multiplies rows by the matrix.
+    let mut images = [[0.0; 4]; 4];
+    for image in &mut images {
+        *image = lines.numbers("four numbers of the transform")?;
+    }
+    let [x, y, z, translation] = images.map(|[x, y, z, _]| DVec3::new(x, y, z));
+    Ok(Scan {
+        grid,
+        position,
+        rotation: DMat3::from_cols(x, y, z),
+        translation,
+        start: lines.at,
+        end: lines.at,
+        line: lines.number + 1,
+        n_fields: 0,
+    })
+}
+
+/// Returns the first byte after the cells of a scan.
+fn end_of_cells(lines: &Lines, scan: &Scan, progress: &dyn Progress) -> Result<usize> {
+    let mut at = scan.start;
+    for cell in 0..scan.n_cells() {
+        if cell.is_multiple_of(1 << 16) {
+            progress.check()?;
+        }
+        let rest = &lines.input[at..];
+        if rest.is_empty() {
+            return Err(Error::Truncated {
+                file: lines.input.name.to_string(),
+                location: Location::Line(scan.line + cell),
+                readable: cell,
+                claimed: scan.n_cells(),
+            });
+        }
+        at += memchr::memchr(b'\n', rest).map_or(rest.len(), |end| end + 1);
+    }
+    Ok(at)
+}
+
+/// The lines of the headers.
+struct Lines<'a> {
+    input: &'a Input<'a>,
+    at: usize,
+    /// Number of lines read.
+    number: u64,
+}
+
+impl<'a> Lines<'a> {
+    /// Skips empty lines.
+    fn skip_empty(&mut self) {
+        while let Some(length) = memchr::memchr(b'\n', &self.input[self.at..])
+            && self.input[self.at..self.at + length].trim_ascii().is_empty()
+        {
+            self.at += length + 1;
+            self.number += 1;
+        }
+        if self.input[self.at..].len() <= MAX_LINE_LENGTH
+            && self.input[self.at..].trim_ascii().is_empty()
+        {
+            self.at = self.input.len();
+        }
+    }
+
+    /// Returns the next line without the spaces about it.
+    fn next(&mut self) -> Result<&'a [u8]> {
+        let rest = &self.input[self.at..];
+        self.number += 1;
+        let near = &rest[..rest.len().min(MAX_LINE_LENGTH)];
+        let Some(length) = memchr::memchr(b'\n', near) else {
+            let found: &[u8] = if near.len() == MAX_LINE_LENGTH {
+                b"a longer line"
+            } else {
+                b"the end of the file"
+            };
+            return Err(self.malformed(found, &format!("the {N_HEADER_LINES} lines before a scan")));
+        };
+        self.at += length + 1;
+        Ok(rest[..length].trim_ascii())
+    }
+
+    /// Returns the numbers of the next line.
+    fn numbers<const N: usize>(&mut self, expected: &str) -> Result<[f64; N]> {
+        let line = self.next()?;
+        let words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let mut numbers = [0.0; N];
+        let mut n_found = 0;
+        for word in words {
+            let number = parse_number(word).ok().filter(|number| number.is_finite());
+            let (Some(slot), Some(number)) = (numbers.get_mut(n_found), number) else {
+                return Err(self.malformed(line, expected));
+            };
+            *slot = number;
+            n_found += 1;
+        }
+        if n_found == N { Ok(numbers) } else { Err(self.malformed(line, expected)) }
+    }
+
+    /// Returns the error of the line that was read last.
+    fn malformed(&self, line: &[u8], expected: &str) -> Error {
+        let found = format!("`{}`", line[..line.len().min(60)].escape_ascii());
+        let advice = "the lines before a scan are broken; write the file again";
+        self.input.malformed(Location::Line(self.number), found, expected, advice)
+    }
+}

@@ -1,0 +1,53 @@
+//! Columns of binary and ascii records whose fields have names.
+
+use super::color_range::{ColorRange, is_byte};
+use super::column_choice::ColumnChoice;
+use super::column_role::ColumnRole;
+use super::layout::{ColumnField, Field, NumberType};
+
+/// Returns columns with roles by their names, and with the scale of colours. Each field has a name.
+///
+/// The range of floating-point colours and whether a column can hold classes also depend on the values in `sample`, the
+/// first records. Opacity is left out unless `choice` names it.
+pub(crate) fn named_columns<'a>(
+    fields: impl Iterator<Item = (&'a str, Field)>,
+    stride: usize,
+    big_endian: bool,
+    sample: &[u8],
+    choice: &ColumnChoice,
+) -> Vec<ColumnField> {
+    let keeps_alpha = choice.names("alpha");
+    let fields: Vec<(&str, Field)> =
+        fields.filter(|(name, _)| keeps_alpha || !ColumnRole::is_alpha(name)).collect();
+    let colors = fields
+        .iter()
+        .filter(|(name, _)| matches!(ColumnRole::from_name(name), Some(ColumnRole::Color(_))));
+    let float_range = ColorRange::from_floats(colors.flat_map(|(_, field)| {
+        sample.chunks_exact(stride).map(|record| field.value(record, big_endian))
+    }));
+    let names: Vec<&str> = fields.iter().map(|(name, _)| *name).collect();
+    let mut columns: Vec<ColumnField> = Vec::new();
+    for (mut role, (name, mut field)) in ColumnRole::from_names(&names).into_iter().zip(fields) {
+        let number_type = field.file_type;
+        let holds_classes = || {
+            let records = sample.chunks_exact(stride);
+            records.into_iter().all(|record| is_byte(field.value(record, big_endian)))
+        };
+        if role == ColumnRole::Classification && number_type != NumberType::U8 && !holds_classes() {
+            role = ColumnRole::Scalar(name.into());
+        }
+        let range = match number_type {
+            NumberType::F32 | NumberType::F64 => float_range,
+            NumberType::U16 => ColorRange::Bits16,
+            _ => ColorRange::Bits8,
+        };
+        if let ColumnRole::Color(_) = role {
+            field.scale = range.scale();
+        } else if ColumnRole::is_alpha(name) {
+            role = ColumnRole::Scalar("alpha".into());
+            field.scale = range.scale() / 65535.0;
+        }
+        columns.push(ColumnField { role, field });
+    }
+    columns
+}

@@ -1,0 +1,32 @@
+//! Fuzzes the E57 reader, with the bytes as they are and with valid checksums and length.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use surfel_core::progress::NoProgress;
+use surfel_formats::{LoadOptions, load_bytes};
+
+const PAGE_LENGTH: usize = 1024;
+
+fuzz_target!(|bytes: &[u8]| {
+    for bytes in [bytes.to_vec(), repaired(bytes)] {
+        if let Ok(loaded) = load_bytes("fuzz.e57", &bytes, &LoadOptions::default(), &NoProgress) {
+            // A point has at least one bit.
+            assert!(loaded.cloud.len() <= 8 * bytes.len() + 1);
+        }
+    }
+});
+
+/// Returns whole pages that begin like a valid file and have valid checksums.
+fn repaired(bytes: &[u8]) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    bytes.resize(bytes.len().max(1).next_multiple_of(PAGE_LENGTH), 0);
+    let length = bytes.len() as u64;
+    bytes[..16].copy_from_slice(b"ASTM-E57\x01\0\0\0\0\0\0\0");
+    bytes[16..24].copy_from_slice(&length.to_le_bytes());
+    bytes[40..48].copy_from_slice(&(PAGE_LENGTH as u64).to_le_bytes());
+    for page in bytes.chunks_exact_mut(PAGE_LENGTH) {
+        let checksum = crc32c::crc32c(&page[..PAGE_LENGTH - 4]).to_be_bytes();
+        page[PAGE_LENGTH - 4..].copy_from_slice(&checksum);
+    }
+    bytes
+}
