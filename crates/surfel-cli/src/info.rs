@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use surfel::resolve::{MemoryEstimate, up_convention};
 use surfel_core::math::Vec3;
-use surfel_core::points::{PointCloud, Subsample, infer_up, spacing};
+use surfel_core::points::{PointCloud, STATION, ScanStation, Subsample, infer_up, spacing};
 use surfel_core::progress::Progress;
 use surfel_formats::{LoadOptions, Loaded, TextColumn};
 
@@ -74,9 +74,27 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
         "resolution": source.resolution.map(|step| step.to_array()),
         "coordinate_system": source.coordinate_system,
         "up": { "axis": up.up.to_array(), "reason": up.reason },
+        "stations": stations(cloud),
         "columns": columns(cloud),
         "columns_in_file": source.columns,
     }))
+}
+
+/// Scans with the places of their scanners and their numbers of points.
+fn stations(cloud: &PointCloud) -> Vec<Value> {
+    let mut n_points = vec![0u64; cloud.stations.len()];
+    match cloud.scalar(STATION) {
+        Some(indices) => (0..cloud.len()).for_each(|i| {
+            n_points.get_mut(indices.get(i) as usize).into_iter().for_each(|n| *n += 1);
+        }),
+        None => n_points.iter_mut().for_each(|n| *n = cloud.len() as u64),
+    }
+    let stations = cloud.stations.iter().zip(n_points);
+    let describe = |(station, n_points): (&ScanStation, u64)| {
+        let position = station.position.map(|position| position.to_array());
+        json!({ "name": station.name, "position": position, "points": n_points })
+    };
+    stations.map(describe).collect()
 }
 
 /// Columns by name with their least and greatest values.
@@ -124,6 +142,11 @@ fn table(info: &Value) -> String {
     row("resolution", text(&info["resolution"]));
     row("coordinates", text(&info["coordinate_system"]));
     row("up", text(&info["up"]["reason"]));
+    for (place, station) in info["stations"].as_array().into_iter().flatten().enumerate() {
+        let title = if place == 0 { "stations" } else { "" };
+        let (name, points) = (text(&station["name"]), text(&station["points"]));
+        row(title, format!("{name:<24}{points} points, scanner at {}", text(&station["position"])));
+    }
     for (place, (name, range)) in info["columns"].as_object().into_iter().flatten().enumerate() {
         let title = if place == 0 { "columns" } else { "" };
         row(title, format!("{name:<24}{}", range_text(range)));

@@ -120,3 +120,44 @@ fn camera_lock_stops_the_camera_animation() {
     let held = shot(&folder, &[&orbit, "--camera-lock"]);
     assert_eq!(shot(&folder, &[&dry_run, "--time", "1"]), held);
 }
+
+#[test]
+fn the_camera_stands_at_a_named_station() {
+    let folder = Folder::new();
+    let scan = |x: f64, cells: &str| {
+        format!("4\n1\n{x} 0 1\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n{x} 0 1 1\n{cells}")
+    };
+    // From the first station most far points lie in the west, from the second in the east.
+    let text = scan(0.0, "-9 -1 0 1\n-9 1 0 1\n1 1 0 1\n0 0 0 0.5\n")
+        + &scan(50.0, "9 1 0 1\n9 -1 0 1\n9 0 0 1\n-1 0 0 1\n");
+    let file = folder.write("site.ptx", text);
+    let camera = dry_run_camera("render", &file, &["--camera-station", "SCAN 1"]);
+    assert_near(&camera["position"], [0.0, 0.0, 1.0]);
+    assert_eq!(camera["view_angle"], json!(60.0));
+    let looks_east = |camera: &Value| 0.0 < camera["focal_point"][0].as_f64().unwrap() - 50.0;
+    let second = ["--camera-station", "scan 2"];
+    assert!(looks_east(&dry_run_camera("render", &file, &second)));
+    let turned = [&second[..], &["--camera-azimuth-angle", "180"]].concat();
+    assert!(!looks_east(&dry_run_camera("render", &file, &turned)));
+    let around = dry_run_camera("render", &file, &[&second[..], &["--camera-panorama"]].concat());
+    assert_near(&around["position"], [50.0, 0.0, 1.0]);
+
+    let message = fail(&["render", &file, "-o", "no.png", "--camera-station", "tower"], 2);
+    assert!(message.contains("no station `tower`; there is scan 1, scan 2"), "{message}");
+    let both = fail(
+        &[
+            "render",
+            &file,
+            "-o",
+            "no.png",
+            "--camera-station",
+            "scan 1",
+            "--camera-position",
+            "0,0,0",
+        ],
+        2,
+    );
+    assert!(both.contains("camera-position") || both.contains("camera.position"), "{both}");
+    let info = succeed(&["info", &file]);
+    assert!(info.contains("scan 2") && info.contains("4 points, scanner at 50, 0, 1"), "{info}");
+}

@@ -23,6 +23,8 @@ pub enum Orientation {
     None,
     /// Toward a point in world coordinates, as a scanner's position.
     Viewpoint(DVec3),
+    /// Toward the station of each point's scan. Normals of points whose station is not known stay.
+    Station,
     /// Toward +Z, as for airborne scans.
     Up,
     /// Propagated along a minimum spanning tree from neighbour to neighbour, the most parallel first (Hoppe et al.
@@ -50,6 +52,12 @@ pub fn orient(
                 (viewpoint - cloud.positions[i].as_dvec3()).dot(normal.as_dvec3()) < 0.0
             }))
         }
+        Orientation::Station => Ok(flip_if(normals, |i, normal| {
+            let station = cloud.station_of(i).and_then(|station| station.position);
+            station.is_some_and(|station| {
+                (station - cloud.world_position(i)).dot(normal.as_dvec3()) < 0.0
+            })
+        })),
         Orientation::Up => Ok(flip_if(normals, |_, normal| normal.z < 0.0)),
         Orientation::SpanningTree => by_spanning_tree(&cloud.positions, normals, progress),
     }
@@ -245,6 +253,7 @@ impl FromStr for Orientation {
         };
         let orientation = match text.split_once(':').unwrap_or((text, "")) {
             ("none", "") => Some(Self::None),
+            ("station", "") => Some(Self::Station),
             ("up", "") => Some(Self::Up),
             ("mst", "") => Some(Self::SpanningTree),
             ("viewpoint", numbers) => viewpoint(numbers),
@@ -253,7 +262,7 @@ impl FromStr for Orientation {
         orientation.ok_or_else(|| Error::Setting {
             name: "orientation",
             found: text.to_owned(),
-            expected: "none, up, mst or viewpoint:x,y,z",
+            expected: "none, station, up, mst or viewpoint:x,y,z",
         })
     }
 }
@@ -264,6 +273,7 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
+    use crate::points::{STATION, Scalar, ScanStation, Values};
     use crate::progress::NoProgress;
 
     /// Two separate balls, with a third of their outward normals flipped.
@@ -319,6 +329,21 @@ mod tests {
         assert_eq!(found, [Vec3::X, -Vec3::X]);
         let found = orient(&cloud, vec![-Vec3::Z, Vec3::Z], Orientation::Up, &NoProgress).unwrap();
         assert_eq!(found, [Vec3::Z; 2]);
+    }
+
+    #[test]
+    fn normals_point_to_the_station_of_their_scan() {
+        let station = |x: f64| ScanStation { name: String::new(), position: Some(DVec3::X * x) };
+        let unknown = ScanStation { name: String::new(), position: None };
+        let indices = Values::U16(vec![0, 1, 2]);
+        let cloud = PointCloud {
+            origin: DVec3::new(1e6, 0.0, 0.0),
+            stations: vec![station(0.0), station(2e6), unknown],
+            scalars: vec![Scalar { name: STATION.into(), values: indices }],
+            ..PointCloud::from_positions(vec![Vec3::ZERO; 3])
+        };
+        let found = orient(&cloud, vec![Vec3::X; 3], Orientation::Station, &NoProgress).unwrap();
+        assert_eq!(found, [-Vec3::X, Vec3::X, Vec3::X]);
     }
 
     #[test]

@@ -38,7 +38,7 @@ pub use interior::{Room, find_room};
 pub use light::{Light, PunctualLight, PunctualLightKind, Sky, Sun};
 pub use material::{AlphaMode, Material, MaterialTextures};
 pub use mesh::Mesh;
-pub use station::{StationView, find_depth_camera, find_station};
+pub use station::{StationView, find_depth_camera, find_station, view_from_station};
 pub use texture::{Texture, TextureEncoding, TextureRef, Wrap};
 
 pub use crate::points::{Morph, Skin};

@@ -73,24 +73,48 @@ struct PolarPoint {
     elevation_rad: f32,
 }
 
-/// Returns the station of `cloud` at the zero of its world coordinates, or `None` if its points are not those of a
-/// scanner that stood there: they surround it, at many distances, and are dense in angle rather than in area.
+/// Returns the station of `cloud`, which is at the place that its file states or else at the zero of its world
+/// coordinates, or `None` if its points are not those of a scanner that stood there: they surround it, at many
+/// distances, and are dense in angle rather than in area.
 pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
-    let zero = (-cloud.origin).as_vec3();
+    let position = match &cloud.stations[..] {
+        [station] => station.position.unwrap_or_default(),
+        _ => DVec3::ZERO,
+    };
+    let scanner = (position - cloud.origin).as_vec3();
     let points = sample(cloud);
     let bounds = Aabb::of_points(points.iter().copied());
-    let is_within = bounds.min.cmplt(zero).all() && zero.cmplt(bounds.max).all();
+    let is_within = bounds.min.cmplt(scanner).all() && scanner.cmplt(bounds.max).all();
     if !is_within || points.len() < MIN_POINTS {
         return None;
     }
-    let points = polar_points(zero, &points, up);
+    let points = polar_points(scanner, &points, up);
     let [near, median, far] = distances(&points)?;
     let is_scan = MIN_DISTANCE_RATIO * near <= far
         && MIN_SECTORS <= n_filled_sectors(&points)
         && density_slope(&points)? < MAX_DENSITY_SLOPE
         && spread_within_cells(&points) < MAX_SPREAD_WITHIN_CELLS;
     is_scan.then(|| StationView {
-        position: DVec3::ZERO,
+        position,
+        direction: longest_view(&points, median, up),
+        distance: median.into(),
+        view_angle_deg: VIEW_ANGLE_DEG,
+    })
+}
+
+/// Returns the view from a station of `cloud` along its longest view, or `None` if its position is not known. Without
+/// points, the view is to the north.
+pub fn view_from_station(cloud: &PointCloud, station_idx: usize, up: Vec3) -> Option<StationView> {
+    let station = cloud.stations.get(station_idx)?;
+    let position = station.position?;
+    let is_measured_here =
+        |i: &usize| cloud.station_of(*i).is_some_and(|other| std::ptr::eq(other, station));
+    let points = sample_indices(cloud).filter(is_measured_here).map(|i| cloud.positions[i]);
+    let points: Vec<Vec3> = points.collect();
+    let points = polar_points((position - cloud.origin).as_vec3(), &points, up);
+    let [_, median, _] = distances(&points).unwrap_or([1.0; 3]);
+    Some(StationView {
+        position,
         direction: longest_view(&points, median, up),
         distance: median.into(),
         view_angle_deg: VIEW_ANGLE_DEG,
@@ -126,17 +150,21 @@ pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
     })
 }
 
-/// Returns points at about equal steps. The steps vary a little, so that they do not follow the rings or columns in
-/// which scanners order their points.
+/// Returns the valid ones of points at about equal steps.
 fn sample(cloud: &PointCloud) -> Vec<Vec3> {
+    sample_indices(cloud).map(|i| cloud.positions[i]).collect()
+}
+
+/// Returns the indices of valid points at about equal steps. The steps vary a little, so that they do not follow the
+/// rings or columns in which scanners order their points.
+fn sample_indices(cloud: &PointCloud) -> impl Iterator<Item = usize> {
     let step = cloud.len().div_ceil(MAX_SAMPLES).max(1);
     let starts = (0..cloud.len()).step_by(step).enumerate();
-    let jittered = starts.map(|(i, start)| {
+    let jittered = starts.map(move |(i, start)| {
         let golden = (i as u32).wrapping_mul(0x9e37_79b9);
         start + ((u64::from(golden) * step as u64) >> 32) as usize
     });
-    let positions = jittered.filter_map(|i| cloud.positions.get(i));
-    positions.copied().filter(|p| is_valid_position(*p)).collect()
+    jittered.filter(|i| cloud.positions.get(*i).copied().is_some_and(is_valid_position))
 }
 
 /// Returns the points as measured from `station`, without missing measurements, which lie at the station itself.
@@ -240,6 +268,7 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
+    use crate::points::{STATION, Scalar, ScanStation, Values};
     use crate::progress::NoProgress;
     use crate::scanner::scenes::street;
     use crate::scanner::{Instrument, SpinningLidar, TerrestrialSurvey};
@@ -350,6 +379,32 @@ mod tests {
         let mut moved = cloud;
         moved.origin = DVec3::new(0.0, 0.0, -20.0);
         assert_eq!(find_depth_camera(&moved, Vec3::NEG_Y), None);
+    }
+
+    #[test]
+    fn stated_stations_are_looked_from() {
+        let mut cloud = street_sweep(40.0);
+        let moved = DVec3::new(500_000.0, 4_900_000.0, 80.0);
+        let zero_based = find_station(&cloud, Vec3::Z).unwrap();
+        cloud.origin += moved;
+        assert_eq!(find_station(&cloud, Vec3::Z), None);
+        let unknown = ScanStation { name: "unknown".into(), position: None };
+        cloud.stations = vec![ScanStation { name: "street".into(), position: Some(moved) }];
+        let station = find_station(&cloud, Vec3::Z).unwrap();
+        assert_eq!(station, StationView { position: moved, ..zero_based });
+        cloud.stations.push(unknown);
+        let column = Values::U16((0..cloud.len()).map(|i| (i % 2) as u16).collect());
+        cloud.scalars = vec![Scalar { name: STATION.into(), values: column }];
+        let half = view_from_station(&cloud, 0, Vec3::Z).unwrap();
+        assert_eq!(half.direction, station.direction);
+        assert_eq!(view_from_station(&cloud, 1, Vec3::Z), None);
+        cloud.stations.pop();
+        cloud.scalars.clear();
+        assert_eq!(view_from_station(&cloud, 0, Vec3::Z), Some(station));
+        assert_eq!(view_from_station(&cloud, 1, Vec3::Z), None);
+        cloud.positions.clear();
+        let alone = view_from_station(&cloud, 0, Vec3::Z).unwrap();
+        assert!(alone.direction.is_finite() && alone.distance == 1.0, "{alone:?}");
     }
 
     #[test]

@@ -18,6 +18,17 @@ const EXCLUSIVE: &[(&str, &[&str])] = &[
     ("camera.direction", &["camera.azimuth_angle", "camera.elevation_angle"]),
     ("camera.position", &["camera.zoom_factor"]),
     (
+        "camera.station",
+        &[
+            "camera.position",
+            "camera.orthographic",
+            "camera.direction",
+            "camera.elevation_angle",
+            "camera.zoom_factor",
+            "camera.name",
+        ],
+    ),
+    (
         "camera.name",
         &[
             "camera.position",

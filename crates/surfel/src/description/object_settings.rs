@@ -58,7 +58,8 @@ settings! {
         normals_k: u32, count(2, 10_000), "K";
         /// Estimates normals from all neighbours within this distance in world units.
         normals_radius: f64, POSITIVE, "LENGTH";
-        /// Front side of the surface: none, up, mst or viewpoint:X,Y,Z.
+        /// Front side of the surface: none, station (toward the scanner of each scan, of E57 and PTX files), up, mst or
+        /// viewpoint:X,Y,Z.
         orient: Orientation = Orientation::default(), parsed(orientation_text), "RULE";
         /// Radius of each point's surface: a length, adaptive[:K] or median[:N] [default: that of the file, or
         /// adaptive:12].
@@ -279,6 +280,7 @@ fn method_name(method: &NeighborMethod) -> String {
 fn orientation_text(orientation: &Orientation) -> String {
     match orientation {
         Orientation::None => "none".into(),
+        Orientation::Station => "station".into(),
         Orientation::Up => "up".into(),
         Orientation::SpanningTree => "mst".into(),
         Orientation::Viewpoint(point) => format!("viewpoint:{},{},{}", point.x, point.y, point.z),

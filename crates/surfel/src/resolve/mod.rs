@@ -35,7 +35,7 @@ use complete_description::complete_description;
 use interior::{choose_room, hidden_walls};
 use point_size::choose_point_size;
 use spread::report_gaps;
-use station::choose_station;
+use station::{choose_station, stand_at_station};
 use sun_and_sky::{LightingContext, choose_lights, lights};
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
@@ -106,6 +106,9 @@ impl AutoSettings {
     ) -> Result<Self> {
         let points = scene.sample_points();
         let up = choose_up(description.world.up, &points, &scene.file_infos, progress);
+        let clouds = scene.clouds().map(|(_, cloud)| cloud);
+        let camera = stand_at_station(&description.camera, clouds, up)?;
+        let description = &SceneDescription { camera, ..description.clone() };
         let bounds = inlier_bounds(&points);
         report_gaps(&points, progress);
         let room = choose_room(scene, description, &points, up);
