@@ -28,7 +28,7 @@ pub struct Args {
     /// The prepared cloud: .ply (all columns), .las or .laz.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Adds normals. Without this, --radius, --orient, --subsample, --remove-outliers, --denoise and
+    /// Adds normals. Without this, --radius, --orient, --filter, --class, --returns, --subsample, --remove-outliers, --denoise and
     /// --keep-variation: normals and radii.
     #[arg(long, help_heading = "Preparation")]
     normals: bool,
@@ -50,6 +50,7 @@ const EXAMPLES: &str = "\
 Examples:
   surfel prepare scan.laz -o ready.ply                                normals and radii
   surfel prepare scan.laz -o thin.laz --subsample spacing:0.1         fewer points, nothing else
+  surfel prepare scan.laz -o ground.laz --class ground                points of a class
   surfel prepare scan.laz -o kept.laz --remove-outliers statistical   without points that stand alone
   surfel prepare scan.laz -o calm.laz --denoise on                    points moved onto their surface
   surfel prepare scan.laz -o ready.ply --normals-k 24 --orient mst
@@ -161,6 +162,7 @@ fn columns(args: &Args, settings: &ObjectSettings) -> Columns {
     };
     let is_empty = !columns.normals && !columns.radii && !columns.variation;
     let has_other_steps = preparation.subsample.is_some()
+        || preparation.point_filter().is_some()
         || preparation.remove_outliers.is_some()
         || preparation.denoise.is_some();
     if is_empty && !has_other_steps {

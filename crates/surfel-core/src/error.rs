@@ -61,6 +61,16 @@ pub enum Error {
         /// The values that are allowed.
         expected: &'static str,
     },
+    /// A filter of points is not written as it should be.
+    #[error("filter, character {character}: found {found}, expected {expected}")]
+    Filter {
+        /// Character of the filter, counted from 1.
+        character: usize,
+        /// Text that was found there.
+        found: String,
+        /// Text that was expected.
+        expected: &'static str,
+    },
     /// No entry of a list of named things has the given name.
     #[error("unknown {kind} '{found}'; known: {known}")]
     UnknownName {

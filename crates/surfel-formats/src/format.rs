@@ -47,7 +47,7 @@ pub(crate) enum Reader {
     Scene(ReadScene),
 }
 
-type ReadPoints = fn(&Input, &LoadOptions, &dyn Progress) -> Result<Loaded>;
+pub(crate) type ReadPoints = fn(&Input, &LoadOptions, &dyn Progress) -> Result<Loaded>;
 type ReadMesh =
     fn(&Input, &ResourceResolver, &LoadOptions, &dyn Progress) -> Result<(Model, FileInfo)>;
 type ReadScene = fn(

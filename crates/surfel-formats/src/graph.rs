@@ -8,6 +8,7 @@ use surfel_core::scene::{Geometry, Graph, Material, Node, Primitive, Texture};
 
 use crate::error::Result;
 use crate::file::{Input, ResourceResolver};
+use crate::filtered::read_filtered;
 use crate::format::{self, Reader, detect};
 use crate::options::{FileInfo, LoadOptions, Loaded};
 
@@ -86,7 +87,7 @@ fn read(
         }
         Reader::Points(read_points) | Reader::Mesh { read_points, .. } => read_points,
     };
-    let Loaded { cloud, info } = read_points(input, options, progress)?;
+    let Loaded { cloud, info } = read_filtered(*read_points, input, options, progress)?;
     let points = Geometry::Points(cloud);
     Ok((graph_of(input, vec![(points, Material::MATTE)], Vec::new()), info))
 }

@@ -42,6 +42,7 @@ mod bin;
 mod gltf;
 mod merge;
 mod format;
+mod filtered;
 mod load;
 mod graph;
 mod save;

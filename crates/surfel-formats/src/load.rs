@@ -6,6 +6,7 @@ use surfel_core::progress::Progress;
 
 use crate::error::{Error, Result};
 use crate::file::{Input, ResourceResolver};
+use crate::filtered::read_filtered;
 use crate::format::{Reader, detect};
 use crate::gltf;
 use crate::merge::merge_loaded;
@@ -71,7 +72,7 @@ fn read_points(
     progress.check()?;
     match &detect(input)?.read {
         Reader::Points(read_points) | Reader::Mesh { read_points, .. } => {
-            read_points(input, options, progress)
+            read_filtered(*read_points, input, options, progress)
         }
         Reader::Scene(read) => Ok(gltf::merge_points(read(input, resolver, None, progress)?)),
     }

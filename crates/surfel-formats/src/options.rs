@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use surfel_core::math::DVec3;
-use surfel_core::points::PointCloud;
+use surfel_core::points::{PointCloud, PointFilter};
 
 use crate::table::{ColumnChoice, TextColumn};
 
@@ -14,6 +14,8 @@ pub struct LoadOptions {
     pub columns: ColumnChoice,
     /// The columns of a text file, in order; inferred from the file if absent.
     pub text_columns: Option<Vec<TextColumn>>,
+    /// Condition that points must meet to be kept; all are kept if absent.
+    pub filter: Option<PointFilter>,
     /// World coordinates of the zero of the positions; chosen from the data if absent.
     pub origin: Option<DVec3>,
     /// Name of the animation to take from glTF files that have any; the first if absent.

@@ -10,7 +10,9 @@ use crate::error::{Location, Result};
 use crate::file::{Input, ResourceResolver};
 use crate::mesh::{Model, relative_to_origin, repair_model, weld};
 use crate::options::{FileInfo, LoadOptions, Loaded};
-use crate::table::{LineError, ParseFault, TextChunk, Tolerance, parse_chunks, parse_number};
+use crate::table::{
+    LineError, ParseFault, TextChunk, Tolerance, keep_matching, parse_chunks, parse_number,
+};
 
 /// Bytes of free text at the start of a binary file; the number of triangles follows.
 const HEADER: usize = 80;
@@ -32,7 +34,10 @@ pub(crate) fn read(
     progress: &dyn Progress,
 ) -> Result<Loaded> {
     let (mesh, info) = read_triangles(input, options, progress)?;
-    let cloud = PointCloud { origin: mesh.origin, ..PointCloud::from_positions(mesh.positions) };
+    let mut cloud =
+        PointCloud { origin: mesh.origin, ..PointCloud::from_positions(mesh.positions) };
+    let info = FileInfo { n_points: Some(cloud.len() as u64), ..info };
+    keep_matching(&mut cloud, 0, options.filter.as_ref())?;
     Ok(Loaded { cloud, info })
 }
 

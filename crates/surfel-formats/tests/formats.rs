@@ -20,6 +20,8 @@ mod text;
 mod las_point_formats;
 #[path = "formats/real_scans.rs"]
 mod real_scans;
+#[path = "formats/filters.rs"]
+mod filters;
 #[path = "formats/round_trip.rs"]
 mod round_trip;
 #[path = "formats/malformed.rs"]

@@ -141,6 +141,7 @@ fn prepare_adds_the_requested_columns_or_all() {
     assert_eq!(columns(&["--orient", "mst"]), (900, [true, false, false]));
     assert_eq!(columns(&["--keep-variation"]), (900, [false, false, true]));
     assert_eq!(columns(&["--subsample", "first:10"]), (10, [false, false, false]));
+    assert_eq!(columns(&["--filter", "rain >= 0 && x > -1e9"]), (900, [false, false, false]));
     assert_eq!(columns(&["--remove-outliers", "radius:1e9,1"]), (900, [false, false, false]));
     assert_eq!(columns(&["--denoise", "on"]), (900, [false, false, false]));
 }
@@ -154,6 +155,39 @@ fn info_prints_a_table_or_json() {
     let both: Value = serde_json::from_str(&succeed(&["info", "--json", &cloud, &cloud])).unwrap();
     assert_eq!(both.as_array().unwrap().len(), 2);
     assert_eq!(both[0]["bounds"]["min"][0], -1.0);
+}
+
+#[test]
+fn points_are_chosen_by_their_columns() {
+    let folder = Folder::new();
+    let lines: String =
+        (0..100).map(|i| format!("{i},{},0,{},{},{}\n", i % 10, 2 + i % 5, 1 + i % 2, 2)).collect();
+    let header = "x,y,z,classification,return_number,number_of_returns\n";
+    let cloud = folder.write("returns.csv", [header, &lines].concat());
+    let kept = folder.path("kept.las");
+    let n_kept = |options: &[&str]| {
+        let arguments = [&["prepare", &cloud, "-o", &kept], options].concat();
+        let output = surfel(&arguments);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{message}");
+        let info: Value = serde_json::from_str(&succeed(&["info", "--json", &kept])).unwrap();
+        let n_points = info["points"].as_u64().unwrap();
+        assert!(message.contains(&format!("{n_points} of 100 points meet")), "{message}");
+        n_points
+    };
+    assert_eq!(n_kept(&["--filter", "x < 30 && y != 0"]), 27);
+    assert_eq!(n_kept(&["--class", "ground,6"]), 40);
+    assert_eq!(n_kept(&["--class", "2", "--returns", "last"]), 10);
+    assert_eq!(n_kept(&["--returns", "first", "--filter", "x[:9]"]), 5);
+
+    let none = fail(&["render", &cloud, "-o", &folder.path("no.png"), "--filter", "x > 1000"], 1);
+    assert!(none.contains("0 of 100 points meet x > 1000") && none.contains("no points"), "{none}");
+    let unknown = fail(&["prepare", &cloud, "-o", &kept, "--filter", "clas == 2"], 1);
+    assert!(unknown.contains("'clas'") && unknown.contains("classification"), "{unknown}");
+    let broken = fail(&["prepare", &cloud, "-o", &kept, "--filter", "x = 2"], 2);
+    assert!(broken.contains("character 3: found `=`"), "{broken}");
+    let class = fail(&["prepare", &cloud, "-o", &kept, "--class", "gras"], 2);
+    assert!(class.contains("as in 2,6 or ground,building"), "{class}");
 }
 
 #[test]

@@ -168,6 +168,26 @@ impl PointCloud {
         }
     }
 
+    /// Drops the points from `start` on for which `keep` is false, in place.
+    pub fn retain_from(&mut self, start: usize, keep: &[bool]) {
+        retain(&mut self.positions, start, keep);
+        self.normals.iter_mut().for_each(|column| retain(column, start, keep));
+        self.radii.iter_mut().for_each(|column| retain(column, start, keep));
+        self.colors.iter_mut().for_each(|column| retain(column, start, keep));
+        self.intensity.iter_mut().for_each(|column| retain(column, start, keep));
+        self.classification.iter_mut().for_each(|column| retain(column, start, keep));
+        self.source_indices.iter_mut().for_each(|column| retain(column, start, keep));
+        for scalar in &mut self.scalars {
+            match &mut scalar.values {
+                Values::U8(column) => retain(column, start, keep),
+                Values::U16(column) => retain(column, start, keep),
+                Values::I32(column) => retain(column, start, keep),
+                Values::F32(column) => retain(column, start, keep),
+                Values::F64(column) => retain(column, start, keep),
+            }
+        }
+    }
+
     /// Returns an origin for points at these world positions: their median, rounded to whole units.
     ///
     /// An outlier does not move the median, as it does the middle of the bounds.
@@ -196,6 +216,16 @@ impl PointCloud {
         }
         self.origin = origin;
     }
+}
+
+/// Drops the entries from `start` on for which `keep` is false.
+fn retain<T: Copy>(column: &mut Vec<T>, start: usize, keep: &[bool]) {
+    let mut end = start;
+    for (i, _) in keep.iter().enumerate().filter(|(_, is_kept)| **is_kept) {
+        column[end] = column[start + i];
+        end += 1;
+    }
+    column.truncate(end);
 }
 
 impl AsRef<PointCloud> for PointCloud {

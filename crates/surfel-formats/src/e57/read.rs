@@ -47,7 +47,7 @@ pub(crate) fn read(
     let roles: Vec<ColumnRole> = columns.iter().map(|(role, _)| role.clone()).collect();
 
     let layout_of = |_: &[u8]| layout(&columns, options);
-    let mut builder = CloudBuilder::new(input, layout_of, options.origin);
+    let mut builder = CloudBuilder::new(input, layout_of, options.origin, options.filter.as_ref());
     let mut n_scan_points = Vec::new();
     let n_invalid = AtomicU64::new(0);
     let n_points = document.scans.iter().fold(0, |sum: u64, scan| sum.saturating_add(scan.records));

@@ -16,8 +16,8 @@ use crate::error::{Error, Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::table::{
-    ColumnChoice, ColumnRole, ColumnSlices, RecordLayout, choose_origin, grow_checked,
-    read_records, sample_positions,
+    ColumnChoice, ColumnRole, ColumnSlices, FILTERED_POINTS_PER_BATCH, RecordLayout, choose_origin,
+    grow_checked, keep_matching, read_records, sample_positions, shrink,
 };
 
 /// Reads the header.
@@ -49,15 +49,16 @@ pub(crate) fn read(
             header: &header,
             layout: &layout,
             origin,
+            options,
             n_withheld: &n_withheld,
         };
-        reader.read_chunks(&chunks, selection(&options.columns), progress)?
+        reader.read_chunks(&chunks, progress)?
     } else {
         let records = uncompressed_records(input, &header)?;
         let origin = origin_of(sample_positions(records, &layout));
         progress.begin(&format!("read {}", input.name), header.n_points);
         n_withheld.store(count_withheld(records, &header), Ordering::Relaxed);
-        read_records(input, records, &layout, origin, progress)?
+        read_records(input, records, &layout, origin, options.filter.as_ref(), progress)?
     };
     let n_withheld = n_withheld.into_inner();
     if 0 < n_withheld {
@@ -110,25 +111,51 @@ struct ChunkReader<'a> {
     header: &'a Header,
     layout: &'a RecordLayout,
     origin: DVec3,
+    options: &'a LoadOptions,
     n_withheld: &'a AtomicU64,
 }
 
 impl ChunkReader<'_> {
-    fn read_chunks(
-        &self,
-        chunks: &Chunks,
-        selection: DecompressionSelection,
-        progress: &dyn Progress,
-    ) -> Result<PointCloud> {
+    fn read_chunks(&self, chunks: &Chunks, progress: &dyn Progress) -> Result<PointCloud> {
         progress.begin(&format!("read {}", self.input.name), self.header.n_points);
         let mut cloud = self.layout.empty_cloud(self.origin);
-        grow_checked(&mut cloud, self.header.n_points as usize, self.input)?;
-        let mut rest = ColumnSlices::from_cloud(&mut cloud, 0);
-        let tasks: Vec<(&Chunk, ColumnSlices)> = chunks
-            .chunks
-            .iter()
-            .map(|chunk| (chunk, rest.split_off_front(chunk.n_points)))
-            .collect();
+        if self.options.filter.is_none() {
+            self.append_chunks(&mut cloud, chunks, &chunks.chunks, progress)?;
+            return Ok(cloud);
+        }
+        let mut rest = &chunks.chunks[..];
+        while !rest.is_empty() {
+            let mut n_points = 0;
+            let is_in_batch = |chunk: &&Chunk| {
+                n_points += chunk.n_points;
+                n_points <= FILTERED_POINTS_PER_BATCH
+            };
+            let n_chunks = rest.iter().take_while(is_in_batch).count().max(1);
+            let (batch, after) = rest.split_at(n_chunks);
+            let n_before = cloud.len();
+            self.append_chunks(&mut cloud, chunks, batch, progress)?;
+            keep_matching(&mut cloud, n_before, self.options.filter.as_ref())?;
+            rest = after;
+        }
+        shrink(&mut cloud);
+        Ok(cloud)
+    }
+
+    /// Decodes some of the chunks to the end of a cloud.
+    fn append_chunks(
+        &self,
+        cloud: &mut PointCloud,
+        chunks: &Chunks,
+        batch: &[Chunk],
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let selection = selection(&self.options.columns);
+        let n_before = cloud.len();
+        let n_new: usize = batch.iter().map(|chunk| chunk.n_points).sum();
+        grow_checked(cloud, n_before + n_new, self.input)?;
+        let mut rest = ColumnSlices::from_cloud(cloud, n_before);
+        let tasks: Vec<(&Chunk, ColumnSlices)> =
+            batch.iter().map(|chunk| (chunk, rest.split_off_front(chunk.n_points))).collect();
         tasks.into_par_iter().with_max_len(1).try_for_each(|(chunk, mut slices)| {
             chunks.decode(self.input, chunk, selection, |records| {
                 progress.check()?;
@@ -139,8 +166,7 @@ impl ChunkReader<'_> {
                 progress.advance(n_points as u64);
                 Ok(())
             })
-        })?;
-        Ok(cloud)
+        })
     }
 }
 

@@ -39,8 +39,16 @@ pub(crate) fn read(
     let parse = |line: &[u8], row: &mut Vec<f64>| parse_vertex(line, n_columns, row);
     let rows = RowRange { start: 0, end: None, line: 1, n_columns, limit: None };
     progress.begin(&format!("read {}", input.name), input.len() as u64);
-    let cloud = read_rows(input, rows, &parse, layout_of, options.origin, progress)?;
-    let info = FileInfo { n_points: Some(cloud.len() as u64), ..file_info(n_columns) };
+    let (cloud, n_points) = read_rows(
+        input,
+        rows,
+        &parse,
+        layout_of,
+        options.origin,
+        options.filter.as_ref(),
+        progress,
+    )?;
+    let info = FileInfo { n_points: Some(n_points), ..file_info(n_columns) };
     Ok(Loaded { cloud, info })
 }
 

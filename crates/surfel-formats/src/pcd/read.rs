@@ -129,7 +129,7 @@ fn read_binary(
         _ => Tolerance::F32_COORDINATES,
     };
     let origin = options.origin.unwrap_or_else(|| origin_of_records(&records, &layout, tolerance));
-    read_records(input, &records, &layout, origin, progress)
+    read_records(input, &records, &layout, origin, options.filter.as_ref(), progress)
 }
 
 fn read_ascii(
@@ -157,9 +157,17 @@ fn read_ascii(
         layout(stride, columns, options)
     };
     progress.begin(&format!("read {}", input.name), (input.len() - header.body) as u64);
-    let cloud = read_rows(input, rows, &parse, layout_of, options.origin, progress)?;
-    if (cloud.len() as u64) < header.n_points() {
-        return Err(truncated(input, header, cloud.len() as u64));
+    let (cloud, n_rows) = read_rows(
+        input,
+        rows,
+        &parse,
+        layout_of,
+        options.origin,
+        options.filter.as_ref(),
+        progress,
+    )?;
+    if n_rows < header.n_points() {
+        return Err(truncated(input, header, n_rows));
     }
     Ok(cloud)
 }

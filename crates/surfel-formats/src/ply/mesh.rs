@@ -40,7 +40,9 @@ pub(crate) fn read_mesh(
     let scalars = ["alpha"].into_iter().chain(UV_NAMES.into_iter().flatten());
     let columns = scalars.map(|name| Column::Scalar(name.into()));
     let columns = columns.chain([Column::Normals, Column::Colors]).collect();
-    let options = LoadOptions { columns: ColumnChoice::Only(columns), ..options.clone() };
+    // Faces name vertices by their places, so all are read.
+    let columns = ColumnChoice::Only(columns);
+    let options = LoadOptions { columns, filter: None, ..options.clone() };
     let cloud = read_cloud(input, &header, &options, progress)?;
     let faces = read_faces(input, &header, vertex.count, progress)?;
     let mut mesh = Mesh {

@@ -132,7 +132,7 @@ fn read_binary(
     };
     let origin = options.origin.unwrap_or_else(|| origin_of_records(records, &layout, tolerance));
     progress.begin(&format!("read {}", input.name), vertex.count);
-    read_records(input, records, &layout, origin, progress)
+    read_records(input, records, &layout, origin, options.filter.as_ref(), progress)
 }
 
 fn read_ascii(
@@ -164,9 +164,17 @@ fn read_ascii(
             .expect("x, y and z were found")
     };
     progress.begin(&format!("read {}", input.name), (input.len() - start) as u64);
-    let cloud = read_rows(input, rows, &parse, layout_of, options.origin, progress)?;
-    if (cloud.len() as u64) < vertex.count {
-        return Err(vertex.truncated(input, cloud.len() as u64));
+    let (cloud, n_rows) = read_rows(
+        input,
+        rows,
+        &parse,
+        layout_of,
+        options.origin,
+        options.filter.as_ref(),
+        progress,
+    )?;
+    if n_rows < vertex.count {
+        return Err(vertex.truncated(input, n_rows));
     }
     Ok(cloud)
 }

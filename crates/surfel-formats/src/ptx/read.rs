@@ -34,7 +34,7 @@ pub(crate) fn read(
     let scans = find_scans(input, progress)?;
     let roles = roles(input, &scans)?;
     let layout_of = |_: &[u8]| layout(&roles, options);
-    let mut builder = CloudBuilder::new(input, layout_of, options.origin);
+    let mut builder = CloudBuilder::new(input, layout_of, options.origin, options.filter.as_ref());
     let mut n_scan_points = Vec::new();
     let n_empty = AtomicU64::new(0);
     progress.begin(&format!("read {}", input.name), input.len() as u64);
@@ -61,6 +61,7 @@ pub(crate) fn read(
         let line = format!("{n_empty} of {n_cells} cells of the scanner's grid are empty; skipped");
         progress.note(&format!("{}: {line}", input.name));
     }
+    let n_points = builder.n_read();
     let mut cloud = builder.finish();
     let stations = scans.iter().enumerate().map(|(i, scan)| ScanStation {
         name: format!("scan {}", i + 1),
@@ -69,7 +70,7 @@ pub(crate) fn read(
     set_stations(&mut cloud, stations.collect(), &n_scan_points);
     let info = FileInfo {
         format: format!("PTX, {}", describe(&scans)),
-        n_points: Some(cloud.len() as u64),
+        n_points: Some(n_points),
         columns: roles.iter().map(|role| role.name().to_owned()).collect(),
         ..FileInfo::default()
     };

@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 use surfel_core::math::DVec3;
-use surfel_core::points::PointCloud;
+use surfel_core::points::{PointCloud, PointFilter};
 
 use super::column_slices::{ColumnSlices, shrink};
 use super::layout::RecordLayout;
-use super::reader::{Tolerance, grow_checked, origin_of_records};
+use super::reader::{Tolerance, grow_checked, keep_matching, origin_of_records};
 use crate::error::Result;
 use crate::file::Input;
 
@@ -16,17 +16,24 @@ pub(crate) struct CloudBuilder<'a, F> {
     pub input: &'a Input<'a>,
     layout_of: F,
     origin: Option<DVec3>,
+    filter: Option<&'a PointFilter>,
     started: Option<(RecordLayout, PointCloud)>,
+    n_read: u64,
 }
 
 impl<'a, F: Fn(&[u8]) -> RecordLayout> CloudBuilder<'a, F> {
-    /// A cloud without points. `layout_of` is called once, with the first records; without an `origin` they also choose
-    /// it.
-    pub fn new(input: &'a Input, layout_of: F, origin: Option<DVec3>) -> Self {
-        Self { input, layout_of, origin, started: None }
+    /// A cloud of points that `filter` keeps. `layout_of` is called once, with the first records; without an `origin`
+    /// they also choose it.
+    pub fn new(
+        input: &'a Input,
+        layout_of: F,
+        origin: Option<DVec3>,
+        filter: Option<&'a PointFilter>,
+    ) -> Self {
+        Self { input, layout_of, origin, filter, started: None, n_read: 0 }
     }
 
-    /// Appends the points of a batch of records.
+    /// Appends the points of a batch of records that the filter keeps.
     pub fn append(&mut self, batch: &[Vec<u8>]) -> Result<()> {
         let Some(sample) = batch.iter().find(|records| !records.is_empty()) else { return Ok(()) };
         let (layout, cloud) = self.started.get_or_insert_with(|| {
@@ -47,10 +54,16 @@ impl<'a, F: Fn(&[u8]) -> RecordLayout> CloudBuilder<'a, F> {
         tasks.into_par_iter().for_each(|(records, mut slices)| {
             layout.decode(records, origin, &mut slices);
         });
-        Ok(())
+        self.n_read += n_new as u64;
+        keep_matching(cloud, n_before, self.filter)
     }
 
-    /// Returns the number of points so far.
+    /// Returns the number of points that were read so far, kept or not.
+    pub fn n_read(&self) -> u64 {
+        self.n_read
+    }
+
+    /// Returns the number of points that were kept so far.
     pub fn n_points(&self) -> usize {
         self.started.as_ref().map_or(0, |(_, cloud)| cloud.len())
     }

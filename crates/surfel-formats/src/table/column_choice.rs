@@ -1,6 +1,8 @@
 //! The columns to read from a file, chosen by the caller.
 
-use super::column_role::ColumnRole;
+use surfel_core::points::{PointCloud, STATION};
+
+use super::column_role::{ColumnRole, plain_name};
 
 /// The columns to keep in memory; positions are always kept.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,7 +27,7 @@ pub enum Column {
     Intensity,
     /// Class of each point.
     Classification,
-    /// The scalar column of this name, whose case does not matter.
+    /// The scalar column of this name, whose case and separators do not matter.
     Scalar(String),
 }
 
@@ -46,9 +48,49 @@ impl ColumnChoice {
             | (Column::Colors, ColumnRole::Color(_))
             | (Column::Intensity, ColumnRole::Intensity)
             | (Column::Classification, ColumnRole::Classification) => true,
-            (Column::Scalar(wanted), ColumnRole::Scalar(name)) => wanted.eq_ignore_ascii_case(name),
+            (Column::Scalar(wanted), ColumnRole::Scalar(name)) => {
+                plain_name(wanted) == plain_name(name)
+            }
             _ => false,
         })
+    }
+
+    /// Returns the choice of these columns and of those with these names.
+    pub(crate) fn with_names(&self, names: &[&str]) -> Self {
+        let Self::Only(columns) = self else { return Self::All };
+        let named = names.iter().filter_map(|name| match ColumnRole::from_name(name) {
+            Some(ColumnRole::Position(_)) => None,
+            Some(ColumnRole::Normal(_)) => Some(Column::Normals),
+            Some(ColumnRole::Color(_)) => Some(Column::Colors),
+            Some(ColumnRole::Radius) => Some(Column::Radii),
+            Some(ColumnRole::Intensity) => Some(Column::Intensity),
+            Some(ColumnRole::Classification) => Some(Column::Classification),
+            Some(ColumnRole::Scalar(_)) | None => Some(Column::Scalar((*name).to_owned())),
+        });
+        Self::Only(columns.iter().cloned().chain(named).collect())
+    }
+
+    /// Drops the columns of `cloud` that are not chosen.
+    pub(crate) fn drop_others(&self, cloud: &mut PointCloud) {
+        let drops = |role: ColumnRole| !self.wants(&role);
+        if drops(ColumnRole::Normal(0)) {
+            cloud.normals = None;
+        }
+        if drops(ColumnRole::Radius) {
+            cloud.radii = None;
+        }
+        if drops(ColumnRole::Color(0)) {
+            cloud.colors = None;
+        }
+        if drops(ColumnRole::Intensity) {
+            cloud.intensity = None;
+        }
+        if drops(ColumnRole::Classification) {
+            cloud.classification = None;
+        }
+        cloud.scalars.retain(|scalar| {
+            scalar.name == STATION || self.wants(&ColumnRole::Scalar(scalar.name.clone()))
+        });
     }
 
     /// Returns true if the choice names this scalar column.

@@ -22,8 +22,7 @@ pub(crate) enum ColumnRole {
 impl ColumnRole {
     /// Returns the role of a column with one of the usual names; case and separators do not matter.
     pub fn from_name(name: &str) -> Option<Self> {
-        let plain: String =
-            name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
+        let plain = plain_name(name);
         Some(match plain.as_str() {
             "x" | "px" | "posx" | "xcoordinate" | "easting" => Self::Position(0),
             "y" | "py" | "posy" | "ycoordinate" | "northing" => Self::Position(1),
@@ -85,6 +84,11 @@ impl ColumnRole {
     pub fn is_alpha(name: &str) -> bool {
         ["alpha", "a", "diffuse_alpha"].contains(&name.to_lowercase().as_str())
     }
+}
+
+/// Returns the letters and digits of a name in lower case, since programs separate words in different ways.
+pub(crate) fn plain_name(name: &str) -> String {
+    name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase()
 }
 
 #[cfg(test)]

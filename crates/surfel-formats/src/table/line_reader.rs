@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use surfel_core::math::DVec3;
-use surfel_core::points::PointCloud;
+use surfel_core::points::{PointCloud, PointFilter};
 use surfel_core::progress::Progress;
 
 use super::cloud_builder::CloudBuilder;
@@ -47,18 +47,21 @@ pub(crate) struct LineError {
 pub(crate) type ParseLine<'a> =
     &'a (dyn Fn(&[u8], &mut Vec<f64>) -> std::result::Result<(), LineError> + Sync);
 
-/// Reads lines to a cloud. `layout_of` is called once, with the first rows as records of f64.
+/// Reads lines to a cloud of the points that `filter` keeps; also returns the number of rows, kept or not. `layout_of` is called once, with the first rows
+/// as records of f64.
 pub(crate) fn read_rows(
     input: &Input,
     rows: RowRange,
     parse: ParseLine,
     layout_of: impl Fn(&[u8]) -> RecordLayout,
     origin: Option<DVec3>,
+    filter: Option<&PointFilter>,
     progress: &dyn Progress,
-) -> Result<PointCloud> {
-    let mut builder = CloudBuilder::new(input, layout_of, origin);
+) -> Result<(PointCloud, u64)> {
+    let mut builder = CloudBuilder::new(input, layout_of, origin, filter);
     append_rows(&mut builder, rows, parse, progress)?;
-    Ok(builder.finish())
+    let n_rows = builder.n_read();
+    Ok((builder.finish(), n_rows))
 }
 
 /// Reads lines to the end of a cloud.

@@ -18,7 +18,7 @@ pub(crate) use chunks::{ParseFault, TextChunk, find_line_end, line_at, parse_chu
 pub(crate) use cloud_builder::CloudBuilder;
 pub(crate) use color_range::{ColorRange, is_byte};
 pub(crate) use column_role::ColumnRole;
-pub(crate) use column_slices::ColumnSlices;
+pub(crate) use column_slices::{ColumnSlices, shrink};
 pub(crate) use encode::{POINTS_PER_CHUNK, encode_points};
 pub(crate) use layout::{ColumnField, Field, NumberType, RecordLayout};
 pub(crate) use line_reader::{
@@ -26,5 +26,6 @@ pub(crate) use line_reader::{
 };
 pub(crate) use named_columns::named_columns;
 pub(crate) use reader::{
-    Tolerance, choose_origin, grow_checked, origin_of_records, read_records, sample_positions,
+    FILTERED_POINTS_PER_BATCH, Tolerance, choose_origin, grow_checked, keep_matching,
+    origin_of_records, read_records, sample_positions,
 };

@@ -2,16 +2,19 @@
 
 use rayon::prelude::*;
 use surfel_core::math::DVec3;
-use surfel_core::points::PointCloud;
+use surfel_core::points::{PointCloud, PointFilter};
 use surfel_core::progress::Progress;
 
-use super::column_slices::{ColumnSlices, grow};
+use super::column_slices::{ColumnSlices, grow, shrink};
 use super::layout::RecordLayout;
 use crate::error::{Error, Result};
 use crate::file::Input;
 
 /// Number of points that a task decodes between two checks for cancellation: some milliseconds of work.
 const POINTS_PER_TASK: usize = 1 << 16;
+
+/// Number of points that are decoded before the filter drops those that are not kept.
+pub(crate) const FILTERED_POINTS_PER_BATCH: usize = 1 << 20;
 
 /// The error of coordinates, in metres, that rounding to f32 may cause before a cloud gets an origin other than zero.
 #[derive(Clone, Copy)]
@@ -24,18 +27,54 @@ impl Tolerance {
     pub const F32_COORDINATES: Self = Self(4e-3);
 }
 
-/// Decodes all of `records` to a cloud.
+/// Decodes those of `records` that `filter` keeps to a cloud.
 pub(crate) fn read_records(
     input: &Input,
     records: &[u8],
     layout: &RecordLayout,
     origin: DVec3,
+    filter: Option<&PointFilter>,
     progress: &dyn Progress,
 ) -> Result<PointCloud> {
-    let n_points = records.len() / layout.stride;
     let mut cloud = layout.empty_cloud(origin);
-    grow_checked(&mut cloud, n_points, input)?;
-    let mut rest = ColumnSlices::from_cloud(&mut cloud, 0);
+    if filter.is_none() {
+        append_decoded(&mut cloud, input, records, layout, progress)?;
+        return Ok(cloud);
+    }
+    for batch in records.chunks(FILTERED_POINTS_PER_BATCH * layout.stride) {
+        let n_before = cloud.len();
+        append_decoded(&mut cloud, input, batch, layout, progress)?;
+        keep_matching(&mut cloud, n_before, filter)?;
+    }
+    shrink(&mut cloud);
+    Ok(cloud)
+}
+
+/// Drops the points from `start` on that `filter` does not keep.
+pub(crate) fn keep_matching(
+    cloud: &mut PointCloud,
+    start: usize,
+    filter: Option<&PointFilter>,
+) -> Result<()> {
+    if let Some(filter) = filter {
+        let matches = filter.matches(cloud, start)?;
+        cloud.retain_from(start, &matches);
+    }
+    Ok(())
+}
+
+/// Decodes all of `records` to the end of a cloud.
+fn append_decoded(
+    cloud: &mut PointCloud,
+    input: &Input,
+    records: &[u8],
+    layout: &RecordLayout,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let n_before = cloud.len();
+    let origin = cloud.origin;
+    grow_checked(cloud, n_before + records.len() / layout.stride, input)?;
+    let mut rest = ColumnSlices::from_cloud(cloud, n_before);
     let tasks: Vec<(&[u8], ColumnSlices)> = records
         .chunks(POINTS_PER_TASK * layout.stride)
         .map(|records| (records, rest.split_off_front(records.len() / layout.stride)))
@@ -44,9 +83,8 @@ pub(crate) fn read_records(
         progress.check()?;
         layout.decode(records, origin, &mut slices);
         progress.advance(slices.len() as u64);
-        Ok::<(), Error>(())
-    })?;
-    Ok(cloud)
+        Ok(())
+    })
 }
 
 /// Extends the columns of `cloud` to `n` points of zeros.

@@ -59,14 +59,21 @@ pub(crate) fn read(
         limit: None,
     };
     progress.begin(&format!("read {}", input.name), (input.len() - preamble.data) as u64);
-    let cloud = read_rows(input, rows, &parse, layout_of, options.origin, progress)?;
+    let (cloud, n_points) = read_rows(
+        input,
+        rows,
+        &parse,
+        layout_of,
+        options.origin,
+        options.filter.as_ref(),
+        progress,
+    )?;
     if let Some(count) = preamble.count {
-        let n_points = cloud.len();
         let line = format!("a line before the points says {count} points, {n_points} were read");
         progress.note(&format!("{}: {line}", input.name));
     }
     let mut info = file_info(&preamble);
-    info.n_points = Some(cloud.len() as u64);
+    info.n_points = Some(n_points);
     info.columns = kept.iter().map(|(_, role)| role.name().to_owned()).collect();
     Ok(Loaded { cloud, info })
 }

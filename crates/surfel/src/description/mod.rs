@@ -19,6 +19,7 @@ mod object_settings;
 mod option;
 pub mod pattern;
 mod picture;
+mod point_filter;
 pub mod rule;
 
 pub use animation::{AnimationDescription, AnimationKind, CameraMotion, ObjectMotion, Orbit};
@@ -34,6 +35,7 @@ pub use object::{ObjectDescription, Placement, Rotation};
 pub use object_settings::{ColorSettings, ObjectSettings, PreparationSettings, SurfaceSettings};
 pub use option::{option_name, value_text};
 pub use picture::{Backend, Exposure, OutputSettings, PictureSettings, RunSettings};
+pub use point_filter::Returns;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};

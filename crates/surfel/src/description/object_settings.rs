@@ -1,6 +1,7 @@
 //! Settings that an object may have for itself: surface, preparation, colour.
 
 use super::keys::{KeyedSettings, settings};
+use super::point_filter::{Classes, RETURNS, Returns, point_filter};
 use super::rule::{
     Checked, ClipBoxRule, ClipPlaneRule, ColorSourceRule, ColormapRule, Flag, Interval, OneOf,
     POSITIVE, Rule, Text, count, parsed,
@@ -12,8 +13,8 @@ use surfel_core::image::Colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
 use surfel_core::points::{
-    Denoise, Orientation, OutlierRemoval, Preparation, Radius, STRUCTURE, SURFACE_VARIATION,
-    StructureChoice, Subsample,
+    Denoise, Orientation, OutlierRemoval, PointFilter, Preparation, Radius, STRUCTURE,
+    SURFACE_VARIATION, StructureChoice, Subsample,
 };
 use surfel_core::scene::color::{ColorSource, Coloring};
 use surfel_core::scene::{Clip, ClipBox, ClipPlane};
@@ -43,6 +44,13 @@ const DENOISE: &[(&str, Denoise)] =
 settings! {
     /// The reduction and completion of points before they become a surface.
     pub struct PreparationSettings {
+        /// Keeps only points whose columns meet a condition, as in "classification == 2 && z < 1200" or
+        /// "intensity[100:]"; surfel info lists the columns.
+        filter: PointFilter, parsed(PointFilter::to_string), "CONDITION", common;
+        /// Keeps only points of these ASPRS classes, as in 2,6 or ground,building.
+        class: Vec<u8>, Classes, "CLASSES", common;
+        /// Keeps only these returns of each laser pulse: first, last or only (those of pulses that have one).
+        returns: Returns, OneOf(RETURNS), "WHICH";
         /// Keeps fewer points: first:N, random:N, stride:S or spacing:LENGTH.
         subsample: Subsample, SubsampleRule, "CHOICE";
         /// Drops points that stand alone: statistical:K,RATIO, whose mean distance to K neighbours exceeds the mean of
@@ -181,11 +189,17 @@ impl SurfaceSettings {
 }
 
 impl PreparationSettings {
-    /// Returns options of a reader that keeps these columns.
+    /// Returns options of a reader that keeps these columns, and the points that the filter keeps.
     pub fn load_options(&self, columns: ColumnChoice) -> LoadOptions {
         let text_columns = self.columns.as_deref().map(TextColumn::parse_list);
         let animation = self.animation_name.clone();
-        LoadOptions { columns, text_columns, animation, ..LoadOptions::default() }
+        let filter = self.point_filter();
+        LoadOptions { columns, text_columns, filter, animation, ..LoadOptions::default() }
+    }
+
+    /// Returns the filter that `filter`, `class` and `returns` make together; `None` if all points are kept.
+    pub fn point_filter(&self) -> Option<PointFilter> {
+        point_filter(self.filter.as_ref(), self.class.as_deref(), self.returns)
     }
 
     /// Returns true if the settings say how normals are estimated.

@@ -6,7 +6,9 @@ use crate::error::Result;
 use std::path::Path;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::Neighborhood;
-use surfel_core::points::{PointCloud, PreparationReport, PreparedCloud, Radius, prepare};
+use surfel_core::points::{
+    PointCloud, PointFilter, PreparationReport, PreparedCloud, Radius, prepare,
+};
 use surfel_core::progress::Progress;
 use surfel_core::scene::color::{choose_source, colorize};
 use surfel_core::scene::{CloudGeometry, Geometry, Graph, Material, Transform};
@@ -29,7 +31,11 @@ pub fn import(
     progress: &dyn Progress,
 ) -> Result<(Graph<PointCloud>, FileInfo)> {
     let columns = if options.keeps_all_columns { ColumnChoice::All } else { settings.columns() };
-    let load_options = settings.preparation.load_options(columns);
+    let mut load_options = settings.preparation.load_options(columns);
+    if options.keeps_all_columns {
+        // All points stay too: the filter may change, and is applied when they are prepared.
+        load_options.filter = None;
+    }
     let loaded = if settings.preparation.vertices() {
         let Loaded { cloud, info } = surfel_formats::load(file, &load_options, progress)?;
         (graph_of(cloud), info)
@@ -58,6 +64,25 @@ pub fn into_cloud(
         Some(Geometry::Points(cloud)) => Ok(cloud),
         _ => Err(Box::new(graph)),
     }
+}
+
+/// Drops the points of a cloud that a filter does not keep.
+///
+/// # Errors
+///
+/// Fails if the cloud lacks a column of the filter.
+pub fn filter_cloud(
+    mut cloud: PointCloud,
+    filter: Option<&PointFilter>,
+    progress: &dyn Progress,
+) -> surfel_core::Result<PointCloud> {
+    if let Some(filter) = filter {
+        let n_points = cloud.len();
+        let matches = filter.matches(&cloud, 0)?;
+        cloud.retain_from(0, &matches);
+        progress.note(&format!("{} of {n_points} points meet {filter}", cloud.len()));
+    }
+    Ok(cloud)
 }
 
 /// Cleans a cloud, and adds the normals and radii that are missing.

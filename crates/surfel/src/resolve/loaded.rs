@@ -1,7 +1,7 @@
 //! The content of all files of a description, side by side in one graph, before it is prepared.
 
 use super::camera::keep_named_camera;
-use super::cloud::{ImportOptions, graph_of, import, into_cloud, prepare_cloud};
+use super::cloud::{ImportOptions, filter_cloud, graph_of, import, into_cloud, prepare_cloud};
 use super::environment::load_environment;
 use super::memory::{MemoryEstimate, n_points};
 use super::sequence::{GeometrySlots, Sequence, element_counts, is_streamed};
@@ -280,7 +280,10 @@ impl LoadedScene {
         progress: &dyn Progress,
     ) -> Result<PreparedCloud> {
         let settings = self.settings_of(geometry, description);
-        let prepared = prepare_cloud(cloud, &settings, description.picture.seed(), progress);
+        let filter = settings.preparation.point_filter().filter(|_| self.keeps_all_columns);
+        let prepared = filter_cloud(cloud, filter.as_ref(), progress).and_then(|cloud| {
+            prepare_cloud(cloud, &settings, description.picture.seed(), progress)
+        });
         prepared.map_err(|cause| self.content_error(geometry, description, cause))
     }
 

@@ -1,0 +1,105 @@
+//! Conditions as trees.
+
+use std::fmt;
+
+/// A condition on a point.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Condition {
+    /// All of these hold.
+    All(Vec<Condition>),
+    /// At least one of these holds.
+    Any(Vec<Condition>),
+    /// This does not hold.
+    Not(Box<Condition>),
+    /// Two numbers are in a relation.
+    Compare(Operand, Relation, Operand),
+}
+
+/// A number of a comparison.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Operand {
+    /// A constant.
+    Number(f64),
+    /// The column of this name.
+    Column(String),
+}
+
+/// The relation of two numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Relation {
+    Equal,
+    NotEqual,
+    Less,
+    LessOrEqual,
+    Greater,
+    GreaterOrEqual,
+}
+
+/// All relations with their signs; a sign stands before those that it begins with.
+pub(super) const RELATIONS: [(&str, Relation); 6] = [
+    ("==", Relation::Equal),
+    ("!=", Relation::NotEqual),
+    ("<=", Relation::LessOrEqual),
+    (">=", Relation::GreaterOrEqual),
+    ("<", Relation::Less),
+    (">", Relation::Greater),
+];
+
+impl Condition {
+    /// The condition that a column has this value.
+    pub fn equals(column: String, value: f64) -> Self {
+        Self::Compare(Operand::Column(column), Relation::Equal, Operand::Number(value))
+    }
+
+    /// Appends the names of all columns.
+    pub fn collect_columns<'a>(&'a self, columns: &mut Vec<&'a str>) {
+        match self {
+            Self::All(parts) | Self::Any(parts) => {
+                parts.iter().for_each(|part| part.collect_columns(columns));
+            }
+            Self::Not(inner) => inner.collect_columns(columns),
+            Self::Compare(left, _, right) => {
+                columns.extend([left, right].into_iter().filter_map(|operand| match operand {
+                    Operand::Column(name) => Some(name.as_str()),
+                    Operand::Number(_) => None,
+                }));
+            }
+        }
+    }
+
+    fn fmt_parts(parts: &[Self], sign: &str, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, part) in parts.iter().enumerate() {
+            if 0 < i {
+                write!(f, " {sign} ")?;
+            }
+            match part {
+                Self::All(inner) | Self::Any(inner) if 1 < inner.len() => write!(f, "({part})")?,
+                _ => write!(f, "{part}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Condition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::All(parts) => Self::fmt_parts(parts, "&&", f),
+            Self::Any(parts) => Self::fmt_parts(parts, "||", f),
+            Self::Not(inner) => write!(f, "!({inner})"),
+            Self::Compare(left, relation, right) => {
+                let sign = RELATIONS.iter().find(|(_, known)| known == relation);
+                write!(f, "{left} {} {right}", sign.map_or("", |(sign, _)| sign))
+            }
+        }
+    }
+}
+
+impl fmt::Display for Operand {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Column(name) => f.write_str(name),
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! Evaluates conditions column by column, on blocks of points.
+
+use super::condition::{Condition, Operand, Relation};
+use crate::error::{Error, Result};
+use crate::points::{PointCloud, Values};
+
+/// The columns of a cloud that a condition compares.
+pub(super) struct Evaluation<'a> {
+    cloud: &'a PointCloud,
+    columns: Vec<(&'a str, ColumnValues<'a>)>,
+}
+
+/// A column of a cloud.
+#[derive(Clone, Copy)]
+enum ColumnValues<'a> {
+    Position(usize),
+    Normal(usize),
+    Color(usize),
+    Radius,
+    Intensity,
+    Classification,
+    Scalar(&'a Values),
+}
+
+/// Names of columns that are no scalars, each with its synonyms.
+const NAMES: [(&[&str], ColumnValues<'static>); 12] = [
+    (&["x", "easting"], ColumnValues::Position(0)),
+    (&["y", "northing"], ColumnValues::Position(1)),
+    (&["z", "elevation", "height"], ColumnValues::Position(2)),
+    (&["nx", "normalx"], ColumnValues::Normal(0)),
+    (&["ny", "normaly"], ColumnValues::Normal(1)),
+    (&["nz", "normalz"], ColumnValues::Normal(2)),
+    (&["red", "r"], ColumnValues::Color(0)),
+    (&["green", "g"], ColumnValues::Color(1)),
+    (&["blue", "b"], ColumnValues::Color(2)),
+    (&["radius"], ColumnValues::Radius),
+    (&["intensity", "i", "reflectance"], ColumnValues::Intensity),
+    (&["classification", "class", "label"], ColumnValues::Classification),
+];
+
+impl<'a> Evaluation<'a> {
+    /// Finds the columns of a condition; fails if the cloud lacks one.
+    pub fn new(condition: &'a Condition, cloud: &'a PointCloud) -> Result<Self> {
+        let mut names = Vec::new();
+        condition.collect_columns(&mut names);
+        let columns = names.into_iter().map(|name| Ok((name, find_column(name, cloud)?)));
+        Ok(Self { cloud, columns: columns.collect::<Result<_>>()? })
+    }
+
+    /// Writes for each point from `start` on whether it meets the condition.
+    pub fn run(&self, condition: &Condition, start: usize, matches: &mut [bool]) {
+        match condition {
+            Condition::All(parts) => {
+                matches.fill(true);
+                self.join(parts, start, matches, |all, part| *all &= part);
+            }
+            Condition::Any(parts) => {
+                matches.fill(false);
+                self.join(parts, start, matches, |any, part| *any |= part);
+            }
+            Condition::Not(inner) => {
+                self.run(inner, start, matches);
+                matches.iter_mut().for_each(|is_match| *is_match = !*is_match);
+            }
+            Condition::Compare(left, relation, right) => {
+                let (left, right) =
+                    (self.values(left, start, matches), self.values(right, start, matches));
+                let pairs = matches.iter_mut().zip(left.iter().zip(&right));
+                match relation {
+                    Relation::Equal => pairs.for_each(|(is_match, (a, b))| *is_match = a == b),
+                    Relation::NotEqual => pairs.for_each(|(is_match, (a, b))| *is_match = a != b),
+                    Relation::Less => pairs.for_each(|(is_match, (a, b))| *is_match = a < b),
+                    Relation::LessOrEqual => {
+                        pairs.for_each(|(is_match, (a, b))| *is_match = a <= b)
+                    }
+                    Relation::Greater => pairs.for_each(|(is_match, (a, b))| *is_match = a > b),
+                    Relation::GreaterOrEqual => {
+                        pairs.for_each(|(is_match, (a, b))| *is_match = a >= b);
+                    }
+                }
+            }
+        }
+    }
+
+    fn join(
+        &self,
+        parts: &[Condition],
+        start: usize,
+        matches: &mut [bool],
+        join: impl Fn(&mut bool, bool),
+    ) {
+        let mut of_part = vec![false; matches.len()];
+        for part in parts {
+            self.run(part, start, &mut of_part);
+            matches.iter_mut().zip(&of_part).for_each(|(all, part)| join(all, *part));
+        }
+    }
+
+    /// Returns the values of an operand for as many points as there are `matches`.
+    fn values(&self, operand: &Operand, start: usize, matches: &[bool]) -> Vec<f64> {
+        let n = matches.len();
+        let name = match operand {
+            Operand::Number(number) => return vec![*number; n],
+            Operand::Column(name) => name,
+        };
+        let range = start..start + n;
+        let cloud = self.cloud;
+        let column = self.columns.iter().find(|(known, _)| known == name).map(|(_, column)| column);
+        let absent = "columns were found before";
+        match *column.expect(absent) {
+            ColumnValues::Position(axis) => {
+                let zero = cloud.origin[axis];
+                cloud.positions[range].iter().map(|p| zero + f64::from(p[axis])).collect()
+            }
+            ColumnValues::Normal(axis) => {
+                let normals = &cloud.normals.as_ref().expect(absent)[range];
+                normals.iter().map(|normal| normal[axis].into()).collect()
+            }
+            ColumnValues::Color(channel) => {
+                let colors = &cloud.colors.as_ref().expect(absent)[range];
+                colors.iter().map(|color| color[channel].into()).collect()
+            }
+            ColumnValues::Radius => widen(&cloud.radii.as_ref().expect(absent)[range]),
+            ColumnValues::Intensity => widen(&cloud.intensity.as_ref().expect(absent)[range]),
+            ColumnValues::Classification => {
+                widen(&cloud.classification.as_ref().expect(absent)[range])
+            }
+            ColumnValues::Scalar(values) => match values {
+                Values::U8(values) => widen(&values[range]),
+                Values::U16(values) => widen(&values[range]),
+                Values::I32(values) => widen(&values[range]),
+                Values::F32(values) => widen(&values[range]),
+                Values::F64(values) => values[range].to_vec(),
+            },
+        }
+    }
+}
+
+fn widen<T: Copy + Into<f64>>(values: &[T]) -> Vec<f64> {
+    values.iter().map(|value| (*value).into()).collect()
+}
+
+fn find_column<'a>(name: &str, cloud: &'a PointCloud) -> Result<ColumnValues<'a>> {
+    let wanted = plain(name);
+    let scalars = cloud.scalars.iter();
+    if let Some(scalar) = scalars.clone().find(|scalar| plain(&scalar.name) == wanted) {
+        return Ok(ColumnValues::Scalar(&scalar.values));
+    }
+    let mut present = NAMES.iter().filter(|(_, column)| is_present(*column, cloud));
+    let found = present.clone().find(|(names, _)| names.contains(&wanted.as_str()));
+    found.map(|(_, column)| *column).ok_or_else(|| {
+        let known = present.by_ref().map(|(names, _)| names[0]);
+        let known: Vec<&str> = known.chain(scalars.map(|scalar| scalar.name.as_str())).collect();
+        let found = name.to_owned();
+        Error::UnknownName { kind: "column of the filter", found, known: known.join(", ") }
+    })
+}
+
+fn is_present(column: ColumnValues, cloud: &PointCloud) -> bool {
+    match column {
+        ColumnValues::Position(_) | ColumnValues::Scalar(_) => true,
+        ColumnValues::Normal(_) => cloud.normals.is_some(),
+        ColumnValues::Color(_) => cloud.colors.is_some(),
+        ColumnValues::Radius => cloud.radii.is_some(),
+        ColumnValues::Intensity => cloud.intensity.is_some(),
+        ColumnValues::Classification => cloud.classification.is_some(),
+    }
+}
+
+/// Returns the letters and digits of a name in lower case, since programs separate words in different ways.
+fn plain(name: &str) -> String {
+    name.chars().filter(|c| c.is_alphanumeric()).collect::<String>().to_lowercase()
+}

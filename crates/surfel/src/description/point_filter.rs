@@ -1,0 +1,67 @@
+//! Settings that choose points by their columns, and the filter that they make together.
+
+use super::Invalid;
+use super::rule::{Rule, as_list};
+use serde_json::{Value, json};
+use std::path::Path;
+use surfel_core::image::class_name;
+use surfel_core::points::PointFilter;
+
+/// The returns of a laser pulse that are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Returns {
+    /// The first return of each pulse.
+    First,
+    /// The last return of each pulse: of vegetation, what is below it.
+    Last,
+    /// Returns of pulses that have no other: of solid surfaces.
+    Only,
+}
+
+/// Names of the returns.
+pub const RETURNS: &[(&str, Returns)] =
+    &[("first", Returns::First), ("last", Returns::Last), ("only", Returns::Only)];
+
+/// Numbers or names of ASPRS classes, as a list or separated by commas.
+pub struct Classes;
+
+impl Rule<Vec<u8>> for Classes {
+    fn read(&self, value: &Value, _: &Path) -> Result<Vec<u8>, Invalid> {
+        let class = |item: &Value| {
+            let text = match item {
+                Value::String(text) => text.trim().to_lowercase(),
+                other => other.to_string(),
+            };
+            let named = || (0..=u8::MAX).find(|class| class_name(*class) == text);
+            text.parse().ok().or_else(named)
+        };
+        let classes: Option<Vec<u8>> = as_list(value).iter().map(class).collect();
+        classes.filter(|classes| !classes.is_empty()).ok_or_else(|| {
+            Invalid::new("expected numbers or names of ASPRS classes, as in 2,6 or ground,building")
+        })
+    }
+
+    fn write(&self, value: &Vec<u8>) -> Value {
+        json!(value)
+    }
+}
+
+/// Returns the filter that all settings make together; `None` if all points are kept.
+pub fn point_filter(
+    filter: Option<&PointFilter>,
+    classes: Option<&[u8]>,
+    returns: Option<Returns>,
+) -> Option<PointFilter> {
+    let classes = classes.map(PointFilter::classes);
+    let returns = returns.map(|returns| {
+        let condition = match returns {
+            Returns::First => "return_number == 1",
+            Returns::Last => "return_number == number_of_returns",
+            Returns::Only => "number_of_returns == 1",
+        };
+        condition.parse().expect("the condition is valid")
+    });
+    let filters: Vec<PointFilter> =
+        filter.cloned().into_iter().chain(classes).chain(returns).collect();
+    (!filters.is_empty()).then(|| PointFilter::all(filters))
+}
