@@ -76,6 +76,7 @@ pub fn animate(
     resumes: bool,
     progress: &dyn Progress,
 ) -> Result<()> {
+    scene.fix_overlay();
     let mut movie = Movie::open(output, options, resumes)?;
     let n_frames = options.n_frames;
     if 0 < movie.n_done() {

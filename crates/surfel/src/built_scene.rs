@@ -3,6 +3,7 @@
 use crate::choice_log::{CancelOnly, Choice};
 use crate::description::{Exposure, SceneDescription};
 use crate::error::Result;
+use crate::overlay::Overlay;
 use crate::picture::RenderedImage;
 use crate::resolve::{Resolved, SceneCamera, Sequence, automatic_exposure, expose, expose_lamps};
 use surfel_core::flat::{FlatPunctualLight, FlatScene};
@@ -20,6 +21,7 @@ pub struct BuiltScene {
     graph: Graph,
     sequences: Vec<Sequence>,
     camera: SceneCamera,
+    overlay: Overlay,
     up: Vec3,
     /// Lights before a turntable turns them.
     lights: Vec<Light>,
@@ -53,7 +55,7 @@ impl Resolved {
     ///
     /// Fails for scenes that no picture can be made of, and if cancelled.
     pub fn build_trees(self, progress: &dyn Progress) -> Result<BuiltScene> {
-        let Self { scene, settings, description, choices, sequences, camera, up } = self;
+        let Self { scene, settings, description, choices, sequences, camera, overlay, up } = self;
         let flat = FlatScene::new(&scene, progress)?;
         progress.end();
         let mut graph = scene.graph;
@@ -67,6 +69,7 @@ impl Resolved {
             graph,
             sequences,
             camera,
+            overlay,
             up,
             lights,
             lamps,
@@ -106,6 +109,11 @@ impl BuiltScene {
         self.lights.clone_from(&self.flat.lights);
         self.lamps.clone_from(&self.flat.punctual_lights);
         Ok(())
+    }
+
+    /// Keeps the legend in one corner from now on, as the frames of a movie need it.
+    pub(crate) fn fix_overlay(&mut self) {
+        self.overlay.is_fixed = true;
     }
 
     /// Returns the arrays that rays are traced against.
@@ -192,7 +200,8 @@ impl BuiltScene {
     ///
     /// Fails if the settings make no picture, and if cancelled.
     pub fn render_with(&self, progress: &dyn Progress) -> Result<(RenderedImage, RenderStats)> {
-        let (image, stats) = self.renderer.render(&self.flat, &self.settings, progress)?;
+        let (mut image, stats) = self.renderer.render(&self.flat, &self.settings, progress)?;
+        self.overlay.draw(&mut image, &self.flat.camera);
         Ok((RenderedImage::new(image, &self.description, self.flat.origin), stats))
     }
 }

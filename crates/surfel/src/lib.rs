@@ -62,6 +62,7 @@ pub mod description;
 mod error;
 mod scene_file;
 pub mod choice_log;
+pub mod overlay;
 pub mod resolve;
 pub mod picture;
 mod cache;

@@ -4,18 +4,20 @@ use crate::built_scene::{exposure_stops, source_indices};
 use crate::cache::{Lru2, hash_of};
 use crate::description::{Exposure, Interior, Invalid, LightKind, SceneDescription, write_parts};
 use crate::error::{Error, Result};
+use crate::overlay::Overlay;
 use crate::resolve::{
-    AutoSettings, KeepOptions, LoadedScene, expose, finish_graph, hide_walls, render_settings,
+    AutoSettings, KeepOptions, LoadedScene, common_legend, expose, finish_graph, hide_walls,
+    render_settings,
 };
 use serde_json::{Value, json};
 use std::sync::{Arc, OnceLock};
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
-use surfel_core::math::{Aabb, DVec3};
+use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
 use surfel_core::render::{self, CpuRenderer, Renderer, Settings};
-use surfel_core::scene::color::{Legend, legend};
+use surfel_core::scene::color::Legend;
 use surfel_core::scene::{
     Background, Camera, ClipPlane, Geometry, Graph, Projection, Scene, inlier_bounds,
 };
@@ -61,6 +63,19 @@ pub struct LiveView {
     pub moves_camera: bool,
     /// The trees, which several views share.
     pub trees: Arc<SceneTrees>,
+}
+
+impl LiveView {
+    /// Returns the legend, scale bar, north arrow and caption of a picture of the view.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the camera does not allow what is asked for.
+    pub fn overlay(&self, progress: &dyn Progress) -> Result<Overlay> {
+        let up = self.description.world.up.unwrap_or(Vec3::Z);
+        let legend = self.trees.legend.clone();
+        Ok(Overlay::new(&self.description.picture, legend, &self.flat.camera, up, progress)?)
+    }
 }
 
 impl LiveScene {
@@ -189,9 +204,7 @@ impl LiveScene {
         progress: &dyn Progress,
     ) -> Result<SceneTrees> {
         let up = auto.up;
-        let coloring = description.objects_default.coloring(up);
-        let first = clouds.first().map(|cloud| legend(cloud, &coloring));
-        let legend = first.and_then(|legend| legend.ok()).unwrap_or(Legend::None);
+        let legend = common_legend(clouds, description, up);
         let raw = self.loaded.graph_without_points();
         let (mut graph, mut sequences) =
             finish_graph(&self.loaded, raw, clouds.to_vec(), description, up, progress)?;

@@ -239,7 +239,8 @@ impl SceneProvider for FileSceneProvider {
         let rays_per_pixel = u64::from(picture.spp()) + u64::from(picture.light_samples());
         Limits::default().check_save(picture.resolution(), rays_per_pixel)?;
         let view = self.view(&description, progress)?;
-        let image = self.scene.render(&view, progress).map_err(rejection)?;
+        let mut image = self.scene.render(&view, progress).map_err(rejection)?;
+        view.overlay(progress).map_err(rejection)?.draw(&mut image, &view.flat.camera);
         let options = image_options(&description, view.flat.origin);
         surfel_formats::encode_png(&image, &options).map_err(rejection)
     }

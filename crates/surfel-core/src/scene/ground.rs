@@ -10,3 +10,8 @@ pub(super) fn ground_axes(up: Vec3) -> (Vec3, Vec3) {
     let east = (east - east.dot(up) * up).normalize();
     (east, up.cross(east))
 }
+
+/// Returns the unit vector to the north of a world with the unit vector `up`: +Y if up is +Z.
+pub fn north(up: Vec3) -> Vec3 {
+    ground_axes(up).1
+}

@@ -33,6 +33,7 @@ pub use clip::{Clip, ClipBox, ClipPlane};
 pub use cloud_geometry::CloudGeometry;
 pub use environment::Environment;
 pub use graph::{Geometry, Graph, Joint, Node, Primitive, Transform};
+pub use ground::north;
 pub use inliers::inlier_bounds;
 pub use interior::{Room, find_room};
 pub use light::{Light, PunctualLight, PunctualLightKind, Sky, Sun};

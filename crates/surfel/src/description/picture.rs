@@ -3,7 +3,8 @@
 use super::Invalid;
 use super::keys::settings;
 use super::rule::{
-    BackgroundRule, Checked, OneOf, Resolution, as_number, count, default_background, number,
+    BackgroundRule, Checked, Flag, OneOf, Resolution, Text, as_number, count, default_background,
+    number,
 };
 use super::rule::{POSITIVE, Rule};
 use serde_json::{Value, json};
@@ -30,6 +31,14 @@ settings! {
         background: Background = default_background(), BackgroundRule, "COLOR", common;
         /// Seed of the random numbers; another seed gives other noise.
         seed: u64 = 0, count(0, u64::MAX), "N";
+        /// Draws a legend: the classes that are there with their colours, or the colour map with its values.
+        legend: bool = false, Flag, "", common;
+        /// Draws a bar of a round length; for --camera-orthographic.
+        scale_bar: bool = false, Flag, "";
+        /// Draws an arrow to the north, which is +Y; for --camera-orthographic.
+        north: bool = false, Flag, "";
+        /// Writes a line of text at the lower left.
+        caption: String, Text, "TEXT";
         /// Bits per channel of a PNG.
         bit_depth: BitDepth = BitDepth::Eight, BIT_DEPTH, "BITS";
     }

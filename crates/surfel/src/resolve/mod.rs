@@ -30,6 +30,7 @@ pub(crate) use sun_and_sky::{expose, expose_lamps};
 use crate::choice_log::{Choice, ChoiceLog};
 use crate::description::{CameraSettings, OrthographicHeight, SceneDescription};
 use crate::error::Result;
+use crate::overlay::Overlay;
 use camera::SceneExtent;
 use complete_description::complete_description;
 use interior::{choose_room, hidden_walls};
@@ -38,8 +39,10 @@ use spread::report_gaps;
 use station::{choose_station, stand_at_station};
 use sun_and_sky::{LightingContext, choose_lights, lights};
 use surfel_core::math::Vec3;
+use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
 use surfel_core::render::Settings;
+use surfel_core::scene::color::{Legend, legend};
 use surfel_core::scene::{Camera, ClipPlane, Light, Projection, Scene, inlier_bounds};
 
 /// A scene that is ready for its trees: everything is read, chosen and prepared, at second 0.
@@ -57,6 +60,8 @@ pub struct Resolved {
     pub(crate) sequences: Vec<Sequence>,
     /// The camera with its movement.
     pub(crate) camera: SceneCamera,
+    /// Legend, scale bar, north arrow and caption.
+    pub(crate) overlay: Overlay,
     /// The world's up.
     pub(crate) up: Vec3,
 }
@@ -152,14 +157,23 @@ impl LoadedScene {
         let complete = auto.complete_description(&self);
         let AutoSettings { up, camera, lights, description, hidden_walls, .. } = auto;
         let clouds = self.take_prepared(&description, progress)?;
+        let legend = match description.picture.legend() {
+            true => common_legend(&clouds, &description, up),
+            false => Legend::None,
+        };
         let raw = std::mem::take(&mut self.graph);
         let (mut graph, sequences) = finish_graph(&self, raw, clouds, &description, up, progress)?;
         hide_walls(&mut graph, &hidden_walls);
         let background = description.picture.background();
         let scene = Scene { camera: camera.at(0.0, &graph), graph, lights, background };
+        let overlay = match is_exr(&description) {
+            true => Overlay::default(),
+            false => Overlay::new(&description.picture, legend, &scene.camera, up, progress)?,
+        };
         let settings = render_settings(&description);
         let choices = Vec::new();
-        Ok(Resolved { scene, settings, description: complete, choices, sequences, camera, up })
+        let description = complete;
+        Ok(Resolved { scene, settings, description, choices, sequences, camera, overlay, up })
     }
 }
 
@@ -167,7 +181,6 @@ impl LoadedScene {
 pub fn render_settings(description: &SceneDescription) -> Settings {
     let picture = &description.picture;
     let (width, height) = picture.resolution();
-    let output = description.output.output.as_ref();
     Settings {
         width,
         height,
@@ -176,10 +189,25 @@ pub fn render_settings(description: &SceneDescription) -> Settings {
         max_depth: picture.max_depth(),
         seed: picture.seed(),
         point_size: picture.point_size.map_or(Settings::default().point_size, |size| size as f32),
-        with_aovs: output.is_none_or(|path| {
-            path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
-        }),
+        with_aovs: description.output.output.is_none() || is_exr(description),
     }
+}
+
+/// Returns the legend of the first cloud, which others share unless they have colours of their own.
+pub(crate) fn common_legend(
+    clouds: &[PreparedCloud],
+    description: &SceneDescription,
+    up: Vec3,
+) -> Legend {
+    let coloring = description.objects_default.coloring(up);
+    let first = clouds.first().map(|cloud| legend(cloud, &coloring));
+    first.and_then(|legend| legend.ok()).unwrap_or(Legend::None)
+}
+
+/// Returns true if the picture is written with all layers, for other programs rather than to be looked at.
+fn is_exr(description: &SceneDescription) -> bool {
+    let extension = description.output.output.as_ref().and_then(|path| path.extension());
+    extension.is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
 }
 
 /// The camera as keys: where it stands, or its name if it is one of a file that moves.
