@@ -48,7 +48,7 @@ settings! {
         /// "intensity[100:]"; surfel info lists the columns.
         filter: PointFilter, parsed(PointFilter::to_string), "CONDITION", common;
         /// Keeps only points of these ASPRS classes, as in 2,6 or ground,building.
-        class: Vec<u8>, Classes, "CLASSES", common;
+        class: Vec<u8>, Classes, "CLASSES";
         /// Keeps only these returns of each laser pulse: first, last or only (those of pulses that have one).
         returns: Returns, OneOf(RETURNS), "WHICH";
         /// Keeps fewer points: first:N, random:N, stride:S or spacing:LENGTH.

@@ -32,7 +32,7 @@ settings! {
         /// Seed of the random numbers; another seed gives other noise.
         seed: u64 = 0, count(0, u64::MAX), "N";
         /// Draws a legend: the classes that are there with their colours, or the colour map with its values.
-        legend: bool = false, Flag, "", common;
+        legend: bool = false, Flag, "";
         /// Draws a bar of a round length; for --camera-orthographic.
         scale_bar: bool = false, Flag, "";
         /// Draws an arrow to the north, which is +Y; for --camera-orthographic.
