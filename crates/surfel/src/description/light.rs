@@ -47,7 +47,7 @@ settings! {
     /// The sun.
     pub struct SunSettings {
         /// Direction of the sun in degrees clockwise from north [default: behind the camera, to the left].
-        azimuth: f64, number(-360.0, 360.0), "DEG", common;
+        azimuth: f64, number(-360.0, 360.0), "DEG";
         /// Height of the sun above the horizon in degrees.
         elevation: f64 = 40.0, number(-90.0, 90.0), "DEG";
         /// Angular diameter of the sun in degrees; 0 gives hard shadows.
