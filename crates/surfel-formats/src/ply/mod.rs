@@ -3,6 +3,7 @@
 mod header;
 mod skip;
 mod element_lines;
+mod trained_splats;
 mod faces;
 mod read;
 mod mesh;

@@ -7,6 +7,7 @@ use super::element_lines::end_of_lines;
 use super::faces::count_faces;
 use super::header::{Element, Encoding, Header, read_header};
 use super::skip::{pack_vertices, skip_elements};
+use super::trained_splats::{PROPERTIES, are_trained_splats, into_discs};
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
@@ -29,9 +30,21 @@ pub(crate) fn read(
     progress: &dyn Progress,
 ) -> Result<Loaded> {
     let header = read_header(input)?;
-    let cloud = read_cloud(input, &header, options, progress)?;
     let (_, vertex) = find_vertex(input, &header)?;
-    Ok(Loaded { cloud, info: file_info(&header, vertex) })
+    let info = file_info(&header, vertex);
+    if !are_trained_splats(vertex) {
+        return Ok(Loaded { cloud: read_cloud(input, &header, options, progress)?, info });
+    }
+    let columns = options.columns.with_names(&PROPERTIES);
+    let needed = LoadOptions { columns, ..options.clone() };
+    let mut cloud = read_cloud(input, &header, &needed, progress)?;
+    let n_faint = into_discs(&mut cloud);
+    options.columns.drop_others(&mut cloud);
+    let line = format!(
+        "trained splats are read as discs of one colour each; {n_faint} faint ones skipped"
+    );
+    progress.note(&format!("{}: {line}", input.name));
+    Ok(Loaded { cloud, info })
 }
 
 /// Reads the vertices of a file with this header.
@@ -56,7 +69,11 @@ pub(super) fn file_info(header: &Header, vertex: &Element) -> FileInfo {
         Encoding::BigEndian => "binary big endian",
     };
     let n_faces = count_faces(header);
-    let suffix = if 0 < n_faces { ", mesh" } else { "" };
+    let suffix = match n_faces {
+        0 if are_trained_splats(vertex) => ", trained splats",
+        0 => "",
+        _ => ", mesh",
+    };
     FileInfo {
         format: format!("PLY, {encoding}{suffix}"),
         n_points: Some(vertex.count),

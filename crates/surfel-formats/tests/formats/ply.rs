@@ -5,7 +5,7 @@ use surfel_core::points::Values;
 use surfel_core::progress::NoProgress;
 use surfel_formats::{Column, ColumnChoice, LoadOptions, load_bytes};
 
-use crate::common::read;
+use crate::common::{Listener, read};
 
 fn binary(header: &str, body: &[u8]) -> Vec<u8> {
     [header.as_bytes(), body].concat()
@@ -134,4 +134,32 @@ fn only_requested_columns_are_loaded() {
     assert_eq!(cloud.colors, Some(vec![[257, 514, 771]]));
     assert_eq!(cloud.intensity, None);
     assert_eq!(cloud.scalars.len(), 1);
+}
+
+#[test]
+fn trained_splats_become_discs() {
+    let names = [
+        "x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "f_rest_0", "opacity",
+        "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
+    ];
+    let properties: String = names.iter().map(|name| format!("property float {name}\n")).collect();
+    let (two, thin) = (2f32.ln(), 0.01f32.ln());
+    // The second splat has an opacity of 0.05.
+    let splats = format!(
+        "1 2 3 0 0 0 1.7724539 -1.7724539 0 9 2 {two} {two} {thin} 1 0 0 0\n\
+        4 5 6 0 0 0 0 0 0 9 -2.9444 {two} {two} {thin} 1 0 0 0\n"
+    );
+    let file = format!("ply\nformat ascii 1.0\nelement vertex 2\n{properties}end_header\n{splats}");
+    let listener = Listener::default();
+    let loaded = load_bytes("a.ply", file.as_bytes(), &LoadOptions::default(), &listener).unwrap();
+    assert_eq!(loaded.cloud.positions, [Vec3::new(1.0, 2.0, 3.0)]);
+    assert_eq!(loaded.cloud.colors, Some(vec![[65535, 0, 32768]]));
+    assert_eq!(loaded.cloud.normals, Some(vec![Vec3::Z]));
+    assert!((loaded.cloud.radii.unwrap()[0] - 3.0).abs() < 1e-5);
+    assert!(loaded.info.format.ends_with("trained splats"));
+    assert!(listener.has_note("1 faint ones skipped"));
+    let columns = ColumnChoice::Only(vec![Column::Colors]);
+    let options = LoadOptions { columns, ..LoadOptions::default() };
+    let cloud = load_bytes("a.ply", file.as_bytes(), &options, &NoProgress).unwrap().cloud;
+    assert!(cloud.colors.is_some() && cloud.normals.is_none() && cloud.scalars.is_empty());
 }

@@ -44,6 +44,8 @@ use surfel_core::progress::Progress;
 use surfel_core::render::Settings;
 use surfel_core::scene::color::{Legend, legend};
 use surfel_core::scene::{Camera, ClipPlane, Light, Projection, Scene, inlier_bounds};
+use surfel_core::surface::SurfaceKind;
+use surfel_formats::FileInfo;
 
 /// A scene that is ready for its trees: everything is read, chosen and prepared, at second 0.
 #[derive(Debug)]
@@ -113,7 +115,9 @@ impl AutoSettings {
         let up = choose_up(description.world.up, &points, &scene.file_infos, progress);
         let clouds = scene.clouds().map(|(_, cloud)| cloud);
         let camera = stand_at_station(&description.camera, clouds, up)?;
-        let description = &SceneDescription { camera, ..description.clone() };
+        let mut description = SceneDescription { camera, ..description.clone() };
+        choose_surface(scene, &mut description, progress);
+        let description = &description;
         let bounds = inlier_bounds(&points);
         report_gaps(&points, progress);
         let room = choose_room(scene, description, &points, up);
@@ -174,6 +178,21 @@ impl LoadedScene {
         let choices = Vec::new();
         let description = complete;
         Ok(Resolved { scene, settings, description, choices, sequences, camera, overlay, up })
+    }
+}
+
+/// Shows trained splats as discs, whose sizes they state, unless the description says how to show points.
+fn choose_surface(
+    scene: &LoadedScene,
+    description: &mut SceneDescription,
+    progress: &dyn Progress,
+) {
+    let surface = &mut description.objects_default.surface.surface;
+    let are_splats = |info: &FileInfo| info.format.ends_with("trained splats");
+    let files = &scene.file_infos;
+    if surface.is_none() && !files.is_empty() && files.iter().all(are_splats) {
+        *surface = Some(SurfaceKind::Disc);
+        progress.choice("surface disc: trained splats state their sizes", &["surface"]);
     }
 }
 
