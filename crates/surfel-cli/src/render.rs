@@ -19,7 +19,7 @@ use surfel_core::trace::Simd;
 #[derive(clap::Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// The picture: .png, .exr (linear, with all layers) or - for PNG on stdout.
+    /// The picture: .png, .jpg, .webp, .tif, .exr (linear, with all layers) or - for PNG on stdout.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Writes numbers about the run as JSON; - for stdout.

@@ -22,7 +22,7 @@ impl RenderedImage {
         Self { image, options: image_options(description, origin) }
     }
 
-    /// Writes the picture: PNG for `.png`, all layers for `.exr`. The file is replaced once it is complete.
+    /// Writes the picture: for display as `.png`, `.jpg`, `.webp` or `.tif`, with all layers as `.exr`. The file is replaced once it is complete.
     ///
     /// # Errors
     ///

@@ -5,15 +5,15 @@ use surfel_core::math::DVec3;
 /// Encoding of an image file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImageOptions {
-    /// Bits per channel of PNG files; EXR files are always 32-bit.
+    /// Bits per channel of PNG and TIFF files; JPEG and WebP files are always 8-bit, EXR files 32-bit.
     pub depth: BitDepth,
-    /// Alpha mode of PNG files; EXR files always have an alpha channel.
+    /// Alpha mode of PNG, WebP and TIFF files; JPEG files have no alpha channel, EXR files always have one.
     pub alpha: Alpha,
     /// World coordinates of the origin of the position layer, written to the header of EXR files.
     pub origin: DVec3,
 }
 
-/// Bits per channel of a PNG file.
+/// Bits per channel of a PNG or TIFF file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BitDepth {
     /// 8 bits per channel.
@@ -23,7 +23,7 @@ pub enum BitDepth {
     Sixteen,
 }
 
-/// Alpha mode of a PNG file.
+/// Alpha mode of an image file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Alpha {
     /// The file has an alpha channel.

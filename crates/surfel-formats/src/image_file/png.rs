@@ -95,8 +95,8 @@ fn encode(writer: impl Write, image: &Image, options: &ImageOptions) -> io::Resu
     Ok(())
 }
 
-/// Returns the sRGB-encoded samples, with premultiplied alpha undone if the file has an alpha channel.
-fn samples(image: &Image, options: &ImageOptions) -> Vec<u8> {
+/// Returns the sRGB-encoded samples, those of 16 bits with their most significant byte first, with premultiplied alpha undone if the file has an alpha channel.
+pub(super) fn samples(image: &Image, options: &ImageOptions) -> Vec<u8> {
     let mut bytes = Vec::new();
     let quantize16 = |encoded: f32| ((encoded * 65535.0 + 0.5) as u16).to_be_bytes();
     for &[r, g, b, a] in &image.color {

@@ -1,4 +1,4 @@
-//! PNG and EXR output, read back by the crates for these formats.
+//! Image files, read back by the crates for their formats.
 
 use exr::prelude::{FlatSamples, read_first_flat_layer_from_file};
 use surfel_core::image::{Image, NO_ID, decode_srgb};
@@ -110,9 +110,41 @@ fn check_output_rejects_unwritable_paths() {
     let message =
         |name: &str| surfel_formats::check_output(&folder.path(name)).unwrap_err().to_string();
     assert!(message("none/a.png").contains("create it first"));
-    assert!(message("a.jpg").contains("the extension `.jpg`"));
+    assert!(message("a.gif").contains("the extension `.gif`"));
     assert!(message("a").contains("a name without extension"));
     std::fs::create_dir(folder.path("b.png")).unwrap();
     assert!(message("b.png").contains("name a file, not a folder"));
     surfel_formats::check_output(&folder.path("a.exr")).unwrap();
+}
+
+#[test]
+fn pictures_for_display_hold_the_colours_of_the_png() {
+    let folder = Folder::new("display");
+    let mut image = Image::new(48, 32);
+    for (i, pixel) in image.color.iter_mut().enumerate() {
+        let alpha = if i % 48 < 24 { 1.0 } else { 0.0 };
+        *pixel = [i as f32 / 1600.0, 0.25, 0.5, 1.0].map(|channel| channel * alpha);
+    }
+    for alpha in [Alpha::Keep, Alpha::Drop] {
+        let options = ImageOptions { alpha, ..ImageOptions::default() };
+        let png = image::load_from_memory(&encode_png(&image, &options).unwrap()).unwrap();
+        for name in ["a.webp", "a.tif", "a.tiff"] {
+            save_image(&folder.path(name), &image, &options).unwrap();
+            assert_eq!(image::open(folder.path(name)).unwrap(), png, "{name}");
+        }
+    }
+    let sixteen = ImageOptions { depth: BitDepth::Sixteen, ..ImageOptions::default() };
+    save_image(&folder.path("deep.tif"), &image, &sixteen).unwrap();
+    let png = image::load_from_memory(&encode_png(&image, &sixteen).unwrap()).unwrap();
+    assert_eq!(image::open(folder.path("deep.tif")).unwrap(), png);
+
+    save_image(&folder.path("a.jpg"), &image, &sixteen).unwrap();
+    let jpeg = image::open(folder.path("a.jpg")).unwrap().into_rgb8();
+    let [left, right] = [jpeg.get_pixel(4, 16).0, jpeg.get_pixel(40, 16).0];
+    let expected = png.to_rgb8().get_pixel(4, 16).0;
+    assert!(left.iter().zip(expected).all(|(a, b)| a.abs_diff(b) < 6), "{left:?} {expected:?}");
+    assert!(right.iter().all(|channel| 250 < *channel), "transparent is white: {right:?}");
+    let error = save_image(&folder.path("a.jpeg"), &Image::new(70_000, 1), &sixteen).unwrap_err();
+    assert!(error.to_string().contains("a.jpeg"), "{error}");
+    assert!(!folder.path("a.jpeg").exists());
 }

@@ -39,7 +39,7 @@ settings! {
         north: bool = false, Flag, "";
         /// Writes a line of text at the lower left.
         caption: String, Text, "TEXT";
-        /// Bits per channel of a PNG.
+        /// Bits per channel of a PNG or TIFF.
         bit_depth: BitDepth = BitDepth::Eight, BIT_DEPTH, "BITS";
     }
 }
@@ -65,7 +65,7 @@ impl Rule<BitDepth> for BitDepthRule {
 settings! {
     /// File of the picture or movie, and the time that it shows.
     pub struct OutputSettings {
-        /// File of the picture (.png, .exr) or movie, from the folder where the program runs.
+        /// File of the picture (.png, .jpg, .webp, .tif, .exr) or movie, from the folder where the program runs.
         output: PathBuf, OutputPath, "PATH";
         /// Second of the animation that a picture shows.
         time: f64 = 0.0, number(0.0, 1e6), "SECONDS";
