@@ -124,7 +124,7 @@ fn prepared(
             cloud = remove_outliers(&cloud, choice, report)?;
         }
         if let Some(moved) = denoise(&mut cloud, mode, report)? {
-            report.choice(&moved.line(), &["denoise"]);
+            report.choice(&moved.report.line(), &["denoise"]);
         }
         return Ok(cloud);
     }

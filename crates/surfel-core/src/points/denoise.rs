@@ -5,6 +5,7 @@
 //! (after Huang et al., Edge-Aware Point Set Resampling, 2013).
 
 use super::PointCloud;
+use super::jets::fit_wide_jet;
 use super::neighbors::{KdTree, Neighbor};
 use super::noise::{GROUP_SIZE, Noise};
 use super::normals::fit_plane;
@@ -55,6 +56,15 @@ pub struct DenoiseReport {
     pub mean_distance: f32,
 }
 
+/// Results of denoising beside the moved points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Denoised {
+    /// The effect.
+    pub report: DenoiseReport,
+    /// Unit normal of either sign of each point where a cubic follows the noisy points, zero elsewhere.
+    pub normals: Vec<Vec3>,
+}
+
 impl DenoiseReport {
     /// Returns a line about the moved points for the user.
     pub fn line(&self) -> String {
@@ -67,7 +77,7 @@ impl DenoiseReport {
     }
 }
 
-/// Moves the points of a cloud onto their surface, and returns what was done; none if the points stay. Points that
+/// Moves the points of a cloud onto their surface; returns none if the points stay. Points that
 /// morph targets or joints move stay where they are.
 ///
 /// # Errors
@@ -78,7 +88,7 @@ pub fn denoise(
     cloud: &mut PointCloud,
     choice: Denoise,
     progress: &dyn Progress,
-) -> Result<Option<DenoiseReport>> {
+) -> Result<Option<Denoised>> {
     let is_animated = !cloud.morphs.is_empty() || cloud.skin.is_some();
     let is_auto = choice == Denoise::Auto;
     if is_animated || choice == Denoise::Off || (is_auto && cloud.normals.is_some()) {
@@ -97,14 +107,17 @@ pub fn denoise(
         let wanted = |noise: f32| (NEIGHBORS_PER_NOISE * noise).clamp(MIN_NEIGHBORS, MAX_NEIGHBORS);
         noise.map_or(0, |noise| wanted(noise) as u32)
     };
-    let counts: Vec<u32> = noise.at_points(&tree, progress)?.iter().map(count).collect();
-    let moved = moved(&tree, &groups, &order, &counts, progress)?;
+    let noises = noise.at_points(&tree, progress)?;
+    let counts: Vec<u32> = noises.iter().map(count).collect();
+    let (moved, normals): (Vec<Vec3>, Vec<Vec3>) =
+        moved(&tree, &groups, &order, &counts, &noises, progress)?.into_iter().unzip();
     let distances = positions.iter().zip(&moved).map(|(from, to)| f64::from(from.distance(*to)));
     let sum: f64 = distances.sum();
     let n_moved = positions.iter().zip(&moved).filter(|(from, to)| from != to).count();
     let mean_distance = (sum / n_moved.max(1) as f64) as f32;
     cloud.positions = moved;
-    Ok(Some(DenoiseReport { noise: noise.median(), n_moved, mean_distance }))
+    let report = DenoiseReport { noise: noise.median(), n_moved, mean_distance };
+    Ok(Some(Denoised { report, normals }))
 }
 
 /// Returns the means of groups of points that follow each other in `order`.
@@ -116,15 +129,16 @@ fn means_of_groups(positions: &[Vec3], order: &[u32]) -> Vec<Vec3> {
     order.par_chunks(GROUP_SIZE).map(mean).collect()
 }
 
-/// Returns the points moved onto their surface. `groups` are the means of groups of points in `order`, and `counts` the
+/// Returns the points moved onto their surface, and their normals where these are known. `groups` are the means of groups of points in `order`, and `counts` the
 /// numbers of neighbours that take part, zero for points that stay.
 fn moved(
     tree: &KdTree,
     groups: &KdTree,
     order: &[u32],
     counts: &[u32],
+    noises: &[Option<f32>],
     progress: &dyn Progress,
-) -> Result<Vec<Vec3>> {
+) -> Result<Vec<(Vec3, Vec3)>> {
     let positions = tree.positions();
     // Points and groups beside those that are used take part in the normals of these.
     let of_group = |group: &[u32]| {
@@ -144,9 +158,17 @@ fn moved(
         }
         let count = counts[point];
         Ok(match count {
-            0 => *position,
-            _ if count < MIN_GROUPED => points.moved(*position, count, 1.0),
-            _ => groups.moved(*position, count.div_ceil(GROUP_SIZE as u32), GROUP_SIZE as f32),
+            0 => (*position, Vec3::ZERO),
+            _ if count < MIN_GROUPED => {
+                let (normal, noise) = (points.normals[point], noises[point].unwrap_or_default());
+                let jet = fit_wide_jet(tree, point, normal, noise);
+                let normal = jet.map_or(Vec3::ZERO, |jet| jet.normal);
+                (points.moved(*position, count, 1.0), normal)
+            }
+            _ => {
+                let count = count.div_ceil(GROUP_SIZE as u32);
+                (groups.moved(*position, count, GROUP_SIZE as f32), Vec3::ZERO)
+            }
         })
     };
     positions.par_iter().enumerate().map(moved).collect()
@@ -294,7 +316,7 @@ mod tests {
     fn noise_is_measured_and_most_of_it_removed() {
         for noise in [0.3, 1.0, 2.0] {
             let mut cloud = noisy_plane(noise);
-            let report = denoise(&mut cloud, Denoise::Auto, &NoProgress).unwrap().unwrap();
+            let report = denoise(&mut cloud, Denoise::Auto, &NoProgress).unwrap().unwrap().report;
             let measured = report.noise / noise as f32;
             assert!((0.7..1.3).contains(&measured), "{noise}: {report:?}");
             assert_eq!(report.n_moved, cloud.len());
@@ -341,7 +363,8 @@ mod tests {
         for points in [Vec::new(), vec![Vec3::ONE], vec![Vec3::ONE; 1000], line, few] {
             let cloud = PointCloud::from_positions(points);
             let mut moved = cloud.clone();
-            let report = denoise(&mut moved, Denoise::On, &NoProgress).unwrap().unwrap();
+            let found = denoise(&mut moved, Denoise::On, &NoProgress).unwrap().unwrap();
+            let report = found.report;
             assert_eq!((report.n_moved, &moved), (0, &cloud));
         }
     }

@@ -189,7 +189,8 @@ fn decide(
         return shape(Structure::Line, fit.normal);
     }
     let is_surface = typical.is_surface(fit, radius);
-    if is_surface && fit.variation < MIN_EDGE_VARIATION.max(2.5 * typical.variation) {
+    let is_even = fit.variation < MIN_EDGE_VARIATION.max(2.5 * typical.variation);
+    if is_surface && (is_even || fit.is_smooth) {
         return shape(Structure::Surface, fit.normal);
     }
     let positions = tree.positions();

@@ -8,6 +8,7 @@ mod filter;
 mod merge;
 pub mod neighbors;
 mod normals;
+mod jets;
 mod orient;
 mod prepared_cloud;
 mod radius;

@@ -20,6 +20,8 @@ pub struct PlaneFit {
     pub variation: f32,
     /// Ratio of the middle to the largest eigenvalue: 0 on a line, 1 in a round neighbourhood.
     pub width: f32,
+    /// True if a smooth surface passes through the neighbours: they are not on different sides of an edge.
+    pub is_smooth: bool,
 }
 
 /// Numbers of normals by their origin.
@@ -51,6 +53,7 @@ pub fn fit_plane(positions: &[Vec3], point_idx: usize, neighbors: &[Neighbor]) -
         normal: canonical_sign(normal.as_vec3().normalize()),
         variation: variation as f32,
         width,
+        is_smooth: false,
     }
 }
 
@@ -71,7 +74,7 @@ fn covariance(positions: &[Vec3], point_idx: usize, neighbors: &[Neighbor]) -> S
 }
 
 /// Returns the normal or its opposite, whichever has a positive last non-zero component.
-fn canonical_sign(normal: Vec3) -> Vec3 {
+pub(super) fn canonical_sign(normal: Vec3) -> Vec3 {
     let leading = [normal.z, normal.y, normal.x].into_iter().find(|&x| x != 0.0).unwrap_or(1.0);
     if leading < 0.0 { -normal } else { normal }
 }

@@ -2,6 +2,7 @@
 
 use super::denoise::{Denoise, DenoiseReport, denoise};
 use super::find_structures::{all_scattered, find_structures};
+use super::jets::{JetFit, MIN_JET_NEIGHBORS, fit_nearest_jet, refine_normals};
 use super::neighbors::{KdTree, Neighbor, NeighborMethod, Neighborhood, map_neighborhoods};
 use super::normals::{NormalReport, PlaneFit, fill_missing, fit_plane};
 use super::orient::{Orientation, orient};
@@ -118,12 +119,14 @@ pub fn prepare(
     if cloud.is_empty() {
         return Err(Error::EmptyCloud);
     }
-    let denoise = denoise(&mut cloud, preparation.denoise, progress)?;
+    let denoised = denoise(&mut cloud, preparation.denoise, progress)?;
+    let (denoise, denoised_normals) = denoised.map(|found| (found.report, found.normals)).unzip();
     let missing = Missing::any(&cloud, preparation);
     let estimated = Missing::all(&cloud);
     let mut report =
         PreparationReport { clean, denoise, n_points: cloud.len(), ..Default::default() };
-    let mut estimates = estimate(&cloud.positions, preparation, &missing, progress)?;
+    let mut estimates =
+        estimate(&cloud.positions, denoised_normals.as_deref(), preparation, &missing, progress)?;
     let shapes = match missing.structure {
         true => find_shapes(&cloud.positions, &mut estimates, preparation.structure, progress)?,
         false => None,
@@ -190,9 +193,11 @@ struct Estimates {
     radii: Option<(Vec<f32>, RadiusReport)>,
 }
 
-/// Fits planes and estimates radii as far as they are missing.
+/// Fits planes and estimates radii as far as they are missing. `normals` are those that denoising has found, zero where
+/// it has not.
 fn estimate(
     positions: &[Vec3],
+    normals: Option<&[Vec3]>,
     preparation: &Preparation,
     missing: &Missing,
     progress: &dyn Progress,
@@ -210,7 +215,7 @@ fn estimate(
         missing.fits,
         missing.radii,
     ) {
-        return estimate_together(positions, k_normal, k_radius, progress);
+        return estimate_together(positions, normals, k_normal, k_radius, progress);
     }
     let mut estimates = Estimates::default();
     if missing.fits {
@@ -226,6 +231,7 @@ fn estimate(
 /// Fits planes and estimates radii with one search for neighbours.
 fn estimate_together(
     positions: &[Vec3],
+    normals: Option<&[Vec3]>,
     k_normal: usize,
     k_radius: usize,
     progress: &dyn Progress,
@@ -233,12 +239,15 @@ fn estimate_together(
     let tree = KdTree::new(positions, progress)?;
     let visit = |point: usize, neighbors: &[Neighbor]| {
         let fit = fit_plane(positions, point, &neighbors[..k_normal.min(neighbors.len())]);
-        (fit, kth_distance(neighbors, k_radius))
+        let jet = fit_nearest_jet(positions, point, neighbors, &fit, k_normal);
+        (fit, jet, kth_distance(neighbors, k_radius))
     };
-    let both = tree.map(Neighborhood::Nearest(k_normal.max(k_radius)), progress, visit)?;
-    // The fits reuse the memory of the pairs, which `unzip` would not.
-    let distances = both.iter().map(|(_, distance)| *distance).collect();
-    let fits = both.into_iter().map(|(fit, _)| fit).collect();
+    let k = k_normal.max(k_radius).max(MIN_JET_NEIGHBORS);
+    let found = tree.map(Neighborhood::Nearest(k), progress, visit)?;
+    let distances = found.iter().map(|(.., distance)| *distance).collect();
+    let jets: Vec<Option<JetFit>> = found.iter().map(|(_, jet, _)| *jet).collect();
+    let mut fits: Vec<PlaneFit> = found.into_iter().map(|(fit, ..)| fit).collect();
+    refine_normals(&tree, &mut fits, &jets, normals, progress)?;
     let radii = clamp_outlier_radii(&tree, k_radius, distances, progress)?;
     Ok(Estimates { fits: Some((fits, Neighborhood::Nearest(k_normal))), radii: Some(radii) })
 }
@@ -364,7 +373,7 @@ fn add_to_morphs(
         if !moved.iter().all(|position| position.is_finite()) {
             continue;
         }
-        let estimates = estimate(&moved, preparation, estimated, &WithoutNotes(progress))?;
+        let estimates = estimate(&moved, None, preparation, estimated, &WithoutNotes(progress))?;
         if let (Some((fits, _)), Some(normals)) = (estimates.fits, &*normals) {
             let added = |(fit, normal): (&PlaneFit, &Vec3)| match fit.normal {
                 // Without a plane at the target, the normal stays; otherwise it keeps its side.
