@@ -167,6 +167,17 @@ impl PointBlock {
         Vec3::new(axis(0), axis(10), axis(20)).normalize()
     }
 
+    /// Returns the least distance between two points in units of their mean radius; none if the block is not full.
+    pub(super) fn min_distance(&self) -> Option<f32> {
+        let is_full = self.occupied_lanes() == u8::MAX;
+        let mut min = f32::INFINITY;
+        for (a, b) in (0..LANES).flat_map(|a| (0..a).map(move |b| (a, b))) {
+            let reach = 0.5 * (self.radius(a) + self.radius(b));
+            min = min.min(self.position(a).distance(self.position(b)) / reach);
+        }
+        is_full.then_some(min)
+    }
+
     /// Returns the radius of the point in `lane`, which is 0 if the lane is unused.
     pub fn radius(&self, lane: usize) -> f32 {
         self.radius_steps(lane) as f32 * self.radius_step()

@@ -11,7 +11,7 @@ use crate::points::Structure;
 use crate::progress::Progress;
 use crate::scene::CloudGeometry;
 use crate::scene::color::SupportColors;
-use crate::surface::{EdgeTest, SurfaceKind};
+use crate::surface::{EdgeTest, SurfaceKind, edge_retest_factor};
 
 /// A point cloud with the surface that its points describe.
 #[derive(Clone, Debug, Default)]
@@ -26,6 +26,8 @@ pub struct FlatCloud {
     pub surface: SurfaceKind,
     /// The test that decides where the surface ends.
     pub edge_test: EdgeTest,
+    /// Factor on the radius of the neighbourhood that decides about a hit which the nearest points do not enclose.
+    pub edge_retest_factor: f32,
     /// True if normals point out of the body that the points enclose.
     pub has_outward_normals: bool,
     /// True if colours may be blended; false if each belongs to one point, as those of classes do.
@@ -73,8 +75,10 @@ impl FlatCloud {
             lines = FlatPoints::new(parts.lines, progress)?;
             scatter = FlatPoints::new(parts.scatter, progress)?;
         }
+        let points = FlatPoints::new(surface_columns, progress)?;
         let mut flat = Self {
-            points: FlatPoints::new(surface_columns, progress)?,
+            edge_retest_factor: edge_retest_factor(points.evenness()),
+            points,
             lines,
             scatter,
             surface: geometry.surface,

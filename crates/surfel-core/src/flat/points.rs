@@ -93,6 +93,21 @@ impl FlatPoints {
         self.blocks.par_iter().map(PointBlock::max_radius).reduce(|| 0.0, f32::max)
     }
 
+    /// Returns how evenly the points are placed: the median, over a sample of blocks, of the least distance between
+    /// two of a block's points in radii. It is about 0.4 for evenly spaced points and 0.15 for random ones; infinite
+    /// if no block is full.
+    pub(super) fn evenness(&self) -> f32 {
+        const N_SAMPLES: usize = 1000;
+        let step = self.blocks.len().div_ceil(N_SAMPLES).max(1);
+        let sample = self.blocks.iter().step_by(step);
+        let mut distances: Vec<f32> = sample.filter_map(PointBlock::min_distance).collect();
+        let middle = distances.len() / 2;
+        if distances.is_empty() {
+            return f32::INFINITY;
+        }
+        *distances.select_nth_unstable_by(middle, f32::total_cmp).1
+    }
+
     /// Returns the radius of the point at `slot`.
     pub fn radius(&self, slot: Slot) -> f32 {
         self.blocks[slot as usize / LANES].radius(slot as usize % LANES)

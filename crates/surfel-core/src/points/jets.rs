@@ -44,7 +44,8 @@ pub struct JetFit {
     pub residual: f32,
 }
 
-/// Returns the cubic through the nearest neighbours of a point; none if a plane fits fewer of them better.
+/// Returns the cubic through the nearest neighbours of a point, or the plane if it fits fewer of them better; none if
+/// they determine neither.
 ///
 /// `fit` is the plane through `n_plane_neighbors` of them.
 pub fn fit_nearest_jet(
@@ -54,12 +55,16 @@ pub fn fit_nearest_jet(
     fit: &PlaneFit,
     n_plane_neighbors: usize,
 ) -> Option<JetFit> {
-    let of_plane = plane_residual(fit, n_plane_neighbors);
-    if of_plane < MIN_PLANE_RESIDUAL {
+    if fit.normal == Vec3::ZERO {
         return None;
     }
+    let of_plane = plane_residual(fit, n_plane_neighbors);
+    let plane = JetFit { normal: fit.normal, residual: of_plane };
+    if of_plane < MIN_PLANE_RESIDUAL {
+        return Some(plane);
+    }
     let jet = fit_jet(positions, point_idx, neighbors, fit.normal)?;
-    (jet.residual <= MAX_PLANE_RATIO * of_plane).then_some(jet)
+    Some(if jet.residual <= MAX_PLANE_RATIO * of_plane { jet } else { plane })
 }
 
 /// Fits a cubic to as many neighbours as the noise in spacings asks for, or down to half as many until they are on one

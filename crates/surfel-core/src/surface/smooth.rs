@@ -12,6 +12,9 @@ pub const FIT_REACH: f32 = 1.4;
 pub(super) const SPAWN_OFFSET: f32 = 0.2;
 /// The distance before which secondary rays ignore hits, in radii.
 pub(super) const SPAWN_T_MIN: f32 = 0.5;
+/// Factors of `edge_retest_factor` for evenly spaced and for random points.
+const EDGE_RETEST_EVEN: f32 = 1.3;
+const EDGE_RETEST_RANDOM: f32 = 1.5;
 /// Steps per unit to which the terms of sums are rounded. f32 adds a thousand terms of up to 1 exactly, so that
 /// sums do not depend on the order of points.
 const STEPS: f32 = 16_384.0;
@@ -26,6 +29,15 @@ const MAX_CURVATURE: f32 = 1.0;
 const MAX_PLANE_DISTANCE: f32 = 0.8;
 /// Maximum distance along the ray from the position of a fit to the sphere, in radii.
 const MAX_STEP: f32 = 1.5;
+
+/// Factor on the radius of the neighbourhood that decides about a hit which the nearest points do not enclose, by how
+/// evenly the points are placed: the distance between the nearest of eight points in radii. Between unevenly placed
+/// points a wider neighbourhood closes the gap; beyond the edge of the surface none does.
+pub fn edge_retest_factor(evenness: f32) -> f32 {
+    let (even, random) = ((0.4, EDGE_RETEST_EVEN), (0.15, EDGE_RETEST_RANDOM));
+    let fraction = ((even.0 - evenness) / (even.0 - random.0)).clamp(0.0, 1.0);
+    even.1 + fraction * (random.1 - even.1)
+}
 
 /// Weighted sums over the points around positions, one position or one point per lane.
 #[derive(Clone, Copy)]

@@ -26,9 +26,6 @@ const TOLERANCE: f32 = 0.01;
 const MAX_LAST_STEP: f32 = 0.2;
 /// Maximum distance along the ray between the disc that was hit and the surface, in radii.
 const MAX_DISTANCE_FROM_DISC: f32 = 1.0;
-/// Factor on the radius of the neighbourhood that decides about a hit which the points around do not enclose: between
-/// unevenly placed points a wider one closes the gap, beyond the edge of the surface none does.
-const WIDER: f32 = 1.3;
 /// Maximum distance of hits that share a traversal of the tree from the first one along any axis, in radii.
 const MAX_GROUP_SPREAD: f32 = 2.0;
 
@@ -238,7 +235,7 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
         accepted &= enclosed & !sparse;
         let open = lanes & !accepted;
         if open != 0 {
-            let radius = L::PacketLanes::splat(WIDER) * radius;
+            let radius = L::PacketLanes::splat(cloud.edge_retest_factor) * radius;
             let hits = PacketCandidates { position, normal: hits.normals, direction, radius };
             accepted |= enclosed_lanes::<L, false>(&cloud.points, open, &hits);
         }
@@ -421,15 +418,16 @@ impl<L: Lanes> SimdTask for TestSurface<'_, L> {
         ray.t_min <= distance
             && distance <= ray.t_max
             && (cloud.edge_test == EdgeTest::Off
-                || is_within_edge::<L>(points, ray.at(distance), candidate))
+                || is_within_edge::<L>(self.cloud, ray.at(distance), candidate))
     }
 }
 
 /// True if the points around a hit enclose it, or those of a wider neighbourhood.
 #[inline(always)]
-fn is_within_edge<L: Lanes>(points: &FlatPoints, position: Vec3, hit: CandidateHit) -> bool {
+fn is_within_edge<L: Lanes>(cloud: &FlatCloud, position: Vec3, hit: CandidateHit) -> bool {
+    let points = &cloud.points;
     let EdgeTestResult { enclosed, sparse } = evaluate_one::<L, false>(points, position, hit);
-    let wider = CandidateHit { radius: WIDER * hit.radius, ..hit };
+    let wider = CandidateHit { radius: cloud.edge_retest_factor * hit.radius, ..hit };
     enclosed & !sparse != 0 || is_enclosed::<L, false>(points, position, wider)
 }
 
