@@ -130,6 +130,9 @@ fn prepared(
     }
     let mut preparation = Preparation { denoise: mode, ..settings.preparation(seed) };
     preparation.keep_variation = columns.variation;
+    if columns.normals && settings.preparation.orient.is_none() {
+        preparation.orientation = Orientation::Auto;
+    }
     let (had_normals, had_radii) = (cloud.normals.is_some(), cloud.radii.is_some());
     let (cloud, prepared) = prepare(cloud, &preparation, report)?;
     let mut cloud = cloud.into_inner();
@@ -156,7 +159,7 @@ fn columns(args: &Args, settings: &ObjectSettings) -> Columns {
     let columns = Columns {
         normals: args.normals
             || preparation.estimates_normals()
-            || preparation.orient() != Orientation::None,
+            || preparation.orient.is_some_and(|orient| orient != Orientation::None),
         radii: preparation.radius.is_some(),
         variation: args.keep_variation,
     };

@@ -332,7 +332,13 @@ struct IslandCandidate {
 }
 
 /// Gives a point the direction and the radius of its final structure. Surface points keep what was decided.
-fn settle(tree: &KdTree, point: usize, radius: f32, structure: Structure, shape: &mut PointShape) {
+pub(super) fn settle(
+    tree: &KdTree,
+    point: usize,
+    radius: f32,
+    structure: Structure,
+    shape: &mut PointShape,
+) {
     let position = tree.positions()[point];
     match structure {
         Structure::Surface | Structure::Redundant => {}

@@ -220,6 +220,7 @@ mod tests {
         let stations = names.iter().enumerate().map(|(i, name)| ScanStation {
             name: (*name).into(),
             position: Some(DVec3::splat(i as f64)),
+            ..ScanStation::default()
         });
         let column =
             indices.map(|indices| Scalar { name: STATION.into(), values: Values::U16(indices) });

@@ -1,7 +1,9 @@
 //! Orientation of normals, which decides the front side of a surface.
 
-use super::PointCloud;
 use super::neighbors::{KdTree, Neighborhood};
+use super::scan_angle::SightLines;
+use super::up::is_terrain;
+use super::{PointCloud, is_valid_position};
 use crate::error::{Error, Result};
 use crate::math::{DVec3, Vec3};
 use crate::progress::Progress;
@@ -21,10 +23,15 @@ pub enum Orientation {
     /// No rule: the sign has no meaning.
     #[default]
     None,
+    /// The first of these that the cloud tells enough for: its stations, scan angles, up if it is terrain, else a
+    /// spanning tree.
+    Auto,
     /// Toward a point in world coordinates, as a scanner's position.
     Viewpoint(DVec3),
     /// Toward the station of each point's scan. Normals of points whose station is not known stay.
     Station,
+    /// Along the line of sight that the scan angles of an airborne scan tell. Without them, up.
+    ScanAngle,
     /// Toward +Z, as for airborne scans.
     Up,
     /// Propagated along a minimum spanning tree from neighbour to neighbour, the most parallel first (Hoppe et al.
@@ -46,21 +53,69 @@ pub fn orient(
 ) -> Result<Vec<Vec3>> {
     match orientation {
         Orientation::None => Ok(normals),
+        Orientation::Auto => {
+            let chosen = choose_orientation(cloud, &normals);
+            progress.choice(&format!("front sides {}", chosen.reason()), &["orient"]);
+            orient(cloud, normals, chosen, progress)
+        }
         Orientation::Viewpoint(world_viewpoint) => {
             let viewpoint = world_viewpoint - cloud.origin;
             Ok(flip_if(normals, |i, normal| {
                 (viewpoint - cloud.positions[i].as_dvec3()).dot(normal.as_dvec3()) < 0.0
             }))
         }
-        Orientation::Station => Ok(flip_if(normals, |i, normal| {
-            let station = cloud.station_of(i).and_then(|station| station.position);
-            station.is_some_and(|station| {
-                (station - cloud.world_position(i)).dot(normal.as_dvec3()) < 0.0
-            })
-        })),
+        Orientation::Station => {
+            let mut normals = normals;
+            turn_to_stations(cloud, &mut normals);
+            Ok(normals)
+        }
+        Orientation::ScanAngle => {
+            let sights = SightLines::new(cloud);
+            let toward = |i: usize| sights.as_ref().map_or(DVec3::Z, |s| s.toward_scanner(i));
+            Ok(flip_if(normals, |i, normal| toward(i).dot(normal.as_dvec3()) < 0.0))
+        }
         Orientation::Up => Ok(flip_if(normals, |_, normal| normal.z < 0.0)),
         Orientation::SpanningTree => by_spanning_tree(&cloud.positions, normals, progress),
     }
+}
+
+/// Flips the normals that point away from the known station of their point, and returns their number: no scanner sees a
+/// surface from behind.
+pub(super) fn turn_to_stations(cloud: &PointCloud, normals: &mut [Vec3]) -> usize {
+    let turned = normals.par_iter_mut().enumerate().filter(|(i, normal)| {
+        let station = cloud.station_of(*i).and_then(|station| station.position);
+        let offset = station.map_or(DVec3::ZERO, |station| station - cloud.world_position(*i));
+        offset.dot(normal.as_dvec3()) < 0.0
+    });
+    turned.map(|(_, normal)| *normal = -*normal).count()
+}
+
+/// Returns true if the positions of all stations of a cloud are known.
+pub(super) fn has_stations(cloud: &PointCloud) -> bool {
+    let is_known = cloud.stations.iter().all(|station| station.position.is_some());
+    is_known && (0..cloud.len()).next().is_some_and(|point| cloud.station_of(point).is_some())
+}
+
+/// Returns the most trusted orientation that the columns and the shape of a cloud allow.
+fn choose_orientation(cloud: &PointCloud, normals: &[Vec3]) -> Orientation {
+    if has_stations(cloud) {
+        Orientation::Station
+    } else if SightLines::new(cloud).is_some() {
+        Orientation::ScanAngle
+    } else if is_terrain(&cloud.positions) && are_mostly_steep(cloud, normals) {
+        Orientation::Up
+    } else {
+        Orientation::SpanningTree
+    }
+}
+
+/// Returns true if most surfaces are seen from above: those of terrestrial scans are mostly walls and trunks.
+fn are_mostly_steep(cloud: &PointCloud, normals: &[Vec3]) -> bool {
+    const MIN_STEEPNESS: f32 = 0.5;
+    const MIN_FRACTION: usize = 2;
+    let valid = cloud.positions.par_iter().zip(normals).filter(|(p, _)| is_valid_position(**p));
+    let n_steep = valid.clone().filter(|(_, normal)| MIN_STEEPNESS < normal.z.abs()).count();
+    valid.count() < MIN_FRACTION * n_steep
 }
 
 fn flip_if(mut normals: Vec<Vec3>, is_backward: impl Fn(usize, Vec3) -> bool + Sync) -> Vec<Vec3> {
@@ -240,6 +295,19 @@ struct Component {
     n_points: usize,
 }
 
+impl Orientation {
+    /// Returns the rule in words, as the end of "front sides ...".
+    fn reason(self) -> &'static str {
+        match self {
+            Self::None | Self::Auto | Self::Viewpoint(_) => "as they are",
+            Self::Station => "toward the station of each scan",
+            Self::ScanAngle => "toward the scanner, by scan angles",
+            Self::Up => "up, as the cloud is terrain",
+            Self::SpanningTree => "from neighbour to neighbour, outward",
+        }
+    }
+}
+
 impl FromStr for Orientation {
     type Err = Error;
 
@@ -253,6 +321,8 @@ impl FromStr for Orientation {
         };
         let orientation = match text.split_once(':').unwrap_or((text, "")) {
             ("none", "") => Some(Self::None),
+            ("auto", "") => Some(Self::Auto),
+            ("scan-angle", "") => Some(Self::ScanAngle),
             ("station", "") => Some(Self::Station),
             ("up", "") => Some(Self::Up),
             ("mst", "") => Some(Self::SpanningTree),
@@ -262,7 +332,7 @@ impl FromStr for Orientation {
         orientation.ok_or_else(|| Error::Setting {
             name: "orientation",
             found: text.to_owned(),
-            expected: "none, station, up, mst or viewpoint:x,y,z",
+            expected: "auto, none, station, scan-angle, up, mst or viewpoint:x,y,z",
         })
     }
 }
@@ -273,7 +343,7 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
-    use crate::points::{STATION, Scalar, ScanStation, Values};
+    use crate::points::{SCAN_ANGLE, STATION, Scalar, ScanStation, Values};
     use crate::progress::NoProgress;
 
     /// Two separate balls, with a third of their outward normals flipped.
@@ -333,8 +403,9 @@ mod tests {
 
     #[test]
     fn normals_point_to_the_station_of_their_scan() {
-        let station = |x: f64| ScanStation { name: String::new(), position: Some(DVec3::X * x) };
-        let unknown = ScanStation { name: String::new(), position: None };
+        let station =
+            |x: f64| ScanStation { position: Some(DVec3::X * x), ..ScanStation::default() };
+        let unknown = ScanStation { position: None, ..ScanStation::default() };
         let indices = Values::U16(vec![0, 1, 2]);
         let cloud = PointCloud {
             origin: DVec3::new(1e6, 0.0, 0.0),
@@ -344,6 +415,49 @@ mod tests {
         };
         let found = orient(&cloud, vec![Vec3::X; 3], Orientation::Station, &NoProgress).unwrap();
         assert_eq!(found, [-Vec3::X, Vec3::X, Vec3::X]);
+    }
+
+    #[test]
+    fn the_most_trusted_orientation_is_chosen() {
+        let ground = |i: usize| Vec3::new((i % 100) as f32, (i / 100) as f32, 0.0);
+        let terrain = PointCloud::from_positions((0..10_000).map(ground).collect());
+        let normals = vec![Vec3::NEG_Z; terrain.len()];
+        assert_eq!(choose_orientation(&terrain, &normals), Orientation::Up);
+        let walls = vec![Vec3::X; terrain.len()];
+        assert_eq!(choose_orientation(&terrain, &walls), Orientation::SpanningTree);
+        let mut flight = terrain.clone();
+        let angles = Values::F32((0..10_000).map(|i| (i % 100) as f32 - 50.0).collect());
+        flight.scalars.push(Scalar { name: SCAN_ANGLE.into(), values: angles });
+        assert_eq!(choose_orientation(&flight, &normals), Orientation::ScanAngle);
+        let station = |position| ScanStation { position, ..ScanStation::default() };
+        let scan = PointCloud { stations: vec![station(Some(DVec3::Z))], ..flight.clone() };
+        assert_eq!(choose_orientation(&scan, &normals), Orientation::Station);
+        let unposed = PointCloud { stations: vec![station(None)], ..flight };
+        assert_eq!(choose_orientation(&unposed, &normals), Orientation::ScanAngle);
+        let (balls, mixed) = balls();
+        assert_eq!(choose_orientation(&balls, &mixed), Orientation::SpanningTree);
+        let found = orient(&balls, mixed, Orientation::Auto, &NoProgress).unwrap();
+        assert_eq!(Some(found), balls.normals);
+    }
+
+    #[test]
+    fn walls_face_the_scanner_that_the_scan_angle_tells() {
+        let position = |i: usize| Vec3::new((i % 100) as f32 - 50.0, (i / 100) as f32, 0.0);
+        let angle = |i: usize| (position(i).x / 100.0).atan().to_degrees();
+        let cloud = PointCloud {
+            scalars: vec![Scalar {
+                name: SCAN_ANGLE.into(),
+                values: Values::F32((0..2000).map(angle).collect()),
+            }],
+            ..PointCloud::from_positions((0..2000).map(position).collect())
+        };
+        let found = orient(&cloud, vec![Vec3::X; 2000], Orientation::ScanAngle, &NoProgress);
+        for (position, normal) in cloud.positions.iter().zip(found.unwrap()) {
+            assert!(position.x.abs() < 1.0 || normal.x * position.x < 0.0, "{position}");
+        }
+        let unknown = PointCloud::from_positions(vec![Vec3::ZERO]);
+        let found = orient(&unknown, vec![Vec3::NEG_Z], Orientation::ScanAngle, &NoProgress);
+        assert_eq!(found.unwrap(), [Vec3::Z]);
     }
 
     #[test]

@@ -2,10 +2,12 @@
 
 use super::denoise::{Denoise, DenoiseReport, denoise};
 use super::find_structures::{all_scattered, find_structures};
+use super::free_space::narrow_to_free_space;
 use super::jets::{JetFit, MIN_JET_NEIGHBORS, fit_nearest_jet, refine_normals};
+use super::mixed_pixels::{MixedPixels, without_mixed_pixels};
 use super::neighbors::{KdTree, Neighbor, NeighborMethod, Neighborhood, map_neighborhoods};
 use super::normals::{NormalReport, PlaneFit, fill_missing, fit_plane};
-use super::orient::{Orientation, orient};
+use super::orient::{Orientation, has_stations, orient, turn_to_stations};
 use super::outliers::{OutlierRemoval, remove_outliers};
 use super::radius::{DistanceSample, Radius, RadiusReport, median_distance};
 use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
@@ -21,6 +23,8 @@ pub const SURFACE_VARIATION: &str = "surface_variation";
 /// Settings of [`prepare`]. The default suits raw scans.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Preparation {
+    /// The choice whether points in the air between two surfaces are dropped, where the grid of a scan tells them.
+    pub mixed_pixels: MixedPixels,
     /// The points to keep; none keeps all.
     pub subsample: Option<Subsample>,
     /// The outliers to remove; none keeps all points.
@@ -31,12 +35,16 @@ pub struct Preparation {
     pub neighbors: NeighborMethod,
     /// The neighbours whose plane gives a normal. Methods that know only distances use the median distance to k.
     pub normals: Neighborhood,
-    /// The signs of normals. Applies if all normals are estimated.
+    /// The signs of normals. Applies if all normals are estimated; `Orientation::Auto` also turns those of the file to
+    /// the stations, if these are known.
     pub orientation: Orientation,
     /// The choice of radii.
     pub radius: Radius,
     /// The choice of structures. Applies if all radii are estimated by `Radius::Adaptive`.
     pub structure: StructureChoice,
+    /// True to narrow what reaches into space through which a scanner saw, where the grid of a scan tells it. Applies if
+    /// structures are found.
+    pub free_space: bool,
     /// True to add the column `SURFACE_VARIATION`: 0 on a plane, up to 1/3.
     pub keep_variation: bool,
     /// Seed of all random choices.
@@ -46,6 +54,7 @@ pub struct Preparation {
 impl Default for Preparation {
     fn default() -> Self {
         Self {
+            mixed_pixels: MixedPixels::default(),
             subsample: None,
             remove_outliers: None,
             denoise: Denoise::default(),
@@ -54,6 +63,7 @@ impl Default for Preparation {
             orientation: Orientation::None,
             radius: Radius::default(),
             structure: StructureChoice::default(),
+            free_space: true,
             keep_variation: false,
             seed: 0,
         }
@@ -110,6 +120,14 @@ pub fn prepare(
 ) -> Result<(PreparedCloud, PreparationReport)> {
     preparation.check()?;
     let (mut cloud, clean) = clean(cloud, progress)?;
+    if preparation.mixed_pixels == MixedPixels::Drop
+        && let Some(kept) = without_mixed_pixels(&cloud)
+    {
+        let n_mixed = cloud.len() - kept.len();
+        let line = format!("{n_mixed} mixed pixels between two surfaces dropped");
+        progress.choice(&line, &["mixed_pixels"]);
+        cloud = cloud.subset(&kept);
+    }
     if let Some(choice) = preparation.subsample {
         cloud = subsample(&cloud, choice, preparation.seed, progress)?;
     }
@@ -128,7 +146,7 @@ pub fn prepare(
     let mut estimates =
         estimate(&cloud.positions, denoised_normals.as_deref(), preparation, &missing, progress)?;
     let shapes = match missing.structure {
-        true => find_shapes(&cloud.positions, &mut estimates, preparation.structure, progress)?,
+        true => find_shapes(&cloud, &mut estimates, preparation, progress)?,
         false => None,
     };
     if let Some((fits, neighborhood)) = estimates.fits {
@@ -141,6 +159,9 @@ pub fn prepare(
             report.normals = Some(found);
             report.normals_from = Some(neighborhood);
         }
+    }
+    if preparation.orientation == Orientation::Auto && !estimated.normals {
+        turn_given_normals(&mut cloud, progress);
     }
     if let Some((radii, found)) = estimates.radii {
         add_radii(&mut cloud, radii);
@@ -254,33 +275,44 @@ fn estimate_together(
 
 /// Finds the structures of points, and replaces the estimates by those of their structure.
 fn find_shapes(
-    positions: &[Vec3],
+    cloud: &PointCloud,
     estimates: &mut Estimates,
-    choice: StructureChoice,
+    preparation: &Preparation,
     progress: &dyn Progress,
 ) -> Result<Option<(Vec<PointShape>, StructureReport)>> {
-    let Some((radii, report)) = &mut estimates.radii else { return Ok(None) };
-    let tree = KdTree::new(positions, progress)?;
-    let found = match (choice, &mut estimates.fits) {
-        (StructureChoice::Auto, Some((fits, _))) => {
-            let found = find_structures(&tree, fits, radii, progress)?;
-            for (fit, shape) in fits.iter_mut().zip(&found.0) {
-                if shape.structure == Structure::Surface {
-                    fit.normal = shape.normal;
-                }
-            }
-            found
-        }
+    let Estimates { fits, radii: Some((radii, report)) } = estimates else { return Ok(None) };
+    let tree = KdTree::new(&cloud.positions, progress)?;
+    let (mut shapes, mut found) = match (preparation.structure, &mut *fits) {
+        (StructureChoice::Auto, Some((fits, _))) => find_structures(&tree, fits, radii, progress)?,
         _ => all_scattered(&tree, radii, progress)?,
     };
-    *radii = found.0.iter().map(|shape| shape.radius).collect();
+    if preparation.free_space {
+        let fits = fits.as_ref().map_or(&[][..], |(fits, _)| fits);
+        let report = narrow_to_free_space(cloud, &tree, fits, &mut shapes, progress)?;
+        report.line().iter().for_each(|line| progress.choice(line, &["free_space"]));
+        if 0 < report.n_lines {
+            found = StructureReport::of(&structures_of(&shapes));
+        }
+    }
+    if let (StructureChoice::Auto, Some((fits, _))) = (preparation.structure, fits) {
+        for (fit, shape) in fits.iter_mut().zip(&shapes) {
+            if shape.structure == Structure::Surface {
+                fit.normal = shape.normal;
+            }
+        }
+    }
+    *radii = shapes.iter().map(|shape| shape.radius).collect();
     report.update(radii);
-    Ok(Some(found))
+    Ok(Some((shapes, found)))
+}
+
+fn structures_of(shapes: &[PointShape]) -> Vec<Structure> {
+    shapes.iter().map(|shape| shape.structure).collect()
 }
 
 /// Adds the column of structures, and gives the points of lines the direction of the line in place of a normal.
 fn add_structures(cloud: &mut PointCloud, shapes: &[PointShape]) {
-    let structures: Vec<Structure> = shapes.iter().map(|shape| shape.structure).collect();
+    let structures = structures_of(shapes);
     if let Some(normals) = &mut cloud.normals {
         for (normal, shape) in normals.iter_mut().zip(shapes) {
             if shape.structure == Structure::Line {
@@ -344,6 +376,17 @@ fn add_normals(
     }
     cloud.normals = Some(normals);
     Ok(report)
+}
+
+/// Turns the normals of the file to the stations, if these are known.
+fn turn_given_normals(cloud: &mut PointCloud, progress: &dyn Progress) {
+    let Some(mut normals) = cloud.normals.take() else { return };
+    let n_turned = if has_stations(cloud) { turn_to_stations(cloud, &mut normals) } else { 0 };
+    if 0 < n_turned {
+        let line = format!("{n_turned} normals of the file turned toward the station of each scan");
+        progress.choice(&line, &["orient"]);
+    }
+    cloud.normals = Some(normals);
 }
 
 fn add_radii(cloud: &mut PointCloud, estimated: Vec<f32>) {

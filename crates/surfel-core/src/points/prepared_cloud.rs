@@ -67,6 +67,11 @@ impl PreparedCloud {
         radii.for_each(|radius| *radius *= factor);
     }
 
+    /// Drops the scalar columns of these names.
+    pub fn drop_scalars(&mut self, names: &[&str]) {
+        self.cloud.scalars.retain(|scalar| !names.contains(&scalar.name.as_str()));
+    }
+
     /// Returns the points at `indices`, in that order, with all their columns.
     pub fn subset(&self, indices: &[u32]) -> Self {
         Self { cloud: self.cloud.subset(indices) }
@@ -108,7 +113,7 @@ mod tests {
     //! Checks of the columns that tracing needs.
 
     use super::*;
-    use crate::points::Skin;
+    use crate::points::{Scalar, Skin, Values};
 
     fn cloud() -> PointCloud {
         PointCloud {
@@ -126,6 +131,15 @@ mod tests {
         assert_eq!(prepared.subset(&[1]).positions(), [Vec3::X]);
         assert_eq!(prepared.into_inner(), cloud());
         assert!(PreparedCloud::new(PreparedCloud::default().into_inner()).is_ok());
+    }
+
+    #[test]
+    fn scalar_columns_are_dropped_by_name() {
+        let scalar = |name: &str| Scalar { name: name.into(), values: Values::U8(vec![1; 2]) };
+        let scalars = ["row_index", "time"].map(scalar).to_vec();
+        let mut prepared = PreparedCloud::new(PointCloud { scalars, ..cloud() }).unwrap();
+        prepared.drop_scalars(&["row_index", "column_index"]);
+        assert_eq!(prepared.scalars, [scalar("time")]);
     }
 
     #[test]

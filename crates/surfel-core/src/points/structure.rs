@@ -122,6 +122,13 @@ pub struct PointShape {
     pub radius: f32,
 }
 
+impl PointShape {
+    /// Returns true for the disc of a surface, whether it is left out or not.
+    pub(super) fn is_disc(&self) -> bool {
+        matches!(self.structure, Structure::Surface | Structure::Redundant)
+    }
+}
+
 impl PointCloud {
     /// Returns the structure of a point, as far as the cloud has a column of structures.
     pub fn structures(&self) -> Option<Vec<Structure>> {

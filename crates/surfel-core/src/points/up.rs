@@ -81,6 +81,11 @@ pub fn infer_up(cloud: &PointCloud, convention: &UpConvention) -> InferredUp {
     }
 }
 
+/// Returns true if a cloud is large, wide and flat in X and Y, as terrain and cities are.
+pub(super) fn is_terrain(positions: &[Vec3]) -> bool {
+    AxisStatistics::of(positions).terrain().is_some()
+}
+
 /// Returns true if all points lie before a depth camera at the origin, whose X points right, Y down and Z ahead.
 fn is_camera_frame(positions: &[Vec3]) -> bool {
     let sample = sample(positions);

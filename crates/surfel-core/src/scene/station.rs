@@ -388,8 +388,13 @@ mod tests {
         let zero_based = find_station(&cloud, Vec3::Z).unwrap();
         cloud.origin += moved;
         assert_eq!(find_station(&cloud, Vec3::Z), None);
-        let unknown = ScanStation { name: "unknown".into(), position: None };
-        cloud.stations = vec![ScanStation { name: "street".into(), position: Some(moved) }];
+        let unknown =
+            ScanStation { name: "unknown".into(), position: None, ..ScanStation::default() };
+        cloud.stations = vec![ScanStation {
+            name: "street".into(),
+            position: Some(moved),
+            ..ScanStation::default()
+        }];
         let station = find_station(&cloud, Vec3::Z).unwrap();
         assert_eq!(station, StationView { position: moved, ..zero_based });
         cloud.stations.push(unknown);

@@ -97,6 +97,7 @@ impl Scan {
         ScanStation {
             name: name.unwrap_or_else(|| format!("scan {}", index + 1)),
             position: description.transform.is_some().then_some(self.translation),
+            rotation: self.rotation,
         }
     }
 

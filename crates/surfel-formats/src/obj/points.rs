@@ -36,7 +36,7 @@ pub(crate) fn read(
         RecordLayout::new(8 * n_columns, false, columns.collect(), &options.columns)
             .expect("the first three columns are x, y and z")
     };
-    let parse = |line: &[u8], row: &mut Vec<f64>| parse_vertex(line, n_columns, row);
+    let parse = |_, line: &[u8], row: &mut Vec<f64>| parse_vertex(line, n_columns, row);
     let rows = RowRange { start: 0, end: None, line: 1, n_columns, limit: None };
     progress.begin(&format!("read {}", input.name), input.len() as u64);
     let (cloud, n_points) = read_rows(

@@ -17,6 +17,8 @@ pub(super) struct Header {
     pub width: u64,
     /// Number of rows of an organised cloud, else 1.
     pub height: u64,
+    /// Position of the sensor in the coordinates of the points.
+    pub viewpoint: [f64; 3],
     /// Encoding of the points.
     pub encoding: Encoding,
     /// First byte after the header.
@@ -64,6 +66,11 @@ impl Header {
         self.width * self.height
     }
 
+    /// Returns true if the points are the grid of a sensor, row by row.
+    pub fn is_organized(&self) -> bool {
+        1 < self.width && 1 < self.height
+    }
+
     /// Returns the bytes of a binary point.
     pub fn stride(&self) -> usize {
         self.fields.iter().map(PcdField::size).sum()
@@ -85,6 +92,7 @@ struct Entries {
     counts: Option<Vec<usize>>,
     width: Option<u64>,
     height: Option<u64>,
+    viewpoint: Option<[f64; 3]>,
     points: Option<u64>,
 }
 
@@ -126,8 +134,18 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
             let fields = entries.point_fields().map_err(found)?;
             let (width, height) = entries.dimensions().map_err(found)?;
             let version = entries.version.unwrap_or_else(|| "0.7".into());
+            let viewpoint = entries.viewpoint.unwrap_or_default();
             let (body, body_line) = (at, number + 1);
-            return Ok(Header { version, fields, width, height, encoding, body, body_line });
+            return Ok(Header {
+                version,
+                fields,
+                width,
+                height,
+                viewpoint,
+                encoding,
+                body,
+                body_line,
+            });
         }
         let expected = entries.set(key, values);
         if let Err(expected) = expected {
@@ -155,7 +173,12 @@ impl Entries {
             "WIDTH" => self.width = Some(one.parse().map_err(|_| "the points of a row")?),
             "HEIGHT" => self.height = Some(one.parse().map_err(|_| "the number of rows")?),
             "POINTS" => self.points = Some(one.parse().map_err(|_| "the number of points")?),
-            "VIEWPOINT" => {}
+            // Its rotation is not needed, and a viewpoint that is none is as good as no line.
+            "VIEWPOINT" => {
+                let numbers = words.map_while(|word| word.parse::<f64>().ok());
+                let numbers: Vec<f64> = numbers.filter(|number| number.is_finite()).collect();
+                self.viewpoint = numbers.first_chunk().copied();
+            }
             _ => {
                 return Err(
                     "VERSION, FIELDS, SIZE, TYPE, COUNT, WIDTH, HEIGHT, VIEWPOINT, POINTS or DATA",

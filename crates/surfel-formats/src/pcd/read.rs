@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use surfel_core::points::PointCloud;
+use surfel_core::math::DVec3;
+use surfel_core::points::{COLUMN_INDEX, PointCloud, ROW_INDEX, Scalar, ScanStation, Values};
 use surfel_core::progress::Progress;
 
 use super::compressed;
@@ -33,11 +34,40 @@ pub(crate) fn read(
 ) -> Result<Loaded> {
     let header = read_header(input)?;
     check_axes(input, &header)?;
-    let cloud = match header.encoding {
+    let mut cloud = match header.encoding {
         Encoding::Ascii => read_ascii(input, &header, options, progress)?,
         _ => read_binary(input, &header, options, progress)?,
     };
+    if header.is_organized() {
+        add_grid(&mut cloud, &header, options);
+    }
     Ok(Loaded { cloud, info: file_info(&header) })
+}
+
+/// Adds the station of an organised cloud, and the row and column of each point. A cloud without the points that a
+/// filter dropped is no grid any more.
+fn add_grid(cloud: &mut PointCloud, header: &Header, options: &LoadOptions) {
+    let position = Some(DVec3::from_array(header.viewpoint));
+    cloud.stations =
+        vec![ScanStation { name: "scan 1".into(), position, ..ScanStation::default() }];
+    if cloud.len() as u64 != header.n_points() {
+        return;
+    }
+    let cells = 0..header.n_points();
+    let (width, n_lines) = (header.width, header.width.max(header.height));
+    let column = |index_of: &dyn Fn(u64) -> u64| match n_lines <= 1 << 16 {
+        true => Values::U16(cells.clone().map(|cell| index_of(cell) as u16).collect()),
+        false => Values::I32(cells.clone().map(|cell| index_of(cell) as i32).collect()),
+    };
+    let is_wanted = |name: &str| options.columns.wants(&ColumnRole::Scalar(name.into()));
+    if is_wanted(ROW_INDEX) {
+        let values = column(&|cell| cell / width);
+        cloud.scalars.push(Scalar { name: ROW_INDEX.into(), values });
+    }
+    if is_wanted(COLUMN_INDEX) {
+        let values = column(&|cell| cell % width);
+        cloud.scalars.push(Scalar { name: COLUMN_INDEX.into(), values });
+    }
 }
 
 /// Checks that x, y and z are among the fields.
@@ -146,7 +176,7 @@ fn read_ascii(
         n_columns: columns.len(),
         limit: Some(header.n_points()),
     };
-    let parse = |line: &[u8], row: &mut Vec<f64>| parse_point(line, header, row);
+    let parse = |_, line: &[u8], row: &mut Vec<f64>| parse_point(line, header, row);
     let stride = 8 * columns.len();
     let layout_of = |sample: &[u8]| {
         let fields = columns

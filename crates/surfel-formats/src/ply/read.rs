@@ -171,7 +171,7 @@ fn read_ascii(
         numbers.map(|p| (p.name.as_str(), p.number_type)).collect();
     let n_columns = columns.len();
     let rows = RowRange { start, end: None, line, n_columns, limit: Some(vertex.count) };
-    let parse = |line: &[u8], row: &mut Vec<f64>| parse_vertex(line, vertex, row);
+    let parse = |_, line: &[u8], row: &mut Vec<f64>| parse_vertex(line, vertex, row);
     let layout_of = |sample: &[u8]| {
         let fields = columns.iter().enumerate();
         let fields =

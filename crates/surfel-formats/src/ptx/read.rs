@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use surfel_core::math::DVec3;
-use surfel_core::points::ScanStation;
+use surfel_core::math::{DMat3, DQuat, DVec3};
+use surfel_core::points::{COLUMN_INDEX, ROW_INDEX, ScanStation};
 use surfel_core::progress::Progress;
 
 use super::scans::{Scan, find_scans, first_header};
@@ -15,6 +15,9 @@ use crate::table::{
     CloudBuilder, ColorRange, ColumnField, ColumnRole, Field, LineError, NumberType, RecordLayout,
     RowRange, append_rows, parse_number,
 };
+
+/// Names of the last columns: the place of each point in the grid of its scan.
+const GRID_COLUMNS: [&str; 2] = [ROW_INDEX, COLUMN_INDEX];
 
 /// Reads the header of the first scan.
 pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
@@ -33,14 +36,14 @@ pub(crate) fn read(
 ) -> Result<Loaded> {
     let scans = find_scans(input, progress)?;
     let roles = roles(input, &scans)?;
-    let layout_of = |_: &[u8]| layout(&roles, options);
+    let layout_of = |_: &[u8]| layout(&roles, &scans, options);
     let mut builder = CloudBuilder::new(input, layout_of, options.origin, options.filter.as_ref());
     let mut n_scan_points = Vec::new();
     let n_empty = AtomicU64::new(0);
     progress.begin(&format!("read {}", input.name), input.len() as u64);
     for scan in &scans {
-        let parse = |line: &[u8], row: &mut Vec<f64>| {
-            parse_cell(line, scan, roles.len(), row)?;
+        let parse = |number: u64, line: &[u8], row: &mut Vec<f64>| {
+            parse_cell(line, scan, number - scan.line, roles.len(), row)?;
             n_empty.fetch_add(u64::from(row.is_empty()), Ordering::Relaxed);
             Ok(())
         };
@@ -66,6 +69,7 @@ pub(crate) fn read(
     let stations = scans.iter().enumerate().map(|(i, scan)| ScanStation {
         name: format!("scan {}", i + 1),
         position: Some(scan.position),
+        rotation: rotation_of(&scan.rotation),
     });
     set_stations(&mut cloud, stations.collect(), &n_scan_points);
     let info = FileInfo {
@@ -75,6 +79,16 @@ pub(crate) fn read(
         ..FileInfo::default()
     };
     Ok(Loaded { cloud, info })
+}
+
+/// Returns the rotation of a transform, which may also scale.
+fn rotation_of(linear: &DMat3) -> DQuat {
+    let axes = [linear.x_axis, linear.y_axis].map(DVec3::try_normalize);
+    let rotation = match axes {
+        [Some(x), Some(y)] => DQuat::from_mat3(&DMat3::from_cols(x, y, x.cross(y))),
+        _ => DQuat::IDENTITY,
+    };
+    if rotation.is_finite() { rotation.normalize() } else { DQuat::IDENTITY }
 }
 
 /// Returns the scans in words.
@@ -104,25 +118,31 @@ fn roles(input: &Input, scans: &[Scan]) -> Result<Vec<ColumnRole>> {
     if n_fields == 7 {
         roles.extend((0..3).map(ColumnRole::Color));
     }
+    roles.extend(GRID_COLUMNS.map(|name| ColumnRole::Scalar(name.into())));
     Ok(roles)
 }
 
 /// Returns the layout of rows with these columns.
-fn layout(roles: &[ColumnRole], options: &LoadOptions) -> RecordLayout {
+fn layout(roles: &[ColumnRole], scans: &[Scan], options: &LoadOptions) -> RecordLayout {
+    let is_small = |scan: &Scan| scan.grid.iter().all(|count| *count <= 1 << 16);
+    let index_type = if scans.iter().all(is_small) { NumberType::U16 } else { NumberType::U32 };
     let columns = roles.iter().enumerate().map(|(i, role)| {
         let is_color = matches!(role, ColumnRole::Color(_));
         let scale = if is_color { ColorRange::Bits8.scale() } else { 1.0 };
-        let field = Field { scale, ..Field::new(8 * i, NumberType::F64) };
+        let is_index = matches!(role, ColumnRole::Scalar(_));
+        let file_type = if is_index { index_type } else { NumberType::F64 };
+        let field = Field { scale, ..Field::parsed(8 * i, file_type) };
         ColumnField { role: role.clone(), field }
     });
     RecordLayout::new(8 * roles.len(), false, columns.collect(), &options.columns)
         .expect("the first three columns are x, y and z")
 }
 
-/// Appends the values of a cell in world coordinates; an empty cell, which is at the scanner, has none.
+/// Appends the values of the `cell`-th cell in world coordinates; an empty cell, which is at the scanner, has none.
 fn parse_cell(
     line: &[u8],
     scan: &Scan,
+    cell: u64,
     n_columns: usize,
     row: &mut Vec<f64>,
 ) -> std::result::Result<(), LineError> {
@@ -140,6 +160,9 @@ fn parse_cell(
     }
     let world = scan.rotation * measured + scan.translation;
     row[..3].copy_from_slice(&world.to_array());
-    row.resize(n_columns, f64::NAN);
+    row.resize(n_columns - GRID_COLUMNS.len(), f64::NAN);
+    // A file lists its cells column by column.
+    let n_rows = scan.grid[1].max(1);
+    row.extend([cell % n_rows, cell / n_rows].map(|index| index as f64));
     Ok(())
 }

@@ -43,9 +43,9 @@ pub(crate) struct LineError {
     pub expected: String,
 }
 
-/// Appends the values of a line to a row; a line without values is no row.
+/// Appends the values of a line of this number to a row; a line without values is no row.
 pub(crate) type ParseLine<'a> =
-    &'a (dyn Fn(&[u8], &mut Vec<f64>) -> std::result::Result<(), LineError> + Sync);
+    &'a (dyn Fn(u64, &[u8], &mut Vec<f64>) -> std::result::Result<(), LineError> + Sync);
 
 /// Reads lines to a cloud of the points that `filter` keeps; also returns the number of rows, kept or not. `layout_of` is called once, with the first rows
 /// as records of f64.
@@ -79,8 +79,9 @@ pub(crate) fn append_rows(
         progress.check()?;
         let tasks = take_tasks(&mut rest);
         let n_bytes: usize = tasks.iter().map(|task| task.len()).sum();
-        let parsed: Vec<Parsed> =
-            tasks.into_par_iter().map(|text| parse_text(text, parse, rows.n_columns)).collect();
+        let firsts = first_lines(&tasks, line);
+        let parse_task = |(text, first)| parse_text(text, first, parse, rows.n_columns);
+        let parsed: Vec<Parsed> = tasks.into_par_iter().zip(firsts).map(parse_task).collect();
 
         let mut batch: Vec<Vec<u8>> = Vec::new();
         for mut parsed in parsed {
@@ -146,7 +147,19 @@ fn take_tasks<'a>(rest: &mut &'a [u8]) -> Vec<&'a [u8]> {
     tasks
 }
 
-fn parse_text(text: &[u8], parse: ParseLine, n_columns: usize) -> Parsed {
+/// Returns the number of the first line of each task; that of the first task is `line`.
+fn first_lines(tasks: &[&[u8]], line: u64) -> Vec<u64> {
+    let count = |task: &&[u8]| memchr::memchr_iter(b'\n', task).count() as u64;
+    let counts: Vec<u64> = tasks.par_iter().map(count).collect();
+    let start = |next: &mut u64, count: u64| {
+        *next += count;
+        Some(*next - count)
+    };
+    counts.into_iter().scan(line, start).collect()
+}
+
+/// Parses lines, the first of which has the number `first`.
+fn parse_text(text: &[u8], first: u64, parse: ParseLine, n_columns: usize) -> Parsed {
     let mut parsed = Parsed { records: Vec::new(), n_lines: 0, error: None };
     let mut row = Vec::new();
     let mut rest = text;
@@ -154,12 +167,13 @@ fn parse_text(text: &[u8], parse: ParseLine, n_columns: usize) -> Parsed {
         let end = memchr::memchr(b'\n', rest);
         let line = rest[..end.unwrap_or(rest.len())].trim_ascii();
         rest = &rest[end.map_or(rest.len(), |end| end + 1)..];
+        let number = first + parsed.n_lines;
         parsed.n_lines += 1;
         if line.is_empty() {
             continue;
         }
         row.clear();
-        if let Err(error) = check_length(line).and_then(|()| parse(line, &mut row)) {
+        if let Err(error) = check_length(line).and_then(|()| parse(number, line, &mut row)) {
             parsed.error = Some(error);
             break;
         }

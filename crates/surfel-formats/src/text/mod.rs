@@ -50,7 +50,7 @@ pub(crate) fn read(
         RecordLayout::new(stride, false, fields.clone(), &options.columns)
             .expect("x, y and z were found")
     };
-    let parse = |line: &[u8], row: &mut Vec<f64>| parse_line(line, &preamble, &columns, row);
+    let parse = |_, line: &[u8], row: &mut Vec<f64>| parse_line(line, &preamble, &columns, row);
     let rows = RowRange {
         start: preamble.data,
         end: None,

@@ -37,6 +37,7 @@ fn scans_are_moved_to_world_coordinates() {
     assert_eq!((hall.name.as_str(), yard.name.as_str()), ("hall", "yard"));
     assert_eq!(hall.position, Some(DVec3::new(500_000.0, 4_900_000.0, 10.0)));
     assert_eq!(yard.position, None);
+    assert!((hall.rotation * DVec3::X).distance(DVec3::Y) < 1e-6, "{}", hall.rotation);
 }
 
 #[test]

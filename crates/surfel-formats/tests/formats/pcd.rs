@@ -1,7 +1,7 @@
 //! PCD files: all encodings, packed colours, fields of any order, and broken headers.
 
 use surfel_core::math::{DVec3, Vec3};
-use surfel_core::points::Values;
+use surfel_core::points::{COLUMN_INDEX, ROW_INDEX, Values};
 use surfel_core::progress::NoProgress;
 use surfel_formats::{Column, ColumnChoice, Error, LoadOptions, load, load_bytes};
 
@@ -55,6 +55,27 @@ fn points() -> [Vec<u8>; 2] {
 /// Compresses by LZF without repetitions, except that of the first byte if it follows itself.
 fn compress(bytes: &[u8]) -> Vec<u8> {
     bytes.chunks(32).flat_map(|run| [&[run.len() as u8 - 1], run].concat()).collect()
+}
+
+#[test]
+fn organized_clouds_have_a_station_and_a_grid() {
+    let header =
+        "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 3\nHEIGHT 2\nVIEWPOINT 4 5 6 1 0 0 0\n";
+    let points: String = (0..6).map(|i| format!("{i} 1 2\n")).collect();
+    let file = format!("{header}DATA ascii\n{points}");
+    let cloud = read("a.pcd", file.clone()).unwrap().cloud;
+    assert_eq!(cloud.scalar(ROW_INDEX), Some(&Values::U16(vec![0, 0, 0, 1, 1, 1])));
+    assert_eq!(cloud.scalar(COLUMN_INDEX), Some(&Values::U16(vec![0, 1, 2, 0, 1, 2])));
+    assert_eq!(cloud.station_of(3).unwrap().position, Some(DVec3::new(4.0, 5.0, 6.0)));
+    let filter = Some("x > 2".parse().unwrap());
+    let options = LoadOptions { filter, ..LoadOptions::default() };
+    let filtered = load_bytes("a.pcd", file.as_bytes(), &options, &NoProgress).unwrap().cloud;
+    assert_eq!((filtered.len(), filtered.scalars.len(), filtered.stations.len()), (3, 0, 1));
+    let broken = file.replace("VIEWPOINT 4 5 6 1 0 0 0", "VIEWPOINT 4 nan");
+    let station = read("a.pcd", broken).unwrap().cloud.stations.pop().unwrap();
+    assert_eq!(station.position, Some(DVec3::ZERO));
+    let line = file.replace("WIDTH 3\nHEIGHT 2", "WIDTH 6\nHEIGHT 1");
+    assert!(read("a.pcd", line).unwrap().cloud.stations.is_empty());
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! PTX files: grids, poses, several scans, and broken lines.
 
 use surfel_core::math::{DVec3, Vec3};
-use surfel_core::points::{STATION, Values};
+use surfel_core::points::{COLUMN_INDEX, ROW_INDEX, STATION, Values};
 use surfel_core::progress::NoProgress;
-use surfel_formats::{Error, LoadOptions, load, load_bytes};
+use surfel_formats::{ColumnChoice, Error, LoadOptions, load, load_bytes};
 
 use crate::common::{Listener, read, shared};
 
@@ -47,8 +47,29 @@ fn points_know_their_station() {
     assert_eq!(station.name, "scan 2");
     assert_eq!(station.position, Some(DVec3::new(500_010.0, 4_900_000.0, 10.0)));
     let single = read("a.ptx", scan([0.0; 3], "1 2 3 1\n4 5 6 1\n")).unwrap().cloud;
-    assert!(single.scalars.is_empty());
+    assert!(single.scalar(STATION).is_none());
+    let turned = single.station_of(0).unwrap().rotation * DVec3::X;
+    assert!(turned.distance(DVec3::Y) < 1e-12, "{turned}");
     assert_eq!(single.station_of(0).unwrap().position, Some(DVec3::ZERO));
+}
+
+#[test]
+fn points_know_their_row_and_column() {
+    let grid = |columns: u64, rows: u64, n_cells: usize| {
+        let header = scan([0.0; 3], "").replacen("2\n1\n", &format!("{columns}\n{rows}\n"), 1);
+        let cells = (0..n_cells).map(|i| format!("{} 1 1\n", if i == 2 { "nan" } else { "1" }));
+        read("a.ptx", header + &cells.collect::<String>()).unwrap().cloud
+    };
+    let cloud = grid(2, 3, 6);
+    assert_eq!(cloud.scalar(ROW_INDEX), Some(&Values::U16(vec![0, 1, 0, 1, 2])));
+    assert_eq!(cloud.scalar(COLUMN_INDEX), Some(&Values::U16(vec![0, 0, 1, 1, 1])));
+    let wide = grid(70_000, 1, 70_000);
+    assert_eq!(wide.scalar(COLUMN_INDEX).unwrap().get(69_998), 69_999.0);
+    assert_eq!(wide.scalar(ROW_INDEX).unwrap().get(69_998), 0.0);
+    let choice = LoadOptions { columns: ColumnChoice::Only(Vec::new()), ..LoadOptions::default() };
+    let bare = load_bytes("a.ptx", two_scans().as_bytes(), &choice, &NoProgress).unwrap().cloud;
+    let names: Vec<&str> = bare.scalars.iter().map(|scalar| scalar.name.as_str()).collect();
+    assert_eq!(names, [STATION]);
 }
 
 #[test]

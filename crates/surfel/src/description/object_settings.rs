@@ -13,8 +13,9 @@ use surfel_core::image::Colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
 use surfel_core::points::{
-    Denoise, Orientation, OutlierRemoval, PointFilter, Preparation, Radius, STRUCTURE,
-    SURFACE_VARIATION, StructureChoice, Subsample,
+    COLUMN_INDEX, Denoise, MixedPixels, Orientation, OutlierRemoval, POINT_SOURCE, PointFilter,
+    Preparation, ROW_INDEX, Radius, SCAN_ANGLE, STRUCTURE, SURFACE_VARIATION, StructureChoice,
+    Subsample,
 };
 use surfel_core::scene::color::{ColorSource, Coloring};
 use surfel_core::scene::{Clip, ClipBox, ClipPlane};
@@ -41,6 +42,9 @@ settings! {
 const DENOISE: &[(&str, Denoise)] =
     &[("auto", Denoise::Auto), ("on", Denoise::On), ("off", Denoise::Off)];
 
+const MIXED_PIXELS: &[(&str, MixedPixels)] =
+    &[("drop", MixedPixels::Drop), ("keep", MixedPixels::Keep)];
+
 settings! {
     /// The reduction and completion of points before they become a surface.
     pub struct PreparationSettings {
@@ -60,21 +64,27 @@ settings! {
         /// Moves noisy points onto their surface: auto (surfaces whose noise is at least 0.15 of the spacing), on or
         /// off [default: auto, off for surfel prepare].
         denoise: Denoise, OneOf(DENOISE), "WHEN";
+        /// Points in the air where the range of a scan jumps, as the grids of E57, PTX and PCD files tell: drop or keep.
+        mixed_pixels: MixedPixels = MixedPixels::default(), OneOf(MIXED_PIXELS), "CHOICE";
         /// Search for neighbours: knn, grid or scan-line.
         neighbors: NeighborMethod = NeighborMethod::default(), parsed(method_name), "METHOD";
         /// Number of neighbours that a normal is estimated from [default: 16].
         normals_k: u32, count(2, 10_000), "K";
         /// Estimates normals from all neighbours within this distance in world units.
         normals_radius: f64, POSITIVE, "LENGTH";
-        /// Front side of the surface: none, station (toward the scanner of each scan, of E57 and PTX files), up, mst or
-        /// viewpoint:X,Y,Z.
-        orient: Orientation = Orientation::default(), parsed(orientation_text), "RULE";
+        /// Front side of the surface: station (toward the scanner of each scan, of E57, PTX and PCD files), scan-angle
+        /// (toward the scanner of an airborne survey), up, mst (outward), viewpoint:X,Y,Z, none, or auto: the first of
+        /// these four that the file tells enough for [default: auto for surfel prepare and the colour normal, else none,
+        /// as no picture depends on it].
+        orient: Orientation, parsed(orientation_text), "RULE";
         /// Radius of each point's surface: a length, adaptive[:K] or median[:N] [default: that of the file, or
         /// adaptive:12].
         radius: Radius, RadiusRule, "RADIUS", common;
         /// Shape of each point by its neighbours: auto tells surfaces, lines (wires, poles) and scattered points
         /// (leaves) apart; surface and scatter take all points for one.
         structure: StructureChoice = StructureChoice::default(), parsed(StructureChoice::to_string), "CHOICE";
+        /// Ends surfaces where a scanner saw through, as the grids of E57, PTX and PCD files tell.
+        free_space: bool = true, Flag, "BOOL";
         /// Takes the vertices of meshes as points.
         vertices: bool = false, Flag, "BOOL";
         /// Columns of a text file, as in x,y,z,-,r,g,b [default: found from the file].
@@ -141,18 +151,43 @@ impl ObjectSettings {
         let within = settings.normals_radius.map(|radius| Neighborhood::Within(radius as f32));
         let nearest = settings.normals_k.map(|k| Neighborhood::Nearest(k as usize));
         Preparation {
+            mixed_pixels: settings.mixed_pixels(),
             subsample: settings.subsample,
             remove_outliers: settings.remove_outliers,
             denoise: settings.denoise.unwrap_or(default.denoise),
             neighbors: settings.neighbors(),
             normals: within.or(nearest).unwrap_or(default.normals),
-            orientation: settings.orient(),
+            orientation: self.orientation(),
             radius: settings.radius.unwrap_or(default.radius),
             structure: settings.structure(),
+            free_space: settings.free_space(),
             // A colour may ask for a column that only the preparation computes.
             keep_variation: matches!(&self.color.color, Some(ColorSource::Column(name)) if name == SURFACE_VARIATION),
             seed,
         }
+    }
+
+    /// Returns the columns that only the preparation needs: what the scanner tells of each point.
+    pub fn columns_of_preparation(&self) -> Vec<&'static str> {
+        let mut columns = Vec::new();
+        if self.preparation.free_space() || self.preparation.mixed_pixels() == MixedPixels::Drop {
+            columns.extend([ROW_INDEX, COLUMN_INDEX]);
+        }
+        if matches!(self.orientation(), Orientation::Auto | Orientation::ScanAngle) {
+            columns.extend([SCAN_ANGLE, POINT_SOURCE]);
+        }
+        let is_shown = |name: &str| matches!(&self.color.color, Some(ColorSource::Column(shown)) if shown == name);
+        columns.retain(|name| !is_shown(name));
+        columns
+    }
+
+    /// Returns the orientation of normals. A picture depends on it only where it shows them as colours.
+    fn orientation(&self) -> Orientation {
+        let default = match self.color.color {
+            Some(ColorSource::Normal) => Orientation::Auto,
+            _ => Orientation::None,
+        };
+        self.preparation.orient.unwrap_or(default)
     }
 
     /// Returns the colouring of the library; elevations count along `up`.
@@ -164,6 +199,8 @@ impl ObjectSettings {
     /// Returns the columns that a picture with these settings needs.
     pub fn columns(&self) -> ColumnChoice {
         let mut columns = self.preparation.kept_columns();
+        let of_preparation = self.columns_of_preparation();
+        columns.extend(of_preparation.iter().map(|name| Column::Scalar((*name).to_owned())));
         match &self.color.color {
             None => columns.extend([Column::Colors, Column::Intensity]),
             Some(ColorSource::Rgb) => columns.push(Column::Colors),
@@ -209,7 +246,7 @@ impl PreparationSettings {
 
     /// Returns true if normals point out of what the points enclose.
     pub fn orients_outward(&self) -> bool {
-        self.orient() == Orientation::SpanningTree
+        self.orient == Some(Orientation::SpanningTree)
     }
 
     /// Returns the columns of a surface that are not to be estimated.
@@ -294,6 +331,8 @@ fn method_name(method: &NeighborMethod) -> String {
 fn orientation_text(orientation: &Orientation) -> String {
     match orientation {
         Orientation::None => "none".into(),
+        Orientation::Auto => "auto".into(),
+        Orientation::ScanAngle => "scan-angle".into(),
         Orientation::Station => "station".into(),
         Orientation::Up => "up".into(),
         Orientation::SpanningTree => "mst".into(),

@@ -284,7 +284,12 @@ impl LoadedScene {
         let prepared = filter_cloud(cloud, filter.as_ref(), progress).and_then(|cloud| {
             prepare_cloud(cloud, &settings, description.picture.seed(), progress)
         });
-        prepared.map_err(|cause| self.content_error(geometry, description, cause))
+        let mut prepared =
+            prepared.map_err(|cause| self.content_error(geometry, description, cause))?;
+        if !self.keeps_all_columns {
+            prepared.drop_scalars(&settings.columns_of_preparation());
+        }
+        Ok(prepared)
     }
 
     /// Adds the files of a geometry to an error of the renderer.

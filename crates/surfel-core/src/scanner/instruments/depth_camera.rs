@@ -1,7 +1,7 @@
 //! Depth cameras: grids of depths whose noise grows with the square of the depth.
 
 use super::instrument::{Instrument, check_positive};
-use super::returns::{Return, into_cloud};
+use super::returns::{Return, add_grid, into_cloud};
 use crate::error::Result;
 use crate::math::DVec3;
 use crate::math::Random;
@@ -29,6 +29,8 @@ pub struct DepthCamera {
     pub max_depth: f64,
     /// Seed of the noise.
     pub seed: u64,
+    /// True to add the stations, and the columns of the station, row and column of each point.
+    pub with_grid: bool,
 }
 
 impl Default for DepthCamera {
@@ -43,6 +45,7 @@ impl Default for DepthCamera {
             step_at_1_m: 0.0008,
             max_depth: 8.0,
             seed: 1,
+            with_grid: false,
         }
     }
 }
@@ -69,7 +72,7 @@ impl DepthCamera {
             let stream = ((pose_idx as u64) << 40) | (y * self.width + x) as u64;
             let mut random = Random::new(self.seed, stream);
             let range = self.measured(hit.distance * cosine, &mut random) / cosine;
-            Some(Return::new(scene, &ray, hit, range, pose_idx as u16 + 1))
+            Some(Return::new(scene, &ray, hit, range, pose_idx as u16 + 1).in_cell(y, x))
         };
         (0..self.width).filter_map(scan_pixel).collect()
     }
@@ -100,7 +103,12 @@ impl Instrument for DepthCamera {
         let rows: Vec<Vec<Return>> =
             (0..n_rows).into_par_iter().map(scan_row).collect::<Result<_>>()?;
         let returns: Vec<Return> = rows.into_iter().flatten().collect();
-        Ok(into_cloud(&returns, DVec3::ZERO, false))
+        let mut cloud = into_cloud(&returns, DVec3::ZERO, false);
+        if self.with_grid {
+            let positions: Vec<DVec3> = self.poses.iter().map(|(position, _)| *position).collect();
+            add_grid(&mut cloud, &returns, &positions);
+        }
+        Ok(cloud)
     }
 
     fn viewpoints(&self, point: DVec3) -> Vec<DVec3> {

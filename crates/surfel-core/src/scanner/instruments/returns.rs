@@ -2,7 +2,7 @@
 
 use crate::math::DVec3;
 use crate::math::Vec3;
-use crate::points::{PointCloud, Scalar, Values};
+use crate::points::{COLUMN_INDEX, PointCloud, ROW_INDEX, STATION, Scalar, ScanStation, Values};
 use crate::scanner::sdf::{DRay, SdfHit, SdfScene};
 
 /// The return of one ray.
@@ -13,6 +13,8 @@ pub struct Return {
     intensity: f32,
     class: u8,
     source: u16,
+    /// Row and column in the grid of the station or picture.
+    cell: [u32; 2],
 }
 
 impl Return {
@@ -31,7 +33,13 @@ impl Return {
             intensity: intensity(f64::from(color.element_sum()) / 3.0, incidence, hit.distance),
             class: sdf.class(),
             source,
+            cell: [0; 2],
         }
+    }
+
+    /// Returns the return of the ray of a row and column.
+    pub fn in_cell(self, row: usize, column: usize) -> Self {
+        Self { cell: [row as u32, column as u32], ..self }
     }
 }
 
@@ -53,6 +61,21 @@ pub fn into_cloud(returns: &[Return], origin: DVec3, with_normals: bool) -> Poin
         }],
         ..PointCloud::default()
     }
+}
+
+/// Adds the stations at `positions` in the scene, and the columns of the station, row and column of each return.
+pub fn add_grid(cloud: &mut PointCloud, returns: &[Return], positions: &[DVec3]) {
+    let station = |(i, position): (usize, &DVec3)| ScanStation {
+        name: format!("scan {}", i + 1),
+        position: Some(cloud.origin + *position),
+        ..ScanStation::default()
+    };
+    cloud.stations = positions.iter().enumerate().map(station).collect();
+    let index = |axis: usize| Values::I32(returns.iter().map(|r| r.cell[axis] as i32).collect());
+    let station = Values::U16(returns.iter().map(|r| r.source - 1).collect());
+    let columns = [(STATION, station), (ROW_INDEX, index(0)), (COLUMN_INDEX, index(1))];
+    let columns = columns.map(|(name, values)| Scalar { name: name.to_owned(), values });
+    cloud.scalars.extend(columns);
 }
 
 /// Returns the intensity from 0 to 65535 by Lambert's cosine law and an inverse square law that levels off near the

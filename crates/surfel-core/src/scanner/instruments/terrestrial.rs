@@ -1,7 +1,7 @@
 //! Terrestrial laser scanners: rays from stations, each of which gives at most one point.
 
 use super::instrument::Instrument;
-use super::returns::{Return, into_cloud};
+use super::returns::{Return, add_grid, into_cloud};
 use super::station::Station;
 use crate::error::{Error, Result};
 use crate::math::DVec3;
@@ -27,6 +27,8 @@ pub struct Scanner {
     pub origin: DVec3,
     /// True to add the true unit normals.
     pub with_normals: bool,
+    /// True to add the stations, and the columns of the station, row and column of each point.
+    pub with_grid: bool,
 }
 
 impl Default for Scanner {
@@ -38,6 +40,7 @@ impl Default for Scanner {
             seed: 1,
             origin: DVec3::ZERO,
             with_normals: false,
+            with_grid: false,
         }
     }
 }
@@ -73,7 +76,12 @@ impl Scanner {
                 .collect::<Result<_>>()?;
             returns.extend(columns.into_iter().flatten());
         }
-        Ok(into_cloud(&returns, self.origin, self.with_normals))
+        let mut cloud = into_cloud(&returns, self.origin, self.with_normals);
+        if self.with_grid {
+            let positions: Vec<DVec3> = stations.iter().map(|station| station.position).collect();
+            add_grid(&mut cloud, &returns, &positions);
+        }
+        Ok(cloud)
     }
 
     fn validate(&self) -> Result<()> {
@@ -104,7 +112,7 @@ impl Scanner {
             let ray = station.ray(column, row, self.step_rad);
             let seed = self.seed ^ hash(station_idx as u64);
             let mut random = Random::new(seed, ((column as u64) << 32) | row as u64);
-            self.measure(scene, &ray, station_idx, &mut random)
+            Some(self.measure(scene, &ray, station_idx, &mut random)?.in_cell(row, column))
         };
         (0..station.n_rows(self.step_rad)).filter_map(scan_ray).collect()
     }

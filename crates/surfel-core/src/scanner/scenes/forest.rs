@@ -61,7 +61,8 @@ pub fn airborne() -> AirborneLidar {
 
 /// Returns a survey from four stations under the trees.
 pub fn terrestrial(step_deg: f64) -> TerrestrialSurvey {
-    let scanner = Scanner { step_rad: step_deg.to_radians(), ..Scanner::default() };
+    let step_rad = step_deg.to_radians();
+    let scanner = Scanner { step_rad, with_grid: true, ..Scanner::default() };
     let positions = [(-7.0, -7.0), (7.0, -6.5), (-6.5, 7.0), (2.3, -20.5)];
     let station =
         |(x, y): (f64, f64)| Station::full_dome(DVec3::new(x, y, TERRAIN.height(x, y) + 1.7));

@@ -37,7 +37,8 @@ pub fn depth_camera() -> DepthCamera {
 
 /// Returns a survey from two stations.
 pub fn terrestrial(step_deg: f64) -> TerrestrialSurvey {
-    let scanner = Scanner { step_rad: step_deg.to_radians(), ..Scanner::default() };
+    let step_rad = step_deg.to_radians();
+    let scanner = Scanner { step_rad, with_grid: true, ..Scanner::default() };
     let positions = [[1.5, -1.5, 1.5], [-2.2, 0.8, 1.5]];
     let stations = positions.map(|position| Station::full_dome(position.into()));
     TerrestrialSurvey { scanner, stations: stations.to_vec() }

@@ -93,7 +93,8 @@ pub fn named_scene() -> NamedScene {
 
 /// Returns the demo's survey with an angle of `step_deg` between rays.
 pub fn terrestrial(step_deg: f64) -> TerrestrialSurvey {
-    let scanner = Scanner { step_rad: step_deg.to_radians(), ..Scanner::default() };
+    let step_rad = step_deg.to_radians();
+    let scanner = Scanner { step_rad, with_grid: true, ..Scanner::default() };
     TerrestrialSurvey { scanner, stations: stations().to_vec() }
 }
 

@@ -59,7 +59,8 @@ pub fn scene() -> NamedScene {
 
 /// Returns a survey from three stations with an angle of `step_deg` between rays.
 pub fn terrestrial(step_deg: f64) -> TerrestrialSurvey {
-    let scanner = Scanner { step_rad: step_deg.to_radians(), ..Scanner::default() };
+    let step_rad = step_deg.to_radians();
+    let scanner = Scanner { step_rad, with_grid: true, ..Scanner::default() };
     let positions = [[-10.0, -1.0, 1.6], [6.5, 1.0, 1.6], [-1.0, -9.5, 1.7]];
     let stations = positions.map(|position| Station::full_dome(position.into()));
     TerrestrialSurvey { scanner, stations: stations.to_vec() }
