@@ -81,10 +81,7 @@ fn all_shapes() -> [Shape; 6] {
 /// Prints the table of all shapes.
 pub fn compare_shapes(selection: &Selection) {
     const RESOLUTION: u32 = 512;
-    println!(
-        "| cloud | surface | missing % | false % | depth, s | over 5 s, % | normals: mean, 95 % | \
-         lit, dB | prepare, CPU s |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
-    );
+    let mut has_header = false;
     let data = shared_data();
     for shape in all_shapes() {
         let names = Sampling::ALL.map(|(name, sampling)| {
@@ -100,6 +97,10 @@ pub fn compare_shapes(selection: &Selection) {
             None if shape.is_file => continue,
             folder => folder.as_deref().unwrap_or(Path::new("")),
         };
+        if !has_header {
+            print_header();
+            has_header = true;
+        }
         let mesh = (shape.mesh)(folder);
         let truth = Truth::new(&mesh, RESOLUTION);
         for (name, sampling) in names {
@@ -162,6 +163,13 @@ fn compare_reconstruction(
     let lit_psnr_db = truth.lit.compare(&images).psnr_db();
     print_row(&sample.name, METHOD, &figures, lit_psnr_db, found.secs);
     Some(images)
+}
+
+fn print_header() {
+    println!(
+        "| cloud | surface | missing % | false % | depth, s | over 5 s, % | normals: mean, 95 % | \
+         lit, dB | prepare, CPU s |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    );
 }
 
 fn print_row(cloud: &str, surface: &str, figures: &Deviation, lit_psnr_db: f64, prepare_secs: f64) {

@@ -3,8 +3,10 @@
 use crate::pictures;
 use crate::reconstruction::{self, METHOD};
 use crate::selection::Selection;
+use rayon::prelude::*;
 use std::time::Instant;
 use surfel_core::image::Image;
+use surfel_core::math::Vec3;
 use surfel_core::points::{PointCloud, Preparation};
 use surfel_core::progress::NoProgress;
 use surfel_core::scanner::Instrument;
@@ -103,7 +105,7 @@ pub fn compare_scans(selection: &Selection) {
         let views = TrueScene::new(&scene, &*case.instrument, RESOLUTION);
         report_secs(case.name, "truth traced", begin);
         let n_points = cloud.len();
-        let compared = compare_surfaces(case, &cloud, &views, selection);
+        let compared = compare_surfaces(case, &scene, &cloud, &views, selection);
         print_tables(case.title, n_points, &compared);
         let truth = views.images();
         let images = compared.iter().map(|compared| &compared.images[0]);
@@ -115,6 +117,7 @@ pub fn compare_scans(selection: &Selection) {
 /// Compares all surfaces of a scan, and its reconstruction, with the scene.
 fn compare_surfaces(
     case: &ScanCase,
+    scene: &NamedScene,
     cloud: &PointCloud,
     views: &TrueScene,
     selection: &Selection,
@@ -124,10 +127,10 @@ fn compare_surfaces(
         let begin = Instant::now();
         let points = scenes::prepared(cloud.clone(), &Preparation::default(), *kind);
         report_secs(case.name, &format!("{surface} prepared"), begin);
-        // Another program needs oriented normals, which it cannot tell without the stations.
-        let normals = points.cloud().normals.clone();
-        let with_normals = PointCloud { normals, ..cloud.clone() };
-        reconstruction::write_cloud(selection, case.name, &with_normals);
+        if selection.written_clouds.is_some() {
+            let cloud = with_normals(cloud, points.cloud(), scene, &*case.instrument);
+            reconstruction::write_cloud(selection, case.name, &cloud);
+        }
         let begin = Instant::now();
         compared.push(Compared::new(&format!("`{surface}`"), views, Geometry::Points(points)));
         report_secs(case.name, &format!("{surface} built and rendered"), begin);
@@ -137,6 +140,28 @@ fn compare_surfaces(
         compared.push(Compared::new(METHOD, views, Geometry::Triangles(found.mesh)));
     }
     compared
+}
+
+/// Returns the scan with the normals of its prepared form, turned toward a position from which the instrument saw the
+/// point: another program needs oriented normals, which it cannot tell without these positions.
+fn with_normals(
+    cloud: &PointCloud,
+    prepared: &PointCloud,
+    scene: &NamedScene,
+    instrument: &dyn Instrument,
+) -> PointCloud {
+    let toward_instrument = |(i, normal): (usize, &Vec3)| {
+        let point = cloud.world_position(i);
+        let viewpoints = instrument.viewpoints(point);
+        let mut seen_from =
+            viewpoints.iter().filter(|from| scene.sdf.is_visible_from(**from, point));
+        let is_away =
+            seen_from.next().is_some_and(|from| normal.as_dvec3().dot(*from - point) < 0.0);
+        if is_away { -*normal } else { *normal }
+    };
+    let normals = prepared.normals.as_deref().unwrap_or_default();
+    let normals = normals.par_iter().enumerate().map(toward_instrument).collect();
+    PointCloud { normals: Some(normals), ..cloud.clone() }
 }
 
 fn report_secs(case: &str, done: &str, begin: Instant) {
