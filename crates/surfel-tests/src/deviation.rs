@@ -51,6 +51,12 @@ impl TrueViews {
         hits
     }
 
+    /// Traces another mesh in the same views.
+    pub fn trace_mesh(&self, mesh: &GroundTruth) -> Vec<SurfaceHit> {
+        let hit = |ray: &Ray| surface_hit(mesh.closest_hit(ray));
+        self.rays.par_iter().map(hit).collect()
+    }
+
     /// Compares the hits of a cloud with those of the mesh; `spacing` is the mean distance between points.
     pub fn compare(&self, hits: &[SurfaceHit], spacing: f32) -> Deviation {
         let (mut n_shape, mut n_false) = (0, 0);
@@ -81,6 +87,16 @@ impl TrueViews {
     }
 }
 
+/// Returns the hit of a triangle as that of a surface of points.
+fn surface_hit(hit: Option<GroundTruthHit>) -> SurfaceHit {
+    hit.map_or(SurfaceHit::MISS, |GroundTruthHit { distance, normal }| SurfaceHit {
+        distance,
+        normal,
+        id: 0,
+        ..SurfaceHit::MISS
+    })
+}
+
 fn percentile_95(values: &mut [f32]) -> f64 {
     if values.is_empty() {
         return f64::NAN;
@@ -90,7 +106,7 @@ fn percentile_95(values: &mut [f32]) -> f64 {
 }
 
 /// Returns cameras around the mesh that see all of it, one from each quarter at heights of their own.
-fn cameras(mesh: &GroundTruth) -> [Camera; 4] {
+pub(crate) fn cameras(mesh: &GroundTruth) -> [Camera; 4] {
     let bounds = mesh.bounds();
     let center = bounds.center().as_dvec3();
     let distance = 2.4 * f64::from(bounds.diagonal());
@@ -126,15 +142,7 @@ mod tests {
     }
 
     fn true_hits(views: &TrueViews) -> Vec<SurfaceHit> {
-        let hit = |truth: &Option<GroundTruthHit>| {
-            truth.map_or(SurfaceHit::MISS, |GroundTruthHit { distance, normal }| SurfaceHit {
-                distance,
-                normal,
-                id: 0,
-                ..SurfaceHit::MISS
-            })
-        };
-        views.hits.iter().map(hit).collect()
+        views.hits.iter().copied().map(surface_hit).collect()
     }
 
     #[test]
@@ -144,6 +152,18 @@ mod tests {
         let Deviation { false_hits, misses, depth_rms, far_off, .. } = figures;
         assert_eq!([false_hits, misses, depth_rms, far_off], [0.0; 4]);
         assert!(figures.normal_p95_deg < 0.1, "{figures:?}");
+    }
+
+    #[test]
+    fn a_smooth_mesh_differs_from_the_flat_one_in_its_normals_alone() {
+        let mut mesh = shapes::low_poly_blob();
+        let views = TrueViews::new(&GroundTruth::from_mesh(&mesh), 32);
+        mesh.smooth_normals();
+        let hits = views.trace_mesh(&GroundTruth::from_smooth_mesh(&mesh));
+        let figures = views.compare(&hits, 0.1);
+        let Deviation { false_hits, misses, depth_rms, normal_deg, .. } = figures;
+        assert_eq!([false_hits, misses, depth_rms], [0.0; 3]);
+        assert!((1.0..10.0).contains(&normal_deg), "{figures:?}");
     }
 
     #[test]

@@ -12,6 +12,8 @@ pub struct GroundTruth {
     /// The positions of the vertices.
     pub vertices: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
+    /// Unit normals of the vertices, interpolated over triangles; without them triangles are flat.
+    vertex_normals: Option<Vec<Vec3>>,
     tree: Bvh,
 }
 
@@ -20,7 +22,7 @@ pub struct GroundTruth {
 pub struct GroundTruthHit {
     /// The distance along the ray.
     pub distance: f32,
-    /// The unit normal of the triangle, turned toward the ray's origin.
+    /// The unit normal of the surface, turned toward the ray's origin.
     pub normal: Vec3,
 }
 
@@ -50,14 +52,24 @@ impl GroundTruth {
         }
     }
 
-    /// Builds the tree over the triangles of a mesh.
+    /// Builds the tree over the triangles of a mesh, which are flat whatever its vertex normals.
     pub fn from_mesh(mesh: &Mesh) -> Self {
         Self::new(mesh.positions.clone(), mesh.triangles.clone())
+    }
+
+    /// Builds the tree over the triangles of a mesh, whose vertex normals are interpolated.
+    pub fn from_smooth_mesh(mesh: &Mesh) -> Self {
+        Self { vertex_normals: mesh.normals.clone(), ..Self::from_mesh(mesh) }
     }
 
     /// Returns the corners of every triangle.
     pub fn triangles(&self) -> impl Iterator<Item = [Vec3; 3]> {
         self.triangles.iter().map(|triangle| triangle.map(|i| self.vertices[i as usize]))
+    }
+
+    /// Returns three indices of vertices for each triangle.
+    pub fn triangle_indices(&self) -> &[[u32; 3]] {
+        &self.triangles
     }
 
     /// Returns the bounds of the triangles.
@@ -76,7 +88,7 @@ impl GroundTruth {
             let members = tree.blocks[block as usize].iter().filter(|&&i| i != NO_PRIMITIVE);
             members.fold(Aabb::EMPTY, |all, &i| all.union(boxes[i as usize]))
         });
-        Self { vertices, triangles, tree }
+        Self { vertices, triangles, vertex_normals: None, tree }
     }
 
     /// Returns the nearest hit by a traversal that is slow but short.
@@ -118,7 +130,13 @@ impl GroundTruth {
         let v = ray.direction.dot(q) / determinant;
         let distance = ac.dot(q) / determinant;
         let inside = 0.0 <= u && 0.0 <= v && u + v <= 1.0 && ray.t_min < distance;
-        let normal = ab.cross(ac).normalize_or(-ray.direction);
+        let normal = match &self.vertex_normals {
+            Some(normals) => {
+                let [a, b, c] = self.triangles[index as usize].map(|i| normals[i as usize]);
+                ((1.0 - u - v) * a + u * b + v * c).normalize_or(-ray.direction)
+            }
+            None => ab.cross(ac).normalize_or(-ray.direction),
+        };
         let normal = if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
         inside.then_some(GroundTruthHit { distance, normal })
     }

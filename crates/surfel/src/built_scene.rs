@@ -10,7 +10,7 @@ use surfel_core::flat::{FlatPunctualLight, FlatScene};
 use surfel_core::math::{DQuat, Vec3};
 use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::render::{CpuRenderer, RenderStats, Renderer, Settings};
-use surfel_core::scene::{Geometry, Graph, Light};
+use surfel_core::scene::{Camera, ClipPlane, Geometry, Graph, Light, Room};
 use surfel_core::trace::Simd;
 
 /// A scene with its trees: it renders, casts rays, and moves to any time.
@@ -21,6 +21,8 @@ pub struct BuiltScene {
     graph: Graph,
     sequences: Vec<Sequence>,
     camera: SceneCamera,
+    /// The room on a turntable, whose walls before the camera are hidden.
+    turned_room: Option<Room>,
     overlay: Overlay,
     up: Vec3,
     /// Lights before a turntable turns them.
@@ -55,8 +57,10 @@ impl Resolved {
     ///
     /// Fails for scenes that no picture can be made of, and if cancelled.
     pub fn build_trees(self, progress: &dyn Progress) -> Result<BuiltScene> {
-        let Self { scene, settings, description, choices, sequences, camera, overlay, up } = self;
-        let flat = FlatScene::new(&scene, progress)?;
+        let Self { scene, settings, description, choices, sequences, .. } = self;
+        let Self { camera, turned_room, overlay, up, .. } = self;
+        let mut flat = FlatScene::new(&scene, progress)?;
+        flat.camera_planes = planes_before(turned_room.as_ref(), &flat.camera);
         progress.end();
         let mut graph = scene.graph;
         let source_indices = source_indices(&graph);
@@ -69,6 +73,7 @@ impl Resolved {
             graph,
             sequences,
             camera,
+            turned_room,
             overlay,
             up,
             lights,
@@ -80,6 +85,11 @@ impl Resolved {
             source_indices,
         })
     }
+}
+
+/// Returns the planes that hide from a camera the walls of a room that it looks through.
+pub(crate) fn planes_before(room: Option<&Room>, camera: &Camera) -> Vec<ClipPlane> {
+    room.map_or(Vec::new(), |room| room.planes_before(camera))
 }
 
 /// Returns for each geometry the index that each of its points had when it was read.
@@ -180,6 +190,7 @@ impl BuiltScene {
         let camera = self.flat.camera;
         let center = (camera.focal_point - self.flat.origin).as_vec3();
         self.flat.camera = camera.rotated_about_focal_point(turn);
+        self.flat.camera_planes = planes_before(self.turned_room.as_ref(), &self.flat.camera);
         self.flat.lights = self.lights.iter().map(|light| light.rotated(turn)).collect();
         let lamps = self.lamps.iter().map(|lamp| lamp.rotated_about(turn, center));
         self.flat.punctual_lights = lamps.collect();

@@ -1,6 +1,6 @@
 //! A scene whose settings change: after a change only what it touches is made again.
 
-use crate::built_scene::{exposure_stops, source_indices};
+use crate::built_scene::{exposure_stops, planes_before, source_indices};
 use crate::cache::{Lru2, hash_of};
 use crate::description::{Exposure, Interior, Invalid, LightKind, SceneDescription, write_parts};
 use crate::error::{Error, Result};
@@ -173,6 +173,7 @@ impl LiveScene {
             flat.update(&graph, progress)?;
             flat.camera = auto.camera.at(time_secs, &graph);
         }
+        flat.camera_planes = planes_before(auto.turned_room.as_ref(), &flat.camera);
         Ok((trees, flat))
     }
 

@@ -28,7 +28,7 @@ use surfel_core::flat::FlatGeometry;
 use surfel_core::math::{DAffine3, DVec3, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
-use surfel_core::scene::{Camera, CloudGeometry, Geometry, Graph, Material, Mesh};
+use surfel_core::scene::{Camera, CameraFit, CloudGeometry, Geometry, Graph, Material, Mesh};
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::{Hit, Simd};
 use surfel_formats::{ColumnChoice, FileInfo, Loaded};
@@ -246,7 +246,8 @@ fn load_unbuilt(
             let (width, height) = args.resolution;
             let up = choose_up(description.world.up, &points, &[info], report);
             let aspect = f64::from(width) / f64::from(height);
-            choose_camera(&description.camera, &points, up, None, aspect, report)
+            let frame = CameraFit { up, aspect, ..CameraFit::default() };
+            choose_camera(&description.camera, &points, &frame, None, report)
         }
     };
     Ok(Unbuilt { graph, camera })

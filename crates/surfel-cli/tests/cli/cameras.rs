@@ -55,6 +55,50 @@ fn a_turntable_turns_about_the_focal_point_of_the_camera_of_the_file() {
     assert!(0 < n_seen(1) && n_seen(1).abs_diff(n_seen(3)) < 12, "{} {}", n_seen(1), n_seen(3));
 }
 
+/// Returns the points of a room of 6 x 4 x 2.5 m with red walls and a red ceiling, a green floor and a green table.
+fn room() -> String {
+    let (red, green) = ("200 0 0", "0 200 0");
+    let side = |n: i32| (0..=n).map(|i| f64::from(i) / 10.0);
+    let grid = |a: i32, b: i32| side(a).flat_map(move |x| side(b).map(move |y| (x, y)));
+    let mut text = String::new();
+    let mut add = |x: f64, y: f64, z: f64, color: &str| {
+        text += &format!("{x} {y} {z} {color}\n");
+    };
+    for (x, y) in grid(60, 40) {
+        add(x, y, 0.0, green);
+        add(x, y, 2.5, red);
+    }
+    for (x, y) in grid(20, 10) {
+        add(2.0 + x, 1.5 + y, 0.8, green);
+    }
+    for y in [0.0, 4.0] {
+        grid(60, 25).for_each(|(x, z)| add(x, y, z, red));
+    }
+    for x in [0.0, 6.0] {
+        grid(40, 25).for_each(|(y, z)| add(x, y, z, red));
+    }
+    text
+}
+
+#[test]
+fn a_turntable_opens_a_room_toward_the_camera_of_each_frame() {
+    let folder = Folder::new();
+    let file = folder.write("room.xyz", room());
+    let turn = folder.path("f#.png");
+    let options = ["--turntable", "4", "--fps", "1", "--light", "none", "--background", "#000"];
+    succeed(&[&["animate", &file, "-o", &turn], &options[..], &SMALL].concat());
+    for frame in 1..=4 {
+        let (width, height, _, samples) = read_png(folder.path(&format!("f{frame}.png")));
+        let middle = (height / 3..2 * height / 3)
+            .flat_map(|y| (width / 3..2 * width / 3).map(move |x| (y * width + x) as usize));
+        let (n_green, n_red) = middle.fold((0, 0), |(n_green, n_red), pixel| {
+            let [red, green] = [0, 1].map(|channel| samples[3 * pixel + channel]);
+            (n_green + u32::from(red < green), n_red + u32::from(green < red))
+        });
+        assert!(10 * n_red < n_green, "{frame}: {n_green} green pixels, {n_red} red ones");
+    }
+}
+
 #[test]
 fn the_dry_run_of_a_movie_keeps_the_camera_animation() {
     let (folder, file) = site();

@@ -9,7 +9,9 @@ use crate::bvh::Bvh;
 use crate::error::Result;
 use crate::math::{Aabb, DAffine3, DVec3};
 use crate::progress::Progress;
-use crate::scene::{Background, Camera, Geometry, Graph, Light, Material, Scene, Texture};
+use crate::scene::{
+    Background, Camera, ClipPlane, Geometry, Graph, Light, Material, Scene, Texture,
+};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -36,6 +38,8 @@ pub struct FlatScene {
     pub background: Background,
     /// The camera.
     pub camera: Camera,
+    /// Planes beyond which camera rays see nothing; light and reflections meet what is there.
+    pub camera_planes: Vec<ClipPlane>,
     /// True if light can pass through any instance.
     pub is_transmissive: bool,
     built: BTreeMap<GeometryKey, BuiltGeometry>,
@@ -119,6 +123,7 @@ impl FlatScene {
             punctual_lights: Vec::new(),
             background: scene.background,
             camera: scene.camera,
+            camera_planes: Vec::new(),
             is_transmissive: false,
             built: BTreeMap::new(),
         };

@@ -84,6 +84,15 @@ struct Job<'a> {
     region: RenderRegion,
 }
 
+impl Job<'_> {
+    /// Returns the ray through a position in the picture, as far as the scene's planes show it.
+    fn camera_ray(&self, x: f32, y: f32) -> Ray {
+        let FlatScene { camera_planes, origin, .. } = self.tracer.scene;
+        let ray = self.view.ray(x, y);
+        camera_planes.iter().fold(ray, |ray, plane| plane.limited(ray, *origin))
+    }
+}
+
 /// Returns the background in a row of pixels: linear colour and alpha.
 fn background(job: &Job, y: u32) -> Vec4 {
     let height = (y as f32 + 0.5) / job.settings.height as f32;
@@ -172,7 +181,7 @@ impl Tile {
 
     /// Traces the camera rays with these sample indices of all pixels and adds up their radiance.
     fn add_samples(&mut self, job: &Job, sample_indices: std::ops::Range<u32>) -> Result<()> {
-        let Job { tracer, view, settings, .. } = *job;
+        let Job { tracer, settings, .. } = *job;
         let per_pixel = sample_indices.len();
         let n = self.color.len() * per_pixel;
         let mut rays = Vec::with_capacity(n);
@@ -187,7 +196,7 @@ impl Tile {
                 } else {
                     owen_sobol_2d(index, key)
                 };
-                rays.push(view.ray(x as f32 + dx, y as f32 + dy));
+                rays.push(job.camera_ray(x as f32 + dx, y as f32 + dy));
                 keys.push(key);
                 indices.push(index);
                 backgrounds.push(background);
@@ -220,8 +229,11 @@ impl Tile {
 
     /// Traces the rays through the pixels' centres for the AOVs.
     fn trace_aovs(&mut self, job: &Job) -> Result<()> {
-        let rays: Vec<Ray> =
-            self.rect.pixels().map(|(x, y)| job.view.ray(x as f32 + 0.5, y as f32 + 0.5)).collect();
+        let rays: Vec<Ray> = self
+            .rect
+            .pixels()
+            .map(|(x, y)| job.camera_ray(x as f32 + 0.5, y as f32 + 0.5))
+            .collect();
         let mut hits = vec![SceneHit::MISS; rays.len()];
         job.tracer.hits(InstanceFilter::All, &rays, &mut hits)?;
         self.counts.primary += rays.len() as u64;

@@ -126,7 +126,11 @@ fn project(
         let occupied = block.occupied_lanes();
         for lane in (0..LANES).filter(|lane| occupied >> lane & 1 == 1) {
             let position = instance.world_position(block.position(lane));
-            let Some((x, y, depth)) = view.project(position) else { continue };
+            let world = scene.origin + position.as_dvec3();
+            let is_hidden = scene.camera_planes.iter().any(|plane| plane.hides(world));
+            let Some((x, y, depth)) = view.project(position).filter(|_| !is_hidden) else {
+                continue;
+            };
             // Positive floats order as their bits do.
             let slot = (block_idx * LANES + lane) as u64;
             let key = u64::from(depth.to_bits()) << 32 | slot;

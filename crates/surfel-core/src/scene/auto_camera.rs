@@ -5,6 +5,7 @@ use super::camera::{Camera, Projection};
 use super::camera_fit::{CameraFit, fit_along};
 use super::ground::ground_axes;
 use super::inliers::{range_along, sample_inliers, without_fringe};
+use super::turntable::fit_turntable;
 use crate::math::{DVec3, Vec3};
 use crate::points::PointCloud;
 
@@ -13,7 +14,10 @@ pub fn fit_camera(cloud: &PointCloud, fit: &CameraFit) -> Camera {
     let points = without_fringe(sample_inliers(cloud));
     let direction = fit.direction.and_then(DVec3::try_normalize);
     let forward = direction.unwrap_or_else(|| automatic_direction(&points, fit));
-    let camera = fit_along(forward, &points, fit);
+    let camera = match fit.is_turntable {
+        true => fit_turntable(forward, &points, fit),
+        false => fit_along(forward, &points, fit),
+    };
     let world = |p: DVec3| cloud.origin + p;
     Camera { position: world(camera.position), focal_point: world(camera.focal_point), ..camera }
 }

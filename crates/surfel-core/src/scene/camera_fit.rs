@@ -26,6 +26,8 @@ pub struct CameraFit {
     pub elevation_deg: Option<f64>,
     /// Zoom factor; values above 1 bring the camera nearer.
     pub zoom: f64,
+    /// True if the camera goes around the points about `up`, and shows all of them from everywhere.
+    pub is_turntable: bool,
 }
 
 impl Default for CameraFit {
@@ -41,6 +43,7 @@ impl Default for CameraFit {
             azimuth_deg: 0.0,
             elevation_deg: None,
             zoom: 1.0,
+            is_turntable: false,
         }
     }
 }

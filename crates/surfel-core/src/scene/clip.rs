@@ -3,7 +3,7 @@
 use super::cloud_geometry::CloudGeometry;
 use super::graph::{Geometry, Graph};
 use super::mesh::Mesh;
-use crate::math::{DAffine3, DVec3};
+use crate::math::{DAffine3, DVec3, Ray};
 use rayon::prelude::*;
 
 /// The part of the world that is kept, in world coordinates; the default keeps all.
@@ -44,6 +44,31 @@ impl Clip {
 
     fn is_unbounded(&self) -> bool {
         *self == Self::default()
+    }
+}
+
+impl ClipPlane {
+    /// Returns true if a position is hidden. Positions on the plane are not.
+    pub fn hides(&self, position: DVec3) -> bool {
+        0.0 < (position - self.point).dot(self.normal)
+    }
+
+    /// Returns a ray that ends where the plane begins to hide, and begins where it ends. Positions of the ray are
+    /// relative to `origin`.
+    pub fn limited(&self, ray: Ray, origin: DVec3) -> Ray {
+        let normal = self.normal.as_vec3();
+        let height = normal.dot(ray.origin - (self.point - origin).as_vec3());
+        let rise = normal.dot(ray.direction);
+        let crossing = -height / rise;
+        if rise < 0.0 {
+            Ray { t_min: ray.t_min.max(crossing), ..ray }
+        } else if 0.0 < rise {
+            Ray { t_max: ray.t_max.min(crossing), ..ray }
+        } else if 0.0 < height {
+            Ray { t_max: ray.t_min, ..ray }
+        } else {
+            ray
+        }
     }
 }
 
@@ -166,6 +191,24 @@ mod tests {
             both.contains(DVec3::ZERO) && !both.contains(DVec3::X) && !both.contains(DVec3::NEG_X)
         );
         assert!(Clip::default().is_unbounded() && Clip::default().contains(DVec3::splat(1e30)));
+    }
+
+    #[test]
+    fn rays_are_limited_to_what_a_plane_keeps() {
+        let plane = ClipPlane { point: DVec3::new(103.0, 0.0, 0.0), normal: 2.0 * DVec3::X };
+        let origin = DVec3::new(100.0, 7.0, 0.0);
+        let range = |x: f32, direction: Vec3| {
+            let Ray { t_min, t_max, .. } =
+                plane.limited(Ray::new(Vec3::new(x, 1.0, 0.0), direction), origin);
+            (t_min, t_max)
+        };
+        assert_eq!(range(5.0, Vec3::NEG_X), (2.0, f32::INFINITY));
+        assert_eq!(range(1.0, Vec3::X), (0.0, 2.0));
+        assert_eq!(range(1.0, Vec3::NEG_X), (0.0, f32::INFINITY));
+        assert_eq!(range(1.0, Vec3::Y), (0.0, f32::INFINITY));
+        for nothing in [range(5.0, Vec3::Y), range(5.0, Vec3::X)] {
+            assert!(nothing.1 <= nothing.0, "{nothing:?}");
+        }
     }
 
     #[test]

@@ -172,6 +172,12 @@ impl Room {
         cos * ahead(turn_deg - azimuth_deg) - sin * up
     }
 
+    /// Returns the plane that hides the ceiling if the camera stands above it.
+    pub fn ceiling_before(&self, camera: &Camera) -> Option<ClipPlane> {
+        let up = self.axes[2].as_dvec3();
+        self.planes_before(camera).into_iter().find(|plane| plane.normal == up)
+    }
+
     /// Returns the planes that hide the walls and the ceiling beyond which the camera stands.
     ///
     /// A camera within the room hides nothing, and the floor always stays.
@@ -279,5 +285,8 @@ mod tests {
             assert!((center - plane.point).dot(plane.normal) < 0.0, "{plane:?}");
         }
         assert_eq!(room.planes_before(&camera_at(center)), []);
+        let ceiling = room.ceiling_before(&camera_at(center - 20.0 * forward)).unwrap();
+        assert_eq!(ceiling.normal, DVec3::Z);
+        assert_eq!(room.ceiling_before(&camera_at(center - 20.0 * DVec3::X)), None);
     }
 }

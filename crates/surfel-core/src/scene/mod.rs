@@ -3,6 +3,7 @@
 mod ground;
 mod camera;
 mod camera_fit;
+mod turntable;
 mod inliers;
 mod auto_viewpoint;
 mod auto_camera;

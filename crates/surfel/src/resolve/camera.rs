@@ -73,7 +73,9 @@ impl SceneCamera {
             (None, None) => {
                 let (width, height) = description.picture.resolution();
                 let aspect = f64::from(width) / f64::from(height);
-                choose_camera(settings, points, up, room, aspect, progress)
+                let is_turntable = description.output.turntable.is_some();
+                let frame = CameraFit { up, aspect, is_turntable, ..CameraFit::default() };
+                choose_camera(settings, points, &frame, room, progress)
             }
         };
         let is_locked = settings.lock();
@@ -183,18 +185,20 @@ fn format_convention(file: &FileInfo) -> UpConvention {
 
 /// Returns a camera from settings; what they leave open is chosen so that the whole cloud is seen, or the inside of
 /// `room`.
+///
+/// `frame` has the up direction, the shape of the picture, and whether the camera goes around.
 pub fn choose_camera(
     settings: &CameraSettings,
     cloud: &PointCloud,
-    up: Vec3,
+    frame: &CameraFit,
     room: Option<&Room>,
-    aspect: f64,
     progress: &dyn Progress,
 ) -> Camera {
+    let up = frame.up;
     if settings.is_panorama() {
         return panorama(settings, cloud, up, progress);
     }
-    let mut fit = fit(settings, up, aspect);
+    let mut fit = fit(settings, frame);
     let into_room =
         |room: &Room| room.view_direction(settings.azimuth_angle(), settings.elevation_angle);
     fit.direction = fit.direction.or_else(|| room.map(into_room));
@@ -259,18 +263,16 @@ fn panorama(
     }
 }
 
-fn fit(settings: &CameraSettings, up: Vec3, aspect: f64) -> CameraFit {
-    let automatic = CameraFit::default();
+fn fit(settings: &CameraSettings, frame: &CameraFit) -> CameraFit {
     CameraFit {
-        up,
-        aspect,
         is_orthographic: settings.orthographic.is_some(),
-        view_angle_deg: settings.view_angle.unwrap_or(automatic.view_angle_deg),
+        view_angle_deg: settings.view_angle.unwrap_or(frame.view_angle_deg),
         direction: settings.direction,
         view_up: settings.view_up,
         azimuth_deg: settings.azimuth_angle(),
         elevation_deg: settings.elevation_angle,
         zoom: settings.zoom_factor(),
+        ..*frame
     }
 }
 

@@ -38,6 +38,19 @@ pub fn hidden_walls(
     planes
 }
 
+/// Returns the plane that hides the ceiling of a room on a turntable, and reports what is hidden.
+///
+/// The walls before the camera change during the turn, and are hidden from the camera alone: if they let in light, it
+/// would flicker.
+pub fn hidden_ceiling(room: &Room, camera: &Camera, progress: &dyn Progress) -> Vec<ClipPlane> {
+    let ceiling = room.ceiling_before(camera);
+    if !room.planes_before(camera).is_empty() {
+        let line = "room: the ceiling, and in each frame the walls before the camera, are hidden";
+        progress.choice(line, &["camera.interior"]);
+    }
+    ceiling.into_iter().collect()
+}
+
 /// Removes everything beyond the planes.
 pub fn hide_walls(graph: &mut Graph, planes: &[ClipPlane]) {
     for plane in planes {

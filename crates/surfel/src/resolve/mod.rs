@@ -33,7 +33,7 @@ use crate::error::Result;
 use crate::overlay::Overlay;
 use camera::SceneExtent;
 use complete_description::complete_description;
-use interior::{choose_room, hidden_walls};
+use interior::{choose_room, hidden_ceiling, hidden_walls};
 use point_size::choose_point_size;
 use spread::report_gaps;
 use station::{choose_station, stand_at_station};
@@ -43,7 +43,7 @@ use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
 use surfel_core::render::Settings;
 use surfel_core::scene::color::{Legend, legend};
-use surfel_core::scene::{Camera, ClipPlane, Light, Projection, Scene, inlier_bounds};
+use surfel_core::scene::{Camera, ClipPlane, Light, Projection, Room, Scene, inlier_bounds};
 use surfel_core::surface::SurfaceKind;
 use surfel_formats::FileInfo;
 
@@ -62,6 +62,8 @@ pub struct Resolved {
     pub(crate) sequences: Vec<Sequence>,
     /// The camera with its movement.
     pub(crate) camera: SceneCamera,
+    /// The room on a turntable.
+    pub(crate) turned_room: Option<Room>,
     /// Legend, scale bar, north arrow and caption.
     pub(crate) overlay: Overlay,
     /// The world's up.
@@ -96,6 +98,8 @@ pub struct AutoSettings {
     pub lights: Vec<Light>,
     /// Planes beyond which the walls and the ceiling of a room are hidden.
     pub hidden_walls: Vec<ClipPlane>,
+    /// The room on a turntable, whose walls before the camera each frame hides.
+    pub turned_room: Option<Room>,
     /// The description, with the chosen lights written into it.
     description: SceneDescription,
 }
@@ -127,13 +131,17 @@ impl AutoSettings {
         let motion = scene.camera_motion.clone();
         let camera = SceneCamera::choose(&scene.graph, &extent, description, motion, progress);
         let diagonal = (bounds.max - bounds.min).length();
-        let hidden_walls = hidden_walls(room.as_ref(), &camera.camera, progress);
+        let turned_room = room.clone().filter(|_| description.output.turntable.is_some());
+        let hidden_walls = match &turned_room {
+            Some(room) => hidden_ceiling(room, &camera.camera, progress),
+            None => hidden_walls(room.as_ref(), &camera.camera, progress),
+        };
         let is_inside = room.is_some_and(|room| room.contains(camera.camera.position));
         let context = LightingContext { camera: camera.camera, up, diagonal, is_inside };
         let mut description = choose_lights(description, &context, progress);
         choose_point_size(scene, &mut description, &points, &camera.camera, progress);
         let lights = lights(&description, scene.environment.as_ref(), up)?;
-        Ok(Self { up, camera, lights, hidden_walls, description })
+        Ok(Self { up, camera, lights, hidden_walls, turned_room, description })
     }
 
     /// Returns the description with everything that was chosen written into it.
@@ -159,7 +167,7 @@ impl LoadedScene {
         progress: &dyn Progress,
     ) -> Result<Resolved> {
         let complete = auto.complete_description(&self);
-        let AutoSettings { up, camera, lights, description, hidden_walls, .. } = auto;
+        let AutoSettings { up, camera, lights, description, hidden_walls, turned_room } = auto;
         let clouds = self.take_prepared(&description, progress)?;
         let legend = match description.picture.legend() {
             true => common_legend(&clouds, &description, up),
@@ -177,7 +185,17 @@ impl LoadedScene {
         let settings = render_settings(&description);
         let choices = Vec::new();
         let description = complete;
-        Ok(Resolved { scene, settings, description, choices, sequences, camera, overlay, up })
+        Ok(Resolved {
+            scene,
+            settings,
+            description,
+            choices,
+            sequences,
+            camera,
+            turned_room,
+            overlay,
+            up,
+        })
     }
 }
 
