@@ -155,7 +155,7 @@ mod tests {
     #[test]
     fn lines_that_were_taken_for_a_surface_are_lines_again() {
         let (cloud, n_wall) = wall_and_wires();
-        let plane = PlaneFit { normal: Vec3::X, variation: 0.0, width: 1.0 };
+        let plane = PlaneFit { normal: Vec3::X, variation: 0.0, width: 1.0, is_smooth: false };
         let line = PlaneFit { width: 0.01, ..plane };
         let fits = [vec![plane; n_wall], vec![line; cloud.len() - n_wall]].concat();
         let (shapes, report) = narrowed_shapes(&cloud, &fits);

@@ -23,15 +23,18 @@ const MIN_NOISE: f32 = 0.03;
 const MAX_RESIDUAL_RATIO: f32 = 1.5;
 /// Residual in spacings below which a plane is as good as a cubic: on a sphere its normal errs by some 0.1 degrees.
 const MIN_PLANE_RESIDUAL: f32 = 0.003;
-/// Ratio of the residuals of cubic and plane above which the plane's fewer neighbours are on one side of an edge.
-const MAX_PLANE_RATIO: f32 = 1.5;
+/// Ratio of a residual to the noise above which more neighbours are not tried.
+const MAX_WIDE_RATIO: f32 = 2.5;
+/// Ratio of the residuals of plane and cubic above which the neighbours bend. Below it the plane, which errs less by
+/// noise, is the better one; at an edge its fewer neighbours may be on one side.
+const MIN_CURVED_RATIO: f32 = 1.25;
 /// Number of points near each other that share a noise.
 const REGION_SIZE: usize = 256;
 /// Number of terms of a cubic in two variables.
 const N_TERMS: usize = 10;
 /// Minimum pivot of the normal equations, as a fraction of the sum of all weights: with less, the neighbours do not
 /// determine the cubic.
-const MIN_PIVOT: f64 = 1e-5;
+const MIN_PIVOT: f64 = 2e-4;
 /// Weight of the farthest neighbours: the nearest have 1.
 const MIN_WEIGHT: f64 = 0.0004;
 
@@ -42,6 +45,8 @@ pub struct JetFit {
     pub normal: Vec3,
     /// Root mean square distance of the neighbours from the cubic, in spacings.
     pub residual: f32,
+    /// False if the neighbours lie on a plane as well.
+    pub is_curved: bool,
 }
 
 /// Returns the cubic through the nearest neighbours of a point, or the plane if it fits fewer of them better; none if
@@ -59,12 +64,12 @@ pub fn fit_nearest_jet(
         return None;
     }
     let of_plane = plane_residual(fit, n_plane_neighbors);
-    let plane = JetFit { normal: fit.normal, residual: of_plane };
+    let plane = JetFit { normal: fit.normal, residual: of_plane, is_curved: false };
     if of_plane < MIN_PLANE_RESIDUAL {
         return Some(plane);
     }
     let jet = fit_jet(positions, point_idx, neighbors, fit.normal)?;
-    Some(if jet.residual <= MAX_PLANE_RATIO * of_plane { jet } else { plane })
+    Some(if MIN_CURVED_RATIO * jet.residual < of_plane { jet } else { plane })
 }
 
 /// Fits a cubic to as many neighbours as the noise in spacings asks for, or down to half as many until they are on one
@@ -103,7 +108,10 @@ pub fn refine_normals(
         let known = given.map(|given| given[point]).filter(|given| *given != Vec3::ZERO);
         let jet = || {
             let nearest = nearest[point]?;
-            let wide = (MIN_NOISE <= *noise).then(|| fit_wide_jet(tree, point, fit.normal, *noise));
+            let has_noise = MIN_NOISE <= *noise
+                && nearest.is_curved
+                && nearest.residual < MAX_WIDE_RATIO * *noise;
+            let wide = has_noise.then(|| fit_wide_jet(tree, point, fit.normal, *noise));
             wide.flatten().or(Some(nearest).filter(|jet| is_smooth(jet, *noise)))
         };
         if let Some(normal) = known.or_else(|| Some(jet()?.normal)) {
@@ -175,6 +183,7 @@ fn fit_jet(
     Some(JetFit {
         normal: (normal - u * terms[1] - v * terms[2]).normalize().as_vec3(),
         residual: (variance.sqrt() * per_spacing) as f32,
+        is_curved: true,
     })
 }
 

@@ -150,9 +150,9 @@ fn extents(cloud: &PointCloud, indices: [&Values; 2], scan_of: &ScanOfPoint) -> 
     for point in 0..cloud.len() {
         let Some(cell) = cell(cloud, indices, point) else { continue };
         if let Some(extent) = extents.get_mut(scan_of.get(point)) {
-            for axis in 0..2 {
-                extent.first[axis] = extent.first[axis].min(cell[axis]);
-                extent.last[axis] = extent.last[axis].max(cell[axis]);
+            for (axis, index) in cell.into_iter().enumerate() {
+                extent.first[axis] = extent.first[axis].min(index);
+                extent.last[axis] = extent.last[axis].max(index);
             }
             extent.n_points += 1;
         }

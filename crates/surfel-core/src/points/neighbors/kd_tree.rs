@@ -1,6 +1,6 @@
 //! A balanced kd-tree without pointers.
 
-use super::candidate_set::{CandidateSet, KNearest};
+use super::candidate_set::{CandidateSet, KNearest, ManyNearest};
 use super::neighbor::{Neighbor, check_count, key};
 use crate::error::Result;
 use crate::math::{Aabb, Vec3, Vec4, set_bits};
@@ -89,10 +89,20 @@ impl<'a> KdTree<'a> {
 
     /// Returns the k points nearest to `position`, nearest first, without the one of index `excluded`.
     pub fn nearest(&self, position: Vec3, k: usize, excluded: Option<u32>) -> Vec<Neighbor> {
-        let mut candidates = KNearest::new(k.min(self.n_points));
+        /// The number of neighbours from which inserting each in its place takes longer than selecting.
+        const MANY: usize = 48;
         let mut neighbors = Vec::new();
-        if 0 < k.min(self.n_points) && position.is_finite() {
-            let target = Target { position, own: excluded.unwrap_or(u32::MAX) };
+        let k = k.min(self.n_points);
+        if k == 0 || !position.is_finite() {
+            return neighbors;
+        }
+        let target = Target { position, own: excluded.unwrap_or(u32::MAX) };
+        if k < MANY {
+            let mut candidates = KNearest::new(k);
+            self.search(self.root(), &target, &mut candidates);
+            candidates.drain_sorted(&mut neighbors);
+        } else {
+            let mut candidates = ManyNearest::new(k);
             self.search(self.root(), &target, &mut candidates);
             candidates.drain_sorted(&mut neighbors);
         }
