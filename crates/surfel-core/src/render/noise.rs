@@ -3,7 +3,7 @@
 use crate::math::{Vec3, Vec4};
 
 /// Greatest factor by which a block's samples grow.
-const MAX_FACTOR: u32 = 8;
+const MAX_FACTOR: u32 = 4;
 /// Number of samples per pixel beyond which no block's samples grow.
 const MAX_ADAPTIVE_SAMPLES: u32 = 32;
 /// Factor by which half the difference of the halves exceeds the deviation of a pixel between seeds. For independent
@@ -21,6 +21,9 @@ pub fn next_n_samples(n_samples: u32, min_samples: u32) -> Option<u32> {
     (next <= max).then_some(next)
 }
 
+/// Square of the median of the absolute value of a normally distributed number with a deviation of 1.
+const MEDIAN_SQUARE: f32 = 0.455;
+
 /// The sums of a pixel's premultiplied samples, and what is behind them.
 #[derive(Clone, Copy)]
 pub struct HalfSums {
@@ -34,18 +37,26 @@ pub struct HalfSums {
 
 /// Returns the standard deviation of pixels between seeds, in steps of an 8-bit picture.
 ///
-/// `n_first` of the `n_all` samples of each pixel are in the first half.
+/// `n_first` of the `n_all` samples of each pixel are in the first half. The estimate is from the median of the pixels,
+/// so that edges, which differ from sample to sample along a few of them, are not taken for grain.
 pub fn standard_deviation(pixels: impl Iterator<Item = HalfSums>, n_first: u32, n_all: u32) -> f32 {
     let (n_first, n_second) = (n_first as f32, (n_all - n_first) as f32);
-    let (mut sum, mut n_channels) = (0.0, 0);
-    for HalfSums { first, all, background } in pixels {
+    let square = |HalfSums { first, all, background }| {
         let difference = displayed(first / n_first, background)
             - displayed((all - first) / n_second, background);
-        sum += difference.length_squared();
-        n_channels += 3;
-    }
-    let variance = sum / n_channels.max(1) as f32;
+        difference.length_squared() / 3.0
+    };
+    let variance = median(pixels.map(square).collect()) / MEDIAN_SQUARE;
     (variance * n_first * n_second).sqrt() / (n_first + n_second) / STRATIFICATION
+}
+
+/// Returns the median, or 0 if there are no values.
+fn median(mut values: Vec<f32>) -> f32 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 /// Returns a colour as an 8-bit picture shows it, in steps. The square root stands in for the sRGB curve, from which it
@@ -92,13 +103,24 @@ mod tests {
     }
 
     #[test]
-    fn samples_double_up_to_eight_times_and_32() {
+    fn edges_through_a_few_pixels_are_no_noise() {
+        let white = Vec4::new(1.0, 1.0, 1.0, 1.0);
+        let smooth = HalfSums { first: white, all: 2.0 * white, background: Vec3::ZERO };
+        let edge = HalfSums { all: white, ..smooth };
+        let block = |n_edge| (0..64).map(move |i| if i < n_edge { edge } else { smooth });
+        assert_eq!(standard_deviation(block(16), 1, 2), 0.0);
+        assert!(50.0 < standard_deviation(block(48), 1, 2));
+    }
+
+    #[test]
+    fn samples_double_up_to_four_times_and_32() {
         let counts = |min| {
             std::iter::successors(Some(min), |n| next_n_samples(*n, min)).collect::<Vec<u32>>()
         };
-        assert_eq!(counts(2), [2, 4, 8, 16]);
-        assert_eq!(counts(4), [4, 8, 16, 32]);
+        assert_eq!(counts(2), [2, 4, 8]);
+        assert_eq!(counts(4), [4, 8, 16]);
         assert_eq!(counts(5), [5, 10, 20]);
+        assert_eq!(counts(12), [12, 24]);
         assert_eq!(counts(17), [17]);
         assert_eq!(counts(u32::MAX), [u32::MAX]);
     }

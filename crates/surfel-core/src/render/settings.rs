@@ -36,9 +36,8 @@ const MAX_SAMPLES: u32 = 1 << 16;
 pub const MAX_NOISE_THRESHOLD: f32 = 255.0;
 
 impl Default for Settings {
-    /// Returns 1920 x 1080 pixels, 4 camera rays and 16 light samples per pixel, a noise threshold of
-    /// 2, 8 bounces, seed 0, points of
-    /// one pixel and no AOVs.
+    /// Returns 1920 x 1080 pixels, 4 camera rays and 16 light samples per pixel, a noise threshold of 2,
+    /// 8 bounces, seed 0, points of one pixel and no AOVs.
     fn default() -> Self {
         Self {
             width: 1920,
