@@ -14,7 +14,7 @@ use std::time::Instant;
 
 /// Side of a tile in pixels.
 pub const TILE_SIZE: u32 = 32;
-/// Number of pixels of a block, whose samples grow together: a square of a tile, as pixels are in Morton order.
+/// Side in pixels of a block, whose samples grow together: a contiguous range of a tile, as pixels are in Morton order.
 const BLOCK_SIZE: u32 = 8;
 /// Approximate number of rays in a batch: enough to fill tiles of few samples, and few enough for the
 /// caches.
