@@ -89,8 +89,9 @@ fn a_turntable_opens_a_room_toward_the_camera_of_each_frame() {
     succeed(&[&["animate", &file, "-o", &turn], &options[..], &SMALL].concat());
     for frame in 1..=4 {
         let (width, height, _, samples) = read_png(folder.path(&format!("f{frame}.png")));
-        let middle = (height / 3..2 * height / 3)
-            .flat_map(|y| (width / 3..2 * width / 3).map(move |x| (y * width + x) as usize));
+        // The floor fills the middle fifth of each frame.
+        let middle = (2 * height / 5..3 * height / 5)
+            .flat_map(|y| (2 * width / 5..3 * width / 5).map(move |x| (y * width + x) as usize));
         let (n_green, n_red) = middle.fold((0, 0), |(n_green, n_red), pixel| {
             let [red, green] = [0, 1].map(|channel| samples[3 * pixel + channel]);
             (n_green + u32::from(red < green), n_red + u32::from(green < red))
