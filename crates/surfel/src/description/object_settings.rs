@@ -68,7 +68,8 @@ settings! {
         mixed_pixels: MixedPixels = MixedPixels::default(), OneOf(MIXED_PIXELS), "CHOICE";
         /// Search for neighbours: knn, grid or scan-line.
         neighbors: NeighborMethod = NeighborMethod::default(), parsed(method_name), "METHOD";
-        /// Number of neighbours that a normal is estimated from [default: 16].
+        /// Number of neighbours whose plane gives the normal. Where they bend, a cubic through 24 of them or more
+        /// does, the more the noisier they are [default: 16].
         normals_k: u32, count(2, 10_000), "K";
         /// Estimates normals from all neighbours within this distance in world units.
         normals_radius: f64, POSITIVE, "LENGTH";
