@@ -179,7 +179,7 @@ impl Tile {
         sizes.map(range).collect()
     }
 
-    /// Returns true if a block's pixels deviate by more than the threshold; `n_first` samples are in the first half.
+    /// Returns true if a block's pixels deviate by more than the threshold, and enough to be seen; `n_first` samples are in the first half.
     fn is_noisy(&self, job: &Job, block: &Range<usize>, n_first: u32) -> bool {
         let pixels = &self.pixels[block.clone()];
         let n_samples = pixels.first().map_or(0, |pixel| pixel.n_samples);
@@ -188,7 +188,9 @@ impl Tile {
             all: pixel.sum,
             background: job.background(pixel.position.1).truncate(),
         });
-        job.settings.noise_threshold < noise::standard_deviation(halves, n_first, n_samples)
+        let deviation = noise::standard_deviation(halves.clone(), n_first, n_samples);
+        job.settings.noise_threshold < deviation
+            && noise::masked_deviation(halves, n_samples) < deviation
     }
 
     /// Adds samples to some of the pixels; those with indices below `end_of_half` are of the first half.
