@@ -265,7 +265,6 @@ fn cancelling(criterion: &mut Criterion) {
         height: 720,
         samples_per_pixel: 16,
         light_samples: 64,
-        noise_threshold: 0.0,
         max_depth: 3,
         seed: 0,
         point_size: 1.0,

@@ -4,12 +4,14 @@ use super::raster;
 use super::region::RenderRegion;
 use super::renderer::{RenderStats, Renderer};
 use super::settings::Settings;
-use super::tile::{Job, TILE_SIZE, Tile, TileRect};
 use crate::error::Result;
 use crate::flat::FlatScene;
-use crate::image::Image;
+use crate::image::{Band, Image};
+use crate::integrator::{CameraRayBatch, Integrator, PixelSamples, RayCounts, Whitted, albedo};
+use crate::math::{Ray, Vec3, Vec4, hash, morton_decode, owen_sobol_2d};
 use crate::progress::Progress;
-use crate::trace::{Simd, Tracer};
+use crate::scene::View;
+use crate::trace::{InstanceFilter, SceneHit, Simd, Support, Tracer};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -19,6 +21,12 @@ pub struct CpuRenderer {
     /// The SIMD level of its kernels.
     pub simd: Simd,
 }
+
+/// Side of a tile in pixels.
+const TILE_SIZE: u32 = 32;
+/// Approximate number of rays in a batch: enough to fill tiles of few samples, and few enough for the
+/// caches.
+const BATCH_SIZE: u32 = 4096;
 
 impl Renderer for CpuRenderer {
     fn render_region(
@@ -57,7 +65,7 @@ fn render_tiles(job: &Job) -> Result<(Image, RenderStats)> {
         };
         let rects: Vec<_> = TileRect::row(row as u32, job).collect();
         let tiles: Vec<_> = rects.into_par_iter().map(render).collect::<Result<_>>()?;
-        tiles.iter().for_each(|tile| tile.copy_to(&mut band, job));
+        tiles.iter().for_each(|tile| tile.copy_to(&mut band, settings.width));
         Ok(tiles.iter().map(|tile| (tile.counts, tile.trace_secs)).collect::<Vec<_>>())
     });
     let mut stats = RenderStats::default();
@@ -66,4 +74,205 @@ fn render_tiles(job: &Job) -> Result<(Image, RenderStats)> {
         stats.trace_secs += trace_secs / rayon::current_num_threads() as f64;
     }
     Ok((image, stats))
+}
+
+/// Inputs that all tiles share.
+struct Job<'a> {
+    tracer: &'a Tracer<'a>,
+    view: &'a View,
+    settings: &'a Settings,
+    region: RenderRegion,
+}
+
+impl Job<'_> {
+    /// Returns the ray through a position in the picture, as far as the scene's planes show it.
+    fn camera_ray(&self, x: f32, y: f32) -> Ray {
+        let FlatScene { camera_planes, origin, .. } = self.tracer.scene;
+        let ray = self.view.ray(x, y);
+        camera_planes.iter().fold(ray, |ray, plane| plane.limited(ray, *origin))
+    }
+}
+
+/// Returns the background in a row of pixels: linear colour and alpha.
+fn background(job: &Job, y: u32) -> Vec4 {
+    let height = (y as f32 + 0.5) / job.settings.height as f32;
+    Vec4::from_array(job.tracer.scene.background.color_at(height))
+}
+
+/// The pixels of a tile: coordinates of its upper left pixel in the picture, and its size.
+#[derive(Clone, Copy)]
+struct TileRect {
+    x: u32,
+    y: u32,
+    width: u32,
+    height: u32,
+}
+
+impl TileRect {
+    /// Returns a row of the region's tiles, from left to right.
+    fn row(row: u32, job: &Job) -> impl Iterator<Item = Self> {
+        let (y, width) = (job.region.rows.0 + row * TILE_SIZE, job.settings.width);
+        let height = TILE_SIZE.min(job.region.rows.1 - y);
+        let rect = move |x| Self { x, y, width: TILE_SIZE.min(width - x), height };
+        (0..width).step_by(TILE_SIZE as usize).map(rect)
+    }
+
+    fn n_pixels(self) -> usize {
+        (self.width * self.height) as usize
+    }
+
+    /// Returns the picture coordinates of the tile's pixels in Morton order, so that the rays of a packet
+    /// and the packets of a group are close to each other.
+    fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
+        let offsets = (0..TILE_SIZE.pow(2)).map(morton_decode);
+        let offsets = offsets.filter(move |&(x, y)| x < self.width && y < self.height);
+        offsets.map(move |(x, y)| (self.x + x, self.y + y))
+    }
+}
+
+/// A rendered tile; its pixels are in the order of `TileRect::pixels`.
+struct Tile {
+    rect: TileRect,
+    color: Vec<Vec4>,
+    coverage: Vec<f32>,
+    aovs: Vec<PixelAovs>,
+    counts: RayCounts,
+    trace_secs: f64,
+}
+
+/// AOVs of one pixel, from the ray through its centre.
+struct PixelAovs {
+    depth: f32,
+    position: Vec3,
+    albedo: Vec3,
+    hit: SceneHit,
+    support: Support,
+}
+
+impl Tile {
+    fn render(job: &Job, rect: TileRect) -> Result<Self> {
+        let Job { settings, .. } = *job;
+        let n = rect.n_pixels();
+        let mut tile = Self {
+            rect,
+            color: vec![Vec4::ZERO; n],
+            coverage: vec![0.0; n],
+            aovs: Vec::new(),
+            counts: RayCounts::default(),
+            trace_secs: 0.0,
+        };
+        let n_samples = job.region.n_samples();
+        let (first, end) = job.region.samples;
+        let samples_per_batch = (BATCH_SIZE / n as u32).clamp(1, n_samples);
+        for first in (first..end).step_by(samples_per_batch as usize) {
+            tile.add_samples(job, first..end.min(first + samples_per_batch))?;
+        }
+        for (i, (_, y)) in rect.pixels().enumerate() {
+            let n_samples = n_samples as f32;
+            tile.coverage[i] /= n_samples;
+            tile.color[i] =
+                tile.color[i] / n_samples + (1.0 - tile.coverage[i]) * background(job, y);
+        }
+        if settings.with_aovs && 1 < settings.samples_per_pixel {
+            tile.trace_aovs(job)?;
+        }
+        Ok(tile)
+    }
+
+    /// Traces the camera rays with these sample indices of all pixels and adds up their radiance.
+    fn add_samples(&mut self, job: &Job, sample_indices: std::ops::Range<u32>) -> Result<()> {
+        let Job { tracer, settings, .. } = *job;
+        let per_pixel = sample_indices.len();
+        let n = self.color.len() * per_pixel;
+        let mut rays = Vec::with_capacity(n);
+        let (mut keys, mut indices) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let mut backgrounds = Vec::with_capacity(n);
+        for (x, y) in self.rect.pixels() {
+            let key = hash(settings.seed ^ hash(u64::from(y) << 32 | u64::from(x)));
+            let background = background(job, y);
+            for index in sample_indices.clone() {
+                let (dx, dy) = if settings.samples_per_pixel == 1 {
+                    (0.5, 0.5)
+                } else {
+                    owen_sobol_2d(index, key)
+                };
+                rays.push(job.camera_ray(x as f32 + dx, y as f32 + dy));
+                keys.push(key);
+                indices.push(index);
+                backgrounds.push(background);
+            }
+        }
+        let start = Instant::now();
+        let mut hits = vec![SceneHit::MISS; rays.len()];
+        tracer.hits(InstanceFilter::All, &rays, &mut hits)?;
+        self.trace_secs += start.elapsed().as_secs_f64();
+        if settings.with_aovs && settings.samples_per_pixel == 1 {
+            self.set_aovs(job, &rays, &hits)?;
+        }
+        let n_light_samples = settings.light_samples.div_ceil(settings.samples_per_pixel);
+        let samples = PixelSamples {
+            keys: &keys,
+            indices: &indices,
+            background: &backgrounds,
+            n_light_samples,
+        };
+        let batch = CameraRayBatch { tracer, rays: &rays, hits: &hits, samples };
+        let integrator = Whitted { max_depth: settings.max_depth };
+        let (colors, counts) = integrator.radiance(&batch)?;
+        for (i, color) in colors.iter().enumerate() {
+            self.color[i / per_pixel] += *color;
+            self.coverage[i / per_pixel] += color.w;
+        }
+        self.counts += counts;
+        Ok(())
+    }
+
+    /// Traces the rays through the pixels' centres for the AOVs.
+    fn trace_aovs(&mut self, job: &Job) -> Result<()> {
+        let rays: Vec<Ray> = self
+            .rect
+            .pixels()
+            .map(|(x, y)| job.camera_ray(x as f32 + 0.5, y as f32 + 0.5))
+            .collect();
+        let mut hits = vec![SceneHit::MISS; rays.len()];
+        job.tracer.hits(InstanceFilter::All, &rays, &mut hits)?;
+        self.counts.primary += rays.len() as u64;
+        self.set_aovs(job, &rays, &hits)
+    }
+
+    /// Sets the AOVs from the rays through the pixels' centres.
+    fn set_aovs(&mut self, job: &Job, rays: &[Ray], hits: &[SceneHit]) -> Result<()> {
+        let supports = job.tracer.supports(rays, hits)?;
+        let aovs = |((ray, hit), support): ((&Ray, &SceneHit), Support)| {
+            if hit.is_miss() {
+                let (depth, zero) = (f32::INFINITY, Vec3::ZERO);
+                return PixelAovs { depth, position: zero, albedo: zero, hit: *hit, support };
+            }
+            let position = ray.at(hit.distance);
+            let albedo = albedo(job.tracer.scene, ray, hit);
+            PixelAovs { depth: job.view.depth(position), position, albedo, hit: *hit, support }
+        };
+        self.aovs = rays.iter().zip(hits).zip(supports).map(aovs).collect();
+        Ok(())
+    }
+
+    /// Copies the tile to its row of tiles in a picture of `width` pixels.
+    fn copy_to(&self, band: &mut Band, width: u32) {
+        for (i, (x, y)) in self.rect.pixels().enumerate() {
+            let pixel = ((y - self.rect.y) * width + x) as usize;
+            band.color[pixel] = self.color[i].to_array();
+            band.coverage[pixel] = self.coverage[i];
+            if let Some(aovs) = &mut band.aovs {
+                let PixelAovs { depth, position, albedo, hit, support } = &self.aovs[i];
+                aovs.depth[pixel] = *depth;
+                aovs.position[pixel] = *position;
+                aovs.normal[pixel] = hit.normal;
+                aovs.point_id[pixel] = hit.id;
+                aovs.instance_id[pixel] = hit.instance;
+                aovs.albedo[pixel] = *albedo;
+                aovs.support_count[pixel] = support.n_points;
+                aovs.support_distance[pixel] = support.distance;
+            }
+        }
+    }
 }

@@ -2,18 +2,16 @@
 
 mod cpu;
 mod footprint;
-mod noise;
 mod raster;
 mod region;
 mod renderer;
 mod settings;
-mod tile;
 
 pub use cpu::CpuRenderer;
 pub use footprint::POINT_SIZE_RANGE;
 pub use region::RenderRegion;
 pub use renderer::{RenderStats, Renderer};
-pub use settings::{MAX_NOISE_THRESHOLD, MAX_PIXELS, Settings};
+pub use settings::{MAX_PIXELS, Settings};
 
 use crate::error::Result;
 use crate::flat::FlatScene;

@@ -26,6 +26,11 @@ impl RenderRegion {
         self.rows.1 - self.rows.0
     }
 
+    /// Returns the number of samples per pixel.
+    pub(super) fn n_samples(&self) -> u32 {
+        self.samples.1 - self.samples.0
+    }
+
     /// Returns an empty image of the region's rows, with AOVs if the settings ask for them.
     pub(super) fn blank_image(&self, settings: &Settings) -> Image {
         let new = if settings.with_aovs { Image::with_aovs } else { Image::new };

@@ -15,9 +15,6 @@ pub struct Settings {
     /// Number of rays per pixel toward each light with soft shadows: sky, environment, suns and punctual
     /// lights.
     pub light_samples: u32,
-    /// Standard deviation of the grain, in steps of an 8-bit picture, above which blocks of pixels of a whole picture
-    /// get more samples; 0 gives every pixel the same number.
-    pub noise_threshold: f32,
     /// Maximum number of reflections and refractions along a path.
     pub max_depth: u32,
     /// Seed of all random numbers.
@@ -32,19 +29,16 @@ pub struct Settings {
 pub const MAX_PIXELS: u64 = 1 << 28;
 /// Maximum number of camera or light samples per pixel.
 const MAX_SAMPLES: u32 = 1 << 16;
-/// Maximum noise threshold: no 8-bit picture deviates by more.
-pub const MAX_NOISE_THRESHOLD: f32 = 255.0;
 
 impl Default for Settings {
-    /// Returns 1920 x 1080 pixels, 4 camera rays and 16 light samples per pixel, a noise threshold of 2,
-    /// 8 bounces, seed 0, points of one pixel and no AOVs.
+    /// Returns 1920 x 1080 pixels, 4 camera rays and 16 light samples per pixel, 8 bounces, seed 0, points of
+    /// one pixel and no AOVs.
     fn default() -> Self {
         Self {
             width: 1920,
             height: 1080,
             samples_per_pixel: 4,
             light_samples: 16,
-            noise_threshold: 2.0,
             max_depth: 8,
             seed: 0,
             point_size: 1.0,
@@ -58,8 +52,7 @@ impl Settings {
     ///
     /// # Errors
     /// Fails if the picture has no pixels or more than [`MAX_PIXELS`], if a number of samples is 0 or
-    /// above 65,536, if the noise threshold is not within 0 to 255, or if points are smaller than 1 or larger than 64
-    /// pixels.
+    /// above 65,536, or if points are smaller than 1 or larger than 64 pixels.
     pub fn check(&self) -> Result<()> {
         let n_pixels = u64::from(self.width) * u64::from(self.height);
         if n_pixels == 0 || MAX_PIXELS < n_pixels {
@@ -76,10 +69,6 @@ impl Settings {
                     expected: "1 to 65536",
                 });
             }
-        }
-        if !(0.0..=MAX_NOISE_THRESHOLD).contains(&self.noise_threshold) {
-            let found = self.noise_threshold.to_string();
-            return Err(Error::Setting { name: "noise threshold", found, expected: "0 to 255" });
         }
         let (min, max) = POINT_SIZE_RANGE;
         if !(min..=max).contains(&self.point_size) {

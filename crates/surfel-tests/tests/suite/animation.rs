@@ -22,7 +22,6 @@ const SETTINGS: Settings = Settings {
     height: 40,
     samples_per_pixel: 2,
     light_samples: 4,
-    noise_threshold: 0.0,
     max_depth: 6,
     seed: 5,
     point_size: 1.0,

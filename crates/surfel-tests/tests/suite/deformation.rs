@@ -20,7 +20,6 @@ const SETTINGS: Settings = Settings {
     height: 64,
     samples_per_pixel: 4,
     light_samples: 1,
-    noise_threshold: 0.0,
     max_depth: 2,
     seed: 9,
     point_size: 1.0,

@@ -19,7 +19,6 @@ const SETTINGS: Settings = Settings {
     height: 50,
     samples_per_pixel: 4,
     light_samples: 8,
-    noise_threshold: 0.0,
     max_depth: 8,
     seed: 3,
     point_size: 5.0,

@@ -19,7 +19,6 @@ const SETTINGS: Settings = Settings {
     height: 64,
     samples_per_pixel: 1,
     light_samples: 16,
-    noise_threshold: 0.0,
     max_depth: 8,
     seed: 1,
     point_size: 1.0,

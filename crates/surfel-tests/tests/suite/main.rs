@@ -1,7 +1,6 @@
 //! Integration tests across crates: scenes with known answers, fast searches against brute force, and output
 //! that is the same on every machine.
 
-mod adaptive_sampling;
 mod animation;
 mod bad_clouds;
 mod batches;

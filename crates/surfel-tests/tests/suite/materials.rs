@@ -17,7 +17,6 @@ pub const SETTINGS: Settings = Settings {
     height: 32,
     samples_per_pixel: 1,
     light_samples: 16,
-    noise_threshold: 0.0,
     max_depth: 8,
     seed: 1,
     point_size: 1.0,

@@ -62,7 +62,6 @@ fn picture(kind: SurfaceKind) -> Image {
         height: SIZE.1,
         samples_per_pixel: 4,
         light_samples: 16,
-        noise_threshold: 0.0,
         max_depth: 8,
         seed: 0,
         point_size: 1.0,

@@ -30,7 +30,6 @@ const SETTINGS: Settings = Settings {
     height: SIDE,
     samples_per_pixel: 1,
     light_samples: 4,
-    noise_threshold: 0.0,
     max_depth: 2,
     seed: 0,
     point_size: 1.0,
@@ -186,7 +185,7 @@ fn soft_shadows_of_a_lamp_have_their_mean() {
 }
 
 /// Returns an environment of random pixels, some of them bright.
-pub fn structured(width: u32, bright_fraction: f32) -> Environment {
+fn structured(width: u32, bright_fraction: f32) -> Environment {
     let mut random = Random::new(91, 0);
     let mut pixel = || {
         let is_bright = random.next_f32() < bright_fraction;

@@ -18,7 +18,6 @@ const SETTINGS: Settings = Settings {
     height: 48,
     samples_per_pixel: 1,
     light_samples: 1,
-    noise_threshold: 0.0,
     max_depth: 2,
     seed: 0,
     point_size: 3.0,

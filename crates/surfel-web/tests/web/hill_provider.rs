@@ -217,7 +217,6 @@ fn render_settings(seed: u64) -> Settings {
         height: PICTURE_SIZE.1,
         samples_per_pixel: N_SAMPLES,
         light_samples: 1,
-        noise_threshold: 0.0,
         max_depth: 2,
         seed,
         point_size: 1.0,

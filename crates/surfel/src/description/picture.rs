@@ -9,7 +9,7 @@ use super::rule::{
 use super::rule::{POSITIVE, Rule};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use surfel_core::render::{MAX_NOISE_THRESHOLD, POINT_SIZE_RANGE};
+use surfel_core::render::POINT_SIZE_RANGE;
 use surfel_core::scene::Background;
 use surfel_formats::BitDepth;
 
@@ -22,9 +22,6 @@ settings! {
         spp: u32 = 4, count(1, 65_536), "N", common;
         /// Rays per pixel toward the sky or environment, and toward each light with soft shadows.
         light_samples: u32 = 16, count(1, 65_536), "N";
-        /// Standard deviation of the grain, in steps of an 8-bit picture, above which parts of the picture get up to 4
-        /// times the samples, but not more than 32 per pixel; 0 = off.
-        noise_threshold: f64 = 2.0, number(0.0, MAX_NOISE_THRESHOLD as f64), "STEPS";
         /// Maximum number of reflections and refractions of a ray.
         max_depth: u32 = 8, count(0, 64), "N";
         /// Diameter of the points of `--surface points` in pixels [default: chosen so that most of them touch].

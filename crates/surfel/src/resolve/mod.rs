@@ -223,7 +223,6 @@ pub fn render_settings(description: &SceneDescription) -> Settings {
         height,
         samples_per_pixel: picture.spp(),
         light_samples: picture.light_samples(),
-        noise_threshold: picture.noise_threshold() as f32,
         max_depth: picture.max_depth(),
         seed: picture.seed(),
         point_size: picture.point_size.map_or(Settings::default().point_size, |size| size as f32),
