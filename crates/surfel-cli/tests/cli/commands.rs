@@ -1,6 +1,6 @@
 //! Each command, end to end.
 
-use super::common::{Folder, dome, fail, read_png, succeed, surfel, tile};
+use super::common::{Folder, dome, fail, read_png, stderr, succeed, surfel, tile};
 use serde_json::Value;
 use std::fs;
 
@@ -114,12 +114,44 @@ fn quiet_prints_nothing_and_choices_name_their_options() {
     for flag in flags.iter().chain(&["--radius", "--color", "--exposure", "--threads"]) {
         assert!(message.contains(&format!("[{flag}")), "{flag}: {message}");
     }
-    for what in ["normals of 400 points from 16 neighbours [", "radii 0.", "color rgb"] {
+    for what in
+        ["normals of 400 points from planes through 16 neighbours,", "radii 0.", "color rgb"]
+    {
         assert_eq!(message.matches(what).count(), 1, "{what}: {message}");
     }
     assert_eq!(message.matches("normals").count(), 2, "once in words, once as a flag: {message}");
     let quiet = surfel(&[&arguments[..], &["--quiet"]].concat());
     assert!(quiet.stderr.is_empty() && quiet.stdout.is_empty());
+}
+
+/// Returns a scan of a wall at x = 4 as PTX, whose rays pass through two columns of the grid.
+fn wall_with_a_gap() -> String {
+    const SIDE: usize = 60;
+    let axes = "1 0 0\n0 1 0\n0 0 1\n";
+    let pose = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+    let mut text = format!("{SIDE}\n{SIDE}\n0 0 0\n{axes}{pose}");
+    for column in 0..SIDE {
+        for row in 0..SIDE {
+            let [azimuth, elevation] = [column, row].map(|index| 0.01 * (index as f64 - 30.0));
+            let (y, z) = (4.0 * azimuth.tan(), 4.0 * elevation.tan() / azimuth.cos());
+            let is_open = (30..32).contains(&column);
+            text += &if is_open { "0 0 0 0.5\n".to_owned() } else { format!("4 {y} {z} 0.5\n") };
+        }
+    }
+    text
+}
+
+#[test]
+fn discs_end_where_a_scanner_saw_through_unless_turned_off() {
+    let folder = Folder::new();
+    let scan = folder.write("wall.ptx", wall_with_a_gap());
+    let picture = folder.path("wall.png");
+    let arguments = ["render", &scan, "-o", &picture, "--resolution", "16x9"];
+    let message = stderr(&surfel(&arguments));
+    assert!(message.contains("scanners saw past"), "{message}");
+    assert!(message.contains("[--free-space]"), "{message}");
+    let message = stderr(&surfel(&[&arguments[..], &["--free-space=false"]].concat()));
+    assert!(message.contains("normals of ") && !message.contains("scanners saw"), "{message}");
 }
 
 #[test]

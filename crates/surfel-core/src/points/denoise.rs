@@ -77,8 +77,8 @@ impl DenoiseReport {
     }
 }
 
-/// Moves the points of a cloud onto their surface; returns none if the points stay. Points that
-/// morph targets or joints move stay where they are.
+/// Moves the points of a cloud onto their surface; returns none if the points stay. Points that morph targets or joints
+/// move stay where they are.
 ///
 /// # Errors
 ///
@@ -129,8 +129,9 @@ fn means_of_groups(positions: &[Vec3], order: &[u32]) -> Vec<Vec3> {
     order.par_chunks(GROUP_SIZE).map(mean).collect()
 }
 
-/// Returns the points moved onto their surface, and their normals where these are known. `groups` are the means of groups of points in `order`, and `counts` the
-/// numbers of neighbours that take part, zero for points that stay.
+/// Returns the points moved onto their surface, and their normals, zero where no cubic follows the points. `groups` are
+/// the means of groups of points in `order`, `counts` the numbers of neighbours that take part, zero for points that
+/// stay, and `noises` the noise in spacings where it is known.
 fn moved(
     tree: &KdTree,
     groups: &KdTree,

@@ -63,7 +63,7 @@ pub fn fit_nearest_jet(
     if fit.normal == Vec3::ZERO {
         return None;
     }
-    let of_plane = plane_residual(fit, n_plane_neighbors);
+    let of_plane = fit.residual(n_plane_neighbors);
     let plane = JetFit { normal: fit.normal, residual: of_plane, is_curved: false };
     if of_plane < MIN_PLANE_RESIDUAL {
         return Some(plane);
@@ -142,13 +142,6 @@ fn regional_noises(tree: &KdTree, jets: &[Option<JetFit>]) -> Vec<f32> {
 /// True if the neighbours of a cubic are on one smooth surface of so much noise.
 fn is_smooth(jet: &JetFit, noise: f32) -> bool {
     jet.residual < MAX_RESIDUAL_RATIO * noise.max(MIN_NOISE)
-}
-
-/// Returns the root mean square distance of `n_neighbors` neighbours from their plane, in spacings.
-fn plane_residual(fit: &PlaneFit, n_neighbors: usize) -> f32 {
-    // The points of a round, even neighbourhood of radius r have a variance of r^2 / 4 along both axes.
-    let per_radius = (0.5 * fit.variation / (1.0 - fit.variation)).sqrt();
-    per_radius * ((n_neighbors + 1) as f32 / std::f32::consts::PI).sqrt()
 }
 
 /// Fits a cubic to the heights of a point and its neighbours, nearest first, over a plane of unit normal `normal`.

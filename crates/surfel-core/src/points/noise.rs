@@ -4,7 +4,7 @@
 //! measured at some points of each region.
 
 use super::neighbors::KdTree;
-use super::normals::fit_plane;
+use super::normals::{PlaneFit, fit_plane};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -204,11 +204,12 @@ impl NoiseAtPoint {
             }
             let variation = fit.variation;
             if variation < MAX_PLANE_VARIATION {
-                return Self::of_plane(variation, k);
+                return Self::Known(fit.residual(k));
             }
             if MAX_BEND_RATIO * last_variation < variation {
                 if has_fallen && last_variation < MAX_BENT_VARIATION {
-                    return Self::of_plane(last_variation, k / 2);
+                    let last = PlaneFit { variation: last_variation, ..fit };
+                    return Self::Known(last.residual(k / 2));
                 }
                 if has_risen && last_variation < MIN_SPACE_VARIATION {
                     return Self::Bent;
@@ -221,12 +222,5 @@ impl NoiseAtPoint {
             k *= 2;
         }
         Self::FillsSpace
-    }
-
-    /// Returns the noise by the surface variation of `k` neighbours.
-    fn of_plane(variation: f32, k: usize) -> Self {
-        // The points of a round, even neighbourhood of radius r have a variance of r^2 / 4 along both axes.
-        let per_radius = (0.5 * variation / (1.0 - variation)).sqrt();
-        Self::Known(per_radius * ((k + 1) as f32 / std::f32::consts::PI).sqrt())
     }
 }

@@ -24,6 +24,15 @@ pub struct PlaneFit {
     pub is_smooth: bool,
 }
 
+impl PlaneFit {
+    /// Returns the root mean square distance of the `n_neighbors` neighbours from the plane, in spacings.
+    pub(super) fn residual(&self, n_neighbors: usize) -> f32 {
+        // The points of a round, even neighbourhood of radius r have a variance of r^2 / 4 along both axes.
+        let per_radius = (0.5 * self.variation / (1.0 - self.variation)).sqrt();
+        per_radius * ((n_neighbors + 1) as f32 / std::f32::consts::PI).sqrt()
+    }
+}
+
 /// Numbers of normals by their origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NormalReport {
@@ -125,7 +134,10 @@ impl NormalReport {
     pub fn line(&self, neighborhood: Neighborhood) -> String {
         let n_points = self.n_estimated + self.n_from_nearest + self.n_up;
         match neighborhood {
-            Neighborhood::Nearest(k) => format!("normals of {n_points} points from {k} neighbours"),
+            Neighborhood::Nearest(k) => format!(
+                "normals of {n_points} points from planes through {k} neighbours, or cubics through more where \
+                 they bend"
+            ),
             Neighborhood::Within(distance) => format!(
                 "normals of {n_points} points from all points within {}",
                 format_length(distance)

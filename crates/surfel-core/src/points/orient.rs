@@ -93,7 +93,7 @@ pub(super) fn turn_to_stations(cloud: &PointCloud, normals: &mut [Vec3]) -> usiz
 /// Returns true if the positions of all stations of a cloud are known.
 pub(super) fn has_stations(cloud: &PointCloud) -> bool {
     let is_known = cloud.stations.iter().all(|station| station.position.is_some());
-    is_known && (0..cloud.len()).next().is_some_and(|point| cloud.station_of(point).is_some())
+    is_known && !cloud.is_empty() && cloud.station_of(0).is_some()
 }
 
 /// Returns the most trusted orientation that the columns and the shape of a cloud allow.

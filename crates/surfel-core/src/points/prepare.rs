@@ -223,54 +223,48 @@ fn estimate(
     missing: &Missing,
     progress: &dyn Progress,
 ) -> Result<Estimates> {
-    if let (
-        NeighborMethod::Knn,
-        Neighborhood::Nearest(k_normal),
-        Radius::Adaptive { k: k_radius },
-        true,
-        true,
-    ) = (
-        preparation.neighbors,
-        preparation.normals,
-        preparation.radius,
-        missing.fits,
-        missing.radii,
-    ) {
-        return estimate_together(positions, normals, k_normal, k_radius, progress);
-    }
-    let mut estimates = Estimates::default();
-    if missing.fits {
-        estimates.fits = Some(fit_planes(positions, preparation, progress)?);
-    }
-    if missing.radii {
-        let Preparation { radius, seed, .. } = *preparation;
+    let Preparation { radius, seed, .. } = *preparation;
+    let k_radius = match radius {
+        Radius::Adaptive { k } if missing.radii => Some(k),
+        _ => None,
+    };
+    let mut estimates = match (preparation.neighbors, preparation.normals) {
+        (NeighborMethod::Knn, Neighborhood::Nearest(k)) if missing.fits => {
+            estimate_by_nearest(positions, normals, k, k_radius, progress)?
+        }
+        _ if missing.fits => {
+            Estimates { fits: Some(fit_planes(positions, preparation, progress)?), radii: None }
+        }
+        _ => Estimates::default(),
+    };
+    if missing.radii && estimates.radii.is_none() {
         estimates.radii = Some(estimate_radii(positions, radius, seed, progress)?);
     }
     Ok(estimates)
 }
 
-/// Fits planes and estimates radii with one search for neighbours.
-fn estimate_together(
+/// Fits planes and cubics to the nearest neighbours, and estimates radii from the same search if `k_radius` is given.
+fn estimate_by_nearest(
     positions: &[Vec3],
     normals: Option<&[Vec3]>,
     k_normal: usize,
-    k_radius: usize,
+    k_radius: Option<usize>,
     progress: &dyn Progress,
 ) -> Result<Estimates> {
     let tree = KdTree::new(positions, progress)?;
     let visit = |point: usize, neighbors: &[Neighbor]| {
         let fit = fit_plane(positions, point, &neighbors[..k_normal.min(neighbors.len())]);
         let jet = fit_nearest_jet(positions, point, neighbors, &fit, k_normal);
-        (fit, jet, kth_distance(neighbors, k_radius))
+        (fit, jet, k_radius.map_or(0.0, |k| kth_distance(neighbors, k)))
     };
-    let k = k_normal.max(k_radius).max(MIN_JET_NEIGHBORS);
+    let k = k_normal.max(k_radius.unwrap_or(0)).max(MIN_JET_NEIGHBORS);
     let found = tree.map(Neighborhood::Nearest(k), progress, visit)?;
     let distances = found.iter().map(|(.., distance)| *distance).collect();
     let jets: Vec<Option<JetFit>> = found.iter().map(|(_, jet, _)| *jet).collect();
     let mut fits: Vec<PlaneFit> = found.into_iter().map(|(fit, ..)| fit).collect();
     refine_normals(&tree, &mut fits, &jets, normals, progress)?;
-    let radii = clamp_outlier_radii(&tree, k_radius, distances, progress)?;
-    Ok(Estimates { fits: Some((fits, Neighborhood::Nearest(k_normal))), radii: Some(radii) })
+    let radii = k_radius.map(|k| clamp_outlier_radii(&tree, k, distances, progress)).transpose()?;
+    Ok(Estimates { fits: Some((fits, Neighborhood::Nearest(k_normal))), radii })
 }
 
 /// Finds the structures of points, and replaces the estimates by those of their structure.
@@ -528,6 +522,18 @@ mod tests {
     }
 
     #[test]
+    fn normals_do_not_depend_on_the_choice_of_radii() {
+        let radii = [Radius::default(), Radius::Fixed(0.1), Radius::Median { n: 6, samples: 20 }];
+        let normals = radii.map(|radius| {
+            // Edges are sought with structures, which only adaptive radii have.
+            let structure = StructureChoice::Surface;
+            let preparation = Preparation { radius, structure, ..Preparation::default() };
+            prepare(ball(3000), &preparation, &NoProgress).unwrap().0.normals().to_vec()
+        });
+        assert!(normals[0] == normals[1] && normals[0] == normals[2]);
+    }
+
+    #[test]
     fn columns_of_the_file_stay_and_missing_entries_are_estimated() {
         let mut cloud = ball(3000);
         let mut normals: Vec<Vec3> = cloud.positions.iter().map(|&p| -p).collect();
@@ -560,7 +566,7 @@ mod tests {
         let mut cloud = ball(3000);
         let (_, report) = prepare(cloud.clone(), &Preparation::default(), &listener).unwrap();
         let line = report.normals.unwrap().line(report.normals_from.unwrap());
-        assert_eq!(line, "normals of 3000 points from 16 neighbours");
+        assert!(line.starts_with("normals of 3000 points from planes through 16 neighbours,"));
         // A line of points far away has no planes.
         cloud.positions.extend((0..40).map(|i| Vec3::X * (1000.0 + i as f32)));
         let grid = Preparation { neighbors: NeighborMethod::Grid, ..Preparation::default() };

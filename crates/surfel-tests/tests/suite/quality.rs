@@ -1,7 +1,11 @@
 //! Surfaces of points compared with the meshes that the points were taken from, in a short form of the benchmark.
 
-use surfel_core::points::PointCloud;
+use surfel_core::flat::FlatCloud;
+use surfel_core::math::{Random, Ray, Vec3};
+use surfel_core::points::{PointCloud, Preparation};
+use surfel_core::progress::NoProgress;
 use surfel_core::surface::SurfaceKind;
+use surfel_core::trace::{self, Simd, SurfaceHit};
 use surfel_tests::deviation::{Deviation, TrueViews};
 use surfel_tests::ground_truth::{GroundTruth, shared_data};
 use surfel_tests::sampling::{Sampling, mean_spacing};
@@ -14,6 +18,12 @@ fn deviation(points: &PointCloud, mesh: &GroundTruth, kind: SurfaceKind) -> Devi
     let views = TrueViews::new(mesh, RESOLUTION);
     let hits = views.trace(&scenes::flat(points.clone(), kind));
     views.compare(&hits, mean_spacing(mesh, points.len()))
+}
+
+/// Returns false hits and misses in percent, the depth in spacings, and the normals' mean and 95 % angle in degrees.
+fn figures(found: &Deviation) -> [f64; 5] {
+    let Deviation { false_hits, misses, depth_rms, normal_deg, normal_p95_deg, .. } = *found;
+    [100.0 * false_hits, 100.0 * misses, depth_rms, normal_deg, normal_p95_deg]
 }
 
 #[test]
@@ -53,14 +63,57 @@ fn sampled_shapes_look_like_their_meshes() {
     for (name, mesh, sampling, limits) in cases {
         let cloud = PointCloud::from_positions(sampling.sample(mesh, 6000, 1));
         let found = deviation(&cloud, mesh, SurfaceKind::Splat);
-        let figures = [
-            100.0 * found.false_hits,
-            100.0 * found.misses,
-            found.depth_rms,
-            found.normal_deg,
-            found.normal_p95_deg,
-        ];
+        let figures = figures(&found);
         let is_within = figures.iter().zip(limits).all(|(figure, limit)| *figure <= limit);
         assert!(is_within, "{name}: {figures:?} exceeds {limits:?}");
     }
+}
+
+/// Returns a cloud with the default surface, prepared as users see it.
+fn as_by_default(cloud: PointCloud) -> FlatCloud {
+    let points = scenes::prepared(cloud, &Preparation::default(), SurfaceKind::Smooth);
+    FlatCloud::new(&points, &NoProgress).unwrap()
+}
+
+#[test]
+fn smooth_surfaces_of_sampled_shapes_look_like_their_meshes() {
+    let cube = GroundTruth::from_mesh(&shapes::cube());
+    let blob = GroundTruth::from_mesh(&shapes::low_poly_blob());
+    let head = GroundTruth::from_mesh(&shapes::head());
+    // Upper limits as above, a tenth to a fifth above the figures.
+    let cases = [
+        ("cube, uniform", &cube, 6000, Sampling::Uniform, [0.09, 0.06, 0.1, 0.9, 1.1]),
+        ("cube, random", &cube, 6000, Sampling::Random, [0.22, 0.22, 0.14, 2.3, 4.5]),
+        ("blob, uniform", &blob, 6000, Sampling::Uniform, [0.01, 0.2, 0.06, 3.6, 7.8]),
+        ("blob, noise", &blob, 6000, Sampling::Noisy(0.3), [0.13, 0.36, 0.3, 5.1, 10.2]),
+        ("blob, falling", &blob, 6000, Sampling::Falling, [0.01, 0.23, 0.07, 3.9, 8.2]),
+        ("head, uniform", &head, 20_000, Sampling::Uniform, [0.01, 0.09, 0.12, 5.0, 19.5]),
+    ];
+    for (name, mesh, n_points, sampling, limits) in cases {
+        let points = sampling.sample(mesh, n_points, 1);
+        let spacing = mean_spacing(mesh, points.len());
+        let views = TrueViews::new(mesh, RESOLUTION);
+        let hits = views.trace(&as_by_default(PointCloud::from_positions(points)));
+        let figures = figures(&views.compare(&hits, spacing));
+        let is_within = figures.iter().zip(limits).all(|(figure, limit)| *figure <= limit);
+        assert!(is_within, "{name}: {figures:?} exceeds {limits:?}");
+    }
+}
+
+#[test]
+fn a_plane_of_random_points_has_no_hole() {
+    let mut random = Random::new(1, 0);
+    let mut coordinate = || 2.0 * random.next_f32() - 1.0;
+    let points = (0..20_000).map(|_| Vec3::new(coordinate(), coordinate(), 0.0)).collect();
+    let flat = as_by_default(PointCloud::from_positions(points));
+    // A margin of four spacings is left out.
+    let cell = |i: u32| 1.886 * ((i as f32 + 0.5) / 500.0 - 0.5);
+    let rays = (0..250_000).map(|i| {
+        let origin = Vec3::new(cell(i % 500), cell(i / 500), 5.0);
+        Ray::new(origin, Vec3::NEG_Z)
+    });
+    let rays: Vec<Ray> = rays.collect();
+    let mut hits = vec![SurfaceHit::MISS; rays.len()];
+    trace::surface_hits(&flat, Simd::detect(), &rays, &mut hits);
+    assert_eq!(hits.iter().filter(|hit| hit.is_miss()).count(), 0);
 }

@@ -91,21 +91,22 @@ impl<'a> KdTree<'a> {
     pub fn nearest(&self, position: Vec3, k: usize, excluded: Option<u32>) -> Vec<Neighbor> {
         /// The number of neighbours from which inserting each in its place takes longer than selecting.
         const MANY: usize = 48;
-        let mut neighbors = Vec::new();
         let k = k.min(self.n_points);
         if k == 0 || !position.is_finite() {
-            return neighbors;
+            return Vec::new();
         }
         let target = Target { position, own: excluded.unwrap_or(u32::MAX) };
         if k < MANY {
-            let mut candidates = KNearest::new(k);
-            self.search(self.root(), &target, &mut candidates);
-            candidates.drain_sorted(&mut neighbors);
+            self.neighbors(&target, KNearest::new(k))
         } else {
-            let mut candidates = ManyNearest::new(k);
-            self.search(self.root(), &target, &mut candidates);
-            candidates.drain_sorted(&mut neighbors);
+            self.neighbors(&target, ManyNearest::new(k))
         }
+    }
+
+    fn neighbors(&self, target: &Target, mut candidates: impl CandidateSet) -> Vec<Neighbor> {
+        let mut neighbors = Vec::new();
+        self.search(self.root(), target, &mut candidates);
+        candidates.drain_sorted(&mut neighbors);
         neighbors
     }
 

@@ -103,6 +103,20 @@ fn nearest_equals_a_brute_force_search() {
 }
 
 #[test]
+fn nearest_to_single_positions_equal_a_brute_force_search() {
+    for (name, positions) in clouds() {
+        let tree = KdTree::new(&positions, &NoProgress).unwrap();
+        for k in [1, 16, 47, 48, 100, 192] {
+            let expected = brute_force(&positions, Neighborhood::Nearest(k));
+            for (point, expected) in expected.iter().enumerate().step_by(7) {
+                let found = tree.nearest(positions[point], k, Some(point as u32));
+                assert_eq!(found, *expected, "{name}, k = {k}, point {point}");
+            }
+        }
+    }
+}
+
+#[test]
 fn within_equals_a_brute_force_search_by_every_method() {
     for (name, positions) in clouds() {
         let bounds = positions.iter().filter(|p| p.is_finite()).copied();
