@@ -23,8 +23,6 @@ const MIN_NOISE: f32 = 0.03;
 const MAX_RESIDUAL_RATIO: f32 = 1.5;
 /// Residual in spacings below which a plane is as good as a cubic: on a sphere its normal errs by some 0.1 degrees.
 const MIN_PLANE_RESIDUAL: f32 = 0.003;
-/// Ratio of a residual to the noise above which more neighbours are not tried.
-const MAX_WIDE_RATIO: f32 = 2.5;
 /// Ratio of the residuals of plane and cubic above which the neighbours bend. Below it the plane, which errs less by
 /// noise, is the better one; at an edge its fewer neighbours may be on one side.
 const MIN_CURVED_RATIO: f32 = 1.25;
@@ -108,10 +106,8 @@ pub fn refine_normals(
         let known = given.map(|given| given[point]).filter(|given| *given != Vec3::ZERO);
         let jet = || {
             let nearest = nearest[point]?;
-            let has_noise = MIN_NOISE <= *noise
-                && nearest.is_curved
-                && nearest.residual < MAX_WIDE_RATIO * *noise;
-            let wide = has_noise.then(|| fit_wide_jet(tree, point, fit.normal, *noise));
+            let is_noisy = MIN_NOISE <= *noise && nearest.is_curved;
+            let wide = is_noisy.then(|| fit_wide_jet(tree, point, fit.normal, *noise));
             wide.flatten().or(Some(nearest).filter(|jet| is_smooth(jet, *noise)))
         };
         if let Some(normal) = known.or_else(|| Some(jet()?.normal)) {

@@ -86,8 +86,8 @@ fn max(a: f64, b: f64) -> f64 {
     if b < a { a } else { b }
 }
 
-/// The k candidates with the lowest keys, for many: twice as many are collected, and then the higher half is dropped.
-/// For 192 neighbours it takes a fifth of the time of [`KNearest`].
+/// The k candidates with the lowest keys, for large k: twice as many are collected, and then the higher half is dropped.
+/// [`KNearest`] moves all of its keys for each new one.
 pub(super) struct ManyNearest {
     k: usize,
     bound: u64,
