@@ -9,19 +9,17 @@ use super::edge_planes::{MIN_PLANE_FRACTION, PLANE_THICKNESS, plane_of_side};
 use super::neighbors::{KdTree, Neighbor, Neighborhood};
 use super::normals::{PlaneFit, fit_plane};
 use super::radius::kth_distance;
-use super::scan_lines::{limit_wide_discs, widen_lines};
+use super::scan_lines::widen_lines;
+use super::solids::{ball_radius, clamp_solids, settle};
 use super::structure::{PointShape, Structure, StructureReport, is_line, is_surface};
+use super::wide_discs::{limit_crowded_discs, narrow_lone_discs};
 use crate::error::Result;
-use crate::math::{DVec3, SymmetricMatrix, Vec3};
+use crate::math::Vec3;
 use crate::progress::Progress;
 use rayon::prelude::*;
 
 /// Maximum width of the neighbourhood of a line.
 const MAX_LINE_WIDTH: f32 = 0.04;
-/// Radius of a ball in distances to the second neighbour: balls of neighbours overlap a little.
-const BALL_REACH: f32 = 0.6;
-/// Maximum ratio of the radius of a ball or capsule to the median of its structure.
-const MAX_SOLID_RATIO: f32 = 1.5;
 /// Number of neighbours for a second look at points that lie in no plane.
 const N_MANY_NEIGHBORS: usize = 48;
 /// Number of neighbours for a third look: a surface whose noise is as large as its spacing shows only from afar.
@@ -77,7 +75,7 @@ pub fn find_structures(
     };
     let mut shapes: Vec<PointShape> =
         (0..positions.len()).into_par_iter().map(decide).collect::<Result<_>>()?;
-    widen_lines(positions, &mut shapes, progress)?;
+    let widened = widen_lines(positions, &mut shapes, progress)?;
     for (shape, fit) in shapes.iter_mut().zip(fits) {
         if shape.structure == Structure::Line && MAX_LINE_WIDTH < fit.width {
             shape.structure = Structure::Scatter;
@@ -89,9 +87,11 @@ pub fn find_structures(
         settle(tree, point, radii[point], *structure, shape);
     };
     shapes.par_iter_mut().zip(&structures).enumerate().for_each(finish);
-    limit_wide_discs(positions, radii, &mut shapes, progress)?;
-    clamp_solids(&mut shapes, Structure::Line);
-    clamp_solids(&mut shapes, Structure::Scatter);
+    limit_crowded_discs(positions, radii, &mut shapes, progress)?;
+    narrow_lone_discs(tree, radii, typical.radius, widened, &mut shapes, progress)?;
+    clamp_solids(&mut shapes, Structure::Line, typical.radius);
+    clamp_solids(&mut shapes, Structure::Scatter, typical.radius);
+    let structures: Vec<Structure> = shapes.iter().map(|shape| shape.structure).collect();
     Ok((shapes, StructureReport::of(&structures)))
 }
 
@@ -113,31 +113,9 @@ pub fn all_scattered(
         radius: ball_radius(*distance, *radius),
     };
     let mut shapes: Vec<PointShape> = distances.iter().zip(radii).map(shape).collect();
-    clamp_solids(&mut shapes, Structure::Scatter);
+    clamp_solids(&mut shapes, Structure::Scatter, f32::INFINITY);
     let report = StructureReport { n_scatter: shapes.len(), ..StructureReport::default() };
     Ok((shapes, report))
-}
-
-/// Returns the radius of a ball by the distance to the second neighbour; `radius` is that of a disc, which a stray
-/// point's ball does not exceed.
-fn ball_radius(distance: f32, radius: f32) -> f32 {
-    let reach = BALL_REACH * distance;
-    if 0.0 < reach { reach.min(radius) } else { radius }
-}
-
-/// Clamps the radii of stray points, which would be as large as the empty space around them.
-fn clamp_solids(shapes: &mut [PointShape], structure: Structure) {
-    let solids = shapes.iter().filter(|shape| shape.structure == structure);
-    let mut radii: Vec<f32> = solids.map(|shape| shape.radius).collect();
-    if radii.is_empty() {
-        return;
-    }
-    let middle = radii.len() / 2;
-    let (_, median, _) = radii.select_nth_unstable_by(middle, f32::total_cmp);
-    let limit = MAX_SOLID_RATIO * *median;
-    for shape in shapes.iter_mut().filter(|shape| shape.structure == structure) {
-        shape.radius = shape.radius.min(limit);
-    }
 }
 
 /// Returns a quantile of some ten thousand of the values, or zero if there are none.
@@ -329,43 +307,6 @@ struct IslandCandidate {
     point: u32,
     /// Squared distance to the farthest of its neighbours, infinite if these are not known.
     reach_squared: f32,
-}
-
-/// Gives a point the direction and the radius of its final structure. Surface points keep what was decided.
-pub(super) fn settle(
-    tree: &KdTree,
-    point: usize,
-    radius: f32,
-    structure: Structure,
-    shape: &mut PointShape,
-) {
-    let position = tree.positions()[point];
-    match structure {
-        Structure::Surface | Structure::Redundant => {}
-        Structure::Line => {
-            let neighbors = tree.nearest(position, N_VOTERS, Some(point as u32));
-            shape.normal = line_direction(tree.positions(), point, &neighbors);
-            let reach = kth_distance(&neighbors, 2);
-            shape.radius = if 0.0 < reach { reach } else { radius };
-        }
-        Structure::Scatter => {
-            let neighbors = tree.nearest(position, 2, Some(point as u32));
-            shape.radius = ball_radius(kth_distance(&neighbors, 2), radius);
-        }
-    }
-    shape.structure = structure;
-}
-
-/// Returns the direction in which the neighbours extend most.
-fn line_direction(positions: &[Vec3], point: usize, neighbors: &[Neighbor]) -> Vec3 {
-    let center = positions[point].as_dvec3();
-    let mut scatter = SymmetricMatrix::default();
-    for neighbor in neighbors {
-        let offset: DVec3 = positions[neighbor.index as usize].as_dvec3() - center;
-        scatter.add_outer(offset, 1.0);
-    }
-    let (_, vectors) = scatter.eigen();
-    vectors[2].as_vec3().normalize_or(Vec3::Z)
 }
 
 #[cfg(test)]

@@ -4,11 +4,11 @@
 //! If more of the surface lies behind that place, the disc is narrowed until it ends before the ray.
 
 use super::PointCloud;
-use super::find_structures::settle;
 use super::neighbors::KdTree;
 use super::normals::PlaneFit;
 use super::scan_grid::ScanGrids;
 use super::seen_scan::{FreeRay, SeenScan};
+use super::solids::settle;
 use super::structure::{PointShape, Structure, is_line};
 use crate::error::Result;
 use crate::progress::Progress;

@@ -20,6 +20,8 @@ mod structure;
 mod noise;
 mod denoise;
 mod edge_planes;
+mod solids;
+mod wide_discs;
 mod scan_lines;
 mod find_structures;
 mod scan_grid;

@@ -5,6 +5,7 @@ use super::normals::{PlaneFit, fit_plane};
 use super::radius::kth_distance;
 use super::structure::{PointShape, Structure, is_line, is_surface};
 use super::subsample::indices_by_spacing;
+use super::wide_discs::WideDisc;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -19,21 +20,20 @@ const N_THINNED_NEIGHBORS: usize = 12;
 const THINNING: f32 = 2.0;
 /// Minimum number of thinned points; fewer say nothing about structure.
 const MIN_THINNED: usize = 256;
-/// Maximum number of surface points within a disc that was widened to close the gaps between scan lines.
-const MAX_POINTS_OF_DISC: usize = 64;
 
 /// Looks at points on lines again, among fewer and fewer points: on a surface that is sampled densely along lines
-/// only, their neighbours come to surround them.
+/// only, their neighbours come to surround them. Returns the discs of those points.
 pub fn widen_lines(
     positions: &[Vec3],
     shapes: &mut [PointShape],
     progress: &dyn Progress,
-) -> Result<()> {
+) -> Result<Vec<WideDisc>> {
+    let mut widened = Vec::new();
     let lines = shapes.iter().enumerate().filter(|(_, shape)| shape.structure == Structure::Line);
     let mut open: Vec<u32> = lines.map(|(point, _)| point as u32).collect();
     let mut radii: Vec<f32> = open.iter().map(|point| shapes[*point as usize].radius).collect();
     if open.is_empty() {
-        return Ok(());
+        return Ok(widened);
     }
     let middle = radii.len() / 4;
     let (_, typical, _) = radii.select_nth_unstable_by(middle, f32::total_cmp);
@@ -48,7 +48,7 @@ pub fn widen_lines(
             break;
         }
         let tree = KdTree::new(&thinned, progress)?;
-        let found = |point: &u32| -> Result<Option<PointShape>> {
+        let found = |point: &u32| -> Result<Option<(PointShape, Vec<u32>)>> {
             progress.check()?;
             let position = positions[*point as usize];
             // A point that is among the thinned ones is not its own neighbour.
@@ -58,7 +58,7 @@ pub fn widen_lines(
             let own = shapes[*point as usize];
             let radius = kth_distance(&neighbors, N_THINNED_NEIGHBORS);
             if MAX_WIDENING * own.radius < radius {
-                return Ok(Some(own));
+                return Ok(Some((own, Vec::new())));
             }
             let fit = fit_around(&thinned, position, &neighbors);
             if is_line(&fit) {
@@ -67,53 +67,30 @@ pub fn widen_lines(
             let structure = match is_surface(&fit) {
                 true if kept.binary_search(point).is_ok() => Structure::Surface,
                 true => Structure::Redundant,
-                false => return Ok(Some(own)),
+                false => return Ok(Some((own, Vec::new()))),
             };
-            Ok(Some(PointShape { structure, normal: fit.normal, radius }))
+            let shape = PointShape { structure, normal: fit.normal, radius };
+            let index = |neighbor: &Neighbor| kept[neighbor.index as usize];
+            Ok(Some((shape, neighbors.iter().map(index).collect())))
         };
         let decided = open.par_iter().map(found).collect::<Result<Vec<_>>>()?;
         let mut left = Vec::new();
         for (point, shape) in open.into_iter().zip(decided) {
             match shape {
-                Some(shape) => shapes[point as usize] = shape,
+                Some((shape, neighbors)) => {
+                    shapes[point as usize] = shape;
+                    if shape.is_disc() {
+                        let otherwise = Structure::Line;
+                        widened.push(WideDisc { point, neighbors, otherwise });
+                    }
+                }
                 None => left.push(point),
             }
         }
         open = left;
         spacing *= THINNING;
     }
-    Ok(())
-}
-
-/// Narrows the widened discs that reach over densely sampled surfaces, where the points at hand describe the surface
-/// better than a wide disc does.
-pub fn limit_wide_discs(
-    positions: &[Vec3],
-    radii: &[f32],
-    shapes: &mut [PointShape],
-    progress: &dyn Progress,
-) -> Result<()> {
-    let is_surface = |point: &usize| shapes[*point].structure == Structure::Surface;
-    let is_wide = |point: &usize| is_surface(point) && radii[*point] < shapes[*point].radius;
-    let wide: Vec<usize> = (0..shapes.len()).filter(is_wide).collect();
-    if wide.is_empty() {
-        return Ok(());
-    }
-    let surface: Vec<Vec3> =
-        (0..shapes.len()).filter(is_surface).map(|point| positions[point]).collect();
-    let tree = KdTree::new(&surface, progress)?;
-    let limited = |point: &usize| -> Result<f32> {
-        progress.check()?;
-        let neighbors = tree.nearest(positions[*point], MAX_POINTS_OF_DISC, None);
-        let reach = kth_distance(&neighbors, MAX_POINTS_OF_DISC);
-        let is_crowded = neighbors.len() == MAX_POINTS_OF_DISC && reach < shapes[*point].radius;
-        Ok(if is_crowded { reach.max(radii[*point]) } else { shapes[*point].radius })
-    };
-    let limits = wide.par_iter().map(limited).collect::<Result<Vec<_>>>()?;
-    for (point, radius) in wide.into_iter().zip(limits) {
-        shapes[point].radius = radius;
-    }
-    Ok(())
+    Ok(widened)
 }
 
 /// Fits a plane to a position and points around it.

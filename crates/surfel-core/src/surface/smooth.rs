@@ -21,10 +21,17 @@ const STEPS: f32 = 16_384.0;
 /// Minimum weight of all points of a fit. With less, beyond the reach of all points but one or two, rounding showed as
 /// noise.
 const MIN_WEIGHT: f32 = 0.1;
+/// Additional weight of the nearest point's colour. Without it, rounding turned the colours of points with tiny weights
+/// black.
+const NEAREST_COLOR_WEIGHT: f32 = 0.02;
 /// Exponent of the weight of normals at an angle of 90 degrees: 2 / (2/3)^2.
 const NORMAL_FALLOFF: f32 = 4.5;
 /// Maximum curvature of a fitted sphere's equation, in 1 / radius: its radius is at least half a disc's radius.
 const MAX_CURVATURE: f32 = 1.0;
+/// Squared spread of a fit's points around their mean, in squared radii, up to which they give no curvature, and from
+/// which they give all of it. Where one point has nearly all the weight, the quotient is rounding alone.
+const FLAT_SPREAD: f32 = 0.01;
+const CURVED_SPREAD: f32 = 0.04;
 /// Distance of a point's plane from the position, in radii, beyond which the point belongs to another sheet.
 const MAX_PLANE_DISTANCE: f32 = 0.8;
 /// Maximum distance along the ray from the position of a fit to the sphere, in radii.
@@ -143,8 +150,12 @@ impl<F: Floats> SphereSums<F> {
         let bend = self.offset_dot_normal - self.offset.dot(self.normal) * per_weight;
         let curvature = F::splat(0.5) * bend / spread;
         let (least, most) = (F::splat(-MAX_CURVATURE), F::splat(MAX_CURVATURE));
-        let has_spread = F::splat(1e-4).lt(spread * per_weight);
-        let curvature = F::select(has_spread, curvature.max(least).min(most), zero);
+        let certainty = (spread * per_weight - F::splat(FLAT_SPREAD))
+            * F::splat(1.0 / (CURVED_SPREAD - FLAT_SPREAD));
+        let certainty = certainty.max(zero).min(one);
+        let has_spread = zero.lt(certainty);
+        let curvature = certainty * curvature.max(least).min(most);
+        let curvature = F::select(has_spread, curvature, zero);
         let twice = curvature + curvature;
         let gradient = self.normal.minus(self.offset.scaled(twice)).scaled(per_weight);
         let value =
@@ -243,11 +254,11 @@ impl<F: Floats> ColorSums<F> {
         self.color = self.color.plus(in_steps_vector(color.scaled(weight)));
     }
 
-    /// Returns the mean colour, or `otherwise` where no point has a weight.
+    /// Returns the mean colour, which is `nearest`, that of the nearest point, where the points have hardly any weight.
     #[inline(always)]
-    pub fn mean(&self, otherwise: Vec3Lanes<F>) -> Vec3Lanes<F> {
-        let has_weight = F::splat(0.0).lt(self.weight);
-        let mean = self.color.scaled(F::splat(1.0) / self.weight);
-        Vec3Lanes::select(has_weight, mean, otherwise)
+    pub fn mean(&self, nearest: Vec3Lanes<F>) -> Vec3Lanes<F> {
+        let weight = F::splat(NEAREST_COLOR_WEIGHT * STEPS);
+        let sum = self.color.plus(nearest.scaled(weight));
+        sum.scaled(F::splat(1.0) / (self.weight + weight))
     }
 }
