@@ -3,9 +3,10 @@
 //!
 //! The radius of a stray point is the distance to other surfaces, so that its disc hangs in the air between them. The
 //! points of those surfaces have small radii: they do not reach the stray point. On a surface, points reach each other.
-//! The plane of two parallel wires is as flat as a surface, but no point of it is surrounded by others.
+//! The plane of two parallel wires is as flat as a surface, but it is a narrow strip.
 
-use super::neighbors::KdTree;
+use super::neighbors::{KdTree, Neighbor};
+use super::normals::fit_plane;
 use super::radius::kth_distance;
 use super::solids::settle;
 use super::structure::{PointShape, Structure};
@@ -13,7 +14,7 @@ use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
 use rayon::prelude::*;
-use std::f32::consts::{PI, TAU};
+use std::collections::HashMap;
 
 /// Maximum number of surface points within a disc that was widened to close the gaps between scan lines.
 const MAX_POINTS_OF_DISC: usize = 64;
@@ -25,12 +26,10 @@ const N_NEAREST: usize = 64;
 const MIN_SPACING: f32 = 0.3;
 /// Minimum number of neighbours that reach a point of a surface.
 const MIN_CONFIRMING: usize = 4;
-/// Minimum number of surrounded neighbours at the border of a surface.
-const MIN_INSIDE: usize = 1;
-/// Minimum cosine between the normals of a point at the border and of a surrounded neighbour.
-const MIN_INSIDE_COSINE: f32 = 0.7;
 /// Ratio of a distance to a neighbour's radius up to which the neighbour reaches a point.
 const REACH: f32 = 2.0;
+/// Ratio of a distance to a neighbour's radius up to which the neighbour reaches a point in its own plane.
+const REACH_IN_PLANE: f32 = 16.0;
 /// Minimum cosine between the normals of discs in one plane.
 const MIN_COSINE: f32 = 0.9;
 /// Maximum height of a point above the plane of a disc in the same plane, by its distance.
@@ -39,10 +38,10 @@ const MAX_SLOPE: f32 = 0.1;
 const MAX_OVERHANG: f32 = 1.5;
 /// Ratio of a radius to the typical one below which a disc is not looked at.
 const MIN_RATIO: f32 = 2.0;
+/// Maximum width of a strip, as the ratio of its eigenvalues.
+const MAX_STRIP_WIDTH: f32 = 0.12;
 /// Number of rounds: points that a round takes from a surface confirm no others in the next one.
 const N_ROUNDS: usize = 2;
-/// Maximum angle between the directions to successive neighbours around a point that is surrounded.
-const MAX_GAP: f32 = 0.9 * PI;
 
 /// A disc that may reach beyond the nearest points, with the neighbours that describe the surface there, nearest first.
 pub struct WideDisc {
@@ -84,7 +83,7 @@ pub fn limit_crowded_discs(
 }
 
 /// Narrows `widened` discs and others beyond the typical radius to the neighbours that reach them. Points that too few
-/// reach become scattered ones, and points where hardly any is surrounded become points of lines.
+/// reach become scattered ones, and points of narrow strips become points of lines.
 pub fn narrow_lone_discs(
     tree: &KdTree,
     radii: &[f32],
@@ -96,7 +95,7 @@ pub fn narrow_lone_discs(
     let mut wide = widened;
     wide.extend(other_wide_discs(tree, radii, MIN_RATIO * typical_radius, shapes, progress)?);
     for _ in 0..N_ROUNDS {
-        wide.retain(|wide| shapes[wide.point as usize].is_disc());
+        wide.retain(|disc| shapes[disc.point as usize].is_disc());
         narrow(tree, radii, typical_radius, &mut wide, shapes, progress)?;
     }
     Ok(())
@@ -112,38 +111,55 @@ fn narrow(
     progress: &dyn Progress,
 ) -> Result<()> {
     let positions = tree.positions();
-    wide.par_iter_mut().for_each(|wide| wide.keep_confirming(positions, shapes));
-    let mut is_surrounded: Vec<bool> = shapes.iter().map(PointShape::is_disc).collect();
-    let gap = |wide: &WideDisc| wide.widest_gap(positions, shapes[wide.point as usize].normal);
-    let gaps: Vec<f32> = wide.par_iter().map(gap).collect();
-    for (wide, gap) in wide.iter().zip(gaps) {
-        is_surrounded[wide.point as usize] &= gap < MAX_GAP;
-    }
-    let narrowed = |wide: &WideDisc| -> Result<PointShape> {
+    wide.par_iter_mut().for_each(|disc| disc.keep_confirming(positions, shapes));
+    let index_of: HashMap<u32, usize> =
+        wide.iter().enumerate().map(|(index, disc)| (disc.point, index)).collect();
+    let narrowed = |disc: &WideDisc| -> Result<PointShape> {
         progress.check()?;
-        let WideDisc { point, neighbors, otherwise } = wide;
-        let point = *point as usize;
+        let point = disc.point as usize;
         let mut shape = shapes[point];
-        let is_inside = |other: &&u32| {
-            let cosine = shapes[**other as usize].normal.dot(shape.normal).abs();
-            is_surrounded[**other as usize] && MIN_INSIDE_COSINE < cosine
-        };
-        let n_inside = neighbors.iter().filter(is_inside).count();
-        if neighbors.len() < MIN_CONFIRMING {
-            settle(tree, point, radii[point], *otherwise, &mut shape);
+        if disc.neighbors.len() < MIN_CONFIRMING {
+            settle(tree, point, radii[point], disc.otherwise, &mut shape);
             shape.radius = shape.radius.min(typical_radius);
-        } else if !is_surrounded[point] && n_inside < MIN_INSIDE {
+        } else if is_strip(positions, disc, wide, &index_of, shapes) {
             settle(tree, point, radii[point], Structure::Line, &mut shape);
         } else {
-            shape.radius = shape.radius.min(MAX_OVERHANG * wide.reach(positions));
+            shape.radius = shape.radius.min(MAX_OVERHANG * disc.reach(positions));
         }
         Ok(shape)
     };
     let found = wide.par_iter().map(narrowed).collect::<Result<Vec<_>>>()?;
-    for (wide, shape) in wide.iter().zip(found) {
-        shapes[wide.point as usize] = shape;
+    for (disc, shape) in wide.iter().zip(found) {
+        shapes[disc.point as usize] = shape;
     }
     Ok(())
+}
+
+/// True if the neighbours of a disc and their neighbours form a strip, as the points of two wires do: a surface of scan
+/// lines is wider the farther one looks.
+fn is_strip(
+    positions: &[Vec3],
+    disc: &WideDisc,
+    wide: &[WideDisc],
+    index_of: &HashMap<u32, usize>,
+    shapes: &[PointShape],
+) -> bool {
+    let normal = shapes[disc.point as usize].normal;
+    let mut around = disc.neighbors.clone();
+    for neighbor in &disc.neighbors {
+        match index_of.get(neighbor) {
+            Some(index) => around.extend(&wide[*index].neighbors),
+            None if MIN_COSINE < shapes[*neighbor as usize].normal.dot(normal).abs() => {
+                return false;
+            }
+            None => {}
+        }
+    }
+    around.sort_unstable();
+    around.dedup();
+    let neighbor = |index: u32| Neighbor { index, distance_squared: 0.0 };
+    let around: Vec<Neighbor> = around.into_iter().map(neighbor).collect();
+    fit_plane(positions, disc.point as usize, &around).width < MAX_STRIP_WIDTH
 }
 
 /// Returns the surface points of more than a radius whose discs were not widened.
@@ -186,7 +202,8 @@ impl WideDisc {
             let other = shapes[*other as usize];
             let distance = offset.length();
             let is_in_plane = || {
-                MIN_COSINE < normal.dot(other.normal).abs()
+                distance <= REACH_IN_PLANE * other.radius
+                    && MIN_COSINE < normal.dot(other.normal).abs()
                     && other.normal.dot(offset).abs() < MAX_SLOPE * distance
             };
             other.is_disc() && (distance <= REACH * other.radius || is_in_plane())
@@ -197,22 +214,6 @@ impl WideDisc {
     fn reach(&self, positions: &[Vec3]) -> f32 {
         let last = self.neighbors.last();
         last.map_or(0.0, |last| positions[*last as usize].distance(positions[self.point as usize]))
-    }
-
-    /// Returns the widest angle between the directions to successive neighbours, seen along the normal.
-    fn widest_gap(&self, positions: &[Vec3], normal: Vec3) -> f32 {
-        let (right, ahead) = normal.any_orthonormal_pair();
-        // The directions to nearer points are noise.
-        let min_distance = MIN_SPACING * self.reach(positions);
-        let offset = |other: &u32| positions[*other as usize] - positions[self.point as usize];
-        let offsets = self.neighbors.iter().map(offset);
-        let offsets = offsets.filter(|offset| min_distance < offset.length());
-        let angle = |offset: Vec3| offset.dot(ahead).atan2(offset.dot(right));
-        let mut angles: Vec<f32> = offsets.map(angle).collect();
-        angles.sort_unstable_by(f32::total_cmp);
-        let (Some(first), Some(last)) = (angles.first(), angles.last()) else { return TAU };
-        let around = first + TAU - last;
-        angles.windows(2).map(|pair| pair[1] - pair[0]).fold(around, f32::max)
     }
 }
 
