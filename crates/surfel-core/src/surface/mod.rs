@@ -19,7 +19,8 @@ pub use edge_test::{
 pub use kind::SurfaceKind;
 pub use shape::{MAX_NORMAL_COMPONENT, PointLanes, RayLanes, Shape};
 pub use smooth::{
-    ColorSums, FIT_REACH, FitPoint, SUPPORT_FACTOR, SphereHit, SphereSums, edge_retest_factor,
+    ColorSums, FIT_REACH, FitPoint, OverhangSums, SUPPORT_FACTOR, SphereHit, SphereSums,
+    edge_retest_factor,
 };
 pub use sphere::Sphere;
 pub use splat::{MAX_GATHERED, SplatAccumulator, Surfel, fit_plane_normal, gather_limit};

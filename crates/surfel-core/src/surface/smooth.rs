@@ -34,6 +34,12 @@ const FLAT_SPREAD: f32 = 0.01;
 const CURVED_SPREAD: f32 = 0.04;
 /// Distance of a point's plane from the position, in radii, beyond which the point belongs to another sheet.
 const MAX_PLANE_DISTANCE: f32 = 0.8;
+/// Maximum cosine between the normals of two sides of an edge.
+const MAX_EDGE_COSINE: f32 = 0.7;
+/// Minimum weight of the points on the other side of an edge.
+const MIN_EDGE_WEIGHT: f32 = 0.05;
+/// Maximum mean height of a hit above the surface on the other side of an edge, in radii.
+const MAX_OVERHANG: f32 = 0.1;
 /// Maximum distance along the ray from the position of a fit to the sphere, in radii.
 const MAX_STEP: f32 = 1.5;
 
@@ -174,6 +180,73 @@ impl<F: Floats> SphereSums<F> {
             & is_near
             & F::splat(1e-3).lt(length);
         SphereHit { step: step / self.per_radius, normal: normal.scaled(one / length), is_hit }
+    }
+}
+
+/// Weighted sums that tell whether hits lie on the part of a surface that sticks out beyond a convex edge, where it
+/// covers the surface on the other side.
+#[derive(Clone, Copy)]
+pub struct OverhangSums<F> {
+    /// Unit normals of the hits, facing the rays' origins.
+    normal: Vec3Lanes<F>,
+    /// Centres of the discs that were hit, relative to the hits.
+    center: Vec3Lanes<F>,
+    /// Reciprocal of the radius of the disc that was hit: heights are in radii.
+    per_radius: F,
+    weight: F,
+    height: F,
+}
+
+impl<F: Floats> OverhangSums<F> {
+    /// Returns the sums over no points, for hits with unit normals on discs of `radius` whose centres are at `center`
+    /// relative to the hits.
+    #[inline(always)]
+    pub fn new(normal: Vec3Lanes<F>, center: Vec3Lanes<F>, radius: F) -> Self {
+        let zero = F::splat(0.0);
+        Self { normal, center, per_radius: F::splat(1.0) / radius, weight: zero, height: zero }
+    }
+
+    /// Adds a point in `lanes`. It counts if it is on the other side of an edge: its normal is far from that of the hit,
+    /// and it lies below the hit's tangent plane. Its own plane has the centre of the disc below it.
+    #[inline(always)]
+    pub fn add(&mut self, point: &FitPoint<F>, lanes: F::Mask) {
+        let zero = F::splat(0.0);
+        let squared = point.offset.dot(point.offset) * self.per_radius * self.per_radius;
+        let is_other_side = squared.lt(F::splat(FIT_REACH * FIT_REACH))
+            & point.normal.dot(self.normal).abs().lt(F::splat(MAX_EDGE_COSINE))
+            & self.normal.dot(point.offset).lt(zero);
+        let of_center = point.normal.dot(self.center.minus(point.offset));
+        let below = point.normal.dot(point.offset);
+        let height = F::select(of_center.lt(zero), zero - below, below) * self.per_radius;
+        let weight = F::select(lanes & is_other_side, point.weight(), zero);
+        self.weight = self.weight + in_steps(weight);
+        self.height = self.height + in_steps(weight * height);
+    }
+
+    /// Returns the lanes in which the hit sticks out.
+    #[inline(always)]
+    pub fn sticks_out(&self) -> F::Mask {
+        F::splat(MIN_EDGE_WEIGHT * STEPS).lt(self.weight)
+            & (F::splat(MAX_OVERHANG) * self.weight).lt(self.height)
+    }
+}
+
+impl<L: Lanes> OverhangSums<L> {
+    /// Sums up all lanes, whose position must be the same.
+    #[inline(always)]
+    pub fn reduce_lanes(self) -> OverhangSums<f32> {
+        let first = |Vec3Lanes { x, y, z }: Vec3Lanes<L>| Vec3Lanes {
+            x: x.store()[0],
+            y: y.store()[0],
+            z: z.store()[0],
+        };
+        OverhangSums {
+            normal: first(self.normal),
+            center: first(self.center),
+            per_radius: self.per_radius.store()[0],
+            weight: sum(self.weight),
+            height: sum(self.height),
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use crate::math::{
 };
 use crate::surface::{
     CandidateHit, CandidateHitLanes, ColorSums, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint,
-    NeighborhoodStats, SUPPORT_FACTOR, SphereSums,
+    NeighborhoodStats, OverhangSums, SUPPORT_FACTOR, SphereSums,
 };
 use crate::trace::query::any::HitFilter;
 use crate::trace::query::edge_test::{
@@ -102,7 +102,7 @@ impl<L: Lanes, const HAS_COLORS: bool> SimdTask for FindSurface<'_, L, HAS_COLOR
             let region = candidates.region_along_rays(group, FIT_REACH, MAX_DISTANCE_FROM_DISC);
             collect_blocks::<L>(&cloud.points, &region, blocks);
             let found = approach(blocks, rays, &candidates, group, &mut hits);
-            finish::<L, HAS_COLORS>(cloud, blocks, rays, &candidates, found, &mut hits);
+            finish::<L, HAS_COLORS>(cloud, blocks, rays, &candidates, slots, found, &mut hits);
         }
         hits
     }
@@ -187,6 +187,7 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
     blocks: &[StoredBlock],
     rays: &PacketRays<L::PacketLanes>,
     candidates: &PacketCandidates<L::PacketLanes>,
+    hit_slots: &[Slot; PACKET_WIDTH],
     lanes: u32,
     hits: &mut SmoothHits<L::PacketLanes>,
 ) {
@@ -201,6 +202,13 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
     let mut neighborhood = NeighborhoodStats::<_, false>::new(candidates);
     let reach = L::PacketLanes::splat(FIT_REACH) * radius;
     let max_squared = reach * reach;
+    let mut centers = [[0.0; PACKET_WIDTH]; 3];
+    for lane in set_bits::<PACKET_WIDTH>(lanes) {
+        let center = cloud.points.center(hit_slots[lane]);
+        [centers[0][lane], centers[1][lane], centers[2][lane]] = center.to_array();
+    }
+    let center = Vec3Lanes::load_packet(&centers).minus(position);
+    let mut overhang = OverhangSums::new(hits.normals, center, radius);
     let mut colors = ColorSums::default();
     let mut nearest =
         NearestHits { distances: L::PacketLanes::splat(f32::INFINITY), slots: hits.slots };
@@ -213,6 +221,7 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
                 let normal = Vec3Lanes::splat_lane(&block.normals, lane);
                 neighborhood.add(point.offset, normal, is_neighbor);
             }
+            overhang.add(&point, mask);
             if HAS_COLORS {
                 let slot = block.first_slot + lane as u32;
                 let squared = point.offset.dot(point.offset);
@@ -231,8 +240,9 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
     }
     let mut accepted = lanes;
     if cloud.edge_test != EdgeTest::Off {
+        let lanes = lanes & !overhang.sticks_out().bits();
         let EdgeTestResult { enclosed, sparse } = neighborhood.evaluate();
-        accepted &= enclosed & !sparse;
+        accepted = lanes & enclosed & !sparse;
         let open = lanes & !accepted;
         if open != 0 {
             let radius = L::PacketLanes::splat(cloud.edge_retest_factor) * radius;
@@ -415,11 +425,56 @@ impl<L: Lanes> SimdTask for TestSurface<'_, L> {
             }
         }
         let candidate = CandidateHit { normal, direction: ray.direction, radius };
+        let position = ray.at(distance);
         ray.t_min <= distance
             && distance <= ray.t_max
             && (cloud.edge_test == EdgeTest::Off
-                || is_within_edge::<L>(self.cloud, ray.at(distance), candidate))
+                || is_within_edge::<L>(self.cloud, position, candidate)
+                    && !sticks_out::<L>(points, position, hit.slot, normal))
     }
+}
+
+/// True if a hit on the disc in a slot sticks out beyond an edge.
+#[inline(always)]
+fn sticks_out<L: Lanes>(points: &FlatPoints, position: Vec3, slot: Slot, normal: Vec3) -> bool {
+    let radius = points.radius(slot);
+    let center = Vec3Lanes::splat(points.center(slot) - position);
+    let sums = OverhangSums::<L>::new(Vec3Lanes::splat(normal), center, L::splat(radius));
+    let reach = Vec3::splat(FIT_REACH * radius);
+    let region = Aabb { min: position - reach, max: position + reach };
+    let mut visitor = SingleOverhang { position, sums };
+    query_box::<L>(points, &region, &mut visitor);
+    visitor.sums.reduce_lanes().sticks_out()
+}
+
+/// Adds points to the sums of one hit, eight at a time, one per lane.
+struct SingleOverhang<L> {
+    position: Vec3,
+    sums: OverhangSums<L>,
+}
+
+impl<L: Lanes> BoxVisitor for SingleOverhang<L> {
+    #[inline(always)]
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        let (point, is_used) = fit_points::<L>(points, block_idx, self.position);
+        self.sums.add(&point, is_used);
+    }
+}
+
+/// Returns the points of a block relative to a position, and the lanes that have one.
+#[inline(always)]
+fn fit_points<L: Lanes>(
+    points: &FlatPoints,
+    block_idx: u32,
+    position: Vec3,
+) -> (FitPoint<L>, L::Mask) {
+    let points = points.blocks[block_idx as usize].points::<L>(position);
+    let point = FitPoint {
+        offset: points.center,
+        normal: unit(points.normal),
+        inverse_support: inverse_support(points.radius),
+    };
+    (point, L::splat(0.0).lt(points.radius))
 }
 
 /// True if the points around a hit enclose it, or those of a wider neighbourhood.
@@ -456,13 +511,7 @@ struct SingleFit<L> {
 impl<L: Lanes> BoxVisitor for SingleFit<L> {
     #[inline(always)]
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let points = points.blocks[block_idx as usize].points::<L>(self.position);
-        let is_used = L::splat(0.0).lt(points.radius);
-        let point = FitPoint {
-            offset: points.center,
-            normal: unit(points.normal),
-            inverse_support: inverse_support(points.radius),
-        };
+        let (point, is_used) = fit_points::<L>(points, block_idx, self.position);
         let near = is_used & self.sums.is_near(&point);
         if near.bits() != 0 {
             self.sums.add(&point, near);
