@@ -91,8 +91,8 @@ pub fn find_structures(
     narrow_lone_discs(tree, radii, typical.radius, widened, &mut shapes, progress)?;
     clamp_solids(&mut shapes, Structure::Line, typical.radius);
     clamp_solids(&mut shapes, Structure::Scatter, typical.radius);
-    let structures: Vec<Structure> = shapes.iter().map(|shape| shape.structure).collect();
-    Ok((shapes, StructureReport::of(&structures)))
+    let report = StructureReport::of(&shapes);
+    Ok((shapes, report))
 }
 
 /// Makes each point stand for itself.

@@ -285,7 +285,7 @@ fn find_shapes(
         let report = narrow_to_free_space(cloud, &tree, fits, &mut shapes, progress)?;
         report.line().iter().for_each(|line| progress.choice(line, &["free_space"]));
         if 0 < report.n_lines {
-            found = StructureReport::of(&structures_of(&shapes));
+            found = StructureReport::of(&shapes);
         }
     }
     if let (StructureChoice::Auto, Some((fits, _))) = (preparation.structure, fits) {
@@ -300,13 +300,9 @@ fn find_shapes(
     Ok(Some((shapes, found)))
 }
 
-fn structures_of(shapes: &[PointShape]) -> Vec<Structure> {
-    shapes.iter().map(|shape| shape.structure).collect()
-}
-
 /// Adds the column of structures, and gives the points of lines the direction of the line in place of a normal.
 fn add_structures(cloud: &mut PointCloud, shapes: &[PointShape]) {
-    let structures = structures_of(shapes);
+    let structures: Vec<Structure> = shapes.iter().map(|shape| shape.structure).collect();
     if let Some(normals) = &mut cloud.normals {
         for (normal, shape) in normals.iter_mut().zip(shapes) {
             if shape.structure == Structure::Line {

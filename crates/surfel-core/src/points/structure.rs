@@ -83,8 +83,8 @@ pub struct StructureReport {
 }
 
 impl StructureReport {
-    pub(super) fn of(structures: &[Structure]) -> Self {
-        let count = |kind| structures.par_iter().filter(|s| **s == kind).count();
+    pub(super) fn of(shapes: &[PointShape]) -> Self {
+        let count = |kind| shapes.par_iter().filter(|shape| shape.structure == kind).count();
         Self {
             n_surface: count(Structure::Surface),
             n_lines: count(Structure::Line),

@@ -88,6 +88,13 @@ impl<F: Floats> FitPoint<F> {
     }
 }
 
+/// Returns the lanes in which a point is within `FIT_REACH` radii.
+#[inline(always)]
+fn is_within_reach<F: Floats>(point: &FitPoint<F>, per_radius: F) -> F::Mask {
+    let squared = point.offset.dot(point.offset);
+    (squared * per_radius * per_radius).lt(F::splat(FIT_REACH * FIT_REACH))
+}
+
 /// Rounds to a multiple of `1 / STEPS`, scaled by `STEPS`.
 #[inline(always)]
 fn in_steps<F: Floats>(value: F) -> F {
@@ -120,9 +127,8 @@ impl<F: Floats> SphereSums<F> {
     #[inline(always)]
     pub fn is_near(&self, point: &FitPoint<F>) -> F::Mask {
         let squared = point.offset.dot(point.offset);
-        let is_within_reach =
-            (squared * self.per_radius * self.per_radius).lt(F::splat(FIT_REACH * FIT_REACH));
-        is_within_reach & (squared * point.inverse_support).lt(F::splat(1.0))
+        is_within_reach(point, self.per_radius)
+            & (squared * point.inverse_support).lt(F::splat(1.0))
     }
 
     /// Adds a point in `lanes`, to which it is near. Its normal is turned to the side of the guide.
@@ -206,14 +212,18 @@ impl<F: Floats> OverhangSums<F> {
         Self { normal, center, per_radius: F::splat(1.0) / radius, weight: zero, height: zero }
     }
 
-    /// Adds a point in `lanes`. It counts if it is on the other side of an edge: its normal is far from that of the hit,
+    /// Returns the lanes in which a point is near the hit.
+    #[inline(always)]
+    pub fn is_near(&self, point: &FitPoint<F>) -> F::Mask {
+        is_within_reach(point, self.per_radius)
+    }
+
+    /// Adds a point in `lanes`, to which it is near. It counts if it is on the other side of an edge: its normal is far from that of the hit,
     /// and it lies below the hit's tangent plane. Its own plane has the centre of the disc below it.
     #[inline(always)]
     pub fn add(&mut self, point: &FitPoint<F>, lanes: F::Mask) {
         let zero = F::splat(0.0);
-        let squared = point.offset.dot(point.offset) * self.per_radius * self.per_radius;
-        let is_other_side = squared.lt(F::splat(FIT_REACH * FIT_REACH))
-            & point.normal.dot(self.normal).abs().lt(F::splat(MAX_EDGE_COSINE))
+        let is_other_side = point.normal.dot(self.normal).abs().lt(F::splat(MAX_EDGE_COSINE))
             & self.normal.dot(point.offset).lt(zero);
         let of_center = point.normal.dot(self.center.minus(point.offset));
         let below = point.normal.dot(point.offset);
@@ -333,5 +343,80 @@ impl<F: Floats> ColorSums<F> {
         let weight = F::splat(NEAREST_COLOR_WEIGHT * STEPS);
         let sum = self.color.plus(nearest.scaled(weight));
         sum.scaled(F::splat(1.0) / (self.weight + weight))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Fits of few points, their colours, and edges.
+
+    use super::*;
+
+    fn point(offset: Vec3, normal: Vec3) -> FitPoint<f32> {
+        FitPoint {
+            offset: Vec3Lanes::splat(offset),
+            normal: Vec3Lanes::splat(normal),
+            inverse_support: 1.0 / (SUPPORT_FACTOR * SUPPORT_FACTOR),
+        }
+    }
+
+    #[test]
+    fn a_single_point_is_a_plane_up_to_its_rim() {
+        let normal = Vec3::new(0.3, -0.2, 0.9).normalize();
+        let (along, _) = normal.any_orthonormal_pair();
+        for i in 0..200 {
+            let offset = 0.0037 * i as f32 * along;
+            let mut sums = SphereSums::new(Vec3Lanes::splat(normal), 1.0);
+            sums.add(&point(offset, normal), true);
+            let hit = sums.intersect(Vec3Lanes::splat(-normal));
+            let found = Vec3::new(hit.normal.x, hit.normal.y, hit.normal.z);
+            if hit.is_hit {
+                assert!(0.9999 < found.dot(normal), "{i}: {found}");
+                assert!(hit.step.abs() < 0.001, "{i}: {}", hit.step);
+            } else {
+                assert!(0.7 < offset.length(), "{i}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_point_keeps_its_colour_up_to_its_rim() {
+        let color = Vec3Lanes::splat(Vec3::new(0.02, 0.05, 0.01));
+        for i in 0..120 {
+            let mut sums = ColorSums::default();
+            sums.add(&point(0.01 * i as f32 * Vec3::X, Vec3::Z), color, true);
+            let mean = sums.mean(color);
+            for (mean, color) in [(mean.x, color.x), (mean.y, color.y), (mean.z, color.z)] {
+                assert!((mean - color).abs() < 0.002, "{i}: {mean} for {color}");
+            }
+        }
+    }
+
+    /// True if a hit at `x` on the plane z = 0 sticks out, whose disc has its centre at x = -0.5. The points of the other
+    /// side lie below an edge at x = 0, at distances of 0.1 on a plane that falls as steeply as `slope`.
+    fn sticks_out(x: f32, slope: f32) -> bool {
+        let center = Vec3Lanes::splat(Vec3::new(-0.5 - x, 0.0, 0.0));
+        let mut sums = OverhangSums::new(Vec3Lanes::splat(Vec3::Z), center, 1.0);
+        let down = Vec3::new(1.0, 0.0, -slope).normalize();
+        let normal = Vec3::new(slope, 0.0, 1.0).normalize();
+        for i in 1..10 {
+            for normal in [normal, -normal] {
+                let point = point(0.1 * i as f32 * down - x * Vec3::X, normal);
+                sums.add(&point, sums.is_near(&point));
+            }
+        }
+        sums.sticks_out()
+    }
+
+    #[test]
+    fn hits_beyond_a_convex_edge_stick_out() {
+        for slope in [1.5, 3.0, 20.0] {
+            assert!(sticks_out(0.3, slope), "{slope}");
+            assert!(!sticks_out(-0.1, slope), "{slope}");
+        }
+        // Blunt edges are bends.
+        assert!(!sticks_out(0.3, 0.5));
+        // On the other side of a concave edge the points lie above the plane.
+        assert!(!sticks_out(0.3, -3.0));
     }
 }

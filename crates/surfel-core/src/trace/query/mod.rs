@@ -12,6 +12,7 @@ pub mod gather;
 pub mod edge_test;
 pub mod edge_filter;
 pub mod smooth_query;
+pub mod smooth_filter;
 pub mod splat_query;
 pub mod support;
 pub mod surface;

@@ -2,30 +2,27 @@
 
 use crate::flat::{FlatCloud, FlatPoints, PointBlock, Slot};
 use crate::math::{
-    Aabb, Floats, LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Ray, SimdTask, Vec3,
-    Vec3Lanes, set_bits,
+    Aabb, Floats, LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, SimdTask, Vec3, Vec3Lanes,
+    set_bits,
 };
 use crate::surface::{
-    CandidateHit, CandidateHitLanes, ColorSums, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint,
-    NeighborhoodStats, OverhangSums, SUPPORT_FACTOR, SphereSums,
+    CandidateHitLanes, ColorSums, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, NeighborhoodStats,
+    OverhangSums, SUPPORT_FACTOR, SphereSums,
 };
-use crate::trace::query::any::HitFilter;
-use crate::trace::query::edge_test::{
-    PacketCandidates, enclosed_lanes, evaluate_one, is_enclosed, lane_mask,
-};
-use crate::trace::query::hit::{Hit, NearestHits};
+use crate::trace::query::edge_test::{PacketCandidates, enclosed_lanes, lane_mask};
+use crate::trace::query::hit::NearestHits;
 use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::traversal::region::{BoxVisitor, query_box};
 use std::marker::PhantomData;
 
 /// Maximum number of fits along a ray, each at the intersection with the sphere before.
-const MAX_FITS: usize = 5;
+pub(super) const MAX_FITS: usize = 5;
 /// Distance between a fit's position and its intersection, in radii, at which the intersection is the surface.
-const TOLERANCE: f32 = 0.01;
+pub(super) const TOLERANCE: f32 = 0.01;
 /// Maximum distance of the last fit from its intersection, in radii: a ray with a longer one has found no surface.
-const MAX_LAST_STEP: f32 = 0.2;
+pub(super) const MAX_LAST_STEP: f32 = 0.2;
 /// Maximum distance along the ray between the disc that was hit and the surface, in radii.
-const MAX_DISTANCE_FROM_DISC: f32 = 1.0;
+pub(super) const MAX_DISTANCE_FROM_DISC: f32 = 1.0;
 /// Maximum distance of hits that share a traversal of the tree from the first one along any axis, in radii.
 const MAX_GROUP_SPREAD: f32 = 2.0;
 
@@ -72,13 +69,13 @@ impl<'s> SmoothTracer<'s> {
 }
 
 /// The search for the surface along the rays of a packet, with colours or without.
-struct FindSurface<'a, L: Lanes, const HAS_COLORS: bool> {
-    cloud: &'a FlatCloud,
-    blocks: &'a mut Vec<StoredBlock>,
-    rays: &'a PacketRays<L::PacketLanes>,
-    lanes: u32,
-    distances: L::PacketLanes,
-    slots: &'a [Slot; PACKET_WIDTH],
+pub(super) struct FindSurface<'a, L: Lanes, const HAS_COLORS: bool> {
+    pub(super) cloud: &'a FlatCloud,
+    pub(super) blocks: &'a mut Vec<StoredBlock>,
+    pub(super) rays: &'a PacketRays<L::PacketLanes>,
+    pub(super) lanes: u32,
+    pub(super) distances: L::PacketLanes,
+    pub(super) slots: &'a [Slot; PACKET_WIDTH],
 }
 
 impl<L: Lanes, const HAS_COLORS: bool> SimdTask for FindSurface<'_, L, HAS_COLORS> {
@@ -200,8 +197,6 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
     // A fitted sphere has no rim that sticks out beyond a bend and shows its back.
     let candidates = CandidateHitLanes::new(hits.normals, direction, radius);
     let mut neighborhood = NeighborhoodStats::<_, false>::new(candidates);
-    let reach = L::PacketLanes::splat(FIT_REACH) * radius;
-    let max_squared = reach * reach;
     let mut centers = [[0.0; PACKET_WIDTH]; 3];
     for lane in set_bits::<PACKET_WIDTH>(lanes) {
         let center = cloud.points.center(hit_slots[lane]);
@@ -216,25 +211,24 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
         let corner = block.corner_from(&position);
         for lane in set_bits::<LANES>(block.lanes) {
             let point = block.point(&corner, lane);
-            let is_neighbor = mask & neighborhood.is_neighbor(point.offset);
+            let is_near = mask & overhang.is_near(&point);
+            if is_near.bits() == 0 {
+                continue;
+            }
+            let is_neighbor = is_near & neighborhood.is_neighbor(point.offset);
             if is_neighbor.bits() != 0 {
                 let normal = Vec3Lanes::splat_lane(&block.normals, lane);
                 neighborhood.add(point.offset, normal, is_neighbor);
             }
-            overhang.add(&point, mask);
+            overhang.add(&point, is_near);
             if HAS_COLORS {
                 let slot = block.first_slot + lane as u32;
-                let squared = point.offset.dot(point.offset);
-                let is_near = mask & squared.lt(max_squared);
-                if is_near.bits() == 0 {
-                    continue;
-                }
                 if cloud.blends_colors {
                     let color = cloud.points.surfel(slot).color;
                     colors.add(&point, Vec3Lanes::splat(color), is_near);
                 }
                 let slot = L::PacketLanes::splat(f32::from_bits(slot));
-                nearest.merge(is_near, squared, slot);
+                nearest.merge(is_near, point.offset.dot(point.offset), slot);
             }
         }
     }
@@ -267,7 +261,7 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
 /// Returns a step along the ray after another one. Where it would turn back, steps could go to and fro around a bend:
 /// then it ends at the root of the line through both (the secant method).
 #[inline(always)]
-fn damped<F: Floats>(step: F, last_step: F) -> F {
+pub(super) fn damped<F: Floats>(step: F, last_step: F) -> F {
     let turns_back = (step * last_step).lt(F::splat(0.0));
     F::select(turns_back, step * last_step / (last_step - step), step)
 }
@@ -280,7 +274,7 @@ fn facing<F: Floats>(normal: Vec3Lanes<F>, direction: Vec3Lanes<F>) -> Vec3Lanes
 }
 
 /// A decoded block, whose points are read one by one.
-struct StoredBlock {
+pub(super) struct StoredBlock {
     /// Lanes of the points in the region.
     lanes: u32,
     first_slot: Slot,
@@ -324,13 +318,13 @@ impl StoredBlock {
 
 /// Returns normals of unit length. Those of unused lanes are zero and stay so.
 #[inline(always)]
-fn unit<F: Floats>(normal: Vec3Lanes<F>) -> Vec3Lanes<F> {
+pub(super) fn unit<F: Floats>(normal: Vec3Lanes<F>) -> Vec3Lanes<F> {
     let squared = normal.dot(normal).max(F::splat(1.0));
     normal.scaled(F::splat(1.0) / squared.sqrt())
 }
 
 #[inline(always)]
-fn inverse_support<F: Floats>(radius: F) -> F {
+pub(super) fn inverse_support<F: Floats>(radius: F) -> F {
     let support = F::splat(SUPPORT_FACTOR) * radius;
     F::splat(1.0) / (support * support)
 }
@@ -355,166 +349,6 @@ impl<L: Lanes> BoxVisitor for BlockCollector<'_, L> {
         let inside = block.lanes_within::<L>(self.region);
         if inside != 0 {
             self.blocks.push(StoredBlock::new::<L>(block, block_idx, inside));
-        }
-    }
-}
-
-/// Accepts discs near which the ray hits the smooth surface.
-#[derive(Clone, Copy)]
-pub struct SmoothFilter<'s>(pub &'s FlatCloud);
-
-impl HitFilter for SmoothFilter<'_> {
-    const ACCEPTS_ALL: bool = false;
-
-    #[inline(always)]
-    fn accepts<L: Lanes>(&self, ray: &Ray, hit: &Hit) -> bool {
-        L::dispatch(TestSurface::<L> { cloud: self.0, ray, hit, lanes: PhantomData })
-    }
-
-    #[inline(always)]
-    fn accepts_packet<L: Lanes>(
-        &self,
-        rays: &PacketRays<L::PacketLanes>,
-        lanes: u32,
-        distances: L::PacketLanes,
-        slots: &[Slot; PACKET_WIDTH],
-    ) -> u32 {
-        let blocks = &mut Vec::new();
-        let found =
-            FindSurface::<L, false> { cloud: self.0, blocks, rays, lanes, distances, slots };
-        L::dispatch(found).lanes
-    }
-}
-
-/// The test whether a ray hits the surface near the disc that it hits.
-struct TestSurface<'a, L> {
-    cloud: &'a FlatCloud,
-    ray: &'a Ray,
-    hit: &'a Hit,
-    lanes: PhantomData<L>,
-}
-
-impl<L: Lanes> SimdTask for TestSurface<'_, L> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run(self) -> bool {
-        let Self { cloud, ray, hit, .. } = self;
-        let points = &cloud.points;
-        let radius = points.radius(hit.slot);
-        let toward = |normal: Vec3| if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
-        let mut normal = toward(points.normal(hit.slot));
-        let mut distance = hit.distance;
-        let mut last_step = 0.0;
-        for fit in 1..=MAX_FITS {
-            let sums = fit_one::<L>(points, ray.at(distance), normal, radius);
-            let sphere = sums.intersect(Vec3Lanes::splat(ray.direction));
-            let step = damped(sphere.step, last_step);
-            last_step = step;
-            let moved = distance + step;
-            if !sphere.is_hit || MAX_DISTANCE_FROM_DISC * radius < (moved - hit.distance).abs() {
-                return false;
-            }
-            distance = moved;
-            normal = toward(Vec3::new(sphere.normal.x, sphere.normal.y, sphere.normal.z));
-            if sphere.step.abs() <= TOLERANCE * radius {
-                break;
-            }
-            if fit == MAX_FITS && MAX_LAST_STEP * radius < sphere.step.abs() {
-                return false;
-            }
-        }
-        let candidate = CandidateHit { normal, direction: ray.direction, radius };
-        let position = ray.at(distance);
-        ray.t_min <= distance
-            && distance <= ray.t_max
-            && (cloud.edge_test == EdgeTest::Off
-                || is_within_edge::<L>(self.cloud, position, candidate)
-                    && !sticks_out::<L>(points, position, hit.slot, normal))
-    }
-}
-
-/// True if a hit on the disc in a slot sticks out beyond an edge.
-#[inline(always)]
-fn sticks_out<L: Lanes>(points: &FlatPoints, position: Vec3, slot: Slot, normal: Vec3) -> bool {
-    let radius = points.radius(slot);
-    let center = Vec3Lanes::splat(points.center(slot) - position);
-    let sums = OverhangSums::<L>::new(Vec3Lanes::splat(normal), center, L::splat(radius));
-    let reach = Vec3::splat(FIT_REACH * radius);
-    let region = Aabb { min: position - reach, max: position + reach };
-    let mut visitor = SingleOverhang { position, sums };
-    query_box::<L>(points, &region, &mut visitor);
-    visitor.sums.reduce_lanes().sticks_out()
-}
-
-/// Adds points to the sums of one hit, eight at a time, one per lane.
-struct SingleOverhang<L> {
-    position: Vec3,
-    sums: OverhangSums<L>,
-}
-
-impl<L: Lanes> BoxVisitor for SingleOverhang<L> {
-    #[inline(always)]
-    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let (point, is_used) = fit_points::<L>(points, block_idx, self.position);
-        self.sums.add(&point, is_used);
-    }
-}
-
-/// Returns the points of a block relative to a position, and the lanes that have one.
-#[inline(always)]
-fn fit_points<L: Lanes>(
-    points: &FlatPoints,
-    block_idx: u32,
-    position: Vec3,
-) -> (FitPoint<L>, L::Mask) {
-    let points = points.blocks[block_idx as usize].points::<L>(position);
-    let point = FitPoint {
-        offset: points.center,
-        normal: unit(points.normal),
-        inverse_support: inverse_support(points.radius),
-    };
-    (point, L::splat(0.0).lt(points.radius))
-}
-
-/// True if the points around a hit enclose it, or those of a wider neighbourhood.
-#[inline(always)]
-fn is_within_edge<L: Lanes>(cloud: &FlatCloud, position: Vec3, hit: CandidateHit) -> bool {
-    let points = &cloud.points;
-    let EdgeTestResult { enclosed, sparse } = evaluate_one::<L, false>(points, position, hit);
-    let wider = CandidateHit { radius: cloud.edge_retest_factor * hit.radius, ..hit };
-    enclosed & !sparse != 0 || is_enclosed::<L, false>(points, position, wider)
-}
-
-/// Sums up the points around one position.
-#[inline(always)]
-fn fit_one<L: Lanes>(
-    points: &FlatPoints,
-    position: Vec3,
-    guide: Vec3,
-    radius: f32,
-) -> SphereSums<f32> {
-    let sums = SphereSums::<L>::new(Vec3Lanes::splat(guide), L::splat(radius));
-    let mut visitor = SingleFit { position, sums };
-    let reach = Vec3::splat(FIT_REACH * radius);
-    let region = Aabb { min: position - reach, max: position + reach };
-    query_box::<L>(points, &region, &mut visitor);
-    visitor.sums.reduce_lanes()
-}
-
-/// Adds points to the sums of one hit, eight at a time, one per lane.
-struct SingleFit<L> {
-    position: Vec3,
-    sums: SphereSums<L>,
-}
-
-impl<L: Lanes> BoxVisitor for SingleFit<L> {
-    #[inline(always)]
-    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let (point, is_used) = fit_points::<L>(points, block_idx, self.position);
-        let near = is_used & self.sums.is_near(&point);
-        if near.bits() != 0 {
-            self.sums.add(&point, near);
         }
     }
 }

@@ -1,0 +1,180 @@
+//! The smooth surface in queries that only ask whether a ray hits: for packets, and for single rays, which find the same.
+
+use crate::flat::{FlatCloud, FlatPoints, Slot};
+use crate::math::{Aabb, LaneMask, Lanes, PACKET_WIDTH, Ray, SimdTask, Vec3, Vec3Lanes};
+use crate::surface::{
+    CandidateHit, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, OverhangSums, SphereSums,
+};
+use crate::trace::query::any::HitFilter;
+use crate::trace::query::edge_test::{evaluate_one, is_enclosed};
+use crate::trace::query::hit::Hit;
+use crate::trace::query::smooth_query::{
+    FindSurface, MAX_DISTANCE_FROM_DISC, MAX_FITS, MAX_LAST_STEP, TOLERANCE, damped,
+    inverse_support, unit,
+};
+use crate::trace::simd::packet_rays::PacketRays;
+use crate::trace::traversal::region::{BoxVisitor, query_box};
+use std::marker::PhantomData;
+
+/// Accepts discs near which the ray hits the smooth surface.
+#[derive(Clone, Copy)]
+pub struct SmoothFilter<'s>(pub &'s FlatCloud);
+
+impl HitFilter for SmoothFilter<'_> {
+    const ACCEPTS_ALL: bool = false;
+
+    #[inline(always)]
+    fn accepts<L: Lanes>(&self, ray: &Ray, hit: &Hit) -> bool {
+        L::dispatch(TestSurface::<L> { cloud: self.0, ray, hit, lanes: PhantomData })
+    }
+
+    #[inline(always)]
+    fn accepts_packet<L: Lanes>(
+        &self,
+        rays: &PacketRays<L::PacketLanes>,
+        lanes: u32,
+        distances: L::PacketLanes,
+        slots: &[Slot; PACKET_WIDTH],
+    ) -> u32 {
+        let blocks = &mut Vec::new();
+        let found =
+            FindSurface::<L, false> { cloud: self.0, blocks, rays, lanes, distances, slots };
+        L::dispatch(found).lanes
+    }
+}
+
+/// The test whether a ray hits the surface near the disc that it hits.
+struct TestSurface<'a, L> {
+    cloud: &'a FlatCloud,
+    ray: &'a Ray,
+    hit: &'a Hit,
+    lanes: PhantomData<L>,
+}
+
+impl<L: Lanes> SimdTask for TestSurface<'_, L> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let Self { cloud, ray, hit, .. } = self;
+        let points = &cloud.points;
+        let radius = points.radius(hit.slot);
+        let toward = |normal: Vec3| if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
+        let mut normal = toward(points.normal(hit.slot));
+        let mut distance = hit.distance;
+        let mut last_step = 0.0;
+        for fit in 1..=MAX_FITS {
+            let sums = fit_one::<L>(points, ray.at(distance), normal, radius);
+            let sphere = sums.intersect(Vec3Lanes::splat(ray.direction));
+            let step = damped(sphere.step, last_step);
+            last_step = step;
+            let moved = distance + step;
+            if !sphere.is_hit || MAX_DISTANCE_FROM_DISC * radius < (moved - hit.distance).abs() {
+                return false;
+            }
+            distance = moved;
+            normal = toward(Vec3::new(sphere.normal.x, sphere.normal.y, sphere.normal.z));
+            if sphere.step.abs() <= TOLERANCE * radius {
+                break;
+            }
+            if fit == MAX_FITS && MAX_LAST_STEP * radius < sphere.step.abs() {
+                return false;
+            }
+        }
+        let candidate = CandidateHit { normal, direction: ray.direction, radius };
+        let position = ray.at(distance);
+        ray.t_min <= distance
+            && distance <= ray.t_max
+            && (cloud.edge_test == EdgeTest::Off
+                || is_within_edge::<L>(self.cloud, position, candidate)
+                    && !sticks_out::<L>(points, position, hit.slot, normal))
+    }
+}
+
+/// True if a hit on the disc in a slot sticks out beyond an edge.
+#[inline(always)]
+fn sticks_out<L: Lanes>(points: &FlatPoints, position: Vec3, slot: Slot, normal: Vec3) -> bool {
+    let radius = points.radius(slot);
+    let center = Vec3Lanes::splat(points.center(slot) - position);
+    let sums = OverhangSums::<L>::new(Vec3Lanes::splat(normal), center, L::splat(radius));
+    let reach = Vec3::splat(FIT_REACH * radius);
+    let region = Aabb { min: position - reach, max: position + reach };
+    let mut visitor = SingleOverhang { position, sums };
+    query_box::<L>(points, &region, &mut visitor);
+    visitor.sums.reduce_lanes().sticks_out()
+}
+
+/// Adds points to the sums of one hit, eight at a time, one per lane.
+struct SingleOverhang<L> {
+    position: Vec3,
+    sums: OverhangSums<L>,
+}
+
+impl<L: Lanes> BoxVisitor for SingleOverhang<L> {
+    #[inline(always)]
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        let (point, is_used) = fit_points::<L>(points, block_idx, self.position);
+        let near = is_used & self.sums.is_near(&point);
+        if near.bits() != 0 {
+            self.sums.add(&point, near);
+        }
+    }
+}
+
+/// Returns the points of a block relative to a position, and the lanes that have one.
+#[inline(always)]
+fn fit_points<L: Lanes>(
+    points: &FlatPoints,
+    block_idx: u32,
+    position: Vec3,
+) -> (FitPoint<L>, L::Mask) {
+    let points = points.blocks[block_idx as usize].points::<L>(position);
+    let point = FitPoint {
+        offset: points.center,
+        normal: unit(points.normal),
+        inverse_support: inverse_support(points.radius),
+    };
+    (point, L::splat(0.0).lt(points.radius))
+}
+
+/// True if the points around a hit enclose it, or those of a wider neighbourhood.
+#[inline(always)]
+fn is_within_edge<L: Lanes>(cloud: &FlatCloud, position: Vec3, hit: CandidateHit) -> bool {
+    let points = &cloud.points;
+    let EdgeTestResult { enclosed, sparse } = evaluate_one::<L, false>(points, position, hit);
+    let wider = CandidateHit { radius: cloud.edge_retest_factor * hit.radius, ..hit };
+    enclosed & !sparse != 0 || is_enclosed::<L, false>(points, position, wider)
+}
+
+/// Sums up the points around one position.
+#[inline(always)]
+fn fit_one<L: Lanes>(
+    points: &FlatPoints,
+    position: Vec3,
+    guide: Vec3,
+    radius: f32,
+) -> SphereSums<f32> {
+    let sums = SphereSums::<L>::new(Vec3Lanes::splat(guide), L::splat(radius));
+    let mut visitor = SingleFit { position, sums };
+    let reach = Vec3::splat(FIT_REACH * radius);
+    let region = Aabb { min: position - reach, max: position + reach };
+    query_box::<L>(points, &region, &mut visitor);
+    visitor.sums.reduce_lanes()
+}
+
+/// Adds points to the sums of one hit, eight at a time, one per lane.
+struct SingleFit<L> {
+    position: Vec3,
+    sums: SphereSums<L>,
+}
+
+impl<L: Lanes> BoxVisitor for SingleFit<L> {
+    #[inline(always)]
+    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
+        let (point, is_used) = fit_points::<L>(points, block_idx, self.position);
+        let near = is_used & self.sums.is_near(&point);
+        if near.bits() != 0 {
+            self.sums.add(&point, near);
+        }
+    }
+}
