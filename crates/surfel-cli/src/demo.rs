@@ -40,9 +40,14 @@ Examples:
   surfel demo -o /tmp/ruin --points 5000000     twice the points, elsewhere
   surfel demo --gallery                         also glass, a mirror, a mesh, and a movie of them";
 
-/// A clear sky, and a sun that lights the front and throws the columns' shadows over the floor.
-const LIGHT: [(&str, &str); 3] =
-    [("sun.azimuth", "190"), ("sun.elevation", "32"), ("background", "#4f7fb8,#d5e2ee")];
+/// A clear sky, a sun that lights the front and throws the columns' shadows over the floor, and front sides, by which
+/// slits are closed.
+const SETTINGS: [(&str, &str); 4] = [
+    ("sun.azimuth", "190"),
+    ("sun.elevation", "32"),
+    ("background", "#4f7fb8,#d5e2ee"),
+    ("orient", "mst"),
+];
 
 /// Scans the ruin and renders it.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
@@ -84,7 +89,7 @@ fn set_view(description: &mut SceneDescription) -> anyhow::Result<()> {
     camera.focal_point = Some(ruin::UTM_ORIGIN + focal_point);
     camera.view_angle = Some(view_angle_deg);
     description.picture.resolution = Some((1280, 720));
-    for (path, value) in LIGHT {
+    for (path, value) in SETTINGS {
         description.set(path, &json!(value), Path::new(""))?;
     }
     Ok(())

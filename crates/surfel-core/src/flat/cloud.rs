@@ -30,6 +30,8 @@ pub struct FlatCloud {
     pub edge_retest_factor: f32,
     /// True if normals point out of the body that the points enclose.
     pub has_outward_normals: bool,
+    /// True if normals point to the side from which the surface was seen.
+    pub has_front_sides: bool,
     /// True if colours may be blended; false if each belongs to one point, as those of classes do.
     pub blends_colors: bool,
     /// Colours of hits by their support, instead of the points' own.
@@ -84,6 +86,7 @@ impl FlatCloud {
             surface: geometry.surface,
             edge_test: geometry.edge_test,
             has_outward_normals: geometry.has_outward_normals,
+            has_front_sides: geometry.has_front_sides,
             blends_colors: geometry.blends_colors,
             support_colors: geometry.support_colors,
             max_blend_distance: 0.0,

@@ -1,6 +1,7 @@
 //! Prepared clouds, whose type guarantees that they can be traced.
 
 use super::cloud::{PointCloud, is_valid_position};
+use super::orient::has_stations;
 use crate::error::{Error, Result};
 use crate::math::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -53,6 +54,11 @@ impl PreparedCloud {
     /// Returns the unit normals, one for each position.
     pub fn normals(&self) -> &[Vec3] {
         self.cloud.normals.as_deref().unwrap_or_default()
+    }
+
+    /// Returns true if the positions of all stations are known, toward which normals are turned.
+    pub fn has_stations(&self) -> bool {
+        has_stations(&self.cloud)
     }
 
     /// Returns the radii in world units, one for each position.

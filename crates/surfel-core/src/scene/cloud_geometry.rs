@@ -25,6 +25,9 @@ pub struct CloudGeometry {
     /// True if normals point out of the body that the points enclose, which gives glass an interior. If not,
     /// every other hit of a ray enters the body (Schaufler and Jensen 2000).
     pub has_outward_normals: bool,
+    /// True if normals point to the side from which the surface was seen. Then rays that would meet a back face behind
+    /// a slit end at the slit.
+    pub has_front_sides: bool,
 }
 
 impl Default for CloudGeometry {
@@ -38,6 +41,7 @@ impl Default for CloudGeometry {
             blends_colors: true,
             support_colors: None,
             has_outward_normals: false,
+            has_front_sides: false,
         }
     }
 }

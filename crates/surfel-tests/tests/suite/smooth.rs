@@ -96,3 +96,52 @@ fn classes_are_not_blended() {
     assert!(found.iter().all(|hit| !hit.is_miss()));
     assert!(found.iter().all(|hit| hit.color == Vec3::X || hit.color == Vec3::Z));
 }
+
+/// Distance between the points of `sheet_with_slit`.
+const SLIT_SPACING: f32 = 0.05;
+
+/// Returns a sheet of points at Z = 0 that faces up, with a slit along Y at X = 0, and with `has_back` a sheet at Z = -1
+/// that faces down.
+fn sheet_with_slit(width: f32, has_back: bool) -> CloudGeometry {
+    let mut cloud = PointCloud::default();
+    let (mut normals, mut radii) = (Vec::new(), Vec::new());
+    let mut add = |x: f32, y: i32, height: f32, normal: Vec3| {
+        cloud.positions.push(Vec3::new(x, y as f32 * SLIT_SPACING, height));
+        normals.push(normal);
+        radii.push(1.5 * SLIT_SPACING);
+    };
+    for (x, y) in (0..20).flat_map(|x| (-20..=20).map(move |y| (x as f32 * SLIT_SPACING, y))) {
+        add(-x, y, 0.0, Vec3::Z);
+        add(width + x, y, 0.0, Vec3::Z);
+        if has_back {
+            add(-x, y, -1.0, -Vec3::Z);
+            add(x + SLIT_SPACING, y, -1.0, -Vec3::Z);
+        }
+    }
+    (cloud.normals, cloud.radii) = (Some(normals), Some(radii));
+    scenes::points(cloud, SurfaceKind::Smooth)
+}
+
+/// Returns the heights at which rays straight down at `x` end.
+fn heights_at(sheet: &CloudGeometry, x: f32) -> Vec<f32> {
+    let flat = FlatCloud::new(sheet, &NoProgress).unwrap();
+    let ray = |i: i32| Ray::new(Vec3::new(x, 0.001 * i as f32, 3.0), -Vec3::Z);
+    let rays: Vec<Ray> = (-200..200).map(ray).collect();
+    hits(&flat, &rays).iter().map(|hit| 3.0 - hit.distance).collect()
+}
+
+#[test]
+fn rays_end_at_slits_where_front_sides_are_known() {
+    // The points on the other side of the first slit are too far away to enclose a hit; but behind it is a back face.
+    for (width, has_back, behind) in [(0.25, true, -1.0), (0.2, false, f32::NEG_INFINITY)] {
+        let mut sheet = sheet_with_slit(width, has_back);
+        let (in_slit, beyond) = (1.2 * SLIT_SPACING, 20.2 * SLIT_SPACING + width);
+        let through = heights_at(&sheet, in_slit);
+        assert!(through.iter().all(|z| *z == behind || (z - behind).abs() < 0.01), "{through:?}");
+        sheet.has_front_sides = true;
+        let closed = heights_at(&sheet, in_slit);
+        assert!(closed.iter().all(|z| z.abs() < 0.01), "{closed:?}");
+        let beyond = heights_at(&sheet, beyond);
+        assert!(beyond.iter().all(|z| *z == f32::NEG_INFINITY), "{beyond:?}");
+    }
+}

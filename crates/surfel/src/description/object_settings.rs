@@ -75,8 +75,8 @@ settings! {
         normals_radius: f64, POSITIVE, "LENGTH";
         /// Front side of the surface: station (toward the scanner of each scan, of E57, PTX and PCD files), scan-angle
         /// (toward the scanner of an airborne survey), up, mst (outward), viewpoint:X,Y,Z, none, or auto: the first of
-        /// these four that the file tells enough for [default: auto for surfel prepare and the colour normal, else none,
-        /// as no picture depends on it].
+        /// these four that the file tells enough for. Where front sides are known, the back of a surface does not show
+        /// through slits between the points [default: auto for surfel prepare and the colour normal, else station].
         orient: Orientation, parsed(orientation_text), "RULE";
         /// Radius of each point's surface: a length, adaptive[:K] or median[:N] [default: that of the file, or
         /// adaptive:12].
@@ -182,11 +182,12 @@ impl ObjectSettings {
         columns
     }
 
-    /// Returns the orientation of normals. A picture depends on it only where it shows them as colours.
+    /// Returns the orientation of normals. By stations it takes no time; a picture depends on another one only where it
+    /// shows normals as colours, or where slits are to be closed.
     fn orientation(&self) -> Orientation {
         let default = match self.color.color {
             Some(ColorSource::Normal) => Orientation::Auto,
-            _ => Orientation::None,
+            _ => Orientation::Station,
         };
         self.preparation.orient.unwrap_or(default)
     }
@@ -243,6 +244,14 @@ impl PreparationSettings {
     /// Returns true if the settings say how normals are estimated.
     pub fn estimates_normals(&self) -> bool {
         self.normals_k.is_some() || self.normals_radius.is_some()
+    }
+
+    /// Returns true if the settings or the stations say which side of the surface is its front.
+    pub fn knows_front_sides(&self, has_stations: bool) -> bool {
+        match self.orient {
+            None | Some(Orientation::Station) => has_stations,
+            Some(orientation) => orientation != Orientation::None,
+        }
     }
 
     /// Returns true if normals point out of what the points enclose.

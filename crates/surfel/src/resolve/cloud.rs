@@ -121,6 +121,8 @@ pub fn apply_surface_and_color(
     geometry.support_colors = coloring.support_colors()?;
     geometry.edge_test = settings.surface.edge_test();
     geometry.has_outward_normals = settings.preparation.orients_outward();
+    let has_stations = geometry.cloud().has_stations();
+    geometry.has_front_sides = settings.preparation.knows_front_sides(has_stations);
     Ok(geometry)
 }
 

@@ -17,7 +17,7 @@ const MAX_EXCESS: f32 = 1.4;
 const HIGHLIGHT_PERCENTILE: f32 = 0.99;
 
 /// Least and greatest number of stops: a black object must not turn white.
-const LIMITS: (f32, f32) = (-1.0, 1.5);
+const LIMITS: (f32, f32) = (-1.0, 2.2);
 
 /// Width of the preview in pixels.
 const WIDTH: u32 = 200;

@@ -2,10 +2,11 @@
 
 use crate::flat::{FlatCloud, FlatPoints, Slot};
 use crate::math::{Lanes, PACKET_WIDTH, PacketLanes, Ray, Vec3};
-use crate::surface::{Capsule, Disc, EdgeTest, Sphere, SurfaceKind, Surfel, capsule};
+use crate::surface::{CandidateHit, Capsule, Disc, EdgeTest, Sphere, SurfaceKind, Surfel, capsule};
 use crate::trace::query::any::{AcceptAll, any_accepted_hit, any_hits_kernel};
 use crate::trace::query::closest::{closest_hits_kernel, closest_shapes};
 use crate::trace::query::edge_filter::EdgeFilter;
+use crate::trace::query::edge_test::is_enclosed;
 use crate::trace::query::hit::Hit;
 use crate::trace::query::leaf::LeafGeometry;
 use crate::trace::query::smooth_filter::SmoothFilter;
@@ -62,6 +63,12 @@ const MAX_REJECTED_HITS: usize = 48;
 const RESTART_OFFSET: f32 = 0.05;
 /// Distance behind a disc without a smooth surface nearby at which the search restarts, in radii.
 const SMOOTH_RESTART_OFFSET: f32 = 0.002;
+
+/// Minimum distance between a disc's front and a back face behind it, in radii of the disc, at which a ray has come
+/// through a slit. Nearer back faces are those of thin sheets.
+const MIN_SLIT_DEPTH: f32 = 3.0;
+/// Factor on the radius of the disc that a ray passed: around slits, points lie on both sides within this distance.
+const SLIT_RADIUS_FACTOR: f32 = 1.6;
 
 /// Finds the closest hit of each ray on the continuous surface.
 pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
@@ -178,6 +185,8 @@ fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHi
     let mut rays = rays.to_vec();
     let mut nearest = vec![Hit::MISS; rays.len()];
     let mut tracer = SmoothTracer::new(cloud);
+    // The last disc that each ray passed from its front.
+    let mut passed = vec![Hit::MISS; if cloud.has_front_sides { rays.len() } else { 0 }];
     for _ in 0..MAX_REJECTED_HITS {
         let nearest = &mut nearest[..rays.len()];
         closest_hits_kernel::<L>(cloud, &rays, nearest);
@@ -226,6 +235,11 @@ fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHi
                     };
                     continue;
                 }
+                if let Some(disc) = passed.get_mut(ray_idx as usize)
+                    && cloud.points.normal(slots[lane]).dot(ray.direction) < 0.0
+                {
+                    *disc = Hit { distance: distances[lane], slot: slots[lane] };
+                }
                 let behind = distances[lane] + SMOOTH_RESTART_OFFSET * radius;
                 let t_min = behind.max(distances[lane] * (1.0 + 2.0 * f32::EPSILON));
                 (rays[n_left], searching[n_left]) = (Ray { t_min, ..ray }, ray_idx);
@@ -234,9 +248,38 @@ fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHi
         }
         rays.truncate(n_left);
         if rays.is_empty() {
-            return;
+            break;
         }
     }
+    for ((ray, disc), hit) in all_rays.iter().zip(&passed).zip(hits) {
+        if !disc.is_miss() && is_through_slit::<L>(cloud, ray, disc, hit) {
+            let Surfel { normal, radius, color, .. } = cloud.points.surfel(disc.slot);
+            *hit = SurfaceHit {
+                distance: disc.distance,
+                id: cloud.points.id(disc.slot),
+                slot: disc.slot,
+                radius,
+                normal,
+                color,
+                surface: cloud.surface,
+                is_backface: false,
+            };
+        }
+    }
+}
+
+/// Returns true if a ray, which passed `disc` from its front, went through a slit between the points there: it hits a back
+/// face behind it, or nothing although points lie on both sides of the slit.
+#[inline(always)]
+fn is_through_slit<L: Lanes>(cloud: &FlatCloud, ray: &Ray, disc: &Hit, hit: &SurfaceHit) -> bool {
+    let radius = cloud.points.radius(disc.slot);
+    if !hit.is_miss() {
+        return hit.is_backface && disc.distance + MIN_SLIT_DEPTH * radius < hit.distance;
+    }
+    let normal = cloud.points.normal(disc.slot);
+    let around =
+        CandidateHit { normal, direction: ray.direction, radius: SLIT_RADIUS_FACTOR * radius };
+    is_enclosed::<L, true>(&cloud.points, ray.at(disc.distance), around)
 }
 
 /// Traces all rays together until each has a hit within the edge of the surface, or hits nothing more.
