@@ -97,7 +97,7 @@ fn load(
     let infos = inspected.collect::<surfel_formats::Result<_>>()?;
     let preparation = &settings.preparation;
     MemoryEstimate::from_files(&infos, preparation.subsample, 0).check(limit)?;
-    let options = preparation.load_options(ColumnChoice::All);
+    let options = preparation.load_options(ColumnChoice::All)?;
     let (mut loaded, _) = surfel_formats::load_all(files, &options, report)?;
     report.end();
     report.note(&format!("{} points, {}", loaded.cloud.len(), loaded.info.format));
@@ -165,7 +165,7 @@ fn columns(args: &Args, settings: &ObjectSettings) -> Columns {
     };
     let is_empty = !columns.normals && !columns.radii && !columns.variation;
     let has_other_steps = preparation.subsample.is_some()
-        || preparation.point_filter().is_some()
+        || preparation.filters_points()
         || preparation.remove_outliers.is_some()
         || preparation.denoise.is_some();
     if is_empty && !has_other_steps {

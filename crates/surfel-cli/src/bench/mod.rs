@@ -259,8 +259,8 @@ fn load(
     settings: &ObjectSettings,
     report: &Report,
 ) -> anyhow::Result<(Geometry<PointCloud>, FileInfo)> {
-    let options =
-        settings.preparation.load_options(ColumnChoice::Only(settings.preparation.kept_columns()));
+    let columns = ColumnChoice::Only(settings.preparation.kept_columns());
+    let options = settings.preparation.load_options(columns)?;
     let vertices = || -> anyhow::Result<(Geometry<PointCloud>, FileInfo)> {
         let Loaded { cloud, info: source } = surfel_formats::load(&args.cloud, &options, report)?;
         Ok((Geometry::Points(cloud), source))

@@ -4,7 +4,9 @@ use super::rejection::rejection;
 use serde_json::Value;
 use std::path::Path;
 use surfel::SceneDescription;
-use surfel::description::{Invalid, MaterialChoice, OutputSettings, parse_table, write_table};
+use surfel::description::{
+    Crop, Invalid, MaterialChoice, OutputSettings, parse_table, write_table,
+};
 use surfel::names::file_name;
 use surfel_web::{Error, Limits, SettingsMap};
 
@@ -25,6 +27,10 @@ pub fn read(startup: &SceneDescription, settings: &SettingsMap) -> Result<SceneD
     page.merge(settings).map_err(rejection)?;
     if page.light.environment.is_some() && page.get("environment") != startup.get("environment") {
         return Err(Error::invalid_value("environment", "a page cannot change this setting"));
+    }
+    let crop = page.objects_default.preparation.crop.as_ref();
+    if matches!(crop, Some(Crop::File(_))) && page.get("crop") != startup.get("crop") {
+        return Err(Error::invalid_value("crop", "a page cannot name a file"));
     }
     let mut hidden = write_table(&page.output).into_iter().chain(write_table(&page.run));
     if let Some((key, _)) = hidden.find(|(key, _)| key != "time") {
@@ -88,6 +94,17 @@ mod tests {
 
     use super::*;
     use serde_json::json;
+
+    #[test]
+    fn a_page_names_no_file_of_an_area() {
+        let startup = SceneDescription::default();
+        let with_area = |area: &str| {
+            let settings = SettingsMap::from_iter([("crop".to_owned(), Value::from(area))]);
+            read(&startup, &settings).map(|page| page.objects_default.preparation.crop)
+        };
+        assert!(with_area("/etc/passwd").unwrap_err().to_string().contains("cannot name a file"));
+        assert!(with_area("0,0,10,10").unwrap().is_some());
+    }
 
     #[test]
     fn materials_of_objects_are_named_by_their_targets() {

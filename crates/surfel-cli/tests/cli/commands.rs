@@ -190,6 +190,40 @@ fn info_prints_a_table_or_json() {
 }
 
 #[test]
+fn points_are_chosen_by_an_area() {
+    let folder = Folder::new();
+    let lines: String = (0..100).map(|i| format!("{} {} {i}\n", i % 10, i / 10)).collect();
+    let cloud = folder.write("grid.xyz", lines);
+    let kept = folder.path("kept.ply");
+    let n_kept = |area: &str| {
+        succeed(&["prepare", &cloud, "-o", &kept, "--crop", area]);
+        let info: Value = serde_json::from_str(&succeed(&["info", "--json", &kept])).unwrap();
+        info["points"].as_u64().unwrap()
+    };
+    assert_eq!(n_kept("([1,3],[2,8.5])"), 21);
+    assert_eq!(n_kept("1,2,3,8.5"), 21);
+    assert_eq!(n_kept("([1,3],[2,8],[0,50])"), 9);
+    let square = "[[[-0.5,-0.5],[4.5,-0.5],[4.5,4.5],[-0.5,4.5],[-0.5,-0.5]],\
+                  [[0.5,0.5],[3.5,0.5],[3.5,3.5],[0.5,3.5],[0.5,0.5]]]";
+    let geometry = format!(r#"{{"type":"Polygon","coordinates":{square}}}"#);
+    let feature = format!(r#"{{"type":"Feature","properties":{{}},"geometry":{geometry}}}"#);
+    assert_eq!(n_kept(&folder.write("ring.geojson", feature)), 16);
+    let wkt = "multipolygon (((-1 -1, 1.5 -1, 1.5 1.5, -1 1.5, -1 -1)), ((8.5 8.5, 11 8.5, 11 11, 8.5 8.5)))";
+    assert_eq!(n_kept(wkt), 6);
+    assert_eq!(n_kept(&folder.write("area.wkt", wkt)), 6);
+
+    let refused = |area: &str, code| fail(&["prepare", &cloud, "-o", &kept, "--crop", area], code);
+    assert!(refused("1,2,3", 2).contains("expected bounds"));
+    assert!(refused("POLYGON ((0 0, 1 1))", 2).contains("a ring of 2 corners"));
+    assert!(refused("absent.geojson", 1).contains("absent.geojson: cannot be read"));
+    let no_area = folder.write("point.geojson", r#"{"type":"Point","coordinates":[1,2]}"#);
+    assert!(refused(&no_area, 1).contains("point.geojson: crop: has no polygon"));
+    let broken =
+        folder.write("broken.geojson", r#"{"type":"Polygon","coordinates":[[[0,0],[1]]]}"#);
+    assert!(refused(&broken, 1).contains("broken.geojson"));
+}
+
+#[test]
 fn points_are_chosen_by_their_columns() {
     let folder = Folder::new();
     let lines: String =

@@ -6,6 +6,7 @@
 
 mod animation;
 mod camera;
+mod crop;
 mod exclusive;
 mod file;
 mod invalid;
@@ -24,6 +25,7 @@ pub mod rule;
 
 pub use animation::{AnimationDescription, AnimationKind, CameraMotion, ObjectMotion, Orbit};
 pub use camera::{CameraSettings, Interior, OrthographicHeight, WorldSettings};
+pub use crop::Crop;
 pub use file::{is_scene_file, parse_table};
 pub use invalid::Invalid;
 pub use keys::{Key, KeyedSettings};

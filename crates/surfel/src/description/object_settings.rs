@@ -1,5 +1,6 @@
 //! Settings that an object may have for itself: surface, preparation, colour.
 
+use super::crop::{Crop, CropRule};
 use super::keys::{KeyedSettings, settings};
 use super::point_filter::{Classes, RETURNS, Returns, point_filter};
 use super::rule::{
@@ -7,6 +8,7 @@ use super::rule::{
     POSITIVE, Rule, Text, count, parsed,
 };
 use super::{Invalid, Part};
+use crate::error::Result;
 use serde_json::Value;
 use std::path::Path;
 use surfel_core::image::Colormap;
@@ -55,6 +57,9 @@ settings! {
         class: Vec<u8>, Classes, "CLASSES";
         /// Keeps only these returns of each laser pulse: first, last or only (those of pulses that have one).
         returns: Returns, OneOf(RETURNS), "WHICH";
+        /// Keeps only points in an area, in the coordinates of their file: bounds as ([0,10],[0,10]), a POLYGON as
+        /// well-known text, or a GeoJSON or WKT file of polygons. Other points take no memory.
+        crop: Crop, CropRule, "AREA", common;
         /// Keeps fewer points: first:N, random:N, stride:S or spacing:LENGTH.
         subsample: Subsample, SubsampleRule, "CHOICE";
         /// Drops points that stand alone: statistical:K,RATIO, whose mean distance to K neighbours exceeds the mean of
@@ -229,16 +234,31 @@ impl SurfaceSettings {
 
 impl PreparationSettings {
     /// Returns options of a reader that keeps these columns, and the points that the filter keeps.
-    pub fn load_options(&self, columns: ColumnChoice) -> LoadOptions {
+    ///
+    /// # Errors
+    ///
+    /// Fails if the file of the area that is kept has no polygons.
+    pub fn load_options(&self, columns: ColumnChoice) -> Result<LoadOptions> {
         let text_columns = self.columns.as_deref().map(TextColumn::parse_list);
         let animation = self.animation_name.clone();
-        let filter = self.point_filter();
-        LoadOptions { columns, text_columns, filter, animation, ..LoadOptions::default() }
+        let filter = self.point_filter()?;
+        Ok(LoadOptions { columns, text_columns, filter, animation, ..LoadOptions::default() })
     }
 
-    /// Returns the filter that `filter`, `class` and `returns` make together; `None` if all points are kept.
-    pub fn point_filter(&self) -> Option<PointFilter> {
-        point_filter(self.filter.as_ref(), self.class.as_deref(), self.returns)
+    /// Returns the filter that `filter`, `class`, `returns` and `crop` make together; `None` if all points are kept.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the file of the area that is kept has no polygons.
+    pub fn point_filter(&self) -> Result<Option<PointFilter>> {
+        let area = self.crop.as_ref().map(Crop::filter).transpose()?;
+        Ok(point_filter(self.filter.as_ref(), self.class.as_deref(), self.returns, area))
+    }
+
+    /// Returns true if not all points are kept.
+    pub fn filters_points(&self) -> bool {
+        let by_column = self.filter.is_some() || self.class.is_some() || self.returns.is_some();
+        by_column || self.crop.is_some()
     }
 
     /// Returns true if the settings say how normals are estimated.

@@ -51,6 +51,7 @@ pub fn point_filter(
     filter: Option<&PointFilter>,
     classes: Option<&[u8]>,
     returns: Option<Returns>,
+    area: Option<PointFilter>,
 ) -> Option<PointFilter> {
     let classes = classes.map(PointFilter::classes);
     let returns = returns.map(|returns| {
@@ -62,6 +63,6 @@ pub fn point_filter(
         condition.parse().expect("the condition is valid")
     });
     let filters: Vec<PointFilter> =
-        filter.cloned().into_iter().chain(classes).chain(returns).collect();
+        filter.cloned().into_iter().chain(classes).chain(returns).chain(area).collect();
     (!filters.is_empty()).then(|| PointFilter::all(filters))
 }

@@ -31,7 +31,7 @@ pub fn import(
     progress: &dyn Progress,
 ) -> Result<(Graph<PointCloud>, FileInfo)> {
     let columns = if options.keeps_all_columns { ColumnChoice::All } else { settings.columns() };
-    let mut load_options = settings.preparation.load_options(columns);
+    let mut load_options = settings.preparation.load_options(columns)?;
     if options.keeps_all_columns {
         // All points stay too: the filter may change, and is applied when they are prepared.
         load_options.filter = None;

@@ -280,7 +280,7 @@ impl LoadedScene {
         progress: &dyn Progress,
     ) -> Result<PreparedCloud> {
         let settings = self.settings_of(geometry, description);
-        let filter = settings.preparation.point_filter().filter(|_| self.keeps_all_columns);
+        let filter = settings.preparation.point_filter()?.filter(|_| self.keeps_all_columns);
         let prepared = filter_cloud(cloud, filter.as_ref(), progress).and_then(|cloud| {
             prepare_cloud(cloud, &settings, description.picture.seed(), progress)
         });

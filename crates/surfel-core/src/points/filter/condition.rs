@@ -1,5 +1,6 @@
 //! Conditions as trees.
 
+use super::polygon::Polygon;
 use std::fmt;
 
 /// A condition on a point.
@@ -13,6 +14,8 @@ pub(super) enum Condition {
     Not(Box<Condition>),
     /// Two numbers are in a relation.
     Compare(Operand, Relation, Operand),
+    /// At least one of these contains the point.
+    Within(Vec<Polygon>),
 }
 
 /// A number of a comparison.
@@ -58,6 +61,7 @@ impl Condition {
                 parts.iter().for_each(|part| part.collect_columns(columns));
             }
             Self::Not(inner) => inner.collect_columns(columns),
+            Self::Within(_) => {}
             Self::Compare(left, _, right) => {
                 columns.extend([left, right].into_iter().filter_map(|operand| match operand {
                     Operand::Column(name) => Some(name.as_str()),
@@ -87,6 +91,10 @@ impl fmt::Display for Condition {
             Self::All(parts) => Self::fmt_parts(parts, "&&", f),
             Self::Any(parts) => Self::fmt_parts(parts, "||", f),
             Self::Not(inner) => write!(f, "!({inner})"),
+            Self::Within(polygons) if polygons.len() == 1 => {
+                f.write_str("(x, y) inside of a polygon")
+            }
+            Self::Within(polygons) => write!(f, "(x, y) inside of {} polygons", polygons.len()),
             Self::Compare(left, relation, right) => {
                 let sign = RELATIONS.iter().find(|(_, known)| known == relation);
                 write!(f, "{left} {} {right}", sign.map_or("", |(sign, _)| sign))

@@ -1,6 +1,7 @@
 //! Evaluates conditions column by column, on blocks of points.
 
 use super::condition::{Condition, Operand, Relation};
+use super::polygon::Polygon;
 use crate::error::{Error, Result};
 use crate::points::{PointCloud, Values};
 
@@ -61,6 +62,14 @@ impl<'a> Evaluation<'a> {
             Condition::Not(inner) => {
                 self.run(inner, start, matches);
                 matches.iter_mut().for_each(|is_match| *is_match = !*is_match);
+            }
+            Condition::Within(polygons) => {
+                let positions = &self.cloud.positions[start..start + matches.len()];
+                for (is_match, position) in matches.iter_mut().zip(positions) {
+                    let position = self.cloud.origin + position.as_dvec3();
+                    let is_inside = |polygon: &Polygon| polygon.contains([position.x, position.y]);
+                    *is_match = polygons.iter().any(is_inside);
+                }
             }
             Condition::Compare(left, relation, right) => {
                 let (left, right) =

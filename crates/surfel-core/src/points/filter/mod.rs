@@ -3,9 +3,11 @@
 mod condition;
 mod parse;
 mod evaluate;
+mod polygon;
 
-use condition::Condition;
+use condition::{Condition, Operand, Relation};
 use evaluate::Evaluation;
+use polygon::Polygon;
 use std::fmt;
 use std::str::FromStr;
 
@@ -33,6 +35,33 @@ impl PointFilter {
         let column = || "classification".to_owned();
         let is_class = |class: &u8| Condition::equals(column(), f64::from(*class));
         Self { condition: Condition::Any(classes.iter().map(is_class).collect()) }
+    }
+
+    /// The filter that keeps points within a box: at least `low` and at most `high` along the axes X, Y and Z. Infinite
+    /// bounds keep all.
+    pub fn within_box(low: [f64; 3], high: [f64; 3]) -> Self {
+        let bound = |axis: usize, relation, bound: f64| {
+            let column = Operand::Column(["x", "y", "z"][axis].to_owned());
+            bound.is_finite().then(|| Condition::Compare(column, relation, Operand::Number(bound)))
+        };
+        let both = |axis: usize| {
+            let above = bound(axis, Relation::GreaterOrEqual, low[axis]);
+            [above, bound(axis, Relation::LessOrEqual, high[axis])]
+        };
+        Self { condition: Condition::All((0..3).flat_map(both).flatten().collect()) }
+    }
+
+    /// The filter that keeps points above or below at least one of some polygons in the XY plane of the world. Each has
+    /// an outline and holes, as rings of corners; where rings cross, areas inside of an even number are holes.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Error::Setting`] for a polygon without rings, a ring of fewer than three corners, and corners that are
+    /// not finite.
+    pub fn within_polygons(polygons: &[Vec<Vec<[f64; 2]>>]) -> Result<Self> {
+        let polygons: Result<Vec<Polygon>> =
+            polygons.iter().map(|rings| Polygon::new(rings)).collect();
+        Ok(Self { condition: Condition::Within(polygons?) })
     }
 
     /// The filter that keeps points that all of these keep.
@@ -148,6 +177,19 @@ mod tests {
         assert_eq!(text, "(classification == 2 || classification == 5) && z < 1003");
         assert_eq!(text.parse::<PointFilter>().unwrap().to_string(), text);
         assert_eq!(both.columns(), ["classification", "classification", "z"]);
+    }
+
+    #[test]
+    fn boxes_and_polygons_are_in_world_coordinates() {
+        let kept = |filter: PointFilter| filter.matches(&cloud(), 0).unwrap();
+        let low = [f64::NEG_INFINITY, 1.0, 1001.0];
+        let slab = PointFilter::within_box(low, [f64::INFINITY, f64::INFINITY, 1002.0]);
+        assert_eq!(slab.to_string(), "y >= 1 && z >= 1001 && z <= 1002");
+        assert_eq!(kept(slab), [false, true, true, false]);
+        let triangle = |at: f64| vec![vec![[at - 0.5, at - 0.5], [at + 0.5, at], [at, at + 0.5]]];
+        let two = PointFilter::within_polygons(&[triangle(0.0), triangle(2.0)]).unwrap();
+        assert_eq!(two.to_string(), "(x, y) inside of 2 polygons");
+        assert_eq!(kept(two), [true, false, true, false]);
     }
 
     #[test]

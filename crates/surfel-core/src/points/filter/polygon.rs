@@ -1,0 +1,131 @@
+//! Areas of the XY plane bounded by polygons.
+
+use crate::error::{Error, Result};
+
+/// Maximum number of strips into which a polygon is cut.
+const MAX_STRIPS: usize = 4096;
+
+/// A polygon with holes: a point is inside if a line from it to infinity crosses the rings an odd number of times.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Polygon {
+    /// Ends of the sides, the lower one first; level sides bound nothing.
+    sides: Vec<[[f64; 2]; 2]>,
+    /// Least and greatest Y of all sides.
+    y_range: [f64; 2],
+    /// The sides that reach into each of a number of strips of equal height.
+    strips: Vec<Vec<u32>>,
+}
+
+impl Polygon {
+    /// Makes a polygon of rings, which are closed if they are not yet.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Error::Setting`] for a ring of fewer than three corners, for corners that are not finite, and without
+    /// rings.
+    pub fn new(rings: &[Vec<[f64; 2]>]) -> Result<Self> {
+        let fail = |found: String| Error::Setting {
+            name: "polygon",
+            found,
+            expected: "rings of at least three finite corners",
+        };
+        if rings.is_empty() {
+            return Err(fail("no ring".to_owned()));
+        }
+        let mut sides = Vec::new();
+        for ring in rings {
+            if let Some([x, y]) = ring.iter().find(|corner| !corner.iter().all(|c| c.is_finite())) {
+                return Err(fail(format!("the corner {x} {y}")));
+            }
+            let is_closed = ring.first() == ring.last();
+            let n_corners = ring.len() - usize::from(is_closed && !ring.is_empty());
+            if n_corners < 3 {
+                return Err(fail(format!("a ring of {n_corners} corners")));
+            }
+            let next = ring.iter().cycle().skip(1);
+            let ends =
+                ring.iter().zip(next).map(|(a, b)| if a[1] < b[1] { [*a, *b] } else { [*b, *a] });
+            sides.extend(ends.filter(|[low, high]| low[1] < high[1]));
+        }
+        let low = sides.iter().map(|[low, _]| low[1]).fold(f64::INFINITY, f64::min);
+        let high = sides.iter().map(|[_, high]| high[1]).fold(f64::NEG_INFINITY, f64::max);
+        let strips = vec![Vec::new(); sides.len().clamp(1, MAX_STRIPS)];
+        let mut polygon = Self { sides, y_range: [low, high], strips };
+        for (i, [low, high]) in polygon.sides.iter().enumerate() {
+            for strip in polygon.strip_at(low[1])..=polygon.strip_at(high[1]) {
+                polygon.strips[strip].push(i as u32);
+            }
+        }
+        Ok(polygon)
+    }
+
+    /// Returns the strip of a Y within `y_range`. It never falls as Y grows.
+    fn strip_at(&self, y: f64) -> usize {
+        let [low, high] = self.y_range;
+        let strip = (y - low) / (high - low) * self.strips.len() as f64;
+        (strip as usize).min(self.strips.len() - 1)
+    }
+
+    /// Returns true if the polygon contains a position.
+    pub fn contains(&self, [x, y]: [f64; 2]) -> bool {
+        if !(self.y_range[0] <= y && y <= self.y_range[1]) {
+            return false;
+        }
+        let crosses = |side: &&u32| {
+            let [low, high] = self.sides[**side as usize];
+            let is_beside = low[1] <= y && y < high[1];
+            is_beside && x < low[0] + (y - low[1]) / (high[1] - low[1]) * (high[0] - low[0])
+        };
+        self.strips[self.strip_at(y)].iter().filter(crosses).count() % 2 == 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Positions inside and outside of polygons, and polygons that are none.
+
+    use super::*;
+    use crate::math::Random;
+
+    #[test]
+    fn holes_and_bays_are_outside() {
+        let outline = vec![[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, 1.0], [0.0, 4.0], [0.0, 0.0]];
+        let hole = vec![[0.5, 0.5], [1.0, 0.5], [0.5, 1.0]];
+        let polygon = Polygon::new(&[outline, hole]).unwrap();
+        for inside in [[0.1, 3.0], [3.9, 3.0], [2.0, 0.9], [0.9, 0.9]] {
+            assert!(polygon.contains(inside), "{inside:?}");
+        }
+        for outside in [[2.0, 1.1], [0.6, 0.6], [-0.1, 1.0], [4.1, 1.0], [2.0, 4.1], [2.0, -0.1]] {
+            assert!(!polygon.contains(outside), "{outside:?}");
+        }
+        assert!(!polygon.contains([f64::NAN, 1.0]) && !polygon.contains([1.0, f64::NAN]));
+    }
+
+    #[test]
+    fn strips_change_no_result() {
+        let mut random = Random::new(4, 0);
+        let mut next = || f64::from(random.next_f32());
+        let ring: Vec<[f64; 2]> = (0..300).map(|_| [next(), next()]).collect();
+        let polygon = Polygon::new(&[ring]).unwrap();
+        let one_strip =
+            Polygon { strips: vec![(0..polygon.sides.len() as u32).collect()], ..polygon.clone() };
+        let positions: Vec<[f64; 2]> = (0..5000).map(|_| [next(), next()]).collect();
+        let n_inside = positions.iter().filter(|position| polygon.contains(**position)).count();
+        assert!((1000..4000).contains(&n_inside), "{n_inside}");
+        assert!(positions.iter().all(|p| polygon.contains(*p) == one_strip.contains(*p)));
+    }
+
+    #[test]
+    fn broken_rings_are_rejected() {
+        let message = |rings: &[Vec<[f64; 2]>]| Polygon::new(rings).unwrap_err().to_string();
+        assert!(message(&[]).contains("no ring"));
+        assert!(message(&[vec![]]).contains("a ring of 0 corners"));
+        assert!(
+            message(&[vec![[0.0, 0.0], [1.0, 1.0], [0.0, 0.0]]]).contains("a ring of 2 corners")
+        );
+        let infinite = vec![[0.0, 0.0], [1.0, f64::INFINITY], [1.0, 0.0]];
+        assert!(message(&[infinite]).contains("the corner 1 inf"));
+        let level = Polygon::new(&[vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]]).unwrap();
+        assert!(!level.contains([1.0, 0.0]));
+    }
+}
