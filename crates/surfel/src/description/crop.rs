@@ -2,7 +2,6 @@
 
 use super::Invalid;
 use super::rule::{ClipBoxRule, Rule, absolute_text, as_numbers};
-use crate::error::{Error, Result};
 use geojson::{GeoJson, Geometry, GeometryValue};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -34,7 +33,7 @@ impl Crop {
     /// # Errors
     ///
     /// Fails for a file that cannot be read or has no polygons, and for polygons with broken rings.
-    pub fn filter(&self) -> Result<PointFilter> {
+    pub fn filter(&self) -> Result<PointFilter, Invalid> {
         let (polygons, file) = match self {
             Self::Bounds(bounds) => {
                 let (low, high) = (bounds.min.to_array(), bounds.max.to_array());
@@ -42,7 +41,8 @@ impl Crop {
             }
             Self::Wkt(text) => (polygons_of_wkt(text), None),
             Self::File(path) => {
-                let text = surfel_formats::load_text(path, MAX_BYTES)?;
+                let text = surfel_formats::load_text(path, MAX_BYTES)
+                    .map_err(|error| Invalid::at("crop", error.to_string()))?;
                 let polygons =
                     if is_wkt(&text) { polygons_of_wkt(&text) } else { polygons_of_geojson(&text) };
                 (polygons, Some(path.clone()))
@@ -51,7 +51,7 @@ impl Crop {
         let filter = polygons.and_then(|polygons| {
             PointFilter::within_polygons(&polygons).map_err(|error| error.to_string())
         });
-        filter.map_err(|message| Error::Invalid(Invalid { file, ..Invalid::at("crop", message) }))
+        filter.map_err(|message| Invalid { file, ..Invalid::at("crop", message) })
     }
 }
 
@@ -119,7 +119,7 @@ fn collect_polygons(geometry: &Geometry, polygons: &mut Vec<Rings>) {
 pub struct CropRule;
 
 impl Rule<Crop> for CropRule {
-    fn read(&self, value: &Value, folder: &Path) -> std::result::Result<Crop, Invalid> {
+    fn read(&self, value: &Value, folder: &Path) -> Result<Crop, Invalid> {
         let wrong = || {
             Invalid::new(
                 "expected bounds as ([0,10],[0,10]) or 0,0,10,10, a POLYGON as well-known text, or the name of a \
@@ -143,10 +143,7 @@ impl Rule<Crop> for CropRule {
             "" => Err(wrong()),
             text if is_wkt(text) => {
                 let crop = Crop::Wkt(text.to_owned());
-                crop.filter().map_err(|error| match error {
-                    Error::Invalid(invalid) => Invalid::new(invalid.message),
-                    error => Invalid::new(error.to_string()),
-                })?;
+                crop.filter().map_err(|invalid| Invalid::new(invalid.message))?;
                 Ok(crop)
             }
             name => Ok(Crop::File(folder.join(name))),
@@ -168,7 +165,7 @@ mod tests {
 
     use super::*;
 
-    fn read(value: Value) -> std::result::Result<Crop, String> {
+    fn read(value: Value) -> Result<Crop, String> {
         CropRule.read(&value, Path::new("/folder")).map_err(|error| error.message)
     }
 

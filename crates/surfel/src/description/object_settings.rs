@@ -8,7 +8,6 @@ use super::rule::{
     POSITIVE, Rule, Text, count, parsed,
 };
 use super::{Invalid, Part};
-use crate::error::Result;
 use serde_json::Value;
 use std::path::Path;
 use surfel_core::image::Colormap;
@@ -238,7 +237,7 @@ impl PreparationSettings {
     /// # Errors
     ///
     /// Fails if the file of the area that is kept has no polygons.
-    pub fn load_options(&self, columns: ColumnChoice) -> Result<LoadOptions> {
+    pub fn load_options(&self, columns: ColumnChoice) -> Result<LoadOptions, Invalid> {
         let text_columns = self.columns.as_deref().map(TextColumn::parse_list);
         let animation = self.animation_name.clone();
         let filter = self.point_filter()?;
@@ -250,7 +249,7 @@ impl PreparationSettings {
     /// # Errors
     ///
     /// Fails if the file of the area that is kept has no polygons.
-    pub fn point_filter(&self) -> Result<Option<PointFilter>> {
+    pub fn point_filter(&self) -> Result<Option<PointFilter>, Invalid> {
         let area = self.crop.as_ref().map(Crop::filter).transpose()?;
         Ok(point_filter(self.filter.as_ref(), self.class.as_deref(), self.returns, area))
     }
