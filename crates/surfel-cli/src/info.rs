@@ -4,12 +4,16 @@ use crate::global::Global;
 use crate::inputs::expand;
 use crate::report::{Report, print};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use surfel::resolve::{MemoryEstimate, up_convention};
+use surfel_core::image::class_name;
 use surfel_core::math::Vec3;
-use surfel_core::points::{PointCloud, STATION, ScanStation, Subsample, infer_up, spacing};
+use surfel_core::points::{
+    PointCloud, STATION, ScanStation, Subsample, infer_up, points_per_area, spacing,
+};
 use surfel_core::progress::Progress;
-use surfel_formats::{LoadOptions, Loaded, TextColumn};
+use surfel_formats::{FileInfo, LoadOptions, Loaded, TextColumn};
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -23,11 +27,21 @@ pub struct Args {
     /// Columns of a text file, as in x,y,z,-,r,g,b; by default they are inferred from the file.
     #[arg(long, value_name = "NAMES")]
     columns: Option<String>,
+    /// Only what the header states, at once, however large the file is.
+    #[arg(long)]
+    summary: bool,
 }
+
+/// Side of the cells in which points are counted for their density, in distances between points.
+const DENSITY_CELL: f32 = 5.0;
+
+/// Name of the column of the numbers of returns.
+const RETURN_NUMBER: &str = "return_number";
 
 const EXAMPLES: &str = "\
 Examples:
   surfel info scan.laz
+  surfel info --summary 'tiles/*.laz'
   surfel info --json scan.laz | jq .bounds";
 
 /// Shows what each file holds.
@@ -37,11 +51,16 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let limit = global.start()?.memory_limit;
     let mut all = Vec::new();
     for file in &expand(&args.files)? {
-        let infos = [(file.as_path(), surfel_formats::inspect(file)?)].into();
-        // Points are only looked at.
-        MemoryEstimate::from_files(&infos, Some(Subsample::First(0)), 0).check(limit)?;
-        let loaded = surfel_formats::load(file, &options, report)?;
-        let info = describe(file, &loaded, report)?;
+        let header = surfel_formats::inspect(file)?;
+        let info = if args.summary {
+            summarize(file, &header)
+        } else {
+            let infos = [(file.as_path(), header)].into();
+            // Points are only looked at.
+            MemoryEstimate::from_files(&infos, Some(Subsample::First(0)), 0).check(limit)?;
+            let loaded = surfel_formats::load(file, &options, report)?;
+            describe(file, &loaded, report)?
+        };
         report.end();
         if args.json {
             all.push(info);
@@ -54,6 +73,20 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         [only] => Ok(print(&format!("{only:#}"))?),
         several => Ok(print(&format!("{:#}", json!(several)))?),
     }
+}
+
+/// Describes a file by its header.
+fn summarize(file: &Path, header: &FileInfo) -> Value {
+    json!({
+        "file": file.display().to_string(),
+        "format": header.format,
+        "points": header.n_points,
+        "triangles": header.n_triangles,
+        "bounds": header.bounds.map(|[low, high]| json!({ "min": low.to_array(), "max": high.to_array() })),
+        "resolution": header.resolution.map(|step| step.to_array()),
+        "coordinate_system": header.coordinate_system,
+        "columns_in_file": header.columns,
+    })
 }
 
 fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Result<Value> {
@@ -71,11 +104,14 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
         "bounds": { "min": corner(bounds.min), "max": corner(bounds.max) },
         "global_shift": cloud.origin.to_array(),
         "spacing": distance,
+        "points_per_square_unit": points_per_area(&cloud.positions, DENSITY_CELL * distance),
         "resolution": source.resolution.map(|step| step.to_array()),
         "coordinate_system": source.coordinate_system,
         "up": { "axis": up.up.to_array(), "reason": up.reason },
         "stations": stations(cloud),
         "columns": columns(cloud),
+        "classes": classes(cloud),
+        "returns": returns(cloud),
         "columns_in_file": source.columns,
     }))
 }
@@ -97,11 +133,29 @@ fn stations(cloud: &PointCloud) -> Vec<Value> {
     stations.map(describe).collect()
 }
 
+/// Numbers of points of each ASPRS class that occurs.
+fn classes(cloud: &PointCloud) -> Map<String, Value> {
+    let mut counts = [0u64; 256];
+    cloud.classification.iter().flatten().for_each(|class| counts[usize::from(*class)] += 1);
+    let found = (0..=u8::MAX).zip(counts).filter(|(_, count)| 0 < *count);
+    found.map(|(class, count)| (format!("{class} {}", class_name(class)), json!(count))).collect()
+}
+
+/// Numbers of points of each return of a pulse.
+fn returns(cloud: &PointCloud) -> Map<String, Value> {
+    let mut counts = BTreeMap::new();
+    if let Some(numbers) = cloud.scalar(RETURN_NUMBER) {
+        (0..cloud.len()).for_each(|i| *counts.entry(numbers.get(i) as u8).or_insert(0u64) += 1);
+    }
+    counts.into_iter().map(|(number, count)| (number.to_string(), json!(count))).collect()
+}
+
 /// Columns by name with their least and greatest values.
 fn columns(cloud: &PointCloud) -> Map<String, Value> {
     let mut columns = Map::new();
     let mut add = |name: &str, values: &mut dyn Iterator<Item = f64>| {
-        let finite = values.filter(|value| value.is_finite());
+        // Programs write the greatest number of the type for values that are missing.
+        let finite = values.filter(|value| value.abs() < f64::from(f32::MAX));
         let none = (f64::INFINITY, f64::NEG_INFINITY);
         let (low, high) = finite.fold(none, |(low, high), v| (v.min(low), v.max(high)));
         let range = if low <= high { json!([low, high]) } else { Value::Null };
@@ -136,16 +190,46 @@ fn table(info: &Value) -> String {
     if !info["triangles"].is_null() {
         row("triangles", text(&info["triangles"]));
     }
-    row("bounds", format!("{} to {}", text(&info["bounds"]["min"]), text(&info["bounds"]["max"])));
-    row("global shift", text(&info["global_shift"]));
-    row("spacing", format!("{} between points, about", text(&info["spacing"])));
+    let bounds = &info["bounds"];
+    row(
+        "bounds",
+        match bounds {
+            Value::Null => text(bounds),
+            bounds => format!("{} to {}", text(&bounds["min"]), text(&bounds["max"])),
+        },
+    );
+    let is_summary = info["columns"].is_null();
+    if !is_summary {
+        row("global shift", text(&info["global_shift"]));
+        row("spacing", format!("{} between points, about", text(&info["spacing"])));
+        // Nobody counts the corners of a mesh by area.
+        let density = info["points_per_square_unit"].as_f64();
+        if let Some(density) = density.filter(|_| info["triangles"].is_null()) {
+            row(
+                "density",
+                format!("{} points a square unit seen from above, about", rounded(density)),
+            );
+        }
+    }
     row("resolution", text(&info["resolution"]));
     row("coordinates", text(&info["coordinate_system"]));
+    if is_summary {
+        row("columns", text(&info["columns_in_file"]));
+        return lines.join("\n");
+    }
     row("up", text(&info["up"]["reason"]));
     for (place, station) in info["stations"].as_array().into_iter().flatten().enumerate() {
         let title = if place == 0 { "stations" } else { "" };
         let (name, points) = (text(&station["name"]), text(&station["points"]));
         row(title, format!("{name:<24}{points} points, scanner at {}", text(&station["position"])));
+    }
+    let n_points = info["points"].as_f64().unwrap_or(1.0);
+    for key in ["classes", "returns"] {
+        for (place, (name, count)) in info[key].as_object().into_iter().flatten().enumerate() {
+            let percent = 100.0 * count.as_f64().unwrap_or(0.0) / n_points;
+            let title = if place == 0 { key } else { "" };
+            row(title, format!("{name:<24}{:<12}{percent:.1} %", text(count)));
+        }
     }
     for (place, (name, range)) in info["columns"].as_object().into_iter().flatten().enumerate() {
         let title = if place == 0 { "columns" } else { "" };
@@ -169,6 +253,11 @@ fn text(value: &Value) -> String {
         Value::Number(number) if number.is_f64() => short(number.as_f64().unwrap_or(f64::NAN)),
         other => other.to_string(),
     }
+}
+
+/// Three digits.
+fn rounded(value: f64) -> String {
+    format!("{value:.*}", (2 - value.log10().floor() as i32).clamp(0, 9) as usize)
 }
 
 /// Six digits at least, and no zeros at the end.

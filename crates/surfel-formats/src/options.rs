@@ -41,6 +41,8 @@ pub struct FileInfo {
     /// Number of triangles of a mesh. Before the mesh is read it is the number of its faces, which may have more
     /// than three corners.
     pub n_triangles: Option<u64>,
+    /// Least and greatest coordinates of the points, if the header states them.
+    pub bounds: Option<[DVec3; 2]>,
     /// Smallest step between coordinates on each axis, if the format states one.
     pub resolution: Option<DVec3>,
     /// Coordinate system, as WKT, as "EPSG:" and a code, or in the words of the file.

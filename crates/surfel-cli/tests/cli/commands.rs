@@ -1,7 +1,7 @@
 //! Each command, end to end.
 
 use super::common::{Folder, dome, fail, read_png, stderr, succeed, surfel, tile};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::fs;
 
 #[test]
@@ -187,6 +187,33 @@ fn info_prints_a_table_or_json() {
     let both: Value = serde_json::from_str(&succeed(&["info", "--json", &cloud, &cloud])).unwrap();
     assert_eq!(both.as_array().unwrap().len(), 2);
     assert_eq!(both[0]["bounds"]["min"][0], -1.0);
+}
+
+#[test]
+fn info_counts_classes_and_returns_and_sums_up_headers() {
+    let folder = Folder::new();
+    let lines: String = (0..100)
+        .map(|i| format!("{},{},0,{},{}\n", i % 10, i / 10, 2 + i % 2 * 3, 1 + i / 90))
+        .collect();
+    let cloud = folder.write("a.csv", ["x,y,z,classification,return_number\n", &lines].concat());
+    let las = folder.path("a.las");
+    succeed(&["prepare", &cloud, "-o", &las]);
+    let info: Value = serde_json::from_str(&succeed(&["info", "--json", &las])).unwrap();
+    assert_eq!(info["classes"], json!({ "2 ground": 50, "5 high vegetation": 50 }));
+    assert_eq!(info["returns"], json!({ "1": 90, "2": 10 }));
+    let density = info["points_per_square_unit"].as_f64().unwrap();
+    assert!((0.3..1.2).contains(&density), "{density}");
+    let table = succeed(&["info", &las]);
+    assert!(table.contains("5 high vegetation") && table.contains("50.0 %"), "{table}");
+
+    let of_header: Value =
+        serde_json::from_str(&succeed(&["info", "--summary", "--json", &las])).unwrap();
+    assert_eq!(of_header["points"], 100);
+    assert_eq!(of_header["bounds"], json!({ "min": [0.0, 0.0, 0.0], "max": [9.0, 9.0, 0.0] }));
+    let columns = of_header["columns_in_file"].as_array().unwrap();
+    assert!(columns.iter().any(|name| name == "return_number"), "{columns:?}");
+    let summary = succeed(&["info", "--summary", &las, &cloud]);
+    assert!(summary.contains("bounds        not stated"), "{summary}");
 }
 
 #[test]

@@ -29,12 +29,14 @@ mod grid_rays;
 mod mixed_pixels;
 mod seen_scan;
 mod free_space;
+mod density;
 mod prepare;
 
 pub use clean::{CleanReport, clean};
 pub use cloud::{PointCloud, Scalar, Values, is_valid_position};
 pub use deformation::{Morph, Skin};
 pub use denoise::{Denoise, DenoiseReport, denoise};
+pub use density::points_per_area;
 pub use filter::PointFilter;
 pub use find_structures::{all_scattered, find_structures};
 pub use merge::merge;

@@ -25,6 +25,8 @@ pub(super) struct Header {
     pub scale: DVec3,
     /// World coordinates of the integer coordinates 0.
     pub offset: DVec3,
+    /// Least and greatest coordinates that the header states.
+    pub bounds: [DVec3; 2],
     /// Bytes of the points, from the first to the end of the file or the extended records.
     pub data: Range<usize>,
     /// Variable length records.
@@ -107,6 +109,11 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
         DVec3::new(read_f64(input, byte), read_f64(input, byte + 8), read_f64(input, byte + 16))
     };
     let (scale, offset) = (vector(131), vector(155));
+    // For each axis the greatest coordinate and then the least.
+    let every_second = |byte| {
+        DVec3::new(read_f64(input, byte), read_f64(input, byte + 16), read_f64(input, byte + 32))
+    };
+    let bounds = [every_second(187), every_second(179)];
     if !scale.is_finite() || scale.cmpeq(DVec3::ZERO).any() || !offset.is_finite() {
         let found = format!("scale {} and offset {}", format_vector(scale), format_vector(offset));
         return Err(malformed(131, found, "finite numbers, and scales other than 0"));
@@ -144,6 +151,7 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
         n_points,
         scale,
         offset,
+        bounds,
         data,
         records,
     })

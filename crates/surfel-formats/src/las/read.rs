@@ -84,6 +84,8 @@ fn file_info(input: &Input, header: &Header) -> FileInfo {
         n_points: Some(header.n_points),
         n_triangles: None,
         external_files: Vec::new(),
+        bounds: Some(header.bounds)
+            .filter(|[low, high]| low.cmple(*high).all() && low.is_finite() && high.is_finite()),
         resolution: Some(header.scale.abs()),
         coordinate_system: coordinate_system(input, header),
         columns: columns.iter().map(|column| column.role.name().to_owned()).collect(),

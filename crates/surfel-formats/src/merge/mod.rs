@@ -50,6 +50,11 @@ pub fn common_file_info(infos: &[FileInfo]) -> FileInfo {
         format: formats.join("; "),
         n_points: infos.iter().map(|info| info.n_points).sum(),
         n_triangles: infos.iter().map(|info| info.n_triangles).sum(),
+        bounds: infos
+            .iter()
+            .map(|info| info.bounds)
+            .reduce(|a, b| a.zip(b).map(|([a, b], [c, d])| [a.min(c), b.max(d)]))
+            .flatten(),
         resolution: infos
             .iter()
             .map(|info| info.resolution)
