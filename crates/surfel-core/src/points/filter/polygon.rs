@@ -4,12 +4,40 @@ use crate::error::{Error, Result};
 
 /// Maximum number of strips into which a polygon is cut.
 const MAX_STRIPS: usize = 4096;
+/// Maximum mean number of strips that a side reaches into: each takes memory.
+const MAX_STRIPS_PER_SIDE: f64 = 8.0;
+
+/// A side of a polygon that is not level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Side {
+    /// The lower end.
+    low: [f64; 2],
+    /// Y of the upper end.
+    high_y: f64,
+    /// Change of X with Y.
+    slope: f64,
+}
+
+impl Side {
+    /// Returns the side between two corners, or `None` if it is level.
+    fn new(a: [f64; 2], b: [f64; 2]) -> Option<Self> {
+        let [low, high] = if a[1] < b[1] { [a, b] } else { [b, a] };
+        let slope = (high[0] - low[0]) / (high[1] - low[1]);
+        (low[1] < high[1]).then_some(Self { low, high_y: high[1], slope })
+    }
+
+    /// Returns true if a ray from a position along +X crosses the side.
+    fn crosses(&self, [x, y]: [f64; 2]) -> bool {
+        let is_beside = self.low[1] <= y && y < self.high_y;
+        is_beside && x < self.low[0] + (y - self.low[1]) * self.slope
+    }
+}
 
 /// A polygon with holes: a point is inside if a line from it to infinity crosses the rings an odd number of times.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Polygon {
-    /// Ends of the sides, the lower one first; level sides bound nothing.
-    sides: Vec<[[f64; 2]; 2]>,
+    /// Sides; level ones bound nothing.
+    sides: Vec<Side>,
     /// Least and greatest Y of all sides.
     y_range: [f64; 2],
     /// The sides that reach into each of a number of strips of equal height.
@@ -43,16 +71,18 @@ impl Polygon {
                 return Err(fail(format!("a ring of {n_corners} corners")));
             }
             let next = ring.iter().cycle().skip(1);
-            let ends =
-                ring.iter().zip(next).map(|(a, b)| if a[1] < b[1] { [*a, *b] } else { [*b, *a] });
-            sides.extend(ends.filter(|[low, high]| low[1] < high[1]));
+            sides.extend(ring.iter().zip(next).filter_map(|(a, b)| Side::new(*a, *b)));
         }
-        let low = sides.iter().map(|[low, _]| low[1]).fold(f64::INFINITY, f64::min);
-        let high = sides.iter().map(|[_, high]| high[1]).fold(f64::NEG_INFINITY, f64::max);
-        let strips = vec![Vec::new(); sides.len().clamp(1, MAX_STRIPS)];
+        let low = sides.iter().map(|side| side.low[1]).fold(f64::INFINITY, f64::min);
+        let high = sides.iter().map(|side| side.high_y).fold(f64::NEG_INFINITY, f64::max);
+        let mean_height =
+            sides.iter().map(|side| side.high_y - side.low[1]).sum::<f64>() / sides.len() as f64;
+        let most = MAX_STRIPS_PER_SIDE * (high - low) / mean_height;
+        let n_strips = sides.len().min(MAX_STRIPS).min(most as usize).max(1);
+        let strips = vec![Vec::new(); n_strips];
         let mut polygon = Self { sides, y_range: [low, high], strips };
-        for (i, [low, high]) in polygon.sides.iter().enumerate() {
-            for strip in polygon.strip_at(low[1])..=polygon.strip_at(high[1]) {
+        for (i, side) in polygon.sides.iter().enumerate() {
+            for strip in polygon.strip_at(side.low[1])..=polygon.strip_at(side.high_y) {
                 polygon.strips[strip].push(i as u32);
             }
         }
@@ -71,11 +101,7 @@ impl Polygon {
         if !(self.y_range[0] <= y && y <= self.y_range[1]) {
             return false;
         }
-        let crosses = |side: &&u32| {
-            let [low, high] = self.sides[**side as usize];
-            let is_beside = low[1] <= y && y < high[1];
-            is_beside && x < low[0] + (y - low[1]) / (high[1] - low[1]) * (high[0] - low[0])
-        };
+        let crosses = |side: &&u32| self.sides[**side as usize].crosses([x, y]);
         self.strips[self.strip_at(y)].iter().filter(crosses).count() % 2 == 1
     }
 }
@@ -113,6 +139,15 @@ mod tests {
         let n_inside = positions.iter().filter(|position| polygon.contains(**position)).count();
         assert!((1000..4000).contains(&n_inside), "{n_inside}");
         assert!(positions.iter().all(|p| polygon.contains(*p) == one_strip.contains(*p)));
+    }
+
+    #[test]
+    fn tall_sides_take_little_memory() {
+        let comb: Vec<[f64; 2]> = (0..20_000).map(|i| [f64::from(i), f64::from(i % 2)]).collect();
+        let polygon = Polygon::new(&[comb]).unwrap();
+        let n_entries: usize = polygon.strips.iter().map(Vec::len).sum();
+        assert!(n_entries < 10 * 20_000, "{n_entries}");
+        assert!(polygon.contains([1000.0, 0.5 + 1e-9]) != polygon.contains([1001.0, 0.5 + 1e-9]));
     }
 
     #[test]
