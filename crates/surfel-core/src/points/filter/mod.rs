@@ -42,7 +42,11 @@ impl PointFilter {
     pub fn within_box(low: [f64; 3], high: [f64; 3]) -> Self {
         let bound = |axis: usize, relation, bound: f64| {
             let column = Operand::Column(["x", "y", "z"][axis].to_owned());
-            bound.is_finite().then(|| Condition::Compare(column, relation, Operand::Number(bound)))
+            bound.is_finite().then_some(Condition::Compare(
+                column,
+                relation,
+                Operand::Number(bound),
+            ))
         };
         let both = |axis: usize| {
             let above = bound(axis, Relation::GreaterOrEqual, low[axis]);
