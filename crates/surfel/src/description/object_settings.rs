@@ -58,7 +58,7 @@ settings! {
         returns: Returns, OneOf(RETURNS), "WHICH";
         /// Keeps only points in an area, in the coordinates of their file: bounds as ([0,10],[0,10]), a POLYGON as
         /// well-known text, or a GeoJSON or WKT file of polygons. Other points take no memory.
-        crop: Crop, CropRule, "AREA", common;
+        crop: Crop, CropRule, "AREA";
         /// Keeps fewer points: first:N, random:N, stride:S or spacing:LENGTH.
         subsample: Subsample, SubsampleRule, "CHOICE";
         /// Drops points that stand alone: statistical:K,RATIO, whose mean distance to K neighbours exceeds the mean of
