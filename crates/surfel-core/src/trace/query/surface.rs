@@ -2,11 +2,10 @@
 
 use crate::flat::{FlatCloud, FlatPoints, Slot};
 use crate::math::{Lanes, PACKET_WIDTH, PacketLanes, Ray, Vec3};
-use crate::surface::{CandidateHit, Capsule, Disc, EdgeTest, Sphere, SurfaceKind, Surfel, capsule};
+use crate::surface::{Capsule, Disc, EdgeTest, Sphere, SurfaceKind, Surfel, capsule};
 use crate::trace::query::any::{AcceptAll, any_accepted_hit, any_hits_kernel};
 use crate::trace::query::closest::{closest_hits_kernel, closest_shapes};
 use crate::trace::query::edge_filter::EdgeFilter;
-use crate::trace::query::edge_test::is_enclosed;
 use crate::trace::query::hit::Hit;
 use crate::trace::query::leaf::LeafGeometry;
 use crate::trace::query::smooth_filter::SmoothFilter;
@@ -63,12 +62,9 @@ const MAX_REJECTED_HITS: usize = 48;
 const RESTART_OFFSET: f32 = 0.05;
 /// Distance behind a disc without a smooth surface nearby at which the search restarts, in radii.
 const SMOOTH_RESTART_OFFSET: f32 = 0.002;
-
 /// Minimum distance between a disc's front and a back face behind it, in radii of the disc, at which a ray has come
 /// through a slit. Nearer back faces are those of thin sheets.
 const MIN_SLIT_DEPTH: f32 = 3.0;
-/// Factor on the radius of the disc that a ray passed: around slits, points lie on both sides within this distance.
-const SLIT_RADIUS_FACTOR: f32 = 1.6;
 
 /// Finds the closest hit of each ray on the continuous surface.
 pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
@@ -251,8 +247,8 @@ fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHi
             break;
         }
     }
-    for ((ray, disc), hit) in all_rays.iter().zip(&passed).zip(hits) {
-        if !disc.is_miss() && is_through_slit::<L>(cloud, ray, disc, hit) {
+    for (disc, hit) in passed.iter().zip(hits) {
+        if !disc.is_miss() && is_through_slit(cloud, disc, hit) {
             let Surfel { normal, radius, color, .. } = cloud.points.surfel(disc.slot);
             *hit = SurfaceHit {
                 distance: disc.distance,
@@ -268,18 +264,11 @@ fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHi
     }
 }
 
-/// Returns true if a ray, which passed `disc` from its front, went through a slit between the points there: it hits a back
-/// face behind it, or nothing although points lie on both sides of the slit.
-#[inline(always)]
-fn is_through_slit<L: Lanes>(cloud: &FlatCloud, ray: &Ray, disc: &Hit, hit: &SurfaceHit) -> bool {
-    let radius = cloud.points.radius(disc.slot);
-    if !hit.is_miss() {
-        return hit.is_backface && disc.distance + MIN_SLIT_DEPTH * radius < hit.distance;
-    }
-    let normal = cloud.points.normal(disc.slot);
-    let around =
-        CandidateHit { normal, direction: ray.direction, radius: SLIT_RADIUS_FACTOR * radius };
-    is_enclosed::<L, true>(&cloud.points, ray.at(disc.distance), around)
+/// Returns true if a ray, which passed `disc` from its front, hits a back face behind it: it went through a slit between
+/// the points there.
+fn is_through_slit(cloud: &FlatCloud, disc: &Hit, hit: &SurfaceHit) -> bool {
+    hit.is_backface
+        && disc.distance + MIN_SLIT_DEPTH * cloud.points.radius(disc.slot) < hit.distance
 }
 
 /// Traces all rays together until each has a hit within the edge of the surface, or hits nothing more.
