@@ -19,7 +19,7 @@ pub use edge_test::{
 pub use kind::SurfaceKind;
 pub use shape::{MAX_NORMAL_COMPONENT, PointLanes, RayLanes, Shape};
 pub use smooth::{
-    ColorSums, FIT_REACH, FitPoint, OverhangSums, SUPPORT_FACTOR, SphereHit, SphereSums,
+    ColorSums, FIT_REACH, FitPoint, OverhangSums, PointSums, SUPPORT_FACTOR, SphereHit, SphereSums,
     edge_retest_factor,
 };
 pub use sphere::Sphere;

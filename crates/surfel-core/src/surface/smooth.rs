@@ -52,6 +52,15 @@ pub fn edge_retest_factor(evenness: f32) -> f32 {
     even.1 + fraction * (random.1 - even.1)
 }
 
+/// Sums over the points around positions.
+pub trait PointSums<F: Floats> {
+    /// Returns the lanes in which a point may take part.
+    fn is_near(&self, point: &FitPoint<F>) -> F::Mask;
+
+    /// Adds a point in `lanes`, to which it is near.
+    fn add(&mut self, point: &FitPoint<F>, lanes: F::Mask);
+}
+
 /// Weighted sums over the points around positions, one position or one point per lane.
 #[derive(Clone, Copy)]
 pub struct SphereSums<F> {
@@ -123,34 +132,6 @@ impl<F: Floats> SphereSums<F> {
         }
     }
 
-    /// Returns the lanes in which a point may take part in the fit.
-    #[inline(always)]
-    pub fn is_near(&self, point: &FitPoint<F>) -> F::Mask {
-        let squared = point.offset.dot(point.offset);
-        is_within_reach(point, self.per_radius)
-            & (squared * point.inverse_support).lt(F::splat(1.0))
-    }
-
-    /// Adds a point in `lanes`, to which it is near. Its normal is turned to the side of the guide.
-    #[inline(always)]
-    pub fn add(&mut self, point: &FitPoint<F>, lanes: F::Mask) {
-        let (zero, one) = (F::splat(0.0), F::splat(1.0));
-        let offset = point.offset.scaled(self.per_radius);
-        let cosine = point.normal.dot(self.guide);
-        let height = point.normal.dot(offset) * F::splat(1.0 / MAX_PLANE_DISTANCE);
-        let closeness = (one - height * height).max(zero);
-        let weight = point.weight() * alignment(cosine.abs()) * closeness * closeness;
-        let weight = F::select(lanes, weight, zero);
-        let side = F::select(cosine.lt(zero), zero - one, one);
-        let normal = point.normal.scaled(weight * side);
-        let weighted_offset = offset.scaled(weight);
-        self.weight = self.weight + in_steps(weight);
-        self.offset = self.offset.plus(in_steps_vector(weighted_offset));
-        self.normal = self.normal.plus(in_steps_vector(normal));
-        self.offset_dot_normal = self.offset_dot_normal + in_steps(offset.dot(normal));
-        self.offset_squared = self.offset_squared + in_steps(offset.dot(weighted_offset));
-    }
-
     /// Fits a sphere to the points and intersects it with rays through the positions along unit vectors
     /// `direction`.
     #[inline(always)]
@@ -189,6 +170,35 @@ impl<F: Floats> SphereSums<F> {
     }
 }
 
+impl<F: Floats> PointSums<F> for SphereSums<F> {
+    #[inline(always)]
+    fn is_near(&self, point: &FitPoint<F>) -> F::Mask {
+        let squared = point.offset.dot(point.offset);
+        is_within_reach(point, self.per_radius)
+            & (squared * point.inverse_support).lt(F::splat(1.0))
+    }
+
+    /// The point's normal is turned to the side of the guide.
+    #[inline(always)]
+    fn add(&mut self, point: &FitPoint<F>, lanes: F::Mask) {
+        let (zero, one) = (F::splat(0.0), F::splat(1.0));
+        let offset = point.offset.scaled(self.per_radius);
+        let cosine = point.normal.dot(self.guide);
+        let height = point.normal.dot(offset) * F::splat(1.0 / MAX_PLANE_DISTANCE);
+        let closeness = (one - height * height).max(zero);
+        let weight = point.weight() * alignment(cosine.abs()) * closeness * closeness;
+        let weight = F::select(lanes, weight, zero);
+        let side = F::select(cosine.lt(zero), zero - one, one);
+        let normal = point.normal.scaled(weight * side);
+        let weighted_offset = offset.scaled(weight);
+        self.weight = self.weight + in_steps(weight);
+        self.offset = self.offset.plus(in_steps_vector(weighted_offset));
+        self.normal = self.normal.plus(in_steps_vector(normal));
+        self.offset_dot_normal = self.offset_dot_normal + in_steps(offset.dot(normal));
+        self.offset_squared = self.offset_squared + in_steps(offset.dot(weighted_offset));
+    }
+}
+
 /// Weighted sums that tell whether hits lie on the part of a surface that sticks out beyond a convex edge, where it
 /// covers the surface on the other side.
 #[derive(Clone, Copy)]
@@ -212,16 +222,24 @@ impl<F: Floats> OverhangSums<F> {
         Self { normal, center, per_radius: F::splat(1.0) / radius, weight: zero, height: zero }
     }
 
-    /// Returns the lanes in which a point is near the hit.
+    /// Returns the lanes in which the hit sticks out.
     #[inline(always)]
-    pub fn is_near(&self, point: &FitPoint<F>) -> F::Mask {
+    pub fn sticks_out(&self) -> F::Mask {
+        F::splat(MIN_EDGE_WEIGHT * STEPS).lt(self.weight)
+            & (F::splat(MAX_OVERHANG) * self.weight).lt(self.height)
+    }
+}
+
+impl<F: Floats> PointSums<F> for OverhangSums<F> {
+    #[inline(always)]
+    fn is_near(&self, point: &FitPoint<F>) -> F::Mask {
         is_within_reach(point, self.per_radius)
     }
 
-    /// Adds a point in `lanes`, to which it is near. It counts if it is on the other side of an edge: its normal is far from that of the hit,
-    /// and it lies below the hit's tangent plane. Its own plane has the centre of the disc below it.
+    /// A point counts if it is on the other side of an edge: its normal is far from that of the hit, and it lies below the
+    /// hit's tangent plane. Its own plane has the centre of the disc below it.
     #[inline(always)]
-    pub fn add(&mut self, point: &FitPoint<F>, lanes: F::Mask) {
+    fn add(&mut self, point: &FitPoint<F>, lanes: F::Mask) {
         let zero = F::splat(0.0);
         let is_other_side = point.normal.dot(self.normal).abs().lt(F::splat(MAX_EDGE_COSINE))
             & self.normal.dot(point.offset).lt(zero);
@@ -231,13 +249,6 @@ impl<F: Floats> OverhangSums<F> {
         let weight = F::select(lanes & is_other_side, point.weight(), zero);
         self.weight = self.weight + in_steps(weight);
         self.height = self.height + in_steps(weight * height);
-    }
-
-    /// Returns the lanes in which the hit sticks out.
-    #[inline(always)]
-    pub fn sticks_out(&self) -> F::Mask {
-        F::splat(MIN_EDGE_WEIGHT * STEPS).lt(self.weight)
-            & (F::splat(MAX_OVERHANG) * self.weight).lt(self.height)
     }
 }
 

@@ -3,7 +3,8 @@
 use crate::flat::{FlatCloud, FlatPoints, Slot};
 use crate::math::{Aabb, LaneMask, Lanes, PACKET_WIDTH, Ray, SimdTask, Vec3, Vec3Lanes};
 use crate::surface::{
-    CandidateHit, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, OverhangSums, SphereSums,
+    CandidateHit, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, OverhangSums, PointSums,
+    SphereSums,
 };
 use crate::trace::query::any::HitFilter;
 use crate::trace::query::edge_test::{evaluate_one, is_enclosed};
@@ -97,20 +98,31 @@ fn sticks_out<L: Lanes>(points: &FlatPoints, position: Vec3, slot: Slot, normal:
     let radius = points.radius(slot);
     let center = Vec3Lanes::splat(points.center(slot) - position);
     let sums = OverhangSums::<L>::new(Vec3Lanes::splat(normal), center, L::splat(radius));
+    sum_up::<L, _>(points, position, radius, sums).reduce_lanes().sticks_out()
+}
+
+/// Adds the points around one position to sums over them, eight at a time, one per lane.
+#[inline(always)]
+fn sum_up<L: Lanes, S: PointSums<L>>(
+    points: &FlatPoints,
+    position: Vec3,
+    radius: f32,
+    sums: S,
+) -> S {
     let reach = Vec3::splat(FIT_REACH * radius);
     let region = Aabb { min: position - reach, max: position + reach };
-    let mut visitor = SingleOverhang { position, sums };
+    let mut visitor = SingleHitSums::<L, S> { position, sums, lanes: PhantomData };
     query_box::<L>(points, &region, &mut visitor);
-    visitor.sums.reduce_lanes().sticks_out()
+    visitor.sums
 }
 
-/// Adds points to the sums of one hit, eight at a time, one per lane.
-struct SingleOverhang<L> {
+struct SingleHitSums<L, S> {
     position: Vec3,
-    sums: OverhangSums<L>,
+    sums: S,
+    lanes: PhantomData<L>,
 }
 
-impl<L: Lanes> BoxVisitor for SingleOverhang<L> {
+impl<L: Lanes, S: PointSums<L>> BoxVisitor for SingleHitSums<L, S> {
     #[inline(always)]
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
         let (point, is_used) = fit_points::<L>(points, block_idx, self.position);
@@ -155,26 +167,5 @@ fn fit_one<L: Lanes>(
     radius: f32,
 ) -> SphereSums<f32> {
     let sums = SphereSums::<L>::new(Vec3Lanes::splat(guide), L::splat(radius));
-    let mut visitor = SingleFit { position, sums };
-    let reach = Vec3::splat(FIT_REACH * radius);
-    let region = Aabb { min: position - reach, max: position + reach };
-    query_box::<L>(points, &region, &mut visitor);
-    visitor.sums.reduce_lanes()
-}
-
-/// Adds points to the sums of one hit, eight at a time, one per lane.
-struct SingleFit<L> {
-    position: Vec3,
-    sums: SphereSums<L>,
-}
-
-impl<L: Lanes> BoxVisitor for SingleFit<L> {
-    #[inline(always)]
-    fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let (point, is_used) = fit_points::<L>(points, block_idx, self.position);
-        let near = is_used & self.sums.is_near(&point);
-        if near.bits() != 0 {
-            self.sums.add(&point, near);
-        }
-    }
+    sum_up::<L, _>(points, position, radius, sums).reduce_lanes()
 }

@@ -7,7 +7,7 @@ use crate::math::{
 };
 use crate::surface::{
     CandidateHitLanes, ColorSums, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, NeighborhoodStats,
-    OverhangSums, SUPPORT_FACTOR, SphereSums,
+    OverhangSums, PointSums, SUPPORT_FACTOR, SphereSums,
 };
 use crate::trace::query::edge_test::{PacketCandidates, enclosed_lanes, lane_mask};
 use crate::trace::query::hit::NearestHits;
