@@ -280,7 +280,11 @@ impl LoadedScene {
         progress: &dyn Progress,
     ) -> Result<PreparedCloud> {
         let settings = self.settings_of(geometry, description);
-        let filter = settings.preparation.point_filter()?.filter(|_| self.keeps_all_columns);
+        // Else the points were filtered while they were read.
+        let filter = match self.keeps_all_columns {
+            true => settings.preparation.point_filter()?,
+            false => None,
+        };
         let prepared = filter_cloud(cloud, filter.as_ref(), progress).and_then(|cloud| {
             prepare_cloud(cloud, &settings, description.picture.seed(), progress)
         });
