@@ -206,6 +206,12 @@ fn info_counts_classes_and_returns_and_sums_up_headers() {
     let table = succeed(&["info", &las]);
     assert!(table.contains("5 high vegetation") && table.contains("50.0 %"), "{table}");
 
+    // The greatest number stands for a missing value.
+    let heights = format!("x,y,z,height\n0,0,0,3\n1,0,0,{}\n0,1,0,5\n", f64::MAX);
+    let gaps = folder.write("gaps.csv", heights);
+    let info: Value = serde_json::from_str(&succeed(&["info", "--json", &gaps])).unwrap();
+    assert_eq!(info["columns"]["height"], json!([3.0, 5.0]));
+
     let of_header: Value =
         serde_json::from_str(&succeed(&["info", "--summary", "--json", &las])).unwrap();
     assert_eq!(of_header["points"], 100);

@@ -160,7 +160,8 @@ pub fn prepare(
             report.normals_from = Some(neighborhood);
         }
     }
-    if preparation.orientation == Orientation::Auto && !estimated.normals {
+    let by_stations = matches!(preparation.orientation, Orientation::Auto | Orientation::Station);
+    if by_stations && !estimated.normals {
         turn_given_normals(&mut cloud, progress);
     }
     if let Some((radii, found)) = estimates.radii {
