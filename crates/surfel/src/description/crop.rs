@@ -1,7 +1,8 @@
 //! The area whose points are kept: bounds, polygons as text, or those of a file.
 
 use super::Invalid;
-use super::rule::{ClipBoxRule, Rule, absolute_text, as_numbers};
+use super::clip_rule::ClipBoxRule;
+use super::rule::{Rule, absolute_text, as_numbers};
 use geojson::{GeoJson, Geometry, GeometryValue};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

@@ -1,7 +1,8 @@
 //! Lamps: lights at places, which may move.
 
+use super::color_rule::Color;
 use super::keys::settings;
-use super::rule::{Checked, Color, OneOf, Text, Vector, number};
+use super::rule::{Checked, OneOf, Text, Vector, number};
 use super::{Invalid, read_table};
 use serde_json::{Map, Value};
 use std::f64::consts::PI;

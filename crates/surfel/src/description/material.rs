@@ -1,7 +1,8 @@
 //! Materials: a kind and properties, as a table or as text like `glass:ior=1.33,color=#88ccff`.
 
+use super::color_rule::Color;
 use super::keys::{KeyedSettings, settings};
-use super::rule::{Checked, Color, Flag, POSITIVE, Rule, from_core, number};
+use super::rule::{Checked, Flag, POSITIVE, Rule, from_core, number};
 use super::{Invalid, read_table, write_table};
 use serde_json::{Map, Value, json};
 use std::path::Path;

@@ -6,6 +6,8 @@
 
 mod animation;
 mod camera;
+mod clip_rule;
+mod color_rule;
 mod crop;
 mod exclusive;
 mod file;

@@ -1,12 +1,11 @@
 //! Settings that an object may have for itself: surface, preparation, colour.
 
+use super::clip_rule::{ClipBoxRule, ClipPlaneRule};
+use super::color_rule::{ColorSourceRule, ColormapRule};
 use super::crop::{Crop, CropRule};
 use super::keys::{KeyedSettings, settings};
 use super::point_filter::{Classes, RETURNS, Returns, point_filter};
-use super::rule::{
-    Checked, ClipBoxRule, ClipPlaneRule, ColorSourceRule, ColormapRule, Flag, Interval, OneOf,
-    POSITIVE, Rule, Text, count, parsed,
-};
+use super::rule::{Checked, Flag, Interval, OneOf, POSITIVE, Rule, Text, count, parsed};
 use super::{Invalid, Part};
 use serde_json::Value;
 use std::path::Path;

@@ -1,11 +1,9 @@
 //! The picture: its size, quality and background, and the instant that it shows.
 
 use super::Invalid;
+use super::color_rule::{BackgroundRule, default_background};
 use super::keys::settings;
-use super::rule::{
-    BackgroundRule, Checked, Flag, OneOf, Resolution, Text, as_number, count, default_background,
-    number,
-};
+use super::rule::{Checked, Flag, OneOf, Resolution, Text, as_number, count, number};
 use super::rule::{POSITIVE, Rule};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

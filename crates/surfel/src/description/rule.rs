@@ -7,10 +7,7 @@ use super::nearest::nearest;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf, absolute};
 use std::str::FromStr;
-use surfel_core::image::{Colormap, decode_srgb8, encode_srgb};
 use surfel_core::math::{DVec3, Vec3};
-use surfel_core::scene::color::ColorSource;
-use surfel_core::scene::{Background, ClipBox, ClipPlane};
 
 /// Reads and writes one kind of value.
 pub trait Rule<T> {
@@ -28,7 +25,7 @@ pub trait Rule<T> {
 /// Coordinates, lengths and factors stay below this: beyond, their squares are not finite in f32.
 pub const MAX_LENGTH: f64 = 1e15;
 
-fn expected(what: impl std::fmt::Display) -> Invalid {
+pub(super) fn expected(what: impl std::fmt::Display) -> Invalid {
     Invalid::new(format!("expected {what}"))
 }
 
@@ -372,188 +369,6 @@ impl Rule<(f64, f64)> for Interval {
     }
 }
 
-/// A linear colour, as `#RRGGBB`, `#RGB` or a name of CSS.
-pub struct Color;
-
-const COLOR: &str = "a colour as in #aabbcc or steelblue";
-
-impl Rule<Vec3> for Color {
-    fn read(&self, value: &Value, _: &Path) -> Result<Vec3, Invalid> {
-        let color = value.as_str().and_then(srgb_color);
-        color.map(to_linear).ok_or_else(|| expected(COLOR))
-    }
-
-    fn write(&self, value: &Vec3) -> Value {
-        json!(hex(*value))
-    }
-}
-
-/// Returns a colour by its hexadecimal digits or its CSS name, sRGB-encoded.
-pub fn srgb_color(text: &str) -> Option<[u8; 3]> {
-    let text = text.trim();
-    let is_hex = text.starts_with('#') && [4, 7].contains(&text.len());
-    let is_name = text.bytes().all(|byte| byte.is_ascii_alphabetic()) && text != "transparent";
-    let color = (is_hex || is_name).then(|| csscolorparser::parse(text).ok())??;
-    let [r, g, b, _] = color.to_rgba8();
-    Some([r, g, b])
-}
-
-fn to_linear(srgb: [u8; 3]) -> Vec3 {
-    Vec3::from_array(srgb.map(decode_srgb8))
-}
-
-fn hex(linear: Vec3) -> String {
-    let byte = |value: f32| (255.0 * encode_srgb(value)).round() as u8;
-    let [r, g, b] = linear.to_array().map(byte);
-    format!("#{r:02x}{g:02x}{b:02x}")
-}
-
-/// One colour, two from top to bottom, or the name of a background.
-pub struct BackgroundRule;
-
-/// Dark enough at the top for light stone to stand out, light enough at the bottom for dark things.
-const GRADIENT: [&str; 2] = ["#6f7c8a", "#c9ced3"];
-
-/// Returns the background of pictures that name none.
-pub fn default_background() -> Background {
-    let [top, bottom] = GRADIENT.map(|color| to_linear(srgb_color(color).unwrap_or_default()));
-    Background::Gradient { top, bottom }
-}
-
-impl Rule<Background> for BackgroundRule {
-    fn read(&self, value: &Value, _: &Path) -> Result<Background, Invalid> {
-        match value.as_str() {
-            Some("transparent") => return Ok(Background::Transparent),
-            Some("environment") => return Ok(Background::Environment),
-            Some("gradient") => return Ok(default_background()),
-            _ => {}
-        }
-        let colors = as_list(value);
-        let colors: Option<Vec<Vec3>> =
-            colors.iter().map(|color| color.as_str().and_then(srgb_color).map(to_linear)).collect();
-        match colors.as_deref() {
-            Some(&[plain]) => Ok(Background::Gradient { top: plain, bottom: plain }),
-            Some(&[top, bottom]) => Ok(Background::Gradient { top, bottom }),
-            _ => Err(expected(
-                "a colour as in #aabbcc or white, two colours (top, bottom), gradient, environment or transparent",
-            )),
-        }
-    }
-
-    fn write(&self, value: &Background) -> Value {
-        match *value {
-            Background::Transparent => json!("transparent"),
-            Background::Environment => json!("environment"),
-            Background::Gradient { top, bottom } => json!([hex(top), hex(bottom)]),
-        }
-    }
-}
-
-/// The source of colours of points: a column, a computed value, or one colour.
-pub struct ColorSourceRule;
-
-impl Rule<ColorSource> for ColorSourceRule {
-    fn read(&self, value: &Value, _: &Path) -> Result<ColorSource, Invalid> {
-        let text = value.as_str().unwrap_or_default().trim();
-        match srgb_color(text) {
-            Some(color) => Ok(ColorSource::Constant(color)),
-            None if text == "height" => Ok(ColorSource::Elevation),
-            None => text.parse().map_err(|_| {
-                expected(
-                    "rgb, intensity, elevation, class, normal, support, the name of a column, #RRGGBB or a colour's CSS name",
-                )
-            }),
-        }
-    }
-
-    fn write(&self, value: &ColorSource) -> Value {
-        json!(value.to_string())
-    }
-}
-
-/// A colour map by its matplotlib name.
-pub struct ColormapRule;
-
-impl Rule<Colormap> for ColormapRule {
-    fn read(&self, value: &Value, _: &Path) -> Result<Colormap, Invalid> {
-        Colormap::from_name(value.as_str().unwrap_or_default()).map_err(from_core)
-    }
-
-    fn write(&self, value: &Colormap) -> Value {
-        json!(value.to_string())
-    }
-}
-
-/// Bounds as `([x0,x1],[y0,y1],[z0,z1])`, as six numbers (low corner, high corner), or of any height with two ranges.
-pub struct ClipBoxRule;
-
-impl Rule<ClipBox> for ClipBoxRule {
-    fn read(&self, value: &Value, _: &Path) -> Result<ClipBox, Invalid> {
-        let wrong = || {
-            expected(
-                "two or three ranges from low to high as in ([0,10],[0,10],[2,5]), or six numbers x0,y0,z0,x1,y1,z1",
-            )
-        };
-        let any = [f64::NEG_INFINITY, f64::INFINITY];
-        let ranges = match (value.as_str().map(bracketed_ranges), as_numbers(value).as_deref()) {
-            (Some(Some(ranges)), _) => ranges,
-            (_, Some(&[x0, y0, z0, x1, y1, z1])) => vec![[x0, x1], [y0, y1], [z0, z1]],
-            _ => return Err(wrong()),
-        };
-        let ranges = match ranges[..] {
-            [x, y] => [x, y, any],
-            [x, y, z] => [x, y, z],
-            _ => return Err(wrong()),
-        };
-        if !ranges.iter().all(|[low, high]| low <= high) {
-            return Err(wrong());
-        }
-        let [low, high] = [0, 1].map(|end| DVec3::from_array(ranges.map(|range| range[end])));
-        Ok(ClipBox { min: low, max: high })
-    }
-
-    fn write(&self, value: &ClipBox) -> Value {
-        let ranges = value.min.to_array().into_iter().zip(value.max.to_array());
-        let finite = ranges.filter(|(low, high)| low.is_finite() && high.is_finite());
-        let ranges: Vec<String> = finite.map(|(low, high)| format!("[{low},{high}]")).collect();
-        json!(format!("({})", ranges.join(",")))
-    }
-}
-
-/// Reads `([low,high],[low,high])` and so on, as PDAL writes bounds.
-fn bracketed_ranges(text: &str) -> Option<Vec<[f64; 2]>> {
-    let inner = text.trim().strip_prefix('(')?.strip_suffix(')')?;
-    let words: Vec<&str> = inner.split(',').map(str::trim).collect();
-    let range = |words: &[&str]| {
-        let [low, high] = words else { return None };
-        let inner = [low.strip_prefix('[')?, high.strip_suffix(']')?].join(",");
-        <[f64; 2]>::try_from(as_numbers(&Value::String(inner))?).ok()
-    };
-    words.chunks(2).map(range).collect()
-}
-
-/// A plane as six numbers: one of its points, and the normal, which points to the hidden side.
-pub struct ClipPlaneRule;
-
-impl Rule<ClipPlane> for ClipPlaneRule {
-    fn read(&self, value: &Value, _: &Path) -> Result<ClipPlane, Invalid> {
-        let numbers = as_numbers(value).filter(|numbers| numbers.len() == 6);
-        let numbers =
-            numbers.ok_or_else(|| expected("a point and a normal as in [0,0,5,0,0,1]"))?;
-        let [point, normal] = [0, 3].map(|first| DVec3::from_slice(&numbers[first..]));
-        let length_error = (normal.length_squared() - 1.0).abs();
-        let unit = if length_error < 1e-6 { Some(normal) } else { normal.try_normalize() };
-        match unit {
-            Some(normal) => Ok(ClipPlane { point, normal }),
-            None => Err(expected("a normal other than 0,0,0")),
-        }
-    }
-
-    fn write(&self, value: &ClipPlane) -> Value {
-        json!([value.point.to_array(), value.normal.to_array()].concat())
-    }
-}
-
 /// A list of values of one rule.
 pub struct List<R> {
     /// The rule of the elements.
@@ -606,15 +421,30 @@ pub fn as_list(value: &Value) -> Vec<Value> {
 }
 
 #[cfg(test)]
-mod tests {
-    //! Values are read as people write them, nonsense is refused, and what is written reads back equal.
+pub(super) mod tests_of_rules {
+    //! What tests of rules have in common.
 
     use super::*;
 
-    fn read<T, R: Rule<T>>(rule: R, text: &str) -> Result<T, String> {
+    /// Reads a value as JSON or as text.
+    pub fn read<T, R: Rule<T>>(rule: R, text: &str) -> Result<T, String> {
         let value = serde_json::from_str(text).unwrap_or_else(|_| json!(text));
         rule.read(&value, Path::new("")).map_err(|error| error.to_string())
     }
+
+    /// Checks that the value that a text says reads back equal when written.
+    pub fn check<T: PartialEq + std::fmt::Debug>(rule: impl Rule<T>, text: &str) {
+        let value = rule.read(&json!(text), Path::new("")).unwrap();
+        assert_eq!(rule.read(&rule.write(&value), Path::new("")), Ok(value), "{text}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Values are read as people write them, nonsense is refused, and what is written reads back equal.
+
+    use super::tests_of_rules::{check, read};
+    use super::*;
 
     #[test]
     fn values_are_read_in_all_spellings() {
@@ -625,21 +455,7 @@ mod tests {
         for text in ["64x48", "64,48", "[64, 48]"] {
             assert_eq!(read(Resolution, text), Ok((64, 48)), "{text}");
         }
-        assert_eq!(read(BackgroundRule, "transparent"), Ok(Background::Transparent));
-        assert_eq!(read(BackgroundRule, "#fff"), read(BackgroundRule, "white,WHITE"));
         assert_eq!(read(Interval, "-1,2"), Ok((-1.0, 2.0)));
-        assert_eq!(read(Color, "tomato"), read(Color, "#ff6347"));
-        assert_eq!(read(ColorSourceRule, "height"), Ok(ColorSource::Elevation));
-        assert_eq!(read(ColorSourceRule, "red"), Ok(ColorSource::Constant([255, 0, 0])));
-        assert_eq!(read(ColorSourceRule, "Redness"), Ok(ColorSource::Column("Redness".into())));
-        let (low, high) = (DVec3::new(0.0, -2.0, 4e5), DVec3::new(1.0, 3.5, 5e5));
-        for text in [" ( [0, 1],[-2,3.5] , [4e5,5e5] ) ", "0,-2,4e5,1,3.5,5e5"] {
-            assert_eq!(read(ClipBoxRule, text), Ok(ClipBox { min: low, max: high }), "{text}");
-        }
-        let (low, high) = (low.with_z(f64::NEG_INFINITY), high.with_z(f64::INFINITY));
-        assert_eq!(read(ClipBoxRule, "([0,1],[-2,3.5])"), Ok(ClipBox { min: low, max: high }));
-        let plane = ClipPlane { point: DVec3::new(1.0, 2.0, 3.0), normal: DVec3::NEG_Z };
-        assert_eq!(read(ClipPlaneRule, "1,2,3,0,0,-2"), Ok(plane));
     }
 
     #[test]
@@ -650,19 +466,6 @@ mod tests {
         for text in ["0x0", "x", "1920", "-1x5", "100000x100000", "5x"] {
             assert!(read(Resolution, text).is_err(), "{text}");
         }
-        for text in ["", "0,1,0,1", "[0,1],[0,1]", "([0,1])", "([1,0],[0,1])", "()", "5,0,0,1,1,1"]
-        {
-            assert!(read(ClipBoxRule, text).is_err(), "{text}");
-        }
-        for text in ["([0,1],[0,NaN])", "([0 1],[0,1])", "([0,1],0,1])", "([0,1],[0,1],)"] {
-            assert!(read(ClipBoxRule, text).is_err(), "{text}");
-        }
-        for text in ["", "0,0,1", "0,0,0,0,0,0", "0,0,0,0,0,x", "0,0,0,0,0,1,2"] {
-            assert!(read(ClipPlaneRule, text).is_err(), "{text}");
-        }
-        for text in ["", "#12", "reddish", "#fff,#fff,#fff"] {
-            assert!(read(BackgroundRule, text).is_err(), "{text}");
-        }
         assert!(read(Axis, "W").is_err() && read(Direction, "0,0,0").is_err());
         assert!(read(Interval, "1,1").is_err() && read(POSITIVE, "0").is_err());
         assert!(read(POSITIVE, "NaN").is_err() && read(POSITIVE, "inf").is_err());
@@ -670,17 +473,8 @@ mod tests {
 
     #[test]
     fn written_values_read_back_equal() {
-        fn check<T: PartialEq + std::fmt::Debug>(rule: impl Rule<T>, text: &str) {
-            let value = rule.read(&json!(text), Path::new("")).unwrap();
-            assert_eq!(rule.read(&rule.write(&value), Path::new("")), Ok(value), "{text}");
-        }
         check(Vector, "0.1,1e-7,562326.8");
         check(Direction, "1,2,3");
         check(Axis, "1,2,3");
-        check(Color, "#89abcd");
-        check(BackgroundRule, "#123456,#fedcba");
-        check(ClipBoxRule, "([0.1,0.3],[-2,3.5])");
-        check(ClipPlaneRule, "1,2,3,1,1,1");
-        check(ColorSourceRule, "surface_variation");
     }
 }
