@@ -422,7 +422,7 @@ pub fn as_list(value: &Value) -> Vec<Value> {
 
 #[cfg(test)]
 pub(super) mod tests_of_rules {
-    //! What tests of rules have in common.
+    //! Functions for the tests of all rules.
 
     use super::*;
 
