@@ -1,7 +1,7 @@
 //! `surfel animate`: a movie of an animated scene, frame by frame, or of a turn around anything.
 
 use crate::global::{Global, start_threads};
-use crate::options::{EVERYWHERE, Scope};
+use crate::options::{EVERYWHERE, PLANS, Scope};
 use crate::render::{report_threads, with_info};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
@@ -33,7 +33,7 @@ pub struct Args {
 
 impl Scope for Args {
     fn has(heading: &str, path: &str) -> bool {
-        heading != EVERYWHERE && !["output", "time"].contains(&path)
+        ![EVERYWHERE, PLANS].contains(&heading) && !["output", "time"].contains(&path)
     }
 }
 

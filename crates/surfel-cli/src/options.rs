@@ -24,6 +24,8 @@ pub struct KeyOptions<S> {
 
 /// Heading of the options that all commands have.
 pub const EVERYWHERE: &str = "Everywhere";
+/// Heading of the options of plans, which only pictures have.
+pub const PLANS: &str = "Plans to scale";
 
 /// The keys of a scope with their paths and headings.
 fn keys<S: Scope>() -> impl Iterator<Item = (String, &'static str, Key)> {

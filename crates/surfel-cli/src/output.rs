@@ -14,6 +14,17 @@ pub fn check_output(path: &Path) -> anyhow::Result<()> {
     check_is_file(path)
 }
 
+/// Fails where a height map could not be written, or would take the place of the picture.
+pub fn check_height_map(path: &Path, picture: &Path) -> anyhow::Result<()> {
+    surfel_formats::check_height_map(path)?;
+    check_is_file(path)?;
+    if is_same_file(path, picture) {
+        let text = "picture and height map have the same name; name another file for one";
+        return Err(Usage(text.into()).into());
+    }
+    Ok(())
+}
+
 /// Fails where the numbers of a run would take the place of the picture, or of what it is made from.
 pub fn check_stats(
     stats: &Path,

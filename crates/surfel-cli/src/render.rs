@@ -2,7 +2,7 @@
 
 use crate::global::{Global, start_threads};
 use crate::options::{EVERYWHERE, Scope};
-use crate::output::{check_output, check_stats};
+use crate::output::{check_height_map, check_output, check_stats};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
 use crate::stats::{self, RunStats, Seconds};
@@ -42,7 +42,8 @@ const EXAMPLES: &str = "\
 Examples:
   surfel render scan.laz -o scan.png
   surfel render scan.laz -o close.png --camera-azimuth-angle 60 --camera-zoom-factor 1.5
-  surfel render scan.laz -o map.png --camera-direction 0,0,-1 --camera-orthographic
+  surfel render scan.laz -o plan.tif --gsd 0.1 --height-map heights.tif
+  surfel render facade.e57 -o elevation.png --scale 1:50 --camera-elevation-angle 0
   surfel render scan.laz -o classes.png --color class --light sky
   surfel render north.las south.las -o heights.png --color elevation --cmap terrain
   surfel render 'tiles/*.laz' -o tiles.png
@@ -75,6 +76,9 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     if let Some(stats) = &args.stats {
         check_stats(stats, &output, &args.scene.files, &description)?;
     }
+    if let Some(heights) = &description.plan.height_map {
+        check_height_map(heights, &output)?;
+    }
     render_to_file(&description, &output, args.stats.as_deref(), report)
 }
 
@@ -100,10 +104,16 @@ pub fn render_to_file(
     report.end();
     report.check()?;
     report_coverage(&image, report);
+    let heights = description.plan.height_map.as_deref();
+    let heights = heights.map(|path| Ok((path, scene.height_map(report)?)));
+    let heights = heights.transpose().map_err(|error: surfel::Error| error)?;
     image.save(output)?;
+    if let (Some((path, map)), Some(place)) = (heights, scene.georeference()) {
+        surfel_formats::save_height_map(path, &map, place)?;
+    }
     if let Some(path) = stats {
         seconds.total = start.elapsed().as_secs_f64();
-        let resolution = description.picture.resolution();
+        let resolution = scene.description().picture.resolution();
         let (flat, simd) = (scene.flat(), scene.simd());
         let run = RunStats { flat, counts, seconds, rendered, resolution, simd };
         stats::write(path, &run.json())?;

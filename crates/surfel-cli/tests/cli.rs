@@ -20,6 +20,8 @@ mod inputs;
 mod materials;
 #[path = "cli/pictures.rs"]
 mod pictures;
+#[path = "cli/plans.rs"]
+mod plans;
 #[path = "cli/scenes.rs"]
 mod scenes;
 #[path = "cli/deformation.rs"]

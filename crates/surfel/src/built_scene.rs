@@ -1,10 +1,11 @@
 //! A scene with its trees, shown at one time after another: what moves is moved, everything else stays.
 
 use crate::choice_log::{CancelOnly, Choice};
+use crate::crs::CoordinateSystem;
 use crate::description::{Exposure, SceneDescription};
 use crate::error::Result;
 use crate::overlay::Overlay;
-use crate::picture::RenderedImage;
+use crate::picture::{RenderedImage, georeference, image_options};
 use crate::resolve::{Resolved, SceneCamera, Sequence, automatic_exposure, expose, expose_lamps};
 use surfel_core::flat::{FlatPunctualLight, FlatScene};
 use surfel_core::math::{DQuat, Vec3};
@@ -12,6 +13,7 @@ use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::render::{CpuRenderer, RenderStats, Renderer, Settings};
 use surfel_core::scene::{Camera, ClipPlane, Geometry, Graph, Light, Room};
 use surfel_core::trace::Simd;
+use surfel_formats::Georeference;
 
 /// A scene with its trees: it renders, casts rays, and moves to any time.
 #[derive(Debug)]
@@ -24,6 +26,7 @@ pub struct BuiltScene {
     /// The room on a turntable, whose walls before the camera are hidden.
     turned_room: Option<Room>,
     overlay: Overlay,
+    system: Option<CoordinateSystem>,
     up: Vec3,
     /// Lights before a turntable turns them.
     lights: Vec<Light>,
@@ -58,7 +61,7 @@ impl Resolved {
     /// Fails for scenes that no picture can be made of, and if cancelled.
     pub fn build_trees(self, progress: &dyn Progress) -> Result<BuiltScene> {
         let Self { scene, settings, description, choices, sequences, .. } = self;
-        let Self { camera, turned_room, overlay, up, .. } = self;
+        let Self { camera, turned_room, overlay, system, up, .. } = self;
         let mut flat = FlatScene::new(&scene, progress)?;
         flat.camera_planes = planes_before(turned_room.as_ref(), &flat.camera);
         progress.end();
@@ -75,6 +78,7 @@ impl Resolved {
             camera,
             turned_room,
             overlay,
+            system,
             up,
             lights,
             lamps,
@@ -196,6 +200,12 @@ impl BuiltScene {
         self.flat.punctual_lights = lamps.collect();
     }
 
+    /// Returns where the pixels of the picture lie, if the camera looks straight down without perspective.
+    pub fn georeference(&self) -> Option<Georeference> {
+        let size = (self.settings.width, self.settings.height);
+        georeference(&self.flat.camera, size, self.system.as_ref())
+    }
+
     /// Renders the picture of the current time.
     ///
     /// # Errors
@@ -213,7 +223,9 @@ impl BuiltScene {
     pub fn render_with(&self, progress: &dyn Progress) -> Result<(RenderedImage, RenderStats)> {
         let (mut image, stats) = self.renderer.render(&self.flat, &self.settings, progress)?;
         self.overlay.draw(&mut image, &self.flat.camera);
-        Ok((RenderedImage::new(image, &self.description, self.flat.origin), stats))
+        let mut options = image_options(&self.description, self.flat.origin);
+        options.georeference = self.georeference().filter(|_| self.description.plan.is_to_scale());
+        Ok((RenderedImage::new(image, options), stats))
     }
 }
 

@@ -57,6 +57,7 @@
 //! The renderer itself is the crate [`surfel_core`], the readers and writers are [`surfel_formats`].
 
 pub mod names;
+pub mod crs;
 mod troubleshooting;
 pub mod description;
 mod error;
@@ -68,6 +69,7 @@ pub mod picture;
 mod cache;
 mod built_scene;
 mod raycast;
+mod height_map;
 pub mod animate;
 pub mod live_scene;
 

@@ -2,12 +2,13 @@
 
 use crate::built_scene::{exposure_stops, planes_before, source_indices};
 use crate::cache::{Lru2, hash_of};
+use crate::crs::Unit;
 use crate::description::{Exposure, Interior, Invalid, LightKind, SceneDescription, write_parts};
 use crate::error::{Error, Result};
 use crate::overlay::Overlay;
 use crate::resolve::{
-    AutoSettings, KeepOptions, LoadedScene, common_legend, expose, finish_graph, hide_walls,
-    render_settings,
+    AutoSettings, KeepOptions, LoadedScene, common_legend, coordinate_system, expose, finish_graph,
+    hide_walls, render_settings,
 };
 use serde_json::{Value, json};
 use std::sync::{Arc, OnceLock};
@@ -61,6 +62,8 @@ pub struct LiveView {
     pub description: SceneDescription,
     /// True if the scene moves the camera.
     pub moves_camera: bool,
+    /// Unit of the coordinates.
+    unit: Unit,
     /// The trees, which several views share.
     pub trees: Arc<SceneTrees>,
 }
@@ -74,7 +77,8 @@ impl LiveView {
     pub fn overlay(&self, progress: &dyn Progress) -> Result<Overlay> {
         let up = self.description.world.up.unwrap_or(Vec3::Z);
         let legend = self.trees.legend.clone();
-        Ok(Overlay::new(&self.description.picture, legend, &self.flat.camera, up, progress)?)
+        let (picture, camera) = (&self.description.picture, &self.flat.camera);
+        Ok(Overlay::new(picture, legend, camera, (up, self.unit), progress)?)
     }
 }
 
@@ -139,7 +143,9 @@ impl LiveScene {
         expose(&mut flat, stops);
         complete.light.exposure = Some(Exposure::Stops(stops.into()));
         let moves_camera = auto.moves_camera(&self.loaded);
-        Ok(LiveView { flat, settings, description: complete, moves_camera, trees })
+        let system = coordinate_system(&self.loaded, description);
+        let unit = system.map_or(Unit::Unknown, |system| system.unit());
+        Ok(LiveView { flat, settings, description: complete, moves_camera, unit, trees })
     }
 
     /// Renders a view on the threads of the preparation.

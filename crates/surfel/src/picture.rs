@@ -1,13 +1,14 @@
 //! Rendered pictures and the files that they are saved to.
 
+use crate::crs::{CoordinateSystem, Unit};
 use crate::description::SceneDescription;
 use crate::error::Result;
 use std::ops::Deref;
 use std::path::Path;
 use surfel_core::image::Image;
 use surfel_core::math::DVec3;
-use surfel_core::scene::Background;
-use surfel_formats::{Alpha, ImageOptions};
+use surfel_core::scene::{Background, Camera, Projection};
+use surfel_formats::{Alpha, Georeference, ImageOptions};
 
 /// A rendered picture: linear colours and layers, and how they become a file.
 #[derive(Clone, Debug)]
@@ -17,12 +18,13 @@ pub struct RenderedImage {
 }
 
 impl RenderedImage {
-    /// A picture that is saved as its description says.
-    pub(crate) fn new(image: Image, description: &SceneDescription, origin: DVec3) -> Self {
-        Self { image, options: image_options(description, origin) }
+    /// A picture that is saved with these options.
+    pub(crate) fn new(image: Image, options: ImageOptions) -> Self {
+        Self { image, options }
     }
 
-    /// Writes the picture: for display as `.png`, `.jpg`, `.webp` or `.tif`, with all layers as `.exr`. The file is replaced once it is complete.
+    /// Writes the picture: for display as `.png`, `.jpg`, `.webp` or `.tif`, with all layers as `.exr`. The file is
+    /// replaced once it is complete. A plan to scale is a GeoTIFF, or gets a world file beside it.
     ///
     /// # Errors
     ///
@@ -56,5 +58,32 @@ pub fn image_options(description: &SceneDescription, origin: DVec3) -> ImageOpti
         depth: description.picture.bit_depth(),
         alpha: if is_opaque { Alpha::Drop } else { Alpha::Keep },
         origin,
+        dpi: description.plan.stated_dpi(),
+        georeference: None,
     }
+}
+
+/// Returns where the pixels of a camera's picture lie, if it looks straight down without perspective.
+pub(crate) fn georeference(
+    camera: &Camera,
+    (width, height): (u32, u32),
+    system: Option<&CoordinateSystem>,
+) -> Option<Georeference> {
+    let Projection::Orthographic { height: shown } = camera.projection else { return None };
+    let [right, up, forward] = camera.axes();
+    if 1e-9 < (forward + DVec3::Z).length() {
+        return None;
+    }
+    let pixel_size = shown / f64::from(height);
+    let [right, down] = [right, -up].map(|axis| [axis.x, axis.y].map(|x| pixel_size * x + 0.0));
+    let middle = [camera.position.x, camera.position.y];
+    let half = [0.5 * f64::from(width), 0.5 * f64::from(height)];
+    let corner = [0, 1].map(|i| middle[i] - half[0] * right[i] - half[1] * down[i]);
+    Some(Georeference {
+        corner,
+        right,
+        down,
+        epsg: system.and_then(CoordinateSystem::epsg),
+        is_geographic: system.is_some_and(|system| system.unit() == Unit::Degrees),
+    })
 }

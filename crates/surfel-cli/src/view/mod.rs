@@ -8,7 +8,7 @@ mod page_settings;
 mod scene_provider;
 
 use crate::global::{Global, start_threads};
-use crate::options::{EVERYWHERE, Scope};
+use crate::options::{EVERYWHERE, PLANS, Scope};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
 use anyhow::anyhow;
@@ -52,7 +52,7 @@ pub struct Args {
 
 impl Scope for Args {
     fn has(heading: &str, _: &str) -> bool {
-        ![EVERYWHERE, "Output"].contains(&heading)
+        ![EVERYWHERE, PLANS, "Output"].contains(&heading)
     }
 }
 

@@ -17,7 +17,7 @@ pub const EVERYTHING: &str = "*";
 pub fn shown(description: SceneDescription) -> SettingsMap {
     let mut shown = description.with_content_of(&SceneDescription::default());
     shown.output = OutputSettings { time: shown.output.time, ..OutputSettings::default() };
-    (shown.run, shown.picture.bit_depth) = Default::default();
+    (shown.run, shown.plan, shown.picture.bit_depth) = Default::default();
     shown.to_table()
 }
 
@@ -32,7 +32,8 @@ pub fn read(startup: &SceneDescription, settings: &SettingsMap) -> Result<SceneD
     if matches!(crop, Some(Crop::File(_))) && page.get("crop") != startup.get("crop") {
         return Err(Error::invalid_value("crop", "a page cannot name a file"));
     }
-    let mut hidden = write_table(&page.output).into_iter().chain(write_table(&page.run));
+    let hidden = write_table(&page.output).into_iter().chain(write_table(&page.run));
+    let mut hidden = hidden.chain(write_table(&page.plan));
     if let Some((key, _)) = hidden.find(|(key, _)| key != "time") {
         return Err(Error::invalid_value(key, "is not a setting of a page"));
     }

@@ -1,11 +1,10 @@
-//! Writes JPEG, WebP and TIFF: pictures to be looked at, by the encoders of the crate `image`.
+//! Writes JPEG and WebP: pictures to be looked at, by the encoders of the crate `image`.
 
 use std::borrow::Cow;
 use std::io::{self, Cursor};
 use std::path::Path;
 
-use image::codecs::jpeg::JpegEncoder;
-use image::codecs::tiff::TiffEncoder;
+use image::codecs::jpeg::{JpegEncoder, PixelDensity};
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder, ImageResult};
 use surfel_core::image::Image;
@@ -25,8 +24,6 @@ pub(super) enum DisplayFormat {
     Jpeg,
     /// 8 bits per channel, lossless.
     WebP,
-    /// 8 or 16 bits per channel, uncompressed.
-    Tiff,
 }
 
 impl DisplayFormat {
@@ -35,7 +32,6 @@ impl DisplayFormat {
         Some(match extension {
             "jpg" | "jpeg" => Self::Jpeg,
             "webp" => Self::WebP,
-            "tif" | "tiff" => Self::Tiff,
             _ => return None,
         })
     }
@@ -56,34 +52,27 @@ pub(super) fn write(
 }
 
 fn encode(image: &Image, options: &ImageOptions, format: DisplayFormat) -> ImageResult<Vec<u8>> {
-    let depth = if format == DisplayFormat::Tiff { options.depth } else { BitDepth::Eight };
     let (image, alpha) = match (format, options.alpha) {
         (DisplayFormat::Jpeg, Alpha::Keep) => (Cow::Owned(over_white(image)), Alpha::Drop),
         (_, alpha) => (Cow::Borrowed(image), alpha),
     };
-    let mut samples = samples(&image, &ImageOptions { depth, alpha, ..*options });
-    let color = match (alpha, depth) {
-        (Alpha::Drop, BitDepth::Eight) => ExtendedColorType::Rgb8,
-        (Alpha::Keep, BitDepth::Eight) => ExtendedColorType::Rgba8,
-        (Alpha::Drop, BitDepth::Sixteen) => ExtendedColorType::Rgb16,
-        (Alpha::Keep, BitDepth::Sixteen) => ExtendedColorType::Rgba16,
+    let samples = samples(&image, &ImageOptions { depth: BitDepth::Eight, alpha, ..*options });
+    let color = match alpha {
+        Alpha::Drop => ExtendedColorType::Rgb8,
+        Alpha::Keep => ExtendedColorType::Rgba8,
     };
-    if depth == BitDepth::Sixteen {
-        // PNG has the most significant byte first, the encoder takes the machine's order.
-        for sample in samples.as_chunks_mut().0 {
-            *sample = u16::from_be_bytes(*sample).to_ne_bytes();
-        }
-    }
     let mut file = Cursor::new(Vec::new());
     let (width, height) = (image.width, image.height);
     match format {
-        DisplayFormat::Jpeg => JpegEncoder::new_with_quality(&mut file, JPEG_QUALITY)
-            .write_image(&samples, width, height, color)?,
+        DisplayFormat::Jpeg => {
+            let mut encoder = JpegEncoder::new_with_quality(&mut file, JPEG_QUALITY);
+            if let Some(dpi) = options.dpi {
+                encoder.set_pixel_density(PixelDensity::dpi(dpi.round() as u16));
+            }
+            encoder.write_image(&samples, width, height, color)?;
+        }
         DisplayFormat::WebP => {
             WebPEncoder::new_lossless(&mut file).write_image(&samples, width, height, color)?;
-        }
-        DisplayFormat::Tiff => {
-            TiffEncoder::new(&mut file).write_image(&samples, width, height, color)?;
         }
     }
     Ok(file.into_inner())

@@ -1,24 +1,31 @@
 //! Image writers: PNG, JPEG, WebP and TIFF for display, OpenEXR with all layers.
 
+mod georeference;
 mod options;
 mod exr;
 pub(crate) mod png;
 mod display;
+mod tiff;
 
+pub use self::georeference::{EpsgCodes, Georeference};
 pub use self::options::{Alpha, BitDepth, ImageOptions};
 pub use self::png::encode_png;
+pub use self::tiff::{HeightMap, check_height_map, save_height_map};
 
 use std::path::Path;
 
 use surfel_core::image::Image;
 
 use self::display::DisplayFormat;
+use self::georeference::world_file_extension;
 use crate::error::Result;
-use crate::file::{check_output, extension, unsupported_extension};
+use crate::file::{check_output, extension, save_text, unsupported_extension};
 
 const ADVICE: &str = "surfel writes images as .png, .jpg, .webp, .tif and .exr";
 
 /// Writes `image` to a .png, .jpg, .webp, .tif or .exr file, or as PNG to the standard output if `path` is `-`.
+///
+/// A picture for display that has a [`Georeference`] and is not a TIFF gets a world file beside it, as `plan.pgw`.
 ///
 /// # Errors
 ///
@@ -27,12 +34,27 @@ pub fn save_image(path: &Path, image: &Image, options: &ImageOptions) -> Result<
     check_output(path)?;
     let extension = extension(path);
     if let Some(format) = DisplayFormat::from_extension(&extension) {
-        return display::write(path, image, options, format);
+        display::write(path, image, options, format)?;
+        return write_world_file(path, &extension, options);
     }
     match extension.as_str() {
-        "png" => png::write(path, image, options),
+        "png" => {
+            png::write(path, image, options)?;
+            write_world_file(path, &extension, options)
+        }
         "exr" => exr::write(path, image, options),
+        "tif" | "tiff" => tiff::write(path, image, options),
         _ if path == Path::new("-") => png::write_to_stdout(image, options),
         _ => Err(unsupported_extension(path, ADVICE)),
+    }
+}
+
+fn write_world_file(path: &Path, extension: &str, options: &ImageOptions) -> Result<()> {
+    match &options.georeference {
+        Some(georeference) => {
+            let beside = path.with_extension(world_file_extension(extension));
+            save_text(&beside, &georeference.world_file())
+        }
+        None => Ok(()),
     }
 }

@@ -2,6 +2,8 @@
 
 use surfel_core::math::DVec3;
 
+use super::georeference::Georeference;
+
 /// Encoding of an image file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImageOptions {
@@ -11,6 +13,10 @@ pub struct ImageOptions {
     pub alpha: Alpha,
     /// World coordinates of the origin of the position layer, written to the header of EXR files.
     pub origin: DVec3,
+    /// Pixels per inch at which the picture is to be printed, written to PNG, JPEG and TIFF files.
+    pub dpi: Option<f64>,
+    /// Where a plan lies, written to TIFF files.
+    pub georeference: Option<Georeference>,
 }
 
 /// Bits per channel of a PNG or TIFF file.

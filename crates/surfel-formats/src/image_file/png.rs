@@ -73,6 +73,14 @@ pub(crate) fn encoder<W: Write>(
     encoder.set_color(color);
     encoder.set_depth(depth);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    encoder.set_pixel_dims(options.dpi.map(|dpi| {
+        let pixels_per_metre = (dpi / 0.0254).round() as u32;
+        png::PixelDimensions {
+            xppu: pixels_per_metre,
+            yppu: pixels_per_metre,
+            unit: png::Unit::Meter,
+        }
+    }));
     encoder
 }
 

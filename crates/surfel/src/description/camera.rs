@@ -2,9 +2,11 @@
 
 use super::Invalid;
 use super::keys::settings;
+use super::place::{CrsRule, PlaceRule};
 use super::rule::{
     Axis, Checked, Direction, Flag, OneOf, POSITIVE, Rule, Text, VIEW_ANGLE, Vector, number,
 };
+use crate::crs::Place;
 use serde_json::{Value, json};
 use std::path::Path;
 use surfel_core::math::{DVec3, Vec3};
@@ -73,10 +75,15 @@ settings! {
 }
 
 settings! {
-    /// Directions of the world.
+    /// Directions of the world, and where on Earth it is.
     pub struct WorldSettings {
         /// Axis that points up: +Z, -Y or x,y,z [default: found from the data].
         up: Vec3, Axis, "AXIS", common;
+        /// Coordinate reference system of the coordinates, as in EPSG:25832 [default: that of the files]. It tells the
+        /// unit, and where the sun of --sun stands.
+        crs: String, CrsRule, "CRS";
+        /// Latitude and longitude in degrees, for the sun of --sun [default: by the coordinate system].
+        place: Place, PlaceRule, "LAT,LON";
     }
 }
 

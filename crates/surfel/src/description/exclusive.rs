@@ -42,6 +42,30 @@ const EXCLUSIVE: &[(&str, &[&str])] = &[
             "camera.zoom_factor",
         ],
     ),
+    (
+        "gsd",
+        &[
+            "scale",
+            "camera.orthographic",
+            "camera.panorama",
+            "camera.station",
+            "camera.name",
+            "camera.zoom_factor",
+            "camera.view_angle",
+        ],
+    ),
+    (
+        "scale",
+        &[
+            "camera.orthographic",
+            "camera.panorama",
+            "camera.station",
+            "camera.name",
+            "camera.zoom_factor",
+            "camera.view_angle",
+        ],
+    ),
+    ("sun.date", &["sun.azimuth", "sun.elevation"]),
     ("normals_k", &["normals_radius"]),
 ];
 

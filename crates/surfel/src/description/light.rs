@@ -2,7 +2,9 @@
 
 use super::keys::settings;
 use super::picture::{Exposure, ExposureRule, GAIN};
+use super::place::DateRule;
 use super::rule::{FilePath, OneOf, POSITIVE, SeveralOf, number};
+use chrono::{DateTime, FixedOffset};
 use std::path::PathBuf;
 
 /// A light of the whole scene.
@@ -46,6 +48,9 @@ settings! {
 settings! {
     /// The sun.
     pub struct SunSettings {
+        /// Puts the sun where it stands at a date and time, as in 2026-06-21T15:00+02:00. The place follows from the
+        /// coordinate system of the file or of --crs, or is given by --place.
+        date: DateTime<FixedOffset>, DateRule, "DATE";
         /// Direction of the sun in degrees clockwise from north [default: behind the camera, to the left].
         azimuth: f64, number(-360.0, 360.0), "DEG";
         /// Height of the sun above the horizon in degrees.

@@ -22,6 +22,8 @@ mod object_settings;
 mod option;
 pub mod pattern;
 mod picture;
+mod place;
+mod plan;
 mod point_filter;
 pub mod rule;
 
@@ -39,6 +41,7 @@ pub use object::{ObjectDescription, Placement, Rotation};
 pub use object_settings::{ColorSettings, ObjectSettings, PreparationSettings, SurfaceSettings};
 pub use option::{option_name, value_text};
 pub use picture::{Backend, Exposure, OutputSettings, PictureSettings, RunSettings};
+pub use plan::PlanSettings;
 pub use point_filter::Returns;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -60,6 +63,8 @@ pub struct SceneDescription {
     pub output: OutputSettings,
     /// Size, quality and background of the picture.
     pub picture: PictureSettings,
+    /// Plans to scale.
+    pub plan: PlanSettings,
     /// The camera.
     pub camera: CameraSettings,
     /// Directions of the world.
@@ -120,13 +125,14 @@ impl SceneDescription {
     }
 
     /// Returns the parts with their keys.
-    pub fn parts(&self) -> [Part<&dyn KeyedSettings>; 12] {
+    pub fn parts(&self) -> [Part<&dyn KeyedSettings>; 13] {
         let [surface, preparation, color] = self.objects_default.parts();
         let part = |heading, prefix, settings| Part { heading, prefix, settings };
         [
             part("Output", "", &self.output as &dyn KeyedSettings),
             part("Picture", "", &self.picture),
             surface,
+            part("Plans to scale", "", &self.plan),
             part("Camera (in the file's own coordinates)", "camera.", &self.camera),
             part("World", "", &self.world),
             part("Light", "", &self.light),
@@ -139,12 +145,13 @@ impl SceneDescription {
         ]
     }
 
-    fn parts_mut(&mut self) -> [(&'static str, &mut dyn KeyedSettings); 12] {
+    fn parts_mut(&mut self) -> [(&'static str, &mut dyn KeyedSettings); 13] {
         let ObjectSettings { surface, preparation, color } = &mut self.objects_default;
         [
             ("", &mut self.output),
             ("", &mut self.picture),
             ("", surface),
+            ("", &mut self.plan),
             ("camera.", &mut self.camera),
             ("", &mut self.world),
             ("", &mut self.light),
@@ -251,6 +258,7 @@ impl SceneDescription {
         }
         self.output.overlay(&over.output);
         self.picture.overlay(&over.picture);
+        self.plan.overlay(&over.plan);
         self.camera.overlay(&over.camera);
         self.world.overlay(&over.world);
         self.light.overlay(&over.light);

@@ -4,8 +4,13 @@ use super::SceneDescription;
 use serde_json::Value;
 
 /// Returns the name of the option for the path of a key: `camera-view-angle` for `camera.view_angle`.
+///
+/// The date of the sun is the option `sun`; a scene file may say so too.
 pub fn option_name(path: &str) -> String {
-    path.replace(['.', '_'], "-")
+    match path {
+        "sun.date" => "sun".to_owned(),
+        path => path.replace(['.', '_'], "-"),
+    }
 }
 
 /// Writes a value as it is typed.

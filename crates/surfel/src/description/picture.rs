@@ -77,7 +77,7 @@ settings! {
 }
 
 /// A path that starts where the program runs, not where the scene file lies.
-struct OutputPath;
+pub(super) struct OutputPath;
 
 impl Rule<PathBuf> for OutputPath {
     fn read(&self, value: &Value, _: &Path) -> Result<PathBuf, Invalid> {

@@ -8,6 +8,7 @@ use canvas::{Area, Canvas, Ink, cut_to_width, text_width};
 use legend_block::LegendBlock;
 use ticks::round_step;
 
+use crate::crs::Unit;
 use crate::description::{Invalid, PictureSettings};
 use surfel_core::image::Image;
 use surfel_core::math::Vec3;
@@ -21,6 +22,8 @@ pub struct Overlay {
     legend: Option<LegendBlock>,
     caption: Option<String>,
     has_scale_bar: bool,
+    /// Unit of the coordinates.
+    unit: Unit,
     /// Direction of north if an arrow shows it.
     north: Option<Vec3>,
     /// True if the legend stays in its corner, as in movies.
@@ -43,7 +46,8 @@ const PANEL_OPACITY: f32 = 0.65;
 const ARROW_LENGTH: f32 = 3.0;
 
 impl Overlay {
-    /// The overlay that settings ask for. `camera` is the one of the first picture.
+    /// The overlay that settings ask for. `camera` is the one of the first picture; `up` and `unit` are those of the
+    /// coordinates.
     ///
     /// # Errors
     ///
@@ -53,7 +57,7 @@ impl Overlay {
         picture: &PictureSettings,
         legend: Legend,
         camera: &Camera,
-        up: Vec3,
+        (up, unit): (Vec3, Unit),
         progress: &dyn Progress,
     ) -> Result<Self, Invalid> {
         let is_orthographic = matches!(camera.projection, Projection::Orthographic { .. });
@@ -76,6 +80,7 @@ impl Overlay {
             legend,
             caption: picture.caption.clone(),
             has_scale_bar: picture.scale_bar(),
+            unit,
             north,
             is_fixed: false,
         })
@@ -102,7 +107,7 @@ impl Overlay {
         if let (true, Projection::Orthographic { height: shown }) =
             (self.has_scale_bar, camera.projection)
         {
-            draw_scale_bar(&mut canvas, size, f64::from(height) / shown, &layout);
+            draw_scale_bar(&mut canvas, size, f64::from(height) / shown, self.unit, &layout);
             taken.push((true, true));
         }
         if let Some(direction) = self.north.and_then(|north| arrow(camera, north)) {
@@ -171,19 +176,19 @@ fn draw_text(canvas: &mut Canvas, text: &str, size: f32, layout: &Layout) -> Are
 }
 
 /// Draws a bar of a round length, about a fifth of the picture's width, at the lower right.
-fn draw_scale_bar(canvas: &mut Canvas, size: f32, pixels_per_unit: f64, layout: &Layout) {
+fn draw_scale_bar(
+    canvas: &mut Canvas,
+    size: f32,
+    pixels_per_unit: f64,
+    unit: Unit,
+    layout: &Layout,
+) {
     let [width, _] = canvas.size();
     let length = round_step(f64::from(width) / 4.0 / pixels_per_unit);
     if !length.is_finite() {
         return;
     }
-    let text = if (0.001..1.0).contains(&length) {
-        format!("{} mm", (1000.0 * length).round())
-    } else if 1000.0 <= length {
-        format!("{} km", length / 1000.0)
-    } else {
-        format!("{length} m")
-    };
+    let text = length_text(length, unit);
     let bar = (length * pixels_per_unit) as f32;
     let block = [bar.max(text_width(&text, size)) + size, 2.4 * size];
     let area = layout.area((true, true), block);
@@ -199,6 +204,18 @@ fn draw_scale_bar(canvas: &mut Canvas, size: f32, pixels_per_unit: f64, layout: 
             Area { x: end, y: y + 0.5 * (thickness - height), width: thickness, height },
             ink,
         );
+    }
+}
+
+/// Writes a length of the coordinates with its unit. Coordinates without a known unit are taken as metres.
+fn length_text(length: f64, unit: Unit) -> String {
+    match unit {
+        Unit::Degrees => format!("{length}°"),
+        unit if unit.is_foot() => format!("{length} ft"),
+        Unit::Metres(metres) if metres != 1.0 => format!("{length} units"),
+        _ if (0.001..1.0).contains(&length) => format!("{} mm", (1000.0 * length).round()),
+        _ if 1000.0 <= length => format!("{} km", length / 1000.0),
+        _ => format!("{length} m"),
     }
 }
 
@@ -238,7 +255,7 @@ mod tests {
     }
 
     fn overlay(picture: &PictureSettings, legend: Legend) -> Overlay {
-        Overlay::new(picture, legend, &plan(50.0), Vec3::Z, &NoProgress).unwrap()
+        Overlay::new(picture, legend, &plan(50.0), (Vec3::Z, Unit::Unknown), &NoProgress).unwrap()
     }
 
     fn everything() -> (PictureSettings, Legend) {
@@ -271,6 +288,16 @@ mod tests {
         let rows = (0..image.height).filter_map(|y| dark_columns(&image, y));
         let longest = rows.map(|(first, last)| last - first + 1).max().unwrap();
         assert!((99..=101).contains(&longest), "{longest}");
+    }
+
+    #[test]
+    fn lengths_have_the_unit_of_the_coordinates() {
+        let texts =
+            [Unit::Unknown, Unit::Metres(1.0), Unit::Metres(1200.0 / 3937.0), Unit::Degrees];
+        let texts = texts.map(|unit| length_text(0.5, unit));
+        assert_eq!(texts, ["500 mm", "500 mm", "0.5 ft", "0.5°"]);
+        assert_eq!(length_text(2000.0, Unit::Metres(1.0)), "2 km");
+        assert_eq!(length_text(2000.0, Unit::Metres(0.3048)), "2000 ft");
     }
 
     #[test]
@@ -322,7 +349,8 @@ mod tests {
         let camera =
             Camera { projection: Projection::Perspective { view_angle_deg: 35.0 }, ..plan(1.0) };
         let (picture, legend) = everything();
-        let error = Overlay::new(&picture, legend, &camera, Vec3::Z, &NoProgress).unwrap_err();
+        let error = Overlay::new(&picture, legend, &camera, (Vec3::Z, Unit::Unknown), &NoProgress)
+            .unwrap_err();
         assert!(error.to_string().contains("--camera-orthographic"), "{error}");
     }
 }

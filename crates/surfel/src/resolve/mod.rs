@@ -14,6 +14,8 @@ mod unlit;
 mod appearance;
 mod sequence;
 mod loaded;
+mod plan;
+mod sun_position;
 mod complete_description;
 
 pub(crate) use appearance::finish_graph;
@@ -23,21 +25,25 @@ pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;
 pub use loaded::{KeepOptions, LoadedScene, check_files};
 pub use memory::{MemoryEstimate, n_points, readable};
+pub(crate) use plan::coordinate_system;
 pub(crate) use sequence::Sequence;
 pub use spread::report_coverage;
 pub(crate) use sun_and_sky::{expose, expose_lamps};
 
 use crate::choice_log::{Choice, ChoiceLog};
+use crate::crs::{CoordinateSystem, Unit};
 use crate::description::{CameraSettings, OrthographicHeight, SceneDescription};
 use crate::error::Result;
 use crate::overlay::Overlay;
 use camera::SceneExtent;
 use complete_description::complete_description;
 use interior::{choose_room, hidden_ceiling, hidden_walls};
+use plan::{check_height_map, frame_plan};
 use point_size::choose_point_size;
 use spread::report_gaps;
 use station::{choose_station, stand_at_station};
 use sun_and_sky::{LightingContext, choose_lights, lights};
+use sun_position::stand_sun_at_date;
 use surfel_core::math::Vec3;
 use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
@@ -66,6 +72,8 @@ pub struct Resolved {
     pub(crate) turned_room: Option<Room>,
     /// Legend, scale bar, north arrow and caption.
     pub(crate) overlay: Overlay,
+    /// The coordinate system, if it is known.
+    pub(crate) system: Option<CoordinateSystem>,
     /// The world's up.
     pub(crate) up: Vec3,
 }
@@ -121,8 +129,11 @@ impl AutoSettings {
         let camera = stand_at_station(&description.camera, clouds, up)?;
         let mut description = SceneDescription { camera, ..description.clone() };
         choose_surface(scene, &mut description, progress);
-        let description = &description;
         let bounds = inlier_bounds(&points);
+        frame_plan(scene, &mut description, (&points, bounds), up, progress)?;
+        let place = points.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
+        stand_sun_at_date(scene, &mut description, place, up, progress)?;
+        let description = &description;
         report_gaps(&points, progress);
         let room = choose_room(scene, description, &points, up);
         let station = choose_station(scene, description, up, room.as_ref());
@@ -178,10 +189,15 @@ impl LoadedScene {
         hide_walls(&mut graph, &hidden_walls);
         let background = description.picture.background();
         let scene = Scene { camera: camera.at(0.0, &graph), graph, lights, background };
+        let system = coordinate_system(&self, &description);
+        let unit = system.as_ref().map_or(Unit::Unknown, CoordinateSystem::unit);
         let overlay = match is_exr(&description) {
             true => Overlay::default(),
-            false => Overlay::new(&description.picture, legend, &scene.camera, up, progress)?,
+            false => {
+                Overlay::new(&description.picture, legend, &scene.camera, (up, unit), progress)?
+            }
         };
+        check_height_map(&description, &scene.camera)?;
         let settings = render_settings(&description);
         let choices = Vec::new();
         let description = complete;
@@ -194,6 +210,7 @@ impl LoadedScene {
             camera,
             turned_room,
             overlay,
+            system,
             up,
         })
     }
@@ -262,7 +279,10 @@ fn description_camera(
         };
     }
     let CameraSettings { lock, interior, .. } = description.camera;
-    CameraSettings { lock, interior, ..CameraSettings::of(&auto.camera.camera) }
+    let mut camera = CameraSettings { lock, interior, ..CameraSettings::of(&auto.camera.camera) };
+    // The height of a plan follows from its pixels.
+    camera.orthographic.take_if(|_| description.plan.is_to_scale());
+    camera
 }
 
 impl CameraSettings {

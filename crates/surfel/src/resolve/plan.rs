@@ -1,0 +1,254 @@
+//! Plans to scale: the camera and the size of the picture, so that pixels lie on round coordinates.
+
+use super::loaded::LoadedScene;
+use crate::crs::{CoordinateSystem, Unit};
+use crate::description::{CameraSettings, Invalid, OrthographicHeight, SceneDescription};
+use crate::picture::georeference;
+use surfel_core::math::{Aabb, DVec3, Vec3};
+use surfel_core::points::{PointCloud, is_valid_position};
+use surfel_core::progress::Progress;
+use surfel_core::render::MAX_PIXELS;
+use surfel_core::scene::{Camera, CameraFit, Projection, default_view_up, fit_camera};
+use surfel_core::surface::SurfaceKind;
+
+/// Returns the coordinate system of a scene: that of the description, or the one that its files share.
+pub fn coordinate_system(
+    scene: &LoadedScene,
+    description: &SceneDescription,
+) -> Option<CoordinateSystem> {
+    let stated = description.world.crs.clone().or_else(|| scene.file_info().coordinate_system);
+    CoordinateSystem::parse(&stated?)
+}
+
+/// Writes the camera and the resolution of a plan into a description that asks for one.
+///
+/// The edges of the picture lie on multiples of a pixel, so that plans of the same scene tile.
+pub fn frame_plan(
+    scene: &LoadedScene,
+    description: &mut SceneDescription,
+    (points, bounds): (&PointCloud, Aabb),
+    up: Vec3,
+    progress: &dyn Progress,
+) -> Result<(), Invalid> {
+    if !description.plan.is_to_scale() {
+        return Ok(());
+    }
+    let unit = coordinate_system(scene, description).map_or(Unit::Unknown, |system| system.unit());
+    let key = if description.plan.gsd.is_some() { "gsd" } else { "scale" };
+    let degrees =
+        || Invalid::at(key, "the coordinates are degrees of longitude and latitude, not lengths");
+    let metres = unit.metres().ok_or_else(degrees)?;
+    let Some(pixel_size) = description.plan.pixel_size(metres) else { return Ok(()) };
+    let camera = plan_camera(&description.camera, (points, bounds), up);
+    let window = match description.picture.resolution {
+        Some(resolution) => Window::about(&camera, resolution, pixel_size),
+        None => Window::around(&camera, (points, bounds), pixel_size),
+    };
+    let (width, height) = window.resolution().filter(|_| pixel_size.is_normal()).ok_or_else(|| {
+        let [width, height] = window.size;
+        let message = format!(
+            "the plan has {width:.0}x{height:.0} pixels, more than {MAX_PIXELS} in all; use larger \
+             pixels, or give the size of a sheet by --resolution and its middle by --camera-focal-point"
+        );
+        Invalid::at(key, message)
+    })?;
+    let line = format!("plan of {width}x{height} pixels, each {} wide", length(pixel_size, unit),);
+    progress.choice(&line, &["gsd", "scale", "resolution"]);
+    description.picture.resolution = Some((width, height));
+    description.camera = window.camera_settings(&description.camera, &camera);
+    Ok(())
+}
+
+/// Checks that a height map is asked of a camera that looks straight down.
+pub fn check_height_map(description: &SceneDescription, camera: &Camera) -> Result<(), Invalid> {
+    if description.plan.height_map.is_none() {
+        return Ok(());
+    }
+    if description.objects_default.surface.surface() == SurfaceKind::Points {
+        let advice = "needs a surface; leave out --surface points";
+        return Err(Invalid::at("height_map", advice));
+    }
+    if georeference(camera, (1, 1), None).is_none() {
+        let advice =
+            "needs a camera that looks straight down without perspective: add --gsd LENGTH";
+        return Err(Invalid::at("height_map", advice));
+    }
+    Ok(())
+}
+
+/// Writes a length with its unit.
+fn length(length: f64, unit: Unit) -> String {
+    match unit {
+        Unit::Metres(1.0) => format!("{length} m"),
+        unit if unit.is_foot() => format!("{length} ft"),
+        _ => format!("{length} units"),
+    }
+}
+
+/// The direction of a plan's camera and the middle of its picture. Straight down, if the settings leave it open.
+fn plan_camera(
+    settings: &CameraSettings,
+    (points, bounds): (&PointCloud, Aabb),
+    up: Vec3,
+) -> Camera {
+    let towards = settings.position.zip(settings.focal_point).map(|(from, to)| to - from);
+    let is_turned = settings.azimuth_angle.is_some() || settings.elevation_angle.is_some();
+    let turned = || elevation_direction(settings, points, up);
+    let forward = settings.direction.or(towards).or_else(|| is_turned.then(turned));
+    let forward = forward.unwrap_or(-up.as_dvec3()).normalize();
+    let middle = points.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
+    let focal_point = settings.focal_point.or(settings.position).unwrap_or(middle);
+    let view_up = settings.view_up.unwrap_or_else(|| default_view_up(up, forward));
+    let position = settings.position.unwrap_or_else(|| {
+        // Before all points, whatever the depth of the focal point.
+        let corners = [bounds.min, bounds.max].map(|corner| points.origin + corner.as_dvec3());
+        let corners =
+            (0..8).map(|i| DVec3::new(corners[i & 1].x, corners[i >> 1 & 1].y, corners[i >> 2].z));
+        let nearest =
+            corners.map(|corner| forward.dot(corner - focal_point)).fold(f64::INFINITY, f64::min);
+        focal_point + (nearest - f64::from((bounds.max - bounds.min).length()) - 1.0) * forward
+    });
+    // A focal point behind the camera would turn it round.
+    let focal_point =
+        if forward.dot(focal_point - position) <= 0.0 { position + forward } else { focal_point };
+    Camera { position, focal_point, view_up, projection: Projection::Orthographic { height: 1.0 } }
+}
+
+/// The direction of an elevation: level unless the settings say otherwise.
+fn elevation_direction(settings: &CameraSettings, points: &PointCloud, up: Vec3) -> DVec3 {
+    let fit = CameraFit {
+        up,
+        is_orthographic: true,
+        azimuth_deg: settings.azimuth_angle(),
+        elevation_deg: settings.elevation_angle.or(Some(0.0)),
+        ..CameraFit::default()
+    };
+    let camera = fit_camera(points, &fit);
+    camera.focal_point - camera.position
+}
+
+fn is_within(bounds: Aabb, point: Vec3) -> bool {
+    bounds.contains(Aabb { min: point, max: point })
+}
+
+/// The part of the world that a plan shows, in pixels along the right and the up of its camera.
+struct Window {
+    left: f64,
+    top: f64,
+    size: [f64; 2],
+    pixel_size: f64,
+}
+
+impl Window {
+    /// A window of this size about the focal point.
+    fn about(camera: &Camera, (width, height): (u32, u32), pixel_size: f64) -> Self {
+        let [right, up, _] = camera.axes();
+        let [x, y] = [right, up].map(|axis| axis.dot(camera.focal_point) / pixel_size);
+        let size = [f64::from(width), f64::from(height)];
+        let (left, top) = ((x - 0.5 * size[0]).round(), (y + 0.5 * size[1]).round());
+        Self { left, top, size, pixel_size }
+    }
+
+    /// The window of whole pixels around all points within bounds.
+    fn around(camera: &Camera, (points, bounds): (&PointCloud, Aabb), pixel_size: f64) -> Self {
+        let [right, up, _] = camera.axes();
+        let within =
+            points.positions.iter().filter(|p| is_valid_position(**p) && is_within(bounds, **p));
+        let range = |axis: DVec3| {
+            let along = within.clone().map(|p| axis.dot(p.as_dvec3()));
+            let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+                (low.min(x), high.max(x))
+            });
+            let start = axis.dot(points.origin);
+            [((start + low) / pixel_size).floor(), ((start + high) / pixel_size).ceil()]
+        };
+        let ([left, right_edge], [bottom, top]) = (range(right), range(up));
+        let size = [right_edge - left, top - bottom].map(|n| n.max(1.0));
+        Self { left, top, size, pixel_size }
+    }
+
+    /// Returns width and height in pixels, if a picture can have so many.
+    fn resolution(&self) -> Option<(u32, u32)> {
+        let [width, height] = self.size;
+        let is_possible = 1.0 <= width.min(height) && width * height <= MAX_PIXELS as f64;
+        is_possible.then_some((width as u32, height as u32))
+    }
+
+    /// Returns the settings of a camera that shows the window.
+    fn camera_settings(&self, settings: &CameraSettings, camera: &Camera) -> CameraSettings {
+        let [right, up, _] = camera.axes();
+        let x = self.pixel_size * (self.left + 0.5 * self.size[0]);
+        let y = self.pixel_size * (self.top - 0.5 * self.size[1]);
+        let shift = [(right, x), (up, y)].map(|(axis, to)| to - axis.dot(camera.focal_point));
+        // A camera that shows the window already stays as it is, bit by bit.
+        let is_there = shift.iter().all(|shift| shift.abs() < 1e-6 * self.pixel_size);
+        let shift = if is_there { DVec3::ZERO } else { shift[0] * right + shift[1] * up };
+        let height = self.pixel_size * self.size[1];
+        CameraSettings {
+            position: Some(camera.position + shift),
+            focal_point: Some(camera.focal_point + shift),
+            view_up: Some(camera.view_up),
+            orthographic: Some(OrthographicHeight::Fixed(height)),
+            lock: settings.lock,
+            interior: settings.interior,
+            ..CameraSettings::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Edges of plans lie on multiples of a pixel, and sheets meet.
+
+    use super::*;
+
+    const MIDDLE: DVec3 = DVec3::new(691_607.123, 5_334_760.987, 520.0);
+
+    fn down() -> Camera {
+        let projection = Projection::Orthographic { height: 1.0 };
+        Camera { position: MIDDLE + DVec3::Z, focal_point: MIDDLE, view_up: DVec3::Y, projection }
+    }
+
+    fn corner(settings: &CameraSettings, size: [f64; 2], pixel_size: f64) -> [f64; 2] {
+        let middle = settings.focal_point.unwrap();
+        [middle.x - 0.5 * size[0] * pixel_size, middle.y + 0.5 * size[1] * pixel_size]
+    }
+
+    #[test]
+    fn sheets_of_one_scale_tile() {
+        let pixel_size = 0.05;
+        for (width, height) in [(800, 600), (801, 599)] {
+            let window = Window::about(&down(), (width, height), pixel_size);
+            let settings = window.camera_settings(&CameraSettings::default(), &down());
+            for edge in corner(&settings, window.size, pixel_size) {
+                let pixels = edge / pixel_size;
+                assert!((pixels - pixels.round()).abs() < 1e-4, "{edge}");
+            }
+            let moved = settings.focal_point.unwrap() - MIDDLE;
+            assert!(moved.length() < pixel_size, "{moved}");
+            // Framed again, nothing moves.
+            let camera = Camera {
+                position: settings.position.unwrap(),
+                focal_point: settings.focal_point.unwrap(),
+                ..down()
+            };
+            let again = Window::about(&camera, (width, height), pixel_size);
+            assert_eq!(again.camera_settings(&CameraSettings::default(), &camera), settings);
+        }
+    }
+
+    #[test]
+    fn a_plan_of_everything_has_no_pixel_to_spare() {
+        let positions = vec![Vec3::new(-1.2, -0.3, 0.0), Vec3::new(2.3, 4.1, 1.0), Vec3::ZERO];
+        let mut points = PointCloud::from_positions(positions);
+        points.origin = DVec3::new(100.0, 200.0, 0.0);
+        let bounds = points.bounds();
+        let camera = plan_camera(&CameraSettings::default(), (&points, bounds), Vec3::Z);
+        let window = Window::around(&camera, (&points, bounds), 0.5);
+        assert_eq!((window.left, window.top, window.size), (197.0, 409.0, [8.0, 10.0]));
+        assert_eq!(window.resolution(), Some((8, 10)));
+        assert!(1.0 < camera.position.z);
+        let huge = Window::around(&camera, (&points, bounds), 1e-7);
+        assert_eq!(huge.resolution(), None);
+    }
+}
