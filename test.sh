@@ -63,6 +63,12 @@ page_tests() {
     skipped=$((skipped + ${left_out:-0}))
 }
 
+# Installs GDAL, by which tests read plans; without it they are skipped.
+prepare_gdal() {
+    command -v gdalinfo >/dev/null || [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null && return
+    apt-get update >"$log" 2>&1 && apt-get install -y --no-install-recommends gdal-bin >"$log" 2>&1
+}
+
 # Finds the browser (CHROMIUM if it is set) and playwright-core, which drives it and is installed outside of the
 # repository. Fails with a reason in `missing` if one of them is unavailable.
 prepare_browser() {
@@ -97,6 +103,7 @@ done
 
 check "formatting" cargo fmt --all --check
 check "lints" cargo clippy --workspace --all-targets -- -D warnings
+prepare_gdal
 tests "tests" cargo test --workspace --lib --bins --tests --no-fail-fast -- --show-output
 tests "doc tests" cargo test --workspace --doc --no-fail-fast
 # The page's tests use `import.meta.dirname`, which Node.js has since 20.11.

@@ -1,14 +1,13 @@
 //! Rendered pictures and the files that they are saved to.
 
-use crate::crs::{CoordinateSystem, Unit};
 use crate::description::SceneDescription;
 use crate::error::Result;
 use std::ops::Deref;
 use std::path::Path;
 use surfel_core::image::Image;
 use surfel_core::math::DVec3;
-use surfel_core::scene::{Background, Camera, Projection};
-use surfel_formats::{Alpha, Georeference, ImageOptions};
+use surfel_core::scene::Background;
+use surfel_formats::{Alpha, ImageOptions};
 
 /// A rendered picture: linear colours and layers, and how they become a file.
 #[derive(Clone, Debug)]
@@ -61,29 +60,4 @@ pub fn image_options(description: &SceneDescription, origin: DVec3) -> ImageOpti
         dpi: description.plan.stated_dpi(),
         georeference: None,
     }
-}
-
-/// Returns where the pixels of a camera's picture lie, if it looks straight down without perspective.
-pub(crate) fn georeference(
-    camera: &Camera,
-    (width, height): (u32, u32),
-    system: Option<&CoordinateSystem>,
-) -> Option<Georeference> {
-    let Projection::Orthographic { height: shown } = camera.projection else { return None };
-    let [right, up, forward] = camera.axes();
-    if 1e-9 < (forward + DVec3::Z).length() {
-        return None;
-    }
-    let pixel_size = shown / f64::from(height);
-    let [right, down] = [right, -up].map(|axis| [axis.x, axis.y].map(|x| pixel_size * x + 0.0));
-    let middle = [camera.position.x, camera.position.y];
-    let half = [0.5 * f64::from(width), 0.5 * f64::from(height)];
-    let corner = [0, 1].map(|i| middle[i] - half[0] * right[i] - half[1] * down[i]);
-    Some(Georeference {
-        corner,
-        right,
-        down,
-        epsg: system.and_then(CoordinateSystem::epsg),
-        is_geographic: system.is_some_and(|system| system.unit() == Unit::Degrees),
-    })
 }

@@ -1,4 +1,4 @@
-//! Where a picture lies in the world: a plan's pixels in world coordinates, and the coordinate system.
+//! The place of a plan: its pixels in world coordinates, and the coordinate system.
 
 /// The place of a plan: a picture without perspective, seen from straight above.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -15,7 +15,7 @@ pub struct ImageOptions {
     pub origin: DVec3,
     /// Pixels per inch at which the picture is to be printed, written to PNG, JPEG and TIFF files.
     pub dpi: Option<f64>,
-    /// Where a plan lies, written to TIFF files.
+    /// Place of a plan, written to TIFF files.
     pub georeference: Option<Georeference>,
 }
 

@@ -1,6 +1,9 @@
 //! Coordinate reference systems (CRS): their unit, their EPSG codes, and where on Earth a position lies.
 
 mod wkt;
+mod georeference;
+
+pub use georeference::georeference;
 
 use proj4rs::Proj;
 use proj4rs::adaptors::transform_xyz;

@@ -78,7 +78,7 @@ impl<'a> Node<'a> {
 /// Splits text at the commas that stand neither in brackets nor in quotes.
 fn split(text: &str) -> Vec<&str> {
     let (mut depth, mut is_quoted) = (0_i32, false);
-    let mut is_separator = |character: char| {
+    let is_separator = |character: char| {
         match character {
             '"' => is_quoted = !is_quoted,
             '[' | '(' if !is_quoted => depth += 1,
@@ -87,7 +87,7 @@ fn split(text: &str) -> Vec<&str> {
         }
         character == ',' && depth == 0 && !is_quoted
     };
-    text.split(|character| is_separator(character)).collect()
+    text.split(is_separator).collect()
 }
 
 #[cfg(test)]

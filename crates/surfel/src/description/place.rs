@@ -1,4 +1,4 @@
-//! Where and when on Earth a scene is: its coordinate system, its place, and the date of its sun.
+//! A scene on Earth: its coordinate system, its place, and the date of its sun.
 
 use super::Invalid;
 use super::rule::{Rule, Text, as_numbers, expected};

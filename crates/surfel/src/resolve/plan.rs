@@ -1,9 +1,8 @@
 //! Plans to scale: the camera and the size of the picture, so that pixels lie on round coordinates.
 
 use super::loaded::LoadedScene;
-use crate::crs::{CoordinateSystem, Unit};
+use crate::crs::{CoordinateSystem, Unit, georeference};
 use crate::description::{CameraSettings, Invalid, OrthographicHeight, SceneDescription};
-use crate::picture::georeference;
 use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::{PointCloud, is_valid_position};
 use surfel_core::progress::Progress;
