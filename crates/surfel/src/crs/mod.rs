@@ -64,9 +64,15 @@ impl Unit {
         }
     }
 
-    /// Returns true for the international foot and the foot of surveys in the United States.
-    pub fn is_foot(self) -> bool {
-        matches!(self, Self::Metres(metres) if (metres - 0.3048).abs() < 1e-5)
+    /// Returns the symbol that stands after a number: `m`, `ft` for the feet of all countries, or `°`.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::Unknown => "m",
+            Self::Metres(metres) if metres == 1.0 => "m",
+            Self::Metres(metres) if (metres - 0.3048).abs() < 1e-5 => "ft",
+            Self::Metres(_) => "units",
+            Self::Degrees => "°",
+        }
     }
 }
 
@@ -184,7 +190,7 @@ mod tests {
     fn units_are_those_of_the_system() {
         let unit = |text: &str| CoordinateSystem::parse(text).map(|system| system.unit());
         assert_eq!(unit("EPSG:2154+5720"), Some(Unit::Metres(1.0)));
-        assert!(unit("epsg:2261").unwrap().is_foot());
+        assert_eq!(unit("epsg:2261").unwrap().symbol(), "ft");
         assert_eq!(unit("EPSG:4326"), Some(Unit::Degrees));
         assert_eq!(unit("EPSG:4326").unwrap().metres(), None);
         for unknown in ["", "EPSG:", "EPSG:99999", "EPSG:abc", "Local grid", "EPSG:2154+x", "é"] {

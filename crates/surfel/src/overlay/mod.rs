@@ -209,13 +209,11 @@ fn draw_scale_bar(
 
 /// Writes a length of the coordinates with its unit. Coordinates without a known unit are taken as metres.
 fn length_text(length: f64, unit: Unit) -> String {
-    match unit {
-        Unit::Degrees => format!("{length}°"),
-        unit if unit.is_foot() => format!("{length} ft"),
-        Unit::Metres(metres) if metres != 1.0 => format!("{length} units"),
-        _ if (0.001..1.0).contains(&length) => format!("{} mm", (1000.0 * length).round()),
-        _ if 1000.0 <= length => format!("{} km", length / 1000.0),
-        _ => format!("{length} m"),
+    match unit.symbol() {
+        "m" if (0.001..1.0).contains(&length) => format!("{} mm", (1000.0 * length).round()),
+        "m" if 1000.0 <= length => format!("{} km", length / 1000.0),
+        "°" => format!("{length}°"),
+        symbol => format!("{length} {symbol}"),
     }
 }
 

@@ -51,7 +51,12 @@ pub fn frame_plan(
         );
         Invalid::at(key, message)
     })?;
-    let line = format!("plan of {width}x{height} pixels, each {} wide", length(pixel_size, unit),);
+    // Six digits are less than a pixel on the largest sheet.
+    let digits = (6 - pixel_size.log10().ceil() as i32).clamp(0, 12) as usize;
+    let side = format!("{pixel_size:.digits$}");
+    let side =
+        if side.contains('.') { side.trim_end_matches('0').trim_end_matches('.') } else { &side };
+    let line = format!("plan of {width}x{height} pixels, each {side} {} wide", unit.symbol());
     progress.choice(&line, &["gsd", "scale", "resolution"]);
     description.picture.resolution = Some((width, height));
     description.camera = window.camera_settings(&description.camera, &camera);
@@ -73,15 +78,6 @@ pub fn check_height_map(description: &SceneDescription, camera: &Camera) -> Resu
         return Err(Invalid::at("height_map", advice));
     }
     Ok(())
-}
-
-/// Writes a length with its unit.
-fn length(length: f64, unit: Unit) -> String {
-    match unit {
-        Unit::Metres(1.0) => format!("{length} m"),
-        unit if unit.is_foot() => format!("{length} ft"),
-        _ => format!("{length} units"),
-    }
 }
 
 /// The direction of a plan's camera and the middle of its picture. Straight down, if the settings leave it open.
