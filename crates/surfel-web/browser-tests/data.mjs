@@ -57,6 +57,28 @@ function houseObj() {
   return [...corners.map(([a, b, c]) => `v ${x + a} ${y + b} ${z + c}`), ...faces.map((face) => `f ${face}`), ''].join('\n');
 }
 
+/** The places of the scanners in the room. */
+export const STATIONS = [[2, 2, 1.5], [8, 3, 1.5]];
+
+/** A room of 10 x 5 x 3, scanned from both stations. */
+function roomPtx() {
+  const [columns, rows] = [90, 45];
+  const size = [10, 5, 3];
+  const scan = (station) => {
+    const cells = Array.from({ length: columns * rows }, (_, i) => {
+      const azimuth = (2 * Math.PI * Math.floor(i / rows)) / columns;
+      const elevation = Math.PI * ((i % rows + 0.5) / rows - 0.5);
+      const direction = [Math.cos(azimuth) * Math.cos(elevation), Math.sin(azimuth) * Math.cos(elevation), Math.sin(elevation)];
+      const toWall = direction.map((part, axis) => ((0 < part ? size[axis] : 0) - station[axis]) / part);
+      const range = Math.min(...toWall.filter((length) => 0 < length));
+      return `${direction.map((part) => (range * part).toFixed(4)).join(' ')} 0.5`;
+    });
+    const [x, y, z] = station;
+    return [columns, rows, `${x} ${y} ${z}`, '1 0 0', '0 1 0', '0 0 1', '1 0 0 0', '0 1 0 0', '0 0 1 0', `${x} ${y} ${z} 1`, ...cells].join('\n');
+  };
+  return `${STATIONS.map(scan).join('\n')}\n`;
+}
+
 const MOVING_TOML = `
 color = "rgb"
 
@@ -121,7 +143,7 @@ export function makeData() {
   const folder = mkdtempSync(join(tmpdir(), 'surfel-browser-'));
   const points = townPoints();
   const files = {
-    'town.ply': ply(points), 'house.obj': houseObj(), 'moving.toml': MOVING_TOML, 'orbit.toml': ORBIT_TOML, 'rising.toml': RISING_TOML, 'past.gltf': pastGltf(),
+    'town.ply': ply(points), 'house.obj': houseObj(), 'moving.toml': MOVING_TOML, 'orbit.toml': ORBIT_TOML, 'rising.toml': RISING_TOML, 'past.gltf': pastGltf(), 'room.ptx': roomPtx(),
   };
   for (const [name, text] of Object.entries(files)) writeFileSync(join(folder, name), text);
   return { folder, points, remove: () => rmSync(folder, { recursive: true, force: true }) };

@@ -8,9 +8,9 @@ import {
   closePage, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, serve, settled, state, unfoldPanel, recordPictures,
 } from './harness.mjs';
 
-const { surfaceControls, colorControls, sunControls, skyControls, pictureControls, clipControls, materialControls } = tables;
+const { surfaceControls, colorControls, pointControls, sunControls, skyControls, pictureControls, clipControls, materialControls } = tables;
 const OBJECTS = ['house.obj', 'town.ply'];
-const CONTROLS = [surfaceControls, colorControls, sunControls, skyControls, pictureControls, clipControls,
+const CONTROLS = [surfaceControls, colorControls, pointControls, sunControls, skyControls, pictureControls, clipControls,
   ...OBJECTS.map((name) => materialControls({ name }))].flat();
 
 const BY_ELEVATION = [['color', 'elevation']];
@@ -26,6 +26,8 @@ const CASES = {
   color: { value: 'intensity' },
   cmap: { given: BY_ELEVATION, value: 'magma' },
   range: { given: BY_ELEVATION, value: [147, 152.5] },
+  filter: { value: 'z > 149' },
+  class: { value: [2] },
   'light.sun': { value: false },
   'sun.azimuth': { value: 30 },
   'sun.elevation': { value: 75.5 },
@@ -63,8 +65,8 @@ const CASES = {
   'material.house.obj.emissive_strength': { given: [['material.house.obj', 'emissive']], value: 2 },
 };
 
-// Controls of pictures without meshes have a test of their own.
-const FOR_CLOUDS = ['point_size'];
+// Controls of other scenes have tests of their own.
+const FOR_OTHERS = ['point_size', 'returns'];
 
 let page;
 let first;
@@ -92,6 +94,14 @@ const setters = {
   toggle: (key, value) => field(key).setChecked(value),
   color: (key, value) => field(key).fill(value),
   button: (key) => field(key).click(),
+  async text(key, value) {
+    await field(key).fill(value);
+    await field(key).press('Enter');
+  },
+  async checklist(key, values) {
+    const { class: classes = [2, 6] } = await state(page, 'scene');
+    for (const value of new Set([...values, ...classes])) await field(`${key}.${value}`).setChecked(values.includes(value));
+  },
   async slider(key, value) {
     const number = page.locator(`[data-number="${key}"]`);
     await number.fill(String(value));
@@ -126,7 +136,7 @@ async function sceneValue({ key, read }) {
 test('each control has a case', async () => {
   const { objects } = await state(page, 'info');
   assert.deepEqual(objects.map(({ name }) => name), OBJECTS);
-  assert.deepEqual([...Object.keys(CASES), ...FOR_CLOUDS].sort(), CONTROLS.map(({ key }) => key).sort());
+  assert.deepEqual([...Object.keys(CASES), ...FOR_OTHERS].sort(), CONTROLS.map(({ key }) => key).sort());
 });
 
 test('the size of points is chosen, and can be changed and chosen again', async () => {
@@ -151,7 +161,7 @@ test('the size of points is chosen, and can be changed and chosen again', async 
   await closePage(other);
 });
 
-for (const control of CONTROLS.filter(({ key }) => !FOR_CLOUDS.includes(key))) {
+for (const control of CONTROLS.filter(({ key }) => !FOR_OTHERS.includes(key))) {
   const { given = [], value, unseen } = CASES[control.key];
   test(`${control.key} changes the picture`, async () => {
     for (const [key, needed] of given) await setControl(key, needed);

@@ -114,6 +114,12 @@ export function orbit(camera, pivot, up, yaw_rad, pitch_rad) {
   return { ...moved, view_up: isSteep ? pictureUp : up };
 }
 
+/** Turns at its position for a drag by this many pixels, so that the surface under the pointer follows it. */
+export function lookAround(camera, size, up, dx, dy) {
+  const perPixel = ((camera.view_angle ?? DEFAULT_VIEW_ANGLE) * RADIANS) / size.height;
+  return { ...orbit(camera, camera.position, up, dx * perPixel, dy * perPixel), position: camera.position };
+}
+
 /** A panorama turned to the left about its own up. */
 export function turnPanorama(camera, yaw_rad) {
   const offset = rotate(subtract(camera.focal_point, camera.position), axesOf(camera).up, yaw_rad);

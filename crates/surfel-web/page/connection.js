@@ -3,11 +3,13 @@
 const MIN_RECONNECT_DELAY_MS = 500;
 const MAX_RECONNECT_DELAY_MS = 5000;
 const HEADER_BYTES = 20;
+/** Place and length before each file of a picture. */
+const PLACE_BYTES = 12;
 const PICTURE_TYPES = { 1: 'image/jpeg', 2: 'image/png', 3: 'image/png' };
 
-export const SAVED_PICTURE = 3;
+const SAVED_PICTURE = 3;
 
-/** The header before the file in a binary message. */
+/** The header before the files in a binary message. */
 export function readHeader(buffer) {
   const view = new DataView(buffer);
   const kind = view.getUint8(0);
@@ -25,6 +27,19 @@ export function readHeader(buffer) {
   };
 }
 
+/** The files of a picture in the order in which they are drawn, each with its place in the picture. */
+export function readFiles(buffer, type) {
+  const view = new DataView(buffer);
+  const files = [];
+  for (let at = HEADER_BYTES; at < buffer.byteLength;) {
+    const [x, y, width, height] = [0, 2, 4, 6].map((offset) => view.getUint16(at + offset, true));
+    const length = view.getUint32(at + 8, true);
+    files.push({ x, y, width, height, blob: new Blob([new Uint8Array(buffer, at + PLACE_BYTES, length)], { type }) });
+    at += PLACE_BYTES + length;
+  }
+  return files;
+}
+
 /** Address of the server's socket for the page's own address, token included. */
 export function socketAddress(location) {
   const token = new URLSearchParams(location.search).get('token');
@@ -36,7 +51,7 @@ export class Connection {
   #socket = null;
   #reconnectDelay_ms = MIN_RECONNECT_DELAY_MS;
 
-  /** `on` has `opened()`, `message(object)`, `picture(header, blob)` and `lost(wait_ms)`. */
+  /** `on` has `opened()`, `message(object)`, `picture(header, files)`, `saved(id, blob)` and `lost(wait_ms)`. */
   constructor(address, on) {
     this.address = address;
     this.on = on;
@@ -72,7 +87,8 @@ export class Connection {
       return;
     }
     const header = readHeader(data);
-    this.on.picture(header, new Blob([new Uint8Array(data, HEADER_BYTES)], { type: header.type }));
+    if (header.kind !== SAVED_PICTURE) this.on.picture(header, readFiles(data, header.type));
+    else this.on.saved(header.frame, new Blob([new Uint8Array(data, HEADER_BYTES)], { type: header.type }));
   }
 
   #reconnect() {

@@ -35,6 +35,24 @@ export const colorControls = [
     write: (range) => ({ range }) },
 ];
 
+const allClasses = ({ info }) => info.classes.map((one) => one.class);
+
+export const pointControls = [
+  { key: 'filter', label: 'Filter', kind: 'text', isWide: true, placeholder: 'z > 100 && intensity < 5000',
+    help: 'Shows only points that meet a condition on their columns',
+    note: ({ info }) => `Columns: ${info.columns.join(', ')}`,
+    read: (scene) => scene.filter ?? '', write: (filter) => ({ filter: filter || null }) },
+  { key: 'class', label: 'Classes', kind: 'checklist', isWide: true, isVisible: (_, { info }) => 0 < info.classes.length,
+    help: 'Shows only points of these classes',
+    options: ({ info }) => info.classes.map((one) => ({ ...one, value: one.class })),
+    read: (scene, viewer) => scene.class ?? allClasses(viewer),
+    write: (classes, _, viewer) => ({ class: classes.length < allClasses(viewer).length ? classes : null }) },
+  { key: 'returns', label: 'Returns', kind: 'select', isVisible: (_, { info }) => info.has_returns,
+    help: 'Shows only these returns of each laser pulse; only: of pulses that have one',
+    options: () => [{ value: '', label: 'all' }, 'first', 'last', 'only'],
+    read: (scene) => scene.returns ?? '', write: (returns) => ({ returns: returns || null }) },
+];
+
 function lightControl(name, label, help) {
   return {
     key: `light.${name}`, sceneKey: 'light', label, kind: 'toggle', help,
@@ -101,6 +119,19 @@ export const pictureControls = [
   { key: 'spp', label: 'Samples per pixel', ...SLIDER, range: [1, 256], limits: [1, 65536], scale: 'logarithmic', step: 1, help: 'Camera rays per pixel of the finished picture' },
   { key: 'light_samples', label: 'Light samples', ...SLIDER, range: [1, 256], limits: [1, 65536], scale: 'logarithmic', step: 1, help: 'Rays per hit toward the sky and a soft sun' },
   { key: 'max_depth', label: 'Max bounces', ...SLIDER, range: [0, 32], limits: [0, 64], step: 1, help: 'Maximum number of reflections and refractions' },
+];
+
+const withoutScale = (_, { camera }) => (camera?.orthographic === undefined ? 'needs orthographic' : '');
+
+/** What is drawn into the picture, on the screen and in the saved file. `unavailable` tells why a control is disabled. */
+export const annotationControls = [
+  { key: 'legend', label: 'Legend', kind: 'toggle', help: 'Classes with their colours, or the colour map with its values',
+    unavailable: (_, { legend }) => (legend ? '' : 'the colours need none') },
+  { key: 'scale_bar', label: 'Scale bar', kind: 'toggle', help: 'A bar of a round length', followsCamera: true, unavailable: withoutScale },
+  { key: 'north', label: 'North arrow', kind: 'toggle', help: 'An arrow to the north, which is +Y, unless it is along the view',
+    followsCamera: true, unavailable: withoutScale },
+  { key: 'caption', label: 'Caption', kind: 'text', placeholder: 'a line of text', help: 'A line of text at the lower left',
+    read: (scene) => scene.caption ?? '', write: (caption) => ({ caption: caption || null }) },
 ];
 
 const FROM_FILE = { value: '', label: 'From file' };

@@ -1,12 +1,14 @@
 // Fields of the panel, a factory for each kind: an element that shows a value and reports changes.
 
 import { element, icon } from './dom.js';
+import { count } from './format.js';
+import { areEqual } from './merge-patch.js';
 
 const SLIDER_STEPS = 1000;
 
 // Each factory takes a control (see controls.js), a callback `change(value, isMoving)`, and the id of the field that
 // the label refers to; it returns { element, show(value, viewer) }.
-export const fieldFactories = { slider, select, toggle, color, numbers, button };
+export const fieldFactories = { slider, select, toggle, color, numbers, text, checklist, button };
 
 function slider(control, change, id) {
   let ends = Array.isArray(control.range) ? control.range : [0, 1];
@@ -83,8 +85,14 @@ function toggle(control, change, id) {
   const box = element('input', {
     type: 'checkbox', role: 'switch', id, 'data-key': control.key, onchange: () => change(box.checked, false),
   });
-  const show = (value) => { box.checked = Boolean(value); };
-  return { element: element('div', { class: 'field toggle' }, box), show };
+  const reason = element('span', { class: 'note', id: `${id}-reason` });
+  const show = (value, viewer) => {
+    box.checked = Boolean(value);
+    reason.textContent = control.unavailable?.(viewer.scene, viewer) ?? '';
+    box.disabled = reason.textContent !== '';
+  };
+  if (control.unavailable) box.setAttribute('aria-describedby', reason.id);
+  return { element: element('div', { class: 'field toggle' }, box, reason), show };
 }
 
 function color(control, change, id) {
@@ -117,6 +125,51 @@ function numbers(control, change, id) {
     if (document.activeElement !== input) input.value = values ? Number(values[i].toPrecision(9)) : '';
   });
   return { element: element('div', { class: 'field numbers' }, ...inputs), show };
+}
+
+function text(control, change, id) {
+  const field = element('input', {
+    type: 'text', id, 'data-key': control.key, placeholder: control.placeholder, maxlength: 1000, spellcheck: 'false', autocomplete: 'off',
+  });
+  let isTyping = false;
+  field.addEventListener('input', () => { isTyping = true; });
+  field.addEventListener('change', () => {
+    isTyping = false;
+    change(field.value.trim(), false);
+  });
+  const note = control.note ? element('p', { class: 'note', id: `${id}-note` }) : null;
+  if (note) field.setAttribute('aria-describedby', note.id);
+  const show = (value, viewer) => {
+    if (!isTyping) field.value = value;
+    if (note) note.textContent = control.note(viewer);
+  };
+  return { element: element('div', { class: 'field text' }, field, note), show };
+}
+
+/** Check boxes of the control's options, each `{ value, name, color, points }`. The last one that is checked stays so. */
+function checklist(control, change, id) {
+  const list = element('ul', { class: 'field checklist', id, role: 'group', 'aria-label': control.label });
+  let shown = null;
+  const boxes = () => [...list.querySelectorAll('input')];
+  const checked = () => boxes().flatMap((box, i) => (box.checked ? [shown[i].value] : []));
+  const item = ({ value, name, color, points }) => {
+    const box = element('input', { type: 'checkbox', 'data-key': `${control.key}.${value}`, onchange: () => change(checked(), false) });
+    const swatch = element('span', { class: 'swatch' });
+    swatch.style.background = color;
+    return element('li', {}, element('label', {}, box, swatch, element('span', {}, name), element('small', {}, count(points))));
+  };
+  const show = (values, viewer) => {
+    const options = control.options(viewer);
+    if (!areEqual(options, shown)) {
+      shown = options;
+      list.replaceChildren(...options.map(item));
+    }
+    boxes().forEach((box, i) => {
+      box.checked = values.includes(shown[i].value);
+      box.disabled = box.checked && values.length === 1;
+    });
+  };
+  return { element: list, show };
 }
 
 function button(control, change, id) {

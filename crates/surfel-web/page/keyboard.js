@@ -19,6 +19,8 @@ export const KEY_HELP = [
   ['+ −', 'zoom in, zoom out'],
   ['1 … 6', 'view from the front, back, left, right, top, bottom'],
   ['F', 'fit to view'],
+  ['Home', 'view at the start'],
+  ['Backspace', 'previous view'],
   ['O / P', 'orthographic / perspective'],
   ['R G B', 'colour by RGB'],
   ['Z', 'colour by elevation'],
@@ -30,7 +32,7 @@ export const KEY_HELP = [
 ];
 
 export const MOUSE_HELP = [
-  ['Left drag', 'orbit about the pivot'],
+  ['Left drag', 'orbit about the pivot; at a station, look around'],
   ['Right or middle drag, Shift + left drag', 'pan'],
   ['Wheel', 'zoom toward the point under the pointer'],
   ['Double click', 'set the pivot to this point'],
@@ -66,6 +68,8 @@ export function setUpKeyboard(viewer, navigation, actions) {
 
   const commands = {
     f: () => navigation.fit(),
+    home: () => navigation.goHome(),
+    backspace: () => navigation.goBack(),
     o: () => navigation.setOrthographic(true),
     p: () => navigation.setOrthographic(false),
     r: () => colorBy('rgb'),

@@ -1,4 +1,4 @@
-// The legend on the picture: a colour map with its scale, or classes with their colours.
+// The legend on the picture, unless the picture contains one: a colour map with its scale, or classes with their colours.
 
 import { element } from './dom.js';
 import { rounded, ticks } from './format.js';
@@ -10,7 +10,7 @@ export function setUpLegend(viewer) {
   const card = document.getElementById('legend');
   let shown = null;
   viewer.sceneChanged.listen(() => {
-    const { legend } = viewer;
+    const legend = viewer.scene?.legend ? null : viewer.legend;
     if (areEqual(legend, shown)) return;
     shown = legend;
     card.hidden = !legend;

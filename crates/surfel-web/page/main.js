@@ -1,6 +1,7 @@
 // Entry point: creates the parts of the page and connects them.
 
 import { animationRows } from './animation.js';
+import { makeRoomForAnnotations } from './annotations.js';
 import { clipPainter, grabHandle } from './clip-handles.js';
 import * as controls from './controls.js';
 import { element } from './dom.js';
@@ -45,6 +46,7 @@ const openExportDialog = setUpExportDialog(viewer);
 setUpNotifications(viewer);
 setUpStatusLine(viewer);
 setUpLegend(viewer);
+makeRoomForAnnotations(viewer);
 setUpSceneLoading(viewer);
 setUpToolbar(viewer, navigation, { save: openSaveDialog, export: openExportDialog, help: showHelp });
 fillPanel();
@@ -118,14 +120,18 @@ function fillPanel() {
     panel.removeRows([...body.children]);
     body.append(...viewer.info.objects.flatMap((object) => rows(controls.materialControls(object))));
   });
+  const points = section('Points', false, ...rows(controls.pointControls));
+  viewer.infoChanged.listen(() => { points.hidden = viewer.info.points === 0; });
   const animation = section('Animation', true, ...animationRows(viewer, () => animation));
   document.getElementById('sections').append(
     animation,
     section('Surface', true, ...rows(controls.surfaceControls)),
     section('Colour', true, ...withPreview(rows(controls.colorControls))),
+    points,
     section('Sun', true, ...rows(controls.sunControls), sunClock(viewer)),
     section('Sky', true, ...rows(controls.skyControls)),
     section('Picture', false, ...rows(controls.pictureControls)),
+    section('Annotations', false, ...rows(controls.annotationControls)),
     section('View', false, ...viewRows(viewer, navigation)),
     section('Clipping', false, ...rows(controls.clipControls)),
     materials,

@@ -1,7 +1,7 @@
 // Navigation: moves the camera by hand, in smooth transitions, and on a turntable.
 
 import * as cameras from './camera.js';
-import { addScaled, scale } from './vector.js';
+import { addScaled, distance, scale } from './vector.js';
 
 const TRANSITION_MS = 350;
 const SETTLE_MS = 150;
@@ -15,6 +15,7 @@ export class Navigation {
   /** Whether the user is moving the camera; the pivot is shown meanwhile. */
   isActive = false;
   turntable_secs = 0;
+  #previousCamera = null;
   #animationRequest = 0;
   #settleTimer = 0;
 
@@ -26,11 +27,24 @@ export class Navigation {
     return this.viewer.camera;
   }
 
-  /** Orbits for a drag by this many pixels of the picture. */
+  /** The station at which the camera stands; undefined elsewhere. */
+  get station() {
+    const { camera, viewer } = this;
+    if (!camera || camera.panorama || cameras.isOrthographic(camera)) return undefined;
+    // Links round positions.
+    const isHere = ({ camera: there }) => distance(there.position, camera.position) < 1e-6 * cameras.focalDistance(there);
+    return viewer.info.stations.find(isHere);
+  }
+
+  /** Orbits for a drag by this many pixels of the picture; at a station, looks around. */
   orbit(dx, dy) {
     const { camera } = this;
     if (camera.panorama) {
       this.#panPanorama(dx);
+      return;
+    }
+    if (this.station) {
+      this.#move(cameras.lookAround(camera, this.viewer.size, this.up, dx, dy));
       return;
     }
     const perPixel = RADIANS_PER_HEIGHT / this.viewer.size.height;
@@ -96,6 +110,7 @@ export class Navigation {
   transitionTo(camera) {
     this.stop();
     const from = this.camera;
+    this.#previousCamera = from;
     const isSameProjection = cameras.isOrthographic(from) === cameras.isOrthographic(camera) && !from.panorama;
     if (!isSameProjection || matchMedia('(prefers-reduced-motion: reduce)').matches) {
       this.viewer.setCamera(camera, false);
@@ -108,6 +123,18 @@ export class Navigation {
       this.#animationRequest = t < 1 ? requestAnimationFrame(step) : 0;
     };
     step();
+  }
+
+  /** Moves the camera to where it was before the last transition. */
+  goBack() {
+    if (this.#previousCamera) this.transitionTo(this.#previousCamera);
+  }
+
+  /** Moves the camera to where it was at the start. */
+  goHome() {
+    const { info, initialScene } = this.viewer;
+    if (info.camera_moves && !initialScene.camera.lock) this.viewer.resumeAnimation();
+    else this.transitionTo(initialScene.camera);
   }
 
   viewFromSide(side) {

@@ -105,7 +105,8 @@ function viewOf(camera, size) {
 /** Paints a cross at the pivot while the user moves the camera. */
 export function pivotPainter(navigation) {
   return ({ camera, toPixel }) => {
-    const at = navigation.isActive && !camera.panorama ? toPixel(camera.focal_point) : null;
+    const hasPivot = navigation.isActive && !camera.panorama && !navigation.station;
+    const at = hasPivot ? toPixel(camera.focal_point) : null;
     if (!at) return [];
     const shape = `M${at.x - 9} ${at.y}h6m6 0h6M${at.x} ${at.y - 9}v6m0 6v6`;
     return [svg('path', { class: 'pivot-halo', d: shape }), svg('path', { class: 'pivot', d: shape })];

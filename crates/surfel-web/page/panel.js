@@ -20,6 +20,8 @@ export class Panel {
   constructor(viewer) {
     this.viewer = viewer;
     viewer.sceneChanged.listen(() => viewer.scene && this.#rows.forEach((row) => row.update()));
+    viewer.cameraChanged.listen(() => viewer.scene
+      && this.#rows.filter(({ control }) => control.followsCamera).forEach((row) => row.update()));
     viewer.rejected.listen((rejection) => this.#showRejection(rejection));
   }
 
@@ -76,7 +78,7 @@ function createRow(control, viewer, onChange) {
     onclick: () => send(patchAt(control.key, null)),
   }, 'auto') : null;
   const title = control.help ? `${control.help}\n${sceneKey}` : sceneKey;
-  const row = element('div', { class: 'row', 'data-row': control.key },
+  const row = element('div', { class: control.isWide ? 'row is-wide' : 'row', 'data-row': control.key },
     element('label', { for: id, title }, control.label, control.unit && element('small', {}, control.unit)),
     field.element, automatic, resetButton, error);
 

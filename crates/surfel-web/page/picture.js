@@ -12,7 +12,7 @@ export class Picture {
     this.canvas = canvas;
     this.viewer = viewer;
     this.#context = canvas.getContext('2d');
-    viewer.pictureReceived.listen((header, blob) => this.#receive(header, blob));
+    viewer.pictureReceived.listen((header, files) => this.#receive(header, files));
     viewer.infoChanged.listen(() => this.resize());
     new ResizeObserver(() => this.resize()).observe(canvas);
     // The pixel ratio changes when the window moves to another screen.
@@ -29,24 +29,26 @@ export class Picture {
     if (size.width !== canvas.width || size.height !== canvas.height) {
       const old = canvas.width && canvas.height ? copyOf(canvas) : null;
       Object.assign(canvas, size);
-      if (old) this.#draw(old);
+      if (old) this.#draw(old, { x: 0, y: 0, width: old.width, height: old.height }, old);
     }
     this.viewer.resize(size);
   }
 
   /** Draws a picture. While one is being decoded, only the newest of those that arrive is kept. */
-  async #receive(header, blob) {
-    this.#next = { header, blob };
+  async #receive(header, files) {
+    this.#next = { header, files };
     if (this.#isDecoding) return;
     this.#isDecoding = true;
     while (this.#next) {
-      const { header: shown, blob: file } = this.#next;
+      const { header: shown, files: parts } = this.#next;
       this.#next = null;
       try {
-        const bitmap = await createImageBitmap(file);
-        this.#draw(bitmap);
+        const bitmaps = await Promise.all(parts.map(({ blob }) => createImageBitmap(blob)));
+        const [whole] = parts;
+        this.#context.clearRect(0, 0, this.canvas.width, this.canvas.height);
+        parts.forEach((part, i) => this.#draw(bitmaps[i], part, whole));
         this.canvas.classList.add('is-drawn');
-        bitmap.close();
+        for (const bitmap of bitmaps) bitmap.close();
       } catch {
         // A broken picture is skipped, and acknowledged, as the server waits for it.
       }
@@ -55,14 +57,18 @@ export class Picture {
     this.#isDecoding = false;
   }
 
-  /** Draws an image over the full height, which the vertical angle of view covers; other aspect ratios are centred. */
-  #draw(image) {
+  /**
+   * Draws an image at its place in a picture of the size of `whole`, which covers the full height, as the vertical angle
+   * of view does; other aspect ratios are centred.
+   */
+  #draw(image, place, whole) {
     const { width, height } = this.canvas;
-    const drawnWidth = Math.abs(image.width / image.height - width / height) < 0.01
-      ? width : (image.width * height) / image.height;
+    const scale = height / whole.height;
+    const hasAspect = Math.abs(whole.width / whole.height - width / height) < 0.01;
+    const scaleX = hasAspect ? width / whole.width : scale;
+    const left = (width - scaleX * whole.width) / 2;
     this.#context.imageSmoothingQuality = 'high';
-    this.#context.clearRect(0, 0, width, height);
-    this.#context.drawImage(image, (width - drawnWidth) / 2, 0, drawnWidth, height);
+    this.#context.drawImage(image, left + scaleX * place.x, scale * place.y, scaleX * place.width, scale * place.height);
   }
 }
 

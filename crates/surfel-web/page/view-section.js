@@ -1,9 +1,15 @@
-// The panel's section for the camera: projection, angle of view, sides, and turntable.
+// The panel's section for the camera: projection, angle of view, stations, sides, and turntable.
 
 import { isOrthographic } from './camera.js';
 import { element, icon } from './dom.js';
 import { fieldFactories } from './fields.js';
 
+/** Buttons that move the camera: name, title and action. */
+const JUMPS = [
+  ['home', 'View at the start (Home)', (navigation) => navigation.goHome()],
+  ['fit', 'Fit to view (F)', (navigation) => navigation.fit()],
+  ['previous', 'Previous view (Backspace)', (navigation) => navigation.goBack()],
+];
 const SIDES = ['front', 'back', 'left', 'right', 'top', 'bottom'];
 
 export function viewRows(viewer, navigation) {
@@ -26,10 +32,23 @@ export function viewRows(viewer, navigation) {
     read: () => navigation.isTrackball,
     write: (isOn) => { navigation.isTrackball = isOn; },
   });
+  const station = fieldRow(viewer, {
+    key: 'camera.station', label: 'Station', kind: 'select', title: 'Looks from where the scanner of a scan stood\ncamera.station',
+    options: ({ info }) => [
+      ...(navigation.station ? [] : [{ value: '', label: 'choose a station' }]),
+      ...info.stations.map(({ name }, i) => ({ value: String(i), label: name })),
+    ],
+    read: () => (navigation.station ? String(viewer.info.stations.indexOf(navigation.station)) : ''),
+    write: (value) => navigation.transitionTo(viewer.info.stations[value].camera),
+    isVisible: () => 0 < viewer.info.stations.length,
+  });
+  const jumps = element('div', { class: 'sides' }, ...JUMPS.map(([name, title, jump]) => element('button', {
+    type: 'button', class: 'button', title, 'data-jump': name, onclick: () => jump(navigation),
+  }, name)));
   const sides = element('div', { class: 'sides' }, ...SIDES.map((side, i) => element('button', {
     type: 'button', class: 'button', title: `${side} (${i + 1})`, 'data-side': side, onclick: () => navigation.viewFromSide(side),
   }, side)));
-  const rows = [projection, angle, trackball, sides, turntable(viewer, navigation)];
+  const rows = [projection, angle, trackball, station, jumps, sides, turntable(viewer, navigation)];
   // The position of an animated camera arrives with the first scene.
   const update = () => rows.forEach((row) => { row.inert = !viewer.camera; });
   viewer.cameraChanged.listen(update);

@@ -1,6 +1,6 @@
 // The state of the view: scene, camera and size, as the user changes them and as the server confirms them.
 
-import { Connection, SAVED_PICTURE, socketAddress } from './connection.js';
+import { Connection, socketAddress } from './connection.js';
 import { viewPatch } from './link.js';
 import { areEqual, combinePatches, createPatch, mergePatch } from './merge-patch.js';
 import { rejectionText } from './rejections.js';
@@ -59,7 +59,8 @@ export class Viewer {
     this.#connection = new Connection(socketAddress(location), {
       opened: () => this.#sendHello(),
       message: (message) => this.#receive(message),
-      picture: (header, blob) => this.#receivePicture(header, blob),
+      picture: (header, files) => this.pictureReceived(header, files),
+      saved: (id, blob) => this.#resolveRequest({ id, blob }),
       lost: (wait_ms) => this.#handleLoss(wait_ms),
     });
   }
@@ -274,14 +275,6 @@ export class Viewer {
     const patches = this.#pendingPatches.map(({ patch }) => patch);
     if (this.#queuedPatch) patches.push(this.#queuedPatch.patch);
     this.scene = patches.reduce(mergePatch, this.#confirmedScene);
-  }
-
-  #receivePicture(header, blob) {
-    if (header.kind === SAVED_PICTURE) {
-      this.#resolveRequest({ id: header.frame, blob });
-      return;
-    }
-    this.pictureReceived(header, blob);
   }
 
   #receiveError({ id, seq, key, text }) {

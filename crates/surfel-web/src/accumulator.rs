@@ -3,13 +3,14 @@
 use crate::deadline::{Deadline, SLICE_TIMEOUT};
 use crate::dynamic_resolution::ResolutionController;
 use crate::encode::{self, Pixels};
-use crate::frame::{Frame, Quality};
-use crate::scene_provider::PreparedScene;
+use crate::frame::{Frame, PlacedFile, Quality};
+use crate::scene_provider::{Patch, PreparedScene};
 use crate::view::ViewState;
 use std::sync::Arc;
 use std::time::Instant;
 use surfel_core::Result;
 use surfel_core::flat::FlatScene;
+use surfel_core::image::Image;
 use surfel_core::progress::Progress;
 use surfel_core::render::{POINT_SIZE_RANGE, RenderRegion, RenderStats, Renderer, Settings};
 
@@ -23,6 +24,8 @@ pub struct Accumulator {
     resolution: ResolutionController,
     /// Linear colours, summed over the samples that each row has.
     sum: Vec<[f32; 4]>,
+    /// Coverage, summed likewise; empty without an overlay.
+    coverage_sum: Vec<f32>,
     /// Number of samples that all rows have.
     n_samples: u32,
     /// Number of rows, from the top, that have one sample more.
@@ -97,16 +100,34 @@ impl Accumulator {
             ..full
         };
         let n_pixels = u64::from(width) * u64::from(height);
-        let Some(scene) = self.scene(prepared, view) else { return Ok(None) };
+        let Some(scene) = self.scene(prepared.clone(), view) else { return Ok(None) };
+        let camera = scene.camera;
         let deadline = Deadline::new(progress, ResolutionController::is_min_size((width, height)));
         let start = Instant::now();
         let rendered = renderer.render(scene, &settings, &deadline);
         self.record_time(start.elapsed().as_secs_f64(), rendered.is_ok());
         self.resolution.record(n_pixels, self.slice_secs);
         let (image, stats) = rendered?;
-        let pixels =
-            Pixels { width: width as u16, height: height as u16, sum: &image.color, weight: 1.0 };
-        Ok(Some(frame(pixels, Quality::Draft, full.samples_per_pixel, Work::of(&stats))))
+        let start = Instant::now();
+        let mut files = vec![place(jpeg(&image, DRAFT_JPEG_QUALITY), (0, 0), view.size)];
+        if let Some(overlay) = &prepared.overlay {
+            let patches = overlay.patches(&image, view.size, &camera, view.is_moving);
+            files.extend(patches.iter().map(|Patch { x, y, image }| {
+                let file = jpeg(image, REFINED_JPEG_QUALITY);
+                place(file, (*x, *y), (image.width, image.height))
+            }));
+        }
+        Ok(Some(Frame {
+            quality: Quality::Draft,
+            width: width as u16,
+            height: height as u16,
+            samples: 1,
+            of_samples: full.samples_per_pixel,
+            files,
+            trace_secs: stats.frame_secs,
+            encode_secs: start.elapsed().as_secs_f64(),
+            mrays_per_s: Work::of(&stats).mrays_per_s(),
+        }))
     }
 
     /// Starts the finished picture of the view that a draft showed.
@@ -142,7 +163,8 @@ impl Accumulator {
         self.secs_per_row = self.slice_secs / f64::from(n_rows);
         let (image, stats) = rendered?;
         self.work += Work::of(&stats);
-        self.add(&image.color, slice, width as usize * height as usize);
+        let has_overlay = view.scene.as_ref().is_some_and(|scene| scene.overlay.is_some());
+        self.add(&image, slice, width as usize * height as usize, has_overlay);
         if self.n_rows == height {
             (self.n_samples, self.n_rows) = (self.n_samples + 1, 0);
             // Each picture that is sent has twice as many samples as the one before.
@@ -157,17 +179,49 @@ impl Accumulator {
         if !std::mem::take(&mut self.has_frame) {
             return None;
         }
-        let of_samples = view.scene.as_ref()?.render_settings.samples_per_pixel;
+        let prepared = view.scene.as_ref()?;
+        let of_samples = prepared.render_settings.samples_per_pixel;
         let (width, height) = view.size;
         let is_finished = self.n_samples == of_samples;
-        let quality = if is_finished { Quality::Finished } else { Quality::Refined };
-        let pixels = Pixels {
+        let start = Instant::now();
+        let drawn = prepared.overlay.as_ref().zip(view.camera).map(|(overlay, camera)| {
+            let mut image = self.mean(view.size);
+            overlay.draw(&mut image, &camera);
+            image
+        });
+        let pixels = match &drawn {
+            Some(image) => pixels_of(image),
+            None => Pixels {
+                width: width as u16,
+                height: height as u16,
+                sum: &self.sum,
+                weight: self.n_samples as f32,
+            },
+        };
+        let file = match is_finished {
+            true => encode::png(pixels),
+            false => encode::jpeg(pixels, REFINED_JPEG_QUALITY),
+        };
+        let work = std::mem::take(&mut self.work);
+        Some(Frame {
+            quality: if is_finished { Quality::Finished } else { Quality::Refined },
             width: width as u16,
             height: height as u16,
-            sum: &self.sum,
-            weight: self.n_samples as f32,
-        };
-        Some(frame(pixels, quality, of_samples, std::mem::take(&mut self.work)))
+            samples: self.n_samples,
+            of_samples,
+            files: vec![place(file, (0, 0), view.size)],
+            trace_secs: work.trace_secs,
+            encode_secs: start.elapsed().as_secs_f64(),
+            mrays_per_s: work.mrays_per_s(),
+        })
+    }
+
+    /// The mean of the samples so far.
+    fn mean(&self, (width, height): (u32, u32)) -> Image {
+        let scale = 1.0 / self.n_samples as f32;
+        let color = self.sum.iter().map(|sum| sum.map(|channel| scale * channel)).collect();
+        let coverage = self.coverage_sum.iter().map(|sum| scale * sum).collect();
+        Image { width, height, color, coverage, aovs: None }
     }
 
     fn next_slice(&self, height: u32) -> RenderRegion {
@@ -178,17 +232,21 @@ impl Accumulator {
         RenderRegion { rows, samples: (self.n_samples, self.n_samples + 1) }
     }
 
-    fn add(&mut self, color: &[[f32; 4]], slice: RenderRegion, n_pixels: usize) {
+    fn add(&mut self, image: &Image, slice: RenderRegion, n_pixels: usize, has_overlay: bool) {
         if slice.rows.0 == 0 && slice.samples.0 == 0 {
             self.sum.clear();
             self.sum.resize(n_pixels, [0.0; 4]);
+            self.coverage_sum.clear();
+            self.coverage_sum.resize(if has_overlay { n_pixels } else { 0 }, 0.0);
         }
-        let width = color.len() / (slice.rows.1 - slice.rows.0) as usize;
-        let sums = &mut self.sum[slice.rows.0 as usize * width..];
-        for (sum, color) in sums.iter_mut().zip(color) {
+        let start = slice.rows.0 as usize * image.width as usize;
+        for (sum, color) in self.sum[start..].iter_mut().zip(&image.color) {
             for (sum, channel) in sum.iter_mut().zip(color) {
                 *sum += channel;
             }
+        }
+        for (sum, coverage) in self.coverage_sum.iter_mut().skip(start).zip(&image.coverage) {
+            *sum += coverage;
         }
         self.n_rows = slice.rows.1;
     }
@@ -205,29 +263,27 @@ impl Accumulator {
     }
 }
 
-fn frame(pixels: Pixels, quality: Quality, of_samples: u32, work: Work) -> Frame {
-    let start = Instant::now();
-    let file = match quality {
-        Quality::Draft => encode::jpeg(pixels, DRAFT_JPEG_QUALITY),
-        Quality::Refined => encode::jpeg(pixels, REFINED_JPEG_QUALITY),
-        Quality::Finished => encode::png(pixels),
-    };
-    Frame {
-        quality,
-        width: pixels.width,
-        height: pixels.height,
-        samples: pixels.weight as u32,
-        of_samples,
-        file,
-        trace_secs: work.trace_secs,
-        encode_secs: start.elapsed().as_secs_f64(),
-        mrays_per_s: work.n_rays as f64 / work.trace_secs.max(1e-9) / 1e6,
-    }
+fn jpeg(image: &Image, quality: u8) -> Vec<u8> {
+    encode::jpeg(pixels_of(image), quality)
+}
+
+fn pixels_of(image: &Image) -> Pixels<'_> {
+    let (width, height) = (image.width as u16, image.height as u16);
+    Pixels { width, height, sum: &image.color, weight: 1.0 }
+}
+
+fn place(file: Vec<u8>, (x, y): (u32, u32), (width, height): (u32, u32)) -> PlacedFile {
+    let [x, y, width, height] = [x, y, width, height].map(|length| length as u16);
+    PlacedFile { x, y, width, height, file }
 }
 
 impl Work {
     fn of(stats: &RenderStats) -> Self {
         Self { trace_secs: stats.frame_secs, n_rays: stats.rays.total() }
+    }
+
+    fn mrays_per_s(&self) -> f64 {
+        self.n_rays as f64 / self.trace_secs.max(1e-9) / 1e6
     }
 }
 

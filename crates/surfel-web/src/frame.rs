@@ -11,6 +11,20 @@ pub enum Quality {
     Finished,
 }
 
+/// An encoded file, and the place in pixels that it takes in the page's picture.
+pub struct PlacedFile {
+    /// Column of the left edge.
+    pub x: u16,
+    /// Row of the upper edge.
+    pub y: u16,
+    /// Width of the place.
+    pub width: u16,
+    /// Height of the place.
+    pub height: u16,
+    /// The JPEG or PNG file.
+    pub file: Vec<u8>,
+}
+
 /// An encoded picture, and facts about how it was rendered.
 pub struct Frame {
     /// The quality of the picture.
@@ -23,8 +37,8 @@ pub struct Frame {
     pub samples: u32,
     /// Number of camera rays a pixel of the finished picture.
     pub of_samples: u32,
-    /// The JPEG or PNG file.
-    pub file: Vec<u8>,
+    /// The file of the whole picture, then those of parts that lie over it.
+    pub files: Vec<PlacedFile>,
     /// Time spent tracing, in seconds.
     pub trace_secs: f64,
     /// Time spent encoding, in seconds.
@@ -45,7 +59,8 @@ impl Frame {
     /// `seq` that of the last message that took effect.
     pub fn message(&self, number: u32, scene_number: u16, seq: u32) -> Vec<u8> {
         let is_finished = self.quality == Quality::Finished;
-        let mut message = Vec::with_capacity(20 + self.file.len());
+        let n_bytes: usize = self.files.iter().map(|placed| 12 + placed.file.len()).sum();
+        let mut message = Vec::with_capacity(20 + n_bytes);
         message.extend([if is_finished { PNG } else { JPEG }, u8::from(is_finished)]);
         message.extend(scene_number.to_le_bytes());
         message.extend(number.to_le_bytes());
@@ -54,7 +69,11 @@ impl Frame {
         for number in [self.width, self.height, samples[0], samples[1]] {
             message.extend(number.to_le_bytes());
         }
-        message.extend(&self.file);
+        for PlacedFile { x, y, width, height, file } in &self.files {
+            [x, y, width, height].iter().for_each(|number| message.extend(number.to_le_bytes()));
+            message.extend((file.len() as u32).to_le_bytes());
+            message.extend(file);
+        }
         message
     }
 }

@@ -31,6 +31,7 @@ mod server;
 
 pub use limits::{Limits, Timeouts};
 pub use scene_provider::{
-    Error, Export, PickedPoint, PointDescriber, PreparedScene, Result, SceneProvider, SettingsMap,
+    Error, Export, Patch, PickedPoint, PictureOverlay, PointDescriber, PreparedScene, Result,
+    SceneProvider, SettingsMap,
 };
 pub use server::Server;

@@ -3,9 +3,11 @@
 use serde_json::{Map, Value};
 use std::sync::Arc;
 use surfel_core::flat::FlatScene;
+use surfel_core::image::Image;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::progress::Progress;
 use surfel_core::render::Settings;
+use surfel_core::scene::Camera;
 
 /// Settings as the keys and values of a scene file.
 pub type SettingsMap = Map<String, Value>;
@@ -45,6 +47,11 @@ pub trait SceneProvider: Send + Sync + 'static {
     /// Fails if a setting is invalid, if the picture exceeds the limits, or if `progress` cancels.
     fn render_png(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<Vec<u8>>;
 
+    /// Returns the settings without those that pictures of their camera lack, as a scale bar with perspective.
+    fn drawable_settings(&self, settings: &SettingsMap) -> SettingsMap {
+        settings.clone()
+    }
+
     /// These settings as a command line and as scene files.
     ///
     /// # Errors
@@ -61,6 +68,32 @@ pub trait SceneProvider: Send + Sync + 'static {
 /// Returns facts about a picked point of a flat scene, as the page shows them.
 pub type PointDescriber = Arc<dyn Fn(&FlatScene, &PickedPoint) -> Value + Send + Sync>;
 
+/// Draws a scene's legend, scale bar, north arrow and caption onto its pictures.
+pub trait PictureOverlay: Send + Sync {
+    /// Draws onto a picture at rest.
+    fn draw(&self, image: &mut Image, camera: &Camera);
+
+    /// Returns the parts of the picture of `size` that are drawn on, over an enlarged `draft` of it. While the camera
+    /// is moving, everything keeps its place.
+    fn patches(
+        &self,
+        draft: &Image,
+        size: (u32, u32),
+        camera: &Camera,
+        is_moving: bool,
+    ) -> Vec<Patch>;
+}
+
+/// A part of a picture.
+pub struct Patch {
+    /// Column of the left edge in the picture.
+    pub x: u32,
+    /// Row of the upper edge in the picture.
+    pub y: u32,
+    /// The part.
+    pub image: Image,
+}
+
 /// A scene that is ready to be rendered.
 pub struct PreparedScene {
     /// The complete settings, automatic choices included.
@@ -73,6 +106,8 @@ pub struct PreparedScene {
     pub render_settings: Settings,
     /// The meaning of the colours, as the page shows it; null if they need no legend.
     pub legend: Value,
+    /// What is drawn onto its pictures; none if they stay as they are.
+    pub overlay: Option<Box<dyn PictureOverlay>>,
     /// Describes picked points.
     pub describe: PointDescriber,
 }

@@ -295,7 +295,8 @@ impl Session {
             let error = Error::invalid_request("there is nothing to export yet");
             return self.reject(RequestRef::Id(id), &error).await;
         };
-        let export = self.state.run_blocking(move || provider.export(&settings)).await;
+        let export = move || provider.export(&provider.drawable_settings(&settings));
+        let export = self.state.run_blocking(export).await;
         let message = match export.flatten() {
             Ok(export) => json!({
                 "type": "exported",
@@ -355,5 +356,6 @@ async fn render_png(
     let is_cancelled =
         move || is_cancelled.load(Ordering::Relaxed) || for_cancel.is_stopped() || page.is_closed();
     let reporter = ProgressReporter::new(report, is_cancelled);
-    state.run_blocking(move || provider.render_png(&settings, &reporter)).await?
+    let render = move || provider.render_png(&provider.drawable_settings(&settings), &reporter);
+    state.run_blocking(render).await?
 }

@@ -69,16 +69,10 @@ pub struct LiveView {
 }
 
 impl LiveView {
-    /// Returns the legend, scale bar, north arrow and caption of a picture of the view.
-    ///
-    /// # Errors
-    ///
-    /// Fails if the camera does not allow what is asked for.
-    pub fn overlay(&self, progress: &dyn Progress) -> Result<Overlay> {
+    /// Returns the legend, scale bar, north arrow and caption of pictures of the view.
+    pub fn overlay(&self) -> Overlay {
         let up = self.description.world.up.unwrap_or(Vec3::Z);
-        let legend = self.trees.legend.clone();
-        let (picture, camera) = (&self.description.picture, &self.flat.camera);
-        Ok(Overlay::new(picture, legend, camera, (up, self.unit), progress)?)
+        Overlay::of(&self.description.picture, self.trees.legend.clone(), (up, self.unit))
     }
 }
 

@@ -21,6 +21,7 @@ pub fn legend_json(legend: &Legend) -> Value {
     }
 }
 
-fn hex([r, g, b]: [u8; 3]) -> String {
+/// Writes an sRGB-encoded colour as a page does.
+pub fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }

@@ -4,6 +4,7 @@ mod browser;
 mod legend;
 mod point;
 mod rejection;
+mod page_overlay;
 mod page_settings;
 mod scene_provider;
 

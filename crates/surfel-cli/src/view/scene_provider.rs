@@ -1,6 +1,7 @@
 //! Scenes of the files that the viewer was started with, by the settings of its pages.
 
-use super::legend::legend_json;
+use super::legend::{hex, legend_json};
+use super::page_overlay::page_overlay;
 use super::page_settings::{self, EVERYTHING};
 use super::point::describe;
 use super::rejection::rejection;
@@ -16,11 +17,12 @@ use surfel::description::rule::absolute_text;
 use surfel::description::{CameraSettings, ObjectDescription, write_table};
 use surfel::live_scene::{LiveScene, LiveView};
 use surfel::names::{file_name, list_files};
+use surfel::overlay;
 use surfel::picture::image_options;
-use surfel::resolve::AutoSettings;
-use surfel_core::image::colormap;
+use surfel::resolve::{AutoSettings, LoadedScene, located_stations};
+use surfel_core::image::{class_color, class_name, colormap};
 use surfel_core::math::Vec3;
-use surfel_core::points::PointCloud;
+use surfel_core::points::{PointCloud, PointFilter};
 use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::scene::color::choose_source;
 use surfel_core::scene::{Material, inlier_bounds};
@@ -40,6 +42,8 @@ pub struct FileSceneProvider {
     up: Vec3,
     /// True if the scene moves its camera.
     moves_camera: bool,
+    /// The cameras at the stations of its scans.
+    stations: Vec<Value>,
 }
 
 /// Number of points of a preview; clouds that are not much larger need none.
@@ -57,8 +61,9 @@ impl FileSceneProvider {
         let moves_camera = auto.moves_camera(scene.loaded());
         let mut startup_settings = page_settings::shown(startup.clone());
         startup_settings.shift_remove("time");
+        let stations = stations(scene.loaded(), auto.up);
         let (scene, up) = (Arc::new(scene), auto.up);
-        Ok(Self { startup, startup_settings, typed, scene, up, moves_camera })
+        Ok(Self { startup, startup_settings, typed, scene, up, moves_camera, stations })
     }
 
     fn read(&self, settings: &SettingsMap) -> Result<SceneDescription> {
@@ -145,6 +150,38 @@ fn columns(cloud: &PointCloud) -> Vec<&str> {
     usual.chain(cloud.scalars.iter().map(|scalar| scalar.name.as_str())).collect()
 }
 
+/// The stations of all scans by name, with the cameras that look from there.
+fn stations(scene: &LoadedScene, up: Vec3) -> Vec<Value> {
+    let stations = located_stations(scene).into_iter().filter_map(|station| {
+        let camera = CameraSettings::of(&station.view(up)?.camera(up, None));
+        Some(json!({ "name": station.name, "camera": write_table(&camera) }))
+    });
+    stations.collect()
+}
+
+/// The classes of all clouds with their names, colours and numbers of points.
+fn classes(scene: &LoadedScene) -> Vec<Value> {
+    let mut counts = [0u64; 256];
+    let classes = scene.clouds().filter_map(|(_, cloud)| cloud.classification.as_ref());
+    classes.flatten().for_each(|class| counts[usize::from(*class)] += 1);
+    let found = (0..=u8::MAX).zip(counts).filter(|(_, count)| 0 < *count);
+    let described = found.map(|(class, count)| {
+        let name = format!("{class} {}", class_name(class));
+        json!({ "class": class, "name": name, "color": hex(class_color(class)), "points": count })
+    });
+    described.collect()
+}
+
+/// Returns true if all clouds tell the returns of each pulse.
+fn has_returns(scene: &LoadedScene) -> bool {
+    let filter: PointFilter =
+        "return_number <= number_of_returns".parse().expect("the condition is valid");
+    let mut clouds = scene.clouds().map(|(_, cloud)| cloud).peekable();
+    // Fails for missing columns, also without points.
+    let tells_returns = |cloud: &PointCloud| filter.matches(cloud, cloud.len()).is_ok();
+    clouds.peek().is_some() && clouds.all(tells_returns)
+}
+
 impl SceneProvider for FileSceneProvider {
     fn info(&self) -> Value {
         let loaded = self.scene.loaded();
@@ -167,6 +204,10 @@ impl SceneProvider for FileSceneProvider {
             "objects": self.objects(),
             "duration_secs": loaded.duration_secs(),
             "camera_moves": self.moves_camera,
+            "stations": self.stations,
+            "classes": classes(loaded),
+            "has_returns": has_returns(loaded),
+            "columns": loaded.file_info().columns,
             "threads": rayon::current_num_threads(),
             "simd": self.scene.simd().name(),
             "coordinate_system": loaded.file_info().coordinate_system,
@@ -227,6 +268,7 @@ impl SceneProvider for FileSceneProvider {
             animated_camera: view.moves_camera.then(camera),
             render_settings: view.settings,
             legend: legend_json(&view.trees.legend),
+            overlay: page_overlay(view.overlay()),
             describe: self.describer(&view, description.output.time()),
             settings: self.complete_settings(view.description, &description),
             flat: view.flat,
@@ -239,10 +281,27 @@ impl SceneProvider for FileSceneProvider {
         let rays_per_pixel = u64::from(picture.spp()) + u64::from(picture.light_samples());
         Limits::default().check_save(picture.resolution(), rays_per_pixel)?;
         let view = self.view(&description, progress)?;
+        let (up, camera) = (view.description.world.up.unwrap_or(self.up), &view.flat.camera);
+        if let Some(fault) = overlay::faults(picture, camera, up).into_iter().next() {
+            return Err(rejection(fault));
+        }
         let mut image = self.scene.render(&view, progress).map_err(rejection)?;
-        view.overlay(progress).map_err(rejection)?.draw(&mut image, &view.flat.camera);
+        view.overlay().draw(&mut image, &view.flat.camera);
         let options = image_options(&description, view.flat.origin);
         surfel_formats::encode_png(&image, &options).map_err(rejection)
+    }
+
+    fn drawable_settings(&self, settings: &SettingsMap) -> SettingsMap {
+        let mut drawable = settings.clone();
+        let faults = || {
+            let description = self.read(settings).ok()?;
+            let auto = AutoSettings::choose(self.scene.loaded(), &description, &NoProgress).ok()?;
+            Some(overlay::faults(&description.picture, &auto.camera.camera, auto.up))
+        };
+        for fault in faults().unwrap_or_default() {
+            drawable.shift_remove(fault.path.trim_start_matches("picture."));
+        }
+        drawable
     }
 
     fn export(&self, settings: &SettingsMap) -> Result<Export> {

@@ -1,6 +1,6 @@
 //! Delivery of pictures: their order, quality and number, and fairness between pages.
 
-use crate::hill_provider::{FaultyRenderer, N_SAMPLES, PICTURE_SIZE};
+use crate::hill_provider::{FaultyRenderer, N_SAMPLES, PICTURE_SIZE, STAMP};
 use crate::test_page::{JPEG, PNG, Picture, TestPage};
 use crate::test_server::TestServer;
 use serde_json::json;
@@ -39,10 +39,30 @@ async fn headers_describe_the_file() {
         let image = picture.decode();
         let size = (u32::from(picture.size.0), u32::from(picture.size.1));
         assert_eq!((image.width(), image.height()), size);
-        let format = image::guess_format(&picture.file).unwrap();
+        let format = image::guess_format(picture.file()).unwrap();
         let is_jpeg = format == image::ImageFormat::Jpeg;
         assert_eq!(picture.kind, if is_jpeg { JPEG } else { PNG });
     }
+}
+
+#[tokio::test]
+async fn drafts_have_the_overlay_in_full_size_and_finished_pictures_contain_it() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({ "stamp": true })).await;
+    let draft = page.wait_for_picture(|picture| picture.samples == 1).await;
+    let (whole, stamp) = (&draft.files[0], &draft.files[1]);
+    assert_eq!(whole.0, [0, 0, PICTURE_SIZE.0 as u16, PICTURE_SIZE.1 as u16]);
+    let [x, y, width, height] = STAMP;
+    assert_eq!(stamp.0, STAMP.map(|length| length as u16));
+    let stamp = image::load_from_memory(&stamp.1).unwrap().into_rgb8();
+    assert_eq!(stamp.dimensions(), (width, height));
+    assert!(stamp.pixels().all(|pixel| 250 < pixel.0[0] && pixel.0[1] < 5));
+    let finished = page.finished_picture().await;
+    assert_eq!(finished.files.len(), 1);
+    let pixel_at = |x, y| finished.decode().into_rgba8().get_pixel(x, y).0;
+    assert_eq!(pixel_at(x, y), [255, 0, 0, 255]);
+    assert_eq!(pixel_at(x + width - 1, y + height - 1), [255, 0, 0, 255]);
+    assert_ne!(pixel_at(x + width, y), [255, 0, 0, 255]);
 }
 
 #[tokio::test]
@@ -158,7 +178,7 @@ async fn each_page_has_its_own_camera() {
     let mut files = Vec::new();
     for page in &mut pages {
         let condition = |picture: &Picture| picture.is_finished && picture.seq == 1;
-        files.push(page.wait_for_picture(condition).await.file);
+        files.push(page.wait_for_picture(condition).await.files);
     }
     files.sort();
     files.dedup();

@@ -17,7 +17,9 @@ use surfel_core::scene::{
     Scene, fit_camera,
 };
 use surfel_core::trace::Simd;
-use surfel_web::{Error, Export, PreparedScene, Result, SceneProvider, SettingsMap};
+use surfel_web::{
+    Error, Export, Patch, PictureOverlay, PreparedScene, Result, SceneProvider, SettingsMap,
+};
 
 /// Size of a page's picture in pixels.
 pub const PICTURE_SIZE: (u32, u32) = (64, 48);
@@ -55,6 +57,7 @@ impl Gate {
 /// | `fault` | the seed of the render settings, which tells the `FaultyRenderer` its fault |
 /// | `camera_angle` | the scene animates its camera, which is at this angle |
 /// | `preview` | there is a preview |
+/// | `stamp` | pictures have an overlay |
 /// | `tint` | none |
 pub struct HillProvider {
     flat: FlatScene,
@@ -118,6 +121,32 @@ impl HillProvider {
     }
 }
 
+/// Left and upper edge, width and height of the overlay.
+pub const STAMP: [u32; 4] = [3, 5, 8, 6];
+
+/// An overlay that is a red rectangle.
+struct Stamp;
+
+impl PictureOverlay for Stamp {
+    fn draw(&self, image: &mut Image, _: &Camera) {
+        let [x, y, width, height] = STAMP;
+        for row in y..y + height {
+            let start = (row * image.width + x) as usize;
+            image.color[start..][..width as usize].fill(RED);
+        }
+    }
+
+    fn patches(&self, _: &Image, size: (u32, u32), _: &Camera, _: bool) -> Vec<Patch> {
+        assert_eq!(size, PICTURE_SIZE);
+        let [x, y, width, height] = STAMP;
+        let mut image = Image::new(width, height);
+        image.color.fill(RED);
+        vec![Patch { x, y, image }]
+    }
+}
+
+const RED: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
+
 impl SceneProvider for HillProvider {
     fn info(&self) -> Value {
         json!({ "name": "hill" })
@@ -168,7 +197,7 @@ impl SceneProvider for HillProvider {
                 "panic" => panic!("requested by a test"),
                 "fault" => seed = value.as_u64().unwrap_or(0),
                 "camera_angle" => animated_camera = value.as_f64().map(camera),
-                "camera" | "tint" | "preview" | "resolution" | "slow_render" => {}
+                "camera" | "tint" | "stamp" | "preview" | "resolution" | "slow_render" => {}
                 _ => return Err(Error::invalid_value(key, "unknown key")),
             }
             complete.insert(key.clone(), value.clone());
@@ -179,6 +208,7 @@ impl SceneProvider for HillProvider {
             flat: self.flat.clone(),
             render_settings: render_settings(seed),
             legend: Value::Null,
+            overlay: settings.contains_key("stamp").then(|| Box::new(Stamp) as _),
             describe: Arc::new(
                 |_, point| json!({ "index": point.primitive_idx, "position": point.position.to_array() }),
             ),

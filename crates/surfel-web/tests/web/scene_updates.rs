@@ -63,7 +63,7 @@ async fn an_animated_camera_moves_unless_the_user_has_moved_it_meanwhile() {
     page.change_settings(1, json!({ "camera_angle": 2 })).await;
     assert_eq!(page.message("scene").await["camera"], camera(2.0));
     let condition = |picture: &Picture| picture.is_finished && picture.seq == 1;
-    assert_ne!(page.wait_for_picture(condition).await.file, first.file);
+    assert_ne!(page.wait_for_picture(condition).await.files, first.files);
 
     page.change_settings(2, json!({ "camera_angle": 3, "gated": true })).await;
     page.set_camera(3, 1.0, false).await;
@@ -74,7 +74,7 @@ async fn an_animated_camera_moves_unless_the_user_has_moved_it_meanwhile() {
     assert_eq!(page.message("scene").await["seq"], 2);
     page.set_camera(4, 1.0, false).await;
     let condition = |picture: &Picture| picture.is_finished && picture.seq == 4;
-    assert_eq!(page.wait_for_picture(condition).await.file, first.file);
+    assert_eq!(page.wait_for_picture(condition).await.files, first.files);
     page.send_json(json!({ "type": "export", "id": 1, "width": 30, "height": 20 })).await;
     let exported = page.message("exported").await;
     let exported: Value = serde_json::from_str(exported["json"].as_str().unwrap()).unwrap();

@@ -32,7 +32,8 @@ pub struct Picture {
     pub size: (u16, u16),
     pub samples: u16,
     pub of_samples: u16,
-    pub file: Vec<u8>,
+    /// The files, each with x, y, width and height of its place.
+    pub files: Vec<([u16; 4], Vec<u8>)>,
 }
 
 pub const JPEG: u8 = 1;
@@ -55,13 +56,34 @@ impl Picture {
             size: (read_u16(12), read_u16(14)),
             samples: read_u16(16),
             of_samples: read_u16(18),
-            file: bytes[20..].to_vec(),
+            files: if bytes[0] == SAVED {
+                vec![([0; 4], bytes[20..].to_vec())]
+            } else {
+                placed_files(&bytes[20..])
+            },
         }
     }
 
-    pub fn decode(&self) -> image::DynamicImage {
-        image::load_from_memory(&self.file).unwrap()
+    /// The file of the whole picture.
+    pub fn file(&self) -> &[u8] {
+        &self.files[0].1
     }
+
+    pub fn decode(&self) -> image::DynamicImage {
+        image::load_from_memory(self.file()).unwrap()
+    }
+}
+
+/// The files of a picture with their places.
+fn placed_files(mut bytes: &[u8]) -> Vec<([u16; 4], Vec<u8>)> {
+    let mut files = Vec::new();
+    while let Some((head, rest)) = bytes.split_at_checked(12) {
+        let place = [0, 2, 4, 6].map(|i| u16::from_le_bytes([head[i], head[i + 1]]));
+        let length = u32::from_le_bytes(head[8..].try_into().unwrap()) as usize;
+        files.push((place, rest[..length].to_vec()));
+        bytes = &rest[length..];
+    }
+    files
 }
 
 impl TestPage {

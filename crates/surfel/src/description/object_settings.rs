@@ -4,7 +4,7 @@ use super::clip_rule::{ClipBoxRule, ClipPlaneRule};
 use super::color_rule::{ColorSourceRule, ColormapRule};
 use super::crop::{Crop, CropRule};
 use super::keys::{KeyedSettings, settings};
-use super::point_filter::{Classes, RETURNS, Returns, point_filter};
+use super::point_filter::{Classes, RETURNS, Returns, point_filters};
 use super::rule::{Checked, Flag, Interval, OneOf, POSITIVE, Rule, Text, count, parsed};
 use super::{Invalid, Part};
 use serde_json::Value;
@@ -249,8 +249,19 @@ impl PreparationSettings {
     ///
     /// Fails if the file of the area that is kept has no polygons.
     pub fn point_filter(&self) -> Result<Option<PointFilter>, Invalid> {
+        let filters = self.point_filters()?.into_iter().map(|(_, filter)| filter);
+        let filters: Vec<PointFilter> = filters.collect();
+        Ok((!filters.is_empty()).then(|| PointFilter::all(filters)))
+    }
+
+    /// Returns the filters that the settings make, each with the key of its setting.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the file of the area that is kept has no polygons.
+    pub fn point_filters(&self) -> Result<Vec<(&'static str, PointFilter)>, Invalid> {
         let area = self.crop.as_ref().map(Crop::filter).transpose()?;
-        Ok(point_filter(self.filter.as_ref(), self.class.as_deref(), self.returns, area))
+        Ok(point_filters(self.filter.as_ref(), self.class.as_deref(), self.returns, area))
     }
 
     /// Returns true if not all points are kept.

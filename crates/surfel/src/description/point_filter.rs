@@ -46,13 +46,13 @@ impl Rule<Vec<u8>> for Classes {
     }
 }
 
-/// Returns the filter that all settings make together; `None` if all points are kept.
-pub fn point_filter(
+/// Returns the filters that the settings make, each with the key of its setting.
+pub fn point_filters(
     filter: Option<&PointFilter>,
     classes: Option<&[u8]>,
     returns: Option<Returns>,
     area: Option<PointFilter>,
-) -> Option<PointFilter> {
+) -> Vec<(&'static str, PointFilter)> {
     let classes = classes.map(PointFilter::classes);
     let returns = returns.map(|returns| {
         let condition = match returns {
@@ -62,7 +62,7 @@ pub fn point_filter(
         };
         condition.parse().expect("the condition is valid")
     });
-    let filters: Vec<PointFilter> =
-        filter.cloned().into_iter().chain(classes).chain(returns).chain(area).collect();
-    (!filters.is_empty()).then(|| PointFilter::all(filters))
+    let filters =
+        [("filter", filter.cloned()), ("class", classes), ("returns", returns), ("crop", area)];
+    filters.into_iter().filter_map(|(key, filter)| Some((key, filter?))).collect()
 }

@@ -1,6 +1,7 @@
 //! Draws rectangles, lines and text onto a picture, in linear light.
 
 use ab_glyph::{Font, FontRef, Glyph, PxScale, ScaleFont, point};
+use std::ops::Range;
 use std::sync::LazyLock;
 use surfel_core::image::{Image, decode_srgb8};
 
@@ -30,9 +31,21 @@ pub(super) struct Ink {
     pub opacity: f32,
 }
 
-/// A picture that is drawn on.
+/// A picture, or a part of one, that is drawn on.
 pub(super) struct Canvas<'a> {
     image: &'a mut Image,
+    /// The corner of the image at the upper left in the picture.
+    origin: [f32; 2],
+    /// Width and height of the picture.
+    size: [f32; 2],
+}
+
+impl Area {
+    /// Returns the columns and rows of the pixels that lie within a picture of this size.
+    pub fn pixels(&self, (width, height): (u32, u32)) -> (Range<u32>, Range<u32>) {
+        let columns = pixels(self.x, self.x + self.width, width);
+        (columns, pixels(self.y, self.y + self.height, height))
+    }
 }
 
 impl Ink {
@@ -45,23 +58,30 @@ impl Ink {
 impl<'a> Canvas<'a> {
     /// A canvas on `image`.
     pub fn new(image: &'a mut Image) -> Self {
-        Self { image }
+        let size = [image.width as f32, image.height as f32];
+        Self { image, origin: [0.0; 2], size }
     }
 
-    /// Returns width and height in pixels.
+    /// A canvas on the part of a picture of `size` that begins at `origin`. Positions are those in the picture.
+    pub fn of_part(image: &'a mut Image, origin: [f32; 2], size: [f32; 2]) -> Self {
+        Self { image, origin, size }
+    }
+
+    /// Returns width and height of the picture in pixels.
     pub fn size(&self) -> [f32; 2] {
-        [self.image.width as f32, self.image.height as f32]
+        self.size
     }
 
     /// Fills a rectangle; its edges are antialiased.
     pub fn fill(&mut self, area: Area, ink: Ink) {
+        let area = self.local(area);
         let (right, bottom) = (area.x + area.width, area.y + area.height);
         let overlap = |pixel: u32, low: f32, high: f32| {
             (high.min(pixel as f32 + 1.0) - low.max(pixel as f32)).max(0.0)
         };
-        let [width, height] = [self.image.width, self.image.height];
-        for y in pixels(area.y, bottom, height) {
-            for x in pixels(area.x, right, width) {
+        let (columns, rows) = area.pixels((self.image.width, self.image.height));
+        for y in rows {
+            for x in columns.clone() {
                 let coverage = overlap(x, area.x, right) * overlap(y, area.y, bottom);
                 self.blend(x, y, ink, coverage);
             }
@@ -71,6 +91,8 @@ impl<'a> Canvas<'a> {
     /// Fills the triangle of three corners; its edges are antialiased by 16 samples a pixel.
     pub fn fill_triangle(&mut self, corners: [[f32; 2]; 3], ink: Ink) {
         const N: u32 = 4;
+        let [left, top] = self.origin;
+        let corners = corners.map(|[x, y]| [x - left, y - top]);
         let [a, b, c] = corners;
         let side = |a: [f32; 2], b: [f32; 2], p: [f32; 2]| {
             (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
@@ -100,12 +122,14 @@ impl<'a> Canvas<'a> {
 
     /// Writes a line of text whose capitals stand on `baseline`.
     pub fn write(&mut self, text: &str, x: f32, baseline: f32, size: f32, ink: Ink) {
-        for glyph in glyphs(text, size, x, baseline) {
+        let [left, top] = self.origin;
+        let (width, height) = (self.image.width as f32, self.image.height as f32);
+        for glyph in glyphs(text, size, x - left, baseline - top) {
             let Some(outline) = FONT.outline_glyph(glyph) else { continue };
             let bounds = outline.px_bounds();
             outline.draw(|column, row, coverage| {
                 let (x, y) = (bounds.min.x + column as f32, bounds.min.y + row as f32);
-                if 0.0 <= x && 0.0 <= y && x < self.size()[0] && y < self.size()[1] {
+                if 0.0 <= x && 0.0 <= y && x < width && y < height {
                     self.blend(x as u32, y as u32, ink, coverage.min(1.0));
                 }
             });
@@ -114,29 +138,20 @@ impl<'a> Canvas<'a> {
 
     /// Returns the fraction of an area that a surface covers.
     pub fn coverage(&self, area: Area) -> f32 {
-        self.mean(area, |image, i| image.coverage[i])
+        coverage(self.image, self.local(area))
     }
 
     /// Returns the mean luminance of an area, up to 1 a pixel; transparent pixels count as white.
     pub fn luminance(&self, area: Area) -> f32 {
-        self.mean(area, |image, i| {
-            let [r, g, b, a] = image.color[i];
+        mean(self.image, self.local(area), |i| {
+            let [r, g, b, a] = self.image.color[i];
             let luminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
             (luminance + 1.0 - a).clamp(0.0, 1.0)
         })
     }
 
-    fn mean(&self, area: Area, value: impl Fn(&Image, usize) -> f32) -> f32 {
-        let [width, height] = [self.image.width, self.image.height];
-        let columns = pixels(area.x, area.x + area.width, width);
-        let (mut sum, mut n) = (0.0f64, 0usize);
-        for y in pixels(area.y, area.y + area.height, height) {
-            for x in columns.clone() {
-                sum += f64::from(value(self.image, y as usize * width as usize + x as usize));
-                n += 1;
-            }
-        }
-        (sum / n.max(1) as f64) as f32
+    fn local(&self, area: Area) -> Area {
+        Area { x: area.x - self.origin[0], y: area.y - self.origin[1], ..area }
     }
 
     fn blend(&mut self, x: u32, y: u32, ink: Ink, coverage: f32) {
@@ -150,6 +165,24 @@ impl<'a> Canvas<'a> {
     }
 }
 
+/// Returns the fraction of an area of an image that a surface covers.
+pub(super) fn coverage(image: &Image, area: Area) -> f32 {
+    mean(image, area, |i| image.coverage[i])
+}
+
+/// Returns the mean of a value over the pixels of an area.
+fn mean(image: &Image, area: Area, value: impl Fn(usize) -> f32) -> f32 {
+    let (columns, rows) = area.pixels((image.width, image.height));
+    let (mut sum, mut n) = (0.0f64, 0usize);
+    for y in rows {
+        for x in columns.clone() {
+            sum += f64::from(value(y as usize * image.width as usize + x as usize));
+            n += 1;
+        }
+    }
+    (sum / n.max(1) as f64) as f32
+}
+
 /// Returns the width of a line of text in pixels.
 pub(super) fn text_width(text: &str, size: f32) -> f32 {
     let font = FONT.as_scaled(PxScale::from(size));
@@ -158,15 +191,21 @@ pub(super) fn text_width(text: &str, size: f32) -> f32 {
         .map_or(0.0, |last| last.position.x + font.h_advance(last.id))
 }
 
+/// More characters than fit in any picture.
+const MAX_CHARACTERS: usize = 10_000;
+
 /// Returns the start of a text that fits in `width` pixels, with an ellipsis if it is cut.
 pub(super) fn cut_to_width(text: &str, size: f32, width: f32) -> String {
-    if text_width(text, size) <= width {
+    let characters: Vec<char> = text.chars().take(MAX_CHARACTERS).collect();
+    if characters.len() < MAX_CHARACTERS && text_width(text, size) <= width {
         return text.to_owned();
     }
-    let characters: Vec<char> = text.chars().collect();
     let cut = |n: usize| characters[..n].iter().collect::<String>().trim_end().to_owned() + "…";
-    let fits = |n: &usize| text_width(&cut(*n), size) <= width;
-    (1..characters.len()).rev().find(fits).map(cut).unwrap_or_default()
+    let lengths: Vec<usize> = (1..characters.len()).collect();
+    match lengths.partition_point(|n| text_width(&cut(*n), size) <= width) {
+        0 => String::new(),
+        n => cut(n),
+    }
 }
 
 /// Returns the glyphs of a line of text. Characters that the font lacks become its box.
@@ -186,7 +225,7 @@ fn glyphs(text: &str, size: f32, x: f32, baseline: f32) -> Vec<Glyph> {
 }
 
 /// Returns the pixels from `low` to `high` that lie within a picture of `n` pixels.
-fn pixels(low: f32, high: f32, n: u32) -> std::ops::Range<u32> {
+fn pixels(low: f32, high: f32, n: u32) -> Range<u32> {
     let end = (high.ceil().max(0.0) as u32).min(n);
     (low.floor().max(0.0) as u32).min(end)..end
 }

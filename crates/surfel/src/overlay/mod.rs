@@ -3,8 +3,15 @@
 mod canvas;
 mod ticks;
 mod legend_block;
+mod block;
+mod enlarged;
 
-use canvas::{Area, Canvas, Ink, cut_to_width, text_width};
+pub use block::Style;
+pub use enlarged::Patch;
+
+use block::{Block, Content, Corner, Layout};
+use canvas::{Area, Canvas, cut_to_width};
+use enlarged::Enlarged;
 use legend_block::LegendBlock;
 use ticks::round_step;
 
@@ -30,20 +37,16 @@ pub struct Overlay {
     pub(crate) is_fixed: bool,
 }
 
-/// A corner of a picture: whether it is at the right, and whether it is at the bottom.
-type Corner = (bool, bool);
-
 /// Corners in the order in which the legend takes them if they are equally free.
 const CORNERS: [Corner; 4] = [(true, true), (true, false), (false, false), (false, true)];
+const CAPTION_CORNER: Corner = (false, true);
+const SCALE_BAR_CORNER: Corner = (true, true);
+const NORTH_CORNER: Corner = (true, false);
 
 /// Lines of text that fit in the height of a picture.
 const LINES_PER_PICTURE: f32 = 45.0;
 /// Height of the smallest readable text in pixels.
 const MIN_TEXT_SIZE: f32 = 11.0;
-/// Opacity of the panel behind text.
-const PANEL_OPACITY: f32 = 0.65;
-/// Length of the north arrow in text heights.
-const ARROW_LENGTH: f32 = 3.0;
 
 impl Overlay {
     /// The overlay that settings ask for. `camera` is the one of the first picture; `up` and `unit` are those of the
@@ -60,151 +63,150 @@ impl Overlay {
         (up, unit): (Vec3, Unit),
         progress: &dyn Progress,
     ) -> Result<Self, Invalid> {
-        let is_orthographic = matches!(camera.projection, Projection::Orthographic { .. });
-        let needs_scale =
-            [("picture.scale_bar", picture.scale_bar()), ("picture.north", picture.north())];
-        if let Some((key, _)) = needs_scale.iter().find(|(_, asked)| *asked && !is_orthographic) {
-            let advice = "needs a camera without perspective: add --camera-orthographic";
-            return Err(Invalid::at(*key, advice));
+        if let Some(fault) = faults(picture, camera, up).into_iter().next() {
+            return Err(fault);
         }
-        let legend = LegendBlock::new(legend).filter(|_| picture.legend());
-        if picture.legend() && legend.is_none() {
+        let overlay = Self::of(picture, legend, (up, unit));
+        if picture.legend() && overlay.legend.is_none() {
             progress.note("no legend: the colours are the points' own, or one for all");
         }
-        let north = picture.north().then(|| north(up));
-        if north.is_some_and(|north| arrow(camera, north).is_none()) {
-            let advice = "north is along the view; look down, as with --camera-direction 0,0,-1";
-            return Err(Invalid::at("picture.north", advice));
-        }
-        Ok(Self {
-            legend,
+        Ok(overlay)
+    }
+
+    /// The overlay that settings ask for, for cameras that may change: pictures lack what their camera does not allow.
+    pub fn of(picture: &PictureSettings, legend: Legend, (up, unit): (Vec3, Unit)) -> Self {
+        Self {
+            legend: LegendBlock::new(legend).filter(|_| picture.legend()),
             caption: picture.caption.clone(),
             has_scale_bar: picture.scale_bar(),
             unit,
-            north,
+            north: picture.north().then(|| north(up)),
             is_fixed: false,
-        })
+        }
+    }
+
+    /// Returns true if there is nothing to draw.
+    pub fn is_empty(&self) -> bool {
+        let has_text = self.legend.is_some() || self.caption.is_some();
+        !has_text && !self.has_scale_bar && self.north.is_none()
     }
 
     /// Draws onto the picture that `camera` shows.
     pub fn draw(&self, image: &mut Image, camera: &Camera) {
+        self.draw_in_style(image, camera, &mut Style::default());
+    }
+
+    /// Draws onto the picture that `camera` shows. What `style` leaves open is chosen from the picture.
+    pub fn draw_in_style(&self, image: &mut Image, camera: &Camera, style: &mut Style) {
         let mut canvas = Canvas::new(image);
-        let [width, height] = canvas.size();
+        let blocks = self.blocks(canvas.size(), camera, style, &|area| canvas.coverage(area));
+        blocks.iter().for_each(|block| block.draw(&mut canvas, style));
+    }
+
+    /// Returns the parts of the picture of `size` that are drawn on, over a smaller `draft` that is enlarged. What
+    /// `style` leaves open is chosen from the draft.
+    pub fn patches(
+        &self,
+        draft: &Image,
+        size: (u32, u32),
+        camera: &Camera,
+        style: &mut Style,
+    ) -> Vec<Patch> {
+        let enlarged = Enlarged { draft, size };
+        let size = [size.0 as f32, size.1 as f32];
+        let blocks = self.blocks(size, camera, style, &|area| enlarged.coverage(area));
+        let patches = blocks.iter().map(|block| {
+            let mut patch = enlarged.patch(block.area);
+            let origin = [patch.x as f32, patch.y as f32];
+            block.draw(&mut Canvas::of_part(&mut patch.image, origin, size), style);
+            patch
+        });
+        patches.collect()
+    }
+
+    /// Places everything in a picture. `coverage` tells how much of an area is not free.
+    fn blocks(
+        &self,
+        picture: [f32; 2],
+        camera: &Camera,
+        style: &mut Style,
+        coverage: &dyn Fn(Area) -> f32,
+    ) -> Vec<Block<'_>> {
+        let [width, height] = picture;
         let size = (height / LINES_PER_PICTURE).max(MIN_TEXT_SIZE);
         if width < 4.0 * size || height < 4.0 * size {
-            return;
+            return Vec::new();
         }
-        let mut taken: Vec<Corner> = Vec::new();
-        let mut layout = Layout { picture: canvas.size(), margin: size, lift: 0.0 };
+        let mut layout = Layout { picture, text_size: size, lift: 0.0 };
+        let mut blocks: Vec<Block> = Vec::new();
         if let Some(caption) = &self.caption {
-            let text = cut_to_width(caption, size, width - 4.0 * size);
-            let area = draw_text(&mut canvas, &text, size, &layout);
-            taken.push((false, true));
-            if 0.5 * width < area.width {
-                layout.lift = area.height + 0.5 * size;
+            let content = Content::Caption(cut_to_width(caption, size, width - 4.0 * size));
+            let block = Block::new(content, CAPTION_CORNER, &layout);
+            if 0.5 * width < block.area.width {
+                layout.lift = block.area.height + 0.5 * size;
             }
+            blocks.push(block);
         }
-        if let (true, Projection::Orthographic { height: shown }) =
-            (self.has_scale_bar, camera.projection)
-        {
-            draw_scale_bar(&mut canvas, size, f64::from(height) / shown, self.unit, &layout);
-            taken.push((true, true));
+        if let Some(bar) = self.scale_bar(picture, camera) {
+            blocks.push(Block::new(bar, SCALE_BAR_CORNER, &layout));
         }
         if let Some(direction) = self.north.and_then(|north| arrow(camera, north)) {
-            draw_north(&mut canvas, size, direction, &layout);
-            taken.push((true, false));
+            blocks.push(Block::new(Content::North(direction), NORTH_CORNER, &layout));
         }
         if let Some(legend) = &self.legend {
-            let block = legend.size(size, height);
-            let free = CORNERS.into_iter().filter(|corner| !taken.contains(corner));
-            let areas = free.map(|corner| layout.area(corner, block));
-            let coverage = |area: &Area| if self.is_fixed { 0.0 } else { canvas.coverage(*area) };
-            let best = areas.min_by(|a, b| coverage(a).total_cmp(&coverage(b)));
-            if let Some(area) = best {
-                let ink = panel(&mut canvas, area);
-                legend.draw(&mut canvas, area, size, ink);
-            }
+            let is_free = |corner: &Corner| blocks.iter().all(|block| block.corner != *corner);
+            let free = CORNERS.into_iter().filter(is_free);
+            let places = free.map(|corner| Block::new(Content::Legend(legend), corner, &layout));
+            let covered = |block: &Block| match (style.legend_corner, self.is_fixed) {
+                (Some(kept), _) => f32::from(u8::from(block.corner != kept)),
+                (None, true) => 0.0,
+                (None, false) => coverage(block.area),
+            };
+            let best = places.min_by(|a, b| covered(a).total_cmp(&covered(b)));
+            style.legend_corner = best.as_ref().map(|block| block.corner);
+            blocks.extend(best);
         }
+        blocks
+    }
+
+    /// Returns a bar of a round length, about a fifth of the picture's width.
+    fn scale_bar(&self, [width, height]: [f32; 2], camera: &Camera) -> Option<Content<'_>> {
+        let Projection::Orthographic { height: shown } = camera.projection else { return None };
+        let pixels_per_unit = f64::from(height) / shown;
+        let length = round_step(f64::from(width) / 4.0 / pixels_per_unit);
+        let bar = (length * pixels_per_unit) as f32;
+        let is_shown = self.has_scale_bar && length.is_finite();
+        is_shown.then(|| Content::ScaleBar { text: length_text(length, self.unit), length: bar })
     }
 }
 
-/// Returns the direction of north in the picture, to the right and down; `None` if it is almost along the view.
+/// Returns why a camera does not allow what settings ask for, at the keys at fault.
+pub fn faults(picture: &PictureSettings, camera: &Camera, up: Vec3) -> Vec<Invalid> {
+    let is_orthographic = matches!(camera.projection, Projection::Orthographic { .. });
+    let fault = |key: &str| {
+        let advice = match is_orthographic {
+            false => "needs a camera without perspective: add --camera-orthographic",
+            true => "north is along the view; look down, as with --camera-direction 0,0,-1",
+        };
+        Invalid::at(format!("picture.{key}"), advice)
+    };
+    let lacks_scale = picture.scale_bar() && !is_orthographic;
+    let lacks_north = picture.north() && arrow(camera, north(up)).is_none();
+    [("scale_bar", lacks_scale), ("north", lacks_north)]
+        .into_iter()
+        .filter_map(|(key, is_fault)| is_fault.then(|| fault(key)))
+        .collect()
+}
+
+/// Returns the direction of north in the picture, to the right and down; `None` with perspective, and if it is almost
+/// along the view.
 fn arrow(camera: &Camera, north: Vec3) -> Option<[f32; 2]> {
+    let Projection::Orthographic { .. } = camera.projection else { return None };
     let [right, up, _] = camera.axes();
     let north = north.as_dvec3();
     let direction = [right.dot(north) as f32, -up.dot(north) as f32];
     let length = direction[0].hypot(direction[1]);
     (0.2 < length).then(|| direction.map(|component| component / length))
-}
-
-/// The space for blocks in the corners of a picture, in pixels.
-struct Layout {
-    /// Width and height of the picture.
-    picture: [f32; 2],
-    /// Distance of blocks from the edges.
-    margin: f32,
-    /// Height of a caption that takes the whole lower edge.
-    lift: f32,
-}
-
-impl Layout {
-    /// Returns where a block of this size lies in a corner.
-    fn area(&self, (is_right, is_bottom): Corner, [width, height]: [f32; 2]) -> Area {
-        let x = if is_right { self.picture[0] - width - self.margin } else { self.margin };
-        let bottom = self.picture[1] - height - self.margin - self.lift;
-        let y = if is_bottom { bottom.max(self.margin) } else { self.margin };
-        Area { x, y, width, height }
-    }
-}
-
-/// Draws a panel that is light on light ground and dark on dark ground, and returns the ink that is read on it.
-fn panel(canvas: &mut Canvas, area: Area) -> Ink {
-    // 0.18 is the middle grey of sRGB.
-    let is_light = 0.18 < canvas.luminance(area);
-    let (paper, ink) = if is_light { ([255; 3], [20; 3]) } else { ([10; 3], [245; 3]) };
-    canvas.fill(area, Ink { color: paper, opacity: PANEL_OPACITY });
-    Ink::opaque(ink)
-}
-
-/// Draws a line of text at the lower left, and returns the area that it takes.
-fn draw_text(canvas: &mut Canvas, text: &str, size: f32, layout: &Layout) -> Area {
-    let block = [text_width(text, size) + size, 1.6 * size];
-    let area = layout.area((false, true), block);
-    let ink = panel(canvas, area);
-    canvas.write(text, area.x + 0.5 * size, area.y + 1.1 * size, size, ink);
-    area
-}
-
-/// Draws a bar of a round length, about a fifth of the picture's width, at the lower right.
-fn draw_scale_bar(
-    canvas: &mut Canvas,
-    size: f32,
-    pixels_per_unit: f64,
-    unit: Unit,
-    layout: &Layout,
-) {
-    let [width, _] = canvas.size();
-    let length = round_step(f64::from(width) / 4.0 / pixels_per_unit);
-    if !length.is_finite() {
-        return;
-    }
-    let text = length_text(length, unit);
-    let bar = (length * pixels_per_unit) as f32;
-    let block = [bar.max(text_width(&text, size)) + size, 2.4 * size];
-    let area = layout.area((true, true), block);
-    let ink = panel(canvas, area);
-    let middle = area.x + 0.5 * area.width;
-    canvas.write(&text, middle - 0.5 * text_width(&text, size), area.y + 1.1 * size, size, ink);
-    let (left, thickness) = (middle - 0.5 * bar, (0.14 * size).max(1.0));
-    let y = area.y + 1.75 * size;
-    canvas.fill(Area { x: left, y, width: bar, height: thickness }, ink);
-    for end in [left, left + bar - thickness] {
-        let height = 0.5 * size;
-        canvas.fill(
-            Area { x: end, y: y + 0.5 * (thickness - height), width: thickness, height },
-            ink,
-        );
-    }
 }
 
 /// Writes a length of the coordinates with its unit. Coordinates without a known unit are taken as metres.
@@ -217,28 +219,11 @@ fn length_text(length: f64, unit: Unit) -> String {
     }
 }
 
-/// Draws an arrow in a direction, to the right and down, at the upper right.
-fn draw_north(canvas: &mut Canvas, size: f32, [dx, dy]: [f32; 2], layout: &Layout) {
-    let block = [(ARROW_LENGTH + 2.0) * size; 2];
-    let area = layout.area((true, false), block);
-    let ink = panel(canvas, area);
-    let middle = [area.x + 0.5 * area.width, area.y + 0.5 * area.height];
-    let at = |along: f32, aside: f32| {
-        [middle[0] + size * (along * dx - aside * dy), middle[1] + size * (along * dy + aside * dx)]
-    };
-    let (tip, tail) = (0.5 * ARROW_LENGTH - 0.5, -0.5 * ARROW_LENGTH);
-    for aside in [-0.7, 0.7] {
-        canvas.fill_triangle([at(tip, 0.0), at(tail, aside), at(tail + 0.5, 0.0)], ink);
-    }
-    let letter = at(tip + 0.75, 0.0);
-    let half_width = 0.5 * text_width("N", size);
-    canvas.write("N", letter[0] - half_width, letter[1] + 0.36 * size, size, ink);
-}
-
 #[cfg(test)]
 mod tests {
     //! Lengths, directions and places of what is drawn.
 
+    use super::canvas::text_width;
     use super::*;
     use surfel_core::math::DVec3;
     use surfel_core::progress::NoProgress;
@@ -339,7 +324,57 @@ mod tests {
             };
             assert_eq!(draw(), draw(), "{size:?}");
         }
-        assert!(cut_to_width("a long line of text", 20.0, 100.0).ends_with('…'));
+    }
+
+    #[test]
+    fn a_caption_is_cut_to_the_width_that_there_is() {
+        let cut = |n: usize, width| cut_to_width(&"a line ".repeat(n), 20.0, width);
+        for n in [2, 100, 100_000] {
+            assert!(cut(n, 100.0).ends_with('…') && text_width(&cut(n, 100.0), 20.0) <= 100.0);
+        }
+        assert_eq!(cut(1, 100.0), "a line ");
+        assert_eq!(cut(1, 1.0), "");
+    }
+
+    #[test]
+    fn patches_of_a_draft_show_what_the_whole_picture_shows() {
+        let (picture, legend) = everything();
+        let overlay = overlay(&picture, legend);
+        let mut image = Image::new(640, 360);
+        image.color.fill([0.4, 0.5, 0.6, 1.0]);
+        let mut draft = Image::new(160, 90);
+        draft.color.fill([0.4, 0.5, 0.6, 1.0]);
+        let patches = overlay.patches(&draft, (640, 360), &plan(50.0), &mut Style::default());
+        let mut patched = image.clone();
+        for Patch { x, y, image } in &patches {
+            for (i, color) in image.color.iter().enumerate() {
+                let (column, row) = (i as u32 % image.width, i as u32 / image.width);
+                patched.color[((y + row) * 640 + x + column) as usize] = *color;
+            }
+        }
+        overlay.draw(&mut image, &plan(50.0));
+        let differs = |(a, b): (&[f32; 4], &[f32; 4])| (0..4).any(|i| 0.02 < (a[i] - b[i]).abs());
+        let n_different = image.color.iter().zip(&patched.color).filter(|pair| differs(*pair));
+        assert_eq!(n_different.count(), 0);
+        assert_eq!(patches.len(), 4);
+    }
+
+    #[test]
+    fn a_kept_style_keeps_the_place_of_the_legend() {
+        let picture = PictureSettings { legend: Some(true), ..PictureSettings::default() };
+        let overlay = overlay(&picture, everything().1);
+        let mut draft = Image::new(160, 90);
+        let mut style = Style::default();
+        let mut place = |draft: &Image| {
+            let patches = overlay.patches(draft, (640, 360), &plan(50.0), &mut style);
+            (patches[0].x, patches[0].y)
+        };
+        let at_first = place(&draft);
+        draft.coverage[80 * 160 + 80..].fill(1.0);
+        assert_eq!(place(&draft), at_first);
+        style = Style::default();
+        let freest = overlay.patches(&draft, (640, 360), &plan(50.0), &mut style);
+        assert_ne!((freest[0].x, freest[0].y), at_first);
     }
 
     #[test]

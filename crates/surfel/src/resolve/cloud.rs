@@ -1,14 +1,12 @@
 //! A cloud on its way from the file to a surface: read, prepared, coloured.
 
 use crate::choice_log::NotesAsChoices;
-use crate::description::ObjectSettings;
+use crate::description::{Invalid, ObjectSettings, PreparationSettings};
 use crate::error::Result;
 use std::path::Path;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::Neighborhood;
-use surfel_core::points::{
-    PointCloud, PointFilter, PreparationReport, PreparedCloud, Radius, prepare,
-};
+use surfel_core::points::{PointCloud, PreparationReport, PreparedCloud, Radius, prepare};
 use surfel_core::progress::Progress;
 use surfel_core::scene::color::{choose_source, colorize};
 use surfel_core::scene::{CloudGeometry, Geometry, Graph, Material, Transform};
@@ -66,20 +64,25 @@ pub fn into_cloud(
     }
 }
 
-/// Drops the points of a cloud that a filter does not keep.
+/// Drops the points of a cloud that the settings do not keep.
 ///
 /// # Errors
 ///
-/// Fails if the cloud lacks a column of the filter.
+/// Fails, with the key at fault, if the cloud lacks a column of a filter, and if a filter keeps no point.
 pub fn filter_cloud(
     mut cloud: PointCloud,
-    filter: Option<&PointFilter>,
+    settings: &PreparationSettings,
     progress: &dyn Progress,
-) -> surfel_core::Result<PointCloud> {
-    if let Some(filter) = filter {
+) -> Result<PointCloud, Invalid> {
+    for (key, filter) in settings.point_filters()? {
         let n_points = cloud.len();
-        let matches = filter.matches(&cloud, 0)?;
+        let matches = filter.matches(&cloud, 0);
+        let matches = matches.map_err(|error| Invalid::at(key, error.to_string()))?;
         cloud.retain_from(0, &matches);
+        if cloud.is_empty() {
+            let message = format!("none of {n_points} points meets {filter}");
+            return Err(Invalid::at(key, message));
+        }
         progress.note(&format!("{} of {n_points} points meet {filter}", cloud.len()));
     }
     Ok(cloud)

@@ -280,14 +280,12 @@ impl LoadedScene {
         progress: &dyn Progress,
     ) -> Result<PreparedCloud> {
         let settings = self.settings_of(geometry, description);
-        // Else the points were filtered while they were read.
-        let filter = match self.keeps_all_columns {
-            true => settings.preparation.point_filter()?,
-            false => None,
+        let cloud = match self.keeps_all_columns {
+            true => filter_cloud(cloud, &settings.preparation, progress)?,
+            // The points were filtered while they were read.
+            false => cloud,
         };
-        let prepared = filter_cloud(cloud, filter.as_ref(), progress).and_then(|cloud| {
-            prepare_cloud(cloud, &settings, description.picture.seed(), progress)
-        });
+        let prepared = prepare_cloud(cloud, &settings, description.picture.seed(), progress);
         let mut prepared =
             prepared.map_err(|cause| self.content_error(geometry, description, cause))?;
         if !self.keeps_all_columns {

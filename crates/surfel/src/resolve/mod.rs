@@ -28,6 +28,7 @@ pub use memory::{MemoryEstimate, n_points, readable};
 pub(crate) use plan::coordinate_system;
 pub(crate) use sequence::Sequence;
 pub use spread::report_coverage;
+pub use station::{LocatedStation, located_stations};
 pub(crate) use sun_and_sky::{expose, expose_lamps};
 
 use crate::choice_log::{Choice, ChoiceLog};
@@ -125,8 +126,7 @@ impl AutoSettings {
     ) -> Result<Self> {
         let points = scene.sample_points();
         let up = choose_up(description.world.up, &points, &scene.file_infos, progress);
-        let clouds = scene.clouds().map(|(_, cloud)| cloud);
-        let camera = stand_at_station(&description.camera, clouds, up)?;
+        let camera = stand_at_station(&description.camera, scene, up)?;
         let mut description = SceneDescription { camera, ..description.clone() };
         choose_surface(scene, &mut description, progress);
         let bounds = inlier_bounds(&points);
