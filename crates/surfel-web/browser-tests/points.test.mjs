@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
-import { closePage, finishedPixels, openPage, pixels, QUICK, serve, settled, show, state, unfoldPanel } from './harness.mjs';
+import { closePage, finishedPixels, openPage, pixels, QUICK, serve, settled, state, unfoldPanel } from './harness.mjs';
 
 let page;
 let first;
@@ -11,7 +11,12 @@ before(async () => {
   await unfoldPanel(page);
   first = await finishedPixels(page);
 });
-beforeEach(() => show(page, {}));
+beforeEach(async () => {
+  // The last message of a refused filter has no picture.
+  await page.reload();
+  await settled(page);
+  await unfoldPanel(page);
+});
 after(() => closePage(page));
 
 const filter = () => page.locator('[data-key="filter"]');

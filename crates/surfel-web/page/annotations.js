@@ -1,4 +1,4 @@
-// Scale bar, north arrow and caption of the picture: the elements over it make room for them.
+// Legend, scale bar, north arrow and caption of the picture: the elements over it make room for them.
 
 import { isOrthographic } from './camera.js';
 
@@ -7,6 +7,7 @@ export function makeRoomForAnnotations(viewer) {
     const { scene, camera } = viewer;
     if (!scene || !camera) return;
     const shown = {
+      'has-legend': Boolean(scene.legend && viewer.legend),
       'has-caption': Boolean(scene.caption),
       'has-scale-bar': isOrthographic(camera) && Boolean(scene.scale_bar),
       'has-north': isOrthographic(camera) && Boolean(scene.north),
