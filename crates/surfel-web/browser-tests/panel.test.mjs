@@ -8,9 +8,9 @@ import {
   closePage, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, serve, settled, state, unfoldPanel, recordPictures,
 } from './harness.mjs';
 
-const { surfaceControls, colorControls, pointControls, sunControls, skyControls, pictureControls, clipControls, materialControls } = tables;
+const { surfaceControls, colorControls, pointControls, sunControls, skyControls, pictureControls, annotationControls, clipControls, materialControls } = tables;
 const OBJECTS = ['house.obj', 'town.ply'];
-const CONTROLS = [surfaceControls, colorControls, pointControls, sunControls, skyControls, pictureControls, clipControls,
+const CONTROLS = [surfaceControls, colorControls, pointControls, sunControls, skyControls, pictureControls, annotationControls, clipControls,
   ...OBJECTS.map((name) => materialControls({ name }))].flat();
 
 const BY_ELEVATION = [['color', 'elevation']];
@@ -41,6 +41,8 @@ const CASES = {
   background: { value: 'transparent' },
   'background.top': { given: [['background', 'colors']], value: '#102030' },
   'background.bottom': { given: [['background', 'colors']], value: '#a08010' },
+  legend: { given: BY_ELEVATION, value: true },
+  caption: { value: 'The town' },
   spp: { value: 3 },
   light_samples: { value: 5 },
   max_depth: { given: [['material.house.obj', 'mirror']], value: 0 },
@@ -66,7 +68,7 @@ const CASES = {
 };
 
 // Controls of other scenes have tests of their own.
-const FOR_OTHERS = ['point_size', 'returns'];
+const FOR_OTHERS = ['point_size', 'returns', 'scale_bar', 'north'];
 
 let page;
 let first;
