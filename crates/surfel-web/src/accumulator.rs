@@ -4,6 +4,7 @@ use crate::deadline::{Deadline, SLICE_TIMEOUT};
 use crate::dynamic_resolution::ResolutionController;
 use crate::encode::{self, Pixels};
 use crate::frame::{Frame, PlacedFile, Quality};
+use crate::keyframe::{Keyframe, keyframe_size};
 use crate::scene_provider::{Patch, PreparedScene};
 use crate::view::ViewState;
 use std::sync::Arc;
@@ -12,7 +13,10 @@ use surfel_core::Result;
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
 use surfel_core::progress::Progress;
-use surfel_core::render::{POINT_SIZE_RANGE, RenderRegion, RenderStats, Renderer, Settings};
+use surfel_core::render::{
+    POINT_SIZE_RANGE, RenderRegion, RenderStats, Renderer, Settings, uses_rasterizer,
+};
+use surfel_core::scene::Camera;
 
 /// The samples of a client's picture so far.
 #[derive(Default)]
@@ -35,7 +39,24 @@ pub struct Accumulator {
     slice_secs: f64,
     /// True if there is a picture worth showing that has not been sent.
     has_frame: bool,
+    /// The last picture at rest, from which drafts are drawn.
+    keyframe: Option<KeyframeOf>,
+    /// The keyframe of the picture that is being refined.
+    next_keyframe: Option<KeyframeOf>,
+    /// Duration of drawing the keyframe, in seconds.
+    keyframe_secs: f64,
     work: Work,
+}
+
+/// A keyframe with the picture that it is of.
+struct KeyframeOf {
+    keyframe: Keyframe,
+    scene: Arc<PreparedScene>,
+    /// Version of the view.
+    version: u64,
+    /// Number of rows, from the top, whose places are known.
+    n_rows: u32,
+    has_colors: bool,
 }
 
 /// Rendering work since the last picture was sent.
@@ -47,6 +68,8 @@ struct Work {
 
 /// Light samples a hit in drafts.
 const DRAFT_LIGHT_SAMPLES: u32 = 1;
+/// Fraction of the keyframe's width from which a draft is shown as it was traced.
+const SHARP_DRAFT: f64 = 0.8;
 /// JPEG quality of drafts, from 1 to 100.
 const DRAFT_JPEG_QUALITY: u8 = 80;
 /// JPEG quality of refined pictures, from 1 to 100.
@@ -86,6 +109,10 @@ impl Accumulator {
     ) -> Result<Option<Frame>> {
         let Some(prepared) = view.scene.clone() else { return Ok(None) };
         let full = prepared.render_settings;
+        self.finish_keyframe(&prepared, view.size);
+        let has_keyframe = self.keyframe.is_some();
+        let keyframe_secs = if has_keyframe { self.keyframe_secs } else { 0.0 };
+        let secs = (secs - keyframe_secs).max(0.5 * secs);
         let (width, height) = self.resolution.size(view.size, secs);
         let light_samples = full.light_samples.min(DRAFT_LIGHT_SAMPLES);
         // The page enlarges a draft to its own size, and the points with it.
@@ -107,8 +134,10 @@ impl Accumulator {
         let rendered = renderer.render(scene, &settings, &deadline);
         self.record_time(start.elapsed().as_secs_f64(), rendered.is_ok());
         self.resolution.record(n_pixels, self.slice_secs);
-        let (image, stats) = rendered?;
+        let (traced, stats) = rendered?;
         let start = Instant::now();
+        let image = self.draw_keyframe(&traced, &camera, view.size).unwrap_or(traced);
+        let (width, height) = (image.width, image.height);
         let mut files = vec![place(jpeg(&image, DRAFT_JPEG_QUALITY), (0, 0), view.size)];
         if let Some(overlay) = &prepared.overlay {
             let patches = overlay.patches(&image, view.size, &camera, view.is_moving);
@@ -150,6 +179,9 @@ impl Accumulator {
         let Some(prepared) = view.scene.clone() else { return Ok(false) };
         let (width, height) = view.size;
         let settings = Settings { width, height, ..prepared.render_settings };
+        if 0 < self.n_samples && self.extend_keyframe(renderer, view, &prepared, progress)? {
+            return Ok(true);
+        }
         if self.n_samples == settings.samples_per_pixel || self.has_frame {
             return Ok(false);
         }
@@ -222,6 +254,103 @@ impl Accumulator {
         let color = self.sum.iter().map(|sum| sum.map(|channel| scale * channel)).collect();
         let coverage = self.coverage_sum.iter().map(|sum| scale * sum).collect();
         Image { width, height, color, coverage, aovs: None }
+    }
+
+    /// Finds what the next rows of the keyframe show; returns false if all are known.
+    fn extend_keyframe(
+        &mut self,
+        renderer: &dyn Renderer,
+        view: &ViewState,
+        prepared: &Arc<PreparedScene>,
+        progress: &dyn Progress,
+    ) -> Result<bool> {
+        let size = keyframe_size(view.size);
+        let is_known = |known: &KeyframeOf| known.version == self.version;
+        if self.keyframe.as_ref().is_some_and(is_known) || uses_rasterizer(&prepared.flat)? {
+            return Ok(false);
+        }
+        let secs_per_row = 0.5 * self.secs_per_row;
+        let version = self.version;
+        let Some(scene) = self.scene(prepared.clone(), view) else { return Ok(false) };
+        let (camera, origin) = (scene.camera, scene.origin);
+        let n_known = self.next_keyframe.as_ref().filter(|next| next.version == version);
+        let first = n_known.map_or(0, |next| next.n_rows);
+        let n_rows = ((SLICE_SECS / secs_per_row.max(1e-6)) as u32).max(1);
+        let rows = (first, size.1.min(first.saturating_add(n_rows)));
+        let settings = Settings {
+            width: size.0,
+            height: size.1,
+            samples_per_pixel: 1,
+            light_samples: 1,
+            max_depth: 0,
+            with_aovs: true,
+            ..prepared.render_settings
+        };
+        let region = RenderRegion { rows, samples: (0, 1) };
+        let deadline = Deadline::new(progress, rows.1 - rows.0 == 1);
+        let Some(scene) = self.scene(prepared.clone(), view) else { return Ok(false) };
+        let (image, stats) = renderer.render_region(scene, &settings, region, &deadline)?;
+        self.work += Work::of(&stats);
+        let next = self.next_keyframe.take().filter(|next| next.version == version);
+        let mut next = next.unwrap_or_else(|| KeyframeOf {
+            keyframe: Keyframe::new(size, camera.view(origin, size.0, size.1)),
+            scene: prepared.clone(),
+            version,
+            n_rows: 0,
+            has_colors: false,
+        });
+        if let Some(aovs) = &image.aovs {
+            next.keyframe.set_rows(rows.0, aovs);
+        }
+        next.n_rows = rows.1;
+        if next.n_rows == size.1 {
+            self.keyframe = Some(next);
+        } else {
+            self.next_keyframe = Some(next);
+        }
+        Ok(true)
+    }
+
+    /// Takes the colours of the keyframe from the samples so far. Forgets keyframes of other scenes and sizes.
+    fn finish_keyframe(&mut self, prepared: &Arc<PreparedScene>, size: (u32, u32)) {
+        let is_of = |known: &KeyframeOf| {
+            let is_same_size = known.keyframe.size() == keyframe_size(size);
+            Arc::ptr_eq(&known.scene, prepared) && is_same_size
+        };
+        let is_complete = self.sum.len() == size.0 as usize * size.1 as usize;
+        let Some(known) = self.keyframe.as_mut().filter(|known| is_of(known)) else {
+            self.keyframe = None;
+            return;
+        };
+        if !known.has_colors && known.version == self.version && is_complete && 0 < self.n_samples {
+            let (sum, n_samples, n_rows) = (&self.sum, self.n_samples, self.n_rows);
+            known.keyframe.set_colors(size, |x, y| {
+                let scale = 1.0 / (n_samples + u32::from(y < n_rows)) as f32;
+                let [r, g, b, _] = sum[(y * size.0 + x) as usize];
+                [r, g, b].map(|channel| scale * channel)
+            });
+            known.has_colors = true;
+        }
+        self.keyframe.take_if(|known| !known.has_colors);
+    }
+
+    /// Draws the keyframe as the camera sees it, where that is sharper than the traced draft.
+    fn draw_keyframe(
+        &mut self,
+        traced: &Image,
+        camera: &Camera,
+        full: (u32, u32),
+    ) -> Option<Image> {
+        let KeyframeOf { keyframe, scene, .. } = self.keyframe.as_ref()?;
+        let (width, height) = keyframe_size(full);
+        if SHARP_DRAFT * f64::from(width) <= f64::from(traced.width) {
+            return None;
+        }
+        let start = Instant::now();
+        let view = camera.view(scene.flat.origin, width, height);
+        let image = keyframe.draw(&view, traced);
+        self.keyframe_secs = start.elapsed().as_secs_f64();
+        Some(image)
     }
 
     fn next_slice(&self, height: u32) -> RenderRegion {

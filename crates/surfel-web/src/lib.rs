@@ -13,6 +13,7 @@ mod access;
 mod page;
 mod deadline;
 mod dynamic_resolution;
+mod keyframe;
 mod encode;
 mod frame;
 mod view;

@@ -9,6 +9,7 @@ mod settings;
 
 pub use cpu::CpuRenderer;
 pub use footprint::POINT_SIZE_RANGE;
+pub use raster::uses_rasterizer;
 pub use region::RenderRegion;
 pub use renderer::{RenderStats, Renderer};
 pub use settings::{MAX_PIXELS, Settings};
@@ -22,7 +23,7 @@ use crate::flat::FlatScene;
 /// Fails if only some of the scene's surfaces are rasterised points: the rasterizer draws all of a scene
 /// or none of it.
 pub fn check(scene: &FlatScene) -> Result<()> {
-    raster::uses_rasterizer(scene).map(drop)
+    uses_rasterizer(scene).map(drop)
 }
 
 /// Checks surfaces before their trees are built; each is true if it is rasterised points.

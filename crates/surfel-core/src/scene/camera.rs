@@ -161,6 +161,14 @@ impl View {
         }
     }
 
+    /// Returns the size of a pixel at `position` in world units.
+    pub fn pixel_size_at(&self, position: Vec3) -> f32 {
+        match self.lens {
+            Lens::Orthographic { pixel_size } => pixel_size,
+            _ => self.pixel_size() * self.depth(position),
+        }
+    }
+
     /// Returns the distance of `position` along the view axis, or from the camera in a panorama.
     pub fn depth(&self, position: Vec3) -> f32 {
         let offset = position - self.position;

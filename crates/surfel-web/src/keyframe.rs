@@ -1,0 +1,278 @@
+//! The last picture at rest, drawn as a moved camera sees it (after Walter, Drettakis and Parker, "Interactive rendering
+//! using the render cache", 1999).
+
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+use surfel_core::image::{Aovs, Image, NO_ID, decode_srgb8, encode_srgb8};
+use surfel_core::math::Vec3;
+use surfel_core::scene::View;
+
+/// A picture whose pixels know their places in the world.
+pub struct Keyframe {
+    width: u32,
+    height: u32,
+    /// Camera of the picture.
+    view: View,
+    /// What each pixel shows, relative to the scene's origin; NaN where it shows the background.
+    positions: Vec<Vec3>,
+    /// sRGB codes of each pixel.
+    colors: Vec<[u8; 3]>,
+}
+
+/// Pixels of a keyframe at most: with 15 bytes each it takes less than 8 MiB.
+const MAX_PIXELS: f64 = 500_000.0;
+/// Side of a keyframe as a fraction of the page's picture.
+const SCALE: f64 = 0.5;
+/// Side of the square that stands for a pixel of the keyframe, in its pixels as the new camera sees them: neighbours
+/// overlap, so that no cracks open between them.
+const OVERLAP: f32 = 1.3;
+/// Largest side of a square in pixels: nearer to the camera the draft shows more.
+const MAX_SIDE: f32 = 8.0;
+/// No pixel of the keyframe.
+const NONE: u64 = u64::MAX;
+
+/// Returns width and height of the keyframe of a page's picture.
+pub fn keyframe_size((width, height): (u32, u32)) -> (u32, u32) {
+    let n_pixels = f64::from(width) * f64::from(height);
+    let scale = (MAX_PIXELS / n_pixels.max(1.0)).sqrt().min(SCALE);
+    let scaled = |length: u32| (scale * f64::from(length)).ceil().max(1.0) as u32;
+    (scaled(width), scaled(height))
+}
+
+impl Keyframe {
+    /// A keyframe of this size that shows the background everywhere.
+    pub fn new((width, height): (u32, u32), view: View) -> Self {
+        let n_pixels = width as usize * height as usize;
+        let positions = vec![Vec3::NAN; n_pixels];
+        Self { width, height, view, positions, colors: vec![[0; 3]; n_pixels] }
+    }
+
+    /// Returns its width and height.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
+    /// Sets what the rows from `first_row` on show.
+    pub fn set_rows(&mut self, first_row: u32, aovs: &Aovs) {
+        let start = first_row as usize * self.width as usize;
+        let shown = aovs.position.iter().zip(&aovs.instance_id);
+        for (position, (shown, instance)) in self.positions[start..].iter_mut().zip(shown) {
+            *position = if *instance == NO_ID { Vec3::NAN } else { *shown };
+        }
+    }
+
+    /// Takes the colours from a larger picture: `pixel` returns one of its linear colours by column and row.
+    pub fn set_colors(
+        &mut self,
+        (width, height): (u32, u32),
+        pixel: impl Fn(u32, u32) -> [f32; 3] + Sync,
+    ) {
+        let range =
+            |i: u32, n: u32, of: u32| i * of / n..((i + 1) * of / n).clamp(i * of / n + 1, of);
+        let rows = self.colors.par_chunks_mut(self.width as usize).enumerate();
+        rows.for_each(|(y, row)| {
+            for (x, color) in row.iter_mut().enumerate() {
+                let (xs, ys) =
+                    (range(x as u32, self.width, width), range(y as u32, self.height, height));
+                let n_averaged = (xs.len() * ys.len()).max(1) as f32;
+                let mut sum = Vec3::ZERO;
+                for y in ys {
+                    sum += xs.clone().map(|x| Vec3::from_array(pixel(x, y))).sum::<Vec3>();
+                }
+                *color = (sum / n_averaged).to_array().map(encode_srgb8);
+            }
+        });
+    }
+
+    /// Draws the picture that `view` shows in the keyframe's size. Pixels that the keyframe does not show are those of
+    /// `draft`, enlarged.
+    pub fn draw(&self, view: &View, draft: &Image) -> Image {
+        let nearest = self.nearest_pixels(view);
+        let mut image = Image::new(self.width, self.height);
+        let width = self.width as usize;
+        let rows = image.color.par_chunks_mut(width).zip(image.coverage.par_chunks_mut(width));
+        rows.zip(nearest.par_chunks(width)).enumerate().for_each(
+            |(y, ((color, coverage), found))| {
+                for x in 0..width {
+                    let found = found[x].load(Ordering::Relaxed);
+                    (color[x], coverage[x]) = if found == NONE {
+                        self.draft_pixel(draft, x, y)
+                    } else {
+                        let [r, g, b] = self.colors[found as u32 as usize].map(decode_srgb8);
+                        ([r, g, b, 1.0], 1.0)
+                    };
+                }
+            },
+        );
+        image
+    }
+
+    /// Returns for each pixel of the new picture a key that ends in the index of the keyframe's pixel that it shows.
+    fn nearest_pixels(&self, view: &View) -> Vec<AtomicU64> {
+        let n_pixels = self.positions.len();
+        let keys: Vec<AtomicU64> = (0..n_pixels).map(|_| AtomicU64::new(NONE)).collect();
+        self.positions.par_iter().enumerate().for_each(|(i, position)| {
+            let Some((x, y, depth)) = view.project(*position).filter(|_| position.is_finite())
+            else {
+                return;
+            };
+            let ratio = self.view.pixel_size_at(*position) / view.pixel_size_at(*position);
+            let side = (OVERLAP * ratio).ceil().clamp(1.0, MAX_SIDE);
+            let (left, top) = ((x - 0.5 * side).round(), (y - 0.5 * side).round());
+            let columns = clamped(left, side, self.width);
+            for row in clamped(top, side, self.height) {
+                for column in columns.clone() {
+                    let (dx, dy) = (column as f32 + 0.5 - x, row as f32 + 0.5 - y);
+                    let key = key(depth, dx.abs().max(dy.abs()), i as u32);
+                    let pixel = row as usize * self.width as usize + column as usize;
+                    keys[pixel].fetch_min(key, Ordering::Relaxed);
+                }
+            }
+        });
+        keys
+    }
+
+    /// Returns colour and coverage of the enlarged draft: of what is there, or of the background.
+    fn draft_pixel(&self, draft: &Image, x: usize, y: usize) -> ([f32; 4], f32) {
+        let along = |i: usize, n: u32, of: u32| {
+            let at = (i as f32 + 0.5) * of as f32 / n as f32 - 0.5;
+            let low = at.floor().clamp(0.0, of.saturating_sub(1) as f32);
+            let high = (low + 1.0).min(of.saturating_sub(1) as f32);
+            (low as usize, high as usize, (at - low).clamp(0.0, 1.0))
+        };
+        let (x0, x1, fx) = along(x, self.width, draft.width);
+        let (y0, y1, fy) = along(y, self.height, draft.height);
+        let corners = [
+            (x0, y0, (1.0 - fx) * (1.0 - fy)),
+            (x1, y0, fx * (1.0 - fy)),
+            (x0, y1, (1.0 - fx) * fy),
+            (x1, y1, fx * fy),
+        ];
+        let corners = corners.map(|(x, y, weight)| (y * draft.width as usize + x, weight));
+        let coverage: f32 = corners.iter().map(|(i, weight)| weight * draft.coverage[*i]).sum();
+        // Things and background are not mixed, so that edges stay sharp.
+        let is_thing = 0.5 <= coverage;
+        let (mut color, mut total) = ([0.0; 4], 0.0);
+        for (i, weight) in corners {
+            let covered = draft.coverage[i];
+            let weight = weight * if is_thing { covered } else { 1.0 - covered };
+            for (sum, channel) in color.iter_mut().zip(draft.color[i]) {
+                *sum += weight * channel;
+            }
+            total += weight;
+        }
+        (color.map(|channel| channel / total), f32::from(u8::from(is_thing)))
+    }
+}
+
+/// Returns a key that is less for what meets the pixel's centre, which overlaps of others do not hide, so that edges stay
+/// in place; then for what is nearer; at about the same depth for what is nearer to the pixel's centre.
+fn key(depth: f32, offset: f32, index: u32) -> u64 {
+    // Positive floats are ordered as their bits; ten bits of the mantissa tell a thousandth.
+    let depth = u64::from(depth.max(0.0).to_bits() >> 13);
+    let offset = (16.0 * offset).min(255.0) as u64;
+    let is_overlap = u64::from(8 < offset);
+    is_overlap << 60 | depth << 40 | offset << 32 | u64::from(index)
+}
+
+/// Returns the pixels of a span that lie in a picture of `n` pixels.
+fn clamped(start: f32, side: f32, n: u32) -> std::ops::Range<u32> {
+    let end = (start + side).clamp(0.0, n as f32) as u32;
+    (start.clamp(0.0, n as f32) as u32).min(end)..end
+}
+
+#[cfg(test)]
+mod tests {
+    //! Keyframes seen by the same camera and by others.
+
+    use super::*;
+    use surfel_core::math::DVec3;
+    use surfel_core::scene::{Camera, Projection};
+
+    const SIZE: (u32, u32) = (40, 30);
+
+    /// A camera that looks down at 40 x 30 units of the floor, moved to the right.
+    fn view(x: f64) -> View {
+        let camera = Camera {
+            position: DVec3::new(x, 0.0, 100.0),
+            focal_point: DVec3::new(x, 0.0, 0.0),
+            view_up: DVec3::Y,
+            projection: Projection::Orthographic { height: 30.0 },
+        };
+        camera.view(DVec3::ZERO, SIZE.0, SIZE.1)
+    }
+
+    /// The floor with columns of different greys, and a wall of one pixel that stands 50 higher in column 10.
+    fn keyframe() -> Keyframe {
+        let mut keyframe = Keyframe::new(SIZE, view(0.0));
+        let mut aovs = Image::with_aovs(SIZE.0, SIZE.1).aovs.unwrap();
+        for i in 0..aovs.position.len() {
+            let (x, y) = (i as u32 % SIZE.0, i as u32 / SIZE.0);
+            let position = view(0.0).ray(x as f32 + 0.5, y as f32 + 0.5).at(100.0);
+            aovs.position[i] = position.with_z(if x == 10 { 50.0 } else { 0.0 });
+            aovs.instance_id[i] = 0;
+        }
+        keyframe.set_rows(0, &aovs);
+        keyframe.set_colors(SIZE, |x, _| [decode_srgb8(6 * x as u8); 3]);
+        keyframe
+    }
+
+    fn draft() -> Image {
+        let mut draft = Image::new(4, 3);
+        draft.color.fill([0.0, 1.0, 0.0, 1.0]);
+        draft
+    }
+
+    fn codes(image: &Image) -> Vec<u8> {
+        image.color[..40].iter().map(|[r, ..]| encode_srgb8(*r)).collect()
+    }
+
+    #[test]
+    fn the_same_camera_sees_the_same_picture() {
+        let image = keyframe().draw(&view(0.0), &draft());
+        assert_eq!(codes(&image), (0..40).map(|x| 6 * x).collect::<Vec<u8>>());
+        assert!(image.coverage.iter().all(|coverage| *coverage == 1.0));
+    }
+
+    #[test]
+    fn what_was_not_seen_is_that_of_the_draft() {
+        let image = keyframe().draw(&view(5.0), &draft());
+        // The last column overlaps what is beyond by one pixel.
+        let expected: Vec<u8> = (5..40).map(|x| 6 * x).chain([234, 0, 0, 0, 0]).collect();
+        assert_eq!(codes(&image), expected);
+        assert_eq!((image.color[38], image.coverage[38]), ([0.0, 1.0, 0.0, 1.0], 0.0));
+        // Nothing of it is seen from behind.
+        let behind = Camera {
+            position: DVec3::new(0.0, 0.0, 200.0),
+            focal_point: DVec3::new(0.0, 0.0, 300.0),
+            view_up: DVec3::Y,
+            projection: Projection::Perspective { view_angle_deg: 40.0 },
+        };
+        let image = keyframe().draw(&behind.view(DVec3::ZERO, SIZE.0, SIZE.1), &draft());
+        assert!(image.color.iter().all(|[r, g, ..]| *r == 0.0 && 0.999 < *g));
+    }
+
+    #[test]
+    fn the_nearer_of_two_surfaces_hides_the_other() {
+        let from_left = Camera {
+            position: DVec3::new(-40.0, 0.0, 100.0),
+            focal_point: DVec3::new(-10.0, 0.0, 0.0),
+            view_up: DVec3::Y,
+            projection: Projection::Orthographic { height: 30.0 },
+        };
+        let view = from_left.view(DVec3::ZERO, SIZE.0, SIZE.1);
+        let image = keyframe().draw(&view, &draft());
+        // The wall appears where its top projects to, before the floor that lies there.
+        let (x, y, _) = view.project(Vec3::new(-9.5, 0.5, 50.0)).unwrap();
+        let seen = image.color[y as usize * 40 + x as usize][0];
+        assert_eq!(encode_srgb8(seen), 60);
+    }
+
+    #[test]
+    fn keyframes_have_half_the_width_and_a_limit() {
+        assert_eq!(keyframe_size((1128, 872)), (564, 436));
+        let (width, height) = keyframe_size((3840, 2160));
+        assert!((460_000..510_000).contains(&(width * height)), "{width}x{height}");
+        assert_eq!(keyframe_size((1, 1)), (1, 1));
+    }
+}
