@@ -28,7 +28,8 @@ pub trait SceneProvider: Send + Sync + 'static {
     /// The settings that the user gave at startup, without automatic choices.
     fn startup_settings(&self) -> SettingsMap;
 
-    /// A scene of a subset of the points, to show until `prepare` is done; none if it would not be faster.
+    /// A scene of a subset of the points, to show until `prepare` is done; none if it would not be faster, or if the
+    /// points are prepared already.
     fn preview(
         &self,
         settings: &SettingsMap,

@@ -27,12 +27,12 @@ pub async fn run(
     let info = state.info(&*provider);
     let welcome = json!({ "type": "welcome", "scene": settings, "info": info });
     send_json(&out, &welcome).await;
-    let mut updater = SceneUpdater { state, client, pending, out, provider, settings };
-    let first = updater.pending.take().await;
-    updater.show_preview(&first).await;
-    updater.apply(first).await;
+    let shows_preview = false;
+    let mut updater =
+        SceneUpdater { state, client, pending, out, provider, settings, shows_preview };
     loop {
         let change = updater.pending.take().await;
+        updater.show_preview(&change).await;
         updater.apply(change).await;
     }
 }
@@ -72,18 +72,33 @@ struct SceneUpdater {
     pending: Arc<PendingChanges>,
     out: mpsc::Sender<Outgoing>,
     provider: Arc<dyn SceneProvider>,
-    /// The settings of the scene that the page shows.
+    /// The settings of the last whole scene.
     settings: SettingsMap,
+    /// True if the page shows a preview of later settings.
+    shows_preview: bool,
 }
 
 impl SceneUpdater {
-    /// Shows a subset of the points before the whole scene is prepared.
+    /// Shows a subset of the points before the whole scene is prepared, if that takes long.
     async fn show_preview(&mut self, change: &SettingsChange) {
         let (provider, settings) = (self.provider.clone(), self.settings_with(change));
         let reporter = self.reporter();
         let task = move || provider.preview(&settings, &reporter);
         if let Ok(Some(Ok(scene))) = self.state.run_blocking(task).await {
             self.show(scene, change).await;
+            self.shows_preview = true;
+        }
+    }
+
+    /// Replaces a preview of settings that were rejected by the last whole scene.
+    async fn take_back_preview(&mut self, change: &SettingsChange) {
+        let (provider, settings) = (self.provider.clone(), self.settings.clone());
+        let reporter = self.reporter();
+        let task = move || provider.prepare(&settings, &reporter);
+        if let Ok(Ok(scene)) = self.state.run_blocking(task).await {
+            self.shows_preview = false;
+            let kept = SettingsChange { seq: change.seq, ..SettingsChange::default() };
+            self.show(scene, &kept).await;
         }
     }
 
@@ -94,9 +109,16 @@ impl SceneUpdater {
         let prepared =
             self.state.run_blocking(move || provider.prepare(&settings, &reporter)).await;
         match prepared.flatten() {
-            Ok(scene) => self.show(scene, &change).await,
+            Ok(scene) => {
+                self.settings = scene.settings.clone();
+                self.shows_preview = false;
+                self.show(scene, &change).await;
+            }
             Err(Error::Cancelled) => self.pending.requeue(change),
             Err(error) => {
+                if self.shows_preview {
+                    self.take_back_preview(&change).await;
+                }
                 send_json(&self.out, &rejection(RequestRef::Seq(change.seq), &error)).await;
                 self.client.set_moving(change.is_moving);
                 // A page whose first settings are invalid shows the initial scene.
@@ -122,8 +144,7 @@ impl SceneUpdater {
         settings
     }
 
-    async fn show(&mut self, scene: PreparedScene, change: &SettingsChange) {
-        self.settings = scene.settings.clone();
+    async fn show(&self, scene: PreparedScene, change: &SettingsChange) {
         let camera_settings = scene.settings.get("camera").cloned().unwrap_or_default();
         let shown_camera = scene.animated_camera.as_ref().unwrap_or(&camera_settings);
         // Pictures of the previous scene may still be on their way; the number tells them apart.

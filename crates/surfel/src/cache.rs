@@ -49,6 +49,16 @@ impl<T> Lru2<T> {
         Ok(made)
     }
 
+    /// Returns true if the result for `key` is known, false too while another is made.
+    pub fn contains(&self, key: u64) -> bool {
+        let entries = match self.0.try_lock() {
+            Ok(entries) => entries,
+            Err(TryLockError::Poisoned(error)) => PoisonError::into_inner(error),
+            Err(TryLockError::WouldBlock) => return false,
+        };
+        entries.iter().any(|(known, _)| *known == key)
+    }
+
     /// Unlike `Mutex::lock`, stops waiting when the caller is cancelled.
     fn lock(&self, progress: &dyn Progress) -> Result<MutexGuard<'_, Entries<T>>> {
         loop {
@@ -88,6 +98,7 @@ mod tests {
             });
             assert_eq!(*made.unwrap(), key);
         }
+        assert_eq!([1, 2, 3].map(|key| cache.contains(key)), [true, true, false]);
         assert_eq!(n_made, 4);
     }
 }

@@ -29,13 +29,21 @@ use surfel_core::trace::Simd;
 #[derive(Debug)]
 pub struct LiveScene {
     loaded: LoadedScene,
-    prepared: Lru2<Vec<PreparedCloud>>,
-    trees: Lru2<SceneTrees>,
+    made: Made,
+    /// Apart, so that previews leave what was made of all points.
+    made_for_previews: Made,
     renderer: CpuRenderer,
     /// Walls that the first camera hides; they stay hidden while it moves, so that no tree is built again.
     hidden_walls: OnceLock<Vec<ClipPlane>>,
     /// Threads beside those that draw: preparation for one viewer must not hold up another's picture.
     pool: rayon::ThreadPool,
+}
+
+/// What was made for the last descriptions.
+#[derive(Debug, Default)]
+struct Made {
+    prepared: Lru2<Vec<PreparedCloud>>,
+    trees: Lru2<SceneTrees>,
 }
 
 /// Trees over the points of a scene, and what shows which point is which.
@@ -91,8 +99,8 @@ impl LiveScene {
         let pool = pool.map_err(|error| Error::Unfit(format!("{advice}: {error}")))?;
         Ok(Self {
             loaded,
-            prepared: Lru2::default(),
-            trees: Lru2::default(),
+            made: Made::default(),
+            made_for_previews: Made::default(),
             renderer: CpuRenderer { simd: Simd::detect() },
             hidden_walls: OnceLock::new(),
             pool,
@@ -109,6 +117,11 @@ impl LiveScene {
         self.renderer.simd
     }
 
+    /// Returns true if the clouds were prepared under a description lately.
+    pub fn is_prepared(&self, description: &SceneDescription) -> bool {
+        self.made.prepared.contains(preparation_key(description))
+    }
+
     /// Returns the scene under a description at the description's time.
     ///
     /// # Errors
@@ -116,6 +129,28 @@ impl LiveScene {
     /// Fails for settings that do not fit the data, and if cancelled.
     pub fn view(
         &self,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<LiveView> {
+        self.view_of(&self.made, description, progress)
+    }
+
+    /// Returns the scene under a description that keeps few points, to be shown for a moment.
+    ///
+    /// # Errors
+    ///
+    /// Fails as [`view`](Self::view) does.
+    pub fn preview(
+        &self,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<LiveView> {
+        self.view_of(&self.made_for_previews, description, progress)
+    }
+
+    fn view_of(
+        &self,
+        made: &Made,
         description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<LiveView> {
@@ -129,11 +164,11 @@ impl LiveScene {
         let exposure = description.light.exposure();
         // An automatic exposure is chosen at second 0, as for a movie. Otherwise the first file of a sequence is not read.
         let metered_at = if exposure == Exposure::Auto { 0.0 } else { time_secs };
-        let (_, metered) = self.flat_at(metered_at, description, &auto, progress)?;
+        let (_, metered) = self.flat_at(made, metered_at, description, &auto, progress)?;
         let stops = self
             .pool
             .install(|| exposure_stops(exposure, &self.renderer, &metered, &settings, progress))?;
-        let (trees, mut flat) = self.flat_at(time_secs, description, &auto, progress)?;
+        let (trees, mut flat) = self.flat_at(made, time_secs, description, &auto, progress)?;
         expose(&mut flat, stops);
         complete.light.exposure = Some(Exposure::Stops(stops.into()));
         let moves_camera = auto.moves_camera(&self.loaded);
@@ -154,12 +189,13 @@ impl LiveScene {
 
     fn flat_at(
         &self,
+        made: &Made,
         time_secs: f64,
         description: &SceneDescription,
         auto: &AutoSettings,
         progress: &dyn Progress,
     ) -> Result<(Arc<SceneTrees>, FlatScene)> {
-        let trees = self.trees_at(time_secs, description, auto, progress)?;
+        let trees = self.trees_at(made, time_secs, description, auto, progress)?;
         let mut flat = trees.flat.clone();
         flat.lights.clone_from(&auto.lights);
         flat.background = description.picture.background();
@@ -180,6 +216,7 @@ impl LiveScene {
     /// Everything but lights and camera, which change without any tree.
     fn trees_at(
         &self,
+        made: &Made,
         time_secs: f64,
         description: &SceneDescription,
         auto: &AutoSettings,
@@ -188,8 +225,8 @@ impl LiveScene {
         let preparation = preparation_key(description);
         let frames = self.loaded.sequence_frames_at(time_secs);
         let trees = tree_key(description, preparation, auto, &frames);
-        self.trees.get_or_make(trees, progress, || {
-            let clouds = self.prepared.get_or_make(preparation, progress, || {
+        made.trees.get_or_make(trees, progress, || {
+            let clouds = made.prepared.get_or_make(preparation, progress, || {
                 self.pool.install(|| self.loaded.prepared(description, progress))
             })?;
             self.pool.install(|| self.build(time_secs, description, &clouds, auto, progress))

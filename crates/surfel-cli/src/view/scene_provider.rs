@@ -74,6 +74,25 @@ impl FileSceneProvider {
         self.scene.view(description, progress).map_err(rejection)
     }
 
+    fn prepare_by(
+        &self,
+        settings: &SettingsMap,
+        view: impl FnOnce(&SceneDescription) -> Result<LiveView>,
+    ) -> Result<PreparedScene> {
+        let description = self.read(settings)?;
+        let view = view(&description)?;
+        let camera = || Value::Object(write_table(&CameraSettings::of(&view.flat.camera)));
+        Ok(PreparedScene {
+            animated_camera: view.moves_camera.then(camera),
+            render_settings: view.settings,
+            legend: legend_json(&view.trees.legend),
+            overlay: page_overlay(view.overlay()),
+            describe: self.describer(&view, description.output.time()),
+            settings: self.complete_settings(view.description, &description),
+            flat: view.flat,
+        })
+    }
+
     fn complete_settings(
         &self,
         complete: SceneDescription,
@@ -251,28 +270,22 @@ impl SceneProvider for FileSceneProvider {
         if n_points < 3 * PREVIEW_POINTS || settings.contains_key("subsample") {
             return None;
         }
+        if self.read(settings).is_ok_and(|description| self.scene.is_prepared(&description)) {
+            return None;
+        }
         let mut reduced = settings.clone();
         reduced.insert("subsample".into(), json!(format!("random:{PREVIEW_POINTS}")));
         // Fewer points surround less.
         reduced.insert("edge_test".into(), json!("off"));
-        let scene = self.prepare(&reduced, progress);
+        let scene = self.prepare_by(&reduced, |description| {
+            self.scene.preview(description, progress).map_err(rejection)
+        });
         // The page keeps its settings; what was chosen from few points is chosen again from all.
         Some(scene.map(|scene| PreparedScene { settings: settings.clone(), ..scene }))
     }
 
     fn prepare(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<PreparedScene> {
-        let description = self.read(settings)?;
-        let view = self.view(&description, progress)?;
-        let camera = || Value::Object(write_table(&CameraSettings::of(&view.flat.camera)));
-        Ok(PreparedScene {
-            animated_camera: view.moves_camera.then(camera),
-            render_settings: view.settings,
-            legend: legend_json(&view.trees.legend),
-            overlay: page_overlay(view.overlay()),
-            describe: self.describer(&view, description.output.time()),
-            settings: self.complete_settings(view.description, &description),
-            flat: view.flat,
-        })
+        self.prepare_by(settings, |description| self.view(description, progress))
     }
 
     fn render_png(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<Vec<u8>> {

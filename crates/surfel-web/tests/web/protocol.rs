@@ -67,7 +67,7 @@ async fn rejections_name_the_key_and_keep_the_old_settings() {
     page.send_json(json!({ "type": "camera", "seq": 4, "camera": camera })).await;
     let error = page.message("error").await;
     assert_eq!((&error["seq"], &error["key"]), (&json!(4), &json!("camera.view_angle")));
-    page.change_settings(5, json!({ "preview": false })).await;
+    page.change_settings(5, json!({ "slow": 0 })).await;
     let scene = page.message("scene").await;
     assert_eq!((&scene["seq"], &scene["scene"]["tint"]), (&json!(5), &json!(0)));
 }
@@ -157,7 +157,7 @@ async fn settings_are_exported_and_loaded() {
     let load = |id: u32, text: &str| json!({ "type": "loadScene", "id": id, "name": "a.json", "text": text });
     page.send_json(load(2, "{")).await;
     assert_eq!(page.message("error").await["id"], 2);
-    page.send_json(load(3, r#"{"preview":0}"#)).await;
+    page.send_json(load(3, r#"{"slow":0}"#)).await;
     let scene = page.message("scene").await["scene"].clone();
-    assert_eq!((&scene["preview"], &scene["tint"]), (&json!(0), &json!(7)));
+    assert_eq!((&scene["slow"], &scene["tint"]), (&json!(0), &json!(7)));
 }

@@ -25,6 +25,19 @@ async fn a_preview_is_shown_before_the_whole_scene() {
 }
 
 #[tokio::test]
+async fn a_preview_of_rejected_settings_is_taken_back() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({ "tint": 3 })).await;
+    page.message("scene").await;
+    page.change_settings(1, json!({ "preview": true, "invalid": 1 })).await;
+    let preview = page.message("scene").await;
+    assert_eq!(preview["legend"], "preview");
+    let kept = page.message("scene").await;
+    assert_eq!((&kept["seq"], &kept["scene"]["tint"]), (&json!(1), &json!(3)));
+    assert_eq!(page.message("error").await["key"], "invalid");
+}
+
+#[tokio::test]
 async fn pictures_carry_the_number_of_their_scene() {
     let server = TestServer::start();
     let mut page = TestPage::open(&server, json!({})).await;
