@@ -194,7 +194,8 @@ pub fn faults(picture: &PictureSettings, camera: &Camera, up: Vec3) -> Vec<Inval
     let lacks_north = picture.north() && arrow(camera, north(up)).is_none();
     [("scale_bar", lacks_scale), ("north", lacks_north)]
         .into_iter()
-        .filter_map(|(key, is_fault)| is_fault.then(|| fault(key)))
+        .filter(|(_, is_fault)| *is_fault)
+        .map(|(key, _)| fault(key))
         .collect()
 }
 
