@@ -5,7 +5,7 @@ use crate::dynamic_resolution::ResolutionController;
 use crate::encode::{self, Pixels};
 use crate::frame::{Frame, PlacedFile, Quality};
 use crate::keyframe::{Keyframe, keyframe_size};
-use crate::scene_provider::{Patch, PreparedScene};
+use crate::scene_provider::{PicturePart, PreparedScene};
 use crate::view::ViewState;
 use std::sync::Arc;
 use std::time::Instant;
@@ -141,7 +141,7 @@ impl Accumulator {
         let mut files = vec![place(jpeg(&image, DRAFT_JPEG_QUALITY), (0, 0), view.size)];
         if let Some(overlay) = &prepared.overlay {
             let patches = overlay.patches(&image, view.size, &camera, view.is_moving);
-            files.extend(patches.iter().map(|Patch { x, y, image }| {
+            files.extend(patches.iter().map(|PicturePart { x, y, image }| {
                 let file = jpeg(image, REFINED_JPEG_QUALITY);
                 place(file, (*x, *y), (image.width, image.height))
             }));

@@ -32,7 +32,7 @@ mod server;
 
 pub use limits::{Limits, Timeouts};
 pub use scene_provider::{
-    Error, Export, Patch, PickedPoint, PictureOverlay, PointDescriber, PreparedScene, Result,
+    Error, Export, PickedPoint, PictureOverlay, PicturePart, PointDescriber, PreparedScene, Result,
     SceneProvider, SettingsMap,
 };
 pub use server::Server;

@@ -82,11 +82,11 @@ pub trait PictureOverlay: Send + Sync {
         size: (u32, u32),
         camera: &Camera,
         is_moving: bool,
-    ) -> Vec<Patch>;
+    ) -> Vec<PicturePart>;
 }
 
 /// A part of a picture.
-pub struct Patch {
+pub struct PicturePart {
     /// Column of the left edge in the picture.
     pub x: u32,
     /// Row of the upper edge in the picture.
@@ -107,7 +107,7 @@ pub struct PreparedScene {
     pub render_settings: Settings,
     /// The meaning of the colours, as the page shows it; null if they need no legend.
     pub legend: Value,
-    /// What is drawn onto its pictures; none if they stay as they are.
+    /// The overlay of its pictures; none if they stay as they are.
     pub overlay: Option<Box<dyn PictureOverlay>>,
     /// Describes picked points.
     pub describe: PointDescriber,

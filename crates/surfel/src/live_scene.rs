@@ -39,7 +39,7 @@ pub struct LiveScene {
     pool: rayon::ThreadPool,
 }
 
-/// What was made for the last descriptions.
+/// Results for the last descriptions.
 #[derive(Debug, Default)]
 struct Made {
     prepared: Lru2<Vec<PreparedCloud>>,

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 use surfel::overlay::{self, Overlay, Style};
 use surfel_core::image::Image;
 use surfel_core::scene::Camera;
-use surfel_web::{Patch, PictureOverlay};
+use surfel_web::{PictureOverlay, PicturePart};
 
 /// The overlay of a page's pictures.
 struct PageOverlay {
@@ -32,12 +32,12 @@ impl PictureOverlay for PageOverlay {
         size: (u32, u32),
         camera: &Camera,
         is_moving: bool,
-    ) -> Vec<Patch> {
+    ) -> Vec<PicturePart> {
         let mut style = self.style.lock().unwrap_or_else(PoisonError::into_inner);
         if !is_moving {
             *style = Style::default();
         }
         let patches = self.overlay.patches(draft, size, camera, &mut style).into_iter();
-        patches.map(|overlay::Patch { x, y, image }| Patch { x, y, image }).collect()
+        patches.map(|overlay::Patch { x, y, image }| PicturePart { x, y, image }).collect()
     }
 }

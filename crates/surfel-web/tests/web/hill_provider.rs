@@ -18,7 +18,7 @@ use surfel_core::scene::{
 };
 use surfel_core::trace::Simd;
 use surfel_web::{
-    Error, Export, Patch, PictureOverlay, PreparedScene, Result, SceneProvider, SettingsMap,
+    Error, Export, PictureOverlay, PicturePart, PreparedScene, Result, SceneProvider, SettingsMap,
 };
 
 /// Size of a page's picture in pixels.
@@ -136,12 +136,12 @@ impl PictureOverlay for Stamp {
         }
     }
 
-    fn patches(&self, _: &Image, size: (u32, u32), _: &Camera, _: bool) -> Vec<Patch> {
+    fn patches(&self, _: &Image, size: (u32, u32), _: &Camera, _: bool) -> Vec<PicturePart> {
         assert_eq!(size, PICTURE_SIZE);
         let [x, y, width, height] = STAMP;
         let mut image = Image::new(width, height);
         image.color.fill(RED);
-        vec![Patch { x, y, image }]
+        vec![PicturePart { x, y, image }]
     }
 }
 

@@ -20,7 +20,7 @@ pub(super) struct Block<'a> {
     content: Content<'a>,
 }
 
-/// What stands on a panel.
+/// The content of a panel.
 pub(super) enum Content<'a> {
     /// A line of text.
     Caption(String),
@@ -42,7 +42,7 @@ pub(super) struct Layout {
     pub lift: f32,
 }
 
-/// What is chosen from the picture: where the legend stands, and which panels are light. Kept from one picture to the
+/// Choices made from the picture: where the legend stands, and which panels are light. Kept from one picture to the
 /// next, nothing jumps while the camera moves.
 #[derive(Clone, Debug, Default)]
 pub struct Style {
