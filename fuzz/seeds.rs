@@ -27,6 +27,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "gltf",
         "scene",
         "viewer",
+        "area",
+        "filter",
     ] {
         fs::create_dir_all(corpus.join(target))?;
     }
@@ -61,11 +63,44 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         [f32::NAN, 1e30, -0.0, -1.0, 0.0, f32::INFINITY, 2.0].map(f32::to_le_bytes).concat();
     fs::write(corpus.join("bin/one.bin"), &record)?;
     fs::write(corpus.join("bin/three.bin"), [&record[..], &non_finite, &record].concat())?;
+    write_conditions(&corpus)?;
     write_scans(&corpus)?;
     write_gltf(&corpus.join("gltf"))?;
     write_scenes(&corpus.join("scene"))?;
     write_viewer_input(&corpus.join("viewer"))?;
     write_environment_maps(&corpus.join("environment"))
+}
+
+/// Writes areas and conditions on columns.
+fn write_conditions(corpus: &Path) -> std::io::Result<()> {
+    let rings = "[[[0,0],[4,0],[4,4],[0,0]],[[1,0.5],[2,0.5],[2,1],[1,0.5]]]";
+    let feature = |kind: &str, coordinates: &str| {
+        format!(
+            r#"{{"type":"Feature","properties":null,"geometry":{{"type":"{kind}","coordinates":{coordinates}}}}}"#
+        )
+    };
+    let features = [feature("Polygon", rings), feature("MultiPolygon", &format!("[{rings}]"))];
+    let areas = [
+        "POLYGON ((0 0, 4 0, 4 4, 0 0), (1 0.5, 2 0.5, 2 1, 1 0.5))",
+        "MULTIPOLYGON Z (((0 0 1, 1 0 1, 0 1 1, 0 0 1)), ((-1e9 2 0, 3 .5 0, 2 2 0)))",
+        "([0,10],[-1.5,5],[0,1e3])",
+        "0,0,10,5",
+        &features[0],
+        &format!(r#"{{"type":"FeatureCollection","features":[{}]}}"#, features.join(",")),
+        r#"{"type":"GeometryCollection","geometries":[{"type":"Point","coordinates":[1,2]}]}"#,
+    ];
+    for (i, text) in areas.iter().enumerate() {
+        fs::write(corpus.join(format!("area/{i}")), text)?;
+    }
+    let conditions = [
+        "classification == 2 && z < 1200",
+        "not (Intensity[100:] or ReturnNumber(1:3]) and x != -1.5e3",
+        "!(blue>=65535||red<=y)",
+    ];
+    for (i, text) in conditions.iter().enumerate() {
+        fs::write(corpus.join(format!("filter/{i}")), text)?;
+    }
+    Ok(())
 }
 
 /// Writes the formats of scanners: PCD in each encoding, PTX, and E57 with floats and with scaled integers.

@@ -2,6 +2,7 @@
 
 use crate::global::Global;
 use crate::inputs::expand;
+use crate::options::{KeyOptions, Scope};
 use crate::report::{Report, print};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -13,7 +14,7 @@ use surfel_core::points::{
     PointCloud, STATION, ScanStation, Subsample, infer_up, points_per_area, spacing,
 };
 use surfel_core::progress::Progress;
-use surfel_formats::{FileInfo, LoadOptions, Loaded, TextColumn};
+use surfel_formats::{ColumnChoice, EmbeddedImage, FileInfo, Loaded};
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -24,12 +25,17 @@ pub struct Args {
     /// JSON instead of a table: one object a file, in an array if there are several.
     #[arg(long)]
     json: bool,
-    /// Columns of a text file, as in x,y,z,-,r,g,b; by default they are inferred from the file.
-    #[arg(long, value_name = "NAMES")]
-    columns: Option<String>,
     /// Only what the header states, at once, however large the file is.
     #[arg(long)]
     summary: bool,
+    #[command(flatten)]
+    options: KeyOptions<Args>,
+}
+
+impl Scope for Args {
+    fn has(_: &str, path: &str) -> bool {
+        ["columns", "salvage"].contains(&path)
+    }
 }
 
 /// Side of the cells in which points are counted for their density, in distances between points.
@@ -46,8 +52,8 @@ Examples:
 
 /// Shows what each file holds.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    let text_columns = args.columns.as_deref().map(TextColumn::parse_list);
-    let options = LoadOptions { text_columns, ..LoadOptions::default() };
+    let description = args.options.description.clone()?;
+    let options = description.objects_default.preparation.load_options(ColumnChoice::All)?;
     let limit = global.start()?.memory_limit;
     let mut all = Vec::new();
     for file in &expand(&args.files)? {
@@ -86,6 +92,7 @@ fn summarize(file: &Path, header: &FileInfo) -> Value {
         "resolution": header.resolution.map(|step| step.to_array()),
         "coordinate_system": header.coordinate_system,
         "columns_in_file": header.columns,
+        "images": images(header),
     })
 }
 
@@ -113,6 +120,7 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
         "classes": classes(cloud),
         "returns": returns(cloud),
         "columns_in_file": source.columns,
+        "images": images(source),
     }))
 }
 
@@ -131,6 +139,21 @@ fn stations(cloud: &PointCloud) -> Vec<Value> {
         json!({ "name": station.name, "position": position, "points": n_points })
     };
     stations.map(describe).collect()
+}
+
+/// Pictures in the file with the places of their cameras.
+fn images(source: &FileInfo) -> Vec<Value> {
+    let describe = |image: &EmbeddedImage| {
+        json!({
+            "name": image.name,
+            "camera": image.camera.name(),
+            "resolution": [image.width, image.height],
+            "bytes": image.n_bytes,
+            "position": image.position.map(|position| position.to_array()),
+            "scan": image.scan,
+        })
+    };
+    source.images.iter().map(describe).collect()
 }
 
 /// Numbers of points of each ASPRS class that occurs.
@@ -213,6 +236,9 @@ fn table(info: &Value) -> String {
     }
     row("resolution", text(&info["resolution"]));
     row("coordinates", text(&info["coordinate_system"]));
+    for (place, image) in info["images"].as_array().into_iter().flatten().enumerate() {
+        row(if place == 0 { "images" } else { "" }, image_text(image));
+    }
     if is_summary {
         row("columns", text(&info["columns_in_file"]));
         return lines.join("\n");
@@ -236,6 +262,24 @@ fn table(info: &Value) -> String {
         row(title, format!("{name:<24}{}", range_text(range)));
     }
     lines.join("\n")
+}
+
+fn image_text(image: &Value) -> String {
+    let resolution: Vec<String> =
+        image["resolution"].as_array().into_iter().flatten().map(text).collect();
+    let mut line = format!(
+        "{:<24}{}, {} pixels, {} bytes",
+        text(&image["name"]),
+        text(&image["camera"]),
+        resolution.join(" x "),
+        text(&image["bytes"])
+    );
+    for (words, key) in [("camera at", "position"), ("of", "scan")] {
+        if !image[key].is_null() {
+            line += &format!(", {words} {}", text(&image[key]));
+        }
+    }
+    line
 }
 
 fn range_text(range: &Value) -> String {

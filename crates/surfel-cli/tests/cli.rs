@@ -30,6 +30,8 @@ mod deformation;
 mod sequences;
 #[path = "cli/viewer.rs"]
 mod viewer;
+#[path = "cli/salvage.rs"]
+mod salvage;
 #[path = "cli/invalid_input.rs"]
 mod invalid_input;
 #[path = "cli/invalid_scenes.rs"]

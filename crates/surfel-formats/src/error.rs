@@ -1,5 +1,6 @@
 //! Errors of reading and writing files.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::io;
 
@@ -40,12 +41,11 @@ pub enum Error {
         /// The content that the format asks for.
         expected: String,
         /// Advice to the user.
-        advice: &'static str,
+        advice: Cow<'static, str>,
     },
     /// A file ends before its last point.
     #[error(
-        "{file}: the file ends early, at {location}: {readable} of {claimed} points are complete; \
-         copy the file again from its source, or write it again"
+        "{file}: the file ends early, at {location}: {readable} of {claimed} points are complete; {advice}"
     )]
     Truncated {
         /// Name of the file.
@@ -56,6 +56,8 @@ pub enum Error {
         readable: u64,
         /// Number of points that the file claims to hold.
         claimed: u64,
+        /// Advice to the user.
+        advice: Cow<'static, str>,
     },
     /// surfel cannot read or write such a file.
     #[error("{file}: found {found}, which surfel cannot {action}; {advice}")]
@@ -153,6 +155,8 @@ pub enum Location {
     Line(u64),
     /// Point, counted from 0.
     Point(u64),
+    /// Chunk of compressed points, counted from 0.
+    Chunk(u64),
     /// JSON pointer, as in `/accessors/3/count`.
     Json(String),
 }
@@ -160,12 +164,29 @@ pub enum Location {
 /// The result of an operation on a file.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
+impl Error {
+    /// Returns what is wrong with a damaged file, without its name and without advice.
+    pub(crate) fn damage(&self) -> String {
+        match self {
+            Self::Truncated { location: chunk @ Location::Chunk(_), .. } => {
+                format!("the file ends inside {chunk}")
+            }
+            Self::Truncated { location, .. } => format!("the file ends at {location}"),
+            Self::Malformed { location, found, expected, .. } => {
+                format!("found {found} at {location}, expected {expected}")
+            }
+            other => other.to_string(),
+        }
+    }
+}
+
 impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Byte(byte) => write!(f, "byte {byte}"),
             Self::Line(line) => write!(f, "line {line}"),
             Self::Point(point) => write!(f, "point {point}"),
+            Self::Chunk(chunk) => write!(f, "chunk {chunk}"),
             Self::Json(pointer) if pointer.is_empty() => f.write_str("the whole of its JSON"),
             Self::Json(pointer) => f.write_str(pointer),
         }

@@ -6,7 +6,7 @@ use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Geometry, Graph, Material, Node, Primitive, Texture};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::file::{Input, ResourceResolver};
 use crate::filtered::read_filtered;
 use crate::format::{self, Reader, detect};
@@ -77,13 +77,18 @@ fn read(
         Reader::Scene(read) => {
             return read(input, resolver, options.animation.as_deref(), progress);
         }
-        Reader::Mesh { has_triangles, read_mesh, .. } if has_triangles(input)? => {
-            let (model, mut info) = read_mesh(input, &resolver, options, progress)?;
-            info.external_files = resolver.into_requested();
-            let parts = model.parts.into_iter();
-            let parts =
-                parts.map(|(mesh, material)| (Geometry::Triangles(mesh), material)).collect();
-            return Ok((graph_of(input, parts, model.textures), info));
+        Reader::Mesh { has_triangles, read_points, read_mesh } if has_triangles(input)? => {
+            match read_mesh(input, &resolver, options, progress) {
+                // Without all of its vertices a mesh has no faces; what is whole of it are points.
+                Err(Error::Truncated { .. }) if options.salvage => read_points,
+                read => {
+                    let (model, mut info) = read?;
+                    info.external_files = resolver.into_requested();
+                    let parts = model.parts.into_iter();
+                    let parts = parts.map(|(mesh, material)| (Geometry::Triangles(mesh), material));
+                    return Ok((graph_of(input, parts.collect(), model.textures), info));
+                }
+            }
         }
         Reader::Points(read_points) | Reader::Mesh { read_points, .. } => read_points,
     };

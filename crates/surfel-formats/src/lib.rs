@@ -26,6 +26,7 @@
 mod error;
 mod display;
 mod file;
+mod salvage;
 mod table;
 mod options;
 mod stations;
@@ -63,6 +64,6 @@ pub use image_file::{
 pub use load::{inspect, load, load_all, load_bytes};
 pub use merge::{common_file_info, merge_loaded};
 pub use movie::{Movie, MovieOptions, check_movie};
-pub use options::{FileInfo, LoadOptions, Loaded, SaveOptions};
+pub use options::{EmbeddedImage, FileInfo, ImageCamera, LoadOptions, Loaded, SaveOptions};
 pub use save::save;
 pub use table::{Column, ColumnChoice, TextColumn};

@@ -18,6 +18,8 @@ pub struct LoadOptions {
     pub filter: Option<PointFilter>,
     /// World coordinates of the zero of the positions; chosen from the data if absent.
     pub origin: Option<DVec3>,
+    /// Reads what is whole of a damaged LAS, LAZ, PLY, E57, PCD, PTX or text file.
+    pub salvage: bool,
     /// Name of the animation to take from glTF files that have any; the first if absent.
     pub animation: Option<String>,
 }
@@ -49,9 +51,55 @@ pub struct FileInfo {
     pub coordinate_system: Option<String>,
     /// Names of the columns in the file.
     pub columns: Vec<String>,
+    /// Pictures that the file holds beside its points.
+    pub images: Vec<EmbeddedImage>,
     /// Paths of further files that it names and that were looked for while it was read, found or not: buffers,
     /// materials, textures.
     pub external_files: Vec<PathBuf>,
+}
+
+/// A picture inside a file of points, as the file describes it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EmbeddedImage {
+    /// Name of the picture.
+    pub name: String,
+    /// Camera model of the picture.
+    pub camera: ImageCamera,
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Number of bytes of the encoded picture.
+    pub n_bytes: u64,
+    /// World position of the camera, if the file states its pose.
+    pub position: Option<DVec3>,
+    /// Name of the scan that the picture was taken with, if the file states one.
+    pub scan: Option<String>,
+}
+
+/// The camera model of a picture inside a file of points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageCamera {
+    /// Perspective picture.
+    Pinhole,
+    /// Panorama with equal angles along both axes.
+    Spherical,
+    /// Panorama on a cylinder.
+    Cylindrical,
+    /// Picture that shows the site and has no projection.
+    VisualReference,
+}
+
+impl ImageCamera {
+    /// Returns the name of the model.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pinhole => "pinhole",
+            Self::Spherical => "spherical",
+            Self::Cylindrical => "cylindrical",
+            Self::VisualReference => "visual reference",
+        }
+    }
 }
 
 /// Properties of an output file that a cloud does not hold itself.

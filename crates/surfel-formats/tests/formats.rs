@@ -14,6 +14,8 @@ mod ptx;
 mod e57_writer;
 #[path = "formats/e57_scans.rs"]
 mod e57_scans;
+#[path = "formats/e57_images.rs"]
+mod e57_images;
 #[path = "formats/text.rs"]
 mod text;
 #[path = "formats/las_point_formats.rs"]
@@ -26,6 +28,8 @@ mod filters;
 mod round_trip;
 #[path = "formats/malformed.rs"]
 mod malformed;
+#[path = "formats/salvage.rs"]
+mod salvage;
 #[path = "formats/meshes.rs"]
 mod meshes;
 #[path = "formats/mesh_materials.rs"]

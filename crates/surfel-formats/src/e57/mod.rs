@@ -6,6 +6,7 @@ mod streams;
 mod values;
 mod columns;
 mod scan;
+mod images;
 mod read;
 
 pub(crate) use read::{inspect, read};

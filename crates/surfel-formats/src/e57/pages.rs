@@ -3,8 +3,7 @@
 use rayon::prelude::*;
 use surfel_core::progress::Progress;
 
-use crate::error::{Error, Location, Result};
-use crate::file::Input;
+use crate::error::Result;
 
 /// Bytes of a page with its checksum; the standard allows no other size.
 pub(super) const PAGE_LENGTH: usize = 1024;
@@ -17,33 +16,36 @@ const PAGES_PER_TASK: usize = 1 << 12;
 #[derive(Clone, Copy)]
 pub(super) struct Pages<'a> {
     pages: &'a [[u8; PAGE_LENGTH]],
+    /// Indices of pages whose content is not to be used, in order.
+    broken: &'a [usize],
 }
 
 impl<'a> Pages<'a> {
     /// The whole pages of `bytes`.
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self { pages: bytes.as_chunks().0 }
+        Self { pages: bytes.as_chunks().0, broken: &[] }
     }
 
-    /// Checks all checksums.
-    pub fn check(&self, input: &Input, progress: &dyn Progress) -> Result<()> {
+    /// The same pages without those in `broken`, whose indices are in order.
+    pub fn without(self, broken: &'a [usize]) -> Self {
+        Self { broken, ..self }
+    }
+
+    /// Returns the indices of the pages whose checksums are wrong, in order.
+    pub fn find_broken(&self, progress: &dyn Progress) -> Result<Vec<usize>> {
         let tasks = self.pages.par_chunks(PAGES_PER_TASK).enumerate();
-        tasks.try_for_each(|(task, pages)| {
+        let broken = tasks.map(|(task, pages)| {
             progress.check()?;
             let is_broken = |page: &[u8; PAGE_LENGTH]| {
                 let (content, checksum) = page.split_at(CONTENT_LENGTH);
                 // The standard's library writes the checksum with its most significant byte first.
                 crc32c::crc32c(content).to_be_bytes() != *checksum
             };
-            let Some(broken) = pages.iter().position(is_broken) else { return Ok(()) };
-            let page = task * PAGES_PER_TASK + broken;
-            Err::<(), Error>(input.malformed(
-                Location::Byte((page * PAGE_LENGTH) as u64),
-                "a page whose checksum is wrong",
-                "the bytes that were written",
-                "copy the file again from its source",
-            ))
-        })
+            let first = task * PAGES_PER_TASK;
+            let broken = pages.iter().enumerate().filter(|(_, page)| is_broken(page));
+            Ok(broken.map(|(i, _)| first + i).collect::<Vec<usize>>())
+        });
+        Ok(broken.collect::<Result<Vec<_>>>()?.concat())
     }
 
     /// Returns the position in the content of a byte of the file.
@@ -62,9 +64,19 @@ impl<'a> Pages<'a> {
         (self.pages.len() * CONTENT_LENGTH) as u64
     }
 
-    /// Copies the content from position `at` on; returns `None` if it ends before `out` is full.
+    /// Returns true if the pages have `length` bytes of content at position `at`, none of them in a broken page.
+    pub fn are_whole(&self, at: u64, length: u64) -> bool {
+        let Some(end) = at.checked_add(length).filter(|end| *end <= self.len()) else {
+            return false;
+        };
+        let is_before = |page: &usize| (*page as u64 + 1) * CONTENT_LENGTH as u64 <= at;
+        let next_broken = self.broken.get(self.broken.partition_point(is_before));
+        next_broken.is_none_or(|page| end <= *page as u64 * CONTENT_LENGTH as u64)
+    }
+
+    /// Copies the content from position `at` on; returns `None` if it is not whole before `out` is full.
     pub fn copy(&self, at: u64, mut out: &mut [u8]) -> Option<()> {
-        if self.len() < at.checked_add(out.len() as u64)? {
+        if !self.are_whole(at, out.len() as u64) {
             return None;
         }
         let (mut page, mut start) = (at as usize / CONTENT_LENGTH, at as usize % CONTENT_LENGTH);
@@ -102,5 +114,18 @@ mod tests {
         assert_eq!(Pages::content_position(1026), 1022);
         assert_eq!(pages.bytes::<2>(3 * 1020 - 1), None);
         assert_eq!(pages.bytes::<2>(u64::MAX), None);
+    }
+
+    #[test]
+    fn broken_pages_have_no_content() {
+        let bytes = [0; 4 * PAGE_LENGTH];
+        let broken = [1, 2];
+        let pages = Pages::new(&bytes).without(&broken);
+        let is_whole = |at: u64| pages.bytes::<4>(at).is_some();
+        assert_eq!(
+            [1016, 1017, 1020, 3059, 3060, 4077].map(is_whole),
+            [true, false, false, false, true, false]
+        );
+        assert!(pages.are_whole(1020, 0) && pages.are_whole(4080, 0));
     }
 }

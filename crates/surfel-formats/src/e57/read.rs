@@ -3,15 +3,18 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
+use surfel_core::math::DVec3;
 use surfel_core::progress::Progress;
 
 use super::document::{Document, check_header, read_document};
-use super::pages::Pages;
-use super::scan::Scan;
+use super::images::embedded_images;
+use super::pages::{PAGE_LENGTH, Pages};
+use super::scan::{Scan, union};
 use super::streams::find_streams;
 use crate::error::{Error, Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::salvage::Salvage;
 use crate::stations::{MAX_STATIONS, set_stations};
 use crate::table::{
     CloudBuilder, ColumnField, ColumnRole, Field, MAX_FIELDS, NumberType, RecordLayout,
@@ -24,10 +27,12 @@ const BLOCKS_PER_BATCH: usize = 32;
 
 /// Reads header and XML.
 pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
-    let document = read_document(input, check_header(input)?)?;
+    // What the XML states does not depend on damage elsewhere.
+    let mut salvage = Salvage::new(input, true);
+    let document = read_document(input, check_header(&mut salvage)?)?;
     let scans = scans(input, &document)?;
     let columns = columns(&scans);
-    Ok(file_info(&document, &columns))
+    Ok(file_info(&document, &scans, &columns))
 }
 
 /// Reads the points.
@@ -36,13 +41,29 @@ pub(crate) fn read(
     options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<Loaded> {
-    let length = check_header(input)?;
+    let mut salvage = Salvage::new(input, options.salvage);
+    let length = check_header(&mut salvage)?;
     let pages = Pages::new(&input[..length]);
-    pages.check(input, progress)?;
-    let document = read_document(input, length)?;
+    let broken = pages.find_broken(progress)?;
+    let document = read_document(input, length);
+    if let Some(page) = broken.first() {
+        let broken_page = input.malformed(
+            Location::Byte((page * PAGE_LENGTH) as u64),
+            "a page whose checksum is wrong",
+            "the bytes that were written",
+            "copy the file again from its source",
+        );
+        // Without the document nothing can be salvaged.
+        match document {
+            Err(_) => return Err(broken_page),
+            Ok(_) => salvage.accept(broken_page)?,
+        }
+    }
+    let document = document?;
+    let pages = pages.without(&broken);
     let scans = scans(input, &document)?;
     let mut columns = columns(&scans);
-    let info = file_info(&document, &columns);
+    let mut info = file_info(&document, &scans, &columns);
     columns.retain(|(role, _)| options.columns.wants(role));
     let roles: Vec<ColumnRole> = columns.iter().map(|(role, _)| role.clone()).collect();
 
@@ -50,28 +71,27 @@ pub(crate) fn read(
     let mut builder = CloudBuilder::new(input, layout_of, options.origin, options.filter.as_ref());
     let mut n_scan_points = Vec::new();
     let n_invalid = AtomicU64::new(0);
-    let n_points = document.scans.iter().fold(0, |sum: u64, scan| sum.saturating_add(scan.records));
-    progress.begin(&format!("read {}", input.name), n_points);
+    let mut n_points = 0;
+    let n_claimed =
+        document.scans.iter().fold(0, |sum: u64, scan| sum.saturating_add(scan.records));
+    progress.begin(&format!("read {}", input.name), n_claimed);
     for (scan, description) in scans.iter().zip(&document.scans) {
         let n_before = builder.n_points();
         if 0 < scan.n_points {
             let lengths = scan.stream_lengths();
             let section = description.file_offset;
-            let streams = find_streams(input, pages, section, &lengths, progress)?;
+            let streams = find_streams(&mut salvage, pages, section, &lengths, progress)?;
             let n_readable = scan.n_readable(&streams);
             if n_readable < scan.n_points {
-                return Err(Error::Truncated {
-                    file: input.name.to_string(),
-                    location: Location::Byte(section),
-                    readable: n_readable,
-                    claimed: scan.n_points,
-                });
+                let location = Location::Byte(section);
+                salvage.accept(input.truncated(location, n_readable, scan.n_points))?;
             }
-            let firsts: Vec<u64> = (0..scan.n_points).step_by(POINTS_PER_BLOCK as usize).collect();
+            n_points += n_readable;
+            let firsts: Vec<u64> = (0..n_readable).step_by(POINTS_PER_BLOCK as usize).collect();
             for batch in firsts.chunks(BLOCKS_PER_BATCH) {
                 let decode = |first: &u64| {
                     progress.check()?;
-                    let n_points = POINTS_PER_BLOCK.min(scan.n_points - first);
+                    let n_points = POINTS_PER_BLOCK.min(n_readable - first);
                     let records = scan.decode(&streams, pages, *first, n_points as usize, &roles);
                     let n_valid = (records.len() / (8 * (3 + roles.len()))) as u64;
                     n_invalid.fetch_add(n_points - n_valid, Ordering::Relaxed);
@@ -83,6 +103,8 @@ pub(crate) fn read(
         }
         n_scan_points.push(builder.n_points() - n_before);
     }
+    salvage.report("points", n_points, Some(n_claimed), progress)?;
+    info.n_points = Some(n_points);
     let n_invalid = n_invalid.into_inner();
     if 0 < n_invalid {
         let line = format!("{n_invalid} of {n_points} points have no valid position; skipped");
@@ -152,14 +174,23 @@ fn layout(columns: &[(ColumnRole, NumberType)], options: &LoadOptions) -> Record
 }
 
 /// Returns the information in header and XML.
-fn file_info(document: &Document, columns: &[(ColumnRole, NumberType)]) -> FileInfo {
+fn file_info(
+    document: &Document,
+    scans: &[Scan],
+    columns: &[(ColumnRole, NumberType)],
+) -> FileInfo {
+    let filled = scans.iter().zip(&document.scans).filter(|(scan, _)| 0 < scan.n_points);
+    let bounds: Option<Vec<[DVec3; 2]>> =
+        filled.map(|(scan, description)| scan.stated_bounds(description)).collect();
     let n_scans = document.scans.len();
     let scans = if n_scans == 1 { "1 scan".into() } else { format!("{n_scans} scans") };
     let names = columns.iter().map(|(role, _)| role.name().to_owned());
     FileInfo {
         format: format!("E57 1.0, {scans}"),
         n_points: Some(document.scans.iter().fold(0, |sum, scan| sum.saturating_add(scan.records))),
+        bounds: bounds.and_then(|boxes| boxes.into_iter().reduce(union)),
         coordinate_system: document.coordinate_system.clone(),
+        images: embedded_images(document),
         columns: ["x", "y", "z"].into_iter().map(str::to_owned).chain(names).collect(),
         ..FileInfo::default()
     }

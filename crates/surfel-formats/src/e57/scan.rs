@@ -43,6 +43,17 @@ struct Block<'a> {
     n_points: usize,
 }
 
+/// Returns the name of the `index`-th scan of a file.
+pub(super) fn scan_name(index: usize, description: &PointCloud) -> String {
+    let name = description.name.clone().filter(|name| !name.trim().is_empty());
+    name.unwrap_or_else(|| format!("scan {}", index + 1))
+}
+
+/// Returns the bounds of two boxes together.
+pub(super) fn union([a, b]: [DVec3; 2], [c, d]: [DVec3; 2]) -> [DVec3; 2] {
+    [a.min(c), b.max(d)]
+}
+
 impl Scan {
     /// The scan of a description; `None` if its points have no coordinates.
     pub fn new(description: &PointCloud) -> Option<Self> {
@@ -93,12 +104,25 @@ impl Scan {
 
     /// Returns the station of the scan, which is the `index`-th of the file.
     pub fn station(&self, index: usize, description: &PointCloud) -> ScanStation {
-        let name = description.name.clone().filter(|name| !name.trim().is_empty());
         ScanStation {
-            name: name.unwrap_or_else(|| format!("scan {}", index + 1)),
+            name: scan_name(index, description),
             position: description.transform.is_some().then_some(self.translation),
             rotation: self.rotation,
         }
+    }
+
+    /// Returns the least and greatest world coordinates that the points may have by a description that states bounds.
+    pub fn stated_bounds(&self, description: &PointCloud) -> Option<[DVec3; 2]> {
+        let bounds = description.cartesian_bounds.as_ref()?;
+        let low = DVec3::new(bounds.x_min?, bounds.y_min?, bounds.z_min?);
+        let high = DVec3::new(bounds.x_max?, bounds.y_max?, bounds.z_max?);
+        let is_valid = low.is_finite() && high.is_finite() && low.cmple(high).all();
+        let corners = (0..8).map(|corner: u32| {
+            let side = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
+            self.rotation * DVec3::from_array([0, 1, 2].map(side)) + self.translation
+        });
+        let boxes = corners.map(|corner| [corner; 2]);
+        boxes.reduce(union).filter(|_| is_valid)
     }
 
     /// Returns the bytes that the stream of each field must have.

@@ -3,8 +3,8 @@
 use surfel_core::progress::Progress;
 
 use super::pages::Pages;
-use crate::error::{Error, Location, Result};
-use crate::file::Input;
+use crate::error::{Location, Result};
+use crate::salvage::Salvage;
 
 /// First byte of the section that holds a scan's packets.
 const SECTION_ID: u8 = 1;
@@ -61,31 +61,30 @@ impl Stream {
     }
 }
 
-/// Finds the streams of `n_fields` fields in the section at byte `section` of the file. Packets are read until every
-/// stream has as many bytes as `needed` says, or the section ends.
+/// Finds the streams of as many fields as `needed` has numbers, in the section at byte `section` of the file. Packets are
+/// read until every stream has as many bytes as `needed` says, until the section ends, or until one is damaged.
 pub(super) fn find_streams(
-    input: &Input,
+    salvage: &mut Salvage,
     pages: Pages,
     section: u64,
     needed: &[u64],
     progress: &dyn Progress,
 ) -> Result<Vec<Stream>> {
+    let input = salvage.input;
     let mut streams = vec![Stream::default(); needed.len()];
     let start = Pages::content_position(section);
     let malformed = |at: u64, found: String, expected: &str| {
         let location = Location::Byte(Pages::file_position(at));
-        Err::<Vec<Stream>, Error>(input.malformed(
-            location,
-            found,
-            expected,
-            "copy the file again from its source",
-        ))
+        input.malformed(location, found, expected, "copy the file again from its source")
     };
     let Some(header) = pages.bytes::<32>(start) else {
-        return malformed(start, "the end of the file".into(), "a section of points");
+        salvage.accept(malformed(start, "the end of the file".into(), "a section of points"))?;
+        return Ok(streams);
     };
     if header[0] != SECTION_ID {
-        return malformed(start, format!("section {}", header[0]), "a section of points, 1");
+        let found = format!("section {}", header[0]);
+        salvage.accept(malformed(start, found, "a section of points, 1"))?;
+        return Ok(streams);
     }
     let number = |at: usize| u64::from_le_bytes(header[at..at + 8].try_into().expect("8 bytes"));
     let end = start.saturating_add(number(8)).min(pages.len());
@@ -101,17 +100,17 @@ pub(super) fn find_streams(
         n_packets += 1;
         let Some([kind, _, low, high]) = pages.bytes(at) else { break };
         let length = u64::from(u16::from_le_bytes([low, high])) + 1;
-        if pages.len() < at + length {
+        if !pages.are_whole(at, length) {
             break;
         }
-        match kind {
-            DATA_PACKET => {
-                if let Err((found, expected)) = add_packet(&mut streams, pages, at, length) {
-                    return malformed(at, found, &expected);
-                }
-            }
-            INDEX_PACKET | IGNORED_PACKET => {}
-            _ => return malformed(at, format!("packet type {kind}"), "type 0, 1 or 2"),
+        let added = match kind {
+            DATA_PACKET => add_packet(&mut streams, pages, at, length),
+            INDEX_PACKET | IGNORED_PACKET => Ok(()),
+            _ => Err((format!("packet type {kind}"), "type 0, 1 or 2".into())),
+        };
+        if let Err((found, expected)) = added {
+            salvage.accept(malformed(at, found, &expected))?;
+            break;
         }
         at += length.next_multiple_of(4);
     }

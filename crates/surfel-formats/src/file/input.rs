@@ -96,7 +96,18 @@ impl<'a> Input<'a> {
             location,
             found: found.into(),
             expected: expected.into(),
-            advice,
+            advice: advice.into(),
+        }
+    }
+
+    /// Returns the error of a file that ends at `location`, after `readable` of the points that it claims to hold.
+    pub fn truncated(&self, location: Location, readable: u64, claimed: u64) -> Error {
+        Error::Truncated {
+            file: self.name.to_string(),
+            location,
+            readable,
+            claimed,
+            advice: "copy the file again from its source, or write it again".into(),
         }
     }
 

@@ -43,7 +43,7 @@ impl<'a> Json<'a> {
             location: Location::Json(self.pointer.clone()),
             found: found.into(),
             expected: expected.into(),
-            advice: ADVICE,
+            advice: ADVICE.into(),
         }
     }
 

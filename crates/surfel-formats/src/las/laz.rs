@@ -1,10 +1,9 @@
-//! Finds and decodes the compressed chunks of LAZ files, which are checked before the decoder reads them.
+//! Decodes the compressed chunks of LAZ files, which are checked before the decoder reads them.
 
-use std::io::Cursor;
+use std::io::{Cursor, ErrorKind};
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use laz::laszip::ChunkTable;
 use laz::record::{
     LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
 };
@@ -12,10 +11,11 @@ use laz::{DecompressionSelection, LazItem, LazItemType, LazVlr};
 use surfel_core::progress::Progress;
 
 use super::gps::GpsTimeField;
-use super::header::{Header, read_u16, read_u32, read_u64};
+use super::header::{Header, read_u32};
 use super::point14::Point14;
 use crate::error::{Error, Location, Result};
 use crate::file::Input;
+use crate::salvage::Salvage;
 
 /// Number of points decoded at a time, whose raw records stay in the processor's cache.
 const POINTS_PER_BATCH: usize = 1024;
@@ -35,7 +35,7 @@ pub(super) struct Chunks {
     items: Vec<LazItem>,
     record_length: usize,
     /// True for point formats from 6 on, which compress each part of a chunk's points in a layer of its own.
-    is_layered: bool,
+    pub is_layered: bool,
 }
 
 /// A run of points that is decoded independently of others.
@@ -46,67 +46,14 @@ pub(super) struct Chunk {
     pub n_points: usize,
 }
 
-/// Finds the chunks of a file and checks that they lie in it.
-pub(super) fn find_chunks(
-    input: &Input,
-    header: &Header,
-    progress: &dyn Progress,
-) -> Result<Chunks> {
-    let vlr = read_laszip_record(input, header)?;
-    let items = vlr.items().clone();
-    let is_layered = matches!(items[0].item_type(), LazItemType::Point14);
-    let mut found =
-        Chunks { chunks: Vec::new(), items, record_length: header.record_length, is_layered };
-    if header.n_points == 0 {
-        return Ok(found);
-    }
-    let record = header.record(input, LazVlr::USER_ID, LazVlr::RECORD_ID).unwrap_or_default();
-    // Compressor 1 writes all points in one run, without a table.
-    let (data_start, table) = if read_u16(record, 0) == 1 {
-        (header.data.start, vec![(header.n_points, header.data.len() as u64)])
-    } else {
-        (header.data.start + ChunkTable::OFFSET_SIZE, read_chunk_table(input, header, &vlr)?)
-    };
-    let mut n_left = header.n_points;
-    let mut start = data_start;
-    for (point_count, byte_count) in table {
-        let n_points = point_count.min(n_left);
-        if n_points == 0 {
-            continue;
-        }
-        let point = Location::Point(header.n_points - n_left);
-        let end = usize::try_from(byte_count).ok().and_then(|count| start.checked_add(count));
-        let Some(end) = end.filter(|end| *end <= header.data.end) else {
-            return Err(Error::Truncated {
-                file: input.name.to_string(),
-                location: point,
-                readable: header.n_points - n_left,
-                claimed: header.n_points,
-            });
-        };
-        let chunk = Chunk { bytes: start..end, n_points: n_points as usize };
-        if MAX_POINTS_PER_BYTE * byte_count < n_points {
-            let found = format!("a chunk of {n_points} points in {byte_count} bytes");
-            return Err(broken(input, point, found, "a count that the bytes can hold"));
-        }
-        found.check_layers(input, &chunk, point)?;
-        start = end;
-        n_left -= n_points;
-        found.chunks.push(chunk);
-    }
-    if 0 < n_left {
-        return Err(Error::Truncated {
-            file: input.name.to_string(),
-            location: Location::Byte(start as u64),
-            readable: header.n_points - n_left,
-            claimed: header.n_points,
-        });
-    }
-    found.probe_suspicious_chunks(input, progress)?;
-    Ok(found)
-}
-
 impl Chunks {
+    /// No chunks yet, of points that are compressed as `vlr` says.
+    pub fn new(vlr: &LazVlr, header: &Header) -> Self {
+        let items = vlr.items().clone();
+        let is_layered = matches!(items[0].item_type(), LazItemType::Point14);
+        Self { chunks: Vec::new(), items, record_length: header.record_length, is_layered }
+    }
+
     /// Yields the first record of each chunk, which is stored uncompressed.
     pub fn first_records<'a>(&self, input: &'a Input) -> impl Iterator<Item = &'a [u8]> {
         self.chunks.iter().map(|chunk| &input[chunk.bytes.start..][..self.record_length])
@@ -171,32 +118,95 @@ impl Chunks {
         Ok(Box::new(decoder))
     }
 
-    /// Checks that the first record and the announced layers of a chunk lie in it.
-    fn check_layers(&self, input: &Input, chunk: &Chunk, location: Location) -> Result<()> {
+    /// Checks that a chunk holds its first record and the announced layers, and that it can hold its points.
+    pub fn check(&self, input: &Input, chunk: &Chunk, location: Location) -> Result<()> {
         let bytes = &input[chunk.bytes.clone()];
-        let n_layers: usize = self.items.iter().map(n_layers).sum();
-        let fixed = self.record_length + if self.is_layered { 4 + 4 * n_layers } else { 4 };
-        let sizes = bytes.get(self.record_length + 4..fixed).unwrap_or_default();
-        let sum: u64 = sizes.chunks_exact(4).map(|size| u64::from(read_u32(size, 0))).sum();
-        let needed = fixed as u64 + sum;
-        if needed <= bytes.len() as u64 {
+        if MAX_POINTS_PER_BYTE * (bytes.len() as u64) < chunk.n_points as u64 {
+            let found = format!("{} points in {} bytes", chunk.n_points, bytes.len());
+            return Err(broken(input, location, found, "a count that the bytes can hold"));
+        }
+        let n_fixed = self.n_bytes_before_layers();
+        let needed = n_fixed as u64 + self.n_bytes_of_layers(bytes);
+        if n_fixed <= bytes.len() && needed <= bytes.len() as u64 {
             return Ok(());
         }
-        let found = format!("a chunk of {} bytes", bytes.len());
-        Err(broken(input, location, found, &format!("{needed} bytes, as its layers announce")))
+        let found = format!("{} bytes", bytes.len());
+        Err(broken(input, location, found, &format!("{needed}, as the chunk's layers announce")))
+    }
+
+    /// Returns the numbers of points and bytes that a layered chunk at the start of `bytes` states; `None` if `bytes`
+    /// end before, or if it states none.
+    pub fn stated_size(&self, bytes: &[u8]) -> Option<(u64, u64)> {
+        let n_fixed = self.n_bytes_before_layers();
+        let head = bytes.get(..n_fixed)?;
+        let n_points = u64::from(read_u32(head, self.record_length));
+        (0 < n_points).then(|| (n_points, n_fixed as u64 + self.n_bytes_of_layers(head)))
+    }
+
+    /// Decodes a chunk as far as its bytes go, and returns the numbers of points and bytes that were decoded. Points
+    /// before any other fault than the end of the bytes may be wrong and do not count.
+    pub fn decoded_size(
+        &self,
+        input: &Input,
+        chunk: &Chunk,
+        progress: &dyn Progress,
+    ) -> Result<(usize, usize)> {
+        let Ok(mut decoder) = self.decoder(Cursor::new(&input[chunk.bytes.clone()])) else {
+            return Ok((0, 0));
+        };
+        let mut record = vec![0; self.record_length];
+        let mut n_points = 0;
+        while n_points < chunk.n_points {
+            progress.check()?;
+            let batch_end = chunk.n_points.min(n_points + POINTS_PER_BATCH);
+            // As in `decode`.
+            let decoded = catch_unwind(AssertUnwindSafe(|| {
+                while n_points < batch_end {
+                    decoder.decompress_next(&mut record)?;
+                    n_points += 1;
+                }
+                Ok::<(), std::io::Error>(())
+            }));
+            match decoded {
+                Ok(Ok(())) => {}
+                Ok(Err(error)) if error.kind() == ErrorKind::UnexpectedEof => break,
+                _ => return Ok((0, 0)),
+            }
+        }
+        Ok((n_points, decoder.box_into_inner().position() as usize))
+    }
+
+    /// Returns the bytes of a chunk before its layers or its arithmetic code: first record, and number of points and
+    /// sizes of layers if there are any.
+    fn n_bytes_before_layers(&self) -> usize {
+        let n_layers: usize = self.items.iter().map(n_layers).sum();
+        self.record_length + if self.is_layered { 4 + 4 * n_layers } else { 4 }
+    }
+
+    /// Returns the bytes of the layers that the head of a chunk announces; 0 if there are none.
+    fn n_bytes_of_layers(&self, bytes: &[u8]) -> u64 {
+        let sizes = bytes.get(self.record_length + 4..self.n_bytes_before_layers());
+        let sizes = sizes.unwrap_or_default().chunks_exact(4);
+        sizes.map(|size| u64::from(read_u32(size, 0))).sum()
     }
 
     /// Decodes chunks that claim suspiciously many points once, so that no memory is allocated for a false claim.
-    fn probe_suspicious_chunks(&self, input: &Input, progress: &dyn Progress) -> Result<()> {
-        for chunk in &self.chunks {
-            if SUSPICIOUS_POINTS_PER_BYTE * (chunk.bytes.len() as u64) < chunk.n_points as u64 {
-                self.decode(
-                    input,
-                    chunk,
-                    DecompressionSelection::all(),
-                    |_| Ok(progress.check()?),
-                )?;
+    pub fn probe_suspicious_chunks(
+        &mut self,
+        salvage: &mut Salvage,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        for chunk in std::mem::take(&mut self.chunks) {
+            let max_points = SUSPICIOUS_POINTS_PER_BYTE * chunk.bytes.len() as u64;
+            if max_points < chunk.n_points as u64 {
+                let check = |_: &[u8]| Ok(progress.check()?);
+                let all = DecompressionSelection::all();
+                if let Err(error) = self.decode(salvage.input, &chunk, all, check) {
+                    salvage.accept(error)?;
+                    continue;
+                }
             }
+            self.chunks.push(chunk);
         }
         Ok(())
     }
@@ -213,7 +223,7 @@ fn n_layers(item: &LazItem) -> usize {
 }
 
 /// Reads the record that describes the compression, and checks that it fits the header.
-fn read_laszip_record(input: &Input, header: &Header) -> Result<LazVlr> {
+pub(super) fn read_laszip_record(input: &Input, header: &Header) -> Result<LazVlr> {
     let location = Location::Byte(header.data.start as u64);
     let Some(record) = header.record(input, LazVlr::USER_ID, LazVlr::RECORD_ID) else {
         return Err(broken(
@@ -265,48 +275,12 @@ fn read_laszip_record(input: &Input, header: &Header) -> Result<LazVlr> {
     Ok(vlr)
 }
 
-/// Reads the numbers of points and bytes of each chunk.
-fn read_chunk_table(input: &Input, header: &Header, vlr: &LazVlr) -> Result<Vec<(u64, u64)>> {
-    let start = header.data.start;
-    let missing = |found: String| {
-        let advice = "the file was cut off or never closed; copy or write it again";
-        let expected = "the offset of a chunk table inside the file";
-        input.malformed(Location::Byte(start as u64), found, expected, advice)
-    };
-    if header.data.len() < ChunkTable::OFFSET_SIZE {
-        return Err(missing("the end of the file".into()));
-    }
-    let mut offset = read_u64(input, start);
-    // A writer that cannot seek puts the offset at the end.
-    if offset == u64::MAX {
-        offset = read_u64(input, input.len() - 8);
-    }
-    let at = usize::try_from(offset).ok().filter(|at| start + 8 <= *at && at + 8 <= input.len());
-    let Some(at) = at else {
-        return Err(missing(format!("offset {}", offset as i64)));
-    };
-    let n_chunks = read_u32(input, at + 4);
-    // Each chunk begins with an uncompressed record.
-    if ((header.data.len() / header.record_length) as u32) < n_chunks {
-        let found = format!("{n_chunks} chunks");
-        return Err(broken(
-            input,
-            Location::Byte(at as u64 + 4),
-            found,
-            "at most one a record's length of bytes",
-        ));
-    }
-    let is_variable = vlr.uses_variable_size_chunks();
-    let mut table_bytes = Cursor::new(&input[at..]);
-    // The table is coded arithmetically too, so decoding it can panic as in `Chunks::decode`.
-    let table = catch_unwind(AssertUnwindSafe(|| ChunkTable::read(&mut table_bytes, is_variable)))
-        .map_err(|_| missing("a broken chunk table".into()))?
-        .map_err(|error| missing(error.to_string()))?;
-    let fixed = u64::from(vlr.chunk_size());
-    let count = |point_count| if is_variable { point_count } else { fixed };
-    Ok(table.into_iter().map(|entry| (count(entry.point_count), entry.byte_count)).collect())
-}
-
-fn broken(input: &Input, location: Location, found: impl Into<String>, expected: &str) -> Error {
+/// Returns the error of a damaged file.
+pub(super) fn broken(
+    input: &Input,
+    location: Location,
+    found: impl Into<String>,
+    expected: &str,
+) -> Error {
     input.malformed(location, found, expected, "the file is damaged; copy it again from its source")
 }

@@ -8,6 +8,7 @@ mod gps;
 mod median;
 mod point14;
 mod laz;
+mod find_chunks;
 mod write_plan;
 mod read;
 mod write;

@@ -1,6 +1,6 @@
 //! Reads the points of LAS and LAZ files.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::iter::repeat_n;
 
 use laz::DecompressionSelection;
 use rayon::prelude::*;
@@ -10,11 +10,13 @@ use surfel_core::progress::Progress;
 
 use super::crs::coordinate_system;
 use super::fields::{columns, withheld_flag};
+use super::find_chunks::find_chunks;
 use super::header::{Header, read_header};
-use super::laz::{Chunk, Chunks, find_chunks};
-use crate::error::{Error, Location, Result};
+use super::laz::{Chunk, Chunks};
+use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::salvage::Salvage;
 use crate::table::{
     ColumnChoice, ColumnRole, ColumnSlices, FILTERED_POINTS_PER_BATCH, RecordLayout, choose_origin,
     grow_checked, keep_matching, read_records, sample_positions, shrink,
@@ -39,28 +41,32 @@ pub(crate) fn read(
     let tolerance = header.scale.abs() / 4.0;
     let origin_of =
         |sample: Vec<DVec3>| options.origin.unwrap_or_else(|| choose_origin(&sample, tolerance));
-    let n_withheld = AtomicU64::new(0);
-    let mut cloud = if header.is_compressed {
-        let chunks = find_chunks(input, &header, progress)?;
+    let mut salvage = Salvage::new(input, options.salvage);
+    let Decoded { mut cloud, n_points, n_withheld } = if header.is_compressed {
+        let chunks = find_chunks(&mut salvage, &header, progress)?;
         let sample = chunks.first_records(input).map(|record| layout.world_position(record));
         let origin = origin_of(sample.collect());
-        let reader = ChunkReader {
-            input,
-            header: &header,
-            layout: &layout,
-            origin,
-            options,
-            n_withheld: &n_withheld,
-        };
-        reader.read_chunks(&chunks, progress)?
+        let reader = ChunkReader { input, header: &header, layout: &layout, options };
+        reader.read_chunks(&chunks, origin, &mut salvage, progress)?
     } else {
-        let records = uncompressed_records(input, &header)?;
+        let records = uncompressed_records(&mut salvage, &header)?;
         let origin = origin_of(sample_positions(records, &layout));
-        progress.begin(&format!("read {}", input.name), header.n_points);
-        n_withheld.store(count_withheld(records, &header), Ordering::Relaxed);
-        read_records(input, records, &layout, origin, options.filter.as_ref(), progress)?
+        let n_points = (records.len() / header.record_length) as u64;
+        progress.begin(&format!("read {}", input.name), n_points);
+        Decoded {
+            cloud: read_records(
+                input,
+                records,
+                &layout,
+                origin,
+                options.filter.as_ref(),
+                progress,
+            )?,
+            n_points,
+            n_withheld: count_withheld(records, &header),
+        }
     };
-    let n_withheld = n_withheld.into_inner();
+    salvage.report("points", n_points, Some(header.n_points), progress)?;
     if 0 < n_withheld {
         progress.note(&format!("{}: {n_withheld} points are flagged withheld; kept", input.name));
     }
@@ -68,7 +74,8 @@ pub(crate) fn read(
         normalize_colors(input, &mut cloud, progress);
         drop_zero_columns(input, &mut cloud, progress);
     }
-    Ok(Loaded { cloud, info: file_info(input, &header) })
+    let info = FileInfo { n_points: Some(n_points), ..file_info(input, &header) };
+    Ok(Loaded { cloud, info })
 }
 
 /// Returns the information in a header.
@@ -82,29 +89,35 @@ fn file_info(input: &Input, header: &Header) -> FileInfo {
     FileInfo {
         format: format!("{name} 1.{}, point format {}", header.minor_version, header.point_format),
         n_points: Some(header.n_points),
-        n_triangles: None,
-        external_files: Vec::new(),
         bounds: Some(header.bounds)
             .filter(|[low, high]| low.cmple(*high).all() && low.is_finite() && high.is_finite()),
         resolution: Some(header.scale.abs()),
         coordinate_system: coordinate_system(input, header),
         columns: columns.iter().map(|column| column.role.name().to_owned()).collect(),
+        ..FileInfo::default()
     }
 }
 
 /// Returns the records of an uncompressed file.
-fn uncompressed_records<'a>(input: &'a Input, header: &Header) -> Result<&'a [u8]> {
+fn uncompressed_records<'a>(salvage: &mut Salvage<'a>, header: &Header) -> Result<&'a [u8]> {
+    let input = salvage.input;
     let data = &input[header.data.clone()];
     let readable = (data.len() / header.record_length) as u64;
     if readable < header.n_points {
-        return Err(Error::Truncated {
-            file: input.name.to_string(),
-            location: Location::Byte(header.data.end as u64),
-            readable,
-            claimed: header.n_points,
-        });
+        let location = Location::Byte(header.data.end as u64);
+        salvage.accept(input.truncated(location, readable, header.n_points))?;
     }
-    Ok(&data[..header.n_points as usize * header.record_length])
+    Ok(&data[..readable.min(header.n_points) as usize * header.record_length])
+}
+
+/// The points of a file.
+struct Decoded {
+    /// Points that the filter keeps.
+    cloud: PointCloud,
+    /// Number of points that were read, kept or not.
+    n_points: u64,
+    /// Number of them that are flagged withheld.
+    n_withheld: u64,
 }
 
 /// Reads the chunks of a compressed file in parallel.
@@ -112,18 +125,24 @@ struct ChunkReader<'a> {
     input: &'a Input<'a>,
     header: &'a Header,
     layout: &'a RecordLayout,
-    origin: DVec3,
     options: &'a LoadOptions,
-    n_withheld: &'a AtomicU64,
 }
 
 impl ChunkReader<'_> {
-    fn read_chunks(&self, chunks: &Chunks, progress: &dyn Progress) -> Result<PointCloud> {
+    fn read_chunks(
+        &self,
+        chunks: &Chunks,
+        origin: DVec3,
+        salvage: &mut Salvage,
+        progress: &dyn Progress,
+    ) -> Result<Decoded> {
         progress.begin(&format!("read {}", self.input.name), self.header.n_points);
-        let mut cloud = self.layout.empty_cloud(self.origin);
-        if self.options.filter.is_none() {
-            self.append_chunks(&mut cloud, chunks, &chunks.chunks, progress)?;
-            return Ok(cloud);
+        let cloud = self.layout.empty_cloud(origin);
+        let mut decoded = Decoded { cloud, n_points: 0, n_withheld: 0 };
+        let filter = self.options.filter.as_ref();
+        if filter.is_none() {
+            self.append_chunks(&mut decoded, chunks, &chunks.chunks, salvage, progress)?;
+            return Ok(decoded);
         }
         let mut rest = &chunks.chunks[..];
         while !rest.is_empty() {
@@ -134,41 +153,62 @@ impl ChunkReader<'_> {
             };
             let n_chunks = rest.iter().take_while(is_in_batch).count().max(1);
             let (batch, after) = rest.split_at(n_chunks);
-            let n_before = cloud.len();
-            self.append_chunks(&mut cloud, chunks, batch, progress)?;
-            keep_matching(&mut cloud, n_before, self.options.filter.as_ref())?;
+            let n_before = decoded.cloud.len();
+            self.append_chunks(&mut decoded, chunks, batch, salvage, progress)?;
+            keep_matching(&mut decoded.cloud, n_before, filter)?;
             rest = after;
         }
-        shrink(&mut cloud);
-        Ok(cloud)
+        shrink(&mut decoded.cloud);
+        Ok(decoded)
     }
 
-    /// Decodes some of the chunks to the end of a cloud.
+    /// Decodes some of the chunks to the end of a cloud. Those that do not decode are damage.
     fn append_chunks(
         &self,
-        cloud: &mut PointCloud,
+        decoded: &mut Decoded,
         chunks: &Chunks,
         batch: &[Chunk],
+        salvage: &mut Salvage,
         progress: &dyn Progress,
     ) -> Result<()> {
         let selection = selection(&self.options.columns);
-        let n_before = cloud.len();
+        let Decoded { cloud, n_points, n_withheld } = decoded;
+        let (n_before, origin) = (cloud.len(), cloud.origin);
         let n_new: usize = batch.iter().map(|chunk| chunk.n_points).sum();
         grow_checked(cloud, n_before + n_new, self.input)?;
         let mut rest = ColumnSlices::from_cloud(cloud, n_before);
         let tasks: Vec<(&Chunk, ColumnSlices)> =
             batch.iter().map(|chunk| (chunk, rest.split_off_front(chunk.n_points))).collect();
-        tasks.into_par_iter().with_max_len(1).try_for_each(|(chunk, mut slices)| {
+        let decode = |(chunk, mut slices): (&Chunk, ColumnSlices)| {
+            let mut n_withheld = 0;
             chunks.decode(self.input, chunk, selection, |records| {
                 progress.check()?;
                 let n_points = records.len() / self.header.record_length;
                 let mut batch = slices.split_off_front(n_points);
-                self.layout.decode(records, self.origin, &mut batch);
-                self.n_withheld.fetch_add(count_withheld(records, self.header), Ordering::Relaxed);
+                self.layout.decode(records, origin, &mut batch);
+                n_withheld += count_withheld(records, self.header);
                 progress.advance(n_points as u64);
                 Ok(())
-            })
-        })
+            })?;
+            Ok(n_withheld)
+        };
+        let results: Vec<Result<u64>> = tasks.into_par_iter().with_max_len(1).map(decode).collect();
+        let mut is_whole = Vec::new();
+        for (chunk, result) in batch.iter().zip(results) {
+            is_whole.push((chunk.n_points, result.is_ok()));
+            match result {
+                Ok(n_withheld_in_chunk) => {
+                    *n_points += chunk.n_points as u64;
+                    *n_withheld += n_withheld_in_chunk;
+                }
+                Err(error) => salvage.accept(error)?,
+            }
+        }
+        if is_whole.iter().any(|(_, is_whole)| !is_whole) {
+            let of_points = is_whole.into_iter().flat_map(|(n, is_whole)| repeat_n(is_whole, n));
+            cloud.retain_from(n_before, &of_points.collect::<Vec<bool>>());
+        }
+        Ok(())
     }
 }
 

@@ -67,6 +67,7 @@ pub fn common_file_info(infos: &[FileInfo]) -> FileInfo {
             .filter(|name| infos.iter().all(|info| info.columns.contains(name)))
             .cloned()
             .collect(),
+        images: infos.iter().flat_map(|info| info.images.clone()).collect(),
         external_files: infos.iter().flat_map(|info| info.external_files.clone()).collect(),
     }
 }

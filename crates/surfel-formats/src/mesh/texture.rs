@@ -60,7 +60,7 @@ fn malformed(name: &str, found: String, expected: &str) -> Error {
         location: Location::Byte(0),
         found,
         expected: expected.into(),
-        advice: "copy the picture again from its source, or save it again",
+        advice: "copy the picture again from its source, or save it again".into(),
     }
 }
 

@@ -5,6 +5,7 @@ use surfel_core::progress::Progress;
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::salvage::Salvage;
 use crate::table::{
     ColorRange, ColumnField, ColumnRole, Field, LineError, NumberType, RecordLayout, RowRange,
     parse_number, read_rows,
@@ -39,8 +40,9 @@ pub(crate) fn read(
     let parse = |_, line: &[u8], row: &mut Vec<f64>| parse_vertex(line, n_columns, row);
     let rows = RowRange { start: 0, end: None, line: 1, n_columns, limit: None };
     progress.begin(&format!("read {}", input.name), input.len() as u64);
+    let mut salvage = Salvage::new(input, options.salvage);
     let (cloud, n_points) = read_rows(
-        input,
+        &mut salvage,
         rows,
         &parse,
         layout_of,
@@ -48,6 +50,7 @@ pub(crate) fn read(
         options.filter.as_ref(),
         progress,
     )?;
+    salvage.report("points", n_points, None, progress)?;
     let info = FileInfo { n_points: Some(n_points), ..file_info(n_columns) };
     Ok(Loaded { cloud, info })
 }

@@ -31,12 +31,10 @@ pub(super) fn records(input: &Input, header: &Header, progress: &dyn Progress) -
         let expected = format!("{expected_bytes}, as its fields and points take");
         return Err(input.malformed(location, format!("{n_bytes} bytes"), expected, ADVICE));
     }
-    let data = data.get(..n_compressed as usize).ok_or_else(|| Error::Truncated {
-        file: input.name.to_string(),
-        location: Location::Byte(input.len() as u64),
-        readable: 0,
-        claimed: n_points,
-    })?;
+    // Values are stored field by field, so no point is whole in a part of the data.
+    let data = data
+        .get(..n_compressed as usize)
+        .ok_or_else(|| input.truncated(Location::Byte(input.len() as u64), 0, n_points))?;
     if data.len().saturating_mul(MAX_RATIO) < n_bytes as usize {
         let location = Location::Byte(header.body as u64);
         let expected = format!("at most {} from {} bytes", data.len() * MAX_RATIO, data.len());

@@ -8,9 +8,10 @@ use surfel_core::progress::Progress;
 
 use super::compressed;
 use super::header::{Encoding, Header, PcdField, read_header};
-use crate::error::{Error, Location, Result};
+use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::salvage::Salvage;
 use crate::table::{
     ColumnField, ColumnRole, Field, LineError, NumberType, RecordLayout, RowRange, Tolerance,
     named_columns, origin_of_records, parse_number, read_records, read_rows,
@@ -34,14 +35,16 @@ pub(crate) fn read(
 ) -> Result<Loaded> {
     let header = read_header(input)?;
     check_axes(input, &header)?;
-    let mut cloud = match header.encoding {
-        Encoding::Ascii => read_ascii(input, &header, options, progress)?,
-        _ => read_binary(input, &header, options, progress)?,
+    let mut salvage = Salvage::new(input, options.salvage);
+    let (mut cloud, n_points) = match header.encoding {
+        Encoding::Ascii => read_ascii(&mut salvage, &header, options, progress)?,
+        _ => read_binary(&mut salvage, &header, options, progress)?,
     };
+    salvage.report("points", n_points, Some(header.n_points()), progress)?;
     if header.is_organized() {
         add_grid(&mut cloud, &header, options);
     }
-    Ok(Loaded { cloud, info: file_info(&header) })
+    Ok(Loaded { cloud, info: FileInfo { n_points: Some(n_points), ..file_info(&header) } })
 }
 
 /// Adds the station of an organised cloud, and the row and column of each point. A cloud without the points that a
@@ -130,12 +133,14 @@ fn name_of(field: &PcdField, i: usize) -> String {
     if field.count == 1 { field.name.clone() } else { format!("{}_{i}", field.name) }
 }
 
+/// Reads binary points; also returns their number, kept or not.
 fn read_binary(
-    input: &Input,
+    salvage: &mut Salvage,
     header: &Header,
     options: &LoadOptions,
     progress: &dyn Progress,
-) -> Result<PointCloud> {
+) -> Result<(PointCloud, u64)> {
+    let input = salvage.input;
     let stride = header.stride();
     progress.begin(&format!("read {}", input.name), header.n_points());
     let records = match header.encoding {
@@ -144,9 +149,10 @@ fn read_binary(
             let rest = &input[header.body..];
             let readable = (rest.len() / stride) as u64;
             if readable < header.n_points() {
-                return Err(truncated(input, header, readable));
+                let location = Location::Byte(input.len() as u64);
+                salvage.accept(input.truncated(location, readable, header.n_points()))?;
             }
-            Cow::Borrowed(&rest[..header.n_points() as usize * stride])
+            Cow::Borrowed(&rest[..header.n_points().min(readable) as usize * stride])
         }
     };
     let columns = binary_columns(header);
@@ -159,15 +165,19 @@ fn read_binary(
         _ => Tolerance::F32_COORDINATES,
     };
     let origin = options.origin.unwrap_or_else(|| origin_of_records(&records, &layout, tolerance));
-    read_records(input, &records, &layout, origin, options.filter.as_ref(), progress)
+    let n_points = (records.len() / stride) as u64;
+    let cloud = read_records(input, &records, &layout, origin, options.filter.as_ref(), progress)?;
+    Ok((cloud, n_points))
 }
 
+/// Reads points by lines; also returns their number, kept or not.
 fn read_ascii(
-    input: &Input,
+    salvage: &mut Salvage,
     header: &Header,
     options: &LoadOptions,
     progress: &dyn Progress,
-) -> Result<PointCloud> {
+) -> Result<(PointCloud, u64)> {
+    let input = salvage.input;
     let columns = binary_columns(header);
     let rows = RowRange {
         start: header.body,
@@ -187,33 +197,11 @@ fn read_ascii(
         layout(stride, columns, options)
     };
     progress.begin(&format!("read {}", input.name), (input.len() - header.body) as u64);
-    let (cloud, n_rows) = read_rows(
-        input,
-        rows,
-        &parse,
-        layout_of,
-        options.origin,
-        options.filter.as_ref(),
-        progress,
-    )?;
-    if n_rows < header.n_points() {
-        return Err(truncated(input, header, n_rows));
-    }
-    Ok(cloud)
+    read_rows(salvage, rows, &parse, layout_of, options.origin, options.filter.as_ref(), progress)
 }
 
 fn layout(stride: usize, columns: Vec<ColumnField>, options: &LoadOptions) -> RecordLayout {
     RecordLayout::new(stride, false, columns, &options.columns).expect("x, y and z were found")
-}
-
-/// Returns the error of a file that ends after `readable` points.
-fn truncated(input: &Input, header: &Header, readable: u64) -> Error {
-    Error::Truncated {
-        file: input.name.to_string(),
-        location: Location::Byte(input.len() as u64),
-        readable,
-        claimed: header.n_points(),
-    }
 }
 
 /// Appends the columns of an ascii point to `row`.

@@ -8,6 +8,7 @@ use super::header::{Element, Encoding, Header};
 use super::skip::{property_end, skip_elements};
 use crate::error::{Location, Result};
 use crate::file::Input;
+use crate::salvage::Salvage;
 use crate::table::{
     Field, LineError, NumberType, ParseFault, TextChunk, find_line_end, line_at, parse_chunks,
     parse_number,
@@ -20,6 +21,8 @@ pub(super) struct Faces {
     pub triangles: Vec<[u32; 3]>,
     /// Texture coordinates of their corners, with v up as in the file; as many as triangles, or none.
     pub uvs: Vec<[Vec2; 3]>,
+    /// Number of faces that were read.
+    pub n_read: u64,
     /// Number of faces with fewer than three corners.
     pub n_short: u64,
     /// Location of the first face.
@@ -52,34 +55,45 @@ pub(super) fn count_faces(header: &Header) -> u64 {
     faces.fold(0, |sum, element| sum.saturating_add(element.count))
 }
 
-/// Reads all faces, whose corners are indices of `n_vertices` vertices.
+/// Reads all faces, whose corners are indices of `n_vertices` vertices; salvage reads those before the first damage.
 pub(super) fn read_faces(
-    input: &Input,
+    salvage: &mut Salvage,
     header: &Header,
     n_vertices: u64,
     progress: &dyn Progress,
 ) -> Result<Faces> {
+    let input = salvage.input;
     progress.begin(&format!("read the faces of {}", input.name), count_faces(header));
-    let big_endian = header.encoding == Encoding::BigEndian;
-    let is_ascii = header.encoding == Encoding::Ascii;
     let mut faces = Faces::default();
     let mut at = header.body;
     for element in &header.elements {
-        let Some(face_element) = FaceElement::new(element, n_vertices) else {
-            at = match is_ascii {
-                true => end_of_lines(input, at, element, progress)?,
-                false => skip_elements(input, at, element, big_endian, progress)?,
-            };
-            continue;
+        let read = match FaceElement::new(element, n_vertices) {
+            Some(element) => element.read(input, at, header.encoding, &mut faces, progress),
+            None => skip(input, at, element, header.encoding, progress),
         };
-        let location = if is_ascii { line_at(input, at) } else { Location::Byte(at as u64) };
-        faces.location.get_or_insert(location);
-        at = match is_ascii {
-            true => face_element.read_ascii(input, at, &mut faces, progress)?,
-            false => face_element.read_binary(input, at, big_endian, &mut faces, progress)?,
-        };
+        match read {
+            Ok(end) => at = end,
+            Err(error) => {
+                salvage.accept(error)?;
+                break;
+            }
+        }
     }
     Ok(faces)
+}
+
+/// Returns the first byte after elements that hold no faces, which begin at `start`.
+fn skip(
+    input: &Input,
+    start: usize,
+    element: &Element,
+    encoding: Encoding,
+    progress: &dyn Progress,
+) -> Result<usize> {
+    match encoding {
+        Encoding::Ascii => end_of_lines(input, start, element, progress),
+        _ => skip_elements(input, start, element, encoding == Encoding::BigEndian, progress),
+    }
 }
 
 impl<'a> FaceElement<'a> {
@@ -94,6 +108,24 @@ impl<'a> FaceElement<'a> {
         let texcoords = list(["texcoord", "texcoords"]).filter(|_| !is_strips);
         let has_faces = (is_strips || element.name == "face") && 0 < element.count;
         has_faces.then_some(Self { element, indices, texcoords, is_strips, n_vertices })
+    }
+
+    /// Reads faces from `start`; returns the first byte after them. If one is broken, those before it are read.
+    fn read(
+        &self,
+        input: &Input,
+        start: usize,
+        encoding: Encoding,
+        faces: &mut Faces,
+        progress: &dyn Progress,
+    ) -> Result<usize> {
+        let is_ascii = encoding == Encoding::Ascii;
+        let location = if is_ascii { line_at(input, start) } else { Location::Byte(start as u64) };
+        faces.location.get_or_insert(location);
+        match encoding {
+            Encoding::Ascii => self.read_ascii(input, start, faces, progress),
+            _ => self.read_binary(input, start, encoding == Encoding::BigEndian, faces, progress),
+        }
     }
 
     /// Reads binary faces from `start`; returns the first byte after them.
@@ -141,24 +173,32 @@ impl<'a> FaceElement<'a> {
         faces: &mut Faces,
         progress: &dyn Progress,
     ) -> Result<usize> {
-        let end = end_of_lines(input, start, self.element, progress)?;
-        let chunks = TextChunk { text: &input[start..end], start }.split(find_line_end);
+        let end = end_of_lines(input, start, self.element, progress);
+        // The last line of a file that ends early may be cut within a number.
+        let last_line = || start + memchr::memrchr(b'\n', &input[start..]).map_or(0, |at| at + 1);
+        let text_end = end.as_ref().map_or_else(|_| last_line(), |end| *end);
+        let chunks = TextChunk { text: &input[start..text_end], start }.split(find_line_end);
         let parse = |_: usize, chunk: TextChunk| {
             let mut faces = Faces::default();
             let mut lists = Lists::default();
             for (at, line) in chunk.lines(find_line_end) {
                 let parsed = self.parse_line(line, &mut lists);
-                let added = parsed.and_then(|()| self.add(&lists, &mut faces));
-                added.map_err(|error| ParseFault::new(at, error))?;
+                if let Err(error) = parsed.and_then(|()| self.add(&lists, &mut faces)) {
+                    return Ok((faces, Some(ParseFault::new(at, error))));
+                }
             }
-            Ok(faces)
+            Ok((faces, None))
         };
-        for parsed in parse_chunks(input, &chunks, parse, progress)? {
+        for (parsed, fault) in parse_chunks(input, &chunks, parse, progress)? {
             faces.triangles.extend(parsed.triangles);
             faces.uvs.extend(parsed.uvs);
+            faces.n_read += parsed.n_read;
             faces.n_short += parsed.n_short;
+            if let Some(fault) = fault {
+                return Err(fault.into_error(input));
+            }
         }
-        Ok(end)
+        end
     }
 
     /// Parses the lists in a line.
@@ -195,8 +235,22 @@ impl<'a> FaceElement<'a> {
         }
     }
 
-    /// Adds the triangles of a polygon or of strips.
+    /// Adds the triangles of a polygon or of strips, all or none.
     fn add(&self, lists: &Lists, faces: &mut Faces) -> std::result::Result<(), LineError> {
+        let n_before = faces.triangles.len();
+        let added = self.add_triangles(lists, faces);
+        match added {
+            Ok(()) => faces.n_read += 1,
+            Err(_) => faces.triangles.truncate(n_before),
+        }
+        added
+    }
+
+    fn add_triangles(
+        &self,
+        lists: &Lists,
+        faces: &mut Faces,
+    ) -> std::result::Result<(), LineError> {
         let vertex = |corner: f64| {
             let is_vertex =
                 corner.fract() == 0.0 && 0.0 <= corner && corner < self.n_vertices as f64;

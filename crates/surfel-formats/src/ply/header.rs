@@ -68,12 +68,7 @@ impl Element {
 
     /// Returns the error of a file that ends after `readable` of these elements, which are its points.
     pub fn truncated(&self, input: &Input, readable: u64) -> Error {
-        Error::Truncated {
-            file: input.name.to_string(),
-            location: Location::Byte(input.len() as u64),
-            readable,
-            claimed: self.count,
-        }
+        input.truncated(Location::Byte(input.len() as u64), readable, self.count)
     }
 }
 

@@ -13,6 +13,7 @@ use crate::error::{Location, Result};
 use crate::file::{Input, ResourceResolver};
 use crate::mesh::{Model, TextureLoader, repair_model, weld};
 use crate::options::{FileInfo, LoadOptions};
+use crate::salvage::Salvage;
 use crate::table::{Column, ColumnChoice};
 
 /// Names of texture coordinates, as Blender and MeshLab write them.
@@ -43,8 +44,13 @@ pub(crate) fn read_mesh(
     // Faces name vertices by their places, so all are read.
     let columns = ColumnChoice::Only(columns);
     let options = LoadOptions { columns, filter: None, ..options.clone() };
-    let cloud = read_cloud(input, &header, &options, progress)?;
-    let faces = read_faces(input, &header, vertex.count, progress)?;
+    let mut salvage = Salvage::new(input, options.salvage);
+    let (cloud, n_vertices) = read_cloud(&mut salvage, &header, &options, progress)?;
+    if n_vertices < vertex.count {
+        return Err(vertex.truncated(input, n_vertices));
+    }
+    let faces = read_faces(&mut salvage, &header, vertex.count, progress)?;
+    salvage.report("faces", faces.n_read, Some(count_faces(&header)), progress)?;
     let mut mesh = Mesh {
         origin: cloud.origin,
         uvs: [uvs(&cloud), None],

@@ -11,6 +11,7 @@ use super::trained_splats::{PROPERTIES, are_trained_splats, into_discs};
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::salvage::Salvage;
 use crate::table::{
     ColumnRole, Field, LineError, NumberType, RecordLayout, RowRange, Tolerance, named_columns,
     origin_of_records, parse_number, read_records, read_rows,
@@ -31,13 +32,17 @@ pub(crate) fn read(
 ) -> Result<Loaded> {
     let header = read_header(input)?;
     let (_, vertex) = find_vertex(input, &header)?;
-    let info = file_info(&header, vertex);
+    let mut info = file_info(&header, vertex);
+    let mut salvage = Salvage::new(input, options.salvage);
     if !are_trained_splats(vertex) {
-        return Ok(Loaded { cloud: read_cloud(input, &header, options, progress)?, info });
+        let (cloud, n_points) = read_cloud(&mut salvage, &header, options, progress)?;
+        salvage.report("points", n_points, info.n_points.replace(n_points), progress)?;
+        return Ok(Loaded { cloud, info });
     }
     let columns = options.columns.with_names(&PROPERTIES);
     let needed = LoadOptions { columns, ..options.clone() };
-    let mut cloud = read_cloud(input, &header, &needed, progress)?;
+    let (mut cloud, n_points) = read_cloud(&mut salvage, &header, &needed, progress)?;
+    salvage.report("points", n_points, info.n_points.replace(n_points), progress)?;
     let n_faint = into_discs(&mut cloud);
     options.columns.drop_others(&mut cloud);
     let line = format!(
@@ -47,17 +52,17 @@ pub(crate) fn read(
     Ok(Loaded { cloud, info })
 }
 
-/// Reads the vertices of a file with this header.
+/// Reads the vertices of a file with this header; also returns their number, kept or not.
 pub(super) fn read_cloud(
-    input: &Input,
+    salvage: &mut Salvage,
     header: &Header,
     options: &LoadOptions,
     progress: &dyn Progress,
-) -> Result<PointCloud> {
-    let (before, vertex) = find_vertex(input, header)?;
+) -> Result<(PointCloud, u64)> {
+    let (before, vertex) = find_vertex(salvage.input, header)?;
     match header.encoding {
-        Encoding::Ascii => read_ascii(input, header, before, vertex, options, progress),
-        _ => read_binary(input, header, before, vertex, options, progress),
+        Encoding::Ascii => read_ascii(salvage, header, before, vertex, options, progress),
+        _ => read_binary(salvage, header, before, vertex, options, progress),
     }
 }
 
@@ -109,13 +114,14 @@ pub(super) fn find_vertex<'a>(
 }
 
 fn read_binary(
-    input: &Input,
+    salvage: &mut Salvage,
     header: &Header,
     before: &[Element],
     vertex: &Element,
     options: &LoadOptions,
     progress: &dyn Progress,
-) -> Result<PointCloud> {
+) -> Result<(PointCloud, u64)> {
+    let input = salvage.input;
     let big_endian = header.encoding == Encoding::BigEndian;
     let mut start = header.body;
     for element in before {
@@ -132,13 +138,13 @@ fn read_binary(
     let packed;
     let records = if vertex.stride().is_some() {
         let rest = &input[start..];
-        let readable = rest.len() / stride;
-        if (readable as u64) < vertex.count {
-            return Err(vertex.truncated(input, readable as u64));
+        let readable = (rest.len() / stride) as u64;
+        if readable < vertex.count {
+            salvage.accept(vertex.truncated(input, readable))?;
         }
-        &rest[..vertex.count as usize * stride]
+        &rest[..vertex.count.min(readable) as usize * stride]
     } else {
-        packed = pack_vertices(input, start, vertex, big_endian, progress)?;
+        packed = pack_vertices(salvage, start, vertex, big_endian, progress)?;
         &packed
     };
     let layout =
@@ -148,18 +154,21 @@ fn read_binary(
         _ => Tolerance::F32_COORDINATES,
     };
     let origin = options.origin.unwrap_or_else(|| origin_of_records(records, &layout, tolerance));
-    progress.begin(&format!("read {}", input.name), vertex.count);
-    read_records(input, records, &layout, origin, options.filter.as_ref(), progress)
+    let n_points = (records.len() / stride) as u64;
+    progress.begin(&format!("read {}", input.name), n_points);
+    let cloud = read_records(input, records, &layout, origin, options.filter.as_ref(), progress)?;
+    Ok((cloud, n_points))
 }
 
 fn read_ascii(
-    input: &Input,
+    salvage: &mut Salvage,
     header: &Header,
     before: &[Element],
     vertex: &Element,
     options: &LoadOptions,
     progress: &dyn Progress,
-) -> Result<PointCloud> {
+) -> Result<(PointCloud, u64)> {
+    let input = salvage.input;
     let mut start = header.body;
     for element in before {
         start = end_of_lines(input, start, element, progress)?;
@@ -181,19 +190,7 @@ fn read_ascii(
             .expect("x, y and z were found")
     };
     progress.begin(&format!("read {}", input.name), (input.len() - start) as u64);
-    let (cloud, n_rows) = read_rows(
-        input,
-        rows,
-        &parse,
-        layout_of,
-        options.origin,
-        options.filter.as_ref(),
-        progress,
-    )?;
-    if n_rows < vertex.count {
-        return Err(vertex.truncated(input, n_rows));
-    }
-    Ok(cloud)
+    read_rows(salvage, rows, &parse, layout_of, options.origin, options.filter.as_ref(), progress)
 }
 
 /// Parses an ascii vertex: a number for each property; a list has its length and its items, which are not kept.

@@ -5,25 +5,31 @@ use surfel_core::progress::Progress;
 use super::header::{Element, Property};
 use crate::error::Result;
 use crate::file::Input;
+use crate::salvage::Salvage;
 use crate::table::Field;
 
 /// Returns the binary vertices without their lists, as records of fixed length.
 pub(super) fn pack_vertices(
-    input: &Input,
+    salvage: &mut Salvage,
     start: usize,
     vertex: &Element,
     big_endian: bool,
     progress: &dyn Progress,
 ) -> Result<Vec<u8>> {
+    let input = salvage.input;
     let mut packed = Vec::new();
     let mut at = start;
     for point in 0..vertex.count {
         if point % 65536 == 0 {
             progress.check()?;
         }
+        let n_whole = packed.len();
         for property in &vertex.properties {
-            let end = property_end(input, at, property, big_endian)
-                .ok_or_else(|| vertex.truncated(input, point))?;
+            let Some(end) = property_end(input, at, property, big_endian) else {
+                salvage.accept(vertex.truncated(input, point))?;
+                packed.truncate(n_whole);
+                return Ok(packed);
+            };
             if property.length_type.is_none() {
                 packed.extend_from_slice(&input[at..end]);
             }

@@ -1,15 +1,14 @@
 //! Reads the points of PTX files to world coordinates.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use surfel_core::math::{DMat3, DQuat, DVec3};
 use surfel_core::points::{COLUMN_INDEX, ROW_INDEX, ScanStation};
 use surfel_core::progress::Progress;
 
 use super::scans::{Scan, find_scans, first_header};
-use crate::error::{Location, Result};
+use crate::error::{Error, Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::salvage::Salvage;
 use crate::stations::set_stations;
 use crate::table::{
     CloudBuilder, ColorRange, ColumnField, ColumnRole, Field, LineError, NumberType, RecordLayout,
@@ -34,18 +33,17 @@ pub(crate) fn read(
     options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<Loaded> {
-    let scans = find_scans(input, progress)?;
+    let mut salvage = Salvage::new(input, options.salvage);
+    let scans = find_scans(&mut salvage, progress)?;
     let roles = roles(input, &scans)?;
     let layout_of = |_: &[u8]| layout(&roles, &scans, options);
     let mut builder = CloudBuilder::new(input, layout_of, options.origin, options.filter.as_ref());
     let mut n_scan_points = Vec::new();
-    let n_empty = AtomicU64::new(0);
+    let mut n_cells_read = 0;
     progress.begin(&format!("read {}", input.name), input.len() as u64);
     for scan in &scans {
         let parse = |number: u64, line: &[u8], row: &mut Vec<f64>| {
-            parse_cell(line, scan, number - scan.line, roles.len(), row)?;
-            n_empty.fetch_add(u64::from(row.is_empty()), Ordering::Relaxed);
-            Ok(())
+            parse_cell(line, scan, number - scan.line, roles.len(), row)
         };
         let rows = RowRange {
             start: scan.start,
@@ -55,16 +53,28 @@ pub(crate) fn read(
             limit: None,
         };
         let n_before = builder.n_points();
-        append_rows(&mut builder, rows, &parse, progress)?;
+        n_cells_read += match append_rows(&mut builder, rows, &parse, progress) {
+            Ok(()) => scan.n_lines,
+            Err(error) => {
+                let line = match &error {
+                    Error::Malformed { location: Location::Line(line), .. } => *line,
+                    _ => scan.line,
+                };
+                salvage.accept(error)?;
+                line - scan.line
+            }
+        };
         n_scan_points.push(builder.n_points() - n_before);
     }
-    let n_empty = n_empty.into_inner();
+    let n_points = builder.n_read();
+    let n_empty = n_cells_read - n_points;
     if 0 < n_empty {
-        let n_cells: u64 = scans.iter().map(Scan::n_cells).sum();
-        let line = format!("{n_empty} of {n_cells} cells of the scanner's grid are empty; skipped");
+        let line =
+            format!("{n_empty} of {n_cells_read} cells of the scanner's grid are empty; skipped");
         progress.note(&format!("{}: {line}", input.name));
     }
-    let n_points = builder.n_read();
+    let n_cells = scans.iter().fold(0, |sum: u64, scan| sum.saturating_add(scan.n_cells()));
+    salvage.report("cells of the scanner's grid", n_cells_read, Some(n_cells), progress)?;
     let mut cloud = builder.finish();
     let stations = scans.iter().enumerate().map(|(i, scan)| ScanStation {
         name: format!("scan {}", i + 1),
@@ -102,7 +112,7 @@ fn describe(scans: &[Scan]) -> String {
 /// Returns the columns that the scans have together.
 fn roles(input: &Input, scans: &[Scan]) -> Result<Vec<ColumnRole>> {
     let mut roles: Vec<ColumnRole> = (0..3).map(ColumnRole::Position).collect();
-    let filled = || scans.iter().filter(|scan| 0 < scan.n_cells());
+    let filled = || scans.iter().filter(|scan| 0 < scan.n_lines);
     if let Some(scan) = filled().find(|scan| ![3, 4, 7].contains(&scan.n_fields)) {
         return Err(input.malformed(
             Location::Line(scan.line),

@@ -5,6 +5,7 @@ use surfel_core::progress::Progress;
 
 use crate::error::{Error, Location, Result};
 use crate::file::Input;
+use crate::salvage::Salvage;
 use crate::stations::MAX_STATIONS;
 use crate::table::{MAX_LINE_LENGTH, parse_number};
 
@@ -29,6 +30,8 @@ pub(super) struct Scan {
     pub end: usize,
     /// Number of the line at `start`.
     pub line: u64,
+    /// Number of whole lines: that of the cells, unless the file ends early.
+    pub n_lines: u64,
     /// Number of fields in the first cell's line.
     pub n_fields: usize,
 }
@@ -40,8 +43,9 @@ impl Scan {
     }
 }
 
-/// Reads the headers of all scans and finds their lines.
-pub(super) fn find_scans(input: &Input, progress: &dyn Progress) -> Result<Vec<Scan>> {
+/// Reads the headers of all scans and finds their lines. Salvage ends with the last whole line.
+pub(super) fn find_scans(salvage: &mut Salvage, progress: &dyn Progress) -> Result<Vec<Scan>> {
+    let input = salvage.input;
     let mut scans: Vec<Scan> = Vec::new();
     let mut lines = Lines { input, at: 0, number: 0 };
     loop {
@@ -59,8 +63,25 @@ pub(super) fn find_scans(input: &Input, progress: &dyn Progress) -> Result<Vec<S
                 advice,
             ));
         }
-        let mut scan = read_scan_header(&mut lines)?;
-        scan.end = end_of_cells(&lines, &scan, progress)?;
+        let mut scan = match read_scan_header(&mut lines) {
+            Ok(scan) => scan,
+            Err(error) if scans.is_empty() => return Err(error),
+            Err(error) => {
+                salvage.accept(error)?;
+                return Ok(scans);
+            }
+        };
+        let end = end_of_cells(&lines, &scan, progress);
+        let is_whole = end.is_ok();
+        match end {
+            Ok(end) => (scan.end, scan.n_lines) = (end, scan.n_cells()),
+            Err(error) => {
+                salvage.accept(error)?;
+                let cells = &input[scan.start..];
+                scan.end = scan.start + memchr::memrchr(b'\n', cells).map_or(0, |at| at + 1);
+                scan.n_lines = memchr::memchr_iter(b'\n', cells).count() as u64;
+            }
+        }
         let first = input[scan.start..scan.end].split(|byte| *byte == b'\n').next();
         scan.n_fields = first
             .unwrap_or_default()
@@ -69,8 +90,11 @@ pub(super) fn find_scans(input: &Input, progress: &dyn Progress) -> Result<Vec<S
             .filter(|word| !word.is_empty())
             .count();
         lines.at = scan.end;
-        lines.number += scan.n_cells();
+        lines.number += scan.n_lines;
         scans.push(scan);
+        if !is_whole {
+            return Ok(scans);
+        }
     }
 }
 
@@ -110,6 +134,7 @@ fn read_scan_header(lines: &mut Lines) -> Result<Scan> {
         start: lines.at,
         end: lines.at,
         line: lines.number + 1,
+        n_lines: 0,
         n_fields: 0,
     })
 }
@@ -123,12 +148,8 @@ fn end_of_cells(lines: &Lines, scan: &Scan, progress: &dyn Progress) -> Result<u
         }
         let rest = &lines.input[at..];
         if rest.is_empty() {
-            return Err(Error::Truncated {
-                file: lines.input.name.to_string(),
-                location: Location::Line(scan.line + cell),
-                readable: cell,
-                claimed: scan.n_cells(),
-            });
+            let location = Location::Line(scan.line + cell);
+            return Err(lines.input.truncated(location, cell, scan.n_cells()));
         }
         at += memchr::memchr(b'\n', rest).map_or(rest.len(), |end| end + 1);
     }

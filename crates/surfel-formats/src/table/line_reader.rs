@@ -9,6 +9,7 @@ use super::cloud_builder::CloudBuilder;
 use super::layout::RecordLayout;
 use crate::error::{Location, Result};
 use crate::file::Input;
+use crate::salvage::Salvage;
 
 /// Bytes of text that a task parses.
 const BYTES_PER_TASK: usize = 1 << 18;
@@ -22,6 +23,7 @@ pub(crate) const MAX_LINE_LENGTH: usize = 1 << 20;
 pub(crate) const MAX_FIELDS: usize = 1000;
 
 /// The lines of a file to read.
+#[derive(Clone, Copy)]
 pub(crate) struct RowRange {
     /// First byte.
     pub start: usize,
@@ -47,10 +49,11 @@ pub(crate) struct LineError {
 pub(crate) type ParseLine<'a> =
     &'a (dyn Fn(u64, &[u8], &mut Vec<f64>) -> std::result::Result<(), LineError> + Sync);
 
-/// Reads lines to a cloud of the points that `filter` keeps; also returns the number of rows, kept or not. `layout_of` is called once, with the first rows
-/// as records of f64.
+/// Reads lines to a cloud of the points that `filter` keeps; also returns the number of rows, kept or not. `layout_of`
+/// is called once, with the first rows as records of f64. A broken line is damage, before which the rows end; so is a
+/// file that ends before as many rows as its limit says.
 pub(crate) fn read_rows(
-    input: &Input,
+    salvage: &mut Salvage,
     rows: RowRange,
     parse: ParseLine,
     layout_of: impl Fn(&[u8]) -> RecordLayout,
@@ -58,13 +61,40 @@ pub(crate) fn read_rows(
     filter: Option<&PointFilter>,
     progress: &dyn Progress,
 ) -> Result<(PointCloud, u64)> {
+    let input = salvage.input;
     let mut builder = CloudBuilder::new(input, layout_of, origin, filter);
-    append_rows(&mut builder, rows, parse, progress)?;
+    let claimed = rows.limit;
+    let (whole, last) = match claimed {
+        Some(_) if salvage.is_on => rows.split_unfinished_line(input),
+        _ => (rows, None),
+    };
+    if let Err(error) = append_rows(&mut builder, whole, parse, progress) {
+        salvage.accept(error)?;
+    } else if let (Some(last), Some(claimed)) = (last, claimed)
+        && builder.n_read() + 1 == claimed
+        && let Err(error) = append_rows(&mut builder, last, parse, progress)
+    {
+        salvage.accept(error)?;
+    }
     let n_rows = builder.n_read();
+    if let Some(claimed) = claimed.filter(|claimed| n_rows < *claimed) {
+        salvage.accept(input.truncated(Location::Byte(input.len() as u64), n_rows, claimed))?;
+    }
     Ok((builder.finish(), n_rows))
 }
 
-/// Reads lines to the end of a cloud.
+impl RowRange {
+    /// Splits off a last line without an end, which may be cut within a number.
+    fn split_unfinished_line(self, input: &Input) -> (Self, Option<Self>) {
+        let text = &input[self.start..self.end.unwrap_or(input.len())];
+        let end = self.start + memchr::memrchr(b'\n', text).map_or(0, |at| at + 1);
+        let n_lines = memchr::memchr_iter(b'\n', text).count() as u64;
+        let last = Self { start: end, line: self.line + n_lines, ..self };
+        (Self { end: Some(end), ..self }, Some(last))
+    }
+}
+
+/// Reads lines to the end of a cloud. If one is broken, those before it are appended.
 pub(crate) fn append_rows(
     builder: &mut CloudBuilder<impl Fn(&[u8]) -> RecordLayout>,
     rows: RowRange,
@@ -89,13 +119,11 @@ pub(crate) fn append_rows(
             if left <= n_rows {
                 parsed.records.truncate(left as usize * 8 * rows.n_columns);
             } else if let Some(LineError { found, expected }) = parsed.error {
+                batch.push(parsed.records);
+                builder.append(&batch)?;
                 let location = Location::Line(line + parsed.n_lines - 1);
-                return Err(input.malformed(
-                    location,
-                    found,
-                    expected,
-                    "repair or remove the line",
-                ));
+                let advice = "repair or remove the line";
+                return Err(input.malformed(location, found, expected, advice));
             }
             left = left.saturating_sub(n_rows);
             line += parsed.n_lines;

@@ -8,6 +8,7 @@ use surfel_core::progress::Progress;
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::salvage::Salvage;
 use crate::table::{
     ColorRange, ColumnField, ColumnRole, Field, LineError, MAX_LINE_LENGTH, NumberType,
     RecordLayout, RowRange, TextColumn, parse_number, read_rows,
@@ -59,8 +60,9 @@ pub(crate) fn read(
         limit: None,
     };
     progress.begin(&format!("read {}", input.name), (input.len() - preamble.data) as u64);
+    let mut salvage = Salvage::new(input, options.salvage);
     let (cloud, n_points) = read_rows(
-        input,
+        &mut salvage,
         rows,
         &parse,
         layout_of,
@@ -68,6 +70,7 @@ pub(crate) fn read(
         options.filter.as_ref(),
         progress,
     )?;
+    salvage.report("points", n_points, preamble.count, progress)?;
     if let Some(count) = preamble.count {
         let line = format!("a line before the points says {count} points, {n_points} were read");
         progress.note(&format!("{}: {line}", input.name));

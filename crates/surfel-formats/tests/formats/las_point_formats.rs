@@ -11,7 +11,7 @@ use crate::common::{Listener, read};
 use surfel_formats::{LoadOptions, load_bytes};
 
 /// Number of points, more than one chunk.
-const N_POINTS: usize = 50_300;
+pub const N_POINTS: usize = 50_300;
 
 fn point(i: usize, format: &Format) -> Point {
     Point {
@@ -40,7 +40,8 @@ fn point(i: usize, format: &Format) -> Point {
     }
 }
 
-fn file(minor_version: u8, format: Format) -> Vec<u8> {
+/// Returns a file of two chunks.
+pub fn file(minor_version: u8, format: Format) -> Vec<u8> {
     let mut builder = Builder::from((1, minor_version));
     builder.point_format = format;
     let axis = |offset| Transform { scale: 0.01, offset };

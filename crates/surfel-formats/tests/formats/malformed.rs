@@ -12,7 +12,7 @@ fn message(name: &str, bytes: impl AsRef<[u8]>) -> String {
 }
 
 /// Returns small files of every format, each with several points.
-fn small_files() -> Vec<(&'static str, Vec<u8>)> {
+pub fn small_files() -> Vec<(&'static str, Vec<u8>)> {
     let cloud = full_cloud(5);
     let lists = "ply\nformat binary_big_endian 1.0\nelement face 1\nproperty list uchar int i\n\
         element vertex 2\nproperty float x\nproperty float y\nproperty list uchar char l\n\

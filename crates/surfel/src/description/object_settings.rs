@@ -89,6 +89,8 @@ settings! {
         structure: StructureChoice = StructureChoice::default(), parsed(StructureChoice::to_string), "CHOICE";
         /// Ends surfaces where a scanner saw through, as the grids of E57, PTX and PCD files tell.
         free_space: bool = true, Flag, "BOOL";
+        /// Reads what is whole of a damaged LAS, LAZ, PLY, E57, PCD, PTX or text file, and reports how much that is.
+        salvage: bool = false, Flag, "BOOL";
         /// Takes the vertices of meshes as points.
         vertices: bool = false, Flag, "BOOL";
         /// Columns of a text file, as in x,y,z,-,r,g,b [default: found from the file].
@@ -239,8 +241,14 @@ impl PreparationSettings {
     pub fn load_options(&self, columns: ColumnChoice) -> Result<LoadOptions, Invalid> {
         let text_columns = self.columns.as_deref().map(TextColumn::parse_list);
         let animation = self.animation_name.clone();
-        let filter = self.point_filter()?;
-        Ok(LoadOptions { columns, text_columns, filter, animation, ..LoadOptions::default() })
+        Ok(LoadOptions {
+            columns,
+            text_columns,
+            filter: self.point_filter()?,
+            salvage: self.salvage(),
+            animation,
+            ..LoadOptions::default()
+        })
     }
 
     /// Returns the filter that `filter`, `class`, `returns` and `crop` make together; `None` if all points are kept.

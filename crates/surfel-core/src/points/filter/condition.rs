@@ -76,12 +76,17 @@ impl Condition {
             if 0 < i {
                 write!(f, " {sign} ")?;
             }
-            match part {
-                Self::All(inner) | Self::Any(inner) if 1 < inner.len() => write!(f, "({part})")?,
-                _ => write!(f, "{part}")?,
-            }
+            part.fmt_single(f)?;
         }
         Ok(())
+    }
+
+    /// Writes the condition, in parentheses if it has parts.
+    fn fmt_single(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::All(parts) | Self::Any(parts) if 1 < parts.len() => write!(f, "({self})"),
+            _ => write!(f, "{self}"),
+        }
     }
 }
 
@@ -90,7 +95,10 @@ impl fmt::Display for Condition {
         match self {
             Self::All(parts) => Self::fmt_parts(parts, "&&", f),
             Self::Any(parts) => Self::fmt_parts(parts, "||", f),
-            Self::Not(inner) => write!(f, "!({inner})"),
+            Self::Not(inner) => {
+                f.write_str("!")?;
+                inner.fmt_single(f)
+            }
             Self::Within(polygons) if polygons.len() == 1 => {
                 f.write_str("(x, y) inside of a polygon")
             }

@@ -94,6 +94,13 @@ impl<'a> Parser<'a> {
         };
         let bound = |high| Condition::Compare(column.clone(), below, Operand::Number(high));
         parts.extend(high.map(bound));
+        if parts.is_empty() {
+            return Err(self.fail("a range with a bound before it"));
+        }
+        // Two bounds are written back in parentheses.
+        if self.depth == MAX_DEPTH {
+            return Err(self.fail("fewer parentheses"));
+        }
         Ok(Condition::All(parts))
     }
 
@@ -191,8 +198,19 @@ mod tests {
         assert!(message("(z < 3").contains("expected `)`"));
         assert!(message("z[3]").contains("`:` between the bounds"));
         assert!(message("z[3:4").contains("`]` or `)`"));
+        assert!(message("z[:]").contains("a range with a bound"));
         assert!(message("z < 1e999").contains("found `1e999`"));
         assert!(message(&"(".repeat(1000)).contains("fewer parentheses"));
         assert!(message(&"!".repeat(1000)).contains("fewer parentheses"));
+    }
+
+    #[test]
+    fn the_deepest_conditions_are_written_back_readably() {
+        for deepest in ["!".repeat(MAX_DEPTH - 1) + "x == 1", "!".repeat(MAX_DEPTH - 2) + "x[1:2]"]
+        {
+            let written = parse(&deepest).unwrap().to_string();
+            assert_eq!(parse(&written).unwrap().to_string(), written);
+            assert!(parse(&format!("!{deepest}")).is_err());
+        }
     }
 }

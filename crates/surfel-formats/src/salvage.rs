@@ -1,0 +1,59 @@
+//! Reads what is whole of damaged files, if that is asked for.
+
+use surfel_core::progress::Progress;
+
+use crate::error::{Error, Result};
+use crate::file::Input;
+
+/// The damage of an input, which ends its reading unless salvage is on.
+pub(crate) struct Salvage<'a> {
+    /// Input that is read.
+    pub input: &'a Input<'a>,
+    /// True if what is whole is read.
+    pub is_on: bool,
+    /// The first damage.
+    damage: Option<Error>,
+}
+
+impl<'a> Salvage<'a> {
+    /// An input without damage so far.
+    pub fn new(input: &'a Input<'a>, is_on: bool) -> Self {
+        Self { input, is_on, damage: None }
+    }
+
+    /// Accepts damage that leaves something whole.
+    ///
+    /// Fails with it, and with advice to salvage, if salvage is off; and with errors that are no damage.
+    pub fn accept(&mut self, mut error: Error) -> Result<()> {
+        let (Error::Malformed { advice, .. } | Error::Truncated { advice, .. }) = &mut error else {
+            return Err(error);
+        };
+        if !self.is_on {
+            advice.to_mut().push_str("; --salvage reads what is whole");
+            return Err(error);
+        }
+        self.damage.get_or_insert(error);
+        Ok(())
+    }
+
+    /// Reports how many of the `claimed` points or other `things` were read in spite of damage; fails if there are none.
+    pub fn report(
+        self,
+        things: &str,
+        readable: u64,
+        claimed: Option<u64>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let Some(damage) = self.damage else { return Ok(()) };
+        if readable == 0 {
+            return Err(damage);
+        }
+        let of_claimed = claimed.map(|claimed| format!(" of {claimed}")).unwrap_or_default();
+        progress.note(&format!(
+            "{}: salvaged {readable}{of_claimed} {things}; {}",
+            self.input.name,
+            damage.damage()
+        ));
+        Ok(())
+    }
+}

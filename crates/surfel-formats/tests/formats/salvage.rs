@@ -1,0 +1,251 @@
+//! Damaged files: what is whole of them is read if that is asked for, and a note says how much that is.
+
+use e57::{Record, RecordValue};
+use las::point::Format;
+use surfel_core::points::PointCloud;
+use surfel_core::progress::NoProgress;
+use surfel_core::scene::Geometry;
+use surfel_formats::{Error, LoadOptions, Loaded, load_bytes, load_graph_bytes};
+
+use crate::common::{Listener, encode_cloud, full_cloud, read};
+use crate::las_point_formats::{N_POINTS, file};
+use crate::malformed::small_files;
+use crate::{e57_writer, pcd, ptx};
+
+const ADVICE: &str = "; --salvage reads what is whole";
+
+fn options() -> LoadOptions {
+    LoadOptions { salvage: true, ..LoadOptions::default() }
+}
+
+fn salvage(name: &str, bytes: &[u8]) -> Result<Loaded, Error> {
+    load_bytes(name, bytes, &options(), &NoProgress)
+}
+
+/// Returns the cloud of a damaged file; checks that a note begins with `words`, and that the file is refused otherwise.
+fn salvaged(name: &str, bytes: &[u8], words: &str) -> PointCloud {
+    let refused = read(name, bytes).unwrap_err().to_string();
+    assert!(refused.ends_with(ADVICE), "{name}: {refused}");
+    let listener = Listener::default();
+    let loaded = load_bytes(name, bytes, &options(), &listener).unwrap();
+    let words = format!("{name}: salvaged {words}");
+    assert!(listener.has_note(&words), "{words}: {:?}", listener.notes.lock());
+    loaded.cloud
+}
+
+fn assert_is_prefix(part: &PointCloud, whole: &PointCloud) {
+    let indices: Vec<u32> = (0..part.len() as u32).collect();
+    let prefix = whole.subset(&indices);
+    assert_eq!(part.positions, prefix.positions);
+    assert_eq!(part.intensity, prefix.intensity);
+}
+
+#[test]
+fn whole_files_are_read_without_a_note() {
+    for (name, bytes) in small_files() {
+        let listener = Listener::default();
+        let loaded = load_bytes(name, &bytes, &options(), &listener).unwrap();
+        assert_eq!(loaded.cloud, read(name, &bytes).unwrap().cloud, "{name}");
+        assert!(!listener.has_note("salvaged"), "{name}");
+    }
+}
+
+#[test]
+fn files_cut_anywhere_give_their_first_points() {
+    for (name, bytes) in small_files() {
+        let whole = read(name, &bytes).unwrap().cloud;
+        for length in 0..bytes.len() {
+            let Ok(loaded) = salvage(name, &bytes[..length]) else { continue };
+            assert!(loaded.cloud.len() <= whole.len(), "{name} {length}");
+            // Text without a number of points may end within a number.
+            if !["a.csv", "a.pts", "a.obj"].contains(&name) && loaded.cloud.origin == whole.origin {
+                assert_is_prefix(&loaded.cloud, &whole);
+            }
+        }
+    }
+}
+
+#[test]
+fn damaged_files_do_not_panic() {
+    for (name, mut bytes) in small_files() {
+        for at in 0..bytes.len() {
+            for value in [0, 0x7f, 0xff] {
+                let old = std::mem::replace(&mut bytes[at], value);
+                if let Ok(loaded) = salvage(name, &bytes) {
+                    assert!(loaded.cloud.len() <= bytes.len() * 100, "{name} {at} {value}");
+                }
+                bytes[at] = old;
+            }
+        }
+    }
+}
+
+#[test]
+fn records_before_the_end_of_the_file_are_read() {
+    let cloud = full_cloud(9);
+    for name in ["a.las", "a.ply"] {
+        let bytes = encode_cloud(&cloud, &name[2..]);
+        let whole = read(name, &bytes).unwrap().cloud;
+        let record = bytes.len() - encode_cloud(&full_cloud(8), &name[2..]).len();
+        let cut = &bytes[..bytes.len() - 2 * record - record / 2];
+        let words = format!("6 of 9 points; the file ends at byte {}", cut.len());
+        assert_is_prefix(&salvaged(name, cut, &words), &whole);
+    }
+    let cut = &pcd::binary_file()[..pcd::binary_file().len() - 1];
+    assert_eq!(salvaged("a.pcd", cut, "1 of 2 points").len(), 1);
+    let compressed = &pcd::compressed_file()[..pcd::compressed_file().len() - 1];
+    let error = salvage("a.pcd", compressed).unwrap_err().to_string();
+    assert!(
+        error.contains("0 of 2 points are complete") && !error.contains("--salvage"),
+        "{error}"
+    );
+}
+
+/// Returns the byte at which the points of a LAZ file begin, and that of its chunk table.
+fn points_and_table(bytes: &[u8]) -> (usize, usize) {
+    let number = |at: usize, n: usize| {
+        bytes[at..at + n].iter().rev().fold(0, |sum, byte| sum << 8 | usize::from(*byte))
+    };
+    let start = number(96, 4);
+    (start, number(start, 8))
+}
+
+#[test]
+fn chunks_are_found_without_their_table() {
+    for (number, minor_version) in [(1, 2), (3, 2), (6, 4), (7, 4)] {
+        let format = Format { is_compressed: true, ..Format::new(number).unwrap() };
+        let bytes = file(minor_version, format);
+        let whole = read("a.laz", &bytes).unwrap().cloud;
+        let (start, table) = points_and_table(&bytes);
+        let words = format!("{N_POINTS} of {N_POINTS} points; found offset");
+        let cloud = salvaged("a.laz", &bytes[..table], &words);
+        assert_eq!(cloud, whole, "{number}");
+        let mut unfinished = bytes.clone();
+        unfinished[start..start + 8].fill(0);
+        assert_eq!(salvage("a.laz", &unfinished).unwrap().cloud, whole, "{number}");
+        // The last bytes of the second chunk are missing.
+        let cut = salvage("a.laz", &bytes[..table - 20]).unwrap().cloud;
+        assert_is_prefix(&cut, &whole);
+        if number < 6 {
+            assert!(50_200 < cut.len() && cut.len() < N_POINTS, "{number}: {}", cut.len());
+            let half = salvage("a.laz", &bytes[..start + (table - start) / 2]).unwrap().cloud;
+            assert!(20_000 < half.len() && half.len() < 30_000, "{number}: {}", half.len());
+            assert_is_prefix(&half, &whole);
+        } else {
+            // A layered chunk is read whole or not at all.
+            assert_eq!(cut.len(), 50_000, "{number}");
+            let half = salvage("a.laz", &bytes[..start + (table - start) / 2]);
+            assert!(half.unwrap_err().to_string().contains("offset"));
+        }
+    }
+}
+
+#[test]
+fn whole_chunks_after_a_damaged_one_are_read() {
+    let format = Format { is_compressed: true, ..Format::new(7).unwrap() };
+    let mut bytes = file(4, format);
+    let whole = read("a.laz", &bytes).unwrap().cloud;
+    let (start, _) = points_and_table(&bytes);
+    // The sizes of the layers stand after the offset, the first record and the number of points.
+    bytes[start + 8 + 36 + 4..][..8].fill(0xff);
+    let cloud = salvaged("a.laz", &bytes, &format!("300 of {N_POINTS} points; found"));
+    let last: Vec<u32> = (50_000..N_POINTS as u32).collect();
+    assert_eq!(cloud.positions.len(), 300);
+    let expected = whole.subset(&last);
+    assert_eq!(cloud.world_position(299), expected.world_position(299));
+    assert_eq!(cloud.intensity, expected.intensity);
+}
+
+#[test]
+fn an_ascii_row_that_may_be_cut_is_left_out() {
+    let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+        property float z\nend_header\n";
+    let cut = format!("{header}1 2 3\n4 5 6.25\n7 8 9.");
+    assert_eq!(read("a.ply", &cut).unwrap().cloud.len(), 3);
+    let cut = format!("{header}1 2 3\n4 5 6.");
+    assert_eq!(salvaged("a.ply", cut.as_bytes(), "1 of 3 points").len(), 1);
+    let broken = format!("{header}1 2 3\n4 x 6\n7 8 9\n");
+    let words = "1 of 3 points; found `x` at line 9, expected a number";
+    assert_eq!(salvaged("a.ply", broken.as_bytes(), words).len(), 1);
+    assert_eq!(salvaged("a.xyz", b"1 2 3\n4 5 6\n7 8", "2 points; found 2 fields").len(), 2);
+}
+
+#[test]
+fn cut_scans_keep_their_whole_cells() {
+    let whole = ptx::two_scans();
+    let cut = &whole[..whole.len() - 2];
+    let cloud = salvaged("a.ptx", cut.as_bytes(), "3 of 4 cells of the scanner's grid");
+    assert_eq!((cloud.len(), cloud.stations.len()), (2, 2));
+    // The second scan ends within its header.
+    let header = whole.find("500010").unwrap();
+    let cloud = salvaged("a.ptx", &whole.as_bytes()[..header + 3], "2 of 2 cells");
+    assert_eq!((cloud.len(), cloud.stations.len()), (1, 1));
+}
+
+/// Returns a file of three scans of several packets each.
+fn three_scans() -> Vec<u8> {
+    let point = |i: usize| [i, 2 * i, 7].map(|v| RecordValue::Double(v as f64)).to_vec();
+    let scan = |name: &'static str| e57_writer::Scan {
+        name,
+        pose: None,
+        prototype: vec![Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64],
+        points: (0..10_000).map(point).collect(),
+    };
+    e57_writer::write(&["a", "b", "c"].map(scan))
+}
+
+#[test]
+fn a_page_with_a_wrong_checksum_ends_its_scan() {
+    let mut bytes = three_scans();
+    let whole = read("a.e57", &bytes).unwrap().cloud;
+    // In the last third of the second scan.
+    let page = bytes.len() / 1024 * 6 / 10;
+    bytes[1024 * page + 100] ^= 1;
+    let cloud = salvaged("a.e57", &bytes, "");
+    let n_second = cloud.len() - 20_000;
+    assert!(5_000 < n_second && n_second < 9_000, "{n_second}");
+    let kept: Vec<u32> =
+        (0..30_000).filter(|i| *i < 10_000 + n_second as u32 || 20_000 <= *i).collect();
+    assert_eq!(cloud, whole.subset(&kept));
+}
+
+#[test]
+fn scans_without_their_description_cannot_be_read() {
+    let bytes = three_scans();
+    let error = salvage("a.e57", &bytes[..bytes.len() / 2]).unwrap_err().to_string();
+    assert!(error.contains("the description of the scans, without which no point"), "{error}");
+    assert!(!error.contains("--salvage"), "{error}");
+}
+
+#[test]
+fn meshes_keep_the_faces_that_are_there() {
+    let header = "element vertex 4\nproperty char x\nproperty char y\nproperty char z\n\
+        element face 3\nproperty list uchar uchar vertex_index\nend_header\n";
+    let binary = |body: &[u8]| {
+        let start = format!("ply\nformat binary_little_endian 1.0\n{header}");
+        [start.as_bytes(), &[0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0], body].concat()
+    };
+    let ascii = |body: &str| {
+        let start = format!("ply\nformat ascii 1.0\n{header}");
+        format!("{start}0 0 0\n1 0 0\n0 1 0\n1 1 0\n{body}").into_bytes()
+    };
+    let n_triangles = |bytes: &[u8], words: &str| {
+        let refused = load_graph_bytes("a.ply", bytes, &LoadOptions::default(), &NoProgress);
+        assert!(refused.unwrap_err().to_string().ends_with(ADVICE));
+        let listener = Listener::default();
+        let (graph, _) = load_graph_bytes("a.ply", bytes, &options(), &listener).unwrap();
+        assert!(listener.has_note(words), "{words}: {:?}", listener.notes.lock());
+        match &graph.geometries[0] {
+            Geometry::Triangles(mesh) => mesh.triangles.len(),
+            Geometry::Points(_) => 0,
+        }
+    };
+    let words = "a.ply: salvaged 2 of 3 faces";
+    assert_eq!(n_triangles(&binary(&[3, 0, 1, 2, 3, 1, 2, 3, 3, 0]), words), 2);
+    assert_eq!(n_triangles(&binary(&[3, 0, 1, 2, 3, 1, 2, 3, 3, 0, 1, 9]), words), 2);
+    assert_eq!(n_triangles(&ascii("3 0 1 2\n3 1 2 3\n3 0 1"), words), 2);
+    assert_eq!(n_triangles(&ascii("3 0 1 2\n3 1 2 3\n3 0 1 9\n"), words), 2);
+    // Without all vertices there are no faces; points are left.
+    let cut = binary(&[]);
+    assert_eq!(n_triangles(&cut[..cut.len() - 2], "a.ply: salvaged 3 of 4 points"), 0);
+}
