@@ -159,7 +159,10 @@ fn broken_files_are_rejected() {
     assert!(message(&bytes[..20]).contains("expected a header of 48 bytes"));
     let length = bytes.len();
     let cut = message(&bytes[..length - 1024]);
-    assert!(cut.contains(&format!("expected {length} bytes, as its header states")), "{cut}");
+    assert!(
+        cut.contains(&format!("expected {length} bytes; the description of the scans")),
+        "{cut}"
+    );
     let mut flipped = bytes.clone();
     flipped[100] ^= 1;
     let error = message(&flipped);

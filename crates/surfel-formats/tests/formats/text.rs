@@ -110,7 +110,8 @@ fn invalid_lines_are_errors_with_a_line_number() {
     let message = |file: &str| read("a.xyz", file).unwrap_err().to_string();
     assert_eq!(
         message("1 2 3\n4 5\n"),
-        "a.xyz: line 2: found 2 fields, expected 3 as in the lines before; repair or remove the line"
+        "a.xyz: line 2: found 2 fields, expected 3 as in the lines before; repair or remove the line; \
+         --salvage reads what is whole"
     );
     assert!(message("1 2 3\n# c\n\n4 x 6\n").contains("line 4: found `x`, expected a number"));
     assert!(message("1,5;2,5;3,5\n").contains("not a comma"));
