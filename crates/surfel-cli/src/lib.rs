@@ -61,7 +61,7 @@ enum Command {
     /// Shows a scene, ray traced, in a browser.
     View(Box<view::Args>),
     /// Shows what a file holds.
-    Info(info::Args),
+    Info(Box<info::Args>),
     /// Cleans a cloud, adds normals and radii, and writes it to a file.
     Prepare(Box<prepare::Args>),
     /// Scans a ruin with a virtual scanner and renders it: something to begin with.

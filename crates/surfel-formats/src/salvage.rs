@@ -24,7 +24,14 @@ impl<'a> Salvage<'a> {
     /// Accepts damage that leaves something whole.
     ///
     /// Fails with it, and with advice to salvage, if salvage is off; and with errors that are no damage.
-    pub fn accept(&mut self, mut error: Error) -> Result<()> {
+    pub fn accept(&mut self, error: Error) -> Result<()> {
+        let damage = self.check(error)?;
+        self.damage.get_or_insert(damage);
+        Ok(())
+    }
+
+    /// Returns damage that may be accepted later; fails as `accept` does.
+    pub fn check(&self, mut error: Error) -> Result<Error> {
         let (Error::Malformed { advice, .. } | Error::Truncated { advice, .. }) = &mut error else {
             return Err(error);
         };
@@ -32,8 +39,7 @@ impl<'a> Salvage<'a> {
             advice.to_mut().push_str("; --salvage reads what is whole");
             return Err(error);
         }
-        self.damage.get_or_insert(error);
-        Ok(())
+        Ok(error)
     }
 
     /// Reports how many of the `claimed` points or other `things` were read in spite of damage; fails if there are none.

@@ -26,7 +26,7 @@ impl<'a> Pages<'a> {
         Self { pages: bytes.as_chunks().0, broken: &[] }
     }
 
-    /// The same pages without those in `broken`, whose indices are in order.
+    /// Pages without those in `broken`, whose indices are in order.
     pub fn without(self, broken: &'a [usize]) -> Self {
         Self { broken, ..self }
     }

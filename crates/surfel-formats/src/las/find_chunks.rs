@@ -9,7 +9,7 @@ use surfel_core::progress::Progress;
 
 use super::header::{Header, read_u16, read_u32, read_u64};
 use super::laz::{Chunk, Chunks, broken, read_laszip_record};
-use crate::error::{Location, Result};
+use crate::error::{Error, Location, Result};
 use crate::file::Input;
 use crate::salvage::Salvage;
 
@@ -26,7 +26,8 @@ pub(super) fn find_chunks(
     if header.n_points == 0 {
         return Ok(found);
     }
-    let (mut start, table) = chunk_sizes(salvage, header, &vlr, &found, progress)?;
+    let ChunkSizes { mut start, table, missing_table } =
+        chunk_sizes(salvage, header, &vlr, &found, progress)?;
     let mut n_left = header.n_points;
     for (i, (point_count, byte_count)) in table.into_iter().enumerate() {
         let n_points = point_count.min(n_left);
@@ -61,39 +62,51 @@ pub(super) fn find_chunks(
         salvage.accept(input.truncated(location, readable, header.n_points))?;
     }
     found.probe_suspicious_chunks(salvage, progress)?;
+    // The place where the file ends says more.
+    missing_table.map_or(Ok(()), |error| salvage.accept(error))?;
     Ok(found)
 }
 
-/// Returns the first byte of the first chunk, and the numbers of points and bytes of each chunk.
+/// The sizes of the chunks.
+struct ChunkSizes {
+    /// First byte of the first chunk.
+    start: usize,
+    /// Numbers of points and bytes of each chunk.
+    table: Vec<(u64, u64)>,
+    /// The error of a table that is missing.
+    missing_table: Option<Error>,
+}
+
 fn chunk_sizes(
-    salvage: &mut Salvage,
+    salvage: &Salvage,
     header: &Header,
     vlr: &LazVlr,
     chunks: &Chunks,
     progress: &dyn Progress,
-) -> Result<(usize, Vec<(u64, u64)>)> {
+) -> Result<ChunkSizes> {
     let input = salvage.input;
     let record = header.record(input, LazVlr::USER_ID, LazVlr::RECORD_ID).unwrap_or_default();
     let start = header.data.start;
     // Compressor 1 writes all points in one run, without a table.
     if read_u16(record, 0) == 1 {
-        return Ok(match salvage.is_on {
-            true => (start, walk_chunks(input, header, start, header.n_points, chunks, progress)?),
-            false => (start, vec![(header.n_points, header.data.len() as u64)]),
-        });
+        let table = match salvage.is_on {
+            true => walk_chunks(input, header, start, header.n_points, chunks, progress)?,
+            false => vec![(header.n_points, header.data.len() as u64)],
+        };
+        return Ok(ChunkSizes { start, table, missing_table: None });
     }
-    let first = start + ChunkTable::OFFSET_SIZE;
-    let table = match read_chunk_table(input, header, vlr) {
-        Ok(table) => table,
+    let start = start + ChunkTable::OFFSET_SIZE;
+    match read_chunk_table(input, header, vlr) {
+        Ok(table) => Ok(ChunkSizes { start, table, missing_table: None }),
         Err(error) => {
-            salvage.accept(error)?;
+            let missing_table = Some(salvage.check(error)?);
             // Chunks of various sizes state them in layered files, and nowhere in others.
             let is_countable = chunks.is_layered || !vlr.uses_variable_size_chunks();
             let chunk_size = if is_countable { u64::from(vlr.chunk_size()) } else { 0 };
-            walk_chunks(input, header, first, chunk_size, chunks, progress)?
+            let table = walk_chunks(input, header, start, chunk_size, chunks, progress)?;
+            Ok(ChunkSizes { start, table, missing_table })
         }
-    };
-    Ok((first, table))
+    }
 }
 
 /// Returns the numbers of points and bytes of the chunks from `start` on, without their table: layered chunks state

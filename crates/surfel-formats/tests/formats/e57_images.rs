@@ -1,4 +1,4 @@
-//! What E57 files state of their pictures and bounds.
+//! Pictures and bounds that E57 files state.
 
 use std::io::Cursor;
 
