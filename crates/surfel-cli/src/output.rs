@@ -5,13 +5,24 @@ use anyhow::bail;
 use std::path::{Path, PathBuf};
 use surfel::SceneDescription;
 
-/// Fails where a picture or cloud could not be written.
-pub fn check_output(path: &Path) -> anyhow::Result<()> {
-    surfel_formats::check_output(path).map_err(|error| match error {
+/// Fails where a picture could not be written.
+pub fn check_picture(path: &Path) -> anyhow::Result<()> {
+    surfel_formats::check_image_output(path).map_err(usage_error)?;
+    check_is_file(path)
+}
+
+/// Fails where a cloud could not be written.
+pub fn check_cloud(path: &Path) -> anyhow::Result<()> {
+    surfel_formats::check_cloud_output(path).map_err(usage_error)?;
+    check_is_file(path)
+}
+
+/// Takes an extension that cannot be written for an error of usage.
+fn usage_error(error: surfel_formats::Error) -> anyhow::Error {
+    match error {
         surfel_formats::Error::Unsupported { .. } => Usage(error.to_string()).into(),
         other => anyhow::Error::from(other),
-    })?;
-    check_is_file(path)
+    }
 }
 
 /// Fails where a height map could not be written, or would take the place of the picture.

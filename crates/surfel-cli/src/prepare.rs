@@ -3,16 +3,15 @@
 use crate::global::Global;
 use crate::inputs::expand;
 use crate::options::{KeyOptions, Scope};
-use crate::output::check_output;
+use crate::output::check_cloud;
 use crate::report::Report;
-use crate::usage::Usage;
 use anyhow::Context;
 use std::path::PathBuf;
 use surfel::description::ObjectSettings;
 use surfel::resolve::{MemoryEstimate, report_denoise, report_normals, report_radii};
 use surfel_core::points::{
-    Denoise, Orientation, PointCloud, Preparation, clean, denoise, prepare, remove_outliers,
-    subsample,
+    Denoise, Duplicates, Orientation, PointCloud, Preparation, clean, denoise, prepare,
+    remove_outliers, subsample,
 };
 use surfel_core::progress::Progress;
 use surfel_formats::{ColumnChoice, Loaded, SaveOptions};
@@ -25,11 +24,10 @@ pub struct Args {
     /// for its files, `*` for any part of a name, - for standard input.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// The prepared cloud: .ply (all columns), .las or .laz.
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", help = output_help())]
     output: PathBuf,
-    /// Adds normals. Without this, --radius, --orient, --filter, --class, --returns, --subsample, --remove-outliers, --denoise and
-    /// --keep-variation: normals and radii.
+    /// Adds normals. Without this, --radius, --orient, --filter, --class, --returns, --crop, --duplicates, --subsample,
+    /// --remove-outliers, --denoise and --keep-variation: normals and radii.
     #[arg(long, help_heading = "Preparation")]
     normals: bool,
     /// Adds the column surface_variation: 0 on a plane, up to 1/3 where points fill space.
@@ -46,12 +44,21 @@ impl Scope for Args {
     }
 }
 
+fn output_help() -> String {
+    let extensions = surfel_formats::writable_extensions("or");
+    format!(
+        "The prepared cloud: {extensions}; PTS holds intensity and colour only, all others every column"
+    )
+}
+
 const EXAMPLES: &str = "\
 Examples:
   surfel prepare scan.laz -o ready.ply                                normals and radii
   surfel prepare scan.laz -o thin.laz --subsample spacing:0.1         fewer points, nothing else
   surfel prepare scan.laz -o ground.laz --class ground                points of a class
   surfel prepare scan.laz -o kept.laz --remove-outliers statistical   without points that stand alone
+  surfel prepare scan.laz -o once.laz --duplicates drop               one point at each position
+  surfel prepare scan.laz -o scan.xyz --duplicates keep               as text, with no other change
   surfel prepare scan.laz -o calm.laz --denoise on                    points moved onto their surface
   surfel prepare scan.laz -o ready.ply --normals-k 24 --orient mst
   surfel prepare east.laz west.laz -o both.ply --radius median:6";
@@ -68,12 +75,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let limit = global.start()?.memory_limit;
     let description = args.options.description.clone()?;
     let settings = &description.objects_default;
-    check_output(&args.output)?;
-    let extension = args.output.extension().unwrap_or_default().to_ascii_lowercase();
-    if !["ply", "las", "laz"].iter().any(|known| extension == *known) {
-        let text = format!("{}: clouds are written as .ply, .las or .laz", args.output.display());
-        return Err(Usage(text).into());
-    }
+    check_cloud(&args.output)?;
     let files = expand(&args.files)?;
     let Loaded { cloud, info } = load(&files, settings, limit, report)?;
     let columns = columns(args, settings);
@@ -112,10 +114,11 @@ fn prepared(
     seed: u64,
     report: &Report,
 ) -> anyhow::Result<PointCloud> {
-    // A file keeps its points where they are unless asked.
+    // A file keeps its points, and where they are, unless asked.
     let mode = settings.preparation.denoise.unwrap_or(Denoise::Off);
+    let duplicates = settings.preparation.duplicates.unwrap_or(Duplicates::Keep);
     if !columns.normals && !columns.radii && !columns.variation {
-        let (cloud, _) = clean(cloud, report)?;
+        let (cloud, _) = clean(cloud, duplicates, report)?;
         let mut cloud = match settings.preparation.subsample {
             Some(choice) => subsample(&cloud, choice, seed, report)?,
             None => cloud,
@@ -128,7 +131,7 @@ fn prepared(
         }
         return Ok(cloud);
     }
-    let mut preparation = Preparation { denoise: mode, ..settings.preparation(seed) };
+    let mut preparation = Preparation { denoise: mode, duplicates, ..settings.preparation(seed) };
     preparation.keep_variation = columns.variation;
     if columns.normals && settings.preparation.orient.is_none() {
         preparation.orientation = Orientation::Auto;
@@ -166,6 +169,7 @@ fn columns(args: &Args, settings: &ObjectSettings) -> Columns {
     let is_empty = !columns.normals && !columns.radii && !columns.variation;
     let has_other_steps = preparation.subsample.is_some()
         || preparation.filters_points()
+        || preparation.duplicates.is_some()
         || preparation.remove_outliers.is_some()
         || preparation.denoise.is_some();
     if is_empty && !has_other_steps {

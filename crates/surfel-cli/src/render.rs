@@ -2,7 +2,7 @@
 
 use crate::global::{Global, start_threads};
 use crate::options::{EVERYWHERE, Scope};
-use crate::output::{check_height_map, check_output, check_stats};
+use crate::output::{check_height_map, check_picture, check_stats};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
 use crate::stats::{self, RunStats, Seconds};
@@ -72,7 +72,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         let text = "picture and stats cannot both go to stdout; name a file for one";
         return Err(Usage(text.into()).into());
     }
-    check_output(&output)?;
+    check_picture(&output)?;
     if let Some(stats) = &args.stats {
         check_stats(stats, &output, &args.scene.files, &description)?;
     }
@@ -135,7 +135,7 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> surfel::Result<T>) -> surf
 }
 
 fn print_dry_run(description: &SceneDescription, report: &Report) -> anyhow::Result<()> {
-    description.output.output.as_deref().map_or(Ok(()), check_output)?;
+    description.output.output.as_deref().map_or(Ok(()), check_picture)?;
     let loaded = LoadedScene::read(description, KeepOptions::default(), report)?;
     loaded.check_surfaces(description, description.output.time())?;
     let auto = AutoSettings::choose(&loaded, description, report)?;

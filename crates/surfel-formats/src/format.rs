@@ -1,5 +1,6 @@
-//! The file formats that surfel reads: one table, with a row for each.
+//! The file formats that surfel reads and writes: one table, with a row for each.
 
+use std::path::Path;
 use std::sync::LazyLock;
 
 use surfel_core::points::PointCloud;
@@ -14,7 +15,7 @@ use crate::gltf;
 use crate::las;
 use crate::mesh::Model;
 use crate::obj;
-use crate::options::{FileInfo, LoadOptions, Loaded};
+use crate::options::{FileInfo, LoadOptions, Loaded, SaveOptions};
 use crate::pcd;
 use crate::ply;
 use crate::ptx;
@@ -35,6 +36,16 @@ pub struct Format {
     pub(crate) inspect: fn(&Input) -> Result<FileInfo>,
     /// Functions that read the content.
     pub(crate) read: Reader,
+    /// The function that writes clouds; none if the format is only read.
+    pub(crate) writer: Option<CloudWriter>,
+}
+
+/// The function that writes clouds in a format.
+pub(crate) struct CloudWriter {
+    /// Extensions that ask for the format, in lower case and without the dot.
+    pub extensions: &'static [&'static str],
+    /// Writes a cloud to a path with one of the extensions.
+    pub write: fn(&Path, &PointCloud, &SaveOptions, &dyn Progress) -> Result<()>,
 }
 
 /// The functions that read the content of a format, by what it can contain.
@@ -57,7 +68,7 @@ type ReadScene = fn(
     &dyn Progress,
 ) -> Result<(Graph<PointCloud>, FileInfo)>;
 
-/// All formats that surfel reads. An input is of the first format whose probe accepts it, else of the one that
+/// All formats. An input is of the first format whose probe accepts it, else of the one that
 /// has its extension.
 pub const FORMATS: &[Format] = &[
     Format {
@@ -67,6 +78,7 @@ pub const FORMATS: &[Format] = &[
         probe: gltf::is_gltf,
         inspect: gltf::inspect,
         read: Reader::Scene(gltf::read),
+        writer: None,
     },
     Format {
         name: "PLY",
@@ -81,6 +93,10 @@ pub const FORMATS: &[Format] = &[
             read_points: ply::read,
             read_mesh: ply::read_mesh,
         },
+        writer: Some(CloudWriter {
+            extensions: &["ply"],
+            write: |path, cloud, _, progress| ply::write(path, cloud, progress),
+        }),
     },
     Format {
         name: "LAS",
@@ -89,6 +105,7 @@ pub const FORMATS: &[Format] = &[
         probe: |input| input.starts_with(b"LASF"),
         inspect: las::inspect,
         read: Reader::Points(las::read),
+        writer: Some(CloudWriter { extensions: &["las", "laz"], write: las::write }),
     },
     Format {
         name: "E57",
@@ -97,6 +114,7 @@ pub const FORMATS: &[Format] = &[
         probe: |input| input.starts_with(b"ASTM-E57"),
         inspect: e57::inspect,
         read: Reader::Points(e57::read),
+        writer: None,
     },
     Format {
         name: "PCD",
@@ -105,6 +123,7 @@ pub const FORMATS: &[Format] = &[
         probe: |input| input.starts_with(b"# .PCD"),
         inspect: pcd::inspect,
         read: Reader::Points(pcd::read),
+        writer: None,
     },
     Format {
         name: "PTX",
@@ -113,6 +132,7 @@ pub const FORMATS: &[Format] = &[
         probe: |_| false,
         inspect: ptx::inspect,
         read: Reader::Points(ptx::read),
+        writer: None,
     },
     Format {
         name: "BIN",
@@ -125,6 +145,7 @@ pub const FORMATS: &[Format] = &[
         },
         inspect: bin::inspect,
         read: Reader::Points(bin::read),
+        writer: None,
     },
     Format {
         name: "text",
@@ -133,6 +154,10 @@ pub const FORMATS: &[Format] = &[
         probe: |_| false,
         inspect: text::inspect,
         read: Reader::Points(text::read),
+        writer: Some(CloudWriter {
+            extensions: &["xyz", "txt", "csv", "asc", "pts"],
+            write: text::write,
+        }),
     },
     Format {
         name: "OBJ",
@@ -145,6 +170,7 @@ pub const FORMATS: &[Format] = &[
             read_points: obj::read,
             read_mesh: obj::read_mesh,
         },
+        writer: None,
     },
     Format {
         name: "STL",
@@ -157,6 +183,7 @@ pub const FORMATS: &[Format] = &[
             read_points: stl::read,
             read_mesh: stl::read_mesh,
         },
+        writer: None,
     },
 ];
 
@@ -173,10 +200,22 @@ const FOREIGN_SIGNATURES: [(&[u8], &str); 4] = [
 
 static ADVICE: LazyLock<String> = LazyLock::new(|| {
     let extensions = FORMATS.iter().flat_map(|format| format.extensions);
-    let extensions: Vec<String> = extensions.map(|extension| format!(".{extension}")).collect();
-    let (last, others) = extensions.split_last().expect("there are formats");
-    format!("surfel reads {} and {last}; convert the file to one of them", others.join(", "))
+    format!("surfel reads {}; convert the file to one of them", list_extensions(extensions, "and"))
 });
+
+/// Returns extensions with their dots as a list in words, whose last two are joined by `conjunction`.
+pub(crate) fn list_extensions<'e>(
+    extensions: impl Iterator<Item = &'e &'e str>,
+    conjunction: &str,
+) -> String {
+    let extensions: Vec<String> = extensions.map(|extension| format!(".{extension}")).collect();
+    match extensions.split_last() {
+        Some((last, others)) if !others.is_empty() => {
+            format!("{} {conjunction} {last}", others.join(", "))
+        }
+        _ => extensions.concat(),
+    }
+}
 
 /// Returns the format of an input, by its first bytes or else by its extension.
 pub(crate) fn detect(input: &Input) -> Result<&'static Format> {

@@ -53,17 +53,17 @@ mod environment;
 
 pub use environment::{HdrImage, load_environment_map, load_environment_map_bytes};
 pub use error::{Error, Location, Result};
-pub use file::{check_output, check_output_path, load_text, save_text};
+pub use file::{check_output_path, load_text, save_text};
 pub use format::{FORMATS, Format, detect_bytes};
 pub use gltf::{load_gltf, load_gltf_bytes};
 pub use graph::{is_cloud, is_scene, load_graph, load_graph_bytes};
 pub use image_file::{
     Alpha, BitDepth, EpsgCodes, Georeference, HeightMap, ImageOptions, check_height_map,
-    encode_png, save_height_map, save_image,
+    check_image_output, encode_png, save_height_map, save_image,
 };
 pub use load::{inspect, load, load_all, load_bytes};
 pub use merge::{common_file_info, merge_loaded};
 pub use movie::{Movie, MovieOptions, check_movie};
 pub use options::{EmbeddedImage, FileInfo, ImageCamera, LoadOptions, Loaded, SaveOptions};
-pub use save::save;
+pub use save::{check_cloud_output, save, writable_extensions};
 pub use table::{Column, ColumnChoice, TextColumn};

@@ -7,8 +7,8 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use std::hint::black_box;
 use surfel_core::math::{Random, Vec3};
 use surfel_core::points::neighbors::{NeighborMethod, Neighborhood, map_neighborhoods};
+use surfel_core::points::{Duplicates, clean, fit_plane, orient, prepare, subsample};
 use surfel_core::points::{Orientation, PointCloud, Preparation, Subsample};
-use surfel_core::points::{clean, fit_plane, orient, prepare, subsample};
 use surfel_core::progress::NoProgress;
 
 criterion_group!(benches, normals, steps);
@@ -69,7 +69,9 @@ fn steps(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("steps");
     group.sample_size(10).throughput(Throughput::Elements(n_points() as u64));
     let cloud = PointCloud::from_positions(in_scan_order());
-    group.bench_function("clean", |bencher| bencher.iter(|| clean(cloud.clone(), &NoProgress)));
+    group.bench_function("clean", |bencher| {
+        bencher.iter(|| clean(cloud.clone(), Duplicates::Drop, &NoProgress))
+    });
     group.bench_function("subsample spacing", |bencher| {
         bencher.iter(|| subsample(black_box(&cloud), Subsample::Spacing(2.0), 0, &NoProgress));
     });

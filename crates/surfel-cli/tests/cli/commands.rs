@@ -1,6 +1,6 @@
 //! Each command, end to end.
 
-use super::common::{Folder, dome, fail, read_png, stderr, succeed, surfel, tile};
+use super::common::{Folder, dome, fail, read_png, square, stderr, succeed, surfel, tile};
 use serde_json::{Value, json};
 use std::fs;
 
@@ -176,6 +176,30 @@ fn prepare_adds_the_requested_columns_or_all() {
     assert_eq!(columns(&["--filter", "rain >= 0 && x > -1e9"]), (900, [false, false, false]));
     assert_eq!(columns(&["--remove-outliers", "radius:1e9,1"]), (900, [false, false, false]));
     assert_eq!(columns(&["--denoise", "on"]), (900, [false, false, false]));
+}
+
+#[test]
+fn prepare_keeps_duplicates_unless_asked() {
+    let folder = Folder::new();
+    let cloud = folder.write("twice.xyz", square(20, 9).repeat(2));
+    let prepared = folder.path("out.xyz");
+    let n_points = |options: &[&str]| {
+        let output = surfel(&[&["prepare", &cloud, "-o", &prepared], options].concat());
+        assert!(output.status.success(), "{}", stderr(&output));
+        (fs::read_to_string(&prepared).unwrap().lines().count() - 1, stderr(&output))
+    };
+    for options in [&[][..], &["--duplicates", "keep"]] {
+        let (n, message) = n_points(options);
+        assert_eq!(n, 800);
+        assert!(message.contains("400 points kept: exact duplicates"), "{message}");
+        assert!(message.contains("[--duplicates]"), "{message}");
+    }
+    let (n, message) = n_points(&["--duplicates", "drop"]);
+    assert_eq!(n, 400);
+    assert!(message.contains("400 points dropped: exact duplicates"), "{message}");
+    // Nothing else was asked for, so there are no normals and radii.
+    let text = fs::read_to_string(&prepared).unwrap();
+    assert!(text.starts_with("//X Y Z R G B\n0 0 0 9 9 9\n"), "{text}");
 }
 
 #[test]

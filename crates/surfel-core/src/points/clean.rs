@@ -26,20 +26,34 @@ pub struct CleanReport {
     pub n_invalid_radii: usize,
 }
 
+/// The choice whether duplicates are dropped: all but the first of points at one position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Duplicates {
+    /// They are dropped.
+    #[default]
+    Drop,
+    /// They stay.
+    Keep,
+}
+
 /// ASPRS classes of noise: low points and high noise.
 const NOISE_CLASSES: [u8; 2] = [7, 18];
 
-/// Drops points with invalid positions, those of classes of noise unless there are no others, and all but the first of duplicate points, and marks unusable normals and
-/// radii. Duplicates of a cloud that deforms are kept, as they may part at another time.
+/// Drops points with invalid positions, those of classes of noise unless there are no others, and duplicates if chosen,
+/// and marks unusable normals and radii. Duplicates of a cloud that deforms are kept, as they may part at another time.
 ///
 /// A column of normals or radii without a usable entry, as trained splats have, is removed.
 ///
 /// # Errors
 ///
 /// Fails if there are too many points for 32-bit indices, or if `progress` is cancelled.
-pub fn clean(cloud: PointCloud, progress: &dyn Progress) -> Result<(PointCloud, CleanReport)> {
+pub fn clean(
+    cloud: PointCloud,
+    duplicates: Duplicates,
+    progress: &dyn Progress,
+) -> Result<(PointCloud, CleanReport)> {
     let mut report = CleanReport { n_points_before: cloud.len(), ..CleanReport::default() };
-    let dropped = find_dropped(&cloud, progress, &mut report)?;
+    let dropped = find_dropped(&cloud, duplicates, progress, &mut report)?;
     let mut cloud = if dropped.is_empty() { cloud } else { without(&cloud, &dropped) };
     clean_normals(&mut cloud, &mut report);
     clean_radii(&mut cloud, &mut report);
@@ -68,6 +82,7 @@ impl CleanReport {
 /// Returns the indices of the points to drop in ascending order.
 fn find_dropped(
     cloud: &PointCloud,
+    duplicates: Duplicates,
     progress: &dyn Progress,
     report: &mut CleanReport,
 ) -> Result<Vec<u32>> {
@@ -88,7 +103,15 @@ fn find_dropped(
     report.n_noise = dropped.len() - report.n_invalid_positions;
     if cloud.morphs.is_empty() && cloud.skin.is_none() {
         let is_candidate = |i: u32| !is_invalid(i) && !is_noise(i);
-        dropped.extend(find_duplicates(positions, is_candidate, progress)?);
+        let found = find_duplicates(positions, is_candidate, progress)?;
+        match duplicates {
+            Duplicates::Drop => dropped.extend(found),
+            Duplicates::Keep if found.is_empty() => {}
+            Duplicates::Keep => {
+                let line = format!("{} points kept: exact duplicates", found.len());
+                progress.choice(&line, &["duplicates"]);
+            }
+        }
     }
     report.n_duplicates = dropped.len() - report.n_invalid_positions - report.n_noise;
     dropped.par_sort_unstable();
@@ -185,7 +208,7 @@ mod tests {
     use crate::progress::NoProgress;
 
     fn cleaned(cloud: PointCloud) -> (PointCloud, CleanReport) {
-        clean(cloud, &NoProgress).unwrap()
+        clean(cloud, Duplicates::Drop, &NoProgress).unwrap()
     }
 
     #[test]
@@ -196,6 +219,15 @@ mod tests {
         let (cloud, report) = cleaned(cloud);
         assert_eq!(cloud.intensity, Some(vec![0.0, 1.0, 3.0]));
         assert_eq!((report.n_invalid_positions, report.n_duplicates), (1, 3));
+    }
+
+    #[test]
+    fn duplicates_stay_if_chosen() {
+        let positions = vec![Vec3::X, Vec3::Y, Vec3::X, Vec3::NAN];
+        let cloud = PointCloud::from_positions(positions.clone());
+        let (cloud, report) = clean(cloud, Duplicates::Keep, &NoProgress).unwrap();
+        assert_eq!(cloud.positions, positions[..3]);
+        assert_eq!((report.n_invalid_positions, report.n_duplicates), (1, 0));
     }
 
     #[test]
@@ -265,10 +297,10 @@ mod tests {
             classification: Some(classes.to_vec()),
             ..PointCloud::from_positions(positions.clone())
         };
-        let (cloud, report) = clean(classified([2, 7, 2, 18]), &NoProgress).unwrap();
+        let (cloud, report) = cleaned(classified([2, 7, 2, 18]));
         assert_eq!(cloud.positions, [Vec3::ZERO, Vec3::X]);
         assert_eq!((report.n_noise, report.n_duplicates), (2, 0));
-        let (cloud, report) = clean(classified([7, 7, 7, 18]), &NoProgress).unwrap();
+        let (cloud, report) = cleaned(classified([7, 7, 7, 18]));
         assert_eq!((cloud.len(), report.n_noise, report.n_duplicates), (3, 0, 1));
     }
 }

@@ -32,7 +32,7 @@ mod free_space;
 mod density;
 mod prepare;
 
-pub use clean::{CleanReport, clean};
+pub use clean::{CleanReport, Duplicates, clean};
 pub use cloud::{PointCloud, Scalar, Values, is_valid_position};
 pub use deformation::{Morph, Skin};
 pub use denoise::{Denoise, DenoiseReport, denoise};

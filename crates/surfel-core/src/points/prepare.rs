@@ -1,5 +1,6 @@
 //! Preparation: cleans a cloud, thins and denoises it, and adds the normals and radii that it lacks.
 
+use super::clean::{CleanReport, Duplicates, clean};
 use super::denoise::{Denoise, DenoiseReport, denoise};
 use super::find_structures::{all_scattered, find_structures};
 use super::free_space::narrow_to_free_space;
@@ -12,7 +13,8 @@ use super::outliers::{OutlierRemoval, remove_outliers};
 use super::radius::{DistanceSample, Radius, RadiusReport, median_distance};
 use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
 use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
-use super::{CleanReport, PointCloud, PreparedCloud, Scalar, Subsample, Values, clean, subsample};
+use super::subsample::{Subsample, subsample};
+use super::{PointCloud, PreparedCloud, Scalar, Values};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -23,6 +25,8 @@ pub const SURFACE_VARIATION: &str = "surface_variation";
 /// Settings of [`prepare`]. The default suits raw scans.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Preparation {
+    /// The choice whether duplicates are dropped.
+    pub duplicates: Duplicates,
     /// The choice whether points in the air between two surfaces are dropped, where the grid of a scan tells them.
     pub mixed_pixels: MixedPixels,
     /// The points to keep; none keeps all.
@@ -54,6 +58,7 @@ pub struct Preparation {
 impl Default for Preparation {
     fn default() -> Self {
         Self {
+            duplicates: Duplicates::default(),
             mixed_pixels: MixedPixels::default(),
             subsample: None,
             remove_outliers: None,
@@ -119,7 +124,7 @@ pub fn prepare(
     progress: &dyn Progress,
 ) -> Result<(PreparedCloud, PreparationReport)> {
     preparation.check()?;
-    let (mut cloud, clean) = clean(cloud, progress)?;
+    let (mut cloud, clean) = clean(cloud, preparation.duplicates, progress)?;
     if preparation.mixed_pixels == MixedPixels::Drop
         && let Some(kept) = without_mixed_pixels(&cloud)
     {

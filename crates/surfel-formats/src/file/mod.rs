@@ -7,7 +7,7 @@ mod output_path;
 
 pub use atomic_write::save_text;
 pub use input::load_text;
-pub use output_path::{check_output, check_output_path};
+pub use output_path::check_output_path;
 
 pub(crate) use atomic_write::{write_error, write_file, write_temp};
 pub(crate) use external_files::{MissingFiles, ResourceResolver};

@@ -5,25 +5,6 @@ use std::path::Path;
 use super::atomic_write::{parent_folder, write_error};
 use crate::error::{Error, Result};
 
-const SUPPORTED: &str =
-    "surfel writes pictures as .png, .jpg, .webp, .tif and .exr, clouds as .ply, .las and .laz";
-const EXTENSIONS: [&str; 10] =
-    ["png", "jpg", "jpeg", "webp", "tif", "tiff", "exr", "ply", "las", "laz"];
-
-/// Checks before any work that a picture or cloud can be written to `path`; `-` is standard output.
-///
-/// # Errors
-/// Fails if the extension belongs to no format that surfel writes, or for the reasons of [`check_output_path`].
-pub fn check_output(path: &Path) -> Result<()> {
-    if path == Path::new("-") {
-        return Ok(());
-    }
-    if !EXTENSIONS.contains(&extension(path).as_str()) {
-        return Err(unsupported_extension(path, SUPPORTED));
-    }
-    check_output_path(path)
-}
-
 /// Checks that a file of any format can be written to `path`.
 ///
 /// # Errors

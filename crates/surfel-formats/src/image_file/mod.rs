@@ -19,9 +19,27 @@ use surfel_core::image::Image;
 use self::display::DisplayFormat;
 use self::georeference::world_file_extension;
 use crate::error::Result;
-use crate::file::{check_output, extension, save_text, unsupported_extension};
+use crate::file::{check_output_path, extension, save_text, unsupported_extension};
 
 const ADVICE: &str = "surfel writes images as .png, .jpg, .webp, .tif and .exr";
+
+/// Checks before any work that a picture can be written to `path`; `-` is standard output.
+///
+/// # Errors
+///
+/// Fails if the extension belongs to no format of pictures, or for the reasons of [`check_output_path`].
+pub fn check_image_output(path: &Path) -> Result<()> {
+    if path == Path::new("-") {
+        return Ok(());
+    }
+    let extension = extension(path);
+    let is_known = ["png", "tif", "tiff", "exr"].contains(&&*extension)
+        || DisplayFormat::from_extension(&extension).is_some();
+    if !is_known {
+        return Err(unsupported_extension(path, ADVICE));
+    }
+    check_output_path(path)
+}
 
 /// Writes `image` to a .png, .jpg, .webp, .tif or .exr file, or as PNG to the standard output if `path` is `-`.
 ///
@@ -31,7 +49,7 @@ const ADVICE: &str = "surfel writes images as .png, .jpg, .webp, .tif and .exr";
 ///
 /// Fails if the extension is unknown or if the file cannot be written.
 pub fn save_image(path: &Path, image: &Image, options: &ImageOptions) -> Result<()> {
-    check_output(path)?;
+    check_image_output(path)?;
     let extension = extension(path);
     if let Some(format) = DisplayFormat::from_extension(&extension) {
         display::write(path, image, options, format)?;
@@ -44,8 +62,7 @@ pub fn save_image(path: &Path, image: &Image, options: &ImageOptions) -> Result<
         }
         "exr" => exr::write(path, image, options),
         "tif" | "tiff" => tiff::write(path, image, options),
-        _ if path == Path::new("-") => png::write_to_stdout(image, options),
-        _ => Err(unsupported_extension(path, ADVICE)),
+        _ => png::write_to_stdout(image, options),
     }
 }
 

@@ -16,7 +16,7 @@ use super::georeference::Georeference;
 use super::options::{Alpha, BitDepth, ImageOptions};
 use super::png::samples;
 use crate::error::Result;
-use crate::file::{check_output, write_error, write_file};
+use crate::file::{check_output_path, write_error, write_file};
 
 /// Elevations of a plan's pixels, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,7 +70,7 @@ pub fn save_height_map(path: &Path, map: &HeightMap, georeference: Georeference)
 ///
 /// Fails if the extension is neither .tif nor .tiff, and if the folder cannot be written to.
 pub fn check_height_map(path: &Path) -> Result<()> {
-    check_output(path)?;
+    check_output_path(path)?;
     match crate::file::extension(path).as_str() {
         "tif" | "tiff" => Ok(()),
         _ => Err(crate::file::unsupported_extension(path, "surfel writes height maps as .tif")),

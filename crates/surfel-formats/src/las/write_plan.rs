@@ -13,6 +13,7 @@ use super::fields::{
 };
 use super::header::{RECORD_LENGTHS, VLR_HEADER_SIZE};
 use crate::options::SaveOptions;
+use crate::table::decimal_step;
 
 /// Bytes of the fixed part of a LAS 1.4 header.
 const HEADER_SIZE: usize = 375;
@@ -305,8 +306,7 @@ fn push_vlr(records: &mut Vec<u8>, user_id: &str, record_id: u16, data: &[u8]) {
 /// Returns units of integer coordinates that lose nothing visible of f32 positions whose magnitude is up to `extent`.
 fn choose_scale(extent: DVec3, resolution: Option<DVec3>) -> DVec3 {
     let step = |axis: usize| {
-        let spacing = extent[axis].max(f64::MIN_POSITIVE) * 0.5_f64.powi(23);
-        let fine = 10.0_f64.powf(spacing.log10().floor()).clamp(1e-9, 1e-3);
+        let fine = decimal_step(extent[axis]).clamp(1e-9, 1e-3);
         let stated = resolution.map(|resolution| resolution[axis]);
         let mut step = stated.filter(|step| 0.0 < *step && step.is_finite()).unwrap_or(fine);
         // Coordinates are i32 multiples of the step.

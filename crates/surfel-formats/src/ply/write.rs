@@ -10,7 +10,7 @@ use surfel_core::progress::Progress;
 
 use crate::error::Result;
 use crate::file::{write_error, write_file};
-use crate::table::{ColumnRole, encode_points};
+use crate::table::{encode_points, has_wide_colors, scalar_word};
 
 /// Writes `cloud` to `path`.
 pub(crate) fn write(path: &Path, cloud: &PointCloud, progress: &dyn Progress) -> Result<()> {
@@ -33,10 +33,9 @@ struct Types {
 
 impl Types {
     fn new(cloud: &PointCloud) -> Self {
-        let is_wide = |color: &[u16; 3]| color.iter().any(|channel| channel % 257 != 0);
         Self {
             has_wide_positions: cloud.origin != DVec3::ZERO,
-            has_wide_colors: cloud.colors.iter().flatten().any(is_wide),
+            has_wide_colors: cloud.colors.as_deref().is_some_and(has_wide_colors),
         }
     }
 }
@@ -74,19 +73,9 @@ fn header(cloud: &PointCloud, types: &Types) -> String {
             Values::F32(_) => "float",
             Values::F64(_) => "double",
         };
-        property(type_name, &property_name(&scalar.name));
+        property(type_name, &scalar_word(&scalar.name));
     }
     header + "end_header\n"
-}
-
-/// Returns a scalar's name as one word that no reader takes for another column.
-fn property_name(name: &str) -> String {
-    let name: String =
-        name.chars().map(|c| if c.is_whitespace() || c.is_control() { '_' } else { c }).collect();
-    if name.is_empty() || ColumnRole::from_name(&name).is_some() || ColumnRole::is_alpha(&name) {
-        return format!("column_{name}");
-    }
-    name
 }
 
 fn encode(cloud: &PointCloud, types: &Types, points: Range<usize>) -> Vec<u8> {

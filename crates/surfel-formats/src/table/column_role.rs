@@ -24,9 +24,16 @@ impl ColumnRole {
     pub fn from_name(name: &str) -> Option<Self> {
         let plain = plain_name(name);
         Some(match plain.as_str() {
-            "x" | "px" | "posx" | "xcoordinate" | "easting" => Self::Position(0),
-            "y" | "py" | "posy" | "ycoordinate" | "northing" => Self::Position(1),
-            "z" | "pz" | "posz" | "zcoordinate" | "elevation" | "height" => Self::Position(2),
+            "x" | "px" | "posx" | "xcoordinate" | "easting" | "east" | "rechtswert" | "ostwert" => {
+                Self::Position(0)
+            }
+            "y" | "py" | "posy" | "ycoordinate" | "northing" | "north" | "hochwert"
+            | "nordwert" => Self::Position(1),
+            "z" | "pz" | "posz" | "zcoordinate" | "elevation" | "elev" | "height" | "hoehe" => {
+                Self::Position(2)
+            }
+            // `Höhe` in any encoding, without the letter that is not ASCII.
+            "hhe" => Self::Position(2),
             "nx" | "normalx" => Self::Normal(0),
             "ny" | "normaly" => Self::Normal(1),
             "nz" | "normalz" => Self::Normal(2),

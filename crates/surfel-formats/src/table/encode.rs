@@ -1,10 +1,11 @@
-//! Encodes points to bytes in parallel, and writes them in order.
+//! Encodes points to bytes in parallel and writes them in order; the names and steps that writers share.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 use surfel_core::progress::Progress;
 
+use super::column_role::ColumnRole;
 use crate::error::Result;
 
 /// Number of points that a task encodes; the usual size of a LAZ chunk.
@@ -37,4 +38,21 @@ pub(crate) fn encode_points(
         }
     }
     Ok(())
+}
+
+/// Returns a scalar's name as one word that no reader takes for another column.
+pub(crate) fn scalar_word(name: &str) -> String {
+    let is_separator =
+        |c: char| c.is_whitespace() || c.is_control() || matches!(c, ',' | ';' | '"');
+    let name: String = name.chars().map(|c| if is_separator(c) { '_' } else { c }).collect();
+    if name.is_empty() || ColumnRole::from_name(&name).is_some() || ColumnRole::is_alpha(&name) {
+        return format!("column_{name}");
+    }
+    name
+}
+
+/// Returns the largest power of ten that is at most the distance between f32 numbers of magnitude `extent`.
+pub(crate) fn decimal_step(extent: f64) -> f64 {
+    let spacing = extent.max(f64::MIN_POSITIVE) * 0.5_f64.powi(23);
+    10.0_f64.powf(spacing.log10().floor())
 }

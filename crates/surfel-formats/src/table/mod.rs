@@ -16,10 +16,10 @@ pub use column_choice::{Column, ColumnChoice, TextColumn};
 
 pub(crate) use chunks::{ParseFault, TextChunk, find_line_end, line_at, parse_chunks};
 pub(crate) use cloud_builder::CloudBuilder;
-pub(crate) use color_range::{ColorRange, is_byte};
+pub(crate) use color_range::{ColorRange, has_wide_colors, is_byte};
 pub(crate) use column_role::ColumnRole;
 pub(crate) use column_slices::{ColumnSlices, shrink};
-pub(crate) use encode::{POINTS_PER_CHUNK, encode_points};
+pub(crate) use encode::{POINTS_PER_CHUNK, decimal_step, encode_points, scalar_word};
 pub(crate) use layout::{ColumnField, Field, NumberType, RecordLayout};
 pub(crate) use line_reader::{
     LineError, MAX_FIELDS, MAX_LINE_LENGTH, RowRange, append_rows, parse_number, read_rows,

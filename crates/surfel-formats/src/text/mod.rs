@@ -1,20 +1,28 @@
 //! Points as lines of text: XYZ, TXT, CSV, ASC and PTS.
 
+mod header;
 mod infer_columns;
+mod number;
 mod preamble;
+mod separator;
+mod write;
+
+pub(crate) use write::write;
 
 use surfel_core::progress::Progress;
 
-use crate::error::{Location, Result};
+use crate::error::{Error, Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::salvage::Salvage;
 use crate::table::{
     ColorRange, ColumnField, ColumnRole, Field, LineError, MAX_LINE_LENGTH, NumberType,
-    RecordLayout, RowRange, TextColumn, parse_number, read_rows,
+    RecordLayout, RowRange, TextColumn, read_rows,
 };
+use header::roles_of_names;
 use infer_columns::{color_range, has_class_values, infer_columns};
-use preamble::{Preamble, Separator, comment, read_preamble};
+use preamble::{Preamble, read_preamble};
+use separator::{Separator, comment};
 
 /// Reads the lines before the points.
 pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
@@ -30,11 +38,12 @@ pub(crate) fn read(
 ) -> Result<Loaded> {
     let preamble = read_preamble(input)?;
     let sample = sample_rows(input, &preamble);
-    let columns = match (&options.text_columns, &preamble.names) {
+    let mut columns = match (&options.text_columns, &preamble.names) {
         (Some(stated), _) => stated.iter().map(|TextColumn(role)| role.clone()).collect(),
         (None, Some(names)) => roles_of_header(names),
+        (None, None) if preamble.has_text => return Err(unnamed_text(input, &preamble)),
         (None, None) => {
-            let (columns, description) = infer_columns(&sample, preamble.n_fields);
+            let (columns, description) = infer_columns(&sample.rows, preamble.n_fields);
             progress.note(&format!(
                 "{}: no header; columns taken as {description} (state them with --columns)",
                 input.name
@@ -43,9 +52,12 @@ pub(crate) fn read(
         }
     };
     check_columns(input, &columns, &preamble)?;
+    if options.text_columns.is_some() || preamble.names.is_some() {
+        skip_text(input, &mut columns, &sample, &preamble, progress);
+    }
     let kept: Vec<(usize, &ColumnRole)> =
         columns.iter().enumerate().filter_map(|(i, role)| Some((i, role.as_ref()?))).collect();
-    let fields = column_fields(&kept, &sample, input, progress);
+    let fields = column_fields(&kept, &sample.rows, input, progress);
     let stride = 8 * kept.len();
     let layout_of = |_: &[u8]| {
         RecordLayout::new(stride, false, fields.clone(), &options.columns)
@@ -83,9 +95,42 @@ pub(crate) fn read(
 
 /// Returns the roles of named columns, `None` for opacity.
 fn roles_of_header(names: &[String]) -> Vec<Option<ColumnRole>> {
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let roles = ColumnRole::from_names(&names).into_iter().zip(names);
+    let roles = roles_of_names(names).into_iter().zip(names);
     roles.map(|(role, name)| (!ColumnRole::is_alpha(name)).then_some(role)).collect()
+}
+
+/// Returns the error of lines that hold text besides numbers, of which nothing tells the coordinates.
+fn unnamed_text(input: &Input, preamble: &Preamble) -> Error {
+    let line = input[preamble.data..].split(|byte| *byte == b'\n').next().unwrap_or_default();
+    let line = line.trim_ascii();
+    input.malformed(
+        Location::Line(preamble.data_line),
+        format!("`{}`", line[..line.len().min(60)].escape_ascii()),
+        "numbers, or a header with at least x, y and z or E, N and H",
+        "state the columns with --columns, as in -,x,y,z,-, or remove the line if it is no point",
+    )
+}
+
+/// Leaves out columns whose values are texts. A text in place of a coordinate, a colour or a normal stays an error.
+fn skip_text(
+    input: &Input,
+    columns: &mut [Option<ColumnRole>],
+    sample: &Sample,
+    preamble: &Preamble,
+    progress: &dyn Progress,
+) {
+    let mut skipped = Vec::new();
+    for (i, column) in columns.iter_mut().enumerate().filter(|(i, _)| sample.is_text[*i]) {
+        if let Some(role @ (ColumnRole::Scalar(_) | ColumnRole::Classification)) = column {
+            let name = preamble.names.as_ref().map_or(role.name(), |names| &names[i]);
+            skipped.push(name.to_owned());
+            *column = None;
+        }
+    }
+    if !skipped.is_empty() {
+        let word = if skipped.len() == 1 { "column" } else { "columns" };
+        progress.note(&format!("{}: skipped text {word} {}", input.name, skipped.join(", ")));
+    }
 }
 
 /// Checks that there is a column for each field, and that x, y and z are among them.
@@ -154,7 +199,8 @@ fn parse_line(
     let mut has_empty_end = false;
     for field in preamble.separator.fields(line) {
         if let Some(Some(_)) = columns.get(n_fields) {
-            row.push(if field.is_empty() { f64::NAN } else { parse_number(field)? });
+            let separator = preamble.separator;
+            row.push(if field.is_empty() { f64::NAN } else { separator.parse_number(field)? });
         }
         n_fields += 1;
         has_empty_end = field.is_empty();
@@ -172,13 +218,20 @@ fn parse_line(
     Ok(())
 }
 
-/// Parses some lines spread over the file, with all their fields. Broken lines are skipped, and become errors when the
-/// file is read.
-fn sample_rows(input: &Input, preamble: &Preamble) -> Vec<Vec<f64>> {
+/// Lines spread over the file, with all their fields.
+struct Sample {
+    /// Values of each line; those of texts are not numbers.
+    rows: Vec<Vec<f64>>,
+    /// True for the columns that hold a text.
+    is_text: Vec<bool>,
+}
+
+/// Parses some lines spread over the file. Broken lines are skipped, and become errors when the file is read.
+fn sample_rows(input: &Input, preamble: &Preamble) -> Sample {
     const N_POSITIONS: usize = 64;
     const LINES_PER_POSITION: usize = 16;
     let data = &input[preamble.data..];
-    let mut rows = Vec::new();
+    let mut sample = Sample { rows: Vec::new(), is_text: vec![false; preamble.n_fields] };
     for i in 0..N_POSITIONS {
         let start = data.len() * i / N_POSITIONS;
         let near = &data[start..data.len().min(start + MAX_LINE_LENGTH)];
@@ -188,15 +241,20 @@ fn sample_rows(input: &Input, preamble: &Preamble) -> Vec<Vec<f64>> {
         let lines = near[..end].split(|byte| *byte == b'\n').skip(usize::from(0 < i));
         for line in lines.take(LINES_PER_POSITION) {
             let line = line.trim_ascii();
-            let fields = preamble.separator.fields(line).take(preamble.n_fields);
-            let row: Vec<f64> =
-                fields.map(|field| parse_number(field).unwrap_or(f64::NAN)).collect();
-            if comment(line).is_none() && row.len() == preamble.n_fields {
-                rows.push(row);
+            let fields: Vec<&[u8]> =
+                preamble.separator.fields(line).take(preamble.n_fields).collect();
+            if comment(line).is_some() || fields.len() < preamble.n_fields {
+                continue;
             }
+            let values = fields.iter().map(|field| preamble.separator.parse_number(field));
+            let values: Vec<Option<f64>> = values.map(std::result::Result::ok).collect();
+            for (i, value) in values.iter().enumerate() {
+                sample.is_text[i] |= value.is_none() && !fields[i].is_empty();
+            }
+            sample.rows.push(values.iter().map(|value| value.unwrap_or(f64::NAN)).collect());
         }
     }
-    rows
+    sample
 }
 
 /// Returns the information in the lines before the points.

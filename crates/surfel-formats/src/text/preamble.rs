@@ -1,8 +1,10 @@
 //! Reads the lines before the points of a text file, and finds how its fields are separated.
 
+use super::header::{column_names, roles_of_names};
+use super::separator::{Separator, comment};
 use crate::error::{Error, Location, Result};
 use crate::file::Input;
-use crate::table::{ColumnRole, MAX_FIELDS, MAX_LINE_LENGTH, parse_number};
+use crate::table::{ColumnRole, MAX_FIELDS, MAX_LINE_LENGTH};
 
 const ONE_POINT_PER_LINE: &str = "put each point on a line of its own";
 
@@ -16,54 +18,18 @@ pub(super) struct Preamble {
     pub separator: Separator,
     /// Number of columns.
     pub n_fields: usize,
+    /// True if the first line of points holds text, too.
+    pub has_text: bool,
     /// First byte of the points.
     pub data: usize,
     /// First line of the points.
     pub data_line: u64,
 }
 
-/// The separator of the fields in a line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Separator {
-    Whitespace,
-    Comma,
-    Semicolon,
-}
-
-impl Separator {
-    /// Returns the separator that a line uses.
-    fn detect(line: &[u8]) -> Self {
-        if line.contains(&b';') {
-            Self::Semicolon
-        } else if line.contains(&b',') {
-            Self::Comma
-        } else {
-            Self::Whitespace
-        }
-    }
-
-    /// Splits a line into trimmed fields.
-    pub fn fields(self, line: &[u8]) -> impl Iterator<Item = &[u8]> {
-        let separator = if self == Self::Semicolon { b';' } else { b',' };
-        let is_separated = self != Self::Whitespace;
-        line.split(
-            move |byte| {
-                if is_separated { *byte == separator } else { byte.is_ascii_whitespace() }
-            },
-        )
-        .filter(move |field| is_separated || !field.is_empty())
-        .map(|field| field.trim_ascii())
-    }
-}
-
-/// Returns the text of a comment; `None` if the line is none.
-pub(super) fn comment(line: &[u8]) -> Option<&[u8]> {
-    line.strip_prefix(b"#").or_else(|| line.strip_prefix(b"//"))
-}
-
 /// Reads the lines up to the first one of numbers.
 pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
-    let mut names = None;
+    let mut names: Option<Vec<String>> = None;
+    let mut header_separator = None;
     // A comment may be a header or only mention x, y and z: the number of fields decides.
     let mut comment_names = None;
     let mut count = None;
@@ -96,7 +62,13 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
         if text.is_empty() {
             continue;
         }
-        let separator = Separator::detect(text);
+        // Texts may hold the separators of other files.
+        let fits_header = |separator: &Separator| {
+            let n_names = names.as_ref().map_or(0, Vec::len);
+            separator.fields(text).take(MAX_FIELDS).count() == n_names
+        };
+        let separator =
+            header_separator.filter(fits_header).unwrap_or_else(|| Separator::detect(text));
         let has_too_many = separator.fields(text).nth(MAX_FIELDS).is_some();
         if has_too_many && is_comment {
             continue;
@@ -118,6 +90,7 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
         }
         if let Some(header) = column_names(&fields) {
             names = Some(header);
+            header_separator = Some(separator);
             continue;
         }
         if let ([field], None) = (&fields[..], count)
@@ -126,11 +99,18 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
             count = Some(points);
             continue;
         }
-        if fields.iter().all(|field| field.is_empty() || parse_number(field).is_ok()) {
-            let has_empty_end = fields.last().is_some_and(|field| field.is_empty());
-            let fits = |names: &Vec<String>| {
-                names.len() == fields.len() || has_empty_end && names.len() + 1 == fields.len()
-            };
+        let has_empty_end = fields.last().is_some_and(|field| field.is_empty());
+        let fits = |names: &Vec<String>| {
+            names.len() == fields.len() || has_empty_end && names.len() + 1 == fields.len()
+        };
+        let header = names.as_ref().or(comment_names.as_ref()).filter(|names| fits(names));
+        let is_number = |field: &&[u8]| separator.parse_number(field).is_ok();
+        let has_text = !fields.iter().all(|field| field.is_empty() || is_number(field));
+        let is_point = match header {
+            Some(names) => has_numbers_on_axes(names, &fields, is_number),
+            None => 3 <= fields.iter().filter(|field| is_number(field)).count(),
+        };
+        if !has_text || is_point {
             let names = names.or(comment_names.filter(fits));
             let n_names = names.as_ref().map_or(fields.len() - 1, Vec::len);
             // A separator at the end of each line does not begin a further column.
@@ -140,6 +120,7 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
                 count,
                 separator,
                 n_fields,
+                has_text,
                 data: start,
                 data_line: line_number,
             });
@@ -155,30 +136,30 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
     ))
 }
 
+/// Returns true if the fields of x, y and z are numbers.
+fn has_numbers_on_axes(
+    names: &[String],
+    fields: &[&[u8]],
+    is_number: impl Fn(&&[u8]) -> bool,
+) -> bool {
+    let roles = roles_of_names(names);
+    let mut columns = roles.iter().zip(fields);
+    columns.all(|(role, field)| !matches!(role, ColumnRole::Position(_)) || is_number(field))
+}
+
 /// Returns the error of a line that holds neither numbers nor a header.
 fn not_numbers(input: &Input, location: Location, text: &[u8], separator: Separator) -> Error {
     let found = format!("`{}`", text[..text.len().min(60)].escape_ascii());
-    let has_inner_space =
-        separator == Separator::Comma && separator.fields(text).any(|field| field.contains(&b' '));
-    if has_inner_space || separator == Separator::Semicolon && text.contains(&b',') {
-        let expected = "numbers with a decimal point, not a comma";
-        return input.malformed(location, found, expected, "replace the decimal commas by points");
-    }
-    let expected = "numbers, or a header with at least x, y and z";
-    input.malformed(location, found, expected, "remove the line or put # before it")
-}
-
-/// Returns the fields as names of columns, if x, y and z are among them.
-fn column_names(fields: &[&[u8]]) -> Option<Vec<String>> {
-    let mut names: Vec<String> = fields
-        .iter()
-        .map(|field| String::from_utf8_lossy(field).trim_matches(['"', '\'', ' ']).to_owned())
-        .collect();
-    if names.last().is_some_and(String::is_empty) {
-        names.pop();
-    }
-    let has_axis = |axis| {
-        names.iter().any(|name| ColumnRole::from_name(name) == Some(ColumnRole::Position(axis)))
+    let is_number_list = |field: &[u8]| {
+        let mut words = Separator::Whitespace.fields(field);
+        words.all(|word| separator.parse_number(word).is_ok())
     };
-    (0..3).all(has_axis).then_some(names)
+    let has_inner_space = separator.fields(text).any(|field| field.contains(&b' '));
+    if has_inner_space && separator.fields(text).all(is_number_list) {
+        let expected = "numbers with a decimal point, not a comma";
+        let advice = "replace the decimal commas by points, or separate the fields by semicolons";
+        return input.malformed(location, found, expected, advice);
+    }
+    let expected = "numbers, or a header with at least x, y and z or E, N and H";
+    input.malformed(location, found, expected, "remove the line or put # before it")
 }

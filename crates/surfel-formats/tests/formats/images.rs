@@ -105,16 +105,17 @@ fn exr_keeps_every_layer_and_the_origin() {
 }
 
 #[test]
-fn check_output_rejects_unwritable_paths() {
+fn check_image_output_rejects_unwritable_paths() {
     let folder = Folder::new("outputs");
-    let message =
-        |name: &str| surfel_formats::check_output(&folder.path(name)).unwrap_err().to_string();
+    let message = |name: &str| {
+        surfel_formats::check_image_output(&folder.path(name)).unwrap_err().to_string()
+    };
     assert!(message("none/a.png").contains("create it first"));
     assert!(message("a.gif").contains("the extension `.gif`"));
     assert!(message("a").contains("a name without extension"));
     std::fs::create_dir(folder.path("b.png")).unwrap();
     assert!(message("b.png").contains("name a file, not a folder"));
-    surfel_formats::check_output(&folder.path("a.exr")).unwrap();
+    surfel_formats::check_image_output(&folder.path("a.exr")).unwrap();
 }
 
 #[test]

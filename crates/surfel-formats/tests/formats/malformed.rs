@@ -2,7 +2,7 @@
 
 use surfel_core::points::{PointCloud, STATION};
 use surfel_core::progress::NoProgress;
-use surfel_formats::{ColumnChoice, Error, LoadOptions, check_output, load, load_bytes};
+use surfel_formats::{ColumnChoice, Error, LoadOptions, check_cloud_output, load, load_bytes};
 
 use crate::common::{Folder, Listener, encode_cloud, full_cloud, read};
 use crate::{e57_writer, pcd, ptx};
@@ -116,7 +116,7 @@ fn errors_contain_the_system_message_once() {
     assert_eq!(error.to_string().matches("os error").count(), 1, "{error}");
 
     let out = folder.path("none/out.ply");
-    let error = check_output(&out).unwrap_err().to_string();
+    let error = check_cloud_output(&out).unwrap_err().to_string();
     let missing = folder.path("none").display().to_string();
     assert!(error.contains(&format!("no folder `{missing}`; create it first")), "{error}");
 }

@@ -1,6 +1,7 @@
 //! Text files: separators, headers, inferred columns and limits.
 
 use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::PointCloud;
 use surfel_formats::{LoadOptions, TextColumn, load_bytes};
 
 use crate::common::{Listener, read};
@@ -114,13 +115,73 @@ fn invalid_lines_are_errors_with_a_line_number() {
          --salvage reads what is whole"
     );
     assert!(message("1 2 3\n# c\n\n4 x 6\n").contains("line 4: found `x`, expected a number"));
-    assert!(message("1,5;2,5;3,5\n").contains("not a comma"));
     assert!(message("1,5 2,5 3,5\n").contains("not a comma"));
     assert!(message("1 2\n3 4\n").contains("2 columns without z"));
     assert!(message("hello world\n").contains("expected numbers, or a header"));
     assert!(message("# only words\n").contains("no line with numbers"));
     let long = "1 2 3\n".repeat(200_000) + "1 2\n" + &"1 2 3\n".repeat(100_000);
     assert!(message(&long).contains("line 200001:"), "{}", message(&long));
+}
+
+/// Returns a file, and its cloud with the notes that reading it gave.
+fn survey(file: &str) -> (PointCloud, Listener) {
+    let listener = Listener::default();
+    let options = LoadOptions::default();
+    let loaded = load_bytes("survey.csv", file.as_bytes(), &options, &listener);
+    (loaded.unwrap_or_else(|error| panic!("{file}: {error}")).cloud, listener)
+}
+
+#[test]
+fn axes_of_survey_points_are_known_in_any_order() {
+    let files = [
+        "PtName,E,N,H,Code\nP1,10,20,3,TREE\n",
+        "Pt,N,E,H,Code\nP1,20,10,3,TREE\n",
+        "Pt,Easting,Northing,Elevation,Description\nP1,10,20,3,\"oak; tall, old\"\n",
+        "Pt,Northing,Easting,Elevation\nP1,20,10,3\n",
+        "Punktnummer;Rechtswert;Hochwert;H\u{f6}he\nP1;10,0;20,0;3,0\n",
+        "Name\tEast\tNorth\tElev\nP1\t10\t20\t3\n",
+        "\"pt no\";\"e\";\"n\";\"z\"\n\"P 1\";\"10\";\"20\";\"3\"\n",
+    ];
+    for file in files {
+        let (cloud, listener) = survey(file);
+        assert_eq!(cloud.positions, [Vec3::new(10.0, 20.0, 3.0)], "{file}");
+        assert!(cloud.scalars.is_empty(), "{file}");
+        assert!(listener.has_note("survey.csv: skipped text column"), "{file}");
+    }
+    let (cloud, _) = survey("x,y,z,n,h\n1,2,3,4,5\n");
+    assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0)]);
+    assert_eq!((cloud.scalars[0].name.as_str(), cloud.scalars[1].name.as_str()), ("n", "h"));
+}
+
+#[test]
+fn text_columns_are_skipped_and_named() {
+    let (cloud, listener) = survey("Pt,E,N,H,Code,Quality\n1,1,2,3,TREE,0.5\nA2,4,5,6,,0.25\n");
+    assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
+    assert!(listener.has_note("survey.csv: skipped text columns Pt, Code"));
+    assert_eq!(cloud.scalars.len(), 1);
+    assert_eq!(cloud.scalar("quality").unwrap().get(1), 0.25);
+}
+
+#[test]
+fn text_without_a_header_needs_stated_columns() {
+    let file = "P1,20,10,3,TREE\nP2,21,11,3,\"a, b\"\n";
+    let error = read("a.csv", file).unwrap_err().to_string();
+    assert!(error.contains("line 1: found `P1,20,10,3,TREE`"), "{error}");
+    assert!(error.contains("--columns, as in -,x,y,z,-"), "{error}");
+    let columns = Some(TextColumn::parse_list("-,y,x,z,code"));
+    let options = LoadOptions { text_columns: columns, ..LoadOptions::default() };
+    let listener = Listener::default();
+    let cloud = load_bytes("a.csv", file.as_bytes(), &options, &listener).unwrap().cloud;
+    assert_eq!(cloud.positions[1], Vec3::new(11.0, 21.0, 3.0));
+    assert!(listener.has_note("skipped text column code"));
+}
+
+#[test]
+fn texts_in_place_of_coordinates_and_colours_are_errors() {
+    for file in ["x,y,z\n1,2,3\n1,two,3\n", "x,y,z,r,g,b\n1,2,3,1,1,1\n1,2,3,1,x,1\n"] {
+        let error = read("a.csv", file).unwrap_err().to_string();
+        assert!(error.contains("line 3: found `") && error.contains("a number"), "{error}");
+    }
 }
 
 #[test]

@@ -13,9 +13,9 @@ use surfel_core::image::Colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
 use surfel_core::points::{
-    COLUMN_INDEX, Denoise, MixedPixels, Orientation, OutlierRemoval, POINT_SOURCE, PointFilter,
-    Preparation, ROW_INDEX, Radius, SCAN_ANGLE, STRUCTURE, SURFACE_VARIATION, StructureChoice,
-    Subsample,
+    COLUMN_INDEX, Denoise, Duplicates, MixedPixels, Orientation, OutlierRemoval, POINT_SOURCE,
+    PointFilter, Preparation, ROW_INDEX, Radius, SCAN_ANGLE, STRUCTURE, SURFACE_VARIATION,
+    StructureChoice, Subsample,
 };
 use surfel_core::scene::color::{ColorSource, Coloring};
 use surfel_core::scene::{Clip, ClipBox, ClipPlane};
@@ -42,6 +42,8 @@ settings! {
 const DENOISE: &[(&str, Denoise)] =
     &[("auto", Denoise::Auto), ("on", Denoise::On), ("off", Denoise::Off)];
 
+const DUPLICATES: &[(&str, Duplicates)] = &[("drop", Duplicates::Drop), ("keep", Duplicates::Keep)];
+
 const MIXED_PIXELS: &[(&str, MixedPixels)] =
     &[("drop", MixedPixels::Drop), ("keep", MixedPixels::Keep)];
 
@@ -58,6 +60,8 @@ settings! {
         /// Keeps only points in an area, in the coordinates of their file: bounds as ([0,10],[0,10]), a POLYGON as
         /// well-known text, or a GeoJSON or WKT file of polygons. Other points take no memory.
         crop: Crop, CropRule, "AREA";
+        /// All but the first of points at exactly one position: drop or keep [default: drop, keep for surfel prepare].
+        duplicates: Duplicates, OneOf(DUPLICATES), "CHOICE";
         /// Keeps fewer points: first:N, random:N, stride:S or spacing:LENGTH.
         subsample: Subsample, SubsampleRule, "CHOICE";
         /// Drops points that stand alone: statistical:K,RATIO, whose mean distance to K neighbours exceeds the mean of
@@ -157,6 +161,7 @@ impl ObjectSettings {
         let within = settings.normals_radius.map(|radius| Neighborhood::Within(radius as f32));
         let nearest = settings.normals_k.map(|k| Neighborhood::Nearest(k as usize));
         Preparation {
+            duplicates: settings.duplicates.unwrap_or(default.duplicates),
             mixed_pixels: settings.mixed_pixels(),
             subsample: settings.subsample,
             remove_outliers: settings.remove_outliers,
