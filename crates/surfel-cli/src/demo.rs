@@ -61,6 +61,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let options = SaveOptions {
         resolution: Some(DVec3::splat(0.001)),
         coordinate_system: Some("EPSG:32634".into()),
+        ..SaveOptions::default()
     };
     surfel_formats::save(&cloud_path, &cloud, &options, report)?;
     report.end();

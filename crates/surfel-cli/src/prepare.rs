@@ -81,8 +81,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let columns = columns(args, settings);
     let cloud = prepared(cloud, &columns, settings, description.picture.seed(), report)
         .with_context(|| files[0].display().to_string())?;
-    let options =
-        SaveOptions { resolution: info.resolution, coordinate_system: info.coordinate_system };
+    let options = SaveOptions::from_source(&info);
     surfel_formats::save(&args.output, &cloud, &options, report)?;
     report.end();
     report.note(&format!("{}: {} points", args.output.display(), cloud.len()));

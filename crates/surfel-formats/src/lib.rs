@@ -64,6 +64,8 @@ pub use image_file::{
 pub use load::{inspect, load, load_all, load_bytes};
 pub use merge::{common_file_info, merge_loaded};
 pub use movie::{Movie, MovieOptions, check_movie};
-pub use options::{EmbeddedImage, FileInfo, ImageCamera, LoadOptions, Loaded, SaveOptions};
+pub use options::{
+    EmbeddedImage, FileInfo, ImageCamera, LasProfile, LoadOptions, Loaded, SaveOptions,
+};
 pub use save::{check_cloud_output, save, writable_extensions};
 pub use table::{Column, ColumnChoice, TextColumn};

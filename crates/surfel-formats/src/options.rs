@@ -49,6 +49,8 @@ pub struct FileInfo {
     pub resolution: Option<DVec3>,
     /// Coordinate system, as WKT, as "EPSG:" and a code, or in the words of the file.
     pub coordinate_system: Option<String>,
+    /// Properties of a LAS file that a file made from its points keeps.
+    pub las: Option<LasProfile>,
     /// Names of the columns in the file.
     pub columns: Vec<String>,
     /// Pictures that the file holds beside its points.
@@ -109,4 +111,34 @@ pub struct SaveOptions {
     pub resolution: Option<DVec3>,
     /// Coordinate system as WKT, or "EPSG:" and a code; LAS and LAZ keep it.
     pub coordinate_system: Option<String>,
+    /// Properties of the LAS file that the cloud was read from; LAS and LAZ keep them where they hold the cloud.
+    pub las: Option<LasProfile>,
+}
+
+impl SaveOptions {
+    /// Options that keep what the file of the cloud states about itself.
+    pub fn from_source(info: &FileInfo) -> Self {
+        Self {
+            resolution: info.resolution,
+            coordinate_system: info.coordinate_system.clone(),
+            las: info.las.clone(),
+        }
+    }
+}
+
+/// The properties of a LAS file that a file made from its points keeps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LasProfile {
+    /// Minor version of LAS 1.
+    pub minor_version: u8,
+    /// Point data record format.
+    pub point_format: u8,
+    /// Global encoding: type of the GPS times, form of the coordinate system.
+    pub global_encoding: u16,
+    /// World coordinates of the integer coordinates 0.
+    pub offset: DVec3,
+    /// Records of the coordinate system: their ids and data.
+    pub projection: Vec<(u16, Vec<u8>)>,
+    /// Data of the record that describes the extra bytes.
+    pub extra_bytes: Vec<u8>,
 }

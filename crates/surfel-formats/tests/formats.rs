@@ -22,6 +22,8 @@ mod text;
 mod text_output;
 #[path = "formats/las_point_formats.rs"]
 mod las_point_formats;
+#[path = "formats/las_output.rs"]
+mod las_output;
 #[path = "formats/real_scans.rs"]
 mod real_scans;
 #[path = "formats/filters.rs"]

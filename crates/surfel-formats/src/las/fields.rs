@@ -10,6 +10,10 @@ pub(super) const EXTRA_BYTES_USER_ID: &str = "LASF_Spec";
 pub(super) const EXTRA_BYTES_RECORD_ID: u16 = 4;
 /// Bytes of the description of one extra column.
 pub(super) const DESCRIPTION_SIZE: usize = 192;
+/// Bits of the options of an extra column: a value stands for a missing one, and there is a scale and an offset.
+const HAS_NO_DATA: u8 = 0x01;
+const HAS_SCALE: u8 = 0x08;
+const HAS_OFFSET: u8 = 0x10;
 /// Unit of the scan angle in degrees, from point format 6 on.
 pub(super) const SCAN_ANGLE_STEP: f64 = 0.006;
 
@@ -84,12 +88,41 @@ fn standard_columns(header: &Header) -> Vec<ColumnField> {
     columns
 }
 
+/// A value in the extra bytes as its description states it.
+pub(super) struct ExtraField {
+    /// Name of the column; values of pairs and triples have a number behind it.
+    pub name: String,
+    /// Field of the value, whose byte counts from the first extra byte.
+    pub field: Field,
+    /// The description as one of a single value, without its least and greatest value.
+    pub description: [u8; DESCRIPTION_SIZE],
+}
+
 /// Returns the columns in the extra bytes.
 fn extra_columns(input: &Input, header: &Header) -> Vec<ColumnField> {
     let descriptions = header.record(input, EXTRA_BYTES_USER_ID, EXTRA_BYTES_RECORD_ID);
-    let mut byte = RECORD_LENGTHS[usize::from(header.point_format)];
-    let mut columns = Vec::new();
-    for description in descriptions.into_iter().flat_map(|all| all.chunks_exact(DESCRIPTION_SIZE)) {
+    let fields = extra_fields(descriptions.unwrap_or_default());
+    let n_extra_bytes = header.n_extra_bytes();
+    let is_inside =
+        |extra: &ExtraField| extra.field.byte + extra.field.number_type.size() <= n_extra_bytes;
+    let columns = fields.into_iter().take_while(is_inside).map(|extra| {
+        let role = match ColumnRole::from_name(&extra.name) {
+            Some(role @ (ColumnRole::Normal(_) | ColumnRole::Radius | ColumnRole::Intensity)) => {
+                role
+            }
+            _ => ColumnRole::Scalar(extra.name),
+        };
+        let byte = RECORD_LENGTHS[usize::from(header.point_format)] + extra.field.byte;
+        ColumnField { role, field: Field { byte, ..extra.field } }
+    });
+    columns.collect()
+}
+
+/// Returns the values in the extra bytes from the data of the record that describes them (LAS 1.4 R15, table 24).
+pub(super) fn extra_fields(descriptions: &[u8]) -> Vec<ExtraField> {
+    let mut fields = Vec::new();
+    let mut byte = 0;
+    for description in descriptions.chunks_exact(DESCRIPTION_SIZE) {
         let (data_type, options) = (description[2], description[3]);
         let Some((number_type, n_values)) = extra_type(data_type) else {
             // Type 0 marks bytes without a meaning, whose number the options hold.
@@ -98,28 +131,46 @@ fn extra_columns(input: &Input, header: &Header) -> Vec<ColumnField> {
         };
         let name = text(&description[4..36]);
         for value in 0..n_values {
-            if header.record_length < byte + number_type.size() {
-                return columns;
-            }
-            let has_scale = options & 0x08 != 0;
-            let has_offset = options & 0x10 != 0;
+            let has_scale = options & HAS_SCALE != 0;
+            let has_offset = options & HAS_OFFSET != 0;
             let field = Field {
                 scale: if has_scale { read_f64(description, 112 + 8 * value) } else { 1.0 },
                 offset: if has_offset { read_f64(description, 136 + 8 * value) } else { 0.0 },
                 ..Field::new(byte, number_type)
             };
             let name = if n_values == 1 { name.clone() } else { format!("{name}[{value}]") };
-            let role = match ColumnRole::from_name(&name) {
-                Some(
-                    role @ (ColumnRole::Normal(_) | ColumnRole::Radius | ColumnRole::Intensity),
-                ) => role,
-                _ => ColumnRole::Scalar(name),
-            };
-            columns.push(ColumnField { role, field });
+            let description = single_description(description, &name, value);
+            fields.push(ExtraField { name, field, description });
             byte += number_type.size();
         }
     }
-    columns
+    fields
+}
+
+/// Returns the description of one of the values that `description` describes. Its least and greatest value are left out,
+/// as they may differ among other points.
+fn single_description(description: &[u8], name: &str, value: usize) -> [u8; DESCRIPTION_SIZE] {
+    let mut single = [0; DESCRIPTION_SIZE];
+    single[2] = (description[2] - 1) % 10 + 1;
+    single[3] = description[3] & (HAS_NO_DATA | HAS_SCALE | HAS_OFFSET);
+    put_name(&mut single, name);
+    // The value that stands for a missing one, the scale and the offset have 8 bytes for each value.
+    for start in [40, 112, 136] {
+        let from = start + 8 * value;
+        single[start..start + 8].copy_from_slice(&description[from..from + 8]);
+    }
+    single[160..].copy_from_slice(&description[160..]);
+    single
+}
+
+/// Writes the name of an extra column into its description, as far as there is room.
+pub(super) fn put_name(description: &mut [u8; DESCRIPTION_SIZE], name: &str) {
+    let mut length = name.len().min(32);
+    // The name is cut between characters.
+    while !name.is_char_boundary(length) {
+        length -= 1;
+    }
+    description[4..4 + length].copy_from_slice(&name.as_bytes()[..length]);
 }
 
 /// Returns the type and the number of the values of an extra column; types above 10 are the deprecated pairs and

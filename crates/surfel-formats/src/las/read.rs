@@ -13,6 +13,7 @@ use super::fields::{columns, withheld_flag};
 use super::find_chunks::find_chunks;
 use super::header::{Header, read_header};
 use super::laz::{Chunk, Chunks};
+use super::profile::read_profile;
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
@@ -93,6 +94,7 @@ fn file_info(input: &Input, header: &Header) -> FileInfo {
             .filter(|[low, high]| low.cmple(*high).all() && low.is_finite() && high.is_finite()),
         resolution: Some(header.scale.abs()),
         coordinate_system: coordinate_system(input, header),
+        las: Some(read_profile(input, header)),
         columns: columns.iter().map(|column| column.role.name().to_owned()).collect(),
         ..FileInfo::default()
     }

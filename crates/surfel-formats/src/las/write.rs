@@ -1,17 +1,20 @@
-//! Writes clouds as LAS 1.4, compressed or not.
+//! Writes clouds as LAS, compressed or not, in the version and the point format of their source where these suffice.
 
-use std::io::{self, Seek, SeekFrom, Write};
+use std::io::{self, Cursor, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::Path;
 
 use laz::laszip::{ChunkTable, ChunkTableEntry};
-use laz::record::{LayeredPointRecordCompressor, RecordCompressor};
+use laz::record::{
+    LayeredPointRecordCompressor, RecordCompressor, SequentialPointRecordCompressor,
+};
 use laz::{LazItemRecordBuilder, LazVlr, LazVlrBuilder};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 
 use super::laz::MAX_EXTRA_BYTES;
-use super::write_plan::{MAX_EXTRA_COLUMNS, WritePlan};
+use super::write_header::{MAX_EXTRA_COLUMNS, header_bytes};
+use super::write_plan::WritePlan;
 use crate::display::format_vector;
 use crate::error::{Error, Result};
 use crate::file::{extension, write_error, write_file};
@@ -35,26 +38,27 @@ pub(crate) fn write(
     }
     progress.begin(&format!("write {}", path.display()), cloud.len() as u64);
     let plan = WritePlan::new(cloud, options);
-    if options.coordinate_system.is_some() && !plan.has_coordinate_system {
+    if options.coordinate_system.is_some() && plan.projection.is_empty() {
         let line = "the coordinate system is neither WKT nor an EPSG code, and is left out";
+        progress.note(&format!("{}: {line}", path.display()));
+    }
+    if let Some(line) = &plan.change {
         progress.note(&format!("{}: {line}", path.display()));
     }
     let failed = |cause: io::Error| write_error(path, cause);
     let is_compressed = extension(path) == "laz";
     let n_extra_bytes = plan.n_extra_bytes();
-    if MAX_EXTRA_COLUMNS < plan.n_extra_columns()
-        || is_compressed && MAX_EXTRA_BYTES < n_extra_bytes
-    {
+    if MAX_EXTRA_COLUMNS < plan.extras.len() || is_compressed && MAX_EXTRA_BYTES < n_extra_bytes {
         return Err(Error::Unsupported {
             file: path.display().to_string(),
             action: "write",
-            found: format!("{} extra columns of {n_extra_bytes} bytes", plan.n_extra_columns()),
+            found: format!("{} extra columns of {n_extra_bytes} bytes", plan.extras.len()),
             advice: "LAS holds 341 and LAZ 1024 bytes of them; load fewer columns or write PLY",
         });
     }
     let vlr = if is_compressed { Some(laszip_record(&plan).map_err(failed)?) } else { None };
     write_file(path, |writer| {
-        let header = plan.header(cloud, vlr.as_ref().map(laszip_bytes).as_deref());
+        let header = header_bytes(&plan, cloud, vlr.as_ref().map(laszip_bytes).as_deref());
         writer.write_all(&header).map_err(failed)?;
         let encode = |points: Range<usize>| Ok(plan.encode(cloud, points));
         let Some(vlr) = &vlr else {
@@ -64,7 +68,17 @@ pub(crate) fn write(
         // The offset of the chunk table is filled in when the chunks are written.
         writer.write_all(&[0; ChunkTable::OFFSET_SIZE]).map_err(failed)?;
         let mut table = ChunkTable::default();
-        let compress = |points| compress(vlr, &plan.encode(cloud, points)).map_err(failed);
+        let compress = |points| {
+            let records = plan.encode(cloud, points);
+            // The records of point formats up to 5 are compressed as a whole, those of later ones field by field.
+            let compressed = match plan.fields.is_extended {
+                true => compress(vlr, LayeredPointRecordCompressor::new(new_cursor()), &records),
+                false => {
+                    compress(vlr, SequentialPointRecordCompressor::new(new_cursor()), &records)
+                }
+            };
+            compressed.map_err(failed)
+        };
         encode_points(cloud.len(), compress, progress, |bytes| {
             // The number of points is not stored for chunks of fixed size.
             let byte_count = bytes.len() as u64;
@@ -84,7 +98,7 @@ pub(crate) fn write(
 /// Returns the record that describes the compression.
 fn laszip_record(plan: &WritePlan) -> io::Result<LazVlr> {
     let items = LazItemRecordBuilder::default_for_point_format_id(
-        plan.point_format,
+        plan.fields.format(),
         plan.n_extra_bytes() as u16,
     );
     let items = items.map_err(|error| io::Error::other(error.to_string()))?;
@@ -97,9 +111,16 @@ fn laszip_bytes(vlr: &LazVlr) -> Vec<u8> {
     bytes
 }
 
+fn new_cursor() -> Cursor<Vec<u8>> {
+    Cursor::new(Vec::new())
+}
+
 /// Compresses the records of a chunk.
-fn compress(vlr: &LazVlr, records: &[u8]) -> io::Result<Vec<u8>> {
-    let mut compressor = LayeredPointRecordCompressor::new(io::Cursor::new(Vec::new()));
+fn compress(
+    vlr: &LazVlr,
+    mut compressor: impl RecordCompressor<Cursor<Vec<u8>>>,
+    records: &[u8],
+) -> io::Result<Vec<u8>> {
     compressor.set_fields_from(vlr.items()).map_err(|error| io::Error::other(error.to_string()))?;
     compressor.compress_many(records)?;
     compressor.done()?;

@@ -8,7 +8,8 @@ use surfel_core::points::merge;
 use surfel_core::progress::Progress;
 
 use self::precision::CloudPrecision;
-use crate::options::{FileInfo, Loaded};
+use crate::las::common_profile;
+use crate::options::{FileInfo, LasProfile, Loaded};
 
 /// Merges the clouds of several files into one, relative to the origin of the largest.
 ///
@@ -61,6 +62,7 @@ pub fn common_file_info(infos: &[FileInfo]) -> FileInfo {
             .reduce(|a, b| Some(a?.min(b?)))
             .flatten(),
         coordinate_system: first.coordinate_system.clone().filter(|_| same_system),
+        las: common_las_profile(infos, same_system),
         columns: first
             .columns
             .iter()
@@ -70,4 +72,14 @@ pub fn common_file_info(infos: &[FileInfo]) -> FileInfo {
         images: infos.iter().flat_map(|info| info.images.clone()).collect(),
         external_files: infos.iter().flat_map(|info| info.external_files.clone()).collect(),
     }
+}
+
+/// Returns the properties that a LAS file of all points keeps; none if some of the files are no LAS.
+fn common_las_profile(infos: &[FileInfo], same_system: bool) -> Option<LasProfile> {
+    let profiles: Option<Vec<&LasProfile>> = infos.iter().map(|info| info.las.as_ref()).collect();
+    let (first, others) =
+        profiles?.split_first().map(|(first, others)| ((*first).clone(), others.to_vec()))?;
+    let common = others.into_iter().fold(first, common_profile);
+    let projection = if same_system { common.projection } else { Vec::new() };
+    Some(LasProfile { projection, ..common })
 }

@@ -112,10 +112,7 @@ fn scans_round_trip_within_their_resolution() {
     for name in ["lone-star.copc.laz", "ign_lidar_697k.laz", "sample_c.las", "vol_total.ply"] {
         let Some(path) = shared(&format!("clouds/{name}")) else { return };
         let Loaded { cloud, info } = load(&path, &LoadOptions::default(), &NoProgress).unwrap();
-        let options = SaveOptions {
-            resolution: info.resolution,
-            coordinate_system: info.coordinate_system.clone(),
-        };
+        let options = SaveOptions::from_source(&info);
         for extension in ["ply", "laz"] {
             let back = round_trip(&cloud, extension, &options);
             let step = info.resolution.unwrap_or(DVec3::splat(1e-3));
