@@ -100,8 +100,7 @@ pub(super) struct ExtraField {
 
 /// Returns the columns in the extra bytes.
 fn extra_columns(input: &Input, header: &Header) -> Vec<ColumnField> {
-    let descriptions = header.record(input, EXTRA_BYTES_USER_ID, EXTRA_BYTES_RECORD_ID);
-    let fields = extra_fields(descriptions.unwrap_or_default());
+    let fields = extra_fields(&extra_descriptions(input, header));
     let n_extra_bytes = header.n_extra_bytes();
     let is_inside =
         |extra: &ExtraField| extra.field.byte + extra.field.number_type.size() <= n_extra_bytes;
@@ -116,6 +115,14 @@ fn extra_columns(input: &Input, header: &Header) -> Vec<ColumnField> {
         ColumnField { role, field: Field { byte, ..extra.field } }
     });
     columns.collect()
+}
+
+/// Returns the descriptions of the extra bytes. Some programs write a record for each column.
+pub(super) fn extra_descriptions(input: &Input, header: &Header) -> Vec<u8> {
+    let records = header.records.iter().filter(|record| {
+        (record.user_id.as_str(), record.record_id) == (EXTRA_BYTES_USER_ID, EXTRA_BYTES_RECORD_ID)
+    });
+    records.flat_map(|record| &input[record.data.clone()]).copied().collect()
 }
 
 /// Returns the values in the extra bytes from the data of the record that describes them (LAS 1.4 R15, table 24).

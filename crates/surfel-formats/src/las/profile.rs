@@ -1,7 +1,7 @@
 //! The properties of a LAS file that a file made from its points keeps.
 
 use super::crs;
-use super::fields::{EXTRA_BYTES_RECORD_ID, EXTRA_BYTES_USER_ID};
+use super::fields::extra_descriptions;
 use super::header::{Header, read_u16};
 use super::point_format::PointFields;
 use crate::file::Input;
@@ -12,7 +12,6 @@ pub(super) fn read_profile(input: &Input, header: &Header) -> LasProfile {
     let projection = header.records.iter().filter(|record| {
         record.user_id == crs::USER_ID && record.data.len() <= crs::MAX_RECORD_SIZE
     });
-    let descriptions = header.record(input, EXTRA_BYTES_USER_ID, EXTRA_BYTES_RECORD_ID);
     LasProfile {
         minor_version: header.minor_version,
         point_format: header.point_format,
@@ -22,7 +21,7 @@ pub(super) fn read_profile(input: &Input, header: &Header) -> LasProfile {
         projection: projection
             .map(|record| (record.record_id, input[record.data.clone()].to_vec()))
             .collect(),
-        extra_bytes: descriptions.unwrap_or_default().to_vec(),
+        extra_bytes: extra_descriptions(input, header),
     }
 }
 

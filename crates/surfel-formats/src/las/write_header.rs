@@ -103,7 +103,8 @@ fn global_encoding(plan: &WritePlan) -> u16 {
         || plan.standard.gps_time.is_some_and(|time| !all(time, |v| v <= SECONDS_PER_WEEK));
     let kept = match plan.global_encoding {
         Some(encoding) => encoding & (STANDARD_TIME | SYNTHETIC_RETURNS),
-        None => u16::from(is_standard_time()) * STANDARD_TIME,
+        None if is_standard_time() => STANDARD_TIME,
+        None => 0,
     };
     let has = |id| plan.projection.iter().any(|(record_id, _)| *record_id == id);
     let is_wkt = match plan.fields.is_extended {
@@ -115,7 +116,7 @@ fn global_encoding(plan: &WritePlan) -> u16 {
             4 <= plan.minor_version && has(crs::WKT) && is_so_in_source
         }
     };
-    kept | u16::from(is_wkt) * IS_WKT
+    if is_wkt { kept | IS_WKT } else { kept }
 }
 
 /// Returns the bounds of the points after quantization.

@@ -20,8 +20,8 @@ pub(super) const MAX_DECIMALS: usize = POWERS_OF_TEN.len() - 1;
 pub(super) fn push_fixed(text: &mut Vec<u8>, value: f64, decimals: usize, trims_zeros: bool) {
     let one = POWERS_OF_TEN[decimals];
     let scaled = (value * one as f64).round();
-    // Larger numbers have no decimals, and NaN fails this test too.
-    if !(scaled.abs() < MAX_WHOLE) {
+    // Larger numbers have no decimals.
+    if scaled.is_nan() || MAX_WHOLE <= scaled.abs() {
         push_float(text, value);
         return;
     }
@@ -73,7 +73,7 @@ mod tests {
     #[test]
     fn coordinates_have_the_decimals_of_their_precision() {
         let fixed = |value, decimals| text(|text| push_fixed(text, value, decimals, false));
-        assert_eq!(fixed(484_800.0625, 2), "484800.06");
+        assert_eq!(fixed(484_800.25, 2), "484800.25");
         assert_eq!(fixed(-0.0625, 3), "-0.063");
         assert_eq!(fixed(-0.0001, 2), "0.00");
         assert_eq!(fixed(12.0, 0), "12");

@@ -82,8 +82,10 @@ fn las_file((minor_version, format): Kind) -> Vec<u8> {
     }
     let axis = |offset| Transform { scale: 0.01, offset };
     builder.transforms = Vector { x: axis(484_000.5), y: axis(6_632_000.0), z: axis(-10.0) };
+    // Some programs write a record for each extra column.
     let descriptions = [description(3, 0x1f, "Height"), description(24, 0x18, "Slope")];
-    builder.vlrs = vec![projection(format), vlr("LASF_Spec", 4, descriptions.as_flattened())];
+    let extras = descriptions.map(|description| vlr("LASF_Spec", 4, &description));
+    builder.vlrs = [vec![projection(format)], extras.to_vec()].concat();
     let mut writer = Writer::new(Cursor::new(Vec::new()), builder.into_header().unwrap()).unwrap();
     let format = *writer.header().point_format();
     for i in 0..N_POINTS {
