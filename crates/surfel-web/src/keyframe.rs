@@ -13,7 +13,7 @@ pub struct Keyframe {
     height: u32,
     /// Camera of the picture.
     view: View,
-    /// What each pixel shows, relative to the scene's origin; NaN where it shows the background.
+    /// Place that each pixel shows, relative to the scene's origin; NaN where it shows the background.
     positions: Vec<Vec3>,
     /// sRGB codes of each pixel.
     colors: Vec<[u8; 3]>,

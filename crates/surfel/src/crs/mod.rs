@@ -68,7 +68,7 @@ impl Unit {
     pub fn symbol(self) -> &'static str {
         match self {
             Self::Unknown => "m",
-            Self::Metres(metres) if metres == 1.0 => "m",
+            Self::Metres(1.0) => "m",
             Self::Metres(metres) if (metres - 0.3048).abs() < 1e-5 => "ft",
             Self::Metres(_) => "units",
             Self::Degrees => "°",
