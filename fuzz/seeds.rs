@@ -29,6 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "viewer",
         "area",
         "filter",
+        "crs",
     ] {
         fs::create_dir_all(corpus.join(target))?;
     }
@@ -99,6 +100,14 @@ fn write_conditions(corpus: &Path) -> std::io::Result<()> {
     ];
     for (i, text) in conditions.iter().enumerate() {
         fs::write(corpus.join(format!("filter/{i}")), text)?;
+    }
+    let systems = [
+        "EPSG:25832+5783",
+        "EPSG:4978",
+        r#"PROJCS["a",GEOGCS["b",DATUM["c",SPHEROID["d",6378137,298.26]],PRIMEM["Greenwich",0],UNIT["degree",0.01745]],PROJECTION["Transverse_Mercator"],PARAMETER["central_meridian",9],PARAMETER["scale_factor",0.9996],UNIT["metre",1],AUTHORITY["EPSG","25832"]]"#,
+    ];
+    for (i, text) in systems.iter().enumerate() {
+        fs::write(corpus.join(format!("crs/{i}")), text)?;
     }
     Ok(())
 }
