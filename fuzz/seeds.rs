@@ -39,6 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             save(&path, &cloud, &SaveOptions::default(), &NoProgress)?;
         }
     }
+    write_sequential_laz(&corpus.join("las"))?;
     let ply = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int i\n\
         element vertex 2\nproperty float x\nproperty double y\nproperty short z\n\
         property list uint ushort l\nend_header\n3 1 2 3\n0 1 2 1 5\n3 4 5 0\n";
@@ -70,6 +71,27 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     write_scenes(&corpus.join("scene"))?;
     write_viewer_input(&corpus.join("viewer"))?;
     write_environment_maps(&corpus.join("environment"))
+}
+
+/// Writes LAZ files of old point formats, whose chunks are not layered.
+fn write_sequential_laz(folder: &Path) -> las::Result<()> {
+    for number in [1, 3] {
+        let mut builder = las::Builder::from((1, 2));
+        builder.point_format = las::point::Format::new(number)?;
+        builder.point_format.is_compressed = true;
+        let path = folder.join(format!("sequential-{number}.laz"));
+        let mut writer = las::Writer::from_path(path, builder.into_header()?)?;
+        for i in 0..9 {
+            writer.write_point(las::Point {
+                x: f64::from(i),
+                gps_time: Some(f64::from(i) / 8.0),
+                color: (number == 3).then(|| las::Color::new(i as u16, 7, 65535)),
+                ..las::Point::default()
+            })?;
+        }
+        writer.close()?;
+    }
+    Ok(())
 }
 
 /// Writes areas and conditions on columns.
