@@ -43,6 +43,8 @@ pub struct Accumulator {
     keyframe: Option<KeyframeOf>,
     /// The keyframe of the picture that is being refined.
     next_keyframe: Option<KeyframeOf>,
+    /// Duration of a row of the keyframe that is being made, in seconds.
+    keyframe_secs_per_row: f64,
     /// Duration of drawing the keyframe, in seconds.
     keyframe_secs: f64,
     work: Work,
@@ -269,12 +271,12 @@ impl Accumulator {
         if self.keyframe.as_ref().is_some_and(is_known) || uses_rasterizer(&prepared.flat)? {
             return Ok(false);
         }
-        let secs_per_row = 0.5 * self.secs_per_row;
         let version = self.version;
         let Some(scene) = self.scene(prepared.clone(), view) else { return Ok(false) };
         let (camera, origin) = (scene.camera, scene.origin);
         let n_known = self.next_keyframe.as_ref().filter(|next| next.version == version);
         let first = n_known.map_or(0, |next| next.n_rows);
+        let secs_per_row = self.keyframe_secs_per_row.max(0.5 * self.secs_per_row);
         let n_rows = ((SLICE_SECS / secs_per_row.max(1e-6)) as u32).max(1);
         let rows = (first, size.1.min(first.saturating_add(n_rows)));
         let settings = Settings {
@@ -289,7 +291,11 @@ impl Accumulator {
         let region = RenderRegion { rows, samples: (0, 1) };
         let deadline = Deadline::new(progress, rows.1 - rows.0 == 1);
         let Some(scene) = self.scene(prepared.clone(), view) else { return Ok(false) };
-        let (image, stats) = renderer.render_region(scene, &settings, region, &deadline)?;
+        let start = Instant::now();
+        let rendered = renderer.render_region(scene, &settings, region, &deadline);
+        // A slice that was cancelled because it took too long is tried again with fewer rows.
+        self.keyframe_secs_per_row = start.elapsed().as_secs_f64() / f64::from(rows.1 - rows.0);
+        let (image, stats) = rendered?;
         self.work += Work::of(&stats);
         let next = self.next_keyframe.take().filter(|next| next.version == version);
         let mut next = next.unwrap_or_else(|| KeyframeOf {
