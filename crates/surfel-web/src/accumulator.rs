@@ -271,23 +271,14 @@ impl Accumulator {
         if self.keyframe.as_ref().is_some_and(is_known) || uses_rasterizer(&prepared.flat)? {
             return Ok(false);
         }
-        let version = self.version;
-        let Some(scene) = self.scene(prepared.clone(), view) else { return Ok(false) };
-        let (camera, origin) = (scene.camera, scene.origin);
+        let (version, origin) = (self.version, prepared.flat.origin);
+        let Some(camera) = view.camera else { return Ok(false) };
         let n_known = self.next_keyframe.as_ref().filter(|next| next.version == version);
         let first = n_known.map_or(0, |next| next.n_rows);
         let secs_per_row = self.keyframe_secs_per_row.max(0.5 * self.secs_per_row);
         let n_rows = ((SLICE_SECS / secs_per_row.max(1e-6)) as u32).max(1);
         let rows = (first, size.1.min(first.saturating_add(n_rows)));
-        let settings = Settings {
-            width: size.0,
-            height: size.1,
-            samples_per_pixel: 1,
-            light_samples: 1,
-            max_depth: 0,
-            with_aovs: true,
-            ..prepared.render_settings
-        };
+        let settings = place_settings(prepared.render_settings, size);
         let region = RenderRegion { rows, samples: (0, 1) };
         let deadline = Deadline::new(progress, rows.1 - rows.0 == 1);
         let Some(scene) = self.scene(prepared.clone(), view) else { return Ok(false) };
@@ -395,6 +386,19 @@ impl Accumulator {
         let (_, scene) = self.scene.as_mut()?;
         scene.camera = view.camera?;
         Some(scene)
+    }
+}
+
+/// Returns settings of a picture of this size that shows the place of each pixel, for as few rays as there can be.
+fn place_settings(full: Settings, (width, height): (u32, u32)) -> Settings {
+    Settings {
+        width,
+        height,
+        samples_per_pixel: 1,
+        light_samples: 1,
+        max_depth: 0,
+        with_aovs: true,
+        ..full
     }
 }
 

@@ -199,6 +199,13 @@ async fn disconnecting_during_a_picture_does_not_block_others() {
     other.wait_for_picture(|picture| picture.is_finished && picture.seq == 1).await;
 }
 
+#[tokio::test]
+async fn a_picture_is_finished_although_its_layers_take_long() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({ "fault": FaultyRenderer::SLOW_LAYERS })).await;
+    page.wait_for_picture(|picture| picture.is_finished).await;
+}
+
 /// A finished picture of the slow page takes more than a minute.
 #[tokio::test]
 async fn a_slow_picture_leaves_time_to_a_moving_page() {

@@ -284,6 +284,9 @@ impl FaultyRenderer {
     /// Rendering fails.
     pub const FAIL: u64 = 1003;
 
+    /// Layers take a hundred times as long as the picture: all of them at once take longer than a slice may.
+    pub const SLOW_LAYERS: u64 = 1005;
+
     const SECS_PER_PIXEL: f64 = 2e-5;
 }
 
@@ -296,9 +299,14 @@ impl Renderer for FaultyRenderer {
         progress: &dyn Progress,
     ) -> surfel_core::Result<(Image, RenderStats)> {
         match settings.seed {
-            Self::SLOW | Self::VERY_SLOW => {
+            Self::SLOW | Self::VERY_SLOW | Self::SLOW_LAYERS => {
                 let n_pixels = settings.width * (region.rows.1 - region.rows.0);
-                let factor = if settings.seed == Self::VERY_SLOW { 20.0 } else { 1.0 };
+                let factor = match settings.seed {
+                    Self::VERY_SLOW => 20.0,
+                    Self::SLOW_LAYERS if settings.with_aovs => 100.0,
+                    Self::SLOW_LAYERS => 0.0,
+                    _ => 1.0,
+                };
                 let secs = factor * Self::SECS_PER_PIXEL * f64::from(n_pixels);
                 let start = Instant::now();
                 while start.elapsed().as_secs_f64() < secs {

@@ -3,7 +3,17 @@
 use super::keys::KeyedSettings;
 use super::{Invalid, Part};
 
-/// Each key with those that it excludes.
+/// Keys of the camera that a plan to scale has none of.
+const NOT_OF_PLANS: &[&str] = &[
+    "camera.orthographic",
+    "camera.panorama",
+    "camera.station",
+    "camera.name",
+    "camera.zoom_factor",
+    "camera.view_angle",
+];
+
+/// Keys with those that they exclude.
 const EXCLUSIVE: &[(&str, &[&str])] = &[
     (
         "camera.panorama",
@@ -42,29 +52,9 @@ const EXCLUSIVE: &[(&str, &[&str])] = &[
             "camera.zoom_factor",
         ],
     ),
-    (
-        "gsd",
-        &[
-            "scale",
-            "camera.orthographic",
-            "camera.panorama",
-            "camera.station",
-            "camera.name",
-            "camera.zoom_factor",
-            "camera.view_angle",
-        ],
-    ),
-    (
-        "scale",
-        &[
-            "camera.orthographic",
-            "camera.panorama",
-            "camera.station",
-            "camera.name",
-            "camera.zoom_factor",
-            "camera.view_angle",
-        ],
-    ),
+    ("gsd", &["scale"]),
+    ("gsd", NOT_OF_PLANS),
+    ("scale", NOT_OF_PLANS),
     ("sun.date", &["sun.azimuth", "sun.elevation"]),
     ("normals_k", &["normals_radius"]),
 ];
