@@ -3,6 +3,7 @@
 use super::loaded::LoadedScene;
 use crate::crs::{CoordinateSystem, Unit, georeference};
 use crate::description::{CameraSettings, Invalid, OrthographicHeight, SceneDescription};
+use crate::error::Result;
 use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::{PointCloud, is_valid_position};
 use surfel_core::progress::Progress;
@@ -22,13 +23,17 @@ pub fn coordinate_system(
 /// Writes the camera and the resolution of a plan into a description that asks for one.
 ///
 /// The edges of the picture lie on multiples of a pixel, so that plans of the same scene tile.
+///
+/// # Errors
+///
+/// Fails for coordinates in degrees, and for pictures of too many pixels or more memory than they may take.
 pub fn frame_plan(
     scene: &LoadedScene,
     description: &mut SceneDescription,
     (points, bounds): (&PointCloud, Aabb),
     up: Vec3,
     progress: &dyn Progress,
-) -> Result<(), Invalid> {
+) -> Result<()> {
     if !description.plan.is_to_scale() {
         return Ok(());
     }
@@ -51,20 +56,19 @@ pub fn frame_plan(
         );
         Invalid::at(key, message)
     })?;
-    // Six digits are less than a pixel on the largest sheet.
-    let digits = (6 - pixel_size.log10().ceil() as i32).clamp(0, 12) as usize;
-    let side = format!("{pixel_size:.digits$}");
-    let side =
-        if side.contains('.') { side.trim_end_matches('0').trim_end_matches('.') } else { &side };
+    let side = six_digits(pixel_size);
     let line = format!("plan of {width}x{height} pixels, each {side} {} wide", unit.symbol());
     progress.choice(&line, &["gsd", "scale", "resolution"]);
     description.picture.resolution = Some((width, height));
     description.camera = window.camera_settings(&description.camera, &camera);
-    Ok(())
+    scene.check_memory(description)
 }
 
 /// Checks that a height map is asked of a camera that looks straight down.
-pub fn check_height_map(description: &SceneDescription, camera: &Camera) -> Result<(), Invalid> {
+pub fn check_height_map(
+    description: &SceneDescription,
+    camera: &Camera,
+) -> std::result::Result<(), Invalid> {
     if description.plan.height_map.is_none() {
         return Ok(());
     }
@@ -78,6 +82,16 @@ pub fn check_height_map(description: &SceneDescription, camera: &Camera) -> Resu
         return Err(Invalid::at("height_map", advice));
     }
     Ok(())
+}
+
+/// Writes a positive number with its first six digits.
+fn six_digits(number: f64) -> String {
+    let n_decimals = (6 - number.log10().ceil() as i32).clamp(0, 12) as usize;
+    let text = format!("{number:.n_decimals$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
 }
 
 /// The direction of a plan's camera and the middle of its picture. Straight down, if the settings leave it open.

@@ -1,0 +1,239 @@
+//! Adds files, objects, sequences and movements to the content of a scene.
+
+use super::super::cloud::{ImportOptions, graph_of, import, into_cloud};
+use super::super::sequence::{GeometrySlots, Sequence, element_counts, is_streamed};
+use super::{LoadedScene, ObjectNodes};
+use crate::description::{ObjectDescription, ObjectMotion, ObjectSettings, SceneDescription};
+use crate::error::{Error, Result};
+use crate::names::file_name;
+use std::ops::Range;
+use std::path::PathBuf;
+use surfel_core::points::PointCloud;
+use surfel_core::progress::Progress;
+use surfel_core::scene::{Channel, Graph, Interpolation, Keyframes, Node, Track, Transform};
+use surfel_formats::Loaded;
+
+impl LoadedScene {
+    pub(super) fn import_options(&self, description: &SceneDescription) -> ImportOptions {
+        ImportOptions {
+            keeps_all_columns: self.keeps_all_columns,
+            seed: description.picture.seed(),
+        }
+    }
+
+    /// Adds the files without an object.
+    pub(super) fn add_files(
+        &mut self,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let options = self.import_options(description);
+        let (mut separate, mut merging) = (Vec::new(), (Vec::new(), Vec::new()));
+        for file in &description.files {
+            let (graph, info) = import(file, &description.objects_default, &options, progress)?;
+            self.file_infos.push(info.clone());
+            let has_material =
+                description.materials.choices().iter().any(|choice| choice.names(file));
+            match into_cloud(graph) {
+                Ok(cloud) if has_material => {
+                    separate.push((vec![Loaded { cloud, info }], vec![file.clone()]));
+                }
+                Ok(cloud) => {
+                    merging.0.push(Loaded { cloud, info });
+                    merging.1.push(file.clone());
+                }
+                Err(graph) => {
+                    let nodes = self.append(*graph, None);
+                    self.files.push((file.clone(), nodes));
+                }
+            }
+        }
+        for (clouds, files) in separate.into_iter().chain([merging]) {
+            if clouds.is_empty() {
+                continue;
+            }
+            let graph = merged(clouds, &files, progress)?;
+            let nodes = self.append(graph, None);
+            self.files.extend(files.into_iter().map(|file| (file, nodes.clone())));
+        }
+        Ok(())
+    }
+
+    /// Adds a graph to what is here; returns its nodes.
+    fn append(&mut self, graph: Graph<PointCloud>, owner: Option<usize>) -> Range<usize> {
+        let first = self.graph.append(graph);
+        self.owners.resize(self.graph.geometries.len(), owner);
+        first..self.graph.nodes.len()
+    }
+
+    /// Adds an object with its instances.
+    pub(super) fn add_object(
+        &mut self,
+        object: &ObjectDescription,
+        description: &SceneDescription,
+        motions: &[ObjectMotion],
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let object_idx = self.objects.len();
+        let before = &description.objects[..object_idx];
+        let parent = object.parent.as_ref();
+        let parent = parent.and_then(|name| before.iter().position(|other| other.name() == *name));
+        let node = Node {
+            parent: parent.map(|object_idx| self.objects[object_idx].node),
+            transform: object.placement.transform()?,
+            is_visible: object.visible(),
+            ..Node::new(object.name())
+        };
+        let node = self.add_animated(node, motions);
+        let first = self.graph.nodes.len();
+        if let Some(twin) = before.iter().position(|other| other.has_same_content(object)) {
+            // The same files with the same settings are held once.
+            self.graph.add_instance(self.objects[twin].content.clone(), node);
+        } else {
+            self.add_content(node, object, description, progress)?;
+        }
+        let content = first..self.graph.nodes.len();
+        for instance in &object.instances {
+            let instance = Node {
+                parent: Some(node),
+                transform: instance.transform()?,
+                ..Node::new(object.name())
+            };
+            let instance = self.graph.add_node(instance);
+            self.graph.add_instance(content.clone(), instance);
+        }
+        self.objects.push(ObjectNodes { node, content, all: first..self.graph.nodes.len() });
+        Ok(())
+    }
+
+    /// Puts what an object's files hold under its node.
+    fn add_content(
+        &mut self,
+        node: usize,
+        object: &ObjectDescription,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let owner = self.objects.len();
+        let settings = object.settings.over(&description.objects_default);
+        let options = self.import_options(description);
+        if is_streamed(object, &settings)? {
+            return self.add_sequence(node, object, settings, options, progress);
+        }
+        let mut merging = Vec::new();
+        for (file_idx, file) in object.files.iter().enumerate() {
+            let (graph, info) = import(file, &settings, &options, progress)?;
+            self.file_infos.push(info.clone());
+            if object.merge() {
+                let cloud = into_cloud(graph).map_err(|_| {
+                    Error::Unfit(format!(
+                        "{}: is not a point cloud; `merge` is for point clouds",
+                        file.display()
+                    ))
+                })?;
+                merging.push(Loaded { cloud, info });
+                continue;
+            }
+            let above = Node { parent: Some(node), ..Node::new(file_name(file)) };
+            let above = self.graph.add_node(above);
+            if 1 < object.files.len() {
+                self.show_in_turn(above, file_idx, object);
+            }
+            self.append_below(above, graph, owner);
+        }
+        if object.merge() {
+            let graph = merged(merging, &object.files, progress)?;
+            self.append_below(node, graph, owner);
+        }
+        Ok(())
+    }
+
+    /// Puts the first file of a sequence under an object's node; the others take its place.
+    fn add_sequence(
+        &mut self,
+        node: usize,
+        object: &ObjectDescription,
+        settings: ObjectSettings,
+        options: ImportOptions,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let first = &object.files[0];
+        let (graph, info) = import(first, &settings, &options, progress)?;
+        self.file_infos.push(info);
+        let above = Node { parent: Some(node), ..Node::new(file_name(first)) };
+        let above = self.graph.add_node(above);
+        let before = element_counts(&self.graph);
+        self.append_below(above, graph, self.objects.len());
+        let slots = GeometrySlots::behind(before, &self.graph);
+        let sequence = Sequence::new(object.files.clone(), object.fps(), settings, options, slots);
+        self.sequences.push(sequence);
+        Ok(())
+    }
+
+    fn append_below(&mut self, above: usize, graph: Graph<PointCloud>, owner: usize) {
+        let nodes = self.append(graph, Some(owner));
+        for node in &mut self.graph.nodes[nodes] {
+            node.parent.get_or_insert(above);
+        }
+    }
+
+    /// Shows a file of a sequence for its time; the last one stays.
+    fn show_in_turn(&mut self, node: usize, file_idx: usize, object: &ObjectDescription) {
+        let fps = object.fps();
+        let (start, end) = (file_idx as f64 / fps, (file_idx + 1) as f64 / fps);
+        let is_last = file_idx + 1 == object.files.len();
+        let mut keys = vec![(start, true), (end, is_last)];
+        if 0 < file_idx {
+            keys.insert(0, (0.0, false));
+        }
+        let keys = Keyframes {
+            times_secs: keys.iter().map(|(time, _)| *time).collect(),
+            values: keys.iter().map(|(_, visible)| *visible).collect(),
+            interpolation: Interpolation::Step,
+        };
+        self.graph.animation.channels.push(Channel { node, track: Track::Visible(keys) });
+    }
+
+    /// Adds a node with its movements. One that orbits hangs on another that stands in the middle.
+    pub(super) fn add_animated(&mut self, mut node: Node, motions: &[ObjectMotion]) -> usize {
+        let name = node.name.clone();
+        let motions = motions.iter().filter(|motion| motion.object == name);
+        for motion in motions.clone().filter(|motion| motion.is_orbit) {
+            let center = motion.pivot.unwrap_or(node.transform.matrix().translation);
+            let mut middle = Node { parent: node.parent, ..Node::new("") };
+            middle.transform = Transform::from_translation(center);
+            let middle = self.graph.add_node(middle);
+            self.add_tracks(middle, motion);
+            // Back again, so that the node's own keys count from where they always do.
+            let mut back = Node { parent: Some(middle), ..Node::new("") };
+            back.transform = Transform::from_translation(-center);
+            node.parent = Some(self.graph.add_node(back));
+        }
+        let node = self.graph.add_node(node);
+        for motion in motions.filter(|motion| !motion.is_orbit) {
+            self.add_tracks(node, motion);
+        }
+        node
+    }
+
+    fn add_tracks(&mut self, node: usize, motion: &ObjectMotion) {
+        let channels = motion.tracks.iter().map(|track| Channel { node, track: track.clone() });
+        self.graph.animation.channels.extend(channels);
+    }
+}
+
+/// Clouds as one, whose points lie among each other.
+fn merged(
+    clouds: Vec<Loaded>,
+    files: &[PathBuf],
+    progress: &dyn Progress,
+) -> Result<Graph<PointCloud>> {
+    let cloud = surfel_formats::merge_loaded(clouds, files, progress).cloud;
+    if cloud.is_empty() {
+        let cause = surfel_core::Error::EmptyCloud;
+        return Err(Error::Content { files: files.to_vec(), cause });
+    }
+    let mut graph = graph_of(cloud);
+    graph.nodes[0].name = file_name(&files[0]);
+    Ok(graph)
+}
