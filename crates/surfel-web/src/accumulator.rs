@@ -45,7 +45,7 @@ pub struct Accumulator {
     next_keyframe: Option<KeyframeOf>,
     /// Duration of a row of the keyframe that is being made, in seconds.
     keyframe_secs_per_row: f64,
-    /// Duration of drawing the keyframe, in seconds.
+    /// Duration of drawing the keyframe and encoding the draft, in seconds.
     keyframe_secs: f64,
     work: Work,
 }
@@ -72,6 +72,8 @@ struct Work {
 const DRAFT_LIGHT_SAMPLES: u32 = 1;
 /// Fraction of the keyframe's width from which a draft is shown as it was traced.
 const SHARP_DRAFT: f64 = 0.8;
+/// Least fraction of the time of a draft that is spent tracing.
+const MIN_TRACED: f64 = 0.3;
 /// JPEG quality of drafts, from 1 to 100.
 const DRAFT_JPEG_QUALITY: u8 = 80;
 /// JPEG quality of refined pictures, from 1 to 100.
@@ -114,7 +116,7 @@ impl Accumulator {
         self.finish_keyframe(&prepared, view.size);
         let has_keyframe = self.keyframe.is_some();
         let keyframe_secs = if has_keyframe { self.keyframe_secs } else { 0.0 };
-        let secs = (secs - keyframe_secs).max(0.5 * secs);
+        let secs = (secs - keyframe_secs).max(MIN_TRACED * secs);
         let (width, height) = self.resolution.size(view.size, secs);
         let light_samples = full.light_samples.min(DRAFT_LIGHT_SAMPLES);
         // The page enlarges a draft to its own size, and the points with it.
@@ -148,6 +150,7 @@ impl Accumulator {
                 place(file, (*x, *y), (image.width, image.height))
             }));
         }
+        self.keyframe_secs = start.elapsed().as_secs_f64();
         Ok(Some(Frame {
             quality: Quality::Draft,
             width: width as u16,
@@ -271,8 +274,7 @@ impl Accumulator {
         if self.keyframe.as_ref().is_some_and(is_known) || uses_rasterizer(&prepared.flat)? {
             return Ok(false);
         }
-        let (version, origin) = (self.version, prepared.flat.origin);
-        let Some(camera) = view.camera else { return Ok(false) };
+        let version = self.version;
         let n_known = self.next_keyframe.as_ref().filter(|next| next.version == version);
         let first = n_known.map_or(0, |next| next.n_rows);
         let secs_per_row = self.keyframe_secs_per_row.max(0.5 * self.secs_per_row);
@@ -290,7 +292,7 @@ impl Accumulator {
         self.work += Work::of(&stats);
         let next = self.next_keyframe.take().filter(|next| next.version == version);
         let mut next = next.unwrap_or_else(|| KeyframeOf {
-            keyframe: Keyframe::new(size, camera.view(origin, size.0, size.1)),
+            keyframe: Keyframe::new(size),
             scene: prepared.clone(),
             version,
             n_rows: 0,
@@ -332,22 +334,14 @@ impl Accumulator {
     }
 
     /// Draws the keyframe as the camera sees it, where that is sharper than the traced draft.
-    fn draw_keyframe(
-        &mut self,
-        traced: &Image,
-        camera: &Camera,
-        full: (u32, u32),
-    ) -> Option<Image> {
+    fn draw_keyframe(&self, traced: &Image, camera: &Camera, full: (u32, u32)) -> Option<Image> {
         let KeyframeOf { keyframe, scene, .. } = self.keyframe.as_ref()?;
         let (width, height) = keyframe_size(full);
         if SHARP_DRAFT * f64::from(width) <= f64::from(traced.width) {
             return None;
         }
-        let start = Instant::now();
         let view = camera.view(scene.flat.origin, width, height);
-        let image = keyframe.draw(&view, traced);
-        self.keyframe_secs = start.elapsed().as_secs_f64();
-        Some(image)
+        Some(keyframe.draw(&view, traced))
     }
 
     fn next_slice(&self, height: u32) -> RenderRegion {

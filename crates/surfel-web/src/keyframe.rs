@@ -2,7 +2,6 @@
 //! using the render cache", 1999).
 
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU64, Ordering};
 use surfel_core::image::{Aovs, Image, NO_ID, decode_srgb8, encode_srgb8};
 use surfel_core::math::Vec3;
 use surfel_core::scene::View;
@@ -11,8 +10,6 @@ use surfel_core::scene::View;
 pub struct Keyframe {
     width: u32,
     height: u32,
-    /// Camera of the picture.
-    view: View,
     /// Place that each pixel shows, relative to the scene's origin; NaN where it shows the background.
     positions: Vec<Vec3>,
     /// sRGB codes of each pixel.
@@ -23,13 +20,8 @@ pub struct Keyframe {
 const MAX_PIXELS: f64 = 500_000.0;
 /// Side of a keyframe as a fraction of the page's picture.
 const SCALE: f64 = 0.5;
-/// Side of the square that stands for a pixel of the keyframe, in its pixels as the new camera sees them: neighbours
-/// overlap, so that no cracks open between them.
-const OVERLAP: f32 = 1.3;
-/// Largest side of a square in pixels: nearer to the camera the draft shows more.
-const MAX_SIDE: f32 = 8.0;
 /// No pixel of the keyframe.
-const NONE: u64 = u64::MAX;
+const NONE: u32 = u32::MAX;
 
 /// Returns width and height of the keyframe of a page's picture.
 pub fn keyframe_size((width, height): (u32, u32)) -> (u32, u32) {
@@ -41,10 +33,10 @@ pub fn keyframe_size((width, height): (u32, u32)) -> (u32, u32) {
 
 impl Keyframe {
     /// A keyframe of this size that shows the background everywhere.
-    pub fn new((width, height): (u32, u32), view: View) -> Self {
+    pub fn new((width, height): (u32, u32)) -> Self {
         let n_pixels = width as usize * height as usize;
         let positions = vec![Vec3::NAN; n_pixels];
-        Self { width, height, view, positions, colors: vec![[0; 3]; n_pixels] }
+        Self { width, height, positions, colors: vec![[0; 3]; n_pixels] }
     }
 
     /// Returns its width and height.
@@ -91,45 +83,61 @@ impl Keyframe {
         let mut image = Image::new(self.width, self.height);
         let width = self.width as usize;
         let rows = image.color.par_chunks_mut(width).zip(image.coverage.par_chunks_mut(width));
-        rows.zip(nearest.par_chunks(width)).enumerate().for_each(
-            |(y, ((color, coverage), found))| {
-                for x in 0..width {
-                    let found = found[x].load(Ordering::Relaxed);
-                    (color[x], coverage[x]) = if found == NONE {
-                        self.draft_pixel(draft, x, y)
-                    } else {
-                        let [r, g, b] = self.colors[found as u32 as usize].map(decode_srgb8);
+        rows.enumerate().for_each(|(y, (color, coverage))| {
+            for x in 0..width {
+                (color[x], coverage[x]) = match self.shown_pixel(&nearest, x, y) {
+                    Some(shown) => {
+                        let [r, g, b] = self.colors[shown].map(decode_srgb8);
                         ([r, g, b, 1.0], 1.0)
-                    };
-                }
-            },
-        );
+                    }
+                    None => self.draft_pixel(draft, x, y),
+                };
+            }
+        });
         image
     }
 
-    /// Returns for each pixel of the new picture a key that ends in the index of the keyframe's pixel that it shows.
-    fn nearest_pixels(&self, view: &View) -> Vec<AtomicU64> {
-        let n_pixels = self.positions.len();
-        let keys: Vec<AtomicU64> = (0..n_pixels).map(|_| AtomicU64::new(NONE)).collect();
-        self.positions.par_iter().enumerate().for_each(|(i, position)| {
-            let Some((x, y, depth)) = view.project(*position).filter(|_| position.is_finite())
-            else {
-                return;
-            };
-            let ratio = self.view.pixel_size_at(*position) / view.pixel_size_at(*position);
-            let side = (OVERLAP * ratio).ceil().clamp(1.0, MAX_SIDE);
-            let (left, top) = ((x - 0.5 * side).round(), (y - 0.5 * side).round());
-            let columns = clamped(left, side, self.width);
-            for row in clamped(top, side, self.height) {
-                for column in columns.clone() {
-                    let (dx, dy) = (column as f32 + 0.5 - x, row as f32 + 0.5 - y);
-                    let key = key(depth, dx.abs().max(dy.abs()), i as u32);
-                    let pixel = row as usize * self.width as usize + column as usize;
-                    keys[pixel].fetch_min(key, Ordering::Relaxed);
+    /// Returns for each pixel of the new picture the index of the nearest of the keyframe's pixels whose places it shows.
+    fn nearest_pixels(&self, view: &View) -> Vec<u32> {
+        let (width, height) = (self.width as f32, self.height as f32);
+        let project = |position: &Vec3| {
+            let (x, y, depth) = view.project(*position)?;
+            let is_inside = (0.0..width).contains(&x) && (0.0..height).contains(&y);
+            is_inside.then(|| (y as u32 * self.width + x as u32, depth))
+        };
+        // Places of the background are NaN, and lie in no picture.
+        let project = |position: &Vec3| project(position).unwrap_or((NONE, f32::INFINITY));
+        let mut projected = Vec::new();
+        self.positions.par_iter().map(project).collect_into_vec(&mut projected);
+        let mut nearest = vec![NONE; projected.len()];
+        // Each thread looks for the places in its own rows: that is faster than atomic minima.
+        let n_rows = (self.height as usize).div_ceil(rayon::current_num_threads());
+        let n_pixels = n_rows * self.width as usize;
+        nearest.par_chunks_mut(n_pixels).enumerate().for_each(|(band, nearest)| {
+            let start = (band * n_pixels) as u32;
+            for (i, (pixel, depth)) in projected.iter().enumerate() {
+                let Some(known) = nearest.get_mut(pixel.wrapping_sub(start) as usize) else {
+                    continue;
+                };
+                if *known == NONE || *depth < projected[*known as usize].1 {
+                    *known = i as u32;
                 }
             }
         });
-        keys
+        nearest
+    }
+
+    /// Returns the index of the keyframe's pixel that a pixel shows: its own, or one of its neighbours', as places that were
+    /// neighbours are up to three pixels apart where the camera has come nearer.
+    fn shown_pixel(&self, nearest: &[u32], x: usize, y: usize) -> Option<usize> {
+        let (width, height) = (self.width as usize, self.height as usize);
+        let mut found = nearest[y * width + x];
+        if found == NONE {
+            let around = |i: usize, n: usize| i.saturating_sub(1)..=(i + 1).min(n - 1);
+            let neighbors = around(y, height).flat_map(|y| around(x, width).map(move |x| (x, y)));
+            found = neighbors.map(|(x, y)| nearest[y * width + x]).min().unwrap_or(NONE);
+        }
+        (found != NONE).then_some(found as usize)
     }
 
     /// Returns colour and coverage of the enlarged draft: of what is there, or of the background.
@@ -165,22 +173,6 @@ impl Keyframe {
     }
 }
 
-/// Returns a key that is less for what meets the pixel's centre, which overlaps of others do not hide, so that edges stay
-/// in place; then for what is nearer; at about the same depth for what is nearer to the pixel's centre.
-fn key(depth: f32, offset: f32, index: u32) -> u64 {
-    // Positive floats are ordered as their bits; ten bits of the mantissa tell a thousandth.
-    let depth = u64::from(depth.max(0.0).to_bits() >> 13);
-    let offset = (16.0 * offset).min(255.0) as u64;
-    let is_overlap = u64::from(8 < offset);
-    is_overlap << 60 | depth << 40 | offset << 32 | u64::from(index)
-}
-
-/// Returns the pixels of a span that lie in a picture of `n` pixels.
-fn clamped(start: f32, side: f32, n: u32) -> std::ops::Range<u32> {
-    let end = (start + side).clamp(0.0, n as f32) as u32;
-    (start.clamp(0.0, n as f32) as u32).min(end)..end
-}
-
 #[cfg(test)]
 mod tests {
     //! Keyframes seen by the same camera and by others.
@@ -204,7 +196,7 @@ mod tests {
 
     /// The floor with columns of different greys, and a wall of one pixel that stands 50 higher in column 10.
     fn keyframe() -> Keyframe {
-        let mut keyframe = Keyframe::new(SIZE, view(0.0));
+        let mut keyframe = Keyframe::new(SIZE);
         let mut aovs = Image::with_aovs(SIZE.0, SIZE.1).aovs.unwrap();
         for i in 0..aovs.position.len() {
             let (x, y) = (i as u32 % SIZE.0, i as u32 / SIZE.0);

@@ -132,7 +132,8 @@ impl View {
     /// behind the camera.
     pub fn project(&self, position: Vec3) -> Option<(f32, f32, f32)> {
         let offset = position - self.position;
-        let [right, up, forward] = [self.right, self.up, self.forward].map(|axis| offset.dot(axis));
+        let (right, up) = (offset.dot(self.right), offset.dot(self.up));
+        let forward = offset.dot(self.forward);
         let depth = self.depth(position);
         let (across, along) = match self.lens {
             Lens::Perspective { pixel_size } => {
@@ -158,14 +159,6 @@ impl View {
         match self.lens {
             Lens::Perspective { pixel_size } | Lens::Orthographic { pixel_size } => pixel_size,
             Lens::Panorama { pixel_rad } => pixel_rad.1,
-        }
-    }
-
-    /// Returns the size of a pixel at `position` in world units.
-    pub fn pixel_size_at(&self, position: Vec3) -> f32 {
-        match self.lens {
-            Lens::Orthographic { pixel_size } => pixel_size,
-            _ => self.pixel_size() * self.depth(position),
         }
     }
 
