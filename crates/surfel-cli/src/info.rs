@@ -11,7 +11,8 @@ use surfel::resolve::{MemoryEstimate, up_convention};
 use surfel_core::image::class_name;
 use surfel_core::math::Vec3;
 use surfel_core::points::{
-    PointCloud, STATION, ScanStation, Subsample, infer_up, points_per_area, spacing,
+    PointCloud, STATION, ScanStation, Subsample, Values, infer_up, is_flag, points_per_area,
+    spacing,
 };
 use surfel_core::progress::Progress;
 use surfel_formats::{ColumnChoice, EmbeddedImage, FileInfo, Loaded};
@@ -119,6 +120,7 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
         "columns": columns(cloud),
         "classes": classes(cloud),
         "returns": returns(cloud),
+        "flags": flags(cloud),
         "columns_in_file": source.columns,
         "images": images(source),
     }))
@@ -171,6 +173,13 @@ fn returns(cloud: &PointCloud) -> Map<String, Value> {
         (0..cloud.len()).for_each(|i| *counts.entry(numbers.get(i) as u8).or_insert(0u64) += 1);
     }
     counts.into_iter().map(|(number, count)| (number.to_string(), json!(count))).collect()
+}
+
+/// Numbers of points of each flag that is set at all.
+fn flags(cloud: &PointCloud) -> Map<String, Value> {
+    let count = |values: &Values| (0..values.len()).filter(|i| values.get(*i) != 0.0).count();
+    let of_flags = cloud.scalars.iter().filter(|scalar| is_flag(&scalar.name));
+    of_flags.map(|scalar| (scalar.name.clone(), json!(count(&scalar.values)))).collect()
 }
 
 /// Columns by name with their least and greatest values.
@@ -250,7 +259,7 @@ fn table(info: &Value) -> String {
         row(title, format!("{name:<24}{points} points, scanner at {}", text(&station["position"])));
     }
     let n_points = info["points"].as_f64().unwrap_or(1.0);
-    for key in ["classes", "returns"] {
+    for key in ["classes", "returns", "flags"] {
         for (place, (name, count)) in info[key].as_object().into_iter().flatten().enumerate() {
             let percent = 100.0 * count.as_f64().unwrap_or(0.0) / n_points;
             let title = if place == 0 { key } else { "" };

@@ -1,7 +1,7 @@
 //! Cleaning: drops points and marks entries that no later step can use, and counts them.
 
-use super::PointCloud;
 use super::cloud::is_valid_position;
+use super::{PointCloud, Values, WITHHELD};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -16,6 +16,8 @@ pub struct CleanReport {
     pub n_invalid_positions: usize,
     /// Number of points dropped because they are of a class of noise.
     pub n_noise: usize,
+    /// Number of points dropped because they are flagged withheld.
+    pub n_withheld: usize,
     /// Number of points dropped because an earlier point has the same position.
     pub n_duplicates: usize,
     /// Number of zero or non-finite normals, set to zero, which `prepare` takes as missing.
@@ -39,8 +41,8 @@ pub enum Duplicates {
 /// ASPRS classes of noise: low points and high noise.
 const NOISE_CLASSES: [u8; 2] = [7, 18];
 
-/// Drops points with invalid positions, those of classes of noise unless there are no others, and duplicates if chosen,
-/// and marks unusable normals and radii. Duplicates of a cloud that deforms are kept, as they may part at another time.
+/// Drops points with invalid positions, those of classes of noise and those flagged withheld unless there are no others,
+/// and duplicates if chosen, and marks unusable normals and radii. Duplicates of a cloud that deforms are kept, as they may part at another time.
 ///
 /// A column of normals or radii without a usable entry, as trained splats have, is removed.
 ///
@@ -69,6 +71,7 @@ impl CleanReport {
         let counts = [
             (self.n_invalid_positions, "points dropped: no position, or beyond 1e15"),
             (self.n_noise, "points dropped: classes of noise (7, 18)"),
+            (self.n_withheld, "points dropped: flagged withheld"),
             (self.n_duplicates, "points dropped: exact duplicates"),
             (self.n_invalid_normals, "normals treated as missing: zero or not finite"),
             (self.n_scaled_normals, "normals scaled to unit length"),
@@ -101,8 +104,15 @@ fn find_dropped(
     let indices = 0..positions.len() as u32;
     dropped.par_extend(indices.into_par_iter().filter(|i| !is_invalid(*i) && is_noise(*i)));
     report.n_noise = dropped.len() - report.n_invalid_positions;
+    let withheld = withheld_points(cloud, |i| !is_invalid(i) && !is_noise(i));
+    let is_withheld = |i: u32| withheld.is_some_and(|flags| flags.get(i as usize) != 0.0);
+    let indices = 0..positions.len() as u32;
+    let is_unseen = |i: &u32| !is_invalid(*i) && !is_noise(*i) && is_withheld(*i);
+    dropped.par_extend(indices.into_par_iter().filter(is_unseen));
+    report.n_withheld = dropped.len() - report.n_invalid_positions - report.n_noise;
+    let n_dropped = dropped.len();
     if cloud.morphs.is_empty() && cloud.skin.is_none() {
-        let is_candidate = |i: u32| !is_invalid(i) && !is_noise(i);
+        let is_candidate = |i: u32| !is_invalid(i) && !is_noise(i) && !is_withheld(i);
         let found = find_duplicates(positions, is_candidate, progress)?;
         match duplicates {
             Duplicates::Drop => dropped.extend(found),
@@ -113,9 +123,16 @@ fn find_dropped(
             }
         }
     }
-    report.n_duplicates = dropped.len() - report.n_invalid_positions - report.n_noise;
+    report.n_duplicates = dropped.len() - n_dropped;
     dropped.par_sort_unstable();
     Ok(dropped)
+}
+
+/// Returns the withheld flags, unless all points that would stay are withheld.
+fn withheld_points(cloud: &PointCloud, stays: impl Fn(u32) -> bool + Sync) -> Option<&Values> {
+    let flags = cloud.scalar(WITHHELD)?;
+    let is_shown = |i: u32| stays(i) && flags.get(i as usize) == 0.0;
+    (0..cloud.len() as u32).into_par_iter().any(is_shown).then_some(flags)
 }
 
 fn is_noise(class: &u8) -> bool {
@@ -205,6 +222,7 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
+    use crate::points::Scalar;
     use crate::progress::NoProgress;
 
     fn cleaned(cloud: PointCloud) -> (PointCloud, CleanReport) {
@@ -302,5 +320,20 @@ mod tests {
         assert_eq!((report.n_noise, report.n_duplicates), (2, 0));
         let (cloud, report) = cleaned(classified([7, 7, 7, 18]));
         assert_eq!((cloud.len(), report.n_noise, report.n_duplicates), (3, 0, 1));
+    }
+
+    #[test]
+    fn withheld_points_are_dropped_unless_there_are_no_others() {
+        let positions: Vec<Vec3> = [0.0, 1.0, 2.0].map(|x| x * Vec3::X).to_vec();
+        let flagged = |flags: [u8; 3], classes: [u8; 3]| PointCloud {
+            classification: Some(classes.to_vec()),
+            scalars: vec![Scalar { name: "Withheld".into(), values: Values::U8(flags.to_vec()) }],
+            ..PointCloud::from_positions(positions.clone())
+        };
+        let (cloud, report) = cleaned(flagged([0, 1, 0], [2, 2, 7]));
+        assert_eq!(cloud.positions, [Vec3::ZERO]);
+        assert_eq!((report.n_noise, report.n_withheld), (1, 1));
+        let (cloud, report) = cleaned(flagged([1, 1, 0], [2, 2, 7]));
+        assert_eq!((cloud.len(), report.n_noise, report.n_withheld), (2, 1, 0));
     }
 }

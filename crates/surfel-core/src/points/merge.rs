@@ -1,11 +1,12 @@
-//! Merging of clouds: a common origin, and the columns that all of them have.
+//! Merging of clouds: a common origin, and the columns that all of them have; classes and flags that some of them have.
 
+use super::flags::is_flag;
 use super::{PointCloud, STATION, Scalar, ScanStation, Values};
 
 /// Merges clouds in their order. Returns the merged cloud and the names of the columns that were left out.
 ///
 /// The origin is that of the largest cloud. Empty clouds are ignored. Scalar columns of different types become f64.
-/// A merged cloud has no morph targets and joints. Columns are moved one by one to save memory.
+/// Where some clouds lack classes or flags that others have, these are 0. A merged cloud has no morph targets and joints. Columns are moved one by one to save memory.
 pub fn merge(mut clouds: Vec<PointCloud>) -> (PointCloud, Vec<String>) {
     clouds.retain(|cloud| !cloud.is_empty());
     if clouds.len() < 2 {
@@ -20,6 +21,12 @@ pub fn merge(mut clouds: Vec<PointCloud>) -> (PointCloud, Vec<String>) {
     if has_dropped_stations {
         dropped.push("stations".to_owned());
     }
+    if clouds.iter().any(|cloud| cloud.classification.is_some()) {
+        for cloud in &mut clouds {
+            cloud.classification.get_or_insert_with(|| vec![0; cloud.positions.len()]);
+        }
+    }
+    let n_points: Vec<usize> = clouds.iter().map(PointCloud::len).collect();
     let positions = clouds.iter_mut().map(|cloud| std::mem::take(&mut cloud.positions)).collect();
     if clouds.iter().any(|cloud| !cloud.morphs.is_empty() || cloud.skin.is_some()) {
         dropped.push("morph targets and joints".to_owned());
@@ -38,7 +45,7 @@ pub fn merge(mut clouds: Vec<PointCloud>) -> (PointCloud, Vec<String>) {
             &mut dropped,
         ),
         source_indices: None,
-        scalars: scalars(&mut clouds, &mut dropped),
+        scalars: scalars(&mut clouds, &n_points, &mut dropped),
         stations,
         morphs: Vec::new(),
         skin: None,
@@ -102,7 +109,11 @@ fn column<T>(
     None
 }
 
-fn scalars(clouds: &mut [PointCloud], dropped: &mut Vec<String>) -> Vec<Scalar> {
+fn scalars(
+    clouds: &mut [PointCloud],
+    n_points: &[usize],
+    dropped: &mut Vec<String>,
+) -> Vec<Scalar> {
     let mut names: Vec<String> = Vec::new();
     for Scalar { name, .. } in clouds.iter().flat_map(|cloud| &cloud.scalars) {
         if !names.iter().any(|known| known.eq_ignore_ascii_case(name)) {
@@ -112,11 +123,13 @@ fn scalars(clouds: &mut [PointCloud], dropped: &mut Vec<String>) -> Vec<Scalar> 
     let mut kept = Vec::new();
     for name in names {
         let is_named = |scalar: &Scalar| scalar.name.eq_ignore_ascii_case(&name);
-        let take = |cloud: &mut PointCloud| {
-            let at = cloud.scalars.iter().position(is_named)?;
+        let take = |(cloud, n_points): (&mut PointCloud, &usize)| {
+            let Some(at) = cloud.scalars.iter().position(is_named) else {
+                return is_flag(&name).then(|| Values::U8(vec![0; *n_points]));
+            };
             Some(cloud.scalars.swap_remove(at).values)
         };
-        let columns: Vec<Values> = clouds.iter_mut().filter_map(take).collect();
+        let columns: Vec<Values> = clouds.iter_mut().zip(n_points).filter_map(take).collect();
         if columns.len() == clouds.len() {
             kept.push(Scalar { name, values: concatenate_values(columns) });
         } else {
@@ -194,6 +207,17 @@ mod tests {
         let (merged, dropped) = merge(vec![PointCloud::default(), with.clone()]);
         assert_eq!((merged, dropped.len()), (with, 0));
         assert_eq!(merge(Vec::new()).0, PointCloud::default());
+    }
+
+    #[test]
+    fn classes_and_flags_that_a_cloud_lacks_are_zero() {
+        let mut with = cloud(0.0, None);
+        with.classification = Some(vec![2, 6]);
+        with.scalars = vec![Scalar { name: "Overlap".into(), values: Values::U8(vec![0, 1]) }];
+        let (merged, dropped) = merge(vec![cloud(0.0, None), with]);
+        assert!(dropped.is_empty(), "{dropped:?}");
+        assert_eq!(merged.classification, Some(vec![0, 0, 2, 6]));
+        assert_eq!(merged.scalar("overlap"), Some(&Values::U8(vec![0, 0, 0, 1])));
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! The fields of the columns in the records of each point format, extra bytes included.
 
+use surfel_core::points::WITHHELD;
+
 use super::header::{Header, RECORD_LENGTHS, read_f64, text};
 use crate::file::Input;
 use crate::table::{ColumnField, ColumnRole, Field, NumberType};
@@ -27,9 +29,26 @@ pub(super) fn columns(input: &Input, header: &Header) -> Vec<ColumnField> {
     columns
 }
 
-/// Returns the byte and the mask of a point's withheld flag.
-pub(super) fn withheld_flag(point_format: u8) -> (usize, u8) {
-    if point_format < 6 { (15, 0x80) } else { (15, 0x04) }
+/// Returns the names of the flags of a point with the byte of each, its lowest bit and its number of bits.
+pub(super) fn flag_fields(is_extended: bool) -> &'static [(&'static str, usize, u32, u32)] {
+    match is_extended {
+        true => &[
+            ("synthetic", 15, 0, 1),
+            ("key_point", 15, 1, 1),
+            (WITHHELD, 15, 2, 1),
+            ("overlap", 15, 3, 1),
+            ("scanner_channel", 15, 4, 2),
+            ("scan_direction_flag", 15, 6, 1),
+            ("edge_of_flight_line", 15, 7, 1),
+        ],
+        false => &[
+            ("scan_direction_flag", 14, 6, 1),
+            ("edge_of_flight_line", 14, 7, 1),
+            ("synthetic", 15, 5, 1),
+            ("key_point", 15, 6, 1),
+            (WITHHELD, 15, 7, 1),
+        ],
+    }
 }
 
 /// Returns the columns of the point format.
@@ -62,6 +81,9 @@ fn standard_columns(header: &Header) -> Vec<ColumnField> {
         let angle = Field::new(18, NumberType::I16);
         add(scalar("scan_angle"), Field { scale: SCAN_ANGLE_STEP, ..angle });
         add(scalar("point_source_id"), Field::new(20, NumberType::U16));
+    }
+    for &(name, byte, lowest, n_bits) in flag_fields(6 <= format) {
+        add(scalar(name), bits(byte, lowest, n_bits));
     }
     let gps_time = match format {
         1 | 3 | 4 | 5 => Some(20),

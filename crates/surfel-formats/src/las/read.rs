@@ -5,11 +5,11 @@ use std::iter::repeat_n;
 use laz::DecompressionSelection;
 use rayon::prelude::*;
 use surfel_core::math::DVec3;
-use surfel_core::points::PointCloud;
+use surfel_core::points::{PointCloud, Values, is_flag};
 use surfel_core::progress::Progress;
 
 use super::crs::coordinate_system;
-use super::fields::{columns, withheld_flag};
+use super::fields::columns;
 use super::find_chunks::find_chunks;
 use super::header::{Header, read_header};
 use super::laz::{Chunk, Chunks};
@@ -43,7 +43,7 @@ pub(crate) fn read(
     let origin_of =
         |sample: Vec<DVec3>| options.origin.unwrap_or_else(|| choose_origin(&sample, tolerance));
     let mut salvage = Salvage::new(input, options.salvage);
-    let Decoded { mut cloud, n_points, n_withheld } = if header.is_compressed {
+    let Decoded { mut cloud, n_points } = if header.is_compressed {
         let chunks = find_chunks(&mut salvage, &header, progress)?;
         let sample = chunks.first_records(input).map(|record| layout.world_position(record));
         let origin = origin_of(sample.collect());
@@ -64,13 +64,9 @@ pub(crate) fn read(
                 progress,
             )?,
             n_points,
-            n_withheld: count_withheld(records, &header),
         }
     };
     salvage.report("points", n_points, Some(header.n_points), progress)?;
-    if 0 < n_withheld {
-        progress.note(&format!("{}: {n_withheld} points are flagged withheld; kept", input.name));
-    }
     if !cloud.is_empty() {
         normalize_colors(input, &mut cloud, progress);
         drop_zero_columns(input, &mut cloud, progress);
@@ -118,8 +114,6 @@ struct Decoded {
     cloud: PointCloud,
     /// Number of points that were read, kept or not.
     n_points: u64,
-    /// Number of them that are flagged withheld.
-    n_withheld: u64,
 }
 
 /// Reads the chunks of a compressed file in parallel.
@@ -140,7 +134,7 @@ impl ChunkReader<'_> {
     ) -> Result<Decoded> {
         progress.begin(&format!("read {}", self.input.name), self.header.n_points);
         let cloud = self.layout.empty_cloud(origin);
-        let mut decoded = Decoded { cloud, n_points: 0, n_withheld: 0 };
+        let mut decoded = Decoded { cloud, n_points: 0 };
         let filter = self.options.filter.as_ref();
         if filter.is_none() {
             self.append_chunks(&mut decoded, chunks, &chunks.chunks, salvage, progress)?;
@@ -174,7 +168,7 @@ impl ChunkReader<'_> {
         progress: &dyn Progress,
     ) -> Result<()> {
         let selection = selection(&self.options.columns);
-        let Decoded { cloud, n_points, n_withheld } = decoded;
+        let Decoded { cloud, n_points } = decoded;
         let (n_before, origin) = (cloud.len(), cloud.origin);
         let n_new: usize = batch.iter().map(|chunk| chunk.n_points).sum();
         grow_checked(cloud, n_before + n_new, self.input)?;
@@ -182,27 +176,21 @@ impl ChunkReader<'_> {
         let tasks: Vec<(&Chunk, ColumnSlices)> =
             batch.iter().map(|chunk| (chunk, rest.split_off_front(chunk.n_points))).collect();
         let decode = |(chunk, mut slices): (&Chunk, ColumnSlices)| {
-            let mut n_withheld = 0;
             chunks.decode(self.input, chunk, selection, |records| {
                 progress.check()?;
                 let n_points = records.len() / self.header.record_length;
                 let mut batch = slices.split_off_front(n_points);
                 self.layout.decode(records, origin, &mut batch);
-                n_withheld += count_withheld(records, self.header);
                 progress.advance(n_points as u64);
                 Ok(())
-            })?;
-            Ok(n_withheld)
+            })
         };
-        let results: Vec<Result<u64>> = tasks.into_par_iter().with_max_len(1).map(decode).collect();
+        let results: Vec<Result<()>> = tasks.into_par_iter().with_max_len(1).map(decode).collect();
         let mut is_whole = Vec::new();
         for (chunk, result) in batch.iter().zip(results) {
             is_whole.push((chunk.n_points, result.is_ok()));
             match result {
-                Ok(n_withheld_in_chunk) => {
-                    *n_points += chunk.n_points as u64;
-                    *n_withheld += n_withheld_in_chunk;
-                }
+                Ok(()) => *n_points += chunk.n_points as u64,
                 Err(error) => salvage.accept(error)?,
             }
         }
@@ -212,13 +200,6 @@ impl ChunkReader<'_> {
         }
         Ok(())
     }
-}
-
-/// Returns the number of points that are flagged withheld.
-fn count_withheld(records: &[u8], header: &Header) -> u64 {
-    let (byte, mask) = withheld_flag(header.point_format);
-    let is_withheld = |record: &&[u8]| record[byte] & mask != 0;
-    records.chunks_exact(header.record_length).filter(is_withheld).count() as u64
 }
 
 /// Returns the parts to decode, for point formats whose parts are compressed separately.
@@ -268,8 +249,8 @@ fn normalize_colors(input: &Input, cloud: &mut PointCloud, progress: &dyn Progre
     }
 }
 
-/// Drops intensities and classes that are all zero: every point format has fields for them, so zeros mean that they
-/// were never set.
+/// Drops intensities, classes and flags that are all zero: every point format has fields for them, so zeros mean that
+/// they were never set.
 fn drop_zero_columns(input: &Input, cloud: &mut PointCloud, progress: &dyn Progress) {
     let note = |what: &str| {
         progress.note(&format!("{}: all {what} are zero; treated as absent", input.name));
@@ -282,4 +263,6 @@ fn drop_zero_columns(input: &Input, cloud: &mut PointCloud, progress: &dyn Progr
         note("classes");
         cloud.classification = None;
     }
+    let is_set = |values: &Values| (0..values.len()).into_par_iter().any(|i| values.get(i) != 0.0);
+    cloud.scalars.retain(|scalar| !is_flag(&scalar.name) || is_set(&scalar.values));
 }

@@ -7,7 +7,7 @@ use surfel_core::points::{PointCloud, Values};
 
 use super::crs::projection_records;
 use super::extra::{ExtraColumn, ExtraValues};
-use super::fields::{SCAN_ANGLE_STEP, extra_fields};
+use super::fields::{SCAN_ANGLE_STEP, extra_fields, flag_fields};
 use super::point_format::PointFields;
 use crate::options::{LasProfile, SaveOptions};
 use crate::table::decimal_step;
@@ -48,6 +48,7 @@ pub(super) struct StandardColumns<'a> {
     point_source_id: Option<&'a Values>,
     pub gps_time: Option<&'a Values>,
     nir: Option<&'a Values>,
+    flags: Vec<(&'a str, &'a Values)>,
 }
 
 impl<'a> WritePlan<'a> {
@@ -117,14 +118,29 @@ impl<'a> WritePlan<'a> {
         let class = cloud.classification.as_ref().map_or(0, |column| column[i]);
         let user_data = value(standard.user_data, i, 0.0) as u8;
         let angle = value(standard.scan_angle, i, 0.0);
+        let [of_returns, of_class] = self.encode_flags(i);
         if self.fields.is_extended {
-            bytes.extend([return_number | number_of_returns << 4, 0, class, user_data]);
+            let returns = return_number | number_of_returns << 4;
+            bytes.extend([returns, of_class, class, user_data]);
             bytes.extend(((angle / SCAN_ANGLE_STEP).round() as i16).to_le_bytes());
         } else {
             let angle = (angle as i8).to_le_bytes()[0];
-            bytes.extend([return_number | number_of_returns << 3, class, angle, user_data]);
+            let returns = return_number | number_of_returns << 3;
+            bytes.extend([returns | of_returns, class | of_class, angle, user_data]);
         }
         bytes.extend((value(standard.point_source_id, i, 0.0) as u16).to_le_bytes());
+    }
+
+    /// Returns the flags of a point in the bytes 14 and 15 of its record.
+    fn encode_flags(&self, point_idx: usize) -> [u8; 2] {
+        let mut bytes = [0; 2];
+        for (name, values) in &self.standard.flags {
+            let mut fields = flag_fields(self.fields.is_extended).iter();
+            if let Some((_, byte, lowest_bit, _)) = fields.find(|(field, ..)| field == name) {
+                bytes[byte - 14] |= (values.get(point_idx) as u8) << lowest_bit;
+            }
+        }
+        bytes
     }
 
     /// Returns the integer coordinates of a point.
@@ -168,7 +184,15 @@ fn assign_columns(
         let whole = |largest: f64| {
             all(values, |v| v.fract() == 0.0 && (0.0..=largest).contains(&v)).then_some(values)
         };
-        let field = match scalar.name.to_lowercase().as_str() {
+        let name = scalar.name.to_lowercase();
+        let flag = flag_fields(true).iter().find(|(flag, ..)| *flag == name);
+        if let Some((flag, _, _, n_bits)) = flag
+            && let Some(values) = whole(((1 << n_bits) - 1).into())
+        {
+            standard.flags.push((flag, values));
+            continue;
+        }
+        let field = match name.as_str() {
             "return_number" => (&mut standard.return_number, whole(15.0)),
             "number_of_returns" => (&mut standard.number_of_returns, whole(15.0)),
             "user_data" => (&mut standard.user_data, whole(255.0)),
@@ -226,14 +250,22 @@ fn choose_fields(
                 "scan angles finer than a degree",
                 exceeds(standard.scan_angle, |v| v.fract() == 0.0 && v.abs() <= 127.0),
             ),
+            ("flags of overlap or scanner channels", has_extended_flags(standard)),
             ("near infrared", fields.has_nir),
         ];
         fields.is_extended = limits.iter().any(|(_, is_exceeded)| *is_exceeded);
-        limits[..3].iter().for_each(|(reason, is_exceeded)| add(reason, *is_exceeded));
+        limits[..4].iter().for_each(|(reason, is_exceeded)| add(reason, *is_exceeded));
     }
     // Extended formats have times in any case.
     fields.has_gps_time |= fields.is_extended;
     (fields, reasons)
+}
+
+/// Returns true if flags are set that only extended formats have.
+fn has_extended_flags(standard: &StandardColumns) -> bool {
+    let legacy = flag_fields(false);
+    let is_lost = |name: &str| legacy.iter().all(|(field, ..)| *field != name);
+    standard.flags.iter().any(|(name, values)| is_lost(name) && !all(values, |v| v == 0.0))
 }
 
 /// Says what differs from the version and the point format of the source, and why; none if nothing does.

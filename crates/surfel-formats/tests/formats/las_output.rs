@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use las::point::{Classification, Format};
+use las::point::{Classification, Format, ScanDirection};
 use las::raw::point::Waveform;
 use las::{Builder, Color, GpsTimeType, Header, Point, Transform, Vector, Vlr, Writer};
 use surfel_core::points::{PointCloud, Scalar, Values};
@@ -63,6 +63,17 @@ fn point(i: u16, format: &Format) -> Point {
         } else {
             f32::from(i % 40) - 20.0
         },
+        is_synthetic: i % 5 == 1,
+        is_key_point: i % 7 == 1,
+        is_withheld: i % 11 == 1,
+        is_overlap: format.is_extended && i % 13 == 1,
+        scanner_channel: if format.is_extended { (i % 4) as u8 } else { 0 },
+        scan_direction: if i.is_multiple_of(2) {
+            ScanDirection::RightToLeft
+        } else {
+            ScanDirection::LeftToRight
+        },
+        is_edge_of_flight_line: i % 17 == 1,
         user_data: (i % 256) as u8,
         point_source_id: i % 9,
         gps_time: format.has_gps_time.then_some(1e8 + f64::from(i) * 1e-4),
@@ -70,7 +81,6 @@ fn point(i: u16, format: &Format) -> Point {
         nir: format.has_nir.then_some(i + 1),
         waveform: format.has_waveform.then(Waveform::default),
         extra_bytes: extra,
-        ..Point::default()
     }
 }
 
@@ -185,6 +195,11 @@ fn changes_of_version_and_format_are_reported() {
     expect((4, 6), &add_colors, (4, 7), "point format 7, not as LAS 1.4, point format 6: colours");
     let add_classes = |cloud: &mut PointCloud| cloud.classification = Some(vec![64; n]);
     expect((2, 3), &add_classes, (4, 7), "LAS 1.2, point format 3: classes above 31");
+    let add_overlap = |cloud: &mut PointCloud| {
+        let values = Values::U8(vec![1; n]);
+        cloud.scalars.push(Scalar { name: "overlap".into(), values });
+    };
+    expect((2, 1), &add_overlap, (4, 6), "point format 1: flags of overlap or scanner channels");
     let add_times = |cloud: &mut PointCloud| {
         let values = Values::F64(vec![7.5; n]);
         cloud.scalars.push(Scalar { name: "gps_time".into(), values });

@@ -15,7 +15,7 @@ use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
 use surfel_core::points::{
     COLUMN_INDEX, Denoise, Duplicates, MixedPixels, Orientation, OutlierRemoval, POINT_SOURCE,
     PointFilter, Preparation, ROW_INDEX, Radius, SCAN_ANGLE, STRUCTURE, SURFACE_VARIATION,
-    StructureChoice, Subsample,
+    StructureChoice, Subsample, WITHHELD,
 };
 use surfel_core::scene::color::{ColorSource, Coloring};
 use surfel_core::scene::{Clip, ClipBox, ClipPlane};
@@ -306,9 +306,9 @@ impl PreparationSettings {
         let normals = (!self.estimates_normals()).then_some(Column::Normals);
         let radii = self.radius.is_none().then_some(Column::Radii);
         let structure = self.radius.is_none().then(|| Column::Scalar(STRUCTURE.to_owned()));
-        // Points of classes of noise are left out.
-        let classes = Some(Column::Classification);
-        normals.into_iter().chain(radii).chain(structure).chain(classes).collect()
+        // Points of classes of noise, and those flagged withheld, are left out.
+        let of_cleaning = [Column::Classification, Column::Scalar(WITHHELD.to_owned())];
+        normals.into_iter().chain(radii).chain(structure).chain(of_cleaning).collect()
     }
 
     /// Drops the normals and radii that are to be estimated.
