@@ -156,7 +156,7 @@ impl Accumulator {
             width: width as u16,
             height: height as u16,
             samples: 1,
-            of_samples: full.samples_per_pixel,
+            of_samples: of_samples(&prepared),
             files,
             trace_secs: stats.frame_secs,
             encode_secs: start.elapsed().as_secs_f64(),
@@ -187,13 +187,15 @@ impl Accumulator {
         if 0 < self.n_samples && self.extend_keyframe(renderer, view, &prepared, progress)? {
             return Ok(true);
         }
-        if self.n_samples == settings.samples_per_pixel || self.has_frame {
+        let of_samples = of_samples(&prepared);
+        if self.n_samples == of_samples || self.has_frame {
             return Ok(false);
         }
-        let slice = self.next_slice(height);
+        let is_rasterized = uses_rasterizer(&prepared.flat)?;
+        let slice = self.next_slice(height, is_rasterized);
         let n_rows = slice.rows.1 - slice.rows.0;
         let Some(scene) = self.scene(prepared, view) else { return Ok(false) };
-        let deadline = Deadline::new(progress, n_rows == 1);
+        let deadline = Deadline::new(progress, n_rows == 1 || is_rasterized);
         let start = Instant::now();
         let rendered = renderer.render_region(scene, &settings, slice, &deadline);
         self.record_time(start.elapsed().as_secs_f64(), rendered.is_ok());
@@ -205,7 +207,7 @@ impl Accumulator {
         if self.n_rows == height {
             (self.n_samples, self.n_rows) = (self.n_samples + 1, 0);
             // Each picture that is sent has twice as many samples as the one before.
-            let is_last = self.n_samples == settings.samples_per_pixel;
+            let is_last = self.n_samples == of_samples;
             self.has_frame = self.n_samples.is_power_of_two() || is_last;
         }
         Ok(true)
@@ -217,7 +219,7 @@ impl Accumulator {
             return None;
         }
         let prepared = view.scene.as_ref()?;
-        let of_samples = prepared.render_settings.samples_per_pixel;
+        let of_samples = of_samples(prepared);
         let (width, height) = view.size;
         let is_finished = self.n_samples == of_samples;
         let start = Instant::now();
@@ -239,6 +241,11 @@ impl Accumulator {
             true => encode::png(pixels),
             false => encode::jpeg(pixels, REFINED_JPEG_QUALITY),
         };
+        if is_finished {
+            // A page at rest keeps no more than its keyframe.
+            self.finish_keyframe(&prepared.clone(), view.size);
+            (self.sum, self.coverage_sum) = (Vec::new(), Vec::new());
+        }
         let work = std::mem::take(&mut self.work);
         Some(Frame {
             quality: if is_finished { Quality::Finished } else { Quality::Refined },
@@ -344,10 +351,14 @@ impl Accumulator {
         Some(keyframe.draw(&view, traced))
     }
 
-    fn next_slice(&self, height: u32) -> RenderRegion {
+    /// Returns the next rows. The rasterizer draws all points for any number of rows, so it gets all rows.
+    fn next_slice(&self, height: u32, is_rasterized: bool) -> RenderRegion {
         let affordable = SLICE_SECS / self.secs_per_row.max(1e-6);
         let is_slow = SLICE_TIMEOUT.as_secs_f64() <= f64::from(MIN_SLICE_ROWS) * self.secs_per_row;
-        let n_rows = (affordable as u32).max(if is_slow { 1 } else { MIN_SLICE_ROWS });
+        let n_rows = match is_rasterized {
+            true => height,
+            false => (affordable as u32).max(if is_slow { 1 } else { MIN_SLICE_ROWS }),
+        };
         let rows = (self.n_rows, height.min(self.n_rows.saturating_add(n_rows)));
         RenderRegion { rows, samples: (self.n_samples, self.n_samples + 1) }
     }
@@ -381,6 +392,12 @@ impl Accumulator {
         scene.camera = view.camera?;
         Some(scene)
     }
+}
+
+/// Returns the number of samples of a finished picture. All samples of rasterised points are equal.
+fn of_samples(prepared: &PreparedScene) -> u32 {
+    let is_rasterized = uses_rasterizer(&prepared.flat).unwrap_or(false);
+    if is_rasterized { 1 } else { prepared.render_settings.samples_per_pixel }
 }
 
 /// Returns settings of a picture of this size that shows the place of each pixel, for as few rays as there can be.

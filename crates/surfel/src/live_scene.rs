@@ -10,6 +10,7 @@ use crate::resolve::{
     AutoSettings, KeepOptions, LoadedScene, common_legend, coordinate_system, expose, finish_graph,
     hide_walls, render_settings,
 };
+use rayon::ThreadPool;
 use serde_json::{Value, json};
 use std::sync::{Arc, OnceLock};
 use surfel_core::flat::FlatScene;
@@ -24,6 +25,7 @@ use surfel_core::scene::{
 };
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
+use thread_priority::ThreadPriority;
 
 /// A loaded scene that is shown under one description after another. Threads share it.
 #[derive(Debug)]
@@ -36,7 +38,9 @@ pub struct LiveScene {
     /// Walls that the first camera hides; they stay hidden while it moves, so that no tree is built again.
     hidden_walls: OnceLock<Vec<ClipPlane>>,
     /// Threads beside those that draw: preparation for one viewer must not hold up another's picture.
-    pool: rayon::ThreadPool,
+    preparation_threads: ThreadPool,
+    /// Threads for whole pictures, which take long. They run when the others leave processors idle.
+    picture_threads: ThreadPool,
 }
 
 /// Results for the last descriptions.
@@ -93,17 +97,14 @@ impl LiveScene {
     pub fn open(description: &SceneDescription, progress: &dyn Progress) -> Result<Self> {
         let keep = KeepOptions { all_columns: true, source_indices: true };
         let loaded = LoadedScene::read(description, keep, progress)?;
-        let pool =
-            rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).build();
-        let advice = "the threads cannot be started; ask for fewer with --threads";
-        let pool = pool.map_err(|error| Error::Unfit(format!("{advice}: {error}")))?;
         Ok(Self {
             loaded,
             made: Made::default(),
             made_for_previews: Made::default(),
             renderer: CpuRenderer { simd: Simd::detect() },
             hidden_walls: OnceLock::new(),
-            pool,
+            preparation_threads: start_threads(|_| ())?,
+            picture_threads: start_threads(|_| lower_priority())?,
         })
     }
 
@@ -165,9 +166,8 @@ impl LiveScene {
         // An automatic exposure is chosen at second 0, as for a movie. Otherwise the first file of a sequence is not read.
         let metered_at = if exposure == Exposure::Auto { 0.0 } else { time_secs };
         let (_, metered) = self.flat_at(made, metered_at, description, &auto, progress)?;
-        let stops = self
-            .pool
-            .install(|| exposure_stops(exposure, &self.renderer, &metered, &settings, progress))?;
+        let meter = || exposure_stops(exposure, &self.renderer, &metered, &settings, progress);
+        let stops = self.preparation_threads.install(meter)?;
         let (trees, mut flat) = self.flat_at(made, time_secs, description, &auto, progress)?;
         expose(&mut flat, stops);
         complete.light.exposure = Some(Exposure::Stops(stops.into()));
@@ -177,14 +177,14 @@ impl LiveScene {
         Ok(LiveView { flat, settings, description: complete, moves_camera, unit, trees })
     }
 
-    /// Renders a view on the threads of the preparation.
+    /// Renders a view on threads of the lowest priority, however many others wait for their preparation.
     ///
     /// # Errors
     ///
     /// Fails if the settings make no picture, and if cancelled.
     pub fn render(&self, view: &LiveView, progress: &dyn Progress) -> Result<Image> {
         let rendered = || self.renderer.render(&view.flat, &view.settings, progress);
-        Ok(self.pool.install(rendered)?.0)
+        Ok(self.picture_threads.install(rendered)?.0)
     }
 
     fn flat_at(
@@ -227,9 +227,10 @@ impl LiveScene {
         let trees = tree_key(description, preparation, auto, &frames);
         made.trees.get_or_make(trees, progress, || {
             let clouds = made.prepared.get_or_make(preparation, progress, || {
-                self.pool.install(|| self.loaded.prepared(description, progress))
+                self.preparation_threads.install(|| self.loaded.prepared(description, progress))
             })?;
-            self.pool.install(|| self.build(time_secs, description, &clouds, auto, progress))
+            let build = || self.build(time_secs, description, &clouds, auto, progress);
+            self.preparation_threads.install(build)
         })
     }
 
@@ -260,6 +261,20 @@ impl LiveScene {
         graph.release_static();
         Ok(SceneTrees { graph, flat, source_indices, legend })
     }
+}
+
+/// Starts as many threads as the current pool has; each begins with `start`.
+fn start_threads(start: fn(usize)) -> Result<ThreadPool> {
+    let n_threads = rayon::current_num_threads();
+    let threads =
+        rayon::ThreadPoolBuilder::new().num_threads(n_threads).start_handler(start).build();
+    let advice = "the threads cannot be started; ask for fewer with --threads";
+    threads.map_err(|error| Error::Unfit(format!("{advice}: {error}")))
+}
+
+/// Gives the current thread the processor time that others leave. A system that denies this shares time evenly.
+fn lower_priority() {
+    let _ = ThreadPriority::Min.set_for_current();
 }
 
 /// A camera for trees that nobody looks at yet.
@@ -346,4 +361,92 @@ fn mean_overlap(cloud: &PreparedCloud) -> f32 {
     let size = (max - min).as_dvec3() + 2.0 * sum(1) / n;
     let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
     (std::f64::consts::PI * sum(2) / area) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    //! Work on pictures beside other work.
+
+    use super::*;
+    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+    use std::sync::mpsc::channel;
+    use std::thread;
+    use std::time::Duration;
+    use surfel_core::math::Random;
+    use surfel_core::points::PointCloud;
+    use surfel_core::progress::NoProgress;
+    use surfel_formats::SaveOptions;
+
+    /// Holds up the threads of a picture at the end of their first tile.
+    #[derive(Default)]
+    struct Halt {
+        n_held: AtomicUsize,
+        is_over: AtomicBool,
+    }
+
+    impl Halt {
+        fn wait_until(&self, is_reached: impl Fn() -> bool) {
+            while !is_reached() {
+                thread::sleep(Duration::from_millis(1));
+            }
+        }
+    }
+
+    impl Progress for Halt {
+        fn advance(&self, _: u64) {
+            self.n_held.fetch_add(1, Ordering::Relaxed);
+            self.wait_until(|| self.is_over.load(Ordering::Relaxed));
+        }
+    }
+
+    fn scene_of_a_plane(name: &str) -> (LiveScene, SceneDescription) {
+        let name = format!("surfel-live-{name}-{}.ply", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        let mut random = Random::new(1, 0);
+        let mut next = || random.below(1000) as f32;
+        let positions = (0..400).map(|_| Vec3::new(next(), next(), 0.0)).collect();
+        let cloud = PointCloud::from_positions(positions);
+        surfel_formats::save(&path, &cloud, &SaveOptions::default(), &NoProgress).unwrap();
+        let description =
+            SceneDescription { files: vec![path.clone()], ..SceneDescription::default() };
+        let scene = LiveScene::open(&description, &NoProgress).unwrap();
+        std::fs::remove_file(path).unwrap();
+        (scene, description)
+    }
+
+    #[test]
+    fn settings_change_while_all_threads_of_a_picture_are_busy() {
+        let (scene, mut description) = scene_of_a_plane("change");
+        (description.picture.spp, description.picture.light_samples) = (Some(1), Some(1));
+        let view = scene.view(&description, &NoProgress).unwrap();
+        let halt = Halt::default();
+        let n_threads = scene.picture_threads.current_num_threads();
+        let mut changed = description.clone();
+        changed.objects_default.surface.radius_scale = Some(1.5);
+        thread::scope(|scope| {
+            let picture = scope.spawn(|| scene.render(&view, &halt));
+            halt.wait_until(|| halt.n_held.load(Ordering::Relaxed) == n_threads);
+            let (sender, receiver) = channel();
+            let (scene, changed) = (&scene, &changed);
+            scope.spawn(move || sender.send(scene.view(changed, &NoProgress).is_ok()));
+            let is_changed = receiver.recv_timeout(Duration::from_secs(120));
+            halt.is_over.store(true, Ordering::Relaxed);
+            assert_eq!(is_changed, Ok(true));
+            assert!(picture.join().unwrap().is_ok());
+        });
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn threads_of_pictures_have_the_lowest_priority() {
+        let (scene, _) = scene_of_a_plane("priority");
+        // The niceness is the 19th value of the file, the 17th behind the name of the thread.
+        let niceness = || {
+            let file = std::fs::read_to_string("/proc/thread-self/stat").unwrap();
+            let after_name = file.rsplit_once(") ").unwrap().1.to_owned();
+            after_name.split(' ').nth(16).unwrap().parse::<i32>().unwrap()
+        };
+        assert_eq!(scene.picture_threads.install(niceness), 19);
+        assert_eq!(scene.preparation_threads.install(niceness), niceness());
+    }
 }

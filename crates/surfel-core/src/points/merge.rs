@@ -6,7 +6,8 @@ use super::{PointCloud, STATION, Scalar, ScanStation, Values};
 /// Merges clouds in their order. Returns the merged cloud and the names of the columns that were left out.
 ///
 /// The origin is that of the largest cloud. Empty clouds are ignored. Scalar columns of different types become f64.
-/// Where some clouds lack classes or flags that others have, these are 0. A merged cloud has no morph targets and joints. Columns are moved one by one to save memory.
+/// Classes and flags that only some clouds have are 0 for the points of the others. A merged cloud has no
+/// morph targets and joints. Columns are moved one by one to save memory.
 pub fn merge(mut clouds: Vec<PointCloud>) -> (PointCloud, Vec<String>) {
     clouds.retain(|cloud| !cloud.is_empty());
     if clouds.len() < 2 {

@@ -31,6 +31,18 @@ async fn pictures_are_refined_to_the_finished_picture() {
 }
 
 #[tokio::test]
+async fn rasterised_points_are_drawn_once_and_whole() {
+    let server = TestServer::start();
+    let settings = json!({ "points": true, "fault": FaultyRenderer::WHOLE });
+    let mut page = TestPage::open(&server, settings).await;
+    for seq in 1..4 {
+        let finished = page.finished_picture().await;
+        assert_eq!((finished.samples, finished.of_samples), (1, 1));
+        page.set_camera(seq, 0.1 * f64::from(seq), false).await;
+    }
+}
+
+#[tokio::test]
 async fn headers_describe_the_file() {
     let server = TestServer::start();
     let mut page = TestPage::open(&server, json!({})).await;

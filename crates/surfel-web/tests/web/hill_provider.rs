@@ -16,6 +16,7 @@ use surfel_core::scene::{
     Background, Camera, CameraFit, CloudGeometry, Geometry, Graph, Light, Material, Projection,
     Scene, fit_camera,
 };
+use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
 use surfel_web::{
     Error, Export, PictureOverlay, PicturePart, PreparedScene, Result, SceneProvider, SettingsMap,
@@ -56,11 +57,14 @@ impl Gate {
 /// | `panic` | preparation panics |
 /// | `fault` | the seed of the render settings, which tells the `FaultyRenderer` its fault |
 /// | `camera_angle` | the scene animates its camera, which is at this angle |
+/// | `points` | points are rasterised |
 /// | `preview` | there is a preview |
 /// | `stamp` | pictures have an overlay |
 /// | `tint` | none |
 pub struct HillProvider {
     flat: FlatScene,
+    /// The same with rasterised points.
+    rasterized: FlatScene,
     pool: rayon::ThreadPool,
     lock: Mutex<()>,
     /// The gate at which preparation with `gated` waits.
@@ -82,14 +86,20 @@ impl HillProvider {
         let camera = fit_camera(&cloud, &CameraFit { aspect: 4.0 / 3.0, ..CameraFit::default() });
         let colors = vec![[200, 180, 150]; cloud.len()];
         let hill = CloudGeometry::new(cloud, colors).unwrap();
-        let scene = Scene {
-            graph: Graph::from_geometry(Geometry::Points(hill), Material::PLASTIC),
-            lights: vec![Light::Headlight(1.0)],
-            background: Background::Transparent,
-            camera,
+        let flat = |hill: CloudGeometry| {
+            let scene = Scene {
+                graph: Graph::from_geometry(Geometry::Points(hill), Material::PLASTIC),
+                lights: vec![Light::Headlight(1.0)],
+                background: Background::Transparent,
+                camera,
+            };
+            FlatScene::new(&scene, &NoProgress).unwrap()
         };
+        let mut points = hill.clone();
+        points.surface = SurfaceKind::Points;
         Self {
-            flat: FlatScene::new(&scene, &NoProgress).unwrap(),
+            flat: flat(hill),
+            rasterized: flat(points),
             pool: rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap(),
             lock: Mutex::default(),
             gate: Gate::default(),
@@ -185,6 +195,7 @@ impl SceneProvider for HillProvider {
     fn prepare(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<PreparedScene> {
         let mut complete = self.initial_settings(0, 0);
         let (mut seed, mut animated_camera) = (0, None);
+        let mut flat = self.flat.clone();
         for (key, value) in settings {
             let secs = value.as_f64().unwrap_or(0.0);
             match key.as_str() {
@@ -196,6 +207,7 @@ impl SceneProvider for HillProvider {
                 }
                 "panic" => panic!("requested by a test"),
                 "fault" => seed = value.as_u64().unwrap_or(0),
+                "points" => flat = self.rasterized.clone(),
                 "camera_angle" => animated_camera = value.as_f64().map(camera),
                 "camera" | "tint" | "stamp" | "preview" | "resolution" | "slow_render" => {}
                 _ => return Err(Error::invalid_value(key, "unknown key")),
@@ -205,7 +217,7 @@ impl SceneProvider for HillProvider {
         Ok(PreparedScene {
             settings: complete,
             animated_camera,
-            flat: self.flat.clone(),
+            flat,
             render_settings: render_settings(seed),
             legend: Value::Null,
             overlay: settings.contains_key("stamp").then(|| Box::new(Stamp) as _),
@@ -287,6 +299,9 @@ impl FaultyRenderer {
     /// Layers take a hundred times as long as the picture: all of them at once take longer than a slice may.
     pub const SLOW_LAYERS: u64 = 1005;
 
+    /// Rendering takes 60 milliseconds, and fails for a part of the rows.
+    pub const WHOLE: u64 = 1006;
+
     const SECS_PER_PIXEL: f64 = 2e-5;
 }
 
@@ -313,6 +328,12 @@ impl Renderer for FaultyRenderer {
                     progress.check()?;
                     std::thread::sleep(Duration::from_millis(1));
                 }
+            }
+            Self::WHOLE => {
+                if region.rows != (0, settings.height) {
+                    return Err(surfel_core::Error::EmptyCloud);
+                }
+                std::thread::sleep(Duration::from_millis(60));
             }
             Self::PANIC => panic!("requested by a test"),
             Self::FAIL => return Err(surfel_core::Error::EmptyCloud),
