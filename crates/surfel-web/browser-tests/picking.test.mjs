@@ -36,7 +36,7 @@ const positionOf = (row) => AXES.map((name) => Number(row[name]));
 /** Asserts that the card shows a point of the file that is near the clicked pixel. */
 async function assertIsInFile(row, pixel, maxDistance = 30) {
   const point = data.points[Number(row.index)];
-  for (const axis of AXES) assert.ok(Math.abs(Number(row[axis]) - point[axis]) < RESOLUTION / 10, `${axis}: ${row[axis]} ${point[axis]}`);
+  for (const axis of AXES) assert.equal(Number(row[axis]), point[axis], axis);
   for (const name of ['red', 'green', 'blue', 'intensity', 'classification', 'gps_time']) assert.equal(Number(row[name]), point[name], name);
   assert.equal(row.class, { 2: 'ground', 6: 'building' }[point.classification]);
   const found = project(await state(page, 'camera'), await state(page, 'size'), positionOf(row));

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { count, duration, exact, rounded, ticks } from '../page/format.js';
+import { coordinate, count, duration, exact, rounded, ticks, withUnit } from '../page/format.js';
 import { formatMaterial, materialOf, parseMaterial, withMaterial } from '../page/materials.js';
 import { readHeader, socketAddress } from '../page/connection.js';
 import { pictureSize } from '../page/picture.js';
@@ -71,4 +71,15 @@ test('the socket address has the host and token of the page', () => {
   const at = (protocol, search) => socketAddress({ protocol, host: 'host:8000', search });
   assert.equal(at('http:', ''), 'ws://host:8000/ws');
   assert.equal(at('https:', '?token=a%20b'), 'wss://host:8000/ws?token=a%20b');
+});
+
+test('coordinates have the decimals of the file', () => {
+  assert.equal(coordinate(484913.1, 2), '484913.10');
+  assert.equal(coordinate(484913.1, null), '484913.1');
+  assert.equal(coordinate(0.12345679), '0.12345679');
+});
+
+test('units stand behind values', () => {
+  assert.equal(withUnit('2.51', 'ft'), '2.51\u00a0ft');
+  assert.equal(withUnit('2.51', null), '2.51');
 });

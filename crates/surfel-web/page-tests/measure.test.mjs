@@ -36,7 +36,7 @@ test('labels are at the middle, the corner of a height above its first point', (
 
 test('results have names', () => {
   const height = resultsOf({ kind: 'height', points: [[0, 0, 5], [1, 1, 2]] }, up);
-  assert.deepEqual(height, [{ name: 'Height', value: 3 }]);
+  assert.deepEqual(height, [{ name: 'Height', value: 3, dimension: 1 }]);
   const square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]];
   assert.deepEqual(resultsOf({ kind: 'area', points: square }, up).map(({ value }) => value), [1, 1, 4]);
 });

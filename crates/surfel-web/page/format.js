@@ -7,6 +7,16 @@ export function exact(value) {
   return String(Number(value.toPrecision(Math.min(15, whole + 6))));
 }
 
+/** A coordinate with the decimals of its file, or with those that it has. */
+export function coordinate(value, decimals) {
+  return typeof decimals === 'number' ? value.toFixed(decimals) : String(value);
+}
+
+/** A value with its unit behind it, if it has one. */
+export function withUnit(value, unit) {
+  return unit ? `${value}\u00a0${unit}` : value;
+}
+
 /** About five digits, with thousands separators. */
 export function rounded(value, digits = 5) {
   const whole = Math.abs(value) < 1 ? 0 : Math.floor(Math.log10(Math.abs(value))) + 1;

@@ -2,14 +2,12 @@
 
 import { copyButton } from './copy.js';
 import { element, iconButton } from './dom.js';
-import { rounded } from './format.js';
+import { exact, rounded, withUnit } from './format.js';
 import { corner, middle, resultsOf } from './measure.js';
 import { mix } from './vector.js';
 
 export const MEASURE_TOOLS = ['distance', 'height', 'area'];
 const DOT_RADIUS = 4;
-/** Formats a length or area in the unit of the file. */
-const text = (value) => rounded(value, 6);
 
 export class MeasureTool {
   #finished = [];
@@ -63,6 +61,12 @@ export class MeasureTool {
     return resultsOf(figure, this.viewer.info.up);
   }
 
+  /** The text of a length or area in the unit of the file. */
+  #text({ value, dimension }) {
+    const { unit } = this.viewer.info;
+    return withUnit(rounded(value, 6), unit && dimension === 2 ? `${unit}²` : unit);
+  }
+
   #list() {
     this.card.hidden = this.#finished.length === 0;
     const all = () => this.#finished.map((figure) => this.#textOf(figure)).join('\n');
@@ -82,8 +86,8 @@ export class MeasureTool {
       this.#finished = this.#finished.filter((other) => other !== figure);
       this.#list();
     };
-    const rows = this.#results(figure).flatMap(({ name, value }) =>
-      [element('dt', {}, name), element('dd', {}, element('span', {}, text(value)))]);
+    const rows = this.#results(figure).flatMap((result) =>
+      [element('dt', {}, result.name), element('dd', {}, element('span', {}, this.#text(result)))]);
     return element('section', { class: 'measurement' },
       element('header', {}, element('h3', {}, figure.name),
         copyButton(`Copy ${figure.name}`, () => this.#textOf(figure)),
@@ -93,7 +97,7 @@ export class MeasureTool {
 
   /** The text for the clipboard: full precision, separated by tabs. */
   #textOf(figure) {
-    const results = this.#results(figure).map(({ name, value }) => `${name}\t${value}`);
+    const results = this.#results(figure).map(({ name, value }) => `${name}\t${exact(value)}`);
     const points = figure.points.map((point, i) => `point ${i + 1}\t${point.join('\t')}`);
     return [figure.name, ...results, ...points].join('\n');
   }
@@ -113,7 +117,8 @@ export class MeasureTool {
   #paintFigure(view, figure) {
     const { up } = this.viewer.info;
     const { kind, points } = figure;
-    const lines = this.#results(figure).map(({ name, value }) => (kind === 'height' ? text(value) : `${name} ${text(value)}`));
+    const lines = this.#results(figure).map((result) =>
+      (kind === 'height' ? this.#text(result) : `${result.name} ${this.#text(result)}`));
     if (kind === 'area') {
       return [...view.polygon(points, 'measure-area'), ...view.path(points, 'measure', true), ...dots(view, points),
         ...view.label(middle(points), lines)];

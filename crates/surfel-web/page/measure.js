@@ -45,20 +45,20 @@ function newell(points) {
   return scale(sum, 0.5);
 }
 
-/** The results of a measurement as rows of name and value. */
+/** The results of a measurement as rows of name, value and dimension: 1 for lengths, 2 for areas. */
 export function resultsOf({ kind, points }, up) {
   if (kind === 'area') {
     return [
-      { name: 'Area', value: area(points) },
-      { name: 'Level area', value: levelArea(points, up) },
-      { name: 'Perimeter', value: perimeter(points) },
+      { name: 'Area', value: area(points), dimension: 2 },
+      { name: 'Level area', value: levelArea(points, up), dimension: 2 },
+      { name: 'Perimeter', value: perimeter(points), dimension: 1 },
     ];
   }
   const found = distances(points[0], points[1], up);
-  if (kind === 'height') return [{ name: 'Height', value: Math.abs(found.vertical) }];
+  if (kind === 'height') return [{ name: 'Height', value: Math.abs(found.vertical), dimension: 1 }];
   return [
-    { name: 'Distance', value: found.straight },
-    { name: 'Horizontal', value: found.horizontal },
-    { name: 'Vertical', value: found.vertical },
+    { name: 'Distance', value: found.straight, dimension: 1 },
+    { name: 'Horizontal', value: found.horizontal, dimension: 1 },
+    { name: 'Vertical', value: found.vertical, dimension: 1 },
   ];
 }

@@ -2,6 +2,7 @@
 
 mod browser;
 mod legend;
+mod coordinates;
 mod point;
 mod rejection;
 mod page_overlay;

@@ -1,9 +1,11 @@
 //! Facts about a picked point, as the page shows them.
 
+use super::coordinates::{coordinates, shortest};
 use serde_json::{Value, json};
 use surfel::live_scene::SceneTrees;
 use surfel::resolve::LoadedScene;
 use surfel_core::flat::{FlatGeometry, FlatScene};
+use surfel_core::math::DAffine3;
 use surfel_core::points::{PointCloud, Values};
 use surfel_core::scene::{Geometry, Graph};
 use surfel_web::PickedPoint;
@@ -49,7 +51,14 @@ pub fn describe(
     // A deformed point is where it was hit.
     if cloud.morphs.is_empty() && cloud.skin.is_none() {
         let world = graph.world_from_nodes()[instance.node_idx as usize];
-        facts["position"] = json!(world.transform_point3(cloud.world_position(index)).to_array());
+        let in_file = coordinates(cloud, index, &loaded.file_info());
+        if world == DAffine3::IDENTITY {
+            facts["position"] = json!(in_file.map(|coordinate| coordinate.value));
+            facts["decimals"] = json!(in_file.map(|coordinate| coordinate.decimals));
+        } else {
+            let moved = world.transform_point3(cloud.world_position(index));
+            facts["position"] = json!(moved.to_array());
+        }
     }
     facts["columns"] = columns(cloud, index).into();
     facts
@@ -72,7 +81,7 @@ fn columns(cloud: &PointCloud, index: usize) -> Vec<Value> {
         columns.extend(channels.map(|(name, channel)| column(name, channel.into())));
     }
     if let Some(intensity) = &cloud.intensity {
-        columns.push(column("intensity", shortest(intensity[index])));
+        columns.push(column("intensity", shortest(intensity[index]).into()));
     }
     if let Some(classes) = &cloud.classification {
         let class = classes[index];
@@ -81,14 +90,14 @@ fn columns(cloud: &PointCloud, index: usize) -> Vec<Value> {
     }
     if let Some(normals) = &cloud.normals {
         let names = ["nx", "ny", "nz"].into_iter().zip(normals[index].to_array());
-        columns.extend(names.map(|(name, value)| column(name, shortest(value))));
+        columns.extend(names.map(|(name, value)| column(name, shortest(value).into())));
     }
     if let Some(radii) = &cloud.radii {
-        columns.push(column("radius", shortest(radii[index])));
+        columns.push(column("radius", shortest(radii[index]).into()));
     }
     for scalar in &cloud.scalars {
         let value = match &scalar.values {
-            Values::F32(values) => shortest(values[index]),
+            Values::F32(values) => json!(shortest(values[index])),
             values => json!(values.get(index)),
         };
         columns.push(column(&scalar.name, value));
@@ -106,11 +115,6 @@ fn channels(colors: &[[u16; 3]], index: usize) -> [u16; 3] {
     } else {
         color
     }
-}
-
-/// Returns the shortest number that is still this f32, instead of the digits of the f64 that it becomes.
-fn shortest(value: f32) -> Value {
-    value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
 }
 
 #[cfg(test)]

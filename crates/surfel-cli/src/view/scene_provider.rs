@@ -13,13 +13,14 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use surfel::SceneDescription;
+use surfel::crs::Unit;
 use surfel::description::rule::absolute_text;
 use surfel::description::{CameraSettings, ObjectDescription, write_table};
 use surfel::live_scene::{LiveScene, LiveView};
 use surfel::names::{file_name, list_files};
 use surfel::overlay;
 use surfel::picture::image_options;
-use surfel::resolve::{AutoSettings, LoadedScene, located_stations};
+use surfel::resolve::{AutoSettings, LoadedScene, coordinate_system, located_stations};
 use surfel_core::image::{class_color, class_name, colormap};
 use surfel_core::math::Vec3;
 use surfel_core::points::{PointCloud, PointFilter};
@@ -169,6 +170,12 @@ fn columns(cloud: &PointCloud) -> Vec<&str> {
     usual.chain(cloud.scalars.iter().map(|scalar| scalar.name.as_str())).collect()
 }
 
+/// The symbol of the unit of lengths, if the coordinate system tells it.
+fn unit_symbol(scene: &LoadedScene, startup: &SceneDescription) -> Option<&'static str> {
+    let unit = coordinate_system(scene, startup)?.unit();
+    matches!(unit, Unit::Metres(_)).then(|| unit.symbol())
+}
+
 /// The stations of all scans by name, with the cameras that look from there.
 fn stations(scene: &LoadedScene, up: Vec3) -> Vec<Value> {
     let stations = located_stations(scene).into_iter().filter_map(|station| {
@@ -230,6 +237,7 @@ impl SceneProvider for FileSceneProvider {
             "threads": rayon::current_num_threads(),
             "simd": self.scene.simd().name(),
             "coordinate_system": loaded.file_info().coordinate_system,
+            "unit": unit_symbol(loaded, &self.startup),
             "limits": {
                 "max_pixels": limits.max_view_pixels,
                 "max_save_pixels": limits.max_save_pixels,

@@ -27,7 +27,7 @@ pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;
 pub use loaded::{KeepOptions, LoadedScene};
 pub use memory::{MemoryEstimate, n_points, readable};
-pub(crate) use plan::coordinate_system;
+pub use plan::coordinate_system;
 pub(crate) use sequence::Sequence;
 pub use spread::report_coverage;
 pub use station::{LocatedStation, located_stations};
