@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
-import { closePage, drag, finishedPixels, openPage, pixelAt, QUICK, serve, settled, state, unfoldPanel } from './harness.mjs';
+import { closePage, drag, finishedPixels, openPage, pixelAt, QUICK, reopen, serve, settled, state, unfoldPanel } from './harness.mjs';
 
 const DURATION_SECS = 2;
 let page;
@@ -12,8 +12,7 @@ before(async () => {
   first = await finishedPixels(page);
 });
 beforeEach(async () => {
-  await page.reload();
-  await settled(page);
+  await reopen(page);
 });
 after(() => closePage(page));
 

@@ -87,6 +87,14 @@ export async function openPage(link, options) {
   return page;
 }
 
+/** Opens the initial view again: the address of a page has its view, which a reload would keep. */
+export async function reopen(page) {
+  const link = page.url().replace(/#.*/, '');
+  await page.goto('about:blank');
+  await page.goto(link);
+  await settled(page);
+}
+
 /** Closes a page after its tests; asserts that it has recorded only these faults. */
 export async function closePage(page, faults = []) {
   await page.context().close();

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
 import * as cameras from '../page/camera.js';
 import { distance, dot } from '../page/vector.js';
-import { closePage, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, serve, settled, state, unfoldPanel } from './harness.mjs';
+import { closePage, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, reopen, serve, settled, state, unfoldPanel } from './harness.mjs';
 
 let server;
 let page;
@@ -19,8 +19,7 @@ before(async () => {
   opening = await state(page, 'camera');
 });
 beforeEach(async () => {
-  await page.reload();
-  await settled(page);
+  await reopen(page);
   await unfoldPanel(page);
   await page.locator('#viewport').focus();
 });

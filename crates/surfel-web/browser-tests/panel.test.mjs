@@ -5,7 +5,7 @@ import { after, before, beforeEach, test } from 'node:test';
 import * as tables from '../page/controls.js';
 import { valueAt } from '../page/merge-patch.js';
 import {
-  closePage, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, serve, settled, state, unfoldPanel, recordPictures,
+  closePage, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, reopen, serve, settled, state, unfoldPanel, recordPictures,
 } from './harness.mjs';
 
 const { surfaceControls, colorControls, pointControls, sunControls, skyControls, pictureControls, annotationControls, clipControls, materialControls } = tables;
@@ -81,8 +81,7 @@ before(async () => {
 beforeEach(async () => {
   if (await pixels(page) === first && (await state(page, 'lastFrame')).seq === await state(page, 'lastSeq')) return;
   // The test before this one failed, or its last message has no picture.
-  await page.reload();
-  await settled(page);
+  await reopen(page);
   await unfoldPanel(page);
 });
 after(() => closePage(page));

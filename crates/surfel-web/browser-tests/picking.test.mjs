@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
 import { project } from '../page/camera.js';
 import { RESOLUTION } from './data.mjs';
-import { closePage, copyBy, data, openPage, pixelAt, QUICK, serve, settled, show, state } from './harness.mjs';
+import { closePage, copyBy, data, openPage, pixelAt, QUICK, reopen, serve, settled, show, state } from './harness.mjs';
 
 const AXES = ['x', 'y', 'z'];
 let page;
@@ -13,9 +13,7 @@ before(async () => {
   page = await openPage(server.link, { viewport: { width: 1300, height: 640 } });
 });
 beforeEach(async () => {
-  await page.goto(page.url().replace(/#.*/, ''));
-  await page.reload();
-  await settled(page);
+  await reopen(page);
 });
 after(() => closePage(page));
 

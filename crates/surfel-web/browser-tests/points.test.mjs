@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
-import { closePage, finishedPixels, openPage, pixels, QUICK, serve, settled, state, unfoldPanel } from './harness.mjs';
+import { closePage, finishedPixels, openPage, pixels, QUICK, reopen, serve, settled, state, unfoldPanel } from './harness.mjs';
 
 let page;
 let first;
@@ -13,8 +13,7 @@ before(async () => {
 });
 beforeEach(async () => {
   // The last message of a refused filter has no picture.
-  await page.reload();
-  await settled(page);
+  await reopen(page);
   await unfoldPanel(page);
 });
 after(() => closePage(page));

@@ -15,7 +15,7 @@ const currentScene = {
 };
 
 test('the patch of a link restores the scene', () => {
-  const patch = decodeHash(encodeHash(viewPatch(initialScene, currentScene)));
+  const { patch } = decodeHash(encodeHash(viewPatch(initialScene, currentScene)));
   assert.deepEqual(patch, {
     color: 'class', sun: { azimuth: 12.5 }, clip_box: '([0,1],[0,1],[0,1])',
     camera: { position: [1, 2, 3], view_angle: null, orthographic: 8 },
@@ -31,9 +31,22 @@ test('hashes are URL-safe, and keep any name and micrometres', () => {
   const patch = { material: ['Säule №1 🏛=glass'], camera: { position: [4183168.26694470001, -1 / 3] } };
   const hash = encodeHash(patch);
   assert.match(hash, /^#view=[A-Za-z0-9_-]+$/);
-  const back = decodeHash(hash);
+  const { patch: back } = decodeHash(hash);
   assert.deepEqual(back.material, patch.material);
   assert.ok(Math.abs(back.camera.position[0] - 4183168.2669447) < 1e-6);
+});
+
+test('links carry valid measurements', () => {
+  const figure = { kind: 'distance', name: 'distance 1', points: [[1, 2, 3], [4, 5, 6]] };
+  assert.deepEqual(decodeHash(encodeHash({}, [figure])), { patch: {}, measurements: [figure] });
+  const invalid = [
+    null, 7, {}, { ...figure, kind: 'toString' }, { ...figure, name: 5 }, { ...figure, name: 'a'.repeat(101) },
+    { ...figure, points: [[1, 2, 3]] }, { ...figure, points: [[1, 2], [3, 4]] }, { ...figure, points: [[1, 2, 'x'], [1, 2, 3]] },
+    { ...figure, kind: 'area' },
+  ];
+  const many = Array(2000).fill(figure);
+  assert.deepEqual(decodeHash(encodeHash({ color: 'rgb' }, [...invalid, ...many])), { patch: { color: 'rgb' }, measurements: many });
+  assert.deepEqual(decodeHash(encodeHash({ measurements: 'text' })), { patch: {}, measurements: [] });
 });
 
 test('invalid hashes are ignored', () => {

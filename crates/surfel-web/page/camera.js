@@ -10,6 +10,9 @@ import {
 
 const RADIANS = Math.PI / 180;
 const DEFAULT_VIEW_ANGLE = 35;
+/** Least distance of the focal point, and greatest distance from the centre, in diagonals of the scene. */
+const NEAREST_ZOOM = 1e-5;
+const FARTHEST_ZOOM = 50;
 
 /** Unit directions to the right, up and forward of the picture. */
 export function axesOf(camera) {
@@ -155,6 +158,22 @@ export function zoomTo(camera, target, factor) {
   const offset = subtract(target, camera.position);
   const sideways = addScaled(offset, forward, -dot(offset, forward));
   return { ...translate(camera, scale(sideways, 1 - factor)), orthographic: camera.orthographic * factor };
+}
+
+/** The camera after `zoomTo`, or as it was where it would be so near or far that nothing could be told apart. */
+export function zoomWithin(bounds, camera, target, factor) {
+  const zoomed = zoomTo(camera, target, factor);
+  const diagonal = distance(bounds.min, bounds.max);
+  const center = mix(bounds.min, bounds.max, 0.5);
+  const isTooNear = (zoomed.orthographic ?? focalDistance(zoomed)) < NEAREST_ZOOM * diagonal;
+  const isTooFar = 0 < diagonal && FARTHEST_ZOOM * diagonal < (zoomed.orthographic ?? distance(zoomed.position, center));
+  return (factor < 1 ? isTooNear : isTooFar) ? camera : zoomed;
+}
+
+/** Whether a point is in `bounds`, or next to it. */
+export function isNear({ min, max }, point) {
+  const margin = 0.25 * distance(min, max);
+  return point.every((value, axis) => min[axis] - margin <= value && value <= max[axis] + margin);
 }
 
 /** The camera centred on `point`, with the same direction and depth. */

@@ -2,21 +2,14 @@
 
 import { copyText } from './copy.js';
 import { download, element } from './dom.js';
-import { decodeHash, encodeHash, viewPatch } from './link.js';
+import { NO_LINK, decodeHash } from './link.js';
 import { stemOf } from './save-dialog.js';
 import { showToast } from './toast.js';
 
 const FORMATS = { command: 'Command', toml: 'TOML', json: 'JSON', link: 'Link' };
 
-/** Puts the link to the current view into the address bar; returns it. */
-function updateLink(viewer) {
-  const hash = encodeHash(viewPatch(viewer.initialScene, viewer.currentScene()));
-  history.replaceState(null, '', hash || location.pathname + location.search);
-  return location.href;
-}
-
 /** Returns a function that opens the dialog. */
-export function setUpExportDialog(viewer) {
+export function setUpExportDialog(viewer, viewHistory) {
   const dialog = document.getElementById('export-dialog');
   const text = document.getElementById('export-text');
   const tabs = document.getElementById('export-tabs');
@@ -43,7 +36,7 @@ export function setUpExportDialog(viewer) {
   document.getElementById('export-close').addEventListener('click', () => dialog.close());
 
   return async () => {
-    exported = { link: updateLink(viewer) };
+    exported = { link: viewHistory.updateAddress() };
     show();
     dialog.showModal();
     try {
@@ -56,7 +49,7 @@ export function setUpExportDialog(viewer) {
 }
 
 /** Loads scene files from the file button or dropped on the page, and links typed into the address bar. */
-export function setUpSceneLoading(viewer) {
+export function setUpSceneLoading(viewer, measureTool) {
   const load = async (file) => {
     if (!/\.(toml|json)$/i.test(file.name)) showToast(`${file.name} is not a scene file (.toml or .json)`);
     else await viewer.loadScene(file);
@@ -78,5 +71,10 @@ export function setUpSceneLoading(viewer) {
     document.body.classList.remove('is-dropping');
     if (event.dataTransfer.files[0]) load(event.dataTransfer.files[0]);
   });
-  window.addEventListener('hashchange', () => viewer.isConnected && viewer.showLink(decodeHash(location.hash) ?? {}));
+  window.addEventListener('hashchange', () => {
+    if (!viewer.isConnected) return;
+    const { patch, measurements } = decodeHash(location.hash) ?? NO_LINK;
+    viewer.showLink(patch);
+    measureTool.figures = measurements;
+  });
 }

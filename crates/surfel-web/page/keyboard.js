@@ -21,6 +21,8 @@ export const KEY_HELP = [
   ['F', 'fit to view'],
   ['Home', 'view at the start'],
   ['Backspace', 'previous view'],
+  ['Ctrl + Z', 'undo'],
+  ['Ctrl + Shift + Z', 'redo'],
   ['O / P', 'orthographic / perspective'],
   ['R G B', 'colour by RGB'],
   ['Z', 'colour by elevation'],
@@ -42,7 +44,7 @@ export const MOUSE_HELP = [
 ];
 
 /** `actions` has `escape()`, `enter()` and `help()`. */
-export function setUpKeyboard(viewer, navigation, actions) {
+export function setUpKeyboard(viewer, navigation, viewHistory, actions) {
   const held = new Set();
   let last = 0;
 
@@ -88,10 +90,23 @@ export function setUpKeyboard(viewer, navigation, actions) {
     navigation.settle();
   };
 
+  const undoOrRedo = (event) => {
+    const key = event.key.toLowerCase();
+    const isRedo = key === 'y' || (key === 'z' && event.shiftKey);
+    if (!isRedo && key !== 'z') return;
+    if (isRedo) viewHistory.redo();
+    else viewHistory.undo();
+    event.preventDefault();
+  };
+
   window.addEventListener('keydown', (event) => {
     if (document.querySelector('dialog[open]')) return;
     if (event.key === 'Escape') actions.escape();
-    if (!viewer.camera || event.ctrlKey || event.metaKey || event.altKey || usesKeys(event.target)) return;
+    if (!viewer.camera || event.altKey || usesKeys(event.target)) return;
+    if (event.ctrlKey || event.metaKey) {
+      undoOrRedo(event);
+      return;
+    }
     if (event.key === 'Enter' && !event.target.closest('button, summary, a')) actions.enter();
     if (ORBIT_DIRECTIONS[event.key]) {
       if (event.target.closest('#panel')) return;
@@ -112,7 +127,7 @@ export function setUpKeyboard(viewer, navigation, actions) {
   window.addEventListener('blur', () => held.clear());
 }
 
-/** Whether the focused element handles letters, digits and arrows itself. */
+/** Whether the focused element is a control that keys are meant for. A button that was clicked keeps its focus, but not the keys. */
 function usesKeys(target) {
-  return target.matches('select, textarea, input:not([type=checkbox], [type=button], [type=range])');
+  return target.matches('select, textarea, input, :is(button, summary, a):focus-visible');
 }

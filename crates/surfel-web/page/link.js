@@ -1,7 +1,10 @@
-// Links: the address of a view holds, after `#`, the patch between the initial scene and the view.
+// Links: the address of a view holds, after `#`, the patch between the initial scene and the view, and measurements.
 
+import { isMeasurement } from './measure.js';
 import { createPatch } from './merge-patch.js';
 
+/** What an address without a link stands for. */
+export const NO_LINK = { patch: {}, measurements: [] };
 const PREFIX = '#view=';
 /** Keys of the window and the files, which are not part of a view. */
 const KEYS_OUTSIDE_VIEW = ['resolution', 'object', 'info', 'output'];
@@ -13,23 +16,26 @@ export function viewPatch(initialScene, scene) {
   return patch;
 }
 
-/** The hash of an address for a patch; empty for an empty patch. */
-export function encodeHash(patch) {
-  if (Object.keys(patch).length === 0) return '';
-  const text = JSON.stringify(patch, (_, value) => (typeof value === 'number' ? rounded(value) : value));
+/** The hash of an address for a patch and measurements; empty if there are none. */
+export function encodeHash(patch, measurements = []) {
+  const content = measurements.length ? { ...patch, measurements } : patch;
+  if (Object.keys(content).length === 0) return '';
+  const text = JSON.stringify(content, (_, value) => (typeof value === 'number' ? rounded(value) : value));
   const bytes = new TextEncoder().encode(text);
-  const base64 = btoa(String.fromCharCode(...bytes));
+  const base64 = btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(''));
   return PREFIX + base64.replaceAll('+', '-').replaceAll('/', '_').replace(/=+$/, '');
 }
 
-/** The patch in the hash of an address; null if there is no valid one. */
+/** The `{ patch, measurements }` in the hash of an address; null if it has no valid patch. Invalid measurements are left out. */
 export function decodeHash(hash) {
   if (!hash.startsWith(PREFIX)) return null;
   const base64 = hash.slice(PREFIX.length).replaceAll('-', '+').replaceAll('_', '/');
   try {
     const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-    const patch = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes));
-    return typeof patch === 'object' && !Array.isArray(patch) ? patch : null;
+    const content = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes));
+    if (typeof content !== 'object' || content === null || Array.isArray(content)) return null;
+    const { measurements, ...patch } = content;
+    return { patch, measurements: Array.isArray(measurements) ? measurements.filter(isMeasurement) : [] };
   } catch {
     return null;
   }

@@ -8,7 +8,7 @@ import { element } from './dom.js';
 import { setUpExportDialog, setUpSceneLoading } from './export-dialog.js';
 import { KEY_HELP, MOUSE_HELP, setUpKeyboard } from './keyboard.js';
 import { colormapPreview, setUpLegend } from './legend.js';
-import { decodeHash } from './link.js';
+import { NO_LINK, decodeHash } from './link.js';
 import { MEASURE_TOOLS, MeasureTool } from './measure-tool.js';
 import { Navigation } from './navigation.js';
 import { Overlay, pivotPainter } from './overlay.js';
@@ -23,15 +23,18 @@ import { exposeState } from './test-hooks.js';
 import { setUpNotifications, showToast } from './toast.js';
 import { setUpToolbar } from './toolbar.js';
 import { Viewer } from './viewer.js';
+import { ViewHistory } from './view-history.js';
 import { viewRows } from './view-section.js';
 
-const viewer = new Viewer(decodeHash(location.hash) ?? {});
+const link = decodeHash(location.hash) ?? NO_LINK;
+const viewer = new Viewer(link.patch);
 const navigation = new Navigation(viewer);
 const panel = new Panel(viewer);
 const viewport = document.getElementById('viewport');
 const overlay = new Overlay(document.getElementById('overlay'), viewer);
 const pickCard = new PickCard(viewer, overlay);
 const measureTool = new MeasureTool(viewer, overlay);
+const viewHistory = new ViewHistory(viewer, measureTool);
 overlay.add(clipPainter(viewer));
 overlay.add(pivotPainter(navigation));
 
@@ -41,14 +44,14 @@ let lastPick = null;
 const helpDialog = document.getElementById('help-dialog');
 const showHelp = () => helpDialog.showModal();
 const openSaveDialog = setUpSaveDialog(viewer);
-const openExportDialog = setUpExportDialog(viewer);
+const openExportDialog = setUpExportDialog(viewer, viewHistory);
 
 setUpNotifications(viewer);
 setUpStatusLine(viewer);
 setUpLegend(viewer);
 makeRoomForAnnotations(viewer);
-setUpSceneLoading(viewer);
-setUpToolbar(viewer, navigation, { save: openSaveDialog, export: openExportDialog, help: showHelp });
+setUpSceneLoading(viewer, measureTool);
+setUpToolbar(viewer, navigation, viewHistory, { save: openSaveDialog, export: openExportDialog, help: showHelp });
 fillPanel();
 fillHelp();
 
@@ -76,7 +79,7 @@ setUpPointer(viewport, viewer, navigation, {
   },
 });
 
-setUpKeyboard(viewer, navigation, {
+setUpKeyboard(viewer, navigation, viewHistory, {
   help: showHelp,
   enter: finishArea,
   escape() {
@@ -89,7 +92,14 @@ setUpKeyboard(viewer, navigation, {
 
 new Picture(document.getElementById('picture'), viewer);
 exposeState(viewer);
+// The results need the up axis of the data.
+viewer.infoChanged.listen(showLinkedMeasurements);
 viewer.connect();
+
+/** Shows the measurements of the link with which the page was opened. */
+function showLinkedMeasurements() {
+  if (link.measurements.length) measureTool.figures = link.measurements.splice(0);
+}
 
 /** Sends a pick at once; resolves after the pick before it, so that points come in the order of the clicks. */
 async function pickAfter(previous, pixel) {

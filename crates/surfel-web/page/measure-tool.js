@@ -4,17 +4,19 @@ import { copyButton } from './copy.js';
 import { element, iconButton } from './dom.js';
 import { exact, rounded, withUnit } from './format.js';
 import { corner, middle, resultsOf } from './measure.js';
+import { signal } from './signal.js';
 import { mix } from './vector.js';
 
 export const MEASURE_TOOLS = ['distance', 'height', 'area'];
 const DOT_RADIUS = 4;
 
 export class MeasureTool {
+  changed = signal();
+  /** Finished figures, each `{ kind, name, points }`. */
   #finished = [];
   /** The points of the unfinished figure. */
   #points = [];
   #hover = null;
-  #lastNumber = 0;
 
   constructor(viewer, overlay) {
     this.viewer = viewer;
@@ -22,6 +24,15 @@ export class MeasureTool {
     this.card = document.getElementById('measure-card');
     overlay.add((view) => this.#paint(view));
     viewer.toolChanged.listen(() => this.cancel());
+  }
+
+  get figures() {
+    return this.#finished;
+  }
+
+  set figures(figures) {
+    this.#finished = figures;
+    this.#list();
   }
 
   get isActive() {
@@ -38,10 +49,20 @@ export class MeasureTool {
   finish() {
     const kind = this.viewer.tool;
     if (this.#points.length < (kind === 'area' ? 3 : 2)) return;
-    const name = `${kind} ${++this.#lastNumber}`;
-    this.#finished.push({ kind, name, points: this.#points });
+    const figure = { kind, name: this.#newName(kind), points: this.#points };
     this.cancel();
-    this.#list();
+    this.#change([...this.#finished, figure]);
+  }
+
+  /** A name with a number above those of all figures. */
+  #newName(kind) {
+    const numbers = this.#finished.map(({ name }) => Number(name.split(' ').at(-1)) || 0);
+    return `${kind} ${Math.max(0, ...numbers) + 1}`;
+  }
+
+  #change(figures) {
+    this.figures = figures;
+    this.changed();
   }
 
   cancel() {
@@ -70,10 +91,7 @@ export class MeasureTool {
   #list() {
     this.card.hidden = this.#finished.length === 0;
     const all = () => this.#finished.map((figure) => this.#textOf(figure)).join('\n');
-    const clear = () => {
-      this.#finished = [];
-      this.#list();
-    };
+    const clear = () => this.#change([]);
     this.card.replaceChildren(
       element('header', {}, element('h2', {}, 'Measurements'), copyButton('Copy all', all),
         iconButton('close', 'Delete all', clear)),
@@ -82,10 +100,7 @@ export class MeasureTool {
   }
 
   #item(figure) {
-    const remove = () => {
-      this.#finished = this.#finished.filter((other) => other !== figure);
-      this.#list();
-    };
+    const remove = () => this.#change(this.#finished.filter((other) => other !== figure));
     const rows = this.#results(figure).flatMap((result) =>
       [element('dt', {}, result.name), element('dd', {}, element('span', {}, this.#text(result)))]);
     return element('section', { class: 'measurement' },

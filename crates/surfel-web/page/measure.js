@@ -2,6 +2,17 @@
 
 import { add, addScaled, cross, distance, dot, length, scale, subtract } from './vector.js';
 
+/** Kinds of measurements with their least number of points. */
+const LEAST_POINTS = { distance: 2, height: 2, area: 3 };
+const MAX_NAME_LENGTH = 100;
+
+/** Whether a value from a link is a measurement: `{ kind, name, points }`. */
+export function isMeasurement(value) {
+  const isPoint = (point) => Array.isArray(point) && point.length === 3 && point.every(Number.isFinite);
+  return Object.hasOwn(LEAST_POINTS, value?.kind) && typeof value.name === 'string' && value.name.length <= MAX_NAME_LENGTH
+    && Array.isArray(value.points) && LEAST_POINTS[value.kind] <= value.points.length && value.points.every(isPoint);
+}
+
 const horizontalPart = (offset, up) => addScaled(offset, up, -dot(offset, up));
 
 /** Straight, horizontal and vertical distance of two points; vertical is positive if `b` is above `a`. */

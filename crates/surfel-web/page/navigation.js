@@ -72,7 +72,7 @@ export class Navigation {
     const { camera, viewer } = this;
     const depth = cameras.focalDistance(camera);
     const aim = target ?? cameras.pointAtDepth(camera, viewer.size, pixel.x, pixel.y, depth);
-    this.#move(cameras.zoomTo(camera, aim, factor));
+    this.#move(cameras.zoomWithin(viewer.info.bounds, camera, aim, factor));
   }
 
   zoomCenter(factor) {
@@ -138,7 +138,10 @@ export class Navigation {
   }
 
   viewFromSide(side) {
-    this.transitionTo(cameras.fromSide(this.camera, side, this.up));
+    const { bounds } = this.viewer.info;
+    const seen = cameras.fromSide(this.camera, side, this.up);
+    // A pivot far outside would show nothing.
+    this.transitionTo(cameras.isNear(bounds, this.camera.focal_point) ? seen : cameras.fit(seen, this.viewer.size, bounds));
   }
 
   fit() {

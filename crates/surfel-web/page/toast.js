@@ -4,13 +4,15 @@ import { element } from './dom.js';
 import { rejectionText } from './rejections.js';
 
 const TOAST_MS = 6000;
+const MAX_TOASTS = 3;
 
-export function showToast(text) {
+/** Shows a text; it replaces that of the same cause, which is the text itself unless it is named. */
+export function showToast(text, cause = text) {
   const toasts = document.getElementById('toasts');
-  // A repeated text replaces the toast that still shows it.
-  [...toasts.children].find((shown) => shown.textContent === text)?.remove();
-  const toast = element('div', { class: 'toast' }, text);
+  [...toasts.children].find((shown) => shown.dataset.cause === cause)?.remove();
+  const toast = element('div', { class: 'toast', 'data-cause': cause }, text);
   toasts.append(toast);
+  while (MAX_TOASTS < toasts.children.length) toasts.firstChild.remove();
   // Opening the popover again puts it on top of dialogs opened since.
   toasts.hidePopover?.();
   toasts.showPopover?.();
@@ -27,5 +29,5 @@ export function setUpNotifications(viewer) {
     const seconds = wait_ms < 1000 ? 'a moment' : `${Math.round(wait_ms / 1000)} s`;
     banner.textContent = `There is no connection to the server. The next attempt is in ${seconds}.`;
   });
-  viewer.rejected.listen((rejection) => showToast(rejectionText(rejection)));
+  viewer.rejected.listen((rejection) => showToast(rejectionText(rejection), rejection.key));
 }

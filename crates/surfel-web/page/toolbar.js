@@ -10,8 +10,11 @@ const HINTS = {
 };
 
 /** `open` has `save()`, `export()` and `help()`. */
-export function setUpToolbar(viewer, navigation, open) {
+export function setUpToolbar(viewer, navigation, viewHistory, open) {
   const actions = {
+    undo: () => viewHistory.undo(),
+    redo: () => viewHistory.redo(),
+    home: () => navigation.goHome(),
     fit: () => navigation.fit(),
     projection: () => navigation.setOrthographic(!isOrthographic(viewer.camera)),
     load: () => document.getElementById('scene-file').click(),
@@ -31,6 +34,11 @@ export function setUpToolbar(viewer, navigation, open) {
     hint.hidden = !hint.textContent;
     document.getElementById('viewport').dataset.tool = viewer.tool;
   });
+
+  const [undo, redo] = ['undo', 'redo'].map((action) => toolbar.querySelector(`[data-action=${action}]`));
+  const showHistory = () => [undo.disabled, redo.disabled] = [!viewHistory.canUndo, !viewHistory.canRedo];
+  viewHistory.changed.listen(showHistory);
+  showHistory();
 
   const fold = document.getElementById('panel-fold');
   fold.addEventListener('click', () => {

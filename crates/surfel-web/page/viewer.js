@@ -25,6 +25,8 @@ export class Viewer {
 
   infoChanged = signal();
   sceneChanged = signal();
+  /** Emits when settings or the camera are changed here, not by the server. */
+  changedByUser = signal();
   cameraChanged = signal();
   frameShown = signal();
   toolChanged = signal();
@@ -74,6 +76,11 @@ export class Viewer {
     return this.#seq;
   }
 
+  /** Whether the camera is being moved. */
+  get isMoving() {
+    return this.#isMoving;
+  }
+
   /** Whether the scene's animation moves the camera. */
   get isCameraAnimated() {
     return Boolean(this.info?.camera_moves) && !this.camera?.lock;
@@ -95,6 +102,7 @@ export class Viewer {
     this.#queuedPatch = { patch: combinePatches(this.#queuedPatch?.patch ?? {}, patch), isMoving };
     this.#scheduleFlush();
     this.sceneChanged();
+    this.changedByUser();
   }
 
   /** Changes the camera, and sends it in the next animation frame. The scene's animation no longer moves it. */
@@ -104,6 +112,7 @@ export class Viewer {
     this.#queuedCamera = this.camera;
     this.#scheduleFlush();
     this.cameraChanged();
+    this.changedByUser();
   }
 
   /** Lets the scene's animation move the camera again. */
