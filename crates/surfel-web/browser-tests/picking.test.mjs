@@ -1,8 +1,10 @@
 // Picking and measuring: the page shows the attributes that are in the file.
 
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { after, before, beforeEach, test } from 'node:test';
 import { project } from '../page/camera.js';
+import { angleDegrees, circleThrough, pathLength } from '../page/measure.js';
 import { RESOLUTION } from './data.mjs';
 import { closePage, copyBy, data, openPage, pixelAt, QUICK, reopen, serve, settled, show, state } from './harness.mjs';
 
@@ -168,6 +170,60 @@ test('an area agrees with its corners', async () => {
   assert.ok(Math.abs(found['Level area'] - Math.abs(shoelace) / 2) < 0.01, `${found['Level area']}`);
   assert.ok(found['Level area'] <= found.Area + 1e-9);
 });
+
+test('angles, circles and polylines agree with their points', async () => {
+  const pixels = [await pixelAt(page, 0.6, 0.75), await pixelAt(page, 0.9, 0.7), await pixelAt(page, 0.9, 0.45)];
+  const corners = (await pointsAt(pixels)).map(positionOf);
+  await measure('angle', pixels);
+  isClose((await measuredValues('angle 1')).Angle, angleDegrees(corners));
+  await measure('circle', pixels);
+  isClose((await measuredValues('circle 2')).Radius, circleThrough(corners).radius);
+  await measure('polyline', pixels);
+  await page.keyboard.press('Enter');
+  isClose((await measuredValues('polyline 3')).Length, pathLength(corners));
+  const [file] = await Promise.all([page.waitForEvent('download'), page.locator('[aria-label="Download as GeoJSON"]').click()]);
+  const { features } = JSON.parse(readFileSync(await file.path(), 'utf8'));
+  assert.deepEqual(features.map(({ geometry }) => geometry.type), ['LineString', 'MultiPoint', 'LineString']);
+  assert.deepEqual(features[2].geometry.coordinates, corners);
+});
+
+test('a height profile shows the points of the file beside its line', async () => {
+  const pixels = [await pixelAt(page, 0.45, 0.6), await pixelAt(page, 0.9, 0.7)];
+  const line = (await pointsAt(pixels)).map(positionOf);
+  await measure('profile', pixels);
+  await page.keyboard.press('Enter');
+  const card = page.locator('#profile-card');
+  await card.locator('.note', { hasText: 'points' }).waitFor();
+  const width = card.locator('input');
+  await width.fill('2');
+  await width.press('Enter');
+  const pointsWithin = (margin) => data.points.map(positionOf).filter((point) => {
+    const [along, across] = inLine(point, line);
+    return -margin <= along && along <= 1 + margin && Math.abs(across) <= 1 + margin;
+  });
+  // The corners of the line are points, on whose side of its ends rounding decides.
+  const [least, most] = [pointsWithin(-RESOLUTION), pointsWithin(RESOLUTION)];
+  await page.waitForFunction(([low, high]) => {
+    const n = parseInt(document.querySelector('#profile-card .note').textContent, 10);
+    return low <= n && n <= high;
+  }, [least.length, most.length]);
+  const [file] = await Promise.all([page.waitForEvent('download'), card.getByText('CSV').click()]);
+  const rows = readFileSync(await file.path(), 'utf8').trim().split('\n').slice(1).map((row) => row.split(',').map(Number));
+  assert.ok(100 < least.length && least.length <= rows.length && rows.length <= most.length);
+  const isKnown = (row) => most.some((point) => point.every((value, axis) => Math.abs(value - row[3 + axis]) < RESOLUTION / 2));
+  assert.deepEqual(rows.filter((row) => !isKnown(row)), []);
+  await page.locator('[data-action=undo]').click();
+  await page.waitForFunction(() => !document.querySelector('#profile-card').hidden);
+  await page.keyboard.press('Escape');
+});
+
+/** Place of a point along a line of two points, from 0 to 1, and its level distance from it. */
+function inLine(point, [a, b]) {
+  const [x, y] = [b[0] - a[0], b[1] - a[1]];
+  const [dx, dy] = [point[0] - a[0], point[1] - a[1]];
+  const length = Math.hypot(x, y);
+  return [(dx * x + dy * y) / length ** 2, (dy * x - dx * y) / length];
+}
 
 test('Escape cancels the unfinished measurement, then the tool', async () => {
   const pixel = await pixelAt(page, 0.6, 0.6);

@@ -2,7 +2,8 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { area, corner, distances, levelArea, middle, perimeter, resultsOf } from '../page/measure.js';
+import { geoJson } from '../page/geojson.js';
+import { angleDegrees, area, circleThrough, corner, distances, levelArea, middle, pathLength, perimeter, resultsOf } from '../page/measure.js';
 
 const up = [0, 0, 1];
 const [east, north] = [562337, 4183203];
@@ -39,4 +40,29 @@ test('results have names', () => {
   assert.deepEqual(height, [{ name: 'Height', value: 3, dimension: 1 }]);
   const square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]];
   assert.deepEqual(resultsOf({ kind: 'area', points: square }, up).map(({ value }) => value), [1, 1, 4]);
+});
+
+test('angles, circles and lines have known sizes', () => {
+  const corner = [[east + 3, north, 5], [east, north, 5], [east, north + 2, 5]];
+  close(angleDegrees(corner), 90);
+  close(angleDegrees([[1, 0, 0], [0, 0, 0], [-1, 0, 0]]), 180);
+  close(pathLength(corner), 5);
+  const turn = (degrees) => [Math.cos((degrees * Math.PI) / 180), Math.sin((degrees * Math.PI) / 180)];
+  const circle = circleThrough([10, 130, 200].map((degrees) => [east + 2.5 * turn(degrees)[0], north, 7 + 2.5 * turn(degrees)[1]]));
+  close(circle.radius, 2.5);
+  circle.center.forEach((value, axis) => close(value, [east, north, 7][axis]));
+  circle.axes.forEach((axis) => close(Math.hypot(...axis), 1));
+  assert.equal(circleThrough([[0, 0, 0], [1, 1, 1], [3, 3, 3]]), null);
+  assert.deepEqual(resultsOf({ kind: 'circle', points: [[0, 0, 0], [1, 1, 1], [3, 3, 3]] }, up)[1].value, Infinity);
+});
+
+test('measurements become GeoJSON in the coordinates of the file', () => {
+  const points = [[east, north, 1], [east + 4, north, 1], [east + 4, north + 3, 1]];
+  const info = { up, unit: 'm', coordinate_system: 'EPSG:32633+5783' };
+  const { crs, features } = geoJson([{ kind: 'area', name: 'roof', points }, { kind: 'polyline', name: 'eaves', points }], info);
+  assert.equal(crs.properties.name, 'urn:ogc:def:crs:EPSG::32633');
+  assert.deepEqual(features[0].geometry, { type: 'Polygon', coordinates: [[...points, points[0]]] });
+  assert.deepEqual(features[0].properties, { name: 'roof', kind: 'area', unit: 'm', area: 6, level_area: 6, perimeter: 12 });
+  assert.deepEqual([features[1].geometry.type, features[1].properties.length], ['LineString', 7]);
+  assert.equal(geoJson([], { up }).crs, undefined);
 });

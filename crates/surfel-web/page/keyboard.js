@@ -28,7 +28,7 @@ export const KEY_HELP = [
   ['Z', 'colour by elevation'],
   ['I', 'colour by intensity'],
   ['C', 'colour by class'],
-  ['Enter', 'close the measured area'],
+  ['Enter', 'end the measured line, area or profile'],
   ['Esc', 'cancel or close'],
   ['?', 'show this help'],
 ];

@@ -14,6 +14,7 @@ import { Navigation } from './navigation.js';
 import { Overlay, pivotPainter } from './overlay.js';
 import { Panel, section } from './panel.js';
 import { PickCard } from './pick-card.js';
+import { ProfileCard } from './profile-card.js';
 import { Picture } from './picture.js';
 import { setUpPointer } from './pointer.js';
 import { setUpSaveDialog } from './save-dialog.js';
@@ -34,6 +35,7 @@ const viewport = document.getElementById('viewport');
 const overlay = new Overlay(document.getElementById('overlay'), viewer);
 const pickCard = new PickCard(viewer, overlay);
 const measureTool = new MeasureTool(viewer, overlay);
+const profileCard = new ProfileCard(viewer, overlay, measureTool);
 const viewHistory = new ViewHistory(viewer, measureTool);
 overlay.add(clipPainter(viewer));
 overlay.add(pivotPainter(navigation));
@@ -70,8 +72,8 @@ setUpPointer(viewport, viewer, navigation, {
     else pickCard.show(point);
   },
   async doubleClick(pixel) {
-    if (viewer.tool === 'area') {
-      await finishArea();
+    if (MEASURE_TOOLS.includes(viewer.tool)) {
+      await finishFigure();
       return;
     }
     const point = await viewer.pick(pixel);
@@ -81,12 +83,13 @@ setUpPointer(viewport, viewer, navigation, {
 
 setUpKeyboard(viewer, navigation, viewHistory, {
   help: showHelp,
-  enter: finishArea,
+  enter: finishFigure,
   escape() {
     if (navigation.turntable_secs) navigation.stop();
     else if (measureTool.isActive) measureTool.cancel();
     else if (viewer.tool !== 'navigate') viewer.selectTool('navigate');
     else if (pickCard.isOpen) pickCard.close();
+    else profileCard.close();
   },
 });
 
@@ -108,8 +111,8 @@ async function pickAfter(previous, pixel) {
   return point;
 }
 
-/** Closes the area after the answer to the last pick, which adds its last corner. */
-async function finishArea() {
+/** Finishes the figure after the answer to the last pick, which adds its last point. */
+async function finishFigure() {
   await lastPick;
   measureTool.finish();
 }

@@ -1,18 +1,31 @@
 // Measuring tools: the user clicks on points, the overlay draws the figure, a card lists the results.
 
 import { copyButton } from './copy.js';
-import { element, iconButton } from './dom.js';
+import { download, element, iconButton } from './dom.js';
 import { exact, rounded, withUnit } from './format.js';
-import { corner, middle, resultsOf } from './measure.js';
+import { geoJson } from './geojson.js';
+import { KINDS, circleThrough, corner, middle, pathLength, resultsOf } from './measure.js';
+import { borders } from './profile.js';
+import { stemOf } from './save-dialog.js';
 import { signal } from './signal.js';
-import { mix } from './vector.js';
+import { addScaled, mix } from './vector.js';
 
-export const MEASURE_TOOLS = ['distance', 'height', 'area'];
+export const MEASURE_TOOLS = Object.keys(KINDS);
+/** Kinds whose only result needs no name. */
+const KINDS_OF_ONE_RESULT = ['height', 'angle', 'polyline'];
+/** Width of the strip of a new profile as a fraction of its length. */
+const PROFILE_WIDTH = 0.01;
+/** Number of lines that a circle is drawn with. */
+const N_CIRCLE_LINES = 64;
 const DOT_RADIUS = 4;
 
 export class MeasureTool {
   changed = signal();
-  /** Finished figures, each `{ kind, name, points }`. */
+  /** Emits when the list of figures is shown again. */
+  figuresShown = signal();
+  /** Emits the figure of a profile whose chart is to be shown. */
+  profileOpened = signal();
+  /** Finished figures, each `{ kind, name, points }`, and the `width` of a profile. */
   #finished = [];
   /** The points of the unfinished figure. */
   #points = [];
@@ -41,23 +54,29 @@ export class MeasureTool {
 
   add(point) {
     this.#points.push(point);
-    if (this.viewer.tool !== 'area' && this.#points.length === 2) this.finish();
+    if (this.#points.length === KINDS[this.viewer.tool].fixed) this.finish();
     this.overlay.redraw();
   }
 
   /** Finishes the figure if it has enough points. */
   finish() {
     const kind = this.viewer.tool;
-    if (this.#points.length < (kind === 'area' ? 3 : 2)) return;
+    if (this.#points.length < KINDS[kind].least) return;
     const figure = { kind, name: this.#newName(kind), points: this.#points };
+    if (kind === 'profile') figure.width = PROFILE_WIDTH * pathLength(figure.points);
     this.cancel();
     this.#change([...this.#finished, figure]);
+    if (kind === 'profile') this.profileOpened(figure);
   }
 
   /** A name with a number above those of all figures. */
   #newName(kind) {
     const numbers = this.#finished.map(({ name }) => Number(name.split(' ').at(-1)) || 0);
     return `${kind} ${Math.max(0, ...numbers) + 1}`;
+  }
+
+  replace(figure, changed) {
+    this.#change(this.#finished.map((other) => (other === figure ? changed : other)));
   }
 
   #change(figures) {
@@ -84,6 +103,8 @@ export class MeasureTool {
 
   /** The text of a length or area in the unit of the file. */
   #text({ value, dimension }) {
+    if (dimension === 0) return `${rounded(value, 4)}°`;
+    if (value === Infinity) return 'straight line';
     const { unit } = this.viewer.info;
     return withUnit(rounded(value, 6), unit && dimension === 2 ? `${unit}²` : unit);
   }
@@ -94,9 +115,17 @@ export class MeasureTool {
     const clear = () => this.#change([]);
     this.card.replaceChildren(
       element('header', {}, element('h2', {}, 'Measurements'), copyButton('Copy all', all),
+        iconButton('export', 'Download as GeoJSON', () => this.#download()),
         iconButton('close', 'Delete all', clear)),
       ...this.#finished.map((figure) => this.#item(figure)));
     this.overlay.redraw();
+    this.figuresShown();
+  }
+
+  #download() {
+    const { info } = this.viewer;
+    const content = geoJson(this.#finished, info);
+    download(new Blob([JSON.stringify(content, null, 1)], { type: 'application/geo+json' }), `${stemOf(info.name)}-measurements.geojson`);
   }
 
   #item(figure) {
@@ -105,6 +134,7 @@ export class MeasureTool {
       [element('dt', {}, result.name), element('dd', {}, element('span', {}, this.#text(result)))]);
     return element('section', { class: 'measurement' },
       element('header', {}, element('h3', {}, figure.name),
+        figure.kind === 'profile' ? iconButton('profile', `Show ${figure.name}`, () => this.profileOpened(figure)) : null,
         copyButton(`Copy ${figure.name}`, () => this.#textOf(figure)),
         iconButton('delete', `Delete ${figure.name}`, remove)),
       element('dl', { class: 'values' }, ...rows));
@@ -133,10 +163,23 @@ export class MeasureTool {
     const { up } = this.viewer.info;
     const { kind, points } = figure;
     const lines = this.#results(figure).map((result) =>
-      (kind === 'height' ? this.#text(result) : `${result.name} ${this.#text(result)}`));
+      (KINDS_OF_ONE_RESULT.includes(kind) ? this.#text(result) : `${result.name} ${this.#text(result)}`));
     if (kind === 'area') {
       return [...view.polygon(points, 'measure-area'), ...view.path(points, 'measure', true), ...dots(view, points),
         ...view.label(middle(points), lines)];
+    }
+    if (kind === 'profile') {
+      const strip = borders(points, figure.width, up).flatMap(([from, to]) => view.line(from, to, 'measure-leg'));
+      return [...strip, ...view.path(points, 'measure', false), ...dots(view, points), ...view.label(points[0], [figure.name])];
+    }
+    if (kind === 'polyline' || kind === 'angle') {
+      const at = kind === 'angle' ? points[1] : points.at(-1);
+      return [...view.path(points, 'measure', false), ...dots(view, points), ...view.label(at, lines)];
+    }
+    if (kind === 'circle') {
+      const circle = circleThrough(points);
+      return [...view.path(circle ? outlineOf(circle) : points, 'measure', circle !== null), ...dots(view, points),
+        ...view.label(circle?.center ?? points[1], lines)];
     }
     const [a, b] = points;
     const elbow = corner(a, b, up);
@@ -145,6 +188,14 @@ export class MeasureTool {
     const at = kind === 'height' ? mix(a, elbow, 0.5) : mix(a, b, 0.5);
     return [...legs, ...straight, ...dots(view, points), ...view.label(at, lines)];
   }
+}
+
+/** Points of a circle at equal distances. */
+function outlineOf({ center, radius, axes: [first, second] }) {
+  return Array.from({ length: N_CIRCLE_LINES }, (_, i) => {
+    const angle = (2 * Math.PI * i) / N_CIRCLE_LINES;
+    return addScaled(addScaled(center, first, radius * Math.cos(angle)), second, radius * Math.sin(angle));
+  });
 }
 
 const dots = (view, points) => points.flatMap((point) => view.dot(point, DOT_RADIUS, 'measure-dot'));

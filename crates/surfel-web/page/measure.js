@@ -1,16 +1,27 @@
-// Measurements: lengths, heights and areas of points in the world.
+// Measurements: lengths, heights, angles, circles and areas of points in the world.
 
 import { add, addScaled, cross, distance, dot, length, scale, subtract } from './vector.js';
 
-/** Kinds of measurements with their least number of points. */
-const LEAST_POINTS = { distance: 2, height: 2, area: 3 };
+/** Kinds of measurements: the least number of their points, and their number if it is fixed. */
+export const KINDS = {
+  distance: { least: 2, fixed: 2 },
+  height: { least: 2, fixed: 2 },
+  angle: { least: 3, fixed: 3 },
+  circle: { least: 3, fixed: 3 },
+  polyline: { least: 2 },
+  area: { least: 3 },
+  profile: { least: 2 },
+};
 const MAX_NAME_LENGTH = 100;
 
-/** Whether a value from a link is a measurement: `{ kind, name, points }`. */
+/** Whether a value from a link is a measurement: `{ kind, name, points }`, and the `width` of a profile. */
 export function isMeasurement(value) {
   const isPoint = (point) => Array.isArray(point) && point.length === 3 && point.every(Number.isFinite);
-  return Object.hasOwn(LEAST_POINTS, value?.kind) && typeof value.name === 'string' && value.name.length <= MAX_NAME_LENGTH
-    && Array.isArray(value.points) && LEAST_POINTS[value.kind] <= value.points.length && value.points.every(isPoint);
+  if (!Object.hasOwn(KINDS, value?.kind) || typeof value.name !== 'string' || MAX_NAME_LENGTH < value.name.length) return false;
+  const { least, fixed = Infinity } = KINDS[value.kind];
+  const n = Array.isArray(value.points) ? value.points.length : 0;
+  const hasWidth = value.kind !== 'profile' || (Number.isFinite(value.width) && 0 < value.width);
+  return least <= n && n <= fixed && value.points.every(isPoint) && hasWidth;
 }
 
 const horizontalPart = (offset, up) => addScaled(offset, up, -dot(offset, up));
@@ -36,6 +47,29 @@ export function perimeter(points) {
   return points.reduce((sum, point, i) => sum + distance(point, points[(i + 1) % points.length]), 0);
 }
 
+/** Length of the lines between consecutive points. */
+export function pathLength(points) {
+  return points.slice(1).reduce((sum, point, i) => sum + distance(points[i], point), 0);
+}
+
+/** Angle at `b` between the directions to `a` and `c`, in degrees. */
+export function angleDegrees([a, b, c]) {
+  const [toA, toC] = [subtract(a, b), subtract(c, b)];
+  return (Math.atan2(length(cross(toA, toC)), dot(toA, toC)) * 180) / Math.PI;
+}
+
+/** The circle through three points: `{ center, radius, axes }` with two unit vectors in its plane; null for points on a line. */
+export function circleThrough([a, b, c]) {
+  const [toB, toC] = [subtract(b, a), subtract(c, a)];
+  const normal = cross(toB, toC);
+  const [lengthB, lengthC, lengthNormal] = [toB, toC, normal].map(length);
+  if (!(1e-9 * lengthB * lengthC < lengthNormal)) return null;
+  const toCenter = scale(
+    add(scale(cross(normal, toB), lengthC ** 2), scale(cross(toC, normal), lengthB ** 2)), 0.5 / lengthNormal ** 2);
+  const first = scale(toB, 1 / lengthB);
+  return { center: add(a, toCenter), radius: length(toCenter), axes: [first, scale(cross(normal, first), 1 / lengthNormal)] };
+}
+
 /** Mean of a polygon's corners, for a label. */
 export function middle(points) {
   const first = points[0];
@@ -56,13 +90,22 @@ function newell(points) {
   return scale(sum, 0.5);
 }
 
-/** The results of a measurement as rows of name, value and dimension: 1 for lengths, 2 for areas. */
+/** The results of a measurement as rows of name, value and dimension: 0 for angles, 1 for lengths, 2 for areas. */
 export function resultsOf({ kind, points }, up) {
   if (kind === 'area') {
     return [
       { name: 'Area', value: area(points), dimension: 2 },
       { name: 'Level area', value: levelArea(points, up), dimension: 2 },
       { name: 'Perimeter', value: perimeter(points), dimension: 1 },
+    ];
+  }
+  if (kind === 'angle') return [{ name: 'Angle', value: angleDegrees(points), dimension: 0 }];
+  if (kind === 'polyline' || kind === 'profile') return [{ name: 'Length', value: pathLength(points), dimension: 1 }];
+  if (kind === 'circle') {
+    const radius = circleThrough(points)?.radius ?? Infinity;
+    return [
+      { name: 'Diameter', value: 2 * radius, dimension: 1 },
+      { name: 'Radius', value: radius, dimension: 1 },
     ];
   }
   const found = distances(points[0], points[1], up);

@@ -10,6 +10,7 @@ const NEAR_FRACTION = 1e-3;
 const N_CURVE_SEGMENTS = 32;
 const LABEL_LINE_HEIGHT = 16;
 const LABEL_GAP = 10;
+const LABEL_SPACING = 3;
 
 export class Overlay {
   #painters = [];
@@ -84,13 +85,21 @@ function viewOf(camera, size) {
     return pixel ? [svg('circle', { class: className, cx: pixel.x, cy: pixel.y, r: radius, ...attributes })] : [];
   };
 
-  /** A label with lines of text above a point. */
+  /** Frames of the labels so far. */
+  const labels = [];
+  const overlaps = (a, b) => Math.abs(a.x - b.x) < (a.width + b.width) / 2 && Math.abs(a.y - b.y) < (a.height + b.height) / 2;
+
+  /** A label with lines of text above a point, and above earlier labels. */
   const label = (point, lines) => {
     const foot = toPixel(point);
     if (!foot) return [];
     const width = 14 + 6.7 * Math.max(...lines.map((text) => text.length));
     const height = 8 + LABEL_LINE_HEIGHT * lines.length;
-    const at = { x: foot.x, y: foot.y - height / 2 - LABEL_GAP };
+    const at = { x: foot.x, y: foot.y - height / 2 - LABEL_GAP, width, height };
+    for (let below = labels.find((other) => overlaps(at, other)); below; below = labels.find((other) => overlaps(at, other))) {
+      at.y = below.y - (below.height + height) / 2 - LABEL_SPACING;
+    }
+    labels.push(at);
     const texts = lines.map((text, i) =>
       svg('text', { x: at.x, y: at.y - height / 2 + LABEL_LINE_HEIGHT * (i + 1) }, text));
     const frame = svg('rect', { x: at.x - width / 2, y: at.y - height / 2, width, height, rx: 6 });

@@ -6,6 +6,10 @@ const HINTS = {
   pick: 'Click on a point to show its attributes.',
   distance: 'Click on two points to measure their distance.',
   height: 'Click on two points to measure their difference in height.',
+  angle: 'Click on three points to measure the angle at the second.',
+  circle: 'Click on three points of a circle to measure its diameter.',
+  polyline: 'Click on the points of a line. Double click or Enter ends it.',
+  profile: 'Click on the points of a line. Double click or Enter shows the heights along it.',
   area: 'Click on the corners. Double click or Enter closes the area.',
 };
 

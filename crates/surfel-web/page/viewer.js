@@ -234,6 +234,7 @@ export class Viewer {
       stats: () => this.statsReceived(message),
       state: () => this.progressChanged(message),
       picked: () => this.#resolveRequest(message),
+      profiled: () => this.#resolveRequest(message),
       exported: () => this.#resolveRequest(message),
       progress: () => this.#requests.get(message.id)?.progress?.(message),
       error: () => this.#receiveError(message),

@@ -22,6 +22,7 @@ mod outgoing;
 mod client;
 mod render_loop;
 mod pick;
+mod profile;
 mod progress_reporter;
 mod pending_changes;
 mod server_state;

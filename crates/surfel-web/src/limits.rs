@@ -30,8 +30,8 @@ pub struct Limits {
     pub max_tasks: usize,
     /// Maximum number of one page's saved pictures that are rendered or on their way.
     pub max_page_saves: usize,
-    /// Maximum number of one page's picks at once.
-    pub max_page_picks: usize,
+    /// Maximum number of one page's questions about points at once: picks and profiles.
+    pub max_page_queries: usize,
     /// Maximum size of one page's settings changes that have not taken effect, in bytes.
     pub max_pending_bytes: usize,
     /// Maximum number of messages a second that a page may send in the long run.
@@ -72,7 +72,7 @@ impl Default for Limits {
             max_renders: 2,
             max_tasks: 64,
             max_page_saves: 2,
-            max_page_picks: 4,
+            max_page_queries: 4,
             max_pending_bytes: 1 << 19,
             max_message_rate: 400.0,
             max_message_burst: 800.0,

@@ -35,6 +35,8 @@ pub enum Incoming {
     Ack { frame: u32 },
     /// A request for the point behind a pixel.
     Pick { id: u32, x: f64, y: f64 },
+    /// A request for the points beside a line, for a height profile.
+    Profile { id: u32, points: Vec<[f64; 3]>, width: f64, up: [f64; 3] },
     /// A request for a finished picture of this size.
     Save { id: u32, width: u32, height: u32 },
     /// Cancels a `Save`.
@@ -76,6 +78,7 @@ mod tests {
             r#"{"type":"size","width":-1,"height":2}"#,
             r#"{"type":"size","width":1e99,"height":2}"#,
             r#"{"type":"set","seq":1,"scene":[]}"#,
+            r#"{"type":"profile","id":1,"points":[[1,2]],"width":1,"up":[0,0,1]}"#,
         ] {
             assert!(Incoming::parse(invalid).is_err(), "{invalid}");
         }

@@ -8,6 +8,7 @@ use crate::message::Incoming;
 use crate::outgoing::{Outgoing, RequestRef, rejection, send_json};
 use crate::pending_changes::{PendingChanges, SettingsChange};
 use crate::pick;
+use crate::profile;
 use crate::progress_reporter::{ProgressReporter, ProgressUpdate};
 use crate::scene_provider::{Error, Result, SettingsMap};
 use crate::scene_update;
@@ -20,6 +21,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use surfel_core::flat::ProfileLine;
+use surfel_core::progress::Progress;
 use tokio::sync::{Semaphore, mpsc};
 use tokio::time::timeout;
 
@@ -43,8 +46,9 @@ pub async fn run(socket: WebSocket, state: Arc<ServerState>) {
                 pending.clone(),
                 out.clone(),
             ));
-            let picks = Arc::new(Semaphore::new(state.limits.max_page_picks));
-            let mut session = Session { state, client, pending, out, picks, saves: HashMap::new() };
+            let queries = Arc::new(Semaphore::new(state.limits.max_page_queries));
+            let mut session =
+                Session { state, client, pending, out, queries, saves: HashMap::new() };
             session.change(SettingsChange { patch, ..SettingsChange::default() }).await;
             session.read(stream).await;
             session.saves.values().for_each(cancel);
@@ -115,8 +119,8 @@ struct Session {
     client: Arc<Client>,
     pending: Arc<PendingChanges>,
     out: mpsc::Sender<Outgoing>,
-    /// One permit for each pick that is being answered.
-    picks: Arc<Semaphore>,
+    /// One permit for each question about points that is being answered.
+    queries: Arc<Semaphore>,
     /// The cancellation flags of saved pictures that have not been sent completely, by request id.
     saves: HashMap<u32, Arc<AtomicBool>>,
 }
@@ -176,6 +180,9 @@ impl Session {
                 self.state.render_loop.notify();
             }
             Incoming::Pick { id, x, y } => self.pick(id, (x, y)).await,
+            Incoming::Profile { id, points, width, up } => {
+                self.profile(id, profile::parse(&points, width, up)).await;
+            }
             Incoming::Save { id, width, height } => self.save(id, width, height).await,
             Incoming::Cancel { id } => self.saves.get(&id).into_iter().for_each(cancel),
             Incoming::Export { id, width, height } => self.export(id, width, height).await,
@@ -223,25 +230,49 @@ impl Session {
     }
 
     async fn pick(&self, id: u32, pixel: (f64, f64)) {
-        let Ok(permit) = self.picks.clone().try_acquire_owned() else {
-            let error =
-                Error::invalid_request("too many picks at once; wait for one to be answered");
+        let (client, renderer) = (self.client.clone(), self.state.renderer.clone());
+        let pick = move |progress: &dyn Progress| {
+            let picked = pick::pick(&*renderer, &client.view(), pixel, progress);
+            let point = picked.map(|(scene, point)| (scene.describe)(&scene.flat, &point));
+            Ok(json!({ "type": "picked", "id": id, "point": point }))
+        };
+        self.answer(id, pick).await;
+    }
+
+    async fn profile(&self, id: u32, line: Result<ProfileLine>) {
+        let line = match line {
+            Ok(line) => line,
+            Err(error) => return self.reject(RequestRef::Id(id), &error).await,
+        };
+        let Some(scene) = self.client.view().scene else {
+            let error = Error::invalid_request("there is nothing to show yet");
             return self.reject(RequestRef::Id(id), &error).await;
         };
-        let (state, client, out) = (self.state.clone(), self.client.clone(), self.out.clone());
+        let find = move |progress: &dyn Progress| {
+            let profile = profile::profile(&scene, &line, progress)?;
+            Ok(json!({ "type": "profiled", "id": id, "profile": profile }))
+        };
+        self.answer(id, find).await;
+    }
+
+    /// Sends what `find` returns, unless too many answers are being found already.
+    async fn answer(
+        &self,
+        id: u32,
+        find: impl FnOnce(&dyn Progress) -> Result<Value> + Send + 'static,
+    ) {
+        let Ok(permit) = self.queries.clone().try_acquire_owned() else {
+            let text = "too many questions about points at once; wait for an answer";
+            return self.reject(RequestRef::Id(id), &Error::invalid_request(text)).await;
+        };
+        let (state, out) = (self.state.clone(), self.out.clone());
         tokio::spawn(async move {
             let _permit = permit;
-            let (renderer, for_cancel, page) = (state.renderer.clone(), state.clone(), out.clone());
+            let (for_cancel, page) = (state.clone(), out.clone());
             let is_cancelled = move || page.is_closed() || for_cancel.is_stopped();
             let progress = ProgressReporter::new(|_| {}, is_cancelled);
-            let picked = state.run_blocking(move || {
-                let (scene, point) = pick::pick(&*renderer, &client.view(), pixel, &progress)?;
-                Some((scene.describe)(&scene.flat, &point))
-            });
-            let message = match picked.await {
-                Ok(point) => json!({ "type": "picked", "id": id, "point": point }),
-                Err(error) => rejection(RequestRef::Id(id), &error),
-            };
+            let found = state.run_blocking(move || find(&progress)).await.flatten();
+            let message = found.unwrap_or_else(|error| rejection(RequestRef::Id(id), &error));
             send_json(&out, &message).await;
         });
     }

@@ -12,6 +12,7 @@ mod points;
 mod punctual_light;
 mod refit;
 mod scene;
+mod profile;
 mod triangles;
 
 pub use block::{BlockPoint, PointBlock};
@@ -21,6 +22,7 @@ pub use instance::Instance;
 pub use mesh::FlatMesh;
 pub use point_columns::PointColumns;
 pub use points::FlatPoints;
+pub use profile::{Profile, ProfileLine, ProfilePoint, height_profile};
 pub use punctual_light::FlatPunctualLight;
 pub use refit::{MAX_COST_RATIO, Refit};
 pub use scene::{FlatGeometry, FlatScene};

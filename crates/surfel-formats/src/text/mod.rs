@@ -122,8 +122,9 @@ fn skip_text(
     let mut skipped = Vec::new();
     for (i, column) in columns.iter_mut().enumerate().filter(|(i, _)| sample.is_text[*i]) {
         if let Some(role @ (ColumnRole::Scalar(_) | ColumnRole::Classification)) = column {
-            let name = preamble.names.as_ref().map_or(role.name(), |names| &names[i]);
-            skipped.push(name.to_owned());
+            // The columns may be stated for more fields than the header names.
+            let name = preamble.names.as_ref().and_then(|names| names.get(i));
+            skipped.push(name.map_or(role.name(), String::as_str).to_owned());
             *column = None;
         }
     }

@@ -163,6 +163,17 @@ fn text_columns_are_skipped_and_named() {
 }
 
 #[test]
+fn columns_may_be_stated_for_more_fields_than_the_header_names() {
+    let file = "x,y,z\n1,2,3,TREE\n4,5,6,OAK\n";
+    let columns = Some(TextColumn::parse_list("x,y,z,class"));
+    let options = LoadOptions { text_columns: columns, ..LoadOptions::default() };
+    let listener = Listener::default();
+    let cloud = load_bytes("a.csv", file.as_bytes(), &options, &listener).unwrap().cloud;
+    assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
+    assert!(listener.has_note("skipped text column classification"), "{:?}", listener.notes);
+}
+
+#[test]
 fn text_without_a_header_needs_stated_columns() {
     let file = "P1,20,10,3,TREE\nP2,21,11,3,\"a, b\"\n";
     let error = read("a.csv", file).unwrap_err().to_string();

@@ -1,0 +1,243 @@
+//! Height profiles: the points beside a line over the ground, by their distance along it and their height.
+
+use super::{FlatGeometry, FlatPoints, FlatScene, Instance};
+use crate::bvh::NO_PRIMITIVE;
+use crate::error::Result;
+use crate::math::{DVec3, LANES, hash};
+use crate::progress::Progress;
+use rayon::prelude::*;
+
+/// The line and the width of a profile.
+#[derive(Clone, Debug)]
+pub struct ProfileLine {
+    /// Corners of the line in world coordinates, at least two.
+    pub corners: Vec<DVec3>,
+    /// Width of the strip whose points are shown, half of it on each side of the line.
+    pub width: f64,
+    /// The unit vector up; the profile is level across it.
+    pub up: DVec3,
+}
+
+/// A point of a profile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProfilePoint {
+    /// Distance from the first corner along the level line.
+    pub distance: f64,
+    /// Level distance from the line, positive on its left side.
+    pub offset: f64,
+    /// Coordinate along the up axis.
+    pub height: f64,
+    /// Colour as sRGB.
+    pub color: [u8; 3],
+}
+
+/// The points of a profile.
+#[derive(Clone, Debug, Default)]
+pub struct Profile {
+    /// The points by their distance.
+    pub points: Vec<ProfilePoint>,
+    /// Number of points beside the line; more than `points` holds if there are too many.
+    pub n_found: u64,
+}
+
+/// Fraction of the limit that is chosen among more points, so that hardly ever some at the end are cut off.
+const CHOSEN_FRACTION: f64 = 0.97;
+
+/// A level part of a line between two corners.
+struct Segment {
+    start: DVec3,
+    /// Level unit vectors along the line, and to its left.
+    along: DVec3,
+    left: DVec3,
+    length: f64,
+    /// Distance of the start along the whole line.
+    distance: f64,
+}
+
+/// Returns at most `limit` points beside a line, a fixed random choice if there are more.
+///
+/// # Errors
+/// Fails if `progress` is cancelled.
+pub fn height_profile(
+    scene: &FlatScene,
+    line: &ProfileLine,
+    limit: usize,
+    progress: &dyn Progress,
+) -> Result<Profile> {
+    let segments = segments(line);
+    let n_found = visit(scene, line, &segments, u64::MAX, progress, |_| ())?.len() as u64;
+    let threshold = match n_found <= limit as u64 {
+        true => u64::MAX,
+        false => (CHOSEN_FRACTION * limit as f64 / n_found as f64 * u64::MAX as f64) as u64,
+    };
+    let mut points = visit(scene, line, &segments, threshold, progress, |point| point)?;
+    points.truncate(limit);
+    points.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+    Ok(Profile { points, n_found })
+}
+
+fn segments(line: &ProfileLine) -> Vec<Segment> {
+    let mut distance = 0.0;
+    let pairs = line.corners.windows(2).filter_map(|pair| {
+        let along = (pair[1] - pair[0]).reject_from_normalized(line.up);
+        let length = along.length();
+        let along = along.try_normalize()?;
+        let left = line.up.cross(along);
+        let segment = Segment { start: pair[0], along, left, length, distance };
+        distance += length;
+        Some(segment)
+    });
+    pairs.collect()
+}
+
+/// Calls `keep` for each point beside the line whose hash is at most `threshold`; returns the results in a fixed order.
+fn visit<T: Send>(
+    scene: &FlatScene,
+    line: &ProfileLine,
+    segments: &[Segment],
+    threshold: u64,
+    progress: &dyn Progress,
+    keep: impl Fn(ProfilePoint) -> T + Sync,
+) -> Result<Vec<T>> {
+    let mut kept = Vec::new();
+    for (instance_idx, instance) in scene.instances.iter().enumerate() {
+        let FlatGeometry::Cloud(cloud) = scene.geometry(instance) else { continue };
+        for points in [&cloud.points, &cloud.lines, &cloud.scatter] {
+            let visit_block = |block_idx: usize| {
+                if block_idx.is_multiple_of(1024) {
+                    progress.check()?;
+                }
+                let slots = LANES * block_idx..LANES * (block_idx + 1);
+                let chosen = slots.filter(|slot| {
+                    threshold == u64::MAX
+                        || hash((instance_idx as u64) << 40 | *slot as u64) <= threshold
+                });
+                let found = chosen.filter_map(|slot| {
+                    point_beside(scene, instance, points, slot as u32, line, segments)
+                });
+                Ok(found.map(&keep).collect())
+            };
+            let blocks = (0..points.blocks.len()).into_par_iter().with_min_len(256);
+            let found: Vec<Vec<T>> = blocks.map(visit_block).collect::<Result<_>>()?;
+            kept.extend(found.into_iter().flatten());
+        }
+    }
+    Ok(kept)
+}
+
+/// Returns the place of a point in the profile if it is beside the line, on the first segment that it is beside.
+fn point_beside(
+    scene: &FlatScene,
+    instance: &Instance,
+    points: &FlatPoints,
+    slot: u32,
+    line: &ProfileLine,
+    segments: &[Segment],
+) -> Option<ProfilePoint> {
+    let block = &points.blocks[slot as usize / LANES];
+    if points.id(slot) == NO_PRIMITIVE {
+        return None;
+    }
+    let position = scene.origin + instance.world_position(points.center(slot)).as_dvec3();
+    let is_shown = !scene.camera_planes.iter().any(|plane| plane.hides(position));
+    segments.iter().filter(|_| is_shown).find_map(|segment| {
+        let to_point = position - segment.start;
+        let (along, offset) = (segment.along.dot(to_point), segment.left.dot(to_point));
+        let is_beside = (0.0..=segment.length).contains(&along) && offset.abs() <= line.width / 2.0;
+        is_beside.then(|| ProfilePoint {
+            distance: segment.distance + along,
+            offset,
+            height: line.up.dot(position),
+            color: block.color(slot as usize % LANES),
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    //! Profiles across a known hill.
+
+    use super::*;
+    use crate::math::Vec3;
+    use crate::points::{PointCloud, Preparation, PreparedCloud, prepare};
+    use crate::progress::NoProgress;
+    use crate::scene::{
+        Background, Camera, CloudGeometry, Geometry, Graph, Material, Projection, Scene,
+    };
+
+    /// A grid of 101 x 101 points of a slope that rises along x, at an origin far away.
+    fn slope() -> FlatScene {
+        let positions = (0..101 * 101).map(|i| {
+            let (x, y) = ((i % 101) as f32, (i / 101) as f32);
+            Vec3::new(x, y, 0.5 * x)
+        });
+        let mut cloud = PointCloud::from_positions(positions.collect());
+        cloud.origin = DVec3::new(484_000.0, 6_632_000.0, 100.0);
+        let (cloud, _): (PreparedCloud, _) =
+            prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+        let colors = vec![[10, 20, 30]; cloud.len()];
+        let geometry = Geometry::Points(CloudGeometry::new(cloud, colors).unwrap());
+        let camera = Camera {
+            position: DVec3::Z,
+            focal_point: DVec3::ZERO,
+            view_up: DVec3::Y,
+            projection: Projection::Panorama,
+        };
+        let scene = Scene {
+            graph: Graph::from_geometry(geometry, Material::PLASTIC),
+            lights: Vec::new(),
+            background: Background::Transparent,
+            camera,
+        };
+        FlatScene::new(&scene, &NoProgress).unwrap()
+    }
+
+    fn line(corners: &[[f64; 2]], width: f64) -> ProfileLine {
+        let origin = DVec3::new(484_000.0, 6_632_000.0, 0.0);
+        let corners = corners.iter().map(|[x, y]| origin + DVec3::new(*x, *y, 300.0)).collect();
+        ProfileLine { corners, width, up: DVec3::Z }
+    }
+
+    #[test]
+    fn a_profile_has_the_points_of_its_strip_in_order() {
+        let scene = slope();
+        // Along x at y = 50, then along y at x = 80.
+        let line = line(&[[10.0, 50.0], [80.0, 50.0], [80.0, 90.0]], 4.2);
+        let profile = height_profile(&scene, &line, 10_000, &NoProgress).unwrap();
+        // Five rows of 71 points, and five columns of 41, of which the corner's 3 x 3 belong to the first part.
+        assert_eq!(profile.n_found, 5 * 71 + 5 * 41 - 3 * 3);
+        assert_eq!(profile.points.len() as u64, profile.n_found);
+        assert!(profile.points.is_sorted_by_key(|point| point.distance));
+        // A point at the corner may belong to either part.
+        for point in profile.points.iter().filter(|point| point.distance != 70.0) {
+            let height = 100.0
+                + 0.5
+                    * match point.distance {
+                        0.0..=70.0 => 10.0 + point.distance,
+                        _ => 80.0 - point.offset,
+                    };
+            assert!((point.height - height).abs() < 1e-3, "{point:?} {height}");
+            assert!(point.offset.abs() <= 2.1 && point.color == [10, 20, 30]);
+        }
+    }
+
+    #[test]
+    fn many_points_are_thinned_alike_each_time() {
+        let scene = slope();
+        let line = line(&[[0.0, 50.0], [100.0, 50.0]], 60.0);
+        let profile = || height_profile(&scene, &line, 500, &NoProgress).unwrap();
+        assert_eq!(profile().n_found, 61 * 101);
+        assert!((300..=500).contains(&profile().points.len()), "{}", profile().points.len());
+        assert_eq!(profile().points, profile().points);
+        let spans_all =
+            |points: &[ProfilePoint]| points[points.len() - 1].distance - points[0].distance;
+        assert!(90.0 < spans_all(&profile().points));
+    }
+
+    #[test]
+    fn a_line_without_length_has_no_points() {
+        let profile =
+            height_profile(&slope(), &line(&[[5.0, 5.0]; 3], 10.0), 10, &NoProgress).unwrap();
+        assert_eq!((profile.n_found, profile.points.len()), (0, 0));
+    }
+}

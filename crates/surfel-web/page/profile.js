@@ -1,0 +1,115 @@
+// Height profiles: places of their points in the world, their chart, and their points as CSV and SVG.
+
+import { rounded, ticks } from './format.js';
+import { addScaled, cross, dot, length, normalize, subtract } from './vector.js';
+
+const MARGIN = { left: 64, right: 14, top: 12, bottom: 28 };
+/** Part of the chart's height that stays free above and below the points. */
+const FREE_HEIGHT = 0.06;
+/** Step of coordinates in files as a fraction of the line's length. */
+const COORDINATE_STEP = 1e-5;
+const [TICK_DISTANCE_X, TICK_DISTANCE_Y] = [90, 36];
+
+/** World positions of the points of a profile along the line of `points`. */
+export function positionsOf({ distances, offsets, heights }, points, up) {
+  const segments = segmentsOf(points, up);
+  return distances.map((along, i) => {
+    const segment = segments.findLast(({ distance }) => distance <= along) ?? segments[0];
+    const level = addScaled(addScaled(segment.start, segment.along, along - segment.distance), segment.left, offsets[i]);
+    return addScaled(level, up, heights[i] - dot(level, up));
+  });
+}
+
+/** Length of a line over level ground. */
+export function levelLength(points, up) {
+  const last = segmentsOf(points, up).at(-1);
+  return last ? last.distance + last.length : 0;
+}
+
+/** The two lines at the borders of the strip of this width, as pairs of points. */
+export function borders(points, width, up) {
+  const side = (sign) => segmentsOf(points, up).map(({ start, end, left }) =>
+    [start, end].map((point) => addScaled(point, left, (sign * width) / 2)));
+  return [...side(1), ...side(-1)];
+}
+
+function segmentsOf(points, up) {
+  let distance = 0;
+  return points.slice(1).flatMap((end, i) => {
+    const offset = subtract(end, points[i]);
+    const level = addScaled(offset, up, -dot(offset, up));
+    if (length(level) === 0) return [];
+    const along = normalize(level);
+    const segment = { start: points[i], end, along, left: cross(up, along), length: length(level), distance };
+    distance += segment.length;
+    return [segment];
+  });
+}
+
+/** The chart of a profile in a picture of this size: functions from lengths to pixels and back, ticks, and exaggeration. */
+export function chartOf(profile, lineLength, { width, height }) {
+  const [low, high] = profile.heights.reduce(([least, most], value) => [Math.min(least, value), Math.max(most, value)], [Infinity, -Infinity]);
+  const range = Math.max(high - low, 1e-3 * lineLength) * (1 + 2 * FREE_HEIGHT) || 1;
+  const lowest = (low + high - range) / 2;
+  const [innerWidth, innerHeight] = [width - MARGIN.left - MARGIN.right, height - MARGIN.top - MARGIN.bottom];
+  const [perLength, perHeight] = [innerWidth / lineLength, innerHeight / range];
+  return {
+    width,
+    height,
+    x: (distance) => MARGIN.left + perLength * distance,
+    y: (value) => height - MARGIN.bottom - perHeight * (value - lowest),
+    exaggeration: perHeight / perLength,
+    xTicks: ticks(0, lineLength, innerWidth / TICK_DISTANCE_X),
+    yTicks: ticks(lowest, lowest + range, innerHeight / TICK_DISTANCE_Y),
+    /** Digits of a tick's label, so that neighbours differ. */
+    digits: Math.max(5, Math.ceil(Math.log10(Math.max(Math.abs(low), Math.abs(high), 1e-9) / range)) + 4),
+  };
+}
+
+/** The points of a profile as comma-separated values, with a line of names. Coordinates have the decimals that the line's length makes sensible. */
+export function csvOf(profile, points, up) {
+  const positions = positionsOf(profile, points, up);
+  const nDecimals = Math.min(12, Math.max(0, Math.ceil(-Math.log10(COORDINATE_STEP * levelLength(points, up)))));
+  const rows = profile.distances.map((distance, i) => {
+    const position = positions[i].map((value) => Number(value.toFixed(nDecimals)));
+    return [distance, profile.offsets[i], profile.heights[i], ...position, ...profile.colors[i]].join(',');
+  });
+  return `distance,offset,height,x,y,z,red,green,blue\n${rows.join('\n')}\n`;
+}
+
+/** The chart of a profile as the text of an SVG file. */
+export function svgOf(profile, chart, unit) {
+  const { width, height, x, y } = chart;
+  const short = (value) => value.toFixed(1);
+  const text = (label, at, anchor) => `<text x="${short(at.x)}" y="${short(at.y)}" text-anchor="${anchor}">${label}</text>`;
+  const line = (from, to) => `<path d="M${short(from.x)} ${short(from.y)}L${short(to.x)} ${short(to.y)}"/>`;
+  const [left, right, bottom] = [MARGIN.left, width - MARGIN.right, height - MARGIN.bottom];
+  const grid = [
+    ...chart.xTicks.map((tick) => line({ x: x(tick), y: MARGIN.top }, { x: x(tick), y: bottom })),
+    ...chart.yTicks.map((tick) => line({ x: left, y: y(tick) }, { x: right, y: y(tick) })),
+  ];
+  const labels = [
+    ...chart.xTicks.map((tick) => text(rounded(tick), { x: x(tick), y: bottom + 16 }, 'middle')),
+    ...chart.yTicks.map((tick) => text(rounded(tick, chart.digits), { x: left - 6, y: y(tick) + 4 }, 'end')),
+    text(unit ?? '', { x: right, y: bottom + 26 }, 'end'),
+  ];
+  const dots = profile.distances.map((distance, i) =>
+    `<circle cx="${short(x(distance))}" cy="${short(y(profile.heights[i]))}" r="0.9" fill="rgb(${profile.colors[i].join(' ')})"/>`);
+  return `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" font-family="sans-serif" font-size="11">
+<rect width="100%" height="100%" fill="#fff"/>
+<g stroke="#ddd" fill="none">${grid.join('')}</g>
+${dots.join('\n')}
+<g fill="#333">${labels.join('')}</g>
+</svg>
+`;
+}
+
+/** Index of the point of a profile that is drawn next to a pixel, within this many pixels; -1 if there is none. */
+export function nearestPoint({ distances, heights }, chart, pixel, maxDistance) {
+  let [nearest, least] = [-1, maxDistance];
+  distances.forEach((distance, i) => {
+    const away = Math.hypot(chart.x(distance) - pixel.x, chart.y(heights[i]) - pixel.y);
+    if (away < least) [nearest, least] = [i, away];
+  });
+  return nearest;
+}

@@ -1,0 +1,79 @@
+//! Height profiles for pages: the points of the scene beside a line.
+
+use crate::scene_provider::{Error, PreparedScene, Result};
+use serde_json::{Value, json};
+use surfel_core::flat::{Profile, ProfileLine, ProfilePoint, height_profile};
+use surfel_core::math::DVec3;
+use surfel_core::progress::Progress;
+
+/// Maximum number of points that a page gets.
+const MAX_POINTS: usize = 20_000;
+/// Maximum number of corners of a line.
+const MAX_CORNERS: usize = 100;
+
+/// Checks a line from a page.
+///
+/// # Errors
+/// Fails if it has fewer than two corners or too many, and if a number is not what it should be.
+pub fn parse(corners: &[[f64; 3]], width: f64, up: [f64; 3]) -> Result<ProfileLine> {
+    if !(2..=MAX_CORNERS).contains(&corners.len()) {
+        let text = format!("profile: found {} corners, expected 2 to {MAX_CORNERS}", corners.len());
+        return Err(Error::invalid_request(text));
+    }
+    let corners: Vec<DVec3> = corners.iter().copied().map(DVec3::from_array).collect();
+    let up = DVec3::from_array(up).try_normalize();
+    let up = up.filter(|_| corners.iter().all(|corner| corner.is_finite()) && 0.0 < width);
+    match up {
+        Some(up) if width.is_finite() => Ok(ProfileLine { corners, width, up }),
+        _ => Err(Error::invalid_request("profile: expected finite numbers and a width above 0")),
+    }
+}
+
+/// Returns the points of a profile as a page gets them: a list for each of their properties.
+///
+/// # Errors
+/// Fails if `progress` is cancelled.
+pub fn profile(
+    scene: &PreparedScene,
+    line: &ProfileLine,
+    progress: &dyn Progress,
+) -> Result<Value> {
+    let Profile { points, n_found } = height_profile(&scene.flat, line, MAX_POINTS, progress)?;
+    let numbers = |number: fn(&ProfilePoint) -> f64| {
+        points.iter().map(number).map(rounded).collect::<Vec<f64>>()
+    };
+    Ok(json!({
+        "n_found": n_found,
+        "distances": numbers(|point| point.distance),
+        "offsets": numbers(|point| point.offset),
+        "heights": numbers(|point| point.height),
+        "colors": points.iter().map(|point| point.color).collect::<Vec<_>>(),
+    }))
+}
+
+/// Rounds to nine digits, more than the f32 offsets of points hold.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.8e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    //! Valid and invalid lines.
+
+    use super::*;
+
+    #[test]
+    fn lines_are_checked() {
+        let up = [0.0, 0.0, 2.0];
+        let line = parse(&[[0.0; 3], [1.0; 3]], 0.5, up).unwrap();
+        assert_eq!((line.corners.len(), line.width, line.up), (2, 0.5, DVec3::Z));
+        for corners in [vec![], vec![[0.0; 3]], vec![[0.0; 3]; 101], vec![[f64::NAN; 3], [0.0; 3]]]
+        {
+            assert!(parse(&corners, 1.0, up).is_err(), "{}", corners.len());
+        }
+        for width in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(parse(&[[0.0; 3], [1.0; 3]], width, up).is_err(), "{width}");
+        }
+        assert!(parse(&[[0.0; 3], [1.0; 3]], 1.0, [0.0; 3]).is_err());
+    }
+}
