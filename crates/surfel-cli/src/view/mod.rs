@@ -1,6 +1,7 @@
 //! `surfel view`: the interactive viewer, in a browser.
 
 mod browser;
+mod file_names;
 mod legend;
 mod point;
 mod rejection;
@@ -13,8 +14,9 @@ use crate::options::{EVERYWHERE, PLANS, Scope};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
 use anyhow::anyhow;
+use file_names::ClientProgress;
 use rejection::rejection;
-use scene_provider::FileSceneProvider;
+use scene_provider::{FileSceneProvider, viewed_folders};
 use std::io::ErrorKind;
 use std::net::IpAddr;
 use std::path::{Path, PathBuf};
@@ -111,7 +113,9 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let typed = args.scene.files.clone();
     let report_for_loading = report.for_thread();
     let open = move |progress: &dyn Progress| {
-        let report = report_for_loading.with_listener(progress);
+        let folders = viewed_folders(&description, &typed);
+        let progress = ClientProgress { folders: &folders, progress };
+        let report = report_for_loading.with_listener(&progress);
         open_scene_provider(description, typed, &report).map_err(rejection)
     };
     let renderer = Arc::new(CpuRenderer { simd: Simd::detect() });
