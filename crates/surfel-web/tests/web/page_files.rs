@@ -36,7 +36,6 @@ async fn the_first_load_is_light() {
         n_bytes += file.headers.len() + file.body.len();
     }
     let n_requests = files.len() + 1;
-    println!("{n_requests} requests, {n_bytes} bytes");
     assert!(n_requests <= MAX_REQUESTS, "{n_requests} requests");
     assert!(n_bytes <= MAX_BYTES, "{n_bytes} bytes");
 }
