@@ -48,7 +48,7 @@ fn port() -> u16 {
         let provider = surfel_cli::scene_provider(arguments.map(Into::into).collect());
         let provider = provider.expect("run `cargo run --bin seeds` first");
         let server = Server::bind(IpAddr::V4(Ipv4Addr::LOCALHOST), 0).unwrap();
-        let link = server.link();
+        let link = server.links().swap_remove(0);
         let renderer = Arc::new(CpuRenderer { simd: Simd::detect() });
         let is_stopped = Arc::new(AtomicBool::new(false));
         std::thread::spawn(move || server.run(renderer, is_stopped, |_| Ok(provider)));

@@ -2,10 +2,16 @@
 
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import { blankPage, closePage, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, serve, settled, show, state } from './harness.mjs';
+import { encodeHash } from '../page/link.js';
+import {
+  blankPage, closePage, drag, finishedPixels, openPage, pixels, pixelAt, PLAIN_HOST, QUICK, serve, settled, show, state,
+} from './harness.mjs';
 
 const open = [];
 after(() => Promise.all(open.map((page) => page.context().close())));
+
+/** The token in the link that a server has printed. */
+const tokenOf = (server) => new URL(server.link).searchParams.get('token');
 
 async function openTracked(link) {
   const page = await openPage(link);
@@ -75,27 +81,55 @@ test('two pages have views of their own, and one survives the other', async () =
 
 test('beyond loopback a token is required', async () => {
   const server = await serve(['town.ply'], '--host', '0.0.0.0', ...QUICK);
-  const token = new URL(server.link).searchParams.get('token');
+  const token = tokenOf(server);
   assert.match(token, /^[0-9a-f]{32}$/);
   const address = `http://127.0.0.1:${server.port}/`;
-  for (const query of ['', '?token=', `?token=${token.replace(/^./, (digit) => (digit === '0' ? '1' : '0'))}`]) {
-    const page = await blankPage();
-    await page.goto(address + query);
-    await page.locator('#banner', { hasText: 'no connection' }).waitFor();
-    assert.equal(await state(page, 'lastFrame'), null);
-    await page.context().close();
+  const wrong = ['?token=', `?token=${token.replace(/^./, (digit) => (digit === '0' ? '1' : '0'))}`];
+  for (const query of wrong) assert.equal((await fetch(address + query)).status, 401);
+  for (const query of ['', ...wrong]) {
     for (const path of ['render', 'scene', 'stats']) assert.equal((await fetch(address + path + query)).status, 401, path);
   }
-  const page = await openPage(`${address}?token=${token}`);
-  // Exported links contain the token.
-  await show(page, { color: 'class' });
-  await page.locator('[data-action="export"]').click();
-  await page.locator('[data-format="link"]').click();
-  const link = await page.locator('#export-text').inputValue();
-  assert.equal(new URL(link).searchParams.get('token'), token);
-  await closePage(page);
+  const page = await blankPage();
+  await page.goto(address);
+  await page.locator('#banner', { hasText: 'no connection' }).waitFor();
+  assert.equal(await state(page, 'lastFrame'), null);
+  await page.context().close();
   const picture = await fetch(`${address}render?resolution=20x10&token=${token}`);
   assert.equal(picture.headers.get('content-type'), 'image/png');
+});
+
+test('the token moves from the address into a cookie, and the view stays', async () => {
+  const server = await serve(['town.ply'], '--host', '0.0.0.0', ...QUICK);
+  for (const host of ['127.0.0.1', PLAIN_HOST]) {
+    const address = `http://${host}:${server.port}/`;
+    const hash = encodeHash({ color: 'class' });
+    const page = await openPage(`${address}?token=${tokenOf(server)}${hash}`);
+    assert.equal(page.url(), address + hash);
+    assert.equal((await state(page, 'scene')).color, 'class');
+    assert.equal(await page.evaluate(() => document.cookie), '');
+    await page.locator('[data-action="export"]').click();
+    await page.locator('[data-format="link"]').click();
+    const link = new URL(await page.locator('#export-text').inputValue());
+    assert.deepEqual([link.origin + link.pathname, link.search], [address, '']);
+    await page.reload();
+    await settled(page);
+    await closePage(page);
+  }
+});
+
+test('an image of a foreign page renders nothing', async () => {
+  const server = await serve(['town.ply'], ...QUICK);
+  const foreign = await blankPage();
+  const address = `http://127.0.0.1:${server.port}/`;
+  const outcomes = await foreign.evaluate((paths) => Promise.all(paths.map((path) => new Promise((resolve) => {
+    const image = new Image();
+    image.onload = () => resolve('loaded');
+    image.onerror = () => resolve('failed');
+    image.src = path;
+  }))), [`${address}render?resolution=20x10`, `${address}render?color=none`]);
+  assert.deepEqual(outcomes, ['failed', 'failed']);
+  assert.equal((await (await fetch(`${address}stats`)).json()).pictures, 0);
+  await foreign.context().close();
 });
 
 test('pages of other origins are denied', async () => {

@@ -24,6 +24,28 @@ test('a first picture arrives and is not blank', async () => {
   await closePage(fresh);
 });
 
+test('the page loads with few requests to its server alone, and keeps to its content security policy', async () => {
+  const fresh = await blankPage();
+  const requests = [];
+  fresh.on('request', (request) => requests.push(request.url()));
+  fresh.on('websocket', (socket) => requests.push(socket.url()));
+  await fresh.goto(server.link);
+  await settled(fresh);
+  assert.ok(requests.length <= 10, `${requests}`);
+  assert.deepEqual(new Set(requests.map((address) => new URL(address).host)), new Set([new URL(server.link).host]));
+  // Violations of the policy are errors on the console.
+  assert.deepEqual(fresh.faults, []);
+  const violated = await fresh.evaluate(() => new Promise((resolve) => {
+    document.addEventListener('securitypolicyviolation', ({ effectiveDirective }) => resolve(effectiveDirective), { once: true });
+    const script = document.createElement('script');
+    script.textContent = 'window.isInjected = true';
+    document.body.append(script);
+  }));
+  assert.equal(violated, 'script-src-elem');
+  assert.equal(await fresh.evaluate(() => window.isInjected), undefined);
+  await fresh.context().close();
+});
+
 test('the finished picture is lossless and has the size of the screen', async () => {
   const { kind, finished, width, height, samples, of_samples } = await state(page, 'lastFrame');
   assert.deepEqual({ kind, finished, samples }, { kind: PNG, finished: true, samples: of_samples });

@@ -40,11 +40,9 @@ export function readFiles(buffer, type) {
   return files;
 }
 
-/** Address of the server's socket for the page's own address, token included. */
-export function socketAddress(location) {
-  const token = new URLSearchParams(location.search).get('token');
-  const query = token ? `?token=${encodeURIComponent(token)}` : '';
-  return `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${query}`;
+/** Address of the server's socket for the page's own address. The browser sends the token as a cookie. */
+export function socketAddress({ protocol, host }) {
+  return `${protocol === 'https:' ? 'wss' : 'ws'}://${host}/ws`;
 }
 
 export class Connection {

@@ -10,6 +10,7 @@ mod limits;
 mod message;
 mod camera;
 mod access;
+mod bundle;
 mod page;
 mod deadline;
 mod dynamic_resolution;
@@ -28,6 +29,8 @@ mod pending_changes;
 mod server_state;
 mod scene_update;
 mod session;
+mod connections;
+mod tls;
 mod routes;
 mod server;
 
@@ -37,3 +40,4 @@ pub use scene_provider::{
     SceneProvider, SettingsMap,
 };
 pub use server::Server;
+pub use tls::{TlsError, TlsIdentity};

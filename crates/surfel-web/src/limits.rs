@@ -10,8 +10,10 @@ use std::time::{Duration, Instant};
 pub struct Limits {
     /// Maximum number of pages that are connected at once.
     pub max_pages: usize,
-    /// Maximum number of connections at once, pages included.
+    /// Maximum number of connections at once on which a request was authorised, pages included.
     pub max_connections: usize,
+    /// Maximum number of other connections at once; one more closes an older one.
+    pub max_pending_connections: usize,
     /// Maximum number of pixels of a page's interactive picture, whose accumulation buffer takes 16 bytes a pixel.
     pub max_view_pixels: u64,
     /// Maximum number of pixels of a saved picture.
@@ -62,7 +64,8 @@ impl Default for Limits {
     fn default() -> Self {
         Self {
             max_pages: 32,
-            max_connections: 256,
+            max_connections: 192,
+            max_pending_connections: 64,
             max_view_pixels: 1 << 21,
             max_save_pixels: 1 << 26,
             max_rays: 1 << 34,

@@ -1,41 +1,169 @@
-//! The page's files, embedded in the program: no request reaches the file system.
+//! The page's files, embedded in the program, bundled and compressed: no request reaches the file system.
 
-use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use crate::bundle::{bundle_modules, bundle_styles};
+use axum::body::Bytes;
+use axum::http::header::{self, HeaderName};
+use axum::http::{HeaderMap, HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use rust_embed::RustEmbed;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io::Write;
+use std::sync::LazyLock;
 
 #[derive(RustEmbed)]
 #[folder = "page/"]
-struct Page;
+struct Embedded;
 
-/// The page loads nothing from other origins, and no other page may frame it.
-const POLICY: &str = "default-src 'self'; connect-src 'self' ws: wss:; img-src 'self' blob: data:; \
-    style-src 'self' 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+/// The page loads nothing from other origins and runs no code of its own text, and no other page may frame it.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; \
+    connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-const HEADERS: [(HeaderName, HeaderValue); 4] = [
-    (header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY)),
-    (header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
-    // The address contains the token.
-    (header::REFERRER_POLICY, HeaderValue::from_static("no-referrer")),
-    (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
-];
-
-/// The response with a file of the page; an empty name stands for `index.html`.
-pub fn file(name: &str) -> Response {
-    let name = if name.is_empty() { "index.html" } else { name };
-    let Some(found) = Page::get(name) else {
-        return (StatusCode::NOT_FOUND, "no such page; the viewer is at /").into_response();
-    };
-    let content_type = [(header::CONTENT_TYPE, HeaderValue::from_static(content_type(name)))];
-    (HEADERS, content_type, found.data).into_response()
+/// One file as it is served.
+struct PageFile {
+    name: String,
+    content_type: &'static str,
+    /// Quoted hash of the content.
+    tag: HeaderValue,
+    cache_control: &'static str,
+    plain: Bytes,
+    gzipped: Bytes,
 }
 
-fn content_type(name: &str) -> &'static str {
-    match name.rsplit_once('.').map(|(_, extension)| extension) {
-        Some("html") => "text/html; charset=utf-8",
-        Some("css") => "text/css; charset=utf-8",
-        Some("js") => "text/javascript; charset=utf-8",
-        Some("svg") => "image/svg+xml",
+/// Names with the hash of their content never change it; the page itself is requested again each time.
+const CACHE_FOREVER: &str = "public, max-age=31536000, immutable";
+const CACHE_AND_ASK: &str = "no-cache";
+
+static FILES: LazyLock<Vec<PageFile>> =
+    LazyLock::new(|| page_files().expect("a test bundles the page"));
+
+/// The response with a file of the page for a request with these headers; an empty name stands for the page itself.
+pub fn file(name: &str, request: &HeaderMap) -> Response {
+    let Some(file) = FILES.iter().find(|file| file.name == name) else {
+        return (StatusCode::NOT_FOUND, "no such page; the viewer is at /").into_response();
+    };
+    let common = [
+        (header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY)),
+        (header::CACHE_CONTROL, HeaderValue::from_static(file.cache_control)),
+        (header::ETAG, file.tag.clone()),
+        (header::VARY, HeaderValue::from_static("accept-encoding")),
+    ];
+    if request.get_all(header::IF_NONE_MATCH).iter().any(|tag| tag == file.tag) {
+        return (StatusCode::NOT_MODIFIED, common).into_response();
+    }
+    let content_type = [(header::CONTENT_TYPE, file.content_type)];
+    if !accepts_gzip(request) {
+        return (common, content_type, file.plain.clone()).into_response();
+    }
+    (common, content_type, [(header::CONTENT_ENCODING, "gzip")], file.gzipped.clone())
+        .into_response()
+}
+
+/// Returns whether a client accepts compressed content.
+fn accepts_gzip(request: &HeaderMap) -> bool {
+    let lines =
+        request.get_all(header::ACCEPT_ENCODING).iter().filter_map(|line| line.to_str().ok());
+    lines.flat_map(|line| line.split(',')).any(|encoding| {
+        let (name, weight) = encoding.split_once(';').unwrap_or((encoding, ""));
+        let weight = weight.trim().strip_prefix("q=").map_or(Ok(1.0), str::parse::<f32>);
+        name.trim().eq_ignore_ascii_case("gzip") && weight.is_ok_and(|weight| 0.0 < weight)
+    })
+}
+
+/// The page with one script, one style sheet and its icon, whose addresses hold the hashes of their contents.
+fn page_files() -> Result<Vec<PageFile>, String> {
+    let read = |name: &str| {
+        let found = Embedded::get(name)?;
+        String::from_utf8(found.data.into_owned()).ok()
+    };
+    let mut page = read("index.html").ok_or("index.html: is missing")?;
+    let mut styles = Vec::new();
+    let mut lines = Vec::new();
+    for line in page.lines() {
+        match line.trim().strip_prefix(STYLE_LINK).and_then(|rest| rest.strip_suffix("\">")) {
+            Some(name) => styles.push(name),
+            None => lines.push(line),
+        }
+    }
+    let style = PageFile::hashed("page", "css", bundle_styles(&styles, &read)?);
+    let script = PageFile::hashed("page", "js", bundle_modules(ENTRY, &read)?);
+    let icon = PageFile::hashed("icon", "svg", read(ICON).ok_or("the icon is missing")?);
+    page =
+        lines.join("\n").replacen("</head>", &format!("{STYLE_LINK}{}\">\n</head>", style.name), 1);
+    for (name, file) in [(ENTRY, &script), (ICON, &icon)] {
+        page = page.replacen(&format!("\"{name}\""), &format!("\"{}\"", file.name), 1);
+    }
+    let page = PageFile::new(String::new(), "html", CACHE_AND_ASK, page);
+    Ok(vec![page, style, script, icon])
+}
+
+/// The first module of the page.
+const ENTRY: &str = "main.js";
+const ICON: &str = "icon.svg";
+/// The beginning of a link to a style sheet in the page, up to the sheet's name.
+const STYLE_LINK: &str = "<link rel=\"stylesheet\" href=\"";
+
+impl PageFile {
+    /// A file whose name holds the hash of its content.
+    fn hashed(stem: &str, extension: &str, content: String) -> Self {
+        let name = format!("{stem}-{}.{extension}", hash(&content));
+        Self::new(name, extension, CACHE_FOREVER, content)
+    }
+
+    fn new(name: String, extension: &str, cache_control: &'static str, content: String) -> Self {
+        let tag = HeaderValue::try_from(format!("\"{}\"", hash(&content)))
+            .expect("a hash has digits alone");
+        let gzipped = gzipped(content.as_bytes()).expect("memory can be written").into();
+        let content_type = content_type(extension);
+        Self { name, content_type, tag, cache_control, plain: content.into(), gzipped }
+    }
+}
+
+fn hash(content: &str) -> String {
+    let mut hasher = DefaultHasher::new();
+    content.hash(&mut hasher);
+    format!("{:016x}", hasher.finish())
+}
+
+fn gzipped(content: &[u8]) -> std::io::Result<Vec<u8>> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(content)?;
+    encoder.finish()
+}
+
+fn content_type(extension: &str) -> &'static str {
+    match extension {
+        "html" => "text/html; charset=utf-8",
+        "css" => "text/css; charset=utf-8",
+        "js" => "text/javascript; charset=utf-8",
+        "svg" => "image/svg+xml",
         _ => "application/octet-stream",
+    }
+}
+
+/// Headers of every response, errors among them.
+pub const COMMON_HEADERS: [(HeaderName, HeaderValue); 3] = [
+    (header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
+    // Without Fetch metadata the page's own requests are known by their referrer.
+    (header::REFERRER_POLICY, HeaderValue::from_static("same-origin")),
+    (
+        HeaderName::from_static("cross-origin-resource-policy"),
+        HeaderValue::from_static("same-origin"),
+    ),
+];
+
+#[cfg(test)]
+mod tests {
+    //! The page is bundled.
+
+    use super::*;
+
+    #[test]
+    fn the_page_can_be_bundled() {
+        let files = page_files().unwrap();
+        let page = std::str::from_utf8(&files[0].plain).unwrap();
+        assert!(files[1..].iter().all(|file| page.contains(&format!("\"{}\"", file.name))));
+        assert!(!page.contains(ENTRY) && !page.contains("base.css"));
     }
 }

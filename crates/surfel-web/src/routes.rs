@@ -1,6 +1,7 @@
 //! The server's HTTP routes: the page, its WebSocket, and pictures and facts for programs.
 
-use crate::access::AccessDenied;
+use crate::access::{AccessDenied, TokenExchange};
+use crate::connections::ConnectionEntry;
 use crate::merge_patch::apply_merge_patch;
 use crate::page;
 use crate::scene_provider::{Error, SceneProvider, SettingsMap};
@@ -8,9 +9,9 @@ use crate::server_state::ServerState;
 use crate::session;
 use axum::body::{Body, to_bytes};
 use axum::extract::ws::WebSocketUpgrade;
-use axum::extract::{Path, Query, Request, State};
-use axum::http::{StatusCode, header};
-use axum::middleware::{Next, from_fn_with_state};
+use axum::extract::{Extension, Path, Query, Request, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state, map_response};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get};
 use axum::{Json, Router};
@@ -19,7 +20,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use surfel_core::progress::Progress;
 
-/// All routes. Each checks host and origin; all but the page's files and `/healthz` need the token, too.
+/// All routes. Each checks host and origin; all but the page's files and `/healthz` need the token, too. Requests have
+/// the entry of their connection as an extension.
 pub fn router(state: Arc<ServerState>) -> Router {
     let guarded = Router::new()
         .route("/ws", any(socket))
@@ -28,11 +30,12 @@ pub fn router(state: Arc<ServerState>) -> Router {
         .route("/render", get(render_query).post(render_body))
         .route_layer(from_fn_with_state(state.clone(), check_token));
     Router::new()
-        .route("/", get(|| async { page::file("") }))
-        .route("/{file}", get(|Path(file): Path<String>| async move { page::file(&file) }))
+        .route("/", get(page))
+        .route("/{file}", get(page_file))
         .route("/healthz", get(health))
         .merge(guarded)
         .layer(from_fn_with_state(state.clone(), check_origin))
+        .layer(map_response(with_common_headers))
         .with_state(state)
 }
 
@@ -63,12 +66,23 @@ impl From<Error> for Failure {
 
 type RouteResult = Result<Response, Failure>;
 
+async fn with_common_headers(mut response: Response) -> Response {
+    response.headers_mut().extend(page::COMMON_HEADERS);
+    response
+}
+
+/// Checks the origin of a request, and keeps the connection of one that has the token.
 async fn check_origin(
     State(state): State<Arc<ServerState>>,
+    Extension(connection): Extension<Arc<ConnectionEntry>>,
     request: Request,
     next: Next,
 ) -> RouteResult {
-    state.guard.check_origin(request.headers())?;
+    state.guard.check_origin(&request)?;
+    if state.guard.check_token(&request).is_ok() && !connection.authorize() {
+        let text = "too many connections; close another one or try again later";
+        return Err(Failure(StatusCode::SERVICE_UNAVAILABLE, text.into()));
+    }
     Ok(next.run(request).await)
 }
 
@@ -77,11 +91,34 @@ async fn check_token(
     request: Request,
     next: Next,
 ) -> RouteResult {
-    state.guard.check_token(request.headers(), request.uri())?;
+    state.guard.check_token(&request)?;
     Ok(next.run(request).await)
 }
 
-async fn socket(State(state): State<Arc<ServerState>>, upgrade: WebSocketUpgrade) -> RouteResult {
+/// The page. A link with the token leads to it by a cookie, and leaves the rest of the address as it is.
+async fn page(State(state): State<Arc<ServerState>>, request: Request) -> RouteResult {
+    Ok(match state.guard.exchange_token(&request)? {
+        Some(TokenExchange { location, cookie }) => {
+            let headers = [
+                (header::LOCATION, location),
+                (header::SET_COOKIE, cookie),
+                (header::CACHE_CONTROL, HeaderValue::from_static("no-store")),
+            ];
+            (StatusCode::SEE_OTHER, headers).into_response()
+        }
+        None => page::file("", request.headers()),
+    })
+}
+
+async fn page_file(Path(name): Path<String>, headers: HeaderMap) -> Response {
+    page::file(&name, &headers)
+}
+
+async fn socket(
+    State(state): State<Arc<ServerState>>,
+    Extension(connection): Extension<Arc<ConnectionEntry>>,
+    upgrade: WebSocketUpgrade,
+) -> RouteResult {
     let Ok(permit) = state.page_permits.clone().try_acquire_owned() else {
         let text = "too many pages are open; close another one or try again later";
         return Err(Failure(StatusCode::SERVICE_UNAVAILABLE, text.into()));
@@ -90,7 +127,7 @@ async fn socket(State(state): State<Arc<ServerState>>, upgrade: WebSocketUpgrade
     let upgrade = upgrade.max_message_size(max_bytes).max_frame_size(max_bytes);
     Ok(upgrade.on_upgrade(async move |socket| {
         session::run(socket, state).await;
-        drop(permit);
+        drop((permit, connection));
     }))
 }
 

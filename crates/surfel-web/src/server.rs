@@ -1,23 +1,28 @@
 //! The server: listens at a port, accepts connections, and stops on request.
 
-use crate::access::AccessGuard;
+use crate::access::{AccessGuard, Scheme};
+use crate::connections::ConnectionTable;
 use crate::limits::{Limits, Timeouts};
 use crate::progress_reporter::ProgressReporter;
 use crate::routes;
 use crate::scene_provider::{Error, Result, SceneProvider};
 use crate::server_state::ServerState;
+use crate::tls::TlsIdentity;
 use axum::Router;
+use axum::extract::Extension;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
-use std::net::{IpAddr, SocketAddr, TcpListener};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use surfel_core::progress::Progress;
 use surfel_core::render::Renderer;
-use tokio::sync::Semaphore;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::time::timeout;
 use tokio_io_timeout::TimeoutStream;
+use tokio_rustls::TlsAcceptor;
 
 /// A server that is bound to a port and does not answer until it runs.
 pub struct Server {
@@ -25,6 +30,7 @@ pub struct Server {
     address: SocketAddr,
     guard: AccessGuard,
     limits: Limits,
+    tls: Option<TlsIdentity>,
 }
 
 /// Number of threads for network input and output; rendering has threads of its own.
@@ -48,7 +54,7 @@ impl Server {
         let bound = listener.local_addr().map_err(io)?;
         let guard = AccessGuard::new(host)
             .map_err(|error| Error::invalid_request(format!("token: {error}")))?;
-        Ok(Self { listener, address: bound, guard, limits: Limits::default() })
+        Ok(Self { listener, address: bound, guard, limits: Limits::default(), tls: None })
     }
 
     /// Replaces the default limits.
@@ -56,15 +62,26 @@ impl Server {
         Self { limits, ..self }
     }
 
-    /// The link to the page, with the token if one is needed.
-    pub fn link(&self) -> String {
-        let host = match self.address.ip() {
-            ip if ip.is_unspecified() => "localhost".to_owned(),
-            ip @ IpAddr::V6(_) => format!("[{ip}]"),
-            ip => ip.to_string(),
+    /// Encrypts all connections.
+    pub fn with_tls(self, identity: TlsIdentity) -> Self {
+        let mut guard = self.guard;
+        guard.scheme = Scheme::Https;
+        Self { guard, tls: Some(identity), ..self }
+    }
+
+    /// The links to the page, with the token if one is needed. A server that listens at all addresses has one for
+    /// other machines, if it has a network, and one for its own.
+    pub fn links(&self) -> Vec<String> {
+        let ip = self.address.ip();
+        let hosts = if ip.is_unspecified() {
+            let outer = outer_address(ip).map(host_name);
+            outer.into_iter().chain(["localhost".to_owned()]).collect()
+        } else {
+            vec![host_name(ip)]
         };
+        let (scheme, port) = (self.guard.scheme.name(), self.address.port());
         let token = self.guard.token().map_or(String::new(), |token| format!("?token={token}"));
-        format!("http://{host}:{}/{token}", self.address.port())
+        hosts.iter().map(|host| format!("{scheme}://{host}:{port}/{token}")).collect()
     }
 
     /// Answers requests until `is_stopped` is set. Pages may connect while `open` still loads the files.
@@ -90,7 +107,8 @@ impl Server {
         let ended = runtime.block_on(async {
             self.listener.set_nonblocking(true).map_err(io)?;
             let listener = tokio::net::TcpListener::from_std(self.listener).map_err(io)?;
-            let accepting = tokio::spawn(accept(listener, state.clone()));
+            let acceptor = self.tls.map(|identity| identity.acceptor());
+            let accepting = tokio::spawn(accept(listener, acceptor, state.clone()));
             let loaded = load(state.clone(), open).await;
             if loaded.is_ok() {
                 wait_until_stopped(&state).await;
@@ -127,33 +145,83 @@ async fn wait_until_stopped(state: &ServerState) {
     }
 }
 
-async fn accept(listener: tokio::net::TcpListener, state: Arc<ServerState>) {
-    let permits = Arc::new(Semaphore::new(state.limits.max_connections));
+async fn accept(
+    listener: tokio::net::TcpListener,
+    acceptor: Option<TlsAcceptor>,
+    state: Arc<ServerState>,
+) {
+    let connections = Arc::new(ConnectionTable::new(&state.limits));
     let timeouts = state.limits.timeouts;
     let app = routes::router(state);
     loop {
-        let Ok((stream, _)) = listener.accept().await else {
+        let Ok((stream, address)) = listener.accept().await else {
             tokio::time::sleep(ACCEPT_RETRY_DELAY).await;
             continue;
         };
-        let Ok(permit) = permits.clone().try_acquire_owned() else { continue };
-        let app = app.clone();
+        let entry = Arc::new(connections.add(address.ip()));
+        let app = app.clone().layer(Extension(entry.clone()));
+        let served = serve(stream, acceptor.clone(), app, timeouts);
         tokio::spawn(async move {
-            let _permit = permit;
-            serve(stream, app, timeouts).await;
+            tokio::select! {
+                () = served => {}
+                () = entry.evicted() => {}
+            }
         });
     }
 }
 
-async fn serve(stream: tokio::net::TcpStream, app: Router, timeouts: Timeouts) {
+async fn serve(
+    stream: tokio::net::TcpStream,
+    acceptor: Option<TlsAcceptor>,
+    app: Router,
+    timeouts: Timeouts,
+) {
     // Otherwise small messages wait for one another.
     let _ = stream.set_nodelay(true);
     let mut stream = Box::pin(TimeoutStream::new(stream));
-    // A client that sends requests and does not read the answers would hold its permit for ever.
+    // A client that sends requests and does not read the answers would keep its place for ever.
     stream.as_mut().set_write_timeout_pinned(Some(timeouts.write));
+    match acceptor {
+        None => serve_http(stream, app, timeouts).await,
+        Some(acceptor) => {
+            if let Ok(Ok(stream)) = timeout(timeouts.request, acceptor.accept(stream)).await {
+                serve_http(stream, app, timeouts).await;
+            }
+        }
+    }
+}
+
+async fn serve_http(
+    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+    app: Router,
+    timeouts: Timeouts,
+) {
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(timeouts.request);
     // An error means that the client broke off: there is nobody to report it to.
     let service = TowerToHyperService::new(app);
     let _ = http.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
+}
+
+/// A host as an address has it.
+fn host_name(ip: IpAddr) -> String {
+    match ip {
+        IpAddr::V6(ip) => format!("[{ip}]"),
+        IpAddr::V4(ip) => ip.to_string(),
+    }
+}
+
+/// The address by which other machines reach this one: that of the network interface with the default route.
+fn outer_address(listening: IpAddr) -> Option<IpAddr> {
+    // These addresses are reserved for documentation (RFC 5737, RFC 3849). A UDP socket sends nothing when it connects.
+    let v4 = (IpAddr::V4(Ipv4Addr::UNSPECIFIED), IpAddr::from([192, 0, 2, 1]));
+    let v6 =
+        (IpAddr::V6(Ipv6Addr::UNSPECIFIED), Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1).into());
+    let routes = if listening.is_ipv4() { vec![v4] } else { vec![v4, v6] };
+    let address = |(from, to): (IpAddr, IpAddr)| {
+        let socket = UdpSocket::bind((from, 0)).ok()?;
+        socket.connect((to, 9)).ok()?;
+        socket.local_addr().ok().map(|address| address.ip())
+    };
+    routes.into_iter().find_map(address).filter(|address| !address.is_loopback())
 }

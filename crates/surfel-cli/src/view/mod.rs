@@ -1,6 +1,7 @@
 //! `surfel view`: the interactive viewer, in a browser.
 
 mod browser;
+mod file_names;
 mod legend;
 mod coordinates;
 mod point;
@@ -14,18 +15,19 @@ use crate::options::{EVERYWHERE, PLANS, Scope};
 use crate::report::{Report, print};
 use crate::scene_args::SceneArgs;
 use anyhow::anyhow;
+use file_names::ClientProgress;
 use rejection::rejection;
-use scene_provider::FileSceneProvider;
+use scene_provider::{FileSceneProvider, viewed_folders};
 use std::io::ErrorKind;
 use std::net::IpAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use surfel::SceneDescription;
 use surfel::resolve::check_files;
 use surfel_core::progress::Progress;
 use surfel_core::render::CpuRenderer;
 use surfel_core::trace::Simd;
-use surfel_web::{Error, SceneProvider, Server};
+use surfel_web::{Error, SceneProvider, Server, TlsError, TlsIdentity};
 
 /// Arguments of `surfel view`.
 #[derive(clap::Args, Debug)]
@@ -44,6 +46,24 @@ pub struct Args {
         hide_short_help = true
     )]
     host: IpAddr,
+    /// Certificate of the server in PEM format, followed by those that sign it; connections are then encrypted.
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "tls_key",
+        help_heading = "Server",
+        hide_short_help = true
+    )]
+    tls_cert: Option<PathBuf>,
+    /// Private key of the certificate in PEM format.
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "tls_cert",
+        help_heading = "Server",
+        hide_short_help = true
+    )]
+    tls_key: Option<PathBuf>,
     /// Opens the page in a browser.
     #[arg(long, help_heading = "Server")]
     open: bool,
@@ -64,6 +84,7 @@ Examples:
   surfel view scan.laz house.glb --open
   surfel view scene.toml --port 9000
   surfel view scan.laz --host 0.0.0.0    for other machines: the link holds a token
+  surfel view scan.laz --host 0.0.0.0 --tls-cert cert.pem --tls-key key.pem
   ssh -L 8080:localhost:8080 server      on your own machine, to look at what a server views";
 
 /// Serves the viewer until it is interrupted.
@@ -71,6 +92,9 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let description = args.scene.description(global)?;
     start_threads(&description.run)?;
     check_files(&description)?;
+    let identity = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
+    let identity =
+        identity.map(|(certificate, key)| read_identity(certificate, key)).transpose()?;
     let server = Server::bind(args.host, args.port).map_err(|error| match error {
         Error::Io { ref source, .. } if source.kind() == ErrorKind::AddrNotAvailable => {
             anyhow!("{error}; choose an address of this machine with --host, or 0.0.0.0 for all")
@@ -78,20 +102,39 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         Error::Io { .. } => anyhow!("{error}; choose another port with --port, or 0 for any"),
         error => anyhow!(error),
     })?;
-    print(&server.link())?;
-    if args.open && !browser::open(&server.link()) {
+    let server = match identity {
+        Some(identity) => server.with_tls(identity),
+        None => server,
+    };
+    let links = server.links();
+    print(&links.join("\n"))?;
+    if args.open && !browser::open(&links[0]) {
         report.note("no browser could be started; open the link yourself");
     }
     let typed = args.scene.files.clone();
     let report_for_loading = report.for_thread();
     let open = move |progress: &dyn Progress| {
-        let report = report_for_loading.with_listener(progress);
+        let folders = viewed_folders(&description, &typed);
+        let progress = ClientProgress { folders: &folders, progress };
+        let report = report_for_loading.with_listener(&progress);
         open_scene_provider(description, typed, &report).map_err(rejection)
     };
     let renderer = Arc::new(CpuRenderer { simd: Simd::detect() });
     server.run(renderer, report.cancellation(), open).map_err(|error| match error {
         Error::Cancelled => anyhow!(surfel_core::Error::Cancelled),
         error => anyhow!(error),
+    })
+}
+
+/// Maximum size of a file with certificates or a key, in bytes.
+const MAX_PEM_BYTES: usize = 1 << 20;
+
+fn read_identity(certificate: &Path, key: &Path) -> anyhow::Result<TlsIdentity> {
+    let read = |file| surfel_formats::load_text(file, MAX_PEM_BYTES);
+    let identity = TlsIdentity::from_pem(read(certificate)?.as_bytes(), read(key)?.as_bytes());
+    identity.map_err(|error| {
+        let file = if matches!(error, TlsError::Certificate(_)) { certificate } else { key };
+        anyhow!("{}: {error}", file.display())
     })
 }
 

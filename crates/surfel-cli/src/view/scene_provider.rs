@@ -1,5 +1,6 @@
 //! Scenes of the files that the viewer was started with, by the settings of its pages.
 
+use super::file_names::{ClientProgress, ViewedFolders};
 use super::legend::{hex, legend_json};
 use super::page_overlay::page_overlay;
 use super::page_settings::{self, EVERYTHING};
@@ -15,7 +16,7 @@ use std::sync::Arc;
 use surfel::SceneDescription;
 use surfel::crs::Unit;
 use surfel::description::rule::absolute_text;
-use surfel::description::{CameraSettings, ObjectDescription, write_table};
+use surfel::description::{CameraSettings, Crop, ObjectDescription, write_table};
 use surfel::live_scene::{LiveScene, LiveView};
 use surfel::names::{file_name, list_files};
 use surfel::overlay;
@@ -45,6 +46,7 @@ pub struct FileSceneProvider {
     moves_camera: bool,
     /// The cameras at the stations of its scans.
     stations: Vec<Value>,
+    folders: ViewedFolders,
 }
 
 /// Number of points of a preview; clouds that are not much larger need none.
@@ -64,7 +66,8 @@ impl FileSceneProvider {
         startup_settings.shift_remove("time");
         let stations = stations(scene.loaded(), auto.up);
         let (scene, up) = (Arc::new(scene), auto.up);
-        Ok(Self { startup, startup_settings, typed, scene, up, moves_camera, stations })
+        let folders = viewed_folders(&startup, &typed);
+        Ok(Self { startup, startup_settings, typed, scene, up, moves_camera, stations, folders })
     }
 
     fn read(&self, settings: &SettingsMap) -> Result<SceneDescription> {
@@ -72,7 +75,8 @@ impl FileSceneProvider {
     }
 
     fn view(&self, description: &SceneDescription, progress: &dyn Progress) -> Result<LiveView> {
-        self.scene.view(description, progress).map_err(rejection)
+        let progress = ClientProgress { folders: &self.folders, progress };
+        self.folders.removed(self.scene.view(description, &progress).map_err(rejection))
     }
 
     fn prepare_by(
@@ -131,12 +135,6 @@ impl FileSceneProvider {
         names
     }
 
-    /// The files of the command line and of objects.
-    fn all_files(&self) -> Vec<PathBuf> {
-        let objects = self.startup.objects.iter().flat_map(|object| &object.files);
-        self.startup.files.iter().chain(objects).cloned().collect()
-    }
-
     fn describer(&self, view: &LiveView, time_secs: f64) -> PointDescriber {
         let (scene, trees) = (self.scene.clone(), view.trees.clone());
         Arc::new(move |flat, picked: &PickedPoint| {
@@ -147,6 +145,22 @@ impl FileSceneProvider {
             describe(scene.loaded(), &trees, flat, &graph, picked)
         })
     }
+}
+
+/// The files of the command line and of objects.
+fn all_files(startup: &SceneDescription) -> impl Iterator<Item = &PathBuf> {
+    let objects = startup.objects.iter().flat_map(|object| &object.files);
+    startup.files.iter().chain(objects)
+}
+
+/// The folders of all files that a scene is made of.
+pub fn viewed_folders(startup: &SceneDescription, typed: &[PathBuf]) -> ViewedFolders {
+    let area = match &startup.objects_default.preparation.crop {
+        Some(Crop::File(file)) => Some(file),
+        _ => None,
+    };
+    let others = typed.iter().chain(&startup.light.environment).chain(area);
+    ViewedFolders::of(all_files(startup).chain(others).map(PathBuf::as_path))
 }
 
 fn kind_of(file: &Path) -> &'static str {
@@ -286,7 +300,8 @@ impl SceneProvider for FileSceneProvider {
         // Fewer points surround less.
         reduced.insert("edge_test".into(), json!("off"));
         let scene = self.prepare_by(&reduced, |description| {
-            self.scene.preview(description, progress).map_err(rejection)
+            let progress = ClientProgress { folders: &self.folders, progress };
+            self.folders.removed(self.scene.preview(description, &progress).map_err(rejection))
         });
         // The page keeps its settings; what was chosen from few points is chosen again from all.
         Some(scene.map(|scene| PreparedScene { settings: settings.clone(), ..scene }))
@@ -306,7 +321,8 @@ impl SceneProvider for FileSceneProvider {
         if let Some(fault) = overlay::faults(picture, camera, up).into_iter().next() {
             return Err(rejection(fault));
         }
-        let mut image = self.scene.render(&view, progress).map_err(rejection)?;
+        let image = self.scene.render(&view, progress).map_err(rejection);
+        let mut image = self.folders.removed(image)?;
         view.overlay().draw(&mut image, &view.flat.camera);
         let options = image_options(&description, view.flat.origin);
         surfel_formats::encode_png(&image, &options).map_err(rejection)
@@ -329,7 +345,8 @@ impl SceneProvider for FileSceneProvider {
         let description = self.read(settings)?;
         let loaded = self.scene.loaded();
         let auto = AutoSettings::choose(loaded, &description, &NoProgress);
-        let complete = auto.map_err(rejection)?.complete_description(loaded);
+        let auto = self.folders.removed(auto.map_err(rejection))?;
+        let complete = auto.complete_description(loaded);
         let mut words: Vec<String> = ["surfel", "render"].map(str::to_owned).into();
         words.extend(self.typed.iter().map(|file| file.display().to_string()));
         words.extend(description.to_options());
@@ -344,7 +361,7 @@ impl SceneProvider for FileSceneProvider {
 
     fn read_scene_file(&self, name: &str, text: &str) -> Result<SettingsMap> {
         let served: Vec<String> =
-            self.all_files().iter().chain(&self.typed).map(|file| absolute_text(file)).collect();
+            all_files(&self.startup).chain(&self.typed).map(|file| absolute_text(file)).collect();
         page_settings::from_file(name, text, &served)
     }
 }

@@ -98,6 +98,24 @@ fn the_server_renders_a_sequence_at_any_time() {
 }
 
 #[test]
+fn errors_name_files_without_their_folders() {
+    let folder = sequences::site();
+    let files = format!("files = {:?}\nfps = 2\n", sequences::FRAMES);
+    let scene = folder.write("scene.toml", sequences::scene("\"sun\"", &files));
+    let place = folder.path("");
+    let server = Server::start(&[&scene, "--spp", "1"]);
+    let assert_hidden = |query: &str, name: &str| {
+        let error = server.error(&format!("/render?resolution=40x30&{query}"));
+        assert!(error.contains(name) && !error.contains(&place), "{query}: {error}");
+    };
+    assert_hidden("color=nothing", ".ply");
+    for name in sequences::FRAMES {
+        fs::remove_file(folder.path(name)).unwrap();
+    }
+    assert_hidden("time=1.5", ".ply");
+}
+
+#[test]
 fn settings_that_a_page_may_not_change_are_rejected() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(60));
@@ -120,6 +138,33 @@ fn settings_that_a_page_may_not_change_are_rejected() {
     let pixels = "/render?surface=points&radius-scale=100&resolution=20x10";
     assert_eq!(server.get(pixels).0, 200);
     assert_eq!(server.get("/../Cargo.toml").0, 404);
+}
+
+#[test]
+fn the_links_of_all_addresses_reach_the_server() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(20));
+    let arguments = ["view", &cloud, "--port", "0", "--host", "0.0.0.0"];
+    let mut child =
+        command(&arguments).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    // The last link is for this machine, the one before it, if there is a network, for others.
+    for link in lines {
+        let link = link.unwrap();
+        let (host, query) = link["http://".len()..].split_once('/').unwrap();
+        let mut stream = TcpStream::connect(host).unwrap();
+        let head = format!("GET /scene{query} HTTP/1.0\r\nHost: {host}\r\n\r\n");
+        stream.write_all(head.as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        assert!(["200", "503"].contains(&&answer[9..12]), "{link}: {answer}");
+        if link.contains("//localhost:") {
+            break;
+        }
+        assert!(!link.contains("//0.0.0.0"), "{link}");
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
 }
 
 #[test]
@@ -146,4 +191,13 @@ fn errors_before_serving_are_reported() {
     assert!(message.contains("--host"), "{message}");
     assert!(fail(&["view", &cloud, "--port", &port], 1).contains("--port"));
     fail(&["view", &cloud, "--camera-view-angle", "400"], 2);
+    assert!(fail(&["view", &cloud, "--tls-cert", &cloud], 2).contains("--tls-key"));
+    let (empty, absent) = (folder.write("empty.pem", ""), folder.path("absent.pem"));
+    for (certificate, key, expected) in
+        [(&empty, &empty, "empty.pem: expected a certificate"), (&empty, &absent, "absent.pem")]
+    {
+        let options = ["--port", "0", "--tls-cert", certificate, "--tls-key", key];
+        let message = fail(&[&["view", &cloud][..], &options].concat(), 1);
+        assert!(message.contains(expected), "{message}");
+    }
 }

@@ -2,8 +2,9 @@
 
 use crate::test_server::TestServer;
 use serde_json::Value;
-use tokio::io::{AsyncReadExt, AsyncWriteExt};
-use tokio::net::TcpStream;
+use std::net::Ipv4Addr;
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpSocket, TcpStream};
 
 pub struct Response {
     /// The status code; 0 if the server closed the connection without a response.
@@ -42,6 +43,13 @@ pub async fn request(server: &TestServer, head: &str, body: &[u8]) -> Response {
     read_response(&mut stream).await
 }
 
+/// A connection from this address, which is one of loopback, on which nothing has been sent.
+pub async fn connect_from(source: Ipv4Addr, server: &TestServer) -> TcpStream {
+    let socket = TcpSocket::new_v4().unwrap();
+    socket.bind((source, 0).into()).unwrap();
+    socket.connect(server.socket_address()).await.unwrap()
+}
+
 /// A connection on which this text has been sent.
 pub async fn begin(server: &TestServer, text: &str) -> TcpStream {
     let mut stream = TcpStream::connect(server.address()).await.unwrap();
@@ -50,7 +58,7 @@ pub async fn begin(server: &TestServer, text: &str) -> TcpStream {
 }
 
 /// Reads until the server closes the connection.
-pub async fn read_response(stream: &mut TcpStream) -> Response {
+pub async fn read_response(stream: &mut (impl AsyncRead + Unpin)) -> Response {
     let mut bytes = Vec::new();
     let _ = stream.read_to_end(&mut bytes).await;
     let end = bytes.windows(4).position(|four| four == b"\r\n\r\n").unwrap_or(bytes.len());

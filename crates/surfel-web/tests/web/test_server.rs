@@ -3,12 +3,13 @@
 use crate::hill_provider::{FaultyRenderer, HillProvider};
 use crate::test_page::TestPage;
 use serde_json::json;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use surfel_core::progress::Progress;
-use surfel_web::{Limits, Result, SceneProvider, Server};
+use surfel_web::{Limits, Result, SceneProvider, Server, TlsIdentity};
 
 /// Duration after which a test that waits for the server fails; generous, for busy machines.
 pub const TIMEOUT: Duration = Duration::from_secs(60);
@@ -23,7 +24,7 @@ pub async fn wait_until(condition: impl Fn() -> bool) {
 }
 
 pub struct TestServer {
-    /// The link to the page, with the token if there is one.
+    /// The link to the page at this machine, with the token if there is one.
     pub link: String,
     pub provider: Arc<HillProvider>,
     is_stopped: Arc<AtomicBool>,
@@ -48,7 +49,19 @@ impl TestServer {
         load: impl FnOnce(&dyn Progress) -> Result<()> + Send + 'static,
     ) -> Self {
         let server = Server::bind(host.parse().unwrap(), 0).unwrap().with_limits(limits);
-        let (link, provider) = (server.link(), Arc::new(HillProvider::new()));
+        Self::run(server, load)
+    }
+
+    /// A server at this host whose connections are encrypted.
+    pub fn start_encrypted(host: &str, identity: TlsIdentity) -> Self {
+        Self::run(Server::bind(host.parse().unwrap(), 0).unwrap().with_tls(identity), |_| Ok(()))
+    }
+
+    fn run(
+        server: Server,
+        load: impl FnOnce(&dyn Progress) -> Result<()> + Send + 'static,
+    ) -> Self {
+        let (link, provider) = (server.links().pop().unwrap(), Arc::new(HillProvider::new()));
         let is_stopped: Arc<AtomicBool> = Arc::default();
         let (loaded, stop) = (provider.clone(), is_stopped.clone());
         let open = move |progress: &dyn Progress| {
@@ -61,7 +74,18 @@ impl TestServer {
 
     /// Host and port.
     pub fn address(&self) -> &str {
-        self.link["http://".len()..].split_once('/').unwrap().0
+        self.link.split('/').nth(2).unwrap()
+    }
+
+    /// The address of the server on loopback.
+    pub fn socket_address(&self) -> SocketAddr {
+        let port = self.address().rsplit_once(':').unwrap().1;
+        (Ipv4Addr::LOCALHOST, port.parse().unwrap()).into()
+    }
+
+    /// The token in the link.
+    pub fn token(&self) -> &str {
+        self.link.split_once("token=").unwrap().1
     }
 
     /// Waits until the server ends, by itself or because it was stopped.

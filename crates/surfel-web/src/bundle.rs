@@ -1,0 +1,233 @@
+//! Bundling: the page's modules as one script, and its style sheets as one, so that it loads with few requests.
+//!
+//! Each module becomes a function that is called once and returns the module's exports. This understands the forms
+//! of `import` and `export` that the page uses, and rejects all others; a test bundles the page. Lines that hold only
+//! a comment are left out.
+
+use std::collections::BTreeSet;
+
+/// Reads a file of the page by its name.
+pub type ReadFile<'r> = &'r dyn Fn(&str) -> Option<String>;
+
+/// Returns one module that does what `entry` and all modules that it imports do.
+///
+/// # Errors
+/// Fails with the reason if a module is missing, imports itself through others, or uses another form of `import` or
+/// `export`.
+pub fn bundle_modules(entry: &str, read: ReadFile) -> Result<String, String> {
+    let mut bundle =
+        Bundle { read, is_added: BTreeSet::new(), open: Vec::new(), text: String::new() };
+    bundle.add(entry)?;
+    Ok(bundle.text)
+}
+
+/// Returns the style sheets in their order as one.
+///
+/// # Errors
+/// Fails with the reason if one is missing.
+pub fn bundle_styles(names: &[&str], read: ReadFile) -> Result<String, String> {
+    let texts = names.iter().map(|name| read(name).ok_or_else(|| format!("{name}: is missing")));
+    texts.collect::<Result<Vec<String>, String>>().map(|texts| texts.concat())
+}
+
+struct Bundle<'r> {
+    read: ReadFile<'r>,
+    is_added: BTreeSet<String>,
+    /// The modules whose imports are being added.
+    open: Vec<String>,
+    text: String,
+}
+
+impl Bundle<'_> {
+    /// Adds a module after those that it imports.
+    fn add(&mut self, name: &str) -> Result<(), String> {
+        if self.is_added.contains(name) {
+            return Ok(());
+        }
+        if self.open.iter().any(|open| open == name) {
+            return Err(format!("{name}: imports itself through {}", self.open.join(", ")));
+        }
+        let text = (self.read)(name).ok_or_else(|| format!("{name}: is missing"))?;
+        let module = Module::parse(&text).map_err(|error| format!("{name}: {error}"))?;
+        self.open.push(name.to_owned());
+        for import in &module.imports {
+            self.add(&import.from)?;
+        }
+        self.open.pop();
+        self.is_added.insert(name.to_owned());
+        self.text += &module.as_function(name);
+        Ok(())
+    }
+}
+
+/// One module: its imports, the names that it exports, and its text without `import` and `export`.
+struct Module<'t> {
+    imports: Vec<Import>,
+    exports: Vec<&'t str>,
+    lines: Vec<&'t str>,
+}
+
+struct Import {
+    /// The name of the module that is imported.
+    from: String,
+    /// The name or the pattern that its exports are assigned to.
+    target: String,
+}
+
+impl<'t> Module<'t> {
+    fn parse(text: &'t str) -> Result<Self, String> {
+        let mut module = Self { imports: Vec::new(), exports: Vec::new(), lines: Vec::new() };
+        let mut lines = text.lines();
+        while let Some(line) = lines.next() {
+            if line.contains("import(") || line.contains("import.meta") {
+                return Err(format!("`{line}` is not supported"));
+            }
+            if line.starts_with("import") {
+                let mut statement = line.to_owned();
+                while !statement.ends_with(';') {
+                    let next = lines.next().ok_or("an import does not end with a semicolon")?;
+                    statement += next;
+                }
+                module.imports.push(Import::parse(&statement)?);
+            } else if let Some(declaration) = line.strip_prefix("export") {
+                let declaration = declaration.trim_start();
+                let name = exported_name(declaration);
+                module.exports.push(name.ok_or_else(|| format!("`{line}` is not supported"))?);
+                module.lines.push(declaration);
+            } else if !is_comment(line) {
+                module.lines.push(line);
+            }
+        }
+        Ok(module)
+    }
+
+    fn as_function(&self, name: &str) -> String {
+        let imports = self
+            .imports
+            .iter()
+            .map(|Import { from, target }| format!("const {target} = {};\n", variable_of(from)));
+        format!(
+            "// {name}\nconst {} = (() => {{\n{}{}\nreturn {{ {} }};\n}})();\n",
+            variable_of(name),
+            imports.collect::<String>(),
+            self.lines.join("\n"),
+            self.exports.join(", "),
+        )
+    }
+}
+
+impl Import {
+    fn parse(statement: &str) -> Result<Self, String> {
+        let parsed = || {
+            let (names, from) = statement.strip_prefix("import ")?.split_once(" from './")?;
+            let from = from.strip_suffix("';")?.to_owned();
+            let names = names.trim();
+            let target = match names.strip_prefix("* as ") {
+                Some(name) => name.to_owned(),
+                None if names.starts_with('{') => names.replace(" as ", ": "),
+                None => return None,
+            };
+            Some(Self { from, target })
+        };
+        parsed().ok_or_else(|| format!("`{statement}` is not supported"))
+    }
+}
+
+/// Returns whether a line holds only a comment.
+fn is_comment(line: &str) -> bool {
+    let text = line.trim();
+    text.starts_with("//") || text.starts_with("/**") && text.ends_with("*/")
+}
+
+/// The name that a declaration declares; none if it is not a function, class or constant with a single name.
+fn exported_name(declaration: &str) -> Option<&str> {
+    let declaration = declaration.strip_prefix("async ").unwrap_or(declaration);
+    let name =
+        ["function ", "class ", "const "].iter().find_map(|kind| declaration.strip_prefix(kind))?;
+    let is_part = |letter: char| letter.is_ascii_alphanumeric() || letter == '_' || letter == '$';
+    let end = name.find(|letter| !is_part(letter)).unwrap_or(name.len());
+    Some(&name[..end]).filter(|name| !name.is_empty())
+}
+
+/// The variable that holds the exports of a module.
+fn variable_of(name: &str) -> String {
+    let stem = name.strip_suffix(".js").unwrap_or(name);
+    format!("module_{}", stem.replace(|letter: char| !letter.is_ascii_alphanumeric(), "_"))
+}
+
+#[cfg(test)]
+mod tests {
+    //! Modules of all supported forms, and those that are rejected.
+
+    use super::*;
+
+    fn bundle(files: &[(&str, &str)]) -> Result<String, String> {
+        let read = |name: &str| {
+            let found = files.iter().find(|(found, _)| *found == name);
+            found.map(|(_, text)| (*text).to_owned())
+        };
+        bundle_modules("main.js", &read)
+    }
+
+    #[test]
+    fn modules_come_once_and_after_those_they_import() {
+        let found = bundle(&[
+            (
+                "main.js",
+                "import { one as first,\n  Two } from './a-b.js';\nimport * as c from './c.js';\nc.run(first);",
+            ),
+            (
+                "a-b.js",
+                "import { run } from './c.js';\nexport const one = run();\nexport class Two {}",
+            ),
+            (
+                "c.js",
+                "// Runs.\nexport async function run(x) {\n  /** Now. */\n  return x; // Later.\n}",
+            ),
+        ]);
+        let expected = "\
+// c.js
+const module_c = (() => {
+async function run(x) {
+  return x; // Later.
+}
+return { run };
+})();
+// a-b.js
+const module_a_b = (() => {
+const { run } = module_c;
+const one = run();
+class Two {}
+return { one, Two };
+})();
+// main.js
+const module_main = (() => {
+const { one: first,  Two } = module_a_b;
+const c = module_c;
+c.run(first);
+return {  };
+})();
+";
+        assert_eq!(found.unwrap(), expected);
+    }
+
+    #[test]
+    fn other_forms_are_rejected() {
+        for (text, expected) in [
+            ("import './a.js';", "`import './a.js';`"),
+            ("import a from './a.js';", "import a"),
+            ("import { a } from 'https://a.example/a.js';", "a.example"),
+            ("import { a } from './a.js'", "semicolon"),
+            ("const a = await import('./a.js');", "await import"),
+            ("export default 3;", "export default"),
+            ("export let a = 3;", "export let"),
+            ("export { a };", "export { a }"),
+            ("export const { a, b } = c;", "export const {"),
+            ("import { a } from './a.js';", "a.js: is missing"),
+            ("import { a } from './main.js';", "main.js: imports itself"),
+        ] {
+            let error = bundle(&[("main.js", text)]).unwrap_err();
+            assert!(error.contains(expected), "{text}: {error}");
+        }
+    }
+}
