@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { coordinate, count, duration, exact, rounded, ticks, withUnit } from '../page/format.js';
+import { coordinate, count, duration, exact, rounded, shortest, ticks, withUnit } from '../page/format.js';
 import { formatMaterial, materialOf, parseMaterial, withMaterial } from '../page/materials.js';
 import { readHeader, socketAddress } from '../page/connection.js';
 import { pictureSize } from '../page/picture.js';
@@ -82,4 +82,11 @@ test('coordinates have the decimals of the file', () => {
 test('units stand behind values', () => {
   assert.equal(withUnit('2.51', 'ft'), '2.51\u00a0ft');
   assert.equal(withUnit('2.51', null), '2.51');
+});
+
+test('numbers of single precision lose their noise', () => {
+  assert.equal(shortest(Math.fround(0.01)), 0.01);
+  assert.equal(shortest(Math.fround(24.9789995)), 24.979);
+  assert.equal(shortest(484913.123456), 484913.123);
+  assert.equal(shortest(-3), -3);
 });

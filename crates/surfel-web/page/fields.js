@@ -1,7 +1,7 @@
 // Fields of the panel, a factory for each kind: an element that shows a value and reports changes.
 
 import { element, icon } from './dom.js';
-import { count } from './format.js';
+import { count, shortest } from './format.js';
 import { areEqual } from './merge-patch.js';
 
 const SLIDER_STEPS = 1000;
@@ -122,7 +122,7 @@ function numbers(control, change, id) {
   });
   inputs[0].id = id;
   const show = (values) => inputs.forEach((input, i) => {
-    if (document.activeElement !== input) input.value = values ? Number(values[i].toPrecision(9)) : '';
+    if (document.activeElement !== input) input.value = values ? shortest(values[i]) : '';
   });
   return { element: element('div', { class: 'field numbers' }, ...inputs), show };
 }

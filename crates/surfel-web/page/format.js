@@ -7,6 +7,13 @@ export function exact(value) {
   return String(Number(value.toPrecision(Math.min(15, whole + 6))));
 }
 
+/** A number with at most nine digits. One that the server holds with single precision has as few as tell it apart. */
+export function shortest(value) {
+  if (Math.fround(value) !== value) return Number(value.toPrecision(9));
+  return [6, 7, 8].map((digits) => Number(value.toPrecision(digits))).find((short) => Math.fround(short) === value)
+    ?? Number(value.toPrecision(9));
+}
+
 /** A coordinate with the decimals of its file, or with those that it has. */
 export function coordinate(value, decimals) {
   return typeof decimals === 'number' ? value.toFixed(decimals) : String(value);

@@ -1,5 +1,6 @@
 // Measurements: lengths, heights, angles, circles and areas of points in the world.
 
+import { levelLength } from './profile.js';
 import { add, addScaled, cross, distance, dot, length, scale, subtract } from './vector.js';
 
 /** Kinds of measurements: the least number of their points, and their number if it is fixed. */
@@ -100,7 +101,8 @@ export function resultsOf({ kind, points }, up) {
     ];
   }
   if (kind === 'angle') return [{ name: 'Angle', value: angleDegrees(points), dimension: 0 }];
-  if (kind === 'polyline' || kind === 'profile') return [{ name: 'Length', value: pathLength(points), dimension: 1 }];
+  if (kind === 'profile') return [{ name: 'Level length', value: levelLength(points, up), dimension: 1 }];
+  if (kind === 'polyline') return [{ name: 'Length', value: pathLength(points), dimension: 1 }];
   if (kind === 'circle') {
     const radius = circleThrough(points)?.radius ?? Infinity;
     return [

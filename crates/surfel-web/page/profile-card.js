@@ -116,7 +116,7 @@ export class ProfileCard {
       context.fillRect(x(distance) - POINT_SIZE / 2, y(heights[i]) - POINT_SIZE / 2, POINT_SIZE, POINT_SIZE);
     });
     const shown = distances.length < n_found ? `${count(distances.length)} of ${count(n_found)} points` : `${count(n_found)} points`;
-    this.summary = n_found ? `${shown}; heights ${rounded(exaggeration, 2)} times exaggerated` : 'There are no points in this strip.';
+    this.summary = n_found ? `${shown}, vertical exaggeration ${rounded(exaggeration, 2)}` : 'There are no points in this strip.';
     this.#mark(null);
   }
 

@@ -63,7 +63,7 @@ impl Gate {
 /// | `tint` | none |
 pub struct HillProvider {
     flat: FlatScene,
-    /// The same with rasterised points.
+    /// The hill as rasterised points.
     rasterized: FlatScene,
     pool: rayon::ThreadPool,
     lock: Mutex<()>,
