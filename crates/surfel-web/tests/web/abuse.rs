@@ -59,6 +59,7 @@ impl Random {
             "set",
             "ack",
             "pick",
+            "profile",
             "save",
             "cancel",
             "export",
@@ -67,7 +68,7 @@ impl Random {
         ];
         let keys = [
             "width", "height", "scene", "seq", "camera", "moving", "frame", "id", "x", "y", "name",
-            "text",
+            "text", "points", "up",
         ];
         let mut message = json!({ "type": self.choose(&kinds) });
         for key in keys {

@@ -98,6 +98,33 @@ async fn picks_return_points_or_null() {
 }
 
 #[tokio::test]
+async fn profiles_have_the_points_beside_their_line() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({})).await;
+    page.finished_picture().await;
+    let request = |id: u32, points: Value| json!({ "type": "profile", "id": id, "points": points, "width": 0.05, "up": [0, 0, 1] });
+    page.send_json(request(1, json!([[-1.001, 0, 7], [1, 0, 9]]))).await;
+    let profiled = page.message("profiled").await;
+    let profile = &profiled["profile"];
+    assert_eq!((&profiled["id"], &profile["n_found"]), (&json!(1), &json!(50)));
+    let numbers = |name: &str, i: usize| profile[name][i].as_f64().unwrap();
+    for i in 0..50 {
+        let x = numbers("distances", i) - 1.001;
+        let height = 0.5 * (-2.0 * x * x).exp();
+        assert!((numbers("heights", i) - height).abs() < 1e-5, "{i}");
+        assert!(numbers("offsets", i).abs() < 1e-5 && profile["colors"][i].is_array());
+    }
+    for invalid in [json!([]), json!([[0, 0, 0]])] {
+        page.send_json(request(2, invalid)).await;
+        let error = page.message("error").await;
+        assert_eq!(
+            (&error["id"], error["text"].as_str().unwrap().contains("corners")),
+            (&json!(2), true)
+        );
+    }
+}
+
+#[tokio::test]
 async fn a_saved_picture_has_the_camera_of_the_page() {
     let server = TestServer::start();
     let mut page = TestPage::open(&server, json!({})).await;
