@@ -212,9 +212,8 @@ test('a height profile shows the points of the file beside its line', async () =
   assert.ok(100 < least.length && least.length <= rows.length && rows.length <= most.length);
   const isKnown = (row) => most.some((point) => point.every((value, axis) => Math.abs(value - row[3 + axis]) < RESOLUTION / 2));
   assert.deepEqual(rows.filter((row) => !isKnown(row)), []);
-  await page.locator('[data-action=undo]').click();
-  await page.waitForFunction(() => !document.querySelector('#profile-card').hidden);
-  await page.keyboard.press('Escape');
+  await page.locator('[aria-label="Delete profile 1"]').click();
+  assert.ok(await card.isHidden());
 });
 
 /** Place of a point along a line of two points, from 0 to 1, and its level distance from it. */

@@ -12,8 +12,9 @@ use surfel_formats::{EmbeddedImage, FileInfo, ImageCamera, inspect};
 use crate::common::{Folder, shared};
 use crate::e57_writer::{replace, small_file};
 
-fn inspected(bytes: &[u8]) -> FileInfo {
-    let folder = Folder::new("e57-images");
+/// Returns the information in a file; each test has a folder of its own.
+fn inspected(test: &str, bytes: &[u8]) -> FileInfo {
+    let folder = Folder::new(test);
     let path = folder.path("a.e57");
     std::fs::write(&path, bytes).unwrap();
     inspect(&path).unwrap()
@@ -21,14 +22,14 @@ fn inspected(bytes: &[u8]) -> FileInfo {
 
 #[test]
 fn bounds_are_those_of_all_scans_in_the_world() {
-    let [low, high] = inspected(&small_file()).bounds.unwrap();
+    let [low, high] = inspected("e57-bounds", &small_file()).bounds.unwrap();
     // The hall spans (0, 0, -4) to (7, 2, 1.02), and its quarter turn takes x to y and y to -x.
     assert!(low.distance(DVec3::new(1.0, 2.0, 3.0)) < 1e-6, "{low}");
     assert!(high.distance(DVec3::new(500_000.0, 4_900_007.0, 11.02)) < 1e-6, "{high}");
     // One of the two scans does not state its bounds.
     let unknown = replace(&small_file(), "<xMinimum", "<xMinimim");
     let unknown = replace(&unknown, "</xMinimum", "</xMinimim");
-    assert_eq!(inspected(&unknown).bounds, None);
+    assert_eq!(inspected("e57-bounds", &unknown).bounds, None);
 }
 
 #[test]
@@ -87,7 +88,7 @@ fn pictures_are_listed_with_camera_size_and_scan() {
         position: None,
         scan: None,
     };
-    assert_eq!(inspected(&bytes.into_inner()).images, [north, panorama]);
+    assert_eq!(inspected("e57-images", &bytes.into_inner()).images, [north, panorama]);
 }
 
 #[test]
