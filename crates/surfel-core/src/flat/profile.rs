@@ -43,6 +43,9 @@ pub struct Profile {
 /// Fraction of the limit that is chosen among more points, so that hardly ever some at the end are cut off.
 const CHOSEN_FRACTION: f64 = 0.97;
 
+/// Number of slots that a task goes through.
+const SLOTS_PER_PART: usize = 8192;
+
 /// A level part of a line between two corners.
 struct Segment {
     start: DVec3,
@@ -103,11 +106,10 @@ fn visit<T: Send>(
     for (instance_idx, instance) in scene.instances.iter().enumerate() {
         let FlatGeometry::Cloud(cloud) = scene.geometry(instance) else { continue };
         for points in [&cloud.points, &cloud.lines, &cloud.scatter] {
-            let visit_block = |block_idx: usize| {
-                if block_idx.is_multiple_of(1024) {
-                    progress.check()?;
-                }
-                let slots = LANES * block_idx..LANES * (block_idx + 1);
+            let visit_part = |part: usize| {
+                progress.check()?;
+                let slots =
+                    SLOTS_PER_PART * part..points.ids.len().min(SLOTS_PER_PART * (part + 1));
                 let chosen = slots.filter(|slot| {
                     threshold == u64::MAX
                         || hash((instance_idx as u64) << 40 | *slot as u64) <= threshold
@@ -117,8 +119,9 @@ fn visit<T: Send>(
                 });
                 Ok(found.map(&keep).collect())
             };
-            let blocks = (0..points.blocks.len()).into_par_iter().with_min_len(256);
-            let found: Vec<Vec<T>> = blocks.map(visit_block).collect::<Result<_>>()?;
+            let n_parts = points.ids.len().div_ceil(SLOTS_PER_PART);
+            let found: Vec<Vec<T>> =
+                (0..n_parts).into_par_iter().map(visit_part).collect::<Result<_>>()?;
             kept.extend(found.into_iter().flatten());
         }
     }
@@ -139,8 +142,10 @@ fn point_beside(
         return None;
     }
     let position = scene.origin + instance.world_position(points.center(slot)).as_dvec3();
-    let is_shown = !scene.camera_planes.iter().any(|plane| plane.hides(position));
-    segments.iter().filter(|_| is_shown).find_map(|segment| {
+    if scene.camera_planes.iter().any(|plane| plane.hides(position)) {
+        return None;
+    }
+    segments.iter().find_map(|segment| {
         let to_point = position - segment.start;
         let (along, offset) = (segment.along.dot(to_point), segment.left.dot(to_point));
         let is_beside = (0.0..=segment.length).contains(&along) && offset.abs() <= line.width / 2.0;

@@ -86,13 +86,14 @@ impl<'a> WritePlan<'a> {
 
     /// Encodes the records of these points.
     pub fn encode(&self, cloud: &PointCloud, points: Range<usize>) -> Vec<u8> {
+        let flags = self.flag_columns();
         let mut bytes = Vec::new();
         for i in points {
             for coordinate in self.quantized(cloud, i) {
                 bytes.extend(coordinate.to_le_bytes());
             }
             bytes.extend((self.standard.intensity.map_or(0, |v| v[i] as u16)).to_le_bytes());
-            self.encode_return(cloud, i, &mut bytes);
+            self.encode_return(cloud, i, &flags, &mut bytes);
             if self.fields.has_gps_time {
                 bytes.extend(value(self.standard.gps_time, i, 0.0).to_le_bytes());
             }
@@ -111,14 +112,20 @@ impl<'a> WritePlan<'a> {
     }
 
     /// Appends the fields between intensity and time, which differ in order and width.
-    fn encode_return(&self, cloud: &PointCloud, i: usize, bytes: &mut Vec<u8>) {
+    fn encode_return(
+        &self,
+        cloud: &PointCloud,
+        i: usize,
+        flags: &[FlagColumn],
+        bytes: &mut Vec<u8>,
+    ) {
         let standard = &self.standard;
         let return_number = value(standard.return_number, i, 1.0) as u8;
         let number_of_returns = value(standard.number_of_returns, i, 1.0) as u8;
         let class = cloud.classification.as_ref().map_or(0, |column| column[i]);
         let user_data = value(standard.user_data, i, 0.0) as u8;
         let angle = value(standard.scan_angle, i, 0.0);
-        let [of_returns, of_class] = self.encode_flags(i);
+        let [of_returns, of_class] = flag_bytes(flags, i);
         if self.fields.is_extended {
             let returns = return_number | number_of_returns << 4;
             bytes.extend([returns, of_class, class, user_data]);
@@ -131,16 +138,14 @@ impl<'a> WritePlan<'a> {
         bytes.extend((value(standard.point_source_id, i, 0.0) as u16).to_le_bytes());
     }
 
-    /// Returns the flags of a point in the bytes 14 and 15 of its record.
-    fn encode_flags(&self, point_idx: usize) -> [u8; 2] {
-        let mut bytes = [0; 2];
-        for (name, values) in &self.standard.flags {
-            let mut fields = flag_fields(self.fields.is_extended).iter();
-            if let Some((_, byte, lowest_bit, _)) = fields.find(|(field, ..)| field == name) {
-                bytes[byte - 14] |= (values.get(point_idx) as u8) << lowest_bit;
-            }
-        }
-        bytes
+    /// Returns the flags that the point format has.
+    fn flag_columns(&self) -> Vec<FlagColumn<'a>> {
+        let fields = flag_fields(self.fields.is_extended);
+        let columns = self.standard.flags.iter().filter_map(|&(name, values)| {
+            let (_, byte, lowest_bit, _) = fields.iter().find(|(field, ..)| *field == name)?;
+            Some(FlagColumn { byte: byte - 14, lowest_bit: *lowest_bit, values })
+        });
+        columns.collect()
     }
 
     /// Returns the integer coordinates of a point.
@@ -148,6 +153,23 @@ impl<'a> WritePlan<'a> {
         let steps = (cloud.world_position(point_idx) - self.offset) / self.scale;
         steps.to_array().map(|step| step.round() as i32)
     }
+}
+
+/// The values of a flag and their place in a record.
+struct FlagColumn<'a> {
+    /// 0 for the byte of the returns, 1 for the one behind it.
+    byte: usize,
+    lowest_bit: u32,
+    values: &'a Values,
+}
+
+/// Returns the flags of a point in the byte of its returns and the one behind it.
+fn flag_bytes(flags: &[FlagColumn], point_idx: usize) -> [u8; 2] {
+    let mut bytes = [0; 2];
+    for flag in flags {
+        bytes[flag.byte] |= (flag.values.get(point_idx) as u8) << flag.lowest_bit;
+    }
+    bytes
 }
 
 /// Returns the value of a point, or `missing` without the column.
