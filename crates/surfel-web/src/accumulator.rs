@@ -241,11 +241,7 @@ impl Accumulator {
             true => encode::png(pixels),
             false => encode::jpeg(pixels, REFINED_JPEG_QUALITY),
         };
-        if is_finished {
-            // A page at rest keeps no more than its keyframe.
-            self.finish_keyframe(&prepared.clone(), view.size);
-            (self.sum, self.coverage_sum) = (Vec::new(), Vec::new());
-        }
+        self.release_samples(prepared, view.size);
         let work = std::mem::take(&mut self.work);
         Some(Frame {
             quality: if is_finished { Quality::Finished } else { Quality::Refined },
@@ -311,10 +307,25 @@ impl Accumulator {
         next.n_rows = rows.1;
         if next.n_rows == size.1 {
             self.keyframe = Some(next);
+            self.release_samples(prepared, view.size);
         } else {
             self.next_keyframe = Some(next);
         }
         Ok(true)
+    }
+
+    /// Frees the samples of a finished picture that has been taken, once its keyframe has their colours: a page at rest
+    /// keeps no more than its keyframe.
+    fn release_samples(&mut self, prepared: &Arc<PreparedScene>, size: (u32, u32)) {
+        if self.n_samples < of_samples(prepared) || self.has_frame {
+            return;
+        }
+        let has_none = uses_rasterizer(&prepared.flat).unwrap_or(false);
+        let is_known = |known: &KeyframeOf| known.version == self.version;
+        if has_none || self.keyframe.as_ref().is_some_and(is_known) {
+            self.finish_keyframe(prepared, size);
+            (self.sum, self.coverage_sum) = (Vec::new(), Vec::new());
+        }
     }
 
     /// Takes the colours of the keyframe from the samples so far. Forgets keyframes of other scenes and sizes.
