@@ -6,6 +6,7 @@ use crate::test_server::TestServer;
 use serde_json::json;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
 
 #[tokio::test]
 async fn pictures_are_refined_to_the_finished_picture() {
@@ -209,6 +210,30 @@ async fn disconnecting_during_a_picture_does_not_block_others() {
     other.finished_picture().await;
     other.set_camera(1, 2.0, false).await;
     other.wait_for_picture(|picture| picture.is_finished && picture.seq == 1).await;
+}
+
+#[tokio::test]
+async fn drafts_show_the_last_picture_at_rest_whatever_its_samples() {
+    for samples in [1, 2] {
+        let server = TestServer::start();
+        let settings = json!({ "fault": FaultyRenderer::SLOW, "samples": samples });
+        let mut page = TestPage::open(&server, settings).await;
+        page.send_json(json!({ "type": "size", "width": 400, "height": 300 })).await;
+        let mut is_shown = false;
+        // The keyframe of a picture of one sample is made after the picture.
+        for seq in 1..10 {
+            page.wait_for_picture(|picture| picture.is_finished && picture.size.0 == 400).await;
+            page.drain(Duration::from_millis(500 * u64::from(seq))).await;
+            page.set_camera(seq, 0.0, true).await;
+            let draft = page.wait_for_picture(|picture| picture.seq == seq).await;
+            is_shown = draft.size == (200, 150);
+            if is_shown {
+                break;
+            }
+            page.set_camera(seq, 0.0, false).await;
+        }
+        assert!(is_shown, "{samples}");
+    }
 }
 
 #[tokio::test]

@@ -58,6 +58,7 @@ impl Gate {
 /// | `fault` | the seed of the render settings, which tells the `FaultyRenderer` its fault |
 /// | `camera_angle` | the scene animates its camera, which is at this angle |
 /// | `points` | points are rasterised |
+/// | `samples` | a finished picture has this many samples |
 /// | `preview` | there is a preview |
 /// | `stamp` | pictures have an overlay |
 /// | `tint` | none |
@@ -196,6 +197,7 @@ impl SceneProvider for HillProvider {
         let mut complete = self.initial_settings(0, 0);
         let (mut seed, mut animated_camera) = (0, None);
         let mut flat = self.flat.clone();
+        let mut samples = N_SAMPLES;
         for (key, value) in settings {
             let secs = value.as_f64().unwrap_or(0.0);
             match key.as_str() {
@@ -207,6 +209,7 @@ impl SceneProvider for HillProvider {
                 }
                 "panic" => panic!("requested by a test"),
                 "fault" => seed = value.as_u64().unwrap_or(0),
+                "samples" => samples = value.as_u64().unwrap() as u32,
                 "points" => flat = self.rasterized.clone(),
                 "camera_angle" => animated_camera = value.as_f64().map(camera),
                 "camera" | "tint" | "stamp" | "preview" | "resolution" | "slow_render" => {}
@@ -218,7 +221,7 @@ impl SceneProvider for HillProvider {
             settings: complete,
             animated_camera,
             flat,
-            render_settings: render_settings(seed),
+            render_settings: Settings { samples_per_pixel: samples, ..render_settings(seed) },
             legend: Value::Null,
             overlay: settings.contains_key("stamp").then(|| Box::new(Stamp) as _),
             describe: Arc::new(
