@@ -33,6 +33,8 @@ export const colorControls = [
   { key: 'range', label: 'Range', kind: 'numbers', names: ['low', 'high'], automatic: true, isVisible: hasMap,
     read: (scene, { legend }) => scene.range ?? (legend?.kind === 'map' ? [legend.low, legend.high] : null),
     write: (range) => ({ range }) },
+  { key: 'gamma', label: 'Gamma', ...SLIDER, range: [0.5, 4], limits: [0.1, 10], scale: 'logarithmic', automatic: true,
+    isVisible: (scene, viewer) => scene.color === 'rgb' || hasMap(scene, viewer), help: 'Brightens dark colours or values' },
 ];
 
 const allClasses = ({ info }) => info.classes.map((one) => one.class);

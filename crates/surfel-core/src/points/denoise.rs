@@ -5,6 +5,7 @@
 //! (after Huang et al., Edge-Aware Point Set Resampling, 2013).
 
 use super::PointCloud;
+use super::depth_steps::DepthSteps;
 use super::jets::fit_wide_jet;
 use super::neighbors::{KdTree, Neighbor};
 use super::noise::{GROUP_SIZE, Noise};
@@ -99,7 +100,8 @@ pub fn denoise(
     let order = tree.order();
     let means = means_of_groups(positions, &order);
     let groups = KdTree::new(&means, progress)?;
-    let noise = Noise::new(&tree, &groups, &order, progress)?;
+    let steps = DepthSteps::find(cloud);
+    let noise = Noise::new(&tree, &groups, &order, steps.as_ref(), progress)?;
     if is_auto && (noise.median() < MIN_NOISE || !noise.is_of_surfaces()) {
         return Ok(None);
     }

@@ -18,6 +18,7 @@ mod radius;
 mod subsample;
 mod outliers;
 mod structure;
+mod depth_steps;
 mod noise;
 mod denoise;
 mod edge_planes;

@@ -3,6 +3,7 @@
 //! If a plane fits better the more neighbours it is fitted to, the distances from it are noise, not shape. The noise is
 //! measured at some points of each region.
 
+use super::depth_steps::DepthSteps;
 use super::neighbors::KdTree;
 use super::normals::{PlaneFit, fit_plane};
 use crate::error::Result;
@@ -36,6 +37,9 @@ const MIN_KNOWN: f32 = 0.25;
 const MIXED_RATIO: f32 = 2.0;
 /// Minimum share of points at which the noise can be told in a cloud of surfaces. Forests have 0.3 to 0.7.
 const MIN_SURFACES: f32 = 0.8;
+/// Noise in steps of a depth camera. Evenly spread errors have 1 / sqrt(12), but neighbouring points err together, so
+/// that a plane must reach over several steps: at half a step, walls across the view stayed in patches.
+const NOISE_PER_STEP: f32 = 1.0;
 /// Number of regions over which the noise is interpolated.
 const N_BLENDED_REGIONS: usize = 4;
 
@@ -52,7 +56,7 @@ pub struct Noise {
 
 impl Noise {
     /// Measures the noise. `order` lists the points so that those near each other follow each other, and `groups` are the
-    /// means of each [`GROUP_SIZE`] of them.
+    /// means of each [`GROUP_SIZE`] of them. `steps` are those of a depth camera.
     ///
     /// # Errors
     ///
@@ -61,6 +65,7 @@ impl Noise {
         tree: &KdTree,
         groups: &KdTree,
         order: &[u32],
+        steps: Option<&DepthSteps>,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let [least, most] = REGION_SIZES;
@@ -69,7 +74,7 @@ impl Noise {
         let measure = |points: &[u32]| {
             progress.check()?;
             progress.advance(points.len() as u64);
-            Ok(Region::new(tree, groups, points))
+            Ok(Region::new(tree, groups, points, steps))
         };
         let regions = order.par_chunks(size).map(measure).collect::<Result<Vec<_>>>()?;
         let mut fills_space = vec![false; tree.positions().len()];
@@ -135,12 +140,17 @@ struct Region {
 }
 
 impl Region {
-    fn new(tree: &KdTree, groups: &KdTree, points: &[u32]) -> Self {
+    fn new(tree: &KdTree, groups: &KdTree, points: &[u32], steps: Option<&DepthSteps>) -> Self {
         let step = points.len().div_ceil(N_SAMPLES).max(1);
         let samples: Vec<NoiseAtPoint> = points
             .iter()
             .step_by(step)
-            .map(|point| NoiseAtPoint::new(tree, groups, *point))
+            .map(|point| match NoiseAtPoint::new(tree, groups, *point) {
+                NoiseAtPoint::Known(noise) => {
+                    NoiseAtPoint::Known(noise.max(noise_by_steps(tree, *point, steps)))
+                }
+                unknown => unknown,
+            })
             .collect();
         let noise = |sample: &NoiseAtPoint| match sample {
             NoiseAtPoint::Known(noise) => Some(*noise),
@@ -172,6 +182,17 @@ impl Region {
     fn fills_space(&self) -> bool {
         self.n_samples <= 2 * self.n_filled
     }
+}
+
+/// Returns the noise that the steps of a depth camera stand for, in spacings. They are terraces wider than the
+/// neighbourhoods in which the noise is told, so that they do not count there.
+fn noise_by_steps(tree: &KdTree, point: u32, steps: Option<&DepthSteps>) -> f32 {
+    let Some(steps) = steps else { return 0.0 };
+    let position = tree.positions()[point as usize];
+    let neighbors = tree.nearest(position, MIN_NOISE_NEIGHBORS, Some(point));
+    let reach = neighbors.last().map_or(0.0, |last| last.distance_squared);
+    let spacing = (std::f32::consts::PI * reach / MIN_NOISE_NEIGHBORS as f32).sqrt();
+    NOISE_PER_STEP * steps.at(position) / spacing.max(f32::MIN_POSITIVE)
 }
 
 /// The noise around a point.

@@ -5,7 +5,7 @@ use super::color_rule::{ColorSourceRule, ColormapRule};
 use super::crop::{Crop, CropRule};
 use super::keys::{KeyedSettings, settings};
 use super::point_filter::{Classes, RETURNS, Returns, point_filters};
-use super::rule::{Checked, Flag, Interval, OneOf, POSITIVE, Rule, Text, count, parsed};
+use super::rule::{Checked, Flag, Interval, OneOf, POSITIVE, Rule, Text, count, number, parsed};
 use super::{Invalid, Part};
 use serde_json::Value;
 use std::path::Path;
@@ -116,6 +116,9 @@ settings! {
         /// Values of the first and last colour of the map [default: the 2nd and 98th percentile, or 0,1 radii
         /// for support].
         range: (f64, f64), Interval, "LOW,HIGH";
+        /// Brightens (above 1) or darkens colours of the file and values of the map
+        /// [default: brightens dark colours of the file, and dark intensities if no map is named].
+        gamma: f64, number(0.1, 10.0), "NUMBER";
     }
 }
 
@@ -204,8 +207,8 @@ impl ObjectSettings {
 
     /// Returns the colouring of the library; elevations count along `up`.
     pub fn coloring(&self, up: Vec3) -> Coloring {
-        let ColorSettings { color, cmap, range } = self.color.clone();
-        Coloring { source: color, colormap: cmap, range, up }
+        let ColorSettings { color, cmap, range, gamma } = self.color.clone();
+        Coloring { source: color, colormap: cmap, range, gamma, up }
     }
 
     /// Returns the columns that a picture with these settings needs.

@@ -113,7 +113,7 @@ pub fn apply_surface_and_color(
     progress: &dyn Progress,
 ) -> surfel_core::Result<CloudGeometry> {
     cloud.scale_radii(settings.surface.radius_scale() as f32);
-    let notes = NotesAsChoices { progress, keys: &["color", "cmap", "range"] };
+    let notes = NotesAsChoices { progress, keys: &["color", "cmap", "range", "gamma"] };
     let coloring = settings.coloring(up);
     let colors = colorize(&cloud, &coloring, &notes)?;
     let source = settings.color.color.clone().unwrap_or_else(|| choose_source(&cloud).0);

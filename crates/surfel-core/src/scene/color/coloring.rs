@@ -17,6 +17,9 @@ pub struct Coloring {
     pub colormap: Option<Colormap>,
     /// Values of the first and last colour of the map; `None` takes the 2nd and 98th percentile.
     pub range: Option<(f64, f64)>,
+    /// Exponent that brightens colours of the file and values of the map, `value^(1 / gamma)`; `None` brightens dark
+    /// colours of the file, and dark intensities if no map is named.
+    pub gamma: Option<f64>,
     /// Unit vector along which elevation is measured.
     pub up: Vec3,
 }
@@ -24,7 +27,7 @@ pub struct Coloring {
 impl Default for Coloring {
     /// Returns a chosen source, colour map and range, with Z up.
     fn default() -> Self {
-        Self { source: None, colormap: None, range: None, up: Vec3::Z }
+        Self { source: None, colormap: None, range: None, gamma: None, up: Vec3::Z }
     }
 }
 

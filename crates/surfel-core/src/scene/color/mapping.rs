@@ -1,6 +1,7 @@
 //! The mapping from values of points to colours.
 
 use super::coloring::Coloring;
+use super::gamma::Gamma;
 use super::source::ColorSource;
 use super::support::DEFAULT_RANGE;
 use crate::error::Result;
@@ -19,6 +20,7 @@ pub(super) struct Mapping<'c> {
     map: Colormap,
     /// Positions of the first and last colour in the map, from 0 to 1.
     map_range: (f32, f32),
+    gamma: Gamma,
     /// The origin of the range, for a note to the user.
     range_origin: &'static str,
 }
@@ -48,24 +50,29 @@ impl<'c> Mapping<'c> {
         };
         let is_gray = *source == ColorSource::Intensity && coloring.colormap.is_none();
         let map_range = if is_gray { INTENSITY_GRAY_RANGE } else { (0.0, 1.0) };
+        let gamma = match coloring.gamma {
+            None if !is_gray => Gamma::NONE,
+            given => Gamma::new(given, cloud.len(), |i| range.normalize(value_at(i))),
+        };
         let range_origin = match source {
             _ if given.is_some() => "as given",
             ColorSource::Support => "at a point to one radius away from all points",
             _ => "2 % to 98 % of the values",
         };
-        Ok(Self { value_at, range, map, map_range, range_origin })
+        Ok(Self { value_at, range, map, map_range, gamma, range_origin })
     }
 
     /// Returns the sRGB-encoded colour of a value.
     pub fn color(&self, value: f64) -> [u8; 3] {
         let (first, last) = self.map_range;
-        self.map.color(first + (last - first) * self.range.normalize(value))
+        self.map.color(first + (last - first) * self.gamma.apply(self.range.normalize(value)))
     }
 
     /// Returns the range and the name of the map, for a note to the user.
     pub fn description(&self) -> String {
-        let Self { range, range_origin, map, .. } = self;
-        format!("from {} ({range_origin}), map {}", format_range(*range), map.name())
+        let Self { range, range_origin, map, gamma, .. } = self;
+        let gamma = gamma.described().map_or_else(String::new, |gamma| format!(", {gamma}"));
+        format!("from {} ({range_origin}), map {}{gamma}", format_range(*range), map.name())
     }
 }
 

@@ -4,6 +4,7 @@ mod source;
 mod choose;
 mod support;
 mod coloring;
+mod gamma;
 mod mapping;
 mod legend;
 
@@ -17,6 +18,7 @@ use crate::error::Result;
 use crate::image::class_color;
 use crate::points::PointCloud;
 use crate::progress::Progress;
+use gamma::Gamma;
 use mapping::Mapping;
 use rayon::prelude::*;
 
@@ -43,7 +45,16 @@ pub fn colorize(
     match &source {
         ColorSource::Rgb => {
             let colors = cloud.colors.as_ref().ok_or_else(missing)?;
-            Ok(for_all(&|i| colors[i].map(to_8_bits)))
+            let strongest = |i: usize| to_unit(colors[i].into_iter().max().unwrap_or(0));
+            let gamma = Gamma::new(coloring.gamma, colors.len(), strongest);
+            let Some(described) = gamma.described() else {
+                return Ok(for_all(&|i| colors[i].map(to_8_bits)));
+            };
+            if coloring.gamma.is_none() {
+                progress.note(&format!("{described}: the colours of the file are dark"));
+            }
+            let brightened = |value: u16| (255.0 * gamma.apply(to_unit(value))).round() as u8;
+            Ok(for_all(&|i| colors[i].map(brightened)))
         }
         ColorSource::Class => {
             let classes = cloud.classification.as_ref().ok_or_else(missing)?;
@@ -63,6 +74,11 @@ pub fn colorize(
             Ok(for_all(&|i| mapping.color((mapping.value_at)(i))))
         }
     }
+}
+
+/// Returns a 16-bit channel as a fraction of its maximum.
+fn to_unit(value: u16) -> f32 {
+    f32::from(value) / f32::from(u16::MAX)
 }
 
 /// Returns the 8-bit value nearest to a 16-bit channel.
@@ -107,6 +123,34 @@ mod tests {
         };
         let found = colorize(&cloud, &coloring(None), &NoProgress).unwrap();
         assert!(found.iter().enumerate().all(|(v, color)| *color == [v as u8; 3]));
+    }
+
+    #[test]
+    fn dark_colors_are_brightened_unless_a_gamma_is_given() {
+        let colors = Some(vec![[0x1010, 0x0808, 0]; 2500]);
+        let cloud = PointCloud { colors, ..lattice() };
+        let listener = Listener(Mutex::default());
+        let found = colorize(&cloud, &coloring(None), &listener).unwrap()[0];
+        assert!(60 < found[0] && 40 < found[1] && found[2] == 0, "{found:?}");
+        assert!(listener.0.lock().unwrap()[1].starts_with("gamma 2.2"));
+        let plain = Coloring { gamma: Some(1.0), ..coloring(None) };
+        assert_eq!(colorize(&cloud, &plain, &NoProgress).unwrap()[0], [16, 8, 0]);
+    }
+
+    #[test]
+    fn gamma_brightens_the_middle_of_a_map_and_no_named_map_unasked() {
+        let intensity = Some((0..2500).map(|i| (i as f32 / 2499.0).powi(4)).collect());
+        let cloud = PointCloud { intensity, ..lattice() };
+        let middle =
+            |coloring: &Coloring| colorize(&cloud, coloring, &NoProgress).unwrap()[1250][0];
+        let plain = Coloring { gamma: Some(1.0), ..coloring(None) };
+        assert!(20 + middle(&plain) < middle(&coloring(None)));
+        let gray = Some(Colormap::from_name("gray").unwrap());
+        let named = Coloring { colormap: gray, ..coloring(Some("intensity")) };
+        let named_plain = Coloring { gamma: Some(1.0), ..named.clone() };
+        assert_eq!(middle(&named), middle(&named_plain));
+        let brightened = Coloring { gamma: Some(2.0), ..named };
+        assert!(middle(&named_plain) < middle(&brightened));
     }
 
     #[test]
