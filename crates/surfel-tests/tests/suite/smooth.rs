@@ -149,3 +149,31 @@ fn rays_end_at_slits_where_front_sides_are_known() {
     let through = heights_at(&single, in_slit);
     assert!(through.iter().all(|z| *z == f32::NEG_INFINITY), "{through:?}");
 }
+
+#[test]
+fn rays_end_in_corners_whose_points_leave_a_gap() {
+    // A floor and a wall with front sides unknown; each ends before the corner along Y at X = Z = 0.
+    let gap = 1.3 * SLIT_SPACING;
+    let mut cloud = PointCloud::default();
+    let (mut normals, mut radii) = (Vec::new(), Vec::new());
+    for (i, y) in (0..20).flat_map(|i| (-20..=20).map(move |y| (i as f32 * SLIT_SPACING, y))) {
+        let y = y as f32 * SLIT_SPACING;
+        cloud.positions.extend([Vec3::new(gap + i, y, 0.0), Vec3::new(0.0, y, gap + i)]);
+        normals.extend([Vec3::Z, Vec3::X]);
+        radii.extend([1.6 * SLIT_SPACING; 2]);
+    }
+    (cloud.normals, cloud.radii) = (Some(normals), Some(radii));
+    let flat = FlatCloud::new(&scenes::points(cloud, SurfaceKind::Smooth), &NoProgress).unwrap();
+    let ends = |direction: Vec3| {
+        let ray = |i: i32| Ray::new(Vec3::new(0.0, 0.001 * i as f32, 0.0) - direction, direction);
+        let rays: Vec<Ray> = (-200..200).map(ray).collect();
+        hits(&flat, &rays).iter().map(|hit| hit.distance).collect::<Vec<f32>>()
+    };
+    let into_corner = ends(Vec3::new(-1.0, 0.0, -1.0).normalize());
+    assert!(into_corner.iter().all(|distance| (distance - 1.0).abs() < gap), "{into_corner:?}");
+    let beside_the_rims = ends(Vec3::new(-1.0, 0.0, 1.0).normalize());
+    assert!(
+        beside_the_rims.iter().all(|distance| *distance == f32::INFINITY),
+        "{beside_the_rims:?}"
+    );
+}

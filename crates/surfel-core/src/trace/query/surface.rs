@@ -2,10 +2,13 @@
 
 use crate::flat::{FlatCloud, FlatPoints, Slot};
 use crate::math::{Lanes, PACKET_WIDTH, PacketLanes, Ray, Vec3};
-use crate::surface::{Capsule, Disc, EdgeTest, Sphere, SurfaceKind, Surfel, capsule};
+use crate::surface::{
+    CandidateHit, Capsule, Disc, EdgeTest, EdgeTestResult, Sphere, SurfaceKind, Surfel, capsule,
+};
 use crate::trace::query::any::{AcceptAll, any_accepted_hit, any_hits_kernel};
 use crate::trace::query::closest::{closest_hits_kernel, closest_shapes};
 use crate::trace::query::edge_filter::EdgeFilter;
+use crate::trace::query::edge_test::evaluate_one;
 use crate::trace::query::hit::Hit;
 use crate::trace::query::leaf::LeafGeometry;
 use crate::trace::query::smooth_filter::SmoothFilter;
@@ -62,9 +65,12 @@ const MAX_REJECTED_HITS: usize = 48;
 const RESTART_OFFSET: f32 = 0.05;
 /// Distance behind a disc without a smooth surface nearby at which the search restarts, in radii.
 const SMOOTH_RESTART_OFFSET: f32 = 0.002;
-/// Minimum distance between a disc's front and a back face behind it, in radii of the disc, at which a ray has come
-/// through a slit. Nearer back faces are those of thin sheets.
+/// Minimum distance between a disc and what a ray hits behind it, in radii of the disc, at which the ray has come through
+/// a slit. Nearer back faces are those of thin sheets.
 const MIN_SLIT_DEPTH: f32 = 3.0;
+/// Minimum cosine between a ray through a slit and the normal of the disc there. Beside a silhouette rays pass discs more
+/// from their side: without this limit six times as much background was covered around the head.
+const MIN_SLIT_COSINE: f32 = 0.5;
 
 /// Finds the closest hit of each ray on the continuous surface.
 pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
@@ -181,8 +187,8 @@ fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHi
     let mut rays = rays.to_vec();
     let mut nearest = vec![Hit::MISS; rays.len()];
     let mut tracer = SmoothTracer::new(cloud);
-    // The last disc that each ray passed from its front.
-    let mut passed = vec![Hit::MISS; if cloud.has_front_sides { rays.len() } else { 0 }];
+    // The first disc that each ray passed, from its front where front sides are known.
+    let mut passed = vec![Hit::MISS; rays.len()];
     for _ in 0..MAX_REJECTED_HITS {
         let nearest = &mut nearest[..rays.len()];
         closest_hits_kernel::<L>(cloud, &rays, nearest);
@@ -231,10 +237,10 @@ fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHi
                     };
                     continue;
                 }
-                if let Some(disc) = passed.get_mut(ray_idx as usize)
-                    && cloud.points.normal(slots[lane]).dot(ray.direction) < 0.0
-                {
-                    *disc = Hit { distance: distances[lane], slot: slots[lane] };
+                let is_front = cloud.points.normal(slots[lane]).dot(ray.direction) < 0.0;
+                let first = &mut passed[ray_idx as usize];
+                if first.is_miss() && (is_front || !cloud.has_front_sides) {
+                    *first = Hit { distance: distances[lane], slot: slots[lane] };
                 }
                 let behind = distances[lane] + SMOOTH_RESTART_OFFSET * radius;
                 let t_min = behind.max(distances[lane] * (1.0 + 2.0 * f32::EPSILON));
@@ -247,9 +253,10 @@ fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHi
             break;
         }
     }
-    for (disc, hit) in passed.iter().zip(hits) {
-        if !disc.is_miss() && is_through_slit(cloud, disc, hit) {
+    for ((disc, hit), ray) in passed.iter().zip(hits).zip(all_rays) {
+        if !disc.is_miss() && is_through_slit::<L>(cloud, disc, hit, ray) {
             let Surfel { normal, radius, color, .. } = cloud.points.surfel(disc.slot);
+            let normal = if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
             *hit = SurfaceHit {
                 distance: disc.distance,
                 id: cloud.points.id(disc.slot),
@@ -264,11 +271,25 @@ fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHi
     }
 }
 
-/// Returns true if a ray, which passed `disc` from its front, hits a back face behind it: it went through a slit between
-/// the points there.
-fn is_through_slit(cloud: &FlatCloud, disc: &Hit, hit: &SurfaceHit) -> bool {
-    hit.is_backface
-        && disc.distance + MIN_SLIT_DEPTH * cloud.points.radius(disc.slot) < hit.distance
+/// Returns true if a ray went through a slit between the points around `disc`, which it passed before `hit` or a miss: it
+/// hits a back face, or sees points all around and the disc not from its side, as in a corner whose points leave a gap.
+#[inline(always)]
+fn is_through_slit<L: Lanes>(cloud: &FlatCloud, disc: &Hit, hit: &SurfaceHit, ray: &Ray) -> bool {
+    let Surfel { normal, radius, .. } = cloud.points.surfel(disc.slot);
+    if hit.distance <= disc.distance + MIN_SLIT_DEPTH * radius {
+        return false;
+    }
+    if cloud.has_front_sides && hit.is_backface {
+        return true;
+    }
+    let around_ray = CandidateHit { normal: -ray.direction, direction: ray.direction, radius };
+    if cloud.edge_test == EdgeTest::Off || normal.dot(ray.direction).abs() < MIN_SLIT_COSINE {
+        return false;
+    }
+    let position = ray.at(disc.distance);
+    let EdgeTestResult { enclosed, sparse } =
+        evaluate_one::<L, false>(&cloud.points, position, around_ray);
+    enclosed & !sparse != 0
 }
 
 /// Traces all rays together until each has a hit within the edge of the surface, or hits nothing more.
