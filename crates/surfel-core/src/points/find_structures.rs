@@ -28,6 +28,8 @@ const N_WIDEST_NEIGHBORS: usize = 144;
 const MAX_WIDEST_VARIATION: f32 = 0.03;
 /// Number of neighbours that vote on the structure of a point.
 const N_VOTERS: usize = 8;
+/// Indices of the neighbours that vote on the structure of a point, `u32::MAX` where there are fewer.
+pub type Voters = [u32; N_VOTERS];
 /// Number of rounds in which points take over half of their neighbours' mean.
 const N_ROUNDS: usize = 12;
 /// Share of scattered points around a point, after all rounds, that makes it a scattered one.
@@ -47,7 +49,7 @@ const N_ISLAND_ROUNDS: usize = 8;
 const MIN_SHARE_NEAR_SCATTER: f32 = 0.02;
 
 /// Finds the structure of each point from the planes through its neighbours and the distances to the most distant
-/// of them.
+/// of them. `voters` are those of each point; if it is empty, they are searched where they are needed.
 ///
 /// # Errors
 ///
@@ -56,6 +58,7 @@ pub fn find_structures(
     tree: &KdTree,
     fits: &[PlaneFit],
     radii: &[f32],
+    voters: Vec<Voters>,
     progress: &dyn Progress,
 ) -> Result<(Vec<PointShape>, StructureReport)> {
     let positions = tree.positions();
@@ -82,7 +85,7 @@ pub fn find_structures(
         }
     }
     let n_rough = fits.par_iter().filter(|fit| !is_line(fit) && !is_surface(fit)).count();
-    let structures = smoothed(tree, &shapes, n_rough, typical.radius, progress)?;
+    let structures = smoothed(tree, &shapes, voters, n_rough, typical.radius, progress)?;
     let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
         settle(tree, point, radii[point], *structure, shape);
     };
@@ -93,6 +96,15 @@ pub fn find_structures(
     clamp_solids(&mut shapes, Structure::Scatter, typical.radius);
     let report = StructureReport::of(&shapes);
     Ok((shapes, report))
+}
+
+/// Returns the voters among the neighbours of a point, which come nearest first.
+pub fn voters(neighbors: &[Neighbor]) -> Voters {
+    let mut indices = [u32::MAX; N_VOTERS];
+    for (index, neighbor) in indices.iter_mut().zip(neighbors) {
+        *index = neighbor.index;
+    }
+    indices
 }
 
 /// Makes each point stand for itself.
@@ -213,6 +225,7 @@ fn decide(
 fn smoothed(
     tree: &KdTree,
     shapes: &[PointShape],
+    voters: Vec<Voters>,
     n_rough: usize,
     typical_radius: f32,
     progress: &dyn Progress,
@@ -226,18 +239,16 @@ fn smoothed(
     let is_vegetated = !is_noisy && MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32;
     let min_scattered = if is_noisy { MIN_SCATTERED_IN_NOISE } else { MIN_SCATTERED };
     let max_radius = if is_vegetated { SPARSE * typical_radius } else { f32::INFINITY };
-    let voters = |_: usize, neighbors: &[Neighbor]| {
-        let mut indices = [u32::MAX; N_VOTERS];
-        for (index, neighbor) in indices.iter_mut().zip(neighbors) {
-            *index = neighbor.index;
+    let voters = match voters.is_empty() {
+        true => {
+            tree.map(Neighborhood::Nearest(N_VOTERS), progress, |_, found| self::voters(found))?
         }
-        indices
+        false => voters,
     };
-    let voters = tree.map(Neighborhood::Nearest(N_VOTERS), progress, voters)?;
     let mut shares: Vec<f32> =
         own.clone().map(|structure| f32::from(u8::from(structure == Structure::Scatter))).collect();
     for _ in 0..N_ROUNDS {
-        let mixed = |(own, voters): (&f32, &[u32; N_VOTERS])| {
+        let mixed = |(own, voters): (&f32, &Voters)| {
             let of_voters = voters.iter().filter(|voter| **voter != u32::MAX);
             let n_voters = of_voters.clone().count().max(1) as f32;
             let sum: f32 = of_voters.map(|voter| shares[*voter as usize]).sum();

@@ -1,96 +1,21 @@
 //! Preparation: cleans a cloud, thins and denoises it, and adds the normals and radii that it lacks.
 
-use super::clean::{CleanReport, Duplicates, clean};
-use super::denoise::{Denoise, DenoiseReport, denoise};
-use super::find_structures::{all_scattered, find_structures};
-use super::free_space::narrow_to_free_space;
-use super::jets::{JetFit, MIN_JET_NEIGHBORS, fit_nearest_jet, refine_normals};
+use super::clean::{CleanReport, clean};
+use super::denoise::{DenoiseReport, denoise};
+use super::estimate::{Estimates, Missing, estimate, find_shapes};
 use super::mixed_pixels::{MixedPixels, without_mixed_pixels};
-use super::neighbors::{KdTree, Neighbor, NeighborMethod, Neighborhood, map_neighborhoods};
-use super::normals::{NormalReport, PlaneFit, fill_missing, fit_plane};
+use super::neighbors::Neighborhood;
+use super::normals::{NormalReport, PlaneFit, fill_missing};
 use super::orient::{Orientation, has_stations, orient, turn_to_stations};
-use super::outliers::{OutlierRemoval, remove_outliers};
-use super::radius::{DistanceSample, Radius, RadiusReport, median_distance};
-use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
-use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
-use super::subsample::{Subsample, subsample};
+use super::outliers::remove_outliers;
+use super::preparation::{Preparation, SURFACE_VARIATION};
+use super::radius::RadiusReport;
+use super::structure::{PointShape, Structure, StructureReport};
+use super::subsample::subsample;
 use super::{PointCloud, PreparedCloud, Scalar, Values};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::progress::Progress;
-
-/// Name of the scalar column that `Preparation::keep_variation` adds.
-pub const SURFACE_VARIATION: &str = "surface_variation";
-
-/// Settings of [`prepare`]. The default suits raw scans.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Preparation {
-    /// The choice whether duplicates are dropped.
-    pub duplicates: Duplicates,
-    /// The choice whether points in the air between two surfaces are dropped, where the grid of a scan tells them.
-    pub mixed_pixels: MixedPixels,
-    /// The points to keep; none keeps all.
-    pub subsample: Option<Subsample>,
-    /// The outliers to remove; none keeps all points.
-    pub remove_outliers: Option<OutlierRemoval>,
-    /// The choice whether noisy points are moved onto their surface.
-    pub denoise: Denoise,
-    /// The method that finds neighbours.
-    pub neighbors: NeighborMethod,
-    /// The neighbours whose plane gives a normal. Methods that know only distances use the median distance to k.
-    pub normals: Neighborhood,
-    /// The signs of normals. Applies if all normals are estimated; `Orientation::Auto` also turns those of the file to
-    /// the stations, if these are known.
-    pub orientation: Orientation,
-    /// The choice of radii.
-    pub radius: Radius,
-    /// The choice of structures. Applies if all radii are estimated by `Radius::Adaptive`.
-    pub structure: StructureChoice,
-    /// True to narrow what reaches into space through which a scanner saw, where the grid of a scan tells it. Applies if
-    /// structures are found.
-    pub free_space: bool,
-    /// True to add the column `SURFACE_VARIATION`: 0 on a plane, up to 1/3.
-    pub keep_variation: bool,
-    /// Seed of all random choices.
-    pub seed: u64,
-}
-
-impl Default for Preparation {
-    fn default() -> Self {
-        Self {
-            duplicates: Duplicates::default(),
-            mixed_pixels: MixedPixels::default(),
-            subsample: None,
-            remove_outliers: None,
-            denoise: Denoise::default(),
-            neighbors: NeighborMethod::Knn,
-            normals: Neighborhood::Nearest(16),
-            orientation: Orientation::None,
-            radius: Radius::default(),
-            structure: StructureChoice::default(),
-            free_space: true,
-            keep_variation: false,
-            seed: 0,
-        }
-    }
-}
-
-impl Preparation {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    ///
-    /// Returns [`Error::Setting`] for a value out of range, as [`prepare`] does.
-    pub fn check(&self) -> Result<()> {
-        self.radius.check()?;
-        if let Neighborhood::Nearest(k @ 0..2) = self.normals {
-            let expected = "at least 2, to span a plane";
-            let name = "number of neighbours for normals";
-            return Err(Error::Setting { name, found: k.to_string(), expected });
-        }
-        Ok(())
-    }
-}
 
 /// Report of [`prepare`]. A field is none if the cloud already had the column.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -154,7 +79,8 @@ pub fn prepare(
         true => find_shapes(&cloud, &mut estimates, preparation, progress)?,
         false => None,
     };
-    if let Some((fits, neighborhood)) = estimates.fits {
+    let Estimates { fits, radii, .. } = estimates;
+    if let Some((fits, neighborhood)) = fits {
         if preparation.keep_variation {
             add_variation(&mut cloud, &fits);
         }
@@ -169,7 +95,7 @@ pub fn prepare(
     if by_stations && !estimated.normals {
         turn_given_normals(&mut cloud, progress);
     }
-    if let Some((radii, found)) = estimates.radii {
+    if let Some((radii, found)) = radii {
         add_radii(&mut cloud, radii);
         report.radii = Some(found);
     }
@@ -179,131 +105,6 @@ pub fn prepare(
     }
     add_to_morphs(&mut cloud, &estimated, preparation, progress)?;
     Ok((PreparedCloud::new(cloud)?, report))
-}
-
-/// The columns to estimate.
-struct Missing {
-    normals: bool,
-    fits: bool,
-    radii: bool,
-    structure: bool,
-}
-
-impl Missing {
-    /// Columns with missing entries.
-    fn any(cloud: &PointCloud, preparation: &Preparation) -> Self {
-        let normals = cloud.normals.as_ref().is_none_or(|normals| normals.contains(&Vec3::ZERO));
-        let radii = cloud.radii.as_ref().is_none_or(|radii| radii.contains(&0.0));
-        // Points that move may change their structure.
-        let structure = cloud.radii.is_none()
-            && cloud.morphs.is_empty()
-            && cloud.skin.is_none()
-            && cloud.structures().is_none()
-            && preparation.structure != StructureChoice::Surface
-            && matches!(preparation.radius, Radius::Adaptive { .. });
-        let is_searched = structure && preparation.structure == StructureChoice::Auto;
-        let fits = normals || preparation.keep_variation || is_searched;
-        Self { normals, fits, radii, structure }
-    }
-
-    /// Columns that the cloud lacks altogether.
-    fn all(cloud: &PointCloud) -> Self {
-        let (normals, radii) = (cloud.normals.is_none(), cloud.radii.is_none());
-        Self { normals, fits: normals, radii, structure: false }
-    }
-}
-
-/// Estimates from neighbourhoods, none where nothing is missing.
-#[derive(Default)]
-struct Estimates {
-    fits: Option<(Vec<PlaneFit>, Neighborhood)>,
-    radii: Option<(Vec<f32>, RadiusReport)>,
-}
-
-/// Fits planes and estimates radii as far as they are missing. `normals` are those that denoising has found, zero where
-/// it has not.
-fn estimate(
-    positions: &[Vec3],
-    normals: Option<&[Vec3]>,
-    preparation: &Preparation,
-    missing: &Missing,
-    progress: &dyn Progress,
-) -> Result<Estimates> {
-    let Preparation { radius, seed, .. } = *preparation;
-    let k_radius = match radius {
-        Radius::Adaptive { k } if missing.radii => Some(k),
-        _ => None,
-    };
-    let mut estimates = match (preparation.neighbors, preparation.normals) {
-        (NeighborMethod::Knn, Neighborhood::Nearest(k)) if missing.fits => {
-            estimate_by_nearest(positions, normals, k, k_radius, progress)?
-        }
-        _ if missing.fits => {
-            Estimates { fits: Some(fit_planes(positions, preparation, progress)?), radii: None }
-        }
-        _ => Estimates::default(),
-    };
-    if missing.radii && estimates.radii.is_none() {
-        estimates.radii = Some(estimate_radii(positions, radius, seed, progress)?);
-    }
-    Ok(estimates)
-}
-
-/// Fits planes and cubics to the nearest neighbours, and estimates radii from the same search if `k_radius` is given.
-fn estimate_by_nearest(
-    positions: &[Vec3],
-    normals: Option<&[Vec3]>,
-    k_normal: usize,
-    k_radius: Option<usize>,
-    progress: &dyn Progress,
-) -> Result<Estimates> {
-    let tree = KdTree::new(positions, progress)?;
-    let visit = |point: usize, neighbors: &[Neighbor]| {
-        let fit = fit_plane(positions, point, &neighbors[..k_normal.min(neighbors.len())]);
-        let jet = fit_nearest_jet(positions, point, neighbors, &fit, k_normal);
-        (fit, jet, k_radius.map_or(0.0, |k| kth_distance(neighbors, k)))
-    };
-    let k = k_normal.max(k_radius.unwrap_or(0)).max(MIN_JET_NEIGHBORS);
-    let found = tree.map(Neighborhood::Nearest(k), progress, visit)?;
-    let distances = found.iter().map(|(.., distance)| *distance).collect();
-    let jets: Vec<Option<JetFit>> = found.iter().map(|(_, jet, _)| *jet).collect();
-    let mut fits: Vec<PlaneFit> = found.into_iter().map(|(fit, ..)| fit).collect();
-    refine_normals(&tree, &mut fits, &jets, normals, progress)?;
-    let radii = k_radius.map(|k| clamp_outlier_radii(&tree, k, distances, progress)).transpose()?;
-    Ok(Estimates { fits: Some((fits, Neighborhood::Nearest(k_normal))), radii })
-}
-
-/// Finds the structures of points, and replaces the estimates by those of their structure.
-fn find_shapes(
-    cloud: &PointCloud,
-    estimates: &mut Estimates,
-    preparation: &Preparation,
-    progress: &dyn Progress,
-) -> Result<Option<(Vec<PointShape>, StructureReport)>> {
-    let Estimates { fits, radii: Some((radii, report)) } = estimates else { return Ok(None) };
-    let tree = KdTree::new(&cloud.positions, progress)?;
-    let (mut shapes, mut found) = match (preparation.structure, &mut *fits) {
-        (StructureChoice::Auto, Some((fits, _))) => find_structures(&tree, fits, radii, progress)?,
-        _ => all_scattered(&tree, radii, progress)?,
-    };
-    if preparation.free_space {
-        let fits = fits.as_ref().map_or(&[][..], |(fits, _)| fits);
-        let report = narrow_to_free_space(cloud, &tree, fits, &mut shapes, progress)?;
-        report.line().iter().for_each(|line| progress.choice(line, &["free_space"]));
-        if 0 < report.n_lines {
-            found = StructureReport::of(&shapes);
-        }
-    }
-    if let (StructureChoice::Auto, Some((fits, _))) = (preparation.structure, fits) {
-        for (fit, shape) in fits.iter_mut().zip(&shapes) {
-            if shape.structure == Structure::Surface {
-                fit.normal = shape.normal;
-            }
-        }
-    }
-    *radii = shapes.iter().map(|shape| shape.radius).collect();
-    report.update(radii);
-    Ok(Some((shapes, found)))
 }
 
 /// Adds the column of structures, and gives the points of lines the direction of the line in place of a normal.
@@ -317,24 +118,6 @@ fn add_structures(cloud: &mut PointCloud, shapes: &[PointShape]) {
         }
     }
     cloud.set_structures(&structures);
-}
-
-fn fit_planes(
-    positions: &[Vec3],
-    preparation: &Preparation,
-    progress: &dyn Progress,
-) -> Result<(Vec<PlaneFit>, Neighborhood)> {
-    let Preparation { neighbors: method, normals: mut neighborhood, seed, .. } = *preparation;
-    if let (Neighborhood::Nearest(k), NeighborMethod::Grid | NeighborMethod::ScanLine) =
-        (neighborhood, method)
-    {
-        // Half of the k nearest points lie within the median distance, all k within about sqrt(2) times it.
-        let sample = DistanceSample { k: k.min(positions.len()), samples: 100, seed };
-        let distance = std::f32::consts::SQRT_2 * median_distance(positions, &sample, progress)?;
-        neighborhood = Neighborhood::Within(distance);
-    }
-    let fit = |point: usize, neighbors: &[Neighbor]| fit_plane(positions, point, neighbors);
-    Ok((map_neighborhoods(positions, method, neighborhood, progress, fit)?, neighborhood))
 }
 
 fn add_variation(cloud: &mut PointCloud, fits: &[PlaneFit]) {
@@ -453,7 +236,8 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
-    use crate::points::STRUCTURE;
+    use crate::points::neighbors::NeighborMethod;
+    use crate::points::{Radius, STRUCTURE, StructureChoice, Subsample};
     use crate::progress::NoProgress;
 
     fn ball(n_points: usize) -> PointCloud {

@@ -1,0 +1,187 @@
+//! Estimates of normals, radii and structures from the neighbours of each point, as far as a cloud lacks them.
+
+use super::PointCloud;
+use super::find_structures::{Voters, all_scattered, find_structures, voters};
+use super::free_space::narrow_to_free_space;
+use super::jets::{JetFit, MIN_JET_NEIGHBORS, fit_nearest_jet, refine_normals};
+use super::neighbors::{KdTree, Neighbor, NeighborMethod, Neighborhood, map_neighborhoods};
+use super::normals::{PlaneFit, fit_plane};
+use super::preparation::Preparation;
+use super::radius::{DistanceSample, Radius, RadiusReport, median_distance};
+use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
+use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
+use crate::error::Result;
+use crate::math::Vec3;
+use crate::progress::Progress;
+
+/// The columns to estimate.
+pub struct Missing {
+    pub normals: bool,
+    pub fits: bool,
+    pub radii: bool,
+    pub structure: bool,
+}
+
+impl Missing {
+    /// Columns with missing entries.
+    pub fn any(cloud: &PointCloud, preparation: &Preparation) -> Self {
+        let normals = cloud.normals.as_ref().is_none_or(|normals| normals.contains(&Vec3::ZERO));
+        let radii = cloud.radii.as_ref().is_none_or(|radii| radii.contains(&0.0));
+        // Points that move may change their structure.
+        let structure = cloud.radii.is_none()
+            && cloud.morphs.is_empty()
+            && cloud.skin.is_none()
+            && cloud.structures().is_none()
+            && preparation.structure != StructureChoice::Surface
+            && matches!(preparation.radius, Radius::Adaptive { .. });
+        let is_searched = structure && preparation.structure == StructureChoice::Auto;
+        let fits = normals || preparation.keep_variation || is_searched;
+        Self { normals, fits, radii, structure }
+    }
+
+    /// Columns that the cloud lacks altogether.
+    pub fn all(cloud: &PointCloud) -> Self {
+        let (normals, radii) = (cloud.normals.is_none(), cloud.radii.is_none());
+        Self { normals, fits: normals, radii, structure: false }
+    }
+}
+
+/// Estimates from neighbourhoods, none where nothing is missing.
+#[derive(Default)]
+pub struct Estimates<'a> {
+    pub fits: Option<(Vec<PlaneFit>, Neighborhood)>,
+    pub radii: Option<(Vec<f32>, RadiusReport)>,
+    /// The tree of the points, if one was built.
+    tree: Option<KdTree<'a>>,
+    /// The voters on the structure of each point, if structures are missing and they were found.
+    voters: Vec<Voters>,
+}
+
+/// Fits planes and estimates radii as far as they are missing. `normals` are those that denoising has found, zero where
+/// it has not.
+pub fn estimate<'a>(
+    positions: &'a [Vec3],
+    normals: Option<&[Vec3]>,
+    preparation: &Preparation,
+    missing: &Missing,
+    progress: &dyn Progress,
+) -> Result<Estimates<'a>> {
+    let Preparation { radius, seed, .. } = *preparation;
+    let k_radius = match radius {
+        Radius::Adaptive { k } if missing.radii => Some(k),
+        _ => None,
+    };
+    let mut estimates = match (preparation.neighbors, preparation.normals) {
+        (NeighborMethod::Knn, Neighborhood::Nearest(k)) if missing.fits => {
+            let has_voters = missing.structure && preparation.structure == StructureChoice::Auto;
+            let search = NearestSearch { k_normal: k, k_radius, has_voters };
+            estimate_by_nearest(positions, normals, &search, progress)?
+        }
+        _ if missing.fits => {
+            let fits = Some(fit_planes(positions, preparation, progress)?);
+            Estimates { fits, ..Estimates::default() }
+        }
+        _ => Estimates::default(),
+    };
+    if missing.radii && estimates.radii.is_none() {
+        estimates.radii = Some(estimate_radii(positions, radius, seed, progress)?);
+    }
+    Ok(estimates)
+}
+
+/// The results that one search for the nearest neighbours of each point is to give.
+struct NearestSearch {
+    /// Number of neighbours of a plane.
+    k_normal: usize,
+    /// Rank of the neighbour whose distance is the radius, if radii are missing.
+    k_radius: Option<usize>,
+    /// True if the voters on structures are wanted.
+    has_voters: bool,
+}
+
+/// Fits planes and cubics to the nearest neighbours, and takes radii and voters from the same search.
+fn estimate_by_nearest<'a>(
+    positions: &'a [Vec3],
+    normals: Option<&[Vec3]>,
+    search: &NearestSearch,
+    progress: &dyn Progress,
+) -> Result<Estimates<'a>> {
+    let NearestSearch { k_normal, k_radius, has_voters } = *search;
+    let tree = KdTree::new(positions, progress)?;
+    let visit = |point: usize, neighbors: &[Neighbor]| {
+        let fit = fit_plane(positions, point, &neighbors[..k_normal.min(neighbors.len())]);
+        let jet = fit_nearest_jet(positions, point, neighbors, &fit, k_normal);
+        let distance = k_radius.map_or(0.0, |k| kth_distance(neighbors, k));
+        let voters = has_voters.then(|| voters(neighbors));
+        (fit, jet, distance, voters)
+    };
+    let k = k_normal.max(k_radius.unwrap_or(0)).max(MIN_JET_NEIGHBORS);
+    let found = tree.map(Neighborhood::Nearest(k), progress, visit)?;
+    let distances = found.iter().map(|(_, _, distance, _)| *distance).collect();
+    let voters = found.iter().filter_map(|(.., voters)| *voters).collect();
+    let jets: Vec<Option<JetFit>> = found.iter().map(|(_, jet, ..)| *jet).collect();
+    let mut fits: Vec<PlaneFit> = found.into_iter().map(|(fit, ..)| fit).collect();
+    refine_normals(&tree, &mut fits, &jets, normals, progress)?;
+    let radii = k_radius.map(|k| clamp_outlier_radii(&tree, k, distances, progress)).transpose()?;
+    let fits = Some((fits, Neighborhood::Nearest(k_normal)));
+    Ok(Estimates { fits, radii, tree: Some(tree), voters })
+}
+
+/// Finds the structures of points, and replaces the estimates by those of their structure.
+pub fn find_shapes<'a>(
+    cloud: &'a PointCloud,
+    estimates: &mut Estimates<'a>,
+    preparation: &Preparation,
+    progress: &dyn Progress,
+) -> Result<Option<(Vec<PointShape>, StructureReport)>> {
+    let Estimates { fits, radii: Some((radii, report)), tree, voters } = estimates else {
+        return Ok(None);
+    };
+    let tree = match tree.take() {
+        Some(tree) => tree,
+        None => KdTree::new(&cloud.positions, progress)?,
+    };
+    let voters = std::mem::take(voters);
+    let (mut shapes, mut found) = match (preparation.structure, &mut *fits) {
+        (StructureChoice::Auto, Some((fits, _))) => {
+            find_structures(&tree, fits, radii, voters, progress)?
+        }
+        _ => all_scattered(&tree, radii, progress)?,
+    };
+    if preparation.free_space {
+        let fits = fits.as_ref().map_or(&[][..], |(fits, _)| fits);
+        let report = narrow_to_free_space(cloud, &tree, fits, &mut shapes, progress)?;
+        report.line().iter().for_each(|line| progress.choice(line, &["free_space"]));
+        if 0 < report.n_lines {
+            found = StructureReport::of(&shapes);
+        }
+    }
+    if let (StructureChoice::Auto, Some((fits, _))) = (preparation.structure, fits) {
+        for (fit, shape) in fits.iter_mut().zip(&shapes) {
+            if shape.structure == Structure::Surface {
+                fit.normal = shape.normal;
+            }
+        }
+    }
+    *radii = shapes.iter().map(|shape| shape.radius).collect();
+    report.update(radii);
+    Ok(Some((shapes, found)))
+}
+
+fn fit_planes(
+    positions: &[Vec3],
+    preparation: &Preparation,
+    progress: &dyn Progress,
+) -> Result<(Vec<PlaneFit>, Neighborhood)> {
+    let Preparation { neighbors: method, normals: mut neighborhood, seed, .. } = *preparation;
+    if let (Neighborhood::Nearest(k), NeighborMethod::Grid | NeighborMethod::ScanLine) =
+        (neighborhood, method)
+    {
+        // Half of the k nearest points lie within the median distance, all k within about sqrt(2) times it.
+        let sample = DistanceSample { k: k.min(positions.len()), samples: 100, seed };
+        let distance = std::f32::consts::SQRT_2 * median_distance(positions, &sample, progress)?;
+        neighborhood = Neighborhood::Within(distance);
+    }
+    let fit = |point: usize, neighbors: &[Neighbor]| fit_plane(positions, point, neighbors);
+    Ok((map_neighborhoods(positions, method, neighborhood, progress, fit)?, neighborhood))
+}

@@ -1,0 +1,85 @@
+//! Settings of the preparation of a cloud.
+
+use super::clean::Duplicates;
+use super::denoise::Denoise;
+use super::mixed_pixels::MixedPixels;
+use super::neighbors::{NeighborMethod, Neighborhood};
+use super::orient::Orientation;
+use super::outliers::OutlierRemoval;
+use super::radius::Radius;
+use super::structure::StructureChoice;
+use super::subsample::Subsample;
+use crate::error::{Error, Result};
+
+/// Name of the scalar column that `Preparation::keep_variation` adds.
+pub const SURFACE_VARIATION: &str = "surface_variation";
+
+/// Settings of [`prepare`](super::prepare). The default suits raw scans.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Preparation {
+    /// The choice whether duplicates are dropped.
+    pub duplicates: Duplicates,
+    /// The choice whether points in the air between two surfaces are dropped, where the grid of a scan tells them.
+    pub mixed_pixels: MixedPixels,
+    /// The points to keep; none keeps all.
+    pub subsample: Option<Subsample>,
+    /// The outliers to remove; none keeps all points.
+    pub remove_outliers: Option<OutlierRemoval>,
+    /// The choice whether noisy points are moved onto their surface.
+    pub denoise: Denoise,
+    /// The method that finds neighbours.
+    pub neighbors: NeighborMethod,
+    /// The neighbours whose plane gives a normal. Methods that know only distances use the median distance to k.
+    pub normals: Neighborhood,
+    /// The signs of normals. Applies if all normals are estimated; `Orientation::Auto` also turns those of the file to
+    /// the stations, if these are known.
+    pub orientation: Orientation,
+    /// The choice of radii.
+    pub radius: Radius,
+    /// The choice of structures. Applies if all radii are estimated by `Radius::Adaptive`.
+    pub structure: StructureChoice,
+    /// True to narrow what reaches into space through which a scanner saw, where the grid of a scan tells it. Applies if
+    /// structures are found.
+    pub free_space: bool,
+    /// True to add the column `SURFACE_VARIATION`: 0 on a plane, up to 1/3.
+    pub keep_variation: bool,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+impl Default for Preparation {
+    fn default() -> Self {
+        Self {
+            duplicates: Duplicates::default(),
+            mixed_pixels: MixedPixels::default(),
+            subsample: None,
+            remove_outliers: None,
+            denoise: Denoise::default(),
+            neighbors: NeighborMethod::Knn,
+            normals: Neighborhood::Nearest(16),
+            orientation: Orientation::None,
+            radius: Radius::default(),
+            structure: StructureChoice::default(),
+            free_space: true,
+            keep_variation: false,
+            seed: 0,
+        }
+    }
+}
+
+impl Preparation {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Error::Setting`] for a value out of range, as [`prepare`](super::prepare) does.
+    pub fn check(&self) -> Result<()> {
+        self.radius.check()?;
+        if let Neighborhood::Nearest(k @ 0..2) = self.normals {
+            let expected = "at least 2, to span a plane";
+            let name = "number of neighbours for normals";
+            return Err(Error::Setting { name, found: k.to_string(), expected });
+        }
+        Ok(())
+    }
+}
