@@ -1,6 +1,6 @@
 //! Options of the program: the name of a key's option, and a description as words of a command line.
 
-use super::SceneDescription;
+use super::{SceneDescription, has_option, is_list};
 use serde_json::Value;
 
 /// Returns the name of the option for the path of a key: `camera-view-angle` for `camera.view_angle`.
@@ -29,11 +29,12 @@ pub fn value_text(value: &Value) -> String {
 impl SceneDescription {
     /// Writes the keys that differ from their defaults as words of a command line, without files and objects.
     pub fn to_options(&self) -> Vec<String> {
-        let options = self.non_default().into_iter().flat_map(|(path, value)| {
+        let values = self.non_default().into_iter().filter(|(path, _)| has_option(path));
+        let options = values.flat_map(|(path, value)| {
             let option = option_name(&path);
             match value {
                 Value::Bool(true) => vec![format!("--{option}")],
-                Value::Array(choices) if path == "material" => choices
+                Value::Array(choices) if is_list(&path) => choices
                     .iter()
                     .map(|value| format!("--{option}={}", value_text(value)))
                     .collect(),

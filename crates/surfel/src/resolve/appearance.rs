@@ -35,6 +35,9 @@ pub fn finish_graph(
         apply_surface_and_color(cloud, &settings, up, progress)
             .map_err(|cause| scene.content_error(geometry, description, cause))
     })?;
+    for (nodes, object) in scene.objects.iter().zip(&description.objects) {
+        graph.nodes[nodes.node].is_visible = object.visible();
+    }
     let mut sequences = scene.sequences_under(description);
     clip(scene, &mut graph, &mut sequences, description)?;
     assign_materials(scene, &mut graph, &mut sequences, description);

@@ -33,6 +33,8 @@ pub struct LoadedScene {
     pub graph: Graph<PointCloud>,
     /// Facts that each file states about itself.
     pub file_infos: Vec<FileInfo>,
+    /// The files that were read, as they were read.
+    pub read_files: Vec<ReadFile>,
     /// Movement of the camera.
     pub(super) camera_motion: Option<CameraMotion>,
     /// The environment map, upright.
@@ -48,6 +50,19 @@ pub struct LoadedScene {
     keeps_all_columns: bool,
 }
 
+/// The content of a file, and what was unusual about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReadFile {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// Number of points.
+    pub n_points: usize,
+    /// Number of triangles.
+    pub n_triangles: usize,
+    /// Notes of the reader, as of what was repaired or left out.
+    pub notes: Vec<String>,
+}
+
 /// Data of the files that are kept besides those that a picture needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct KeepOptions {
@@ -60,7 +75,7 @@ pub struct KeepOptions {
 /// The nodes of an object.
 #[derive(Clone, Debug)]
 pub(super) struct ObjectNodes {
-    node: usize,
+    pub node: usize,
     /// Nodes of its files, without those of its instances.
     content: Range<usize>,
     /// Nodes of its files and instances.
@@ -86,6 +101,7 @@ impl LoadedScene {
         let mut scene = Self {
             graph: Graph::default(),
             file_infos: Vec::new(),
+            read_files: Vec::new(),
             camera_motion: camera_motion(description)?,
             environment: load_environment(description, progress)?,
             files: Vec::new(),
