@@ -33,6 +33,7 @@ const VIEWS = {
   'a clip box': { clip_box: '([562320,562335.5],[4183190,4183210],[140,160])' },
   'a clip plane': { clip_plane: [562330, 4183200, 149, 0.6, 0, 0.8], radius_scale: 1.5 },
   'glass and metal': { material: ['house.obj=glass:ior=1.3,color=#88ccff', 'town.ply=metal:roughness=0.4'], max_depth: 5 },
+  'a hidden mesh, and colours of one file': { object_settings: ['house.obj:visible=false', 'town.ply:color=intensity'] },
   'an orthographic camera': { camera: { position: [562334, 4183150, 190], focal_point: CENTER, view_up: [0, 0, 1], view_angle: null, orthographic: 31.5 } },
   'another camera and light': {
     camera: { position: [562380.5, 4183230.25, 170.125], focal_point: CENTER, view_angle: 50 },

@@ -54,6 +54,27 @@ test('a picked point has the attributes in the file', async () => {
   }
 });
 
+test('the status line has the coordinates of the point under the mouse, but not during drags', async () => {
+  const [pixel, other] = [await pixelAt(page, 0.6, 0.75), await pixelAt(page, 0.5, 0.8)];
+  const [point] = await pointsAt([pixel]);
+  const cursor = page.locator('#cursor');
+  await page.mouse.move(other.x, other.y);
+  await page.mouse.move(pixel.x, pixel.y);
+  await page.waitForFunction((text) => document.getElementById('cursor').textContent === text, positionOf(point).join('  '));
+  await page.mouse.down();
+  await page.mouse.move(pixel.x + 60, pixel.y, { steps: 4 });
+  assert.equal(await cursor.textContent(), '');
+  const n_answered = await page.evaluate(() => window.picks.n_answered);
+  await page.mouse.move(other.x, other.y, { steps: 4 });
+  await page.waitForTimeout(300);
+  assert.equal(await cursor.textContent(), '');
+  assert.equal(await page.evaluate(() => window.picks.n_answered), n_answered);
+  await page.mouse.up();
+  await page.locator('#cursor:not(:empty)').waitFor();
+  await page.locator('#panel-fold').hover();
+  assert.equal(await cursor.textContent(), '');
+});
+
 test('an animated point has its position at the current time', async () => {
   const rising = await openPage((await serve(['rising.toml'], ...QUICK)).link);
   await show(rising, { time: 1 });

@@ -61,7 +61,7 @@ export class MeasureTool {
   /** Finishes the figure if it has enough points. */
   finish() {
     const kind = this.viewer.tool;
-    if (this.#points.length < KINDS[kind].least) return;
+    if (!KINDS[kind] || this.#points.length < KINDS[kind].least) return;
     const figure = { kind, name: this.#newName(kind), points: this.#points };
     if (kind === 'profile') figure.width = PROFILE_WIDTH * pathLength(figure.points);
     this.cancel();

@@ -53,6 +53,13 @@ pub trait SceneProvider: Send + Sync + 'static {
         settings.clone()
     }
 
+    /// The histogram of a column of all points, as the page shows it: `low`, `high` and `counts` of ranges of equal width
+    /// between them.
+    ///
+    /// # Errors
+    /// Fails if no points have the column.
+    fn histogram(&self, column: &str) -> Result<Value>;
+
     /// These settings as a command line and as scene files.
     ///
     /// # Errors

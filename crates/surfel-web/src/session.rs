@@ -10,9 +10,10 @@ use crate::pending_changes::{PendingChanges, SettingsChange};
 use crate::pick;
 use crate::profile;
 use crate::progress_reporter::{ProgressReporter, ProgressUpdate};
-use crate::scene_provider::{Error, Result, SettingsMap};
+use crate::scene_provider::{Error, PreparedScene, Result, SettingsMap};
 use crate::scene_update;
 use crate::server_state::ServerState;
+use crate::volume;
 use axum::extract::ws::{Message, WebSocket};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt, StreamExt};
@@ -21,7 +22,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use surfel_core::flat::ProfileLine;
+use surfel_core::flat::{ProfileLine, VolumeQuery};
 use surfel_core::progress::Progress;
 use tokio::sync::{Semaphore, mpsc};
 use tokio::time::timeout;
@@ -183,6 +184,10 @@ impl Session {
             Incoming::Profile { id, points, width, up } => {
                 self.profile(id, profile::parse(&points, width, up)).await;
             }
+            Incoming::Volume { id, points, up, base, cell_size } => {
+                self.volume(id, volume::parse(&points, up, &base, cell_size)).await;
+            }
+            Incoming::Histogram { id, column } => self.histogram(id, column).await,
             Incoming::Save { id, width, height } => self.save(id, width, height).await,
             Incoming::Cancel { id } => self.saves.get(&id).into_iter().for_each(cancel),
             Incoming::Export { id, width, height } => self.export(id, width, height).await,
@@ -240,19 +245,45 @@ impl Session {
     }
 
     async fn profile(&self, id: u32, line: Result<ProfileLine>) {
-        let line = match line {
-            Ok(line) => line,
+        let (line, scene) = match line.and_then(|line| Ok((line, self.scene()?))) {
+            Ok(found) => found,
             Err(error) => return self.reject(RequestRef::Id(id), &error).await,
-        };
-        let Some(scene) = self.client.view().scene else {
-            let error = Error::invalid_request("there is nothing to show yet");
-            return self.reject(RequestRef::Id(id), &error).await;
         };
         let find = move |progress: &dyn Progress| {
             let profile = profile::profile(&scene, &line, progress)?;
             Ok(json!({ "type": "profiled", "id": id, "profile": profile }))
         };
         self.answer(id, find).await;
+    }
+
+    async fn volume(&self, id: u32, query: Result<VolumeQuery>) {
+        let (query, scene) = match query.and_then(|query| Ok((query, self.scene()?))) {
+            Ok(found) => found,
+            Err(error) => return self.reject(RequestRef::Id(id), &error).await,
+        };
+        let find = move |progress: &dyn Progress| {
+            let volume = volume::volume(&scene, &query, progress)?;
+            Ok(json!({ "type": "measured", "id": id, "volume": volume }))
+        };
+        self.answer(id, find).await;
+    }
+
+    async fn histogram(&self, id: u32, column: String) {
+        let Some(provider) = self.state.provider.borrow().clone() else {
+            let error = Error::invalid_request("the files are still being loaded");
+            return self.reject(RequestRef::Id(id), &error).await;
+        };
+        let find = move |_: &dyn Progress| {
+            let histogram = provider.histogram(&column)?;
+            Ok(json!({ "type": "counted", "id": id, "histogram": histogram }))
+        };
+        self.answer(id, find).await;
+    }
+
+    /// The scene that the page shows.
+    fn scene(&self) -> Result<Arc<PreparedScene>> {
+        let scene = self.client.view().scene;
+        scene.ok_or_else(|| Error::invalid_request("there is nothing to show yet"))
     }
 
     /// Sends what `find` returns, unless too many answers are being found already.

@@ -245,6 +245,13 @@ impl SceneProvider for HillProvider {
         Ok(png.into_inner())
     }
 
+    fn histogram(&self, column: &str) -> Result<Value> {
+        match column {
+            "z" => Ok(json!({ "low": 0, "high": 2, "width": 1, "counts": [3, 0, 1] })),
+            _ => Err(Error::invalid_request(format!("no column {column}"))),
+        }
+    }
+
     fn export(&self, settings: &SettingsMap) -> Result<Export> {
         let json = Value::Object(settings.clone()).to_string();
         Ok(Export { command: "surfel render hill".into(), toml: String::new(), json })

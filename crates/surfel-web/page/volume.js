@@ -1,0 +1,85 @@
+// Volumes of polygons over a base plane: their requests to the server, results and controls.
+
+import { element } from './dom.js';
+import { showToast } from './toast.js';
+
+/** Duration without a change of the settings after which volumes are computed again. */
+const REST_MS = 600;
+const BASES = { lowest: 'lowest corner', mean: 'mean of the corners', height: 'height' };
+
+/** Whether the base and cell size of a volume from a link are valid. */
+export function isVolume({ base, cell_size }) {
+  const isBase = base === 'lowest' || base === 'mean' || Number.isFinite(base);
+  return isBase && (cell_size === undefined || (Number.isFinite(cell_size) && 0 < cell_size));
+}
+
+/** The results of a volume as rows of name, value and dimension; none until the server has computed it. */
+export function volumeResults({ volume }) {
+  if (!volume) return [];
+  return [
+    { name: 'Cut', value: volume.cut, dimension: 3 },
+    { name: 'Fill', value: volume.fill, dimension: 3 },
+    { name: 'Net', value: volume.cut - volume.fill, dimension: 3 },
+    { name: 'Level area', value: volume.area, dimension: 2 },
+    { name: 'Base height', value: volume.base, dimension: 1 },
+    { name: 'Cell size', value: volume.cell_size, dimension: 1 },
+    { name: 'Empty cells', value: 100 * volume.empty_fraction, dimension: 'percent' },
+  ];
+}
+
+/** Requests the volumes of figures that have none, and all of them again after a change of the settings. */
+export function setUpVolumes(viewer, measureTool) {
+  const requested = new WeakSet();
+  let timer = 0;
+
+  const request = async (figure) => {
+    requested.add(figure);
+    const { points, base, cell_size } = figure;
+    try {
+      const { volume } = await viewer.request({ type: 'volume', points, up: viewer.info.up, base, cell_size });
+      measureTool.complete(figure, { ...figure, volume });
+    } catch (error) {
+      showToast(error.message);
+    }
+  };
+  const requestAll = () => {
+    if (!viewer.isConnected) return;
+    for (const figure of measureTool.figures) {
+      if (figure.kind === 'volume' && !figure.volume && !requested.has(figure)) request(figure);
+    }
+  };
+  measureTool.figuresShown.listen(requestAll);
+  viewer.sceneChanged.listen(() => {
+    clearTimeout(timer);
+    if (!measureTool.figures.some(({ volume }) => volume)) return;
+    timer = setTimeout(() => {
+      for (const figure of measureTool.figures.filter(({ volume }) => volume)) {
+        const { volume, ...without } = figure;
+        measureTool.complete(figure, without);
+      }
+    }, REST_MS);
+  });
+}
+
+/** The controls of a volume's base and cell size; `replace` takes the changed figure. */
+export function volumeControls(figure, replace) {
+  const { volume, ...settings } = figure;
+  const isHeight = typeof figure.base === 'number';
+  const base = element('select', {
+    'aria-label': `Base of ${figure.name}`,
+    onchange: () => replace({ ...settings, base: base.value === 'height' ? volume?.base ?? 0 : base.value }),
+  }, ...Object.entries(BASES).map(([value, label]) => element('option', { value }, label)));
+  base.value = isHeight ? 'height' : figure.base;
+  const height = isHeight ? numberField('Height', figure.base, (value) => replace({ ...settings, base: value })) : null;
+  const cell = numberField('Cell size', figure.cell_size, (value) => {
+    const { cell_size, ...others } = settings;
+    replace(0 < value ? { ...others, cell_size: value } : others);
+  });
+  cell.querySelector('input').placeholder = 'automatic';
+  return element('div', { class: 'volume' }, element('label', {}, 'Base ', base), height, cell);
+}
+
+function numberField(label, value, change) {
+  const input = element('input', { type: 'number', step: 'any', value, onchange: () => change(input.valueAsNumber) });
+  return element('label', {}, `${label} `, input);
+}
