@@ -288,3 +288,25 @@ test('the axis cube turns the view to a side, by the mouse and by keys, and is h
   assert.ok(await other.locator('#axis-cube').isHidden());
   await closePage(other);
 });
+
+test('one tool of the toolbar is reached by Tab, the others by arrows', async () => {
+  const label = () => page.evaluate(() => document.activeElement.ariaLabel);
+  await page.locator('#viewport').focus();
+  await page.keyboard.press('Tab');
+  assert.equal(await label(), 'Pick point');
+  await page.keyboard.press('ArrowDown');
+  assert.equal(await label(), 'Measure distance');
+  await page.keyboard.press('End');
+  assert.equal(await label(), 'Controls');
+  await page.keyboard.press('ArrowRight');
+  assert.equal(await label(), 'Pick point');
+  await page.keyboard.press('ArrowLeft');
+  assert.equal(await label(), 'Controls');
+  assert.deepEqual(await page.locator('#toolbar [tabindex="0"]').evaluateAll((all) => all.map((one) => one.ariaLabel)), ['Controls']);
+  // What is disabled is passed over.
+  for (let i = 0; i < 6; i++) await page.keyboard.press('ArrowUp');
+  assert.equal(await label(), 'View at the start');
+  await page.keyboard.press('ArrowUp');
+  assert.equal(await label(), 'Height profile');
+  assert.deepEqual(await state(page, 'camera'), opening);
+});

@@ -9,6 +9,7 @@ import { Crosshair } from './crosshair.js';
 import { CursorCoordinates } from './cursor-coordinates.js';
 import { element } from './dom.js';
 import { setUpExportDialog, setUpSceneLoading } from './export-dialog.js';
+import { histogramRows } from './histogram.js';
 import { KEY_HELP, MOUSE_HELP, setUpKeyboard } from './keyboard.js';
 import { colormapPreview, setUpLegend } from './legend.js';
 import { NO_LINK, decodeHash } from './link.js';
@@ -30,6 +31,7 @@ import { setUpToolbar } from './toolbar.js';
 import { Viewer } from './viewer.js';
 import { ViewHistory } from './view-history.js';
 import { viewRows } from './view-section.js';
+import { setUpVolumes } from './volume.js';
 
 const link = decodeHash(location.hash) ?? NO_LINK;
 const viewer = new Viewer(link.patch);
@@ -59,6 +61,7 @@ setUpStatusLine(viewer);
 setUpLegend(viewer);
 setUpAxisCube(viewer, navigation);
 makeRoomForAnnotations(viewer);
+setUpVolumes(viewer, measureTool);
 setUpSceneLoading(viewer, measureTool);
 setUpToolbar(viewer, navigation, viewHistory, { save: openSaveDialog, export: openExportDialog, help: showHelp, crosshair: showCrosshair });
 fillPanel();
@@ -164,7 +167,7 @@ function inCssPixels({ x, y }) {
 
 function fillPanel() {
   const rows = (table) => panel.addRows(table);
-  const points = section('Points', false, ...rows(controls.pointControls));
+  const points = section('Points', false, ...rows(controls.pointControls), ...histogramRows(viewer));
   const surface = section('Surface', true, ...rows(controls.surfaceControls));
   const color = section('Colour', true, ...withPreview(rows(controls.colorControls)));
   viewer.infoChanged.listen(() => {

@@ -12,6 +12,7 @@ const HINTS = {
   polyline: 'Click on the points of a line. Double click or Enter ends it.',
   profile: 'Click on the points of a line. Double click or Enter shows the heights along it.',
   area: 'Click on the corners. Double click or Enter closes the area.',
+  volume: 'Click on the corners of an area. Double click or Enter computes cut and fill.',
 };
 
 /** `open` has `save()`, `export()` and `help()`, and `crosshair()` for tools that were chosen by a key. */

@@ -235,6 +235,8 @@ export class Viewer {
       state: () => this.progressChanged(message),
       picked: () => this.#resolveRequest(message),
       profiled: () => this.#resolveRequest(message),
+      measured: () => this.#resolveRequest(message),
+      counted: () => this.#resolveRequest(message),
       exported: () => this.#resolveRequest(message),
       progress: () => this.#requests.get(message.id)?.progress?.(message),
       error: () => this.#receiveError(message),

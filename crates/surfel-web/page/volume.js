@@ -1,4 +1,4 @@
-// Volumes of polygons over a base plane: their requests to the server, results and controls.
+// Volumes of polygons over a base plane: their requests to the server, and their controls.
 
 import { element } from './dom.js';
 import { showToast } from './toast.js';
@@ -6,26 +6,6 @@ import { showToast } from './toast.js';
 /** Duration without a change of the settings after which volumes are computed again. */
 const REST_MS = 600;
 const BASES = { lowest: 'lowest corner', mean: 'mean of the corners', height: 'height' };
-
-/** Whether the base and cell size of a volume from a link are valid. */
-export function isVolume({ base, cell_size }) {
-  const isBase = base === 'lowest' || base === 'mean' || Number.isFinite(base);
-  return isBase && (cell_size === undefined || (Number.isFinite(cell_size) && 0 < cell_size));
-}
-
-/** The results of a volume as rows of name, value and dimension; none until the server has computed it. */
-export function volumeResults({ volume }) {
-  if (!volume) return [];
-  return [
-    { name: 'Cut', value: volume.cut, dimension: 3 },
-    { name: 'Fill', value: volume.fill, dimension: 3 },
-    { name: 'Net', value: volume.cut - volume.fill, dimension: 3 },
-    { name: 'Level area', value: volume.area, dimension: 2 },
-    { name: 'Base height', value: volume.base, dimension: 1 },
-    { name: 'Cell size', value: volume.cell_size, dimension: 1 },
-    { name: 'Empty cells', value: 100 * volume.empty_fraction, dimension: 'percent' },
-  ];
-}
 
 /** Requests the volumes of figures that have none, and all of them again after a change of the settings. */
 export function setUpVolumes(viewer, measureTool) {

@@ -43,7 +43,9 @@ pub enum Incoming {
     Histogram { id: u32, column: String },
     /// A request for a finished picture of this size.
     Save { id: u32, width: u32, height: u32 },
-    /// Cancels a `Save`.
+    /// A request for the points that are shown as a file of a format, `laz` or `ply`.
+    Points { id: u32, format: String },
+    /// Cancels a `Save` or `Points`.
     Cancel { id: u32 },
     /// A request for the settings as command line and scene files.
     Export { id: u32, width: u32, height: u32 },

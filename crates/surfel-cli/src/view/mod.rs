@@ -7,6 +7,7 @@ mod histogram;
 mod coordinates;
 mod point;
 mod rejection;
+mod shown_points;
 mod page_overlay;
 mod page_settings;
 mod scene_provider;

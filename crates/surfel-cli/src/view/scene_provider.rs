@@ -7,6 +7,7 @@ use super::page_overlay::page_overlay;
 use super::page_settings;
 use super::point::describe;
 use super::rejection::rejection;
+use super::shown_points::write_shown_points;
 use crate::render::with_info;
 use crate::report::Report;
 use crate::shell::command_line;
@@ -30,9 +31,10 @@ use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::scene::color::choose_source;
 use surfel_core::scene::{Material, inlier_bounds};
 use surfel_core::surface::SurfaceKind;
+use surfel_formats::{FileInfo, common_file_info};
 use surfel_web::{
-    Error, Export, Limits, PickedPoint, PointDescriber, PreparedScene, Result, SceneProvider,
-    SettingsMap,
+    Error, Export, Limits, PickedPoint, PointDescriber, PointFile, PreparedScene, Result,
+    SceneProvider, SettingsMap,
 };
 
 /// The scenes of one set of files.
@@ -236,6 +238,13 @@ fn classes(scene: &LoadedScene) -> Vec<Value> {
     described.collect()
 }
 
+/// The columns that all files with points have.
+fn filter_columns(scene: &LoadedScene) -> Vec<String> {
+    let files = scene.read_files.iter().zip(&scene.file_infos);
+    let of_points = files.filter(|(file, _)| 0 < file.n_points).map(|(_, info)| info.clone());
+    common_file_info(&of_points.collect::<Vec<FileInfo>>()).columns
+}
+
 /// Returns true if all clouds tell the returns of each pulse.
 fn has_returns(scene: &LoadedScene) -> bool {
     let filter: PointFilter =
@@ -271,7 +280,7 @@ impl SceneProvider for FileSceneProvider {
             "stations": self.stations,
             "classes": classes(loaded),
             "has_returns": has_returns(loaded),
-            "columns": loaded.file_info().columns,
+            "columns": filter_columns(loaded),
             "threads": rayon::current_num_threads(),
             "simd": self.scene.simd().name(),
             "coordinate_system": loaded.file_info().coordinate_system,
@@ -369,6 +378,18 @@ impl SceneProvider for FileSceneProvider {
     fn histogram(&self, column: &str) -> Result<Value> {
         let clouds = self.scene.loaded().clouds().map(|(_, cloud)| cloud);
         Ok(histogram(clouds, column)?)
+    }
+
+    fn write_points(
+        &self,
+        settings: &SettingsMap,
+        format: &str,
+        progress: &dyn Progress,
+    ) -> Result<Arc<dyn PointFile>> {
+        let description = self.read(settings)?;
+        let view = self.view(&description, progress)?;
+        let time_secs = description.output.time();
+        self.folders.removed(write_shown_points(&view, time_secs, format, progress))
     }
 
     fn export(&self, settings: &SettingsMap) -> Result<Export> {
