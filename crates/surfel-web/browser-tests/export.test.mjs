@@ -307,3 +307,28 @@ test('invalid dropped files are rejected with a toast', async () => {
   assert.equal(await finishedPixels(still), screen);
   assert.ok(await still.locator('#banner').isHidden(), 'the connection is kept');
 });
+
+test('the points that are shown are downloaded with all their columns', async () => {
+  await show(still, { clip_box: '([562316,562330],[4183187,4183215],[140,160])', filter: 'classification == 2' });
+  const expected = data.points.filter(({ x, y, classification }) => x <= 562330 && y <= 4183215 && classification === 2);
+  await still.locator('[data-action="export"]').click();
+  for (const format of ['ply', 'laz']) {
+    await still.locator(`[data-points="${format}"]`).click();
+    const link = still.locator('[data-action="download-points"]');
+    await link.waitFor();
+    const note = await still.locator('.points-export .note').textContent();
+    assert.equal(parseInt(note.replace(/\s/g, ''), 10), expected.length, note);
+    const { name, bytes } = await download(still, () => link.click());
+    assert.equal(name, `town-shown.${format}`);
+    writeFileSync(join(data.folder, name), bytes);
+    const found = shell(`surfel info ${name} --json`);
+    assert.equal(JSON.parse(found).points, expected.length);
+  }
+  shell('surfel prepare town-shown.laz -o shown.csv --duplicates keep -q');
+  const [names, ...rows] = readFileSync(join(data.folder, 'shown.csv'), 'utf8').trim().split('\n').map((row) => row.split(','));
+  const column = (word) => names.findIndex((name) => name.toLowerCase().replaceAll(/\W/g, '') === word);
+  const [x, time] = [column('x'), column('gpstime')];
+  assert.deepEqual(rows.map((row) => Number(row[x])), expected.map((point) => point.x));
+  assert.deepEqual(rows.map((row) => Number(row[time])), expected.map((point) => point.gps_time));
+  await still.locator('#export-close').click();
+});

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { coordinate, count, duration, exact, rounded, shortest, ticks, withUnit } from '../page/format.js';
+import { coordinate, count, duration, exact, fileSize, rounded, shortest, ticks, withUnit } from '../page/format.js';
 import { coordinatesText } from '../page/cursor-coordinates.js';
 import { formatMaterial, materialOf, parseMaterial, withMaterial } from '../page/materials.js';
 import { readHeader, socketAddress } from '../page/connection.js';
@@ -24,6 +24,7 @@ test('other numbers are rounded', () => {
   assert.equal(duration(2.44), '2.4 s');
   assert.equal(duration(200), '3 min 20 s');
   assert.equal(duration(7380), '2 h 3 min');
+  assert.deepEqual([0, 640, 12_345_000, 2e15].map(fileSize), ['0\u00a0B', '640\u00a0B', '12.3\u00a0MB', '2\u202f000\u00a0TB']);
 });
 
 test('scales have round ticks', () => {

@@ -59,8 +59,8 @@ export function setUpToolbar(viewer, navigation, viewHistory, open) {
     const isFolded = document.body.classList.toggle('is-folded');
     fold.setAttribute('aria-expanded', !isFolded);
   });
-  // On a phone the panel covers half of the picture, so it starts folded.
-  if (matchMedia('(max-width: 640px)').matches) fold.click();
+  // On a phone the panel covers much of the picture, so it starts folded.
+  if (matchMedia('(max-width: 640px), (max-height: 480px) and (pointer: coarse)').matches) fold.click();
 
   viewer.infoChanged.listen(() => {
     const { name } = viewer.info;

@@ -237,6 +237,7 @@ export class Viewer {
       profiled: () => this.#resolveRequest(message),
       measured: () => this.#resolveRequest(message),
       counted: () => this.#resolveRequest(message),
+      written: () => this.#resolveRequest(message),
       exported: () => this.#resolveRequest(message),
       progress: () => this.#requests.get(message.id)?.progress?.(message),
       error: () => this.#receiveError(message),

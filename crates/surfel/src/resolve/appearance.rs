@@ -35,8 +35,8 @@ pub fn finish_graph(
         apply_surface_and_color(cloud, &settings, up, progress)
             .map_err(|cause| scene.content_error(geometry, description, cause))
     })?;
-    for (nodes, object) in scene.objects.iter().zip(&description.objects) {
-        graph.nodes[nodes.node].is_visible = object.visible();
+    for (node, is_visible) in scene.visibility(&graph, description) {
+        graph.nodes[node].is_visible = is_visible;
     }
     let mut sequences = scene.sequences_under(description);
     clip(scene, &mut graph, &mut sequences, description)?;

@@ -129,7 +129,7 @@ impl AutoSettings {
         description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let points = scene.sample_points();
+        let points = scene.shown_points(description);
         let up = choose_up(description.world.up, &points, &scene.file_infos, progress);
         let camera = stand_at_station(&description.camera, scene, up)?;
         let mut description = SceneDescription { camera, ..description.clone() };
