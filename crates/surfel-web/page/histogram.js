@@ -1,6 +1,6 @@
 // The histogram of a column, with two handles that set the filter.
 
-import { element, svg } from './dom.js';
+import { element, icon, svg } from './dom.js';
 import { shortest } from './format.js';
 
 const N_STEPS = 200;
@@ -123,7 +123,7 @@ export function histogramRows(viewer) {
   return [
     element('div', { class: 'row', 'data-row': 'histogram' },
       element('label', { for: choice.id, title: 'How many points have which values of a column' }, 'Histogram'),
-      element('div', { class: 'field select' }, choice)),
+      element('div', { class: 'field select' }, choice, icon('chevron'))),
     chart,
   ];
 }
