@@ -1,19 +1,17 @@
 //! A scene whose settings change: after a change only what it touches is made again.
 
 use crate::built_scene::{exposure_stops, planes_before, source_indices};
-use crate::cache::{Lru2, hash_of};
+use crate::cache::Lru2;
 use crate::crs::Unit;
-use crate::description::{
-    Exposure, Interior, Invalid, LightKind, ObjectDescription, SceneDescription, write_parts,
-};
+use crate::description::{Exposure, Interior, Invalid, SceneDescription};
 use crate::error::{Error, Result};
 use crate::overlay::Overlay;
 use crate::resolve::{
     AutoSettings, KeepOptions, LoadedScene, common_legend, coordinate_system, expose, finish_graph,
     hide_walls, render_settings,
 };
+use crate::scene_keys::{grouping_key, preparation_key, tree_key};
 use rayon::ThreadPool;
-use serde_json::{Value, json};
 use std::sync::{Arc, OnceLock};
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
@@ -333,59 +331,6 @@ const PLACEHOLDER_CAMERA: Camera = Camera {
     view_up: DVec3::Z,
     projection: Projection::Panorama,
 };
-
-/// A hash of everything that decides how clouds are prepared.
-fn preparation_key(description: &SceneDescription) -> u64 {
-    let settings = &description.objects_default;
-    let keeps_variation = settings.preparation(0).keep_variation;
-    let [_, preparation, _] = settings.parts();
-    let parts = json!([
-        write_parts(&[preparation]),
-        description.picture.seed(),
-        keeps_variation,
-        object_settings(description),
-        grouping_key(description),
-    ]);
-    hash_of(&parts)
-}
-
-/// A hash of everything that decides which files are read as one, which apart, and which geometries are shared.
-fn grouping_key(description: &SceneDescription) -> u64 {
-    let objects = &description.objects;
-    let twin = |i: usize| objects[..i].iter().position(|other| other.has_same_content(&objects[i]));
-    let objects = objects.iter().enumerate().map(|(i, object)| json!([object.files, twin(i)]));
-    hash_of(&json!([description.files, objects.collect::<Vec<Value>>()]))
-}
-
-/// A hash of everything that decides what the trees hold.
-fn tree_key(
-    description: &SceneDescription,
-    preparation: u64,
-    auto: &AutoSettings,
-    frames: &[usize],
-) -> u64 {
-    let light = &description.light;
-    let is_lit = !light.has(LightKind::None) || light.environment.is_some();
-    let planes = auto.hidden_walls.iter();
-    let walls: Vec<[[f64; 3]; 2]> =
-        planes.map(|plane| [plane.point.to_array(), plane.normal.to_array()]).collect();
-    let parts = json!([
-        preparation,
-        write_parts(&description.objects_default.parts()),
-        description.get("material"),
-        description.objects.iter().map(ObjectDescription::visible).collect::<Vec<bool>>(),
-        is_lit,
-        auto.up.to_array(),
-        walls,
-        frames,
-    ]);
-    hash_of(&parts)
-}
-
-fn object_settings(description: &SceneDescription) -> Vec<Value> {
-    let settings = description.objects.iter().map(|object| &object.settings);
-    settings.map(|settings| Value::Object(write_parts(&settings.parts()))).collect()
-}
 
 /// Maximum number of discs of points over each other, on average.
 const MAX_OVERLAP: f32 = 200.0;

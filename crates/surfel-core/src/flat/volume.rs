@@ -67,8 +67,8 @@ pub fn cut_and_fill(
     let ground = Ground::new(query);
     let polygon = Polygon::new(std::slice::from_ref(&ground.ring))?;
     let area = signed_area(&ground.ring).abs();
-    if area == 0.0 {
-        let found = "corners on a line".to_owned();
+    if !area.is_normal() {
+        let found = format!("corners around an area of {area}");
         return Err(Error::Setting { name: "polygon", found, expected: "an area" });
     }
     let points = visit_points(scene, progress, |point| {
@@ -86,6 +86,7 @@ pub fn cut_and_fill(
     let mut volume = Volume { base, cell_size, area, n_points, ..Volume::default() };
     let mut empty_area = 0.0;
     for row in 0..grid.n_rows {
+        progress.check()?;
         let strip = grid.row_of(&ground.ring, row);
         for column in 0..grid.n_columns {
             let covered = grid.covered_area(&strip, column);
@@ -300,6 +301,7 @@ mod tests {
             &[[1.0, 1.0], [2.0, 2.0]][..],
             &[[1.0, 1.0], [2.0, 2.0], [4.0, 4.0]],
             &[[f64::NAN, 0.0], [1.0, 0.0], [1.0, 1.0]],
+            &[[1e308, 0.0], [1.0, 0.0], [1.0, 1e308]],
         ] {
             let query = query(corners, BaseHeight::Lowest, None);
             assert!(cut_and_fill(&slope(), &query, &NoProgress).is_err(), "{corners:?}");

@@ -43,7 +43,7 @@ pub use nearest::nearest;
 pub use object::{ObjectDescription, Placement, Rotation};
 pub use object_override::{ObjectOverride, OverrideSettings};
 pub use object_settings::{ColorSettings, ObjectSettings, PreparationSettings, SurfaceSettings};
-pub use option::{option_name, value_text};
+pub use option::{has_option, is_list, option_name, value_text};
 pub use picture::{Backend, Exposure, OutputSettings, PictureSettings, RunSettings};
 pub use plan::PlanSettings;
 pub use point_filter::Returns;
@@ -410,16 +410,6 @@ impl<'de> Deserialize<'de> for SceneDescription {
         let table = Map::deserialize(deserializer)?;
         Self::from_table(&table, Path::new("")).map_err(serde::de::Error::custom)
     }
-}
-
-/// Returns true for the keys whose option may be given several times.
-pub fn is_list(path: &str) -> bool {
-    ["material", "object_settings"].contains(&path)
-}
-
-/// Returns true for the keys that are options too; some are for scene files and pages alone.
-pub fn has_option(path: &str) -> bool {
-    path != "views"
 }
 
 /// Returns true for values that say that there is none: false where a length could stand, and empty lists.

@@ -1,6 +1,6 @@
 //! Options of the program: the name of a key's option, and a description as words of a command line.
 
-use super::{SceneDescription, has_option, is_list};
+use super::SceneDescription;
 use serde_json::Value;
 
 /// Returns the name of the option for the path of a key: `camera-view-angle` for `camera.view_angle`.
@@ -11,6 +11,16 @@ pub fn option_name(path: &str) -> String {
         "sun.date" => "sun".to_owned(),
         path => path.replace(['.', '_'], "-"),
     }
+}
+
+/// Returns true for the keys whose option may be given several times.
+pub fn is_list(path: &str) -> bool {
+    ["material", "object_settings"].contains(&path)
+}
+
+/// Returns true for the keys that are options too; some are for scene files and pages alone.
+pub fn has_option(path: &str) -> bool {
+    path != "views"
 }
 
 /// Writes a value as it is typed.
