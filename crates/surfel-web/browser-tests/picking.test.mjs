@@ -242,6 +242,12 @@ test('a volume over the roof agrees with its points, above each base', async () 
   const [file] = await Promise.all([page.waitForEvent('download'), page.locator('[aria-label="Download as GeoJSON"]').click()]);
   const { features: [feature] } = JSON.parse(readFileSync(await file.path(), 'utf8'));
   assert.equal(feature.geometry.type, 'Polygon');
+  // A link carries the polygon, whose volume the server computes again.
+  await page.evaluate(() => window.dispatchEvent(new Event('pagehide')));
+  const other = await openPage(page.url());
+  await other.locator('#measure-card dt', { hasText: 'Empty cells' }).waitFor();
+  assert.equal(await other.locator('.toast').count(), 0);
+  await closePage(other);
   assert.ok(Math.abs(feature.properties.cut - found.Cut) < 1e-3 && feature.properties.cell_size === 0.5, JSON.stringify(feature.properties));
 });
 

@@ -87,11 +87,13 @@ function singleRows(object, panel) {
 }
 
 function objectPart(object, panel) {
-  const size = object.kind === 'points' ? `${count(object.points)} points` : `${count(object.triangles)} triangles`;
+  const size = object.kind === 'points' ? amount(object.points, 'point') : amount(object.triangles, 'triangle');
   const [visibility, ...details] = panel.addRows(objectControls(object));
   return element('div', { class: 'object', 'data-object': object.name },
     visibility, ...notesOf(object), element('details', { class: 'inner' }, element('summary', {}, size), ...details));
 }
+
+const amount = (n, word) => `${count(n)} ${word}${n === 1 ? '' : 's'}`;
 
 /** What was unusual about the files of an object. */
 const notesOf = ({ notes }) => notes.map((text) => element('p', { class: 'note' }, text));

@@ -9,7 +9,7 @@ const BASES = { lowest: 'lowest corner', mean: 'mean of the corners', height: 'h
 
 /** Requests the volumes of figures that have none, and all of them again after a change of the settings. */
 export function setUpVolumes(viewer, measureTool) {
-  const requested = new WeakSet();
+  let requested = new WeakSet();
   let timer = 0;
 
   const request = async (figure) => {
@@ -23,12 +23,15 @@ export function setUpVolumes(viewer, measureTool) {
     }
   };
   const requestAll = () => {
-    if (!viewer.isConnected) return;
+    // Before the first picture the server has no points.
+    if (!viewer.isConnected || !viewer.lastFrame) return;
     for (const figure of measureTool.figures) {
       if (figure.kind === 'volume' && !figure.volume && !requested.has(figure)) request(figure);
     }
   };
   measureTool.figuresShown.listen(requestAll);
+  viewer.frameShown.listen(requestAll);
+  viewer.connectionChanged.listen(() => { requested = new WeakSet(); });
   viewer.sceneChanged.listen(() => {
     clearTimeout(timer);
     if (!measureTool.figures.some(({ volume }) => volume)) return;

@@ -108,7 +108,7 @@ impl<'t> Module<'t> {
             .iter()
             .map(|Import { from, target }| format!("const {target} = {};\n", variable_of(from)));
         format!(
-            "// {name}\nconst {} = (() => {{\n{}{}\nreturn {{ {} }};\n}})();\n",
+            "const {} = (() => {{\n{}{}\nreturn {{ {} }};\n}})();\n",
             variable_of(name),
             imports.collect::<String>(),
             self.lines.join("\n"),
@@ -195,21 +195,18 @@ mod tests {
             ),
         ]);
         let expected = "\
-// c.js
 const module_c = (() => {
 async function run(x) {
 return x; // Later.
 }
 return { run };
 })();
-// a-b.js
 const module_a_b = (() => {
 const { run } = module_c;
 const one = run();
 class Two {}
 return { one, Two };
 })();
-// main.js
 const module_main = (() => {
 const { one: first,  Two } = module_a_b;
 const c = module_c;

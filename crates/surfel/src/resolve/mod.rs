@@ -25,7 +25,7 @@ pub use check_files::check_files;
 pub use cloud::{prepare_cloud, report_denoise, report_normals, report_prepared, report_radii};
 pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;
-pub use loaded::{KeepOptions, LoadedScene, SourceFile};
+pub use loaded::{KeepOptions, LoadedFile, LoadedScene};
 pub use memory::{MemoryEstimate, n_points, readable};
 pub use plan::coordinate_system;
 pub(crate) use sequence::Sequence;

@@ -2,7 +2,7 @@
 
 use super::super::cloud::{ImportOptions, graph_of, import, into_cloud};
 use super::super::sequence::{GeometrySlots, Sequence, element_counts, is_streamed};
-use super::{LoadedScene, ObjectNodes, SourceFile};
+use super::{LoadedFile, LoadedScene, ObjectNodes};
 use crate::choice_log::NoteLog;
 use crate::description::{ObjectDescription, ObjectMotion, ObjectSettings, SceneDescription};
 use crate::error::{Error, Result};
@@ -72,7 +72,7 @@ impl LoadedScene {
         let (graph, info) = import(file, settings, options, &log)?;
         let (n_points, n_triangles) = graph.n_points_and_triangles();
         let notes = log.into_notes();
-        self.read_files.push(SourceFile { path: file.to_owned(), n_points, n_triangles, notes });
+        self.read_files.push(LoadedFile { path: file.to_owned(), n_points, n_triangles, notes });
         self.file_infos.push(info.clone());
         Ok((graph, info))
     }

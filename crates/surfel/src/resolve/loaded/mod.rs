@@ -34,7 +34,7 @@ pub struct LoadedScene {
     /// Facts that each file states about itself.
     pub file_infos: Vec<FileInfo>,
     /// The files that were read, as they were read.
-    pub read_files: Vec<SourceFile>,
+    pub read_files: Vec<LoadedFile>,
     /// Movement of the camera.
     pub(super) camera_motion: Option<CameraMotion>,
     /// The environment map, upright.
@@ -52,7 +52,7 @@ pub struct LoadedScene {
 
 /// The content of a file, and what was unusual about it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SourceFile {
+pub struct LoadedFile {
     /// Path of the file.
     pub path: PathBuf,
     /// Number of points.
