@@ -69,8 +69,8 @@ prepare_gdal() {
     apt-get update >"$log" 2>&1 && apt-get install -y --no-install-recommends gdal-bin >"$log" 2>&1
 }
 
-# Finds the browser (CHROMIUM if it is set) and playwright-core, which drives it and is installed outside of the
-# repository. Fails with a reason in `missing` if one of them is unavailable.
+# Finds the browser (CHROMIUM if it is set), playwright-core, which drives it, and axe-core, which checks that pages are
+# accessible; both are installed outside of the repository. Fails with a reason in `missing` if one is unavailable.
 prepare_browser() {
     export PLAYWRIGHT=${PLAYWRIGHT:-${XDG_CACHE_HOME:-${HOME:-/tmp}/.cache}/surfel-playwright}
     export CHROMIUM=${CHROMIUM:-chromium}
@@ -79,11 +79,11 @@ prepare_browser() {
     fi
     missing="$CHROMIUM is not installed"
     CHROMIUM=$(command -v "$CHROMIUM") || return
-    [ -d "$PLAYWRIGHT/node_modules/playwright-core" ] && return
-    missing="playwright-core is not in $PLAYWRIGHT, and npm is not installed"
+    [ -d "$PLAYWRIGHT/node_modules/playwright-core" ] && [ -d "$PLAYWRIGHT/node_modules/axe-core" ] && return
+    missing="playwright-core and axe-core are not in $PLAYWRIGHT, and npm is not installed"
     command -v npm >/dev/null || return
-    missing="npm cannot install playwright-core into $PLAYWRIGHT"
-    npm install --silent --no-audit --no-fund --prefix "$PLAYWRIGHT" playwright-core >"$log" 2>&1
+    missing="npm cannot install playwright-core and axe-core into $PLAYWRIGHT"
+    npm install --silent --no-audit --no-fund --prefix "$PLAYWRIGHT" playwright-core axe-core >"$log" 2>&1
 }
 
 # Counts a check that cannot run, and prints why.

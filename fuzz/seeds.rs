@@ -390,7 +390,10 @@ fn write_viewer_input(folder: &Path) -> std::io::Result<()> {
 {"type":"ack","frame":1}
 {"type":"camera","seq":2,"camera":CAMERA}
 {"type":"pick","id":1,"x":20.5,"y":15}
-{"type":"profile","id":2,"points":[[0,0,0],[4,2,1]],"width":0.5,"up":[0,0,1]}"#,
+{"type":"profile","id":2,"points":[[0,0,0],[4,2,1]],"width":0.5,"up":[0,0,1]}
+{"type":"volume","id":4,"points":[[0,0,0],[4,2,1],[0,3,0]],"up":[0,0,1],"base":"mean","cell_size":0.5}
+{"type":"histogram","id":5,"column":"z"}
+{"type":"points","id":6,"format":"laz"}"#,
         r##"{"type":"set","seq":1,"scene":{"surface":"disc","color":"elevation","cmap":"viridis","range":[0,2],"radius":"knn:6"}}
 {"type":"set","seq":2,"scene":{"sun":{"azimuth":120,"elevation":30},"light":["sun","sky"],"exposure":0.5,"background":"#102030"}}
 {"type":"set","seq":3,"scene":{"material":"a.ply=glass:ior=1.3","clip_box":"([0,5],[0,3],[-2,2])","clip_plane":[1,1,0,1,0,0]},"moving":true}

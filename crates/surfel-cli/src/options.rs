@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::marker::PhantomData;
 use std::path::Path;
 use surfel::SceneDescription;
-use surfel::description::{Invalid, Key, option_name, value_text};
+use surfel::description::{Invalid, Key, has_option, is_list, option_name, value_text};
 
 /// Arguments of a command, some of which are keys of a scene description.
 pub trait Scope {
@@ -29,7 +29,8 @@ pub const PLANS: &str = "Plans to scale";
 
 /// The keys of a scope with their paths and headings.
 fn keys<S: Scope>() -> impl Iterator<Item = (String, &'static str, Key)> {
-    SceneDescription::keys().into_iter().filter(|(path, heading, _)| S::has(heading, path))
+    let keys = SceneDescription::keys().into_iter();
+    keys.filter(|(path, heading, _)| has_option(path) && S::has(heading, path))
 }
 
 fn option(path: &str, heading: &'static str, key: &Key) -> Arg {
@@ -47,7 +48,7 @@ fn option(path: &str, heading: &'static str, key: &Key) -> Arg {
         .help(format!("{}{default}", short.trim_end_matches('.')))
         .long_help(format!("{doc}{default}"))
         .hide_short_help(!key.is_common)
-        .action(if path == "material" { ArgAction::Append } else { ArgAction::Set });
+        .action(if is_list(path) { ArgAction::Append } else { ArgAction::Set });
     match key.value_name {
         "" | "BOOL" => {
             let arg = arg.value_name("BOOL").num_args(0..=1).require_equals(true);
@@ -77,9 +78,9 @@ impl<S: Scope> FromArgMatches for KeyOptions<S> {
             for (path, ..) in keys::<S>() {
                 let Some(words) = matches.get_many::<String>(&path) else { continue };
                 let mut values = words.cloned().map(Value::String);
-                let value = match path.as_str() {
-                    "material" => values.collect(),
-                    _ => values.next_back().unwrap_or_default(),
+                let value = match is_list(&path) {
+                    true => values.collect(),
+                    false => values.next_back().unwrap_or_default(),
                 };
                 description.set(&path, &value, Path::new(""))?;
             }

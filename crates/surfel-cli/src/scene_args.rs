@@ -34,13 +34,24 @@ fn files_help() -> String {
 }
 
 impl<S: Scope> SceneArgs<S> {
+    /// Returns the description of scene files and options, in which files with settings of their own are objects.
+    ///
+    /// # Errors
+    ///
+    /// Fails for files that cannot be read, and for keys and values that are not valid.
+    pub fn description(&self, global: &Global) -> anyhow::Result<SceneDescription> {
+        let mut description = self.startup(global)?;
+        description.apply_object_settings()?;
+        Ok(description)
+    }
+
     /// Returns the description of scene files and options: later scene files lie over earlier ones, the command line
     /// over all of them.
     ///
     /// # Errors
     ///
     /// Fails for files that cannot be read, and for keys and values that are not valid.
-    pub fn description(&self, global: &Global) -> anyhow::Result<SceneDescription> {
+    pub fn startup(&self, global: &Global) -> anyhow::Result<SceneDescription> {
         let mut description = SceneDescription::default();
         let mut layer = self.options.description.clone()?;
         for file in expand(&self.files)? {
@@ -57,6 +68,7 @@ impl<S: Scope> SceneArgs<S> {
         description.overlay(layer);
         // Names may clash between scene files, and keys between a file and the command line.
         let checked = description.check().and_then(|()| description.check_is_not_empty());
+        let checked = checked.and_then(|()| description.clone().apply_object_settings());
         let scene_file = self.files.iter().find(|file| is_scene_file(file));
         checked.map_err(|error| scene_file.into_iter().fold(error, |e, file| e.in_file(file)))?;
         Ok(description)

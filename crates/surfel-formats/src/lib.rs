@@ -47,6 +47,7 @@ mod filtered;
 mod load;
 mod graph;
 mod save;
+mod temp_cloud;
 mod image_file;
 mod movie;
 mod environment;
@@ -69,3 +70,4 @@ pub use options::{
 };
 pub use save::{check_cloud_output, save, writable_extensions};
 pub use table::{Column, ColumnChoice, TextColumn};
+pub use temp_cloud::TempCloud;

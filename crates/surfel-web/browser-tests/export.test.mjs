@@ -33,6 +33,7 @@ const VIEWS = {
   'a clip box': { clip_box: '([562320,562335.5],[4183190,4183210],[140,160])' },
   'a clip plane': { clip_plane: [562330, 4183200, 149, 0.6, 0, 0.8], radius_scale: 1.5 },
   'glass and metal': { material: ['house.obj=glass:ior=1.3,color=#88ccff', 'town.ply=metal:roughness=0.4'], max_depth: 5 },
+  'a hidden mesh, and colours of one file': { object_settings: ['house.obj:visible=false', 'town.ply:color=intensity'] },
   'an orthographic camera': { camera: { position: [562334, 4183150, 190], focal_point: CENTER, view_up: [0, 0, 1], view_angle: null, orthographic: 31.5 } },
   'another camera and light': {
     camera: { position: [562380.5, 4183230.25, 170.125], focal_point: CENTER, view_angle: 50 },
@@ -305,4 +306,29 @@ test('invalid dropped files are rejected with a toast', async () => {
   }
   assert.equal(await finishedPixels(still), screen);
   assert.ok(await still.locator('#banner').isHidden(), 'the connection is kept');
+});
+
+test('the points that are shown are downloaded with all their columns', async () => {
+  await show(still, { clip_box: '([562316,562330],[4183187,4183215],[140,160])', filter: 'classification == 2' });
+  const expected = data.points.filter(({ x, y, classification }) => x <= 562330 && y <= 4183215 && classification === 2);
+  await still.locator('[data-action="export"]').click();
+  for (const format of ['ply', 'laz']) {
+    await still.locator(`[data-points="${format}"]`).click();
+    const link = still.locator('[data-action="download-points"]');
+    await link.waitFor();
+    const note = await still.locator('.points-export .note').textContent();
+    assert.equal(parseInt(note.replace(/\s/g, ''), 10), expected.length, note);
+    const { name, bytes } = await download(still, () => link.click());
+    assert.equal(name, `town-shown.${format}`);
+    writeFileSync(join(data.folder, name), bytes);
+    const found = shell(`surfel info ${name} --json`);
+    assert.equal(JSON.parse(found).points, expected.length);
+  }
+  shell('surfel prepare town-shown.laz -o shown.csv --duplicates keep -q');
+  const [names, ...rows] = readFileSync(join(data.folder, 'shown.csv'), 'utf8').trim().split('\n').map((row) => row.split(','));
+  const column = (word) => names.findIndex((name) => name.toLowerCase().replaceAll(/\W/g, '') === word);
+  const [x, time] = [column('x'), column('gpstime')];
+  assert.deepEqual(rows.map((row) => Number(row[x])), expected.map((point) => point.x));
+  assert.deepEqual(rows.map((row) => Number(row[time])), expected.map((point) => point.gps_time));
+  await still.locator('#export-close').click();
 });

@@ -273,3 +273,40 @@ test('one finger orbits, two fingers pan and zoom', async () => {
   assert.ok(0 < dot(panned.position.map((value, i) => value - near.position[i]), axesOf(near).up));
   await closePage(phone);
 });
+
+test('the axis cube turns the view to a side, by the mouse and by keys, and is hidden in panoramas', async () => {
+  await page.locator('[data-cube-side="top"] polygon').click();
+  isNear(axesOf(await movedCamera()).forward, [0, 0, -1], 1e-6, 'from the top');
+  await page.locator('[data-cube-side="front"]').focus();
+  await page.keyboard.press('ArrowRight');
+  await page.keyboard.press('ArrowRight');
+  assert.equal(await page.evaluate(() => document.activeElement.dataset.cubeSide), 'left');
+  await page.keyboard.press('Enter');
+  isNear(axesOf(await movedCamera()).forward, [1, 0, 0], 1e-6, 'from the left');
+  assert.deepEqual(await page.locator('#axis-cube .is-facing').evaluateAll((sides) => sides.map((side) => side.dataset.cubeSide)), ['left']);
+  const other = await openPage((await serve(['town.ply'], ...QUICK, '--camera-panorama')).link);
+  assert.ok(await other.locator('#axis-cube').isHidden());
+  await closePage(other);
+});
+
+test('one tool of the toolbar is reached by Tab, the others by arrows', async () => {
+  const label = () => page.evaluate(() => document.activeElement.ariaLabel);
+  await page.locator('#viewport').focus();
+  await page.keyboard.press('Tab');
+  assert.equal(await label(), 'Pick point');
+  await page.keyboard.press('ArrowDown');
+  assert.equal(await label(), 'Measure distance');
+  await page.keyboard.press('End');
+  assert.equal(await label(), 'Controls');
+  await page.keyboard.press('ArrowRight');
+  assert.equal(await label(), 'Pick point');
+  await page.keyboard.press('ArrowLeft');
+  assert.equal(await label(), 'Controls');
+  assert.deepEqual(await page.locator('#toolbar [tabindex="0"]').evaluateAll((all) => all.map((one) => one.ariaLabel)), ['Controls']);
+  // What is disabled is passed over.
+  for (let i = 0; i < 6; i++) await page.keyboard.press('ArrowUp');
+  assert.equal(await label(), 'View at the start');
+  await page.keyboard.press('ArrowUp');
+  assert.equal(await label(), 'Height profile');
+  assert.deepEqual(await state(page, 'camera'), opening);
+});

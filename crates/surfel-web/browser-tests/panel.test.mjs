@@ -4,14 +4,16 @@ import assert from 'node:assert/strict';
 import { after, before, beforeEach, test } from 'node:test';
 import * as tables from '../page/controls.js';
 import { valueAt } from '../page/merge-patch.js';
+import { objectControls } from '../page/object-controls.js';
 import {
   closePage, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, reopen, serve, settled, state, unfoldPanel, recordPictures,
 } from './harness.mjs';
 
-const { surfaceControls, colorControls, pointControls, sunControls, skyControls, pictureControls, annotationControls, clipControls, materialControls } = tables;
-const OBJECTS = ['house.obj', 'town.ply'];
+const { surfaceControls, colorControls, pointControls, sunControls, skyControls, pictureControls, annotationControls, clipControls } = tables;
+const FILES = ['house.obj', 'town.ply'];
+const OBJECTS = [{ name: 'house.obj', kind: 'triangles', visible: true }, { name: 'town.ply', kind: 'points', visible: true }];
 const CONTROLS = [surfaceControls, colorControls, pointControls, sunControls, skyControls, pictureControls, annotationControls, clipControls,
-  ...OBJECTS.map((name) => materialControls({ name }))].flat();
+  ...OBJECTS.map(objectControls)].flat();
 
 const BY_ELEVATION = [['color', 'elevation']];
 const IN_BOX = [['clip_box', true]];
@@ -55,6 +57,9 @@ const CASES = {
   'clip_plane.normal': { given: [...ON_PLANE, ['clip_plane.axis', 'free']], value: [0, 0.6, 0.8] },
   'clip_plane.position': { given: ON_PLANE, value: -1 },
   'clip_plane.flip': { given: ON_PLANE },
+  'object.house.obj.visible': { value: false },
+  'object.town.ply.visible': { value: false },
+  'object.town.ply.color': { value: 'class' },
   'material.town.ply': { value: 'metal' },
   'material.town.ply.color': { given: [['material.town.ply', 'matte']], value: '#3060a0' },
   'material.town.ply.roughness': { given: [['material.town.ply', 'metal']], value: 0.7 },
@@ -73,7 +78,7 @@ const FOR_OTHERS = ['point_size', 'returns', 'scale_bar', 'north'];
 let page;
 let first;
 before(async () => {
-  const server = await serve(OBJECTS, ...QUICK);
+  const server = await serve(FILES, ...QUICK);
   page = await openPage(server.link);
   await unfoldPanel(page);
   first = await finishedPixels(page);
@@ -136,7 +141,7 @@ async function sceneValue({ key, read }) {
 
 test('each control has a case', async () => {
   const { objects } = await state(page, 'info');
-  assert.deepEqual(objects.map(({ name }) => name), OBJECTS);
+  assert.deepEqual(objects.map(({ name }) => name), FILES);
   assert.deepEqual([...Object.keys(CASES), ...FOR_OTHERS].sort(), CONTROLS.map(({ key }) => key).sort());
 });
 

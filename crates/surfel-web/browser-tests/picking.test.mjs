@@ -54,6 +54,27 @@ test('a picked point has the attributes in the file', async () => {
   }
 });
 
+test('the status line has the coordinates of the point under the mouse, but not during drags', async () => {
+  const [pixel, other] = [await pixelAt(page, 0.6, 0.75), await pixelAt(page, 0.5, 0.8)];
+  const [point] = await pointsAt([pixel]);
+  const cursor = page.locator('#cursor');
+  await page.mouse.move(other.x, other.y);
+  await page.mouse.move(pixel.x, pixel.y);
+  await page.waitForFunction((text) => document.getElementById('cursor').textContent === text, positionOf(point).join('  '));
+  await page.mouse.down();
+  await page.mouse.move(pixel.x + 60, pixel.y, { steps: 4 });
+  assert.equal(await cursor.textContent(), '');
+  const n_answered = await page.evaluate(() => window.picks.n_answered);
+  await page.mouse.move(other.x, other.y, { steps: 4 });
+  await page.waitForTimeout(300);
+  assert.equal(await cursor.textContent(), '');
+  assert.equal(await page.evaluate(() => window.picks.n_answered), n_answered);
+  await page.mouse.up();
+  await page.locator('#cursor:not(:empty)').waitFor();
+  await page.locator('#panel-fold').hover();
+  assert.equal(await cursor.textContent(), '');
+});
+
 test('an animated point has its position at the current time', async () => {
   const rising = await openPage((await serve(['rising.toml'], ...QUICK)).link);
   await show(rising, { time: 1 });
@@ -185,6 +206,79 @@ test('angles, circles and polylines agree with their points', async () => {
   const { features } = JSON.parse(readFileSync(await file.path(), 'utf8'));
   assert.deepEqual(features.map(({ geometry }) => geometry.type), ['LineString', 'MultiPoint', 'LineString']);
   assert.deepEqual(features[2].geometry.coordinates, corners);
+});
+
+test('a volume over the roof agrees with its points, above each base', async () => {
+  await page.locator('#viewport').focus();
+  for (const key of ['5', 'f']) await page.keyboard.press(key);
+  await settled(page);
+  // Within the roof, which is level at 154.
+  const [camera, size] = [await state(page, 'camera'), await state(page, 'size')];
+  const viewport = await page.locator('#viewport').boundingBox();
+  const pixels = [[9, 13], [13, 13], [13, 19], [9, 19]].map(([east, north]) => {
+    const { x, y } = project(camera, size, [562316.125 + east, 4183187.5 + north, 154]);
+    return { x: viewport.x + x, y: viewport.y + y };
+  });
+  const corners = await pointsAt(pixels);
+  const [xs, ys] = ['x', 'y'].map((axis) => corners.map((corner) => corner[axis]));
+  const area = Math.abs(xs.reduce((sum, x, i) => sum + x * ys[(i + 1) % 4] - ys[i] * xs[(i + 1) % 4], 0)) / 2;
+  await measure('volume', pixels);
+  await page.keyboard.press('Enter');
+  const card = page.locator('#measure-card');
+  await card.locator('dt', { hasText: 'Empty cells' }).waitFor();
+  let found = await measuredValues('volume 1');
+  isClose(found.Cut, 0);
+  isClose(found['Base height'], 154);
+  assert.ok(Math.abs(found['Level area'] - area) < 0.01 && found['Empty cells'] < 15, JSON.stringify(found));
+  await card.locator('select').selectOption('height');
+  await card.getByLabel('Height').fill('150');
+  await card.getByLabel('Height').press('Enter');
+  await card.getByLabel('Cell size').fill('0.5');
+  await card.getByLabel('Cell size').press('Enter');
+  await page.waitForFunction(() => /Cell size0.5/.test(document.getElementById('measure-card').textContent));
+  found = await measuredValues('volume 1');
+  assert.ok(Math.abs(found.Cut / (4 * area * (1 - found['Empty cells'] / 100)) - 1) < 0.01, `${JSON.stringify(found)} ${area}`);
+  assert.equal(found.Net, found.Cut);
+  const [file] = await Promise.all([page.waitForEvent('download'), page.locator('[aria-label="Download as GeoJSON"]').click()]);
+  const { features: [feature] } = JSON.parse(readFileSync(await file.path(), 'utf8'));
+  assert.equal(feature.geometry.type, 'Polygon');
+  // A link carries the polygon, whose volume the server computes again.
+  await page.evaluate(() => window.dispatchEvent(new Event('pagehide')));
+  const other = await openPage(page.url());
+  await other.locator('#measure-card dt', { hasText: 'Empty cells' }).waitFor();
+  assert.equal(await other.locator('.toast').count(), 0);
+  await closePage(other);
+  assert.ok(Math.abs(feature.properties.cut - found.Cut) < 1e-3 && feature.properties.cell_size === 0.5, JSON.stringify(feature.properties));
+});
+
+test('points are picked by the keyboard alone', async () => {
+  await page.locator('[data-tool="pick"]').focus();
+  await page.keyboard.press('Enter');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'viewport');
+  await page.locator('.crosshair').waitFor({ state: 'attached' });
+  for (let i = 0; i < 6; i++) await page.keyboard.press('ArrowDown');
+  await page.keyboard.press('Shift+ArrowLeft');
+  await page.keyboard.press('Enter');
+  await page.locator('#pick-card dl').waitFor();
+  const row = await page.locator('#pick-card').evaluate((element) => Object.fromEntries(
+    [...element.querySelectorAll('dt')].map((name) => [name.textContent, name.nextSibling.querySelector('span').textContent])));
+  const { width, height } = await page.locator('#viewport').boundingBox();
+  await assertIsInFile(row, { x: 0.5 * width - 0.0025 * height, y: 0.65 * height });
+  await page.keyboard.press('Escape');
+  assert.equal(await state(page, 'tool'), 'navigate');
+  await page.locator('.crosshair').waitFor({ state: 'detached' });
+});
+
+test('a distance is measured by the keyboard alone, and a line ends at a second Enter', async () => {
+  await page.locator('[data-tool="polyline"]').focus();
+  await page.keyboard.press('Enter');
+  for (let i = 0; i < 6; i++) await page.keyboard.press('ArrowDown');
+  await page.keyboard.press('Enter');
+  await page.locator('.measure-dot').first().waitFor({ state: 'attached' });
+  for (let i = 0; i < 4; i++) await page.keyboard.press('ArrowRight');
+  await page.keyboard.press('Enter');
+  await page.keyboard.press('Enter');
+  await page.locator('.measurement h3', { hasText: 'polyline 1' }).waitFor();
 });
 
 test('a height profile shows the points of the file beside its line', async () => {

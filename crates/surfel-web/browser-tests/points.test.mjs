@@ -57,7 +57,7 @@ for (const [text, reason] of Object.entries(REFUSED)) {
 }
 
 test('classes have names, counts and colours, and one is always shown', async () => {
-  const labels = await page.locator('[data-row="class"] li').allTextContents();
+  const labels = await page.locator('[data-row="class"] .checklist label').allTextContents();
   assert.match(labels.join(), /^2 ground.*,6 building.*$/);
   await page.getByRole('checkbox', { name: '2 ground' }).uncheck();
   await settled(page);

@@ -2,6 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { cubeSides } from '../page/axis-cube.js';
 import * as cameras from '../page/camera.js';
 import { cross, distance, dot, length } from '../page/vector.js';
 
@@ -151,4 +152,17 @@ test('a panorama shows north at its centre and east to the right', () => {
   near(cameras.rayThrough(north, wide, 60, 20).direction, [1, 0, 0]);
   near(cameras.rayThrough(north, wide, 13, 0).direction, [0, 0, 1]);
   close(cameras.depthOf(north, [1, 2, 7]), 4);
+});
+
+test('the axis cube shows a side in full from its front, with its label upright', () => {
+  const start = { position: [3, -8, 5], focal_point: [0, 0, 0], view_up: up, view_angle: 35 };
+  for (const side of cameras.SIDES) {
+    const sides = cubeSides(cameras.fromSide(start, side, up), up);
+    const facing = sides.filter(({ isFacing }) => isFacing);
+    assert.deepEqual(facing.map((one) => one.side), [side]);
+    const [right, down] = [facing[0].label.slice(0, 2), facing[0].label.slice(2, 4)];
+    for (const [found, expected] of [[right, [1, 0]], [down, [0, 1]]]) assert.ok(Math.hypot(found[0] - expected[0], found[1] - expected[1]) < 1e-9);
+  }
+  const facing = cubeSides(start, up).filter(({ isFacing }) => isFacing).map((one) => one.side);
+  assert.deepEqual(facing, ['front', 'right', 'top']);
 });

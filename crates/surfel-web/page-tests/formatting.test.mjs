@@ -2,7 +2,8 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { coordinate, count, duration, exact, rounded, shortest, ticks, withUnit } from '../page/format.js';
+import { coordinate, count, duration, exact, fileSize, rounded, shortest, ticks, withUnit } from '../page/format.js';
+import { coordinatesText } from '../page/cursor-coordinates.js';
 import { formatMaterial, materialOf, parseMaterial, withMaterial } from '../page/materials.js';
 import { readHeader, socketAddress } from '../page/connection.js';
 import { pictureSize } from '../page/picture.js';
@@ -23,6 +24,7 @@ test('other numbers are rounded', () => {
   assert.equal(duration(2.44), '2.4 s');
   assert.equal(duration(200), '3 min 20 s');
   assert.equal(duration(7380), '2 h 3 min');
+  assert.deepEqual([0, 640, 12_345_000, 2e15].map(fileSize), ['0\u00a0B', '640\u00a0B', '12.3\u00a0MB', '2\u202f000\u00a0TB']);
 });
 
 test('scales have round ticks', () => {
@@ -89,4 +91,11 @@ test('numbers of single precision lose their noise', () => {
   assert.equal(shortest(Math.fround(24.9789995)), 24.979);
   assert.equal(shortest(484913.123456), 484913.123);
   assert.equal(shortest(-3), -3);
+});
+
+test('coordinates under the mouse are those of the file, and of triangles without rounding errors', () => {
+  const point = { kind: 'point', position: [484913.1, 6632700.07, 107.254], decimals: [2, 2, 3] };
+  assert.equal(coordinatesText(point, 'm'), '484913.10  6632700.07  107.254\u00a0m');
+  assert.equal(coordinatesText({ kind: 'point', position: [0.1, 2, -3] }, null), '0.1  2  -3');
+  assert.equal(coordinatesText({ kind: 'triangle', position: [562339.1250000012, 1, 2] }, null), '562339.125  1  2');
 });

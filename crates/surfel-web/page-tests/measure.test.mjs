@@ -3,7 +3,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { geoJson } from '../page/geojson.js';
-import { angleDegrees, area, circleThrough, corner, distances, levelArea, middle, pathLength, perimeter, resultsOf } from '../page/measure.js';
+import { decodeHash, encodeHash } from '../page/link.js';
+import {
+  angleDegrees, area, circleThrough, corner, distances, isMeasurement, levelArea, middle, pathLength, perimeter, resultsOf,
+} from '../page/measure.js';
 
 const up = [0, 0, 1];
 const [east, north] = [562337, 4183203];
@@ -65,4 +68,18 @@ test('measurements become GeoJSON in the coordinates of the file', () => {
   assert.deepEqual(features[0].properties, { name: 'roof', kind: 'area', unit: 'm', area: 6, level_area: 6, perimeter: 12 });
   assert.deepEqual([features[1].geometry.type, features[1].properties.length], ['LineString', 7]);
   assert.equal(geoJson([], { up }).crs, undefined);
+});
+
+test('volumes have their results from the server, and links have none', () => {
+  const points = [[0, 0, 0], [1, 0, 0], [0, 1, 0]];
+  const figure = { kind: 'volume', name: 'volume 1', points, base: 'lowest' };
+  assert.deepEqual(resultsOf(figure, [0, 0, 1]), []);
+  const volume = { cut: 5, fill: 2, area: 0.5, base: 3, cell_size: 0.1, empty_fraction: 0.25 };
+  const values = Object.fromEntries(resultsOf({ ...figure, volume }, [0, 0, 1]).map(({ name, value }) => [name, value]));
+  assert.deepEqual(values, { Cut: 5, Fill: 2, Net: 3, 'Level area': 0.5, 'Base height': 3, 'Cell size': 0.1, 'Empty cells': 25 });
+  assert.deepEqual(decodeHash(encodeHash({}, [{ ...figure, volume }])).measurements, [figure]);
+  for (const changed of [{ base: 'mean' }, { base: -3 }, { cell_size: 2 }]) assert.ok(isMeasurement({ ...figure, ...changed }), JSON.stringify(changed));
+  for (const changed of [{ base: 'top' }, { base: undefined }, { cell_size: 0 }, { cell_size: 'a' }, { points: points.slice(1) }]) {
+    assert.ok(!isMeasurement({ ...figure, ...changed }), JSON.stringify(changed));
+  }
 });

@@ -209,8 +209,11 @@ export function withViewAngle(camera, view_angle) {
   return toPerspective({ ...camera, orthographic: height }, view_angle);
 }
 
+/** The six sides of a scene, in the order of the keys 1 to 6. */
+export const SIDES = ['front', 'back', 'left', 'right', 'top', 'bottom'];
+
 /** View direction and picture's up of one of the six sides. */
-function sideAxes(side, up) {
+export function sideAxes(side, up) {
   const { east, north } = groundAxes(up);
   const sides = {
     front: [north, up], back: [scale(north, -1), up], left: [east, up], right: [scale(east, -1), up],

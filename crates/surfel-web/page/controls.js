@@ -1,7 +1,6 @@
 // The table of controls: each scene-file key that the panel shows, with its label, kind and range.
 
 import * as clip from './clip.js';
-import { materialOf, withMaterial } from './materials.js';
 import { distance, normalize, scale } from './vector.js';
 
 // A control is { key, label, kind, … } with the properties of its kind in fields.js (range, options, names …). It shows
@@ -135,38 +134,6 @@ export const annotationControls = [
   { key: 'caption', label: 'Caption', kind: 'text', placeholder: 'a line of text', help: 'A line of text at the lower left',
     read: (scene) => scene.caption ?? '', write: (caption) => ({ caption: caption || null }) },
 ];
-
-const FROM_FILE = { value: '', label: 'From file' };
-
-/** Material, colour, roughness and index of refraction of one object. */
-export function materialControls({ name }) {
-  const materialIn = (scene) => materialOf(scene.material, name);
-  const property = (word, control) => ({
-    key: `material.${name}.${word}`, sceneKey: 'material', ...control,
-    read: (scene, viewer) => {
-      const text = materialIn(scene)?.properties[word];
-      if (text === undefined) return control.default?.(materialIn(viewer.scene)?.kind);
-      return control.kind === 'slider' ? Number(text) : text;
-    },
-    write: (value, scene) => {
-      const { kind, properties: { [word]: _, ...others } } = materialIn(scene);
-      const properties = value === undefined ? others : { ...others, [word]: value };
-      return { material: withMaterial(scene.material, name, kind, properties) };
-    },
-    isVisible: (scene) => control.kinds.includes(materialIn(scene)?.kind),
-  });
-  return [
-    { key: `material.${name}`, sceneKey: 'material', label: name, help: name, kind: 'select', options: ({ info }) => [FROM_FILE, ...info.materials],
-      read: (scene) => materialIn(scene)?.kind ?? '',
-      write: (kind, scene) => ({ material: withMaterial(scene.material, name, kind || null, {}) }) },
-    property('color', { label: 'Colour', kind: 'color', placeholder: 'from the points', kinds: ['matte', 'metal', 'glass', 'plastic', 'emissive', 'unlit'] }),
-    property('roughness', { label: 'Roughness', ...SLIDER, range: [0, 1], limits: [0, 1], step: 0.01, kinds: ['metal', 'glass', 'plastic'],
-      default: (kind) => ({ metal: 0.25, plastic: 0.2 })[kind] ?? 0 }),
-    property('ior', { label: 'IOR', ...SLIDER, range: [1, 2.5], limits: [1, 4], step: 0.01, kinds: ['glass', 'plastic'],
-      default: () => 1.5, help: 'Index of refraction: water 1.33, glass 1.5' }),
-    property('emissive_strength', { label: 'Emission', ...SLIDER, range: [0, 10], limits: [0, 10000], step: 0.1, kinds: ['emissive'], default: () => 1 }),
-  ];
-}
 
 const boxOf = (scene) => clip.parseBox(scene.clip_box);
 const planeOf = (scene) => clip.parsePlane(scene.clip_plane);

@@ -3,6 +3,7 @@
 import { copyText } from './copy.js';
 import { download, element } from './dom.js';
 import { NO_LINK, decodeHash } from './link.js';
+import { setUpPointsExport } from './points-export.js';
 import { stemOf } from './save-dialog.js';
 import { showToast } from './toast.js';
 
@@ -14,6 +15,7 @@ export function setUpExportDialog(viewer, viewHistory) {
   const text = document.getElementById('export-text');
   const tabs = document.getElementById('export-tabs');
   const downloadButton = document.getElementById('export-download');
+  const beginPoints = setUpPointsExport(viewer, dialog);
   let exported = {};
   let format = 'command';
 
@@ -38,6 +40,7 @@ export function setUpExportDialog(viewer, viewHistory) {
   return async () => {
     exported = { link: viewHistory.updateAddress() };
     show();
+    beginPoints();
     dialog.showModal();
     try {
       exported = { ...exported, ...(await viewer.request({ type: 'export', ...viewer.size })) };

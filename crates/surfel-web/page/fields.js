@@ -148,7 +148,7 @@ function text(control, change, id) {
 
 /** Check boxes of the control's options, each `{ value, name, color, points }`. The last one that is checked stays so. */
 function checklist(control, change, id) {
-  const list = element('ul', { class: 'field checklist', id, role: 'group', 'aria-label': control.label });
+  const list = element('div', { class: 'field checklist', id, role: 'group', 'aria-label': control.label });
   let shown = null;
   const boxes = () => [...list.querySelectorAll('input')];
   const checked = () => boxes().flatMap((box, i) => (box.checked ? [shown[i].value] : []));
@@ -156,7 +156,7 @@ function checklist(control, change, id) {
     const box = element('input', { type: 'checkbox', 'data-key': `${control.key}.${value}`, onchange: () => change(checked(), false) });
     const swatch = element('span', { class: 'swatch' });
     swatch.style.background = color;
-    return element('li', {}, element('label', {}, box, swatch, element('span', {}, name), element('small', {}, count(points))));
+    return element('label', {}, box, swatch, element('span', {}, name), element('small', {}, count(points)));
   };
   const show = (values, viewer) => {
     const options = control.options(viewer);

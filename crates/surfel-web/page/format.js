@@ -44,6 +44,12 @@ export function duration(seconds) {
   return `${Math.floor(whole / 3600)} h ${Math.floor((whole % 3600) / 60)} min`;
 }
 
+/** The size of a file as text: `640 B`, `12.3 MB`. */
+export function fileSize(bytes) {
+  const power = bytes < 1000 ? 0 : Math.min(4, Math.floor(Math.log10(bytes) / 3));
+  return withUnit(rounded(bytes / 1000 ** power, 3), ['B', 'kB', 'MB', 'GB', 'TB'][power]);
+}
+
 /** About `nTicks` round numbers between two ends, for a scale. */
 export function ticks(low, high, nTicks) {
   const raw = (high - low) / nTicks;

@@ -18,7 +18,7 @@ export function geoJson(measurements, { up, coordinate_system: system, unit }) {
 }
 
 function geometryOf({ kind, points }) {
-  if (kind === 'area') return { type: 'Polygon', coordinates: [[...points, points[0]]] };
+  if (kind === 'area' || kind === 'volume') return { type: 'Polygon', coordinates: [[...points, points[0]]] };
   if (kind === 'circle') return { type: 'MultiPoint', coordinates: points };
   return { type: 'LineString', coordinates: points };
 }

@@ -1,12 +1,14 @@
 // Keyboard: flying while keys are held, and commands of single keys.
 
+import { SIDES } from './camera.js';
+
 const FLY_DIRECTIONS = {
   w: [0, 0, 1], s: [0, 0, -1], a: [-1, 0, 0], d: [1, 0, 0], q: [0, -1, 0], e: [0, 1, 0],
 };
 const ORBIT_DIRECTIONS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const CROSSHAIR_DIRECTIONS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 /** Length of the drag that an arrow key stands for, as a fraction of the picture's height. */
 const ORBIT_STEP = 1 / 36;
-const SIDES = ['front', 'back', 'left', 'right', 'top', 'bottom'];
 const FAST_FLY_SPEED = 4;
 const ZOOM_STEP = 0.8;
 
@@ -15,7 +17,7 @@ export const KEY_HELP = [
   ['W A S D', 'fly forward, left, back, right'],
   ['Q E', 'fly down, up'],
   ['Shift', 'fly faster'],
-  ['← ↑ → ↓', 'orbit'],
+  ['← ↑ → ↓', 'orbit; with a tool, move the crosshair, with Shift finely'],
   ['+ −', 'zoom in, zoom out'],
   ['1 … 6', 'view from the front, back, left, right, top, bottom'],
   ['F', 'fit to view'],
@@ -28,7 +30,7 @@ export const KEY_HELP = [
   ['Z', 'colour by elevation'],
   ['I', 'colour by intensity'],
   ['C', 'colour by class'],
-  ['Enter', 'end the measured line, area or profile'],
+  ['Enter', 'pick at the crosshair; end the measured line, area or profile'],
   ['Esc', 'cancel or close'],
   ['?', 'show this help'],
 ];
@@ -43,7 +45,7 @@ export const MOUSE_HELP = [
   ['Two fingers', 'pan and zoom'],
 ];
 
-/** `actions` has `escape()`, `enter()` and `help()`. */
+/** `actions` has `escape()`, `enter()`, `help()`, and `moveCrosshair(direction, isFine)`, which returns whether there is one. */
 export function setUpKeyboard(viewer, navigation, viewHistory, actions) {
   const held = new Set();
   let last = 0;
@@ -110,10 +112,11 @@ export function setUpKeyboard(viewer, navigation, viewHistory, actions) {
     if (event.key === 'Enter' && !event.target.closest('button, summary, a')) actions.enter();
     if (ORBIT_DIRECTIONS[event.key]) {
       if (event.target.closest('#panel')) return;
+      event.preventDefault();
+      if (actions.moveCrosshair(CROSSHAIR_DIRECTIONS[event.key], event.shiftKey)) return;
       const [dx, dy] = ORBIT_DIRECTIONS[event.key].map((step) => step * ORBIT_STEP * viewer.size.height);
       navigation.orbit(dx, dy);
       navigation.settle();
-      event.preventDefault();
       return;
     }
     const key = event.key.toLowerCase();
@@ -129,5 +132,5 @@ export function setUpKeyboard(viewer, navigation, viewHistory, actions) {
 
 /** Whether the focused element is a control that keys are meant for. A button that was clicked keeps its focus, but not the keys. */
 function usesKeys(target) {
-  return target.matches('select, textarea, input, :is(button, summary, a):focus-visible');
+  return target.matches('select, textarea, input, :is(button, summary, a, [role="button"]):focus-visible');
 }

@@ -18,7 +18,7 @@ export function viewPatch(initialScene, scene) {
 
 /** The hash of an address for a patch and measurements; empty if there are none. */
 export function encodeHash(patch, measurements = []) {
-  const content = measurements.length ? { ...patch, measurements } : patch;
+  const content = measurements.length ? { ...patch, measurements: measurements.map(withoutResults) } : patch;
   if (Object.keys(content).length === 0) return '';
   const text = JSON.stringify(content, (_, value) => (typeof value === 'number' ? rounded(value) : value));
   const bytes = new TextEncoder().encode(text);
@@ -35,10 +35,17 @@ export function decodeHash(hash) {
     const content = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes));
     if (typeof content !== 'object' || content === null || Array.isArray(content)) return null;
     const { measurements, ...patch } = content;
-    return { patch, measurements: Array.isArray(measurements) ? measurements.filter(isMeasurement) : [] };
+    return { patch, measurements: Array.isArray(measurements) ? measurements.filter(isMeasurement).map(withoutResults) : [] };
   } catch {
     return null;
   }
+}
+
+/** The results of a volume come from the server. */
+function withoutResults(figure) {
+  if (!figure?.volume) return figure;
+  const { volume, ...others } = figure;
+  return others;
 }
 
 /** Rounds to thirteen digits: micrometres on a national grid, and short links. */

@@ -2,15 +2,20 @@
 
 import { animationRows } from './animation.js';
 import { makeRoomForAnnotations } from './annotations.js';
+import { setUpAxisCube } from './axis-cube.js';
 import { clipPainter, grabHandle } from './clip-handles.js';
 import * as controls from './controls.js';
+import { Crosshair } from './crosshair.js';
+import { CursorCoordinates } from './cursor-coordinates.js';
 import { element } from './dom.js';
 import { setUpExportDialog, setUpSceneLoading } from './export-dialog.js';
+import { histogramRows } from './histogram.js';
 import { KEY_HELP, MOUSE_HELP, setUpKeyboard } from './keyboard.js';
 import { colormapPreview, setUpLegend } from './legend.js';
 import { NO_LINK, decodeHash } from './link.js';
 import { MEASURE_TOOLS, MeasureTool } from './measure-tool.js';
 import { Navigation } from './navigation.js';
+import { objectSection } from './object-controls.js';
 import { Overlay, pivotPainter } from './overlay.js';
 import { Panel, section } from './panel.js';
 import { PickCard } from './pick-card.js';
@@ -26,6 +31,7 @@ import { setUpToolbar } from './toolbar.js';
 import { Viewer } from './viewer.js';
 import { ViewHistory } from './view-history.js';
 import { viewRows } from './view-section.js';
+import { setUpVolumes } from './volume.js';
 
 const link = decodeHash(location.hash) ?? NO_LINK;
 const viewer = new Viewer(link.patch);
@@ -37,6 +43,8 @@ const pickCard = new PickCard(viewer, overlay);
 const measureTool = new MeasureTool(viewer, overlay);
 const profileCard = new ProfileCard(viewer, overlay, measureTool);
 const viewHistory = new ViewHistory(viewer, measureTool);
+const cursorCoordinates = new CursorCoordinates(viewer);
+const crosshair = new Crosshair(viewer, overlay);
 overlay.add(clipPainter(viewer));
 overlay.add(pivotPainter(navigation));
 
@@ -51,25 +59,25 @@ const openExportDialog = setUpExportDialog(viewer, viewHistory);
 setUpNotifications(viewer);
 setUpStatusLine(viewer);
 setUpLegend(viewer);
+setUpAxisCube(viewer, navigation);
 makeRoomForAnnotations(viewer);
+setUpVolumes(viewer, measureTool);
 setUpSceneLoading(viewer, measureTool);
-setUpToolbar(viewer, navigation, viewHistory, { save: openSaveDialog, export: openExportDialog, help: showHelp });
+setUpToolbar(viewer, navigation, viewHistory, { save: openSaveDialog, export: openExportDialog, help: showHelp, crosshair: showCrosshair });
 fillPanel();
 fillHelp();
 
 setUpPointer(viewport, viewer, navigation, {
   grab: (event, pixel) => grabHandle(viewer, event, pixel),
-  hover: (pixel) => measureTool.hover(inCssPixels(pixel)),
-  async click(pixel, event) {
-    const { tool } = viewer;
-    const isMeasuring = MEASURE_TOOLS.includes(tool) && !event.altKey;
-    if (!isMeasuring && tool !== 'pick' && !event.altKey) return;
-    lastPick = pickAfter(lastPick, pixel);
-    const point = await lastPick;
-    if (viewer.tool !== tool) return;
-    if (!point) showToast('There is no point here.');
-    else if (isMeasuring) measureTool.add(point.kind === 'point' ? point.position : point.surface);
-    else pickCard.show(point);
+  hover(pixel, event) {
+    measureTool.hover(inCssPixels(pixel));
+    const isOnPicture = event.pointerType !== 'touch' && event.buttons === 0 && !event.target.closest('[data-ui]');
+    cursorCoordinates.moveTo(isOnPicture ? pixel : null);
+  },
+  leave: () => cursorCoordinates.moveTo(null),
+  click(pixel, event) {
+    crosshair.hide();
+    return useTool(pixel, event.altKey);
   },
   async doubleClick(pixel) {
     if (MEASURE_TOOLS.includes(viewer.tool)) {
@@ -83,7 +91,17 @@ setUpPointer(viewport, viewer, navigation, {
 
 setUpKeyboard(viewer, navigation, viewHistory, {
   help: showHelp,
-  enter: finishFigure,
+  enter() {
+    if (!crosshair.isMoved) return finishFigure();
+    crosshair.markPicked();
+    return useTool(crosshair.pixel, false);
+  },
+  moveCrosshair(direction, isFine) {
+    if (viewer.tool === 'navigate') return false;
+    crosshair.move(direction, isFine);
+    followCrosshair();
+    return true;
+  },
   escape() {
     if (navigation.turntable_secs) navigation.stop();
     else if (measureTool.isActive) measureTool.cancel();
@@ -98,6 +116,31 @@ exposeState(viewer);
 // The results need the up axis of the data.
 viewer.infoChanged.listen(showLinkedMeasurements);
 viewer.connect();
+
+/** Picks or measures the point behind a pixel, as the tool does; `isPick` picks with any tool. */
+async function useTool(pixel, isPick) {
+  const { tool } = viewer;
+  const isMeasuring = MEASURE_TOOLS.includes(tool) && !isPick;
+  if (!isMeasuring && tool !== 'pick' && !isPick) return;
+  lastPick = pickAfter(lastPick, pixel);
+  const point = await lastPick;
+  if (viewer.tool !== tool) return;
+  if (!point) showToast('There is no point here.');
+  else if (isMeasuring) measureTool.add(point.kind === 'point' ? point.position : point.surface);
+  else pickCard.show(point);
+}
+
+/** Gives the keys to the picture, with a crosshair. */
+function showCrosshair() {
+  viewport.focus();
+  crosshair.show();
+  followCrosshair();
+}
+
+function followCrosshair() {
+  measureTool.hover(inCssPixels(crosshair.pixel));
+  cursorCoordinates.moveTo(crosshair.pixel);
+}
 
 /** Shows the measurements of the link with which the page was opened. */
 function showLinkedMeasurements() {
@@ -124,30 +167,25 @@ function inCssPixels({ x, y }) {
 
 function fillPanel() {
   const rows = (table) => panel.addRows(table);
-  const materials = section('Materials', false);
+  const points = section('Points', false, ...rows(controls.pointControls), ...histogramRows(viewer));
+  const surface = section('Surface', true, ...rows(controls.surfaceControls));
+  const color = section('Colour', true, ...withPreview(rows(controls.colorControls)));
   viewer.infoChanged.listen(() => {
-    const isFilled = materials.dataset.dataName === viewer.info.name;
-    materials.dataset.dataName = viewer.info.name;
-    if (isFilled) return;
-    const body = materials.querySelector('.section-body');
-    panel.removeRows([...body.children]);
-    body.append(...viewer.info.objects.flatMap((object) => rows(controls.materialControls(object))));
+    for (const part of [surface, color, points]) part.hidden = viewer.info.points === 0;
   });
-  const points = section('Points', false, ...rows(controls.pointControls));
-  viewer.infoChanged.listen(() => { points.hidden = viewer.info.points === 0; });
   const animation = section('Animation', true, ...animationRows(viewer, () => animation));
   document.getElementById('sections').append(
     animation,
-    section('Surface', true, ...rows(controls.surfaceControls)),
-    section('Colour', true, ...withPreview(rows(controls.colorControls))),
+    surface,
+    color,
     points,
+    objectSection(viewer, panel),
     section('Sun', true, ...rows(controls.sunControls), sunClock(viewer)),
     section('Sky', true, ...rows(controls.skyControls)),
     section('Picture', false, ...rows(controls.pictureControls)),
     section('Annotations', false, ...rows(controls.annotationControls)),
     section('View', false, ...viewRows(viewer, navigation)),
     section('Clipping', false, ...rows(controls.clipControls)),
-    materials,
     section('Statistics', false, statisticsTable(viewer)));
 }
 

@@ -9,8 +9,10 @@ import { borders } from './profile.js';
 import { stemOf } from './save-dialog.js';
 import { signal } from './signal.js';
 import { addScaled, mix } from './vector.js';
+import { volumeControls } from './volume.js';
 
 export const MEASURE_TOOLS = Object.keys(KINDS);
+const POWERS = { 1: '', 2: '²', 3: '³' };
 /** Kinds whose only result needs no name. */
 const KINDS_OF_ONE_RESULT = ['height', 'angle', 'polyline'];
 /** Width of the strip of a new profile as a fraction of its length. */
@@ -61,9 +63,10 @@ export class MeasureTool {
   /** Finishes the figure if it has enough points. */
   finish() {
     const kind = this.viewer.tool;
-    if (this.#points.length < KINDS[kind].least) return;
+    if (!KINDS[kind] || this.#points.length < KINDS[kind].least) return;
     const figure = { kind, name: this.#newName(kind), points: this.#points };
     if (kind === 'profile') figure.width = PROFILE_WIDTH * pathLength(figure.points);
+    if (kind === 'volume') figure.base = 'lowest';
     this.cancel();
     this.#change([...this.#finished, figure]);
     if (kind === 'profile') this.profileOpened(figure);
@@ -77,6 +80,11 @@ export class MeasureTool {
 
   replace(figure, changed) {
     this.#change(this.#finished.map((other) => (other === figure ? changed : other)));
+  }
+
+  /** Puts results that the server has found into a figure, which is no change by the user. */
+  complete(figure, completed) {
+    this.figures = this.#finished.map((other) => (other === figure ? completed : other));
   }
 
   #change(figures) {
@@ -104,9 +112,10 @@ export class MeasureTool {
   /** The text of a length or area in the unit of the file. */
   #text({ value, dimension }) {
     if (dimension === 0) return `${rounded(value, 4)}°`;
+    if (dimension === 'percent') return `${rounded(value, 3)} %`;
     if (value === Infinity) return 'straight line';
     const { unit } = this.viewer.info;
-    return withUnit(rounded(value, 6), unit && dimension === 2 ? `${unit}²` : unit);
+    return withUnit(rounded(value, 6), unit ? `${unit}${POWERS[dimension]}` : unit);
   }
 
   #list() {
@@ -137,6 +146,7 @@ export class MeasureTool {
         figure.kind === 'profile' ? iconButton('profile', `Show ${figure.name}`, () => this.profileOpened(figure)) : null,
         copyButton(`Copy ${figure.name}`, () => this.#textOf(figure)),
         iconButton('delete', `Delete ${figure.name}`, remove)),
+      figure.kind === 'volume' ? volumeControls(figure, (changed) => this.replace(figure, changed)) : null,
       element('dl', { class: 'values' }, ...rows));
   }
 
@@ -162,11 +172,13 @@ export class MeasureTool {
   #paintFigure(view, figure) {
     const { up } = this.viewer.info;
     const { kind, points } = figure;
-    const lines = this.#results(figure).map((result) =>
+    // All results of a volume would hide much of the picture.
+    const shown = kind === 'volume' ? this.#results(figure).slice(0, 3) : this.#results(figure);
+    const lines = shown.map((result) =>
       (KINDS_OF_ONE_RESULT.includes(kind) ? this.#text(result) : `${result.name} ${this.#text(result)}`));
-    if (kind === 'area') {
+    if (kind === 'area' || kind === 'volume') {
       return [...view.polygon(points, 'measure-area'), ...view.path(points, 'measure', true), ...dots(view, points),
-        ...view.label(middle(points), lines)];
+        ...(lines.length ? view.label(middle(points), lines) : [])];
     }
     if (kind === 'profile') {
       const strip = borders(points, figure.width, up).flatMap(([from, to]) => view.line(from, to, 'measure-leg'));

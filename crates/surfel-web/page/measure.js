@@ -1,6 +1,7 @@
 // Measurements: lengths, heights, angles, circles and areas of points in the world.
 
 import { levelLength } from './profile.js';
+import { isVolume, volumeResults } from './volume-results.js';
 import { add, addScaled, cross, distance, dot, length, scale, subtract } from './vector.js';
 
 /** Kinds of measurements: the least number of their points, and their number if it is fixed. */
@@ -12,17 +13,19 @@ export const KINDS = {
   polyline: { least: 2 },
   area: { least: 3 },
   profile: { least: 2 },
+  volume: { least: 3 },
 };
 const MAX_NAME_LENGTH = 100;
 
-/** Whether a value from a link is a measurement: `{ kind, name, points }`, and the `width` of a profile. */
+/** Whether a value from a link is a measurement: `{ kind, name, points }`, and the `width` of a profile or the base of a volume. */
 export function isMeasurement(value) {
   const isPoint = (point) => Array.isArray(point) && point.length === 3 && point.every(Number.isFinite);
   if (!Object.hasOwn(KINDS, value?.kind) || typeof value.name !== 'string' || MAX_NAME_LENGTH < value.name.length) return false;
   const { least, fixed = Infinity } = KINDS[value.kind];
   const n = Array.isArray(value.points) ? value.points.length : 0;
   const hasWidth = value.kind !== 'profile' || (Number.isFinite(value.width) && 0 < value.width);
-  return least <= n && n <= fixed && value.points.every(isPoint) && hasWidth;
+  const hasBase = value.kind !== 'volume' || isVolume(value);
+  return least <= n && n <= fixed && value.points.every(isPoint) && hasWidth && hasBase;
 }
 
 const horizontalPart = (offset, up) => addScaled(offset, up, -dot(offset, up));
@@ -91,8 +94,13 @@ function newell(points) {
   return scale(sum, 0.5);
 }
 
-/** The results of a measurement as rows of name, value and dimension: 0 for angles, 1 for lengths, 2 for areas. */
-export function resultsOf({ kind, points }, up) {
+/**
+ * The results of a measurement as rows of name, value and dimension: 0 for angles, 1 for lengths, 2 for areas,
+ * 3 for volumes, `percent` for fractions.
+ */
+export function resultsOf(figure, up) {
+  const { kind, points } = figure;
+  if (kind === 'volume') return volumeResults(figure);
   if (kind === 'area') {
     return [
       { name: 'Area', value: area(points), dimension: 2 },

@@ -7,7 +7,8 @@ const WHEEL_PAUSE_MS = 300;
 const LINE_PIXELS = 16;
 
 /**
- * `actions` has `click(pixel, event)`, `doubleClick(pixel)` and `hover(pixel)`, in pixels of the picture.
+ * `actions` has `click(pixel, event)`, `doubleClick(pixel)` and `hover(pixel, event)`, in pixels of the picture;
+ * `leave()` ends the hovering.
  * `grab(event, pixel)` may take over a drag by returning `{ move(pixel), end() }`.
  */
 export function setUpPointer(viewport, viewer, navigation, actions) {
@@ -29,6 +30,7 @@ export function setUpPointer(viewport, viewer, navigation, actions) {
   viewport.addEventListener('pointerdown', (event) => {
     if (!viewer.camera || event.target.closest('[data-ui]')) return;
     viewport.focus({ preventScroll: true });
+    actions.leave();
     navigation.stop();
     viewport.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, pixelOf(event));
@@ -46,7 +48,7 @@ export function setUpPointer(viewport, viewer, navigation, actions) {
     const pixel = pixelOf(event);
     if (!pointers.has(event.pointerId)) {
       if (wheel && CLICK_PIXELS < distance(wheel.client, clientOf(event))) wheel = null;
-      actions.hover(pixel);
+      actions.hover(pixel, event);
       return;
     }
     if (pointers.size === 2) pinch(event.pointerId, pixel);
@@ -61,12 +63,14 @@ export function setUpPointer(viewport, viewer, navigation, actions) {
     }
     const { grabbed, isClick, start } = drag;
     drag = null;
+    actions.hover(pixelOf(event), event);
     if (grabbed) grabbed.end();
     else if (isClick && event.type === 'pointerup' && start.button === 0) handleClick(pixelOf(event), start);
     else if (navigation.isActive) navigation.endInteraction();
   };
   viewport.addEventListener('pointerup', release);
   viewport.addEventListener('pointercancel', release);
+  viewport.addEventListener('pointerleave', () => actions.leave());
 
   viewport.addEventListener('wheel', (event) => {
     if (!viewer.camera || event.target.closest('[data-ui]')) return;

@@ -1,6 +1,7 @@
 // The toolbar over the picture, and the button that folds the panel.
 
 import { isOrthographic } from './camera.js';
+import { setUpRovingFocus } from './roving.js';
 
 const HINTS = {
   pick: 'Click on a point to show its attributes.',
@@ -11,9 +12,10 @@ const HINTS = {
   polyline: 'Click on the points of a line. Double click or Enter ends it.',
   profile: 'Click on the points of a line. Double click or Enter shows the heights along it.',
   area: 'Click on the corners. Double click or Enter closes the area.',
+  volume: 'Click on the corners of an area. Double click or Enter computes cut and fill.',
 };
 
-/** `open` has `save()`, `export()` and `help()`. */
+/** `open` has `save()`, `export()` and `help()`, and `crosshair()` for tools that were chosen by a key. */
 export function setUpToolbar(viewer, navigation, viewHistory, open) {
   const actions = {
     undo: () => viewHistory.undo(),
@@ -29,7 +31,11 @@ export function setUpToolbar(viewer, navigation, viewHistory, open) {
   const hint = document.getElementById('hint');
   toolbar.addEventListener('click', (event) => {
     const { tool, action } = event.target.closest('button')?.dataset ?? {};
-    if (tool) viewer.selectTool(viewer.tool === tool ? 'navigate' : tool);
+    if (tool) {
+      viewer.selectTool(viewer.tool === tool ? 'navigate' : tool);
+      // A key activates a button without a position of the mouse.
+      if (event.detail === 0 && viewer.tool === tool) open.crosshair();
+    }
     if (action && viewer.camera) actions[action]();
   });
   viewer.toolChanged.listen(() => {
@@ -40,7 +46,11 @@ export function setUpToolbar(viewer, navigation, viewHistory, open) {
   });
 
   const [undo, redo] = ['undo', 'redo'].map((action) => toolbar.querySelector(`[data-action=${action}]`));
-  const showHistory = () => [undo.disabled, redo.disabled] = [!viewHistory.canUndo, !viewHistory.canRedo];
+  const updateFocus = setUpRovingFocus(toolbar, () => [...toolbar.querySelectorAll('button')]);
+  const showHistory = () => {
+    [undo.disabled, redo.disabled] = [!viewHistory.canUndo, !viewHistory.canRedo];
+    updateFocus();
+  };
   viewHistory.changed.listen(showHistory);
   showHistory();
 
@@ -49,8 +59,8 @@ export function setUpToolbar(viewer, navigation, viewHistory, open) {
     const isFolded = document.body.classList.toggle('is-folded');
     fold.setAttribute('aria-expanded', !isFolded);
   });
-  // On a phone the panel covers half of the picture, so it starts folded.
-  if (matchMedia('(max-width: 640px)').matches) fold.click();
+  // On a phone the panel covers much of the picture, so it starts folded.
+  if (matchMedia('(max-width: 640px), (max-height: 480px) and (pointer: coarse)').matches) fold.click();
 
   viewer.infoChanged.listen(() => {
     const { name } = viewer.info;

@@ -1,8 +1,9 @@
 // The panel's section for the camera: projection, angle of view, stations, sides, and turntable.
 
-import { isOrthographic } from './camera.js';
+import { SIDES, isOrthographic } from './camera.js';
 import { element, icon } from './dom.js';
 import { fieldFactories } from './fields.js';
+import { namedViewRows } from './named-views.js';
 
 /** Buttons that move the camera: name, title and action. */
 const JUMPS = [
@@ -10,7 +11,6 @@ const JUMPS = [
   ['fit', 'Fit to view (F)', (navigation) => navigation.fit()],
   ['previous', 'Previous view (Backspace)', (navigation) => navigation.goBack()],
 ];
-const SIDES = ['front', 'back', 'left', 'right', 'top', 'bottom'];
 
 export function viewRows(viewer, navigation) {
   const projection = fieldRow(viewer, {
@@ -48,7 +48,7 @@ export function viewRows(viewer, navigation) {
   const sides = element('div', { class: 'sides' }, ...SIDES.map((side, i) => element('button', {
     type: 'button', class: 'button', title: `${side} (${i + 1})`, 'data-side': side, onclick: () => navigation.viewFromSide(side),
   }, side)));
-  const rows = [projection, angle, trackball, station, jumps, sides, turntable(viewer, navigation)];
+  const rows = [projection, angle, trackball, station, jumps, sides, turntable(viewer, navigation), ...namedViewRows(viewer, navigation)];
   // The position of an animated camera arrives with the first scene.
   const update = () => rows.forEach((row) => { row.inert = !viewer.camera; });
   viewer.cameraChanged.listen(update);

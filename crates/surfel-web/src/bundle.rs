@@ -2,7 +2,7 @@
 //!
 //! Each module becomes a function that is called once and returns the module's exports. This understands the forms
 //! of `import` and `export` that the page uses, and rejects all others; a test bundles the page. Lines that hold only
-//! a comment are left out.
+//! a comment and indentation are left out, so that the page loads sooner; texts of several lines have no indentation.
 
 use std::collections::BTreeSet;
 
@@ -21,13 +21,14 @@ pub fn bundle_modules(entry: &str, read: ReadFile) -> Result<String, String> {
     Ok(bundle.text)
 }
 
-/// Returns the style sheets in their order as one.
+/// Returns the style sheets in their order as one, without comments and indentation.
 ///
 /// # Errors
 /// Fails with the reason if one is missing.
 pub fn bundle_styles(names: &[&str], read: ReadFile) -> Result<String, String> {
     let texts = names.iter().map(|name| read(name).ok_or_else(|| format!("{name}: is missing")));
-    texts.collect::<Result<Vec<String>, String>>().map(|texts| texts.concat())
+    let texts = texts.collect::<Result<Vec<String>, String>>()?;
+    Ok(dense_lines(&texts.concat()).flat_map(|line| [line.trim(), "\n"]).collect())
 }
 
 struct Bundle<'r> {
@@ -77,7 +78,7 @@ struct Import {
 impl<'t> Module<'t> {
     fn parse(text: &'t str) -> Result<Self, String> {
         let mut module = Self { imports: Vec::new(), exports: Vec::new(), lines: Vec::new() };
-        let mut lines = text.lines();
+        let mut lines = dense_lines(text);
         while let Some(line) = lines.next() {
             if line.contains("import(") || line.contains("import.meta") {
                 return Err(format!("`{line}` is not supported"));
@@ -94,8 +95,8 @@ impl<'t> Module<'t> {
                 let name = exported_name(declaration);
                 module.exports.push(name.ok_or_else(|| format!("`{line}` is not supported"))?);
                 module.lines.push(declaration);
-            } else if !is_comment(line) {
-                module.lines.push(line);
+            } else {
+                module.lines.push(line.trim());
             }
         }
         Ok(module)
@@ -107,7 +108,7 @@ impl<'t> Module<'t> {
             .iter()
             .map(|Import { from, target }| format!("const {target} = {};\n", variable_of(from)));
         format!(
-            "// {name}\nconst {} = (() => {{\n{}{}\nreturn {{ {} }};\n}})();\n",
+            "const {} = (() => {{\n{}{}\nreturn {{ {} }};\n}})();\n",
             variable_of(name),
             imports.collect::<String>(),
             self.lines.join("\n"),
@@ -133,10 +134,18 @@ impl Import {
     }
 }
 
-/// Returns whether a line holds only a comment.
-fn is_comment(line: &str) -> bool {
-    let text = line.trim();
-    text.starts_with("//") || text.starts_with("/**") && text.ends_with("*/")
+/// The lines of a text without those that are empty or hold only a comment.
+fn dense_lines(text: &str) -> impl Iterator<Item = &str> {
+    let mut is_in_comment = false;
+    text.lines().filter(move |line| {
+        let line = line.trim();
+        let begins = line.starts_with("/*");
+        let is_comment = is_in_comment || begins || line.starts_with("//");
+        if begins || is_in_comment {
+            is_in_comment = !line.contains("*/");
+        }
+        !is_comment && !line.is_empty()
+    })
 }
 
 /// The name that a declaration declares; none if it is not a function, class or constant with a single name.
@@ -182,25 +191,22 @@ mod tests {
             ),
             (
                 "c.js",
-                "// Runs.\nexport async function run(x) {\n  /** Now. */\n  return x; // Later.\n}",
+                "// Runs.\n\n/**\n * Returns.\n */\nexport async function run(x) {\n  /** Now. */\n  return x; // Later.\n}",
             ),
         ]);
         let expected = "\
-// c.js
 const module_c = (() => {
 async function run(x) {
-  return x; // Later.
+return x; // Later.
 }
 return { run };
 })();
-// a-b.js
 const module_a_b = (() => {
 const { run } = module_c;
 const one = run();
 class Two {}
 return { one, Two };
 })();
-// main.js
 const module_main = (() => {
 const { one: first,  Two } = module_a_b;
 const c = module_c;
@@ -209,6 +215,18 @@ return {  };
 })();
 ";
         assert_eq!(found.unwrap(), expected);
+    }
+
+    #[test]
+    fn style_sheets_are_joined_without_comments() {
+        let read = |name: &str| match name {
+            "a.css" => Some("/* All. */\n\nb {\n  color: red;\n}\n".to_owned()),
+            "c.css" => Some("/* Two\n   lines. */\nd { top: 0; }\n".to_owned()),
+            _ => None,
+        };
+        let found = bundle_styles(&["a.css", "c.css"], &read);
+        assert_eq!(found.unwrap(), "b {\ncolor: red;\n}\nd { top: 0; }\n");
+        assert!(bundle_styles(&["a.css", "e.css"], &read).unwrap_err().contains("e.css"));
     }
 
     #[test]

@@ -23,9 +23,12 @@ mod outgoing;
 mod client;
 mod render_loop;
 mod pick;
+mod corners;
 mod profile;
+mod volume;
 mod progress_reporter;
 mod pending_changes;
+mod downloads;
 mod server_state;
 mod scene_update;
 mod session;
@@ -36,8 +39,8 @@ mod server;
 
 pub use limits::{Limits, Timeouts};
 pub use scene_provider::{
-    Error, Export, PickedPoint, PictureOverlay, PicturePart, PointDescriber, PreparedScene, Result,
-    SceneProvider, SettingsMap,
+    Error, Export, PickedPoint, PictureOverlay, PicturePart, PointDescriber, PointFile,
+    PreparedScene, Result, SceneProvider, SettingsMap,
 };
 pub use server::Server;
 pub use tls::{TlsError, TlsIdentity};

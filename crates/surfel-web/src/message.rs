@@ -37,9 +37,15 @@ pub enum Incoming {
     Pick { id: u32, x: f64, y: f64 },
     /// A request for the points beside a line, for a height profile.
     Profile { id: u32, points: Vec<[f64; 3]>, width: f64, up: [f64; 3] },
+    /// A request for the volume between the points over a polygon and a base: `lowest`, `mean` or a height.
+    Volume { id: u32, points: Vec<[f64; 3]>, up: [f64; 3], base: Value, cell_size: Option<f64> },
+    /// A request for the histogram of a column.
+    Histogram { id: u32, column: String },
     /// A request for a finished picture of this size.
     Save { id: u32, width: u32, height: u32 },
-    /// Cancels a `Save`.
+    /// A request for the points that are shown as a file of a format, `laz` or `ply`.
+    Points { id: u32, format: String },
+    /// Cancels a `Save` or `Points`.
     Cancel { id: u32 },
     /// A request for the settings as command line and scene files.
     Export { id: u32, width: u32, height: u32 },

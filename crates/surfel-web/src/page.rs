@@ -83,7 +83,7 @@ fn page_files() -> Result<Vec<PageFile>, String> {
     for line in page.lines() {
         match line.trim().strip_prefix(STYLE_LINK).and_then(|rest| rest.strip_suffix("\">")) {
             Some(name) => styles.push(name),
-            None => lines.push(line),
+            None => lines.push(line.trim_start()),
         }
     }
     let style = PageFile::hashed("page", "css", bundle_styles(&styles, &read)?);

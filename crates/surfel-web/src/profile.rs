@@ -1,32 +1,24 @@
 //! Height profiles for pages: the points of the scene beside a line.
 
+use crate::corners;
 use crate::scene_provider::{Error, PreparedScene, Result};
 use serde_json::{Value, json};
 use surfel_core::flat::{Profile, ProfileLine, ProfilePoint, height_profile};
-use surfel_core::math::DVec3;
 use surfel_core::progress::Progress;
 
 /// Maximum number of points that a page gets.
 const MAX_POINTS: usize = 20_000;
-/// Maximum number of corners of a line.
-const MAX_CORNERS: usize = 100;
 
 /// Checks a line from a page.
 ///
 /// # Errors
 /// Fails if it has fewer than two corners or too many, and if a number is not what it should be.
 pub fn parse(corners: &[[f64; 3]], width: f64, up: [f64; 3]) -> Result<ProfileLine> {
-    if !(2..=MAX_CORNERS).contains(&corners.len()) {
-        let text = format!("profile: found {} corners, expected 2 to {MAX_CORNERS}", corners.len());
-        return Err(Error::invalid_request(text));
+    let (corners, up) = corners::parse("profile", 2, corners, up)?;
+    if !(0.0 < width && width.is_finite()) {
+        return Err(Error::invalid_request("profile: expected a width above 0"));
     }
-    let corners: Vec<DVec3> = corners.iter().copied().map(DVec3::from_array).collect();
-    let up = DVec3::from_array(up).try_normalize();
-    let up = up.filter(|_| corners.iter().all(|corner| corner.is_finite()) && 0.0 < width);
-    match up {
-        Some(up) if width.is_finite() => Ok(ProfileLine { corners, width, up }),
-        _ => Err(Error::invalid_request("profile: expected finite numbers and a width above 0")),
-    }
+    Ok(ProfileLine { corners, width, up })
 }
 
 /// Returns the points of a profile as a page gets them: a list for each of their properties.
@@ -61,6 +53,7 @@ mod tests {
     //! Valid and invalid lines.
 
     use super::*;
+    use surfel_core::math::DVec3;
 
     #[test]
     fn lines_are_checked() {

@@ -2,6 +2,7 @@
 
 use crate::access::{AccessDenied, TokenExchange};
 use crate::connections::ConnectionEntry;
+use crate::downloads;
 use crate::merge_patch::apply_merge_patch;
 use crate::page;
 use crate::scene_provider::{Error, SceneProvider, SettingsMap};
@@ -27,6 +28,7 @@ pub fn router(state: Arc<ServerState>) -> Router {
         .route("/ws", any(socket))
         .route("/scene", get(scene))
         .route("/stats", get(stats))
+        .route("/points/{name}", get(points))
         .route("/render", get(render_query).post(render_body))
         .route_layer(from_fn_with_state(state.clone(), check_token));
     Router::new()
@@ -159,6 +161,20 @@ async fn stats(State(state): State<Arc<ServerState>>) -> RouteResult {
         "info": info,
     }))
     .into_response())
+}
+
+/// A file of points that a page has requested.
+async fn points(State(state): State<Arc<ServerState>>, Path(name): Path<String>) -> RouteResult {
+    let missing = || Failure(StatusCode::NOT_FOUND, "there is no such file any more".into());
+    let file = state.downloads.get(&name).ok_or_else(missing)?;
+    let body = downloads::body(&file).map_err(|_| missing())?;
+    let headers = [
+        (header::CONTENT_TYPE, HeaderValue::from_static("application/octet-stream")),
+        (header::CONTENT_DISPOSITION, HeaderValue::from_static("attachment")),
+        (header::CACHE_CONTROL, HeaderValue::from_static("no-store")),
+        (header::CONTENT_LENGTH, HeaderValue::from(file.n_bytes())),
+    ];
+    Ok((headers, body).into_response())
 }
 
 /// Renders with settings from the query, as on a command line: `?resolution=640x480&camera-azimuth-angle=30`.

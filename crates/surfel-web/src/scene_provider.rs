@@ -1,6 +1,7 @@
 //! The interface between the viewer and the program that starts it: scenes from settings, facts about points.
 
 use serde_json::{Map, Value};
+use std::io::Read;
 use std::sync::Arc;
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
@@ -53,6 +54,24 @@ pub trait SceneProvider: Send + Sync + 'static {
         settings.clone()
     }
 
+    /// The histogram of a column of all points, as the page shows it: `low`, `high` and `counts` of ranges of equal width
+    /// between them.
+    ///
+    /// # Errors
+    /// Fails if no points have the column.
+    fn histogram(&self, column: &str) -> Result<Value>;
+
+    /// Writes the points that these settings show to a file of a format: `laz` or `ply`.
+    ///
+    /// # Errors
+    /// Fails if a setting is invalid, if no points are shown, and if `progress` cancels.
+    fn write_points(
+        &self,
+        settings: &SettingsMap,
+        format: &str,
+        progress: &dyn Progress,
+    ) -> Result<Arc<dyn PointFile>>;
+
     /// These settings as a command line and as scene files.
     ///
     /// # Errors
@@ -64,6 +83,21 @@ pub trait SceneProvider: Send + Sync + 'static {
     /// # Errors
     /// Fails if the text is no scene file, or if its objects are not those that are viewed.
     fn read_scene_file(&self, name: &str, text: &str) -> Result<SettingsMap>;
+}
+
+/// A file of points, which is removed when this is dropped.
+pub trait PointFile: Send + Sync {
+    /// Number of points.
+    fn n_points(&self) -> u64;
+
+    /// Size of the file.
+    fn n_bytes(&self) -> u64;
+
+    /// Opens the file.
+    ///
+    /// # Errors
+    /// Fails if the file is not there any more.
+    fn open(&self) -> std::io::Result<Box<dyn Read + Send>>;
 }
 
 /// Returns facts about a picked point of a flat scene, as the page shows them.

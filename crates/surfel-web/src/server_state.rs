@@ -2,6 +2,7 @@
 
 use crate::access::AccessGuard;
 use crate::client::Client;
+use crate::downloads::Downloads;
 use crate::limits::Limits;
 use crate::progress_reporter::ProgressUpdate;
 use crate::render_loop::RenderLoop;
@@ -31,6 +32,8 @@ pub struct ServerState {
     pub page_permits: Arc<Semaphore>,
     /// One permit for each saved picture that is being rendered.
     pub render_permits: Arc<Semaphore>,
+    /// Files of points for the pages that have requested them.
+    pub downloads: Arc<Downloads>,
     /// Set from outside to stop the server.
     pub is_stopped: Arc<AtomicBool>,
     /// When the server started.
@@ -59,6 +62,7 @@ impl ServerState {
             render_permits: permits(limits.max_renders),
             task_permits: permits(limits.max_tasks),
             limits,
+            downloads: Arc::default(),
             is_stopped,
             start: Instant::now(),
             n_pictures: AtomicU64::new(0),

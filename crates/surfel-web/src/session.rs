@@ -2,6 +2,7 @@
 
 use crate::camera;
 use crate::client::Client;
+use crate::downloads::DownloadGuard;
 use crate::frame;
 use crate::limits::{Limits, RateLimiter};
 use crate::message::Incoming;
@@ -10,18 +11,19 @@ use crate::pending_changes::{PendingChanges, SettingsChange};
 use crate::pick;
 use crate::profile;
 use crate::progress_reporter::{ProgressReporter, ProgressUpdate};
-use crate::scene_provider::{Error, Result, SettingsMap};
+use crate::scene_provider::{Error, PreparedScene, Result, SceneProvider, SettingsMap};
 use crate::scene_update;
 use crate::server_state::ServerState;
+use crate::volume;
 use axum::extract::ws::{Message, WebSocket};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt, StreamExt};
 use serde_json::{Value, json};
 use std::collections::HashMap;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
-use surfel_core::flat::ProfileLine;
+use surfel_core::flat::{ProfileLine, VolumeQuery};
 use surfel_core::progress::Progress;
 use tokio::sync::{Semaphore, mpsc};
 use tokio::time::timeout;
@@ -47,8 +49,8 @@ pub async fn run(socket: WebSocket, state: Arc<ServerState>) {
                 out.clone(),
             ));
             let queries = Arc::new(Semaphore::new(state.limits.max_page_queries));
-            let mut session =
-                Session { state, client, pending, out, queries, saves: HashMap::new() };
+            let (saves, download) = (HashMap::new(), Arc::default());
+            let mut session = Session { state, client, pending, out, queries, saves, download };
             session.change(SettingsChange { patch, ..SettingsChange::default() }).await;
             session.read(stream).await;
             session.saves.values().for_each(cancel);
@@ -123,6 +125,8 @@ struct Session {
     queries: Arc<Semaphore>,
     /// The cancellation flags of saved pictures that have not been sent completely, by request id.
     saves: HashMap<u32, Arc<AtomicBool>>,
+    /// The file of points that the page requested last.
+    download: Arc<Mutex<Option<DownloadGuard>>>,
 }
 
 impl Session {
@@ -183,7 +187,12 @@ impl Session {
             Incoming::Profile { id, points, width, up } => {
                 self.profile(id, profile::parse(&points, width, up)).await;
             }
+            Incoming::Volume { id, points, up, base, cell_size } => {
+                self.volume(id, volume::parse(&points, up, &base, cell_size)).await;
+            }
+            Incoming::Histogram { id, column } => self.histogram(id, column).await,
             Incoming::Save { id, width, height } => self.save(id, width, height).await,
+            Incoming::Points { id, format } => self.points(id, format).await,
             Incoming::Cancel { id } => self.saves.get(&id).into_iter().for_each(cancel),
             Incoming::Export { id, width, height } => self.export(id, width, height).await,
             Incoming::LoadScene { id, name, text } => self.load_scene(id, name, text).await,
@@ -240,19 +249,45 @@ impl Session {
     }
 
     async fn profile(&self, id: u32, line: Result<ProfileLine>) {
-        let line = match line {
-            Ok(line) => line,
+        let (line, scene) = match line.and_then(|line| Ok((line, self.scene()?))) {
+            Ok(found) => found,
             Err(error) => return self.reject(RequestRef::Id(id), &error).await,
-        };
-        let Some(scene) = self.client.view().scene else {
-            let error = Error::invalid_request("there is nothing to show yet");
-            return self.reject(RequestRef::Id(id), &error).await;
         };
         let find = move |progress: &dyn Progress| {
             let profile = profile::profile(&scene, &line, progress)?;
             Ok(json!({ "type": "profiled", "id": id, "profile": profile }))
         };
         self.answer(id, find).await;
+    }
+
+    async fn volume(&self, id: u32, query: Result<VolumeQuery>) {
+        let (query, scene) = match query.and_then(|query| Ok((query, self.scene()?))) {
+            Ok(found) => found,
+            Err(error) => return self.reject(RequestRef::Id(id), &error).await,
+        };
+        let find = move |progress: &dyn Progress| {
+            let volume = volume::volume(&scene, &query, progress)?;
+            Ok(json!({ "type": "measured", "id": id, "volume": volume }))
+        };
+        self.answer(id, find).await;
+    }
+
+    async fn histogram(&self, id: u32, column: String) {
+        let Some(provider) = self.state.provider.borrow().clone() else {
+            let error = Error::invalid_request("the files are still being loaded");
+            return self.reject(RequestRef::Id(id), &error).await;
+        };
+        let find = move |_: &dyn Progress| {
+            let histogram = provider.histogram(&column)?;
+            Ok(json!({ "type": "counted", "id": id, "histogram": histogram }))
+        };
+        self.answer(id, find).await;
+    }
+
+    /// The scene that the page shows.
+    fn scene(&self) -> Result<Arc<PreparedScene>> {
+        let scene = self.client.view().scene;
+        scene.ok_or_else(|| Error::invalid_request("there is nothing to show yet"))
     }
 
     /// Sends what `find` returns, unless too many answers are being found already.
@@ -286,14 +321,13 @@ impl Session {
         Some(settings)
     }
 
-    fn settings_to_save(&mut self, id: u32, width: u32, height: u32) -> Result<SettingsMap> {
+    fn settings_to_save(&mut self, id: u32, (width, height): (u32, u32)) -> Result<SettingsMap> {
         self.saves.retain(|_, is_cancelled| is_held(is_cancelled));
-        self.state.limits.check_save_size(width, height)?;
         if self.saves.contains_key(&id) {
-            return Err(Error::invalid_request("this picture is being saved"));
+            return Err(Error::invalid_request("this is being saved"));
         }
         if self.state.limits.max_page_saves <= self.saves.len() {
-            let text = "pictures are being saved; wait for one or cancel it";
+            let text = "files are being saved; wait for one or cancel it";
             return Err(Error::invalid_request(text));
         }
         let settings = self.settings(width, height);
@@ -301,7 +335,8 @@ impl Session {
     }
 
     async fn save(&mut self, id: u32, width: u32, height: u32) {
-        let settings = match self.settings_to_save(id, width, height) {
+        let checked = self.state.limits.check_save_size(width, height);
+        let settings = match checked.and_then(|()| self.settings_to_save(id, (width, height))) {
             Ok(settings) => settings,
             Err(error) => return self.reject(RequestRef::Id(id), &error).await,
         };
@@ -309,7 +344,11 @@ impl Session {
         self.saves.insert(id, is_cancelled.clone());
         let (state, out) = (self.state.clone(), self.out.clone());
         tokio::spawn(async move {
-            let message = match render_png(&state, id, settings, is_cancelled.clone(), &out).await {
+            let render = move |provider: &dyn SceneProvider, progress: &dyn Progress| {
+                provider.render_png(&provider.drawable_settings(&settings), progress)
+            };
+            let png = run_slowly(&state, id, is_cancelled.clone(), &out, render).await;
+            let message = match png {
                 Ok(png) => {
                     let bytes = frame::saved_message(id, (width as u16, height as u16), &png);
                     Outgoing::Binary(bytes, is_cancelled)
@@ -317,6 +356,39 @@ impl Session {
                 Err(error) => Outgoing::Text(rejection(RequestRef::Id(id), &error).to_string()),
             };
             let _ = out.send(message).await;
+        });
+    }
+
+    /// Writes the points that are shown; the page then fetches the file by its name.
+    async fn points(&mut self, id: u32, format: String) {
+        let settings = match self.settings_to_save(id, self.client.view().size) {
+            Ok(settings) => settings,
+            Err(error) => return self.reject(RequestRef::Id(id), &error).await,
+        };
+        let is_cancelled: Arc<AtomicBool> = Arc::default();
+        self.saves.insert(id, is_cancelled.clone());
+        let (state, out, download) = (self.state.clone(), self.out.clone(), self.download.clone());
+        tokio::spawn(async move {
+            let write = move |provider: &dyn SceneProvider, progress: &dyn Progress| {
+                provider.write_points(&settings, &format, progress)
+            };
+            let written = run_slowly(&state, id, is_cancelled, &out, write).await;
+            let kept = written.and_then(|file| {
+                let guard = state.downloads.add(file.clone());
+                let text = "the system has no random numbers";
+                Ok((guard.map_err(|_| Error::invalid_request(text))?, file))
+            });
+            let message = match kept {
+                Ok((guard, file)) => {
+                    let (n_points, n_bytes) = (file.n_points(), file.n_bytes());
+                    let address = format!("points/{}", guard.name);
+                    // The file before it goes.
+                    *download.lock().unwrap_or_else(PoisonError::into_inner) = Some(guard);
+                    json!({ "type": "written", "id": id, "address": address, "n_points": n_points, "n_bytes": n_bytes })
+                }
+                Err(error) => rejection(RequestRef::Id(id), &error),
+            };
+            send_json(&out, &message).await;
         });
     }
 
@@ -367,14 +439,14 @@ fn is_held(is_cancelled: &Arc<AtomicBool>) -> bool {
     1 < Arc::strong_count(is_cancelled)
 }
 
-/// Renders a saved picture once a permit is free, and reports its progress to the page.
-async fn render_png(
+/// Does long work for a page once a permit is free, and reports its progress to the page.
+async fn run_slowly<T: Send + 'static>(
     state: &Arc<ServerState>,
     id: u32,
-    settings: SettingsMap,
     is_cancelled: Arc<AtomicBool>,
     out: &mpsc::Sender<Outgoing>,
-) -> Result<Vec<u8>> {
+    work: impl FnOnce(&dyn SceneProvider, &dyn Progress) -> Result<T> + Send + 'static,
+) -> Result<T> {
     let _permit = state.render_permits.acquire().await.map_err(|_| Error::Cancelled)?;
     let provider = state.provider().await.ok_or(Error::Cancelled)?;
     let (page, for_cancel, queue) = (out.clone(), state.clone(), out.clone());
@@ -387,6 +459,5 @@ async fn render_png(
     let is_cancelled =
         move || is_cancelled.load(Ordering::Relaxed) || for_cancel.is_stopped() || page.is_closed();
     let reporter = ProgressReporter::new(report, is_cancelled);
-    let render = move || provider.render_png(&provider.drawable_settings(&settings), &reporter);
-    state.run_blocking(render).await?
+    state.run_blocking(move || work(&*provider, &reporter)).await?
 }

@@ -1,4 +1,4 @@
-//! A record of the choices that were made from the data.
+//! Records of the choices that were made from the data, and of the notes about files.
 
 use std::sync::{Mutex, PoisonError};
 use surfel_core::progress::Progress;
@@ -27,6 +27,51 @@ impl<'p> ChoiceLog<'p> {
     /// Returns the choices so far, in their order.
     pub fn into_choices(self) -> Vec<Choice> {
         self.choices.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Passes progress on and records the notes.
+pub struct NoteLog<'p> {
+    progress: &'p dyn Progress,
+    notes: Mutex<Vec<String>>,
+}
+
+impl<'p> NoteLog<'p> {
+    /// An empty record; `progress` hears everything too.
+    pub fn new(progress: &'p dyn Progress) -> Self {
+        Self { progress, notes: Mutex::default() }
+    }
+
+    /// Returns the notes so far, in their order.
+    pub fn into_notes(self) -> Vec<String> {
+        self.notes.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Progress for NoteLog<'_> {
+    fn begin(&self, stage: &str, total: u64) {
+        self.progress.begin(stage, total);
+    }
+
+    fn advance(&self, units: u64) {
+        self.progress.advance(units);
+    }
+
+    fn note(&self, line: &str) {
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(line.to_owned());
+        self.progress.note(line);
+    }
+
+    fn choice(&self, line: &str, keys: &[&str]) {
+        self.progress.choice(line, keys);
+    }
+
+    fn end(&self) {
+        self.progress.end();
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.progress.is_cancelled()
     }
 }
 

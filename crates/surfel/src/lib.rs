@@ -71,6 +71,7 @@ mod built_scene;
 mod raycast;
 mod height_map;
 pub mod animate;
+mod scene_keys;
 pub mod live_scene;
 
 pub use built_scene::BuiltScene;

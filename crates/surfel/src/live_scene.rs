@@ -1,17 +1,17 @@
 //! A scene whose settings change: after a change only what it touches is made again.
 
 use crate::built_scene::{exposure_stops, planes_before, source_indices};
-use crate::cache::{Lru2, hash_of};
+use crate::cache::Lru2;
 use crate::crs::Unit;
-use crate::description::{Exposure, Interior, Invalid, LightKind, SceneDescription, write_parts};
+use crate::description::{Exposure, Interior, Invalid, SceneDescription};
 use crate::error::{Error, Result};
 use crate::overlay::Overlay;
 use crate::resolve::{
     AutoSettings, KeepOptions, LoadedScene, common_legend, coordinate_system, expose, finish_graph,
     hide_walls, render_settings,
 };
+use crate::scene_keys::{grouping_key, preparation_key, tree_key};
 use rayon::ThreadPool;
-use serde_json::{Value, json};
 use std::sync::{Arc, OnceLock};
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
@@ -30,7 +30,11 @@ use thread_priority::ThreadPriority;
 /// A loaded scene that is shown under one description after another. Threads share it.
 #[derive(Debug)]
 pub struct LiveScene {
-    loaded: LoadedScene,
+    startup: SceneDescription,
+    /// The content of the files as the startup groups them.
+    loaded: Arc<LoadedScene>,
+    /// The content with other files apart, as those that have settings of their own.
+    regrouped: Lru2<LoadedScene>,
     made: Made,
     /// Apart, so that previews leave what was made of all points.
     made_for_previews: Made,
@@ -66,6 +70,8 @@ pub struct SceneTrees {
 /// A scene under one description, at one time.
 #[derive(Clone, Debug)]
 pub struct LiveView {
+    /// The content of the files.
+    pub loaded: Arc<LoadedScene>,
     /// The arrays that rays are traced against, with camera and exposed lights.
     pub flat: FlatScene,
     /// Size and quality of pictures.
@@ -95,10 +101,13 @@ impl LiveScene {
     ///
     /// Fails as reading does, and if threads cannot be started.
     pub fn open(description: &SceneDescription, progress: &dyn Progress) -> Result<Self> {
-        let keep = KeepOptions { all_columns: true, source_indices: true };
-        let loaded = LoadedScene::read(description, keep, progress)?;
+        let mut startup = description.clone();
+        startup.apply_object_settings()?;
+        let loaded = LoadedScene::read(&startup, KEEP, progress)?;
         Ok(Self {
-            loaded,
+            startup,
+            loaded: Arc::new(loaded),
+            regrouped: Lru2::default(),
             made: Made::default(),
             made_for_previews: Made::default(),
             renderer: CpuRenderer { simd: Simd::detect() },
@@ -108,9 +117,39 @@ impl LiveScene {
         })
     }
 
-    /// Returns the content of the files.
+    /// Returns the description of the start, in which files with settings of their own are objects.
+    pub fn startup(&self) -> &SceneDescription {
+        &self.startup
+    }
+
+    /// Returns the content of the files, grouped as at the start.
     pub fn loaded(&self) -> &LoadedScene {
         &self.loaded
+    }
+
+    /// Returns the content of the files, those apart that have settings or a material of their own. Reads the files again
+    /// unless a description grouped them like this lately.
+    ///
+    /// # Errors
+    ///
+    /// Fails as reading does.
+    pub fn loaded_for(
+        &self,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<Arc<LoadedScene>> {
+        let key = grouping_key(description);
+        if key == grouping_key(&self.startup) {
+            return Ok(self.loaded.clone());
+        }
+        self.regrouped.get_or_make(key, progress, || {
+            let startup = SceneDescription {
+                objects_default: self.startup.objects_default.clone(),
+                picture: self.startup.picture.clone(),
+                ..description.clone()
+            };
+            LoadedScene::read(&startup, KEEP, progress)
+        })
     }
 
     /// Returns the SIMD level of the kernels.
@@ -155,26 +194,28 @@ impl LiveScene {
         description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<LiveView> {
-        let mut auto = AutoSettings::choose(&self.loaded, description, progress)?;
+        let loaded = self.loaded_for(description, progress)?;
+        let mut auto = AutoSettings::choose(&loaded, description, progress)?;
         let first = self.hidden_walls.get_or_init(|| auto.hidden_walls.clone());
         let is_open = description.camera.interior() != Interior::Off;
         auto.hidden_walls = if is_open { first.clone() } else { Vec::new() };
-        let mut complete = auto.complete_description(&self.loaded);
+        let mut complete = auto.complete_description(&loaded);
         let settings = Settings { with_aovs: false, ..render_settings(&complete) };
         let time_secs = description.output.time();
         let exposure = description.light.exposure();
         // An automatic exposure is chosen at second 0, as for a movie. Otherwise the first file of a sequence is not read.
         let metered_at = if exposure == Exposure::Auto { 0.0 } else { time_secs };
-        let (_, metered) = self.flat_at(made, metered_at, description, &auto, progress)?;
+        let (_, metered) = self.flat_at(made, &loaded, metered_at, description, &auto, progress)?;
         let meter = || exposure_stops(exposure, &self.renderer, &metered, &settings, progress);
         let stops = self.preparation_threads.install(meter)?;
-        let (trees, mut flat) = self.flat_at(made, time_secs, description, &auto, progress)?;
+        let (trees, mut flat) =
+            self.flat_at(made, &loaded, time_secs, description, &auto, progress)?;
         expose(&mut flat, stops);
         complete.light.exposure = Some(Exposure::Stops(stops.into()));
-        let moves_camera = auto.moves_camera(&self.loaded);
-        let system = coordinate_system(&self.loaded, description);
+        let moves_camera = auto.moves_camera(&loaded);
+        let system = coordinate_system(&loaded, description);
         let unit = system.map_or(Unit::Unknown, |system| system.unit());
-        Ok(LiveView { flat, settings, description: complete, moves_camera, unit, trees })
+        Ok(LiveView { loaded, flat, settings, description: complete, moves_camera, unit, trees })
     }
 
     /// Renders a view on threads of the lowest priority, however many others wait for their preparation.
@@ -190,12 +231,13 @@ impl LiveScene {
     fn flat_at(
         &self,
         made: &Made,
+        loaded: &LoadedScene,
         time_secs: f64,
         description: &SceneDescription,
         auto: &AutoSettings,
         progress: &dyn Progress,
     ) -> Result<(Arc<SceneTrees>, FlatScene)> {
-        let trees = self.trees_at(made, time_secs, description, auto, progress)?;
+        let trees = self.trees_at(made, loaded, time_secs, description, auto, progress)?;
         let mut flat = trees.flat.clone();
         flat.lights.clone_from(&auto.lights);
         flat.background = description.picture.background();
@@ -217,51 +259,56 @@ impl LiveScene {
     fn trees_at(
         &self,
         made: &Made,
+        loaded: &LoadedScene,
         time_secs: f64,
         description: &SceneDescription,
         auto: &AutoSettings,
         progress: &dyn Progress,
     ) -> Result<Arc<SceneTrees>> {
         let preparation = preparation_key(description);
-        let frames = self.loaded.sequence_frames_at(time_secs);
+        let frames = loaded.sequence_frames_at(time_secs);
         let trees = tree_key(description, preparation, auto, &frames);
         made.trees.get_or_make(trees, progress, || {
             let clouds = made.prepared.get_or_make(preparation, progress, || {
-                self.preparation_threads.install(|| self.loaded.prepared(description, progress))
+                self.preparation_threads.install(|| loaded.prepared(description, progress))
             })?;
-            let build = || self.build(time_secs, description, &clouds, auto, progress);
+            let build = || build(loaded, time_secs, description, &clouds, auto, progress);
             self.preparation_threads.install(build)
         })
     }
-
-    fn build(
-        &self,
-        time_secs: f64,
-        description: &SceneDescription,
-        clouds: &[PreparedCloud],
-        auto: &AutoSettings,
-        progress: &dyn Progress,
-    ) -> Result<SceneTrees> {
-        let up = auto.up;
-        let legend = common_legend(clouds, description, up);
-        let raw = self.loaded.graph_without_points();
-        let (mut graph, mut sequences) =
-            finish_graph(&self.loaded, raw, clouds.to_vec(), description, up, progress)?;
-        hide_walls(&mut graph, &auto.hidden_walls);
-        for sequence in &mut sequences {
-            sequence.seek(time_secs, &mut graph, up, progress)?;
-        }
-        let source_indices = source_indices(&graph);
-        let (lights, background) = (Vec::new(), Background::Transparent);
-        let scene = Scene { graph, lights, background, camera: PLACEHOLDER_CAMERA };
-        check_overlap(&scene.graph)?;
-        let flat = FlatScene::new(&scene, progress)?;
-        progress.end();
-        let mut graph = scene.graph;
-        graph.release_static();
-        Ok(SceneTrees { graph, flat, source_indices, legend })
-    }
 }
+
+/// Builds the trees of prepared clouds and of everything else.
+fn build(
+    loaded: &LoadedScene,
+    time_secs: f64,
+    description: &SceneDescription,
+    clouds: &[PreparedCloud],
+    auto: &AutoSettings,
+    progress: &dyn Progress,
+) -> Result<SceneTrees> {
+    let up = auto.up;
+    let legend = common_legend(clouds, description, up);
+    let raw = loaded.graph_without_points();
+    let (mut graph, mut sequences) =
+        finish_graph(loaded, raw, clouds.to_vec(), description, up, progress)?;
+    hide_walls(&mut graph, &auto.hidden_walls);
+    for sequence in &mut sequences {
+        sequence.seek(time_secs, &mut graph, up, progress)?;
+    }
+    let source_indices = source_indices(&graph);
+    let (lights, background) = (Vec::new(), Background::Transparent);
+    let scene = Scene { graph, lights, background, camera: PLACEHOLDER_CAMERA };
+    check_overlap(&scene.graph)?;
+    let flat = FlatScene::new(&scene, progress)?;
+    progress.end();
+    let mut graph = scene.graph;
+    graph.release_static();
+    Ok(SceneTrees { graph, flat, source_indices, legend })
+}
+
+/// The viewer shows all columns of a point, which is told by its index.
+const KEEP: KeepOptions = KeepOptions { all_columns: true, source_indices: true };
 
 /// Starts as many threads as the current pool has; each begins with `start`.
 fn start_threads(start: fn(usize)) -> Result<ThreadPool> {
@@ -284,49 +331,6 @@ const PLACEHOLDER_CAMERA: Camera = Camera {
     view_up: DVec3::Z,
     projection: Projection::Panorama,
 };
-
-/// A hash of everything that decides how clouds are prepared.
-fn preparation_key(description: &SceneDescription) -> u64 {
-    let settings = &description.objects_default;
-    let keeps_variation = settings.preparation(0).keep_variation;
-    let [_, preparation, _] = settings.parts();
-    let parts = json!([
-        write_parts(&[preparation]),
-        description.picture.seed(),
-        keeps_variation,
-        object_settings(description),
-    ]);
-    hash_of(&parts)
-}
-
-/// A hash of everything that decides what the trees hold.
-fn tree_key(
-    description: &SceneDescription,
-    preparation: u64,
-    auto: &AutoSettings,
-    frames: &[usize],
-) -> u64 {
-    let light = &description.light;
-    let is_lit = !light.has(LightKind::None) || light.environment.is_some();
-    let planes = auto.hidden_walls.iter();
-    let walls: Vec<[[f64; 3]; 2]> =
-        planes.map(|plane| [plane.point.to_array(), plane.normal.to_array()]).collect();
-    let parts = json!([
-        preparation,
-        write_parts(&description.objects_default.parts()),
-        description.get("material"),
-        is_lit,
-        auto.up.to_array(),
-        walls,
-        frames,
-    ]);
-    hash_of(&parts)
-}
-
-fn object_settings(description: &SceneDescription) -> Vec<Value> {
-    let settings = description.objects.iter().map(|object| &object.settings);
-    settings.map(|settings| Value::Object(write_parts(&settings.parts()))).collect()
-}
 
 /// Maximum number of discs of points over each other, on average.
 const MAX_OVERLAP: f32 = 200.0;

@@ -3,9 +3,11 @@
 mod browser;
 mod file_names;
 mod legend;
+mod histogram;
 mod coordinates;
 mod point;
 mod rejection;
+mod shown_points;
 mod page_overlay;
 mod page_settings;
 mod scene_provider;
@@ -89,7 +91,7 @@ Examples:
 
 /// Serves the viewer until it is interrupted.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    let description = args.scene.description(global)?;
+    let description = args.scene.startup(global)?;
     start_threads(&description.run)?;
     check_files(&description)?;
     let identity = args.tls_cert.as_deref().zip(args.tls_key.as_deref());

@@ -5,13 +5,17 @@ use serde_json::Value;
 use std::path::Path;
 use surfel::SceneDescription;
 use surfel::description::{
-    Crop, Invalid, MaterialChoice, OutputSettings, parse_table, write_table,
+    Crop, Invalid, MaterialChoice, ObjectDescription, ObjectOverride, OutputSettings, parse_table,
+    write_table,
 };
 use surfel::names::file_name;
 use surfel_web::{Error, Limits, SettingsMap};
 
 /// Target of a material for everything, where a page names a target.
-pub const EVERYTHING: &str = "*";
+const EVERYTHING: &str = "*";
+
+/// Keys of files that count while the files are read.
+const READ_ONCE: [&str; 5] = ["vertices", "columns", "salvage", "animation_name", "crop"];
 
 /// Returns the settings of a description that a page sees: none of files and what moves them, of output and run.
 pub fn shown(description: SceneDescription) -> SettingsMap {
@@ -40,15 +44,23 @@ pub fn read(startup: &SceneDescription, settings: &SettingsMap) -> Result<SceneD
     for choice in page.materials.material.iter_mut().flatten() {
         choice.target.take_if(|target| target == EVERYTHING);
     }
+    let is_known = |one: &ObjectOverride| startup.overrides.all().contains(one);
+    let read_once = page.overrides.all().iter().find(|one| READ_ONCE.contains(&one.key.as_str()));
+    if let Some(fault) = read_once.filter(|one| !is_known(one)) {
+        let text = format!("a page cannot change {} of a file", fault.key);
+        return Err(Error::invalid_value("object_settings", text));
+    }
     Limits::default().check_samples(page.picture.spp(), page.picture.light_samples())?;
     page.run = startup.run.clone();
-    Ok(page.with_content_of(startup))
+    let mut page = page.with_content_of(startup);
+    page.apply_object_settings().map_err(rejection)?;
+    Ok(page)
 }
 
 /// Returns the settings of a complete description as a page sees them, with the materials as the page names them.
 pub fn complete_settings(complete: SceneDescription, requested: &SceneDescription) -> SettingsMap {
-    let materials = requested.materials.clone();
-    let mut settings = SceneDescription { materials, ..complete };
+    let (materials, overrides) = (requested.materials.clone(), requested.overrides.clone());
+    let mut settings = SceneDescription { materials, overrides, ..complete };
     settings.output.time = Some(requested.output.time());
     shown(settings)
 }
@@ -66,15 +78,22 @@ pub fn from_file(name: &str, text: &str, served: &[String]) -> Result<SettingsMa
         return Err(rejected(Invalid::at("object", format!("`{file}` is not shown here"))));
     }
     let mut description = SceneDescription::from_table(&table, Path::new("")).map_err(rejected)?;
-    let own = description.objects.iter().filter_map(|object| {
+    let target = |object: &ObjectDescription| {
         let only = (object.files.len() == 1).then(|| file_name(&object.files[0]));
-        let target = object.name.clone().or(only).unwrap_or(EVERYTHING.to_owned());
-        Some(MaterialChoice { target: Some(target), material: object.material.clone()? })
+        object.name.clone().or(only).unwrap_or(EVERYTHING.to_owned())
+    };
+    let own = description.objects.iter().filter_map(|object| {
+        let material = object.material.clone()?;
+        Some(MaterialChoice { target: Some(target(object)), material })
     });
     let all = description.materials.choices().iter().cloned().chain(own).collect();
+    let own = description.objects.iter().filter(|object| object.files.len() == 1);
+    let own = own.flat_map(|object| ObjectOverride::all_of(object, &target(object)));
+    let settings = description.overrides.all().iter().cloned().chain(own).collect();
     if table.contains_key("object") {
-        // Objects without a material have none, whatever the page chose before.
+        // Objects without a material or settings have none, whatever the page chose before.
         description.materials.material = Some(all);
+        description.overrides.object_settings = Some(settings);
     }
     Ok(shown(description))
 }

@@ -1,11 +1,13 @@
 //! Scenes of the files that the viewer was started with, by the settings of its pages.
 
 use super::file_names::{ClientProgress, ViewedFolders};
+use super::histogram::histogram;
 use super::legend::{hex, legend_json};
 use super::page_overlay::page_overlay;
-use super::page_settings::{self, EVERYTHING};
+use super::page_settings;
 use super::point::describe;
 use super::rejection::rejection;
+use super::shown_points::write_shown_points;
 use crate::render::with_info;
 use crate::report::Report;
 use crate::shell::command_line;
@@ -16,7 +18,7 @@ use std::sync::Arc;
 use surfel::SceneDescription;
 use surfel::crs::Unit;
 use surfel::description::rule::absolute_text;
-use surfel::description::{CameraSettings, Crop, ObjectDescription, write_table};
+use surfel::description::{CameraSettings, Crop, ObjectDescription, ObjectOverride, write_table};
 use surfel::live_scene::{LiveScene, LiveView};
 use surfel::names::{file_name, list_files};
 use surfel::overlay;
@@ -29,9 +31,10 @@ use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::scene::color::choose_source;
 use surfel_core::scene::{Material, inlier_bounds};
 use surfel_core::surface::SurfaceKind;
+use surfel_formats::{FileInfo, common_file_info};
 use surfel_web::{
-    Error, Export, Limits, PickedPoint, PointDescriber, PreparedScene, Result, SceneProvider,
-    SettingsMap,
+    Error, Export, Limits, PickedPoint, PointDescriber, PointFile, PreparedScene, Result,
+    SceneProvider, SettingsMap,
 };
 
 /// The scenes of one set of files.
@@ -55,12 +58,13 @@ const PREVIEW_POINTS: usize = 150_000;
 impl FileSceneProvider {
     /// Reads the files that the program was started with. Choices are reported once; pages make their own again.
     pub fn open(
-        startup: SceneDescription,
+        mut startup: SceneDescription,
         typed: Vec<PathBuf>,
         report: &Report,
     ) -> surfel::Result<Self> {
+        name_by_rows(&mut startup);
         let scene = LiveScene::open(&startup, report)?;
-        let auto = AutoSettings::choose(scene.loaded(), &startup, report)?;
+        let auto = AutoSettings::choose(scene.loaded(), scene.startup(), report)?;
         let moves_camera = auto.moves_camera(scene.loaded());
         let mut startup_settings = page_settings::shown(startup.clone());
         startup_settings.shift_remove("time");
@@ -112,18 +116,28 @@ impl FileSceneProvider {
         settings
     }
 
+    /// The files and objects that pages change apart, each with its name, kind, number of points or triangles, and notes.
     fn objects(&self) -> Vec<Value> {
-        let of_files = self.scene.loaded().file_groups().map(|files| match &files[..] {
-            [only] => json!({ "name": file_name(only), "kind": kind_of(only) }),
-            several => {
-                let several: Vec<PathBuf> = several.iter().map(|file| file.to_path_buf()).collect();
-                json!({ "name": EVERYTHING, "label": name_of(&several), "kind": "points" })
-            }
-        });
-        let of_files: Vec<Value> = of_files.collect();
-        let objects = self.startup.objects.iter().map(ObjectDescription::name);
-        let of_scene = objects.map(|name| json!({ "name": name, "kind": "object" }));
-        of_files.into_iter().chain(of_scene).collect()
+        let read_files = &self.scene.loaded().read_files;
+        let row = |name: String, files: &[PathBuf], own: &ObjectDescription| {
+            let read = || read_files.iter().filter(|read| files.contains(&read.path));
+            let notes = read().flat_map(|read| &read.notes);
+            let notes = notes.map(|note| self.folders.removed_from(note));
+            json!({
+                "name": name,
+                "kind": files.first().map_or("points", |file| kind_of(file)),
+                "points": read().map(|read| read.n_points).sum::<usize>(),
+                "triangles": read().map(|read| read.n_triangles).sum::<usize>(),
+                "notes": notes.collect::<Vec<String>>(),
+                "visible": own.visible(),
+                "color": own.settings.color.color.as_ref().map(ToString::to_string),
+            })
+        };
+        let none = ObjectDescription::default();
+        let files = self.startup.files.iter();
+        let of_files = files.map(|file| row(file_name(file), std::slice::from_ref(file), &none));
+        let objects = self.startup.objects.iter();
+        of_files.chain(objects.map(|object| row(object.name(), &object.files, object))).collect()
     }
 
     /// Columns by which all clouds can be coloured.
@@ -136,15 +150,27 @@ impl FileSceneProvider {
     }
 
     fn describer(&self, view: &LiveView, time_secs: f64) -> PointDescriber {
-        let (scene, trees) = (self.scene.clone(), view.trees.clone());
+        let (loaded, trees) = (view.loaded.clone(), view.trees.clone());
         Arc::new(move |flat, picked: &PickedPoint| {
             let mut graph = Cow::Borrowed(&trees.graph);
             if !graph.animation.channels.is_empty() {
                 graph.to_mut().evaluate_at(time_secs);
             }
-            describe(scene.loaded(), &trees, flat, &graph, picked)
+            describe(&loaded, &trees, flat, &graph, picked)
         })
     }
+}
+
+/// Names the files in settings as the rows of a page do.
+fn name_by_rows(startup: &mut SceneDescription) {
+    let Some(settings) = startup.overrides.object_settings.take() else { return };
+    let renamed = settings.into_iter().flat_map(|one| {
+        let named = startup.files.iter().filter(|file| one.names_file(file));
+        let renamed: Vec<_> =
+            named.map(|file| ObjectOverride { target: file_name(file), ..one.clone() }).collect();
+        if renamed.is_empty() { vec![one] } else { renamed }
+    });
+    startup.overrides.object_settings = Some(renamed.collect());
 }
 
 /// The files of the command line and of objects.
@@ -212,6 +238,13 @@ fn classes(scene: &LoadedScene) -> Vec<Value> {
     described.collect()
 }
 
+/// The columns that all files with points have.
+fn filter_columns(scene: &LoadedScene) -> Vec<String> {
+    let files = scene.read_files.iter().zip(&scene.file_infos);
+    let of_points = files.filter(|(file, _)| 0 < file.n_points).map(|(_, info)| info.clone());
+    common_file_info(&of_points.collect::<Vec<FileInfo>>()).columns
+}
+
 /// Returns true if all clouds tell the returns of each pulse.
 fn has_returns(scene: &LoadedScene) -> bool {
     let filter: PointFilter =
@@ -247,7 +280,7 @@ impl SceneProvider for FileSceneProvider {
             "stations": self.stations,
             "classes": classes(loaded),
             "has_returns": has_returns(loaded),
-            "columns": loaded.file_info().columns,
+            "columns": filter_columns(loaded),
             "threads": rayon::current_num_threads(),
             "simd": self.scene.simd().name(),
             "coordinate_system": loaded.file_info().coordinate_system,
@@ -332,7 +365,8 @@ impl SceneProvider for FileSceneProvider {
         let mut drawable = settings.clone();
         let faults = || {
             let description = self.read(settings).ok()?;
-            let auto = AutoSettings::choose(self.scene.loaded(), &description, &NoProgress).ok()?;
+            let loaded = self.scene.loaded_for(&description, &NoProgress).ok()?;
+            let auto = AutoSettings::choose(&loaded, &description, &NoProgress).ok()?;
             Some(overlay::faults(&description.picture, &auto.camera.camera, auto.up))
         };
         for fault in faults().unwrap_or_default() {
@@ -341,12 +375,30 @@ impl SceneProvider for FileSceneProvider {
         drawable
     }
 
+    fn histogram(&self, column: &str) -> Result<Value> {
+        let clouds = self.scene.loaded().clouds().map(|(_, cloud)| cloud);
+        Ok(histogram(clouds, column)?)
+    }
+
+    fn write_points(
+        &self,
+        settings: &SettingsMap,
+        format: &str,
+        progress: &dyn Progress,
+    ) -> Result<Arc<dyn PointFile>> {
+        let description = self.read(settings)?;
+        let view = self.view(&description, progress)?;
+        let time_secs = description.output.time();
+        self.folders.removed(write_shown_points(&view, time_secs, format, progress))
+    }
+
     fn export(&self, settings: &SettingsMap) -> Result<Export> {
         let description = self.read(settings)?;
-        let loaded = self.scene.loaded();
-        let auto = AutoSettings::choose(loaded, &description, &NoProgress);
+        let loaded = self.scene.loaded_for(&description, &NoProgress).map_err(rejection);
+        let loaded = self.folders.removed(loaded)?;
+        let auto = AutoSettings::choose(&loaded, &description, &NoProgress);
         let auto = self.folders.removed(auto.map_err(rejection))?;
-        let complete = auto.complete_description(loaded);
+        let complete = auto.complete_description(&loaded);
         let mut words: Vec<String> = ["surfel", "render"].map(str::to_owned).into();
         words.extend(self.typed.iter().map(|file| file.display().to_string()));
         words.extend(description.to_options());
@@ -355,7 +407,7 @@ impl SceneProvider for FileSceneProvider {
         Ok(Export {
             command: command_line(&words),
             toml: toml.map_err(|error| Error::invalid_request(error.to_string()))?,
-            json: format!("{:#}", with_info(&complete, loaded)),
+            json: format!("{:#}", with_info(&complete, &loaded)),
         })
     }
 

@@ -2,6 +2,7 @@
 
 use super::common::{Folder, command, dome, fail, succeed, surfel, wait};
 use super::sequences;
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -75,6 +76,44 @@ fn the_server_renders_the_pictures_of_the_command_line() {
         let common = ["render", &cloud, "-o", &picture, "--resolution", "60x40", "--spp", "2"];
         succeed(&[&common, options].concat());
         assert!(served == fs::read(&picture).unwrap(), "{query}");
+    }
+}
+
+#[test]
+fn files_are_hidden_and_coloured_apart() {
+    let folder = Folder::new();
+    let (cloud, other) = (folder.write("dome.ply", dome(40)), folder.write("other.ply", dome(30)));
+    let picture = folder.path("out.png");
+    let server = Server::start(&[&cloud, &other, "--spp", "1", "--exposure", "0"]);
+    let mut pictures = BTreeSet::new();
+    for setting in ["dome.ply:visible=false", "other:visible=false", "other.ply:color=rain", ""] {
+        let query = match setting {
+            "" => String::new(),
+            setting => format!("&object-settings={setting}"),
+        };
+        let query = format!("/render?resolution=60x40&camera-position=3,-3,3{query}");
+        let (status, served) =
+            server.get(&query.replace(":visible=", ":visible%3D").replace(":color=", ":color%3D"));
+        assert_eq!(status, 200, "{query}: {}", String::from_utf8_lossy(&served));
+        let options = match setting {
+            "" => vec![],
+            setting => vec!["--object-settings", setting],
+        };
+        let camera = ["--camera-position", "3,-3,3", "--resolution", "60x40"];
+        let common = ["render", &cloud, &other, "-o", &picture, "--spp", "1", "--exposure", "0"];
+        succeed(&[&common[..], &camera, &options].concat());
+        assert!(served == fs::read(&picture).unwrap(), "{setting}");
+        pictures.insert(served);
+    }
+    assert_eq!(pictures.len(), 4);
+    for (setting, expected) in [
+        ("none.ply:visible%3Dfalse", "no file or object"),
+        ("dome.ply:vertices%3Dtrue", "cannot change vertices"),
+        ("dome.ply:size%3D3", "expected a file or object"),
+        ("dome.ply:color%3Dwind", "wind"),
+    ] {
+        let error = server.error(&format!("/render?object-settings={setting}"));
+        assert!(error.contains(expected), "{setting}: {error}");
     }
 }
 

@@ -12,7 +12,9 @@ mod points;
 mod punctual_light;
 mod refit;
 mod scene;
+mod visit_points;
 mod profile;
+mod volume;
 mod triangles;
 
 pub use block::{BlockPoint, PointBlock};
@@ -27,3 +29,4 @@ pub use punctual_light::FlatPunctualLight;
 pub use refit::{MAX_COST_RATIO, Refit};
 pub use scene::{FlatGeometry, FlatScene};
 pub use triangles::{FlatTriangles, TriangleBlock};
+pub use volume::{BaseHeight, Volume, VolumeQuery, cut_and_fill};

@@ -1,11 +1,10 @@
 //! Height profiles: the points beside a line over the ground, by their distance along it and their height.
 
-use super::{FlatGeometry, FlatPoints, FlatScene, Instance};
-use crate::bvh::NO_PRIMITIVE;
+use super::FlatScene;
+use super::visit_points::{VisitedPoint, visit_points};
 use crate::error::Result;
-use crate::math::{DVec3, LANES, hash};
+use crate::math::{DVec3, hash};
 use crate::progress::Progress;
-use rayon::prelude::*;
 
 /// The line and the width of a profile.
 #[derive(Clone, Debug)]
@@ -42,9 +41,6 @@ pub struct Profile {
 
 /// Fraction of the limit that is chosen among more points, so that hardly ever some at the end are cut off.
 const CHOSEN_FRACTION: f64 = 0.97;
-
-/// Number of slots that a task goes through.
-const SLOTS_PER_PART: usize = 8192;
 
 /// A level part of a line between two corners.
 struct Segment {
@@ -102,58 +98,30 @@ fn visit<T: Send>(
     progress: &dyn Progress,
     keep: impl Fn(ProfilePoint) -> T + Sync,
 ) -> Result<Vec<T>> {
-    let mut kept = Vec::new();
-    for (instance_idx, instance) in scene.instances.iter().enumerate() {
-        let FlatGeometry::Cloud(cloud) = scene.geometry(instance) else { continue };
-        for points in [&cloud.points, &cloud.lines, &cloud.scatter] {
-            let visit_part = |part: usize| {
-                progress.check()?;
-                let slots =
-                    SLOTS_PER_PART * part..points.ids.len().min(SLOTS_PER_PART * (part + 1));
-                let chosen = slots.filter(|slot| {
-                    threshold == u64::MAX
-                        || hash((instance_idx as u64) << 40 | *slot as u64) <= threshold
-                });
-                let found = chosen.filter_map(|slot| {
-                    point_beside(scene, instance, points, slot as u32, line, segments)
-                });
-                Ok(found.map(&keep).collect())
-            };
-            let n_parts = points.ids.len().div_ceil(SLOTS_PER_PART);
-            let found: Vec<Vec<T>> =
-                (0..n_parts).into_par_iter().map(visit_part).collect::<Result<_>>()?;
-            kept.extend(found.into_iter().flatten());
+    visit_points(scene, progress, |point| {
+        let is_chosen = threshold == u64::MAX || hash(point.key) <= threshold;
+        if !is_chosen {
+            return None;
         }
-    }
-    Ok(kept)
+        point_beside(point, line, segments).map(&keep)
+    })
 }
 
 /// Returns the place of a point in the profile if it is beside the line, on the first segment that it is beside.
 fn point_beside(
-    scene: &FlatScene,
-    instance: &Instance,
-    points: &FlatPoints,
-    slot: u32,
+    point: &VisitedPoint,
     line: &ProfileLine,
     segments: &[Segment],
 ) -> Option<ProfilePoint> {
-    let block = &points.blocks[slot as usize / LANES];
-    if points.id(slot) == NO_PRIMITIVE {
-        return None;
-    }
-    let position = scene.origin + instance.world_position(points.center(slot)).as_dvec3();
-    if scene.camera_planes.iter().any(|plane| plane.hides(position)) {
-        return None;
-    }
     segments.iter().find_map(|segment| {
-        let to_point = position - segment.start;
+        let to_point = point.position - segment.start;
         let (along, offset) = (segment.along.dot(to_point), segment.left.dot(to_point));
         let is_beside = (0.0..=segment.length).contains(&along) && offset.abs() <= line.width / 2.0;
         is_beside.then(|| ProfilePoint {
             distance: segment.distance + along,
             offset,
-            height: line.up.dot(position),
-            color: block.color(slot as usize % LANES),
+            height: line.up.dot(point.position),
+            color: point.color,
         })
     })
 }
@@ -162,40 +130,9 @@ fn point_beside(
 mod tests {
     //! Profiles across a known hill.
 
+    use super::super::visit_points::slope::slope;
     use super::*;
-    use crate::math::Vec3;
-    use crate::points::{PointCloud, Preparation, PreparedCloud, prepare};
     use crate::progress::NoProgress;
-    use crate::scene::{
-        Background, Camera, CloudGeometry, Geometry, Graph, Material, Projection, Scene,
-    };
-
-    /// A grid of 101 x 101 points of a slope that rises along x, at an origin far away.
-    fn slope() -> FlatScene {
-        let positions = (0..101 * 101).map(|i| {
-            let (x, y) = ((i % 101) as f32, (i / 101) as f32);
-            Vec3::new(x, y, 0.5 * x)
-        });
-        let mut cloud = PointCloud::from_positions(positions.collect());
-        cloud.origin = DVec3::new(484_000.0, 6_632_000.0, 100.0);
-        let (cloud, _): (PreparedCloud, _) =
-            prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
-        let colors = vec![[10, 20, 30]; cloud.len()];
-        let geometry = Geometry::Points(CloudGeometry::new(cloud, colors).unwrap());
-        let camera = Camera {
-            position: DVec3::Z,
-            focal_point: DVec3::ZERO,
-            view_up: DVec3::Y,
-            projection: Projection::Panorama,
-        };
-        let scene = Scene {
-            graph: Graph::from_geometry(geometry, Material::PLASTIC),
-            lights: Vec::new(),
-            background: Background::Transparent,
-            camera,
-        };
-        FlatScene::new(&scene, &NoProgress).unwrap()
-    }
 
     fn line(corners: &[[f64; 2]], width: f64) -> ProfileLine {
         let origin = DVec3::new(484_000.0, 6_632_000.0, 0.0);

@@ -300,9 +300,14 @@ impl<C: AsRef<PointCloud>> Graph<C> {
 
     /// Returns a sample of the points and vertices of all visible instances, in world coordinates.
     pub fn sample_points(&self) -> PointCloud {
+        self.sample_points_of(&self.visible_nodes())
+    }
+
+    /// Returns a sample of the points and vertices of all instances for whose nodes `is_chosen` is true.
+    pub fn sample_points_of(&self, is_chosen: &[bool]) -> PointCloud {
         const MAX_POINTS: usize = 400_000;
-        let (world, is_visible) = (self.world_from_nodes(), self.visible_nodes());
-        let nodes = self.nodes.iter().zip(&world).zip(&is_visible).filter(|(_, visible)| **visible);
+        let world = self.world_from_nodes();
+        let nodes = self.nodes.iter().zip(&world).zip(is_chosen).filter(|(_, chosen)| **chosen);
         let instances: Vec<(&Geometry<C>, &DAffine3)> = nodes
             .flat_map(|((node, world), _)| node.primitives.iter().map(move |p| (p, world)))
             .map(|(primitive, world)| (&self.geometries[primitive.geometry], world))

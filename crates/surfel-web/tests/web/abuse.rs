@@ -60,6 +60,9 @@ impl Random {
             "ack",
             "pick",
             "profile",
+            "volume",
+            "histogram",
+            "points",
             "save",
             "cancel",
             "export",
@@ -67,8 +70,24 @@ impl Random {
             "",
         ];
         let keys = [
-            "width", "height", "scene", "seq", "camera", "moving", "frame", "id", "x", "y", "name",
-            "text", "points", "up",
+            "width",
+            "height",
+            "scene",
+            "seq",
+            "camera",
+            "moving",
+            "frame",
+            "id",
+            "x",
+            "y",
+            "name",
+            "text",
+            "points",
+            "up",
+            "base",
+            "cell_size",
+            "column",
+            "format",
         ];
         let mut message = json!({ "type": self.choose(&kinds) });
         for key in keys {

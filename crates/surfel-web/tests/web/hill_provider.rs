@@ -2,7 +2,7 @@
 
 use crate::test_page::camera;
 use serde_json::{Value, json};
-use std::io::Cursor;
+use std::io::{Cursor, Read};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::{Duration, Instant};
@@ -19,7 +19,8 @@ use surfel_core::scene::{
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
 use surfel_web::{
-    Error, Export, PictureOverlay, PicturePart, PreparedScene, Result, SceneProvider, SettingsMap,
+    Error, Export, PictureOverlay, PicturePart, PointFile, PreparedScene, Result, SceneProvider,
+    SettingsMap,
 };
 
 /// Size of a page's picture in pixels.
@@ -158,6 +159,23 @@ impl PictureOverlay for Stamp {
 
 const RED: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
 
+/// A file of a million bytes.
+struct HillPoints;
+
+impl PointFile for HillPoints {
+    fn n_points(&self) -> u64 {
+        7
+    }
+
+    fn n_bytes(&self) -> u64 {
+        1_000_000
+    }
+
+    fn open(&self) -> std::io::Result<Box<dyn Read + Send>> {
+        Ok(Box::new(std::io::repeat(b'x').take(1_000_000)))
+    }
+}
+
 impl SceneProvider for HillProvider {
     fn info(&self) -> Value {
         json!({ "name": "hill" })
@@ -243,6 +261,28 @@ impl SceneProvider for HillProvider {
         let mut png = Cursor::new(Vec::new());
         to_rgba8(&image).write_to(&mut png, image::ImageFormat::Png).unwrap();
         Ok(png.into_inner())
+    }
+
+    fn histogram(&self, column: &str) -> Result<Value> {
+        match column {
+            "z" => Ok(json!({ "low": 0, "high": 2, "width": 1, "counts": [3, 0, 1] })),
+            _ => Err(Error::invalid_request(format!("no column {column}"))),
+        }
+    }
+
+    fn write_points(
+        &self,
+        settings: &SettingsMap,
+        format: &str,
+        progress: &dyn Progress,
+    ) -> Result<Arc<dyn PointFile>> {
+        if let Some(secs) = settings.get("slow_render").and_then(Value::as_f64) {
+            self.work(secs, progress)?;
+        }
+        match format {
+            "laz" => Ok(Arc::new(HillPoints)),
+            _ => Err(Error::invalid_request("expected laz")),
+        }
     }
 
     fn export(&self, settings: &SettingsMap) -> Result<Export> {

@@ -1,8 +1,10 @@
 //! The messages between page and server.
 
+use crate::http_client::get;
 use crate::test_page::{Received, SAVED, TestPage};
 use crate::test_server::TestServer;
 use serde_json::{Value, json};
+use std::time::Duration;
 
 #[tokio::test]
 async fn a_page_gets_welcome_scene_and_statistics() {
@@ -187,4 +189,65 @@ async fn settings_are_exported_and_loaded() {
     page.send_json(load(3, r#"{"slow":0}"#)).await;
     let scene = page.message("scene").await["scene"].clone();
     assert_eq!((&scene["slow"], &scene["tint"]), (&json!(0), &json!(7)));
+}
+
+#[tokio::test]
+async fn histograms_and_volumes_are_answered() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({})).await;
+    page.message("scene").await;
+    page.send_json(json!({ "type": "histogram", "id": 4, "column": "z" })).await;
+    let counted = page.message("counted").await;
+    assert_eq!((&counted["id"], &counted["histogram"]["counts"]), (&json!(4), &json!([3, 0, 1])));
+    page.send_json(json!({ "type": "histogram", "id": 5, "column": "wind" })).await;
+    assert_eq!(page.message("error").await["id"], 5);
+    let corners = json!([[-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]]);
+    let volume = |id: u32, points: &Value, base: Value| json!({ "type": "volume", "id": id, "points": points, "up": [0, 0, 1], "base": base });
+    page.send_json(volume(6, &corners, json!(-2))).await;
+    let measured = page.message("measured").await;
+    assert_eq!((&measured["id"], &measured["volume"]["base"]), (&json!(6), &json!(-2.0)));
+    assert!(0.0 < measured["volume"]["cut"].as_f64().unwrap(), "{measured}");
+    let on_a_line = json!([[0, 0, 0], [1, 1, 0], [2, 2, 5]]);
+    for (id, points, base) in [(7, &on_a_line, json!("mean")), (8, &corners, json!("top"))] {
+        page.send_json(volume(id, points, base)).await;
+        assert_eq!(page.message("error").await["id"], id);
+    }
+}
+
+#[tokio::test]
+async fn points_are_fetched_until_their_page_goes() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({})).await;
+    page.message("scene").await;
+    page.send_json(json!({ "type": "points", "id": 1, "format": "exe" })).await;
+    assert_eq!(page.message("error").await["id"], 1);
+    let mut addresses = Vec::new();
+    for id in [2, 3] {
+        page.send_json(json!({ "type": "points", "id": id, "format": "laz" })).await;
+        let written = page.message("written").await;
+        assert_eq!((&written["id"], &written["n_points"]), (&json!(id), &json!(7)));
+        addresses.push(format!("/{}", written["address"].as_str().unwrap()));
+    }
+    let file = get(&server, &addresses[1]).await;
+    assert_eq!((file.status, file.header("content-length")), (200, Some("1000000")));
+    assert_eq!(file.header("content-disposition"), Some("attachment"));
+    assert!(file.body.iter().all(|byte| *byte == b'x') && file.body.len() == 1_000_000);
+    // A newer file replaces the older one.
+    assert_eq!(get(&server, &addresses[0]).await.status, 404);
+    assert_eq!(get(&server, "/points/x").await.status, 404);
+    drop(page);
+    while get(&server, &addresses[1]).await.status != 404 {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+#[tokio::test]
+async fn writing_points_can_be_cancelled() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({ "slow_render": 60 })).await;
+    page.message("scene").await;
+    page.send_json(json!({ "type": "points", "id": 9, "format": "laz" })).await;
+    page.send_json(json!({ "type": "cancel", "id": 9 })).await;
+    let error = page.message("error").await;
+    assert_eq!((&error["id"], &error["text"]), (&json!(9), &json!("cancelled")));
 }

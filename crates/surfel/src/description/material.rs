@@ -156,10 +156,7 @@ pub struct MaterialChoice {
 impl MaterialChoice {
     /// Returns true if a file or object is meant: by its path, its name, or its name without extension.
     pub fn names(&self, file: &Path) -> bool {
-        let parts = [Some(file.as_os_str()), file.file_name(), file.file_stem()];
-        self.target
-            .as_ref()
-            .is_some_and(|name| parts.into_iter().flatten().any(|part| part == name.as_str()))
+        self.target.as_ref().is_some_and(|target| is_named(file, target))
     }
 
     /// Writes the choice as text, as in `statue.ply=glass:ior=1.33`.
@@ -169,6 +166,12 @@ impl MaterialChoice {
             None => self.material.text(),
         }
     }
+}
+
+/// Returns true if a name means a file or object: by its path, its name, or its name without extension.
+pub(super) fn is_named(file: &Path, name: &str) -> bool {
+    let parts = [Some(file.as_os_str()), file.file_name(), file.file_stem()];
+    parts.into_iter().flatten().any(|part| part == name)
 }
 
 /// Text, a table, or a list of both.

@@ -16,8 +16,10 @@ mod keys;
 mod lamp;
 mod light;
 mod material;
+mod named_view;
 mod nearest;
 mod object;
+mod object_override;
 mod object_settings;
 mod option;
 pub mod pattern;
@@ -36,10 +38,12 @@ pub use keys::{Key, KeyedSettings};
 pub use lamp::{LampDescription, LampShape};
 pub use light::{LIGHT_KINDS, LightKind, LightSettings, SkySettings, SunSettings};
 pub use material::{MaterialChoice, MaterialDescription, MaterialSettings};
+pub use named_view::{NamedView, ViewSettings};
 pub use nearest::nearest;
 pub use object::{ObjectDescription, Placement, Rotation};
+pub use object_override::{ObjectOverride, OverrideSettings};
 pub use object_settings::{ColorSettings, ObjectSettings, PreparationSettings, SurfaceSettings};
-pub use option::{option_name, value_text};
+pub use option::{has_option, is_list, option_name, value_text};
 pub use picture::{Backend, Exposure, OutputSettings, PictureSettings, RunSettings};
 pub use plan::PlanSettings;
 pub use point_filter::Returns;
@@ -81,6 +85,10 @@ pub struct SceneDescription {
     pub run: RunSettings,
     /// Materials for everything, or for files and objects by their names.
     pub materials: MaterialSettings,
+    /// Settings of files and objects by their names.
+    pub overrides: OverrideSettings,
+    /// Views that were saved under names.
+    pub views: ViewSettings,
 }
 
 /// A part of a description: a heading for help texts, the table that its keys stand in, and the settings.
@@ -125,7 +133,7 @@ impl SceneDescription {
     }
 
     /// Returns the parts with their keys.
-    pub fn parts(&self) -> [Part<&dyn KeyedSettings>; 13] {
+    pub fn parts(&self) -> [Part<&dyn KeyedSettings>; 15] {
         let [surface, preparation, color] = self.objects_default.parts();
         let part = |heading, prefix, settings| Part { heading, prefix, settings };
         [
@@ -142,10 +150,12 @@ impl SceneDescription {
             preparation,
             part("Everywhere", "", &self.run),
             part("Materials", "", &self.materials),
+            part("Materials", "", &self.overrides),
+            part("Views", "", &self.views),
         ]
     }
 
-    fn parts_mut(&mut self) -> [(&'static str, &mut dyn KeyedSettings); 13] {
+    fn parts_mut(&mut self) -> [(&'static str, &mut dyn KeyedSettings); 15] {
         let ObjectSettings { surface, preparation, color } = &mut self.objects_default;
         [
             ("", &mut self.output),
@@ -161,6 +171,8 @@ impl SceneDescription {
             ("", preparation),
             ("", &mut self.run),
             ("", &mut self.materials),
+            ("", &mut self.overrides),
+            ("", &mut self.views),
         ]
     }
 
@@ -267,6 +279,8 @@ impl SceneDescription {
         self.objects_default = over.objects_default.over(&self.objects_default);
         self.run.overlay(&over.run);
         self.materials.overlay(&over.materials);
+        self.overrides.overlay(&over.overrides);
+        self.views.overlay(&over.views);
         self.files.extend(over.files);
         self.objects.extend(over.objects);
         self.lamps.extend(over.lamps);
@@ -398,11 +412,11 @@ impl<'de> Deserialize<'de> for SceneDescription {
     }
 }
 
-/// Returns true for values that say that there is none: false where a length could stand, and no materials.
+/// Returns true for values that say that there is none: false where a length could stand, and empty lists.
 fn is_none(path: &str, value: &Value) -> bool {
     match path {
         "camera.orthographic" => *value == Value::Bool(false) || value.as_str() == Some("false"),
-        "material" => value.as_array().is_some_and(Vec::is_empty),
+        path if is_list(path) || !has_option(path) => value.as_array().is_some_and(Vec::is_empty),
         _ => false,
     }
 }

@@ -13,6 +13,16 @@ pub fn option_name(path: &str) -> String {
     }
 }
 
+/// Returns true for the keys whose option may be given several times.
+pub fn is_list(path: &str) -> bool {
+    ["material", "object_settings"].contains(&path)
+}
+
+/// Returns true for the keys that are options too; some are for scene files and pages alone.
+pub fn has_option(path: &str) -> bool {
+    path != "views"
+}
+
 /// Writes a value as it is typed.
 pub fn value_text(value: &Value) -> String {
     match value {
@@ -29,11 +39,12 @@ pub fn value_text(value: &Value) -> String {
 impl SceneDescription {
     /// Writes the keys that differ from their defaults as words of a command line, without files and objects.
     pub fn to_options(&self) -> Vec<String> {
-        let options = self.non_default().into_iter().flat_map(|(path, value)| {
+        let values = self.non_default().into_iter().filter(|(path, _)| has_option(path));
+        let options = values.flat_map(|(path, value)| {
             let option = option_name(&path);
             match value {
                 Value::Bool(true) => vec![format!("--{option}")],
-                Value::Array(choices) if path == "material" => choices
+                Value::Array(choices) if is_list(&path) => choices
                     .iter()
                     .map(|value| format!("--{option}={}", value_text(value)))
                     .collect(),

@@ -35,6 +35,9 @@ pub fn finish_graph(
         apply_surface_and_color(cloud, &settings, up, progress)
             .map_err(|cause| scene.content_error(geometry, description, cause))
     })?;
+    for (node, is_visible) in scene.visibility(&graph, description) {
+        graph.nodes[node].is_visible = is_visible;
+    }
     let mut sequences = scene.sequences_under(description);
     clip(scene, &mut graph, &mut sequences, description)?;
     assign_materials(scene, &mut graph, &mut sequences, description);

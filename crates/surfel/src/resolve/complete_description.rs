@@ -3,7 +3,7 @@
 use super::appearance::{material_of_file, material_of_object};
 use super::loaded::LoadedScene;
 use super::{AutoSettings, description_camera};
-use crate::description::{KeyedSettings, MaterialSettings, ObjectDescription, SceneDescription};
+use crate::description::{KeyedSettings, ObjectDescription, SceneDescription};
 use surfel_core::scene::color::{ColorSource, choose_source};
 
 /// Returns the description with everything that was chosen written into it. It makes the same picture, byte for byte.
@@ -29,7 +29,7 @@ pub fn complete_description(
     });
     complete.objects = of_files.chain(of_scene).collect();
     complete.files.clear();
-    complete.materials = MaterialSettings::default();
+    (complete.materials, complete.overrides) = Default::default();
     complete
 }
 

@@ -25,7 +25,7 @@ pub use check_files::check_files;
 pub use cloud::{prepare_cloud, report_denoise, report_normals, report_prepared, report_radii};
 pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;
-pub use loaded::{KeepOptions, LoadedScene};
+pub use loaded::{KeepOptions, LoadedFile, LoadedScene};
 pub use memory::{MemoryEstimate, n_points, readable};
 pub use plan::coordinate_system;
 pub(crate) use sequence::Sequence;
@@ -89,6 +89,9 @@ pub struct Resolved {
 /// [`surfel_core::Error::Cancelled`].
 pub fn resolve(description: &SceneDescription, progress: &dyn Progress) -> Result<Resolved> {
     description.check()?;
+    let mut description = description.clone();
+    description.apply_object_settings()?;
+    let description = &description;
     let log = ChoiceLog::new(progress);
     let keep = KeepOptions { source_indices: true, ..KeepOptions::default() };
     let scene = LoadedScene::read(description, keep, &log)?;
@@ -126,7 +129,7 @@ impl AutoSettings {
         description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let points = scene.sample_points();
+        let points = scene.shown_points(description);
         let up = choose_up(description.world.up, &points, &scene.file_infos, progress);
         let camera = stand_at_station(&description.camera, scene, up)?;
         let mut description = SceneDescription { camera, ..description.clone() };

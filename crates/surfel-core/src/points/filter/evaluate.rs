@@ -4,6 +4,7 @@ use super::condition::{Condition, Operand, Relation};
 use super::polygon::Polygon;
 use crate::error::{Error, Result};
 use crate::points::{PointCloud, Values};
+use std::ops::Range;
 
 /// The columns of a cloud that a condition compares.
 pub(super) struct Evaluation<'a> {
@@ -112,11 +113,17 @@ impl<'a> Evaluation<'a> {
             Operand::Number(number) => return vec![*number; n],
             Operand::Column(name) => name,
         };
-        let range = start..start + n;
-        let cloud = self.cloud;
         let column = self.columns.iter().find(|(known, _)| known == name).map(|(_, column)| column);
-        let absent = "columns were found before";
-        match *column.expect(absent) {
+        let column = column.expect("columns were found before");
+        column.values(self.cloud, start..start + n)
+    }
+}
+
+impl ColumnValues<'_> {
+    /// Returns the values of a range of points of the cloud that has the column.
+    fn values(self, cloud: &PointCloud, range: Range<usize>) -> Vec<f64> {
+        let absent = "a column is there if it was found";
+        match self {
             ColumnValues::Position(axis) => {
                 let zero = cloud.origin[axis];
                 cloud.positions[range].iter().map(|p| zero + f64::from(p[axis])).collect()
@@ -143,6 +150,15 @@ impl<'a> Evaluation<'a> {
             },
         }
     }
+}
+
+/// Returns the values of a column by its name, which a filter may use. `x`, `y` and `z` are world coordinates.
+///
+/// # Errors
+///
+/// Returns [`Error::UnknownName`] if the cloud lacks the column.
+pub fn column_values(cloud: &PointCloud, name: &str) -> Result<Vec<f64>> {
+    Ok(find_column(name, cloud)?.values(cloud, 0..cloud.len()))
 }
 
 fn widen<T: Copy + Into<f64>>(values: &[T]) -> Vec<f64> {

@@ -7,7 +7,8 @@ mod polygon;
 
 use condition::{Condition, Operand, Relation};
 use evaluate::Evaluation;
-use polygon::Polygon;
+pub use evaluate::column_values;
+pub(crate) use polygon::Polygon;
 use std::fmt;
 use std::str::FromStr;
 

@@ -35,7 +35,7 @@ impl Side {
 
 /// A polygon with holes: a point is inside if a line from it to infinity crosses the rings an odd number of times.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Polygon {
+pub(crate) struct Polygon {
     /// Sides; level ones bound nothing.
     sides: Vec<Side>,
     /// Least and greatest Y of all sides.

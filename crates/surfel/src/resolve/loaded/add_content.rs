@@ -2,16 +2,17 @@
 
 use super::super::cloud::{ImportOptions, graph_of, import, into_cloud};
 use super::super::sequence::{GeometrySlots, Sequence, element_counts, is_streamed};
-use super::{LoadedScene, ObjectNodes};
+use super::{LoadedFile, LoadedScene, ObjectNodes};
+use crate::choice_log::NoteLog;
 use crate::description::{ObjectDescription, ObjectMotion, ObjectSettings, SceneDescription};
 use crate::error::{Error, Result};
 use crate::names::file_name;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Channel, Graph, Interpolation, Keyframes, Node, Track, Transform};
-use surfel_formats::Loaded;
+use surfel_formats::{FileInfo, Loaded};
 
 impl LoadedScene {
     pub(super) fn import_options(&self, description: &SceneDescription) -> ImportOptions {
@@ -30,8 +31,8 @@ impl LoadedScene {
         let options = self.import_options(description);
         let (mut separate, mut merging) = (Vec::new(), (Vec::new(), Vec::new()));
         for file in &description.files {
-            let (graph, info) = import(file, &description.objects_default, &options, progress)?;
-            self.file_infos.push(info.clone());
+            let (graph, info) =
+                self.import(file, &description.objects_default, &options, progress)?;
             let has_material =
                 description.materials.choices().iter().any(|choice| choice.names(file));
             match into_cloud(graph) {
@@ -57,6 +58,23 @@ impl LoadedScene {
             self.files.extend(files.into_iter().map(|file| (file, nodes.clone())));
         }
         Ok(())
+    }
+
+    /// Reads a file, and keeps what is to be known about it.
+    fn import(
+        &mut self,
+        file: &Path,
+        settings: &ObjectSettings,
+        options: &ImportOptions,
+        progress: &dyn Progress,
+    ) -> Result<(Graph<PointCloud>, FileInfo)> {
+        let log = NoteLog::new(progress);
+        let (graph, info) = import(file, settings, options, &log)?;
+        let (n_points, n_triangles) = graph.n_points_and_triangles();
+        let notes = log.into_notes();
+        self.read_files.push(LoadedFile { path: file.to_owned(), n_points, n_triangles, notes });
+        self.file_infos.push(info.clone());
+        Ok((graph, info))
     }
 
     /// Adds a graph to what is here; returns its nodes.
@@ -122,8 +140,7 @@ impl LoadedScene {
         }
         let mut merging = Vec::new();
         for (file_idx, file) in object.files.iter().enumerate() {
-            let (graph, info) = import(file, &settings, &options, progress)?;
-            self.file_infos.push(info.clone());
+            let (graph, info) = self.import(file, &settings, &options, progress)?;
             if object.merge() {
                 let cloud = into_cloud(graph).map_err(|_| {
                     Error::Unfit(format!(
@@ -158,8 +175,7 @@ impl LoadedScene {
         progress: &dyn Progress,
     ) -> Result<()> {
         let first = &object.files[0];
-        let (graph, info) = import(first, &settings, &options, progress)?;
-        self.file_infos.push(info);
+        let (graph, _) = self.import(first, &settings, &options, progress)?;
         let above = Node { parent: Some(node), ..Node::new(file_name(first)) };
         let above = self.graph.add_node(above);
         let before = element_counts(&self.graph);

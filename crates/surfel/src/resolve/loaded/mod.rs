@@ -20,7 +20,7 @@ use surfel_core::points::{PointCloud, PreparedCloud, STRUCTURE, SURFACE_VARIATIO
 use surfel_core::progress::Progress;
 use surfel_core::render::check_surfaces;
 use surfel_core::scene::color::ColorSource;
-use surfel_core::scene::{Environment, Geometry, Graph, Transform};
+use surfel_core::scene::{Environment, Geometry, Graph, Track, Transform};
 use surfel_core::surface::SurfaceKind;
 use surfel_formats::FileInfo;
 
@@ -33,6 +33,8 @@ pub struct LoadedScene {
     pub graph: Graph<PointCloud>,
     /// Facts that each file states about itself.
     pub file_infos: Vec<FileInfo>,
+    /// The files that were read, as they were read.
+    pub read_files: Vec<LoadedFile>,
     /// Movement of the camera.
     pub(super) camera_motion: Option<CameraMotion>,
     /// The environment map, upright.
@@ -48,6 +50,19 @@ pub struct LoadedScene {
     keeps_all_columns: bool,
 }
 
+/// The content of a file, and what was unusual about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadedFile {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// Number of points.
+    pub n_points: usize,
+    /// Number of triangles.
+    pub n_triangles: usize,
+    /// Notes of the reader, as of what was repaired or left out.
+    pub notes: Vec<String>,
+}
+
 /// Data of the files that are kept besides those that a picture needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct KeepOptions {
@@ -60,7 +75,7 @@ pub struct KeepOptions {
 /// The nodes of an object.
 #[derive(Clone, Debug)]
 pub(super) struct ObjectNodes {
-    node: usize,
+    pub node: usize,
     /// Nodes of its files, without those of its instances.
     content: Range<usize>,
     /// Nodes of its files and instances.
@@ -86,6 +101,7 @@ impl LoadedScene {
         let mut scene = Self {
             graph: Graph::default(),
             file_infos: Vec::new(),
+            read_files: Vec::new(),
             camera_motion: camera_motion(description)?,
             environment: load_environment(description, progress)?,
             files: Vec::new(),
@@ -174,6 +190,41 @@ impl LoadedScene {
         groups.map(|group| group.iter().map(|(file, _)| file.as_path()).collect())
     }
 
+    /// Returns the nodes of objects in the scene's graph, and whether each is visible under another description of the
+    /// same objects. Movements decide about nodes that appear and vanish.
+    pub(super) fn visibility<C>(
+        &self,
+        graph: &Graph<C>,
+        description: &SceneDescription,
+    ) -> Vec<(usize, bool)> {
+        let vanishes = |node: usize| {
+            let mut channels = graph.animation.channels.iter();
+            channels
+                .any(|channel| channel.node == node && matches!(channel.track, Track::Visible(_)))
+        };
+        let objects = self.objects.iter().zip(&description.objects);
+        let visible = objects.map(|(nodes, object)| (nodes.node, object.visible()));
+        visible.filter(|(node, _)| !vanishes(*node)).collect()
+    }
+
+    /// Returns points that show where everything is that a description shows; where all of it is if it shows nothing.
+    pub(super) fn shown_points(&self, description: &SceneDescription) -> Cow<'_, PointCloud> {
+        let visibility = self.visibility(&self.graph, description);
+        if visibility.iter().all(|(node, shown)| self.graph.nodes[*node].is_visible == *shown) {
+            return self.sample_points();
+        }
+        let nodes = self.graph.nodes.clone();
+        let mut graph = Graph::<PointCloud> { nodes, ..Graph::default() };
+        for (node, is_visible) in visibility {
+            graph.nodes[node].is_visible = is_visible;
+        }
+        let shown = self.graph.sample_points_of(&graph.visible_nodes());
+        match shown.is_empty() {
+            true => Cow::Owned(self.graph.sample_points_of(&vec![true; graph.nodes.len()])),
+            false => Cow::Owned(shown),
+        }
+    }
+
     /// Returns points that show where everything is.
     pub fn sample_points(&self) -> Cow<'_, PointCloud> {
         let single = self.single_cloud().map(Cow::Borrowed);
@@ -206,6 +257,9 @@ impl LoadedScene {
     /// Fails as rendering does.
     pub fn check_surfaces(&self, description: &SceneDescription, time_secs: f64) -> Result<()> {
         let mut graph = self.graph_without_points();
+        for (node, is_visible) in self.visibility(&self.graph, description) {
+            graph.nodes[node].is_visible = is_visible;
+        }
         graph.evaluate_at(time_secs);
         let nodes = graph.nodes.iter().zip(graph.visible_nodes());
         let shown =

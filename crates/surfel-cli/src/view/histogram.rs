@@ -1,0 +1,93 @@
+//! Histograms of columns, as the page shows them.
+
+use serde_json::{Value, json};
+use surfel_core::points::{PointCloud, column_values};
+
+/// Maximum number of ranges.
+const MAX_BINS: usize = 64;
+
+/// Returns the least and greatest value of a column of clouds, and the numbers of points in ranges of equal width
+/// between them. Whole numbers have ranges of whole width. Clouds without the column are left out.
+///
+/// # Errors
+/// Fails if no cloud has finite values of the column.
+pub fn histogram<'c>(
+    clouds: impl Iterator<Item = &'c PointCloud>,
+    column: &str,
+) -> surfel_core::Result<Value> {
+    let mut error = None;
+    let mut values = Vec::new();
+    for cloud in clouds {
+        match column_values(cloud, column) {
+            Ok(found) => values.extend(found.into_iter().filter(|value| value.is_finite())),
+            Err(missing) => error = Some(missing),
+        }
+    }
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if high < low {
+        return Err(error.unwrap_or(surfel_core::Error::EmptyCloud));
+    }
+    let is_whole = values.iter().all(|value| value.fract() == 0.0);
+    let width = match is_whole {
+        true => ((high - low + 1.0) / MAX_BINS as f64).ceil(),
+        false => (high - low) / MAX_BINS as f64,
+    };
+    let n_bins = match is_whole {
+        true => ((high - low + 1.0) / width).ceil() as usize,
+        false => MAX_BINS,
+    };
+    let mut counts = vec![0u64; n_bins];
+    for value in values {
+        counts[(((value - low) / width) as usize).min(n_bins - 1)] += 1;
+    }
+    Ok(json!({ "low": low, "high": high, "width": width, "counts": counts }))
+}
+
+#[cfg(test)]
+mod tests {
+    //! Ranges of whole and of other numbers.
+
+    use super::*;
+    use surfel_core::math::{DVec3, Vec3};
+
+    fn cloud() -> PointCloud {
+        let positions = (0..=128).map(|i| Vec3::new(0.0, 0.0, 0.5 * i as f32));
+        let mut cloud = PointCloud::from_positions(positions.collect());
+        cloud.classification = Some((0..=128).map(|i| if i < 100 { 2 } else { 6 }).collect());
+        cloud.origin = DVec3::new(0.0, 0.0, 100.0);
+        cloud
+    }
+
+    fn counts(column: &str) -> Value {
+        histogram([&cloud()].into_iter(), column).unwrap()
+    }
+
+    #[test]
+    fn whole_numbers_have_ranges_of_whole_width() {
+        let expected =
+            json!({ "low": 2.0, "high": 6.0, "width": 1.0, "counts": [100, 0, 0, 0, 29] });
+        assert_eq!(counts("classification"), expected);
+    }
+
+    #[test]
+    fn other_numbers_have_ranges_of_equal_width() {
+        let found = counts("z");
+        assert_eq!((&found["low"], &found["high"]), (&json!(100.0), &json!(164.0)));
+        let mut expected = vec![2; MAX_BINS];
+        expected[MAX_BINS - 1] = 3;
+        assert_eq!(found["counts"], json!(expected));
+        let flat = counts("x");
+        assert_eq!((&flat["width"], &flat["counts"]), (&json!(1.0), &json!([129])));
+    }
+
+    #[test]
+    fn clouds_without_the_column_are_left_out() {
+        let other = PointCloud::from_positions(vec![Vec3::ZERO]);
+        let found = histogram([&cloud(), &other].into_iter(), "class").unwrap();
+        assert_eq!(found["counts"], counts("class")["counts"]);
+        assert!(
+            histogram([&other].into_iter(), "class").unwrap_err().to_string().contains("class")
+        );
+    }
+}

@@ -1,0 +1,122 @@
+//! The points that a view shows, with the columns of their files, for download.
+
+use super::rejection::rejection;
+use std::io::Read;
+use std::sync::Arc;
+use surfel::live_scene::LiveView;
+use surfel_core::math::{DAffine3, DMat3};
+use surfel_core::points::{PointCloud, merge};
+use surfel_core::progress::Progress;
+use surfel_core::scene::{Geometry, Graph};
+use surfel_formats::{SaveOptions, TempCloud};
+use surfel_web::{Error, PointFile, Result};
+
+/// Formats of downloads.
+const FORMATS: [&str; 2] = ["laz", "ply"];
+
+/// Points in a temporary file.
+struct ShownPoints {
+    n_points: u64,
+    file: TempCloud,
+}
+
+impl PointFile for ShownPoints {
+    fn n_points(&self) -> u64 {
+        self.n_points
+    }
+
+    fn n_bytes(&self) -> u64 {
+        self.file.n_bytes()
+    }
+
+    fn open(&self) -> std::io::Result<Box<dyn Read + Send>> {
+        Ok(Box::new(self.file.open()?))
+    }
+}
+
+/// Writes the points of a view at a time to a file.
+///
+/// # Errors
+/// Fails for other formats, for a view without points, as writing does, and if cancelled.
+pub fn write_shown_points(
+    view: &LiveView,
+    time_secs: f64,
+    format: &str,
+    progress: &dyn Progress,
+) -> Result<Arc<dyn PointFile>> {
+    if !FORMATS.contains(&format) {
+        let text = format!("found the format {format}, expected {}", FORMATS.join(" or "));
+        return Err(Error::invalid_request(text));
+    }
+    let mut graph = view.trees.graph.clone();
+    graph.evaluate_at(time_secs);
+    let clouds = shown_clouds(view, &graph);
+    if clouds.is_empty() {
+        return Err(Error::invalid_request("no points are shown"));
+    }
+    let (cloud, _) = merge(clouds);
+    let options = SaveOptions::from_source(&view.loaded.file_info());
+    let file = TempCloud::write(&cloud, format, &options, progress);
+    let file = file.map_err(|error| rejection(surfel::Error::from(error)))?;
+    Ok(Arc::new(ShownPoints { n_points: cloud.len() as u64, file }))
+}
+
+/// The shown points of each cloud in the order of its file, where its first instance is.
+fn shown_clouds(view: &LiveView, graph: &Graph) -> Vec<PointCloud> {
+    let is_visible = graph.visible_nodes();
+    let shows = |geometry: usize| {
+        let mut nodes = graph.nodes.iter().zip(&is_visible).filter(|(_, is_visible)| **is_visible);
+        nodes.any(|(node, _)| node.primitives.iter().any(|part| part.geometry == geometry))
+    };
+    let transforms = graph.world_from_geometries();
+    let geometries = view.loaded.graph.geometries.iter().enumerate();
+    let clouds = geometries.filter_map(|(i, geometry)| {
+        let Geometry::Points(source) = geometry else { return None };
+        let mut indices = view.trees.source_indices[i].clone();
+        if indices.is_empty() || !shows(i) {
+            return None;
+        }
+        indices.sort_unstable();
+        let mut cloud = source.subset(&indices);
+        move_by(&mut cloud, &transforms[i]);
+        Some(cloud)
+    });
+    clouds.collect()
+}
+
+/// Moves a cloud to world coordinates.
+fn move_by(cloud: &mut PointCloud, world_from_cloud: &DAffine3) {
+    if *world_from_cloud == DAffine3::IDENTITY {
+        return;
+    }
+    let linear = world_from_cloud.matrix3;
+    cloud.origin = world_from_cloud.transform_point3(cloud.origin);
+    for position in &mut cloud.positions {
+        *position = (linear * position.as_dvec3()).as_vec3();
+    }
+    let of_normals: DMat3 = linear.inverse().transpose();
+    for normal in cloud.normals.iter_mut().flatten() {
+        *normal = (of_normals * normal.as_dvec3()).normalize_or_zero().as_vec3();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Points at other places.
+
+    use super::*;
+    use surfel_core::math::{DVec3, Vec3};
+
+    #[test]
+    fn points_are_moved_with_their_normals() {
+        let mut cloud = PointCloud::from_positions(vec![Vec3::new(1.0, 2.0, 3.0)]);
+        cloud.origin = DVec3::new(500_000.0, 0.0, 0.0);
+        cloud.normals = Some(vec![Vec3::new(0.6, 0.0, 0.8)]);
+        let moved = DAffine3::from_translation(DVec3::new(0.0, 7.0, 0.0))
+            * DAffine3::from_scale(DVec3::new(1.0, 1.0, 2.0));
+        move_by(&mut cloud, &moved);
+        assert_eq!(cloud.world_position(0), DVec3::new(500_001.0, 9.0, 6.0));
+        let normal = cloud.normals.unwrap()[0];
+        assert!((normal - Vec3::new(0.6, 0.0, 0.4).normalize()).length() < 1e-6, "{normal}");
+    }
+}

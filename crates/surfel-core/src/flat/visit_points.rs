@@ -1,0 +1,125 @@
+//! Visits the points of a scene in parallel, in a fixed order.
+
+use super::{FlatGeometry, FlatScene};
+use crate::bvh::NO_PRIMITIVE;
+use crate::error::Result;
+use crate::math::{DVec3, LANES};
+use crate::progress::Progress;
+use rayon::prelude::*;
+
+/// Number of slots that a task goes through.
+const SLOTS_PER_PART: usize = 8192;
+
+/// A visible point of a scene.
+#[derive(Clone, Copy, Debug)]
+pub struct VisitedPoint {
+    /// Position in world coordinates.
+    pub position: DVec3,
+    /// Colour as sRGB.
+    pub color: [u8; 3],
+    /// Number that no other point of the scene has, the same in each visit.
+    pub key: u64,
+}
+
+/// Calls `find` for each point that is shown; returns what it finds, in a fixed order.
+///
+/// # Errors
+/// Fails if `progress` is cancelled.
+pub fn visit_points<T: Send>(
+    scene: &FlatScene,
+    progress: &dyn Progress,
+    find: impl Fn(&VisitedPoint) -> Option<T> + Sync,
+) -> Result<Vec<T>> {
+    let mut found = Vec::new();
+    for (instance_idx, instance) in scene.instances.iter().enumerate() {
+        let FlatGeometry::Cloud(cloud) = scene.geometry(instance) else { continue };
+        for points in [&cloud.points, &cloud.lines, &cloud.scatter] {
+            let point_at = |slot: usize| {
+                let block = &points.blocks[slot / LANES];
+                if points.id(slot as u32) == NO_PRIMITIVE {
+                    return None;
+                }
+                let center = instance.world_position(points.center(slot as u32));
+                let position = scene.origin + center.as_dvec3();
+                let is_hidden = scene.camera_planes.iter().any(|plane| plane.hides(position));
+                let key = (instance_idx as u64) << 40 | slot as u64;
+                let color = block.color(slot % LANES);
+                (!is_hidden).then_some(VisitedPoint { position, color, key })
+            };
+            let visit_part = |part: usize| {
+                progress.check()?;
+                let end = points.ids.len().min(SLOTS_PER_PART * (part + 1));
+                let slots = SLOTS_PER_PART * part..end;
+                Ok(slots.filter_map(point_at).filter_map(|point| find(&point)).collect())
+            };
+            let n_parts = points.ids.len().div_ceil(SLOTS_PER_PART);
+            let parts: Vec<Vec<T>> =
+                (0..n_parts).into_par_iter().map(visit_part).collect::<Result<_>>()?;
+            found.extend(parts.into_iter().flatten());
+        }
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+pub(super) mod slope {
+    //! A scene whose points are known.
+
+    use super::*;
+    use crate::math::Vec3;
+    use crate::points::{PointCloud, Preparation, PreparedCloud, prepare};
+    use crate::progress::NoProgress;
+    use crate::scene::{
+        Background, Camera, CloudGeometry, Geometry, Graph, Material, Projection, Scene,
+    };
+
+    /// A grid of 101 x 101 points of a slope that rises along x, at an origin far away.
+    pub fn slope() -> FlatScene {
+        let positions = (0..101 * 101).map(|i| {
+            let (x, y) = ((i % 101) as f32, (i / 101) as f32);
+            Vec3::new(x, y, 0.5 * x)
+        });
+        let mut cloud = PointCloud::from_positions(positions.collect());
+        cloud.origin = DVec3::new(484_000.0, 6_632_000.0, 100.0);
+        let (cloud, _): (PreparedCloud, _) =
+            prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+        let colors = vec![[10, 20, 30]; cloud.len()];
+        let geometry = Geometry::Points(CloudGeometry::new(cloud, colors).unwrap());
+        let camera = Camera {
+            position: DVec3::Z,
+            focal_point: DVec3::ZERO,
+            view_up: DVec3::Y,
+            projection: Projection::Panorama,
+        };
+        let scene = Scene {
+            graph: Graph::from_geometry(geometry, Material::PLASTIC),
+            lights: Vec::new(),
+            background: Background::Transparent,
+            camera,
+        };
+        FlatScene::new(&scene, &NoProgress).unwrap()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Points that are shown.
+
+    use super::slope::slope;
+    use super::*;
+    use crate::progress::NoProgress;
+    use crate::scene::ClipPlane;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn each_shown_point_is_visited_once() {
+        let mut scene = slope();
+        let keys = visit_points(&scene, &NoProgress, |point| Some(point.key)).unwrap();
+        assert_eq!(keys.iter().collect::<BTreeSet<_>>().len(), 101 * 101);
+        let (point, normal) = (DVec3::new(484_050.5, 0.0, 0.0), DVec3::X);
+        scene.camera_planes = vec![ClipPlane { point, normal }];
+        let shown = visit_points(&scene, &NoProgress, |point| Some(point.position)).unwrap();
+        assert_eq!(shown.len(), 51 * 101);
+        assert!(shown.iter().all(|position| position.x < 484_050.5));
+    }
+}

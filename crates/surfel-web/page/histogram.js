@@ -1,0 +1,129 @@
+// The histogram of a column, with two handles that set the filter.
+
+import { element, icon, svg } from './dom.js';
+import { shortest } from './format.js';
+
+const N_STEPS = 200;
+/** A condition that the handles write, at the end of a filter. */
+const LAST_TERM = /^(?:(.*) && )?(\w+) (>=|<=) (-?\d[\d.]*(?:e[+-]?\d+)?)$/s;
+
+/** A column's name as filters have it. */
+export const filterName = (column) => column.replaceAll(/\W/g, '_');
+
+/** Whether a text stands in one pair of parentheses. */
+function isWrapped(text) {
+  let depth = 0;
+  const closes = [...text].findIndex((sign) => {
+    depth += { '(': 1, ')': -1 }[sign] ?? 0;
+    return depth === 0;
+  });
+  return text.startsWith('(') && closes === text.length - 1;
+}
+
+/** Splits a filter into a head, and the conditions at its end that handles can set, as `[column, relation, number]`. */
+function splitFilter(filter) {
+  const terms = [];
+  let head = filter;
+  for (let match = LAST_TERM.exec(head); match; match = LAST_TERM.exec(head)) {
+    terms.unshift([match[2], match[3], Number(match[4])]);
+    head = match[1] ?? '';
+  }
+  // `a || b && c` means `a || (b && c)`.
+  return head.includes('||') && !isWrapped(head) ? { head: filter, terms: [] } : { head, terms };
+}
+
+/** The range of a column that a filter keeps, as far as handles can set it; its ends may be null. */
+export function rangeIn(filter, column) {
+  const { terms } = splitFilter(filter);
+  const bound = (relation) => terms.findLast(([name, sign]) => name === column && sign === relation)?.[2] ?? null;
+  return [bound('>='), bound('<=')];
+}
+
+/** The filter with another range of a column; null keeps an end open. */
+export function withRange(filter, column, [low, high]) {
+  const { head, terms } = splitFilter(filter);
+  const others = terms.filter(([name]) => name !== column);
+  const own = [[column, '>=', low], [column, '<=', high]].filter(([, , value]) => value !== null);
+  const all = [...others, ...own].map((term) => term.join(' '));
+  const first = all.length && head.includes('||') && !isWrapped(head) ? `(${head})` : head;
+  return [...(first ? [first] : []), ...all].join(' && ');
+}
+
+/** The rows of the panel with the choice of the column and its histogram. */
+export function histogramRows(viewer) {
+  let histogram = null;
+  const column = () => filterName(choice.value);
+  const choice = element('select', { id: 'histogram-column', 'data-key': 'histogram.column', onchange: () => request() });
+  const bars = svg('svg', { class: 'histogram-bars', preserveAspectRatio: 'none', 'aria-hidden': 'true' });
+  const [low, high] = ['Lowest', 'Highest'].map((name) => element('input', {
+    type: 'range', class: 'histogram-handle', 'data-handle-name': name, oninput: () => showHandles(), onchange: () => apply(),
+  }));
+  const readout = element('output', { class: 'note' });
+  const chart = element('div', { class: 'histogram', hidden: true }, element('div', { class: 'histogram-plot' }, bars, low, high), readout);
+
+  const request = async () => {
+    const name = choice.value;
+    histogram = null;
+    chart.hidden = true;
+    if (!name) return;
+    const answer = await viewer.request({ type: 'histogram', column: name }).catch((error) => viewer.rejected({ text: error.message }));
+    if (!answer || choice.value !== name) return;
+    ({ histogram } = answer);
+    showHistogram();
+  };
+
+  const showHistogram = () => {
+    const { counts, low: least, high: most } = histogram;
+    const top = counts.reduce((largest, n) => Math.max(largest, n), 1);
+    bars.setAttribute('viewBox', `0 0 ${counts.length} 1`);
+    bars.replaceChildren(...counts.map((n, i) => {
+      // A few points must be seen beside very many.
+      const height = n === 0 ? 0 : Math.max(0.03, n / top);
+      return svg('rect', { x: i, width: 0.9, y: 1 - height, height });
+    }));
+    const isWhole = Number.isInteger(least) && Number.isInteger(most) && Number.isInteger(histogram.width);
+    for (const handle of [low, high]) {
+      Object.assign(handle, { min: least, max: most, step: isWhole ? 1 : (most - least) / N_STEPS || 1 });
+      handle.setAttribute('aria-label', `${handle.dataset.handleName} ${choice.value}`);
+    }
+    chart.hidden = false;
+    showFilter();
+  };
+
+  /** Puts the handles where the filter has them. */
+  const showFilter = () => {
+    if (!histogram) return;
+    const [from, to] = rangeIn(viewer.scene.filter ?? '', column());
+    [low.value, high.value] = [from ?? histogram.low, to ?? histogram.high];
+    showHandles();
+  };
+
+  const showHandles = () => {
+    const [from, to] = [low.valueAsNumber, high.valueAsNumber];
+    [...bars.children].forEach((bar, i) => {
+      const [start, end] = [histogram.low + i * histogram.width, histogram.low + (i + 1) * histogram.width];
+      bar.classList.toggle('is-outside', end <= from || to < start);
+    });
+    for (const handle of [low, high]) handle.setAttribute('aria-valuetext', shortest(handle.valueAsNumber));
+    readout.textContent = `${shortest(from)} to ${shortest(to)}`;
+  };
+
+  const apply = () => {
+    const [from, to] = [low, high].map((handle) => shortest(handle.valueAsNumber)).sort((a, b) => a - b);
+    const range = [histogram.low < from ? from : null, to < histogram.high ? to : null];
+    viewer.changeSettings({ filter: withRange(viewer.scene.filter ?? '', column(), range) || null });
+  };
+
+  viewer.infoChanged.listen(() => {
+    const names = ['', ...viewer.info.columns];
+    choice.replaceChildren(...names.map((name) => element('option', { value: name }, name || 'none')));
+    request();
+  });
+  viewer.sceneChanged.listen(() => { if (viewer.scene) showFilter(); });
+  return [
+    element('div', { class: 'row', 'data-row': 'histogram' },
+      element('label', { for: choice.id, title: 'How many points have which values of a column' }, 'Histogram'),
+      element('div', { class: 'field select' }, choice, icon('chevron'))),
+    chart,
+  ];
+}

@@ -1,0 +1,99 @@
+// Rows of the panel for each file and object: visibility, colour and material.
+
+import { element } from './dom.js';
+import { count } from './format.js';
+import { materialOf, withMaterial } from './materials.js';
+import { settingOf, withSetting } from './object-settings.js';
+import { section } from './panel.js';
+
+const SLIDER = { kind: 'slider' };
+const FROM_FILE = { value: '', label: 'From file' };
+
+/** Material, colour, roughness and index of refraction of one object. */
+function materialControls({ name, kind: content }) {
+  const materialIn = (scene) => materialOf(scene.material, name);
+  const property = (word, control) => ({
+    key: `material.${name}.${word}`, sceneKey: 'material', ...control,
+    read: (scene, viewer) => {
+      const text = materialIn(scene)?.properties[word];
+      if (text === undefined) return control.default?.(materialIn(viewer.scene)?.kind);
+      return control.kind === 'slider' ? Number(text) : text;
+    },
+    write: (value, scene) => {
+      const { kind, properties: { [word]: _, ...others } } = materialIn(scene);
+      const properties = value === undefined ? others : { ...others, [word]: value };
+      return { material: withMaterial(scene.material, name, kind, properties) };
+    },
+    isVisible: (scene) => control.kinds.includes(materialIn(scene)?.kind),
+  });
+  return [
+    { key: `material.${name}`, sceneKey: 'material', label: 'Material', help: name, kind: 'select', options: ({ info }) => [FROM_FILE, ...info.materials],
+      read: (scene) => materialIn(scene)?.kind ?? '',
+      write: (kind, scene) => ({ material: withMaterial(scene.material, name, kind || null, {}) }) },
+    property('color', { label: 'Colour', kind: 'color', placeholder: content === 'points' ? 'from the points' : 'from the file', kinds: ['matte', 'metal', 'glass', 'plastic', 'emissive', 'unlit'] }),
+    property('roughness', { label: 'Roughness', ...SLIDER, range: [0, 1], limits: [0, 1], step: 0.01, kinds: ['metal', 'glass', 'plastic'],
+      default: (kind) => ({ metal: 0.25, plastic: 0.2 })[kind] ?? 0 }),
+    property('ior', { label: 'IOR', ...SLIDER, range: [1, 2.5], limits: [1, 4], step: 0.01, kinds: ['glass', 'plastic'],
+      default: () => 1.5, help: 'Index of refraction: water 1.33, glass 1.5' }),
+    property('emissive_strength', { label: 'Emission', ...SLIDER, range: [0, 10], limits: [0, 10000], step: 0.1, kinds: ['emissive'], default: () => 1 }),
+  ];
+}
+
+/** A control of one setting of an object. */
+function objectControl({ name }, key, control) {
+  return {
+    key: `object.${name}.${key}`, sceneKey: 'object_settings', ...control,
+    read: (scene) => control.fromText(settingOf(scene.object_settings, name, key)),
+    write: (value, scene) => ({ object_settings: withSetting(scene.object_settings, name, key, control.toText(value)) }),
+  };
+}
+
+const visibilityControl = (object) => objectControl(object, 'visible', {
+  label: object.name, help: `Shows ${object.name}`, kind: 'toggle',
+  fromText: (text) => (text === undefined ? object.visible : text === 'true'),
+  toText: (isOn) => (isOn === object.visible ? null : String(isOn)),
+});
+
+const colorControl = (object) => objectControl(object, 'color', {
+  label: 'Colour by', kind: 'select', help: `Colours of the points of ${object.name}`,
+  options: ({ info }) => [{ value: '', label: object.color ?? 'as the scene' }, ...info.colors],
+  fromText: (text) => text ?? '',
+  toText: (source) => source || null,
+});
+
+/** The controls of one of several objects. A mesh has those that act on it. */
+export function objectControls(object) {
+  const colors = object.kind === 'points' ? [colorControl(object)] : [];
+  return [visibilityControl(object), ...colors, ...materialControls(object)];
+}
+
+/** The section of all objects. One alone has its material; several can also be hidden and coloured apart. */
+export function objectSection(viewer, panel) {
+  const objects = section('Objects', false);
+  viewer.infoChanged.listen(() => {
+    const isFilled = objects.dataset.dataName === viewer.info.name;
+    objects.dataset.dataName = viewer.info.name;
+    if (isFilled) return;
+    const body = objects.querySelector('.section-body');
+    panel.removeRows([...body.querySelectorAll('.row')]);
+    const { objects: all } = viewer.info;
+    body.replaceChildren(...(all.length === 1 ? singleRows(all[0], panel) : all.map((object) => objectPart(object, panel))));
+  });
+  return objects;
+}
+
+function singleRows(object, panel) {
+  return [...panel.addRows(materialControls(object)), ...notesOf(object)];
+}
+
+function objectPart(object, panel) {
+  const size = object.kind === 'points' ? amount(object.points, 'point') : amount(object.triangles, 'triangle');
+  const [visibility, ...details] = panel.addRows(objectControls(object));
+  return element('div', { class: 'object', 'data-object': object.name },
+    visibility, ...notesOf(object), element('details', { class: 'inner' }, element('summary', {}, size), ...details));
+}
+
+const amount = (n, word) => `${count(n)} ${word}${n === 1 ? '' : 's'}`;
+
+/** What was unusual about the files of an object. */
+const notesOf = ({ notes }) => notes.map((text) => element('p', { class: 'note' }, text));

@@ -1,0 +1,68 @@
+// Volumes of polygons over a base plane: their requests to the server, and their controls.
+
+import { element } from './dom.js';
+import { showToast } from './toast.js';
+
+/** Duration without a change of the settings after which volumes are computed again. */
+const REST_MS = 600;
+const BASES = { lowest: 'lowest corner', mean: 'mean of the corners', height: 'height' };
+
+/** Requests the volumes of figures that have none, and all of them again after a change of the settings. */
+export function setUpVolumes(viewer, measureTool) {
+  let requested = new WeakSet();
+  let timer = 0;
+
+  const request = async (figure) => {
+    requested.add(figure);
+    const { points, base, cell_size } = figure;
+    try {
+      const { volume } = await viewer.request({ type: 'volume', points, up: viewer.info.up, base, cell_size });
+      measureTool.complete(figure, { ...figure, volume });
+    } catch (error) {
+      showToast(error.message);
+    }
+  };
+  const requestAll = () => {
+    // Before the first picture the server has no points.
+    if (!viewer.isConnected || !viewer.lastFrame) return;
+    for (const figure of measureTool.figures) {
+      if (figure.kind === 'volume' && !figure.volume && !requested.has(figure)) request(figure);
+    }
+  };
+  measureTool.figuresShown.listen(requestAll);
+  viewer.frameShown.listen(requestAll);
+  viewer.connectionChanged.listen(() => { requested = new WeakSet(); });
+  viewer.sceneChanged.listen(() => {
+    clearTimeout(timer);
+    if (!measureTool.figures.some(({ volume }) => volume)) return;
+    timer = setTimeout(() => {
+      for (const figure of measureTool.figures.filter(({ volume }) => volume)) {
+        const { volume, ...without } = figure;
+        measureTool.complete(figure, without);
+      }
+    }, REST_MS);
+  });
+}
+
+/** The controls of a volume's base and cell size; `replace` takes the changed figure. */
+export function volumeControls(figure, replace) {
+  const { volume, ...settings } = figure;
+  const isHeight = typeof figure.base === 'number';
+  const base = element('select', {
+    'aria-label': `Base of ${figure.name}`,
+    onchange: () => replace({ ...settings, base: base.value === 'height' ? volume?.base ?? 0 : base.value }),
+  }, ...Object.entries(BASES).map(([value, label]) => element('option', { value }, label)));
+  base.value = isHeight ? 'height' : figure.base;
+  const height = isHeight ? numberField('Height', figure.base, (value) => replace({ ...settings, base: value })) : null;
+  const cell = numberField('Cell size', figure.cell_size, (value) => {
+    const { cell_size, ...others } = settings;
+    replace(0 < value ? { ...others, cell_size: value } : others);
+  });
+  cell.querySelector('input').placeholder = 'automatic';
+  return element('div', { class: 'volume' }, element('label', {}, 'Base ', base), height, cell);
+}
+
+function numberField(label, value, change) {
+  const input = element('input', { type: 'number', step: 'any', value, onchange: () => change(input.valueAsNumber) });
+  return element('label', {}, `${label} `, input);
+}

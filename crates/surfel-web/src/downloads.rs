@@ -1,0 +1,81 @@
+//! Files of points that pages have requested, until they are fetched or replaced.
+
+use crate::scene_provider::PointFile;
+use axum::body::{Body, Bytes};
+use futures_util::stream;
+use std::collections::HashMap;
+use std::io::Read;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Number of bytes that are read at once.
+const CHUNK_BYTES: usize = 1 << 18;
+/// Number of random bytes in the name of a file.
+const NAME_BYTES: usize = 16;
+
+/// The files of all pages, by random names.
+#[derive(Default)]
+pub struct Downloads(Mutex<HashMap<String, Arc<dyn PointFile>>>);
+
+/// Removes a file when dropped; answers that are being read keep it until they end.
+pub struct DownloadGuard {
+    downloads: Arc<Downloads>,
+    /// Name of the file.
+    pub name: String,
+}
+
+impl Downloads {
+    /// Keeps a file for as long as the returned guard lives.
+    ///
+    /// # Errors
+    /// Fails if the system has no random numbers.
+    pub fn add(
+        self: &Arc<Self>,
+        file: Arc<dyn PointFile>,
+    ) -> Result<DownloadGuard, getrandom::Error> {
+        let mut bytes = [0; NAME_BYTES];
+        getrandom::fill(&mut bytes)?;
+        let name: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        self.lock().insert(name.clone(), file);
+        Ok(DownloadGuard { downloads: self.clone(), name })
+    }
+
+    /// The file of this name, if it is kept.
+    pub fn get(&self, name: &str) -> Option<Arc<dyn PointFile>> {
+        self.lock().get(name).cloned()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashMap<String, Arc<dyn PointFile>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for DownloadGuard {
+    fn drop(&mut self) {
+        self.downloads.lock().remove(&self.name);
+    }
+}
+
+/// Reads a file piece by piece, as fast as the client does.
+///
+/// # Errors
+/// Fails if the file cannot be opened.
+pub fn body(file: &Arc<dyn PointFile>) -> std::io::Result<Body> {
+    let (reader, held) = (file.open()?, file.clone());
+    let pieces = stream::unfold((reader, held), async |(mut reader, held)| {
+        let read = tokio::task::spawn_blocking(move || {
+            let mut piece = vec![0; CHUNK_BYTES];
+            let n_read = reader.read(&mut piece)?;
+            piece.truncate(n_read);
+            Ok((piece, reader))
+        });
+        match read.await.unwrap_or_else(|error| Err(std::io::Error::other(error))) {
+            Ok((piece, _)) if piece.is_empty() => None,
+            Ok((piece, reader)) => Some((Ok(Bytes::from(piece)), (reader, held))),
+            Err(error) => {
+                let ended: Box<dyn Read + Send> = Box::new(std::io::empty());
+                Some((Err(error), (ended, held)))
+            }
+        }
+    });
+    Ok(Body::from_stream(pieces))
+}

@@ -1,0 +1,59 @@
+//! Hashes of the parts of a description that decide what is read, prepared and built.
+
+use crate::cache::hash_of;
+use crate::description::{LightKind, ObjectDescription, SceneDescription, write_parts};
+use crate::resolve::AutoSettings;
+use serde_json::{Value, json};
+
+/// A hash of everything that decides how clouds are prepared.
+pub fn preparation_key(description: &SceneDescription) -> u64 {
+    let settings = &description.objects_default;
+    let keeps_variation = settings.preparation(0).keep_variation;
+    let [_, preparation, _] = settings.parts();
+    let parts = json!([
+        write_parts(&[preparation]),
+        description.picture.seed(),
+        keeps_variation,
+        object_settings(description),
+        grouping_key(description),
+    ]);
+    hash_of(&parts)
+}
+
+/// A hash of everything that decides which files are read as one, which apart, and which geometries are shared.
+pub fn grouping_key(description: &SceneDescription) -> u64 {
+    let objects = &description.objects;
+    let twin = |i: usize| objects[..i].iter().position(|other| other.has_same_content(&objects[i]));
+    let objects = objects.iter().enumerate().map(|(i, object)| json!([object.files, twin(i)]));
+    hash_of(&json!([description.files, objects.collect::<Vec<Value>>()]))
+}
+
+/// A hash of everything that decides what the trees hold.
+pub fn tree_key(
+    description: &SceneDescription,
+    preparation: u64,
+    auto: &AutoSettings,
+    frames: &[usize],
+) -> u64 {
+    let light = &description.light;
+    let is_lit = !light.has(LightKind::None) || light.environment.is_some();
+    let planes = auto.hidden_walls.iter();
+    let walls: Vec<[[f64; 3]; 2]> =
+        planes.map(|plane| [plane.point.to_array(), plane.normal.to_array()]).collect();
+    let parts = json!([
+        preparation,
+        write_parts(&description.objects_default.parts()),
+        description.get("material"),
+        description.objects.iter().map(ObjectDescription::visible).collect::<Vec<bool>>(),
+        is_lit,
+        auto.up.to_array(),
+        walls,
+        frames,
+    ]);
+    hash_of(&parts)
+}
+
+fn object_settings(description: &SceneDescription) -> Vec<Value> {
+    let settings = description.objects.iter().map(|object| &object.settings);
+    settings.map(|settings| Value::Object(write_parts(&settings.parts()))).collect()
+}
