@@ -91,7 +91,7 @@ test('a second page and changes of settings while a large picture is rendered', 
   const server = await serve(SCENE);
   const first = await openPage(server.link);
   const abort = new AbortController();
-  const render = fetch(`${server.link}/render?${RENDER}`, { signal: abort.signal }).then(() => 'done', () => 'aborted');
+  const render = fetch(new URL(`/render?${RENDER}`, server.link), { signal: abort.signal }).then(() => 'done', () => 'aborted');
   const page = await blankPage();
   const start = performance.now();
   await page.goto(server.link);
