@@ -67,7 +67,8 @@ export class Picture {
     const hasAspect = Math.abs(whole.width / whole.height - width / height) < 0.01;
     const scaleX = hasAspect ? width / whole.width : scale;
     const left = (width - scaleX * whole.width) / 2;
-    this.#context.imageSmoothingQuality = 'high';
+    // Smoothing of high quality takes longer than all else that the page does for a draft.
+    this.#context.imageSmoothingQuality = this.viewer.isMoving ? 'low' : 'high';
     this.#context.drawImage(image, left + scaleX * place.x, scale * place.y, scaleX * place.width, scale * place.height);
   }
 }

@@ -47,6 +47,8 @@ pub struct Accumulator {
     keyframe_secs_per_row: f64,
     /// Duration of drawing the keyframe and encoding the draft, in seconds.
     keyframe_secs: f64,
+    /// The traced part of the last draft, which fills what the keyframe does not show in the next one, too.
+    last_traced: Option<Image>,
     work: Work,
 }
 
@@ -112,35 +114,25 @@ impl Accumulator {
         progress: &dyn Progress,
     ) -> Result<Option<Frame>> {
         let Some(prepared) = view.scene.clone() else { return Ok(None) };
-        let full = prepared.render_settings;
         self.finish_keyframe(&prepared, view.size);
-        let has_keyframe = self.keyframe.is_some();
-        let keyframe_secs = if has_keyframe { self.keyframe_secs } else { 0.0 };
-        let secs = (secs - keyframe_secs).max(MIN_TRACED * secs);
-        let (width, height) = self.resolution.size(view.size, secs);
-        let light_samples = full.light_samples.min(DRAFT_LIGHT_SAMPLES);
-        // The page enlarges a draft to its own size, and the points with it.
-        let point_size = full.point_size * width as f32 / view.size.0.max(1) as f32;
-        let (min, max) = POINT_SIZE_RANGE;
-        let settings = Settings {
-            width,
-            height,
-            samples_per_pixel: 1,
-            light_samples,
-            point_size: point_size.clamp(min, max),
-            ..full
+        // Between two drafts little comes into view, and tracing takes longest.
+        let is_reusable = view.is_moving && self.keyframe.is_some();
+        let (traced, stats) = match self.last_traced.take().filter(|_| is_reusable) {
+            Some(traced) => (traced, RenderStats::default()),
+            None => match self.trace_draft(renderer, view, &prepared, secs, progress)? {
+                Some((traced, stats)) => (traced, stats),
+                None => return Ok(None),
+            },
         };
-        let n_pixels = u64::from(width) * u64::from(height);
-        let Some(scene) = self.scene(prepared.clone(), view) else { return Ok(None) };
-        let camera = scene.camera;
-        let deadline = Deadline::new(progress, ResolutionController::is_min_size((width, height)));
+        let Some(camera) = view.camera else { return Ok(None) };
         let start = Instant::now();
-        let rendered = renderer.render(scene, &settings, &deadline);
-        self.record_time(start.elapsed().as_secs_f64(), rendered.is_ok());
-        self.resolution.record(n_pixels, self.slice_secs);
-        let (traced, stats) = rendered?;
-        let start = Instant::now();
-        let image = self.draw_keyframe(&traced, &camera, view.size).unwrap_or(traced);
+        let image = match self.draw_keyframe(&traced, &camera, view.size) {
+            Some(drawn) => {
+                self.last_traced = (0 < stats.rays.total()).then_some(traced);
+                drawn
+            }
+            None => traced,
+        };
         let (width, height) = (image.width, image.height);
         let mut files = vec![place(jpeg(&image, DRAFT_JPEG_QUALITY), (0, 0), view.size)];
         if let Some(overlay) = &prepared.overlay {
@@ -164,10 +156,47 @@ impl Accumulator {
         }))
     }
 
+    /// Traces a draft as large as `secs` allow; none without a camera.
+    fn trace_draft(
+        &mut self,
+        renderer: &dyn Renderer,
+        view: &ViewState,
+        prepared: &Arc<PreparedScene>,
+        secs: f64,
+        progress: &dyn Progress,
+    ) -> Result<Option<(Image, RenderStats)>> {
+        let full = prepared.render_settings;
+        let keyframe_secs = if self.keyframe.is_some() { self.keyframe_secs } else { 0.0 };
+        let secs = (secs - keyframe_secs).max(MIN_TRACED * secs);
+        let (width, height) = self.resolution.size(view.size, secs);
+        let light_samples = full.light_samples.min(DRAFT_LIGHT_SAMPLES);
+        // The page enlarges a draft to its own size, and the points with it.
+        let point_size = full.point_size * width as f32 / view.size.0.max(1) as f32;
+        let (min, max) = POINT_SIZE_RANGE;
+        let settings = Settings {
+            width,
+            height,
+            samples_per_pixel: 1,
+            light_samples,
+            point_size: point_size.clamp(min, max),
+            ..full
+        };
+        let n_pixels = u64::from(width) * u64::from(height);
+        let Some(scene) = self.scene(prepared.clone(), view) else { return Ok(None) };
+        let deadline = Deadline::new(progress, ResolutionController::is_min_size((width, height)));
+        let start = Instant::now();
+        let rendered = renderer.render(scene, &settings, &deadline);
+        self.record_time(start.elapsed().as_secs_f64(), rendered.is_ok());
+        self.resolution.record(n_pixels, self.slice_secs);
+        rendered.map(Some)
+    }
+
     /// Starts the finished picture of the view that a draft showed.
     pub fn begin(&mut self, version: u64) {
         self.version = version;
         (self.n_samples, self.n_rows, self.has_frame) = (0, 0, false);
+        // A page that moves needs no memory for samples.
+        (self.sum, self.coverage_sum) = (Vec::new(), Vec::new());
         self.work = Work::default();
     }
 
@@ -325,6 +354,7 @@ impl Accumulator {
         if has_none || self.keyframe.as_ref().is_some_and(is_known) {
             self.finish_keyframe(prepared, size);
             (self.sum, self.coverage_sum) = (Vec::new(), Vec::new());
+            self.last_traced = None;
         }
     }
 

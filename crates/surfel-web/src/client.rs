@@ -47,6 +47,9 @@ const RESERVED_CAPACITY: usize = 8;
 const STATS_INTERVAL: Duration = Duration::from_millis(250);
 /// Duration after which a draft of an older view is cancelled.
 const STALE_DRAFT_TIMEOUT: Duration = Duration::from_millis(80);
+/// Duration for which a view that is being moved must stay as it is before its picture is refined: between two drafts
+/// the page needs the processor to show the first one.
+pub const MOVING_PAUSE: Duration = Duration::from_millis(100);
 
 impl Client {
     /// A client without a scene, whose pictures have this size.
@@ -59,6 +62,7 @@ impl Client {
             size,
             seq: 0,
             is_moving: false,
+            changed_at: Instant::now(),
         };
         Self {
             view: Mutex::new(view),
@@ -74,6 +78,7 @@ impl Client {
     pub fn update_view(&self, change: impl FnOnce(&mut ViewState)) {
         let mut view = lock(&self.view);
         change(&mut view);
+        view.changed_at = Instant::now();
         self.version.fetch_add(1, Ordering::Relaxed);
     }
 
@@ -135,6 +140,9 @@ impl Client {
     /// Fails if rendering fails or is cancelled.
     pub fn refine(&self, renderer: &dyn Renderer) -> surfel_core::Result<bool> {
         let (view, version) = self.versioned_view();
+        if view.is_moving && view.changed_at.elapsed() < MOVING_PAUSE {
+            return Ok(false);
+        }
         let mut accumulator = lock(&self.accumulator);
         if accumulator.version() != version || !view.is_complete() || self.out.is_closed() {
             return Ok(false);

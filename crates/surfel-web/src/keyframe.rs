@@ -82,16 +82,24 @@ impl Keyframe {
         let nearest = self.nearest_pixels(view);
         let mut image = Image::new(self.width, self.height);
         let width = self.width as usize;
+        let linear: [f32; 256] = std::array::from_fn(|code| decode_srgb8(code as u8));
+        let columns: Vec<Between> =
+            (0..self.width).map(|x| Between::new(x, self.width, draft.width)).collect();
         let rows = image.color.par_chunks_mut(width).zip(image.coverage.par_chunks_mut(width));
         rows.enumerate().for_each(|(y, (color, coverage))| {
+            let above = y.saturating_sub(1);
+            let below = (y + 1).min(self.height as usize - 1);
+            let around = [y, above, below].map(|y| &nearest[y * width..][..width]);
+            let row = Between::new(y as u32, self.height, draft.height);
             for x in 0..width {
-                (color[x], coverage[x]) = match self.shown_pixel(&nearest, x, y) {
-                    Some(shown) => {
-                        let [r, g, b] = self.colors[shown].map(decode_srgb8);
-                        ([r, g, b, 1.0], 1.0)
-                    }
-                    None => self.draft_pixel(draft, x, y),
-                };
+                let shown = shown_pixel(around, x);
+                if shown == NONE {
+                    (color[x], coverage[x]) = draft_pixel(draft, columns[x], row);
+                } else {
+                    let [r, g, b] = self.colors[shown as usize];
+                    let [r, g, b] = [linear[r as usize], linear[g as usize], linear[b as usize]];
+                    (color[x], coverage[x]) = ([r, g, b, 1.0], 1.0);
+                }
             }
         });
         image
@@ -126,51 +134,74 @@ impl Keyframe {
         });
         nearest
     }
+}
 
-    /// Returns the index of the keyframe's pixel that a pixel shows: its own, or one of its neighbours', as places that were
-    /// neighbours are up to three pixels apart where the camera has come nearer.
-    fn shown_pixel(&self, nearest: &[u32], x: usize, y: usize) -> Option<usize> {
-        let (width, height) = (self.width as usize, self.height as usize);
-        let mut found = nearest[y * width + x];
-        if found == NONE {
-            let around = |i: usize, n: usize| i.saturating_sub(1)..=(i + 1).min(n - 1);
-            let neighbors = around(y, height).flat_map(|y| around(x, width).map(move |x| (x, y)));
-            found = neighbors.map(|(x, y)| nearest[y * width + x]).min().unwrap_or(NONE);
-        }
-        (found != NONE).then_some(found as usize)
+/// Returns the index of the keyframe's pixel that a pixel shows: its own, or one of its neighbours', as places that were
+/// neighbours are up to three pixels apart where the camera has come nearer. `around` has its row and the two beside it.
+fn shown_pixel(around: [&[u32]; 3], x: usize) -> u32 {
+    let own = around[0][x];
+    if own != NONE {
+        return own;
     }
+    let (first, end) = (x.saturating_sub(1), (x + 2).min(around[0].len()));
+    let mut found = NONE;
+    for row in around {
+        for neighbor in &row[first..end] {
+            found = found.min(*neighbor);
+        }
+    }
+    found
+}
 
-    /// Returns colour and coverage of the enlarged draft: of what is there, or of the background.
-    fn draft_pixel(&self, draft: &Image, x: usize, y: usize) -> ([f32; 4], f32) {
-        let along = |i: usize, n: u32, of: u32| {
-            let at = (i as f32 + 0.5) * of as f32 / n as f32 - 0.5;
-            let low = at.floor().clamp(0.0, of.saturating_sub(1) as f32);
-            let high = (low + 1.0).min(of.saturating_sub(1) as f32);
-            (low as usize, high as usize, (at - low).clamp(0.0, 1.0))
-        };
-        let (x0, x1, fx) = along(x, self.width, draft.width);
-        let (y0, y1, fy) = along(y, self.height, draft.height);
-        let corners = [
-            (x0, y0, (1.0 - fx) * (1.0 - fy)),
-            (x1, y0, fx * (1.0 - fy)),
-            (x0, y1, (1.0 - fx) * fy),
-            (x1, y1, fx * fy),
-        ];
-        let corners = corners.map(|(x, y, weight)| (y * draft.width as usize + x, weight));
-        let coverage: f32 = corners.iter().map(|(i, weight)| weight * draft.coverage[*i]).sum();
-        // Things and background are not mixed, so that edges stay sharp.
-        let is_thing = 0.5 <= coverage;
-        let (mut color, mut total) = ([0.0; 4], 0.0);
-        for (i, weight) in corners {
-            let covered = draft.coverage[i];
-            let weight = weight * if is_thing { covered } else { 1.0 - covered };
-            for (sum, channel) in color.iter_mut().zip(draft.color[i]) {
-                *sum += weight * channel;
-            }
-            total += weight;
-        }
-        (color.map(|channel| channel / total), f32::from(u8::from(is_thing)))
+/// The two columns or rows of a smaller picture between which a pixel of a larger one lies.
+#[derive(Clone, Copy)]
+struct Between {
+    low: usize,
+    high: usize,
+    /// Weight of `high`.
+    weight: f32,
+}
+
+impl Between {
+    /// Pixel `i` of `n`, in a picture of `n_smaller`.
+    fn new(i: u32, n: u32, n_smaller: u32) -> Self {
+        let at = (i as f32 + 0.5) * n_smaller as f32 / n as f32 - 0.5;
+        let last = n_smaller.saturating_sub(1) as f32;
+        let low = at.floor().clamp(0.0, last);
+        let high = (low + 1.0).min(last);
+        Self { low: low as usize, high: high as usize, weight: (at - low).clamp(0.0, 1.0) }
     }
+}
+
+/// Returns colour and coverage of the enlarged draft: of what is there, or of the background.
+fn draft_pixel(draft: &Image, x: Between, y: Between) -> ([f32; 4], f32) {
+    let width = draft.width as usize;
+    let corners = [
+        (y.low * width + x.low, (1.0 - x.weight) * (1.0 - y.weight)),
+        (y.low * width + x.high, x.weight * (1.0 - y.weight)),
+        (y.high * width + x.low, (1.0 - x.weight) * y.weight),
+        (y.high * width + x.high, x.weight * y.weight),
+    ];
+    let mut coverage = 0.0;
+    for (i, weight) in corners {
+        coverage += weight * draft.coverage[i];
+    }
+    // Things and background are not mixed, so that edges stay sharp.
+    let is_thing = 0.5 <= coverage;
+    let (mut color, mut total) = ([0.0; 4], 0.0);
+    for (i, weight) in corners {
+        let covered = draft.coverage[i];
+        let weight = weight * if is_thing { covered } else { 1.0 - covered };
+        let [r, g, b, a] = draft.color[i];
+        color[0] += weight * r;
+        color[1] += weight * g;
+        color[2] += weight * b;
+        color[3] += weight * a;
+        total += weight;
+    }
+    let scale = 1.0 / total;
+    let [r, g, b, a] = color;
+    ([scale * r, scale * g, scale * b, scale * a], f32::from(u8::from(is_thing)))
 }
 
 #[cfg(test)]

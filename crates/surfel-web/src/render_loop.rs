@@ -1,6 +1,6 @@
 //! The render loop: one thread that renders for all clients in turn.
 
-use crate::client::Client;
+use crate::client::{Client, MOVING_PAUSE};
 use crate::dynamic_resolution::draft_secs;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -101,8 +101,10 @@ impl RenderLoop {
                 paused_until = Instant::now() + SLOW_CLIENT_PAUSE * start.elapsed();
             }
             if !has_rendered {
-                drop((slow, quick));
                 let max_wait = if is_pause_over { MAX_WAIT } else { paused_until - start };
+                let is_any_moving = quick.iter().chain(&slow).any(|client| client.is_moving());
+                let max_wait = if is_any_moving { max_wait.min(MOVING_PAUSE) } else { max_wait };
+                drop((slow, quick));
                 self.wait(n_notifications, max_wait);
             }
         }

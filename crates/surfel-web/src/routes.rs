@@ -149,7 +149,9 @@ const DEFAULT_SIZE: (u32, u32) = (1920, 1080);
 
 async fn scene(State(state): State<Arc<ServerState>>) -> RouteResult {
     let (width, height) = DEFAULT_SIZE;
-    Ok(Json(loaded_provider(&state)?.initial_settings(width, height)).into_response())
+    let provider = loaded_provider(&state)?;
+    let settings = state.run_blocking(move || provider.initial_settings(width, height)).await?;
+    Ok(Json(settings).into_response())
 }
 
 async fn stats(State(state): State<Arc<ServerState>>) -> RouteResult {

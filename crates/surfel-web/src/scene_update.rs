@@ -23,8 +23,9 @@ pub async fn run(
 ) {
     let Some(provider) = wait_for_provider(&state, &out).await else { return };
     let (width, height) = client.view().size;
-    let settings = provider.initial_settings(width, height);
-    let info = state.info(&*provider);
+    let (for_facts, of_scene) = (state.clone(), provider.clone());
+    let facts = move || (of_scene.initial_settings(width, height), for_facts.info(&*of_scene));
+    let Ok((settings, info)) = state.run_blocking(facts).await else { return };
     let welcome = json!({ "type": "welcome", "scene": settings, "info": info });
     send_json(&out, &welcome).await;
     let shows_preview = false;

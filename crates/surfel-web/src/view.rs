@@ -3,6 +3,7 @@
 use crate::scene_provider::PreparedScene;
 use serde_json::Value;
 use std::sync::Arc;
+use std::time::Instant;
 use surfel_core::scene::Camera;
 
 /// The view that a client's pictures show.
@@ -22,6 +23,8 @@ pub struct ViewState {
     pub seq: u32,
     /// True if the user is dragging.
     pub is_moving: bool,
+    /// When the view changed last.
+    pub changed_at: Instant,
 }
 
 impl ViewState {

@@ -14,7 +14,7 @@ use crate::shell::command_line;
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use surfel::SceneDescription;
 use surfel::crs::Unit;
 use surfel::description::rule::absolute_text;
@@ -50,6 +50,8 @@ pub struct FileSceneProvider {
     /// The cameras at the stations of its scans.
     stations: Vec<Value>,
     folders: ViewedFolders,
+    /// The initial settings of the last page, by the size of its picture.
+    initial_settings: Mutex<Option<((u32, u32), SettingsMap)>>,
 }
 
 /// Number of points of a preview; clouds that are not much larger need none.
@@ -71,7 +73,17 @@ impl FileSceneProvider {
         let stations = stations(scene.loaded(), auto.up);
         let (scene, up) = (Arc::new(scene), auto.up);
         let folders = viewed_folders(&startup, &typed);
-        Ok(Self { startup, startup_settings, typed, scene, up, moves_camera, stations, folders })
+        Ok(Self {
+            startup,
+            startup_settings,
+            typed,
+            scene,
+            up,
+            moves_camera,
+            stations,
+            folders,
+            initial_settings: Mutex::default(),
+        })
     }
 
     fn read(&self, settings: &SettingsMap) -> Result<SceneDescription> {
@@ -114,6 +126,25 @@ impl FileSceneProvider {
             settings.insert("color".into(), json!(choose_source(cloud).0.to_string()));
         }
         settings
+    }
+
+    fn choose_initial_settings(&self, width: u32, height: u32) -> SettingsMap {
+        let mut settings = self.startup_settings.clone();
+        settings.insert("resolution".into(), json!(format!("{width}x{height}")));
+        let complete = || {
+            let description = self.read(&settings).ok()?;
+            let loaded = self.scene.loaded();
+            let auto = AutoSettings::choose(loaded, &description, &NoProgress).ok()?;
+            let complete = auto.complete_description(loaded);
+            let mut initial = self.complete_settings(complete, &description);
+            // Chosen once there is something to see.
+            initial.shift_remove("exposure");
+            let exposure = self.startup_settings.get("exposure").cloned();
+            initial.extend(exposure.map(|exposure| ("exposure".to_owned(), exposure)));
+            Some(initial)
+        };
+        // What was valid at the start is so for every size.
+        complete().unwrap_or(settings.clone())
     }
 
     /// The files and objects that pages change apart, each with its name, kind, number of points or triangles, and notes.
@@ -294,22 +325,13 @@ impl SceneProvider for FileSceneProvider {
     }
 
     fn initial_settings(&self, width: u32, height: u32) -> SettingsMap {
-        let mut settings = self.startup_settings.clone();
-        settings.insert("resolution".into(), json!(format!("{width}x{height}")));
-        let complete = || {
-            let description = self.read(&settings).ok()?;
-            let loaded = self.scene.loaded();
-            let auto = AutoSettings::choose(loaded, &description, &NoProgress).ok()?;
-            let complete = auto.complete_description(loaded);
-            let mut initial = self.complete_settings(complete, &description);
-            // Chosen once there is something to see.
-            initial.shift_remove("exposure");
-            let exposure = self.startup_settings.get("exposure").cloned();
-            initial.extend(exposure.map(|exposure| ("exposure".to_owned(), exposure)));
-            Some(initial)
-        };
-        // What was valid at the start is so for every size.
-        complete().unwrap_or(settings.clone())
+        // Choosing a camera takes as long as all else that a page waits for, and most pages have one size.
+        let mut known = self.initial_settings.lock().unwrap_or_else(PoisonError::into_inner);
+        let of_size = known.take().filter(|(size, _)| *size == (width, height));
+        let settings = of_size.map(|(_, settings)| settings);
+        let settings = settings.unwrap_or_else(|| self.choose_initial_settings(width, height));
+        *known = Some(((width, height), settings.clone()));
+        settings
     }
 
     fn startup_settings(&self) -> SettingsMap {

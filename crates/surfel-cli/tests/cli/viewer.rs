@@ -118,6 +118,18 @@ fn files_are_hidden_and_coloured_apart() {
 }
 
 #[test]
+fn each_request_of_the_initial_scene_gets_the_same() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(40));
+    let server = Server::start(&[&cloud]);
+    let (status, first) = server.get("/scene");
+    assert_eq!(status, 200);
+    let scene = String::from_utf8(first.clone()).unwrap();
+    assert!(scene.contains("\"focal_point\"") && scene.contains("1920x1080"), "{scene}");
+    assert_eq!(server.get("/scene"), (200, first));
+}
+
+#[test]
 fn the_server_renders_a_sequence_at_any_time() {
     let folder = sequences::site();
     let files = format!("files = {:?}\nfps = 2\n", sequences::FRAMES);

@@ -6,7 +6,7 @@ use crate::test_server::TestServer;
 use serde_json::json;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 #[tokio::test]
 async fn pictures_are_refined_to_the_finished_picture() {
@@ -234,6 +234,17 @@ async fn drafts_show_the_last_picture_at_rest_whatever_its_samples() {
         }
         assert!(is_shown, "{samples}");
     }
+}
+
+#[tokio::test]
+async fn a_dragged_view_is_refined_once_it_has_stayed() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({})).await;
+    page.finished_picture().await;
+    let start = Instant::now();
+    page.set_camera(1, 0.5, true).await;
+    page.wait_for_picture(|picture| picture.seq == 1 && picture.is_finished).await;
+    assert!(Duration::from_millis(100) <= start.elapsed());
 }
 
 #[tokio::test]

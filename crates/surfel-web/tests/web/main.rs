@@ -6,6 +6,9 @@ mod frame_delivery;
 mod hill_provider;
 mod http_client;
 mod http_routes;
+mod load;
+#[path = "../../examples/load/clients.rs"]
+mod load_clients;
 mod page_files;
 mod protocol;
 mod scene_updates;

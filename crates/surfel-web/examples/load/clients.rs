@@ -1,8 +1,4 @@
-//! Load test of a viewer: pages that all orbit the scene at once, their frame rates and latencies, and the memory
-//! of the server.
-//!
-//! `cargo run --release -p surfel-web --example load -- LINK PAGES SECONDS [PID of the server]`
-#![allow(clippy::print_stdout, reason = "this program prints its measurements")]
+//! Pages that orbit a scene at once, each with a new camera for every frame of a screen.
 
 use futures_util::{SinkExt, StreamExt};
 use serde_json::{Value, json};
@@ -13,76 +9,44 @@ use tokio::net::TcpStream;
 use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
 
-type Failure = Box<dyn Error + Send + Sync>;
+/// The reason why a page got no pictures.
+pub type Failure = Box<dyn Error + Send + Sync>;
 
 /// Size of a page's picture in pixels.
 const SIZE: (u32, u32) = (1280, 720);
 /// Interval between two cameras: a screen of 60 Hz.
 const CAMERA_INTERVAL: Duration = Duration::from_millis(16);
 const RADIANS_PER_S: f64 = 0.5;
-/// Interval between two samples of the server's memory.
-const MEMORY_INTERVAL: Duration = Duration::from_secs(5);
 
-#[tokio::main]
-async fn main() -> Result<(), Failure> {
-    let args: Vec<String> = std::env::args().skip(1).collect();
-    let [link, n_pages, secs, pid @ ..] = &args[..] else {
-        return Err("expected LINK PAGES SECONDS [PID]".into());
-    };
-    let (n_pages, secs): (usize, f64) = (n_pages.parse()?, secs.parse()?);
-    let duration = Duration::from_secs_f64(secs);
+/// Measurements of one page.
+#[derive(Default)]
+pub struct PageStats {
+    /// Number of pictures received.
+    pub n_pictures: u32,
+    /// Duration from a camera to the first picture that obeys it.
+    pub latencies: Vec<Duration>,
+}
+
+/// Opens this many pages of the viewer at `link` and lets all of them orbit.
+///
+/// # Errors
+/// Fails if a page cannot be opened, or if the server closes its connection.
+pub async fn orbit_pages(
+    link: &str,
+    n_pages: usize,
+    duration: Duration,
+) -> Result<Vec<PageStats>, Failure> {
     let mut pages = Vec::new();
     for _ in 0..n_pages {
         pages.push(open(link).await?);
     }
     let start = |(socket, camera)| tokio::spawn(orbit(socket, camera, duration));
     let pages: Vec<_> = pages.into_iter().map(start).collect();
-    if let Some(pid) = pid.first() {
-        sample_memory(pid, duration).await?;
-    }
     let mut stats = Vec::new();
     for page in pages {
         stats.push(page.await??);
     }
-    report(&stats, secs);
-    Ok(())
-}
-
-/// Prints the server's memory over time.
-async fn sample_memory(pid: &str, duration: Duration) -> Result<(), Failure> {
-    let start = Instant::now();
-    while start.elapsed() < duration {
-        let status = std::fs::read_to_string(format!("/proc/{pid}/status"))?;
-        let kib = status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.strip_suffix("kB"));
-        let mib = kib.unwrap_or_default().trim().parse::<f64>()? / 1024.0;
-        println!("{:5.0} s {mib:8.1} MiB", start.elapsed().as_secs_f64());
-        tokio::time::sleep(MEMORY_INTERVAL).await;
-    }
-    Ok(())
-}
-
-/// Measurements of one page.
-#[derive(Default)]
-struct PageStats {
-    n_pictures: u32,
-    /// Duration from a camera to the first picture that obeys it.
-    latencies: Vec<Duration>,
-}
-
-fn report(pages: &[PageStats], secs: f64) {
-    let rates: Vec<f64> = pages.iter().map(|page| f64::from(page.n_pictures) / secs).collect();
-    let min = rates.iter().copied().fold(f64::INFINITY, f64::min);
-    let max = rates.iter().copied().fold(0.0, f64::max);
-    let texts: Vec<String> = rates.iter().map(|rate| format!("{rate:.1}")).collect();
-    println!("pictures a second: {}", texts.join(" "));
-    println!("minimum {min:.1}, maximum {max:.1}, ratio {:.2}", max / min);
-    let mut latencies: Vec<Duration> =
-        pages.iter().flat_map(|page| &page.latencies).copied().collect();
-    latencies.sort();
-    let quantile = |q: f64| latencies.get((q * latencies.len() as f64) as usize);
-    if let (Some(median), Some(p95)) = (quantile(0.5), quantile(0.95)) {
-        println!("latency: median {median:.0?}, 95% within {p95:.0?}");
-    }
+    Ok(stats)
 }
 
 type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
