@@ -5,6 +5,7 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { pointAtDepth, project } from '../page/camera.js';
+import { RESOLUTION } from './data.mjs';
 import {
   closePage, colorCount, copyBy, data, drag, finishedPixels, openPage, PLAIN_HOST, pixelAt, QUICK, serve, settled, shell, show, state,
 } from './harness.mjs';
@@ -326,9 +327,9 @@ test('the points that are shown are downloaded with all their columns', async ()
   }
   shell('surfel prepare town-shown.laz -o shown.csv --duplicates keep -q');
   const [names, ...rows] = readFileSync(join(data.folder, 'shown.csv'), 'utf8').trim().split('\n').map((row) => row.split(','));
-  const column = (word) => names.findIndex((name) => name.toLowerCase().replaceAll(/\W/g, '') === word);
+  const column = (word) => names.findIndex((name) => name.toLowerCase().replaceAll(/[\W_]/g, '') === word);
   const [x, time] = [column('x'), column('gpstime')];
-  assert.deepEqual(rows.map((row) => Number(row[x])), expected.map((point) => point.x));
+  assert.ok(rows.every((row, i) => Math.abs(row[x] - expected[i].x) < RESOLUTION / 2));
   assert.deepEqual(rows.map((row) => Number(row[time])), expected.map((point) => point.gps_time));
   await still.locator('#export-close').click();
 });

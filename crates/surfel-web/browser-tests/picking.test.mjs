@@ -235,7 +235,7 @@ test('a volume over the roof agrees with its points, above each base', async () 
   await card.getByLabel('Height').press('Enter');
   await card.getByLabel('Cell size').fill('0.5');
   await card.getByLabel('Cell size').press('Enter');
-  await page.waitForFunction(() => /Cell size0.5/.test(document.getElementById('measure-card').textContent));
+  await page.waitForFunction(() => /Cell size0\.5(?!\d)/.test(document.getElementById('measure-card').textContent));
   found = await measuredValues('volume 1');
   assert.ok(Math.abs(found.Cut / (4 * area * (1 - found['Empty cells'] / 100)) - 1) < 0.01, `${JSON.stringify(found)} ${area}`);
   assert.equal(found.Net, found.Cut);

@@ -29,6 +29,8 @@ export class MeasureTool {
   profileOpened = signal();
   /** Finished figures, each `{ kind, name, points }`, and the `width` of a profile. */
   #finished = [];
+  /** The elements with the results of each finished figure. */
+  #values = [];
   /** The points of the unfinished figure. */
   #points = [];
   #hover = null;
@@ -82,9 +84,14 @@ export class MeasureTool {
     this.#change(this.#finished.map((other) => (other === figure ? changed : other)));
   }
 
-  /** Puts results that the server has found into a figure, which is no change by the user. */
+  /** Puts results that the server has found into a figure, which is no change by the user, who may be typing in its fields. */
   complete(figure, completed) {
-    this.figures = this.#finished.map((other) => (other === figure ? completed : other));
+    const i = this.#finished.indexOf(figure);
+    if (i < 0) return;
+    this.#finished = this.#finished.with(i, completed);
+    this.#values[i].replaceChildren(...this.#rows(completed));
+    this.overlay.redraw();
+    this.figuresShown();
   }
 
   #change(figures) {
@@ -122,11 +129,12 @@ export class MeasureTool {
     this.card.hidden = this.#finished.length === 0;
     const all = () => this.#finished.map((figure) => this.#textOf(figure)).join('\n');
     const clear = () => this.#change([]);
+    this.#values = this.#finished.map((figure) => element('dl', { class: 'values' }, ...this.#rows(figure)));
     this.card.replaceChildren(
       element('header', {}, element('h2', {}, 'Measurements'), copyButton('Copy all', all),
         iconButton('export', 'Download as GeoJSON', () => this.#download()),
         iconButton('close', 'Delete all', clear)),
-      ...this.#finished.map((figure) => this.#item(figure)));
+      ...this.#finished.map((figure, i) => this.#item(figure, () => this.#finished[i], this.#values[i])));
     this.overlay.redraw();
     this.figuresShown();
   }
@@ -137,17 +145,21 @@ export class MeasureTool {
     download(new Blob([JSON.stringify(content, null, 1)], { type: 'application/geo+json' }), `${stemOf(info.name)}-measurements.geojson`);
   }
 
-  #item(figure) {
-    const remove = () => this.#change(this.#finished.filter((other) => other !== figure));
-    const rows = this.#results(figure).flatMap((result) =>
+  #rows(figure) {
+    return this.#results(figure).flatMap((result) =>
       [element('dt', {}, result.name), element('dd', {}, element('span', {}, this.#text(result)))]);
+  }
+
+  /** The part of the card for a figure; `current()` is the figure with the results so far, which `values` shows. */
+  #item({ kind, name }, current, values) {
+    const remove = () => this.#change(this.#finished.filter((other) => other !== current()));
     return element('section', { class: 'measurement' },
-      element('header', {}, element('h3', {}, figure.name),
-        figure.kind === 'profile' ? iconButton('profile', `Show ${figure.name}`, () => this.profileOpened(figure)) : null,
-        copyButton(`Copy ${figure.name}`, () => this.#textOf(figure)),
-        iconButton('delete', `Delete ${figure.name}`, remove)),
-      figure.kind === 'volume' ? volumeControls(figure, (changed) => this.replace(figure, changed)) : null,
-      element('dl', { class: 'values' }, ...rows));
+      element('header', {}, element('h3', {}, name),
+        kind === 'profile' ? iconButton('profile', `Show ${name}`, () => this.profileOpened(current())) : null,
+        copyButton(`Copy ${name}`, () => this.#textOf(current())),
+        iconButton('delete', `Delete ${name}`, remove)),
+      kind === 'volume' ? volumeControls(current, (changed) => this.replace(current(), changed)) : null,
+      values);
   }
 
   /** The text for the clipboard: full precision, separated by tabs. */

@@ -44,20 +44,22 @@ export function setUpVolumes(viewer, measureTool) {
   });
 }
 
-/** The controls of a volume's base and cell size; `replace` takes the changed figure. */
-export function volumeControls(figure, replace) {
-  const { volume, ...settings } = figure;
+/** The controls of a volume's base and cell size; `current()` is the figure, `replace` takes the changed one. */
+export function volumeControls(current, replace) {
+  const figure = current();
   const isHeight = typeof figure.base === 'number';
+  /** Replaces the figure, whose results no longer hold. */
+  const change = (settings) => {
+    const { volume, ...others } = { ...current(), ...settings };
+    replace(others);
+  };
   const base = element('select', {
     'aria-label': `Base of ${figure.name}`,
-    onchange: () => replace({ ...settings, base: base.value === 'height' ? volume?.base ?? 0 : base.value }),
+    onchange: () => change({ base: base.value === 'height' ? current().volume?.base ?? 0 : base.value }),
   }, ...Object.entries(BASES).map(([value, label]) => element('option', { value }, label)));
   base.value = isHeight ? 'height' : figure.base;
-  const height = isHeight ? numberField('Height', figure.base, (value) => replace({ ...settings, base: value })) : null;
-  const cell = numberField('Cell size', figure.cell_size, (value) => {
-    const { cell_size, ...others } = settings;
-    replace(0 < value ? { ...others, cell_size: value } : others);
-  });
+  const height = isHeight ? numberField('Height', figure.base, (value) => Number.isFinite(value) && change({ base: value })) : null;
+  const cell = numberField('Cell size', figure.cell_size, (value) => change({ cell_size: 0 < value ? value : undefined }));
   cell.querySelector('input').placeholder = 'automatic';
   return element('div', { class: 'volume' }, element('label', {}, 'Base ', base), height, cell);
 }
