@@ -95,5 +95,5 @@ function objectPart(object, panel) {
 
 const amount = (n, word) => `${count(n)} ${word}${n === 1 ? '' : 's'}`;
 
-/** What was unusual about the files of an object. */
+/** The notes of the reader about the files of an object. */
 const notesOf = ({ notes }) => notes.map((text) => element('p', { class: 'note' }, text));

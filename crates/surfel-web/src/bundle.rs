@@ -139,7 +139,9 @@ fn dense_lines(text: &str) -> impl Iterator<Item = &str> {
     let mut is_in_comment = false;
     text.lines().filter(move |line| {
         let line = line.trim();
-        let begins = line.starts_with("/*");
+        // A comment before code stays.
+        let begins =
+            line.starts_with("/*") && line.find("*/").is_none_or(|end| end + 2 == line.len());
         let is_comment = is_in_comment || begins || line.starts_with("//");
         if begins || is_in_comment {
             is_in_comment = !line.contains("*/");

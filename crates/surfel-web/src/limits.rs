@@ -26,13 +26,13 @@ pub struct Limits {
     pub max_side_length: u32,
     /// Maximum size of a page's message or a request's body, in bytes.
     pub max_message_bytes: usize,
-    /// Maximum number of saved pictures that are rendered at once, for all clients.
+    /// Maximum number of saved pictures and files of points that are made at once, for all clients.
     pub max_renders: usize,
     /// Maximum number of blocking tasks at once, for all clients; further tasks wait.
     pub max_tasks: usize,
-    /// Maximum number of one page's saved pictures that are rendered or on their way.
+    /// Maximum number of one page's saved pictures and files of points that are made or on their way.
     pub max_page_saves: usize,
-    /// Maximum number of one page's questions about points at once: picks and profiles.
+    /// Maximum number of one page's questions about points at once: picks, profiles, volumes and histograms.
     pub max_page_queries: usize,
     /// Maximum size of one page's settings changes that have not taken effect, in bytes.
     pub max_pending_bytes: usize,

@@ -30,7 +30,7 @@ pub struct ServerState {
     pub limits: Limits,
     /// One permit for each connected page.
     pub page_permits: Arc<Semaphore>,
-    /// One permit for each saved picture that is being rendered.
+    /// One permit for each saved picture or file of points that is being made.
     pub render_permits: Arc<Semaphore>,
     /// Files of points for the pages that have requested them.
     pub downloads: Arc<Downloads>,

@@ -123,7 +123,7 @@ struct Session {
     out: mpsc::Sender<Outgoing>,
     /// One permit for each question about points that is being answered.
     queries: Arc<Semaphore>,
-    /// The cancellation flags of saved pictures that have not been sent completely, by request id.
+    /// The cancellation flags of saved pictures and files of points that are not sent completely, by request id.
     saves: HashMap<u32, Arc<AtomicBool>>,
     /// The file of points that the page requested last.
     download: Arc<Mutex<Option<DownloadGuard>>>,

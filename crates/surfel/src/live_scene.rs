@@ -307,7 +307,7 @@ fn build(
     Ok(SceneTrees { graph, flat, source_indices, legend })
 }
 
-/// The viewer shows all columns of a point, which is told by its index.
+/// The parts of files that are kept: the viewer shows all columns of a point, which is told by its index.
 const KEEP: KeepOptions = KeepOptions { all_columns: true, source_indices: true };
 
 /// Starts as many threads as the current pool has; each begins with `start`.

@@ -4,6 +4,7 @@ use crate::cache::hash_of;
 use crate::description::{LightKind, ObjectDescription, SceneDescription, write_parts};
 use crate::resolve::AutoSettings;
 use serde_json::{Value, json};
+use std::path::PathBuf;
 
 /// A hash of everything that decides how clouds are prepared.
 pub fn preparation_key(description: &SceneDescription) -> u64 {
@@ -25,7 +26,13 @@ pub fn grouping_key(description: &SceneDescription) -> u64 {
     let objects = &description.objects;
     let twin = |i: usize| objects[..i].iter().position(|other| other.has_same_content(&objects[i]));
     let objects = objects.iter().enumerate().map(|(i, object)| json!([object.files, twin(i)]));
-    hash_of(&json!([description.files, objects.collect::<Vec<Value>>()]))
+    // Of several clouds, those with a material of their own are apart.
+    let choices = description.materials.choices();
+    let has_material = |file: &&PathBuf| choices.iter().any(|choice| choice.names(file));
+    let is_one_of_several = 1 < description.files.len();
+    let with_material: Vec<&PathBuf> =
+        description.files.iter().filter(|_| is_one_of_several).filter(has_material).collect();
+    hash_of(&json!([description.files, with_material, objects.collect::<Vec<Value>>()]))
 }
 
 /// A hash of everything that decides what the trees hold.

@@ -6,11 +6,14 @@ use surfel_core::points::{PointCloud, column_values};
 /// Maximum number of ranges.
 const MAX_BINS: usize = 64;
 
+/// Greatest value that counts: larger ones stand for no data, and the width of their range would be infinite.
+const MAX_VALUE: f64 = 1e300;
+
 /// Returns the least and greatest value of a column of clouds, and the numbers of points in ranges of equal width
 /// between them. Whole numbers have ranges of whole width. Clouds without the column are left out.
 ///
 /// # Errors
-/// Fails if no cloud has finite values of the column.
+/// Fails if no cloud has values of the column.
 pub fn histogram<'c>(
     clouds: impl Iterator<Item = &'c PointCloud>,
     column: &str,
@@ -19,7 +22,7 @@ pub fn histogram<'c>(
     let mut values = Vec::new();
     for cloud in clouds {
         match column_values(cloud, column) {
-            Ok(found) => values.extend(found.into_iter().filter(|value| value.is_finite())),
+            Ok(found) => values.extend(found.into_iter().filter(|value| value.abs() < MAX_VALUE)),
             Err(missing) => error = Some(missing),
         }
     }
@@ -50,6 +53,7 @@ mod tests {
 
     use super::*;
     use surfel_core::math::{DVec3, Vec3};
+    use surfel_core::points::{Scalar, Values};
 
     fn cloud() -> PointCloud {
         let positions = (0..=128).map(|i| Vec3::new(0.0, 0.0, 0.5 * i as f32));
@@ -79,6 +83,16 @@ mod tests {
         assert_eq!(found["counts"], json!(expected));
         let flat = counts("x");
         assert_eq!((&flat["width"], &flat["counts"]), (&json!(1.0), &json!([129])));
+    }
+
+    #[test]
+    fn values_that_stand_for_no_data_do_not_count() {
+        let mut cloud = cloud();
+        let values = (0..=128).map(|i| [f64::MAX, -f64::MAX, f64::NAN, 7.0][i % 4]).collect();
+        let column = Scalar { name: "tree".to_owned(), values: Values::F64(values) };
+        cloud.scalars.push(column);
+        let found = histogram([&cloud].into_iter(), "tree").unwrap();
+        assert_eq!((&found["low"], &found["counts"]), (&json!(7.0), &json!([32])));
     }
 
     #[test]

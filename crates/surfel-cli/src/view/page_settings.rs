@@ -17,6 +17,10 @@ const EVERYTHING: &str = "*";
 /// Keys of files that count while the files are read.
 const READ_ONCE: [&str; 5] = ["vertices", "columns", "salvage", "animation_name", "crop"];
 
+fn is_read_once(setting: &ObjectOverride) -> bool {
+    READ_ONCE.contains(&setting.key.as_str())
+}
+
 /// Returns the settings of a description that a page sees: none of files and what moves them, of output and run.
 pub fn shown(description: SceneDescription) -> SettingsMap {
     let mut shown = description.with_content_of(&SceneDescription::default());
@@ -45,8 +49,8 @@ pub fn read(startup: &SceneDescription, settings: &SettingsMap) -> Result<SceneD
         choice.target.take_if(|target| target == EVERYTHING);
     }
     let is_known = |one: &ObjectOverride| startup.overrides.all().contains(one);
-    let read_once = page.overrides.all().iter().find(|one| READ_ONCE.contains(&one.key.as_str()));
-    if let Some(fault) = read_once.filter(|one| !is_known(one)) {
+    let is_new = |one: &&ObjectOverride| is_read_once(one) && !is_known(one);
+    if let Some(fault) = page.overrides.all().iter().find(is_new) {
         let text = format!("a page cannot change {} of a file", fault.key);
         return Err(Error::invalid_value("object_settings", text));
     }
@@ -89,7 +93,9 @@ pub fn from_file(name: &str, text: &str, served: &[String]) -> Result<SettingsMa
     let all = description.materials.choices().iter().cloned().chain(own).collect();
     let own = description.objects.iter().filter(|object| object.files.len() == 1);
     let own = own.flat_map(|object| ObjectOverride::all_of(object, &target(object)));
-    let settings = description.overrides.all().iter().cloned().chain(own).collect();
+    let settings = description.overrides.all().iter().cloned().chain(own);
+    // The files are read as at the start.
+    let settings = settings.filter(|one| !is_read_once(one)).collect();
     if table.contains_key("object") {
         // Objects without a material or settings have none, whatever the page chose before.
         description.materials.material = Some(all);
@@ -127,6 +133,28 @@ mod tests {
     }
 
     #[test]
+    fn a_page_changes_nothing_that_counts_while_files_are_read() {
+        let with_settings = |settings: &[&str]| {
+            SettingsMap::from_iter([("object_settings".to_owned(), json!(settings))])
+        };
+        let mut startup = SceneDescription::default();
+        startup.merge(&with_settings(&["a.laz:salvage=true"])).unwrap();
+        for settings in
+            [&["a.laz:salvage=true", "a.laz:crop=/etc/passwd"][..], &["a.laz:vertices=true"]]
+        {
+            let error = read(&startup, &with_settings(settings)).unwrap_err().to_string();
+            assert!(error.contains("a page cannot change"), "{error}");
+        }
+    }
+
+    #[test]
+    fn scene_files_of_a_page_leave_out_what_counts_while_files_are_read() {
+        let text = "[[object]]\nfile = \"a.laz\"\nsalvage = true\ncolor = \"class\"";
+        let settings = from_file("a.toml", text, &["/data/a.laz".to_owned()]).unwrap();
+        assert_eq!(settings["object_settings"], json!(["a.laz:color=class"]));
+    }
+
+    #[test]
     fn materials_of_objects_are_named_by_their_targets() {
         let text = r##"{ "material": "metal", "object": [
             { "file": "/data/a.ply", "material": { "kind": "glass", "ior": 1.3, "color": "#88ccff" } },
@@ -152,7 +180,7 @@ mod tests {
             from_file("a.toml", "spp = 9\ntime = 2\n[[object]]\nfile = \"scan.laz\"", &served);
         assert_eq!(
             Value::Object(settings.unwrap()),
-            json!({ "time": 2.0, "spp": 9, "material": [] })
+            json!({ "time": 2.0, "spp": 9, "material": [], "object_settings": [] })
         );
         for wrong in ["[[object]]\nfile = \"/etc/passwd\"", "object = { files = [\"x\"] }", "spp ="]
         {

@@ -1,6 +1,5 @@
 //! The points that a view shows, with the columns of their files, for download.
 
-use super::rejection::rejection;
 use std::io::Read;
 use std::sync::Arc;
 use surfel::live_scene::LiveView;
@@ -48,6 +47,10 @@ pub fn write_shown_points(
         let text = format!("found the format {format}, expected {}", FORMATS.join(" or "));
         return Err(Error::invalid_request(text));
     }
+    if view.loaded.has_sequences() {
+        let text = "points of sequences cannot be downloaded; save a file of the sequence instead";
+        return Err(Error::invalid_request(text));
+    }
     let mut graph = view.trees.graph.clone();
     graph.evaluate_at(time_secs);
     let clouds = shown_clouds(view, &graph);
@@ -57,28 +60,31 @@ pub fn write_shown_points(
     let (cloud, _) = merge(clouds);
     let options = SaveOptions::from_source(&view.loaded.file_info());
     let file = TempCloud::write(&cloud, format, &options, progress);
-    let file = file.map_err(|error| rejection(surfel::Error::from(error)))?;
+    let file = file.map_err(|error| match surfel::Error::from(error) {
+        error if error.is_cancelled() => Error::Cancelled,
+        // The error names the temporary folder of the server.
+        _ => Error::invalid_request("the server cannot write the points to a temporary file"),
+    })?;
     Ok(Arc::new(ShownPoints { n_points: cloud.len() as u64, file }))
 }
 
-/// The shown points of each cloud in the order of its file, where its first instance is.
+/// The shown points of each visible instance of a cloud, in the order of its file.
 fn shown_clouds(view: &LiveView, graph: &Graph) -> Vec<PointCloud> {
-    let is_visible = graph.visible_nodes();
-    let shows = |geometry: usize| {
-        let mut nodes = graph.nodes.iter().zip(&is_visible).filter(|(_, is_visible)| **is_visible);
-        nodes.any(|(node, _)| node.primitives.iter().any(|part| part.geometry == geometry))
-    };
-    let transforms = graph.world_from_geometries();
-    let geometries = view.loaded.graph.geometries.iter().enumerate();
-    let clouds = geometries.filter_map(|(i, geometry)| {
-        let Geometry::Points(source) = geometry else { return None };
-        let mut indices = view.trees.source_indices[i].clone();
-        if indices.is_empty() || !shows(i) {
+    let transforms = graph.world_from_nodes();
+    let nodes = graph.nodes.iter().zip(transforms).zip(graph.visible_nodes());
+    let visible = nodes.filter(|(_, is_visible)| *is_visible);
+    let instances = visible.flat_map(|((node, world_from_node), _)| {
+        node.primitives.iter().map(move |part| (part.geometry, world_from_node))
+    });
+    let clouds = instances.filter_map(|(geometry, world_from_cloud)| {
+        let Geometry::Points(source) = &view.loaded.graph.geometries[geometry] else { return None };
+        let mut indices = view.trees.source_indices[geometry].clone();
+        if indices.is_empty() {
             return None;
         }
         indices.sort_unstable();
         let mut cloud = source.subset(&indices);
-        move_by(&mut cloud, &transforms[i]);
+        move_by(&mut cloud, &world_from_cloud);
         Some(cloud)
     });
     clouds.collect()

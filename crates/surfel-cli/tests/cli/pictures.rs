@@ -170,7 +170,7 @@ fn support_is_a_colour_source_with_a_map_and_a_range() {
     let file = folder.path("told.png");
     let report = stderr(&surfel(&["render", &cloud, "-o", &file, "--color", "support"]));
     let expected = "color support from 0.000 to 1.000 (at a point to one radius away from all points), map \
-                    viridis [--color, --cmap, --range]";
+                    viridis [--color, --cmap, --range, --gamma]";
     assert!(report.contains(expected), "{report}");
 }
 

@@ -116,7 +116,7 @@ settings! {
         /// Values of the first and last colour of the map [default: the 2nd and 98th percentile, or 0,1 radii
         /// for support].
         range: (f64, f64), Interval, "LOW,HIGH";
-        /// Brightens (above 1) or darkens colours of the file and values of the map
+        /// Brightens (above 1) or darkens colours of the file and values of the map, but not support
         /// [default: brightens dark colours of the file, and dark intensities if no map is named].
         gamma: f64, number(0.1, 10.0), "NUMBER";
     }

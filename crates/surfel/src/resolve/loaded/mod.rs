@@ -184,6 +184,11 @@ impl LoadedScene {
         files.chain(description.objects.iter().flat_map(|object| &object.files)).cloned().collect()
     }
 
+    /// Returns true if objects show files of a sequence one after the other.
+    pub fn has_sequences(&self) -> bool {
+        !self.sequences.is_empty()
+    }
+
     /// Returns the files without an object; those together that became one cloud.
     pub fn file_groups(&self) -> impl Iterator<Item = Vec<&Path>> {
         let groups = self.files.chunk_by(|(_, a), (_, b)| a == b);
