@@ -110,7 +110,9 @@ export function histogramRows(viewer) {
 
   const apply = () => {
     const [from, to] = [low, high].map((handle) => shortest(handle.valueAsNumber)).sort((a, b) => a - b);
-    const range = [histogram.low < from ? from : null, to < histogram.high ? to : null];
+    // A handle is at its end even if its step does not divide the range.
+    const halfStep = 0.5 * Number(low.step);
+    const range = [halfStep < from - histogram.low ? from : null, halfStep < histogram.high - to ? to : null];
     viewer.changeSettings({ filter: withRange(viewer.scene.filter ?? '', column(), range) || null });
   };
 

@@ -18,6 +18,13 @@ export function renamed(views, oldName, newName) {
   return views.map((view) => (view.name === oldName ? { ...view, name } : view));
 }
 
+/** A camera of a scene file, which may leave keys open, with those of the `current` one. */
+export function completed(camera, current) {
+  const { view_angle, orthographic, panorama, ...place } = current;
+  const hasProjection = camera.view_angle || camera.orthographic || camera.panorama;
+  return { ...(hasProjection ? place : current), ...camera };
+}
+
 /** The list of views, and the button that adds the current one. */
 export function namedViewRows(viewer, navigation) {
   const list = element('ul', { class: 'named-views', 'aria-label': 'Saved views' });
@@ -36,7 +43,7 @@ export function namedViewRows(viewer, navigation) {
     });
     field.value = name;
     return element('li', {}, field,
-      element('button', { type: 'button', class: 'button', 'aria-label': `Go to ${name}`, onclick: () => navigation.transitionTo(camera) }, 'Go'),
+      element('button', { type: 'button', class: 'button', 'aria-label': `Go to ${name}`, onclick: () => navigation.transitionTo(completed(camera, viewer.camera)) }, 'Go'),
       iconButton('delete', `Delete ${name}`, () => change(viewsOf().filter((view) => view.name !== name))));
   };
   const save = element('button', {

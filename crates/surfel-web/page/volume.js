@@ -7,32 +7,39 @@ import { showToast } from './toast.js';
 const REST_MS = 600;
 const BASES = { lowest: 'lowest corner', mean: 'mean of the corners', height: 'height' };
 
-/** Requests the volumes of figures that have none, and all of them again after a change of the settings. */
+/** Requests the volumes of figures that have none, one at a time, and all of them again after a change of the settings. */
 export function setUpVolumes(viewer, measureTool) {
-  let requested = new WeakSet();
+  let failed = new WeakSet();
+  let isAsking = false;
+  let nChanges = 0;
   let timer = 0;
 
   const request = async (figure) => {
-    requested.add(figure);
+    isAsking = true;
+    const asked = nChanges;
     const { points, base, cell_size } = figure;
     try {
       const { volume } = await viewer.request({ type: 'volume', points, up: viewer.info.up, base, cell_size });
-      measureTool.complete(figure, { ...figure, volume });
+      // After a change the answer is that of other points: the figure is asked for again.
+      if (asked === nChanges) measureTool.complete(figure, { ...figure, volume });
     } catch (error) {
+      failed.add(figure);
       showToast(error.message);
     }
+    isAsking = false;
+    requestNext();
   };
-  const requestAll = () => {
+  const requestNext = () => {
     // Before the first picture the server has no points.
-    if (!viewer.isConnected || !viewer.lastFrame) return;
-    for (const figure of measureTool.figures) {
-      if (figure.kind === 'volume' && !figure.volume && !requested.has(figure)) request(figure);
-    }
+    if (isAsking || !viewer.isConnected || !viewer.lastFrame) return;
+    const figure = measureTool.figures.find((one) => one.kind === 'volume' && !one.volume && !failed.has(one));
+    if (figure) request(figure);
   };
-  measureTool.figuresShown.listen(requestAll);
-  viewer.frameShown.listen(requestAll);
-  viewer.connectionChanged.listen(() => { requested = new WeakSet(); });
+  measureTool.figuresShown.listen(requestNext);
+  viewer.frameShown.listen(requestNext);
+  viewer.connectionChanged.listen(() => { failed = new WeakSet(); });
   viewer.sceneChanged.listen(() => {
+    nChanges += 1;
     clearTimeout(timer);
     if (!measureTool.figures.some(({ volume }) => volume)) return;
     timer = setTimeout(() => {
