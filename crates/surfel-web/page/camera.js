@@ -26,6 +26,8 @@ export function axesOf(camera) {
   return { right, up: cross(right, forward), forward };
 }
 
+/** Whether a camera of a scene file says where it stands; the server finds a place for others. */
+export const isPlaced = ({ position, focal_point, orthographic }) => position && focal_point && orthographic !== true;
 export const isOrthographic = (camera) => camera.orthographic !== undefined;
 export const focalDistance = (camera) => distance(camera.position, camera.focal_point);
 

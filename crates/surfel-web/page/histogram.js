@@ -3,7 +3,8 @@
 import { element, icon, svg } from './dom.js';
 import { shortest } from './format.js';
 
-const N_STEPS = 200;
+/** Number of steps in the range of a handle, not a whole one, so that rounding cannot leave out the last step. */
+const N_STEPS = 200.25;
 /** A condition that the handles write, at the end of a filter. */
 const LAST_TERM = /^(?:(.*) && )?(\w+) (>=|<=) (-?\d[\d.]*(?:e[+-]?\d+)?)$/s;
 
@@ -47,6 +48,12 @@ export function withRange(filter, column, [low, high]) {
   const all = [...others, ...own].map((term) => term.join(' '));
   const first = all.length && head.includes('||') && !isWrapped(head) ? `(${head})` : head;
   return [...(first ? [first] : []), ...all].join(' && ');
+}
+
+/** The range between two handles; null where a handle is at the end of the histogram, as near as its steps let it. */
+export function rangeOf(handles, { low, high }, step) {
+  const [from, to] = handles.sort((a, b) => a - b);
+  return [step < 2 * (from - low) ? shortest(from) : null, step < 2 * (high - to) ? shortest(to) : null];
 }
 
 /** The rows of the panel with the choice of the column and its histogram. */
@@ -109,10 +116,7 @@ export function histogramRows(viewer) {
   };
 
   const apply = () => {
-    const [from, to] = [low, high].map((handle) => shortest(handle.valueAsNumber)).sort((a, b) => a - b);
-    // A handle is at its end even if its step does not divide the range.
-    const halfStep = 0.5 * Number(low.step);
-    const range = [halfStep < from - histogram.low ? from : null, halfStep < histogram.high - to ? to : null];
+    const range = rangeOf([low.valueAsNumber, high.valueAsNumber], histogram, Number(low.step));
     viewer.changeSettings({ filter: withRange(viewer.scene.filter ?? '', column(), range) || null });
   };
 

@@ -1,5 +1,6 @@
 // Named views: cameras that are saved under names, with the rows of the panel that list them.
 
+import { isPlaced } from './camera.js';
 import { element, iconButton } from './dom.js';
 import { areEqual } from './merge-patch.js';
 
@@ -18,8 +19,9 @@ export function renamed(views, oldName, newName) {
   return views.map((view) => (view.name === oldName ? { ...view, name } : view));
 }
 
-/** A camera of a scene file, which may leave keys open, with those of the `current` one. */
+/** A camera of a scene file with the picture's up and the projection of the `current` one where it has none. */
 export function completed(camera, current) {
+  if (!isPlaced(camera)) return camera;
   const { view_angle, orthographic, panorama, ...place } = current;
   const hasProjection = camera.view_angle || camera.orthographic || camera.panorama;
   return { ...(hasProjection ? place : current), ...camera };

@@ -111,6 +111,11 @@ export class Navigation {
     this.stop();
     const from = this.camera;
     this.#previousCamera = from;
+    if (!cameras.isPlaced(camera)) {
+      this.endInteraction();
+      this.viewer.findCamera(camera);
+      return;
+    }
     const isSameProjection = cameras.isOrthographic(from) === cameras.isOrthographic(camera) && !from.panorama;
     if (!isSameProjection || matchMedia('(prefers-reduced-motion: reduce)').matches) {
       this.viewer.setCamera(camera, false);

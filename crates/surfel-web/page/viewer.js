@@ -115,6 +115,14 @@ export class Viewer {
     this.changedByUser();
   }
 
+  /** Lets the server find a camera with these keys of a scene file. */
+  findCamera(camera) {
+    const lock = this.info.camera_moves || undefined;
+    // A camera that waits would be sent after the settings, and replace what the server finds.
+    this.#queuedCamera = null;
+    this.changeSettings({ camera: createPatch(this.camera, { ...camera, lock }) });
+  }
+
   /** Lets the scene's animation move the camera again. */
   resumeAnimation() {
     this.showLink({ ...viewPatch(this.initialScene, this.currentScene()), camera: {} });

@@ -18,15 +18,16 @@ export function setUpVolumes(viewer, measureTool) {
     isAsking = true;
     const asked = nChanges;
     const { points, base, cell_size } = figure;
-    try {
-      const { volume } = await viewer.request({ type: 'volume', points, up: viewer.info.up, base, cell_size });
-      // After a change the answer is that of other points: the figure is asked for again.
-      if (asked === nChanges) measureTool.complete(figure, { ...figure, volume });
-    } catch (error) {
-      failed.add(figure);
-      showToast(error.message);
-    }
+    const answer = await viewer.request({ type: 'volume', points, up: viewer.info.up, base, cell_size }).catch((error) => error);
     isAsking = false;
+    // After a change the answer is that of other points: the figure is asked for again.
+    if (asked === nChanges) {
+      if (answer.volume) measureTool.complete(figure, { ...figure, volume: answer.volume });
+      else {
+        failed.add(figure);
+        showToast(answer.message);
+      }
+    }
     requestNext();
   };
   const requestNext = () => {
@@ -41,12 +42,13 @@ export function setUpVolumes(viewer, measureTool) {
   viewer.sceneChanged.listen(() => {
     nChanges += 1;
     clearTimeout(timer);
-    if (!measureTool.figures.some(({ volume }) => volume)) return;
     timer = setTimeout(() => {
+      failed = new WeakSet();
       for (const figure of measureTool.figures.filter(({ volume }) => volume)) {
         const { volume, ...without } = figure;
         measureTool.complete(figure, without);
       }
+      requestNext();
     }, REST_MS);
   });
 }
