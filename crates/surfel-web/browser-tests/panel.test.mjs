@@ -28,6 +28,7 @@ const CASES = {
   color: { value: 'intensity' },
   cmap: { given: BY_ELEVATION, value: 'magma' },
   range: { given: BY_ELEVATION, value: [147, 152.5] },
+  gamma: { value: 2 },
   filter: { value: 'z > 149' },
   class: { value: [2] },
   'light.sun': { value: false },
@@ -139,6 +140,9 @@ async function sceneValue({ key, read }) {
   return read ? read(scene, { scene, info, legend: null }) : valueAt(scene, key);
 }
 
+/** Rounds numbers: a clip plane's normal and position are computed from its point. */
+const rounded = (value) => JSON.parse(JSON.stringify(value), (_, part) => (typeof part === 'number' ? Number(part.toPrecision(6)) : part));
+
 test('each control has a case', async () => {
   const { objects } = await state(page, 'info');
   assert.deepEqual(objects.map(({ name }) => name), FILES);
@@ -182,9 +186,6 @@ for (const control of CONTROLS.filter(({ key }) => !FOR_OTHERS.includes(key))) {
     assert.equal(await finishedPixels(page), first, 'the controls are reset');
   });
 }
-
-/** Rounds numbers: a clip plane's normal and position are computed from its point. */
-const rounded = (value) => JSON.parse(JSON.stringify(value), (_, part) => (typeof part === 'number' ? Number(part.toPrecision(6)) : part));
 
 test('each surface, colour and material gives another picture', async () => {
   const { surfaces, colors, materials } = await state(page, 'info');

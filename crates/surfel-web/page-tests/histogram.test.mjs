@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { filterName, rangeIn, withRange } from '../page/histogram.js';
+import { filterName, rangeIn, rangeOf, withRange } from '../page/histogram.js';
 
 test('ranges are added to a filter, changed and removed', () => {
   let filter = withRange('', 'z', [3, null]);
@@ -35,4 +35,19 @@ test('what the user has typed keeps its meaning', () => {
 
 test('names of columns are written as filters have them', () => {
   assert.equal(filterName('Return Number'), 'Return_Number');
+});
+
+test('a handle at its end sets no limit, whatever its digits and steps', () => {
+  const [low, high] = [12.345678912345, 987.654321987654];
+  const step = (high - low) / 200.001;
+  assert.deepEqual(rangeOf([low, high], { low, high }, step), [null, null]);
+  assert.deepEqual(rangeOf([low, low + 200 * step], { low, high }, step), [null, null]);
+  assert.ok(!rangeOf([low + step, low + 199 * step], { low, high }, step).includes(null));
+  assert.deepEqual(rangeOf([high, low], { low, high }, step), [null, null]);
+});
+
+test('a step is a limit for whole numbers, of ten digits too', () => {
+  assert.deepEqual(rangeOf([2, 5], { low: 1, high: 6 }, 1), [2, 5]);
+  const [low, high] = [1234567891, 1234567899];
+  assert.deepEqual(rangeOf([low, high], { low, high }, 1), [null, null]);
 });

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { completed, renamed, withNewView } from '../page/named-views.js';
+import { renamed, withNewView } from '../page/named-views.js';
 
 test('new views have names of their own, also after deletions', () => {
   const views = withNewView(withNewView([{ name: 'north', camera: {} }], { view_angle: 1 }), { view_angle: 2 });
@@ -15,12 +15,4 @@ test('a view is renamed unless the name is empty or taken', () => {
   assert.deepEqual(renamed(views, 'a', ' north side ')[0], { name: 'north side', camera: { view_angle: 3 } });
   for (const name of ['', '  ', 'b', 'a']) assert.equal(renamed(views, 'a', name), views);
   assert.equal(renamed(views, 'a', 'x'.repeat(200))[0].name.length, 100);
-});
-
-test('what the camera of a view leaves open is that of the current camera', () => {
-  const current = { position: [1, 2, 3], focal_point: [0, 0, 0], view_up: [0, 0, 1], view_angle: 35 };
-  assert.deepEqual(completed({ position: [0, 90, 2] }, current), { ...current, position: [0, 90, 2] });
-  const { view_angle, ...place } = current;
-  assert.deepEqual(completed({ orthographic: 8 }, current), { ...place, orthographic: 8 });
-  assert.deepEqual(completed(current, { ...place, orthographic: 8 }), current);
 });

@@ -26,8 +26,6 @@ export function axesOf(camera) {
   return { right, up: cross(right, forward), forward };
 }
 
-/** Whether a camera of a scene file says where it stands; the server finds a place for others. */
-export const isPlaced = ({ position, focal_point, orthographic }) => position && focal_point && orthographic !== true;
 export const isOrthographic = (camera) => camera.orthographic !== undefined;
 export const focalDistance = (camera) => distance(camera.position, camera.focal_point);
 
@@ -256,6 +254,13 @@ export function fit(camera, size, bounds) {
 /** The eight corners of a box. */
 export function cornersOf({ min, max }) {
   return [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [0, 1, 2].map((axis) => ((i >> axis) & 1 ? max : min)[axis]));
+}
+
+/** A camera of a scene file with the picture's up and the projection of the `current` one where it has none. */
+export function completed(camera, current) {
+  const { view_angle, orthographic, panorama, ...place } = current;
+  const hasProjection = camera.view_angle || camera.orthographic || camera.panorama;
+  return { ...(hasProjection ? place : current), ...camera };
 }
 
 /** Interpolates between two cameras of one projection; `t` is from 0 to 1. */

@@ -3,8 +3,8 @@
 import { element, icon, svg } from './dom.js';
 import { shortest } from './format.js';
 
-/** Number of steps in the range of a handle, not a whole one, so that rounding cannot leave out the last step. */
-const N_STEPS = 200.25;
+/** Number of steps in the range of a handle: a little more than a whole one, so that rounding leaves out none. */
+const N_STEPS = 200.001;
 /** A condition that the handles write, at the end of a filter. */
 const LAST_TERM = /^(?:(.*) && )?(\w+) (>=|<=) (-?\d[\d.]*(?:e[+-]?\d+)?)$/s;
 

@@ -1,6 +1,5 @@
 // Named views: cameras that are saved under names, with the rows of the panel that list them.
 
-import { isPlaced } from './camera.js';
 import { element, iconButton } from './dom.js';
 import { areEqual } from './merge-patch.js';
 
@@ -17,14 +16,6 @@ export function renamed(views, oldName, newName) {
   const name = newName.trim().slice(0, MAX_NAME_LENGTH);
   if (!name || views.some((view) => view.name === name)) return views;
   return views.map((view) => (view.name === oldName ? { ...view, name } : view));
-}
-
-/** A camera of a scene file with the picture's up and the projection of the `current` one where it has none. */
-export function completed(camera, current) {
-  if (!isPlaced(camera)) return camera;
-  const { view_angle, orthographic, panorama, ...place } = current;
-  const hasProjection = camera.view_angle || camera.orthographic || camera.panorama;
-  return { ...(hasProjection ? place : current), ...camera };
 }
 
 /** The list of views, and the button that adds the current one. */
@@ -45,7 +36,7 @@ export function namedViewRows(viewer, navigation) {
     });
     field.value = name;
     return element('li', {}, field,
-      element('button', { type: 'button', class: 'button', 'aria-label': `Go to ${name}`, onclick: () => navigation.transitionTo(completed(camera, viewer.camera)) }, 'Go'),
+      element('button', { type: 'button', class: 'button', 'aria-label': `Go to ${name}`, onclick: () => navigation.transitionTo(camera) }, 'Go'),
       iconButton('delete', `Delete ${name}`, () => change(viewsOf().filter((view) => view.name !== name))));
   };
   const save = element('button', {

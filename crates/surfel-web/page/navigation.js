@@ -106,16 +106,17 @@ export class Navigation {
     this.viewer.setCamera(this.camera, false);
   }
 
-  /** Moves the camera there in a smooth transition. */
-  transitionTo(camera) {
+  /** Moves the camera in a smooth transition to one of a scene file; the server finds one that has no place or size. */
+  transitionTo(target) {
     this.stop();
     const from = this.camera;
     this.#previousCamera = from;
-    if (!cameras.isPlaced(camera)) {
+    if (!target.position || !target.focal_point || target.orthographic === true) {
       this.endInteraction();
-      this.viewer.findCamera(camera);
+      this.viewer.findCamera(target);
       return;
     }
+    const camera = cameras.completed(target, from);
     const isSameProjection = cameras.isOrthographic(from) === cameras.isOrthographic(camera) && !from.panorama;
     if (!isSameProjection || matchMedia('(prefers-reduced-motion: reduce)').matches) {
       this.viewer.setCamera(camera, false);

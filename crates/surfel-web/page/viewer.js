@@ -193,8 +193,8 @@ export class Viewer {
   acknowledge(header) {
     this.#connection.send({ type: 'ack', frame: header.frame });
     const now = performance.now();
-    const { frame, scene, seq, width, height, kind, finished, samples, of_samples } = header;
-    this.lastFrame = { frame, scene, seq, width, height, kind, finished, samples, of_samples, shownAt: now };
+    const { seq } = header;
+    this.lastFrame = { ...header, shownAt: now };
     // Only the first picture of a message counts as its answer; later ones refine it.
     if (this.#sendTimeBySeq.has(seq)) this.latencies_ms.push(now - this.#sendTimeBySeq.get(seq));
     this.latencies_ms.splice(0, this.latencies_ms.length - MAX_LATENCIES);

@@ -7,7 +7,7 @@ import { showToast } from './toast.js';
 const REST_MS = 600;
 const BASES = { lowest: 'lowest corner', mean: 'mean of the corners', height: 'height' };
 
-/** Requests the volumes of figures that have none, one at a time, and all of them again after a change of the settings. */
+/** Requests the volumes of figures that have none, one at a time; all again after a change of the settings or a reconnection. */
 export function setUpVolumes(viewer, measureTool) {
   let failed = new WeakSet();
   let isAsking = false;
@@ -38,13 +38,13 @@ export function setUpVolumes(viewer, measureTool) {
   };
   measureTool.figuresShown.listen(requestNext);
   viewer.frameShown.listen(requestNext);
-  viewer.connectionChanged.listen(() => { failed = new WeakSet(); });
   viewer.sceneChanged.listen(() => {
     nChanges += 1;
     clearTimeout(timer);
+    const outdated = measureTool.figures.filter(({ volume }) => volume);
     timer = setTimeout(() => {
       failed = new WeakSet();
-      for (const figure of measureTool.figures.filter(({ volume }) => volume)) {
+      for (const figure of outdated) {
         const { volume, ...without } = figure;
         measureTool.complete(figure, without);
       }
