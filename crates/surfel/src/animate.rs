@@ -1,10 +1,10 @@
 //! Movies: one frame after another, with a turntable if one is asked for.
 
 use crate::built_scene::BuiltScene;
-use crate::choice_log::CancelOnly;
 use crate::description::{Invalid, SceneDescription};
 use crate::error::{Error, Result};
 use crate::picture::{RenderedImage, image_options};
+use crate::progress_log::CancelOnly;
 use crate::resolve::LoadedScene;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};

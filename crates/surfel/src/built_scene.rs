@@ -1,11 +1,11 @@
 //! A scene with its trees, shown at one time after another: what moves is moved, everything else stays.
 
-use crate::choice_log::{CancelOnly, Choice};
 use crate::crs::{CoordinateSystem, georeference};
 use crate::description::{Exposure, SceneDescription};
 use crate::error::Result;
 use crate::overlay::Overlay;
 use crate::picture::{RenderedImage, image_options};
+use crate::progress_log::{CancelOnly, Choice};
 use crate::resolve::{Resolved, SceneCamera, Sequence, automatic_exposure, expose, expose_lamps};
 use surfel_core::flat::{FlatPunctualLight, FlatScene};
 use surfel_core::math::{DQuat, Vec3};

@@ -62,7 +62,7 @@ mod troubleshooting;
 pub mod description;
 mod error;
 mod scene_file;
-pub mod choice_log;
+pub mod progress_log;
 pub mod overlay;
 pub mod resolve;
 pub mod picture;
@@ -75,10 +75,10 @@ mod scene_keys;
 pub mod live_scene;
 
 pub use built_scene::BuiltScene;
-pub use choice_log::Choice;
 pub use description::SceneDescription;
 pub use error::{Error, Result};
 pub use picture::RenderedImage;
+pub use progress_log::Choice;
 pub use raycast::RayHit;
 pub use resolve::{Resolved, resolve};
 

@@ -28,6 +28,7 @@ mod place;
 mod plan;
 mod point_filter;
 pub mod rule;
+mod table;
 
 pub use animation::{AnimationDescription, AnimationKind, CameraMotion, ObjectMotion, Orbit};
 pub use camera::{CameraSettings, Interior, OrthographicHeight, WorldSettings};
@@ -47,10 +48,15 @@ pub use option::{has_option, is_list, option_name, value_text};
 pub use picture::{Backend, Exposure, OutputSettings, PictureSettings, RunSettings};
 pub use plan::PlanSettings;
 pub use point_filter::Returns;
+pub(crate) use table::write_parts;
+pub use table::write_table;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
+use table::{
+    flatten, is_unique, numbered, read_table, read_value, take_normalized, take_tables, unknown_key,
+};
 
 /// Everything that decides what a picture shows. The default is an empty scene under automatic light.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -419,117 +425,6 @@ fn is_none(path: &str, value: &Value) -> bool {
         path if is_list(path) || !has_option(path) => value.as_array().is_some_and(Vec::is_empty),
         _ => false,
     }
-}
-
-/// Sets a key of a part if the part has it.
-fn read_value(
-    settings: &mut dyn KeyedSettings,
-    key: &str,
-    value: &Value,
-    folder: &Path,
-) -> Result<bool, Invalid> {
-    if !settings.keys().iter().any(|known| known.name == key) {
-        return Ok(false);
-    }
-    if value.is_null() {
-        settings.unset(key);
-    } else {
-        settings.set(key, value, folder).map_err(|error| error.within(key))?;
-    }
-    Ok(true)
-}
-
-/// Sets all keys of a table.
-fn read_table(
-    settings: &mut dyn KeyedSettings,
-    table: &Map<String, Value>,
-    folder: &Path,
-) -> Result<(), Invalid> {
-    for (key, value) in &take_normalized(table) {
-        if !read_value(settings, key, value, folder)? {
-            let known = settings.keys();
-            return Err(unknown_key(key, known.iter().map(|key| key.name)));
-        }
-    }
-    Ok(())
-}
-
-/// Writes the keys of a part that are set.
-pub fn write_table<S: KeyedSettings + ?Sized>(settings: &S) -> Map<String, Value> {
-    let keys = settings.keys().into_iter();
-    keys.filter_map(|key| Some((key.name.to_owned(), settings.get(key.name)?))).collect()
-}
-
-/// Writes the keys of parts that are set, in tables by their prefixes.
-pub(crate) fn write_parts(parts: &[Part<&dyn KeyedSettings>]) -> Map<String, Value> {
-    let mut table = Map::new();
-    for Part { prefix, settings, .. } in parts {
-        let values = write_table(*settings);
-        match prefix.trim_end_matches('.') {
-            "" => table.extend(values),
-            _ if values.is_empty() => {}
-            name => _ = table.insert(name.to_owned(), Value::Object(values)),
-        }
-    }
-    table
-}
-
-/// Both spellings are known: `focal-point` as on the command line, `focal_point` as in programs.
-fn take_normalized(table: &Map<String, Value>) -> Map<String, Value> {
-    table.iter().map(|(key, value)| (key.replace('-', "_"), value.clone())).collect()
-}
-
-fn unknown_key(key: &str, known: impl IntoIterator<Item = impl AsRef<str>>) -> Invalid {
-    let known: Vec<String> = known.into_iter().map(|name| name.as_ref().to_owned()).collect();
-    let advice = nearest(&key.replace('-', "_"), known.iter().map(String::as_str));
-    Invalid::at(key, format!("unknown key{advice}"))
-}
-
-/// Takes the tables of `[[name]]` out of a table.
-fn take_tables(
-    table: &mut Map<String, Value>,
-    name: &str,
-) -> Result<Vec<Map<String, Value>>, Invalid> {
-    let tables = match table.shift_remove(name) {
-        None => return Ok(Vec::new()),
-        Some(Value::Array(tables)) => tables,
-        Some(table @ Value::Object(_)) => vec![table],
-        Some(other) => return Err(Invalid::at(name, "expected tables").found(&other)),
-    };
-    let tables = tables.into_iter().enumerate().map(|(i, table)| match table {
-        Value::Object(table) => Ok(table),
-        other => Err(Invalid::at(format!("{name}[{i}]"), "expected a table").found(&other)),
-    });
-    tables.collect()
-}
-
-/// Lists values by their paths: tables in tables are one path. A material is a value itself.
-fn flatten<'v>(prefix: &str, table: &'v Map<String, Value>, values: &mut Vec<(String, &'v Value)>) {
-    for (key, value) in table {
-        let path = format!("{prefix}{key}");
-        match value {
-            Value::Object(inner) if path != "material" => {
-                flatten(&format!("{path}."), inner, values)
-            }
-            value => values.push((path, value)),
-        }
-    }
-}
-
-/// Names with the tables that have them: `object[0]` and so on.
-fn numbered(table: &str, names: impl Iterator<Item = String>) -> Vec<(String, String)> {
-    names.enumerate().map(|(i, name)| (format!("{table}[{i}]"), name)).collect()
-}
-
-/// Returns true if a name is there; fails if several tables have it.
-fn is_unique(named: &[(String, String)], wanted: &str, path: &str) -> Result<bool, Invalid> {
-    let bearers = named.iter().filter(|(_, name)| name == wanted);
-    let bearers: Vec<&str> = bearers.map(|(bearer, _)| bearer.as_str()).collect();
-    if bearers.len() < 2 {
-        return Ok(!bearers.is_empty());
-    }
-    let bearers = bearers.join(" and ");
-    Err(Invalid::at(path, format!("`{wanted}` is the name of {bearers}; give each its own")))
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! A cloud on its way from the file to a surface: read, prepared, coloured.
 
-use crate::choice_log::NotesAsChoices;
 use crate::description::{Invalid, ObjectSettings, PreparationSettings};
 use crate::error::Result;
+use crate::progress_log::NotesAsChoices;
 use std::path::Path;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::Neighborhood;

@@ -33,11 +33,11 @@ pub use spread::report_coverage;
 pub use station::{LocatedStation, located_stations};
 pub(crate) use sun_and_sky::{expose, expose_lamps};
 
-use crate::choice_log::{Choice, ChoiceLog};
 use crate::crs::{CoordinateSystem, Unit};
 use crate::description::{CameraSettings, OrthographicHeight, SceneDescription};
 use crate::error::Result;
 use crate::overlay::Overlay;
+use crate::progress_log::{Choice, ProgressLog};
 use camera::SceneExtent;
 use complete_description::complete_description;
 use interior::{choose_room, hidden_ceiling, hidden_walls};
@@ -92,7 +92,7 @@ pub fn resolve(description: &SceneDescription, progress: &dyn Progress) -> Resul
     let mut description = description.clone();
     description.apply_object_settings()?;
     let description = &description;
-    let log = ChoiceLog::new(progress);
+    let log = ProgressLog::new(progress);
     let keep = KeepOptions { source_indices: true, ..KeepOptions::default() };
     let scene = LoadedScene::read(description, keep, &log)?;
     let auto = AutoSettings::choose(&scene, description, &log)?;

@@ -57,14 +57,14 @@ mod tests {
     //! Gaps and empty pictures are reported, others are not.
 
     use super::*;
-    use crate::choice_log::ChoiceLog;
+    use crate::progress_log::ProgressLog;
     use surfel_core::math::Vec3;
     use surfel_core::progress::NoProgress;
 
     fn reported(offset: f32) -> usize {
         let part = |x: f32| (0..100).map(move |i| Vec3::new(x + 0.01 * i as f32, 0.0, 0.0));
         let cloud = PointCloud::from_positions(part(0.0).chain(part(offset)).collect());
-        let log = ChoiceLog::new(&NoProgress);
+        let log = ProgressLog::new(&NoProgress);
         report_gaps(&cloud, &log);
         log.into_choices().len()
     }
@@ -89,7 +89,7 @@ mod tests {
     fn an_almost_empty_picture_is_reported() {
         let lines = |coverage: f32| {
             let image = Image { coverage: vec![coverage; 100], ..Image::new(10, 10) };
-            let log = ChoiceLog::new(&NoProgress);
+            let log = ProgressLog::new(&NoProgress);
             report_coverage(&image, &log);
             log.into_choices().len()
         };

@@ -3,10 +3,10 @@
 use super::super::cloud::{ImportOptions, graph_of, import, into_cloud};
 use super::super::sequence::{GeometrySlots, Sequence, element_counts, is_streamed};
 use super::{LoadedFile, LoadedScene, ObjectNodes};
-use crate::choice_log::NoteLog;
 use crate::description::{ObjectDescription, ObjectMotion, ObjectSettings, SceneDescription};
 use crate::error::{Error, Result};
 use crate::names::file_name;
+use crate::progress_log::ProgressLog;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use surfel_core::points::PointCloud;
@@ -68,7 +68,7 @@ impl LoadedScene {
         options: &ImportOptions,
         progress: &dyn Progress,
     ) -> Result<(Graph<PointCloud>, FileInfo)> {
-        let log = NoteLog::new(progress);
+        let log = ProgressLog::new(progress);
         let (graph, info) = import(file, settings, options, &log)?;
         let (n_points, n_triangles) = graph.n_points_and_triangles();
         let notes = log.into_notes();

@@ -12,34 +12,22 @@ pub struct Choice {
     pub keys: Vec<String>,
 }
 
-/// Passes progress on and records the choices.
-pub struct ChoiceLog<'p> {
+/// Passes progress on, and records the choices and the notes.
+pub struct ProgressLog<'p> {
     progress: &'p dyn Progress,
     choices: Mutex<Vec<Choice>>,
+    notes: Mutex<Vec<String>>,
 }
 
-impl<'p> ChoiceLog<'p> {
+impl<'p> ProgressLog<'p> {
     /// An empty record; `progress` hears everything too.
     pub fn new(progress: &'p dyn Progress) -> Self {
-        Self { progress, choices: Mutex::default() }
+        Self { progress, choices: Mutex::default(), notes: Mutex::default() }
     }
 
     /// Returns the choices so far, in their order.
     pub fn into_choices(self) -> Vec<Choice> {
         self.choices.into_inner().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// Passes progress on and records the notes.
-pub struct NoteLog<'p> {
-    progress: &'p dyn Progress,
-    notes: Mutex<Vec<String>>,
-}
-
-impl<'p> NoteLog<'p> {
-    /// An empty record; `progress` hears everything too.
-    pub fn new(progress: &'p dyn Progress) -> Self {
-        Self { progress, notes: Mutex::default() }
     }
 
     /// Returns the notes so far, in their order.
@@ -48,7 +36,7 @@ impl<'p> NoteLog<'p> {
     }
 }
 
-impl Progress for NoteLog<'_> {
+impl Progress for ProgressLog<'_> {
     fn begin(&self, stage: &str, total: u64) {
         self.progress.begin(stage, total);
     }
@@ -59,32 +47,6 @@ impl Progress for NoteLog<'_> {
 
     fn note(&self, line: &str) {
         self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(line.to_owned());
-        self.progress.note(line);
-    }
-
-    fn choice(&self, line: &str, keys: &[&str]) {
-        self.progress.choice(line, keys);
-    }
-
-    fn end(&self) {
-        self.progress.end();
-    }
-
-    fn is_cancelled(&self) -> bool {
-        self.progress.is_cancelled()
-    }
-}
-
-impl Progress for ChoiceLog<'_> {
-    fn begin(&self, stage: &str, total: u64) {
-        self.progress.begin(stage, total);
-    }
-
-    fn advance(&self, units: u64) {
-        self.progress.advance(units);
-    }
-
-    fn note(&self, line: &str) {
         self.progress.note(line);
     }
 
