@@ -1,6 +1,7 @@
 //! The coordinate system that a LAS file names, as WKT or by GeoTIFF keys: read and written.
 
 use super::header::{Header, read_u16, text};
+use super::point_format::PointFields;
 use crate::file::Input;
 use crate::options::SaveOptions;
 
@@ -58,20 +59,35 @@ fn from_geo_keys(input: &Input, header: &Header) -> Option<String> {
 
 /// Returns the records of the coordinate system by their ids: those of the source, or one made from the text of the
 /// options, which is WKT or "EPSG:" and the code of a horizontal system. A vertical code after `+` is ignored.
-pub(super) fn projection_records(options: &SaveOptions) -> Vec<(u16, Vec<u8>)> {
-    let of_source = options.las.as_ref().map(|las| las.projection.clone());
-    if let Some(records) = of_source.filter(|records| !records.is_empty()) {
-        return records;
+///
+/// The point formats from 6 on require WKT (LAS 1.4, section 2.4). A source that has only GeoTIFF keys keeps them if its
+/// own format is one of these.
+pub(super) fn projection_records(
+    options: &SaveOptions,
+    is_extended: bool,
+) -> Vec<(u16, Vec<u8>)> {
+    let kept = options.las.as_ref().map_or(Vec::new(), |las| las.projection.clone());
+    let is_so_in_source =
+        options.las.as_ref().is_some_and(|las| PointFields::of_format(las.point_format).is_extended);
+    let has_wkt = kept.iter().any(|(record_id, _)| *record_id == WKT);
+    if !kept.is_empty() && (has_wkt || !is_extended || is_so_in_source) {
+        return kept;
     }
-    let Some(text) = &options.coordinate_system else { return Vec::new() };
-    if let Some(codes) = text.strip_prefix("EPSG:") {
-        let code = codes.split('+').next().and_then(|code| code.parse().ok());
-        return code.map(|code| (GEO_KEYS, geo_keys(code))).into_iter().collect();
-    }
-    // The last byte of a record is zero.
-    let is_wkt = text.contains('[') && text.len() < MAX_RECORD_SIZE;
-    let wkt = is_wkt.then(|| (WKT, [text.as_bytes(), &[0]].concat()));
-    wkt.into_iter().collect()
+    let record = options.coordinate_system.as_ref().and_then(|text| record(text, is_extended));
+    record.map_or(kept, |record| vec![record])
+}
+
+/// Returns a record that describes a coordinate system.
+fn record(text: &str, is_extended: bool) -> Option<(u16, Vec<u8>)> {
+    let wkt_record = |wkt: &str| {
+        // The last byte of a record is zero.
+        let is_wkt = wkt.contains('[') && wkt.len() < MAX_RECORD_SIZE;
+        is_wkt.then(|| (WKT, [wkt.as_bytes(), &[0]].concat()))
+    };
+    let Some(codes) = text.strip_prefix("EPSG:") else { return wkt_record(text) };
+    let code = codes.split('+').next()?.parse().ok()?;
+    let known = crs_definitions::from_code(code).filter(|_| is_extended);
+    known.and_then(|system| wkt_record(system.wkt)).or_else(|| Some((GEO_KEYS, geo_keys(code))))
 }
 
 /// Returns a GeoTIFF key directory that names the coordinate system.

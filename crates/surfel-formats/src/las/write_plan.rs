@@ -75,7 +75,7 @@ impl<'a> WritePlan<'a> {
             offset,
             standard,
             extras,
-            projection: projection_records(options),
+            projection: projection_records(options, fields.is_extended),
         }
     }
 

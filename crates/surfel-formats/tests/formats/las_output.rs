@@ -187,6 +187,8 @@ fn changes_of_version_and_format_are_reported() {
         change(&mut cloud);
         let (header, _, listener) = written_again(&cloud, &info, "laz");
         assert_eq!(kind(&header), expected, "{kinds:?}");
+        // GeoTIFF keys become WKT in the formats that require it.
+        assert_eq!(header.has_wkt_crs(), 6 <= expected.1, "{kinds:?}");
         assert!(listener.has_note(reason), "{kinds:?}: {:?}", listener.notes);
     };
     let n = usize::from(N_POINTS);

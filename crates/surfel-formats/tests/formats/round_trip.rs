@@ -70,12 +70,22 @@ fn failed_las_writes_keep_the_old_file() {
 
 #[test]
 fn coordinate_systems_round_trip() {
-    for system in ["EPSG:2154", "EPSG:4326", "PROJCS[\"somewhere\"]"] {
+    // Codes are written as WKT, which the point formats from 6 on require; unknown ones as GeoTIFF keys.
+    let lambert = crs_definitions::from_code(2154).unwrap().wkt;
+    assert!(lambert.contains("Lambert-93"));
+    for (system, expected) in [
+        ("EPSG:2154", lambert),
+        ("EPSG:2154+5720", lambert),
+        ("EPSG:1", "EPSG:1"),
+        ("PROJCS[\"somewhere\"]", "PROJCS[\"somewhere\"]"),
+    ] {
         for extension in ["las", "laz"] {
             let options =
                 SaveOptions { coordinate_system: Some(system.into()), ..Default::default() };
             let back = round_trip(&full_cloud(3), extension, &options);
-            assert_eq!(back.info.coordinate_system.as_deref(), Some(system));
+            assert_eq!(back.info.coordinate_system.as_deref(), Some(expected));
+            let las = back.info.las.unwrap();
+            assert_eq!((las.point_format, las.global_encoding & 16 != 0), (7, system != "EPSG:1"));
         }
     }
 }
