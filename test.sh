@@ -53,7 +53,8 @@ tests() {
 page_tests() {
     begin "$1"
     shift
-    node --test --test-reporter=tap "$@" 2>&1 | tee "$log" | grep -E '^(not )?ok |^ +error:|^# (tests|duration)'
+    node --test --test-reporter=tap "$@" 2>&1 | tee "$log" |
+        awk '/^(not )?ok |^# (tests|duration)/ { is_failure = /^not/; print; next } is_failure && /^ /'
     local ok bad left_out
     ok=$(sed -nE 's/^# pass ([0-9]+)$/\1/p' "$log")
     left_out=$(sed -nE 's/^# (skipped|todo) ([0-9]+)$/\2/p' "$log" | paste -sd+)

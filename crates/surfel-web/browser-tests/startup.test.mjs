@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import {
-  blankPage, closePage, colorCount, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, serve, settled, state, recordPictures,
+  blankPage, closePage, colorCount, drag, finishedPixels, openPage, pixels, pixelAt, QUICK, serve, settled, show, state, recordPictures,
 } from './harness.mjs';
 
 const PNG = 2;
@@ -86,4 +86,16 @@ test('the picture has the size of a resized window', async () => {
   await page.setViewportSize({ width: 700, height: 400 });
   await page.waitForFunction((height) => window.surfel.state.size.height < height, before.height);
   assert.notEqual(await finishedPixels(page), first);
+});
+
+test('a picture at rest goes on to more samples if nobody chose their number', async () => {
+  const resting = await serve(['town.ply'], '--light-samples', '1', '--exposure', '0');
+  const other = await openPage(resting.link, { viewport: { width: 500, height: 300 } });
+  await other.locator('#numbers', { hasText: ' 64 samples' }).waitFor();
+  const best = await pixels(other);
+  assert.equal((await state(other, 'lastFrame')).finished, true);
+  await show(other, { spp: 64, light_samples: 16 });
+  assert.equal((await state(other, 'lastFrame')).samples, 64);
+  assert.equal(await pixels(other), best);
+  await closePage(other);
 });

@@ -65,3 +65,6 @@ function withSeparators(value, options) {
   // Thin spaces: many readers take commas for decimal signs.
   return value.toLocaleString('en-US', options).replaceAll(',', '\u202f');
 }
+
+/** A file's name without folder and extensions. */
+export const stemOf = (name) => name.replace(/^.*[/\\]/, '').replace(/\..*$/, '') || 'picture';

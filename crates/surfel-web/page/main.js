@@ -8,7 +8,6 @@ import * as controls from './controls.js';
 import { Crosshair } from './crosshair.js';
 import { CursorCoordinates } from './cursor-coordinates.js';
 import { element } from './dom.js';
-import { setUpExportDialog, setUpSceneLoading } from './export-dialog.js';
 import { histogramRows } from './histogram.js';
 import { KEY_HELP, MOUSE_HELP, setUpKeyboard } from './keyboard.js';
 import { colormapPreview, setUpLegend } from './legend.js';
@@ -22,7 +21,7 @@ import { PickCard } from './pick-card.js';
 import { ProfileCard } from './profile-card.js';
 import { Picture } from './picture.js';
 import { setUpPointer } from './pointer.js';
-import { setUpSaveDialog } from './save-dialog.js';
+import { setUpSceneLoading } from './scene-loading.js';
 import { setUpStatusLine, statisticsTable } from './status.js';
 import { sunClock } from './sun-clock.js';
 import { exposeState } from './test-hooks.js';
@@ -53,8 +52,8 @@ let lastPick = null;
 
 const helpDialog = document.getElementById('help-dialog');
 const showHelp = () => helpDialog.showModal();
-const openSaveDialog = setUpSaveDialog(viewer);
-const openExportDialog = setUpExportDialog(viewer, viewHistory);
+const openSaveDialog = whenNeeded(async () => (await import('./save-dialog.js')).setUpSaveDialog(viewer));
+const openExportDialog = whenNeeded(async () => (await import('./export-dialog.js')).setUpExportDialog(viewer, viewHistory));
 
 setUpNotifications(viewer);
 setUpStatusLine(viewer);
@@ -116,6 +115,20 @@ exposeState(viewer);
 // The results need the up axis of the data.
 viewer.infoChanged.listen(showLinkedMeasurements);
 viewer.connect();
+
+/** Returns a function that calls the one that `load` resolves to, whose module is loaded at the first call. */
+function whenNeeded(load) {
+  let loaded = null;
+  return async () => {
+    try {
+      loaded ??= load();
+      (await loaded)();
+    } catch (error) {
+      loaded = null;
+      showToast(error.message);
+    }
+  };
+}
 
 /** Picks or measures the point behind a pixel, as the tool does; `isPick` picks with any tool. */
 async function useTool(pixel, isPick) {

@@ -2,11 +2,10 @@
 
 import { copyButton } from './copy.js';
 import { download, element, iconButton } from './dom.js';
-import { exact, rounded, withUnit } from './format.js';
+import { exact, rounded, stemOf, withUnit } from './format.js';
 import { geoJson } from './geojson.js';
 import { KINDS, circleThrough, corner, middle, pathLength, resultsOf } from './measure.js';
 import { borders } from './profile.js';
-import { stemOf } from './save-dialog.js';
 import { signal } from './signal.js';
 import { addScaled, mix } from './vector.js';
 import { volumeControls } from './volume.js';

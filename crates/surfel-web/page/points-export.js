@@ -1,8 +1,7 @@
 // The part of the export dialog that downloads the points that are shown, as a file with the columns of theirs.
 
 import { element } from './dom.js';
-import { count, duration, fileSize } from './format.js';
-import { stemOf } from './save-dialog.js';
+import { count, duration, fileSize, stemOf } from './format.js';
 
 const FORMATS = ['laz', 'ply'];
 

@@ -1,9 +1,8 @@
 // The card with the chart of a height profile.
 
 import { download, element, iconButton } from './dom.js';
-import { count, rounded, withUnit } from './format.js';
+import { count, rounded, stemOf, withUnit } from './format.js';
 import { chartOf, csvOf, levelLength, nearestPoint, positionsOf, svgOf } from './profile.js';
-import { stemOf } from './save-dialog.js';
 import { showToast } from './toast.js';
 
 const POINT_SIZE = 2;

@@ -1,7 +1,7 @@
 // The dialog that saves a finished picture: its size, progress and file.
 
 import { download, element } from './dom.js';
-import { duration } from './format.js';
+import { duration, stemOf } from './format.js';
 
 const PRESETS = {
   window: ({ width, height }) => [width, height],
@@ -69,6 +69,3 @@ export function setUpSaveDialog(viewer) {
     dialog.showModal();
   };
 }
-
-/** A file's name without folder and extensions. */
-export const stemOf = (name) => name.replace(/^.*[/\\]/, '').replace(/\..*$/, '') || 'picture';

@@ -42,12 +42,15 @@ export function setUpStatusLine(viewer) {
   viewer.connectionChanged.listen(({ isConnected }) => isConnected || endWork());
   viewer.frameShown.listen(() => {
     if (!isWorking) showIdle();
-    const { width, height, samples, of_samples } = viewer.lastFrame;
-    numbers.textContent = `${width} × ${height}   ${samples} of ${of_samples} samples`;
+    const { width, height } = viewer.lastFrame;
+    numbers.textContent = `${width} × ${height}   ${samplesText(viewer.lastFrame)} samples`;
   });
   const rate = document.getElementById('rate');
   viewer.statsReceived.listen(({ frames_per_s }) => { rate.textContent = `${rounded(frames_per_s, 2)} frames/s`; });
 }
+
+/** A finished picture may go on to more samples than it has asked for. */
+const samplesText = ({ samples, of_samples }) => (samples < of_samples ? `${samples} of ${of_samples}` : `${samples}`);
 
 /** The table of statistics in the panel. */
 export function statisticsTable(viewer) {
@@ -65,7 +68,7 @@ export function statisticsTable(viewer) {
       ...(median === undefined ? [] : [['Latency', `${rounded(median, 3)} ms`]]),
       ['Rays', `${rounded(stats.mrays_per_s, 3)} million/s`],
       ['Picture', `${stats.width} × ${stats.height}`],
-      ['Samples', `${stats.samples} of ${stats.of_samples}`],
+      ['Samples', samplesText(stats)],
       ['Points', count(info.points)],
       ['Triangles', count(info.triangles)],
       ['Processor', `${info.threads} threads, ${info.simd}`],

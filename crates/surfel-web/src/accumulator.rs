@@ -84,6 +84,17 @@ const REFINED_JPEG_QUALITY: u8 = 92;
 const SLICE_SECS: f64 = 0.015;
 /// Minimum number of rows of a slice, unless rows take long: each slice has a fixed cost.
 const MIN_SLICE_ROWS: u32 = 8;
+/// Numbers of samples at which a picture at rest that goes on after it was finished is sent again.
+const REST_SAMPLES: [u32; 2] = [16, 64];
+
+/// How far a picture is refined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// To the samples of the settings.
+    Finish,
+    /// To those of a picture at rest.
+    Rest,
+}
 
 impl Accumulator {
     /// Version of the view that the last draft showed.
@@ -208,18 +219,33 @@ impl Accumulator {
         &mut self,
         renderer: &dyn Renderer,
         view: &ViewState,
+        stage: Stage,
         progress: &dyn Progress,
     ) -> Result<bool> {
         let Some(prepared) = view.scene.clone() else { return Ok(false) };
         let (width, height) = view.size;
-        let settings = Settings { width, height, ..prepared.render_settings };
         if 0 < self.n_samples && self.extend_keyframe(renderer, view, &prepared, progress)? {
             return Ok(true);
         }
         let of_samples = of_samples(&prepared);
-        if self.n_samples == of_samples || self.has_frame {
+        let is_begun = 0 < self.n_samples;
+        let target = match stage {
+            Stage::Finish => of_samples,
+            Stage::Rest if is_begun => rest_samples(&prepared),
+            Stage::Rest => 0,
+        };
+        if target <= self.n_samples || self.has_frame {
             return Ok(false);
         }
+        let full = prepared.render_settings;
+        let settings = Settings {
+            width,
+            height,
+            samples_per_pixel: target,
+            // As many for each sample.
+            light_samples: full.light_samples.saturating_mul(target / of_samples),
+            ..full
+        };
         let is_rasterized = uses_rasterizer(&prepared.flat)?;
         let slice = self.next_slice(height, is_rasterized);
         let n_rows = slice.rows.1 - slice.rows.0;
@@ -235,9 +261,11 @@ impl Accumulator {
         self.add(&image, slice, width as usize * height as usize, has_overlay);
         if self.n_rows == height {
             (self.n_samples, self.n_rows) = (self.n_samples + 1, 0);
-            // Each picture that is sent has twice as many samples as the one before.
-            let is_last = self.n_samples == of_samples;
-            self.has_frame = self.n_samples.is_power_of_two() || is_last;
+            // Each picture that is sent has twice as many samples as the one before, at rest four times as many.
+            let n = self.n_samples;
+            let is_sent =
+                if of_samples < n { REST_SAMPLES.contains(&n) } else { n.is_power_of_two() };
+            self.has_frame = is_sent || n == of_samples;
         }
         Ok(true)
     }
@@ -250,7 +278,7 @@ impl Accumulator {
         let prepared = view.scene.as_ref()?;
         let of_samples = of_samples(prepared);
         let (width, height) = view.size;
-        let is_finished = self.n_samples == of_samples;
+        let is_finished = of_samples <= self.n_samples;
         let start = Instant::now();
         let drawn = prepared.overlay.as_ref().zip(view.camera).map(|(overlay, camera)| {
             let mut image = self.mean(view.size);
@@ -343,10 +371,10 @@ impl Accumulator {
         Ok(true)
     }
 
-    /// Frees the samples of a finished picture that has been taken, once its keyframe has their colours: a page at rest
-    /// keeps no more than its keyframe.
+    /// Frees the samples of a picture that has been taken and goes on to no more, once its keyframe has their colours: a
+    /// page then keeps no more than its keyframe.
     fn release_samples(&mut self, prepared: &Arc<PreparedScene>, size: (u32, u32)) {
-        if self.n_samples < of_samples(prepared) || self.has_frame {
+        if self.n_samples < rest_samples(prepared) || self.has_frame {
             return;
         }
         let has_none = uses_rasterizer(&prepared.flat).unwrap_or(false);
@@ -439,6 +467,14 @@ impl Accumulator {
 fn of_samples(prepared: &PreparedScene) -> u32 {
     let is_rasterized = uses_rasterizer(&prepared.flat).unwrap_or(false);
     if is_rasterized { 1 } else { prepared.render_settings.samples_per_pixel }
+}
+
+/// Returns the number of samples that a picture at rest goes on to after it was finished.
+fn rest_samples(prepared: &PreparedScene) -> u32 {
+    let of_samples = of_samples(prepared);
+    let goes_on =
+        prepared.goes_on_at_rest && of_samples == prepared.render_settings.samples_per_pixel;
+    if goes_on { REST_SAMPLES[1].max(of_samples) } else { of_samples }
 }
 
 /// Returns settings of a picture of this size that shows the place of each pixel, for as few rays as there can be.

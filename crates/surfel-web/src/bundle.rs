@@ -1,24 +1,48 @@
 //! Bundling: the page's modules as one script, and its style sheets as one, so that it loads with few requests.
 //!
-//! Each module becomes a function that is called once and returns the module's exports. This understands the forms
-//! of `import` and `export` that the page uses, and rejects all others; a test bundles the page. Lines that hold only
-//! a comment and indentation are left out, so that the page loads sooner; texts of several lines have no indentation.
+//! Each module becomes a function that is called once and returns the module's exports. A module that another one loads
+//! by `import('./name.js')` becomes a script of its own, with those that it alone imports; it is given the modules of the
+//! first script that it imports, too. This understands the forms of `import` and `export` that the page uses, and rejects
+//! all others; a test bundles the page. Lines that hold only a comment and indentation are left out, so that the page loads
+//! sooner; texts of several lines have no indentation.
 
 use std::collections::BTreeSet;
 
 /// Reads a file of the page by its name.
 pub type ReadFile<'r> = &'r dyn Fn(&str) -> Option<String>;
 
-/// Returns one module that does what `entry` and all modules that it imports do.
+/// Returns one module that does what `entry` and all modules that it imports do. `add_script` gets the name and the text
+/// of each script that is loaded when it is needed, and returns its address.
 ///
 /// # Errors
 /// Fails with the reason if a module is missing, imports itself through others, or uses another form of `import` or
 /// `export`.
-pub fn bundle_modules(entry: &str, read: ReadFile) -> Result<String, String> {
-    let mut bundle =
-        Bundle { read, is_added: BTreeSet::new(), open: Vec::new(), text: String::new() };
-    bundle.add(entry)?;
-    Ok(bundle.text)
+pub fn bundle_modules(
+    entry: &str,
+    read: ReadFile,
+    add_script: &mut dyn FnMut(&str, String) -> String,
+) -> Result<String, String> {
+    let mut first = Bundle::new(read);
+    first.add(entry)?;
+    let mut text = first.text;
+    for name in first.needed_later {
+        let mut later = Bundle { given: Some(&first.is_added), ..Bundle::new(read) };
+        later.add(&name)?;
+        if let Some(other) = later.needed_later.first() {
+            return Err(format!("{name}: loads {other}, although it is not in the first script"));
+        }
+        let given: Vec<String> = later.used.iter().map(|name| variable_of(name)).collect();
+        let given = given.join(", ");
+        let variable = variable_of(&name);
+        let script = format!(
+            "export default ({{ {given} }}) => {{\n{}return {variable};\n}};\n",
+            later.text
+        );
+        let address = add_script(&name, script);
+        let call = format!("import('./{address}').then((script) => script.default({{ {given} }}))");
+        text = text.replace(&format!("import('./{name}')"), &call);
+    }
+    Ok(text)
 }
 
 /// Returns the style sheets in their order as one, without comments and needless spaces.
@@ -41,15 +65,37 @@ fn dense_style(line: &str) -> String {
 
 struct Bundle<'r> {
     read: ReadFile<'r>,
+    /// The modules of the first script, if this is another one.
+    given: Option<&'r BTreeSet<String>>,
+    /// Names of given modules that are imported.
+    used: BTreeSet<String>,
     is_added: BTreeSet<String>,
     /// The modules whose imports are being added.
     open: Vec<String>,
+    /// The modules that are loaded when they are needed.
+    needed_later: BTreeSet<String>,
     text: String,
 }
 
-impl Bundle<'_> {
+impl<'r> Bundle<'r> {
+    fn new(read: ReadFile<'r>) -> Self {
+        Self {
+            read,
+            given: None,
+            used: BTreeSet::new(),
+            is_added: BTreeSet::new(),
+            open: Vec::new(),
+            needed_later: BTreeSet::new(),
+            text: String::new(),
+        }
+    }
+
     /// Adds a module after those that it imports.
     fn add(&mut self, name: &str) -> Result<(), String> {
+        if self.given.is_some_and(|given| given.contains(name)) {
+            self.used.insert(name.to_owned());
+            return Ok(());
+        }
         if self.is_added.contains(name) {
             return Ok(());
         }
@@ -65,6 +111,7 @@ impl Bundle<'_> {
         self.open.pop();
         self.is_added.insert(name.to_owned());
         self.text += &module.as_function(name);
+        self.needed_later.extend(module.needed_later);
         Ok(())
     }
 }
@@ -72,6 +119,8 @@ impl Bundle<'_> {
 /// One module: its imports, the names that it exports, and its text without `import` and `export`.
 struct Module<'t> {
     imports: Vec<Import>,
+    /// The names of the modules that it loads when it needs them.
+    needed_later: Vec<String>,
     exports: Vec<&'t str>,
     lines: Vec<&'t str>,
 }
@@ -85,13 +134,23 @@ struct Import {
 
 impl<'t> Module<'t> {
     fn parse(text: &'t str) -> Result<Self, String> {
-        let mut module = Self { imports: Vec::new(), exports: Vec::new(), lines: Vec::new() };
+        let mut module = Self {
+            imports: Vec::new(),
+            needed_later: Vec::new(),
+            exports: Vec::new(),
+            lines: Vec::new(),
+        };
         let mut lines = dense_lines(text);
         while let Some(line) = lines.next() {
-            if line.contains("import(") || line.contains("import.meta") {
-                return Err(format!("`{line}` is not supported"));
+            let unsupported = || format!("`{line}` is not supported");
+            if line.contains("import.meta") {
+                return Err(unsupported());
             }
-            if line.starts_with("import") {
+            for rest in line.split("import(").skip(1) {
+                let name = rest.strip_prefix("'./").and_then(|rest| rest.split_once("')"));
+                module.needed_later.push(name.ok_or_else(unsupported)?.0.to_owned());
+            }
+            if line.starts_with("import ") {
                 let mut statement = line.to_owned();
                 while !statement.ends_with(';') {
                     let next = lines.next().ok_or("an import does not end with a semicolon")?;
@@ -101,7 +160,7 @@ impl<'t> Module<'t> {
             } else if let Some(declaration) = line.strip_prefix("export") {
                 let declaration = declaration.trim_start();
                 let name = exported_name(declaration);
-                module.exports.push(name.ok_or_else(|| format!("`{line}` is not supported"))?);
+                module.exports.push(name.ok_or_else(unsupported)?);
                 module.lines.push(declaration);
             } else {
                 module.lines.push(line.trim());
@@ -180,12 +239,24 @@ mod tests {
 
     use super::*;
 
-    fn bundle(files: &[(&str, &str)]) -> Result<String, String> {
+    /// The first script, then the others.
+    fn bundle_all(files: &[(&str, &str)]) -> Result<Vec<String>, String> {
         let read = |name: &str| {
             let found = files.iter().find(|(found, _)| *found == name);
             found.map(|(_, text)| (*text).to_owned())
         };
-        bundle_modules("main.js", &read)
+        let mut scripts = Vec::new();
+        let mut add_script = |name: &str, text: String| {
+            scripts.push(text);
+            format!("hashed-{name}")
+        };
+        let first = bundle_modules("main.js", &read, &mut add_script)?;
+        scripts.insert(0, first);
+        Ok(scripts)
+    }
+
+    fn bundle(files: &[(&str, &str)]) -> Result<String, String> {
+        Ok(bundle_all(files)?.swap_remove(0))
     }
 
     #[test]
@@ -228,6 +299,39 @@ return {  };
     }
 
     #[test]
+    fn modules_that_are_needed_later_are_scripts_of_their_own() {
+        let found = bundle_all(&[
+            ("main.js", "import { a } from './a.js';\nconst later = () => import('./late.js');"),
+            ("a.js", "export const a = 1;"),
+            (
+                "late.js",
+                "import { a } from './a.js';\nimport { b } from './b.js';\nexport const c = a + b;",
+            ),
+            ("b.js", "export const b = 2;"),
+        ]);
+        let [first, later] = found.unwrap().try_into().unwrap();
+        let call = "import('./hashed-late.js').then((script) => script.default({ module_a }))";
+        assert!(first.contains(&format!("const later = () => {call};")), "{first}");
+        assert!(!first.contains("module_b"), "{first}");
+        let expected = "\
+export default ({ module_a }) => {
+const module_b = (() => {
+const b = 2;
+return { b };
+})();
+const module_late = (() => {
+const { a } = module_a;
+const { b } = module_b;
+const c = a + b;
+return { c };
+})();
+return module_late;
+};
+";
+        assert_eq!(later, expected);
+    }
+
+    #[test]
     fn style_sheets_are_joined_without_comments() {
         let read = |name: &str| match name {
             "a.css" => Some("/* All. */\n\nb {\n  color: red;\n}\n".to_owned()),
@@ -246,7 +350,8 @@ return {  };
             ("import a from './a.js';", "import a"),
             ("import { a } from 'https://a.example/a.js';", "a.example"),
             ("import { a } from './a.js'", "semicolon"),
-            ("const a = await import('./a.js');", "await import"),
+            ("const a = await import(name);", "await import"),
+            ("const a = await import('./a.js');", "a.js: is missing"),
             ("export default 3;", "export default"),
             ("export let a = 3;", "export let"),
             ("export { a };", "export { a }"),

@@ -1,6 +1,6 @@
 //! One page as the render loop sees it: the view it shows, and the pictures that are on their way to it.
 
-use crate::accumulator::Accumulator;
+use crate::accumulator::{Accumulator, Stage};
 use crate::frame::{Frame, Quality};
 use crate::outgoing::Outgoing;
 use crate::scene_provider::Error;
@@ -134,13 +134,13 @@ impl Client {
         Ok(true)
     }
 
-    /// Renders one slice of the finished picture; returns whether there was anything to do.
+    /// Renders one slice of the picture of a stage; returns whether there was anything to do.
     ///
     /// # Errors
     /// Fails if rendering fails or is cancelled.
-    pub fn refine(&self, renderer: &dyn Renderer) -> surfel_core::Result<bool> {
+    pub fn refine(&self, renderer: &dyn Renderer, stage: Stage) -> surfel_core::Result<bool> {
         let (view, version) = self.versioned_view();
-        if view.is_moving && view.changed_at.elapsed() < MOVING_PAUSE {
+        if view.is_moving && (stage == Stage::Rest || view.changed_at.elapsed() < MOVING_PAUSE) {
             return Ok(false);
         }
         let mut accumulator = lock(&self.accumulator);
@@ -148,7 +148,7 @@ impl Client {
             return Ok(false);
         }
         let check = self.stale_check(version, Duration::ZERO);
-        let has_rendered = accumulator.refine(renderer, &view, &check)?;
+        let has_rendered = accumulator.refine(renderer, &view, stage, &check)?;
         let frame = if self.can_send() { accumulator.take_frame(&view) } else { None };
         let has_frame = frame.is_some();
         frame.into_iter().for_each(|frame| self.send(frame, &view));

@@ -71,7 +71,8 @@ fn accepts_gzip(request: &HeaderMap) -> bool {
     })
 }
 
-/// The page with one script, one style sheet and its icon, whose addresses hold the hashes of their contents.
+/// The page with its first script, one style sheet and its icon, and the scripts that it loads when it needs them. Their
+/// addresses hold the hashes of their contents.
 fn page_files() -> Result<Vec<PageFile>, String> {
     let read = |name: &str| {
         let found = Embedded::get(name)?;
@@ -87,7 +88,14 @@ fn page_files() -> Result<Vec<PageFile>, String> {
         }
     }
     let style = PageFile::hashed("page", "css", bundle_styles(&styles, &read)?);
-    let script = PageFile::hashed("page", "js", bundle_modules(ENTRY, &read)?);
+    let mut scripts = Vec::new();
+    let mut add_script = |name: &str, text: String| {
+        let script = PageFile::hashed(name.trim_end_matches(".js"), "js", text);
+        let address = script.name.clone();
+        scripts.push(script);
+        address
+    };
+    let script = PageFile::hashed("page", "js", bundle_modules(ENTRY, &read, &mut add_script)?);
     let icon = PageFile::hashed("icon", "svg", read(ICON).ok_or("the icon is missing")?);
     page =
         lines.join("\n").replacen("</head>", &format!("{STYLE_LINK}{}\">\n</head>", style.name), 1);
@@ -95,7 +103,8 @@ fn page_files() -> Result<Vec<PageFile>, String> {
         page = page.replacen(&format!("\"{name}\""), &format!("\"{}\"", file.name), 1);
     }
     let page = PageFile::new(String::new(), "html", CACHE_AND_ASK, page);
-    Ok(vec![page, style, script, icon])
+    scripts.extend([page, style, script, icon]);
+    Ok(scripts)
 }
 
 /// The first module of the page.
@@ -162,8 +171,15 @@ mod tests {
     #[test]
     fn the_page_can_be_bundled() {
         let files = page_files().unwrap();
-        let page = std::str::from_utf8(&files[0].plain).unwrap();
-        assert!(files[1..].iter().all(|file| page.contains(&format!("\"{}\"", file.name))));
+        let text = |file: &PageFile| String::from_utf8(file.plain.to_vec()).unwrap();
+        let page = files.iter().find(|file| file.name.is_empty()).map(text).unwrap();
         assert!(!page.contains(ENTRY) && !page.contains("base.css"));
+        let is_script =
+            |file: &&PageFile| file.name.starts_with("page-") && file.name.ends_with(".js");
+        let script = files.iter().find(is_script).map(text).unwrap();
+        for PageFile { name, .. } in files.iter().filter(|file| !file.name.is_empty()) {
+            let is_named = page.contains(&format!("\"{name}\""));
+            assert!(is_named || script.contains(&format!("import('./{name}')")), "{name}");
+        }
     }
 }

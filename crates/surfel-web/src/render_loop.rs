@@ -1,5 +1,6 @@
 //! The render loop: one thread that renders for all clients in turn.
 
+use crate::accumulator::Stage;
 use crate::client::{Client, MOVING_PAUSE};
 use crate::dynamic_resolution::draft_secs;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -25,6 +26,8 @@ struct LoopState {
     clients: Vec<Arc<Client>>,
     /// Counts notifications, each of which may mean new work.
     n_notifications: u64,
+    /// Number of tasks beside the loop: scenes that are prepared, pictures that are saved, questions about points.
+    n_tasks: usize,
     is_closed: bool,
 }
 
@@ -59,6 +62,12 @@ impl RenderLoop {
         self.changed.notify_all();
     }
 
+    /// Holds back pictures that are finished and go on at rest, for as long as the returned guard lives.
+    pub fn begin_task(self: &Arc<Self>) -> TaskGuard {
+        self.lock().n_tasks += 1;
+        TaskGuard { render_loop: self.clone() }
+    }
+
     /// Ends the thread after its current slice.
     pub fn close(&self) {
         self.lock().is_closed = true;
@@ -74,12 +83,12 @@ impl RenderLoop {
         let (mut next, mut next_slow) = (0, 0);
         let mut paused_until = Instant::now();
         loop {
-            let (clients, n_notifications) = {
+            let (clients, n_notifications, has_tasks) = {
                 let state = self.lock();
                 if state.is_closed {
                     return;
                 }
-                (state.clients.clone(), state.n_notifications)
+                (state.clients.clone(), state.n_notifications, 0 < state.n_tasks)
             };
             let (slow, quick): (Vec<_>, Vec<_>) =
                 clients.into_iter().partition(|client| client.is_slow());
@@ -89,8 +98,10 @@ impl RenderLoop {
             let secs = draft_secs(n_moving);
             let draft =
                 |client: &Arc<Client>| client.catch_failures(|client| client.draft(renderer, secs));
-            let refine =
-                |client: &Arc<Client>| client.catch_failures(|client| client.refine(renderer));
+            let refine_to = |client: &Arc<Client>, stage| {
+                client.catch_failures(|client| client.refine(renderer, stage))
+            };
+            let refine = |client: &Arc<Client>| refine_to(client, Stage::Finish);
             let n_drafts = quick.iter().filter(|client| draft(client)).count();
             let mut has_rendered = round_robin(&quick, &mut next, refine) || 0 < n_drafts;
             let start = Instant::now();
@@ -99,6 +110,10 @@ impl RenderLoop {
                 let render = |client: &Arc<Client>| draft(client) || refine(client);
                 has_rendered |= round_robin(&slow, &mut next_slow, render);
                 paused_until = Instant::now() + SLOW_CLIENT_PAUSE * start.elapsed();
+            }
+            if !has_rendered && !has_tasks {
+                has_rendered =
+                    round_robin(&quick, &mut next, |client| refine_to(client, Stage::Rest));
             }
             if !has_rendered {
                 let max_wait = if is_pause_over { MAX_WAIT } else { paused_until - start };
@@ -118,6 +133,18 @@ impl RenderLoop {
 
     fn lock(&self) -> MutexGuard<'_, LoopState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A task beside the render loop, which ends when this is dropped.
+pub struct TaskGuard {
+    render_loop: Arc<RenderLoop>,
+}
+
+impl Drop for TaskGuard {
+    fn drop(&mut self) {
+        self.render_loop.lock().n_tasks -= 1;
+        self.render_loop.notify();
     }
 }
 

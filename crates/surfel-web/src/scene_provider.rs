@@ -139,6 +139,8 @@ pub struct PreparedScene {
     pub flat: FlatScene,
     /// The render settings; each client replaces the size.
     pub render_settings: Settings,
+    /// True if a picture at rest goes on to more samples than its settings have, because nobody chose their number.
+    pub goes_on_at_rest: bool,
     /// The meaning of the colours, as the page shows it; null if they need no legend.
     pub legend: Value,
     /// The overlay of its pictures; none if they stay as they are.

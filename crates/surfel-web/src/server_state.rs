@@ -101,8 +101,9 @@ impl ServerState {
         task: impl FnOnce() -> R + Send + 'static,
     ) -> Result<R> {
         let permit = self.task_permits.clone().acquire_owned().await;
-        // The task holds the permit until it ends, even if nothing waits for its result any more.
-        let done = tokio::task::spawn_blocking(move || (task(), permit).0).await;
+        let guard = self.render_loop.begin_task();
+        // The task holds both until it ends, even if nothing waits for its result any more.
+        let done = tokio::task::spawn_blocking(move || (task(), permit, guard).0).await;
         done.map_err(|_| Error::Panicked)
     }
 

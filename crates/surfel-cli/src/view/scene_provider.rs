@@ -106,6 +106,8 @@ impl FileSceneProvider {
         Ok(PreparedScene {
             animated_camera: view.moves_camera.then(camera),
             render_settings: view.settings,
+            goes_on_at_rest: self.startup.picture.spp.is_none()
+                && description.picture.spp() == SceneDescription::default().picture.spp(),
             legend: legend_json(&view.trees.legend),
             overlay: page_overlay(view.overlay()),
             describe: self.describer(&view, description.output.time()),

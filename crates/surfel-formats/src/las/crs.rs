@@ -62,13 +62,12 @@ fn from_geo_keys(input: &Input, header: &Header) -> Option<String> {
 ///
 /// The point formats from 6 on require WKT (LAS 1.4, section 2.4). A source that has only GeoTIFF keys keeps them if its
 /// own format is one of these.
-pub(super) fn projection_records(
-    options: &SaveOptions,
-    is_extended: bool,
-) -> Vec<(u16, Vec<u8>)> {
+pub(super) fn projection_records(options: &SaveOptions, is_extended: bool) -> Vec<(u16, Vec<u8>)> {
     let kept = options.las.as_ref().map_or(Vec::new(), |las| las.projection.clone());
-    let is_so_in_source =
-        options.las.as_ref().is_some_and(|las| PointFields::of_format(las.point_format).is_extended);
+    let is_so_in_source = options
+        .las
+        .as_ref()
+        .is_some_and(|las| PointFields::of_format(las.point_format).is_extended);
     let has_wkt = kept.iter().any(|(record_id, _)| *record_id == WKT);
     if !kept.is_empty() && (has_wkt || !is_extended || is_so_in_source) {
         return kept;

@@ -2,7 +2,7 @@
 
 use crate::hill_provider::{FaultyRenderer, N_SAMPLES, PICTURE_SIZE, STAMP};
 use crate::test_page::{JPEG, PNG, Picture, TestPage};
-use crate::test_server::TestServer;
+use crate::test_server::{TestServer, wait_until};
 use serde_json::json;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -29,6 +29,44 @@ async fn pictures_are_refined_to_the_finished_picture() {
     // The samples are summed in another order, so their rounding differs.
     let is_close = |(a, b): (&u8, &u8)| a.abs_diff(*b) <= 1;
     assert!(found.iter().zip(expected.iter()).all(is_close));
+}
+
+#[tokio::test]
+async fn finished_pictures_go_on_at_rest() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({ "goes_on": true })).await;
+    let finished = page.finished_picture().await;
+    assert_eq!((finished.kind, finished.samples), (PNG, N_SAMPLES as u16));
+    for samples in [16, 64] {
+        let better = page.wait_for_picture(|_| true).await;
+        assert_eq!((better.kind, better.samples, better.is_finished), (PNG, samples, true));
+        assert_eq!((better.of_samples, better.seq), (N_SAMPLES as u16, finished.seq));
+        let found = better.decode().into_rgba8();
+        let expected = server.provider.picture(PICTURE_SIZE, samples.into());
+        let is_close = |(a, b): (&u8, &u8)| a.abs_diff(*b) <= 1;
+        assert!(found.iter().zip(expected.iter()).all(is_close), "{samples}");
+    }
+    assert!(page.sync().await.is_empty());
+    // Another view begins anew.
+    page.set_camera(1, 0.5, false).await;
+    assert_eq!(page.finished_picture().await.samples, N_SAMPLES as u16);
+}
+
+#[tokio::test]
+async fn pictures_at_rest_wait_for_the_tasks_of_others() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({})).await;
+    page.finished_picture().await;
+    let mut other = TestPage::open(&server, json!({})).await;
+    other.finished_picture().await;
+    other.change_settings(1, json!({ "slow": 600 })).await;
+    wait_until(|| server.provider.n_started.load(Ordering::Relaxed) == 1).await;
+    page.change_settings(1, json!({ "goes_on": true })).await;
+    let finished = page.wait_for_picture(|picture| picture.is_finished && picture.seq == 1).await;
+    assert_eq!(finished.samples, N_SAMPLES as u16);
+    assert!(page.sync().await.is_empty());
+    drop(other);
+    assert_eq!(page.picture().await.samples, 16);
 }
 
 #[tokio::test]

@@ -60,6 +60,7 @@ impl Gate {
 /// | `camera_angle` | the scene animates its camera, which is at this angle |
 /// | `points` | points are rasterised |
 /// | `samples` | a finished picture has this many samples |
+/// | `goes_on` | finished pictures go on at rest |
 /// | `preview` | there is a preview |
 /// | `stamp` | pictures have an overlay |
 /// | `tint` | none |
@@ -111,8 +112,13 @@ impl HillProvider {
     }
 
     /// The finished picture of this size, as a page or a program should get it.
-    pub fn finished_picture(&self, (width, height): (u32, u32)) -> image::RgbaImage {
-        let settings = Settings { width, height, ..render_settings(0) };
+    pub fn finished_picture(&self, size: (u32, u32)) -> image::RgbaImage {
+        self.picture(size, N_SAMPLES)
+    }
+
+    /// The picture of this size with this number of samples.
+    pub fn picture(&self, (width, height): (u32, u32), samples_per_pixel: u32) -> image::RgbaImage {
+        let settings = Settings { width, height, samples_per_pixel, ..render_settings(0) };
         let (image, _) = cpu_renderer().render(&self.flat, &settings, &NoProgress).unwrap();
         to_rgba8(&image)
     }
@@ -216,6 +222,7 @@ impl SceneProvider for HillProvider {
         let (mut seed, mut animated_camera) = (0, None);
         let mut flat = self.flat.clone();
         let mut samples = N_SAMPLES;
+        let mut goes_on_at_rest = false;
         for (key, value) in settings {
             let secs = value.as_f64().unwrap_or(0.0);
             match key.as_str() {
@@ -228,6 +235,7 @@ impl SceneProvider for HillProvider {
                 "panic" => panic!("requested by a test"),
                 "fault" => seed = value.as_u64().unwrap_or(0),
                 "samples" => samples = value.as_u64().unwrap() as u32,
+                "goes_on" => goes_on_at_rest = true,
                 "points" => flat = self.rasterized.clone(),
                 "camera_angle" => animated_camera = value.as_f64().map(camera),
                 "camera" | "tint" | "stamp" | "preview" | "resolution" | "slow_render" => {}
@@ -240,6 +248,7 @@ impl SceneProvider for HillProvider {
             animated_camera,
             flat,
             render_settings: Settings { samples_per_pixel: samples, ..render_settings(seed) },
+            goes_on_at_rest,
             legend: Value::Null,
             overlay: settings.contains_key("stamp").then(|| Box::new(Stamp) as _),
             describe: Arc::new(
