@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, before, beforeEach, test } from 'node:test';
 import { project } from '../page/camera.js';
+import { encodeHash } from '../page/link.js';
 import { angleDegrees, circleThrough, pathLength } from '../page/measure.js';
 import { RESOLUTION } from './data.mjs';
 import { closePage, copyBy, data, openPage, pixelAt, QUICK, reopen, serve, settled, show, state } from './harness.mjs';
@@ -206,6 +207,27 @@ test('angles, circles and polylines agree with their points', async () => {
   const { features } = JSON.parse(readFileSync(await file.path(), 'utf8'));
   assert.deepEqual(features.map(({ geometry }) => geometry.type), ['LineString', 'MultiPoint', 'LineString']);
   assert.deepEqual(features[2].geometry.coordinates, corners);
+});
+
+test('labels are hidden behind what hides their points', async () => {
+  const pixels = [await pixelAt(page, 0.6, 0.75), await pixelAt(page, 0.9, 0.4)];
+  const seen = (await pointsAt(pixels)).map(positionOf);
+  const buried = seen.map(([x, y, z]) => [x, y, z - 3]);
+  const figure = (name, points) => ({ kind: 'polyline', name, points });
+  const shown = async (n, figures, patch = {}) => {
+    await page.evaluate((hash) => { location.hash = hash; }, encodeHash(patch, figures));
+    await page.waitForFunction((count) => document.querySelectorAll('#overlay .label').length === count, n);
+    return Number(await page.locator('#overlay .label').first().textContent());
+  };
+  const figures = [figure('polyline 1', seen), figure('polyline 2', [buried[0], buried[1], buried[0]])];
+  const [length, lengthBelow] = figures.map(({ points }) => pathLength(points));
+  isClose(await shown(1, figures), length);
+  await shown(1, [figure('polyline 1', [seen[0], buried[1]])]);
+  const { position, focal_point } = await state(page, 'camera');
+  const camera = { position: [position[0], position[1], 2 * focal_point[2] - position[2]], focal_point, view_up: [0, 0, 1] };
+  await shown(1, figures, { camera });
+  await page.waitForFunction((from) => from < Number(document.querySelector('#overlay .label')?.textContent), 1.5 * length);
+  isClose(await shown(1, figures, { camera }), lengthBelow);
 });
 
 test('a volume over the roof agrees with its points, above each base', async () => {

@@ -189,27 +189,27 @@ export class MeasureTool {
       (KINDS_OF_ONE_RESULT.includes(kind) ? this.#text(result) : `${result.name} ${this.#text(result)}`));
     if (kind === 'area' || kind === 'volume') {
       return [...view.polygon(points, 'measure-area'), ...view.path(points, 'measure', true), ...dots(view, points),
-        ...(lines.length ? view.label(middle(points), lines) : [])];
+        ...(lines.length ? view.label(middle(points), lines, points) : [])];
     }
     if (kind === 'profile') {
       const strip = borders(points, figure.width, up).flatMap(([from, to]) => view.line(from, to, 'measure-leg'));
-      return [...strip, ...view.path(points, 'measure', false), ...dots(view, points), ...view.label(points[0], [figure.name])];
+      return [...strip, ...view.path(points, 'measure', false), ...dots(view, points), ...view.label(points[0], [figure.name], points)];
     }
     if (kind === 'polyline' || kind === 'angle') {
       const at = kind === 'angle' ? points[1] : points.at(-1);
-      return [...view.path(points, 'measure', false), ...dots(view, points), ...view.label(at, lines)];
+      return [...view.path(points, 'measure', false), ...dots(view, points), ...view.label(at, lines, points)];
     }
     if (kind === 'circle') {
       const circle = circleThrough(points);
       return [...view.path(circle ? outlineOf(circle) : points, 'measure', circle !== null), ...dots(view, points),
-        ...view.label(circle?.center ?? points[1], lines)];
+        ...view.label(circle?.center ?? points[1], lines, points)];
     }
     const [a, b] = points;
     const elbow = corner(a, b, up);
     const legs = [...view.line(a, elbow, kind === 'height' ? 'measure' : 'measure-leg'), ...view.line(elbow, b, 'measure-leg')];
     const straight = kind === 'distance' ? view.line(a, b, 'measure') : [];
     const at = kind === 'height' ? mix(a, elbow, 0.5) : mix(a, b, 0.5);
-    return [...legs, ...straight, ...dots(view, points), ...view.label(at, lines)];
+    return [...legs, ...straight, ...dots(view, points), ...view.label(at, lines, points)];
   }
 }
 

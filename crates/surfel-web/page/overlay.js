@@ -15,6 +15,10 @@ const LABEL_SPACING = 3;
 export class Overlay {
   #painters = [];
   #isScheduled = false;
+  /** Keys of the points that surfaces hide, of which the server was asked last. */
+  #hidden = new Set();
+  #isAsking = false;
+  #askedFor = '';
 
   constructor(root, viewer) {
     this.root = root;
@@ -37,14 +41,42 @@ export class Overlay {
       this.#isScheduled = false;
       const camera = this.viewer.shownCamera;
       if (!camera) return;
-      const view = viewOf(camera, { width: this.root.clientWidth, height: this.root.clientHeight });
+      const anchors = new Map();
+      const isHidden = (points) => {
+        for (const point of points) anchors.set(`${point}`, point);
+        return points.every((point) => this.#hidden.has(`${point}`));
+      };
+      const view = viewOf(camera, { width: this.root.clientWidth, height: this.root.clientHeight }, isHidden);
       this.root.replaceChildren(...this.#painters.flatMap((paint) => paint(view)));
+      this.#askForHidden([...anchors.values()]);
     });
+  }
+
+  /** Asks the server which of the points of labels are hidden, one question at a time, and draws again if that changes. */
+  async #askForHidden(points) {
+    const { lastFrame } = this.viewer;
+    if (this.#isAsking || points.length === 0 || this.#askedFor === keyOf(points, lastFrame)) return;
+    this.#isAsking = true;
+    this.#askedFor = keyOf(points, lastFrame);
+    try {
+      const { visible } = await this.viewer.request({ type: 'visible', points });
+      const hidden = new Set(points.filter((_, i) => !visible[i]).map(String));
+      const isSame = hidden.size === this.#hidden.size && [...hidden].every((key) => this.#hidden.has(key));
+      this.#hidden = hidden;
+      if (!isSame) this.redraw();
+    } catch {
+      // All labels are shown until there is an answer.
+    }
+    this.#isAsking = false;
+    if (this.viewer.lastFrame?.frame !== lastFrame?.frame) this.redraw();
   }
 }
 
+/** Changes with the labels' points and with the picture. */
+const keyOf = (points, frame) => `${frame?.frame} ${points.join(' ')}`;
+
 /** The functions that painters draw with. Points are in the world, their positions on the overlay in CSS pixels. */
-function viewOf(camera, size) {
+function viewOf(camera, size, isHidden) {
   const toPixel = (point) => project(camera, size, point);
 
   const lineBetween = (from, to, className) => svg('line', { class: className, x1: from.x, y1: from.y, x2: to.x, y2: to.y });
@@ -89,10 +121,10 @@ function viewOf(camera, size) {
   const labels = [];
   const overlaps = (a, b) => Math.abs(a.x - b.x) < (a.width + b.width) / 2 && Math.abs(a.y - b.y) < (a.height + b.height) / 2;
 
-  /** A label with lines of text above a point, and above earlier labels. */
-  const label = (point, lines) => {
+  /** A label with lines of text above a point, and above earlier labels; none if what it labels, `points`, is hidden. */
+  const label = (point, lines, points) => {
     const foot = toPixel(point);
-    if (!foot) return [];
+    if (!foot || isHidden(points)) return [];
     const width = 14 + 6.7 * Math.max(...lines.map((text) => text.length));
     const height = 8 + LABEL_LINE_HEIGHT * lines.length;
     const at = { x: foot.x, y: foot.y - height / 2 - LABEL_GAP, width, height };

@@ -242,6 +242,7 @@ export class Viewer {
       stats: () => this.statsReceived(message),
       state: () => this.progressChanged(message),
       picked: () => this.#resolveRequest(message),
+      seen: () => this.#resolveRequest(message),
       profiled: () => this.#resolveRequest(message),
       measured: () => this.#resolveRequest(message),
       counted: () => this.#resolveRequest(message),

@@ -18,6 +18,7 @@ mod keyframe;
 mod encode;
 mod frame;
 mod view;
+mod visibility;
 mod accumulator;
 mod outgoing;
 mod client;

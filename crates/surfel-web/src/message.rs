@@ -35,6 +35,8 @@ pub enum Incoming {
     Ack { frame: u32 },
     /// A request for the point behind a pixel.
     Pick { id: u32, x: f64, y: f64 },
+    /// A question which of these points the camera sees.
+    Visible { id: u32, points: Vec<[f64; 3]> },
     /// A request for the points beside a line, for a height profile.
     Profile { id: u32, points: Vec<[f64; 3]>, width: f64, up: [f64; 3] },
     /// A request for the volume between the points over a polygon and a base: `lowest`, `mean` or a height.

@@ -14,6 +14,7 @@ use crate::progress_reporter::{ProgressReporter, ProgressUpdate};
 use crate::scene_provider::{Error, PreparedScene, Result, SceneProvider, SettingsMap};
 use crate::scene_update;
 use crate::server_state::ServerState;
+use crate::visibility::visibility;
 use crate::volume;
 use axum::extract::ws::{Message, WebSocket};
 use futures_util::stream::{SplitSink, SplitStream};
@@ -184,6 +185,7 @@ impl Session {
                 self.state.render_loop.notify();
             }
             Incoming::Pick { id, x, y } => self.pick(id, (x, y)).await,
+            Incoming::Visible { id, points } => self.visible(id, points).await,
             Incoming::Profile { id, points, width, up } => {
                 self.profile(id, profile::parse(&points, width, up)).await;
             }
@@ -246,6 +248,15 @@ impl Session {
             Ok(json!({ "type": "picked", "id": id, "point": point }))
         };
         self.answer(id, pick).await;
+    }
+
+    async fn visible(&self, id: u32, points: Vec<[f64; 3]>) {
+        let view = self.client.view();
+        let find = move |_: &dyn Progress| {
+            let visible = visibility(&view, &points)?;
+            Ok(json!({ "type": "seen", "id": id, "visible": visible }))
+        };
+        self.answer(id, find).await;
     }
 
     async fn profile(&self, id: u32, line: Result<ProfileLine>) {

@@ -127,6 +127,23 @@ async fn profiles_have_the_points_beside_their_line() {
 }
 
 #[tokio::test]
+async fn pages_learn_which_points_are_hidden() {
+    let server = TestServer::start();
+    let mut page = TestPage::open(&server, json!({})).await;
+    page.finished_picture().await;
+    let request = |id: u32, points: Value| json!({ "type": "visible", "id": id, "points": points });
+    // On the hill, below it, beside it, and behind the camera.
+    let points = json!([[0, 0, 0.5], [0, 0, -0.5], [3, 0, 0], [0, -20, 12]]);
+    page.send_json(request(1, points)).await;
+    let seen = page.message("seen").await;
+    assert_eq!((&seen["id"], &seen["visible"]), (&json!(1), &json!([true, false, true, true])));
+    for invalid in [json!(vec![[0; 3]; 2001]), json!([["x", 0, 0]])] {
+        page.send_json(request(2, invalid)).await;
+        assert!(page.message("error").await["text"].is_string());
+    }
+}
+
+#[tokio::test]
 async fn a_saved_picture_has_the_camera_of_the_page() {
     let server = TestServer::start();
     let mut page = TestPage::open(&server, json!({})).await;
