@@ -21,8 +21,10 @@ const MIN_ON_SIDES: f64 = 0.5;
 /// Minimum fraction of the points that lie well within a room: furniture, people, the other side of a wall. Boxes and
 /// houses that were scanned from outside have none.
 const MIN_CONTENT: f64 = 0.004;
-/// Thickness of the layer that is removed with a wall, as a fraction of the room's longest side.
+/// Thickness of the layer that is removed with a wall, as a fraction of the room's longest side, and at most as one of the
+/// side across the wall: floor and ceiling of a flat hall stay apart, and wide terrain is no room.
 const WALL_THICKNESS: f32 = 0.02;
+const MAX_THICKNESS: f32 = 0.08;
 /// Azimuth from the room's own axes and elevation of the viewpoint: two walls are seen, and most of the floor.
 const VIEW_AZIMUTH_DEG: f64 = 35.0;
 const VIEW_ELEVATION_DEG: f64 = 42.0;
@@ -96,8 +98,11 @@ impl Room {
         self.high[axis] - self.low[axis]
     }
 
-    fn wall_thickness(&self) -> f32 {
-        WALL_THICKNESS * (0..3).map(|axis| self.size(axis)).fold(0.0, f32::max)
+    /// Returns the thickness of the walls across each axis.
+    fn wall_thickness(&self) -> [f32; 3] {
+        let sizes = [0, 1, 2].map(|axis| self.size(axis));
+        let longest = sizes.iter().copied().fold(0.0, f32::max);
+        sizes.map(|size| (WALL_THICKNESS * longest).min(MAX_THICKNESS * size))
     }
 
     /// Returns the fraction of the points that lie well within the box.
@@ -119,7 +124,7 @@ impl Room {
         let mut n_on_sides = 0;
         for point in points {
             let local = self.local(*point);
-            let is_at = |axis: usize, side: f32| (local[axis] - side).abs() < thickness;
+            let is_at = |axis: usize, side: f32| (local[axis] - side).abs() < thickness[axis];
             let is_on_side =
                 |axis: usize| is_at(axis, self.low[axis]) || is_at(axis, self.high[axis]);
             n_on_sides += usize::from((0..3).any(is_on_side));
@@ -187,7 +192,7 @@ impl Room {
         let mut planes = Vec::new();
         for (axis, position) in position.into_iter().enumerate() {
             let normal = self.axes[axis];
-            let (low, high) = (self.low[axis] + thickness, self.high[axis] - thickness);
+            let (low, high) = (self.low[axis] + thickness[axis], self.high[axis] - thickness[axis]);
             let mut hide = |normal: Vec3, coordinate: f32| {
                 let point = self.origin + (coordinate * self.axes[axis]).as_dvec3();
                 planes.push(ClipPlane { point, normal: normal.as_dvec3() });
@@ -268,6 +273,26 @@ mod tests {
         let ball = PointCloud::from_positions(ball.collect());
         assert_eq!(find_room(&ball, Vec3::Z, false), None);
         assert_eq!(find_room(&PointCloud::default(), Vec3::Z, false), None);
+    }
+
+    #[test]
+    fn wide_terrain_is_no_room_and_a_flat_hall_is_one() {
+        let mut random = Random::new(9, 0);
+        let mut scattered = |n: usize, height: &dyn Fn(f32, f32) -> f32| -> Vec<Vec3> {
+            let mut point = || (1400.0 * random.next_f32(), 1200.0 * random.next_f32());
+            let at = |(x, y): (f32, f32)| Vec3::new(x, y, height(x, y));
+            (0..n).map(|_| at(point())).collect()
+        };
+        let hills = |x: f32, y: f32| {
+            8.0 * (x / 130.0).sin()
+                + 6.0 * (y / 90.0 + x / 300.0).cos()
+                + 15.0 * (x * y).sin().powi(8)
+        };
+        let terrain = PointCloud::from_positions(scattered(60_000, &hills));
+        assert_eq!(find_room(&terrain, Vec3::Z, true), None);
+        let mut hall = room(0.0, true);
+        hall.positions.iter_mut().for_each(|p| *p *= Vec3::new(10.0, 10.0, 1.0));
+        assert!(find_room(&hall, Vec3::Z, true).is_some());
     }
 
     #[test]
