@@ -13,6 +13,8 @@ const BALL_REACH: f32 = 0.6;
 const MAX_SOLID_RATIO: f32 = 1.5;
 /// Minimum number of points of a structure for a typical radius of their own.
 const MIN_SOLIDS: usize = 16;
+/// The same of scattered points, as a fraction of all points: fewer may all be stray.
+const MIN_SCATTERED: f32 = 0.01;
 
 /// Gives a point the direction and the radius of its final structure. Surface points keep what was decided.
 pub fn settle(
@@ -69,7 +71,9 @@ pub fn clamp_solids(shapes: &mut [PointShape], structure: Structure, typical_rad
     let middle = radii.len() / 2;
     let median = *radii.select_nth_unstable_by(middle, f32::total_cmp).1;
     let limit = MAX_SOLID_RATIO * median;
-    let limit = if radii.len() < MIN_SOLIDS { limit.min(typical_radius) } else { limit };
+    let min_fraction = if structure == Structure::Scatter { MIN_SCATTERED } else { 0.0 };
+    let n_least = MIN_SOLIDS.max((min_fraction * shapes.len() as f32) as usize);
+    let limit = if radii.len() < n_least { limit.min(typical_radius) } else { limit };
     for shape in shapes.iter_mut().filter(|shape| shape.structure == structure) {
         shape.radius = shape.radius.min(limit);
     }
