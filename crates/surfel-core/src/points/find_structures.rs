@@ -10,7 +10,7 @@ use super::neighbors::{KdTree, Neighbor, Neighborhood};
 use super::normals::{PlaneFit, fit_plane};
 use super::radius::kth_distance;
 use super::scan_lines::widen_lines;
-use super::solids::{ball_radius, clamp_solids, settle};
+use super::solids::{ball_radius, clamp_solids, limit_stray_points, settle};
 use super::structure::{PointShape, Structure, StructureReport, is_line, is_surface};
 use super::wide_discs::{limit_crowded_discs, narrow_lone_discs};
 use crate::error::Result;
@@ -94,6 +94,7 @@ pub fn find_structures(
     narrow_lone_discs(tree, radii, typical.radius, widened, &mut shapes, progress)?;
     clamp_solids(&mut shapes, Structure::Line, typical.radius);
     clamp_solids(&mut shapes, Structure::Scatter, typical.radius);
+    limit_stray_points(positions, &mut shapes, progress)?;
     let report = StructureReport::of(&shapes);
     Ok((shapes, report))
 }

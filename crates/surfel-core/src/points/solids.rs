@@ -3,7 +3,10 @@
 use super::neighbors::{KdTree, Neighbor};
 use super::radius::kth_distance;
 use super::structure::{PointShape, Structure};
+use crate::error::Result;
 use crate::math::{DVec3, SymmetricMatrix, Vec3};
+use crate::progress::Progress;
+use rayon::prelude::*;
 
 /// Number of neighbours that give the direction of a line.
 const N_LINE_NEIGHBORS: usize = 8;
@@ -13,8 +16,19 @@ const BALL_REACH: f32 = 0.6;
 const MAX_SOLID_RATIO: f32 = 1.5;
 /// Minimum number of points of a structure for a typical radius of their own.
 const MIN_SOLIDS: usize = 16;
-/// The same of scattered points, as a fraction of all points: fewer may all be stray.
-const MIN_SCATTERED: f32 = 0.01;
+/// Minimum fraction of the points on surfaces of a cloud that has stray points: those of a forest all stand for themselves.
+const MIN_ON_SURFACES: f32 = 0.5;
+/// Fraction of the discs, from the smallest on, that a stray point is compared with: chance makes surfaces of a few stray
+/// points, too.
+const TRUSTED_DISCS: f32 = 0.95;
+/// Maximum ratio of the radius of a ball or capsule to that of the nearest disc.
+const MAX_STRAY_RATIO: f32 = 2.0;
+/// The same of a disc beyond those: the spacing of a scan grows with distance, but not at once.
+const MAX_DISC_RATIO: f32 = 8.0;
+/// Ratio of the distance to the nearest disc to its radius from which a point is no part of its surroundings.
+const FAR_RATIO: f32 = 8.0;
+/// Maximum number of discs among which the nearest is searched.
+const MAX_DISCS: usize = 100_000;
 
 /// Gives a point the direction and the radius of its final structure. Surface points keep what was decided.
 pub fn settle(
@@ -71,10 +85,61 @@ pub fn clamp_solids(shapes: &mut [PointShape], structure: Structure, typical_rad
     let middle = radii.len() / 2;
     let median = *radii.select_nth_unstable_by(middle, f32::total_cmp).1;
     let limit = MAX_SOLID_RATIO * median;
-    let min_fraction = if structure == Structure::Scatter { MIN_SCATTERED } else { 0.0 };
-    let n_least = MIN_SOLIDS.max((min_fraction * shapes.len() as f32) as usize);
-    let limit = if radii.len() < n_least { limit.min(typical_radius) } else { limit };
+    let limit = if radii.len() < MIN_SOLIDS { limit.min(typical_radius) } else { limit };
     for shape in shapes.iter_mut().filter(|shape| shape.structure == structure) {
         shape.radius = shape.radius.min(limit);
     }
+}
+
+/// Limits the balls and capsules of stray points far from all surfaces by the discs of the nearest surface, and makes balls
+/// of their discs: there may be so many of them that their own median is large, and that some lie in a plane, as below
+/// aerial scans and around clouds of features of photographs.
+///
+/// # Errors
+///
+/// Returns [`Error::Cancelled`](crate::error::Error::Cancelled) if `progress` is cancelled.
+pub fn limit_stray_points(
+    positions: &[Vec3],
+    shapes: &mut [PointShape],
+    progress: &dyn Progress,
+) -> Result<()> {
+    let is_surface = |shape: &&PointShape| shape.structure == Structure::Surface;
+    let mut radii: Vec<f32> = shapes.iter().filter(is_surface).map(|shape| shape.radius).collect();
+    if radii.is_empty() || (radii.len() as f32) < MIN_ON_SURFACES * shapes.len() as f32 {
+        return Ok(());
+    }
+    let middle = radii.len() / 2;
+    let typical = *radii.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let trusted = ((TRUSTED_DISCS * radii.len() as f32) as usize).min(radii.len() - 1);
+    let largest = *radii.select_nth_unstable_by(trusted, f32::total_cmp).1;
+    let max_ratio = |shape: &PointShape| match shape.structure {
+        Structure::Scatter | Structure::Line => MAX_STRAY_RATIO,
+        Structure::Surface if largest < shape.radius => MAX_DISC_RATIO,
+        Structure::Surface | Structure::Redundant => f32::INFINITY,
+    };
+    let is_wide = |shape: &PointShape| max_ratio(shape) * typical < shape.radius;
+    if !shapes.iter().any(is_wide) {
+        return Ok(());
+    }
+    let step = radii.len().div_ceil(MAX_DISCS);
+    let discs = shapes.iter().zip(positions).filter(|(shape, _)| is_surface(shape));
+    let discs = discs.step_by(step).filter(|(shape, _)| shape.radius <= largest);
+    let (places, radii): (Vec<Vec3>, Vec<f32>) =
+        discs.map(|(shape, position)| (*position, shape.radius)).unzip();
+    let tree = KdTree::new(&places, progress)?;
+    shapes.par_iter_mut().zip(positions).filter(|(shape, _)| is_wide(shape)).for_each(
+        |(shape, position)| {
+            let nearest = tree.nearest(*position, 1, None);
+            let Some(disc) = nearest.first() else { return };
+            let radius = radii[disc.index as usize];
+            if max_ratio(shape) * radius < shape.radius {
+                let is_far = FAR_RATIO * radius < disc.distance_squared.sqrt();
+                shape.radius = if is_far { typical } else { MAX_STRAY_RATIO * radius };
+                if shape.structure == Structure::Surface {
+                    shape.structure = Structure::Scatter;
+                }
+            }
+        },
+    );
+    Ok(())
 }

@@ -262,6 +262,18 @@ mod tests {
     }
 
     #[test]
+    fn many_stray_points_far_apart_are_small() {
+        let mut points = plane();
+        let mut random = Random::new(7, 0);
+        let mut stray = || Vec3::from_array([(); 3].map(|()| 8.0 * random.next_f32() - 4.0));
+        points.extend((0..200).map(|_| stray()));
+        let (cloud, structures) = prepared(points);
+        let n_small = cloud.radii()[5000..].iter().filter(|radius| **radius < 0.1).count();
+        assert!(190 <= n_small, "{n_small}");
+        assert!(!structures[5000..].iter().all(|structure| *structure == Structure::Surface));
+    }
+
+    #[test]
     fn two_parallel_wires_do_not_become_a_sheet() {
         // Two wires 0.5 apart, 6 above the ground, of points that are 0.3 apart.
         let mut random = Random::new(3, 0);

@@ -21,6 +21,8 @@ const MIN_ON_SIDES: f64 = 0.5;
 /// Minimum fraction of the points that lie well within a room: furniture, people, the other side of a wall. Boxes and
 /// houses that were scanned from outside have none.
 const MIN_CONTENT: f64 = 0.004;
+/// Minimum height as a fraction of the longest side: flatter boxes are plates with bores rather than halls with columns.
+const MIN_HEIGHT: f32 = 0.05;
 /// Thickness of the layer that is removed with a wall, as a fraction of the room's longest side, and at most as one of the
 /// side across the wall: floor and ceiling of a flat hall stay apart, and wide terrain is no room.
 const WALL_THICKNESS: f32 = 0.02;
@@ -56,7 +58,7 @@ pub fn find_room(cloud: &PointCloud, up: Vec3, needs_content: bool) -> Option<Ro
     let (room, _) = rooms.max_by(|(_, a), (_, b)| a.cmp(b))?;
     let room = Room { origin: cloud.origin, ..room };
     let is_filled = !needs_content || MIN_CONTENT <= room.content(&points);
-    (is_filled && room.is_enclosed(&points)).then_some(room)
+    (is_filled && room.is_high() && room.is_enclosed(&points)).then_some(room)
 }
 
 /// Returns the box of the densest layers for an azimuth, and the number of points in the layers of its walls.
@@ -96,6 +98,10 @@ impl Room {
 
     fn size(&self, axis: usize) -> f32 {
         self.high[axis] - self.low[axis]
+    }
+
+    fn is_high(&self) -> bool {
+        MIN_HEIGHT * self.size(0).max(self.size(1)) <= self.size(2)
     }
 
     /// Returns the thickness of the walls across each axis.
@@ -276,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn wide_terrain_is_no_room_and_a_flat_hall_is_one() {
+    fn terrain_and_plates_are_no_rooms_and_a_flat_hall_is_one() {
         let mut random = Random::new(9, 0);
         let mut scattered = |n: usize, height: &dyn Fn(f32, f32) -> f32| -> Vec<Vec3> {
             let mut point = || (1400.0 * random.next_f32(), 1200.0 * random.next_f32());
@@ -291,8 +297,12 @@ mod tests {
         let terrain = PointCloud::from_positions(scattered(60_000, &hills));
         assert_eq!(find_room(&terrain, Vec3::Z, true), None);
         let mut hall = room(0.0, true);
-        hall.positions.iter_mut().for_each(|p| *p *= Vec3::new(10.0, 10.0, 1.0));
-        assert!(find_room(&hall, Vec3::Z, true).is_some());
+        let mut widen = |by: f32| {
+            hall.positions.iter_mut().for_each(|p| *p *= Vec3::new(by, by, 1.0));
+            find_room(&hall, Vec3::Z, true)
+        };
+        assert!(widen(6.0).is_some());
+        assert_eq!(widen(3.0), None);
     }
 
     #[test]
