@@ -94,7 +94,7 @@ pub fn find_structures(
     narrow_lone_discs(tree, radii, typical.radius, widened, &mut shapes, progress)?;
     clamp_solids(&mut shapes, Structure::Line, typical.radius);
     clamp_solids(&mut shapes, Structure::Scatter, typical.radius);
-    limit_stray_points(positions, &mut shapes, progress)?;
+    limit_stray_points(tree, &mut shapes, progress)?;
     let report = StructureReport::of(&shapes);
     Ok((shapes, report))
 }

@@ -1,8 +1,9 @@
 //! Solids: the capsules of points on lines, and the balls of scattered points.
 
 use super::neighbors::{KdTree, Neighbor};
+use super::normals::fit_plane;
 use super::radius::kth_distance;
-use super::structure::{PointShape, Structure};
+use super::structure::{PointShape, Structure, is_line};
 use crate::error::Result;
 use crate::math::{DVec3, SymmetricMatrix, Vec3};
 use crate::progress::Progress;
@@ -21,13 +22,15 @@ const MIN_ON_SURFACES: f32 = 0.5;
 /// Fraction of the discs, from the smallest on, that a stray point is compared with: chance makes surfaces of a few stray
 /// points, too.
 const TRUSTED_DISCS: f32 = 0.95;
-/// Maximum ratio of the radius of a ball or capsule to that of the nearest disc.
+/// Maximum ratio of the radius of a ball or capsule to that of the discs nearby.
 const MAX_STRAY_RATIO: f32 = 2.0;
 /// The same of a disc beyond those: the spacing of a scan grows with distance, but not at once.
-const MAX_DISC_RATIO: f32 = 8.0;
+const MAX_DISC_RATIO: f32 = 4.0;
 /// Ratio of the distance to the nearest disc to its radius from which a point is no part of its surroundings.
 const FAR_RATIO: f32 = 8.0;
-/// Maximum number of discs among which the nearest is searched.
+/// Number of nearest discs of which the smallest counts.
+const N_DISCS: usize = 8;
+/// Maximum number of discs among which these are searched.
 const MAX_DISCS: usize = 100_000;
 
 /// Gives a point the direction and the radius of its final structure. Surface points keep what was decided.
@@ -92,17 +95,18 @@ pub fn clamp_solids(shapes: &mut [PointShape], structure: Structure, typical_rad
 }
 
 /// Limits the balls and capsules of stray points far from all surfaces by the discs of the nearest surface, and makes balls
-/// of their discs: there may be so many of them that their own median is large, and that some lie in a plane, as below
+/// and capsules of their discs: there may be so many of them that their own median is large, and that some lie in a plane, as below
 /// aerial scans and around clouds of features of photographs.
 ///
 /// # Errors
 ///
 /// Returns [`Error::Cancelled`](crate::error::Error::Cancelled) if `progress` is cancelled.
 pub fn limit_stray_points(
-    positions: &[Vec3],
+    all: &KdTree,
     shapes: &mut [PointShape],
     progress: &dyn Progress,
 ) -> Result<()> {
+    let positions = all.positions();
     let is_surface = |shape: &&PointShape| shape.structure == Structure::Surface;
     let mut radii: Vec<f32> = shapes.iter().filter(is_surface).map(|shape| shape.radius).collect();
     if radii.is_empty() || (radii.len() as f32) < MIN_ON_SURFACES * shapes.len() as f32 {
@@ -127,16 +131,21 @@ pub fn limit_stray_points(
     let (places, radii): (Vec<Vec3>, Vec<f32>) =
         discs.map(|(shape, position)| (*position, shape.radius)).unzip();
     let tree = KdTree::new(&places, progress)?;
-    shapes.par_iter_mut().zip(positions).filter(|(shape, _)| is_wide(shape)).for_each(
-        |(shape, position)| {
-            let nearest = tree.nearest(*position, 1, None);
+    shapes.par_iter_mut().enumerate().filter(|(_, shape)| is_wide(shape)).for_each(
+        |(point, shape)| {
+            let nearest = tree.nearest(positions[point], N_DISCS, None);
             let Some(disc) = nearest.first() else { return };
-            let radius = radii[disc.index as usize];
+            let around = nearest.iter().map(|disc| radii[disc.index as usize]);
+            let radius = around.fold(f32::INFINITY, f32::min);
             if max_ratio(shape) * radius < shape.radius {
                 let is_far = FAR_RATIO * radius < disc.distance_squared.sqrt();
                 shape.radius = if is_far { typical } else { MAX_STRAY_RATIO * radius };
                 if shape.structure == Structure::Surface {
-                    shape.structure = Structure::Scatter;
+                    let around =
+                        all.nearest(positions[point], N_LINE_NEIGHBORS, Some(point as u32));
+                    let is_line = is_line(&fit_plane(positions, point, &around));
+                    let structure = if is_line { Structure::Line } else { Structure::Scatter };
+                    settle(all, point, shape.radius, structure, shape);
                 }
             }
         },
