@@ -23,6 +23,15 @@ const MIN_FLOOR_FRACTION: f64 = 0.02;
 /// armadillo. A room whose walls are scanned as well as its floor has a lower ratio.
 const MIN_FLOOR_RATIO: f64 = 2.5;
 
+/// Minimum ratio of the points on a floor to those at the opposite end, if the other four ends are alike.
+const MIN_PEDESTAL_RATIO: f64 = 10.0;
+
+/// Minimum fraction of the points at each of these four ends: the sides of a pedestal, or the walls of a room.
+const MIN_SIDE_FRACTION: f64 = 0.01;
+
+/// Maximum ratio of the points at two opposite ones of these ends.
+const MAX_SIDES_RATIO: f64 = 1.5;
+
 /// Minimum ratio of each horizontal side to the height of a cloud that counts as flat, as terrain and cities do.
 const MIN_FLAT_RATIO: f64 = 4.0;
 
@@ -145,18 +154,26 @@ impl AxisStatistics {
         Self { sides, ends }
     }
 
-    /// Returns the axis whose one end has far more points than any other end: a floor or a flat base.
+    /// Returns the axis whose one end has far more points than any other end: a floor or a flat base. The sides of a
+    /// pedestal and the walls of a room without a ceiling may have as many, if they are alike.
     fn flat_base(&self) -> Option<InferredUp> {
         let [x, y, z] = self.ends;
-        let stands_on = |base: f64, others: [f64; 5]| {
-            MIN_FLOOR_FRACTION <= base
-                && others.into_iter().all(|other| MIN_FLOOR_RATIO * other < base)
+        let are_sides = |low: f64, high: f64| {
+            MIN_SIDE_FRACTION <= low.min(high) && low.max(high) <= MAX_SIDES_RATIO * low.min(high)
         };
-        let (up, name, end, base) = if stands_on(y.low, [x.low, x.high, y.high, z.low, z.high]) {
+        // The last of the others is opposite.
+        let stands_on = |base: f64, others: [f64; 5]| {
+            let [a, b, c, d, opposite] = others;
+            let is_between_sides = are_sides(a, b) && are_sides(c, d);
+            let is_pedestal = is_between_sides && MIN_PEDESTAL_RATIO * opposite < base;
+            let is_floor = others.into_iter().all(|other| MIN_FLOOR_RATIO * other < base);
+            MIN_FLOOR_FRACTION <= base && (is_floor || is_pedestal)
+        };
+        let (up, name, end, base) = if stands_on(y.low, [x.low, x.high, z.low, z.high, y.high]) {
             (Vec3::Y, "+Y", "low end of Y", y.low)
         } else if stands_on(z.low, [x.low, x.high, y.low, y.high, z.high]) {
             (Vec3::Z, "+Z", "low end of Z", z.low)
-        } else if stands_on(y.high, [x.low, x.high, y.low, z.low, z.high]) {
+        } else if stands_on(y.high, [x.low, x.high, z.low, z.high, y.low]) {
             (Vec3::NEG_Y, "-Y", "high end of Y", y.high)
         } else {
             return None;
@@ -285,6 +302,22 @@ mod tests {
             Vec3::new(on_ball.x, on_ball.y.max(-0.8), on_ball.z)
         });
         assert_eq!(inferred(dome), Vec3::Y);
+    }
+
+    #[test]
+    fn a_pedestal_lies_at_the_bottom() {
+        // A ball on a box whose six sides are seen.
+        let mut random = Random::new(8, 0);
+        let on_box = (0..9000).map(|i| {
+            let mut p = Vec3::from_array(std::array::from_fn(|_| random.next_f32() - 0.5));
+            p[i % 3] = if i % 2 == 0 { -0.5 } else { 0.5 };
+            p
+        });
+        let statue: Vec<Vec3> =
+            on_box.chain(ball().into_iter().map(|p| 0.6 * p + Vec3::Y)).collect();
+        assert_eq!(inferred(statue.iter().copied()), Vec3::Y);
+        assert_eq!(inferred(statue.iter().map(|p| Vec3::new(p.x, -p.z, p.y))), Vec3::Z);
+        assert_eq!(inferred(statue.iter().map(|p| Vec3::new(p.x, -p.y, p.z))), Vec3::NEG_Y);
     }
 
     #[test]
