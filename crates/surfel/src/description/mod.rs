@@ -51,6 +51,7 @@ pub use point_filter::Returns;
 pub(crate) use table::write_parts;
 pub use table::write_table;
 
+use crate::memory_files::MemoryFiles;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
@@ -69,6 +70,8 @@ pub struct SceneDescription {
     pub lamps: Vec<LampDescription>,
     /// Movements of objects, lamps and the camera.
     pub animations: Vec<AnimationDescription>,
+    /// Files, here and of objects, that are in memory instead. No scene file holds them.
+    pub memory: MemoryFiles,
     /// File of the picture or movie, and the time that it shows.
     pub output: OutputSettings,
     /// Size, quality and background of the picture.
@@ -134,6 +137,7 @@ impl SceneDescription {
             objects: other.objects.clone(),
             lamps: other.lamps.clone(),
             animations: other.animations.clone(),
+            memory: other.memory.clone(),
             ..self
         }
     }
@@ -291,6 +295,7 @@ impl SceneDescription {
         self.objects.extend(over.objects);
         self.lamps.extend(over.lamps);
         self.animations.extend(over.animations);
+        self.memory.extend(over.memory);
     }
 
     fn unset(&mut self, path: &str) {

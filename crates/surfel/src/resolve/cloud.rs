@@ -2,6 +2,7 @@
 
 use crate::description::{Invalid, ObjectSettings, PreparationSettings};
 use crate::error::Result;
+use crate::memory_files::MemoryFiles;
 use crate::progress_log::NotesAsChoices;
 use std::path::Path;
 use surfel_core::math::Vec3;
@@ -19,6 +20,8 @@ pub struct ImportOptions {
     pub keeps_all_columns: bool,
     /// Decides what a random subsample keeps.
     pub seed: u64,
+    /// Files that are in memory instead.
+    pub memory: MemoryFiles,
 }
 
 /// Reads what a file holds.
@@ -28,6 +31,9 @@ pub fn import(
     options: &ImportOptions,
     progress: &dyn Progress,
 ) -> Result<(Graph<PointCloud>, FileInfo)> {
+    if let Some(content) = options.memory.get(file) {
+        return import_from_memory(file, content.clone(), settings, options, progress);
+    }
     let columns = if options.keeps_all_columns { ColumnChoice::All } else { settings.columns() };
     let mut load_options = settings.preparation.load_options(columns)?;
     if options.keeps_all_columns {
@@ -42,6 +48,22 @@ pub fn import(
     };
     progress.end();
     Ok(loaded)
+}
+
+/// Takes content in memory as if a file held it.
+fn import_from_memory(
+    name: &Path,
+    content: Graph<PointCloud>,
+    settings: &ObjectSettings,
+    options: &ImportOptions,
+    progress: &dyn Progress,
+) -> Result<(Graph<PointCloud>, FileInfo)> {
+    let info = options.memory.info(name).unwrap_or_default();
+    let keep = |cloud| match options.keeps_all_columns {
+        true => Ok(cloud),
+        false => filter_cloud(cloud, &settings.preparation, progress),
+    };
+    Ok((content.try_map_clouds(keep)?, info))
 }
 
 /// A graph of one cloud.
