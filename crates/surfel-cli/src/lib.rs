@@ -32,6 +32,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use surfel_web::SceneProvider;
 use usage::Usage;
+pub use view::RunningViewer;
 
 /// Turns point clouds into pictures and movies by ray tracing the points themselves, as a continuous surface,
 /// together with meshes.

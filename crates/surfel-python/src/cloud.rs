@@ -19,7 +19,8 @@ use surfel_formats::SaveOptions;
 pub struct PyCloud {
     /// The columns.
     pub cloud: Arc<PointCloud>,
-    options: SaveOptions,
+    /// Properties of the file that it came from, which a saved one keeps.
+    pub options: SaveOptions,
 }
 
 impl PyCloud {

@@ -9,7 +9,13 @@ mod buffer;
 mod image;
 mod array;
 mod cloud;
+mod rays;
+mod object;
+mod threads;
 mod scene;
+mod movie;
+mod preparation;
+mod viewer;
 mod program;
 
 use pyo3::prelude::*;
@@ -25,9 +31,15 @@ mod native {
     #[pymodule_export]
     use crate::image::PyImage;
     #[pymodule_export]
+    use crate::movie::animate;
+    #[pymodule_export]
+    use crate::preparation::prepare;
+    #[pymodule_export]
     use crate::program::run_program;
     #[pymodule_export]
     use crate::scene::{PyScene, load};
+    #[pymodule_export]
+    use crate::viewer::{PyViewer, view};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

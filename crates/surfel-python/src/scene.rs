@@ -1,7 +1,11 @@
 //! Scenes: what is shown, and the queries about it.
 
+use crate::buffer::owned_array;
 use crate::errors::to_exception;
 use crate::image::PyImage;
+use crate::object::NewObject;
+use crate::rays::{RayArray, ray_hits};
+use crate::threads::{on_threads, start_threads};
 use crate::value::{to_python, with_keys};
 use crate::work;
 use pyo3::prelude::*;
@@ -11,10 +15,10 @@ use serde_json::Value;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 use std::time::Duration;
-use surfel::description::{Backend, Invalid, is_scene_file};
+use surfel::description::is_scene_file;
 use surfel::live_scene::{LiveScene, LiveView, UseCase};
 use surfel::progress_log::{Choice, ProgressLog};
-use surfel::{Error, RenderedImage, SceneDescription};
+use surfel::{RenderedImage, SceneDescription};
 use surfel_core::progress::Progress;
 
 /// A scene of files and clouds. Threads may share it.
@@ -36,6 +40,15 @@ struct OpenScene {
     scene: LiveScene,
     /// Threads of the scene, if it has a number of its own.
     threads: Option<ThreadPool>,
+    /// The view of the last description, and the choices that were made for it.
+    last: Mutex<Option<Arc<ChosenView>>>,
+}
+
+/// A view with its description and the choices that were made for it.
+struct ChosenView {
+    description: SceneDescription,
+    view: LiveView,
+    choices: Vec<Choice>,
 }
 
 /// Time between two looks at a scene that another thread reads.
@@ -43,29 +56,34 @@ const LOCK_POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 impl OpenScene {
     fn open(description: &SceneDescription, progress: &dyn Progress) -> surfel::Result<Self> {
-        if description.run.backend() == Backend::Gpu {
-            return Err(Invalid::at("backend", "gpu is not in this build; use cpu").into());
-        }
-        let threads = description.run.threads.map(start_threads).transpose()?;
+        let threads = start_threads(&description.run)?;
         let open = || LiveScene::open(description, UseCase::Pictures, progress);
-        let scene = threads.as_ref().map_or_else(open, |threads| threads.install(open))?;
-        Ok(Self { scene, threads })
+        let scene = on_threads(threads.as_ref(), open)?;
+        Ok(Self { scene, threads, last: Mutex::default() })
+    }
+
+    /// Returns the view under a description, which is made unless it is the last one.
+    fn view(
+        &self,
+        description: SceneDescription,
+        progress: &dyn Progress,
+    ) -> surfel::Result<Arc<ChosenView>> {
+        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some(last) = last.filter(|last| last.description == description) {
+            return Ok(last);
+        }
+        let log = ProgressLog::new(progress);
+        let view = self.install(|scene| scene.view(&description, &log))?;
+        let choices = log.into_choices();
+        let view = Arc::new(ChosenView { description, view, choices });
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(view.clone());
+        Ok(view)
     }
 
     /// Runs `work` on the scene's threads.
     fn install<T: Send>(&self, work: impl FnOnce(&LiveScene) -> T + Send) -> T {
-        match &self.threads {
-            Some(threads) => threads.install(|| work(&self.scene)),
-            None => work(&self.scene),
-        }
+        on_threads(self.threads.as_ref(), || work(&self.scene))
     }
-}
-
-fn start_threads(n_threads: u32) -> surfel::Result<ThreadPool> {
-    let threads = rayon::ThreadPoolBuilder::new().num_threads(n_threads as usize).build();
-    threads.map_err(|error| {
-        Error::Unfit(format!("the threads cannot be started; ask for fewer with threads: {error}"))
-    })
 }
 
 /// Returns the scene of a description, which is read unless it is there.
@@ -97,36 +115,149 @@ impl PyScene {
         Self { state: Mutex::new(State { description, opened: Slot::default() }) }
     }
 
+    /// Returns the description, without what is chosen from the data.
+    pub fn description(&self) -> SceneDescription {
+        self.state().0
+    }
+
     /// Returns the description and the slot of what was read of it.
     fn state(&self) -> (SceneDescription, Slot) {
         let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         (state.description.clone(), state.opened.clone())
     }
 
-    /// Runs `work` about the scene under a description, with the choices that were made for it.
+    /// Runs `work` about the scene under a description.
     fn with_view<T: Send>(
         &self,
         py: Python<'_>,
         keys: Option<&Bound<'_, PyDict>>,
         progress: Option<&Bound<'_, PyAny>>,
-        work: impl FnOnce(&LiveScene, LiveView, &dyn Progress) -> surfel::Result<T> + Send,
-    ) -> PyResult<(T, Vec<Choice>)> {
+        work: impl FnOnce(&LiveScene, &ChosenView, &dyn Progress) -> surfel::Result<T> + Send,
+    ) -> PyResult<T> {
         let (startup, slot) = self.state();
         let description = with_keys(py, &startup, keys)?;
         work::run(py, progress, |progress| {
-            let log = ProgressLog::new(progress);
-            let scene = opened(&slot, &startup, &log)?;
-            let result = scene.install(|scene| {
-                let view = scene.view(&description, &log)?;
-                work(scene, view, &log)
-            })?;
-            Ok((result, log.into_choices()))
+            let scene = opened(&slot, &startup, progress)?;
+            let view = scene.view(description, progress)?;
+            scene.install(|scene| work(scene, &view, progress))
         })
     }
 }
 
 #[pymethods]
 impl PyScene {
+    /// Makes a scene that shows nothing yet. Keywords are keys of scene files.
+    ///
+    /// Raises `InvalidSetting`.
+    #[new]
+    #[pyo3(signature = (**keys))]
+    fn empty(py: Python<'_>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        Ok(Self::new(with_keys(py, &SceneDescription::default(), keys)?))
+    }
+
+    /// Adds a `Cloud`, a `Mesh`, a file, or a cloud or mesh of another package, and returns its number, which the
+    /// `geometry_ids` of rays have.
+    ///
+    /// `name`: for `parent` of others and for messages. `material`: a name as `mirror`, or a dict. `transform`: a 4x4 matrix to
+    /// the world's coordinates, or to those of the parent. Other keywords are keys of objects in scene files, as
+    /// `translate`, `rotate`, `scale`, `color`, `surface`, `visible`.
+    ///
+    /// Raises `InvalidSetting`, `InvalidArray`, `MissingFile`.
+    #[pyo3(signature = (what, *, name = None, material = None, transform = None, **keys))]
+    fn add(
+        &self,
+        py: Python<'_>,
+        what: &Bound<'_, PyAny>,
+        name: Option<&Bound<'_, PyAny>>,
+        material: Option<&Bound<'_, PyAny>>,
+        transform: Option<&Bound<'_, PyAny>>,
+        keys: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<usize> {
+        let object = NewObject::new(what, name, material, transform, keys)?;
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let description = object.added_to(py, &state.description)?;
+        let number = description.objects.len() - 1 + usize::from(!description.files.is_empty());
+        *state = State { description, opened: Slot::default() };
+        Ok(number)
+    }
+
+    /// Finds the nearest surface on each ray.
+    ///
+    /// `rays`: (..., 6), x, y, z of the origin in world coordinates and of the direction, which has any length but 0. A ray
+    /// with NaN hits nothing. Returns a dict of arrays: `t_hit` (...), float32, in multiples of the direction's length, `inf`
+    /// where nothing was hit; `geometry_ids` (...), uint32, the number of what was added; `primitive_ids` (...), uint32, of
+    /// the triangle or of the nearest point; `primitive_normals` (..., 3), float32, unit, facing the origin of the ray;
+    /// `point_ids` (...), uint32, the nearest point by its index in its file or array. Ids are 0xFFFFFFFF where there is none.
+    ///
+    /// Raises `InvalidArray` for other shapes.
+    #[pyo3(signature = (rays, *, progress = None))]
+    fn cast_rays<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Bound<'py, PyAny>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let rays = RayArray::new(rays)?;
+        let t_range = (0.0, f32::INFINITY);
+        let numbers = &rays.numbers;
+        let (hits, contents) = self.with_view(py, None, progress, |scene, chosen, progress| {
+            let rays = numbers.in_scene(&chosen.view, t_range);
+            let hits = chosen.view.ray_caster(scene.simd()).hits(&rays, progress)?;
+            Ok((hits, chosen.view.contents()))
+        })?;
+        ray_hits(py, hits, &contents, &rays.shape)
+    }
+
+    /// Returns for each ray whether any surface lies on it: bool, (...).
+    ///
+    /// `rays` as for `cast_rays`; `tnear` and `tfar` are the part that counts, in multiples of the direction's length:
+    /// `tfar=1` ends where the direction does, which is a line of sight between two points.
+    #[pyo3(signature = (rays, tnear = 0.0, tfar = f32::INFINITY, *, progress = None))]
+    fn test_occlusions<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Bound<'py, PyAny>,
+        tnear: f32,
+        tfar: f32,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let rays = RayArray::new(rays)?;
+        let numbers = &rays.numbers;
+        let occluded = self.with_view(py, None, progress, |scene, chosen, progress| {
+            let rays = numbers.in_scene(&chosen.view, (tnear, tfar));
+            chosen.view.ray_caster(scene.simd()).occlusions(&rays, progress)
+        })?;
+        let occluded: Vec<u8> = occluded.into_iter().map(u8::from).collect();
+        owned_array(py, occluded, rays.shape)?.call_method1("view", ("bool",))
+    }
+
+    /// Counts the surfaces on each ray: int32, (...).
+    ///
+    /// `rays` as for `cast_rays`. Surfaces of points that are nearer to each other than a point's radius count as one.
+    #[pyo3(signature = (rays, *, progress = None))]
+    fn count_intersections<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Bound<'py, PyAny>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let rays = RayArray::new(rays)?;
+        let t_range = (0.0, f32::INFINITY);
+        let numbers = &rays.numbers;
+        let counts = self.with_view(py, None, progress, |scene, chosen, progress| {
+            let rays = numbers.in_scene(&chosen.view, t_range);
+            chosen.view.ray_caster(scene.simd()).counts(&rays, progress)
+        })?;
+        owned_array(py, counts.into_iter().map(|n| n as i32).collect(), rays.shape)
+    }
+
+    /// Corners of a box around everything that is shown, in world coordinates: float64, (2, 3), least and greatest.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let bounds = self.with_view(py, None, None, |_, chosen, _| Ok(chosen.view.bounds()))?;
+        owned_array(py, bounds.as_flattened().to_vec(), vec![2, 3])
+    }
+
     /// Renders a picture. Keywords are keys of scene files; they count for this picture alone.
     ///
     /// `layers=False` leaves out all layers but the colour. `progress` is called as `progress(stage, done, total)`.
@@ -140,15 +271,13 @@ impl PyScene {
         progress: Option<&Bound<'_, PyAny>>,
         keys: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyImage> {
-        let ((image, origin, point_ids), choices) =
-            self.with_view(py, keys, progress, |scene, mut view, progress| {
-                view.settings.with_aovs = layers;
-                let (image, _) = scene.picture(&view, progress)?;
-                let point_ids = point_ids(&view, &image);
-                Ok((image, view.flat.origin, point_ids))
-            })?;
-        let line = |choice: Choice| format!("{} [{}]", choice.reason, choice.keys.join(", "));
-        Ok(PyImage::new(image, origin, point_ids, choices.into_iter().map(line).collect()))
+        self.with_view(py, keys, progress, |scene, ChosenView { view, choices, .. }, progress| {
+            let (image, _) = scene.picture(view, layers, progress)?;
+            let point_ids = point_ids(view, &image);
+            let line = |choice: &Choice| format!("{} [{}]", choice.reason, choice.keys.join(", "));
+            let choices = choices.iter().map(line).collect();
+            Ok(PyImage::new(image, view.flat.origin, point_ids, choices))
+        })
     }
 
     /// Returns all keys of the scene as a scene file has them, with those that are chosen from the data.
@@ -158,8 +287,8 @@ impl PyScene {
         py: Python<'py>,
         keys: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (table, _) =
-            self.with_view(py, keys, None, |_, view, _| Ok(view.description.to_table()))?;
+        let table =
+            self.with_view(py, keys, None, |_, chosen, _| Ok(chosen.view.description.to_table()))?;
         to_python(py, &Value::Object(table))
     }
 

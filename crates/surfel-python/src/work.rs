@@ -4,6 +4,7 @@
 use crate::errors::{panicked, to_exception};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use pyo3::types::PyBool;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -18,7 +19,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Bytes of the stack of the thread that works, as many as a program's main thread has.
 const STACK_BYTES: usize = 8 << 20;
 
-/// Runs `work`. `callback` is called as `callback(stage, done, total)` on the caller's thread.
+/// Runs `work`. `callback` is called as `callback(stage, done, total)` on the caller's thread; `True` shows a bar.
 ///
 /// # Errors
 ///
@@ -29,6 +30,24 @@ pub fn run<T: Send>(
     work: impl FnOnce(&dyn Progress) -> surfel::Result<T> + Send,
 ) -> PyResult<T> {
     check_process()?;
+    let bar = match callback.and_then(|callback| callback.extract::<bool>().ok()) {
+        Some(true) => Some(py.import("surfel._progress")?.call_method0("bar")?),
+        _ => None,
+    };
+    let callback = match callback {
+        Some(flag) if flag.is_instance_of::<PyBool>() => bar.as_ref(),
+        other => other,
+    };
+    let result = run_reporting(py, callback, work);
+    bar.map_or(Ok(()), |bar| bar.call_method0("close").map(drop))?;
+    result
+}
+
+fn run_reporting<T: Send>(
+    py: Python<'_>,
+    callback: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&dyn Progress) -> surfel::Result<T> + Send,
+) -> PyResult<T> {
     let listener = Listener::default();
     let (sender, receiver) = channel();
     thread::scope(|scope| {

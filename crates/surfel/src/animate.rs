@@ -5,7 +5,7 @@ use crate::description::{Invalid, SceneDescription};
 use crate::error::{Error, Result};
 use crate::picture::{RenderedImage, image_options};
 use crate::progress_log::CancelOnly;
-use crate::resolve::LoadedScene;
+use crate::resolve::{AutoSettings, KeepOptions, LoadedScene};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use surfel_core::math::DVec3;
@@ -62,6 +62,50 @@ pub fn fingerprint(
     let text = format!("{} {table} {files:?}", env!("CARGO_PKG_VERSION"));
     let hash = text.bytes().fold(0, |hash, byte| surfel_core::math::hash(hash ^ u64::from(byte)));
     format!("{hash:016x}")
+}
+
+/// A movie whose files are read and whose choices are made.
+#[derive(Debug)]
+pub struct PlannedMovie {
+    /// The content of the files.
+    pub loaded: LoadedScene,
+    /// The complete description, with everything that was chosen.
+    pub complete: SceneDescription,
+    description: SceneDescription,
+    auto: AutoSettings,
+    options: MovieOptions,
+}
+
+impl PlannedMovie {
+    /// Reads the files of a description and chooses what it leaves open.
+    ///
+    /// # Errors
+    ///
+    /// Fails for missing and broken files, if nothing moves and no number of frames is given, and if cancelled.
+    pub fn new(description: &SceneDescription, progress: &dyn Progress) -> Result<Self> {
+        let mut options = movie_options(description);
+        let loaded = LoadedScene::read(description, KeepOptions::default(), progress)?;
+        options.n_frames = frame_count(description, loaded.duration_secs())?;
+        let auto = AutoSettings::choose(&loaded, description, progress)?;
+        let mut complete = auto.complete_description(&loaded);
+        complete.output.frames = Some(options.n_frames);
+        complete.output.fps = Some(options.fps);
+        Ok(Self { loaded, complete, description: description.clone(), auto, options })
+    }
+
+    /// Renders the movie to a file.
+    ///
+    /// # Errors
+    ///
+    /// Fails if a frame cannot be rendered or written, and if cancelled; the message says how many frames are kept.
+    pub fn render(self, output: &Path, resumes: bool, progress: &dyn Progress) -> Result<()> {
+        let Self { loaded, complete, description, auto, mut options } = self;
+        options.fingerprint = fingerprint(&complete, &description, &loaded);
+        let mut scene = loaded.into_resolved(auto, progress)?.build_trees(progress)?;
+        scene.choose_exposure(progress)?;
+        options.image = image_options(&description, scene.flat().origin);
+        animate(&mut scene, output, &options, resumes, progress)
+    }
 }
 
 /// Renders the frames that a movie lacks, and finishes it.

@@ -73,6 +73,7 @@ pub mod ray_query;
 mod raycast;
 mod height_map;
 pub mod animate;
+pub mod prepare;
 mod scene_keys;
 pub mod live_scene;
 

@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::overlay::Overlay;
 use crate::picture::{RenderedImage, image_options};
 use crate::ray_query::RayCaster;
+use crate::raycast::world_bounds;
 use crate::resolve::{
     AutoSettings, KeepOptions, LoadedScene, common_legend, coordinate_system, expose, finish_graph,
     hide_walls, render_settings,
@@ -121,6 +122,11 @@ impl LiveView {
         let content = |instance: &Instance| self.loaded.content_of(instance.node_idx as usize);
         let contents = self.flat.instances.iter().map(content);
         contents.map(|content| content.map_or(NO_ID, |content| content as u32)).collect()
+    }
+
+    /// Returns the corners of a box around everything, in world coordinates: least and greatest.
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
+        world_bounds(&self.flat)
     }
 
     /// Returns what casts rays at the view.
@@ -272,7 +278,7 @@ impl LiveScene {
         Ok(LiveView { loaded, flat, settings, description: complete, moves_camera, unit, trees })
     }
 
-    /// Renders the picture of a view with its overlay, on the caller's threads: all layers of it if the settings say so.
+    /// Renders the picture of a view with its overlay, on the caller's threads.
     ///
     /// # Errors
     ///
@@ -280,9 +286,11 @@ impl LiveScene {
     pub fn picture(
         &self,
         view: &LiveView,
+        with_aovs: bool,
         progress: &dyn Progress,
     ) -> Result<(RenderedImage, RenderStats)> {
-        let (mut image, stats) = self.renderer.render(&view.flat, &view.settings, progress)?;
+        let settings = Settings { with_aovs, ..view.settings };
+        let (mut image, stats) = self.renderer.render(&view.flat, &settings, progress)?;
         view.overlay().draw(&mut image, &view.flat.camera);
         let mut options = image_options(&view.description, view.flat.origin);
         options.georeference = view.georeference();

@@ -3,7 +3,7 @@
 use crate::built_scene::BuiltScene;
 use crate::ray_query::WorldRays;
 use rayon::prelude::*;
-use surfel_core::flat::FlatGeometry;
+use surfel_core::flat::{FlatGeometry, FlatScene};
 use surfel_core::math::{Aabb, DVec3};
 use surfel_core::trace::{InstanceFilter, SceneHit, scene_hits, scene_occlusions};
 
@@ -24,13 +24,17 @@ pub struct RayHit {
     pub triangle: Option<u32>,
 }
 
+/// Returns the corners of a box around all instances, in world coordinates: least and greatest.
+pub(crate) fn world_bounds(flat: &FlatScene) -> [[f64; 3]; 2] {
+    let boxes = flat.instances.iter().map(|instance| instance.bounds);
+    let all = boxes.fold(Aabb::EMPTY, Aabb::union);
+    [all.min, all.max].map(|corner| (flat.origin + corner.as_dvec3()).to_array())
+}
+
 impl BuiltScene {
     /// Returns the corners of a box around everything, in world coordinates: least and greatest.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
-        let flat = self.flat();
-        let boxes = flat.instances.iter().map(|instance| instance.bounds);
-        let all = boxes.fold(Aabb::EMPTY, Aabb::union);
-        [all.min, all.max].map(|corner| (flat.origin + corner.as_dvec3()).to_array())
+        world_bounds(self.flat())
     }
 
     /// Finds the nearest surface on each ray. A ray is `[x, y, z, dx, dy, dz]`: origin and direction in world

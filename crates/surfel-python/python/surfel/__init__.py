@@ -19,9 +19,11 @@ from surfel._errors import (
     MissingFile,
     OutOfMemory,
 )
-from surfel._native import Image, Scene, __version__, load
+from surfel._native import Cloud, Image, Mesh, Scene, Viewer, __version__, animate, load, prepare, view
+from surfel._rays import create_rays_pinhole
 
 __all__ = [
+    "Cloud",
     "EncoderError",
     "Error",
     "Image",
@@ -30,9 +32,15 @@ __all__ = [
     "InvalidFile",
     "InvalidScene",
     "InvalidSetting",
+    "Mesh",
     "MissingFile",
     "OutOfMemory",
     "Scene",
+    "Viewer",
     "__version__",
+    "animate",
+    "create_rays_pinhole",
     "load",
+    "prepare",
+    "view",
 ]

@@ -265,6 +265,16 @@ impl SceneDescription {
         Ok(description)
     }
 
+    /// Adds an object from a table, as of `[[object]]` in a scene file. Files that it names start at `folder`.
+    ///
+    /// # Errors
+    ///
+    /// Fails for unknown keys, values that are not valid, and a parent that is not there; then nothing is added.
+    pub fn add_object(&mut self, table: &Map<String, Value>, folder: &Path) -> Result<(), Invalid> {
+        self.objects.push(ObjectDescription::read(table, folder)?);
+        self.check().inspect_err(|_| drop(self.objects.pop()))
+    }
+
     /// Lays another description over this one: its keys count, its objects, lamps and animations are added.
     ///
     /// Keys of this one that exclude a key of the other are unset.

@@ -7,7 +7,9 @@ use crate::progress_log::NotesAsChoices;
 use std::path::Path;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::Neighborhood;
-use surfel_core::points::{PointCloud, PreparationReport, PreparedCloud, Radius, prepare};
+use surfel_core::points::{
+    PointCloud, PointFilter, PreparationReport, PreparedCloud, Radius, prepare,
+};
 use surfel_core::progress::Progress;
 use surfel_core::scene::color::{choose_source, colorize};
 use surfel_core::scene::{CloudGeometry, Geometry, Graph, Material, Transform};
@@ -98,16 +100,28 @@ pub fn filter_cloud(
 ) -> Result<PointCloud, Invalid> {
     for (key, filter) in settings.point_filters()? {
         let n_points = cloud.len();
-        let matches = filter.matches(&cloud, 0);
-        let matches = matches.map_err(|error| Invalid::at(key, error.to_string()))?;
-        cloud.retain_from(0, &matches);
+        keep_matching(&mut cloud, key, &filter, progress)?;
         if cloud.is_empty() {
             let message = format!("none of {n_points} points meets {filter}");
             return Err(Invalid::at(key, message));
         }
-        progress.note(&format!("{} of {n_points} points meet {filter}", cloud.len()));
     }
     Ok(cloud)
+}
+
+/// Drops the points of a cloud that do not meet the filter of a key.
+pub(crate) fn keep_matching(
+    cloud: &mut PointCloud,
+    key: &str,
+    filter: &PointFilter,
+    progress: &dyn Progress,
+) -> Result<(), Invalid> {
+    let n_points = cloud.len();
+    let matches = filter.matches(cloud, 0);
+    let matches = matches.map_err(|error| Invalid::at(key, error.to_string()))?;
+    cloud.retain_from(0, &matches);
+    progress.note(&format!("{} of {n_points} points meet {filter}", cloud.len()));
+    Ok(())
 }
 
 /// Cleans a cloud, and adds the normals and radii that are missing.
