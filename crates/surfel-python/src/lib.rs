@@ -31,7 +31,7 @@ mod native {
     #[pymodule_export]
     use crate::image::PyImage;
     #[pymodule_export]
-    use crate::movie::animate;
+    use crate::movie::{PyFilm, animate};
     #[pymodule_export]
     use crate::preparation::prepare;
     #[pymodule_export]

@@ -8,9 +8,11 @@ use crate::work;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
+use std::sync::Arc;
 use surfel::SceneDescription;
 use surfel::description::Invalid;
 use surfel::prepare::{PrepareOptions, prepare_files, prepare_points};
+use surfel_core::points::PointCloud;
 use surfel_formats::{Loaded, SaveOptions};
 
 /// Cleans a cloud, and adds normals and radii: of a file, of several that become one, or of a `Cloud`.
@@ -39,8 +41,9 @@ pub fn prepare(
         let threads = start_threads(&description.run)?;
         on_threads(threads.as_ref(), || match source {
             Source::Cloud(cloud, options_of_file) => {
+                let cloud = Arc::unwrap_or_clone(cloud);
                 let cloud = prepare_points(cloud, &description, options, progress)?;
-                Ok(PyCloud::new(cloud, options_of_file))
+                Ok(PyCloud::new(cloud, *options_of_file))
             }
             Source::Files(files) => {
                 let Loaded { cloud, info } =
@@ -53,7 +56,7 @@ pub fn prepare(
 
 /// What is prepared.
 enum Source {
-    Cloud(surfel_core::points::PointCloud, SaveOptions),
+    Cloud(Arc<PointCloud>, Box<SaveOptions>),
     Files(Vec<PathBuf>),
 }
 
@@ -63,7 +66,7 @@ impl Source {
             && let Ok(cloud) = only.cast::<PyCloud>()
         {
             let cloud = cloud.get();
-            return Ok(Self::Cloud((*cloud.cloud).clone(), cloud.options.clone()));
+            return Ok(Self::Cloud(cloud.cloud.clone(), Box::new(cloud.options.clone())));
         }
         let files = sources.iter().map(|source| source.extract::<PathBuf>());
         Ok(Self::Files(files.collect::<PyResult<_>>()?))

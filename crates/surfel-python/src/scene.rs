@@ -1,5 +1,6 @@
 //! Scenes: what is shown, and the queries about it.
 
+use crate::array::{checked, column};
 use crate::buffer::owned_array;
 use crate::errors::to_exception;
 use crate::image::PyImage;
@@ -18,7 +19,8 @@ use std::time::Duration;
 use surfel::description::is_scene_file;
 use surfel::live_scene::{LiveScene, LiveView, UseCase};
 use surfel::progress_log::{Choice, ProgressLog};
-use surfel::{RenderedImage, SceneDescription};
+use surfel::{Error, RenderedImage, SceneDescription};
+use surfel_core::image::Image;
 use surfel_core::progress::Progress;
 
 /// A scene of files and clouds. Threads may share it.
@@ -277,6 +279,44 @@ impl PyScene {
             let line = |choice: &Choice| format!("{} [{}]", choice.reason, choice.keys.join(", "));
             let choices = choices.iter().map(line).collect();
             Ok(PyImage::new(image, view.flat.origin, point_ids, choices))
+        })
+    }
+
+    /// Renders rows of a picture, from `first` to before `end`: linear colour without overlay, float32, (rows, width, 4).
+    #[pyo3(signature = (first, end, **keys))]
+    fn _render_rows<'py>(
+        &self,
+        py: Python<'py>,
+        first: u32,
+        end: u32,
+        keys: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let image = self.with_view(py, keys, None, |scene, chosen, progress| {
+            scene.rows(&chosen.view, (first, end), progress)
+        })?;
+        let shape = vec![image.height as usize, image.width as usize, 4];
+        owned_array(py, bytemuck::cast_vec::<[f32; 4], f32>(image.color), shape)
+    }
+
+    /// Makes a picture of the colours of all its rows.
+    #[pyo3(signature = (color, **keys))]
+    fn _picture_of_rows(
+        &self,
+        py: Python<'_>,
+        color: &Bound<'_, PyAny>,
+        keys: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<PyImage> {
+        let color = column::<f32>(&checked(py, "numbers", ("color", color, [None::<u8>; 3]))?)?;
+        self.with_view(py, keys, None, |_, ChosenView { view, .. }, _| {
+            let mut image = Image::new(view.settings.width, view.settings.height);
+            let rows = color.as_chunks::<4>().0;
+            let expected = image.color.len();
+            if rows.len() != expected {
+                let found = rows.len();
+                return Err(Error::Unfit(format!("found {found} pixels, expected {expected}")));
+            }
+            image.color.copy_from_slice(rows);
+            Ok(PyImage::new(view.finished(image), view.flat.origin, Vec::new(), Vec::new()))
         })
     }
 

@@ -55,3 +55,16 @@ def test_videos_are_encoded(hill, tmp_path):
         pytest.skip("ffmpeg is not installed")
     surfel.animate(surfel.load(hill, **SMALL), tmp_path / "turn.mp4", frames=5, turntable=1)
     assert 500 < (tmp_path / "turn.mp4").stat().st_size
+
+
+def test_frames_are_rendered_one_by_one(hill, tmp_path):
+    scene = surfel.load(hill, turntable=1, fps=5, **SMALL)
+    film = surfel.Film(scene)
+    assert len(film) == 5
+    surfel.animate(scene, tmp_path / "f_#.png")
+    for index in (3, 0, 4):
+        assert film.render(index)._repr_png_() == (tmp_path / f"f_{index + 1}.png").read_bytes()
+    with pytest.raises(IndexError, match="frame 5 of 5"):
+        film.render(5)
+    with pytest.raises(surfel.InvalidSetting, match="nothing moves"):
+        surfel.Film(surfel.load(hill))

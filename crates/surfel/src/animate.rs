@@ -99,12 +99,22 @@ impl PlannedMovie {
     ///
     /// Fails if a frame cannot be rendered or written, and if cancelled; the message says how many frames are kept.
     pub fn render(self, output: &Path, resumes: bool, progress: &dyn Progress) -> Result<()> {
+        let (mut scene, options) = self.build(progress)?;
+        animate(&mut scene, output, &options, resumes, progress)
+    }
+
+    /// Builds the trees of the scene, whose frames [`render_frame`] renders.
+    ///
+    /// # Errors
+    ///
+    /// Fails for scenes that no picture can be made of, and if cancelled.
+    pub fn build(self, progress: &dyn Progress) -> Result<(BuiltScene, MovieOptions)> {
         let Self { loaded, complete, description, auto, mut options } = self;
         options.fingerprint = fingerprint(&complete, &description, &loaded);
         let mut scene = loaded.into_resolved(auto, progress)?.build_trees(progress)?;
         scene.choose_exposure(progress)?;
         options.image = image_options(&description, scene.flat().origin);
-        animate(&mut scene, output, &options, resumes, progress)
+        Ok((scene, options))
     }
 }
 
@@ -120,7 +130,6 @@ pub fn animate(
     resumes: bool,
     progress: &dyn Progress,
 ) -> Result<()> {
-    scene.fix_overlay();
     let mut movie = Movie::open(output, options, resumes)?;
     let n_frames = options.n_frames;
     if 0 < movie.n_done() {
@@ -143,12 +152,18 @@ pub fn animate(
     Ok(())
 }
 
-fn render_frame(
+/// Renders the frame of a movie at a time in seconds.
+///
+/// # Errors
+///
+/// Fails if the frame cannot be rendered, and if cancelled.
+pub fn render_frame(
     scene: &mut BuiltScene,
     time_secs: f64,
     progress: &dyn Progress,
 ) -> Result<RenderedImage> {
     let quiet = CancelOnly(progress);
+    scene.fix_overlay();
     scene.seek(time_secs, &quiet)?;
     if let Some(seconds) = scene.description().output.turntable {
         scene.turn(TAU * time_secs / seconds);

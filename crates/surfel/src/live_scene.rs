@@ -21,7 +21,7 @@ use surfel_core::image::{Image, NO_ID};
 use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
-use surfel_core::render::{self, CpuRenderer, RenderStats, Renderer, Settings};
+use surfel_core::render::{self, CpuRenderer, RenderRegion, RenderStats, Renderer, Settings};
 use surfel_core::scene::color::Legend;
 use surfel_core::scene::{
     Background, Camera, ClipPlane, Geometry, Graph, Projection, Scene, inlier_bounds,
@@ -106,6 +106,14 @@ impl LiveView {
     pub fn overlay(&self) -> Overlay {
         let up = self.description.world.up.unwrap_or(Vec3::Z);
         Overlay::of(&self.description.picture, self.trees.legend.clone(), (up, self.unit))
+    }
+
+    /// Draws the overlay onto a picture of the view, which becomes a file as the description says.
+    pub fn finished(&self, mut image: Image) -> RenderedImage {
+        self.overlay().draw(&mut image, &self.flat.camera);
+        let mut options = image_options(&self.description, self.flat.origin);
+        options.georeference = self.georeference();
+        RenderedImage::new(image, options)
     }
 
     /// Returns where the pixels of a plan to scale lie.
@@ -290,11 +298,23 @@ impl LiveScene {
         progress: &dyn Progress,
     ) -> Result<(RenderedImage, RenderStats)> {
         let settings = Settings { with_aovs, ..view.settings };
-        let (mut image, stats) = self.renderer.render(&view.flat, &settings, progress)?;
-        view.overlay().draw(&mut image, &view.flat.camera);
-        let mut options = image_options(&view.description, view.flat.origin);
-        options.georeference = view.georeference();
-        Ok((RenderedImage::new(image, options), stats))
+        let (image, stats) = self.renderer.render(&view.flat, &settings, progress)?;
+        Ok((view.finished(image), stats))
+    }
+
+    /// Renders some rows of the picture of a view, without layers and overlay: from the first to before the second.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the picture has no such rows, and if cancelled.
+    pub fn rows(
+        &self,
+        view: &LiveView,
+        rows: (u32, u32),
+        progress: &dyn Progress,
+    ) -> Result<Image> {
+        let region = RenderRegion { rows, ..RenderRegion::whole(&view.settings) };
+        Ok(self.renderer.render_region(&view.flat, &view.settings, region, progress)?.0)
     }
 
     /// Renders a view on threads of the lowest priority, however many others wait for their preparation.

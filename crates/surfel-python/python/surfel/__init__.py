@@ -19,13 +19,14 @@ from surfel._errors import (
     MissingFile,
     OutOfMemory,
 )
-from surfel._native import Cloud, Image, Mesh, Scene, Viewer, __version__, animate, load, prepare, view
+from surfel._native import Cloud, Film, Image, Mesh, Scene, Viewer, __version__, animate, load, prepare, view
 from surfel._rays import create_rays_pinhole
 
 __all__ = [
     "Cloud",
     "EncoderError",
     "Error",
+    "Film",
     "Image",
     "InaccessibleFile",
     "InvalidArray",

@@ -17,7 +17,7 @@ def cloud_columns(source):
 
 def mesh_columns(source):
     """The vertices and triangles of a mesh as keywords of `Mesh`, or `None` if `source` is none."""
-    if _has(source, "vertices", "triangles"):
+    if _has(source, "vertices", "triangles", "has_triangles"):
         columns = {"vertices": source.vertices, "triangles": source.triangles}
         return columns | _if_filled(normals=source.vertex_normals, colors=source.vertex_colors)
     if _has(source, "vertices", "faces") and len(source.faces):
@@ -42,7 +42,7 @@ def _laspy(las):
     names = [name for name in las.point_format.dimension_names if name not in ("X", "Y", "Z", *_COLORS)]
     columns = {name: as_array(name, las[name]) for name in names}
     result = {
-        "points": (las.X, las.Y, las.Z),
+        "points": tuple(_integers(axis) for axis in (las.X, las.Y, las.Z)),
         "scales": las.header.scales,
         "offsets": las.header.offsets,
         "intensity": columns.pop("intensity", None),
@@ -54,6 +54,12 @@ def _laspy(las):
         # Files whose colours have eight bits hold nothing above 255.
         result["colors"] = colors.astype("u1") if colors.size and colors.max() <= 255 else colors
     return result
+
+
+def _integers(axis):
+    import numpy
+
+    return numpy.ascontiguousarray(axis, dtype=numpy.int32)
 
 
 def _open3d(cloud):
