@@ -259,7 +259,7 @@ fn values_of(array: &Bound<'_, PyAny>) -> PyResult<Values> {
 #[pyclass(frozen, module = "surfel", name = "Mesh")]
 pub struct PyMesh {
     /// The columns.
-    pub mesh: Mesh,
+    pub mesh: Arc<Mesh>,
 }
 
 #[pymethods]
@@ -294,7 +294,7 @@ impl PyMesh {
         for (name, values) in given {
             values.map_or(Ok(()), |values| columns.set_item(name, values))?;
         }
-        Ok(Self { mesh: mesh_of(py, &columns)? })
+        Ok(Self { mesh: Arc::new(mesh_of(py, &columns)?) })
     }
 
     fn __repr__(&self) -> String {

@@ -1,7 +1,7 @@
 //! Movies.
 
-use crate::image::PyImage;
 use crate::errors::{invalid_setting, to_exception};
+use crate::image::PyImage;
 use crate::scene::PyScene;
 use crate::threads::{on_threads, start_threads};
 use crate::value::with_keys;
@@ -103,9 +103,8 @@ impl PyFilm {
             let mut scene = self.scene.lock().unwrap_or_else(PoisonError::into_inner);
             let time_secs = f64::from(index) / self.options.fps;
             let scene = &mut *scene;
-            let mut image = on_threads(self.threads.as_ref(), || {
-                render_frame(scene, time_secs, progress)
-            })?;
+            let mut image =
+                on_threads(self.threads.as_ref(), || render_frame(scene, time_secs, progress))?;
             // Movies keep no index that points had when they were read.
             image.drop_aovs();
             let origin = scene.flat().origin;

@@ -9,13 +9,13 @@ use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use surfel::SceneDescription;
 use surfel::description::Invalid;
-use surfel_core::points::PointCloud;
-use surfel_core::scene::{Geometry, Graph, Material};
+use surfel::memory_files::MemoryContent;
 
-/// What is added to a scene.
+/// An object that is about to be added to a scene.
+#[derive(Clone)]
 pub struct NewObject {
     /// Content in memory; none if it is in a file.
-    content: Option<Graph<PointCloud>>,
+    content: Option<MemoryContent>,
     /// The object as a scene file has it, but for content in memory.
     table: Map<String, Value>,
 }
@@ -54,12 +54,13 @@ impl NewObject {
         let mut description = description.clone();
         if let Some(content) = self.content {
             let number = description.objects.len();
-            let name = self.table.get("name").and_then(Value::as_str).unwrap_or("array");
-            // Each name is used once: what is known of content is known by its name.
-            let name = format!("memory:{number}:{name}");
-            self.table.insert("file".into(), json!(name));
-            self.table.entry("name").or_insert_with(|| json!(format!("object {number}")));
-            description.memory.insert(name, content);
+            let name =
+                self.table.entry("name").or_insert_with(|| json!(format!("object {number}")));
+            let own = format!("memory:{number}:{}", name.as_str().unwrap_or_default());
+            let known = description.memory.name_of(&content).map(|name| name.display().to_string());
+            let file = known.unwrap_or(own);
+            description.memory.insert(&file, content);
+            self.table.insert("file".into(), json!(file));
         }
         let added = description.add_object(&self.table, Path::new(""));
         added.map_err(|error| invalid(py, error))?;
@@ -89,18 +90,18 @@ fn matrix(transform: &Bound<'_, PyAny>) -> PyResult<Value> {
 }
 
 /// Returns the content of a cloud or mesh, of ours or of another package.
-fn content(what: &Bound<'_, PyAny>) -> PyResult<Graph<PointCloud>> {
+fn content(what: &Bound<'_, PyAny>) -> PyResult<MemoryContent> {
     let py = what.py();
-    let geometry = if let Ok(cloud) = what.cast::<PyCloud>() {
-        Geometry::Points((*cloud.get().cloud).clone())
-    } else if let Ok(mesh) = what.cast::<PyMesh>() {
-        Geometry::Triangles(mesh.get().mesh.clone())
-    } else if mesh_columns(py, what)?.is_some() {
+    if let Ok(cloud) = what.cast::<PyCloud>() {
+        return Ok(MemoryContent::Points(cloud.get().cloud.clone()));
+    }
+    if let Ok(mesh) = what.cast::<PyMesh>() {
+        return Ok(MemoryContent::Triangles(mesh.get().mesh.clone()));
+    }
+    if mesh_columns(py, what)?.is_some() {
         let mesh = py.get_type::<PyMesh>().call1((what,))?.cast_into::<PyMesh>()?;
-        Geometry::Triangles(mesh.get().mesh.clone())
-    } else {
-        let cloud = py.get_type::<PyCloud>().call1((what,))?.cast_into::<PyCloud>()?;
-        Geometry::Points((*cloud.get().cloud).clone())
-    };
-    Ok(Graph::from_geometry(geometry, Material::MATTE))
+        return Ok(MemoryContent::Triangles(mesh.get().mesh.clone()));
+    }
+    let cloud = py.get_type::<PyCloud>().call1((what,))?.cast_into::<PyCloud>()?;
+    Ok(MemoryContent::Points(cloud.get().cloud.clone()))
 }

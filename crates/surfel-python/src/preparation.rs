@@ -54,7 +54,7 @@ pub fn prepare(
     })
 }
 
-/// What is prepared.
+/// The points that are prepared: a cloud, or those of files.
 enum Source {
     Cloud(Arc<PointCloud>, Box<SaveOptions>),
     Files(Vec<PathBuf>),

@@ -176,11 +176,17 @@ impl PyScene {
         keys: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<usize> {
         let object = NewObject::new(what, name, material, transform, keys)?;
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let description = object.added_to(py, &state.description)?;
-        let number = description.objects.len() - 1 + usize::from(!description.files.is_empty());
-        *state = State { description, opened: Slot::default() };
-        Ok(number)
+        loop {
+            // No lock is held while the interpreter may run another thread, which could wait for it.
+            let before = self.description();
+            let description = object.clone().added_to(py, &before)?;
+            let number = description.objects.len() - 1 + usize::from(!description.files.is_empty());
+            let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+            if state.description == before {
+                *state = State { description, opened: Slot::default() };
+                return Ok(number);
+            }
+        }
     }
 
     /// Finds the nearest surface on each ray.
@@ -201,13 +207,12 @@ impl PyScene {
     ) -> PyResult<Bound<'py, PyDict>> {
         let rays = RayArray::new(rays)?;
         let t_range = (0.0, f32::INFINITY);
-        let numbers = &rays.numbers;
         let (hits, contents) = self.with_view(py, None, progress, |scene, chosen, progress| {
-            let rays = numbers.in_scene(&chosen.view, t_range);
+            let rays = rays.in_scene(&chosen.view, t_range);
             let hits = chosen.view.ray_caster(scene.simd()).hits(&rays, progress)?;
             Ok((hits, chosen.view.contents()))
         })?;
-        ray_hits(py, hits, &contents, &rays.shape)
+        ray_hits(py, &rays, hits, &contents)
     }
 
     /// Returns for each ray whether any surface lies on it: bool, (...).
@@ -224,12 +229,11 @@ impl PyScene {
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let rays = RayArray::new(rays)?;
-        let numbers = &rays.numbers;
         let occluded = self.with_view(py, None, progress, |scene, chosen, progress| {
-            let rays = numbers.in_scene(&chosen.view, (tnear, tfar));
+            let rays = rays.in_scene(&chosen.view, (tnear, tfar));
             chosen.view.ray_caster(scene.simd()).occlusions(&rays, progress)
         })?;
-        let occluded: Vec<u8> = occluded.into_iter().map(u8::from).collect();
+        let occluded = rays.restored(occluded).into_iter().map(u8::from).collect::<Vec<u8>>();
         owned_array(py, occluded, rays.shape)?.call_method1("view", ("bool",))
     }
 
@@ -245,12 +249,12 @@ impl PyScene {
     ) -> PyResult<Bound<'py, PyAny>> {
         let rays = RayArray::new(rays)?;
         let t_range = (0.0, f32::INFINITY);
-        let numbers = &rays.numbers;
         let counts = self.with_view(py, None, progress, |scene, chosen, progress| {
-            let rays = numbers.in_scene(&chosen.view, t_range);
+            let rays = rays.in_scene(&chosen.view, t_range);
             chosen.view.ray_caster(scene.simd()).counts(&rays, progress)
         })?;
-        owned_array(py, counts.into_iter().map(|n| n as i32).collect(), rays.shape)
+        let counts = rays.restored(counts).into_iter().map(|n| n as i32).collect();
+        owned_array(py, counts, rays.shape)
     }
 
     /// Corners of a box around everything that is shown, in world coordinates: float64, (2, 3), least and greatest.

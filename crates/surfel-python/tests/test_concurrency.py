@@ -45,6 +45,22 @@ def test_a_scene_grows_while_another_thread_renders(points):
     assert scene.cast_rays([[12, 0, 9, 0, 0, -1]])["geometry_ids"].tolist() == [4]
 
 
+def test_threads_add_to_one_scene(points):
+    scene, cloud = surfel.Scene(), surfel.Cloud(points)
+    numbers = []
+
+    def work():
+        for _ in range(20):
+            numbers.append(scene.add(cloud))
+            with pytest.raises(surfel.InvalidSetting):
+                scene.add(cloud, colour="red")
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    assert sorted(numbers) == list(range(80))
+
+
 def test_other_threads_run_while_a_picture_is_rendered(hill):
     scene, ticks = surfel.load(hill), []
     thread = threading.Thread(target=lambda: scene.render(resolution=(640, 480), spp=4, light_samples=16))

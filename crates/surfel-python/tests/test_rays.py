@@ -87,6 +87,16 @@ def test_the_pinhole_camera_sees_the_depth_of_the_picture(hill):
     assert (hits["point_ids"] == image.point_ids)[both].mean() > 0.99
 
 
+def test_pictures_of_rays_are_answered_in_their_order(hill):
+    scene = surfel.load(hill)
+    rays = surfel.create_rays_pinhole(60, (0, 0, 0), (0, -3, 2), (0, 0, 1), 45, 70)
+    for query in (scene.test_occlusions, scene.count_intersections):
+        assert (query(rays).ravel() == query(rays.reshape(-1, 6))).all()
+    picture, row = scene.cast_rays(rays), scene.cast_rays(rays.reshape(-1, 6))
+    for name, values in picture.items():
+        assert (values.reshape(row[name].shape) == row[name]).all(), name
+
+
 @pytest.mark.parametrize("shape", [(6, 5), (7,), (), (3, 3)])
 def test_other_shapes_are_refused(scene, shape):
     for query in (scene.cast_rays, scene.test_occlusions, scene.count_intersections):

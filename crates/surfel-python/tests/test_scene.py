@@ -36,6 +36,15 @@ def test_things_are_numbered_and_placed(hill, points):
     assert repr(scene) == "<surfel.Scene of 0 files and 3 objects>"
 
 
+def test_one_cloud_is_shown_at_several_places(points):
+    scene, cloud = surfel.Scene(), surfel.Cloud(points)
+    for x in (0, 5, 10):
+        scene.add(cloud, translate=(x, 0, 0))
+    hits = scene.cast_rays([down(0, 0), down(5, 0), down(10, 0)])
+    assert hits["geometry_ids"].tolist() == [0, 1, 2]
+    assert len(set(hits["point_ids"].tolist())) == 1
+
+
 def test_added_things_follow_files(hill):
     scene = surfel.load(hill)
     assert scene.add(SQUARE, translate=(10, 0, 0)) == 1

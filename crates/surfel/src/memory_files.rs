@@ -4,17 +4,26 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use surfel_core::points::PointCloud;
-use surfel_core::scene::{Geometry, Graph};
+use surfel_core::scene::{Geometry, Graph, Material, Mesh};
 use surfel_formats::FileInfo;
 
 /// Content in memory by the names that the files of a description give it. Copies share it.
-#[derive(Clone, Debug, Default)]
-pub struct MemoryFiles(BTreeMap<PathBuf, Arc<Graph<PointCloud>>>);
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MemoryFiles(BTreeMap<PathBuf, MemoryContent>);
+
+/// A cloud or a mesh in memory. Content is equal if it is the same.
+#[derive(Clone, Debug)]
+pub enum MemoryContent {
+    /// A point cloud.
+    Points(Arc<PointCloud>),
+    /// A triangle mesh.
+    Triangles(Arc<Mesh>),
+}
 
 impl MemoryFiles {
     /// Adds content under a name, in place of what had it.
-    pub fn insert(&mut self, name: impl Into<PathBuf>, content: Graph<PointCloud>) {
-        self.0.insert(name.into(), Arc::new(content));
+    pub fn insert(&mut self, name: impl Into<PathBuf>, content: MemoryContent) {
+        self.0.insert(name.into(), content);
     }
 
     /// Returns true if content has this name.
@@ -22,26 +31,15 @@ impl MemoryFiles {
         self.0.contains_key(name)
     }
 
-    /// Returns the content of a name.
-    pub(crate) fn get(&self, name: &Path) -> Option<&Graph<PointCloud>> {
-        self.0.get(name).map(Arc::as_ref)
+    /// Returns a name of content, if it has one: objects with one name share a geometry.
+    pub fn name_of(&self, content: &MemoryContent) -> Option<&Path> {
+        let named = self.0.iter().find(|(_, other)| *other == content);
+        named.map(|(name, _)| name.as_path())
     }
 
-    /// Returns what is known of the content of a name, as the header of a file states it.
-    pub(crate) fn info(&self, name: &Path) -> Option<FileInfo> {
-        let content = self.get(name)?;
-        let (n_points, n_triangles) = content.n_points_and_triangles();
-        let columns = content.geometries.iter().flat_map(|geometry| match geometry {
-            Geometry::Points(cloud) => column_names(cloud),
-            Geometry::Triangles(_) => Vec::new(),
-        });
-        Some(FileInfo {
-            format: "in memory".into(),
-            n_points: Some(n_points as u64),
-            n_triangles: (0 < n_triangles).then_some(n_triangles as u64),
-            columns: columns.collect(),
-            ..FileInfo::default()
-        })
+    /// Returns the content of a name.
+    pub(crate) fn get(&self, name: &Path) -> Option<&MemoryContent> {
+        self.0.get(name)
     }
 
     /// Adds the content of another, in place of what had its names.
@@ -50,12 +48,41 @@ impl MemoryFiles {
     }
 }
 
-impl PartialEq for MemoryFiles {
-    /// Content is equal if it is the same.
+impl MemoryContent {
+    /// Returns a copy as a graph, as reading a file does.
+    pub(crate) fn to_graph(&self) -> Graph<PointCloud> {
+        let geometry = match self {
+            Self::Points(cloud) => Geometry::Points(PointCloud::clone(cloud)),
+            Self::Triangles(mesh) => Geometry::Triangles(Mesh::clone(mesh)),
+        };
+        Graph::from_geometry(geometry, Material::MATTE)
+    }
+
+    /// Returns what is known of the content, as the header of a file states it.
+    pub(crate) fn info(&self) -> FileInfo {
+        let info = FileInfo { format: "in memory".into(), ..FileInfo::default() };
+        match self {
+            Self::Points(cloud) => FileInfo {
+                n_points: Some(cloud.len() as u64),
+                columns: column_names(cloud),
+                ..info
+            },
+            Self::Triangles(mesh) => FileInfo {
+                n_points: Some(mesh.positions.len() as u64),
+                n_triangles: Some(mesh.triangles.len() as u64),
+                ..info
+            },
+        }
+    }
+}
+
+impl PartialEq for MemoryContent {
     fn eq(&self, other: &Self) -> bool {
-        let same = |a: &Arc<_>, b: &Arc<_>| Arc::ptr_eq(a, b);
-        self.0.len() == other.0.len()
-            && self.0.iter().all(|(name, a)| other.0.get(name).is_some_and(|b| same(a, b)))
+        match (self, other) {
+            (Self::Points(a), Self::Points(b)) => Arc::ptr_eq(a, b),
+            (Self::Triangles(a), Self::Triangles(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
     }
 }
 
@@ -70,4 +97,35 @@ fn column_names(cloud: &PointCloud) -> Vec<String> {
     ];
     let known = known.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name.into());
     known.chain(cloud.scalars.iter().map(|scalar| scalar.name.clone())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    //! Clouds in memory are shown as those of files are, once for all objects that name them.
+
+    use super::*;
+    use crate::SceneDescription;
+    use crate::resolve::resolve;
+    use serde_json::json;
+    use surfel_core::math::Vec3;
+    use surfel_core::progress::NoProgress;
+
+    #[test]
+    fn objects_of_one_name_share_a_geometry() {
+        let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0);
+        let cloud = Arc::new(PointCloud::from_positions((0..400).map(corner).collect()));
+        let content = MemoryContent::Points(cloud);
+        let mut description = SceneDescription::default();
+        description.memory.insert("memory:square", content.clone());
+        assert_eq!(description.memory.name_of(&content), Some(Path::new("memory:square")));
+        for x in [0, 30] {
+            let object = json!({ "file": "memory:square", "translate": [x, 0, 0] });
+            let Some(table) = object.as_object() else { panic!("an object is a table") };
+            description.add_object(table, Path::new("")).unwrap();
+        }
+        let resolved = resolve(&description, &NoProgress).unwrap();
+        let graph = &resolved.scene.graph;
+        assert_eq!(graph.geometries.len(), 1);
+        assert_eq!(graph.nodes.iter().filter(|node| !node.primitives.is_empty()).count(), 2);
+    }
 }

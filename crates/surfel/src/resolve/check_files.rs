@@ -24,8 +24,8 @@ pub fn check_files(description: &SceneDescription) -> Result<()> {
         .map(PathBuf::as_path)
         .collect();
     check_materials(description)?;
-    let inspected = files.into_iter().map(|file| match description.memory.info(file) {
-        Some(info) => Ok((file, info)),
+    let inspected = files.into_iter().map(|file| match description.memory.get(file) {
+        Some(content) => Ok((file, content.info())),
         None => Ok((file, surfel_formats::inspect(file)?)),
     });
     let mut infos = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, FileInfo>>>()?;

@@ -2,7 +2,7 @@
 
 use crate::description::{Invalid, ObjectSettings, PreparationSettings};
 use crate::error::Result;
-use crate::memory_files::MemoryFiles;
+use crate::memory_files::{MemoryContent, MemoryFiles};
 use crate::progress_log::NotesAsChoices;
 use std::path::Path;
 use surfel_core::math::Vec3;
@@ -34,7 +34,7 @@ pub fn import(
     progress: &dyn Progress,
 ) -> Result<(Graph<PointCloud>, FileInfo)> {
     if let Some(content) = options.memory.get(file) {
-        return import_from_memory(file, content.clone(), settings, options, progress);
+        return import_from_memory(content, settings, options, progress);
     }
     let columns = if options.keeps_all_columns { ColumnChoice::All } else { settings.columns() };
     let mut load_options = settings.preparation.load_options(columns)?;
@@ -54,18 +54,16 @@ pub fn import(
 
 /// Takes content in memory as if a file held it.
 fn import_from_memory(
-    name: &Path,
-    content: Graph<PointCloud>,
+    content: &MemoryContent,
     settings: &ObjectSettings,
     options: &ImportOptions,
     progress: &dyn Progress,
 ) -> Result<(Graph<PointCloud>, FileInfo)> {
-    let info = options.memory.info(name).unwrap_or_default();
     let keep = |cloud| match options.keeps_all_columns {
         true => Ok(cloud),
         false => filter_cloud(cloud, &settings.preparation, progress),
     };
-    Ok((content.try_map_clouds(keep)?, info))
+    Ok((content.to_graph().try_map_clouds(keep)?, content.info()))
 }
 
 /// A graph of one cloud.
