@@ -1,6 +1,6 @@
 //! Rays as arrays, and what they hit.
 
-use crate::array::{checked, column};
+use crate::array::{checked, with_slice};
 use crate::buffer::owned_array;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -12,9 +12,9 @@ use surfel_core::image::NO_ID;
 use surfel_core::math::morton_decode;
 
 /// Rays of an array (..., 6).
-pub struct RayArray {
-    /// The numbers, six a ray.
-    numbers: RayNumbers,
+pub struct RayArray<'py> {
+    /// Rows of six numbers, one after the other.
+    array: Bound<'py, PyAny>,
     /// Shape of what is said of each ray.
     pub shape: Vec<usize>,
     /// Order in which rays of a picture are traced; none for any others.
@@ -24,41 +24,30 @@ pub struct RayArray {
 /// Pixels along the side of a tile of a picture.
 const TILE: u32 = 32;
 
-/// Six numbers for each ray, copied: whoever changes the array changes nothing.
-enum RayNumbers {
-    /// From an array of float32.
-    Single(Vec<f32>),
-    /// From any other array.
-    Double(Vec<f64>),
-}
-
-impl RayArray {
-    /// Looks at an array and copies it.
-    pub fn new(rays: &Bound<'_, PyAny>) -> PyResult<Self> {
+impl<'py> RayArray<'py> {
+    /// Looks at an array.
+    pub fn new(rays: &Bound<'py, PyAny>) -> PyResult<Self> {
         let (array, shape): (Bound<'_, PyAny>, Vec<usize>) =
             checked(rays.py(), "rays", (rays,))?.extract()?;
-        let numbers = match array.cast::<PyArrayDyn<f32>>() {
-            Ok(_) => RayNumbers::Single(column(&array)?),
-            Err(_) => RayNumbers::Double(column(&array)?),
-        };
         let order = match shape[..] {
             [height, width] => tile_order(height, width),
             _ => None,
         };
-        Ok(Self { numbers, shape, order })
+        Ok(Self { array, shape, order })
     }
 
-    /// Returns the rays relative to the origin of a view's scene, in the order in which they are traced.
-    pub fn in_scene(&self, view: &LiveView, t_range: (f32, f32)) -> WorldRays {
-        match &self.numbers {
-            RayNumbers::Single(numbers) => {
+    /// Returns the rays relative to the origin of a view's scene, in the order in which they are traced. They are copied
+    /// while the interpreter waits: whoever changes the array later changes nothing.
+    pub fn in_scene(&self, view: &LiveView, t_range: (f32, f32)) -> PyResult<WorldRays> {
+        if self.array.cast::<PyArrayDyn<f32>>().is_ok() {
+            return with_slice::<f32, _>(&self.array, |numbers| {
                 let rays = numbers.as_chunks::<6>().0;
                 self.ordered(rays, |ray| ray.map(f64::from), view, t_range)
-            }
-            RayNumbers::Double(numbers) => {
-                self.ordered(numbers.as_chunks::<6>().0, |ray| *ray, view, t_range)
-            }
+            });
         }
+        with_slice::<f64, _>(&self.array, |numbers| {
+            self.ordered(numbers.as_chunks::<6>().0, |ray| *ray, view, t_range)
+        })
     }
 
     fn ordered<T: Sync>(
@@ -68,13 +57,18 @@ impl RayArray {
         view: &LiveView,
         t_range: (f32, f32),
     ) -> WorldRays {
-        match &self.order {
+        match self.order.as_deref() {
             Some(order) => {
                 let rays = order.par_iter().map(|i| ray(&rays[*i as usize]));
                 WorldRays::new(rays, t_range, &view.flat)
             }
             None => WorldRays::new(rays.par_iter().map(ray), t_range, &view.flat),
         }
+    }
+
+    /// Returns the interpreter.
+    pub fn py(&self) -> Python<'py> {
+        self.array.py()
     }
 
     /// Puts answers into the order of the array.
@@ -101,13 +95,15 @@ fn tile_order(height: usize, width: usize) -> Option<Vec<u32>> {
         (0..TILE * TILE).map(morton_decode).map(move |(column, row)| (x + column, y + row))
     });
     let inside = pixels.filter(|(x, y)| *x < width && *y < height);
-    Some(inside.map(|(x, y)| y * width + x).collect())
+    let mut order = Vec::with_capacity(height as usize * width as usize);
+    order.extend(inside.map(|(x, y)| y * width + x));
+    Some(order)
 }
 
 /// Returns hits as a dict of arrays; `contents` has the number of what each instance shows.
 pub fn ray_hits<'py>(
     py: Python<'py>,
-    rays: &RayArray,
+    rays: &RayArray<'_>,
     hits: RayHits,
     contents: &[u32],
 ) -> PyResult<Bound<'py, PyDict>> {

@@ -19,6 +19,7 @@ use std::time::Duration;
 use surfel::description::is_scene_file;
 use surfel::live_scene::{LiveScene, LiveView, UseCase};
 use surfel::progress_log::{Choice, ProgressLog};
+use surfel::ray_query::{RayCaster, WorldRays};
 use surfel::{Error, RenderedImage, SceneDescription};
 use surfel_core::image::Image;
 use surfel_core::progress::Progress;
@@ -52,6 +53,9 @@ struct ChosenView {
     view: LiveView,
     choices: Vec<Choice>,
 }
+
+/// All of a ray, from its origin without end.
+const WHOLE_RAY: (f32, f32) = (0.0, f32::INFINITY);
 
 /// Time between two looks at a scene that another thread reads.
 const LOCK_POLL_INTERVAL: Duration = Duration::from_millis(2);
@@ -136,13 +140,41 @@ impl PyScene {
         progress: Option<&Bound<'_, PyAny>>,
         work: impl FnOnce(&LiveScene, &ChosenView, &dyn Progress) -> surfel::Result<T> + Send,
     ) -> PyResult<T> {
+        let (scene, view) = self.open_view(py, keys, progress)?;
+        work::run(py, progress, |progress| scene.install(|scene| work(scene, &view, progress)))
+    }
+
+    /// Returns the scene and its view under a description; both are made unless they are there.
+    fn open_view(
+        &self,
+        py: Python<'_>,
+        keys: Option<&Bound<'_, PyDict>>,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<(Arc<OpenScene>, Arc<ChosenView>)> {
         let (startup, slot) = self.state();
         let description = with_keys(py, &startup, keys)?;
         work::run(py, progress, |progress| {
             let scene = opened(&slot, &startup, progress)?;
             let view = scene.view(description, progress)?;
-            scene.install(|scene| work(scene, &view, progress))
+            Ok((scene, view))
         })
+    }
+
+    /// Runs a query about rays, of which the part `t_range` counts.
+    fn query_rays<T: Send>(
+        &self,
+        rays: &RayArray<'_>,
+        t_range: (f32, f32),
+        progress: Option<&Bound<'_, PyAny>>,
+        query: impl FnOnce(&RayCaster<'_>, &WorldRays, &dyn Progress) -> surfel::Result<T> + Send,
+    ) -> PyResult<(T, Arc<ChosenView>)> {
+        let py = rays.py();
+        let (scene, chosen) = self.open_view(py, None, progress)?;
+        let local = rays.in_scene(&chosen.view, t_range)?;
+        let answers = work::run(py, progress, |progress| {
+            scene.install(|scene| query(&chosen.view.ray_caster(scene.simd()), &local, progress))
+        })?;
+        Ok((answers, chosen))
     }
 }
 
@@ -206,12 +238,11 @@ impl PyScene {
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let rays = RayArray::new(rays)?;
-        let t_range = (0.0, f32::INFINITY);
-        let (hits, contents) = self.with_view(py, None, progress, |scene, chosen, progress| {
-            let rays = rays.in_scene(&chosen.view, t_range);
-            let hits = chosen.view.ray_caster(scene.simd()).hits(&rays, progress)?;
-            Ok((hits, chosen.view.contents()))
-        })?;
+        let (hits, chosen) =
+            self.query_rays(&rays, WHOLE_RAY, progress, |caster, rays, progress| {
+                caster.hits(rays, progress)
+            })?;
+        let contents = chosen.view.contents();
         ray_hits(py, &rays, hits, &contents)
     }
 
@@ -229,10 +260,11 @@ impl PyScene {
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let rays = RayArray::new(rays)?;
-        let occluded = self.with_view(py, None, progress, |scene, chosen, progress| {
-            let rays = rays.in_scene(&chosen.view, (tnear, tfar));
-            chosen.view.ray_caster(scene.simd()).occlusions(&rays, progress)
-        })?;
+        let t_range = (tnear, tfar);
+        let (occluded, _) =
+            self.query_rays(&rays, t_range, progress, |caster, rays, progress| {
+                caster.occlusions(rays, progress)
+            })?;
         let occluded = rays.restored(occluded).into_iter().map(u8::from).collect::<Vec<u8>>();
         owned_array(py, occluded, rays.shape)?.call_method1("view", ("bool",))
     }
@@ -248,11 +280,10 @@ impl PyScene {
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let rays = RayArray::new(rays)?;
-        let t_range = (0.0, f32::INFINITY);
-        let counts = self.with_view(py, None, progress, |scene, chosen, progress| {
-            let rays = rays.in_scene(&chosen.view, t_range);
-            chosen.view.ray_caster(scene.simd()).counts(&rays, progress)
-        })?;
+        let (counts, _) =
+            self.query_rays(&rays, WHOLE_RAY, progress, |caster, rays, progress| {
+                caster.counts(rays, progress)
+            })?;
         let counts = rays.restored(counts).into_iter().map(|n| n as i32).collect();
         owned_array(py, counts, rays.shape)
     }
