@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Runs every check: formatting, lints, tests, doc tests, tests of the viewer's page and in a browser, licences, and
-# each benchmark once. Prints the time of each step and ends with a line "N passed, N failed, N skipped"; the exit
+# Runs every check: formatting, lints, tests, doc tests, tests of the viewer's page and in a browser, those of the Python
+# package, licences, and each benchmark once. Prints the time of each step and ends with a line "N passed, N failed, N skipped"; the exit
 # status is 0 if nothing failed.
 set -uo pipefail
 cd "$(dirname "$0")" || exit 1
@@ -87,6 +87,50 @@ prepare_browser() {
     npm install --silent --no-audit --no-fund --prefix "$PLAYWRIGHT" playwright-core axe-core >"$log" 2>&1
 }
 
+# Builds the wheel, installs it into a fresh environment of the newest Python and into one of the oldest, and runs
+# pytest there. Prints why and counts one skipped check where there is no Python, or no package registry.
+python_tests() {
+    begin "Python"
+    local found=() python environment wheel
+    for python in python3.15 python3.14 python3.13 python3.12 python3.11 python3.10 python3; do
+        "$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null && found+=("$python")
+    done
+    [ ${#found[@]} -gt 0 ] || { skip "tests of the Python package: Python 3.10 or newer is not installed"; return; }
+    environment=$(mktemp -d)
+    if ! "${found[0]}" -m venv "$environment/build" || ! "$environment/build/bin/pip" install -q maturin >"$log" 2>&1; then
+        skip "tests of the Python package: pip cannot install maturin"
+    elif ! (cd crates/surfel-python && "$environment/build/bin/maturin" build --profile dev -q --out "$environment"); then
+        echo "FAILED: the wheel cannot be built"
+        failed=$((failed + 1))
+    else
+        wheel=$(echo "$environment"/*.whl)
+        for python in $(printf '%s\n' "${found[0]}" "${found[-1]}" | uniq); do
+            pytest_in "$environment/$python" "$python" "$wheel"
+        done
+    fi
+    rm -rf "$environment"
+}
+
+# Runs pytest with a wheel in a fresh environment, and counts its tests.
+pytest_in() {
+    local pip="$1/bin/pip" word count
+    if ! "$2" -m venv "$1" || ! "$pip" install -q pytest numpy >"$log" 2>&1; then
+        skip "tests of the Python package: pip cannot install pytest and numpy for $2"
+        return
+    fi
+    # What surfel works with but does not need; tests that need one that is missing are skipped.
+    for word in laspy pandas trimesh "dask distributed"; do "$pip" install -q $word >"$log" 2>&1; done
+    "$pip" install -q --no-index --no-deps "$3" && (cd crates/surfel-python && "$1/bin/python" -m pytest -q -rs tests) 2>&1 | tee "$log"
+    grep -qE '^[0-9].* in [0-9.]+s' "$log" || failed=$((failed + 1))
+    while read -r count word; do
+        case $word in
+            passed) passed=$((passed + count)) ;;
+            failed | error | errors) failed=$((failed + count)) ;;
+            skipped) skipped=$((skipped + count)) ;;
+        esac
+    done < <(grep -E '^[0-9].* in [0-9.]+s' "$log" | tail -1 | grep -oE '[0-9]+ [a-z]+')
+}
+
 # Counts a check that cannot run, and prints why.
 skip() {
     echo "skipped: $1"
@@ -119,6 +163,7 @@ if node -e 'const [a, b] = process.versions.node.split("."); process.exit(+a < 2
 else
     skip "tests of the page and in a browser: node 20.11 or newer is not installed"
 fi
+python_tests
 if cargo deny --version >/dev/null 2>&1; then
     check "licences and sources" cargo deny check bans licenses sources
 else

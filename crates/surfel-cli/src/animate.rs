@@ -8,9 +8,8 @@ use crate::scene_args::SceneArgs;
 use crate::usage::Usage;
 use std::path::{Path, PathBuf};
 use surfel::SceneDescription;
-use surfel::animate::{animate, fingerprint, frame_count, movie_options};
-use surfel::picture::image_options;
-use surfel::resolve::{AutoSettings, KeepOptions, LoadedScene};
+use surfel::animate::{PlannedMovie, movie_options};
+use surfel_core::trace::Simd;
 use surfel_formats::MovieOptions;
 
 /// Arguments of `surfel animate`.
@@ -65,26 +64,19 @@ pub fn animate_description(
     report: &Report,
 ) -> anyhow::Result<()> {
     let output = description.output.output.as_deref();
-    let mut options = movie_options(description);
-    output.map_or(Ok(()), |output| check(output, &options))?;
-    let loaded = LoadedScene::read(description, KeepOptions::default(), report)?;
-    options.n_frames = frame_count(description, loaded.duration_secs()).map_err(|_| {
-        Usage("nothing moves; add --turntable SECONDS, or --frames N for a still movie".into())
+    output.map_or(Ok(()), |output| check(output, &movie_options(description)))?;
+    let movie = PlannedMovie::new(description, report).map_err(|error| match error {
+        surfel::Error::Invalid(invalid) if invalid.path == "frames" => anyhow::Error::from(Usage(
+            "nothing moves; add --turntable SECONDS, or --frames N for a still movie".into(),
+        )),
+        error => error.into(),
     })?;
-    let auto = AutoSettings::choose(&loaded, description, report)?;
-    let mut complete = auto.complete_description(&loaded);
-    complete.output.frames = Some(options.n_frames);
-    complete.output.fps = Some(options.fps);
     let (Some(output), false) = (output, is_dry_run) else {
-        loaded.check_surfaces(description, 0.0)?;
-        return Ok(print(&format!("{:#}", with_info(&complete, &loaded)))?);
+        movie.loaded.check_surfaces(description, 0.0)?;
+        return Ok(print(&format!("{:#}", with_info(&movie.complete, &movie.loaded)))?);
     };
-    options.fingerprint = fingerprint(&complete, description, &loaded);
-    let mut scene = loaded.into_resolved(auto, report)?.build_trees(report)?;
-    scene.choose_exposure(report)?;
-    report_threads(scene.simd(), report);
-    options.image = image_options(description, scene.flat().origin);
-    Ok(animate(&mut scene, output, &options, resumes, report)?)
+    report_threads(Simd::detect(), report);
+    Ok(movie.render(output, resumes, report)?)
 }
 
 fn check(output: &Path, options: &MovieOptions) -> anyhow::Result<()> {

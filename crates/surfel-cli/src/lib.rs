@@ -32,6 +32,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use surfel_web::SceneProvider;
 use usage::Usage;
+pub use view::RunningViewer;
 
 /// Turns point clouds into pictures and movies by ray tracing the points themselves, as a continuous surface,
 /// together with meshes.
@@ -77,13 +78,25 @@ enum Command {
 
 /// Runs the program by its command line.
 pub fn main() -> ExitCode {
+    ExitCode::from(run_program(std::env::args_os()))
+}
+
+/// Runs the program with these words, the first of which is its name; returns its exit code.
+pub fn run_program(words: impl IntoIterator<Item = OsString>) -> u8 {
     silence_decoder_panics();
-    let cli = parse(std::env::args_os()).unwrap_or_else(|error| error.exit());
+    let cli = match parse(words) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Nothing can be said about a closed stream.
+            let _ = error.print();
+            return error.exit_code() as u8;
+        }
+    };
     let report = Report::new(cli.global.verbosity());
     let result = run(&cli, &report);
     cleanup::remove_files();
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(error) => {
             report.error(&error);
             exit_code(&error)
@@ -122,21 +135,21 @@ fn command() -> ClapCommand {
     lenient(Cli::command()).mut_subcommands(lenient)
 }
 
-fn exit_code(error: &anyhow::Error) -> ExitCode {
+fn exit_code(error: &anyhow::Error) -> u8 {
     let is_cancelled = error.chain().any(|cause| {
         let by_library =
             cause.downcast_ref::<surfel::Error>().is_some_and(surfel::Error::is_cancelled);
         by_library || cause.downcast_ref() == Some(&surfel_core::Error::Cancelled)
     });
     if is_cancelled {
-        return ExitCode::from(interrupt::exit_code());
+        return interrupt::exit_code();
     }
     let is_invalid = |cause: &(dyn std::error::Error + 'static)| {
         cause.is::<Usage>()
             || cause.is::<surfel::description::Invalid>()
             || matches!(cause.downcast_ref(), Some(surfel::Error::Invalid(_)))
     };
-    ExitCode::from(if error.chain().any(is_invalid) { 2 } else { 1 })
+    if error.chain().any(is_invalid) { 2 } else { 1 }
 }
 
 fn run(cli: &Cli, report: &Report) -> anyhow::Result<()> {
@@ -157,7 +170,7 @@ fn run(cli: &Cli, report: &Report) -> anyhow::Result<()> {
 
 /// Silences panics of the decoders of LAZ and EXR, which panic on bytes that no encoder writes. `surfel_formats`
 /// returns an error that names the file instead.
-fn silence_decoder_panics() {
+pub fn silence_decoder_panics() {
     let default = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         let is_decoder = |file: &str| file.contains("laz-") || file.contains("exr-");

@@ -5,7 +5,7 @@ use crate::description::{Invalid, SceneDescription};
 use crate::error::{Error, Result};
 use crate::picture::{RenderedImage, image_options};
 use crate::progress_log::CancelOnly;
-use crate::resolve::LoadedScene;
+use crate::resolve::{AutoSettings, KeepOptions, LoadedScene};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use surfel_core::math::DVec3;
@@ -64,6 +64,60 @@ pub fn fingerprint(
     format!("{hash:016x}")
 }
 
+/// A movie whose files are read and whose choices are made.
+#[derive(Debug)]
+pub struct PlannedMovie {
+    /// The content of the files.
+    pub loaded: LoadedScene,
+    /// The complete description, with everything that was chosen.
+    pub complete: SceneDescription,
+    description: SceneDescription,
+    auto: AutoSettings,
+    options: MovieOptions,
+}
+
+impl PlannedMovie {
+    /// Reads the files of a description and chooses what it leaves open.
+    ///
+    /// # Errors
+    ///
+    /// Fails for missing and broken files, if nothing moves and no number of frames is given, and if cancelled.
+    pub fn new(description: &SceneDescription, progress: &dyn Progress) -> Result<Self> {
+        let mut options = movie_options(description);
+        let loaded = LoadedScene::read(description, KeepOptions::default(), progress)?;
+        options.n_frames = frame_count(description, loaded.duration_secs())?;
+        let auto = AutoSettings::choose(&loaded, description, progress)?;
+        let mut complete = auto.complete_description(&loaded);
+        complete.output.frames = Some(options.n_frames);
+        complete.output.fps = Some(options.fps);
+        Ok(Self { loaded, complete, description: description.clone(), auto, options })
+    }
+
+    /// Renders the movie to a file.
+    ///
+    /// # Errors
+    ///
+    /// Fails if a frame cannot be rendered or written, and if cancelled; the message says how many frames are kept.
+    pub fn render(self, output: &Path, resumes: bool, progress: &dyn Progress) -> Result<()> {
+        let (mut scene, options) = self.build(progress)?;
+        animate(&mut scene, output, &options, resumes, progress)
+    }
+
+    /// Builds the trees of the scene, whose frames [`render_frame`] renders.
+    ///
+    /// # Errors
+    ///
+    /// Fails for scenes that no picture can be made of, and if cancelled.
+    pub fn build(self, progress: &dyn Progress) -> Result<(BuiltScene, MovieOptions)> {
+        let Self { loaded, complete, description, auto, mut options } = self;
+        options.fingerprint = fingerprint(&complete, &description, &loaded);
+        let mut scene = loaded.into_resolved(auto, progress)?.build_trees(progress)?;
+        scene.choose_exposure(progress)?;
+        options.image = image_options(&description, scene.flat().origin);
+        Ok((scene, options))
+    }
+}
+
 /// Renders the frames that a movie lacks, and finishes it.
 ///
 /// # Errors
@@ -76,7 +130,6 @@ pub fn animate(
     resumes: bool,
     progress: &dyn Progress,
 ) -> Result<()> {
-    scene.fix_overlay();
     let mut movie = Movie::open(output, options, resumes)?;
     let n_frames = options.n_frames;
     if 0 < movie.n_done() {
@@ -99,12 +152,18 @@ pub fn animate(
     Ok(())
 }
 
-fn render_frame(
+/// Renders the frame of a movie at a time in seconds.
+///
+/// # Errors
+///
+/// Fails if the frame cannot be rendered, and if cancelled.
+pub fn render_frame(
     scene: &mut BuiltScene,
     time_secs: f64,
     progress: &dyn Progress,
 ) -> Result<RenderedImage> {
     let quiet = CancelOnly(progress);
+    scene.fix_overlay();
     scene.seek(time_secs, &quiet)?;
     if let Some(seconds) = scene.description().output.turntable {
         scene.turn(TAU * time_secs / seconds);

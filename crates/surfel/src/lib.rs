@@ -59,6 +59,7 @@
 pub mod names;
 pub mod crs;
 mod troubleshooting;
+pub mod memory_files;
 pub mod description;
 mod error;
 mod scene_file;
@@ -68,9 +69,11 @@ pub mod resolve;
 pub mod picture;
 mod cache;
 mod built_scene;
+pub mod ray_query;
 mod raycast;
 mod height_map;
 pub mod animate;
+pub mod prepare;
 mod scene_keys;
 pub mod live_scene;
 

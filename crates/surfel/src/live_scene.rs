@@ -2,10 +2,13 @@
 
 use crate::built_scene::{exposure_stops, planes_before, source_indices};
 use crate::cache::Lru2;
-use crate::crs::Unit;
+use crate::crs::{Unit, georeference};
 use crate::description::{Exposure, Interior, Invalid, SceneDescription};
 use crate::error::{Error, Result};
 use crate::overlay::Overlay;
+use crate::picture::{RenderedImage, image_options};
+use crate::ray_query::RayCaster;
+use crate::raycast::world_bounds;
 use crate::resolve::{
     AutoSettings, KeepOptions, LoadedScene, common_legend, coordinate_system, expose, finish_graph,
     hide_walls, render_settings,
@@ -13,18 +16,19 @@ use crate::resolve::{
 use crate::scene_keys::{grouping_key, preparation_key, tree_key};
 use rayon::ThreadPool;
 use std::sync::{Arc, OnceLock};
-use surfel_core::flat::FlatScene;
-use surfel_core::image::Image;
+use surfel_core::flat::{FlatScene, Instance};
+use surfel_core::image::{Image, NO_ID};
 use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
-use surfel_core::render::{self, CpuRenderer, Renderer, Settings};
+use surfel_core::render::{self, CpuRenderer, RenderRegion, RenderStats, Renderer, Settings};
 use surfel_core::scene::color::Legend;
 use surfel_core::scene::{
     Background, Camera, ClipPlane, Geometry, Graph, Projection, Scene, inlier_bounds,
 };
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
+use surfel_formats::Georeference;
 use thread_priority::ThreadPriority;
 
 /// A loaded scene that is shown under one description after another. Threads share it.
@@ -45,6 +49,17 @@ pub struct LiveScene {
     preparation_threads: ThreadPool,
     /// Threads for whole pictures, which take long. They run when the others leave processors idle.
     picture_threads: ThreadPool,
+    use_case: UseCase,
+}
+
+/// The callers of a live scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UseCase {
+    /// Several viewers. Walls that the first camera hides stay hidden while it moves, and points so large that each ray
+    /// meets thousands of them are refused, as others would wait.
+    Viewers,
+    /// A program that makes one picture after another, each as `surfel render` would.
+    Pictures,
 }
 
 /// Results for the last descriptions.
@@ -92,6 +107,52 @@ impl LiveView {
         let up = self.description.world.up.unwrap_or(Vec3::Z);
         Overlay::of(&self.description.picture, self.trees.legend.clone(), (up, self.unit))
     }
+
+    /// Draws the overlay onto a picture of the view, which becomes a file as the description says.
+    pub fn finished(&self, mut image: Image) -> RenderedImage {
+        self.overlay().draw(&mut image, &self.flat.camera);
+        let mut options = image_options(&self.description, self.flat.origin);
+        options.georeference = self.georeference();
+        RenderedImage::new(image, options)
+    }
+
+    /// Returns where the pixels of a plan to scale lie.
+    fn georeference(&self) -> Option<Georeference> {
+        let system = coordinate_system(&self.loaded, &self.description);
+        let size = (self.settings.width, self.settings.height);
+        let place = georeference(&self.flat.camera, size, system.as_ref());
+        place.filter(|_| self.description.plan.is_to_scale())
+    }
+
+    /// Returns for each instance the number of what it shows: first come the files without an object, of which those
+    /// together that became one cloud, then the objects.
+    pub fn contents(&self) -> Vec<u32> {
+        let content = |instance: &Instance| self.loaded.content_of(instance.node_idx as usize);
+        let contents = self.flat.instances.iter().map(content);
+        contents.map(|content| content.map_or(NO_ID, |content| content as u32)).collect()
+    }
+
+    /// Returns the corners of a box around everything, in world coordinates: least and greatest.
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
+        world_bounds(&self.flat)
+    }
+
+    /// Returns what casts rays at the view.
+    pub fn ray_caster(&self, simd: Simd) -> RayCaster<'_> {
+        RayCaster { scene: &self.flat, simd, sources: self.sources() }
+    }
+
+    /// Returns for each instance the index that each of its points had when it was read; empty for triangles.
+    pub fn sources(&self) -> Vec<&[u32]> {
+        let source = |instance: &Instance| {
+            let node = self.trees.graph.nodes.get(instance.node_idx as usize)?;
+            let is_shown = |material: usize| material == instance.material_idx as usize;
+            let primitive =
+                node.primitives.iter().find(|primitive| is_shown(primitive.material))?;
+            Some(&self.trees.source_indices.get(primitive.geometry)?[..])
+        };
+        self.flat.instances.iter().map(|instance| source(instance).unwrap_or_default()).collect()
+    }
 }
 
 impl LiveScene {
@@ -100,7 +161,11 @@ impl LiveScene {
     /// # Errors
     ///
     /// Fails as reading does, and if threads cannot be started.
-    pub fn open(description: &SceneDescription, progress: &dyn Progress) -> Result<Self> {
+    pub fn open(
+        description: &SceneDescription,
+        use_case: UseCase,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let mut startup = description.clone();
         startup.apply_object_settings()?;
         let loaded = LoadedScene::read(&startup, KEEP, progress)?;
@@ -114,6 +179,7 @@ impl LiveScene {
             hidden_walls: OnceLock::new(),
             preparation_threads: start_threads(|_| ())?,
             picture_threads: start_threads(|_| lower_priority())?,
+            use_case,
         })
     }
 
@@ -196,9 +262,11 @@ impl LiveScene {
     ) -> Result<LiveView> {
         let loaded = self.loaded_for(description, progress)?;
         let mut auto = AutoSettings::choose(&loaded, description, progress)?;
-        let first = self.hidden_walls.get_or_init(|| auto.hidden_walls.clone());
-        let is_open = description.camera.interior() != Interior::Off;
-        auto.hidden_walls = if is_open { first.clone() } else { Vec::new() };
+        if self.use_case == UseCase::Viewers {
+            let first = self.hidden_walls.get_or_init(|| auto.hidden_walls.clone());
+            let is_open = description.camera.interior() != Interior::Off;
+            auto.hidden_walls = if is_open { first.clone() } else { Vec::new() };
+        }
         let mut complete = auto.complete_description(&loaded);
         let settings = Settings { with_aovs: false, ..render_settings(&complete) };
         let time_secs = description.output.time();
@@ -216,6 +284,37 @@ impl LiveScene {
         let system = coordinate_system(&loaded, description);
         let unit = system.map_or(Unit::Unknown, |system| system.unit());
         Ok(LiveView { loaded, flat, settings, description: complete, moves_camera, unit, trees })
+    }
+
+    /// Renders the picture of a view with its overlay, on the caller's threads.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the settings make no picture, and if cancelled.
+    pub fn picture(
+        &self,
+        view: &LiveView,
+        with_aovs: bool,
+        progress: &dyn Progress,
+    ) -> Result<(RenderedImage, RenderStats)> {
+        let settings = Settings { with_aovs, ..view.settings };
+        let (image, stats) = self.renderer.render(&view.flat, &settings, progress)?;
+        Ok((view.finished(image), stats))
+    }
+
+    /// Renders some rows of the picture of a view, without layers and overlay: from the first to before the second.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the picture has no such rows, and if cancelled.
+    pub fn rows(
+        &self,
+        view: &LiveView,
+        rows: (u32, u32),
+        progress: &dyn Progress,
+    ) -> Result<Image> {
+        let region = RenderRegion { rows, ..RenderRegion::whole(&view.settings) };
+        Ok(self.renderer.render_region(&view.flat, &view.settings, region, progress)?.0)
     }
 
     /// Renders a view on threads of the lowest priority, however many others wait for their preparation.
@@ -272,7 +371,8 @@ impl LiveScene {
             let clouds = made.prepared.get_or_make(preparation, progress, || {
                 self.preparation_threads.install(|| loaded.prepared(description, progress))
             })?;
-            let build = || build(loaded, time_secs, description, &clouds, auto, progress);
+            let build =
+                || build(loaded, time_secs, description, &clouds, auto, self.use_case, progress);
             self.preparation_threads.install(build)
         })
     }
@@ -285,6 +385,7 @@ fn build(
     description: &SceneDescription,
     clouds: &[PreparedCloud],
     auto: &AutoSettings,
+    use_case: UseCase,
     progress: &dyn Progress,
 ) -> Result<SceneTrees> {
     let up = auto.up;
@@ -299,7 +400,9 @@ fn build(
     let source_indices = source_indices(&graph);
     let (lights, background) = (Vec::new(), Background::Transparent);
     let scene = Scene { graph, lights, background, camera: PLACEHOLDER_CAMERA };
-    check_overlap(&scene.graph)?;
+    if use_case == UseCase::Viewers {
+        check_overlap(&scene.graph)?;
+    }
     let flat = FlatScene::new(&scene, progress)?;
     progress.end();
     let mut graph = scene.graph;
@@ -413,7 +516,7 @@ mod tests {
         surfel_formats::save(&path, &cloud, &SaveOptions::default(), &NoProgress).unwrap();
         let description =
             SceneDescription { files: vec![path.clone()], ..SceneDescription::default() };
-        let scene = LiveScene::open(&description, &NoProgress).unwrap();
+        let scene = LiveScene::open(&description, UseCase::Viewers, &NoProgress).unwrap();
         std::fs::remove_file(path).unwrap();
         (scene, description)
     }

@@ -32,6 +32,11 @@ impl RenderedImage {
         Ok(surfel_formats::save_image(path.as_ref(), &self.image, &self.options)?)
     }
 
+    /// Drops all layers beside colour and coverage.
+    pub fn drop_aovs(&mut self) {
+        self.image.aovs = None;
+    }
+
     /// Returns the bytes of a PNG.
     ///
     /// # Errors

@@ -1,8 +1,10 @@
 //! Rays in world coordinates against a built scene, after Open3D's `RaycastingScene`.
 
 use crate::built_scene::BuiltScene;
-use surfel_core::flat::FlatGeometry;
-use surfel_core::math::{Aabb, DVec3, Ray, Vec3};
+use crate::ray_query::WorldRays;
+use rayon::prelude::*;
+use surfel_core::flat::{FlatGeometry, FlatScene};
+use surfel_core::math::{Aabb, DVec3};
 use surfel_core::trace::{InstanceFilter, SceneHit, scene_hits, scene_occlusions};
 
 /// The nearest surface on a ray.
@@ -22,46 +24,45 @@ pub struct RayHit {
     pub triangle: Option<u32>,
 }
 
+/// Returns the corners of a box around all instances, in world coordinates: least and greatest.
+pub(crate) fn world_bounds(flat: &FlatScene) -> [[f64; 3]; 2] {
+    let boxes = flat.instances.iter().map(|instance| instance.bounds);
+    let all = boxes.fold(Aabb::EMPTY, Aabb::union);
+    [all.min, all.max].map(|corner| (flat.origin + corner.as_dvec3()).to_array())
+}
+
 impl BuiltScene {
     /// Returns the corners of a box around everything, in world coordinates: least and greatest.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
-        let flat = self.flat();
-        let boxes = flat.instances.iter().map(|instance| instance.bounds);
-        let all = boxes.fold(Aabb::EMPTY, Aabb::union);
-        [all.min, all.max].map(|corner| (flat.origin + corner.as_dvec3()).to_array())
+        world_bounds(self.flat())
     }
 
     /// Finds the nearest surface on each ray. A ray is `[x, y, z, dx, dy, dz]`: origin and direction in world
     /// coordinates; the direction has any length but 0.
     pub fn cast_rays(&self, rays: &[[f64; 6]]) -> Vec<Option<RayHit>> {
-        let local = self.local_rays(rays);
+        let local = self.local_rays(rays, f32::INFINITY);
         let mut hits = vec![SceneHit::MISS; rays.len()];
-        scene_hits(self.flat(), self.simd(), InstanceFilter::All, &local, &mut hits);
+        scene_hits(self.flat(), self.simd(), InstanceFilter::All, local.local(), &mut hits);
         let found = hits.iter().zip(rays).map(|(hit, ray)| self.world_hit(hit, ray));
         found.collect()
     }
 
     /// Returns whether any surface lies on each ray up to the end of its direction.
     pub fn test_occlusions(&self, rays: &[[f64; 6]]) -> Vec<bool> {
-        let mut local = self.local_rays(rays);
-        for (ray, [_, _, _, dx, dy, dz]) in local.iter_mut().zip(rays) {
-            ray.t_max = DVec3::new(*dx, *dy, *dz).length() as f32;
-        }
+        let local = self.local_rays(rays, 1.0);
         let mut occluded = vec![false; rays.len()];
-        scene_occlusions(self.flat(), self.simd(), InstanceFilter::All, &local, &mut occluded);
+        scene_occlusions(
+            self.flat(),
+            self.simd(),
+            InstanceFilter::All,
+            local.local(),
+            &mut occluded,
+        );
         occluded
     }
 
-    /// Rays relative to the flat scene's origin. A direction of length 0 becomes one that hits nothing.
-    fn local_rays(&self, rays: &[[f64; 6]]) -> Vec<Ray> {
-        let local = rays.iter().map(|[x, y, z, dx, dy, dz]| {
-            let origin = (DVec3::new(*x, *y, *z) - self.flat().origin).as_vec3();
-            match DVec3::new(*dx, *dy, *dz).try_normalize() {
-                Some(direction) => Ray::new(origin, direction.as_vec3()),
-                None => Ray { t_max: -1.0, ..Ray::new(origin, Vec3::Z) },
-            }
-        });
-        local.collect()
+    fn local_rays(&self, rays: &[[f64; 6]], t_max: f32) -> WorldRays {
+        WorldRays::new(rays.par_iter().copied(), (0.0, t_max), self.flat())
     }
 
     fn world_hit(&self, hit: &SceneHit, ray: &[f64; 6]) -> Option<RayHit> {

@@ -14,16 +14,18 @@ mod scene_provider;
 
 use crate::global::{Global, start_threads};
 use crate::options::{EVERYWHERE, PLANS, Scope};
-use crate::report::{Report, print};
+use crate::report::{Report, Verbosity, print};
 use crate::scene_args::SceneArgs;
 use anyhow::anyhow;
 use file_names::ClientProgress;
 use rejection::rejection;
 use scene_provider::{FileSceneProvider, viewed_folders};
 use std::io::ErrorKind;
-use std::net::IpAddr;
+use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
 use surfel::SceneDescription;
 use surfel::resolve::check_files;
 use surfel_core::progress::Progress;
@@ -113,7 +115,19 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     if args.open && !browser::open(&links[0]) {
         report.note("no browser could be started; open the link yourself");
     }
-    let typed = args.scene.files.clone();
+    serve(server, description, args.scene.files.clone(), report).map_err(|error| match error {
+        Error::Cancelled => anyhow!(surfel_core::Error::Cancelled),
+        error => anyhow!(error),
+    })
+}
+
+/// Serves a description until `report` is cancelled.
+fn serve(
+    server: Server,
+    description: SceneDescription,
+    typed: Vec<PathBuf>,
+    report: &Report,
+) -> surfel_web::Result<()> {
     let report_for_loading = report.for_thread();
     let open = move |progress: &dyn Progress| {
         let folders = viewed_folders(&description, &typed);
@@ -122,10 +136,47 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         open_scene_provider(description, typed, &report).map_err(rejection)
     };
     let renderer = Arc::new(CpuRenderer { simd: Simd::detect() });
-    server.run(renderer, report.cancellation(), open).map_err(|error| match error {
-        Error::Cancelled => anyhow!(surfel_core::Error::Cancelled),
-        error => anyhow!(error),
-    })
+    server.run(renderer, report.cancellation(), open)
+}
+
+/// A viewer that serves a scene on a thread of its own, to this machine alone.
+pub struct RunningViewer {
+    /// The link to its page.
+    pub link: String,
+    is_stopped: Arc<AtomicBool>,
+    thread: JoinHandle<surfel_web::Result<()>>,
+}
+
+impl RunningViewer {
+    /// Starts to serve a description at a port; port 0 takes any free one.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the system refuses the port or a thread.
+    pub fn start(description: SceneDescription, port: u16) -> surfel_web::Result<Self> {
+        let server = Server::bind(Ipv4Addr::LOCALHOST.into(), port)?;
+        let link = server.links().swap_remove(0);
+        let report = Report::new(Verbosity::Quiet);
+        let is_stopped = report.cancellation();
+        let typed = description.files.clone();
+        let run = move || serve(server, description, typed, &report);
+        let thread = std::thread::Builder::new().name("viewer".into()).spawn(run);
+        let thread = thread.map_err(|source| Error::Io { address: link.clone(), source })?;
+        Ok(Self { link, is_stopped, thread })
+    }
+
+    /// Stops the server and returns what ended it, if that was something else.
+    ///
+    /// # Errors
+    ///
+    /// Fails as reading the files did.
+    pub fn stop(self) -> surfel_web::Result<()> {
+        self.is_stopped.store(true, Ordering::Relaxed);
+        match self.thread.join() {
+            Ok(Err(Error::Cancelled)) | Err(_) => Ok(()),
+            Ok(ended) => ended,
+        }
+    }
 }
 
 /// Maximum size of a file with certificates or a key, in bytes.

@@ -19,7 +19,7 @@ use surfel::SceneDescription;
 use surfel::crs::Unit;
 use surfel::description::rule::absolute_text;
 use surfel::description::{CameraSettings, Crop, ObjectDescription, ObjectOverride, write_table};
-use surfel::live_scene::{LiveScene, LiveView};
+use surfel::live_scene::{LiveScene, LiveView, UseCase};
 use surfel::names::{file_name, list_files};
 use surfel::overlay;
 use surfel::picture::image_options;
@@ -65,7 +65,7 @@ impl FileSceneProvider {
         report: &Report,
     ) -> surfel::Result<Self> {
         name_by_rows(&mut startup);
-        let scene = LiveScene::open(&startup, report)?;
+        let scene = LiveScene::open(&startup, UseCase::Viewers, report)?;
         let auto = AutoSettings::choose(scene.loaded(), scene.startup(), report)?;
         let moves_camera = auto.moves_camera(scene.loaded());
         let mut startup_settings = page_settings::shown(startup.clone());

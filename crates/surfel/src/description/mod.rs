@@ -51,6 +51,7 @@ pub use point_filter::Returns;
 pub(crate) use table::write_parts;
 pub use table::write_table;
 
+use crate::memory_files::MemoryFiles;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
@@ -69,6 +70,8 @@ pub struct SceneDescription {
     pub lamps: Vec<LampDescription>,
     /// Movements of objects, lamps and the camera.
     pub animations: Vec<AnimationDescription>,
+    /// Files, here and of objects, that are in memory instead. No scene file holds them.
+    pub memory: MemoryFiles,
     /// File of the picture or movie, and the time that it shows.
     pub output: OutputSettings,
     /// Size, quality and background of the picture.
@@ -134,6 +137,7 @@ impl SceneDescription {
             objects: other.objects.clone(),
             lamps: other.lamps.clone(),
             animations: other.animations.clone(),
+            memory: other.memory.clone(),
             ..self
         }
     }
@@ -261,6 +265,16 @@ impl SceneDescription {
         Ok(description)
     }
 
+    /// Adds an object from a table, as of `[[object]]` in a scene file. Files that it names start at `folder`.
+    ///
+    /// # Errors
+    ///
+    /// Fails for unknown keys, values that are not valid, and a parent that is not there; then nothing is added.
+    pub fn add_object(&mut self, table: &Map<String, Value>, folder: &Path) -> Result<(), Invalid> {
+        self.objects.push(ObjectDescription::read(table, folder)?);
+        self.check().inspect_err(|_| drop(self.objects.pop()))
+    }
+
     /// Lays another description over this one: its keys count, its objects, lamps and animations are added.
     ///
     /// Keys of this one that exclude a key of the other are unset.
@@ -291,6 +305,7 @@ impl SceneDescription {
         self.objects.extend(over.objects);
         self.lamps.extend(over.lamps);
         self.animations.extend(over.animations);
+        self.memory.extend(over.memory);
     }
 
     fn unset(&mut self, path: &str) {

@@ -24,7 +24,10 @@ pub fn check_files(description: &SceneDescription) -> Result<()> {
         .map(PathBuf::as_path)
         .collect();
     check_materials(description)?;
-    let inspected = files.into_iter().map(|file| Ok((file, surfel_formats::inspect(file)?)));
+    let inspected = files.into_iter().map(|file| match description.memory.get(file) {
+        Some(content) => Ok((file, content.info())),
+        None => Ok((file, surfel_formats::inspect(file)?)),
+    });
     let mut infos = inspected.collect::<surfel_formats::Result<BTreeMap<&Path, FileInfo>>>()?;
     for object in objects.filter(|object| 1 < object.files.len()) {
         let settings = object.settings.over(&description.objects_default);

@@ -2,11 +2,14 @@
 
 use crate::description::{Invalid, ObjectSettings, PreparationSettings};
 use crate::error::Result;
+use crate::memory_files::{MemoryContent, MemoryFiles};
 use crate::progress_log::NotesAsChoices;
 use std::path::Path;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::Neighborhood;
-use surfel_core::points::{PointCloud, PreparationReport, PreparedCloud, Radius, prepare};
+use surfel_core::points::{
+    PointCloud, PointFilter, PreparationReport, PreparedCloud, Radius, prepare,
+};
 use surfel_core::progress::Progress;
 use surfel_core::scene::color::{choose_source, colorize};
 use surfel_core::scene::{CloudGeometry, Geometry, Graph, Material, Transform};
@@ -19,6 +22,8 @@ pub struct ImportOptions {
     pub keeps_all_columns: bool,
     /// Decides what a random subsample keeps.
     pub seed: u64,
+    /// Files that are in memory instead.
+    pub memory: MemoryFiles,
 }
 
 /// Reads what a file holds.
@@ -28,6 +33,9 @@ pub fn import(
     options: &ImportOptions,
     progress: &dyn Progress,
 ) -> Result<(Graph<PointCloud>, FileInfo)> {
+    if let Some(content) = options.memory.get(file) {
+        return import_from_memory(content, settings, options, progress);
+    }
     let columns = if options.keeps_all_columns { ColumnChoice::All } else { settings.columns() };
     let mut load_options = settings.preparation.load_options(columns)?;
     if options.keeps_all_columns {
@@ -42,6 +50,20 @@ pub fn import(
     };
     progress.end();
     Ok(loaded)
+}
+
+/// Takes content in memory as if a file held it.
+fn import_from_memory(
+    content: &MemoryContent,
+    settings: &ObjectSettings,
+    options: &ImportOptions,
+    progress: &dyn Progress,
+) -> Result<(Graph<PointCloud>, FileInfo)> {
+    let keep = |cloud| match options.keeps_all_columns {
+        true => Ok(cloud),
+        false => filter_cloud(cloud, &settings.preparation, progress),
+    };
+    Ok((content.to_graph().try_map_clouds(keep)?, content.info()))
 }
 
 /// A graph of one cloud.
@@ -76,16 +98,28 @@ pub fn filter_cloud(
 ) -> Result<PointCloud, Invalid> {
     for (key, filter) in settings.point_filters()? {
         let n_points = cloud.len();
-        let matches = filter.matches(&cloud, 0);
-        let matches = matches.map_err(|error| Invalid::at(key, error.to_string()))?;
-        cloud.retain_from(0, &matches);
+        keep_matching(&mut cloud, key, &filter, progress)?;
         if cloud.is_empty() {
             let message = format!("none of {n_points} points meets {filter}");
             return Err(Invalid::at(key, message));
         }
-        progress.note(&format!("{} of {n_points} points meet {filter}", cloud.len()));
     }
     Ok(cloud)
+}
+
+/// Drops the points of a cloud that do not meet the filter of a key.
+pub(crate) fn keep_matching(
+    cloud: &mut PointCloud,
+    key: &str,
+    filter: &PointFilter,
+    progress: &dyn Progress,
+) -> Result<(), Invalid> {
+    let n_points = cloud.len();
+    let matches = filter.matches(cloud, 0);
+    let matches = matches.map_err(|error| Invalid::at(key, error.to_string()))?;
+    cloud.retain_from(0, &matches);
+    progress.note(&format!("{} of {n_points} points meet {filter}", cloud.len()));
+    Ok(())
 }
 
 /// Cleans a cloud, and adds the normals and radii that are missing.

@@ -22,6 +22,7 @@ mod complete_description;
 pub(crate) use appearance::finish_graph;
 pub use camera::{SceneCamera, choose_camera, choose_up, short_position, up_convention};
 pub use check_files::check_files;
+pub(crate) use cloud::keep_matching;
 pub use cloud::{prepare_cloud, report_denoise, report_normals, report_prepared, report_radii};
 pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;

@@ -19,6 +19,7 @@ impl LoadedScene {
         ImportOptions {
             keeps_all_columns: self.keeps_all_columns,
             seed: description.picture.seed(),
+            memory: description.memory.clone(),
         }
     }
 

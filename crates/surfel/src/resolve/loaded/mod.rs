@@ -195,6 +195,14 @@ impl LoadedScene {
         groups.map(|group| group.iter().map(|(file, _)| file.as_path()).collect())
     }
 
+    /// Returns the number of what a node belongs to: first come the files without an object, of which those together that
+    /// became one cloud, then the objects.
+    pub(crate) fn content_of(&self, node: usize) -> Option<usize> {
+        let files = self.files.chunk_by(|(_, a), (_, b)| a == b).map(|group| &group[0].1);
+        let mut all = files.chain(self.objects.iter().map(|object| &object.all));
+        all.position(|nodes| nodes.contains(&node))
+    }
+
     /// Returns the nodes of objects in the scene's graph, and whether each is visible under another description of the
     /// same objects. Movements decide about nodes that appear and vanish.
     pub(super) fn visibility<C>(

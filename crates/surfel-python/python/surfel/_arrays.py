@@ -1,0 +1,105 @@
+"""Arrays as numpy has them: what users hand over is looked at here, and refused with the reason."""
+
+from surfel._errors import InvalidArray
+
+
+def as_array(name, values):
+    """Anything that is an array or can be one: numpy, `__array_interface__`, buffers, `__dlpack__`, sequences."""
+    import numpy
+
+    known = ("__array_interface__", "__array__", "__array_struct__")
+    try:
+        if hasattr(values, "__dlpack__") and not any(hasattr(values, way) for way in known):
+            return numpy.from_dlpack(values)
+        return numpy.asarray(values)
+    except (TypeError, ValueError, BufferError, RuntimeError) as error:
+        message = f"{name}: found {_kind(values)} that is no array of this machine's memory: {error}"
+        raise InvalidArray(message) from error
+
+
+def numbers(name, values, shape):
+    """An array of float32 or float64 in rows one after the other; `None` in `shape` stands for any length."""
+    array = _shaped(name, as_array(name, values), shape)
+    return _contiguous(name, array, ("f4", "f8"))
+
+
+def rays(values):
+    """Rays as rows of six numbers, and the shape of what is said of each."""
+    array = as_array("rays", values)
+    if array.ndim < 1 or array.shape[-1] != 6:
+        raise InvalidArray(f"rays: found shape {array.shape}, expected (..., 6): x, y, z, dx, dy, dz")
+    return _contiguous("rays", array.reshape(-1, 6), ("f4", "f8")), array.shape[:-1]
+
+
+def scalars(name, values, n_points):
+    """A column of one of the types that clouds hold: uint8, uint16, int32, float32 or float64."""
+    array = _shaped(name, as_array(name, values), (n_points,))
+    types = {"b1": "u1", "i1": "i4", "i2": "i4", "u4": "f8", "f2": "f4"}
+    code = types.get(array.dtype.str[1:])
+    return _contiguous(name, array.astype(code) if code else array, ("u1", "u2", "i4", "f4", "f8"))
+
+
+def classes(values, n_points):
+    """ASPRS classes from 0 to 255."""
+    import numpy
+
+    array = _shaped("classification", as_array("classification", values), (n_points,))
+    if array.dtype.kind not in "iub" or (array.size and not 0 <= array.min() <= array.max() <= 255):
+        raise InvalidArray(f"classification: found dtype {array.dtype}, expected integers from 0 to 255")
+    return numpy.ascontiguousarray(array, dtype=numpy.uint8)
+
+
+def indices(name, values, n_columns, limit):
+    """Rows of indices below `limit`, as uint32."""
+    import numpy
+
+    array = _shaped(name, as_array(name, values), (None, n_columns))
+    if array.dtype.kind not in "iu":
+        raise InvalidArray(f"{name}: found dtype {array.dtype}, expected integers")
+    if array.size and not 0 <= array.min() <= array.max() < limit:
+        message = f"{name}: found indices {array.min()} to {array.max()}, expected 0 to {limit - 1}"
+        raise InvalidArray(message)
+    return numpy.ascontiguousarray(array, dtype=numpy.uint32)
+
+
+def colors(values, n_points):
+    """sRGB colours of 16 bits a channel, from uint8, uint16 or numbers from 0 to 1; alpha is left out."""
+    import numpy
+
+    array = as_array("colors", values)
+    if array.ndim != 2 or len(array) != n_points or array.shape[1] not in (3, 4):
+        raise InvalidArray(f"colors: found shape {array.shape}, expected ({n_points}, 3) or ({n_points}, 4)")
+    array = array[:, :3]
+    if array.dtype == numpy.uint8:
+        return numpy.ascontiguousarray(array, dtype=numpy.uint16) * numpy.uint16(257)
+    if array.dtype.kind == "f":
+        # Numbers that are not finite fail here too.
+        if array.size and not (0 <= array.min() and array.max() <= 1):
+            raise InvalidArray(f"colors: found {array.min()} to {array.max()}, expected 0 to 1 in {array.dtype}")
+        return numpy.rint(array * 65535).astype(numpy.uint16)
+    if array.dtype != numpy.uint16:
+        raise InvalidArray(f"colors: found dtype {array.dtype}, expected uint8, uint16, or numbers from 0 to 1")
+    return numpy.ascontiguousarray(array)
+
+
+def _shaped(name, array, shape):
+    fits = array.ndim == len(shape) and all(want in (None, have) for want, have in zip(shape, array.shape))
+    if not fits:
+        expected = ", ".join("N" if length is None else str(length) for length in shape)
+        expected = f"({expected},)" if len(shape) == 1 else f"({expected})"
+        raise InvalidArray(f"{name}: found shape {array.shape}, expected {expected}")
+    return array
+
+
+def _contiguous(name, array, codes):
+    """The array in one of these types, or else as float64, in rows one after the other and in native byte order."""
+    import numpy
+
+    if array.dtype.kind not in "fiub":
+        raise InvalidArray(f"{name}: found dtype {array.dtype}, expected numbers")
+    code = array.dtype.str[1:]
+    return numpy.ascontiguousarray(array, dtype=numpy.dtype(code if code in codes else "f8"))
+
+
+def _kind(values):
+    return f"an object of type {type(values).__name__}"

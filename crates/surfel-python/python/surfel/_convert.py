@@ -1,0 +1,118 @@
+"""Clouds and meshes of other packages, recognised by what they have; none of the packages is imported."""
+
+from surfel._arrays import as_array
+
+_POSITIONS = ("x", "y", "z")
+_COLORS = ("red", "green", "blue")
+
+
+def cloud_columns(source):
+    """The columns of a cloud as keywords of `Cloud`, or `None` if `source` is an array of positions."""
+    for reader in (_laspy, _open3d, _open3d_tensor, _pyvista, _trimesh, _table):
+        columns = reader(source)
+        if columns is not None:
+            return {name: values for name, values in columns.items() if values is not None}
+    return None
+
+
+def mesh_columns(source):
+    """The vertices and triangles of a mesh as keywords of `Mesh`, or `None` if `source` is none."""
+    if _has(source, "vertices", "triangles", "has_triangles"):
+        columns = {"vertices": source.vertices, "triangles": source.triangles}
+        return columns | _if_filled(normals=source.vertex_normals, colors=source.vertex_colors)
+    if _has(source, "vertices", "faces") and len(source.faces):
+        return {"vertices": source.vertices, "triangles": source.faces}
+    if _has(source, "points", "faces", "n_cells") and len(source.faces):
+        triangles = source if source.is_all_triangles else source.triangulate()
+        return {"vertices": triangles.points, "triangles": as_array("faces", triangles.faces).reshape(-1, 4)[:, 1:]}
+    return None
+
+
+def _has(source, *names):
+    return all(hasattr(source, name) for name in names)
+
+
+def _if_filled(**columns):
+    return {name: values for name, values in columns.items() if values is not None and len(values)}
+
+
+def _laspy(las):
+    if not _has(las, "X", "Y", "Z", "header", "point_format"):
+        return None
+    names = [name for name in las.point_format.dimension_names if name not in ("X", "Y", "Z", *_COLORS)]
+    columns = {name: as_array(name, las[name]) for name in names}
+    result = {
+        "points": tuple(_integers(axis) for axis in (las.X, las.Y, las.Z)),
+        "scales": las.header.scales,
+        "offsets": las.header.offsets,
+        "intensity": columns.pop("intensity", None),
+        "classification": columns.pop("classification", None),
+        "scalars": {name: values for name, values in columns.items() if values.ndim == 1},
+    }
+    if all(name in las.point_format.dimension_names for name in _COLORS):
+        colors = _stacked([as_array(name, las[name]) for name in _COLORS])
+        # Files whose colours have eight bits hold nothing above 255.
+        result["colors"] = colors.astype("u1") if colors.size and colors.max() <= 255 else colors
+    return result
+
+
+def _integers(axis):
+    import numpy
+
+    return numpy.ascontiguousarray(axis, dtype=numpy.int32)
+
+
+def _open3d(cloud):
+    if not _has(cloud, "points", "has_normals", "has_colors"):
+        return None
+    normals = cloud.normals if cloud.has_normals() else None
+    colors = cloud.colors if cloud.has_colors() else None
+    return {"points": as_array("points", cloud.points), "normals": normals, "colors": colors}
+
+
+def _open3d_tensor(cloud):
+    point = getattr(cloud, "point", None)
+    if point is None or "positions" not in point:
+        return None
+    column = lambda name: point[name].cpu().numpy() if name in point else None
+    return {name: column(key) for name, key in (("points", "positions"), ("normals", "normals"), ("colors", "colors"))}
+
+
+def _pyvista(data):
+    if not _has(data, "points", "point_data"):
+        return None
+    columns = {name: as_array(name, data.point_data[name]) for name in data.point_data.keys()}
+    colors = next((columns.pop(name) for name in ("RGB", "RGBA", "rgb", "rgba", "colors") if name in columns), None)
+    normals = next((columns.pop(name) for name in ("Normals", "normals") if name in columns), None)
+    scalars = {name: values for name, values in columns.items() if values.ndim == 1}
+    return {"points": data.points, "normals": normals, "colors": colors, "scalars": scalars}
+
+
+def _trimesh(cloud):
+    if not _has(cloud, "vertices", "colors") or hasattr(cloud, "faces"):
+        return None
+    colors = cloud.colors if cloud.colors is not None and len(cloud.colors) else None
+    return {"points": cloud.vertices, "colors": colors}
+
+
+def _table(table):
+    """A DataFrame or Dataset with the columns x, y and z in any case."""
+    if not hasattr(table, "columns") and not hasattr(table, "data_vars"):
+        return None
+    names = [*getattr(table, "columns", ()), *getattr(table, "data_vars", ()), *getattr(table, "coords", ())]
+    columns = {str(name).lower(): (str(name), as_array(str(name), table[name])) for name in names}
+    if not all(axis in columns for axis in _POSITIONS):
+        return None
+    take = lambda name: columns.pop(name, (None, None))[1]
+    result = {"points": _stacked([take(axis) for axis in _POSITIONS])}
+    if all(color in columns for color in _COLORS):
+        result["colors"] = _stacked([take(color) for color in _COLORS])
+    result |= {name: take(name) for name in ("intensity", "classification")}
+    result["scalars"] = {name: values for name, values in columns.values() if values.dtype.kind in "fiub"}
+    return result
+
+
+def _stacked(columns):
+    import numpy
+
+    return numpy.stack(columns, axis=1)

@@ -1,0 +1,49 @@
+//! The Python package `surfel`: a thin layer over the crate `surfel`.
+//!
+//! Keywords are the keys of scene files; values, defaults and messages are those of every other door.
+
+mod errors;
+mod value;
+mod work;
+mod buffer;
+mod image;
+mod array;
+mod cloud;
+mod rays;
+mod object;
+mod threads;
+mod scene;
+mod movie;
+mod preparation;
+mod viewer;
+mod program;
+
+use pyo3::prelude::*;
+
+/// The compiled part of the package `surfel`.
+#[pymodule]
+#[pyo3(name = "_native")]
+mod native {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::cloud::{PyCloud, PyMesh};
+    #[pymodule_export]
+    use crate::image::PyImage;
+    #[pymodule_export]
+    use crate::movie::{PyFilm, animate};
+    #[pymodule_export]
+    use crate::preparation::prepare;
+    #[pymodule_export]
+    use crate::program::run_program;
+    #[pymodule_export]
+    use crate::scene::{PyScene, load};
+    #[pymodule_export]
+    use crate::viewer::{PyViewer, view};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        surfel_cli::silence_decoder_panics();
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

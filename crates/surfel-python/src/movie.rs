@@ -1,0 +1,126 @@
+//! Movies.
+
+use crate::errors::{invalid_setting, to_exception};
+use crate::image::PyImage;
+use crate::scene::PyScene;
+use crate::threads::{on_threads, start_threads};
+use crate::value::with_keys;
+use crate::work;
+use pyo3::exceptions::PyIndexError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::ThreadPool;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+use surfel::BuiltScene;
+use surfel::animate::{PlannedMovie, movie_options, render_frame};
+use surfel::description::Invalid;
+use surfel_formats::MovieOptions;
+
+/// Renders a movie of a scene: what moves in it, or a turn (`turntable=SECONDS`).
+///
+/// `output`: .mp4, .mov, .mkv, .webm or .avi (by ffmpeg), .gif, .png (an animated one), or numbered pictures as
+/// frame_####.png. `frames`: a number, or `range(n)`; all that move if it is left out. `resume=True` continues an
+/// interrupted run of the same movie. `progress` is called as `progress(stage, done, total)`. Other keywords are keys of
+/// scene files, as `fps` and `turntable`.
+///
+/// Raises `InvalidSetting`, `InvalidScene`, `EncoderError`, `InaccessibleFile`.
+#[pyfunction]
+#[pyo3(signature = (scene, output, *, frames = None, resume = false, progress = None, **keys))]
+pub fn animate(
+    py: Python<'_>,
+    scene: &Bound<'_, PyScene>,
+    output: PathBuf,
+    frames: Option<&Bound<'_, PyAny>>,
+    resume: bool,
+    progress: Option<&Bound<'_, PyAny>>,
+    keys: Option<&Bound<'_, PyDict>>,
+) -> PyResult<()> {
+    let mut description = with_keys(py, &scene.get().description(), keys)?;
+    if let Some(frames) = frames {
+        description.output.frames = Some(n_frames(frames)?);
+    }
+    description.output.output = Some(output.clone());
+    surfel_formats::check_movie(&output, &movie_options(&description))
+        .map_err(|error| to_exception(py, &error.into()))?;
+    work::run(py, progress, |progress| {
+        let threads = start_threads(&description.run)?;
+        on_threads(threads.as_ref(), || {
+            PlannedMovie::new(&description, progress)?.render(&output, resume, progress)
+        })
+    })
+}
+
+/// The frames of a movie of a scene as it is now, one by one and in any order. Keywords are keys of scene files.
+///
+/// Raises `InvalidSetting` if nothing moves and neither `frames` nor `turntable` is given.
+#[pyclass(frozen, module = "surfel", name = "Film")]
+pub struct PyFilm {
+    scene: Mutex<BuiltScene>,
+    options: MovieOptions,
+    threads: Option<ThreadPool>,
+}
+
+#[pymethods]
+impl PyFilm {
+    #[new]
+    #[pyo3(signature = (scene, *, progress = None, **keys))]
+    fn new(
+        py: Python<'_>,
+        scene: &Bound<'_, PyScene>,
+        progress: Option<&Bound<'_, PyAny>>,
+        keys: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let description = with_keys(py, &scene.get().description(), keys)?;
+        work::run(py, progress, |progress| {
+            let threads = start_threads(&description.run)?;
+            let build = || PlannedMovie::new(&description, progress)?.build(progress);
+            let (scene, options) = on_threads(threads.as_ref(), build)?;
+            Ok(Self { scene: Mutex::new(scene), options, threads })
+        })
+    }
+
+    /// The number of frames.
+    fn __len__(&self) -> usize {
+        self.options.n_frames as usize
+    }
+
+    /// Renders a frame, counted from 0: the picture that `animate` would write, without layers but the colour.
+    ///
+    /// Raises `IndexError` beyond the last one.
+    #[pyo3(signature = (index, *, progress = None))]
+    fn render(
+        &self,
+        py: Python<'_>,
+        index: u32,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<PyImage> {
+        if self.options.n_frames <= index {
+            let message = format!("frame {index} of {}", self.options.n_frames);
+            return Err(PyIndexError::new_err(message));
+        }
+        work::run(py, progress, |progress| {
+            let mut scene = self.scene.lock().unwrap_or_else(PoisonError::into_inner);
+            let time_secs = f64::from(index) / self.options.fps;
+            let scene = &mut *scene;
+            let mut image =
+                on_threads(self.threads.as_ref(), || render_frame(scene, time_secs, progress))?;
+            // Movies keep no index that points had when they were read.
+            image.drop_aovs();
+            let origin = scene.flat().origin;
+            Ok(PyImage::new(image, origin, Vec::new(), Vec::new()))
+        })
+    }
+}
+
+/// Reads a number of frames, or a range that begins with the first one.
+fn n_frames(frames: &Bound<'_, PyAny>) -> PyResult<u32> {
+    let range = |name| frames.getattr(name).and_then(|value| value.extract::<u32>());
+    match (frames.extract::<u32>(), range("start"), range("stop"), range("step")) {
+        (Ok(n), ..) | (_, Ok(0), Ok(n), Ok(1)) if 0 < n => Ok(n),
+        _ => {
+            let message = format!("found {}, expected a number or range(n)", frames.repr()?);
+            Err(invalid_setting(frames.py(), Invalid::at("frames", message)))
+        }
+    }
+}

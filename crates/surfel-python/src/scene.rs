@@ -1,0 +1,416 @@
+//! Scenes: what is shown, and the queries about it.
+
+use crate::array::{checked, column};
+use crate::buffer::owned_array;
+use crate::errors::to_exception;
+use crate::image::PyImage;
+use crate::object::NewObject;
+use crate::rays::{RayArray, ray_hits};
+use crate::threads::{on_threads, start_threads};
+use crate::value::{to_python, with_keys};
+use crate::work;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::ThreadPool;
+use serde_json::Value;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
+use std::time::Duration;
+use surfel::description::is_scene_file;
+use surfel::live_scene::{LiveScene, LiveView, UseCase};
+use surfel::progress_log::{Choice, ProgressLog};
+use surfel::ray_query::{RayCaster, WorldRays};
+use surfel::{Error, RenderedImage, SceneDescription};
+use surfel_core::image::Image;
+use surfel_core::progress::Progress;
+
+/// A scene of files and clouds. Threads may share it.
+#[pyclass(frozen, module = "surfel", name = "Scene")]
+pub struct PyScene {
+    state: Mutex<State>,
+}
+
+struct State {
+    description: SceneDescription,
+    /// The scene as it was read; none until it is needed, and after something was added.
+    opened: Slot,
+}
+
+type Slot = Arc<Mutex<Option<Arc<OpenScene>>>>;
+
+/// A scene whose files are read.
+struct OpenScene {
+    scene: LiveScene,
+    /// Threads of the scene, if it has a number of its own.
+    threads: Option<ThreadPool>,
+    /// The view of the last description, and the choices that were made for it.
+    last: Mutex<Option<Arc<ChosenView>>>,
+}
+
+/// A view with its description and the choices that were made for it.
+struct ChosenView {
+    description: SceneDescription,
+    view: LiveView,
+    choices: Vec<Choice>,
+}
+
+/// All of a ray, from its origin without end.
+const WHOLE_RAY: (f32, f32) = (0.0, f32::INFINITY);
+
+/// Time between two looks at a scene that another thread reads.
+const LOCK_POLL_INTERVAL: Duration = Duration::from_millis(2);
+
+impl OpenScene {
+    fn open(description: &SceneDescription, progress: &dyn Progress) -> surfel::Result<Self> {
+        let threads = start_threads(&description.run)?;
+        let open = || LiveScene::open(description, UseCase::Pictures, progress);
+        let scene = on_threads(threads.as_ref(), open)?;
+        Ok(Self { scene, threads, last: Mutex::default() })
+    }
+
+    /// Returns the view under a description, which is made unless it is the last one.
+    fn view(
+        &self,
+        description: SceneDescription,
+        progress: &dyn Progress,
+    ) -> surfel::Result<Arc<ChosenView>> {
+        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some(last) = last.filter(|last| last.description == description) {
+            return Ok(last);
+        }
+        let log = ProgressLog::new(progress);
+        let view = self.install(|scene| scene.view(&description, &log))?;
+        let choices = log.into_choices();
+        let view = Arc::new(ChosenView { description, view, choices });
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(view.clone());
+        Ok(view)
+    }
+
+    /// Runs `work` on the scene's threads.
+    fn install<T: Send>(&self, work: impl FnOnce(&LiveScene) -> T + Send) -> T {
+        on_threads(self.threads.as_ref(), || work(&self.scene))
+    }
+}
+
+/// Returns the scene of a description, which is read unless it is there.
+fn opened(
+    slot: &Slot,
+    description: &SceneDescription,
+    progress: &dyn Progress,
+) -> surfel::Result<Arc<OpenScene>> {
+    let mut slot = loop {
+        match slot.try_lock() {
+            Ok(slot) => break slot,
+            Err(TryLockError::Poisoned(error)) => break error.into_inner(),
+            Err(TryLockError::WouldBlock) => {
+                progress.check()?;
+                std::thread::sleep(LOCK_POLL_INTERVAL);
+            }
+        }
+    };
+    if let Some(scene) = &*slot {
+        return Ok(scene.clone());
+    }
+    let scene = Arc::new(OpenScene::open(description, progress)?);
+    *slot = Some(scene.clone());
+    Ok(scene)
+}
+
+impl PyScene {
+    fn new(description: SceneDescription) -> Self {
+        Self { state: Mutex::new(State { description, opened: Slot::default() }) }
+    }
+
+    /// Returns the description, without what is chosen from the data.
+    pub fn description(&self) -> SceneDescription {
+        self.state().0
+    }
+
+    /// Returns the description and the slot of what was read of it.
+    fn state(&self) -> (SceneDescription, Slot) {
+        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        (state.description.clone(), state.opened.clone())
+    }
+
+    /// Runs `work` about the scene under a description.
+    fn with_view<T: Send>(
+        &self,
+        py: Python<'_>,
+        keys: Option<&Bound<'_, PyDict>>,
+        progress: Option<&Bound<'_, PyAny>>,
+        work: impl FnOnce(&LiveScene, &ChosenView, &dyn Progress) -> surfel::Result<T> + Send,
+    ) -> PyResult<T> {
+        let (scene, view) = self.open_view(py, keys, progress)?;
+        work::run(py, progress, |progress| scene.install(|scene| work(scene, &view, progress)))
+    }
+
+    /// Returns the scene and its view under a description; both are made unless they are there.
+    fn open_view(
+        &self,
+        py: Python<'_>,
+        keys: Option<&Bound<'_, PyDict>>,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<(Arc<OpenScene>, Arc<ChosenView>)> {
+        let (startup, slot) = self.state();
+        let description = with_keys(py, &startup, keys)?;
+        work::run(py, progress, |progress| {
+            let scene = opened(&slot, &startup, progress)?;
+            let view = scene.view(description, progress)?;
+            Ok((scene, view))
+        })
+    }
+
+    /// Runs a query about rays, of which the part `t_range` counts.
+    fn query_rays<T: Send>(
+        &self,
+        rays: &RayArray<'_>,
+        t_range: (f32, f32),
+        progress: Option<&Bound<'_, PyAny>>,
+        query: impl FnOnce(&RayCaster<'_>, &WorldRays, &dyn Progress) -> surfel::Result<T> + Send,
+    ) -> PyResult<(T, Arc<ChosenView>)> {
+        let py = rays.py();
+        let (scene, chosen) = self.open_view(py, None, progress)?;
+        let local = rays.in_scene(&chosen.view, t_range)?;
+        let answers = work::run(py, progress, |progress| {
+            scene.install(|scene| query(&chosen.view.ray_caster(scene.simd()), &local, progress))
+        })?;
+        Ok((answers, chosen))
+    }
+}
+
+#[pymethods]
+impl PyScene {
+    /// Makes a scene that shows nothing yet. Keywords are keys of scene files.
+    ///
+    /// Raises `InvalidSetting`.
+    #[new]
+    #[pyo3(signature = (**keys))]
+    fn empty(py: Python<'_>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        Ok(Self::new(with_keys(py, &SceneDescription::default(), keys)?))
+    }
+
+    /// Adds a `Cloud`, a `Mesh`, a file, or a cloud or mesh of another package, and returns its number, which the
+    /// `geometry_ids` of rays have.
+    ///
+    /// `name`: for `parent` of others and for messages. `material`: a name as `mirror`, or a dict. `transform`: a 4x4 matrix to
+    /// the world's coordinates, or to those of the parent. Other keywords are keys of objects in scene files, as
+    /// `translate`, `rotate`, `scale`, `color`, `surface`, `visible`.
+    ///
+    /// Raises `InvalidSetting`, `InvalidArray`, `MissingFile`.
+    #[pyo3(signature = (what, *, name = None, material = None, transform = None, **keys))]
+    fn add(
+        &self,
+        py: Python<'_>,
+        what: &Bound<'_, PyAny>,
+        name: Option<&Bound<'_, PyAny>>,
+        material: Option<&Bound<'_, PyAny>>,
+        transform: Option<&Bound<'_, PyAny>>,
+        keys: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<usize> {
+        let object = NewObject::new(what, name, material, transform, keys)?;
+        loop {
+            // No lock is held while the interpreter may run another thread, which could wait for it.
+            let before = self.description();
+            let description = object.clone().added_to(py, &before)?;
+            let number = description.objects.len() - 1 + usize::from(!description.files.is_empty());
+            let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+            if state.description == before {
+                *state = State { description, opened: Slot::default() };
+                return Ok(number);
+            }
+        }
+    }
+
+    /// Finds the nearest surface on each ray.
+    ///
+    /// `rays`: (..., 6), x, y, z of the origin in world coordinates and of the direction, which has any length but 0. A ray
+    /// with NaN hits nothing. Returns a dict of arrays: `t_hit` (...), float32, in multiples of the direction's length, `inf`
+    /// where nothing was hit; `geometry_ids` (...), uint32, the number of what was added; `primitive_ids` (...), uint32, of
+    /// the triangle or of the nearest point; `primitive_normals` (..., 3), float32, unit, facing the origin of the ray;
+    /// `point_ids` (...), uint32, the nearest point by its index in its file or array. Ids are 0xFFFFFFFF where there is none.
+    ///
+    /// Raises `InvalidArray` for other shapes.
+    #[pyo3(signature = (rays, *, progress = None))]
+    fn cast_rays<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Bound<'py, PyAny>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let rays = RayArray::new(rays)?;
+        let (hits, chosen) =
+            self.query_rays(&rays, WHOLE_RAY, progress, |caster, rays, progress| {
+                caster.hits(rays, progress)
+            })?;
+        let contents = chosen.view.contents();
+        ray_hits(py, &rays, hits, &contents)
+    }
+
+    /// Returns for each ray whether any surface lies on it: bool, (...).
+    ///
+    /// `rays` as for `cast_rays`; `tnear` and `tfar` are the part that counts, in multiples of the direction's length:
+    /// `tfar=1` ends where the direction does, which is a line of sight between two points.
+    #[pyo3(signature = (rays, tnear = 0.0, tfar = f32::INFINITY, *, progress = None))]
+    fn test_occlusions<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Bound<'py, PyAny>,
+        tnear: f32,
+        tfar: f32,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let rays = RayArray::new(rays)?;
+        let t_range = (tnear, tfar);
+        let (occluded, _) =
+            self.query_rays(&rays, t_range, progress, |caster, rays, progress| {
+                caster.occlusions(rays, progress)
+            })?;
+        let occluded = rays.restored(occluded).into_iter().map(u8::from).collect::<Vec<u8>>();
+        owned_array(py, occluded, rays.shape)?.call_method1("view", ("bool",))
+    }
+
+    /// Counts the surfaces on each ray: int32, (...).
+    ///
+    /// `rays` as for `cast_rays`. Surfaces of points that are nearer to each other than a point's radius count as one.
+    #[pyo3(signature = (rays, *, progress = None))]
+    fn count_intersections<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Bound<'py, PyAny>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let rays = RayArray::new(rays)?;
+        let (counts, _) =
+            self.query_rays(&rays, WHOLE_RAY, progress, |caster, rays, progress| {
+                caster.counts(rays, progress)
+            })?;
+        let counts = rays.restored(counts).into_iter().map(|n| n as i32).collect();
+        owned_array(py, counts, rays.shape)
+    }
+
+    /// Corners of a box around everything that is shown, in world coordinates: float64, (2, 3), least and greatest.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let bounds = self.with_view(py, None, None, |_, chosen, _| Ok(chosen.view.bounds()))?;
+        owned_array(py, bounds.as_flattened().to_vec(), vec![2, 3])
+    }
+
+    /// Renders a picture. Keywords are keys of scene files; they count for this picture alone.
+    ///
+    /// `layers=False` leaves out all layers but the colour. `progress` is called as `progress(stage, done, total)`.
+    ///
+    /// Raises `InvalidSetting` for unknown keys and wrong values, `InvalidScene` for settings that do not fit the data.
+    #[pyo3(signature = (*, layers = true, progress = None, **keys))]
+    fn render(
+        &self,
+        py: Python<'_>,
+        layers: bool,
+        progress: Option<&Bound<'_, PyAny>>,
+        keys: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<PyImage> {
+        self.with_view(py, keys, progress, |scene, ChosenView { view, choices, .. }, progress| {
+            let (image, _) = scene.picture(view, layers, progress)?;
+            let point_ids = point_ids(view, &image);
+            let line = |choice: &Choice| format!("{} [{}]", choice.reason, choice.keys.join(", "));
+            let choices = choices.iter().map(line).collect();
+            Ok(PyImage::new(image, view.flat.origin, point_ids, choices))
+        })
+    }
+
+    /// Renders rows of a picture, from `first` to before `end`: linear colour without overlay, float32, (rows, width, 4).
+    #[pyo3(signature = (first, end, **keys))]
+    fn _render_rows<'py>(
+        &self,
+        py: Python<'py>,
+        first: u32,
+        end: u32,
+        keys: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let image = self.with_view(py, keys, None, |scene, chosen, progress| {
+            scene.rows(&chosen.view, (first, end), progress)
+        })?;
+        let shape = vec![image.height as usize, image.width as usize, 4];
+        owned_array(py, bytemuck::cast_vec::<[f32; 4], f32>(image.color), shape)
+    }
+
+    /// Makes a picture of the colours of all its rows.
+    #[pyo3(signature = (color, **keys))]
+    fn _picture_of_rows(
+        &self,
+        py: Python<'_>,
+        color: &Bound<'_, PyAny>,
+        keys: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<PyImage> {
+        let color = column::<f32>(&checked(py, "numbers", ("color", color, [None::<u8>; 3]))?)?;
+        self.with_view(py, keys, None, |_, ChosenView { view, .. }, _| {
+            let mut image = Image::new(view.settings.width, view.settings.height);
+            let rows = color.as_chunks::<4>().0;
+            let expected = image.color.len();
+            if rows.len() != expected {
+                let found = rows.len();
+                return Err(Error::Unfit(format!("found {found} pixels, expected {expected}")));
+            }
+            image.color.copy_from_slice(rows);
+            Ok(PyImage::new(view.finished(image), view.flat.origin, Vec::new(), Vec::new()))
+        })
+    }
+
+    /// Returns all keys of the scene as a scene file has them, with those that are chosen from the data.
+    #[pyo3(signature = (**keys))]
+    fn describe<'py>(
+        &self,
+        py: Python<'py>,
+        keys: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let table =
+            self.with_view(py, keys, None, |_, chosen, _| Ok(chosen.view.description.to_table()))?;
+        to_python(py, &Value::Object(table))
+    }
+
+    fn __repr__(&self) -> String {
+        let (description, _) = self.state();
+        let n_files = description.files.len();
+        format!("<surfel.Scene of {n_files} files and {} objects>", description.objects.len())
+    }
+}
+
+/// Returns the index that each pixel's point had when it was read.
+fn point_ids(view: &LiveView, image: &RenderedImage) -> Vec<u32> {
+    let Some(aovs) = &image.aovs else { return Vec::new() };
+    let sources = view.sources();
+    let pixels = aovs.instance_id.iter().zip(&aovs.point_id);
+    let source = |(instance, id): (&u32, &u32)| {
+        let source = || sources.get(*instance as usize)?.get(*id as usize).copied();
+        source().unwrap_or(*id)
+    };
+    pixels.map(source).collect()
+}
+
+/// Opens a file, or several: point clouds, meshes, glTF scenes, scene files (.toml, .json).
+///
+/// Keywords are keys of scene files: a dot is an underscore, or a dict: `camera_position=(1, 2, 3)` or
+/// `camera={"position": (1, 2, 3)}`. What they leave open is chosen from the data.
+///
+/// Raises `MissingFile`, `InvalidFile`, `InvalidSetting`.
+#[pyfunction]
+#[pyo3(signature = (*paths, progress = None, **keys))]
+pub fn load(
+    py: Python<'_>,
+    paths: Vec<PathBuf>,
+    progress: Option<&Bound<'_, PyAny>>,
+    keys: Option<&Bound<'_, PyDict>>,
+) -> PyResult<PyScene> {
+    let mut description = SceneDescription::default();
+    for path in paths {
+        if is_scene_file(&path) {
+            let read = SceneDescription::read(&path).map_err(|error| to_exception(py, &error))?;
+            description.overlay(read);
+        } else {
+            description.files.push(path);
+        }
+    }
+    let scene = PyScene::new(with_keys(py, &description, keys)?);
+    let (description, slot) = scene.state();
+    work::run(py, progress, |progress| opened(&slot, &description, progress).map(drop))?;
+    Ok(scene)
+}

@@ -1,0 +1,98 @@
+//! Values of Python as those of scene files.
+
+use crate::errors::invalid_setting;
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString};
+use serde_json::{Map, Number, Value};
+use surfel::SceneDescription;
+use surfel::description::Invalid;
+
+/// Reads keywords as a table of keys.
+pub fn table(keys: Option<&Bound<'_, PyDict>>) -> PyResult<Map<String, Value>> {
+    let mut table = Map::new();
+    for (key, value) in keys.into_iter().flatten() {
+        let key: String = key.extract()?;
+        let value = to_value(&key, &value)?;
+        table.insert(key, value);
+    }
+    Ok(table)
+}
+
+/// Lays keywords over a description: `None` makes a key automatic again.
+pub fn with_keys(
+    py: Python<'_>,
+    description: &SceneDescription,
+    keys: Option<&Bound<'_, PyDict>>,
+) -> PyResult<SceneDescription> {
+    let mut description = description.clone();
+    let (unset, set) = table(keys)?.into_iter().partition(|(_, value)| value.is_null());
+    let mut layer = SceneDescription::default();
+    let merged = layer.merge(&set).and_then(|()| description.merge(&unset));
+    merged.map_err(|error| invalid_setting(py, error))?;
+    description.overlay(layer);
+    description.check().map_err(|error| invalid_setting(py, error))?;
+    Ok(description)
+}
+
+/// Converts a value; `key` is the path that an error names.
+pub fn to_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
+    if value.is_none() {
+        return Ok(Value::Null);
+    }
+    if let Ok(flag) = value.cast::<PyBool>() {
+        return Ok(Value::Bool(flag.is_true()));
+    }
+    if value.is_instance_of::<PyInt>() {
+        return integer(key, value);
+    }
+    if value.is_instance_of::<PyFloat>() {
+        return number(key, value);
+    }
+    if let Ok(text) = value.cast::<PyString>() {
+        return Ok(Value::String(text.to_str()?.to_owned()));
+    }
+    if let Ok(dict) = value.cast::<PyDict>() {
+        return Ok(Value::Object(table(Some(dict)).map_err(|error| within(key, value, error))?));
+    }
+    // Paths, dates, arrays and numbers of numpy: each says itself what it is.
+    for method in ["__fspath__", "isoformat", "tolist"] {
+        if value.hasattr(method)? {
+            return to_value(key, &value.call_method0(method)?);
+        }
+    }
+    let items = value.try_iter().map_err(|error| within(key, value, error))?;
+    let items = items.enumerate().map(|(i, item)| to_value(&format!("{key}[{i}]"), &item?));
+    Ok(Value::Array(items.collect::<PyResult<_>>()?))
+}
+
+fn integer(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
+    if let Ok(integer) = value.extract::<i64>() {
+        return Ok(integer.into());
+    }
+    value.extract::<u64>().map(Value::from).or_else(|_| number(key, value))
+}
+
+fn number(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
+    let number: f64 = value.extract()?;
+    let finite = Number::from_f64(number).map(Value::Number);
+    finite.ok_or_else(|| {
+        let message = format!("found {number}, expected a number");
+        invalid_setting(value.py(), Invalid::at(key, message))
+    })
+}
+
+/// An error about a value that no scene file can hold.
+fn within(key: &str, value: &Bound<'_, PyAny>, error: PyErr) -> PyErr {
+    if !error.is_instance_of::<PyTypeError>(value.py()) {
+        return error;
+    }
+    let found = value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string());
+    let message = format!("found an object of type {found}, expected a number, text, list or dict");
+    invalid_setting(value.py(), Invalid::at(key, message))
+}
+
+/// Converts a value of a scene file.
+pub fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
+    py.import("json")?.call_method1("loads", (value.to_string(),))
+}

@@ -1,0 +1,71 @@
+//! The viewer, on a thread beside the interpreter.
+
+use crate::errors::exception;
+use crate::scene::PyScene;
+use pyo3::prelude::*;
+use std::sync::{Mutex, PoisonError};
+use surfel_cli::RunningViewer;
+
+/// A running viewer. It stops with `close()`, at the end of a `with` block, or with the interpreter.
+#[pyclass(frozen, module = "surfel", name = "Viewer")]
+pub struct PyViewer {
+    link: String,
+    running: Mutex<Option<RunningViewer>>,
+}
+
+#[pymethods]
+impl PyViewer {
+    /// The link to its page, on this machine.
+    #[getter]
+    fn link(&self) -> &str {
+        &self.link
+    }
+
+    /// Stops the viewer. Raises `InvalidScene` if its files could not be read.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        let running = self.running.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let ended = py.detach(|| running.map_or(Ok(()), RunningViewer::stop));
+        ended.map_err(|error| exception(py, "InvalidScene", &error.to_string()))
+    }
+
+    fn __enter__(viewer: Py<Self>) -> Py<Self> {
+        viewer
+    }
+
+    #[pyo3(signature = (*_reason))]
+    fn __exit__(&self, py: Python<'_>, _reason: Vec<Bound<'_, PyAny>>) -> PyResult<()> {
+        self.close(py)
+    }
+
+    /// The link in a cell of a notebook.
+    fn _repr_html_(&self) -> String {
+        format!("<a href=\"{0}\" target=\"_blank\">{0}</a>", self.link)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<surfel.Viewer {}>", self.link)
+    }
+}
+
+/// Starts the viewer of a scene as it is now, on this machine alone, and returns at once.
+///
+/// `port` 0 takes any free one. `open=True` opens the page in a browser; in a notebook the result is a link to it.
+///
+/// Raises `Error` if the system refuses the port.
+#[pyfunction]
+#[pyo3(signature = (scene, *, port = 0, open = false))]
+pub fn view(
+    py: Python<'_>,
+    scene: &Bound<'_, PyScene>,
+    port: u16,
+    open: bool,
+) -> PyResult<PyViewer> {
+    let description = scene.get().description();
+    let running = RunningViewer::start(description, port)
+        .map_err(|error| exception(py, "Error", &error.to_string()))?;
+    let link = running.link.clone();
+    if open {
+        py.import("webbrowser")?.call_method1("open", (&link,))?;
+    }
+    Ok(PyViewer { link, running: Mutex::new(Some(running)) })
+}

@@ -1,0 +1,206 @@
+"""Clouds and meshes of arrays: what is taken, what is refused, and what becomes of it."""
+
+import array
+
+import numpy
+import pytest
+import surfel
+from conftest import hill_points
+
+
+class Interface:
+    """An object that has nothing but the array interface."""
+
+    def __init__(self, values):
+        self.values = values
+        self.__array_interface__ = values.__array_interface__
+
+
+class Dlpack:
+    """An object that has nothing but DLPack."""
+
+    def __init__(self, values):
+        self.values = values
+
+    def __dlpack__(self, **keywords):
+        return self.values.__dlpack__(**keywords)
+
+    def __dlpack_device__(self):
+        return self.values.__dlpack_device__()
+
+
+def read_only(values):
+    values = values.copy()
+    values.flags.writeable = False
+    return values
+
+
+@pytest.mark.parametrize(
+    "convert",
+    [
+        lambda points: points,
+        lambda points: points.astype("f4"),
+        lambda points: points.astype(">f8"),
+        lambda points: numpy.asfortranarray(points),
+        lambda points: numpy.repeat(points, 2, axis=0)[::2],
+        lambda points: points[::-1].copy()[::-1],
+        lambda points: numpy.hstack([points, points])[:, :3],
+        lambda points: numpy.hstack([points[:, ::-1], points])[:, 2::-1],
+        read_only,
+        lambda points: points.tolist(),
+        lambda points: memoryview(points),
+        Interface,
+        Dlpack,
+        lambda points: Dlpack(points.astype("f4")),
+    ],
+)
+def test_arrays_of_many_kinds_are_the_same_cloud(points, convert):
+    cloud = surfel.Cloud(convert(points))
+    assert len(cloud) == len(points)
+    assert numpy.allclose(cloud.points, points, atol=1e-6)
+
+
+def test_integers_are_taken(points):
+    cloud = surfel.Cloud((points * 1000).astype("i2"))
+    assert (cloud.points == (points * 1000).astype("i2")).all()
+
+
+def test_far_coordinates_keep_their_resolution():
+    points = hill_points(offset=(5e5, 4.9e6, 100.0))
+    cloud = surfel.Cloud(points)
+    assert numpy.abs(cloud.points - points).max() < 1e-6
+    assert cloud.local_points.dtype == numpy.float32 and numpy.abs(cloud.local_points).max() < 200
+    assert numpy.allclose(cloud.local_points + numpy.array(cloud.origin), points, atol=1e-6)
+
+
+def test_columns_come_back(points):
+    n = len(points)
+    colors = numpy.arange(3 * n, dtype="u2").reshape(n, 3)
+    columns = {
+        "u1": numpy.arange(n).astype("u1"),
+        "u2": numpy.arange(n).astype("u2"),
+        "i4": numpy.arange(n).astype("i4") - 7,
+        "f4": numpy.linspace(0, 1, n).astype("f4"),
+        "f8": numpy.linspace(0, 1, n),
+        "i8": numpy.arange(n),
+        "bool": numpy.arange(n) % 2 == 0,
+    }
+    normals = numpy.tile([0.0, 0.0, 2.0], (n, 1))
+    cloud = surfel.Cloud(
+        points, normals=normals, radii=0.05, colors=colors, intensity=columns["f4"], classification=columns["u1"], scalars=columns
+    )
+    assert (cloud.normals == normals).all() and (cloud.radii == numpy.float32(0.05)).all()
+    assert (cloud.colors == colors).all() and (cloud.intensity == columns["f4"]).all()
+    assert (cloud.classification == columns["u1"]).all()
+    assert list(cloud.scalars) == list(columns)
+    for name, values in columns.items():
+        assert (cloud.scalars[name] == values).all(), name
+    assert cloud.scalars["i4"].dtype == numpy.int32 and cloud.scalars["i8"].dtype == numpy.float64
+    bare = surfel.Cloud(points)
+    assert bare.normals is None and bare.colors is None and bare.scalars == {}
+
+
+@pytest.mark.parametrize(
+    ("colors", "expected"),
+    [
+        (numpy.array([[255, 128, 0]], "u1"), [65535, 128 * 257, 0]),
+        (numpy.array([[255, 128, 0, 9]], "u1"), [65535, 128 * 257, 0]),
+        (numpy.array([[1.0, 0.5, 0.0]]), [65535, 32768, 0]),
+        (numpy.array([[7, 8, 9]], "u2"), [7, 8, 9]),
+    ],
+)
+def test_colours_have_sixteen_bits(colors, expected):
+    cloud = surfel.Cloud([[0.0, 0.0, 0.0]], colors=colors)
+    assert cloud.colors.tolist() == [expected]
+
+
+@pytest.mark.parametrize(
+    ("keywords", "words"),
+    [
+        ({"points": numpy.zeros((5, 2))}, r"points: found shape \(5, 2\), expected \(N, 3\)"),
+        ({"points": numpy.zeros(15)}, r"points: found shape \(15,\)"),
+        ({"points": numpy.zeros((0, 3))}, "points: found none"),
+        ({"points": numpy.zeros((5, 3), "c8")}, "points: found dtype complex64"),
+        ({"points": numpy.full((5, 3), "x")}, "points: found dtype"),
+        ({"points": [[1, 2, 3], [4, 5]]}, "points: found an object of type list"),
+        ({"points": None}, "points: found"),
+        ({"normals": numpy.zeros((4, 3))}, r"normals: found shape \(4, 3\), expected \(5, 3\)"),
+        ({"radii": numpy.zeros(4)}, r"radii: found shape \(4,\), expected \(5,\)"),
+        ({"colors": numpy.zeros((5, 2))}, r"colors: found shape \(5, 2\)"),
+        ({"colors": numpy.full((5, 3), 1.5)}, "colors: found 1.5 to 1.5, expected 0 to 1"),
+        ({"colors": numpy.full((5, 3), numpy.nan)}, "colors: found nan"),
+        ({"colors": numpy.zeros((5, 3), "i8")}, "colors: found dtype int64"),
+        ({"intensity": numpy.zeros((5, 1))}, r"intensity: found shape \(5, 1\)"),
+        ({"classification": numpy.full(5, 256)}, "classification: found dtype int64, expected integers from 0 to 255"),
+        ({"scalars": {"age": numpy.zeros(6)}}, r"age: found shape \(6,\), expected \(5,\)"),
+        ({"scalars": {"age": numpy.array(["a"] * 5)}}, "age: found dtype"),
+    ],
+)
+def test_wrong_arrays_are_refused(keywords, words):
+    with pytest.raises(surfel.InvalidArray, match=words):
+        surfel.Cloud(**({"points": numpy.zeros((5, 3))} | keywords))
+
+
+def test_unknown_keywords_are_refused(points):
+    with pytest.raises(TypeError, match="colours"):
+        surfel.Cloud(points, colours=points)
+
+
+def test_points_that_are_not_finite_are_left_out(points):
+    points[::7] = numpy.nan
+    points[1] = numpy.inf
+    scene = surfel.Scene(resolution=(32, 24), spp=1, light_samples=1)
+    scene.add(surfel.Cloud(points))
+    ids = scene.render().point_ids
+    shown = ids[ids != 0xFFFFFFFF]
+    assert shown.size and numpy.isfinite(points[shown]).all()
+    scene = surfel.Scene()
+    scene.add(surfel.Cloud(numpy.full((9, 3), numpy.nan)))
+    with pytest.raises(surfel.InvalidScene, match="no points"):
+        scene.render(resolution=(8, 8))
+
+
+def test_later_changes_of_arrays_change_nothing(points):
+    cloud = surfel.Cloud(points)
+    before = cloud.points
+    points[:] = 7
+    del points
+    assert (cloud.points == before).all()
+
+
+@pytest.mark.parametrize("extension", ["ply", "laz", "xyz"])
+def test_clouds_are_saved_and_read(points, tmp_path, extension):
+    n = len(points)
+    path = tmp_path / f"hill.{extension}"
+    surfel.Cloud(points, scalars={"age": numpy.arange(n).astype("f4")}).save(path)
+    scene = surfel.load(path, color="age", resolution=(32, 24), spp=1, light_samples=1)
+    assert numpy.isfinite(scene.render().depth).any()
+
+
+def test_clouds_cannot_be_saved_anyhow(points, tmp_path):
+    with pytest.raises(surfel.InvalidFile):
+        surfel.Cloud(points).save(tmp_path / "hill.bmp")
+
+
+def test_meshes_of_arrays_are_refused_or_taken():
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    assert repr(surfel.Mesh(corners, [[0, 1, 2]])) == "<surfel.Mesh of 1 triangles>"
+    for triangles, words in [
+        ([[0, 1, 3]], "triangles: found indices 0 to 3, expected 0 to 2"),
+        ([[0, 1, -1]], "triangles: found indices -1 to 1"),
+        ([[0.0, 1.0, 2.0]], "triangles: found dtype float64, expected integers"),
+        (numpy.zeros((0, 3), int), "triangles: found none"),
+        ([[0, 1]], r"triangles: found shape \(1, 2\)"),
+    ]:
+        with pytest.raises(surfel.InvalidArray, match=words):
+            surfel.Mesh(corners, triangles)
+    with pytest.raises(surfel.InvalidArray, match="vertices: found one that is not finite, at index 1"):
+        surfel.Mesh([[0, 0, 0], [numpy.nan, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    with pytest.raises(surfel.InvalidArray, match="triangles: found none"):
+        surfel.Mesh(corners)
+
+
+def test_buffers_of_the_standard_library_are_arrays():
+    flat = array.array("d", range(12))
+    cloud = surfel.Cloud(numpy.frombuffer(flat).reshape(4, 3))
+    assert cloud.points.tolist() == [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11]]

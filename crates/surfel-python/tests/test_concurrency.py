@@ -1,0 +1,153 @@
+"""Threads, processes, signals and progress while work goes on."""
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy
+import pytest
+import surfel
+from conftest import hill_points
+
+SMALL = {"resolution": (48, 32), "spp": 1, "light_samples": 1}
+LONG = {"resolution": (1600, 1200), "spp": 64, "light_samples": 64}
+
+
+def test_threads_share_a_scene(hill):
+    scene = surfel.load(hill)
+    expected = scene.render(**SMALL).color
+    found = {}
+
+    def work(i):
+        found[i] = [scene.render(camera_azimuth_angle=90 if i % 2 else None, **SMALL).color for _ in range(3)]
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(6)]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    assert len(found) == 6
+    for i in (0, 2, 4):
+        assert all((color == expected).all() for color in found[i])
+    assert all((color == found[1][0]).all() for i in (1, 3, 5) for color in found[i])
+
+
+def test_a_scene_grows_while_another_thread_renders(points):
+    scene = surfel.Scene(**SMALL)
+    scene.add(surfel.Cloud(points))
+    thread = threading.Thread(target=lambda: [scene.render() for _ in range(5)])
+    thread.start()
+    for i in range(1, 5):
+        assert scene.add(surfel.Cloud(points), translate=(3 * i, 0, 0)) == i
+    thread.join()
+    assert scene.cast_rays([[12, 0, 9, 0, 0, -1]])["geometry_ids"].tolist() == [4]
+
+
+def test_threads_add_to_one_scene(points):
+    scene, cloud = surfel.Scene(), surfel.Cloud(points)
+    numbers = []
+
+    def work():
+        for _ in range(20):
+            numbers.append(scene.add(cloud))
+            with pytest.raises(surfel.InvalidSetting):
+                scene.add(cloud, colour="red")
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    assert sorted(numbers) == list(range(80))
+
+
+def test_other_threads_run_while_a_picture_is_rendered(hill):
+    scene, ticks = surfel.load(hill), []
+    thread = threading.Thread(target=lambda: scene.render(resolution=(640, 480), spp=4, light_samples=16))
+    thread.start()
+    while thread.is_alive():
+        ticks.append(time.perf_counter())
+        time.sleep(0.001)
+    assert 10 < len(ticks)
+
+
+def test_progress_is_reported(hill):
+    reports = []
+    surfel.load(hill).render(resolution=(640, 480), progress=lambda *report: reports.append(report))
+    assert reports
+    for stage, done, total in reports:
+        assert isinstance(stage, str) and stage and 0 <= done and isinstance(total, int)
+
+
+def test_what_a_callback_raises_stops_the_work(hill):
+    def refuse(stage, done, total):
+        raise RuntimeError("enough")
+
+    scene = surfel.load(hill)
+    start = time.perf_counter()
+    with pytest.raises(RuntimeError, match="enough"):
+        scene.render(progress=refuse, **LONG)
+    assert time.perf_counter() - start < 10
+    assert scene.render(**SMALL).color.any()
+
+
+def test_progress_true_shows_a_bar(hill, capsys):
+    surfel.load(hill).render(resolution=(640, 480), progress=True)
+    assert "render" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of Unix")
+def test_ctrl_c_stops_a_picture(hill):
+    code = f"""
+import os, signal, sys, threading, time, surfel
+scene = surfel.load({str(hill)!r})
+scene.render(resolution=(8, 8), spp=1)
+sent = []
+def interrupt():
+    time.sleep(0.5)
+    sent.append(time.perf_counter())
+    os.kill(os.getpid(), signal.SIGINT)
+threading.Thread(target=interrupt).start()
+try:
+    scene.render(resolution=(1600, 1200), spp=64, light_samples=64)
+except KeyboardInterrupt:
+    print(time.perf_counter() - sent[0])
+"""
+    program = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    # On an idle machine it is below 0.1 s; others may keep this one busy.
+    assert float(program.stdout) < 1.0, program.stderr
+
+
+def render_in_child(queue):
+    try:
+        scene = surfel.Scene(**SMALL)
+        scene.add(surfel.Cloud(hill_points()))
+        queue.put(bool(scene.render().color.any()))
+    except Exception as error:
+        queue.put(repr(error))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_forked_processes_raise_instead_of_waiting(hill):
+    surfel.load(hill)
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    process = context.Process(target=render_in_child, args=(queue,))
+    process.start()
+    assert "was forked" in queue.get(timeout=60)
+    process.join(60)
+    assert process.exitcode == 0
+
+
+def test_spawned_processes_render():
+    context = multiprocessing.get_context("spawn")
+    queue = context.Queue()
+    process = context.Process(target=render_in_child, args=(queue,))
+    process.start()
+    assert queue.get(timeout=120) is True
+    process.join(60)
+
+
+def test_a_scene_has_its_own_number_of_threads(hill):
+    one, two = (surfel.load(hill, threads=n).render(**SMALL).color for n in (1, 2))
+    assert (one == two).all()

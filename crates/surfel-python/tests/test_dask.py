@@ -1,0 +1,82 @@
+"""Pictures by Dask: the program's bytes, on threads and on processes that die."""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+
+import pytest
+import surfel
+
+dask = pytest.importorskip("dask")
+from surfel.dask import Recipe, VersionMismatch, render_frames, render_tiles, save_frames  # noqa: E402
+
+SMALL = {"resolution": (48, 32), "spp": 1, "light_samples": 1}
+
+
+@pytest.fixture
+def recipe(hill):
+    return Recipe(hill, turntable=2, **SMALL)
+
+
+def program(*words):
+    subprocess.run([sys.executable, "-m", "surfel", *map(str, words), "--quiet"], check=True)
+
+
+def options(hill):
+    return [hill, "--resolution", "48x32", "--spp", 1, "--light-samples", 1]
+
+
+def test_frames_are_those_of_the_program(hill, recipe, tmp_path):
+    names = save_frames(recipe, range(3), tmp_path / "ours_####.png")
+    program("animate", *options(hill), "-o", tmp_path / "theirs_####.png", "--turntable", 2, "--frames", 3)
+    assert [os.path.basename(name) for name in names] == ["ours_0001.png", "ours_0002.png", "ours_0003.png"]
+    for i in (1, 2, 3):
+        ours, theirs = (tmp_path / f"{whose}_000{i}.png" for whose in ("ours", "theirs"))
+        assert ours.read_bytes() == theirs.read_bytes(), i
+
+
+def test_tiles_join_to_the_program_s_picture(hill, tmp_path):
+    program("render", *options(hill), "-o", tmp_path / "whole.png", "--legend")
+    whole = (tmp_path / "whole.png").read_bytes()
+    for tiles in (1, 5, 99):
+        assert render_tiles(Recipe(hill, legend=True, **SMALL), tiles).compute() == whole, tiles
+
+
+def test_recipes_travel_as_descriptions(hill, recipe):
+    data = pickle.dumps(recipe)
+    assert len(data) < 500
+    assert pickle.loads(data) == recipe and hash(pickle.loads(data)) == hash(recipe)
+    assert recipe != Recipe(hill, **SMALL)
+
+
+def test_recipes_of_other_versions_are_refused(recipe):
+    version = surfel.__version__.encode()
+    data = pickle.dumps(recipe, protocol=0).replace(version, b"9" * len(version))
+    with pytest.raises(VersionMismatch, match="made by surfel 9"):
+        pickle.loads(data)
+
+
+def test_wrong_recipes_are_named_where_they_are_rendered(hill):
+    with pytest.raises(surfel.InvalidSetting, match="nearest known one is `surface`"):
+        render_tiles(Recipe(hill, surfce="smooth")).compute()
+    with pytest.raises(surfel.MissingFile):
+        dask.compute(*render_frames(Recipe("nowhere.ply", turntable=1), range(2)))
+    with pytest.raises(surfel.InvalidSetting, match="nothing moves"):
+        dask.compute(*render_frames(Recipe(hill, **SMALL), range(2)))
+    with pytest.raises(surfel.InvalidSetting, match="found no #"):
+        save_frames(Recipe(hill), range(2), "frame.png")
+
+
+def test_films_survive_a_worker(recipe, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        with distributed.Client(cluster) as client:
+            frames = client.compute(render_frames(recipe, range(12)))
+            distributed.wait(frames[0])
+            victim = next(iter(cluster.workers.values())).pid
+            os.kill(victim, signal.SIGKILL)
+            found = client.gather(frames)
+    expected = dask.compute(*render_frames(recipe, range(12)))
+    assert found == list(expected)

@@ -1,0 +1,83 @@
+"""Clouds and meshes of other packages; each test is skipped where its package is not installed."""
+
+import numpy
+import pytest
+import surfel
+from conftest import hill_points
+
+COLORS = numpy.tile([[10, 20, 30]], (2500, 1))
+
+
+def test_laspy_coordinates_are_exact(tmp_path):
+    laspy = pytest.importorskip("laspy")
+    las = laspy.LasData(laspy.LasHeader(version="1.4", point_format=7))
+    las.header.scales, las.header.offsets = [0.001] * 3, [5e5, 4e6, 0]
+    points = hill_points(offset=(500123.4, 4000567.8, 90.0))
+    las.x, las.y, las.z = points.T
+    las.red, las.green, las.blue = (COLORS * 257).T
+    las.classification = numpy.arange(2500) % 7
+    las.intensity = numpy.arange(2500)
+    cloud = surfel.Cloud(las)
+    assert numpy.abs(cloud.points - las.xyz).max() < 1e-6
+    assert (cloud.colors == COLORS * 257).all()
+    assert (cloud.classification == numpy.arange(2500) % 7).all() and (cloud.intensity == numpy.arange(2500)).all()
+    assert {"gps_time", "return_number"} <= cloud.scalars.keys()
+    scene = surfel.Scene(resolution=(32, 24), spp=1, light_samples=1)
+    assert scene.add(las, color="class") == 0
+    assert numpy.isfinite(scene.render().depth).any()
+
+
+def test_laspy_colours_of_eight_bits_are_bright():
+    laspy = pytest.importorskip("laspy")
+    las = laspy.LasData(laspy.LasHeader(version="1.2", point_format=2))
+    las.x, las.y, las.z = hill_points().T
+    las.red, las.green, las.blue = COLORS.T
+    assert (surfel.Cloud(las).colors == COLORS * 257).all()
+
+
+def test_pandas_columns_become_scalars():
+    pandas = pytest.importorskip("pandas")
+    x, y, z = hill_points().T
+    frame = pandas.DataFrame({"X": x, "Y": y, "Z": z, "age": numpy.arange(2500.0), "name": ["a"] * 2500})
+    cloud = surfel.Cloud(frame)
+    assert (cloud.points == hill_points().astype("f4")).all() or numpy.allclose(cloud.points, hill_points(), atol=1e-6)
+    assert list(cloud.scalars) == ["age"]
+    assert list(surfel.Cloud(frame, scalars={"depth": z}).scalars) == ["age", "depth"]
+
+
+def test_xarray_columns_become_scalars():
+    xarray = pytest.importorskip("xarray")
+    x, y, z = hill_points().T
+    data = xarray.Dataset({"x": ("n", x), "y": ("n", y), "z": ("n", z), "age": ("n", numpy.arange(2500.0))})
+    cloud = surfel.Cloud(data)
+    assert numpy.allclose(cloud.points, hill_points(), atol=1e-6) and list(cloud.scalars) == ["age"]
+
+
+def test_trimesh_meshes_and_clouds_are_added():
+    trimesh = pytest.importorskip("trimesh")
+    box = trimesh.creation.box(extents=(2, 2, 2))
+    scene = surfel.Scene()
+    scene.add(box)
+    assert scene.cast_rays([0.1, 0.2, 5, 0, 0, -1])["t_hit"] == 4
+    cloud = surfel.Cloud(trimesh.PointCloud(hill_points(), colors=COLORS))
+    assert len(cloud) == 2500 and (cloud.colors == COLORS * 257).all()
+
+
+def test_pyvista_meshes_and_clouds_are_added():
+    pyvista = pytest.importorskip("pyvista")
+    scene = surfel.Scene()
+    scene.add(pyvista.Cube(x_length=2, y_length=2, z_length=2))
+    assert scene.cast_rays([0.1, 0.2, 5, 0, 0, -1])["t_hit"] == 4
+    data = pyvista.PolyData(hill_points())
+    data.point_data["age"] = numpy.arange(2500.0)
+    assert list(surfel.Cloud(data).scalars) == ["age"]
+
+
+def test_open3d_meshes_and_clouds_are_added():
+    open3d = pytest.importorskip("open3d")
+    scene = surfel.Scene()
+    scene.add(open3d.geometry.TriangleMesh.create_box(2, 2, 2))
+    assert scene.cast_rays([0.5, 0.5, 5, 0, 0, -1])["t_hit"] == 3
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(hill_points()))
+    cloud.colors = open3d.utility.Vector3dVector(COLORS / 255)
+    assert (surfel.Cloud(cloud).colors == COLORS * 257).all()

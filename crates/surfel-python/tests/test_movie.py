@@ -1,0 +1,70 @@
+"""Movies: frames, refusals, and the program's movie beside them."""
+
+import shutil
+import subprocess
+import sys
+
+import pytest
+import surfel
+
+SMALL = {"resolution": (32, 24), "spp": 1, "light_samples": 1}
+
+
+def test_frames_are_those_of_the_program(hill, tmp_path):
+    ours, theirs = tmp_path / "ours", tmp_path / "theirs"
+    ours.mkdir()
+    theirs.mkdir()
+    scene = surfel.load(hill, turntable=2, **SMALL)
+    surfel.animate(scene, ours / "f_####.png", frames=range(3))
+    words = ["animate", hill, "-o", theirs / "f_####.png", "--frames", 3, "--turntable", 2]
+    words += ["--resolution", "32x24", "--spp", 1, "--light-samples", 1, "--quiet"]
+    subprocess.run([sys.executable, "-m", "surfel", *map(str, words)], check=True)
+    names = sorted(file.name for file in ours.glob("*.png"))
+    assert len(names) == 3 and names == sorted(file.name for file in theirs.glob("*.png"))
+    for name in names:
+        assert (ours / name).read_bytes() == (theirs / name).read_bytes(), name
+
+
+def test_clouds_of_arrays_turn(points, tmp_path):
+    scene = surfel.Scene(**SMALL)
+    scene.add(surfel.Cloud(points))
+    reports = []
+    surfel.animate(scene, tmp_path / "turn.gif", frames=4, turntable=1, progress=lambda *report: reports.append(report))
+    assert (tmp_path / "turn.gif").read_bytes().startswith(b"GIF89a")
+    assert reports
+
+
+@pytest.mark.parametrize("frames", [range(2, 5), range(0, 6, 2), "many", -1, 0])
+def test_other_frames_are_refused(hill, tmp_path, frames):
+    with pytest.raises(surfel.InvalidSetting, match="frames: found"):
+        surfel.animate(surfel.load(hill), tmp_path / "turn.gif", frames=frames)
+
+
+def test_still_scenes_need_a_number_of_frames(hill, tmp_path):
+    with pytest.raises(surfel.InvalidSetting, match="nothing moves"):
+        surfel.animate(surfel.load(hill), tmp_path / "still.gif")
+
+
+def test_other_files_are_refused(hill, tmp_path):
+    with pytest.raises(surfel.InvalidFile, match="extension"):
+        surfel.animate(surfel.load(hill), tmp_path / "turn.doc", frames=2)
+
+
+def test_videos_are_encoded(hill, tmp_path):
+    if shutil.which("ffmpeg") is None:
+        pytest.skip("ffmpeg is not installed")
+    surfel.animate(surfel.load(hill, **SMALL), tmp_path / "turn.mp4", frames=5, turntable=1)
+    assert 500 < (tmp_path / "turn.mp4").stat().st_size
+
+
+def test_frames_are_rendered_one_by_one(hill, tmp_path):
+    scene = surfel.load(hill, turntable=1, fps=5, **SMALL)
+    film = surfel.Film(scene)
+    assert len(film) == 5
+    surfel.animate(scene, tmp_path / "f_#.png")
+    for index in (3, 0, 4):
+        assert film.render(index)._repr_png_() == (tmp_path / f"f_{index + 1}.png").read_bytes()
+    with pytest.raises(IndexError, match="frame 5 of 5"):
+        film.render(5)
+    with pytest.raises(surfel.InvalidSetting, match="nothing moves"):
+        surfel.Film(surfel.load(hill))

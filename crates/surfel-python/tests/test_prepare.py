@@ -1,0 +1,70 @@
+"""Prepared clouds: of files and of arrays, by the program's rules."""
+
+import subprocess
+import sys
+
+import numpy
+import pytest
+import surfel
+
+
+def test_normals_and_radii_are_added(hill):
+    cloud = surfel.prepare(hill)
+    assert len(cloud) == 2500
+    assert numpy.allclose(numpy.linalg.norm(cloud.normals, axis=1), 1, atol=1e-3)
+    assert (cloud.radii > 0).all()
+
+
+def test_single_steps_add_nothing_else(hill):
+    cloud = surfel.prepare(hill, filter="z > 0.2")
+    assert (cloud.points[:, 2] > 0.2).all() and 0 < len(cloud) < 2500
+    assert cloud.normals is None and cloud.radii is None
+    assert surfel.prepare(hill, filter="z > 0.2", normals=True).normals is not None
+    assert "surface_variation" in surfel.prepare(hill, keep_variation=True).scalars
+
+
+def test_clouds_of_arrays_are_prepared(points):
+    cloud = surfel.prepare(surfel.Cloud(points), subsample="random:100")
+    assert len(cloud) == 100
+    twice = surfel.prepare(surfel.prepare(surfel.Cloud(points)), radius="0.1")
+    assert numpy.allclose(twice.radii, 0.1)
+
+
+def test_saved_clouds_are_those_of_the_program(hill, tmp_path):
+    ours, theirs = tmp_path / "ours.ply", tmp_path / "theirs.ply"
+    surfel.prepare(hill, normals_k=12).save(ours)
+    words = ["prepare", hill, "-o", theirs, "--normals-k", "12", "--quiet"]
+    subprocess.run([sys.executable, "-m", "surfel", *map(str, words)], check=True)
+    assert ours.read_bytes() == theirs.read_bytes()
+
+
+def test_several_files_become_one_cloud(hill):
+    assert len(surfel.prepare(hill, hill, duplicates="keep")) == 5000
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"surface": "smooth"}, "surface: is no key of preparation"),
+        ({"camera_position": (1, 2, 3)}, "camera.position: is no key of preparation"),
+        ({"filtre": "z > 1"}, "nearest known one is `filter`"),
+        ({"filter": "z >"}, "filter: found"),
+    ],
+)
+def test_other_keys_are_refused(hill, keys, words):
+    with pytest.raises(surfel.InvalidSetting, match=words):
+        surfel.prepare(hill, **keys)
+
+
+def test_filters_may_keep_nothing(hill, points):
+    for source in (hill, surfel.Cloud(points)):
+        assert len(surfel.prepare(source, filter="z > 9")) == 0
+        with pytest.raises(surfel.Error, match="age"):
+            surfel.prepare(source, filter="age > 9")
+
+
+def test_missing_files_are_named():
+    with pytest.raises(surfel.MissingFile):
+        surfel.prepare("nowhere.laz")
+    with pytest.raises(surfel.Error, match="no input file"):
+        surfel.prepare()

@@ -1,0 +1,112 @@
+"""Scenes of clouds, meshes and files: places, materials, numbers of what was added."""
+
+import numpy
+import pytest
+import surfel
+from conftest import hill_points
+
+SMALL = {"resolution": (64, 48), "spp": 1, "light_samples": 1}
+SQUARE = surfel.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+
+
+def down(x, y, z=10.0):
+    return [x, y, z, 0.0, 0.0, -1.0]
+
+
+def test_a_cloud_of_arrays_renders_as_its_file_does(hill):
+    scene = surfel.Scene(**SMALL)
+    assert scene.add(surfel.Cloud(numpy.loadtxt(hill))) == 0
+    ours, theirs = scene.render(up="+Z"), surfel.load(hill, up="+Z").render(**SMALL)
+    assert (ours.color == theirs.color).all() and (ours.point_ids == theirs.point_ids).all()
+
+
+def test_things_are_numbered_and_placed(hill, points):
+    scene = surfel.Scene()
+    shift = numpy.eye(4)
+    shift[0, 3] = 10
+    assert scene.add(surfel.Cloud(points), name="wall") == 0
+    assert scene.add(SQUARE, transform=shift) == 1
+    assert scene.add(hill, translate=(20, 0, 0), scale=2) == 2
+    hits = scene.cast_rays([down(0, 0), down(10, 0.5), down(20, 0), down(30, 0)])
+    assert hits["geometry_ids"].tolist() == [0, 1, 2, 0xFFFFFFFF]
+    assert numpy.allclose(hits["t_hit"][:3], [9.5, 10, 9], atol=0.02)
+    assert hits["point_ids"][1] == 0xFFFFFFFF and hits["primitive_ids"][1] < 2
+    assert numpy.hypot(*points[hits["point_ids"][0], :2]) < 0.1
+    assert numpy.allclose(scene.bounds[:, 0], [-1, 22], atol=0.5)
+    assert repr(scene) == "<surfel.Scene of 0 files and 3 objects>"
+
+
+def test_one_cloud_is_shown_at_several_places(points):
+    scene, cloud = surfel.Scene(), surfel.Cloud(points)
+    for x in (0, 5, 10):
+        scene.add(cloud, translate=(x, 0, 0))
+    hits = scene.cast_rays([down(0, 0), down(5, 0), down(10, 0)])
+    assert hits["geometry_ids"].tolist() == [0, 1, 2]
+    assert len(set(hits["point_ids"].tolist())) == 1
+
+
+def test_added_things_follow_files(hill):
+    scene = surfel.load(hill)
+    assert scene.add(SQUARE, translate=(10, 0, 0)) == 1
+    assert scene.cast_rays([down(0, 0), down(10, 0)])["geometry_ids"].tolist() == [0, 1]
+
+
+def test_materials_are_those_of_scene_files(points):
+    pictures = []
+    for material in (None, "mirror", {"kind": "plastic", "roughness": 0.2}):
+        scene = surfel.Scene(camera_position=(0, -4, 3), camera_focal_point=(0, 0, 0), **SMALL)
+        scene.add(surfel.Cloud(points), material=material)
+        pictures.append(scene.render().color)
+    assert (pictures[0] != pictures[1]).any() and (pictures[0] != pictures[2]).any()
+
+
+def test_scalars_colour_a_cloud(points):
+    ages = numpy.arange(len(points)).astype("f4")
+    scene = surfel.Scene(light="none", **SMALL)
+    scene.add(surfel.Cloud(points, scalars={"age": ages}), color="age", cmap="viridis")
+    image = scene.render()
+    hit = image.point_ids != 0xFFFFFFFF
+    assert 50 < len(numpy.unique(image.srgb[hit], axis=0))
+
+
+def test_filters_keep_the_ids_of_the_array(points):
+    scene = surfel.Scene(**SMALL)
+    scene.add(surfel.Cloud(points), filter="z > 0.2")
+    ids = scene.render().point_ids
+    shown = ids[ids != 0xFFFFFFFF]
+    assert shown.size and (points[shown, 2] > 0.2).all()
+    assert scene.add(SQUARE, visible=False) == 1
+
+
+@pytest.mark.parametrize(
+    ("what", "keywords", "error", "words"),
+    [
+        (SQUARE, {"trnslate": (1, 2, 3)}, surfel.InvalidSetting, "^trnslate: unknown key; the nearest known one is `translate`"),
+        (SQUARE, {"translate": "far"}, surfel.InvalidSetting, "^translate: found"),
+        (SQUARE, {"material": "velvet"}, surfel.InvalidSetting, "velvet"),
+        (SQUARE, {"transform": numpy.eye(3)}, surfel.InvalidArray, "transform: expected a 4x4 matrix"),
+        (SQUARE, {"transform": numpy.zeros((4, 4))}, surfel.InvalidSetting, "flat, empty or infinite"),
+        (SQUARE, {"transform": numpy.full((4, 4), numpy.nan)}, surfel.InvalidSetting, "found NaN"),
+        (SQUARE, {"parent": "nobody"}, surfel.InvalidSetting, "no object `nobody`"),
+        ("nowhere.ply", {}, surfel.MissingFile, "nowhere.ply"),
+        (42, {}, surfel.InvalidArray, "points: found shape"),
+        (object(), {}, surfel.InvalidArray, "points: found"),
+    ],
+)
+def test_what_cannot_be_added_changes_nothing(what, keywords, error, words):
+    scene = surfel.Scene()
+    with pytest.raises(error, match=words):
+        scene.add(what, **keywords)
+    assert repr(scene) == "<surfel.Scene of 0 files and 0 objects>"
+
+
+def test_scenes_without_anything_cannot_be_rendered():
+    with pytest.raises(surfel.InvalidSetting, match="no objects"):
+        surfel.Scene().render()
+
+
+def test_parents_move_their_children(points):
+    scene = surfel.Scene()
+    scene.add(surfel.Cloud(points), name="ground", translate=(5, 0, 0))
+    scene.add(SQUARE, parent="ground", translate=(0, 5, 3))
+    assert scene.cast_rays([down(5, 5)])["t_hit"].tolist() == [7.0]

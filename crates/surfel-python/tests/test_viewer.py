@@ -1,0 +1,43 @@
+"""The viewer: its page, its end, and several at once."""
+
+import time
+import urllib.error
+import urllib.request
+
+import pytest
+import surfel
+
+
+def fetch(link):
+    with urllib.request.urlopen(link, timeout=30) as answer:
+        return answer.read()
+
+
+def test_the_page_is_there_until_the_viewer_is_closed(points):
+    scene = surfel.Scene()
+    scene.add(surfel.Cloud(points), name="hill")
+    with surfel.view(scene) as viewer, surfel.view(scene) as other:
+        assert viewer.link.startswith("http://127.0.0.1:") and viewer.link != other.link
+        assert b"<!doctype html>" in fetch(viewer.link).lower()
+        assert viewer.link in viewer._repr_html_() and viewer.link in repr(viewer)
+    with pytest.raises(urllib.error.URLError):
+        fetch(viewer.link)
+    viewer.close()
+
+
+def test_programs_get_pictures_of_clouds_of_arrays(points):
+    scene = surfel.Scene()
+    scene.add(surfel.Cloud(points))
+    with surfel.view(scene) as viewer:
+        while b"ready" not in fetch(viewer.link + "healthz"):
+            time.sleep(0.05)
+        picture = fetch(viewer.link + "render?resolution=32x24&spp=1&light-samples=1")
+        assert picture.startswith(b"\x89PNG")
+
+
+def test_ports_in_use_are_refused(hill):
+    scene = surfel.load(hill)
+    with surfel.view(scene) as viewer:
+        port = int(viewer.link.rsplit(":", 1)[1].strip("/"))
+        with pytest.raises(surfel.Error, match=str(port)):
+            surfel.view(scene, port=port)

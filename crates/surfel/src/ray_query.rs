@@ -1,0 +1,252 @@
+//! Rays as columns against a flat scene, on all threads, after Open3D's `RaycastingScene`.
+
+use crate::error::{Error, Result};
+use rayon::prelude::*;
+use surfel_core::flat::{FlatGeometry, FlatScene};
+use surfel_core::image::NO_ID;
+use surfel_core::math::{DVec3, Ray, Vec3};
+use surfel_core::progress::Progress;
+use surfel_core::trace::{InstanceFilter, SceneHit, Simd, scene_hits, scene_occlusions};
+
+/// Number of rays that a thread claims at a time.
+const CHUNK: usize = 4096;
+
+/// Rays in world coordinates, kept relative to the origin of a flat scene.
+#[derive(Clone, Debug, Default)]
+pub struct WorldRays {
+    rays: Vec<Ray>,
+    /// Lengths of the directions.
+    lengths: Vec<f32>,
+}
+
+impl WorldRays {
+    /// Rays `[x, y, z, dx, dy, dz]`: origin and direction in world coordinates. The direction has any length; one of length
+    /// 0, and a ray with a number that is not finite, hits nothing. `t_range` is the part of each ray that counts, in
+    /// multiples of the length of its direction.
+    pub fn new(
+        rays: impl IndexedParallelIterator<Item = [f64; 6]>,
+        t_range: (f32, f32),
+        scene: &FlatScene,
+    ) -> Self {
+        let local = |[x, y, z, dx, dy, dz]: [f64; 6]| {
+            let origin = (DVec3::new(x, y, z) - scene.origin).as_vec3();
+            let direction = DVec3::new(dx, dy, dz);
+            let length = direction.length() as f32;
+            let Some(direction) = direction.try_normalize().filter(|_| origin.is_finite()) else {
+                return (Ray { t_max: -1.0, ..Ray::new(Vec3::ZERO, Vec3::Z) }, length);
+            };
+            let (t_min, t_max) = (t_range.0 * length, t_range.1 * length);
+            (Ray { t_min, t_max, ..Ray::new(origin, direction.as_vec3()) }, length)
+        };
+        let (rays, lengths) = rays.map(local).unzip();
+        Self { rays, lengths }
+    }
+
+    /// Returns the number of rays.
+    pub fn len(&self) -> usize {
+        self.rays.len()
+    }
+
+    /// Returns true if there are no rays.
+    pub fn is_empty(&self) -> bool {
+        self.rays.is_empty()
+    }
+
+    pub(crate) fn local(&self) -> &[Ray] {
+        &self.rays
+    }
+}
+
+/// The nearest surfaces on rays as columns, with an entry for each ray.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RayHits {
+    /// Distance in multiples of the length of the direction; infinite without a hit.
+    pub t_hit: Vec<f32>,
+    /// Index of the instance; `NO_ID` without a hit.
+    pub instances: Vec<u32>,
+    /// Index of the triangle in its mesh, or of the nearest point in its cloud; `NO_ID` without a hit.
+    pub primitives: Vec<u32>,
+    /// Unit normal that faces the ray's origin; 0 without a hit.
+    pub normals: Vec<[f32; 3]>,
+    /// Index that the nearest point had when it was read; `NO_ID` for triangles and without a hit.
+    pub points: Vec<u32>,
+}
+
+/// Casts rays at a flat scene.
+#[derive(Clone, Debug)]
+pub struct RayCaster<'s> {
+    /// The scene.
+    pub scene: &'s FlatScene,
+    /// SIMD level of the kernels.
+    pub simd: Simd,
+    /// For each instance, the index that each of its points had when it was read; empty where that is not known.
+    pub sources: Vec<&'s [u32]>,
+}
+
+impl RayCaster<'_> {
+    /// Finds the nearest surface on each ray.
+    ///
+    /// # Errors
+    ///
+    /// Fails if cancelled.
+    pub fn hits(&self, rays: &WorldRays, progress: &dyn Progress) -> Result<RayHits> {
+        let n = rays.len();
+        let mut hits = RayHits {
+            t_hit: vec![f32::INFINITY; n],
+            instances: vec![NO_ID; n],
+            primitives: vec![NO_ID; n],
+            normals: vec![[0.0; 3]; n],
+            points: vec![NO_ID; n],
+        };
+        let columns = hits.t_hit.par_chunks_mut(CHUNK).zip(hits.instances.par_chunks_mut(CHUNK));
+        let columns = columns.zip(hits.primitives.par_chunks_mut(CHUNK));
+        let columns = columns.zip(hits.normals.par_chunks_mut(CHUNK));
+        let columns = columns.zip(hits.points.par_chunks_mut(CHUNK));
+        let chunks = rays.rays.par_chunks(CHUNK).zip(rays.lengths.par_chunks(CHUNK));
+        let buffer = || vec![SceneHit::MISS; CHUNK];
+        columns.zip(chunks).try_for_each_init(buffer, |buffer, (columns, (rays, lengths))| {
+            progress.check()?;
+            let ((((t_hit, instances), primitives), normals), points) = columns;
+            let found = &mut buffer[..rays.len()];
+            scene_hits(self.scene, self.simd, InstanceFilter::All, rays, found);
+            for (i, hit) in found.iter().enumerate().filter(|(_, hit)| !hit.is_miss()) {
+                t_hit[i] = hit.distance / lengths[i];
+                instances[i] = hit.instance;
+                normals[i] = hit.normal.to_array();
+                (primitives[i], points[i]) = self.ids(hit);
+            }
+            Ok::<(), Error>(())
+        })?;
+        Ok(hits)
+    }
+
+    /// Returns the index of a hit's primitive, and that of its point if it is one.
+    fn ids(&self, hit: &SceneHit) -> (u32, u32) {
+        let source = || self.sources.get(hit.instance as usize)?.get(hit.id as usize).copied();
+        let id = source().unwrap_or(hit.id);
+        let is_point = |instance| matches!(self.scene.geometry(instance), FlatGeometry::Cloud(_));
+        let instance = self.scene.instances.get(hit.instance as usize);
+        (id, if instance.is_some_and(is_point) { id } else { NO_ID })
+    }
+
+    /// Finds out for each ray whether any surface lies on it.
+    ///
+    /// # Errors
+    ///
+    /// Fails if cancelled.
+    pub fn occlusions(&self, rays: &WorldRays, progress: &dyn Progress) -> Result<Vec<bool>> {
+        let mut occluded = vec![false; rays.len()];
+        let chunks = occluded.par_chunks_mut(CHUNK).zip(rays.rays.par_chunks(CHUNK));
+        chunks.try_for_each(|(occluded, rays)| {
+            progress.check()?;
+            scene_occlusions(self.scene, self.simd, InstanceFilter::All, rays, occluded);
+            Ok::<(), Error>(())
+        })?;
+        Ok(occluded)
+    }
+
+    /// Counts the surfaces on each ray. Surfaces of points that are nearer to each other than a point's radius are one.
+    ///
+    /// # Errors
+    ///
+    /// Fails if cancelled.
+    pub fn counts(&self, rays: &WorldRays, progress: &dyn Progress) -> Result<Vec<u32>> {
+        let mut counts = vec![0; rays.len()];
+        let chunks = counts.par_chunks_mut(CHUNK).zip(rays.rays.par_chunks(CHUNK));
+        chunks.try_for_each(|(counts, rays)| self.count(rays, counts, progress))?;
+        Ok(counts)
+    }
+
+    /// Counts surfaces one after the other, on all rays that have any left.
+    fn count(&self, rays: &[Ray], counts: &mut [u32], progress: &dyn Progress) -> Result<()> {
+        let (mut rays, mut indices): (Vec<Ray>, Vec<usize>) =
+            (rays.to_vec(), (0..rays.len()).collect());
+        let mut hits = vec![SceneHit::MISS; rays.len()];
+        while !rays.is_empty() {
+            progress.check()?;
+            scene_hits(
+                self.scene,
+                self.simd,
+                InstanceFilter::All,
+                &rays,
+                &mut hits[..indices.len()],
+            );
+            let mut n_left = 0;
+            for i in (0..indices.len()).filter(|i| !hits[*i].is_miss()) {
+                counts[indices[i]] += 1;
+                (rays[n_left], indices[n_left]) = (behind(&rays[i], &hits[i]), indices[i]);
+                n_left += 1;
+            }
+            rays.truncate(n_left);
+            indices.truncate(n_left);
+        }
+        Ok(())
+    }
+}
+
+/// Returns the rest of a ray behind a surface.
+fn behind(ray: &Ray, hit: &SceneHit) -> Ray {
+    /// A ray along the surface would otherwise be moved without bound.
+    const MIN_COS: f32 = 0.1;
+    let cos = ray.direction.dot(hit.geometric_normal).abs().max(MIN_COS);
+    let end = hit.distance.max(ray.t_min).next_up();
+    Ray { t_min: end.max(hit.distance + hit.radius / cos), ..*ray }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Columns of rays against a square of triangles and against nothing.
+
+    use super::*;
+    use surfel_core::math::Vec2;
+    use surfel_core::progress::NoProgress;
+    use surfel_core::scene::Background;
+    use surfel_core::scene::{Camera, Geometry, Graph, Material, Mesh, Projection, Scene};
+
+    /// Two squares of side 2 about the z axis, at z = 0 and z = 3, far from the world's origin.
+    fn two_squares() -> FlatScene {
+        let corners =
+            [Vec2::new(-1.0, -1.0), Vec2::new(1.0, -1.0), Vec2::ONE, Vec2::new(-1.0, 1.0)];
+        let square = |z: f32| corners.map(|corner| corner.extend(z));
+        let mesh = Mesh {
+            origin: DVec3::new(5e5, 4e6, 0.0),
+            positions: [square(0.0), square(3.0)].concat(),
+            triangles: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]],
+            ..Mesh::default()
+        };
+        let graph = Graph::from_geometry(Geometry::Triangles(mesh), Material::MATTE);
+        let camera = Camera {
+            position: DVec3::ZERO,
+            focal_point: DVec3::Y,
+            view_up: DVec3::Z,
+            projection: Projection::Panorama,
+        };
+        let scene =
+            Scene { graph, lights: Vec::new(), background: Background::Transparent, camera };
+        FlatScene::new(&scene, &NoProgress).unwrap()
+    }
+
+    #[test]
+    fn rays_meet_both_squares() {
+        let scene = two_squares();
+        let caster = RayCaster { scene: &scene, simd: Simd::detect(), sources: Vec::new() };
+        let down = |x: f64, length: f64| [5e5 + x, 4e6 + 0.25, 10.0, 0.0, 0.0, -length];
+        let nan = [f64::NAN, 4e6, 10.0, 0.0, 0.0, -1.0];
+        let rays = [down(0.5, 1.0), down(0.5, 2.0), down(5.0, 1.0), down(0.5, 0.0), nan];
+        let all = WorldRays::new(rays.par_iter().copied(), (0.0, f32::INFINITY), &scene);
+        let hits = caster.hits(&all, &NoProgress).unwrap();
+        let none = f32::INFINITY;
+        assert_eq!(hits.t_hit, [7.0, 3.5, none, none, none]);
+        assert_eq!(hits.instances, [0, 0, NO_ID, NO_ID, NO_ID]);
+        assert_eq!(hits.primitives, [2, 2, NO_ID, NO_ID, NO_ID]);
+        assert_eq!(hits.points, [NO_ID; 5]);
+        assert_eq!(hits.normals[..3], [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0; 3]]);
+        assert_eq!(caster.counts(&all, &NoProgress).unwrap(), [2, 2, 0, 0, 0]);
+        let occluded = [true, true, false, false, false];
+        assert_eq!(caster.occlusions(&all, &NoProgress).unwrap(), occluded);
+        let short = WorldRays::new(rays.par_iter().copied(), (0.0, 6.0), &scene);
+        assert_eq!(caster.occlusions(&short, &NoProgress).unwrap()[..2], [false, true]);
+        let late = WorldRays::new(rays.par_iter().copied(), (8.0, 20.0), &scene);
+        assert_eq!(caster.hits(&late, &NoProgress).unwrap().t_hit[0], 10.0);
+    }
+}
