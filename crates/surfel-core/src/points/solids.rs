@@ -22,15 +22,13 @@ const MIN_ON_SURFACES: f32 = 0.5;
 /// Fraction of the discs, from the smallest on, that a stray point is compared with: chance makes surfaces of a few stray
 /// points, too.
 const TRUSTED_DISCS: f32 = 0.95;
-/// Maximum ratio of the radius of a ball or capsule to that of the discs nearby.
+/// Maximum ratio of the radius of a ball or capsule to that of the nearest disc.
 const MAX_STRAY_RATIO: f32 = 2.0;
-/// The same of a disc beyond those: the spacing of a scan grows with distance, but not at once.
+/// The same of a disc beyond those that is far from it: the spacing of a scan grows with distance, but not at once.
 const MAX_DISC_RATIO: f32 = 4.0;
 /// Ratio of the distance to the nearest disc to its radius from which a point is no part of its surroundings.
 const FAR_RATIO: f32 = 8.0;
-/// Number of nearest discs of which the smallest counts.
-const N_DISCS: usize = 8;
-/// Maximum number of discs among which these are searched.
+/// Maximum number of discs among which the nearest is searched.
 const MAX_DISCS: usize = 100_000;
 
 /// Gives a point the direction and the radius of its final structure. Surface points keep what was decided.
@@ -133,14 +131,14 @@ pub fn limit_stray_points(
     let tree = KdTree::new(&places, progress)?;
     shapes.par_iter_mut().enumerate().filter(|(_, shape)| is_wide(shape)).for_each(
         |(point, shape)| {
-            let nearest = tree.nearest(positions[point], N_DISCS, None);
+            let nearest = tree.nearest(positions[point], 1, None);
             let Some(disc) = nearest.first() else { return };
-            let around = nearest.iter().map(|disc| radii[disc.index as usize]);
-            let radius = around.fold(f32::INFINITY, f32::min);
-            if max_ratio(shape) * radius < shape.radius {
-                let is_far = FAR_RATIO * radius < disc.distance_squared.sqrt();
+            let radius = radii[disc.index as usize];
+            let is_far = FAR_RATIO * radius < disc.distance_squared.sqrt();
+            let is_surface = shape.structure == Structure::Surface;
+            if max_ratio(shape) * radius < shape.radius && (is_far || !is_surface) {
                 shape.radius = if is_far { typical } else { MAX_STRAY_RATIO * radius };
-                if shape.structure == Structure::Surface {
+                if is_surface {
                     let around =
                         all.nearest(positions[point], N_LINE_NEIGHBORS, Some(point as u32));
                     let is_line = is_line(&fit_plane(positions, point, &around));
