@@ -25,10 +25,9 @@ use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use surfel::SceneDescription;
+use surfel::SceneRenderer;
 use surfel::resolve::check_files;
 use surfel_core::progress::Progress;
-use surfel_core::render::CpuRenderer;
-use surfel_core::trace::Simd;
 use surfel_web::{Error, SceneProvider, Server, TlsError, TlsIdentity};
 
 /// Arguments of `surfel view`.
@@ -93,6 +92,7 @@ Examples:
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
     let description = args.scene.startup(global)?;
     start_threads(&description.run)?;
+    let renderer = SceneRenderer::new(&description.run)?;
     check_files(&description)?;
     let identity = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
     let identity =
@@ -121,8 +121,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         let report = report_for_loading.with_listener(&progress);
         open_scene_provider(description, typed, &report).map_err(rejection)
     };
-    let renderer = Arc::new(CpuRenderer { simd: Simd::detect() });
-    server.run(renderer, report.cancellation(), open).map_err(|error| match error {
+    server.run(Arc::new(renderer), report.cancellation(), open).map_err(|error| match error {
         Error::Cancelled => anyhow!(surfel_core::Error::Cancelled),
         error => anyhow!(error),
     })
