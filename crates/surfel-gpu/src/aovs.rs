@@ -1,6 +1,6 @@
 //! AOVs from the hits of a device.
 
-use crate::records::{FrameRecord, HitRecord, NONE, SURFACES};
+use crate::records::{FrameRecord, HitRecord, NONE, SURFACES, TRIANGLE};
 use surfel_core::flat::{FlatGeometry, FlatScene};
 use surfel_core::image::Aovs;
 use surfel_core::math::Vec3;
@@ -41,14 +41,16 @@ pub fn set_aovs(
         aovs.point_id[pixel] = point_id(scene, hit);
         aovs.instance_id[pixel] = hit.instance;
         aovs.albedo[pixel] = material.base_color * color;
-        aovs.support_count[pixel] = hit.support_count;
-        aovs.support_distance[pixel] = hit.support_distance;
+        if hit.surface != TRIANGLE {
+            aovs.support_count[pixel] = hit.support_count;
+            aovs.support_distance[pixel] = hit.support_distance;
+        }
     }
 }
 
 fn point_id(scene: &FlatScene, hit: &HitRecord) -> u32 {
     match scene.geometry(&scene.instances[hit.instance as usize]) {
         FlatGeometry::Cloud(cloud) => cloud.points_of(SURFACES[hit.surface as usize]).id(hit.slot),
-        FlatGeometry::Mesh(_) => NONE,
+        FlatGeometry::Mesh(mesh) => mesh.triangles.id(hit.slot),
     }
 }

@@ -41,6 +41,7 @@ pub mod shader;
 mod device;
 mod kernels;
 mod unsupported;
+mod mesh_blocks;
 mod upload;
 mod wavefront;
 mod passes;

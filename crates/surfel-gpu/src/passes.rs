@@ -1,17 +1,20 @@
 //! The passes that render a sample of each pixel, and the records that they read.
 
+use crate::mesh_blocks::{attributes, block_vectors};
 use crate::records::lens;
 use crate::records::light_kind;
 use crate::records::{
-    FrameRecord, LightSample, MAX_PLANES, MaterialRecord, NO_LIMIT, Visit, surface_number,
+    FrameRecord, LightSample, MAX_PLANES, MaterialRecord, NO_LIMIT, TRIANGLE, Visit, surface_number,
 };
 use crate::shader::{Kernel, Surface};
 use crate::unsupported::trees;
 use crate::wavefront::RECORD_STRIDE;
-use surfel_core::flat::{FlatCloud, FlatGeometry, FlatScene, Instance};
+use surfel_core::flat::{
+    FlatCloud, FlatGeometry, FlatMesh, FlatPunctualLight, FlatScene, Instance,
+};
 use surfel_core::math::{Affine3A, Mat3, Vec3, Vec3A};
 use surfel_core::render::Settings;
-use surfel_core::scene::{Background, Lens, Light, Material, Sky, View};
+use surfel_core::scene::{Background, Lens, Light, Material, PunctualLightKind, Sky, View};
 use surfel_core::surface::{EdgeTest, SurfaceKind};
 
 /// A tree that rays are traced against, as an instance shows it.
@@ -56,8 +59,10 @@ impl Passes {
         }
         passes.add(Kernel::Shade, None, 0);
         passes.add_background(scene);
-        for (light_idx, light) in scene.lights.iter().enumerate() {
-            let samples = light_samples(light_idx as u32, light, settings);
+        let lights = scene.lights.iter().map(|light| light_samples(light, settings));
+        let lamps = scene.punctual_lights.iter().enumerate();
+        let lamps = lamps.map(|(i, lamp)| lamp_samples(i as u32, lamp, settings));
+        for samples in lights.chain(lamps) {
             for sample in &samples {
                 let record = passes.add_record(bytemuck::bytes_of(sample));
                 passes.add(Kernel::SampleLight, None, record);
@@ -101,26 +106,36 @@ impl Passes {
         if !settings.with_aovs {
             return;
         }
-        let visit = |kernel: fn(Surface) -> Kernel| {
-            let pass = move |(tree, surface, record_offset): &(TreeRef, Surface, u32)| {
-                let (kernel, tree) = (kernel(*surface), Some(*tree));
-                Pass { kernel, tree, record_offset: *record_offset }
-            };
-            visits.iter().map(pass)
+        let pass = |kernel, (tree, _, record_offset): &(TreeRef, Surface, u32)| Pass {
+            kernel,
+            tree: Some(*tree),
+            record_offset: *record_offset,
         };
         if 1 < settings.samples_per_pixel {
             let generate = Pass { kernel: Kernel::Generate, tree: None, record_offset: 0 };
             self.aov_passes.push(generate);
-            self.aov_passes.extend(visit(Kernel::Closest));
+            let closest = visits.iter().map(|visit| pass(Kernel::Closest(visit.1), visit));
+            self.aov_passes.extend(closest);
         }
-        self.aov_passes.extend(visit(Kernel::Support));
+        let visits = visits.iter().filter(|(_, surface, _)| *surface != Surface::Triangle);
+        self.aov_passes.extend(visits.map(|visit| pass(Kernel::Support(visit.1), visit)));
     }
 
     /// Adds the records of all instances of trees, in the order of the instances.
     fn add_visits(&mut self, scene: &FlatScene) -> Vec<(TreeRef, Surface, u32)> {
         let mut visits = Vec::new();
         for (instance_idx, instance) in scene.instances.iter().enumerate() {
-            let FlatGeometry::Cloud(cloud) = scene.geometry(instance) else { continue };
+            let cloud = match scene.geometry(instance) {
+                FlatGeometry::Cloud(cloud) => cloud,
+                FlatGeometry::Mesh(mesh) => {
+                    let visit = mesh_visit(instance_idx as u32, instance, mesh);
+                    let record = self.add_record(bytemuck::bytes_of(&visit));
+                    let geometry_idx = instance.geometry_idx as usize;
+                    let tree = TreeRef { geometry_idx, tree_idx: 0 };
+                    visits.push((tree, Surface::Triangle, record));
+                    continue;
+                }
+            };
             for (tree_idx, (kind, points)) in trees(cloud).into_iter().enumerate() {
                 let Some(surface) = Surface::of_kind(kind) else { continue };
                 if points.nodes.is_empty() {
@@ -146,20 +161,34 @@ impl Passes {
 fn visit(instance_idx: u32, instance: &Instance, cloud: &FlatCloud, kind: SurfaceKind) -> Visit {
     let is_surface = kind == cloud.surface;
     Visit {
-        object_from_world: affine_columns(&instance.object_from_world),
-        world_from_normal: matrix_columns(&instance.world_from_normal),
-        instance: instance_idx,
-        material: instance.material_idx,
-        is_identity: instance.is_identity.into(),
         surface: surface_number(kind),
-        max_scale: instance.max_scale,
         max_blend_distance: if is_surface { cloud.max_blend_distance } else { 0.0 },
         edge_retest_factor: cloud.edge_retest_factor,
         has_edge_test: (cloud.edge_test == EdgeTest::AngularGap).into(),
         has_front_sides: cloud.has_front_sides.into(),
         blends_colors: cloud.blends_colors.into(),
-        reserved_a: 0,
-        reserved_b: 0,
+        ..placement(instance_idx, instance)
+    }
+}
+
+fn mesh_visit(instance_idx: u32, instance: &Instance, mesh: &FlatMesh) -> Visit {
+    Visit {
+        surface: TRIANGLE,
+        block_vectors: block_vectors(mesh),
+        attributes: attributes(mesh),
+        ..placement(instance_idx, instance)
+    }
+}
+
+fn placement(instance_idx: u32, instance: &Instance) -> Visit {
+    Visit {
+        object_from_world: affine_columns(&instance.object_from_world),
+        world_from_normal: matrix_columns(&instance.world_from_normal),
+        instance: instance_idx,
+        material: instance.material_idx,
+        is_identity: instance.is_identity.into(),
+        max_scale: instance.max_scale,
+        ..bytemuck::Zeroable::zeroed()
     }
 }
 
@@ -174,9 +203,9 @@ fn matrix_columns(matrix: &Mat3) -> [[f32; 4]; 3] {
 }
 
 /// Returns the records of the samples of a light at each hit.
-fn light_samples(light_idx: u32, light: &Light, settings: &Settings) -> Vec<LightSample> {
-    let n_light_samples = settings.light_samples.div_ceil(settings.samples_per_pixel);
-    let none = LightSample { light: light_idx, n_samples: 1, ..bytemuck::Zeroable::zeroed() };
+fn light_samples(light: &Light, settings: &Settings) -> Vec<LightSample> {
+    let n_light_samples = n_light_samples(settings);
+    let none = LightSample { n_samples: 1, ..bytemuck::Zeroable::zeroed() };
     let sample = match light {
         Light::Sun(sun) => {
             let is_point = sun.angular_diameter_deg <= 0.0;
@@ -189,15 +218,48 @@ fn light_samples(light_idx: u32, light: &Light, settings: &Settings) -> Vec<Ligh
                 ..none
             }
         }
-        Light::Sky(sky) => {
-            LightSample { n_samples: n_light_samples, light: light_idx, ..sky_record(sky) }
-        }
+        Light::Sky(sky) => LightSample { n_samples: n_light_samples, ..sky_record(sky) },
         Light::Headlight(strength) => {
             LightSample { kind: light_kind::HEADLIGHT, color: [*strength; 3], ..none }
         }
         Light::Environment(_) => return Vec::new(),
     };
+    repeated(sample)
+}
+
+fn n_light_samples(settings: &Settings) -> u32 {
+    settings.light_samples.div_ceil(settings.samples_per_pixel)
+}
+
+fn repeated(sample: LightSample) -> Vec<LightSample> {
     (0..sample.n_samples).map(|sample_idx| LightSample { sample_idx, ..sample }).collect()
+}
+
+/// Returns the records of the samples of a lamp at each hit. A directional one is a sun without extent.
+fn lamp_samples(lamp_idx: u32, lamp: &FlatPunctualLight, settings: &Settings) -> Vec<LightSample> {
+    let is_directional = lamp.kind == PunctualLightKind::Directional;
+    let is_point = lamp.radius <= 0.0 || is_directional;
+    let (kind, cosines) = match lamp.kind {
+        PunctualLightKind::Directional => (light_kind::POINT_SUN, (0.0, 0.0)),
+        PunctualLightKind::Point => (light_kind::POINT, (0.0, 0.0)),
+        PunctualLightKind::Spot { inner_rad, outer_rad } => {
+            (light_kind::SPOT, (inner_rad.cos(), outer_rad.cos()))
+        }
+    };
+    let direction = if is_directional { -lamp.direction } else { lamp.direction };
+    repeated(LightSample {
+        direction: direction.to_array(),
+        kind,
+        color: lamp.color.to_array(),
+        n_samples: if is_point { 1 } else { n_light_samples(settings) },
+        light: lamp_idx,
+        range: lamp.range.min(NO_LIMIT),
+        position: lamp.position.to_array(),
+        radius: lamp.radius,
+        inner_cos: cosines.0,
+        outer_cos: cosines.1,
+        ..bytemuck::Zeroable::zeroed()
+    })
 }
 
 fn sky_record(sky: &Sky) -> LightSample {

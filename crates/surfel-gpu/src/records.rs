@@ -82,21 +82,21 @@ pub struct Visit {
     pub has_front_sides: u32,
     /// 1 if colours may be blended.
     pub blends_colors: u32,
-    /// Zero.
-    pub reserved_a: u32,
-    /// Zero.
-    pub reserved_b: u32,
+    /// Vectors of four words that a block of triangles takes with the attributes of its vertices.
+    pub block_vectors: u32,
+    /// 1 if triangles have the normals of their vertices, 2 if they have colours, 3 for both.
+    pub attributes: u32,
 }
 
 /// One of the samples of a light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct LightSample {
-    /// Unit vector toward the sun, or toward a sky's zenith.
+    /// Unit vector toward the sun or a sky's zenith, or in which a spot shines.
     pub direction: [f32; 3],
     /// Number of the [`light_kind`].
     pub kind: u32,
-    /// Linear colour of a sun or a headlight, or radiance from a sky's zenith.
+    /// Linear colour of a sun, a headlight or a lamp, or radiance from a sky's zenith.
     pub color: [f32; 3],
     /// Cosine of half the sun's angular diameter.
     pub cos_max: f32,
@@ -108,10 +108,22 @@ pub struct LightSample {
     pub sample_idx: u32,
     /// Number of samples of the light at a hit.
     pub n_samples: u32,
-    /// Index of the light.
+    /// Index of a lamp.
     pub light: u32,
+    /// Distance that a lamp reaches.
+    pub range: f32,
+    /// Position of a lamp.
+    pub position: [f32; 3],
+    /// Radius of a lamp's luminous ball.
+    pub radius: f32,
+    /// Cosine of the angle from a spot's axis up to which the light has full strength.
+    pub inner_cos: f32,
+    /// Cosine of the angle from a spot's axis beyond which there is no light.
+    pub outer_cos: f32,
     /// Zero.
     pub reserved_a: u32,
+    /// Zero.
+    pub reserved_b: u32,
 }
 
 /// A material.
@@ -146,9 +158,13 @@ pub struct HitRecord {
     pub distance: f32,
     /// Linear colour.
     pub color: [f32; 3],
-    /// Radius of the point in world units.
+    /// Radius of the point in world units; 0 for triangles.
     pub radius: f32,
-    /// Slot of the point in its tree.
+    /// Unit normal of the surface itself, which differs from the shading normal on triangles.
+    pub geometric_normal: [f32; 3],
+    /// Zero.
+    pub reserved_c: f32,
+    /// Slot of the point or triangle in its tree.
     pub slot: u32,
     /// Index of the instance, [`NONE`] for a miss.
     pub instance: u32,
@@ -210,6 +226,10 @@ pub mod light_kind {
     pub const SKY: u32 = 2;
     /// A light at the camera.
     pub const HEADLIGHT: u32 = 3;
+    /// A lamp that shines to all sides.
+    pub const POINT: u32 = 4;
+    /// A lamp that shines in a cone.
+    pub const SPOT: u32 = 5;
 }
 
 /// Indices of the numbers of rays.
@@ -235,6 +255,9 @@ pub const SURFACES: [SurfaceKind; 8] = [
     SurfaceKind::Smooth,
     SurfaceKind::Capsule,
 ];
+
+/// The number that stands for triangles beside those of surface kinds.
+pub const TRIANGLE: u32 = SURFACES.len() as u32;
 
 /// Returns the number that stands for a surface kind in the kernels.
 pub fn surface_number(kind: SurfaceKind) -> u32 {

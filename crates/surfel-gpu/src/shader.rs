@@ -3,7 +3,7 @@
 use crate::records::lens;
 use crate::records::light_kind;
 use crate::records::ray_kind;
-use crate::records::{MAX_PLANES, surface_number};
+use crate::records::{MAX_PLANES, TRIANGLE, surface_number};
 use std::fmt::Write;
 use surfel_core::bvh::MAX_DEPTH;
 use surfel_core::integrator::constants as integrator;
@@ -56,11 +56,14 @@ pub enum Surface {
     Splat,
     /// The smooth surface.
     Smooth,
+    /// Triangles.
+    Triangle,
 }
 
 impl Surface {
     /// Every surface.
-    pub const ALL: [Self; 5] = [Self::Sphere, Self::Capsule, Self::Disc, Self::Splat, Self::Smooth];
+    pub const ALL: [Self; 6] =
+        [Self::Sphere, Self::Capsule, Self::Disc, Self::Splat, Self::Smooth, Self::Triangle];
 
     /// Returns the surface by which a kind is traced, or none if no kernel traces it.
     pub fn of_kind(kind: SurfaceKind) -> Option<Self> {
@@ -110,7 +113,14 @@ const REGION: &[&str] = parts!["trace/region.wgsl"];
 const SUPPORT: &[&str] = parts!["trace/support_kernel.wgsl"];
 const CLOSEST: &[&str] = parts!["trace/query/closest.wgsl"];
 const CLOSEST_KERNEL: &[&str] = parts!["trace/closest_kernel.wgsl"];
-const ANY: &[&str] = parts!["trace/query/any.wgsl", "trace/any_kernel.wgsl"];
+const ANY: &[&str] = parts!["trace/query/any.wgsl"];
+const ANY_KERNEL: &[&str] = parts!["trace/any_kernel.wgsl"];
+const TRIANGLES: &[&str] = parts![
+    "math/basis.wgsl",
+    "surface/triangle.wgsl",
+    "flat/triangles.wgsl",
+    "trace/query/triangles.wgsl",
+];
 const EDGE: &[&str] =
     parts!["math/basis.wgsl", "surface/edge_test.wgsl", "trace/query/edge_test.wgsl",];
 const SOLIDS: &[&str] = parts!["trace/query/solids.wgsl"];
@@ -140,7 +150,8 @@ impl Kernel {
         ];
         all.extend(Surface::ALL.map(Self::Closest));
         all.extend(Surface::ALL.map(Self::Any));
-        all.extend(Surface::ALL.map(Self::Support));
+        let of_points = Surface::ALL.into_iter().filter(|surface| *surface != Surface::Triangle);
+        all.extend(of_points.map(Self::Support));
         all
     }
 
@@ -170,7 +181,6 @@ impl Kernel {
         if let Self::Closest(surface) | Self::Any(surface) | Self::Support(surface) = self {
             let has_colors = matches!(self, Self::Closest(_));
             _ = writeln!(source, "const SHAPE: u32 = {}u;", surface_number(surface.shape()));
-            _ = writeln!(source, "const RADIUS_FACTOR: f32 = 1.0;");
             _ = writeln!(source, "const HAS_COLORS: bool = {has_colors};");
         }
         self.parts().iter().copied().flatten().for_each(|part| source.push_str(part));
@@ -190,17 +200,19 @@ impl Kernel {
                     Surface::Sphere | Surface::Capsule => &[CLOSEST, SOLIDS],
                     Surface::Disc => &[CLOSEST, REGION, EDGE, DISCS],
                     Surface::Splat => &[REGION, EDGE, SPLATS],
+                    Surface::Triangle => &[TRIANGLES],
                     Surface::Smooth => &[CLOSEST, REGION, EDGE, SMOOTH, SMOOTH_SURFACE],
                 });
                 parts
             }
             Self::Support(_) => vec![COMMON, TREE, REGION, SUPPORT],
             Self::Any(surface) => {
-                let mut parts = vec![COMMON, TREE, TRAVERSE, ANY];
+                let mut parts = vec![COMMON, TREE, TRAVERSE, ANY_KERNEL];
                 parts.extend_from_slice(match surface {
-                    Surface::Sphere | Surface::Capsule => &[ACCEPT_ALL],
-                    Surface::Disc | Surface::Splat => &[REGION, EDGE, EDGE_FILTER],
-                    Surface::Smooth => &[REGION, EDGE, SMOOTH, SMOOTH_FILTER],
+                    Surface::Sphere | Surface::Capsule => &[ANY, ACCEPT_ALL],
+                    Surface::Triangle => &[TRIANGLES],
+                    Surface::Disc | Surface::Splat => &[ANY, REGION, EDGE, EDGE_FILTER],
+                    Surface::Smooth => &[ANY, REGION, EDGE, SMOOTH, SMOOTH_FILTER],
                 });
                 parts
             }
@@ -232,6 +244,10 @@ fn constants() -> String {
         ("SUN", light_kind::SUN),
         ("SKY", light_kind::SKY),
         ("HEADLIGHT", light_kind::HEADLIGHT),
+        ("POINT", light_kind::POINT),
+        ("SPOT", light_kind::SPOT),
+        ("TRIANGLE", TRIANGLE),
+        ("PUNCTUAL_LIGHT_POSITION", integrator::PUNCTUAL_LIGHT_POSITION as u32),
         ("PRIMARY_RAYS", ray_kind::PRIMARY as u32),
         ("SHADOW_RAYS", ray_kind::SHADOW as u32),
         ("SKY_RAYS", ray_kind::SKY as u32),
@@ -372,8 +388,8 @@ mod tests {
                 has_edge_test,
                 has_front_sides,
                 blends_colors,
-                reserved_a,
-                reserved_b
+                block_vectors,
+                attributes
             }),
             rust_layout!(LightSample {
                 direction,
@@ -385,7 +401,13 @@ mod tests {
                 sample_idx,
                 n_samples,
                 light,
-                reserved_a
+                range,
+                position,
+                radius,
+                inner_cos,
+                outer_cos,
+                reserved_a,
+                reserved_b
             }),
             rust_layout!(MaterialRecord {
                 base_color,
@@ -402,6 +424,8 @@ mod tests {
                 distance,
                 color,
                 radius,
+                geometric_normal,
+                reserved_c,
                 slot,
                 instance,
                 material,

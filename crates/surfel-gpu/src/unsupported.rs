@@ -3,7 +3,7 @@
 use crate::records::MAX_PLANES;
 use crate::shader::Surface;
 use surfel_core::flat::{FlatCloud, FlatGeometry, FlatScene};
-use surfel_core::scene::{AlphaMode, Light, Material};
+use surfel_core::scene::{AlphaMode, Light, Material, MaterialTextures};
 use surfel_core::surface::SurfaceKind;
 
 /// Maximum number of instances: each is a pass over all rays.
@@ -19,7 +19,7 @@ pub fn unsupported(scene: &FlatScene) -> Vec<String> {
     };
     for instance in &scene.instances {
         match scene.geometry(instance) {
-            FlatGeometry::Mesh(_) => add(true, "triangles".into()),
+            FlatGeometry::Mesh(_) => {}
             FlatGeometry::Cloud(cloud) => {
                 let kind = cloud.surface;
                 add(Surface::of_kind(kind).is_none(), format!("the surface {}", kind.name()));
@@ -29,13 +29,13 @@ pub fn unsupported(scene: &FlatScene) -> Vec<String> {
         let material = &scene.materials[instance.material_idx as usize];
         add(is_specular(material), "materials that reflect or transmit".into());
         add(material.alpha_mode != AlphaMode::Opaque, "alpha".into());
+        add(material.textures != MaterialTextures::default(), "textures".into());
     }
     let n_instances = scene.instances.len();
     add(MAX_INSTANCES < n_instances, format!("more than {MAX_INSTANCES} instances"));
     for light in &scene.lights {
         add(matches!(light, Light::Environment(_)), "environment maps".into());
     }
-    add(!scene.punctual_lights.is_empty(), "lamps".into());
     add(MAX_PLANES < scene.camera_planes.len(), format!("more than {MAX_PLANES} planes"));
     found
 }

@@ -3,10 +3,11 @@
 use crate::device::Gpu;
 use crate::error::{Error, Result};
 use crate::kernels::{Kernels, bind};
+use crate::mesh_blocks::mesh_blocks;
 use crate::unsupported::trees;
 use std::sync::{Arc, Weak};
 use surfel_core::bvh::BvhNode;
-use surfel_core::flat::{FlatGeometry, FlatPoints, PointBlock};
+use surfel_core::flat::FlatGeometry;
 
 /// Bytes of a node in the device's memory: five times sixteen, so that it is read in vectors of four words.
 const NODE_BYTES: usize = 80;
@@ -63,21 +64,34 @@ impl Uploads {
 }
 
 fn upload(gpu: &Gpu, kernels: &Kernels, geometry: &FlatGeometry) -> Result<GpuGeometry> {
-    let FlatGeometry::Cloud(cloud) = geometry else { return Ok([None, None, None]) };
-    let [surface, lines, scatter] =
-        trees(cloud).map(|(_, points)| upload_tree(gpu, kernels, points));
+    let cloud = match geometry {
+        FlatGeometry::Cloud(cloud) => cloud,
+        FlatGeometry::Mesh(mesh) => {
+            let blocks = mesh_blocks(mesh);
+            let tree =
+                upload_tree(gpu, kernels, &mesh.triangles.nodes, bytemuck::cast_slice(&blocks));
+            return Ok([tree?, None, None]);
+        }
+    };
+    let [surface, lines, scatter] = trees(cloud).map(|(_, points)| {
+        upload_tree(gpu, kernels, &points.nodes, bytemuck::cast_slice(&points.blocks))
+    });
     Ok([surface?, lines?, scatter?])
 }
 
-fn upload_tree(gpu: &Gpu, kernels: &Kernels, points: &FlatPoints) -> Result<Option<GpuTree>> {
-    if points.nodes.is_empty() {
+fn upload_tree(
+    gpu: &Gpu,
+    kernels: &Kernels,
+    tree_nodes: &[BvhNode],
+    tree_blocks: &[u8],
+) -> Result<Option<GpuTree>> {
+    if tree_nodes.is_empty() {
         return Ok(None);
     }
-    let nodes = array(gpu, "nodes", points.nodes.len() * NODE_BYTES)?;
-    let blocks = array(gpu, "blocks", size_of_val(points.blocks.as_slice()))?;
-    write_padded(gpu, &nodes, &points.nodes)?;
-    let bytes: &[u8] = bytemuck::cast_slice::<PointBlock, u8>(&points.blocks);
-    write(gpu, &blocks, bytes)?;
+    let nodes = array(gpu, "nodes", tree_nodes.len() * NODE_BYTES)?;
+    let blocks = array(gpu, "blocks", tree_blocks.len())?;
+    write_padded(gpu, &nodes, tree_nodes)?;
+    write(gpu, &blocks, tree_blocks)?;
     let buffers = [nodes.as_entire_binding(), blocks.as_entire_binding()];
     let arrays = gpu.catch("a tree", || bind(gpu, &kernels.tree, &buffers))?;
     Ok(Some(GpuTree { arrays }))
@@ -86,7 +100,7 @@ fn upload_tree(gpu: &Gpu, kernels: &Kernels, points: &FlatPoints) -> Result<Opti
 fn array(gpu: &Gpu, label: &'static str, n_bytes: usize) -> Result<wgpu::Buffer> {
     let (needed, found) = (n_bytes as u64, gpu.info.max_array_bytes);
     if found < needed {
-        let limit = "bytes in one array of points";
+        let limit = "bytes in one array";
         return Err(Error::Limit { device: gpu.info.name.clone(), limit, found, needed });
     }
     gpu.buffer(label, needed, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)

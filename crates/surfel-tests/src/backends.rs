@@ -53,8 +53,9 @@ impl Difference {
         assert_eq!((a.width, a.height), (b.width, b.height));
         let n_pixels = a.color.len() as f32;
         let pairs = || a.color.iter().zip(&b.color);
-        let is_other = |(a, b): &(&[f32; 4], &[f32; 4])| {
-            a.iter().zip(*b).any(|(a, b)| !((a - b).abs() <= TOLERANCE.rounding))
+        // NaN is not equal to anything.
+        let is_equal = |(a, b): (&[f32; 4], &[f32; 4])| {
+            a.iter().zip(b).all(|(a, b)| (a - b).abs() <= TOLERANCE.rounding)
         };
         let channels = |pixel: &[f32; 4]| f64::from(pixel.iter().sum::<f32>());
         let sum: f64 = pairs().map(|(a, b)| channels(a) - channels(b)).sum();
@@ -68,7 +69,7 @@ impl Difference {
         };
         Self {
             other_points: n_other_points as f32 / n_pixels,
-            other_pixels: pairs().filter(is_other).count() as f32 / n_pixels,
+            other_pixels: pairs().filter(|pair| !is_equal(*pair)).count() as f32 / n_pixels,
             mean: (sum / f64::from(4.0 * n_pixels)).abs() as f32,
         }
     }

@@ -23,5 +23,7 @@ pub use smooth::{
     edge_retest_factor,
 };
 pub use sphere::Sphere;
-pub use splat::{MAX_GATHERED, SplatAccumulator, Surfel, fit_plane_normal, gather_limit};
+pub use splat::{
+    MAX_GATHERED, MIN_PLANE_RATIO, SplatAccumulator, Surfel, fit_plane_normal, gather_limit,
+};
 pub use triangle::{RayFrame, RayRelativeTriangles, Triangle, TriangleLanes};

@@ -38,8 +38,8 @@ struct Visit {
     has_edge_test: u32,
     has_front_sides: u32,
     blends_colors: u32,
-    reserved_a: u32,
-    reserved_b: u32,
+    block_vectors: u32,
+    attributes: u32,
 }
 
 // One of the samples of a light.
@@ -53,7 +53,13 @@ struct LightSample {
     sample_idx: u32,
     n_samples: u32,
     light: u32,
+    range: f32,
+    position: vec3<f32>,
+    radius: f32,
+    inner_cos: f32,
+    outer_cos: f32,
     reserved_a: u32,
+    reserved_b: u32,
 }
 
 struct MaterialRecord {
@@ -73,6 +79,8 @@ struct HitRecord {
     distance: f32,
     color: vec3<f32>,
     radius: f32,
+    geometric_normal: vec3<f32>,
+    reserved_c: f32,
     slot: u32,
     instance: u32,
     material: u32,

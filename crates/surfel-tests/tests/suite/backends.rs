@@ -7,12 +7,13 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use surfel_core::Error;
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
-use surfel_core::math::{DAffine3, DVec3, Vec3};
+use surfel_core::math::{DAffine3, DQuat, DVec3, Vec3};
 use surfel_core::points::{Preparation, StructureChoice};
 use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::render::{RenderRegion, Renderer, Settings};
 use surfel_core::scene::{
-    Background, Camera, ClipPlane, Geometry, Light, Material, Projection, Scene,
+    Background, Camera, ClipPlane, Geometry, Graph, Light, Material, Node, Projection,
+    PunctualLight, PunctualLightKind, Scene, Transform,
 };
 use surfel_core::surface::{EdgeTest, SurfaceKind};
 use surfel_formats::{ImageOptions, save_image};
@@ -170,6 +171,48 @@ fn materials_and_backgrounds_are_equal() {
         scene.background = background;
         scene.lights.push(Light::Headlight(0.3));
         check(name, &flat(&scene), &SETTINGS);
+    }
+}
+
+#[test]
+fn triangles_are_equal() {
+    let ball = scenes::uv_sphere(12, 24, 0.8);
+    let mut painted = scenes::cuboid(Vec3::new(-1.5, -2.0, -1.0), Vec3::new(-0.5, -1.0, 1.2));
+    let color = |p: &Vec3| (0.3 * p.abs()).extend(1.0);
+    painted.colors = Some(painted.positions.iter().map(color).collect());
+    let floor = scenes::floor(-1.0, 4.0);
+    let mut scene = reference::scene(SurfaceKind::Splat);
+    for mesh in [ball, painted, floor] {
+        scene.graph.append(Graph::from_geometry(Geometry::Triangles(mesh), Material::MATTE));
+    }
+    let turned = DAffine3::from_axis_angle(DVec3::X, 0.7);
+    let moved = DAffine3::from_translation(DVec3::new(1.6, -1.0, 0.5)) * turned;
+    scene.graph.nodes[1].transform = Transform::Matrix(moved);
+    check("triangles", &flat(&scene), &SETTINGS);
+}
+
+#[test]
+fn lamps_are_equal() {
+    let kinds = [
+        ("directional", PunctualLightKind::Directional),
+        ("point", PunctualLightKind::Point),
+        ("spot", PunctualLightKind::Spot { inner_rad: 0.2, outer_rad: 0.5 }),
+    ];
+    for (name, kind) in kinds {
+        for radius in [0.0, 0.3] {
+            let mut scene = reference::scene(SurfaceKind::Splat);
+            let color = Vec3::new(60.0, 50.0, 40.0);
+            let light = PunctualLight { kind, color, range: 20.0, radius };
+            let position = DVec3::new(3.0, -2.0, 3.5);
+            let toward_ball = (DVec3::Z - position).normalize();
+            let turned = DQuat::from_rotation_arc(DVec3::NEG_Z, toward_ball);
+            let placed = DAffine3::from_rotation_translation(turned, position);
+            let transform = Transform::Matrix(placed);
+            let lamp = Node { light: Some(light), transform, ..Node::new("lamp") };
+            scene.graph.nodes.push(lamp);
+            scene.lights.clear();
+            check(name, &flat(&scene), &SETTINGS);
+        }
     }
 }
 

@@ -61,6 +61,9 @@ fn sampled_ray(shading: Shading, key: vec2<u32>) -> ShadowRay {
         ray.t_max = min(light.ao_distance * end, NO_LIMIT);
         return ShadowRay(ray, weight * sky_radiance(light, direction) * shading.base_color, 1u);
     }
+    if light.kind == POINT || light.kind == SPOT {
+        return lamp_ray(shading, key, sample_idx);
+    }
     var direction = light.direction;
     if light.kind == SUN {
         let uv = owen_sobol_2d(sample_idx, hash(key ^ vec2<u32>(SUN_DIRECTION, 0u)));
@@ -68,4 +71,27 @@ fn sampled_ray(shading: Shading, key: vec2<u32>) -> ShadowRay {
     }
     let cos = max(dot(shading.normal, direction), 0.0);
     return ShadowRay(spawn(shading, direction), weight * cos * shading.base_color * light.color, 1u);
+}
+
+// Returns a ray toward a position on a lamp; it contributes nothing where the lamp does not reach.
+fn lamp_ray(shading: Shading, key: vec2<u32>, sample_idx: u32) -> ShadowRay {
+    var lamp = light.position;
+    if 0.0 < light.radius {
+        // The visible half of the ball appears as a disc that faces the shading point.
+        let dimension = hash(vec2<u32>(PUNCTUAL_LIGHT_POSITION ^ (light.light << 8u), light.light >> 24u));
+        let on_disk = disk(owen_sobol_2d(sample_idx, hash(key ^ dimension)));
+        let toward = shading.position - lamp;
+        let squared = dot(toward, toward);
+        let axis = select(vec3<f32>(0.0, 0.0, 1.0), toward / sqrt(max(squared, 1e-30)), 1e-30 < squared);
+        let basis = basis_around(axis);
+        lamp += light.radius * (on_disk.x * basis.tangent + on_disk.y * basis.bitangent);
+    }
+    let offset = lamp - shading.position;
+    let distance = length(offset);
+    let direction = offset / max(distance, 1e-30);
+    let strength = lamp_falloff(light, -direction, distance) / f32(light.n_samples);
+    let cos = max(dot(shading.normal, direction), 0.0);
+    var ray = spawn(shading, direction);
+    ray.t_max = distance - min(light.radius, 0.5 * distance);
+    return ShadowRay(ray, strength * cos * shading.base_color * light.color, 1u);
 }

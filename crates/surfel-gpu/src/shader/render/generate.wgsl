@@ -12,7 +12,7 @@ fn generate(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let none = vec3<f32>(0.0);
     rays[ray_idx] = camera_ray(vec2<f32>(pixel_of(ray_idx)) + offset);
-    hits[ray_idx] = HitRecord(none, NO_LIMIT, none, 0.0, NONE, NONE, 0u, 0u, 0u, 0.0, 0u, 0u);
+    hits[ray_idx] = HitRecord(none, NO_LIMIT, none, 0.0, none, 0.0, NONE, NONE, 0u, 0u, 0u, 0.0, 0u, 0u);
     var sum = pixels[ray_idx].sum;
     if frame.is_first == 1u {
         sum = vec4<f32>(0.0);

@@ -23,15 +23,16 @@ fn closest(@builtin(global_invocation_id) id: vec3<u32>) {
     if !found.is_hit || !is_nearer {
         return;
     }
-    var normal = found.normal;
-    if visit.is_identity == 0u {
-        normal = normalize(visit.world_from_normal * normal);
-    }
+    let normal = world_normal(found.normal);
+    let geometric_normal = world_normal(found.geometric_normal);
     hits[ray_idx] = HitRecord(
-        normal,
+        // Some programs write normals against the winding order.
+        select(normal, -normal, dot(normal, geometric_normal) < 0.0),
         distance,
         found.color,
         found.radius * visit.max_scale,
+        geometric_normal,
+        0.0,
         found.slot,
         visit.instance,
         visit.material,
@@ -41,4 +42,11 @@ fn closest(@builtin(global_invocation_id) id: vec3<u32>) {
         0u,
         0u,
     );
+}
+
+fn world_normal(normal: vec3<f32>) -> vec3<f32> {
+    if visit.is_identity == 1u {
+        return normal;
+    }
+    return normalize(visit.world_from_normal * normal);
 }

@@ -21,7 +21,7 @@ fn support(@builtin(global_invocation_id) id: vec3<u32>) {
     let point = block_point(load_block(hit.slot >> 3u), hit.slot & 7u, vec3<f32>(0.0));
     support_position = ray_at(ray, hit.distance * scale);
     let to_center = point.center - support_position;
-    let radius = point.radius / RADIUS_FACTOR;
+    let radius = point.radius;
     if SHAPE != DISC {
         let across = to_center - dot(to_center, ray.direction) * ray.direction;
         hits[ray_idx].support_count = 1u;

@@ -8,11 +8,18 @@ struct SurfaceHit {
     slot: u32,
     radius: f32,
     normal: vec3<f32>,
+    geometric_normal: vec3<f32>,
     color: vec3<f32>,
 }
 
 fn missed_surface() -> SurfaceHit {
-    return SurfaceHit(false, NO_LIMIT, NONE, 0.0, vec3<f32>(0.0), vec3<f32>(0.0));
+    let none = vec3<f32>(0.0);
+    return SurfaceHit(false, NO_LIMIT, NONE, 0.0, none, none, none);
+}
+
+// Returns a hit on points, whose shading normal is that of their surface.
+fn point_hit(distance: f32, slot: u32, radius: f32, normal: vec3<f32>, color: vec3<f32>) -> SurfaceHit {
+    return SurfaceHit(true, distance, slot, radius, normal, normal, color);
 }
 
 // Returns the factor by which distances along a ray grow from the world to the object.

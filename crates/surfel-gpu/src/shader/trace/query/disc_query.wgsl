@@ -7,7 +7,7 @@ fn splat(ray: Ray) -> SurfaceHit {
     }
     let surfel = slot_surfel(nearest.slot);
     let normal = facing(surfel.normal, ray.direction);
-    return SurfaceHit(true, nearest.distance, nearest.slot, surfel.radius, normal, surfel.color);
+    return point_hit(nearest.distance, nearest.slot, surfel.radius, normal, surfel.color);
 }
 
 // Returns the number of the discs that make the hit.

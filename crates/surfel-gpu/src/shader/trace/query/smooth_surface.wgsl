@@ -18,7 +18,7 @@ fn surface_hit(whole_ray: Ray) -> SurfaceHit {
         if found.is_hit {
             let of_nearest = slot_surfel(nearest_slot);
             let color = mean_color(colors, of_nearest.color);
-            hit = SurfaceHit(true, found.distance, nearest_slot, disc.radius, found.normal, color);
+            hit = point_hit(found.distance, nearest_slot, disc.radius, found.normal, color);
             hit_is_backface = 0.0 < dot(of_nearest.normal, ray.direction);
             break;
         }
@@ -35,7 +35,7 @@ fn surface_hit(whole_ray: Ray) -> SurfaceHit {
     let disc = slot_surfel(passed.slot);
     if is_through_slit(disc, passed.distance, hit.distance, hit_is_backface, whole_ray) {
         let normal = facing(disc.normal, whole_ray.direction);
-        return SurfaceHit(true, passed.distance, passed.slot, disc.radius, normal, disc.color);
+        return point_hit(passed.distance, passed.slot, disc.radius, normal, disc.color);
     }
     return hit;
 }

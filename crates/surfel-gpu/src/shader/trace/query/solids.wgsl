@@ -14,5 +14,5 @@ fn surface_hit(ray: Ray) -> SurfaceHit {
     let squared = dot(outward, outward);
     outward = select(-ray.direction, outward * inverseSqrt(max(squared, 1e-37)), 1e-37 < squared);
     let normal = select(-outward, outward, dot(outward, ray.direction) < 0.0);
-    return SurfaceHit(true, nearest.distance, nearest.slot, surfel.radius, normal, surfel.color);
+    return point_hit(nearest.distance, nearest.slot, surfel.radius, normal, surfel.color);
 }

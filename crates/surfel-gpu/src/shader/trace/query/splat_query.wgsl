@@ -13,11 +13,9 @@ fn splat(ray: Ray) -> SurfaceHit {
         sums = with_disc(sums, surfel, offset);
     }
     let normal = splat_normal(sums, ray.direction);
-    return SurfaceHit(
-        true,
-        gathered_distances[0],
+    return point_hit(gathered_distances[0],
         gathered_slots[0],
-        nearest.radius / RADIUS_FACTOR,
+        nearest.radius,
         normal,
         sums.color / sums.total_weight,
     );
