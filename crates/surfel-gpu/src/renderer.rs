@@ -33,9 +33,12 @@ struct State {
 }
 
 /// Number of rays of the first part of a picture.
-const FIRST_PART: u32 = 1 << 14;
+const FIRST_PART: u32 = 1 << 12;
 /// Maximum number of rays of a part: it bounds the memory, 240 bytes a ray.
 const MAX_PART: u32 = 1 << 20;
+/// Number of passes that the device is given at once. Between them work can be cancelled, and the wait for them is far
+/// shorter than its limit, also on slow devices and with many light samples.
+const PASSES_AT_ONCE: usize = 16;
 /// Time of a sample of a part above which the next part is smaller, and well below which it is larger. A device that
 /// also draws a screen must not be busy for long, and work is cancelled between samples.
 const MAX_SAMPLE_TIME: Duration = Duration::from_millis(200);
@@ -152,14 +155,13 @@ impl Job<'_> {
     ) -> surfel_core::Result<Duration> {
         let mut slowest = Duration::ZERO;
         for sample_idx in self.region.samples.0..self.region.samples.1 {
-            progress.check()?;
             let start = Instant::now();
             let is_first = (sample_idx == self.region.samples.0).into();
             wavefront.set_frame(self.gpu, &FrameRecord { sample_idx, is_first, ..frame });
-            self.gpu.catch("the passes", || {
-                self.submit(wavefront, &self.passes.passes, frame.n_rays)
-            })?;
-            self.gpu.wait()?;
+            for passes in self.passes.passes.chunks(PASSES_AT_ONCE) {
+                progress.check()?;
+                self.run(wavefront, passes, frame.n_rays)?;
+            }
             slowest = slowest.max(start.elapsed());
         }
         Ok(slowest)
@@ -168,9 +170,16 @@ impl Job<'_> {
     /// Returns the hits of the rays through the centres of the pixels of a part.
     fn find_aov_hits(&self, wavefront: &Wavefront, frame: FrameRecord) -> Result<Vec<HitRecord>> {
         wavefront.set_frame(self.gpu, &frame);
-        let passes = &self.passes.aov_passes;
-        self.gpu.catch("the passes", || self.submit(wavefront, passes, frame.n_rays))?;
+        for passes in self.passes.aov_passes.chunks(PASSES_AT_ONCE) {
+            self.run(wavefront, passes, frame.n_rays)?;
+        }
         wavefront.read_hits(self.gpu, frame.n_rays)
+    }
+
+    /// Runs passes and waits for them.
+    fn run(&self, wavefront: &Wavefront, passes: &[Pass], n_rays: u32) -> Result<()> {
+        self.gpu.catch("the passes", || self.submit(wavefront, passes, n_rays))?;
+        self.gpu.wait()
     }
 
     fn submit(&self, wavefront: &Wavefront, passes: &[Pass], n_rays: u32) {
@@ -234,9 +243,48 @@ fn next_part(part: u32, slowest: Duration) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    //! Parts grow while they are fast and shrink while they are slow.
+    //! Parts grow while they are fast and shrink while they are slow; a lost device is an error.
 
     use super::*;
+    use surfel_core::Error as CoreError;
+    use surfel_core::math::DVec3;
+    use surfel_core::progress::NoProgress;
+    use surfel_core::scene::{Background, Camera, Graph, Projection, Scene};
+
+    fn empty() -> FlatScene {
+        let camera = Camera {
+            position: DVec3::ZERO,
+            focal_point: DVec3::Y,
+            view_up: DVec3::Z,
+            projection: Projection::Panorama,
+        };
+        let (graph, background) = (Graph::default(), Background::Transparent);
+        let scene = Scene { graph, lights: Vec::new(), background, camera };
+        FlatScene::new(&scene, &NoProgress).unwrap()
+    }
+
+    #[test]
+    fn a_device_that_is_lost_is_an_error_for_ever() {
+        let renderer = match GpuRenderer::open(None) {
+            Ok(renderer) => renderer,
+            Err(error) => {
+                #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
+                {
+                    println!("skipped: {error}");
+                }
+                return;
+            }
+        };
+        let (scene, settings) = (empty(), Settings { width: 8, height: 4, ..Settings::default() });
+        let render = || renderer.render(&scene, &settings, &NoProgress);
+        assert!(render().is_ok());
+        renderer.gpu.device.destroy();
+        for _ in 0..2 {
+            let error = render().unwrap_err();
+            let CoreError::Renderer(reason) = &error else { panic!("{error}") };
+            assert!(reason.starts_with(&renderer.device().name), "{reason}");
+        }
+    }
 
     #[test]
     fn parts_follow_the_speed_of_the_device() {
