@@ -102,7 +102,10 @@ impl SceneRenderer {
                 progress.note(&format!("on the CPU: {reason}"));
                 None
             }
-            result => Some(result),
+            result => {
+                self.report(progress, &format!("on the GPU: {}", gpu.device().name));
+                Some(result)
+            }
         }
     }
 
@@ -130,9 +133,6 @@ impl Renderer for SceneRenderer {
             _ => self.try_gpu(scene, settings, region, progress),
         };
         self.was_on_gpu.store(on_gpu.is_some(), Ordering::Relaxed);
-        if let (Some(Ok(_)), Some(name)) = (&on_gpu, self.gpu_name()) {
-            self.report(progress, &format!("on the GPU: {name}"));
-        }
         on_gpu.unwrap_or_else(|| self.cpu.render_region(scene, settings, region, progress))
     }
 }
