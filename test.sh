@@ -70,6 +70,15 @@ prepare_gdal() {
     apt-get update >"$log" 2>&1 && apt-get install -y --no-install-recommends gdal-bin >"$log" 2>&1
 }
 
+# Installs a Vulkan driver that runs on the processor, on which the tests of the GPU run; without any they are skipped.
+prepare_vulkan() {
+    # wgpu warns about a missing folder for sockets, which no test uses.
+    export XDG_RUNTIME_DIR=${XDG_RUNTIME_DIR:-/tmp}
+    compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null && return
+    [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null && return
+    apt-get update >"$log" 2>&1 && apt-get install -y --no-install-recommends libvulkan1 mesa-vulkan-drivers >"$log" 2>&1
+}
+
 # Finds the browser (CHROMIUM if it is set), playwright-core, which drives it, and axe-core, which checks that pages are
 # accessible; both are installed outside of the repository. Fails with a reason in `missing` if one is unavailable.
 prepare_browser() {
@@ -149,6 +158,7 @@ done
 check "formatting" cargo fmt --all --check
 check "lints" cargo clippy --workspace --all-targets -- -D warnings
 prepare_gdal
+prepare_vulkan
 tests "tests" cargo test --workspace --lib --bins --tests --no-fail-fast -- --show-output
 tests "doc tests" cargo test --workspace --doc --no-fail-fast
 # The page's tests use `import.meta.dirname`, which Node.js has since 20.11.

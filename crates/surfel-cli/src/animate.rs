@@ -1,6 +1,6 @@
 //! `surfel animate`: a movie of an animated scene, frame by frame, or of a turn around anything.
 
-use crate::global::{Global, start_threads};
+use crate::global::{Global, check_device, start_threads};
 use crate::options::{EVERYWHERE, PLANS, Scope};
 use crate::render::{report_threads, with_info};
 use crate::report::{Report, print};
@@ -50,6 +50,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         description.output.output.clone_from(&args.output);
     }
     start_threads(&description.run)?;
+    check_device(&description.run)?;
     if description.output.output.is_none() && !args.dry_run {
         return Err(Usage("name the movie with -o, as in -o movie.mp4".into()).into());
     }

@@ -2,9 +2,9 @@
 
 use crate::options::{EVERYWHERE, KeyOptions, Scope};
 use crate::report::Verbosity;
-use crate::usage::Usage;
 use anyhow::Context;
 use clap::Args;
+use surfel::SceneRenderer;
 use surfel::description::{Backend, RunSettings};
 
 /// Options of all commands.
@@ -46,11 +46,16 @@ impl Global {
     }
 }
 
+/// Fails if a GPU is demanded that is not there, before any file is read.
+pub fn check_device(settings: &RunSettings) -> anyhow::Result<()> {
+    if settings.backend() == Backend::Gpu {
+        SceneRenderer::new(settings)?;
+    }
+    Ok(())
+}
+
 /// Starts the threads of all work to come.
 pub fn start_threads(settings: &RunSettings) -> anyhow::Result<()> {
-    if settings.backend() == Backend::Gpu {
-        return Err(Usage("--backend gpu: is not in this build; use cpu".into()).into());
-    }
     let pool = rayon::ThreadPoolBuilder::new();
     pool.num_threads(settings.threads.unwrap_or(0) as usize)
         .build_global()

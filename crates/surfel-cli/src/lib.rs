@@ -22,6 +22,7 @@ mod gallery;
 mod demo;
 mod bench;
 mod completions;
+mod devices;
 
 use clap::builder::Styles;
 use clap::{Arg, Command as ClapCommand, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -69,6 +70,8 @@ enum Command {
     Demo(demo::Args),
     /// Measures how many rays per second are traced.
     Bench(Box<bench::Args>),
+    /// Lists the devices that can render.
+    Devices(devices::Args),
     /// Prints completions for a shell.
     Completions(completions::Args),
     /// Prints the manual page.
@@ -163,6 +166,7 @@ fn run(cli: &Cli, report: &Report) -> anyhow::Result<()> {
         Command::Prepare(args) => prepare::run(args, global, report),
         Command::Demo(args) => demo::run(args, global, report),
         Command::Bench(args) => bench::run(args, global, report),
+        Command::Devices(args) => devices::run(args),
         Command::Completions(args) => completions::run(args, command()),
         Command::Man => completions::man(command()),
     }

@@ -1,6 +1,6 @@
 //! `surfel render`: from files to a picture.
 
-use crate::global::{Global, start_threads};
+use crate::global::{Global, check_device, start_threads};
 use crate::options::{EVERYWHERE, Scope};
 use crate::output::{check_height_map, check_picture, check_stats};
 use crate::report::{Report, print};
@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use surfel::SceneDescription;
+use surfel::description::Backend;
 use surfel::resolve::{AutoSettings, KeepOptions, LoadedScene, report_coverage};
 use surfel_core::progress::Progress;
 use surfel_core::trace::Simd;
@@ -61,6 +62,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         description.output.output.clone_from(&args.output);
     }
     start_threads(&description.run)?;
+    check_device(&description.run)?;
     if args.dry_run {
         return print_dry_run(&description, report);
     }
@@ -115,7 +117,8 @@ pub fn render_to_file(
         seconds.total = start.elapsed().as_secs_f64();
         let resolution = scene.description().picture.resolution();
         let (flat, simd) = (scene.flat(), scene.simd());
-        let run = RunStats { flat, counts, seconds, rendered, resolution, simd };
+        let gpu = scene.gpu_name();
+        let run = RunStats { flat, counts, seconds, rendered, resolution, simd, gpu };
         stats::write(path, &run.json())?;
     }
     Ok(())
@@ -144,6 +147,14 @@ fn print_dry_run(description: &SceneDescription, report: &Report) -> anyhow::Res
     Ok(print(&format!("{:#}", with_info(&complete, &loaded)))?)
 }
 
+fn backend_word(backend: Backend) -> &'static str {
+    match backend {
+        Backend::Auto => "auto",
+        Backend::Cpu => "cpu",
+        Backend::Gpu => "gpu",
+    }
+}
+
 /// Returns a complete description as a scene file, with facts about the data and the machine.
 pub fn with_info(complete: &SceneDescription, loaded: &LoadedScene) -> Value {
     let (n_points, n_triangles) = loaded.graph.n_points_and_triangles();
@@ -155,7 +166,7 @@ pub fn with_info(complete: &SceneDescription, loaded: &LoadedScene) -> Value {
             "triangles": n_triangles,
             "threads": rayon::current_num_threads(),
             "simd": Simd::detect().name(),
-            "backend": "cpu",
+            "backend": backend_word(complete.run.backend()),
         }),
     );
     Value::Object(table)

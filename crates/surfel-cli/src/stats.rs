@@ -36,6 +36,8 @@ pub struct RunStats<'a> {
     pub resolution: (u32, u32),
     /// The SIMD level of the kernels.
     pub simd: Simd,
+    /// Name of the GPU; none if the CPU rendered.
+    pub gpu: Option<&'a str>,
 }
 
 impl RunStats<'_> {
@@ -63,8 +65,8 @@ impl RunStats<'_> {
             "bytes_per_point": bytes_per_point(self.flat.clouds(), n_points),
             "bytes_per_triangle": bytes_per_triangle(self.flat.meshes(), n_triangles),
             "peak_rss_bytes": peak_rss_bytes(),
-            "backend": "cpu",
-            "device": device(),
+            "backend": if self.gpu.is_some() { "gpu" } else { "cpu" },
+            "device": self.gpu.map_or_else(device, str::to_owned),
             "threads": rayon::current_num_threads(),
             "simd": self.simd.name(),
             "resolution": [self.resolution.0, self.resolution.1],

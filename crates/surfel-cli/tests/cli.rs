@@ -12,6 +12,8 @@ mod cameras;
 mod clips;
 #[path = "cli/commands.rs"]
 mod commands;
+#[path = "cli/gpu.rs"]
+mod gpu;
 #[path = "cli/help.rs"]
 mod help;
 #[path = "cli/inputs.rs"]

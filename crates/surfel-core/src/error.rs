@@ -61,6 +61,9 @@ pub enum Error {
         /// The values that are allowed.
         expected: &'static str,
     },
+    /// A renderer's device failed, or cannot render the picture.
+    #[error("{0}")]
+    Renderer(String),
     /// A filter of points is not written as it should be.
     #[error("filter, character {character}: found {found}, expected {expected}")]
     Filter {

@@ -2,6 +2,7 @@
 
 pub mod clouds;
 pub mod scenes;
+pub mod backends;
 pub mod ground_truth;
 pub mod shapes;
 pub mod sampling;

@@ -6,11 +6,12 @@ use crate::error::Result;
 use crate::overlay::Overlay;
 use crate::picture::{RenderedImage, image_options};
 use crate::progress_log::{CancelOnly, Choice};
+use crate::renderer::SceneRenderer;
 use crate::resolve::{Resolved, SceneCamera, Sequence, automatic_exposure, expose, expose_lamps};
 use surfel_core::flat::{FlatPunctualLight, FlatScene};
 use surfel_core::math::{DQuat, Vec3};
 use surfel_core::progress::{NoProgress, Progress};
-use surfel_core::render::{CpuRenderer, RenderStats, Renderer, Settings};
+use surfel_core::render::{RenderStats, Renderer, Settings};
 use surfel_core::scene::{Camera, ClipPlane, Geometry, Graph, Light, Room};
 use surfel_core::trace::Simd;
 use surfel_formats::Georeference;
@@ -19,7 +20,7 @@ use surfel_formats::Georeference;
 #[derive(Debug)]
 pub struct BuiltScene {
     flat: FlatScene,
-    renderer: CpuRenderer,
+    renderer: SceneRenderer,
     graph: Graph,
     sequences: Vec<Sequence>,
     camera: SceneCamera,
@@ -62,13 +63,13 @@ impl Resolved {
     pub fn build_trees(self, progress: &dyn Progress) -> Result<BuiltScene> {
         let Self { scene, settings, description, choices, sequences, .. } = self;
         let Self { camera, turned_room, overlay, system, up, .. } = self;
+        let renderer = SceneRenderer::new(&description.run)?;
         let mut flat = FlatScene::new(&scene, progress)?;
         flat.camera_planes = planes_before(turned_room.as_ref(), &flat.camera);
         progress.end();
         let mut graph = scene.graph;
         let source_indices = source_indices(&graph);
         graph.release_static();
-        let renderer = CpuRenderer { simd: Simd::detect() };
         let (lights, lamps) = (flat.lights.clone(), flat.punctual_lights.clone());
         Ok(BuiltScene {
             flat,
@@ -147,7 +148,12 @@ impl BuiltScene {
 
     /// Returns the SIMD level of the kernels.
     pub fn simd(&self) -> Simd {
-        self.renderer.simd
+        self.renderer.simd()
+    }
+
+    /// Returns the name of the GPU that rendered the last picture; none if the CPU did.
+    pub fn gpu_name(&self) -> Option<&str> {
+        self.renderer.gpu_name()
     }
 
     /// Returns the index that a point of an instance had when it was read.
@@ -232,7 +238,7 @@ impl BuiltScene {
 /// Returns the stops of an exposure; an automatic one is chosen from a preview and reported.
 pub(crate) fn exposure_stops(
     exposure: Exposure,
-    renderer: &CpuRenderer,
+    renderer: &dyn Renderer,
     flat: &FlatScene,
     settings: &Settings,
     progress: &dyn Progress,

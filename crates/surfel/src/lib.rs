@@ -68,6 +68,9 @@ pub mod overlay;
 pub mod resolve;
 pub mod picture;
 mod cache;
+#[cfg(not(feature = "gpu"))]
+mod no_gpu;
+mod renderer;
 mod built_scene;
 pub mod ray_query;
 mod raycast;
@@ -83,9 +86,12 @@ pub use error::{Error, Result};
 pub use picture::RenderedImage;
 pub use progress_log::Choice;
 pub use raycast::RayHit;
+pub use renderer::SceneRenderer;
 pub use resolve::{Resolved, resolve};
 
 /// The crates that this one stands on.
+#[cfg(feature = "gpu")]
+pub use surfel_gpu;
 pub use {surfel_core, surfel_formats};
 
 use std::path::Path;

@@ -9,6 +9,7 @@ use crate::overlay::Overlay;
 use crate::picture::{RenderedImage, image_options};
 use crate::ray_query::RayCaster;
 use crate::raycast::world_bounds;
+use crate::renderer::SceneRenderer;
 use crate::resolve::{
     AutoSettings, KeepOptions, LoadedScene, common_legend, coordinate_system, expose, finish_graph,
     hide_walls, render_settings,
@@ -21,7 +22,7 @@ use surfel_core::image::{Image, NO_ID};
 use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
-use surfel_core::render::{self, CpuRenderer, RenderRegion, RenderStats, Renderer, Settings};
+use surfel_core::render::{self, RenderRegion, RenderStats, Renderer, Settings};
 use surfel_core::scene::color::Legend;
 use surfel_core::scene::{
     Background, Camera, ClipPlane, Geometry, Graph, Projection, Scene, inlier_bounds,
@@ -42,7 +43,7 @@ pub struct LiveScene {
     made: Made,
     /// Apart, so that previews leave what was made of all points.
     made_for_previews: Made,
-    renderer: CpuRenderer,
+    renderer: SceneRenderer,
     /// Walls that the first camera hides; they stay hidden while it moves, so that no tree is built again.
     hidden_walls: OnceLock<Vec<ClipPlane>>,
     /// Threads beside those that draw: preparation for one viewer must not hold up another's picture.
@@ -175,7 +176,7 @@ impl LiveScene {
             regrouped: Lru2::default(),
             made: Made::default(),
             made_for_previews: Made::default(),
-            renderer: CpuRenderer { simd: Simd::detect() },
+            renderer: SceneRenderer::new(&description.run)?,
             hidden_walls: OnceLock::new(),
             preparation_threads: start_threads(|_| ())?,
             picture_threads: start_threads(|_| lower_priority())?,
@@ -220,7 +221,7 @@ impl LiveScene {
 
     /// Returns the SIMD level of the kernels.
     pub fn simd(&self) -> Simd {
-        self.renderer.simd
+        self.renderer.simd()
     }
 
     /// Returns true if the clouds were prepared under a description lately.

@@ -21,8 +21,8 @@ use measure::{Bench, Rays, closest_hits};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use surfel::SceneDescription;
-use surfel::description::ObjectSettings;
 use surfel::description::rule::{Resolution, Rule};
+use surfel::description::{Backend, ObjectSettings, RunSettings};
 use surfel::resolve::{MemoryEstimate, choose_camera, choose_up, prepare_cloud, short_position};
 use surfel_core::flat::FlatGeometry;
 use surfel_core::math::{DAffine3, DVec3, Vec3};
@@ -102,7 +102,10 @@ const DEFAULT_RAYS: [Rays; 5] =
 
 /// Measures rates and prints them.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    let limit = global.start()?.memory_limit;
+    let RunSettings { memory_limit: limit, backend, .. } = global.start()?;
+    if backend == Some(Backend::Gpu) {
+        anyhow::bail!("--backend gpu: bench measures the CPU only; leave it out");
+    }
     let description = args.options.description.clone()?;
     check_surface(args, &description)?;
     let file = args.camera_file.as_deref().map(CameraFile::read).transpose()?;

@@ -26,11 +26,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use surfel::SceneDescription;
+use surfel::{SceneDescription, SceneRenderer};
 use surfel::resolve::check_files;
 use surfel_core::progress::Progress;
-use surfel_core::render::CpuRenderer;
-use surfel_core::trace::Simd;
 use surfel_web::{Error, SceneProvider, Server, TlsError, TlsIdentity};
 
 /// Arguments of `surfel view`.
@@ -95,6 +93,7 @@ Examples:
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
     let description = args.scene.startup(global)?;
     start_threads(&description.run)?;
+    let renderer = SceneRenderer::new(&description.run)?;
     check_files(&description)?;
     let identity = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
     let identity =
@@ -115,7 +114,8 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     if args.open && !browser::open(&links[0]) {
         report.note("no browser could be started; open the link yourself");
     }
-    serve(server, description, args.scene.files.clone(), report).map_err(|error| match error {
+    let served = serve(server, renderer, description, args.scene.files.clone(), report);
+    served.map_err(|error| match error {
         Error::Cancelled => anyhow!(surfel_core::Error::Cancelled),
         error => anyhow!(error),
     })
@@ -124,6 +124,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
 /// Serves a description until `report` is cancelled.
 fn serve(
     server: Server,
+    renderer: SceneRenderer,
     description: SceneDescription,
     typed: Vec<PathBuf>,
     report: &Report,
@@ -135,8 +136,7 @@ fn serve(
         let report = report_for_loading.with_listener(&progress);
         open_scene_provider(description, typed, &report).map_err(rejection)
     };
-    let renderer = Arc::new(CpuRenderer { simd: Simd::detect() });
-    server.run(renderer, report.cancellation(), open)
+    server.run(Arc::new(renderer), report.cancellation(), open)
 }
 
 /// A viewer that serves a scene on a thread of its own, to this machine alone.
@@ -159,7 +159,8 @@ impl RunningViewer {
         let report = Report::new(Verbosity::Quiet);
         let is_stopped = report.cancellation();
         let typed = description.files.clone();
-        let run = move || serve(server, description, typed, &report);
+        let renderer = SceneRenderer::new(&description.run).map_err(rejection)?;
+        let run = move || serve(server, renderer, description, typed, &report);
         let thread = std::thread::Builder::new().name("viewer".into()).spawn(run);
         let thread = thread.map_err(|source| Error::Io { address: link.clone(), source })?;
         Ok(Self { link, is_stopped, thread })

@@ -105,7 +105,6 @@ fn invalid_values_name_the_option_and_what_was_expected() {
             "error: --material: glow: unknown key; known: kind, color, alpha, metallic, roughness, ior, \
              transmission, attenuation_color, attenuation_distance, thin, emissive, emissive_strength",
         ),
-        (&["--backend", "gpu"], "error: --backend gpu: is not in this build; use cpu"),
     ] {
         let text = fail(&[&["render", &cloud, "-o", &folder.path("no.png")], options].concat(), 2);
         assert_eq!(text.lines().next(), Some(expected));

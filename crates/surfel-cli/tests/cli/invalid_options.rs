@@ -66,7 +66,6 @@ fn invalid_values_end_with_code_2() {
         &["--radius", "adaptive:0"],
         &["--bit-depth", "12"],
         &["--memory-limit", "lots"],
-        &["--backend", "gpu"],
         &["--backend", "abacus"],
         &["--no-such-option"],
     ];

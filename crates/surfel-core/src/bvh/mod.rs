@@ -16,5 +16,5 @@ pub use build::build;
 pub use node::{BvhNode, Child};
 pub use primitive::BvhPrimitive;
 pub use refit::refit_boxes;
-pub use tree::{Bvh, NO_PRIMITIVE, STACK_SIZE};
+pub use tree::{Bvh, MAX_DEPTH, NO_PRIMITIVE, STACK_SIZE};
 pub use validate::validate_boxes;

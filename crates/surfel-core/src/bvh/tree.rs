@@ -16,7 +16,7 @@ pub struct Bvh {
 pub const NO_PRIMITIVE: u32 = u32::MAX;
 
 /// Maximum number of levels of nodes. `build` stays within it for any input.
-pub(super) const MAX_DEPTH: usize = 56;
+pub const MAX_DEPTH: usize = 56;
 
 /// Maximum number of stack entries of a traversal that pops one entry and pushes at most eight.
 pub const STACK_SIZE: usize = MAX_DEPTH * 7 + 8;

@@ -44,12 +44,15 @@ pub struct DirectLight<'a> {
     pub max_light_samples: u32,
 }
 
-// Random dimensions: no two uses share random numbers.
-const SKY_DIRECTION: u64 = 1;
-const SKY_DISTANCE: u64 = 2;
-const SUN_DIRECTION: u64 = 3;
+/// Random dimension of directions toward the sky. No two uses share random numbers.
+pub const SKY_DIRECTION: u64 = 1;
+/// Random dimension of the ends of rays toward the sky.
+pub const SKY_DISTANCE: u64 = 2;
+/// Random dimension of directions toward suns.
+pub const SUN_DIRECTION: u64 = 3;
 const ENVIRONMENT_DIRECTION: u64 = 4;
-const PUNCTUAL_LIGHT_POSITION: u64 = 5;
+/// Random dimension of positions on punctual lights.
+pub const PUNCTUAL_LIGHT_POSITION: u64 = 5;
 /// Approximate number of shadow rays traced at once: it bounds their memory, whatever the number of light
 /// samples.
 const SHADOW_RAY_CHUNK_SIZE: u32 = 1 << 14;

@@ -14,6 +14,7 @@ mod shading;
 mod specular;
 mod transmittance;
 mod whitted;
+pub mod constants;
 
 pub(crate) use background::background_radiance;
 pub use batch::{CameraRayBatch, Integrator, PixelSamples, RayCounts};

@@ -6,6 +6,9 @@ use crate::scene::{AlphaMode, TextureEncoding, TextureRef};
 use crate::surface::SurfaceKind;
 use crate::trace::SceneHit;
 
+/// Least cosine between a shading normal and the direction to the viewer.
+pub const MIN_FACING_COS: f32 = 1e-3;
+
 /// Position, normals and material parameters of a surface at a hit.
 #[derive(Clone, Copy, Debug)]
 pub struct Shading {
@@ -118,11 +121,10 @@ impl Shading {
     ///
     /// Interpolated normals can face away at silhouettes.
     fn faceforward(&mut self, direction: Vec3) {
-        const MIN_COS: f32 = 1e-3;
         let away = self.normal.dot(direction);
-        if -MIN_COS < away {
-            self.normal =
-                (self.normal - (away + MIN_COS) * direction).normalize_or(self.geometric_normal);
+        if -MIN_FACING_COS < away {
+            self.normal = (self.normal - (away + MIN_FACING_COS) * direction)
+                .normalize_or(self.geometric_normal);
         }
     }
 

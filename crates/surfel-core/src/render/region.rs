@@ -22,23 +22,26 @@ impl RenderRegion {
     }
 
     /// Returns the number of rows.
-    pub(super) fn n_rows(&self) -> u32 {
+    pub fn n_rows(&self) -> u32 {
         self.rows.1 - self.rows.0
     }
 
     /// Returns the number of samples per pixel.
-    pub(super) fn n_samples(&self) -> u32 {
+    pub fn n_samples(&self) -> u32 {
         self.samples.1 - self.samples.0
     }
 
     /// Returns an empty image of the region's rows, with AOVs if the settings ask for them.
-    pub(super) fn blank_image(&self, settings: &Settings) -> Image {
+    pub fn blank_image(&self, settings: &Settings) -> Image {
         let new = if settings.with_aovs { Image::with_aovs } else { Image::new };
         new(settings.width, self.n_rows())
     }
 
+    /// Checks that the region is a part of the picture.
+    ///
+    /// # Errors
     /// Fails if the region is empty or extends beyond the picture.
-    pub(super) fn check(&self, settings: &Settings) -> Result<()> {
+    pub fn check(&self, settings: &Settings) -> Result<()> {
         let whole = Self::whole(settings);
         let is_within = |part: (u32, u32), whole: (u32, u32)| part.0 < part.1 && part.1 <= whole.1;
         if is_within(self.rows, whole.rows) && is_within(self.samples, whole.samples) {

@@ -39,23 +39,38 @@ pub enum Projection {
 /// A camera for pictures of one size, relative to a scene's origin. It makes the primary rays.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
-    position: Vec3,
-    forward: Vec3,
-    right: Vec3,
-    up: Vec3,
-    lens: Lens,
-    center: (f32, f32),
+    /// Position of the camera.
+    pub position: Vec3,
+    /// Unit direction of the view.
+    pub forward: Vec3,
+    /// Unit direction to the right of the picture.
+    pub right: Vec3,
+    /// Unit direction to the top of the picture.
+    pub up: Vec3,
+    /// The mapping from positions in the picture to rays.
+    pub lens: Lens,
+    /// Position of the picture's centre, in pixels from its upper left corner.
+    pub center: (f32, f32),
 }
 
 /// The mapping from positions in the picture to rays.
 #[derive(Clone, Copy, Debug)]
-enum Lens {
-    /// A pixel spans `pixel_size` world units at distance 1.
-    Perspective { pixel_size: f32 },
-    /// A pixel spans `pixel_size` world units.
-    Orthographic { pixel_size: f32 },
-    /// A pixel spans these angles in radians, horizontally and vertically.
-    Panorama { pixel_rad: (f32, f32) },
+pub enum Lens {
+    /// A perspective projection.
+    Perspective {
+        /// Size of a pixel in world units at distance 1.
+        pixel_size: f32,
+    },
+    /// A parallel projection.
+    Orthographic {
+        /// Size of a pixel in world units.
+        pixel_size: f32,
+    },
+    /// An equirectangular projection of all directions.
+    Panorama {
+        /// Angles in radians that a pixel spans, horizontally and vertically.
+        pixel_rad: (f32, f32),
+    },
 }
 
 impl Camera {

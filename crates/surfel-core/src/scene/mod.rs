@@ -28,7 +28,7 @@ pub use animation::{
 };
 pub use auto_camera::{fit_camera, panorama_camera};
 pub use background::Background;
-pub use camera::{Camera, Projection, View};
+pub use camera::{Camera, Lens, Projection, View};
 pub use camera_fit::{CameraFit, default_view_up};
 pub use clip::{Clip, ClipBox, ClipPlane};
 pub use cloud_geometry::CloudGeometry;

@@ -4,7 +4,7 @@ use super::shape::{PointLanes, RayLanes, Shape};
 use crate::math::{Aabb, Floats, Vec3};
 
 /// Half the length of a capsule, in multiples of its thickness's radius.
-const ASPECT: f32 = 4.0;
+pub const ASPECT: f32 = 4.0;
 
 /// The shape of a capsule. The point's radius is half the length, its normal the direction.
 pub struct Capsule;

@@ -4,9 +4,9 @@ use super::shape::{PointLanes, RayLanes, Shape};
 use crate::math::{Aabb, Floats, Vec3};
 
 /// The height of the origin of secondary rays above the surface, in radii.
-pub(super) const SPAWN_OFFSET: f32 = 0.5;
+pub const SPAWN_OFFSET: f32 = 0.5;
 /// The distance before which secondary rays ignore hits, in radii.
-pub(super) const SPAWN_T_MIN: f32 = 2.0;
+pub const SPAWN_T_MIN: f32 = 2.0;
 
 /// The shape of a flat disc.
 pub struct Disc;

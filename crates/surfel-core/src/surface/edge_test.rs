@@ -6,24 +6,24 @@ use crate::math::{Floats, LaneMask, Lanes, ROUND_TO_INTEGER, Vec3, Vec3Lanes, ta
 /// The radius of the neighbourhood of a hit, in multiples of the hit's radius.
 pub const NEIGHBORHOOD_RADIUS_FACTOR: f32 = 1.3;
 /// Maximum distance of a neighbour from the hit's tangent plane, in radii.
-const MAX_PLANE_DISTANCE: f32 = 0.8;
+pub const MAX_PLANE_DISTANCE: f32 = 0.8;
 /// Minimum distance before the hit, in radii, at which the ray passes a point for the point to count for the
 /// back-face test.
-const MIN_PASSED_DISTANCE: f32 = 0.2;
+pub const MIN_PASSED_DISTANCE: f32 = 0.2;
 /// Maximum cosine between the hit's normal and the normal of the passed points at which the hit counts as a
 /// back face.
-const MAX_BACKFACE_COSINE: f32 = -0.5;
+pub const MAX_BACKFACE_COSINE: f32 = -0.5;
 /// Steps per radius and unit of normal length to which heights above the points' planes are rounded. Steps are
 /// at most 0.002 radii long, and f32 adds about thirty of the greatest heights exactly.
-const HEIGHT_STEPS: f32 = 1.0;
+pub const HEIGHT_STEPS: f32 = 1.0;
 /// Angle in radians by which half of the directions are rotated: thirty times the rounding error of a
 /// direction, and far too small to be visible.
-const TIE_BREAK_ANGLE: f32 = 4e-6;
+pub const TIE_BREAK_ANGLE: f32 = 4e-6;
 /// A neighbourhood of fewer points is sparse and has to be evaluated again at a larger radius. With 8 the
 /// depth error of the bunny grew by a sixth; with 4 there were holes at radii of 0.85 spacings.
-const MIN_DENSE: u32 = 5;
+pub const MIN_DENSE: u32 = 5;
 /// Fewer points than this form no surface.
-const MIN_NEIGHBORS: u32 = 4;
+pub const MIN_NEIGHBORS: u32 = 4;
 
 /// The test that decides where a surface of discs ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]

@@ -7,6 +7,9 @@ use super::sphere;
 use crate::error::Error;
 use crate::math::{Aabb, Ray, Vec3};
 
+/// The height of the origin of secondary rays above spheres and capsules, in radii.
+pub const SOLID_SPAWN_OFFSET: f32 = 1e-3;
+
 /// The shape given to the points of a cloud (Wiesmeier, Ray Tracing Point Clouds, 2011).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum SurfaceKind {
@@ -84,7 +87,7 @@ impl SurfaceKind {
         let (offset, t_min) = match self {
             Self::Smooth => (smooth::SPAWN_OFFSET * radius, smooth::SPAWN_T_MIN * radius),
             _ if self.uses_discs() => (disc::SPAWN_OFFSET * radius, disc::SPAWN_T_MIN * radius),
-            _ => (1e-3 * radius, 0.0),
+            _ => (SOLID_SPAWN_OFFSET * radius, 0.0),
         };
         let origin = position + (offset + rounding) * normal;
         Ray { origin, t_min, direction, t_max: f32::INFINITY }

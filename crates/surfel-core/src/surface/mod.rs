@@ -1,11 +1,11 @@
 //! Surface kinds: the shape that a ray intersects at each point or triangle, one file per shape.
 
 pub mod capsule;
-mod disc;
-mod edge_test;
+pub mod disc;
+pub mod edge_test;
 mod kind;
 mod shape;
-mod smooth;
+pub mod smooth;
 mod sphere;
 mod splat;
 pub mod triangle;
@@ -16,12 +16,14 @@ pub use edge_test::{
     CandidateHit, CandidateHitLanes, EdgeTest, EdgeTestResult, NEIGHBORHOOD_RADIUS_FACTOR,
     NeighborhoodStats,
 };
-pub use kind::SurfaceKind;
+pub use kind::{SOLID_SPAWN_OFFSET, SurfaceKind};
 pub use shape::{MAX_NORMAL_COMPONENT, PointLanes, RayLanes, Shape};
 pub use smooth::{
     ColorSums, FIT_REACH, FitPoint, OverhangSums, PointSums, SUPPORT_FACTOR, SphereHit, SphereSums,
     edge_retest_factor,
 };
 pub use sphere::Sphere;
-pub use splat::{MAX_GATHERED, SplatAccumulator, Surfel, fit_plane_normal, gather_limit};
+pub use splat::{
+    MAX_GATHERED, MIN_PLANE_RATIO, SplatAccumulator, Surfel, fit_plane_normal, gather_limit,
+};
 pub use triangle::{RayFrame, RayRelativeTriangles, Triangle, TriangleLanes};

@@ -9,39 +9,40 @@ pub const SUPPORT_FACTOR: f32 = 1.2;
 /// Maximum distance of a point from the position of a fit, in radii of the disc that was hit.
 pub const FIT_REACH: f32 = 1.4;
 /// The height of the origin of secondary rays above the surface, in radii.
-pub(super) const SPAWN_OFFSET: f32 = 0.2;
+pub const SPAWN_OFFSET: f32 = 0.2;
 /// The distance before which secondary rays ignore hits, in radii.
-pub(super) const SPAWN_T_MIN: f32 = 0.5;
+pub const SPAWN_T_MIN: f32 = 0.5;
 /// Factors of `edge_retest_factor` for evenly spaced and for random points.
 const EDGE_RETEST_EVEN: f32 = 1.3;
 const EDGE_RETEST_RANDOM: f32 = 1.5;
 /// Steps per unit to which the terms of sums are rounded. f32 adds a thousand terms of up to 1 exactly, so that
 /// sums do not depend on the order of points.
-const STEPS: f32 = 16_384.0;
+pub const STEPS: f32 = 16_384.0;
 /// Minimum weight of all points of a fit. With less, beyond the reach of all points but one or two, rounding showed as
 /// noise.
-const MIN_WEIGHT: f32 = 0.1;
+pub const MIN_WEIGHT: f32 = 0.1;
 /// Additional weight of the nearest point's colour. Without it, rounding turned the colours of points with tiny weights
 /// black.
-const NEAREST_COLOR_WEIGHT: f32 = 0.02;
+pub const NEAREST_COLOR_WEIGHT: f32 = 0.02;
 /// Exponent of the weight of normals at an angle of 90 degrees: 2 / (2/3)^2.
-const NORMAL_FALLOFF: f32 = 4.5;
+pub const NORMAL_FALLOFF: f32 = 4.5;
 /// Maximum curvature of a fitted sphere's equation, in 1 / radius: its radius is at least half a disc's radius.
-const MAX_CURVATURE: f32 = 1.0;
-/// Squared spread of a fit's points around their mean, in squared radii, up to which they give no curvature, and from
-/// which they give all of it. Where one point has nearly all the weight, the quotient is rounding alone.
-const FLAT_SPREAD: f32 = 0.01;
-const CURVED_SPREAD: f32 = 0.04;
+pub const MAX_CURVATURE: f32 = 1.0;
+/// Squared spread of a fit's points around their mean, in squared radii, up to which they give no curvature. Where one
+/// point has nearly all the weight, the quotient is rounding alone.
+pub const FLAT_SPREAD: f32 = 0.01;
+/// Squared spread of a fit's points, in squared radii, from which they give all of the curvature.
+pub const CURVED_SPREAD: f32 = 0.04;
 /// Distance of a point's plane from the position, in radii, beyond which the point belongs to another sheet.
-const MAX_PLANE_DISTANCE: f32 = 0.8;
+pub const MAX_PLANE_DISTANCE: f32 = 0.8;
 /// Maximum cosine between the normals of two sides of an edge.
-const MAX_EDGE_COSINE: f32 = 0.7;
+pub const MAX_EDGE_COSINE: f32 = 0.7;
 /// Minimum weight of the points on the other side of an edge.
-const MIN_EDGE_WEIGHT: f32 = 0.05;
+pub const MIN_EDGE_WEIGHT: f32 = 0.05;
 /// Maximum mean height of a hit above the surface on the other side of an edge, in radii.
-const MAX_OVERHANG: f32 = 0.1;
+pub const MAX_OVERHANG: f32 = 0.1;
 /// Maximum distance along the ray from the position of a fit to the sphere, in radii.
-const MAX_STEP: f32 = 1.5;
+pub const MAX_STEP: f32 = 1.5;
 
 /// Factor on the radius of the neighbourhood that decides about a hit which the nearest points do not enclose, by how
 /// evenly the points are placed: the distance between the nearest of eight points in radii. Between unevenly placed

@@ -3,6 +3,8 @@
 use super::kind::SurfaceKind;
 use crate::math::{DVec3, Floats, SymmetricMatrix, Vec3, Vec3Lanes, smallest_eigenvector};
 
+/// Minimum ratio of the second to the largest eigenvalue of points that span a plane.
+pub const MIN_PLANE_RATIO: f64 = 1e-4;
 /// Maximum number of discs blended at a hit. If there are more, the nearest are kept.
 pub const MAX_GATHERED: usize = 16;
 
@@ -124,5 +126,5 @@ pub fn fit_plane_normal(points: &[Vec3]) -> Option<Vec3> {
     }
     let (normal, values) = smallest_eigenvector(&covariance);
     // Fewer than three points, or points on a line, leave the second eigenvalue at zero.
-    (1e-4 * values[2] < values[1]).then(|| normal.as_vec3())
+    (MIN_PLANE_RATIO * values[2] < values[1]).then(|| normal.as_vec3())
 }

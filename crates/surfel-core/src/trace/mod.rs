@@ -9,6 +9,7 @@ mod traversal;
 mod query;
 mod scene;
 mod tracer;
+pub mod constants;
 
 pub use query::any::{any_hits, any_triangles};
 pub use query::closest::{closest_hits, closest_triangles};

@@ -11,6 +11,7 @@ use surfel_core::scene::{
 };
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
+use surfel_tests::backends;
 use surfel_tests::clouds;
 use surfel_tests::scenes;
 
@@ -36,13 +37,19 @@ const FURNACE: Sky =
 
 #[test]
 fn a_white_sphere_in_a_furnace_is_white() {
-    for kind in [SurfaceKind::Sphere, SurfaceKind::Disc, SurfaceKind::Splat, SurfaceKind::SplatFit]
-    {
+    let kinds = [SurfaceKind::Sphere, SurfaceKind::Disc, SurfaceKind::Splat, SurfaceKind::SplatFit];
+    check_furnace(&backends::cpu(), &kinds);
+}
+
+/// Fails unless a renderer shows white spheres of these kinds in a white furnace as white.
+pub fn check_furnace(renderer: &dyn Renderer, kinds: &[SurfaceKind]) {
+    for &kind in kinds {
         let points = scenes::points(clouds::sphere(20_000, 1.0), kind);
         let colors = vec![[255; 3]; points.cloud().len()];
         let scene = scenes::lit(scenes::colored(&points, colors));
         let scene = Scene { lights: vec![Light::Sky(FURNACE)], ..scene };
-        let image = render(&scene, &SETTINGS);
+        let flat = FlatScene::new(&scene, &NoProgress).unwrap();
+        let image = backends::render(renderer, &flat, &SETTINGS);
         let covered = image.color.iter().filter(|pixel| pixel[3] == 1.0);
         let (sum, count) = covered.fold((0.0, 0), |(sum, n), pixel| (sum + pixel[0], n + 1));
         let mean = sum / count as f32;

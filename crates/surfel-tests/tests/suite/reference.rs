@@ -7,11 +7,11 @@ use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::progress::NoProgress;
-use surfel_core::render::{CpuRenderer, Renderer, Settings};
+use surfel_core::render::{Renderer, Settings};
 use surfel_core::scene::{Background, Camera, Light, Projection, Scene, Sky, Sun};
 use surfel_core::surface::SurfaceKind;
-use surfel_core::trace::Simd;
 use surfel_formats::{ImageOptions, encode_png, save_image};
+use surfel_tests::backends;
 use surfel_tests::clouds;
 use surfel_tests::scenes;
 
@@ -29,7 +29,22 @@ const MAX_PIXELS: usize = 2;
 /// The greatest difference of a channel in 8-bit steps: one of a pixel's 64 light rays is 255 / 64 of them.
 const MAX_STEPS: u8 = 4;
 
-fn picture(kind: SurfaceKind) -> Image {
+/// Returns a sun and a sky.
+pub fn lights() -> Vec<Light> {
+    let toward_sun = Vec3::new(0.6, -0.5, 0.7).normalize();
+    vec![
+        Light::Sun(Sun { direction: toward_sun, color: Vec3::ONE, angular_diameter_deg: 0.5 }),
+        Light::Sky(Sky {
+            up: Vec3::Z,
+            zenith: Vec3::splat(0.4),
+            ground: Vec3::splat(0.2),
+            ao_distance: 3.0,
+        }),
+    ]
+}
+
+/// Returns a scene of a ball on a cube whose points have this kind.
+pub fn scene(kind: SurfaceKind) -> Scene {
     let mut cloud = clouds::cube(24, 0.4, 11);
     let ball = clouds::sphere(1500, 0.7).positions.into_iter().map(|p| p + 1.7 * Vec3::Z);
     cloud.positions.extend(ball);
@@ -37,17 +52,8 @@ fn picture(kind: SurfaceKind) -> Image {
     let points = scenes::points(cloud, kind);
     let color = |p: &Vec3| if 1.0 < p.z { [230, 120, 60] } else { [150, 170, 190] };
     let colors = points.cloud().positions.iter().map(color).collect();
-    let toward_sun = Vec3::new(0.6, -0.5, 0.7).normalize();
-    let scene = Scene {
-        lights: vec![
-            Light::Sun(Sun { direction: toward_sun, color: Vec3::ONE, angular_diameter_deg: 0.5 }),
-            Light::Sky(Sky {
-                up: Vec3::Z,
-                zenith: Vec3::splat(0.4),
-                ground: Vec3::splat(0.2),
-                ao_distance: 3.0,
-            }),
-        ],
+    Scene {
+        lights: lights(),
         background: Background::Gradient { top: Vec3::splat(0.2), bottom: Vec3::splat(0.8) },
         camera: Camera {
             position: DVec3::new(6.0, -5.0, 3.5),
@@ -56,7 +62,10 @@ fn picture(kind: SurfaceKind) -> Image {
             projection: Projection::Perspective { view_angle_deg: 32.0 },
         },
         ..scenes::lit(scenes::colored(&points, colors))
-    };
+    }
+}
+
+fn picture(kind: SurfaceKind, renderer: &dyn Renderer) -> Image {
     let settings = Settings {
         width: SIZE.0,
         height: SIZE.1,
@@ -67,30 +76,43 @@ fn picture(kind: SurfaceKind) -> Image {
         point_size: 1.0,
         with_aovs: false,
     };
-    let flat = FlatScene::new(&scene, &NoProgress).unwrap();
-    CpuRenderer { simd: Simd::detect() }.render(&flat, &settings, &NoProgress).unwrap().0
+    let flat = FlatScene::new(&scene(kind), &NoProgress).unwrap();
+    backends::render(renderer, &flat, &settings)
 }
 
 #[test]
 fn pictures_equal_their_references() {
-    let references = Path::new(env!("CARGO_MANIFEST_DIR")).join("references");
-    let mut failures = Vec::new();
-    for (name, kind) in SurfaceKind::ALL {
-        let image = picture(kind);
-        let reference = references.join(format!("{name}.png"));
-        if std::env::var_os(ACCEPT).is_some() {
-            save_image(&reference, &image, &ImageOptions::default()).unwrap();
+    if std::env::var_os(ACCEPT).is_some() {
+        for (name, kind) in SurfaceKind::ALL {
+            let image = picture(kind, &backends::cpu());
+            save_image(&reference(name), &image, &ImageOptions::default()).unwrap();
         }
-        failures.extend(compare(name, &image, &reference));
     }
+    let allowed = Difference { n_pixels: MAX_PIXELS, n_steps: MAX_STEPS };
+    check(&backends::cpu(), &SurfaceKind::ALL.map(|(_, kind)| kind), allowed);
+}
+
+/// Fails unless the pictures of a renderer equal the references of these kinds, up to an allowed difference.
+pub fn check(renderer: &dyn Renderer, kinds: &[SurfaceKind], allowed: Difference) {
+    let failures = kinds.iter().filter_map(|kind| {
+        let name = kind.name();
+        compare(name, &picture(*kind, renderer), &reference(name), allowed)
+    });
+    let failures: Vec<_> = failures.collect();
     assert!(failures.is_empty(), "{}\nset {ACCEPT}=1 to accept them", failures.join("\n"));
+}
+
+fn reference(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("references").join(format!("{name}.png"))
 }
 
 /// The number of pixels that differ and the greatest difference of a channel in 8-bit steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Difference {
-    n_pixels: usize,
-    n_steps: u8,
+pub struct Difference {
+    /// Number of pixels that differ.
+    pub n_pixels: usize,
+    /// Greatest difference of a channel.
+    pub n_steps: u8,
 }
 
 impl Difference {
@@ -100,20 +122,20 @@ impl Difference {
         Self { n_pixels, n_steps: pairs().map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0) }
     }
 
-    fn is_allowed(self) -> bool {
-        self.n_pixels <= MAX_PIXELS && self.n_steps <= MAX_STEPS
+    fn is_within(self, allowed: Self) -> bool {
+        self.n_pixels <= allowed.n_pixels && self.n_steps <= allowed.n_steps
     }
 }
 
 /// Returns a message if a picture differs from its reference, and writes both and their difference.
-fn compare(name: &str, image: &Image, reference: &Path) -> Option<String> {
+fn compare(name: &str, image: &Image, reference: &Path, allowed: Difference) -> Option<String> {
     let found = decode_png(&encode_png(image, &ImageOptions::default()).unwrap());
     let expected = fs::read(reference);
     let expected = expected.unwrap_or_else(|error| panic!("{}: {error}", reference.display()));
     let expected = decode_png(&expected);
     assert_eq!(found.len(), expected.len(), "{name}");
     let difference = Difference::new(&found, &expected);
-    if difference.is_allowed() {
+    if difference.is_within(allowed) {
         return None;
     }
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
@@ -153,7 +175,7 @@ fn three_changed_pixels_or_one_wrong_pixel_fail() {
         found.iter_mut().step_by(4 * 97).take(n_pixels).for_each(|channel| *channel += n_steps);
         let difference = Difference::new(&found, &reference);
         assert_eq!(difference, Difference { n_pixels, n_steps });
-        difference.is_allowed()
+        difference.is_within(Difference { n_pixels: MAX_PIXELS, n_steps: MAX_STEPS })
     };
     assert!(changed(0, 0) && changed(2, 4));
     assert!(!changed(3, 1) && !changed(1, 5));

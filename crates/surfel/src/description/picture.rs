@@ -112,6 +112,8 @@ settings! {
         /// Device that does the work: auto, cpu or gpu.
         backend: Backend = Backend::Auto,
             OneOf(&[("auto", Backend::Auto), ("cpu", Backend::Cpu), ("gpu", Backend::Gpu)]), "NAME";
+        /// GPU to use, by its index or a part of its name as `surfel devices` lists them [default: the first].
+        device: String, Text, "NAME|INDEX";
     }
 }
 

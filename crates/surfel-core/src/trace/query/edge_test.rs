@@ -13,7 +13,7 @@ use crate::trace::traversal::region::{BoxVisitor, query_box};
 use std::marker::PhantomData;
 
 /// Factor on the radius of a neighbourhood for the second try, if the first one holds too few points.
-const RETRY_RADIUS_FACTOR: f32 = 2.0;
+pub const RETRY_RADIUS_FACTOR: f32 = 2.0;
 /// Maximum distance of a group's hits from the first one along any axis, in radii.
 const MAX_GROUP_SPREAD: f32 = 2.0;
 /// Minimum number of hits that are tested as a group; fewer are tested one by one.

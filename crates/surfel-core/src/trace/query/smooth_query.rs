@@ -16,13 +16,13 @@ use crate::trace::traversal::region::{BoxVisitor, query_box};
 use std::marker::PhantomData;
 
 /// Maximum number of fits along a ray, each at the intersection with the sphere before.
-pub(super) const MAX_FITS: usize = 5;
+pub const MAX_FITS: usize = 5;
 /// Distance between a fit's position and its intersection, in radii, at which the intersection is the surface.
-pub(super) const TOLERANCE: f32 = 0.01;
+pub const TOLERANCE: f32 = 0.01;
 /// Maximum distance of the last fit from its intersection, in radii: a ray with a longer one has found no surface.
-pub(super) const MAX_LAST_STEP: f32 = 0.2;
+pub const MAX_LAST_STEP: f32 = 0.2;
 /// Maximum distance along the ray between the disc that was hit and the surface, in radii.
-pub(super) const MAX_DISTANCE_FROM_DISC: f32 = 1.0;
+pub const MAX_DISTANCE_FROM_DISC: f32 = 1.0;
 /// Maximum distance of hits that share a traversal of the tree from the first one along any axis, in radii.
 const MAX_GROUP_SPREAD: f32 = 2.0;
 

@@ -60,17 +60,17 @@ impl SurfaceHit {
 
 /// Maximum number of rejected hits of a ray. A ray with more runs along a rim, where each step is tiny, and
 /// is taken to miss.
-const MAX_REJECTED_HITS: usize = 48;
+pub const MAX_REJECTED_HITS: usize = 48;
 /// Distance behind a rejected hit at which the search restarts, in radii.
-const RESTART_OFFSET: f32 = 0.05;
+pub const RESTART_OFFSET: f32 = 0.05;
 /// Distance behind a disc without a smooth surface nearby at which the search restarts, in radii.
-const SMOOTH_RESTART_OFFSET: f32 = 0.002;
+pub const SMOOTH_RESTART_OFFSET: f32 = 0.002;
 /// Minimum distance between a disc and what a ray hits behind it, in radii of the disc, at which the ray has come through
 /// a slit. Nearer back faces are those of thin sheets.
-const MIN_SLIT_DEPTH: f32 = 3.0;
+pub const MIN_SLIT_DEPTH: f32 = 3.0;
 /// Minimum cosine between a ray through a slit and the normal of the disc there. Beside a silhouette rays pass discs more
 /// from their side: without this limit six times as much background was covered around the head.
-const MIN_SLIT_COSINE: f32 = 0.5;
+pub const MIN_SLIT_COSINE: f32 = 0.5;
 
 /// Finds the closest hit of each ray on the continuous surface.
 pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {

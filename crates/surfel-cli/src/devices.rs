@@ -1,0 +1,42 @@
+//! `surfel devices`: the devices that can render.
+
+use crate::report::print;
+use crate::stats;
+use rayon::current_num_threads;
+
+/// Arguments of `surfel devices`.
+#[derive(clap::Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {}
+
+const EXAMPLES: &str = "\
+Examples:
+  surfel devices
+  surfel render scan.laz -o scan.png --backend gpu --device 0
+  surfel render scan.laz -o scan.png --backend gpu --device nvidia";
+
+/// Lists the processor and all GPUs.
+pub fn run(_: &Args) -> anyhow::Result<()> {
+    let mut lines = vec![format!("cpu  {}, {} threads", stats::device(), current_num_threads())];
+    lines.extend(gpu_lines());
+    Ok(print(&lines.join("\n"))?)
+}
+
+#[cfg(feature = "gpu")]
+fn gpu_lines() -> Vec<String> {
+    let devices = surfel::surfel_gpu::devices();
+    if devices.is_empty() {
+        return vec!["no GPU: neither Vulkan nor Metal nor DirectX 12 has a device".into()];
+    }
+    let lines = devices.iter().enumerate().map(|(index, device)| {
+        let (kind, mib) = (device.kind.name(), device.max_array_bytes >> 20);
+        let surfel::surfel_gpu::DeviceInfo { name, api, driver, .. } = device;
+        format!("{index:<4} {name}, {kind}, {api}, driver {driver}, arrays of up to {mib} MiB")
+    });
+    lines.collect()
+}
+
+#[cfg(not(feature = "gpu"))]
+fn gpu_lines() -> Vec<String> {
+    vec!["no GPU: this build has no GPU support (feature gpu)".into()]
+}

@@ -1,0 +1,59 @@
+//! GPUs: the list of devices, and what is said where a GPU cannot do what it is told.
+
+use super::common::{Folder, command, dome, fail, succeed};
+
+/// Runs the program on a machine whose Vulkan has no device.
+#[cfg(target_os = "linux")]
+fn without_devices(arguments: &[&str]) -> std::process::Output {
+    let nowhere = [("VK_DRIVER_FILES", "/nowhere"), ("VK_ICD_FILENAMES", "/nowhere")];
+    command(arguments).envs(nowhere).output().unwrap()
+}
+
+#[test]
+fn devices_lists_the_processor_first() {
+    let text = succeed(&["devices"]);
+    assert!(text.starts_with("cpu  ") && 2 <= text.lines().count(), "{text}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_demanded_gpu_that_is_absent_is_an_error_and_auto_takes_the_cpu() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let picture = folder.path("out.png");
+    let run = |backend| {
+        let size = ["--resolution", "32x24", "--spp", "1"];
+        let words = ["render", &cloud, "-o", &picture, "--backend", backend];
+        without_devices(&[&words[..], &size].concat())
+    };
+    let refused = run("gpu");
+    let text = String::from_utf8_lossy(&refused.stderr);
+    let expected =
+        "error: no GPU was found: neither Vulkan nor Metal nor DirectX 12 has a device\n";
+    assert_eq!((refused.status.code(), &*text), (Some(1), expected));
+    assert_eq!(folder.names(), ["dome.ply"]);
+    assert!(run("auto").status.success());
+}
+
+#[test]
+fn gpus_refuse_what_they_do_not_render() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let picture = folder.path("out.png");
+    let render = ["render", &cloud, "-o", &picture, "--backend", "gpu", "--resolution", "32x24"];
+    let text = fail(&[&render[..], &["--device", "nobody's"]].concat(), 1);
+    if text.contains("no GPU was found") {
+        #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
+        {
+            println!("skipped: {text}");
+        }
+        return;
+    }
+    assert!(text.contains("unknown device 'nobody's'; known: 0 ("), "{text}");
+    let text = fail(&[&render[..], &["--material", "glass"]].concat(), 1);
+    let expected = "the GPU does not render materials that reflect or transmit yet";
+    assert!(text.contains(expected), "{text}");
+    assert_eq!(folder.names(), ["dome.ply"]);
+    succeed(&render);
+    assert_eq!(folder.names(), ["dome.ply", "out.png"]);
+}

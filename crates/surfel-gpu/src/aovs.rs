@@ -1,0 +1,56 @@
+//! AOVs from the hits of a device.
+
+use crate::records::{FrameRecord, HitRecord, NONE, SURFACES, TRIANGLE};
+use surfel_core::flat::{FlatGeometry, FlatScene};
+use surfel_core::image::Aovs;
+use surfel_core::math::Vec3;
+use surfel_core::render::Settings;
+use surfel_core::scene::View;
+
+/// The picture whose AOVs are set.
+pub struct AovSource<'a> {
+    /// The scene.
+    pub scene: &'a FlatScene,
+    /// The camera for the picture.
+    pub view: &'a View,
+    /// The size of the picture.
+    pub settings: &'a Settings,
+}
+
+/// Sets the AOVs of the pixels from `first` on by the hits of the rays through their centres.
+pub fn set_aovs(
+    aovs: &mut Aovs,
+    hits: &[HitRecord],
+    source: &AovSource,
+    frame: FrameRecord,
+    first: u32,
+) {
+    for (i, hit) in hits.iter().enumerate().filter(|(_, hit)| hit.instance != NONE) {
+        let (scene, width) = (source.scene, source.settings.width);
+        let in_picture = frame.first_pixel + i as u32;
+        let (x, y) = (in_picture % width, in_picture / width);
+        let ray = source.view.ray(x as f32 + 0.5, y as f32 + 0.5);
+        let position = ray.at(hit.distance);
+        let material = &scene.materials[hit.material as usize];
+        let color =
+            if material.ignores_vertex_colors { Vec3::ONE } else { Vec3::from_array(hit.color) };
+        let pixel = first as usize + i;
+        aovs.depth[pixel] = source.view.depth(position);
+        aovs.position[pixel] = position;
+        aovs.normal[pixel] = Vec3::from_array(hit.normal);
+        aovs.point_id[pixel] = point_id(scene, hit);
+        aovs.instance_id[pixel] = hit.instance;
+        aovs.albedo[pixel] = material.base_color * color;
+        if hit.surface != TRIANGLE {
+            aovs.support_count[pixel] = hit.support_count;
+            aovs.support_distance[pixel] = hit.support_distance;
+        }
+    }
+}
+
+fn point_id(scene: &FlatScene, hit: &HitRecord) -> u32 {
+    match scene.geometry(&scene.instances[hit.instance as usize]) {
+        FlatGeometry::Cloud(cloud) => cloud.points_of(SURFACES[hit.surface as usize]).id(hit.slot),
+        FlatGeometry::Mesh(mesh) => mesh.triangles.id(hit.slot),
+    }
+}

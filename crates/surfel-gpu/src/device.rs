@@ -1,0 +1,285 @@
+//! Devices: the list of them, and one opened for work.
+
+use crate::error::{Error, Result};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// A device on which pictures can be rendered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeviceInfo {
+    /// Name of the device.
+    pub name: String,
+    /// The kind of device.
+    pub kind: DeviceKind,
+    /// The interface by which it is used: Vulkan, Metal or Dx12.
+    pub api: String,
+    /// Name and version of the driver.
+    pub driver: String,
+    /// Size of the largest array that a kernel can read, in bytes.
+    pub max_array_bytes: u64,
+}
+
+/// The kind of a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DeviceKind {
+    /// A GPU with memory of its own.
+    Discrete,
+    /// A GPU that shares the processor's memory.
+    Integrated,
+    /// A GPU of a virtual machine.
+    Virtual,
+    /// A device of an unknown kind.
+    Other,
+    /// A driver that runs kernels on the processor.
+    Software,
+}
+
+impl DeviceKind {
+    /// Returns the kind in words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Discrete => "discrete GPU",
+            Self::Integrated => "integrated GPU",
+            Self::Virtual => "virtual GPU",
+            Self::Other => "other device",
+            Self::Software => "software on the CPU",
+        }
+    }
+}
+
+/// Number of storage buffers that a kernel uses at most.
+const N_STORAGE_BUFFERS: u64 = 8;
+/// Time after which a device that does not finish a piece of work counts as hung. Pieces take far less than a second.
+const WAIT_TIMEOUT: Duration = Duration::from_secs(60);
+
+/// Returns all devices, those first that are preferred.
+pub fn devices() -> Vec<DeviceInfo> {
+    adapters().iter().map(info).collect()
+}
+
+fn adapters() -> Vec<wgpu::Adapter> {
+    let mut description = wgpu::InstanceDescriptor::new_without_display_handle();
+    description.backends = wgpu::Backends::PRIMARY;
+    let instance = wgpu::Instance::new(description);
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    // The sort is stable: equal devices keep the order of the system.
+    adapters.sort_by_key(|adapter| kind(adapter) as u32);
+    adapters
+}
+
+fn kind(adapter: &wgpu::Adapter) -> DeviceKind {
+    match adapter.get_info().device_type {
+        wgpu::DeviceType::DiscreteGpu => DeviceKind::Discrete,
+        wgpu::DeviceType::IntegratedGpu => DeviceKind::Integrated,
+        wgpu::DeviceType::VirtualGpu => DeviceKind::Virtual,
+        wgpu::DeviceType::Other => DeviceKind::Other,
+        wgpu::DeviceType::Cpu => DeviceKind::Software,
+    }
+}
+
+fn info(adapter: &wgpu::Adapter) -> DeviceInfo {
+    let info = adapter.get_info();
+    let limits = adapter.limits();
+    DeviceInfo {
+        name: info.name,
+        kind: kind(adapter),
+        api: format!("{:?}", info.backend),
+        driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+        max_array_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
+    }
+}
+
+/// Returns the index of the device with this index, or with this text in its name, whatever its case; without a
+/// selector the first one.
+fn select(devices: &[DeviceInfo], selector: Option<&str>) -> Result<usize> {
+    if devices.is_empty() {
+        return Err(Error::NoDevice);
+    }
+    let Some(selector) = selector else { return Ok(0) };
+    let by_index = selector.parse().ok().filter(|index| *index < devices.len());
+    let text = selector.to_lowercase();
+    let by_name = || devices.iter().position(|device| device.name.to_lowercase().contains(&text));
+    let is_number = selector.parse::<usize>().is_ok();
+    by_index.or_else(|| if is_number { None } else { by_name() }).ok_or_else(|| {
+        let known = devices.iter().enumerate().map(|(i, device)| format!("{i} ({})", device.name));
+        Error::UnknownDevice {
+            found: selector.to_owned(),
+            known: known.collect::<Vec<_>>().join(", "),
+        }
+    })
+}
+
+/// An opened device.
+#[derive(Debug)]
+pub struct Gpu {
+    /// The device.
+    pub info: DeviceInfo,
+    /// Makes buffers and kernels.
+    pub device: wgpu::Device,
+    /// Takes work.
+    pub queue: wgpu::Queue,
+    /// The first failure, after which the device is not used any more.
+    failure: Arc<Mutex<Option<Error>>>,
+}
+
+impl Gpu {
+    /// Opens the device with this index or name, or the first one.
+    ///
+    /// # Errors
+    /// Fails if there is no such device, if it allows less than is needed, or if its driver refuses to open it.
+    pub fn open(selector: Option<&str>) -> Result<Self> {
+        let adapters = adapters();
+        let devices: Vec<DeviceInfo> = adapters.iter().map(info).collect();
+        let chosen = select(&devices, selector)?;
+        let (adapter, info) = (&adapters[chosen], devices[chosen].clone());
+        let limits = adapter.limits();
+        check_limits(&info, &limits)?;
+        let description = wgpu::DeviceDescriptor {
+            label: Some("surfel"),
+            required_limits: limits,
+            memory_hints: wgpu::MemoryHints::Performance,
+            ..wgpu::DeviceDescriptor::default()
+        };
+        let opened = pollster::block_on(adapter.request_device(&description));
+        let (device, queue) = opened.map_err(|error| Error::Device {
+            device: info.name.clone(),
+            reason: format!("cannot be opened: {error}"),
+        })?;
+        let failure = Arc::new(Mutex::new(None));
+        let (name, first) = (info.name.clone(), Arc::clone(&failure));
+        device
+            .on_uncaptured_error(Arc::new(move |error| keep_first(&first, of_wgpu(&name, error))));
+        let (name, first) = (info.name.clone(), Arc::clone(&failure));
+        device.set_device_lost_callback(move |_, reason| {
+            let reason = format!("was lost: {reason}");
+            keep_first(&first, Error::Device { device: name.clone(), reason });
+        });
+        Ok(Self { info, device, queue, failure })
+    }
+
+    /// Fails if the device has failed since it was opened.
+    pub fn check(&self) -> Result<()> {
+        let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        failure.clone().map_or(Ok(()), Err)
+    }
+
+    /// Waits until the device has done what it was told.
+    pub fn wait(&self) -> Result<()> {
+        let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(WAIT_TIMEOUT) };
+        let polled = self.device.poll(wait);
+        self.check()?;
+        polled.map(drop).map_err(|_| {
+            let secs = WAIT_TIMEOUT.as_secs();
+            self.keep_failure(format!("did not finish within {secs} seconds"))
+        })
+    }
+
+    /// Runs `work` and returns its result, or the error that it caused.
+    pub fn catch<T>(&self, what: &str, work: impl FnOnce() -> T) -> Result<T> {
+        let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
+        let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let result = work();
+        let errors = [validation.pop(), internal.pop(), memory.pop()].map(pollster::block_on);
+        match errors.into_iter().flatten().next() {
+            None => Ok(result),
+            Some(wgpu::Error::OutOfMemory { .. }) => {
+                Err(Error::OutOfMemory { device: self.info.name.clone() })
+            }
+            Some(error) => Err(Error::Device {
+                device: self.info.name.clone(),
+                reason: format!("refused {what}: {error}"),
+            }),
+        }
+    }
+
+    /// Makes a buffer.
+    pub fn buffer(
+        &self,
+        label: &str,
+        size: u64,
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer> {
+        let description =
+            wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
+        self.catch(label, || self.device.create_buffer(&description))
+    }
+
+    /// Keeps a failure of the device, and returns it.
+    pub fn keep_failure(&self, reason: String) -> Error {
+        let error = Error::Device { device: self.info.name.clone(), reason };
+        keep_first(&self.failure, error.clone());
+        error
+    }
+}
+
+fn keep_first(first: &Mutex<Option<Error>>, error: Error) {
+    first.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+}
+
+fn of_wgpu(device: &str, error: wgpu::Error) -> Error {
+    let device = device.to_owned();
+    match error {
+        wgpu::Error::OutOfMemory { .. } => Error::OutOfMemory { device },
+        error => Error::Device { device, reason: error.to_string() },
+    }
+}
+
+fn check_limits(info: &DeviceInfo, limits: &wgpu::Limits) -> Result<()> {
+    let n_buffers = u64::from(limits.max_storage_buffers_per_shader_stage);
+    let n_invocations = u64::from(limits.max_compute_invocations_per_workgroup);
+    for (limit, found, needed) in [
+        ("storage buffers a kernel", n_buffers, N_STORAGE_BUFFERS),
+        ("invocations a workgroup", n_invocations, u64::from(crate::shader::WORKGROUP_SIZE)),
+    ] {
+        if found < needed {
+            return Err(Error::Limit { device: info.name.clone(), limit, found, needed });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    //! Devices are chosen by index and by name, and limits are checked.
+
+    use super::*;
+
+    fn device(name: &str, kind: DeviceKind) -> DeviceInfo {
+        DeviceInfo {
+            name: name.into(),
+            kind,
+            api: "Vulkan".into(),
+            driver: String::new(),
+            max_array_bytes: 1 << 27,
+        }
+    }
+
+    #[test]
+    fn devices_are_chosen_by_index_and_by_name() {
+        let devices = [
+            device("NVIDIA H100", DeviceKind::Discrete),
+            device("llvmpipe (LLVM 15)", DeviceKind::Software),
+        ];
+        assert_eq!(select(&devices, None), Ok(0));
+        assert_eq!(select(&devices, Some("1")), Ok(1));
+        assert_eq!(select(&devices, Some("LLVMpipe")), Ok(1));
+        assert_eq!(select(&[], None), Err(Error::NoDevice));
+        // A number is an index, also where a name has it.
+        for unknown in ["2", "100", "radeon"] {
+            let known = "0 (NVIDIA H100), 1 (llvmpipe (LLVM 15))".to_owned();
+            let error = Error::UnknownDevice { found: unknown.into(), known };
+            assert_eq!(select(&devices, Some(unknown)), Err(error));
+        }
+    }
+
+    #[test]
+    fn devices_that_allow_too_little_are_refused() {
+        let info = device("small", DeviceKind::Integrated);
+        let enough = wgpu::Limits::default();
+        assert_eq!(check_limits(&info, &enough), Ok(()));
+        let limits = wgpu::Limits { max_storage_buffers_per_shader_stage: 4, ..enough };
+        let error = check_limits(&info, &limits).unwrap_err();
+        assert_eq!(error.to_string(), "small allows 4 storage buffers a kernel, 8 are needed");
+    }
+}

@@ -1,0 +1,57 @@
+// Splats: the discs close behind the nearest one, blended into a smooth surface (Wiesmeier 2011, 'multi').
+
+// The weighted sums over the discs of a ray.
+struct SplatSums {
+    // Normal of the nearest disc, flipped toward the ray's origin.
+    nearest: vec3<f32>,
+    normal: vec3<f32>,
+    color: vec3<f32>,
+    total_weight: f32,
+}
+
+fn no_discs(nearest: vec3<f32>, direction: vec3<f32>) -> SplatSums {
+    let none = vec3<f32>(0.0);
+    return SplatSums(flip_to_hemisphere(nearest, -direction), none, none, 0.0);
+}
+
+// Adds a disc, which the ray hits at `offset` from its centre.
+fn with_disc(sums: SplatSums, disc: Surfel, offset: vec3<f32>) -> SplatSums {
+    let weight = max(1.0 - sqrt(dot(offset, offset)) / disc.radius, 1e-4);
+    let is_opposed = visit.surface == SPLAT && dot(disc.normal, sums.nearest) < 0.0;
+    return SplatSums(
+        sums.nearest,
+        sums.normal + select(weight, -weight, is_opposed) * disc.normal,
+        sums.color + weight * disc.color,
+        sums.total_weight + weight,
+    );
+}
+
+// Returns the unit normal, which faces the ray's origin.
+fn splat_normal(sums: SplatSums, direction: vec3<f32>) -> vec3<f32> {
+    // Opposite normals may cancel in splat-mean; the normal of the nearest disc is then as good as any.
+    let normal = normalize_or(sums.normal, sums.nearest);
+    if visit.surface == SPLAT {
+        return clamp_to_visible(normal, direction);
+    }
+    return flip_to_hemisphere(normal, -direction);
+}
+
+// Returns `normal` or its negative, whichever lies in the hemisphere of `guide`.
+fn flip_to_hemisphere(normal: vec3<f32>, guide: vec3<f32>) -> vec3<f32> {
+    return select(normal, -normal, dot(normal, guide) < 0.0);
+}
+
+// Returns `vector` at unit length, or `fallback` if its length is close to zero.
+fn normalize_or(vector: vec3<f32>, fallback: vec3<f32>) -> vec3<f32> {
+    let squared = dot(vector, vector);
+    return select(fallback, vector / sqrt(max(squared, 1e-30)), 1e-30 < squared);
+}
+
+// Returns the nearest normal that does not face away from the ray.
+fn clamp_to_visible(normal: vec3<f32>, direction: vec3<f32>) -> vec3<f32> {
+    let along = dot(normal, direction);
+    if along <= 0.0 {
+        return normal;
+    }
+    return normalize_or(normal - along * direction, -direction);
+}

@@ -1,0 +1,21 @@
+// The nearest disc on a ray.
+
+fn splat(ray: Ray) -> SurfaceHit {
+    let nearest = closest_hit(ray);
+    if nearest.slot == NONE {
+        return missed_surface();
+    }
+    let surfel = slot_surfel(nearest.slot);
+    let normal = facing(surfel.normal, ray.direction);
+    return point_hit(nearest.distance, nearest.slot, surfel.radius, normal, surfel.color);
+}
+
+// Returns the number of the discs that make the hit.
+fn n_hit_discs() -> u32 {
+    return 1u;
+}
+
+// Returns the slot of one of these discs.
+fn hit_disc(disc_idx: u32) -> u32 {
+    return nearest_hit.slot;
+}

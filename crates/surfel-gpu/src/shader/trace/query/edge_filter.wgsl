@@ -1,0 +1,15 @@
+// The filter by which only hits within the edge of the surface count.
+
+fn visit_region_block(block_idx: u32) {
+    add_neighbors(block_idx);
+}
+
+fn accepts_hit(ray: Ray, distance: f32, slot: u32) -> bool {
+    if visit.has_edge_test == 0u {
+        return true;
+    }
+    let surfel = slot_surfel(slot);
+    let normal = facing(surfel.normal, ray.direction);
+    let radius = surfel.radius;
+    return is_enclosed(CandidateHit(ray_at(ray, distance), normal, ray.direction, radius), true);
+}

@@ -1,0 +1,135 @@
+// The smooth surface along a ray: from the disc that the ray hits to the sphere fitted to the points around.
+
+// The question that a query for blocks answers.
+const FIT: u32 = 0u;
+const FINISH: u32 = 1u;
+const NEIGHBORS: u32 = 2u;
+
+var<private> question: u32;
+var<private> sphere_sums: SphereSums;
+var<private> overhang: OverhangSums;
+var<private> colors: ColorSums;
+var<private> nearest_squared: f32;
+var<private> nearest_slot: u32;
+// The position that points are relative to.
+var<private> fit_position: vec3<f32>;
+
+struct SmoothHit {
+    is_hit: bool,
+    distance: f32,
+    normal: vec3<f32>,
+}
+
+fn visit_region_block(block_idx: u32) {
+    if question == NEIGHBORS {
+        add_neighbors(block_idx);
+        return;
+    }
+    let block = load_block(block_idx);
+    for (var lane = 0u; lane < 8u; lane++) {
+        let point = block_point(block, lane, fit_position);
+        if 0.0 < point.radius {
+            if question == FIT {
+                add_fit_point(&sphere_sums, fit_point(point));
+            } else {
+                finish_with_point(point, 8u * block_idx + lane);
+            }
+        }
+    }
+}
+
+fn finish_with_point(point: Point, slot: u32) {
+    let fit = fit_point(point);
+    if !is_within_reach(fit, overhang.per_radius) {
+        return;
+    }
+    if is_neighbor(neighborhood.hit, point.center) {
+        add_neighbor(&neighborhood, point.center, point.normal);
+    }
+    add_overhang_point(&overhang, fit);
+    if !HAS_COLORS {
+        return;
+    }
+    if visit.blends_colors == 1u {
+        colors = with_color(colors, fit, slot_color(slot));
+    }
+    let squared = dot(point.center, point.center);
+    if squared < nearest_squared || squared == nearest_squared && slot < nearest_slot {
+        nearest_squared = squared;
+        nearest_slot = slot;
+    }
+}
+
+// Asks for the points within reach of a position.
+fn query_points(task: u32, position: vec3<f32>, radius: f32) {
+    question = task;
+    fit_position = position;
+    query_box(position - FIT_REACH * radius, position + FIT_REACH * radius);
+    question = NEIGHBORS;
+}
+
+// Finds where a ray hits the surface near the disc that it hits.
+fn find_surface(ray: Ray, disc_distance: f32, disc: Surfel) -> SmoothHit {
+    let missed = SmoothHit(false, 0.0, vec3<f32>(0.0));
+    var normal = facing(disc.normal, ray.direction);
+    var distance = disc_distance;
+    var last_step = 0.0;
+    for (var fit = 1u; fit <= MAX_FITS; fit++) {
+        sphere_sums = no_fit_points(normal, disc.radius);
+        query_points(FIT, ray_at(ray, distance), disc.radius);
+        let sphere = intersect_fit(sphere_sums, ray.direction);
+        let step = damped(sphere.step, last_step);
+        last_step = step;
+        let moved = distance + step;
+        if !sphere.is_hit || MAX_DISTANCE_FROM_DISC * disc.radius < abs(moved - disc_distance) {
+            return missed;
+        }
+        distance = moved;
+        normal = facing(sphere.normal, ray.direction);
+        if abs(sphere.step) <= FIT_TOLERANCE * disc.radius {
+            break;
+        }
+        if fit == MAX_FITS && MAX_LAST_STEP * disc.radius < abs(sphere.step) {
+            return missed;
+        }
+    }
+    let is_in_range = ray.t_min <= distance && distance <= ray.t_max;
+    if !is_in_range || !is_accepted(ray, distance, normal, disc) {
+        return missed;
+    }
+    return SmoothHit(true, distance, normal);
+}
+
+// Returns true if the points enclose a hit, and finds its nearest point and its colour.
+fn is_accepted(ray: Ray, distance: f32, normal: vec3<f32>, disc: Surfel) -> bool {
+    if !HAS_COLORS && visit.has_edge_test == 0u {
+        return true;
+    }
+    let position = ray_at(ray, distance);
+    let hit = CandidateHit(position, normal, ray.direction, disc.radius);
+    neighborhood = no_neighbors(hit);
+    overhang = no_overhang(normal, disc.center - position, disc.radius);
+    colors = ColorSums(0.0, vec3<f32>(0.0));
+    nearest_squared = NO_LIMIT;
+    query_points(FINISH, position, disc.radius);
+    if visit.has_edge_test == 0u {
+        return true;
+    }
+    if sticks_out(overhang) {
+        return false;
+    }
+    if is_surrounded(neighborhood, false) && !is_sparse(neighborhood) {
+        return true;
+    }
+    let radius = visit.edge_retest_factor * disc.radius;
+    return is_enclosed(CandidateHit(position, normal, ray.direction, radius), false);
+}
+
+// Returns a step along the ray after another one. Where it would turn back, it ends at the root of the line through
+// both (the secant method).
+fn damped(step: f32, last_step: f32) -> f32 {
+    if step * last_step < 0.0 {
+        return step * last_step / (last_step - step);
+    }
+    return step;
+}

@@ -1,0 +1,18 @@
+// Points as solids: spheres and capsules.
+
+fn surface_hit(ray: Ray) -> SurfaceHit {
+    let nearest = closest_hit(ray);
+    if nearest.slot == NONE {
+        return missed_surface();
+    }
+    let surfel = slot_surfel(nearest.slot);
+    let position = ray_at(ray, nearest.distance);
+    var outward = position - surfel.center;
+    if SHAPE == CAPSULE {
+        outward = capsule_normal(position, surfel);
+    }
+    let squared = dot(outward, outward);
+    outward = select(-ray.direction, outward * inverseSqrt(max(squared, 1e-37)), 1e-37 < squared);
+    let normal = select(-outward, outward, dot(outward, ray.direction) < 0.0);
+    return point_hit(nearest.distance, nearest.slot, surfel.radius, normal, surfel.color);
+}

@@ -1,0 +1,39 @@
+// The surface of discs and splats: the first hit that the edge test does not reject.
+
+fn visit_region_block(block_idx: u32) {
+    add_neighbors(block_idx);
+}
+
+fn surface_hit(first_ray: Ray) -> SurfaceHit {
+    var ray = first_ray;
+    for (var n_rejected = 0u; n_rejected < MAX_REJECTED_HITS; n_rejected++) {
+        let found = splat(ray);
+        if !found.is_hit || visit.has_edge_test == 0u {
+            return found;
+        }
+        let position = ray_at(ray, found.distance);
+        let candidate = CandidateHit(position, found.normal, ray.direction, found.radius);
+        if is_enclosed_by_blocks(candidate) || is_enclosed(candidate, true) {
+            return found;
+        }
+        let behind = found.distance + RESTART_OFFSET * found.radius;
+        ray.t_min = max(behind, found.distance * (1.0 + 2.0 * EPSILON));
+    }
+    return missed_surface();
+}
+
+// Returns true if a hit is enclosed already by the points in the blocks of the discs that the ray hits.
+fn is_enclosed_by_blocks(hit: CandidateHit) -> bool {
+    neighborhood = no_neighbors(hit);
+    for (var i = 0u; i < n_hit_discs(); i++) {
+        let block_idx = hit_disc(i) >> 3u;
+        var is_new = true;
+        for (var earlier = 0u; earlier < i; earlier++) {
+            is_new = is_new && hit_disc(earlier) >> 3u != block_idx;
+        }
+        if is_new {
+            add_neighbors(block_idx);
+        }
+    }
+    return is_surrounded(neighborhood, true) && !is_sparse(neighborhood);
+}

@@ -1,0 +1,142 @@
+//! The renderers that draw the same pictures, and how far they may differ.
+
+use std::collections::BTreeSet;
+use std::sync::{Mutex, OnceLock};
+use std::thread;
+use surfel_core::flat::FlatScene;
+use surfel_core::image::Image;
+use surfel_core::progress::NoProgress;
+use surfel_core::render::{CpuRenderer, Renderer, Settings};
+use surfel_core::trace::Simd;
+use surfel_gpu::GpuRenderer;
+
+/// How far a picture of a GPU may differ from that of the CPU.
+///
+/// Both trace the same rays against the same numbers, but a GPU fuses multiplications and additions, divides and takes
+/// roots with an error of some units in the last place, and has a sine of its own. A ray within such an error of the rim
+/// of a disc hits it on one of them only.
+#[derive(Clone, Copy, Debug)]
+pub struct Tolerance {
+    /// The greatest fraction of pixels whose nearest point may be another one, as between two points that are
+    /// equally near.
+    pub other_points: f32,
+    /// The greatest difference of a channel that is rounding alone: the colour of a pixel is a sum of up to a hundred
+    /// terms, each rounded.
+    pub rounding: f32,
+    /// The greatest fraction of pixels that differ by more. Each of a pixel's hundred rays may pass a rim.
+    pub other_pixels: f32,
+    /// The greatest difference of a mean over all pixels: rays that pass a rim do so on either side.
+    pub mean: f32,
+    /// The greatest difference in 8-bit steps from a picture of four samples a pixel: a camera ray that hits something
+    /// else is a fourth of its pixel.
+    pub steps: u8,
+}
+
+/// The tolerance of all scenes.
+pub const TOLERANCE: Tolerance =
+    Tolerance { other_points: 1e-3, rounding: 1e-3, other_pixels: 5e-3, mean: 1e-4, steps: 64 };
+
+/// The difference between two pictures, in the terms of [`Tolerance`].
+#[derive(Clone, Copy, Debug)]
+pub struct Difference {
+    /// Fraction of pixels whose nearest point is another one; 0 without AOVs.
+    pub other_points: f32,
+    /// Fraction of pixels that differ by more than rounding.
+    pub other_pixels: f32,
+    /// Difference of the means over all pixels.
+    pub mean: f32,
+}
+
+impl Difference {
+    /// Compares two pictures of one size.
+    pub fn new(a: &Image, b: &Image) -> Self {
+        assert_eq!((a.width, a.height), (b.width, b.height));
+        let n_pixels = a.color.len() as f32;
+        let pairs = || a.color.iter().zip(&b.color);
+        // NaN is not equal to anything.
+        let is_equal = |(a, b): (&[f32; 4], &[f32; 4])| {
+            a.iter().zip(b).all(|(a, b)| (a - b).abs() <= TOLERANCE.rounding)
+        };
+        let channels = |pixel: &[f32; 4]| f64::from(pixel.iter().sum::<f32>());
+        let sum: f64 = pairs().map(|(a, b)| channels(a) - channels(b)).sum();
+        let n_other_points = match (&a.aovs, &b.aovs) {
+            (Some(a), Some(b)) => {
+                let a = a.point_id.iter().zip(&a.instance_id);
+                let b = b.point_id.iter().zip(&b.instance_id);
+                a.zip(b).filter(|(a, b)| a != b).count()
+            }
+            _ => 0,
+        };
+        Self {
+            other_points: n_other_points as f32 / n_pixels,
+            other_pixels: pairs().filter(|pair| !is_equal(*pair)).count() as f32 / n_pixels,
+            mean: (sum / f64::from(4.0 * n_pixels)).abs() as f32,
+        }
+    }
+
+    /// Returns true if the pictures are within the tolerance.
+    pub fn is_allowed(&self) -> bool {
+        self.other_points <= TOLERANCE.other_points
+            && self.other_pixels <= TOLERANCE.other_pixels
+            && self.mean <= TOLERANCE.mean
+    }
+}
+
+/// Returns the CPU's renderer.
+pub fn cpu() -> CpuRenderer {
+    CpuRenderer { simd: Simd::detect() }
+}
+
+/// Returns the renderer of this machine's first GPU, or of the one that the variable `SURFEL_DEVICE` names. Without
+/// any, says so in a line that is counted.
+pub fn gpu() -> Option<&'static GpuRenderer> {
+    static GPU: OnceLock<Result<GpuRenderer, surfel_gpu::Error>> = OnceLock::new();
+    let open = || GpuRenderer::open(std::env::var("SURFEL_DEVICE").ok().as_deref());
+    match GPU.get_or_init(open) {
+        Ok(gpu) => Some(gpu),
+        Err(error) => {
+            report_skipped(&error.to_string());
+            None
+        }
+    }
+}
+
+/// Prints the line by which `test.sh` counts a skipped test, once for each test: each runs on a thread of its name.
+#[expect(clippy::print_stdout, reason = "the line of a test that cannot run")]
+fn report_skipped(reason: &str) {
+    static REPORTED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let test = thread::current().name().unwrap_or_default().to_owned();
+    if REPORTED.lock().is_ok_and(|mut reported| reported.insert(test)) {
+        println!("skipped: {reason}");
+    }
+}
+
+/// Renders a scene on a renderer.
+pub fn render(renderer: &dyn Renderer, scene: &FlatScene, settings: &Settings) -> Image {
+    renderer.render(scene, settings, &NoProgress).unwrap_or_else(|error| panic!("{error}")).0
+}
+
+#[cfg(test)]
+mod tests {
+    //! Differences are found where they are.
+
+    use super::*;
+    use surfel_core::image::Image;
+
+    #[test]
+    fn differences_count_what_differs() {
+        let a = Image::with_aovs(20, 10);
+        assert!(Difference::new(&a, &a).is_allowed());
+        let mut b = a.clone();
+        b.color[3][1] = 0.5;
+        let difference = Difference::new(&a, &b);
+        assert_eq!((difference.other_pixels, difference.other_points), (0.005, 0.0));
+        assert!(!difference.is_allowed() && 6e-4 < difference.mean);
+        let mut b = a.clone();
+        b.color[3][1] = f32::NAN;
+        assert!(!Difference::new(&a, &b).is_allowed());
+        let mut b = a.clone();
+        b.aovs.as_mut().unwrap().point_id[7] = 1;
+        assert!(!Difference::new(&a, &b).is_allowed());
+    }
+}

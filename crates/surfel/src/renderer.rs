@@ -1,0 +1,168 @@
+//! The renderer of a description: the CPU, or a GPU where one is demanded or is likely to be faster.
+
+use crate::description::{Backend, RunSettings};
+use crate::error::Result;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use surfel_core::flat::FlatScene;
+use surfel_core::image::Image;
+use surfel_core::progress::Progress;
+use surfel_core::render::{CpuRenderer, RenderRegion, RenderStats, Renderer, Settings};
+use surfel_core::trace::Simd;
+
+#[cfg(not(feature = "gpu"))]
+use crate::no_gpu::{DeviceKind, GpuRenderer, unsupported};
+#[cfg(feature = "gpu")]
+use surfel_gpu::{DeviceKind, GpuRenderer, unsupported};
+
+/// Number of rays of a picture from which on a GPU is taken: with fewer, the CPU is done before a GPU's kernels are
+/// compiled. It is an estimate, not a measurement.
+const MIN_RAYS: u64 = 1 << 24;
+/// Number of points for each ray above which the upload of the points would take longer than their picture.
+const MAX_POINTS_PER_RAY: u64 = 20;
+
+/// Renders on the CPU or on a GPU, as the settings of a run say.
+#[derive(Debug)]
+pub struct SceneRenderer {
+    cpu: CpuRenderer,
+    backend: Backend,
+    device: Option<String>,
+    /// The GPU, once it was opened; none if there is none that is worth it.
+    gpu: OnceLock<Option<GpuRenderer>>,
+    /// True if the last picture was rendered on the GPU.
+    was_on_gpu: AtomicBool,
+    has_reported_device: AtomicBool,
+}
+
+impl SceneRenderer {
+    /// Makes the renderer, and opens the device if a GPU is demanded.
+    ///
+    /// # Errors
+    ///
+    /// Fails if a GPU is demanded and there is no such device, or if it cannot be opened.
+    pub fn new(settings: &RunSettings) -> Result<Self> {
+        let renderer = Self {
+            cpu: CpuRenderer { simd: Simd::detect() },
+            backend: settings.backend(),
+            device: settings.device.clone(),
+            gpu: OnceLock::new(),
+            was_on_gpu: AtomicBool::new(false),
+            has_reported_device: AtomicBool::new(false),
+        };
+        if renderer.backend == Backend::Gpu {
+            let opened = GpuRenderer::open(renderer.device.as_deref());
+            let opened = opened.map_err(surfel_core::Error::from)?;
+            _ = renderer.gpu.set(Some(opened));
+        }
+        Ok(renderer)
+    }
+
+    /// Returns the SIMD level of the kernels that run on the CPU.
+    pub fn simd(&self) -> Simd {
+        self.cpu.simd
+    }
+
+    /// Returns the name of the GPU that rendered the last picture; none if the CPU did.
+    pub fn gpu_name(&self) -> Option<&str> {
+        let gpu = self.gpu.get()?.as_ref()?;
+        self.was_on_gpu.load(Ordering::Relaxed).then(|| gpu.device().name.as_str())
+    }
+
+    /// Returns a GPU that may be taken unasked: one that is not emulated, or that is named.
+    fn automatic_gpu(&self) -> Option<&GpuRenderer> {
+        let open = || {
+            let opened = GpuRenderer::open(self.device.as_deref()).ok()?;
+            let is_emulated = opened.device().kind == DeviceKind::Software;
+            (self.device.is_some() || !is_emulated).then_some(opened)
+        };
+        self.gpu.get_or_init(open).as_ref()
+    }
+
+    /// Renders on the GPU if that is likely to be faster and possible; otherwise returns none, and says why if there is a
+    /// GPU.
+    fn try_gpu(
+        &self,
+        scene: &FlatScene,
+        settings: &Settings,
+        region: RenderRegion,
+        progress: &dyn Progress,
+    ) -> Option<surfel_core::Result<(Image, RenderStats)>> {
+        if !is_worth_upload(scene, settings, region) {
+            return None;
+        }
+        let gpu = self.automatic_gpu()?;
+        let missing = unsupported(scene);
+        if !missing.is_empty() {
+            let reason = format!("on the CPU: the GPU does not render {} yet", missing.join(", "));
+            self.report(progress, &reason);
+            return None;
+        }
+        match gpu.render_region(scene, settings, region, progress) {
+            Err(surfel_core::Error::Renderer(reason)) => {
+                progress.note(&format!("on the CPU: {reason}"));
+                None
+            }
+            result => {
+                self.report(progress, &format!("on the GPU: {}", gpu.device().name));
+                Some(result)
+            }
+        }
+    }
+
+    /// Reports the device once.
+    fn report(&self, progress: &dyn Progress, line: &str) {
+        if !self.has_reported_device.swap(true, Ordering::Relaxed) {
+            progress.choice(line, &["backend", "device"]);
+        }
+    }
+}
+
+impl Renderer for SceneRenderer {
+    fn render_region(
+        &self,
+        scene: &FlatScene,
+        settings: &Settings,
+        region: RenderRegion,
+        progress: &dyn Progress,
+    ) -> surfel_core::Result<(Image, RenderStats)> {
+        let on_gpu = match (self.backend, self.gpu.get()) {
+            (Backend::Cpu, _) => None,
+            (Backend::Gpu, Some(Some(gpu))) => {
+                Some(gpu.render_region(scene, settings, region, progress))
+            }
+            _ => self.try_gpu(scene, settings, region, progress),
+        };
+        self.was_on_gpu.store(on_gpu.is_some(), Ordering::Relaxed);
+        on_gpu.unwrap_or_else(|| self.cpu.render_region(scene, settings, region, progress))
+    }
+}
+
+/// Returns true if a picture takes so many rays, and the scene has so few points for them, that a GPU is likely to be
+/// faster.
+fn is_worth_upload(scene: &FlatScene, settings: &Settings, region: RenderRegion) -> bool {
+    let n_points = scene.clouds().map(|cloud| cloud.points.ids.len() as u64).sum();
+    let n_pixels = u64::from(settings.width) * u64::from(region.n_rows());
+    let n_light_rays = scene.lights.len() as u64 * u64::from(settings.light_samples);
+    let n_samples = u64::from(region.n_samples());
+    let n_light_rays = n_light_rays * n_samples / u64::from(settings.samples_per_pixel.max(1));
+    is_worth(n_points, n_pixels * (n_samples + n_light_rays))
+}
+
+fn is_worth(n_points: u64, n_rays: u64) -> bool {
+    MIN_RAYS <= n_rays && n_points <= MAX_POINTS_PER_RAY.saturating_mul(n_rays)
+}
+
+#[cfg(test)]
+mod tests {
+    //! A GPU is taken for large pictures, and not for huge clouds in small ones.
+
+    use super::*;
+
+    #[test]
+    fn large_pictures_are_worth_an_upload() {
+        let full_hd = 1920 * 1080 * 36;
+        assert!(is_worth(1_000_000, full_hd) && is_worth(100_000_000, full_hd));
+        assert!(!is_worth(1_000_000, 200 * 150 * 17));
+        assert!(!is_worth(1_000_000_000, MIN_RAYS));
+    }
+}
