@@ -26,8 +26,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use surfel::{SceneDescription, SceneRenderer};
 use surfel::resolve::check_files;
+use surfel::{SceneDescription, SceneRenderer};
 use surfel_core::progress::Progress;
 use surfel_web::{Error, SceneProvider, Server, TlsError, TlsIdentity};
 
