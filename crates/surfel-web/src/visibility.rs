@@ -1,4 +1,4 @@
-//! Which points a page's camera sees: those that no surface hides.
+//! Visibility of points: a page's camera sees those that no surface hides.
 
 use crate::scene_provider::{Error, Result};
 use crate::view::ViewState;

@@ -24,7 +24,8 @@ const MIN_ON_SURFACES: f32 = 0.5;
 const TRUSTED_DISCS: f32 = 0.95;
 /// Maximum ratio of the radius of a ball or capsule to that of the nearest disc.
 const MAX_STRAY_RATIO: f32 = 2.0;
-/// The same of a disc beyond those that is far from it: the spacing of a scan grows with distance, but not at once.
+/// Maximum ratio of the radius of a larger disc, far from all these, to that of the nearest: the spacing of a scan grows with
+/// distance, but not at once.
 const MAX_DISC_RATIO: f32 = 4.0;
 /// Ratio of the distance to the nearest disc to its radius from which a point is no part of its surroundings.
 const FAR_RATIO: f32 = 8.0;
