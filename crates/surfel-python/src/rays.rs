@@ -6,7 +6,7 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
-use surfel::live_scene::LiveView;
+use surfel::live_view::LiveView;
 use surfel::ray_query::{RayHits, WorldRays};
 use surfel_core::image::NO_ID;
 use surfel_core::math::morton_decode;

@@ -5,6 +5,7 @@ use crate::dynamic_resolution::ResolutionController;
 use crate::encode::{self, Pixels};
 use crate::frame::{Frame, PlacedFile, Quality};
 use crate::keyframe::{Keyframe, keyframe_size};
+use crate::sample_counts::{REST_SAMPLES, Stage, of_samples, rest_samples};
 use crate::scene_provider::{PicturePart, PreparedScene};
 use crate::view::ViewState;
 use std::sync::Arc;
@@ -84,17 +85,6 @@ const REFINED_JPEG_QUALITY: u8 = 92;
 const SLICE_SECS: f64 = 0.015;
 /// Minimum number of rows of a slice, unless rows take long: each slice has a fixed cost.
 const MIN_SLICE_ROWS: u32 = 8;
-/// Numbers of samples at which a picture at rest that goes on after it was finished is sent again.
-const REST_SAMPLES: [u32; 2] = [16, 64];
-
-/// How far a picture is refined.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// To the samples of the settings.
-    Finish,
-    /// To those of a picture at rest.
-    Rest,
-}
 
 impl Accumulator {
     /// Version of the view that the last draft showed.
@@ -461,20 +451,6 @@ impl Accumulator {
         scene.camera = view.camera?;
         Some(scene)
     }
-}
-
-/// Returns the number of samples of a finished picture. All samples of rasterised points are equal.
-fn of_samples(prepared: &PreparedScene) -> u32 {
-    let is_rasterized = uses_rasterizer(&prepared.flat).unwrap_or(false);
-    if is_rasterized { 1 } else { prepared.render_settings.samples_per_pixel }
-}
-
-/// Returns the number of samples that a picture at rest goes on to after it was finished.
-fn rest_samples(prepared: &PreparedScene) -> u32 {
-    let of_samples = of_samples(prepared);
-    let goes_on =
-        prepared.goes_on_at_rest && of_samples == prepared.render_settings.samples_per_pixel;
-    if goes_on { REST_SAMPLES[1].max(of_samples) } else { of_samples }
 }
 
 /// Returns settings of a picture of this size that shows the place of each pixel, for as few rays as there can be.

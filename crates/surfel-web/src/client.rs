@@ -1,8 +1,9 @@
 //! One page as the render loop sees it: the view it shows, and the pictures that are on their way to it.
 
-use crate::accumulator::{Accumulator, Stage};
+use crate::accumulator::Accumulator;
 use crate::frame::{Frame, Quality};
 use crate::outgoing::Outgoing;
+use crate::sample_counts::Stage;
 use crate::scene_provider::Error;
 use crate::view::ViewState;
 use serde_json::{Value, json};

@@ -19,6 +19,7 @@ mod encode;
 mod frame;
 mod view;
 mod visibility;
+mod sample_counts;
 mod accumulator;
 mod outgoing;
 mod client;

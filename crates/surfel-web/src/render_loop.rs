@@ -1,8 +1,8 @@
 //! The render loop: one thread that renders for all clients in turn.
 
-use crate::accumulator::Stage;
 use crate::client::{Client, MOVING_PAUSE};
 use crate::dynamic_resolution::draft_secs;
+use crate::sample_counts::Stage;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};

@@ -78,6 +78,7 @@ mod height_map;
 pub mod animate;
 pub mod prepare;
 mod scene_keys;
+pub mod live_view;
 pub mod live_scene;
 
 pub use built_scene::BuiltScene;

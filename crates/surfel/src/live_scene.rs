@@ -2,13 +2,11 @@
 
 use crate::built_scene::{exposure_stops, planes_before, source_indices};
 use crate::cache::Lru2;
-use crate::crs::{Unit, georeference};
+use crate::crs::Unit;
 use crate::description::{Exposure, Interior, Invalid, SceneDescription};
 use crate::error::{Error, Result};
-use crate::overlay::Overlay;
-use crate::picture::{RenderedImage, image_options};
-use crate::ray_query::RayCaster;
-use crate::raycast::world_bounds;
+use crate::live_view::{LiveView, SceneTrees};
+use crate::picture::RenderedImage;
 use crate::renderer::SceneRenderer;
 use crate::resolve::{
     AutoSettings, KeepOptions, LoadedScene, common_legend, coordinate_system, expose, finish_graph,
@@ -17,19 +15,17 @@ use crate::resolve::{
 use crate::scene_keys::{grouping_key, preparation_key, tree_key};
 use rayon::ThreadPool;
 use std::sync::{Arc, OnceLock};
-use surfel_core::flat::{FlatScene, Instance};
-use surfel_core::image::{Image, NO_ID};
-use surfel_core::math::{Aabb, DVec3, Vec3};
+use surfel_core::flat::FlatScene;
+use surfel_core::image::Image;
+use surfel_core::math::{Aabb, DVec3};
 use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
 use surfel_core::render::{self, RenderRegion, RenderStats, Renderer, Settings};
-use surfel_core::scene::color::Legend;
 use surfel_core::scene::{
     Background, Camera, ClipPlane, Geometry, Graph, Projection, Scene, inlier_bounds,
 };
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
-use surfel_formats::Georeference;
 use thread_priority::ThreadPriority;
 
 /// A loaded scene that is shown under one description after another. Threads share it.
@@ -68,92 +64,6 @@ pub enum UseCase {
 struct Made {
     prepared: Lru2<Vec<PreparedCloud>>,
     trees: Lru2<SceneTrees>,
-}
-
-/// Trees over the points of a scene, and what shows which point is which.
-#[derive(Debug)]
-pub struct SceneTrees {
-    /// The graph without the points.
-    pub graph: Graph,
-    /// The flat scene without lights.
-    pub flat: FlatScene,
-    /// For each geometry, the index that each point had when it was read; empty for triangles.
-    pub source_indices: Vec<Vec<u32>>,
-    /// The meaning of the colours of the first cloud.
-    pub legend: Legend,
-}
-
-/// A scene under one description, at one time.
-#[derive(Clone, Debug)]
-pub struct LiveView {
-    /// The content of the files.
-    pub loaded: Arc<LoadedScene>,
-    /// The arrays that rays are traced against, with camera and exposed lights.
-    pub flat: FlatScene,
-    /// Size and quality of pictures.
-    pub settings: Settings,
-    /// The complete description, with everything that was chosen and the exposure.
-    pub description: SceneDescription,
-    /// True if the scene moves the camera.
-    pub moves_camera: bool,
-    /// Unit of the coordinates.
-    unit: Unit,
-    /// The trees, which several views share.
-    pub trees: Arc<SceneTrees>,
-}
-
-impl LiveView {
-    /// Returns the legend, scale bar, north arrow and caption of pictures of the view.
-    pub fn overlay(&self) -> Overlay {
-        let up = self.description.world.up.unwrap_or(Vec3::Z);
-        Overlay::of(&self.description.picture, self.trees.legend.clone(), (up, self.unit))
-    }
-
-    /// Draws the overlay onto a picture of the view, which becomes a file as the description says.
-    pub fn finished(&self, mut image: Image) -> RenderedImage {
-        self.overlay().draw(&mut image, &self.flat.camera);
-        let mut options = image_options(&self.description, self.flat.origin);
-        options.georeference = self.georeference();
-        RenderedImage::new(image, options)
-    }
-
-    /// Returns where the pixels of a plan to scale lie.
-    fn georeference(&self) -> Option<Georeference> {
-        let system = coordinate_system(&self.loaded, &self.description);
-        let size = (self.settings.width, self.settings.height);
-        let place = georeference(&self.flat.camera, size, system.as_ref());
-        place.filter(|_| self.description.plan.is_to_scale())
-    }
-
-    /// Returns for each instance the number of what it shows: first come the files without an object, of which those
-    /// together that became one cloud, then the objects.
-    pub fn contents(&self) -> Vec<u32> {
-        let content = |instance: &Instance| self.loaded.content_of(instance.node_idx as usize);
-        let contents = self.flat.instances.iter().map(content);
-        contents.map(|content| content.map_or(NO_ID, |content| content as u32)).collect()
-    }
-
-    /// Returns the corners of a box around everything, in world coordinates: least and greatest.
-    pub fn bounds(&self) -> [[f64; 3]; 2] {
-        world_bounds(&self.flat)
-    }
-
-    /// Returns what casts rays at the view.
-    pub fn ray_caster(&self, simd: Simd) -> RayCaster<'_> {
-        RayCaster { scene: &self.flat, simd, sources: self.sources() }
-    }
-
-    /// Returns for each instance the index that each of its points had when it was read; empty for triangles.
-    pub fn sources(&self) -> Vec<&[u32]> {
-        let source = |instance: &Instance| {
-            let node = self.trees.graph.nodes.get(instance.node_idx as usize)?;
-            let is_shown = |material: usize| material == instance.material_idx as usize;
-            let primitive =
-                node.primitives.iter().find(|primitive| is_shown(primitive.material))?;
-            Some(&self.trees.source_indices.get(primitive.geometry)?[..])
-        };
-        self.flat.instances.iter().map(|instance| source(instance).unwrap_or_default()).collect()
-    }
 }
 
 impl LiveScene {
@@ -481,6 +391,7 @@ mod tests {
     use std::thread;
     use std::time::Duration;
     use surfel_core::math::Random;
+    use surfel_core::math::Vec3;
     use surfel_core::points::PointCloud;
     use surfel_core::progress::NoProgress;
     use surfel_formats::SaveOptions;

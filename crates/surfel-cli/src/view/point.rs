@@ -2,7 +2,7 @@
 
 use super::coordinates::{coordinates, shortest};
 use serde_json::{Value, json};
-use surfel::live_scene::SceneTrees;
+use surfel::live_view::SceneTrees;
 use surfel::resolve::LoadedScene;
 use surfel_core::flat::{FlatGeometry, FlatScene};
 use surfel_core::math::DAffine3;

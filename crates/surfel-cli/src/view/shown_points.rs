@@ -2,7 +2,7 @@
 
 use std::io::Read;
 use std::sync::Arc;
-use surfel::live_scene::LiveView;
+use surfel::live_view::LiveView;
 use surfel_core::math::{DAffine3, DMat3};
 use surfel_core::points::{PointCloud, merge};
 use surfel_core::progress::Progress;

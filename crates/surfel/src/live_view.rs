@@ -1,0 +1,104 @@
+//! A scene under one description, at one time: what is drawn, and what its pixels and rays lead back to.
+
+use crate::crs::{Unit, georeference};
+use crate::description::SceneDescription;
+use crate::overlay::Overlay;
+use crate::picture::{RenderedImage, image_options};
+use crate::ray_query::RayCaster;
+use crate::raycast::world_bounds;
+use crate::resolve::{LoadedScene, coordinate_system};
+use std::sync::Arc;
+use surfel_core::flat::{FlatScene, Instance};
+use surfel_core::image::{Image, NO_ID};
+use surfel_core::math::Vec3;
+use surfel_core::render::Settings;
+use surfel_core::scene::Graph;
+use surfel_core::scene::color::Legend;
+use surfel_core::trace::Simd;
+use surfel_formats::Georeference;
+
+/// Trees over the points of a scene, and what shows which point is which.
+#[derive(Debug)]
+pub struct SceneTrees {
+    /// The graph without the points.
+    pub graph: Graph,
+    /// The flat scene without lights.
+    pub flat: FlatScene,
+    /// For each geometry, the index that each point had when it was read; empty for triangles.
+    pub source_indices: Vec<Vec<u32>>,
+    /// The meaning of the colours of the first cloud.
+    pub legend: Legend,
+}
+
+/// A scene under one description, at one time.
+#[derive(Clone, Debug)]
+pub struct LiveView {
+    /// The content of the files.
+    pub loaded: Arc<LoadedScene>,
+    /// The arrays that rays are traced against, with camera and exposed lights.
+    pub flat: FlatScene,
+    /// Size and quality of pictures.
+    pub settings: Settings,
+    /// The complete description, with everything that was chosen and the exposure.
+    pub description: SceneDescription,
+    /// True if the scene moves the camera.
+    pub moves_camera: bool,
+    /// Unit of the coordinates.
+    pub(crate) unit: Unit,
+    /// The trees, which several views share.
+    pub trees: Arc<SceneTrees>,
+}
+
+impl LiveView {
+    /// Returns the legend, scale bar, north arrow and caption of pictures of the view.
+    pub fn overlay(&self) -> Overlay {
+        let up = self.description.world.up.unwrap_or(Vec3::Z);
+        Overlay::of(&self.description.picture, self.trees.legend.clone(), (up, self.unit))
+    }
+
+    /// Draws the overlay onto a picture of the view, which becomes a file as the description says.
+    pub fn finished(&self, mut image: Image) -> RenderedImage {
+        self.overlay().draw(&mut image, &self.flat.camera);
+        let mut options = image_options(&self.description, self.flat.origin);
+        options.georeference = self.georeference();
+        RenderedImage::new(image, options)
+    }
+
+    /// Returns where the pixels of a plan to scale lie.
+    fn georeference(&self) -> Option<Georeference> {
+        let system = coordinate_system(&self.loaded, &self.description);
+        let size = (self.settings.width, self.settings.height);
+        let place = georeference(&self.flat.camera, size, system.as_ref());
+        place.filter(|_| self.description.plan.is_to_scale())
+    }
+
+    /// Returns for each instance the number of what it shows: first come the files without an object, of which those
+    /// together that became one cloud, then the objects.
+    pub fn contents(&self) -> Vec<u32> {
+        let content = |instance: &Instance| self.loaded.content_of(instance.node_idx as usize);
+        let contents = self.flat.instances.iter().map(content);
+        contents.map(|content| content.map_or(NO_ID, |content| content as u32)).collect()
+    }
+
+    /// Returns the corners of a box around everything, in world coordinates: least and greatest.
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
+        world_bounds(&self.flat)
+    }
+
+    /// Returns what casts rays at the view.
+    pub fn ray_caster(&self, simd: Simd) -> RayCaster<'_> {
+        RayCaster { scene: &self.flat, simd, sources: self.sources() }
+    }
+
+    /// Returns for each instance the index that each of its points had when it was read; empty for triangles.
+    pub fn sources(&self) -> Vec<&[u32]> {
+        let source = |instance: &Instance| {
+            let node = self.trees.graph.nodes.get(instance.node_idx as usize)?;
+            let is_shown = |material: usize| material == instance.material_idx as usize;
+            let primitive =
+                node.primitives.iter().find(|primitive| is_shown(primitive.material))?;
+            Some(&self.trees.source_indices.get(primitive.geometry)?[..])
+        };
+        self.flat.instances.iter().map(|instance| source(instance).unwrap_or_default()).collect()
+    }
+}
