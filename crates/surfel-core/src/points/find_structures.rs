@@ -6,6 +6,7 @@
 //! edge (after Demantké et al., Dimensionality Based Scale Selection in 3D Lidar Point Clouds, 2011).
 
 use super::edge_planes::{MIN_PLANE_FRACTION, PLANE_THICKNESS, plane_of_side};
+use super::junctions::join_to_surfaces;
 use super::neighbors::{KdTree, Neighbor, Neighborhood};
 use super::normals::{PlaneFit, fit_plane};
 use super::radius::kth_distance;
@@ -78,6 +79,7 @@ pub fn find_structures(
     };
     let mut shapes: Vec<PointShape> =
         (0..positions.len()).into_par_iter().map(decide).collect::<Result<_>>()?;
+    join_to_surfaces(tree, typical.noise(), &mut shapes, progress)?;
     let widened = widen_lines(positions, &mut shapes, progress)?;
     for (shape, fit) in shapes.iter_mut().zip(fits) {
         if shape.structure == Structure::Line && MAX_LINE_WIDTH < fit.width {
@@ -149,11 +151,15 @@ struct Typical {
 }
 
 impl Typical {
-    /// True if the noise is low enough for the two sides of an edge to be told apart. The points of a round, even
-    /// neighbourhood of radius 1 have a variance of 1/4 along each axis, so that noise is the root of half the
-    /// variation.
+    /// Noise in radii of the neighbourhoods. The points of a round, even neighbourhood of radius 1 have a variance of 1/4
+    /// along each axis, so that noise is the root of half the variation.
+    fn noise(&self) -> f32 {
+        (0.5 * self.low_variation).sqrt()
+    }
+
+    /// True if the noise is low enough for the two sides of an edge to be told apart.
     fn has_edges(&self) -> bool {
-        (0.5 * self.low_variation).sqrt() < PLANE_THICKNESS
+        self.noise() < PLANE_THICKNESS
     }
 
     /// True if a plane fits the neighbourhood of a radius. The variation that noise causes falls with the square of the

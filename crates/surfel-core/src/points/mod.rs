@@ -24,6 +24,7 @@ mod denoise;
 mod edge_planes;
 mod solids;
 mod wide_discs;
+mod junctions;
 mod scan_lines;
 mod find_structures;
 mod scan_grid;

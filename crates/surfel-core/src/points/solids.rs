@@ -21,12 +21,12 @@ const MIN_SOLIDS: usize = 16;
 const MIN_ON_SURFACES: f32 = 0.5;
 /// Fraction of the discs, from the smallest on, that a stray point is compared with: chance makes surfaces of a few stray
 /// points, too.
-const TRUSTED_DISCS: f32 = 0.95;
+const TRUSTED_DISCS: f32 = 0.98;
 /// Maximum ratio of the radius of a ball or capsule to that of the nearest disc.
 const MAX_STRAY_RATIO: f32 = 2.0;
 /// Maximum ratio of the radius of a larger disc, far from all these, to that of the nearest: the spacing of a scan grows with
 /// distance, but not at once.
-const MAX_DISC_RATIO: f32 = 4.0;
+const MAX_DISC_RATIO: f32 = 5.0;
 /// Ratio of the distance to the nearest disc to its radius from which a point is no part of its surroundings.
 const FAR_RATIO: f32 = 8.0;
 /// Maximum number of discs among which the nearest is searched.

@@ -275,7 +275,7 @@ mod tests {
 
     #[test]
     fn three_wires_at_two_heights_are_thin() {
-        // Over ground with points 0.5 apart: a wire of 2 points a unit on either side, and one 4 above the middle.
+        // Over ground with points 0.4 apart: a wire of 2 points a unit on either side, and one 4 above the middle.
         let mut random = Random::new(9, 0);
         let mut noise = || 0.05 * random.next_gaussian() as f32;
         let wires = [(-6.0, 24.0), (0.0, 28.0), (6.0, 24.0)]
@@ -287,7 +287,7 @@ mod tests {
         let mut random = Random::new(10, 0);
         points.extend(
             (0..30_000).map(|_| {
-                Vec3::new(100.0 * random.next_f32(), 75.0 * random.next_f32() - 37.5, 0.0)
+                Vec3::new(100.0 * random.next_f32(), 40.0 * random.next_f32() - 20.0, 0.0)
             }),
         );
         let (cloud, structures) = prepared(points);
