@@ -102,6 +102,8 @@ def test_ctrl_c_stops_a_picture(hill):
 import os, signal, sys, threading, time, surfel
 scene = surfel.load({str(hill)!r})
 scene.render(resolution=(8, 8), spp=1)
+# Programs that a shell has put in the background ignore the signal.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 sent = []
 def interrupt():
     time.sleep(0.5)
