@@ -27,6 +27,9 @@ const MAX_STRAY_RATIO: f32 = 2.0;
 /// Maximum ratio of the radius of a larger disc, far from all these, to that of the nearest: the spacing of a scan grows with
 /// distance, but not at once.
 const MAX_DISC_RATIO: f32 = 5.0;
+/// Maximum ratio of the trusted discs to the median one of a cloud that is sampled evenly, as from the air. On the far
+/// ground of a scanner on a tripod discs grow to far larger ones.
+const MAX_SPREAD: f32 = 6.0;
 /// Ratio of the distance to the nearest disc to its radius from which a point is no part of its surroundings.
 const FAR_RATIO: f32 = 8.0;
 /// Maximum number of discs among which the nearest is searched.
@@ -115,9 +118,10 @@ pub fn limit_stray_points(
     let typical = *radii.select_nth_unstable_by(middle, f32::total_cmp).1;
     let trusted = ((TRUSTED_DISCS * radii.len() as f32) as usize).min(radii.len() - 1);
     let largest = *radii.select_nth_unstable_by(trusted, f32::total_cmp).1;
+    let is_even = largest < MAX_SPREAD * typical;
     let max_ratio = |shape: &PointShape| match shape.structure {
         Structure::Scatter | Structure::Line => MAX_STRAY_RATIO,
-        Structure::Surface if largest < shape.radius => MAX_DISC_RATIO,
+        Structure::Surface if is_even && largest < shape.radius => MAX_DISC_RATIO,
         Structure::Surface | Structure::Redundant => f32::INFINITY,
     };
     let is_wide = |shape: &PointShape| max_ratio(shape) * typical < shape.radius;
