@@ -5,14 +5,16 @@
 //! surround the point. Where they lie in no plane, a plane through at least half of them still makes a surface: an
 //! edge (after Demantké et al., Dimensionality Based Scale Selection in 3D Lidar Point Clouds, 2011).
 
-use super::edge_planes::{MIN_PLANE_FRACTION, PLANE_THICKNESS, plane_of_side};
+use super::edge_planes::{MIN_PLANE_FRACTION, plane_of_side};
 use super::junctions::join_to_surfaces;
 use super::neighbors::{KdTree, Neighbor, Neighborhood};
 use super::normals::{PlaneFit, fit_plane};
 use super::radius::kth_distance;
 use super::scan_lines::widen_lines;
-use super::solids::{ball_radius, clamp_solids, limit_stray_points, settle};
+use super::solids::{ball_radius, clamp_solids, settle};
+use super::stray_points::limit_stray_points;
 use super::structure::{PointShape, Structure, StructureReport, is_line, is_surface};
+use super::typical::{SPARSE, Typical};
 use super::wide_discs::{limit_crowded_discs, narrow_lone_discs};
 use crate::error::Result;
 use crate::math::Vec3;
@@ -37,8 +39,6 @@ const N_ROUNDS: usize = 12;
 const MIN_SCATTERED: f32 = 0.5;
 /// Minimum share of scattered points around a scattered point of a noisy cloud.
 const MIN_SCATTERED_IN_NOISE: f32 = 0.9;
-/// Ratio of a radius to the typical one from which the neighbourhood is sparse.
-const SPARSE: f32 = 2.0;
 /// Minimum share of scattered points among the rough ones of a cloud that is leafy, not noisy.
 const MIN_SCATTERED_ROUGH: f32 = 0.5;
 /// Minimum share of scattered points in a cloud with much vegetation.
@@ -64,12 +64,7 @@ pub fn find_structures(
 ) -> Result<(Vec<PointShape>, StructureReport)> {
     let positions = tree.positions();
     progress.begin("structure", positions.len() as u64);
-    let variations: Vec<f32> = fits.iter().map(|fit| fit.variation).collect();
-    let typical = Typical {
-        variation: quantile(&variations, 0.5),
-        low_variation: quantile(&variations, 0.25),
-        radius: quantile(radii, 0.5),
-    };
+    let typical = Typical::of(fits, radii);
     let decide = |point: usize| {
         if point.is_multiple_of(4096) {
             progress.check()?;
@@ -131,44 +126,6 @@ pub fn all_scattered(
     clamp_solids(&mut shapes, Structure::Scatter, f32::INFINITY);
     let report = StructureReport { n_scatter: shapes.len(), ..StructureReport::default() };
     Ok((shapes, report))
-}
-
-/// Returns a quantile of some ten thousand of the values, or zero if there are none.
-fn quantile(values: &[f32], fraction: f32) -> f32 {
-    let mut sample: Vec<f32> = values.iter().step_by(values.len() / 10_000 + 1).copied().collect();
-    sample.sort_unstable_by(f32::total_cmp);
-    sample.get((fraction * sample.len() as f32) as usize).copied().unwrap_or(0.0)
-}
-
-/// Typical properties of the neighbourhoods of a cloud's points.
-struct Typical {
-    /// Median of the surface variations.
-    variation: f32,
-    /// First quartile of the surface variations: that of the even parts, which noise causes.
-    low_variation: f32,
-    /// Median of the radii.
-    radius: f32,
-}
-
-impl Typical {
-    /// Noise in radii of the neighbourhoods. The points of a round, even neighbourhood of radius 1 have a variance of 1/4
-    /// along each axis, so that noise is the root of half the variation.
-    fn noise(&self) -> f32 {
-        (0.5 * self.low_variation).sqrt()
-    }
-
-    /// True if the noise is low enough for the two sides of an edge to be told apart.
-    fn has_edges(&self) -> bool {
-        self.noise() < PLANE_THICKNESS
-    }
-
-    /// True if a plane fits the neighbourhood of a radius. The variation that noise causes falls with the square of the
-    /// radius: where points are sparse, as between the branches of a crown, a plane has to fit better.
-    fn is_surface(&self, fit: &PlaneFit, radius: f32) -> bool {
-        let sparseness = (radius / (SPARSE * self.radius)).max(1.0);
-        let expected = PlaneFit { variation: fit.variation * sparseness * sparseness, ..*fit };
-        is_surface(&expected)
-    }
 }
 
 /// Decides about a point by its nearest neighbours alone.

@@ -262,41 +262,6 @@ mod tests {
     }
 
     #[test]
-    fn many_stray_points_far_apart_are_small() {
-        let mut points = plane();
-        let mut random = Random::new(7, 0);
-        let mut stray = || Vec3::from_array([(); 3].map(|()| 8.0 * random.next_f32() - 4.0));
-        points.extend((0..200).map(|_| stray()));
-        let (cloud, structures) = prepared(points);
-        let n_small = cloud.radii()[5000..].iter().filter(|radius| **radius < 0.1).count();
-        assert!(190 <= n_small, "{n_small}");
-        assert!(!structures[5000..].iter().all(|structure| *structure == Structure::Surface));
-    }
-
-    #[test]
-    fn three_wires_at_two_heights_are_thin() {
-        // Over ground with points 0.4 apart: a wire of 2 points a unit on either side, and one 4 above the middle.
-        let mut random = Random::new(9, 0);
-        let mut noise = || 0.05 * random.next_gaussian() as f32;
-        let wires = [(-6.0, 24.0), (0.0, 28.0), (6.0, 24.0)]
-            .into_iter()
-            .flat_map(|(y, z)| (0..200).map(move |i| Vec3::new(i as f32 / 2.0, y, z)));
-        let mut points: Vec<Vec3> =
-            wires.map(|point| point + Vec3::new(noise(), noise(), noise())).collect();
-        let n_wires = points.len();
-        let mut random = Random::new(10, 0);
-        points.extend(
-            (0..30_000).map(|_| {
-                Vec3::new(100.0 * random.next_f32(), 40.0 * random.next_f32() - 20.0, 0.0)
-            }),
-        );
-        let (cloud, structures) = prepared(points);
-        let drawn = (0..n_wires).filter(|point| structures[*point] != Structure::Redundant);
-        let widest = drawn.map(|point| cloud.radii()[point]).fold(0.0, f32::max);
-        assert!(widest < 5.0, "{widest}");
-    }
-
-    #[test]
     fn two_parallel_wires_do_not_become_a_sheet() {
         // Two wires 0.5 apart, 6 above the ground, of points that are 0.3 apart.
         let mut random = Random::new(3, 0);
