@@ -11,6 +11,10 @@ const N_CURVE_SEGMENTS = 32;
 const LABEL_LINE_HEIGHT = 16;
 const LABEL_GAP = 10;
 const LABEL_SPACING = 3;
+/** Time between two questions about hidden points. */
+const QUESTION_PAUSE_MS = 150;
+/** Maximum number of points of a question. */
+const MAX_POINTS = 2000;
 
 export class Overlay {
   #painters = [];
@@ -53,7 +57,8 @@ export class Overlay {
   }
 
   /** Asks the server which of the points of labels are hidden, one question at a time, and draws again if that changes. */
-  async #askForHidden(points) {
+  async #askForHidden(anchors) {
+    const points = anchors.slice(0, MAX_POINTS);
     const { lastFrame } = this.viewer;
     if (this.#isAsking || points.length === 0 || this.#askedFor === keyOf(points, lastFrame)) return;
     this.#isAsking = true;
@@ -67,6 +72,7 @@ export class Overlay {
     } catch {
       // All labels are shown until there is an answer.
     }
+    await new Promise((resolve) => { setTimeout(resolve, QUESTION_PAUSE_MS); });
     this.#isAsking = false;
     if (this.viewer.lastFrame?.frame !== lastFrame?.frame) this.redraw();
   }

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 const MIN_ON_SURFACES: f32 = 0.5;
 /// Fraction of the discs, from the smallest on, that a stray point is compared with: chance makes surfaces of a few stray
 /// points, too.
-const TRUSTED_DISCS: f32 = 0.98;
+const TRUSTED_DISCS: f32 = 0.95;
 /// Maximum ratio of the radius of a ball or capsule to that of the nearest disc.
 const MAX_STRAY_RATIO: f32 = 2.0;
 /// Maximum ratio of the radius of a larger disc, far from all these, to that of the nearest: the spacing of a scan grows
@@ -25,7 +25,7 @@ const MAX_STRAY_RATIO: f32 = 2.0;
 const MAX_DISC_RATIO: f32 = 5.0;
 /// Maximum ratio of the trusted discs to the median one of a cloud that is sampled evenly, as from the air. On the far
 /// ground of a scanner on a tripod discs grow to far larger ones.
-const MAX_SPREAD: f32 = 6.0;
+const MAX_SPREAD: f32 = 3.0;
 /// Ratio of the distance to the nearest disc to its radius from which a point is no part of its surroundings.
 const FAR_RATIO: f32 = 8.0;
 /// Maximum number of discs among which the nearest is searched.
@@ -151,10 +151,10 @@ mod tests {
         (cloud, structures)
     }
 
-    /// Points of a level plane of this length and width, with a corner at zero.
+    /// Points of a level plane of this length and width about zero.
     fn plane(n: usize, length: f32, width: f32) -> Vec<Vec3> {
         let mut random = Random::new(1, 0);
-        let mut next = || random.next_f32();
+        let mut next = || random.next_f32() - 0.5;
         (0..n).map(|_| Vec3::new(length * next(), width * next(), 0.0)).collect()
     }
 
@@ -182,7 +182,7 @@ mod tests {
             wires.map(|point| point + Vec3::new(noise(), noise(), noise())).collect();
         let n_wires = points.len();
         points.extend(
-            plane(30_000, 100.0, 40.0).iter().map(|point| *point - Vec3::new(0.0, 20.0, 0.0)),
+            plane(30_000, 100.0, 40.0).iter().map(|point| *point + Vec3::new(50.0, 0.0, 0.0)),
         );
         let (cloud, structures) = prepared(points);
         let drawn = (0..n_wires).filter(|point| structures[*point] != Structure::Redundant);

@@ -47,7 +47,7 @@ async fn finished_pictures_go_on_at_rest() {
         assert!(found.iter().zip(expected.iter()).all(is_close), "{samples}");
     }
     assert!(page.sync().await.is_empty());
-    // Another view begins anew.
+    // Another view begins with its first sample.
     page.set_camera(1, 0.5, false).await;
     assert_eq!(page.finished_picture().await.samples, N_SAMPLES as u16);
 }
