@@ -74,7 +74,8 @@ export class Overlay {
     }
     await new Promise((resolve) => { setTimeout(resolve, QUESTION_PAUSE_MS); });
     this.#isAsking = false;
-    if (this.viewer.lastFrame?.frame !== lastFrame?.frame) this.redraw();
+    // Asks again if points or picture have changed meanwhile.
+    this.redraw();
   }
 }
 

@@ -19,6 +19,7 @@ mod graph;
 mod evaluate;
 mod clip;
 mod interior;
+mod direction_cells;
 mod station;
 mod validate;
 pub mod color;

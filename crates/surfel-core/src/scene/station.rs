@@ -1,11 +1,13 @@
 //! Stations: the place from which one scanner or depth camera measured a cloud in its own coordinates.
 
 use super::camera::{Camera, Projection};
+use super::direction_cells::{
+    PolarPoint, density_slope, fraction_behind, polar_points, spread_within_cells,
+};
 use super::ground::ground_axes;
 use crate::math::{Aabb, DVec3, Vec3};
 use crate::points::{MAX_CAMERA_SLOPE, PointCloud, is_valid_position};
-use std::collections::BTreeMap;
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::TAU;
 
 /// Maximum number of points that are looked at: enough for some 40 in each cell of directions.
 const MAX_SAMPLES: usize = 100_000;
@@ -22,10 +24,6 @@ const MIN_SECTOR_FRACTION: f64 = 0.005;
 const MIN_DISTANCE_RATIO: f32 = 3.0;
 /// Minimum ratio of these distances from a depth camera: an object alone is shown as any other.
 const MIN_CAMERA_DISTANCE_RATIO: f32 = 1.5;
-/// Width and height of the cells of directions: many rays of a scanner, and about one distance.
-const CELL_DEG: f32 = 5.0;
-/// Minimum number of points in a cell that counts: the logarithm of fewer is mostly noise.
-const MIN_CELL_POINTS: usize = 4;
 /// Maximum slope of the logarithm of the points in a cell over that of its squared distance. It is 0 for points that are
 /// dense in angle and 1 for points that are dense in area: scanners had -0.26 to 0.03, vertices of meshes 0.68, evenly
 /// sampled boxes and terrain 1.0 to 1.4.
@@ -33,10 +31,6 @@ const MAX_DENSITY_SLOPE: f64 = 0.4;
 /// Maximum spread of the distances within cells, as a fraction of that of all: most rays of a scanner end at the first
 /// surface.
 const MAX_SPREAD_WITHIN_CELLS: f64 = 0.7;
-/// Width and height of the cells in which a ray sees but one surface.
-const NARROW_CELL_DEG: f32 = 1.5;
-/// Ratio of the distance of a point to that of the nearest ones of its narrow cell from which it lies behind them.
-const BEHIND_RATIO: f32 = 1.3;
 /// Maximum fraction of the points that lie behind others: a scanner does not see through surfaces. Scans had 0.02 to 0.03,
 /// an object whose zero lies within it 0.4.
 const MAX_BEHIND: f64 = 0.25;
@@ -70,14 +64,6 @@ impl StationView {
             },
         }
     }
-}
-
-/// A point as the scanner measured it.
-struct PolarPoint {
-    distance: f32,
-    /// Clockwise from north seen from above, from 0 to 2 pi.
-    azimuth_rad: f32,
-    elevation_rad: f32,
 }
 
 /// Returns the station of `cloud`, which is at the place that its file states or else at the zero of its world
@@ -175,19 +161,6 @@ fn sample_indices(cloud: &PointCloud) -> impl Iterator<Item = usize> {
     jittered.filter(|i| cloud.positions.get(*i).copied().is_some_and(is_valid_position))
 }
 
-/// Returns the points as measured from `station`, without missing measurements, which lie at the station itself.
-fn polar_points(station: Vec3, points: &[Vec3], up: Vec3) -> Vec<PolarPoint> {
-    let (east, north) = ground_axes(up);
-    let polar = |point: &Vec3| {
-        let offset = *point - station;
-        let distance = offset.length();
-        let azimuth_rad = offset.dot(east).atan2(offset.dot(north)).rem_euclid(TAU);
-        let elevation_rad = (offset.dot(up) / distance).clamp(-1.0, 1.0).asin();
-        (0.0 < distance).then_some(PolarPoint { distance, azimuth_rad, elevation_rad })
-    };
-    points.iter().filter_map(polar).collect()
-}
-
 /// Returns the 10th, 50th and 90th percentile of the distances.
 fn distances(points: &[PolarPoint]) -> Option<[f32; 3]> {
     let mut distances: Vec<f32> = points.iter().map(|point| point.distance).collect();
@@ -204,67 +177,6 @@ fn n_filled_sectors(points: &[PolarPoint]) -> usize {
     }
     let min_count = MIN_SECTOR_FRACTION * points.len() as f64;
     counts.into_iter().filter(|count| min_count <= *count as f64).count()
-}
-
-/// Returns the distances of the points by cells of directions of this width and height.
-fn cells(points: &[PolarPoint], cell_deg: f32) -> BTreeMap<(u32, u32), Vec<f32>> {
-    let cell_rad = cell_deg.to_radians();
-    let mut cells: BTreeMap<(u32, u32), Vec<f32>> = BTreeMap::new();
-    for point in points {
-        let row = ((point.elevation_rad + PI / 2.0) / cell_rad) as u32;
-        let column = (point.azimuth_rad / cell_rad) as u32;
-        cells.entry((row, column)).or_default().push(point.distance);
-    }
-    cells
-}
-
-/// Returns the variance of the logarithms of distances within cells of directions, as a fraction of that of all: 1 for
-/// points that fill space.
-fn spread_within_cells(points: &[PolarPoint]) -> f64 {
-    let sum_of_squares = |distances: &[f32]| {
-        let logarithms = distances.iter().map(|distance| f64::from(*distance).ln());
-        let mean = logarithms.clone().sum::<f64>() / distances.len() as f64;
-        logarithms.map(|logarithm| (logarithm - mean).powi(2)).sum::<f64>()
-    };
-    let all: Vec<f32> = points.iter().map(|point| point.distance).collect();
-    let within: f64 = cells(points, CELL_DEG).values().map(|cell| sum_of_squares(cell)).sum();
-    within / sum_of_squares(&all).max(f64::MIN_POSITIVE)
-}
-
-/// Returns the fraction of the points that lie behind others of their narrow cell.
-fn fraction_behind(points: &[PolarPoint]) -> f64 {
-    let (mut n_behind, mut n_counted) = (0, 0);
-    for mut distances in cells(points, NARROW_CELL_DEG).into_values() {
-        if MIN_CELL_POINTS <= distances.len() {
-            // A stray point may lie before all others.
-            let nearest = distances.len() / 10;
-            let limit = BEHIND_RATIO * *distances.select_nth_unstable_by(nearest, f32::total_cmp).1;
-            n_behind += distances.iter().filter(|distance| limit < **distance).count();
-            n_counted += distances.len();
-        }
-    }
-    f64::from(n_behind as u32) / f64::from((n_counted as u32).max(1))
-}
-
-/// Returns the slope of the line of least squares through ln(points) over ln(median distance squared) of the cells of
-/// directions, or `None` if all cells are equally far.
-fn density_slope(points: &[PolarPoint]) -> Option<f64> {
-    let full = cells(points, CELL_DEG)
-        .into_values()
-        .filter(|distances| MIN_CELL_POINTS <= distances.len());
-    let logarithms = full.map(|mut distances| {
-        let middle = distances.len() / 2;
-        let median = *distances.select_nth_unstable_by(middle, f32::total_cmp).1;
-        (2.0 * f64::from(median).ln(), (distances.len() as f64).ln())
-    });
-    let logarithms: Vec<(f64, f64)> = logarithms.collect();
-    let n = logarithms.len() as f64;
-    let (sum_x, sum_y) = logarithms.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0, y + p.1));
-    let (mean_x, mean_y) = (sum_x / n, sum_y / n);
-    let (variance, covariance) = logarithms.iter().fold((0.0, 0.0), |(xx, xy), (x, y)| {
-        (xx + (x - mean_x) * (x - mean_x), xy + (x - mean_x) * (y - mean_y))
-    });
-    (0.0 < variance).then(|| covariance / variance)
 }
 
 /// Returns the horizontal direction about which most points lie beyond `distance`.
