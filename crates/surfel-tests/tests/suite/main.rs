@@ -27,4 +27,5 @@ mod statistics;
 mod support;
 mod textures;
 mod traversal_paths;
+mod triangle_meshes;
 mod triangles;
