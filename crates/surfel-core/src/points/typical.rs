@@ -1,4 +1,4 @@
-//! What is typical of the neighbourhoods of a cloud's points: their size, their noise.
+//! Typical sizes and noise of the neighbourhoods of a cloud's points.
 
 use super::edge_planes::PLANE_THICKNESS;
 use super::normals::PlaneFit;
