@@ -231,8 +231,9 @@ pub(crate) fn detect(input: &Input) -> Result<&'static Format> {
         return Err(input.unsupported(*name, &ADVICE));
     }
     let extension = input.extension();
-    let Some(format) = FORMATS.iter().find(|format| format.extensions.contains(&&*extension))
-    else {
+    let has_extension = |format: &&Format| format.extensions.contains(&&*extension);
+    let of_name = FORMATS.iter().find(has_extension);
+    let Some(format) = of_name.or_else(|| text_format(input)) else {
         let found = match extension.as_str() {
             "" => "a name without extension and unknown content".into(),
             extension => format!("the extension `.{extension}`"),
@@ -245,6 +246,12 @@ pub(crate) fn detect(input: &Input) -> Result<&'static Format> {
         return Err(input.malformed(Location::Byte(0), found, signature, advice));
     }
     Ok(format)
+}
+
+/// Returns the format of text if the lines of an input are points, whatever its extension.
+fn text_format(input: &Input) -> Option<&'static Format> {
+    let format = FORMATS.iter().find(|format| format.extensions.contains(&"xyz"));
+    format.filter(|_| text::begins_with_points(input))
 }
 
 /// Returns true if an input holds a whole scene, with transforms and animation of its own.
@@ -282,10 +289,19 @@ mod tests {
     }
 
     #[test]
+    fn lines_of_numbers_are_text_whatever_the_extension() {
+        for name in ["-", "cloud", "cloud.3d", "cloud.neu"] {
+            assert_eq!(detected(name, b"# scan 7\n1 2 3\n4 5 6\n").unwrap(), "text", "{name}");
+        }
+        assert!(detected("notes.md", b"1 of 2 things: 3\n").is_err());
+        assert!(detected("cloud.neu", b"\x00\x01\x02").is_err());
+    }
+
+    #[test]
     fn every_extension_belongs_to_one_format_and_is_listed_in_messages() {
         let mut extensions: Vec<&str> =
             FORMATS.iter().flat_map(|f| f.extensions).copied().collect();
-        let message = detected("a.what", b"1 2 3").unwrap_err().to_string();
+        let message = detected("a.what", b"words").unwrap_err().to_string();
         assert!(extensions.iter().all(|extension| message.contains(&format!(".{extension}"))));
         let n_extensions = extensions.len();
         extensions.sort_unstable();

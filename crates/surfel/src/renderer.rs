@@ -2,6 +2,7 @@
 
 use crate::description::{Backend, RunSettings};
 use crate::error::Result;
+use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use surfel_core::flat::FlatScene;
@@ -71,6 +72,9 @@ impl SceneRenderer {
     /// Returns a GPU that may be taken unasked: one that is not emulated, or that is named.
     fn automatic_gpu(&self) -> Option<&GpuRenderer> {
         let open = || {
+            if self.device.is_none() && !may_have_gpu() {
+                return None;
+            }
             let opened = GpuRenderer::open(self.device.as_deref()).ok()?;
             let is_emulated = opened.device().kind == DeviceKind::Software;
             (self.device.is_some() || !is_emulated).then_some(opened)
@@ -135,6 +139,13 @@ impl Renderer for SceneRenderer {
         self.was_on_gpu.store(on_gpu.is_some(), Ordering::Relaxed);
         on_gpu.unwrap_or_else(|| self.cpu.render_region(scene, settings, region, progress))
     }
+}
+
+/// Returns false if there is certainly no GPU. Asking the drivers takes a tenth of a second, and on servers without
+/// desktops those of Mesa print errors that are none.
+fn may_have_gpu() -> bool {
+    let devices = ["/dev/dri", "/dev/nvidiactl", "/dev/dxg", "/dev/mali0"];
+    !cfg!(target_os = "linux") || devices.iter().any(|device| Path::new(device).exists())
 }
 
 /// Returns true if a picture takes so many rays, and the scene has so few points for them, that a GPU is likely to be

@@ -24,27 +24,35 @@ pub struct PolarPoint {
     pub elevation_rad: f32,
 }
 
-/// Returns the points as measured from `station`, without missing measurements, which lie at the station itself.
-pub fn polar_points(station: Vec3, points: &[Vec3], up: Vec3) -> Vec<PolarPoint> {
-    let (east, north) = ground_axes(up);
-    let polar = |point: &Vec3| {
-        let offset = *point - station;
+impl PolarPoint {
+    /// Returns the point at `offset` from the scanner, or `None` for the scanner's own place.
+    pub fn of_offset(offset: Vec3, east: Vec3, north: Vec3, up: Vec3) -> Option<Self> {
         let distance = offset.length();
         let azimuth_rad = offset.dot(east).atan2(offset.dot(north)).rem_euclid(TAU);
         let elevation_rad = (offset.dot(up) / distance).clamp(-1.0, 1.0).asin();
-        (0.0 < distance).then_some(PolarPoint { distance, azimuth_rad, elevation_rad })
-    };
+        (0.0 < distance).then_some(Self { distance, azimuth_rad, elevation_rad })
+    }
+
+    /// Returns row and column of the cell of directions of this width and height.
+    pub fn cell(&self, cell_deg: f32) -> (u32, u32) {
+        let cell_rad = cell_deg.to_radians();
+        let row = (self.elevation_rad + PI / 2.0) / cell_rad;
+        (row as u32, (self.azimuth_rad / cell_rad) as u32)
+    }
+}
+
+/// Returns the points as measured from `station`, without missing measurements, which lie at the station itself.
+pub fn polar_points(station: Vec3, points: &[Vec3], up: Vec3) -> Vec<PolarPoint> {
+    let (east, north) = ground_axes(up);
+    let polar = |point: &Vec3| PolarPoint::of_offset(*point - station, east, north, up);
     points.iter().filter_map(polar).collect()
 }
 
 /// Returns the distances of the points by cells of directions of this width and height.
-fn cells(points: &[PolarPoint], cell_deg: f32) -> BTreeMap<(u32, u32), Vec<f32>> {
-    let cell_rad = cell_deg.to_radians();
+pub fn cells(points: &[PolarPoint], cell_deg: f32) -> BTreeMap<(u32, u32), Vec<f32>> {
     let mut cells: BTreeMap<(u32, u32), Vec<f32>> = BTreeMap::new();
     for point in points {
-        let row = ((point.elevation_rad + PI / 2.0) / cell_rad) as u32;
-        let column = (point.azimuth_rad / cell_rad) as u32;
-        cells.entry((row, column)).or_default().push(point.distance);
+        cells.entry(point.cell(cell_deg)).or_default().push(point.distance);
     }
     cells
 }

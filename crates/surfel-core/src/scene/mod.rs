@@ -21,6 +21,7 @@ mod clip;
 mod interior;
 mod direction_cells;
 mod station;
+mod sunlit;
 mod validate;
 pub mod color;
 
@@ -42,6 +43,7 @@ pub use light::{Light, PunctualLight, PunctualLightKind, Sky, Sun};
 pub use material::{AlphaMode, Material, MaterialTextures};
 pub use mesh::Mesh;
 pub use station::{StationView, find_depth_camera, find_station, view_from_station};
+pub use sunlit::sunlit_fraction;
 pub use texture::{Texture, TextureEncoding, TextureRef, Wrap};
 
 pub use crate::points::{Morph, Skin};

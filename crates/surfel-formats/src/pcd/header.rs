@@ -161,7 +161,9 @@ impl Entries {
         let one = values.trim();
         let words = values.split_whitespace();
         match key {
-            "VERSION" => self.version = Some(one.trim_start_matches('.').into()),
+            // Most programs write `.7`.
+            "VERSION" if one.starts_with('.') => self.version = Some(format!("0{one}")),
+            "VERSION" => self.version = Some(one.into()),
             // Version 0.5 says COLUMNS.
             "FIELDS" | "COLUMNS" => self.fields = Some(words.map(str::to_owned).collect()),
             "SIZE" => self.sizes = Some(numbers(words).ok_or("the bytes of each field")?),

@@ -9,8 +9,10 @@ pub(super) fn infer_columns(
 ) -> (Vec<Option<ColumnRole>>, String) {
     let is_color = |first| (first..first + 3).all(|column| has_class_values(sample, column));
     let names: &[&str] = match n_fields {
+        4 if counts_up(sample) => &["-", "x", "y", "z"],
         4 => &["x", "y", "z", "intensity"],
         6 if is_color(3) => &["x", "y", "z", "r", "g", "b"],
+        6 if has_fractions_of_color(sample, 3) => &["x", "y", "z", "r", "g", "b"],
         6 => &["x", "y", "z", "nx", "ny", "nz"],
         // The order of PTS files takes precedence, because an intensity may look like a colour.
         7 if is_color(4) => &["x", "y", "z", "intensity", "r", "g", "b"],
@@ -20,7 +22,7 @@ pub(super) fn infer_columns(
         _ => &["x", "y", "z"],
     };
     let mut columns: Vec<Option<ColumnRole>> =
-        names.iter().map(|name| ColumnRole::from_name(name)).collect();
+        names.iter().map(|name| ColumnRole::from_name(name).filter(|_| *name != "-")).collect();
     let mut description = names.join(" ");
     for column in names.len()..n_fields {
         let name = format!("column {}", column + 1);
@@ -29,6 +31,28 @@ pub(super) fn infer_columns(
     }
     columns.truncate(n_fields);
     (columns, description)
+}
+
+/// Returns true if three columns have colours from 0 to 1: other than normals, they differ in length.
+fn has_fractions_of_color(sample: &[Vec<f64>], first: usize) -> bool {
+    let channels = |row: &Vec<f64>| [row[first], row[first + 1], row[first + 2]];
+    let is_color = |row: &Vec<f64>| channels(row).iter().all(|value| (0.0..=1.0).contains(value));
+    let is_unit = |row: &Vec<f64>| {
+        let squares: f64 = channels(row).iter().map(|value| value * value).sum();
+        (0.98..1.02).contains(&squares)
+    };
+    sample.iter().all(is_color) && !sample.iter().all(is_unit)
+}
+
+/// Returns true if the first column numbers the points: whole numbers that grow from line to line, also over the parts of
+/// the file from which the lines are. A column of coordinates starts again with each row of a grid.
+fn counts_up(sample: &[Vec<f64>]) -> bool {
+    /// With fewer lines, coordinates may grow by chance.
+    const MIN_LINES: usize = 32;
+    let numbers = sample.iter().map(|row| row[0]);
+    MIN_LINES <= sample.len()
+        && numbers.clone().all(|number| number.fract() == 0.0)
+        && numbers.clone().zip(numbers.skip(1)).all(|(a, b)| a < b)
 }
 
 /// Returns the range of the colours in these columns.

@@ -30,6 +30,11 @@ pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
     Ok(file_info(&preamble))
 }
 
+/// Returns true if the first lines are a header and points, or lines of numbers.
+pub(crate) fn begins_with_points(input: &Input) -> bool {
+    read_preamble(input).is_ok_and(|preamble| preamble.names.is_some() || !preamble.has_text)
+}
+
 /// Reads the points.
 pub(crate) fn read(
     input: &Input,
@@ -233,14 +238,21 @@ fn sample_rows(input: &Input, preamble: &Preamble) -> Sample {
     const LINES_PER_POSITION: usize = 16;
     let data = &input[preamble.data..];
     let mut sample = Sample { rows: Vec::new(), is_text: vec![false; preamble.n_fields] };
+    let mut next = 0;
     for i in 0..N_POSITIONS {
-        let start = data.len() * i / N_POSITIONS;
+        let start = next.max(data.len() * i / N_POSITIONS);
         let near = &data[start..data.len().min(start + MAX_LINE_LENGTH)];
         let is_cut = start + near.len() < data.len();
         let end = if is_cut { memchr::memrchr(b'\n', near).unwrap_or(0) } else { near.len() };
-        // The position falls inside a line, so the next line is the first whole one.
-        let lines = near[..end].split(|byte| *byte == b'\n').skip(usize::from(0 < i));
-        for line in lines.take(LINES_PER_POSITION) {
+        // A position inside a line belongs to the line before.
+        let is_inside = start != next;
+        next = start;
+        let lines = near[..end].split_inclusive(|byte| *byte == b'\n');
+        for (i, line) in lines.take(LINES_PER_POSITION + usize::from(is_inside)).enumerate() {
+            next += line.len();
+            if i == 0 && is_inside {
+                continue;
+            }
             let line = line.trim_ascii();
             let fields: Vec<&[u8]> =
                 preamble.separator.fields(line).take(preamble.n_fields).collect();

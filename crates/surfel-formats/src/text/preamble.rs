@@ -8,6 +8,9 @@ use crate::table::{ColumnRole, MAX_FIELDS, MAX_LINE_LENGTH};
 
 const ONE_POINT_PER_LINE: &str = "put each point on a line of its own";
 
+/// First bytes of texts in UTF-16, of both byte orders.
+const UTF_16_MARKS: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
+
 /// The content of the lines before the first point, and the form of its line.
 pub(super) struct Preamble {
     /// Names of the columns, from a header.
@@ -28,6 +31,10 @@ pub(super) struct Preamble {
 
 /// Reads the lines up to the first one of numbers.
 pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
+    if UTF_16_MARKS.iter().any(|mark| input.starts_with(mark)) {
+        let advice = "save it as UTF-8 or as plain text";
+        return Err(input.malformed(Location::Byte(0), "text in UTF-16", "UTF-8", advice));
+    }
     let mut names: Option<Vec<String>> = None;
     let mut header_separator = None;
     // A comment may be a header or only mention x, y and z: the number of fields decides.

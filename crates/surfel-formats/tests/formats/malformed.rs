@@ -83,8 +83,8 @@ fn empty_misnamed_and_missing_files_are_rejected() {
     assert!(message("a.ply", "").contains("found an empty file"));
     assert!(message("a.ply", "plx\n").contains("found `plx\\n`, expected `ply`"));
     assert!(message("a.laz", "PK").contains("the extension does not fit"));
-    assert!(message("a.what", "1 2 3").contains("the extension `.what`"));
-    assert!(message("what", "1 2 3").contains("without extension"));
+    assert!(message("a.what", "some words").contains("the extension `.what`"));
+    assert!(message("what", "some words").contains("without extension"));
     let folder = Folder::new("absent");
     let failed = |name: &str| {
         load(&folder.path(name), &LoadOptions::default(), &NoProgress).unwrap_err().to_string()

@@ -94,7 +94,7 @@ fn all_encodings_hold_the_same_points() {
         assert_eq!(loaded.cloud.colors, ascii.cloud.colors, "{name}");
         assert_eq!(loaded.cloud.positions[0], ascii.cloud.positions[0], "{name}");
     }
-    assert_eq!(ascii.info.format, "PCD 7, ascii");
+    assert_eq!(ascii.info.format, "PCD 0.7, ascii");
 }
 
 #[test]

@@ -78,11 +78,41 @@ fn columns_are_inferred_and_reported() {
     assert_eq!(guess("1 2 3 0.5").intensity, Some(vec![0.5]));
     assert_eq!(guess("1 2 3 0 128 255").colors, Some(vec![[0, 128 * 257, 65535]]));
     assert_eq!(guess("1 2 3 0 -1 0").normals, Some(vec![-Vec3::Y]));
+    assert_eq!(guess("1 2 3 0.6 0 0.8").normals, Some(vec![Vec3::new(0.6, 0.0, 0.8)]));
+    assert_eq!(guess("1 2 3 0.2 1 0").colors, Some(vec![[13107, 65535, 0]]));
     let pts = guess("1 2 3 -700 1 2 3");
     assert_eq!((pts.intensity, pts.colors), (Some(vec![-700.0]), Some(vec![[257, 514, 771]])));
     let behind = guess("1 2 3 1 2 3 0.5");
     assert_eq!((behind.intensity, behind.colors), (Some(vec![0.5]), Some(vec![[257, 514, 771]])));
     assert_eq!(guess("1 2 3 4 5").scalars.len(), 2);
+}
+
+#[test]
+fn a_first_column_that_numbers_the_points_is_skipped() {
+    let cloud_of = |first: fn(usize) -> usize| {
+        let lines = (0..200).map(|i| format!("{} 7 8 {i}\n", first(i)));
+        read("a.txt", lines.collect::<String>()).unwrap().cloud
+    };
+    let numbered = cloud_of(|i| i + 1);
+    let place = numbered.world_position(3);
+    assert_eq!((place, numbered.intensity), (DVec3::new(7.0, 8.0, 3.0), None));
+    // The first column of a grid of points starts again with each row.
+    let grid = cloud_of(|i| i % 20);
+    assert_eq!(grid.world_position(3), DVec3::new(3.0, 7.0, 8.0));
+    assert_eq!(grid.intensity.map(|intensity| intensity[3]), Some(3.0));
+}
+
+#[test]
+fn text_in_utf_16_is_refused_by_name() {
+    for mark in [[0xff, 0xfe], [0xfe, 0xff]] {
+        let file = [&mark[..], b"1\x00 \x002\x00"].concat();
+        let error = load_bytes("a.txt", &file, &LoadOptions::default(), &Listener::default());
+        let message = error.unwrap_err().to_string();
+        assert!(
+            message.contains("text in UTF-16") && message.contains("save it as UTF-8"),
+            "{message}"
+        );
+    }
 }
 
 #[test]

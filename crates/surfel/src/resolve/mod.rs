@@ -46,7 +46,7 @@ use plan::{check_height_map, frame_plan};
 use point_size::choose_point_size;
 use spread::{report_degrees, report_gaps};
 use station::{choose_station, stand_at_station};
-use sun_and_sky::{LightingContext, choose_lights, lights};
+use sun_and_sky::{LightingContext, ScanInView, choose_lights, lights};
 use sun_position::stand_sun_at_date;
 use surfel_core::math::Vec3;
 use surfel_core::points::PreparedCloud;
@@ -155,7 +155,8 @@ impl AutoSettings {
             None => hidden_walls(room.as_ref(), &camera.camera, progress),
         };
         let is_inside = room.is_some_and(|room| room.contains(camera.camera.position));
-        let context = LightingContext { camera: camera.camera, up, diagonal, is_inside };
+        let scan = station.map(|station| ScanInView { points: &points, station });
+        let context = LightingContext { camera: camera.camera, up, diagonal, is_inside, scan };
         let mut description = choose_lights(description, &context, progress);
         choose_point_size(scene, &mut description, &points, &camera.camera, progress);
         let lights = lights(&description, scene.environment.as_ref(), up)?;

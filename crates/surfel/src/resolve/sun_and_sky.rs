@@ -4,8 +4,9 @@ use crate::description::{KeyedSettings, LightKind, SceneDescription, SkySettings
 use crate::error::Result;
 use surfel_core::flat::{FlatPunctualLight, FlatScene};
 use surfel_core::math::Vec3;
+use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
-use surfel_core::scene::{Camera, Environment, Light, Sky, Sun};
+use surfel_core::scene::{Camera, Environment, Light, Sky, StationView, Sun, sunlit_fraction};
 use surfel_core::surface::SurfaceKind;
 
 /// Warm sun and bluish sky, which on level ground under the usual sun add up to white. The sky gives a third of the
@@ -25,8 +26,12 @@ const AO_FRACTION: f32 = 0.15;
 /// Radiance of the headlight on a surface that faces it.
 const HEADLIGHT: f32 = 0.8;
 
+/// Fraction of the points in view that the sun must reach to be the main light. Rooms had 0, forests 0.01 to 0.4, an
+/// arcade 0.46, streets 0.6 to 1.
+const MIN_SUNLIT: f64 = 0.5;
+
 /// The scene as its lights need to know it.
-pub struct LightingContext {
+pub struct LightingContext<'a> {
     /// The camera, behind which the sun stands.
     pub camera: Camera,
     /// The world's up.
@@ -35,6 +40,16 @@ pub struct LightingContext {
     pub diagonal: f32,
     /// True if the camera stands in a closed room, which neither sun nor sky lights.
     pub is_inside: bool,
+    /// The scan that is shown from its station.
+    pub scan: Option<ScanInView<'a>>,
+}
+
+/// A scan that is shown from its station.
+pub struct ScanInView<'a> {
+    /// The points of the scan.
+    pub points: &'a PointCloud,
+    /// The view from its station.
+    pub station: &'a StationView,
 }
 
 /// Returns the description with everything written into it that it leaves open about the lights of the whole scene.
@@ -51,6 +66,12 @@ pub fn choose_lights(
         progress.choice("headlight: the camera stands in a closed room", &["light"]);
         light.light = Some(vec![LightKind::Headlight]);
     }
+    let is_sun_open =
+        light.light.is_none() && light.environment.is_none() && *sun == SunSettings::default();
+    if is_lit && is_sun_open && is_sun_hidden(context) {
+        progress.choice("headlight: hardly any sun would reach what the scanner saw", &["light"]);
+        light.light = Some(vec![LightKind::Sky, LightKind::Headlight]);
+    }
     light.light = Some(light.kinds()).filter(|kinds| !kinds.is_empty());
     if is_lit && light.has(LightKind::Sun) {
         choose_sun(sun, context, progress);
@@ -66,6 +87,18 @@ pub fn choose_lights(
     light.environment_rotation = has_environment.then(|| light.environment_rotation());
     light.environment_strength = has_environment.then(|| light.environment_strength());
     chosen
+}
+
+/// Returns true if the sun at its automatic place would reach hardly anything of what is shown from a scanner's station,
+/// as under a roof.
+fn is_sun_hidden(context: &LightingContext) -> bool {
+    let Some(ScanInView { points, station }) = &context.scan else { return false };
+    let azimuth_deg = automatic_azimuth_deg(context) as f32;
+    let elevation_deg = SunSettings::default().elevation() as f32;
+    let to_sun = Sun::direction_from_angles(azimuth_deg, elevation_deg, context.up);
+    let position = (station.position - points.origin).as_vec3();
+    let ahead = station.direction.as_vec3();
+    sunlit_fraction(&points.positions, position, ahead, to_sun, context.up) < MIN_SUNLIT
 }
 
 /// Points as pixels are shaded by their depth alone.
@@ -181,20 +214,21 @@ fn automatic_azimuth_deg(context: &LightingContext) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    //! The direction of the sun, and the brightness of level ground.
+    //! The direction of the sun, where it does not shine, and the brightness of level ground.
 
     use super::*;
     use surfel_core::math::DVec3;
+    use surfel_core::progress::NoProgress;
     use surfel_core::scene::Projection;
 
-    fn context(forward: DVec3) -> LightingContext {
+    fn context(forward: DVec3) -> LightingContext<'static> {
         let camera = Camera {
             position: -forward,
             focal_point: DVec3::ZERO,
             view_up: DVec3::new(0.0, 0.1, 1.0),
             projection: Projection::Perspective { view_angle_deg: 35.0 },
         };
-        LightingContext { camera, up: Vec3::Z, diagonal: 1.0, is_inside: false }
+        LightingContext { camera, up: Vec3::Z, diagonal: 1.0, is_inside: false, scan: None }
     }
 
     #[test]
@@ -202,6 +236,45 @@ mod tests {
         assert!((automatic_azimuth_deg(&context(DVec3::Y)) - 240.0).abs() < 1e-4);
         assert!((automatic_azimuth_deg(&context(DVec3::X)) - 330.0).abs() < 1e-4);
         assert!((automatic_azimuth_deg(&context(-DVec3::Z)) - 315.0).abs() < 1e-4);
+    }
+
+    /// What a scanner 1.5 m under a ceiling and 2 m above a floor measures; nothing of the ceiling if it has none.
+    fn scan(has_ceiling: bool) -> PointCloud {
+        let directions = (0..20_000).map(|i| {
+            let z = 1.0 - (2.0 * i as f32 + 1.0) / 20_000.0;
+            let (sin, cos) = (2.399_963 * i as f32).sin_cos();
+            Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+        });
+        let hit = |direction: Vec3| match direction.z {
+            z if z < 0.0 => Some(-2.0 / z * direction),
+            z => has_ceiling.then(|| 1.5 / z * direction),
+        };
+        let points = directions.filter_map(hit).filter(|point| point.length() < 40.0);
+        PointCloud::from_positions(points.collect())
+    }
+
+    #[test]
+    fn a_scan_under_a_roof_is_lit_from_the_camera_unless_a_sun_is_asked_for() {
+        let kinds = |has_ceiling: bool, azimuth: Option<f64>| {
+            let points = scan(has_ceiling);
+            let station = StationView {
+                position: DVec3::ZERO,
+                direction: DVec3::Y,
+                distance: 4.0,
+                view_angle_deg: 60.0,
+            };
+            let scan = Some(ScanInView { points: &points, station: &station });
+            let context = LightingContext { scan, ..context(DVec3::Y) };
+            let mut description = SceneDescription::default();
+            description.sun.azimuth = azimuth;
+            let chosen = choose_lights(&description, &context, &NoProgress);
+            (chosen.light.light.unwrap_or_default(), chosen.sun.azimuth)
+        };
+        let from_camera = vec![LightKind::Sky, LightKind::Headlight];
+        let outdoors = vec![LightKind::Sun, LightKind::Sky];
+        assert_eq!(kinds(true, None), (from_camera, None));
+        assert_eq!(kinds(true, Some(10.0)), (outdoors.clone(), Some(10.0)));
+        assert_eq!(kinds(false, None), (outdoors, Some(240.0)));
     }
 
     #[test]
