@@ -69,8 +69,8 @@ mod tests {
     use super::*;
     use std::f32::consts::{PI, TAU};
 
-    /// Returns what a spinning laser between a ground 2 m below it and a ceiling measures; `is_covered` tells where the ceiling
-    /// is, and elsewhere is a wall 40 m away.
+    /// Returns what a spinning laser between a ground 2 m below it and a ceiling measures; `is_covered` tells where the
+    /// ceiling is, and elsewhere is a wall 40 m away.
     fn scan(is_covered: impl Fn(Vec3) -> bool) -> Vec<Vec3> {
         let rays = (0..80).flat_map(|row| (0..360).map(move |column| (row, column)));
         let hit = |(row, column): (i32, i32)| {

@@ -238,7 +238,7 @@ mod tests {
         assert!((automatic_azimuth_deg(&context(-DVec3::Z)) - 315.0).abs() < 1e-4);
     }
 
-    /// Returns what a scanner 1.5 m under a ceiling and 2 m above a floor measures; nothing of the ceiling if it has none.
+    /// Returns what a scanner 1.5 m under a ceiling and 2 m above a floor measures, or without the ceiling.
     fn scan(has_ceiling: bool) -> PointCloud {
         let directions = (0..20_000).map(|i| {
             let z = 1.0 - (2.0 * i as f32 + 1.0) / 20_000.0;
