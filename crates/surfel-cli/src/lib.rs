@@ -31,6 +31,7 @@ use report::{Report, Verbosity};
 use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::Arc;
+pub use surfel_web::FrameAncestors;
 use surfel_web::SceneProvider;
 use usage::Usage;
 pub use view::RunningViewer;
