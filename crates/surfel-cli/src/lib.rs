@@ -14,6 +14,7 @@ mod global;
 mod scene_args;
 mod output;
 mod render;
+mod cluster;
 mod animate;
 mod view;
 mod info;
