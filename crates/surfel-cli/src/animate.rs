@@ -1,5 +1,6 @@
 //! `surfel animate`: a movie of an animated scene, frame by frame, or of a turn around anything.
 
+use crate::cluster;
 use crate::global::{Global, check_device, start_threads};
 use crate::options::{EVERYWHERE, PLANS, Scope};
 use crate::render::{report_threads, with_info};
@@ -23,6 +24,10 @@ pub struct Args {
     /// Continues an interrupted run of the same movie.
     #[arg(long, help_heading = "Output")]
     resume: bool,
+    /// Renders the frames on the workers of a Dask scheduler, as in tcp://scheduler:8786. They need the files under the
+    /// same names and the Python package, which this machine needs too.
+    #[arg(long, value_name = "ADDRESS", help_heading = "Output", hide_short_help = true)]
+    cluster: Option<String>,
     /// Prints what would be done as a scene file on stdout, and renders nothing.
     #[arg(long, help_heading = "Output", hide_short_help = true)]
     dry_run: bool,
@@ -54,7 +59,12 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     if description.output.output.is_none() && !args.dry_run {
         return Err(Usage("name the movie with -o, as in -o movie.mp4".into()).into());
     }
-    animate_description(&description, args.resume, args.dry_run, report)
+    match (&args.cluster, &description.output.output) {
+        (Some(address), Some(output)) if !args.dry_run => {
+            animate_on_cluster(&description, output, (address, args.resume), report)
+        }
+        _ => animate_description(&description, args.resume, args.dry_run, report),
+    }
 }
 
 /// Renders the movie of a description to its output, or prints what would be done.
@@ -66,18 +76,40 @@ pub fn animate_description(
 ) -> anyhow::Result<()> {
     let output = description.output.output.as_deref();
     output.map_or(Ok(()), |output| check(output, &movie_options(description)))?;
-    let movie = PlannedMovie::new(description, report).map_err(|error| match error {
-        surfel::Error::Invalid(invalid) if invalid.path == "frames" => anyhow::Error::from(Usage(
-            "nothing moves; add --turntable SECONDS, or --frames N for a still movie".into(),
-        )),
-        error => error.into(),
-    })?;
+    let movie = plan(description, report)?;
     let (Some(output), false) = (output, is_dry_run) else {
         movie.loaded.check_surfaces(description, 0.0)?;
         return Ok(print(&format!("{:#}", with_info(&movie.complete, &movie.loaded)))?);
     };
     report_threads(Simd::detect(), report);
     Ok(movie.render(output, resumes, report)?)
+}
+
+/// Renders the movie of a description on the workers of the scheduler at `address`.
+fn animate_on_cluster(
+    description: &SceneDescription,
+    output: &Path,
+    (address, resumes): (&str, bool),
+    report: &Report,
+) -> anyhow::Result<()> {
+    check(output, &movie_options(description))?;
+    let movie = plan(description, report)?;
+    let mut recipe = description.clone();
+    // The workers render frames of a movie whose length the data of this machine decide.
+    recipe.output.frames = movie.complete.output.frames;
+    recipe.output.output = None;
+    Ok(movie.collect(output, resumes, report, |frames, format, add| {
+        cluster::render_frames(address, &recipe, (frames, format), add, report)
+    })?)
+}
+
+fn plan(description: &SceneDescription, report: &Report) -> anyhow::Result<PlannedMovie> {
+    PlannedMovie::new(description, report).map_err(|error| match error {
+        surfel::Error::Invalid(invalid) if invalid.path == "frames" => anyhow::Error::from(Usage(
+            "nothing moves; add --turntable SECONDS, or --frames N for a still movie".into(),
+        )),
+        error => error.into(),
+    })
 }
 
 fn check(output: &Path, options: &MovieOptions) -> anyhow::Result<()> {

@@ -85,8 +85,11 @@ impl Renderer for GpuRenderer {
         let all = passes.passes.iter().chain(&passes.aov_passes);
         kernels.compile(&self.gpu, all.map(|pass| pass.kernel))?;
         uploads.update(&self.gpu, kernels, &scene.geometries)?;
-        let job = Job { gpu: &self.gpu, kernels, uploads, scene, settings, region, passes };
-        job.render(progress)
+        // The kernels number pixels row by row.
+        let rows = RenderRegion { columns: RenderRegion::whole(settings).columns, ..region };
+        let job = Job { gpu: &self.gpu, kernels, uploads, scene, settings, region: rows, passes };
+        let (image, stats) = job.render(progress)?;
+        Ok((image.with_columns(region.columns), stats))
     }
 }
 

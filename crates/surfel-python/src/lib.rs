@@ -37,7 +37,7 @@ mod native {
     #[pymodule_export]
     use crate::program::run_program;
     #[pymodule_export]
-    use crate::scene::{PyScene, load};
+    use crate::scene::{_unread, PyScene, load};
     #[pymodule_export]
     use crate::viewer::{PyViewer, view};
 

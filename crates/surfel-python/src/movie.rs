@@ -12,9 +12,11 @@ use pyo3::types::PyDict;
 use rayon::ThreadPool;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
-use surfel::BuiltScene;
 use surfel::animate::{PlannedMovie, movie_options, render_frame};
 use surfel::description::Invalid;
+use surfel::{BuiltScene, RenderedImage};
+use surfel_core::math::DVec3;
+use surfel_core::progress::Progress;
 use surfel_formats::MovieOptions;
 
 /// Renders a movie of a scene: what moves in it, or a turn (`turntable=SECONDS`).
@@ -58,6 +60,8 @@ pub fn animate(
 pub struct PyFilm {
     scene: Mutex<BuiltScene>,
     options: MovieOptions,
+    /// About how many bytes the scene takes.
+    memory_estimate: u64,
     threads: Option<ThreadPool>,
 }
 
@@ -74,15 +78,22 @@ impl PyFilm {
         let description = with_keys(py, &scene.get().description(), keys)?;
         work::run(py, progress, |progress| {
             let threads = start_threads(&description.run)?;
-            let build = || PlannedMovie::new(&description, progress)?.build(progress);
-            let (scene, options) = on_threads(threads.as_ref(), build)?;
-            Ok(Self { scene: Mutex::new(scene), options, threads })
+            let planned =
+                on_threads(threads.as_ref(), || PlannedMovie::new(&description, progress))?;
+            let memory_estimate = planned.memory_estimate();
+            let (scene, options) = on_threads(threads.as_ref(), || planned.build(progress))?;
+            Ok(Self { scene: Mutex::new(scene), options, memory_estimate, threads })
         })
     }
 
     /// The number of frames.
     fn __len__(&self) -> usize {
         self.options.n_frames as usize
+    }
+
+    /// Returns about how many bytes the film takes.
+    fn _memory_estimate(&self) -> u64 {
+        self.memory_estimate
     }
 
     /// Renders a frame, counted from 0: the picture that `animate` would write, without layers but the colour.
@@ -95,21 +106,37 @@ impl PyFilm {
         index: u32,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyImage> {
-        if self.options.n_frames <= index {
-            let message = format!("frame {index} of {}", self.options.n_frames);
-            return Err(PyIndexError::new_err(message));
-        }
+        self.check(index)?;
         work::run(py, progress, |progress| {
-            let mut scene = self.scene.lock().unwrap_or_else(PoisonError::into_inner);
-            let time_secs = f64::from(index) / self.options.fps;
-            let scene = &mut *scene;
-            let mut image =
-                on_threads(self.threads.as_ref(), || render_frame(scene, time_secs, progress))?;
+            let (mut image, origin) = self.frame(index, progress)?;
             // Movies keep no index that points had when they were read.
             image.drop_aovs();
-            let origin = scene.flat().origin;
             Ok(PyImage::new(image, origin, Vec::new(), Vec::new()))
         })
+    }
+
+    /// Renders a frame to a file as `animate` would write it, of .exr with all layers.
+    fn _save(&self, py: Python<'_>, index: u32, path: PathBuf) -> PyResult<()> {
+        self.check(index)?;
+        work::run(py, None, |progress| self.frame(index, progress)?.0.save(path))
+    }
+}
+
+impl PyFilm {
+    fn check(&self, index: u32) -> PyResult<()> {
+        if index < self.options.n_frames {
+            return Ok(());
+        }
+        let message = format!("frame {index} of {}", self.options.n_frames);
+        Err(PyIndexError::new_err(message))
+    }
+
+    /// Renders a frame; returns it with the origin of its positions.
+    fn frame(&self, index: u32, progress: &dyn Progress) -> surfel::Result<(RenderedImage, DVec3)> {
+        let mut scene = self.scene.lock().unwrap_or_else(PoisonError::into_inner);
+        let (scene, time_secs) = (&mut *scene, f64::from(index) / self.options.fps);
+        let image = on_threads(self.threads.as_ref(), || render_frame(scene, time_secs, progress))?;
+        Ok((image, scene.flat().origin))
     }
 }
 

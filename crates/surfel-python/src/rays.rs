@@ -18,7 +18,7 @@ pub struct RayArray<'py> {
     /// Shape of what is said of each ray.
     pub shape: Vec<usize>,
     /// Order in which rays of a picture are traced; none for any others.
-    order: Option<Vec<u32>>,
+    order: Option<TileOrder>,
 }
 
 /// Pixels along the side of a tile of a picture.
@@ -30,7 +30,7 @@ impl<'py> RayArray<'py> {
         let (array, shape): (Bound<'_, PyAny>, Vec<usize>) =
             checked(rays.py(), "rays", (rays,))?.extract()?;
         let order = match shape[..] {
-            [height, width] => tile_order(height, width),
+            [height, width] => TileOrder::new(height, width),
             _ => None,
         };
         Ok(Self { array, shape, order })
@@ -57,10 +57,10 @@ impl<'py> RayArray<'py> {
         view: &LiveView,
         t_range: (f32, f32),
     ) -> WorldRays {
-        match self.order.as_deref() {
+        match &self.order {
             Some(order) => {
-                let rays = order.par_iter().map(|i| ray(&rays[*i as usize]));
-                WorldRays::new(rays, t_range, &view.flat)
+                let pixels = (0..rays.len()).into_par_iter().map(|i| ray(&rays[order.pixel(i)]));
+                WorldRays::new(pixels, t_range, &view.flat)
             }
             None => WorldRays::new(rays.par_iter().map(ray), t_range, &view.flat),
         }
@@ -72,32 +72,67 @@ impl<'py> RayArray<'py> {
     }
 
     /// Puts answers into the order of the array.
-    pub fn restored<T: Copy + Default>(&self, answers: Vec<T>) -> Vec<T> {
+    pub fn restored<T: Copy + Default + Send + Sync>(&self, answers: Vec<T>) -> Vec<T> {
         let Some(order) = &self.order else { return answers };
         let mut restored = vec![T::default(); answers.len()];
-        for (i, answer) in order.iter().zip(answers) {
-            restored[*i as usize] = answer;
-        }
+        let n = order.row.len();
+        let rows = restored.par_chunks_mut(n).zip(answers.par_chunks(n));
+        rows.for_each(|(restored, answers)| {
+            for (pixel, answer) in order.of_row(answers.len()).iter().zip(answers) {
+                restored[*pixel as usize] = *answer;
+            }
+        });
         restored
     }
 }
 
-/// Returns the pixels of a picture tile by tile, along a Morton curve inside each: rays of neighbouring pixels, traced
-/// together, visit the same nodes. Returns none for pictures without two dimensions.
-fn tile_order(height: usize, width: usize) -> Option<Vec<u32>> {
-    let (height, width) = (u32::try_from(height).ok()?, u32::try_from(width).ok()?);
-    if height < 2 || width < 2 || height.checked_mul(width).is_none() {
-        return None;
+/// The pixels of a picture tile by tile, along a Morton curve inside each: rays of neighbouring pixels, traced together,
+/// visit the same nodes. Each row of tiles is a part of the picture by itself.
+struct TileOrder {
+    /// Pixels of a row of tiles, by their index in it.
+    row: Vec<u32>,
+    /// Pixels of the last row, which may have fewer.
+    last: Vec<u32>,
+    /// Number of pixels of all rows but the last.
+    n_before_last: usize,
+}
+
+impl TileOrder {
+    /// Returns the order of a picture; none for arrays without two dimensions.
+    fn new(height: usize, width: usize) -> Option<Self> {
+        let (height, width) = (u32::try_from(height).ok()?, u32::try_from(width).ok()?);
+        if height < 2 || width < 2 || height.checked_mul(width).is_none() {
+            return None;
+        }
+        let last_height = (height - 1) % TILE + 1;
+        let n_before_last = (height - last_height) as usize * width as usize;
+        let [row, last] = [TILE.min(height), last_height].map(|height| tile_row(height, width));
+        Some(Self { row, last, n_before_last })
     }
-    let corners = |size: u32| (0..size).step_by(TILE as usize);
-    let tiles = corners(height).flat_map(|y| corners(width).map(move |x| (x, y)));
-    let pixels = tiles.flat_map(|(x, y)| {
-        (0..TILE * TILE).map(morton_decode).map(move |(column, row)| (x + column, y + row))
+
+    /// Returns the pixel of the `i`-th ray.
+    fn pixel(&self, i: usize) -> usize {
+        if self.n_before_last <= i {
+            return self.n_before_last + self.last[i - self.n_before_last] as usize;
+        }
+        let within = i % self.row.len();
+        i - within + self.row[within] as usize
+    }
+
+    /// Returns the order of a row of so many pixels.
+    fn of_row(&self, n_pixels: usize) -> &[u32] {
+        if n_pixels == self.row.len() { &self.row } else { &self.last }
+    }
+}
+
+/// Returns the pixels of a row of tiles of this height.
+fn tile_row(height: u32, width: u32) -> Vec<u32> {
+    let tiles = (0..width).step_by(TILE as usize);
+    let pixels = tiles.flat_map(|x| {
+        (0..TILE * TILE).map(morton_decode).map(move |(column, row)| (x + column, row))
     });
     let inside = pixels.filter(|(x, y)| *x < width && *y < height);
-    let mut order = Vec::with_capacity(height as usize * width as usize);
-    order.extend(inside.map(|(x, y)| y * width + x));
-    Some(order)
+    inside.map(|(x, y)| y * width + x).collect()
 }
 
 /// Returns hits as a dict of arrays; `contents` has the number of what each instance shows.
@@ -109,7 +144,8 @@ pub fn ray_hits<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let shape = &rays.shape;
     let content = |instance: u32| contents.get(instance as usize).copied().unwrap_or(NO_ID);
-    let geometries: Vec<u32> = hits.instances.into_par_iter().map(content).collect();
+    let mut geometries = hits.instances;
+    geometries.par_iter_mut().for_each(|instance| *instance = content(*instance));
     let vectors = shape.iter().copied().chain([3]).collect();
     let normals = bytemuck::cast_vec::<[f32; 3], f32>(rays.restored(hits.normals));
     let all = PyDict::new(py);

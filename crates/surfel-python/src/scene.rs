@@ -2,7 +2,7 @@
 
 use crate::array::{checked, column};
 use crate::buffer::owned_array;
-use crate::errors::to_exception;
+use crate::errors::{invalid_setting, to_exception};
 use crate::image::PyImage;
 use crate::object::NewObject;
 use crate::rays::{RayArray, ray_hits};
@@ -13,10 +13,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::ThreadPool;
 use serde_json::Value;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 use std::time::Duration;
-use surfel::description::is_scene_file;
+use surfel::description::{Invalid, is_scene_file};
 use surfel::live_scene::{LiveScene, UseCase};
 use surfel::live_view::LiveView;
 use surfel::progress_log::{Choice, ProgressLog};
@@ -24,6 +24,8 @@ use surfel::ray_query::{RayCaster, WorldRays};
 use surfel::{Error, RenderedImage, SceneDescription};
 use surfel_core::image::Image;
 use surfel_core::progress::Progress;
+use surfel_core::scene::Background;
+use surfel_core::scene::color::Legend;
 
 /// A scene of files and clouds. Threads may share it.
 #[pyclass(frozen, module = "surfel", name = "Scene")]
@@ -318,25 +320,27 @@ impl PyScene {
         })
     }
 
-    /// Renders rows of a picture, from `first` to before `end`: linear colour without overlay, float32, (rows, width, 4).
-    #[pyo3(signature = (first, end, **keys))]
-    fn _render_rows<'py>(
+    /// Renders a region of a picture, columns and rows from the first to before the second: linear colour without overlay,
+    /// float32, (rows, columns, 4).
+    #[pyo3(signature = (columns, rows, **keys))]
+    fn _render_region<'py>(
         &self,
         py: Python<'py>,
-        first: u32,
-        end: u32,
+        columns: (u32, u32),
+        rows: (u32, u32),
         keys: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let image = self.with_view(py, keys, None, |scene, chosen, progress| {
-            scene.rows(&chosen.view, (first, end), progress)
+            scene.region(&chosen.view, (columns, rows), progress)
         })?;
         let shape = vec![image.height as usize, image.width as usize, 4];
         owned_array(py, bytemuck::cast_vec::<[f32; 4], f32>(image.color), shape)
     }
 
-    /// Makes a picture of the colours of all its rows.
+    /// Makes a picture of the colours of all its pixels, float32, (height, width, 4). Pixels that are NaN show the
+    /// background.
     #[pyo3(signature = (color, **keys))]
-    fn _picture_of_rows(
+    fn _picture_of(
         &self,
         py: Python<'_>,
         color: &Bound<'_, PyAny>,
@@ -345,13 +349,14 @@ impl PyScene {
         let color = column::<f32>(&checked(py, "numbers", ("color", color, [None::<u8>; 3]))?)?;
         self.with_view(py, keys, None, |_, ChosenView { view, .. }, _| {
             let mut image = Image::new(view.settings.width, view.settings.height);
-            let rows = color.as_chunks::<4>().0;
+            let pixels = color.as_chunks::<4>().0;
             let expected = image.color.len();
-            if rows.len() != expected {
-                let found = rows.len();
+            if pixels.len() != expected {
+                let found = pixels.len();
                 return Err(Error::Unfit(format!("found {found} pixels, expected {expected}")));
             }
-            image.color.copy_from_slice(rows);
+            image.color.copy_from_slice(pixels);
+            show_background(&mut image, view.flat.background);
             Ok(PyImage::new(view.finished(image), view.flat.origin, Vec::new(), Vec::new()))
         })
     }
@@ -368,10 +373,37 @@ impl PyScene {
         to_python(py, &Value::Object(table))
     }
 
+    /// Returns the least and the greatest value of the colour map; none if the colours are no map.
+    fn _color_range(&self, py: Python<'_>) -> PyResult<Option<(f64, f64)>> {
+        self.with_view(py, None, None, |_, chosen, _| {
+            Ok(match chosen.view.trees.legend {
+                Legend::Map { low, high, .. } => Some((low, high)),
+                _ => None,
+            })
+        })
+    }
+
+    /// Returns about how many bytes the scene takes once it is prepared. Reads its files.
+    fn _memory_estimate(&self, py: Python<'_>) -> PyResult<u64> {
+        let (description, slot) = self.state();
+        work::run(py, None, |progress| {
+            Ok(opened(&slot, &description, progress)?.scene.memory_estimate())
+        })
+    }
+
     fn __repr__(&self) -> String {
         let (description, _) = self.state();
         let n_files = description.files.len();
         format!("<surfel.Scene of {n_files} files and {} objects>", description.objects.len())
+    }
+}
+
+/// Sets pixels that are NaN to the background.
+fn show_background(image: &mut Image, background: Background) {
+    let Image { width, height, color, .. } = image;
+    for (row, y) in color.chunks_mut(*width as usize).zip(0..) {
+        let behind = background.color_at((y as f32 + 0.5) / *height as f32);
+        row.iter_mut().filter(|pixel| pixel[0].is_nan()).for_each(|pixel| *pixel = behind);
     }
 }
 
@@ -385,6 +417,12 @@ fn point_ids(view: &LiveView, image: &RenderedImage) -> Vec<u32> {
         source().unwrap_or(*id)
     };
     pixels.map(source).collect()
+}
+
+fn scene_of_text(py: Python<'_>, text: &str) -> PyResult<SceneDescription> {
+    let table = serde_json::from_str(text).map_err(|error| Invalid::new(error.to_string()));
+    let description = table.and_then(|table| SceneDescription::from_table(&table, Path::new("")));
+    description.map_err(|error| invalid_setting(py, error))
 }
 
 /// Opens a file, or several: point clouds, meshes, glTF scenes, scene files (.toml, .json).
@@ -401,7 +439,23 @@ pub fn load(
     progress: Option<&Bound<'_, PyAny>>,
     keys: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<PyScene> {
-    let mut description = SceneDescription::default();
+    let scene = _unread(py, paths, None, keys)?;
+    let (description, slot) = scene.state();
+    work::run(py, progress, |progress| opened(&slot, &description, progress).map(drop))?;
+    Ok(scene)
+}
+
+/// Makes the scene that `load` opens, whose files are read when they are needed. `_scene` is the text of a scene file
+/// that counts besides, as JSON.
+#[pyfunction]
+#[pyo3(signature = (*paths, _scene = None, **keys))]
+pub fn _unread(
+    py: Python<'_>,
+    paths: Vec<PathBuf>,
+    _scene: Option<&str>,
+    keys: Option<&Bound<'_, PyDict>>,
+) -> PyResult<PyScene> {
+    let mut description = scene_of_text(py, _scene.unwrap_or("{}"))?;
     for path in paths {
         if is_scene_file(&path) {
             let read = SceneDescription::read(&path).map_err(|error| to_exception(py, &error))?;
@@ -410,8 +464,5 @@ pub fn load(
             description.files.push(path);
         }
     }
-    let scene = PyScene::new(with_keys(py, &description, keys)?);
-    let (description, slot) = scene.state();
-    work::run(py, progress, |progress| opened(&slot, &description, progress).map(drop))?;
-    Ok(scene)
+    Ok(PyScene::new(with_keys(py, &description, keys)?))
 }

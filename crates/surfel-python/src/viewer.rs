@@ -1,15 +1,18 @@
 //! The viewer, on a thread beside the interpreter.
 
-use crate::errors::exception;
+use crate::errors::{exception, invalid_setting};
 use crate::scene::PyScene;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::sync::{Mutex, PoisonError};
-use surfel_cli::RunningViewer;
+use surfel::description::Invalid;
+use surfel_cli::{FrameAncestors, RunningViewer};
 
 /// A running viewer. It stops with `close()`, at the end of a `with` block, or with the interpreter.
 #[pyclass(frozen, module = "surfel", name = "Viewer")]
 pub struct PyViewer {
     link: String,
+    frame_ancestors: FrameAncestors,
     running: Mutex<Option<RunningViewer>>,
 }
 
@@ -37,9 +40,27 @@ impl PyViewer {
         self.close(py)
     }
 
+    /// Lets pages of an origin, as `http://localhost:8888`, show the page in a frame; no others may. A notebook's cell does
+    /// so by itself.
+    ///
+    /// Raises `InvalidSetting` for anything but a scheme, a host and a port.
+    fn allow_frame(&self, py: Python<'_>, origin: &str) -> PyResult<()> {
+        let allowed = self.frame_ancestors.allow(origin);
+        allowed.map_err(|error| invalid_setting(py, Invalid::new(error.to_string())))
+    }
+
     /// The link in a cell of a notebook.
     fn _repr_html_(&self) -> String {
         format!("<a href=\"{0}\" target=\"_blank\">{0}</a>", self.link)
+    }
+
+    /// The page in a cell of a notebook, where anywidget is installed, and the link.
+    #[pyo3(signature = (**_options))]
+    fn _repr_mimebundle_<'py>(
+        viewer: &Bound<'py, Self>,
+        _options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        viewer.py().import("surfel._widget")?.call_method1("mimebundle", (viewer,))
     }
 
     fn __repr__(&self) -> String {
@@ -49,7 +70,8 @@ impl PyViewer {
 
 /// Starts the viewer of a scene as it is now, on this machine alone, and returns at once.
 ///
-/// `port` 0 takes any free one. `open=True` opens the page in a browser; in a notebook the result is a link to it.
+/// `port` 0 takes any free one. `open=True` opens the page in a browser. In a notebook the result shows the page where anywidget is installed, else
+/// a link to it.
 ///
 /// Raises `Error` if the system refuses the port.
 #[pyfunction]
@@ -63,9 +85,9 @@ pub fn view(
     let description = scene.get().description();
     let running = RunningViewer::start(description, port)
         .map_err(|error| exception(py, "Error", &error.to_string()))?;
-    let link = running.link.clone();
+    let (link, frame_ancestors) = (running.link.clone(), running.frame_ancestors.clone());
     if open {
         py.import("webbrowser")?.call_method1("open", (&link,))?;
     }
-    Ok(PyViewer { link, running: Mutex::new(Some(running)) })
+    Ok(PyViewer { link, frame_ancestors, running: Mutex::new(Some(running)) })
 }

@@ -40,7 +40,7 @@ def test_frames_are_those_of_the_program(hill, recipe, tmp_path):
 def test_tiles_join_to_the_program_s_picture(hill, tmp_path):
     program("render", *options(hill), "-o", tmp_path / "whole.png", "--legend")
     whole = (tmp_path / "whole.png").read_bytes()
-    for tiles in (1, 5, 99):
+    for tiles in (1, 5, 99, (1, 1), (4, 4), (3, 1), (60, 2)):
         assert render_tiles(Recipe(hill, legend=True, **SMALL), tiles).compute() == whole, tiles
 
 
@@ -54,8 +54,29 @@ def test_recipes_travel_as_descriptions(hill, recipe):
 def test_recipes_of_other_versions_are_refused(recipe):
     version = surfel.__version__.encode()
     data = pickle.dumps(recipe, protocol=0).replace(version, b"9" * len(version))
-    with pytest.raises(VersionMismatch, match="made by surfel 9"):
-        pickle.loads(data)
+    with pytest.raises(VersionMismatch, match=f"this process has surfel {surfel.__version__}.*made by surfel 9"):
+        pickle.loads(data).scene()
+
+
+def test_workers_of_other_versions_are_refused_by_name(recipe):
+    distributed = pytest.importorskip("distributed")
+
+    def become_other():
+        import surfel
+
+        surfel.__version__ = "9.9.9"
+
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        with distributed.Client(cluster) as client:
+            client.run(become_other)
+            with pytest.raises(VersionMismatch, match="worker 0 at tcp://.* has surfel 9.9.9"):
+                client.gather(client.compute(render_frames(recipe, range(1))))
+
+
+@pytest.mark.parametrize("tiles", [0, (0, 4), (1, 2, 3), "4x4", 2.5, (2, -1)])
+def test_other_tiles_are_refused(recipe, tiles):
+    with pytest.raises(surfel.InvalidSetting, match="tiles: found"):
+        render_tiles(recipe, tiles)
 
 
 def test_wrong_recipes_are_named_where_they_are_rendered(hill):

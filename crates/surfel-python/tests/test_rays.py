@@ -87,9 +87,10 @@ def test_the_pinhole_camera_sees_the_depth_of_the_picture(hill):
     assert (hits["point_ids"] == image.point_ids)[both].mean() > 0.99
 
 
-def test_pictures_of_rays_are_answered_in_their_order(hill):
+@pytest.mark.parametrize("width, height", [(45, 70), (64, 96), (33, 32), (2, 2), (31, 129), (100, 3)])
+def test_pictures_of_rays_are_answered_in_their_order(hill, width, height):
     scene = surfel.load(hill)
-    rays = surfel.create_rays_pinhole(60, (0, 0, 0), (0, -3, 2), (0, 0, 1), 45, 70)
+    rays = surfel.create_rays_pinhole(60, (0, 0, 0), (0, -3, 2), (0, 0, 1), width, height)
     for query in (scene.test_occlusions, scene.count_intersections):
         assert (query(rays).ravel() == query(rays.reshape(-1, 6))).all()
     picture, row = scene.cast_rays(rays), scene.cast_rays(rays.reshape(-1, 6))

@@ -1,5 +1,6 @@
 //! Access control: a token beyond loopback, and checks that keep foreign web pages out.
 
+use crate::frame_ancestors::FrameAncestors;
 use axum::http::header::{AUTHORIZATION, COOKIE, HOST, HeaderName, ORIGIN, REFERER};
 use axum::http::{HeaderMap, HeaderValue, Method, Request, Uri};
 use std::net::IpAddr;
@@ -10,6 +11,8 @@ use subtle::ConstantTimeEq;
 pub struct AccessGuard {
     /// The scheme of the server's addresses.
     pub scheme: Scheme,
+    /// The origins whose pages may show the page in a frame.
+    pub frame_ancestors: FrameAncestors,
     /// The token that requests need; none on loopback.
     token: Option<String>,
 }
@@ -86,14 +89,14 @@ impl AccessGuard {
     /// # Errors
     /// Fails if the system has no random numbers.
     pub fn new(host: IpAddr) -> Result<Self, getrandom::Error> {
-        let scheme = Scheme::Http;
+        let (scheme, frame_ancestors) = (Scheme::Http, FrameAncestors::default());
         if host.is_loopback() {
-            return Ok(Self { scheme, token: None });
+            return Ok(Self { scheme, frame_ancestors, token: None });
         }
         let mut bytes = [0; TOKEN_BYTES];
         getrandom::fill(&mut bytes)?;
         let token = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-        Ok(Self { scheme, token: Some(token) })
+        Ok(Self { scheme, frame_ancestors, token: Some(token) })
     }
 
     /// The token that requests need; none on loopback.
@@ -105,7 +108,8 @@ impl AccessGuard {
     ///
     /// # Errors
     /// Fails if `Host` is missing, repeated, or on loopback no loopback name, and if another web site has made the
-    /// browser send the request. A link from there to the page itself is allowed.
+    /// browser send the request. A link from there to the page itself is allowed, and so is a frame of it if there are
+    /// origins whose pages may show one: the page's policy says which, and browsers obey it.
     pub fn check_origin<B>(&self, request: &Request<B>) -> Result<(), AccessDenied> {
         let host = host_of(request).ok_or(AccessDenied::Host)?;
         // The port is not compared: a tunnel may change it. Beyond loopback a machine has many names, and the
@@ -113,7 +117,7 @@ impl AccessGuard {
         if self.token.is_none() && !is_loopback(host) {
             return Err(AccessDenied::Host);
         }
-        if self.sender(request) == Sender::Foreign && !is_visit(request) {
+        if self.sender(request) == Sender::Foreign && !self.is_visit(request) {
             return Err(AccessDenied::Origin);
         }
         Ok(())
@@ -161,6 +165,20 @@ impl AccessGuard {
         let cookie = format!("{name}={expected}; Path=/; HttpOnly; SameSite=Strict{secure}");
         let value = |text: String| HeaderValue::try_from(text).map_err(|_| AccessDenied::Token);
         Ok(Some(TokenExchange { location: value(location)?, cookie: value(cookie)? }))
+    }
+
+    /// Returns whether a request is a visit of the page in a tab, or in a frame where one may be. Without Fetch metadata
+    /// this cannot be known, and the page itself holds nothing that needs protection.
+    fn is_visit<B>(&self, request: &Request<B>) -> bool {
+        let says = |name: &str, expected: &str| {
+            request.headers().get_all(name).iter().all(|value| value == expected)
+        };
+        let is_frame = || !self.frame_ancestors.is_empty() && says("sec-fetch-dest", "iframe");
+        request.method() == Method::GET
+            && request.uri().path() == "/"
+            && !request.headers().contains_key(ORIGIN)
+            && says("sec-fetch-mode", "navigate")
+            && (says("sec-fetch-dest", "document") || is_frame())
     }
 
     fn is_token(&self, found: &str) -> bool {
@@ -211,19 +229,6 @@ fn host_of<B>(request: &Request<B>) -> Option<&str> {
     let authority = request.uri().authority();
     let host = host.to_str().ok()?;
     authority.is_none_or(|authority| authority.as_str().eq_ignore_ascii_case(host)).then_some(host)
-}
-
-/// Returns whether a request is a visit of the page in a tab. Without Fetch metadata this cannot be known, and the
-/// page itself holds nothing that needs protection.
-fn is_visit<B>(request: &Request<B>) -> bool {
-    let says = |name: &str, expected: &str| {
-        request.headers().get_all(name).iter().all(|value| value == expected)
-    };
-    request.method() == Method::GET
-        && request.uri().path() == "/"
-        && !request.headers().contains_key(ORIGIN)
-        && says("sec-fetch-mode", "navigate")
-        && says("sec-fetch-dest", "document")
 }
 
 /// The name of the cookie. All ports of a host share their cookies, so it holds the port that the browser knows.
@@ -352,6 +357,28 @@ mod tests {
             assert_eq!(check("/", &frame), denied, "{site}");
             let image = [visit[0], ("sec-fetch-mode", "no-cors"), ("sec-fetch-dest", "image")];
             assert_eq!(check("/", &image), denied, "{site}");
+        }
+    }
+
+    #[test]
+    fn frames_need_an_origin_that_may_show_them() {
+        let guard = on_loopback();
+        let frame = |path: &str, site: &str, dest: &str| {
+            let headers = [("host", "localhost"), ("sec-fetch-site", site)];
+            let headers =
+                [headers[0], headers[1], ("sec-fetch-mode", "navigate"), ("sec-fetch-dest", dest)];
+            guard.check_origin(&get(path, &headers))
+        };
+        assert_eq!(frame("/", "same-site", "iframe"), Err(AccessDenied::Origin));
+        guard.frame_ancestors.allow("http://localhost:8888").unwrap();
+        for site in ["same-site", "cross-site"] {
+            assert_eq!(frame("/", site, "iframe"), Ok(()), "{site}");
+            for path in ["/render", "/ws", "/scene", "/stats", "/healthz"] {
+                assert_eq!(frame(path, site, "iframe"), Err(AccessDenied::Origin), "{path}");
+            }
+            for dest in ["frame", "embed", "object", "image", "script"] {
+                assert_eq!(frame("/", site, dest), Err(AccessDenied::Origin), "{dest}");
+            }
         }
     }
 

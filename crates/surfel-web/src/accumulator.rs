@@ -237,7 +237,7 @@ impl Accumulator {
             ..full
         };
         let is_rasterized = uses_rasterizer(&prepared.flat)?;
-        let slice = self.next_slice(height, is_rasterized);
+        let slice = self.next_slice((width, height), is_rasterized);
         let n_rows = slice.rows.1 - slice.rows.0;
         let Some(scene) = self.scene(prepared, view) else { return Ok(false) };
         let deadline = Deadline::new(progress, n_rows == 1 || is_rasterized);
@@ -331,7 +331,7 @@ impl Accumulator {
         let n_rows = ((SLICE_SECS / secs_per_row.max(1e-6)) as u32).max(1);
         let rows = (first, size.1.min(first.saturating_add(n_rows)));
         let settings = place_settings(prepared.render_settings, size);
-        let region = RenderRegion { rows, samples: (0, 1) };
+        let region = RenderRegion { rows, columns: (0, size.0), samples: (0, 1) };
         let deadline = Deadline::new(progress, rows.1 - rows.0 == 1);
         let Some(scene) = self.scene(prepared.clone(), view) else { return Ok(false) };
         let start = Instant::now();
@@ -411,7 +411,7 @@ impl Accumulator {
     }
 
     /// Returns the next rows. The rasterizer draws all points for any number of rows, so it gets all rows.
-    fn next_slice(&self, height: u32, is_rasterized: bool) -> RenderRegion {
+    fn next_slice(&self, (width, height): (u32, u32), is_rasterized: bool) -> RenderRegion {
         let affordable = SLICE_SECS / self.secs_per_row.max(1e-6);
         let is_slow = SLICE_TIMEOUT.as_secs_f64() <= f64::from(MIN_SLICE_ROWS) * self.secs_per_row;
         let n_rows = match is_rasterized {
@@ -419,7 +419,8 @@ impl Accumulator {
             false => (affordable as u32).max(if is_slow { 1 } else { MIN_SLICE_ROWS }),
         };
         let rows = (self.n_rows, height.min(self.n_rows.saturating_add(n_rows)));
-        RenderRegion { rows, samples: (self.n_samples, self.n_samples + 1) }
+        let samples = (self.n_samples, self.n_samples + 1);
+        RenderRegion { rows, columns: (0, width), samples }
     }
 
     fn add(&mut self, image: &Image, slice: RenderRegion, n_pixels: usize, has_overlay: bool) {

@@ -9,6 +9,7 @@ mod merge_patch;
 mod limits;
 mod message;
 mod camera;
+mod frame_ancestors;
 mod access;
 mod bundle;
 mod page;
@@ -39,6 +40,7 @@ mod tls;
 mod routes;
 mod server;
 
+pub use frame_ancestors::FrameAncestors;
 pub use limits::{Limits, Timeouts};
 pub use scene_provider::{
     Error, Export, PickedPoint, PictureOverlay, PicturePart, PointDescriber, PointFile,

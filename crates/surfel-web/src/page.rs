@@ -1,6 +1,7 @@
 //! The page's files, embedded in the program, bundled and compressed: no request reaches the file system.
 
 use crate::bundle::{bundle_modules, bundle_styles};
+use crate::frame_ancestors::FrameAncestors;
 use axum::body::Bytes;
 use axum::http::header::{self, HeaderName};
 use axum::http::{HeaderMap, HeaderValue, StatusCode};
@@ -16,9 +17,9 @@ use std::sync::LazyLock;
 #[folder = "page/"]
 struct Embedded;
 
-/// The page loads nothing from other origins and runs no code of its own text, and no other page may frame it.
+/// The page loads nothing from other origins and runs no code of its own text. Which pages may frame it follows.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; \
-    connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+    connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors ";
 
 /// One file as it is served.
 struct PageFile {
@@ -38,13 +39,16 @@ const CACHE_AND_ASK: &str = "no-cache";
 static FILES: LazyLock<Vec<PageFile>> =
     LazyLock::new(|| page_files().expect("a test bundles the page"));
 
-/// The response with a file of the page for a request with these headers; an empty name stands for the page itself.
-pub fn file(name: &str, request: &HeaderMap) -> Response {
+/// The response with a file of the page for a request with these headers; an empty name stands for the page itself, which
+/// pages of `ancestors` may frame.
+pub fn file(name: &str, request: &HeaderMap, ancestors: &FrameAncestors) -> Response {
     let Some(file) = FILES.iter().find(|file| file.name == name) else {
         return (StatusCode::NOT_FOUND, "no such page; the viewer is at /").into_response();
     };
+    let policy = HeaderValue::try_from(format!("{POLICY}{}", ancestors.source_list()));
+    let policy = policy.expect("origins have characters of headers alone");
     let common = [
-        (header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY)),
+        (header::CONTENT_SECURITY_POLICY, policy),
         (header::CACHE_CONTROL, HeaderValue::from_static(file.cache_control)),
         (header::ETAG, file.tag.clone()),
         (header::VARY, HeaderValue::from_static("accept-encoding")),

@@ -34,7 +34,8 @@ pub fn pick(
         ..prepared.render_settings
     };
     let (column, row) = (x as usize, y as u32);
-    let region = RenderRegion { rows: (row, row + 1), samples: (0, 1) };
+    let region =
+        RenderRegion { rows: (row, row + 1), samples: (0, 1), ..RenderRegion::whole(&settings) };
     let mut scene = prepared.flat.clone();
     scene.camera = camera;
     let (image, _) = renderer.render_region(&scene, &settings, region, progress).ok()?;

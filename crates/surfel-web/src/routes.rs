@@ -108,12 +108,16 @@ async fn page(State(state): State<Arc<ServerState>>, request: Request) -> RouteR
             ];
             (StatusCode::SEE_OTHER, headers).into_response()
         }
-        None => page::file("", request.headers()),
+        None => page::file("", request.headers(), &state.guard.frame_ancestors),
     })
 }
 
-async fn page_file(Path(name): Path<String>, headers: HeaderMap) -> Response {
-    page::file(&name, &headers)
+async fn page_file(
+    State(state): State<Arc<ServerState>>,
+    Path(name): Path<String>,
+    headers: HeaderMap,
+) -> Response {
+    page::file(&name, &headers, &state.guard.frame_ancestors)
 }
 
 async fn socket(

@@ -2,6 +2,7 @@
 
 use crate::access::{AccessGuard, Scheme};
 use crate::connections::ConnectionTable;
+use crate::frame_ancestors::FrameAncestors;
 use crate::limits::{Limits, Timeouts};
 use crate::progress_reporter::ProgressReporter;
 use crate::routes;
@@ -67,6 +68,11 @@ impl Server {
         let mut guard = self.guard;
         guard.scheme = Scheme::Https;
         Self { guard, tls: Some(identity), ..self }
+    }
+
+    /// The origins whose pages may show the page in a frame. They can be allowed while the server runs, too.
+    pub fn frame_ancestors(&self) -> FrameAncestors {
+        self.guard.frame_ancestors.clone()
     }
 
     /// The links to the page, with the token if one is needed. A server that listens at all addresses has one for

@@ -5,7 +5,7 @@ use crate::description::{Invalid, SceneDescription};
 use crate::error::{Error, Result};
 use crate::picture::{RenderedImage, image_options};
 use crate::progress_log::CancelOnly;
-use crate::resolve::{AutoSettings, KeepOptions, LoadedScene};
+use crate::resolve::{AutoSettings, KeepOptions, LoadedScene, MemoryEstimate};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use surfel_core::math::DVec3;
@@ -64,6 +64,9 @@ pub fn fingerprint(
     format!("{hash:016x}")
 }
 
+/// A function that adds a finished frame, by its index from 0, as the bytes of a file.
+pub type AddFrame<'f> = dyn FnMut(u32, &[u8]) -> Result<()> + 'f;
+
 /// A movie whose files are read and whose choices are made.
 #[derive(Debug)]
 pub struct PlannedMovie {
@@ -93,6 +96,12 @@ impl PlannedMovie {
         Ok(Self { loaded, complete, description: description.clone(), auto, options })
     }
 
+    /// Returns about how many bytes the scene takes once it is built.
+    pub fn memory_estimate(&self) -> u64 {
+        let subsample = self.description.objects_default.preparation.subsample;
+        MemoryEstimate::from_graph(&self.loaded.graph, subsample, 0).held()
+    }
+
     /// Renders the movie to a file.
     ///
     /// # Errors
@@ -103,14 +112,49 @@ impl PlannedMovie {
         animate(&mut scene, output, &options, resumes, progress)
     }
 
+    /// Completes the movie with frames that are rendered elsewhere: `render` gets the indices of those that are missing
+    /// and the extension of their files, and adds them.
+    ///
+    /// # Errors
+    ///
+    /// Fails as `render` does, if a frame is missing in the end or cannot be written, and if cancelled; the message says
+    /// how many frames are kept.
+    pub fn collect(
+        &self,
+        output: &Path,
+        resumes: bool,
+        progress: &dyn Progress,
+        render: impl FnOnce(&[u32], &str, &mut AddFrame<'_>) -> Result<()>,
+    ) -> Result<()> {
+        let options = self.options();
+        let mut movie = open(output, &options, resumes, progress)?;
+        progress.advance(movie.n_done().into());
+        let missing: Vec<u32> =
+            (0..options.n_frames).filter(|frame| !movie.has_frame(*frame)).collect();
+        let format = movie.frame_format();
+        let rendered = render(&missing, &format, &mut |frame, bytes| {
+            movie.add_encoded_frame(frame, bytes)?;
+            progress.advance(1);
+            Ok(())
+        });
+        rendered.map_err(|error| unfinished(error, movie.n_done(), options.n_frames))?;
+        finish(movie, options.n_frames, progress)
+    }
+
+    /// Returns how the movie becomes a file, with the fingerprint of all that its frames depend on.
+    fn options(&self) -> MovieOptions {
+        let fingerprint = fingerprint(&self.complete, &self.description, &self.loaded);
+        MovieOptions { fingerprint, ..self.options.clone() }
+    }
+
     /// Builds the trees of the scene, whose frames [`render_frame`] renders.
     ///
     /// # Errors
     ///
     /// Fails for scenes that no picture can be made of, and if cancelled.
     pub fn build(self, progress: &dyn Progress) -> Result<(BuiltScene, MovieOptions)> {
-        let Self { loaded, complete, description, auto, mut options } = self;
-        options.fingerprint = fingerprint(&complete, &description, &loaded);
+        let mut options = self.options();
+        let Self { loaded, description, auto, .. } = self;
         let mut scene = loaded.into_resolved(auto, progress)?.build_trees(progress)?;
         scene.choose_exposure(progress)?;
         options.image = image_options(&description, scene.flat().origin);
@@ -130,12 +174,8 @@ pub fn animate(
     resumes: bool,
     progress: &dyn Progress,
 ) -> Result<()> {
-    let mut movie = Movie::open(output, options, resumes)?;
+    let mut movie = open(output, options, resumes, progress)?;
     let n_frames = options.n_frames;
-    if 0 < movie.n_done() {
-        progress.note(&format!("{} of {n_frames} frames are there already", movie.n_done()));
-    }
-    progress.begin("animate", u64::from(n_frames));
     for frame in 0..n_frames {
         if !movie.has_frame(frame) {
             let image = render_frame(scene, f64::from(frame) / options.fps, progress);
@@ -144,6 +184,27 @@ pub fn animate(
         }
         progress.advance(1);
     }
+    finish(movie, n_frames, progress)
+}
+
+/// Opens a movie, and says which of its frames are there.
+fn open(
+    output: &Path,
+    options: &MovieOptions,
+    resumes: bool,
+    progress: &dyn Progress,
+) -> Result<Movie> {
+    let movie = Movie::open(output, options, resumes)?;
+    let n_frames = options.n_frames;
+    if 0 < movie.n_done() {
+        progress.note(&format!("{} of {n_frames} frames are there already", movie.n_done()));
+    }
+    progress.begin("animate", u64::from(n_frames));
+    Ok(movie)
+}
+
+/// Encodes a movie whose frames are all there.
+fn finish(movie: Movie, n_frames: u32, progress: &dyn Progress) -> Result<()> {
     progress.end();
     let n_done = movie.n_done();
     let finished = movie.finish(progress).map_err(Error::from);

@@ -9,8 +9,8 @@ use crate::live_view::{LiveView, SceneTrees};
 use crate::picture::RenderedImage;
 use crate::renderer::SceneRenderer;
 use crate::resolve::{
-    AutoSettings, KeepOptions, LoadedScene, common_legend, coordinate_system, expose, finish_graph,
-    hide_walls, render_settings,
+    AutoSettings, KeepOptions, LoadedScene, MemoryEstimate, common_legend, coordinate_system,
+    expose, finish_graph, hide_walls, render_settings,
 };
 use crate::scene_keys::{grouping_key, preparation_key, tree_key};
 use rayon::ThreadPool;
@@ -129,6 +129,12 @@ impl LiveScene {
         })
     }
 
+    /// Returns about how many bytes the scene takes once it is prepared.
+    pub fn memory_estimate(&self) -> u64 {
+        let subsample = self.startup.objects_default.preparation.subsample;
+        MemoryEstimate::from_graph(&self.loaded.graph, subsample, 0).held()
+    }
+
     /// Returns the SIMD level of the kernels.
     pub fn simd(&self) -> Simd {
         self.renderer.simd()
@@ -213,18 +219,18 @@ impl LiveScene {
         Ok((view.finished(image), stats))
     }
 
-    /// Renders some rows of the picture of a view, without layers and overlay: from the first to before the second.
+    /// Renders a region of the picture of a view, without layers and overlay.
     ///
     /// # Errors
     ///
-    /// Fails if the picture has no such rows, and if cancelled.
-    pub fn rows(
+    /// Fails if the picture has no such region, and if cancelled.
+    pub fn region(
         &self,
         view: &LiveView,
-        rows: (u32, u32),
+        (columns, rows): ((u32, u32), (u32, u32)),
         progress: &dyn Progress,
     ) -> Result<Image> {
-        let region = RenderRegion { rows, ..RenderRegion::whole(&view.settings) };
+        let region = RenderRegion { columns, rows, ..RenderRegion::whole(&view.settings) };
         Ok(self.renderer.render_region(&view.flat, &view.settings, region, progress)?.0)
     }
 

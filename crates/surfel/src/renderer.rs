@@ -152,11 +152,10 @@ fn may_have_gpu() -> bool {
 /// faster.
 fn is_worth_upload(scene: &FlatScene, settings: &Settings, region: RenderRegion) -> bool {
     let n_points = scene.clouds().map(|cloud| cloud.points.ids.len() as u64).sum();
-    let n_pixels = u64::from(settings.width) * u64::from(region.n_rows());
     let n_light_rays = scene.lights.len() as u64 * u64::from(settings.light_samples);
     let n_samples = u64::from(region.n_samples());
     let n_light_rays = n_light_rays * n_samples / u64::from(settings.samples_per_pixel.max(1));
-    is_worth(n_points, n_pixels * (n_samples + n_light_rays))
+    is_worth(n_points, region.n_pixels() * (n_samples + n_light_rays))
 }
 
 fn is_worth(n_points: u64, n_rays: u64) -> bool {

@@ -29,7 +29,7 @@ use std::thread::JoinHandle;
 use surfel::resolve::check_files;
 use surfel::{SceneDescription, SceneRenderer};
 use surfel_core::progress::Progress;
-use surfel_web::{Error, SceneProvider, Server, TlsError, TlsIdentity};
+use surfel_web::{Error, FrameAncestors, SceneProvider, Server, TlsError, TlsIdentity};
 
 /// Arguments of `surfel view`.
 #[derive(clap::Args, Debug)]
@@ -143,6 +143,8 @@ fn serve(
 pub struct RunningViewer {
     /// The link to its page.
     pub link: String,
+    /// The origins whose pages may show the page in a frame.
+    pub frame_ancestors: FrameAncestors,
     is_stopped: Arc<AtomicBool>,
     thread: JoinHandle<surfel_web::Result<()>>,
 }
@@ -155,7 +157,7 @@ impl RunningViewer {
     /// Fails if the system refuses the port or a thread.
     pub fn start(description: SceneDescription, port: u16) -> surfel_web::Result<Self> {
         let server = Server::bind(Ipv4Addr::LOCALHOST.into(), port)?;
-        let link = server.links().swap_remove(0);
+        let (link, frame_ancestors) = (server.links().swap_remove(0), server.frame_ancestors());
         let report = Report::new(Verbosity::Quiet);
         let is_stopped = report.cancellation();
         let typed = description.files.clone();
@@ -163,7 +165,7 @@ impl RunningViewer {
         let run = move || serve(server, renderer, description, typed, &report);
         let thread = std::thread::Builder::new().name("viewer".into()).spawn(run);
         let thread = thread.map_err(|source| Error::Io { address: link.clone(), source })?;
-        Ok(Self { link, is_stopped, thread })
+        Ok(Self { link, frame_ancestors, is_stopped, thread })
     }
 
     /// Stops the server and returns what ended it, if that was something else.

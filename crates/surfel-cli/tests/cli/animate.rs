@@ -417,3 +417,15 @@ fn the_dry_run_of_a_movie_renders_the_same_movie() {
     succeed(&["render", &dry_run, "-o", &picture]);
     assert!(read_png(&picture).3 == read_apng(&path).0[0]);
 }
+
+#[test]
+fn a_cluster_needs_the_python_package() {
+    let folder = Folder::new();
+    let (cloud, movie) = (folder.write("dome.ply", dome(20)), folder.path("turn.gif"));
+    let words = ["animate", &cloud, "-o", &movie, "--turntable", "2", "--cluster", "tcp://x:1"];
+    let ended = command(&words).env("SURFEL_PYTHON", "no-such-python").output().unwrap();
+    let text = stderr(&ended);
+    assert_eq!(ended.status.code(), Some(1), "{text}");
+    assert!(text.contains("error: ") && text.contains("pip install surfel[dask]"), "{text}");
+    assert_eq!(folder.names(), ["dome.ply"]);
+}

@@ -75,6 +75,31 @@ impl Image {
         Self { aovs: Some(aovs), ..Self::new(width, height) }
     }
 
+    /// Returns the columns from the first to before the second.
+    pub fn with_columns(self, columns: (u32, u32)) -> Self {
+        if columns == (0, self.width) {
+            return self;
+        }
+        let Self { width, height, color, coverage, aovs } = self;
+        let cut = Cut { width: width as usize, columns };
+        Self {
+            width: columns.1 - columns.0,
+            height,
+            color: cut.column(&color),
+            coverage: cut.column(&coverage),
+            aovs: aovs.map(|aovs| Aovs {
+                depth: cut.column(&aovs.depth),
+                normal: cut.column(&aovs.normal),
+                position: cut.column(&aovs.position),
+                point_id: cut.column(&aovs.point_id),
+                instance_id: cut.column(&aovs.instance_id),
+                albedo: cut.column(&aovs.albedo),
+                support_count: cut.column(&aovs.support_count),
+                support_distance: cut.column(&aovs.support_distance),
+            }),
+        }
+    }
+
     /// Splits the picture into bands of `n_rows` rows from the top; the last band may have fewer.
     pub fn bands_mut(&mut self, n_rows: usize) -> Vec<Band<'_>> {
         let n = n_rows * self.width as usize;
@@ -85,6 +110,19 @@ impl Image {
             Band { color, coverage, aovs }
         };
         pixels.map(band).collect()
+    }
+}
+
+/// Columns of pictures of one width, from the first to before the second.
+struct Cut {
+    width: usize,
+    columns: (u32, u32),
+}
+
+impl Cut {
+    fn column<T: Copy>(&self, pixels: &[T]) -> Vec<T> {
+        let columns = self.columns.0 as usize..self.columns.1 as usize;
+        pixels.chunks(self.width).flat_map(|row| &row[columns.clone()]).copied().collect()
     }
 }
 

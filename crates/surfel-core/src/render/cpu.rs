@@ -54,7 +54,7 @@ impl Renderer for CpuRenderer {
 
 fn render_tiles(job: &Job) -> Result<(Image, RenderStats)> {
     let Job { tracer: Tracer { progress, .. }, settings, region, .. } = *job;
-    progress.begin("render", u64::from(settings.width) * u64::from(region.n_rows()));
+    progress.begin("render", region.n_pixels());
     let mut image = region.blank_image(settings);
     let bands: Vec<_> = image.bands_mut(TILE_SIZE as usize).into_iter().enumerate().collect();
     let bands = bands.into_par_iter().map(|(row, mut band)| {
@@ -65,7 +65,7 @@ fn render_tiles(job: &Job) -> Result<(Image, RenderStats)> {
         };
         let rects: Vec<_> = TileRect::row(row as u32, job).collect();
         let tiles: Vec<_> = rects.into_par_iter().map(render).collect::<Result<_>>()?;
-        tiles.iter().for_each(|tile| tile.copy_to(&mut band, settings.width));
+        tiles.iter().for_each(|tile| tile.copy_to(&mut band, region.columns));
         Ok(tiles.iter().map(|tile| (tile.counts, tile.trace_secs)).collect::<Vec<_>>())
     });
     let mut stats = RenderStats::default();
@@ -111,10 +111,11 @@ struct TileRect {
 impl TileRect {
     /// Returns a row of the region's tiles, from left to right.
     fn row(row: u32, job: &Job) -> impl Iterator<Item = Self> {
-        let (y, width) = (job.region.rows.0 + row * TILE_SIZE, job.settings.width);
+        let y = job.region.rows.0 + row * TILE_SIZE;
+        let (first, end) = job.region.columns;
         let height = TILE_SIZE.min(job.region.rows.1 - y);
-        let rect = move |x| Self { x, y, width: TILE_SIZE.min(width - x), height };
-        (0..width).step_by(TILE_SIZE as usize).map(rect)
+        let rect = move |x| Self { x, y, width: TILE_SIZE.min(end - x), height };
+        (first..end).step_by(TILE_SIZE as usize).map(rect)
     }
 
     fn n_pixels(self) -> usize {
@@ -256,10 +257,10 @@ impl Tile {
         Ok(())
     }
 
-    /// Copies the tile to its row of tiles in a picture of `width` pixels.
-    fn copy_to(&self, band: &mut Band, width: u32) {
+    /// Copies the tile to its row of tiles, which has these columns of the picture.
+    fn copy_to(&self, band: &mut Band, (first, end): (u32, u32)) {
         for (i, (x, y)) in self.rect.pixels().enumerate() {
-            let pixel = ((y - self.rect.y) * width + x) as usize;
+            let pixel = ((y - self.rect.y) * (end - first) + x - first) as usize;
             band.color[pixel] = self.color[i].to_array();
             band.coverage[pixel] = self.coverage[i];
             if let Some(aovs) = &mut band.aovs {

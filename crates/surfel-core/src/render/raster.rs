@@ -169,8 +169,8 @@ impl Raster {
         region: RenderRegion,
     ) -> Image {
         let mut image = region.blank_image(settings);
-        let (first, end) = region.rows;
-        let pixels = (first..end).flat_map(|y| (0..settings.width).map(move |x| (x, y)));
+        let (rows, columns) = (region.rows.0..region.rows.1, region.columns.0..region.columns.1);
+        let pixels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
         for (pixel, (x, y)) in pixels.enumerate() {
             let Some(index) = self.rows.index(i64::from(x), i64::from(y)) else { continue };
             let VisiblePoint { instance: instance_idx, slot } = self.visible[index];

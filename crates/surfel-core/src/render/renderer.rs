@@ -22,7 +22,7 @@ pub struct RenderStats {
 
 /// A renderer of flat scenes.
 pub trait Renderer: Sync {
-    /// Renders the rows of `region`, each pixel as the mean of the region's samples alone.
+    /// Renders the pixels of `region`, each as the mean of the region's samples alone.
     ///
     /// # Errors
     /// Fails if `settings` or `region` are out of range, if the scene cannot be rendered (see

@@ -15,12 +15,14 @@ mod ffmpeg;
 mod video;
 
 use std::ffi::OsStr;
+use std::io::Write;
 use std::path::Path;
 
 use surfel_core::image::Image;
 use surfel_core::progress::Progress;
 
 use crate::error::{Error, Result};
+use crate::file::{write_error, write_file};
 use crate::image_file::save_image;
 
 use format::MovieFormat;
@@ -128,6 +130,35 @@ impl Movie {
         }
         save_image(&self.spec.names.path(frame), image, &options.image)?;
         self.log.record(frame)
+    }
+
+    /// Stores the bytes of a file as a frame, counted from 0. The file has the format that
+    /// [`frame_format`](Self::frame_format) names.
+    ///
+    /// # Errors
+    ///
+    /// Fails if there is no such frame, or if the file cannot be written.
+    pub fn add_encoded_frame(&mut self, frame: u32, bytes: &[u8]) -> Result<()> {
+        let n_frames = self.spec.options.n_frames;
+        if n_frames <= frame {
+            return Err(Error::InvalidFrames {
+                file: self.spec.file(),
+                found: format!("frame {frame}"),
+                expected: format!("frames 0 to {}", n_frames - 1),
+                advice: "render the announced number of frames",
+            });
+        }
+        let path = self.spec.names.path(frame);
+        write_file(&path, |writer| {
+            writer.write_all(bytes).map_err(|cause| write_error(&path, cause))
+        })?;
+        self.log.record(frame)
+    }
+
+    /// Returns the extension of the files of frames, without a dot.
+    pub fn frame_format(&self) -> String {
+        let path = self.spec.names.path(0);
+        path.extension().unwrap_or_default().to_string_lossy().into_owned()
     }
 
     /// Encodes the movie and removes its temporary files.

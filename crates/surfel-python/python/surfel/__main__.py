@@ -1,5 +1,6 @@
 """The program `surfel`, as `surfel ...` or `python -m surfel ...`."""
 
+import os
 import signal
 import sys
 
@@ -10,6 +11,8 @@ def main() -> int:
     """Runs the program by its command line; returns its exit code."""
     # The program stops by its own handler of Ctrl-C, as it does outside of Python.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # The interpreter by which the program finds this package.
+    os.environ.setdefault("SURFEL_PYTHON", sys.executable)
     return run_program(["surfel", *sys.argv[1:]])
 
 

@@ -242,11 +242,19 @@ fn regions_are_parts_of_the_picture() {
     let Some(gpu) = gpu() else { return };
     let scene = flat(&reference::scene(SurfaceKind::Splat));
     let whole = render(gpu, &scene, &SETTINGS);
-    let region = RenderRegion { rows: (13, 40), samples: (0, SETTINGS.samples_per_pixel) };
+    let region = RenderRegion { rows: (13, 40), ..RenderRegion::whole(&SETTINGS) };
     let (part, _) = gpu.render_region(&scene, &SETTINGS, region, &NoProgress).unwrap();
     let rows = 13 * 80..40 * 80;
     assert_eq!(part.color, whole.color[rows.clone()]);
-    assert_eq!(part.aovs.unwrap().point_id, whole.aovs.unwrap().point_id[rows]);
+    assert_eq!(part.aovs.unwrap().point_id, whole.aovs.as_ref().unwrap().point_id[rows]);
+    let region = RenderRegion { columns: (7, 50), ..region };
+    let (part, _) = gpu.render_region(&scene, &SETTINGS, region, &NoProgress).unwrap();
+    let pixels: Vec<_> = (13..40).flat_map(|y| (7..50).map(move |x| y * 80 + x)).collect();
+    let colors: Vec<_> = pixels.iter().map(|pixel| whole.color[*pixel]).collect();
+    assert_eq!((part.width, part.height, part.color), (43, 27, colors));
+    let ids = &whole.aovs.as_ref().unwrap().point_id;
+    let ids: Vec<_> = pixels.iter().map(|pixel| ids[*pixel]).collect();
+    assert_eq!(part.aovs.unwrap().point_id, ids);
 }
 
 #[test]

@@ -106,13 +106,21 @@ fn regions_make_the_whole_picture() {
         let renderer = CpuRenderer { simd: Simd::detect() };
         let whole = renderer.render(&flat, &SETTINGS, &NoProgress).unwrap().0;
         let piece = |rows, samples| {
-            let region = RenderRegion { rows, samples };
+            let region = RenderRegion { rows, samples, ..RenderRegion::whole(&SETTINGS) };
             renderer.render_region(&flat, &SETTINGS, region, &NoProgress).unwrap().0
         };
         let rows = [(0, 7), (7, 40), (40, 50)].map(|rows| piece(rows, (0, 4)));
         assert_eq!(rows.each_ref().map(|image| image.height), [7, 33, 10]);
         let stacked: Vec<[f32; 4]> = rows.iter().flat_map(|image| image.color.clone()).collect();
         assert!(stacked == whole.color, "{name}");
+        let (rows, columns) = ((11, 47), (5, 44));
+        let region = RenderRegion { rows, columns, ..RenderRegion::whole(&SETTINGS) };
+        let part = renderer.render_region(&flat, &SETTINGS, region, &NoProgress).unwrap().0;
+        assert_eq!((part.width, part.height), (39, 36));
+        for (row, y) in part.color.chunks(39).zip(11..) {
+            let first = y * SETTINGS.width as usize;
+            assert!(row == &whole.color[first + 5..first + 44], "{name}, row {y}");
+        }
         if kind == SurfaceKind::Points {
             continue;
         }
@@ -130,10 +138,16 @@ fn regions_make_the_whole_picture() {
 fn a_region_outside_the_picture_is_an_error() {
     let flat = FlatScene::new(&scene(SurfaceKind::Disc), &NoProgress).unwrap();
     let renderer = CpuRenderer { simd: Simd::detect() };
-    for (rows, samples) in
-        [((0, 51), (0, 4)), ((9, 9), (0, 4)), ((0, 50), (3, 5)), ((5, 4), (0, 1))]
-    {
-        let region = RenderRegion { rows, samples };
+    let width = SETTINGS.width;
+    for (rows, columns, samples) in [
+        ((0, 51), (0, width), (0, 4)),
+        ((9, 9), (0, width), (0, 4)),
+        ((0, 50), (0, width), (3, 5)),
+        ((5, 4), (0, width), (0, 1)),
+        ((0, 50), (0, width + 1), (0, 4)),
+        ((0, 50), (3, 3), (0, 4)),
+    ] {
+        let region = RenderRegion { rows, columns, samples };
         let error = renderer.render_region(&flat, &SETTINGS, region, &NoProgress).unwrap_err();
         assert!(error.to_string().contains("region"), "{error}");
     }

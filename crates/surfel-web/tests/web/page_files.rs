@@ -56,7 +56,24 @@ async fn page_files_have_security_headers() {
         let policy = file.header("content-security-policy").unwrap();
         assert!(policy.contains("default-src 'none'") && policy.contains("connect-src 'self'"));
         assert!(!policy.contains("unsafe"), "{policy}");
+        assert!(policy.ends_with("; frame-ancestors 'none'"), "{policy}");
         assert!(!file.body.is_empty());
+    }
+}
+
+#[tokio::test]
+async fn frames_are_for_pages_of_allowed_origins() {
+    let server = TestServer::start();
+    let frame =
+        "Sec-Fetch-Site: cross-site\r\nSec-Fetch-Mode: navigate\r\nSec-Fetch-Dest: iframe\r\n";
+    assert_eq!(get(&server, "/", frame).await.status, 403);
+    server.frame_ancestors.allow("http://localhost:8888").unwrap();
+    let page = get(&server, "/", frame).await;
+    let policy = page.header("content-security-policy").unwrap();
+    assert_eq!(page.status, 200);
+    assert!(policy.ends_with("; frame-ancestors http://localhost:8888"), "{policy}");
+    for path in ["/ws", "/render", "/points/x", "/scene", "/stats", "/healthz"] {
+        assert_eq!(get(&server, path, frame).await.status, 403, "{path}");
     }
 }
 

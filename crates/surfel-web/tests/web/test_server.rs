@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use surfel_core::progress::Progress;
-use surfel_web::{Limits, Result, SceneProvider, Server, TlsIdentity};
+use surfel_web::{FrameAncestors, Limits, Result, SceneProvider, Server, TlsIdentity};
 
 /// Duration after which a test that waits for the server fails; generous, for busy machines.
 pub const TIMEOUT: Duration = Duration::from_secs(60);
@@ -27,6 +27,7 @@ pub struct TestServer {
     /// The link to the page at this machine, with the token if there is one.
     pub link: String,
     pub provider: Arc<HillProvider>,
+    pub frame_ancestors: FrameAncestors,
     is_stopped: Arc<AtomicBool>,
     server: Option<JoinHandle<Result<()>>>,
 }
@@ -62,6 +63,7 @@ impl TestServer {
         load: impl FnOnce(&dyn Progress) -> Result<()> + Send + 'static,
     ) -> Self {
         let (link, provider) = (server.links().pop().unwrap(), Arc::new(HillProvider::new()));
+        let frame_ancestors = server.frame_ancestors();
         let is_stopped: Arc<AtomicBool> = Arc::default();
         let (loaded, stop) = (provider.clone(), is_stopped.clone());
         let open = move |progress: &dyn Progress| {
@@ -69,7 +71,8 @@ impl TestServer {
             Ok(loaded as Arc<dyn SceneProvider>)
         };
         let run = move || server.run(Arc::new(FaultyRenderer), stop, open);
-        Self { link, provider, is_stopped, server: Some(std::thread::spawn(run)) }
+        let server = Some(std::thread::spawn(run));
+        Self { link, provider, frame_ancestors, is_stopped, server }
     }
 
     /// Host and port.

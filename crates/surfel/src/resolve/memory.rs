@@ -78,6 +78,12 @@ impl MemoryEstimate {
         [read, flat, sum([(self.n_pixels, PIXEL)])]
     }
 
+    /// Returns the bytes of a scene that is kept: as read, as prepared, and in the flat form.
+    pub fn held(&self) -> u64 {
+        let [read, flat, _] = self.bytes();
+        sum([(read, 2), (flat, 1)])
+    }
+
     /// Checks the estimate against a limit in bytes.
     ///
     /// # Errors

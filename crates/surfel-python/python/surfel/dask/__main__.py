@@ -1,0 +1,45 @@
+"""Renders frames for the program: reads a job as JSON from stdin, writes frames to stdout, messages to stderr.
+
+A frame is a line with its index and its number of bytes, and the bytes of its file. `surfel animate --cluster` runs this.
+"""
+
+import json
+import sys
+
+from distributed import Client, as_completed
+
+from surfel.dask import Recipe, render_frames
+
+#: Seconds in which a scheduler must answer.
+TIMEOUT_SECS = 10
+
+
+def main():
+    """Renders a job; returns the exit code."""
+    job = json.load(sys.stdin)
+    recipe = Recipe(*job["files"], _scene=job["scene"])
+    try:
+        with Client(job["address"], timeout=TIMEOUT_SECS) as client:
+            write_frames(client, recipe, job)
+    except KeyboardInterrupt:
+        return 130
+    except Exception as error:
+        print(str(error).splitlines()[0] if str(error) else repr(error), file=sys.stderr)
+        return 1
+    return 0
+
+
+def write_frames(client, recipe, job):
+    """Writes frames in the order in which they are finished."""
+    futures = client.compute(render_frames(recipe, job["frames"], format=job["format"]))
+    indices = dict(zip(futures, job["frames"]))
+    for future, content in as_completed(futures, with_results=True):
+        sys.stdout.buffer.write(b"%d %d\n" % (indices[future], len(content)))
+        sys.stdout.buffer.write(content)
+        sys.stdout.buffer.flush()
+        # The workers need not keep it.
+        future.release()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,124 @@
+"""The viewer in a cell: its widget, and the page in a JupyterLab in Chromium."""
+
+import json
+import os
+import pathlib
+import shutil
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+
+import pytest
+import surfel
+
+TOKEN = "of-the-test"
+
+
+@pytest.fixture
+def viewer(points):
+    scene = surfel.Scene()
+    scene.add(surfel.Cloud(points))
+    with surfel.view(scene) as viewer:
+        yield viewer
+
+
+def policy(viewer):
+    """The pages that may frame the viewer, as its page says."""
+    with urllib.request.urlopen(viewer.link, timeout=30) as answer:
+        return answer.headers["content-security-policy"].split("frame-ancestors ")[1]
+
+
+def test_frames_are_allowed_one_by_one(viewer):
+    assert policy(viewer) == "'none'"
+    for wrong in ("*", "http://*:8888", "localhost:8888", "http://a; script-src *", ""):
+        with pytest.raises(surfel.InvalidSetting, match="expected one as http://localhost:8888"):
+            viewer.allow_frame(wrong)
+    assert policy(viewer) == "'none'"
+    viewer.allow_frame("http://localhost:8888")
+    assert policy(viewer) == "http://localhost:8888"
+
+
+def test_the_widget_allows_the_notebook_that_shows_it(viewer):
+    pytest.importorskip("anywidget")
+    import anywidget
+    import traitlets
+    from surfel._widget import _widget_class
+
+    widget = _widget_class(anywidget, traitlets)(viewer)
+    assert widget.link == viewer.link and widget.allowed == "" and policy(viewer) == "'none'"
+    # What the front end sends.
+    widget.set_state({"origin": "http://127.0.0.1:8888"})
+    assert widget.allowed == "http://127.0.0.1:8888" == policy(viewer)
+    bundle = viewer._repr_mimebundle_()
+    bundle = bundle[0] if isinstance(bundle, tuple) else bundle
+    assert "application/vnd.jupyter.widget-view+json" in bundle
+
+
+def test_without_anywidget_a_link_is_shown(viewer, monkeypatch):
+    monkeypatch.setitem(sys.modules, "anywidget", None)
+    assert viewer.link in viewer._repr_mimebundle_(include=None, exclude=None)["text/html"]
+
+
+def browser_environment():
+    """The environment in which node finds Chromium and playwright-core; skips the test where one is missing."""
+    cache = pathlib.Path(os.environ.get("XDG_CACHE_HOME", pathlib.Path.home() / ".cache"))
+    playwright = os.environ.get("PLAYWRIGHT", str(cache / "surfel-playwright"))
+    chromium = os.environ.get("CHROMIUM") or shutil.which("chromium")
+    if shutil.which("node") is None or chromium is None:
+        pytest.skip("node or Chromium is not installed")
+    if not (pathlib.Path(playwright) / "node_modules" / "playwright-core").is_dir():
+        pytest.skip(f"playwright-core is not in {playwright}")
+    return os.environ | {"PLAYWRIGHT": playwright, "CHROMIUM": chromium}
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def start_lab(folder):
+    """Starts a JupyterLab of a folder; returns its process and address."""
+    port = free_port()
+    own = {f"JUPYTER_{name}_DIR": str(folder / f"jupyter-{name.lower()}") for name in ("CONFIG", "DATA", "RUNTIME")}
+    words = ["--no-browser", "--allow-root", "--ip=127.0.0.1", f"--port={port}", f"--IdentityProvider.token={TOKEN}"]
+    words += ["--LabApp.expose_app_in_browser=True", "--LabApp.news_url=", f"--ServerApp.root_dir={folder}"]
+    log = open(folder / "lab.log", "w")
+    lab = subprocess.Popen([sys.executable, "-m", "jupyterlab", *words], env=os.environ | own, stdout=log, stderr=log)
+    address = f"http://127.0.0.1:{port}"
+    for _ in range(240):
+        try:
+            urllib.request.urlopen(f"{address}/api/status?token={TOKEN}", timeout=30).close()
+            return lab, address
+        except urllib.error.URLError:
+            assert lab.poll() is None, (folder / "lab.log").read_text()
+            time.sleep(0.5)
+    raise AssertionError((folder / "lab.log").read_text())
+
+
+def test_the_page_is_in_a_cell_of_jupyterlab(hill, tmp_path):
+    for package in ("jupyterlab", "anywidget", "nbformat", "ipykernel"):
+        pytest.importorskip(package)
+    environment = browser_environment()
+    code = [f"import surfel\nviewer = surfel.view(surfel.load({str(hill)!r}, light_samples=1, spp=1))\nviewer"]
+    cells = [{"cell_type": "code", "id": "a", "metadata": {}, "execution_count": None, "outputs": [], "source": code}]
+    kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
+    notebook = {"cells": cells, "metadata": kernel, "nbformat": 4, "nbformat_minor": 5}
+    (tmp_path / "viewer.ipynb").write_text(json.dumps(notebook))
+    screenshot = pathlib.Path(os.environ.get("SURFEL_SCREENSHOTS", tmp_path)) / "jupyterlab.png"
+    lab, address = start_lab(tmp_path)
+    try:
+        script = pathlib.Path(__file__).parent / "jupyter_page.mjs"
+        words = ["node", str(script), f"{address}/lab/tree/viewer.ipynb?token={TOKEN}", str(screenshot)]
+        page = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=400)
+    finally:
+        lab.terminate()
+        lab.wait(60)
+    assert page.returncode == 0, page.stderr + (tmp_path / "lab.log").read_text()
+    found = json.loads(page.stdout)
+    assert found["parents"] == [address] and found["address"].startswith("http://127.0.0.1:")
+    assert found["nColors"] > 100
+    assert screenshot.stat().st_size > 10_000
