@@ -48,7 +48,7 @@ pub fn render_frames(
     received.and_then(|()| python.end())
 }
 
-/// What is to be rendered, as the package reads it.
+/// Returns the job as the package reads it.
 fn job(
     address: &str,
     description: &SceneDescription,

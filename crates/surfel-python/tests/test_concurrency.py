@@ -107,17 +107,18 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 sent = []
 def interrupt():
     time.sleep(0.5)
-    sent.append(time.perf_counter())
+    sent.extend([time.perf_counter(), time.process_time()])
     os.kill(os.getpid(), signal.SIGINT)
 threading.Thread(target=interrupt).start()
 try:
     scene.render(resolution=(1600, 1200), spp=64, light_samples=64)
 except KeyboardInterrupt:
-    print(time.perf_counter() - sent[0])
+    print(time.perf_counter() - sent[0], time.process_time() - sent[1])
 """
     program = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
-    # On an idle machine it is below 0.1 s; others may keep this one busy.
-    assert float(program.stdout) < 1.0, program.stderr
+    seconds, processor_seconds = map(float, program.stdout.split())
+    # Others may keep this machine busy, so that the time counts that the work itself takes after the signal.
+    assert processor_seconds < 0.1 and seconds < 1.0, (seconds, processor_seconds, program.stderr)
 
 
 def render_in_child(queue):

@@ -5,12 +5,21 @@ import pickle
 import signal
 import subprocess
 import sys
+import threading
+import time
 
 import pytest
 import surfel
 
 dask = pytest.importorskip("dask")
-from surfel.dask import Recipe, VersionMismatch, render_frames, render_tiles, save_frames  # noqa: E402
+from surfel.dask import (  # noqa: E402
+    ClusterLost,
+    Recipe,
+    VersionMismatch,
+    render_frames,
+    render_tiles,
+    save_frames,
+)
 
 SMALL = {"resolution": (48, 32), "spp": 1, "light_samples": 1}
 
@@ -71,6 +80,35 @@ def test_workers_of_other_versions_are_refused_by_name(recipe):
             client.run(become_other)
             with pytest.raises(VersionMismatch, match="worker 0 at tcp://.* has surfel 9.9.9"):
                 client.gather(client.compute(render_frames(recipe, range(1))))
+
+
+def test_a_scheduler_that_vanishes_leaves_the_finished_frames(hill, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    found = tmp_path / "scheduler.json"
+    words = ["--scheduler-file", str(found)]
+    start = lambda *more: subprocess.Popen([sys.executable, "-m", "dask", *more, *words], stderr=subprocess.DEVNULL)
+    processes = [start("scheduler", "--port", "0", "--no-dashboard")]
+    try:
+        while not found.exists():
+            time.sleep(0.05)
+        processes.append(start("worker", "--no-nanny", "--nthreads", "1", "--no-dashboard"))
+        with distributed.Client(scheduler_file=str(found)) as client:
+            client.wait_for_workers(1)
+            (tmp_path / "film").mkdir()
+            end = threading.Thread(target=lambda: kill_after_a_file(processes[0], tmp_path / "film"))
+            end.start()
+            with pytest.raises(ClusterLost, match="start it and do the same again"):
+                save_frames(Recipe(hill, turntable=40, **SMALL), range(1000), tmp_path / "film" / "frame_####.png")
+            end.join()
+    finally:
+        [process.kill() for process in processes]
+    assert 0 < len(list((tmp_path / "film").glob("frame_*.png"))) < 1000
+
+
+def kill_after_a_file(process, folder):
+    while not any(folder.glob("*.png")):
+        time.sleep(0.01)
+    process.kill()
 
 
 @pytest.mark.parametrize("tiles", [0, (0, 4), (1, 2, 3), "4x4", 2.5, (2, -1)])

@@ -15,7 +15,7 @@ renders it again after a worker is lost.
 
 from surfel.dask._frames import render_frames, save_frames
 from surfel.dask._mosaic import render_mosaic
-from surfel.dask._recipe import Recipe, VersionMismatch
+from surfel.dask._recipe import ClusterLost, Recipe, VersionMismatch
 from surfel.dask._tiles import render_tiles
 
-__all__ = ["Recipe", "VersionMismatch", "render_frames", "render_mosaic", "render_tiles", "save_frames"]
+__all__ = ["ClusterLost", "Recipe", "VersionMismatch", "render_frames", "render_mosaic", "render_tiles", "save_frames"]

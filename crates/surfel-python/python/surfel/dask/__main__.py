@@ -3,12 +3,13 @@
 A frame is a line with its index and its number of bytes, and the bytes of its file. `surfel animate --cluster` runs this.
 """
 
+import concurrent.futures
 import json
 import sys
 
 from distributed import Client, as_completed
 
-from surfel.dask import Recipe, render_frames
+from surfel.dask import ClusterLost, Recipe, render_frames
 
 #: Seconds in which a scheduler must answer.
 TIMEOUT_SECS = 10
@@ -23,6 +24,9 @@ def main():
             write_frames(client, recipe, job)
     except KeyboardInterrupt:
         return 130
+    except concurrent.futures.CancelledError:
+        print(ClusterLost(), file=sys.stderr)
+        return 1
     except Exception as error:
         print(str(error).splitlines()[0] if str(error) else repr(error), file=sys.stderr)
         return 1

@@ -1,5 +1,6 @@
 """Frames of a film."""
 
+import concurrent.futures
 import os
 import pathlib
 import re
@@ -9,6 +10,7 @@ import dask
 
 from surfel._errors import InvalidSetting
 from surfel.dask import _worker
+from surfel.dask._recipe import ClusterLost
 
 
 def render_frames(recipe, frames, *, format="png"):
@@ -25,7 +27,7 @@ def save_frames(recipe, frames, pattern):
 
     Files that are there already are kept, so that an interrupted film goes on.
 
-    Raises `InvalidSetting` for a pattern without `#`.
+    Raises `InvalidSetting` for a pattern without `#`, and `ClusterLost` if the scheduler vanishes.
     """
     pattern = os.fspath(pattern)
     if "#" not in os.path.basename(pattern):
@@ -34,7 +36,10 @@ def save_frames(recipe, frames, pattern):
     missing = [index for index, name in names.items() if not os.path.exists(name)]
     pictures = render_frames(recipe, missing, format=pathlib.Path(pattern).suffix[1:])
     save = dask.delayed(_replace)
-    dask.compute(*(save(names[index], picture) for index, picture in zip(missing, pictures)))
+    try:
+        dask.compute(*(save(names[index], picture) for index, picture in zip(missing, pictures)))
+    except concurrent.futures.CancelledError as error:
+        raise ClusterLost() from error
     return list(names.values())
 
 

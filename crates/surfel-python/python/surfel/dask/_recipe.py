@@ -11,6 +11,13 @@ class VersionMismatch(Error):
     """A worker has another version of surfel than the one that made a recipe."""
 
 
+class ClusterLost(Error):
+    """The scheduler is gone, or has cancelled the work."""
+
+    def __init__(self):
+        super().__init__("the scheduler is gone or has cancelled the work; start it and do the same again: finished frames are kept")
+
+
 class Recipe:
     """Files and keywords of `surfel.load`, which are read where they are rendered.
 
