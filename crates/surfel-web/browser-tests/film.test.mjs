@@ -47,7 +47,7 @@ test('views are added, moved in time, replaced, deleted, and these changes undon
   await settled(page);
   assert.deepEqual((await path()).times, [0, 1.5, 3]);
   const { position } = await path();
-  await page.locator('[aria-label="Replace view 1 by the current view"]').click();
+  await page.locator('[aria-label="Set view 1 to the current view"]').click();
   await settled(page);
   assert.deepEqual((await path()).position, [position[1], position[1], position[2]]);
   await page.locator('[aria-label="Delete view 2"]').click();

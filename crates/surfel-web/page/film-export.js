@@ -5,8 +5,8 @@ import { count, duration, fileSize, stemOf } from './format.js';
 
 const FORMATS = { mp4: 'MP4 (H.264)', webm: 'WebM (VP9)', gif: 'GIF', png: 'animated PNG' };
 
-/** Returns the part, a function that says whether the path is empty, and one that returns the size of frames. */
-export function setUpFilmExport(viewer) {
+/** `sceneFile` is the button beside those of the film. Returns the part, a function that says whether the path is empty, and one that returns the size of frames. */
+export function setUpFilmExport(viewer, sceneFile) {
   const number = (label, key, value, max) => element('input', { type: 'number', min: 1, max, step: 1, value, 'aria-label': label, 'data-film': key });
   const [width, height, fps] = [number('Width', 'width', 1280, 32768), number('Height', 'height', 720, 32768), number('Frames a second', 'fps', 25, 120)];
   const format = element('select', { 'aria-label': 'Format of the film', 'data-film': 'format' },
@@ -19,7 +19,7 @@ export function setUpFilmExport(viewer) {
   const part = element('div', { class: 'film' },
     element('h3', {}, 'Film'),
     element('div', { class: 'chips' }, format, width, element('span', { 'aria-hidden': 'true' }, '×'), height, fps, element('span', { class: 'note' }, 'fps')),
-    element('div', { class: 'chips' }, start, cancel, link), bar, note);
+    element('div', { class: 'chips' }, start, cancel, link, sceneFile), bar, note);
   let abort = null;
   let isEmpty = true;
 

@@ -3,8 +3,8 @@
 import { cameraAt, fitsPath, keysOf, pathPatch, withNewKey, withTime } from './camera-path.js';
 import { download, element, icon, iconButton } from './dom.js';
 import { setUpFilmExport } from './film-export.js';
-import { areEqual } from './merge-patch.js';
 import { stemOf } from './format.js';
+import { areEqual } from './merge-patch.js';
 import { showToast } from './toast.js';
 
 const INTERPOLATIONS = { cubic: 'smooth', linear: 'straight', ease: 'straight, with stops' };
@@ -21,15 +21,14 @@ export function setUpPathCard(viewer, navigation) {
     type: 'button', class: 'button', 'data-action': 'add-key', title: 'Adds this view to the path\ncamera_path', onclick: () => add(),
   }, 'Add view');
   const note = element('p', { class: 'note' });
-  const film = setUpFilmExport(viewer);
   const sceneFile = element('button', {
     type: 'button', class: 'button', 'data-action': 'film-scene-file', title: 'surfel animate film.toml -o film.mp4', onclick: () => saveSceneFile(),
   }, 'Scene file');
+  const film = setUpFilmExport(viewer, sceneFile);
   const card = element('section', { id: 'path-card', class: 'card', 'aria-label': 'Camera path', hidden: true },
     element('header', {}, element('h2', {}, 'Camera path'), iconButton('close', 'Close the camera path', () => show(false))),
     list, note,
-    element('div', { class: 'chips' }, addKey, play, interpolation),
-    clock, film.part, element('div', { class: 'chips' }, sceneFile));
+    element('div', { class: 'chips' }, addKey, play, clock), element('div', { class: 'chips' }, interpolation), film.part);
   document.getElementById('cards').append(card);
   let shown = null;
 
@@ -65,7 +64,7 @@ export function setUpPathCard(viewer, navigation) {
     return element('li', {}, field, element('span', { class: 'note' }, 's'),
       element('button', { type: 'button', class: 'button', 'aria-label': `Go to ${name}`, onclick: () => navigation.transitionTo(camera) }, 'Go'),
       element('button', {
-        type: 'button', class: 'button', 'aria-label': `Replace ${name} by the current view`,
+        type: 'button', class: 'button', 'aria-label': `Set ${name} to the current view`,
         onclick: () => {
           const replaced = fittingView(keys().filter((_, other) => other !== i));
           if (replaced) change(keys().map((key, other) => (other === i ? { ...key, camera: replaced } : key)));
@@ -78,7 +77,7 @@ export function setUpPathCard(viewer, navigation) {
     if (navigation.isFollowing) navigation.stop();
     else navigation.follow((time) => cameraAt(keys(), interpolation.value, time), duration(), showTime);
   };
-  const showTime = (time) => { clock.value = `${time.toFixed(1)} of ${duration().toFixed(1)} s`; };
+  const showTime = (time) => { clock.value = `${time.toFixed(1)} / ${duration().toFixed(1)} s`; };
 
   const update = () => {
     const path = viewer.scene?.camera_path ?? null;
