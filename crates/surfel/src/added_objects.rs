@@ -43,13 +43,13 @@ mod tests {
     fn objects_in_memory_that_the_start_lacks_are_added() {
         let content = || MemoryContent::Points(Arc::new(PointCloud::default()));
         let mut startup = SceneDescription::default();
-        startup.objects = vec![object("a.ply"), object("memory:b")];
-        startup.memory.insert("memory:b", content());
+        startup.objects = vec![object("a.ply"), object("memory-b")];
+        startup.memory.insert("memory-b", content());
         assert_eq!(first_added(&startup, &startup), 2);
         let mut more = startup.clone();
-        more.objects.push(object("memory:c"));
-        more.memory.insert("memory:c", content());
-        let materials = json!(["memory:c=metal", "a.ply=glass", "matte"]);
+        more.objects.push(object("memory-c"));
+        more.memory.insert("memory-c", content());
+        let materials = json!(["memory-c=metal", "a.ply=glass", "matte"]);
         more.set("material", &materials, Path::new("")).unwrap();
         assert_eq!(first_added(&more, &startup), 2);
         let base = without_added(&more, 2);
