@@ -47,7 +47,7 @@ mod filtered;
 mod load;
 mod graph;
 mod save;
-mod temp_cloud;
+mod temp_file;
 mod image_file;
 mod movie;
 mod environment;
@@ -62,7 +62,7 @@ pub use image_file::{
     Alpha, BitDepth, EpsgCodes, Georeference, HeightMap, ImageOptions, check_height_map,
     check_image_output, encode_png, save_height_map, save_image,
 };
-pub use load::{inspect, load, load_all, load_bytes};
+pub use load::{inspect, inspect_bytes, load, load_all, load_bytes};
 pub use merge::{common_file_info, merge_loaded};
 pub use movie::{Movie, MovieOptions, check_movie};
 pub use options::{
@@ -70,4 +70,4 @@ pub use options::{
 };
 pub use save::{check_cloud_output, save, writable_extensions};
 pub use table::{Column, ColumnChoice, TextColumn};
-pub use temp_cloud::TempCloud;
+pub use temp_file::TempFile;

@@ -63,6 +63,16 @@ pub fn inspect(path: &Path) -> Result<FileInfo> {
     (detect(&input)?.inspect)(&input)
 }
 
+/// Reads the information that the bytes of a file state about it, without its points. `name` is its name in messages, and
+/// its extension gives the format of bytes without a signature.
+///
+/// # Errors
+/// Fails if the format is not supported or the header broken.
+pub fn inspect_bytes(name: &str, bytes: &[u8]) -> Result<FileInfo> {
+    let input = Input::from_bytes(name, bytes);
+    (detect(&input)?.inspect)(&input)
+}
+
 fn read_points(
     input: &Input,
     resolver: ResourceResolver,

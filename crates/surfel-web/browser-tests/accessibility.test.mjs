@@ -54,6 +54,10 @@ for (const [name, options] of Object.entries(SITUATIONS)) {
     await page.locator('[data-action="save-view"]').click();
     await settled(page);
     found.push(...(await violations(page)).map((text) => `panel: ${text}`));
+    await page.locator('[data-action="camera-path"]').click();
+    await page.locator('[data-action="add-key"]').click();
+    await page.locator('.path-keys li').waitFor();
+    found.push(...(await violations(page)).map((text) => `path: ${text}`));
     assert.deepEqual([...new Set(found)], []);
     await closePage(page);
   });

@@ -14,12 +14,17 @@ export function setUpExportDialog(viewer, viewHistory) {
   const text = document.getElementById('export-text');
   const tabs = document.getElementById('export-tabs');
   const downloadButton = document.getElementById('export-download');
+  const note = element('p', { class: 'note' });
+  text.after(note);
   const beginPoints = setUpPointsExport(viewer, dialog);
   let exported = {};
   let format = 'command';
 
   const show = () => {
     text.value = exported[format] ?? '';
+    const names = viewer.addedObjects.map(({ name }) => name).join(', ');
+    const where = format === 'link' ? 'are not part of a link; others do not see them' : 'must lie where the command runs, or beside the scene file';
+    note.textContent = names && `Added files (${names}) ${where}.`;
     downloadButton.hidden = format !== 'toml' && format !== 'json';
     for (const tab of tabs.children) tab.setAttribute('aria-pressed', tab.dataset.format === format);
   };

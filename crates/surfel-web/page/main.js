@@ -53,6 +53,8 @@ let lastPick = null;
 const helpDialog = document.getElementById('help-dialog');
 const showHelp = () => helpDialog.showModal();
 const openSaveDialog = whenNeeded(async () => (await import('./save-dialog.js')).setUpSaveDialog(viewer));
+const addFiles = whenNeeded(async () => (await import('./added-files.js')).setUpAddedFiles(viewer));
+const openPathCard = whenNeeded(async () => (await import('./path-card.js')).setUpPathCard(viewer, navigation));
 const openExportDialog = whenNeeded(async () => (await import('./export-dialog.js')).setUpExportDialog(viewer, viewHistory));
 
 setUpNotifications(viewer);
@@ -61,7 +63,7 @@ setUpLegend(viewer);
 setUpAxisCube(viewer, navigation);
 makeRoomForAnnotations(viewer);
 setUpVolumes(viewer, measureTool);
-setUpSceneLoading(viewer, measureTool);
+setUpSceneLoading(viewer, measureTool, addFiles);
 setUpToolbar(viewer, navigation, viewHistory, { save: openSaveDialog, export: openExportDialog, help: showHelp, crosshair: showCrosshair });
 fillPanel();
 fillHelp();
@@ -102,7 +104,7 @@ setUpKeyboard(viewer, navigation, viewHistory, {
     return true;
   },
   escape() {
-    if (navigation.turntable_secs) navigation.stop();
+    if (navigation.turntable_secs || navigation.isFollowing) navigation.stop();
     else if (measureTool.isActive) measureTool.cancel();
     else if (viewer.tool !== 'navigate') viewer.selectTool('navigate');
     else if (pickCard.isOpen) pickCard.close();
@@ -119,10 +121,10 @@ viewer.connect();
 /** Returns a function that calls the one that `load` resolves to, whose module is loaded at the first call. */
 function whenNeeded(load) {
   let loaded = null;
-  return async () => {
+  return async (...words) => {
     try {
       loaded ??= load();
-      (await loaded)();
+      (await loaded)(...words);
     } catch (error) {
       loaded = null;
       showToast(error.message);
@@ -183,8 +185,8 @@ function fillPanel() {
   const points = section('Points', false, ...rows(controls.pointControls), ...histogramRows(viewer));
   const surface = section('Surface', true, ...rows(controls.surfaceControls));
   const color = section('Colour', true, ...withPreview(rows(controls.colorControls)));
-  viewer.infoChanged.listen(() => {
-    for (const part of [surface, color, points]) part.hidden = viewer.info.points === 0;
+  viewer.sceneChanged.listen(() => {
+    for (const part of [surface, color, points]) part.hidden = !viewer.objects.some((object) => object.points);
   });
   const animation = section('Animation', true, ...animationRows(viewer, () => animation));
   document.getElementById('sections').append(
@@ -192,12 +194,12 @@ function fillPanel() {
     surface,
     color,
     points,
-    objectSection(viewer, panel),
+    objectSection(viewer, panel, navigation),
     section('Sun', true, ...rows(controls.sunControls), sunClock(viewer)),
     section('Sky', true, ...rows(controls.skyControls)),
     section('Picture', false, ...rows(controls.pictureControls)),
     section('Annotations', false, ...rows(controls.annotationControls)),
-    section('View', false, ...viewRows(viewer, navigation)),
+    section('View', false, ...viewRows(viewer, navigation, openPathCard)),
     section('Clipping', false, ...rows(controls.clipControls)),
     section('Statistics', false, statisticsTable(viewer)));
 }

@@ -18,8 +18,8 @@ export function renamed(views, oldName, newName) {
   return views.map((view) => (view.name === oldName ? { ...view, name } : view));
 }
 
-/** The list of views, and the button that adds the current one. */
-export function namedViewRows(viewer, navigation) {
+/** The list of views, the button that adds the current one, and the one that opens the camera's path. */
+export function namedViewRows(viewer, navigation, openPathCard) {
   const list = element('ul', { class: 'named-views', 'aria-label': 'Saved views' });
   const viewsOf = () => viewer.scene.views ?? [];
   const change = (views) => viewer.changeSettings({ views });
@@ -48,5 +48,8 @@ export function namedViewRows(viewer, navigation) {
     shown = viewsOf();
     list.replaceChildren(...shown.map(item));
   });
-  return [list, element('div', { class: 'row' }, save)];
+  const path = element('button', {
+    type: 'button', class: 'button', 'data-action': 'camera-path', title: 'Views at times, as a film\ncamera_path', onclick: openPathCard,
+  }, 'Camera path');
+  return [list, element('div', { class: 'row' }, save, path)];
 }

@@ -15,6 +15,8 @@ export class Navigation {
   /** Whether the user is moving the camera; the pivot is shown meanwhile. */
   isActive = false;
   turntable_secs = 0;
+  /** Whether the camera follows a path. */
+  isFollowing = false;
   #previousCamera = null;
   #animationRequest = 0;
   #settleTimer = 0;
@@ -150,8 +152,8 @@ export class Navigation {
     this.transitionTo(cameras.isNear(bounds, this.camera.focal_point) ? seen : cameras.fit(seen, this.viewer.size, bounds));
   }
 
-  fit() {
-    this.transitionTo(cameras.fit(this.camera, this.viewer.size, this.viewer.info.bounds));
+  fit(bounds = this.viewer.info.bounds) {
+    this.transitionTo(cameras.fit(this.camera, this.viewer.size, bounds));
   }
 
   centerOn(point) {
@@ -187,12 +189,28 @@ export class Navigation {
     this.#animationRequest = requestAnimationFrame(step);
   }
 
-  /** Stops a transition or the turntable at the current camera. */
+  /** Follows a path for this many seconds, until the camera is moved otherwise. `cameraAt(time)` has its cameras. */
+  follow(cameraAt, seconds, showTime) {
+    this.stop();
+    this.isFollowing = true;
+    const start = performance.now();
+    const step = (now) => {
+      const time = Math.min(seconds, Math.max(0, now - start) / 1000);
+      this.viewer.setCamera(cameraAt(time), true);
+      showTime(time);
+      if (seconds <= time) this.stop();
+      else this.#animationRequest = requestAnimationFrame(step);
+    };
+    this.#animationRequest = requestAnimationFrame(step);
+  }
+
+  /** Stops a transition, a path or the turntable at the current camera. */
   stop() {
     if (!this.#animationRequest) return;
     cancelAnimationFrame(this.#animationRequest);
     this.#animationRequest = 0;
     this.turntable_secs = 0;
+    this.isFollowing = false;
     this.viewer.setCamera(this.camera, false);
   }
 

@@ -1,6 +1,7 @@
-// Rows of the panel for each file and object: visibility, colour and material.
+// Rows of the panel for each file and object: visibility, zoom, colour and material; added files can be removed.
 
-import { element } from './dom.js';
+import { withoutSettings } from './added.js';
+import { element, iconButton } from './dom.js';
 import { count } from './format.js';
 import { materialOf, withMaterial } from './materials.js';
 import { settingOf, withSetting } from './object-settings.js';
@@ -68,16 +69,17 @@ export function objectControls(object) {
 }
 
 /** The section of all objects. One alone has its material; several can also be hidden and coloured apart. */
-export function objectSection(viewer, panel) {
+export function objectSection(viewer, panel, navigation) {
   const objects = section('Objects', false);
-  viewer.infoChanged.listen(() => {
-    const isFilled = objects.dataset.dataName === viewer.info.name;
-    objects.dataset.dataName = viewer.info.name;
-    if (isFilled) return;
+  let shown = null;
+  viewer.sceneChanged.listen(() => {
+    const names = viewer.objects.map(({ name }) => name).join('\n');
+    if (!viewer.scene || names === shown) return;
+    shown = names;
     const body = objects.querySelector('.section-body');
     panel.removeRows([...body.querySelectorAll('.row')]);
-    const { objects: all } = viewer.info;
-    body.replaceChildren(...(all.length === 1 ? singleRows(all[0], panel) : all.map((object) => objectPart(object, panel))));
+    const all = viewer.objects;
+    body.replaceChildren(...(all.length === 1 ? singleRows(all[0], panel) : all.map((object) => objectPart(object, panel, viewer, navigation))));
   });
   return objects;
 }
@@ -86,11 +88,20 @@ function singleRows(object, panel) {
   return [...panel.addRows(materialControls(object)), ...notesOf(object)];
 }
 
-function objectPart(object, panel) {
+function objectPart(object, panel, viewer, navigation) {
+  const { name } = object;
   const size = object.kind === 'points' ? amount(object.points, 'point') : amount(object.triangles, 'triangle');
   const [visibility, ...details] = panel.addRows(objectControls(object));
+  if (object.bounds) visibility.append(iconButton('fit', `Zoom to ${name}`, () => navigation.fit(object.bounds)));
+  if (object.id) visibility.append(iconButton('delete', `Remove ${name}`, () => remove(viewer, object)));
   return element('div', { class: 'object', 'data-object': object.name },
     visibility, ...notesOf(object), element('details', { class: 'inner' }, element('summary', {}, size), ...details));
+}
+
+/** Removes an added file from the scene. It is kept, so that this can be undone. */
+function remove(viewer, { id, name }) {
+  const others = viewer.scene.added_files.filter((other) => other !== id);
+  viewer.changeSettings({ ...withoutSettings(viewer.scene, name), added_files: others.length ? others : null });
 }
 
 const amount = (n, word) => `${count(n)} ${word}${n === 1 ? '' : 's'}`;

@@ -30,6 +30,7 @@ export class Panel {
     return controls.map((control) => {
       const row = createRow(control, this.viewer, () => { this.#lastChanged = row; });
       this.#rows.push(row);
+      if (this.viewer.scene) row.update();
       return row.element;
     });
   }

@@ -48,7 +48,7 @@ export function setUpPointsExport(viewer, dialog) {
   dialog.querySelector('footer').before(part);
   dialog.addEventListener('close', () => abort?.abort());
   return () => {
-    part.hidden = viewer.info.points === 0;
+    part.hidden = !viewer.objects.some((object) => object.points);
     link.hidden = true;
     show(false, '');
   };

@@ -1,16 +1,24 @@
-// Loading of scene files from the file button or dropped on the page, and of links typed into the address bar.
+// Files from the file button or dropped on the page: scene files are shown, others are added. Links typed into the address
+// bar.
 
 import { NO_LINK, decodeHash } from './link.js';
 import { showToast } from './toast.js';
 
-export function setUpSceneLoading(viewer, measureTool) {
-  const load = async (file) => {
-    if (!/\.(toml|json)$/i.test(file.name)) showToast(`${file.name} is not a scene file (.toml or .json)`);
-    else await viewer.loadScene(file);
+const isSceneFile = ({ name }) => /\.(toml|json)$/i.test(name);
+/** Key of the session's storage for the names of added files, which a reload loses. */
+const ADDED = 'added files';
+
+/** `addFiles` adds files to the view. */
+export function setUpSceneLoading(viewer, measureTool, addFiles) {
+  const load = (files) => {
+    const [scene] = [...files].filter(isSceneFile);
+    const others = [...files].filter((file) => !isSceneFile(file));
+    if (scene) viewer.loadScene(scene);
+    if (others.length && viewer.isConnected) addFiles(others);
   };
   const input = document.getElementById('scene-file');
   input.addEventListener('change', () => {
-    if (input.files[0]) load(input.files[0]);
+    load([...input.files]);
     input.value = '';
   });
   document.addEventListener('dragover', (event) => {
@@ -23,12 +31,19 @@ export function setUpSceneLoading(viewer, measureTool) {
   document.addEventListener('drop', (event) => {
     event.preventDefault();
     document.body.classList.remove('is-dropping');
-    if (event.dataTransfer.files[0]) load(event.dataTransfer.files[0]);
+    load(event.dataTransfer.files);
   });
   window.addEventListener('hashchange', () => {
     if (!viewer.isConnected) return;
     const { patch, measurements } = decodeHash(location.hash) ?? NO_LINK;
     viewer.showLink(patch);
     measureTool.figures = measurements;
+  });
+  const lost = sessionStorage.getItem(ADDED);
+  if (lost) showToast(`${lost}: added to the page, and not kept when it is loaded again. Add it again.`);
+  sessionStorage.removeItem(ADDED);
+  window.addEventListener('pagehide', () => {
+    const names = viewer.addedObjects.map(({ name }) => name).join(', ');
+    if (names) sessionStorage.setItem(ADDED, names);
   });
 }

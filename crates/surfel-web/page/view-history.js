@@ -1,5 +1,6 @@
 // Undo and redo: the states that the user has shown. The address in the browser is that of the current one.
 
+import { withoutAdded } from './added.js';
 import { encodeHash, viewPatch } from './link.js';
 import { areEqual } from './merge-patch.js';
 import { signal } from './signal.js';
@@ -27,7 +28,11 @@ export class ViewHistory {
     };
     viewer.changedByUser.listen(noteChange);
     measureTool.changed.listen(noteChange);
-    viewer.sceneChanged.listen(() => this.#schedule());
+    viewer.sceneChanged.listen(() => {
+      // The first state, so that a change can be undone that is made before the first picture is finished.
+      if (this.#currentIdx < 0 && viewer.isConnected) this.#record();
+      this.#schedule();
+    });
     viewer.infoChanged.listen(() => this.#forgetOtherData());
     window.addEventListener('pagehide', () => this.updateAddress());
   }
@@ -54,7 +59,7 @@ export class ViewHistory {
     const { viewer } = this;
     if (viewer.initialScene) {
       const { patch, measurements } = this.#state();
-      history.replaceState(null, '', encodeHash(patch, measurements) || location.pathname + location.search);
+      history.replaceState(null, '', encodeHash(withoutAdded(patch, viewer.addedFiles), measurements) || location.pathname + location.search);
     }
     return location.href;
   }
@@ -93,7 +98,9 @@ export class ViewHistory {
     const state = this.#states[stateIdx];
     if (!state || !this.viewer.isConnected) return;
     this.#currentIdx = stateIdx;
-    this.viewer.showLink(state.patch);
+    const { addedFiles } = this.viewer;
+    const isLost = state.patch.added_files?.some((id) => addedFiles.get(id)?.isLost);
+    this.viewer.showLink(isLost ? withoutAdded(state.patch, addedFiles) : state.patch);
     this.measureTool.figures = state.measurements;
     this.#isChanged = false;
     this.changed();

@@ -12,7 +12,7 @@ const JUMPS = [
   ['previous', 'Previous view (Backspace)', (navigation) => navigation.goBack()],
 ];
 
-export function viewRows(viewer, navigation) {
+export function viewRows(viewer, navigation, openPathCard) {
   const projection = fieldRow(viewer, {
     key: 'camera.projection', label: 'Projection', kind: 'select', title: 'O, P\ncamera.orthographic, camera.view_angle',
     options: () => ['perspective', 'orthographic'],
@@ -48,7 +48,7 @@ export function viewRows(viewer, navigation) {
   const sides = element('div', { class: 'sides' }, ...SIDES.map((side, i) => element('button', {
     type: 'button', class: 'button', title: `${side} (${i + 1})`, 'data-side': side, onclick: () => navigation.viewFromSide(side),
   }, side)));
-  const rows = [projection, angle, trackball, station, jumps, sides, turntable(viewer, navigation), ...namedViewRows(viewer, navigation)];
+  const rows = [projection, angle, trackball, station, jumps, sides, turntable(viewer, navigation), ...namedViewRows(viewer, navigation, openPathCard)];
   // The position of an animated camera arrives with the first scene.
   const update = () => rows.forEach((row) => { row.inert = !viewer.camera; });
   viewer.cameraChanged.listen(update);

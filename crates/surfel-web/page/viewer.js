@@ -1,5 +1,6 @@
 // The state of the view: scene, camera and size, as the user changes them and as the server confirms them.
 
+import { boxAround, withoutAdded } from './added.js';
 import { Connection, socketAddress } from './connection.js';
 import { viewPatch } from './link.js';
 import { areEqual, combinePatches, createPatch, mergePatch } from './merge-patch.js';
@@ -22,6 +23,8 @@ export class Viewer {
   isConnected = false;
   lastFrame = null;
   latencies_ms = [];
+  /** The files that were added to this page, by their ids; those that are not shown any more can come back by undo. */
+  addedFiles = new Map();
 
   infoChanged = signal();
   sceneChanged = signal();
@@ -69,6 +72,16 @@ export class Viewer {
 
   connect() {
     this.#connection.open();
+  }
+
+  /** The added files that are shown. */
+  get addedObjects() {
+    return (this.scene?.added_files ?? []).map((id) => this.addedFiles.get(id)).filter(Boolean);
+  }
+
+  /** All files and objects. */
+  get objects() {
+    return [...this.info.objects, ...this.addedObjects];
   }
 
   /** Sequence number of the last message about settings or camera; each picture carries that of the last one it obeys. */
@@ -246,6 +259,8 @@ export class Viewer {
       profiled: () => this.#resolveRequest(message),
       measured: () => this.#resolveRequest(message),
       counted: () => this.#resolveRequest(message),
+      upload: () => this.#requests.get(message.id)?.progress?.(message),
+      added: () => this.#resolveRequest(message),
       written: () => this.#resolveRequest(message),
       exported: () => this.#resolveRequest(message),
       progress: () => this.#requests.get(message.id)?.progress?.(message),
@@ -256,6 +271,8 @@ export class Viewer {
 
   #receiveWelcome({ scene, info }) {
     const isOtherData = this.info?.name !== info.name;
+    const ofFiles = info.bounds;
+    Object.defineProperty(info, 'bounds', { get: () => boxAround([ofFiles, ...this.addedObjects.map(({ bounds }) => bounds)]) });
     this.info = info;
     this.initialScene = scene;
     this.#confirmedScene = mergePatch(scene, this.#helloPatch);
@@ -321,7 +338,7 @@ export class Viewer {
   }
 
   #handleLoss(wait_ms) {
-    if (this.isConnected) this.#helloPatch = viewPatch(this.initialScene, this.currentScene());
+    if (this.isConnected) this.#helloPatch = withoutAdded(viewPatch(this.initialScene, this.currentScene()), this.addedFiles);
     this.isConnected = false;
     for (const id of [...this.#requests.keys()]) this.#rejectRequest(id, 'the connection was lost');
     this.connectionChanged({ isConnected: false, wait_ms });

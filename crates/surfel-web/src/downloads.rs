@@ -1,6 +1,6 @@
-//! Files of points that pages have requested, until they are fetched or replaced.
+//! Files of points and films that pages have requested, until they are fetched or replaced.
 
-use crate::scene_provider::PointFile;
+use crate::scene_provider::WrittenFile;
 use axum::body::{Body, Bytes};
 use futures_util::stream;
 use std::collections::HashMap;
@@ -14,7 +14,7 @@ const NAME_BYTES: usize = 16;
 
 /// The files of all pages, by random names.
 #[derive(Default)]
-pub struct Downloads(Mutex<HashMap<String, Arc<dyn PointFile>>>);
+pub struct Downloads(Mutex<HashMap<String, Arc<dyn WrittenFile>>>);
 
 /// Removes a file when dropped; answers that are being read keep it until they end.
 pub struct DownloadGuard {
@@ -30,7 +30,7 @@ impl Downloads {
     /// Fails if the system has no random numbers.
     pub fn add(
         self: &Arc<Self>,
-        file: Arc<dyn PointFile>,
+        file: Arc<dyn WrittenFile>,
     ) -> Result<DownloadGuard, getrandom::Error> {
         let mut bytes = [0; NAME_BYTES];
         getrandom::fill(&mut bytes)?;
@@ -40,11 +40,11 @@ impl Downloads {
     }
 
     /// The file of this name, if it is kept.
-    pub fn get(&self, name: &str) -> Option<Arc<dyn PointFile>> {
+    pub fn get(&self, name: &str) -> Option<Arc<dyn WrittenFile>> {
         self.lock().get(name).cloned()
     }
 
-    fn lock(&self) -> MutexGuard<'_, HashMap<String, Arc<dyn PointFile>>> {
+    fn lock(&self) -> MutexGuard<'_, HashMap<String, Arc<dyn WrittenFile>>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -59,7 +59,7 @@ impl Drop for DownloadGuard {
 ///
 /// # Errors
 /// Fails if the file cannot be opened.
-pub fn body(file: &Arc<dyn PointFile>) -> std::io::Result<Body> {
+pub fn body(file: &Arc<dyn WrittenFile>) -> std::io::Result<Body> {
     let (reader, held) = (file.open()?, file.clone());
     let pieces = stream::unfold((reader, held), async |(mut reader, held)| {
         let read = tokio::task::spawn_blocking(move || {

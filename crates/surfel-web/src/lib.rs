@@ -23,6 +23,7 @@ mod visibility;
 mod sample_counts;
 mod accumulator;
 mod outgoing;
+mod handshake;
 mod client;
 mod render_loop;
 mod pick;
@@ -32,8 +33,11 @@ mod volume;
 mod progress_reporter;
 mod pending_changes;
 mod downloads;
+mod added_files;
 mod server_state;
 mod scene_update;
+mod long_work;
+mod add_file;
 mod session;
 mod connections;
 mod tls;
@@ -43,8 +47,8 @@ mod server;
 pub use frame_ancestors::FrameAncestors;
 pub use limits::{Limits, Timeouts};
 pub use scene_provider::{
-    Error, Export, PickedPoint, PictureOverlay, PicturePart, PointDescriber, PointFile,
-    PreparedScene, Result, SceneProvider, SettingsMap,
+    AddedFile, Error, Export, FilmOptions, PickedPoint, PictureOverlay, PicturePart,
+    PointDescriber, PreparedScene, Result, SceneProvider, SentFile, SettingsMap, WrittenFile,
 };
 pub use server::Server;
 pub use tls::{TlsError, TlsIdentity};

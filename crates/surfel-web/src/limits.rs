@@ -20,6 +20,10 @@ pub struct Limits {
     pub max_save_pixels: u64,
     /// Maximum number of camera rays and light samples of a saved picture together.
     pub max_rays: u64,
+    /// Maximum number of pixels of all frames of a film.
+    pub max_film_pixels: u64,
+    /// Maximum number of camera rays and light samples of a film together.
+    pub max_film_rays: u64,
     /// Maximum number of camera rays a pixel, and of light samples.
     pub max_samples: u32,
     /// Maximum width and height of any picture, in pixels.
@@ -34,6 +38,12 @@ pub struct Limits {
     pub max_page_saves: usize,
     /// Maximum number of one page's questions about points at once: picks, profiles, volumes and histograms.
     pub max_page_queries: usize,
+    /// Maximum number of files that one page adds to its view.
+    pub max_page_files: usize,
+    /// Maximum size of a file that a page adds, as it is sent and as it is read, in bytes.
+    pub max_added_file_bytes: u64,
+    /// Maximum size of the files that all pages add, in bytes.
+    pub max_added_bytes: u64,
     /// Maximum size of one page's settings changes that have not taken effect, in bytes.
     pub max_pending_bytes: usize,
     /// Maximum number of messages a second that a page may send in the long run.
@@ -69,6 +79,8 @@ impl Default for Limits {
             max_view_pixels: 1 << 21,
             max_save_pixels: 1 << 26,
             max_rays: 1 << 34,
+            max_film_pixels: 1 << 32,
+            max_film_rays: 1 << 38,
             max_samples: 1024,
             max_side_length: 1 << 15,
             max_message_bytes: 1 << 18,
@@ -76,6 +88,9 @@ impl Default for Limits {
             max_tasks: 64,
             max_page_saves: 2,
             max_page_queries: 4,
+            max_page_files: 32,
+            max_added_file_bytes: 1 << 29,
+            max_added_bytes: 1 << 31,
             max_pending_bytes: 1 << 19,
             max_message_rate: 400.0,
             max_message_burst: 800.0,
@@ -139,6 +154,32 @@ impl Limits {
         if max_rays < n_rays {
             let text = format!("{n_rays} rays, expected at most {max_rays}; choose fewer samples");
             return Err(Error::invalid_value("resolution", text));
+        }
+        Ok(())
+    }
+
+    /// Checks the size of a film, and the work that it takes with a number of rays a pixel.
+    ///
+    /// # Errors
+    /// Fails for films that would fill the disk or take days.
+    pub fn check_film(
+        &self,
+        (width, height): (u32, u32),
+        rays_per_pixel: u64,
+        n_frames: u32,
+    ) -> Result<()> {
+        self.check_save_size(width, height)?;
+        let n_pixels = u64::from(width) * u64::from(height) * u64::from(n_frames);
+        let counts = [
+            (n_pixels, self.max_film_pixels, "pixels", "a smaller or shorter film"),
+            (n_pixels.saturating_mul(rays_per_pixel), self.max_film_rays, "rays", "fewer samples"),
+        ];
+        for (found, limit, what, advice) in counts {
+            if limit < found {
+                let text =
+                    format!("a film of {found} {what}, expected at most {limit}; choose {advice}");
+                return Err(Error::invalid_request(text));
+            }
         }
         Ok(())
     }
@@ -211,6 +252,10 @@ mod tests {
         assert!(limits.check_save_size(9000, 9000).is_err());
         assert!(limits.check_save((4096, 4096), 1024).is_ok());
         assert!(limits.check_save((4096, 4096), 1025).is_err());
+        assert!(limits.check_film((1920, 1080), 20, 1800).is_ok());
+        assert!(limits.check_film((1920, 1080), 20, 3600).is_err());
+        assert!(limits.check_film((1920, 1080), 200, 1800).is_err());
+        assert!(limits.check_film((1, 0), 1, 1).is_err());
     }
 
     #[test]

@@ -1,9 +1,13 @@
 //! Messages to pages: the queue's items, and errors that answer requests.
 
 use crate::scene_provider::Error;
+use axum::extract::ws::{Message, WebSocket};
+use futures_util::SinkExt;
+use futures_util::stream::SplitSink;
 use serde_json::{Value, json};
 use std::any::Any;
 use std::sync::Arc;
+use std::time::Duration;
 use tokio::sync::mpsc;
 
 /// A message to a page.
@@ -24,6 +28,28 @@ pub enum RequestRef {
     Id(u32),
     /// A camera or settings change with a sequence number.
     Seq(u32),
+}
+
+/// Sends what is queued. Ends if the connection's write timeout passes, or once all senders are gone.
+pub async fn write(
+    mut sink: SplitSink<WebSocket, Message>,
+    mut queue: mpsc::Receiver<Outgoing>,
+    ping_interval: Duration,
+) {
+    let mut pings = tokio::time::interval(ping_interval);
+    loop {
+        let (message, _held) = tokio::select! {
+            outgoing = queue.recv() => match outgoing {
+                Some(Outgoing::Text(text)) => (Message::Text(text.into()), None),
+                Some(Outgoing::Binary(bytes, held)) => (Message::Binary(bytes.into()), Some(held)),
+                None => return,
+            },
+            _ = pings.tick() => (Message::Ping(Default::default()), None),
+        };
+        if sink.send(message).await.is_err() {
+            return;
+        }
+    }
 }
 
 /// Queues a message; waits while the queue is full.

@@ -1,6 +1,7 @@
 //! The server's HTTP routes: the page, its WebSocket, and pictures and facts for programs.
 
 use crate::access::{AccessDenied, TokenExchange};
+use crate::added_files::UploadError;
 use crate::connections::ConnectionEntry;
 use crate::downloads;
 use crate::merge_patch::apply_merge_patch;
@@ -14,7 +15,7 @@ use axum::extract::{Extension, Path, Query, Request, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state, map_response};
 use axum::response::{IntoResponse, Response};
-use axum::routing::{any, get};
+use axum::routing::{any, get, post};
 use axum::{Json, Router};
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -29,6 +30,7 @@ pub fn router(state: Arc<ServerState>) -> Router {
         .route("/scene", get(scene))
         .route("/stats", get(stats))
         .route("/points/{name}", get(points))
+        .route("/files/{name}", post(added_file))
         .route("/render", get(render_query).post(render_body))
         .route_layer(from_fn_with_state(state.clone(), check_token));
     Router::new()
@@ -181,6 +183,26 @@ async fn points(State(state): State<Arc<ServerState>>, Path(name): Path<String>)
         (header::CONTENT_LENGTH, HeaderValue::from(file.n_bytes())),
     ];
     Ok((headers, body).into_response())
+}
+
+/// The bytes of a file that a page has announced.
+async fn added_file(
+    State(state): State<Arc<ServerState>>,
+    Path(name): Path<String>,
+    body: Body,
+) -> RouteResult {
+    let patience = state.limits.timeouts.request;
+    let taken = state.uploads.take(&name, body, patience).await;
+    let (status, text) = match taken {
+        Ok(()) => return Ok(StatusCode::NO_CONTENT.into_response()),
+        Err(UploadError::Unexpected) => (StatusCode::NOT_FOUND, "this file is not expected"),
+        Err(UploadError::TooLarge) => {
+            (StatusCode::PAYLOAD_TOO_LARGE, "body: is larger than announced")
+        }
+        Err(UploadError::TooSmall) => (StatusCode::BAD_REQUEST, "body: is smaller than announced"),
+        Err(UploadError::TooSlow) => (StatusCode::REQUEST_TIMEOUT, "body: did not arrive in time"),
+    };
+    Err(Failure(status, text.into()))
 }
 
 /// Renders with settings from the query, as on a command line: `?resolution=640x480&camera-azimuth-angle=30`.

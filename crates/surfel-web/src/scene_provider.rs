@@ -70,7 +70,28 @@ pub trait SceneProvider: Send + Sync + 'static {
         settings: &SettingsMap,
         format: &str,
         progress: &dyn Progress,
-    ) -> Result<Arc<dyn PointFile>>;
+    ) -> Result<Arc<dyn WrittenFile>>;
+
+    /// Writes the film of the camera's path in these settings, whose `resolution` is that of the frames.
+    ///
+    /// # Errors
+    /// Fails if a setting is invalid, without a path, if the film exceeds the limits, and if `progress` cancels.
+    fn write_film(
+        &self,
+        settings: &SettingsMap,
+        options: &FilmOptions,
+        progress: &dyn Progress,
+    ) -> Result<Arc<dyn WrittenFile>>;
+
+    /// Reads a file that a page adds to its view. The settings of the page then name it by its id, in the list `added_files`.
+    ///
+    /// # Errors
+    /// Fails if the bytes are of no known format or broken, if they need too much memory, and if `progress` cancels.
+    fn read_added_file(
+        &self,
+        file: &SentFile,
+        progress: &dyn Progress,
+    ) -> Result<Arc<dyn AddedFile>>;
 
     /// These settings as a command line and as scene files.
     ///
@@ -85,10 +106,46 @@ pub trait SceneProvider: Send + Sync + 'static {
     fn read_scene_file(&self, name: &str, text: &str) -> Result<SettingsMap>;
 }
 
-/// A file of points, which is removed when this is dropped.
-pub trait PointFile: Send + Sync {
-    /// Number of points.
-    fn n_points(&self) -> u64;
+/// A file as a page sends it.
+#[derive(Clone, Copy, Debug)]
+pub struct SentFile<'f> {
+    /// The random name by which settings name the file, in their list `added_files`.
+    pub id: &'f str,
+    /// Name of the file on the page's machine.
+    pub name: &'f str,
+    /// Content of the file.
+    pub bytes: &'f [u8],
+    /// Names of the files that the page has added before.
+    pub taken: &'f [String],
+    /// Maximum number of bytes of memory that the content may take.
+    pub max_bytes: u64,
+}
+
+/// A file that a page has added to its view, in memory. No settings can name it any more when this is dropped.
+pub trait AddedFile: Send + Sync {
+    /// Name of the file, different from those of all other files of the page.
+    fn name(&self) -> &str;
+
+    /// The file as the page lists it: a JSON object like those of `objects` in `info`.
+    fn description(&self) -> Value;
+
+    /// Number of bytes of memory that the file takes.
+    fn n_bytes(&self) -> u64;
+}
+
+/// The form of a film.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmOptions {
+    /// Extension of the file, as in `mp4`.
+    pub format: String,
+    /// Frames a second.
+    pub fps: f64,
+}
+
+/// A file of points or a film, which is removed when this is dropped.
+pub trait WrittenFile: Send + Sync {
+    /// Number of points, or of frames.
+    fn n_items(&self) -> u64;
 
     /// Size of the file.
     fn n_bytes(&self) -> u64;
@@ -173,6 +230,8 @@ pub struct Export {
     pub toml: String,
     /// A scene file in JSON.
     pub json: String,
+    /// A scene file in TOML of which the command line makes the film of the camera's path; none without a path.
+    pub film: Option<String>,
 }
 
 /// A result with the viewer's error.

@@ -1,6 +1,7 @@
 //! The state that all connections of a server share.
 
 use crate::access::AccessGuard;
+use crate::added_files::FileUploads;
 use crate::client::Client;
 use crate::downloads::Downloads;
 use crate::limits::Limits;
@@ -34,6 +35,8 @@ pub struct ServerState {
     pub render_permits: Arc<Semaphore>,
     /// Files of points for the pages that have requested them.
     pub downloads: Arc<Downloads>,
+    /// Files that pages are adding, and the memory of those that they have added.
+    pub uploads: Arc<FileUploads>,
     /// Set from outside to stop the server.
     pub is_stopped: Arc<AtomicBool>,
     /// When the server started.
@@ -61,6 +64,7 @@ impl ServerState {
             page_permits: permits(limits.max_pages),
             render_permits: permits(limits.max_renders),
             task_permits: permits(limits.max_tasks),
+            uploads: Arc::new(FileUploads::new(&limits)),
             limits,
             downloads: Arc::default(),
             is_stopped,
@@ -88,6 +92,7 @@ impl ServerState {
             "max_pixels": self.limits.max_view_pixels,
             "max_save_pixels": self.limits.max_save_pixels,
             "max_message_bytes": self.limits.max_message_bytes,
+            "max_added_file_bytes": self.limits.max_added_file_bytes,
         });
         info
     }

@@ -1,29 +1,35 @@
 //! One page's connection: reads its messages, and writes pictures and answers.
 
+use crate::add_file::{self, Announcement};
+use crate::added_files::PageFiles;
 use crate::camera;
 use crate::client::Client;
 use crate::downloads::DownloadGuard;
 use crate::frame;
-use crate::limits::{Limits, RateLimiter};
+use crate::handshake::handshake;
+use crate::limits::RateLimiter;
+use crate::long_work::run_slowly;
 use crate::message::Incoming;
-use crate::outgoing::{Outgoing, RequestRef, rejection, send_json};
+use crate::outgoing::{Outgoing, RequestRef, rejection, send_json, write};
 use crate::pending_changes::{PendingChanges, SettingsChange};
 use crate::pick;
 use crate::profile;
-use crate::progress_reporter::{ProgressReporter, ProgressUpdate};
-use crate::scene_provider::{Error, PreparedScene, Result, SceneProvider, SettingsMap};
+use crate::progress_reporter::ProgressReporter;
+use crate::scene_provider::{
+    Error, FilmOptions, PreparedScene, Result, SceneProvider, SettingsMap, WrittenFile,
+};
 use crate::scene_update;
 use crate::server_state::ServerState;
 use crate::visibility::visibility;
 use crate::volume;
 use axum::extract::ws::{Message, WebSocket};
-use futures_util::stream::{SplitSink, SplitStream};
-use futures_util::{SinkExt, StreamExt};
+use futures_util::StreamExt;
+use futures_util::stream::SplitStream;
 use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use surfel_core::flat::{ProfileLine, VolumeQuery};
 use surfel_core::progress::Progress;
 use tokio::sync::{Semaphore, mpsc};
@@ -50,8 +56,10 @@ pub async fn run(socket: WebSocket, state: Arc<ServerState>) {
                 out.clone(),
             ));
             let queries = Arc::new(Semaphore::new(state.limits.max_page_queries));
-            let (saves, download) = (HashMap::new(), Arc::default());
-            let mut session = Session { state, client, pending, out, queries, saves, download };
+            let saves = HashMap::new();
+            let (download, files) = (Arc::default(), Arc::default());
+            let mut session =
+                Session { state, client, pending, out, queries, saves, download, files };
             session.change(SettingsChange { patch, ..SettingsChange::default() }).await;
             session.read(stream).await;
             session.saves.values().for_each(cancel);
@@ -68,55 +76,6 @@ pub async fn run(socket: WebSocket, state: Arc<ServerState>) {
     writer.abort();
 }
 
-/// The picture size and the settings in a page's first message; none if the page goes away or sends nothing.
-async fn handshake(
-    stream: &mut SplitStream<WebSocket>,
-    limits: &Limits,
-) -> Option<Result<((u32, u32), SettingsMap)>> {
-    let first = timeout(limits.timeouts.request, first_message(stream)).await.ok()??;
-    let Message::Text(text) = first else {
-        return Some(Err(Error::invalid_request("expected hello")));
-    };
-    Some(Incoming::parse(&text).and_then(|message| match message {
-        Incoming::Hello { width, height, scene } => {
-            limits.check_view_size(width, height).map(|()| ((width, height), scene))
-        }
-        _ => Err(Error::invalid_request("expected hello first")),
-    }))
-}
-
-/// The first message that is not a ping or pong.
-async fn first_message(stream: &mut SplitStream<WebSocket>) -> Option<Message> {
-    loop {
-        match stream.next().await?.ok()? {
-            Message::Ping(_) | Message::Pong(_) => {}
-            message => return Some(message),
-        }
-    }
-}
-
-/// Sends what is queued. Ends if the connection's write timeout passes, or once all senders are gone.
-async fn write(
-    mut sink: SplitSink<WebSocket, Message>,
-    mut queue: mpsc::Receiver<Outgoing>,
-    ping_interval: Duration,
-) {
-    let mut pings = tokio::time::interval(ping_interval);
-    loop {
-        let (message, _held) = tokio::select! {
-            outgoing = queue.recv() => match outgoing {
-                Some(Outgoing::Text(text)) => (Message::Text(text.into()), None),
-                Some(Outgoing::Binary(bytes, held)) => (Message::Binary(bytes.into()), Some(held)),
-                None => return,
-            },
-            _ = pings.tick() => (Message::Ping(Default::default()), None),
-        };
-        if sink.send(message).await.is_err() {
-            return;
-        }
-    }
-}
-
 struct Session {
     state: Arc<ServerState>,
     client: Arc<Client>,
@@ -128,6 +87,8 @@ struct Session {
     saves: HashMap<u32, Arc<AtomicBool>>,
     /// The file of points that the page requested last.
     download: Arc<Mutex<Option<DownloadGuard>>>,
+    /// The files that the page has added.
+    files: Arc<PageFiles>,
 }
 
 impl Session {
@@ -195,6 +156,12 @@ impl Session {
             Incoming::Histogram { id, column } => self.histogram(id, column).await,
             Incoming::Save { id, width, height } => self.save(id, width, height).await,
             Incoming::Points { id, format } => self.points(id, format).await,
+            Incoming::Film { id, format, width, height, fps } => {
+                self.film(id, (width, height), FilmOptions { format, fps }).await;
+            }
+            Incoming::AddFile { id, name, n_bytes } => {
+                self.add_file(Announcement { id, name, n_bytes }).await;
+            }
             Incoming::Cancel { id } => self.saves.get(&id).into_iter().for_each(cancel),
             Incoming::Export { id, width, height } => self.export(id, width, height).await,
             Incoming::LoadScene { id, name, text } => self.load_scene(id, name, text).await,
@@ -332,17 +299,38 @@ impl Session {
         Some(settings)
     }
 
-    fn settings_to_save(&mut self, id: u32, (width, height): (u32, u32)) -> Result<SettingsMap> {
+    /// Checks that the page may save or add another file.
+    fn check_saves(&mut self, id: u32) -> Result<()> {
         self.saves.retain(|_, is_cancelled| is_held(is_cancelled));
         if self.saves.contains_key(&id) {
             return Err(Error::invalid_request("this is being saved"));
         }
         if self.state.limits.max_page_saves <= self.saves.len() {
-            let text = "files are being saved; wait for one or cancel it";
+            let text = "files are being saved or added; wait for one or cancel it";
             return Err(Error::invalid_request(text));
         }
+        Ok(())
+    }
+
+    fn settings_to_save(&mut self, id: u32, (width, height): (u32, u32)) -> Result<SettingsMap> {
+        self.check_saves(id)?;
         let settings = self.settings(width, height);
         settings.ok_or_else(|| Error::invalid_request("there is nothing to save yet"))
+    }
+
+    async fn add_file(&mut self, announced: Announcement) {
+        let id = announced.id;
+        if let Err(error) = self.check_saves(id) {
+            return self.reject(RequestRef::Id(id), &error).await;
+        }
+        let is_cancelled: Arc<AtomicBool> = Arc::default();
+        self.saves.insert(id, is_cancelled.clone());
+        let (state, files, out) = (self.state.clone(), self.files.clone(), self.out.clone());
+        tokio::spawn(async move {
+            let added = add_file::run(&state, announced, &files, is_cancelled, &out).await;
+            let message = added.unwrap_or_else(|error| rejection(RequestRef::Id(id), &error));
+            send_json(&out, &message).await;
+        });
     }
 
     async fn save(&mut self, id: u32, width: u32, height: u32) {
@@ -370,9 +358,41 @@ impl Session {
         });
     }
 
-    /// Writes the points that are shown; the page then fetches the file by its name.
+    /// Writes the points that are shown.
     async fn points(&mut self, id: u32, format: String) {
-        let settings = match self.settings_to_save(id, self.client.view().size) {
+        let size = self.client.view().size;
+        self.write_file(id, size, "n_points", move |provider, settings, progress| {
+            provider.write_points(settings, &format, progress)
+        })
+        .await;
+    }
+
+    /// Writes the film of the camera's path.
+    async fn film(&mut self, id: u32, size: (u32, u32), options: FilmOptions) {
+        if let Err(error) = self.state.limits.check_save_size(size.0, size.1) {
+            return self.reject(RequestRef::Id(id), &error).await;
+        }
+        self.write_file(id, size, "n_frames", move |provider, settings, progress| {
+            provider.write_film(&provider.drawable_settings(settings), &options, progress)
+        })
+        .await;
+    }
+
+    /// Writes a file, which the page then fetches by its name. `count` is the word for what is in it.
+    async fn write_file(
+        &mut self,
+        id: u32,
+        size: (u32, u32),
+        count: &'static str,
+        write: impl FnOnce(
+            &dyn SceneProvider,
+            &SettingsMap,
+            &dyn Progress,
+        ) -> Result<Arc<dyn WrittenFile>>
+        + Send
+        + 'static,
+    ) {
+        let settings = match self.settings_to_save(id, size) {
             Ok(settings) => settings,
             Err(error) => return self.reject(RequestRef::Id(id), &error).await,
         };
@@ -381,7 +401,7 @@ impl Session {
         let (state, out, download) = (self.state.clone(), self.out.clone(), self.download.clone());
         tokio::spawn(async move {
             let write = move |provider: &dyn SceneProvider, progress: &dyn Progress| {
-                provider.write_points(&settings, &format, progress)
+                write(provider, &settings, progress)
             };
             let written = run_slowly(&state, id, is_cancelled, &out, write).await;
             let kept = written.and_then(|file| {
@@ -391,11 +411,10 @@ impl Session {
             });
             let message = match kept {
                 Ok((guard, file)) => {
-                    let (n_points, n_bytes) = (file.n_points(), file.n_bytes());
                     let address = format!("points/{}", guard.name);
                     // The file before it goes.
                     *download.lock().unwrap_or_else(PoisonError::into_inner) = Some(guard);
-                    json!({ "type": "written", "id": id, "address": address, "n_points": n_points, "n_bytes": n_bytes })
+                    json!({ "type": "written", "id": id, "address": address, count: file.n_items(), "n_bytes": file.n_bytes() })
                 }
                 Err(error) => rejection(RequestRef::Id(id), &error),
             };
@@ -418,6 +437,7 @@ impl Session {
                 "command": export.command,
                 "toml": export.toml,
                 "json": export.json,
+                "film": export.film,
             }),
             Err(error) => rejection(RequestRef::Id(id), &error),
         };
@@ -448,27 +468,4 @@ fn cancel(is_cancelled: &Arc<AtomicBool>) {
 /// Returns whether a saved picture is still being rendered or sent.
 fn is_held(is_cancelled: &Arc<AtomicBool>) -> bool {
     1 < Arc::strong_count(is_cancelled)
-}
-
-/// Does long work for a page once a permit is free, and reports its progress to the page.
-async fn run_slowly<T: Send + 'static>(
-    state: &Arc<ServerState>,
-    id: u32,
-    is_cancelled: Arc<AtomicBool>,
-    out: &mpsc::Sender<Outgoing>,
-    work: impl FnOnce(&dyn SceneProvider, &dyn Progress) -> Result<T> + Send + 'static,
-) -> Result<T> {
-    let _permit = state.render_permits.acquire().await.map_err(|_| Error::Cancelled)?;
-    let provider = state.provider().await.ok_or(Error::Cancelled)?;
-    let (page, for_cancel, queue) = (out.clone(), state.clone(), out.clone());
-    let report = move |update: ProgressUpdate| {
-        let ProgressUpdate { done, left_secs, .. } = update;
-        let message = json!({ "type": "progress", "id": id, "done": done, "left_secs": left_secs });
-        // Dropped if the queue is full.
-        let _ = queue.try_send(Outgoing::Text(message.to_string()));
-    };
-    let is_cancelled =
-        move || is_cancelled.load(Ordering::Relaxed) || for_cancel.is_stopped() || page.is_closed();
-    let reporter = ProgressReporter::new(report, is_cancelled);
-    state.run_blocking(move || work(&*provider, &reporter)).await?
 }

@@ -78,8 +78,11 @@ mod height_map;
 pub mod animate;
 pub mod prepare;
 mod scene_keys;
+mod added_objects;
+mod point_overlap;
 pub mod live_view;
 pub mod live_scene;
+pub mod live_film;
 
 pub use built_scene::BuiltScene;
 pub use description::SceneDescription;

@@ -1,12 +1,14 @@
 //! A scene whose settings change: after a change only what it touches is made again.
 
+use crate::added_objects::{first_added, without_added};
 use crate::built_scene::{exposure_stops, planes_before, source_indices};
 use crate::cache::Lru2;
 use crate::crs::Unit;
-use crate::description::{Exposure, Interior, Invalid, SceneDescription};
+use crate::description::{Exposure, Interior, SceneDescription};
 use crate::error::{Error, Result};
 use crate::live_view::{LiveView, SceneTrees};
 use crate::picture::RenderedImage;
+use crate::point_overlap::check_overlap;
 use crate::renderer::SceneRenderer;
 use crate::resolve::{
     AutoSettings, KeepOptions, LoadedScene, MemoryEstimate, common_legend, coordinate_system,
@@ -17,14 +19,11 @@ use rayon::ThreadPool;
 use std::sync::{Arc, OnceLock};
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
-use surfel_core::math::{Aabb, DVec3};
+use surfel_core::math::DVec3;
 use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
 use surfel_core::render::{self, RenderRegion, RenderStats, Renderer, Settings};
-use surfel_core::scene::{
-    Background, Camera, ClipPlane, Geometry, Graph, Projection, Scene, inlier_bounds,
-};
-use surfel_core::surface::SurfaceKind;
+use surfel_core::scene::{Background, Camera, ClipPlane, Projection, Scene};
 use surfel_core::trace::Simd;
 use thread_priority::ThreadPriority;
 
@@ -36,6 +35,8 @@ pub struct LiveScene {
     loaded: Arc<LoadedScene>,
     /// The content with other files apart, as those that have settings of their own.
     regrouped: Lru2<LoadedScene>,
+    /// The content with objects that were added.
+    extended: Lru2<LoadedScene>,
     made: Made,
     /// Apart, so that previews leave what was made of all points.
     made_for_previews: Made,
@@ -63,11 +64,14 @@ pub enum UseCase {
 #[derive(Debug, Default)]
 struct Made {
     prepared: Lru2<Vec<PreparedCloud>>,
+    /// The clouds of added objects, apart, so that all others need not be prepared again beside them.
+    prepared_added: Lru2<Vec<PreparedCloud>>,
     trees: Lru2<SceneTrees>,
 }
 
 impl LiveScene {
-    /// Reads the files of a description. All later descriptions have the same files, objects, lamps and animations.
+    /// Reads the files of a description. All later descriptions have the same files, objects, lamps and animations. Behind
+    /// these objects they may have others, whose content is in memory.
     ///
     /// # Errors
     ///
@@ -84,6 +88,7 @@ impl LiveScene {
             startup,
             loaded: Arc::new(loaded),
             regrouped: Lru2::default(),
+            extended: Lru2::default(),
             made: Made::default(),
             made_for_previews: Made::default(),
             renderer: SceneRenderer::new(&description.run)?,
@@ -104,13 +109,28 @@ impl LiveScene {
         &self.loaded
     }
 
-    /// Returns the content of the files, those apart that have settings or a material of their own. Reads the files again
-    /// unless a description grouped them like this lately.
+    /// Returns the content of the files, those apart that have settings or a material of their own, and of added objects.
+    /// Reads the files again unless a description grouped them like this lately.
     ///
     /// # Errors
     ///
     /// Fails as reading does.
     pub fn loaded_for(
+        &self,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<Arc<LoadedScene>> {
+        let first = first_added(description, &self.startup);
+        if first == description.objects.len() {
+            return self.regrouped_for(description, progress);
+        }
+        self.extended.get_or_make(grouping_key(description), progress, || {
+            let base = self.regrouped_for(&without_added(description, first), progress)?;
+            base.with_further_objects(description, progress)
+        })
+    }
+
+    fn regrouped_for(
         &self,
         description: &SceneDescription,
         progress: &dyn Progress,
@@ -142,7 +162,12 @@ impl LiveScene {
 
     /// Returns true if the clouds were prepared under a description lately.
     pub fn is_prepared(&self, description: &SceneDescription) -> bool {
-        self.made.prepared.contains(preparation_key(description))
+        let first = first_added(description, &self.startup);
+        let has_added = first < description.objects.len();
+        let base = preparation_key(&without_added(description, first));
+        let is_added_prepared =
+            !has_added || self.made.prepared_added.contains(preparation_key(description));
+        is_added_prepared && self.made.prepared.contains(base)
     }
 
     /// Returns the scene under a description at the description's time.
@@ -285,13 +310,36 @@ impl LiveScene {
         let frames = loaded.sequence_frames_at(time_secs);
         let trees = tree_key(description, preparation, auto, &frames);
         made.trees.get_or_make(trees, progress, || {
-            let clouds = made.prepared.get_or_make(preparation, progress, || {
-                self.preparation_threads.install(|| loaded.prepared(description, progress))
-            })?;
+            let clouds = self.prepared(made, loaded, description, progress)?;
             let build =
-                || build(loaded, time_secs, description, &clouds, auto, self.use_case, progress);
+                || build(loaded, time_secs, description, clouds, auto, self.use_case, progress);
             self.preparation_threads.install(build)
         })
+    }
+
+    /// The prepared clouds of all files and objects.
+    fn prepared(
+        &self,
+        made: &Made,
+        loaded: &LoadedScene,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<Vec<PreparedCloud>> {
+        let (first, n_objects) =
+            (first_added(description, &self.startup), description.objects.len());
+        let prepare = |added: bool| {
+            let is_meant =
+                |object: Option<usize>| object.is_some_and(|object| first <= object) == added;
+            self.preparation_threads.install(|| loaded.prepared(description, is_meant, progress))
+        };
+        let base = preparation_key(&without_added(description, first));
+        let mut clouds = made.prepared.get_or_make(base, progress, || prepare(false))?.to_vec();
+        if first < n_objects {
+            let key = preparation_key(description);
+            let added = made.prepared_added.get_or_make(key, progress, || prepare(true))?;
+            clouds.extend_from_slice(&added);
+        }
+        Ok(clouds)
     }
 }
 
@@ -300,16 +348,15 @@ fn build(
     loaded: &LoadedScene,
     time_secs: f64,
     description: &SceneDescription,
-    clouds: &[PreparedCloud],
+    clouds: Vec<PreparedCloud>,
     auto: &AutoSettings,
     use_case: UseCase,
     progress: &dyn Progress,
 ) -> Result<SceneTrees> {
     let up = auto.up;
-    let legend = common_legend(clouds, description, up);
+    let legend = common_legend(&clouds, description, up);
     let raw = loaded.graph_without_points();
-    let (mut graph, mut sequences) =
-        finish_graph(loaded, raw, clouds.to_vec(), description, up, progress)?;
+    let (mut graph, mut sequences) = finish_graph(loaded, raw, clouds, description, up, progress)?;
     hide_walls(&mut graph, &auto.hidden_walls);
     for sequence in &mut sequences {
         sequence.seek(time_secs, &mut graph, up, progress)?;
@@ -352,53 +399,20 @@ const PLACEHOLDER_CAMERA: Camera = Camera {
     projection: Projection::Panorama,
 };
 
-/// Maximum number of discs of points over each other, on average.
-const MAX_OVERLAP: f32 = 200.0;
-
-/// Fails for points so large that each ray meets thousands of them: other viewers would wait for this one's pictures,
-/// and nothing could be seen on them.
-fn check_overlap(graph: &Graph) -> Result<()> {
-    for geometry in &graph.geometries {
-        let Geometry::Points(points) = geometry else { continue };
-        // Pixels are drawn, not traced.
-        if points.surface == SurfaceKind::Points {
-            continue;
-        }
-        let overlap = mean_overlap(points.cloud());
-        if MAX_OVERLAP < overlap {
-            let message = format!(
-                "found {overlap:.0} points over each other, expected at most {MAX_OVERLAP}; \
-                 choose a smaller radius or radius_scale"
-            );
-            return Err(Invalid::at("radius_scale", message).into());
-        }
-    }
-    Ok(())
-}
-
-/// The number of discs over each other, about: their area as a fraction of that of a box around them.
-fn mean_overlap(cloud: &PreparedCloud) -> f32 {
-    let radii = cloud.radii();
-    let n = radii.len().max(1) as f64;
-    let sum = |power: i32| radii.iter().map(|radius| f64::from(*radius).powi(power)).sum::<f64>();
-    let Aabb { min, max } = inlier_bounds(cloud);
-    let size = (max - min).as_dvec3() + 2.0 * sum(1) / n;
-    let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
-    (std::f64::consts::PI * sum(2) / area) as f32
-}
-
 #[cfg(test)]
 mod tests {
     //! Work on pictures beside other work.
 
     use super::*;
+    use crate::description::ObjectDescription;
+    use crate::memory_files::MemoryContent;
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
     use std::sync::mpsc::channel;
     use std::thread;
     use std::time::Duration;
     use surfel_core::math::Random;
     use surfel_core::math::Vec3;
-    use surfel_core::points::PointCloud;
+    use surfel_core::points::{PointCloud, Subsample};
     use surfel_core::progress::NoProgress;
     use surfel_formats::SaveOptions;
 
@@ -459,6 +473,28 @@ mod tests {
             assert_eq!(is_changed, Ok(true));
             assert!(picture.join().unwrap().is_ok());
         });
+    }
+
+    #[test]
+    fn an_added_object_joins_the_scene_and_leaves_it() {
+        let (scene, description) = scene_of_a_plane("added");
+        let n_instances = |description: &SceneDescription| {
+            scene.view(description, &NoProgress).unwrap().flat.instances.len()
+        };
+        let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 50.0);
+        let cloud = PointCloud::from_positions((0..400).map(corner).collect());
+        let mut more = description.clone();
+        more.memory.insert("memory:more", MemoryContent::Points(Arc::new(cloud)));
+        more.objects.push(ObjectDescription::new("memory:more"));
+        assert_eq!(n_instances(&more), 2);
+        // The points of the start are prepared once for both.
+        assert!(scene.is_prepared(&more) && scene.is_prepared(&description));
+        assert_eq!(n_instances(&description), 1);
+        let mut other = more.clone();
+        other.objects[0].settings.preparation.subsample = Some(Subsample::Stride(2.0));
+        assert!(!scene.is_prepared(&other));
+        assert_eq!(n_instances(&other), 2);
+        assert!(scene.is_prepared(&description));
     }
 
     #[cfg(target_os = "linux")]

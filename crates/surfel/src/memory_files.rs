@@ -18,6 +18,17 @@ pub enum MemoryContent {
     Points(Arc<PointCloud>),
     /// A triangle mesh.
     Triangles(Arc<Mesh>),
+    /// All that was read of a file.
+    File(Arc<FileContent>),
+}
+
+/// The content of a file, and what the file states about itself.
+#[derive(Clone, Debug)]
+pub struct FileContent {
+    /// The clouds and meshes.
+    pub graph: Graph<PointCloud>,
+    /// The facts.
+    pub info: FileInfo,
 }
 
 impl MemoryFiles {
@@ -54,6 +65,7 @@ impl MemoryContent {
         let geometry = match self {
             Self::Points(cloud) => Geometry::Points(PointCloud::clone(cloud)),
             Self::Triangles(mesh) => Geometry::Triangles(Mesh::clone(mesh)),
+            Self::File(file) => return file.graph.clone(),
         };
         Graph::from_geometry(geometry, Material::MATTE)
     }
@@ -72,6 +84,7 @@ impl MemoryContent {
                 n_triangles: Some(mesh.triangles.len() as u64),
                 ..info
             },
+            Self::File(file) => file.info.clone(),
         }
     }
 }
@@ -81,6 +94,7 @@ impl PartialEq for MemoryContent {
         match (self, other) {
             (Self::Points(a), Self::Points(b)) => Arc::ptr_eq(a, b),
             (Self::Triangles(a), Self::Triangles(b)) => Arc::ptr_eq(a, b),
+            (Self::File(a), Self::File(b)) => Arc::ptr_eq(a, b),
             _ => false,
         }
     }

@@ -1,5 +1,6 @@
 //! Texts for clients: they name files without their folders, which are nobody's business beyond this machine.
 
+use super::added_files::without_ids;
 use std::path::{MAIN_SEPARATOR_STR, Path};
 use surfel::description::rule::absolute_text;
 use surfel_core::progress::Progress;
@@ -23,9 +24,10 @@ impl ViewedFolders {
         Self { names }
     }
 
-    /// A text without these folders.
+    /// A text without these folders, and without the ids of added files.
     pub fn removed_from(&self, text: &str) -> String {
-        self.names.iter().fold(text.to_owned(), |text, name| text.replace(name, ""))
+        let removed = self.names.iter().fold(text.to_owned(), |text, name| text.replace(name, ""));
+        without_ids(&removed)
     }
 
     /// A result whose error has a text for clients.

@@ -1,12 +1,17 @@
 //! `surfel view`: the interactive viewer, in a browser.
 
 mod browser;
+mod rejection;
+mod rows;
+mod added_files;
 mod file_names;
 mod legend;
+mod facts;
 mod histogram;
 mod coordinates;
 mod point;
-mod rejection;
+mod temp_download;
+mod camera_path;
 mod shown_points;
 mod page_overlay;
 mod page_settings;

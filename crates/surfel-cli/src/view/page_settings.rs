@@ -1,9 +1,14 @@
 //! Settings of a page as a scene description, and back.
 
+use super::added_files::{self, PageFile, is_added};
+use super::camera_path::{self, path_setting};
 use super::rejection::rejection;
+use super::rows::Rows;
 use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use surfel::SceneDescription;
+use surfel::description::rule::absolute_text;
 use surfel::description::{
     Crop, Invalid, MaterialChoice, ObjectDescription, ObjectOverride, OutputSettings, parse_table,
     write_table,
@@ -29,10 +34,26 @@ pub fn shown(description: SceneDescription) -> SettingsMap {
     shown.to_table()
 }
 
-/// Reads the settings of a page, which may say anything, over the files and objects of `startup`.
-pub fn read(startup: &SceneDescription, settings: &SettingsMap) -> Result<SceneDescription, Error> {
+/// The files and objects that settings of pages are about.
+pub struct Content<'c> {
+    /// The description with which the program was started.
+    pub startup: &'c SceneDescription,
+    /// The rows of its files and objects.
+    pub rows: &'c Rows,
+    /// The files that the page has added.
+    pub added: &'c [Arc<PageFile>],
+}
+
+/// Reads the settings of a page, which may say anything, over the files and objects of the startup and those that the
+/// page has added.
+pub fn read(content: &Content, settings: &SettingsMap) -> Result<SceneDescription, Error> {
+    let &Content { startup, rows, added } = content;
     let mut page = SceneDescription::default();
-    page.merge(settings).map_err(rejection)?;
+    let mut of_description = settings.clone();
+    of_description.shift_remove(added_files::KEY);
+    of_description.shift_remove(camera_path::KEY);
+    camera_path::camera_path(settings)?;
+    page.merge(&of_description).map_err(rejection)?;
     if page.light.environment.is_some() && page.get("environment") != startup.get("environment") {
         return Err(Error::invalid_value("environment", "a page cannot change this setting"));
     }
@@ -56,21 +77,53 @@ pub fn read(startup: &SceneDescription, settings: &SettingsMap) -> Result<SceneD
     }
     Limits::default().check_samples(page.picture.spp(), page.picture.light_samples())?;
     page.run = startup.run.clone();
+    rename_targets(&mut page, |name| rows.target_of(name).to_owned());
     let mut page = page.with_content_of(startup);
+    added.iter().for_each(|file| file.add_to(&mut page));
     page.apply_object_settings().map_err(rejection)?;
+    // Files with settings of their own became objects behind them.
+    page.objects.sort_by_key(is_added);
     Ok(page)
 }
 
-/// Returns the settings of a complete description as a page sees them, with the materials as the page names them.
-pub fn complete_settings(complete: SceneDescription, requested: &SceneDescription) -> SettingsMap {
+/// Gives the materials and settings of files and objects other targets.
+fn rename_targets(page: &mut SceneDescription, renamed: impl Fn(&str) -> String) {
+    let choices = page.materials.material.iter_mut().flatten();
+    let materials = choices.filter_map(|choice| choice.target.as_mut());
+    let settings = page.overrides.object_settings.iter_mut().flatten();
+    for target in materials.chain(settings.map(|one| &mut one.target)) {
+        *target = renamed(target);
+    }
+}
+
+/// Returns the settings of a complete description as a page sees them, with targets as the page names them, and with what
+/// belongs to the page alone.
+pub fn complete_settings(
+    complete: SceneDescription,
+    requested: &SceneDescription,
+    content: &Content,
+    settings: &SettingsMap,
+) -> SettingsMap {
     let (materials, overrides) = (requested.materials.clone(), requested.overrides.clone());
-    let mut settings = SceneDescription { materials, overrides, ..complete };
-    settings.output.time = Some(requested.output.time());
-    shown(settings)
+    let mut complete = SceneDescription { materials, overrides, ..complete };
+    complete.output.time = Some(requested.output.time());
+    rename_targets(&mut complete, |target| content.rows.name_of(target).to_owned());
+    let of_page = [added_files::KEY, camera_path::KEY].into_iter();
+    let of_page = of_page.filter_map(|key| settings.get_key_value(key));
+    let of_page: Vec<_> = of_page.map(|(key, value)| (key.clone(), value.clone())).collect();
+    let mut complete = shown(complete);
+    complete.extend(of_page);
+    complete
 }
 
 /// Reads the settings of a scene file that a page sends, if its objects are those that are `served`. No file is opened.
-pub fn from_file(name: &str, text: &str, served: &[String]) -> Result<SettingsMap, Error> {
+pub fn from_file(
+    name: &str,
+    text: &str,
+    served: &[String],
+    content: &Content,
+) -> Result<SettingsMap, Error> {
+    let rows = content.rows;
     let rejected = |error: Invalid| Error::invalid_request(error.in_file(name).to_string());
     let is_json = name.to_ascii_lowercase().ends_with(".json");
     let table = parse_table(text, is_json).map_err(rejected)?;
@@ -83,7 +136,11 @@ pub fn from_file(name: &str, text: &str, served: &[String]) -> Result<SettingsMa
     }
     let mut description = SceneDescription::from_table(&table, Path::new("")).map_err(rejected)?;
     let target = |object: &ObjectDescription| {
-        let only = (object.files.len() == 1).then(|| file_name(&object.files[0]));
+        let row = |file: &PathBuf| {
+            let is_same = |other: &Path| absolute_text(other) == absolute_text(file);
+            rows.meant(is_same).pop().unwrap_or_else(|| file_name(file))
+        };
+        let only = (object.files.len() == 1).then(|| row(&object.files[0]));
         object.name.clone().or(only).unwrap_or(EVERYTHING.to_owned())
     };
     let own = description.objects.iter().filter_map(|object| {
@@ -96,12 +153,17 @@ pub fn from_file(name: &str, text: &str, served: &[String]) -> Result<SettingsMa
     let settings = description.overrides.all().iter().cloned().chain(own);
     // The files are read as at the start.
     let settings = settings.filter(|one| !is_read_once(one)).collect();
+    rename_targets(&mut description, |target| rows.name_of(target).to_owned());
     if table.contains_key("object") {
         // Objects without a material or settings have none, whatever the page chose before.
         description.materials.material = Some(all);
         description.overrides.object_settings = Some(settings);
     }
-    Ok(shown(description))
+    let moves_camera = content.startup.animations.iter().any(|animation| animation.is_of_camera());
+    let path = path_setting(&description).filter(|_| !moves_camera);
+    let mut settings = shown(description);
+    settings.extend(path.map(|path| (camera_path::KEY.to_owned(), path)));
+    Ok(settings)
 }
 
 /// Returns the files that the objects of a scene file name.
@@ -120,13 +182,20 @@ mod tests {
 
     use super::*;
     use serde_json::json;
+    use std::sync::LazyLock;
+
+    static NO_ROWS: LazyLock<Rows> = LazyLock::new(Rows::default);
+
+    fn content(startup: &SceneDescription) -> Content<'_> {
+        Content { startup, rows: &NO_ROWS, added: &[] }
+    }
 
     #[test]
     fn a_page_names_no_file_of_an_area() {
         let startup = SceneDescription::default();
         let with_area = |area: &str| {
             let settings = SettingsMap::from_iter([("crop".to_owned(), Value::from(area))]);
-            read(&startup, &settings).map(|page| page.objects_default.preparation.crop)
+            read(&content(&startup), &settings).map(|page| page.objects_default.preparation.crop)
         };
         assert!(with_area("/etc/passwd").unwrap_err().to_string().contains("cannot name a file"));
         assert!(with_area("0,0,10,10").unwrap().is_some());
@@ -142,7 +211,7 @@ mod tests {
         for settings in
             [&["a.laz:salvage=true", "a.laz:crop=/etc/passwd"][..], &["a.laz:vertices=true"]]
         {
-            let error = read(&startup, &with_settings(settings)).unwrap_err().to_string();
+            let error = read(&content(&startup), &with_settings(settings)).unwrap_err().to_string();
             assert!(error.contains("a page cannot change"), "{error}");
         }
     }
@@ -150,7 +219,13 @@ mod tests {
     #[test]
     fn scene_files_of_a_page_leave_out_what_counts_while_files_are_read() {
         let text = "[[object]]\nfile = \"a.laz\"\nsalvage = true\ncolor = \"class\"";
-        let settings = from_file("a.toml", text, &["/data/a.laz".to_owned()]).unwrap();
+        let settings = from_file(
+            "a.toml",
+            text,
+            &["/data/a.laz".to_owned()],
+            &content(&SceneDescription::default()),
+        )
+        .unwrap();
         assert_eq!(settings["object_settings"], json!(["a.laz:color=class"]));
     }
 
@@ -163,7 +238,8 @@ mod tests {
             { "file": "/data/e.ply" } ] }"##;
         let served =
             ["a.ply", "b.obj", "c.ply", "d.ply", "e.ply"].map(|name| format!("/data/{name}"));
-        let settings = from_file("a.json", text, &served).unwrap();
+        let settings =
+            from_file("a.json", text, &served, &content(&SceneDescription::default())).unwrap();
         let expected = json!([
             "metal",
             "a.ply=glass:color=#88ccff,ior=1.3",
@@ -176,15 +252,16 @@ mod tests {
     #[test]
     fn a_scene_file_of_other_objects_is_rejected() {
         let served = ["/data/scan.laz".to_owned()];
-        let settings =
-            from_file("a.toml", "spp = 9\ntime = 2\n[[object]]\nfile = \"scan.laz\"", &served);
+        let from_file =
+            |text: &str| from_file("a.toml", text, &served, &content(&SceneDescription::default()));
+        let settings = from_file("spp = 9\ntime = 2\n[[object]]\nfile = \"scan.laz\"");
         assert_eq!(
             Value::Object(settings.unwrap()),
             json!({ "time": 2.0, "spp": 9, "material": [], "object_settings": [] })
         );
         for wrong in ["[[object]]\nfile = \"/etc/passwd\"", "object = { files = [\"x\"] }", "spp ="]
         {
-            assert!(from_file("a.toml", wrong, &served).is_err(), "{wrong}");
+            assert!(from_file(wrong).is_err(), "{wrong}");
         }
     }
 }

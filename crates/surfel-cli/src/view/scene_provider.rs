@@ -1,12 +1,16 @@
 //! Scenes of the files that the viewer was started with, by the settings of its pages.
 
+use super::added_files::{self, AddedFiles, PageFile};
+use super::camera_path::{camera_path, with_path, write_film};
+use super::facts::{classes, columns, filter_columns, has_returns, stations, unit_symbol};
 use super::file_names::{ClientProgress, ViewedFolders};
 use super::histogram::histogram;
-use super::legend::{hex, legend_json};
+use super::legend::legend_json;
 use super::page_overlay::page_overlay;
-use super::page_settings;
+use super::page_settings::{self, Content};
 use super::point::describe;
 use super::rejection::rejection;
+use super::rows::{Rows, bounds_json, name_by_rows};
 use super::shown_points::write_shown_points;
 use crate::render::with_info;
 use crate::report::Report;
@@ -16,26 +20,24 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use surfel::SceneDescription;
-use surfel::crs::Unit;
 use surfel::description::rule::absolute_text;
-use surfel::description::{CameraSettings, Crop, ObjectDescription, ObjectOverride, write_table};
+use surfel::description::{CameraSettings, Crop, ObjectDescription, write_table};
 use surfel::live_scene::{LiveScene, UseCase};
 use surfel::live_view::LiveView;
 use surfel::names::{file_name, list_files};
 use surfel::overlay;
 use surfel::picture::image_options;
-use surfel::resolve::{AutoSettings, LoadedScene, coordinate_system, located_stations};
-use surfel_core::image::{class_color, class_name, colormap};
+use surfel::resolve::AutoSettings;
+use surfel_core::image::colormap;
 use surfel_core::math::Vec3;
-use surfel_core::points::{PointCloud, PointFilter};
+use surfel_core::points::PointCloud;
 use surfel_core::progress::{NoProgress, Progress};
+use surfel_core::scene::Material;
 use surfel_core::scene::color::choose_source;
-use surfel_core::scene::{Material, inlier_bounds};
 use surfel_core::surface::SurfaceKind;
-use surfel_formats::{FileInfo, common_file_info};
 use surfel_web::{
-    Error, Export, Limits, PickedPoint, PointDescriber, PointFile, PreparedScene, Result,
-    SceneProvider, SettingsMap,
+    AddedFile, Error, Export, FilmOptions, Limits, PickedPoint, PointDescriber, PreparedScene,
+    Result, SceneProvider, SentFile, SettingsMap, WrittenFile,
 };
 
 /// The scenes of one set of files.
@@ -44,6 +46,8 @@ pub struct FileSceneProvider {
     startup_settings: SettingsMap,
     /// Files as they were typed, scene files among them.
     typed: Vec<PathBuf>,
+    rows: Rows,
+    added_files: AddedFiles,
     scene: Arc<LiveScene>,
     up: Vec3,
     /// True if the scene moves its camera.
@@ -65,8 +69,9 @@ impl FileSceneProvider {
         typed: Vec<PathBuf>,
         report: &Report,
     ) -> surfel::Result<Self> {
-        name_by_rows(&mut startup);
         let scene = LiveScene::open(&startup, UseCase::Viewers, report)?;
+        let rows = Rows::of(&startup);
+        name_by_rows(&mut startup, &rows);
         let auto = AutoSettings::choose(scene.loaded(), scene.startup(), report)?;
         let moves_camera = auto.moves_camera(scene.loaded());
         let mut startup_settings = page_settings::shown(startup.clone());
@@ -78,6 +83,8 @@ impl FileSceneProvider {
             startup,
             startup_settings,
             typed,
+            rows,
+            added_files: AddedFiles::default(),
             scene,
             up,
             moves_camera,
@@ -88,7 +95,12 @@ impl FileSceneProvider {
     }
 
     fn read(&self, settings: &SettingsMap) -> Result<SceneDescription> {
-        page_settings::read(&self.startup, settings)
+        let added = self.added_files.listed(settings)?;
+        page_settings::read(&self.content(&added), settings)
+    }
+
+    fn content<'c>(&'c self, added: &'c [Arc<PageFile>]) -> Content<'c> {
+        Content { startup: &self.startup, rows: &self.rows, added }
     }
 
     fn view(&self, description: &SceneDescription, progress: &dyn Progress) -> Result<LiveView> {
@@ -101,7 +113,9 @@ impl FileSceneProvider {
         settings: &SettingsMap,
         view: impl FnOnce(&SceneDescription) -> Result<LiveView>,
     ) -> Result<PreparedScene> {
-        let description = self.read(settings)?;
+        let added = self.added_files.listed(settings)?;
+        let content = self.content(&added);
+        let description = page_settings::read(&content, settings)?;
         let view = view(&description)?;
         let camera = || Value::Object(write_table(&CameraSettings::of(&view.flat.camera)));
         Ok(PreparedScene {
@@ -112,7 +126,7 @@ impl FileSceneProvider {
             legend: legend_json(&view.trees.legend),
             overlay: page_overlay(view.overlay()),
             describe: self.describer(&view, description.output.time()),
-            settings: self.complete_settings(view.description, &description),
+            settings: self.complete_settings(view.description, &description, &content, settings),
             flat: view.flat,
         })
     }
@@ -121,8 +135,10 @@ impl FileSceneProvider {
         &self,
         complete: SceneDescription,
         requested: &SceneDescription,
+        content: &Content,
+        settings: &SettingsMap,
     ) -> SettingsMap {
-        let mut settings = page_settings::complete_settings(complete, requested);
+        let mut settings = page_settings::complete_settings(complete, requested, content, settings);
         if !settings.contains_key("color")
             && let Some((_, cloud)) = self.scene.loaded().clouds().next()
         {
@@ -139,7 +155,8 @@ impl FileSceneProvider {
             let loaded = self.scene.loaded();
             let auto = AutoSettings::choose(loaded, &description, &NoProgress).ok()?;
             let complete = auto.complete_description(loaded);
-            let mut initial = self.complete_settings(complete, &description);
+            let mut initial =
+                self.complete_settings(complete, &description, &self.content(&[]), &settings);
             // Chosen once there is something to see.
             initial.shift_remove("exposure");
             let exposure = self.startup_settings.get("exposure").cloned();
@@ -152,26 +169,38 @@ impl FileSceneProvider {
 
     /// The files and objects that pages change apart, each with its name, kind, number of points or triangles, and notes.
     fn objects(&self) -> Vec<Value> {
-        let read_files = &self.scene.loaded().read_files;
-        let row = |name: String, files: &[PathBuf], own: &ObjectDescription| {
+        let loaded = self.scene.loaded();
+        let read_files = &loaded.read_files;
+        let mut names = self.rows.names().into_iter();
+        let mut row = |files: &[PathBuf], own: &ObjectDescription, bounds: Option<Value>| {
             let read = || read_files.iter().filter(|read| files.contains(&read.path));
             let notes = read().flat_map(|read| &read.notes);
             let notes = notes.map(|note| self.folders.removed_from(note));
             json!({
-                "name": name,
+                "name": names.next(),
                 "kind": files.first().map_or("points", |file| kind_of(file)),
                 "points": read().map(|read| read.n_points).sum::<usize>(),
                 "triangles": read().map(|read| read.n_triangles).sum::<usize>(),
                 "notes": notes.collect::<Vec<String>>(),
                 "visible": own.visible(),
                 "color": own.settings.color.color.as_ref().map(ToString::to_string),
+                "bounds": bounds,
             })
         };
         let none = ObjectDescription::default();
         let files = self.startup.files.iter();
-        let of_files = files.map(|file| row(file_name(file), std::slice::from_ref(file), &none));
-        let objects = self.startup.objects.iter();
-        of_files.chain(objects.map(|object| row(object.name(), &object.files, object))).collect()
+        let bounds_of = |file: &PathBuf| {
+            let read = read_files.iter().find(|read| read.path == *file)?;
+            let [min, max] = read.bounds.map(|corner| corner.to_array());
+            Some(json!({ "min": min, "max": max }))
+        };
+        let mut all: Vec<Value> =
+            files.map(|file| row(std::slice::from_ref(file), &none, bounds_of(file))).collect();
+        for (i, object) in self.startup.objects.iter().enumerate() {
+            let bounds = bounds_json(&loaded.sample_points_of_object(i));
+            all.push(row(&object.files, object, Some(bounds)));
+        }
+        all
     }
 
     /// Columns by which all clouds can be coloured.
@@ -195,16 +224,11 @@ impl FileSceneProvider {
     }
 }
 
-/// Names the files in settings as the rows of a page do.
-fn name_by_rows(startup: &mut SceneDescription) {
-    let Some(settings) = startup.overrides.object_settings.take() else { return };
-    let renamed = settings.into_iter().flat_map(|one| {
-        let named = startup.files.iter().filter(|file| one.names_file(file));
-        let renamed: Vec<_> =
-            named.map(|file| ObjectOverride { target: file_name(file), ..one.clone() }).collect();
-        if renamed.is_empty() { vec![one] } else { renamed }
-    });
-    startup.overrides.object_settings = Some(renamed.collect());
+/// Returns a scene file in TOML, in whose folder added files lie.
+fn toml_of(description: &SceneDescription) -> Result<String> {
+    let text = toml::to_string_pretty(description);
+    let text = text.map_err(|error| Error::invalid_request(error.to_string()))?;
+    Ok(added_files::beside(&text))
 }
 
 /// The files of the command line and of objects.
@@ -233,68 +257,10 @@ fn name_of(files: &[PathBuf]) -> String {
     list_files(&names)
 }
 
-/// Columns of a cloud as `--color` takes them.
-fn columns(cloud: &PointCloud) -> Vec<&str> {
-    let usual = [
-        ("rgb", cloud.colors.is_some()),
-        ("intensity", cloud.intensity.is_some()),
-        ("class", cloud.classification.is_some()),
-    ];
-    let usual = usual.into_iter().filter_map(|(name, is_there)| is_there.then_some(name));
-    usual.chain(cloud.scalars.iter().map(|scalar| scalar.name.as_str())).collect()
-}
-
-/// The symbol of the unit of lengths, if the coordinate system tells it.
-fn unit_symbol(scene: &LoadedScene, startup: &SceneDescription) -> Option<&'static str> {
-    let unit = coordinate_system(scene, startup)?.unit();
-    matches!(unit, Unit::Metres(_)).then(|| unit.symbol())
-}
-
-/// The stations of all scans by name, with the cameras that look from there.
-fn stations(scene: &LoadedScene, up: Vec3) -> Vec<Value> {
-    let stations = located_stations(scene).into_iter().filter_map(|station| {
-        let camera = CameraSettings::of(&station.view(up)?.camera(up, None));
-        Some(json!({ "name": station.name, "camera": write_table(&camera) }))
-    });
-    stations.collect()
-}
-
-/// The classes of all clouds with their names, colours and numbers of points.
-fn classes(scene: &LoadedScene) -> Vec<Value> {
-    let mut counts = [0u64; 256];
-    let classes = scene.clouds().filter_map(|(_, cloud)| cloud.classification.as_ref());
-    classes.flatten().for_each(|class| counts[usize::from(*class)] += 1);
-    let found = (0..=u8::MAX).zip(counts).filter(|(_, count)| 0 < *count);
-    let described = found.map(|(class, count)| {
-        let name = format!("{class} {}", class_name(class));
-        json!({ "class": class, "name": name, "color": hex(class_color(class)), "points": count })
-    });
-    described.collect()
-}
-
-/// The columns that all files with points have.
-fn filter_columns(scene: &LoadedScene) -> Vec<String> {
-    let files = scene.read_files.iter().zip(&scene.file_infos);
-    let of_points = files.filter(|(file, _)| 0 < file.n_points).map(|(_, info)| info.clone());
-    common_file_info(&of_points.collect::<Vec<FileInfo>>()).columns
-}
-
-/// Returns true if all clouds tell the returns of each pulse.
-fn has_returns(scene: &LoadedScene) -> bool {
-    let filter: PointFilter =
-        "return_number <= number_of_returns".parse().expect("the condition is valid");
-    let mut clouds = scene.clouds().map(|(_, cloud)| cloud).peekable();
-    // Fails for missing columns, also without points.
-    let tells_returns = |cloud: &PointCloud| filter.matches(cloud, cloud.len()).is_ok();
-    clouds.peek().is_some() && clouds.all(tells_returns)
-}
-
 impl SceneProvider for FileSceneProvider {
     fn info(&self) -> Value {
         let loaded = self.scene.loaded();
         let points = loaded.sample_points();
-        let bounds = inlier_bounds(&points);
-        let world = |corner: Vec3| (points.origin + corner.as_dvec3()).to_array();
         let (n_points, n_triangles) = loaded.graph.n_points_and_triangles();
         let limits = Limits::default();
         json!({
@@ -302,7 +268,7 @@ impl SceneProvider for FileSceneProvider {
             "points": n_points,
             "triangles": n_triangles,
             "version": env!("CARGO_PKG_VERSION"),
-            "bounds": { "min": world(bounds.min), "max": world(bounds.max) },
+            "bounds": bounds_json(&points),
             "up": self.up.to_array(),
             "surfaces": SurfaceKind::ALL.map(|(name, _)| name),
             "colors": self.colors(),
@@ -401,8 +367,9 @@ impl SceneProvider for FileSceneProvider {
     }
 
     fn histogram(&self, column: &str) -> Result<Value> {
-        let clouds = self.scene.loaded().clouds().map(|(_, cloud)| cloud);
-        Ok(histogram(clouds, column)?)
+        let clouds: Vec<&PointCloud> =
+            self.scene.loaded().clouds().map(|(_, cloud)| cloud).collect();
+        Ok(histogram(&clouds, column)?)
     }
 
     fn write_points(
@@ -410,11 +377,32 @@ impl SceneProvider for FileSceneProvider {
         settings: &SettingsMap,
         format: &str,
         progress: &dyn Progress,
-    ) -> Result<Arc<dyn PointFile>> {
+    ) -> Result<Arc<dyn WrittenFile>> {
         let description = self.read(settings)?;
         let view = self.view(&description, progress)?;
         let time_secs = description.output.time();
         self.folders.removed(write_shown_points(&view, time_secs, format, progress))
+    }
+
+    fn write_film(
+        &self,
+        settings: &SettingsMap,
+        options: &FilmOptions,
+        progress: &dyn Progress,
+    ) -> Result<Arc<dyn WrittenFile>> {
+        let text = "there is no path of the camera; add views to it";
+        let path = camera_path(settings)?.ok_or_else(|| Error::invalid_request(text))?;
+        let description = with_path(self.read(settings)?, path);
+        self.folders.removed(write_film(&self.scene, description, options, progress))
+    }
+
+    fn read_added_file(
+        &self,
+        file: &SentFile,
+        progress: &dyn Progress,
+    ) -> Result<Arc<dyn AddedFile>> {
+        let file = PageFile::read(file, &self.rows.names(), progress)?;
+        Ok(self.added_files.insert(file))
     }
 
     fn export(&self, settings: &SettingsMap) -> Result<Export> {
@@ -423,22 +411,30 @@ impl SceneProvider for FileSceneProvider {
         let loaded = self.folders.removed(loaded)?;
         let auto = AutoSettings::choose(&loaded, &description, &NoProgress);
         let auto = self.folders.removed(auto.map_err(rejection))?;
-        let complete = auto.complete_description(&loaded);
+        let mut complete = auto.complete_description(&loaded);
+        let path = camera_path(settings)?;
+        let film = path.clone().map(|path| toml_of(&with_path(complete.clone(), path)));
+        if let Some(path) = path {
+            complete = with_path(complete, path);
+            // The picture shows this view.
+            complete.camera.lock = Some(true);
+        }
         let mut words: Vec<String> = ["surfel", "render"].map(str::to_owned).into();
         words.extend(self.typed.iter().map(|file| file.display().to_string()));
+        words.extend(added_files::words(&description));
         words.extend(description.to_options());
         words.extend(["-o", "picture.png"].map(str::to_owned));
-        let toml = toml::to_string_pretty(&complete);
         Ok(Export {
             command: command_line(&words),
-            toml: toml.map_err(|error| Error::invalid_request(error.to_string()))?,
-            json: format!("{:#}", with_info(&complete, &loaded)),
+            toml: toml_of(&complete)?,
+            film: film.transpose()?,
+            json: added_files::beside(&format!("{:#}", with_info(&complete, &loaded))),
         })
     }
 
     fn read_scene_file(&self, name: &str, text: &str) -> Result<SettingsMap> {
         let served: Vec<String> =
             all_files(&self.startup).chain(&self.typed).map(|file| absolute_text(file)).collect();
-        page_settings::from_file(name, text, &served)
+        page_settings::from_file(name, text, &served, &self.content(&[]))
     }
 }

@@ -1,37 +1,17 @@
 //! The points that a view shows, with the columns of their files, for download.
 
-use std::io::Read;
+use super::temp_download::TempDownload;
 use std::sync::Arc;
 use surfel::live_view::LiveView;
 use surfel_core::math::{DAffine3, DMat3};
 use surfel_core::points::{PointCloud, merge};
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Geometry, Graph};
-use surfel_formats::{SaveOptions, TempCloud};
-use surfel_web::{Error, PointFile, Result};
+use surfel_formats::{SaveOptions, TempFile};
+use surfel_web::{Error, Result, WrittenFile};
 
 /// Formats of downloads.
 const FORMATS: [&str; 2] = ["laz", "ply"];
-
-/// Points in a temporary file.
-struct ShownPoints {
-    n_points: u64,
-    file: TempCloud,
-}
-
-impl PointFile for ShownPoints {
-    fn n_points(&self) -> u64 {
-        self.n_points
-    }
-
-    fn n_bytes(&self) -> u64 {
-        self.file.n_bytes()
-    }
-
-    fn open(&self) -> std::io::Result<Box<dyn Read + Send>> {
-        Ok(Box::new(self.file.open()?))
-    }
-}
 
 /// Writes the points of a view at a time to a file.
 ///
@@ -42,7 +22,7 @@ pub fn write_shown_points(
     time_secs: f64,
     format: &str,
     progress: &dyn Progress,
-) -> Result<Arc<dyn PointFile>> {
+) -> Result<Arc<dyn WrittenFile>> {
     if !FORMATS.contains(&format) {
         let text = format!("found the format {format}, expected {}", FORMATS.join(" or "));
         return Err(Error::invalid_request(text));
@@ -59,13 +39,15 @@ pub fn write_shown_points(
     }
     let (cloud, _) = merge(clouds);
     let options = SaveOptions::from_source(&view.loaded.file_info());
-    let file = TempCloud::write(&cloud, format, &options, progress);
+    let name = format!("points.{format}");
+    let file =
+        TempFile::write(&name, |path| surfel_formats::save(path, &cloud, &options, progress));
     let file = file.map_err(|error| match surfel::Error::from(error) {
         error if error.is_cancelled() => Error::Cancelled,
         // The error names the temporary folder of the server.
         _ => Error::invalid_request("the server cannot write the points to a temporary file"),
     })?;
-    Ok(Arc::new(ShownPoints { n_points: cloud.len() as u64, file }))
+    Ok(Arc::new(TempDownload { n_items: cloud.len() as u64, file }))
 }
 
 /// The shown points of each visible instance of a cloud, in the order of its file.

@@ -10,6 +10,9 @@ use rayon::prelude::*;
 /// Number of slots that a task goes through.
 const SLOTS_PER_PART: usize = 8192;
 
+/// Number of tasks whose results are held at once.
+const MAX_PARTS_AT_ONCE: usize = 64;
+
 /// A visible point of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct VisitedPoint {
@@ -30,7 +33,22 @@ pub fn visit_points<T: Send>(
     progress: &dyn Progress,
     find: impl Fn(&VisitedPoint) -> Option<T> + Sync,
 ) -> Result<Vec<T>> {
-    let mut found = Vec::new();
+    let mut all = Vec::new();
+    visit_points_in_turn(scene, progress, find, |found| all.push(found))?;
+    Ok(all)
+}
+
+/// Calls `find` for each point that is shown, and `take` with what it finds, in a fixed order. Few results are held at
+/// once, however many points there are.
+///
+/// # Errors
+/// Fails if `progress` is cancelled.
+pub fn visit_points_in_turn<T: Send>(
+    scene: &FlatScene,
+    progress: &dyn Progress,
+    find: impl Fn(&VisitedPoint) -> Option<T> + Sync,
+    mut take: impl FnMut(T),
+) -> Result<()> {
     for (instance_idx, instance) in scene.instances.iter().enumerate() {
         let FlatGeometry::Cloud(cloud) = scene.geometry(instance) else { continue };
         for points in [&cloud.points, &cloud.lines, &cloud.scatter] {
@@ -53,12 +71,15 @@ pub fn visit_points<T: Send>(
                 Ok(slots.filter_map(point_at).filter_map(|point| find(&point)).collect())
             };
             let n_parts = points.ids.len().div_ceil(SLOTS_PER_PART);
-            let parts: Vec<Vec<T>> =
-                (0..n_parts).into_par_iter().map(visit_part).collect::<Result<_>>()?;
-            found.extend(parts.into_iter().flatten());
+            for first in (0..n_parts).step_by(MAX_PARTS_AT_ONCE) {
+                let parts = first..n_parts.min(first + MAX_PARTS_AT_ONCE);
+                let found: Vec<Vec<T>> =
+                    parts.into_par_iter().map(visit_part).collect::<Result<_>>()?;
+                found.into_iter().flatten().for_each(&mut take);
+            }
         }
     }
-    Ok(found)
+    Ok(())
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Volumes between the points of a scene and a base plane, on a grid of cells over level ground (2.5D).
 
 use super::FlatScene;
-use super::visit_points::visit_points;
+use super::visit_points::{VisitedPoint, visit_points_in_turn};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 use crate::points::Polygon;
@@ -71,18 +71,28 @@ pub fn cut_and_fill(
         let found = format!("corners around an area of {area}");
         return Err(Error::Setting { name: "polygon", found, expected: "an area" });
     }
-    let points = visit_points(scene, progress, |point| {
+    let inside = |point: &VisitedPoint| {
         let [x, y, height] = ground.coordinates(point.position);
         polygon.contains([x, y]).then_some([x, y, height])
-    })?;
-    let grid = Grid::new(&ground, query.cell_size.unwrap_or_else(|| spacing(area, points.len())));
-    let mut heights = vec![(0.0, 0u32); grid.n_columns * grid.n_rows];
-    for [x, y, height] in &points {
-        let (sum, n) = &mut heights[grid.cell_of([*x, *y])];
+    };
+    let cell_size = match query.cell_size {
+        Some(size) => size,
+        None => {
+            let mut n_points = 0;
+            let count = |point: &VisitedPoint| inside(point).map(|_| ());
+            visit_points_in_turn(scene, progress, count, |()| n_points += 1)?;
+            spacing(area, n_points)
+        }
+    };
+    let grid = Grid::new(&ground, cell_size);
+    let (mut heights, mut n_points) = (vec![(0.0, 0u32); grid.n_columns * grid.n_rows], 0);
+    visit_points_in_turn(scene, progress, inside, |[x, y, height]| {
+        let (sum, n) = &mut heights[grid.cell_of([x, y])];
         *sum += height - ground.base;
         *n += 1;
-    }
-    let (base, cell_size, n_points) = (ground.base, grid.cell_size, points.len() as u64);
+        n_points += 1;
+    })?;
+    let (base, cell_size) = (ground.base, grid.cell_size);
     let mut volume = Volume { base, cell_size, area, n_points, ..Volume::default() };
     let mut empty_area = 0.0;
     for row in 0..grid.n_rows {

@@ -45,7 +45,7 @@ pub use deformation::{Morph, Skin};
 pub use denoise::{Denoise, DenoiseReport, denoise};
 pub use density::points_per_area;
 pub(crate) use filter::Polygon;
-pub use filter::{PointFilter, column_values};
+pub use filter::{PointFilter, visit_column};
 pub use flags::{FLAGS, WITHHELD, is_flag};
 pub use merge::merge;
 pub use mixed_pixels::MixedPixels;

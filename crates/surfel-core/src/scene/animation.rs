@@ -2,6 +2,7 @@
 
 use crate::math::{DQuat, DVec3};
 use std::f64::consts::TAU;
+use std::ops::{Div, Sub};
 
 /// Channels that change nodes over time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -136,7 +137,7 @@ impl<T: KeyframeValue> Keyframes<T> {
     }
 }
 
-impl Keyframes<DVec3> {
+impl<T: KeyframeValue + Copy + Default + Sub<Output = T> + Div<f64, Output = T>> Keyframes<T> {
     /// Returns the same keys with a smooth path between them (Catmull and Rom 1974).
     ///
     /// The tangent at each key is the mean velocity from the key before to the key after.
@@ -146,7 +147,7 @@ impl Keyframes<DVec3> {
         let tangent = |i: usize| {
             let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
             let secs = times_secs[after] - times_secs[before];
-            if 0.0 < secs { (values[after] - values[before]) / secs } else { DVec3::ZERO }
+            if 0.0 < secs { (values[after] - values[before]) / secs } else { T::default() }
         };
         let values = (0..values.len()).flat_map(|i| [tangent(i), values[i], tangent(i)]).collect();
         Self { times_secs, values, interpolation: Interpolation::Cubic }
@@ -185,6 +186,24 @@ pub fn orbit(axis: DVec3, turns: f64, secs: f64) -> Keyframes<DQuat> {
 fn hermite_weights(weight: f64, secs: f64) -> [f64; 4] {
     let (t, t2, t3) = (weight, weight * weight, weight * weight * weight);
     [2.0 * t3 - 3.0 * t2 + 1.0, secs * (t3 - 2.0 * t2 + t), 3.0 * t2 - 2.0 * t3, secs * (t3 - t2)]
+}
+
+impl KeyframeValue for f64 {
+    fn lerp(&self, other: &Self, weight: f64) -> Self {
+        self + weight * (other - self)
+    }
+
+    fn hermite(
+        &self,
+        out_tangent: &Self,
+        other: &Self,
+        in_tangent: &Self,
+        weight: f64,
+        secs: f64,
+    ) -> Self {
+        let [a, b, c, d] = hermite_weights(weight, secs);
+        a * self + b * out_tangent + c * other + d * in_tangent
+    }
 }
 
 impl KeyframeValue for DVec3 {

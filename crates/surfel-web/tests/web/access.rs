@@ -11,8 +11,8 @@ use tokio::io::AsyncWriteExt;
 use tokio::net::TcpStream;
 
 /// Paths of all kinds of requests.
-const PATHS: [&str; 8] =
-    ["/", "/ws", "/render", "/points/x", "/scene", "/stats", "/healthz", "/nothing"];
+const PATHS: [&str; 9] =
+    ["/", "/ws", "/render", "/points/x", "/files/x", "/scene", "/stats", "/healthz", "/nothing"];
 
 async fn get_with(server: &TestServer, path: &str, headers: &str) -> Response {
     request(server, &format!("GET {path} HTTP/1.1\r\n{headers}\r\n"), b"").await

@@ -19,8 +19,8 @@ use surfel_core::scene::{
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
 use surfel_web::{
-    Error, Export, PictureOverlay, PicturePart, PointFile, PreparedScene, Result, SceneProvider,
-    SettingsMap,
+    AddedFile, Error, Export, FilmOptions, PictureOverlay, PicturePart, PreparedScene, Result,
+    SceneProvider, SentFile, SettingsMap, WrittenFile,
 };
 
 /// Size of a page's picture in pixels.
@@ -63,7 +63,7 @@ impl Gate {
 /// | `goes_on` | finished pictures go on at rest |
 /// | `preview` | there is a preview |
 /// | `stamp` | pictures have an overlay |
-/// | `tint` | none |
+/// | `tint`, `added_files` | none |
 pub struct HillProvider {
     flat: FlatScene,
     /// The hill as rasterised points.
@@ -168,8 +168,8 @@ const RED: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
 /// A file of a million bytes.
 struct HillPoints;
 
-impl PointFile for HillPoints {
-    fn n_points(&self) -> u64 {
+impl WrittenFile for HillPoints {
+    fn n_items(&self) -> u64 {
         7
     }
 
@@ -179,6 +179,26 @@ impl PointFile for HillPoints {
 
     fn open(&self) -> std::io::Result<Box<dyn Read + Send>> {
         Ok(Box::new(std::io::repeat(b'x').take(1_000_000)))
+    }
+}
+
+/// A file that takes as much memory as it has bytes.
+struct HillFile {
+    name: String,
+    n_bytes: u64,
+}
+
+impl AddedFile for HillFile {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn description(&self) -> Value {
+        json!({ "name": self.name, "points": self.n_bytes })
+    }
+
+    fn n_bytes(&self) -> u64 {
+        self.n_bytes
     }
 }
 
@@ -238,7 +258,8 @@ impl SceneProvider for HillProvider {
                 "goes_on" => goes_on_at_rest = true,
                 "points" => flat = self.rasterized.clone(),
                 "camera_angle" => animated_camera = value.as_f64().map(camera),
-                "camera" | "tint" | "stamp" | "preview" | "resolution" | "slow_render" => {}
+                "camera" | "tint" | "added_files" | "stamp" | "preview" | "resolution"
+                | "slow_render" => {}
                 _ => return Err(Error::invalid_value(key, "unknown key")),
             }
             complete.insert(key.clone(), value.clone());
@@ -284,7 +305,7 @@ impl SceneProvider for HillProvider {
         settings: &SettingsMap,
         format: &str,
         progress: &dyn Progress,
-    ) -> Result<Arc<dyn PointFile>> {
+    ) -> Result<Arc<dyn WrittenFile>> {
         if let Some(secs) = settings.get("slow_render").and_then(Value::as_f64) {
             self.work(secs, progress)?;
         }
@@ -294,9 +315,35 @@ impl SceneProvider for HillProvider {
         }
     }
 
+    fn write_film(
+        &self,
+        settings: &SettingsMap,
+        options: &FilmOptions,
+        progress: &dyn Progress,
+    ) -> Result<Arc<dyn WrittenFile>> {
+        self.write_points(settings, if options.format == "gif" { "laz" } else { "" }, progress)
+    }
+
+    fn read_added_file(
+        &self,
+        file: &SentFile,
+        progress: &dyn Progress,
+    ) -> Result<Arc<dyn AddedFile>> {
+        if file.bytes.starts_with(b"slow") {
+            self.work(60.0, progress)?;
+        }
+        if file.bytes.starts_with(b"broken") {
+            return Err(Error::invalid_request(format!("{}: is broken", file.name)));
+        }
+        let name = format!("{}{}", file.name, "'".repeat(file.taken.len()));
+        // A file may take more memory than it has bytes.
+        let factor = if file.bytes.starts_with(b"dense") { 1000 } else { 1 };
+        Ok(Arc::new(HillFile { name, n_bytes: factor * file.bytes.len() as u64 }))
+    }
+
     fn export(&self, settings: &SettingsMap) -> Result<Export> {
         let json = Value::Object(settings.clone()).to_string();
-        Ok(Export { command: "surfel render hill".into(), toml: String::new(), json })
+        Ok(Export { command: "surfel render hill".into(), toml: String::new(), json, film: None })
     }
 
     fn read_scene_file(&self, name: &str, text: &str) -> Result<SettingsMap> {

@@ -2,6 +2,7 @@
 
 mod abuse;
 mod access;
+mod added_files;
 mod frame_delivery;
 mod hill_provider;
 mod http_client;

@@ -167,6 +167,17 @@ impl TestPage {
         }
     }
 
+    /// The next message that answers a request.
+    pub async fn message_of(&mut self, id: u32) -> Value {
+        loop {
+            match self.next().await.expect("the server closed the connection") {
+                Received::Message(message) if message["id"] == id => return message,
+                Received::Message(_) => {}
+                Received::Picture(picture) => self.acknowledge(&picture).await,
+            }
+        }
+    }
+
     /// Waits for progress of work with this name; for none, until work has ended.
     pub async fn progress_state(&mut self, text: Option<&str>) -> Value {
         loop {

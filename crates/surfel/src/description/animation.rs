@@ -2,13 +2,16 @@
 
 use super::keys::{KeyedSettings, settings};
 use super::object::{Rotation, RotationRule, ScaleRule};
-use super::rule::{Checked, FINITE, Flag, List, OneOf, Text, Vector};
+use super::rule::{Checked, FINITE, Flag, List, OneOf, POSITIVE, Text, VIEW_ANGLE, Vector};
 use super::{Invalid, read_table};
 use serde_json::{Map, Value};
 use std::f64::consts::TAU;
+use std::ops::{Div, Sub};
 use std::path::Path;
 use surfel_core::math::{DQuat, DVec3, Vec3};
-use surfel_core::scene::{Camera, Interpolation, Keyframes, Track, catmull_rom_path, orbit};
+use surfel_core::scene::{
+    Camera, Interpolation, KeyframeValue, Keyframes, Projection, Track, catmull_rom_path, orbit,
+};
 
 /// The kind of an animation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,6 +73,12 @@ settings! {
         position: Vec<DVec3>, VECTORS, "VECTORS";
         /// Points that the camera looks at, at the times.
         focal_point: Vec<DVec3>, VECTORS, "VECTORS";
+        /// Directions that point up in the picture of the camera, at the times.
+        view_up: Vec<DVec3>, VECTORS, "VECTORS";
+        /// Vertical fields of view of the camera in degrees, at the times.
+        view_angle: Vec<f64>, List { rule: VIEW_ANGLE, expected: "angles as in [35, 50]" }, "DEGREES";
+        /// Heights of the picture of a camera without perspective in world units, at the times.
+        orthographic: Vec<f64>, List { rule: POSITIVE, expected: "heights as in [10, 2.5]" }, "HEIGHTS";
         /// Points of a path.
         points: Vec<DVec3>, VECTORS, "VECTORS";
         /// Duration of a path or orbit.
@@ -86,7 +95,15 @@ settings! {
 /// Keys that have a meaning for an animation, by target and kind; `object` and `kind` always have.
 fn allowed(is_camera: bool, kind: AnimationKind) -> &'static [&'static str] {
     match (is_camera, kind) {
-        (true, AnimationKind::Keys) => &["times", "interpolation", "position", "focal_point"],
+        (true, AnimationKind::Keys) => &[
+            "times",
+            "interpolation",
+            "position",
+            "focal_point",
+            "view_up",
+            "view_angle",
+            "orthographic",
+        ],
         (false, AnimationKind::Keys) => {
             &["times", "interpolation", "translate", "rotate", "scale", "visible"]
         }
@@ -116,6 +133,12 @@ pub struct CameraMotion {
     pub position: Option<Keyframes<DVec3>>,
     /// Focal points over time.
     pub focal_point: Option<Keyframes<DVec3>>,
+    /// Directions up in the picture over time.
+    pub view_up: Option<Keyframes<DVec3>>,
+    /// Vertical fields of view in degrees over time.
+    pub view_angle: Option<Keyframes<f64>>,
+    /// Heights of an orthographic picture in world units over time.
+    pub orthographic: Option<Keyframes<f64>>,
     /// A turn about the focal point.
     pub orbit: Option<Orbit>,
 }
@@ -184,13 +207,19 @@ impl AnimationDescription {
     pub fn camera_motion(&self, motion: &mut CameraMotion) -> Result<(), Invalid> {
         match self.kind() {
             AnimationKind::Keys => {
-                let position = self.keyed("position", &self.position)?;
-                let focal_point = self.keyed("focal_point", &self.focal_point)?;
-                if position.is_none() && focal_point.is_none() {
-                    return Err(Invalid::new("nothing moves; expected position or focal_point"));
+                let moved = CameraMotion {
+                    position: self.keyed("position", &self.position)?,
+                    focal_point: self.keyed("focal_point", &self.focal_point)?,
+                    view_up: self.keyed("view_up", &self.view_up)?,
+                    view_angle: self.keyed("view_angle", &self.view_angle)?,
+                    orthographic: self.keyed("orthographic", &self.orthographic)?,
+                    orbit: None,
+                };
+                if moved == CameraMotion::default() {
+                    let keys = "position, focal_point, view_up, view_angle or orthographic";
+                    return Err(Invalid::new(format!("nothing moves; expected {keys}")));
                 }
-                motion.position = position.or(motion.position.take());
-                motion.focal_point = focal_point.or(motion.focal_point.take());
+                motion.add_keys(moved);
             }
             AnimationKind::Path => motion.position = Some(self.path()?),
             AnimationKind::Orbit => motion.orbit = Some(self.orbit()?),
@@ -279,11 +308,11 @@ impl AnimationDescription {
         Ok(tracks)
     }
 
-    fn keyed(
+    fn keyed<T: KeyframeValue + Copy + Default + Sub<Output = T> + Div<f64, Output = T>>(
         &self,
         key: &str,
-        values: &Option<Vec<DVec3>>,
-    ) -> Result<Option<Keyframes<DVec3>>, Invalid> {
+        values: &Option<Vec<T>>,
+    ) -> Result<Option<Keyframes<T>>, Invalid> {
         let Some(values) = values else { return Ok(None) };
         let keys = self.keys_of(key, values.clone(), Interpolation::Linear)?;
         Ok(Some(match self.interpolation() {
@@ -316,22 +345,57 @@ fn count(n: usize, what: &str) -> String {
 }
 
 impl CameraMotion {
+    /// Replaces the keys of this motion that another has, too.
+    fn add_keys(&mut self, over: Self) {
+        self.position = over.position.or(self.position.take());
+        self.focal_point = over.focal_point.or(self.focal_point.take());
+        self.view_up = over.view_up.or(self.view_up.take());
+        self.view_angle = over.view_angle.or(self.view_angle.take());
+        self.orthographic = over.orthographic.or(self.orthographic.take());
+    }
+
     /// Returns `camera` moved to where it is at a time.
     pub fn at(&self, time_secs: f64, camera: Camera, up: Vec3) -> Camera {
         let focal_point = self.focal_point.as_ref().map(|keys| keys.at(time_secs));
         let focal_point = focal_point.unwrap_or(camera.focal_point);
         let position = self.position.as_ref().map(|keys| keys.at(time_secs));
-        let moved = Camera { position: position.unwrap_or(camera.position), focal_point, ..camera };
+        let view_up = self.view_up.as_ref().map(|keys| keys.at(time_secs));
+        let moved = Camera {
+            position: position.unwrap_or(camera.position),
+            focal_point,
+            view_up: view_up.unwrap_or(camera.view_up),
+            projection: self.projection_at(time_secs, camera.projection),
+        };
         let Some(Orbit { seconds, turns, axis }) = self.orbit else { return moved };
         let axis = axis.unwrap_or(up.as_dvec3()).try_normalize().unwrap_or(DVec3::Z);
         let turn = DQuat::from_axis_angle(axis, TAU * turns * time_secs / seconds);
         moved.rotated_about_focal_point(turn)
     }
 
+    /// Smooth keys may swing beyond their values.
+    fn projection_at(&self, time_secs: f64, projection: Projection) -> Projection {
+        match projection {
+            Projection::Perspective { view_angle_deg } => {
+                let angle = self.view_angle.as_ref().map(|keys| keys.at(time_secs));
+                let view_angle_deg = angle.map_or(view_angle_deg, |angle| angle.clamp(0.1, 179.0));
+                Projection::Perspective { view_angle_deg }
+            }
+            Projection::Orthographic { height } => {
+                let keyed = self.orthographic.as_ref().map(|keys| keys.at(time_secs));
+                let height = keyed.map_or(height, |keyed| keyed.max(1e-3 * height));
+                Projection::Orthographic { height }
+            }
+            Projection::Panorama => projection,
+        }
+    }
+
     /// Returns the time of the last change in seconds.
     pub fn duration_secs(&self) -> f64 {
-        let keys = [&self.position, &self.focal_point];
-        let ends = keys.into_iter().flatten().filter_map(|keys| keys.times_secs.last().copied());
+        let vectors = [&self.position, &self.focal_point, &self.view_up];
+        let numbers = [&self.view_angle, &self.orthographic];
+        let vectors = vectors.into_iter().flatten().map(|keys| &keys.times_secs);
+        let times = vectors.chain(numbers.into_iter().flatten().map(|keys| &keys.times_secs));
+        let ends = times.filter_map(|times| times.last().copied());
         ends.chain(self.orbit.map(|orbit| orbit.seconds)).fold(0.0, f64::max)
     }
 }

@@ -2,6 +2,8 @@
 
 use super::*;
 use serde_json::json;
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::scene::{Camera, Projection};
 use surfel_core::surface::SurfaceKind;
 
 fn parse(text: &str) -> Result<SceneDescription, Invalid> {
@@ -199,4 +201,25 @@ fn every_key_has_a_unique_option_and_a_sentence_of_help() {
     for (path, _, key) in &keys {
         assert!(key.doc.ends_with(['.', ']']) && 10 < key.doc.len(), "{path}: {}", key.doc);
     }
+}
+
+#[test]
+fn keys_of_the_camera_change_its_projection() {
+    let text = "[[animation]]\nobject = \"camera\"\ntimes = [0, 2]\nview-angle = [30, 60]\northographic = [4, 8]\nview-up = [[0, 0, 1], [0, 1, 1]]";
+    let scene = parse(text).unwrap();
+    let mut motion = CameraMotion::default();
+    scene.animations[0].camera_motion(&mut motion).unwrap();
+    assert_eq!(motion.duration_secs(), 2.0);
+    let at = |projection| {
+        let (position, focal_point) = (DVec3::ZERO, DVec3::Y);
+        let camera = Camera { position, focal_point, view_up: DVec3::Z, projection };
+        motion.at(1.0, camera, Vec3::Z)
+    };
+    let perspective = at(Projection::Perspective { view_angle_deg: 20.0 });
+    assert_eq!(perspective.projection, Projection::Perspective { view_angle_deg: 45.0 });
+    assert_eq!(perspective.view_up, DVec3::new(0.0, 0.5, 1.0));
+    let flat = at(Projection::Orthographic { height: 1.0 });
+    assert_eq!(flat.projection, Projection::Orthographic { height: 6.0 });
+    let wrong = text.replace("[30, 60]", "[30, 180]");
+    assert!(error(&wrong).contains("angles"), "{}", error(&wrong));
 }

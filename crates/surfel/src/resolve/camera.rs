@@ -99,6 +99,19 @@ impl SceneCamera {
     }
 }
 
+/// Returns the movement of the camera that a description has, if it has one.
+///
+/// # Errors
+///
+/// Fails for missing keys, and for lists of different lengths.
+pub fn camera_motion(description: &SceneDescription) -> Result<Option<CameraMotion>, Invalid> {
+    let mut motion = None;
+    for animation in description.animations.iter().filter(|animation| animation.is_of_camera()) {
+        animation.camera_motion(motion.get_or_insert_default())?;
+    }
+    Ok(motion)
+}
+
 /// A file's camera has a direction, but no distance of what it looks at, about which orbits go: as far as the middle of
 /// the scene, unless that is behind it.
 fn adjusted_file_camera(camera: Camera, middle: DVec3, view_angle_deg: Option<f64>) -> Camera {

@@ -8,10 +8,11 @@ use std::path::Path;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::Neighborhood;
 use surfel_core::points::{
-    PointCloud, PointFilter, PreparationReport, PreparedCloud, Radius, prepare,
+    PointCloud, PointFilter, PreparationReport, PreparedCloud, Radius, STRUCTURE,
+    SURFACE_VARIATION, prepare,
 };
 use surfel_core::progress::Progress;
-use surfel_core::scene::color::{choose_source, colorize};
+use surfel_core::scene::color::{ColorSource, choose_source, colorize};
 use surfel_core::scene::{CloudGeometry, Geometry, Graph, Material, Transform};
 use surfel_formats::{ColumnChoice, FileInfo, Loaded};
 
@@ -120,6 +121,16 @@ pub(crate) fn keep_matching(
     cloud.retain_from(0, &matches);
     progress.note(&format!("{} of {n_points} points meet {filter}", cloud.len()));
     Ok(())
+}
+
+/// Returns true if a cloud has the values of a colour source, or gets them when it is prepared.
+pub fn can_be_colored(cloud: &PointCloud, color: &ColorSource) -> bool {
+    let is_computed = match color {
+        ColorSource::Normal => true,
+        ColorSource::Column(name) => [SURFACE_VARIATION, STRUCTURE].contains(&name.as_str()),
+        _ => false,
+    };
+    is_computed || color.is_available_in(cloud)
 }
 
 /// Cleans a cloud, and adds the normals and radii that are missing.

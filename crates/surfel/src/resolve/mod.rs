@@ -20,10 +20,14 @@ mod sun_position;
 mod complete_description;
 
 pub(crate) use appearance::finish_graph;
-pub use camera::{SceneCamera, choose_camera, choose_up, short_position, up_convention};
+pub use camera::{
+    SceneCamera, camera_motion, choose_camera, choose_up, short_position, up_convention,
+};
 pub use check_files::check_files;
 pub(crate) use cloud::keep_matching;
-pub use cloud::{prepare_cloud, report_denoise, report_normals, report_prepared, report_radii};
+pub use cloud::{
+    can_be_colored, prepare_cloud, report_denoise, report_normals, report_prepared, report_radii,
+};
 pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;
 pub use loaded::{KeepOptions, LoadedFile, LoadedScene};
@@ -146,7 +150,7 @@ impl AutoSettings {
         let station = choose_station(scene, description, up, room.as_ref());
         let (room_seen, station) = (room.as_ref(), station.as_ref());
         let extent = SceneExtent { points: &points, bounds, up, room: room_seen, station };
-        let motion = scene.camera_motion.clone();
+        let motion = camera_motion(description)?;
         let camera = SceneCamera::choose(&scene.graph, &extent, description, motion, progress);
         let diagonal = (bounds.max - bounds.min).length();
         let turned_room = room.clone().filter(|_| description.output.turntable.is_some());

@@ -152,13 +152,22 @@ impl ColumnValues<'_> {
     }
 }
 
-/// Returns the values of a column by its name, which a filter may use. `x`, `y` and `z` are world coordinates.
+/// Number of values of a column that are held at once.
+const MAX_VALUES_AT_ONCE: usize = 1 << 16;
+
+/// Calls `visit` with the values of a column, block by block. The column has a name that a filter may use; `x`, `y` and
+/// `z` are world coordinates.
 ///
 /// # Errors
 ///
 /// Returns [`Error::UnknownName`] if the cloud lacks the column.
-pub fn column_values(cloud: &PointCloud, name: &str) -> Result<Vec<f64>> {
-    Ok(find_column(name, cloud)?.values(cloud, 0..cloud.len()))
+pub fn visit_column(cloud: &PointCloud, name: &str, mut visit: impl FnMut(&[f64])) -> Result<()> {
+    let column = find_column(name, cloud)?;
+    for start in (0..cloud.len()).step_by(MAX_VALUES_AT_ONCE) {
+        let end = cloud.len().min(start + MAX_VALUES_AT_ONCE);
+        visit(&column.values(cloud, start..end));
+    }
+    Ok(())
 }
 
 fn widen<T: Copy + Into<f64>>(values: &[T]) -> Vec<f64> {

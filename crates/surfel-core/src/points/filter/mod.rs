@@ -7,7 +7,7 @@ mod polygon;
 
 use condition::{Condition, Operand, Relation};
 use evaluate::Evaluation;
-pub use evaluate::column_values;
+pub use evaluate::visit_column;
 pub(crate) use polygon::Polygon;
 use std::fmt;
 use std::str::FromStr;

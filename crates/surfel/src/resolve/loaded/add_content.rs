@@ -9,9 +9,12 @@ use crate::names::file_name;
 use crate::progress_log::ProgressLog;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use surfel_core::math::Aabb;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
-use surfel_core::scene::{Channel, Graph, Interpolation, Keyframes, Node, Track, Transform};
+use surfel_core::scene::{
+    Channel, Graph, Interpolation, Keyframes, Node, Track, Transform, inlier_bounds,
+};
 use surfel_formats::{FileInfo, Loaded};
 
 impl LoadedScene {
@@ -73,7 +76,11 @@ impl LoadedScene {
         let (graph, info) = import(file, settings, options, &log)?;
         let (n_points, n_triangles) = graph.n_points_and_triangles();
         let notes = log.into_notes();
-        self.read_files.push(LoadedFile { path: file.to_owned(), n_points, n_triangles, notes });
+        let points = graph.sample_points();
+        let Aabb { min, max } = inlier_bounds(&points);
+        let bounds = [min, max].map(|corner| points.origin + corner.as_dvec3());
+        let path = file.to_owned();
+        self.read_files.push(LoadedFile { path, n_points, n_triangles, bounds, notes });
         self.file_infos.push(info.clone());
         Ok((graph, info))
     }

@@ -2,9 +2,9 @@
 
 mod add_content;
 
-use super::camera::keep_named_camera;
+use super::camera::{camera_motion, keep_named_camera};
 use super::check_files::{check_files, n_pixels};
-use super::cloud::{filter_cloud, prepare_cloud};
+use super::cloud::{can_be_colored, filter_cloud, prepare_cloud};
 use super::environment::load_environment;
 use super::memory::MemoryEstimate;
 use super::sequence::Sequence;
@@ -16,10 +16,10 @@ use std::borrow::Cow;
 use std::iter::successors;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use surfel_core::math::DVec3;
 use surfel_core::points::{PointCloud, PreparedCloud, STRUCTURE, SURFACE_VARIATION};
 use surfel_core::progress::Progress;
 use surfel_core::render::check_surfaces;
-use surfel_core::scene::color::ColorSource;
 use surfel_core::scene::{Environment, Geometry, Graph, Track, Transform};
 use surfel_core::surface::SurfaceKind;
 use surfel_formats::FileInfo;
@@ -27,7 +27,7 @@ use surfel_formats::FileInfo;
 /// The content of the files of a description, before it is prepared.
 ///
 /// Further descriptions of the same files and objects, with other settings, can be resolved from it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct LoadedScene {
     /// All geometries, as they were read.
     pub graph: Graph<PointCloud>,
@@ -59,6 +59,8 @@ pub struct LoadedFile {
     pub n_points: usize,
     /// Number of triangles.
     pub n_triangles: usize,
+    /// Least and greatest coordinates in the file's own coordinate system, outliers aside.
+    pub bounds: [DVec3; 2],
     /// Notes of the reader, as of what was repaired or left out.
     pub notes: Vec<String>,
 }
@@ -130,6 +132,28 @@ impl LoadedScene {
         if let Some(name) = &description.camera.name {
             keep_named_camera(&mut scene.graph, name)?;
         }
+        Ok(scene)
+    }
+
+    /// Returns a copy with the objects of a description that this scene lacks, which stand behind those that it has. All
+    /// points keep the indices that they have among those that were read.
+    ///
+    /// # Errors
+    ///
+    /// Fails as reading does.
+    pub(crate) fn with_further_objects(
+        &self,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let mut scene = self.clone();
+        for object in &description.objects[self.objects.len()..] {
+            scene.add_object(object, description, &[], progress)?;
+        }
+        scene.check_memory(description)?;
+        scene.check_colors(description)?;
+        scene.number_points();
+        scene.graph.evaluate_at(0.0);
         Ok(scene)
     }
 
@@ -244,6 +268,13 @@ impl LoadedScene {
         single.unwrap_or_else(|| Cow::Owned(self.graph.sample_points()))
     }
 
+    /// Returns points that show where an object of the description is at second 0.
+    pub fn sample_points_of_object(&self, object_idx: usize) -> PointCloud {
+        let is_chosen = |node: usize| self.objects[object_idx].all.contains(&node);
+        let chosen: Vec<bool> = (0..self.graph.nodes.len()).map(is_chosen).collect();
+        self.graph.sample_points_of(&chosen)
+    }
+
     /// Returns the cloud of a scene that has nothing else, if it is in the coordinates of its files.
     pub(super) fn single_cloud(&self) -> Option<&PointCloud> {
         match (&self.graph.geometries[..], &self.graph.nodes[..]) {
@@ -327,13 +358,15 @@ impl LoadedScene {
         Ok(clouds)
     }
 
-    /// Prepares copies of all clouds.
+    /// Prepares copies of the clouds that `is_meant` accepts, by the index of their object; files have none.
     pub(crate) fn prepared(
         &self,
         description: &SceneDescription,
+        is_meant: impl Fn(Option<usize>) -> bool,
         progress: &dyn Progress,
     ) -> Result<Vec<PreparedCloud>> {
-        let prepared = self.clouds().map(|(i, cloud)| {
+        let meant = self.clouds().filter(|(i, _)| is_meant(self.owners[*i]));
+        let prepared = meant.map(|(i, cloud)| {
             let mut cloud = cloud.clone();
             self.settings_of(i, description).preparation.drop_estimated(&mut cloud);
             self.prepare(i, cloud, description, progress)
@@ -378,14 +411,7 @@ impl LoadedScene {
     pub(crate) fn check_colors(&self, description: &SceneDescription) -> Result<()> {
         for (i, cloud) in self.clouds() {
             let Some(color) = self.settings_of(i, description).color.color else { continue };
-            let is_computed = match &color {
-                ColorSource::Normal => true,
-                ColorSource::Column(name) => {
-                    [SURFACE_VARIATION, STRUCTURE].contains(&name.as_str())
-                }
-                _ => false,
-            };
-            if is_computed || color.is_available_in(cloud) {
+            if can_be_colored(cloud, &color) {
                 continue;
             }
             return Err(Error::Unfit(format!(
@@ -433,14 +459,6 @@ impl LoadedScene {
 fn object_motions(description: &SceneDescription) -> Result<Vec<ObjectMotion>, Invalid> {
     let of_objects = description.animations.iter().filter(|animation| !animation.is_of_camera());
     of_objects.map(|animation| animation.object_motion()).collect()
-}
-
-fn camera_motion(description: &SceneDescription) -> Result<Option<CameraMotion>, Invalid> {
-    let mut motion = None;
-    for animation in description.animations.iter().filter(|animation| animation.is_of_camera()) {
-        animation.camera_motion(motion.get_or_insert_default())?;
-    }
-    Ok(motion)
 }
 
 fn content_summary(graph: &Graph<PointCloud>) -> String {

@@ -1,43 +1,36 @@
-//! Clouds in temporary files, which are removed with them.
+//! Temporary files, which are removed with what refers to them.
 
 use std::fs::{self, DirBuilder, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use surfel_core::points::PointCloud;
-use surfel_core::progress::Progress;
-
-use crate::error::Result;
+use crate::error::Error;
 use crate::file::write_error;
-use crate::options::SaveOptions;
-use crate::save::save;
 
-/// A cloud in a file of its own folder, which nobody else may read. Both are removed when this is dropped.
+/// A file in a folder of its own, which nobody else may enter. Both are removed when this is dropped.
 #[derive(Debug)]
-pub struct TempCloud {
+pub struct TempFile {
     folder: PathBuf,
     path: PathBuf,
     n_bytes: u64,
 }
 
-impl TempCloud {
-    /// Writes a cloud in the format of an extension, as in `laz`.
+impl TempFile {
+    /// Lets `write` make the file of a name, as in `points.laz`, and files that it needs beside it.
     ///
     /// # Errors
-    /// Fails as [`save`] does, and if the system's folder for temporary files cannot be written to.
-    pub fn write(
-        cloud: &PointCloud,
-        extension: &str,
-        options: &SaveOptions,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
+    /// Fails as `write` does, and if the system's folder for temporary files cannot be written to.
+    pub fn write<E: From<Error>>(
+        name: &str,
+        write: impl FnOnce(&Path) -> Result<(), E>,
+    ) -> Result<Self, E> {
         let parent = std::env::temp_dir();
         let folder = new_folder(&parent).map_err(|cause| write_error(&parent, cause))?;
-        let path = folder.join(format!("points.{extension}"));
+        let path = folder.join(name);
         // Removes the folder also if writing fails.
         let mut file = Self { folder, path, n_bytes: 0 };
-        save(&file.path, cloud, options, progress)?;
+        write(&file.path)?;
         let metadata = fs::metadata(&file.path).map_err(|cause| write_error(&file.path, cause))?;
         file.n_bytes = metadata.len();
         Ok(file)
@@ -57,7 +50,7 @@ impl TempCloud {
     }
 }
 
-impl Drop for TempCloud {
+impl Drop for TempFile {
     fn drop(&mut self) {
         // A failure cannot be reported from here.
         let _ = fs::remove_dir_all(&self.folder);
@@ -87,16 +80,21 @@ mod tests {
 
     use super::*;
     use crate::load::load_bytes;
-    use crate::options::LoadOptions;
+    use crate::options::{LoadOptions, SaveOptions};
+    use crate::save::save;
     use std::io::Read;
     use surfel_core::math::Vec3;
+    use surfel_core::points::PointCloud;
     use surfel_core::progress::NoProgress;
 
     #[test]
     fn a_cloud_is_read_back_until_its_file_is_removed() {
         let cloud = PointCloud::from_positions(vec![Vec3::ONE, Vec3::new(2.0, 3.0, 4.0)]);
         let options = SaveOptions::default();
-        let write = |extension: &str| TempCloud::write(&cloud, extension, &options, &NoProgress);
+        let write = |extension: &str| {
+            let name = format!("points.{extension}");
+            TempFile::write(&name, |path| save(path, &cloud, &options, &NoProgress))
+        };
         for extension in ["laz", "ply"] {
             let file = write(extension).unwrap();
             let mut bytes = Vec::new();

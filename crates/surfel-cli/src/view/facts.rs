@@ -1,0 +1,68 @@
+//! Facts about the loaded files that a page offers controls by.
+
+use super::legend::hex;
+use serde_json::{Value, json};
+use surfel::SceneDescription;
+use surfel::crs::Unit;
+use surfel::description::{CameraSettings, write_table};
+use surfel::resolve::{LoadedScene, coordinate_system, located_stations};
+use surfel_core::image::{class_color, class_name};
+use surfel_core::math::Vec3;
+use surfel_core::points::{PointCloud, PointFilter};
+use surfel_formats::{FileInfo, common_file_info};
+
+/// Columns of a cloud as `--color` takes them.
+pub fn columns(cloud: &PointCloud) -> Vec<&str> {
+    let usual = [
+        ("rgb", cloud.colors.is_some()),
+        ("intensity", cloud.intensity.is_some()),
+        ("class", cloud.classification.is_some()),
+    ];
+    let usual = usual.into_iter().filter_map(|(name, is_there)| is_there.then_some(name));
+    usual.chain(cloud.scalars.iter().map(|scalar| scalar.name.as_str())).collect()
+}
+
+/// The symbol of the unit of lengths, if the coordinate system tells it.
+pub fn unit_symbol(scene: &LoadedScene, startup: &SceneDescription) -> Option<&'static str> {
+    let unit = coordinate_system(scene, startup)?.unit();
+    matches!(unit, Unit::Metres(_)).then(|| unit.symbol())
+}
+
+/// The stations of all scans by name, with the cameras that look from there.
+pub fn stations(scene: &LoadedScene, up: Vec3) -> Vec<Value> {
+    let stations = located_stations(scene).into_iter().filter_map(|station| {
+        let camera = CameraSettings::of(&station.view(up)?.camera(up, None));
+        Some(json!({ "name": station.name, "camera": write_table(&camera) }))
+    });
+    stations.collect()
+}
+
+/// The classes of all clouds with their names, colours and numbers of points.
+pub fn classes(scene: &LoadedScene) -> Vec<Value> {
+    let mut counts = [0u64; 256];
+    let classes = scene.clouds().filter_map(|(_, cloud)| cloud.classification.as_ref());
+    classes.flatten().for_each(|class| counts[usize::from(*class)] += 1);
+    let found = (0..=u8::MAX).zip(counts).filter(|(_, count)| 0 < *count);
+    let described = found.map(|(class, count)| {
+        let name = format!("{class} {}", class_name(class));
+        json!({ "class": class, "name": name, "color": hex(class_color(class)), "points": count })
+    });
+    described.collect()
+}
+
+/// The columns that all files with points have.
+pub fn filter_columns(scene: &LoadedScene) -> Vec<String> {
+    let files = scene.read_files.iter().zip(&scene.file_infos);
+    let of_points = files.filter(|(file, _)| 0 < file.n_points).map(|(_, info)| info.clone());
+    common_file_info(&of_points.collect::<Vec<FileInfo>>()).columns
+}
+
+/// Returns true if all clouds tell the returns of each pulse.
+pub fn has_returns(scene: &LoadedScene) -> bool {
+    let filter: PointFilter =
+        "return_number <= number_of_returns".parse().expect("the condition is valid");
+    let mut clouds = scene.clouds().map(|(_, cloud)| cloud).peekable();
+    // Fails for missing columns, also without points.
+    let tells_returns = |cloud: &PointCloud| filter.matches(cloud, cloud.len()).is_ok();
+    clouds.peek().is_some() && clouds.all(tells_returns)
+}

@@ -1,0 +1,61 @@
+// The part of the camera path's card that exports the path as a film: format, size, rate, progress and file.
+
+import { element } from './dom.js';
+import { count, duration, fileSize, stemOf } from './format.js';
+
+const FORMATS = { mp4: 'MP4 (H.264)', webm: 'WebM (VP9)', gif: 'GIF', png: 'animated PNG' };
+
+/** `sceneFile` is the button beside those of the film. Returns the part, a function that says whether the path is empty, and one that returns the size of frames. */
+export function setUpFilmExport(viewer, sceneFile) {
+  const number = (label, key, value, max) => element('input', { type: 'number', min: 1, max, step: 1, value, 'aria-label': label, 'data-film': key });
+  const [width, height, fps] = [number('Width', 'width', 1280, 32768), number('Height', 'height', 720, 32768), number('Frames a second', 'fps', 25, 120)];
+  const format = element('select', { 'aria-label': 'Format of the film', 'data-film': 'format' },
+    ...Object.entries(FORMATS).map(([value, label]) => element('option', { value }, label)));
+  const bar = element('progress', { max: 1, 'aria-label': 'Progress of the film', hidden: true });
+  const note = element('p', { class: 'note', role: 'status' });
+  const link = element('a', { class: 'button is-main', 'data-action': 'download-film', hidden: true }, 'Download');
+  const start = element('button', { type: 'button', class: 'button', 'data-action': 'film', onclick: () => write() }, 'Export film');
+  const cancel = element('button', { type: 'button', class: 'button', 'data-action': 'cancel-film', hidden: true, onclick: () => abort?.abort() }, 'Cancel');
+  const part = element('div', { class: 'film' },
+    element('h3', {}, 'Film'),
+    element('div', { class: 'chips' }, format, width, element('span', { 'aria-hidden': 'true' }, '×'), height, fps, element('span', { class: 'note' }, 'fps')),
+    element('div', { class: 'chips' }, start, cancel, link, sceneFile), bar, note);
+  let abort = null;
+  let isEmpty = true;
+
+  const show = (isWriting, text) => {
+    bar.hidden = cancel.hidden = !isWriting;
+    start.disabled = isWriting || isEmpty;
+    note.textContent = text;
+  };
+
+  const size = () => ({ width: width.valueAsNumber || 1280, height: height.valueAsNumber || 720 });
+
+  const write = async () => {
+    link.hidden = true;
+    bar.removeAttribute('value');
+    show(true, 'Waiting');
+    abort = new AbortController();
+    const progress = ({ done, left_secs }) => {
+      if (typeof done === 'number') bar.value = done;
+      note.textContent = typeof left_secs === 'number' ? `Rendering, ${duration(left_secs)} left` : 'Rendering';
+    };
+    try {
+      const message = { type: 'film', format: format.value, ...size(), fps: fps.valueAsNumber || 25 };
+      const { address, n_frames, n_bytes } = await viewer.request(message, { progress, abort: abort.signal });
+      link.href = address;
+      link.download = `${stemOf(viewer.info.name)}-film.${format.value}`;
+      link.hidden = false;
+      show(false, `${count(n_frames)} frames, ${fileSize(n_bytes)}`);
+    } catch (error) {
+      show(false, error.message === 'cancelled' ? 'Cancelled.' : error.message);
+    }
+    abort = null;
+  };
+
+  const update = (isNowEmpty) => {
+    isEmpty = isNowEmpty;
+    if (!abort) start.disabled = isEmpty;
+  };
+  return { part, size, update };
+}
