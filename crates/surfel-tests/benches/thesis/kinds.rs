@@ -34,7 +34,7 @@ pub fn check() {
     for (name, kind) in SurfaceKind::ALL {
         if kind != SurfaceKind::Points {
             let figures = compare(&mesh, &views, 3000, kind);
-            assert!(figures.deviation.misses < 0.02, "{name}: {:?}", figures.deviation);
+            assert!(figures.deviation.misses < 0.05, "{name}: {:?}", figures.deviation);
         }
     }
 }

@@ -19,7 +19,7 @@ const MIN_LEVEL_SUPPORT: f32 = 2.0;
 
 /// Number of points for each point of the cloud that the search for the cells of a level looks at. Clouds of surfaces need
 /// a few hundred; among points that lie on each other in great numbers there is no end.
-const STEPS_PER_POINT: usize = 4000;
+const STEPS_PER_POINT: usize = 2000;
 /// Number of cells that the octree of any cloud may have.
 const MIN_CELLS: usize = 64;
 

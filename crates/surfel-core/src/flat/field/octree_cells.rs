@@ -10,6 +10,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Size of the finest cells, in radii of the points: about one spacing.
 pub(super) const FINEST_CELL: f32 = 0.5;
+/// Maximum distance of a plane from the middle of its cell, in those of the corners. Planes on the face between two cells
+/// belong to both: rounding decided otherwise, and left holes.
+const MAX_PLANE_HEIGHT: f32 = 1.1;
 /// Minimum number of points of a cell whose children are computed in parallel.
 const MIN_PARALLEL: usize = 4096;
 
@@ -135,7 +138,7 @@ impl OctreeCell for CellPlane {
     ) -> Option<Self> {
         let FieldValue { value, normal, slot } = *middle;
         let extent = normal.abs().dot(0.5 * cell.size());
-        (value.abs() <= extent).then_some(Self { normal, height: value, slot })
+        (value.abs() <= MAX_PLANE_HEIGHT * extent).then_some(Self { normal, height: value, slot })
     }
 }
 

@@ -17,7 +17,7 @@ use std::marker::PhantomData;
 /// not meet exactly and need `MAX_CELL_MARGIN`.
 const CORNER_MARGIN: f32 = 0.01;
 /// Number of parts of a ray's interval in which the sign of the field is compared.
-const N_PARTS: usize = 4;
+const N_PARTS: usize = 2;
 /// Minimum cosine between the directions of a packet's rays.
 const MIN_COHERENT_COSINE: f32 = 0.98;
 /// Maximum distance between the origins of a packet's rays along any axis, in sides of the octree.
