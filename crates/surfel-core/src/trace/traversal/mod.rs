@@ -1,5 +1,5 @@
-//! Traversals of a tree: by packets of coherent rays, by interleaved incoherent rays, and by a box; of a
-//! kd-tree or an octree by single rays.
+//! Traversals of a tree: by packets of coherent rays, by interleaved incoherent rays, and by a box. A
+//! kd-tree and an octree have traversals of their own.
 //!
 //! A file uses only those above it.
 
