@@ -142,9 +142,10 @@ fn octrees_of_bad_clouds_have_bounded_size_and_depth() {
     for (name, cloud) in bad_clouds::bad_clouds() {
         let n = cloud.len();
         let rays = bad_clouds::rays_toward(&cloud, 8);
-        for (kind, depth) in KINDS.into_iter().flat_map(|kind| {
-            [OctreeDepth::Auto, OctreeDepth::Levels(12)].map(|depth| (kind, depth))
-        }) {
+        for (kind, depth) in KINDS
+            .into_iter()
+            .flat_map(|kind| [OctreeDepth::Auto, OctreeDepth::Levels(6)].map(|depth| (kind, depth)))
+        {
             let mut flat = bad_clouds::flat(cloud.clone(), kind);
             let options = OctreeOptions {
                 has_corners: kind == SurfaceKind::Octree,

@@ -18,8 +18,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 const MIN_LEVEL_SUPPORT: f32 = 2.0;
 
 /// Number of points for each point of the cloud that the search for the cells of a level looks at. Clouds of surfaces need
-/// a few hundred; among points that lie on each other in great numbers there is no end.
-const STEPS_PER_POINT: usize = 2000;
+/// about a thousand; among points that lie on each other in great numbers there is no end.
+const STEPS_PER_POINT: usize = 4000;
 /// Number of cells that the octree of any cloud may have.
 const MIN_CELLS: usize = 64;
 
@@ -119,7 +119,7 @@ fn build<C: OctreeCell>(
             break;
         }
         if is_full {
-            return coarser(points, options, depth, n_before, progress);
+            return coarser(points, options, depth - 1, n_before, progress);
         }
         levels.push(cells);
     }
@@ -132,7 +132,7 @@ fn build<C: OctreeCell>(
     Ok((Octree { cube, depth: n_levels - 1, nodes, ..Octree::default() }, cells))
 }
 
-/// Builds an octree of a fixed depth again that had no room at `depth`.
+/// Builds an octree again at a depth where it may have room, if there is any for `n_cells`.
 fn coarser<C: OctreeCell>(
     points: &FlatPoints,
     options: &OctreeOptions,
@@ -140,14 +140,10 @@ fn coarser<C: OctreeCell>(
     n_cells: usize,
     progress: &dyn Progress,
 ) -> Result<(Octree, Vec<C>)> {
-    if depth <= 1 || n_cells == 0 {
+    if depth == 0 || n_cells == 0 {
         return Ok((Octree::default(), Vec::new()));
     }
-    build(
-        points,
-        &OctreeOptions { depth: OctreeDepth::Levels(depth as u32 - 1), ..*options },
-        progress,
-    )
+    build(points, &OctreeOptions { depth: OctreeDepth::Levels(depth as u32), ..*options }, progress)
 }
 
 /// Puts nodes over the cells of all levels.
