@@ -74,6 +74,8 @@ impl Surface {
             SurfaceKind::Splat | SurfaceKind::SplatMean => Some(Self::Splat),
             SurfaceKind::Smooth => Some(Self::Smooth),
             SurfaceKind::Points | SurfaceKind::SplatFit => None,
+            // Their trees are traversed on the CPU alone.
+            SurfaceKind::Implicit | SurfaceKind::Octree | SurfaceKind::OctreeSplat => None,
         }
     }
 

@@ -22,7 +22,8 @@ pub fn unsupported(scene: &FlatScene) -> Vec<String> {
             FlatGeometry::Mesh(_) => {}
             FlatGeometry::Cloud(cloud) => {
                 let kind = cloud.surface;
-                add(Surface::of_kind(kind).is_none(), format!("the surface {}", kind.name()));
+                let what = format!("the surface {}{}", kind.name(), structure(kind));
+                add(Surface::of_kind(kind).is_none(), what);
                 add(cloud.support_colors.is_some(), "colours by support".into());
             }
         }
@@ -38,6 +39,15 @@ pub fn unsupported(scene: &FlatScene) -> Vec<String> {
     }
     add(MAX_PLANES < scene.camera_planes.len(), format!("more than {MAX_PLANES} planes"));
     found
+}
+
+/// Returns words for the structure of a surface that no kernel traverses.
+fn structure(kind: SurfaceKind) -> &'static str {
+    match kind {
+        SurfaceKind::Implicit => " (a kd-tree)",
+        SurfaceKind::Octree | SurfaceKind::OctreeSplat => " (an octree)",
+        _ => "",
+    }
 }
 
 /// True if light is reflected or refracted in single directions, which takes more than one ray for each camera ray.

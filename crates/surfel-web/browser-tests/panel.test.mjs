@@ -25,6 +25,7 @@ const CASES = {
   surface: { value: 'sphere' },
   radius_scale: { value: 2 },
   edge_test: { value: 'off' },
+  octree_depth: { given: [['surface', 'octree']], value: '3' },
   color: { value: 'intensity' },
   cmap: { given: BY_ELEVATION, value: 'magma' },
   range: { given: BY_ELEVATION, value: [147, 152.5] },

@@ -20,6 +20,10 @@ export const surfaceControls = [
     read: (scene) => scene.radius_scale ?? 1, help: 'Factor of the radius of each point' },
   { key: 'edge_test', label: 'Edge test', kind: 'select', help: 'How the edge of the surface is found',
     options: () => [{ value: 'angular-gap', label: 'angular gap' }, { value: 'off', label: 'off' }] },
+  { key: 'octree_depth', label: 'Octree depth', kind: 'select', help: 'Levels of the octree; automatic: as fine as the points',
+    isVisible: ({ surface }) => surface === 'octree' || surface === 'octree-splat',
+    options: () => [{ value: 'auto', label: 'automatic' }, ...Array.from({ length: 12 }, (_, i) => String(i + 1))],
+    read: (scene) => String(scene.octree_depth ?? 'auto') },
 ];
 
 const hasMap = (scene, { legend }) => legend?.kind === 'map';

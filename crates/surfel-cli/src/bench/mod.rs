@@ -221,7 +221,7 @@ fn estimate_memory(args: &Args, description: &SceneDescription) -> anyhow::Resul
     let n_pixels = 2 * u64::from(args.resolution.0) * u64::from(args.resolution.1);
     let infos = [(args.cloud.as_path(), info)].into();
     let subsample = description.objects_default.preparation.subsample;
-    Ok(MemoryEstimate::from_files(&infos, subsample, n_pixels))
+    Ok(MemoryEstimate::from_files(&infos, subsample, n_pixels).with_surfaces_of(description))
 }
 
 fn load_unbuilt(
@@ -240,6 +240,7 @@ fn load_unbuilt(
         let mut geometry = CloudGeometry::with_uniform_color(cloud, [200; 3]);
         geometry.surface = settings.surface.surface();
         geometry.edge_test = settings.surface.edge_test();
+        geometry.octree_depth = settings.surface.octree_depth();
         anyhow::Ok(geometry)
     })?;
     let camera = match file {

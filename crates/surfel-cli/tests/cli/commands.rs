@@ -52,6 +52,10 @@ fn render_accepts_all_surfaces_and_colors() {
     for surface in ["points", "sphere", "disc", "splat-mean", "splat", "splat-fit"] {
         render(&["--surface", surface]);
     }
+    for surface in ["implicit", "octree", "octree-splat"] {
+        render(&["--surface", surface]);
+    }
+    render(&["--surface", "octree", "--octree-depth", "4"]);
     for color in
         ["rgb", "elevation", "class", "normal", "#ff8000", "rain", "RAIN", "surface_variation"]
     {

@@ -10,6 +10,8 @@ fn invalid_values_end_with_code_2() {
     let wrong = [
         &["--surface", "marble"][..],
         &["--edge-test", "maybe"],
+        &["--octree-depth", "17"],
+        &["--octree-depth", "deep"],
         &["--radius-scale", "0"],
         &["--clip-box", "0,1,0,1"],
         &["--clip-box", "([0,1],[1,0])"],

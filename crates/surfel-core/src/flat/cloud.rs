@@ -1,6 +1,7 @@
 //! Point clouds in the form that kernels read.
 
 use super::deform::Deformed;
+use super::field::{FieldTree, Octree, OctreeOptions};
 use super::point_columns::PointColumns;
 use super::points::FlatPoints;
 use super::refit::Refit;
@@ -22,6 +23,10 @@ pub struct FlatCloud {
     pub lines: FlatPoints,
     /// Points that stand for themselves, as spheres.
     pub scatter: FlatPoints,
+    /// The kd-tree over the field of weighted planes; empty unless that is the surface.
+    pub field: Box<FieldTree>,
+    /// The octree whose cells are the surface; empty unless they are.
+    pub octree: Box<Octree>,
     /// The shape of the points.
     pub surface: SurfaceKind,
     /// The test that decides where the surface ends.
@@ -83,6 +88,8 @@ impl FlatCloud {
             points,
             lines,
             scatter,
+            field: Box::default(),
+            octree: Box::default(),
             surface: geometry.surface,
             edge_test: geometry.edge_test,
             has_outward_normals: geometry.has_outward_normals,
@@ -92,6 +99,7 @@ impl FlatCloud {
             max_blend_distance: 0.0,
         };
         flat.set_max_blend_distance();
+        flat.build_field(geometry, progress)?;
         Ok(flat)
     }
 
@@ -116,6 +124,9 @@ impl FlatCloud {
             }
         };
         self.set_max_blend_distance();
+        if !needs_rebuild {
+            self.build_field(geometry, progress)?;
+        }
         needs_rebuild.then(|| Self::from_columns(columns, geometry, progress)).transpose()
     }
 
@@ -131,13 +142,40 @@ impl FlatCloud {
     /// Returns the sizes of the trees and of the points in bytes.
     pub fn bytes(&self) -> (usize, usize) {
         let parts = [&self.points, &self.lines, &self.scatter].map(FlatPoints::bytes);
-        (parts.iter().map(|part| part.0).sum(), parts.iter().map(|part| part.1).sum())
+        let trees: usize = parts.iter().map(|part| part.0).sum();
+        (trees + self.field.bytes() + self.octree.bytes(), parts.iter().map(|part| part.1).sum())
     }
 
     /// Returns the bounding box of all points, which is empty if no point is traceable.
     pub fn bounds(&self) -> Aabb {
         let parts = [&self.points, &self.lines, &self.scatter];
-        parts.iter().fold(Aabb::EMPTY, |bounds, part| bounds.union(root_bounds(&part.nodes)))
+        let field = self.field.bounds().or(self.octree.cube()).unwrap_or(Aabb::EMPTY);
+        parts.iter().fold(field, |bounds, part| bounds.union(root_bounds(&part.nodes)))
+    }
+
+    /// True if the normals of the field of weighted planes all point to the same side.
+    pub fn has_field_sides(&self) -> bool {
+        self.has_outward_normals || self.has_front_sides
+    }
+
+    fn build_field(&mut self, geometry: &CloudGeometry, progress: &dyn Progress) -> Result<()> {
+        let has_sides = self.has_field_sides();
+        match self.surface {
+            SurfaceKind::Implicit => {
+                *self.field = FieldTree::new(&self.points, has_sides, progress)?;
+            }
+            SurfaceKind::Octree | SurfaceKind::OctreeSplat => {
+                let options = OctreeOptions {
+                    has_corners: self.surface == SurfaceKind::Octree,
+                    depth: geometry.octree_depth,
+                    has_edge_test: self.edge_test == EdgeTest::AngularGap,
+                    has_sides,
+                };
+                *self.octree = Octree::new(&self.points, &options, progress)?;
+            }
+            _ => {}
+        }
+        Ok(())
     }
 
     fn set_max_blend_distance(&mut self) {

@@ -3,12 +3,13 @@
 mod block;
 mod block_tree;
 mod bounds;
-mod cloud;
 mod deform;
 mod instance;
 mod mesh;
 mod point_columns;
 mod points;
+mod field;
+mod cloud;
 mod punctual_light;
 mod refit;
 mod scene;
@@ -20,6 +21,10 @@ mod triangles;
 pub use block::{BlockPoint, PointBlock};
 pub use block_tree::{BlockTree, Slot};
 pub use cloud::FlatCloud;
+pub use field::{
+    CellCorners, CellPlane, FieldLeaf, FieldTree, KdChild, MAX_KD_DEPTH, MAX_OCTREE_DEPTH, Octree,
+    OctreeNode, OctreeOptions, max_field_bytes,
+};
 pub use instance::Instance;
 pub use mesh::FlatMesh;
 pub use point_columns::PointColumns;

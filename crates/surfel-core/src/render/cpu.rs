@@ -10,8 +10,8 @@ use crate::image::{Band, Image};
 use crate::integrator::{CameraRayBatch, Integrator, PixelSamples, RayCounts, Whitted, albedo};
 use crate::math::{Ray, Vec3, Vec4, hash, morton_decode, owen_sobol_2d};
 use crate::progress::Progress;
-use crate::scene::View;
-use crate::trace::{InstanceFilter, SceneHit, Simd, Support, Tracer};
+use crate::scene::{Lens, View};
+use crate::trace::{InstanceFilter, PixelSize, SceneHit, Simd, Support, Tracer};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -43,12 +43,21 @@ impl Renderer for CpuRenderer {
         let (image, mut stats) = if raster::uses_rasterizer(scene)? {
             (raster::render(scene, &view, settings, region, progress)?, RenderStats::default())
         } else {
-            let tracer = Tracer::new(scene, self.simd, progress);
+            let tracer = Tracer::new(scene, self.simd, pixel_size(&view), progress);
             let job = Job { tracer: &tracer, view: &view, settings, region };
             render_tiles(&job)?
         };
         stats.frame_secs = start.elapsed().as_secs_f64();
         Ok((image, stats))
+    }
+}
+
+/// Returns the size of a pixel along the rays of a view.
+fn pixel_size(view: &View) -> PixelSize {
+    let size = view.pixel_size();
+    match view.lens {
+        Lens::Orthographic { .. } => PixelSize { at_origin: size, per_distance: 0.0 },
+        _ => PixelSize { at_origin: 0.0, per_distance: size },
     }
 }
 

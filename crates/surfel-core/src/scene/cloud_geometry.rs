@@ -3,7 +3,7 @@
 use super::color::SupportColors;
 use crate::error::Result;
 use crate::points::{PointCloud, PreparedCloud, Structure, check_length};
-use crate::surface::{EdgeTest, SurfaceKind};
+use crate::surface::{EdgeTest, OctreeDepth, SurfaceKind};
 
 /// A prepared cloud with one colour for each point, and the surface that its points describe.
 #[derive(Clone, Debug)]
@@ -17,6 +17,8 @@ pub struct CloudGeometry {
     pub surface: SurfaceKind,
     /// The test that rejects hits beyond the edge of the surface.
     pub edge_test: EdgeTest,
+    /// Depth of the cells, if the surface is an octree.
+    pub octree_depth: OctreeDepth,
     /// True if colours of neighbouring points may be blended; false if each belongs to one point, as those of
     /// classes do.
     pub blends_colors: bool,
@@ -38,6 +40,7 @@ impl Default for CloudGeometry {
             structures: None,
             surface: SurfaceKind::default(),
             edge_test: EdgeTest::default(),
+            octree_depth: OctreeDepth::default(),
             blends_colors: true,
             support_colors: None,
             has_outward_normals: false,

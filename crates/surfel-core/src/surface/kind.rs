@@ -31,6 +31,14 @@ pub enum SurfaceKind {
     /// 2007): one smooth surface for rays of all kinds.
     #[default]
     Smooth,
+    /// The zeros of the mean distance from the planes of the points around each position (Wald and Seidel, Interactive
+    /// Ray Tracing of Point-based Models, 2005), found in a kd-tree of their own.
+    Implicit,
+    /// The field of `Implicit` at the corners of an octree's cells, linear in each axis between them (Kashyap, Goradia,
+    /// Chaudhuri and Chandran, Implicit Surface Octrees for Ray Tracing Point Models, 2010).
+    Octree,
+    /// A plane in each cell of an octree: the splat octree of the same authors.
+    OctreeSplat,
     /// Each point is a short thick line along its normal. The points of lines have this kind, whatever the kind of
     /// their cloud's surface is.
     Capsule,
@@ -38,7 +46,7 @@ pub enum SurfaceKind {
 
 impl SurfaceKind {
     /// The kinds of surface that a cloud can be given, with their names.
-    pub const ALL: [(&'static str, Self); 7] = [
+    pub const ALL: [(&'static str, Self); 10] = [
         ("points", Self::Points),
         ("sphere", Self::Sphere),
         ("disc", Self::Disc),
@@ -46,6 +54,9 @@ impl SurfaceKind {
         ("splat", Self::Splat),
         ("splat-fit", Self::SplatFit),
         ("smooth", Self::Smooth),
+        ("implicit", Self::Implicit),
+        ("octree", Self::Octree),
+        ("octree-splat", Self::OctreeSplat),
     ];
 
     /// Returns the name that `from_str` parses.
@@ -85,7 +96,9 @@ impl SurfaceKind {
     pub fn spawn_ray(self, position: Vec3, normal: Vec3, radius: f32, direction: Vec3) -> Ray {
         let rounding = 4.0 * f32::EPSILON * position.abs().max_element();
         let (offset, t_min) = match self {
-            Self::Smooth => (smooth::SPAWN_OFFSET * radius, smooth::SPAWN_T_MIN * radius),
+            Self::Smooth | Self::Implicit => {
+                (smooth::SPAWN_OFFSET * radius, smooth::SPAWN_T_MIN * radius)
+            }
             _ if self.uses_discs() => (disc::SPAWN_OFFSET * radius, disc::SPAWN_T_MIN * radius),
             _ => (SOLID_SPAWN_OFFSET * radius, 0.0),
         };

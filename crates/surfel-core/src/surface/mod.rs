@@ -3,7 +3,9 @@
 pub mod capsule;
 pub mod disc;
 pub mod edge_test;
+mod field;
 mod kind;
+mod octree_depth;
 mod shape;
 pub mod smooth;
 mod sphere;
@@ -16,7 +18,9 @@ pub use edge_test::{
     CandidateHit, CandidateHitLanes, EdgeTest, EdgeTestResult, NEIGHBORHOOD_RADIUS_FACTOR,
     NeighborhoodStats,
 };
+pub use field::{FIELD_SUPPORT, FieldPoint, FieldSums, MIN_FIELD_WEIGHT, field_weight};
 pub use kind::{SOLID_SPAWN_OFFSET, SurfaceKind};
+pub use octree_depth::OctreeDepth;
 pub use shape::{MAX_NORMAL_COMPONENT, PointLanes, RayLanes, Shape};
 pub use smooth::{
     ColorSums, FIT_REACH, FitPoint, OverhangSums, PointSums, SUPPORT_FACTOR, SphereHit, SphereSums,

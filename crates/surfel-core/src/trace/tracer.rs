@@ -7,9 +7,10 @@ use crate::progress::Progress;
 use crate::trace::query::support::Support;
 use crate::trace::scene::instance_filter::InstanceFilter;
 use crate::trace::scene::scene_hit::SceneHit;
-use crate::trace::scene::scene_query::{scene_hits, scene_occlusions};
+use crate::trace::scene::scene_query::{scene_hits_at, scene_occlusions};
 use crate::trace::scene::scene_support::scene_supports;
 use crate::trace::simd::Simd;
+use crate::trace::traversal::octree_walk::PixelSize;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -23,6 +24,8 @@ pub struct Tracer<'a> {
     pub simd: Simd,
     /// Cancels the job.
     pub progress: &'a dyn Progress,
+    /// The size of a pixel along rays from the camera.
+    pub pixel: PixelSize,
     /// Number of rays traced so far by all threads.
     n_traced: AtomicUsize,
     /// Number of rays that take `MAX_CHUNK_TIME`, estimated from the last chunk of any thread.
@@ -38,18 +41,24 @@ const MAX_CHUNK_TIME: Duration = Duration::from_millis(5);
 
 impl<'a> Tracer<'a> {
     /// Returns the tracer of a job.
-    pub fn new(scene: &'a FlatScene, simd: Simd, progress: &'a dyn Progress) -> Self {
+    pub fn new(
+        scene: &'a FlatScene,
+        simd: Simd,
+        pixel: PixelSize,
+        progress: &'a dyn Progress,
+    ) -> Self {
         let (n_traced, n_affordable) = (AtomicUsize::new(0), AtomicUsize::new(MAX_CHUNK_SIZE));
-        Self { scene, simd, progress, n_traced, n_affordable }
+        Self { scene, simd, progress, pixel, n_traced, n_affordable }
     }
 
-    /// Runs [`scene_hits`].
+    /// Runs [`scene_hits`](super::scene_hits) at the size of a pixel.
     ///
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels the job.
     pub fn hits(&self, filter: InstanceFilter, rays: &[Ray], hits: &mut [SceneHit]) -> Result<()> {
         self.in_chunks(rays.len(), |chunk| {
-            scene_hits(self.scene, self.simd, filter, &rays[chunk.clone()], &mut hits[chunk]);
+            let (rays, hits) = (&rays[chunk.clone()], &mut hits[chunk]);
+            scene_hits_at(self.scene, self.simd, filter, self.pixel, rays, hits);
         })
     }
 
@@ -151,7 +160,7 @@ mod tests {
     #[test]
     fn chunks_grow_while_rays_are_fast_and_shrink_while_they_are_slow() {
         let scene = empty();
-        let tracer = Tracer::new(&scene, Simd::detect(), &NoProgress);
+        let tracer = Tracer::new(&scene, Simd::detect(), PixelSize::ZERO, &NoProgress);
         let fast = chunk_sizes(&tracer, 400_000, Duration::ZERO);
         assert_eq!((fast[0], fast.iter().sum()), (PACKET_WIDTH, 400_000));
         assert!(fast.iter().all(|n| *n <= MAX_CHUNK_SIZE) && 4096 <= *fast.iter().max().unwrap());
@@ -171,7 +180,7 @@ mod tests {
             }
         }
         let scene = empty();
-        let tracer = Tracer::new(&scene, Simd::detect(), &CancelledJob);
+        let tracer = Tracer::new(&scene, Simd::detect(), PixelSize::ZERO, &CancelledJob);
         let stopped = tracer.in_chunks(100, |_| panic!("the job is cancelled"));
         assert!(matches!(stopped, Err(Error::Cancelled)));
     }

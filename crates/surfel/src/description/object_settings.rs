@@ -19,16 +19,20 @@ use surfel_core::points::{
 };
 use surfel_core::scene::color::{ColorSource, Coloring};
 use surfel_core::scene::{Clip, ClipBox, ClipPlane};
-use surfel_core::surface::{EdgeTest, SurfaceKind};
+use surfel_core::surface::{EdgeTest, OctreeDepth, SurfaceKind};
 use surfel_formats::{Column, ColumnChoice, LoadOptions, TextColumn};
 
 settings! {
     /// The shape that is given to points, and the part of an object that is shown.
     pub struct SurfaceSettings {
-        /// Surface of the points: smooth, points, sphere, disc, splat-mean, splat or splat-fit.
+        /// Surface of the points: smooth, points, sphere, disc, splat-mean, splat, splat-fit, implicit, octree or
+        /// octree-splat.
         surface: SurfaceKind = SurfaceKind::default(), parsed(|kind: &SurfaceKind| kind.name().to_owned()), "KIND", common;
         /// Edge of the surface: at the outermost points (angular-gap) or at the rims of their discs (off).
         edge_test: EdgeTest = EdgeTest::default(), parsed(|test: &EdgeTest| test.name().to_owned()), "TEST";
+        /// Depth of the cells of octree and octree-splat: auto (as fine as the points, coarser where a pixel is larger) or
+        /// a number of levels from 1 to 16.
+        octree_depth: OctreeDepth = OctreeDepth::default(), parsed(OctreeDepth::to_string), "auto|N";
         /// Multiplies the radii of all points, those of the file and those estimated.
         radius_scale: f64 = 1.0, POSITIVE, "FACTOR";
         /// Hides what lies outside: ([x0,x1],[y0,y1],[z0,z1]) or x0,y0,z0,x1,y1,z1 in the file's own coordinates; two

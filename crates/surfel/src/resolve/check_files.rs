@@ -37,6 +37,7 @@ pub fn check_files(description: &SceneDescription) -> Result<()> {
     }
     let subsample = description.objects_default.preparation.subsample;
     MemoryEstimate::from_files(&infos, subsample, n_pixels(description))
+        .with_surfaces_of(description)
         .check(description.run.memory_limit)
 }
 

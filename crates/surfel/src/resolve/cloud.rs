@@ -168,6 +168,7 @@ pub fn apply_surface_and_color(
     geometry.blends_colors = blends_colors;
     geometry.support_colors = coloring.support_colors()?;
     geometry.edge_test = settings.surface.edge_test();
+    geometry.octree_depth = settings.surface.octree_depth();
     geometry.has_outward_normals = settings.preparation.orients_outward();
     let has_stations = geometry.cloud().has_stations();
     geometry.has_front_sides = settings.preparation.knows_front_sides(has_stations);

@@ -1,10 +1,11 @@
 //! The memory that a picture takes, and the limit that the user may set.
 
+use crate::description::SceneDescription;
 use crate::error::{Error, Result};
 use crate::troubleshooting::TroubleshootingSection;
 use std::collections::BTreeMap;
 use std::path::Path;
-use surfel_core::flat::PointBlock;
+use surfel_core::flat::{PointBlock, max_field_bytes};
 use surfel_core::math::LANES;
 use surfel_core::points::{PointCloud, Subsample};
 use surfel_core::scene::Graph;
@@ -18,6 +19,8 @@ pub struct MemoryEstimate {
     n_triangles: u64,
     n_texels: u64,
     n_pixels: u64,
+    /// Bytes of a point's tree, block, index, and other structures of its surface.
+    flat_point: u64,
 }
 
 /// Bytes of a point as it is loaded: position, normal, radius, colour and intensity.
@@ -52,7 +55,7 @@ impl MemoryEstimate {
         let triangles = files.values().filter_map(|info| info.n_triangles);
         let n_triangles = sum(triangles.map(|n| (n, 1)));
         let n_kept_points = kept(n_points, subsample);
-        Self { n_points, n_kept_points, n_triangles, n_texels: 0, n_pixels }
+        Self { n_points, n_kept_points, n_triangles, n_texels: 0, n_pixels, flat_point: FLAT_POINT }
     }
 
     /// Estimates from what was read, where textures are known too.
@@ -65,14 +68,24 @@ impl MemoryEstimate {
         let (n_points, n_triangles) = (n_points as u64, n_triangles as u64);
         let n_texels = graph.textures.iter().map(|texture| texture.texels.len() as u64).sum();
         let n_kept_points = kept(n_points, subsample);
-        Self { n_points, n_kept_points, n_triangles, n_texels, n_pixels }
+        let flat_point = FLAT_POINT;
+        Self { n_points, n_kept_points, n_triangles, n_texels, n_pixels, flat_point }
+    }
+
+    /// Adds the structures that the surfaces of a description take besides the points' tree.
+    pub fn with_surfaces_of(self, description: &SceneDescription) -> Self {
+        let scene = &description.objects_default;
+        let objects = description.objects.iter().map(|object| object.settings.over(scene));
+        let kinds = objects.chain([scene.clone()]).map(|settings| settings.surface.surface());
+        let most = kinds.map(max_field_bytes).max().unwrap_or_default() as u64;
+        Self { flat_point: self.flat_point + most, ..self }
     }
 
     /// Bytes of the input as read, of the flat form with what building it takes, and of the picture.
     fn bytes(&self) -> [u64; 3] {
         let meshes = sum([(self.n_triangles, TRIANGLE), (self.n_texels, TEXEL)]);
         let read = sum([(self.n_points, COLUMNS), (meshes, 1)]);
-        let trees = sum([(self.n_kept_points, FLAT_POINT), (self.n_triangles, FLAT_TRIANGLE)]);
+        let trees = sum([(self.n_kept_points, self.flat_point), (self.n_triangles, FLAT_TRIANGLE)]);
         // Vertices and textures stand in the flat form as they were read.
         let flat = sum([(trees / 2, 5), (meshes, 1)]);
         [read, flat, sum([(self.n_pixels, PIXEL)])]
@@ -119,7 +132,7 @@ impl MemoryEstimate {
     /// Advice that helps besides a higher limit, if there is any.
     fn advice(&self, limit: u64) -> String {
         let least = Self { n_kept_points: 0, ..*self }.total();
-        let fitting = limit.saturating_sub(least) / 5 * 2 / FLAT_POINT;
+        let fitting = limit.saturating_sub(least) / 5 * 2 / self.flat_point;
         let [.., picture] = self.bytes();
         if 0 < fitting && fitting < self.n_kept_points {
             return format!("keep fewer points with --subsample random:{fitting} or ");
@@ -166,9 +179,17 @@ mod tests {
 
     use super::*;
 
+    const NOTHING: MemoryEstimate = MemoryEstimate {
+        n_points: 0,
+        n_kept_points: 0,
+        n_triangles: 0,
+        n_texels: 0,
+        n_pixels: 0,
+        flat_point: FLAT_POINT,
+    };
+
     fn advice(n_points: u64, n_kept_points: u64, n_pixels: u64, limit: u64) -> String {
-        let estimate =
-            MemoryEstimate { n_points, n_kept_points, n_triangles: 0, n_texels: 0, n_pixels };
+        let estimate = MemoryEstimate { n_points, n_kept_points, n_pixels, ..NOTHING };
         assert!(limit < estimate.total());
         estimate.advice(limit)
     }
@@ -179,13 +200,7 @@ mod tests {
         let text = advice(n_points, n_points, 10_000, limit);
         let n_kept_points = text.split(|c: char| !c.is_ascii_digit()).find(|word| !word.is_empty());
         let n_kept_points = n_kept_points.unwrap().parse().unwrap();
-        let estimate = MemoryEstimate {
-            n_points,
-            n_kept_points,
-            n_triangles: 0,
-            n_texels: 0,
-            n_pixels: 10_000,
-        };
+        let estimate = MemoryEstimate { n_points, n_kept_points, n_pixels: 10_000, ..NOTHING };
         assert!(limit - 1000 < estimate.total() && estimate.total() <= limit, "{text}");
         // Fewer points do not reduce what is read.
         assert_eq!(advice(n_points, n_points, 10_000, 30_000_000), "");

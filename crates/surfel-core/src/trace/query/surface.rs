@@ -9,14 +9,18 @@ use crate::trace::query::any::{AcceptAll, any_accepted_hit, any_hits_kernel};
 use crate::trace::query::closest::{closest_hits_kernel, closest_shapes};
 use crate::trace::query::edge_filter::EdgeFilter;
 use crate::trace::query::edge_test::evaluate_one;
+use crate::trace::query::field_query::{DiscSearch, FieldSearch, KdSearch, field_hits};
 use crate::trace::query::hit::Hit;
 use crate::trace::query::leaf::LeafGeometry;
+use crate::trace::query::octree_query::{CellHit, cell_color, octree_hits};
+use crate::trace::query::ray_field::FieldHit;
 use crate::trace::query::smooth_filter::SmoothFilter;
 use crate::trace::query::smooth_query::SmoothTracer;
 use crate::trace::query::splat_query::{Splat, SplatTracer};
 use crate::trace::query::support::support;
 use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::simd::{Simd, dispatch_simd};
+use crate::trace::traversal::octree_walk::PixelSize;
 
 /// The hit of a ray on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,18 +78,43 @@ pub const MIN_SLIT_COSINE: f32 = 0.5;
 
 /// Finds the closest hit of each ray on the continuous surface.
 pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    surface_hits_at(cloud, simd, PixelSize::ZERO, rays, hits);
+}
+
+/// Finds the closest hit of each ray on the continuous surface, where nothing smaller than a pixel counts: the cells of
+/// octrees are as large as it.
+pub fn surface_hits_at(
+    cloud: &FlatCloud,
+    simd: Simd,
+    pixel: PixelSize,
+    rays: &[Ray],
+    hits: &mut [SurfaceHit],
+) {
     dispatch_simd!(
         simd,
-        surface_hits_kernel(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit])
+        surface_hits_kernel(
+            cloud: &FlatCloud,
+            pixel: PixelSize,
+            rays: &[Ray],
+            hits: &mut [SurfaceHit]
+        )
     );
 }
 
 #[inline(always)]
-fn surface_hits_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
+fn surface_hits_kernel<L: Lanes>(
+    cloud: &FlatCloud,
+    pixel: PixelSize,
+    rays: &[Ray],
+    hits: &mut [SurfaceHit],
+) {
     hits.fill(SurfaceHit::MISS);
     if !cloud.points.nodes.is_empty() {
         match cloud.surface {
             SurfaceKind::Smooth => trace_smooth::<L>(cloud, rays, hits),
+            SurfaceKind::Implicit => trace_field::<L, KdSearch>(cloud, rays, hits),
+            SurfaceKind::Octree => trace_octree::<L, true>(cloud, pixel, rays, hits),
+            SurfaceKind::OctreeSplat => trace_octree::<L, false>(cloud, pixel, rays, hits),
             kind if kind.uses_discs() => splat_hits::<L>(cloud, rays, hits),
             _ => merge_solids::<L, Sphere>(&cloud.points, SurfaceKind::Sphere, rays, hits),
         }
@@ -100,6 +129,91 @@ fn surface_hits_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [Su
     }
 }
 
+/// Finds what `surface_hits` does for a cloud of the kind [`SurfaceKind::Implicit`], without its kd-tree: the field is
+/// searched near the discs that rays hit in the tree of the points.
+pub fn implicit_hits_by_discs(
+    cloud: &FlatCloud,
+    simd: Simd,
+    rays: &[Ray],
+    hits: &mut [SurfaceHit],
+) {
+    if cloud.points.nodes.is_empty() {
+        return hits.fill(SurfaceHit::MISS);
+    }
+    dispatch_simd!(
+        simd,
+        implicit_hits_by_discs_kernel(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit])
+    );
+}
+
+#[inline(always)]
+fn implicit_hits_by_discs_kernel<L: Lanes>(
+    cloud: &FlatCloud,
+    rays: &[Ray],
+    hits: &mut [SurfaceHit],
+) {
+    trace_field::<L, DiscSearch>(cloud, rays, hits);
+}
+
+#[inline(always)]
+fn trace_field<L: Lanes, S: FieldSearch>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    let mut found = vec![FieldHit::MISS; rays.len()];
+    field_hits::<L, S, true>(cloud, rays, &mut found);
+    for ((ray, FieldHit { hit, normal, color }), result) in rays.iter().zip(found).zip(hits) {
+        *result = SurfaceHit::MISS;
+        if !hit.is_miss() {
+            *result = SurfaceHit {
+                distance: hit.distance,
+                id: cloud.points.id(hit.slot),
+                slot: hit.slot,
+                radius: cloud.points.radius(hit.slot),
+                normal,
+                color,
+                surface: cloud.surface,
+                is_backface: 0.0 < cloud.points.normal(hit.slot).dot(ray.direction),
+            };
+        }
+    }
+}
+
+#[inline(always)]
+fn trace_octree<L: Lanes, const HAS_CORNERS: bool>(
+    cloud: &FlatCloud,
+    pixel: PixelSize,
+    rays: &[Ray],
+    hits: &mut [SurfaceHit],
+) {
+    let mut found = vec![CellHit::MISS; rays.len()];
+    octree_hits::<L, HAS_CORNERS>(cloud, pixel, rays, &mut found);
+    for ((ray, CellHit { hit, normal, size }), result) in rays.iter().zip(found).zip(hits) {
+        *result = SurfaceHit::MISS;
+        if !hit.is_miss() {
+            *result = SurfaceHit {
+                distance: hit.distance,
+                id: cloud.points.id(hit.slot),
+                slot: hit.slot,
+                // New rays keep their distance from cells that are larger than the discs.
+                radius: cloud.points.radius(hit.slot).max(size),
+                normal,
+                color: cell_color(cloud, hit.slot),
+                surface: cloud.surface,
+                is_backface: 0.0 < cloud.points.normal(hit.slot).dot(ray.direction),
+            };
+        }
+    }
+}
+
+#[inline(always)]
+fn octree_occlusions<L: Lanes, const HAS_CORNERS: bool>(
+    cloud: &FlatCloud,
+    rays: &[Ray],
+    occluded: &mut [bool],
+) {
+    let mut hits = vec![CellHit::MISS; rays.len()];
+    octree_hits::<L, HAS_CORNERS>(cloud, PixelSize::ZERO, rays, &mut hits);
+    occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.hit.is_miss());
+}
+
 /// Finds out for each ray whether the continuous surface lies in its range.
 pub fn occlusions(cloud: &FlatCloud, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
     dispatch_simd!(simd, occlusions_kernel(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [bool]));
@@ -111,6 +225,14 @@ fn occlusions_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [
         occluded.fill(false);
     } else if cloud.surface == SurfaceKind::Smooth {
         any_accepted_hit::<L, Disc, _>(&cloud.points, rays, SmoothFilter(cloud), occluded);
+    } else if cloud.surface == SurfaceKind::Implicit {
+        let mut hits = vec![FieldHit::MISS; rays.len()];
+        field_hits::<L, KdSearch, false>(cloud, rays, &mut hits);
+        occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.hit.is_miss());
+    } else if cloud.surface == SurfaceKind::Octree {
+        octree_occlusions::<L, true>(cloud, rays, occluded);
+    } else if cloud.surface == SurfaceKind::OctreeSplat {
+        octree_occlusions::<L, false>(cloud, rays, occluded);
     } else if !cloud.surface.uses_discs() || cloud.edge_test == EdgeTest::Off {
         any_hits_kernel::<L>(cloud, rays, occluded);
     } else {

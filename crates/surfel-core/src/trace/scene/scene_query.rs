@@ -6,11 +6,12 @@ use crate::math::{PACKET_WIDTH, Ray};
 use crate::trace::query::any::any_triangles;
 use crate::trace::query::closest::closest_triangles;
 use crate::trace::query::hit::Hit;
-use crate::trace::query::surface::{SurfaceHit, occlusions, surface_hits};
+use crate::trace::query::surface::{SurfaceHit, occlusions, surface_hits_at};
 use crate::trace::scene::instance_filter::InstanceFilter;
 use crate::trace::scene::scene_hit::{SceneHit, point_hit, triangle_hit};
 use crate::trace::scene::scheduler::{InstanceScheduler, RayRanges};
 use crate::trace::simd::Simd;
+use crate::trace::traversal::octree_walk::PixelSize;
 use std::ops::Range;
 
 /// Finds the closest hit of each ray on the accepted instances.
@@ -21,9 +22,21 @@ pub fn scene_hits(
     rays: &[Ray],
     hits: &mut [SceneHit],
 ) {
+    scene_hits_at(scene, simd, filter, PixelSize::ZERO, rays, hits);
+}
+
+/// Finds the closest hit of each ray on the accepted instances, where nothing smaller than a pixel counts.
+pub fn scene_hits_at(
+    scene: &FlatScene,
+    simd: Simd,
+    filter: InstanceFilter,
+    pixel: PixelSize,
+    rays: &[Ray],
+    hits: &mut [SceneHit],
+) {
     let mut batch = InstanceHits::default();
     if let Some(instance) = sole_identity_instance(scene, filter) {
-        batch.trace(&instance, simd, rays);
+        batch.trace(&instance, simd, pixel, rays);
         for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate() {
             let distance = batch.distance(&instance, i);
             let is_miss = distance == f32::INFINITY;
@@ -44,7 +57,8 @@ pub fn scene_hits(
                 FlatGeometry::Mesh(_) => 0.0,
             };
             local.load(instance.instance, ranges, rays, &distances, blend_distance);
-            batch.trace(&instance, simd, &local.rays);
+            let scaled = pixel.scaled(1.0 / instance.instance.max_scale);
+            batch.trace(&instance, simd, scaled, &local.rays);
             for (range, positions) in ranges.with_positions() {
                 let (hits, distances) = (&mut hits[range.clone()], &mut distances[range]);
                 batch.merge_nearer(&instance, &local, positions, hits, distances);
@@ -176,11 +190,11 @@ struct InstanceHits {
 }
 
 impl InstanceHits {
-    fn trace(&mut self, instance: &InstanceRef, simd: Simd, rays: &[Ray]) {
+    fn trace(&mut self, instance: &InstanceRef, simd: Simd, pixel: PixelSize, rays: &[Ray]) {
         match instance.geometry {
             FlatGeometry::Cloud(cloud) => {
                 self.of_points.resize(rays.len(), SurfaceHit::MISS);
-                surface_hits(cloud, simd, rays, &mut self.of_points);
+                surface_hits_at(cloud, simd, pixel, rays, &mut self.of_points);
             }
             FlatGeometry::Mesh(mesh) => {
                 self.of_triangles.resize(rays.len(), Hit::MISS);

@@ -161,6 +161,7 @@ impl LoadedScene {
     pub(super) fn check_memory(&self, description: &SceneDescription) -> Result<()> {
         let subsample = description.objects_default.preparation.subsample;
         MemoryEstimate::from_graph(&self.graph, subsample, n_pixels(description))
+            .with_surfaces_of(description)
             .check(description.run.memory_limit)
     }
 

@@ -1,0 +1,64 @@
+//! The figures of the thesis with other clouds, and a picture of each kind.
+
+use super::clouds::{self, Subject};
+use super::timing::{scene, settings};
+use std::path::Path;
+use surfel_core::flat::FlatScene;
+use surfel_core::image::Image;
+use surfel_core::math::Vec3;
+use surfel_core::progress::NoProgress;
+use surfel_core::render::{CpuRenderer, Renderer, Settings};
+use surfel_core::scene::Background;
+use surfel_core::surface::SurfaceKind;
+use surfel_core::trace::Simd;
+use surfel_formats::{Alpha, ImageOptions, save_image};
+
+/// Width and height of each picture.
+const SIZE: u32 = 320;
+
+/// Writes the figures that rays make, each as `figure-NN.jpg`.
+pub fn write_figures(folder: &Path) {
+    let (head, ruin) = (clouds::head(), clouds::ruin_scan());
+    let bunny = clouds::bunny().unwrap_or_else(|| {
+        eprintln!("figures: the head stands for the bunny, whose file is not there");
+        head.clone()
+    });
+    let random = bunny.with_random_signs();
+    let cube = clouds::cube().with_random_signs();
+    let figures = [
+        (1, &head, SurfaceKind::Points),
+        (2, &head, SurfaceKind::Sphere),
+        (3, &ruin, SurfaceKind::Sphere),
+        (5, &bunny, SurfaceKind::Disc),
+        (6, &head, SurfaceKind::Disc),
+        (7, &random, SurfaceKind::SplatMean),
+        (8, &cube, SurfaceKind::SplatMean),
+        (9, &random, SurfaceKind::Splat),
+        (10, &cube, SurfaceKind::Splat),
+        (12, &bunny, SurfaceKind::SplatFit),
+        (13, &head, SurfaceKind::SplatFit),
+    ];
+    for (number, subject, kind) in figures {
+        save(folder, &format!("figure-{number:02}"), &picture(subject, kind));
+    }
+}
+
+/// Writes a picture of each kind, as `kind-NAME.jpg`.
+pub fn write_kinds(folder: &Path, subject: &Subject) {
+    for (name, kind) in SurfaceKind::ALL {
+        save(folder, &format!("kind-{name}"), &picture(subject, kind));
+    }
+}
+
+fn picture(subject: &Subject, kind: SurfaceKind) -> Image {
+    let mut scene = scene(subject, kind);
+    scene.background = Background::Gradient { top: Vec3::ONE, bottom: Vec3::ONE };
+    let flat = FlatScene::new(&scene, &NoProgress).unwrap();
+    let settings = Settings { samples_per_pixel: 4, ..settings(SIZE) };
+    CpuRenderer { simd: Simd::detect() }.render(&flat, &settings, &NoProgress).unwrap().0
+}
+
+fn save(folder: &Path, name: &str, image: &Image) {
+    let options = ImageOptions { alpha: Alpha::Drop, ..ImageOptions::default() };
+    save_image(&folder.join(format!("{name}.jpg")), image, &options).unwrap();
+}

@@ -1,0 +1,199 @@
+//! The field of weighted planes: known answers, both of its searches, its kd-tree, and clouds that are hard on it.
+
+use crate::bad_clouds;
+use surfel_core::flat::{FieldTree, FlatCloud};
+use surfel_core::math::{Ray, Vec3};
+use surfel_core::points::PointCloud;
+use surfel_core::progress::NoProgress;
+use surfel_core::scene::CloudGeometry;
+use surfel_core::surface::SurfaceKind;
+use surfel_core::trace::{Simd, SurfaceHit, implicit_hits_by_discs, occlusions, surface_hits};
+use surfel_tests::clouds;
+use surfel_tests::scenes;
+
+const KIND: SurfaceKind = SurfaceKind::Implicit;
+
+fn hits(flat: &FlatCloud, rays: &[Ray]) -> Vec<SurfaceHit> {
+    let mut hits = vec![SurfaceHit::MISS; rays.len()];
+    surface_hits(flat, Simd::detect(), rays, &mut hits);
+    hits
+}
+
+/// Returns parallel rays along -Z through the points of a square grid.
+fn rays_from_above(half_side: f32, n_side: usize) -> Vec<Ray> {
+    let at = |i: usize| half_side * ((2 * i + 1) as f32 / n_side as f32 - 1.0);
+    let origins = (0..n_side * n_side).map(|i| Vec3::new(at(i % n_side), at(i / n_side), 5.0));
+    origins.map(|origin| Ray::new(origin, Vec3::NEG_Z)).collect()
+}
+
+#[test]
+fn a_sphere_has_its_depth_and_its_normals() {
+    let flat = scenes::flat(clouds::sphere(20_000, 1.0), KIND);
+    for (ray, hit) in rays_from_above(0.65, 80).iter().zip(hits(&flat, &rays_from_above(0.65, 80)))
+    {
+        let height = (1.0 - ray.origin.truncate().length_squared()).sqrt();
+        // Points of spacing 0.025 have supports of 0.06, whose planes stand out by at most 0.06^2 / 2.
+        assert!((hit.distance - (5.0 - height)).abs() < 1.8e-3, "{ray:?} {hit:?}");
+        assert!(hit.normal.angle_between(ray.origin.with_z(height)).to_degrees() < 1.0);
+    }
+}
+
+#[test]
+fn a_plane_is_flat_and_ends_at_its_outermost_points() {
+    let flat = scenes::flat(clouds::plane(50, 0.3, 4), KIND);
+    for hit in hits(&flat, &rays_from_above(0.95, 60)) {
+        assert!((hit.distance - 5.0).abs() < 1e-5 && 1.0 - 1e-6 < hit.normal.z, "{hit:?}");
+    }
+    let beyond = rays_from_above(1.2, 120).into_iter();
+    let beyond: Vec<Ray> =
+        beyond.filter(|ray| 1.0 < ray.origin.truncate().abs().max_element()).collect();
+    assert!(hits(&flat, &beyond).iter().all(SurfaceHit::is_miss));
+}
+
+#[test]
+fn crossing_planes_stay_planes_away_from_the_crossing() {
+    let flat = scenes::flat(clouds::crossing_planes(50, 0.3, 5), KIND);
+    let rays = rays_from_above(0.95, 60);
+    for (ray, hit) in rays.iter().zip(hits(&flat, &rays)) {
+        if 0.15 < ray.origin.x.abs() {
+            assert!((hit.distance - 5.0).abs() < 1e-4 && 0.999 < hit.normal.z, "{ray:?} {hit:?}");
+        }
+    }
+}
+
+/// Returns the cube of side 2 with normals that point outward, in random directions if `is_random`.
+fn cube(is_random: bool) -> CloudGeometry {
+    let mut points = scenes::points(clouds::cube(40, 0.3, 3), KIND);
+    if is_random {
+        return scenes::changed(&points, |cloud| {
+            for (i, normal) in cloud.normals.iter_mut().flatten().enumerate() {
+                *normal *= if (i * 7919) % 13 < 6 { -1.0 } else { 1.0 };
+            }
+        });
+    }
+    points.has_outward_normals = true;
+    points
+}
+
+#[test]
+fn a_cube_is_flat_and_closed_whatever_the_signs_of_its_normals() {
+    for is_random in [false, true] {
+        let flat = FlatCloud::new(&cube(is_random), &NoProgress).unwrap();
+        let rays = rays_from_above(0.9, 60);
+        for hit in hits(&flat, &rays) {
+            assert!(
+                (hit.distance - 4.0).abs() < 1e-4 && 0.999 < hit.normal.z,
+                "{is_random}: {hit:?}"
+            );
+        }
+        let rays: Vec<Ray> = scenes::random_rays(3000, 0.9, 4);
+        let rays: Vec<Ray> = rays.into_iter().filter(|ray| ray.t_max.is_infinite()).collect();
+        let toward = |ray: &Ray| {
+            let cube = surfel_core::math::Aabb { min: -0.9 * Vec3::ONE, max: 0.9 * Vec3::ONE };
+            0.1 < cube.length_along(ray)
+        };
+        let rays: Vec<Ray> = rays.into_iter().filter(toward).collect();
+        let n_misses = hits(&flat, &rays).iter().filter(|hit| hit.is_miss()).count();
+        assert!(2 * n_misses <= rays.len() / 1000, "{is_random}: {n_misses} of {}", rays.len());
+    }
+}
+
+/// Two sheets that face up, `gap` apart, of points with spacing 0.04.
+fn sheets(gap: f32) -> FlatCloud {
+    let mut cloud = clouds::plane(50, 0.3, 6);
+    let below = cloud.positions.clone();
+    cloud.positions.extend(below.iter().map(|position| *position - gap * Vec3::Z));
+    let n = cloud.positions.len();
+    cloud.normals = Some(vec![Vec3::Z; n]);
+    cloud.radii = Some(vec![0.08; n]);
+    FlatCloud::new(&scenes::points(cloud, KIND), &NoProgress).unwrap()
+}
+
+#[test]
+fn sheets_closer_than_the_reach_of_their_points_stay_apart() {
+    // The reach is 0.096.
+    let flat = sheets(0.07);
+    let rays = rays_from_above(0.9, 60);
+    let upper = hits(&flat, &rays);
+    for hit in &upper {
+        assert!((hit.distance - 5.0).abs() < 0.01, "{hit:?}");
+    }
+    let behind = |(ray, hit): (&Ray, &SurfaceHit)| Ray { t_min: hit.distance + 0.02, ..*ray };
+    let behind: Vec<Ray> = rays.iter().zip(&upper).map(behind).collect();
+    for hit in hits(&flat, &behind) {
+        assert!((hit.distance - 5.07).abs() < 0.01, "{hit:?}");
+    }
+}
+
+#[test]
+fn the_kd_tree_and_the_tree_of_points_find_the_same_surface() {
+    let rough = |mut cloud: PointCloud| {
+        cloud.normals = None;
+        cloud
+    };
+    let tested = [
+        ("sphere", clouds::sphere(20_000, 1.0)),
+        ("waves", clouds::waves(20_000, 0.3)),
+        ("cube", clouds::cube(40, 0.4, 11)),
+        ("cube with estimated normals", rough(clouds::cube(40, 0.4, 11))),
+    ];
+    for (name, cloud) in tested {
+        let flat = scenes::flat(cloud, KIND);
+        let rays = scenes::random_rays(20_000, 1.2, 5);
+        let mut by_discs = vec![SurfaceHit::MISS; rays.len()];
+        implicit_hits_by_discs(&flat, Simd::detect(), &rays, &mut by_discs);
+        let found = hits(&flat, &rays);
+        let n_hits = found.iter().filter(|hit| !hit.is_miss()).count();
+        let differs = |(a, b): &(&SurfaceHit, &SurfaceHit)| {
+            a.is_miss() != b.is_miss() || 0.1 * a.radius < (a.distance - b.distance).abs()
+        };
+        let n_different = found.iter().zip(&by_discs).filter(differs).count();
+        assert!(
+            2000 < n_hits && 1000 * n_different <= rays.len(),
+            "{name}: {n_different} of {} rays differ, {n_hits} hit",
+            rays.len()
+        );
+    }
+}
+
+#[test]
+fn what_a_camera_ray_hits_also_occludes_it() {
+    let flat = scenes::flat(clouds::cube(24, 0.4, 11), KIND);
+    let rays = scenes::random_rays(4000, 1.5, 8);
+    let mut occluded = vec![false; rays.len()];
+    occlusions(&flat, Simd::detect(), &rays, &mut occluded);
+    let is_hit: Vec<bool> = hits(&flat, &rays).iter().map(|hit| !hit.is_miss()).collect();
+    assert_eq!(is_hit, occluded);
+}
+
+#[test]
+fn the_scale_of_a_cloud_does_not_matter() {
+    let rays = rays_from_above(0.65, 40);
+    for scale in [1e-6, 1.0, 1e6] {
+        let mut cloud = clouds::sphere(2000, 1.0);
+        cloud.positions.iter_mut().for_each(|position| *position *= scale);
+        let flat = scenes::flat(cloud, KIND);
+        let scaled: Vec<Ray> =
+            rays.iter().map(|ray| Ray { origin: scale * ray.origin, ..*ray }).collect();
+        for (ray, hit) in rays.iter().zip(hits(&flat, &scaled)) {
+            let height = (1.0 - ray.origin.truncate().length_squared()).sqrt();
+            let distance = hit.distance / scale;
+            assert!((distance - (5.0 - height)).abs() < 0.02, "{scale}: {ray:?} {hit:?}");
+        }
+    }
+}
+
+#[test]
+fn kd_trees_of_bad_clouds_have_bounded_size() {
+    for (name, cloud) in bad_clouds::bad_clouds() {
+        let n = cloud.len();
+        let rays = bad_clouds::rays_toward(&cloud, 3);
+        let mut flat = bad_clouds::flat(cloud, KIND);
+        for has_sides in [false, true] {
+            flat.field = FieldTree::new(&flat.points, has_sides, &NoProgress).unwrap().into();
+            assert!(flat.field.bytes() <= 96 * n + 64, "{name}: {} bytes", flat.field.bytes());
+            let found = hits(&flat, &rays);
+            assert!(found.iter().all(|hit| hit.is_miss() || hit.distance.is_finite()), "{name}");
+        }
+    }
+}
