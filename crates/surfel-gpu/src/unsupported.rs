@@ -23,6 +23,7 @@ pub fn unsupported(scene: &FlatScene) -> Vec<String> {
             FlatGeometry::Cloud(cloud) => {
                 let kind = cloud.surface;
                 add(Surface::of_kind(kind).is_none(), format!("the surface {}", kind.name()));
+                add(cloud.options.changes(kind), "options of the surface".into());
                 add(cloud.support_colors.is_some(), "colours by support".into());
             }
         }

@@ -24,6 +24,9 @@ const GLASS = [['material.house.obj', 'glass']];
 const CASES = {
   surface: { value: 'sphere' },
   radius_scale: { value: 2 },
+  reach: { given: [['surface', 'cylinder']], value: 2 },
+  density: { given: [['surface', 'cylinder']], value: 16 },
+  degree: { given: [['surface', 'mls']], value: 1 },
   edge_test: { value: 'off' },
   color: { value: 'intensity' },
   cmap: { given: BY_ELEVATION, value: 'magma' },

@@ -18,6 +18,12 @@ export const surfaceControls = [
     isVisible: ({ surface }) => surface === 'points', help: 'Diameter of each point in pixels' },
   { key: 'radius_scale', label: 'Radius', ...SLIDER, range: [0.25, 4], limits: [0.01, 100], scale: 'logarithmic',
     read: (scene) => scene.radius_scale ?? 1, help: 'Factor of the radius of each point' },
+  { key: 'reach', label: 'Reach', ...SLIDER, range: [0.5, 4], limits: [0.25, 8], scale: 'logarithmic', automatic: true,
+    isVisible: ({ surface }) => ['cylinder', 'mls', 'splat-fit'].includes(surface), help: 'How far points count, in radii' },
+  { key: 'density', label: 'Density', ...SLIDER, range: [1, 16], limits: [1, 128], step: 1, automatic: true,
+    isVisible: ({ surface }) => surface === 'cylinder', help: 'Points that a hit needs' },
+  { key: 'degree', label: 'Degree', ...SLIDER, range: [1, 3], limits: [1, 3], step: 1, automatic: true,
+    isVisible: ({ surface }) => surface === 'mls', help: 'Degree of the fitted polynomials' },
   { key: 'edge_test', label: 'Edge test', kind: 'select', help: 'How the edge of the surface is found',
     options: () => [{ value: 'angular-gap', label: 'angular gap' }, { value: 'off', label: 'off' }] },
 ];

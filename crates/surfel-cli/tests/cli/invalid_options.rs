@@ -10,6 +10,9 @@ fn invalid_values_end_with_code_2() {
     let wrong = [
         &["--surface", "marble"][..],
         &["--edge-test", "maybe"],
+        &["--reach", "0"],
+        &["--density", "0"],
+        &["--degree", "4"],
         &["--radius-scale", "0"],
         &["--clip-box", "0,1,0,1"],
         &["--clip-box", "([0,1],[1,0])"],

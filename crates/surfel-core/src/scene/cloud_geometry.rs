@@ -3,7 +3,7 @@
 use super::color::SupportColors;
 use crate::error::Result;
 use crate::points::{PointCloud, PreparedCloud, Structure, check_length};
-use crate::surface::{EdgeTest, SurfaceKind};
+use crate::surface::{EdgeTest, SurfaceKind, SurfaceOptions};
 
 /// A prepared cloud with one colour for each point, and the surface that its points describe.
 #[derive(Clone, Debug)]
@@ -15,6 +15,8 @@ pub struct CloudGeometry {
     structures: Option<Vec<Structure>>,
     /// The surface that the points describe.
     pub surface: SurfaceKind,
+    /// Options of that surface.
+    pub options: SurfaceOptions,
     /// The test that rejects hits beyond the edge of the surface.
     pub edge_test: EdgeTest,
     /// True if colours of neighbouring points may be blended; false if each belongs to one point, as those of
@@ -37,6 +39,7 @@ impl Default for CloudGeometry {
             colors: Vec::new(),
             structures: None,
             surface: SurfaceKind::default(),
+            options: SurfaceOptions::default(),
             edge_test: EdgeTest::default(),
             blends_colors: true,
             support_colors: None,
@@ -65,7 +68,7 @@ impl CloudGeometry {
 
     /// Returns the structure of each point, or none if all points are part of the surface.
     pub fn structures(&self) -> Option<&[Structure]> {
-        let is_split = self.surface.uses_discs();
+        let is_split = self.surface.is_continuous();
         self.structures.as_deref().filter(|_| is_split)
     }
 

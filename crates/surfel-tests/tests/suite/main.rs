@@ -1,6 +1,7 @@
 //! Integration tests across crates: scenes with known answers, fast searches against brute force, and output
 //! that is the same on every machine.
 
+mod alignment;
 mod animation;
 mod backends;
 mod bad_clouds;
@@ -14,6 +15,7 @@ mod instances;
 mod light;
 mod many_instances;
 mod materials;
+mod neighbors;
 mod packet_groups;
 mod punctual_lights;
 mod quality;

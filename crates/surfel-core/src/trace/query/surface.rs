@@ -11,6 +11,7 @@ use crate::trace::query::edge_filter::EdgeFilter;
 use crate::trace::query::edge_test::evaluate_one;
 use crate::trace::query::hit::Hit;
 use crate::trace::query::leaf::LeafGeometry;
+use crate::trace::query::mls_surface::{MlsHit, mls_hits};
 use crate::trace::query::smooth_filter::SmoothFilter;
 use crate::trace::query::smooth_query::SmoothTracer;
 use crate::trace::query::splat_query::{Splat, SplatTracer};
@@ -86,6 +87,7 @@ fn surface_hits_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [Su
     if !cloud.points.nodes.is_empty() {
         match cloud.surface {
             SurfaceKind::Smooth => trace_smooth::<L>(cloud, rays, hits),
+            SurfaceKind::Mls => trace_mls::<L>(cloud, rays, hits),
             kind if kind.uses_discs() => splat_hits::<L>(cloud, rays, hits),
             _ => merge_solids::<L, Sphere>(&cloud.points, SurfaceKind::Sphere, rays, hits),
         }
@@ -111,6 +113,17 @@ fn occlusions_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [
         occluded.fill(false);
     } else if cloud.surface == SurfaceKind::Smooth {
         any_accepted_hit::<L, Disc, _>(&cloud.points, rays, SmoothFilter(cloud), occluded);
+    } else if cloud.surface == SurfaceKind::Mls {
+        let mut hits = vec![MlsHit::MISS; rays.len()];
+        mls_hits::<L, false>(cloud, rays, &mut hits);
+        occluded
+            .iter_mut()
+            .zip(&hits)
+            .for_each(|(occluded, found)| *occluded = !found.hit.is_miss());
+    } else if cloud.surface == SurfaceKind::Cylinder {
+        let mut hits = vec![SurfaceHit::MISS; rays.len()];
+        splat_hits::<L>(cloud, rays, &mut hits);
+        occluded.iter_mut().zip(&hits).for_each(|(occluded, hit)| *occluded = !hit.is_miss());
     } else if !cloud.surface.uses_discs() || cloud.edge_test == EdgeTest::Off {
         any_hits_kernel::<L>(cloud, rays, occluded);
     } else {
@@ -176,6 +189,30 @@ fn merge_occlusions<L: Lanes, S: LeafGeometry<Tree = FlatPoints>>(
     any_accepted_hit::<L, S, _>(points, &rays, AcceptAll, &mut by_solids);
     for (i, is_occluded) in open.into_iter().zip(by_solids) {
         occluded[i] = is_occluded;
+    }
+}
+
+/// Traces the surface of moving least squares.
+#[inline(always)]
+fn trace_mls<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    let mut found = vec![MlsHit::MISS; rays.len()];
+    mls_hits::<L, true>(cloud, rays, &mut found);
+    for ((hit, ray), MlsHit { hit: nearest, radius, normal, color }) in
+        hits.iter_mut().zip(rays).zip(found)
+    {
+        if nearest.is_miss() {
+            continue;
+        }
+        *hit = SurfaceHit {
+            distance: nearest.distance,
+            id: cloud.points.id(nearest.slot),
+            slot: nearest.slot,
+            radius: radius / cloud.radius_factor(),
+            normal,
+            color,
+            surface: cloud.surface,
+            is_backface: 0.0 < cloud.points.normal(nearest.slot).dot(ray.direction),
+        };
     }
 }
 
@@ -296,7 +333,8 @@ fn is_through_slit<L: Lanes>(cloud: &FlatCloud, disc: &Hit, hit: &SurfaceHit, ra
 #[inline(always)]
 fn splat_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
     hits.fill(SurfaceHit::MISS);
-    if cloud.edge_test == EdgeTest::Off {
+    let tests_edge = cloud.edge_test != EdgeTest::Off;
+    if !tests_edge && cloud.surface != SurfaceKind::Cylinder {
         let mut splats = vec![Splat::MISS; rays.len()];
         SplatTracer::new(cloud, cloud.surface, EdgeTest::Off).trace::<L>(rays, &mut splats);
         for ((hit, ray), splat) in hits.iter_mut().zip(rays).zip(&splats) {
@@ -307,7 +345,7 @@ fn splat_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]
     let mut searching: Vec<u32> = (0..rays.len() as u32).collect();
     let mut rays = rays.to_vec();
     let mut splats = vec![Splat::MISS; rays.len()];
-    let mut tracer = SplatTracer::new(cloud, cloud.surface, EdgeTest::AngularGap);
+    let mut tracer = SplatTracer::new(cloud, cloud.surface, cloud.edge_test);
     for _ in 0..MAX_REJECTED_HITS {
         let splats = &mut splats[..rays.len()];
         tracer.trace::<L>(&rays, splats);
@@ -318,7 +356,7 @@ fn splat_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]
                 continue;
             }
             let found = surface_hit(cloud, &ray, splat);
-            if splat.is_enclosed {
+            if splat.is_dense && (splat.is_enclosed || !tests_edge) {
                 hits[ray_idx as usize] = found;
                 continue;
             }
@@ -340,10 +378,10 @@ fn surface_hit(cloud: &FlatCloud, ray: &Ray, splat: &Splat) -> SurfaceHit {
         return SurfaceHit::MISS;
     }
     SurfaceHit {
-        distance: splat.hit.distance,
+        distance: splat.distance,
         id: cloud.points.id(splat.hit.slot),
         slot: splat.hit.slot,
-        radius: splat.radius / cloud.surface.radius_factor(),
+        radius: splat.radius / cloud.radius_factor(),
         normal: splat.normal,
         color: splat.color,
         surface: cloud.surface,
