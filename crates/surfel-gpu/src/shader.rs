@@ -7,6 +7,7 @@ use crate::records::{MAX_PLANES, TRIANGLE, surface_number};
 use std::fmt::Write;
 use surfel_core::bvh::MAX_DEPTH;
 use surfel_core::integrator::constants as integrator;
+use surfel_core::surface::align;
 use surfel_core::surface::capsule;
 use surfel_core::surface::disc;
 use surfel_core::surface::edge_test;
@@ -76,6 +77,7 @@ impl Surface {
             SurfaceKind::Points | SurfaceKind::SplatFit => None,
             // Their trees are traversed on the CPU alone.
             SurfaceKind::Implicit | SurfaceKind::Octree | SurfaceKind::OctreeSplat => None,
+            SurfaceKind::Cylinder | SurfaceKind::Mls => None,
         }
     }
 
@@ -259,6 +261,8 @@ fn constants() -> String {
     ];
     let floats = [
         ("CAPSULE_ASPECT", capsule::ASPECT),
+        ("MIN_ALIGNED_COSINE", align::MIN_ALIGNED_COSINE),
+        ("MIN_BENT_COSINE", align::MIN_BENT_COSINE),
         ("SOLID_SPAWN_OFFSET", SOLID_SPAWN_OFFSET),
         ("DISC_SPAWN_OFFSET", disc::SPAWN_OFFSET),
         ("DISC_SPAWN_T_MIN", disc::SPAWN_T_MIN),

@@ -24,6 +24,7 @@ pub fn unsupported(scene: &FlatScene) -> Vec<String> {
                 let kind = cloud.surface;
                 let what = format!("the surface {}{}", kind.name(), structure(kind));
                 add(Surface::of_kind(kind).is_none(), what);
+                add(cloud.options.changes(kind), "options of the surface".into());
                 add(cloud.support_colors.is_some(), "colours by support".into());
             }
         }

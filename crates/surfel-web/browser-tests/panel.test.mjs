@@ -24,6 +24,9 @@ const GLASS = [['material.house.obj', 'glass']];
 const CASES = {
   surface: { value: 'sphere' },
   radius_scale: { value: 2 },
+  reach: { given: [['surface', 'cylinder']], value: 2 },
+  density: { given: [['surface', 'cylinder']], value: 16 },
+  degree: { given: [['surface', 'mls']], value: 1 },
   edge_test: { value: 'off' },
   octree_depth: { given: [['surface', 'octree']], value: '3' },
   color: { value: 'intensity' },

@@ -239,6 +239,7 @@ fn load_unbuilt(
         cloud.scale_radii(settings.surface.radius_scale() as f32);
         let mut geometry = CloudGeometry::with_uniform_color(cloud, [200; 3]);
         geometry.surface = settings.surface.surface();
+        geometry.options = settings.surface.options();
         geometry.edge_test = settings.surface.edge_test();
         geometry.octree_depth = settings.surface.octree_depth();
         anyhow::Ok(geometry)

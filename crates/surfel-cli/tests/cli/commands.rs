@@ -49,13 +49,17 @@ fn render_accepts_all_surfaces_and_colors() {
         let common = ["render", &cloud, "-o", &picture, "--resolution", "32x24", "--spp", "1"];
         succeed(&[&common, options].concat());
     };
-    for surface in ["points", "sphere", "disc", "splat-mean", "splat", "splat-fit"] {
+    for surface in
+        ["points", "sphere", "disc", "splat-mean", "splat", "splat-fit", "cylinder", "mls"]
+    {
         render(&["--surface", surface]);
     }
     for surface in ["implicit", "octree", "octree-splat"] {
         render(&["--surface", surface]);
     }
     render(&["--surface", "octree", "--octree-depth", "4"]);
+    render(&["--surface", "cylinder", "--reach", "1.5", "--density", "4"]);
+    render(&["--surface", "mls", "--reach", "2", "--degree", "3"]);
     for color in
         ["rgb", "elevation", "class", "normal", "#ff8000", "rain", "RAIN", "surface_variation"]
     {

@@ -12,7 +12,7 @@ use crate::points::Structure;
 use crate::progress::Progress;
 use crate::scene::CloudGeometry;
 use crate::scene::color::SupportColors;
-use crate::surface::{EdgeTest, SurfaceKind, edge_retest_factor};
+use crate::surface::{EdgeTest, SurfaceKind, SurfaceOptions, edge_retest_factor};
 
 /// A point cloud with the surface that its points describe.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +29,8 @@ pub struct FlatCloud {
     pub octree: Box<Octree>,
     /// The shape of the points.
     pub surface: SurfaceKind,
+    /// Options of that shape.
+    pub options: SurfaceOptions,
     /// The test that decides where the surface ends.
     pub edge_test: EdgeTest,
     /// Factor on the radius of the neighbourhood that decides about a hit which the nearest points do not enclose.
@@ -57,7 +59,7 @@ impl FlatCloud {
         let (positions, normals, radii) = (cloud.positions(), cloud.normals(), cloud.radii());
         let colors = geometry.colors();
         let columns = PointColumns::new(geometry.surface, positions, normals, radii, colors)?;
-        Self::from_columns(columns, geometry, progress)
+        Self::from_columns(scaled(columns, geometry), geometry, progress)
     }
 
     /// Sorts deformed points into a tree.
@@ -91,6 +93,7 @@ impl FlatCloud {
             field: Box::default(),
             octree: Box::default(),
             surface: geometry.surface,
+            options: geometry.options,
             edge_test: geometry.edge_test,
             has_outward_normals: geometry.has_outward_normals,
             has_front_sides: geometry.has_front_sides,
@@ -139,6 +142,11 @@ impl FlatCloud {
         }
     }
 
+    /// Returns the factor that multiplied the radii of the surface's points.
+    pub fn radius_factor(&self) -> f32 {
+        self.options.radius_factor(self.surface)
+    }
+
     /// Returns the sizes of the trees and of the points in bytes.
     pub fn bytes(&self) -> (usize, usize) {
         let parts = [&self.points, &self.lines, &self.scatter].map(FlatPoints::bytes);
@@ -179,7 +187,8 @@ impl FlatCloud {
     }
 
     fn set_max_blend_distance(&mut self) {
-        let looks_behind = self.surface.blends_discs() || self.surface == SurfaceKind::Smooth;
+        let is_smooth = matches!(self.surface, SurfaceKind::Smooth | SurfaceKind::Mls);
+        let looks_behind = self.surface.blends_discs() || is_smooth;
         self.max_blend_distance = if looks_behind { self.points.max_radius() } else { 0.0 };
     }
 }
@@ -214,5 +223,12 @@ fn deformed_columns<'a>(
     geometry: &'a CloudGeometry,
 ) -> Result<PointColumns<'a>> {
     let Deformed { positions, normals, radii, .. } = deformed;
-    PointColumns::new(geometry.surface, positions, normals, radii, geometry.colors())
+    let columns =
+        PointColumns::new(geometry.surface, positions, normals, radii, geometry.colors())?;
+    Ok(scaled(columns, geometry))
+}
+
+/// Scales the radii of columns as the options of the surface ask for.
+fn scaled<'a>(columns: PointColumns<'a>, geometry: &CloudGeometry) -> PointColumns<'a> {
+    columns.with_radius_factor(geometry.options.radius_factor(geometry.surface))
 }

@@ -16,6 +16,8 @@ pub struct PointColumns<'a> {
     normals: &'a [Vec3],
     radii: &'a [f32],
     colors: &'a [[u8; 3]],
+    /// The factor that multiplies the radii.
+    radius_factor: f32,
     /// The structure of each point, and the one whose points count; none if all do.
     part: Option<(&'a [Structure], Structure)>,
 }
@@ -36,7 +38,13 @@ impl<'a> PointColumns<'a> {
         check_length("normals", normals.len(), positions.len())?;
         check_length("radii", radii.len(), positions.len())?;
         check_length("colours", colors.len(), positions.len())?;
-        Ok(Self { kind, positions, normals, radii, colors, part: None })
+        let radius_factor = kind.radius_factor();
+        Ok(Self { kind, positions, normals, radii, colors, radius_factor, part: None })
+    }
+
+    /// Multiplies the radii by this factor instead of that of the surface kind.
+    pub(super) fn with_radius_factor(self, radius_factor: f32) -> Self {
+        Self { radius_factor, ..self }
     }
 
     /// Leaves out all points but those of one structure, which get this kind.
@@ -46,7 +54,9 @@ impl<'a> PointColumns<'a> {
         kind: SurfaceKind,
         part: Structure,
     ) -> Self {
-        Self { kind, part: Some((structures, part)), ..self }
+        let is_same = kind == self.kind;
+        let radius_factor = if is_same { self.radius_factor } else { kind.radius_factor() };
+        Self { kind, radius_factor, part: Some((structures, part)), ..self }
     }
 
     /// Returns the shape of the points.
@@ -65,7 +75,7 @@ impl<'a> PointColumns<'a> {
         BlockPoint {
             position: self.positions[i],
             normal: normal_or_z(self.normals[i]),
-            radius: if self.has_radii() { self.kind.radius_factor() * self.radii[i] } else { 0.0 },
+            radius: if self.has_radii() { self.radius_factor * self.radii[i] } else { 0.0 },
             color: self.colors[i],
         }
     }

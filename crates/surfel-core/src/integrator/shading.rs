@@ -36,8 +36,8 @@ pub struct Shading {
     pub emission: Vec3,
     /// True if the surface shows its base colour whatever the light.
     pub is_unlit: bool,
-    /// Radius of the point in world units; 0 for triangles.
-    pub radius: f32,
+    /// The radius of a point, in world units, from which the distance follows that new rays skip; 0 for triangles.
+    spawn_radius: f32,
     /// The kind of surface of points; `None` for triangles.
     surface: Option<SurfaceKind>,
     /// Largest absolute coordinate of the hit and of the ray's origin, which bounds rounding errors.
@@ -70,7 +70,7 @@ impl Shading {
             is_thin: material.is_thin,
             emission: material.emissive,
             is_unlit: material.is_unlit,
-            radius: hit.radius,
+            spawn_radius: hit.spawn_radius,
             surface: hit.surface,
             coordinate_magnitude: position.abs().max(ray.origin.abs()).max_element(),
         };
@@ -138,7 +138,7 @@ impl Shading {
         let is_outward = 0.0 <= self.geometric_normal.dot(direction);
         let side = if is_outward { self.geometric_normal } else { -self.geometric_normal };
         match self.surface {
-            Some(surface) => surface.spawn_ray(self.position, side, self.radius, direction),
+            Some(surface) => surface.spawn_ray(self.position, side, self.spawn_radius, direction),
             None => {
                 // The position is wrong by a few roundings of the coordinates that it was computed from.
                 let origin = self.position + 32.0 * f32::EPSILON * self.coordinate_magnitude * side;

@@ -18,7 +18,7 @@ pub struct CleanReport {
     pub n_noise: usize,
     /// Number of points dropped because they are flagged withheld.
     pub n_withheld: usize,
-    /// Number of points dropped because an earlier point has the same position.
+    /// Number of points dropped because an earlier point has the same position, and a normal of about that direction.
     pub n_duplicates: usize,
     /// Number of zero or non-finite normals, set to zero, which `prepare` takes as missing.
     pub n_invalid_normals: usize,
@@ -28,7 +28,8 @@ pub struct CleanReport {
     pub n_invalid_radii: usize,
 }
 
-/// The choice whether duplicates are dropped: all but the first of points at one position.
+/// The choice whether duplicates are dropped: all but the first of points at one position. Points with different normals,
+/// as those that the faces of an edge share, are no duplicates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Duplicates {
     /// They are dropped.
@@ -37,6 +38,11 @@ pub enum Duplicates {
     /// They stay.
     Keep,
 }
+
+/// Minimum cosine, of any sign, between the normals of duplicates.
+const MIN_DUPLICATE_COSINE: f32 = 0.85;
+/// Maximum number of points at one position that are compared with each other.
+const MAX_COMPARED: usize = 64;
 
 /// ASPRS classes of noise: low points and high noise.
 const NOISE_CLASSES: [u8; 2] = [7, 18];
@@ -113,7 +119,7 @@ fn find_dropped(
     let n_dropped = dropped.len();
     if cloud.morphs.is_empty() && cloud.skin.is_none() {
         let is_candidate = |i: u32| !is_invalid(i) && !is_noise(i) && !is_withheld(i);
-        let found = find_duplicates(positions, is_candidate, progress)?;
+        let found = find_duplicates(cloud, is_candidate, progress)?;
         match duplicates {
             Duplicates::Drop => dropped.extend(found),
             Duplicates::Keep if found.is_empty() => {}
@@ -142,11 +148,12 @@ fn is_noise(class: &u8) -> bool {
 /// Returns all but the first index of each group of candidates at equal positions. Takes 8 bytes per point while it
 /// runs.
 fn find_duplicates(
-    positions: &[Vec3],
+    cloud: &PointCloud,
     is_candidate: impl Fn(u32) -> bool + Sync,
     progress: &dyn Progress,
 ) -> Result<Vec<u32>> {
-    let mut keys: Vec<u64> = positions
+    let mut keys: Vec<u64> = cloud
+        .positions
         .par_iter()
         .enumerate()
         .filter(|(i, _)| is_candidate(*i as u32))
@@ -156,15 +163,31 @@ fn find_duplicates(
     keys.par_sort_unstable();
     progress.check()?;
     let groups = keys.par_chunk_by_mut(|a, b| a >> 32 == b >> 32);
-    Ok(groups.filter(|group| 1 < group.len()).flat_map_iter(|g| duplicates(g, positions)).collect())
+    Ok(groups.filter(|group| 1 < group.len()).flat_map_iter(|g| duplicates(g, cloud)).collect())
 }
 
 /// Returns the duplicates among points of one hash value, which rarely have different positions.
-fn duplicates(group: &mut [u64], positions: &[Vec3]) -> Vec<u32> {
-    let bits = |key: u64| position_bits(positions[key as u32 as usize]);
+fn duplicates(group: &mut [u64], cloud: &PointCloud) -> Vec<u32> {
+    let bits = |key: u64| position_bits(cloud.positions[key as u32 as usize]);
     group.sort_unstable_by_key(|&key| (bits(key), key as u32));
-    let pairs = group.windows(2).filter(|pair| bits(pair[0]) == bits(pair[1]));
-    pairs.map(|pair| pair[1] as u32).collect()
+    let mut found = Vec::new();
+    for points in group.chunk_by(|a, b| bits(*a) == bits(*b)) {
+        let mut kept: Vec<u32> = Vec::new();
+        for &key in points {
+            let point = key as u32;
+            let is_kept = kept.len() < MAX_COMPARED
+                && !kept.iter().any(|other| have_similar_normals(cloud, *other, point));
+            if is_kept { kept.push(point) } else { found.push(point) }
+        }
+    }
+    found
+}
+
+/// True if two points have normals of about one direction, or if either has none.
+fn have_similar_normals(cloud: &PointCloud, a: u32, b: u32) -> bool {
+    let normal = |point: u32| cloud.normals.as_ref()?[point as usize].try_normalize();
+    let (Some(a), Some(b)) = (normal(a), normal(b)) else { return true };
+    MIN_DUPLICATE_COSINE < a.dot(b).abs()
 }
 
 /// Returns the bits of the coordinates, equal for equal coordinates: adding 0 turns -0 into 0.
@@ -272,8 +295,18 @@ mod tests {
 
     #[test]
     fn different_points_of_one_hash_are_no_duplicates() {
-        let positions = [Vec3::X, Vec3::Y, Vec3::X];
-        assert_eq!(duplicates(&mut [0, 1, 2], &positions), [2]);
+        let cloud = PointCloud::from_positions(vec![Vec3::X, Vec3::Y, Vec3::X]);
+        assert_eq!(duplicates(&mut [0, 1, 2], &cloud), [2]);
+    }
+
+    #[test]
+    fn points_of_several_faces_keep_their_normals() {
+        let mut cloud = PointCloud::from_positions(vec![Vec3::ONE; 6]);
+        cloud.normals =
+            Some(vec![Vec3::X, Vec3::Y, Vec3::new(1.0, 0.1, 0.0), Vec3::Z, -Vec3::Y, Vec3::ZERO]);
+        let (cloud, report) = cleaned(cloud);
+        assert_eq!(cloud.normals, Some(vec![Vec3::X, Vec3::Y, Vec3::Z]));
+        assert_eq!(report.n_duplicates, 3);
     }
 
     #[test]

@@ -15,6 +15,7 @@ mod scan_angle;
 mod orient;
 mod prepared_cloud;
 mod radius;
+mod normal_lengths;
 mod subsample;
 mod outliers;
 mod structure;
@@ -56,7 +57,10 @@ pub use preparation::{Preparation, SURFACE_VARIATION};
 pub use prepare::{PreparationReport, prepare};
 pub use prepared_cloud::PreparedCloud;
 pub(crate) use prepared_cloud::check_length;
-pub use radius::{DistanceSample, Radius, RadiusReport, estimate_radii, median_distance, spacing};
+pub use radius::{
+    DEFAULT_RADIUS_SAMPLES, DistanceSample, Radius, RadiusReport, estimate_radii, median_distance,
+    spacing,
+};
 pub use scan_angle::{POINT_SOURCE, SCAN_ANGLE};
 pub use scan_station::{COLUMN_INDEX, ROW_INDEX, STATION, ScanStation};
 pub use structure::{PointShape, STRUCTURE, Structure, StructureChoice, StructureReport};

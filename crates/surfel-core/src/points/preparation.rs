@@ -34,6 +34,8 @@ pub struct Preparation {
     /// The signs of normals. Applies if all normals are estimated; `Orientation::Auto` also turns those of the file to
     /// the stations, if these are known.
     pub orientation: Orientation,
+    /// True to take the lengths of the file's normals for radii, if these vary as radii do and the file has no others.
+    pub radii_from_normals: bool,
     /// The choice of radii.
     pub radius: Radius,
     /// The choice of structures. Applies if all radii are estimated by `Radius::Adaptive`.
@@ -58,6 +60,7 @@ impl Default for Preparation {
             neighbors: NeighborMethod::Knn,
             normals: Neighborhood::Nearest(16),
             orientation: Orientation::None,
+            radii_from_normals: true,
             radius: Radius::default(),
             structure: StructureChoice::default(),
             free_space: true,

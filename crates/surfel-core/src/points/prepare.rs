@@ -5,6 +5,7 @@ use super::denoise::{DenoiseReport, denoise};
 use super::estimate::{Estimates, Missing, estimate, find_shapes};
 use super::mixed_pixels::{MixedPixels, without_mixed_pixels};
 use super::neighbors::Neighborhood;
+use super::normal_lengths::take_radii_from_normals;
 use super::normals::{NormalReport, PlaneFit, fill_missing};
 use super::orient::{Orientation, has_stations, orient, turn_to_stations};
 use super::outliers::remove_outliers;
@@ -49,6 +50,10 @@ pub fn prepare(
     progress: &dyn Progress,
 ) -> Result<(PreparedCloud, PreparationReport)> {
     preparation.check()?;
+    let mut cloud = cloud;
+    if preparation.radii_from_normals {
+        take_radii_from_normals(&mut cloud, progress)?;
+    }
     let (mut cloud, clean) = clean(cloud, preparation.duplicates, progress)?;
     if preparation.mixed_pixels == MixedPixels::Drop
         && let Some(kept) = without_mixed_pixels(&cloud)

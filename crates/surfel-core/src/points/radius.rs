@@ -10,6 +10,9 @@ use std::str::FromStr;
 /// Maximum ratio of a radius to the median of its neighbours' radii. It keeps outliers from getting giant discs.
 const MAX_OUTLIER_RATIO: f32 = 4.0;
 
+/// Number of points from which one radius for all points is estimated, unless another one is asked for.
+pub const DEFAULT_RADIUS_SAMPLES: usize = 100;
+
 /// The choice of radii.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Radius {
@@ -295,16 +298,26 @@ impl FromStr for Radius {
         let radius = match name {
             "auto" if number.is_empty() => Some(Self::default()),
             "adaptive" => count(12).map(|k| Self::Adaptive { k }),
-            "median" => count(6).map(|n| Self::Median { n, samples: 100 }),
+            "median" => parse_median(number),
             _ => text.parse().ok().map(Self::Fixed),
         };
         let radius = radius.filter(|radius| radius.check().is_ok());
         radius.ok_or_else(|| Error::Setting {
             name: "radius",
             found: text.to_owned(),
-            expected: "auto, adaptive[:K], median[:N] or a positive number in world units",
+            expected: "auto, adaptive[:K], median[:N[,C]] or a positive number in world units",
         })
     }
+}
+
+/// Parses the number of points in a neighbourhood and that of samples, both of which may be missing.
+fn parse_median(text: &str) -> Option<Radius> {
+    let (n, samples) = match text.split_once(',') {
+        Some((n, samples)) => (n, samples.parse().ok()?),
+        None => (text, DEFAULT_RADIUS_SAMPLES),
+    };
+    let n = if text.is_empty() { 6 } else { n.parse().ok()? };
+    Some(Radius::Median { n, samples })
 }
 
 #[cfg(test)]
@@ -397,8 +410,20 @@ mod tests {
         assert_eq!("auto".parse::<Radius>().unwrap(), Radius::Adaptive { k: 12 });
         assert_eq!("adaptive:20".parse::<Radius>().unwrap(), Radius::Adaptive { k: 20 });
         assert_eq!("median:4".parse::<Radius>().unwrap(), Radius::Median { n: 4, samples: 100 });
+        assert_eq!("median:6,9".parse::<Radius>().unwrap(), Radius::Median { n: 6, samples: 9 });
         assert_eq!("0.25".parse::<Radius>().unwrap(), Radius::Fixed(0.25));
-        for text in ["", "0", "-1", "inf", "adaptive:0", "median:x", "auto:3", "mean"] {
+        for text in [
+            "",
+            "0",
+            "-1",
+            "inf",
+            "adaptive:0",
+            "median:x",
+            "median:6,0",
+            "median:6,",
+            "auto:3",
+            "mean",
+        ] {
             assert!(text.parse::<Radius>().is_err(), "{text}");
         }
     }

@@ -3,7 +3,7 @@
 use super::color::SupportColors;
 use crate::error::Result;
 use crate::points::{PointCloud, PreparedCloud, Structure, check_length};
-use crate::surface::{EdgeTest, OctreeDepth, SurfaceKind};
+use crate::surface::{EdgeTest, OctreeDepth, SurfaceKind, SurfaceOptions};
 
 /// A prepared cloud with one colour for each point, and the surface that its points describe.
 #[derive(Clone, Debug)]
@@ -15,6 +15,8 @@ pub struct CloudGeometry {
     structures: Option<Vec<Structure>>,
     /// The surface that the points describe.
     pub surface: SurfaceKind,
+    /// Options of that surface.
+    pub options: SurfaceOptions,
     /// The test that rejects hits beyond the edge of the surface.
     pub edge_test: EdgeTest,
     /// Depth of the cells, if the surface is an octree.
@@ -39,6 +41,7 @@ impl Default for CloudGeometry {
             colors: Vec::new(),
             structures: None,
             surface: SurfaceKind::default(),
+            options: SurfaceOptions::default(),
             edge_test: EdgeTest::default(),
             octree_depth: OctreeDepth::default(),
             blends_colors: true,
@@ -68,7 +71,7 @@ impl CloudGeometry {
 
     /// Returns the structure of each point, or none if all points are part of the surface.
     pub fn structures(&self) -> Option<&[Structure]> {
-        let is_split = self.surface.uses_discs();
+        let is_split = self.surface.is_continuous();
         self.structures.as_deref().filter(|_| is_split)
     }
 

@@ -2,6 +2,7 @@
 
 use super::capsule;
 use super::disc;
+use super::mls;
 use super::smooth;
 use super::sphere;
 use crate::error::Error;
@@ -27,6 +28,12 @@ pub enum SurfaceKind {
     /// All discs within two radii behind the nearest are blended; the normal is that of a plane fitted to
     /// their centres.
     SplatFit,
+    /// A ray is a cylinder: position, normal and colour are means over all points in a short part of it behind the
+    /// first disc that it pierces (Schaufler and Jensen, Ray Tracing Point Sampled Geometry, 2000).
+    Cylinder,
+    /// Moving least squares: planes and polynomials are fitted to the points around each position (Adamson and Alexa,
+    /// Approximating and Intersecting Surfaces from Points, 2003). It needs no normals.
+    Mls,
     /// Spheres are fitted to the points around each position (Guennebaud and Gross, Algebraic Point Set Surfaces,
     /// 2007): one smooth surface for rays of all kinds.
     #[default]
@@ -46,13 +53,15 @@ pub enum SurfaceKind {
 
 impl SurfaceKind {
     /// The kinds of surface that a cloud can be given, with their names.
-    pub const ALL: [(&'static str, Self); 10] = [
+    pub const ALL: [(&'static str, Self); 12] = [
         ("points", Self::Points),
         ("sphere", Self::Sphere),
         ("disc", Self::Disc),
         ("splat-mean", Self::SplatMean),
         ("splat", Self::Splat),
         ("splat-fit", Self::SplatFit),
+        ("cylinder", Self::Cylinder),
+        ("mls", Self::Mls),
         ("smooth", Self::Smooth),
         ("implicit", Self::Implicit),
         ("octree", Self::Octree),
@@ -64,27 +73,51 @@ impl SurfaceKind {
         Self::ALL.iter().find(|(_, kind)| *kind == self).map_or("capsule", |(name, _)| name)
     }
 
-    /// Returns the factor that multiplies the points' radii before tracing.
+    /// Returns the factor that multiplies the points' radii before tracing, unless options choose another one.
     pub fn radius_factor(self) -> f32 {
-        if self == Self::SplatFit { 2.0 } else { 1.0 }
+        match self {
+            Self::SplatFit => 2.0,
+            Self::Mls => mls::DEFAULT_REACH / mls::SUPPORT_FACTOR,
+            _ => 1.0,
+        }
     }
 
-    /// Returns true if points are discs with normals rather than spheres.
+    /// Returns true if an option can choose how far from a ray or a position points count.
+    pub fn has_reach(self) -> bool {
+        matches!(self, Self::SplatFit | Self::Cylinder | Self::Mls)
+    }
+
+    /// Returns true if points are discs with normals rather than spheres or balls.
     pub fn uses_discs(self) -> bool {
-        !matches!(self, Self::Points | Self::Sphere | Self::Capsule)
+        !matches!(self, Self::Points | Self::Sphere | Self::Mls | Self::Capsule)
+    }
+
+    /// Returns true if the points describe a surface between them, rather than each one for itself.
+    pub fn is_continuous(self) -> bool {
+        self.uses_discs() || self == Self::Mls
     }
 
     /// Returns true if all discs near the nearest one contribute to a hit.
     pub fn blends_discs(self) -> bool {
-        matches!(self, Self::SplatMean | Self::Splat | Self::SplatFit)
+        matches!(self, Self::SplatMean | Self::Splat | Self::SplatFit | Self::Cylinder)
     }
 
     /// Returns the bounding box of a point of this kind. `normal` has unit length.
     pub fn bounds(self, center: Vec3, normal: Vec3, radius: f32) -> Aabb {
         match self {
-            Self::Points | Self::Sphere => sphere::bounds(center, radius),
+            Self::Points | Self::Sphere | Self::Mls => sphere::bounds(center, radius),
             Self::Capsule => capsule::bounds(center, normal, radius),
             _ => disc::bounds(center, normal, radius),
+        }
+    }
+
+    /// Returns the distance before which secondary rays ignore hits, in radii; 1 for spheres, where they ignore none.
+    pub fn spawn_distance(self) -> f32 {
+        match self {
+            Self::Smooth | Self::Implicit => smooth::SPAWN_T_MIN,
+            Self::Mls => mls::SPAWN_T_MIN,
+            _ if self.uses_discs() => disc::SPAWN_T_MIN,
+            _ => 1.0,
         }
     }
 
@@ -95,13 +128,14 @@ impl SurfaceKind {
     /// (Schaufler and Jensen 2000). Spheres are solid and need an offset for the rounding of f32 only.
     pub fn spawn_ray(self, position: Vec3, normal: Vec3, radius: f32, direction: Vec3) -> Ray {
         let rounding = 4.0 * f32::EPSILON * position.abs().max_element();
-        let (offset, t_min) = match self {
-            Self::Smooth | Self::Implicit => {
-                (smooth::SPAWN_OFFSET * radius, smooth::SPAWN_T_MIN * radius)
-            }
-            _ if self.uses_discs() => (disc::SPAWN_OFFSET * radius, disc::SPAWN_T_MIN * radius),
-            _ => (SOLID_SPAWN_OFFSET * radius, 0.0),
+        let t_min = if self.is_continuous() { self.spawn_distance() * radius } else { 0.0 };
+        let offset = match self {
+            Self::Smooth | Self::Implicit => smooth::SPAWN_OFFSET,
+            Self::Mls => mls::SPAWN_OFFSET,
+            _ if self.uses_discs() => disc::SPAWN_OFFSET,
+            _ => SOLID_SPAWN_OFFSET,
         };
+        let offset = offset * radius;
         let origin = position + (offset + rounding) * normal;
         Ray { origin, t_min, direction, t_max: f32::INFINITY }
     }

@@ -1,17 +1,21 @@
 //! Surface kinds: the shape that a ray intersects at each point or triangle, one file per shape.
 
+pub mod align;
 pub mod capsule;
 pub mod disc;
 pub mod edge_test;
 mod field;
 mod kind;
+pub mod mls;
 mod octree_depth;
+pub mod options;
 mod shape;
 pub mod smooth;
 mod sphere;
 mod splat;
 pub mod triangle;
 
+pub use align::Align;
 pub use capsule::Capsule;
 pub use disc::Disc;
 pub use edge_test::{
@@ -21,6 +25,7 @@ pub use edge_test::{
 pub use field::{FIELD_SUPPORT, FieldPoint, FieldSums, MIN_FIELD_WEIGHT, field_weight};
 pub use kind::{SOLID_SPAWN_OFFSET, SurfaceKind};
 pub use octree_depth::OctreeDepth;
+pub use options::{GatherLimit, SurfaceOptions};
 pub use shape::{MAX_NORMAL_COMPONENT, PointLanes, RayLanes, Shape};
 pub use smooth::{
     ColorSums, FIT_REACH, FitPoint, OverhangSums, PointSums, SUPPORT_FACTOR, SphereHit, SphereSums,
@@ -28,6 +33,6 @@ pub use smooth::{
 };
 pub use sphere::Sphere;
 pub use splat::{
-    MAX_GATHERED, MIN_PLANE_RATIO, SplatAccumulator, Surfel, fit_plane_normal, gather_limit,
+    Blend, MAX_CANDIDATES, MAX_GATHERED, NearestDisc, SplatAccumulator, Surfel, gather_limit,
 };
 pub use triangle::{RayFrame, RayRelativeTriangles, Triangle, TriangleLanes};

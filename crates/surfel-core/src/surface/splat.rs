@@ -1,12 +1,14 @@
 //! Splats: the discs close behind the nearest one, blended into a smooth surface (Wiesmeier 2011, 'multi').
 
+use super::align::Align;
 use super::kind::SurfaceKind;
-use crate::math::{DVec3, Floats, SymmetricMatrix, Vec3, Vec3Lanes, smallest_eigenvector};
+use crate::math::{Floats, Vec3, Vec3Lanes};
 
-/// Minimum ratio of the second to the largest eigenvalue of points that span a plane.
-pub const MIN_PLANE_RATIO: f64 = 1e-4;
 /// Maximum number of discs blended at a hit. If there are more, the nearest are kept.
 pub const MAX_GATHERED: usize = 16;
+/// Maximum number of discs from which those of a hit of `Cylinder` or `SplatFit` are taken. If there are more, the nearest
+/// along the ray are kept: points that lie thousands over each other cost no more.
+pub const MAX_CANDIDATES: usize = 128;
 
 /// A point of a cloud as a disc with colour.
 #[derive(Clone, Copy, Debug)]
@@ -28,64 +30,113 @@ pub fn gather_limit<T: std::ops::Add<Output = T>>(distance: T, radius: T) -> T {
     distance + radius
 }
 
-/// Accumulates the weighted mean of disc normals and colours, one ray per lane and one disc at a time.
-///
-/// Wiesmeier flips each normal toward the ray's origin on its own. At a silhouette that turns the discs behind
-/// the bend inside out. Here the normal of the nearest disc is flipped, and the others follow it.
+/// The nearest disc of rays, one per lane.
+#[derive(Clone, Copy)]
+pub struct NearestDisc<F> {
+    /// Distance along the ray.
+    pub distance: F,
+    /// Centre in the cloud's coordinates.
+    pub center: Vec3Lanes<F>,
+    /// Unit normal.
+    pub normal: Vec3Lanes<F>,
+}
+
+/// Accumulates the weighted mean of disc normals and colours, one ray per lane and one disc at a time, and for
+/// `Cylinder` of their distances.
 pub struct SplatAccumulator<F> {
     kind: SurfaceKind,
+    align: Align,
     direction: Vec3Lanes<F>,
-    /// Normal of the nearest disc, flipped toward the ray's origin.
-    nearest: Vec3Lanes<F>,
+    /// The nearest disc, its normal flipped toward the ray's origin.
+    nearest: NearestDisc<F>,
     normal: Vec3Lanes<F>,
     color: Vec3Lanes<F>,
+    /// Distances behind the nearest disc.
+    depth: F,
     total_weight: F,
 }
 
+/// The weighted means of rays' discs, one ray per lane.
+pub struct Blend<F> {
+    /// Distance along the ray.
+    pub distance: F,
+    /// Unit normal, which faces the ray's origin.
+    pub normal: Vec3Lanes<F>,
+    /// Linear colour.
+    pub color: Vec3Lanes<F>,
+}
+
 impl<F: Floats> SplatAccumulator<F> {
-    /// Returns an empty accumulator. `nearest` is the unit normal of the nearest disc on each ray.
+    /// Returns an empty accumulator. `align` is the rule of `Splat`.
     #[inline(always)]
-    pub fn new(kind: SurfaceKind, nearest: Vec3Lanes<F>, direction: Vec3Lanes<F>) -> Self {
-        let zero = Vec3Lanes::splat(Vec3::ZERO);
-        let nearest = flip_to_hemisphere(nearest, zero.minus(direction));
-        Self { kind, direction, nearest, normal: zero, color: zero, total_weight: F::splat(0.0) }
+    pub fn new(
+        kind: SurfaceKind,
+        align: Align,
+        nearest: &NearestDisc<F>,
+        direction: Vec3Lanes<F>,
+    ) -> Self {
+        let (none, zero) = (Vec3Lanes::splat(Vec3::ZERO), F::splat(0.0));
+        let normal = flip_to_hemisphere(nearest.normal, none.minus(direction));
+        let nearest = NearestDisc { normal, ..*nearest };
+        Self {
+            kind,
+            align,
+            direction,
+            nearest,
+            normal: none,
+            color: none,
+            depth: zero,
+            total_weight: zero,
+        }
     }
 
-    /// Adds a disc to the lanes of the rays that hit it, at `offset` from its centre.
+    /// Adds a disc to the lanes of the rays that hit it, at `distance` along the ray and `offset` from its centre.
     #[inline(always)]
-    pub fn add(&mut self, disc: &Surfel, offset: Vec3Lanes<F>, is_hit: F::Mask) {
+    pub fn add(&mut self, disc: &Surfel, distance: F, offset: Vec3Lanes<F>, is_hit: F::Mask) {
         let zero = F::splat(0.0);
         let nearness = F::splat(1.0) - offset.dot(offset).sqrt() / F::splat(disc.radius);
         let weight = F::select(is_hit, nearness.max(F::splat(1e-4)), zero);
         let normal = Vec3Lanes::splat(disc.normal);
-        let sign = if self.kind == SurfaceKind::Splat {
-            let is_opposed = normal.dot(self.nearest).lt(zero);
-            F::select(is_opposed, zero - weight, weight)
-        } else {
-            weight
+        let sign = match self.kind {
+            SurfaceKind::Splat => {
+                let chord = Vec3Lanes::splat(disc.center).minus(self.nearest.center);
+                let (nearest, direction) = (self.nearest.normal, self.direction);
+                let is_opposed = self.align.is_opposed(normal, nearest, chord, direction);
+                F::select(is_opposed, zero - weight, weight)
+            }
+            SurfaceKind::Cylinder => {
+                let depth = F::select(is_hit, distance - self.nearest.distance, zero);
+                self.depth = self.depth + weight * depth;
+                F::select(zero.lt(normal.dot(self.direction)), zero - weight, weight)
+            }
+            _ => weight,
         };
         self.normal = self.normal.plus(normal.scaled(sign));
         self.color = self.color.plus(Vec3Lanes::splat(disc.color).scaled(weight));
         self.total_weight = self.total_weight + weight;
     }
 
-    /// Returns the unit normal, which faces the ray's origin, and the colour. The normal of `SplatFit` is that
-    /// of the nearest disc: the caller replaces it by `fit_plane_normal` where that has a result.
+    /// Returns the means. The normal of `SplatFit` is that of the nearest disc: the caller replaces it by
+    /// that of a plane where the discs' centres span one.
     #[inline(always)]
-    pub fn finish(self) -> (Vec3Lanes<F>, Vec3Lanes<F>) {
-        let color = self.color.scaled(F::splat(1.0) / self.total_weight);
+    pub fn finish(self) -> Blend<F> {
+        let per_weight = F::splat(1.0) / self.total_weight;
+        let nearest = self.nearest.normal;
         // Opposite normals may cancel in splat-mean; the normal of the nearest disc is then as good as any.
         let normal = match self.kind {
             SurfaceKind::Splat => {
-                clamp_to_visible(normalize_or(self.normal, self.nearest), self.direction)
+                clamp_to_visible(normalize_or(self.normal, nearest), self.direction)
             }
-            SurfaceKind::SplatFit => self.nearest,
+            SurfaceKind::SplatFit => nearest,
             _ => {
                 let toward = Vec3Lanes::splat(Vec3::ZERO).minus(self.direction);
-                flip_to_hemisphere(normalize_or(self.normal, self.nearest), toward)
+                flip_to_hemisphere(normalize_or(self.normal, nearest), toward)
             }
         };
-        (normal, color)
+        let distance = self.nearest.distance;
+        let is_mean = self.kind == SurfaceKind::Cylinder;
+        let distance = if is_mean { distance + self.depth * per_weight } else { distance };
+        Blend { distance, normal, color: self.color.scaled(per_weight) }
     }
 }
 
@@ -114,17 +165,4 @@ fn clamp_to_visible<F: Floats>(normal: Vec3Lanes<F>, direction: Vec3Lanes<F>) ->
     let toward = Vec3Lanes::splat(Vec3::ZERO).minus(direction);
     let perpendicular = normalize_or(normal.minus(direction.scaled(along)), toward);
     Vec3Lanes::select(F::splat(0.0).lt(along), perpendicular, normal)
-}
-
-/// Returns a unit normal, of either sign, of the plane fitted to `points`, or none if they do not span a plane.
-pub fn fit_plane_normal(points: &[Vec3]) -> Option<Vec3> {
-    let relative = |point: &Vec3| (*point - points[0]).as_dvec3();
-    let mean = points.iter().map(relative).sum::<DVec3>() / points.len() as f64;
-    let mut covariance = SymmetricMatrix::default();
-    for point in points {
-        covariance.add_outer(relative(point) - mean, 1.0);
-    }
-    let (normal, values) = smallest_eigenvector(&covariance);
-    // Fewer than three points, or points on a line, leave the second eigenvalue at zero.
-    (MIN_PLANE_RATIO * values[2] < values[1]).then(|| normal.as_vec3())
 }

@@ -1,6 +1,7 @@
 //! Integration tests across crates: scenes with known answers, fast searches against brute force, and output
 //! that is the same on every machine.
 
+mod alignment;
 mod animation;
 mod backends;
 mod bad_clouds;
@@ -15,6 +16,7 @@ mod instances;
 mod light;
 mod many_instances;
 mod materials;
+mod neighbors;
 mod octree;
 mod packet_groups;
 mod punctual_lights;

@@ -67,8 +67,9 @@ fn supports_equal_those_of_a_plain_loop() {
             let points = cloud.points_of(surface);
             assert_eq!(points.id(hit.slot), hit.id);
             let position = ray.at(hit.distance);
-            let radius = points.radius(hit.slot) / surface.radius_factor();
-            if !surface.uses_discs() {
+            let factor = if surface == kind { cloud.radius_factor() } else { 1.0 };
+            let radius = points.radius(hit.slot) / factor;
+            if !surface.is_continuous() {
                 n_of_kinds[1 + usize::from(surface == SurfaceKind::Capsule)] += 1;
                 let across = (points.center(hit.slot) - ray.origin).cross(ray.direction).length();
                 assert_eq!(support.n_points, 1);

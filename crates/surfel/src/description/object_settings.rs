@@ -13,23 +13,41 @@ use surfel_core::image::Colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
 use surfel_core::points::{
-    COLUMN_INDEX, Denoise, Duplicates, MixedPixels, Orientation, OutlierRemoval, POINT_SOURCE,
-    PointFilter, Preparation, ROW_INDEX, Radius, SCAN_ANGLE, STRUCTURE, SURFACE_VARIATION,
-    StructureChoice, Subsample, WITHHELD,
+    COLUMN_INDEX, DEFAULT_RADIUS_SAMPLES, Denoise, Duplicates, MixedPixels, Orientation,
+    OutlierRemoval, POINT_SOURCE, PointFilter, Preparation, ROW_INDEX, Radius, SCAN_ANGLE,
+    STRUCTURE, SURFACE_VARIATION, StructureChoice, Subsample, WITHHELD,
 };
 use surfel_core::scene::color::{ColorSource, Coloring};
 use surfel_core::scene::{Clip, ClipBox, ClipPlane};
-use surfel_core::surface::{EdgeTest, OctreeDepth, SurfaceKind};
+use surfel_core::surface::{
+    Align, EdgeTest, GatherLimit, OctreeDepth, SurfaceKind, SurfaceOptions,
+};
 use surfel_formats::{Column, ColumnChoice, LoadOptions, TextColumn};
 
 settings! {
     /// The shape that is given to points, and the part of an object that is shown.
     pub struct SurfaceSettings {
-        /// Surface of the points: smooth, points, sphere, disc, splat-mean, splat, splat-fit, implicit, octree or
-        /// octree-splat.
+        /// Surface of the points: smooth, points, sphere, disc, splat-mean, splat, splat-fit, cylinder, mls, implicit, octree
+        /// or octree-splat.
         surface: SurfaceKind = SurfaceKind::default(), parsed(|kind: &SurfaceKind| kind.name().to_owned()), "KIND", common;
         /// Edge of the surface: at the outermost points (angular-gap) or at the rims of their discs (off).
         edge_test: EdgeTest = EdgeTest::default(), parsed(|test: &EdgeTest| test.name().to_owned()), "TEST";
+        /// Side of normals that splat blends: each is turned toward the viewer, or to the side of the nearest, or both
+        /// [default: both].
+        align: Align, OneOf(&Align::ALL), "RULE";
+        /// Discs that are blended: up to the least distance plus radius of all (least), or up to that of the nearest
+        /// disc [default: least].
+        gather_limit: GatherLimit, OneOf(&GatherLimit::ALL), "RULE";
+        /// Distance before which shadows, reflections and refractions ignore the surface, in radii. At 0 neighbouring discs
+        /// shade each other [default: 2 for discs, 0.5 for smooth and mls].
+        min_distance: f64, number(0.0, 100.0), "RADII";
+        /// How far points count, in radii: from a ray for cylinder, from a position for mls, from a hit for splat-fit
+        /// [default: 1, 1.4 and 2].
+        reach: f64, number(0.25, 8.0), "RADII";
+        /// Points that a hit of cylinder needs; a ray with fewer goes through a hole [default: 3].
+        density: u32, count(1, 128), "COUNT";
+        /// Degree of the polynomials of mls: 1 (planes), 2 or 3 [default: 2].
+        degree: u32, count(1, 3), "DEGREE";
         /// Depth of the cells of octree and octree-splat: auto (as fine as the points, coarser where a pixel is larger) or
         /// a number of levels from 1 to 16.
         octree_depth: OctreeDepth = OctreeDepth::default(), parsed(OctreeDepth::to_string), "auto|N";
@@ -89,8 +107,8 @@ settings! {
         /// these four that the file tells enough for. Where front sides are known, the back of a surface does not show
         /// through slits between the points [default: auto for surfel prepare and the colour normal, else station].
         orient: Orientation, parsed(orientation_text), "RULE";
-        /// Radius of each point's surface: a length, adaptive[:K] or median[:N] [default: that of the file, or
-        /// adaptive:12].
+        /// Radius of each point's surface: a length, adaptive[:K] (the distance to the K-th neighbour) or median[:N[,C]]
+        /// (the median distance of C points, 100, to their 2N nearest) [default: that of the file, or adaptive:12].
         radius: Radius, RadiusRule, "RADIUS", common;
         /// Shape of each point by its neighbours: auto tells surfaces, lines (wires, poles) and scattered points
         /// (leaves) apart; surface and scatter take all points for one.
@@ -176,6 +194,7 @@ impl ObjectSettings {
             neighbors: settings.neighbors(),
             normals: within.or(nearest).unwrap_or(default.normals),
             orientation: self.orientation(),
+            radii_from_normals: settings.radius.is_none(),
             radius: settings.radius.unwrap_or(default.radius),
             structure: settings.structure(),
             free_space: settings.free_space(),
@@ -238,6 +257,19 @@ impl ObjectSettings {
 }
 
 impl SurfaceSettings {
+    /// Returns the options of the surface.
+    pub fn options(&self) -> SurfaceOptions {
+        let default = SurfaceOptions::default();
+        SurfaceOptions {
+            align: self.align.unwrap_or_default(),
+            gather_limit: self.gather_limit.unwrap_or_default(),
+            min_distance: self.min_distance.map(|distance| distance as f32),
+            reach: self.reach.map(|reach| reach as f32),
+            density: self.density.unwrap_or(default.density),
+            degree: self.degree.unwrap_or(default.degree),
+        }
+    }
+
     /// Returns the part of the scene that is shown.
     pub fn clip(&self) -> Clip {
         Clip { bounds: self.clip_box, plane: self.clip_plane }
@@ -374,7 +406,8 @@ impl Rule<Radius> for RadiusRule {
 fn radius_text(radius: &Radius) -> String {
     match radius {
         Radius::Fixed(length) => length.to_string(),
-        Radius::Median { n, .. } => format!("median:{n}"),
+        Radius::Median { n, samples: DEFAULT_RADIUS_SAMPLES } => format!("median:{n}"),
+        Radius::Median { n, samples } => format!("median:{n},{samples}"),
         Radius::Adaptive { k } => format!("adaptive:{k}"),
     }
 }

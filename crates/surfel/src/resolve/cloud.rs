@@ -165,6 +165,7 @@ pub fn apply_surface_and_color(
     let blends_colors = !source.is_categorical(&cloud);
     let mut geometry = CloudGeometry::new(cloud, colors)?;
     geometry.surface = settings.surface.surface();
+    geometry.options = settings.surface.options();
     geometry.blends_colors = blends_colors;
     geometry.support_colors = coloring.support_colors()?;
     geometry.edge_test = settings.surface.edge_test();

@@ -14,7 +14,7 @@ pub struct EdgeFilter<'s>(pub &'s FlatCloud);
 
 impl EdgeFilter<'_> {
     fn radius(&self, slot: Slot) -> f32 {
-        self.0.points.radius(slot) / self.0.surface.radius_factor()
+        self.0.points.radius(slot) / self.0.radius_factor()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::flat::{FlatCloud, FlatPoints};
 use crate::math::{Floats, LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Ray};
-use crate::surface::{Disc, gather_limit};
+use crate::surface::{Disc, MAX_GATHERED, gather_limit};
 use crate::trace::query::hit::{Gather, Hit};
 use crate::trace::query::leaf::{LeafGeometry, PacketBlock};
 use crate::trace::query::packet_disc_hits::{PacketDiscHit, cull_and_sort};
@@ -34,6 +34,16 @@ fn gathers_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], gathers: &mut [Gath
 pub trait DiscConsumer {
     /// The result for one ray.
     type Result;
+
+    /// Returns the maximum number of discs of a ray. If there are more, the nearest are kept.
+    fn max_discs(&self) -> usize {
+        MAX_GATHERED
+    }
+
+    /// Returns the distance behind each disc up to which others are wanted; `None` if it is the disc's radius.
+    fn length(&self) -> Option<f32> {
+        None
+    }
 
     /// Turns discs to results. Each ray's discs count up to its limit.
     fn consume<L: Lanes>(
@@ -69,10 +79,10 @@ impl PacketDiscs {
         self.limits = [f32::MAX; PACKET_WIDTH];
     }
 
-    /// Drops what lies beyond the limits and what is not among the nearest of a ray, and sorts by slot.
+    /// Drops what lies beyond the limits and what is not among the nearest `max_discs` of a ray, and sorts by slot.
     #[inline(always)]
-    pub fn cull_and_sort<W: PacketLanes>(&mut self) {
-        cull_and_sort::<W>(&mut self.hits, &self.limits);
+    pub fn cull_and_sort<W: PacketLanes>(&mut self, max_discs: usize) {
+        cull_and_sort::<W>(&mut self.hits, &self.limits, max_discs);
     }
 }
 
@@ -89,7 +99,7 @@ impl DiscConsumer for CollectGathers {
         _rays: &[Ray],
         gathers: &mut [Gather],
     ) {
-        discs.cull_and_sort::<L::PacketLanes>();
+        discs.cull_and_sort::<L::PacketLanes>(MAX_GATHERED);
         for (lane, gather) in gathers.iter_mut().enumerate() {
             *gather = gather_of_lane(&discs.hits, lane);
         }
@@ -124,7 +134,9 @@ impl<L: Lanes, C: DiscConsumer> RayQuery<L> for GatherQuery<'_, C> {
 
     #[inline(always)]
     fn ray_visitor<'r>(&mut self, ray: &'r Ray) -> GatherRayVisitor<'r> {
-        GatherRayVisitor { ray, gather: Gather::EMPTY, limit: ray.t_max }
+        let all = (MAX_GATHERED < self.consumer.max_discs()).then(Vec::new);
+        let length = self.consumer.length();
+        GatherRayVisitor { ray, gather: Gather::EMPTY, all, length, limit: ray.t_max }
     }
 
     #[inline(always)]
@@ -133,13 +145,16 @@ impl<L: Lanes, C: DiscConsumer> RayQuery<L> for GatherQuery<'_, C> {
         packet: &'p Packet<'p, L::PacketLanes>,
     ) -> GatherPacketVisitor<'p, L> {
         let hits = std::mem::take(&mut self.discs.hits);
-        GatherPacketVisitor { packet, limits: packet.initial_limits(), hits }
+        let length = self.consumer.length();
+        GatherPacketVisitor { packet, length, limits: packet.initial_limits(), hits }
     }
 
     #[inline(always)]
     fn ray_results(&mut self, visitors: &[GatherRayVisitor], _results: &mut [C::Result]) {
         for (lane, visitor) in visitors.iter().enumerate() {
-            for hit in visitor.gather.hits() {
+            let all = visitor.all.as_deref();
+            let hits = all.unwrap_or(visitor.gather.hits()).iter();
+            for hit in hits.filter(|hit| hit.distance <= visitor.limit) {
                 self.discs.hits.push(PacketDiscHit::single(lane, *hit));
             }
         }
@@ -163,6 +178,9 @@ impl<L: Lanes, C: DiscConsumer> RayQuery<L> for GatherQuery<'_, C> {
 pub struct GatherRayVisitor<'r> {
     ray: &'r Ray,
     gather: Gather,
+    /// All discs, if more than a `Gather` holds are wanted; `gather` is then empty.
+    all: Option<Vec<Hit>>,
+    length: Option<f32>,
     limit: f32,
 }
 
@@ -185,7 +203,12 @@ impl RayVisitor for GatherRayVisitor<'_> {
         let block = Disc::decode_relative_to::<L>(points, block_idx, self.ray.origin);
         for (hit, radius) in Disc::block_hits(&block, block_idx, self.ray).up_to(self.limit()) {
             if hit.distance <= self.limit {
-                self.limit = self.limit.min(gather_limit(hit.distance, radius));
+                let length = self.length.unwrap_or(radius);
+                self.limit = self.limit.min(gather_limit(hit.distance, length));
+                if let Some(all) = &mut self.all {
+                    all.push(hit);
+                    continue;
+                }
                 self.gather.insert(hit);
                 self.gather.drop_beyond(self.limit);
             }
@@ -198,6 +221,7 @@ impl RayVisitor for GatherRayVisitor<'_> {
 /// end.
 pub struct GatherPacketVisitor<'p, L: Lanes> {
     packet: &'p Packet<'p, L::PacketLanes>,
+    length: Option<f32>,
     limits: [f32; PACKET_WIDTH],
     hits: Vec<PacketDiscHit>,
 }
@@ -223,7 +247,8 @@ impl<L: Lanes> PacketVisitor<L> for GatherPacketVisitor<'_, L> {
         for lane in 0..LANES {
             let (distance, mask) = block.intersect(&rays, lane);
             let is_hit = mask & distance.le(limits);
-            let limit = gather_limit(distance, L::PacketLanes::splat(block.radius(lane)));
+            let length = self.length.unwrap_or(block.radius(lane));
+            let limit = gather_limit(distance, L::PacketLanes::splat(length));
             limits = L::PacketLanes::select(is_hit, limit.min(limits), limits);
             let slot = block_idx * LANES as u32 + lane as u32;
             // The sum turns a negative zero into a positive one.
@@ -242,7 +267,8 @@ impl<L: Lanes> PacketVisitor<L> for GatherPacketVisitor<'_, L> {
         let ray = &self.packet.rays[lane];
         let block = Disc::decode_relative_to::<L>(points, block_idx, ray.origin);
         for (hit, radius) in Disc::block_hits(&block, block_idx, ray).up_to(self.limits[lane]) {
-            self.limits[lane] = self.limits[lane].min(gather_limit(hit.distance, radius));
+            let length = self.length.unwrap_or(radius);
+            self.limits[lane] = self.limits[lane].min(gather_limit(hit.distance, length));
             self.hits.push(PacketDiscHit::single(lane, hit));
         }
     }

@@ -2,8 +2,10 @@
 
 use crate::flat::Slot;
 use crate::math::{LaneMask, PACKET_WIDTH, PacketLanes, set_bits};
-use crate::surface::MAX_GATHERED;
 use crate::trace::query::hit::Hit;
+
+/// Maximum number of discs that are sorted by insertion.
+const MAX_INSERTION_SORT: usize = 512;
 
 /// A disc and the distances at which the rays of a packet hit it.
 #[derive(Clone, Copy)]
@@ -33,10 +35,14 @@ impl PacketDiscHit {
     }
 }
 
-/// Drops what lies beyond the rays' limits and what is not among the nearest `MAX_GATHERED` hits of a ray,
-/// and sorts by slot: sums over the rest then do not depend on the order in which they were found.
+/// Drops what lies beyond the rays' limits and what is not among the nearest `max_hits` of a ray, and sorts by slot: sums
+/// over the rest then do not depend on the order in which they were found.
 #[inline(always)]
-pub fn cull_and_sort<W: PacketLanes>(hits: &mut Vec<PacketDiscHit>, limits: &[f32; PACKET_WIDTH]) {
+pub fn cull_and_sort<W: PacketLanes>(
+    hits: &mut Vec<PacketDiscHit>,
+    limits: &[f32; PACKET_WIDTH],
+    max_hits: usize,
+) {
     let limits = W::load(limits);
     let (mut n_kept, mut counts) = (0, W::splat(0.0));
     for i in 0..hits.len() {
@@ -49,25 +55,24 @@ pub fn cull_and_sort<W: PacketLanes>(hits: &mut Vec<PacketDiscHit>, limits: &[f3
         counts = counts + W::select(is_kept, W::splat(1.0), W::splat(0.0));
     }
     hits.truncate(n_kept);
-    let is_full = W::splat(MAX_GATHERED as f32).lt(counts).bits();
+    let is_full = W::splat(max_hits as f32).lt(counts).bits();
     if is_full != 0 {
-        keep_nearest_k(hits, is_full);
+        keep_nearest_k(hits, is_full, max_hits);
     }
     sort(hits);
 }
 
-/// Leaves each of these lanes its nearest `MAX_GATHERED` hits, and drops discs that no ray hits any more: few
+/// Leaves each of these lanes its nearest `max_hits` hits, and drops discs that no ray hits any more: few
 /// remain to be sorted, also of discs that lie thousands over each other.
 #[cold]
-fn keep_nearest_k(hits: &mut Vec<PacketDiscHit>, lanes: u32) {
+fn keep_nearest_k(hits: &mut Vec<PacketDiscHit>, lanes: u32, max_hits: usize) {
     for lane in set_bits::<PACKET_WIDTH>(lanes) {
         let of_lane = hits
             .iter()
             .enumerate()
             .map(|(i, hit)| (Hit { distance: hit.distances[lane], slot: hit.slot }, i));
         let mut of_lane: Vec<_> = of_lane.filter(|(hit, _)| !hit.distance.is_nan()).collect();
-        let (.., farther) =
-            of_lane.select_nth_unstable_by_key(MAX_GATHERED - 1, |(hit, _)| hit.key());
+        let (.., farther) = of_lane.select_nth_unstable_by_key(max_hits - 1, |(hit, _)| hit.key());
         for (_, i) in farther {
             hits[*i].distances[lane] = f32::NAN;
         }
@@ -79,6 +84,9 @@ fn keep_nearest_k(hits: &mut Vec<PacketDiscHit>, lanes: u32) {
 /// slot.
 #[inline(always)]
 fn sort(hits: &mut [PacketDiscHit]) {
+    if MAX_INSERTION_SORT < hits.len() {
+        return hits.sort_unstable_by_key(|hit| hit.slot);
+    }
     for end in 1..hits.len() {
         let next = hits[end];
         let mut i = end;
@@ -96,6 +104,7 @@ mod tests {
 
     use super::*;
     use crate::math::{Lanes, PortableLanes};
+    use crate::surface::MAX_GATHERED;
 
     #[test]
     fn each_ray_keeps_its_nearest_of_thousands_of_discs() {
@@ -113,6 +122,7 @@ mod tests {
         cull_and_sort::<<PortableLanes as Lanes>::PacketLanes>(
             &mut hits,
             &[f32::MAX; PACKET_WIDTH],
+            MAX_GATHERED,
         );
         let slots = |lane: usize| -> Vec<u32> {
             let of_lane = hits.iter().filter(|hit| !hit.distances[lane].is_nan());

@@ -5,13 +5,15 @@ use crate::math::{
     Floats, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Ray, SimdTask, Vec3, Vec3Lanes,
 };
 use crate::surface::{
-    CandidateHit, EdgeTest, MAX_GATHERED, SplatAccumulator, SurfaceKind, Surfel, fit_plane_normal,
+    Blend, CandidateHit, EdgeTest, GatherLimit, MAX_CANDIDATES, MAX_GATHERED, NearestDisc,
+    SplatAccumulator, SurfaceKind, Surfel, gather_limit,
 };
 use crate::trace::query::closest::closest_hits_kernel;
 use crate::trace::query::edge_test::{PacketCandidates, enclosed_by_blocks, enclosed_lanes};
 use crate::trace::query::gather::{DiscConsumer, GatherQuery, PacketDiscs};
 use crate::trace::query::hit::Hit;
 use crate::trace::query::packet_disc_hits::PacketDiscHit;
+use crate::trace::query::plane_fit::FittedDiscs;
 use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::simd::{Simd, dispatch_simd};
 use crate::trace::traversal::batch::trace_batch;
@@ -25,6 +27,8 @@ use std::marker::PhantomData;
 pub struct Splat {
     /// The nearest disc.
     pub hit: Hit,
+    /// Distance along the ray: that of the nearest disc, or the mean of all discs of `Cylinder`.
+    pub distance: f32,
     /// Number of discs.
     pub n_discs: u32,
     /// Radius of the nearest disc.
@@ -33,6 +37,8 @@ pub struct Splat {
     pub normal: Vec3,
     /// Linear colour.
     pub color: Vec3,
+    /// False where too few points are near the ray: it goes through a hole.
+    pub(in crate::trace) is_dense: bool,
     /// True if the points around the hit are known to enclose it, which is found out only for the edge test.
     pub(in crate::trace) is_enclosed: bool,
 }
@@ -41,10 +47,12 @@ impl Splat {
     /// The result of a ray that hits nothing.
     pub const MISS: Self = Self {
         hit: Hit::MISS,
+        distance: f32::INFINITY,
         n_discs: 0,
         radius: 0.0,
         normal: Vec3::ZERO,
         color: Vec3::ZERO,
+        is_dense: false,
         is_enclosed: false,
     };
 }
@@ -117,13 +125,13 @@ impl<'s> SplatTracer<'s> {
         open.clear();
         open_hits.clear();
         for (splat_idx, (splat, ray)) in splats.iter().zip(rays).enumerate() {
-            if splat.hit.is_miss() || splat.is_enclosed {
+            if !splat.is_dense || splat.is_enclosed {
                 continue;
             }
-            let radius = splat.radius / blender.cloud.surface.radius_factor();
+            let radius = splat.radius / blender.cloud.radius_factor();
             let candidate = CandidateHit { normal: splat.normal, direction: ray.direction, radius };
             open.push(splat_idx as u32);
-            open_hits.push((ray.at(splat.hit.distance), candidate));
+            open_hits.push((ray.at(splat.distance), candidate));
         }
         for (open, hits) in open.chunks(PACKET_WIDTH).zip(open_hits.chunks(PACKET_WIDTH)) {
             let lanes = (1 << open.len()) - 1;
@@ -199,55 +207,100 @@ struct DiscBlender<'s> {
 
 /// The nearest disc of each ray.
 struct NearestDiscs<W> {
-    distances: W,
+    discs: NearestDisc<W>,
     /// Slots, as the bits of floats.
     slots: W,
-    normals: Vec3Lanes<W>,
     radii: W,
     n_discs: W,
+}
+
+impl<W: PacketLanes> NearestDiscs<W> {
+    /// Drops the hits that lie farther behind the nearest disc of a ray than that disc's radius.
+    #[inline(always)]
+    fn drop_beyond_first(&mut self, hits: &mut [PacketDiscHit]) {
+        let limits = gather_limit(self.discs.distance, self.radii);
+        self.n_discs = W::splat(0.0);
+        for hit in hits {
+            let distances = W::load(&hit.distances);
+            let is_near = distances.le(limits);
+            hit.distances = W::select(is_near, distances, W::splat(f32::NAN)).store();
+            self.n_discs = self.n_discs + W::select(is_near, W::splat(1.0), W::splat(0.0));
+        }
+    }
 }
 
 impl DiscConsumer for DiscBlender<'_> {
     type Result = Splat;
 
+    #[inline(always)]
+    fn max_discs(&self) -> usize {
+        match self.kind {
+            SurfaceKind::Cylinder | SurfaceKind::SplatFit => MAX_CANDIDATES,
+            _ => MAX_GATHERED,
+        }
+    }
+
+    #[inline(always)]
+    fn length(&self) -> Option<f32> {
+        let is_nearest = self.cloud.options.gather_limit == GatherLimit::Nearest;
+        is_nearest.then_some(self.cloud.max_blend_distance)
+    }
+
     /// Blends the discs of one to sixteen rays up to their limits.
     #[inline(always)]
     fn consume<L: Lanes>(&mut self, discs: &mut PacketDiscs, rays: &[Ray], splats: &mut [Splat]) {
         let rays = PacketRays::<L::PacketLanes>::new(rays);
-        discs.cull_and_sort::<L::PacketLanes>();
-        let hits = &discs.hits;
-        if hits.is_empty() {
+        discs.cull_and_sort::<L::PacketLanes>(self.max_discs());
+        if discs.hits.is_empty() {
             splats.fill(Splat::MISS);
             return;
         }
-        let nearest = self.find_nearest::<L::PacketLanes>(hits);
+        let mut nearest = self.find_nearest::<L::PacketLanes>(&discs.hits);
+        if self.length().is_some() {
+            nearest.drop_beyond_first(&mut discs.hits);
+        }
         let (origin, direction) = (rays.origin(), rays.direction());
-        let mut accumulator = SplatAccumulator::new(self.kind, nearest.normals, direction);
-        for (surfel, hit) in self.surfels.iter().zip(hits) {
+        let mut fitted = FittedDiscs {
+            discs: &self.surfels,
+            hits: &mut discs.hits,
+            position: origin.plus(direction.scaled(nearest.discs.distance)),
+            radius: nearest.radii,
+        };
+        if self.kind == SurfaceKind::SplatFit {
+            fitted.keep_nearest();
+            nearest.n_discs = nearest.n_discs.min(L::PacketLanes::splat(MAX_GATHERED as f32));
+        }
+        let mut accumulator =
+            SplatAccumulator::new(self.kind, self.cloud.options.align, &nearest.discs, direction);
+        for (surfel, hit) in fitted.discs.iter().zip(&*fitted.hits) {
             let distances = L::PacketLanes::load(&hit.distances);
             let position = origin.plus(direction.scaled(distances));
             let offset = position.minus(Vec3Lanes::splat(surfel.center));
-            accumulator.add(surfel, offset, hit.hit_mask::<L::PacketLanes>());
+            accumulator.add(surfel, distances, offset, hit.hit_mask::<L::PacketLanes>());
         }
-        let (mut normals, colors) = accumulator.finish();
+        let Blend { distance, normal: mut normals, color: colors } = accumulator.finish();
         if self.kind == SurfaceKind::SplatFit {
-            normals = self.fit_planes(hits, normals, splats.len());
+            normals = fitted.normals(normals);
         }
         let n_discs = nearest.n_discs.store();
         let mut is_enclosed = 0;
         if self.tests_edge {
-            let factor = L::PacketLanes::splat(self.cloud.surface.radius_factor());
+            let factor = L::PacketLanes::splat(self.cloud.radius_factor());
             let candidates = PacketCandidates {
-                position: origin.plus(direction.scaled(nearest.distances)),
+                position: origin.plus(direction.scaled(distance)),
                 normal: normals,
                 direction,
                 radius: nearest.radii / factor,
             };
             let is_hit = L::PacketLanes::splat(0.0).lt(nearest.n_discs).bits();
             let lanes = is_hit & ((1 << splats.len()) - 1);
-            is_enclosed = enclosed_by_blocks::<L>(&self.cloud.points, hits, lanes, &candidates);
+            is_enclosed =
+                enclosed_by_blocks::<L>(&self.cloud.points, &discs.hits, lanes, &candidates);
         }
-        let (distances, slots) = (nearest.distances.store(), nearest.slots.store());
+        let min_discs =
+            if self.kind == SurfaceKind::Cylinder { self.cloud.options.density } else { 1 };
+        let nearest_distances = nearest.discs.distance.store();
+        let (distances, slots) = (distance.store(), nearest.slots.store());
         let radii = nearest.radii.store();
         let (normals, colors) = (normals.store_packet(), colors.store_packet());
         for lane in 0..splats.len() {
@@ -257,11 +310,13 @@ impl DiscConsumer for DiscBlender<'_> {
                     Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane])
                 };
                 splats[lane] = Splat {
-                    hit: Hit { distance: distances[lane], slot: slots[lane].to_bits() },
+                    hit: Hit { distance: nearest_distances[lane], slot: slots[lane].to_bits() },
+                    distance: distances[lane],
                     n_discs: n_discs[lane] as u32,
                     radius: radii[lane],
                     normal: vector(&normals),
                     color: vector(&colors),
+                    is_dense: min_discs <= n_discs[lane] as u32,
                     is_enclosed: is_enclosed >> lane & 1 == 1,
                 };
             }
@@ -275,9 +330,12 @@ impl DiscBlender<'_> {
     fn find_nearest<W: PacketLanes>(&mut self, hits: &[PacketDiscHit]) -> NearestDiscs<W> {
         let zero = W::splat(0.0);
         let mut nearest = NearestDiscs {
-            distances: W::splat(f32::INFINITY),
+            discs: NearestDisc {
+                distance: W::splat(f32::INFINITY),
+                center: Vec3Lanes::splat(Vec3::ZERO),
+                normal: Vec3Lanes::splat(Vec3::Z),
+            },
             slots: W::splat(f32::from_bits(Hit::MISS.slot)),
-            normals: Vec3Lanes::splat(Vec3::Z),
             radii: zero,
             n_discs: zero,
         };
@@ -286,43 +344,19 @@ impl DiscBlender<'_> {
             let surfel = self.cloud.points.surfel(hit.slot);
             let distances = W::load(&hit.distances);
             // The discs are sorted by slot, so the first of equally near ones counts.
-            let is_nearer = distances.lt(nearest.distances);
+            let is_nearer = distances.lt(nearest.discs.distance);
             let slot = W::splat(f32::from_bits(hit.slot));
             let normal = Vec3Lanes::splat(surfel.normal);
-            nearest.distances = W::select(is_nearer, distances, nearest.distances);
+            let disc = nearest.discs;
+            nearest.discs.distance = W::select(is_nearer, distances, disc.distance);
+            let center = Vec3Lanes::splat(surfel.center);
+            nearest.discs.center = Vec3Lanes::select(is_nearer, center, disc.center);
+            nearest.discs.normal = Vec3Lanes::select(is_nearer, normal, disc.normal);
             nearest.slots = W::select(is_nearer, slot, nearest.slots);
-            nearest.normals = Vec3Lanes::select(is_nearer, normal, nearest.normals);
             nearest.radii = W::select(is_nearer, W::splat(surfel.radius), nearest.radii);
             nearest.n_discs = nearest.n_discs + W::select(hit.hit_mask::<W>(), W::splat(1.0), zero);
             self.surfels.push(surfel);
         }
         nearest
-    }
-
-    /// Replaces normals by those of planes through the discs' centres, where these span one.
-    #[inline(always)]
-    fn fit_planes<W: PacketLanes>(
-        &self,
-        hits: &[PacketDiscHit],
-        normals: Vec3Lanes<W>,
-        n_rays: usize,
-    ) -> Vec3Lanes<W> {
-        let [mut x, mut y, mut z] = normals.store_packet();
-        for lane in 0..n_rays {
-            let mut centers = [Vec3::ZERO; MAX_GATHERED];
-            let mut n = 0;
-            for (surfel, hit) in self.surfels.iter().zip(hits) {
-                if !hit.distances[lane].is_nan() {
-                    centers[n] = surfel.center;
-                    n += 1;
-                }
-            }
-            let facing = Vec3::new(x[lane], y[lane], z[lane]);
-            if let Some(normal) = (0 < n).then(|| fit_plane_normal(&centers[..n])).flatten() {
-                let normal = if normal.dot(facing) < 0.0 { -normal } else { normal };
-                [x[lane], y[lane], z[lane]] = normal.to_array();
-            }
-        }
-        Vec3Lanes::load_packet(&[x, y, z])
     }
 }

@@ -34,12 +34,13 @@ pub fn support<L: Lanes>(cloud: &FlatCloud, ray: &Ray, hit: &Hit, surface: Surfa
     let to_center = points.center(hit.slot) - position;
     // The flat form stores the radii of the discs, which may be larger than the points'.
     let reach = points.radius(hit.slot);
-    let radius = reach / surface.radius_factor();
-    if !surface.uses_discs() {
+    let factor = if surface == cloud.surface { cloud.radius_factor() } else { 1.0 };
+    let radius = reach / factor;
+    if !surface.is_continuous() {
         let across = to_center - to_center.dot(ray.direction) * ray.direction;
         return Support { n_points: 1, distance: across.length() / radius };
     }
-    let reach = Vec3::splat(FIT_REACH * reach);
+    let reach = Vec3::splat(FIT_REACH * reach.max(radius));
     let region = Aabb { min: position - reach, max: position + reach };
     let nearest = L::splat(to_center.length_squared());
     let mut found = NearbyPoints { position, max_squared: radius * radius, n_points: 0, nearest };

@@ -12,6 +12,7 @@ use crate::trace::query::edge_test::evaluate_one;
 use crate::trace::query::field_query::{DiscSearch, FieldSearch, KdSearch, field_hits};
 use crate::trace::query::hit::Hit;
 use crate::trace::query::leaf::LeafGeometry;
+use crate::trace::query::mls_surface::{MlsHit, mls_hits};
 use crate::trace::query::octree_query::{CellHit, cell_color, octree_hits};
 use crate::trace::query::ray_field::FieldHit;
 use crate::trace::query::smooth_filter::SmoothFilter;
@@ -115,6 +116,7 @@ fn surface_hits_kernel<L: Lanes>(
             SurfaceKind::Implicit => trace_field::<L, KdSearch>(cloud, rays, hits),
             SurfaceKind::Octree => trace_octree::<L, true>(cloud, pixel, rays, hits),
             SurfaceKind::OctreeSplat => trace_octree::<L, false>(cloud, pixel, rays, hits),
+            SurfaceKind::Mls => trace_mls::<L>(cloud, rays, hits),
             kind if kind.uses_discs() => splat_hits::<L>(cloud, rays, hits),
             _ => merge_solids::<L, Sphere>(&cloud.points, SurfaceKind::Sphere, rays, hits),
         }
@@ -233,6 +235,17 @@ fn occlusions_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [
         octree_occlusions::<L, true>(cloud, rays, occluded);
     } else if cloud.surface == SurfaceKind::OctreeSplat {
         octree_occlusions::<L, false>(cloud, rays, occluded);
+    } else if cloud.surface == SurfaceKind::Mls {
+        let mut hits = vec![MlsHit::MISS; rays.len()];
+        mls_hits::<L, false>(cloud, rays, &mut hits);
+        occluded
+            .iter_mut()
+            .zip(&hits)
+            .for_each(|(occluded, found)| *occluded = !found.hit.is_miss());
+    } else if cloud.surface == SurfaceKind::Cylinder {
+        let mut hits = vec![SurfaceHit::MISS; rays.len()];
+        splat_hits::<L>(cloud, rays, &mut hits);
+        occluded.iter_mut().zip(&hits).for_each(|(occluded, hit)| *occluded = !hit.is_miss());
     } else if !cloud.surface.uses_discs() || cloud.edge_test == EdgeTest::Off {
         any_hits_kernel::<L>(cloud, rays, occluded);
     } else {
@@ -298,6 +311,30 @@ fn merge_occlusions<L: Lanes, S: LeafGeometry<Tree = FlatPoints>>(
     any_accepted_hit::<L, S, _>(points, &rays, AcceptAll, &mut by_solids);
     for (i, is_occluded) in open.into_iter().zip(by_solids) {
         occluded[i] = is_occluded;
+    }
+}
+
+/// Traces the surface of moving least squares.
+#[inline(always)]
+fn trace_mls<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
+    let mut found = vec![MlsHit::MISS; rays.len()];
+    mls_hits::<L, true>(cloud, rays, &mut found);
+    for ((hit, ray), MlsHit { hit: nearest, radius, normal, color }) in
+        hits.iter_mut().zip(rays).zip(found)
+    {
+        if nearest.is_miss() {
+            continue;
+        }
+        *hit = SurfaceHit {
+            distance: nearest.distance,
+            id: cloud.points.id(nearest.slot),
+            slot: nearest.slot,
+            radius: radius / cloud.radius_factor(),
+            normal,
+            color,
+            surface: cloud.surface,
+            is_backface: 0.0 < cloud.points.normal(nearest.slot).dot(ray.direction),
+        };
     }
 }
 
@@ -418,7 +455,8 @@ fn is_through_slit<L: Lanes>(cloud: &FlatCloud, disc: &Hit, hit: &SurfaceHit, ra
 #[inline(always)]
 fn splat_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
     hits.fill(SurfaceHit::MISS);
-    if cloud.edge_test == EdgeTest::Off {
+    let tests_edge = cloud.edge_test != EdgeTest::Off;
+    if !tests_edge && cloud.surface != SurfaceKind::Cylinder {
         let mut splats = vec![Splat::MISS; rays.len()];
         SplatTracer::new(cloud, cloud.surface, EdgeTest::Off).trace::<L>(rays, &mut splats);
         for ((hit, ray), splat) in hits.iter_mut().zip(rays).zip(&splats) {
@@ -429,7 +467,7 @@ fn splat_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]
     let mut searching: Vec<u32> = (0..rays.len() as u32).collect();
     let mut rays = rays.to_vec();
     let mut splats = vec![Splat::MISS; rays.len()];
-    let mut tracer = SplatTracer::new(cloud, cloud.surface, EdgeTest::AngularGap);
+    let mut tracer = SplatTracer::new(cloud, cloud.surface, cloud.edge_test);
     for _ in 0..MAX_REJECTED_HITS {
         let splats = &mut splats[..rays.len()];
         tracer.trace::<L>(&rays, splats);
@@ -440,7 +478,7 @@ fn splat_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]
                 continue;
             }
             let found = surface_hit(cloud, &ray, splat);
-            if splat.is_enclosed {
+            if splat.is_dense && (splat.is_enclosed || !tests_edge) {
                 hits[ray_idx as usize] = found;
                 continue;
             }
@@ -462,10 +500,10 @@ fn surface_hit(cloud: &FlatCloud, ray: &Ray, splat: &Splat) -> SurfaceHit {
         return SurfaceHit::MISS;
     }
     SurfaceHit {
-        distance: splat.hit.distance,
+        distance: splat.distance,
         id: cloud.points.id(splat.hit.slot),
         slot: splat.hit.slot,
-        radius: splat.radius / cloud.surface.radius_factor(),
+        radius: splat.radius / cloud.radius_factor(),
         normal: splat.normal,
         color: splat.color,
         surface: cloud.surface,

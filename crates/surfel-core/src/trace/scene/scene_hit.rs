@@ -21,6 +21,8 @@ pub struct SceneHit {
     pub barycentrics: (f32, f32),
     /// Radius of the nearest point, 0 for triangles.
     pub radius: f32,
+    /// The radius from which the distance follows that new rays skip, 0 for triangles.
+    pub spawn_radius: f32,
     /// Unit shading normal, facing the ray's origin; interpolated between the corners of a triangle that has
     /// normals.
     pub normal: Vec3,
@@ -45,6 +47,7 @@ impl SceneHit {
         slot: 0,
         barycentrics: (0.0, 0.0),
         radius: 0.0,
+        spawn_radius: 0.0,
         normal: Vec3::ZERO,
         geometric_normal: Vec3::ZERO,
         color: Vec3::ZERO,
@@ -63,10 +66,12 @@ impl SceneHit {
 #[inline]
 pub fn point_hit(cloud: &FlatCloud, hit: &SurfaceHit, instance: &Instance) -> SceneHit {
     let normal = instance.world_normal(hit.normal);
+    let radius = hit.radius * instance.max_scale;
     SceneHit {
         id: hit.id,
         slot: hit.slot,
-        radius: hit.radius * instance.max_scale,
+        radius,
+        spawn_radius: cloud.options.spawn_factor(hit.surface) * radius,
         normal,
         geometric_normal: normal,
         color: hit.color,

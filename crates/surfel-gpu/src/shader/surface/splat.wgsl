@@ -2,25 +2,46 @@
 
 // The weighted sums over the discs of a ray.
 struct SplatSums {
+    direction: vec3<f32>,
     // Normal of the nearest disc, flipped toward the ray's origin.
     nearest: vec3<f32>,
+    // Centre of the nearest disc.
+    center: vec3<f32>,
     normal: vec3<f32>,
     color: vec3<f32>,
     total_weight: f32,
 }
 
-fn no_discs(nearest: vec3<f32>, direction: vec3<f32>) -> SplatSums {
+fn no_discs(nearest: Surfel, direction: vec3<f32>) -> SplatSums {
     let none = vec3<f32>(0.0);
-    return SplatSums(flip_to_hemisphere(nearest, -direction), none, none, 0.0);
+    let normal = flip_to_hemisphere(nearest.normal, -direction);
+    return SplatSums(direction, normal, nearest.center, none, none, 0.0);
+}
+
+// Returns true if a disc's normal is to be turned around.
+fn is_opposed(sums: SplatSums, disc: Surfel) -> bool {
+    let cosine = dot(disc.normal, sums.nearest);
+    if MIN_ALIGNED_COSINE < abs(cosine) {
+        return cosine < 0.0;
+    }
+    let chord = disc.center - sums.center;
+    let squared = dot(chord, chord);
+    let bent = cosine * squared - 2.0 * dot(sums.nearest, chord) * dot(disc.normal, chord);
+    if MIN_BENT_COSINE * squared < abs(bent) {
+        return bent < 0.0;
+    }
+    return 0.0 < dot(disc.normal, sums.direction);
 }
 
 // Adds a disc, which the ray hits at `offset` from its centre.
 fn with_disc(sums: SplatSums, disc: Surfel, offset: vec3<f32>) -> SplatSums {
     let weight = max(1.0 - sqrt(dot(offset, offset)) / disc.radius, 1e-4);
-    let is_opposed = visit.surface == SPLAT && dot(disc.normal, sums.nearest) < 0.0;
+    let turns = visit.surface == SPLAT && is_opposed(sums, disc);
     return SplatSums(
+        sums.direction,
         sums.nearest,
-        sums.normal + select(weight, -weight, is_opposed) * disc.normal,
+        sums.center,
+        sums.normal + select(weight, -weight, turns) * disc.normal,
         sums.color + weight * disc.color,
         sums.total_weight + weight,
     );

@@ -6,7 +6,7 @@ fn splat(ray: Ray) -> SurfaceHit {
         return missed_surface();
     }
     let nearest = slot_surfel(gathered_slots[0]);
-    var sums = no_discs(nearest.normal, ray.direction);
+    var sums = no_discs(nearest, ray.direction);
     for (var i = 0u; i < n_gathered; i++) {
         let surfel = slot_surfel(gathered_slots[i]);
         let offset = ray_at(ray, gathered_distances[i]) - surfel.center;

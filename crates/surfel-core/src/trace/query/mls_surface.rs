@@ -1,0 +1,100 @@
+//! The closest hit of each ray on the surface of moving least squares.
+
+use crate::flat::FlatCloud;
+use crate::math::{Lanes, PACKET_WIDTH, PacketLanes, Ray, Vec3};
+use crate::surface::mls::Ball;
+use crate::trace::query::closest::closest_shapes;
+use crate::trace::query::hit::Hit;
+use crate::trace::query::mls_query::MlsTracer;
+use crate::trace::simd::packet_rays::PacketRays;
+
+/// Maximum number of balls of a ray that are tried. A ray with more runs along a rim and is taken to miss.
+const MAX_TRIED_BALLS: usize = 48;
+
+/// The hit of a ray on the surface.
+#[derive(Clone, Copy)]
+pub struct MlsHit {
+    /// The distance along the ray and the slot of the nearest point.
+    pub hit: Hit,
+    /// Radius of the ball through which the surface was found.
+    pub radius: f32,
+    /// Unit normal, facing the ray's origin.
+    pub normal: Vec3,
+    /// Linear colour.
+    pub color: Vec3,
+}
+
+impl MlsHit {
+    /// The result of a ray that hits nothing.
+    pub const MISS: Self =
+        Self { hit: Hit::MISS, radius: 0.0, normal: Vec3::ZERO, color: Vec3::ZERO };
+}
+
+/// Traces all rays together until each hits the surface, or enters no more balls.
+#[inline(always)]
+pub fn mls_hits<L: Lanes, const HAS_COLORS: bool>(
+    cloud: &FlatCloud,
+    all_rays: &[Ray],
+    hits: &mut [MlsHit],
+) {
+    hits.fill(MlsHit::MISS);
+    let mut searching: Vec<u32> = (0..all_rays.len() as u32).collect();
+    let mut rays = all_rays.to_vec();
+    let mut nearest = vec![Hit::MISS; rays.len()];
+    let mut tracer = MlsTracer::new(cloud);
+    for _ in 0..MAX_TRIED_BALLS {
+        let nearest = &mut nearest[..rays.len()];
+        closest_shapes::<L, Ball>(&cloud.points, &rays, nearest);
+        let mut n_candidates = 0;
+        for i in 0..nearest.len() {
+            if !nearest[i].is_miss() {
+                (rays[n_candidates], nearest[n_candidates]) = (rays[i], nearest[i]);
+                searching[n_candidates] = searching[i];
+                n_candidates += 1;
+            }
+        }
+        let mut n_left = 0;
+        for first in (0..n_candidates).step_by(PACKET_WIDTH) {
+            let packet = first..n_candidates.min(first + PACKET_WIDTH);
+            let (mut slots, mut distances) = ([0; PACKET_WIDTH], [0.0; PACKET_WIDTH]);
+            // The surface may lie before a ball, and even before the balls that were tried.
+            let mut whole_rays = [all_rays[0]; PACKET_WIDTH];
+            for (lane, i) in packet.clone().enumerate() {
+                (slots[lane], distances[lane]) = (nearest[i].slot, nearest[i].distance);
+                whole_rays[lane] = all_rays[searching[i] as usize];
+            }
+            let lanes = (1 << packet.len()) - 1;
+            let found = tracer.trace::<L, HAS_COLORS>(
+                &PacketRays::<L::PacketLanes>::new(&whole_rays),
+                lanes,
+                L::PacketLanes::load(&distances),
+                &slots,
+            );
+            let [x, y, z] = found.normals.store_packet();
+            let (found_distances, restarts) = (found.distances.store(), found.restarts.store());
+            let found_slots = found.slots.store();
+            for lane in 0..packet.len() {
+                let (ray, ray_idx) = (rays[first + lane], searching[first + lane]);
+                if found.lanes >> lane & 1 == 1 {
+                    let slot = found_slots[lane].to_bits();
+                    hits[ray_idx as usize] = MlsHit {
+                        hit: Hit { distance: found_distances[lane], slot },
+                        radius: cloud.points.radius(slots[lane]),
+                        normal: Vec3::new(x[lane], y[lane], z[lane]),
+                        color: found.colors[lane],
+                    };
+                    continue;
+                }
+                // NaN where the points around span no plane.
+                let least = distances[lane] * (1.0 + 2.0 * f32::EPSILON) + f32::MIN_POSITIVE;
+                let t_min = restarts[lane].max(least);
+                (rays[n_left], searching[n_left]) = (Ray { t_min, ..ray }, ray_idx);
+                n_left += 1;
+            }
+        }
+        rays.truncate(n_left);
+        if rays.is_empty() {
+            break;
+        }
+    }
+}

@@ -1,0 +1,259 @@
+//! Surfaces of the methods that the thesis compares itself with: known answers, holes, and one surface for rays of all
+//! kinds.
+
+use surfel_core::flat::FlatCloud;
+use surfel_core::math::{Ray, Vec3};
+use surfel_core::points::PointCloud;
+use surfel_core::progress::NoProgress;
+use surfel_core::surface::{EdgeTest, SurfaceKind, SurfaceOptions};
+use surfel_core::trace::{Simd, SurfaceHit, occlusions, surface_hits};
+use surfel_tests::clouds;
+use surfel_tests::scenes;
+
+const KINDS: [SurfaceKind; 2] = [SurfaceKind::Cylinder, SurfaceKind::Mls];
+
+fn hits(flat: &FlatCloud, rays: &[Ray]) -> Vec<SurfaceHit> {
+    let mut hits = vec![SurfaceHit::MISS; rays.len()];
+    surface_hits(flat, Simd::detect(), rays, &mut hits);
+    hits
+}
+
+/// Returns a cloud with these options.
+fn flat_with(cloud: PointCloud, kind: SurfaceKind, options: SurfaceOptions) -> FlatCloud {
+    let mut points = scenes::points(cloud, kind);
+    points.options = options;
+    FlatCloud::new(&points, &NoProgress).unwrap()
+}
+
+/// Returns parallel rays along -Z through the points of a square grid.
+fn rays_from_above(half_side: f32, n_side: usize) -> Vec<Ray> {
+    let at = |i: usize| half_side * ((2 * i + 1) as f32 / n_side as f32 - 1.0);
+    let origins = (0..n_side * n_side).map(|i| Vec3::new(at(i % n_side), at(i / n_side), 5.0));
+    origins.map(|origin| Ray::new(origin, Vec3::NEG_Z)).collect()
+}
+
+/// Returns a copy whose normals have random signs.
+fn unoriented(mut cloud: PointCloud) -> PointCloud {
+    for (i, normal) in cloud.normals.iter_mut().flatten().enumerate() {
+        if surfel_core::math::hash(i as u64) & 1 == 1 {
+            *normal = -*normal;
+        }
+    }
+    cloud
+}
+
+#[test]
+fn a_sphere_has_the_depth_and_normals_of_a_sphere() {
+    // The radius of a point is 0.05. Greatest errors of depth in units and of angle in degrees, up to 45 degrees from the
+    // normal: discs stand out by r^2 / 2 at most, a fitted quadric does not.
+    let flat_error = 0.05 * 0.05;
+    for (kind, degree, max_depth, max_angle) in [
+        (SurfaceKind::Cylinder, 2, 1.5 * flat_error, 3.0),
+        (SurfaceKind::Mls, 1, flat_error, 1.0),
+        (SurfaceKind::Mls, 2, 0.1 * flat_error, 0.2),
+        (SurfaceKind::Mls, 3, 0.1 * flat_error, 0.2),
+    ] {
+        let options = SurfaceOptions { degree, ..SurfaceOptions::default() };
+        let flat = flat_with(unoriented(clouds::sphere(20_000, 1.0)), kind, options);
+        let rays = rays_from_above(0.7, 100);
+        let inside = |ray: &&Ray| ray.origin.truncate().length() < 0.7;
+        let rays: Vec<Ray> = rays.iter().filter(inside).copied().collect();
+        for (ray, hit) in rays.iter().zip(hits(&flat, &rays)) {
+            let height = (1.0 - ray.origin.truncate().length_squared()).sqrt();
+            let depth = (hit.distance - (5.0 - height)).abs();
+            let angle = hit.normal.angle_between(ray.origin.with_z(height)).to_degrees();
+            assert!(depth < max_depth && angle < max_angle, "{kind:?} {degree}: {depth} {angle}");
+        }
+    }
+}
+
+#[test]
+fn a_plane_is_flat_and_ends_at_its_outermost_points() {
+    for kind in KINDS {
+        let flat = scenes::flat(unoriented(clouds::plane(50, 0.3, 4)), kind);
+        for hit in hits(&flat, &rays_from_above(0.95, 60)) {
+            assert!((hit.distance - 5.0).abs() < 1e-4, "{kind:?} {hit:?}");
+            assert!(0.99999 < hit.normal.z, "{kind:?} {hit:?}");
+        }
+        let beyond: Vec<Ray> = rays_from_above(1.2, 120)
+            .into_iter()
+            .filter(|ray| 1.0 < ray.origin.truncate().abs().max_element())
+            .collect();
+        assert!(hits(&flat, &beyond).iter().all(SurfaceHit::is_miss), "{kind:?}");
+    }
+}
+
+#[test]
+fn the_sides_of_a_cube_are_flat() {
+    for kind in KINDS {
+        let flat = scenes::flat(unoriented(clouds::cube(40, 0.3, 2)), kind);
+        // The radius of a point is 0.1.
+        for hit in hits(&flat, &rays_from_above(0.8, 60)) {
+            assert!((hit.distance - 4.0).abs() < 1e-3 && 0.999 < hit.normal.z, "{kind:?} {hit:?}");
+        }
+        for hit in hits(&flat, &rays_from_above(0.97, 60)) {
+            assert!((hit.distance - 4.0).abs() < 0.06, "{kind:?} {hit:?}");
+        }
+    }
+}
+
+#[test]
+fn crossing_planes_are_flat_beside_their_crossing() {
+    for kind in KINDS {
+        let flat = scenes::flat(unoriented(clouds::crossing_planes(50, 0.3, 5)), kind);
+        for (ray, hit) in
+            rays_from_above(0.95, 60).iter().zip(hits(&flat, &rays_from_above(0.95, 60)))
+        {
+            if 0.25 < ray.origin.x.abs() {
+                let is_flat = (hit.distance - 5.0).abs() < 1e-3 && 0.999 < hit.normal.z;
+                assert!(is_flat, "{kind:?} {ray:?} {hit:?}");
+            }
+        }
+        let end = |height: f32| {
+            let y = |i: i32| -0.9 + 0.036 * i as f32;
+            let ray = |i| Ray::new(Vec3::new(5.0, y(i), height), Vec3::NEG_X);
+            let rays: Vec<Ray> = (0..50).map(ray).collect();
+            hits(&flat, &rays)
+        };
+        assert!(end(1.01).iter().all(SurfaceHit::is_miss), "{kind:?}");
+        assert!(end(0.8).iter().all(|hit| (hit.distance - 5.0).abs() < 1e-3), "{kind:?}");
+    }
+}
+
+/// Returns a Möbius strip of radius 1 and its exact normals, which no orientation makes agree.
+fn moebius_strip() -> PointCloud {
+    let (n_around, n_across) = (300, 20);
+    let (mut positions, mut normals) = (Vec::new(), Vec::new());
+    for i in 0..n_around {
+        let angle = std::f32::consts::TAU * i as f32 / n_around as f32;
+        let outward = Vec3::new(angle.cos(), angle.sin(), 0.0);
+        let across = (0.5 * angle).cos() * outward + (0.5 * angle).sin() * Vec3::Z;
+        let along = Vec3::new(-angle.sin(), angle.cos(), 0.0);
+        for j in 0..n_across {
+            let offset = 0.4 * (j as f32 / (n_across - 1) as f32 - 0.5);
+            positions.push(outward + offset * across);
+            normals.push(across.cross(along));
+        }
+    }
+    PointCloud { normals: Some(normals), ..PointCloud::from_positions(positions) }
+}
+
+#[test]
+fn a_moebius_strip_has_no_seam() {
+    for kind in KINDS {
+        let flat = scenes::flat(unoriented(moebius_strip()), kind);
+        for i in 0..2000 {
+            let angle = std::f32::consts::TAU * i as f32 / 2000.0;
+            let outward = Vec3::new(angle.cos(), angle.sin(), 0.0);
+            let across = (0.5 * angle).cos() * outward + (0.5 * angle).sin() * Vec3::Z;
+            let normal = across.cross(Vec3::new(-angle.sin(), angle.cos(), 0.0));
+            let target = outward + 0.1 * across;
+            let [hit] = hits(&flat, &[Ray::new(target + normal, -normal)])[..] else { panic!() };
+            assert!((hit.distance - 1.0).abs() < 0.01, "{kind:?} {angle}: {hit:?}");
+            assert!(0.99 < hit.normal.dot(normal).abs(), "{kind:?} {angle}: {hit:?}");
+        }
+    }
+}
+
+/// Returns two sheets at Z = 0 and Z = -`distance`, with points of radius 0.1.
+fn sheets(distance: f32) -> PointCloud {
+    let mut cloud = clouds::plane(40, 0.3, 8);
+    let lower = clouds::plane(40, 0.3, 9).positions.into_iter().map(|p| p - distance * Vec3::Z);
+    cloud.positions.extend(lower);
+    let n = cloud.positions.len();
+    (cloud.normals, cloud.radii) = (Some(vec![Vec3::Z; n]), Some(vec![0.1; n]));
+    cloud
+}
+
+#[test]
+fn sheets_closer_than_the_reach_become_one_and_others_do_not() {
+    let depths = |kind, distance, reach| {
+        let options = SurfaceOptions { reach: Some(reach), ..SurfaceOptions::default() };
+        let flat = flat_with(sheets(distance), kind, options);
+        let found = hits(&flat, &rays_from_above(0.7, 30));
+        found.iter().map(|hit| hit.distance - 5.0).collect::<Vec<f32>>()
+    };
+    // The ray's cylinder is as long as it is wide.
+    let one = depths(SurfaceKind::Cylinder, 0.05, 1.0);
+    assert!(one.iter().all(|depth| (0.005..0.045).contains(depth)), "{one:?}");
+    let two = depths(SurfaceKind::Cylinder, 0.12, 1.0);
+    assert!(two.iter().all(|depth| depth.abs() < 1e-4), "{two:?}");
+    // At the upper sheet the points of the lower one have no weight beyond the support.
+    let two = depths(SurfaceKind::Mls, 0.16, 1.4);
+    assert!(two.iter().all(|depth| depth.abs() < 1e-3), "{two:?}");
+    let one = depths(SurfaceKind::Mls, 0.02, 1.4);
+    assert!(one.iter().all(|depth| (0.0..0.02).contains(depth)), "{one:?}");
+}
+
+#[test]
+fn cylinders_with_too_few_points_go_through_holes() {
+    let with_density = |density| {
+        let options = SurfaceOptions { density, ..SurfaceOptions::default() };
+        let mut cloud = clouds::plane(40, 0.0, 1);
+        cloud.radii = Some(vec![0.1; cloud.len()]);
+        let mut flat = flat_with(cloud, SurfaceKind::Cylinder, options);
+        flat.edge_test = EdgeTest::Off;
+        flat
+    };
+    // Beyond the rim fewer and fewer discs are pierced; inside about twelve are.
+    let beyond = |distance: f32| -> Vec<Ray> {
+        let at = |i: i32| Vec3::new(0.975 + distance, 0.02 * i as f32 - 0.8, 5.0);
+        (0..80).map(|i| Ray::new(at(i), Vec3::NEG_Z)).collect()
+    };
+    let n_hits = |flat: &FlatCloud, distance| {
+        hits(flat, &beyond(distance)).iter().filter(|hit| !hit.is_miss()).count()
+    };
+    let (loose, strict) = (with_density(1), with_density(6));
+    assert_eq!((n_hits(&loose, -0.2), n_hits(&strict, -0.2)), (80, 80));
+    assert_eq!((n_hits(&loose, 0.05), n_hits(&strict, 0.05)), (80, 0));
+    assert_eq!(n_hits(&with_density(128), -0.2), 0);
+}
+
+#[test]
+fn what_a_ray_hits_also_occludes_it() {
+    let rays = scenes::random_rays(3000, 1.5, 8);
+    for kind in KINDS {
+        let mut cloud = clouds::cube(24, 0.4, 11);
+        cloud.normals = None;
+        let flat = scenes::flat(cloud, kind);
+        let mut occluded = vec![false; rays.len()];
+        occlusions(&flat, Simd::detect(), &rays, &mut occluded);
+        let found = hits(&flat, &rays);
+        assert!(found.iter().zip(&occluded).all(|(hit, occluded)| hit.is_miss() != *occluded));
+        assert!(500 < found.iter().filter(|hit| !hit.is_miss()).count(), "{kind:?}");
+    }
+}
+
+#[test]
+fn the_order_of_rays_does_not_change_their_hits() {
+    let rays = [scenes::random_rays(700, 1.2, 5), rays_from_above(1.0, 30)].concat();
+    for kind in KINDS {
+        let flat = scenes::flat(clouds::cube(30, 0.4, 3), kind);
+        let together = hits(&flat, &rays);
+        for simd in Simd::available() {
+            for (i, ray) in rays.iter().enumerate().step_by(7) {
+                let mut alone = [SurfaceHit::MISS];
+                surface_hits(&flat, simd, &[*ray], &mut alone);
+                assert_eq!(alone[0], together[i], "{kind:?} {} {i}", simd.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn few_points_and_extreme_radii_give_no_panic() {
+    for kind in KINDS {
+        for n in [1, 2, 3, 9] {
+            hits(&scenes::flat(clouds::sphere(n, 1.0), kind), &scenes::random_rays(200, 1.2, 1));
+        }
+        for scale in [1e-6, 1e6] {
+            let mut cloud = clouds::sphere(2000, scale);
+            cloud.normals = None;
+            let ray = Ray::new(3.0 * scale * Vec3::Z, Vec3::NEG_Z);
+            let found = hits(&scenes::flat(cloud, kind), &[ray])[0].distance;
+            assert!((found / scale - 2.0).abs() < 0.01, "{kind:?} {scale}: {found}");
+        }
+        let line = hits(&scenes::flat(clouds::line(300), kind), &scenes::random_rays(500, 1.2, 2));
+        assert!(line.iter().all(|hit| hit.is_miss() || hit.distance.is_finite()));
+    }
+}
