@@ -2,6 +2,7 @@
 //! that is the same on every machine.
 
 mod animation;
+mod backend_materials;
 mod backends;
 mod bad_clouds;
 mod batches;

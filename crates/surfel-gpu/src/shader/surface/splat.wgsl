@@ -17,7 +17,7 @@ fn no_discs(nearest: vec3<f32>, direction: vec3<f32>) -> SplatSums {
 // Adds a disc, which the ray hits at `offset` from its centre.
 fn with_disc(sums: SplatSums, disc: Surfel, offset: vec3<f32>) -> SplatSums {
     let weight = max(1.0 - sqrt(dot(offset, offset)) / disc.radius, 1e-4);
-    let is_opposed = visit.surface == SPLAT && dot(disc.normal, sums.nearest) < 0.0;
+    let is_opposed = visits[visit_idx].surface == SPLAT && dot(disc.normal, sums.nearest) < 0.0;
     return SplatSums(
         sums.nearest,
         sums.normal + select(weight, -weight, is_opposed) * disc.normal,
@@ -30,7 +30,7 @@ fn with_disc(sums: SplatSums, disc: Surfel, offset: vec3<f32>) -> SplatSums {
 fn splat_normal(sums: SplatSums, direction: vec3<f32>) -> vec3<f32> {
     // Opposite normals may cancel in splat-mean; the normal of the nearest disc is then as good as any.
     let normal = normalize_or(sums.normal, sums.nearest);
-    if visit.surface == SPLAT {
+    if visits[visit_idx].surface == SPLAT {
         return clamp_to_visible(normal, direction);
     }
     return flip_to_hemisphere(normal, -direction);
