@@ -1,11 +1,14 @@
 //! AOVs from the hits of a device.
 
-use crate::records::{FrameRecord, HitRecord, NONE, SURFACES, TRIANGLE};
+use crate::numbers::{NONE, SURFACES, TRIANGLE};
+use crate::records::{FrameRecord, HitRecord};
 use surfel_core::flat::{FlatGeometry, FlatScene};
 use surfel_core::image::Aovs;
+use surfel_core::integrator::albedo;
 use surfel_core::math::Vec3;
 use surfel_core::render::Settings;
 use surfel_core::scene::View;
+use surfel_core::trace::SceneHit;
 
 /// The picture whose AOVs are set.
 pub struct AovSource<'a> {
@@ -31,16 +34,13 @@ pub fn set_aovs(
         let (x, y) = (in_picture % width, in_picture / width);
         let ray = source.view.ray(x as f32 + 0.5, y as f32 + 0.5);
         let position = ray.at(hit.distance);
-        let material = &scene.materials[hit.material as usize];
-        let color =
-            if material.ignores_vertex_colors { Vec3::ONE } else { Vec3::from_array(hit.color) };
         let pixel = first as usize + i;
         aovs.depth[pixel] = source.view.depth(position);
         aovs.position[pixel] = position;
         aovs.normal[pixel] = Vec3::from_array(hit.normal);
         aovs.point_id[pixel] = point_id(scene, hit);
         aovs.instance_id[pixel] = hit.instance;
-        aovs.albedo[pixel] = material.base_color * color;
+        aovs.albedo[pixel] = albedo(scene, &ray, &scene_hit(scene, hit));
         if hit.surface != TRIANGLE {
             aovs.support_count[pixel] = hit.support_count;
             aovs.support_distance[pixel] = hit.support_distance;
@@ -52,5 +52,25 @@ fn point_id(scene: &FlatScene, hit: &HitRecord) -> u32 {
     match scene.geometry(&scene.instances[hit.instance as usize]) {
         FlatGeometry::Cloud(cloud) => cloud.points_of(SURFACES[hit.surface as usize]).id(hit.slot),
         FlatGeometry::Mesh(mesh) => mesh.triangles.id(hit.slot),
+    }
+}
+
+/// Returns the part of a hit that its albedo depends on.
+fn scene_hit(scene: &FlatScene, hit: &HitRecord) -> SceneHit {
+    let [second, third] = hit.barycentrics;
+    SceneHit {
+        distance: hit.distance,
+        instance: hit.instance,
+        id: point_id(scene, hit),
+        slot: hit.slot,
+        barycentrics: (second, third),
+        radius: hit.radius,
+        spawn_radius: hit.radius,
+        normal: Vec3::from_array(hit.normal),
+        geometric_normal: Vec3::from_array(hit.geometric_normal),
+        color: Vec3::from_array(hit.color),
+        alpha: hit.alpha,
+        surface: SURFACES.get(hit.surface as usize).copied(),
+        is_backface: hit.is_backface == 1,
     }
 }

@@ -1,6 +1,7 @@
 //! Devices: the list of them, and one opened for work.
 
 use crate::error::{Error, Result};
+use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES, WORKGROUP_SIZE};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -47,8 +48,10 @@ impl DeviceKind {
     }
 }
 
-/// Number of storage buffers that a kernel uses at most.
-const N_STORAGE_BUFFERS: u64 = 8;
+/// Bytes of a vector of four words.
+const VECTOR_BYTES: u64 = 16;
+/// Number of storage buffers that a kernel uses at most, where trees are whole.
+const N_STORAGE_BUFFERS: u64 = 10;
 /// Time after which a device that does not finish a piece of work counts as hung. Pieces take far less than a second.
 const WAIT_TIMEOUT: Duration = Duration::from_secs(60);
 
@@ -60,6 +63,8 @@ pub fn devices() -> Vec<DeviceInfo> {
 fn adapters() -> Vec<wgpu::Adapter> {
     let mut description = wgpu::InstanceDescriptor::new_without_display_handle();
     description.backends = wgpu::Backends::PRIMARY;
+    // The sizes of indirect dispatches come from kernels that keep the limits; their check would be one more dispatch.
+    description.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     let instance = wgpu::Instance::new(description);
     let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
     // The sort is stable: equal devices keep the order of the system.
@@ -118,16 +123,19 @@ pub struct Gpu {
     pub device: wgpu::Device,
     /// Takes work.
     pub queue: wgpu::Queue,
+    /// Binary logarithm of the number of vectors of four words in a page of a tree.
+    pub page_shift: u32,
     /// The first failure, after which the device is not used any more.
     failure: Arc<Mutex<Option<Error>>>,
 }
 
 impl Gpu {
-    /// Opens the device with this index or name, or the first one.
+    /// Opens the device with this index or name, or the first one. Trees larger than `max_page_bytes`, or than the device's
+    /// arrays, are split.
     ///
     /// # Errors
     /// Fails if there is no such device, if it allows less than is needed, or if its driver refuses to open it.
-    pub fn open(selector: Option<&str>) -> Result<Self> {
+    pub fn open(selector: Option<&str>, max_page_bytes: u64) -> Result<Self> {
         let adapters = adapters();
         let devices: Vec<DeviceInfo> = adapters.iter().map(info).collect();
         let chosen = select(&devices, selector)?;
@@ -154,7 +162,21 @@ impl Gpu {
             let reason = format!("was lost: {reason}");
             keep_first(&first, Error::Device { device: name.clone(), reason });
         });
-        Ok(Self { info, device, queue, failure })
+        let page_vectors = info.max_array_bytes.min(max_page_bytes) / VECTOR_BYTES;
+        let page_shift = page_vectors.max(1).ilog2();
+        Ok(Self { info, device, queue, page_shift, failure })
+    }
+
+    /// Returns the number of bytes in a page of a tree.
+    pub fn page_bytes(&self) -> usize {
+        (VECTOR_BYTES as usize) << self.page_shift
+    }
+
+    /// Returns true if the device allows kernels that read a tree in pages.
+    pub fn has_pages(&self) -> bool {
+        let n_pages = (N_NODE_PAGES + N_BLOCK_PAGES - 2) as u64;
+        let n_allowed = self.device.limits().max_storage_buffers_per_shader_stage;
+        N_STORAGE_BUFFERS - 1 + n_pages <= u64::from(n_allowed)
     }
 
     /// Fails if the device has failed since it was opened.
@@ -230,7 +252,7 @@ fn check_limits(info: &DeviceInfo, limits: &wgpu::Limits) -> Result<()> {
     let n_invocations = u64::from(limits.max_compute_invocations_per_workgroup);
     for (limit, found, needed) in [
         ("storage buffers a kernel", n_buffers, N_STORAGE_BUFFERS),
-        ("invocations a workgroup", n_invocations, u64::from(crate::shader::WORKGROUP_SIZE)),
+        ("invocations a workgroup", n_invocations, u64::from(WORKGROUP_SIZE)),
     ] {
         if found < needed {
             return Err(Error::Limit { device: info.name.clone(), limit, found, needed });
@@ -276,10 +298,11 @@ mod tests {
     #[test]
     fn devices_that_allow_too_little_are_refused() {
         let info = device("small", DeviceKind::Integrated);
-        let enough = wgpu::Limits::default();
+        let enough =
+            wgpu::Limits { max_storage_buffers_per_shader_stage: 10, ..wgpu::Limits::default() };
         assert_eq!(check_limits(&info, &enough), Ok(()));
         let limits = wgpu::Limits { max_storage_buffers_per_shader_stage: 4, ..enough };
         let error = check_limits(&info, &limits).unwrap_err();
-        assert_eq!(error.to_string(), "small allows 4 storage buffers a kernel, 8 are needed");
+        assert_eq!(error.to_string(), "small allows 4 storage buffers a kernel, 10 are needed");
     }
 }

@@ -2,21 +2,28 @@
 
 use crate::device::Gpu;
 use crate::error::Result;
-use crate::shader::Kernel;
+use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
+use crate::shader::{Kernel, Resources};
 use std::collections::BTreeMap;
 
 /// Layouts of the arrays that kernels use, and the kernels compiled so far.
 #[derive(Debug)]
 pub struct Kernels {
-    /// Layout of the uniforms: picture, instance or light, and the table of sRGB.
+    /// Layout of the uniforms: picture, task and tables.
     pub uniforms: wgpu::BindGroupLayout,
     /// Layout of the arrays of rays.
     pub rays: wgpu::BindGroupLayout,
-    /// Layout of the arrays of a tree.
+    /// Layout of the arrays of a tree and its instances.
     pub tree: wgpu::BindGroupLayout,
-    /// Layout of the kernels that read no tree, and of those that do.
-    pipeline_layouts: [wgpu::PipelineLayout; 2],
-    compiled: BTreeMap<Kernel, wgpu::ComputePipeline>,
+    /// Layout of the arrays of a tree in pages and its instances.
+    pub paged_tree: wgpu::BindGroupLayout,
+    /// Layout of the arrays of a scene.
+    pub scene: wgpu::BindGroupLayout,
+    /// Layout of the sizes of dispatches.
+    pub dispatches: wgpu::BindGroupLayout,
+    /// Layouts of the kernels that read a tree, a tree in pages, the scene, or the sizes of dispatches.
+    pipeline_layouts: [wgpu::PipelineLayout; 4],
+    compiled: BTreeMap<(Kernel, bool), wgpu::ComputePipeline>,
 }
 
 impl Kernels {
@@ -25,54 +32,75 @@ impl Kernels {
         gpu.catch("the layouts of arrays", || {
             let (read, write) = (storage(true), storage(false));
             let uniforms = layout(gpu, &[uniform(false), uniform(true), uniform(false)]);
-            let rays = layout(gpu, &[write, write, write, write, read, write]);
-            let tree = layout(gpu, &[read, read]);
-            let pipeline = |groups: &[Option<&wgpu::BindGroupLayout>]| {
+            let rays = layout(gpu, &[write; 6]);
+            let tree = layout(gpu, &[read; 3]);
+            // A tree in pages takes more arrays than some devices allow in one kernel; they refuse such trees.
+            let n_pages = if gpu.has_pages() { N_NODE_PAGES + N_BLOCK_PAGES } else { 2 };
+            let paged_tree = layout(gpu, &vec![read; 1 + n_pages]);
+            let scene = layout(gpu, &[read; 4]);
+            let dispatches = layout(gpu, &[write]);
+            let pipeline_layouts = [&tree, &paged_tree, &scene, &dispatches].map(|resources| {
                 gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                     label: None,
-                    bind_group_layouts: groups,
+                    bind_group_layouts: &[Some(&uniforms), Some(&rays), Some(resources)],
                     immediate_size: 0,
                 })
-            };
-            let all = [Some(&uniforms), Some(&rays), Some(&tree)];
-            let pipeline_layouts = [pipeline(&all[..2]), pipeline(&all)];
-            Self { uniforms, rays, tree, pipeline_layouts, compiled: BTreeMap::new() }
+            });
+            let compiled = BTreeMap::new();
+            Self { uniforms, rays, tree, paged_tree, scene, dispatches, pipeline_layouts, compiled }
         })
     }
 
-    /// Compiles kernels that are not compiled yet.
+    /// Compiles kernels that are not compiled yet, each for whole trees or for trees in pages.
     ///
     /// # Errors
     /// Fails if the driver refuses one.
-    pub fn compile(&mut self, gpu: &Gpu, kernels: impl Iterator<Item = Kernel>) -> Result<()> {
-        for kernel in kernels {
-            if !self.compiled.contains_key(&kernel) {
-                let layout = &self.pipeline_layouts[usize::from(kernel.reads_tree())];
-                let pipeline = gpu.catch("a kernel", || compile(gpu, kernel, layout))?;
-                self.compiled.insert(kernel, pipeline);
+    pub fn compile(
+        &mut self,
+        gpu: &Gpu,
+        kernels: impl Iterator<Item = (Kernel, bool)>,
+    ) -> Result<()> {
+        for (kernel, is_paged) in kernels {
+            if !self.compiled.contains_key(&(kernel, is_paged)) {
+                let [tree, paged_tree, scene, dispatches] = &self.pipeline_layouts;
+                let layout = match kernel.resources() {
+                    Resources::Tree if is_paged => paged_tree,
+                    Resources::Tree => tree,
+                    Resources::Scene => scene,
+                    Resources::Dispatches => dispatches,
+                };
+                let page_shift = is_paged.then_some(gpu.page_shift);
+                let pipeline =
+                    gpu.catch("a kernel", || compile(gpu, kernel, page_shift, layout))?;
+                self.compiled.insert((kernel, is_paged), pipeline);
             }
         }
         Ok(())
     }
 
     /// Returns a compiled kernel.
-    pub fn get(&self, kernel: Kernel) -> &wgpu::ComputePipeline {
-        &self.compiled[&kernel]
+    pub fn get(&self, kernel: Kernel, is_paged: bool) -> &wgpu::ComputePipeline {
+        &self.compiled[&(kernel, is_paged)]
     }
 }
 
-fn compile(gpu: &Gpu, kernel: Kernel, layout: &wgpu::PipelineLayout) -> wgpu::ComputePipeline {
+fn compile(
+    gpu: &Gpu,
+    kernel: Kernel,
+    page_shift: Option<u32>,
+    layout: &wgpu::PipelineLayout,
+) -> wgpu::ComputePipeline {
     let name = format!("{kernel:?}");
     let description = wgpu::ShaderModuleDescriptor {
         label: Some(&name),
-        source: wgpu::ShaderSource::Wgsl(kernel.source().into()),
+        source: wgpu::ShaderSource::Wgsl(kernel.source(page_shift).into()),
     };
     // Debug builds check the bounds of all arrays in the kernels.
     let checks = match cfg!(debug_assertions) {
         true => wgpu::ShaderRuntimeChecks::checked(),
         false => wgpu::ShaderRuntimeChecks::unchecked(),
     };
-    // SAFETY: the kernels are those of this crate. They stop at the number of rays, which is that of the arrays; indices
+    // SAFETY: the kernels are those of this crate. They stop at the lengths of queues, which fit the arrays; indices
     // of nodes and blocks come from trees that `surfel_core` builds; all loops end.
     let module = unsafe { gpu.device.create_shader_module_trusted(description, checks) };
     gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {

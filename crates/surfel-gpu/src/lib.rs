@@ -36,19 +36,27 @@
 //! ```
 
 mod error;
+pub mod numbers;
 pub mod records;
+mod constants;
 pub mod shader;
 mod device;
 mod kernels;
 mod unsupported;
 mod mesh_blocks;
 mod upload;
+mod scene_records;
+mod words;
 mod wavefront;
+mod tree_visits;
 mod passes;
 mod aovs;
+mod job;
+mod ray_timing;
 mod renderer;
 
 pub use device::{DeviceInfo, DeviceKind, devices};
 pub use error::{Error, Result};
+pub use ray_timing::{RayTimes, TimedQuery, Timing};
 pub use renderer::GpuRenderer;
 pub use unsupported::unsupported;

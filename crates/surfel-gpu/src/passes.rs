@@ -1,326 +1,238 @@
-//! The passes that render a sample of each pixel, and the records that they read.
+//! The passes that render a sample of each pixel, and the tasks that they read.
 
-use crate::mesh_blocks::{attributes, block_vectors};
-use crate::records::lens;
-use crate::records::light_kind;
-use crate::records::{
-    FrameRecord, LightSample, MAX_PLANES, MaterialRecord, NO_LIMIT, TRIANGLE, Visit, surface_number,
-};
+use crate::numbers::queue;
+use crate::numbers::ray_kind;
+use crate::records::{Task, Visit};
+use crate::scene_records::n_light_samples;
 use crate::shader::{Kernel, Surface};
-use crate::unsupported::trees;
+use crate::tree_visits::{TreeInstances, TreeRef, TreeVisits};
 use crate::wavefront::RECORD_STRIDE;
-use surfel_core::flat::{
-    FlatCloud, FlatGeometry, FlatMesh, FlatPunctualLight, FlatScene, Instance,
-};
-use surfel_core::math::{Affine3A, Mat3, Vec3, Vec3A};
+use std::ops::Range;
+use surfel_core::flat::FlatScene;
 use surfel_core::render::Settings;
-use surfel_core::scene::{Background, Lens, Light, Material, PunctualLightKind, Sky, View};
-use surfel_core::surface::{EdgeTest, SurfaceKind};
+use surfel_core::scene::{AlphaMode, Light, Material, PunctualLightKind};
 
-/// A tree that rays are traced against, as an instance shows it.
+/// The number of invocations of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TreeRef {
-    /// Index of the geometry.
-    pub geometry_idx: usize,
-    /// Index of the tree among those of the geometry.
-    pub tree_idx: usize,
+pub enum Size {
+    /// One for each pixel.
+    Pixels,
+    /// One.
+    One,
+    /// One for each entry of the queue of this number.
+    Queue(u32),
 }
 
-/// One pass over all rays.
+/// One pass over the entries of a queue.
 #[derive(Clone, Copy, Debug)]
 pub struct Pass {
     /// The kernel.
     pub kernel: Kernel,
     /// The tree that the kernel reads.
     pub tree: Option<TreeRef>,
-    /// Offset of the record of the instance or light.
-    pub record_offset: u32,
+    /// Offset of the task.
+    pub task_offset: u32,
+    /// The number of invocations.
+    pub size: Size,
+    /// True if the kernel works on the rays toward a light, not on paths.
+    pub is_of_light: bool,
 }
 
-/// The passes of one sample, and the records of instances and lights that they read.
+/// A part of the work on a wavefront.
+#[derive(Clone, Debug)]
+pub enum PassStage {
+    /// Passes that run once.
+    Once(Vec<Pass>),
+    /// Passes that take all rays toward a light through one surface each, and run until none is left.
+    Surfaces(Vec<Pass>),
+}
+
+/// The passes of one sample, and what they read.
 #[derive(Debug, Default)]
 pub struct Passes {
-    /// The passes in their order.
-    pub passes: Vec<Pass>,
-    /// The passes that find the hits of the rays through the centres of pixels, if the picture has AOVs.
-    pub aov_passes: Vec<Pass>,
-    /// The records, at multiples of `RECORD_STRIDE`.
-    pub records: Vec<u8>,
+    /// The passes that make the camera rays.
+    pub camera: Vec<Pass>,
+    /// The passes that find the hits of a wavefront.
+    pub trace: Vec<Pass>,
+    /// The passes that shade them.
+    pub shade: Vec<PassStage>,
+    /// The passes that begin the next wavefront; none if there is only one.
+    pub next_wave: Option<Pass>,
+    /// The passes that find the hits of the rays through the centres of pixels, if the picture has AOVs and these hits
+    /// are not known from its only sample.
+    pub aov_hits: Vec<Pass>,
+    /// The passes that find the points behind these hits.
+    pub aov_supports: Vec<Pass>,
+    /// The tasks, at multiples of `RECORD_STRIDE`.
+    pub tasks: Vec<u8>,
+    /// The instances of trees.
+    pub visits: Vec<Visit>,
 }
 
 impl Passes {
     /// Returns the passes that render one sample of each pixel.
     pub fn new(scene: &FlatScene, settings: &Settings) -> Self {
         let mut passes = Self::default();
-        let visits = passes.add_visits(scene);
-        passes.add(Kernel::Generate, None, 0);
-        for (tree, surface, record) in &visits {
-            passes.add(Kernel::Closest(*surface), Some(*tree), *record);
-        }
-        passes.add(Kernel::Shade, None, 0);
-        passes.add_background(scene);
-        let lights = scene.lights.iter().map(|light| light_samples(light, settings));
-        let lamps = scene.punctual_lights.iter().enumerate();
-        let lamps = lamps.map(|(i, lamp)| lamp_samples(i as u32, lamp, settings));
-        for samples in lights.chain(lamps) {
-            for sample in &samples {
-                let record = passes.add_record(bytemuck::bytes_of(sample));
-                passes.add(Kernel::SampleLight, None, record);
-                if sample.kind == light_kind::HEADLIGHT {
-                    continue;
+        let TreeVisits { trees, visits } = TreeVisits::new(scene);
+        passes.visits = visits;
+        passes.camera = passes.camera_passes(ray_kind::PRIMARY);
+        passes.trace = passes.trace_passes(&trees);
+        let shade = passes.pass(Kernel::Shade, Size::Queue(queue::PATHS), Task::default());
+        let mut once = vec![shade];
+        once.push(passes.take(queue::POINTS, ray_kind::UNCOUNTED));
+        for (light_idx, (kind, max_samples)) in
+            light_samples(scene, settings).into_iter().enumerate()
+        {
+            for sample_idx in 0..max_samples {
+                let task =
+                    Task { light: light_idx as u32, sample_idx, max_samples, ..Task::default() };
+                let mut sample = passes.pass(Kernel::SampleLight, Size::Queue(queue::POINTS), task);
+                sample.is_of_light = true;
+                once.push(sample);
+                if let Some(kind) = kind {
+                    passes.add_light_passes(scene, &trees, kind, &mut once);
                 }
-                for (tree, surface, record) in &visits {
-                    passes.add(Kernel::Any(*surface), Some(*tree), *record);
-                }
-                passes.add(Kernel::AddLight, None, record);
             }
         }
-        passes.add(Kernel::Accumulate, None, 0);
-        passes.add_aov_passes(&visits, settings);
-        passes.records.resize(passes.records.len().max(RECORD_STRIDE as usize), 0);
+        passes.shade.push(PassStage::Once(once));
+        if scene.materials.iter().any(has_branches) {
+            passes.next_wave = Some(passes.take(queue::PATHS, ray_kind::SECONDARY));
+        }
+        passes.add_aov_passes(&trees, settings);
         passes
     }
 
-    fn add(&mut self, kernel: Kernel, tree: Option<TreeRef>, record_offset: u32) {
-        self.passes.push(Pass { kernel, tree, record_offset });
+    /// Returns every pass.
+    pub fn all(&self) -> impl Iterator<Item = &Pass> {
+        let shade = self.shade.iter().flat_map(|stage| match stage {
+            PassStage::Once(passes) | PassStage::Surfaces(passes) => passes,
+        });
+        let aovs = self.aov_hits.iter().chain(&self.aov_supports);
+        self.camera.iter().chain(&self.trace).chain(shade).chain(&self.next_wave).chain(aovs)
     }
 
-    /// Adds the passes that show the sky, black without one, where it is the background.
-    fn add_background(&mut self, scene: &FlatScene) {
-        if scene.background != Background::Environment {
+    fn pass(&mut self, kernel: Kernel, size: Size, task: Task) -> Pass {
+        let task_offset = self.tasks.len() as u32;
+        self.tasks.extend_from_slice(bytemuck::bytes_of(&task));
+        self.tasks.resize(task_offset as usize + RECORD_STRIDE as usize, 0);
+        Pass { kernel, tree: None, task_offset, size, is_of_light: false }
+    }
+
+    /// Returns the pass of paths, or of rays toward lights, over these instances of a tree; none without any.
+    fn tree_pass(
+        &mut self,
+        kernel: fn(Surface) -> Kernel,
+        tree: &TreeInstances,
+        visits: Range<u32>,
+        queue: u32,
+    ) -> Option<Pass> {
+        let n_visits = visits.end - visits.start;
+        let task = Task { queue, first_visit: visits.start, n_visits, ..Task::default() };
+        let is_of_light = queue == queue::LIGHT_RAYS;
+        (0 < n_visits).then(|| Pass {
+            tree: Some(tree.tree),
+            is_of_light,
+            ..self.pass(kernel(tree.surface), Size::Queue(queue), task)
+        })
+    }
+
+    /// Returns the passes that find hits, and the points behind them where these give the colour.
+    fn closest(&mut self, tree: &TreeInstances, visits: Range<u32>, queue: u32) -> Vec<Pass> {
+        let closest = self.tree_pass(Kernel::Closest, tree, visits.clone(), queue);
+        let support = tree.has_support_colors;
+        let support =
+            support.then(|| self.tree_pass(Kernel::Support, tree, visits, queue)).flatten();
+        closest.into_iter().chain(support).collect()
+    }
+
+    fn take(&mut self, queue: u32, ray_kind: u32) -> Pass {
+        self.pass(Kernel::TakeQueue, Size::One, Task { queue, ray_kind, ..Task::default() })
+    }
+
+    fn camera_passes(&mut self, ray_kind: u32) -> Vec<Pass> {
+        let generate = self.pass(Kernel::Generate, Size::Pixels, Task::default());
+        vec![generate, self.take(queue::PATHS, ray_kind)]
+    }
+
+    fn trace_passes(&mut self, trees: &[TreeInstances]) -> Vec<Pass> {
+        let task = Task { queue: queue::PATHS, ..Task::default() };
+        let mut passes = vec![self.pass(Kernel::ClearHits, Size::Queue(queue::PATHS), task)];
+        for tree in trees {
+            passes.extend(self.closest(tree, tree.all(), queue::PATHS));
+        }
+        passes
+    }
+
+    /// Adds the passes that find out how much light the rays of a sample bring.
+    fn add_light_passes(
+        &mut self,
+        scene: &FlatScene,
+        trees: &[TreeInstances],
+        ray_kind: u32,
+        once: &mut Vec<Pass>,
+    ) {
+        let task = Task { queue: queue::LIGHT_RAYS, ray_kind, ..Task::default() };
+        let size = Size::Queue(queue::LIGHT_RAYS);
+        let of_light = |pass: Pass| Pass { is_of_light: true, ..pass };
+        once.push(of_light(self.pass(Kernel::TakeQueue, Size::One, task)));
+        for tree in trees {
+            let any = self.tree_pass(Kernel::Any, tree, tree.opaque.clone(), queue::LIGHT_RAYS);
+            once.extend(any);
+        }
+        if !scene.is_transmissive {
+            once.push(of_light(self.pass(Kernel::AddLight, size, task)));
             return;
         }
-        let black = LightSample { kind: light_kind::SKY, ..bytemuck::Zeroable::zeroed() };
-        let skies = scene.lights.iter().filter_map(|light| match light {
-            Light::Sky(sky) => Some(sky_record(sky)),
-            _ => None,
-        });
-        for sample in skies.chain([black]) {
-            let record = self.add_record(bytemuck::bytes_of(&sample));
-            self.add(Kernel::ShadeMiss, None, record);
+        once.push(of_light(self.pass(Kernel::ClearHits, size, task)));
+        self.shade.push(PassStage::Once(std::mem::take(once)));
+        let mut surfaces = Vec::new();
+        for tree in trees {
+            surfaces.extend(self.closest(tree, tree.transmissive.clone(), queue::LIGHT_RAYS));
         }
+        surfaces.push(of_light(self.pass(Kernel::PassSurface, size, task)));
+        self.shade.push(PassStage::Surfaces(surfaces));
     }
 
-    /// Adds the passes for AOVs. The only sample of a pixel goes through its centre and has left its hits.
-    fn add_aov_passes(&mut self, visits: &[(TreeRef, Surface, u32)], settings: &Settings) {
+    /// Adds the passes for AOVs. If there is one sample and one wavefront, it has left its hits.
+    fn add_aov_passes(&mut self, trees: &[TreeInstances], settings: &Settings) {
         if !settings.with_aovs {
             return;
         }
-        let pass = |kernel, (tree, _, record_offset): &(TreeRef, Surface, u32)| Pass {
-            kernel,
-            tree: Some(*tree),
-            record_offset: *record_offset,
-        };
-        if 1 < settings.samples_per_pixel {
-            let generate = Pass { kernel: Kernel::Generate, tree: None, record_offset: 0 };
-            self.aov_passes.push(generate);
-            let closest = visits.iter().map(|visit| pass(Kernel::Closest(visit.1), visit));
-            self.aov_passes.extend(closest);
+        let is_sampled = 1 < settings.samples_per_pixel;
+        if is_sampled || self.next_wave.is_some() {
+            let kind = if is_sampled { ray_kind::PRIMARY } else { ray_kind::UNCOUNTED };
+            self.aov_hits = self.camera_passes(kind);
+            let trace = self.trace_passes(trees);
+            self.aov_hits.extend(trace);
         }
-        let visits = visits.iter().filter(|(_, surface, _)| *surface != Surface::Triangle);
-        self.aov_passes.extend(visits.map(|visit| pass(Kernel::Support(visit.1), visit)));
-    }
-
-    /// Adds the records of all instances of trees, in the order of the instances.
-    fn add_visits(&mut self, scene: &FlatScene) -> Vec<(TreeRef, Surface, u32)> {
-        let mut visits = Vec::new();
-        for (instance_idx, instance) in scene.instances.iter().enumerate() {
-            let cloud = match scene.geometry(instance) {
-                FlatGeometry::Cloud(cloud) => cloud,
-                FlatGeometry::Mesh(mesh) => {
-                    let visit = mesh_visit(instance_idx as u32, instance, mesh);
-                    let record = self.add_record(bytemuck::bytes_of(&visit));
-                    let geometry_idx = instance.geometry_idx as usize;
-                    let tree = TreeRef { geometry_idx, tree_idx: 0 };
-                    visits.push((tree, Surface::Triangle, record));
-                    continue;
-                }
-            };
-            for (tree_idx, (kind, points)) in trees(cloud).into_iter().enumerate() {
-                let Some(surface) = Surface::of_kind(kind) else { continue };
-                if points.nodes.is_empty() {
-                    continue;
-                }
-                let visit = visit(instance_idx as u32, instance, cloud, kind);
-                let record = self.add_record(bytemuck::bytes_of(&visit));
-                let geometry_idx = instance.geometry_idx as usize;
-                visits.push((TreeRef { geometry_idx, tree_idx }, surface, record));
-            }
+        for tree in trees.iter().filter(|tree| tree.surface != Surface::Triangle) {
+            let support = self.tree_pass(Kernel::Support, tree, tree.all(), queue::PATHS);
+            self.aov_supports.extend(support);
         }
-        visits
-    }
-
-    fn add_record(&mut self, record: &[u8]) -> u32 {
-        let offset = self.records.len();
-        self.records.extend_from_slice(record);
-        self.records.resize(offset + RECORD_STRIDE as usize, 0);
-        offset as u32
     }
 }
 
-fn visit(instance_idx: u32, instance: &Instance, cloud: &FlatCloud, kind: SurfaceKind) -> Visit {
-    let is_surface = kind == cloud.surface;
-    Visit {
-        surface: surface_number(kind),
-        max_blend_distance: if is_surface { cloud.max_blend_distance } else { 0.0 },
-        edge_retest_factor: cloud.edge_retest_factor,
-        has_edge_test: (cloud.edge_test == EdgeTest::AngularGap).into(),
-        has_front_sides: cloud.has_front_sides.into(),
-        blends_colors: cloud.blends_colors.into(),
-        ..placement(instance_idx, instance)
-    }
+/// Returns true if paths go on behind a surface of this material.
+fn has_branches(material: &Material) -> bool {
+    material.metallic != 0.0
+        || material.ior != 1.0
+        || material.transmission != 0.0
+        || material.alpha_mode != AlphaMode::Opaque
 }
 
-fn mesh_visit(instance_idx: u32, instance: &Instance, mesh: &FlatMesh) -> Visit {
-    Visit {
-        surface: TRIANGLE,
-        block_vectors: block_vectors(mesh),
-        attributes: attributes(mesh),
-        ..placement(instance_idx, instance)
-    }
-}
-
-fn placement(instance_idx: u32, instance: &Instance) -> Visit {
-    Visit {
-        object_from_world: affine_columns(&instance.object_from_world),
-        world_from_normal: matrix_columns(&instance.world_from_normal),
-        instance: instance_idx,
-        material: instance.material_idx,
-        is_identity: instance.is_identity.into(),
-        max_scale: instance.max_scale,
-        ..bytemuck::Zeroable::zeroed()
-    }
-}
-
-fn affine_columns(transform: &Affine3A) -> [[f32; 4]; 4] {
-    let Affine3A { matrix3, translation } = transform;
-    let column = |axis: Vec3A| Vec3::from(axis).extend(0.0).to_array();
-    [column(matrix3.x_axis), column(matrix3.y_axis), column(matrix3.z_axis), column(*translation)]
-}
-
-fn matrix_columns(matrix: &Mat3) -> [[f32; 4]; 3] {
-    [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|axis| axis.extend(0.0).to_array())
-}
-
-/// Returns the records of the samples of a light at each hit.
-fn light_samples(light: &Light, settings: &Settings) -> Vec<LightSample> {
+/// Returns for each light, in the order of their records, the kind of its rays, none for a headlight, and the maximum
+/// number of rays from a point.
+fn light_samples(scene: &FlatScene, settings: &Settings) -> Vec<(Option<u32>, u32)> {
     let n_light_samples = n_light_samples(settings);
-    let none = LightSample { n_samples: 1, ..bytemuck::Zeroable::zeroed() };
-    let sample = match light {
-        Light::Sun(sun) => {
-            let is_point = sun.angular_diameter_deg <= 0.0;
-            LightSample {
-                direction: sun.direction.to_array(),
-                kind: if is_point { light_kind::POINT_SUN } else { light_kind::SUN },
-                color: sun.color.to_array(),
-                cos_max: (sun.angular_diameter_deg.to_radians() / 2.0).cos(),
-                n_samples: if is_point { 1 } else { n_light_samples },
-                ..none
-            }
-        }
-        Light::Sky(sky) => LightSample { n_samples: n_light_samples, ..sky_record(sky) },
-        Light::Headlight(strength) => {
-            LightSample { kind: light_kind::HEADLIGHT, color: [*strength; 3], ..none }
-        }
-        Light::Environment(_) => return Vec::new(),
-    };
-    repeated(sample)
-}
-
-fn n_light_samples(settings: &Settings) -> u32 {
-    settings.light_samples.div_ceil(settings.samples_per_pixel)
-}
-
-fn repeated(sample: LightSample) -> Vec<LightSample> {
-    (0..sample.n_samples).map(|sample_idx| LightSample { sample_idx, ..sample }).collect()
-}
-
-/// Returns the records of the samples of a lamp at each hit. A directional one is a sun without extent.
-fn lamp_samples(lamp_idx: u32, lamp: &FlatPunctualLight, settings: &Settings) -> Vec<LightSample> {
-    let is_directional = lamp.kind == PunctualLightKind::Directional;
-    let is_point = lamp.radius <= 0.0 || is_directional;
-    let (kind, cosines) = match lamp.kind {
-        PunctualLightKind::Directional => (light_kind::POINT_SUN, (0.0, 0.0)),
-        PunctualLightKind::Point => (light_kind::POINT, (0.0, 0.0)),
-        PunctualLightKind::Spot { inner_rad, outer_rad } => {
-            (light_kind::SPOT, (inner_rad.cos(), outer_rad.cos()))
-        }
-    };
-    let direction = if is_directional { -lamp.direction } else { lamp.direction };
-    repeated(LightSample {
-        direction: direction.to_array(),
-        kind,
-        color: lamp.color.to_array(),
-        n_samples: if is_point { 1 } else { n_light_samples(settings) },
-        light: lamp_idx,
-        range: lamp.range.min(NO_LIMIT),
-        position: lamp.position.to_array(),
-        radius: lamp.radius,
-        inner_cos: cosines.0,
-        outer_cos: cosines.1,
-        ..bytemuck::Zeroable::zeroed()
-    })
-}
-
-fn sky_record(sky: &Sky) -> LightSample {
-    LightSample {
-        direction: sky.up.to_array(),
-        kind: light_kind::SKY,
-        color: sky.zenith.to_array(),
-        ground: sky.ground.to_array(),
-        ao_distance: sky.ao_distance.min(NO_LIMIT),
-        ..bytemuck::Zeroable::zeroed()
-    }
-}
-
-/// Returns the record of a picture from its first pixel and sample on, for no rays.
-pub fn frame(scene: &FlatScene, view: &View, settings: &Settings) -> FrameRecord {
-    let (lens, pixel_width, pixel_height) = match view.lens {
-        Lens::Perspective { pixel_size } => (lens::PERSPECTIVE, pixel_size, pixel_size),
-        Lens::Orthographic { pixel_size } => (lens::ORTHOGRAPHIC, pixel_size, pixel_size),
-        Lens::Panorama { pixel_rad } => (lens::PANORAMA, pixel_rad.0, pixel_rad.1),
-    };
-    let mut planes = [[0.0; 4]; MAX_PLANES];
-    for (record, plane) in planes.iter_mut().zip(&scene.camera_planes) {
-        let normal = plane.normal.as_vec3();
-        let distance = normal.dot((plane.point - scene.origin).as_vec3());
-        *record = normal.extend(distance).to_array();
-    }
-    FrameRecord {
-        position: view.position.to_array(),
-        lens,
-        forward: view.forward.to_array(),
-        pixel_width,
-        right: view.right.to_array(),
-        pixel_height,
-        up: view.up.to_array(),
-        n_planes: scene.camera_planes.len() as u32,
-        center: view.center.into(),
-        seed: [settings.seed as u32, (settings.seed >> 32) as u32],
-        width: settings.width,
-        samples_per_pixel: settings.samples_per_pixel,
-        is_centered: (settings.samples_per_pixel == 1).into(),
-        planes,
-        ..bytemuck::Zeroable::zeroed()
-    }
-}
-
-/// Returns the records of a scene's materials, at least one.
-pub fn materials(scene: &FlatScene) -> Vec<MaterialRecord> {
-    let mut materials: Vec<_> = scene.materials.iter().map(material).collect();
-    materials.resize_with(materials.len().max(1), bytemuck::Zeroable::zeroed);
-    materials
-}
-
-fn material(material: &Material) -> MaterialRecord {
-    MaterialRecord {
-        base_color: material.base_color.to_array(),
-        ignores_vertex_colors: material.ignores_vertex_colors.into(),
-        emissive: material.emissive.to_array(),
-        emissive_strength: material.emissive_strength,
-        is_unlit: material.is_unlit.into(),
-        reserved_a: 0,
-        reserved_b: 0,
-        reserved_c: 0,
-    }
+    let n_samples = |is_point: bool| if is_point { 1 } else { n_light_samples };
+    let lights = scene.lights.iter().map(|light| match light {
+        Light::Sun(sun) => (Some(ray_kind::SHADOW), n_samples(sun.angular_diameter_deg <= 0.0)),
+        Light::Sky(_) | Light::Environment(_) => (Some(ray_kind::SKY), n_light_samples),
+        Light::Headlight(_) => (None, 1),
+    });
+    let lamps = scene.punctual_lights.iter().map(|lamp| {
+        let is_directional = lamp.kind == PunctualLightKind::Directional;
+        (Some(ray_kind::SHADOW), n_samples(lamp.radius <= 0.0 || is_directional))
+    });
+    lights.chain(lamps).collect()
 }

@@ -1,14 +1,7 @@
 //! The records that Rust and the kernels share, field by field as in `shader/records.wgsl`.
 
+use crate::numbers::{MAX_PLANES, texture};
 use bytemuck::{Pod, Zeroable};
-use surfel_core::surface::SurfaceKind;
-
-/// Maximum number of planes that limit camera rays.
-pub const MAX_PLANES: usize = 8;
-/// The distance beyond which there is nothing, instead of infinity.
-pub const NO_LIMIT: f32 = 3e38;
-/// The index that no instance and no slot has.
-pub const NONE: u32 = u32::MAX;
 
 /// The picture, the camera, and the part of both that one pass renders.
 #[repr(C)]
@@ -48,8 +41,28 @@ pub struct FrameRecord {
     pub is_centered: u32,
     /// 1 if the sample is the first one that is summed up.
     pub is_first: u32,
+    /// Number of entries that each queue holds.
+    pub capacity: u32,
+    /// Linear colour of the background at the top of the picture.
+    pub background_top: [f32; 3],
+    /// Number of the [`background`].
+    pub background: u32,
+    /// Linear colour of the background at the bottom of the picture.
+    pub background_bottom: [f32; 3],
+    /// Height of the picture in pixels.
+    pub height: u32,
+    /// Unit vector from the bottom to the top of the background.
+    pub background_up: [f32; 3],
+    /// Number of lights.
+    pub n_lights: u32,
+    /// Maximum number of reflections and refractions along a path.
+    pub max_depth: u32,
+    /// Number of rays toward each extended light from a hit of a camera ray.
+    pub n_light_samples: u32,
     /// Zero.
     pub reserved_a: u32,
+    /// Zero.
+    pub reserved_b: u32,
     /// Normals of planes, and their distances from the scene's origin along these.
     pub planes: [[f32; 4]; MAX_PLANES],
 }
@@ -62,10 +75,12 @@ pub struct Visit {
     pub object_from_world: [[f32; 4]; 4],
     /// Columns of the matrix that transforms normals to world coordinates.
     pub world_from_normal: [[f32; 4]; 3],
+    /// Columns of the matrix that transforms vectors to world coordinates.
+    pub world_from_object: [[f32; 4]; 3],
     /// Index of the instance.
     pub instance: u32,
-    /// Index of the material.
-    pub material: u32,
+    /// Zero.
+    pub reserved_a: u32,
     /// 1 if object and world coordinates are the same.
     pub is_identity: u32,
     /// Number of the surface kind, as [`surface_number`] gives it.
@@ -84,34 +99,67 @@ pub struct Visit {
     pub blends_colors: u32,
     /// Vectors of four words that a block of triangles takes with the attributes of its vertices.
     pub block_vectors: u32,
-    /// 1 if triangles have the normals of their vertices, 2 if they have colours, 3 for both.
+    /// The [`attribute`]s of the vertices of triangles.
     pub attributes: u32,
+    /// Zero.
+    pub reserved_e: u32,
+    /// 1 if normals point out of the body, so that a back face is seen from inside.
+    pub has_outward_normals: u32,
+    /// Zero.
+    pub reserved_b: u32,
+    /// 1 if the transform mirrors.
+    pub is_mirrored: u32,
+    /// Lower corner of the bounding box in world coordinates.
+    pub lower: [f32; 3],
+    /// Zero.
+    pub reserved_c: f32,
+    /// Upper corner of the bounding box in world coordinates.
+    pub upper: [f32; 3],
+    /// Zero.
+    pub reserved_d: f32,
 }
 
-/// One of the samples of a light.
+/// The task of a pass: the sample of a light, the queue that it works on and the kind of its rays, or the instances of a
+/// tree.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Task {
+    /// Index of the light.
+    pub light: u32,
+    /// Index of the sample among those of the light at a hit.
+    pub sample_idx: u32,
+    /// Maximum number of samples of the light at a hit.
+    pub max_samples: u32,
+    /// Number of the [`queue`].
+    pub queue: u32,
+    /// Number of the [`ray_kind`] of the rays in the queue.
+    pub ray_kind: u32,
+    /// Index of the first [`Visit`].
+    pub first_visit: u32,
+    /// Number of visits.
+    pub n_visits: u32,
+    /// Zero.
+    pub reserved_a: u32,
+}
+
+/// A light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub struct LightSample {
-    /// Unit vector toward the sun or a sky's zenith, or in which a spot shines.
+pub struct LightRecord {
+    /// Unit vector toward the sun or a sky's zenith, or in which a spot shines; to the right of the middle of an
+    /// environment map.
     pub direction: [f32; 3],
     /// Number of the [`light_kind`].
     pub kind: u32,
-    /// Linear colour of a sun, a headlight or a lamp, or radiance from a sky's zenith.
+    /// Linear colour of a sun, a headlight or a lamp, or radiance from a sky's zenith; unit vector to the middle of an
+    /// environment map.
     pub color: [f32; 3],
     /// Cosine of half the sun's angular diameter.
     pub cos_max: f32,
-    /// Radiance of a sky from straight below.
+    /// Radiance of a sky from straight below; unit vector to the top of an environment map.
     pub ground: [f32; 3],
     /// Distance beyond which occluders have no effect on a sky.
     pub ao_distance: f32,
-    /// Index of the sample among those of the light at a hit.
-    pub sample_idx: u32,
-    /// Number of samples of the light at a hit.
-    pub n_samples: u32,
-    /// Index of a lamp.
-    pub light: u32,
-    /// Distance that a lamp reaches.
-    pub range: f32,
     /// Position of a lamp.
     pub position: [f32; 3],
     /// Radius of a lamp's luminous ball.
@@ -120,6 +168,38 @@ pub struct LightSample {
     pub inner_cos: f32,
     /// Cosine of the angle from a spot's axis beyond which there is no light.
     pub outer_cos: f32,
+    /// Distance that a lamp reaches.
+    pub range: f32,
+    /// Index of a lamp among the lamps, [`NONE`] for other lights.
+    pub lamp: u32,
+    /// Width and height of an environment map.
+    pub size: [u32; 2],
+    /// Index of the first word of an environment map.
+    pub first_word: u32,
+    /// Factor of the radiance of an environment map.
+    pub strength: f32,
+}
+
+/// A material's reference to a texture.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct TextureRecord {
+    /// Index of the first texel.
+    pub first_word: u32,
+    /// Width in texels.
+    pub width: u32,
+    /// Height in texels.
+    pub height: u32,
+    /// The bits of [`texture`].
+    pub flags: u32,
+    /// Offset of the coordinates.
+    pub offset: [f32; 2],
+    /// Scale of the coordinates.
+    pub scale: [f32; 2],
+    /// Cosine of the rotation of the coordinates.
+    pub cos: f32,
+    /// Sine of the rotation of the coordinates.
+    pub sin: f32,
     /// Zero.
     pub reserved_a: u32,
     /// Zero.
@@ -138,8 +218,60 @@ pub struct MaterialRecord {
     pub emissive: [f32; 3],
     /// Emitted radiance as a multiple of the base colour.
     pub emissive_strength: f32,
+    /// Colour of white light after `attenuation_distance` inside of the body.
+    pub attenuation_color: [f32; 3],
+    /// Distance in object units, [`NO_LIMIT`] if nothing is absorbed.
+    pub attenuation_distance: f32,
     /// 1 if the surface shows its base colour whatever the light.
     pub is_unlit: u32,
+    /// Opacity from 0 to 1.
+    pub alpha: f32,
+    /// Number of the [`alpha_mode`].
+    pub alpha_mode: u32,
+    /// Opacity below which a mask cuts the surface out.
+    pub alpha_cutoff: f32,
+    /// Metalness from 0 to 1.
+    pub metallic: f32,
+    /// Perceptual roughness from 0 to 1.
+    pub roughness: f32,
+    /// Index of refraction.
+    pub ior: f32,
+    /// Fraction of the entering light that is transmitted.
+    pub transmission: f32,
+    /// 1 if the surface is a thin slab without an interior.
+    pub is_thin: u32,
+    /// Scale of the x and y of a normal map.
+    pub normal_scale: f32,
+    /// Zero.
+    pub reserved_a: u32,
+    /// Zero.
+    pub reserved_b: u32,
+    /// Textures at the numbers of [`texture`].
+    pub textures: [TextureRecord; texture::N_TEXTURES],
+}
+
+/// An instance as shading sees it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct InstanceRecord {
+    /// Lower corner of the bounding box in world coordinates.
+    pub lower: [f32; 3],
+    /// Index of the material.
+    pub material: u32,
+    /// Upper corner of the bounding box in world coordinates.
+    pub upper: [f32; 3],
+    /// Largest scale factor along the object's axes.
+    pub max_scale: f32,
+    /// 1 if normals point out of the body, so that a back face is seen from inside.
+    pub has_outward_normals: u32,
+    /// The [`attribute`]s of the vertices of triangles.
+    pub attributes: u32,
+    /// Index of the first word of the colours by support, [`NONE`] without them.
+    pub first_support_color: u32,
+    /// Distance in radii of the first colour.
+    pub support_low: f32,
+    /// Distance in radii of the last colour.
+    pub support_high: f32,
     /// Zero.
     pub reserved_a: u32,
     /// Zero.
@@ -162,104 +294,100 @@ pub struct HitRecord {
     pub radius: f32,
     /// Unit normal of the surface itself, which differs from the shading normal on triangles.
     pub geometric_normal: [f32; 3],
-    /// Zero.
-    pub reserved_c: f32,
+    /// Alpha of the geometry.
+    pub alpha: f32,
     /// Slot of the point or triangle in its tree.
     pub slot: u32,
     /// Index of the instance, [`NONE`] for a miss.
     pub instance: u32,
-    /// Index of the material.
-    pub material: u32,
+    /// 1 if the ray hits the back of the surface, as far as its orientation is known.
+    pub is_backface: u32,
     /// Number of the surface kind.
     pub surface: u32,
     /// Number of points within one radius of the hit.
     pub support_count: u32,
     /// Distance from the hit to the nearest point in radii.
     pub support_distance: f32,
+    /// Barycentric coordinates of the triangle's second and third corners.
+    pub barycentrics: [f32; 2],
+    /// Both sets of texture coordinates.
+    pub uvs: [f32; 4],
+    /// Unit tangent of a normal map in world space, zero without one, and the sign of its bitangent.
+    pub tangent: [f32; 4],
+}
+
+/// A path's next ray, or a ray toward a light.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Path {
+    /// The ray.
+    pub ray: surfel_core::math::Ray,
+    /// Throughput from the ray's end to the camera, or the radiance that a light adds if nothing blocks the ray.
+    pub weight: [f32; 3],
+    /// Index of the pixel in its part of the picture.
+    pub pixel: u32,
+    /// The light that has passed all surfaces so far, of a ray toward a light.
+    pub transmittance: [f32; 3],
+    /// Distance from the surface that the ray left to its origin, along the ray.
+    pub origin_offset: f32,
+    /// Instances that the ray is inside of; the one entered last comes first.
+    pub media: [u32; 4],
+    /// Random key.
+    pub key: [u32; 2],
+    /// Index of the path among those with the same random key.
+    pub index: u32,
+    /// Depth, number of alpha-blended layers and [`miss`], from the lowest bits; of a ray toward a light 1 until it is
+    /// done.
+    pub state: u32,
+}
+
+/// A point at which direct light is computed.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct ShadingPointRecord {
+    /// Position of the point.
+    pub position: [f32; 3],
+    /// Distance by which new rays are offset.
+    pub spawn_offset: f32,
+    /// Unit shading normal.
+    pub normal: [f32; 3],
+    /// Distance at which new rays begin.
+    pub spawn_t_min: f32,
+    /// Unit normal along which new rays are offset.
+    pub geometric_normal: [f32; 3],
+    /// Perceptual roughness from 0 to 1.
+    pub roughness: f32,
+    /// Unit direction toward the viewer.
+    pub to_viewer: [f32; 3],
+    /// Index of the pixel in its part of the picture.
+    pub pixel: u32,
+    /// Diffuse albedo times the throughput of the path to the camera.
+    pub diffuse: [f32; 3],
+    /// Index of the path among those with the same random key.
+    pub index: u32,
+    /// Specular reflectance of a rough surface times the throughput of the path to the camera.
+    pub glossy: [f32; 3],
+    /// Number of rays toward each extended light.
+    pub n_light_samples: u32,
+    /// The media on the viewer's side of the surface.
+    pub media: [u32; 4],
+    /// Random key of the path.
+    pub key: [u32; 2],
     /// Zero.
     pub reserved_a: u32,
     /// Zero.
     pub reserved_b: u32,
 }
 
-/// A ray toward a light.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub struct ShadowRay {
-    /// The ray.
-    pub ray: surfel_core::math::Ray,
-    /// Radiance that reaches the pixel if nothing blocks the ray.
-    pub contribution: [f32; 3],
-    /// 1 until something blocks the ray.
-    pub is_open: u32,
-}
+/// Sums of radiance and alpha over all samples of a pixel, in fixed point of 32 bits before and 32 behind the point: the
+/// lower words come first.
+pub type Pixel = [u32; 8];
 
-/// The light of a pixel.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub struct Pixel {
-    /// Radiance of the current sample.
-    pub radiance: [f32; 3],
-    /// 1 if the current sample hits a surface.
-    pub alpha: f32,
-    /// Sum of radiance and alpha over all samples.
-    pub sum: [f32; 4],
-}
-
-/// Numbers of lenses.
-pub mod lens {
-    /// A perspective projection.
-    pub const PERSPECTIVE: u32 = 0;
-    /// A parallel projection.
-    pub const ORTHOGRAPHIC: u32 = 1;
-    /// An equirectangular projection.
-    pub const PANORAMA: u32 = 2;
-}
-
-/// Numbers of the kinds of lights.
-pub mod light_kind {
-    /// A sun without extent.
-    pub const POINT_SUN: u32 = 0;
-    /// A sun with soft shadows.
-    pub const SUN: u32 = 1;
-    /// A sky.
-    pub const SKY: u32 = 2;
-    /// A light at the camera.
-    pub const HEADLIGHT: u32 = 3;
-    /// A lamp that shines to all sides.
-    pub const POINT: u32 = 4;
-    /// A lamp that shines in a cone.
-    pub const SPOT: u32 = 5;
-}
-
-/// Indices of the numbers of rays.
-pub mod ray_kind {
-    /// Camera rays.
-    pub const PRIMARY: usize = 0;
-    /// Rays toward suns.
-    pub const SHADOW: usize = 1;
-    /// Rays toward the sky.
-    pub const SKY: usize = 2;
-    /// Number of kinds.
-    pub const N_KINDS: usize = 4;
-}
-
-/// The surface kinds, at the numbers that stand for them in the kernels.
-pub const SURFACES: [SurfaceKind; 8] = [
-    SurfaceKind::Points,
-    SurfaceKind::Sphere,
-    SurfaceKind::Disc,
-    SurfaceKind::SplatMean,
-    SurfaceKind::Splat,
-    SurfaceKind::SplatFit,
-    SurfaceKind::Smooth,
-    SurfaceKind::Capsule,
-];
-
-/// The number that stands for triangles beside those of surface kinds.
-pub const TRIANGLE: u32 = SURFACES.len() as u32;
-
-/// Returns the number that stands for a surface kind in the kernels.
-pub fn surface_number(kind: SurfaceKind) -> u32 {
-    SURFACES.iter().position(|known| *known == kind).map_or(0, |number| number as u32)
+/// Returns the values of the sums of a pixel.
+pub fn pixel_sums(pixel: &Pixel) -> [f32; 4] {
+    let value = |channel: usize| {
+        let fixed = u64::from(pixel[4 + channel]) << 32 | u64::from(pixel[channel]);
+        (fixed as f64 / (1u64 << 32) as f64) as f32
+    };
+    [value(0), value(1), value(2), value(3)]
 }

@@ -1,47 +1,44 @@
 //! The kernels' source text: the files of each kernel, after the constants that Rust writes.
 
-use crate::records::lens;
-use crate::records::light_kind;
-use crate::records::ray_kind;
-use crate::records::{MAX_PLANES, TRIANGLE, surface_number};
+use crate::constants::constants;
+use crate::numbers::surface_number;
 use std::fmt::Write;
-use surfel_core::bvh::MAX_DEPTH;
-use surfel_core::integrator::constants as integrator;
-use surfel_core::surface::align;
-use surfel_core::surface::capsule;
-use surfel_core::surface::disc;
-use surfel_core::surface::edge_test;
-use surfel_core::surface::smooth;
-use surfel_core::surface::{
-    FIT_REACH, MAX_GATHERED, NEIGHBORHOOD_RADIUS_FACTOR, SOLID_SPAWN_OFFSET, SUPPORT_FACTOR,
-    SurfaceKind,
-};
-use surfel_core::trace::constants as trace;
+use surfel_core::surface::SurfaceKind;
 
-/// Number of invocations of a workgroup.
-pub const WORKGROUP_SIZE: u32 = 64;
-
-/// A kernel: one pass over all rays.
+/// A kernel: one pass over the entries of a queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kernel {
     /// Makes the camera rays.
     Generate,
+    /// Closes a queue, so that passes over it do only what is needed.
+    TakeQueue,
+    /// Sets the hits of all rays to misses.
+    ClearHits,
     /// Finds the nearest hit on a tree whose points have this surface.
     Closest(Surface),
     /// Finds the points behind the hits on a tree.
     Support(Surface),
-    /// Adds the light that surfaces emit.
+    /// Adds the light that surfaces emit, and makes the rays that continue the paths.
     Shade,
-    /// Adds the light of a sky that camera rays see.
-    ShadeMiss,
     /// Makes rays toward a light.
     SampleLight,
     /// Finds out which rays toward a light a tree blocks.
     Any(Surface),
     /// Adds the light of the rays that nothing blocks.
     AddLight,
-    /// Adds a sample to the sum over samples.
-    Accumulate,
+    /// Tints the light of rays by the surfaces that they hit, and adds that of rays that hit none.
+    PassSurface,
+}
+
+/// The arrays that a kernel reads beside those of rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resources {
+    /// A tree.
+    Tree,
+    /// Materials, instances, lights, textures.
+    Scene,
+    /// The sizes of dispatches.
+    Dispatches,
 }
 
 /// A surface that kernels trace.
@@ -100,9 +97,18 @@ macro_rules! parts {
 const COMMON: &[&str] = parts!["math/ray.wgsl", "records.wgsl"];
 const SAMPLING: &[&str] = parts!["math/random.wgsl", "math/sampling.wgsl", "render/key.wgsl"];
 const GENERATE: &[&str] = parts!["scene/camera.wgsl", "render/generate.wgsl"];
-const SHADING: &[&str] = parts!["integrator/shading.wgsl"];
-const SHADE: &[&str] = parts!["integrator/whitted.wgsl"];
-const DIRECT: &[&str] = parts!["math/basis.wgsl", "scene/light.wgsl", "integrator/direct.wgsl"];
+const QUEUE: &[&str] = parts!["render/queue.wgsl"];
+const CLEAR: &[&str] = parts!["render/clear.wgsl"];
+const SCENE: &[&str] = parts!["math/basis.wgsl", "scene/buffers.wgsl", "render/pixel.wgsl"];
+const LIGHTS: &[&str] = parts!["scene/light.wgsl", "scene/environment.wgsl"];
+const SPECULAR: &[&str] = parts!["integrator/specular.wgsl"];
+const SHADING: &[&str] =
+    parts!["scene/texture.wgsl", "integrator/shading.wgsl", "integrator/media.wgsl"];
+const SHADE: &[&str] = parts!["integrator/background.wgsl", "integrator/whitted.wgsl"];
+const DIRECT: &[&str] = parts!["integrator/direct.wgsl"];
+const TRANSMITTANCE: &[&str] = parts!["integrator/transmittance.wgsl"];
+const ARRAYS: &[&str] = parts!["flat/arrays.wgsl"];
+const PAGED_ARRAYS: &[&str] = parts!["flat/paged_arrays.wgsl"];
 const TREE: &[&str] = parts![
     "bvh/node.wgsl",
     "flat/block.wgsl",
@@ -146,11 +152,12 @@ impl Kernel {
     pub fn all() -> Vec<Self> {
         let mut all = vec![
             Self::Generate,
+            Self::TakeQueue,
+            Self::ClearHits,
             Self::Shade,
-            Self::ShadeMiss,
             Self::SampleLight,
             Self::AddLight,
-            Self::Accumulate,
+            Self::PassSurface,
         ];
         all.extend(Surface::ALL.map(Self::Closest));
         all.extend(Surface::ALL.map(Self::Any));
@@ -163,41 +170,57 @@ impl Kernel {
     pub fn entry_point(self) -> &'static str {
         match self {
             Self::Generate => "generate",
+            Self::TakeQueue => "take_queue",
+            Self::ClearHits => "clear_hits",
             Self::Closest(_) => "closest",
-            Self::Shade => "shade",
-            Self::ShadeMiss => "shade_miss",
-            Self::SampleLight => "sample_light",
-            Self::Any(_) => "any",
             Self::Support(_) => "support",
+            Self::Shade => "shade",
+            Self::SampleLight => "sample_light",
+            Self::Any(_) => "any_hit",
             Self::AddLight => "add_light",
-            Self::Accumulate => "accumulate",
+            Self::PassSurface => "pass_surface",
         }
     }
 
-    /// Returns true if the kernel reads a tree.
-    pub fn reads_tree(self) -> bool {
-        matches!(self, Self::Closest(_) | Self::Any(_) | Self::Support(_))
+    /// Returns the arrays that the kernel reads beside those of rays.
+    pub fn resources(self) -> Resources {
+        match self {
+            Self::Closest(_) | Self::Any(_) | Self::Support(_) => Resources::Tree,
+            Self::Generate | Self::TakeQueue | Self::ClearHits => Resources::Dispatches,
+            Self::Shade | Self::SampleLight | Self::AddLight | Self::PassSurface => {
+                Resources::Scene
+            }
+        }
     }
 
-    /// Returns the kernel's source text.
-    pub fn source(self) -> String {
+    /// Returns the kernel's source text, for trees in pages of `1 << page_shift` vectors or for whole trees.
+    pub fn source(self, page_shift: Option<u32>) -> String {
         let mut source = constants();
+        if let Some(page_shift) = page_shift {
+            _ = writeln!(source, "const PAGE_SHIFT: u32 = {page_shift}u;");
+        }
         if let Self::Closest(surface) | Self::Any(surface) | Self::Support(surface) = self {
             let has_colors = matches!(self, Self::Closest(_));
             _ = writeln!(source, "const SHAPE: u32 = {}u;", surface_number(surface.shape()));
             _ = writeln!(source, "const HAS_COLORS: bool = {has_colors};");
         }
-        self.parts().iter().copied().flatten().for_each(|part| source.push_str(part));
+        let arrays = if page_shift.is_some() { PAGED_ARRAYS } else { ARRAYS };
+        let arrays = if self.resources() == Resources::Tree { arrays } else { &[] };
+        let parts = self.parts().into_iter().flatten().chain(arrays);
+        parts.for_each(|part| source.push_str(part));
         source
     }
 
     fn parts(self) -> Vec<&'static [&'static str]> {
         match self {
-            Self::Generate | Self::Accumulate => vec![COMMON, SAMPLING, GENERATE],
-            Self::Shade => vec![COMMON, SHADING, SHADE],
-            Self::ShadeMiss | Self::SampleLight | Self::AddLight => {
-                vec![COMMON, SAMPLING, SHADING, DIRECT]
+            Self::Generate => vec![COMMON, SAMPLING, GENERATE],
+            Self::TakeQueue => vec![COMMON, QUEUE],
+            Self::ClearHits => vec![COMMON, CLEAR],
+            Self::Shade => vec![COMMON, SAMPLING, SCENE, LIGHTS, SPECULAR, SHADING, SHADE],
+            Self::SampleLight | Self::AddLight => {
+                vec![COMMON, SAMPLING, SCENE, LIGHTS, SPECULAR, DIRECT]
             }
+            Self::PassSurface => vec![COMMON, SAMPLING, SCENE, SPECULAR, SHADING, TRANSMITTANCE],
             Self::Closest(surface) => {
                 let mut parts = vec![COMMON, TREE, TRAVERSE, CLOSEST_KERNEL];
                 parts.extend_from_slice(match surface {
@@ -224,93 +247,14 @@ impl Kernel {
     }
 }
 
-/// Returns the declarations of the constants that the kernels share with Rust.
-fn constants() -> String {
-    let kinds = [
-        ("SPHERE", SurfaceKind::Sphere),
-        ("DISC", SurfaceKind::Disc),
-        ("SPLAT", SurfaceKind::Splat),
-        ("SMOOTH", SurfaceKind::Smooth),
-        ("CAPSULE", SurfaceKind::Capsule),
-    ];
-    let kinds = kinds.map(|(name, kind)| (name, surface_number(kind)));
-    let integers = [
-        ("WORKGROUP_SIZE", WORKGROUP_SIZE),
-        ("MAX_PLANES", MAX_PLANES as u32),
-        ("MAX_DEPTH", MAX_DEPTH as u32),
-        ("MAX_GATHERED", MAX_GATHERED as u32),
-        ("MAX_REJECTED_HITS", trace::MAX_REJECTED_HITS as u32),
-        ("MAX_FITS", trace::MAX_FITS as u32),
-        ("MIN_DENSE", edge_test::MIN_DENSE),
-        ("MIN_NEIGHBORS", edge_test::MIN_NEIGHBORS),
-        ("PERSPECTIVE", lens::PERSPECTIVE),
-        ("PANORAMA", lens::PANORAMA),
-        ("SUN", light_kind::SUN),
-        ("SKY", light_kind::SKY),
-        ("HEADLIGHT", light_kind::HEADLIGHT),
-        ("POINT", light_kind::POINT),
-        ("SPOT", light_kind::SPOT),
-        ("TRIANGLE", TRIANGLE),
-        ("PUNCTUAL_LIGHT_POSITION", integrator::PUNCTUAL_LIGHT_POSITION as u32),
-        ("PRIMARY_RAYS", ray_kind::PRIMARY as u32),
-        ("SHADOW_RAYS", ray_kind::SHADOW as u32),
-        ("SKY_RAYS", ray_kind::SKY as u32),
-        ("SKY_DIRECTION", integrator::SKY_DIRECTION as u32),
-        ("SKY_DISTANCE", integrator::SKY_DISTANCE as u32),
-        ("SUN_DIRECTION", integrator::SUN_DIRECTION as u32),
-    ];
-    let floats = [
-        ("CAPSULE_ASPECT", capsule::ASPECT),
-        ("MIN_ALIGNED_COSINE", align::MIN_ALIGNED_COSINE),
-        ("MIN_BENT_COSINE", align::MIN_BENT_COSINE),
-        ("SOLID_SPAWN_OFFSET", SOLID_SPAWN_OFFSET),
-        ("DISC_SPAWN_OFFSET", disc::SPAWN_OFFSET),
-        ("DISC_SPAWN_T_MIN", disc::SPAWN_T_MIN),
-        ("SMOOTH_SPAWN_OFFSET", smooth::SPAWN_OFFSET),
-        ("SMOOTH_SPAWN_T_MIN", smooth::SPAWN_T_MIN),
-        ("NEIGHBORHOOD_RADIUS_FACTOR", NEIGHBORHOOD_RADIUS_FACTOR),
-        ("EDGE_MAX_PLANE_DISTANCE", edge_test::MAX_PLANE_DISTANCE),
-        ("MIN_PASSED_DISTANCE", edge_test::MIN_PASSED_DISTANCE),
-        ("MAX_BACKFACE_COSINE", edge_test::MAX_BACKFACE_COSINE),
-        ("HEIGHT_STEPS", edge_test::HEIGHT_STEPS),
-        ("TIE_BREAK_ANGLE", edge_test::TIE_BREAK_ANGLE),
-        ("RETRY_RADIUS_FACTOR", trace::RETRY_RADIUS_FACTOR),
-        ("RESTART_OFFSET", trace::RESTART_OFFSET),
-        ("SMOOTH_RESTART_OFFSET", trace::SMOOTH_RESTART_OFFSET),
-        ("MIN_SLIT_DEPTH", trace::MIN_SLIT_DEPTH),
-        ("MIN_SLIT_COSINE", trace::MIN_SLIT_COSINE),
-        ("MAX_DISTANCE_FROM_DISC", trace::MAX_DISTANCE_FROM_DISC),
-        ("FIT_TOLERANCE", trace::TOLERANCE),
-        ("MAX_LAST_STEP", trace::MAX_LAST_STEP),
-        ("SUPPORT_FACTOR", SUPPORT_FACTOR),
-        ("FIT_REACH", FIT_REACH),
-        ("FIT_STEPS", smooth::STEPS),
-        ("FIT_MIN_WEIGHT", smooth::MIN_WEIGHT),
-        ("NEAREST_COLOR_WEIGHT", smooth::NEAREST_COLOR_WEIGHT),
-        ("NORMAL_FALLOFF", smooth::NORMAL_FALLOFF),
-        ("MAX_CURVATURE", smooth::MAX_CURVATURE),
-        ("FLAT_SPREAD", smooth::FLAT_SPREAD),
-        ("CURVED_SPREAD", smooth::CURVED_SPREAD),
-        ("FIT_MAX_PLANE_DISTANCE", smooth::MAX_PLANE_DISTANCE),
-        ("MAX_EDGE_COSINE", smooth::MAX_EDGE_COSINE),
-        ("MIN_EDGE_WEIGHT", smooth::MIN_EDGE_WEIGHT),
-        ("MAX_OVERHANG", smooth::MAX_OVERHANG),
-        ("MAX_STEP", smooth::MAX_STEP),
-        ("MIN_FACING_COS", integrator::MIN_FACING_COS),
-    ];
-    let integers = integers.into_iter().chain(kinds);
-    let integers = integers.map(|(name, value)| format!("const {name}: u32 = {value}u;\n"));
-    let floats = floats.map(|(name, value)| format!("const {name}: f32 = {value:?}f;\n"));
-    integers.chain(floats).collect()
-}
-
 #[cfg(test)]
 mod tests {
     //! Every kernel is valid and short, and the records have the same fields at the same offsets on both sides.
 
     use super::*;
     use crate::records::{
-        FrameRecord, HitRecord, LightSample, MaterialRecord, Pixel, ShadowRay, Visit,
+        FrameRecord, HitRecord, InstanceRecord, LightRecord, MaterialRecord, Path,
+        ShadingPointRecord, Task, TextureRecord, Visit,
     };
     use std::mem::{offset_of, size_of};
     use surfel_core::math::Ray;
@@ -318,19 +262,21 @@ mod tests {
     use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
     use wgpu::naga::{Module, TypeInner};
 
-    fn parse(kernel: Kernel) -> Module {
-        let source = kernel.source();
+    fn parse(kernel: Kernel, page_shift: Option<u32>) -> Module {
+        let source = kernel.source(page_shift);
         wgsl::parse_str(&source)
             .unwrap_or_else(|error| panic!("{kernel:?}: {}", error.emit_to_string(&source)))
     }
 
     #[test]
     fn every_kernel_is_valid() {
-        for kernel in Kernel::all() {
-            let module = parse(kernel);
+        for (kernel, page_shift) in
+            Kernel::all().into_iter().flat_map(|kernel| [(kernel, None), (kernel, Some(23))])
+        {
+            let module = parse(kernel, page_shift);
             let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
             if let Err(error) = validator.validate(&module) {
-                panic!("{kernel:?}: {}", error.emit_to_string(&kernel.source()));
+                panic!("{kernel:?}: {}", error.emit_to_string(&kernel.source(page_shift)));
             }
             let entries: Vec<&str> =
                 module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
@@ -378,14 +324,25 @@ mod tests {
                 samples_per_pixel,
                 is_centered,
                 is_first,
+                capacity,
+                background_top,
+                background,
+                background_bottom,
+                height,
+                background_up,
+                n_lights,
+                max_depth,
+                n_light_samples,
                 reserved_a,
+                reserved_b,
                 planes
             }),
             rust_layout!(Visit {
                 object_from_world,
                 world_from_normal,
+                world_from_object,
                 instance,
-                material,
+                reserved_a,
                 is_identity,
                 surface,
                 max_scale,
@@ -395,23 +352,52 @@ mod tests {
                 has_front_sides,
                 blends_colors,
                 block_vectors,
-                attributes
+                attributes,
+                reserved_e,
+                has_outward_normals,
+                reserved_b,
+                is_mirrored,
+                lower,
+                reserved_c,
+                upper,
+                reserved_d
             }),
-            rust_layout!(LightSample {
+            rust_layout!(Task {
+                light,
+                sample_idx,
+                max_samples,
+                queue,
+                ray_kind,
+                first_visit,
+                n_visits,
+                reserved_a
+            }),
+            rust_layout!(LightRecord {
                 direction,
                 kind,
                 color,
                 cos_max,
                 ground,
                 ao_distance,
-                sample_idx,
-                n_samples,
-                light,
-                range,
                 position,
                 radius,
                 inner_cos,
                 outer_cos,
+                range,
+                lamp,
+                size,
+                first_word,
+                strength
+            }),
+            rust_layout!(TextureRecord {
+                first_word,
+                width,
+                height,
+                flags,
+                offset,
+                scale,
+                cos,
+                sin,
                 reserved_a,
                 reserved_b
             }),
@@ -420,7 +406,32 @@ mod tests {
                 ignores_vertex_colors,
                 emissive,
                 emissive_strength,
+                attenuation_color,
+                attenuation_distance,
                 is_unlit,
+                alpha,
+                alpha_mode,
+                alpha_cutoff,
+                metallic,
+                roughness,
+                ior,
+                transmission,
+                is_thin,
+                normal_scale,
+                reserved_a,
+                reserved_b,
+                textures
+            }),
+            rust_layout!(InstanceRecord {
+                lower,
+                material,
+                upper,
+                max_scale,
+                has_outward_normals,
+                attributes,
+                first_support_color,
+                support_low,
+                support_high,
                 reserved_a,
                 reserved_b,
                 reserved_c
@@ -431,20 +442,48 @@ mod tests {
                 color,
                 radius,
                 geometric_normal,
-                reserved_c,
+                alpha,
                 slot,
                 instance,
-                material,
+                is_backface,
                 surface,
                 support_count,
                 support_distance,
+                barycentrics,
+                uvs,
+                tangent
+            }),
+            rust_layout!(Path {
+                ray,
+                weight,
+                pixel,
+                transmittance,
+                origin_offset,
+                media,
+                key,
+                index,
+                state
+            }),
+            rust_layout!(ShadingPointRecord {
+                position,
+                spawn_offset,
+                normal,
+                spawn_t_min,
+                geometric_normal,
+                roughness,
+                to_viewer,
+                pixel,
+                diffuse,
+                index,
+                glossy,
+                n_light_samples,
+                media,
+                key,
                 reserved_a,
                 reserved_b
             }),
-            rust_layout!(ShadowRay { ray, contribution, is_open }),
-            rust_layout!(Pixel { radiance, alpha, sum }),
         ];
-        let module = parse(Kernel::Generate);
+        let module = parse(Kernel::Generate, None);
         for (name, layout) in layouts {
             assert_eq!(wgsl_layout(&module, name), layout, "{name}");
         }

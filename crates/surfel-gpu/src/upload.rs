@@ -4,6 +4,7 @@ use crate::device::Gpu;
 use crate::error::{Error, Result};
 use crate::kernels::{Kernels, bind};
 use crate::mesh_blocks::mesh_blocks;
+use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
 use crate::unsupported::trees;
 use std::sync::{Arc, Weak};
 use surfel_core::bvh::BvhNode;
@@ -17,8 +18,33 @@ const CHUNK_BYTES: usize = 1 << 24;
 /// A tree over blocks of points in a device's memory.
 #[derive(Debug)]
 pub struct GpuTree {
-    /// The arrays of nodes and blocks.
-    pub arrays: wgpu::BindGroup,
+    /// The pages of nodes.
+    nodes: Vec<wgpu::Buffer>,
+    /// The pages of blocks.
+    blocks: Vec<wgpu::Buffer>,
+}
+
+impl GpuTree {
+    /// Returns true if the tree has more than one page of nodes or blocks.
+    pub fn is_paged(&self) -> bool {
+        1 < self.nodes.len().max(self.blocks.len())
+    }
+
+    /// Binds the tree together with the records of its instances.
+    pub fn bind(&self, gpu: &Gpu, kernels: &Kernels, visits: &wgpu::Buffer) -> wgpu::BindGroup {
+        let Self { nodes, blocks } = self;
+        // The places of pages that are missing are never read.
+        let page = |pages: &'_ [wgpu::Buffer], i: usize| pages[i.min(pages.len() - 1)].clone();
+        let (layout, n_nodes, n_blocks) = match self.is_paged() {
+            true => (&kernels.paged_tree, N_NODE_PAGES, N_BLOCK_PAGES),
+            false => (&kernels.tree, 1, 1),
+        };
+        let nodes = (0..n_nodes).map(|i| page(nodes, i));
+        let blocks = (0..n_blocks).map(|i| page(blocks, i));
+        let arrays: Vec<_> = [visits.clone()].into_iter().chain(nodes).chain(blocks).collect();
+        let arrays: Vec<_> = arrays.iter().map(wgpu::Buffer::as_entire_binding).collect();
+        bind(gpu, layout, &arrays)
+    }
 }
 
 /// The trees of a geometry: of the points of its surface, of its lines, and of its scatter.
@@ -33,21 +59,21 @@ impl Uploads {
     ///
     /// # Errors
     /// Fails if a geometry is too large for the device.
-    pub fn update(
-        &mut self,
-        gpu: &Gpu,
-        kernels: &Kernels,
-        geometries: &[Arc<FlatGeometry>],
-    ) -> Result<()> {
+    pub fn update(&mut self, gpu: &Gpu, geometries: &[Arc<FlatGeometry>]) -> Result<()> {
         // A geometry that was changed has lost its weak references, also where it stayed at its place in memory.
         self.0.retain(|(geometry, _)| geometry.strong_count() != 0);
         for geometry in geometries {
             if self.position(geometry).is_none() {
-                let uploaded = upload(gpu, kernels, geometry)?;
+                let uploaded = upload(gpu, geometry)?;
                 self.0.push((Arc::downgrade(geometry), uploaded));
             }
         }
         Ok(())
+    }
+
+    /// Returns a tree of a geometry that is uploaded.
+    pub fn tree(&self, geometry: &Arc<FlatGeometry>, tree_idx: usize) -> Option<&GpuTree> {
+        self.get(geometry)?[tree_idx].as_ref()
     }
 
     /// Returns a geometry that is uploaded.
@@ -63,41 +89,63 @@ impl Uploads {
     }
 }
 
-fn upload(gpu: &Gpu, kernels: &Kernels, geometry: &FlatGeometry) -> Result<GpuGeometry> {
+fn upload(gpu: &Gpu, geometry: &FlatGeometry) -> Result<GpuGeometry> {
     let cloud = match geometry {
         FlatGeometry::Cloud(cloud) => cloud,
         FlatGeometry::Mesh(mesh) => {
             let blocks = mesh_blocks(mesh);
-            let tree =
-                upload_tree(gpu, kernels, &mesh.triangles.nodes, bytemuck::cast_slice(&blocks));
+            let tree = upload_tree(gpu, &mesh.triangles.nodes, bytemuck::cast_slice(&blocks));
             return Ok([tree?, None, None]);
         }
     };
-    let [surface, lines, scatter] = trees(cloud).map(|(_, points)| {
-        upload_tree(gpu, kernels, &points.nodes, bytemuck::cast_slice(&points.blocks))
-    });
+    let [surface, lines, scatter] = trees(cloud)
+        .map(|(_, points)| upload_tree(gpu, &points.nodes, bytemuck::cast_slice(&points.blocks)));
     Ok([surface?, lines?, scatter?])
 }
 
-fn upload_tree(
-    gpu: &Gpu,
-    kernels: &Kernels,
-    tree_nodes: &[BvhNode],
-    tree_blocks: &[u8],
-) -> Result<Option<GpuTree>> {
+fn upload_tree(gpu: &Gpu, tree_nodes: &[BvhNode], tree_blocks: &[u8]) -> Result<Option<GpuTree>> {
     if tree_nodes.is_empty() {
         return Ok(None);
     }
-    let nodes = array(gpu, "nodes", tree_nodes.len() * NODE_BYTES)?;
-    let blocks = array(gpu, "blocks", tree_blocks.len())?;
-    write_padded(gpu, &nodes, tree_nodes)?;
-    write(gpu, &blocks, tree_blocks)?;
-    let buffers = [nodes.as_entire_binding(), blocks.as_entire_binding()];
-    let arrays = gpu.catch("a tree", || bind(gpu, &kernels.tree, &buffers))?;
-    Ok(Some(GpuTree { arrays }))
+    let node_bytes = padded_nodes(tree_nodes);
+    let nodes = pages(gpu, "nodes", &node_bytes, N_NODE_PAGES)?;
+    let blocks = pages(gpu, "blocks", tree_blocks, N_BLOCK_PAGES)?;
+    Ok(Some(GpuTree { nodes, blocks }))
 }
 
-fn array(gpu: &Gpu, label: &'static str, n_bytes: usize) -> Result<wgpu::Buffer> {
+/// Uploads bytes in pages.
+fn pages(
+    gpu: &Gpu,
+    label: &'static str,
+    bytes: &[u8],
+    max_pages: usize,
+) -> Result<Vec<wgpu::Buffer>> {
+    let max_pages = if gpu.has_pages() { max_pages } else { 1 };
+    let max_bytes = max_pages * gpu.page_bytes();
+    if max_bytes < bytes.len() {
+        let (device, limit) = (gpu.info.name.clone(), "bytes in the pages of a tree");
+        let (found, needed) = (max_bytes as u64, bytes.len() as u64);
+        return Err(Error::Limit { device, limit, found, needed });
+    }
+    let page = |bytes: &[u8]| {
+        let buffer = array(gpu, label, bytes.len())?;
+        write(gpu, &buffer, bytes)?;
+        Ok(buffer)
+    };
+    bytes.chunks(gpu.page_bytes()).map(page).collect()
+}
+
+/// Returns nodes, each followed by the bytes that are missing to `NODE_BYTES`.
+fn padded_nodes(nodes: &[BvhNode]) -> Vec<u8> {
+    let mut padded = vec![0; nodes.len() * NODE_BYTES];
+    for (node, padded) in nodes.iter().zip(padded.chunks_exact_mut(NODE_BYTES)) {
+        padded[..size_of::<BvhNode>()].copy_from_slice(bytemuck::bytes_of(node));
+    }
+    padded
+}
+
+/// Makes an array, if the device allows one of this size.
+pub fn array(gpu: &Gpu, label: &'static str, n_bytes: usize) -> Result<wgpu::Buffer> {
     let (needed, found) = (n_bytes as u64, gpu.info.max_array_bytes);
     if found < needed {
         let limit = "bytes in one array";
@@ -106,21 +154,8 @@ fn array(gpu: &Gpu, label: &'static str, n_bytes: usize) -> Result<wgpu::Buffer>
     gpu.buffer(label, needed, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
 }
 
-/// Writes nodes, each followed by the bytes that are missing to `NODE_BYTES`.
-fn write_padded(gpu: &Gpu, buffer: &wgpu::Buffer, nodes: &[BvhNode]) -> Result<()> {
-    let per_chunk = CHUNK_BYTES / NODE_BYTES;
-    let mut padded = vec![0; nodes.len().min(per_chunk) * NODE_BYTES];
-    for (chunk_idx, chunk) in nodes.chunks(per_chunk).enumerate() {
-        for (node, padded) in chunk.iter().zip(padded.chunks_exact_mut(NODE_BYTES)) {
-            padded[..size_of::<BvhNode>()].copy_from_slice(bytemuck::bytes_of(node));
-        }
-        let offset = chunk_idx * per_chunk * NODE_BYTES;
-        write_chunk(gpu, buffer, offset, &padded[..chunk.len() * NODE_BYTES])?;
-    }
-    Ok(())
-}
-
-fn write(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {
+/// Writes an array chunk by chunk.
+pub fn write(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {
     for (chunk_idx, chunk) in bytes.chunks(CHUNK_BYTES).enumerate() {
         write_chunk(gpu, buffer, chunk_idx * CHUNK_BYTES, chunk)?;
     }

@@ -1,12 +1,12 @@
 //! Measures a kind of ray: all rays traced several times by all threads, chunk by chunk.
 
+use super::BenchGpu;
 use super::BenchScene;
 use super::clock::{Elapsed, timed};
-use super::rays::{bounce_rays, shadow_rays};
+use super::rays::{Rays, bounce_rays, shadow_rays};
 use super::search::{self, CHUNK, Nearest, Shaded};
 use crate::report::Report;
 use crate::stats::mrays_per_s;
-use clap::ValueEnum;
 use serde_json::{Value, json};
 use std::sync::{Mutex, PoisonError};
 use surfel_core::flat::FlatGeometry;
@@ -14,29 +14,14 @@ use surfel_core::math::{Ray, Vec3};
 use surfel_core::progress::Progress;
 use surfel_core::trace::{Hit, Simd};
 
-/// A kind of rays, and the question about them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Rays {
-    /// Camera rays: the nearest disc, sphere or triangle.
-    Primary,
-    /// Rays from each hit to a point light: is anything between?
-    Shadow,
-    /// Rays from each hit in one random direction: is anything there?
-    BounceAny,
-    /// Rays from each hit in one random direction: the nearest disc, sphere or triangle.
-    Bounce,
-    /// Camera rays: up to 16 discs within a radius behind the nearest, and the mean of their normals.
-    Gather,
-    /// Camera rays: the finished surface, with its edge test.
-    Surface,
-}
-
 /// Data that all measurements share.
 pub struct Bench<'a> {
     /// The scene.
     pub scene: &'a BenchScene,
     /// The SIMD level of the kernels.
     pub simd: Simd,
+    /// The GPU that is measured; none for the CPU.
+    pub gpu: Option<&'a BenchGpu>,
     /// Number of timed runs.
     pub runs: u32,
     /// Position of the light relative to the scene's origin, as all rays are.
@@ -62,12 +47,21 @@ impl Bench<'_> {
     pub fn measure(&self, kind: Rays) -> surfel_core::Result<Value> {
         let (primary, hits) = (&self.primary, &self.hits);
         let bounces = || bounce_rays(self.scene, primary, hits);
+        let shadows = || shadow_rays(self.scene, primary, hits, self.light);
+        if let Some(gpu) = self.gpu {
+            let rays = match kind {
+                Rays::Primary | Rays::Surface | Rays::Gather => primary.clone(),
+                Rays::Bounce | Rays::BounceAny => bounces(),
+                Rays::Shadow => shadows(),
+            };
+            return gpu.measure(&self.scene.geometry, &rays, kind, self.runs, self.report);
+        }
         match kind {
             Rays::Primary => self.nearest(primary, search::nearest),
             Rays::Surface => self.nearest(primary, search::surface),
             Rays::Bounce => self.nearest(&bounces(), search::nearest),
             Rays::BounceAny => self.any(&bounces()),
-            Rays::Shadow => self.any(&shadow_rays(self.scene, primary, hits, self.light)),
+            Rays::Shadow => self.any(&shadows()),
             Rays::Gather => self.gather(primary),
         }
     }

@@ -2,7 +2,11 @@
 
 mod camera_file;
 mod clock;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod measure;
+#[cfg(not(feature = "gpu"))]
+mod no_gpu;
 mod rays;
 mod search;
 mod table;
@@ -17,9 +21,15 @@ use camera_file::CameraFile;
 use clap::ValueEnum;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clock::{Elapsed, timed};
-use measure::{Bench, Rays, closest_hits};
+#[cfg(feature = "gpu")]
+use gpu::BenchGpu;
+use measure::{Bench, closest_hits};
+#[cfg(not(feature = "gpu"))]
+use no_gpu::BenchGpu;
+use rays::Rays;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use surfel::SceneDescription;
 use surfel::description::rule::{Resolution, Rule};
 use surfel::description::{Backend, ObjectSettings, RunSettings};
@@ -102,10 +112,9 @@ const DEFAULT_RAYS: [Rays; 5] =
 
 /// Measures rates and prints them.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    let RunSettings { memory_limit: limit, backend, .. } = global.start()?;
-    if backend == Some(Backend::Gpu) {
-        anyhow::bail!("--backend gpu: bench measures the CPU only; leave it out");
-    }
+    let RunSettings { memory_limit: limit, backend, device, .. } = global.start()?;
+    let is_on_gpu = backend == Some(Backend::Gpu);
+    let gpu = is_on_gpu.then(|| BenchGpu::open(device.as_deref())).transpose()?;
     let description = args.options.description.clone()?;
     check_surface(args, &description)?;
     let file = args.camera_file.as_deref().map(CameraFile::read).transpose()?;
@@ -117,7 +126,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
 
     let simd = args.simd.unwrap_or_else(Simd::detect);
     let kinds = kinds(args, &scene, report)?;
-    let (bytes_of, bytes, count_of, count, surface) = match &scene.geometry {
+    let (bytes_of, bytes, count_of, count, surface) = match &*scene.geometry {
         FlatGeometry::Cloud(cloud) => {
             let bytes = stats::bytes_per_point(std::iter::once(cloud), n_points);
             ("bytes_per_point", bytes, "points", n_points, cloud.surface.name())
@@ -128,10 +137,12 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         }
     };
     let result = json!({
-        "rays": measure(args, &kinds, &scene, simd, file.as_ref(), report)?,
+        "rays": measure(args, &kinds, &scene, &Engine { simd, gpu: gpu.as_ref() }, file.as_ref(), report)?,
         "build_s": build.wall,
         bytes_of: bytes,
         "peak_rss_bytes": stats::peak_rss_bytes(),
+        "backend": if gpu.is_some() { "gpu" } else { "cpu" },
+        "device": gpu.as_ref().map_or_else(stats::device, BenchGpu::name),
         "threads": rayon::current_num_threads(),
         "simd": simd.name(),
         "build_cpu_s": build.cpu,
@@ -146,7 +157,7 @@ pub struct BenchScene {
     /// World coordinates of the geometry's zero, to which all rays are relative.
     pub origin: DVec3,
     /// The geometry with its tree.
-    pub geometry: FlatGeometry,
+    pub geometry: Arc<FlatGeometry>,
     /// The camera of the primary rays.
     pub camera: Camera,
 }
@@ -157,22 +168,31 @@ struct Unbuilt {
     camera: Camera,
 }
 
+/// The processor or GPU that traces the rays.
+struct Engine<'a> {
+    /// The SIMD level of the CPU's kernels.
+    simd: Simd,
+    /// The GPU; none if the CPU is measured.
+    gpu: Option<&'a BenchGpu>,
+}
+
 /// Measures each kind of rays; returns the results by name.
 fn measure(
     args: &Args,
     kinds: &[Rays],
     scene: &BenchScene,
-    simd: Simd,
+    engine: &Engine,
     file: Option<&CameraFile>,
     report: &Report,
 ) -> surfel_core::Result<Map<String, Value>> {
     let primary = rays::camera_rays(scene, file, args.resolution);
-    let hits = closest_hits(scene, simd, &primary);
+    let hits = closest_hits(scene, engine.simd, &primary);
     if hits.iter().all(Hit::is_miss) {
         report.note("no camera ray hits anything; see --camera-position and --camera-file");
     }
     let light = light(scene, file, report);
-    let bench = Bench { scene, simd, runs: args.runs, light, primary, hits, report };
+    let Engine { simd, gpu } = *engine;
+    let bench = Bench { scene, simd, gpu, runs: args.runs, light, primary, hits, report };
     let name = |kind: &Rays| kind.to_possible_value().map(|value| value.get_name().to_owned());
     let named =
         kinds.iter().map(|kind| Ok((name(kind).unwrap_or_default(), bench.measure(*kind)?)));
@@ -199,7 +219,7 @@ fn reject_gather(kinds: &[Rays], why: &str) -> Result<(), Usage> {
 
 /// Returns the kinds of rays that fit the geometry.
 fn kinds(args: &Args, scene: &BenchScene, report: &Report) -> Result<Vec<Rays>, Usage> {
-    let unblended = match &scene.geometry {
+    let unblended = match &*scene.geometry {
         FlatGeometry::Cloud(cloud) if cloud.surface.uses_discs() => {
             return Ok(args.rays.clone().unwrap_or(DEFAULT_RAYS.to_vec()));
         }
@@ -319,7 +339,7 @@ fn build(unbuilt: Unbuilt, report: &Report) -> anyhow::Result<(BenchScene, Elaps
         (geometry, spent) = timed(flat);
         least = least.least(spent);
     }
-    Ok((BenchScene { origin: source.origin(), geometry: geometry?, camera }, least))
+    Ok((BenchScene { origin: source.origin(), geometry: Arc::new(geometry?), camera }, least))
 }
 
 /// Returns the position of the light relative to the scene's origin.

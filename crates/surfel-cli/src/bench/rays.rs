@@ -5,10 +5,28 @@
 
 use super::BenchScene;
 use super::camera_file::CameraFile;
+use clap::ValueEnum;
 use std::f32::consts::TAU;
 use surfel_core::flat::FlatGeometry;
 use surfel_core::math::{DVec3, Ray, Vec3, morton_decode};
 use surfel_core::trace::Hit;
+
+/// A kind of rays, and the question about them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Rays {
+    /// Camera rays: the nearest disc, sphere or triangle.
+    Primary,
+    /// Rays from each hit to a point light: is anything between?
+    Shadow,
+    /// Rays from each hit in one random direction: is anything there?
+    BounceAny,
+    /// Rays from each hit in one random direction: the nearest disc, sphere or triangle.
+    Bounce,
+    /// Camera rays: up to 16 discs within a radius behind the nearest, and the mean of their normals.
+    Gather,
+    /// Camera rays: the finished surface, with its edge test.
+    Surface,
+}
 
 /// Pixels along the side of a tile.
 const TILE: u32 = 16;
@@ -93,7 +111,7 @@ fn starts(scene: &BenchScene, rays: &[Ray], hits: &[Hit]) -> impl Iterator<Item 
 
 fn start(scene: &BenchScene, ray_idx: usize, ray: &Ray, hit: &Hit) -> Start {
     let position = ray.at(hit.distance);
-    let cloud = match &scene.geometry {
+    let cloud = match &*scene.geometry {
         FlatGeometry::Cloud(cloud) => cloud,
         FlatGeometry::Mesh(mesh) => {
             let [a, b, c] = mesh.triangles.triangle(hit.slot);

@@ -25,10 +25,17 @@ fn footer(result: &Value) -> String {
     let bytes = &result[format!("bytes_per_{one}")];
     let [tree, leaves, total] = ["tree", many, "total"].map(|key| two(&bytes[key]));
     let (threads, simd) = (&result["threads"], result["simd"].as_str().unwrap_or_default());
+    let traced = match result["backend"].as_str() {
+        Some("gpu") => {
+            format!("device: {}; rates by the wall, without transfers", result["device"])
+        }
+        _ => format!(
+            "threads: {threads}; simd: {simd}; rates by processor time / threads, the last by the wall"
+        ),
+    };
     format!(
         "built in {wall} s ({cpu} s of processor time); {total} bytes a {one}: tree \
-         {tree}, {many} {leaves}\nthreads: {threads}; simd: {simd}; rates by processor time / threads, \
-         the last by the wall"
+         {tree}, {many} {leaves}\n{traced}"
     )
 }
 

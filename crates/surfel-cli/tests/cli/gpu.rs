@@ -50,10 +50,42 @@ fn gpus_refuse_what_they_do_not_render() {
         return;
     }
     assert!(text.contains("unknown device 'nobody's'; known: 0 ("), "{text}");
-    let text = fail(&[&render[..], &["--material", "glass"]].concat(), 1);
-    let expected = "the GPU does not render materials that reflect or transmit yet";
-    assert!(text.contains(expected), "{text}");
+    let text = fail(&[&render[..], &["--surface", "splat-fit"]].concat(), 1);
+    assert!(text.contains("the GPU does not render the surface splat-fit yet"), "{text}");
     assert_eq!(folder.names(), ["dome.ply"]);
     succeed(&render);
     assert_eq!(folder.names(), ["dome.ply", "out.png"]);
+}
+
+#[test]
+fn bench_traces_the_rays_of_the_cpu_on_a_gpu() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(30));
+    let size = ["--resolution", "48x48", "--runs", "2", "--json", "--quiet"];
+    let kinds = ["--rays", "primary,shadow,bounce-any,bounce,gather,surface"];
+    let bench = |backend: &str| {
+        let words = [&["bench", &cloud, "--backend", backend][..], &size, &kinds].concat();
+        command(&words).output().unwrap()
+    };
+    let [cpu, gpu] = ["cpu", "gpu"].map(bench);
+    let text = String::from_utf8_lossy(&gpu.stderr);
+    if text.contains("no GPU was found") {
+        #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
+        {
+            println!("skipped: {text}");
+        }
+        return;
+    }
+    assert!(gpu.status.success(), "{text}");
+    let [cpu, gpu] = [cpu, gpu]
+        .map(|output| serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap());
+    assert_eq!((&cpu["backend"], &gpu["backend"]), (&"cpu".into(), &"gpu".into()));
+    for (kind, of_cpu) in cpu["rays"].as_object().unwrap() {
+        let of_gpu = &gpu["rays"][kind];
+        assert_eq!(of_cpu["rays"], of_gpu["rays"], "{kind}");
+        let [cpu, gpu] = [of_cpu, of_gpu].map(|row| row["hits"].as_u64().unwrap());
+        // A ray within a rounding error of a rim hits on one of them only.
+        assert!(cpu.abs_diff(gpu) <= 1 + cpu / 1000, "{kind}: {cpu} {gpu}");
+        assert!(0.0 < of_gpu["median_mrays_per_s"].as_f64().unwrap(), "{kind}");
+    }
 }

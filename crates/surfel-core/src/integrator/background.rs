@@ -6,7 +6,7 @@ use crate::scene::{Background, Light, Sun};
 
 /// Maximum radiance of the sun's disc in mirrors. Its true radiance, tens of thousands, would speckle
 /// pictures.
-const MAX_SUN_RADIANCE: f32 = 50.0;
+pub const MAX_SUN_RADIANCE: f32 = 50.0;
 
 /// Returns the radiance that a ray which leaves the scene in `direction` (unit) brings.
 ///

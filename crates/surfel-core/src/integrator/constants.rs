@@ -1,4 +1,12 @@
 //! Constants of the integrators, for other implementations of them.
 
-pub use super::direct::{PUNCTUAL_LIGHT_POSITION, SKY_DIRECTION, SKY_DISTANCE, SUN_DIRECTION};
+pub use super::background::MAX_SUN_RADIANCE;
+pub use super::direct::{
+    ENVIRONMENT_DIRECTION, PUNCTUAL_LIGHT_POSITION, SKY_DIRECTION, SKY_DISTANCE, SUN_DIRECTION,
+};
 pub use super::shading::MIN_FACING_COS;
+pub use super::specular::{ALBEDO_STEPS, MIN_ROUGHNESS, directional_albedo};
+pub use super::transmittance::{MAX_SURFACES, MIN_TRANSMITTANCE};
+pub use super::whitted::{
+    ALPHA_LAYER, LOBE_DIRECTION, MAX_ALPHA_LAYERS, MIN_WEIGHT, REFLECTED, REFRACTED, ROULETTE,
+};

@@ -50,7 +50,8 @@ pub const SKY_DIRECTION: u64 = 1;
 pub const SKY_DISTANCE: u64 = 2;
 /// Random dimension of directions toward suns.
 pub const SUN_DIRECTION: u64 = 3;
-const ENVIRONMENT_DIRECTION: u64 = 4;
+/// Random dimension of directions toward environments.
+pub const ENVIRONMENT_DIRECTION: u64 = 4;
 /// Random dimension of positions on punctual lights.
 pub const PUNCTUAL_LIGHT_POSITION: u64 = 5;
 /// Approximate number of shadow rays traced at once: it bounds their memory, whatever the number of light

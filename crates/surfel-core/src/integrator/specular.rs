@@ -4,6 +4,8 @@ use crate::math::{Vec3, owen_sobol_2d};
 use std::f32::consts::{PI, TAU};
 use std::sync::OnceLock;
 
+/// Number of steps of cosine and of roughness between which directional albedos are interpolated.
+pub const ALBEDO_STEPS: usize = 32;
 /// Roughness below which a surface is a perfect mirror.
 pub const MIN_ROUGHNESS: f32 = 0.02;
 
@@ -96,23 +98,22 @@ pub fn smith_g2_over_g1(cos_view: f32, cos_light: f32, roughness: f32) -> f32 {
 ///
 /// Division by it compensates for the energy of all further bounces (Turquin 2019).
 pub fn directional_albedo(cos: f32, roughness: f32) -> f32 {
-    const STEPS: usize = 32;
     static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
     let table = TABLE.get_or_init(|| {
         let value = |i: usize| {
-            let cos = (i % STEPS) as f32 / (STEPS - 1) as f32;
-            integrate_albedo(cos.max(1e-3), (i / STEPS) as f32 / (STEPS - 1) as f32)
+            let cos = (i % ALBEDO_STEPS) as f32 / (ALBEDO_STEPS - 1) as f32;
+            integrate_albedo(cos.max(1e-3), (i / ALBEDO_STEPS) as f32 / (ALBEDO_STEPS - 1) as f32)
         };
-        (0..STEPS * STEPS).map(value).collect()
+        (0..ALBEDO_STEPS * ALBEDO_STEPS).map(value).collect()
     });
     let cell = |value: f32| {
-        let position = value.clamp(0.0, 1.0) * (STEPS - 1) as f32;
-        let index = (position as usize).min(STEPS - 2);
+        let position = value.clamp(0.0, 1.0) * (ALBEDO_STEPS - 1) as f32;
+        let index = (position as usize).min(ALBEDO_STEPS - 2);
         (index, position - index as f32)
     };
     let ((x, weight_x), (y, weight_y)) = (cell(cos), cell(roughness));
     let row = |y: usize| {
-        let first = STEPS * y + x;
+        let first = ALBEDO_STEPS * y + x;
         table[first] + weight_x * (table[first + 1] - table[first])
     };
     row(y) + weight_y * (row(y + 1) - row(y))

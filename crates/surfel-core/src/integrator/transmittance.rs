@@ -8,9 +8,9 @@ use crate::math::{Ray, Vec3};
 use crate::trace::{InstanceFilter, SceneHit, Tracer};
 
 /// Maximum number of surfaces that a shadow ray passes; behind more of them nothing arrives.
-const MAX_SURFACES: usize = 64;
+pub const MAX_SURFACES: usize = 64;
 /// Transmittance below which a shadow ray counts as blocked.
-const MIN_TRANSMITTANCE: f32 = 1.0 / 512.0;
+pub const MIN_TRANSMITTANCE: f32 = 1.0 / 512.0;
 
 /// Computes the transmittance of each ray up to its `t_max` and writes it to `transmittances`.
 ///

@@ -22,16 +22,20 @@ pub struct Whitted {
 }
 
 /// Maximum number of alpha-blended layers along a path.
-const MAX_ALPHA_LAYERS: u32 = 64;
+pub const MAX_ALPHA_LAYERS: u32 = 64;
 /// Path weight below which Russian roulette ends paths, with the mean preserved.
-const MIN_WEIGHT: f32 = 0.01;
+pub const MIN_WEIGHT: f32 = 0.01;
 
-// Random dimensions besides those of direct light.
-const LOBE_DIRECTION: u64 = 11;
-const ROULETTE: u64 = 12;
-const REFLECTED: u64 = 13;
-const REFRACTED: u64 = 14;
-const ALPHA_LAYER: u64 = 15;
+/// Random dimension of directions in a rough lobe.
+pub const LOBE_DIRECTION: u64 = 11;
+/// Random dimension of Russian roulette.
+pub const ROULETTE: u64 = 12;
+/// Random dimension of reflected branches.
+pub const REFLECTED: u64 = 13;
+/// Random dimension of refracted branches.
+pub const REFRACTED: u64 = 14;
+/// Random dimension of branches behind an alpha-blended layer.
+pub const ALPHA_LAYER: u64 = 15;
 
 /// A path from the camera up to its next ray.
 #[derive(Clone, Copy)]

@@ -73,6 +73,12 @@ impl Distribution2d {
         Some(Self { rows: Distribution1d::from_weights(&rows)?, width, cdf })
     }
 
+    /// Returns the starts of the rows in the distribution over all rows, and of the cells in that of each row. A cell ends
+    /// where the next one begins, the last one at the largest u32.
+    pub fn arrays(&self) -> (&[u32], &[u32]) {
+        (&self.rows.cdf, &self.cdf)
+    }
+
     /// Maps a uniform point of the unit square to the column and the row of a cell and a uniform offset in
     /// it.
     pub fn sample(&self, (u, v): (f32, f32)) -> ((usize, usize), (f32, f32)) {

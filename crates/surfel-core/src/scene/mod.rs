@@ -34,7 +34,7 @@ pub use camera::{Camera, Lens, Projection, View};
 pub use camera_fit::{CameraFit, default_view_up};
 pub use clip::{Clip, ClipBox, ClipPlane};
 pub use cloud_geometry::CloudGeometry;
-pub use environment::Environment;
+pub use environment::{Environment, EnvironmentArrays};
 pub use graph::{Geometry, Graph, Joint, Node, Primitive, Transform};
 pub use ground::north;
 pub use inliers::inlier_bounds;

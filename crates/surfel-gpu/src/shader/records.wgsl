@@ -19,7 +19,17 @@ struct FrameRecord {
     samples_per_pixel: u32,
     is_centered: u32,
     is_first: u32,
+    capacity: u32,
+    background_top: vec3<f32>,
+    background: u32,
+    background_bottom: vec3<f32>,
+    height: u32,
+    background_up: vec3<f32>,
+    n_lights: u32,
+    max_depth: u32,
+    n_light_samples: u32,
     reserved_a: u32,
+    reserved_b: u32,
     // Normals of planes, and their distances from the scene's origin along these.
     planes: array<vec4<f32>, MAX_PLANES>,
 }
@@ -28,8 +38,9 @@ struct FrameRecord {
 struct Visit {
     object_from_world: mat4x3<f32>,
     world_from_normal: mat3x3<f32>,
+    world_from_object: mat3x3<f32>,
     instance: u32,
-    material: u32,
+    reserved_a: u32,
     is_identity: u32,
     surface: u32,
     max_scale: f32,
@@ -40,24 +51,58 @@ struct Visit {
     blends_colors: u32,
     block_vectors: u32,
     attributes: u32,
+    reserved_e: u32,
+    has_outward_normals: u32,
+    reserved_b: u32,
+    is_mirrored: u32,
+    // Bounding box in world coordinates.
+    lower: vec3<f32>,
+    reserved_c: f32,
+    upper: vec3<f32>,
+    reserved_d: f32,
 }
 
-// One of the samples of a light.
-struct LightSample {
+// What a pass does: the sample of a light, the queue that it works on and the kind of its rays, or the instances of a
+// tree.
+struct Task {
+    light: u32,
+    sample_idx: u32,
+    max_samples: u32,
+    queue: u32,
+    ray_kind: u32,
+    first_visit: u32,
+    n_visits: u32,
+    reserved_a: u32,
+}
+
+struct LightRecord {
     direction: vec3<f32>,
     kind: u32,
     color: vec3<f32>,
     cos_max: f32,
     ground: vec3<f32>,
     ao_distance: f32,
-    sample_idx: u32,
-    n_samples: u32,
-    light: u32,
-    range: f32,
     position: vec3<f32>,
     radius: f32,
     inner_cos: f32,
     outer_cos: f32,
+    range: f32,
+    lamp: u32,
+    size: vec2<u32>,
+    first_word: u32,
+    strength: f32,
+}
+
+struct TextureRecord {
+    first_word: u32,
+    width: u32,
+    height: u32,
+    // Bits, as `TEXTURE_*` gives them.
+    flags: u32,
+    offset: vec2<f32>,
+    scale: vec2<f32>,
+    cos: f32,
+    sin: f32,
     reserved_a: u32,
     reserved_b: u32,
 }
@@ -67,7 +112,33 @@ struct MaterialRecord {
     ignores_vertex_colors: u32,
     emissive: vec3<f32>,
     emissive_strength: f32,
+    attenuation_color: vec3<f32>,
+    attenuation_distance: f32,
     is_unlit: u32,
+    alpha: f32,
+    alpha_mode: u32,
+    alpha_cutoff: f32,
+    metallic: f32,
+    roughness: f32,
+    ior: f32,
+    transmission: f32,
+    is_thin: u32,
+    normal_scale: f32,
+    reserved_a: u32,
+    reserved_b: u32,
+    textures: array<TextureRecord, N_TEXTURES>,
+}
+
+struct InstanceRecord {
+    lower: vec3<f32>,
+    material: u32,
+    upper: vec3<f32>,
+    max_scale: f32,
+    has_outward_normals: u32,
+    attributes: u32,
+    first_support_color: u32,
+    support_low: f32,
+    support_high: f32,
     reserved_a: u32,
     reserved_b: u32,
     reserved_c: u32,
@@ -80,30 +151,68 @@ struct HitRecord {
     color: vec3<f32>,
     radius: f32,
     geometric_normal: vec3<f32>,
-    reserved_c: f32,
+    alpha: f32,
     slot: u32,
     instance: u32,
-    material: u32,
+    is_backface: u32,
     surface: u32,
     // The points behind the hit, once they are asked for.
     support_count: u32,
     support_distance: f32,
+    // Of the second and third corners of a triangle.
+    barycentrics: vec2<f32>,
+    // Both sets of texture coordinates.
+    uvs: vec4<f32>,
+    // Tangent of a normal map, and the sign of its bitangent; 0 without one.
+    tangent: vec4<f32>,
+}
+
+// A path's next ray, or a ray toward a light.
+struct Path {
+    ray: Ray,
+    // Throughput from the ray's end to the camera, or the radiance that a light adds if nothing blocks the ray.
+    weight: vec3<f32>,
+    // Index of the pixel in its part of the picture.
+    pixel: u32,
+    // The light that has passed all surfaces so far, of a ray toward a light.
+    transmittance: vec3<f32>,
+    // Distance from the surface that the ray left to its origin, along the ray.
+    origin_offset: f32,
+    // Instances that the ray is inside of; the one entered last comes first.
+    media: vec4<u32>,
+    // Random key, and the index of the path among those with the same key.
+    key: vec2<u32>,
+    index: u32,
+    // Depth, number of alpha-blended layers and `MISS_*`, eight bits each; of a ray toward a light 1 until it is done.
+    state: u32,
+}
+
+// A point at which direct light is computed.
+struct ShadingPointRecord {
+    position: vec3<f32>,
+    spawn_offset: f32,
+    normal: vec3<f32>,
+    spawn_t_min: f32,
+    geometric_normal: vec3<f32>,
+    roughness: f32,
+    to_viewer: vec3<f32>,
+    pixel: u32,
+    // Reflectances times the throughput of the path to the camera.
+    diffuse: vec3<f32>,
+    index: u32,
+    glossy: vec3<f32>,
+    n_light_samples: u32,
+    media: vec4<u32>,
+    key: vec2<u32>,
     reserved_a: u32,
     reserved_b: u32,
 }
 
-// A ray toward a light, and the radiance that it adds to its pixel if nothing blocks it.
-struct ShadowRay {
-    ray: Ray,
-    contribution: vec3<f32>,
-    is_open: u32,
-}
-
-// The radiance of a pixel's current sample, and the sum over all samples.
-struct Pixel {
-    radiance: vec3<f32>,
-    alpha: f32,
-    sum: vec4<f32>,
+struct Tables {
+    // Linear values of 8-bit sRGB values.
+    srgb: array<vec4<f32>, 64>,
+    // Directional albedo of rough mirrors, by roughness and cosine.
+    albedo: array<vec4<f32>, N_ALBEDO_VECTORS>,
 }
 
 const NONE: u32 = 0xffffffffu;
@@ -112,10 +221,13 @@ const NO_LIMIT: f32 = 3e38;
 const EPSILON: f32 = 1.1920929e-7;
 
 @group(0) @binding(0) var<uniform> frame: FrameRecord;
-@group(1) @binding(0) var<storage, read_write> rays: array<Ray>;
+@group(0) @binding(1) var<uniform> task: Task;
+@group(0) @binding(2) var<uniform> tables: Tables;
+@group(1) @binding(0) var<storage, read_write> paths: array<Path>;
 @group(1) @binding(1) var<storage, read_write> hits: array<HitRecord>;
-@group(1) @binding(2) var<storage, read_write> shadow_rays: array<ShadowRay>;
-@group(1) @binding(3) var<storage, read_write> pixels: array<Pixel>;
-@group(1) @binding(4) var<storage, read> materials: array<MaterialRecord>;
-// Numbers of primary, shadow and sky rays.
-@group(1) @binding(5) var<storage, read_write> n_traced: array<atomic<u32>, 4>;
+@group(1) @binding(2) var<storage, read_write> next_paths: array<Path>;
+@group(1) @binding(3) var<storage, read_write> points: array<ShadingPointRecord>;
+// Sums of radiance and alpha over all samples of each pixel, in fixed point: the lower words come first.
+@group(1) @binding(4) var<storage, read_write> pixels: array<array<atomic<u32>, 8>>;
+// Lengths of queues and numbers of rays, as `N_*` and `FIRST_*` give them.
+@group(1) @binding(5) var<storage, read_write> counts: array<atomic<u32>, N_COUNTS>;

@@ -3,6 +3,7 @@
 
 mod alignment;
 mod animation;
+mod backend_materials;
 mod backends;
 mod bad_clouds;
 mod batches;

@@ -36,7 +36,32 @@ pub struct Environment {
     n_repaired: usize,
 }
 
+/// The arrays of an environment, for other implementations of its sampling.
+#[derive(Clone, Copy, Debug)]
+pub struct EnvironmentArrays<'a> {
+    /// Width and height of the picture in pixels.
+    pub size: [usize; 2],
+    /// Linear radiances, row by row from the top.
+    pub pixels: &'a [Vec3],
+    /// Factor of the radiances.
+    pub strength: f32,
+    /// Unit vectors to the right of the picture's middle, to its middle, and up.
+    pub axes: [Vec3; 3],
+    /// Starts of the rows in the cumulative distribution over all rows.
+    pub row_cdf: &'a [u32],
+    /// Starts of the pixels in the cumulative distribution of each row, row by row.
+    pub column_cdf: &'a [u32],
+}
+
 impl Environment {
+    /// Returns the arrays from which the environment is sampled.
+    pub fn arrays(&self) -> EnvironmentArrays<'_> {
+        let Self { width, height, pixels, strength, axes, distribution, .. } = self;
+        let (row_cdf, column_cdf) = distribution.arrays();
+        let (size, strength, axes) = ([*width, *height], *strength, *axes);
+        EnvironmentArrays { size, pixels, strength, axes, row_cdf, column_cdf }
+    }
+
     /// Makes an environment of `width * height` linear Rec.709 radiances; row 0 is the top.
     ///
     /// `rotation_deg` rotates the environment about `up`, in degrees clockwise seen from above: the middle

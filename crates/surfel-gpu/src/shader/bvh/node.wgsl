@@ -13,15 +13,13 @@ struct Node {
 // Words of four bytes that a node takes in `nodes`, and those that it fills.
 const NODE_VECTORS: u32 = 5u;
 
-@group(2) @binding(0) var<storage, read> nodes: array<vec4<u32>>;
-
 fn load_node(node_idx: u32) -> Node {
     let first = node_idx * NODE_VECTORS;
-    let head = nodes[first];
-    let a = nodes[first + 1u];
-    let b = nodes[first + 2u];
-    let c = nodes[first + 3u];
-    let d = nodes[first + 4u];
+    let head = node_vector(first);
+    let a = node_vector(first + 1u);
+    let b = node_vector(first + 2u);
+    let c = node_vector(first + 3u);
+    let d = node_vector(first + 4u);
     return Node(
         bitcast<vec3<f32>>(head.xyz),
         head.w,

@@ -29,19 +29,16 @@ struct Surfel {
 // Vectors of four words that a block takes in `blocks`.
 const BLOCK_VECTORS: u32 = 8u;
 
-@group(2) @binding(1) var<storage, read> blocks: array<vec4<u32>>;
-// Linear values of 8-bit sRGB values.
-@group(0) @binding(2) var<uniform> srgb: array<vec4<f32>, 64>;
 
 fn load_block(block_idx: u32) -> PointBlock {
     let first = block_idx * BLOCK_VECTORS;
     return PointBlock(
-        blocks[first],
-        blocks[first + 1u],
-        blocks[first + 2u],
-        blocks[first + 3u],
-        array<vec4<u32>, 2>(blocks[first + 4u], blocks[first + 5u]),
-        blocks[first + 6u].xy,
+        block_vector(first),
+        block_vector(first + 1u),
+        block_vector(first + 2u),
+        block_vector(first + 3u),
+        array<vec4<u32>, 2>(block_vector(first + 4u), block_vector(first + 5u)),
+        block_vector(first + 6u).xy,
     );
 }
 
@@ -75,9 +72,9 @@ fn slot_color(slot: u32) -> vec3<f32> {
 // Returns a byte of the colours of the block of `slot`, which follow its eight radii, as linear light.
 fn color_byte(slot: u32, byte_idx: u32) -> f32 {
     let word = 2u + (byte_idx >> 2u);
-    let vector = blocks[(slot >> 3u) * BLOCK_VECTORS + 6u + (word >> 2u)];
+    let vector = block_vector((slot >> 3u) * BLOCK_VECTORS + 6u + (word >> 2u));
     let encoded = (vector[word & 3u] >> (8u * (byte_idx & 3u))) & 0xffu;
-    return srgb[encoded >> 2u][encoded & 3u];
+    return tables.srgb[encoded >> 2u][encoded & 3u];
 }
 
 fn slot_surfel(slot: u32) -> Surfel {

@@ -1,35 +1,38 @@
 // Leaf blocks of eight triangles with the attributes of their vertices.
 
-// Attributes that a mesh may have, as bits.
-const HAS_NORMALS: u32 = 1u;
-const HAS_COLORS_OF_VERTICES: u32 = 2u;
-// Vectors of four words that the corners and indices of a block, its normals and its colours take.
+// Vectors of four words that the corners and indices of a block take, and one component of the three corners.
 const CORNER_VECTORS: u32 = 20u;
-const NORMAL_VECTORS: u32 = 18u;
+const COMPONENT_VECTORS: u32 = 6u;
 
 // Returns the corners of the triangle at `slot`.
 fn slot_corners(slot: u32) -> array<vec3<f32>, 3> {
-    return array<vec3<f32>, 3>(slot_vector(slot, 0u, 0u), slot_vector(slot, 0u, 1u), slot_vector(slot, 0u, 2u));
-}
-
-// Returns a vector of a corner of the triangle at `slot`: values are stored by corner, axis and lane from `offset` on.
-fn slot_vector(slot: u32, offset: u32, corner: u32) -> vec3<f32> {
-    return vec3<f32>(
-        slot_value(slot, offset, 3u * corner),
-        slot_value(slot, offset, 3u * corner + 1u),
-        slot_value(slot, offset, 3u * corner + 2u),
+    return array<vec3<f32>, 3>(
+        slot_vector(slot, 0u, 3u, 0u).xyz,
+        slot_vector(slot, 0u, 3u, 1u).xyz,
+        slot_vector(slot, 0u, 3u, 2u).xyz,
     );
 }
 
-fn slot_value(slot: u32, offset: u32, row: u32) -> f32 {
+// Returns a vector of `n` components of a corner of the triangle at `slot`: values are stored by corner, component and
+// lane from `offset` on.
+fn slot_vector(slot: u32, offset: u32, n: u32, corner: u32) -> vec4<f32> {
     let lane = slot & 7u;
-    let vector = (slot >> 3u) * visit.block_vectors + offset + 2u * row + (lane >> 2u);
-    return bitcast<f32>(blocks[vector][lane & 3u]);
+    let first = (slot >> 3u) * visits[visit_idx].block_vectors + offset + 2u * n * corner + (lane >> 2u);
+    var vector = vec4<f32>(0.0);
+    for (var i = 0u; i < n; i++) {
+        vector[i] = bitcast<f32>(block_vector(first + 2u * i)[lane & 3u]);
+    }
+    return vector;
 }
 
-// Returns a column of vertices at barycentric coordinates of the triangle at `slot`.
-fn interpolate(slot: u32, offset: u32, weights: vec3<f32>) -> vec3<f32> {
-    return weights.x * slot_vector(slot, offset, 0u)
-        + weights.y * slot_vector(slot, offset, 1u)
-        + weights.z * slot_vector(slot, offset, 2u);
+// Returns a column of `n` components of vertices at barycentric coordinates of the triangle at `slot`.
+fn interpolate(slot: u32, offset: u32, n: u32, weights: vec3<f32>) -> vec4<f32> {
+    return weights.x * slot_vector(slot, offset, n, 0u)
+        + weights.y * slot_vector(slot, offset, n, 1u)
+        + weights.z * slot_vector(slot, offset, n, 2u);
+}
+
+// Returns true if the mesh has a column.
+fn has_column(column: u32) -> bool {
+    return (visits[visit_idx].attributes & column) != 0u;
 }

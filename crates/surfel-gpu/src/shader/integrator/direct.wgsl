@@ -1,97 +1,130 @@
-// Direct lighting: a ray toward a light from each hit, and the light that it brings.
+// Direct lighting: a ray toward a light from each point, and the light that it brings.
 
-@group(0) @binding(1) var<uniform> light: LightSample;
+// A sampled ray toward a light, without its origin; it contributes nothing where the light does not reach.
+struct LightRay {
+    direction: vec3<f32>,
+    t_max: f32,
+    contribution: vec3<f32>,
+}
 
-// Makes a ray toward the light from each hit that the light can reach, or adds a light without shadows.
+// Makes a ray toward the light from each point that the light can reach, or adds a light without shadows.
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn sample_light(@builtin(global_invocation_id) id: vec3<u32>) {
-    let ray_idx = id.x;
-    if frame.n_rays <= ray_idx {
+    if atomicLoad(&counts[FIRST_TAKEN + POINTS]) <= id.x {
         return;
     }
-    shadow_rays[ray_idx].is_open = 0u;
-    let hit = hits[ray_idx];
-    if hit.instance == NONE {
-        return;
-    }
-    let shading = shading_at(rays[ray_idx], hit);
-    if shading.is_unlit {
-        return;
-    }
+    let point = points[id.x];
+    let light = lights[task.light];
     if light.kind == HEADLIGHT {
-        let cos = dot(shading.normal, -rays[ray_idx].direction);
-        pixels[ray_idx].radiance += max(cos, 0.0) * shading.base_color * light.color;
+        add_radiance(point.pixel, reflected_radiance(point, point.to_viewer, light.color));
         return;
     }
-    let sampled = sampled_ray(shading, pixel_key(ray_idx));
-    let is_behind = dot(shading.geometric_normal, sampled.ray.direction) <= 0.0;
+    let n_samples = min(point.n_light_samples, task.max_samples);
+    if n_samples <= task.sample_idx {
+        return;
+    }
+    let sampled = sampled_ray(point, light, point.index * n_samples + task.sample_idx);
+    let is_behind = dot(point.geometric_normal, sampled.direction) <= 0.0;
     if is_behind || all(sampled.contribution == vec3<f32>(0.0)) {
         return;
     }
-    atomicAdd(&n_traced[select(SHADOW_RAYS, SKY_RAYS, light.kind == SKY)], 1u);
-    shadow_rays[ray_idx] = sampled;
-}
-
-// Adds the light of a sky where camera rays see it.
-@compute @workgroup_size(WORKGROUP_SIZE)
-fn shade_miss(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < frame.n_rays && hits[id.x].instance == NONE {
-        pixels[id.x].alpha = 1.0;
-        pixels[id.x].radiance += sky_radiance(light, rays[id.x].direction);
-    }
+    let slot = atomicAdd(&counts[FIRST_ADDED + LIGHT_RAYS], 1u);
+    let side = select(-point.geometric_normal, point.geometric_normal, 0.0 <= dot(point.geometric_normal, sampled.direction));
+    let ray = Ray(point.position + point.spawn_offset * side, point.spawn_t_min, sampled.direction, sampled.t_max);
+    // As in `from_surface`.
+    let cos = max(abs(dot(ray.direction, point.geometric_normal)), 0.1);
+    let height = abs(dot(ray.origin - point.position, point.geometric_normal));
+    let weight = sampled.contribution / f32(n_samples);
+    paths[slot] = Path(ray, weight, point.pixel, vec3<f32>(1.0), height / cos, point.media, point.key, point.index, 1u);
 }
 
 // Adds the light of the rays that nothing blocks.
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn add_light(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < frame.n_rays && shadow_rays[id.x].is_open == 1u {
-        pixels[id.x].radiance += shadow_rays[id.x].contribution;
+    if id.x < atomicLoad(&counts[FIRST_TAKEN + LIGHT_RAYS]) && paths[id.x].state == 1u {
+        add_radiance(paths[id.x].pixel, paths[id.x].weight);
     }
 }
 
-fn sampled_ray(shading: Shading, key: vec2<u32>) -> ShadowRay {
-    let sample_idx = frame.sample_idx * light.n_samples + light.sample_idx;
-    let weight = 1.0 / f32(light.n_samples);
+fn sampled_ray(point: ShadingPointRecord, light: LightRecord, sample_idx: u32) -> LightRay {
+    let key = point.key;
     if light.kind == SKY {
         let uv = owen_sobol_2d(sample_idx, hash(key ^ vec2<u32>(SKY_DIRECTION, 0u)));
-        let direction = basis_to_world(basis_around(shading.normal), cosine_hemisphere(uv));
+        let direction = basis_to_world(basis_around(point.normal), cosine_hemisphere(uv));
         // A uniform end of the ray makes occlusion fall off linearly with an occluder's distance.
         let end = 1.0 - owen_sobol_2d(sample_idx, hash(key ^ vec2<u32>(SKY_DISTANCE, 0u))).x;
-        var ray = spawn(shading, direction);
-        ray.t_max = min(light.ao_distance * end, NO_LIMIT);
-        return ShadowRay(ray, weight * sky_radiance(light, direction) * shading.base_color, 1u);
+        let t_max = min(light.ao_distance * end, NO_LIMIT);
+        return LightRay(direction, t_max, sky_radiance(light, direction) * point.diffuse);
+    }
+    if light.kind == ENVIRONMENT {
+        return environment_ray(point, light, sample_idx);
     }
     if light.kind == POINT || light.kind == SPOT {
-        return lamp_ray(shading, key, sample_idx);
+        return lamp_ray(point, light, sample_idx);
     }
     var direction = light.direction;
     if light.kind == SUN {
         let uv = owen_sobol_2d(sample_idx, hash(key ^ vec2<u32>(SUN_DIRECTION, 0u)));
         direction = basis_to_world(basis_around(light.direction), uniform_cone(uv, light.cos_max));
     }
-    let cos = max(dot(shading.normal, direction), 0.0);
-    return ShadowRay(spawn(shading, direction), weight * cos * shading.base_color * light.color, 1u);
+    return LightRay(direction, NO_LIMIT, reflected_radiance(point, direction, light.color));
 }
 
-// Returns a ray toward a position on a lamp; it contributes nothing where the lamp does not reach.
-fn lamp_ray(shading: Shading, key: vec2<u32>, sample_idx: u32) -> ShadowRay {
+// Samples an environment by multiple importance sampling: half of the directions follow its luminance, half the cosine,
+// weighted by the balance heuristic (Veach and Guibas 1995).
+fn environment_ray(point: ShadingPointRecord, light: LightRecord, sample_idx: u32) -> LightRay {
+    let uv = owen_sobol_2d(sample_idx, hash(point.key ^ vec2<u32>(ENVIRONMENT_DIRECTION, 0u)));
+    var direction = point.normal;
+    if uv.x < 0.5 {
+        direction = sample_environment(light, vec2<f32>(2.0 * uv.x, uv.y));
+    } else {
+        let local = cosine_hemisphere(vec2<f32>(2.0 * uv.x - 1.0, uv.y));
+        direction = basis_to_world(basis_around(point.normal), local);
+    }
+    let cos = dot(point.normal, direction);
+    if cos <= 0.0 {
+        return LightRay(direction, NO_LIMIT, vec3<f32>(0.0));
+    }
+    let density = 0.5 * environment_density(light, direction) + 0.5 * cos / PI;
+    let contribution = environment_radiance(light, direction) * (cos / PI / density) * point.diffuse;
+    return LightRay(direction, NO_LIMIT, contribution);
+}
+
+fn lamp_ray(point: ShadingPointRecord, light: LightRecord, sample_idx: u32) -> LightRay {
     var lamp = light.position;
     if 0.0 < light.radius {
         // The visible half of the ball appears as a disc that faces the shading point.
-        let dimension = hash(vec2<u32>(PUNCTUAL_LIGHT_POSITION ^ (light.light << 8u), light.light >> 24u));
-        let on_disk = disk(owen_sobol_2d(sample_idx, hash(key ^ dimension)));
-        let toward = shading.position - lamp;
+        let dimension = hash(vec2<u32>(PUNCTUAL_LIGHT_POSITION ^ (light.lamp << 8u), light.lamp >> 24u));
+        let on_disk = disk(owen_sobol_2d(sample_idx, hash(point.key ^ dimension)));
+        let toward = point.position - lamp;
         let squared = dot(toward, toward);
         let axis = select(vec3<f32>(0.0, 0.0, 1.0), toward / sqrt(max(squared, 1e-30)), 1e-30 < squared);
         let basis = basis_around(axis);
         lamp += light.radius * (on_disk.x * basis.tangent + on_disk.y * basis.bitangent);
     }
-    let offset = lamp - shading.position;
+    let offset = lamp - point.position;
     let distance = length(offset);
     let direction = offset / max(distance, 1e-30);
-    let strength = lamp_falloff(light, -direction, distance) / f32(light.n_samples);
-    let cos = max(dot(shading.normal, direction), 0.0);
-    var ray = spawn(shading, direction);
-    ray.t_max = distance - min(light.radius, 0.5 * distance);
-    return ShadowRay(ray, strength * cos * shading.base_color * light.color, 1u);
+    let strength = lamp_falloff(light, -direction, distance);
+    let t_max = distance - min(light.radius, 0.5 * distance);
+    return LightRay(direction, t_max, reflected_radiance(point, direction, strength * light.color));
+}
+
+// Returns the radiance reflected toward the viewer for a light of this strength, zero if it is behind the surface.
+fn reflected_radiance(point: ShadingPointRecord, direction: vec3<f32>, strength: vec3<f32>) -> vec3<f32> {
+    let cos = dot(point.normal, direction);
+    if cos <= 0.0 {
+        return vec3<f32>(0.0);
+    }
+    var reflectance = point.diffuse;
+    if any(point.glossy != vec3<f32>(0.0)) {
+        let middle = direction + point.to_viewer;
+        let squared = dot(middle, middle);
+        let half_vector = select(point.normal, middle / sqrt(max(squared, 1e-30)), 1e-30 < squared);
+        let cos_view = max(dot(point.normal, point.to_viewer), 1e-3);
+        // Unit strength means an irradiance of pi at normal incidence.
+        reflectance +=
+            PI * ggx_specular(cos_view, cos, dot(point.normal, half_vector), point.roughness) * point.glossy;
+    }
+    return cos * reflectance * strength;
 }

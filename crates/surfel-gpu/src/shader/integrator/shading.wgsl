@@ -1,4 +1,4 @@
-// Shading parameters at a hit: the material with the colours of the points applied.
+// Shading parameters at a hit: the material with its textures and the geometry's colours applied.
 
 struct Shading {
     position: vec3<f32>,
@@ -7,29 +7,113 @@ struct Shading {
     // Geometric normal, along which new rays are offset.
     geometric_normal: vec3<f32>,
     base_color: vec3<f32>,
+    alpha: f32,
+    metallic: f32,
+    roughness: f32,
+    ior: f32,
+    transmission: f32,
+    is_thin: bool,
     emission: vec3<f32>,
     is_unlit: bool,
-    radius: f32,
-    surface: u32,
-    // Largest absolute coordinate of the hit and of the ray's origin, which bounds rounding errors.
-    coordinate_magnitude: f32,
+    // Distance by which new rays are offset, and where they begin.
+    spawn_offset: f32,
+    spawn_t_min: f32,
 }
 
 fn shading_at(ray: Ray, hit: HitRecord) -> Shading {
-    let material = materials[hit.material];
-    let color = select(hit.color, vec3<f32>(1.0), material.ignores_vertex_colors == 1u);
-    let base_color = material.base_color * color;
-    return Shading(
+    let material_idx = instances[hit.instance].material;
+    let material = materials[material_idx];
+    let color = select(hit_color(hit), vec3<f32>(1.0), material.ignores_vertex_colors == 1u);
+    var shading = Shading(
         ray_at(ray, hit.distance),
-        faceforward(hit.normal, hit.geometric_normal, ray.direction),
+        hit.normal,
         hit.geometric_normal,
-        base_color,
-        material.emissive + material.emissive_strength * base_color,
+        material.base_color * color,
+        material.alpha * hit.alpha,
+        material.metallic,
+        material.roughness,
+        material.ior,
+        material.transmission,
+        material.is_thin == 1u,
+        material.emissive,
         material.is_unlit == 1u,
-        hit.radius,
-        hit.surface,
-        max(largest(abs(ray_at(ray, hit.distance))), largest(abs(ray.origin))),
+        0.0,
+        0.0,
     );
+    apply_textures(&shading, material_idx, hit);
+    shading.emission += material.emissive_strength * shading.base_color;
+    if material.alpha_mode == ALPHA_MASK {
+        shading.alpha = select(0.0, 1.0, material.alpha_cutoff <= shading.alpha);
+    } else if material.alpha_mode == ALPHA_BLEND {
+        shading.alpha = clamp(shading.alpha, 0.0, 1.0);
+    } else {
+        shading.alpha = 1.0;
+    }
+    shading.normal = faceforward(shading.normal, hit.geometric_normal, ray.direction);
+    set_spawn(&shading, ray, hit);
+    return shading;
+}
+
+// Returns the colour of the geometry, or that of the hit's support.
+fn hit_color(hit: HitRecord) -> vec3<f32> {
+    let first = instances[hit.instance].first_support_color;
+    if first == NONE {
+        return hit.color;
+    }
+    let low = instances[hit.instance].support_low;
+    let range = instances[hit.instance].support_high - low;
+    let above = hit.support_distance - low;
+    var position = 0.5;
+    if range != 0.0 {
+        position = clamp(above / range, 0.0, 1.0);
+    } else if above != 0.0 {
+        position = select(0.0, 1.0, 0.0 < above);
+    }
+    let color = words[first + u32(round(position * f32(N_SUPPORT_COLORS - 1u)))];
+    return vec3<f32>(decode(color & 0xffu), decode((color >> 8u) & 0xffu), decode((color >> 16u) & 0xffu));
+}
+
+fn apply_textures(shading: ptr<function, Shading>, material_idx: u32, hit: HitRecord) {
+    if is_textured(material_idx, BASE_COLOR_TEXTURE, hit) {
+        let texel = sample_texture(materials[material_idx].textures[BASE_COLOR_TEXTURE], hit.uvs, true);
+        (*shading).base_color *= texel.xyz;
+        (*shading).alpha *= texel.w;
+    }
+    if is_textured(material_idx, ROUGHNESS_TEXTURE, hit) {
+        let texel = sample_texture(materials[material_idx].textures[ROUGHNESS_TEXTURE], hit.uvs, false);
+        (*shading).roughness *= texel.y;
+        (*shading).metallic *= texel.z;
+    }
+    if is_textured(material_idx, EMISSIVE_TEXTURE, hit) {
+        let texel = sample_texture(materials[material_idx].textures[EMISSIVE_TEXTURE], hit.uvs, true);
+        (*shading).emission *= texel.xyz;
+    }
+    if is_textured(material_idx, TRANSMISSION_TEXTURE, hit) {
+        let texel = sample_texture(materials[material_idx].textures[TRANSMISSION_TEXTURE], hit.uvs, false);
+        (*shading).transmission *= texel.x;
+    }
+    if is_textured(material_idx, NORMAL_TEXTURE, hit) {
+        let texel = sample_texture(materials[material_idx].textures[NORMAL_TEXTURE], hit.uvs, false);
+        let scale = materials[material_idx].normal_scale;
+        (*shading).normal = normal_mapped(hit, (2.0 * texel.xyz - 1.0) * vec3<f32>(scale, scale, 1.0));
+    }
+}
+
+// Returns the normal of a hit with the tangent-space normal `local` of a normal map applied.
+fn normal_mapped(hit: HitRecord, local: vec3<f32>) -> vec3<f32> {
+    let has_tangent = any(hit.tangent.xyz != vec3<f32>(0.0));
+    let tangent = select(basis_around(hit.normal).tangent, hit.tangent.xyz, has_tangent);
+    let bitangent = hit.tangent.w * cross(hit.normal, tangent);
+    let mapped = local.x * tangent + local.y * bitangent + local.z * hit.normal;
+    let squared = dot(mapped, mapped);
+    return select(hit.normal, mapped / sqrt(max(squared, 1e-30)), 1e-30 < squared);
+}
+
+// Returns true if a material has a texture, and the hit the coordinates for it.
+fn is_textured(material_idx: u32, texture: u32, hit: HitRecord) -> bool {
+    let flags = materials[material_idx].textures[texture].flags;
+    let needed = select(HAS_FIRST_UVS, HAS_SECOND_UVS, (flags & TEXTURE_SECOND_UV_SET) != 0u);
+    return (flags & TEXTURE_IS_PRESENT) != 0u && (instances[hit.instance].attributes & needed) != 0u;
 }
 
 fn largest(vector: vec3<f32>) -> f32 {
@@ -47,25 +131,35 @@ fn faceforward(normal: vec3<f32>, geometric_normal: vec3<f32>, direction: vec3<f
     return select(geometric_normal, tilted / sqrt(max(squared, 1e-30)), 1e-30 < squared);
 }
 
+fn is_solid_dielectric(shading: Shading) -> bool {
+    return 0.0 < shading.transmission && !shading.is_thin;
+}
+
+fn set_spawn(shading: ptr<function, Shading>, ray: Ray, hit: HitRecord) {
+    let position = (*shading).position;
+    if hit.surface == TRIANGLE {
+        // The position is wrong by a few roundings of the coordinates that it was computed from.
+        let coordinates = max(largest(abs(position)), largest(abs(ray.origin)));
+        (*shading).spawn_offset = 32.0 * EPSILON * coordinates;
+        return;
+    }
+    var offset = SOLID_SPAWN_OFFSET;
+    var t_min = 0.0;
+    if hit.surface == SMOOTH {
+        offset = SMOOTH_SPAWN_OFFSET;
+        t_min = SMOOTH_SPAWN_T_MIN;
+    } else if hit.surface != SPHERE && hit.surface != CAPSULE {
+        offset = DISC_SPAWN_OFFSET;
+        t_min = DISC_SPAWN_T_MIN;
+    }
+    (*shading).spawn_offset = offset * hit.radius + 4.0 * EPSILON * largest(abs(position));
+    (*shading).spawn_t_min = t_min * hit.radius;
+}
+
 // Returns a ray in `direction`, offset to that side so that it does not hit the surface again.
 fn spawn(shading: Shading, direction: vec3<f32>) -> Ray {
     let normal = shading.geometric_normal;
     let side = select(-normal, normal, 0.0 <= dot(normal, direction));
-    if shading.surface == TRIANGLE {
-        // The position is wrong by a few roundings of the coordinates that it was computed from.
-        let origin = shading.position + 32.0 * EPSILON * shading.coordinate_magnitude * side;
-        return Ray(origin, 0.0, direction, NO_LIMIT);
-    }
-    let rounding = 4.0 * EPSILON * largest(abs(shading.position));
-    var offset = SOLID_SPAWN_OFFSET;
-    var t_min = 0.0;
-    if shading.surface == SMOOTH {
-        offset = SMOOTH_SPAWN_OFFSET;
-        t_min = SMOOTH_SPAWN_T_MIN;
-    } else if shading.surface != SPHERE && shading.surface != CAPSULE {
-        offset = DISC_SPAWN_OFFSET;
-        t_min = DISC_SPAWN_T_MIN;
-    }
-    let origin = shading.position + (offset * shading.radius + rounding) * side;
-    return Ray(origin, t_min * shading.radius, direction, NO_LIMIT);
+    let origin = shading.position + shading.spawn_offset * side;
+    return Ray(origin, shading.spawn_t_min, direction, NO_LIMIT);
 }

@@ -1,5 +1,6 @@
 // Maps from the unit square to directions, and the stratified points for them.
 
+const PI: f32 = 3.1415927;
 const TAU: f32 = 6.2831855;
 
 // Maps the unit square to the unit disk and preserves areas (concentric map, Shirley and Chiu 1997).

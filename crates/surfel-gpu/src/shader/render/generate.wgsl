@@ -1,4 +1,4 @@
-// The first and the last pass of a sample: camera rays, and the sum over samples.
+// The first passes of a sample: camera rays, and hits that are misses so far.
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn generate(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -6,25 +6,20 @@ fn generate(@builtin(global_invocation_id) id: vec3<u32>) {
     if frame.n_rays <= ray_idx {
         return;
     }
+    if ray_idx == 0u {
+        atomicStore(&counts[FIRST_ADDED + PATHS], frame.n_rays);
+    }
+    if frame.is_first == 1u {
+        for (var i = 0u; i < 8u; i++) {
+            atomicStore(&pixels[ray_idx][i], 0u);
+        }
+    }
+    let key = pixel_key(ray_idx);
     var offset = vec2<f32>(0.5);
     if frame.is_centered == 0u {
-        offset = owen_sobol_2d(frame.sample_idx, pixel_key(ray_idx));
+        offset = owen_sobol_2d(frame.sample_idx, key);
     }
-    let none = vec3<f32>(0.0);
-    rays[ray_idx] = camera_ray(vec2<f32>(pixel_of(ray_idx)) + offset);
-    hits[ray_idx] = HitRecord(none, NO_LIMIT, none, 0.0, none, 0.0, NONE, NONE, 0u, 0u, 0u, 0.0, 0u, 0u);
-    var sum = pixels[ray_idx].sum;
-    if frame.is_first == 1u {
-        sum = vec4<f32>(0.0);
-    }
-    pixels[ray_idx] = Pixel(none, 0.0, sum);
-    atomicAdd(&n_traced[PRIMARY_RAYS], 1u);
-}
-
-@compute @workgroup_size(WORKGROUP_SIZE)
-fn accumulate(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < frame.n_rays {
-        let pixel = pixels[id.x];
-        pixels[id.x].sum = pixel.sum + vec4<f32>(pixel.radiance, pixel.alpha);
-    }
+    let ray = camera_ray(vec2<f32>(pixel_of(ray_idx)) + offset);
+    let one = vec3<f32>(1.0);
+    paths[ray_idx] = Path(ray, one, ray_idx, one, 0.0, vec4<u32>(NONE), key, frame.sample_idx, MISS_BACKGROUND << 16u);
 }

@@ -36,7 +36,7 @@ fn is_opposed(sums: SplatSums, disc: Surfel) -> bool {
 // Adds a disc, which the ray hits at `offset` from its centre.
 fn with_disc(sums: SplatSums, disc: Surfel, offset: vec3<f32>) -> SplatSums {
     let weight = max(1.0 - sqrt(dot(offset, offset)) / disc.radius, 1e-4);
-    let turns = visit.surface == SPLAT && is_opposed(sums, disc);
+    let turns = visits[visit_idx].surface == SPLAT && is_opposed(sums, disc);
     return SplatSums(
         sums.direction,
         sums.nearest,
@@ -51,7 +51,7 @@ fn with_disc(sums: SplatSums, disc: Surfel, offset: vec3<f32>) -> SplatSums {
 fn splat_normal(sums: SplatSums, direction: vec3<f32>) -> vec3<f32> {
     // Opposite normals may cancel in splat-mean; the normal of the nearest disc is then as good as any.
     let normal = normalize_or(sums.normal, sums.nearest);
-    if visit.surface == SPLAT {
+    if visits[visit_idx].surface == SPLAT {
         return clamp_to_visible(normal, direction);
     }
     return flip_to_hemisphere(normal, -direction);

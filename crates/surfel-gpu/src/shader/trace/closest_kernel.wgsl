@@ -1,52 +1,82 @@
-// The pass that merges the hits of rays on one instance into their nearest hits.
+// The pass that merges the hits of rays on the instances of one tree into their nearest hits.
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn closest(@builtin(global_invocation_id) id: vec3<u32>) {
     let ray_idx = id.x;
-    if frame.n_rays <= ray_idx {
+    if atomicLoad(&counts[FIRST_TAKEN + task.queue]) <= ray_idx {
         return;
     }
-    let world_ray = rays[ray_idx];
-    let known = hits[ray_idx];
+    for (var i = 0u; i < task.n_visits; i++) {
+        visit_idx = task.first_visit + i;
+        merge_nearer(ray_idx);
+    }
+}
+
+// Replaces the hit of a ray by a nearer one on the instance.
+fn merge_nearer(ray_idx: u32) {
+    let world_ray = paths[ray_idx].ray;
+    let known_distance = hits[ray_idx].distance;
+    let known_instance = hits[ray_idx].instance;
+    if !may_hit_instance(world_ray, min(world_ray.t_max, known_distance)) {
+        return;
+    }
     let scale = object_scale(world_ray);
     var ray = object_ray(world_ray, scale);
     // Hits as near as the nearest stay, although their distances were rounded. Discs behind the nearest are blended with
     // it, whatever other instances are between them.
-    let limit = scaled_limit(known.distance, scale * (1.0 + 2.0 * EPSILON));
-    ray.t_max = min(ray.t_max, min(limit + visit.max_blend_distance, NO_LIMIT));
+    let limit = scaled_limit(known_distance, scale * (1.0 + 2.0 * EPSILON));
+    ray.t_max = min(ray.t_max, min(limit + visits[visit_idx].max_blend_distance, NO_LIMIT));
     if ray.t_max < ray.t_min {
         return;
     }
     let found = surface_hit(ray);
     let distance = found.distance / scale;
-    let is_nearer = distance < known.distance || distance == known.distance && visit.instance <= known.instance;
+    let is_nearer = distance < known_distance || distance == known_distance && visits[visit_idx].instance <= known_instance;
     if !found.is_hit || !is_nearer {
         return;
     }
-    let normal = world_normal(found.normal);
+    var normal = world_normal(found.normal);
     let geometric_normal = world_normal(found.geometric_normal);
+    // Some programs write normals against the winding order.
+    let is_flipped = dot(normal, geometric_normal) < 0.0;
+    normal = select(normal, -normal, is_flipped);
+    let is_backface = found.is_backface && visits[visit_idx].has_outward_normals == 1u;
     hits[ray_idx] = HitRecord(
-        // Some programs write normals against the winding order.
-        select(normal, -normal, dot(normal, geometric_normal) < 0.0),
+        normal,
         distance,
-        found.color,
-        found.radius * visit.max_scale,
+        found.color.xyz,
+        found.radius * visits[visit_idx].max_scale,
         geometric_normal,
-        0.0,
+        found.color.w,
         found.slot,
-        visit.instance,
-        visit.material,
-        visit.surface,
+        visits[visit_idx].instance,
+        select(0u, 1u, is_backface),
+        visits[visit_idx].surface,
         0u,
         0.0,
-        0u,
-        0u,
+        found.barycentrics,
+        found.uvs,
+        world_tangent(found, normal, is_flipped),
     );
 }
 
+// Returns the unit tangent of a normal map perpendicular to the normal, zero without one, and the sign of the bitangent.
+fn world_tangent(found: SurfaceHit, normal: vec3<f32>, is_flipped: bool) -> vec4<f32> {
+    let world = visits[visit_idx].world_from_object * found.tangent.xyz;
+    let tangent = world - dot(world, normal) * normal;
+    let squared = dot(tangent, tangent);
+    // The bitangent flips where the normal was flipped, as on a back face, and where the transform mirrors.
+    let is_turned = select(found.is_backface, is_flipped, found.has_normal);
+    let side = select(1.0, -1.0, is_turned != (visits[visit_idx].is_mirrored == 1u));
+    if squared <= 1e-30 {
+        return vec4<f32>(0.0, 0.0, 0.0, side);
+    }
+    return vec4<f32>(tangent / sqrt(squared), select(side, -side, found.tangent.w < 0.0));
+}
+
 fn world_normal(normal: vec3<f32>) -> vec3<f32> {
-    if visit.is_identity == 1u {
+    if visits[visit_idx].is_identity == 1u {
         return normal;
     }
-    return normalize(visit.world_from_normal * normal);
+    return normalize(visits[visit_idx].world_from_normal * normal);
 }

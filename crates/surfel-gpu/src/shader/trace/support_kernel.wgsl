@@ -8,14 +8,19 @@ var<private> n_near: u32;
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn support(@builtin(global_invocation_id) id: vec3<u32>) {
     let ray_idx = id.x;
-    if frame.n_rays <= ray_idx {
+    if atomicLoad(&counts[FIRST_TAKEN + task.queue]) <= ray_idx {
         return;
     }
     let hit = hits[ray_idx];
-    if hit.instance != visit.instance || hit.surface != visit.surface {
+    visit_idx = task.first_visit;
+    let end = task.first_visit + task.n_visits;
+    while visit_idx < end && visits[visit_idx].instance != hit.instance {
+        visit_idx += 1u;
+    }
+    if visit_idx == end || hit.surface != visits[visit_idx].surface {
         return;
     }
-    let world_ray = rays[ray_idx];
+    let world_ray = paths[ray_idx].ray;
     let scale = object_scale(world_ray);
     let ray = object_ray(world_ray, scale);
     let point = block_point(load_block(hit.slot >> 3u), hit.slot & 7u, vec3<f32>(0.0));

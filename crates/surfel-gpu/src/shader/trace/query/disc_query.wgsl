@@ -7,7 +7,8 @@ fn splat(ray: Ray) -> SurfaceHit {
     }
     let surfel = slot_surfel(nearest.slot);
     let normal = facing(surfel.normal, ray.direction);
-    return point_hit(nearest.distance, nearest.slot, surfel.radius, normal, surfel.color);
+    let is_backface = 0.0 < dot(surfel.normal, ray.direction);
+    return point_hit(nearest.distance, nearest.slot, surfel.radius, normal, surfel.color, is_backface);
 }
 
 // Returns the number of the discs that make the hit.

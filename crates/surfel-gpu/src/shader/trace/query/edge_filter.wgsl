@@ -5,7 +5,7 @@ fn visit_region_block(block_idx: u32) {
 }
 
 fn accepts_hit(ray: Ray, distance: f32, slot: u32) -> bool {
-    if visit.has_edge_test == 0u {
+    if visits[visit_idx].has_edge_test == 0u {
         return true;
     }
     let surfel = slot_surfel(slot);

@@ -50,7 +50,7 @@ fn finish_with_point(point: Point, slot: u32) {
     if !HAS_COLORS {
         return;
     }
-    if visit.blends_colors == 1u {
+    if visits[visit_idx].blends_colors == 1u {
         colors = with_color(colors, fit, slot_color(slot));
     }
     let squared = dot(point.center, point.center);
@@ -102,7 +102,7 @@ fn find_surface(ray: Ray, disc_distance: f32, disc: Surfel) -> SmoothHit {
 
 // Returns true if the points enclose a hit, and finds its nearest point and its colour.
 fn is_accepted(ray: Ray, distance: f32, normal: vec3<f32>, disc: Surfel) -> bool {
-    if !HAS_COLORS && visit.has_edge_test == 0u {
+    if !HAS_COLORS && visits[visit_idx].has_edge_test == 0u {
         return true;
     }
     let position = ray_at(ray, distance);
@@ -112,7 +112,7 @@ fn is_accepted(ray: Ray, distance: f32, normal: vec3<f32>, disc: Surfel) -> bool
     colors = ColorSums(0.0, vec3<f32>(0.0));
     nearest_squared = NO_LIMIT;
     query_points(FINISH, position, disc.radius);
-    if visit.has_edge_test == 0u {
+    if visits[visit_idx].has_edge_test == 0u {
         return true;
     }
     if sticks_out(overhang) {
@@ -121,7 +121,7 @@ fn is_accepted(ray: Ray, distance: f32, normal: vec3<f32>, disc: Surfel) -> bool
     if is_surrounded(neighborhood, false) && !is_sparse(neighborhood) {
         return true;
     }
-    let radius = visit.edge_retest_factor * disc.radius;
+    let radius = visits[visit_idx].edge_retest_factor * disc.radius;
     return is_enclosed(CandidateHit(position, normal, ray.direction, radius), false);
 }
 

@@ -3,7 +3,6 @@
 fn surface_hit(whole_ray: Ray) -> SurfaceHit {
     var ray = whole_ray;
     var hit = missed_surface();
-    var hit_is_backface = false;
     // The first disc that the ray passed, from its front where front sides are known.
     var passed = NearestHit(NO_LIMIT, NONE);
     for (var n_rejected = 0u; n_rejected < MAX_REJECTED_HITS; n_rejected++) {
@@ -18,12 +17,12 @@ fn surface_hit(whole_ray: Ray) -> SurfaceHit {
         if found.is_hit {
             let of_nearest = slot_surfel(nearest_slot);
             let color = mean_color(colors, of_nearest.color);
-            hit = point_hit(found.distance, nearest_slot, disc.radius, found.normal, color);
-            hit_is_backface = 0.0 < dot(of_nearest.normal, ray.direction);
+            let is_backface = 0.0 < dot(of_nearest.normal, ray.direction);
+            hit = point_hit(found.distance, nearest_slot, disc.radius, found.normal, color, is_backface);
             break;
         }
         let is_front = dot(disc.normal, ray.direction) < 0.0;
-        if passed.slot == NONE && (is_front || visit.has_front_sides == 0u) {
+        if passed.slot == NONE && (is_front || visits[visit_idx].has_front_sides == 0u) {
             passed = nearest;
         }
         let behind = nearest.distance + SMOOTH_RESTART_OFFSET * disc.radius;
@@ -33,9 +32,9 @@ fn surface_hit(whole_ray: Ray) -> SurfaceHit {
         return hit;
     }
     let disc = slot_surfel(passed.slot);
-    if is_through_slit(disc, passed.distance, hit.distance, hit_is_backface, whole_ray) {
+    if is_through_slit(disc, passed.distance, hit.distance, hit.is_backface, whole_ray) {
         let normal = facing(disc.normal, whole_ray.direction);
-        return point_hit(passed.distance, passed.slot, disc.radius, normal, disc.color);
+        return point_hit(passed.distance, passed.slot, disc.radius, normal, disc.color, false);
     }
     return hit;
 }
@@ -52,10 +51,10 @@ fn is_through_slit(
     if hit_distance <= disc_distance + MIN_SLIT_DEPTH * disc.radius {
         return false;
     }
-    if visit.has_front_sides == 1u && hit_is_backface {
+    if visits[visit_idx].has_front_sides == 1u && hit_is_backface {
         return true;
     }
-    if visit.has_edge_test == 0u || abs(dot(disc.normal, ray.direction)) < MIN_SLIT_COSINE {
+    if visits[visit_idx].has_edge_test == 0u || abs(dot(disc.normal, ray.direction)) < MIN_SLIT_COSINE {
         return false;
     }
     let position = ray_at(ray, disc_distance);

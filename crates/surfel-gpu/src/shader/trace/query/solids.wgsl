@@ -13,6 +13,7 @@ fn surface_hit(ray: Ray) -> SurfaceHit {
     }
     let squared = dot(outward, outward);
     outward = select(-ray.direction, outward * inverseSqrt(max(squared, 1e-37)), 1e-37 < squared);
-    let normal = select(-outward, outward, dot(outward, ray.direction) < 0.0);
-    return point_hit(nearest.distance, nearest.slot, surfel.radius, normal, surfel.color);
+    let along = dot(outward, ray.direction);
+    let normal = select(-outward, outward, along < 0.0);
+    return point_hit(nearest.distance, nearest.slot, surfel.radius, normal, surfel.color, 0.0 < along);
 }

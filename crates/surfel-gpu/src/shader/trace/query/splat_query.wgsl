@@ -13,12 +13,9 @@ fn splat(ray: Ray) -> SurfaceHit {
         sums = with_disc(sums, surfel, offset);
     }
     let normal = splat_normal(sums, ray.direction);
-    return point_hit(gathered_distances[0],
-        gathered_slots[0],
-        nearest.radius,
-        normal,
-        sums.color / sums.total_weight,
-    );
+    let color = sums.color / sums.total_weight;
+    let is_backface = 0.0 < dot(nearest.normal, ray.direction);
+    return point_hit(gathered_distances[0], gathered_slots[0], nearest.radius, normal, color, is_backface);
 }
 
 // Returns the number of the discs that make the hit.

@@ -8,7 +8,7 @@ fn surface_hit(first_ray: Ray) -> SurfaceHit {
     var ray = first_ray;
     for (var n_rejected = 0u; n_rejected < MAX_REJECTED_HITS; n_rejected++) {
         let found = splat(ray);
-        if !found.is_hit || visit.has_edge_test == 0u {
+        if !found.is_hit || visits[visit_idx].has_edge_test == 0u {
             return found;
         }
         let position = ray_at(ray, found.distance);

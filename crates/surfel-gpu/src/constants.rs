@@ -1,0 +1,178 @@
+//! The declarations of the constants that the kernels share with Rust.
+
+use crate::numbers::alpha_mode;
+use crate::numbers::attribute;
+use crate::numbers::background;
+use crate::numbers::count;
+use crate::numbers::lens;
+use crate::numbers::light_kind;
+use crate::numbers::miss;
+use crate::numbers::queue;
+use crate::numbers::texture;
+use crate::numbers::{MAX_PLANES, TRIANGLE, WORKGROUP_SIZE, surface_number};
+use surfel_core::bvh::MAX_DEPTH;
+use surfel_core::integrator::constants as integrator;
+use surfel_core::surface::align;
+use surfel_core::surface::capsule;
+use surfel_core::surface::disc;
+use surfel_core::surface::edge_test;
+use surfel_core::surface::smooth;
+use surfel_core::surface::{
+    FIT_REACH, MAX_GATHERED, NEIGHBORHOOD_RADIUS_FACTOR, SOLID_SPAWN_OFFSET, SUPPORT_FACTOR,
+    SurfaceKind,
+};
+use surfel_core::trace::constants as trace;
+
+/// Number of colours by support, from the first to the last.
+pub const N_SUPPORT_COLORS: u32 = 1 << 16;
+
+/// Returns the declarations of the constants that the kernels share with Rust.
+pub fn constants() -> String {
+    let integers = [numbers(), kinds(), limits(), dimensions()].concat();
+    let integers =
+        integers.into_iter().map(|(name, value)| format!("const {name}: u32 = {value}u;\n"));
+    let floats =
+        floats().into_iter().map(|(name, value)| format!("const {name}: f32 = {value:?}f;\n"));
+    integers.chain(floats).collect()
+}
+
+fn kinds() -> Vec<(&'static str, u32)> {
+    let kinds = [
+        ("SPHERE", SurfaceKind::Sphere),
+        ("DISC", SurfaceKind::Disc),
+        ("SPLAT", SurfaceKind::Splat),
+        ("SMOOTH", SurfaceKind::Smooth),
+        ("CAPSULE", SurfaceKind::Capsule),
+    ];
+    kinds.into_iter().map(|(name, kind)| (name, surface_number(kind))).collect()
+}
+
+fn numbers() -> Vec<(&'static str, u32)> {
+    vec![
+        ("PERSPECTIVE", lens::PERSPECTIVE),
+        ("PANORAMA", lens::PANORAMA),
+        ("POINT_SUN", light_kind::POINT_SUN),
+        ("SUN", light_kind::SUN),
+        ("SKY", light_kind::SKY),
+        ("HEADLIGHT", light_kind::HEADLIGHT),
+        ("POINT", light_kind::POINT),
+        ("SPOT", light_kind::SPOT),
+        ("ENVIRONMENT", light_kind::ENVIRONMENT),
+        ("TRIANGLE", TRIANGLE),
+        ("PATHS", queue::PATHS),
+        ("POINTS", queue::POINTS),
+        ("LIGHT_RAYS", queue::LIGHT_RAYS),
+        ("FIRST_ADDED", count::FIRST_ADDED),
+        ("FIRST_TAKEN", count::FIRST_TAKEN),
+        ("FIRST_TRACED", count::FIRST_TRACED),
+        ("N_ACTIVE", count::N_ACTIVE),
+        ("N_COUNTS", count::N_COUNTS),
+        ("BACKGROUND_ENVIRONMENT", background::ENVIRONMENT),
+        ("GRADIENT", background::GRADIENT),
+        ("MISS_BACKGROUND", miss::BACKGROUND),
+        ("MISS_THROUGH_GLASS", miss::THROUGH_GLASS),
+        ("MISS_SKY", miss::SKY),
+        ("MISS_SKY_WITH_SUN", miss::SKY_WITH_SUN),
+        ("ALPHA_MASK", alpha_mode::MASK),
+        ("ALPHA_BLEND", alpha_mode::BLEND),
+        ("BASE_COLOR_TEXTURE", texture::BASE_COLOR),
+        ("ROUGHNESS_TEXTURE", texture::ROUGHNESS),
+        ("NORMAL_TEXTURE", texture::NORMAL),
+        ("EMISSIVE_TEXTURE", texture::EMISSIVE),
+        ("TRANSMISSION_TEXTURE", texture::TRANSMISSION),
+        ("N_TEXTURES", texture::N_TEXTURES as u32),
+        ("TEXTURE_IS_PRESENT", texture::IS_PRESENT),
+        ("TEXTURE_IS_NEAREST", texture::IS_NEAREST),
+        ("TEXTURE_SECOND_UV_SET", texture::SECOND_UV_SET),
+        ("TEXTURE_WRAP_X", texture::WRAP_X),
+        ("TEXTURE_WRAP_Y", texture::WRAP_Y),
+        ("WRAP_MIRRORED", texture::WRAP_MIRRORED),
+        ("WRAP_CLAMP", texture::WRAP_CLAMP),
+        ("HAS_NORMALS", attribute::NORMALS),
+        ("HAS_COLORS_OF_VERTICES", attribute::COLORS),
+        ("HAS_FIRST_UVS", attribute::FIRST_UVS),
+        ("HAS_SECOND_UVS", attribute::SECOND_UVS),
+        ("HAS_TANGENTS", attribute::TANGENTS),
+        ("TANGENTS_OF_SECOND_UVS", attribute::TANGENTS_OF_SECOND_UVS),
+    ]
+}
+
+fn limits() -> Vec<(&'static str, u32)> {
+    vec![
+        ("WORKGROUP_SIZE", WORKGROUP_SIZE),
+        ("MAX_PLANES", MAX_PLANES as u32),
+        ("MAX_DEPTH", MAX_DEPTH as u32),
+        ("MAX_GATHERED", MAX_GATHERED as u32),
+        ("MAX_REJECTED_HITS", trace::MAX_REJECTED_HITS as u32),
+        ("MAX_FITS", trace::MAX_FITS as u32),
+        ("MAX_ALPHA_LAYERS", integrator::MAX_ALPHA_LAYERS),
+        ("MIN_DENSE", edge_test::MIN_DENSE),
+        ("MIN_NEIGHBORS", edge_test::MIN_NEIGHBORS),
+        ("ALBEDO_STEPS", integrator::ALBEDO_STEPS as u32),
+        ("N_ALBEDO_VECTORS", (integrator::ALBEDO_STEPS.pow(2) / 4) as u32),
+        ("N_SUPPORT_COLORS", N_SUPPORT_COLORS),
+    ]
+}
+
+/// Returns the random dimensions, all of which are below 2^32.
+fn dimensions() -> Vec<(&'static str, u32)> {
+    let dimensions = [
+        ("SKY_DIRECTION", integrator::SKY_DIRECTION),
+        ("SKY_DISTANCE", integrator::SKY_DISTANCE),
+        ("SUN_DIRECTION", integrator::SUN_DIRECTION),
+        ("ENVIRONMENT_DIRECTION", integrator::ENVIRONMENT_DIRECTION),
+        ("PUNCTUAL_LIGHT_POSITION", integrator::PUNCTUAL_LIGHT_POSITION),
+        ("LOBE_DIRECTION", integrator::LOBE_DIRECTION),
+        ("ROULETTE", integrator::ROULETTE),
+        ("REFLECTED", integrator::REFLECTED),
+        ("REFRACTED", integrator::REFRACTED),
+        ("ALPHA_LAYER", integrator::ALPHA_LAYER),
+    ];
+    dimensions.into_iter().map(|(name, value)| (name, value as u32)).collect()
+}
+
+fn floats() -> Vec<(&'static str, f32)> {
+    vec![
+        ("CAPSULE_ASPECT", capsule::ASPECT),
+        ("MIN_ALIGNED_COSINE", align::MIN_ALIGNED_COSINE),
+        ("MIN_BENT_COSINE", align::MIN_BENT_COSINE),
+        ("SOLID_SPAWN_OFFSET", SOLID_SPAWN_OFFSET),
+        ("DISC_SPAWN_OFFSET", disc::SPAWN_OFFSET),
+        ("DISC_SPAWN_T_MIN", disc::SPAWN_T_MIN),
+        ("SMOOTH_SPAWN_OFFSET", smooth::SPAWN_OFFSET),
+        ("SMOOTH_SPAWN_T_MIN", smooth::SPAWN_T_MIN),
+        ("NEIGHBORHOOD_RADIUS_FACTOR", NEIGHBORHOOD_RADIUS_FACTOR),
+        ("EDGE_MAX_PLANE_DISTANCE", edge_test::MAX_PLANE_DISTANCE),
+        ("MIN_PASSED_DISTANCE", edge_test::MIN_PASSED_DISTANCE),
+        ("MAX_BACKFACE_COSINE", edge_test::MAX_BACKFACE_COSINE),
+        ("HEIGHT_STEPS", edge_test::HEIGHT_STEPS),
+        ("TIE_BREAK_ANGLE", edge_test::TIE_BREAK_ANGLE),
+        ("RETRY_RADIUS_FACTOR", trace::RETRY_RADIUS_FACTOR),
+        ("RESTART_OFFSET", trace::RESTART_OFFSET),
+        ("SMOOTH_RESTART_OFFSET", trace::SMOOTH_RESTART_OFFSET),
+        ("MIN_SLIT_DEPTH", trace::MIN_SLIT_DEPTH),
+        ("MIN_SLIT_COSINE", trace::MIN_SLIT_COSINE),
+        ("MAX_DISTANCE_FROM_DISC", trace::MAX_DISTANCE_FROM_DISC),
+        ("FIT_TOLERANCE", trace::TOLERANCE),
+        ("MAX_LAST_STEP", trace::MAX_LAST_STEP),
+        ("SUPPORT_FACTOR", SUPPORT_FACTOR),
+        ("FIT_REACH", FIT_REACH),
+        ("FIT_STEPS", smooth::STEPS),
+        ("FIT_MIN_WEIGHT", smooth::MIN_WEIGHT),
+        ("NEAREST_COLOR_WEIGHT", smooth::NEAREST_COLOR_WEIGHT),
+        ("NORMAL_FALLOFF", smooth::NORMAL_FALLOFF),
+        ("MAX_CURVATURE", smooth::MAX_CURVATURE),
+        ("FLAT_SPREAD", smooth::FLAT_SPREAD),
+        ("CURVED_SPREAD", smooth::CURVED_SPREAD),
+        ("FIT_MAX_PLANE_DISTANCE", smooth::MAX_PLANE_DISTANCE),
+        ("MAX_EDGE_COSINE", smooth::MAX_EDGE_COSINE),
+        ("MIN_EDGE_WEIGHT", smooth::MIN_EDGE_WEIGHT),
+        ("MAX_OVERHANG", smooth::MAX_OVERHANG),
+        ("MAX_STEP", smooth::MAX_STEP),
+        ("MIN_FACING_COS", integrator::MIN_FACING_COS),
+        ("MIN_ROUGHNESS", integrator::MIN_ROUGHNESS),
+        ("MIN_WEIGHT", integrator::MIN_WEIGHT),
+        ("MIN_TRANSMITTANCE", integrator::MIN_TRANSMITTANCE),
+        ("MAX_SUN_RADIANCE", integrator::MAX_SUN_RADIANCE),
+    ]
+}

@@ -1,0 +1,262 @@
+//! Timed searches along given rays, for benchmarks.
+
+use crate::device::Gpu;
+use crate::error::{Error, Result};
+use crate::kernels::Kernels;
+use crate::numbers::queue;
+use crate::numbers::ray_kind;
+use crate::numbers::{NO_LIMIT, NONE, WORKGROUP_SIZE};
+use crate::passes::{Pass, Size};
+use crate::records::{FrameRecord, Path, Task, Visit};
+use crate::scene_records::SceneRecords;
+use crate::shader::{Kernel, Surface};
+use crate::tree_visits::lone_visit;
+use crate::unsupported::trees;
+use crate::upload::{GpuTree, Uploads};
+use crate::wavefront::{Capacities, Contents, RECORD_STRIDE, Wavefront, written};
+use bytemuck::Zeroable;
+use std::sync::Arc;
+use std::time::Instant;
+use surfel_core::flat::FlatGeometry;
+use surfel_core::math::Ray;
+use surfel_core::progress::Progress;
+
+/// The question that rays ask.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TimedQuery {
+    /// The nearest disc, sphere or triangle.
+    Nearest,
+    /// Whether there is any disc, sphere or triangle.
+    Any,
+    /// The blend of the discs within a radius behind the nearest.
+    Gather,
+    /// The finished surface, with its edge test, lines and scatter.
+    Surface,
+}
+
+/// The result of timed searches.
+#[derive(Clone, Debug, Default)]
+pub struct RayTimes {
+    /// Seconds of each run: from the command to the end of the device's work, without transfers.
+    pub run_secs: Vec<f64>,
+    /// Seconds in which points or triangles went to the device; 0 if they were there.
+    pub geometry_upload_secs: f64,
+    /// Seconds in which rays went to the device and results came back, for one run.
+    pub ray_transfer_secs: f64,
+    /// Distance to what each ray found; infinite if that is nothing, 0 if it is not asked for.
+    pub distances: Vec<f32>,
+}
+
+/// Maximum number of rays that are traced at once.
+const MAX_RAYS: usize = 1 << 20;
+
+/// Searches to be timed.
+#[derive(Clone, Copy, Debug)]
+pub struct Timing<'a> {
+    /// The points or triangles.
+    pub geometry: &'a Arc<FlatGeometry>,
+    /// The rays in their coordinates.
+    pub rays: &'a [Ray],
+    /// The question.
+    pub query: TimedQuery,
+    /// Number of timed runs.
+    pub n_runs: u32,
+}
+
+/// Times searches. The first run, in which memory is mapped, does not count.
+pub fn time(
+    gpu: &Gpu,
+    kernels: &mut Kernels,
+    uploads: &mut Uploads,
+    timing: Timing,
+    progress: &dyn Progress,
+) -> surfel_core::Result<RayTimes> {
+    let searches = searches(timing.geometry, timing.query);
+    let start = Instant::now();
+    uploads.update(gpu, std::slice::from_ref(timing.geometry))?;
+    let mut times = RayTimes {
+        geometry_upload_secs: start.elapsed().as_secs_f64(),
+        run_secs: vec![0.0; timing.n_runs as usize],
+        ..RayTimes::default()
+    };
+    let tree = |search: &Search| uploads.tree(timing.geometry, search.tree_idx);
+    let is_paged = |search: &Search| tree(search).is_some_and(GpuTree::is_paged);
+    let own = [Kernel::TakeQueue, Kernel::ClearHits].map(|kernel| (kernel, false));
+    let of_trees = searches.iter().map(|search| (search.kernel, is_paged(search)));
+    kernels.compile(gpu, own.into_iter().chain(of_trees))?;
+    let kernels = &*kernels;
+    for rays in timing.rays.chunks(MAX_RAYS) {
+        let chunk = Chunk::new(gpu, kernels, &searches, rays)?;
+        let visits: Vec<Visit> = searches.iter().map(|search| search.visit).collect();
+        let bytes = bytemuck::cast_slice(&visits);
+        let visits = written(gpu, "instances", bytes, wgpu::BufferUsages::STORAGE)?;
+        let groups: Result<Vec<_>> = searches
+            .iter()
+            .filter_map(|search| {
+                let tree = tree(search)?;
+                let group = gpu.catch("a tree", || tree.bind(gpu, kernels, &visits));
+                Some(group.map(|group| (group, tree.is_paged())))
+            })
+            .collect();
+        let groups = groups?;
+        for run in 0..=timing.n_runs {
+            progress.check()?;
+            times.ray_transfer_secs += chunk.reset(gpu)? / f64::from(timing.n_runs + 1);
+            let start = Instant::now();
+            chunk.search(gpu, kernels, &groups)?;
+            if let Some(before) = run.checked_sub(1) {
+                times.run_secs[before as usize] += start.elapsed().as_secs_f64();
+            }
+        }
+        let start = Instant::now();
+        times.distances.extend(chunk.results(gpu, timing.query)?);
+        times.ray_transfer_secs += start.elapsed().as_secs_f64();
+    }
+    Ok(times)
+}
+
+/// A search in one tree.
+struct Search {
+    kernel: Kernel,
+    tree_idx: usize,
+    visit: Visit,
+}
+
+/// Returns the searches that answer a question.
+fn searches(geometry: &FlatGeometry, query: TimedQuery) -> Vec<Search> {
+    let kernel = |surface| match query {
+        TimedQuery::Any => Kernel::Any(surface),
+        _ => Kernel::Closest(surface),
+    };
+    let search = |tree_idx, surface| {
+        let visit = lone_visit(geometry, tree_idx);
+        let has_edge_test = if query == TimedQuery::Surface { visit.has_edge_test } else { 0 };
+        let visit = Visit { has_edge_test, ..visit };
+        Search { kernel: kernel(surface), tree_idx, visit }
+    };
+    let cloud = match geometry {
+        FlatGeometry::Mesh(_) => return vec![search(0, Surface::Triangle)],
+        FlatGeometry::Cloud(cloud) => cloud,
+    };
+    match query {
+        TimedQuery::Surface => {
+            let shown = trees(cloud).into_iter().enumerate();
+            let shown = shown.filter(|(_, (_, points))| !points.nodes.is_empty());
+            let surfaces = shown.filter_map(|(i, (kind, _))| Some((i, Surface::of_kind(kind)?)));
+            surfaces.map(|(i, surface)| search(i, surface)).collect()
+        }
+        TimedQuery::Gather => vec![search(0, Surface::Splat)],
+        _ if cloud.surface.uses_discs() => vec![search(0, Surface::Disc)],
+        _ => vec![search(0, Surface::Sphere)],
+    }
+}
+
+/// Rays on a device.
+struct Chunk {
+    wavefront: Wavefront,
+    paths: Vec<Path>,
+    clear: Vec<Pass>,
+    searches: Vec<Pass>,
+}
+
+impl Chunk {
+    fn new(gpu: &Gpu, kernels: &Kernels, searches: &[Search], rays: &[Ray]) -> Result<Self> {
+        let n = rays.len() as u32;
+        let sizes =
+            Capacities { n_pixels: n, n_entries: n, has_waves: false, is_transmissive: false };
+        let mut tasks = Vec::new();
+        let mut pass = |kernel: Kernel, size, task: Task| {
+            let task_offset = tasks.len() as u32;
+            tasks.extend_from_slice(bytemuck::bytes_of(&task));
+            tasks.resize(task_offset as usize + RECORD_STRIDE as usize, 0);
+            Pass { kernel, tree: None, task_offset, size, is_of_light: false }
+        };
+        let mut clear = Vec::new();
+        for queue in [queue::PATHS, queue::LIGHT_RAYS] {
+            let task = Task { queue, ray_kind: ray_kind::UNCOUNTED, ..Task::default() };
+            clear.push(pass(Kernel::TakeQueue, Size::One, task));
+        }
+        clear.push(pass(Kernel::ClearHits, Size::Pixels, Task::default()));
+        let searches = searches.iter().zip(0..).map(|(search, first_visit)| {
+            let task = Task { first_visit, n_visits: 1, ..Task::default() };
+            pass(search.kernel, Size::Pixels, task)
+        });
+        let searches = searches.collect();
+        let records = SceneRecords::empty();
+        let words = written(gpu, "textures", &[0; 4], wgpu::BufferUsages::STORAGE)?;
+        let contents = Contents { scene: &records, words: &words, tasks: &tasks };
+        let wavefront = Wavefront::new(gpu, kernels, sizes, contents)?;
+        wavefront.set_frame(gpu, &FrameRecord { n_rays: n, capacity: n, ..Zeroable::zeroed() });
+        let path = |ray: &Ray| Path {
+            ray: Ray { t_max: ray.t_max.min(NO_LIMIT), ..*ray },
+            state: 1,
+            ..Zeroable::zeroed()
+        };
+        Ok(Self { wavefront, paths: rays.iter().map(path).collect(), clear, searches })
+    }
+
+    /// Uploads the rays, which have found nothing yet; returns the seconds that this took.
+    fn reset(&self, gpu: &Gpu) -> Result<f64> {
+        let start = Instant::now();
+        self.wavefront.write_paths(gpu, &self.paths);
+        self.wavefront.fill_queues(gpu, self.paths.len() as u32);
+        gpu.queue.submit([]);
+        gpu.wait()?;
+        Ok(start.elapsed().as_secs_f64())
+    }
+
+    /// Searches along all rays and waits for the end.
+    fn search(
+        &self,
+        gpu: &Gpu,
+        kernels: &Kernels,
+        trees: &[(wgpu::BindGroup, bool)],
+    ) -> Result<()> {
+        let n_groups = (self.paths.len() as u32).div_ceil(WORKGROUP_SIZE);
+        gpu.catch("the passes", || {
+            let description = wgpu::CommandEncoderDescriptor::default();
+            let mut encoder = gpu.device.create_command_encoder(&description);
+            {
+                let description = wgpu::ComputePassDescriptor::default();
+                let mut encoder = encoder.begin_compute_pass(&description);
+                let searches = self.searches.iter().zip(trees);
+                let clear = self.clear.iter().map(|pass| (pass, None));
+                for (pass, tree) in clear.chain(searches.map(|(pass, tree)| (pass, Some(tree)))) {
+                    let (resources, is_paged) = match tree {
+                        Some((group, is_paged)) => (group, *is_paged),
+                        None => (&self.wavefront.dispatches, false),
+                    };
+                    encoder.set_pipeline(kernels.get(pass.kernel, is_paged));
+                    encoder.set_bind_group(0, &self.wavefront.uniforms, &[pass.task_offset]);
+                    encoder.set_bind_group(1, &self.wavefront.paths[0], &[]);
+                    encoder.set_bind_group(2, resources, &[]);
+                    let n_groups = if pass.size == Size::One { 1 } else { n_groups };
+                    encoder.dispatch_workgroups(n_groups, 1, 1);
+                }
+            }
+            gpu.queue.submit([encoder.finish()]);
+        })?;
+        gpu.wait()
+    }
+
+    fn results(&self, gpu: &Gpu, query: TimedQuery) -> Result<Vec<f32>> {
+        let n = self.paths.len() as u32;
+        let found = |is_hit, distance| if is_hit { distance } else { f32::INFINITY };
+        if query == TimedQuery::Any {
+            let paths = self.wavefront.read_paths(gpu, n)?;
+            return Ok(paths.iter().map(|path| found(path.state == 0, 0.0)).collect());
+        }
+        let hits = self.wavefront.read_hits(gpu, n)?;
+        Ok(hits.iter().map(|hit| found(hit.instance != NONE, hit.distance)).collect())
+    }
+}
+
+/// Returns an error if a question about a geometry has no kernel.
+pub fn check(gpu: &Gpu, geometry: &FlatGeometry, query: TimedQuery) -> Result<()> {
+    let FlatGeometry::Cloud(cloud) = geometry else { return Ok(()) };
+    if query != TimedQuery::Surface || Surface::of_kind(cloud.surface).is_some() {
+        return Ok(());
+    }
+    let reason = format!("the GPU does not render the surface {} yet", cloud.surface.name());
+    Err(Error::Device { device: gpu.info.name.clone(), reason })
+}

@@ -1,0 +1,85 @@
+//! Texels, environment maps and colours by support in one array on a device, kept from picture to picture.
+
+use crate::device::Gpu;
+use crate::error::Result;
+use crate::scene_records::{WordOffsets, append_words};
+use crate::upload::{array, write};
+use std::sync::Arc;
+use surfel_core::flat::{FlatGeometry, FlatScene};
+use surfel_core::scene::Light;
+use surfel_core::scene::color::SupportColors;
+
+/// The words of a scene in a device's memory.
+#[derive(Debug)]
+pub struct SceneWords {
+    source: Source,
+    /// The array.
+    pub buffer: wgpu::Buffer,
+    /// The places of textures and the like in it.
+    pub offsets: WordOffsets,
+}
+
+/// The addresses of pictures that are alive, and the colours by support of geometries.
+#[derive(Debug, Default, PartialEq)]
+struct Source {
+    pictures: Vec<Picture>,
+    support_colors: Vec<Option<SupportColors>>,
+}
+
+/// A picture, kept alive so that its address stays its own.
+#[derive(Debug, Clone)]
+enum Picture {
+    Texture(Arc<[[u8; 4]]>),
+    Environment(Box<surfel_core::scene::Environment>),
+}
+
+impl PartialEq for Picture {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Texture(a), Self::Texture(b)) => Arc::ptr_eq(a, b),
+            (Self::Environment(a), Self::Environment(b)) => {
+                std::ptr::eq(a.arrays().pixels, b.arrays().pixels)
+            }
+            _ => false,
+        }
+    }
+}
+
+impl Source {
+    fn new(scene: &FlatScene) -> Self {
+        let textures =
+            scene.textures.iter().map(|texture| Picture::Texture(texture.texels.clone()));
+        let environments = scene.lights.iter().filter_map(|light| match light {
+            Light::Environment(environment) => {
+                Some(Picture::Environment(Box::new(environment.clone())))
+            }
+            _ => None,
+        });
+        let support_colors = scene.geometries.iter().map(|geometry| match &**geometry {
+            FlatGeometry::Cloud(cloud) => cloud.support_colors,
+            FlatGeometry::Mesh(_) => None,
+        });
+        Self {
+            pictures: textures.chain(environments).collect(),
+            support_colors: support_colors.collect(),
+        }
+    }
+}
+
+impl SceneWords {
+    /// Returns the words of a scene: `known` if they are the same.
+    ///
+    /// # Errors
+    /// Fails if they are too many for the device.
+    pub fn update(known: Option<Self>, gpu: &Gpu, scene: &FlatScene) -> Result<Self> {
+        let source = Source::new(scene);
+        if let Some(known) = known.filter(|known| known.source == source) {
+            return Ok(known);
+        }
+        let mut words = Vec::new();
+        let offsets = append_words(scene, &mut words);
+        let buffer = array(gpu, "textures", 4 * words.len())?;
+        write(gpu, &buffer, bytemuck::cast_slice(&words))?;
+        Ok(Self { source, buffer, offsets })
+    }
+}
