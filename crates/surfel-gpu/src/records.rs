@@ -9,7 +9,7 @@ use bytemuck::{Pod, Zeroable};
 pub struct FrameRecord {
     /// Position of the camera.
     pub position: [f32; 3],
-    /// Number of the camera's [`lens`].
+    /// Number of the camera's [`lens`](crate::numbers::lens).
     pub lens: u32,
     /// Unit direction of the view.
     pub forward: [f32; 3],
@@ -45,7 +45,7 @@ pub struct FrameRecord {
     pub capacity: u32,
     /// Linear colour of the background at the top of the picture.
     pub background_top: [f32; 3],
-    /// Number of the [`background`].
+    /// Number of the [`background`](crate::numbers::background).
     pub background: u32,
     /// Linear colour of the background at the bottom of the picture.
     pub background_bottom: [f32; 3],
@@ -83,7 +83,7 @@ pub struct Visit {
     pub reserved_a: u32,
     /// 1 if object and world coordinates are the same.
     pub is_identity: u32,
-    /// Number of the surface kind, as [`surface_number`] gives it.
+    /// Number of the surface kind, as [`surface_number`](crate::numbers::surface_number) gives it.
     pub surface: u32,
     /// Largest scale factor along the object's axes.
     pub max_scale: f32,
@@ -99,7 +99,7 @@ pub struct Visit {
     pub blends_colors: u32,
     /// Vectors of four words that a block of triangles takes with the attributes of its vertices.
     pub block_vectors: u32,
-    /// The [`attribute`]s of the vertices of triangles.
+    /// The [`attribute`](crate::numbers::attribute)s of the vertices of triangles.
     pub attributes: u32,
     /// Zero.
     pub reserved_e: u32,
@@ -130,9 +130,9 @@ pub struct Task {
     pub sample_idx: u32,
     /// Maximum number of samples of the light at a hit.
     pub max_samples: u32,
-    /// Number of the [`queue`].
+    /// Number of the [`queue`](crate::numbers::queue).
     pub queue: u32,
-    /// Number of the [`ray_kind`] of the rays in the queue.
+    /// Number of the [`ray_kind`](crate::numbers::ray_kind) of the rays in the queue.
     pub ray_kind: u32,
     /// Index of the first [`Visit`].
     pub first_visit: u32,
@@ -149,7 +149,7 @@ pub struct LightRecord {
     /// Unit vector toward the sun or a sky's zenith, or in which a spot shines; to the right of the middle of an
     /// environment map.
     pub direction: [f32; 3],
-    /// Number of the [`light_kind`].
+    /// Number of the [`light_kind`](crate::numbers::light_kind).
     pub kind: u32,
     /// Linear colour of a sun, a headlight or a lamp, or radiance from a sky's zenith; unit vector to the middle of an
     /// environment map.
@@ -170,7 +170,7 @@ pub struct LightRecord {
     pub outer_cos: f32,
     /// Distance that a lamp reaches.
     pub range: f32,
-    /// Index of a lamp among the lamps, [`NONE`] for other lights.
+    /// Index of a lamp among the lamps, [`NONE`](crate::numbers::NONE) for other lights.
     pub lamp: u32,
     /// Width and height of an environment map.
     pub size: [u32; 2],
@@ -220,13 +220,13 @@ pub struct MaterialRecord {
     pub emissive_strength: f32,
     /// Colour of white light after `attenuation_distance` inside of the body.
     pub attenuation_color: [f32; 3],
-    /// Distance in object units, [`NO_LIMIT`] if nothing is absorbed.
+    /// Distance in object units, [`NO_LIMIT`](crate::numbers::NO_LIMIT) if nothing is absorbed.
     pub attenuation_distance: f32,
     /// 1 if the surface shows its base colour whatever the light.
     pub is_unlit: u32,
     /// Opacity from 0 to 1.
     pub alpha: f32,
-    /// Number of the [`alpha_mode`].
+    /// Number of the [`alpha_mode`](crate::numbers::alpha_mode).
     pub alpha_mode: u32,
     /// Opacity below which a mask cuts the surface out.
     pub alpha_cutoff: f32,
@@ -264,9 +264,9 @@ pub struct InstanceRecord {
     pub max_scale: f32,
     /// 1 if normals point out of the body, so that a back face is seen from inside.
     pub has_outward_normals: u32,
-    /// The [`attribute`]s of the vertices of triangles.
+    /// The [`attribute`](crate::numbers::attribute)s of the vertices of triangles.
     pub attributes: u32,
-    /// Index of the first word of the colours by support, [`NONE`] without them.
+    /// Index of the first word of the colours by support, [`NONE`](crate::numbers::NONE) without them.
     pub first_support_color: u32,
     /// Distance in radii of the first colour.
     pub support_low: f32,
@@ -298,7 +298,7 @@ pub struct HitRecord {
     pub alpha: f32,
     /// Slot of the point or triangle in its tree.
     pub slot: u32,
-    /// Index of the instance, [`NONE`] for a miss.
+    /// Index of the instance, [`NONE`](crate::numbers::NONE) for a miss.
     pub instance: u32,
     /// 1 if the ray hits the back of the surface, as far as its orientation is known.
     pub is_backface: u32,
@@ -336,8 +336,8 @@ pub struct Path {
     pub key: [u32; 2],
     /// Index of the path among those with the same random key.
     pub index: u32,
-    /// Depth, number of alpha-blended layers and [`miss`], from the lowest bits; of a ray toward a light 1 until it is
-    /// done.
+    /// Depth, number of alpha-blended layers and [`miss`](crate::numbers::miss), from the lowest bits; of a ray toward a
+    /// light 1 until it is done.
     pub state: u32,
 }
 
