@@ -42,8 +42,8 @@ mod tests {
     #[test]
     fn objects_in_memory_that_the_start_lacks_are_added() {
         let content = || MemoryContent::Points(Arc::new(PointCloud::default()));
-        let mut startup = SceneDescription::default();
-        startup.objects = vec![object("a.ply"), object("memory-b")];
+        let objects = vec![object("a.ply"), object("memory-b")];
+        let mut startup = SceneDescription { objects, ..SceneDescription::default() };
         startup.memory.insert("memory-b", content());
         assert_eq!(first_added(&startup, &startup), 2);
         let mut more = startup.clone();

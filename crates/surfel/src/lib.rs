@@ -80,6 +80,7 @@ pub mod prepare;
 mod scene_keys;
 mod added_objects;
 mod point_overlap;
+mod thread_pools;
 pub mod live_view;
 pub mod live_scene;
 pub mod live_film;

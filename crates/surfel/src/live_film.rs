@@ -43,7 +43,7 @@ pub fn film(
     let image = image_options(description, view.flat.origin);
     let options = MovieOptions { n_frames, image, ..movie_options(description) };
     let mut movie = Movie::open(output, &options, false)?;
-    let moves_objects = scene.loaded().duration_secs() > 0.0;
+    let moves_objects = 0.0 < scene.loaded().duration_secs();
     progress.begin("film", u64::from(n_frames));
     for frame in 0..n_frames {
         let time_secs = f64::from(frame) / options.fps;

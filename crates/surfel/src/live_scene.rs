@@ -5,7 +5,7 @@ use crate::built_scene::{exposure_stops, planes_before, source_indices};
 use crate::cache::Lru2;
 use crate::crs::Unit;
 use crate::description::{Exposure, Interior, SceneDescription};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::live_view::{LiveView, SceneTrees};
 use crate::picture::RenderedImage;
 use crate::point_overlap::check_overlap;
@@ -15,6 +15,7 @@ use crate::resolve::{
     expose, finish_graph, hide_walls, render_settings,
 };
 use crate::scene_keys::{grouping_key, preparation_key, tree_key};
+use crate::thread_pools::{lower_priority, start_threads};
 use rayon::ThreadPool;
 use std::sync::{Arc, OnceLock};
 use surfel_core::flat::FlatScene;
@@ -25,7 +26,6 @@ use surfel_core::progress::Progress;
 use surfel_core::render::{self, RenderRegion, RenderStats, Renderer, Settings};
 use surfel_core::scene::{Background, Camera, ClipPlane, Projection, Scene};
 use surfel_core::trace::Simd;
-use thread_priority::ThreadPriority;
 
 /// A loaded scene that is shown under one description after another. Threads share it.
 #[derive(Debug)]
@@ -376,20 +376,6 @@ fn build(
 
 /// The parts of files that are kept: the viewer shows all columns of a point, which is told by its index.
 const KEEP: KeepOptions = KeepOptions { all_columns: true, source_indices: true };
-
-/// Starts as many threads as the current pool has; each begins with `start`.
-fn start_threads(start: fn(usize)) -> Result<ThreadPool> {
-    let n_threads = rayon::current_num_threads();
-    let threads =
-        rayon::ThreadPoolBuilder::new().num_threads(n_threads).start_handler(start).build();
-    let advice = "the threads cannot be started; ask for fewer with --threads";
-    threads.map_err(|error| Error::Unfit(format!("{advice}: {error}")))
-}
-
-/// Gives the current thread the processor time that others leave. A system that denies this shares time evenly.
-fn lower_priority() {
-    let _ = ThreadPriority::Min.set_for_current();
-}
 
 /// A camera for trees that nobody looks at yet.
 const PLACEHOLDER_CAMERA: Camera = Camera {
