@@ -187,7 +187,7 @@ fn the_scale_of_a_cloud_does_not_matter() {
 fn kd_trees_of_bad_clouds_have_bounded_size() {
     for (name, cloud) in bad_clouds::bad_clouds() {
         let n = cloud.len();
-        let rays = bad_clouds::rays_toward(&cloud, 3);
+        let rays = bad_clouds::rays_toward(&cloud, 20);
         let mut flat = bad_clouds::flat(cloud, KIND);
         for has_sides in [false, true] {
             flat.field = FieldTree::new(&flat.points, has_sides, &NoProgress).unwrap().into();

@@ -141,7 +141,7 @@ fn the_scale_of_a_cloud_does_not_matter() {
 fn octrees_of_bad_clouds_have_bounded_size_and_depth() {
     for (name, cloud) in bad_clouds::bad_clouds() {
         let n = cloud.len();
-        let rays = bad_clouds::rays_toward(&cloud, 8);
+        let rays = bad_clouds::rays_toward(&cloud, 20);
         for (kind, depth) in KINDS
             .into_iter()
             .flat_map(|kind| [OctreeDepth::Auto, OctreeDepth::Levels(6)].map(|depth| (kind, depth)))

@@ -74,8 +74,10 @@ impl<'t> KdWalk<'t> {
                     }
                     KdChild::Split { axis, at, first_child } => {
                         let crossing = (at - self.origin[axis]) * self.inverse[axis];
-                        let near = first_child + u32::from(self.inverse[axis] < 0.0);
-                        let far = first_child + u32::from(0.0 <= self.inverse[axis]);
+                        // The children differ for NaN, too: each node is visited once at most.
+                        let is_upper_near = self.inverse[axis] < 0.0;
+                        let near = first_child + u32::from(is_upper_near);
+                        let far = first_child + u32::from(!is_upper_near);
                         if crossing <= enter {
                             node_idx = far;
                         } else if leave <= crossing {
