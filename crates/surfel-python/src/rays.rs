@@ -72,17 +72,17 @@ impl<'py> RayArray<'py> {
     }
 
     /// Puts answers into the order of the array.
-    pub fn restored<T: Copy + Default + Send + Sync>(&self, answers: Vec<T>) -> Vec<T> {
+    pub fn restored<T: Copy + Send>(&self, mut answers: Vec<T>) -> Vec<T> {
         let Some(order) = &self.order else { return answers };
-        let mut restored = vec![T::default(); answers.len()];
-        let n = order.row.len();
-        let rows = restored.par_chunks_mut(n).zip(answers.par_chunks(n));
-        rows.for_each(|(restored, answers)| {
-            for (pixel, answer) in order.of_row(answers.len()).iter().zip(answers) {
-                restored[*pixel as usize] = *answer;
+        // In place, row by row of tiles, so that no second copy of the columns is held.
+        answers.par_chunks_mut(order.row.len()).for_each_init(Vec::new, |ordered, row| {
+            ordered.clear();
+            ordered.extend_from_slice(row);
+            for (pixel, answer) in order.of_row(row.len()).iter().zip(ordered.iter()) {
+                row[*pixel as usize] = *answer;
             }
         });
-        restored
+        answers
     }
 }
 
