@@ -17,9 +17,8 @@ pub use query::gather::gathers;
 pub use query::hit::{Gather, Hit};
 pub use query::splat_query::{Splat, splats};
 pub use query::support::Support;
-pub use query::surface::{
-    SurfaceHit, implicit_hits_by_discs, occlusions, surface_hits, surface_hits_at,
-};
+pub use query::surface::{implicit_hits_by_discs, occlusions, surface_hits, surface_hits_at};
+pub use query::surface_hit::SurfaceHit;
 pub use scene::instance_filter::InstanceFilter;
 pub use scene::scene_hit::SceneHit;
 pub use scene::scene_query::{scene_hits, scene_occlusions};

@@ -8,7 +8,7 @@ use surfel_core::image::Image;
 use surfel_core::math::Vec3;
 use surfel_core::progress::NoProgress;
 use surfel_core::render::{CpuRenderer, Renderer, Settings};
-use surfel_core::scene::Background;
+use surfel_core::scene::{Background, Geometry, Scene};
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
 use surfel_formats::{Alpha, ImageOptions, save_image};
@@ -39,21 +39,28 @@ pub fn write_figures(folder: &Path) {
         (13, &head, SurfaceKind::SplatFit),
     ];
     for (number, subject, kind) in figures {
-        save(folder, &format!("figure-{number:02}"), &picture(subject, kind));
+        save(folder, &format!("figure-{number:02}"), &picture(&scene(subject, kind)));
     }
+    let mut without_distance = scene(&bunny, SurfaceKind::Disc);
+    let clouds = without_distance.graph.geometries.iter_mut();
+    for geometry in clouds {
+        if let Geometry::Points(cloud) = geometry {
+            cloud.options.min_distance = Some(0.0);
+        }
+    }
+    save(folder, "figure-04", &picture(&without_distance));
 }
 
 /// Writes a picture of each kind, as `kind-NAME.jpg`.
 pub fn write_kinds(folder: &Path, subject: &Subject) {
     for (name, kind) in SurfaceKind::ALL {
-        save(folder, &format!("kind-{name}"), &picture(subject, kind));
+        save(folder, &format!("kind-{name}"), &picture(&scene(subject, kind)));
     }
 }
 
-fn picture(subject: &Subject, kind: SurfaceKind) -> Image {
-    let mut scene = scene(subject, kind);
-    scene.background = Background::Gradient { top: Vec3::ONE, bottom: Vec3::ONE };
-    let flat = FlatScene::new(&scene, &NoProgress).unwrap();
+fn picture(scene: &Scene) -> Image {
+    let mut flat = FlatScene::new(scene, &NoProgress).unwrap();
+    flat.background = Background::Gradient { top: Vec3::ONE, bottom: Vec3::ONE };
     let settings = Settings { samples_per_pixel: 4, ..settings(SIZE) };
     CpuRenderer { simd: Simd::detect() }.render(&flat, &settings, &NoProgress).unwrap().0
 }

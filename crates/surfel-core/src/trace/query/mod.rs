@@ -23,4 +23,6 @@ pub mod packet_field;
 pub mod field_query;
 pub mod octree_query;
 pub mod support;
+pub mod surface_hit;
+pub mod smooth_hits;
 pub mod surface;

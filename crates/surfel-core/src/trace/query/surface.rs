@@ -1,14 +1,11 @@
 //! The continuous surface of a cloud: blended discs without the hits that the edge test rejects, or spheres.
 
-use crate::flat::{FlatCloud, FlatPoints, Slot};
-use crate::math::{Lanes, PACKET_WIDTH, PacketLanes, Ray, Vec3};
-use crate::surface::{
-    CandidateHit, Capsule, Disc, EdgeTest, EdgeTestResult, Sphere, SurfaceKind, Surfel, capsule,
-};
+use crate::flat::{FlatCloud, FlatPoints};
+use crate::math::{Lanes, Ray};
+use crate::surface::{Capsule, Disc, EdgeTest, Sphere, SurfaceKind, Surfel, capsule};
 use crate::trace::query::any::{AcceptAll, any_accepted_hit, any_hits_kernel};
-use crate::trace::query::closest::{closest_hits_kernel, closest_shapes};
+use crate::trace::query::closest::closest_shapes;
 use crate::trace::query::edge_filter::EdgeFilter;
-use crate::trace::query::edge_test::evaluate_one;
 use crate::trace::query::field_query::{DiscSearch, FieldSearch, KdSearch, field_hits};
 use crate::trace::query::hit::Hit;
 use crate::trace::query::leaf::LeafGeometry;
@@ -16,67 +13,15 @@ use crate::trace::query::mls_surface::{MlsHit, mls_hits};
 use crate::trace::query::octree_query::{CellHit, cell_color, octree_hits};
 use crate::trace::query::ray_field::FieldHit;
 use crate::trace::query::smooth_filter::SmoothFilter;
-use crate::trace::query::smooth_query::SmoothTracer;
+use crate::trace::query::smooth_hits::trace_smooth;
 use crate::trace::query::splat_query::{Splat, SplatTracer};
 use crate::trace::query::support::support;
-use crate::trace::simd::packet_rays::PacketRays;
+use crate::trace::query::surface_hit::{MAX_REJECTED_HITS, SurfaceHit};
 use crate::trace::simd::{Simd, dispatch_simd};
 use crate::trace::traversal::octree_walk::PixelSize;
 
-/// The hit of a ray on the surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfaceHit {
-    /// Distance along the ray, infinite if nothing was hit.
-    pub distance: f32,
-    /// Index of the nearest point in its cloud.
-    pub id: u32,
-    /// Slot of that point in the tree of its kind of surface.
-    pub slot: Slot,
-    /// Radius of that point, in object space.
-    pub radius: f32,
-    /// Unit normal, facing the ray's origin.
-    pub normal: Vec3,
-    /// Linear colour.
-    pub color: Vec3,
-    /// The kind of the surface there.
-    pub surface: SurfaceKind,
-    /// True if that point's own normal faces away from the ray's origin: the ray hits its back.
-    pub is_backface: bool,
-}
-
-impl SurfaceHit {
-    /// The result of a ray that hits nothing.
-    pub const MISS: Self = Self {
-        distance: f32::INFINITY,
-        id: u32::MAX,
-        slot: 0,
-        radius: 0.0,
-        normal: Vec3::ZERO,
-        color: Vec3::ZERO,
-        surface: SurfaceKind::Points,
-        is_backface: false,
-    };
-
-    /// True if nothing was hit.
-    pub fn is_miss(&self) -> bool {
-        self.id == u32::MAX
-    }
-}
-
-/// Maximum number of rejected hits of a ray. A ray with more runs along a rim, where each step is tiny, and
-/// is taken to miss.
-pub const MAX_REJECTED_HITS: usize = 48;
 /// Distance behind a rejected hit at which the search restarts, in radii.
 pub const RESTART_OFFSET: f32 = 0.05;
-/// Distance behind a disc without a smooth surface nearby at which the search restarts, in radii.
-pub const SMOOTH_RESTART_OFFSET: f32 = 0.002;
-/// Minimum distance between a disc and what a ray hits behind it, in radii of the disc, at which the ray has come through
-/// a slit. Nearer back faces are those of thin sheets.
-pub const MIN_SLIT_DEPTH: f32 = 3.0;
-/// Minimum cosine between a ray through a slit and the normal of the disc there. Beside a silhouette rays pass discs more
-/// from their side: without this limit six times as much background was covered around the head.
-pub const MIN_SLIT_COSINE: f32 = 0.5;
-
 /// Finds the closest hit of each ray on the continuous surface.
 pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
     surface_hits_at(cloud, simd, PixelSize::ZERO, rays, hits);
@@ -225,34 +170,42 @@ pub fn occlusions(cloud: &FlatCloud, simd: Simd, rays: &[Ray], occluded: &mut [b
 fn occlusions_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [bool]) {
     if cloud.points.nodes.is_empty() {
         occluded.fill(false);
-    } else if cloud.surface == SurfaceKind::Smooth {
-        any_accepted_hit::<L, Disc, _>(&cloud.points, rays, SmoothFilter(cloud), occluded);
-    } else if cloud.surface == SurfaceKind::Implicit {
-        let mut hits = vec![FieldHit::MISS; rays.len()];
-        field_hits::<L, KdSearch, false>(cloud, rays, &mut hits);
-        occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.hit.is_miss());
-    } else if cloud.surface == SurfaceKind::Octree {
-        octree_occlusions::<L, true>(cloud, rays, occluded);
-    } else if cloud.surface == SurfaceKind::OctreeSplat {
-        octree_occlusions::<L, false>(cloud, rays, occluded);
-    } else if cloud.surface == SurfaceKind::Mls {
-        let mut hits = vec![MlsHit::MISS; rays.len()];
-        mls_hits::<L, false>(cloud, rays, &mut hits);
-        occluded
-            .iter_mut()
-            .zip(&hits)
-            .for_each(|(occluded, found)| *occluded = !found.hit.is_miss());
-    } else if cloud.surface == SurfaceKind::Cylinder {
-        let mut hits = vec![SurfaceHit::MISS; rays.len()];
-        splat_hits::<L>(cloud, rays, &mut hits);
-        occluded.iter_mut().zip(&hits).for_each(|(occluded, hit)| *occluded = !hit.is_miss());
-    } else if !cloud.surface.uses_discs() || cloud.edge_test == EdgeTest::Off {
-        any_hits_kernel::<L>(cloud, rays, occluded);
     } else {
-        any_accepted_hit::<L, Disc, _>(&cloud.points, rays, EdgeFilter(cloud), occluded);
+        surface_occlusions::<L>(cloud, rays, occluded);
     }
     merge_occlusions::<L, Capsule>(&cloud.lines, rays, occluded);
     merge_occlusions::<L, Sphere>(&cloud.scatter, rays, occluded);
+}
+
+/// Finds out for each ray whether the surface of a cloud that has one lies in its range.
+#[inline(always)]
+fn surface_occlusions<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [bool]) {
+    match cloud.surface {
+        SurfaceKind::Smooth => {
+            any_accepted_hit::<L, Disc, _>(&cloud.points, rays, SmoothFilter(cloud), occluded);
+        }
+        SurfaceKind::Implicit => {
+            let mut hits = vec![FieldHit::MISS; rays.len()];
+            field_hits::<L, KdSearch, false>(cloud, rays, &mut hits);
+            occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.hit.is_miss());
+        }
+        SurfaceKind::Octree => octree_occlusions::<L, true>(cloud, rays, occluded),
+        SurfaceKind::OctreeSplat => octree_occlusions::<L, false>(cloud, rays, occluded),
+        SurfaceKind::Mls => {
+            let mut hits = vec![MlsHit::MISS; rays.len()];
+            mls_hits::<L, false>(cloud, rays, &mut hits);
+            occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.hit.is_miss());
+        }
+        SurfaceKind::Cylinder => {
+            let mut hits = vec![SurfaceHit::MISS; rays.len()];
+            splat_hits::<L>(cloud, rays, &mut hits);
+            occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.is_miss());
+        }
+        kind if kind.uses_discs() && cloud.edge_test != EdgeTest::Off => {
+            any_accepted_hit::<L, Disc, _>(&cloud.points, rays, EdgeFilter(cloud), occluded);
+        }
+        _ => any_hits_kernel::<L>(cloud, rays, occluded),
+    }
 }
 
 /// Replaces hits by nearer ones on the spheres or capsules of `points`.
@@ -336,119 +289,6 @@ fn trace_mls<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit])
             is_backface: 0.0 < cloud.points.normal(nearest.slot).dot(ray.direction),
         };
     }
-}
-
-/// Traces all rays together until each hits the smooth surface, or hits no more discs.
-#[inline(always)]
-fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
-    let mut searching: Vec<u32> = (0..rays.len() as u32).collect();
-    let all_rays = rays;
-    let mut rays = rays.to_vec();
-    let mut nearest = vec![Hit::MISS; rays.len()];
-    let mut tracer = SmoothTracer::new(cloud);
-    // The first disc that each ray passed, from its front where front sides are known.
-    let mut passed = vec![Hit::MISS; rays.len()];
-    for _ in 0..MAX_REJECTED_HITS {
-        let nearest = &mut nearest[..rays.len()];
-        closest_hits_kernel::<L>(cloud, &rays, nearest);
-        let mut n_candidates = 0;
-        for i in 0..nearest.len() {
-            if !nearest[i].is_miss() {
-                (rays[n_candidates], nearest[n_candidates]) = (rays[i], nearest[i]);
-                searching[n_candidates] = searching[i];
-                n_candidates += 1;
-            }
-        }
-        let mut n_left = 0;
-        for first in (0..n_candidates).step_by(PACKET_WIDTH) {
-            let packet = first..n_candidates.min(first + PACKET_WIDTH);
-            let (mut slots, mut distances) = ([0; PACKET_WIDTH], [0.0; PACKET_WIDTH]);
-            for (lane, hit) in nearest[packet.clone()].iter().enumerate() {
-                (slots[lane], distances[lane]) = (hit.slot, hit.distance);
-            }
-            // The surface may lie before a disc, and even before the discs that were rejected.
-            let mut whole_rays = [all_rays[0]; PACKET_WIDTH];
-            for (ray, ray_idx) in whole_rays.iter_mut().zip(&searching[packet.clone()]) {
-                *ray = all_rays[*ray_idx as usize];
-            }
-            let packet_rays = PacketRays::<L::PacketLanes>::new(&whole_rays);
-            let lanes = (1 << packet.len()) - 1;
-            let disc_distances = L::PacketLanes::load(&distances);
-            let found = tracer.trace::<L>(&packet_rays, lanes, disc_distances, &slots);
-            let (found_distances, [r, g, b]) =
-                (found.distances.store(), found.colors.store_packet());
-            let [x, y, z] = found.normals.store_packet();
-            let nearest_slots = found.slots.store().map(f32::to_bits);
-            for lane in 0..packet.len() {
-                let (ray, ray_idx) = (rays[first + lane], searching[first + lane]);
-                let radius = cloud.points.radius(slots[lane]);
-                if found.lanes >> lane & 1 == 1 {
-                    let slot = nearest_slots[lane];
-                    hits[ray_idx as usize] = SurfaceHit {
-                        distance: found_distances[lane],
-                        id: cloud.points.id(slot),
-                        slot,
-                        radius,
-                        normal: Vec3::new(x[lane], y[lane], z[lane]),
-                        color: Vec3::new(r[lane], g[lane], b[lane]),
-                        surface: cloud.surface,
-                        is_backface: 0.0 < cloud.points.normal(slot).dot(ray.direction),
-                    };
-                    continue;
-                }
-                let is_front = cloud.points.normal(slots[lane]).dot(ray.direction) < 0.0;
-                let first = &mut passed[ray_idx as usize];
-                if first.is_miss() && (is_front || !cloud.has_front_sides) {
-                    *first = Hit { distance: distances[lane], slot: slots[lane] };
-                }
-                let behind = distances[lane] + SMOOTH_RESTART_OFFSET * radius;
-                let t_min = behind.max(distances[lane] * (1.0 + 2.0 * f32::EPSILON));
-                (rays[n_left], searching[n_left]) = (Ray { t_min, ..ray }, ray_idx);
-                n_left += 1;
-            }
-        }
-        rays.truncate(n_left);
-        if rays.is_empty() {
-            break;
-        }
-    }
-    for ((disc, hit), ray) in passed.iter().zip(hits).zip(all_rays) {
-        if !disc.is_miss() && is_through_slit::<L>(cloud, disc, hit, ray) {
-            let Surfel { normal, radius, color, .. } = cloud.points.surfel(disc.slot);
-            let normal = if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
-            *hit = SurfaceHit {
-                distance: disc.distance,
-                id: cloud.points.id(disc.slot),
-                slot: disc.slot,
-                radius,
-                normal,
-                color,
-                surface: cloud.surface,
-                is_backface: false,
-            };
-        }
-    }
-}
-
-/// Returns true if a ray went through a slit between the points around `disc`, which it passed before `hit` or a miss: it
-/// hits a back face, or sees points all around and the disc not from its side, as in a corner whose points leave a gap.
-#[inline(always)]
-fn is_through_slit<L: Lanes>(cloud: &FlatCloud, disc: &Hit, hit: &SurfaceHit, ray: &Ray) -> bool {
-    let Surfel { normal, radius, .. } = cloud.points.surfel(disc.slot);
-    if hit.distance <= disc.distance + MIN_SLIT_DEPTH * radius {
-        return false;
-    }
-    if cloud.has_front_sides && hit.is_backface {
-        return true;
-    }
-    let around_ray = CandidateHit { normal: -ray.direction, direction: ray.direction, radius };
-    if cloud.edge_test == EdgeTest::Off || normal.dot(ray.direction).abs() < MIN_SLIT_COSINE {
-        return false;
-    }
-    let position = ray.at(disc.distance);
-    let EdgeTestResult { enclosed, sparse } =
-        evaluate_one::<L, false>(&cloud.points, position, around_ray);
-    enclosed & !sparse != 0
 }
 
 /// Traces all rays together until each has a hit within the edge of the surface, or hits nothing more.

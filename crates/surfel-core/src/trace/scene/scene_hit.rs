@@ -4,7 +4,7 @@ use crate::flat::{FlatCloud, FlatMesh, Instance, Slot};
 use crate::math::{Ray, Vec3, Vec4};
 use crate::surface::{SurfaceKind, triangle};
 use crate::trace::query::hit::Hit;
-use crate::trace::query::surface::SurfaceHit;
+use crate::trace::query::surface_hit::SurfaceHit;
 
 /// The hit of a ray on a scene, in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
