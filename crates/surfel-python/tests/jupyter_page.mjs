@@ -34,9 +34,6 @@ try {
     return new Set(new Uint32Array(copy.getImageData(0, 0, picture.width, picture.height).data.buffer)).size;
   });
   const parents = await frame.evaluate(() => [...location.ancestorOrigins]);
-  // JupyterLab may ask whether to build extensions of other packages.
-  const cancel = page.getByRole('button', { name: 'Cancel' });
-  if (await cancel.isVisible()) await cancel.click();
   await element.scrollIntoViewIfNeeded();
   await page.screenshot({ path: screenshot });
   console.log(JSON.stringify({ parents, address: frame.url(), nColors }));
