@@ -315,7 +315,7 @@ mod tests {
             ("a.xyz", &b""[..]),
             ("a.xyz", b"not a number\n"),
             ("a.laz", b"LASF but nothing else"),
-            ("a.what", b"1 2 3"),
+            ("a.what", b"some words"),
             ("a.zip", b"PK\x03\x04"),
             ("a.obj", b"v 0 0 0\nf 1 2 3\n"),
             ("a.gltf", b"{}"),

@@ -82,6 +82,7 @@ fn json_has_its_keys_in_order() {
     let result = bench(&[&cloud, "--resolution", "40x30", "--simd", "portable"]);
     let first = ["rays", "build_s", "bytes_per_point", "peak_rss_bytes", "threads", "simd"];
     assert_eq!(keys(&result)[..6], first);
+    assert_eq!(result["backend"], "cpu");
     assert_eq!(keys(&result["bytes_per_point"]), ["tree", "points", "total"]);
     assert_eq!(keys(&result["rays"]), ["primary", "shadow", "bounce-any", "bounce", "gather"]);
     let row =

@@ -268,7 +268,7 @@ mod tests {
             let mut description = SceneDescription::default();
             description.sun.azimuth = azimuth;
             let chosen = choose_lights(&description, &context, &NoProgress);
-            (chosen.light.light.unwrap_or_default(), chosen.sun.azimuth)
+            (chosen.light.light.unwrap_or_default(), chosen.sun.azimuth.map(f64::round))
         };
         let from_camera = vec![LightKind::Sky, LightKind::Headlight];
         let outdoors = vec![LightKind::Sun, LightKind::Sky];
