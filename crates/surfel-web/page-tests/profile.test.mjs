@@ -2,7 +2,8 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { borders, chartOf, csvOf, levelLength, nearestPoint, positionsOf, svgOf } from '../page/profile.js';
+import { borders, chartOf, levelLength, nearestPoint, positionsOf } from '../page/profile.js';
+import { csvOf, svgOf } from '../page/profile-files.js';
 
 const up = [0, 0, 1];
 const [east, north] = [484000, 6632000];

@@ -3,7 +3,6 @@
 import { copyButton } from './copy.js';
 import { download, element, iconButton } from './dom.js';
 import { exact, rounded, stemOf, withUnit } from './format.js';
-import { geoJson } from './geojson.js';
 import { KINDS, circleThrough, corner, middle, pathLength, resultsOf } from './measure.js';
 import { borders } from './profile.js';
 import { signal } from './signal.js';
@@ -138,7 +137,8 @@ export class MeasureTool {
     this.figuresShown();
   }
 
-  #download() {
+  async #download() {
+    const { geoJson } = await import('./geojson.js');
     const { info } = this.viewer;
     const content = geoJson(this.#finished, info);
     download(new Blob([JSON.stringify(content, null, 1)], { type: 'application/geo+json' }), `${stemOf(info.name)}-measurements.geojson`);

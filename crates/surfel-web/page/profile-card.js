@@ -2,7 +2,7 @@
 
 import { download, element, iconButton } from './dom.js';
 import { count, rounded, stemOf, withUnit } from './format.js';
-import { chartOf, csvOf, levelLength, nearestPoint, positionsOf, svgOf } from './profile.js';
+import { chartOf, levelLength, nearestPoint, positionsOf } from './profile.js';
 import { showToast } from './toast.js';
 
 const POINT_SIZE = 2;
@@ -129,7 +129,8 @@ export class ProfileCard {
     this.overlay.redraw();
   }
 
-  #download(format) {
+  async #download(format) {
+    const { csvOf, svgOf } = await import('./profile-files.js');
     if (!this.#profile) return;
     const { info } = this.viewer;
     const contents = {

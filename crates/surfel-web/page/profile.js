@@ -1,13 +1,12 @@
-// Height profiles: places of their points in the world, their chart, and their points as CSV and SVG.
+// Height profiles: places of their points in the world, and their chart.
 
-import { rounded, ticks } from './format.js';
+import { ticks } from './format.js';
 import { addScaled, cross, dot, length, normalize, subtract } from './vector.js';
 
-const MARGIN = { left: 64, right: 14, top: 12, bottom: 28 };
+/** Pixels about the chart, for its labels. */
+export const MARGIN = { left: 64, right: 14, top: 12, bottom: 28 };
 /** Part of the chart's height that stays free above and below the points. */
 const FREE_HEIGHT = 0.06;
-/** Step of coordinates in files as a fraction of the line's length. */
-const COORDINATE_STEP = 1e-5;
 const [TICK_DISTANCE_X, TICK_DISTANCE_Y] = [90, 36];
 
 /** World positions of the points of a profile along the line of `points`. */
@@ -64,44 +63,6 @@ export function chartOf(profile, lineLength, { width, height }) {
     /** Digits of a tick's label, so that neighbours differ. */
     digits: Math.max(5, Math.ceil(Math.log10(Math.max(Math.abs(low), Math.abs(high), 1e-9) / range)) + 4),
   };
-}
-
-/** The points of a profile as comma-separated values, with a line of names. Coordinates have the decimals that the line's length makes sensible. */
-export function csvOf(profile, points, up) {
-  const positions = positionsOf(profile, points, up);
-  const nDecimals = Math.min(12, Math.max(0, Math.ceil(-Math.log10(COORDINATE_STEP * levelLength(points, up)))));
-  const rows = profile.distances.map((distance, i) => {
-    const position = positions[i].map((value) => Number(value.toFixed(nDecimals)));
-    return [distance, profile.offsets[i], profile.heights[i], ...position, ...profile.colors[i]].join(',');
-  });
-  return `distance,offset,height,x,y,z,red,green,blue\n${rows.join('\n')}\n`;
-}
-
-/** The chart of a profile as the text of an SVG file. */
-export function svgOf(profile, chart, unit) {
-  const { width, height, x, y } = chart;
-  const short = (value) => value.toFixed(1);
-  const text = (label, at, anchor) => `<text x="${short(at.x)}" y="${short(at.y)}" text-anchor="${anchor}">${label}</text>`;
-  const line = (from, to) => `<path d="M${short(from.x)} ${short(from.y)}L${short(to.x)} ${short(to.y)}"/>`;
-  const [left, right, bottom] = [MARGIN.left, width - MARGIN.right, height - MARGIN.bottom];
-  const grid = [
-    ...chart.xTicks.map((tick) => line({ x: x(tick), y: MARGIN.top }, { x: x(tick), y: bottom })),
-    ...chart.yTicks.map((tick) => line({ x: left, y: y(tick) }, { x: right, y: y(tick) })),
-  ];
-  const labels = [
-    ...chart.xTicks.map((tick) => text(rounded(tick), { x: x(tick), y: bottom + 16 }, 'middle')),
-    ...chart.yTicks.map((tick) => text(rounded(tick, chart.digits), { x: left - 6, y: y(tick) + 4 }, 'end')),
-    text(unit ?? '', { x: right, y: bottom + 26 }, 'end'),
-  ];
-  const dots = profile.distances.map((distance, i) =>
-    `<circle cx="${short(x(distance))}" cy="${short(y(profile.heights[i]))}" r="0.9" fill="rgb(${profile.colors[i].join(' ')})"/>`);
-  return `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" font-family="sans-serif" font-size="11">
-<rect width="100%" height="100%" fill="#fff"/>
-<g stroke="#ddd" fill="none">${grid.join('')}</g>
-${dots.join('\n')}
-<g fill="#333">${labels.join('')}</g>
-</svg>
-`;
 }
 
 /** Index of the point of a profile that is drawn next to a pixel, within this many pixels; -1 if there is none. */
