@@ -99,6 +99,7 @@ def start_lab(folder):
     raise AssertionError((folder / "lab.log").read_text())
 
 
+@pytest.mark.skipif("SURFEL_JUPYTERLAB" not in os.environ, reason="JupyterLab is started if SURFEL_JUPYTERLAB is set")
 def test_the_page_is_in_a_cell_of_jupyterlab(hill, tmp_path):
     for package in ("jupyterlab", "anywidget", "nbformat", "ipykernel"):
         pytest.importorskip(package)
