@@ -1,30 +1,18 @@
 //! The field of weighted planes: known answers, both of its searches, its kd-tree, and clouds that are hard on it.
 
 use crate::bad_clouds;
+use crate::rays::{hits, rays_from_above};
 use surfel_core::flat::{FieldTree, FlatCloud};
 use surfel_core::math::{Ray, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::NoProgress;
 use surfel_core::scene::CloudGeometry;
 use surfel_core::surface::SurfaceKind;
-use surfel_core::trace::{Simd, SurfaceHit, implicit_hits_by_discs, occlusions, surface_hits};
+use surfel_core::trace::{Simd, SurfaceHit, implicit_hits_by_discs, occlusions};
 use surfel_tests::clouds;
 use surfel_tests::scenes;
 
 const KIND: SurfaceKind = SurfaceKind::Implicit;
-
-fn hits(flat: &FlatCloud, rays: &[Ray]) -> Vec<SurfaceHit> {
-    let mut hits = vec![SurfaceHit::MISS; rays.len()];
-    surface_hits(flat, Simd::detect(), rays, &mut hits);
-    hits
-}
-
-/// Returns parallel rays along -Z through the points of a square grid.
-fn rays_from_above(half_side: f32, n_side: usize) -> Vec<Ray> {
-    let at = |i: usize| half_side * ((2 * i + 1) as f32 / n_side as f32 - 1.0);
-    let origins = (0..n_side * n_side).map(|i| Vec3::new(at(i % n_side), at(i / n_side), 5.0));
-    origins.map(|origin| Ray::new(origin, Vec3::NEG_Z)).collect()
-}
 
 #[test]
 fn a_sphere_has_its_depth_and_its_normals() {
@@ -164,23 +152,6 @@ fn what_a_camera_ray_hits_also_occludes_it() {
     occlusions(&flat, Simd::detect(), &rays, &mut occluded);
     let is_hit: Vec<bool> = hits(&flat, &rays).iter().map(|hit| !hit.is_miss()).collect();
     assert_eq!(is_hit, occluded);
-}
-
-#[test]
-fn the_scale_of_a_cloud_does_not_matter() {
-    let rays = rays_from_above(0.65, 40);
-    for scale in [1e-6, 1.0, 1e6] {
-        let mut cloud = clouds::sphere(2000, 1.0);
-        cloud.positions.iter_mut().for_each(|position| *position *= scale);
-        let flat = scenes::flat(cloud, KIND);
-        let scaled: Vec<Ray> =
-            rays.iter().map(|ray| Ray { origin: scale * ray.origin, ..*ray }).collect();
-        for (ray, hit) in rays.iter().zip(hits(&flat, &scaled)) {
-            let height = (1.0 - ray.origin.truncate().length_squared()).sqrt();
-            let distance = hit.distance / scale;
-            assert!((distance - (5.0 - height)).abs() < 0.02, "{scale}: {ray:?} {hit:?}");
-        }
-    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Surfaces of the methods that the thesis compares itself with: known answers, holes, and one surface for rays of all
 //! kinds.
 
+use crate::rays::{hits, rays_from_above};
 use surfel_core::flat::FlatCloud;
 use surfel_core::math::{Ray, Vec3};
 use surfel_core::points::PointCloud;
@@ -12,24 +13,11 @@ use surfel_tests::scenes;
 
 const KINDS: [SurfaceKind; 2] = [SurfaceKind::Cylinder, SurfaceKind::Mls];
 
-fn hits(flat: &FlatCloud, rays: &[Ray]) -> Vec<SurfaceHit> {
-    let mut hits = vec![SurfaceHit::MISS; rays.len()];
-    surface_hits(flat, Simd::detect(), rays, &mut hits);
-    hits
-}
-
 /// Returns a cloud with these options.
 fn flat_with(cloud: PointCloud, kind: SurfaceKind, options: SurfaceOptions) -> FlatCloud {
     let mut points = scenes::points(cloud, kind);
     points.options = options;
     FlatCloud::new(&points, &NoProgress).unwrap()
-}
-
-/// Returns parallel rays along -Z through the points of a square grid.
-fn rays_from_above(half_side: f32, n_side: usize) -> Vec<Ray> {
-    let at = |i: usize| half_side * ((2 * i + 1) as f32 / n_side as f32 - 1.0);
-    let origins = (0..n_side * n_side).map(|i| Vec3::new(at(i % n_side), at(i / n_side), 5.0));
-    origins.map(|origin| Ray::new(origin, Vec3::NEG_Z)).collect()
 }
 
 /// Returns a copy whose normals have random signs.

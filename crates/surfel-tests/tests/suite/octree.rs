@@ -1,28 +1,16 @@
 //! Octrees whose cells hold the surface: known answers, depths, and clouds that are hard on them.
 
 use crate::bad_clouds;
+use crate::rays::{hits, rays_from_above};
 use surfel_core::flat::{FlatCloud, Octree, OctreeOptions};
 use surfel_core::math::{Ray, Vec3};
 use surfel_core::progress::NoProgress;
 use surfel_core::surface::{OctreeDepth, SurfaceKind};
-use surfel_core::trace::{Simd, SurfaceHit, occlusions, surface_hits};
+use surfel_core::trace::{Simd, SurfaceHit, occlusions};
 use surfel_tests::clouds;
 use surfel_tests::scenes;
 
 const KINDS: [SurfaceKind; 2] = [SurfaceKind::Octree, SurfaceKind::OctreeSplat];
-
-fn hits(flat: &FlatCloud, rays: &[Ray]) -> Vec<SurfaceHit> {
-    let mut hits = vec![SurfaceHit::MISS; rays.len()];
-    surface_hits(flat, Simd::detect(), rays, &mut hits);
-    hits
-}
-
-/// Returns parallel rays along -Z through the points of a square grid.
-fn rays_from_above(half_side: f32, n_side: usize) -> Vec<Ray> {
-    let at = |i: usize| half_side * ((2 * i + 1) as f32 / n_side as f32 - 1.0);
-    let origins = (0..n_side * n_side).map(|i| Vec3::new(at(i % n_side), at(i / n_side), 5.0));
-    origins.map(|origin| Ray::new(origin, Vec3::NEG_Z)).collect()
-}
 
 #[test]
 fn a_sphere_has_its_depth_and_its_normals() {
@@ -116,23 +104,6 @@ fn a_given_depth_gives_cells_of_that_size() {
             let error = errors.fold(0.0, f32::max);
             assert!(error < 0.7 * last_error, "{kind:?} at depth {depth}: {error}");
             last_error = error;
-        }
-    }
-}
-
-#[test]
-fn the_scale_of_a_cloud_does_not_matter() {
-    let rays = rays_from_above(0.65, 40);
-    for (kind, scale) in KINDS.into_iter().flat_map(|kind| [1e-6, 1e6].map(|scale| (kind, scale))) {
-        let mut cloud = clouds::sphere(2000, 1.0);
-        cloud.positions.iter_mut().for_each(|position| *position *= scale);
-        let flat = scenes::flat(cloud, kind);
-        let scaled: Vec<Ray> =
-            rays.iter().map(|ray| Ray { origin: scale * ray.origin, ..*ray }).collect();
-        for (ray, hit) in rays.iter().zip(hits(&flat, &scaled)) {
-            let height = (1.0 - ray.origin.truncate().length_squared()).sqrt();
-            let distance = hit.distance / scale;
-            assert!((distance - (5.0 - height)).abs() < 0.02, "{kind:?} {scale}: {ray:?} {hit:?}");
         }
     }
 }

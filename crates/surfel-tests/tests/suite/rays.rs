@@ -4,7 +4,7 @@ use crate::brute_force::BruteForce;
 use surfel_core::bvh::BvhNode;
 use surfel_core::flat::FlatCloud;
 use surfel_core::math::{Aabb, Basis, LANES, Random, Ray, Vec3};
-use surfel_core::trace::Hit;
+use surfel_core::trace::{Hit, Simd, SurfaceHit, surface_hits};
 
 /// The number of rays that make a packet.
 pub const TILE: usize = 16;
@@ -12,6 +12,20 @@ pub const TILE: usize = 16;
 /// Returns the decoded centres of all points, in the order of their slots.
 pub fn centers(scene: &FlatCloud) -> Vec<Vec3> {
     scene.points.slots().map(|slot| scene.points.center(slot)).collect()
+}
+
+/// Returns parallel rays along -Z through the points of a square grid, from a height of 5.
+pub fn rays_from_above(half_side: f32, n_side: usize) -> Vec<Ray> {
+    let at = |i: usize| half_side * ((2 * i + 1) as f32 / n_side as f32 - 1.0);
+    let origins = (0..n_side * n_side).map(|i| Vec3::new(at(i % n_side), at(i / n_side), 5.0));
+    origins.map(|origin| Ray::new(origin, Vec3::NEG_Z)).collect()
+}
+
+/// Returns the hits of rays on the surface of a cloud.
+pub fn hits(scene: &FlatCloud, rays: &[Ray]) -> Vec<SurfaceHit> {
+    let mut hits = vec![SurfaceHit::MISS; rays.len()];
+    surface_hits(scene, Simd::detect(), rays, &mut hits);
+    hits
 }
 
 /// Returns camera rays through tiles of four by four pixels, each tile about a point.

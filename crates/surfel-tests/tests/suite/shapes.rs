@@ -1,25 +1,13 @@
 //! Shapes with closed forms: the position, normals and edges of the surface that points of them make.
 
+use crate::rays::{hits, rays_from_above};
 use surfel_core::flat::FlatCloud;
 use surfel_core::math::{Ray, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::surface::{EdgeTest, SurfaceKind};
-use surfel_core::trace::{self, Simd, SurfaceHit};
+use surfel_core::trace::SurfaceHit;
 use surfel_tests::clouds;
 use surfel_tests::scenes;
-
-fn hits(scene: &FlatCloud, rays: &[Ray]) -> Vec<SurfaceHit> {
-    let mut hits = vec![SurfaceHit::MISS; rays.len()];
-    trace::surface_hits(scene, Simd::detect(), rays, &mut hits);
-    hits
-}
-
-/// Returns parallel rays along -Z through the points of a square grid.
-fn rays_from_above(half_side: f32, n_side: usize) -> Vec<Ray> {
-    let at = |i: usize| half_side * ((2 * i + 1) as f32 / n_side as f32 - 1.0);
-    let origins = (0..n_side * n_side).map(|i| Vec3::new(at(i % n_side), at(i / n_side), 5.0));
-    origins.map(|origin| Ray::new(origin, Vec3::NEG_Z)).collect()
-}
 
 /// A sphere of 20,000 points of radius 1 has spacing 0.025 and disc radius 0.05.
 #[test]
@@ -182,4 +170,22 @@ fn small_radii_leave_no_holes_if_discs_overlap() {
     let rays = rays_from_above(0.9, 150);
     let holes = hits(&scene, &rays).iter().filter(|hit| hit.is_miss()).count();
     assert_eq!(holes, 0, "of {}", rays.len());
+}
+
+#[test]
+fn the_scale_of_a_cloud_does_not_matter() {
+    let rays = rays_from_above(0.65, 40);
+    let kinds = [SurfaceKind::Implicit, SurfaceKind::Octree, SurfaceKind::OctreeSplat];
+    for (kind, scale) in kinds.into_iter().flat_map(|kind| [1e-6, 1.0, 1e6].map(|s| (kind, s))) {
+        let mut cloud = clouds::sphere(2000, 1.0);
+        cloud.positions.iter_mut().for_each(|position| *position *= scale);
+        let flat = scenes::flat(cloud, kind);
+        let scaled: Vec<Ray> =
+            rays.iter().map(|ray| Ray { origin: scale * ray.origin, ..*ray }).collect();
+        for (ray, hit) in rays.iter().zip(hits(&flat, &scaled)) {
+            let height = (1.0 - ray.origin.truncate().length_squared()).sqrt();
+            let distance = hit.distance / scale;
+            assert!((distance - (5.0 - height)).abs() < 0.02, "{kind:?} {scale}: {ray:?} {hit:?}");
+        }
+    }
 }

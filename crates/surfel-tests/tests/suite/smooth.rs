@@ -1,20 +1,15 @@
 //! The smooth surface: its depth and normals where these are known, and one surface for rays of all kinds.
 
+use crate::rays::hits;
 use surfel_core::flat::FlatCloud;
 use surfel_core::math::{Ray, Vec3};
 use surfel_core::points::{PointCloud, Preparation, prepare};
 use surfel_core::progress::NoProgress;
 use surfel_core::scene::CloudGeometry;
 use surfel_core::surface::SurfaceKind;
-use surfel_core::trace::{Simd, SurfaceHit, occlusions, surface_hits};
+use surfel_core::trace::{Simd, SurfaceHit, occlusions};
 use surfel_tests::clouds;
 use surfel_tests::scenes;
-
-fn hits(flat: &FlatCloud, rays: &[Ray]) -> Vec<SurfaceHit> {
-    let mut hits = vec![SurfaceHit::MISS; rays.len()];
-    surface_hits(flat, Simd::detect(), rays, &mut hits);
-    hits
-}
 
 #[test]
 fn a_sphere_of_points_has_the_depth_and_the_normals_of_a_sphere() {
