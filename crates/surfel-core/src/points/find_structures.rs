@@ -5,6 +5,7 @@
 //! surround the point. Where they lie in no plane, a plane through at least half of them still makes a surface: an
 //! edge (after Demantké et al., Dimensionality Based Scale Selection in 3D Lidar Point Clouds, 2011).
 
+use super::above_land::is_above_land;
 use super::edge_planes::{MIN_PLANE_FRACTION, plane_of_side};
 use super::junctions::join_to_surfaces;
 use super::neighbors::{KdTree, Neighbor, Neighborhood};
@@ -15,6 +16,7 @@ use super::solids::{ball_radius, clamp_solids, settle};
 use super::stray_points::limit_stray_points;
 use super::structure::{PointShape, Structure, StructureReport, is_line, is_surface};
 use super::typical::{SPARSE, Typical};
+use super::up::is_mostly_land;
 use super::wide_discs::{limit_crowded_discs, narrow_lone_discs};
 use crate::error::Result;
 use crate::math::Vec3;
@@ -65,15 +67,19 @@ pub fn find_structures(
     let positions = tree.positions();
     progress.begin("structure", positions.len() as u64);
     let typical = Typical::of(fits, radii);
+    let is_land = is_mostly_land(positions);
     let decide = |point: usize| {
         if point.is_multiple_of(4096) {
             progress.check()?;
             progress.advance(4096.min(positions.len() - point) as u64);
         }
-        Ok(decide(tree, point, &fits[point], radii[point], &typical))
+        Ok(decide(tree, point, &fits[point], radii[point], &typical, is_land))
     };
-    let mut shapes: Vec<PointShape> =
+    let decided: Vec<Decision> =
         (0..positions.len()).into_par_iter().map(decide).collect::<Result<_>>()?;
+    let above_land: Vec<usize> =
+        (0..decided.len()).filter(|point| decided[*point].is_above_land).collect();
+    let mut shapes: Vec<PointShape> = decided.into_iter().map(|decision| decision.shape).collect();
     join_to_surfaces(tree, typical.noise(), &mut shapes, progress)?;
     let widened = widen_lines(positions, &mut shapes, progress)?;
     for (shape, fit) in shapes.iter_mut().zip(fits) {
@@ -82,7 +88,8 @@ pub fn find_structures(
         }
     }
     let n_rough = fits.par_iter().filter(|fit| !is_line(fit) && !is_surface(fit)).count();
-    let structures = smoothed(tree, &shapes, voters, n_rough, typical.radius, progress)?;
+    let mut structures = smoothed(tree, &shapes, voters, n_rough, typical.radius, progress)?;
+    above_land.iter().for_each(|point| structures[*point] = Structure::Scatter);
     let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
         settle(tree, point, radii[point], *structure, shape);
     };
@@ -128,6 +135,14 @@ pub fn all_scattered(
     Ok((shapes, report))
 }
 
+/// The shape of a point by its nearest neighbours alone.
+struct Decision {
+    shape: PointShape,
+    /// True for a point above land, as of a low plant. Around it the ground has most of the points, whose vote would make
+    /// a surface of it.
+    is_above_land: bool,
+}
+
 /// Decides about a point by its nearest neighbours alone.
 fn decide(
     tree: &KdTree,
@@ -135,10 +150,14 @@ fn decide(
     fit: &PlaneFit,
     radius: f32,
     typical: &Typical,
-) -> PointShape {
+    is_land: bool,
+) -> Decision {
     /// Below this variation the mean plane is as good as that of an edge's side.
     const MIN_EDGE_VARIATION: f32 = 0.012;
-    let shape = |structure, normal| PointShape { structure, normal, radius };
+    let shape = |structure, normal| Decision {
+        shape: PointShape { structure, normal, radius },
+        is_above_land: false,
+    };
     if is_line(fit) {
         return shape(Structure::Line, fit.normal);
     }
@@ -159,6 +178,9 @@ fn decide(
         && MIN_PLANE_FRACTION <= fraction
     {
         return shape(Structure::Surface, normal);
+    }
+    if is_land && is_above_land(positions, point, nearest, typical.noise()) {
+        return Decision { is_above_land: true, ..shape(Structure::Scatter, fit.normal) };
     }
     let normal = side.map_or(fit.normal, |(normal, _)| normal);
     if is_surface {

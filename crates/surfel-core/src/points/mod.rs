@@ -22,6 +22,7 @@ mod structure;
 mod depth_steps;
 mod noise;
 mod denoise;
+mod above_land;
 mod edge_planes;
 mod typical;
 mod solids;

@@ -32,6 +32,9 @@ const MIN_SIDE_FRACTION: f64 = 0.01;
 /// Maximum ratio of the points at two opposite ones of these ends.
 const MAX_SIDES_RATIO: f64 = 1.5;
 
+/// Minimum ratio of the height of an upright object to its other two sides.
+const MIN_UPRIGHT_RATIO: f64 = 1.3;
+
 /// Minimum ratio of each horizontal side to the height of a cloud that counts as flat, as terrain and cities do.
 const MIN_FLAT_RATIO: f64 = 4.0;
 
@@ -95,6 +98,23 @@ pub(super) fn is_terrain(positions: &[Vec3]) -> bool {
     AxisStatistics::of(positions).terrain().is_some()
 }
 
+/// Returns true if most points of a cloud form land that is large, wide and flat in X and Y, whatever stands on it.
+pub(super) fn is_mostly_land(positions: &[Vec3]) -> bool {
+    /// Fraction of the points at each end of an axis that need not be part of the land.
+    const FRACTION: f64 = 0.1;
+    let sample = sample(positions);
+    if sample.is_empty() {
+        return false;
+    }
+    let n_left_out = (FRACTION * sample.len() as f64) as usize;
+    let last = sample.len() - 1 - n_left_out;
+    is_wide_and_flat([0, 1, 2].map(|axis| {
+        let mut values: Vec<f32> = sample.iter().map(|p| p[axis]).collect();
+        let high = *values.select_nth_unstable_by(last, f32::total_cmp).1;
+        f64::from(high - *values.select_nth_unstable_by(n_left_out, f32::total_cmp).1)
+    }))
+}
+
 /// Returns true if all points lie before a depth camera at the origin, whose X points right, Y down and Z ahead.
 fn is_camera_frame(positions: &[Vec3]) -> bool {
     let sample = sample(positions);
@@ -155,25 +175,35 @@ impl AxisStatistics {
     }
 
     /// Returns the axis whose one end has far more points than any other end: a floor or a flat base. The sides of a
-    /// pedestal and the walls of a room without a ceiling may have as many, if they are alike.
+    /// pedestal and the walls of a room without a ceiling may have as many, if they are alike, and so may those of the
+    /// foot of an object that is higher than wide.
     fn flat_base(&self) -> Option<InferredUp> {
         let [x, y, z] = self.ends;
-        let are_sides = |low: f64, high: f64| {
-            MIN_SIDE_FRACTION <= low.min(high) && low.max(high) <= MAX_SIDES_RATIO * low.min(high)
+        let is_upright = |axis: usize| {
+            let height = self.sides[axis];
+            (0..3).all(|other| other == axis || MIN_UPRIGHT_RATIO * self.sides[other] <= height)
         };
+        let are_alike = |low: f64, high: f64| low.max(high) <= MAX_SIDES_RATIO * low.min(high);
+        let are_sides =
+            |low: f64, high: f64| MIN_SIDE_FRACTION <= low.min(high) && are_alike(low, high);
         // The last of the others is opposite.
-        let stands_on = |base: f64, others: [f64; 5]| {
+        let stands_on = |base: f64, axis: usize, others: [f64; 5]| {
             let [a, b, c, d, opposite] = others;
             let is_between_sides = are_sides(a, b) && are_sides(c, d);
             let is_pedestal = is_between_sides && MIN_PEDESTAL_RATIO * opposite < base;
             let is_floor = others.into_iter().all(|other| MIN_FLOOR_RATIO * other < base);
-            MIN_FLOOR_FRACTION <= base && (is_floor || is_pedestal)
+            let is_foot = is_upright(axis)
+                && are_alike(a, b)
+                && are_alike(c, d)
+                && [a, b, c, d].into_iter().all(|side| side < base)
+                && MIN_FLOOR_RATIO * opposite < base;
+            MIN_FLOOR_FRACTION <= base && (is_floor || is_pedestal || is_foot)
         };
-        let (up, name, end, base) = if stands_on(y.low, [x.low, x.high, z.low, z.high, y.high]) {
+        let (up, name, end, base) = if stands_on(y.low, 1, [x.low, x.high, z.low, z.high, y.high]) {
             (Vec3::Y, "+Y", "low end of Y", y.low)
-        } else if stands_on(z.low, [x.low, x.high, y.low, y.high, z.high]) {
+        } else if stands_on(z.low, 2, [x.low, x.high, y.low, y.high, z.high]) {
             (Vec3::Z, "+Z", "low end of Z", z.low)
-        } else if stands_on(y.high, [x.low, x.high, z.low, z.high, y.low]) {
+        } else if stands_on(y.high, 1, [x.low, x.high, z.low, z.high, y.low]) {
             (Vec3::NEG_Y, "-Y", "high end of Y", y.high)
         } else {
             return None;
@@ -188,12 +218,15 @@ impl AxisStatistics {
     ///
     /// There is no such rule for Y: a wall in the plane of X and Z is as flat.
     fn terrain(&self) -> Option<InferredUp> {
-        let [x, y, z] = self.sides;
-        let side = x.min(y);
-        let is_terrain = MIN_TERRAIN_SIDE <= side && MIN_FLAT_RATIO * z < side;
         let reason = "up is +Z: the points spread wide over X and Y, as terrain does".to_owned();
-        is_terrain.then_some(InferredUp { up: Vec3::Z, reason })
+        is_wide_and_flat(self.sides).then_some(InferredUp { up: Vec3::Z, reason })
     }
+}
+
+/// Returns true for sides along X, Y and Z of terrain.
+fn is_wide_and_flat([x, y, z]: [f64; 3]) -> bool {
+    let side = x.min(y);
+    MIN_TERRAIN_SIDE <= side && MIN_FLAT_RATIO * z < side
 }
 
 #[cfg(test)]
@@ -318,6 +351,31 @@ mod tests {
         assert_eq!(inferred(statue.iter().copied()), Vec3::Y);
         assert_eq!(inferred(statue.iter().map(|p| Vec3::new(p.x, -p.z, p.y))), Vec3::Z);
         assert_eq!(inferred(statue.iter().map(|p| Vec3::new(p.x, -p.y, p.z))), Vec3::NEG_Y);
+    }
+
+    #[test]
+    fn the_foot_of_an_upright_object_lies_at_the_bottom() {
+        // A ball on a box that is as deep as the ball, but not as wide; the box has half of the points.
+        let mut random = Random::new(9, 0);
+        let on_box = (0..6000).map(|i| {
+            let mut p = Vec3::from_array(std::array::from_fn(|_| random.next_f32() - 0.5));
+            p[i % 3] = if i % 2 == 0 { -0.5 } else { 0.5 };
+            p
+        });
+        let head = ball().into_iter().map(|p| Vec3::new(0.7, 0.5, 0.45) * p + Vec3::Y);
+        let bust: Vec<Vec3> = on_box.chain(head).collect();
+        assert_eq!(inferred(bust.iter().copied()), Vec3::Y);
+        assert_eq!(inferred(bust.iter().map(|p| Vec3::new(p.x, -p.y, p.z))), Vec3::NEG_Y);
+        // A corridor along Y that is open at one end.
+        let corridor = (0..6000).map(|i| {
+            let mut p = Vec3::from_array(std::array::from_fn(|_| random.next_f32() - 0.5));
+            match i % 8 {
+                7 => p.y = -0.5,
+                side => p[2 * (side % 2)] = if i % 4 < 2 { -0.5 } else { 0.5 },
+            }
+            p * Vec3::new(1.0, 5.0, 1.0)
+        });
+        assert_eq!(inferred(corridor), Vec3::Z);
     }
 
     #[test]

@@ -2,9 +2,10 @@
 
 use super::camera::{Camera, Projection};
 use super::camera_fit::{CameraFit, fit_along};
+use super::corridor::view_along;
 use super::ground::ground_axes;
 use super::inliers::range_along;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DQuat, DVec3, Vec3};
 
 /// Azimuth of the viewpoint if no other is clearly better: south, a little to the east.
 const FRONT_AZIMUTH_DEG: f64 = 155.0;
@@ -15,7 +16,8 @@ const MAX_TERRAIN_FLATNESS: f64 = 0.25;
 
 /// Returns the direction of view toward `points`: the flatter the cloud, the higher the viewpoint.
 ///
-/// Terrain has no front, so it is viewed from where it fills the picture best. Anything else is viewed from
+/// Terrain has no front, so it is viewed from where it fills the picture best, and along its length if it is a corridor.
+/// Anything else is viewed from
 /// the side from which most points are visible. Objects that are visible equally well from all sides are viewed
 /// from the side that models face by convention, or from behind it if that side has more relief.
 pub(super) fn automatic_direction(points: &[Vec3], fit: &CameraFit) -> DVec3 {
@@ -35,7 +37,11 @@ pub(super) fn automatic_direction(points: &[Vec3], fit: &CameraFit) -> DVec3 {
             azimuth_deg => azimuth_deg,
         }
     };
-    direction_from(azimuth_deg + fit.azimuth_deg, elevation_deg, fit.up)
+    let across = direction_from(azimuth_deg, elevation_deg, fit.up);
+    let along = if fit.is_turntable { None } else { view_along(points, across, fit) };
+    // Azimuths count clockwise seen from above.
+    let turn = DQuat::from_axis_angle(fit.up.as_dvec3(), -fit.azimuth_deg.to_radians());
+    turn * along.unwrap_or(across)
 }
 
 /// Returns the azimuth in the south from which the nearest camera shows the whole cloud.

@@ -22,7 +22,7 @@ pub(super) fn sample_inliers(cloud: &PointCloud) -> Vec<Vec3> {
     // A place counts once, however many points lie there.
     let mut seen = HashSet::new();
     let places = valid.filter(|p| seen.insert(p.to_array().map(f32::to_bits)));
-    without_outliers(&places.collect::<Vec<Vec3>>())
+    without_stray_groups(without_outliers(&places.collect::<Vec<Vec3>>()))
 }
 
 /// Returns the points within the inner quantiles of all axes, widened by a quarter of their range.
@@ -64,6 +64,76 @@ pub(super) fn without_fringe(points: Vec<Vec3>) -> Vec<Vec3> {
     points.into_iter().filter(|p| p.distance(middle) <= FRINGE_RATIO * core).collect()
 }
 
+/// Returns the points without those far from all others that lie in small groups, as the outliers of photogrammetry do;
+/// all points of clouds that are not much smaller without them.
+fn without_stray_groups(points: Vec<Vec3>) -> Vec<Vec3> {
+    /// Maximum fraction of the points in a small group.
+    const MAX_GROUP_FRACTION: f64 = 0.002;
+    /// Maximum fraction of the points in small groups: more of them are no outliers.
+    const MAX_STRAY_FRACTION: f64 = 0.1;
+    /// Minimum ratio of the longest side with the small groups to that without them.
+    const MIN_RATIO: f32 = 1.3;
+    /// Number of rounds: the cells of the next round are those of the smaller cloud.
+    const N_ROUNDS: usize = 3;
+    let mut points = points;
+    for _ in 0..N_ROUNDS {
+        let longest =
+            |points: &[Vec3]| Aabb::of_points(points.iter().copied()).size().max_element();
+        let group_sizes = group_sizes(&points);
+        let max_size = MAX_GROUP_FRACTION * points.len() as f64;
+        let of_point = points.iter().copied().zip(group_sizes);
+        let kept = of_point.filter(|(_, size)| max_size < f64::from(*size));
+        let kept: Vec<Vec3> = kept.map(|(point, _)| point).collect();
+        let n_stray = points.len() - kept.len();
+        let are_few = n_stray as f64 <= MAX_STRAY_FRACTION * points.len() as f64;
+        if !are_few || longest(&points) < MIN_RATIO * longest(&kept) {
+            break;
+        }
+        points = kept;
+    }
+    points
+}
+
+/// Returns, for each point, the number of points in its group. Points in cells that touch each other are one group.
+fn group_sizes(points: &[Vec3]) -> Vec<u32> {
+    /// Number of cells along the longest side of the cloud.
+    const N_CELLS: usize = 48;
+    /// Number of cells along each axis of the grid, which has a border.
+    const STRIDE: usize = N_CELLS + 2;
+    let bounds = Aabb::of_points(points.iter().copied());
+    let per_cell = N_CELLS as f32 / bounds.size().max_element().max(f32::MIN_POSITIVE);
+    let cell = |point: &Vec3| {
+        let at = ((*point - bounds.min) * per_cell).to_array();
+        let [x, y, z] = at.map(|along| (along as usize).min(N_CELLS - 1) + 1);
+        x + STRIDE * (y + STRIDE * z)
+    };
+    let mut counts = vec![0u32; STRIDE.pow(3)];
+    points.iter().for_each(|point| counts[cell(point)] += 1);
+    let mut size_of_cell = vec![0; counts.len()];
+    for first in 0..counts.len() {
+        if counts[first] == 0 || size_of_cell[first] != 0 {
+            continue;
+        }
+        let mut group = vec![first];
+        size_of_cell[first] = u32::MAX;
+        let mut n_looked_at = 0;
+        while let Some(cell) = group.get(n_looked_at).copied() {
+            n_looked_at += 1;
+            for step in 0..27 {
+                let [x, y, z] = [step % 3, step / 3 % 3, step / 9];
+                let other = cell + x + STRIDE * (y + STRIDE * z) - (1 + STRIDE * (1 + STRIDE));
+                if counts[other] != 0 && size_of_cell[other] == 0 {
+                    size_of_cell[other] = u32::MAX;
+                    group.push(other);
+                }
+            }
+        }
+        let size = group.iter().map(|cell| counts[*cell]).sum();
+        group.into_iter().for_each(|cell| size_of_cell[cell] = size);
+    }
+    points.iter().map(|point| size_of_cell[cell(point)]).collect()
+}
+
 /// Returns the smallest and largest coordinate of `points` along an axis.
 pub(super) fn range_along(points: &[Vec3], axis: Vec3) -> (f32, f32) {
     let along = points.iter().map(|p| p.dot(axis));
@@ -93,6 +163,24 @@ mod tests {
         points.extend(disk(1));
         let bounds = inlier_bounds(&PointCloud::from_positions(points));
         assert!(39.0 < bounds.max.x && bounds.min.y < -39.0, "{bounds:?}");
+    }
+
+    #[test]
+    fn stray_points_are_left_out_and_parts_of_the_scene_are_not() {
+        let mut random = Random::new(7, 0);
+        let mut cube =
+            |size: f32| size * Vec3::from_array(std::array::from_fn(|_| random.next_f32() - 0.5));
+        let scene: Vec<Vec3> = (0..5000).map(|_| cube(10.0)).collect();
+        let strays = (0..200).map(|_| cube(100.0));
+        let size =
+            |points: Vec<Vec3>| Aabb::of_points(without_stray_groups(points)).size().max_element();
+        let without = size(scene.iter().copied().chain(strays).collect());
+        assert!(without < 15.0, "{without}");
+        let beside = (0..100).map(|_| cube(3.0) + 40.0 * Vec3::X);
+        assert!(40.0 < size(scene.iter().copied().chain(beside).collect()));
+        for few in [vec![], vec![Vec3::ONE], vec![Vec3::ONE; 3]] {
+            assert_eq!(without_stray_groups(few.clone()), few);
+        }
     }
 
     #[test]

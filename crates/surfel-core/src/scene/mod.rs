@@ -5,6 +5,7 @@ mod camera;
 mod camera_fit;
 mod turntable;
 mod inliers;
+mod corridor;
 mod auto_viewpoint;
 mod auto_camera;
 mod environment;
