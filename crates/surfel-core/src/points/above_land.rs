@@ -10,12 +10,12 @@ const MIN_THICKNESS: f32 = 0.06;
 /// Distance from a plane of the points on it, in deviations of the noise.
 const THICKNESS_OF_NOISE: f32 = 2.5;
 /// Minimum fraction of the neighbours on the plane of the ground.
-const MIN_ON_GROUND: f32 = 0.5;
+const MIN_ON_GROUND: f32 = 0.4;
 /// Minimum height of a plant above this plane, in distances of the points on it.
 const MIN_HEIGHT: f32 = 2.0;
 /// Minimum number of neighbours on a plane through a point of a roof or a wall, as a fraction of those on the ground: a
 /// steep plane through a plant meets some points of the ground.
-const MIN_ON_OWN_PLANE: f32 = 0.6;
+const MIN_ON_OWN_PLANE: f32 = 0.75;
 
 /// Returns true for a point that lies above or below the plane of most of its neighbours, and on no plane with others of
 /// them. `noise` is the typical deviation from planes in radii of neighbourhoods.
@@ -63,6 +63,7 @@ mod tests {
     use super::*;
     use crate::math::Random;
     use crate::points::neighbors::KdTree;
+    use crate::points::{PointCloud, Preparation, Structure, prepare};
     use crate::progress::NoProgress;
 
     /// Returns the fraction of points of a place that lie above land, among `others`.
@@ -74,6 +75,30 @@ mod tests {
             is_above_land(&points, *point, &neighbors, 0.02)
         };
         (0..place.len()).filter(is_above).count() as f64 / place.len() as f64
+    }
+
+    #[test]
+    fn the_vote_of_the_ground_makes_no_surface_of_plants() {
+        let mut random = Random::new(5, 0);
+        let mut points = Vec::new();
+        for i in 0..20_000 {
+            let (x, y) = (100.0 * random.next_f32(), 100.0 * random.next_f32());
+            // Every fifth point in a strip is part of a plant.
+            let is_plant = i % 5 == 0 && 40.0 < x && x < 60.0;
+            let height = random.next_f32() * if is_plant { 2.0 } else { 0.05 };
+            let height = if is_plant { height + 1.0 } else { height };
+            points.push(Vec3::new(x, y, height));
+        }
+        let is_plant: Vec<bool> = points.iter().map(|p| 0.5 < p.z).collect();
+        let cloud = PointCloud::from_positions(points);
+        let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+        let structures = cloud.structures().unwrap();
+        let count = |kind: bool| {
+            let of_kind = structures.iter().zip(&is_plant).filter(|(_, plant)| **plant == kind);
+            let n_scattered = of_kind.clone().filter(|(s, _)| **s == Structure::Scatter).count();
+            n_scattered as f64 / of_kind.count() as f64
+        };
+        assert!(0.9 < count(true) && count(false) < 0.02, "{} {}", count(true), count(false));
     }
 
     #[test]

@@ -5,12 +5,14 @@
 //! (after Huang et al., Edge-Aware Point Set Resampling, 2013).
 
 use super::PointCloud;
+use super::above_land::is_above_land;
 use super::depth_steps::DepthSteps;
 use super::jets::fit_wide_jet;
 use super::neighbors::{KdTree, Neighbor};
 use super::noise::{GROUP_SIZE, Noise};
 use super::normals::fit_plane;
 use super::radius::format_length;
+use super::up::is_mostly_land;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -105,12 +107,18 @@ pub fn denoise(
     if is_auto && (noise.median() < MIN_NOISE || !noise.is_of_surfaces()) {
         return Ok(None);
     }
-    let count = |noise: &Option<f32>| {
-        let wanted = |noise: f32| (NEIGHBORS_PER_NOISE * noise).clamp(MIN_NEIGHBORS, MAX_NEIGHBORS);
-        noise.map_or(0, |noise| wanted(noise) as u32)
-    };
     let noises = noise.at_points(&tree, progress)?;
-    let counts: Vec<u32> = noises.iter().map(count).collect();
+    let is_land = is_mostly_land(positions);
+    let noise_of_ground = noise.quantile(0.25);
+    let count = |(point, noise): (usize, &Option<f32>)| {
+        progress.check()?;
+        let Some(noise) = *noise else { return Ok(0) };
+        if is_land && is_plant(&tree, point, noise_of_ground) {
+            return Ok(0);
+        }
+        Ok((NEIGHBORS_PER_NOISE * noise).clamp(MIN_NEIGHBORS, MAX_NEIGHBORS) as u32)
+    };
+    let counts = noises.par_iter().enumerate().map(count).collect::<Result<Vec<u32>>>()?;
     let (moved, normals): (Vec<Vec3>, Vec<Vec3>) =
         moved(&tree, &groups, &order, &counts, &noises, progress)?.into_iter().unzip();
     let distances = positions.iter().zip(&moved).map(|(from, to)| f64::from(from.distance(*to)));
@@ -120,6 +128,16 @@ pub fn denoise(
     cloud.positions = moved;
     let report = DenoiseReport { noise: noise.median(), n_moved, mean_distance };
     Ok(Some(Denoised { report, normals }))
+}
+
+/// True for a point above land: low plants look like noise of the ground, but are none. `noise` is that of the ground in
+/// spacings.
+fn is_plant(tree: &KdTree, point: usize, noise: f32) -> bool {
+    const N_NEIGHBORS: usize = 24;
+    let positions = tree.positions();
+    let neighbors = tree.nearest(positions[point], N_NEIGHBORS, Some(point as u32));
+    let radius_in_spacings = (N_NEIGHBORS as f32 / std::f32::consts::PI).sqrt();
+    is_above_land(positions, point, &neighbors, noise / radius_in_spacings)
 }
 
 /// Returns the means of groups of points that follow each other in `order`.

@@ -179,7 +179,9 @@ fn decide(
     {
         return shape(Structure::Surface, normal);
     }
-    if is_land && is_above_land(positions, point, nearest, typical.noise()) {
+    let is_above = |around: &[Neighbor]| is_above_land(positions, point, around, typical.noise());
+    // High plants have many neighbours on others.
+    if is_land && (is_above(nearest) || is_above(&neighbors)) {
         return Decision { is_above_land: true, ..shape(Structure::Scatter, fit.normal) };
     }
     let normal = side.map_or(fit.normal, |(normal, _)| normal);

@@ -96,9 +96,14 @@ impl Noise {
 
     /// Returns the median noise over the regions.
     pub fn median(&self) -> f32 {
+        self.quantile(0.5)
+    }
+
+    /// Returns the noise that this fraction of the regions does not exceed.
+    pub fn quantile(&self, fraction: f32) -> f32 {
         let mut noises = self.noises.clone();
         noises.sort_unstable_by(f32::total_cmp);
-        noises.get(noises.len() / 2).copied().unwrap_or(0.0)
+        noises.get((fraction * noises.len() as f32) as usize).copied().unwrap_or(0.0)
     }
 
     /// True if the cloud is made of surfaces, not of leaves.

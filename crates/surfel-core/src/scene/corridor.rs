@@ -7,6 +7,8 @@ use crate::math::{DVec3, Vec3};
 
 /// Minimum ratio of the length of a corridor to its width and to its height.
 const MIN_LENGTH_RATIO: f32 = 4.0;
+/// Minimum length of a corridor in the unit of the file: long objects are smaller.
+const MIN_LENGTH: f32 = 50.0;
 /// Angles between the view and the corridor in degrees.
 const TURNS_DEG: [f64; 5] = [-20.0, -10.0, 0.0, 10.0, 20.0];
 /// Elevations of the viewpoint in degrees: the lower, the nearer is the near end.
@@ -58,7 +60,8 @@ fn long_axis(points: &[Vec3], up: Vec3) -> Option<Vec3> {
         high - low
     };
     let width = extent(up.cross(axis)).max(extent(up));
-    (MIN_LENGTH_RATIO * width <= extent(axis)).then_some(axis)
+    let length = extent(axis);
+    (MIN_LENGTH <= length && MIN_LENGTH_RATIO * width <= length).then_some(axis)
 }
 
 /// Returns the fraction of the cells of a small picture that show points, if the camera looks along `forward` and sees
@@ -104,9 +107,11 @@ mod tests {
     }
 
     #[test]
-    fn a_field_and_few_points_are_no_corridors() {
-        let field = ground(Vec3::new(300.0, 100.0, 5.0));
-        assert_eq!(view_along(&field, across(), &CameraFit::default()), None);
+    fn fields_beams_and_few_points_are_no_corridors() {
+        for size in [Vec3::new(300.0, 100.0, 5.0), Vec3::new(6.0, 0.3, 0.4)] {
+            let found = view_along(&ground(size), across(), &CameraFit::default());
+            assert_eq!(found, None, "{size}");
+        }
         for points in [vec![], vec![Vec3::ONE]] {
             let found = view_along(&points, across(), &CameraFit::default());
             assert!(found.is_none_or(DVec3::is_finite), "{found:?}");
