@@ -204,7 +204,9 @@ fn check_surface(args: &Args, description: &SceneDescription) -> Result<(), Usag
         (SurfaceKind::Points, _) => {
             Err(Usage("--surface points is not hit by rays; choose another kind".into()))
         }
-        (SurfaceKind::Sphere, Some(kinds)) => reject_gather(kinds, "--surface sphere"),
+        (kind, Some(kinds)) if !kind.uses_discs() => {
+            reject_gather(kinds, &format!("--surface {}", kind.name()))
+        }
         _ => Ok(()),
     }
 }
@@ -223,11 +225,12 @@ fn kinds(args: &Args, scene: &BenchScene, report: &Report) -> Result<Vec<Rays>, 
         FlatGeometry::Cloud(cloud) if cloud.surface.uses_discs() => {
             return Ok(args.rays.clone().unwrap_or(DEFAULT_RAYS.to_vec()));
         }
+        FlatGeometry::Cloud(cloud) if cloud.surface.is_continuous() => "balls",
         FlatGeometry::Cloud(_) => "spheres",
         FlatGeometry::Mesh(_) => "triangles",
     };
     if let Some(kinds) = &args.rays {
-        // Spheres were refused before the file was read.
+        // Clouds without discs were refused before the file was read.
         reject_gather(kinds, "a mesh")?;
         return Ok(kinds.clone());
     }

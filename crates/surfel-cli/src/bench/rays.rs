@@ -123,8 +123,8 @@ fn start(scene: &BenchScene, ray_idx: usize, ray: &Ray, hit: &Hit) -> Start {
         }
     };
     let points = &cloud.points;
-    // Discs overlap, spheres are solid: half a radius lifts a ray out of the discs around its own.
-    let (normal, offset) = if cloud.surface.uses_discs() {
+    // Spheres are solid; half a radius lifts a ray out of the discs or balls around its own.
+    let (normal, offset) = if cloud.surface.is_continuous() {
         (points.normal(hit.slot), 0.5)
     } else {
         ((position - points.center(hit.slot)).normalize_or(-ray.direction), 1e-3)

@@ -203,6 +203,10 @@ fn gather_rays_are_left_out_for_spheres() {
     let text = fail(&[&spheres[..], &["--rays", "primary,gather"]].concat(), 2);
     assert!(text.contains("--surface sphere"), "{text}");
     assert!(fail(&["bench", &cloud, "--surface", "points"], 2).contains("choose another kind"));
+    let balls = ["bench", &cloud, "--runs", "1", "--resolution", "32x32", "--surface", "mls"];
+    assert!(stderr(&surfel(&balls)).contains("gather left out: balls do not blend"));
+    let text = fail(&[&balls[..], &["--rays", "gather"]].concat(), 2);
+    assert!(text.contains("--surface mls"), "{text}");
 }
 
 #[test]

@@ -121,29 +121,26 @@ impl<F: Floats> PlaneLanes<F> {
     }
 }
 
-/// Sums of the least squares fit of polynomials over planes, one per lane: `N` coefficients of 1, u, v, u^2, uv, v^2
-/// (and u^3, u^2 v, u v^2, v^3) for coordinates in units of the support.
+/// Sums of the least squares fit of polynomials over planes through positions, one per lane: `N` coefficients of 1, u, v,
+/// u^2, uv, v^2 (and u^3, u^2 v, u v^2, v^3) for coordinates in units of the support.
 pub struct PolynomialSums<F: Floats, const N: usize> {
-    plane: PlaneLanes<F>,
+    normal: Vec3Lanes<F>,
     tangents: [Vec3Lanes<F>; 2],
     /// Reciprocal of the unit of u and v.
     per_unit: F,
-    matrix: [[F; N]; N],
+    /// Weighted sums of the monomials of up to twice the polynomial's degree, of which the matrix of the fit consists.
+    moments: [F; MAX_MOMENTS],
     right: [F; N],
 }
 
 impl<F: Floats, const N: usize> PolynomialSums<F, N> {
-    /// Returns the sums over no points. `unit` is a length of about the support's radius.
+    /// Returns the sums over no points, for planes with these unit normals. `unit` is a length of about the support's
+    /// radius.
     #[inline(always)]
-    pub fn new(plane: PlaneLanes<F>, unit: f32) -> Self {
-        let zero = F::splat(0.0);
-        let mut matrix = [[zero; N]; N];
-        for (i, row) in matrix.iter_mut().enumerate() {
-            let penalty = if i < 3 { SLOPE_PENALTY } else { BEND_PENALTY };
-            row[i] = F::splat(penalty) * plane.weight;
-        }
-        let per_unit = F::splat(1.0 / unit);
-        Self { plane, tangents: tangents(plane.normal), per_unit, matrix, right: [zero; N] }
+    pub fn new(normal: Vec3Lanes<F>, unit: f32) -> Self {
+        let (zero, per_unit) = (F::splat(0.0), F::splat(1.0 / unit));
+        let tangents = tangents(normal);
+        Self { normal, tangents, per_unit, moments: [zero; MAX_MOMENTS], right: [zero; N] }
     }
 
     /// Adds one point for each lane, at `offset` from the position.
@@ -151,34 +148,79 @@ impl<F: Floats, const N: usize> PolynomialSums<F, N> {
     pub fn add(&mut self, offset: Vec3Lanes<F>, weight: F) {
         let u = self.tangents[0].dot(offset) * self.per_unit;
         let v = self.tangents[1].dot(offset) * self.per_unit;
-        let height = self.plane.normal.dot(offset) - self.plane.height;
-        let monomials = monomials::<F, N>(u, v);
-        for i in 0..N {
-            let weighted = weight * monomials[i];
-            self.right[i] = self.right[i] + weighted * height;
-            for (sum, monomial) in self.matrix[i][..=i].iter_mut().zip(&monomials) {
-                *sum = *sum + weighted * *monomial;
+        let height = self.normal.dot(offset);
+        // Loops and tables kept the sums in memory, and took three times as long.
+        let [w, wu, wv] = [weight, weight * u, weight * v];
+        let [wuu, wuv, wvv] = [wu * u, wu * v, wv * v];
+        let [wuuu, wuuv, wuvv, wvvv] = [wuu * u, wuu * v, wvv * u, wvv * v];
+        let [wuuuu, wuuuv, wuuvv] = [wuuu * u, wuuu * v, wuuv * v];
+        let [wuvvv, wvvvv] = [wvvv * u, wvvv * v];
+        let (sums, zero) = (&mut self.moments, F::splat(0.0));
+        add_to(&mut sums[0], w);
+        add_to(&mut sums[1], wu);
+        add_to(&mut sums[2], wv);
+        add_to(&mut sums[3], wuu);
+        add_to(&mut sums[4], wuv);
+        add_to(&mut sums[5], wvv);
+        add_to(&mut sums[6], wuuu);
+        add_to(&mut sums[7], wuuv);
+        add_to(&mut sums[8], wuvv);
+        add_to(&mut sums[9], wvvv);
+        add_to(&mut sums[10], wuuuu);
+        add_to(&mut sums[11], wuuuv);
+        add_to(&mut sums[12], wuuvv);
+        add_to(&mut sums[13], wuvvv);
+        add_to(&mut sums[14], wvvvv);
+        let right = &mut self.right;
+        add_to(&mut right[0], w * height);
+        add_to(&mut right[1], wu * height);
+        add_to(&mut right[2], wv * height);
+        add_to(&mut right[3], wuu * height);
+        add_to(&mut right[4], wuv * height);
+        add_to(&mut right[5], wvv * height);
+        if N == 10 {
+            add_to(&mut right[N - 4], wuuu * height);
+            add_to(&mut right[N - 3], wuuv * height);
+            add_to(&mut right[N - 2], wuvv * height);
+            add_to(&mut right[N - 1], wvvv * height);
+            let mut monomials = [wuuuu, wuuuv, wuuvv, wuvvv, wvvvv, zero, zero];
+            for (degree, first) in [(5, 15), (6, 21)] {
+                let first_of_lower = monomials[0];
+                for i in (0..degree).rev() {
+                    monomials[i + 1] = monomials[i] * v;
+                }
+                monomials[0] = first_of_lower * u;
+                for i in 0..=degree {
+                    add_to(&mut sums[first + i], monomials[i]);
+                }
             }
         }
+    }
+
+    /// Returns the lanes in which there are points enough.
+    #[inline(always)]
+    pub fn has_points(&self) -> F::Mask {
+        F::splat(MIN_WEIGHT).lt(self.moments[0])
     }
 
     /// Intersects the polynomials with rays through the positions.
     #[inline(always)]
     pub fn intersect(&self, direction: Vec3Lanes<F>) -> StepLanes<F> {
-        let c = solve(&self.matrix, &self.right);
-        let [du, dv] = self.tangents.map(|tangent| tangent.dot(direction) * self.per_unit);
+        let c = solve(&self.matrix(), &self.right);
+        let du = self.tangents[0].dot(direction) * self.per_unit;
+        let dv = self.tangents[1].dot(direction) * self.per_unit;
         let zero = F::splat(0.0);
-        let dz = self.plane.normal.dot(direction);
+        let dz = self.normal.dot(direction);
         // Along the ray the height above the polynomial is itself a polynomial of the distance.
         let along = monomials::<F, N>(du, dv);
         let mut by_degree = [zero; 4];
         for i in 0..N {
-            let degree = [0, 1, 1, 2, 2, 2, 3, 3, 3, 3][i];
+            let degree = DEGREES[i].0 + DEGREES[i].1;
             let term = if i == 0 { c[0] } else { c[i] * along[i] };
             by_degree[degree] = by_degree[degree] + term;
         }
         let [k0, k1, k2, k3] = by_degree;
-        let (start, slope) = (zero - self.plane.height - k0, dz - k1);
+        let (start, slope) = (zero - k0, dz - k1);
         let mut step = zero - start / slope;
         for _ in 0..N_STEPS {
             let value = start + (slope - (k2 + k3 * step) * step) * step;
@@ -188,6 +230,21 @@ impl<F: Floats, const N: usize> PolynomialSums<F, N> {
         let normal = self.normal_at(&c, step * du, step * dv);
         let is_away = zero.lt(normal.dot(direction));
         StepLanes { step, normal: normal.scaled(F::select(is_away, F::splat(-1.0), F::splat(1.0))) }
+    }
+
+    /// Returns the lower triangle of the matrix of the fit, with the penalties of its coefficients.
+    #[inline(always)]
+    fn matrix(&self) -> [[F; N]; N] {
+        let mut matrix = [[F::splat(0.0); N]; N];
+        for i in 0..N {
+            for j in 0..=i {
+                let (of_u, of_v) = (DEGREES[i].0 + DEGREES[j].0, DEGREES[i].1 + DEGREES[j].1);
+                matrix[i][j] = self.moments[monomial_idx(of_u, of_v)];
+            }
+            let penalty = F::splat(if i < 3 { SLOPE_PENALTY } else { BEND_PENALTY });
+            matrix[i][i] = matrix[i][i] + penalty * self.moments[0];
+        }
+        matrix
     }
 
     /// Returns the polynomials' unit normals.
@@ -203,12 +260,24 @@ impl<F: Floats, const N: usize> PolynomialSums<F, N> {
             by_v = by_v + uuv * u * u + two * uvv * u * v + three * vvv * v * v;
         }
         let tilt = self.tangents[0].scaled(by_u).plus(self.tangents[1].scaled(by_v));
-        let normal = self.plane.normal.minus(tilt.scaled(self.per_unit));
+        let normal = self.normal.minus(tilt.scaled(self.per_unit));
         normal.scaled(F::splat(1.0) / normal.dot(normal).sqrt())
     }
 }
 
-/// Returns the first `N` monomials of `PolynomialSums`.
+/// Number of monomials of up to degree 6, which the fit of a polynomial of degree 3 needs.
+const MAX_MOMENTS: usize = 28;
+/// Degrees in u and v of the monomials of a polynomial, in their order.
+const DEGREES: [(usize, usize); 10] =
+    [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)];
+
+/// Returns the index of a monomial of these degrees in u and v.
+const fn monomial_idx(of_u: usize, of_v: usize) -> usize {
+    let degree = of_u + of_v;
+    degree * (degree + 1) / 2 + of_v
+}
+
+/// Returns the monomials of a polynomial of `N` coefficients.
 #[inline(always)]
 fn monomials<F: Floats, const N: usize>(u: F, v: F) -> [F; N] {
     let (uu, uv, vv) = (u * u, u * v, v * v);
@@ -216,6 +285,11 @@ fn monomials<F: Floats, const N: usize>(u: F, v: F) -> [F; N] {
     let mut monomials = [all[0]; N];
     monomials.copy_from_slice(&all[..N]);
     monomials
+}
+
+#[inline(always)]
+fn add_to<F: Floats>(sum: &mut F, summand: F) {
+    *sum = *sum + summand;
 }
 
 /// Solves systems with symmetric positive definite matrices, of which the lower triangle is given (LDL^T).
@@ -261,13 +335,7 @@ mod tests {
     /// Returns the intersection of a ray with the polynomial of `N` coefficients over Z = 0 that is fitted to points of a
     /// height field, and the hit position.
     fn hit<const N: usize>(height: impl Fn(f32, f32) -> f32, direction: Vec3) -> (Vec3, Vec3) {
-        let plane = PlaneLanes {
-            normal: Vec3Lanes::splat(Vec3::Z),
-            height: -0.05,
-            weight: 60.0,
-            is_plane: true,
-        };
-        let mut sums = PolynomialSums::<f32, N>::new(plane, 1.0);
+        let mut sums = PolynomialSums::<f32, N>::new(Vec3Lanes::splat(Vec3::Z), 1.0);
         let mut random = Random::new(5, 0);
         for _ in 0..60 {
             let (x, y) = (2.0 * random.next_f32() - 1.0, 2.0 * random.next_f32() - 1.0);

@@ -78,10 +78,10 @@ fn bits(hit: &Hit) -> (u32, u32) {
 }
 
 /// A hit with the radius of the point that was hit.
-type HitWithRadius = (Hit, f32);
+pub type HitWithRadius = (Hit, f32);
 
 /// Returns all hits in the ray's range, nearest first.
-fn all_hits(scene: &FlatCloud, ray: &Ray) -> Vec<HitWithRadius> {
+pub fn all_hits(scene: &FlatCloud, ray: &Ray) -> Vec<HitWithRadius> {
     let ray_lanes = RayLanes::new(ray);
     let mut found = Vec::new();
     for (block_idx, block) in scene.points.blocks.iter().enumerate() {
@@ -107,8 +107,12 @@ fn all_hits(scene: &FlatCloud, ray: &Ray) -> Vec<HitWithRadius> {
 
 /// Returns the hits that a splat blends: those within the gather limit of the nearest.
 fn gather(hits: &[HitWithRadius]) -> Vec<Hit> {
+    within_limit(hits).map(|(hit, _)| *hit).take(MAX_GATHERED).collect()
+}
+
+/// Returns the hits within the gather limit.
+pub fn within_limit(hits: &[HitWithRadius]) -> impl Iterator<Item = &HitWithRadius> {
     let limit =
         hits.iter().fold(f32::INFINITY, |all, (hit, r)| all.min(gather_limit(hit.distance, *r)));
-    let near = hits.iter().map(|(hit, _)| *hit).filter(|hit| hit.distance <= limit);
-    near.take(MAX_GATHERED).collect()
+    hits.iter().filter(move |(hit, _)| hit.distance <= limit)
 }

@@ -77,9 +77,15 @@ fn check_against_brute_force(name: &str, scene: &FlatScene, rays: &[Ray]) -> usi
         assert_eq!(InstanceHit::of(scene, found), *expected, "{name} {:?}", rays[i]);
         n_differing += usize::from(occluded[i] != (expected.instance != u32::MAX));
     }
-    // Hits test an edge by the blended normal, occlusions by that of one disc: 3 rays in a thousand may differ.
+    // Hits test an edge by the blended normal, occlusions by that of one disc: 3 rays in a thousand may differ. On smooth
+    // surfaces a ray skips discs close behind a rejected one, which an occlusion test may judge: 5 in a thousand of a cloud.
+    let allowed_of = |instance: &Instance| match scene.geometry(instance) {
+        FlatGeometry::Cloud(cloud) if cloud.surface == SurfaceKind::Smooth => 5,
+        _ => 0,
+    };
     let blends_discs = scene.clouds().any(|cloud| cloud.surface.blends_discs());
-    let allowed = if blends_discs { 3 * rays.len() / 1000 } else { 0 };
+    let of_smooth: usize = scene.instances.iter().map(allowed_of).sum();
+    let allowed = (of_smooth + if blends_discs { 3 } else { 0 }) * rays.len() / 1000;
     assert!(n_differing <= allowed, "{name}: {n_differing}");
     expected.iter().filter(|hit| hit.instance != u32::MAX).count()
 }
@@ -170,12 +176,16 @@ fn overlapping(kind: SurfaceKind) -> Graph {
 #[test]
 fn overlapping_instances_are_hit_like_separate_ones() {
     let rays = scenes::random_rays(1500, 1.2, 75);
+    // In kd-trees and octrees packets are rounded differently from single rays, which here have to be alike.
     for kind in [
         SurfaceKind::Sphere,
         SurfaceKind::Disc,
         SurfaceKind::SplatMean,
         SurfaceKind::Splat,
         SurfaceKind::SplatFit,
+        SurfaceKind::Cylinder,
+        SurfaceKind::Mls,
+        SurfaceKind::Smooth,
     ] {
         let scene = flat(overlapping(kind));
         let n_hits = check_against_brute_force(kind.name(), &scene, &rays);

@@ -1,13 +1,14 @@
 //! Surfaces of the methods that the thesis compares itself with: known answers, holes, and one surface for rays of all
 //! kinds.
 
+use crate::brute_force::{all_hits, within_limit};
 use crate::rays::{hits, rays_from_above};
 use surfel_core::flat::FlatCloud;
 use surfel_core::math::{Ray, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::NoProgress;
 use surfel_core::surface::{EdgeTest, SurfaceKind, SurfaceOptions};
-use surfel_core::trace::{Simd, SurfaceHit, occlusions, surface_hits};
+use surfel_core::trace::{Hit, Simd, Splat, SurfaceHit, occlusions, splats, surface_hits};
 use surfel_tests::clouds;
 use surfel_tests::scenes;
 
@@ -195,6 +196,39 @@ fn cylinders_with_too_few_points_go_through_holes() {
     assert_eq!((n_hits(&loose, -0.2), n_hits(&strict, -0.2)), (80, 80));
     assert_eq!((n_hits(&loose, 0.05), n_hits(&strict, 0.05)), (80, 0));
     assert_eq!(n_hits(&with_density(128), -0.2), 0);
+}
+
+#[test]
+fn a_cylinder_has_all_points_that_brute_force_finds_in_it() {
+    let rays = [scenes::random_rays(600, 1.2, 21), rays_from_above(0.9, 20)].concat();
+    for reach in [1.0, 2.5] {
+        let options = SurfaceOptions { reach: Some(reach), ..SurfaceOptions::default() };
+        let flat = flat_with(clouds::sphere(4000, 1.0), SurfaceKind::Cylinder, options);
+        let expected: Vec<(usize, u32, f32)> =
+            rays.iter().map(|ray| mean_of_cylinder(&flat, ray)).collect();
+        assert!(expected.iter().any(|(n, ..)| (12.0 * reach * reach) as usize / 2 < *n));
+        for simd in Simd::available() {
+            let mut found = vec![Splat::MISS; rays.len()];
+            splats(&flat, simd, &rays, &mut found);
+            for (splat, (n, slot, distance)) in found.iter().zip(&expected) {
+                assert_eq!((splat.n_discs as usize, splat.hit.slot), (*n, *slot), "{reach}");
+                assert!(*n == 0 || (splat.distance - distance).abs() < 1e-5, "{splat:?}");
+            }
+        }
+    }
+}
+
+/// Returns the number of points in a ray's cylinder, the slot of the first one, and the mean of their distances.
+fn mean_of_cylinder(flat: &FlatCloud, ray: &Ray) -> (usize, u32, f32) {
+    let all = all_hits(flat, ray);
+    let slot = all.first().map_or(Hit::MISS.slot, |(hit, _)| hit.slot);
+    let (mut n, mut weights, mut sum) = (0, 0.0, 0.0);
+    for (hit, radius) in within_limit(&all) {
+        let offset = ray.at(hit.distance).distance(flat.points.center(hit.slot));
+        let weight = (1.0 - offset / radius).max(1e-4);
+        (n, weights, sum) = (n + 1, weights + weight, sum + weight * hit.distance);
+    }
+    (n, slot, sum / weights)
 }
 
 #[test]

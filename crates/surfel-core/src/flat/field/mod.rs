@@ -5,6 +5,7 @@ mod points;
 mod kd_tree;
 mod kd_build;
 mod octree;
+mod cube_points;
 mod octree_cells;
 mod octree_build;
 

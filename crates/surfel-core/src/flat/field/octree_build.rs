@@ -1,5 +1,6 @@
 //! Construction of octrees level by level, each from points whose supports are as wide as its cells need.
 
+use super::cube_points::CubePoints;
 use super::octree::{
     CellCorners, CellPlane, MAX_OCTREE_BYTES_PER_POINT, MAX_OCTREE_DEPTH, Octree, OctreeNode,
 };
@@ -103,7 +104,7 @@ fn build<C: OctreeCell>(
             n_steps_left: &n_steps_left,
             progress,
         };
-        let cells = level.cells::<C>(&cube, &field.all(), 0, 0);
+        let cells = level.cells::<C>(&cube, &CubePoints::new(field.all()), 0, 0);
         (cells, n_steps_left.load(Ordering::Relaxed) == 0)
     };
     let mut levels: Vec<Vec<PlacedCell<C>>> = Vec::new();

@@ -1,8 +1,9 @@
 //! The cells of one level of an octree, computed from the field.
 
+use super::cube_points::{CubePoints, child_cube};
 use super::octree::{CellCorners, CellPlane};
 use super::points::{CellPoints, FieldPoints, FieldValue};
-use crate::math::{Aabb, Vec3};
+use crate::math::Aabb;
 use crate::progress::Progress;
 use crate::surface::FIELD_SUPPORT;
 use rayon::prelude::*;
@@ -60,21 +61,15 @@ impl Level<'_> {
     pub fn cells<C: OctreeCell>(
         &self,
         cube: &Aabb,
-        points: &CellPoints,
+        inside: &CubePoints,
         key: u64,
         depth: usize,
     ) -> Vec<PlacedCell<C>> {
+        let points = &inside.points;
         let is_stopped =
             self.progress.is_cancelled() || !take(self.n_steps_left, points.slots.len());
-        if points.is_empty() || is_stopped {
+        if points.is_empty() || is_stopped || !inside.may_have_zero() {
             return Vec::new();
-        }
-        if self.field.agree(points) {
-            let flips = self.field.flips(points, cube);
-            let (low, high) = self.field.range(points, &flips, cube);
-            if 0.0 < low || high < 0.0 {
-                return Vec::new();
-            }
         }
         let radius = points.mean_support() / FIELD_SUPPORT;
         let is_fine = self.is_adaptive && cube.size().x <= FINEST_CELL * radius;
@@ -87,15 +82,14 @@ impl Level<'_> {
         if is_fine || self.n_left.load(Ordering::Relaxed) == 0 {
             return Vec::new();
         }
-        let child = |i: usize| {
-            let part = child_cube(cube, i);
-            let inside = self.field.within(points, &part);
-            self.cells(&part, &inside, key << 3 | i as u64, depth + 1)
+        let parts = self.field.split(points, cube);
+        let child = |(i, part): (usize, &CubePoints)| {
+            self.cells(&child_cube(cube, i), part, key << 3 | i as u64, depth + 1)
         };
         if points.slots.len() < MIN_PARALLEL {
-            return (0..8).flat_map(child).collect();
+            return parts.iter().enumerate().flat_map(child).collect();
         }
-        let children: Vec<_> = (0..8).into_par_iter().map(child).collect();
+        let children: Vec<_> = parts.par_iter().enumerate().map(child).collect();
         children.into_iter().flatten().collect()
     }
 
@@ -118,19 +112,6 @@ fn take(left: &AtomicUsize, n: usize) -> bool {
     let subtract = |left: usize| Some(left.saturating_sub(n));
     let before = left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, subtract);
     before.is_ok_and(|before| n < before)
-}
-
-/// Returns one of the eight cubes that a cube consists of.
-pub(super) fn child_cube(cube: &Aabb, i: usize) -> Aabb {
-    let middle = cube.center();
-    let is_upper = |axis: usize| i >> axis & 1 == 1;
-    let pick = |axis: usize, lower: Vec3, upper: Vec3| {
-        if is_upper(axis) { upper[axis] } else { lower[axis] }
-    };
-    Aabb {
-        min: Vec3::from_array([0, 1, 2].map(|axis| pick(axis, cube.min, middle))),
-        max: Vec3::from_array([0, 1, 2].map(|axis| pick(axis, middle, cube.max))),
-    }
 }
 
 impl OctreeCell for CellPlane {
@@ -157,13 +138,9 @@ impl OctreeCell for CellCorners {
     ) -> Option<Self> {
         let per_step = 1.0 / (Self::STEP * cell.size().x);
         let mut corners = Self { values: [0; 8], normals: [[0; 3]; 8], slot: middle.slot };
-        for i in 0..8 {
-            let corner = child_cube(cell, i);
-            let is_upper = |axis: usize| i >> axis & 1 == 1;
-            let pick =
-                |axis: usize| if is_upper(axis) { corner.max[axis] } else { corner.min[axis] };
-            let position = Vec3::from_array([0, 1, 2].map(pick));
-            let FieldValue { value, normal, .. } = field.value(points, flips, position)?;
+        for (i, (value, normal)) in
+            field.corner_values(points, flips, cell)?.into_iter().enumerate()
+        {
             corners.values[i] = (value * per_step).clamp(-32767.0, 32767.0).round() as i16;
             corners.normals[i] = normal.to_array().map(|axis| (127.0 * axis).round() as i8);
         }

@@ -10,9 +10,9 @@ use rayon::prelude::*;
 
 /// Points by their slots.
 pub(super) struct FieldPoints {
-    points: Vec<FieldPoint>,
+    pub(super) points: Vec<FieldPoint>,
     /// True if all normals point to the same side of the surface.
-    has_sides: bool,
+    pub(super) has_sides: bool,
 }
 
 /// The field at a position.
@@ -83,6 +83,49 @@ impl FieldPoints {
         is_valid.then_some(FieldValue { value: sums.value().0, normal, slot: nearest.1 })
     }
 
+    /// Returns the field at the corners of a cube, in the order of the cubes in it, if some of the points have weight at each.
+    /// Slots are not looked for.
+    pub fn corner_values(
+        &self,
+        points: &CellPoints,
+        flips: &[bool],
+        cube: &Aabb,
+    ) -> Option<[(f32, Vec3); LANES]> {
+        let of_axis = |axis: usize| {
+            let ends = [cube.min[axis], cube.max[axis]];
+            [0, 1, 2, 3, 4, 5, 6, 7].map(|i: usize| ends[i >> axis & 1])
+        };
+        let (x, y, z) = (of_axis(0), of_axis(1), of_axis(2));
+        let [mut weights, mut heights] = [[0.0; LANES]; 2];
+        let mut normals = [[0.0; LANES]; 3];
+        for (slot, is_flipped) in points.slots.iter().zip(flips) {
+            let FieldPoint { center, normal, support } = self.points[*slot as usize];
+            let side = if *is_flipped { -normal } else { normal };
+            let inverse = 1.0 / (support * support);
+            // The compiler makes SIMD instructions of this loop.
+            for i in 0..LANES {
+                let offset = [x[i] - center.x, y[i] - center.y, z[i] - center.z];
+                let squared = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
+                let weight = field_weight(squared, inverse);
+                let height = side.x * offset[0] + side.y * offset[1] + side.z * offset[2];
+                weights[i] += weight;
+                heights[i] += weight * height;
+                normals[0][i] += weight * side.x;
+                normals[1][i] += weight * side.y;
+                normals[2][i] += weight * side.z;
+            }
+        }
+        let mut corners = [(0.0, Vec3::ZERO); LANES];
+        for (i, corner) in corners.iter_mut().enumerate() {
+            if weights[i] < MIN_CELL_WEIGHT {
+                return None;
+            }
+            let normal = Vec3::new(normals[0][i], normals[1][i], normals[2][i]);
+            *corner = (heights[i] / weights[i], normal.try_normalize()?);
+        }
+        Some(corners)
+    }
+
     /// True if points enclose a position on the surface.
     pub fn enclose(&self, points: &CellPoints, position: Vec3, normal: Vec3) -> bool {
         let radius = points.mean_support() / FIELD_SUPPORT;
@@ -99,10 +142,10 @@ impl FieldPoints {
 
     /// Returns all points that have weight anywhere.
     pub fn all(&self) -> CellPoints {
-        let mut all = CellPoints::default();
+        let mut all = CellPoints::with_capacity(0);
         for (slot, point) in self.points.iter().enumerate() {
             if 0.0 < point.support {
-                all.push(slot as u32, point);
+                all.push_with_bounds(slot as u32, point);
             }
         }
         all
@@ -112,11 +155,11 @@ impl FieldPoints {
     pub fn within(&self, points: &CellPoints, cell: &Aabb) -> CellPoints {
         let margin = points.margin();
         let cell = Aabb { min: cell.min - margin, max: cell.max + margin };
-        let mut within = CellPoints::default();
+        let mut within = CellPoints::with_capacity(0);
         for slot in &points.slots {
             let point = &self.points[*slot as usize];
             if point.overlaps(&cell) {
-                within.push(*slot, point);
+                within.push_with_bounds(*slot, point);
             }
         }
         within
@@ -161,20 +204,26 @@ const MIN_CELL_WEIGHT: f32 = 1e-3;
 /// Margin of cells in mean supports.
 const MARGIN: f32 = 2e-3;
 /// Minimum cosine between the normals of a cell whose parts are sure to take the same sides: half of 60 degrees.
-const MIN_AGREEING_COSINE: f32 = 0.87;
-
-impl Default for CellPoints {
-    fn default() -> Self {
-        Self { slots: Vec::new(), support_sum: 0.0, bounds: Aabb::EMPTY, n_blocks: 0 }
-    }
-}
+pub(super) const MIN_AGREEING_COSINE: f32 = 0.87;
 
 impl CellPoints {
-    fn push(&mut self, slot: u32, point: &FieldPoint) {
+    /// Returns no points, with memory for some.
+    pub fn with_capacity(capacity: usize) -> Self {
+        let slots = Vec::with_capacity(capacity);
+        Self { slots, support_sum: 0.0, bounds: Aabb::EMPTY, n_blocks: 0 }
+    }
+
+    /// Adds a point whose support does not count for the bounds.
+    #[inline]
+    pub fn push(&mut self, slot: u32, support: f32) {
         let is_in_last_block = self.slots.last().is_some_and(|last| same_block(*last, slot));
         self.n_blocks += usize::from(!is_in_last_block);
         self.slots.push(slot);
-        self.support_sum += f64::from(point.support);
+        self.support_sum += f64::from(support);
+    }
+
+    fn push_with_bounds(&mut self, slot: u32, point: &FieldPoint) {
+        self.push(slot, point.support);
         let ball = Aabb { min: point.center - point.support, max: point.center + point.support };
         self.bounds = self.bounds.union(ball);
     }

@@ -5,7 +5,7 @@ use crate::flat::{FlatCloud, Slot};
 use crate::math::{
     Floats, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, SimdTask, Vec3, Vec3Lanes, set_bits,
 };
-use crate::surface::mls::{self, PlaneSums, PolynomialSums, StepLanes, weight};
+use crate::surface::mls::{self, PlaneLanes, PlaneSums, PolynomialSums, StepLanes, weight};
 use crate::surface::{CandidateHitLanes, EdgeTest, EdgeTestResult, NeighborhoodStats};
 use crate::trace::query::edge_test::{PacketCandidates, enclosed_lanes, lane_mask};
 use crate::trace::query::hit::NearestHits;
@@ -14,16 +14,19 @@ use crate::trace::query::smooth_query::damped;
 use crate::trace::simd::packet_rays::PacketRays;
 use std::marker::PhantomData;
 
-/// Maximum number of fits along a ray: a plane, then polynomials.
-const MAX_FITS: usize = 5;
+/// Maximum number of fits along a ray: planes, then polynomials.
+const MAX_FITS: usize = 6;
+/// Number of planes before polynomials, which cost twice as much. It is fixed, so that no ray depends on the others of its
+/// packet.
+const N_PLANES: usize = 2;
 /// Distance between a fit's position and its intersection, in radii of the ball, at which the intersection is the surface.
-const TOLERANCE: f32 = 0.05;
+const TOLERANCE: f32 = 0.1;
 /// Maximum distance along the ray between a position and the intersection of its fit, in radii of the ball.
 const MAX_STEP: f32 = 1.5;
 /// Maximum distance along the ray between the ball and the surface, in radii of the ball.
 pub const MAX_DISTANCE_FROM_BALL: f32 = 2.0;
 /// Distance that a position may move before the points around it are listed again, in radii of the ball.
-const LIST_MARGIN: f32 = 0.4;
+const LIST_MARGIN: f32 = 0.6;
 /// Distance behind a ball without a surface nearby at which the search goes on, in radii of the ball, and as a fraction of
 /// the distance to the plane that was found.
 const RESTART_OFFSET: f32 = 0.3;
@@ -144,36 +147,43 @@ fn approach<L: Lanes, const N: usize>(
     let mut listed = start;
     let (mut open, mut found, mut stale) = (lanes, 0, lanes);
     let mut last_step = splat(0.0);
+    lists.clear();
     for fit in 1..=MAX_FITS {
         if stale != 0 {
             let mask = lane_mask::<L::PacketLanes>(stale);
-            listed = L::PacketLanes::select(mask, hits.distances, listed);
+            // Most surfaces lie behind the position where the ball is met.
+            let center = hits.distances + splat(if fit == 1 { LIST_MARGIN } else { 0.0 }) * radius;
+            listed = L::PacketLanes::select(mask, center, listed);
             positions.position = rays.origin().plus(direction.scaled(listed));
-            lists.collect::<L>(&cloud.points, positions, stale, mls::SUPPORT_FACTOR + LIST_MARGIN);
+            let support = mls::SUPPORT_FACTOR;
+            lists.collect::<L>(&cloud.points, positions, stale, support + LIST_MARGIN, support);
         }
         let shift = direction.scaled((hits.distances - listed) / radius);
-        let fitted = fit_surface::<L::PacketLanes, N>(lists, shift, direction, fit == 1);
-        let step = damped(fitted.intersection.step, last_step);
-        last_step = step;
+        let fits_planes = N == 1 || fit <= N_PLANES;
+        let (fitted, is_valid) = if fits_planes {
+            let planes = fit_planes(lists, shift, direction);
+            if fit == 1 {
+                let clearance = splat(RESTART_FRACTION) * planes.height.abs().min(splat(MAX_STEP));
+                let ahead = clearance.max(splat(RESTART_OFFSET)) * radius;
+                hits.restarts = hits.restarts + ahead;
+            }
+            (planes.intersect(direction), planes.is_plane)
+        } else {
+            fit_polynomials::<_, N>(lists, shift, hits.normals, direction)
+        };
+        let step = damped(fitted.step, last_step);
+        last_step = if N != 1 && fit == N_PLANES { splat(0.0) } else { step };
         let moved = hits.distances + step * radius;
         let is_near = step.abs().le(splat(MAX_STEP))
             & (moved - start).abs().le(splat(MAX_DISTANCE_FROM_BALL) * radius);
-        let moves = lane_mask::<L::PacketLanes>(open) & fitted.is_plane & is_near;
-        if fit == 1 {
-            let clearance = splat(RESTART_FRACTION) * fitted.height.abs().min(splat(MAX_STEP));
-            let ahead = clearance.max(splat(RESTART_OFFSET)) * radius;
-            hits.restarts = hits.restarts + ahead;
-        }
+        let moves = lane_mask::<L::PacketLanes>(open) & is_valid & is_near;
         hits.distances = L::PacketLanes::select(moves, moved, hits.distances);
-        hits.normals = Vec3Lanes::select(moves, fitted.intersection.normal, hits.normals);
-        let is_final = N == 1 || 1 < fit;
-        let converged = if is_final {
-            (moves & fitted.intersection.step.abs().le(splat(TOLERANCE))).bits()
-        } else {
-            0
-        };
-        found |= converged;
-        open &= moves.bits() & !converged;
+        hits.normals = Vec3Lanes::select(moves, fitted.normal, hits.normals);
+        open &= moves.bits();
+        if N == 1 || !fits_planes {
+            found |= open & fitted.step.abs().le(splat(TOLERANCE)).bits();
+            open &= !found;
+        }
         if open == 0 {
             break;
         }
@@ -185,45 +195,36 @@ fn approach<L: Lanes, const N: usize>(
     found & in_range.bits()
 }
 
-/// The surface fitted around positions, one per lane.
-struct FittedSurface<F: Floats> {
-    intersection: StepLanes<F>,
-    /// Signed distance of the plane.
-    height: F,
-    is_plane: F::Mask,
-}
-
-/// Fits a plane or a polynomial to the listed points, around positions that are moved by `shift` from those of the lists.
+/// Fits planes to the listed points, around positions that are moved by `shift` from those of the lists.
 #[inline(always)]
-fn fit_surface<W: PacketLanes, const N: usize>(
+fn fit_planes<W: PacketLanes>(
     lists: &PointLists,
     shift: Vec3Lanes<W>,
     direction: Vec3Lanes<W>,
-    is_plane: bool,
-) -> FittedSurface<W> {
+) -> PlaneLanes<W> {
     let mut sums = PlaneSums::default();
     for row in lists.rows() {
         let offset = row.offset().minus(shift);
-        sums.add(offset, weight(offset, inverse_support(row.radius())));
+        sums.add(offset, weight(offset, row.inverse_support()));
     }
-    let plane = sums.planes(direction);
-    let intersection = if N == 1 || is_plane {
-        plane.intersect(direction)
-    } else {
-        let mut sums = PolynomialSums::<W, N>::new(plane, mls::SUPPORT_FACTOR);
-        for row in lists.rows() {
-            let offset = row.offset().minus(shift);
-            sums.add(offset, weight(offset, inverse_support(row.radius())));
-        }
-        sums.intersect(direction)
-    };
-    FittedSurface { intersection, height: plane.height, is_plane: plane.is_plane }
+    sums.planes(direction)
 }
 
+/// Fits polynomials of `N` coefficients over planes with these normals through the positions, and returns the lanes in which
+/// there are points enough.
 #[inline(always)]
-fn inverse_support<F: Floats>(radius: F) -> F {
-    let support = F::splat(mls::SUPPORT_FACTOR) * radius;
-    F::splat(1.0) / (support * support)
+fn fit_polynomials<W: PacketLanes, const N: usize>(
+    lists: &PointLists,
+    shift: Vec3Lanes<W>,
+    normals: Vec3Lanes<W>,
+    direction: Vec3Lanes<W>,
+) -> (StepLanes<W>, W::Mask) {
+    let mut sums = PolynomialSums::<W, N>::new(normals, mls::SUPPORT_FACTOR);
+    for row in lists.rows() {
+        let offset = row.offset().minus(shift);
+        sums.add(offset, weight(offset, row.inverse_support()));
+    }
+    (sums.intersect(direction), sums.has_points())
 }
 
 /// Adds the hits in `lanes` that the points enclose, with their nearest points and colours.
@@ -287,7 +288,7 @@ fn find_colors<W: PacketLanes>(
         if !cloud.blends_colors {
             continue;
         }
-        let own = weight(offset, inverse_support(row.radius()));
+        let own = weight(offset, row.inverse_support());
         let own = own * own * own;
         let counts = (mask & W::splat(MIN_COLOR_WEIGHT).lt(own)).bits();
         let own = own.store();

@@ -6,6 +6,7 @@ use crate::surface::mls::Ball;
 use crate::trace::query::closest::closest_shapes;
 use crate::trace::query::hit::Hit;
 use crate::trace::query::mls_query::MlsTracer;
+use crate::trace::query::searching_rays::{CandidatePacket, SearchingRays};
 use crate::trace::simd::packet_rays::PacketRays;
 
 /// Maximum number of balls of a ray that are tried. A ray with more runs along a rim and is taken to miss.
@@ -38,46 +39,26 @@ pub fn mls_hits<L: Lanes, const HAS_COLORS: bool>(
     hits: &mut [MlsHit],
 ) {
     hits.fill(MlsHit::MISS);
-    let mut searching: Vec<u32> = (0..all_rays.len() as u32).collect();
-    let mut rays = all_rays.to_vec();
-    let mut nearest = vec![Hit::MISS; rays.len()];
+    let mut searching = SearchingRays::new(all_rays);
     let mut tracer = MlsTracer::new(cloud);
     for _ in 0..MAX_TRIED_BALLS {
-        let nearest = &mut nearest[..rays.len()];
-        closest_shapes::<L, Ball>(&cloud.points, &rays, nearest);
-        let mut n_candidates = 0;
-        for i in 0..nearest.len() {
-            if !nearest[i].is_miss() {
-                (rays[n_candidates], nearest[n_candidates]) = (rays[i], nearest[i]);
-                searching[n_candidates] = searching[i];
-                n_candidates += 1;
-            }
-        }
-        let mut n_left = 0;
-        for first in (0..n_candidates).step_by(PACKET_WIDTH) {
-            let packet = first..n_candidates.min(first + PACKET_WIDTH);
-            let (mut slots, mut distances) = ([0; PACKET_WIDTH], [0.0; PACKET_WIDTH]);
-            // The surface may lie before a ball, and even before the balls that were tried.
-            let mut whole_rays = [all_rays[0]; PACKET_WIDTH];
-            for (lane, i) in packet.clone().enumerate() {
-                (slots[lane], distances[lane]) = (nearest[i].slot, nearest[i].distance);
-                whole_rays[lane] = all_rays[searching[i] as usize];
-            }
-            let lanes = (1 << packet.len()) - 1;
+        closest_shapes::<L, Ball>(&cloud.points, &searching.rays, &mut searching.nearest);
+        for first in (0..searching.drop_misses()).step_by(PACKET_WIDTH) {
+            let packet = searching.packet(first);
+            let CandidatePacket { rays, slots, distances, .. } = &packet;
             let found = tracer.trace::<L, HAS_COLORS>(
-                &PacketRays::<L::PacketLanes>::new(&whole_rays),
-                lanes,
-                L::PacketLanes::load(&distances),
-                &slots,
+                &PacketRays::<L::PacketLanes>::new(rays),
+                packet.lanes(),
+                L::PacketLanes::load(distances),
+                slots,
             );
             let [x, y, z] = found.normals.store_packet();
             let (found_distances, restarts) = (found.distances.store(), found.restarts.store());
             let found_slots = found.slots.store();
-            for lane in 0..packet.len() {
-                let (ray, ray_idx) = (rays[first + lane], searching[first + lane]);
+            for lane in 0..packet.len {
                 if found.lanes >> lane & 1 == 1 {
                     let slot = found_slots[lane].to_bits();
-                    hits[ray_idx as usize] = MlsHit {
+                    hits[searching.ray_idx(first + lane)] = MlsHit {
                         hit: Hit { distance: found_distances[lane], slot },
                         radius: cloud.points.radius(slots[lane]),
                         normal: Vec3::new(x[lane], y[lane], z[lane]),
@@ -87,13 +68,10 @@ pub fn mls_hits<L: Lanes, const HAS_COLORS: bool>(
                 }
                 // NaN where the points around span no plane.
                 let least = distances[lane] * (1.0 + 2.0 * f32::EPSILON) + f32::MIN_POSITIVE;
-                let t_min = restarts[lane].max(least);
-                (rays[n_left], searching[n_left]) = (Ray { t_min, ..ray }, ray_idx);
-                n_left += 1;
+                searching.restart(first + lane, restarts[lane].max(least));
             }
         }
-        rays.truncate(n_left);
-        if rays.is_empty() {
+        if !searching.keep_restarted() {
             break;
         }
     }

@@ -14,6 +14,7 @@ pub mod edge_test;
 pub mod edge_filter;
 pub mod smooth_query;
 pub mod smooth_filter;
+pub mod searching_rays;
 pub mod point_lists;
 pub mod mls_query;
 pub mod mls_surface;

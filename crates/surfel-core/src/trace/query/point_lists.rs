@@ -4,7 +4,7 @@ use crate::flat::FlatPoints;
 use crate::math::{
     Aabb, Floats, LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Vec3Lanes, set_bits,
 };
-use crate::trace::query::edge_test::PacketCandidates;
+use crate::trace::query::edge_test::{PacketCandidates, lane_mask};
 use crate::trace::traversal::region::{BoxVisitor, query_box};
 use std::marker::PhantomData;
 
@@ -17,7 +17,7 @@ const FAR: f32 = 1e3;
 #[derive(Clone, Copy)]
 pub struct PointRow {
     offset: [[f32; PACKET_WIDTH]; 3],
-    radius: [f32; PACKET_WIDTH],
+    inverse_support: [f32; PACKET_WIDTH],
     /// Slots as the bits of floats.
     pub slot: [f32; PACKET_WIDTH],
 }
@@ -25,7 +25,7 @@ pub struct PointRow {
 impl PointRow {
     const NONE: Self = Self {
         offset: [[FAR; PACKET_WIDTH]; 3],
-        radius: [1.0; PACKET_WIDTH],
+        inverse_support: [1.0; PACKET_WIDTH],
         slot: [0.0; PACKET_WIDTH],
     };
 
@@ -35,19 +35,18 @@ impl PointRow {
         Vec3Lanes::load_packet(&self.offset)
     }
 
-    /// Returns the radii of the points, in radii of the positions.
+    /// Returns the reciprocals of the squared radii of the points' weight functions, in radii of the positions.
     #[inline(always)]
-    pub fn radius<W: PacketLanes>(&self) -> W {
-        W::load(&self.radius)
+    pub fn inverse_support<W: PacketLanes>(&self) -> W {
+        W::load(&self.inverse_support)
     }
 }
 
-/// The points around sixteen positions, those of each position in the order of their slots.
+/// The points around sixteen positions, those of each position in the order of their slots. Positions close to each other
+/// share rows, in which a point is missing for those that it is not near to.
 #[derive(Default)]
 pub struct PointLists {
     rows: Vec<PointRow>,
-    n_rows: usize,
-    n_points: [usize; PACKET_WIDTH],
     blocks: Vec<u32>,
 }
 
@@ -55,10 +54,16 @@ impl PointLists {
     /// Returns the rows: the first one has the first point of each position.
     #[inline(always)]
     pub fn rows(&self) -> &[PointRow] {
-        &self.rows[..self.n_rows]
+        &self.rows
     }
 
-    /// Lists the points within `reach` radii of the positions in `lanes`, instead of what was listed for these.
+    /// Removes all points.
+    pub fn clear(&mut self) {
+        self.rows.clear();
+    }
+
+    /// Lists the points within `reach` radii of the positions in `lanes`, instead of what was listed for these. The weight of
+    /// a point reaches `support_factor` of its radii far.
     #[inline(always)]
     pub fn collect<L: Lanes>(
         &mut self,
@@ -66,12 +71,12 @@ impl PointLists {
         positions: &PacketCandidates<L::PacketLanes>,
         lanes: u32,
         reach: f32,
+        support_factor: f32,
     ) {
-        for lane in set_bits::<PACKET_WIDTH>(lanes) {
-            for row in &mut self.rows[..self.n_points[lane]] {
-                row.offset[0][lane] = FAR;
-            }
-            self.n_points[lane] = 0;
+        let mask = lane_mask::<L::PacketLanes>(lanes);
+        for row in &mut self.rows {
+            let x = L::PacketLanes::load(&row.offset[0]);
+            row.offset[0] = L::PacketLanes::select(mask, L::PacketLanes::splat(FAR), x).store();
         }
         let mut left = lanes;
         while left != 0 {
@@ -83,12 +88,11 @@ impl PointLists {
                 BlockIndices { region: &region, blocks: &mut self.blocks, lanes: PhantomData::<L> };
             query_box::<L>(points, &region, &mut visitor);
             self.blocks.sort_unstable();
-            self.add_group::<L>(points, positions, &region, group, reach);
+            self.add_group::<L>(points, positions, &region, group, (reach, support_factor));
         }
-        self.n_rows = self.n_points.into_iter().max().unwrap_or(0);
     }
 
-    /// Adds the points of the blocks to the lists of a group.
+    /// Adds the points of the blocks that are near to a position of a group to the lists of the group.
     #[inline(always)]
     fn add_group<L: Lanes>(
         &mut self,
@@ -96,38 +100,40 @@ impl PointLists {
         positions: &PacketCandidates<L::PacketLanes>,
         region: &Aabb,
         group: u32,
-        reach: f32,
+        (reach, support_factor): (f32, f32),
     ) {
-        let per_radius = L::PacketLanes::splat(1.0) / positions.radius;
-        let max_squared = L::PacketLanes::splat(reach * reach);
+        let splat = <L::PacketLanes as Floats>::splat;
+        let mask = lane_mask::<L::PacketLanes>(group);
+        let per_radius = splat(1.0) / positions.radius;
+        let per_support = positions.radius * splat(1.0 / support_factor);
+        let max_squared = splat(reach * reach);
+        let (n_before, mut n_listed) = (self.rows.len(), 0);
         for block_idx in &self.blocks {
             let block = &points.blocks[*block_idx as usize];
             let corner = Vec3Lanes::splat(block.corner()).minus(positions.position);
             let offsets = block.offsets::<L>().store();
             let radii = block.radii::<L>().store();
+            if self.rows.len() < n_listed + LANES {
+                self.rows.resize(n_listed + LANES, PointRow::NONE);
+            }
             for point in set_bits::<LANES>(block.lanes_within::<L>(region)) {
                 let offset = corner.plus(Vec3Lanes::splat_lane(&offsets, point)).scaled(per_radius);
-                let near = group & offset.dot(offset).lt(max_squared).bits();
-                if near == 0 {
-                    continue;
-                }
-                let offset = offset.store_packet();
-                let radius = (L::PacketLanes::splat(radii[point]) * per_radius).store();
-                let slot = f32::from_bits(block_idx * LANES as u32 + point as u32);
-                for lane in set_bits::<PACKET_WIDTH>(near) {
-                    let row = self.n_points[lane];
-                    if row == self.rows.len() {
-                        self.rows.push(PointRow::NONE);
-                    }
-                    let row = &mut self.rows[row];
-                    for (own, found) in row.offset.iter_mut().zip(&offset) {
-                        own[lane] = found[lane];
-                    }
-                    (row.radius[lane], row.slot[lane]) = (radius[lane], slot);
-                    self.n_points[lane] += 1;
-                }
+                let near = mask & offset.dot(offset).lt(max_squared);
+                let inverse = per_support * splat(1.0 / radii[point]);
+                let slot = splat(f32::from_bits(block_idx * LANES as u32 + point as u32));
+                // There is no branch: whether a point is near is unpredictable. The next one takes the row of one that is not.
+                let row = &mut self.rows[n_listed];
+                n_listed += usize::from(near.bits() != 0);
+                row.offset = Vec3Lanes::select(near, offset, row.offset()).store_packet();
+                let (inverse_support, slots) =
+                    (row.inverse_support(), L::PacketLanes::load(&row.slot));
+                let inverse_support =
+                    L::PacketLanes::select(near, inverse * inverse, inverse_support);
+                row.inverse_support = inverse_support.store();
+                row.slot = L::PacketLanes::select(near, slot, slots).store();
             }
         }
+        self.rows.truncate(n_before.max(n_listed));
     }
 }
 

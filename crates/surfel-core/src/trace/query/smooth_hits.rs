@@ -6,6 +6,7 @@ use crate::surface::{CandidateHit, EdgeTest, EdgeTestResult, Surfel};
 use crate::trace::query::closest::closest_hits_kernel;
 use crate::trace::query::edge_test::evaluate_one;
 use crate::trace::query::hit::Hit;
+use crate::trace::query::searching_rays::{CandidatePacket, SearchingRays};
 use crate::trace::query::smooth_query::SmoothTracer;
 use crate::trace::query::surface_hit::{MAX_REJECTED_HITS, SurfaceHit};
 use crate::trace::simd::packet_rays::PacketRays;
@@ -22,50 +23,28 @@ pub const MIN_SLIT_COSINE: f32 = 0.5;
 /// Traces all rays together until each hits the smooth surface, or hits no more discs.
 #[inline(always)]
 pub fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
-    let mut searching: Vec<u32> = (0..rays.len() as u32).collect();
-    let all_rays = rays;
-    let mut rays = rays.to_vec();
-    let mut nearest = vec![Hit::MISS; rays.len()];
+    let mut searching = SearchingRays::new(rays);
     let mut tracer = SmoothTracer::new(cloud);
     // The first disc that each ray passed, from its front where front sides are known.
     let mut passed = vec![Hit::MISS; rays.len()];
     for _ in 0..MAX_REJECTED_HITS {
-        let nearest = &mut nearest[..rays.len()];
-        closest_hits_kernel::<L>(cloud, &rays, nearest);
-        let mut n_candidates = 0;
-        for i in 0..nearest.len() {
-            if !nearest[i].is_miss() {
-                (rays[n_candidates], nearest[n_candidates]) = (rays[i], nearest[i]);
-                searching[n_candidates] = searching[i];
-                n_candidates += 1;
-            }
-        }
-        let mut n_left = 0;
-        for first in (0..n_candidates).step_by(PACKET_WIDTH) {
-            let packet = first..n_candidates.min(first + PACKET_WIDTH);
-            let (mut slots, mut distances) = ([0; PACKET_WIDTH], [0.0; PACKET_WIDTH]);
-            for (lane, hit) in nearest[packet.clone()].iter().enumerate() {
-                (slots[lane], distances[lane]) = (hit.slot, hit.distance);
-            }
-            // The surface may lie before a disc, and even before the discs that were rejected.
-            let mut whole_rays = [all_rays[0]; PACKET_WIDTH];
-            for (ray, ray_idx) in whole_rays.iter_mut().zip(&searching[packet.clone()]) {
-                *ray = all_rays[*ray_idx as usize];
-            }
-            let packet_rays = PacketRays::<L::PacketLanes>::new(&whole_rays);
-            let lanes = (1 << packet.len()) - 1;
-            let disc_distances = L::PacketLanes::load(&distances);
-            let found = tracer.trace::<L>(&packet_rays, lanes, disc_distances, &slots);
+        closest_hits_kernel::<L>(cloud, &searching.rays, &mut searching.nearest);
+        for first in (0..searching.drop_misses()).step_by(PACKET_WIDTH) {
+            let packet = searching.packet(first);
+            let CandidatePacket { rays, slots, distances, .. } = &packet;
+            let packet_rays = PacketRays::<L::PacketLanes>::new(rays);
+            let disc_distances = L::PacketLanes::load(distances);
+            let found = tracer.trace::<L>(&packet_rays, packet.lanes(), disc_distances, slots);
             let (found_distances, [r, g, b]) =
                 (found.distances.store(), found.colors.store_packet());
             let [x, y, z] = found.normals.store_packet();
             let nearest_slots = found.slots.store().map(f32::to_bits);
-            for lane in 0..packet.len() {
-                let (ray, ray_idx) = (rays[first + lane], searching[first + lane]);
+            for lane in 0..packet.len {
+                let (ray, ray_idx) = (rays[lane], searching.ray_idx(first + lane));
                 let radius = cloud.points.radius(slots[lane]);
                 if found.lanes >> lane & 1 == 1 {
                     let slot = nearest_slots[lane];
-                    hits[ray_idx as usize] = SurfaceHit {
+                    hits[ray_idx] = SurfaceHit {
                         distance: found_distances[lane],
                         id: cloud.points.id(slot),
                         slot,
@@ -78,22 +57,20 @@ pub fn trace_smooth<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [Surfa
                     continue;
                 }
                 let is_front = cloud.points.normal(slots[lane]).dot(ray.direction) < 0.0;
-                let first = &mut passed[ray_idx as usize];
-                if first.is_miss() && (is_front || !cloud.has_front_sides) {
-                    *first = Hit { distance: distances[lane], slot: slots[lane] };
+                let first_disc = &mut passed[ray_idx];
+                if first_disc.is_miss() && (is_front || !cloud.has_front_sides) {
+                    *first_disc = Hit { distance: distances[lane], slot: slots[lane] };
                 }
                 let behind = distances[lane] + SMOOTH_RESTART_OFFSET * radius;
                 let t_min = behind.max(distances[lane] * (1.0 + 2.0 * f32::EPSILON));
-                (rays[n_left], searching[n_left]) = (Ray { t_min, ..ray }, ray_idx);
-                n_left += 1;
+                searching.restart(first + lane, t_min);
             }
         }
-        rays.truncate(n_left);
-        if rays.is_empty() {
+        if !searching.keep_restarted() {
             break;
         }
     }
-    for ((disc, hit), ray) in passed.iter().zip(hits).zip(all_rays) {
+    for ((disc, hit), ray) in passed.iter().zip(hits).zip(rays) {
         if !disc.is_miss() && is_through_slit::<L>(cloud, disc, hit, ray) {
             let Surfel { normal, radius, color, .. } = cloud.points.surfel(disc.slot);
             let normal = if 0.0 < normal.dot(ray.direction) { -normal } else { normal };
