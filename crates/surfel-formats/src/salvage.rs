@@ -35,11 +35,6 @@ impl<'a> Salvage<'a> {
         self.damage.is_some()
     }
 
-    /// Returns the first damage, if there is any, as the cause of `error`; else `error`.
-    pub fn into_error(self, error: Error) -> Error {
-        self.damage.unwrap_or(error)
-    }
-
     /// Returns damage that may be accepted later; fails as `accept` does.
     pub fn check(&self, mut error: Error) -> Result<Error> {
         let (Error::Malformed { advice, .. } | Error::Truncated { advice, .. }) = &mut error else {

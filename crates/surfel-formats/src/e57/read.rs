@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 use surfel_core::math::DVec3;
-use surfel_core::progress::Progress;
+use surfel_core::progress::{NoProgress, Progress};
 
 use super::document::{Document, read_document, read_header, salvage_document};
 use super::images::embedded_images;
@@ -30,7 +30,12 @@ pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
     // What the XML states does not depend on damage elsewhere.
     let mut salvage = Salvage::new(input, true);
     let header = read_header(&mut salvage)?;
-    let document = read_document(input, &header).map_err(|error| salvage.into_error(error))?;
+    let document = match read_document(input, &header) {
+        Err(_) if salvage.is_damaged() => {
+            salvage_document(input, &header, Pages::new(&input[..header.length]), &NoProgress)?
+        }
+        document => document?,
+    };
     let scans = scans(input, &document)?;
     let columns = columns(&scans);
     Ok(file_info(&document, &scans, &columns))

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use e57::{Record, RecordDataType, RecordName, RecordValue};
 use surfel_core::math::DVec3;
 use surfel_core::points::{STATION, Values};
-use surfel_formats::load_bytes;
+use surfel_formats::{inspect_bytes, load_bytes};
 
 use crate::common::{Listener, read, shared};
 use crate::e57_writer::{Scan, write};
@@ -87,6 +87,8 @@ fn a_page_with_a_wrong_checksum_ends_its_scan() {
 fn positions_are_read_without_a_description() {
     let bytes = three_scans();
     let cut = &bytes[..bytes.len() / 2];
+    // Programs look at a file before they read it.
+    assert_eq!(inspect_bytes("a.e57", cut).unwrap().columns, ["x", "y", "z"]);
     let listener = Listener::default();
     let cloud = load_bytes("a.e57", cut, &options(), &listener).unwrap().cloud;
     assert!(listener.has_note("a.e57: the description of the scans is missing; the first three"));
