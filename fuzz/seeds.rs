@@ -170,7 +170,31 @@ fn write_scans(corpus: &Path) -> Result<(), Box<dyn std::error::Error>> {
     scan.finalize()?;
     writer.finalize()?;
     drop(writer);
-    Ok(fs::write(corpus.join("e57/scans.e57"), file.into_inner())?)
+    fs::write(corpus.join("e57/scans.e57"), file.into_inner())?;
+    write_cut_scans(&corpus.join("e57/cut.e57"))
+}
+
+/// Writes an E57 file of floats and doubles that ends before its description.
+fn write_cut_scans(path: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let mut file = std::io::Cursor::new(Vec::new());
+    let mut writer = E57Writer::new(&mut file, "file")?;
+    let singles = [Record::CARTESIAN_X_F32, Record::CARTESIAN_Y_F32, Record::CARTESIAN_Z_F32];
+    let doubles = [Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64];
+    let values: [fn(f64) -> RecordValue; 2] =
+        [|value| RecordValue::Single(value as f32), RecordValue::Double];
+    for (prototype, value) in [singles, doubles].into_iter().zip(values) {
+        let mut scan = writer.add_pointcloud("scan", prototype.to_vec())?;
+        for i in 0..150 {
+            let angle = f64::from(i) * 0.37;
+            scan.add_point([8.3 * angle.cos(), 9.1 * angle.sin(), angle].map(value).to_vec())?;
+        }
+        scan.finalize()?;
+    }
+    writer.finalize()?;
+    drop(writer);
+    let bytes = file.into_inner();
+    let xml_start = u64::from_le_bytes(*bytes[24..].first_chunk().ok_or("no header")?) as usize;
+    Ok(fs::write(path, &bytes[..xml_start / 1024 * 1024])?)
 }
 
 /// Writes an HDR file in each encoding, and an EXR file.

@@ -249,7 +249,9 @@ fn table(info: &Value) -> String {
         row(if place == 0 { "images" } else { "" }, image_text(image));
     }
     if is_summary {
-        row("columns", text(&info["columns_in_file"]));
+        // The names in files of text are not read before their points.
+        let is_unknown = info["columns_in_file"].as_array().is_none_or(Vec::is_empty);
+        row("columns", text(if is_unknown { &Value::Null } else { &info["columns_in_file"] }));
         return lines.join("\n");
     }
     row("up", text(&info["up"]["reason"]));

@@ -57,7 +57,7 @@ fn option(path: &str, heading: &'static str, key: &Key) -> Arg {
         "HEIGHT" => arg.value_name("HEIGHT").num_args(0..=1).default_missing_value("true"),
         name => arg
             .value_name(name)
-            .allow_hyphen_values(name.contains(',') || ["AXIS", "BOUNDS"].contains(&name)),
+            .allow_hyphen_values(name.contains(',') || ["AXIS", "BOUNDS", "NAMES"].contains(&name)),
     }
 }
 

@@ -30,6 +30,11 @@ impl<'a> Salvage<'a> {
         Ok(())
     }
 
+    /// Returns true if damage was accepted.
+    pub fn is_damaged(&self) -> bool {
+        self.damage.is_some()
+    }
+
     /// Returns damage that may be accepted later; fails as `accept` does.
     pub fn check(&self, mut error: Error) -> Result<Error> {
         let (Error::Malformed { advice, .. } | Error::Truncated { advice, .. }) = &mut error else {

@@ -34,6 +34,8 @@ mod round_trip;
 mod malformed;
 #[path = "formats/salvage.rs"]
 mod salvage;
+#[path = "formats/e57_salvage.rs"]
+mod e57_salvage;
 #[path = "formats/meshes.rs"]
 mod meshes;
 #[path = "formats/mesh_materials.rs"]

@@ -21,7 +21,8 @@ mod program;
 use pyo3::prelude::*;
 
 /// The compiled part of the package `surfel`.
-#[pymodule]
+// Classes are frozen, and what changes in them stands behind locks: a Python without the lock of the interpreter needs none.
+#[pymodule(gil_used = false)]
 #[pyo3(name = "_native")]
 mod native {
     use pyo3::prelude::*;

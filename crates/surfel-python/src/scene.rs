@@ -22,7 +22,7 @@ use surfel::live_view::LiveView;
 use surfel::progress_log::{Choice, ProgressLog};
 use surfel::ray_query::{RayCaster, WorldRays};
 use surfel::{Error, RenderedImage, SceneDescription};
-use surfel_core::image::Image;
+use surfel_core::image::{Image, class_color, class_name};
 use surfel_core::progress::Progress;
 use surfel_core::scene::Background;
 use surfel_core::scene::color::Legend;
@@ -338,12 +338,13 @@ impl PyScene {
     }
 
     /// Makes a picture of the colours of all its pixels, float32, (height, width, 4). Pixels that are NaN show the
-    /// background.
-    #[pyo3(signature = (color, **keys))]
+    /// background. A legend of classes lists `classes`; those of the scene if they are left out.
+    #[pyo3(signature = (color, classes = None, **keys))]
     fn _picture_of(
         &self,
         py: Python<'_>,
         color: &Bound<'_, PyAny>,
+        classes: Option<Vec<u8>>,
         keys: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyImage> {
         let color = column::<f32>(&checked(py, "numbers", ("color", color, [None::<u8>; 3]))?)?;
@@ -357,7 +358,24 @@ impl PyScene {
             }
             image.color.copy_from_slice(pixels);
             show_background(&mut image, view.flat.background);
-            Ok(PyImage::new(view.finished(image), view.flat.origin, Vec::new(), Vec::new()))
+            let legend = match (&view.trees.legend, classes) {
+                (Legend::Classes(_), Some(classes)) => Legend::Classes(
+                    classes.iter().map(|i| (*i, class_name(*i), class_color(*i))).collect(),
+                ),
+                (legend, _) => legend.clone(),
+            };
+            let image = view.finished_with(image, legend);
+            Ok(PyImage::new(image, view.flat.origin, Vec::new(), Vec::new()))
+        })
+    }
+
+    /// Returns the classes that a legend of the scene lists, a byte each, in ascending order.
+    fn _classes(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+        self.with_view(py, None, None, |_, chosen, _| {
+            Ok(match &chosen.view.trees.legend {
+                Legend::Classes(classes) => classes.iter().map(|(class, ..)| *class).collect(),
+                _ => Vec::new(),
+            })
         })
     }
 

@@ -136,6 +136,27 @@ def test_the_ranges_of_colours_are_common(survey):
     assert layout(survey, color="elevation", range=(490, 520)).keys["range"] == (490, 520)
 
 
+def test_the_legend_has_the_classes_of_all_tiles(tmp_path):
+    """The picture is that of all tiles in one scene, whose legend lists the classes of each."""
+    tiles = []
+    for i, others in enumerate([(2, 6), (2, 9)]):
+        x, y = (axis.ravel() for axis in numpy.meshgrid(numpy.linspace(0, 20, 81), numpy.linspace(0, 20, 81)))
+        columns = numpy.stack([x + 20.25 * i, y, 0 * x, numpy.where(x < 10, *others)], axis=1)
+        tiles.append(tmp_path / f"tile_{i}.csv")
+        numpy.savetxt(tiles[-1], columns, fmt="%.3f,%.3f,%.3f,%d", header="x,y,z,classification", comments="")
+    keys = KEYS | {"color": "class", "light": "none"}
+    recipes = [Recipe(tile, **keys, legend=True) for tile in tiles]
+    found = pixels_of_png(render_mosaic(recipes).compute()).astype(int)
+    bare = pixels_of_png(render_mosaic([Recipe(tile, **keys) for tile in tiles]).compute()).astype(int)
+    both = surfel.load(*tiles, **layout(tuple(tiles), **{key: keys[key] for key in ("color", "light")}).keys)
+    both.render(legend=True).save(tmp_path / "whole.png")
+    expected = pixels_of_png((tmp_path / "whole.png").read_bytes()).astype(int)
+    assert found.shape == expected.shape and (found != bare).any()
+    assert (abs(found - expected).max(axis=2) > 1).mean() < 0.001
+    assert surfel.load(tiles[0], color="class")._classes() == bytes([2, 6])
+    assert both._classes() == bytes([2, 6, 9])
+
+
 def test_places_without_tiles_are_background(survey, tmp_path):
     corners = (survey[0], survey[3])
     data = render_mosaic([Recipe(tile, **KEYS, background="transparent") for tile in corners], rim=1).compute()

@@ -14,7 +14,7 @@ use crate::resolve::{
     AutoSettings, KeepOptions, LoadedScene, MemoryEstimate, common_legend, coordinate_system,
     expose, finish_graph, hide_walls, render_settings,
 };
-use crate::scene_keys::{grouping_key, preparation_key, tree_key};
+use crate::scene_keys::{filter_key, grouping_key, preparation_key, tree_key};
 use crate::thread_pools::{lower_priority, start_threads};
 use rayon::ThreadPool;
 use std::sync::{Arc, OnceLock};
@@ -37,6 +37,8 @@ pub struct LiveScene {
     regrouped: Lru2<LoadedScene>,
     /// The content with objects that were added.
     extended: Lru2<LoadedScene>,
+    /// The content without the points that a description drops.
+    filtered: Lru2<LoadedScene>,
     made: Made,
     /// Apart, so that previews leave what was made of all points.
     made_for_previews: Made,
@@ -89,6 +91,7 @@ impl LiveScene {
             loaded: Arc::new(loaded),
             regrouped: Lru2::default(),
             extended: Lru2::default(),
+            filtered: Lru2::default(),
             made: Made::default(),
             made_for_previews: Made::default(),
             renderer: SceneRenderer::new(&description.run)?,
@@ -149,6 +152,28 @@ impl LiveScene {
         })
     }
 
+    /// Makes the choices that a description leaves open, of the points that it keeps; also returns the content with those
+    /// points alone.
+    ///
+    /// # Errors
+    ///
+    /// Fails for settings that do not fit the data, and if cancelled.
+    pub fn choose(
+        &self,
+        description: &SceneDescription,
+        progress: &dyn Progress,
+    ) -> Result<(Arc<LoadedScene>, AutoSettings)> {
+        let loaded = self.loaded_for(description, progress)?;
+        let kept = match loaded.has_more_than(description) {
+            false => loaded,
+            true => self.filtered.get_or_make(filter_key(description), progress, || {
+                loaded.filtered(description, progress)
+            })?,
+        };
+        let auto = AutoSettings::choose(&kept, description, progress)?;
+        Ok((kept, auto))
+    }
+
     /// Returns about how many bytes the scene takes once it is prepared.
     pub fn memory_estimate(&self) -> u64 {
         let subsample = self.startup.objects_default.preparation.subsample;
@@ -203,26 +228,26 @@ impl LiveScene {
         progress: &dyn Progress,
     ) -> Result<LiveView> {
         let loaded = self.loaded_for(description, progress)?;
-        let mut auto = AutoSettings::choose(&loaded, description, progress)?;
+        let (kept, mut auto) = self.choose(description, progress)?;
         if self.use_case == UseCase::Viewers {
             let first = self.hidden_walls.get_or_init(|| auto.hidden_walls.clone());
             let is_open = description.camera.interior() != Interior::Off;
             auto.hidden_walls = if is_open { first.clone() } else { Vec::new() };
         }
-        let mut complete = auto.complete_description(&loaded);
+        let mut complete = auto.complete_description(&kept);
         let settings = Settings { with_aovs: false, ..render_settings(&complete) };
         let time_secs = description.output.time();
         let exposure = description.light.exposure();
         // An automatic exposure is chosen at second 0, as for a movie. Otherwise the first file of a sequence is not read.
         let metered_at = if exposure == Exposure::Auto { 0.0 } else { time_secs };
-        let (_, metered) = self.flat_at(made, &loaded, metered_at, description, &auto, progress)?;
+        let (_, metered) = self.flat_at(made, &kept, metered_at, description, &auto, progress)?;
         let meter = || exposure_stops(exposure, &self.renderer, &metered, &settings, progress);
         let stops = self.preparation_threads.install(meter)?;
         let (trees, mut flat) =
-            self.flat_at(made, &loaded, time_secs, description, &auto, progress)?;
+            self.flat_at(made, &kept, time_secs, description, &auto, progress)?;
         expose(&mut flat, stops);
         complete.light.exposure = Some(Exposure::Stops(stops.into()));
-        let moves_camera = auto.moves_camera(&loaded);
+        let moves_camera = auto.moves_camera(&kept);
         let system = coordinate_system(&loaded, description);
         let unit = system.map_or(Unit::Unknown, |system| system.unit());
         Ok(LiveView { loaded, flat, settings, description: complete, moves_camera, unit, trees })
@@ -354,7 +379,7 @@ fn build(
     progress: &dyn Progress,
 ) -> Result<SceneTrees> {
     let up = auto.up;
-    let legend = common_legend(&clouds, description, up);
+    let legend = common_legend(loaded, &clouds, description, up);
     let raw = loaded.graph_without_points();
     let (mut graph, mut sequences) = finish_graph(loaded, raw, clouds, description, up, progress)?;
     hide_walls(&mut graph, &auto.hidden_walls);
@@ -386,114 +411,4 @@ const PLACEHOLDER_CAMERA: Camera = Camera {
 };
 
 #[cfg(test)]
-mod tests {
-    //! Work on pictures beside other work.
-
-    use super::*;
-    use crate::description::ObjectDescription;
-    use crate::memory_files::MemoryContent;
-    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-    use std::sync::mpsc::channel;
-    use std::thread;
-    use std::time::Duration;
-    use surfel_core::math::Random;
-    use surfel_core::math::Vec3;
-    use surfel_core::points::{PointCloud, Subsample};
-    use surfel_core::progress::NoProgress;
-    use surfel_formats::SaveOptions;
-
-    /// Holds up the threads of a picture at the end of their first tile.
-    #[derive(Default)]
-    struct Halt {
-        n_held: AtomicUsize,
-        is_over: AtomicBool,
-    }
-
-    impl Halt {
-        fn wait_until(&self, is_reached: impl Fn() -> bool) {
-            while !is_reached() {
-                thread::sleep(Duration::from_millis(1));
-            }
-        }
-    }
-
-    impl Progress for Halt {
-        fn advance(&self, _: u64) {
-            self.n_held.fetch_add(1, Ordering::Relaxed);
-            self.wait_until(|| self.is_over.load(Ordering::Relaxed));
-        }
-    }
-
-    fn scene_of_a_plane(name: &str) -> (LiveScene, SceneDescription) {
-        let name = format!("surfel-live-{name}-{}.ply", std::process::id());
-        let path = std::env::temp_dir().join(name);
-        let mut random = Random::new(1, 0);
-        let mut next = || random.below(1000) as f32;
-        let positions = (0..400).map(|_| Vec3::new(next(), next(), 0.0)).collect();
-        let cloud = PointCloud::from_positions(positions);
-        surfel_formats::save(&path, &cloud, &SaveOptions::default(), &NoProgress).unwrap();
-        let description =
-            SceneDescription { files: vec![path.clone()], ..SceneDescription::default() };
-        let scene = LiveScene::open(&description, UseCase::Viewers, &NoProgress).unwrap();
-        std::fs::remove_file(path).unwrap();
-        (scene, description)
-    }
-
-    #[test]
-    fn settings_change_while_all_threads_of_a_picture_are_busy() {
-        let (scene, mut description) = scene_of_a_plane("change");
-        (description.picture.spp, description.picture.light_samples) = (Some(1), Some(1));
-        let view = scene.view(&description, &NoProgress).unwrap();
-        let halt = Halt::default();
-        let n_threads = scene.picture_threads.current_num_threads();
-        let mut changed = description.clone();
-        changed.objects_default.surface.radius_scale = Some(1.5);
-        thread::scope(|scope| {
-            let picture = scope.spawn(|| scene.render(&view, &halt));
-            halt.wait_until(|| halt.n_held.load(Ordering::Relaxed) == n_threads);
-            let (sender, receiver) = channel();
-            let (scene, changed) = (&scene, &changed);
-            scope.spawn(move || sender.send(scene.view(changed, &NoProgress).is_ok()));
-            let is_changed = receiver.recv_timeout(Duration::from_secs(120));
-            halt.is_over.store(true, Ordering::Relaxed);
-            assert_eq!(is_changed, Ok(true));
-            assert!(picture.join().unwrap().is_ok());
-        });
-    }
-
-    #[test]
-    fn an_added_object_joins_the_scene_and_leaves_it() {
-        let (scene, description) = scene_of_a_plane("added");
-        let n_instances = |description: &SceneDescription| {
-            scene.view(description, &NoProgress).unwrap().flat.instances.len()
-        };
-        let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 50.0);
-        let cloud = PointCloud::from_positions((0..400).map(corner).collect());
-        let mut more = description.clone();
-        more.memory.insert("memory:more", MemoryContent::Points(Arc::new(cloud)));
-        more.objects.push(ObjectDescription::new("memory:more"));
-        assert_eq!(n_instances(&more), 2);
-        // The points of the start are prepared once for both.
-        assert!(scene.is_prepared(&more) && scene.is_prepared(&description));
-        assert_eq!(n_instances(&description), 1);
-        let mut other = more.clone();
-        other.objects[0].settings.preparation.subsample = Some(Subsample::Stride(2.0));
-        assert!(!scene.is_prepared(&other));
-        assert_eq!(n_instances(&other), 2);
-        assert!(scene.is_prepared(&description));
-    }
-
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn threads_of_pictures_have_the_lowest_priority() {
-        let (scene, _) = scene_of_a_plane("priority");
-        // The niceness is the 19th value of the file, the 17th behind the name of the thread.
-        let niceness = || {
-            let file = std::fs::read_to_string("/proc/thread-self/stat").unwrap();
-            let after_name = file.rsplit_once(") ").unwrap().1.to_owned();
-            after_name.split(' ').nth(16).unwrap().parse::<i32>().unwrap()
-        };
-        assert_eq!(scene.picture_threads.install(niceness), 19);
-        assert_eq!(scene.preparation_threads.install(niceness), niceness());
-    }
-}
+mod tests;

@@ -26,7 +26,7 @@ pub struct SceneTrees {
     pub flat: FlatScene,
     /// For each geometry, the index that each point had when it was read; empty for triangles.
     pub source_indices: Vec<Vec<u32>>,
-    /// The meaning of the colours of the first cloud.
+    /// The meaning of the colours.
     pub legend: Legend,
 }
 
@@ -52,13 +52,22 @@ pub struct LiveView {
 impl LiveView {
     /// Returns the legend, scale bar, north arrow and caption of pictures of the view.
     pub fn overlay(&self) -> Overlay {
+        self.overlay_with(self.trees.legend.clone())
+    }
+
+    fn overlay_with(&self, legend: Legend) -> Overlay {
         let up = self.description.world.up.unwrap_or(Vec3::Z);
-        Overlay::of(&self.description.picture, self.trees.legend.clone(), (up, self.unit))
+        Overlay::of(&self.description.picture, legend, (up, self.unit))
     }
 
     /// Draws the overlay onto a picture of the view, which becomes a file as the description says.
-    pub fn finished(&self, mut image: Image) -> RenderedImage {
-        self.overlay().draw(&mut image, &self.flat.camera);
+    pub fn finished(&self, image: Image) -> RenderedImage {
+        self.finished_with(image, self.trees.legend.clone())
+    }
+
+    /// Draws the overlay with another legend onto a picture of the view, which becomes a file as the description says.
+    pub fn finished_with(&self, mut image: Image, legend: Legend) -> RenderedImage {
+        self.overlay_with(legend).draw(&mut image, &self.flat.camera);
         let mut options = image_options(&self.description, self.flat.origin);
         options.georeference = self.georeference();
         RenderedImage::new(image, options)

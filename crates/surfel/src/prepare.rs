@@ -2,7 +2,9 @@
 
 use crate::description::{ObjectSettings, SceneDescription};
 use crate::error::{Error, Result};
-use crate::resolve::{MemoryEstimate, keep_matching, report_denoise, report_normals, report_radii};
+use crate::resolve::{
+    MemoryEstimate, check_empty, keep_matching, report_denoise, report_normals, report_radii,
+};
 use std::path::PathBuf;
 use surfel_core::points::{
     Denoise, Duplicates, Orientation, PointCloud, Preparation, clean, denoise, prepare,
@@ -39,8 +41,12 @@ pub fn prepare_files(
     progress: &dyn Progress,
 ) -> Result<Loaded> {
     let Loaded { cloud, info } = load(files, description, progress)?;
-    let cloud = prepared(cloud, description, options, progress);
-    let cloud = cloud.map_err(|cause| Error::Content { files: files.to_vec(), cause })?;
+    let cloud = prepared(cloud, description, options, progress).map_err(|cause| {
+        let settings = &description.objects_default.preparation;
+        let is_empty = cause == surfel_core::Error::EmptyCloud;
+        let filter = is_empty.then(|| check_empty(files, settings)).and_then(Result::err);
+        filter.unwrap_or_else(|| Error::Content { files: files.to_vec(), cause })
+    })?;
     Ok(Loaded { cloud, info })
 }
 

@@ -91,12 +91,13 @@ impl RayCaster<'_> {
     /// Fails if cancelled.
     pub fn hits(&self, rays: &WorldRays, progress: &dyn Progress) -> Result<RayHits> {
         let n = rays.len();
+        // Memory of zeros is touched first by the threads that write hits to it.
         let mut hits = RayHits {
-            t_hit: vec![f32::INFINITY; n],
-            instances: vec![NO_ID; n],
-            primitives: vec![NO_ID; n],
+            t_hit: vec![0.0; n],
+            instances: vec![0; n],
+            primitives: vec![0; n],
             normals: vec![[0.0; 3]; n],
-            points: vec![NO_ID; n],
+            points: vec![0; n],
         };
         let columns = hits.t_hit.par_chunks_mut(CHUNK).zip(hits.instances.par_chunks_mut(CHUNK));
         let columns = columns.zip(hits.primitives.par_chunks_mut(CHUNK));
@@ -109,6 +110,10 @@ impl RayCaster<'_> {
             let ((((t_hit, instances), primitives), normals), points) = columns;
             let found = &mut buffer[..rays.len()];
             scene_hits(self.scene, self.simd, InstanceFilter::All, rays, found);
+            t_hit.fill(f32::INFINITY);
+            for ids in [&mut *instances, &mut *primitives, &mut *points] {
+                ids.fill(NO_ID);
+            }
             for (i, hit) in found.iter().enumerate().filter(|(_, hit)| !hit.is_miss()) {
                 t_hit[i] = hit.distance / lengths[i];
                 instances[i] = hit.instance;

@@ -1,7 +1,9 @@
 //! Hashes of the parts of a description that decide what is read, prepared and built.
 
 use crate::cache::hash_of;
-use crate::description::{LightKind, ObjectDescription, SceneDescription, write_parts};
+use crate::description::{
+    LightKind, ObjectDescription, PreparationSettings, SceneDescription, write_parts,
+};
 use crate::resolve::AutoSettings;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -19,6 +21,14 @@ pub fn preparation_key(description: &SceneDescription) -> u64 {
         grouping_key(description),
     ]);
     hash_of(&parts)
+}
+
+/// A hash of everything that decides which points are there.
+pub fn filter_key(description: &SceneDescription) -> u64 {
+    let scene = &description.objects_default.preparation;
+    let objects = description.objects.iter().map(|object| &object.settings.preparation);
+    let filters = std::iter::once(scene).chain(objects).map(PreparationSettings::filter_values);
+    hash_of(&json!([filters.collect::<Vec<Value>>(), grouping_key(description)]))
 }
 
 /// A hash of everything that decides which files are read as one, which apart, and which geometries are shared.

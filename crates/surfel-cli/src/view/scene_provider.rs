@@ -27,7 +27,6 @@ use surfel::live_view::LiveView;
 use surfel::names::{file_name, list_files};
 use surfel::overlay;
 use surfel::picture::image_options;
-use surfel::resolve::AutoSettings;
 use surfel_core::image::colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
@@ -72,7 +71,7 @@ impl FileSceneProvider {
         let scene = LiveScene::open(&startup, UseCase::Viewers, report)?;
         let rows = Rows::of(&startup);
         name_by_rows(&mut startup, &rows);
-        let auto = AutoSettings::choose(scene.loaded(), scene.startup(), report)?;
+        let (_, auto) = scene.choose(scene.startup(), report)?;
         let moves_camera = auto.moves_camera(scene.loaded());
         let mut startup_settings = page_settings::shown(startup.clone());
         startup_settings.shift_remove("time");
@@ -152,9 +151,8 @@ impl FileSceneProvider {
         settings.insert("resolution".into(), json!(format!("{width}x{height}")));
         let complete = || {
             let description = self.read(&settings).ok()?;
-            let loaded = self.scene.loaded();
-            let auto = AutoSettings::choose(loaded, &description, &NoProgress).ok()?;
-            let complete = auto.complete_description(loaded);
+            let (kept, auto) = self.scene.choose(&description, &NoProgress).ok()?;
+            let complete = auto.complete_description(&kept);
             let mut initial =
                 self.complete_settings(complete, &description, &self.content(&[]), &settings);
             // Chosen once there is something to see.
@@ -356,8 +354,7 @@ impl SceneProvider for FileSceneProvider {
         let mut drawable = settings.clone();
         let faults = || {
             let description = self.read(settings).ok()?;
-            let loaded = self.scene.loaded_for(&description, &NoProgress).ok()?;
-            let auto = AutoSettings::choose(&loaded, &description, &NoProgress).ok()?;
+            let (_, auto) = self.scene.choose(&description, &NoProgress).ok()?;
             Some(overlay::faults(&description.picture, &auto.camera.camera, auto.up))
         };
         for fault in faults().unwrap_or_default() {
@@ -407,11 +404,9 @@ impl SceneProvider for FileSceneProvider {
 
     fn export(&self, settings: &SettingsMap) -> Result<Export> {
         let description = self.read(settings)?;
-        let loaded = self.scene.loaded_for(&description, &NoProgress).map_err(rejection);
-        let loaded = self.folders.removed(loaded)?;
-        let auto = AutoSettings::choose(&loaded, &description, &NoProgress);
-        let auto = self.folders.removed(auto.map_err(rejection))?;
-        let mut complete = auto.complete_description(&loaded);
+        let chosen = self.scene.choose(&description, &NoProgress).map_err(rejection);
+        let (kept, auto) = self.folders.removed(chosen)?;
+        let mut complete = auto.complete_description(&kept);
         let path = camera_path(settings)?;
         let film = path.clone().map(|path| toml_of(&with_path(complete.clone(), path)));
         if let Some(path) = path {
@@ -428,7 +423,7 @@ impl SceneProvider for FileSceneProvider {
             command: command_line(&words),
             toml: toml_of(&complete)?,
             film: film.transpose()?,
-            json: added_files::beside(&format!("{:#}", with_info(&complete, &loaded))),
+            json: added_files::beside(&format!("{:#}", with_info(&complete, &kept))),
         })
     }
 

@@ -312,7 +312,16 @@ fn points_are_chosen_by_their_columns() {
     assert_eq!(n_kept(&["--returns", "first", "--filter", "x[:9]"]), 5);
 
     let none = fail(&["render", &cloud, "-o", &folder.path("no.png"), "--filter", "x > 1000"], 1);
-    assert!(none.contains("0 of 100 points meet x > 1000") && none.contains("no points"), "{none}");
+    assert!(none.contains("0 of 100 points meet x > 1000"), "{none}");
+    assert!(none.contains("returns.csv: no point meets x > 1000"), "{none}");
+    let before = fs::read(&kept).unwrap();
+    for steps in [&[][..], &["--normals"]] {
+        let options = ["prepare", &cloud, "-o", &kept, "--filter", "x > 1000", "--class", "2"];
+        let none = fail(&[&options, steps].concat(), 1);
+        let filter = "no point meets x > 1000 && classification == 2";
+        assert!(none.contains(filter), "{none}");
+        assert!(fs::read(&kept).unwrap() == before);
+    }
     let unknown = fail(&["prepare", &cloud, "-o", &kept, "--filter", "clas == 2"], 1);
     assert!(unknown.contains("'clas'") && unknown.contains("classification"), "{unknown}");
     let broken = fail(&["prepare", &cloud, "-o", &kept, "--filter", "x = 2"], 2);

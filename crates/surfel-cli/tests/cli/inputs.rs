@@ -102,3 +102,15 @@ fn a_file_whose_name_has_a_star_is_not_a_pattern() {
     let plain = folder.write("plain.xyz", square(9, 100));
     assert!(shot(&folder, &[&star]) == shot(&folder, &[&plain]));
 }
+
+#[test]
+fn the_first_column_of_a_text_may_be_skipped() {
+    let folder = Folder::new();
+    let lines: String = (0..100).map(|i| format!("7 {} {} 1\n", i % 10, i / 10)).collect();
+    let cloud = folder.write("numbered.txt", lines);
+    let info = succeed(&["info", "--json", "--columns", "-,x,y,z", &cloud]);
+    let info: serde_json::Value = serde_json::from_str(&info).unwrap();
+    assert_eq!(info["bounds"]["max"], serde_json::json!([9.0, 9.0, 1.0]));
+    let summary = succeed(&["info", "--summary", &cloud]);
+    assert!(summary.contains("columns       not stated"), "{summary}");
+}

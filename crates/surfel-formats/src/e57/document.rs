@@ -3,14 +3,17 @@
 use std::io::Cursor;
 
 use e57::{E57Reader, Image, PointCloud};
+use surfel_core::progress::Progress;
 
-use super::pages::{PAGE_LENGTH, Pages};
+use super::pages::{HEADER_LENGTH, PAGE_LENGTH, Pages};
+use super::partial_xml;
+use super::undescribed::{NO_PACKET, Undescribed, find_scans};
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::salvage::Salvage;
 
-/// Bytes of the header.
-const HEADER_LENGTH: usize = 48;
+/// Maximum bytes of XML that ends early; the crate that parses it accepts as many.
+const MAX_XML_LENGTH: u64 = 50 << 20;
 
 /// The descriptions in a file.
 pub(super) struct Document {
@@ -20,12 +23,24 @@ pub(super) struct Document {
     pub images: Vec<Image>,
     /// Coordinate system of the scans, as WKT or in the words of the file.
     pub coordinate_system: Option<String>,
+    /// False if the descriptions are missing, and those of the scans say only what the points show.
+    pub is_described: bool,
 }
 
 const ADVICE: &str = "copy the file again from its source, or write it again";
 
-/// Checks the header and returns the number of bytes that belong to the file. That the file ends earlier is damage.
-pub(super) fn check_header(salvage: &mut Salvage) -> Result<usize> {
+/// The positions that a valid header states.
+pub(super) struct Header {
+    /// Number of bytes that belong to the file and are there, in whole pages.
+    pub length: usize,
+    /// Byte at which the XML begins.
+    xml_start: u64,
+    /// Bytes of the XML, without checksums.
+    xml_length: u64,
+}
+
+/// Reads the header. That the file ends earlier than it states is damage.
+pub(super) fn read_header(salvage: &mut Salvage) -> Result<Header> {
     let input = salvage.input;
     let number = |byte: usize| {
         let bytes = input.get(byte..byte + 8)?.first_chunk()?;
@@ -47,36 +62,90 @@ pub(super) fn check_header(salvage: &mut Salvage) -> Result<usize> {
         let expected = format!("whole pages of {PAGE_LENGTH}");
         return Err(input.malformed(Location::Byte(16), found, expected, ADVICE));
     }
-    if length <= input.len() as u64 {
-        return Ok(length as usize);
-    }
-    let ends_early = |expected: String| {
-        let location = Location::Byte(input.len() as u64);
-        input.malformed(location, "the end of the file", expected, ADVICE)
-    };
-    let readable = input.len() - input.len() % PAGE_LENGTH;
+    let readable = (input.len() - input.len() % PAGE_LENGTH) as u64;
+    let header = Header { length: length.min(readable) as usize, xml_start, xml_length };
     let xml_end = Pages::content_position(xml_start).saturating_add(xml_length);
-    if Pages::new(&input[..readable]).len() < xml_end {
-        let expected = format!(
-            "{length} bytes; the description of the scans, without which no point can be read, is at byte {xml_start}"
-        );
-        return Err(ends_early(expected));
+    let has_xml = xml_end <= Pages::new(&input[..header.length]).len();
+    if has_xml && length <= input.len() as u64 {
+        return Ok(header);
     }
-    salvage.accept(ends_early(format!("{length} bytes, as its header states")))?;
-    Ok(readable)
+    let expected = match has_xml {
+        true => format!("{length} bytes, as its header states"),
+        false => format!(
+            "{length} bytes; the description of the scans, from byte {xml_start} on, is not whole"
+        ),
+    };
+    let location = Location::Byte(input.len() as u64);
+    salvage.accept(input.malformed(location, "the end of the file", expected, ADVICE))?;
+    Ok(header)
 }
 
-/// Reads the XML of a file whose first `length` bytes belong to it.
-pub(super) fn read_document(input: &Input, length: usize) -> Result<Document> {
-    let reader = E57Reader::new(Cursor::new(&input[..length])).map_err(|error| {
+/// Reads the XML of a file.
+pub(super) fn read_document(input: &Input, header: &Header) -> Result<Document> {
+    parse(&input[..header.length]).map_err(|error| {
         let expected = "a valid header, and XML that describes the scans";
         input.malformed(Location::Byte(0), format!("an error ({error})"), expected, ADVICE)
-    })?;
+    })
+}
+
+/// Returns what the descriptions in a damaged file say, or what its points say if there are none.
+pub(super) fn salvage_document(
+    input: &Input,
+    header: &Header,
+    pages: Pages,
+    progress: &dyn Progress,
+) -> Result<Document> {
+    let note = |line: &str| progress.note(&format!("{}: {line}", input.name));
+    if let Some(document) = partial_document(input, header, pages) {
+        let n_scans = document.scans.len();
+        let scans =
+            if n_scans == 1 { "first scan".into() } else { format!("first {n_scans} scans") };
+        note(&format!(
+            "the description ends early; it has the {scans}, the last maybe without pose"
+        ));
+        return Ok(document);
+    }
+    let Undescribed { scans, skipped } = find_scans(input, pages, progress)?;
+    if scans.is_empty() {
+        let reason = skipped.first().unwrap_or(&NO_PACKET);
+        let found = format!("no description of the scans, and no points without it ({reason})");
+        let location = Location::Byte(header.xml_start);
+        let expected = "the XML that describes the scans";
+        return Err(input.malformed(location, found, expected, ADVICE));
+    }
+    note(&format!(
+        "the description of the scans is missing; the first three fields of {} are taken for positions about \
+         their scanner, and poses, names, colors and all else are lost",
+        if scans.len() == 1 { "a scan".into() } else { format!("{} scans", scans.len()) }
+    ));
+    if let Some(reason) = skipped.first() {
+        note(&format!("{} more lists of points or cells are skipped: {reason}", skipped.len()));
+    }
+    Ok(Document { scans, images: Vec::new(), coordinate_system: None, is_described: false })
+}
+
+/// Reads the descriptions of scans up to the end of the file or the next broken page, if there are any.
+fn partial_document(input: &Input, header: &Header, pages: Pages) -> Option<Document> {
+    let start = Pages::content_position(header.xml_start);
+    let length = header.xml_length.min(pages.whole_length(start)).min(MAX_XML_LENGTH);
+    let mut xml = vec![0; length as usize];
+    pages.copy(start, &mut xml)?;
+    let xml = partial_xml::close(&xml)?;
+    let mut content = input[..HEADER_LENGTH].to_vec();
+    content[24..32].copy_from_slice(&(HEADER_LENGTH as u64).to_le_bytes());
+    content[32..40].copy_from_slice(&(xml.len() as u64).to_le_bytes());
+    content.extend(xml.as_bytes());
+    parse(&Pages::file_of(&content)).ok().filter(|document| !document.scans.is_empty())
+}
+
+fn parse(bytes: &[u8]) -> e57::Result<Document> {
+    let reader = E57Reader::new(Cursor::new(bytes))?;
     let coordinate_system =
         reader.coordinate_metadata().map(str::trim).filter(|text| !text.is_empty());
     Ok(Document {
         scans: reader.pointclouds(),
         images: reader.images(),
         coordinate_system: coordinate_system.map(str::to_owned),
+        is_described: true,
     })
 }

@@ -1,9 +1,11 @@
 //! E57: the exchange format of laser scanners (ASTM E2807), with the pose of each scan.
 
 mod pages;
-mod document;
 mod streams;
 mod values;
+mod partial_xml;
+mod undescribed;
+mod document;
 mod columns;
 mod scan;
 mod images;

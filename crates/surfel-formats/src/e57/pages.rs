@@ -7,6 +7,8 @@ use crate::error::Result;
 
 /// Bytes of a page with its checksum; the standard allows no other size.
 pub(super) const PAGE_LENGTH: usize = 1024;
+/// Bytes of the header, with which the first page begins.
+pub(super) const HEADER_LENGTH: usize = 48;
 /// Bytes of a page without its checksum.
 const CONTENT_LENGTH: usize = PAGE_LENGTH - 4;
 /// Number of pages that a task checks between two checks for cancellation.
@@ -38,8 +40,7 @@ impl<'a> Pages<'a> {
             progress.check()?;
             let is_broken = |page: &[u8; PAGE_LENGTH]| {
                 let (content, checksum) = page.split_at(CONTENT_LENGTH);
-                // The standard's library writes the checksum with its most significant byte first.
-                crc32c::crc32c(content).to_be_bytes() != *checksum
+                self::checksum(content) != *checksum
             };
             let first = task * PAGES_PER_TASK;
             let broken = pages.iter().enumerate().filter(|(_, page)| is_broken(page));
@@ -66,12 +67,15 @@ impl<'a> Pages<'a> {
 
     /// Returns true if the pages have `length` bytes of content at position `at`, none of them in a broken page.
     pub fn are_whole(&self, at: u64, length: u64) -> bool {
-        let Some(end) = at.checked_add(length).filter(|end| *end <= self.len()) else {
-            return false;
-        };
+        length <= self.whole_length(at) && at <= self.len()
+    }
+
+    /// Returns the number of bytes of content from position `at` to the end or to the next broken page.
+    pub fn whole_length(&self, at: u64) -> u64 {
         let is_before = |page: &usize| (*page as u64 + 1) * CONTENT_LENGTH as u64 <= at;
         let next_broken = self.broken.get(self.broken.partition_point(is_before));
-        next_broken.is_none_or(|page| end <= *page as u64 * CONTENT_LENGTH as u64)
+        let end = next_broken.map_or(self.len(), |page| *page as u64 * CONTENT_LENGTH as u64);
+        end.saturating_sub(at)
     }
 
     /// Copies the content from position `at` on; returns `None` if it is not whole before `out` is full.
@@ -89,12 +93,29 @@ impl<'a> Pages<'a> {
         Some(())
     }
 
+    /// Returns the file whose pages have this content, with valid checksums; the last page ends with zeros.
+    pub fn file_of(content: &[u8]) -> Vec<u8> {
+        let pages = content.chunks(CONTENT_LENGTH).map(|content| {
+            let mut page = [0; PAGE_LENGTH];
+            page[..content.len()].copy_from_slice(content);
+            let checksum = checksum(&page[..CONTENT_LENGTH]);
+            page[CONTENT_LENGTH..].copy_from_slice(&checksum);
+            page
+        });
+        pages.collect::<Vec<_>>().into_flattened()
+    }
+
     /// Returns the next `N` bytes of the content at `at`, if there are as many.
     pub fn bytes<const N: usize>(&self, at: u64) -> Option<[u8; N]> {
         let mut bytes = [0; N];
         self.copy(at, &mut bytes)?;
         Some(bytes)
     }
+}
+
+/// Returns the checksum of a page's content. The standard's library writes its most significant byte first.
+fn checksum(content: &[u8]) -> [u8; 4] {
+    crc32c::crc32c(content).to_be_bytes()
 }
 
 #[cfg(test)]

@@ -4,9 +4,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 use surfel_core::math::DVec3;
-use surfel_core::progress::Progress;
+use surfel_core::progress::{NoProgress, Progress};
 
-use super::document::{Document, check_header, read_document};
+use super::document::{Document, read_document, read_header, salvage_document};
 use super::images::embedded_images;
 use super::pages::{PAGE_LENGTH, Pages};
 use super::scan::{Scan, union};
@@ -29,7 +29,13 @@ const BLOCKS_PER_BATCH: usize = 32;
 pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
     // What the XML states does not depend on damage elsewhere.
     let mut salvage = Salvage::new(input, true);
-    let document = read_document(input, check_header(&mut salvage)?)?;
+    let header = read_header(&mut salvage)?;
+    let document = match read_document(input, &header) {
+        Err(_) if salvage.is_damaged() => {
+            salvage_document(input, &header, Pages::new(&input[..header.length]), &NoProgress)?
+        }
+        document => document?,
+    };
     let scans = scans(input, &document)?;
     let columns = columns(&scans);
     Ok(file_info(&document, &scans, &columns))
@@ -42,25 +48,22 @@ pub(crate) fn read(
     progress: &dyn Progress,
 ) -> Result<Loaded> {
     let mut salvage = Salvage::new(input, options.salvage);
-    let length = check_header(&mut salvage)?;
-    let pages = Pages::new(&input[..length]);
+    let header = read_header(&mut salvage)?;
+    let pages = Pages::new(&input[..header.length]);
     let broken = pages.find_broken(progress)?;
-    let document = read_document(input, length);
     if let Some(page) = broken.first() {
-        let broken_page = input.malformed(
+        salvage.accept(input.malformed(
             Location::Byte((page * PAGE_LENGTH) as u64),
             "a page whose checksum is wrong",
             "the bytes that were written",
             "copy the file again from its source",
-        );
-        // Without the document nothing can be salvaged.
-        match document {
-            Err(_) => return Err(broken_page),
-            Ok(_) => salvage.accept(broken_page)?,
-        }
+        ))?;
     }
-    let document = document?;
     let pages = pages.without(&broken);
+    let document = match read_document(input, &header) {
+        Err(_) if salvage.is_damaged() => salvage_document(input, &header, pages, progress)?,
+        document => document?,
+    };
     let scans = scans(input, &document)?;
     let mut columns = columns(&scans);
     let mut info = file_info(&document, &scans, &columns);
@@ -103,7 +106,9 @@ pub(crate) fn read(
         }
         n_scan_points.push(builder.n_points() - n_before);
     }
-    salvage.report("points", n_points, Some(n_claimed), progress)?;
+    // Without a description nothing claims a number.
+    let n_claimed = document.is_described.then_some(n_claimed);
+    salvage.report("points", n_points, n_claimed, progress)?;
     info.n_points = Some(n_points);
     let n_invalid = n_invalid.into_inner();
     if 0 < n_invalid {
@@ -136,7 +141,9 @@ fn scans(input: &Input, document: &Document) -> Result<Vec<Scan>> {
             let found = format!("{n_fields} fields in scan {i}");
             return Err(malformed(found, format!("at most {MAX_FIELDS}")));
         }
-        Scan::new(description).ok_or_else(|| {
+        // Where nothing says which points were measured, those at the scanner were not.
+        let has_empty_cells = description.has_row_column() || !document.is_described;
+        Scan::new(description, has_empty_cells).ok_or_else(|| {
             let expected = "cartesianX, Y and Z, or sphericalRange, Azimuth and Elevation";
             malformed(format!("scan {i} without coordinates"), expected.into())
         })

@@ -55,8 +55,9 @@ pub(super) fn union([a, b]: [DVec3; 2], [c, d]: [DVec3; 2]) -> [DVec3; 2] {
 }
 
 impl Scan {
-    /// The scan of a description; `None` if its points have no coordinates.
-    pub fn new(description: &PointCloud) -> Option<Self> {
+    /// The scan of a description, in which points at the scanner may be cells without a measurement; `None` if its points
+    /// have no coordinates.
+    pub fn new(description: &PointCloud, has_empty_cells: bool) -> Option<Self> {
         let find =
             |name: RecordName| description.prototype.iter().position(|record| record.name == name);
         let coordinates = |names: [RecordName; 3], invalid_state| {
@@ -96,7 +97,7 @@ impl Scan {
             columns,
             cartesian,
             spherical,
-            has_empty_cells: description.has_row_column(),
+            has_empty_cells,
             rotation: if is_rotation { rotation.normalize() } else { DQuat::IDENTITY },
             translation: DVec3::new(t.x, t.y, t.z),
         })

@@ -7,10 +7,12 @@ use crate::error::{Location, Result};
 use crate::salvage::Salvage;
 
 /// First byte of the section that holds a scan's packets.
-const SECTION_ID: u8 = 1;
+pub(super) const SECTION_ID: u8 = 1;
+/// Bytes of a section before its packets.
+pub(super) const SECTION_HEADER_LENGTH: u64 = 32;
 /// First bytes of packets: an index of packets, values, or nothing of use.
 const INDEX_PACKET: u8 = 0;
-const DATA_PACKET: u8 = 1;
+pub(super) const DATA_PACKET: u8 = 1;
 const IGNORED_PACKET: u8 = 2;
 /// Bytes of a data packet before the lengths of its streams' parts.
 const DATA_HEADER_LENGTH: u64 = 6;
@@ -35,6 +37,14 @@ impl Stream {
     /// Returns the number of bytes.
     pub fn len(&self) -> u64 {
         self.length
+    }
+
+    /// Returns true if each packet has as many bytes of this stream as of `other`.
+    pub fn is_parallel_to(&self, other: &Self) -> bool {
+        let mut parts = self.segments.iter().zip(&other.segments);
+        self.length == other.length
+            && self.segments.len() == other.segments.len()
+            && parts.all(|(part, other)| part.start == other.start)
     }
 
     /// Copies the bytes from `start` on; the stream must have them.
@@ -77,7 +87,7 @@ pub(super) fn find_streams(
         let location = Location::Byte(Pages::file_position(at));
         input.malformed(location, found, expected, "copy the file again from its source")
     };
-    let Some(header) = pages.bytes::<32>(start) else {
+    let Some(header) = pages.bytes::<{ SECTION_HEADER_LENGTH as usize }>(start) else {
         salvage.accept(malformed(start, "the end of the file".into(), "a section of points"))?;
         return Ok(streams);
     };
@@ -117,6 +127,11 @@ pub(super) fn find_streams(
     Ok(streams)
 }
 
+/// Returns the number of streams in the data packet at a position in the pages' content.
+pub(super) fn n_streams(pages: Pages, at: u64) -> usize {
+    pages.bytes::<2>(at + 4).map_or(0, u16::from_le_bytes).into()
+}
+
 /// Adds the parts of the streams in a data packet; fails with what was found and what was expected.
 fn add_packet(
     streams: &mut [Stream],
@@ -124,8 +139,8 @@ fn add_packet(
     at: u64,
     length: u64,
 ) -> std::result::Result<(), (String, String)> {
-    let n_found = pages.bytes::<2>(at + 4).map_or(0, u16::from_le_bytes);
-    if usize::from(n_found) != streams.len() {
+    let n_found = n_streams(pages, at);
+    if n_found != streams.len() {
         let expected = format!("{}, one for each field", streams.len());
         return Err((format!("a packet of {n_found} streams"), expected));
     }

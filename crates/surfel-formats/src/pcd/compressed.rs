@@ -31,10 +31,13 @@ pub(super) fn records(input: &Input, header: &Header, progress: &dyn Progress) -
         let expected = format!("{expected_bytes}, as its fields and points take");
         return Err(input.malformed(location, format!("{n_bytes} bytes"), expected, ADVICE));
     }
-    // Values are stored field by field, so no point is whole in a part of the data.
-    let data = data
-        .get(..n_compressed as usize)
-        .ok_or_else(|| input.truncated(Location::Byte(input.len() as u64), 0, n_points))?;
+    let data = data.get(..n_compressed as usize).ok_or_else(|| {
+        let found = format!("the end of the file, so that 0 of {n_points} points are whole");
+        let expected = format!(
+            "{n_compressed} compressed bytes, which hold all values of a field before those of the next"
+        );
+        input.malformed(Location::Byte(input.len() as u64), found, expected, ADVICE)
+    })?;
     if data.len().saturating_mul(MAX_RATIO) < n_bytes as usize {
         let location = Location::Byte(header.body as u64);
         let expected = format!("at most {} from {} bytes", data.len() * MAX_RATIO, data.len());

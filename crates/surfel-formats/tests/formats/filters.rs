@@ -58,6 +58,12 @@ fn unknown_columns_are_rejected() {
         let error = load_bytes(name, &bytes, &filtered("shade == 1"), &NoProgress).unwrap_err();
         assert!(error.to_string().contains("'shade'"), "{name}: {error}");
     }
+    // Columns that the filter does not need are known as well, though they are not read.
+    let columns = ColumnChoice::Only(vec![Column::Colors]);
+    let options = LoadOptions { columns, ..filtered("number_of_return == 2") };
+    let bytes = encode_cloud(&full_cloud(5), "las");
+    let error = load_bytes("a.las", &bytes, &options, &NoProgress).unwrap_err().to_string();
+    assert!(error.contains(", return_number, number_of_returns, classification, "), "{error}");
 }
 
 #[test]

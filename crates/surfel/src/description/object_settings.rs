@@ -322,6 +322,11 @@ impl PreparationSettings {
         by_column || self.crop.is_some()
     }
 
+    /// Returns the values of the settings that say which points are kept.
+    pub(crate) fn filter_values(&self) -> Value {
+        ["filter", "class", "returns", "crop"].map(|key| self.get(key)).into_iter().collect()
+    }
+
     /// Returns true if the settings say how normals are estimated.
     pub fn estimates_normals(&self) -> bool {
         self.normals_k.is_some() || self.normals_radius.is_some()

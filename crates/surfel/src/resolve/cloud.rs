@@ -1,10 +1,11 @@
 //! A cloud on its way from the file to a surface: read, prepared, coloured.
 
 use crate::description::{Invalid, ObjectSettings, PreparationSettings};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::memory_files::{MemoryContent, MemoryFiles};
+use crate::names::list_files;
 use crate::progress_log::NotesAsChoices;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::Neighborhood;
 use surfel_core::points::{
@@ -121,6 +122,16 @@ pub(crate) fn keep_matching(
     cloud.retain_from(0, &matches);
     progress.note(&format!("{} of {n_points} points meet {filter}", cloud.len()));
     Ok(())
+}
+
+/// Reports the filter of settings with which files gave no point.
+///
+/// # Errors
+///
+/// Fails if there is a filter.
+pub fn check_empty(files: &[PathBuf], settings: &PreparationSettings) -> Result<()> {
+    let Some(filter) = settings.point_filter()? else { return Ok(()) };
+    Err(Error::Unfit(format!("{}: no point meets {filter}", list_files(files))))
 }
 
 /// Returns true if a cloud has the values of a colour source, or gets them when it is prepared.

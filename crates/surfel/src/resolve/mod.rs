@@ -15,6 +15,7 @@ mod appearance;
 mod sequence;
 mod check_files;
 mod loaded;
+mod common_legend;
 mod plan;
 mod sun_position;
 mod complete_description;
@@ -26,8 +27,10 @@ pub use camera::{
 pub use check_files::check_files;
 pub(crate) use cloud::keep_matching;
 pub use cloud::{
-    can_be_colored, prepare_cloud, report_denoise, report_normals, report_prepared, report_radii,
+    can_be_colored, check_empty, prepare_cloud, report_denoise, report_normals, report_prepared,
+    report_radii,
 };
+pub(crate) use common_legend::common_legend;
 pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;
 pub use loaded::{KeepOptions, LoadedFile, LoadedScene};
@@ -53,10 +56,9 @@ use station::{choose_station, stand_at_station};
 use sun_and_sky::{LightingContext, ScanInView, choose_lights, lights};
 use sun_position::stand_sun_at_date;
 use surfel_core::math::Vec3;
-use surfel_core::points::PreparedCloud;
 use surfel_core::progress::Progress;
 use surfel_core::render::Settings;
-use surfel_core::scene::color::{Legend, legend};
+use surfel_core::scene::color::Legend;
 use surfel_core::scene::{Camera, ClipPlane, Light, Projection, Room, Scene, inlier_bounds};
 use surfel_core::surface::SurfaceKind;
 use surfel_formats::FileInfo;
@@ -193,7 +195,7 @@ impl LoadedScene {
         let AutoSettings { up, camera, lights, description, hidden_walls, turned_room } = auto;
         let clouds = self.take_prepared(&description, progress)?;
         let legend = match description.picture.legend() {
-            true => common_legend(&clouds, &description, up),
+            true => common_legend(&self, &clouds, &description, up),
             false => Legend::None,
         };
         let raw = std::mem::take(&mut self.graph);
@@ -257,17 +259,6 @@ pub fn render_settings(description: &SceneDescription) -> Settings {
         point_size: picture.point_size.map_or(Settings::default().point_size, |size| size as f32),
         with_aovs: description.output.output.is_none() || is_exr(description),
     }
-}
-
-/// Returns the legend of the first cloud, which others share unless they have colours of their own.
-pub(crate) fn common_legend(
-    clouds: &[PreparedCloud],
-    description: &SceneDescription,
-    up: Vec3,
-) -> Legend {
-    let coloring = description.objects_default.coloring(up);
-    let first = clouds.first().map(|cloud| legend(cloud, &coloring));
-    first.and_then(|legend| legend.ok()).unwrap_or(Legend::None)
 }
 
 /// Returns true if the picture is written with all layers, for other programs rather than to be looked at.

@@ -171,8 +171,12 @@ def _overlap(a, b):
 
 
 def _part(layout, i):
+    """The pixels of a tile's region and the classes of its points; none if it has no pixel."""
     region = layout.regions[i]
-    return region and _worker.scene(layout.recipe(i))._render_region(*region)
+    if region is None:
+        return None
+    scene = _worker.scene(layout.recipe(i))
+    return scene._render_region(*region), scene._classes()
 
 
 def _joined(layout, parts, format):
@@ -184,8 +188,9 @@ def _joined(layout, parts, format):
         if part is not None:
             pixels = slice(*region[1]), slice(*region[0])
             own = owners[pixels] == i
-            color[pixels][own] = part[own]
+            color[pixels][own] = part[0][own]
+    classes = set().union(*(part[1] for part in parts if part is not None))
     first = layout.recipes[0]
-    # What is drawn over the plan does not depend on the points.
+    # Of what is drawn over the plan, only the classes depend on the points.
     scene = first.derived(first.paths, **layout.keys | {"subsample": "random:1000"}).scene()
-    return _worker.encoded(scene._picture_of(color), format)
+    return _worker.encoded(scene._picture_of(color, sorted(classes)), format)

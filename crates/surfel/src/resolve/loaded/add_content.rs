@@ -1,9 +1,11 @@
 //! Adds files, objects, sequences and movements to the content of a scene.
 
-use super::super::cloud::{ImportOptions, graph_of, import, into_cloud};
+use super::super::cloud::{ImportOptions, check_empty, graph_of, import, into_cloud};
 use super::super::sequence::{GeometrySlots, Sequence, element_counts, is_streamed};
 use super::{LoadedFile, LoadedScene, ObjectNodes};
-use crate::description::{ObjectDescription, ObjectMotion, ObjectSettings, SceneDescription};
+use crate::description::{
+    ObjectDescription, ObjectMotion, ObjectSettings, PreparationSettings, SceneDescription,
+};
 use crate::error::{Error, Result};
 use crate::names::file_name;
 use crate::progress_log::ProgressLog;
@@ -57,7 +59,8 @@ impl LoadedScene {
             if clouds.is_empty() {
                 continue;
             }
-            let graph = merged(clouds, &files, progress)?;
+            let preparation = &description.objects_default.preparation;
+            let graph = merged(clouds, &files, preparation, progress)?;
             let nodes = self.append(graph, None);
             self.files.extend(files.into_iter().map(|file| (file, nodes.clone())));
         }
@@ -167,7 +170,7 @@ impl LoadedScene {
             self.append_below(above, graph, owner);
         }
         if object.merge() {
-            let graph = merged(merging, &object.files, progress)?;
+            let graph = merged(merging, &object.files, &settings.preparation, progress)?;
             self.append_below(node, graph, owner);
         }
         Ok(())
@@ -250,10 +253,12 @@ impl LoadedScene {
 fn merged(
     clouds: Vec<Loaded>,
     files: &[PathBuf],
+    settings: &PreparationSettings,
     progress: &dyn Progress,
 ) -> Result<Graph<PointCloud>> {
     let cloud = surfel_formats::merge_loaded(clouds, files, progress).cloud;
     if cloud.is_empty() {
+        check_empty(files, settings)?;
         let cause = surfel_core::Error::EmptyCloud;
         return Err(Error::Content { files: files.to_vec(), cause });
     }

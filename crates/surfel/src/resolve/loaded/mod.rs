@@ -1,10 +1,11 @@
 //! The content of all files of a description, side by side in one graph, before it is prepared.
 
 mod add_content;
+mod filtered;
 
 use super::camera::{camera_motion, keep_named_camera};
 use super::check_files::{check_files, n_pixels};
-use super::cloud::{can_be_colored, filter_cloud, prepare_cloud};
+use super::cloud::{can_be_colored, check_empty, filter_cloud, prepare_cloud};
 use super::environment::load_environment;
 use super::memory::MemoryEstimate;
 use super::sequence::Sequence;
@@ -48,6 +49,8 @@ pub struct LoadedScene {
     /// Sequences whose files are read one by one.
     pub(super) sequences: Vec<Sequence>,
     keeps_all_columns: bool,
+    /// True if points that the description does not keep were dropped.
+    is_filtered: bool,
 }
 
 /// The content of a file, and what was unusual about it.
@@ -111,6 +114,7 @@ impl LoadedScene {
             owners: Vec::new(),
             sequences: Vec::new(),
             keeps_all_columns: keep.all_columns,
+            is_filtered: !keep.all_columns,
         };
         let motions = object_motions(description)?;
         scene.add_files(description, progress)?;
@@ -326,6 +330,11 @@ impl LoadedScene {
         }
     }
 
+    /// Returns true if a description shows a geometry: it hides objects only.
+    pub(super) fn is_shown(&self, geometry: usize, description: &SceneDescription) -> bool {
+        self.owners[geometry].is_none_or(|object| description.objects[object].visible())
+    }
+
     /// Returns the files that a geometry came from.
     pub(super) fn files_of<'d>(
         &self,
@@ -383,11 +392,13 @@ impl LoadedScene {
         progress: &dyn Progress,
     ) -> Result<PreparedCloud> {
         let settings = self.settings_of(geometry, description);
-        let cloud = match self.keeps_all_columns {
-            true => filter_cloud(cloud, &settings.preparation, progress)?,
-            // The points were filtered while they were read.
-            false => cloud,
+        let cloud = match self.is_filtered {
+            true => cloud,
+            false => filter_cloud(cloud, &settings.preparation, progress)?,
         };
+        if cloud.is_empty() {
+            check_empty(self.files_of(geometry, description), &settings.preparation)?;
+        }
         let prepared = prepare_cloud(cloud, &settings, description.picture.seed(), progress);
         let mut prepared =
             prepared.map_err(|cause| self.content_error(geometry, description, cause))?;

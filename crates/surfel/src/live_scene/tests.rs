@@ -1,0 +1,140 @@
+//! Work on pictures beside other work.
+
+use super::*;
+use crate::description::ObjectDescription;
+use crate::memory_files::MemoryContent;
+use crate::resolve::resolve;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::channel;
+use std::thread;
+use std::time::Duration;
+use surfel_core::math::Random;
+use surfel_core::math::Vec3;
+use surfel_core::points::{PointCloud, Subsample};
+use surfel_core::progress::NoProgress;
+use surfel_formats::SaveOptions;
+
+/// Holds up the threads of a picture at the end of their first tile.
+#[derive(Default)]
+struct Halt {
+    n_held: AtomicUsize,
+    is_over: AtomicBool,
+}
+
+impl Halt {
+    fn wait_until(&self, is_reached: impl Fn() -> bool) {
+        while !is_reached() {
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
+
+impl Progress for Halt {
+    fn advance(&self, _: u64) {
+        self.n_held.fetch_add(1, Ordering::Relaxed);
+        self.wait_until(|| self.is_over.load(Ordering::Relaxed));
+    }
+}
+
+fn scene_of_a_plane(name: &str) -> (LiveScene, SceneDescription) {
+    let name = format!("surfel-live-{name}-{}.ply", std::process::id());
+    let path = std::env::temp_dir().join(name);
+    let mut random = Random::new(1, 0);
+    let mut next = || random.below(1000) as f32;
+    let positions = (0..400).map(|_| Vec3::new(next(), next(), 0.0)).collect();
+    let cloud = PointCloud::from_positions(positions);
+    surfel_formats::save(&path, &cloud, &SaveOptions::default(), &NoProgress).unwrap();
+    let description = SceneDescription { files: vec![path.clone()], ..SceneDescription::default() };
+    let scene = LiveScene::open(&description, UseCase::Viewers, &NoProgress).unwrap();
+    std::fs::remove_file(path).unwrap();
+    (scene, description)
+}
+
+#[test]
+fn settings_change_while_all_threads_of_a_picture_are_busy() {
+    let (scene, mut description) = scene_of_a_plane("change");
+    (description.picture.spp, description.picture.light_samples) = (Some(1), Some(1));
+    let view = scene.view(&description, &NoProgress).unwrap();
+    let halt = Halt::default();
+    let n_threads = scene.picture_threads.current_num_threads();
+    let mut changed = description.clone();
+    changed.objects_default.surface.radius_scale = Some(1.5);
+    thread::scope(|scope| {
+        let picture = scope.spawn(|| scene.render(&view, &halt));
+        halt.wait_until(|| halt.n_held.load(Ordering::Relaxed) == n_threads);
+        let (sender, receiver) = channel();
+        let (scene, changed) = (&scene, &changed);
+        scope.spawn(move || sender.send(scene.view(changed, &NoProgress).is_ok()));
+        let is_changed = receiver.recv_timeout(Duration::from_secs(120));
+        halt.is_over.store(true, Ordering::Relaxed);
+        assert_eq!(is_changed, Ok(true));
+        assert!(picture.join().unwrap().is_ok());
+    });
+}
+
+#[test]
+fn an_added_object_joins_the_scene_and_leaves_it() {
+    let (scene, description) = scene_of_a_plane("added");
+    let n_instances = |description: &SceneDescription| {
+        scene.view(description, &NoProgress).unwrap().flat.instances.len()
+    };
+    let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 50.0);
+    let cloud = PointCloud::from_positions((0..400).map(corner).collect());
+    let mut more = description.clone();
+    more.memory.insert("memory:more", MemoryContent::Points(Arc::new(cloud)));
+    more.objects.push(ObjectDescription::new("memory:more"));
+    assert_eq!(n_instances(&more), 2);
+    // The points of the start are prepared once for both.
+    assert!(scene.is_prepared(&more) && scene.is_prepared(&description));
+    assert_eq!(n_instances(&description), 1);
+    let mut other = more.clone();
+    other.objects[0].settings.preparation.subsample = Some(Subsample::Stride(2.0));
+    assert!(!scene.is_prepared(&other));
+    assert_eq!(n_instances(&other), 2);
+    assert!(scene.is_prepared(&description));
+}
+
+#[test]
+fn choices_are_those_of_a_picture_of_the_same_points() {
+    let path = std::env::temp_dir().join(format!("surfel-live-kept-{}.ply", std::process::id()));
+    // A wall, and far from it a floor.
+    let wall = (0..400).map(|i| Vec3::new((i % 20) as f32, 0.0, (i / 20) as f32));
+    let floor = (0..900).map(|i| Vec3::new(500.0 + (i % 30) as f32, (i / 30) as f32, -40.0));
+    let cloud = PointCloud::from_positions(wall.chain(floor).collect());
+    surfel_formats::save(&path, &cloud, &SaveOptions::default(), &NoProgress).unwrap();
+    let mut description =
+        SceneDescription { files: vec![path.clone()], ..SceneDescription::default() };
+    let scene = LiveScene::open(&description, UseCase::Viewers, &NoProgress).unwrap();
+    let all = scene.view(&description, &NoProgress).unwrap();
+    for filter in ["z > -1", "z < -1", "x < 10 && z > 3"] {
+        description.objects_default.preparation.filter = Some(filter.parse().unwrap());
+        let view = scene.view(&description, &NoProgress).unwrap();
+        let rendered = resolve(&description, &NoProgress).unwrap().description;
+        assert_eq!(view.description.camera, rendered.camera, "{filter}");
+        assert_eq!(view.description.sun, rendered.sun);
+        assert_eq!(view.description.world.up, rendered.world.up);
+        assert_ne!(view.description.camera, all.description.camera, "{filter}");
+        // Points are still told by the index that they have in the file.
+        let sources = view.sources()[0];
+        let is_floor = filter == "z < -1";
+        assert!(sources.iter().all(|source| (400 <= *source) == is_floor), "{filter}");
+    }
+    description.objects_default.preparation.filter = Some("z > 1e6".parse().unwrap());
+    let error = scene.view(&description, &NoProgress).unwrap_err().to_string();
+    assert!(error.contains("none of 1300 points meets"), "{error}");
+    std::fs::remove_file(path).unwrap();
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_of_pictures_have_the_lowest_priority() {
+    let (scene, _) = scene_of_a_plane("priority");
+    // The niceness is the 19th value of the file, the 17th behind the name of the thread.
+    let niceness = || {
+        let file = std::fs::read_to_string("/proc/thread-self/stat").unwrap();
+        let after_name = file.rsplit_once(") ").unwrap().1.to_owned();
+        after_name.split(' ').nth(16).unwrap().parse::<i32>().unwrap()
+    };
+    assert_eq!(scene.picture_threads.install(niceness), 19);
+    assert_eq!(scene.preparation_threads.install(niceness), niceness());
+}
