@@ -30,6 +30,8 @@ mod scenes;
 mod deformation;
 #[path = "cli/sequences.rs"]
 mod sequences;
+#[path = "cli/splats.rs"]
+mod splats;
 #[path = "cli/viewer.rs"]
 mod viewer;
 #[path = "cli/salvage.rs"]

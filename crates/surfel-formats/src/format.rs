@@ -198,6 +198,14 @@ const FOREIGN_SIGNATURES: [(&[u8], &str); 4] = [
     (b"\x1f\x8b", "a gzip archive"),
 ];
 
+/// Extensions of compressed files of trained splats, which surfel does not read, and their names.
+const SPLAT_EXTENSIONS: [(&str, &str); 4] = [
+    ("splat", "a .splat file of trained splats"),
+    ("ksplat", "a .ksplat file of trained splats"),
+    ("spz", "an SPZ file of trained splats"),
+    ("sog", "an SOG file of trained splats"),
+];
+
 static ADVICE: LazyLock<String> = LazyLock::new(|| {
     let extensions = FORMATS.iter().flat_map(|format| format.extensions);
     format!("surfel reads {}; convert the file to one of them", list_extensions(extensions, "and"))
@@ -226,11 +234,14 @@ pub(crate) fn detect(input: &Input) -> Result<&'static Format> {
         let advice = "write the file again or copy it again from its source";
         return Err(input.malformed(Location::Byte(0), "an empty file", "points", advice));
     }
+    let extension = input.extension();
+    if let Some((_, name)) = SPLAT_EXTENSIONS.iter().find(|(splats, _)| *splats == extension) {
+        return Err(input.unsupported(*name, ply::SPLAT_ADVICE));
+    }
     let mut foreign = FOREIGN_SIGNATURES.iter();
     if let Some((_, name)) = foreign.find(|(signature, _)| input.starts_with(signature)) {
         return Err(input.unsupported(*name, &ADVICE));
     }
-    let extension = input.extension();
     let has_extension = |format: &&Format| format.extensions.contains(&&*extension);
     let of_name = FORMATS.iter().find(has_extension);
     let Some(format) = of_name.or_else(|| text_format(input)) else {
@@ -295,6 +306,20 @@ mod tests {
         }
         assert!(detected("notes.md", b"1 of 2 things: 3\n").is_err());
         assert!(detected("cloud.neu", b"\x00\x01\x02").is_err());
+    }
+
+    #[test]
+    fn compressed_splats_are_refused_by_name() {
+        let gzip: &[u8] = b"\x1f\x8b\x08";
+        for (name, bytes) in [("a.splat", &[0; 32][..]), ("a.KSPLAT", &[1; 64]), ("a.spz", gzip)] {
+            let message = detected(name, bytes).unwrap_err().to_string();
+            let kind = name.to_ascii_lowercase().replace("a.", "");
+            assert!(
+                message.to_ascii_lowercase().contains(&format!("{kind} file of trained")),
+                "{message}"
+            );
+            assert!(message.contains("export the splats as PLY"), "{message}");
+        }
     }
 
     #[test]

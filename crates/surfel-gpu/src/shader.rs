@@ -74,7 +74,7 @@ impl Surface {
             SurfaceKind::Points | SurfaceKind::SplatFit => None,
             // Their trees are traversed on the CPU alone.
             SurfaceKind::Implicit | SurfaceKind::Octree | SurfaceKind::OctreeSplat => None,
-            SurfaceKind::Cylinder | SurfaceKind::Mls => None,
+            SurfaceKind::Cylinder | SurfaceKind::Mls | SurfaceKind::Gaussian => None,
         }
     }
 

@@ -30,6 +30,7 @@ fn structure(kind: SurfaceKind) -> &'static str {
     match kind {
         SurfaceKind::Implicit => " (a kd-tree)",
         SurfaceKind::Octree | SurfaceKind::OctreeSplat => " (an octree)",
+        SurfaceKind::Gaussian => " (trained splats)",
         _ => "",
     }
 }

@@ -3,8 +3,11 @@
 use std::f32::consts::{PI, TAU};
 use surfel_core::flat::{FlatCloud, FlatScene, PointColumns};
 use surfel_core::image::Image;
-use surfel_core::math::{DAffine3, DVec3, Random, Ray, Vec2, Vec3};
-use surfel_core::points::{PointCloud, Preparation, PreparedCloud, StructureChoice, prepare};
+use surfel_core::math::{DAffine3, DVec3, Quat, Random, Ray, Vec2, Vec3};
+use surfel_core::points::{
+    GAUSSIAN_COLUMNS, PointCloud, Preparation, PreparedCloud, Scalar, StructureChoice, Values,
+    prepare,
+};
 use surfel_core::progress::NoProgress;
 use surfel_core::render::{CpuRenderer, Renderer, Settings};
 use surfel_core::scene::{
@@ -27,10 +30,37 @@ pub fn prepared(
     surface: SurfaceKind,
 ) -> CloudGeometry {
     let (cloud, _) = prepare(cloud, preparation, &NoProgress).unwrap();
-    let mut points = grey(cloud.into_inner());
+    let cloud = cloud.into_inner();
+    let mut points = grey(if surface == SurfaceKind::Gaussian { trained(cloud) } else { cloud });
     points.surface = surface;
+    points.shows_trained_colors = false;
     points.edge_test = EdgeTest::AngularGap;
     points
+}
+
+/// Adds the columns of trained Gaussians to a cloud that has normals and radii: grey, nearly opaque, and as flat as the
+/// discs that they lie in.
+pub fn trained(mut cloud: PointCloud) -> PointCloud {
+    let (normals, radii) = (cloud.normals.clone().unwrap(), cloud.radii.clone().unwrap());
+    let rotations: Vec<Quat> =
+        normals.iter().map(|normal| Quat::from_rotation_arc(Vec3::Z, *normal)).collect();
+    let column = |value: &dyn Fn(usize) -> f32| Values::F32((0..radii.len()).map(value).collect());
+    let columns = [
+        column(&|_| 0.0),
+        column(&|_| 0.0),
+        column(&|_| 0.0),
+        column(&|_| 5.0),
+        column(&|i| (0.5 * radii[i]).ln()),
+        column(&|i| (0.5 * radii[i]).ln()),
+        column(&|i| (0.05 * radii[i]).ln()),
+        column(&|i| rotations[i].w),
+        column(&|i| rotations[i].x),
+        column(&|i| rotations[i].y),
+        column(&|i| rotations[i].z),
+    ];
+    let scalars = GAUSSIAN_COLUMNS.into_iter().zip(columns);
+    cloud.scalars.extend(scalars.map(|(name, values)| Scalar { name: name.to_owned(), values }));
+    cloud
 }
 
 /// Makes a cloud grey that has normals and radii, and gives it a surface of splats.
@@ -57,6 +87,7 @@ pub fn colored(points: &CloudGeometry, colors: Vec<[u8; 3]>) -> CloudGeometry {
     colored.surface = points.surface;
     colored.edge_test = points.edge_test;
     colored.has_outward_normals = points.has_outward_normals;
+    colored.shows_trained_colors = points.shows_trained_colors;
     colored
 }
 
@@ -68,6 +99,7 @@ pub fn changed(points: &CloudGeometry, change: impl FnOnce(&mut PointCloud)) -> 
     changed.surface = points.surface;
     changed.edge_test = points.edge_test;
     changed.has_outward_normals = points.has_outward_normals;
+    changed.shows_trained_colors = points.shows_trained_colors;
     colored(&changed, points.colors().to_vec())
 }
 

@@ -204,6 +204,10 @@ fn check_surface(args: &Args, description: &SceneDescription) -> Result<(), Usag
         (SurfaceKind::Points, _) => {
             Err(Usage("--surface points is not hit by rays; choose another kind".into()))
         }
+        (SurfaceKind::Gaussian, _) => Err(Usage(
+            "--surface gaussian is no surface that rays end at; time its pictures with `surfel render --stats -`"
+                .into(),
+        )),
         (kind, Some(kinds)) if !kind.uses_discs() => {
             reject_gather(kinds, &format!("--surface {}", kind.name()))
         }

@@ -1,13 +1,15 @@
 //! Point clouds in the form that kernels read.
 
+use super::block_tree::BlockTree;
 use super::deform::Deformed;
 use super::field::{FieldTree, Octree, OctreeOptions};
+use super::gaussians::FlatGaussians;
 use super::point_columns::PointColumns;
 use super::points::FlatPoints;
 use super::refit::Refit;
 use crate::bvh::BvhNode;
 use crate::error::Result;
-use crate::math::{Aabb, LANES};
+use crate::math::{Aabb, LANES, Vec3};
 use crate::points::Structure;
 use crate::progress::Progress;
 use crate::scene::CloudGeometry;
@@ -27,6 +29,8 @@ pub struct FlatCloud {
     pub field: Box<FieldTree>,
     /// The octree whose cells are the surface; empty unless they are.
     pub octree: Box<Octree>,
+    /// Trained Gaussians; empty unless they are what the points are shown as. The trees of points are empty then.
+    pub gaussians: Box<FlatGaussians>,
     /// The shape of the points.
     pub surface: SurfaceKind,
     /// Options of that shape.
@@ -58,6 +62,9 @@ impl FlatCloud {
         let cloud = geometry.cloud();
         let (positions, normals, radii) = (cloud.positions(), cloud.normals(), cloud.radii());
         let colors = geometry.colors();
+        if geometry.surface == SurfaceKind::Gaussian {
+            return Self::of_gaussians(geometry, positions, progress);
+        }
         let columns = PointColumns::new(geometry.surface, positions, normals, radii, colors)?;
         Self::from_columns(scaled(columns, geometry), geometry, progress)
     }
@@ -68,7 +75,21 @@ impl FlatCloud {
         deformed: &Deformed,
         progress: &dyn Progress,
     ) -> Result<Self> {
+        if geometry.surface == SurfaceKind::Gaussian {
+            return Self::of_gaussians(geometry, &deformed.positions, progress);
+        }
         Self::from_columns(deformed_columns(deformed, geometry)?, geometry, progress)
+    }
+
+    /// Sorts trained Gaussians at these positions into a tree.
+    fn of_gaussians(
+        geometry: &CloudGeometry,
+        positions: &[Vec3],
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let gaussians = Box::new(FlatGaussians::new(geometry, positions, progress)?);
+        let (surface, options) = (geometry.surface, geometry.options);
+        Ok(Self { gaussians, surface, options, ..Self::default() })
     }
 
     /// Sorts the points of `columns` into a tree; their surface is that of `geometry`.
@@ -92,6 +113,7 @@ impl FlatCloud {
             scatter,
             field: Box::default(),
             octree: Box::default(),
+            gaussians: Box::default(),
             surface: geometry.surface,
             options: geometry.options,
             edge_test: geometry.edge_test,
@@ -114,6 +136,9 @@ impl FlatCloud {
         deformed: &Deformed,
         progress: &dyn Progress,
     ) -> Result<Option<Self>> {
+        if geometry.surface == SurfaceKind::Gaussian {
+            return Self::deformed(geometry, deformed, progress).map(Some);
+        }
         let columns = deformed_columns(deformed, geometry)?;
         let needs_rebuild = match parts(columns, geometry) {
             None => self.points.refit(columns) == Refit::NeedsRebuild,
@@ -150,15 +175,18 @@ impl FlatCloud {
     /// Returns the sizes of the trees and of the points in bytes.
     pub fn bytes(&self) -> (usize, usize) {
         let parts = [&self.points, &self.lines, &self.scatter].map(FlatPoints::bytes);
-        let trees: usize = parts.iter().map(|part| part.0).sum();
-        (trees + self.field.bytes() + self.octree.bytes(), parts.iter().map(|part| part.1).sum())
+        let parts = parts.into_iter().chain([self.gaussians.bytes()]);
+        let (trees, points): (Vec<usize>, Vec<usize>) = parts.unzip();
+        let trees = trees.iter().sum::<usize>() + self.field.bytes() + self.octree.bytes();
+        (trees, points.iter().sum())
     }
 
     /// Returns the bounding box of all points, which is empty if no point is traceable.
     pub fn bounds(&self) -> Aabb {
-        let parts = [&self.points, &self.lines, &self.scatter];
+        let parts = [&self.points, &self.lines, &self.scatter].map(|part| &part.nodes[..]);
+        let parts = parts.into_iter().chain([self.gaussians.nodes()]);
         let field = self.field.bounds().or(self.octree.cube()).unwrap_or(Aabb::EMPTY);
-        parts.iter().fold(field, |bounds, part| bounds.union(root_bounds(&part.nodes)))
+        parts.fold(field, |bounds, nodes| bounds.union(root_bounds(nodes)))
     }
 
     /// True if the normals of the field of weighted planes all point to the same side.

@@ -28,6 +28,8 @@ pub struct Instance {
     pub node_idx: u32,
     /// True if light can pass through the material.
     pub is_transmissive: bool,
+    /// True if the geometry is Gaussians, which emit light and have no surface.
+    pub is_gaussian: bool,
 }
 
 /// The transform and bounds of an instance.
@@ -68,6 +70,7 @@ impl Instance {
             material_idx: 0,
             node_idx: 0,
             is_transmissive: false,
+            is_gaussian: false,
         })
     }
 

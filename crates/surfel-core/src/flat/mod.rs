@@ -9,6 +9,7 @@ mod mesh;
 mod point_columns;
 mod points;
 mod field;
+mod gaussians;
 mod cloud;
 mod punctual_light;
 mod refit;
@@ -25,6 +26,7 @@ pub use field::{
     CellCorners, CellPlane, FieldLeaf, FieldTree, KdChild, MAX_KD_DEPTH, MAX_OCTREE_DEPTH, Octree,
     OctreeNode, OctreeOptions, max_field_bytes,
 };
+pub use gaussians::{FlatGaussians, GaussianBlock, MAX_GAUSSIAN_BYTES};
 pub use instance::Instance;
 pub use mesh::FlatMesh;
 pub use point_columns::PointColumns;

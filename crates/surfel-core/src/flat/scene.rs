@@ -12,6 +12,7 @@ use crate::progress::Progress;
 use crate::scene::{
     Background, Camera, ClipPlane, Geometry, Graph, Light, Material, Scene, Texture,
 };
+use crate::surface::SurfaceKind;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -42,6 +43,8 @@ pub struct FlatScene {
     pub camera_planes: Vec<ClipPlane>,
     /// True if light can pass through any instance.
     pub is_transmissive: bool,
+    /// True if any instance is Gaussians.
+    pub has_gaussians: bool,
     built: BTreeMap<GeometryKey, BuiltGeometry>,
 }
 
@@ -95,6 +98,11 @@ impl FlatGeometry {
         }
     }
 
+    /// Returns true for a cloud of Gaussians.
+    fn is_gaussian(&self) -> bool {
+        matches!(self, Self::Cloud(cloud) if cloud.surface == SurfaceKind::Gaussian)
+    }
+
     /// Returns the bounding box of the geometry, which is empty if no primitive is traceable.
     pub fn bounds(&self) -> Aabb {
         match self {
@@ -125,6 +133,7 @@ impl FlatScene {
             camera: scene.camera,
             camera_planes: Vec::new(),
             is_transmissive: false,
+            has_gaussians: false,
             built: BTreeMap::new(),
         };
         flat.build_missing_geometries(&scene.graph, &world, progress)?;
@@ -231,17 +240,21 @@ impl FlatScene {
                     object_bounds,
                     scene_origin: self.origin,
                 };
-                let is_transmissive = self.materials[part.material].is_transmissive();
+                let is_gaussian = self.geometries[geometry_idx as usize].is_gaussian();
+                let is_transmissive =
+                    !is_gaussian && self.materials[part.material].is_transmissive();
                 self.instances.extend(Instance::new(placement).map(|instance| Instance {
                     geometry_idx,
                     material_idx: part.material as u32,
                     node_idx: node_idx as u32,
                     is_transmissive,
+                    is_gaussian,
                     ..instance
                 }));
             }
         }
         self.is_transmissive = self.instances.iter().any(|instance| instance.is_transmissive);
+        self.has_gaussians = self.instances.iter().any(|instance| instance.is_gaussian);
         self.tlas = build_tlas(&self.instances)?;
         Ok(())
     }

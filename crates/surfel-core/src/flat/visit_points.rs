@@ -1,9 +1,9 @@
 //! Visits the points of a scene in parallel, in a fixed order.
 
-use super::{FlatGeometry, FlatScene};
+use super::{FlatGaussians, FlatGeometry, FlatPoints, FlatScene, Slot};
 use crate::bvh::NO_PRIMITIVE;
 use crate::error::Result;
-use crate::math::{DVec3, LANES};
+use crate::math::{DVec3, LANES, Vec3};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -22,6 +22,36 @@ pub struct VisitedPoint {
     pub color: [u8; 3],
     /// Number that no other point of the scene has, the same in each visit.
     pub key: u64,
+}
+
+/// The points of a tree by their slots.
+trait Slots: Sync {
+    /// Returns the index in the cloud of the point at each slot, `NO_PRIMITIVE` in unused ones.
+    fn ids(&self) -> &[u32];
+
+    /// Returns centre and sRGB-encoded colour of the point at a used slot.
+    fn center_and_color(&self, slot: Slot) -> (Vec3, [u8; 3]);
+}
+
+impl Slots for FlatPoints {
+    fn ids(&self) -> &[u32] {
+        &self.ids
+    }
+
+    fn center_and_color(&self, slot: Slot) -> (Vec3, [u8; 3]) {
+        let block = &self.blocks[slot as usize / LANES];
+        (self.center(slot), block.color(slot as usize % LANES))
+    }
+}
+
+impl Slots for FlatGaussians {
+    fn ids(&self) -> &[u32] {
+        self.ids()
+    }
+
+    fn center_and_color(&self, slot: Slot) -> (Vec3, [u8; 3]) {
+        (self.gaussian(slot).center, self.color(slot))
+    }
 }
 
 /// Calls `find` for each point that is shown; returns what it finds, in a fixed order.
@@ -51,26 +81,27 @@ pub fn visit_points_in_turn<T: Send>(
 ) -> Result<()> {
     for (instance_idx, instance) in scene.instances.iter().enumerate() {
         let FlatGeometry::Cloud(cloud) = scene.geometry(instance) else { continue };
-        for points in [&cloud.points, &cloud.lines, &cloud.scatter] {
+        let points = [&cloud.points, &cloud.lines, &cloud.scatter].map(|points| points as _);
+        let trees: [&dyn Slots; 4] = [points[0], points[1], points[2], &*cloud.gaussians];
+        for tree in trees {
+            let ids = tree.ids();
             let point_at = |slot: usize| {
-                let block = &points.blocks[slot / LANES];
-                if points.id(slot as u32) == NO_PRIMITIVE {
+                if ids[slot] == NO_PRIMITIVE {
                     return None;
                 }
-                let center = instance.world_position(points.center(slot as u32));
-                let position = scene.origin + center.as_dvec3();
+                let (center, color) = tree.center_and_color(slot as Slot);
+                let position = scene.origin + instance.world_position(center).as_dvec3();
                 let is_hidden = scene.camera_planes.iter().any(|plane| plane.hides(position));
                 let key = (instance_idx as u64) << 40 | slot as u64;
-                let color = block.color(slot % LANES);
                 (!is_hidden).then_some(VisitedPoint { position, color, key })
             };
             let visit_part = |part: usize| {
                 progress.check()?;
-                let end = points.ids.len().min(SLOTS_PER_PART * (part + 1));
+                let end = ids.len().min(SLOTS_PER_PART * (part + 1));
                 let slots = SLOTS_PER_PART * part..end;
                 Ok(slots.filter_map(point_at).filter_map(|point| find(&point)).collect())
             };
-            let n_parts = points.ids.len().div_ceil(SLOTS_PER_PART);
+            let n_parts = ids.len().div_ceil(SLOTS_PER_PART);
             for first in (0..n_parts).step_by(MAX_PARTS_AT_ONCE) {
                 let parts = first..n_parts.min(first + MAX_PARTS_AT_ONCE);
                 let found: Vec<Vec<T>> =
@@ -87,7 +118,6 @@ pub(super) mod slope {
     //! A scene whose points are known.
 
     use super::*;
-    use crate::math::Vec3;
     use crate::points::{PointCloud, Preparation, PreparedCloud, prepare};
     use crate::progress::NoProgress;
     use crate::scene::{

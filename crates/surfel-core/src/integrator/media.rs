@@ -133,6 +133,11 @@ impl MediumRay {
         }
     }
 
+    /// Returns the transmittance of the medium around the ray's origin up to `distance`.
+    pub fn transmittance_to(&self, scene: &FlatScene, distance: f32) -> Vec3 {
+        self.transmittance(scene, self.media, distance)
+    }
+
     /// Returns the transmittance of a ray that hits nothing.
     ///
     /// A body that the ray never leaves extends no farther than its box.

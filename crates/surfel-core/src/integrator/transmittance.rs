@@ -31,6 +31,9 @@ pub fn shadow_transmittance(
     for (transmittance, is_occluded) in transmittances.iter_mut().zip(&occluded) {
         *transmittance = if *is_occluded { Vec3::ZERO } else { Vec3::ONE };
     }
+    if scene.has_gaussians {
+        attenuate_by_gaussians(tracer, rays, &mut occluded, transmittances)?;
+    }
     if !scene.is_transmissive {
         return Ok(());
     }
@@ -73,6 +76,25 @@ pub fn shadow_transmittance(
     }
     for (ray_idx, _) in active {
         transmittances[ray_idx as usize] = Vec3::ZERO;
+    }
+    Ok(())
+}
+
+/// Multiplies the transmittances of rays that reach the light by those of the Gaussians on the way.
+fn attenuate_by_gaussians(
+    tracer: &Tracer,
+    rays: &[Ray],
+    occluded: &mut [bool],
+    transmittances: &mut [Vec3],
+) -> Result<()> {
+    let open: Vec<usize> = (0..rays.len()).filter(|i| !occluded[*i]).collect();
+    let rays: Vec<Ray> = open.iter().map(|i| rays[*i]).collect();
+    let lights = tracer.gaussians(&rays, &vec![SceneHit::MISS; rays.len()])?;
+    for (i, light) in open.into_iter().zip(lights) {
+        transmittances[i] *= light.transmittance;
+        if light.transmittance < MIN_TRANSMITTANCE {
+            (transmittances[i], occluded[i]) = (Vec3::ZERO, true);
+        }
     }
     Ok(())
 }

@@ -12,7 +12,7 @@ use super::specular::{
 use crate::error::Result;
 use crate::math::{Basis, Ray, Vec3, Vec4, hash, owen_sobol_2d};
 use crate::scene::Background;
-use crate::trace::{InstanceFilter, SceneHit};
+use crate::trace::{GaussianLight, InstanceFilter, SceneHit};
 
 /// An integrator for direct light, mirrors and glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,9 +82,8 @@ impl Integrator for Whitted {
         let max_light_samples = batch.samples.n_light_samples;
         let direct = DirectLight { tracer: batch.tracer, max_light_samples };
         let mut counts = RayCounts { primary: batch.rays.len() as u64, ..RayCounts::default() };
-        for (path, hit) in state.camera_paths().zip(batch.hits) {
-            state.shade_hit(path, hit);
-        }
+        let paths: Vec<Path> = state.camera_paths().collect();
+        state.shade(&paths, batch.rays, batch.hits)?;
         let (mut wave, mut hits) = (Vec::new(), Vec::new());
         loop {
             counts += direct.add(&state.shading_points, &mut state.radiance)?;
@@ -96,11 +95,9 @@ impl Integrator for Whitted {
             }
             let rays: Vec<Ray> = wave.iter().map(|path| path.ray.ray).collect();
             hits.resize(rays.len(), SceneHit::MISS);
-            batch.tracer.hits(InstanceFilter::All, &rays, &mut hits)?;
+            batch.tracer.hits(InstanceFilter::Surfaces, &rays, &mut hits)?;
             counts.secondary += rays.len() as u64;
-            for (path, hit) in wave.iter().zip(&hits) {
-                state.shade_hit(*path, hit);
-            }
+            state.shade(&wave, &rays, &hits)?;
         }
         let colors = state.radiance.iter().zip(&state.alpha);
         Ok((colors.map(|(radiance, alpha)| radiance.extend(*alpha)).collect(), counts))
@@ -140,6 +137,34 @@ impl<'a> WavefrontState<'a> {
             on_miss: MissBehavior::Background,
         };
         rays.iter().enumerate().map(path)
+    }
+
+    /// Shades the hits of paths on surfaces, behind the Gaussians that their rays pass.
+    fn shade(&mut self, paths: &[Path], rays: &[Ray], hits: &[SceneHit]) -> Result<()> {
+        if !self.batch.tracer.scene.has_gaussians {
+            paths.iter().zip(hits).for_each(|(path, hit)| self.shade_hit(*path, hit));
+            return Ok(());
+        }
+        let lights = self.batch.tracer.gaussians(rays, hits)?;
+        for ((path, light), hit) in paths.iter().zip(&lights).zip(hits) {
+            if let Some(path) = self.pass_gaussians(*path, light) {
+                self.shade_hit(path, hit);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the light of the Gaussians before the end of a path's ray, and returns the path behind them if light passes.
+    fn pass_gaussians(&mut self, mut path: Path, light: &GaussianLight) -> Option<Path> {
+        let Some(distance) = light.distance() else { return Some(path) };
+        let ray_idx = path.ray_idx as usize;
+        let attenuation = path.ray.transmittance_to(self.batch.tracer.scene, distance);
+        self.radiance[ray_idx] += path.weight * attenuation * light.radiance();
+        if path.on_miss == MissBehavior::Background {
+            self.alpha[ray_idx] += (1.0 - light.transmittance) * path.weight.max_element();
+        }
+        path.weight *= light.transmittance;
+        (0.0 < light.transmittance).then_some(path)
     }
 
     /// Adds the radiance emitted at the end of a path's ray, records the point for direct light, and

@@ -48,7 +48,8 @@ const MAX_COMPARED: usize = 64;
 const NOISE_CLASSES: [u8; 2] = [7, 18];
 
 /// Drops points with invalid positions, those of classes of noise and those flagged withheld unless there are no others,
-/// and duplicates if chosen, and marks unusable normals and radii. Duplicates of a cloud that deforms are kept, as they may part at another time.
+/// and duplicates if chosen, and marks unusable normals and radii. Duplicates of a cloud that deforms are kept, as they may part at another time; so are those of trained Gaussians, which may
+/// have different sizes and colours.
 ///
 /// A column of normals or radii without a usable entry, as trained splats have, is removed.
 ///
@@ -117,7 +118,8 @@ fn find_dropped(
     dropped.par_extend(indices.into_par_iter().filter(is_unseen));
     report.n_withheld = dropped.len() - report.n_invalid_positions - report.n_noise;
     let n_dropped = dropped.len();
-    if cloud.morphs.is_empty() && cloud.skin.is_none() {
+    let may_part = !cloud.morphs.is_empty() || cloud.skin.is_some();
+    if !may_part && !cloud.has_gaussians() {
         let is_candidate = |i: u32| !is_invalid(i) && !is_noise(i) && !is_withheld(i);
         let found = find_duplicates(cloud, is_candidate, progress)?;
         match duplicates {

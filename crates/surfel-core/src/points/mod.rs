@@ -4,6 +4,7 @@ mod deformation;
 mod clean;
 mod scan_station;
 mod cloud;
+mod gaussians;
 mod filter;
 mod flags;
 mod merge;
@@ -49,6 +50,10 @@ pub use density::points_per_area;
 pub(crate) use filter::Polygon;
 pub use filter::{PointFilter, visit_column};
 pub use flags::{FLAGS, WITHHELD, is_flag};
+pub use gaussians::{
+    GAUSSIAN_COLUMNS, Gaussian, GaussianColumns, HARMONIC_0, MAX_HARMONICS, MAX_REST_COLUMNS,
+    MIN_DISC_OPACITY, n_harmonics, rest_column,
+};
 pub use merge::merge;
 pub use mixed_pixels::MixedPixels;
 pub use normals::{NormalReport, PlaneFit, fill_missing, fit_plane};

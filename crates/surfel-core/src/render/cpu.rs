@@ -214,10 +214,13 @@ impl Tile {
         }
         let start = Instant::now();
         let mut hits = vec![SceneHit::MISS; rays.len()];
-        tracer.hits(InstanceFilter::All, &rays, &mut hits)?;
+        tracer.hits(InstanceFilter::Surfaces, &rays, &mut hits)?;
         self.trace_secs += start.elapsed().as_secs_f64();
         if settings.with_aovs && settings.samples_per_pixel == 1 {
-            self.set_aovs(job, &rays, &hits)?;
+            match tracer.scene.has_gaussians {
+                true => self.trace_aovs(job)?,
+                false => self.set_aovs(job, &rays, &hits)?,
+            }
         }
         let n_light_samples = settings.light_samples.div_ceil(settings.samples_per_pixel);
         let samples = PixelSamples {

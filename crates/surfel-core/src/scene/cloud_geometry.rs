@@ -26,6 +26,9 @@ pub struct CloudGeometry {
     pub blends_colors: bool,
     /// Colours of hits by their support, instead of the points' own.
     pub support_colors: Option<SupportColors>,
+    /// True if trained Gaussians show the colours that they were trained with, which depend on the direction; false if
+    /// they show those of this geometry.
+    pub shows_trained_colors: bool,
     /// True if normals point out of the body that the points enclose, which gives glass an interior. If not,
     /// every other hit of a ray enters the body (Schaufler and Jensen 2000).
     pub has_outward_normals: bool,
@@ -46,6 +49,7 @@ impl Default for CloudGeometry {
             octree_depth: OctreeDepth::default(),
             blends_colors: true,
             support_colors: None,
+            shows_trained_colors: true,
             has_outward_normals: false,
             has_front_sides: false,
         }

@@ -46,6 +46,9 @@ pub enum SurfaceKind {
     Octree,
     /// A plane in each cell of an octree: the splat octree of the same authors.
     OctreeSplat,
+    /// Each point is a trained Gaussian, which emits the light that it was trained with (Moenne-Loccoz et al., 3D Gaussian
+    /// Ray Tracing, 2024). It needs the columns of trained files.
+    Gaussian,
     /// Each point is a short thick line along its normal. The points of lines have this kind, whatever the kind of
     /// their cloud's surface is.
     Capsule,
@@ -53,7 +56,7 @@ pub enum SurfaceKind {
 
 impl SurfaceKind {
     /// The kinds of surface that a cloud can be given, with their names.
-    pub const ALL: [(&'static str, Self); 12] = [
+    pub const ALL: [(&'static str, Self); 13] = [
         ("points", Self::Points),
         ("sphere", Self::Sphere),
         ("disc", Self::Disc),
@@ -66,6 +69,7 @@ impl SurfaceKind {
         ("implicit", Self::Implicit),
         ("octree", Self::Octree),
         ("octree-splat", Self::OctreeSplat),
+        ("gaussian", Self::Gaussian),
     ];
 
     /// Returns the name that `from_str` parses.
@@ -89,7 +93,7 @@ impl SurfaceKind {
 
     /// Returns true if points are discs with normals rather than spheres or balls.
     pub fn uses_discs(self) -> bool {
-        !matches!(self, Self::Points | Self::Sphere | Self::Mls | Self::Capsule)
+        !matches!(self, Self::Points | Self::Sphere | Self::Mls | Self::Capsule | Self::Gaussian)
     }
 
     /// Returns true if the points describe a surface between them, rather than each one for itself.
@@ -105,7 +109,9 @@ impl SurfaceKind {
     /// Returns the bounding box of a point of this kind. `normal` has unit length.
     pub fn bounds(self, center: Vec3, normal: Vec3, radius: f32) -> Aabb {
         match self {
-            Self::Points | Self::Sphere | Self::Mls => sphere::bounds(center, radius),
+            Self::Points | Self::Sphere | Self::Mls | Self::Gaussian => {
+                sphere::bounds(center, radius)
+            }
             Self::Capsule => capsule::bounds(center, normal, radius),
             _ => disc::bounds(center, normal, radius),
         }

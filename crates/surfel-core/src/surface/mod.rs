@@ -5,6 +5,7 @@ pub mod capsule;
 pub mod disc;
 pub mod edge_test;
 mod field;
+pub mod gaussian;
 mod kind;
 pub mod mls;
 mod octree_depth;
@@ -23,6 +24,7 @@ pub use edge_test::{
     NeighborhoodStats,
 };
 pub use field::{FIELD_SUPPORT, FieldPoint, FieldSums, MIN_FIELD_WEIGHT, field_weight};
+pub use gaussian::{GaussianLanes, WhitenedGaussian};
 pub use kind::{SOLID_SPAWN_OFFSET, SurfaceKind};
 pub use octree_depth::OctreeDepth;
 pub use options::{GatherLimit, SurfaceOptions};

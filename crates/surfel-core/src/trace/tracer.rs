@@ -4,8 +4,10 @@ use crate::error::Result;
 use crate::flat::FlatScene;
 use crate::math::{PACKET_WIDTH, Ray};
 use crate::progress::Progress;
+use crate::trace::query::gaussian_light::GaussianLight;
 use crate::trace::query::support::Support;
 use crate::trace::scene::instance_filter::InstanceFilter;
+use crate::trace::scene::scene_gaussians::scene_gaussians;
 use crate::trace::scene::scene_hit::SceneHit;
 use crate::trace::scene::scene_query::{scene_hits_at, scene_occlusions};
 use crate::trace::scene::scene_support::scene_supports;
@@ -73,6 +75,21 @@ impl<'a> Tracer<'a> {
             scene_supports(self.scene, self.simd, rays, hits, &mut supports[chunk]);
         })?;
         Ok(supports)
+    }
+
+    /// Runs [`scene_gaussians`](super::scene_gaussians) for rays up to their hits on surfaces.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels the job.
+    pub fn gaussians(&self, rays: &[Ray], hits: &[SceneHit]) -> Result<Vec<GaussianLight>> {
+        let mut lights = vec![GaussianLight::NONE; rays.len()];
+        let up_to_hit =
+            |(ray, hit): (&Ray, &SceneHit)| Ray { t_max: ray.t_max.min(hit.distance), ..*ray };
+        let rays: Vec<Ray> = rays.iter().zip(hits).map(up_to_hit).collect();
+        self.in_chunks(rays.len(), |chunk| {
+            scene_gaussians(self.scene, self.simd, &rays[chunk.clone()], &mut lights[chunk]);
+        })?;
+        Ok(lights)
     }
 
     /// Runs [`scene_occlusions`].

@@ -11,4 +11,5 @@ mod write;
 
 pub(crate) use mesh::{has_faces, read_mesh};
 pub(crate) use read::{inspect, read};
+pub(crate) use trained_splats::SPLAT_ADVICE;
 pub(crate) use write::write;

@@ -1,13 +1,16 @@
 //! Reads the vertices of PLY files: binary ones in place, ascii ones by lines.
 
-use surfel_core::points::PointCloud;
+use surfel_core::points::{GAUSSIAN_COLUMNS, PointCloud};
 use surfel_core::progress::Progress;
 
 use super::element_lines::end_of_lines;
 use super::faces::count_faces;
 use super::header::{Element, Encoding, Header, read_header};
 use super::skip::{pack_vertices, skip_elements};
-use super::trained_splats::{PROPERTIES, are_trained_splats, into_discs};
+use super::trained_splats::{
+    add_discs, are_trained_splats, describe_colors, incomplete_splats, keeps_gaussians,
+    refuse_compressed,
+};
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
@@ -35,20 +38,25 @@ pub(crate) fn read(
     let mut info = file_info(&header, vertex);
     let mut salvage = Salvage::new(input, options.salvage);
     if !are_trained_splats(vertex) {
+        if let Some(line) = incomplete_splats(vertex) {
+            progress.note(&format!("{}: {line}", input.name));
+        }
         let (cloud, n_points) = read_cloud(&mut salvage, &header, options, progress)?;
         salvage.report("points", n_points, info.n_points.replace(n_points), progress)?;
         return Ok(Loaded { cloud, info });
     }
-    let columns = options.columns.with_names(&PROPERTIES);
+    let columns = options.columns.with_names(&GAUSSIAN_COLUMNS);
     let needed = LoadOptions { columns, ..options.clone() };
     let (mut cloud, n_points) = read_cloud(&mut salvage, &header, &needed, progress)?;
     salvage.report("points", n_points, info.n_points.replace(n_points), progress)?;
-    let n_faint = into_discs(&mut cloud);
+    let keeps_gaussians = keeps_gaussians(options);
+    if let Some(mut line) = add_discs(&mut cloud, keeps_gaussians) {
+        if keeps_gaussians {
+            line += &format!("; {}", describe_colors(vertex));
+        }
+        progress.note(&format!("{}: {line}", input.name));
+    }
     options.columns.drop_others(&mut cloud);
-    let line = format!(
-        "trained splats are read as discs of one colour each; {n_faint} faint ones skipped"
-    );
-    progress.note(&format!("{}: {line}", input.name));
     Ok(Loaded { cloud, info })
 }
 
@@ -104,6 +112,7 @@ pub(super) fn find_vertex<'a>(
     };
     let Some(at) = at else { return Err(missing("an element `vertex`")) };
     let vertex = &header.elements[at];
+    refuse_compressed(input, vertex)?;
     for axis in 0..3 {
         let is_axis = |name: &str| ColumnRole::from_name(name) == Some(ColumnRole::Position(axis));
         if !vertex.properties.iter().any(|p| p.length_type.is_none() && is_axis(&p.name)) {

@@ -1,67 +1,110 @@
-//! Trained splats: the Gaussians of 3D Gaussian splatting (Kerbl et al. 2023), which become discs.
+//! Trained splats: the Gaussians of 3D Gaussian splatting (Kerbl et al. 2023). They keep the columns of the file, and get
+//! those of the discs as which other surfaces show them.
 
-use surfel_core::math::{Quat, Vec3};
-use surfel_core::points::PointCloud;
+use surfel_core::math::Vec3;
+use surfel_core::points::{
+    GAUSSIAN_COLUMNS, Gaussian, GaussianColumns, MAX_REST_COLUMNS, MIN_DISC_OPACITY, PointCloud,
+    n_harmonics,
+};
 
-use super::header::Element;
+use super::header::{Element, Property};
+use crate::error::Result;
+use crate::file::Input;
+use crate::options::LoadOptions;
 
-/// Properties that a disc is made of, besides its position.
-pub(super) const PROPERTIES: [&str; 11] = [
-    "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1",
-    "rot_2", "rot_3",
-];
-
-/// Constant of the spherical harmonics of degree 0, which the colours are factors of.
-const SH_DEGREE_0: f64 = 0.282_094_791_773_878_14;
-/// Minimum opacity of a splat that is shown: fainter ones are haze between surfaces.
-const MIN_OPACITY: f64 = 0.1;
+/// Advice about compressed files of trained splats.
+pub(crate) const SPLAT_ADVICE: &str = "export the splats as PLY (uncompressed, as training writes it), for instance with \
+     SuperSplat";
 /// Radius of a disc in standard deviations of its Gaussian: at 1.5, neighbours of a trained surface close.
 const RADIUS_IN_DEVIATIONS: f32 = 1.5;
 
 /// Returns true if vertices have the properties of trained splats.
 pub(super) fn are_trained_splats(vertex: &Element) -> bool {
-    let has = |name: &str| vertex.properties.iter().any(|property| property.name == name);
-    PROPERTIES.into_iter().all(has)
+    GAUSSIAN_COLUMNS.into_iter().all(|name| has_property(vertex, name))
 }
 
-/// Gives points with the properties of trained splats a colour, a normal along the thinnest axis of their Gaussian and
-/// a radius by the other two. Drops the faint ones, and returns how many these are.
-///
-/// The colour is that of all directions, without the part that depends on the view.
-pub(super) fn into_discs(cloud: &mut PointCloud) -> usize {
-    let [color_0, color_1, color_2, opacity, scales @ .., rot_0, rot_1, rot_2, rot_3] =
-        PROPERTIES.map(|name| cloud.scalar(name));
-    let (Some(red), Some(green), Some(blue), Some(opacity)) = (color_0, color_1, color_2, opacity)
-    else {
-        return 0;
+/// Returns what is wrong with vertices that have some properties of trained splats only, in words.
+pub(super) fn incomplete_splats(vertex: &Element) -> Option<String> {
+    let is_meant =
+        ["f_dc_0", "scale_0", "rot_0"].into_iter().filter(|name| has_property(vertex, name));
+    let missing: Vec<&str> =
+        GAUSSIAN_COLUMNS.into_iter().filter(|name| !has_property(vertex, name)).collect();
+    (2 <= is_meant.count() && !missing.is_empty()).then(|| {
+        let missing = missing.join(" ");
+        format!("read as plain points: trained splats also need the properties {missing}")
+    })
+}
+
+/// Fails for the vertices of a compressed PLY, which have packed numbers in place of x, y and z.
+pub(super) fn refuse_compressed(input: &Input, vertex: &Element) -> Result<()> {
+    match has_property(vertex, "packed_position") {
+        true => Err(input.unsupported("a compressed PLY of trained splats", SPLAT_ADVICE)),
+        false => Ok(()),
+    }
+}
+
+fn has_property(vertex: &Element, name: &str) -> bool {
+    vertex.properties.iter().any(|property| property.name == name)
+}
+
+/// Returns true if all columns of Gaussians are to be kept.
+pub(super) fn keeps_gaussians(options: &LoadOptions) -> bool {
+    GAUSSIAN_COLUMNS.into_iter().all(|name| options.columns.keeps(name))
+}
+
+/// Gives trained splats the colour of all directions, a normal along the thinnest axis of their Gaussian and a radius by
+/// the other two. Drops broken ones, and faint ones unless all Gaussians are kept. Returns a line about it.
+pub(super) fn add_discs(cloud: &mut PointCloud, keeps_gaussians: bool) -> Option<String> {
+    let columns = GaussianColumns::new(cloud)?;
+    let n_splats = cloud.len();
+    let is_kept = |gaussian: &Gaussian| keeps_gaussians || MIN_DISC_OPACITY <= gaussian.opacity;
+    let mut n_broken = 0;
+    let mut kept = Vec::with_capacity(n_splats);
+    let (mut colors, mut normals, mut radii) = (Vec::new(), Vec::new(), Vec::new());
+    for i in 0..n_splats {
+        let gaussian = columns.gaussian(i);
+        n_broken += usize::from(gaussian.is_none());
+        let gaussian = gaussian.filter(is_kept);
+        kept.push(gaussian.is_some());
+        let Some(gaussian) = gaussian else { continue };
+        colors.push(columns.color(i).map(|channel| (channel * 65535.0 + 0.5) as u16));
+        normals.push(gaussian.thinnest_axis());
+        radii.push(disc_radius(gaussian.deviations));
+    }
+    cloud.retain_from(0, &kept);
+    let n_faint = n_splats - n_broken - cloud.len();
+    let mut line = match keeps_gaussians {
+        true => format!("{} trained splats", cloud.len()),
+        false => format!(
+            "trained splats are read as discs of one colour each; {n_faint} faint ones skipped"
+        ),
     };
-    let [Some(scale_x), Some(scale_y), Some(scale_z)] = scales else { return 0 };
-    let (Some(w), Some(x), Some(y), Some(z)) = (rot_0, rot_1, rot_2, rot_3) else { return 0 };
-    let indices = 0..cloud.len();
-    let channel = |value: f64| ((0.5 + SH_DEGREE_0 * value) * 65535.0 + 0.5) as u16;
-    let colors = indices.clone().map(|i| [red, green, blue].map(|column| channel(column.get(i))));
-    let discs = indices.clone().map(|i| {
-        let deviations = [scale_x, scale_y, scale_z].map(|column| column.get(i).exp() as f32);
-        let [w, x, y, z] = [w, x, y, z].map(|column| column.get(i) as f32);
-        disc(deviations, Quat::from_xyzw(x, y, z, w))
-    });
-    let (normals, radii): (Vec<Vec3>, Vec<f32>) = discs.unzip();
-    let is_shown = |i: usize| MIN_OPACITY <= 1.0 / (1.0 + (-opacity.get(i)).exp());
-    let shown: Vec<bool> = indices.map(is_shown).collect();
-    (cloud.colors, cloud.normals, cloud.radii) =
-        (Some(colors.collect()), Some(normals), Some(radii));
-    cloud.retain_from(0, &shown);
-    shown.len() - cloud.len()
+    if 0 < n_broken {
+        line += &format!(
+            "; {n_broken} broken ones skipped: numbers that are not finite, sizes beyond 1e15 or rotations of length 0"
+        );
+    }
+    (cloud.colors, cloud.normals, cloud.radii) = (Some(colors), Some(normals), Some(radii));
+    Some(line)
 }
 
-/// Returns normal and radius of the disc of a Gaussian with these standard deviations along its axes.
-fn disc(deviations: [f32; 3], rotation: Quat) -> (Vec3, f32) {
-    let mut axes = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().zip(deviations).collect::<Vec<_>>();
-    axes.sort_by(|(_, a), (_, b)| a.total_cmp(b));
-    let length = rotation.length();
-    let rotation =
-        if 0.0 < length && length.is_finite() { rotation.normalize() } else { Quat::IDENTITY };
-    (rotation * axes[0].0, RADIUS_IN_DEVIATIONS * (axes[1].1 * axes[2].1).sqrt())
+/// Returns words about the colours of trained splats.
+pub(super) fn describe_colors(vertex: &Element) -> String {
+    let is_rest = |property: &&Property| property.name.starts_with("f_rest_");
+    let n_rest = vertex.properties.iter().filter(is_rest).count();
+    match n_harmonics(n_rest) {
+        Some(1) => "colours are the same in all directions".into(),
+        Some(n) => format!("colours by spherical harmonics of degree {}", n.isqrt() - 1),
+        None => format!(
+            "colours are the same in all directions: {n_rest} properties f_rest, 9, 24 or {MAX_REST_COLUMNS} expected"
+        ),
+    }
+}
+
+fn disc_radius(deviations: Vec3) -> f32 {
+    let mut sorted = deviations.to_array();
+    sorted.sort_by(f32::total_cmp);
+    RADIUS_IN_DEVIATIONS * (sorted[1] * sorted[2]).sqrt()
 }
 
 #[cfg(test)]
@@ -69,14 +112,10 @@ mod tests {
     //! The disc of a Gaussian.
 
     use super::*;
-    use std::f32::consts::FRAC_PI_2;
 
     #[test]
-    fn a_disc_lies_across_the_thinnest_axis() {
-        let (normal, radius) = disc([2.0, 0.1, 8.0], Quat::from_rotation_z(2.0 * FRAC_PI_2 / 2.0));
-        // The y axis is turned to -x.
-        assert!(normal.distance(-Vec3::X) < 1e-6, "{normal}");
-        assert_eq!(radius, 6.0);
-        assert_eq!(disc([1.0, 2.0, 2.0], Quat::from_xyzw(0.0, 0.0, 0.0, 0.0)).0, Vec3::X);
+    fn a_disc_is_as_wide_as_the_two_larger_deviations() {
+        assert_eq!(disc_radius(Vec3::new(2.0, 0.1, 8.0)), 6.0);
+        assert_eq!(disc_radius(Vec3::new(2.0, 2.0, 1.0)), 3.0);
     }
 }

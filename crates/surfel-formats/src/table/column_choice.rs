@@ -93,9 +93,14 @@ impl ColumnChoice {
         });
     }
 
+    /// Returns true if a scalar column of this name is to be kept.
+    pub(crate) fn keeps(&self, scalar: &str) -> bool {
+        self.wants(&ColumnRole::Scalar(scalar.into()))
+    }
+
     /// Returns true if the choice names this scalar column.
     pub(crate) fn names(&self, scalar: &str) -> bool {
-        *self != Self::All && self.wants(&ColumnRole::Scalar(scalar.into()))
+        *self != Self::All && self.keeps(scalar)
     }
 }
 

@@ -3,9 +3,9 @@
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::Values;
 use surfel_core::progress::NoProgress;
-use surfel_formats::{Column, ColumnChoice, LoadOptions, load_bytes};
+use surfel_formats::{Column, ColumnChoice, LoadOptions, SaveOptions, load_bytes};
 
-use crate::common::{Listener, read};
+use crate::common::{Listener, read, round_trip};
 
 fn binary(header: &str, body: &[u8]) -> Vec<u8> {
     [header.as_bytes(), body].concat()
@@ -151,7 +151,9 @@ fn trained_splats_become_discs() {
     );
     let file = format!("ply\nformat ascii 1.0\nelement vertex 2\n{properties}end_header\n{splats}");
     let listener = Listener::default();
-    let loaded = load_bytes("a.ply", file.as_bytes(), &LoadOptions::default(), &listener).unwrap();
+    let discs = ColumnChoice::Only(vec![Column::Colors, Column::Normals, Column::Radii]);
+    let discs = LoadOptions { columns: discs, ..LoadOptions::default() };
+    let loaded = load_bytes("a.ply", file.as_bytes(), &discs, &listener).unwrap();
     assert_eq!(loaded.cloud.positions, [Vec3::new(1.0, 2.0, 3.0)]);
     assert_eq!(loaded.cloud.colors, Some(vec![[65535, 0, 32768]]));
     assert_eq!(loaded.cloud.normals, Some(vec![Vec3::Z]));
@@ -162,4 +164,72 @@ fn trained_splats_become_discs() {
     let options = LoadOptions { columns, ..LoadOptions::default() };
     let cloud = load_bytes("a.ply", file.as_bytes(), &options, &NoProgress).unwrap().cloud;
     assert!(cloud.colors.is_some() && cloud.normals.is_none() && cloud.scalars.is_empty());
+}
+
+/// Returns an ascii file of splats that have these values behind x, y and z, and these names.
+fn splat_file(names: &[&str], splats: &[&str]) -> String {
+    let names = ["x", "y", "z"].iter().chain(names);
+    let properties: String = names.map(|name| format!("property float {name}\n")).collect();
+    let splats: Vec<String> = splats.iter().map(|splat| format!("1 2 3 {splat}\n")).collect();
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\n{properties}end_header\n{}",
+        splats.len(),
+        splats.concat()
+    )
+}
+
+const SPLAT: [&str; 11] = [
+    "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1",
+    "rot_2", "rot_3",
+];
+
+#[test]
+fn trained_splats_keep_their_columns_and_are_written_with_them() {
+    let file = splat_file(&SPLAT, &["1 -1 0.5 2 -4 -5 -6 0.5 0 0 2", "0 0 0 -9 0 0 0 1 0 0 0"]);
+    let listener = Listener::default();
+    let loaded = load_bytes("a.ply", file.as_bytes(), &LoadOptions::default(), &listener).unwrap();
+    // Faint splats are no discs, but Gaussians.
+    assert_eq!((loaded.cloud.len(), loaded.cloud.scalars.len()), (2, 11));
+    assert!(listener.has_note("2 trained splats; colours are the same in all directions"));
+    let again = round_trip(&loaded.cloud, "ply", &SaveOptions::default());
+    assert_eq!(again.cloud, loaded.cloud);
+    assert!(again.info.format.ends_with("trained splats"));
+}
+
+#[test]
+fn broken_splats_are_skipped_and_counted() {
+    let good = "0 0 0 1 0 0 0 1 0 0 0";
+    let splats = [
+        good,
+        "nan 0 0 1 0 0 0 1 0 0 0",
+        "0 0 0 nan 0 0 0 1 0 0 0",
+        "0 0 0 1 inf 0 0 1 0 0 0",
+        "0 0 0 1 0 99 0 1 0 0 0",
+        "0 0 0 1 0 0 0 0 0 0 0",
+        "0 0 0 1e30 -1e30 0 0 1 0 0 0",
+    ];
+    let listener = Listener::default();
+    let file = splat_file(&SPLAT, &splats);
+    let loaded = load_bytes("a.ply", file.as_bytes(), &LoadOptions::default(), &listener).unwrap();
+    assert_eq!(loaded.cloud.len(), 2);
+    assert!(listener.has_note("5 broken ones skipped"));
+}
+
+#[test]
+fn incomplete_and_compressed_splats_are_named() {
+    let listener = Listener::default();
+    let file = splat_file(&SPLAT[..10], &["0 0 0 1 0 0 0 1 0 0"]);
+    let loaded = load_bytes("a.ply", file.as_bytes(), &LoadOptions::default(), &listener).unwrap();
+    assert_eq!((loaded.cloud.len(), loaded.cloud.has_gaussians()), (1, false));
+    assert!(
+        listener.has_note("read as plain points: trained splats also need the properties rot_3")
+    );
+    let packed = "ply\nformat ascii 1.0\nelement chunk 1\nproperty float min_x\n\
+        element vertex 1\nproperty uint packed_position\nend_header\n0\n0\n";
+    let error = load_bytes("a.ply", packed.as_bytes(), &LoadOptions::default(), &listener);
+    let error = error.unwrap_err().to_string();
+    assert!(
+        error.contains("compressed PLY of trained splats") && error.contains("export"),
+        "{error}"
+    );
 }

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use surfel_core::math::DVec3;
-use surfel_core::points::{PointCloud, Values};
+use surfel_core::points::{GaussianColumns, PointCloud, Values};
 use surfel_core::progress::NoProgress;
 use surfel_formats::{Column, ColumnChoice, LoadOptions, inspect, load};
 
@@ -66,11 +66,19 @@ fn unselected_columns_are_not_loaded() {
 }
 
 #[test]
-fn trained_splats_lose_the_faint_ones_only() {
+fn trained_splats_lose_the_faint_ones_as_discs_only() {
     let Some(path) = shared("splats/fourth_st_part_a.ply") else { return };
     let cloud = load(&path, &LoadOptions::default(), &NoProgress).unwrap().cloud;
     assert_eq!(inspect(&path).unwrap().n_points, Some(48_000));
-    assert_eq!(cloud.len(), 47_673);
+    assert_eq!(
+        (cloud.len(), cloud.disc_indices().map(|discs| discs.len())),
+        (48_000, Some(47_673))
+    );
+    assert_eq!(GaussianColumns::new(&cloud).unwrap().n_harmonics(), 16);
+    let columns = ColumnChoice::Only(vec![Column::Colors, Column::Normals, Column::Radii]);
+    let options = LoadOptions { columns, ..LoadOptions::default() };
+    let cloud = load(&path, &options, &NoProgress).unwrap().cloud;
+    assert_eq!((cloud.len(), cloud.scalars.len()), (47_673, 0));
     assert!(cloud.colors.is_some() && cloud.normals.is_some() && cloud.radii.is_some());
 }
 

@@ -32,7 +32,7 @@ impl Selection {
         if names.is_empty() {
             names = ["splat", "smooth"].map(str::to_owned).to_vec();
         }
-        let kinds = SurfaceKind::ALL.into_iter();
+        let kinds = SurfaceKind::ALL.into_iter().filter(|(_, kind)| *kind != SurfaceKind::Gaussian);
         let kinds = kinds.filter(|(name, _)| names.iter().any(|word| word == name)).collect();
         Self { kinds, written_clouds, meshes, pictures, filters }
     }

@@ -53,7 +53,8 @@ pub fn write_figures(folder: &Path) {
 
 /// Writes a picture of each kind, as `kind-NAME.jpg`.
 pub fn write_kinds(folder: &Path, subject: &Subject) {
-    for (name, kind) in SurfaceKind::ALL {
+    let kinds = SurfaceKind::ALL.into_iter().filter(|(_, kind)| *kind != SurfaceKind::Gaussian);
+    for (name, kind) in kinds {
         save(folder, &format!("kind-{name}"), &picture(&scene(subject, kind)));
     }
 }

@@ -44,7 +44,7 @@ pub fn print_table_1() {
             continue;
         };
         for (name, kind) in SurfaceKind::ALL {
-            if kind == SurfaceKind::Points {
+            if matches!(kind, SurfaceKind::Points | SurfaceKind::Gaussian) {
                 continue;
             }
             let known = TABLE_1.iter().find(|(known, ..)| *known == kind);

@@ -11,6 +11,7 @@ mod brute_force;
 mod deformation;
 mod determinism;
 mod furnace;
+mod gaussians;
 mod glass;
 mod implicit;
 mod instances;

@@ -24,9 +24,10 @@ const SETTINGS: Settings = Settings {
     with_aovs: true,
 };
 
-/// The kinds of surface that rays hit.
+/// The kinds of surface that rays hit. Gaussians have a support of their own.
 fn traced_kinds() -> impl Iterator<Item = SurfaceKind> {
-    SurfaceKind::ALL.into_iter().map(|(_, kind)| kind).filter(|kind| *kind != SurfaceKind::Points)
+    let others = [SurfaceKind::Points, SurfaceKind::Gaussian];
+    SurfaceKind::ALL.into_iter().map(|(_, kind)| kind).filter(move |kind| !others.contains(kind))
 }
 
 /// Finds the support of hits at all SIMD levels, which must agree.

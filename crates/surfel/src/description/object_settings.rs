@@ -13,9 +13,10 @@ use surfel_core::image::Colormap;
 use surfel_core::math::Vec3;
 use surfel_core::points::neighbors::{NeighborMethod, Neighborhood};
 use surfel_core::points::{
-    COLUMN_INDEX, DEFAULT_RADIUS_SAMPLES, Denoise, Duplicates, MixedPixels, Orientation,
-    OutlierRemoval, POINT_SOURCE, PointFilter, Preparation, ROW_INDEX, Radius, SCAN_ANGLE,
-    STRUCTURE, SURFACE_VARIATION, StructureChoice, Subsample, WITHHELD,
+    COLUMN_INDEX, DEFAULT_RADIUS_SAMPLES, Denoise, Duplicates, GAUSSIAN_COLUMNS, MAX_REST_COLUMNS,
+    MixedPixels, Orientation, OutlierRemoval, POINT_SOURCE, PointFilter, Preparation, ROW_INDEX,
+    Radius, SCAN_ANGLE, STRUCTURE, SURFACE_VARIATION, StructureChoice, Subsample, WITHHELD,
+    rest_column,
 };
 use surfel_core::scene::color::{ColorSource, Coloring};
 use surfel_core::scene::{Clip, ClipBox, ClipPlane};
@@ -27,8 +28,8 @@ use surfel_formats::{Column, ColumnChoice, LoadOptions, TextColumn};
 settings! {
     /// The shape that is given to points, and the part of an object that is shown.
     pub struct SurfaceSettings {
-        /// Surface of the points: smooth, points, sphere, disc, splat-mean, splat, splat-fit, cylinder, mls, implicit, octree
-        /// or octree-splat.
+        /// Surface of the points: smooth, points, sphere, disc, splat-mean, splat, splat-fit, cylinder, mls, implicit, octree,
+        /// octree-splat or gaussian, which is chosen for trained splats and needs them.
         surface: SurfaceKind = SurfaceKind::default(), parsed(|kind: &SurfaceKind| kind.name().to_owned()), "KIND", common;
         /// Edge of the surface: at the outermost points (angular-gap) or at the rims of their discs (off).
         edge_test: EdgeTest = EdgeTest::default(), parsed(|test: &EdgeTest| test.name().to_owned()), "TEST";
@@ -234,11 +235,22 @@ impl ObjectSettings {
         Coloring { source: color, colormap: cmap, range, gamma, up }
     }
 
+    /// Returns the columns of trained splats that a picture with these settings needs if a file has them.
+    fn gaussian_columns(&self) -> impl Iterator<Item = String> {
+        let may_be_gaussian =
+            self.surface.surface.is_none_or(|surface| surface == SurfaceKind::Gaussian);
+        let shows_colors = matches!(self.color.color, None | Some(ColorSource::Rgb));
+        let n_rest = if shows_colors { MAX_REST_COLUMNS } else { 0 };
+        let names = GAUSSIAN_COLUMNS.into_iter().map(str::to_owned);
+        names.chain((0..n_rest).map(rest_column)).filter(move |_| may_be_gaussian)
+    }
+
     /// Returns the columns that a picture with these settings needs.
     pub fn columns(&self) -> ColumnChoice {
         let mut columns = self.preparation.kept_columns();
         let of_preparation = self.columns_of_preparation();
         columns.extend(of_preparation.iter().map(|name| Column::Scalar((*name).to_owned())));
+        columns.extend(self.gaussian_columns().map(Column::Scalar));
         match &self.color.color {
             None => columns.extend([Column::Colors, Column::Intensity]),
             Some(ColorSource::Rgb) => columns.push(Column::Colors),

@@ -15,7 +15,11 @@ use surfel_core::points::{
 use surfel_core::progress::Progress;
 use surfel_core::scene::color::{ColorSource, choose_source, colorize};
 use surfel_core::scene::{CloudGeometry, Geometry, Graph, Material, Transform};
+use surfel_core::surface::SurfaceKind;
 use surfel_formats::{ColumnChoice, FileInfo, Loaded};
+
+/// The columns that the surface gaussian needs, in words.
+const GAUSSIANS: &str = "columns of trained splats (f_dc_0, opacity, scale_0, rot_0 and so on), which the surface gaussian needs";
 
 /// Options of reading besides an object's settings.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -169,13 +173,20 @@ pub fn apply_surface_and_color(
     progress: &dyn Progress,
 ) -> surfel_core::Result<CloudGeometry> {
     cloud.scale_radii(settings.surface.radius_scale() as f32);
+    let surface = surface_of(&cloud, settings);
+    if surface == SurfaceKind::Gaussian {
+        return gaussian_geometry(cloud, settings, up, progress);
+    }
+    if let Some(indices) = cloud.disc_indices() {
+        cloud = cloud.subset(&indices);
+    }
     let notes = NotesAsChoices { progress, keys: &["color", "cmap", "range", "gamma"] };
     let coloring = settings.coloring(up);
     let colors = colorize(&cloud, &coloring, &notes)?;
     let source = settings.color.color.clone().unwrap_or_else(|| choose_source(&cloud).0);
     let blends_colors = !source.is_categorical(&cloud);
     let mut geometry = CloudGeometry::new(cloud, colors)?;
-    geometry.surface = settings.surface.surface();
+    geometry.surface = surface;
     geometry.options = settings.surface.options();
     geometry.blends_colors = blends_colors;
     geometry.support_colors = coloring.support_colors()?;
@@ -184,6 +195,40 @@ pub fn apply_surface_and_color(
     geometry.has_outward_normals = settings.preparation.orients_outward();
     let has_stations = geometry.cloud().has_stations();
     geometry.has_front_sides = settings.preparation.knows_front_sides(has_stations);
+    Ok(geometry)
+}
+
+/// Returns the surface of a cloud: that of the settings, or what suits its columns.
+fn surface_of(cloud: &PointCloud, settings: &ObjectSettings) -> SurfaceKind {
+    match settings.surface.surface {
+        None if cloud.has_gaussians() => SurfaceKind::Gaussian,
+        _ => settings.surface.surface(),
+    }
+}
+
+/// Makes Gaussians of a prepared cloud, with the colours that they were trained with unless others are asked for.
+fn gaussian_geometry(
+    cloud: PreparedCloud,
+    settings: &ObjectSettings,
+    up: Vec3,
+    progress: &dyn Progress,
+) -> surfel_core::Result<CloudGeometry> {
+    if !cloud.has_gaussians() {
+        return Err(surfel_core::Error::MissingColumn { column: GAUSSIANS });
+    }
+    let is_trained = matches!(settings.color.color, None | Some(ColorSource::Rgb));
+    let shows_trained_colors = is_trained && settings.color.gamma.is_none();
+    let notes = NotesAsChoices { progress, keys: &["color", "cmap", "range", "gamma"] };
+    let mut coloring = settings.coloring(up);
+    if shows_trained_colors {
+        notes.note("colors as trained: lights and materials do not change them");
+        // Dark colours stay as they were trained.
+        coloring.gamma = Some(1.0);
+    }
+    let colors = colorize(&cloud, &coloring, &notes)?;
+    let mut geometry = CloudGeometry::new(cloud, colors)?;
+    geometry.surface = SurfaceKind::Gaussian;
+    geometry.shows_trained_colors = shows_trained_colors;
     Ok(geometry)
 }
 

@@ -15,7 +15,10 @@ pub fn complete_description(
 ) -> SceneDescription {
     let mut complete = description.clone();
     complete.picture.fill_defaults();
-    complete.objects_default.surface.surface.get_or_insert_default();
+    // Clouds of trained splats beside others choose their surface again.
+    if !scene.clouds().any(|(_, cloud)| cloud.has_gaussians()) {
+        complete.objects_default.surface.surface.get_or_insert_default();
+    }
     complete.objects_default.surface.edge_test.get_or_insert_default();
     complete.light.exposure.get_or_insert_default();
     complete.world.up = Some(auto.up);

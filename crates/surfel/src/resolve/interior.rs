@@ -9,7 +9,8 @@ use surfel_core::scene::{Camera, Clip, ClipPlane, Graph, Room, find_room};
 
 /// Returns the room whose inside is to be seen, if the points show one.
 ///
-/// Scenes that move keep their walls, as those before the camera change with time.
+/// Scenes that move keep their walls, as those before the camera change with time. Trained splats keep theirs too: they
+/// show things from outside as often as rooms from inside, and have no planes as walls.
 pub fn choose_room(
     scene: &LoadedScene,
     description: &SceneDescription,
@@ -17,10 +18,14 @@ pub fn choose_room(
     up: Vec3,
 ) -> Option<Room> {
     match description.camera.interior() {
-        Interior::Auto if !scene.moves() => find_room(points, up, true),
+        Interior::Auto if !scene.moves() && !has_splats(scene) => find_room(points, up, true),
         Interior::On => find_room(points, up, false),
         _ => None,
     }
+}
+
+fn has_splats(scene: &LoadedScene) -> bool {
+    scene.clouds().any(|(_, cloud)| cloud.has_gaussians())
 }
 
 /// Returns the planes that hide the walls and the ceiling before the camera, and reports how many there are.

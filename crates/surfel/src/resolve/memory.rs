@@ -5,10 +5,11 @@ use crate::error::{Error, Result};
 use crate::troubleshooting::TroubleshootingSection;
 use std::collections::BTreeMap;
 use std::path::Path;
-use surfel_core::flat::{PointBlock, max_field_bytes};
+use surfel_core::flat::{MAX_GAUSSIAN_BYTES, PointBlock, max_field_bytes};
 use surfel_core::math::LANES;
-use surfel_core::points::{PointCloud, Subsample};
-use surfel_core::scene::Graph;
+use surfel_core::points::{GAUSSIAN_COLUMNS, MAX_REST_COLUMNS, PointCloud, Subsample};
+use surfel_core::scene::{Geometry, Graph};
+use surfel_core::surface::SurfaceKind;
 use surfel_formats::FileInfo;
 
 /// Counts from which the memory of a picture follows, known before it is rendered.
@@ -16,6 +17,8 @@ use surfel_formats::FileInfo;
 pub struct MemoryEstimate {
     n_points: u64,
     n_kept_points: u64,
+    /// Number of the points that are trained splats, and shown as such.
+    n_splats: u64,
     n_triangles: u64,
     n_texels: u64,
     n_pixels: u64,
@@ -25,6 +28,9 @@ pub struct MemoryEstimate {
 
 /// Bytes of a point as it is loaded: position, normal, radius, colour and intensity.
 const COLUMNS: u64 = 12 + 12 + 4 + 6 + 4;
+
+/// Bytes of the further columns of a trained splat as it is loaded.
+const SPLAT_COLUMNS: u64 = 4 * (GAUSSIAN_COLUMNS.len() + MAX_REST_COLUMNS) as u64;
 
 /// Bytes of a triangle as it is loaded: corners, and position, normal and texture coordinates of about a vertex.
 const TRIANGLE: u64 = 12 + 12 + 12 + 8;
@@ -51,11 +57,23 @@ impl MemoryEstimate {
         n_pixels: u64,
     ) -> Self {
         let clouds = files.iter().filter(|(_, info)| info.n_triangles.is_none());
-        let n_points = sum(clouds.map(|(file, info)| (n_points(file, info), 1)));
+        let clouds: Vec<(u64, bool)> =
+            clouds.map(|(file, info)| (n_points(file, info), are_splats(info))).collect();
+        let n_points = sum(clouds.iter().map(|(n, _)| (*n, 1)));
+        let n_splats =
+            sum(clouds.iter().filter(|(_, are_splats)| *are_splats).map(|(n, _)| (*n, 1)));
         let triangles = files.values().filter_map(|info| info.n_triangles);
         let n_triangles = sum(triangles.map(|n| (n, 1)));
         let n_kept_points = kept(n_points, subsample);
-        Self { n_points, n_kept_points, n_triangles, n_texels: 0, n_pixels, flat_point: FLAT_POINT }
+        Self {
+            n_points,
+            n_kept_points,
+            n_splats,
+            n_triangles,
+            n_texels: 0,
+            n_pixels,
+            flat_point: FLAT_POINT,
+        }
     }
 
     /// Estimates from what was read, where textures are known too.
@@ -68,8 +86,12 @@ impl MemoryEstimate {
         let (n_points, n_triangles) = (n_points as u64, n_triangles as u64);
         let n_texels = graph.textures.iter().map(|texture| texture.texels.len() as u64).sum();
         let n_kept_points = kept(n_points, subsample);
-        let flat_point = FLAT_POINT;
-        Self { n_points, n_kept_points, n_triangles, n_texels, n_pixels, flat_point }
+        let clouds = graph.geometries.iter().filter_map(|geometry| match geometry {
+            Geometry::Points(cloud) if cloud.has_gaussians() => Some((cloud.len() as u64, 1)),
+            _ => None,
+        });
+        let (n_splats, flat_point) = (sum(clouds), FLAT_POINT);
+        Self { n_points, n_kept_points, n_splats, n_triangles, n_texels, n_pixels, flat_point }
     }
 
     /// Adds the structures that the surfaces of a description take besides the points' tree.
@@ -78,14 +100,22 @@ impl MemoryEstimate {
         let objects = description.objects.iter().map(|object| object.settings.over(scene));
         let kinds = objects.chain([scene.clone()]).map(|settings| settings.surface.surface());
         let most = kinds.map(max_field_bytes).max().unwrap_or_default() as u64;
-        Self { flat_point: self.flat_point + most, ..self }
+        let surface = scene.surface.surface;
+        let are_gaussians = surface.is_none_or(|kind| kind == SurfaceKind::Gaussian);
+        let n_splats = if are_gaussians { self.n_splats } else { 0 };
+        Self { flat_point: self.flat_point + most, n_splats, ..self }
     }
 
     /// Bytes of the input as read, of the flat form with what building it takes, and of the picture.
     fn bytes(&self) -> [u64; 3] {
         let meshes = sum([(self.n_triangles, TRIANGLE), (self.n_texels, TEXEL)]);
-        let read = sum([(self.n_points, COLUMNS), (meshes, 1)]);
-        let trees = sum([(self.n_kept_points, self.flat_point), (self.n_triangles, FLAT_TRIANGLE)]);
+        let read = sum([(self.n_points, COLUMNS), (self.n_splats, SPLAT_COLUMNS), (meshes, 1)]);
+        let n_kept_splats = self.n_splats.min(self.n_kept_points);
+        let trees = sum([
+            (self.n_kept_points, self.flat_point),
+            (n_kept_splats, MAX_GAUSSIAN_BYTES as u64),
+            (self.n_triangles, FLAT_TRIANGLE),
+        ]);
         // Vertices and textures stand in the flat form as they were read.
         let flat = sum([(trees / 2, 5), (meshes, 1)]);
         [read, flat, sum([(self.n_pixels, PIXEL)])]
@@ -132,7 +162,8 @@ impl MemoryEstimate {
     /// Advice that helps besides a higher limit, if there is any.
     fn advice(&self, limit: u64) -> String {
         let least = Self { n_kept_points: 0, ..*self }.total();
-        let fitting = limit.saturating_sub(least) / 5 * 2 / self.flat_point;
+        let splat = if 0 < self.n_splats { MAX_GAUSSIAN_BYTES as u64 } else { 0 };
+        let fitting = limit.saturating_sub(least) / 5 * 2 / (self.flat_point + splat);
         let [.., picture] = self.bytes();
         if 0 < fitting && fitting < self.n_kept_points {
             return format!("keep fewer points with --subsample random:{fitting} or ");
@@ -142,6 +173,12 @@ impl MemoryEstimate {
         }
         String::new()
     }
+}
+
+/// Returns true for a file of trained splats.
+fn are_splats(info: &FileInfo) -> bool {
+    let has_column = |name: &str| info.columns.iter().any(|column| column == name);
+    GAUSSIAN_COLUMNS.into_iter().all(has_column)
 }
 
 /// Sum of counts times bytes; headers may claim any number.
@@ -182,6 +219,7 @@ mod tests {
     const NOTHING: MemoryEstimate = MemoryEstimate {
         n_points: 0,
         n_kept_points: 0,
+        n_splats: 0,
         n_triangles: 0,
         n_texels: 0,
         n_pixels: 0,
@@ -206,5 +244,18 @@ mod tests {
         assert_eq!(advice(n_points, n_points, 10_000, 30_000_000), "");
         assert_eq!(advice(n_points, 16, 10_000, 30_000_000), "");
         assert!(advice(64, 64, 250, 10_000).contains("--resolution"));
+    }
+
+    #[test]
+    fn trained_splats_take_the_bytes_of_all_their_columns() {
+        let points = MemoryEstimate { n_points: 1000, n_kept_points: 1000, ..NOTHING };
+        let splats = MemoryEstimate { n_splats: 1000, ..points };
+        let [read, flat, _] = splats.bytes();
+        let [read_of_points, flat_of_points, _] = points.bytes();
+        assert_eq!(read - read_of_points, 1000 * 4 * 56);
+        assert_eq!(flat - flat_of_points, 2500 * MAX_GAUSSIAN_BYTES as u64);
+        let mut description = SceneDescription::default();
+        description.objects_default.surface.surface = Some(SurfaceKind::Disc);
+        assert_eq!(splats.with_surfaces_of(&description).n_splats, 0);
     }
 }

@@ -42,7 +42,7 @@ pub use station::{LocatedStation, located_stations};
 pub(crate) use sun_and_sky::{expose, expose_lamps};
 
 use crate::crs::{CoordinateSystem, Unit};
-use crate::description::{CameraSettings, OrthographicHeight, SceneDescription};
+use crate::description::{CameraSettings, LightKind, OrthographicHeight, SceneDescription};
 use crate::error::Result;
 use crate::overlay::Overlay;
 use crate::progress_log::{Choice, ProgressLog};
@@ -56,12 +56,12 @@ use station::{choose_station, stand_at_station};
 use sun_and_sky::{LightingContext, ScanInView, choose_lights, lights};
 use sun_position::stand_sun_at_date;
 use surfel_core::math::Vec3;
+use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::render::Settings;
 use surfel_core::scene::color::Legend;
 use surfel_core::scene::{Camera, ClipPlane, Light, Projection, Room, Scene, inlier_bounds};
 use surfel_core::surface::SurfaceKind;
-use surfel_formats::FileInfo;
 
 /// A scene that is ready for its trees: everything is read, chosen and prepared, at second 0.
 #[derive(Debug)]
@@ -230,18 +230,30 @@ impl LoadedScene {
     }
 }
 
-/// Shows trained splats as discs, whose sizes they state, unless the description says how to show points.
+/// Shows trained splats as Gaussians unless the description says how to show points, and lights nothing if there is nothing
+/// else.
 fn choose_surface(
     scene: &LoadedScene,
     description: &mut SceneDescription,
     progress: &dyn Progress,
 ) {
-    let surface = &mut description.objects_default.surface.surface;
-    let are_splats = |info: &FileInfo| info.format.ends_with("trained splats");
-    let files = &scene.file_infos;
-    if surface.is_none() && !files.is_empty() && files.iter().all(are_splats) {
-        *surface = Some(SurfaceKind::Disc);
-        progress.choice("surface disc: trained splats state their sizes", &["surface"]);
+    let is_open = |i: usize| scene.settings_of(i, description).surface.surface.is_none();
+    let open: Vec<&PointCloud> =
+        scene.clouds().filter(|(i, _)| is_open(*i)).map(|(_, cloud)| cloud).collect();
+    let n_splats = open.iter().filter(|cloud| cloud.has_gaussians()).count();
+    if n_splats == 0 {
+        return;
+    }
+    let has_others = n_splats < scene.n_geometries();
+    progress.choice("surface gaussian: trained splats", &["surface"]);
+    if n_splats == open.len() {
+        description.objects_default.surface.surface = Some(SurfaceKind::Gaussian);
+    }
+    let light = &mut description.light;
+    let needs_light = has_others || !description.lamps.is_empty() || light.environment.is_some();
+    if light.light.is_none() && !needs_light {
+        progress.choice("no lights: trained splats show the light of their photos", &["light"]);
+        light.light = Some(vec![LightKind::None]);
     }
 }
 

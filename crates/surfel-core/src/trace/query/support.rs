@@ -1,21 +1,22 @@
 //! The support of hits: how many measured points stand behind a hit, and how near the nearest one is.
 
 use crate::flat::{FlatCloud, FlatPoints};
-use crate::math::{Aabb, LaneMask, Lanes, Ray, Vec3};
-use crate::surface::{FIT_REACH, SurfaceKind};
+use crate::math::{Aabb, LaneMask, Lanes, Ray, Vec3, Vec3Lanes};
+use crate::surface::{FIT_REACH, GaussianLanes, SurfaceKind};
 use crate::trace::query::hit::Hit;
 use crate::trace::traversal::region::{BoxVisitor, query_box};
 
 /// The measured points behind a hit. It tells apart what is measured and what is bridged between points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Support {
-    /// Number of points within one radius of the hit: 1 on a ball, a capsule or a rasterised point, each of which is one
+    /// Number of points within one radius of the hit: 1 on a ball, a capsule, a Gaussian or a rasterised point, each of which is one
     /// point, and 0 on triangles and where nothing was hit.
     pub n_points: u32,
     /// Distance from the hit to the nearest point, in radii of the point that was hit: 0 at a point, and about 1 as far
     /// from all points as a surface reaches. Infinite on triangles and where nothing was hit.
     ///
-    /// Balls and capsules are hit on their outside; there it is the distance from the point to the ray.
+    /// Balls and capsules are hit on their outside; there it is the distance from the point to the ray. That of a Gaussian is
+    /// in its standard deviations.
     pub distance: f32,
 }
 
@@ -29,6 +30,9 @@ impl Support {
 /// Finds the support of a ray's hit on a surface of this kind.
 #[inline(always)]
 pub fn support<L: Lanes>(cloud: &FlatCloud, ray: &Ray, hit: &Hit, surface: SurfaceKind) -> Support {
+    if surface == SurfaceKind::Gaussian {
+        return gaussian_support(cloud, ray, hit);
+    }
     let points = cloud.points_of(surface);
     let position = ray.at(hit.distance);
     let to_center = points.center(hit.slot) - position;
@@ -47,6 +51,17 @@ pub fn support<L: Lanes>(cloud: &FlatCloud, ray: &Ray, hit: &Hit, surface: Surfa
     query_box::<L>(points, &region, &mut found);
     let NearbyPoints { n_points, nearest, .. } = found;
     Support { n_points, distance: nearest.reduce_min().sqrt() / radius }
+}
+
+/// Returns the support of a hit on Gaussians: one point, at its distance from the ray in deviations.
+fn gaussian_support(cloud: &FlatCloud, ray: &Ray, hit: &Hit) -> Support {
+    let gaussian = cloud.gaussians.gaussian(hit.slot);
+    let lanes = GaussianLanes::<f32> {
+        center: Vec3Lanes::splat(gaussian.center - ray.origin),
+        rows: gaussian.rows.map(Vec3Lanes::splat),
+    };
+    let (_, squared) = lanes.intersect(Vec3Lanes::splat(ray.direction));
+    Support { n_points: 1, distance: squared.sqrt() }
 }
 
 /// The points around a position: their number within a distance, and the nearest one.

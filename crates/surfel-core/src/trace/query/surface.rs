@@ -7,6 +7,7 @@ use crate::trace::query::any::{AcceptAll, any_accepted_hit, any_hits_kernel};
 use crate::trace::query::closest::closest_shapes;
 use crate::trace::query::edge_filter::EdgeFilter;
 use crate::trace::query::field_query::{DiscSearch, FieldSearch, KdSearch, field_hits};
+use crate::trace::query::gaussian_hits::{gaussian_hits, gaussian_occlusions};
 use crate::trace::query::hit::Hit;
 use crate::trace::query::leaf::LeafGeometry;
 use crate::trace::query::mls_surface::{MlsHit, mls_hits};
@@ -36,6 +37,9 @@ pub fn surface_hits_at(
     rays: &[Ray],
     hits: &mut [SurfaceHit],
 ) {
+    if cloud.surface == SurfaceKind::Gaussian {
+        return gaussian_hits(cloud, simd, rays, hits);
+    }
     dispatch_simd!(
         simd,
         surface_hits_kernel(
@@ -163,6 +167,9 @@ fn octree_occlusions<L: Lanes, const HAS_CORNERS: bool>(
 
 /// Finds out for each ray whether the continuous surface lies in its range.
 pub fn occlusions(cloud: &FlatCloud, simd: Simd, rays: &[Ray], occluded: &mut [bool]) {
+    if cloud.surface == SurfaceKind::Gaussian {
+        return gaussian_occlusions(cloud, simd, rays, occluded);
+    }
     dispatch_simd!(simd, occlusions_kernel(cloud: &FlatCloud, rays: &[Ray], occluded: &mut [bool]));
 }
 

@@ -5,11 +5,13 @@ use crate::flat::Instance;
 /// The instances that a query is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstanceFilter {
-    /// All instances.
+    /// All instances. Gaussians count as a surface where they let half of the light pass.
     All,
-    /// Instances that no light goes through.
+    /// Instances with a surface: all but Gaussians.
+    Surfaces,
+    /// Instances with a surface that no light goes through.
     Opaque,
-    /// Instances that light may go through.
+    /// Instances with a surface that light may go through.
     Transmissive,
 }
 
@@ -18,7 +20,8 @@ impl InstanceFilter {
     pub(in crate::trace) fn accepts(self, instance: &Instance) -> bool {
         match self {
             Self::All => true,
-            Self::Opaque => !instance.is_transmissive,
+            Self::Surfaces => !instance.is_gaussian,
+            Self::Opaque => !instance.is_transmissive && !instance.is_gaussian,
             Self::Transmissive => instance.is_transmissive,
         }
     }

@@ -9,3 +9,4 @@ pub mod scheduler;
 pub mod scene_hit;
 pub mod scene_query;
 pub mod scene_support;
+pub mod scene_gaussians;

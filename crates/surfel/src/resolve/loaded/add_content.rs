@@ -42,7 +42,7 @@ impl LoadedScene {
             let has_material =
                 description.materials.choices().iter().any(|choice| choice.names(file));
             match into_cloud(graph) {
-                Ok(cloud) if has_material => {
+                Ok(cloud) if has_material || cloud.has_gaussians() => {
                     separate.push((vec![Loaded { cloud, info }], vec![file.clone()]));
                 }
                 Ok(cloud) => {
