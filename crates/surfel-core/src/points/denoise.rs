@@ -134,10 +134,12 @@ pub fn denoise(
 /// spacings.
 fn is_plant(tree: &KdTree, point: usize, noise: f32) -> bool {
     const N_NEIGHBORS: usize = 24;
+    /// Heights by noise alone, in multiples of it: planes through few noisy points err as much as the points do.
+    const SLACK: f32 = 2.0;
     let positions = tree.positions();
     let neighbors = tree.nearest(positions[point], N_NEIGHBORS, Some(point as u32));
     let radius_in_spacings = (N_NEIGHBORS as f32 / std::f32::consts::PI).sqrt();
-    is_above_land(positions, point, &neighbors, noise / radius_in_spacings)
+    is_above_land(positions, point, &neighbors, SLACK * noise / radius_in_spacings)
 }
 
 /// Returns the means of groups of points that follow each other in `order`.

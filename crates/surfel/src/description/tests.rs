@@ -150,7 +150,7 @@ fn errors_name_the_path_what_was_found_and_what_was_expected() {
     );
     assert_eq!(
         error("surface = \"splatt\""),
-        "surface: found \"splatt\", expected one of points, sphere, disc, splat-mean, splat, splat-fit, cylinder, mls, smooth, implicit, octree, octree-splat; the nearest known one is `splat`"
+        "surface: found \"splatt\", expected one of points, sphere, disc, splat-mean, splat, splat-fit, cylinder, mls, smooth, implicit, octree, octree-splat, gaussian; the nearest known one is `splat`"
     );
     assert_eq!(error("spp = 0"), "spp: found 0, expected a whole number from 1 to 65536");
     assert_eq!(error("spp = nan"), "spp: found nan or inf, expected a number");
