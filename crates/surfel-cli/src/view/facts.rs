@@ -9,6 +9,7 @@ use surfel::resolve::{LoadedScene, coordinate_system, located_stations};
 use surfel_core::image::{class_color, class_name};
 use surfel_core::math::Vec3;
 use surfel_core::points::{PointCloud, PointFilter};
+use surfel_core::surface::SurfaceKind;
 use surfel_formats::{FileInfo, common_file_info};
 
 /// Columns of a cloud as `--color` takes them.
@@ -55,6 +56,16 @@ pub fn filter_columns(scene: &LoadedScene) -> Vec<String> {
     let files = scene.read_files.iter().zip(&scene.file_infos);
     let of_points = files.filter(|(file, _)| 0 < file.n_points).map(|(_, info)| info.clone());
     common_file_info(&of_points.collect::<Vec<FileInfo>>()).columns
+}
+
+/// Returns the names of the surfaces that the scene can have: only trained splats are Gaussians.
+pub fn surfaces(scene: &LoadedScene) -> Vec<&'static str> {
+    let has_splats = scene.clouds().any(|(_, cloud)| cloud.has_gaussians());
+    let kinds = SurfaceKind::ALL.iter();
+    kinds
+        .filter(|(_, kind)| has_splats || *kind != SurfaceKind::Gaussian)
+        .map(|(name, _)| *name)
+        .collect()
 }
 
 /// Returns true if all clouds tell the returns of each pulse.

@@ -2,7 +2,9 @@
 
 use super::added_files::{self, AddedFiles, PageFile};
 use super::camera_path::{camera_path, with_path, write_film};
-use super::facts::{classes, columns, filter_columns, has_returns, stations, unit_symbol};
+use super::facts::{
+    classes, columns, filter_columns, has_returns, stations, surfaces, unit_symbol,
+};
 use super::file_names::{ClientProgress, ViewedFolders};
 use super::histogram::histogram;
 use super::legend::legend_json;
@@ -33,7 +35,6 @@ use surfel_core::points::PointCloud;
 use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::scene::Material;
 use surfel_core::scene::color::choose_source;
-use surfel_core::surface::SurfaceKind;
 use surfel_web::{
     AddedFile, Error, Export, FilmOptions, Limits, PickedPoint, PointDescriber, PreparedScene,
     Result, SceneProvider, SentFile, SettingsMap, WrittenFile,
@@ -268,7 +269,7 @@ impl SceneProvider for FileSceneProvider {
             "version": env!("CARGO_PKG_VERSION"),
             "bounds": bounds_json(&points),
             "up": self.up.to_array(),
-            "surfaces": SurfaceKind::ALL.map(|(name, _)| name),
+            "surfaces": surfaces(loaded),
             "colors": self.colors(),
             "colormaps": colormap::names().collect::<Vec<_>>(),
             "materials": Material::NAMED.map(|(name, _)| name),
