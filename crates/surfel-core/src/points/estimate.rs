@@ -2,13 +2,15 @@
 
 use super::PointCloud;
 use super::find_structures::{Voters, all_scattered, find_structures, voters};
-use super::free_space::narrow_to_free_space;
+use super::free_space::FreeSpace;
+use super::gaps::{close_gaps, is_by_gap};
 use super::jets::{JetFit, MIN_JET_NEIGHBORS, fit_nearest_jet, refine_normals};
 use super::neighbors::{KdTree, Neighbor, NeighborMethod, Neighborhood, map_neighborhoods};
 use super::normals::{PlaneFit, fit_plane};
 use super::preparation::Preparation;
 use super::radius::{DistanceSample, Radius, RadiusReport, median_distance};
 use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
+use super::scan_grid::ScanGrids;
 use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
 use crate::error::Result;
 use crate::math::Vec3;
@@ -55,6 +57,8 @@ pub struct Estimates<'a> {
     tree: Option<KdTree<'a>>,
     /// The voters on the structure of each point, if structures are missing and they were found.
     voters: Vec<Voters>,
+    /// Which points lie by gaps, empty if it was not looked for.
+    is_by_gap: Vec<bool>,
 }
 
 /// Fits planes and estimates radii as far as they are missing. `normals` are those that denoising has found, zero where
@@ -112,19 +116,20 @@ fn estimate_by_nearest<'a>(
         let fit = fit_plane(positions, point, &neighbors[..k_normal.min(neighbors.len())]);
         let jet = fit_nearest_jet(positions, point, neighbors, &fit, k_normal);
         let distance = k_radius.map_or(0.0, |k| kth_distance(neighbors, k));
-        let voters = has_voters.then(|| voters(neighbors));
-        (fit, jet, distance, voters)
+        let around = has_voters
+            .then(|| (voters(neighbors), is_by_gap(positions, point, neighbors, fit.normal)));
+        (fit, jet, distance, around)
     };
     let k = k_normal.max(k_radius.unwrap_or(0)).max(MIN_JET_NEIGHBORS);
     let found = tree.map(Neighborhood::Nearest(k), progress, visit)?;
     let distances = found.iter().map(|(_, _, distance, _)| *distance).collect();
-    let voters = found.iter().filter_map(|(.., voters)| *voters).collect();
+    let (voters, is_by_gap) = found.iter().filter_map(|(.., around)| *around).unzip();
     let jets: Vec<Option<JetFit>> = found.iter().map(|(_, jet, ..)| *jet).collect();
     let mut fits: Vec<PlaneFit> = found.into_iter().map(|(fit, ..)| fit).collect();
     refine_normals(&tree, &mut fits, &jets, normals, progress)?;
     let radii = k_radius.map(|k| clamp_outlier_radii(&tree, k, distances, progress)).transpose()?;
     let fits = Some((fits, Neighborhood::Nearest(k_normal)));
-    Ok(Estimates { fits, radii, tree: Some(tree), voters })
+    Ok(Estimates { fits, radii, tree: Some(tree), voters, is_by_gap })
 }
 
 /// Finds the structures of points, and replaces the estimates by those of their structure.
@@ -134,7 +139,8 @@ pub fn find_shapes<'a>(
     preparation: &Preparation,
     progress: &dyn Progress,
 ) -> Result<Option<(Vec<PointShape>, StructureReport)>> {
-    let Estimates { fits, radii: Some((radii, report)), tree, voters } = estimates else {
+    let Estimates { fits, radii: Some((radii, report)), tree, voters, is_by_gap } = estimates
+    else {
         return Ok(None);
     };
     let tree = match tree.take() {
@@ -148,13 +154,19 @@ pub fn find_shapes<'a>(
         }
         _ => all_scattered(&tree, radii, progress)?,
     };
-    if preparation.free_space {
+    let grids = if preparation.free_space { ScanGrids::new(cloud) } else { None };
+    let mut free_space = FreeSpace::default();
+    if let Some(grids) = &grids {
         let fits = fits.as_ref().map_or(&[][..], |(fits, _)| fits);
-        let report = narrow_to_free_space(cloud, &tree, fits, &mut shapes, progress)?;
+        free_space = FreeSpace::new(grids, &cloud.positions, progress)?;
+        let report = free_space.narrow(&tree, fits, &mut shapes, progress)?;
         report.line().iter().for_each(|line| progress.choice(line, &["free_space"]));
         if 0 < report.n_lines {
             found = StructureReport::of(&shapes);
         }
+    }
+    if !is_by_gap.is_empty() {
+        close_gaps(&tree, radii, is_by_gap, &free_space, &mut shapes, progress)?;
     }
     if let (StructureChoice::Auto, Some((fits, _))) = (preparation.structure, fits) {
         for (fit, shape) in fits.iter_mut().zip(&shapes) {

@@ -3,7 +3,6 @@
 //! A ray that measured something far behind a disc, or nothing at all, passed the disc's plane where there is nothing.
 //! If more of the surface lies behind that place, the disc is narrowed until it ends before the ray.
 
-use super::PointCloud;
 use super::neighbors::KdTree;
 use super::normals::PlaneFit;
 use super::scan_grid::ScanGrids;
@@ -11,6 +10,7 @@ use super::seen_scan::{FreeRay, SeenScan};
 use super::solids::settle;
 use super::structure::{PointShape, Structure, is_line};
 use crate::error::Result;
+use crate::math::Vec3;
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -19,7 +19,7 @@ const MIN_NARROWING: f32 = 0.6;
 /// Maximum distance, in radii, of the rays on both sides of a line that was widened to a surface.
 const MAX_SIDE_DISTANCE: f32 = 0.5;
 
-/// Effect of [`narrow_to_free_space`].
+/// Effect of [`FreeSpace::narrow`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FreeSpaceReport {
     /// Number of shapes that are narrower now.
@@ -48,40 +48,62 @@ impl FreeSpaceReport {
     }
 }
 
-/// Narrows the shapes that reach into space through which the scanners of a cloud saw. Lines that were widened to a
-/// surface, on both sides of which the scanners saw through, become lines again; `fits` are the planes of the points'
-/// nearest neighbours.
-pub fn narrow_to_free_space(
-    cloud: &PointCloud,
-    tree: &KdTree,
-    fits: &[PlaneFit],
-    shapes: &mut [PointShape],
-    progress: &dyn Progress,
-) -> Result<FreeSpaceReport> {
-    let Some(grids) = ScanGrids::new(cloud) else { return Ok(FreeSpaceReport::default()) };
-    let mut scans = Vec::new();
-    for grid in grids.scans.iter().flatten() {
-        progress.check()?;
-        scans.extend(SeenScan::new(grid, &cloud.positions));
-    }
-    progress.begin("free space", shapes.len() as u64);
-    let narrow = |(point, shape): (usize, &mut PointShape)| {
-        if point.is_multiple_of(4096) {
+/// The space through which the scanners of a cloud saw.
+#[derive(Default)]
+pub struct FreeSpace<'a> {
+    scans: Vec<SeenScan<'a>>,
+}
+
+impl<'a> FreeSpace<'a> {
+    /// Returns what the scans with a grid tell about the points at `positions`.
+    pub fn new(grids: &'a ScanGrids, positions: &[Vec3], progress: &dyn Progress) -> Result<Self> {
+        let mut scans = Vec::new();
+        for grid in grids.scans.iter().flatten() {
             progress.check()?;
-            progress.advance(4096.min(cloud.len() - point) as u64);
+            scans.extend(SeenScan::new(grid, positions));
         }
-        let found = narrowed(&scans, tree, point, fits.get(point), shape);
-        let is_new_line = found.structure != shape.structure;
-        let is_narrowed = !is_new_line && found.radius < shape.radius;
-        *shape = found;
-        let n_lines = usize::from(is_new_line);
-        Ok(FreeSpaceReport { n_narrowed: usize::from(is_narrowed), n_lines })
-    };
-    let narrowed = shapes.par_iter_mut().enumerate().map(narrow);
-    let report = narrowed.try_reduce(FreeSpaceReport::default, |a, b| Ok(a.add(b)))?;
-    // Not before, as a line that was widened too far is told by its width.
-    scans.iter().for_each(|scan| scan.limit_radii(&cloud.positions, shapes));
-    Ok(report)
+        Ok(Self { scans })
+    }
+
+    /// Narrows the shapes that reach into space through which the scanners saw. Lines that were widened to a surface,
+    /// on both sides of which the scanners saw through, become lines again; `fits` are the planes of the points'
+    /// nearest neighbours.
+    pub fn narrow(
+        &self,
+        tree: &KdTree,
+        fits: &[PlaneFit],
+        shapes: &mut [PointShape],
+        progress: &dyn Progress,
+    ) -> Result<FreeSpaceReport> {
+        if self.scans.is_empty() {
+            return Ok(FreeSpaceReport::default());
+        }
+        progress.begin("free space", shapes.len() as u64);
+        let n_points = shapes.len();
+        let narrow = |(point, shape): (usize, &mut PointShape)| {
+            if point.is_multiple_of(4096) {
+                progress.check()?;
+                progress.advance(4096.min(n_points - point) as u64);
+            }
+            let found = narrowed(&self.scans, tree, point, fits.get(point), shape);
+            let is_new_line = found.structure != shape.structure;
+            let is_narrowed = !is_new_line && found.radius < shape.radius;
+            *shape = found;
+            let n_lines = usize::from(is_new_line);
+            Ok(FreeSpaceReport { n_narrowed: usize::from(is_narrowed), n_lines })
+        };
+        let narrowed = shapes.par_iter_mut().enumerate().map(narrow);
+        let report = narrowed.try_reduce(FreeSpaceReport::default, |a, b| Ok(a.add(b)))?;
+        // Not before, as a line that was widened too far is told by its width.
+        self.scans.iter().for_each(|scan| scan.limit_radii(tree.positions(), shapes));
+        Ok(report)
+    }
+
+    /// Returns the radius of a disc up to the nearest place where a scanner saw through it.
+    pub fn free_radius(&self, position: Vec3, shape: &PointShape) -> f32 {
+        let rays = self.scans.iter().flat_map(|scan| scan.free_rays(position, shape));
+        nearest_bridged(rays, shape.radius)
+    }
 }
 
 /// Returns the shape of a point as far as no scanner saw through it.
@@ -102,9 +124,14 @@ fn narrowed(
     if is_widened && let Some(line) = as_line(&rays, tree, point, shape) {
         return line;
     }
-    let nearest = rays.iter().filter(|ray| ray.is_bridged).map(|ray| ray.offset.length());
-    let radius = nearest.fold(shape.radius, f32::min).max(MIN_NARROWING * shape.radius);
+    let radius = nearest_bridged(rays, shape.radius).max(MIN_NARROWING * shape.radius);
     PointShape { radius, ..*shape }
+}
+
+/// Returns the distance of the nearest ray beyond which the surface goes on, or `radius` if that is less.
+fn nearest_bridged(rays: impl IntoIterator<Item = FreeRay>, radius: f32) -> f32 {
+    let bridged = rays.into_iter().filter(|ray| ray.is_bridged);
+    bridged.map(|ray| ray.offset.length()).fold(radius, f32::min)
 }
 
 /// Returns the line through a point, if scanners saw through its disc close to both sides of the line.
@@ -128,9 +155,8 @@ mod tests {
     //! Discs and lines that scanners saw past.
 
     use super::*;
-    use crate::math::Vec3;
     use crate::points::scan_grid::tests::scan;
-    use crate::points::{Preparation, prepare};
+    use crate::points::{PointCloud, Preparation, prepare};
     use crate::progress::NoProgress;
 
     /// Returns a scan of a wall below two wires and a row of points above them, all at 8 m, and the number of points of
@@ -148,7 +174,11 @@ mod tests {
         let tree = KdTree::new(&cloud.positions, &NoProgress).unwrap();
         let shape = PointShape { structure: Structure::Surface, normal: Vec3::X, radius: 0.5 };
         let mut shapes = vec![shape; cloud.len()];
-        let report = narrow_to_free_space(cloud, &tree, fits, &mut shapes, &NoProgress).unwrap();
+        let grids = ScanGrids::new(cloud);
+        let free_space = grids.as_ref().map_or_else(FreeSpace::default, |grids| {
+            FreeSpace::new(grids, &cloud.positions, &NoProgress).unwrap()
+        });
+        let report = free_space.narrow(&tree, fits, &mut shapes, &NoProgress).unwrap();
         (shapes, report)
     }
 

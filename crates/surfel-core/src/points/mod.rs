@@ -37,6 +37,7 @@ mod grid_rays;
 mod mixed_pixels;
 mod seen_scan;
 mod free_space;
+mod gaps;
 mod density;
 mod preparation;
 mod estimate;

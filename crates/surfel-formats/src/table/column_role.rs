@@ -19,6 +19,11 @@ pub(crate) enum ColumnRole {
     Scalar(String),
 }
 
+/// Names of longitudes, in degrees.
+const LONGITUDES: [&str; 4] = ["longitude", "lon", "lng", "long"];
+/// Names of latitudes, in degrees.
+const LATITUDES: [&str; 2] = ["latitude", "lat"];
+
 impl ColumnRole {
     /// Returns the role of a column with one of the usual names; case and separators do not matter.
     pub fn from_name(name: &str) -> Option<Self> {
@@ -29,9 +34,10 @@ impl ColumnRole {
             }
             "y" | "py" | "posy" | "ycoordinate" | "northing" | "north" | "hochwert"
             | "nordwert" => Self::Position(1),
-            "z" | "pz" | "posz" | "zcoordinate" | "elevation" | "elev" | "height" | "hoehe" => {
-                Self::Position(2)
-            }
+            "z" | "pz" | "posz" | "zcoordinate" | "elevation" | "elev" | "height" | "hoehe"
+            | "altitude" | "alt" => Self::Position(2),
+            name if LONGITUDES.contains(&name) => Self::Position(0),
+            name if LATITUDES.contains(&name) => Self::Position(1),
             // `Höhe` in any encoding, without the letter that is not ASCII.
             "hhe" => Self::Position(2),
             "nx" | "normalx" => Self::Normal(0),
@@ -87,6 +93,11 @@ impl ColumnRole {
         }
     }
 
+    /// True for the name of a column of longitudes.
+    pub fn is_longitude(name: &str) -> bool {
+        LONGITUDES.contains(&plain_name(name).as_str())
+    }
+
     /// Returns true for the names of a colour's opacity, which a cloud does not keep.
     pub fn is_alpha(name: &str) -> bool {
         ["alpha", "a", "diffuse_alpha"].contains(&name.to_lowercase().as_str())
@@ -110,6 +121,9 @@ mod tests {
         assert_eq!(ColumnRole::from_name("normal_z"), Some(ColumnRole::Normal(2)));
         assert_eq!(ColumnRole::from_name("diffuse_green"), Some(ColumnRole::Color(1)));
         assert_eq!(ColumnRole::from_name("scalar_Intensity"), Some(ColumnRole::Intensity));
+        assert_eq!(ColumnRole::from_name("Longitude"), Some(ColumnRole::Position(0)));
+        assert_eq!(ColumnRole::from_name("lat"), Some(ColumnRole::Position(1)));
+        assert!(ColumnRole::is_longitude("Lon") && !ColumnRole::is_longitude("x"));
         assert_eq!(ColumnRole::from_name("Scalar field"), None);
         assert_eq!(ColumnRole::from_name("f_rest_0"), None);
     }

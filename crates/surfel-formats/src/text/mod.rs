@@ -24,6 +24,9 @@ use infer_columns::{color_range, has_class_values, infer_columns};
 use preamble::{Preamble, read_preamble};
 use separator::{Separator, comment};
 
+/// Coordinate system of longitudes and latitudes.
+const WGS84: &str = "EPSG:4326";
+
 /// Reads the lines before the points.
 pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
     let preamble = read_preamble(input)?;
@@ -111,7 +114,7 @@ fn unnamed_text(input: &Input, preamble: &Preamble) -> Error {
     input.malformed(
         Location::Line(preamble.data_line),
         format!("`{}`", line[..line.len().min(60)].escape_ascii()),
-        "numbers, or a header with at least x, y and z or E, N and H",
+        "numbers, or a header with at least x, y and z, E, N and H or longitude, latitude and height",
         "state the columns with --columns, as in -,x,y,z,-, or remove the line if it is no point",
     )
 }
@@ -277,10 +280,19 @@ fn file_info(preamble: &Preamble) -> FileInfo {
         Separator::Comma => "commas",
         Separator::Semicolon => "semicolons",
     };
+    let names = preamble.names.as_deref().unwrap_or_default();
     FileInfo {
         format: format!("text, {} columns separated by {separator}", preamble.n_fields),
         n_points: preamble.count,
-        columns: preamble.names.clone().unwrap_or_default(),
+        columns: names.to_owned(),
+        coordinate_system: has_longitudes(names).then(|| WGS84.to_owned()),
         ..FileInfo::default()
     }
+}
+
+/// True if longitudes stand for x.
+fn has_longitudes(names: &[String]) -> bool {
+    let roles = roles_of_names(names);
+    let x = roles.iter().position(|role| *role == ColumnRole::Position(0));
+    x.is_some_and(|x| ColumnRole::is_longitude(&names[x]))
 }

@@ -167,6 +167,6 @@ fn not_numbers(input: &Input, location: Location, text: &[u8], separator: Separa
         let advice = "replace the decimal commas by points, or separate the fields by semicolons";
         return input.malformed(location, found, expected, advice);
     }
-    let expected = "numbers, or a header with at least x, y and z or E, N and H";
+    let expected = "numbers, or a header with at least x, y and z, E, N and H or longitude, latitude and height";
     input.malformed(location, found, expected, "remove the line or put # before it")
 }

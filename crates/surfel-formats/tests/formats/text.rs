@@ -170,6 +170,7 @@ fn axes_of_survey_points_are_known_in_any_order() {
         "Pt,Northing,Easting,Elevation\nP1,20,10,3\n",
         "Punktnummer;Rechtswert;Hochwert;H\u{f6}he\nP1;10,0;20,0;3,0\n",
         "Name\tEast\tNorth\tElev\nP1\t10\t20\t3\n",
+        "id,latitude,longitude,altitude\nP1,20,10,3\n",
         "\"pt no\";\"e\";\"n\";\"z\"\n\"P 1\";\"10\";\"20\";\"3\"\n",
     ];
     for file in files {
@@ -181,6 +182,17 @@ fn axes_of_survey_points_are_known_in_any_order() {
     let (cloud, _) = survey("x,y,z,n,h\n1,2,3,4,5\n");
     assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0)]);
     assert_eq!((cloud.scalars[0].name.as_str(), cloud.scalars[1].name.as_str()), ("n", "h"));
+}
+
+#[test]
+fn longitudes_and_latitudes_are_degrees() {
+    let system = |file: &str| {
+        let options = LoadOptions::default();
+        let loaded = load_bytes("track.csv", file.as_bytes(), &options, &NoProgress).unwrap();
+        loaded.info.coordinate_system
+    };
+    assert_eq!(system("lat,lon,alt\n48,11,520\n").as_deref(), Some("EPSG:4326"));
+    assert_eq!(system("x,y,z,lat,lon\n1,2,3,48,11\n"), None);
 }
 
 #[test]

@@ -1,9 +1,11 @@
 //! Coordinate reference systems (CRS): their unit, their EPSG codes, and where on Earth a position lies.
 
-mod wkt;
 mod georeference;
+mod reproject;
+mod wkt;
 
 pub use georeference::georeference;
+pub use reproject::metres_from_degrees;
 
 use proj4rs::Proj;
 use proj4rs::adaptors::transform_xyz;

@@ -118,6 +118,9 @@ settings! {
         free_space: bool = true, Flag, "BOOL";
         /// Reads what is whole of a damaged LAS, LAZ, PLY, E57, PCD, PTX or text file, and reports how much that is.
         salvage: bool = false, Flag, "BOOL";
+        /// Moves clouds whose coordinates are degrees of longitude and latitude to metres: to the coordinate system of
+        /// the files before, or to their UTM zone.
+        reproject: bool = true, Flag, "BOOL";
         /// Takes the vertices of meshes as points.
         vertices: bool = false, Flag, "BOOL";
         /// Columns of a text file, as in x,y,z,-,r,g,b [default: found from the file].

@@ -1,5 +1,6 @@
 //! A cloud on its way from the file to a surface: read, prepared, coloured.
 
+use crate::crs::metres_from_degrees;
 use crate::description::{Invalid, ObjectSettings, PreparationSettings};
 use crate::error::{Error, Result};
 use crate::memory_files::{MemoryContent, MemoryFiles};
@@ -30,6 +31,8 @@ pub struct ImportOptions {
     pub seed: u64,
     /// Files that are in memory instead.
     pub memory: MemoryFiles,
+    /// Coordinate system of a file that was read before, to which degrees are moved.
+    pub coordinate_system: Option<String>,
 }
 
 /// Reads what a file holds.
@@ -55,7 +58,25 @@ pub fn import(
         surfel_formats::load_graph(file, &load_options, progress)?
     };
     progress.end();
-    Ok(loaded)
+    match settings.preparation.reproject() {
+        true => Ok(with_metres(loaded, options, progress)),
+        false => Ok(loaded),
+    }
+}
+
+/// Moves a cloud in degrees of longitude and latitude to metres; everything else stays as it is.
+fn with_metres(
+    (mut graph, mut info): (Graph<PointCloud>, FileInfo),
+    options: &ImportOptions,
+    progress: &dyn Progress,
+) -> (Graph<PointCloud>, FileInfo) {
+    if let [Geometry::Points(cloud)] = &mut graph.geometries[..] {
+        let others = options.coordinate_system.as_deref();
+        if let Some(line) = metres_from_degrees(cloud, &mut info, others) {
+            progress.choice(&line, &["reproject"]);
+        }
+    }
+    (graph, info)
 }
 
 /// Takes content in memory as if a file held it.

@@ -51,7 +51,7 @@ use complete_description::complete_description;
 use interior::{choose_room, hidden_ceiling, hidden_walls};
 use plan::{check_height_map, frame_plan};
 use point_size::choose_point_size;
-use spread::{report_degrees, report_gaps};
+use spread::report_gaps;
 use station::{choose_station, stand_at_station};
 use sun_and_sky::{LightingContext, ScanInView, choose_lights, lights};
 use sun_position::stand_sun_at_date;
@@ -147,7 +147,6 @@ impl AutoSettings {
         stand_sun_at_date(scene, &mut description, place, up, progress)?;
         let description = &description;
         report_gaps(&points, progress);
-        report_degrees(&points, progress);
         let room = choose_room(scene, description, &points, up);
         let station = choose_station(scene, description, up, room.as_ref());
         let (room_seen, station) = (room.as_ref(), station.as_ref());

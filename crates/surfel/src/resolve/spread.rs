@@ -1,7 +1,6 @@
 //! Warnings of pictures that show almost nothing, or things out of shape.
 
 use surfel_core::image::Image;
-use surfel_core::math::Aabb;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 
@@ -9,10 +8,6 @@ use surfel_core::progress::Progress;
 const MIN_COVERAGE: f64 = 0.005;
 /// Minimum gap between two parts of a scene that is reported, in multiples of both parts' lengths together.
 const MAX_GAP_RATIO: f64 = 10.0;
-/// Maximum extent of a scan in degrees.
-const MAX_DEGREES: f32 = 2.0;
-/// Minimum height in metres of a scan in degrees, as a multiple of its extent: 1 km is 0.01 degrees wide.
-const MIN_NEEDLE_RATIO: f32 = 100.0;
 /// Minimum number of points of a part: fewer are outliers.
 const MIN_POINTS: usize = 20;
 
@@ -27,23 +22,6 @@ pub fn report_coverage(image: &Image, progress: &dyn Progress) {
             "warning: only {percent:.2} % of the picture is covered; move the camera nearer, or give points a larger radius"
         );
         progress.choice(&line, &["camera.zoom_factor", "camera.focal_point", "radius"]);
-    }
-}
-
-/// Warns of longitudes and latitudes beside heights in metres: in degrees, all scans are needles.
-pub fn report_degrees(points: &PointCloud, progress: &dyn Progress) {
-    let step = points.len().div_ceil(200_000).max(1);
-    let positions = points.positions.iter().step_by(step).filter(|p| p.is_finite());
-    let bounds = Aabb::of_points(positions.copied());
-    let size = bounds.size();
-    let (low, high) =
-        (points.origin + bounds.min.as_dvec3(), points.origin + bounds.max.as_dvec3());
-    let is_on_earth = -180.0 <= low.x && high.x <= 180.0 && -90.0 <= low.y && high.y <= 90.0;
-    let (side, height) = (size.x.max(size.y), size.z);
-    if is_on_earth && 0.0 < side && side < MAX_DEGREES && MIN_NEEDLE_RATIO * side < height {
-        progress.note(
-            "warning: x and y look like degrees of longitude and latitude, z like metres; reproject the file to a system in metres first, with pdal or QGIS for example",
-        );
     }
 }
 
@@ -80,7 +58,7 @@ mod tests {
 
     use super::*;
     use crate::progress_log::ProgressLog;
-    use surfel_core::math::{DVec3, Vec3};
+    use surfel_core::math::Vec3;
     use surfel_core::progress::NoProgress;
 
     fn reported(offset: f32) -> usize {
@@ -89,23 +67,6 @@ mod tests {
         let log = ProgressLog::new(&NoProgress);
         report_gaps(&cloud, &log);
         log.into_choices().len()
-    }
-
-    #[test]
-    fn degrees_are_reported() {
-        let notes = |scale: f32, origin: DVec3| {
-            let points = (0..1000).map(|i| {
-                Vec3::new((i % 30) as f32 * scale, (i / 30) as f32 * scale, (i % 17) as f32)
-            });
-            let mut cloud = PointCloud::from_positions(points.collect());
-            cloud.origin = origin;
-            let log = ProgressLog::new(&NoProgress);
-            report_degrees(&cloud, &log);
-            log.into_notes().len()
-        };
-        assert_eq!(notes(1e-4, DVec3::new(11.57, 48.13, 520.0)), 1);
-        assert_eq!(notes(1.0, DVec3::new(11.57, 48.13, 520.0)), 0);
-        assert_eq!(notes(1e-4, DVec3::new(691_000.0, 48.13, 520.0)), 0);
     }
 
     #[test]

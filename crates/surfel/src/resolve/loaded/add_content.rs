@@ -25,6 +25,10 @@ impl LoadedScene {
             keeps_all_columns: self.keeps_all_columns,
             seed: description.picture.seed(),
             memory: description.memory.clone(),
+            coordinate_system: self
+                .file_infos
+                .iter()
+                .find_map(|info| info.coordinate_system.clone()),
         }
     }
 
@@ -34,11 +38,10 @@ impl LoadedScene {
         description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<()> {
-        let options = self.import_options(description);
         let (mut separate, mut merging) = (Vec::new(), (Vec::new(), Vec::new()));
         for file in &description.files {
             let (graph, info) =
-                self.import(file, &description.objects_default, &options, progress)?;
+                self.import(file, &description.objects_default, description, progress)?;
             let has_material =
                 description.materials.choices().iter().any(|choice| choice.names(file));
             match into_cloud(graph) {
@@ -72,11 +75,12 @@ impl LoadedScene {
         &mut self,
         file: &Path,
         settings: &ObjectSettings,
-        options: &ImportOptions,
+        description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<(Graph<PointCloud>, FileInfo)> {
+        let options = self.import_options(description);
         let log = ProgressLog::new(progress);
-        let (graph, info) = import(file, settings, options, &log)?;
+        let (graph, info) = import(file, settings, &options, &log)?;
         let (n_points, n_triangles) = graph.n_points_and_triangles();
         let notes = log.into_notes();
         let points = graph.sample_points();
@@ -145,13 +149,12 @@ impl LoadedScene {
     ) -> Result<()> {
         let owner = self.objects.len();
         let settings = object.settings.over(&description.objects_default);
-        let options = self.import_options(description);
         if is_streamed(object, &settings)? {
-            return self.add_sequence(node, object, settings, options, progress);
+            return self.add_sequence(node, object, settings, description, progress);
         }
         let mut merging = Vec::new();
         for (file_idx, file) in object.files.iter().enumerate() {
-            let (graph, info) = self.import(file, &settings, &options, progress)?;
+            let (graph, info) = self.import(file, &settings, description, progress)?;
             if object.merge() {
                 let cloud = into_cloud(graph).map_err(|_| {
                     Error::Unfit(format!(
@@ -182,11 +185,12 @@ impl LoadedScene {
         node: usize,
         object: &ObjectDescription,
         settings: ObjectSettings,
-        options: ImportOptions,
+        description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<()> {
         let first = &object.files[0];
-        let (graph, _) = self.import(first, &settings, &options, progress)?;
+        let (graph, _) = self.import(first, &settings, description, progress)?;
+        let options = self.import_options(description);
         let above = Node { parent: Some(node), ..Node::new(file_name(first)) };
         let above = self.graph.add_node(above);
         let before = element_counts(&self.graph);

@@ -1,0 +1,169 @@
+//! Longitudes and latitudes in metres: in degrees, a scan is a needle as high as its heights.
+
+use super::{CoordinateSystem, Place, Unit};
+use surfel_core::math::{Aabb, DVec3};
+use surfel_core::points::PointCloud;
+use surfel_formats::FileInfo;
+
+/// Maximum extent of a scan in degrees, if no coordinate system is stated.
+const MAX_DEGREES: f32 = 2.0;
+/// Minimum height in metres of a scan in degrees, as a multiple of its extent: 1 km is 0.01 degrees wide.
+const MIN_NEEDLE_RATIO: f32 = 100.0;
+/// Minimum ratio of the distance from longitude and latitude zero to the extent of a scan. Coordinates of objects start
+/// near zero.
+const MIN_OFFSET_RATIO: f64 = 100.0;
+
+/// Moves the points of a cloud from degrees to the coordinate system of `others` if that has a unit of length, or to
+/// their zone of the Universal Transverse Mercator (UTM) system. Heights stay.
+///
+/// Returns a line about it for the user, or `None` if the coordinates are no degrees: the file states no geographic
+/// system, and none without a statement look like it.
+pub fn metres_from_degrees(
+    cloud: &mut PointCloud,
+    info: &mut FileInfo,
+    others: Option<&str>,
+) -> Option<String> {
+    let source = info.coordinate_system.as_deref().and_then(CoordinateSystem::parse);
+    let bounds = Aabb::of_points(cloud.positions.iter().copied().filter(|p| p.is_finite()));
+    let [low, high] = [bounds.min, bounds.max].map(|corner| cloud.origin + corner.as_dvec3());
+    let is_on_earth = -180.0 <= low.x && high.x <= 360.0 && -90.0 <= low.y && high.y <= 90.0;
+    let is_stated = source.as_ref().map(|source| source.unit() == Unit::Degrees);
+    if !is_on_earth || !is_stated.unwrap_or_else(|| is_needle(bounds, low)) {
+        return None;
+    }
+    let source = source.or_else(|| CoordinateSystem::parse("EPSG:4326"))?;
+    let middle = source.place(0.5 * (low + high))?;
+    let is_metric = |system: &CoordinateSystem| {
+        !system.projection.is_geocent() && system.unit() != Unit::Degrees
+    };
+    let of_others = others.and_then(|text| Some((text.to_owned(), CoordinateSystem::parse(text)?)));
+    let (name, target) = match of_others.filter(|(_, system)| is_metric(system)) {
+        Some(found) => found,
+        None => {
+            let name = format!("EPSG:{}", utm_code(middle));
+            let system = CoordinateSystem::parse(&name)?;
+            (name, system)
+        }
+    };
+    let origin = target.position(middle)?.round().with_z(cloud.origin.z);
+    let moved = |position: &surfel_core::math::Vec3| {
+        let degrees = cloud.origin + position.as_dvec3();
+        if !degrees.is_finite() {
+            return Some(*position);
+        }
+        let found = target.position(source.place(degrees)?)?;
+        Some((found.with_z(degrees.z) - origin).as_vec3())
+    };
+    cloud.positions = cloud.positions.iter().map(moved).collect::<Option<Vec<_>>>()?;
+    cloud.origin = origin;
+    let line = format!(
+        "longitudes and latitudes around {:.4}, {:.4} moved to metres of {name}",
+        middle.longitude_deg, middle.latitude_deg
+    );
+    *info = FileInfo {
+        coordinate_system: Some(name),
+        bounds: None,
+        resolution: None,
+        ..std::mem::take(info)
+    };
+    Some(line)
+}
+
+/// True if coordinates look like degrees beside heights in metres.
+fn is_needle(bounds: Aabb, low: DVec3) -> bool {
+    let size = bounds.size();
+    let side = size.x.max(size.y);
+    let offset = low.x.abs().max(low.y.abs());
+    0.0 < side
+        && side < MAX_DEGREES
+        && MIN_NEEDLE_RATIO * side < size.z
+        && MIN_OFFSET_RATIO * f64::from(side) < offset
+}
+
+/// Returns the EPSG code of the UTM zone of a place.
+fn utm_code(place: Place) -> u16 {
+    let zone = (((place.longitude_deg + 180.0) / 6.0).floor() as i32).rem_euclid(60) + 1;
+    let first = if place.latitude_deg < 0.0 { 32_700 } else { 32_600 };
+    first + zone as u16
+}
+
+#[cfg(test)]
+mod tests {
+    //! Degrees that are moved, and lengths that are not.
+
+    use super::*;
+    use surfel_core::math::Vec3;
+
+    /// Returns points 1e-4 `scale` apart at an origin.
+    fn points(scale: f32, origin: DVec3) -> PointCloud {
+        let position = |i: i32| {
+            Vec3::new(
+                (i % 30) as f32 * 1e-4 * scale,
+                (i / 30) as f32 * 1e-4 * scale,
+                (i % 17) as f32,
+            )
+        };
+        let mut cloud = PointCloud::from_positions((0..900).map(position).collect());
+        cloud.origin = origin;
+        cloud
+    }
+
+    fn stated(system: &str) -> FileInfo {
+        FileInfo { coordinate_system: Some(system.to_owned()), ..FileInfo::default() }
+    }
+
+    const MUNICH: DVec3 = DVec3::new(11.57, 48.13, 520.0);
+
+    #[test]
+    fn degrees_become_metres_of_their_utm_zone() {
+        for mut info in [FileInfo::default(), stated("EPSG:4326")] {
+            let mut cloud = points(1.0, MUNICH);
+            let line = metres_from_degrees(&mut cloud, &mut info, None).unwrap();
+            assert!(line.ends_with("moved to metres of EPSG:32632"), "{line}");
+            assert_eq!(info.coordinate_system.as_deref(), Some("EPSG:32632"));
+            let size = Aabb::of_points(cloud.positions.iter().copied()).size();
+            // 0.0029 degrees of latitude are 322 m, of longitude two thirds of it.
+            assert!((size.y - 329.0).abs() < 3.0 && (size.x - 228.0).abs() < 3.0, "{size}");
+            assert_eq!(size.z, 16.0);
+            let first = cloud.origin + cloud.positions[0].as_dvec3();
+            let system = CoordinateSystem::parse("EPSG:32632").unwrap();
+            let place = system.place(first).unwrap();
+            assert!((place.longitude_deg - MUNICH.x).abs() < 1e-8, "{place:?}");
+            assert!((place.latitude_deg - MUNICH.y).abs() < 1e-8, "{place:?}");
+        }
+    }
+
+    #[test]
+    fn degrees_follow_the_system_of_other_files() {
+        let mut cloud = points(1.0, MUNICH);
+        let mut info = stated("EPSG:4326");
+        metres_from_degrees(&mut cloud, &mut info, Some("EPSG:25833")).unwrap();
+        assert_eq!(info.coordinate_system.as_deref(), Some("EPSG:25833"));
+        metres_from_degrees(&mut points(1.0, MUNICH), &mut stated("EPSG:4326"), Some("EPSG:4326"));
+    }
+
+    #[test]
+    fn lengths_stay() {
+        for (scale, origin, mut info) in [
+            (1e4, MUNICH, FileInfo::default()),
+            (1.0, DVec3::new(691_000.0, 48.13, 520.0), FileInfo::default()),
+            (1.0, DVec3::ZERO, FileInfo::default()),
+            (1.0, MUNICH, stated("EPSG:25832")),
+            (1.0, DVec3::new(691_000.0, 5_334_000.0, 520.0), stated("EPSG:4326")),
+        ] {
+            let mut cloud = points(scale, origin);
+            let before = cloud.clone();
+            assert_eq!(metres_from_degrees(&mut cloud, &mut info, None), None);
+            assert!(cloud == before);
+        }
+    }
+
+    #[test]
+    fn zones_are_six_degrees_wide() {
+        let code = |longitude_deg, latitude_deg| utm_code(Place { latitude_deg, longitude_deg });
+        assert_eq!(code(-180.0, 10.0), 32_601);
+        assert_eq!(code(179.9, -10.0), 32_760);
+        assert_eq!(code(180.0, 10.0), 32_601);
+        assert_eq!(code(11.57, 48.13), 32_632);
+    }
+}
