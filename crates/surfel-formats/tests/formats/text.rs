@@ -2,6 +2,7 @@
 
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::PointCloud;
+use surfel_core::progress::NoProgress;
 use surfel_formats::{LoadOptions, TextColumn, load_bytes};
 
 use crate::common::{Listener, read};
