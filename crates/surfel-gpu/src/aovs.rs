@@ -8,6 +8,7 @@ use surfel_core::integrator::albedo;
 use surfel_core::math::Vec3;
 use surfel_core::render::Settings;
 use surfel_core::scene::View;
+use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::SceneHit;
 
 /// The picture whose AOVs are set.
@@ -50,6 +51,9 @@ pub fn set_aovs(
 
 fn point_id(scene: &FlatScene, hit: &HitRecord) -> u32 {
     match scene.geometry(&scene.instances[hit.instance as usize]) {
+        FlatGeometry::Cloud(cloud) if cloud.surface == SurfaceKind::Gaussian => {
+            cloud.gaussians.id(hit.slot)
+        }
         FlatGeometry::Cloud(cloud) => cloud.points_of(SURFACES[hit.surface as usize]).id(hit.slot),
         FlatGeometry::Mesh(mesh) => mesh.triangles.id(hit.slot),
     }

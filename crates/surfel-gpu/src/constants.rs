@@ -1,5 +1,8 @@
 //! The declarations of the constants that the kernels share with Rust.
 
+use crate::field_arrays::{
+    CORNER_CELL_VECTORS, KD_HEAD_VECTORS, OCTREE_HEAD_VECTORS, PLANE_VECTORS,
+};
 use crate::numbers::alpha_mode;
 use crate::numbers::attribute;
 use crate::numbers::background;
@@ -9,17 +12,22 @@ use crate::numbers::light_kind;
 use crate::numbers::miss;
 use crate::numbers::queue;
 use crate::numbers::texture;
-use crate::numbers::{MAX_PLANES, TRIANGLE, WORKGROUP_SIZE, surface_number};
+use crate::numbers::{MAX_PLANES, TRIANGLE, WORKGROUP_SIZE, align_number, surface_number};
 use surfel_core::bvh::MAX_DEPTH;
+use surfel_core::flat::{MAX_KD_DEPTH, MAX_OCTREE_DEPTH};
 use surfel_core::integrator::constants as integrator;
+use surfel_core::math::eigen_lanes as eigen;
+use surfel_core::points::HARMONIC_0;
 use surfel_core::surface::align;
 use surfel_core::surface::capsule;
 use surfel_core::surface::disc;
 use surfel_core::surface::edge_test;
+use surfel_core::surface::gaussian;
+use surfel_core::surface::mls;
 use surfel_core::surface::smooth;
 use surfel_core::surface::{
-    FIT_REACH, MAX_GATHERED, NEIGHBORHOOD_RADIUS_FACTOR, SOLID_SPAWN_OFFSET, SUPPORT_FACTOR,
-    SurfaceKind,
+    Align, FIELD_SUPPORT, FIT_REACH, MAX_GATHERED, MIN_FIELD_WEIGHT, NEIGHBORHOOD_RADIUS_FACTOR,
+    SOLID_SPAWN_OFFSET, SUPPORT_FACTOR, SurfaceKind,
 };
 use surfel_core::trace::constants as trace;
 
@@ -41,6 +49,11 @@ fn kinds() -> Vec<(&'static str, u32)> {
         ("SPHERE", SurfaceKind::Sphere),
         ("DISC", SurfaceKind::Disc),
         ("SPLAT", SurfaceKind::Splat),
+        ("SPLAT_FIT", SurfaceKind::SplatFit),
+        ("CYLINDER", SurfaceKind::Cylinder),
+        ("MLS", SurfaceKind::Mls),
+        ("IMPLICIT", SurfaceKind::Implicit),
+        ("OCTREE", SurfaceKind::Octree),
         ("SMOOTH", SurfaceKind::Smooth),
         ("CAPSULE", SurfaceKind::Capsule),
     ];
@@ -59,6 +72,8 @@ fn numbers() -> Vec<(&'static str, u32)> {
         ("SPOT", light_kind::SPOT),
         ("ENVIRONMENT", light_kind::ENVIRONMENT),
         ("TRIANGLE", TRIANGLE),
+        ("ALIGN_EACH", align_number(Align::Each)),
+        ("ALIGN_NEAREST", align_number(Align::Nearest)),
         ("PATHS", queue::PATHS),
         ("POINTS", queue::POINTS),
         ("LIGHT_RAYS", queue::LIGHT_RAYS),
@@ -105,6 +120,21 @@ fn limits() -> Vec<(&'static str, u32)> {
         ("MAX_GATHERED", MAX_GATHERED as u32),
         ("MAX_REJECTED_HITS", trace::MAX_REJECTED_HITS as u32),
         ("MAX_FITS", trace::MAX_FITS as u32),
+        ("KD_DEPTH", MAX_KD_DEPTH as u32 + 1),
+        ("KD_HEAD_VECTORS", KD_HEAD_VECTORS as u32),
+        ("N_SAMPLES", trace::field::N_SAMPLES as u32),
+        ("FIELD_MAX_REJECTED_HITS", trace::field::MAX_REJECTED_HITS as u32),
+        ("OCTREE_DEPTH", MAX_OCTREE_DEPTH as u32),
+        ("OCTREE_HEAD_VECTORS", OCTREE_HEAD_VECTORS as u32),
+        ("PLANE_VECTORS", PLANE_VECTORS as u32),
+        ("CORNER_CELL_VECTORS", CORNER_CELL_VECTORS as u32),
+        ("N_PARTS", trace::octree::N_PARTS as u32),
+        ("BUFFER_SIZE", trace::gaussian::BUFFER_SIZE as u32),
+        ("MAX_TRIED_BALLS", trace::mls::MAX_TRIED_BALLS as u32),
+        ("MLS_MAX_FITS", trace::mls::MAX_FITS as u32),
+        ("N_PLANES", trace::mls::N_PLANES as u32),
+        ("MLS_STEPS", mls::N_STEPS as u32),
+        ("N_EIGEN_STEPS", eigen::N_STEPS as u32),
         ("MAX_ALPHA_LAYERS", integrator::MAX_ALPHA_LAYERS),
         ("MIN_DENSE", edge_test::MIN_DENSE),
         ("MIN_NEIGHBORS", edge_test::MIN_NEIGHBORS),
@@ -136,11 +166,49 @@ fn floats() -> Vec<(&'static str, f32)> {
         ("CAPSULE_ASPECT", capsule::ASPECT),
         ("MIN_ALIGNED_COSINE", align::MIN_ALIGNED_COSINE),
         ("MIN_BENT_COSINE", align::MIN_BENT_COSINE),
+        ("MIN_SPREAD", eigen::MIN_SPREAD),
+        ("NORMAL_STEPS", eigen::NORMAL_STEPS),
+        ("MIN_CROSS", eigen::MIN_CROSS),
         ("SOLID_SPAWN_OFFSET", SOLID_SPAWN_OFFSET),
         ("DISC_SPAWN_OFFSET", disc::SPAWN_OFFSET),
         ("DISC_SPAWN_T_MIN", disc::SPAWN_T_MIN),
         ("SMOOTH_SPAWN_OFFSET", smooth::SPAWN_OFFSET),
         ("SMOOTH_SPAWN_T_MIN", smooth::SPAWN_T_MIN),
+        ("FIELD_SUPPORT", FIELD_SUPPORT),
+        ("MIN_FIELD_WEIGHT", MIN_FIELD_WEIGHT),
+        ("FIELD_OVERLAP", trace::field::OVERLAP),
+        ("FIELD_RESTART_OFFSET", trace::field::RESTART_OFFSET),
+        ("FIELD_MIN_COLOR_WEIGHT", trace::field::MIN_COLOR_WEIGHT),
+        ("BRACKET_MARGIN", trace::field::BRACKET_MARGIN),
+        ("LINEAR_STEP", trace::field::LINEAR_STEP),
+        ("MAX_CELL_MARGIN", trace::octree::MAX_CELL_MARGIN),
+        ("CORNER_MARGIN", trace::octree::CORNER_MARGIN),
+        ("MIN_ALPHA", gaussian::MIN_ALPHA),
+        ("MAX_ALPHA", gaussian::MAX_ALPHA),
+        ("MIN_GAUSSIAN_TRANSMITTANCE", gaussian::MIN_GAUSSIAN_TRANSMITTANCE),
+        ("HARMONIC_0", HARMONIC_0 as f32),
+        ("HARMONIC_1", gaussian::D1),
+        ("HARMONIC_2_A", gaussian::D2[0]),
+        ("HARMONIC_2_B", gaussian::D2[1]),
+        ("HARMONIC_2_C", gaussian::D2[2]),
+        ("HARMONIC_3_A", gaussian::D3[0]),
+        ("HARMONIC_3_B", gaussian::D3[1]),
+        ("HARMONIC_3_C", gaussian::D3[2]),
+        ("HARMONIC_3_D", gaussian::D3[3]),
+        ("HARMONIC_3_E", gaussian::D3[4]),
+        ("MLS_SPAWN_OFFSET", mls::SPAWN_OFFSET),
+        ("MLS_SPAWN_T_MIN", mls::SPAWN_T_MIN),
+        ("MLS_SUPPORT", mls::SUPPORT_FACTOR),
+        ("MLS_MIN_WEIGHT", mls::MIN_WEIGHT),
+        ("SLOPE_PENALTY", mls::SLOPE_PENALTY),
+        ("BEND_PENALTY", mls::BEND_PENALTY),
+        ("LIST_MARGIN", trace::mls::LIST_MARGIN),
+        ("MAX_DISTANCE_FROM_BALL", trace::mls::MAX_DISTANCE_FROM_BALL),
+        ("MLS_MAX_STEP", trace::mls::MAX_STEP),
+        ("MLS_TOLERANCE", trace::mls::TOLERANCE),
+        ("MLS_MIN_COLOR_WEIGHT", trace::mls::MIN_COLOR_WEIGHT),
+        ("MLS_RESTART_OFFSET", trace::mls::RESTART_OFFSET),
+        ("RESTART_FRACTION", trace::mls::RESTART_FRACTION),
         ("NEIGHBORHOOD_RADIUS_FACTOR", NEIGHBORHOOD_RADIUS_FACTOR),
         ("EDGE_MAX_PLANE_DISTANCE", edge_test::MAX_PLANE_DISTANCE),
         ("MIN_PASSED_DISTANCE", edge_test::MIN_PASSED_DISTANCE),

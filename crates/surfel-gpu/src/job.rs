@@ -9,8 +9,7 @@ use crate::passes::{Pass, PassStage, Passes, Size};
 use crate::records::{FrameRecord, HitRecord, ShadingPointRecord};
 use crate::scene_records::{SceneRecords, frame};
 use crate::shader::Resources;
-use crate::tree_visits::TreeRef;
-use crate::upload::Uploads;
+use crate::upload::{TreeRef, Uploads};
 use crate::wavefront::{Capacities, Contents, DISPATCH_BYTES, Wavefront, written};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -171,8 +170,7 @@ impl Job<'_> {
         let visits = written(self.gpu, "instances", bytes, wgpu::BufferUsages::STORAGE)?;
         let mut bound = BTreeMap::new();
         for tree in self.passes.all().filter_map(|pass| pass.tree) {
-            let geometry = &self.scene.geometries[tree.geometry_idx];
-            let Some(arrays) = self.uploads.tree(geometry, tree.tree_idx) else { continue };
+            let Some(arrays) = self.uploads.tree(&self.scene.geometries, tree) else { continue };
             let bind = || arrays.bind(self.gpu, self.kernels, &visits);
             let group = self.gpu.catch("a tree", bind)?;
             bound.insert(tree, BoundTree { group, is_paged: arrays.is_paged() });

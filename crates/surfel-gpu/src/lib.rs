@@ -38,12 +38,14 @@
 mod error;
 pub mod numbers;
 pub mod records;
+mod field_arrays;
 mod constants;
 pub mod shader;
 mod device;
 mod kernels;
 mod unsupported;
 mod mesh_blocks;
+mod gaussian_arrays;
 mod upload;
 mod scene_records;
 mod words;

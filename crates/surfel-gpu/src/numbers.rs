@@ -1,6 +1,6 @@
 //! The numbers that stand for kinds of things in the kernels, and the limits that kernels have.
 
-use surfel_core::surface::SurfaceKind;
+use surfel_core::surface::{Align, SurfaceKind};
 
 /// Number of invocations of a workgroup.
 pub const WORKGROUP_SIZE: u32 = 64;
@@ -165,13 +165,19 @@ pub mod attribute {
 }
 
 /// The surface kinds, at the numbers that stand for them in the kernels.
-pub const SURFACES: [SurfaceKind; 8] = [
+pub const SURFACES: [SurfaceKind; 14] = [
     SurfaceKind::Points,
     SurfaceKind::Sphere,
     SurfaceKind::Disc,
     SurfaceKind::SplatMean,
     SurfaceKind::Splat,
     SurfaceKind::SplatFit,
+    SurfaceKind::Cylinder,
+    SurfaceKind::Mls,
+    SurfaceKind::Implicit,
+    SurfaceKind::Octree,
+    SurfaceKind::OctreeSplat,
+    SurfaceKind::Gaussian,
     SurfaceKind::Smooth,
     SurfaceKind::Capsule,
 ];
@@ -182,4 +188,9 @@ pub const TRIANGLE: u32 = SURFACES.len() as u32;
 /// Returns the number that stands for a surface kind in the kernels.
 pub fn surface_number(kind: SurfaceKind) -> u32 {
     SURFACES.iter().position(|known| *known == kind).map_or(0, |number| number as u32)
+}
+
+/// Returns the number that stands for a rule by which normals are turned.
+pub fn align_number(align: Align) -> u32 {
+    Align::ALL.iter().position(|(_, known)| *known == align).map_or(0, |number| number as u32)
 }

@@ -5,7 +5,8 @@ use crate::numbers::ray_kind;
 use crate::records::{Task, Visit};
 use crate::scene_records::n_light_samples;
 use crate::shader::{Kernel, Surface};
-use crate::tree_visits::{TreeInstances, TreeRef, TreeVisits};
+use crate::tree_visits::{TreeInstances, TreeVisits};
+use crate::upload::TreeRef;
 use crate::wavefront::RECORD_STRIDE;
 use std::ops::Range;
 use surfel_core::flat::FlatScene;
@@ -73,10 +74,12 @@ impl Passes {
     /// Returns the passes that render one sample of each pixel.
     pub fn new(scene: &FlatScene, settings: &Settings) -> Self {
         let mut passes = Self::default();
-        let TreeVisits { trees, visits } = TreeVisits::new(scene);
+        let TreeVisits { trees, gaussians, visits } = TreeVisits::new(scene);
         passes.visits = visits;
         passes.camera = passes.camera_passes(ray_kind::PRIMARY);
         passes.trace = passes.trace_passes(&trees);
+        let light = passes.gaussian_pass(Kernel::Gaussians, queue::PATHS, &gaussians);
+        passes.trace.extend(light);
         let shade = passes.pass(Kernel::Shade, Size::Queue(queue::PATHS), Task::default());
         let mut once = vec![shade];
         once.push(passes.take(queue::POINTS, ray_kind::UNCOUNTED));
@@ -90,7 +93,7 @@ impl Passes {
                 sample.is_of_light = true;
                 once.push(sample);
                 if let Some(kind) = kind {
-                    passes.add_light_passes(scene, &trees, kind, &mut once);
+                    passes.add_light_passes(scene, (&trees, &gaussians), kind, &mut once);
                 }
             }
         }
@@ -98,7 +101,7 @@ impl Passes {
         if scene.materials.iter().any(has_branches) {
             passes.next_wave = Some(passes.take(queue::PATHS, ray_kind::SECONDARY));
         }
-        passes.add_aov_passes(&trees, settings);
+        passes.add_aov_passes(&trees, &gaussians, settings);
         passes
     }
 
@@ -136,6 +139,17 @@ impl Passes {
         })
     }
 
+    /// Returns the pass of paths, or of rays toward lights, over trained Gaussians; none without any.
+    fn gaussian_pass(&mut self, kernel: Kernel, queue: u32, visits: &Range<u32>) -> Option<Pass> {
+        let n_visits = visits.end - visits.start;
+        let task = Task { queue, first_visit: visits.start, n_visits, ..Task::default() };
+        (0 < n_visits).then(|| Pass {
+            tree: Some(TreeRef::Gaussians),
+            is_of_light: queue == queue::LIGHT_RAYS,
+            ..self.pass(kernel, Size::Queue(queue), task)
+        })
+    }
+
     /// Returns the passes that find hits, and the points behind them where these give the colour.
     fn closest(&mut self, tree: &TreeInstances, visits: Range<u32>, queue: u32) -> Vec<Pass> {
         let closest = self.tree_pass(Kernel::Closest, tree, visits.clone(), queue);
@@ -167,7 +181,7 @@ impl Passes {
     fn add_light_passes(
         &mut self,
         scene: &FlatScene,
-        trees: &[TreeInstances],
+        (trees, gaussians): (&[TreeInstances], &Range<u32>),
         ray_kind: u32,
         once: &mut Vec<Pass>,
     ) {
@@ -179,6 +193,7 @@ impl Passes {
             let any = self.tree_pass(Kernel::Any, tree, tree.opaque.clone(), queue::LIGHT_RAYS);
             once.extend(any);
         }
+        once.extend(self.gaussian_pass(Kernel::GaussianShadow, queue::LIGHT_RAYS, gaussians));
         if !scene.is_transmissive {
             once.push(of_light(self.pass(Kernel::AddLight, size, task)));
             return;
@@ -193,22 +208,32 @@ impl Passes {
         self.shade.push(PassStage::Surfaces(surfaces));
     }
 
-    /// Adds the passes for AOVs. If there is one sample and one wavefront, it has left its hits.
-    fn add_aov_passes(&mut self, trees: &[TreeInstances], settings: &Settings) {
+    /// Adds the passes for AOVs. If there is one sample and one wavefront, it has left its hits, if all are on surfaces.
+    fn add_aov_passes(
+        &mut self,
+        trees: &[TreeInstances],
+        gaussians: &Range<u32>,
+        settings: &Settings,
+    ) {
         if !settings.with_aovs {
             return;
         }
         let is_sampled = 1 < settings.samples_per_pixel;
-        if is_sampled || self.next_wave.is_some() {
+        let has_gaussians = !gaussians.is_empty();
+        if is_sampled || self.next_wave.is_some() || has_gaussians {
             let kind = if is_sampled { ray_kind::PRIMARY } else { ray_kind::UNCOUNTED };
             self.aov_hits = self.camera_passes(kind);
             let trace = self.trace_passes(trees);
             self.aov_hits.extend(trace);
+            let hits = self.gaussian_pass(Kernel::GaussianHits, queue::PATHS, gaussians);
+            self.aov_hits.extend(hits);
         }
         for tree in trees.iter().filter(|tree| tree.surface != Surface::Triangle) {
             let support = self.tree_pass(Kernel::Support, tree, tree.all(), queue::PATHS);
             self.aov_supports.extend(support);
         }
+        let support = self.gaussian_pass(Kernel::GaussianSupport, queue::PATHS, gaussians);
+        self.aov_supports.extend(support);
     }
 }
 

@@ -12,7 +12,7 @@ use crate::scene_records::SceneRecords;
 use crate::shader::{Kernel, Surface};
 use crate::tree_visits::lone_visit;
 use crate::unsupported::trees;
-use crate::upload::{GpuTree, Uploads};
+use crate::upload::{GpuTree, TreeRef, Uploads};
 use crate::wavefront::{Capacities, Contents, RECORD_STRIDE, Wavefront, written};
 use bytemuck::Zeroable;
 use std::sync::Arc;
@@ -79,7 +79,10 @@ pub fn time(
         run_secs: vec![0.0; timing.n_runs as usize],
         ..RayTimes::default()
     };
-    let tree = |search: &Search| uploads.tree(timing.geometry, search.tree_idx);
+    let geometries = std::slice::from_ref(timing.geometry);
+    let tree = |search: &Search| {
+        uploads.tree(geometries, TreeRef::Geometry { geometry_idx: 0, tree_idx: search.tree_idx })
+    };
     let is_paged = |search: &Search| tree(search).is_some_and(GpuTree::is_paged);
     let own = [Kernel::TakeQueue, Kernel::ClearHits].map(|kernel| (kernel, false));
     let of_trees = searches.iter().map(|search| (search.kernel, is_paged(search)));
@@ -130,8 +133,10 @@ fn searches(geometry: &FlatGeometry, query: TimedQuery) -> Vec<Search> {
     };
     let search = |tree_idx, surface| {
         let visit = lone_visit(geometry, tree_idx);
-        let has_edge_test = if query == TimedQuery::Surface { visit.has_edge_test } else { 0 };
-        let visit = Visit { has_edge_test, ..visit };
+        let visit = match query {
+            TimedQuery::Surface => visit,
+            _ => Visit { has_edge_test: 0, min_discs: 1, ..visit },
+        };
         Search { kernel: kernel(surface), tree_idx, visit }
     };
     let cloud = match geometry {
@@ -142,7 +147,8 @@ fn searches(geometry: &FlatGeometry, query: TimedQuery) -> Vec<Search> {
         TimedQuery::Surface => {
             let shown = trees(cloud).into_iter().enumerate();
             let shown = shown.filter(|(_, (_, points))| !points.nodes.is_empty());
-            let surfaces = shown.filter_map(|(i, (kind, _))| Some((i, Surface::of_kind(kind)?)));
+            let surfaces = shown
+                .filter_map(|(i, (kind, _))| Some((i, Surface::of_kind(kind, &cloud.options)?)));
             surfaces.map(|(i, surface)| search(i, surface)).collect()
         }
         TimedQuery::Gather => vec![search(0, Surface::Splat)],
@@ -254,9 +260,9 @@ impl Chunk {
 /// Returns an error if a question about a geometry has no kernel.
 pub fn check(gpu: &Gpu, geometry: &FlatGeometry, query: TimedQuery) -> Result<()> {
     let FlatGeometry::Cloud(cloud) = geometry else { return Ok(()) };
-    if query != TimedQuery::Surface || Surface::of_kind(cloud.surface).is_some() {
+    if query != TimedQuery::Surface || Surface::of_kind(cloud.surface, &cloud.options).is_some() {
         return Ok(());
     }
-    let reason = format!("the GPU does not render the surface {} yet", cloud.surface.name());
+    let reason = format!("the GPU has no benchmark of the surface {}", cloud.surface.name());
     Err(Error::Device { device: gpu.info.name.clone(), reason })
 }

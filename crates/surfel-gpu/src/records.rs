@@ -59,10 +59,10 @@ pub struct FrameRecord {
     pub max_depth: u32,
     /// Number of rays toward each extended light from a hit of a camera ray.
     pub n_light_samples: u32,
-    /// Zero.
-    pub reserved_a: u32,
-    /// Zero.
-    pub reserved_b: u32,
+    /// Size of a pixel at the origins of rays.
+    pub pixel_at_origin: f32,
+    /// Growth of a pixel with the distance.
+    pub pixel_per_distance: f32,
     /// Normals of planes, and their distances from the scene's origin along these.
     pub planes: [[f32; 4]; MAX_PLANES],
 }
@@ -79,8 +79,9 @@ pub struct Visit {
     pub world_from_object: [[f32; 4]; 3],
     /// Index of the instance.
     pub instance: u32,
-    /// Zero.
-    pub reserved_a: u32,
+    /// Number of the rule by which normals are turned before they are blended, see
+    /// [`align_number`](crate::numbers::align_number).
+    pub align: u32,
     /// 1 if object and world coordinates are the same.
     pub is_identity: u32,
     /// Number of the surface kind, as [`surface_number`](crate::numbers::surface_number) gives it.
@@ -97,26 +98,36 @@ pub struct Visit {
     pub has_front_sides: u32,
     /// 1 if colours may be blended.
     pub blends_colors: u32,
-    /// Vectors of four words that a block of triangles takes with the attributes of its vertices.
+    /// Vectors of four words that a block of triangles takes with the attributes of its vertices, or a block of trained
+    /// Gaussians with the coefficients of their colours.
     pub block_vectors: u32,
     /// The [`attribute`](crate::numbers::attribute)s of the vertices of triangles.
     pub attributes: u32,
-    /// Zero.
-    pub reserved_e: u32,
+    /// 1 if the radius of the nearest disc alone decides which discs are blended.
+    pub gathers_to_nearest: u32,
     /// 1 if normals point out of the body, so that a back face is seen from inside.
     pub has_outward_normals: u32,
-    /// Zero.
-    pub reserved_b: u32,
+    /// Minimum number of discs of a hit.
+    pub min_discs: u32,
     /// 1 if the transform mirrors.
     pub is_mirrored: u32,
     /// Lower corner of the bounding box in world coordinates.
     pub lower: [f32; 3],
-    /// Zero.
-    pub reserved_c: f32,
+    /// Factor that multiplied the radii of the points.
+    pub radius_factor: f32,
     /// Upper corner of the bounding box in world coordinates.
     pub upper: [f32; 3],
     /// Zero.
-    pub reserved_d: f32,
+    pub reserved_a: f32,
+    /// Index of the root of the tree of trained Gaussians.
+    pub root_node: u32,
+    /// Index of the first vector of four words of the blocks of trained Gaussians, or of the structure behind the nodes of
+    /// a field's points.
+    pub first_vector: u32,
+    /// Number of spherical harmonics of each channel of trained Gaussians.
+    pub n_harmonics: u32,
+    /// Zero.
+    pub reserved_b: u32,
 }
 
 /// The task of a pass: the sample of a light, the queue that it works on and the kind of its rays, or the instances of a
@@ -272,12 +283,12 @@ pub struct InstanceRecord {
     pub support_low: f32,
     /// Distance in radii of the last colour.
     pub support_high: f32,
+    /// Factor on the radius of a hit of the surface, from which the distance follows that new rays skip.
+    pub spawn_factor: f32,
     /// Zero.
     pub reserved_a: u32,
     /// Zero.
     pub reserved_b: u32,
-    /// Zero.
-    pub reserved_c: u32,
 }
 
 /// The nearest hit of a ray.
@@ -314,6 +325,18 @@ pub struct HitRecord {
     pub uvs: [f32; 4],
     /// Unit tangent of a normal map in world space, zero without one, and the sign of its bitangent.
     pub tangent: [f32; 4],
+    /// Radiance of the trained Gaussians before the hit.
+    pub gaussian_radiance: [f32; 3],
+    /// Fraction of the light from the hit that the Gaussians let pass.
+    pub gaussian_transmittance: f32,
+    /// Distance along the ray to the Gaussians, [`NO_LIMIT`](crate::numbers::NO_LIMIT) without any.
+    pub gaussian_distance: f32,
+    /// Zero.
+    pub reserved_a: u32,
+    /// Zero.
+    pub reserved_b: u32,
+    /// Zero.
+    pub reserved_c: u32,
 }
 
 /// A path's next ray, or a ray toward a light.

@@ -7,7 +7,6 @@ use crate::kernels::Kernels;
 use crate::passes::{Pass, Passes};
 use crate::ray_timing::{self, RayTimes, Timing};
 use crate::scene_records::SceneRecords;
-use crate::tree_visits::TreeRef;
 use crate::unsupported::unsupported;
 use crate::upload::{GpuTree, Uploads};
 use crate::words::SceneWords;
@@ -98,10 +97,7 @@ impl Renderer for GpuRenderer {
         let State { kernels, uploads, words } = &mut *state;
         let passes = Passes::new(scene, settings);
         uploads.update(&self.gpu, &scene.geometries)?;
-        let is_paged = |tree: TreeRef| {
-            let tree = uploads.tree(&scene.geometries[tree.geometry_idx], tree.tree_idx);
-            tree.is_some_and(GpuTree::is_paged)
-        };
+        let is_paged = |tree| uploads.tree(&scene.geometries, tree).is_some_and(GpuTree::is_paged);
         let of_pass = |pass: &Pass| (pass.kernel, pass.tree.is_some_and(is_paged));
         kernels.compile(&self.gpu, passes.all().map(of_pass))?;
         let updated = SceneWords::update(words.take(), &self.gpu, scene)?;

@@ -162,6 +162,7 @@ fn instance_record(
         upper: instance.bounds.max.to_array(),
         max_scale: instance.max_scale,
         first_support_color: NONE,
+        spawn_factor: 1.0,
         ..Zeroable::zeroed()
     };
     match scene.geometry(instance) {
@@ -174,6 +175,7 @@ fn instance_record(
             InstanceRecord {
                 has_outward_normals: cloud.has_outward_normals.into(),
                 first_support_color: offset.unwrap_or(NONE),
+                spawn_factor: cloud.options.spawn_factor(cloud.surface),
                 support_low: range.map_or(0.0, |range| range.low as f32),
                 support_high: range.map_or(0.0, |range| range.high as f32),
                 ..none
@@ -298,6 +300,7 @@ pub fn frame(scene: &FlatScene, view: &View, settings: &Settings) -> FrameRecord
         Lens::Orthographic { pixel_size } => (lens::ORTHOGRAPHIC, pixel_size, pixel_size),
         Lens::Panorama { pixel_rad } => (lens::PANORAMA, pixel_rad.0, pixel_rad.1),
     };
+    let is_parallel = matches!(view.lens, Lens::Orthographic { .. });
     let mut planes = [[0.0; 4]; MAX_PLANES];
     for (record, plane) in planes.iter_mut().zip(&scene.camera_planes) {
         let normal = plane.normal.as_vec3();
@@ -331,6 +334,8 @@ pub fn frame(scene: &FlatScene, view: &View, settings: &Settings) -> FrameRecord
         n_lights: (scene.lights.len() + scene.punctual_lights.len()) as u32,
         max_depth: settings.max_depth,
         n_light_samples: n_light_samples(settings),
+        pixel_at_origin: if is_parallel { view.pixel_size() } else { 0.0 },
+        pixel_per_distance: if is_parallel { 0.0 } else { view.pixel_size() },
         planes,
         ..Zeroable::zeroed()
     }

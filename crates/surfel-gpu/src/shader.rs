@@ -1,9 +1,9 @@
 //! The kernels' source text: the files of each kernel, after the constants that Rust writes.
 
 use crate::constants::constants;
-use crate::numbers::surface_number;
+use crate::numbers::{TRIANGLE, surface_number};
 use std::fmt::Write;
-use surfel_core::surface::SurfaceKind;
+use surfel_core::surface::{MAX_CANDIDATES, MAX_GATHERED, SurfaceKind, SurfaceOptions};
 
 /// A kernel: one pass over the entries of a queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,6 +18,14 @@ pub enum Kernel {
     Closest(Surface),
     /// Finds the points behind the hits on a tree.
     Support(Surface),
+    /// Computes the light of trained Gaussians before the hits of rays.
+    Gaussians,
+    /// Attenuates rays toward a light by trained Gaussians.
+    GaussianShadow,
+    /// Finds where trained Gaussians let half of the light pass.
+    GaussianHits,
+    /// Finds how near rays pass the trained Gaussians that they hit.
+    GaussianSupport,
     /// Adds the light that surfaces emit, and makes the rays that continue the paths.
     Shade,
     /// Makes rays toward a light.
@@ -52,6 +60,18 @@ pub enum Surface {
     Disc,
     /// Blended discs.
     Splat,
+    /// Blended discs with the normal of a plane through their centres.
+    SplatFit,
+    /// Blended discs at their mean distance.
+    Cylinder,
+    /// Moving least squares with polynomials of this degree, from 1 to 3.
+    Mls(u32),
+    /// The field of weighted planes.
+    Implicit,
+    /// An octree with the field at the corners of its cells.
+    Octree,
+    /// An octree with a plane in each cell.
+    OctreeSplat,
     /// The smooth surface.
     Smooth,
     /// Triangles.
@@ -60,21 +80,71 @@ pub enum Surface {
 
 impl Surface {
     /// Every surface.
-    pub const ALL: [Self; 6] =
-        [Self::Sphere, Self::Capsule, Self::Disc, Self::Splat, Self::Smooth, Self::Triangle];
+    pub const ALL: [Self; 14] = [
+        Self::Sphere,
+        Self::Capsule,
+        Self::Disc,
+        Self::Splat,
+        Self::SplatFit,
+        Self::Cylinder,
+        Self::Mls(1),
+        Self::Mls(2),
+        Self::Mls(3),
+        Self::Implicit,
+        Self::Octree,
+        Self::OctreeSplat,
+        Self::Smooth,
+        Self::Triangle,
+    ];
 
-    /// Returns the surface by which a kind is traced, or none if no kernel traces it.
-    pub fn of_kind(kind: SurfaceKind) -> Option<Self> {
+    /// Returns the surface by which a kind with these options is traced, or none if no kernel traces it.
+    pub fn of_kind(kind: SurfaceKind, options: &SurfaceOptions) -> Option<Self> {
         match kind {
             SurfaceKind::Sphere => Some(Self::Sphere),
             SurfaceKind::Capsule => Some(Self::Capsule),
             SurfaceKind::Disc => Some(Self::Disc),
             SurfaceKind::Splat | SurfaceKind::SplatMean => Some(Self::Splat),
             SurfaceKind::Smooth => Some(Self::Smooth),
-            SurfaceKind::Points | SurfaceKind::SplatFit => None,
-            // Their trees are traversed on the CPU alone.
-            SurfaceKind::Implicit | SurfaceKind::Octree | SurfaceKind::OctreeSplat => None,
-            SurfaceKind::Cylinder | SurfaceKind::Mls | SurfaceKind::Gaussian => None,
+            SurfaceKind::SplatFit => Some(Self::SplatFit),
+            SurfaceKind::Cylinder => Some(Self::Cylinder),
+            SurfaceKind::Mls if options.degree == 1 => Some(Self::Mls(1)),
+            SurfaceKind::Mls if options.degree == 2 => Some(Self::Mls(2)),
+            SurfaceKind::Mls => Some(Self::Mls(3)),
+            SurfaceKind::Points => None,
+            SurfaceKind::Octree => Some(Self::Octree),
+            SurfaceKind::OctreeSplat => Some(Self::OctreeSplat),
+            SurfaceKind::Implicit => Some(Self::Implicit),
+            // They are composited, not hit.
+            SurfaceKind::Gaussian => None,
+        }
+    }
+
+    /// Returns the number by which kernels know the surface.
+    fn number(self) -> u32 {
+        match self {
+            Self::SplatFit => surface_number(SurfaceKind::SplatFit),
+            Self::Cylinder => surface_number(SurfaceKind::Cylinder),
+            Self::Splat => surface_number(SurfaceKind::Splat),
+            Self::Smooth => surface_number(SurfaceKind::Smooth),
+            Self::Mls(_) => surface_number(SurfaceKind::Mls),
+            Self::Implicit => surface_number(SurfaceKind::Implicit),
+            Self::Octree => surface_number(SurfaceKind::Octree),
+            Self::OctreeSplat => surface_number(SurfaceKind::OctreeSplat),
+            Self::Triangle => TRIANGLE,
+            Self::Sphere | Self::Capsule | Self::Disc => surface_number(self.shape()),
+        }
+    }
+
+    /// Returns true if the blocks of the points' tree hold the surface.
+    fn is_in_blocks(self) -> bool {
+        !matches!(self, Self::Implicit | Self::Octree | Self::OctreeSplat)
+    }
+
+    /// Returns the maximum number of discs that are gathered along a ray.
+    fn max_discs(self) -> usize {
+        match self {
+            Self::SplatFit | Self::Cylinder => MAX_CANDIDATES,
+            _ => MAX_GATHERED,
         }
     }
 
@@ -83,6 +153,7 @@ impl Surface {
         match self {
             Self::Sphere => SurfaceKind::Sphere,
             Self::Capsule => SurfaceKind::Capsule,
+            Self::Mls(_) => SurfaceKind::Mls,
             _ => SurfaceKind::Disc,
         }
     }
@@ -109,14 +180,24 @@ const DIRECT: &[&str] = parts!["integrator/direct.wgsl"];
 const TRANSMITTANCE: &[&str] = parts!["integrator/transmittance.wgsl"];
 const ARRAYS: &[&str] = parts!["flat/arrays.wgsl"];
 const PAGED_ARRAYS: &[&str] = parts!["flat/paged_arrays.wgsl"];
+const VISIT: &[&str] = parts!["bvh/node.wgsl", "trace/visit.wgsl"];
+const GAUSSIANS: &[&str] = parts!["flat/gaussians.wgsl", "surface/gaussian.wgsl"];
+const GAUSSIAN_LIGHT: &[&str] = parts![
+    "trace/query/gaussian_buffer.wgsl",
+    "trace/query/gaussian_query.wgsl",
+    "trace/query/gaussian_light.wgsl",
+];
+const GAUSSIANS_KERNEL: &[&str] = parts!["trace/gaussians_kernel.wgsl"];
+const GAUSSIAN_SHADOW: &[&str] = parts!["trace/gaussian_shadow_kernel.wgsl"];
+const GAUSSIAN_HITS: &[&str] = parts!["trace/gaussian_hits_kernel.wgsl"];
+const GAUSSIAN_SUPPORT: &[&str] = parts!["trace/gaussian_support_kernel.wgsl"];
 const TREE: &[&str] = parts![
-    "bvh/node.wgsl",
     "flat/block.wgsl",
     "surface/disc.wgsl",
     "surface/sphere.wgsl",
     "surface/capsule.wgsl",
+    "surface/mls_ball.wgsl",
     "surface/kind.wgsl",
-    "trace/visit.wgsl",
 ];
 const TRAVERSE: &[&str] = parts!["trace/traverse.wgsl"];
 const REGION: &[&str] = parts!["trace/region.wgsl"];
@@ -137,14 +218,39 @@ const SOLIDS: &[&str] = parts!["trace/query/solids.wgsl"];
 const ACCEPT_ALL: &[&str] = parts!["trace/query/accept_all.wgsl"];
 const DISCS: &[&str] = parts!["trace/query/disc_query.wgsl", "trace/query/surface.wgsl"];
 const SPLATS: &[&str] = parts![
+    "math/eigen.wgsl",
     "surface/splat.wgsl",
     "trace/query/gather.wgsl",
+    "trace/query/plane_fit.wgsl",
     "trace/query/splat_query.wgsl",
     "trace/query/surface.wgsl",
 ];
+const ANY_SURFACE: &[&str] = parts!["trace/query/any_surface.wgsl"];
 const EDGE_FILTER: &[&str] = parts!["trace/query/edge_filter.wgsl"];
-const SMOOTH: &[&str] = parts!["surface/smooth.wgsl", "trace/query/smooth_query.wgsl"];
+const SMOOTH: &[&str] =
+    parts!["surface/smooth.wgsl", "trace/query/damped.wgsl", "trace/query/smooth_query.wgsl",];
 const SMOOTH_SURFACE: &[&str] = parts!["trace/query/smooth_surface.wgsl"];
+const MLS: &[&str] = parts![
+    "math/eigen.wgsl",
+    "surface/mls.wgsl",
+    "trace/query/damped.wgsl",
+    "trace/query/mls_query.wgsl",
+    "trace/query/mls_surface.wgsl",
+];
+const IMPLICIT: &[&str] = parts![
+    "surface/field.wgsl",
+    "flat/field/kd_tree.wgsl",
+    "trace/traversal/kd_walk.wgsl",
+    "trace/query/ray_field.wgsl",
+    "trace/query/field_query.wgsl",
+];
+const OCTREE: &[&str] = parts![
+    "flat/field/octree.wgsl",
+    "trace/traversal/octree_walk.wgsl",
+    "trace/query/octree_query.wgsl",
+];
+const OCTREE_SURFACE: &[&str] = parts!["trace/query/octree_surface.wgsl"];
+const ANY_CELL: &[&str] = parts!["trace/query/any_cell.wgsl"];
 const SMOOTH_FILTER: &[&str] = parts!["trace/query/smooth_filter.wgsl"];
 
 impl Kernel {
@@ -154,6 +260,10 @@ impl Kernel {
             Self::Generate,
             Self::TakeQueue,
             Self::ClearHits,
+            Self::Gaussians,
+            Self::GaussianShadow,
+            Self::GaussianHits,
+            Self::GaussianSupport,
             Self::Shade,
             Self::SampleLight,
             Self::AddLight,
@@ -172,8 +282,10 @@ impl Kernel {
             Self::Generate => "generate",
             Self::TakeQueue => "take_queue",
             Self::ClearHits => "clear_hits",
-            Self::Closest(_) => "closest",
-            Self::Support(_) => "support",
+            Self::Closest(_) | Self::GaussianHits => "closest",
+            Self::Support(_) | Self::GaussianSupport => "support",
+            Self::Gaussians => "gaussians",
+            Self::GaussianShadow => "gaussian_shadow",
             Self::Shade => "shade",
             Self::SampleLight => "sample_light",
             Self::Any(_) => "any_hit",
@@ -186,6 +298,9 @@ impl Kernel {
     pub fn resources(self) -> Resources {
         match self {
             Self::Closest(_) | Self::Any(_) | Self::Support(_) => Resources::Tree,
+            Self::Gaussians | Self::GaussianShadow | Self::GaussianHits | Self::GaussianSupport => {
+                Resources::Tree
+            }
             Self::Generate | Self::TakeQueue | Self::ClearHits => Resources::Dispatches,
             Self::Shade | Self::SampleLight | Self::AddLight | Self::PassSurface => {
                 Resources::Scene
@@ -202,6 +317,11 @@ impl Kernel {
         if let Self::Closest(surface) | Self::Any(surface) | Self::Support(surface) = self {
             let has_colors = matches!(self, Self::Closest(_));
             _ = writeln!(source, "const SHAPE: u32 = {}u;", surface_number(surface.shape()));
+            _ = writeln!(source, "const SURFACE: u32 = {}u;", surface.number());
+            _ = writeln!(source, "const MAX_DISCS: u32 = {}u;", surface.max_discs());
+            if let Surface::Mls(degree) = surface {
+                _ = writeln!(source, "const DEGREE: u32 = {degree}u;");
+            }
             _ = writeln!(source, "const HAS_COLORS: bool = {has_colors};");
         }
         let arrays = if page_shift.is_some() { PAGED_ARRAYS } else { ARRAYS };
@@ -222,23 +342,50 @@ impl Kernel {
             }
             Self::PassSurface => vec![COMMON, SAMPLING, SCENE, SPECULAR, SHADING, TRANSMITTANCE],
             Self::Closest(surface) => {
-                let mut parts = vec![COMMON, TREE, TRAVERSE, CLOSEST_KERNEL];
+                let mut parts = vec![COMMON, VISIT, TREE, CLOSEST_KERNEL];
+                if surface.is_in_blocks() {
+                    parts.push(TRAVERSE);
+                }
                 parts.extend_from_slice(match surface {
                     Surface::Sphere | Surface::Capsule => &[CLOSEST, SOLIDS],
                     Surface::Disc => &[CLOSEST, REGION, EDGE, DISCS],
-                    Surface::Splat => &[REGION, EDGE, SPLATS],
+                    Surface::Splat | Surface::SplatFit | Surface::Cylinder => {
+                        &[REGION, EDGE, SPLATS]
+                    }
                     Surface::Triangle => &[TRIANGLES],
+                    Surface::Mls(_) => &[CLOSEST, REGION, EDGE, MLS],
+                    Surface::Implicit => &[REGION, EDGE, IMPLICIT],
+                    Surface::Octree | Surface::OctreeSplat => &[OCTREE, OCTREE_SURFACE],
                     Surface::Smooth => &[CLOSEST, REGION, EDGE, SMOOTH, SMOOTH_SURFACE],
                 });
                 parts
             }
-            Self::Support(_) => vec![COMMON, TREE, REGION, SUPPORT],
+            Self::Support(_) => vec![COMMON, VISIT, TREE, REGION, SUPPORT],
+            Self::Gaussians => {
+                vec![COMMON, VISIT, GAUSSIANS, TRAVERSE, GAUSSIAN_LIGHT, GAUSSIANS_KERNEL]
+            }
+            Self::GaussianShadow => {
+                vec![COMMON, VISIT, GAUSSIANS, TRAVERSE, GAUSSIAN_LIGHT, GAUSSIAN_SHADOW]
+            }
+            Self::GaussianHits => {
+                vec![COMMON, VISIT, GAUSSIANS, TRAVERSE, GAUSSIAN_LIGHT, GAUSSIAN_HITS]
+            }
+            Self::GaussianSupport => vec![COMMON, VISIT, GAUSSIANS, GAUSSIAN_SUPPORT],
             Self::Any(surface) => {
-                let mut parts = vec![COMMON, TREE, TRAVERSE, ANY_KERNEL];
+                let mut parts = vec![COMMON, VISIT, TREE, ANY_KERNEL];
+                if surface.is_in_blocks() {
+                    parts.push(TRAVERSE);
+                }
                 parts.extend_from_slice(match surface {
                     Surface::Sphere | Surface::Capsule => &[ANY, ACCEPT_ALL],
                     Surface::Triangle => &[TRIANGLES],
-                    Surface::Disc | Surface::Splat => &[ANY, REGION, EDGE, EDGE_FILTER],
+                    Surface::Disc | Surface::Splat | Surface::SplatFit => {
+                        &[ANY, REGION, EDGE, EDGE_FILTER]
+                    }
+                    Surface::Cylinder => &[REGION, EDGE, SPLATS, ANY_SURFACE],
+                    Surface::Mls(_) => &[CLOSEST, REGION, EDGE, MLS, ANY_SURFACE],
+                    Surface::Implicit => &[REGION, EDGE, IMPLICIT, ANY_SURFACE],
+                    Surface::Octree | Surface::OctreeSplat => &[OCTREE, ANY_CELL],
                     Surface::Smooth => &[ANY, REGION, EDGE, SMOOTH, SMOOTH_FILTER],
                 });
                 parts
@@ -248,253 +395,4 @@ impl Kernel {
 }
 
 #[cfg(test)]
-mod tests {
-    //! Every kernel is valid and short, and the records have the same fields at the same offsets on both sides.
-
-    use super::*;
-    use crate::records::{
-        FrameRecord, HitRecord, InstanceRecord, LightRecord, MaterialRecord, Path,
-        ShadingPointRecord, Task, TextureRecord, Visit,
-    };
-    use std::mem::{offset_of, size_of};
-    use surfel_core::math::Ray;
-    use wgpu::naga::front::wgsl;
-    use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
-    use wgpu::naga::{Module, TypeInner};
-
-    fn parse(kernel: Kernel, page_shift: Option<u32>) -> Module {
-        let source = kernel.source(page_shift);
-        wgsl::parse_str(&source)
-            .unwrap_or_else(|error| panic!("{kernel:?}: {}", error.emit_to_string(&source)))
-    }
-
-    #[test]
-    fn every_kernel_is_valid() {
-        for (kernel, page_shift) in
-            Kernel::all().into_iter().flat_map(|kernel| [(kernel, None), (kernel, Some(23))])
-        {
-            let module = parse(kernel, page_shift);
-            let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
-            if let Err(error) = validator.validate(&module) {
-                panic!("{kernel:?}: {}", error.emit_to_string(&kernel.source(page_shift)));
-            }
-            let entries: Vec<&str> =
-                module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
-            assert!(entries.contains(&kernel.entry_point()), "{kernel:?} {entries:?}");
-        }
-    }
-
-    type Layout = (u32, Vec<(String, u32)>);
-
-    fn wgsl_layout(module: &Module, name: &str) -> Layout {
-        let (_, ty) = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name)).unwrap();
-        let TypeInner::Struct { members, span } = &ty.inner else { panic!("{name} is no struct") };
-        let members = members.iter().map(|member| (member.name.clone().unwrap(), member.offset));
-        (*span, members.collect())
-    }
-
-    macro_rules! rust_layout {
-        ($record:ident { $($field:ident),* $(,)? }) => {{
-            let fields: Vec<(String, u32)> = vec![
-                $((stringify!($field).to_owned(), offset_of!($record, $field) as u32)),*
-            ];
-            (stringify!($record), (size_of::<$record>() as u32, fields))
-        }};
-    }
-
-    #[test]
-    fn records_have_equal_layouts() {
-        let layouts: Vec<(&str, Layout)> = vec![
-            rust_layout!(Ray { origin, t_min, direction, t_max }),
-            rust_layout!(FrameRecord {
-                position,
-                lens,
-                forward,
-                pixel_width,
-                right,
-                pixel_height,
-                up,
-                n_planes,
-                center,
-                seed,
-                width,
-                first_pixel,
-                n_rays,
-                sample_idx,
-                samples_per_pixel,
-                is_centered,
-                is_first,
-                capacity,
-                background_top,
-                background,
-                background_bottom,
-                height,
-                background_up,
-                n_lights,
-                max_depth,
-                n_light_samples,
-                reserved_a,
-                reserved_b,
-                planes
-            }),
-            rust_layout!(Visit {
-                object_from_world,
-                world_from_normal,
-                world_from_object,
-                instance,
-                reserved_a,
-                is_identity,
-                surface,
-                max_scale,
-                max_blend_distance,
-                edge_retest_factor,
-                has_edge_test,
-                has_front_sides,
-                blends_colors,
-                block_vectors,
-                attributes,
-                reserved_e,
-                has_outward_normals,
-                reserved_b,
-                is_mirrored,
-                lower,
-                reserved_c,
-                upper,
-                reserved_d
-            }),
-            rust_layout!(Task {
-                light,
-                sample_idx,
-                max_samples,
-                queue,
-                ray_kind,
-                first_visit,
-                n_visits,
-                reserved_a
-            }),
-            rust_layout!(LightRecord {
-                direction,
-                kind,
-                color,
-                cos_max,
-                ground,
-                ao_distance,
-                position,
-                radius,
-                inner_cos,
-                outer_cos,
-                range,
-                lamp,
-                size,
-                first_word,
-                strength
-            }),
-            rust_layout!(TextureRecord {
-                first_word,
-                width,
-                height,
-                flags,
-                offset,
-                scale,
-                cos,
-                sin,
-                reserved_a,
-                reserved_b
-            }),
-            rust_layout!(MaterialRecord {
-                base_color,
-                ignores_vertex_colors,
-                emissive,
-                emissive_strength,
-                attenuation_color,
-                attenuation_distance,
-                is_unlit,
-                alpha,
-                alpha_mode,
-                alpha_cutoff,
-                metallic,
-                roughness,
-                ior,
-                transmission,
-                is_thin,
-                normal_scale,
-                reserved_a,
-                reserved_b,
-                textures
-            }),
-            rust_layout!(InstanceRecord {
-                lower,
-                material,
-                upper,
-                max_scale,
-                has_outward_normals,
-                attributes,
-                first_support_color,
-                support_low,
-                support_high,
-                reserved_a,
-                reserved_b,
-                reserved_c
-            }),
-            rust_layout!(HitRecord {
-                normal,
-                distance,
-                color,
-                radius,
-                geometric_normal,
-                alpha,
-                slot,
-                instance,
-                is_backface,
-                surface,
-                support_count,
-                support_distance,
-                barycentrics,
-                uvs,
-                tangent
-            }),
-            rust_layout!(Path {
-                ray,
-                weight,
-                pixel,
-                transmittance,
-                origin_offset,
-                media,
-                key,
-                index,
-                state
-            }),
-            rust_layout!(ShadingPointRecord {
-                position,
-                spawn_offset,
-                normal,
-                spawn_t_min,
-                geometric_normal,
-                roughness,
-                to_viewer,
-                pixel,
-                diffuse,
-                index,
-                glossy,
-                n_light_samples,
-                media,
-                key,
-                reserved_a,
-                reserved_b
-            }),
-        ];
-        let module = parse(Kernel::Generate, None);
-        for (name, layout) in layouts {
-            assert_eq!(wgsl_layout(&module, name), layout, "{name}");
-        }
-    }
-
-    #[test]
-    fn files_of_kernels_are_short() {
-        for kernel in Kernel::all() {
-            for part in kernel.parts().into_iter().flatten() {
-                assert!(part.lines().count() < 300, "{kernel:?}");
-            }
-        }
-    }
-}
+mod tests;

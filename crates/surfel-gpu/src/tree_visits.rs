@@ -1,25 +1,18 @@
 //! The trees of a scene with the records of their instances.
 
+use crate::gaussian_arrays::gaussian_places;
 use crate::mesh_blocks::{attributes, block_vectors};
-use crate::numbers::{TRIANGLE, attribute, surface_number};
+use crate::numbers::{TRIANGLE, align_number, attribute, surface_number};
 use crate::records::Visit;
 use crate::shader::Surface;
 use crate::unsupported::trees;
+use crate::upload::{NODE_VECTORS, TreeRef};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use surfel_core::flat::{FlatCloud, FlatGeometry, FlatMesh, FlatScene, Instance};
 use surfel_core::math::{Affine3A, Mat3, Vec3, Vec3A};
 use surfel_core::scene::Material;
-use surfel_core::surface::{EdgeTest, SurfaceKind};
-
-/// A tree that rays are traced against.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct TreeRef {
-    /// Index of the geometry.
-    pub geometry_idx: usize,
-    /// Index of the tree among those of the geometry.
-    pub tree_idx: usize,
-}
+use surfel_core::surface::{EdgeTest, GatherLimit, SurfaceKind};
 
 /// A tree with its instances.
 #[derive(Clone, Debug)]
@@ -48,6 +41,8 @@ impl TreeInstances {
 pub struct TreeVisits {
     /// The trees.
     pub trees: Vec<TreeInstances>,
+    /// Indices of the visits of instances of trained Gaussians.
+    pub gaussians: Range<u32>,
     /// Records of the instances of all trees.
     pub visits: Vec<Visit>,
 }
@@ -61,7 +56,7 @@ impl TreeVisits {
             let placement = placement(instance_idx as u32, instance);
             let geometry_idx = instance.geometry_idx as usize;
             let mut add = |tree_idx, surface, visit| {
-                let tree = TreeRef { geometry_idx, tree_idx };
+                let tree = TreeRef::Geometry { geometry_idx, tree_idx };
                 let visits = by_tree.entry((tree, surface)).or_default();
                 visits[usize::from(instance.is_transmissive)].push(visit);
             };
@@ -74,7 +69,7 @@ impl TreeVisits {
                 }
             };
             for (tree_idx, (kind, points)) in trees(cloud).into_iter().enumerate() {
-                let Some(surface) = Surface::of_kind(kind) else { continue };
+                let Some(surface) = Surface::of_kind(kind, &cloud.options) else { continue };
                 if !points.nodes.is_empty() {
                     add(tree_idx, surface, visit(placement, cloud, kind));
                 }
@@ -84,7 +79,30 @@ impl TreeVisits {
         for ((tree, surface), visits) in by_tree {
             found.add(scene, tree, surface, visits);
         }
+        found.add_gaussians(scene);
         found
+    }
+
+    /// Adds the instances of trained Gaussians, which have one tree.
+    fn add_gaussians(&mut self, scene: &FlatScene) {
+        let places = gaussian_places(&scene.geometries);
+        let first = self.visits.len() as u32;
+        for (instance_idx, instance) in scene.instances.iter().enumerate() {
+            let geometry_idx = instance.geometry_idx as usize;
+            let place = places.iter().find(|place| place.geometry_idx == geometry_idx);
+            let (Some(place), FlatGeometry::Cloud(cloud)) = (place, scene.geometry(instance))
+            else {
+                continue;
+            };
+            self.visits.push(Visit {
+                root_node: place.root_node,
+                first_vector: place.first_vector,
+                block_vectors: place.block_vectors,
+                n_harmonics: cloud.gaussians.n_harmonics() as u32,
+                ..visit(placement(instance_idx as u32, instance), cloud, cloud.surface)
+            });
+        }
+        self.gaussians = first..self.visits.len() as u32;
     }
 
     fn add(&mut self, scene: &FlatScene, tree: TreeRef, surface: Surface, visits: [Vec<Visit>; 2]) {
@@ -93,9 +111,12 @@ impl TreeVisits {
             self.visits.extend(visits);
             first..self.visits.len() as u32
         });
-        let has_support_colors = match &*scene.geometries[tree.geometry_idx] {
-            FlatGeometry::Cloud(cloud) => cloud.support_colors.is_some(),
-            FlatGeometry::Mesh(_) => false,
+        let has_support_colors = match tree {
+            TreeRef::Geometry { geometry_idx, .. } => match &*scene.geometries[geometry_idx] {
+                FlatGeometry::Cloud(cloud) => cloud.support_colors.is_some(),
+                FlatGeometry::Mesh(_) => false,
+            },
+            TreeRef::Gaussians => false,
         };
         self.trees.push(TreeInstances { tree, surface, has_support_colors, opaque, transmissive });
     }
@@ -114,6 +135,12 @@ fn visit(placement: Visit, cloud: &FlatCloud, kind: SurfaceKind) -> Visit {
     let is_surface = kind == cloud.surface;
     Visit {
         surface: surface_number(kind),
+        align: align_number(cloud.options.align),
+        gathers_to_nearest: (cloud.options.gather_limit == GatherLimit::Nearest).into(),
+        min_discs: if kind == SurfaceKind::Cylinder { cloud.options.density } else { 1 },
+        // The structure of the surface follows the nodes.
+        first_vector: (cloud.points.nodes.len() * NODE_VECTORS) as u32,
+        radius_factor: if is_surface { cloud.radius_factor() } else { 1.0 },
         max_blend_distance: if is_surface { cloud.max_blend_distance } else { 0.0 },
         edge_retest_factor: cloud.edge_retest_factor,
         has_edge_test: (cloud.edge_test == EdgeTest::AngularGap).into(),

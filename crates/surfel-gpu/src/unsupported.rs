@@ -16,23 +16,13 @@ pub fn unsupported(scene: &FlatScene) -> Vec<String> {
     for instance in &scene.instances {
         if let FlatGeometry::Cloud(cloud) = scene.geometry(instance) {
             let kind = cloud.surface;
-            let what = format!("the surface {}{}", kind.name(), structure(kind));
-            add(Surface::of_kind(kind).is_none(), what);
-            add(cloud.options.changes(kind), "options of the surface".into());
+            let what = format!("the surface {}", kind.name());
+            let is_traced = Surface::of_kind(kind, &cloud.options).is_some();
+            add(!is_traced && kind != SurfaceKind::Gaussian, what);
         }
     }
     add(MAX_PLANES < scene.camera_planes.len(), format!("more than {MAX_PLANES} planes"));
     found
-}
-
-/// Returns words for the structure of a surface that no kernel traverses.
-fn structure(kind: SurfaceKind) -> &'static str {
-    match kind {
-        SurfaceKind::Implicit => " (a kd-tree)",
-        SurfaceKind::Octree | SurfaceKind::OctreeSplat => " (an octree)",
-        SurfaceKind::Gaussian => " (trained splats)",
-        _ => "",
-    }
 }
 
 /// Returns the trees of a cloud with the kinds of surface that their points have.

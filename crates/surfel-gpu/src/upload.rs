@@ -2,6 +2,8 @@
 
 use crate::device::Gpu;
 use crate::error::{Error, Result};
+use crate::field_arrays::structure;
+use crate::gaussian_arrays::{GaussianArrays, gaussian_clouds};
 use crate::kernels::{Kernels, bind};
 use crate::mesh_blocks::mesh_blocks;
 use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
@@ -11,7 +13,9 @@ use surfel_core::bvh::BvhNode;
 use surfel_core::flat::FlatGeometry;
 
 /// Bytes of a node in the device's memory: five times sixteen, so that it is read in vectors of four words.
-const NODE_BYTES: usize = 80;
+const NODE_BYTES: usize = 16 * NODE_VECTORS;
+/// Vectors of four words that a node takes.
+pub const NODE_VECTORS: usize = 5;
 /// Bytes that are uploaded at once.
 const CHUNK_BYTES: usize = 1 << 24;
 
@@ -47,12 +51,30 @@ impl GpuTree {
     }
 }
 
+/// A tree that rays are traced against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum TreeRef {
+    /// A tree of a geometry.
+    Geometry {
+        /// Index of the geometry.
+        geometry_idx: usize,
+        /// Index of the tree among those of the geometry.
+        tree_idx: usize,
+    },
+    /// The tree of the trained Gaussians of all clouds.
+    Gaussians,
+}
+
 /// The trees of a geometry: of the points of its surface, of its lines, and of its scatter.
 pub type GpuGeometry = [Option<GpuTree>; 3];
 
 /// The geometries that are in a device's memory.
 #[derive(Debug, Default)]
-pub struct Uploads(Vec<(Weak<FlatGeometry>, GpuGeometry)>);
+pub struct Uploads {
+    geometries: Vec<(Weak<FlatGeometry>, GpuGeometry)>,
+    /// The trained Gaussians of these geometries in one tree.
+    gaussians: Option<(Vec<Weak<FlatGeometry>>, GpuTree)>,
+}
 
 impl Uploads {
     /// Uploads the geometries that are not uploaded yet, and frees those that are no longer in use.
@@ -61,32 +83,56 @@ impl Uploads {
     /// Fails if a geometry is too large for the device.
     pub fn update(&mut self, gpu: &Gpu, geometries: &[Arc<FlatGeometry>]) -> Result<()> {
         // A geometry that was changed has lost its weak references, also where it stayed at its place in memory.
-        self.0.retain(|(geometry, _)| geometry.strong_count() != 0);
+        self.geometries.retain(|(geometry, _)| geometry.strong_count() != 0);
         for geometry in geometries {
             if self.position(geometry).is_none() {
                 let uploaded = upload(gpu, geometry)?;
-                self.0.push((Arc::downgrade(geometry), uploaded));
+                self.geometries.push((Arc::downgrade(geometry), uploaded));
             }
+        }
+        self.update_gaussians(gpu, geometries)
+    }
+
+    /// Uploads the trained Gaussians of all geometries in one tree, unless they are there.
+    fn update_gaussians(&mut self, gpu: &Gpu, geometries: &[Arc<FlatGeometry>]) -> Result<()> {
+        let clouds: Vec<_> = gaussian_clouds(geometries).map(|(i, _)| &geometries[i]).collect();
+        let known = self.gaussians.take().filter(|(known, _)| {
+            known.len() == clouds.len()
+                && known.iter().zip(&clouds).all(|(known, cloud)| is_same(known, cloud))
+        });
+        if known.is_some() || clouds.is_empty() {
+            self.gaussians = known;
+            return Ok(());
+        }
+        let arrays = GaussianArrays::new(geometries);
+        if let Some(tree) = upload_tree(gpu, &arrays.nodes, &[], &arrays.blocks)? {
+            self.gaussians = Some((clouds.into_iter().map(Arc::downgrade).collect(), tree));
         }
         Ok(())
     }
 
-    /// Returns a tree of a geometry that is uploaded.
-    pub fn tree(&self, geometry: &Arc<FlatGeometry>, tree_idx: usize) -> Option<&GpuTree> {
-        self.get(geometry)?[tree_idx].as_ref()
+    /// Returns a tree that is uploaded, among those of these geometries.
+    pub fn tree(&self, geometries: &[Arc<FlatGeometry>], tree: TreeRef) -> Option<&GpuTree> {
+        match tree {
+            TreeRef::Gaussians => self.gaussians.as_ref().map(|(_, tree)| tree),
+            TreeRef::Geometry { geometry_idx, tree_idx } => {
+                self.get(&geometries[geometry_idx])?[tree_idx].as_ref()
+            }
+        }
     }
 
     /// Returns a geometry that is uploaded.
     pub fn get(&self, geometry: &Arc<FlatGeometry>) -> Option<&GpuGeometry> {
-        self.position(geometry).map(|i| &self.0[i].1)
+        self.position(geometry).map(|i| &self.geometries[i].1)
     }
 
     fn position(&self, geometry: &Arc<FlatGeometry>) -> Option<usize> {
-        let is_same = |known: &Weak<FlatGeometry>| {
-            known.upgrade().is_some_and(|known| Arc::ptr_eq(&known, geometry))
-        };
-        self.0.iter().position(|(known, _)| is_same(known))
+        self.geometries.iter().position(|(known, _)| is_same(known, geometry))
     }
+}
+
+fn is_same(known: &Weak<FlatGeometry>, geometry: &Arc<FlatGeometry>) -> bool {
+    known.upgrade().is_some_and(|known| Arc::ptr_eq(&known, geometry))
 }
 
 fn upload(gpu: &Gpu, geometry: &FlatGeometry) -> Result<GpuGeometry> {
@@ -94,20 +140,32 @@ fn upload(gpu: &Gpu, geometry: &FlatGeometry) -> Result<GpuGeometry> {
         FlatGeometry::Cloud(cloud) => cloud,
         FlatGeometry::Mesh(mesh) => {
             let blocks = mesh_blocks(mesh);
-            let tree = upload_tree(gpu, &mesh.triangles.nodes, bytemuck::cast_slice(&blocks));
+            let tree = upload_tree(gpu, &mesh.triangles.nodes, &[], bytemuck::cast_slice(&blocks));
             return Ok([tree?, None, None]);
         }
     };
-    let [surface, lines, scatter] = trees(cloud)
-        .map(|(_, points)| upload_tree(gpu, &points.nodes, bytemuck::cast_slice(&points.blocks)));
-    Ok([surface?, lines?, scatter?])
+    let structure = structure(cloud);
+    let tree = |tree_idx: usize| {
+        let (_, points) = trees(cloud)[tree_idx];
+        let behind_nodes: &[[u32; 4]] = if tree_idx == 0 { &structure } else { &[] };
+        let blocks = bytemuck::cast_slice(&points.blocks);
+        upload_tree(gpu, &points.nodes, bytemuck::cast_slice(behind_nodes), blocks)
+    };
+    Ok([tree(0)?, tree(1)?, tree(2)?])
 }
 
-fn upload_tree(gpu: &Gpu, tree_nodes: &[BvhNode], tree_blocks: &[u8]) -> Result<Option<GpuTree>> {
+/// Uploads a tree, with the bytes of a structure behind its nodes.
+fn upload_tree(
+    gpu: &Gpu,
+    tree_nodes: &[BvhNode],
+    behind_nodes: &[u8],
+    tree_blocks: &[u8],
+) -> Result<Option<GpuTree>> {
     if tree_nodes.is_empty() {
         return Ok(None);
     }
-    let node_bytes = padded_nodes(tree_nodes);
+    let mut node_bytes = padded_nodes(tree_nodes);
+    node_bytes.extend_from_slice(behind_nodes);
     let nodes = pages(gpu, "nodes", &node_bytes, N_NODE_PAGES)?;
     let blocks = pages(gpu, "blocks", tree_blocks, N_BLOCK_PAGES)?;
     Ok(Some(GpuTree { nodes, blocks }))

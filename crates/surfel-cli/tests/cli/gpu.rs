@@ -50,8 +50,8 @@ fn gpus_refuse_what_they_do_not_render() {
         return;
     }
     assert!(text.contains("unknown device 'nobody's'; known: 0 ("), "{text}");
-    let text = fail(&[&render[..], &["--surface", "splat-fit"]].concat(), 1);
-    assert!(text.contains("the GPU does not render the surface splat-fit yet"), "{text}");
+    let text = fail(&[&render[..], &["--surface", "points"]].concat(), 1);
+    assert!(text.contains("the GPU does not render the surface points yet"), "{text}");
     assert_eq!(folder.names(), ["dome.ply"]);
     succeed(&render);
     assert_eq!(folder.names(), ["dome.ply", "out.png"]);

@@ -198,6 +198,17 @@ impl FlatGaussians {
         color.max(Vec3::ZERO)
     }
 
+    /// Returns the number of spherical harmonics of each channel: 1, 4, 9 or 16.
+    pub fn n_harmonics(&self) -> usize {
+        self.n_harmonics
+    }
+
+    /// Returns the bits of the coefficients at each slot as 16-bit floats: `n_harmonics` of each channel, one channel after
+    /// the other.
+    pub fn coefficient_bits(&self) -> &[u16] {
+        self.coefficients.reinterpret_cast()
+    }
+
     /// Returns the sizes of the tree and of the Gaussians in bytes.
     pub fn bytes(&self) -> (usize, usize) {
         let gaussians = size_of_val(self.blocks.as_slice())

@@ -3,11 +3,11 @@
 use super::{Floats, Vec3, Vec3Lanes};
 
 /// Minimum sum of products of two eigenvalues, for a trace of 1, of a matrix whose vectors span a plane.
-const MIN_SPREAD: f32 = 1e-3;
+pub const MIN_SPREAD: f32 = 1e-3;
 /// Minimum squared length of the cross product of two rows, for a trace of 1. With less, rounding decides its direction.
-const MIN_CROSS: f32 = 1e-9;
+pub const MIN_CROSS: f32 = 1e-9;
 /// Number of Newton steps, each of which about doubles the number of valid digits.
-const N_STEPS: usize = 5;
+pub const N_STEPS: usize = 5;
 
 /// Symmetric positive semidefinite 3x3 matrices, one per lane: sums of outer products.
 #[derive(Clone, Copy)]
@@ -72,6 +72,22 @@ impl<F: Floats> CovarianceLanes<F> {
     }
 }
 
+/// Steps to which components of fitted normals are rounded.
+pub const NORMAL_STEPS: f32 = 16384.0;
+/// Added and subtracted, it rounds a number to an integer.
+const ROUND_TO_INTEGER: f32 = 12_582_912.0;
+
+/// Rounds unit vectors a little: a component that is zero but for rounding becomes a positive zero, so that what depends on
+/// its sign does not depend on rounding.
+#[inline(always)]
+pub fn rounded_normal<F: Floats>(normal: Vec3Lanes<F>) -> Vec3Lanes<F> {
+    let to_integer = F::splat(ROUND_TO_INTEGER);
+    let round = |component: F| component * F::splat(NORMAL_STEPS) + to_integer - to_integer;
+    let Vec3Lanes { x, y, z } = normal;
+    let rounded = Vec3Lanes { x: round(x), y: round(y), z: round(z) };
+    rounded.scaled(F::splat(1.0) / rounded.dot(rounded).sqrt())
+}
+
 /// Returns the smallest root of `x^3 - x^2 + minors x - determinant`, all of whose roots are between 0 and 1.
 ///
 /// Left of the smallest root the cubic is concave, so that Newton's method approaches it from zero and never passes it.
@@ -120,6 +136,15 @@ mod tests {
                 assert!(0.99 < noisy.dot(normal).abs(), "{noisy} {normal}");
             }
         }
+    }
+
+    #[test]
+    fn zeros_of_normals_are_positive_and_no_normal_is_turned() {
+        let normal = Vec3::new(-3e-7, 0.6, -0.8);
+        let Vec3Lanes { x, y, z } = rounded_normal(Vec3Lanes::<f32>::splat(normal));
+        assert_eq!(x.to_bits(), 0);
+        assert!(normal.distance(Vec3::new(x, y, z)) < 1e-4);
+        assert!((Vec3::new(x, y, z).length() - 1.0).abs() < 1e-6);
     }
 
     #[test]

@@ -6,7 +6,7 @@ mod basis;
 mod distribution;
 mod doubled_lanes;
 mod eigen;
-mod eigen_lanes;
+pub mod eigen_lanes;
 mod lanes;
 mod morton;
 mod portable;
@@ -21,7 +21,7 @@ pub use basis::{Basis, tangents};
 pub use distribution::Distribution2d;
 pub use doubled_lanes::DoubledLanes;
 pub use eigen::{SymmetricMatrix, smallest_eigenvector};
-pub use eigen_lanes::CovarianceLanes;
+pub use eigen_lanes::{CovarianceLanes, rounded_normal};
 pub use glam::{
     Affine3A, DAffine3, DMat3, DQuat, DVec2, DVec3, Mat3, Quat, Vec2, Vec3, Vec3A, Vec4,
 };

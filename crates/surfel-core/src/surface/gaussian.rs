@@ -107,13 +107,17 @@ pub fn alpha(max_squared: f32, squared: f32) -> f32 {
     (MIN_ALPHA * (0.5 * (max_squared - squared)).exp()).min(MAX_ALPHA)
 }
 
+/// Factor of the spherical harmonics of degree 1.
+pub const D1: f32 = 0.488_602_5;
+/// Factors of the spherical harmonics of degree 2.
+pub const D2: [f32; 3] = [1.092_548_5, 0.315_391_57, 0.546_274_24];
+/// Factors of the spherical harmonics of degree 3.
+pub const D3: [f32; 5] = [0.590_043_6, 2.890_611_4, 0.457_045_8, 0.373_176_34, 1.445_305_7];
+
 /// Returns the real spherical harmonics of degrees 0 to 3 in a unit direction, in the order and with the signs of trained
 /// files.
 #[inline]
 pub fn spherical_harmonics(direction: Vec3) -> [f32; MAX_HARMONICS] {
-    const D1: f32 = 0.488_602_5;
-    const D2: [f32; 3] = [1.092_548_5, 0.315_391_57, 0.546_274_24];
-    const D3: [f32; 5] = [0.590_043_6, 2.890_611_4, 0.457_045_8, 0.373_176_34, 1.445_305_7];
     let Vec3 { x, y, z } = direction;
     let (xx, yy, zz) = (x * x, y * y, z * z);
     [

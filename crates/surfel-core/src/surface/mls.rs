@@ -16,12 +16,14 @@ pub const SPAWN_T_MIN: f32 = 0.5;
 /// Degree of the polynomial, unless options choose another one.
 pub const DEFAULT_DEGREE: u32 = 2;
 /// Minimum weight of all points of a fit.
-const MIN_WEIGHT: f32 = 0.1;
-/// Weights of the coefficients' squares, in weights of all points, which keep those down that few points decide.
-const SLOPE_PENALTY: f32 = 1e-6;
-const BEND_PENALTY: f32 = 1e-4;
+pub const MIN_WEIGHT: f32 = 0.1;
+/// Weight of the squares of the height and the slopes, in weights of all points, which keeps those down that few points
+/// decide.
+pub const SLOPE_PENALTY: f32 = 1e-6;
+/// Weight of the squares of the other coefficients, in weights of all points.
+pub const BEND_PENALTY: f32 = 1e-4;
 /// Newton steps from the tangent plane to the polynomial.
-const N_STEPS: usize = 3;
+pub const N_STEPS: usize = 3;
 
 /// The ball around a point. A ray meets it where it is nearest to the point.
 pub struct Ball;

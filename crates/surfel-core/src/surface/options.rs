@@ -76,13 +76,4 @@ impl SurfaceOptions {
             _ => 1.0,
         }
     }
-
-    /// Returns true if a surface of this kind is not what it is by default.
-    pub fn changes(&self, kind: SurfaceKind) -> bool {
-        let default = Self::default();
-        let is_aligned = kind != SurfaceKind::Splat || self.align == default.align;
-        let is_gathered = !kind.blends_discs() || self.gather_limit == default.gather_limit;
-        let is_spawned = !kind.is_continuous() || self.min_distance.is_none();
-        !(is_aligned && is_gathered && is_spawned)
-    }
 }

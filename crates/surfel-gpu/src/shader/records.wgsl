@@ -28,8 +28,9 @@ struct FrameRecord {
     n_lights: u32,
     max_depth: u32,
     n_light_samples: u32,
-    reserved_a: u32,
-    reserved_b: u32,
+    // The least size of an octree's cells along a ray.
+    pixel_at_origin: f32,
+    pixel_per_distance: f32,
     // Normals of planes, and their distances from the scene's origin along these.
     planes: array<vec4<f32>, MAX_PLANES>,
 }
@@ -40,7 +41,7 @@ struct Visit {
     world_from_normal: mat3x3<f32>,
     world_from_object: mat3x3<f32>,
     instance: u32,
-    reserved_a: u32,
+    align: u32,
     is_identity: u32,
     surface: u32,
     max_scale: f32,
@@ -51,15 +52,19 @@ struct Visit {
     blends_colors: u32,
     block_vectors: u32,
     attributes: u32,
-    reserved_e: u32,
+    gathers_to_nearest: u32,
     has_outward_normals: u32,
-    reserved_b: u32,
+    min_discs: u32,
     is_mirrored: u32,
     // Bounding box in world coordinates.
     lower: vec3<f32>,
-    reserved_c: f32,
+    radius_factor: f32,
     upper: vec3<f32>,
-    reserved_d: f32,
+    reserved_a: f32,
+    root_node: u32,
+    first_vector: u32,
+    n_harmonics: u32,
+    reserved_b: u32,
 }
 
 // What a pass does: the sample of a light, the queue that it works on and the kind of its rays, or the instances of a
@@ -139,9 +144,9 @@ struct InstanceRecord {
     first_support_color: u32,
     support_low: f32,
     support_high: f32,
+    spawn_factor: f32,
     reserved_a: u32,
     reserved_b: u32,
-    reserved_c: u32,
 }
 
 // The nearest hit of a ray; `instance` is NONE for a miss.
@@ -165,6 +170,13 @@ struct HitRecord {
     uvs: vec4<f32>,
     // Tangent of a normal map, and the sign of its bitangent; 0 without one.
     tangent: vec4<f32>,
+    // The light of the Gaussians before the hit; the distance is NO_LIMIT without any.
+    gaussian_radiance: vec3<f32>,
+    gaussian_transmittance: f32,
+    gaussian_distance: f32,
+    reserved_a: u32,
+    reserved_b: u32,
+    reserved_c: u32,
 }
 
 // A path's next ray, or a ray toward a light.

@@ -60,6 +60,54 @@ fn mirrors_and_glass_are_equal() {
 }
 
 #[test]
+fn every_kind_is_equal_as_a_mirror_and_as_glass() {
+    let kinds = [
+        SurfaceKind::SplatFit,
+        SurfaceKind::Cylinder,
+        SurfaceKind::Mls,
+        SurfaceKind::Implicit,
+        SurfaceKind::Octree,
+        SurfaceKind::OctreeSplat,
+    ];
+    let settings = Settings { width: 40, height: 30, max_depth: 4, light_samples: 4, ..SETTINGS };
+    for (kind, material) in
+        kinds.into_iter().flat_map(|kind| [(kind, Material::MIRROR), (kind, Material::GLASS)])
+    {
+        let name = format!(
+            "{}-{}",
+            kind.name(),
+            if material.metallic == 0.0 { "glass" } else { "mirror" }
+        );
+        check(&name, &flat(&in_a_room(kind, material)), &settings);
+    }
+}
+
+#[test]
+fn gaussians_among_surfaces_are_equal() {
+    // They stand before a mirror and behind a pane, cast shadows through a veil, and overlap another cloud of them.
+    let mut scene = in_a_room(SurfaceKind::Gaussian, Material::MATTE);
+    let other = reference::scene(SurfaceKind::Gaussian).graph;
+    scene.graph.append(other);
+    let turned =
+        DAffine3::from_translation(DVec3::new(0.3, 0.4, 0.2)) * DAffine3::from_rotation_z(0.6);
+    let last = scene.graph.nodes.len() - 1;
+    scene.graph.nodes[last].transform = surfel_core::scene::Transform::Matrix(turned);
+    let mirror = scenes::quad(Vec3::new(-1.9, 0.0, 1.0), 2.0 * Vec3::Y, 1.5 * Vec3::Z);
+    let pane = scenes::quad(Vec3::new(2.0, -1.5, 1.0), Vec3::new(0.6, 0.6, 0.0), 0.8 * Vec3::Z);
+    let ball = scenes::uv_sphere(12, 24, 0.5);
+    let veil = Material { alpha: 0.4, alpha_mode: AlphaMode::Blend, ..Material::MATTE };
+    for (mesh, material) in [(mirror, Material::MIRROR), (pane, veil), (ball, Material::GLASS)] {
+        scene.graph.append(Graph::from_geometry(Geometry::Triangles(mesh), material));
+    }
+    scene.background = Background::Transparent;
+    let settings = Settings { max_depth: 4, ..SETTINGS };
+    check("gaussians-among-surfaces", &flat(&scene), &settings);
+    // A single sample has no hits of its own for the layers.
+    let settings = Settings { samples_per_pixel: 1, ..settings };
+    check("gaussians-single-sample", &flat(&scene), &settings);
+}
+
+#[test]
 fn bodies_of_glass_are_equal() {
     let mut scene = in_a_room(SurfaceKind::Splat, Material::MATTE);
     let ball = Geometry::Triangles(scenes::uv_sphere(24, 48, 0.6));

@@ -15,20 +15,27 @@ use surfel_core::scene::{
     Background, Camera, ClipPlane, Geometry, Graph, Light, Material, Node, Projection,
     PunctualLight, PunctualLightKind, Scene, Transform,
 };
-use surfel_core::surface::{EdgeTest, SurfaceKind};
+use surfel_core::surface::{Align, EdgeTest, GatherLimit, SurfaceKind, SurfaceOptions};
 use surfel_formats::{ImageOptions, save_image};
 use surfel_gpu::GpuRenderer;
 use surfel_tests::backends::{Difference, TOLERANCE, cpu, gpu, render};
 use surfel_tests::clouds;
 use surfel_tests::scenes;
 
-/// The kinds of surface that the GPU renders.
-const KINDS: [SurfaceKind; 5] = [
+/// The kinds of surface that the GPU renders: all but that without rays.
+const KINDS: [SurfaceKind; 12] = [
     SurfaceKind::Sphere,
     SurfaceKind::Disc,
     SurfaceKind::SplatMean,
     SurfaceKind::Splat,
+    SurfaceKind::SplatFit,
+    SurfaceKind::Cylinder,
+    SurfaceKind::Mls,
     SurfaceKind::Smooth,
+    SurfaceKind::Implicit,
+    SurfaceKind::Octree,
+    SurfaceKind::OctreeSplat,
+    SurfaceKind::Gaussian,
 ];
 
 pub const SETTINGS: Settings = Settings {
@@ -94,6 +101,43 @@ fn surfaces_without_edge_test_are_equal() {
             points.edge_test = EdgeTest::Off;
         }
         check(&format!("{}-rims", kind.name()), &flat(&scene), &SETTINGS);
+    }
+}
+
+#[test]
+fn options_of_surfaces_are_equal() {
+    let default = SurfaceOptions::default();
+    let options = [
+        ("align-each", SurfaceKind::Splat, SurfaceOptions { align: Align::Each, ..default }),
+        ("align-nearest", SurfaceKind::Splat, SurfaceOptions { align: Align::Nearest, ..default }),
+        (
+            "gather-limit",
+            SurfaceKind::Splat,
+            SurfaceOptions { gather_limit: GatherLimit::Nearest, ..default },
+        ),
+        (
+            "min-distance",
+            SurfaceKind::Smooth,
+            SurfaceOptions { min_distance: Some(2.5), ..default },
+        ),
+        ("degree-1", SurfaceKind::Mls, SurfaceOptions { degree: 1, ..default }),
+        ("degree-3", SurfaceKind::Mls, SurfaceOptions { degree: 3, ..default }),
+        ("reach", SurfaceKind::SplatFit, SurfaceOptions { reach: Some(1.3), ..default }),
+        (
+            "density",
+            SurfaceKind::Cylinder,
+            SurfaceOptions { density: 5, reach: Some(1.5), ..default },
+        ),
+    ];
+    for (name, kind, options) in options {
+        let mut scene = reference::scene(kind);
+        if let Geometry::Points(points) = &mut scene.graph.geometries[0] {
+            points.options = options;
+        }
+        let scene = flat(&scene);
+        check(name, &scene, &SETTINGS);
+        let default = render(&cpu(), &flat(&reference::scene(kind)), &SETTINGS);
+        assert!(render(&cpu(), &scene, &SETTINGS) != default, "{name} changes nothing");
     }
 }
 
@@ -298,10 +342,10 @@ fn ray_counts_are_equal() {
 #[test]
 fn what_a_gpu_does_not_render_is_refused_with_its_name() {
     let Some(gpu) = gpu() else { return };
-    let scene = flat(&reference::scene(SurfaceKind::SplatFit));
-    let error = gpu.render(&scene, &SETTINGS, &NoProgress).unwrap_err();
-    let Error::Renderer(reason) = error else { panic!("{error}") };
-    let expected = "the GPU does not render the surface splat-fit yet";
+    let scene = flat(&reference::scene(SurfaceKind::Points));
+    let error = gpu.render(&scene, &SETTINGS, &NoProgress).err();
+    let Some(Error::Renderer(reason)) = error else { panic!("{error:?}") };
+    let expected = "the GPU does not render the surface points yet";
     assert!(reason.ends_with(expected), "{reason}");
 }
 

@@ -111,6 +111,23 @@ impl FieldTree {
         }
     }
 
+    /// Returns the two words of each node, the root first: the bits of the coordinate of the plane between its children, and
+    /// the plane's axis (3 for a leaf) in the two low bits, above which is the index of the first child, or of the leaf plus
+    /// one, 0 if that is empty.
+    pub fn node_words(&self) -> impl Iterator<Item = [u32; 2]> {
+        self.nodes.iter().map(|node| [node.split.to_bits(), node.data])
+    }
+
+    /// Returns for each leaf the index of its first entry, and the number of entries at the end.
+    pub fn leaf_starts(&self) -> &[u32] {
+        &self.leaf_starts
+    }
+
+    /// Returns the entries of all leaves.
+    pub fn entries(&self) -> FieldLeaf<'_> {
+        FieldLeaf { blocks: &self.blocks, lanes: &self.lanes, flips: &self.flips }
+    }
+
     /// Returns the number of leaves that are not empty.
     pub fn n_leaves(&self) -> usize {
         self.leaf_starts.len().saturating_sub(1)

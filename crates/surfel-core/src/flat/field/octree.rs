@@ -74,6 +74,21 @@ impl Octree {
         self.depth
     }
 
+    /// Returns the nodes level by level, the root first.
+    pub fn nodes(&self) -> &[OctreeNode] {
+        &self.nodes
+    }
+
+    /// Returns the planes of the cells; none if they hold the field at their corners.
+    pub fn planes(&self) -> &[CellPlane] {
+        &self.planes
+    }
+
+    /// Returns the corners of all cells; none if they hold planes.
+    pub fn all_corners(&self) -> &[CellCorners] {
+        &self.corners
+    }
+
     /// Returns the node at an index.
     #[inline(always)]
     pub fn node(&self, node_idx: u32) -> &OctreeNode {

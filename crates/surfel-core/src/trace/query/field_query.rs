@@ -14,16 +14,16 @@ use crate::trace::traversal::region::{BoxVisitor, query_box};
 use std::marker::PhantomData;
 
 /// Maximum number of hits of a ray that the edge test rejects. A ray with more is taken to miss.
-const MAX_REJECTED_HITS: usize = 48;
+pub const MAX_REJECTED_HITS: usize = 48;
 /// Distance behind a rejected hit at which the search restarts, in radii.
-const RESTART_OFFSET: f32 = 0.05;
+pub const RESTART_OFFSET: f32 = 0.05;
 /// Distance before and behind a disc in which the surface is searched, in radii.
 const DISC_REACH: f32 = 1.0;
 /// Distance from the part of a ray around a disc from which on points are left out, in supports of the disc.
 const GATHER_REACH: f32 = 1.5;
 
 /// Widening of a ray's interval in a leaf, in distances: neighbouring leaves find the zeros between them.
-const OVERLAP: f32 = 4.0 * f32::EPSILON;
+pub const OVERLAP: f32 = 4.0 * f32::EPSILON;
 
 impl LeafInterval {
     /// Returns the segment of the ray in the leaf, widened a little.

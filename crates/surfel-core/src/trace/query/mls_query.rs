@@ -3,7 +3,8 @@
 
 use crate::flat::{FlatCloud, Slot};
 use crate::math::{
-    Floats, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, SimdTask, Vec3, Vec3Lanes, set_bits,
+    Floats, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, SimdTask, Vec3, Vec3Lanes, rounded_normal,
+    set_bits,
 };
 use crate::surface::mls::{self, PlaneLanes, PlaneSums, PolynomialSums, StepLanes, weight};
 use crate::surface::{CandidateHitLanes, EdgeTest, EdgeTestResult, NeighborhoodStats};
@@ -15,24 +16,24 @@ use crate::trace::simd::packet_rays::PacketRays;
 use std::marker::PhantomData;
 
 /// Maximum number of fits along a ray: planes, then polynomials.
-const MAX_FITS: usize = 6;
+pub const MAX_FITS: usize = 6;
 /// Number of planes before polynomials, which cost twice as much. It is fixed, so that no ray depends on the others of its
 /// packet.
-const N_PLANES: usize = 2;
+pub const N_PLANES: usize = 2;
 /// Distance between a fit's position and its intersection, in radii of the ball, at which the intersection is the surface.
-const TOLERANCE: f32 = 0.1;
+pub const TOLERANCE: f32 = 0.1;
 /// Maximum distance along the ray between a position and the intersection of its fit, in radii of the ball.
-const MAX_STEP: f32 = 1.5;
+pub const MAX_STEP: f32 = 1.5;
 /// Maximum distance along the ray between the ball and the surface, in radii of the ball.
 pub const MAX_DISTANCE_FROM_BALL: f32 = 2.0;
 /// Distance that a position may move before the points around it are listed again, in radii of the ball.
-const LIST_MARGIN: f32 = 0.6;
-/// Distance behind a ball without a surface nearby at which the search goes on, in radii of the ball, and as a fraction of
-/// the distance to the plane that was found.
-const RESTART_OFFSET: f32 = 0.3;
-const RESTART_FRACTION: f32 = 0.7;
-/// Exponents of the weights of colours beside those of the fit: colours are sharper than the surface.
-const MIN_COLOR_WEIGHT: f32 = 1e-4;
+pub const LIST_MARGIN: f32 = 0.6;
+/// Minimum distance behind a ball without a surface nearby at which the search goes on, in radii of the ball.
+pub const RESTART_OFFSET: f32 = 0.3;
+/// The distance behind such a ball, as a fraction of the distance to the plane that was found.
+pub const RESTART_FRACTION: f32 = 0.7;
+/// Minimum weight, which is the cube of that of the fit, of a point whose colour is blended.
+pub const MIN_COLOR_WEIGHT: f32 = 1e-4;
 
 /// Surface points of up to sixteen rays.
 #[derive(Clone, Copy)]
@@ -240,6 +241,7 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
     if lanes == 0 {
         return;
     }
+    hits.normals = rounded_normal(hits.normals);
     let splat = <L::PacketLanes as Floats>::splat;
     let PacketCandidates { direction, radius, .. } = *listed;
     let position = rays.origin().plus(direction.scaled(hits.distances));

@@ -10,7 +10,7 @@ use crate::trace::query::searching_rays::{CandidatePacket, SearchingRays};
 use crate::trace::simd::packet_rays::PacketRays;
 
 /// Maximum number of balls of a ray that are tried. A ray with more runs along a rim and is taken to miss.
-const MAX_TRIED_BALLS: usize = 48;
+pub const MAX_TRIED_BALLS: usize = 48;
 
 /// The hit of a ray on the surface.
 #[derive(Clone, Copy)]

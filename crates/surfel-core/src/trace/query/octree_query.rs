@@ -15,9 +15,9 @@ use std::marker::PhantomData;
 
 /// Widening of a ray's interval in a cell that holds the field at its corners, in sides of the cell. Neighbouring planes do
 /// not meet exactly and need `MAX_CELL_MARGIN`.
-const CORNER_MARGIN: f32 = 0.01;
+pub const CORNER_MARGIN: f32 = 0.01;
 /// Number of parts of a ray's interval in which the sign of the field is compared.
-const N_PARTS: usize = 2;
+pub const N_PARTS: usize = 2;
 /// Minimum cosine between the directions of a packet's rays.
 const MIN_COHERENT_COSINE: f32 = 0.98;
 /// Maximum distance between the origins of a packet's rays along any axis, in sides of the octree.

@@ -1,7 +1,7 @@
 //! Planes through the centres of the discs nearest to a hit, for sixteen rays at once.
 
 use crate::math::{
-    CovarianceLanes, LaneMask, PACKET_WIDTH, PacketLanes, Vec3, Vec3Lanes, set_bits,
+    CovarianceLanes, LaneMask, PACKET_WIDTH, PacketLanes, Vec3, Vec3Lanes, rounded_normal, set_bits,
 };
 use crate::surface::{MAX_GATHERED, Surfel};
 use crate::trace::query::packet_disc_hits::PacketDiscHit;
@@ -77,6 +77,6 @@ impl<W: PacketLanes> FittedDiscs<'_, W> {
         let (normal, is_plane) = covariance.smallest_eigenvector();
         let is_away = normal.dot(facing).lt(zero);
         let normal = normal.scaled(W::select(is_away, zero - one, one));
-        Vec3Lanes::select(is_plane, normal, facing)
+        Vec3Lanes::select(is_plane, rounded_normal(normal), facing)
     }
 }

@@ -13,7 +13,7 @@ pub const BRACKET_MARGIN: f32 = 0.01;
 /// Number of places of an interval at which the field is evaluated.
 pub const N_SAMPLES: usize = LANES;
 /// Minimum weight of a point whose colour is blended.
-const MIN_COLOR_WEIGHT: f32 = 0.05;
+pub const MIN_COLOR_WEIGHT: f32 = 0.05;
 
 /// The field along a part of a ray. Its memory is reused from part to part.
 #[derive(Default)]

@@ -77,7 +77,12 @@ fn color_byte(slot: u32, byte_idx: u32) -> f32 {
     return tables.srgb[encoded >> 2u][encoded & 3u];
 }
 
+// Returns the point at `slot` in the coordinates of the object.
+fn slot_point(slot: u32) -> Point {
+    return block_point(load_block(slot >> 3u), slot & 7u, vec3<f32>(0.0));
+}
+
 fn slot_surfel(slot: u32) -> Surfel {
-    let point = block_point(load_block(slot >> 3u), slot & 7u, vec3<f32>(0.0));
+    let point = slot_point(slot);
     return Surfel(point.center, normalize(point.normal), point.radius, slot_color(slot));
 }

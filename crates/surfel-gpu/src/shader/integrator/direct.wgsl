@@ -42,7 +42,7 @@ fn sample_light(@builtin(global_invocation_id) id: vec3<u32>) {
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn add_light(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < atomicLoad(&counts[FIRST_TAKEN + LIGHT_RAYS]) && paths[id.x].state == 1u {
-        add_radiance(paths[id.x].pixel, paths[id.x].weight);
+        add_radiance(paths[id.x].pixel, paths[id.x].weight * paths[id.x].transmittance);
     }
 }
 

@@ -145,15 +145,22 @@ fn set_spawn(shading: ptr<function, Shading>, ray: Ray, hit: HitRecord) {
     }
     var offset = SOLID_SPAWN_OFFSET;
     var t_min = 0.0;
-    if hit.surface == SMOOTH {
+    var radius = hit.radius;
+    if hit.surface != SPHERE && hit.surface != CAPSULE {
+        radius *= instances[hit.instance].spawn_factor;
+    }
+    if hit.surface == SMOOTH || hit.surface == IMPLICIT {
         offset = SMOOTH_SPAWN_OFFSET;
         t_min = SMOOTH_SPAWN_T_MIN;
+    } else if hit.surface == MLS {
+        offset = MLS_SPAWN_OFFSET;
+        t_min = MLS_SPAWN_T_MIN;
     } else if hit.surface != SPHERE && hit.surface != CAPSULE {
         offset = DISC_SPAWN_OFFSET;
         t_min = DISC_SPAWN_T_MIN;
     }
-    (*shading).spawn_offset = offset * hit.radius + 4.0 * EPSILON * largest(abs(position));
-    (*shading).spawn_t_min = t_min * hit.radius;
+    (*shading).spawn_offset = offset * radius + 4.0 * EPSILON * largest(abs(position));
+    (*shading).spawn_t_min = t_min * radius;
 }
 
 // Returns a ray in `direction`, offset to that side so that it does not hit the surface again.

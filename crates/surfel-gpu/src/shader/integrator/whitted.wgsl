@@ -22,6 +22,12 @@ fn shade(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let hit = hits[id.x];
     var path = paths[id.x];
+    if hit.gaussian_distance < NO_LIMIT {
+        path = behind_gaussians(path, hit);
+        if hit.gaussian_transmittance <= 0.0 {
+            return;
+        }
+    }
     if hit.instance == NONE {
         shade_miss(path);
         return;
@@ -55,6 +61,18 @@ fn shade(@builtin(global_invocation_id) id: vec3<u32>) {
         add_branches(path, shading, interface_media, lobes.reflected, REFLECTED);
         add_branches(path, shading, interface_media, lobes.refracted, REFRACTED);
     }
+}
+
+// Adds the light of the Gaussians before the end of a path's ray, and returns the path behind them.
+fn behind_gaussians(path: Path, hit: HitRecord) -> Path {
+    let attenuation = medium_transmittance(path, path.media, hit.gaussian_distance);
+    add_radiance(path.pixel, path.weight * attenuation * hit.gaussian_radiance);
+    if miss_behavior(path) == MISS_BACKGROUND {
+        add_alpha(path.pixel, (1.0 - hit.gaussian_transmittance) * largest(path.weight));
+    }
+    var behind = path;
+    behind.weight *= hit.gaussian_transmittance;
+    return behind;
 }
 
 fn miss_behavior(path: Path) -> u32 {

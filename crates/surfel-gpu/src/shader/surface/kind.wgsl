@@ -8,5 +8,8 @@ fn intersect_shape(point: Point, ray: Ray) -> f32 {
     if SHAPE == CAPSULE {
         return intersect_capsule(point, ray);
     }
+    if SHAPE == MLS {
+        return intersect_ball(point, ray);
+    }
     return intersect_disc(point, ray);
 }

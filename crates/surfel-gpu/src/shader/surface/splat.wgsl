@@ -7,21 +7,30 @@ struct SplatSums {
     nearest: vec3<f32>,
     // Centre of the nearest disc.
     center: vec3<f32>,
+    // Distance along the ray to the nearest disc.
+    distance: f32,
     normal: vec3<f32>,
     color: vec3<f32>,
+    // Distances behind the nearest disc.
+    depth: f32,
     total_weight: f32,
 }
 
-fn no_discs(nearest: Surfel, direction: vec3<f32>) -> SplatSums {
+fn no_discs(nearest: Surfel, distance: f32, direction: vec3<f32>) -> SplatSums {
     let none = vec3<f32>(0.0);
     let normal = flip_to_hemisphere(nearest.normal, -direction);
-    return SplatSums(direction, normal, nearest.center, none, none, 0.0);
+    return SplatSums(direction, normal, nearest.center, distance, none, none, 0.0, 0.0);
 }
 
 // Returns true if a disc's normal is to be turned around.
 fn is_opposed(sums: SplatSums, disc: Surfel) -> bool {
+    let align = visits[visit_idx].align;
+    let along = dot(disc.normal, sums.direction);
+    if SURFACE == CYLINDER || align == ALIGN_EACH {
+        return 0.0 < along;
+    }
     let cosine = dot(disc.normal, sums.nearest);
-    if MIN_ALIGNED_COSINE < abs(cosine) {
+    if MIN_ALIGNED_COSINE < abs(cosine) || align == ALIGN_NEAREST {
         return cosine < 0.0;
     }
     let chord = disc.center - sums.center;
@@ -30,25 +39,39 @@ fn is_opposed(sums: SplatSums, disc: Surfel) -> bool {
     if MIN_BENT_COSINE * squared < abs(bent) {
         return bent < 0.0;
     }
-    return 0.0 < dot(disc.normal, sums.direction);
+    return 0.0 < along;
 }
 
-// Adds a disc, which the ray hits at `offset` from its centre.
-fn with_disc(sums: SplatSums, disc: Surfel, offset: vec3<f32>) -> SplatSums {
+// Adds a disc, which the ray hits at `distance` and at `offset` from its centre.
+fn with_disc(sums: SplatSums, disc: Surfel, distance: f32, offset: vec3<f32>) -> SplatSums {
     let weight = max(1.0 - sqrt(dot(offset, offset)) / disc.radius, 1e-4);
-    let turns = visits[visit_idx].surface == SPLAT && is_opposed(sums, disc);
+    let surface = visits[visit_idx].surface;
+    let turns = (surface == SPLAT || surface == CYLINDER) && is_opposed(sums, disc);
     return SplatSums(
         sums.direction,
         sums.nearest,
         sums.center,
+        sums.distance,
         sums.normal + select(weight, -weight, turns) * disc.normal,
         sums.color + weight * disc.color,
+        sums.depth + weight * (distance - sums.distance),
         sums.total_weight + weight,
     );
 }
 
-// Returns the unit normal, which faces the ray's origin.
+// Returns the distance along the ray: that of the nearest disc, or the mean of all.
+fn splat_distance(sums: SplatSums) -> f32 {
+    if SURFACE == CYLINDER {
+        return sums.distance + sums.depth / sums.total_weight;
+    }
+    return sums.distance;
+}
+
+// Returns the unit normal, which faces the ray's origin. That of a fitted plane replaces it where there is one.
 fn splat_normal(sums: SplatSums, direction: vec3<f32>) -> vec3<f32> {
+    if SURFACE == SPLAT_FIT {
+        return sums.nearest;
+    }
     // Opposite normals may cancel in splat-mean; the normal of the nearest disc is then as good as any.
     let normal = normalize_or(sums.normal, sums.nearest);
     if visits[visit_idx].surface == SPLAT {

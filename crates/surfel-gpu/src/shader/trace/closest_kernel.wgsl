@@ -57,6 +57,12 @@ fn merge_nearer(ray_idx: u32) {
         found.barycentrics,
         found.uvs,
         world_tangent(found, normal, is_flipped),
+        vec3<f32>(0.0),
+        1.0,
+        NO_LIMIT,
+        0u,
+        0u,
+        0u,
     );
 }
 
@@ -72,11 +78,4 @@ fn world_tangent(found: SurfaceHit, normal: vec3<f32>, is_flipped: bool) -> vec4
         return vec4<f32>(0.0, 0.0, 0.0, side);
     }
     return vec4<f32>(tangent / sqrt(squared), select(side, -side, found.tangent.w < 0.0));
-}
-
-fn world_normal(normal: vec3<f32>) -> vec3<f32> {
-    if visits[visit_idx].is_identity == 1u {
-        return normal;
-    }
-    return normalize(visits[visit_idx].world_from_normal * normal);
 }

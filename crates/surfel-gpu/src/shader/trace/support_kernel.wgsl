@@ -23,11 +23,11 @@ fn support(@builtin(global_invocation_id) id: vec3<u32>) {
     let world_ray = paths[ray_idx].ray;
     let scale = object_scale(world_ray);
     let ray = object_ray(world_ray, scale);
-    let point = block_point(load_block(hit.slot >> 3u), hit.slot & 7u, vec3<f32>(0.0));
+    let point = slot_point(hit.slot);
     support_position = ray_at(ray, hit.distance * scale);
     let to_center = point.center - support_position;
-    let radius = point.radius;
-    if SHAPE != DISC {
+    let radius = point.radius / visits[visit_idx].radius_factor;
+    if SHAPE == SPHERE || SHAPE == CAPSULE {
         let across = to_center - dot(to_center, ray.direction) * ray.direction;
         hits[ray_idx].support_count = 1u;
         hits[ray_idx].support_distance = length(across) / radius;
@@ -36,7 +36,7 @@ fn support(@builtin(global_invocation_id) id: vec3<u32>) {
     max_squared = radius * radius;
     nearest_squared = dot(to_center, to_center);
     n_near = 0u;
-    let reach = FIT_REACH * point.radius;
+    let reach = FIT_REACH * max(point.radius, radius);
     query_box(support_position - reach, support_position + reach);
     hits[ray_idx].support_count = n_near;
     hits[ray_idx].support_distance = sqrt(nearest_squared) / radius;

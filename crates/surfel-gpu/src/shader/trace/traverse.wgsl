@@ -4,11 +4,14 @@
 // are tested again when their turn comes, as the ray may have become shorter.
 var<private> waiting: array<vec2<u32>, MAX_DEPTH>;
 
+// Index of the root.
+var<private> root_node: u32;
+
 // Calls `visit_block` for the blocks whose boxes the ray enters before `search_limit()`, until it returns true.
 fn traverse(ray: Ray) {
-    let slabs = slab_ray(load_node(0u), ray);
+    let slabs = slab_ray(load_node(root_node), ray);
     var n_waiting = 0u;
-    var node_idx = 0u;
+    var node_idx = root_node;
     var open = 0xffu;
     loop {
         let node = load_node(node_idx);

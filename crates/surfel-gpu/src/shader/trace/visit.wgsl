@@ -69,6 +69,14 @@ fn scaled_limit(distance: f32, scale: f32) -> f32 {
     return min(distance * scale, NO_LIMIT);
 }
 
+// Returns a unit normal of the object in world space.
+fn world_normal(normal: vec3<f32>) -> vec3<f32> {
+    if visits[visit_idx].is_identity == 1u {
+        return normal;
+    }
+    return normalize(visits[visit_idx].world_from_normal * normal);
+}
+
 // Returns true if a ray may hit the instance nearer than `t_max`. The box of a tree with one instance is not tested, as
 // its root has the same.
 fn may_hit_instance(ray: Ray, t_max: f32) -> bool {

@@ -20,3 +20,8 @@ fn n_hit_discs() -> u32 {
 fn hit_disc(disc_idx: u32) -> u32 {
     return nearest_hit.slot;
 }
+
+// Returns the distance along the ray to the nearest disc.
+fn nearest_disc_distance() -> f32 {
+    return nearest_hit.distance;
+}

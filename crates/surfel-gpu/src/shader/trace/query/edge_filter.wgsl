@@ -10,6 +10,6 @@ fn accepts_hit(ray: Ray, distance: f32, slot: u32) -> bool {
     }
     let surfel = slot_surfel(slot);
     let normal = facing(surfel.normal, ray.direction);
-    let radius = surfel.radius;
+    let radius = surfel.radius / visits[visit_idx].radius_factor;
     return is_enclosed(CandidateHit(ray_at(ray, distance), normal, ray.direction, radius), true);
 }

@@ -1,8 +1,8 @@
-// The gathered discs of a ray: the nearest ones, all within a radius of each other.
+// The gathered discs of a ray: the nearest ones, by default all within a radius of each other.
 
 var<private> query_ray: Ray;
-var<private> gathered_distances: array<f32, MAX_GATHERED>;
-var<private> gathered_slots: array<u32, MAX_GATHERED>;
+var<private> gathered_distances: array<f32, MAX_DISCS>;
+var<private> gathered_slots: array<u32, MAX_DISCS>;
 var<private> n_gathered: u32;
 var<private> gather_limit: f32;
 
@@ -13,9 +13,16 @@ fn gather(ray: Ray) {
     traverse(ray);
 }
 
+// Drops the discs beyond a distance.
+fn drop_beyond(limit: f32) {
+    while 0u < n_gathered && limit < gathered_distances[n_gathered - 1u] {
+        n_gathered -= 1u;
+    }
+}
+
 fn search_limit() -> f32 {
-    if n_gathered == MAX_GATHERED {
-        return min(gather_limit, gathered_distances[MAX_GATHERED - 1u]);
+    if n_gathered == MAX_DISCS {
+        return min(gather_limit, gathered_distances[MAX_DISCS - 1u]);
     }
     return gather_limit;
 }
@@ -31,11 +38,11 @@ fn visit_block(block_idx: u32) -> bool {
         if distance < 0.0 || gather_limit < distance {
             continue;
         }
-        gather_limit = min(gather_limit, distance + point.radius);
+        let length =
+            select(point.radius, visits[visit_idx].max_blend_distance, visits[visit_idx].gathers_to_nearest == 1u);
+        gather_limit = min(gather_limit, distance + length);
         insert_disc(distance, 8u * block_idx + lane);
-        while 0u < n_gathered && gather_limit < gathered_distances[n_gathered - 1u] {
-            n_gathered -= 1u;
-        }
+        drop_beyond(gather_limit);
     }
     return false;
 }
@@ -43,8 +50,8 @@ fn visit_block(block_idx: u32) -> bool {
 // Inserts a disc in the order of distance and slot; of too many, the nearest are kept.
 fn insert_disc(distance: f32, slot: u32) {
     var at = n_gathered;
-    if n_gathered == MAX_GATHERED {
-        at = MAX_GATHERED - 1u;
+    if n_gathered == MAX_DISCS {
+        at = MAX_DISCS - 1u;
         if !is_before(distance, slot, at) {
             return;
         }
