@@ -8,7 +8,7 @@ use super::point_columns::PointColumns;
 use super::points::FlatPoints;
 use super::refit::Refit;
 use crate::bvh::BvhNode;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::{Aabb, LANES, Vec3};
 use crate::points::Structure;
 use crate::progress::Progress;
@@ -43,6 +43,8 @@ pub struct FlatCloud {
     pub has_outward_normals: bool,
     /// True if normals point to the side from which the surface was seen.
     pub has_front_sides: bool,
+    /// True if the points have normals of their own, rather than none.
+    pub has_normals: bool,
     /// True if colours may be blended; false if each belongs to one point, as those of classes do.
     pub blends_colors: bool,
     /// Colours of hits by their support, instead of the points' own.
@@ -57,7 +59,8 @@ impl FlatCloud {
     ///
     /// # Errors
     ///
-    /// Fails if the cloud has too many points for 32-bit indices, or if `progress` is cancelled.
+    /// Fails if the cloud has too many points for 32-bit indices, if it lacks the normals that its surface needs, or if
+    /// `progress` is cancelled.
     pub fn new(geometry: &CloudGeometry, progress: &dyn Progress) -> Result<Self> {
         let cloud = geometry.cloud();
         let (positions, normals, radii) = (cloud.positions(), cloud.normals(), cloud.radii());
@@ -101,6 +104,9 @@ impl FlatCloud {
         let (mut lines, mut scatter) = (FlatPoints::default(), FlatPoints::default());
         let mut surface_columns = columns;
         if let Some(parts) = parts(columns, geometry) {
+            if geometry.cloud().normals.is_none() {
+                return Err(Error::MissingColumn { column: "normals" });
+            }
             surface_columns = parts.surface;
             lines = FlatPoints::new(parts.lines, progress)?;
             scatter = FlatPoints::new(parts.scatter, progress)?;
@@ -119,6 +125,7 @@ impl FlatCloud {
             edge_test: geometry.edge_test,
             has_outward_normals: geometry.has_outward_normals,
             has_front_sides: geometry.has_front_sides,
+            has_normals: geometry.cloud().normals.is_some(),
             blends_colors: geometry.blends_colors,
             support_colors: geometry.support_colors,
             max_blend_distance: 0.0,

@@ -25,7 +25,10 @@ pub struct Missing {
 impl Missing {
     /// Columns with missing entries.
     pub fn any(cloud: &PointCloud, preparation: &Preparation) -> Self {
-        let normals = cloud.normals.as_ref().is_none_or(|normals| normals.contains(&Vec3::ZERO));
+        let normals = match &cloud.normals {
+            Some(normals) => normals.contains(&Vec3::ZERO),
+            None => preparation.estimates_normals,
+        };
         let radii = cloud.radii.as_ref().is_none_or(|radii| radii.contains(&0.0));
         // Points that move may change their structure.
         let structure = cloud.radii.is_none()
@@ -40,8 +43,9 @@ impl Missing {
     }
 
     /// Columns that the cloud lacks altogether.
-    pub fn all(cloud: &PointCloud) -> Self {
-        let (normals, radii) = (cloud.normals.is_none(), cloud.radii.is_none());
+    pub fn all(cloud: &PointCloud, preparation: &Preparation) -> Self {
+        let normals = cloud.normals.is_none() && preparation.estimates_normals;
+        let radii = cloud.radii.is_none();
         Self { normals, fits: normals, radii, structure: false }
     }
 }

@@ -37,7 +37,8 @@ pub struct PreparationReport {
     pub structure: Option<StructureReport>,
 }
 
-/// Cleans a cloud, thins it, removes outliers and noise, then adds the normals and radii that are missing. Those of the
+/// Cleans a cloud, thins it, removes outliers and noise, then adds the radii that are missing, and the normals if they
+/// are wanted. Those of the
 /// file stay. Columns that are estimated get offsets in each morph target, estimated from the points where the target moves them.
 ///
 /// # Errors
@@ -75,7 +76,7 @@ pub fn prepare(
     let denoised = denoise(&mut cloud, preparation.denoise, progress)?;
     let (denoise, denoised_normals) = denoised.map(|found| (found.report, found.normals)).unzip();
     let missing = Missing::any(&cloud, preparation);
-    let estimated = Missing::all(&cloud);
+    let estimated = Missing::all(&cloud, preparation);
     let mut report =
         PreparationReport { clean, denoise, n_points: cloud.len(), ..Default::default() };
     let mut estimates =
@@ -310,6 +311,23 @@ mod tests {
                 assert_eq!(prepare(cloud, &preparation, &NoProgress), Err(Error::EmptyCloud));
             }
         }
+    }
+
+    #[test]
+    fn normals_that_nobody_wants_are_not_estimated() {
+        let structure = StructureChoice::Surface;
+        let wanted = Preparation { structure, ..Preparation::default() };
+        let unwanted = Preparation { estimates_normals: false, ..wanted.clone() };
+        let with_normals = prepare(ball(3000), &wanted, &NoProgress).unwrap().0;
+        let (without, report) = prepare(ball(3000), &unwanted, &NoProgress).unwrap();
+        assert!(without.normals.is_none() && report.normals.is_none());
+        assert_eq!(without.radii(), with_normals.radii());
+        // Those of a file stay, and are completed.
+        let mut given = ball(3000);
+        given.normals = Some(given.positions.clone());
+        given.normals.as_mut().unwrap()[7] = Vec3::ZERO;
+        let kept = prepare(given, &unwanted, &NoProgress).unwrap().0;
+        assert!(0.9 < kept.normals()[7].dot(kept.positions()[7]));
     }
 
     #[test]

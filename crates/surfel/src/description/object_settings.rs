@@ -194,15 +194,41 @@ impl ObjectSettings {
             denoise: settings.denoise.unwrap_or(default.denoise),
             neighbors: settings.neighbors(),
             normals: within.or(nearest).unwrap_or(default.normals),
+            estimates_normals: self.needs_normals(),
             orientation: self.orientation(),
             radii_from_normals: settings.radius.is_none(),
             radius: settings.radius.unwrap_or(default.radius),
-            structure: settings.structure(),
+            structure: if self.needs_structures() {
+                settings.structure()
+            } else {
+                StructureChoice::Surface
+            },
             free_space: settings.free_space(),
             // A colour may ask for a column that only the preparation computes.
             keep_variation: matches!(&self.color.color, Some(ColorSource::Column(name)) if name == SURFACE_VARIATION),
             seed,
         }
+    }
+
+    /// Returns true if normals are estimated where the file has none: the surface, its colours or the settings need them.
+    pub fn needs_normals(&self) -> bool {
+        let settings = &self.preparation;
+        let is_oriented = settings.orient.is_some_and(|rule| rule != Orientation::None);
+        let is_chosen = settings.estimates_normals() || is_oriented;
+        let is_shown = matches!(self.color.color, Some(ColorSource::Normal | ColorSource::Support));
+        self.describes_surface() || is_chosen || is_shown
+    }
+
+    /// Returns true if points may be lines and scatter: spheres and pixels are what they are.
+    fn needs_structures(&self) -> bool {
+        let is_shown =
+            matches!(&self.color.color, Some(ColorSource::Column(name)) if name == STRUCTURE);
+        self.describes_surface() || self.preparation.structure.is_some() || is_shown
+    }
+
+    /// Returns true if the surface lies between the points.
+    fn describes_surface(&self) -> bool {
+        !matches!(self.surface.surface(), SurfaceKind::Points | SurfaceKind::Sphere)
     }
 
     /// Returns the columns that only the preparation needs: what the scanner tells of each point.
