@@ -68,7 +68,7 @@ impl FlatCloud {
         if geometry.surface == SurfaceKind::Gaussian {
             return Self::of_gaussians(geometry, positions, progress);
         }
-        let columns = PointColumns::new(geometry.surface, positions, normals, radii, colors)?;
+        let columns = PointColumns::new(shape(geometry), positions, normals, radii, colors)?;
         Self::from_columns(scaled(columns, geometry), geometry, progress)
     }
 
@@ -174,6 +174,16 @@ impl FlatCloud {
         }
     }
 
+    /// True if the discs of the surface's points have no normals, and face each ray.
+    pub fn fits_balls(&self) -> bool {
+        self.surface == SurfaceKind::SplatFit && !self.has_normals
+    }
+
+    /// True if rays may go on behind the discs that they hit, whatever the edge test.
+    pub fn goes_through_holes(&self) -> bool {
+        self.surface == SurfaceKind::Cylinder || self.fits_balls()
+    }
+
     /// Returns the factor that multiplied the radii of the surface's points.
     pub fn radius_factor(&self) -> f32 {
         self.options.radius_factor(self.surface)
@@ -258,9 +268,16 @@ fn deformed_columns<'a>(
     geometry: &'a CloudGeometry,
 ) -> Result<PointColumns<'a>> {
     let Deformed { positions, normals, radii, .. } = deformed;
-    let columns =
-        PointColumns::new(geometry.surface, positions, normals, radii, geometry.colors())?;
+    let columns = PointColumns::new(shape(geometry), positions, normals, radii, geometry.colors())?;
     Ok(scaled(columns, geometry))
+}
+
+/// Returns the shape of the points of a surface. Without normals those of `SplatFit` are balls.
+fn shape(geometry: &CloudGeometry) -> SurfaceKind {
+    match geometry.surface {
+        SurfaceKind::SplatFit if geometry.cloud().normals.is_none() => SurfaceKind::Sphere,
+        surface => surface,
+    }
 }
 
 /// Scales the radii of columns as the options of the surface ask for.

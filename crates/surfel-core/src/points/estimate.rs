@@ -7,7 +7,7 @@ use super::jets::{JetFit, MIN_JET_NEIGHBORS, fit_nearest_jet, refine_normals};
 use super::neighbors::{KdTree, Neighbor, NeighborMethod, Neighborhood, map_neighborhoods};
 use super::normals::{PlaneFit, fit_plane};
 use super::preparation::Preparation;
-use super::radius::{DistanceSample, Radius, RadiusReport, median_distance};
+use super::radius::{DistanceSample, RadiusReport, median_distance};
 use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
 use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
 use crate::error::Result;
@@ -36,7 +36,7 @@ impl Missing {
             && cloud.skin.is_none()
             && cloud.structures().is_none()
             && preparation.structure != StructureChoice::Surface
-            && matches!(preparation.radius, Radius::Adaptive { .. });
+            && preparation.radius.rank().is_some();
         let is_searched = structure && preparation.structure == StructureChoice::Auto;
         let fits = normals || preparation.keep_variation || is_searched;
         Self { normals, fits, radii, structure }
@@ -71,10 +71,7 @@ pub fn estimate<'a>(
     progress: &dyn Progress,
 ) -> Result<Estimates<'a>> {
     let Preparation { radius, seed, .. } = *preparation;
-    let k_radius = match radius {
-        Radius::Adaptive { k } if missing.radii => Some(k),
-        _ => None,
-    };
+    let k_radius = radius.rank().filter(|_| missing.radii);
     let mut estimates = match (preparation.neighbors, preparation.normals) {
         (NeighborMethod::Knn, Neighborhood::Nearest(k)) if missing.fits => {
             let has_voters = missing.structure && preparation.structure == StructureChoice::Auto;

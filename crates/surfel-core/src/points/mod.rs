@@ -39,6 +39,7 @@ mod seen_scan;
 mod free_space;
 mod density;
 mod preparation;
+mod curvature;
 mod estimate;
 mod prepare;
 

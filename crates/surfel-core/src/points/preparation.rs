@@ -40,7 +40,7 @@ pub struct Preparation {
     pub radii_from_normals: bool,
     /// The choice of radii.
     pub radius: Radius,
-    /// The choice of structures. Applies if all radii are estimated by `Radius::Adaptive`.
+    /// The choice of structures. Applies if all radii are estimated, and differ from point to point.
     pub structure: StructureChoice,
     /// True to narrow what reaches into space through which a scanner saw, where the grid of a scan tells it. Applies if
     /// structures are found.

@@ -1,6 +1,7 @@
 //! Preparation: cleans a cloud, thins and denoises it, and adds the normals and radii that it lacks.
 
 use super::clean::{CleanReport, clean};
+use super::curvature::radii_by_curvature;
 use super::denoise::{DenoiseReport, denoise};
 use super::estimate::{Estimates, Missing, estimate, find_shapes};
 use super::mixed_pixels::{MixedPixels, without_mixed_pixels};
@@ -10,7 +11,7 @@ use super::normals::{NormalReport, PlaneFit, fill_missing};
 use super::orient::{Orientation, has_stations, orient, turn_to_stations};
 use super::outliers::remove_outliers;
 use super::preparation::{Preparation, SURFACE_VARIATION};
-use super::radius::RadiusReport;
+use super::radius::{Radius, RadiusReport};
 use super::structure::{PointShape, Structure, StructureReport};
 use super::subsample::subsample;
 use super::{PointCloud, PreparedCloud, Scalar, Values};
@@ -101,7 +102,16 @@ pub fn prepare(
     if by_stations && !estimated.normals {
         turn_given_normals(&mut cloud, progress);
     }
-    if let Some((radii, found)) = radii {
+    if let Some((mut radii, mut found)) = radii {
+        if let (Radius::Curvature { k }, Some(normals)) = (preparation.radius, &cloud.normals) {
+            let bent = radii_by_curvature(&cloud.positions, normals, &radii, k, progress)?;
+            let is_surface = |i: usize| {
+                shapes.as_ref().is_none_or(|(all, _)| all[i].structure == Structure::Surface)
+            };
+            let radius = |(i, (radius, bent))| if is_surface(i) { bent } else { radius };
+            radii = radii.into_iter().zip(bent).enumerate().map(radius).collect();
+            found.update(&radii);
+        }
         add_radii(&mut cloud, radii);
         report.radii = Some(found);
     }
@@ -243,7 +253,7 @@ mod tests {
     use super::*;
     use crate::math::Random;
     use crate::points::neighbors::NeighborMethod;
-    use crate::points::{Radius, STRUCTURE, StructureChoice, Subsample};
+    use crate::points::{STRUCTURE, StructureChoice, Subsample};
     use crate::progress::NoProgress;
 
     fn ball(n_points: usize) -> PointCloud {

@@ -98,7 +98,7 @@ impl SurfaceKind {
 
     /// Returns true if the shape of the points depends on their normals.
     pub fn needs_normals(self) -> bool {
-        self.uses_discs() || self == Self::Capsule
+        (self.uses_discs() && self != Self::SplatFit) || self == Self::Capsule
     }
 
     /// Returns true if the points describe a surface between them, rather than each one for itself.

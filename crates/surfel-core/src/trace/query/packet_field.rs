@@ -4,6 +4,7 @@
 use crate::flat::{FieldLeaf, FlatCloud};
 use crate::math::{LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Vec3, Vec3Lanes, set_bits};
 use crate::surface::{FIELD_SUPPORT, FieldSums, field_weight};
+use crate::trace::counts::{Counted, count};
 use crate::trace::query::edge_test::lane_mask;
 use crate::trace::query::ray_field::{
     BRACKET_MARGIN, LINEAR_STEP, N_SAMPLES, ShadedPoint, ShadingSums, signs,
@@ -202,6 +203,7 @@ impl<W: PacketLanes> PacketField<W> {
     /// Returns the field at a place of each ray.
     #[inline(always)]
     fn value(&self, places: W) -> (W, W::Mask) {
+        count(Counted::Terms, PACKET_WIDTH * self.points.len());
         let mut sums = FieldSums::new();
         for point in &self.points {
             let distance = point.squared - places * (point.twice_along - places);

@@ -2,6 +2,7 @@
 
 use crate::flat::{FieldTree, KdChild, MAX_KD_DEPTH};
 use crate::math::{Ray, Vec3, clip_to_box, finite_inverse_vec3};
+use crate::trace::counts::{Counted, count};
 
 /// A part of the ray in a node that is still to be visited.
 #[derive(Clone, Copy)]
@@ -77,6 +78,7 @@ impl<'t> KdWalk<'t> {
                     KdChild::Empty => break,
                     KdChild::Leaf(_) if leave < self.range.0 => break,
                     KdChild::Leaf(leaf_idx) => {
+                        count(Counted::Cells, 1);
                         return Some(LeafInterval { leaf_idx, enter, leave });
                     }
                     KdChild::Split { axis, at, first_child } => {

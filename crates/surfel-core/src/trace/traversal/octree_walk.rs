@@ -1,7 +1,8 @@
 //! The ways of single rays and of packets through an octree: nodes and cells, about front to back.
 
 use crate::flat::{MAX_OCTREE_DEPTH, Octree, OctreeNode};
-use crate::math::{Floats, LANES, LaneMask, Lanes, Vec3, Vec3Lanes};
+use crate::math::{Floats, LANES, LaneMask, Lanes, PACKET_WIDTH, Vec3, Vec3Lanes};
+use crate::trace::counts::{Counted, count};
 
 /// The size of a pixel along a ray, in the units of the ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -157,6 +158,7 @@ impl<'t> OctreeWalk<'t> {
         while 0 < self.n_pending {
             self.n_pending -= 1;
             let PendingNode { node_idx, lanes, cube } = self.pending[self.n_pending];
+            count(Counted::Cells, PACKET_WIDTH);
             let lower = Vec3Lanes::splat(cube.min).minus(rays.origin);
             let (enter, leave) = interval(rays, lower, F::splat(cube.size));
             let passed =
@@ -188,6 +190,7 @@ impl<'t> OctreeWalk<'t> {
         while 0 < self.n_pending {
             self.n_pending -= 1;
             let PendingNode { node_idx, cube, .. } = self.pending[self.n_pending];
+            count(Counted::Cells, 1);
             let node = self.octree.node(node_idx);
             let lower = Vec3Lanes::splat(cube.min).minus(ray.origin);
             let (enter, leave) = interval(ray, lower, cube.size);
