@@ -76,7 +76,7 @@ mod tests {
         let mut normal =
             || Vec3::from_array(std::array::from_fn(|_| random.next_gaussian() as f32));
         let outward: Vec<Vec3> = (0..n).map(|_| normal().normalize()).collect();
-        let sign = |i: usize| if i % 3 == 0 { -1.0 } else { 1.0 };
+        let sign = |i: usize| if i.is_multiple_of(3) { -1.0 } else { 1.0 };
         let normals = outward.iter().enumerate().map(|(i, normal)| sign(i) * *normal).collect();
         (outward.iter().map(|normal| sphere * *normal).collect(), normals)
     }
