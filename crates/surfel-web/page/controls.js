@@ -11,6 +11,9 @@ import { distance, normalize, scale } from './vector.js';
 const DEFAULT_GRADIENT = ['#6f7c8a', '#c9ced3'];
 const BLUE_SKY = ['#4f7fb8', '#d5e2ee'];
 const SLIDER = { kind: 'slider' };
+/** Surfaces that blend discs, and those whose points stand for themselves. */
+const BLENDED = ['splat', 'splat-mean', 'splat-fit', 'cylinder'];
+const APART = ['points', 'sphere', 'gaussian'];
 
 export const surfaceControls = [
   { key: 'surface', label: 'Kind', kind: 'select', options: ({ info }) => info.surfaces, help: 'Kind of surface' },
@@ -24,6 +27,12 @@ export const surfaceControls = [
     isVisible: ({ surface }) => surface === 'cylinder', help: 'Points that a hit needs' },
   { key: 'degree', label: 'Degree', ...SLIDER, range: [1, 3], limits: [1, 3], step: 1, automatic: true,
     isVisible: ({ surface }) => surface === 'mls', help: 'Degree of the fitted polynomials' },
+  { key: 'align', label: 'Alignment', kind: 'select', isVisible: ({ surface }) => surface === 'splat',
+    options: () => ['both', 'nearest', 'each'], read: (scene) => scene.align ?? 'both', help: 'How normals are turned before they are blended' },
+  { key: 'gather_limit', label: 'Gather limit', kind: 'select', isVisible: ({ surface }) => BLENDED.includes(surface),
+    options: () => ['least', 'nearest'], read: (scene) => scene.gather_limit ?? 'least', help: 'Which disc says how far behind it others are blended' },
+  { key: 'min_distance', label: 'Min distance', ...SLIDER, range: [0, 4], limits: [0, 100], step: 0.01, automatic: true,
+    isVisible: ({ surface }) => !APART.includes(surface), help: 'Distance before which new rays ignore hits, in radii' },
   { key: 'edge_test', label: 'Edge test', kind: 'select', help: 'How the edge of the surface is found',
     options: () => [{ value: 'angular-gap', label: 'angular gap' }, { value: 'off', label: 'off' }] },
   { key: 'octree_depth', label: 'Octree depth', kind: 'select', help: 'Levels of the octree; automatic: as fine as the points',

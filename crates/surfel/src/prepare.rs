@@ -114,6 +114,7 @@ fn prepared(
     }
     let mut preparation = Preparation { denoise: mode, duplicates, ..settings.preparation(seed) };
     preparation.keep_variation = columns.variation;
+    preparation.estimates_normals = columns.normals;
     if columns.normals && settings.preparation.orient.is_none() {
         preparation.orientation = Orientation::Auto;
     }

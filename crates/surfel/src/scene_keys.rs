@@ -11,12 +11,14 @@ use std::path::PathBuf;
 /// A hash of everything that decides how clouds are prepared.
 pub fn preparation_key(description: &SceneDescription) -> u64 {
     let settings = &description.objects_default;
-    let keeps_variation = settings.preparation(0).keep_variation;
+    let prepared = settings.preparation(0);
+    let by_surface =
+        (prepared.keep_variation, prepared.estimates_normals, prepared.structure.to_string());
     let [_, preparation, _] = settings.parts();
     let parts = json!([
         write_parts(&[preparation]),
         description.picture.seed(),
-        keeps_variation,
+        by_surface,
         object_settings(description),
         grouping_key(description),
     ]);

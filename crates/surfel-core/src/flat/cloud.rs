@@ -8,7 +8,7 @@ use super::point_columns::PointColumns;
 use super::points::FlatPoints;
 use super::refit::Refit;
 use crate::bvh::BvhNode;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::{Aabb, LANES, Vec3};
 use crate::points::Structure;
 use crate::progress::Progress;
@@ -43,6 +43,8 @@ pub struct FlatCloud {
     pub has_outward_normals: bool,
     /// True if normals point to the side from which the surface was seen.
     pub has_front_sides: bool,
+    /// True if the points have normals of their own, rather than none.
+    pub has_normals: bool,
     /// True if colours may be blended; false if each belongs to one point, as those of classes do.
     pub blends_colors: bool,
     /// Colours of hits by their support, instead of the points' own.
@@ -57,7 +59,8 @@ impl FlatCloud {
     ///
     /// # Errors
     ///
-    /// Fails if the cloud has too many points for 32-bit indices, or if `progress` is cancelled.
+    /// Fails if the cloud has too many points for 32-bit indices, if it lacks the normals that its surface needs, or if
+    /// `progress` is cancelled.
     pub fn new(geometry: &CloudGeometry, progress: &dyn Progress) -> Result<Self> {
         let cloud = geometry.cloud();
         let (positions, normals, radii) = (cloud.positions(), cloud.normals(), cloud.radii());
@@ -65,7 +68,7 @@ impl FlatCloud {
         if geometry.surface == SurfaceKind::Gaussian {
             return Self::of_gaussians(geometry, positions, progress);
         }
-        let columns = PointColumns::new(geometry.surface, positions, normals, radii, colors)?;
+        let columns = PointColumns::new(shape(geometry), positions, normals, radii, colors)?;
         Self::from_columns(scaled(columns, geometry), geometry, progress)
     }
 
@@ -101,6 +104,9 @@ impl FlatCloud {
         let (mut lines, mut scatter) = (FlatPoints::default(), FlatPoints::default());
         let mut surface_columns = columns;
         if let Some(parts) = parts(columns, geometry) {
+            if geometry.cloud().normals.is_none() {
+                return Err(Error::MissingColumn { column: "normals" });
+            }
             surface_columns = parts.surface;
             lines = FlatPoints::new(parts.lines, progress)?;
             scatter = FlatPoints::new(parts.scatter, progress)?;
@@ -119,6 +125,7 @@ impl FlatCloud {
             edge_test: geometry.edge_test,
             has_outward_normals: geometry.has_outward_normals,
             has_front_sides: geometry.has_front_sides,
+            has_normals: geometry.cloud().normals.is_some(),
             blends_colors: geometry.blends_colors,
             support_colors: geometry.support_colors,
             max_blend_distance: 0.0,
@@ -165,6 +172,16 @@ impl FlatCloud {
             SurfaceKind::Sphere if self.surface != SurfaceKind::Sphere => &self.scatter,
             _ => &self.points,
         }
+    }
+
+    /// True if the discs of the surface's points have no normals, and face each ray.
+    pub fn fits_balls(&self) -> bool {
+        self.surface == SurfaceKind::SplatFit && !self.has_normals
+    }
+
+    /// True if rays may go on behind the discs that they hit, whatever the edge test.
+    pub fn goes_through_holes(&self) -> bool {
+        self.surface == SurfaceKind::Cylinder || self.fits_balls()
     }
 
     /// Returns the factor that multiplied the radii of the surface's points.
@@ -251,9 +268,16 @@ fn deformed_columns<'a>(
     geometry: &'a CloudGeometry,
 ) -> Result<PointColumns<'a>> {
     let Deformed { positions, normals, radii, .. } = deformed;
-    let columns =
-        PointColumns::new(geometry.surface, positions, normals, radii, geometry.colors())?;
+    let columns = PointColumns::new(shape(geometry), positions, normals, radii, geometry.colors())?;
     Ok(scaled(columns, geometry))
+}
+
+/// Returns the shape of the points of a surface. Without normals those of `SplatFit` are balls.
+fn shape(geometry: &CloudGeometry) -> SurfaceKind {
+    match geometry.surface {
+        SurfaceKind::SplatFit if geometry.cloud().normals.is_none() => SurfaceKind::Sphere,
+        surface => surface,
+    }
 }
 
 /// Scales the radii of columns as the options of the surface ask for.

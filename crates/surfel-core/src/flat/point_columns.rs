@@ -2,7 +2,7 @@
 
 use super::block::{self, BlockPoint};
 use crate::bvh::{BvhPrimitive, NO_PRIMITIVE};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::{Aabb, LANES, Vec3};
 use crate::points::{Structure, check_length};
 use crate::surface::SurfaceKind;
@@ -13,6 +13,7 @@ use rayon::prelude::*;
 pub struct PointColumns<'a> {
     kind: SurfaceKind,
     positions: &'a [Vec3],
+    /// Empty if there are none.
     normals: &'a [Vec3],
     radii: &'a [f32],
     colors: &'a [[u8; 3]],
@@ -23,11 +24,12 @@ pub struct PointColumns<'a> {
 }
 
 impl<'a> PointColumns<'a> {
-    /// Borrows columns of any values. `colors` are sRGB-encoded.
+    /// Borrows columns of any values. `colors` are sRGB-encoded. `normals` may be empty if the kind needs none.
     ///
     /// # Errors
     ///
-    /// Returns [`Error::ColumnLength`](crate::Error::ColumnLength) unless all columns have the same length.
+    /// Returns [`Error::MissingColumn`] if the kind needs normals and there are none, and [`Error::ColumnLength`] unless
+    /// all columns have the same length.
     pub fn new(
         kind: SurfaceKind,
         positions: &'a [Vec3],
@@ -35,7 +37,12 @@ impl<'a> PointColumns<'a> {
         radii: &'a [f32],
         colors: &'a [[u8; 3]],
     ) -> Result<Self> {
-        check_length("normals", normals.len(), positions.len())?;
+        if kind.needs_normals() && normals.is_empty() && !positions.is_empty() {
+            return Err(Error::MissingColumn { column: "normals" });
+        }
+        if !normals.is_empty() {
+            check_length("normals", normals.len(), positions.len())?;
+        }
         check_length("radii", radii.len(), positions.len())?;
         check_length("colours", colors.len(), positions.len())?;
         let radius_factor = kind.radius_factor();
@@ -74,7 +81,7 @@ impl<'a> PointColumns<'a> {
         let i = id as usize;
         BlockPoint {
             position: self.positions[i],
-            normal: normal_or_z(self.normals[i]),
+            normal: self.normals.get(i).map_or(Vec3::Z, |normal| normal_or_z(*normal)),
             radius: if self.has_radii() { self.radius_factor * self.radii[i] } else { 0.0 },
             color: self.colors[i],
         }

@@ -8,7 +8,7 @@ use super::jets::{JetFit, MIN_JET_NEIGHBORS, fit_nearest_jet, refine_normals};
 use super::neighbors::{KdTree, Neighbor, NeighborMethod, Neighborhood, map_neighborhoods};
 use super::normals::{PlaneFit, fit_plane};
 use super::preparation::Preparation;
-use super::radius::{DistanceSample, Radius, RadiusReport, median_distance};
+use super::radius::{DistanceSample, RadiusReport, median_distance};
 use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
 use super::scan_grid::ScanGrids;
 use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
@@ -27,7 +27,10 @@ pub struct Missing {
 impl Missing {
     /// Columns with missing entries.
     pub fn any(cloud: &PointCloud, preparation: &Preparation) -> Self {
-        let normals = cloud.normals.as_ref().is_none_or(|normals| normals.contains(&Vec3::ZERO));
+        let normals = match &cloud.normals {
+            Some(normals) => normals.contains(&Vec3::ZERO),
+            None => preparation.estimates_normals,
+        };
         let radii = cloud.radii.as_ref().is_none_or(|radii| radii.contains(&0.0));
         // Points that move may change their structure.
         let structure = cloud.radii.is_none()
@@ -35,15 +38,16 @@ impl Missing {
             && cloud.skin.is_none()
             && cloud.structures().is_none()
             && preparation.structure != StructureChoice::Surface
-            && matches!(preparation.radius, Radius::Adaptive { .. });
+            && preparation.radius.rank().is_some();
         let is_searched = structure && preparation.structure == StructureChoice::Auto;
         let fits = normals || preparation.keep_variation || is_searched;
         Self { normals, fits, radii, structure }
     }
 
     /// Columns that the cloud lacks altogether.
-    pub fn all(cloud: &PointCloud) -> Self {
-        let (normals, radii) = (cloud.normals.is_none(), cloud.radii.is_none());
+    pub fn all(cloud: &PointCloud, preparation: &Preparation) -> Self {
+        let normals = cloud.normals.is_none() && preparation.estimates_normals;
+        let radii = cloud.radii.is_none();
         Self { normals, fits: normals, radii, structure: false }
     }
 }
@@ -71,10 +75,7 @@ pub fn estimate<'a>(
     progress: &dyn Progress,
 ) -> Result<Estimates<'a>> {
     let Preparation { radius, seed, .. } = *preparation;
-    let k_radius = match radius {
-        Radius::Adaptive { k } if missing.radii => Some(k),
-        _ => None,
-    };
+    let k_radius = radius.rank().filter(|_| missing.radii);
     let mut estimates = match (preparation.neighbors, preparation.normals) {
         (NeighborMethod::Knn, Neighborhood::Nearest(k)) if missing.fits => {
             let has_voters = missing.structure && preparation.structure == StructureChoice::Auto;

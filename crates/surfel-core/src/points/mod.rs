@@ -40,6 +40,7 @@ mod free_space;
 mod gaps;
 mod density;
 mod preparation;
+mod curvature;
 mod estimate;
 mod prepare;
 

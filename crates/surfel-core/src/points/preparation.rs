@@ -31,6 +31,8 @@ pub struct Preparation {
     pub neighbors: NeighborMethod,
     /// The neighbours whose plane gives a normal. Methods that know only distances use the median distance to k.
     pub normals: Neighborhood,
+    /// True to estimate the normals that the file lacks. Spheres and pixels need none.
+    pub estimates_normals: bool,
     /// The signs of normals. Applies if all normals are estimated; `Orientation::Auto` also turns those of the file to
     /// the stations, if these are known.
     pub orientation: Orientation,
@@ -38,7 +40,7 @@ pub struct Preparation {
     pub radii_from_normals: bool,
     /// The choice of radii.
     pub radius: Radius,
-    /// The choice of structures. Applies if all radii are estimated by `Radius::Adaptive`.
+    /// The choice of structures. Applies if all radii are estimated, and differ from point to point.
     pub structure: StructureChoice,
     /// True to narrow what reaches into space through which a scanner saw, where the grid of a scan tells it. Applies if
     /// structures are found.
@@ -59,6 +61,7 @@ impl Default for Preparation {
             denoise: Denoise::default(),
             neighbors: NeighborMethod::Knn,
             normals: Neighborhood::Nearest(16),
+            estimates_normals: true,
             orientation: Orientation::None,
             radii_from_normals: true,
             radius: Radius::default(),

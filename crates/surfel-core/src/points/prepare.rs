@@ -1,6 +1,7 @@
 //! Preparation: cleans a cloud, thins and denoises it, and adds the normals and radii that it lacks.
 
 use super::clean::{CleanReport, clean};
+use super::curvature::radii_by_curvature;
 use super::denoise::{DenoiseReport, denoise};
 use super::estimate::{Estimates, Missing, estimate, find_shapes};
 use super::mixed_pixels::{MixedPixels, without_mixed_pixels};
@@ -10,7 +11,7 @@ use super::normals::{NormalReport, PlaneFit, fill_missing};
 use super::orient::{Orientation, has_stations, orient, turn_to_stations};
 use super::outliers::remove_outliers;
 use super::preparation::{Preparation, SURFACE_VARIATION};
-use super::radius::RadiusReport;
+use super::radius::{Radius, RadiusReport};
 use super::structure::{PointShape, Structure, StructureReport};
 use super::subsample::subsample;
 use super::{PointCloud, PreparedCloud, Scalar, Values};
@@ -37,7 +38,8 @@ pub struct PreparationReport {
     pub structure: Option<StructureReport>,
 }
 
-/// Cleans a cloud, thins it, removes outliers and noise, then adds the normals and radii that are missing. Those of the
+/// Cleans a cloud, thins it, removes outliers and noise, then adds the radii that are missing, and the normals if they
+/// are wanted. Those of the
 /// file stay. Columns that are estimated get offsets in each morph target, estimated from the points where the target moves them.
 ///
 /// # Errors
@@ -75,7 +77,7 @@ pub fn prepare(
     let denoised = denoise(&mut cloud, preparation.denoise, progress)?;
     let (denoise, denoised_normals) = denoised.map(|found| (found.report, found.normals)).unzip();
     let missing = Missing::any(&cloud, preparation);
-    let estimated = Missing::all(&cloud);
+    let estimated = Missing::all(&cloud, preparation);
     let mut report =
         PreparationReport { clean, denoise, n_points: cloud.len(), ..Default::default() };
     let mut estimates =
@@ -100,7 +102,16 @@ pub fn prepare(
     if by_stations && !estimated.normals {
         turn_given_normals(&mut cloud, progress);
     }
-    if let Some((radii, found)) = radii {
+    if let Some((mut radii, mut found)) = radii {
+        if let (Radius::Curvature { k }, Some(normals)) = (preparation.radius, &cloud.normals) {
+            let bent = radii_by_curvature(&cloud.positions, normals, &radii, k, progress)?;
+            let is_surface = |i: usize| {
+                shapes.as_ref().is_none_or(|(all, _)| all[i].structure == Structure::Surface)
+            };
+            let radius = |(i, (radius, bent))| if is_surface(i) { bent } else { radius };
+            radii = radii.into_iter().zip(bent).enumerate().map(radius).collect();
+            found.update(&radii);
+        }
         add_radii(&mut cloud, radii);
         report.radii = Some(found);
     }
@@ -242,7 +253,7 @@ mod tests {
     use super::*;
     use crate::math::Random;
     use crate::points::neighbors::NeighborMethod;
-    use crate::points::{Radius, STRUCTURE, StructureChoice, Subsample};
+    use crate::points::{STRUCTURE, StructureChoice, Subsample};
     use crate::progress::NoProgress;
 
     fn ball(n_points: usize) -> PointCloud {
@@ -310,6 +321,23 @@ mod tests {
                 assert_eq!(prepare(cloud, &preparation, &NoProgress), Err(Error::EmptyCloud));
             }
         }
+    }
+
+    #[test]
+    fn normals_that_nobody_wants_are_not_estimated() {
+        let structure = StructureChoice::Surface;
+        let wanted = Preparation { structure, ..Preparation::default() };
+        let unwanted = Preparation { estimates_normals: false, ..wanted.clone() };
+        let with_normals = prepare(ball(3000), &wanted, &NoProgress).unwrap().0;
+        let (without, report) = prepare(ball(3000), &unwanted, &NoProgress).unwrap();
+        assert!(without.normals.is_none() && report.normals.is_none());
+        assert_eq!(without.radii(), with_normals.radii());
+        // Those of a file stay, and are completed.
+        let mut given = ball(3000);
+        given.normals = Some(given.positions.clone());
+        given.normals.as_mut().unwrap()[7] = Vec3::ZERO;
+        let kept = prepare(given, &unwanted, &NoProgress).unwrap().0;
+        assert!(0.9 < kept.normals()[7].dot(kept.positions()[7]));
     }
 
     #[test]

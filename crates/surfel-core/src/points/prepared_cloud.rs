@@ -11,8 +11,7 @@ use std::ops::Deref;
 /// of a cloud that needs no preparation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PreparedCloud {
-    /// Invariant: the cloud has normals and radii, one entry for each point in every column, and only valid
-    /// positions.
+    /// Invariant: the cloud has radii, one entry for each point in every column, and only valid positions.
     cloud: PointCloud,
 }
 
@@ -21,13 +20,10 @@ impl PreparedCloud {
     ///
     /// # Errors
     ///
-    /// Returns [`Error::MissingColumn`] for a cloud without normals or radii, [`Error::ColumnLength`] for a
-    /// column that does not have one entry for each point, and [`Error::InvalidPosition`] for a position
-    /// that is NaN, infinite or too far from the origin (see [`is_valid_position`]).
+    /// Returns [`Error::MissingColumn`] for a cloud without radii, [`Error::ColumnLength`] for a column that does not
+    /// have one entry for each point, and [`Error::InvalidPosition`] for a position that is NaN, infinite or too far
+    /// from the origin (see [`is_valid_position`]).
     pub fn new(cloud: PointCloud) -> Result<Self> {
-        if cloud.normals.is_none() {
-            return Err(Error::MissingColumn { column: "normals" });
-        }
         if cloud.radii.is_none() {
             return Err(Error::MissingColumn { column: "radii" });
         }
@@ -51,7 +47,7 @@ impl PreparedCloud {
         &self.cloud.positions
     }
 
-    /// Returns the unit normals, one for each position.
+    /// Returns the unit normals, one for each position; none if the cloud has no normals.
     pub fn normals(&self) -> &[Vec3] {
         self.cloud.normals.as_deref().unwrap_or_default()
     }
@@ -137,6 +133,8 @@ mod tests {
         assert_eq!(prepared.subset(&[1]).positions(), [Vec3::X]);
         assert_eq!(prepared.into_inner(), cloud());
         assert!(PreparedCloud::new(PreparedCloud::default().into_inner()).is_ok());
+        let bare = PreparedCloud::new(PointCloud { normals: None, ..cloud() }).unwrap();
+        assert!(bare.normals().is_empty());
     }
 
     #[test]
@@ -155,7 +153,6 @@ mod tests {
             change(&mut cloud);
             PreparedCloud::new(cloud).unwrap_err().to_string()
         };
-        assert_eq!(error(|cloud| cloud.normals = None), "the cloud has no normals");
         assert_eq!(error(|cloud| cloud.radii = None), "the cloud has no radii");
         let expected = "the column of radii has 1 entries, one for each of 2 points expected";
         assert_eq!(error(|cloud| cloud.radii = Some(vec![0.5])), expected);

@@ -31,6 +31,11 @@ pub enum Radius {
         /// Rank of the neighbour, from 1.
         k: usize,
     },
+    /// The distance to the k-th neighbour, or less where the surface bends: as far as a disc stays close to it.
+    Curvature {
+        /// Rank of the neighbour, from 1.
+        k: usize,
+    },
 }
 
 impl Default for Radius {
@@ -74,7 +79,7 @@ pub fn estimate_radii(
             let median = median_distance(positions, &sample, progress)?;
             Ok(with_report(vec![median; positions.len()]))
         }
-        Radius::Adaptive { k } => {
+        Radius::Adaptive { k } | Radius::Curvature { k } => {
             let tree = KdTree::new(positions, progress)?;
             let distance = |_: usize, neighbors: &[Neighbor]| kth_distance(neighbors, k);
             let distances = tree.map(Neighborhood::Nearest(k), progress, distance)?;
@@ -84,6 +89,14 @@ pub fn estimate_radii(
 }
 
 impl Radius {
+    /// Returns the rank of the neighbour whose distance is the radius, if radii differ.
+    pub(super) fn rank(self) -> Option<usize> {
+        match self {
+            Self::Adaptive { k } | Self::Curvature { k } => Some(k),
+            _ => None,
+        }
+    }
+
     /// Checks the values.
     ///
     /// # Errors
@@ -96,6 +109,7 @@ impl Radius {
                 (0 < n && 0 < samples && n < 1 << 20, format!("median:{n} of {samples} samples"))
             }
             Self::Adaptive { k } => ((1..1 << 20).contains(&k), format!("adaptive:{k}")),
+            Self::Curvature { k } => ((1..1 << 20).contains(&k), format!("curvature:{k}")),
         };
         let expected = "positive and finite, counts from 1 to a million";
         if good { Ok(()) } else { Err(Error::Setting { name: "radius", found, expected }) }
@@ -167,6 +181,10 @@ impl RadiusReport {
             }
             Radius::Adaptive { k } => format!(
                 "radii {min} to {max}, median {median}: the distance to the {} neighbour",
+                ordinal(k)
+            ),
+            Radius::Curvature { k } => format!(
+                "radii {min} to {max}, median {median}: the distance to the {} neighbour, less where the surface bends",
                 ordinal(k)
             ),
         }
@@ -298,6 +316,7 @@ impl FromStr for Radius {
         let radius = match name {
             "auto" if number.is_empty() => Some(Self::default()),
             "adaptive" => count(12).map(|k| Self::Adaptive { k }),
+            "curvature" => count(12).map(|k| Self::Curvature { k }),
             "median" => parse_median(number),
             _ => text.parse().ok().map(Self::Fixed),
         };
@@ -305,7 +324,7 @@ impl FromStr for Radius {
         radius.ok_or_else(|| Error::Setting {
             name: "radius",
             found: text.to_owned(),
-            expected: "auto, adaptive[:K], median[:N[,C]] or a positive number in world units",
+            expected: "auto, adaptive[:K], curvature[:K], median[:N[,C]] or a positive number in world units",
         })
     }
 }

@@ -2,6 +2,7 @@
 
 mod cpu;
 mod footprint;
+mod point_light;
 mod raster;
 mod region;
 mod renderer;

@@ -1,13 +1,14 @@
-//! Rasterised points: round and of one size in pixels, with a z-buffer, shaded by eye-dome lighting.
+//! Rasterised points: round and of one size in pixels, with a z-buffer, lit by their normals or shaded by eye-dome lighting.
 
 use super::footprint::RowRange;
+use super::point_light::{LitPoint, has_lights};
 use super::region::RenderRegion;
 use super::settings::Settings;
 use crate::error::{Error, Result};
 use crate::flat::{FlatCloud, FlatGeometry, FlatScene, Instance};
 use crate::image::{Image, NO_ID};
 use crate::integrator::background_radiance;
-use crate::math::LANES;
+use crate::math::{LANES, Vec3};
 use crate::progress::Progress;
 use crate::scene::{Background, View};
 use crate::surface::SurfaceKind;
@@ -186,15 +187,28 @@ impl Raster {
                 continue;
             }
             let instance = &scene.instances[instance_idx as usize];
-            let points = &cloud(scene, instance).points;
+            let cloud = cloud(scene, instance);
+            let points = &cloud.points;
             let material = &scene.materials[instance.material_idx as usize];
             let albedo = material.base_color * points.surfel(slot).color;
-            let shade = if material.is_unlit { 1.0 } else { self.eye_dome((x, y), index) };
-            image.color[pixel] = (shade * albedo).extend(1.0).to_array();
+            let lit = cloud.has_normals.then(|| {
+                let normal = instance.world_normal(points.normal(slot));
+                let to_viewer = -view.ray(x as f32 + 0.5, y as f32 + 0.5).direction;
+                LitPoint::new(instance.world_position(points.center(slot)), normal, to_viewer)
+            });
+            let light = match &lit {
+                _ if material.is_unlit => Vec3::ONE,
+                Some(point) if has_lights(scene) => {
+                    point.reflected(&scene.lights, &scene.punctual_lights)
+                }
+                _ => Vec3::splat(self.eye_dome((x, y), index)),
+            };
+            image.color[pixel] = (light * albedo).extend(1.0).to_array();
             image.coverage[pixel] = 1.0;
             let Some(aovs) = &mut image.aovs else { continue };
             aovs.depth[pixel] = self.depths[index];
             aovs.position[pixel] = instance.world_position(points.center(slot));
+            aovs.normal[pixel] = lit.map_or(Vec3::ZERO, |point| point.normal);
             aovs.point_id[pixel] = points.id(slot);
             aovs.instance_id[pixel] = instance_idx;
             aovs.albedo[pixel] = albedo;

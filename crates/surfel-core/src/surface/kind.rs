@@ -96,6 +96,11 @@ impl SurfaceKind {
         !matches!(self, Self::Points | Self::Sphere | Self::Mls | Self::Capsule | Self::Gaussian)
     }
 
+    /// Returns true if the shape of the points depends on their normals.
+    pub fn needs_normals(self) -> bool {
+        (self.uses_discs() && self != Self::SplatFit) || self == Self::Capsule
+    }
+
     /// Returns true if the points describe a surface between them, rather than each one for itself.
     pub fn is_continuous(self) -> bool {
         self.uses_discs() || self == Self::Mls

@@ -7,7 +7,7 @@ pub use crate::trace::query::smooth_hits::{
 pub use crate::trace::query::smooth_query::{
     MAX_DISTANCE_FROM_DISC, MAX_FITS, MAX_LAST_STEP, TOLERANCE,
 };
-pub use crate::trace::query::surface::RESTART_OFFSET;
+pub use crate::trace::query::splat_query::RESTART_OFFSET;
 pub use crate::trace::query::surface_hit::MAX_REJECTED_HITS;
 
 /// Constants of the surface of moving least squares.

@@ -4,6 +4,7 @@
 //! mesh, and `scene` those about a scene of instances. Each folder uses only those above it, and so does each
 //! file of a folder.
 
+mod counts;
 mod simd;
 mod traversal;
 mod query;
@@ -11,6 +12,7 @@ mod scene;
 mod tracer;
 pub mod constants;
 
+pub use counts::{Counted, take_counts};
 pub use query::any::{any_hits, any_triangles};
 pub use query::closest::{closest_hits, closest_triangles};
 pub use query::gather::gathers;

@@ -35,9 +35,12 @@ impl Subject {
         self.cloud.len()
     }
 
-    /// Returns a grey geometry of a kind.
+    /// Returns a grey geometry of a kind, without normals if the kind needs none.
     pub fn geometry(&self, kind: SurfaceKind) -> CloudGeometry {
-        let mut geometry = CloudGeometry::with_uniform_color(self.cloud.clone(), [188; 3]);
+        let mut cloud = self.cloud.clone().into_inner();
+        cloud.normals = cloud.normals.filter(|_| kind.needs_normals());
+        let cloud = PreparedCloud::new(cloud).unwrap();
+        let mut geometry = CloudGeometry::with_uniform_color(cloud, [188; 3]);
         geometry.surface = kind;
         geometry.edge_test = EdgeTest::AngularGap;
         geometry
@@ -74,6 +77,7 @@ fn prepared(cloud: PointCloud) -> PreparedCloud {
     prepare(cloud, &preparation, &NoProgress).unwrap().0
 }
 
+const CORNER: DVec3 = DVec3::new(-0.55, 0.7, -0.45);
 const FRONT: DVec3 = DVec3::new(-0.35, 0.9, -0.25);
 
 /// Returns the 35,947 vertices of the Stanford bunny, if there is the folder of test data.
@@ -86,8 +90,12 @@ pub fn bunny() -> Option<Subject> {
 
 /// Returns a cube of 301,056 points with exact normals.
 pub fn cube() -> Subject {
-    let direction = DVec3::new(-0.55, 0.7, -0.45);
-    Subject::new("Cube, 301k", clouds::cube(224, 0.3, 1), direction)
+    Subject::new("Cube, 301k", clouds::cube(224, 0.3, 1), CORNER)
+}
+
+/// Returns a cube of 20,184 points, whose discs are a few pixels wide in small pictures.
+pub fn coarse_cube() -> Subject {
+    Subject::new("Cube, 20k", clouds::cube(58, 0.3, 1), CORNER)
 }
 
 /// Returns scans of the built-in ruin of 1,078,000 points.
@@ -95,8 +103,8 @@ pub fn ruin_scan() -> Subject {
     let cloud = ruin::scan(1_078_000, &NoProgress).unwrap();
     let view = ruin::view();
     let camera = Camera {
-        position: view.position,
-        focal_point: view.focal_point,
+        position: ruin::UTM_ORIGIN + view.position,
+        focal_point: ruin::UTM_ORIGIN + view.focal_point,
         view_up: DVec3::Z,
         projection: Projection::Perspective { view_angle_deg: view.view_angle_deg },
     };

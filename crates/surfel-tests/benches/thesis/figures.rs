@@ -24,7 +24,7 @@ pub fn write_figures(folder: &Path) {
         head.clone()
     });
     let random = bunny.with_random_signs();
-    let cube = clouds::cube().with_random_signs();
+    let cube = clouds::coarse_cube().with_random_signs();
     let figures = [
         (1, &head, SurfaceKind::Points),
         (2, &head, SurfaceKind::Sphere),
@@ -39,7 +39,10 @@ pub fn write_figures(folder: &Path) {
         (13, &head, SurfaceKind::SplatFit),
     ];
     for (number, subject, kind) in figures {
-        save(folder, &format!("figure-{number:02}"), &picture(&scene(subject, kind)));
+        let mut scene = scene(subject, kind);
+        let is_unlit = kind == SurfaceKind::Points;
+        scene.graph.materials.iter_mut().for_each(|material| material.is_unlit = is_unlit);
+        save(folder, &format!("figure-{number:02}"), &picture(&scene));
     }
     let mut without_distance = scene(&bunny, SurfaceKind::Disc);
     let clouds = without_distance.graph.geometries.iter_mut();
@@ -63,7 +66,11 @@ fn picture(scene: &Scene) -> Image {
     let mut flat = FlatScene::new(scene, &NoProgress).unwrap();
     flat.background = Background::Gradient { top: Vec3::ONE, bottom: Vec3::ONE };
     let settings = Settings { samples_per_pixel: 4, ..settings(SIZE) };
-    CpuRenderer { simd: Simd::detect() }.render(&flat, &settings, &NoProgress).unwrap().0
+    let (image, _) =
+        CpuRenderer { simd: Simd::detect() }.render(&flat, &settings, &NoProgress).unwrap();
+    let covered: f32 = image.coverage.iter().sum();
+    assert!(0.1 < covered / (SIZE * SIZE) as f32, "nothing is seen");
+    image
 }
 
 fn save(folder: &Path, name: &str, image: &Image) {

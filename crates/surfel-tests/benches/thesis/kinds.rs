@@ -5,8 +5,9 @@ use super::figures;
 use std::path::Path;
 use std::time::Instant;
 use surfel_core::flat::FlatCloud;
-use surfel_core::points::PointCloud;
+use surfel_core::points::{PointCloud, Preparation, StructureChoice};
 use surfel_core::progress::NoProgress;
+use surfel_core::scene::Mesh;
 use surfel_core::surface::SurfaceKind;
 use surfel_tests::deviation::{Deviation, TrueViews};
 use surfel_tests::ground_truth::GroundTruth;
@@ -20,20 +21,40 @@ const RESOLUTION: u32 = 384;
 const N_RUNS: usize = 3;
 
 /// The figures of a kind.
-struct KindFigures {
+pub struct KindFigures {
     deviation: Deviation,
     trace_ms: f64,
     build_ms: f64,
     bytes_per_point: f64,
 }
 
+/// A shape whose points are compared with it.
+pub struct Sampled {
+    mesh: GroundTruth,
+    views: TrueViews,
+    n_points: usize,
+}
+
+impl Sampled {
+    /// Samples a mesh with random points, seen in four views.
+    pub fn new(mesh: &Mesh, n_points: usize, resolution: u32) -> Self {
+        let mesh = GroundTruth::from_mesh(mesh);
+        Self { views: TrueViews::new(&mesh, resolution), mesh, n_points }
+    }
+}
+
+/// Returns the preparation of a cloud as one surface, with normals where a kind needs them.
+pub fn preparation(kind: SurfaceKind) -> Preparation {
+    let (structure, estimates_normals) = (StructureChoice::Surface, kind.needs_normals());
+    Preparation { structure, estimates_normals, ..Preparation::default() }
+}
+
 /// Asserts the figures of all kinds for a small cloud.
 pub fn check() {
-    let mesh = GroundTruth::from_mesh(&shapes::blob());
-    let views = TrueViews::new(&mesh, 64);
+    let sampled = Sampled::new(&shapes::blob(), 3000, 64);
     for (name, kind) in SurfaceKind::ALL {
         if !matches!(kind, SurfaceKind::Points | SurfaceKind::Gaussian) {
-            let figures = compare(&mesh, &views, 3000, kind);
+            let figures = compare(&sampled, kind, &preparation(kind));
             assert!(figures.deviation.misses < 0.05, "{name}: {:?}", figures.deviation);
         }
     }
@@ -41,35 +62,19 @@ pub fn check() {
 
 /// Prints the table, and writes a picture of each kind.
 pub fn print_kinds(folder: Option<&Path>) {
-    println!(
-        "\n| cloud | surface | missing % | false % | depth, s | over 5 s, % | normals: mean, 95 % | \
-         trace, ms | build, ms | bytes a point |\n{}",
-        "| --- ".repeat(10) + "|"
-    );
+    print_header();
     let all = [
         ("cube", shapes::cube(), 20_000),
         ("blob", shapes::blob(), 20_000),
         ("head", shapes::head(), 60_000),
     ];
     for (cloud, mesh, n_points) in all {
-        let mesh = GroundTruth::from_mesh(&mesh);
-        let views = TrueViews::new(&mesh, RESOLUTION);
+        let sampled = Sampled::new(&mesh, n_points, RESOLUTION);
         for (name, kind) in SurfaceKind::ALL {
             if matches!(kind, SurfaceKind::Points | SurfaceKind::Gaussian) {
                 continue;
             }
-            let KindFigures { deviation, trace_ms, build_ms, bytes_per_point } =
-                compare(&mesh, &views, n_points, kind);
-            println!(
-                "| {cloud} | `{name}` | {:.3} | {:.3} | {:.3} | {:.2} | {:.1}°, {:.1}° | \
-                 {trace_ms:.0} | {build_ms:.0} | {bytes_per_point:.1} |",
-                100.0 * deviation.misses,
-                100.0 * deviation.false_hits,
-                deviation.depth_rms,
-                100.0 * deviation.far_off,
-                deviation.normal_deg,
-                deviation.normal_p95_deg,
-            );
+            print_row(cloud, &format!("`{name}`"), &compare(&sampled, kind, &preparation(kind)));
         }
     }
     if let Some(folder) = folder {
@@ -78,14 +83,35 @@ pub fn print_kinds(folder: Option<&Path>) {
     }
 }
 
-fn compare(
-    mesh: &GroundTruth,
-    views: &TrueViews,
-    n_points: usize,
-    kind: SurfaceKind,
-) -> KindFigures {
-    let positions = Sampling::Random.sample(mesh, n_points, 1);
-    let points = scenes::points(PointCloud::from_positions(positions), kind);
+/// Prints the head of a table of figures.
+pub fn print_header() {
+    println!(
+        "\n| cloud | surface | missing % | false % | depth, s | over 5 s, % | normals: mean, 95 % | \
+         trace, ms | build, ms | bytes a point |\n{}",
+        "| --- ".repeat(10) + "|"
+    );
+}
+
+/// Prints the figures of a surface.
+pub fn print_row(cloud: &str, surface: &str, figures: &KindFigures) {
+    let KindFigures { deviation, trace_ms, build_ms, bytes_per_point } = figures;
+    println!(
+        "| {cloud} | {surface} | {:.3} | {:.3} | {:.3} | {:.2} | {:.1}°, {:.1}° | {trace_ms:.0} | \
+         {build_ms:.0} | {bytes_per_point:.1} |",
+        100.0 * deviation.misses,
+        100.0 * deviation.false_hits,
+        deviation.depth_rms,
+        100.0 * deviation.far_off,
+        deviation.normal_deg,
+        deviation.normal_p95_deg,
+    );
+}
+
+/// Compares the surface of a kind with the shape that its points were taken from.
+pub fn compare(sampled: &Sampled, kind: SurfaceKind, preparation: &Preparation) -> KindFigures {
+    let Sampled { mesh, views, n_points } = sampled;
+    let positions = Sampling::Random.sample(mesh, *n_points, 1);
+    let points = scenes::prepared(PointCloud::from_positions(positions), preparation, kind);
     let begin = Instant::now();
     let flat = FlatCloud::new(&points, &NoProgress).unwrap();
     let build_ms = 1000.0 * begin.elapsed().as_secs_f64();
@@ -97,9 +123,9 @@ fn compare(
     }
     let (tree, points) = flat.bytes();
     KindFigures {
-        deviation: views.compare(&hits, mean_spacing(mesh, n_points)),
+        deviation: views.compare(&hits, mean_spacing(mesh, *n_points)),
         trace_ms,
         build_ms,
-        bytes_per_point: (tree + points) as f64 / n_points as f64,
+        bytes_per_point: (tree + points) as f64 / *n_points as f64,
     }
 }

@@ -1,7 +1,7 @@
 //! The tables and figures of C. Wiesmeier, Ray Tracing Point Clouds (2011), repeated: the figures of docs/thesis.md.
 //!
-//! `cargo bench -p surfel-tests --bench thesis -- WORDS`: the words `table1`, `table2`, `kinds`, `edges` and `figures`
-//! select parts, without any all are made. The standard output has the tables as the document shows them, the standard
+//! `cargo bench -p surfel-tests --bench thesis -- WORDS`: the words `table1`, `table2`, `kinds`, `further`, `counts`,
+//! `edges` and `figures` select parts, without any all are made; `counts` needs `--features counts`, which slows the others. The standard output has the tables as the document shows them, the standard
 //! error what is skipped. `--pictures FOLDER` writes the figures and a picture of each kind.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a benchmark prints its tables")]
 
@@ -10,6 +10,8 @@ mod timing;
 mod tables;
 mod edges;
 mod kinds;
+mod further;
+mod counts;
 mod figures;
 
 use std::path::PathBuf;
@@ -32,6 +34,12 @@ fn main() {
     }
     if is_wanted("kinds") {
         kinds::print_kinds(folder.as_deref());
+    }
+    if is_wanted("further") {
+        further::print_further_work();
+    }
+    if is_wanted("counts") {
+        counts::print_counts();
     }
     if is_wanted("edges") {
         edges::print_edges();

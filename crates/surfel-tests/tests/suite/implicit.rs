@@ -87,20 +87,20 @@ fn a_cube_is_flat_and_closed_whatever_the_signs_of_its_normals() {
 }
 
 /// Two sheets that face up, `gap` apart, of points with spacing 0.04.
-fn sheets(gap: f32) -> FlatCloud {
+pub fn sheets(gap: f32, kind: SurfaceKind) -> CloudGeometry {
     let mut cloud = clouds::plane(50, 0.3, 6);
     let below = cloud.positions.clone();
     cloud.positions.extend(below.iter().map(|position| *position - gap * Vec3::Z));
     let n = cloud.positions.len();
     cloud.normals = Some(vec![Vec3::Z; n]);
     cloud.radii = Some(vec![0.08; n]);
-    FlatCloud::new(&scenes::points(cloud, KIND), &NoProgress).unwrap()
+    scenes::points(cloud, kind)
 }
 
 #[test]
 fn sheets_closer_than_the_reach_of_their_points_stay_apart() {
     // The reach is 0.096.
-    let flat = sheets(0.07);
+    let flat = FlatCloud::new(&sheets(0.07, KIND), &NoProgress).unwrap();
     let rays = rays_from_above(0.9, 60);
     let upper = hits(&flat, &rays);
     for hit in &upper {

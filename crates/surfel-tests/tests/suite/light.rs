@@ -36,6 +36,30 @@ const FURNACE: Sky =
     Sky { up: Vec3::Z, zenith: Vec3::ONE, ground: Vec3::ONE, ao_distance: f32::INFINITY };
 
 #[test]
+fn pixels_are_lit_by_the_normals_of_points_that_have_some() {
+    let direction = Vec3::new(0.0, 0.6, 0.8);
+    let sun = Light::Sun(Sun { direction, color: Vec3::ONE, angular_diameter_deg: 0.0 });
+    let brightness = |has_normals: bool, light: &Light| {
+        let mut points = scenes::points(clouds::plane(120, 0.0, 1), SurfaceKind::Points);
+        if !has_normals {
+            points = scenes::changed(&points, |cloud| cloud.normals = None);
+        }
+        let (lights, camera) = (vec![light.clone()], scenes::from_above(1.0));
+        let scene = Scene { lights, camera, ..scenes::lit(points) };
+        let image = render(&scene, &Settings { point_size: 3.0, ..SETTINGS });
+        let sum: f32 = image.color.iter().map(|color| color[0]).sum();
+        sum / image.coverage.iter().sum::<f32>()
+    };
+    let headlight = Light::Headlight(1.0);
+    let ratio = brightness(true, &sun) / brightness(true, &headlight);
+    assert!((ratio - 0.8).abs() < 0.01, "{ratio}");
+    // Eye-dome lighting depends on no light, and leaves a plane seen from above as it is.
+    let eye_dome = brightness(false, &sun);
+    assert_eq!(eye_dome, brightness(false, &headlight));
+    assert!((eye_dome / brightness(true, &headlight) - 1.0).abs() < 0.01, "{eye_dome}");
+}
+
+#[test]
 fn a_white_sphere_in_a_furnace_is_white() {
     let kinds = [SurfaceKind::Sphere, SurfaceKind::Disc, SurfaceKind::Splat, SurfaceKind::SplatFit];
     check_furnace(&backends::cpu(), &kinds);

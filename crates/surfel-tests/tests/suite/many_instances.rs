@@ -176,7 +176,6 @@ fn overlapping(kind: SurfaceKind) -> Graph {
 #[test]
 fn overlapping_instances_are_hit_like_separate_ones() {
     let rays = scenes::random_rays(1500, 1.2, 75);
-    // In kd-trees and octrees packets are rounded differently from single rays, which here have to be alike.
     for kind in [
         SurfaceKind::Sphere,
         SurfaceKind::Disc,
@@ -186,6 +185,9 @@ fn overlapping_instances_are_hit_like_separate_ones() {
         SurfaceKind::Cylinder,
         SurfaceKind::Mls,
         SurfaceKind::Smooth,
+        SurfaceKind::Implicit,
+        SurfaceKind::Octree,
+        SurfaceKind::OctreeSplat,
     ] {
         let scene = flat(overlapping(kind));
         let n_hits = check_against_brute_force(kind.name(), &scene, &rays);

@@ -5,7 +5,7 @@ use crate::brute_force::{all_hits, within_limit};
 use crate::rays::{hits, rays_from_above};
 use surfel_core::flat::FlatCloud;
 use surfel_core::math::{Ray, Vec3};
-use surfel_core::points::PointCloud;
+use surfel_core::points::{PointCloud, Preparation, StructureChoice};
 use surfel_core::progress::NoProgress;
 use surfel_core::surface::{EdgeTest, SurfaceKind, SurfaceOptions};
 use surfel_core::trace::{Hit, Simd, Splat, SurfaceHit, occlusions, splats, surface_hits};
@@ -13,6 +13,9 @@ use surfel_tests::clouds;
 use surfel_tests::scenes;
 
 const KINDS: [SurfaceKind; 2] = [SurfaceKind::Cylinder, SurfaceKind::Mls];
+/// The kinds whose surface is the zeros of a field, with structures of their own.
+const FIELD_KINDS: [SurfaceKind; 3] =
+    [SurfaceKind::Implicit, SurfaceKind::Octree, SurfaceKind::OctreeSplat];
 
 /// Returns a cloud with these options.
 fn flat_with(cloud: PointCloud, kind: SurfaceKind, options: SurfaceOptions) -> FlatCloud {
@@ -129,7 +132,7 @@ fn moebius_strip() -> PointCloud {
 
 #[test]
 fn a_moebius_strip_has_no_seam() {
-    for kind in KINDS {
+    for kind in KINDS.into_iter().chain(FIELD_KINDS) {
         let flat = scenes::flat(unoriented(moebius_strip()), kind);
         for i in 0..2000 {
             let angle = std::f32::consts::TAU * i as f32 / 2000.0;
@@ -258,6 +261,45 @@ fn the_order_of_rays_does_not_change_their_hits() {
                 surface_hits(&flat, simd, &[*ray], &mut alone);
                 assert_eq!(alone[0], together[i], "{kind:?} {} {i}", simd.name());
             }
+        }
+    }
+}
+
+/// Returns splats whose planes are fitted to points without normals.
+fn splats_without_normals(cloud: PointCloud) -> FlatCloud {
+    let (structure, estimates_normals) = (StructureChoice::Surface, false);
+    let preparation = Preparation { structure, estimates_normals, ..Preparation::default() };
+    let cloud = PointCloud { normals: None, ..cloud };
+    let points = scenes::prepared(cloud, &preparation, SurfaceKind::SplatFit);
+    assert!(points.cloud().normals.is_none());
+    FlatCloud::new(&points, &NoProgress).unwrap()
+}
+
+#[test]
+fn planes_are_fitted_to_points_without_normals() {
+    let plane = splats_without_normals(clouds::plane(50, 0.3, 4));
+    for hit in hits(&plane, &rays_from_above(0.95, 60)) {
+        assert!((hit.distance - 5.0).abs() < 1e-4 && 0.9999 < hit.normal.z, "{hit:?}");
+    }
+    let beyond = rays_from_above(1.2, 120).into_iter();
+    let beyond: Vec<Ray> =
+        beyond.filter(|ray| 1.0 < ray.origin.truncate().abs().max_element()).collect();
+    assert!(hits(&plane, &beyond).iter().all(SurfaceHit::is_miss));
+}
+
+#[test]
+fn rays_find_points_without_normals_alone_and_in_packets() {
+    let rays = [scenes::random_rays(1500, 1.4, 8), rays_from_above(1.1, 40)].concat();
+    let flat = splats_without_normals(clouds::cube(30, 0.4, 11));
+    let (together, mut occluded) = (hits(&flat, &rays), vec![false; rays.len()]);
+    occlusions(&flat, Simd::detect(), &rays, &mut occluded);
+    assert!(together.iter().zip(&occluded).all(|(hit, occluded)| hit.is_miss() != *occluded));
+    assert!(500 < occluded.iter().filter(|occluded| **occluded).count());
+    for simd in Simd::available() {
+        for (ray, found) in rays.iter().zip(&together).step_by(7) {
+            let mut alone = [SurfaceHit::MISS];
+            surface_hits(&flat, simd, &[*ray], &mut alone);
+            assert_eq!(alone[0], *found, "{} {ray:?}", simd.name());
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Octrees whose cells hold the surface: known answers, depths, and clouds that are hard on them.
 
 use crate::bad_clouds;
+use crate::implicit::sheets;
 use crate::rays::{hits, rays_from_above};
 use surfel_core::flat::{FlatCloud, Octree, OctreeOptions};
 use surfel_core::math::{Ray, Vec3};
@@ -71,6 +72,27 @@ fn a_cube_is_flat_and_closed() {
         let rays: Vec<Ray> = rays.filter(is_through).collect();
         let n_misses = hits(&flat, &rays).iter().filter(|hit| hit.is_miss()).count();
         assert!(5 * n_misses <= rays.len() / 1000, "{kind:?}: {n_misses} of {}", rays.len());
+    }
+}
+
+#[test]
+fn sheets_are_apart_beyond_the_reach_of_their_points_and_merge_below() {
+    // The reach is 0.096, and cells are 0.04 wide: between sheets that are closer, one cell has the field of both.
+    for (kind, gap) in KINDS.into_iter().flat_map(|kind| [(kind, 0.16), (kind, 0.07)]) {
+        let flat = FlatCloud::new(&sheets(gap, kind), &NoProgress).unwrap();
+        let rays = rays_from_above(0.85, 60);
+        let upper = hits(&flat, &rays);
+        if gap < 0.096 {
+            let is_between = |hit: &SurfaceHit| (4.98..5.02 + gap).contains(&hit.distance);
+            assert!(upper.iter().all(is_between), "{kind:?}");
+            continue;
+        }
+        assert!(upper.iter().all(|hit| (hit.distance - 5.0).abs() < 1e-3), "{kind:?}");
+        let behind = |(ray, hit): (&Ray, &SurfaceHit)| Ray { t_min: hit.distance + 0.05, ..*ray };
+        let behind: Vec<Ray> = rays.iter().zip(&upper).map(behind).collect();
+        for hit in hits(&flat, &behind) {
+            assert!((hit.distance - 5.0 - gap).abs() < 1e-3, "{kind:?} {hit:?}");
+        }
     }
 }
 

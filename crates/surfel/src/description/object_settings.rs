@@ -108,8 +108,9 @@ settings! {
         /// these four that the file tells enough for. Where front sides are known, the back of a surface does not show
         /// through slits between the points [default: auto for surfel prepare and the colour normal, else station].
         orient: Orientation, parsed(orientation_text), "RULE";
-        /// Radius of each point's surface: a length, adaptive[:K] (the distance to the K-th neighbour) or median[:N[,C]]
-        /// (the median distance of C points, 100, to their 2N nearest) [default: that of the file, or adaptive:12].
+        /// Radius of each point's surface: a length, adaptive[:K] (the distance to the K-th neighbour), curvature[:K]
+        /// (less where the surface bends) or median[:N[,C]] (the median distance of C points, 100, to their 2N nearest)
+        /// [default: that of the file, or adaptive:12].
         radius: Radius, RadiusRule, "RADIUS", common;
         /// Shape of each point by its neighbours: auto tells surfaces, lines (wires, poles) and scattered points
         /// (leaves) apart; surface and scatter take all points for one.
@@ -197,15 +198,42 @@ impl ObjectSettings {
             denoise: settings.denoise.unwrap_or(default.denoise),
             neighbors: settings.neighbors(),
             normals: within.or(nearest).unwrap_or(default.normals),
+            estimates_normals: self.needs_normals(),
             orientation: self.orientation(),
             radii_from_normals: settings.radius.is_none(),
             radius: settings.radius.unwrap_or(default.radius),
-            structure: settings.structure(),
+            structure: if self.needs_structures() {
+                settings.structure()
+            } else {
+                StructureChoice::Surface
+            },
             free_space: settings.free_space(),
             // A colour may ask for a column that only the preparation computes.
             keep_variation: matches!(&self.color.color, Some(ColorSource::Column(name)) if name == SURFACE_VARIATION),
             seed,
         }
+    }
+
+    /// Returns true if normals are estimated where the file has none: the surface, its colours or the settings need them.
+    pub fn needs_normals(&self) -> bool {
+        let settings = &self.preparation;
+        let is_oriented = settings.orient.is_some_and(|rule| rule != Orientation::None);
+        let is_bent = matches!(settings.radius, Some(Radius::Curvature { .. }));
+        let is_chosen = settings.estimates_normals() || is_oriented || is_bent;
+        let is_shown = matches!(self.color.color, Some(ColorSource::Normal | ColorSource::Support));
+        self.needs_structures() || is_chosen || is_shown
+    }
+
+    /// Returns true if points may be lines and scatter. Spheres and pixels are what they are, and the planes of `SplatFit`
+    /// are fitted to the points around a hit: these need no normals, which the directions of lines are.
+    fn needs_structures(&self) -> bool {
+        use SurfaceKind::{Points, Sphere, SplatFit};
+        let is_structure = |name: &str| name == STRUCTURE;
+        let is_shown =
+            matches!(&self.color.color, Some(ColorSource::Column(name)) if is_structure(name));
+        let is_chosen = self.preparation.structure.is_some_and(|of| of != StructureChoice::Surface);
+        let has_planes = !matches!(self.surface.surface(), Points | Sphere | SplatFit);
+        has_planes || is_chosen || is_shown
     }
 
     /// Returns the columns that only the preparation needs: what the scanner tells of each point.
@@ -429,6 +457,7 @@ fn radius_text(radius: &Radius) -> String {
         Radius::Median { n, samples: DEFAULT_RADIUS_SAMPLES } => format!("median:{n}"),
         Radius::Median { n, samples } => format!("median:{n},{samples}"),
         Radius::Adaptive { k } => format!("adaptive:{k}"),
+        Radius::Curvature { k } => format!("curvature:{k}"),
     }
 }
 

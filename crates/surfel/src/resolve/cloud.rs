@@ -182,7 +182,7 @@ pub fn prepare_cloud(
 ) -> surfel_core::Result<PreparedCloud> {
     let (cloud, report) = prepare(cloud, &settings.preparation(seed), progress)?;
     progress.end();
-    report_prepared(&report, settings, progress);
+    report_prepared(&report, cloud.normals.is_some(), settings, progress);
     Ok(cloud)
 }
 
@@ -215,7 +215,8 @@ pub fn apply_surface_and_color(
     geometry.octree_depth = settings.surface.octree_depth();
     geometry.has_outward_normals = settings.preparation.orients_outward();
     let has_stations = geometry.cloud().has_stations();
-    geometry.has_front_sides = settings.preparation.knows_front_sides(has_stations);
+    let has_normals = geometry.cloud().normals.is_some();
+    geometry.has_front_sides = has_normals && settings.preparation.knows_front_sides(has_stations);
     Ok(geometry)
 }
 
@@ -253,15 +254,20 @@ fn gaussian_geometry(
     Ok(geometry)
 }
 
-/// Reports where normals and radii come from.
+/// Reports where normals and radii come from, of a cloud that has normals or none.
 pub fn report_prepared(
     report: &PreparationReport,
+    has_normals: bool,
     settings: &ObjectSettings,
     progress: &dyn Progress,
 ) {
     report_denoise(report, progress);
     if report.normals.is_none() {
-        progress.choice("normals as in the file", &["normals_k"]);
+        let line = match has_normals {
+            true => "normals as in the file",
+            false => "no normals: the surface needs none",
+        };
+        progress.choice(line, &["normals_k"]);
     }
     report_normals(report, progress);
     if report.radii.is_none() {

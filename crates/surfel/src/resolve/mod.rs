@@ -161,10 +161,12 @@ impl AutoSettings {
         };
         let is_inside = room.is_some_and(|room| room.contains(camera.camera.position));
         let scan = station.map(|station| ScanInView { points: &points, station });
-        let context = LightingContext { camera: camera.camera, up, diagonal, is_inside, scan };
+        let has_normals = scene.has_normals(description);
+        let context =
+            LightingContext { camera: camera.camera, up, diagonal, is_inside, has_normals, scan };
         let mut description = choose_lights(description, &context, progress);
         choose_point_size(scene, &mut description, &points, &camera.camera, progress);
-        let lights = lights(&description, scene.environment.as_ref(), up)?;
+        let lights = lights(&description, scene.environment.as_ref(), up, has_normals)?;
         Ok(Self { up, camera, lights, hidden_walls, turned_room, description })
     }
 

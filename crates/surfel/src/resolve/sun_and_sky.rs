@@ -40,6 +40,8 @@ pub struct LightingContext<'a> {
     pub diagonal: f32,
     /// True if the camera stands in a closed room, which neither sun nor sky lights.
     pub is_inside: bool,
+    /// True if points have normals of their own.
+    pub has_normals: bool,
     /// The scan that is shown from its station.
     pub scan: Option<ScanInView<'a>>,
 }
@@ -59,7 +61,7 @@ pub fn choose_lights(
     context: &LightingContext,
     progress: &dyn Progress,
 ) -> SceneDescription {
-    let is_lit = is_lit(description);
+    let is_lit = is_lit(description, context.has_normals);
     let mut chosen = description.clone();
     let SceneDescription { light, sun, sky, .. } = &mut chosen;
     if is_lit && context.is_inside && light.light.is_none() && light.environment.is_none() {
@@ -101,20 +103,22 @@ fn is_sun_hidden(context: &LightingContext) -> bool {
     sunlit_fraction(&points.positions, position, ahead, to_sun, context.up) < MIN_SUNLIT
 }
 
-/// Points as pixels are shaded by their depth alone.
-fn is_lit(description: &SceneDescription) -> bool {
-    description.objects_default.surface.surface() != SurfaceKind::Points
+/// Points as pixels are shaded by their depth alone, unless they have normals.
+fn is_lit(description: &SceneDescription, has_normals: bool) -> bool {
+    has_normals || description.objects_default.surface.surface() != SurfaceKind::Points
 }
 
-/// Returns the lights of the whole scene by a description whose lights are chosen.
+/// Returns the lights of the whole scene by a description whose lights are chosen. `has_normals` is true if points have
+/// normals, by which they are lit.
 pub fn lights(
     chosen: &SceneDescription,
     environment: Option<&Environment>,
     up: Vec3,
+    has_normals: bool,
 ) -> Result<Vec<Light>> {
     let settings = &chosen.light;
     let mut lights = Vec::new();
-    if !is_lit(chosen) {
+    if !is_lit(chosen, has_normals) {
         return Ok(lights);
     }
     if let Some(environment) = environment.filter(|_| settings.environment.is_some()) {
@@ -228,7 +232,14 @@ mod tests {
             view_up: DVec3::new(0.0, 0.1, 1.0),
             projection: Projection::Perspective { view_angle_deg: 35.0 },
         };
-        LightingContext { camera, up: Vec3::Z, diagonal: 1.0, is_inside: false, scan: None }
+        LightingContext {
+            camera,
+            up: Vec3::Z,
+            diagonal: 1.0,
+            is_inside: false,
+            has_normals: false,
+            scan: None,
+        }
     }
 
     #[test]

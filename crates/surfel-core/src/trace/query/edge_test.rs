@@ -8,6 +8,7 @@ use crate::math::{
 use crate::surface::{
     CandidateHit, CandidateHitLanes, EdgeTestResult, NEIGHBORHOOD_RADIUS_FACTOR, NeighborhoodStats,
 };
+use crate::trace::counts::{Counted, count};
 use crate::trace::query::packet_disc_hits::PacketDiscHit;
 use crate::trace::traversal::region::{BoxVisitor, query_box};
 use std::marker::PhantomData;
@@ -83,6 +84,7 @@ impl<L: Lanes, const BACKFACES: bool> BoxVisitor for SingleHitVisitor<L, BACKFAC
         let points = points.blocks[block_idx as usize].points::<L>(self.position);
         let is_near = self.stats.is_neighbor(points.center) & L::splat(0.0).lt(points.radius);
         if is_near.bits() != 0 {
+            count(Counted::EdgePoints, LANES);
             self.stats.add(points.center, points.normal, is_near);
         }
     }
@@ -104,28 +106,28 @@ pub struct PacketCandidates<W> {
 /// Returns those `lanes` whose hits are enclosed already by the points in the blocks of the discs that their
 /// rays hit. On even surfaces they are most. `discs` are sorted by slot.
 #[inline(always)]
-pub fn enclosed_by_blocks<L: Lanes>(
+pub fn enclosed_by_blocks<L: Lanes, const BACKFACES: bool>(
     points: &FlatPoints,
     discs: &[PacketDiscHit],
     lanes: u32,
     hits: &PacketCandidates<L::PacketLanes>,
 ) -> u32 {
-    lanes & L::dispatch(EvaluateByBlocks::<L> { points, discs, hits })
+    lanes & L::dispatch(EvaluateByBlocks::<L, BACKFACES> { points, discs, hits })
 }
 
-struct EvaluateByBlocks<'p, L: Lanes> {
+struct EvaluateByBlocks<'p, L: Lanes, const BACKFACES: bool> {
     points: &'p FlatPoints,
     discs: &'p [PacketDiscHit],
     hits: &'p PacketCandidates<L::PacketLanes>,
 }
 
-impl<L: Lanes> SimdTask for EvaluateByBlocks<'_, L> {
+impl<L: Lanes, const BACKFACES: bool> SimdTask for EvaluateByBlocks<'_, L, BACKFACES> {
     type Output = u32;
 
     #[inline(always)]
     fn run(self) -> u32 {
         let Self { points, discs, hits } = self;
-        let mut found = NeighborhoodStats::<_, true>::new(hits.candidates());
+        let mut found = NeighborhoodStats::<_, BACKFACES>::new(hits.candidates());
         let block_of = |i: usize| discs[i].slot / LANES as u32;
         let mut first = 0;
         while first < discs.len() {
@@ -138,7 +140,7 @@ impl<L: Lanes> SimdTask for EvaluateByBlocks<'_, L> {
             }
             let block = &points.blocks[block_idx as usize];
             let all = L::splat(0.0).lt(block.radii()).bits();
-            add_block::<L, _>(block, all, &hits.position, lanes, &mut found);
+            add_block::<L, BACKFACES>(block, all, &hits.position, lanes, &mut found);
         }
         let EdgeTestResult { enclosed, sparse } = found.evaluate();
         enclosed & !sparse
@@ -225,6 +227,7 @@ fn add_block<L: Lanes, const BACKFACES: bool>(
         let offset = corner.plus(Vec3Lanes::splat_lane(&offsets, lane));
         let is_near = lanes & found.is_neighbor(offset);
         if is_near.bits() != 0 {
+            count(Counted::EdgePoints, PACKET_WIDTH);
             found.add(offset, Vec3Lanes::splat_lane(&normals, lane), is_near);
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::flat::{FlatCloud, FlatPoints};
 use crate::math::{Floats, LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Ray};
-use crate::surface::{Disc, MAX_GATHERED, gather_limit};
+use crate::surface::{Disc, MAX_GATHERED, Shape, gather_limit};
 use crate::trace::query::hit::{Gather, Hit};
 use crate::trace::query::leaf::{LeafGeometry, PacketBlock};
 use crate::trace::query::packet_disc_hits::{PacketDiscHit, cull_and_sort};
@@ -11,6 +11,7 @@ use crate::trace::traversal::batch::{RayQuery, trace_batch};
 use crate::trace::traversal::interleaved::{RayPool, RayVisitor};
 use crate::trace::traversal::packet::{Packet, PacketVisitor};
 use crate::trace::traversal::stack::PacketStack;
+use std::marker::PhantomData;
 use std::ops::ControlFlow;
 
 /// Gathers the nearest discs on each ray, all within a radius of each other. Points count as discs, whatever
@@ -26,7 +27,8 @@ pub fn gathers(cloud: &FlatCloud, simd: Simd, rays: &[Ray], gathers: &mut [Gathe
 fn gathers_kernel<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], gathers: &mut [Gather]) {
     let (mut stack, mut pool) = (PacketStack::new(), RayPool::default());
     let mut discs = PacketDiscs::new();
-    let mut query = GatherQuery { discs: &mut discs, consumer: &mut CollectGathers };
+    let mut collect = CollectGathers;
+    let mut query = GatherQuery::<_, Disc>::new(&mut discs, &mut collect);
     trace_batch::<L, _>(&mut stack, &mut pool, &mut query, &cloud.points, rays, gathers);
 }
 
@@ -116,41 +118,50 @@ fn gather_of_lane(hits: &[PacketDiscHit], lane: usize) -> Gather {
     gather
 }
 
-/// The query for the discs of each ray, which `consumer` receives packet by packet.
-pub struct GatherQuery<'q, C> {
+/// The query for the discs, or other shapes of points, of each ray. A consumer receives them packet by packet.
+pub struct GatherQuery<'q, C, S> {
     /// The discs of the current packet.
-    pub discs: &'q mut PacketDiscs,
-    /// The receiver.
-    pub consumer: &'q mut C,
+    discs: &'q mut PacketDiscs,
+    consumer: &'q mut C,
+    shape: PhantomData<S>,
 }
 
-impl<L: Lanes, C: DiscConsumer> RayQuery<L> for GatherQuery<'_, C> {
+impl<'q, C, S> GatherQuery<'q, C, S> {
+    /// Returns a query that reuses the memory of `discs`.
+    pub fn new(discs: &'q mut PacketDiscs, consumer: &'q mut C) -> Self {
+        Self { discs, consumer, shape: PhantomData }
+    }
+}
+
+impl<L: Lanes, C: DiscConsumer, S: Shape> RayQuery<L> for GatherQuery<'_, C, S> {
     type Tree = FlatPoints;
     type Result = C::Result;
-    type RayVisitor<'r> = GatherRayVisitor<'r>;
-    type PacketVisitor<'p> = GatherPacketVisitor<'p, L>;
+    type RayVisitor<'r> = GatherRayVisitor<'r, S>;
+    type PacketVisitor<'p> = GatherPacketVisitor<'p, L, S>;
     const CONVERGES_AT_END: bool = false;
     const IS_PACKETWISE: bool = true;
 
     #[inline(always)]
-    fn ray_visitor<'r>(&mut self, ray: &'r Ray) -> GatherRayVisitor<'r> {
+    fn ray_visitor<'r>(&mut self, ray: &'r Ray) -> GatherRayVisitor<'r, S> {
         let all = (MAX_GATHERED < self.consumer.max_discs()).then(Vec::new);
         let length = self.consumer.length();
-        GatherRayVisitor { ray, gather: Gather::EMPTY, all, length, limit: ray.t_max }
+        let (gather, shape) = (Gather::EMPTY, PhantomData);
+        GatherRayVisitor { ray, gather, all, length, limit: ray.t_max, shape }
     }
 
     #[inline(always)]
     fn packet_visitor<'p>(
         &mut self,
         packet: &'p Packet<'p, L::PacketLanes>,
-    ) -> GatherPacketVisitor<'p, L> {
+    ) -> GatherPacketVisitor<'p, L, S> {
         let hits = std::mem::take(&mut self.discs.hits);
         let length = self.consumer.length();
-        GatherPacketVisitor { packet, length, limits: packet.initial_limits(), hits }
+        let limits = packet.initial_limits();
+        GatherPacketVisitor { packet, length, limits, hits, shape: PhantomData }
     }
 
     #[inline(always)]
-    fn ray_results(&mut self, visitors: &[GatherRayVisitor], _results: &mut [C::Result]) {
+    fn ray_results(&mut self, visitors: &[GatherRayVisitor<S>], _results: &mut [C::Result]) {
         for (lane, visitor) in visitors.iter().enumerate() {
             let all = visitor.all.as_deref();
             let hits = all.unwrap_or(visitor.gather.hits()).iter();
@@ -162,7 +173,11 @@ impl<L: Lanes, C: DiscConsumer> RayQuery<L> for GatherQuery<'_, C> {
     }
 
     #[inline(always)]
-    fn packet_results(&mut self, visitor: &mut GatherPacketVisitor<L>, _results: &mut [C::Result]) {
+    fn packet_results(
+        &mut self,
+        visitor: &mut GatherPacketVisitor<L, S>,
+        _results: &mut [C::Result],
+    ) {
         self.discs.hits = std::mem::take(&mut visitor.hits);
         self.discs.limits = visitor.limits;
     }
@@ -175,8 +190,9 @@ impl<L: Lanes, C: DiscConsumer> RayQuery<L> for GatherQuery<'_, C> {
 }
 
 /// The search for the discs that a ray hits.
-pub struct GatherRayVisitor<'r> {
+pub struct GatherRayVisitor<'r, S> {
     ray: &'r Ray,
+    shape: PhantomData<S>,
     gather: Gather,
     /// All discs, if more than a `Gather` holds are wanted; `gather` is then empty.
     all: Option<Vec<Hit>>,
@@ -184,7 +200,7 @@ pub struct GatherRayVisitor<'r> {
     limit: f32,
 }
 
-impl RayVisitor for GatherRayVisitor<'_> {
+impl<S: Shape> RayVisitor for GatherRayVisitor<'_, S> {
     type Tree = FlatPoints;
     const IS_ORDERED: bool = true;
 
@@ -200,8 +216,8 @@ impl RayVisitor for GatherRayVisitor<'_> {
 
     #[inline(always)]
     fn visit<L: Lanes>(&mut self, points: &FlatPoints, block_idx: u32) -> ControlFlow<()> {
-        let block = Disc::decode_relative_to::<L>(points, block_idx, self.ray.origin);
-        for (hit, radius) in Disc::block_hits(&block, block_idx, self.ray).up_to(self.limit()) {
+        let block = S::decode_relative_to::<L>(points, block_idx, self.ray.origin);
+        for (hit, radius) in S::block_hits(&block, block_idx, self.ray).up_to(self.limit()) {
             if hit.distance <= self.limit {
                 let length = self.length.unwrap_or(radius);
                 self.limit = self.limit.min(gather_limit(hit.distance, length));
@@ -219,14 +235,15 @@ impl RayVisitor for GatherRayVisitor<'_> {
 
 /// The search for the discs that the rays of a packet hit. Which of them each ray keeps is known only at the
 /// end.
-pub struct GatherPacketVisitor<'p, L: Lanes> {
+pub struct GatherPacketVisitor<'p, L: Lanes, S> {
     packet: &'p Packet<'p, L::PacketLanes>,
     length: Option<f32>,
     limits: [f32; PACKET_WIDTH],
     hits: Vec<PacketDiscHit>,
+    shape: PhantomData<S>,
 }
 
-impl<L: Lanes> PacketVisitor<L> for GatherPacketVisitor<'_, L> {
+impl<L: Lanes, S: Shape> PacketVisitor<L> for GatherPacketVisitor<'_, L, S> {
     type Tree = FlatPoints;
     const IS_ORDERED: bool = true;
     const SPARSE_THRESHOLD: f32 = 0.0;
@@ -238,7 +255,7 @@ impl<L: Lanes> PacketVisitor<L> for GatherPacketVisitor<'_, L> {
 
     #[inline(always)]
     fn visit(&mut self, points: &FlatPoints, block_idx: u32) {
-        let block = Disc::packet_block::<L>(points, block_idx, self.packet);
+        let block = S::packet_block::<L>(points, block_idx, self.packet);
         let rays = self.packet.lanes.lanes();
         let mut limits = L::PacketLanes::load(&self.limits);
         let mut end = self.hits.len();
@@ -265,8 +282,8 @@ impl<L: Lanes> PacketVisitor<L> for GatherPacketVisitor<'_, L> {
     #[inline(always)]
     fn visit_single(&mut self, points: &FlatPoints, block_idx: u32, lane: usize) {
         let ray = &self.packet.rays[lane];
-        let block = Disc::decode_relative_to::<L>(points, block_idx, ray.origin);
-        for (hit, radius) in Disc::block_hits(&block, block_idx, ray).up_to(self.limits[lane]) {
+        let block = S::decode_relative_to::<L>(points, block_idx, ray.origin);
+        for (hit, radius) in S::block_hits(&block, block_idx, ray).up_to(self.limits[lane]) {
             let length = self.length.unwrap_or(radius);
             self.limits[lane] = self.limits[lane].min(gather_limit(hit.distance, length));
             self.hits.push(PacketDiscHit::single(lane, hit));

@@ -3,12 +3,14 @@
 
 use crate::flat::{BlockTree, FlatPoints, FlatTriangles, PointBlock, Slot};
 use crate::math::{
-    Floats, LANES, LaneMask, Lanes, PacketLanes, Ray, SetBits, Vec3, Vec3Lanes, set_bits,
+    Floats, LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Ray, SetBits, Vec3, Vec3Lanes,
+    set_bits,
 };
 use crate::surface::triangle::StoredVec3Lanes;
 use crate::surface::{
     PointLanes, RayFrame, RayLanes, RayRelativeTriangles, Shape, Triangle, TriangleLanes,
 };
+use crate::trace::counts::{Counted, count};
 use crate::trace::query::hit::{Hit, NearestHits};
 use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::traversal::packet::Packet;
@@ -170,6 +172,7 @@ impl<S: Shape> LeafGeometry for S {
 
     #[inline(always)]
     fn block_hits<L: Lanes>(block: &PointLanes<L>, block_idx: u32, ray: &Ray) -> BlockHits<L> {
+        count(Counted::Shapes, LANES);
         let (distances, is_hit) = S::intersect(block, &RayLanes::new(ray));
         BlockHits { first_slot: block_idx * LANES as u32, distances, radii: block.radius, is_hit }
     }
@@ -231,6 +234,7 @@ impl<L: Lanes, S: Shape> PacketBlock<L> for PacketPoints<L, S> {
             normal: Vec3Lanes::splat_lane(&self.normal, lane),
             radius: L::PacketLanes::splat(self.radius[lane]),
         };
+        count(Counted::Shapes, PACKET_WIDTH);
         S::intersect(&point, rays)
     }
 }

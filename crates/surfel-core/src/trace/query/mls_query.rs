@@ -8,6 +8,7 @@ use crate::math::{
 };
 use crate::surface::mls::{self, PlaneLanes, PlaneSums, PolynomialSums, StepLanes, weight};
 use crate::surface::{CandidateHitLanes, EdgeTest, EdgeTestResult, NeighborhoodStats};
+use crate::trace::counts::{Counted, count};
 use crate::trace::query::edge_test::{PacketCandidates, enclosed_lanes, lane_mask};
 use crate::trace::query::hit::NearestHits;
 use crate::trace::query::point_lists::PointLists;
@@ -203,6 +204,7 @@ fn fit_planes<W: PacketLanes>(
     shift: Vec3Lanes<W>,
     direction: Vec3Lanes<W>,
 ) -> PlaneLanes<W> {
+    count(Counted::Terms, PACKET_WIDTH * lists.rows().len());
     let mut sums = PlaneSums::default();
     for row in lists.rows() {
         let offset = row.offset().minus(shift);
@@ -220,6 +222,7 @@ fn fit_polynomials<W: PacketLanes, const N: usize>(
     normals: Vec3Lanes<W>,
     direction: Vec3Lanes<W>,
 ) -> (StepLanes<W>, W::Mask) {
+    count(Counted::Terms, PACKET_WIDTH * lists.rows().len());
     let mut sums = PolynomialSums::<W, N>::new(normals, mls::SUPPORT_FACTOR);
     for row in lists.rows() {
         let offset = row.offset().minus(shift);

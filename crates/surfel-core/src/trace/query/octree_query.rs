@@ -6,6 +6,7 @@ use crate::math::{
     Floats, LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Ray, SimdTask, Vec3, Vec3Lanes,
     finite_inverse, set_bits,
 };
+use crate::trace::counts::{Counted, count};
 use crate::trace::query::hit::Hit;
 use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::traversal::octree_walk::{
@@ -135,6 +136,7 @@ fn trace_packet<L: Lanes, const HAS_CORNERS: bool>(
     let mut limits = packet.t_max;
     walk.start(((1u64 << rays.len()) - 1) as u32, rays[0].direction);
     while let Some((interval, shown)) = walk.next_cell(&lanes, limits) {
+        count(Counted::CellRoots, PACKET_WIDTH);
         let (distances, is_hit) = cell_distances::<_, HAS_CORNERS>(octree, &interval, &lanes);
         let found = shown & is_hit.bits();
         if found == 0 {
@@ -166,6 +168,7 @@ fn trace_ray<L: Lanes, const HAS_CORNERS: bool>(
     let (mut nearest, mut limit) = (None, t_max);
     walk.start(1, direction);
     while let Some(interval) = walk.next_cell_of_ray::<L>(&single, &lanes, limit) {
+        count(Counted::CellRoots, 1);
         let (distance, is_hit) = cell_distances::<f32, HAS_CORNERS>(octree, &interval, &single);
         if is_hit {
             take_nearer(&mut nearest, &interval, distance);

@@ -4,6 +4,7 @@
 use crate::flat::{FieldLeaf, FlatCloud};
 use crate::math::{LANES, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Vec3, Vec3Lanes, set_bits};
 use crate::surface::{FIELD_SUPPORT, FieldSums, field_weight};
+use crate::trace::counts::{Counted, count};
 use crate::trace::query::edge_test::lane_mask;
 use crate::trace::query::ray_field::{
     BRACKET_MARGIN, LINEAR_STEP, N_SAMPLES, ShadedPoint, ShadingSums, signs,
@@ -69,11 +70,10 @@ impl<W: PacketLanes> PacketField<W> {
         segment: (W, W),
     ) -> PacketZeros<W> {
         let brackets = self.collect::<L>(cloud, leaf, rays, lanes, segment);
-        let crossings = self.first_crossings(&brackets);
+        let is_coarse = (W::splat(LINEAR_STEP) * brackets.support).lt(brackets.step);
+        let crossings = self.first_crossings(&brackets, rays, segment.0, is_coarse);
         let distance = segment.0 + crossings.roots;
-        let in_range = (rays.t_min.le(distance) & distance.le(rays.t_max)).bits();
-        let is_linear = brackets.step.le(W::splat(LINEAR_STEP) * brackets.support).bits();
-        let ready = crossings.lanes & in_range & is_linear;
+        let ready = crossings.lanes & !is_coarse.bits();
         let mut sums = ShadingSums::new();
         let mut found = 0;
         if ready != 0 {
@@ -166,8 +166,15 @@ impl<W: PacketLanes> PacketField<W> {
         Brackets { from, step, support, lanes }
     }
 
+    /// Finds the first changes of sign in the rays' ranges, or anywhere on rays whose samples are coarse.
     #[inline(always)]
-    fn first_crossings(&self, brackets: &Brackets<W>) -> Crossings<W> {
+    fn first_crossings(
+        &self,
+        brackets: &Brackets<W>,
+        rays: &PacketRays<W>,
+        start: W,
+        is_coarse: W::Mask,
+    ) -> Crossings<W> {
         let Brackets { from, step, lanes, .. } = *brackets;
         let zero = W::splat(0.0);
         let (mut roots, mut slopes, mut found) = (zero, zero, 0);
@@ -180,8 +187,11 @@ impl<W: PacketLanes> PacketField<W> {
             let high = from + step * W::splat(i as f32);
             let (after, is_valid) = self.value(high);
             let changes = zero.lt(before) & after.le(zero) | before.le(zero) & zero.lt(after);
-            let is_new = lanes & was_valid & is_valid & changes & lane_mask::<W>(!found);
             let root = low + (high - low) * (before / (before - after));
+            let distance = start + root;
+            let in_range = rays.t_min.le(distance) & distance.le(rays.t_max);
+            let counts = lanes & (is_coarse | in_range) & lane_mask::<W>(!found);
+            let is_new = counts & was_valid & is_valid & changes;
             roots = W::select(is_new, root, roots);
             slopes = W::select(is_new, after - before, slopes);
             found |= is_new.bits();
@@ -193,6 +203,7 @@ impl<W: PacketLanes> PacketField<W> {
     /// Returns the field at a place of each ray.
     #[inline(always)]
     fn value(&self, places: W) -> (W, W::Mask) {
+        count(Counted::Terms, PACKET_WIDTH * self.points.len());
         let mut sums = FieldSums::new();
         for point in &self.points {
             let distance = point.squared - places * (point.twice_along - places);

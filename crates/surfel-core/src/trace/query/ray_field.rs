@@ -3,6 +3,7 @@
 use crate::flat::{FieldLeaf, FlatCloud, FlatPoints};
 use crate::math::{Floats, LANES, LaneMask, Lanes, Ray, Vec3, Vec3Lanes, set_bits};
 use crate::surface::{FIELD_SUPPORT, FieldSums, PointLanes, field_weight};
+use crate::trace::counts::{Counted, count};
 use crate::trace::query::hit::{Hit, NearestHits};
 use crate::trace::query::smooth_query::unit;
 
@@ -211,6 +212,7 @@ impl RayField {
         let places = L::splat(from) + L::splat(step) * L::load(&STEPS);
         let mut sums = FieldSums::new();
         let n = self.n_points;
+        count(Counted::Terms, LANES * n);
         let (squared, twice_along) = (&self.squared[..n], &self.twice_along[..n]);
         let (height, slope) = (&self.height[..n], &self.slope[..n]);
         let inverse = &self.inverse_support_squared[..n];

@@ -9,6 +9,7 @@ use crate::surface::{
     CandidateHitLanes, ColorSums, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, NeighborhoodStats,
     OverhangSums, PointSums, SUPPORT_FACTOR, SphereSums,
 };
+use crate::trace::counts::{Counted, count};
 use crate::trace::query::edge_test::{PacketCandidates, enclosed_lanes, lane_mask};
 use crate::trace::query::hit::NearestHits;
 use crate::trace::simd::packet_rays::PacketRays;
@@ -147,6 +148,7 @@ fn approach<W: PacketLanes>(
         let lanes = lane_mask::<W>(open);
         let mut sums = SphereSums::new(hits.normals, radius);
         for block in blocks {
+            count(Counted::Terms, PACKET_WIDTH * block.lanes.count_ones() as usize);
             let corner = block.corner_from(&position);
             for lane in set_bits::<LANES>(block.lanes) {
                 let point = block.point(&corner, lane);

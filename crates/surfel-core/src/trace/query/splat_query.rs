@@ -4,8 +4,9 @@ use crate::flat::FlatCloud;
 use crate::math::{
     Floats, LaneMask, Lanes, PACKET_WIDTH, PacketLanes, Ray, SimdTask, Vec3, Vec3Lanes,
 };
+use crate::surface::mls::Ball;
 use crate::surface::{
-    Blend, CandidateHit, EdgeTest, GatherLimit, MAX_CANDIDATES, MAX_GATHERED, NearestDisc,
+    Blend, CandidateHit, Disc, EdgeTest, GatherLimit, MAX_CANDIDATES, MAX_GATHERED, NearestDisc,
     SplatAccumulator, SurfaceKind, Surfel, gather_limit,
 };
 use crate::trace::query::closest::closest_hits_kernel;
@@ -22,6 +23,9 @@ use crate::trace::traversal::interleaved::RayPool;
 use crate::trace::traversal::stack::PacketStack;
 use std::marker::PhantomData;
 
+/// Distance behind a rejected hit at which the search restarts, in radii.
+pub const RESTART_OFFSET: f32 = 0.05;
+
 /// The blended discs of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Splat {
@@ -33,11 +37,13 @@ pub struct Splat {
     pub n_discs: u32,
     /// Radius of the nearest disc.
     pub radius: f32,
+    /// Distance along the ray at which the search goes on if the discs are rejected.
+    pub(in crate::trace) restart: f32,
     /// Unit normal, facing the ray's origin.
     pub normal: Vec3,
     /// Linear colour.
     pub color: Vec3,
-    /// False where too few points are near the ray: it goes through a hole.
+    /// False where too few points are near the ray, or where it does not cross their plane: it goes on.
     pub(in crate::trace) is_dense: bool,
     /// True if the points around the hit are known to enclose it, which is found out only for the edge test.
     pub(in crate::trace) is_enclosed: bool,
@@ -50,6 +56,7 @@ impl Splat {
         distance: f32::INFINITY,
         n_discs: 0,
         radius: 0.0,
+        restart: f32::INFINITY,
         normal: Vec3::ZERO,
         color: Vec3::ZERO,
         is_dense: false,
@@ -108,8 +115,14 @@ impl<'s> SplatTracer<'s> {
     fn blend<L: Lanes>(&mut self, rays: &[Ray], splats: &mut [Splat]) {
         let Self { stack, pool, discs, blender, .. } = self;
         let cloud = blender.cloud;
-        let mut query = GatherQuery { discs, consumer: blender };
-        trace_batch::<L, _>(stack, pool, &mut query, &cloud.points, rays, splats);
+        let points = &cloud.points;
+        if cloud.fits_balls() {
+            let mut query = GatherQuery::<_, Ball>::new(discs, blender);
+            trace_batch::<L, _>(stack, pool, &mut query, points, rays, splats);
+        } else {
+            let mut query = GatherQuery::<_, Disc>::new(discs, blender);
+            trace_batch::<L, _>(stack, pool, &mut query, points, rays, splats);
+        }
     }
 
     /// Makes a splat of the closest disc alone, in a function of its own.
@@ -136,7 +149,11 @@ impl<'s> SplatTracer<'s> {
         for (open, hits) in open.chunks(PACKET_WIDTH).zip(open_hits.chunks(PACKET_WIDTH)) {
             let lanes = (1 << open.len()) - 1;
             let candidates = PacketCandidates::new(hits);
-            let enclosed = enclosed_lanes::<L, true>(&blender.cloud.points, lanes, &candidates);
+            let points = &blender.cloud.points;
+            let enclosed = match blender.cloud.fits_balls() {
+                true => enclosed_lanes::<L, false>(points, lanes, &candidates),
+                false => enclosed_lanes::<L, true>(points, lanes, &candidates),
+            };
             for (lane, splat_idx) in open.iter().enumerate() {
                 splats[*splat_idx as usize].is_enclosed = enclosed >> lane & 1 == 1;
             }
@@ -260,11 +277,14 @@ impl DiscConsumer for DiscBlender<'_> {
             nearest.drop_beyond_first(&mut discs.hits);
         }
         let (origin, direction) = (rays.origin(), rays.direction());
+        if self.cloud.fits_balls() {
+            nearest.discs.normal = Vec3Lanes::splat(Vec3::ZERO).minus(direction);
+        }
         let mut fitted = FittedDiscs {
-            discs: &self.surfels,
+            discs: &mut self.surfels,
             hits: &mut discs.hits,
             position: origin.plus(direction.scaled(nearest.discs.distance)),
-            radius: nearest.radii,
+            per_radius: L::PacketLanes::splat(1.0) / nearest.radii,
         };
         if self.kind == SurfaceKind::SplatFit {
             fitted.keep_nearest();
@@ -272,15 +292,26 @@ impl DiscConsumer for DiscBlender<'_> {
         }
         let mut accumulator =
             SplatAccumulator::new(self.kind, self.cloud.options.align, &nearest.discs, direction);
-        for (surfel, hit) in fitted.discs.iter().zip(&*fitted.hits) {
+        for (surfel, hit) in fitted.discs.iter().zip(fitted.hits.iter()) {
             let distances = L::PacketLanes::load(&hit.distances);
             let position = origin.plus(direction.scaled(distances));
             let offset = position.minus(Vec3Lanes::splat(surfel.center));
             accumulator.add(surfel, distances, offset, hit.hit_mask::<L::PacketLanes>());
         }
-        let Blend { distance, normal: mut normals, color: colors } = accumulator.finish();
+        let Blend { mut distance, normal: mut normals, color: colors } = accumulator.finish();
+        let mut is_crossed = u32::MAX;
+        let offset = RESTART_OFFSET / self.cloud.radius_factor();
+        let mut restart = nearest.discs.distance + L::PacketLanes::splat(offset) * nearest.radii;
         if self.kind == SurfaceKind::SplatFit {
-            normals = fitted.normals(normals);
+            let planes = fitted.planes(normals);
+            normals = planes.normal;
+            if self.cloud.fits_balls() {
+                let crossing = planes.crossing(direction);
+                is_crossed = crossing.lanes;
+                restart = distance + crossing.restart * nearest.radii;
+                distance = distance + crossing.step * nearest.radii;
+                is_crossed &= (rays.t_min.le(distance) & distance.le(rays.t_max)).bits();
+            }
         }
         let n_discs = nearest.n_discs.store();
         let mut is_enclosed = 0;
@@ -293,15 +324,18 @@ impl DiscConsumer for DiscBlender<'_> {
                 radius: nearest.radii / factor,
             };
             let is_hit = L::PacketLanes::splat(0.0).lt(nearest.n_discs).bits();
-            let lanes = is_hit & ((1 << splats.len()) - 1);
-            is_enclosed =
-                enclosed_by_blocks::<L>(&self.cloud.points, &discs.hits, lanes, &candidates);
+            let lanes = is_hit & is_crossed & ((1 << splats.len()) - 1);
+            let (points, hits) = (&self.cloud.points, &discs.hits);
+            is_enclosed = match self.cloud.fits_balls() {
+                true => enclosed_by_blocks::<L, false>(points, hits, lanes, &candidates),
+                false => enclosed_by_blocks::<L, true>(points, hits, lanes, &candidates),
+            };
         }
         let min_discs =
             if self.kind == SurfaceKind::Cylinder { self.cloud.options.density } else { 1 };
         let nearest_distances = nearest.discs.distance.store();
         let (distances, slots) = (distance.store(), nearest.slots.store());
-        let radii = nearest.radii.store();
+        let (radii, restarts) = (nearest.radii.store(), restart.store());
         let (normals, colors) = (normals.store_packet(), colors.store_packet());
         for lane in 0..splats.len() {
             splats[lane] = Splat::MISS;
@@ -314,9 +348,10 @@ impl DiscConsumer for DiscBlender<'_> {
                     distance: distances[lane],
                     n_discs: n_discs[lane] as u32,
                     radius: radii[lane],
+                    restart: restarts[lane],
                     normal: vector(&normals),
                     color: vector(&colors),
-                    is_dense: min_discs <= n_discs[lane] as u32,
+                    is_dense: min_discs <= n_discs[lane] as u32 && is_crossed >> lane & 1 == 1,
                     is_enclosed: is_enclosed >> lane & 1 == 1,
                 };
             }

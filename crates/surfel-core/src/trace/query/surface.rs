@@ -21,8 +21,6 @@ use crate::trace::query::surface_hit::{MAX_REJECTED_HITS, SurfaceHit};
 use crate::trace::simd::{Simd, dispatch_simd};
 use crate::trace::traversal::octree_walk::PixelSize;
 
-/// Distance behind a rejected hit at which the search restarts, in radii.
-pub const RESTART_OFFSET: f32 = 0.05;
 /// Finds the closest hit of each ray on the continuous surface.
 pub fn surface_hits(cloud: &FlatCloud, simd: Simd, rays: &[Ray], hits: &mut [SurfaceHit]) {
     surface_hits_at(cloud, simd, PixelSize::ZERO, rays, hits);
@@ -203,7 +201,7 @@ fn surface_occlusions<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], occluded: &mut 
             mls_hits::<L, false>(cloud, rays, &mut hits);
             occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.hit.is_miss());
         }
-        SurfaceKind::Cylinder => {
+        SurfaceKind::Cylinder | SurfaceKind::SplatFit if cloud.goes_through_holes() => {
             let mut hits = vec![SurfaceHit::MISS; rays.len()];
             splat_hits::<L>(cloud, rays, &mut hits);
             occluded.iter_mut().zip(&hits).for_each(|(found, hit)| *found = !hit.is_miss());
@@ -303,7 +301,7 @@ fn trace_mls<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit])
 fn splat_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]) {
     hits.fill(SurfaceHit::MISS);
     let tests_edge = cloud.edge_test != EdgeTest::Off;
-    if !tests_edge && cloud.surface != SurfaceKind::Cylinder {
+    if !tests_edge && !cloud.goes_through_holes() {
         let mut splats = vec![Splat::MISS; rays.len()];
         SplatTracer::new(cloud, cloud.surface, EdgeTest::Off).trace::<L>(rays, &mut splats);
         for ((hit, ray), splat) in hits.iter_mut().zip(rays).zip(&splats) {
@@ -329,8 +327,7 @@ fn splat_hits<L: Lanes>(cloud: &FlatCloud, rays: &[Ray], hits: &mut [SurfaceHit]
                 hits[ray_idx as usize] = found;
                 continue;
             }
-            let behind = splat.hit.distance + RESTART_OFFSET * found.radius;
-            let t_min = behind.max(splat.hit.distance * (1.0 + 2.0 * f32::EPSILON));
+            let t_min = splat.restart.max(splat.hit.distance * (1.0 + 2.0 * f32::EPSILON));
             (rays[n_left], searching[n_left]) = (Ray { t_min, ..ray }, ray_idx);
             n_left += 1;
         }
@@ -355,5 +352,51 @@ fn surface_hit(cloud: &FlatCloud, ray: &Ray, splat: &Splat) -> SurfaceHit {
         color: splat.color,
         surface: cloud.surface,
         is_backface: 0.0 < cloud.points.normal(splat.hit.slot).dot(ray.direction),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Planes fitted to points without normals lie on a sphere.
+
+    use super::*;
+    use crate::math::Vec3;
+    use crate::points::{PointCloud, Preparation, StructureChoice, prepare};
+    use crate::progress::NoProgress;
+    use crate::scene::CloudGeometry;
+
+    fn evenly_spaced_sphere(n: usize) -> PointCloud {
+        let position = |i: usize| {
+            let height = 1.0 - (2 * i + 1) as f32 / n as f32;
+            let (sin, cos) = (2.399_963_2 * i as f64).sin_cos();
+            let across = (1.0 - height * height).sqrt();
+            Vec3::new(across * cos as f32, across * sin as f32, height)
+        };
+        PointCloud::from_positions((0..n).map(position).collect())
+    }
+
+    #[test]
+    fn planes_are_fitted_to_points_without_normals() {
+        let (structure, estimates_normals) = (StructureChoice::Surface, false);
+        let preparation = Preparation { structure, estimates_normals, ..Preparation::default() };
+        let cloud = prepare(evenly_spaced_sphere(20_000), &preparation, &NoProgress).unwrap().0;
+        let mut points = CloudGeometry::with_uniform_color(cloud, [188; 3]);
+        points.surface = SurfaceKind::SplatFit;
+        let flat = FlatCloud::new(&points, &NoProgress).unwrap();
+        let place = |i: usize| (i as f32 - 29.5) / 42.5;
+        let origins = (0..3600).map(|i| Vec3::new(place(i % 60), place(i / 60), 5.0));
+        // Up to 45 degrees from the normal.
+        let origins = origins.filter(|origin| origin.truncate().length() < 0.7);
+        let rays: Vec<Ray> = origins.map(|origin| Ray::new(origin, Vec3::NEG_Z)).collect();
+        let mut hits = vec![SurfaceHit::MISS; rays.len()];
+        surface_hits(&flat, Simd::detect(), &rays, &mut hits);
+        let (mut depth, mut angle) = (0f32, 0f32);
+        for (ray, hit) in rays.iter().zip(&hits) {
+            let height = (1.0 - ray.origin.truncate().length_squared()).sqrt();
+            depth = depth.max((hit.distance - (5.0 - height)).abs());
+            angle = angle.max(hit.normal.angle_between(ray.origin.with_z(height)).to_degrees());
+        }
+        // The radius of a point is 0.05, over which the sphere bends by 3 degrees and 0.05^2 / 2.
+        assert!(depth < 0.05 * 0.05 && angle < 4.0, "{depth} {angle}");
     }
 }

@@ -1,7 +1,8 @@
 //! The ways of single rays and of packets through an octree: nodes and cells, about front to back.
 
 use crate::flat::{MAX_OCTREE_DEPTH, Octree, OctreeNode};
-use crate::math::{Floats, LANES, LaneMask, Lanes, Vec3, Vec3Lanes};
+use crate::math::{Floats, LANES, LaneMask, Lanes, PACKET_WIDTH, Vec3, Vec3Lanes};
+use crate::trace::counts::{Counted, count};
 
 /// The size of a pixel along a ray, in the units of the ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -106,16 +107,24 @@ impl CellCube {
     }
 }
 
-/// Returns the intervals of rays in the cube from `lower`, which is relative to their origins.
+/// Returns the intervals of the lines of rays in the cube from `lower`, which is relative to their origins. They do not
+/// depend on the rays' ranges, nor does the place where a surface is found in them.
 #[inline(always)]
 fn interval<F: Floats>(rays: &WalkRays<F>, lower: Vec3Lanes<F>, size: F) -> (F, F) {
-    let (mut enter, mut leave) = (rays.t_min, rays.t_max);
+    let (mut enter, mut leave) = (F::splat(f32::NEG_INFINITY), F::splat(f32::INFINITY));
     let axes = [(lower.x, rays.inverse.x), (lower.y, rays.inverse.y), (lower.z, rays.inverse.z)];
     for (lower, inverse) in axes {
         let (a, b) = (lower * inverse, (lower + size) * inverse);
         (enter, leave) = (a.min(b).max(enter), a.max(b).min(leave));
     }
     (enter, leave)
+}
+
+/// Returns the lanes whose rays pass a cube in this interval before their limits, or closely beside it.
+#[inline(always)]
+fn is_passed<F: Floats>(rays: &WalkRays<F>, (enter, leave): (F, F), size: F, limits: F) -> F::Mask {
+    let margin = F::splat(MAX_CELL_MARGIN) * size;
+    enter.le(leave) & rays.t_min.le(leave + margin) & (enter - margin).le(limits)
 }
 
 impl<'t> OctreeWalk<'t> {
@@ -149,15 +158,16 @@ impl<'t> OctreeWalk<'t> {
         while 0 < self.n_pending {
             self.n_pending -= 1;
             let PendingNode { node_idx, lanes, cube } = self.pending[self.n_pending];
+            count(Counted::Cells, PACKET_WIDTH);
             let lower = Vec3Lanes::splat(cube.min).minus(rays.origin);
             let (enter, leave) = interval(rays, lower, F::splat(cube.size));
-            let margin = F::splat(MAX_CELL_MARGIN * cube.size);
-            let passed = lanes & (enter.le(leave) & (enter - margin).le(limits)).bits();
+            let passed =
+                lanes & is_passed(rays, (enter, leave), F::splat(cube.size), limits).bits();
             if passed == 0 {
                 continue;
             }
             let node = self.octree.node(node_idx);
-            let shown = passed & self.shown_lanes(node, cube.size, enter);
+            let shown = passed & self.shown_lanes(node, cube.size, enter.max(rays.t_min));
             if shown != passed {
                 self.add_all_children(node, &cube, passed & !shown);
             }
@@ -180,13 +190,14 @@ impl<'t> OctreeWalk<'t> {
         while 0 < self.n_pending {
             self.n_pending -= 1;
             let PendingNode { node_idx, cube, .. } = self.pending[self.n_pending];
+            count(Counted::Cells, 1);
             let node = self.octree.node(node_idx);
             let lower = Vec3Lanes::splat(cube.min).minus(ray.origin);
             let (enter, leave) = interval(ray, lower, cube.size);
-            if !(enter <= leave && enter - MAX_CELL_MARGIN * cube.size <= limit) {
+            if !is_passed(ray, (enter, leave), cube.size, limit) {
                 continue;
             }
-            if self.shown_lanes(node, cube.size, enter) != 0 {
+            if self.shown_lanes(node, cube.size, enter.max(ray.t_min)) != 0 {
                 return Some(CellInterval { cell_idx: node.cell - 1, enter, leave, cube });
             }
             self.add_passed_children(node, &cube, lanes);
@@ -239,7 +250,8 @@ impl<'t> OctreeWalk<'t> {
         };
         let lower = Vec3Lanes::splat(cube.min).plus(upper).minus(ray.origin);
         let (enter, leave) = interval(ray, lower, size);
-        let passed = enter.le(leave).bits() & u32::from(node.children);
+        let passed = is_passed(ray, (enter, leave), size, ray.t_max).bits();
+        let passed = passed & u32::from(node.children);
         for order in (0..LANES).rev() {
             let child = order ^ self.nearest_child;
             if passed >> child & 1 == 1 {

@@ -330,6 +330,12 @@ impl LoadedScene {
         }
     }
 
+    /// Returns true if a cloud has normals, those of its file or those that its settings need.
+    pub(super) fn has_normals(&self, description: &SceneDescription) -> bool {
+        let is_wanted = |i| self.settings_of(i, description).needs_normals();
+        self.clouds().any(|(i, cloud)| cloud.normals.is_some() || is_wanted(i))
+    }
+
     /// Returns true if a description shows a geometry: it hides objects only.
     pub(super) fn is_shown(&self, geometry: usize, description: &SceneDescription) -> bool {
         self.owners[geometry].is_none_or(|object| description.objects[object].visible())
