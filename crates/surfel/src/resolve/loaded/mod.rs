@@ -21,6 +21,7 @@ use surfel_core::math::DVec3;
 use surfel_core::points::{PointCloud, PreparedCloud, STRUCTURE, SURFACE_VARIATION};
 use surfel_core::progress::Progress;
 use surfel_core::render::check_surfaces;
+use surfel_core::scene::color::{ColorSource, choose_source};
 use surfel_core::scene::{Environment, Geometry, Graph, Track, Transform};
 use surfel_core::surface::SurfaceKind;
 use surfel_formats::FileInfo;
@@ -328,6 +329,11 @@ impl LoadedScene {
             Some(object) => description.objects[object].settings.over(scene),
             None => scene.clone(),
         }
+    }
+
+    /// Returns the source of colours that is chosen for the first cloud if none is set.
+    pub fn color_source(&self) -> Option<ColorSource> {
+        self.clouds().next().map(|(_, cloud)| choose_source(cloud).0)
     }
 
     /// Returns true if a description shows a geometry: it hides objects only.
