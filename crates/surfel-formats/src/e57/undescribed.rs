@@ -8,7 +8,8 @@ use surfel_core::progress::Progress;
 
 use super::pages::{HEADER_LENGTH, Pages};
 use super::streams::{
-    DATA_PACKET, SECTION_HEADER_LENGTH, SECTION_ID, Stream, find_streams, n_streams,
+    DATA_PACKET, SECTION_HEADER_LENGTH, SECTION_ID, Stream, find_streams, n_section_streams,
+    n_streams,
 };
 use super::values::Encoding;
 use crate::error::Result;
@@ -49,9 +50,8 @@ type Range = [f64; 2];
 
 /// Adds the fields of a scan that its description does not list, and returns their number.
 pub(super) fn add_unknown_fields(scan: &mut PointCloud, pages: Pages) -> usize {
-    let section = Pages::content_position(scan.file_offset);
     let n_listed = scan.prototype.len();
-    let n_fields = n_streams(pages, section.saturating_add(SECTION_HEADER_LENGTH));
+    let n_fields = n_section_streams(pages, scan.file_offset);
     if n_fields <= n_listed || MAX_FIELDS < n_fields {
         return 0;
     }

@@ -98,12 +98,13 @@ fn field_ends(header: &Header) -> impl Iterator<Item = usize> {
 /// Returns the number of points from the first on whose positions are among the first `n_bytes` values.
 fn n_readable(header: &Header, n_points: usize, n_bytes: usize) -> usize {
     let is_axis = |field: &PcdField| {
-        matches!(ColumnRole::from_name(&field.name), Some(ColumnRole::Position(_)))
+        let role = ColumnRole::from_name(&field.name);
+        field.count == 1 && matches!(role, Some(ColumnRole::Position(_)))
     };
     let ends = field_ends(header).zip(&header.fields);
     let of_axes = ends.filter(|(_, field)| is_axis(field)).map(|(end, field)| {
         let start = (end - field.size()) * n_points;
-        n_bytes.saturating_sub(start) / field.size().max(1)
+        n_bytes.saturating_sub(start) / field.size()
     });
     of_axes.min().unwrap_or(0).min(n_points)
 }
