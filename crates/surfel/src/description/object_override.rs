@@ -144,7 +144,10 @@ impl SceneDescription {
     ///
     /// Fails for names that no file or object has.
     pub fn apply_object_settings(&mut self) -> Result<(), Invalid> {
-        for one in self.overrides.all().to_vec() {
+        let mut all = self.overrides.all().to_vec();
+        // Once the files with other settings are objects.
+        all.sort_by_key(ObjectOverride::is_label);
+        for one in all {
             let within = |error: Invalid| error.within("object_settings");
             let is_label = one.is_label();
             let own = self.files.extract_if(.., |file| !is_label && one.names_file(file));
@@ -213,6 +216,10 @@ mod tests {
         description.apply_object_settings().unwrap();
         assert_eq!(description.files.len(), 2);
         assert_eq!(description.objects[0].label.as_deref(), Some("House"));
+        let mut both = described(&["b.ply:label=East", "b.ply:visible=false"]);
+        both.apply_object_settings().unwrap();
+        let object = &both.objects[0];
+        assert_eq!((object.label.as_deref(), object.visible), (Some("East"), Some(false)));
         let error = described(&["d.ply:label=x"]).apply_object_settings().unwrap_err().to_string();
         assert!(error.contains("no file or object `d.ply`"), "{error}");
     }
