@@ -61,8 +61,8 @@ fn labels_within_objects(
 
 /// Returns the label of a file, if it has one.
 fn label_of(description: &SceneDescription, file: &Path) -> Option<String> {
-    let labels = description.overrides.all().iter().filter(|one| one.is_label());
-    let label = labels.filter(|one| one.names_file(file)).next_back()?;
+    let mut labels = description.overrides.all().iter().filter(|one| one.is_label());
+    let label = labels.rfind(|one| one.names_file(file))?;
     Some(label.value.as_str()?.to_owned())
 }
 
