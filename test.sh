@@ -115,7 +115,7 @@ python_tests() {
         wheel=$(echo "$environment"/*.whl)
         # What surfel works with but does not need; tests that need one that is missing are skipped. Notebooks run once.
         local others=(laspy pandas trimesh "dask distributed")
-        pytest_in "$environment/newest" "${found[0]}" "$wheel" "${others[@]}" "ipykernel nbclient anywidget"
+        pytest_in "$environment/newest" "${found[0]}" "$wheel" "${others[@]}" "jupyterlab ipykernel nbclient nbformat anywidget"
         [ "${found[0]}" = "${found[-1]}" ] || pytest_in "$environment/oldest" "${found[-1]}" "$wheel" "${others[@]}"
     fi
     rm -rf "$environment"

@@ -1,6 +1,8 @@
 """Measures the Python package beside the program, by processor time, which other programs disturb least.
 
-    python docs/python_speed.py scan.ply
+    python docs/python_speed.py scan.ply [rays]
+
+With `rays`, rays alone are measured.
 """
 
 import json
@@ -71,9 +73,17 @@ def _processor_seconds(words):
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
+def print_rays(scan):
+    ours, theirs = rates_of_rays(scan)
+    print(f"cast_rays and surfel bench: {ours:.2f} and {theirs:.2f} million rays a second ({100 * ours / theirs:.1f} %)")
+
+
 if __name__ == "__main__":
-    scan = sys.argv[1]
+    scan, *only = sys.argv[1:]
+    if only == ["rays"]:
+        print_rays(scan)
+        sys.exit()
     print(f"import surfel: {1000 * seconds_of_import():.0f} ms")
     print(f"Cloud of 10 million points of float32: {seconds_of_cloud():.2f} s")
-    print("cast_rays and surfel bench: {:.2f} and {:.2f} million rays a second".format(*rates_of_rays(scan)))
+    print_rays(scan)
     print("load and render, and the program: {:.2f} and {:.2f} s of processor time".format(*seconds_of_picture(scan)))

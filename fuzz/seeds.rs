@@ -170,7 +170,12 @@ fn write_scans(corpus: &Path) -> Result<(), Box<dyn std::error::Error>> {
     scan.finalize()?;
     writer.finalize()?;
     drop(writer);
-    fs::write(corpus.join("e57/scans.e57"), file.into_inner())?;
+    let bytes = file.into_inner();
+    // The descriptions of the scans take the last two pages.
+    for n_lost in 0..2 {
+        let length = bytes.len().saturating_sub(1024 * n_lost);
+        fs::write(corpus.join(format!("e57/scans{n_lost}.e57")), &bytes[..length])?;
+    }
     write_cut_scans(&corpus.join("e57/cut.e57"))
 }
 

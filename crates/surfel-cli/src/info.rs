@@ -92,6 +92,7 @@ fn summarize(file: &Path, header: &FileInfo) -> Value {
         "bounds": header.bounds.map(|[low, high]| json!({ "min": low.to_array(), "max": high.to_array() })),
         "resolution": header.resolution.map(|step| step.to_array()),
         "coordinate_system": header.coordinate_system,
+        "spherical_harmonics_degree": header.harmonics_degree,
         "columns_in_file": header.columns,
         "images": images(header),
     })
@@ -115,6 +116,7 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
         "points_per_square_unit": points_per_area(&cloud.positions, DENSITY_CELL * distance),
         "resolution": source.resolution.map(|step| step.to_array()),
         "coordinate_system": source.coordinate_system,
+        "spherical_harmonics_degree": source.harmonics_degree,
         "up": { "axis": up.up.to_array(), "reason": up.reason },
         "stations": stations(cloud),
         "columns": columns(cloud),
@@ -221,6 +223,9 @@ fn table(info: &Value) -> String {
     row("points", text(&info["points"]));
     if !info["triangles"].is_null() {
         row("triangles", text(&info["triangles"]));
+    }
+    if !info["spherical_harmonics_degree"].is_null() {
+        row("harmonics", format!("degree {}", text(&info["spherical_harmonics_degree"])));
     }
     let bounds = &info["bounds"];
     row(

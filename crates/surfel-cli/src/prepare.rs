@@ -8,7 +8,6 @@ use crate::report::Report;
 use std::path::PathBuf;
 use surfel::SceneDescription;
 use surfel::prepare::{PrepareOptions, prepare_files};
-use surfel::resolve::check_empty;
 use surfel_core::progress::Progress;
 use surfel_formats::{Loaded, SaveOptions};
 
@@ -67,9 +66,6 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let files = expand(&args.files)?;
     let options = PrepareOptions { normals: args.normals, keep_variation: args.keep_variation };
     let Loaded { cloud, info } = prepare_files(&files, &description, options, report)?;
-    if cloud.is_empty() {
-        check_empty(&files, &description.objects_default.preparation)?;
-    }
     let options = SaveOptions::from_source(&info);
     surfel_formats::save(&args.output, &cloud, &options, report)?;
     report.end();

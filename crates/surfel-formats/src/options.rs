@@ -53,6 +53,8 @@ pub struct FileInfo {
     pub las: Option<LasProfile>,
     /// Names of the columns in the file.
     pub columns: Vec<String>,
+    /// Degree of the spherical harmonics that colour trained splats, 0 to 3; `None` for all other files.
+    pub harmonics_degree: Option<u32>,
     /// Pictures that the file holds beside its points.
     pub images: Vec<EmbeddedImage>,
     /// Paths of further files that it names and that were looked for while it was read, found or not: buffers,

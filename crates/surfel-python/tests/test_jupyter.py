@@ -4,11 +4,11 @@ import json
 import os
 import pathlib
 import shutil
+import signal
 import socket
 import subprocess
 import sys
 import time
-import urllib.error
 import urllib.request
 
 import pytest
@@ -80,26 +80,47 @@ def free_port():
         return probe.getsockname()[1]
 
 
-def start_lab(folder):
+def stop(process):
+    """Ends a process and those that it has started."""
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        if process.poll() is None:
+            os.killpg(process.pid, number)
+        try:
+            process.wait(20)
+            break
+        except subprocess.TimeoutExpired:
+            pass
+    # Kernels and browsers that outlive it.
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except ProcessLookupError:
+        pass
+
+
+def start(words, environment, log):
+    """Starts a program in a process group of its own, which writes into a file."""
+    return subprocess.Popen(words, env=environment, stdout=log, stderr=log, stdin=subprocess.DEVNULL, start_new_session=True)
+
+
+def start_lab(folder, log):
     """Starts a JupyterLab of a folder; returns its process and address."""
     port = free_port()
     own = {f"JUPYTER_{name}_DIR": str(folder / f"jupyter-{name.lower()}") for name in ("CONFIG", "DATA", "RUNTIME")}
     words = ["--no-browser", "--allow-root", "--ip=127.0.0.1", f"--port={port}", f"--IdentityProvider.token={TOKEN}"]
     words += ["--LabApp.expose_app_in_browser=True", "--LabApp.news_url=", f"--ServerApp.root_dir={folder}"]
-    log = open(folder / "lab.log", "w")
-    lab = subprocess.Popen([sys.executable, "-m", "jupyterlab", *words], env=os.environ | own, stdout=log, stderr=log)
+    lab = start([sys.executable, "-m", "jupyterlab", *words], os.environ | own, log)
     address = f"http://127.0.0.1:{port}"
-    for _ in range(240):
+    end = time.monotonic() + 120
+    while time.monotonic() < end and lab.poll() is None:
         try:
-            urllib.request.urlopen(f"{address}/api/status?token={TOKEN}", timeout=30).close()
+            urllib.request.urlopen(f"{address}/api/status?token={TOKEN}", timeout=10).close()
             return lab, address
-        except urllib.error.URLError:
-            assert lab.poll() is None, (folder / "lab.log").read_text()
+        except OSError:
             time.sleep(0.5)
+    stop(lab)
     raise AssertionError((folder / "lab.log").read_text())
 
 
-@pytest.mark.skipif("SURFEL_JUPYTERLAB" not in os.environ, reason="JupyterLab is started if SURFEL_JUPYTERLAB is set")
 def test_the_page_is_in_a_cell_of_jupyterlab(hill, tmp_path):
     for package in ("jupyterlab", "anywidget", "nbformat", "ipykernel"):
         pytest.importorskip(package)
@@ -110,16 +131,22 @@ def test_the_page_is_in_a_cell_of_jupyterlab(hill, tmp_path):
     notebook = {"cells": cells, "metadata": kernel, "nbformat": 4, "nbformat_minor": 5}
     (tmp_path / "viewer.ipynb").write_text(json.dumps(notebook))
     screenshot = pathlib.Path(os.environ.get("SURFEL_SCREENSHOTS", tmp_path)) / "jupyterlab.png"
-    lab, address = start_lab(tmp_path)
-    try:
-        script = pathlib.Path(__file__).parent / "jupyter_page.mjs"
-        words = ["node", str(script), f"{address}/lab/tree/viewer.ipynb?token={TOKEN}", str(screenshot)]
-        page = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=400)
-    finally:
-        lab.terminate()
-        lab.wait(60)
-    assert page.returncode == 0, page.stderr + (tmp_path / "lab.log").read_text()
-    found = json.loads(page.stdout)
+    with open(tmp_path / "lab.log", "w") as lab_log, open(tmp_path / "page.log", "w+") as page_log:
+        lab, address = start_lab(tmp_path, lab_log)
+        try:
+            script = pathlib.Path(__file__).parent / "jupyter_page.mjs"
+            words = ["node", str(script), f"{address}/lab/tree/viewer.ipynb?token={TOKEN}", str(screenshot)]
+            page = start(words, environment, page_log)
+            try:
+                page.wait(400)
+            finally:
+                stop(page)
+        finally:
+            stop(lab)
+        page_log.seek(0)
+        written = page_log.read()
+    assert page.returncode == 0, written + (tmp_path / "lab.log").read_text()
+    found = json.loads(written.splitlines()[0])
     assert found["parents"] == [address] and found["address"].startswith("http://127.0.0.1:")
     assert found["nColors"] > 100
     assert screenshot.stat().st_size > 10_000

@@ -56,9 +56,11 @@ def test_other_keys_are_refused(hill, keys, words):
         surfel.prepare(hill, **keys)
 
 
-def test_filters_may_keep_nothing(hill, points):
+def test_filters_that_keep_nothing_are_refused(hill, points):
     for source in (hill, surfel.Cloud(points)):
-        assert len(surfel.prepare(source, filter="z > 9")) == 0
+        for keys in ({}, {"orient": "none"}, {"normals": True}):
+            with pytest.raises(surfel.InvalidScene, match="no point meets z > 9"):
+                surfel.prepare(source, filter="z > 9", **keys)
         with pytest.raises(surfel.Error, match="age"):
             surfel.prepare(source, filter="age > 9")
 

@@ -93,6 +93,45 @@ test('each file has a row with its number of points; a mesh has what acts on it'
   assert.equal(await finishedPixels(page), hidden);
 });
 
+test('rows are renamed; scene files and links carry the names, and settings go on using those of the files', async () => {
+  const row = page.locator('[data-object="house.obj"]');
+  const title = () => row.locator('label').first().textContent();
+  const rename = async (name) => {
+    const field = page.locator('[data-key="object.house.obj.label"]');
+    await field.evaluate((it) => { it.closest('details').open = true; });
+    await field.fill(name);
+    await field.press('Enter');
+    await settled(page);
+  };
+  assert.equal(await title(), 'house.obj');
+  await rename('East: wing');
+  assert.equal(await title(), 'East: wing');
+  await row.locator('[aria-label="Zoom to East: wing"]').waitFor();
+  assert.equal(await finishedPixels(page), first);
+  assert.deepEqual((await state(page, 'scene')).object_settings, ['house.obj:label=East: wing']);
+  await page.locator('[data-key="object.house.obj.visible"]').uncheck();
+  await settled(page);
+  assert.deepEqual((await state(page, 'scene')).object_settings, ['house.obj:label=East: wing', 'house.obj:visible=false']);
+  await page.locator('[data-action="export"]').click();
+  const text = page.locator('#export-text');
+  await page.waitForFunction(() => document.getElementById('export-text').value.startsWith('surfel'));
+  await page.locator('[data-format="toml"]').click();
+  const toml = await text.inputValue();
+  assert.match(toml, /label = "East: wing"/);
+  await page.locator('[data-format="link"]').click();
+  const link = await text.inputValue();
+  await page.locator('#export-close').click();
+  const other = await openPage(link);
+  assert.equal(await other.locator('[data-object="house.obj"] label').first().textContent(), 'East: wing');
+  await closePage(other);
+  await reopen(page);
+  await page.waitForFunction(() => document.querySelector('[data-object="house.obj"] label').textContent === 'house.obj');
+  await page.locator('#scene-file').setInputFiles({ name: 'names.toml', mimeType: 'text/plain', buffer: Buffer.from(toml) });
+  await page.waitForFunction(() => document.querySelector('[data-object="house.obj"] label').textContent === 'East: wing');
+  await rename('');
+  assert.equal(await title(), 'house.obj');
+});
+
 test('clouds that lie among each other are hidden apart, and keep their places', async () => {
   const points = data.points.filter((_, i) => i % 3 === 0).map(({ x, y, z }) => `${x} ${y} ${z + 3}`);
   writeFileSync(join(data.folder, 'canopy.xyz'), points.join('\n'));

@@ -4,7 +4,7 @@ import { withoutSettings } from './added.js';
 import { element, iconButton } from './dom.js';
 import { count } from './format.js';
 import { materialOf, withMaterial } from './materials.js';
-import { settingOf, withSetting } from './object-settings.js';
+import { labelOf, settingOf, withSetting } from './object-settings.js';
 import { section } from './panel.js';
 
 const SLIDER = { kind: 'slider' };
@@ -55,6 +55,12 @@ const visibilityControl = (object) => objectControl(object, 'visible', {
   toText: (isOn) => (isOn === object.visible ? null : String(isOn)),
 });
 
+const labelControl = (object) => objectControl(object, 'label', {
+  label: 'Name', kind: 'text', help: 'Name in this list; settings and commands go on using that of the file', placeholder: object.name,
+  fromText: (text) => text ?? object.label ?? '',
+  toText: (text) => (text === (object.label ?? '') ? null : text || object.name),
+});
+
 const colorControl = (object) => objectControl(object, 'color', {
   label: 'Colour by', kind: 'select', help: `Colours of the points of ${object.name}`,
   options: ({ info }) => [{ value: '', label: object.color ?? 'as the scene' }, ...info.colors],
@@ -65,7 +71,7 @@ const colorControl = (object) => objectControl(object, 'color', {
 /** The controls of one of several objects. A mesh has those that act on it. */
 export function objectControls(object) {
   const colors = object.kind === 'points' ? [colorControl(object)] : [];
-  return [visibilityControl(object), ...colors, ...materialControls(object)];
+  return [visibilityControl(object), labelControl(object), ...colors, ...materialControls(object)];
 }
 
 /** The section of all objects. One alone has its material; several can also be hidden and coloured apart. */
@@ -73,13 +79,18 @@ export function objectSection(viewer, panel, navigation) {
   const objects = section('Objects', false);
   let shown = null;
   viewer.sceneChanged.listen(() => {
-    const names = viewer.objects.map(({ name }) => name).join('\n');
-    if (!viewer.scene || names === shown) return;
-    shown = names;
     const body = objects.querySelector('.section-body');
+    const names = viewer.objects.map(({ name }) => name).join('\n');
+    if (!viewer.scene) return;
+    if (names === shown) {
+      showLabels(body, viewer);
+      return;
+    }
+    shown = names;
     panel.removeRows([...body.querySelectorAll('.row')]);
     const all = viewer.objects;
     body.replaceChildren(...(all.length === 1 ? singleRows(all[0], panel) : all.map((object) => objectPart(object, panel, viewer, navigation))));
+    showLabels(body, viewer);
   });
   return objects;
 }
@@ -92,10 +103,25 @@ function objectPart(object, panel, viewer, navigation) {
   const { name } = object;
   const size = object.kind === 'points' ? amount(object.points, 'point') : amount(object.triangles, 'triangle');
   const [visibility, ...details] = panel.addRows(objectControls(object));
-  if (object.bounds) visibility.append(iconButton('fit', `Zoom to ${name}`, () => navigation.fit(object.bounds)));
-  if (object.id) visibility.append(iconButton('delete', `Remove ${name}`, () => remove(viewer, object)));
+  if (object.bounds) visibility.append(iconButton('fit', `Zoom to ${name}`, () => navigation.fit(object.bounds), { 'data-of-object': 'fit' }));
+  if (object.id) visibility.append(iconButton('delete', `Remove ${name}`, () => remove(viewer, object), { 'data-of-object': 'delete' }));
   return element('div', { class: 'object', 'data-object': object.name },
     visibility, ...notesOf(object), element('details', { class: 'inner' }, element('summary', {}, size), ...details));
+}
+
+/** Shows each object in the list by its label. */
+function showLabels(body, { objects, scene }) {
+  for (const object of objects) {
+    const part = body.querySelector(`[data-object="${CSS.escape(object.name)}"]`);
+    const label = labelOf(scene.object_settings, object);
+    if (!part || part.dataset.label === label) continue;
+    part.dataset.label = label;
+    part.querySelector('label').firstChild.textContent = label;
+    for (const [action, word] of [['fit', 'Zoom to'], ['delete', 'Remove']]) {
+      const button = part.querySelector(`[data-of-object="${action}"]`);
+      for (const name of button ? ['title', 'aria-label'] : []) button.setAttribute(name, `${word} ${label}`);
+    }
+  }
 }
 
 /** Removes an added file from the scene. It is kept, so that this can be undone. */

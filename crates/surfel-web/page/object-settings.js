@@ -6,6 +6,9 @@ export function settingOf(list, name, key) {
   return (list ?? []).findLast((text) => text.startsWith(head))?.slice(head.length);
 }
 
+/** The name by which an object is shown: its label in the settings, else that of its file, else its name. */
+export const labelOf = (list, { name, label }) => settingOf(list, name, 'label') ?? label ?? name;
+
 /** The list with this setting of one object; null removes the object's entry. */
 export function withSetting(list, name, key, value) {
   const head = `${name}:${key}=`;

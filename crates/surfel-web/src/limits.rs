@@ -68,6 +68,9 @@ pub struct Timeouts {
     /// Duration for which a scene is prepared on although newer settings wait. Less would show nothing while
     /// a slider is dragged.
     pub stale_update: Duration,
+    /// Duration after the last page has gone until what was made for pages is freed. A page that is loaded again comes
+    /// back sooner.
+    pub release: Duration,
 }
 
 impl Default for Limits {
@@ -107,6 +110,7 @@ impl Default for Timeouts {
             ping_interval: Duration::from_secs(10),
             idle: Duration::from_secs(30),
             stale_update: Duration::from_secs(1),
+            release: Duration::from_secs(30),
         }
     }
 }

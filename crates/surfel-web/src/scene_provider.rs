@@ -93,6 +93,9 @@ pub trait SceneProvider: Send + Sync + 'static {
         progress: &dyn Progress,
     ) -> Result<Arc<dyn AddedFile>>;
 
+    /// Frees memory that can be made again, as no page is connected any more.
+    fn release(&self) {}
+
     /// These settings as a command line and as scene files.
     ///
     /// # Errors

@@ -13,6 +13,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 use surfel_core::render::Renderer;
+use tokio::runtime::Handle;
 use tokio::sync::{Semaphore, watch};
 
 /// The state that all connections of a server share.
@@ -43,6 +44,8 @@ pub struct ServerState {
     pub start: Instant,
     /// Number of pictures rendered for `/render`.
     pub n_pictures: AtomicU64,
+    /// Number of pages that have ever been connected.
+    n_registered: AtomicU64,
     task_permits: Arc<Semaphore>,
 }
 
@@ -70,6 +73,7 @@ impl ServerState {
             is_stopped,
             start: Instant::now(),
             n_pictures: AtomicU64::new(0),
+            n_registered: AtomicU64::new(0),
         }
     }
 
@@ -114,8 +118,20 @@ impl ServerState {
 
     /// Renders for a client for as long as the returned guard lives.
     pub fn register(self: &Arc<Self>, client: Arc<Client>) -> ClientGuard {
+        self.n_registered.fetch_add(1, Ordering::Relaxed);
         self.render_loop.add(client.clone());
         ClientGuard { state: self.clone(), client }
+    }
+
+    /// Frees what was made for pages unless one connects within a while.
+    async fn release_unless_used(self: Arc<Self>) {
+        let n_registered = self.n_registered.load(Ordering::Relaxed);
+        tokio::time::sleep(self.limits.timeouts.release).await;
+        let is_used = self.n_registered.load(Ordering::Relaxed) != n_registered;
+        let provider = self.provider.borrow().clone();
+        if let Some(provider) = provider.filter(|_| !is_used) {
+            let _ = self.run_blocking(move || provider.release()).await;
+        }
     }
 }
 
@@ -128,5 +144,10 @@ pub struct ClientGuard {
 impl Drop for ClientGuard {
     fn drop(&mut self) {
         self.state.render_loop.remove(&self.client);
+        let is_last = self.state.render_loop.n_clients() == 0;
+        // A server that ends has no runtime any more.
+        if let Some(runtime) = Handle::try_current().ok().filter(|_| is_last) {
+            runtime.spawn(self.state.clone().release_unless_used());
+        }
     }
 }

@@ -49,6 +49,15 @@ impl<T> Lru2<T> {
         Ok(made)
     }
 
+    /// Forgets all results but one that is being made.
+    pub fn clear(&self) {
+        match self.0.try_lock() {
+            Ok(mut entries) => entries.clear(),
+            Err(TryLockError::Poisoned(error)) => error.into_inner().clear(),
+            Err(TryLockError::WouldBlock) => {}
+        }
+    }
+
     /// Returns true if the result for `key` is known, false too while another is made.
     pub fn contains(&self, key: u64) -> bool {
         let entries = match self.0.try_lock() {
@@ -100,5 +109,7 @@ mod tests {
         }
         assert_eq!([1, 2, 3].map(|key| cache.contains(key)), [true, true, false]);
         assert_eq!(n_made, 4);
+        cache.clear();
+        assert!(!cache.contains(1) && !cache.contains(2));
     }
 }

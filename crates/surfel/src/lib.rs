@@ -78,6 +78,7 @@ mod height_map;
 pub mod animate;
 pub mod prepare;
 mod scene_keys;
+mod known_trees;
 mod added_objects;
 mod point_overlap;
 mod thread_pools;

@@ -6,6 +6,7 @@ use crate::cache::Lru2;
 use crate::crs::Unit;
 use crate::description::{Exposure, Interior, SceneDescription};
 use crate::error::Result;
+use crate::known_trees::KnownTrees;
 use crate::live_view::{LiveView, SceneTrees};
 use crate::picture::RenderedImage;
 use crate::point_overlap::check_overlap;
@@ -69,6 +70,16 @@ struct Made {
     /// The clouds of added objects, apart, so that all others need not be prepared again beside them.
     prepared_added: Lru2<Vec<PreparedCloud>>,
     trees: Lru2<SceneTrees>,
+    /// Trees of single geometries: those that a change leaves as they are need not be built again.
+    known_trees: KnownTrees,
+}
+
+impl Made {
+    fn clear(&self) {
+        self.prepared.clear();
+        self.prepared_added.clear();
+        self.trees.clear();
+    }
 }
 
 impl LiveScene {
@@ -100,6 +111,15 @@ impl LiveScene {
             picture_threads: start_threads(|_| lower_priority())?,
             use_case,
         })
+    }
+
+    /// Frees everything that can be made again from the files' content. Views that are still held stay whole.
+    pub fn release(&self) {
+        self.regrouped.clear();
+        self.extended.clear();
+        self.filtered.clear();
+        self.made.clear();
+        self.made_for_previews.clear();
     }
 
     /// Returns the description of the start, in which files with settings of their own are objects.
@@ -250,7 +270,16 @@ impl LiveScene {
         let moves_camera = auto.moves_camera(&kept);
         let system = coordinate_system(&loaded, description);
         let unit = system.map_or(Unit::Unknown, |system| system.unit());
-        Ok(LiveView { loaded, flat, settings, description: complete, moves_camera, unit, trees })
+        Ok(LiveView {
+            loaded,
+            flat,
+            settings,
+            description: complete,
+            color_source: kept.color_source(),
+            moves_camera,
+            unit,
+            trees,
+        })
     }
 
     /// Renders the picture of a view with its overlay, on the caller's threads.
@@ -336,8 +365,9 @@ impl LiveScene {
         let trees = tree_key(description, preparation, auto, &frames);
         made.trees.get_or_make(trees, progress, || {
             let clouds = self.prepared(made, loaded, description, progress)?;
-            let build =
-                || build(loaded, time_secs, description, clouds, auto, self.use_case, progress);
+            let source =
+                TreeSource { loaded, time_secs, description, auto, use_case: self.use_case };
+            let build = || source.build(clouds, &made.known_trees, progress);
             self.preparation_threads.install(build)
         })
     }
@@ -368,35 +398,44 @@ impl LiveScene {
     }
 }
 
-/// Builds the trees of prepared clouds and of everything else.
-fn build(
-    loaded: &LoadedScene,
+/// Everything besides prepared clouds that trees are built of.
+struct TreeSource<'a> {
+    loaded: &'a LoadedScene,
     time_secs: f64,
-    description: &SceneDescription,
-    clouds: Vec<PreparedCloud>,
-    auto: &AutoSettings,
+    description: &'a SceneDescription,
+    auto: &'a AutoSettings,
     use_case: UseCase,
-    progress: &dyn Progress,
-) -> Result<SceneTrees> {
-    let up = auto.up;
-    let legend = common_legend(loaded, &clouds, description, up);
-    let raw = loaded.graph_without_points();
-    let (mut graph, mut sequences) = finish_graph(loaded, raw, clouds, description, up, progress)?;
-    hide_walls(&mut graph, &auto.hidden_walls);
-    for sequence in &mut sequences {
-        sequence.seek(time_secs, &mut graph, up, progress)?;
+}
+
+impl TreeSource<'_> {
+    fn build(
+        self,
+        clouds: Vec<PreparedCloud>,
+        known: &KnownTrees,
+        progress: &dyn Progress,
+    ) -> Result<SceneTrees> {
+        let Self { loaded, time_secs, description, auto, use_case } = self;
+        let up = auto.up;
+        let legend = common_legend(loaded, &clouds, description, up);
+        let raw = loaded.graph_without_points();
+        let (mut graph, mut sequences) =
+            finish_graph(loaded, raw, clouds, description, up, progress)?;
+        hide_walls(&mut graph, &auto.hidden_walls);
+        for sequence in &mut sequences {
+            sequence.seek(time_secs, &mut graph, up, progress)?;
+        }
+        let source_indices = source_indices(&graph);
+        let (lights, background) = (Vec::new(), Background::Transparent);
+        let scene = Scene { graph, lights, background, camera: PLACEHOLDER_CAMERA };
+        if use_case == UseCase::Viewers {
+            check_overlap(&scene.graph)?;
+        }
+        let flat = known.build(&scene, progress)?;
+        progress.end();
+        let mut graph = scene.graph;
+        graph.release_static();
+        Ok(SceneTrees { graph, flat, source_indices, legend })
     }
-    let source_indices = source_indices(&graph);
-    let (lights, background) = (Vec::new(), Background::Transparent);
-    let scene = Scene { graph, lights, background, camera: PLACEHOLDER_CAMERA };
-    if use_case == UseCase::Viewers {
-        check_overlap(&scene.graph)?;
-    }
-    let flat = FlatScene::new(&scene, progress)?;
-    progress.end();
-    let mut graph = scene.graph;
-    graph.release_static();
-    Ok(SceneTrees { graph, flat, source_indices, legend })
 }
 
 /// The parts of files that are kept: the viewer shows all columns of a point, which is told by its index.

@@ -13,7 +13,7 @@ use surfel_core::image::{Image, NO_ID};
 use surfel_core::math::Vec3;
 use surfel_core::render::Settings;
 use surfel_core::scene::Graph;
-use surfel_core::scene::color::Legend;
+use surfel_core::scene::color::{ColorSource, Legend};
 use surfel_core::trace::Simd;
 use surfel_formats::Georeference;
 
@@ -41,6 +41,8 @@ pub struct LiveView {
     pub settings: Settings,
     /// The complete description, with everything that was chosen and the exposure.
     pub description: SceneDescription,
+    /// The source of colours that was chosen for the first cloud.
+    pub color_source: Option<ColorSource>,
     /// True if the scene moves the camera.
     pub moves_camera: bool,
     /// Unit of the coordinates.

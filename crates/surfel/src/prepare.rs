@@ -33,7 +33,8 @@ struct Columns {
 ///
 /// # Errors
 ///
-/// Fails for missing and broken files, past the memory limit, for clouds that cannot be prepared, and if cancelled.
+/// Fails for missing and broken files, past the memory limit, for filters that keep no point, for clouds that cannot be
+/// prepared, and if cancelled.
 pub fn prepare_files(
     files: &[PathBuf],
     description: &SceneDescription,
@@ -47,6 +48,9 @@ pub fn prepare_files(
         let filter = is_empty.then(|| check_empty(files, settings)).and_then(Result::err);
         filter.unwrap_or_else(|| Error::Content { files: files.to_vec(), cause })
     })?;
+    if cloud.is_empty() {
+        check_empty(files, &description.objects_default.preparation)?;
+    }
     Ok(Loaded { cloud, info })
 }
 
@@ -54,7 +58,8 @@ pub fn prepare_files(
 ///
 /// # Errors
 ///
-/// Fails for a filter of a column that is not there, for clouds that cannot be prepared, and if cancelled.
+/// Fails for a filter of a column that is not there or that keeps no point, for clouds that cannot be prepared, and if
+/// cancelled.
 pub fn prepare_points(
     mut cloud: PointCloud,
     description: &SceneDescription,
@@ -64,6 +69,9 @@ pub fn prepare_points(
     let settings = &description.objects_default.preparation;
     for (key, filter) in settings.point_filters()? {
         keep_matching(&mut cloud, key, &filter, progress)?;
+        if cloud.is_empty() {
+            return Err(Error::Unfit(format!("no point meets {filter}")));
+        }
     }
     settings.drop_estimated(&mut cloud);
     Ok(prepared(cloud, description, options, progress)?)

@@ -34,7 +34,7 @@ use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::scene::Material;
-use surfel_core::scene::color::choose_source;
+use surfel_core::scene::color::ColorSource;
 use surfel_web::{
     AddedFile, Error, Export, FilmOptions, Limits, PickedPoint, PointDescriber, PreparedScene,
     Result, SceneProvider, SentFile, SettingsMap, WrittenFile,
@@ -126,25 +126,15 @@ impl FileSceneProvider {
             legend: legend_json(&view.trees.legend),
             overlay: page_overlay(view.overlay()),
             describe: self.describer(&view, description.output.time()),
-            settings: self.complete_settings(view.description, &description, &content, settings),
+            settings: complete_settings(
+                view.description,
+                &description,
+                &content,
+                settings,
+                view.color_source,
+            ),
             flat: view.flat,
         })
-    }
-
-    fn complete_settings(
-        &self,
-        complete: SceneDescription,
-        requested: &SceneDescription,
-        content: &Content,
-        settings: &SettingsMap,
-    ) -> SettingsMap {
-        let mut settings = page_settings::complete_settings(complete, requested, content, settings);
-        if !settings.contains_key("color")
-            && let Some((_, cloud)) = self.scene.loaded().clouds().next()
-        {
-            settings.insert("color".into(), json!(choose_source(cloud).0.to_string()));
-        }
-        settings
     }
 
     fn choose_initial_settings(&self, width: u32, height: u32) -> SettingsMap {
@@ -154,8 +144,9 @@ impl FileSceneProvider {
             let description = self.read(&settings).ok()?;
             let (kept, auto) = self.scene.choose(&description, &NoProgress).ok()?;
             let complete = auto.complete_description(&kept);
+            let (content, source) = (self.content(&[]), kept.color_source());
             let mut initial =
-                self.complete_settings(complete, &description, &self.content(&[]), &settings);
+                complete_settings(complete, &description, &content, &settings, source);
             // Chosen once there is something to see.
             initial.shift_remove("exposure");
             let exposure = self.startup_settings.get("exposure").cloned();
@@ -177,6 +168,7 @@ impl FileSceneProvider {
             let notes = notes.map(|note| self.folders.removed_from(note));
             json!({
                 "name": names.next(),
+                "label": own.label,
                 "kind": files.first().map_or("points", |file| kind_of(file)),
                 "points": read().map(|read| read.n_points).sum::<usize>(),
                 "triangles": read().map(|read| read.n_triangles).sum::<usize>(),
@@ -221,6 +213,21 @@ impl FileSceneProvider {
             describe(&loaded, &trees, flat, &graph, picked)
         })
     }
+}
+
+/// Returns the settings of a complete description as a page sees them. `source` stands for colours that are left open.
+fn complete_settings(
+    complete: SceneDescription,
+    requested: &SceneDescription,
+    content: &Content,
+    settings: &SettingsMap,
+    source: Option<ColorSource>,
+) -> SettingsMap {
+    let mut settings = page_settings::complete_settings(complete, requested, content, settings);
+    if let Some(source) = source.filter(|_| !settings.contains_key("color")) {
+        settings.insert("color".into(), json!(source.to_string()));
+    }
+    settings
 }
 
 /// Returns a scene file in TOML, in whose folder added files lie.
@@ -401,6 +408,10 @@ impl SceneProvider for FileSceneProvider {
     ) -> Result<Arc<dyn AddedFile>> {
         let file = PageFile::read(file, &self.rows.names(), progress)?;
         Ok(self.added_files.insert(file))
+    }
+
+    fn release(&self) {
+        self.scene.release();
     }
 
     fn export(&self, settings: &SettingsMap) -> Result<Export> {

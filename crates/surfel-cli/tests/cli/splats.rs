@@ -128,3 +128,17 @@ fn other_clouds_are_no_gaussians() {
     let message = fail(&["render", &spz, "-o", &folder.path("a.png")], 1);
     assert!(message.contains("export the splats as PLY"), "{message}");
 }
+
+#[test]
+fn info_shows_the_degree_of_the_harmonics() {
+    let folder = Folder::new();
+    let file = folder.write("splats.ply", splats(3));
+    for arguments in [&["info", &file][..], &["info", "--summary", &file]] {
+        let table = succeed(arguments);
+        assert!(table.contains("harmonics     degree 0"), "{table}");
+    }
+    let info = succeed(&["info", "--json", &file]);
+    assert!(info.contains("\"spherical_harmonics_degree\": 0"), "{info}");
+    let plain = folder.write("plain.xyz", "0 0 0\n1 0 0\n0 1 0\n");
+    assert!(!succeed(&["info", &plain]).contains("harmonics"));
+}

@@ -119,6 +119,20 @@ impl FlatScene {
     ///
     /// Fails if a geometry cannot be built (see `FlatGeometry::new`), or if `progress` is cancelled.
     pub fn new(scene: &Scene, progress: &dyn Progress) -> Result<Self> {
+        Self::with_known(scene, &|_| None, progress)
+    }
+
+    /// Sorts the scene's geometries into trees, except those that `known` has by their index in the graph: trees that
+    /// were built of an equal geometry, which no node deforms.
+    ///
+    /// # Errors
+    ///
+    /// Fails as [`new`](Self::new) does.
+    pub fn with_known(
+        scene: &Scene,
+        known: &dyn Fn(usize) -> Option<Arc<FlatGeometry>>,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let world = scene.graph.world_from_nodes();
         let mut flat = Self {
             origin: origin(&scene.graph, &world),
@@ -136,16 +150,23 @@ impl FlatScene {
             has_gaussians: false,
             built: BTreeMap::new(),
         };
-        flat.build_missing_geometries(&scene.graph, &world, progress)?;
+        flat.build_missing_geometries(&scene.graph, &world, known, progress)?;
         flat.update_instances(&scene.graph, &world)?;
         Ok(flat)
     }
 
-    /// Builds the geometries that nodes show and that are not built yet.
+    /// Returns the trees of a geometry of the graph, unless nodes deform it or none shows it.
+    pub fn undeformed(&self, geometry_idx: usize) -> Option<&Arc<FlatGeometry>> {
+        let built = self.built.get(&(geometry_idx, None))?;
+        Some(&self.geometries[built.geometry_idx as usize])
+    }
+
+    /// Builds the geometries that nodes show and that are neither built yet nor known.
     fn build_missing_geometries(
         &mut self,
         graph: &Graph,
         world: &[DAffine3],
+        known: &dyn Fn(usize) -> Option<Arc<FlatGeometry>>,
         progress: &dyn Progress,
     ) -> Result<()> {
         let shown = graph.nodes.iter().enumerate();
@@ -157,13 +178,17 @@ impl FlatScene {
             }
             let geometry = &graph.geometries[key.0];
             let pose = key.1.map(|node_idx| Pose::new(graph, node_idx, world));
-            let flat = match &pose {
-                Some(pose) => FlatGeometry::deformed(geometry, pose.deform(geometry), progress)?,
-                None => FlatGeometry::new(geometry, progress)?,
+            let known = if pose.is_none() { known(key.0) } else { None };
+            let flat = match (&pose, known) {
+                (_, Some(known)) => known,
+                (Some(pose), _) => {
+                    Arc::new(FlatGeometry::deformed(geometry, pose.deform(geometry), progress)?)
+                }
+                (None, _) => Arc::new(FlatGeometry::new(geometry, progress)?),
             };
             let (pose, geometry_idx) = (pose.unwrap_or_default(), self.geometries.len() as u32);
             self.built.insert(key, BuiltGeometry { geometry_idx, pose, original: None });
-            self.geometries.push(Arc::new(flat));
+            self.geometries.push(flat);
         }
         Ok(())
     }
@@ -187,7 +212,7 @@ impl FlatScene {
             let flat = &mut self.geometries[built.geometry_idx as usize];
             built.deform(flat, &graph.geometries[*geometry_idx], pose, progress)?;
         }
-        self.build_missing_geometries(graph, &world, progress)?;
+        self.build_missing_geometries(graph, &world, &|_| None, progress)?;
         self.update_instances(graph, &world)
     }
 

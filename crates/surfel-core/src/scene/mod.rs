@@ -17,6 +17,7 @@ mod mesh;
 mod cloud_geometry;
 mod animation;
 mod graph;
+mod content_hash;
 mod evaluate;
 mod clip;
 mod interior;

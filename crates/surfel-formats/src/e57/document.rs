@@ -7,7 +7,9 @@ use surfel_core::progress::Progress;
 
 use super::pages::{HEADER_LENGTH, PAGE_LENGTH, Pages};
 use super::partial_xml;
-use super::undescribed::{NO_PACKET, Undescribed, find_scans};
+use super::undescribed::{
+    NO_PACKET, Undescribed, add_unknown_fields, find_scans, n_other_sections,
+};
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::salvage::Salvage;
@@ -96,13 +98,12 @@ pub(super) fn salvage_document(
     progress: &dyn Progress,
 ) -> Result<Document> {
     let note = |line: &str| progress.note(&format!("{}: {line}", input.name));
-    if let Some(document) = partial_document(input, header, pages) {
-        let n_scans = document.scans.len();
-        let scans =
-            if n_scans == 1 { "first scan".into() } else { format!("first {n_scans} scans") };
-        note(&format!(
-            "the description ends early; it has the {scans}, the last maybe without pose"
-        ));
+    if let Some(mut document) = partial_document(input, header, pages) {
+        note(&complete_last_scan(&mut document.scans, pages));
+        let n_skipped = n_other_sections(&document.scans, pages, progress)?;
+        if 0 < n_skipped {
+            note(&format!("{n_skipped} more lists of points or cells are skipped"));
+        }
         return Ok(document);
     }
     let Undescribed { scans, skipped } = find_scans(input, pages, progress)?;
@@ -122,6 +123,25 @@ pub(super) fn salvage_document(
         note(&format!("{} more lists of points or cells are skipped: {reason}", skipped.len()));
     }
     Ok(Document { scans, images: Vec::new(), coordinate_system: None, is_described: false })
+}
+
+/// Adds the fields that the description of the last scan lacks, and returns a line that says what is missing.
+fn complete_last_scan(scans: &mut [PointCloud], pages: Pages) -> String {
+    let n_scans = scans.len();
+    let Some(last) = scans.last_mut() else { return String::new() };
+    let n_missing = add_unknown_fields(last, pages);
+    let subject = match n_scans {
+        1 => "the first scan",
+        _ => &format!("the first {n_scans} scans, the last"),
+    };
+    let lacks_pose = last.transform.is_none();
+    let missing = match (n_missing, lacks_pose) {
+        (0, false) => "whole".to_owned(),
+        (0, true) => "maybe without its pose".to_owned(),
+        (n, false) => format!("without its last fields ({n})"),
+        (n, true) => format!("without its last fields ({n}), maybe without its pose"),
+    };
+    format!("the description ends early; it has {subject} {missing}")
 }
 
 /// Reads the descriptions of scans up to the end of the file or the next broken page, if there are any.

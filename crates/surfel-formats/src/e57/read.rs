@@ -11,6 +11,7 @@ use super::images::embedded_images;
 use super::pages::{PAGE_LENGTH, Pages};
 use super::scan::{Scan, union};
 use super::streams::find_streams;
+use super::undescribed::has_unknown_fields;
 use crate::error::{Error, Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
@@ -142,7 +143,8 @@ fn scans(input: &Input, document: &Document) -> Result<Vec<Scan>> {
             return Err(malformed(found, format!("at most {MAX_FIELDS}")));
         }
         // Where nothing says which points were measured, those at the scanner were not.
-        let has_empty_cells = description.has_row_column() || !document.is_described;
+        let is_described = document.is_described && !has_unknown_fields(description);
+        let has_empty_cells = description.has_row_column() || !is_described;
         Scan::new(description, has_empty_cells).ok_or_else(|| {
             let expected = "cartesianX, Y and Z, or sphericalRange, Azimuth and Elevation";
             malformed(format!("scan {i} without coordinates"), expected.into())

@@ -127,6 +127,26 @@ pub(super) fn find_streams(
     Ok(streams)
 }
 
+/// Returns the number of streams in the first data packet of the section at byte `section` of the file; 0 if there is none.
+pub(super) fn n_section_streams(pages: Pages, section: u64) -> usize {
+    /// Packets before the first of data: an index, or nothing of use.
+    const MAX_OTHERS: usize = 1024;
+    let start = Pages::content_position(section);
+    let Some(offset) = pages.bytes(start.saturating_add(16)) else { return 0 };
+    let mut at = Pages::content_position(u64::from_le_bytes(offset));
+    for _ in 0..MAX_OTHERS {
+        match pages.bytes(at) {
+            Some([DATA_PACKET, _, _, _]) => return n_streams(pages, at),
+            Some([_, _, low, high]) => {
+                let length = u64::from(u16::from_le_bytes([low, high])) + 1;
+                at = at.saturating_add(length.next_multiple_of(4));
+            }
+            None => break,
+        }
+    }
+    0
+}
+
 /// Returns the number of streams in the data packet at a position in the pages' content.
 pub(super) fn n_streams(pages: Pages, at: u64) -> usize {
     pages.bytes::<2>(at + 4).map_or(0, u16::from_le_bytes).into()

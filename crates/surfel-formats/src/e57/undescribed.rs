@@ -8,7 +8,8 @@ use surfel_core::progress::Progress;
 
 use super::pages::{HEADER_LENGTH, Pages};
 use super::streams::{
-    DATA_PACKET, SECTION_HEADER_LENGTH, SECTION_ID, Stream, find_streams, n_streams,
+    DATA_PACKET, SECTION_HEADER_LENGTH, SECTION_ID, Stream, find_streams, n_section_streams,
+    n_streams,
 };
 use super::values::Encoding;
 use crate::error::Result;
@@ -33,6 +34,9 @@ const TRIES_PER_CHECK: u64 = 1 << 20;
 /// Reason why nothing is read where no packet is whole.
 pub(super) const NO_PACKET: &str = "there is no whole packet of points";
 
+/// Namespace of the fields whose names and types are missing.
+const UNKNOWN_NAMESPACE: &str = "unknown";
+
 /// The scans that were found.
 pub(super) struct Undescribed {
     /// Descriptions in which only the fields of positions have names.
@@ -43,6 +47,44 @@ pub(super) struct Undescribed {
 
 /// The least and the greatest number of a stream.
 type Range = [f64; 2];
+
+/// Adds the fields of a scan that its description does not list, and returns their number.
+pub(super) fn add_unknown_fields(scan: &mut PointCloud, pages: Pages) -> usize {
+    let n_listed = scan.prototype.len();
+    let n_fields = n_section_streams(pages, scan.file_offset);
+    if n_fields <= n_listed || MAX_FIELDS < n_fields {
+        return 0;
+    }
+    scan.prototype.extend((n_listed..n_fields).map(unknown_field));
+    n_fields - n_listed
+}
+
+/// Returns true if the description of a scan does not list all its fields.
+pub(super) fn has_unknown_fields(scan: &PointCloud) -> bool {
+    let is_unknown = |record: &Record| matches!(&record.name, RecordName::Unknown { namespace, .. } if namespace == UNKNOWN_NAMESPACE);
+    scan.prototype.iter().any(is_unknown)
+}
+
+/// Returns the number of sections of points or cells that are not those of `scans`.
+pub(super) fn n_other_sections(
+    scans: &[PointCloud],
+    pages: Pages,
+    progress: &dyn Progress,
+) -> Result<usize> {
+    let is_other = |section: &u64| {
+        scans.iter().all(|scan| Pages::content_position(scan.file_offset) != *section)
+    };
+    Ok(find_sections(pages, progress)?.iter().filter(|section| is_other(section)).count())
+}
+
+/// Returns a field of unknown meaning. It has no bits, so that nothing of it is read.
+fn unknown_field(index: usize) -> Record {
+    let namespace = UNKNOWN_NAMESPACE.into();
+    Record {
+        name: RecordName::Unknown { namespace, name: format!("field_{index}") },
+        data_type: RecordDataType::Integer { min: 0, max: 0 },
+    }
+}
 
 /// Finds the scans in the pages of a file.
 pub(super) fn find_scans(
@@ -144,11 +186,7 @@ fn describe(
     };
     let record = |i: usize| match fields.iter().position(|field| *field == i) {
         Some(axis) => Record { name: names[axis].clone(), data_type: data_type.clone() },
-        // Without bits, so that nothing of it is read.
-        None => Record {
-            name: RecordName::Unknown { namespace: "none".into(), name: format!("field_{i}") },
-            data_type: RecordDataType::Integer { min: 0, max: 0 },
-        },
+        None => unknown_field(i),
     };
     let mut scan = PointCloud::default();
     scan.records = n_points;

@@ -69,6 +69,11 @@ pub fn common_file_info(infos: &[FileInfo]) -> FileInfo {
             .filter(|name| infos.iter().all(|info| info.columns.contains(name)))
             .cloned()
             .collect(),
+        harmonics_degree: infos
+            .iter()
+            .map(|info| info.harmonics_degree)
+            .reduce(|a, b| a.max(b))
+            .flatten(),
         images: infos.iter().flat_map(|info| info.images.clone()).collect(),
         external_files: infos.iter().flat_map(|info| info.external_files.clone()).collect(),
     }

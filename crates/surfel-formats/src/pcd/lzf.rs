@@ -12,13 +12,18 @@ pub(super) struct Fault {
     pub found: &'static str,
 }
 
-/// Decompresses `compressed` to exactly `length` bytes, which must be at most `MAX_RATIO` times as many.
+/// Decompresses `compressed` to `length` bytes. Returns the bytes before the first fault, and the fault.
 ///
 /// A control byte below 32 is followed by that many bytes and one, which are copied. Any other has a length in its upper
 /// three bits, 7 being followed by a further byte that adds to it, and the upper five bits of a distance in the others,
 /// followed by its lower eight: length + 2 bytes are repeated from distance + 1 bytes before.
-pub(super) fn decompress(compressed: &[u8], length: usize) -> Result<Vec<u8>, Fault> {
-    let mut out: Vec<u8> = Vec::with_capacity(length);
+pub(super) fn decompress(compressed: &[u8], length: usize) -> (Vec<u8>, Option<Fault>) {
+    let mut out = Vec::with_capacity(length.min(compressed.len().saturating_mul(MAX_RATIO)));
+    let fault = decompress_into(compressed, length, &mut out).err();
+    (out, fault)
+}
+
+fn decompress_into(compressed: &[u8], length: usize, out: &mut Vec<u8>) -> Result<(), Fault> {
     let mut at = 0;
     while at < compressed.len() {
         let start = at;
@@ -57,7 +62,7 @@ pub(super) fn decompress(compressed: &[u8], length: usize) -> Result<Vec<u8>, Fa
     if out.len() < length {
         return Err(Fault { byte: at, found: "fewer bytes than the header claims" });
     }
-    Ok(out)
+    Ok(())
 }
 
 #[cfg(test)]
@@ -70,16 +75,19 @@ mod tests {
     fn runs_and_repetitions_are_decoded() {
         let compressed = [2, b'a', b'b', b'c', 0x20, 2, 0xe0, 3, 0, 0, b'!'];
         let expected = [b"abcabc" as &[u8], &[b'c'; 12], b"!"].concat();
-        assert_eq!(decompress(&compressed, expected.len()), Ok(expected));
+        assert_eq!(decompress(&compressed, expected.len()), (expected, None));
     }
 
     #[test]
     fn broken_data_is_reported() {
-        let found = |compressed: &[u8], length| decompress(compressed, length).unwrap_err().found;
+        let found = |compressed: &[u8], length| decompress(compressed, length).1.unwrap().found;
         assert_eq!(found(&[4, 1, 2], 5), "the end of the data within a run");
         assert_eq!(found(&[0, 1, 0x20], 4), "the end of the data within a run");
         assert_eq!(found(&[0, 1, 0x20, 1], 4), "a repetition from before the start");
         assert_eq!(found(&[1, 1, 2], 1), "more bytes than the header claims");
         assert_eq!(found(&[1, 1, 2], 3), "fewer bytes than the header claims");
+        // The bytes before the fault are kept.
+        assert_eq!(decompress(&[1, 7, 8, 0x20, 9], 6).0, [7, 8]);
+        assert_eq!(decompress(&[1, 7, 8, 0x20, 0, 31], 99).0, [7, 8, 8, 8, 8]);
     }
 }

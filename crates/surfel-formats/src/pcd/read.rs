@@ -143,8 +143,13 @@ fn read_binary(
     let input = salvage.input;
     let stride = header.stride();
     progress.begin(&format!("read {}", input.name), header.n_points());
+    let mut columns = binary_columns(header);
     let records = match header.encoding {
-        Encoding::BinaryCompressed => Cow::Owned(compressed::records(input, header, progress)?),
+        Encoding::BinaryCompressed => {
+            let records = compressed::records(salvage, header, progress)?;
+            drop_lost(&mut columns, &records, input, progress);
+            Cow::Owned(records.bytes)
+        }
         _ => {
             let rest = &input[header.body..];
             let readable = (rest.len() / stride) as u64;
@@ -155,7 +160,6 @@ fn read_binary(
             Cow::Borrowed(&rest[..header.n_points().min(readable) as usize * stride])
         }
     };
-    let columns = binary_columns(header);
     let fields = columns.iter().map(|(name, field)| (name.as_str(), *field));
     let sample = &records[..records.len().min(1 << 20)];
     let columns = named_columns(fields, stride, false, sample, &options.columns);
@@ -168,6 +172,27 @@ fn read_binary(
     let n_points = (records.len() / stride) as u64;
     let cloud = read_records(input, &records, &layout, origin, options.filter.as_ref(), progress)?;
     Ok((cloud, n_points))
+}
+
+/// Drops the columns of which values are lost, and reports them.
+fn drop_lost(
+    columns: &mut Vec<(String, Field)>,
+    records: &compressed::Records,
+    input: &Input,
+    progress: &dyn Progress,
+) {
+    let is_lost = |name: &str, field: &Field| {
+        let is_axis = matches!(ColumnRole::from_name(name), Some(ColumnRole::Position(_)));
+        !is_axis && records.whole_width < field.end()
+    };
+    let lost: Vec<String> = columns
+        .extract_if(.., |(name, field)| is_lost(name, field))
+        .map(|(name, _)| name)
+        .collect();
+    if !lost.is_empty() {
+        let names = lost.join(" ").chars().take(80).collect::<String>();
+        progress.note(&format!("{}: values of {names} are lost", input.name));
+    }
 }
 
 /// Reads points by lines; also returns their number, kept or not.

@@ -8,8 +8,8 @@ use super::faces::count_faces;
 use super::header::{Element, Encoding, Header, read_header};
 use super::skip::{pack_vertices, skip_elements};
 use super::trained_splats::{
-    add_discs, are_trained_splats, describe_colors, incomplete_splats, keeps_gaussians,
-    refuse_compressed,
+    add_discs, are_trained_splats, describe_colors, harmonics_degree, incomplete_splats,
+    keeps_gaussians, refuse_compressed,
 };
 use crate::error::{Location, Result};
 use crate::file::Input;
@@ -92,6 +92,7 @@ pub(super) fn file_info(header: &Header, vertex: &Element) -> FileInfo {
         n_points: Some(vertex.count),
         n_triangles: (0 < n_faces).then_some(n_faces),
         columns: vertex.properties.iter().map(|property| property.name.clone()).collect(),
+        harmonics_degree: are_trained_splats(vertex).then(|| harmonics_degree(vertex)).flatten(),
         ..FileInfo::default()
     }
 }

@@ -90,15 +90,24 @@ pub(super) fn add_discs(cloud: &mut PointCloud, keeps_gaussians: bool) -> Option
 
 /// Returns words about the colours of trained splats.
 pub(super) fn describe_colors(vertex: &Element) -> String {
-    let is_rest = |property: &&Property| property.name.starts_with("f_rest_");
-    let n_rest = vertex.properties.iter().filter(is_rest).count();
-    match n_harmonics(n_rest) {
-        Some(1) => "colours are the same in all directions".into(),
-        Some(n) => format!("colours by spherical harmonics of degree {}", n.isqrt() - 1),
+    match harmonics_degree(vertex) {
+        Some(0) => "colours are the same in all directions".into(),
+        Some(degree) => format!("colours by spherical harmonics of degree {degree}"),
         None => format!(
-            "colours are the same in all directions: {n_rest} properties f_rest, 9, 24 or {MAX_REST_COLUMNS} expected"
+            "colours are the same in all directions: {} properties f_rest, 9, 24 or {MAX_REST_COLUMNS} expected",
+            n_rest(vertex)
         ),
     }
+}
+
+/// Returns the degree of the spherical harmonics of trained splats; `None` if their number is that of no degree.
+pub(super) fn harmonics_degree(vertex: &Element) -> Option<u32> {
+    n_harmonics(n_rest(vertex)).map(|n| n.isqrt() as u32 - 1)
+}
+
+fn n_rest(vertex: &Element) -> usize {
+    let is_rest = |property: &&Property| property.name.starts_with("f_rest_");
+    vertex.properties.iter().filter(is_rest).count()
 }
 
 fn disc_radius(deviations: Vec3) -> f32 {

@@ -94,6 +94,11 @@ impl Field {
         Self { file_type, ..Self::new(byte, NumberType::F64) }
     }
 
+    /// Returns the byte of a record at which the field ends.
+    pub fn end(&self) -> usize {
+        self.byte + self.number_type.size()
+    }
+
     /// Returns the field's value in the record that `record` starts with.
     pub fn value(&self, record: &[u8], big_endian: bool) -> f64 {
         let mut value = [0.0];

@@ -208,6 +208,69 @@ fn scans_whose_fields_are_described_are_read_with_them() {
     assert!(found.is_sorted() && found.contains(&1) && found.contains(&2), "{found:?}");
 }
 
+/// Returns the file up to a byte of its content and with zeros to the end of the page, as the front of a longer file.
+fn cut_content(bytes: &[u8], length: usize) -> Vec<u8> {
+    let content: Vec<u8> = bytes.chunks(1024).flat_map(|page| &page[..1020]).copied().collect();
+    let pages = content[..length].chunks(1020).flat_map(|page| {
+        let mut page = page.to_vec();
+        page.resize(1024, 0);
+        page
+    });
+    let mut pages: Vec<u8> = pages.collect();
+    pages[16..24].copy_from_slice(&(bytes.len() as u64 + 1024).to_le_bytes());
+    crate::e57_writer::with_checksums(&pages)
+}
+
+#[test]
+fn scaled_integers_are_exact_once_their_fields_are_described() {
+    let scaled =
+        |min: i64, max: i64| RecordDataType::ScaledInteger { min, max, scale: 0.001, offset: 0.25 };
+    let [x, y, z] = [scaled(-9000, 9000), scaled(-12_000, 100_000), scaled(-2000, 3000)];
+    let mut prototype: Vec<Record> = CARTESIAN
+        .into_iter()
+        .zip([x, y, z])
+        .map(|(name, data_type)| Record { name, data_type })
+        .collect();
+    let intensity = RecordDataType::Integer { min: 0, max: 4095 };
+    prototype.push(Record { name: RecordName::Intensity, data_type: intensity });
+    prototype.extend([Record::COLOR_RED_U8, Record::COLOR_GREEN_U8, Record::COLOR_BLUE_U8]);
+    let point = |(i, position): (usize, &[f64; 3])| {
+        let raw = position.map(|v| RecordValue::ScaledInteger((v * 1000.0) as i64));
+        let others = [i % 4096, i % 256, i % 7, 255].map(|v| RecordValue::Integer(v as i64));
+        raw.into_iter().chain(others).collect()
+    };
+    let points = hall(3000).iter().enumerate().map(point).collect();
+    let bytes = write(&[Scan { name: "a", pose: None, prototype, points }]);
+    let whole = read("a.e57", &bytes).unwrap().cloud;
+    let xml =
+        without_description(&bytes).len() / 1024 * 1020 + without_description(&bytes).len() % 1024;
+    let content: Vec<u8> = bytes.chunks(1024).flat_map(|page| &page[..1020]).copied().collect();
+    let position_of = |text: &str| {
+        xml + content[xml..].windows(text.len()).position(|it| it == text.as_bytes()).unwrap()
+    };
+    let end_of = |tag: &str| position_of(tag) + tag.len();
+    let (z_end, blue_end) = (end_of("</cartesianZ>"), end_of("</colorBlue>"));
+    let intensity_end = end_of("</intensity>");
+    for length in xml..blue_end + 9 {
+        let cut = cut_content(&bytes, length);
+        if length < z_end {
+            assert!(refusal(&cut).contains("no description of the scans"), "{length}");
+            continue;
+        }
+        let listener = Listener::default();
+        let cloud = load_bytes("a.e57", &cut, &options(), &listener).unwrap().cloud;
+        assert!(cloud.positions == whole.positions, "{length}");
+        let is_short = listener.has_note(
+            "a.e57: the description ends early; it has the first scan without its last fields (",
+        );
+        assert_eq!(is_short, length < blue_end, "{length}");
+        assert_eq!(cloud.intensity.is_some(), intensity_end <= length, "{length}");
+        assert_eq!(cloud.colors.is_some(), blue_end <= length, "{length}");
+        assert_eq!(cloud.colors, whole.colors.clone().filter(|_| blue_end <= length));
+        assert!(cloud.scalars.len() == whole.scalars.len(), "unknown fields are no columns");
+    }
+}
+
 #[test]
 fn xml_with_a_broken_page_is_read_up_to_it() {
     let mut bytes = three_scans();

@@ -38,6 +38,21 @@ pub fn compressed_file() -> Vec<u8> {
     [HEADER.as_bytes(), b"DATA binary_compressed\n", &sizes, &compressed].concat()
 }
 
+/// Returns a compressed file of points with x, y, z, intensity and colour.
+pub fn compressed_grid(n_points: usize) -> Vec<u8> {
+    let values = |value: fn(usize) -> f32| (0..n_points).flat_map(move |i| value(i).to_le_bytes());
+    let axes = values(|i| (i % 25) as f32).chain(values(|i| (i / 25) as f32));
+    let others = values(|i| i as f32 * 0.01).chain(values(|i| (i % 7) as f32));
+    let colors = (0..n_points as u32).flat_map(u32::to_le_bytes);
+    let values: Vec<u8> = axes.chain(others).chain(colors).collect();
+    let compressed = compress(&values);
+    let header = format!(
+        "FIELDS x y z intensity rgb\nSIZE 4 4 4 4 4\nTYPE F F F F U\nWIDTH {n_points}\nHEIGHT 1\nDATA binary_compressed\n"
+    );
+    let sizes = [compressed.len() as u32, values.len() as u32].map(u32::to_le_bytes).concat();
+    [header.as_bytes(), &sizes, &compressed].concat()
+}
+
 /// Returns the records of two points.
 fn points() -> [Vec<u8>; 2] {
     let point = |rgb: u32, z: f32, x: f64, label: u16, histogram: [f32; 2]| {

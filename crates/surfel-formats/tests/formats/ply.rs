@@ -159,6 +159,7 @@ fn trained_splats_become_discs() {
     assert_eq!(loaded.cloud.normals, Some(vec![Vec3::Z]));
     assert!((loaded.cloud.radii.unwrap()[0] - 3.0).abs() < 1e-5);
     assert!(loaded.info.format.ends_with("trained splats"));
+    assert_eq!(loaded.info.harmonics_degree, None, "one coefficient is no degree");
     assert!(listener.has_note("1 faint ones skipped"));
     let columns = ColumnChoice::Only(vec![Column::Colors]);
     let options = LoadOptions { columns, ..LoadOptions::default() };
@@ -190,6 +191,7 @@ fn trained_splats_keep_their_columns_and_are_written_with_them() {
     let loaded = load_bytes("a.ply", file.as_bytes(), &LoadOptions::default(), &listener).unwrap();
     // Faint splats are no discs, but Gaussians.
     assert_eq!((loaded.cloud.len(), loaded.cloud.scalars.len()), (2, 11));
+    assert_eq!(loaded.info.harmonics_degree, Some(0));
     assert!(listener.has_note("2 trained splats; colours are the same in all directions"));
     let again = round_trip(&loaded.cloud, "ply", &SaveOptions::default());
     assert_eq!(again.cloud, loaded.cloud);

@@ -6,7 +6,7 @@ use surfel_core::progress::NoProgress;
 use surfel_core::scene::Geometry;
 use surfel_formats::{Error, LoadOptions, Loaded, load_bytes, load_graph_bytes};
 
-use crate::common::{Listener, encode_cloud, full_cloud, read};
+use crate::common::{Listener, encode_cloud, full_cloud, read, shared};
 use crate::las_point_formats::{N_POINTS, file};
 use crate::malformed::small_files;
 use crate::{pcd, ptx};
@@ -101,9 +101,59 @@ fn records_before_the_end_of_the_file_are_read() {
     }
     let cut = &pcd::binary_file()[..pcd::binary_file().len() - 1];
     assert_eq!(salvaged("a.pcd", cut, "1 of 2 points").len(), 1);
-    let compressed = &pcd::compressed_file()[..pcd::compressed_file().len() - 1];
-    let error = salvage("a.pcd", compressed).unwrap_err().to_string();
-    assert!(error.contains("0 of 2 points are whole") && !error.contains("--salvage"), "{error}");
+}
+
+#[test]
+fn fields_before_the_end_of_a_compressed_file_are_read() {
+    let n_points = 500;
+    let bytes = pcd::compressed_grid(n_points);
+    let whole = read("a.pcd", &bytes).unwrap().cloud;
+    assert!(whole.len() == n_points && whole.colors.is_some());
+    let mut found = Vec::new();
+    for length in 0..bytes.len() {
+        let listener = Listener::default();
+        let loaded = load_bytes("a.pcd", &bytes[..length], &options(), &listener);
+        let Ok(Loaded { cloud, .. }) = loaded else {
+            let refused = loaded.unwrap_err().to_string();
+            assert!(!refused.contains("--salvage"), "{refused}");
+            assert!(found.is_empty(), "{length} of {} {refused}", bytes.len());
+            continue;
+        };
+        let n_read = cloud.len();
+        let kept: Vec<u32> = (0..n_read as u32).collect();
+        assert!(cloud.positions == whole.subset(&kept).positions, "{length}");
+        let words = format!("a.pcd: salvaged {n_read} of {n_points} points; found the end");
+        assert!(listener.has_note(&words), "{words}");
+        assert_eq!(cloud.intensity.is_none(), listener.has_note("a.pcd: values of intensity"));
+        assert!(cloud.intensity.as_ref().is_none_or(|it| Some(it) == whole.intensity.as_ref()));
+        assert!(cloud.colors.is_none(), "the last field is never whole");
+        found.push((n_read, cloud.intensity.is_some()));
+    }
+    assert!(found.is_sorted());
+    // Runs of eight numbers are whole or lost.
+    for state in [(8, false), (n_points, false), (n_points, true)] {
+        assert!(found.contains(&state), "{state:?}");
+    }
+    let refused = read("a.pcd", &bytes[..bytes.len() - 9]).unwrap_err().to_string();
+    assert!(refused.contains("500 of 500 points are whole"), "{refused}");
+    assert!(refused.ends_with("; --salvage reads what is whole"), "{refused}");
+}
+
+#[test]
+fn a_cut_picture_of_a_depth_camera_keeps_its_points() {
+    let Some(path) = shared("clouds/region_growing_rgb_tutorial.pcd") else { return };
+    let bytes = std::fs::read(path).unwrap();
+    let whole = read("a.pcd", &bytes).unwrap().cloud;
+    // Colours begin in the middle of the file.
+    let cloud = salvaged("a.pcd", &bytes[..1_300_000], "307200 of 307200 points; found the end");
+    let bits = |cloud: &PointCloud| -> Vec<[u32; 3]> {
+        cloud.positions.iter().map(|position| position.to_array().map(f32::to_bits)).collect()
+    };
+    assert!(bits(&cloud) == bits(&whole) && cloud.colors.is_none());
+    let early = salvaged("a.pcd", &bytes[..1_100_000], "");
+    assert!(100_000 < early.len() && early.len() < whole.len(), "{}", early.len());
+    assert!(bits(&early) == bits(&whole)[..early.len()]);
+    assert!(salvage("a.pcd", &bytes[..900_000]).is_err());
 }
 
 /// Returns the byte at which the points of a LAZ file begin, and that of its chunk table.

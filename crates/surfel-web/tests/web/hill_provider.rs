@@ -76,6 +76,8 @@ pub struct HillProvider {
     pub n_started: AtomicU32,
     /// Number of slow tasks that were cancelled.
     pub n_cancelled: AtomicU32,
+    /// Number of times that memory was freed.
+    pub n_released: AtomicU32,
 }
 
 impl HillProvider {
@@ -108,6 +110,7 @@ impl HillProvider {
             gate: Gate::default(),
             n_started: AtomicU32::new(0),
             n_cancelled: AtomicU32::new(0),
+            n_released: AtomicU32::new(0),
         }
     }
 
@@ -291,6 +294,10 @@ impl SceneProvider for HillProvider {
         let mut png = Cursor::new(Vec::new());
         to_rgba8(&image).write_to(&mut png, image::ImageFormat::Png).unwrap();
         Ok(png.into_inner())
+    }
+
+    fn release(&self) {
+        self.n_released.fetch_add(1, Ordering::Relaxed);
     }
 
     fn histogram(&self, column: &str) -> Result<Value> {

@@ -106,6 +106,26 @@ async fn work_is_cancelled_when_its_page_disconnects() {
 }
 
 #[tokio::test]
+async fn memory_is_freed_once_the_last_page_has_gone() {
+    let timeouts = Timeouts { release: Duration::from_millis(300), ..Timeouts::default() };
+    let server = TestServer::start_with_limits(Limits { timeouts, ..Limits::default() });
+    let n_released = || server.provider.n_released.load(Ordering::Relaxed);
+    let first = TestPage::open(&server, json!({})).await;
+    let mut second = TestPage::open(&server, json!({})).await;
+    drop(first);
+    second.drain(Duration::from_millis(600)).await;
+    assert_eq!(n_released(), 0, "a page is left");
+    // A page that is loaded again keeps what it had.
+    drop(second);
+    let mut third = TestPage::open(&server, json!({})).await;
+    third.finished_picture().await;
+    third.drain(Duration::from_millis(600)).await;
+    assert_eq!(n_released(), 0, "a page came back");
+    drop(third);
+    wait_until(|| n_released() == 1).await;
+}
+
+#[tokio::test]
 async fn blocked_preparation_does_not_block_other_pages() {
     let server = TestServer::start();
     let mut blocked = Vec::new();

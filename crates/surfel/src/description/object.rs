@@ -18,6 +18,8 @@ settings! {
     pub struct ObjectDescription {
         /// Name for `parent` and animations [default: the name of the first file without its extension].
         name: String, Text, "NAME";
+        /// Name in the viewer's list of objects [default: the name of the file, or of the object].
+        label: String, Text, "TEXT";
         /// Frames per second of a sequence of files.
         fps: f64 = 10.0, FPS, "N";
         /// Makes one cloud of several files; otherwise they are a sequence, shown one after another.

@@ -12,8 +12,8 @@ use std::path::Path;
 settings! {
     /// Settings of single files and objects.
     pub struct OverrideSettings {
-        /// Sets one key of one file or object, as in scan.laz:color=class or house.obj:visible=false: visible, or a key
-        /// of surface, preparation and colour. May be given several times.
+        /// Sets one key of one file or object, as in scan.laz:color=class or house.obj:visible=false: visible, label, or a
+        /// key of surface, preparation and colour. May be given several times.
         object_settings: Vec<ObjectOverride>, ObjectOverrides, "FILE:KEY=VALUE";
     }
 }
@@ -32,6 +32,9 @@ pub struct ObjectOverride {
 /// Name of the key that hides objects.
 const VISIBLE: &str = "visible";
 
+/// Name of the key that names objects in the viewer's list.
+const LABEL: &str = "label";
+
 impl ObjectOverride {
     /// Writes the setting as text, as in `scan.laz:color=class`.
     pub fn text(&self) -> String {
@@ -40,15 +43,21 @@ impl ObjectOverride {
 
     /// Returns the settings of an object under a name.
     pub fn all_of(object: &ObjectDescription, target: &str) -> Vec<Self> {
-        let hidden = object.visible.map(|visible| (VISIBLE.to_owned(), json!(visible)));
+        let own = [VISIBLE, LABEL].into_iter();
+        let own = own.filter_map(|key| Some((key.to_owned(), object.get(key)?)));
         let parts = object.settings.parts().into_iter();
-        let keys = hidden.into_iter().chain(parts.flat_map(|part| write_table(part.settings)));
+        let keys = own.chain(parts.flat_map(|part| write_table(part.settings)));
         keys.map(|(key, value)| Self { target: target.to_owned(), key, value }).collect()
     }
 
     /// Returns true if a file is meant: by its path, its name, or its name without extension.
     pub fn names_file(&self, file: &Path) -> bool {
         is_named(file, &self.target)
+    }
+
+    /// Returns true if the setting is a label, for which a file need not become an object.
+    pub fn is_label(&self) -> bool {
+        self.key == LABEL
     }
 
     fn names(&self, object: &ObjectDescription) -> bool {
@@ -95,7 +104,7 @@ const EXPECTED: &str = "expected a file or object, a key and its value as in sca
 fn known_keys() -> Vec<&'static str> {
     let settings = ObjectSettings::default();
     let of_parts = settings.parts().into_iter().flat_map(|part| part.settings.keys());
-    of_parts.map(|key| key.name).chain([VISIBLE]).collect()
+    of_parts.map(|key| key.name).chain([VISIBLE, LABEL]).collect()
 }
 
 /// Reads `NAME:KEY=VALUE`. Names may contain colons, and values all signs.
@@ -114,7 +123,7 @@ fn parse(text: &str) -> Result<ObjectOverride, Invalid> {
     read.apply(&mut object).map_err(|error| error.within(&read.key))?;
     // The value as its rule writes it: a page compares texts.
     let value = match read.key.as_str() {
-        VISIBLE => object.get(VISIBLE),
+        VISIBLE | LABEL => object.get(&read.key),
         key => object.settings.parts().iter().find_map(|part| part.settings.get(key)),
     };
     Ok(ObjectOverride { value: value.unwrap_or(read.value), ..read })
@@ -128,24 +137,33 @@ impl OverrideSettings {
 }
 
 impl SceneDescription {
-    /// Gives files and objects their settings by name: a file becomes an object, which holds them. Doing so twice
-    /// changes nothing more.
+    /// Gives files and objects their settings by name: a file becomes an object, which holds them, unless it is a label.
+    /// Doing so twice changes nothing more.
     ///
     /// # Errors
     ///
     /// Fails for names that no file or object has.
     pub fn apply_object_settings(&mut self) -> Result<(), Invalid> {
-        for one in self.overrides.all().to_vec() {
+        let mut all = self.overrides.all().to_vec();
+        // Once the files with other settings are objects.
+        all.sort_by_key(ObjectOverride::is_label);
+        for one in all {
             let within = |error: Invalid| error.within("object_settings");
-            let own = self.files.extract_if(.., |file| one.names_file(file));
+            let is_label = one.is_label();
+            let own = self.files.extract_if(.., |file| !is_label && one.names_file(file));
             let own: Vec<ObjectDescription> = own.map(ObjectDescription::new).collect();
             self.objects.extend(own);
-            let mut meant = self.objects.iter_mut().filter(|object| one.names(object)).peekable();
-            if meant.peek().is_none() {
+            let mut is_known = self.files.iter().any(|file| one.names_file(file));
+            let meant = self.objects.iter_mut().filter(|object| one.names(object));
+            // A file among those of an object has a label of its own.
+            let mut meant = meant.inspect(|_| is_known = true).filter(|object| {
+                !is_label || object.files.len() == 1 || one.names_file(Path::new(&object.name()))
+            });
+            meant.try_for_each(|object| one.apply(object)).map_err(within)?;
+            if !is_known {
                 let message = format!("no file or object `{}`", one.target);
                 return Err(within(Invalid::new(message)));
             }
-            meant.try_for_each(|object| one.apply(object)).map_err(within)?;
         }
         Ok(())
     }
@@ -173,6 +191,7 @@ mod tests {
             "x=y.ply:range=1,2.5",
             "b.ply:radius-scale=1.5",
             "b.ply:color=#ff8000",
+            "b.ply:label=East: wall = 2",
         ];
         let read = ObjectOverrides.read(&json!(texts), Path::new("")).unwrap();
         assert_eq!(read[1].target, "C:\\scans\\a:b.laz");
@@ -186,6 +205,23 @@ mod tests {
         {
             assert!(ObjectOverrides.read(&json!(text), Path::new("")).is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn labels_leave_files_as_they_are() {
+        let mut description = described(&["b:label=East", "a.laz:label=West"]);
+        description.objects.push(ObjectDescription::new("/data/c.obj"));
+        let settings = json!(["b:label=East", "a.laz:label=West", "c:label=House"]);
+        description.set("object_settings", &settings, Path::new("")).unwrap();
+        description.apply_object_settings().unwrap();
+        assert_eq!(description.files.len(), 2);
+        assert_eq!(description.objects[0].label.as_deref(), Some("House"));
+        let mut both = described(&["b.ply:label=East", "b.ply:visible=false"]);
+        both.apply_object_settings().unwrap();
+        let object = &both.objects[0];
+        assert_eq!((object.label.as_deref(), object.visible), (Some("East"), Some(false)));
+        let error = described(&["d.ply:label=x"]).apply_object_settings().unwrap_err().to_string();
+        assert!(error.contains("no file or object `d.ply`"), "{error}");
     }
 
     #[test]

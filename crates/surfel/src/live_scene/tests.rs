@@ -95,6 +95,37 @@ fn an_added_object_joins_the_scene_and_leaves_it() {
 }
 
 #[test]
+fn an_added_object_leaves_the_trees_of_the_others() {
+    let (scene, description) = scene_of_a_plane("trees");
+    let first = scene.view(&description, &NoProgress).unwrap();
+    let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 5.0);
+    let cloud = PointCloud::from_positions((0..400).map(corner).collect());
+    let mut more = description.clone();
+    more.memory.insert("memory:more", MemoryContent::Points(Arc::new(cloud)));
+    more.objects.push(ObjectDescription::new("memory:more"));
+    let second = scene.view(&more, &NoProgress).unwrap();
+    let is_same = |a: &LiveView, b: &LiveView, i: usize| {
+        Arc::ptr_eq(&a.flat.geometries[i], &b.flat.geometries[i])
+    };
+    assert!(is_same(&first, &second, 0));
+    // Another surface of the added object.
+    more.objects[0].settings.surface.radius_scale = Some(1.5);
+    let third = scene.view(&more, &NoProgress).unwrap();
+    assert!(is_same(&first, &third, 0) && !is_same(&second, &third, 1));
+    // Another surface of all.
+    more.objects_default.surface.radius_scale = Some(2.0);
+    let fourth = scene.view(&more, &NoProgress).unwrap();
+    assert!(!is_same(&first, &fourth, 0));
+    // Trees that no view has are freed.
+    scene.release();
+    let tree = Arc::downgrade(&fourth.flat.geometries[0]);
+    assert!(tree.upgrade().is_some());
+    drop(fourth);
+    assert!(tree.upgrade().is_none() && !scene.is_prepared(&more));
+    assert_eq!(scene.view(&more, &NoProgress).unwrap().flat.instances.len(), 2);
+}
+
+#[test]
 fn choices_are_those_of_a_picture_of_the_same_points() {
     let path = std::env::temp_dir().join(format!("surfel-live-kept-{}.ply", std::process::id()));
     // A wall, and far from it a floor.
@@ -115,6 +146,7 @@ fn choices_are_those_of_a_picture_of_the_same_points() {
         assert_eq!(view.description.world.up, rendered.world.up);
         assert_ne!(view.description.camera, all.description.camera, "{filter}");
         // Points are still told by the index that they have in the file.
+        assert_eq!(view.color_source, all.color_source);
         let sources = view.sources()[0];
         let is_floor = filter == "z < -1";
         assert!(sources.iter().all(|source| (400 <= *source) == is_floor), "{filter}");

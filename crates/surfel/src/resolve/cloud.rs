@@ -126,12 +126,47 @@ pub fn filter_cloud(
     for (key, filter) in settings.point_filters()? {
         let n_points = cloud.len();
         keep_matching(&mut cloud, key, &filter, progress)?;
-        if cloud.is_empty() {
-            let message = format!("none of {n_points} points meets {filter}");
-            return Err(Invalid::at(key, message));
-        }
+        check_any_left(cloud.len(), n_points, key, &filter)?;
     }
     Ok(cloud)
+}
+
+/// Returns a copy of the points of a cloud that the settings keep. Nothing else of it is copied.
+///
+/// # Errors
+///
+/// Fails as [`filter_cloud`] does.
+pub fn filtered_copy(
+    cloud: &PointCloud,
+    settings: &PreparationSettings,
+    progress: &dyn Progress,
+) -> Result<PointCloud, Invalid> {
+    let mut kept: Vec<u32> = (0..cloud.len() as u32).collect();
+    for (key, filter) in settings.point_filters()? {
+        let n_points = kept.len();
+        let matches = matches(cloud, key, &filter)?;
+        kept.retain(|i| matches[*i as usize]);
+        progress.note(&format!("{} of {n_points} points meet {filter}", kept.len()));
+        check_any_left(kept.len(), n_points, key, &filter)?;
+    }
+    Ok(cloud.subset(&kept))
+}
+
+/// Fails if a filter kept none of the points.
+fn check_any_left(
+    n_left: usize,
+    n_points: usize,
+    key: &str,
+    filter: &PointFilter,
+) -> Result<(), Invalid> {
+    match n_left {
+        0 => Err(Invalid::at(key, format!("none of {n_points} points meets {filter}"))),
+        _ => Ok(()),
+    }
+}
+
+fn matches(cloud: &PointCloud, key: &str, filter: &PointFilter) -> Result<Vec<bool>, Invalid> {
+    filter.matches(cloud, 0).map_err(|error| Invalid::at(key, error.to_string()))
 }
 
 /// Drops the points of a cloud that do not meet the filter of a key.
@@ -142,9 +177,7 @@ pub(crate) fn keep_matching(
     progress: &dyn Progress,
 ) -> Result<(), Invalid> {
     let n_points = cloud.len();
-    let matches = filter.matches(cloud, 0);
-    let matches = matches.map_err(|error| Invalid::at(key, error.to_string()))?;
-    cloud.retain_from(0, &matches);
+    cloud.retain_from(0, &matches(cloud, key, filter)?);
     progress.note(&format!("{} of {n_points} points meet {filter}", cloud.len()));
     Ok(())
 }

@@ -3,7 +3,8 @@
 use super::appearance::{material_of_file, material_of_object};
 use super::loaded::LoadedScene;
 use super::{AutoSettings, description_camera};
-use crate::description::{KeyedSettings, ObjectDescription, SceneDescription};
+use crate::description::{KeyedSettings, ObjectDescription, ObjectOverride, SceneDescription};
+use std::path::Path;
 use surfel_core::scene::color::{ColorSource, choose_source};
 
 /// Returns the description with everything that was chosen written into it. It makes the same picture, byte for byte.
@@ -33,6 +34,7 @@ pub fn complete_description(
     complete.objects = of_files.chain(of_scene).collect();
     complete.files.clear();
     (complete.materials, complete.overrides) = Default::default();
+    complete.overrides.object_settings = labels_within_objects(scene, description);
     complete
 }
 
@@ -45,6 +47,25 @@ fn common_color(scene: &LoadedScene, description: &SceneDescription) -> Option<C
     chosen.all(|other| other == first).then_some(first)
 }
 
+/// The labels of files that are parts of one object.
+fn labels_within_objects(
+    scene: &LoadedScene,
+    description: &SceneDescription,
+) -> Option<Vec<ObjectOverride>> {
+    let several: Vec<Vec<&Path>> = scene.file_groups().filter(|files| 1 < files.len()).collect();
+    let is_part = |one: &&ObjectOverride| several.iter().flatten().any(|file| one.names_file(file));
+    let labels = description.overrides.all().iter().filter(|one| one.is_label()).filter(is_part);
+    let labels: Vec<ObjectOverride> = labels.cloned().collect();
+    (!labels.is_empty()).then_some(labels)
+}
+
+/// Returns the label of a file, if it has one.
+fn label_of(description: &SceneDescription, file: &Path) -> Option<String> {
+    let mut labels = description.overrides.all().iter().filter(|one| one.is_label());
+    let label = labels.rfind(|one| one.names_file(file))?;
+    Some(label.value.as_str()?.to_owned())
+}
+
 /// The files without an object, as objects.
 fn file_objects(
     scene: &LoadedScene,
@@ -54,6 +75,7 @@ fn file_objects(
         let material = files.last().and_then(|file| material_of_file(description, file));
         ObjectDescription {
             files: files.iter().map(|file| file.to_path_buf()).collect(),
+            label: if files.len() == 1 { label_of(description, files[0]) } else { None },
             merge: (1 < files.len()).then_some(true),
             material: material.map(|choice| choice.material.clone()),
             ..ObjectDescription::default()

@@ -1,6 +1,6 @@
 //! A scene without the points that a description drops.
 
-use super::super::cloud::filter_cloud;
+use super::super::cloud::filtered_copy;
 use super::LoadedScene;
 use crate::description::SceneDescription;
 use crate::error::Result;
@@ -28,10 +28,8 @@ impl LoadedScene {
         let mut graph = self.graph_without_points();
         for (i, cloud) in self.clouds() {
             let settings = self.settings_of(i, description).preparation;
-            let kept = filter_cloud(cloud.clone(), &settings, progress)?;
-            // The columns of a copy take no more memory than their points.
-            let all: Vec<u32> = (0..kept.len() as u32).collect();
-            graph.geometries[i] = Geometry::Points(kept.subset(&all));
+            let kept = filtered_copy(cloud, &settings, progress)?;
+            graph.geometries[i] = Geometry::Points(kept);
         }
         Ok(Self {
             graph,

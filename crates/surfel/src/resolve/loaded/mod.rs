@@ -21,6 +21,7 @@ use surfel_core::math::DVec3;
 use surfel_core::points::{PointCloud, PreparedCloud, STRUCTURE, SURFACE_VARIATION};
 use surfel_core::progress::Progress;
 use surfel_core::render::check_surfaces;
+use surfel_core::scene::color::{ColorSource, choose_source};
 use surfel_core::scene::{Environment, Geometry, Graph, Track, Transform};
 use surfel_core::surface::SurfaceKind;
 use surfel_formats::FileInfo;
@@ -334,6 +335,11 @@ impl LoadedScene {
     pub(super) fn has_normals(&self, description: &SceneDescription) -> bool {
         let is_wanted = |i| self.settings_of(i, description).needs_normals();
         self.clouds().any(|(i, cloud)| cloud.normals.is_some() || is_wanted(i))
+    }
+
+    /// Returns the source of colours that is chosen for the first cloud if none is set.
+    pub fn color_source(&self) -> Option<ColorSource> {
+        self.clouds().next().map(|(_, cloud)| choose_source(cloud).0)
     }
 
     /// Returns true if a description shows a geometry: it hides objects only.

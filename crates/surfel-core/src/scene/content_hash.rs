@@ -1,0 +1,147 @@
+//! Hashes of geometries, by which trees that were built before are found again.
+
+use super::cloud_geometry::CloudGeometry;
+use super::graph::Geometry;
+use super::mesh::Mesh;
+use crate::points::Values;
+use crate::surface::SurfaceKind;
+use bytemuck::{NoUninit, cast_slice};
+use rayon::prelude::*;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+/// Number of bytes that a thread hashes at a time.
+const BYTES_PER_TASK: usize = 1 << 20;
+
+impl Geometry {
+    /// Returns a hash of everything that the trees of the geometry hold: points or triangles, relative to their origin,
+    /// with their attributes, and the surface. Morph targets and joints are not counted.
+    pub fn content_hash(&self) -> u64 {
+        match self {
+            Self::Points(points) => cloud_hash(points),
+            Self::Triangles(mesh) => mesh_hash(mesh),
+        }
+    }
+}
+
+fn cloud_hash(geometry: &CloudGeometry) -> u64 {
+    let cloud = geometry.cloud();
+    let mut columns = vec![
+        hash(cloud.positions()),
+        hash(cloud.normals()),
+        hash(cloud.radii()),
+        hash(geometry.colors()),
+    ];
+    let structures = geometry.structures().unwrap_or_default();
+    let structures: Vec<u8> = structures.iter().map(|structure| *structure as u8).collect();
+    columns.push(hash(&structures));
+    if geometry.surface == SurfaceKind::Gaussian {
+        for scalar in &cloud.scalars {
+            let mut hasher = DefaultHasher::new();
+            (&scalar.name, values_hash(&scalar.values)).hash(&mut hasher);
+            columns.push(hasher.finish());
+        }
+    }
+    let settings = format!(
+        "{:?}",
+        (
+            (geometry.surface, geometry.options, geometry.edge_test, geometry.octree_depth),
+            (geometry.blends_colors, geometry.support_colors, geometry.shows_trained_colors),
+            (geometry.has_outward_normals, geometry.has_front_sides),
+        )
+    );
+    let mut hasher = DefaultHasher::new();
+    ("points", columns, settings).hash(&mut hasher);
+    hasher.finish()
+}
+
+fn mesh_hash(mesh: &Mesh) -> u64 {
+    let [first, second] = &mesh.uvs;
+    let columns = (
+        (hash(&mesh.positions), hash(&mesh.triangles)),
+        (mesh.normals.as_deref().map(hash), mesh.tangents.as_deref().map(hash)),
+        (first.as_deref().map(hash), second.as_deref().map(hash)),
+        mesh.colors.as_deref().map(hash),
+    );
+    let mut hasher = DefaultHasher::new();
+    ("triangles", columns).hash(&mut hasher);
+    hasher.finish()
+}
+
+fn values_hash(values: &Values) -> u64 {
+    match values {
+        Values::U8(values) => hash(values),
+        Values::U16(values) => hash(values),
+        Values::I32(values) => hash(values),
+        Values::F32(values) => hash(values),
+        Values::F64(values) => hash(values),
+    }
+}
+
+/// Returns a hash of the bytes and of their number, the same on any number of threads.
+fn hash<T: NoUninit>(values: &[T]) -> u64 {
+    let bytes: &[u8] = cast_slice(values);
+    let of_chunks: Vec<u64> = bytes
+        .par_chunks(BYTES_PER_TASK)
+        .map(|chunk| {
+            let mut hasher = DefaultHasher::new();
+            hasher.write(chunk);
+            hasher.finish()
+        })
+        .collect();
+    let mut hasher = DefaultHasher::new();
+    (bytes.len(), of_chunks).hash(&mut hasher);
+    hasher.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    //! What trees hold changes the hash, and nothing else does.
+
+    use super::*;
+    use crate::math::{DVec3, Vec3};
+    use crate::points::{PointCloud, Preparation, PreparedCloud, prepare};
+    use crate::progress::NoProgress;
+    use crate::surface::EdgeTest;
+
+    fn prepared() -> PreparedCloud {
+        let position = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0);
+        let cloud = PointCloud::from_positions((0..400).map(position).collect());
+        prepare(cloud, &Preparation::default(), &NoProgress).unwrap().0
+    }
+
+    fn points_hash(change: impl FnOnce(&mut CloudGeometry)) -> u64 {
+        let mut geometry = CloudGeometry::with_uniform_color(prepared(), [9; 3]);
+        change(&mut geometry);
+        Geometry::Points(geometry).content_hash()
+    }
+
+    #[test]
+    fn points_and_their_surface_decide() {
+        let first = points_hash(|_| {});
+        assert_eq!(points_hash(|_| {}), first);
+        let changed = [
+            points_hash(|it| it.surface = SurfaceKind::Disc),
+            points_hash(|it| it.edge_test = EdgeTest::Off),
+            points_hash(|it| it.options.reach = Some(3.0)),
+            points_hash(|it| it.retain(&(0..399).collect::<Vec<u32>>())),
+            points_hash(|it| *it = CloudGeometry::with_uniform_color(prepared(), [8; 3])),
+        ];
+        assert!(changed.iter().all(|other| *other != first), "{changed:?}");
+    }
+
+    #[test]
+    fn triangles_and_attributes_decide() {
+        let mesh = Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            triangles: vec![[0, 1, 2]],
+            ..Mesh::default()
+        };
+        let hash = |mesh: Mesh| Geometry::Triangles(mesh).content_hash();
+        let first = hash(mesh.clone());
+        assert_eq!(hash(Mesh { origin: DVec3::X, ..mesh.clone() }), first);
+        assert_ne!(hash(Mesh { normals: Some(vec![Vec3::Z; 3]), ..mesh.clone() }), first);
+        assert_ne!(hash(Mesh { triangles: vec![[1, 2, 0]], ..mesh.clone() }), first);
+        let moved = vec![Vec3::ZERO, Vec3::X, 2.0 * Vec3::Y];
+        assert_ne!(hash(Mesh { positions: moved, ..mesh }), first);
+    }
+}
