@@ -61,7 +61,7 @@ pub struct Estimates<'a> {
     tree: Option<KdTree<'a>>,
     /// The voters on the structure of each point, if structures are missing and they were found.
     voters: Vec<Voters>,
-    /// Which points lie by gaps, empty if it was not looked for.
+    /// True for points by gaps; empty if they were not looked for.
     is_by_gap: Vec<bool>,
 }
 

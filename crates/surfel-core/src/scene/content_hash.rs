@@ -95,7 +95,7 @@ fn hash<T: NoUninit>(values: &[T]) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    //! What trees hold changes the hash, and nothing else does.
+    //! The hash changes with the content of trees, and with nothing else.
 
     use super::*;
     use crate::math::{DVec3, Vec3};
