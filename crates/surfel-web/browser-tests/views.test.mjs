@@ -125,6 +125,7 @@ test('rows are renamed; scene files and links carry the names, and settings go o
   assert.equal(await other.locator('[data-object="house.obj"] label').first().textContent(), 'East: wing');
   await closePage(other);
   await reopen(page);
+  await unfoldPanel(page);
   await page.waitForFunction(() => document.querySelector('[data-object="house.obj"] label').textContent === 'house.obj');
   await page.locator('#scene-file').setInputFiles({ name: 'names.toml', mimeType: 'text/plain', buffer: Buffer.from(toml) });
   await page.waitForFunction(() => document.querySelector('[data-object="house.obj"] label').textContent === 'East: wing');
