@@ -1,29 +1,26 @@
 //! The content of all files of a description, side by side in one graph, before it is prepared.
 
 mod add_content;
+mod checks;
 mod filtered;
 
 use super::camera::{camera_motion, keep_named_camera};
-use super::check_files::{check_files, n_pixels};
-use super::cloud::{can_be_colored, check_empty, filter_cloud, prepare_cloud};
+use super::check_files::check_files;
+use super::cloud::{check_empty, filter_cloud, prepare_cloud};
 use super::environment::load_environment;
-use super::memory::MemoryEstimate;
 use super::sequence::Sequence;
 use crate::description::{CameraMotion, Invalid, ObjectMotion, ObjectSettings, SceneDescription};
 use crate::error::{Error, Result};
 use crate::names::list_files;
-use crate::troubleshooting::TroubleshootingSection;
 use std::borrow::Cow;
 use std::iter::successors;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use surfel_core::math::DVec3;
-use surfel_core::points::{PointCloud, PreparedCloud, STRUCTURE, SURFACE_VARIATION};
+use surfel_core::points::{PointCloud, PreparedCloud};
 use surfel_core::progress::Progress;
-use surfel_core::render::check_surfaces;
 use surfel_core::scene::color::{ColorSource, choose_source};
 use surfel_core::scene::{Environment, Geometry, Graph, Track, Transform};
-use surfel_core::surface::SurfaceKind;
 use surfel_formats::FileInfo;
 
 /// The content of the files of a description, before it is prepared.
@@ -162,14 +159,6 @@ impl LoadedScene {
         Ok(scene)
     }
 
-    /// Fails if trees and picture need more memory than they may take.
-    pub(super) fn check_memory(&self, description: &SceneDescription) -> Result<()> {
-        let subsample = description.objects_default.preparation.subsample;
-        MemoryEstimate::from_graph(&self.graph, subsample, n_pixels(description))
-            .with_surfaces_of(description)
-            .check(description.run.memory_limit)
-    }
-
     fn number_points(&mut self) {
         for geometry in &mut self.graph.geometries {
             if let Geometry::Points(cloud) = geometry {
@@ -300,28 +289,6 @@ impl LoadedScene {
         })
     }
 
-    /// Checks what the renderer would refuse at a time: points as pixels together with traced surfaces.
-    ///
-    /// # Errors
-    ///
-    /// Fails as rendering does.
-    pub fn check_surfaces(&self, description: &SceneDescription, time_secs: f64) -> Result<()> {
-        let mut graph = self.graph_without_points();
-        for (node, is_visible) in self.visibility(&self.graph, description) {
-            graph.nodes[node].is_visible = is_visible;
-        }
-        graph.evaluate_at(time_secs);
-        let nodes = graph.nodes.iter().zip(graph.visible_nodes());
-        let shown =
-            nodes.filter(|(_, is_visible)| *is_visible).flat_map(|(node, _)| &node.primitives);
-        let is_raster = |geometry: usize| {
-            let surface = self.settings_of(geometry, description).surface.surface();
-            let is_cloud = matches!(graph.geometries[geometry], Geometry::Points(_));
-            is_cloud && surface == SurfaceKind::Points
-        };
-        Ok(check_surfaces(shown.map(|primitive| is_raster(primitive.geometry)))?)
-    }
-
     /// Returns the settings of a geometry: those of its object over those of the scene.
     pub fn settings_of(&self, geometry: usize, description: &SceneDescription) -> ObjectSettings {
         let scene = &description.objects_default;
@@ -430,28 +397,6 @@ impl LoadedScene {
         Error::Content { files: self.files_of(geometry, description).to_vec(), cause }
     }
 
-    /// Fails before the preparation if no file has the column asked for. The library knows only the columns that were
-    /// loaded, which are those asked for.
-    pub(crate) fn check_colors(&self, description: &SceneDescription) -> Result<()> {
-        for (i, cloud) in self.clouds() {
-            let Some(color) = self.settings_of(i, description).color.color else { continue };
-            if can_be_colored(cloud, &color) {
-                continue;
-            }
-            return Err(Error::Unfit(format!(
-                "{}: no column {color}; --color takes elevation, normal, support, {SURFACE_VARIATION}, {STRUCTURE}, \
-                 #RRGGBB, a CSS colour name and what the file has: {}; {}",
-                list_files(self.files_of(i, description)),
-                match colorable_columns(&self.file_info().columns) {
-                    none if none.is_empty() => "only positions".to_owned(),
-                    columns => columns.join(", "),
-                },
-                TroubleshootingSection::WrongColors,
-            )));
-        }
-        Ok(())
-    }
-
     /// Returns the graph with clouds that have no points.
     pub(crate) fn graph_without_points(&self) -> Graph<PointCloud> {
         let geometries = self.graph.geometries.iter().map(|geometry| match geometry {
@@ -491,21 +436,4 @@ fn content_summary(graph: &Graph<PointCloud>) -> String {
         (0, triangles) => format!("{triangles} triangles"),
         (points, triangles) => format!("{points} points and {triangles} triangles"),
     }
-}
-
-/// Returns the columns of a file as `color` takes them.
-fn colorable_columns(columns: &[String]) -> Vec<&str> {
-    let mut names: Vec<&str> = Vec::new();
-    for column in columns {
-        let name = match column.to_ascii_lowercase().as_str() {
-            "x" | "y" | "z" | "nx" | "ny" | "nz" | "normal" | "radius" => continue,
-            "red" | "green" | "blue" | "r" | "g" | "b" | "rgb" => "rgb",
-            "classification" => "class",
-            _ => column,
-        };
-        if !names.contains(&name) {
-            names.push(name);
-        }
-    }
-    names
 }
