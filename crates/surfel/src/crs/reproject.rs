@@ -1,14 +1,14 @@
 //! Longitudes and latitudes in metres: in degrees, a scan is a needle as high as its heights.
 
 use super::{CoordinateSystem, Place, Unit};
-use surfel_core::math::{Aabb, DVec3};
+use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_formats::FileInfo;
 
 /// Maximum extent of a scan in degrees, if no coordinate system is stated.
-const MAX_DEGREES: f32 = 2.0;
+const MAX_DEGREES: f64 = 2.0;
 /// Minimum height in metres of a scan in degrees, as a multiple of its extent: 1 km is 0.01 degrees wide.
-const MIN_NEEDLE_RATIO: f32 = 100.0;
+const MIN_NEEDLE_RATIO: f64 = 100.0;
 /// Minimum ratio of the distance from longitude and latitude zero to the extent of a scan. Coordinates of objects start
 /// near zero.
 const MIN_OFFSET_RATIO: f64 = 100.0;
@@ -24,15 +24,13 @@ pub fn metres_from_degrees(
     others: Option<&str>,
 ) -> Option<String> {
     let source = info.coordinate_system.as_deref().and_then(CoordinateSystem::parse);
-    let bounds = Aabb::of_points(cloud.positions.iter().copied().filter(|p| p.is_finite()));
-    let [low, high] = [bounds.min, bounds.max].map(|corner| cloud.origin + corner.as_dvec3());
-    let is_on_earth = -180.0 <= low.x && high.x <= 360.0 && -90.0 <= low.y && high.y <= 90.0;
+    let extent = Extent::of(cloud);
     let is_stated = source.as_ref().map(|source| source.unit() == Unit::Degrees);
-    if !is_on_earth || !is_stated.unwrap_or_else(|| is_needle(bounds, low)) {
+    if !extent.is_on_earth() || !is_stated.unwrap_or_else(|| extent.is_needle()) {
         return None;
     }
     let source = source.or_else(|| CoordinateSystem::parse("EPSG:4326"))?;
-    let middle = source.place(0.5 * (low + high))?;
+    let middle = source.place(0.5 * (extent.low + extent.high))?;
     let is_metric = |system: &CoordinateSystem| {
         !system.projection.is_geocent() && system.unit() != Unit::Degrees
     };
@@ -46,7 +44,7 @@ pub fn metres_from_degrees(
         }
     };
     let origin = target.position(middle)?.round().with_z(cloud.origin.z);
-    let moved = |position: &surfel_core::math::Vec3| {
+    let moved = |position: &Vec3| {
         let degrees = cloud.origin + position.as_dvec3();
         if !degrees.is_finite() {
             return Some(*position);
@@ -69,15 +67,40 @@ pub fn metres_from_degrees(
     Some(line)
 }
 
-/// True if coordinates look like degrees beside heights in metres.
-fn is_needle(bounds: Aabb, low: DVec3) -> bool {
-    let size = bounds.size();
-    let side = size.x.max(size.y);
-    let offset = low.x.abs().max(low.y.abs());
-    0.0 < side
-        && side < MAX_DEGREES
-        && MIN_NEEDLE_RATIO * side < size.z
-        && MIN_OFFSET_RATIO * f64::from(side) < offset
+/// True if the coordinates of a cloud look like degrees beside heights in metres.
+pub fn looks_like_degrees(cloud: &PointCloud) -> bool {
+    let extent = Extent::of(cloud);
+    extent.is_on_earth() && extent.is_needle()
+}
+
+/// The least and greatest coordinates of a cloud.
+struct Extent {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Extent {
+    fn of(cloud: &PointCloud) -> Self {
+        let bounds = Aabb::of_points(cloud.positions.iter().copied().filter(|p| p.is_finite()));
+        let [low, high] = [bounds.min, bounds.max].map(|corner| cloud.origin + corner.as_dvec3());
+        Self { low, high }
+    }
+
+    fn is_on_earth(&self) -> bool {
+        let Self { low, high } = self;
+        -180.0 <= low.x && high.x <= 360.0 && -90.0 <= low.y && high.y <= 90.0
+    }
+
+    /// True if a scan is far higher than wide, and far from zero.
+    fn is_needle(&self) -> bool {
+        let size = self.high - self.low;
+        let side = size.x.max(size.y);
+        let offset = self.low.x.abs().max(self.low.y.abs());
+        0.0 < side
+            && side < MAX_DEGREES
+            && MIN_NEEDLE_RATIO * side < size.z
+            && MIN_OFFSET_RATIO * side < offset
+    }
 }
 
 /// Returns the EPSG code of the UTM zone of a place.
@@ -92,7 +115,6 @@ mod tests {
     //! Degrees that are moved, and lengths that are not.
 
     use super::*;
-    use surfel_core::math::Vec3;
 
     /// Returns points 1e-4 `scale` apart at an origin.
     fn points(scale: f32, origin: DVec3) -> PointCloud {

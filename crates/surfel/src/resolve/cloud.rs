@@ -1,6 +1,6 @@
 //! A cloud on its way from the file to a surface: read, prepared, coloured.
 
-use crate::crs::metres_from_degrees;
+use crate::crs::{looks_like_degrees, metres_from_degrees};
 use crate::description::{Invalid, ObjectSettings, PreparationSettings};
 use crate::error::{Error, Result};
 use crate::memory_files::{MemoryContent, MemoryFiles};
@@ -42,9 +42,35 @@ pub fn import(
     options: &ImportOptions,
     progress: &dyn Progress,
 ) -> Result<(Graph<PointCloud>, FileInfo)> {
-    if let Some(content) = options.memory.get(file) {
-        return import_from_memory(content, settings, options, progress);
+    let content = options.memory.get(file);
+    let loaded = match content {
+        Some(content) => import_from_memory(content, settings, options, progress)?,
+        None => import_from_file(file, settings, options, progress)?,
+    };
+    match content {
+        // Rays that meet them are in their coordinates.
+        Some(MemoryContent::Points(cloud)) => report_degrees(cloud, progress),
+        _ if settings.preparation.reproject() => return Ok(with_metres(loaded, options, progress)),
+        _ => {}
     }
+    Ok(loaded)
+}
+
+/// Warns of points in memory whose coordinates look like degrees.
+fn report_degrees(cloud: &PointCloud, progress: &dyn Progress) {
+    if looks_like_degrees(cloud) {
+        progress.note(
+            "warning: x and y look like degrees of longitude and latitude, z like metres; reproject the points to a system in metres first, with pyproj for example",
+        );
+    }
+}
+
+fn import_from_file(
+    file: &Path,
+    settings: &ObjectSettings,
+    options: &ImportOptions,
+    progress: &dyn Progress,
+) -> Result<(Graph<PointCloud>, FileInfo)> {
     let columns = if options.keeps_all_columns { ColumnChoice::All } else { settings.columns() };
     let mut load_options = settings.preparation.load_options(columns)?;
     if options.keeps_all_columns {
@@ -58,10 +84,7 @@ pub fn import(
         surfel_formats::load_graph(file, &load_options, progress)?
     };
     progress.end();
-    match settings.preparation.reproject() {
-        true => Ok(with_metres(loaded, options, progress)),
-        false => Ok(loaded),
-    }
+    Ok(loaded)
 }
 
 /// Moves a cloud in degrees of longitude and latitude to metres; everything else stays as it is.
@@ -339,5 +362,38 @@ pub fn report_radii(
     let radius = settings.preparation.radius.unwrap_or_default();
     if let (Some(radii), false) = (&report.radii, matches!(radius, Radius::Fixed(_))) {
         progress.choice(&radii.line(radius), &["radius"]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Degrees of files in memory are moved, those of arrays are reported.
+
+    use super::*;
+    use crate::memory_files::FileContent;
+    use crate::progress_log::ProgressLog;
+    use std::sync::Arc;
+    use surfel_core::math::DVec3;
+    use surfel_core::progress::NoProgress;
+
+    #[test]
+    fn files_in_memory_are_moved_to_metres_and_arrays_stay() {
+        let position = |i: i32| Vec3::new(1e-4 * (i % 30) as f32, 1e-4 * (i / 30) as f32, i as f32);
+        let mut cloud = PointCloud::from_positions((0..900).map(position).collect());
+        cloud.origin = DVec3::new(11.57, 48.13, 520.0);
+        let file = FileContent { graph: graph_of(cloud.clone()), info: FileInfo::default() };
+        let contents =
+            [MemoryContent::File(Arc::new(file)), MemoryContent::Points(Arc::new(cloud))];
+        let origins_and_notes = contents.map(|content| {
+            let mut options = ImportOptions::default();
+            options.memory.insert("scan", content);
+            let log = ProgressLog::new(&NoProgress);
+            let settings = ObjectSettings::default();
+            let (graph, _) = import(Path::new("scan"), &settings, &options, &log).unwrap();
+            let origin = into_cloud(graph).unwrap().origin;
+            (origin.y, log.into_notes().iter().any(|note| note.contains("look like degrees")))
+        });
+        assert!(5e6 < origins_and_notes[0].0 && !origins_and_notes[0].1);
+        assert_eq!(origins_and_notes[1], (48.13, true));
     }
 }
