@@ -7,12 +7,7 @@ fn support(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let hit = hits[ray_idx];
-    visit_idx = task.first_visit;
-    let end = task.first_visit + task.n_visits;
-    while visit_idx < end && visits[visit_idx].instance != hit.instance {
-        visit_idx += 1u;
-    }
-    if visit_idx == end || hit.surface != visits[visit_idx].surface {
+    if !find_visit(hit.instance, hit.surface) {
         return;
     }
     let world_ray = paths[ray_idx].ray;

@@ -41,6 +41,16 @@ fn point_hit(
     return SurfaceHit(true, distance, slot, radius, normal, normal, opaque, is_backface, none.xy, none, false, none);
 }
 
+// Goes to the visit of a hit. Returns false if the pass has none for it.
+fn find_visit(instance: u32, surface: u32) -> bool {
+    visit_idx = task.first_visit;
+    let end = task.first_visit + task.n_visits;
+    while visit_idx < end && visits[visit_idx].instance != instance {
+        visit_idx += 1u;
+    }
+    return visit_idx < end && surface == visits[visit_idx].surface;
+}
+
 // Returns the factor by which distances along a ray grow from the world to the object.
 fn object_scale(ray: Ray) -> f32 {
     if visits[visit_idx].is_identity == 1u {
