@@ -45,8 +45,13 @@ pub fn lights() -> Vec<Light> {
 
 /// Returns a scene of a ball on a cube whose points have this kind.
 pub fn scene(kind: SurfaceKind) -> Scene {
+    scene_with_ball_at(1.7, kind)
+}
+
+/// Returns the scene with the middle of the ball at this height; at 1.7 it lies on the cube.
+pub fn scene_with_ball_at(height: f32, kind: SurfaceKind) -> Scene {
     let mut cloud = clouds::cube(24, 0.4, 11);
-    let ball = clouds::sphere(1500, 0.7).positions.into_iter().map(|p| p + 1.7 * Vec3::Z);
+    let ball = clouds::sphere(1500, 0.7).positions.into_iter().map(|p| p + height * Vec3::Z);
     cloud.positions.extend(ball);
     cloud.normals = None;
     let points = scenes::points(cloud, kind);
