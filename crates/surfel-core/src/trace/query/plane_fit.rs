@@ -38,11 +38,12 @@ impl<W: PacketLanes> FittedDiscs<'_, W> {
     #[inline(always)]
     pub fn keep_nearest(&mut self) {
         let none = W::splat(f32::NAN);
-        let squared = self.discs.iter().zip(&*self.hits).map(|(disc, hit)| {
+        // A loop, not a closure: code that `collect` calls is not compiled for the wider vectors.
+        let mut squared: Vec<[f32; PACKET_WIDTH]> = Vec::with_capacity(self.discs.len());
+        for (disc, hit) in self.discs.iter().zip(&*self.hits) {
             let offset = self.offset(disc);
-            W::select(hit.hit_mask::<W>(), offset.dot(offset), none).store()
-        });
-        let squared: Vec<[f32; PACKET_WIDTH]> = squared.collect();
+            squared.push(W::select(hit.hit_mask::<W>(), offset.dot(offset), none).store());
+        }
         let Limits { limits, ties } = limits_of_nearest::<W>(&squared);
         for lane in set_bits::<PACKET_WIDTH>(ties) {
             self.keep_nearest_of_lane(&squared, lane);
