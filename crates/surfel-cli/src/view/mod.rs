@@ -5,6 +5,7 @@ mod rejection;
 mod rows;
 mod added_files;
 mod file_names;
+mod freed_memory;
 mod legend;
 mod facts;
 mod histogram;

@@ -126,7 +126,7 @@ impl FlatPoints {
     }
 
     /// Returns the point at `slot` with its linear colour.
-    #[inline]
+    #[inline(always)]
     pub fn surfel(&self, slot: Slot) -> Surfel {
         let (block, lane) = (&self.blocks[slot as usize / LANES], slot as usize % LANES);
         Surfel {

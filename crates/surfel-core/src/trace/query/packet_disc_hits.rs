@@ -4,8 +4,8 @@ use crate::flat::Slot;
 use crate::math::{LaneMask, PACKET_WIDTH, PacketLanes, set_bits};
 use crate::trace::query::hit::Hit;
 
-/// Maximum number of discs that are sorted by insertion.
-const MAX_INSERTION_SORT: usize = 512;
+/// Maximum number of discs that are sorted by insertion: moving a hit costs more than moving a key.
+const MAX_INSERTION_SORT: usize = 24;
 
 /// A disc and the distances at which the rays of a packet hit it.
 #[derive(Clone, Copy)]
@@ -80,12 +80,11 @@ fn keep_nearest_k(hits: &mut Vec<PacketDiscHit>, lanes: u32, max_hits: usize) {
     hits.retain(|hit| hit.distances.iter().any(|distance| !distance.is_nan()));
 }
 
-/// Sorts by slot. The hits are few, and mostly in order: blocks are visited from near to far, their points by
-/// slot.
+/// Sorts by slot. The hits are mostly in order: blocks are visited from near to far, their points by slot.
 #[inline(always)]
-fn sort(hits: &mut [PacketDiscHit]) {
+fn sort(hits: &mut Vec<PacketDiscHit>) {
     if MAX_INSERTION_SORT < hits.len() {
-        return hits.sort_unstable_by_key(|hit| hit.slot);
+        return sort_by_keys(hits);
     }
     for end in 1..hits.len() {
         let next = hits[end];
@@ -96,6 +95,19 @@ fn sort(hits: &mut [PacketDiscHit]) {
         }
         hits[i] = next;
     }
+}
+
+/// Sorts by slot, and moves each hit only once.
+fn sort_by_keys(hits: &mut Vec<PacketDiscHit>) {
+    if hits.is_sorted_by_key(|hit| hit.slot) {
+        return;
+    }
+    let key = |(i, hit): (usize, &PacketDiscHit)| u64::from(hit.slot) << 32 | i as u64;
+    let mut keys: Vec<u64> = hits.iter().enumerate().map(key).collect();
+    keys.sort_unstable();
+    let mut sorted = Vec::with_capacity(hits.capacity());
+    sorted.extend(keys.iter().map(|key| hits[*key as u32 as usize]));
+    *hits = sorted;
 }
 
 #[cfg(test)]
