@@ -28,8 +28,10 @@ pub enum Refit {
 }
 
 impl Refit {
-    /// Decides whether a tree of this cost ratio needs a rebuild.
-    pub(super) fn from_cost_ratio(cost_ratio: f64) -> Self {
+    /// Decides whether a tree of this cost needs a rebuild. `built` is its cost when it was built. An empty tree costs
+    /// nothing.
+    pub(super) fn from_costs(cost: f64, built: f64) -> Self {
+        let cost_ratio = if cost == built { 1.0 } else { cost / built };
         if cost_ratio <= MAX_COST_RATIO { Self::Kept { cost_ratio } } else { Self::NeedsRebuild }
     }
 }
@@ -46,7 +48,7 @@ impl FlatPoints {
         if !(is_same_set && self.reencode(&columns)) {
             return Refit::NeedsRebuild;
         }
-        Refit::from_cost_ratio(self.refit_boxes(columns.kind()) / self.cost)
+        Refit::from_costs(self.refit_boxes(columns.kind()), self.cost)
     }
 
     fn n_points(&self) -> usize {

@@ -137,7 +137,7 @@ impl FlatTriangles {
         if n_kept != n_traceable || self.slots().count() != n_traceable {
             return Refit::NeedsRebuild;
         }
-        Refit::from_cost_ratio(self.refit_boxes() / self.cost)
+        Refit::from_costs(self.refit_boxes(), self.cost)
     }
 
     fn refit_boxes(&mut self) -> f64 {

@@ -28,6 +28,23 @@ pub struct CameraRayBatch<'a> {
     pub samples: PixelSamples<'a>,
 }
 
+impl CameraRayBatch<'_> {
+    /// Splits the batch into parts of `n_rays` rays, the last of which may have fewer.
+    pub(super) fn parts(&self, n_rays: usize) -> impl Iterator<Item = Self> {
+        let Self { tracer, rays, hits, samples } = *self;
+        (0..rays.len()).step_by(n_rays).map(move |first| {
+            let part = first..rays.len().min(first + n_rays);
+            let samples = PixelSamples {
+                keys: &samples.keys[part.clone()],
+                indices: &samples.indices[part.clone()],
+                background: &samples.background[part.clone()],
+                ..samples
+            };
+            Self { tracer, rays: &rays[part.clone()], hits: &hits[part], samples }
+        })
+    }
+}
+
 /// The pixel samples that the rays of a batch stand for.
 #[derive(Clone, Copy, Debug)]
 pub struct PixelSamples<'a> {

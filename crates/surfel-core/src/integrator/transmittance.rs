@@ -89,7 +89,7 @@ fn attenuate_by_gaussians(
 ) -> Result<()> {
     let open: Vec<usize> = (0..rays.len()).filter(|i| !occluded[*i]).collect();
     let rays: Vec<Ray> = open.iter().map(|i| rays[*i]).collect();
-    let lights = tracer.gaussians(&rays, &vec![SceneHit::MISS; rays.len()])?;
+    let lights = tracer.gaussians_along(&rays)?;
     for (i, light) in open.into_iter().zip(lights) {
         transmittances[i] *= light.transmittance;
         if light.transmittance < MIN_TRANSMITTANCE {

@@ -10,7 +10,7 @@ use super::specular::{
     smith_g2_over_g1, thin_slab_fresnel,
 };
 use crate::error::Result;
-use crate::math::{Basis, Ray, Vec3, Vec4, hash, owen_sobol_2d};
+use crate::math::{Basis, PACKET_WIDTH, Ray, Vec3, Vec4, hash, owen_sobol_2d};
 use crate::scene::Background;
 use crate::trace::{GaussianLight, InstanceFilter, SceneHit};
 
@@ -25,6 +25,9 @@ pub struct Whitted {
 pub const MAX_ALPHA_LAYERS: u32 = 64;
 /// Path weight below which Russian roulette ends paths, with the mean preserved.
 pub const MIN_WEIGHT: f32 = 0.01;
+
+/// Approximate maximum number of paths in a wavefront. A path takes about half a kilobyte with its ray, hit and shading.
+const MAX_WAVE_SIZE: usize = 1 << 15;
 
 /// Random dimension of directions in a rough lobe.
 pub const LOBE_DIRECTION: u64 = 11;
@@ -71,6 +74,28 @@ enum MissBehavior {
 
 impl Integrator for Whitted {
     fn radiance(&self, batch: &CameraRayBatch) -> Result<(Vec<Vec4>, RayCounts)> {
+        let mut colors = Vec::with_capacity(batch.rays.len());
+        let mut counts = RayCounts::default();
+        for part in batch.parts(n_rays_at_once(batch.samples.n_light_samples)) {
+            let (colors_of_part, counts_of_part) = self.radiance_of_part(&part)?;
+            colors.extend(colors_of_part);
+            counts += counts_of_part;
+        }
+        Ok((colors, counts))
+    }
+}
+
+/// Returns the number of camera rays whose paths are followed at once. The branches of a ray in rough lobes share its
+/// light samples, and Russian roulette leaves no more than those of minimum weight.
+fn n_rays_at_once(n_light_samples: u32) -> usize {
+    let max_branches = (1.0 / MIN_WEIGHT) as usize;
+    let n_branches = (n_light_samples as usize).clamp(1, max_branches);
+    (MAX_WAVE_SIZE / n_branches).next_multiple_of(PACKET_WIDTH)
+}
+
+impl Whitted {
+    /// Returns the radiance of some rays of a batch, whose paths are followed at once.
+    fn radiance_of_part(&self, batch: &CameraRayBatch) -> Result<(Vec<Vec4>, RayCounts)> {
         let mut state = WavefrontState {
             batch,
             max_depth: self.max_depth,

@@ -70,6 +70,24 @@ pub enum Values {
     F64(Vec<f64>),
 }
 
+/// The scan of each point of a cloud.
+pub(crate) enum ScanOfPoint<'a> {
+    /// All points are of the only scan.
+    Single,
+    /// The column of scans.
+    Column(&'a [u16]),
+}
+
+impl ScanOfPoint<'_> {
+    /// Returns the index of the station of a point; there is no such station if it is unknown.
+    pub(crate) fn get(&self, point_idx: usize) -> usize {
+        match self {
+            Self::Single => 0,
+            Self::Column(indices) => indices[point_idx].into(),
+        }
+    }
+}
+
 impl PointCloud {
     /// Creates a cloud of positions about the origin (0, 0, 0), without other columns.
     pub fn from_positions(positions: Vec<Vec3>) -> Self {
@@ -128,13 +146,18 @@ impl PointCloud {
             .map(|scalar| &scalar.values)
     }
 
-    /// Returns the station of a point, if it is known.
-    pub fn station_of(&self, point_idx: usize) -> Option<&ScanStation> {
+    /// Returns the scan of each point, if the cloud tells it.
+    pub(crate) fn scan_of_point(&self) -> Option<ScanOfPoint<'_>> {
         match (&self.stations[..], self.scalar(STATION)) {
-            ([station], None) => Some(station),
-            (stations, Some(Values::U16(indices))) => stations.get(usize::from(indices[point_idx])),
+            ([_], None) => Some(ScanOfPoint::Single),
+            ([_, ..], Some(Values::U16(indices))) => Some(ScanOfPoint::Column(indices)),
             _ => None,
         }
+    }
+
+    /// Returns the station of a point, if it is known.
+    pub fn station_of(&self, point_idx: usize) -> Option<&ScanStation> {
+        self.stations.get(self.scan_of_point()?.get(point_idx))
     }
 
     /// Returns the points at `indices`, in that order, with all their columns.

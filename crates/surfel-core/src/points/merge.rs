@@ -61,6 +61,7 @@ fn common_origin(clouds: &[PointCloud]) -> crate::math::DVec3 {
 }
 
 /// Merges the stations of clouds, and renumbers those of their points. If one of the clouds has none, all are dropped.
+/// Points whose station is unknown get an index that no station has.
 ///
 /// Returns the stations and true if any were dropped.
 fn merge_stations(clouds: &mut [PointCloud]) -> (Vec<ScanStation>, bool) {
@@ -73,13 +74,14 @@ fn merge_stations(clouds: &mut [PointCloud]) -> (Vec<ScanStation>, bool) {
     let mut stations = Vec::new();
     for cloud in clouds {
         let first = stations.len() as u16;
-        let n_points = cloud.len();
+        let (n_points, n_stations) = (cloud.len(), cloud.stations.len());
         let is_station = |scalar: &Scalar| scalar.name.eq_ignore_ascii_case(STATION);
         let indices = match cloud.scalars.iter_mut().find(|scalar| is_station(scalar)) {
             Some(Scalar { values: Values::U16(indices), .. }) => indices,
             _ => {
                 cloud.scalars.retain(|scalar| !is_station(scalar));
-                let values = Values::U16(vec![0; n_points]);
+                let index = if n_stations == 1 { 0 } else { u16::MAX };
+                let values = Values::U16(vec![index; n_points]);
                 cloud.scalars.push(Scalar { name: STATION.into(), values });
                 let Some(Scalar { values: Values::U16(indices), .. }) = cloud.scalars.last_mut()
                 else {
@@ -88,7 +90,10 @@ fn merge_stations(clouds: &mut [PointCloud]) -> (Vec<ScanStation>, bool) {
                 indices
             }
         };
-        indices.iter_mut().for_each(|index| *index += first);
+        for index in indices {
+            let is_known = usize::from(*index) < n_stations;
+            *index = if is_known { *index + first } else { u16::MAX };
+        }
         stations.append(&mut cloud.stations);
     }
     (stations, false)
@@ -276,5 +281,13 @@ mod tests {
         assert!(dropped.is_empty());
         let (merged, dropped) = merge(vec![scan(&["a"], None), scan(&[], None)]);
         assert_eq!((names(&merged), dropped), (vec![None; 4], vec!["stations".to_owned()]));
+    }
+
+    #[test]
+    fn points_of_unknown_station_have_none_after_merging() {
+        let unknown = scan(&["a"], Some(vec![5, u16::MAX]));
+        let (merged, _) = merge(vec![scan(&["b"], None), unknown, scan(&["c", "d"], None)]);
+        let expected = [Some("b"), Some("b"), None, None, None, None];
+        assert_eq!((merged.stations.len(), names(&merged)), (4, expected.to_vec()));
     }
 }

@@ -57,7 +57,7 @@ pub use gaussians::{
     MIN_DISC_OPACITY, n_harmonics, rest_column,
 };
 pub use merge::merge;
-pub use mixed_pixels::MixedPixels;
+pub use mixed_pixels::{MixedPixels, without_mixed_pixels};
 pub use normals::{NormalReport, PlaneFit, fill_missing, fit_plane};
 pub use orient::{Orientation, orient};
 pub use outliers::{OutlierRemoval, remove_outliers};

@@ -82,8 +82,9 @@ pub fn orient(
 /// Flips the normals that point away from the known station of their point, and returns their number: no scanner sees a
 /// surface from behind.
 pub(super) fn turn_to_stations(cloud: &PointCloud, normals: &mut [Vec3]) -> usize {
+    let Some(scan_of) = cloud.scan_of_point() else { return 0 };
     let turned = normals.par_iter_mut().enumerate().filter(|(i, normal)| {
-        let station = cloud.station_of(*i).and_then(|station| station.position);
+        let station = cloud.stations.get(scan_of.get(*i)).and_then(|station| station.position);
         let offset = station.map_or(DVec3::ZERO, |station| station - cloud.world_position(*i));
         offset.dot(normal.as_dvec3()) < 0.0
     });

@@ -39,8 +39,8 @@ pub struct PreparationReport {
 }
 
 /// Cleans a cloud, thins it, removes outliers and noise, then adds the radii that are missing, and the normals if they
-/// are wanted. Those of the
-/// file stay. Columns that are estimated get offsets in each morph target, estimated from the points where the target moves them.
+/// are wanted. Those of the file stay. Columns that are estimated get offsets in each morph target, estimated from the
+/// points where the target moves them.
 ///
 /// # Errors
 ///
@@ -104,12 +104,13 @@ pub fn prepare(
     }
     if let Some((mut radii, mut found)) = radii {
         if let (Radius::Curvature { k }, Some(normals)) = (preparation.radius, &cloud.normals) {
-            let bent = radii_by_curvature(&cloud.positions, normals, &radii, k, progress)?;
+            let by_curvature = radii_by_curvature(&cloud.positions, normals, &radii, k, progress)?;
             let is_surface = |i: usize| {
                 shapes.as_ref().is_none_or(|(all, _)| all[i].structure == Structure::Surface)
             };
-            let radius = |(i, (radius, bent))| if is_surface(i) { bent } else { radius };
-            radii = radii.into_iter().zip(bent).enumerate().map(radius).collect();
+            let radius =
+                |(i, (radius, by_curvature))| if is_surface(i) { by_curvature } else { radius };
+            radii = radii.into_iter().zip(by_curvature).enumerate().map(radius).collect();
             found.update(&radii);
         }
         add_radii(&mut cloud, radii);

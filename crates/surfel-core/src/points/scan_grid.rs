@@ -1,6 +1,7 @@
 //! Grids of scans: the rays of a scanner in rows and columns, with the point that each measured.
 
-use super::{COLUMN_INDEX, PointCloud, ROW_INDEX, STATION, Values, is_valid_position};
+use super::cloud::ScanOfPoint;
+use super::{COLUMN_INDEX, PointCloud, ROW_INDEX, Values, is_valid_position};
 use crate::math::{DQuat, DVec3, Vec3};
 
 /// Marks a ray without a point.
@@ -41,7 +42,7 @@ impl ScanGrids {
     /// Returns the grids of the scans whose station is known; `None` if there are none.
     pub fn new(cloud: &PointCloud) -> Option<Self> {
         let indices = [cloud.scalar(ROW_INDEX)?, cloud.scalar(COLUMN_INDEX)?];
-        let scan_of = ScanOfPoint::new(cloud)?;
+        let scan_of = cloud.scan_of_point()?;
         let extents = extents(cloud, indices, &scan_of);
         let grid = |(station, extent): (&super::ScanStation, Extent)| {
             let position = station.position?;
@@ -111,29 +112,6 @@ impl ScanGrid {
     }
 }
 
-/// The scan of each point.
-enum ScanOfPoint<'a> {
-    Single,
-    Column(&'a [u16]),
-}
-
-impl<'a> ScanOfPoint<'a> {
-    fn new(cloud: &'a PointCloud) -> Option<Self> {
-        match (&cloud.stations[..], cloud.scalar(STATION)) {
-            ([_], None) => Some(Self::Single),
-            ([_, ..], Some(Values::U16(indices))) => Some(Self::Column(indices)),
-            _ => None,
-        }
-    }
-
-    fn get(&self, point: usize) -> usize {
-        match self {
-            Self::Single => 0,
-            Self::Column(indices) => indices[point].into(),
-        }
-    }
-}
-
 /// Returns row and column of a point, if they are indices and the point was measured.
 fn cell(cloud: &PointCloud, indices: [&Values; 2], point: usize) -> Option<[u32; 2]> {
     let [row, column] = indices.map(|values| {
@@ -165,7 +143,7 @@ pub(super) mod tests {
     //! Grids of known size, and of broken indices.
 
     use super::*;
-    use crate::points::{Scalar, ScanStation};
+    use crate::points::{STATION, Scalar, ScanStation};
 
     /// Returns a scan from the origin of a grid of rays 0.01 apart along +X, at the distances that `range` tells by row
     /// and column.

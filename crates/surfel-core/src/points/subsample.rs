@@ -98,16 +98,16 @@ pub(super) fn indices_by_spacing(
             progress.advance(4096.min(positions.len() - point) as u64);
         }
         let coordinates = position.as_dvec3() * cells_per_unit;
-        let own = coordinates.floor().to_array().map(|cell| cell as i64);
+        let own: [i64; 3] =
+            std::array::from_fn(|axis| cell_along(coordinates[axis], position[axis]));
         // The neighbour cells to search lie on the side of the cell's half that the point is in.
         let side =
-            (coordinates - coordinates.floor()).to_array().map(|x| if x < 0.5 { -1 } else { 1 });
+            (coordinates - coordinates.floor()).to_array().map(|x| if x < 0.5 { -1i64 } else { 1 });
         let is_too_close = (0..8).any(|corner| {
             let step = |axis: usize| if corner >> axis & 1 == 1 { side[axis] } else { 0 };
-            let cell = std::array::from_fn(|axis| own[axis].saturating_add(step(axis)));
-            let squared = |place: usize| positions[kept[place] as usize].distance_squared(position);
+            let cell = std::array::from_fn(|axis| own[axis] + step(axis));
             std::iter::successors(cells.get(&cell).copied(), |place| before[*place])
-                .any(|place| squared(place) < distance * distance)
+                .any(|place| is_closer(positions[kept[place] as usize], position, distance))
         });
         if !is_too_close {
             before.push(cells.insert(own, kept.len()));
@@ -115,6 +115,23 @@ pub(super) fn indices_by_spacing(
         }
     }
     Ok(kept)
+}
+
+/// Returns the index of a cell along an axis. Where cells are smaller than the steps between values of f32, each value has
+/// a cell of its own, as the indices would not fit.
+fn cell_along(coordinate: f64, value: f32) -> i64 {
+    /// Coordinate from which on at least 2^28 cells lie between two values of f32. Indices below it are exact.
+    const MAX_INDEX: f64 = (1u64 << 52) as f64;
+    if coordinate.abs() < MAX_INDEX {
+        coordinate.floor() as i64
+    } else {
+        i64::from(value.to_bits())
+    }
+}
+
+/// True if two positions are closer than a distance. The squares of tiny distances vanish; then only equal positions are.
+fn is_closer(a: Vec3, b: Vec3, distance: f32) -> bool {
+    a == b || a.distance_squared(b) < distance * distance
 }
 
 /// A fast hasher of cells, the same in every run.
@@ -229,6 +246,17 @@ mod tests {
                 }
             }
             assert_eq!(subsampled(&cloud, &format!("spacing:{distance}")), expected);
+        }
+    }
+
+    #[test]
+    fn a_tiny_spacing_drops_duplicates_only_and_takes_no_quadratic_time() {
+        let mut cloud = cloud(100_000);
+        let distinct = subsampled(&cloud, "spacing:1e-12");
+        assert_eq!(distinct, cloud.positions);
+        cloud.positions.extend_from_within(..);
+        for spacing in ["1e-12", "1e-20", "1e-30"] {
+            assert_eq!(subsampled(&cloud, &format!("spacing:{spacing}")), distinct, "{spacing}");
         }
     }
 

@@ -3,10 +3,15 @@
 use crate::flat::{FlatPunctualLight, FlatScene};
 use crate::math::{Basis, Vec3, cosine_hemisphere, owen_sobol_2d};
 use crate::scene::{Light, PunctualLightKind};
+use std::sync::LazyLock;
 
 /// Number of directions from which light of a sky or an environment is taken. Points get all of it at once: they are drawn
 /// once a picture.
-const N_DIRECTIONS: u32 = 16;
+const N_DIRECTIONS: usize = 16;
+
+/// The directions from which light of a sky or an environment is taken, around the normal +Z.
+static DIRECTIONS: LazyLock<[Vec3; N_DIRECTIONS]> =
+    LazyLock::new(|| std::array::from_fn(|i| cosine_hemisphere(owen_sobol_2d(i as u32, 0))));
 
 /// A point that is lit.
 #[derive(Clone, Copy, Debug)]
@@ -51,8 +56,7 @@ impl LitPoint {
 
     fn mean(&self, radiance: impl Fn(Vec3) -> Vec3) -> Vec3 {
         let basis = Basis::around(self.normal);
-        let direction = |i| basis.to_world(cosine_hemisphere(owen_sobol_2d(i, 0)));
-        let sum: Vec3 = (0..N_DIRECTIONS).map(|i| radiance(direction(i))).sum();
+        let sum: Vec3 = DIRECTIONS.iter().map(|&local| radiance(basis.to_world(local))).sum();
         sum / N_DIRECTIONS as f32
     }
 

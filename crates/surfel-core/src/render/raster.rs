@@ -6,7 +6,7 @@ use super::region::RenderRegion;
 use super::settings::Settings;
 use crate::error::{Error, Result};
 use crate::flat::{FlatCloud, FlatGeometry, FlatScene, Instance};
-use crate::image::{Image, NO_ID};
+use crate::image::{Band, Image, NO_ID};
 use crate::integrator::background_radiance;
 use crate::math::{LANES, Vec3};
 use crate::progress::Progress;
@@ -76,27 +76,16 @@ pub fn render(
     progress: &dyn Progress,
 ) -> Result<Image> {
     let rows = rows_around(region, view, settings);
-    let n_pixels = rows.n_pixels();
     let n_blocks = |instance: &Instance| cloud(scene, instance).points.blocks.len() as u64;
     progress.begin("render", scene.instances.iter().map(n_blocks).sum());
-    let z_buffer: Vec<AtomicU64> = (0..n_pixels).map(|_| AtomicU64::new(EMPTY)).collect();
-    let mut depths = vec![f32::INFINITY; n_pixels];
-    let mut visible = vec![VisiblePoint { instance: NO_ID, slot: 0 }; n_pixels];
+    let z_buffer: Vec<AtomicU64> = (0..rows.n_pixels()).map(|_| AtomicU64::new(EMPTY)).collect();
+    let mut raster = Raster::new(scene, view, settings, rows);
     for (instance_idx, instance) in scene.instances.iter().enumerate() {
         let target = Target { rows, radius: settings.point_size / 2.0, z_buffer: &z_buffer };
         project(scene, instance, view, progress, target)?;
-        let keys = z_buffer.iter().map(|key| key.load(Ordering::Relaxed));
-        for (pixel, key) in keys.enumerate().filter(|(_, key)| *key != EMPTY) {
-            let depth = f32::from_bits((key >> 32) as u32);
-            // Keys of earlier instances have the depth that is stored already.
-            if depth < depths[pixel] {
-                depths[pixel] = depth;
-                visible[pixel] = VisiblePoint { instance: instance_idx as u32, slot: key as u32 };
-            }
-        }
+        raster.add_instance(instance_idx as u32, &z_buffer, progress)?;
     }
-    let eye_dome = EyeDome::new(settings.point_size);
-    Ok(Raster { rows, depths, visible, eye_dome }.shade(scene, view, settings, region))
+    raster.shade(settings, region, progress)
 }
 
 /// The buffer that points are drawn to.
@@ -154,68 +143,128 @@ fn cloud<'s>(scene: &'s FlatScene, instance: &Instance) -> &'s FlatCloud {
 }
 
 /// The nearest points of some rows of a picture.
-struct Raster {
+struct Raster<'s> {
+    scene: &'s FlatScene,
+    view: &'s View,
     rows: RowRange,
     depths: Vec<f32>,
     visible: Vec<VisiblePoint>,
     eye_dome: EyeDome,
 }
 
-impl Raster {
+impl<'s> Raster<'s> {
+    /// Creates empty rows.
+    fn new(scene: &'s FlatScene, view: &'s View, settings: &Settings, rows: RowRange) -> Self {
+        let n_pixels = rows.n_pixels();
+        Self {
+            scene,
+            view,
+            rows,
+            depths: vec![f32::INFINITY; n_pixels],
+            visible: vec![VisiblePoint { instance: NO_ID, slot: 0 }; n_pixels],
+            eye_dome: EyeDome::new(settings.point_size),
+        }
+    }
+
+    /// Adds the points in the z-buffer that are nearer than those of earlier instances.
+    fn add_instance(
+        &mut self,
+        instance: u32,
+        z_buffer: &[AtomicU64],
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let width = self.rows.width;
+        let rows = self.depths.par_chunks_mut(width).zip(self.visible.par_chunks_mut(width));
+        rows.zip(z_buffer.par_chunks(width)).try_for_each(|((depths, visible), keys)| {
+            progress.check()?;
+            for ((depth, visible), key) in depths.iter_mut().zip(visible).zip(keys) {
+                let key = key.load(Ordering::Relaxed);
+                let own_depth = f32::from_bits((key >> 32) as u32);
+                // Keys of earlier instances have the depth that is stored already.
+                if key != EMPTY && own_depth < *depth {
+                    *depth = own_depth;
+                    *visible = VisiblePoint { instance, slot: key as u32 };
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// Returns the picture of a region of the rows.
     fn shade(
         &self,
-        scene: &FlatScene,
-        view: &View,
         settings: &Settings,
         region: RenderRegion,
-    ) -> Image {
+        progress: &dyn Progress,
+    ) -> Result<Image> {
         let mut image = region.blank_image(settings);
-        let (rows, columns) = (region.rows.0..region.rows.1, region.columns.0..region.columns.1);
-        let pixels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
-        for (pixel, (x, y)) in pixels.enumerate() {
-            let Some(index) = self.rows.index(i64::from(x), i64::from(y)) else { continue };
-            let VisiblePoint { instance: instance_idx, slot } = self.visible[index];
-            if instance_idx == NO_ID {
-                let (x, y) = (x as f32 + 0.5, y as f32 + 0.5);
-                image.color[pixel] = match scene.background {
-                    Background::Environment => {
-                        let direction = view.ray(x, y).direction;
-                        background_radiance(scene, direction, false).extend(1.0).to_array()
+        let bands: Vec<_> = image.bands_mut(1).into_iter().zip(region.rows.0..).collect();
+        bands.into_par_iter().try_for_each(|(mut band, y)| -> Result<()> {
+            progress.check()?;
+            for (pixel, x) in (region.columns.0..region.columns.1).enumerate() {
+                let Some(index) = self.rows.index(i64::from(x), i64::from(y)) else { continue };
+                match self.visible[index] {
+                    VisiblePoint { instance: NO_ID, .. } => {
+                        band.color[pixel] = self.background((x, y), settings.height);
                     }
-                    background => background.color_at(y / settings.height as f32),
-                };
-                continue;
-            }
-            let instance = &scene.instances[instance_idx as usize];
-            let cloud = cloud(scene, instance);
-            let points = &cloud.points;
-            let material = &scene.materials[instance.material_idx as usize];
-            let albedo = material.base_color * points.surfel(slot).color;
-            let lit = cloud.has_normals.then(|| {
-                let normal = instance.world_normal(points.normal(slot));
-                let to_viewer = -view.ray(x as f32 + 0.5, y as f32 + 0.5).direction;
-                LitPoint::new(instance.world_position(points.center(slot)), normal, to_viewer)
-            });
-            let light = match &lit {
-                _ if material.is_unlit => Vec3::ONE,
-                Some(point) if has_lights(scene) => {
-                    point.reflected(&scene.lights, &scene.punctual_lights)
+                    visible => self.shade_point(visible, (x, y), index, (&mut band, pixel)),
                 }
-                _ => Vec3::splat(self.eye_dome((x, y), index)),
-            };
-            image.color[pixel] = (light * albedo).extend(1.0).to_array();
-            image.coverage[pixel] = 1.0;
-            let Some(aovs) = &mut image.aovs else { continue };
-            aovs.depth[pixel] = self.depths[index];
-            aovs.position[pixel] = instance.world_position(points.center(slot));
-            aovs.normal[pixel] = lit.map_or(Vec3::ZERO, |point| point.normal);
-            aovs.point_id[pixel] = points.id(slot);
-            aovs.instance_id[pixel] = instance_idx;
-            aovs.albedo[pixel] = albedo;
-            aovs.support_count[pixel] = Support::POINT.n_points;
-            aovs.support_distance[pixel] = Support::POINT.distance;
+            }
+            Ok(())
+        })?;
+        Ok(image)
+    }
+
+    /// Returns linear colour and alpha of a pixel without points.
+    fn background(&self, (x, y): (u32, u32), height: u32) -> [f32; 4] {
+        let (x, y) = (x as f32 + 0.5, y as f32 + 0.5);
+        match self.scene.background {
+            Background::Environment => {
+                let direction = self.view.ray(x, y).direction;
+                background_radiance(self.scene, direction, false).extend(1.0).to_array()
+            }
+            background => background.color_at(y / height as f32),
         }
-        image
+    }
+
+    /// Writes the visible point at `(x, y)` of the picture, the pixel `index` of the rows, to a pixel of a band.
+    fn shade_point(
+        &self,
+        visible: VisiblePoint,
+        (x, y): (u32, u32),
+        index: usize,
+        (band, pixel): (&mut Band, usize),
+    ) {
+        let Self { scene, view, .. } = *self;
+        let VisiblePoint { instance: instance_idx, slot } = visible;
+        let instance = &scene.instances[instance_idx as usize];
+        let cloud = cloud(scene, instance);
+        let points = &cloud.points;
+        let material = &scene.materials[instance.material_idx as usize];
+        let albedo = material.base_color * points.surfel(slot).color;
+        let lit = cloud.has_normals.then(|| {
+            let normal = instance.world_normal(points.normal(slot));
+            let to_viewer = -view.ray(x as f32 + 0.5, y as f32 + 0.5).direction;
+            LitPoint::new(instance.world_position(points.center(slot)), normal, to_viewer)
+        });
+        let light = match &lit {
+            _ if material.is_unlit => Vec3::ONE,
+            Some(point) if has_lights(scene) => {
+                point.reflected(&scene.lights, &scene.punctual_lights)
+            }
+            _ => Vec3::splat(self.eye_dome((x, y), index)),
+        };
+        band.color[pixel] = (light * albedo).extend(1.0).to_array();
+        band.coverage[pixel] = 1.0;
+        let Some(aovs) = &mut band.aovs else { return };
+        aovs.depth[pixel] = self.depths[index];
+        aovs.position[pixel] = instance.world_position(points.center(slot));
+        aovs.normal[pixel] = lit.map_or(Vec3::ZERO, |point| point.normal);
+        aovs.point_id[pixel] = points.id(slot);
+        aovs.instance_id[pixel] = instance_idx;
+        aovs.albedo[pixel] = albedo;
+        aovs.support_count[pixel] = Support::POINT.n_points;
+        aovs.support_distance[pixel] = Support::POINT.distance;
     }
 
     /// Returns the light of a pixel, from 0 to 1.

@@ -3,7 +3,7 @@
 use super::cloud_geometry::CloudGeometry;
 use super::graph::Geometry;
 use super::mesh::Mesh;
-use crate::points::Values;
+use crate::points::{PointCloud, Values};
 use crate::surface::SurfaceKind;
 use bytemuck::{NoUninit, cast_slice};
 use rayon::prelude::*;
@@ -18,8 +18,44 @@ impl Geometry {
     pub fn content_hash(&self) -> u64 {
         match self {
             Self::Points(points) => cloud_hash(points),
-            Self::Triangles(mesh) => mesh_hash(mesh),
+            Self::Triangles(mesh) => mesh.content_hash(),
         }
+    }
+}
+
+impl PointCloud {
+    /// Returns a hash of all columns, with positions relative to their origin. Stations, morph targets and joints are not
+    /// counted.
+    pub fn content_hash(&self) -> u64 {
+        let scalars = self.scalars.iter();
+        let scalars: Vec<(&str, u64)> =
+            scalars.map(|scalar| (scalar.name.as_str(), values_hash(&scalar.values))).collect();
+        let columns = (
+            (hash(&self.positions), self.normals.as_deref().map(hash)),
+            (self.radii.as_deref().map(hash), self.colors.as_deref().map(hash)),
+            (self.intensity.as_deref().map(hash), self.classification.as_deref().map(hash)),
+            scalars,
+        );
+        let mut hasher = DefaultHasher::new();
+        ("cloud", columns).hash(&mut hasher);
+        hasher.finish()
+    }
+}
+
+impl Mesh {
+    /// Returns a hash of triangles and attributes, with positions relative to their origin. Morph targets and joints are
+    /// not counted.
+    pub fn content_hash(&self) -> u64 {
+        let [first, second] = &self.uvs;
+        let columns = (
+            (hash(&self.positions), hash(&self.triangles)),
+            (self.normals.as_deref().map(hash), self.tangents.as_deref().map(hash)),
+            (first.as_deref().map(hash), second.as_deref().map(hash)),
+            self.colors.as_deref().map(hash),
+        );
+        let mut hasher = DefaultHasher::new();
+        ("triangles", columns).hash(&mut hasher);
+        hasher.finish()
     }
 }
 
@@ -51,19 +87,6 @@ fn cloud_hash(geometry: &CloudGeometry) -> u64 {
     );
     let mut hasher = DefaultHasher::new();
     ("points", columns, settings).hash(&mut hasher);
-    hasher.finish()
-}
-
-fn mesh_hash(mesh: &Mesh) -> u64 {
-    let [first, second] = &mesh.uvs;
-    let columns = (
-        (hash(&mesh.positions), hash(&mesh.triangles)),
-        (mesh.normals.as_deref().map(hash), mesh.tangents.as_deref().map(hash)),
-        (first.as_deref().map(hash), second.as_deref().map(hash)),
-        mesh.colors.as_deref().map(hash),
-    );
-    let mut hasher = DefaultHasher::new();
-    ("triangles", columns).hash(&mut hasher);
     hasher.finish()
 }
 
@@ -99,9 +122,10 @@ mod tests {
 
     use super::*;
     use crate::math::{DVec3, Vec3};
-    use crate::points::{PointCloud, Preparation, PreparedCloud, prepare};
+    use crate::points::{Preparation, PreparedCloud, Scalar, prepare};
     use crate::progress::NoProgress;
     use crate::surface::EdgeTest;
+    use std::collections::BTreeSet;
 
     fn prepared() -> PreparedCloud {
         let position = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0);
@@ -130,13 +154,33 @@ mod tests {
     }
 
     #[test]
+    fn columns_of_a_cloud_decide() {
+        let cloud = PointCloud::from_positions(vec![Vec3::ZERO, Vec3::X]);
+        let column =
+            |value| vec![Scalar { name: "age".into(), values: Values::U8(vec![value; 2]) }];
+        let clouds = [
+            cloud.clone(),
+            PointCloud::from_positions(vec![Vec3::ZERO, Vec3::Y]),
+            PointCloud { colors: Some(vec![[0; 3]; 2]), ..cloud.clone() },
+            PointCloud { colors: Some(vec![[1; 3]; 2]), ..cloud.clone() },
+            PointCloud { radii: Some(vec![1.0; 2]), ..cloud.clone() },
+            PointCloud { scalars: column(1), ..cloud.clone() },
+            PointCloud { scalars: column(2), ..cloud.clone() },
+        ];
+        let hashes: BTreeSet<u64> = clouds.iter().map(PointCloud::content_hash).collect();
+        assert_eq!(hashes.len(), clouds.len());
+        let moved = PointCloud { origin: DVec3::X, ..cloud.clone() };
+        assert_eq!(moved.content_hash(), cloud.content_hash());
+    }
+
+    #[test]
     fn triangles_and_attributes_decide() {
         let mesh = Mesh {
             positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
             triangles: vec![[0, 1, 2]],
             ..Mesh::default()
         };
-        let hash = |mesh: Mesh| Geometry::Triangles(mesh).content_hash();
+        let hash = |mesh: Mesh| mesh.content_hash();
         let first = hash(mesh.clone());
         assert_eq!(hash(Mesh { origin: DVec3::X, ..mesh.clone() }), first);
         assert_ne!(hash(Mesh { normals: Some(vec![Vec3::Z; 3]), ..mesh.clone() }), first);

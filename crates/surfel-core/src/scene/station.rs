@@ -101,8 +101,9 @@ pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
 pub fn view_from_station(cloud: &PointCloud, station_idx: usize, up: Vec3) -> Option<StationView> {
     let station = cloud.stations.get(station_idx)?;
     let position = station.position?;
+    let scan_of = cloud.scan_of_point();
     let is_measured_here =
-        |i: &usize| cloud.station_of(*i).is_some_and(|other| std::ptr::eq(other, station));
+        |i: &usize| scan_of.as_ref().is_some_and(|scan_of| scan_of.get(*i) == station_idx);
     let points = sample_indices(cloud).filter(is_measured_here).map(|i| cloud.positions[i]);
     let points: Vec<Vec3> = points.collect();
     let points = polar_points((position - cloud.origin).as_vec3(), &points, up);

@@ -15,9 +15,11 @@ pub const SPAWN_T_MIN: f32 = 0.5;
 /// Factors of `edge_retest_factor` for evenly spaced and for random points.
 const EDGE_RETEST_EVEN: f32 = 1.3;
 const EDGE_RETEST_RANDOM: f32 = 1.5;
-/// Steps per unit to which the terms of sums are rounded. f32 adds a thousand terms of up to 1 exactly, so that
-/// sums do not depend on the order of points.
+/// Steps per unit to which the terms of sums are rounded, so that sums of up to [`MAX_EXACT_TERMS`] points do not depend
+/// on their order.
 pub const STEPS: f32 = 16_384.0;
+/// Number of terms of up to 1 that f32 adds exactly in these steps: its integers are exact up to 2^24.
+pub const MAX_EXACT_TERMS: usize = (1 << 24) / STEPS as usize;
 /// Minimum weight of all points of a fit. With less, beyond the reach of all points but one or two, rounding showed as
 /// noise.
 pub const MIN_WEIGHT: f32 = 0.1;

@@ -82,10 +82,18 @@ impl<'a> Tracer<'a> {
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels the job.
     pub fn gaussians(&self, rays: &[Ray], hits: &[SceneHit]) -> Result<Vec<GaussianLight>> {
-        let mut lights = vec![GaussianLight::NONE; rays.len()];
         let up_to_hit =
             |(ray, hit): (&Ray, &SceneHit)| Ray { t_max: ray.t_max.min(hit.distance), ..*ray };
         let rays: Vec<Ray> = rays.iter().zip(hits).map(up_to_hit).collect();
+        self.gaussians_along(&rays)
+    }
+
+    /// Runs [`scene_gaussians`](super::scene_gaussians) for rays up to their ends.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels the job.
+    pub fn gaussians_along(&self, rays: &[Ray]) -> Result<Vec<GaussianLight>> {
+        let mut lights = vec![GaussianLight::NONE; rays.len()];
         self.in_chunks(rays.len(), |chunk| {
             scene_gaussians(self.scene, self.simd, &rays[chunk.clone()], &mut lights[chunk]);
         })?;

@@ -76,6 +76,33 @@ fn check_surface(name: &str, scene: &FlatCloud, rays: &[Ray]) {
 }
 
 #[test]
+fn smooth_hits_among_thousands_of_points_do_not_depend_on_other_rays() {
+    // More points are in reach of each hit than f32 adds exactly.
+    let mut cloud = clouds::plane(200, 0.4, 13);
+    cloud.radii = Some(vec![0.5; cloud.len()]);
+    for position in &mut cloud.positions {
+        position.z = 0.2 * (3.0 * position.x).sin() * position.y;
+    }
+    let scene = bad_clouds::flat(cloud, SurfaceKind::Smooth);
+    let scene = FlatCloud { edge_test: EdgeTest::Off, ..scene };
+    let ray = |i: u8| {
+        let aside = Vec3::new(f32::from(i % 4), f32::from(i / 4), 0.0);
+        Ray::new(0.1 * aside + 2.0 * Vec3::Z, (0.02 * aside - Vec3::Z).normalize())
+    };
+    let rays: Vec<Ray> = (0..16).map(ray).collect();
+    for simd in Simd::available() {
+        let mut together = vec![SurfaceHit::MISS; rays.len()];
+        surface_hits(&scene, simd, &rays, &mut together);
+        for (ray, together) in rays.iter().zip(&together) {
+            let mut alone = [SurfaceHit::MISS];
+            surface_hits(&scene, simd, &[*ray], &mut alone);
+            assert!(!together.is_miss(), "{ray:?}");
+            assert_eq!(alone[0], *together, "{ray:?}");
+        }
+    }
+}
+
+#[test]
 fn a_cloud_of_nan_positions_is_not_hit() {
     let mut cloud =
         scenes::points(clouds::sphere(20, 1.0), SurfaceKind::Disc).cloud().clone().into_inner();

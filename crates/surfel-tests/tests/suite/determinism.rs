@@ -8,7 +8,7 @@ use surfel_core::image::Image;
 use surfel_core::math::{Vec3, Vec4};
 use surfel_core::progress::{NoProgress, Progress};
 use surfel_core::render::{CpuRenderer, RenderRegion, Renderer, Settings};
-use surfel_core::scene::{Light, Scene, Sky, Sun};
+use surfel_core::scene::{Light, Material, Scene, Sky, Sun};
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
 use surfel_tests::clouds;
@@ -100,6 +100,18 @@ fn every_stage_can_be_cancelled() {
 }
 
 #[test]
+fn rasterised_points_can_be_cancelled_in_every_row() {
+    let flat = FlatScene::new(&scene(SurfaceKind::Points), &NoProgress).unwrap();
+    let n_rows = u64::from(SETTINGS.height);
+    // The first question is asked while the points are drawn, and two more in each row of pixels.
+    for left in [0, 1, n_rows / 2, n_rows + 1, 2 * n_rows] {
+        let progress = CancelAt { left: AtomicU64::new(left) };
+        let result = CpuRenderer { simd: Simd::detect() }.render(&flat, &SETTINGS, &progress);
+        assert!(matches!(result, Err(surfel_core::Error::Cancelled)), "after {left}");
+    }
+}
+
+#[test]
 fn regions_make_the_whole_picture() {
     for (name, kind) in SurfaceKind::ALL {
         let flat = FlatScene::new(&scene(kind), &NoProgress).unwrap();
@@ -132,6 +144,26 @@ fn regions_make_the_whole_picture() {
             assert!(difference < 1e-5, "{name}, pixel {pixel}");
         }
     }
+}
+
+#[test]
+fn rays_of_many_branches_give_the_same_picture_in_parts() {
+    // 64 branches a ray: the paths of half a tile are followed at once.
+    let settings =
+        Settings { width: 32, height: 32, samples_per_pixel: 1, light_samples: 64, ..SETTINGS };
+    let mut rough = scenes::scene(clouds::cube(10, 0.4, 9), SurfaceKind::Disc);
+    rough.graph.materials[0] = Material::METAL;
+    let flat = FlatScene::new(&rough, &NoProgress).unwrap();
+    let rendered = |rows| {
+        let region = RenderRegion { rows, ..RenderRegion::whole(&settings) };
+        let renderer = CpuRenderer { simd: Simd::detect() };
+        let (image, stats) = renderer.render_region(&flat, &settings, region, &NoProgress).unwrap();
+        (image.color, stats.rays.secondary)
+    };
+    let (whole, n_secondary) = rendered((0, 32));
+    let ((top, n_top), (bottom, n_bottom)) = (rendered((0, 16)), rendered((16, 32)));
+    assert!(whole == [top, bottom].concat());
+    assert!(1000 < n_secondary && n_secondary == n_top + n_bottom, "{n_secondary}");
 }
 
 #[test]

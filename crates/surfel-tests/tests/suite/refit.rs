@@ -3,9 +3,10 @@
 
 use crate::bad_clouds::flat;
 use crate::brute_force::BruteForce;
-use surfel_core::flat::{FlatCloud, MAX_COST_RATIO, Refit};
+use surfel_core::flat::{FlatCloud, FlatTriangles, MAX_COST_RATIO, Refit};
 use surfel_core::math::{Quat, Random, Vec3};
 use surfel_core::points::PointCloud;
+use surfel_core::progress::NoProgress;
 use surfel_core::surface::SurfaceKind;
 use surfel_tests::clouds;
 use surfel_tests::scenes;
@@ -54,6 +55,14 @@ fn points_that_have_not_moved_give_the_same_bytes() {
         assert_eq!(refit(&mut scene, &cloud()), Refit::Kept { cost_ratio: 1.0 });
         assert!(same_bytes(&scene, &before));
     }
+}
+
+#[test]
+fn empty_trees_need_no_rebuild() {
+    let (none, mut scene) = (cloud().subset(&[]), flat(cloud(), SurfaceKind::Disc));
+    let lines = scene.lines.refit(scenes::columns(&none, SurfaceKind::Disc, &[]));
+    let triangles = FlatTriangles::new(&[], &[], &NoProgress).unwrap().refit(&[], &[]);
+    assert_eq!([lines, triangles], [Refit::Kept { cost_ratio: 1.0 }; 2]);
 }
 
 #[test]

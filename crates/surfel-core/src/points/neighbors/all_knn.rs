@@ -1,6 +1,6 @@
 //! Neighbours of all points of a tree, leaf by leaf: the points of a leaf share the traversal of the tree.
 
-use super::candidate_set::{CandidateSet, KNearest, WithinDistance};
+use super::candidate_set::{CandidateSet, KNearest, MANY, ManyNearest, NearestSet, WithinDistance};
 use super::kd_tree::{KdTree, LANES, Subtree, Target};
 use super::nearby_leaves::NearbyLeaves;
 use super::neighbor::{Neighbor, Neighborhood, checked_square};
@@ -35,9 +35,26 @@ impl NeighborIndex for AllKnn<'_> {
         &self,
         slots: Range<usize>,
         progress: &dyn Progress,
+        visit: impl FnMut(u32, &[Neighbor]),
+    ) -> Result<()> {
+        let k = self.k.min(self.tree.n_points);
+        if k < MANY {
+            self.visit_with(KNearest::new(k), slots, progress, visit)
+        } else {
+            self.visit_with(ManyNearest::new(k), slots, progress, visit)
+        }
+    }
+}
+
+impl AllKnn<'_> {
+    /// Calls `visit` with the neighbours of each point in `slots`, which are collected in `candidates`.
+    fn visit_with(
+        &self,
+        mut candidates: impl NearestSet,
+        slots: Range<usize>,
+        progress: &dyn Progress,
         mut visit: impl FnMut(u32, &[Neighbor]),
     ) -> Result<()> {
-        let mut candidates = KNearest::new(self.k.min(self.tree.n_points));
         let mut neighbors = Vec::new();
         let mut siblings = Vec::with_capacity(32);
         let mut nearby_leaves = NearbyLeaves::new();
@@ -61,11 +78,8 @@ impl NeighborIndex for AllKnn<'_> {
                 } else {
                     search(self.tree, &siblings, &target, &mut candidates);
                 }
-                spheres.push(KnnSphere {
-                    center: target.position,
-                    radius_squared: candidates.max_distance_squared(),
-                });
                 candidates.drain_sorted(&mut neighbors);
+                spheres.push(KnnSphere::new(target.position, &neighbors, self.k));
                 visit(target.own, &neighbors);
             }
         }
@@ -124,6 +138,13 @@ struct KnnSphere {
 }
 
 impl KnnSphere {
+    /// Returns the sphere about a position with these neighbours, which is infinite if there are fewer than k.
+    fn new(center: Vec3, neighbors: &[Neighbor], k: usize) -> Self {
+        let farthest = neighbors.get(k - 1);
+        let radius_squared = farthest.map_or(f32::INFINITY, |farthest| farthest.distance_squared);
+        Self { center, radius_squared }
+    }
+
     /// Returns a squared distance from `position` within which there are k points.
     fn limit_at(&self, position: Vec3) -> f32 {
         self.limit(self.center.distance(position))

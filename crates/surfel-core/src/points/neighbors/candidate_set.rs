@@ -20,6 +20,15 @@ pub(super) trait CandidateSet {
     fn drain_sorted(&mut self, neighbors: &mut Vec<Neighbor>);
 }
 
+/// A set of the k nearest candidates.
+pub(super) trait NearestSet: CandidateSet {
+    /// Limits the candidates of an empty set to a squared distance within which there are at least k points.
+    fn limit_to(&mut self, distance_squared: f32);
+}
+
+/// The number of neighbours from which [`KNearest`], which inserts each in its place, takes longer than [`ManyNearest`].
+pub(super) const MANY: usize = 48;
+
 /// The key of an unused entry: at infinite distance, with an index that no point has.
 const UNUSED: u64 = ((f32::INFINITY.to_bits() as u64) << 32) | u32::MAX as u64;
 
@@ -38,9 +47,10 @@ impl KNearest {
         keys[0] = [0.0; 2];
         Self { k, keys }
     }
+}
 
-    /// Limits the candidates to a squared distance within which there are at least k points.
-    pub fn limit_to(&mut self, distance_squared: f32) {
+impl NearestSet for KNearest {
+    fn limit_to(&mut self, distance_squared: f32) {
         self.keys[1..].fill([f64::from_bits(key(distance_squared, u32::MAX)); 2]);
     }
 }
@@ -98,6 +108,12 @@ impl ManyNearest {
     /// Creates an empty set of at most `k` candidates, at least 1.
     pub fn new(k: usize) -> Self {
         Self { k, bound: UNUSED, keys: Vec::with_capacity(2 * k) }
+    }
+}
+
+impl NearestSet for ManyNearest {
+    fn limit_to(&mut self, distance_squared: f32) {
+        self.bound = key(distance_squared, u32::MAX);
     }
 }
 

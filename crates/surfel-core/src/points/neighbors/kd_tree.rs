@@ -1,6 +1,6 @@
 //! A balanced kd-tree without pointers.
 
-use super::candidate_set::{CandidateSet, KNearest, ManyNearest};
+use super::candidate_set::{CandidateSet, KNearest, MANY, ManyNearest};
 use super::neighbor::{Neighbor, check_count, key};
 use crate::error::Result;
 use crate::math::{Aabb, Vec3, Vec4, set_bits};
@@ -89,8 +89,6 @@ impl<'a> KdTree<'a> {
 
     /// Returns the k points nearest to `position`, nearest first, without the one of index `excluded`.
     pub fn nearest(&self, position: Vec3, k: usize, excluded: Option<u32>) -> Vec<Neighbor> {
-        /// The number of neighbours from which inserting each in its place takes longer than selecting.
-        const MANY: usize = 48;
         let k = k.min(self.n_points);
         if k == 0 || !position.is_finite() {
             return Vec::new();

@@ -45,6 +45,7 @@ pub(super) fn map<T: Copy + Default + Send + Sync>(
             index.visit_slots(slots, progress, |point, neighbors| {
                 visited.push((point, visit(point as usize, neighbors)));
             })?;
+            visited.sort_unstable_by_key(|(point, _)| *point);
             progress.advance(n_slots as u64);
             Ok(visited)
         });
@@ -56,14 +57,18 @@ pub(super) fn map<T: Copy + Default + Send + Sync>(
     Ok(values)
 }
 
-/// Writes visited values to `values`, of which each thread owns a part.
+/// Writes visited values, of which each list is in the order of the points, to `values`, of which each thread owns a part.
 fn scatter<T: Copy + Send + Sync>(visited: &[Vec<(u32, T)>], values: &mut [T]) {
     let part_size = values.len().div_ceil(rayon::current_num_threads()).max(1);
     values.par_chunks_mut(part_size).enumerate().for_each(|(part, values)| {
-        let first = part * part_size;
-        for &(point, value) in visited.iter().flatten() {
-            if let Some(target) = values.get_mut((point as usize).wrapping_sub(first)) {
-                *target = value;
+        let (first, end) = (part * part_size, part * part_size + values.len());
+        for visited in visited {
+            let start = visited.partition_point(|(point, _)| (*point as usize) < first);
+            for &(point, value) in &visited[start..] {
+                if end <= point as usize {
+                    break;
+                }
+                values[point as usize - first] = value;
             }
         }
     });

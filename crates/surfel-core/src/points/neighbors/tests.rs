@@ -91,7 +91,7 @@ fn clouds() -> Vec<(&'static str, Vec<Vec3>)> {
 #[test]
 fn nearest_equals_a_brute_force_search() {
     for (name, positions) in clouds() {
-        for k in [1, 2, 7, 16, 100] {
+        for k in [1, 2, 7, 16, 47, 48, 200] {
             let neighborhood = Neighborhood::Nearest(k);
             assert_eq!(
                 found(&positions, NeighborMethod::Knn, neighborhood),

@@ -15,6 +15,9 @@ use std::ops::ControlFlow;
 
 /// Decides which hits count.
 pub trait HitFilter: Copy {
+    /// Memory that is reused from packet to packet.
+    type Scratch: Default;
+
     /// True if all hits count.
     const ACCEPTS_ALL: bool;
 
@@ -28,6 +31,7 @@ pub trait HitFilter: Copy {
     #[inline(always)]
     fn accepts_packet<L: Lanes>(
         &self,
+        _scratch: &mut Self::Scratch,
         _rays: &PacketRays<L::PacketLanes>,
         lanes: u32,
         _distances: L::PacketLanes,
@@ -42,6 +46,7 @@ pub trait HitFilter: Copy {
 pub struct AcceptAll;
 
 impl HitFilter for AcceptAll {
+    type Scratch = ();
     const ACCEPTS_ALL: bool = true;
 }
 
@@ -87,12 +92,15 @@ pub fn any_accepted_hit<L: Lanes, S: LeafGeometry, F: HitFilter>(
     filter: F,
     occluded: &mut [bool],
 ) {
-    run_query::<L, _>(Any { filter, shape: PhantomData::<S> }, tree, rays, occluded);
+    let query = Any { filter, scratch: F::Scratch::default(), shape: PhantomData::<S> };
+    run_query::<L, _>(query, tree, rays, occluded);
 }
 
 /// The query for any accepted hit.
-struct Any<S, F> {
+struct Any<S, F: HitFilter> {
     filter: F,
+    /// The memory of the filter, which the visitor of a packet has while it is alive.
+    scratch: F::Scratch,
     shape: PhantomData<S>,
 }
 
@@ -115,11 +123,12 @@ impl<L: Lanes, S: LeafGeometry, F: HitFilter> RayQuery<L> for Any<S, F> {
         packet: &'p Packet<'p, L::PacketLanes>,
     ) -> AnyPacketVisitor<'p, L, S, F> {
         let (rays, limits) = (S::prepare_rays(&packet.lanes), packet.initial_limits());
-        AnyPacketVisitor { packet, filter: self.filter, rays, limits, is_hit: 0 }
+        let scratch = std::mem::take(&mut self.scratch);
+        AnyPacketVisitor { packet, filter: self.filter, scratch, rays, limits, is_hit: 0 }
     }
 
     #[inline(always)]
-    fn ray_results(&mut self, visitors: &[AnyRayVisitor<S, F>], occluded: &mut [bool]) {
+    fn ray_results(&mut self, visitors: &mut [AnyRayVisitor<S, F>], occluded: &mut [bool]) {
         for (visitor, occluded) in visitors.iter().zip(occluded) {
             *occluded = visitor.is_hit;
         }
@@ -127,6 +136,7 @@ impl<L: Lanes, S: LeafGeometry, F: HitFilter> RayQuery<L> for Any<S, F> {
 
     #[inline(always)]
     fn packet_results(&mut self, visitor: &mut AnyPacketVisitor<L, S, F>, occluded: &mut [bool]) {
+        self.scratch = std::mem::take(&mut visitor.scratch);
         for (lane, occluded) in occluded.iter_mut().enumerate() {
             *occluded = visitor.is_hit >> lane & 1 == 1;
         }
@@ -182,9 +192,10 @@ fn has_accepted_hit<L: Lanes, F: HitFilter>(
     false
 }
 
-struct AnyPacketVisitor<'p, L: Lanes, S: LeafGeometry, F> {
+struct AnyPacketVisitor<'p, L: Lanes, S: LeafGeometry, F: HitFilter> {
     packet: &'p Packet<'p, L::PacketLanes>,
     filter: F,
+    scratch: F::Scratch,
     rays: S::PreparedRays<L::PacketLanes>,
     /// Distances beyond which rays ignore boxes, negative infinity for rays that have hit something.
     limits: [f32; PACKET_WIDTH],
@@ -229,8 +240,9 @@ impl<L: Lanes, S: LeafGeometry, F: HitFilter> AnyPacketVisitor<'_, L, S, F> {
                 return;
             }
             let distances = L::PacketLanes::load(&distances);
+            let Self { filter, scratch, packet, .. } = self;
             let accepted =
-                self.filter.accepts_packet::<L>(&self.packet.lanes, filtered, distances, &slots);
+                filter.accepts_packet::<L>(scratch, &packet.lanes, filtered, distances, &slots);
             self.finish(accepted);
             open = filtered & !accepted;
         }

@@ -84,7 +84,7 @@ impl<L: Lanes, S: LeafGeometry> RayQuery<L> for Closest<S> {
     }
 
     #[inline(always)]
-    fn ray_results(&mut self, visitors: &[ClosestRayVisitor<S>], hits: &mut [Hit]) {
+    fn ray_results(&mut self, visitors: &mut [ClosestRayVisitor<S>], hits: &mut [Hit]) {
         for (visitor, hit) in visitors.iter().zip(hits) {
             *hit = if visitor.hit.is_miss() { Hit::MISS } else { visitor.hit };
         }

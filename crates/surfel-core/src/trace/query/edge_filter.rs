@@ -19,6 +19,7 @@ impl EdgeFilter<'_> {
 }
 
 impl HitFilter for EdgeFilter<'_> {
+    type Scratch = ();
     const ACCEPTS_ALL: bool = false;
 
     #[inline(always)]
@@ -35,6 +36,7 @@ impl HitFilter for EdgeFilter<'_> {
     #[inline(always)]
     fn accepts_packet<L: Lanes>(
         &self,
+        _scratch: &mut (),
         rays: &PacketRays<L::PacketLanes>,
         lanes: u32,
         distances: L::PacketLanes,

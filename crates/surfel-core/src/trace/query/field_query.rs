@@ -224,9 +224,12 @@ fn nearest_group(intervals: &[LeafInterval; PACKET_WIDTH], searching: u32) -> u3
 /// Returns starts and lengths of the segments of rays in their leaves.
 #[inline(always)]
 fn segments<W: PacketLanes>(intervals: &[LeafInterval; PACKET_WIDTH]) -> (W, W) {
-    let segments = intervals.map(|interval| interval.segment());
-    let starts = segments.map(|segment| segment.start);
-    (W::load(&starts), W::load(&segments.map(|segment| segment.length)))
+    let (mut starts, mut lengths) = ([0.0; PACKET_WIDTH], [0.0; PACKET_WIDTH]);
+    for (lane, interval) in intervals.iter().enumerate() {
+        let segment = interval.segment();
+        (starts[lane], lengths[lane]) = (segment.start, segment.length);
+    }
+    (W::load(&starts), W::load(&lengths))
 }
 
 /// Takes the zeros that were found as hits.

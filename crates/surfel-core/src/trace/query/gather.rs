@@ -62,12 +62,14 @@ pub struct PacketDiscs {
     pub hits: Vec<PacketDiscHit>,
     /// The distance on each ray up to which hits count.
     limits: [f32; PACKET_WIDTH],
+    /// Memory for all hits of single rays, while no ray uses it.
+    spare: Vec<Vec<Hit>>,
 }
 
 impl PacketDiscs {
     /// Returns no discs.
     pub fn new() -> Self {
-        Self { hits: Vec::new(), limits: [f32::MAX; PACKET_WIDTH] }
+        Self { hits: Vec::new(), limits: [f32::MAX; PACKET_WIDTH], spare: Vec::new() }
     }
 
     /// Adds the hits of rays, one per lane.
@@ -143,7 +145,8 @@ impl<L: Lanes, C: DiscConsumer, S: Shape> RayQuery<L> for GatherQuery<'_, C, S> 
 
     #[inline(always)]
     fn ray_visitor<'r>(&mut self, ray: &'r Ray) -> GatherRayVisitor<'r, S> {
-        let all = (MAX_GATHERED < self.consumer.max_discs()).then(Vec::new);
+        let keeps_all = MAX_GATHERED < self.consumer.max_discs();
+        let all = keeps_all.then(|| self.discs.spare.pop().unwrap_or_default());
         let length = self.consumer.length();
         let (gather, shape) = (Gather::EMPTY, PhantomData);
         GatherRayVisitor { ray, gather, all, length, limit: ray.t_max, shape }
@@ -161,12 +164,16 @@ impl<L: Lanes, C: DiscConsumer, S: Shape> RayQuery<L> for GatherQuery<'_, C, S> 
     }
 
     #[inline(always)]
-    fn ray_results(&mut self, visitors: &[GatherRayVisitor<S>], _results: &mut [C::Result]) {
-        for (lane, visitor) in visitors.iter().enumerate() {
+    fn ray_results(&mut self, visitors: &mut [GatherRayVisitor<S>], _results: &mut [C::Result]) {
+        for (lane, visitor) in visitors.iter_mut().enumerate() {
             let all = visitor.all.as_deref();
             let hits = all.unwrap_or(visitor.gather.hits()).iter();
             for hit in hits.filter(|hit| hit.distance <= visitor.limit) {
                 self.discs.hits.push(PacketDiscHit::single(lane, *hit));
+            }
+            if let Some(mut all) = visitor.all.take() {
+                all.clear();
+                self.discs.spare.push(all);
             }
         }
         self.discs.limits = [f32::MAX; PACKET_WIDTH];

@@ -114,7 +114,8 @@ fn limits_of_nearest<W: PacketLanes>(squared: &[[f32; PACKET_WIDTH]]) -> Limits<
     let (zero, one, wanted) = (W::splat(0.0), W::splat(1.0), W::splat(MAX_GATHERED as f32));
     let (mut low, mut n_low) = (zero, zero);
     let (mut high, mut n_high) = (zero, zero);
-    for squared in squared.iter().map(W::load) {
+    for squared in squared {
+        let squared = W::load(squared);
         let counts = squared.le(W::splat(f32::MAX));
         n_high = n_high + W::select(counts, one, zero);
         high = W::select(counts & high.lt(squared), squared, high);
@@ -129,8 +130,8 @@ fn limits_of_nearest<W: PacketLanes>(squared: &[[f32; PACKET_WIDTH]]) -> Limits<
         let fraction = fraction.max(W::splat(0.05)).min(W::splat(0.95));
         let place = low + (high - low) * fraction;
         let mut n = zero;
-        for squared in squared.iter().map(W::load) {
-            n = n + W::select(squared.le(place), one, zero);
+        for squared in squared {
+            n = n + W::select(W::load(squared).le(place), one, zero);
         }
         let found = open & (n.le(wanted) & wanted.le(n)).bits();
         limits = W::select(lane_mask::<W>(found), place, limits);

@@ -10,7 +10,7 @@ use crate::trace::query::any::HitFilter;
 use crate::trace::query::edge_test::{evaluate_one, is_enclosed};
 use crate::trace::query::hit::Hit;
 use crate::trace::query::smooth_query::{
-    FindSurface, MAX_DISTANCE_FROM_DISC, MAX_FITS, MAX_LAST_STEP, TOLERANCE, damped,
+    FindSurface, MAX_DISTANCE_FROM_DISC, MAX_FITS, MAX_LAST_STEP, StoredBlock, TOLERANCE, damped,
     inverse_support, unit,
 };
 use crate::trace::simd::packet_rays::PacketRays;
@@ -22,6 +22,7 @@ use std::marker::PhantomData;
 pub struct SmoothFilter<'s>(pub &'s FlatCloud);
 
 impl HitFilter for SmoothFilter<'_> {
+    type Scratch = Vec<StoredBlock>;
     const ACCEPTS_ALL: bool = false;
 
     #[inline(always)]
@@ -32,12 +33,12 @@ impl HitFilter for SmoothFilter<'_> {
     #[inline(always)]
     fn accepts_packet<L: Lanes>(
         &self,
+        blocks: &mut Vec<StoredBlock>,
         rays: &PacketRays<L::PacketLanes>,
         lanes: u32,
         distances: L::PacketLanes,
         slots: &[Slot; PACKET_WIDTH],
     ) -> u32 {
-        let blocks = &mut Vec::new();
         let found =
             FindSurface::<L, false> { cloud: self.0, blocks, rays, lanes, distances, slots };
         L::dispatch(found).lanes

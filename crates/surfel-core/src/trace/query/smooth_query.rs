@@ -6,8 +6,8 @@ use crate::math::{
     set_bits,
 };
 use crate::surface::{
-    CandidateHitLanes, ColorSums, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, NeighborhoodStats,
-    OverhangSums, PointSums, SUPPORT_FACTOR, SphereSums,
+    CandidateHitLanes, ColorSums, EdgeTest, EdgeTestResult, FIT_REACH, FitPoint, MAX_EXACT_TERMS,
+    NeighborhoodStats, OverhangSums, PointSums, SUPPORT_FACTOR, SphereSums,
 };
 use crate::trace::counts::{Counted, count};
 use crate::trace::query::edge_test::{PacketCandidates, enclosed_lanes, lane_mask};
@@ -276,7 +276,7 @@ fn facing<F: Floats>(normal: Vec3Lanes<F>, direction: Vec3Lanes<F>) -> Vec3Lanes
 }
 
 /// A decoded block, whose points are read one by one.
-pub(super) struct StoredBlock {
+pub struct StoredBlock {
     /// Lanes of the points in the region.
     lanes: u32,
     first_slot: Slot,
@@ -336,6 +336,15 @@ pub(super) fn inverse_support<F: Floats>(radius: F) -> F {
 fn collect_blocks<L: Lanes>(points: &FlatPoints, region: &Aabb, blocks: &mut Vec<StoredBlock>) {
     blocks.clear();
     query_box::<L>(points, region, &mut BlockCollector::<L> { region, blocks, lanes: PhantomData });
+    if MAX_EXACT_TERMS < LANES * blocks.len() {
+        sort_by_slot(blocks);
+    }
+}
+
+/// Sorts blocks into an order that does not depend on the region in which they were found, for sums that are not exact.
+#[cold]
+fn sort_by_slot(blocks: &mut [StoredBlock]) {
+    blocks.sort_unstable_by_key(|block| block.first_slot);
 }
 
 struct BlockCollector<'a, L> {

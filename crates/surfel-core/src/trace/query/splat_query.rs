@@ -14,7 +14,7 @@ use crate::trace::query::edge_test::{PacketCandidates, enclosed_by_blocks, enclo
 use crate::trace::query::gather::{DiscConsumer, GatherQuery, PacketDiscs};
 use crate::trace::query::hit::Hit;
 use crate::trace::query::packet_disc_hits::PacketDiscHit;
-use crate::trace::query::plane_fit::FittedDiscs;
+use crate::trace::query::plane_fit::{FittedDiscs, FittedPlanes};
 use crate::trace::simd::packet_rays::PacketRays;
 use crate::trace::simd::{Simd, dispatch_simd};
 use crate::trace::traversal::batch::trace_batch;
@@ -246,6 +246,29 @@ impl<W: PacketLanes> NearestDiscs<W> {
     }
 }
 
+/// The blended discs of each ray.
+struct BlendedDiscs<W> {
+    blend: Blend<W>,
+    /// Distances at which the search goes on if the discs are rejected.
+    restart: W,
+    /// Lanes of the rays that cross the plane of their discs; all if the planes are not asked.
+    crossed: u32,
+}
+
+impl<W: PacketLanes> BlendedDiscs<W> {
+    /// Moves the hits to where the rays cross planes, and restarts behind them. The planes are in radii.
+    #[inline(always)]
+    fn move_to_planes(&mut self, planes: &FittedPlanes<W>, rays: &PacketRays<W>, radii: W) {
+        let crossing = planes.crossing(rays.direction());
+        let distance = self.blend.distance;
+        self.restart = distance + crossing.restart * radii;
+        let moved = distance + crossing.step * radii;
+        self.blend.distance = moved;
+        let in_range = rays.t_min.le(moved) & moved.le(rays.t_max);
+        self.crossed = crossing.lanes & in_range.bits();
+    }
+}
+
 impl DiscConsumer for DiscBlender<'_> {
     type Result = Splat;
 
@@ -276,86 +299,13 @@ impl DiscConsumer for DiscBlender<'_> {
         if self.length().is_some() {
             nearest.drop_beyond_first(&mut discs.hits);
         }
-        let (origin, direction) = (rays.origin(), rays.direction());
         if self.cloud.fits_balls() {
-            nearest.discs.normal = Vec3Lanes::splat(Vec3::ZERO).minus(direction);
+            nearest.discs.normal = Vec3Lanes::splat(Vec3::ZERO).minus(rays.direction());
         }
-        let mut fitted = FittedDiscs {
-            discs: &mut self.surfels,
-            hits: &mut discs.hits,
-            position: origin.plus(direction.scaled(nearest.discs.distance)),
-            per_radius: L::PacketLanes::splat(1.0) / nearest.radii,
-        };
-        if self.kind == SurfaceKind::SplatFit {
-            fitted.keep_nearest();
-            nearest.n_discs = nearest.n_discs.min(L::PacketLanes::splat(MAX_GATHERED as f32));
-        }
-        let mut accumulator =
-            SplatAccumulator::new(self.kind, self.cloud.options.align, &nearest.discs, direction);
-        for (surfel, hit) in fitted.discs.iter().zip(fitted.hits.iter()) {
-            let distances = L::PacketLanes::load(&hit.distances);
-            let position = origin.plus(direction.scaled(distances));
-            let offset = position.minus(Vec3Lanes::splat(surfel.center));
-            accumulator.add(surfel, distances, offset, hit.hit_mask::<L::PacketLanes>());
-        }
-        let Blend { mut distance, normal: mut normals, color: colors } = accumulator.finish();
-        let mut is_crossed = u32::MAX;
-        let offset = RESTART_OFFSET / self.cloud.radius_factor();
-        let mut restart = nearest.discs.distance + L::PacketLanes::splat(offset) * nearest.radii;
-        if self.kind == SurfaceKind::SplatFit {
-            let planes = fitted.planes(normals);
-            normals = planes.normal;
-            if self.cloud.fits_balls() {
-                let crossing = planes.crossing(direction);
-                is_crossed = crossing.lanes;
-                restart = distance + crossing.restart * nearest.radii;
-                distance = distance + crossing.step * nearest.radii;
-                is_crossed &= (rays.t_min.le(distance) & distance.le(rays.t_max)).bits();
-            }
-        }
-        let n_discs = nearest.n_discs.store();
-        let mut is_enclosed = 0;
-        if self.tests_edge {
-            let factor = L::PacketLanes::splat(self.cloud.radius_factor());
-            let candidates = PacketCandidates {
-                position: origin.plus(direction.scaled(distance)),
-                normal: normals,
-                direction,
-                radius: nearest.radii / factor,
-            };
-            let is_hit = L::PacketLanes::splat(0.0).lt(nearest.n_discs).bits();
-            let lanes = is_hit & is_crossed & ((1 << splats.len()) - 1);
-            let (points, hits) = (&self.cloud.points, &discs.hits);
-            is_enclosed = match self.cloud.fits_balls() {
-                true => enclosed_by_blocks::<L, false>(points, hits, lanes, &candidates),
-                false => enclosed_by_blocks::<L, true>(points, hits, lanes, &candidates),
-            };
-        }
-        let min_discs =
-            if self.kind == SurfaceKind::Cylinder { self.cloud.options.density } else { 1 };
-        let nearest_distances = nearest.discs.distance.store();
-        let (distances, slots) = (distance.store(), nearest.slots.store());
-        let (radii, restarts) = (nearest.radii.store(), restart.store());
-        let (normals, colors) = (normals.store_packet(), colors.store_packet());
-        for lane in 0..splats.len() {
-            splats[lane] = Splat::MISS;
-            if 0.0 < n_discs[lane] {
-                let vector = |rows: &[[f32; PACKET_WIDTH]; 3]| {
-                    Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane])
-                };
-                splats[lane] = Splat {
-                    hit: Hit { distance: nearest_distances[lane], slot: slots[lane].to_bits() },
-                    distance: distances[lane],
-                    n_discs: n_discs[lane] as u32,
-                    radius: radii[lane],
-                    restart: restarts[lane],
-                    normal: vector(&normals),
-                    color: vector(&colors),
-                    is_dense: min_discs <= n_discs[lane] as u32 && is_crossed >> lane & 1 == 1,
-                    is_enclosed: is_enclosed >> lane & 1 == 1,
-                };
-            }
-        }
+        let blended = self.blend(&rays, &mut discs.hits, &mut nearest);
+        let lanes = (1 << splats.len()) - 1;
+        let enclosed = self.enclosed::<L>(&rays, &discs.hits, &nearest, &blended, lanes);
+        self.store(&nearest, &blended, enclosed, splats);
     }
 }
 
@@ -393,5 +343,110 @@ impl DiscBlender<'_> {
             self.surfels.push(surfel);
         }
         nearest
+    }
+
+    /// Blends the discs that were hit, of which `SplatFit` keeps those near the nearest hits.
+    #[inline(always)]
+    fn blend<W: PacketLanes>(
+        &mut self,
+        rays: &PacketRays<W>,
+        hits: &mut Vec<PacketDiscHit>,
+        nearest: &mut NearestDiscs<W>,
+    ) -> BlendedDiscs<W> {
+        let (origin, direction) = (rays.origin(), rays.direction());
+        let mut fitted = FittedDiscs {
+            discs: &mut self.surfels,
+            hits,
+            position: origin.plus(direction.scaled(nearest.discs.distance)),
+            per_radius: W::splat(1.0) / nearest.radii,
+        };
+        if self.kind == SurfaceKind::SplatFit {
+            fitted.keep_nearest();
+            nearest.n_discs = nearest.n_discs.min(W::splat(MAX_GATHERED as f32));
+        }
+        let mut accumulator =
+            SplatAccumulator::new(self.kind, self.cloud.options.align, &nearest.discs, direction);
+        for (surfel, hit) in fitted.discs.iter().zip(fitted.hits.iter()) {
+            let distances = W::load(&hit.distances);
+            let position = origin.plus(direction.scaled(distances));
+            let offset = position.minus(Vec3Lanes::splat(surfel.center));
+            accumulator.add(surfel, distances, offset, hit.hit_mask::<W>());
+        }
+        let blend = accumulator.finish();
+        let offset = W::splat(RESTART_OFFSET / self.cloud.radius_factor());
+        let restart = nearest.discs.distance + offset * nearest.radii;
+        let mut blended = BlendedDiscs { blend, restart, crossed: u32::MAX };
+        if self.kind == SurfaceKind::SplatFit {
+            let planes = fitted.planes(blended.blend.normal);
+            blended.blend.normal = planes.normal;
+            if self.cloud.fits_balls() {
+                blended.move_to_planes(&planes, rays, nearest.radii);
+            }
+        }
+        blended
+    }
+
+    /// Returns those of `lanes` whose hits are known to be enclosed; none unless edges are tested.
+    #[inline(always)]
+    fn enclosed<L: Lanes>(
+        &self,
+        rays: &PacketRays<L::PacketLanes>,
+        hits: &[PacketDiscHit],
+        nearest: &NearestDiscs<L::PacketLanes>,
+        blended: &BlendedDiscs<L::PacketLanes>,
+        lanes: u32,
+    ) -> u32 {
+        if !self.tests_edge {
+            return 0;
+        }
+        let direction = rays.direction();
+        let factor = L::PacketLanes::splat(self.cloud.radius_factor());
+        let candidates = PacketCandidates {
+            position: rays.origin().plus(direction.scaled(blended.blend.distance)),
+            normal: blended.blend.normal,
+            direction,
+            radius: nearest.radii / factor,
+        };
+        let is_hit = L::PacketLanes::splat(0.0).lt(nearest.n_discs).bits();
+        let (points, lanes) = (&self.cloud.points, is_hit & blended.crossed & lanes);
+        match self.cloud.fits_balls() {
+            true => enclosed_by_blocks::<L, false>(points, hits, lanes, &candidates),
+            false => enclosed_by_blocks::<L, true>(points, hits, lanes, &candidates),
+        }
+    }
+
+    /// Writes the splat of each ray.
+    #[inline(always)]
+    fn store<W: PacketLanes>(
+        &self,
+        nearest: &NearestDiscs<W>,
+        blended: &BlendedDiscs<W>,
+        enclosed: u32,
+        splats: &mut [Splat],
+    ) {
+        let min_discs =
+            if self.kind == SurfaceKind::Cylinder { self.cloud.options.density } else { 1 };
+        let (nearest_distances, slots) = (nearest.discs.distance.store(), nearest.slots.store());
+        let (n_discs, radii) = (nearest.n_discs.store(), nearest.radii.store());
+        let (distances, restarts) = (blended.blend.distance.store(), blended.restart.store());
+        let [x, y, z] = blended.blend.normal.store_packet();
+        let [r, g, b] = blended.blend.color.store_packet();
+        for (lane, splat) in splats.iter_mut().enumerate() {
+            *splat = Splat::MISS;
+            if 0.0 < n_discs[lane] {
+                let is_crossed = blended.crossed >> lane & 1 == 1;
+                *splat = Splat {
+                    hit: Hit { distance: nearest_distances[lane], slot: slots[lane].to_bits() },
+                    distance: distances[lane],
+                    n_discs: n_discs[lane] as u32,
+                    radius: radii[lane],
+                    restart: restarts[lane],
+                    normal: Vec3::new(x[lane], y[lane], z[lane]),
+                    color: Vec3::new(r[lane], g[lane], b[lane]),
+                    is_dense: min_discs <= n_discs[lane] as u32 && is_crossed,
+                    is_enclosed: enclosed >> lane & 1 == 1,
+                };
+            }
+        }
     }
 }

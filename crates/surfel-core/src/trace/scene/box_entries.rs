@@ -44,6 +44,7 @@ fn box_entries_kernel<L: Lanes>(boxes: &[Aabb], rays: &[Ray], entries: &mut [Box
 }
 
 /// Returns the distance at which one ray enters a box within its range, infinite if it does not.
+#[inline(always)]
 pub fn box_entry(bounds: &Aabb, ray: &Ray) -> f32 {
     let inverse = finite_inverse_vec3(Vec3A::from(ray.direction)).to_array();
     intersect_aabb(&ray.origin.to_array(), &inverse, (ray.t_min, ray.t_max), bounds)

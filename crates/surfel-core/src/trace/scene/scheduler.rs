@@ -5,7 +5,7 @@ use crate::flat::FlatScene;
 use crate::math::{Aabb, PACKET_WIDTH, Ray};
 use crate::trace::scene::box_entries::{BoxEntries, box_entries};
 use crate::trace::scene::instance_filter::InstanceFilter;
-use crate::trace::scene::tlas::traverse_tlas;
+use crate::trace::scene::tlas::{TlasEntries, tlas_entries};
 use crate::trace::simd::Simd;
 use std::ops::Range;
 
@@ -80,7 +80,7 @@ impl InstanceScheduler {
         let instances: Vec<u32> =
             accepted.take(MAX_BRUTE_FORCE + 1).map(|(i, _)| i as u32).collect();
         if MAX_BRUTE_FORCE < instances.len() {
-            return Self { visits: tlas_visits(scene, filter, rays), batches: Vec::new() };
+            return Self { visits: tlas_visits(scene, simd, filter, rays), batches: Vec::new() };
         }
         let boxes: Vec<Aabb> =
             instances.iter().map(|&i| scene.instances[i as usize].bounds).collect();
@@ -168,17 +168,10 @@ fn add_rays(
 }
 
 /// Finds all visits of each ray by the tree over the instances.
-fn tlas_visits(scene: &FlatScene, filter: InstanceFilter, rays: &[Ray]) -> Visits {
-    let (mut entries, mut active_rays) = (Vec::new(), Vec::with_capacity(rays.len()));
-    for (ray_idx, ray) in rays.iter().enumerate() {
-        let first = entries.len();
-        traverse_tlas(scene, filter, ray, &mut entries);
-        if first < entries.len() {
-            entries[first..].sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            active_rays.push((ray_idx as u32, first as u32..entries.len() as u32));
-        }
-    }
-    Visits::Tlas { entries, active_rays, visits: Vec::new() }
+fn tlas_visits(scene: &FlatScene, simd: Simd, filter: InstanceFilter, rays: &[Ray]) -> Visits {
+    let mut found = TlasEntries::default();
+    tlas_entries(scene, simd, filter, rays, &mut found);
+    Visits::Tlas { entries: found.entries, active_rays: found.rays, visits: Vec::new() }
 }
 
 /// Lists the next visit of each ray that has one within its limit.

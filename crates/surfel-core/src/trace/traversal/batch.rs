@@ -35,7 +35,7 @@ pub trait RayQuery<L: Lanes> {
     ) -> Self::PacketVisitor<'p>;
 
     /// Takes the results of one to sixteen incoherent rays, which would be those of one packet.
-    fn ray_results(&mut self, visitors: &[Self::RayVisitor<'_>], results: &mut [Self::Result]);
+    fn ray_results(&mut self, visitors: &mut [Self::RayVisitor<'_>], results: &mut [Self::Result]);
 
     /// Takes the results of a packet.
     fn packet_results(
@@ -140,8 +140,9 @@ fn trace_incoherent<L: Lanes, Q: RayQuery<L>>(
     results: &mut [Q::Result],
 ) {
     trace_interleaved::<L, _>(pool, tree, visitors);
-    for (first, visitors) in firsts.iter().zip(visitors.chunks(PACKET_WIDTH)) {
-        query.ray_results(visitors, &mut results[*first..][..visitors.len()]);
+    for (first, visitors) in firsts.iter().zip(visitors.chunks_mut(PACKET_WIDTH)) {
+        let results = &mut results[*first..][..visitors.len()];
+        query.ray_results(visitors, results);
     }
     visitors.clear();
     firsts.clear();
