@@ -29,19 +29,6 @@ pub fn load_graph(
     read(&Input::open(path)?, ResourceResolver::for_file(path), options, progress)
 }
 
-/// Returns true if [`load_graph`] reads one untransformed cloud from a file, and nothing else.
-///
-/// # Errors
-/// Fails if the file cannot be read, or if its format is not supported or its header broken.
-pub fn is_cloud(path: &Path) -> Result<bool> {
-    let input = Input::open(path)?;
-    Ok(match &detect(&input)?.read {
-        Reader::Points(_) => true,
-        Reader::Mesh { has_triangles, .. } => !has_triangles(&input)?,
-        Reader::Scene(_) => false,
-    })
-}
-
 /// Returns true if a file holds a scene with transforms and animation, rather than one cloud or mesh.
 ///
 /// # Errors

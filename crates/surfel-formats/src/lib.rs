@@ -57,7 +57,7 @@ pub use error::{Error, Location, Result};
 pub use file::{check_output_path, load_text, save_text};
 pub use format::{FORMATS, Format, detect_bytes};
 pub use gltf::{load_gltf, load_gltf_bytes};
-pub use graph::{is_cloud, is_scene, load_graph, load_graph_bytes};
+pub use graph::{is_scene, load_graph, load_graph_bytes};
 pub use image_file::{
     Alpha, BitDepth, EpsgCodes, Georeference, HeightMap, ImageOptions, check_height_map,
     check_image_output, encode_png, save_height_map, save_image,

@@ -12,6 +12,7 @@ use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::salvage::Salvage;
+use crate::stations::set_stations;
 use crate::table::{
     ColumnField, ColumnRole, Field, LineError, NumberType, RecordLayout, RowRange, Tolerance,
     named_columns, origin_of_records, parse_number, read_records, read_rows,
@@ -51,9 +52,10 @@ pub(crate) fn read(
 /// filter dropped is no grid any more.
 fn add_grid(cloud: &mut PointCloud, header: &Header, options: &LoadOptions) {
     let position = Some(DVec3::from_array(header.viewpoint));
-    cloud.stations =
-        vec![ScanStation { name: "scan 1".into(), position, ..ScanStation::default() }];
-    if cloud.len() as u64 != header.n_points() {
+    let station = ScanStation { name: "scan 1".into(), position, ..ScanStation::default() };
+    let n_points = cloud.len();
+    set_stations(cloud, vec![station], &[n_points]);
+    if n_points as u64 != header.n_points() {
         return;
     }
     let cells = 0..header.n_points();

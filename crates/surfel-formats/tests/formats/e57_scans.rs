@@ -41,6 +41,29 @@ fn scans_are_moved_to_world_coordinates() {
 }
 
 #[test]
+fn a_field_named_station_is_not_taken_for_the_stations_of_points() {
+    let scan = |name| Scan {
+        name,
+        pose: None,
+        prototype: vec![
+            Record::CARTESIAN_X_F64,
+            Record::CARTESIAN_Y_F64,
+            Record::CARTESIAN_Z_F64,
+            record(
+                RecordName::Unknown { namespace: "nor".into(), name: "station".into() },
+                RecordDataType::Integer { min: 0, max: 1000 },
+            ),
+        ],
+        points: vec![[vec![RecordValue::Double(1.0); 3], vec![RecordValue::Integer(7)]].concat()],
+    };
+    let cloud = read("a.e57", write(&[scan("hall"), scan("yard")])).unwrap().cloud;
+    assert_eq!(cloud.scalar(STATION), Some(&Values::U16(vec![0, 1])));
+    assert_eq!(cloud.scalars.len(), 1);
+    let single = read("a.e57", write(&[scan("hall")])).unwrap().cloud;
+    assert_eq!(single.station_of(0).unwrap().name, "hall");
+}
+
+#[test]
 fn inspect_reads_the_xml_alone() {
     let folder = Folder::new("e57");
     let path = folder.path("a.e57");

@@ -1,7 +1,7 @@
 //! PCD files: all encodings, packed colours, fields of any order, and broken headers.
 
 use surfel_core::math::{DVec3, Vec3};
-use surfel_core::points::{COLUMN_INDEX, ROW_INDEX, Values};
+use surfel_core::points::{COLUMN_INDEX, ROW_INDEX, STATION, Values};
 use surfel_core::progress::NoProgress;
 use surfel_formats::{Column, ColumnChoice, Error, LoadOptions, load, load_bytes};
 
@@ -91,6 +91,15 @@ fn organized_clouds_have_a_station_and_a_grid() {
     assert_eq!(station.position, Some(DVec3::ZERO));
     let line = file.replace("WIDTH 3\nHEIGHT 2", "WIDTH 6\nHEIGHT 1");
     assert!(read("a.pcd", line).unwrap().cloud.stations.is_empty());
+}
+
+#[test]
+fn a_field_named_station_is_not_taken_for_the_stations_of_points() {
+    let header = "FIELDS x y z station\nSIZE 4 4 4 2\nTYPE F F F U\nWIDTH 2\nHEIGHT 2\n";
+    let points: String = (0..4).map(|i| format!("{i} 1 2 5\n")).collect();
+    let cloud = read("a.pcd", format!("{header}DATA ascii\n{points}")).unwrap().cloud;
+    assert_eq!(cloud.scalar(STATION), None);
+    assert_eq!(cloud.station_of(3).unwrap().name, "scan 1");
 }
 
 #[test]
