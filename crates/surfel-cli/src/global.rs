@@ -48,7 +48,7 @@ impl Global {
 
 /// Fails if a GPU is demanded that is not there, before any file is read.
 pub fn check_device(settings: &RunSettings) -> anyhow::Result<()> {
-    if settings.backend() == Backend::Gpu {
+    if settings.chosen_backend() == Backend::Gpu {
         SceneRenderer::new(settings)?;
     }
     Ok(())

@@ -9,6 +9,7 @@ mod cleanup;
 mod shell;
 mod stats;
 pub mod options;
+mod tips;
 mod inputs;
 mod global;
 mod scene_args;
@@ -127,7 +128,9 @@ pub fn scene_provider(words: Vec<OsString>) -> anyhow::Result<Arc<dyn SceneProvi
 }
 
 fn parse(words: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {
-    Cli::from_arg_matches(&command().try_get_matches_from(words)?)
+    let words: Vec<OsString> = words.into_iter().collect();
+    let matches = command().try_get_matches_from(&words);
+    Cli::from_arg_matches(&matches.map_err(|error| tips::with_tip(error, &words, &command()))?)
 }
 
 /// The last of several values counts, and numbers below zero are values, not options.

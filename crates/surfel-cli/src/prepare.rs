@@ -21,8 +21,9 @@ pub struct Args {
     files: Vec<PathBuf>,
     #[arg(short, long, value_name = "FILE", help = output_help())]
     output: PathBuf,
-    /// Adds normals. Without this, --radius, --orient, --filter, --class, --returns, --crop, --duplicates, --subsample,
-    /// --remove-outliers, --denoise and --keep-variation: normals and radii.
+    /// Adds normals. Normals and radii are both added if you choose no step: none of --normals, --normals-k,
+    /// --normals-radius, --radius, --orient, --filter, --class, --returns, --crop, --duplicates, --subsample,
+    /// --mixed-pixels, --remove-outliers, --denoise, --keep-variation.
     #[arg(long, help_heading = "Preparation")]
     normals: bool,
     /// Adds the column surface_variation: 0 on a plane, up to 1/3 where points fill space.

@@ -166,7 +166,7 @@ pub fn with_info(complete: &SceneDescription, loaded: &LoadedScene) -> Value {
             "triangles": n_triangles,
             "threads": rayon::current_num_threads(),
             "simd": Simd::detect().name(),
-            "backend": backend_word(complete.run.backend()),
+            "backend": backend_word(complete.run.chosen_backend()),
         }),
     );
     Value::Object(table)

@@ -6,7 +6,7 @@ use crate::options::{KeyOptions, Scope};
 use clap::Args;
 use std::path::PathBuf;
 use surfel::SceneDescription;
-use surfel::description::is_scene_file;
+use surfel::description::{Invalid, is_scene_file};
 use surfel_core::scene::Background;
 use surfel_formats::FORMATS;
 
@@ -65,12 +65,17 @@ impl<S: Scope> SceneArgs<S> {
             layer.picture.background = Some(Background::Transparent);
         }
         layer.run = global.run.description.clone()?.run;
+        let has_typed_settings = layer.overrides.object_settings.is_some();
         description.overlay(layer);
+        let scene_file = self.files.iter().find(|file| is_scene_file(file));
+        let of_scene_file =
+            |error: Invalid| scene_file.into_iter().fold(error, |error, file| error.in_file(file));
         // Names may clash between scene files, and keys between a file and the command line.
         let checked = description.check().and_then(|()| description.check_is_not_empty());
-        let checked = checked.and_then(|()| description.clone().apply_object_settings());
-        let scene_file = self.files.iter().find(|file| is_scene_file(file));
-        checked.map_err(|error| scene_file.into_iter().fold(error, |e, file| e.in_file(file)))?;
+        checked.map_err(of_scene_file)?;
+        let applied = description.clone().apply_object_settings();
+        // Settings of the command line take the place of those of scene files.
+        applied.map_err(|e| if has_typed_settings { e } else { of_scene_file(e) })?;
         Ok(description)
     }
 }

@@ -5,22 +5,26 @@ use crate::errors::invalid_setting;
 use crate::threads::{on_threads, start_threads};
 use crate::value::with_keys;
 use crate::work;
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::Arc;
-use surfel::SceneDescription;
 use surfel::description::Invalid;
 use surfel::prepare::{PrepareOptions, prepare_files, prepare_points};
+use surfel::progress_log::ProgressLog;
+use surfel::{Choice, SceneDescription};
 use surfel_core::points::PointCloud;
-use surfel_formats::{Loaded, SaveOptions};
+use surfel_formats::{FileInfo, Loaded, SaveOptions};
 
 /// Cleans a cloud, and adds normals and radii: of a file, of several that become one, or of a `Cloud`.
 ///
 /// Keywords are the keys of preparation in scene files: `filter`, `crop`, `subsample`, `remove_outliers`, `denoise`, `orient`,
 /// `normals_k`, `radius` and others, besides `seed`, `threads` and `memory_limit`. Without any, normals and radii are added;
 /// with some, those steps alone are taken, and `normals=True` adds normals. `keep_variation=True` adds the column
-/// `surface_variation`. `progress` is called as `progress(stage, done, total)`.
+/// `surface_variation`. Coordinates in degrees of longitude and latitude stay, with a warning, unless `reproject=True` moves
+/// them to metres. `progress` is called as `progress(stage, done, total)`.
 ///
 /// Raises `InvalidSetting`, `MissingFile`, `InvalidFile`, `InvalidScene`.
 #[pyfunction]
@@ -37,26 +41,37 @@ pub fn prepare(
     check_keys(&description).map_err(|error| invalid_setting(py, error))?;
     let options = PrepareOptions { normals, keep_variation };
     let source = Source::new(&sources)?;
-    work::run(py, progress, |progress| {
+    let (prepared, choices) = work::run(py, progress, |progress| {
         let threads = start_threads(&description.run)?;
-        on_threads(threads.as_ref(), || match source {
-            Source::Cloud(cloud, options_of_file) => {
-                let cloud = Arc::unwrap_or_clone(cloud);
-                let cloud = prepare_points(cloud, &description, options, progress)?;
-                Ok(PyCloud::new(cloud, *options_of_file))
+        let log = ProgressLog::new(progress);
+        let prepared = on_threads(threads.as_ref(), || match source {
+            Source::Cloud(cloud, info) => {
+                let loaded = Loaded { cloud: Arc::unwrap_or_clone(cloud), info: *info };
+                prepare_points(loaded, &description, options, &log)
             }
-            Source::Files(files) => {
-                let Loaded { cloud, info } =
-                    prepare_files(&files, &description, options, progress)?;
-                Ok(PyCloud::new(cloud, SaveOptions::from_source(&info)))
-            }
-        })
-    })
+            Source::Files(files) => prepare_files(&files, &description, options, &log),
+        })?;
+        Ok((prepared, log.into_choices()))
+    })?;
+    warn(py, &choices)?;
+    let Loaded { cloud, info } = prepared;
+    Ok(PyCloud::new(cloud, SaveOptions::from_source(&info)))
+}
+
+/// Raises a `UserWarning` for each choice that is a warning.
+fn warn(py: Python<'_>, choices: &[Choice]) -> PyResult<()> {
+    for Choice { reason, keys } in choices {
+        if let Some(text) = reason.strip_prefix("warning: ") {
+            let text = CString::new(format!("{text} [{}]", keys.join(", ")))?;
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+        }
+    }
+    Ok(())
 }
 
 /// The points that are prepared: a cloud, or those of files.
 enum Source {
-    Cloud(Arc<PointCloud>, Box<SaveOptions>),
+    Cloud(Arc<PointCloud>, Box<FileInfo>),
     Files(Vec<PathBuf>),
 }
 
@@ -66,11 +81,17 @@ impl Source {
             && let Ok(cloud) = only.cast::<PyCloud>()
         {
             let cloud = cloud.get();
-            return Ok(Self::Cloud(cloud.cloud.clone(), Box::new(cloud.options.clone())));
+            return Ok(Self::Cloud(cloud.cloud.clone(), Box::new(info(&cloud.options))));
         }
         let files = sources.iter().map(|source| source.extract::<PathBuf>());
         Ok(Self::Files(files.collect::<PyResult<_>>()?))
     }
+}
+
+/// Returns what the properties of a saved cloud tell about the file that it came from.
+fn info(options: &SaveOptions) -> FileInfo {
+    let SaveOptions { resolution, coordinate_system, las } = options.clone();
+    FileInfo { resolution, coordinate_system, las, ..FileInfo::default() }
 }
 
 /// Fails for keys that do not concern points.

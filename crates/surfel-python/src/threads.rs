@@ -6,7 +6,7 @@ use surfel::description::{Backend, Invalid, RunSettings};
 
 /// Starts the threads that settings ask for; none if those of all work will do.
 pub fn start_threads(settings: &RunSettings) -> surfel::Result<Option<ThreadPool>> {
-    if settings.backend() == Backend::Gpu {
+    if settings.chosen_backend() == Backend::Gpu {
         return Err(Invalid::at("backend", "gpu is not in this build; use cpu").into());
     }
     let Some(n_threads) = settings.threads else { return Ok(None) };

@@ -21,6 +21,8 @@ import surfel
         ({"color": object()}, "color: found an object of type object"),
         ({"camera_position": (1, 2, 3), "camera_focal_point": (1, 2, 3)}, "focal point"),
         ({"backend": "gpu"}, "backend: gpu is not in this build"),
+        ({"device": "0"}, "backend: gpu is not in this build"),
+        ({"window_size": (640, 480)}, "window_size: unknown key; here it is `resolution`"),
     ],
 )
 def test_wrong_keywords_are_named(hill, keys, words):

@@ -42,6 +42,17 @@ def test_several_files_become_one_cloud(hill):
     assert len(surfel.prepare(hill, hill, duplicates="keep")) == 5000
 
 
+def test_degrees_are_moved_on_request_and_warned_of_otherwise():
+    angles = numpy.arange(900)
+    degrees = [11.57 + 1e-4 * (angles % 30), 48.13 + 1e-4 * (angles // 30), angles % 17]
+    cloud = surfel.Cloud(numpy.stack(degrees, axis=1))
+    with pytest.warns(UserWarning, match=r"degrees of longitude and latitude.*\[reproject\]"):
+        kept = surfel.prepare(cloud, duplicates="keep")
+    assert (kept.points[:, 1] < 90).all()
+    moved = surfel.prepare(cloud, duplicates="keep", reproject=True)
+    assert (moved.points[:, 1] > 5e6).all()
+
+
 @pytest.mark.parametrize(
     ("keys", "words"),
     [

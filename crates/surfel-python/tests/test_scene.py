@@ -51,6 +51,15 @@ def test_added_things_follow_files(hill):
     assert scene.cast_rays([down(0, 0), down(10, 0)])["geometry_ids"].tolist() == [0, 1]
 
 
+def test_all_files_together_have_one_number(hill, tmp_path):
+    house = tmp_path / "house.obj"
+    house.write_text("v 4 -1 0\nv 6 -1 0\nv 6 1 0\nv 4 1 0\nf 1 2 3 4\n")
+    scene = surfel.load(hill, house)
+    assert scene.add(SQUARE, translate=(10, 0, 0)) == 1
+    hits = scene.cast_rays([down(0, 0), down(5, 0.5), down(10, 0.5)])
+    assert hits["geometry_ids"].tolist() == [0, 0, 1]
+
+
 def test_materials_are_those_of_scene_files(points):
     pictures = []
     for material in (None, "mirror", {"kind": "plastic", "roughness": 0.2}):

@@ -39,6 +39,7 @@ test('materials survive parsing and formatting', () => {
   }
   assert.deepEqual(parseMaterial('a=glass:ior=1.33').properties, { ior: '1.33' });
   assert.deepEqual(parseMaterial('emissive:emissive-strength=2').properties, { emissive_strength: '2' });
+  assert.deepEqual(parseMaterial('12:30.laz=glass'), { name: '12:30.laz', kind: 'glass', properties: {} });
 });
 
 test('an object uses its own last material before that of all objects', () => {

@@ -3,7 +3,8 @@
 /** Parses one entry to { name, kind, properties }; the name is null for all objects. */
 export function parseMaterial(text) {
   const colon = text.lastIndexOf(':');
-  const hasProperties = 0 <= colon && text.slice(colon).includes('=');
+  // In `12:30.laz=glass` the colon belongs to the name.
+  const hasProperties = /^:[a-z_-]+=/.test(text.slice(colon));
   const head = hasProperties ? text.slice(0, colon) : text;
   const tail = hasProperties ? text.slice(colon + 1) : '';
   const equals = head.lastIndexOf('=');

@@ -1,11 +1,13 @@
 //! Movies: one frame after another, with a turntable if one is asked for.
 
 use crate::built_scene::BuiltScene;
-use crate::description::{Invalid, SceneDescription};
+use crate::description::{Crop, Invalid, SceneDescription};
 use crate::error::{Error, Result};
+use crate::memory_files::MemoryFiles;
 use crate::picture::{RenderedImage, image_options};
 use crate::progress_log::CancelOnly;
 use crate::resolve::{AutoSettings, KeepOptions, LoadedScene, MemoryEstimate};
+use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use surfel_core::math::DVec3;
@@ -43,8 +45,8 @@ pub fn movie_options(description: &SceneDescription) -> MovieOptions {
     }
 }
 
-/// Returns a text that changes with everything that frames depend on: the complete description, and the sizes and times
-/// of all files.
+/// Returns a text that changes with everything that frames depend on: the complete description, the sizes and times of
+/// all files, and the clouds and meshes in memory.
 pub fn fingerprint(
     complete: &SceneDescription,
     description: &SceneDescription,
@@ -53,15 +55,32 @@ pub fn fingerprint(
     let objects = description.objects.iter().flat_map(|object| &object.files);
     let external = loaded.file_infos.iter().flat_map(|info| &info.external_files);
     let named = objects.chain(&description.light.environment).chain(external);
-    let stamp = |file: &PathBuf| {
-        let data = std::fs::metadata(file).ok()?;
-        Some((file.clone(), data.len(), data.modified().ok()?))
-    };
-    let files: Vec<_> = description.files.iter().chain(named).map(stamp).collect();
+    let files = description.files.iter().chain(named).chain(crop_files(description));
+    let files: BTreeSet<&PathBuf> = files.collect();
+    let stamps: Vec<_> = files.iter().map(|file| stamp(file, &description.memory)).collect();
     let table = serde_json::Value::Object(complete.to_table());
-    let text = format!("{} {table} {files:?}", env!("CARGO_PKG_VERSION"));
+    let text = format!("{} {table} {stamps:?}", env!("CARGO_PKG_VERSION"));
     let hash = text.bytes().fold(0, |hash, byte| surfel_core::math::hash(hash ^ u64::from(byte)));
     format!("{hash:016x}")
+}
+
+/// Returns the files of the areas whose points are kept.
+fn crop_files(description: &SceneDescription) -> impl Iterator<Item = &PathBuf> {
+    let of_objects = description.objects.iter().map(|object| &object.settings);
+    let all = of_objects.chain([&description.objects_default]);
+    all.filter_map(|settings| match &settings.preparation.crop {
+        Some(Crop::File(path)) => Some(path),
+        _ => None,
+    })
+}
+
+/// Returns a text that changes with the content of a file; `None` if it cannot be read.
+fn stamp(file: &Path, memory: &MemoryFiles) -> Option<String> {
+    if let Some(content) = memory.get(file) {
+        return Some(format!("{file:?} {}", content.fingerprint()));
+    }
+    let data = std::fs::metadata(file).ok()?;
+    Some(format!("{file:?} {} {:?}", data.len(), data.modified().ok()?))
 }
 
 /// A function that adds a finished frame, by its index from 0, as the bytes of a file.
@@ -238,4 +257,52 @@ fn unfinished(error: Error, n_done: u32, n_frames: u32) -> Error {
         return error;
     }
     Error::Unfinished { cause: Box::new(error), n_done, n_frames }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Frames of other data have another fingerprint.
+
+    use super::*;
+    use crate::memory_files::MemoryContent;
+    use std::sync::Arc;
+    use surfel_core::math::Vec3;
+    use surfel_core::points::PointCloud;
+    use surfel_core::progress::NoProgress;
+
+    /// Returns the description of a square of points in memory, whose colours have this brightness.
+    fn square(brightness: u16) -> SceneDescription {
+        let corner = |i: u32| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0);
+        let mut cloud = PointCloud::from_positions((0..400).map(corner).collect());
+        cloud.colors = Some(vec![[brightness; 3]; 400]);
+        let mut description = SceneDescription::of_files(["memory:square"]);
+        let content = MemoryContent::Points(Arc::new(cloud));
+        description.memory.insert("memory:square", content);
+        description
+    }
+
+    fn fingerprint_of(description: &SceneDescription) -> String {
+        let loaded = LoadedScene::read(description, KeepOptions::default(), &NoProgress).unwrap();
+        fingerprint(description, description, &loaded)
+    }
+
+    #[test]
+    fn the_fingerprint_changes_with_points_in_memory() {
+        assert_eq!(fingerprint_of(&square(7)), fingerprint_of(&square(7)));
+        assert_ne!(fingerprint_of(&square(7)), fingerprint_of(&square(8)));
+    }
+
+    #[test]
+    fn the_fingerprint_changes_with_the_file_of_an_area() {
+        let file = std::env::temp_dir().join(format!("surfel-area-{}.wkt", std::process::id()));
+        let mut description = square(7);
+        description.objects_default.preparation.crop = Some(Crop::File(file.clone()));
+        let fingerprints = ["9", "9.25"].map(|end| {
+            let area = format!("POLYGON ((0 0, {end} 0, {end} {end}, 0 {end}, 0 0))");
+            std::fs::write(&file, area).unwrap();
+            fingerprint_of(&description)
+        });
+        std::fs::remove_file(&file).unwrap();
+        assert_ne!(fingerprints[0], fingerprints[1]);
+    }
 }

@@ -9,7 +9,12 @@ use surfel_core::progress::Progress;
 
 /// The last two results, by the hashes of what they were made from: people who compare settings go back and forth.
 #[derive(Debug)]
-pub struct Lru2<T>(Mutex<Entries<T>>);
+pub struct Lru2<T> {
+    /// The results, the latest last. Held for moments only, so that known results are returned while another is made.
+    entries: Mutex<Entries<T>>,
+    /// Held while a result is made.
+    making: Mutex<()>,
+}
 
 type Entries<T> = VecDeque<(u64, Arc<T>)>;
 
@@ -20,7 +25,7 @@ const LOCK_POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 impl<T> Default for Lru2<T> {
     fn default() -> Self {
-        Self(Mutex::default())
+        Self { entries: Mutex::default(), making: Mutex::default() }
     }
 }
 
@@ -33,46 +38,60 @@ impl<T> Lru2<T> {
         progress: &dyn Progress,
         make: impl FnOnce() -> Result<T>,
     ) -> Result<Arc<T>> {
-        let mut entries = self.lock(progress)?;
-        if let Some(i) = entries.iter().position(|(other, _)| *other == key)
-            && let Some(found) = entries.remove(i)
-        {
-            entries.push_back(found.clone());
-            return Ok(found.1);
+        if let Some(known) = self.find(key) {
+            return Ok(known);
+        }
+        let _making = self.wait_to_make(progress)?;
+        // Another caller may have made it in the meantime.
+        if let Some(known) = self.find(key) {
+            return Ok(known);
         }
         // Before the new one takes as much memory.
-        while CAPACITY <= entries.len() {
-            entries.pop_front();
-        }
+        self.drop_oldest();
         let made = Arc::new(make()?);
-        entries.push_back((key, made.clone()));
+        self.entries().push_back((key, made.clone()));
         Ok(made)
     }
 
     /// Forgets all results but one that is being made.
     pub fn clear(&self) {
-        match self.0.try_lock() {
-            Ok(mut entries) => entries.clear(),
-            Err(TryLockError::Poisoned(error)) => error.into_inner().clear(),
-            Err(TryLockError::WouldBlock) => {}
-        }
+        let all = std::mem::take(&mut *self.entries());
+        drop(all);
     }
 
-    /// Returns true if the result for `key` is known, false too while another is made.
+    /// Returns true if the result for `key` is known.
     pub fn contains(&self, key: u64) -> bool {
-        let entries = match self.0.try_lock() {
-            Ok(entries) => entries,
-            Err(TryLockError::Poisoned(error)) => PoisonError::into_inner(error),
-            Err(TryLockError::WouldBlock) => return false,
-        };
-        entries.iter().any(|(known, _)| *known == key)
+        self.entries().iter().any(|(known, _)| *known == key)
     }
 
-    /// Unlike `Mutex::lock`, stops waiting when the caller is cancelled.
-    fn lock(&self, progress: &dyn Progress) -> Result<MutexGuard<'_, Entries<T>>> {
+    /// Returns the result for `key` if it is known, which is the latest then.
+    fn find(&self, key: u64) -> Option<Arc<T>> {
+        let mut entries = self.entries();
+        let i = entries.iter().position(|(known, _)| *known == key)?;
+        let found = entries.remove(i)?;
+        entries.push_back(found.clone());
+        Some(found.1)
+    }
+
+    /// Drops the oldest results, so that another fits.
+    fn drop_oldest(&self) {
+        let mut entries = self.entries();
+        let n_surplus = (entries.len() + 1).saturating_sub(CAPACITY);
+        let surplus: Entries<T> = entries.drain(..n_surplus).collect();
+        // Freeing takes long: without the lock.
+        drop(entries);
+        drop(surplus);
+    }
+
+    fn entries(&self) -> MutexGuard<'_, Entries<T>> {
+        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits until no other result is made. Unlike `Mutex::lock`, stops waiting when the caller is cancelled.
+    fn wait_to_make(&self, progress: &dyn Progress) -> Result<MutexGuard<'_, ()>> {
         loop {
-            match self.0.try_lock() {
-                Ok(entries) => return Ok(entries),
+            match self.making.try_lock() {
+                Ok(guard) => return Ok(guard),
                 Err(TryLockError::Poisoned(error)) => return Ok(PoisonError::into_inner(error)),
                 Err(TryLockError::WouldBlock) => {
                     progress.check()?;
@@ -95,7 +114,17 @@ mod tests {
     //! The last two results are kept, older ones dropped.
 
     use super::*;
+    use std::sync::Barrier;
+    use std::sync::atomic::{AtomicUsize, Ordering};
     use surfel_core::progress::NoProgress;
+
+    struct Cancelled;
+
+    impl Progress for Cancelled {
+        fn is_cancelled(&self) -> bool {
+            true
+        }
+    }
 
     #[test]
     fn the_last_two_results_are_kept() {
@@ -111,5 +140,38 @@ mod tests {
         assert_eq!(n_made, 4);
         cache.clear();
         assert!(!cache.contains(1) && !cache.contains(2));
+    }
+
+    #[test]
+    fn known_results_are_returned_while_another_is_made() {
+        let cache = Lru2::<i32>::default();
+        cache.get_or_make(1, &NoProgress, || Ok(10)).unwrap();
+        let made = cache.get_or_make(2, &NoProgress, || {
+            assert!(cache.contains(1) && !cache.contains(2));
+            // A cancelled caller does not wait.
+            assert!(cache.get_or_make(3, &Cancelled, || Ok(30)).is_err());
+            Ok(2 * *cache.get_or_make(1, &Cancelled, || Ok(11))?)
+        });
+        assert_eq!(*made.unwrap(), 20);
+        assert!(cache.contains(1) && cache.contains(2));
+    }
+
+    #[test]
+    fn two_callers_of_one_key_make_it_once() {
+        let cache = Lru2::default();
+        let (n_made, start) = (AtomicUsize::new(0), Barrier::new(2));
+        let call = || {
+            start.wait();
+            let made = cache.get_or_make(1, &NoProgress, || {
+                std::thread::sleep(Duration::from_millis(20));
+                Ok(n_made.fetch_add(1, Ordering::Relaxed))
+            });
+            *made.unwrap()
+        };
+        std::thread::scope(|scope| {
+            let calls = [scope.spawn(call), scope.spawn(call)];
+            assert_eq!(calls.map(|call| call.join().unwrap()), [0, 0]);
+        });
+        assert_eq!(n_made.into_inner(), 1);
     }
 }

@@ -83,8 +83,8 @@ impl LiveView {
         place.filter(|_| self.description.plan.is_to_scale())
     }
 
-    /// Returns for each instance the number of what it shows: first come the files without an object, of which those
-    /// together that became one cloud, then the objects.
+    /// Returns for each instance the number of what it shows: 0 is all files without an object, if there are any; the
+    /// objects follow in their order.
     pub fn contents(&self) -> Vec<u32> {
         let content = |instance: &Instance| self.loaded.content_of(instance.node_idx as usize);
         let contents = self.flat.instances.iter().map(content);

@@ -70,6 +70,22 @@ impl MemoryContent {
         Graph::from_geometry(geometry, Material::MATTE)
     }
 
+    /// Returns a text that changes with the clouds and meshes, their places and materials.
+    pub(crate) fn fingerprint(&self) -> String {
+        match self {
+            Self::Points(cloud) => points_fingerprint(cloud),
+            Self::Triangles(mesh) => mesh_fingerprint(mesh),
+            Self::File(file) => {
+                let Graph { geometries, materials, nodes, .. } = &file.graph;
+                let geometries = geometries.iter().map(|geometry| match geometry {
+                    Geometry::Points(cloud) => points_fingerprint(cloud),
+                    Geometry::Triangles(mesh) => mesh_fingerprint(mesh),
+                });
+                format!("{:?} {materials:?} {nodes:?}", geometries.collect::<Vec<_>>())
+            }
+        }
+    }
+
     /// Returns what is known of the content, as the header of a file states it.
     pub(crate) fn info(&self) -> FileInfo {
         let info = FileInfo { format: "in memory".into(), ..FileInfo::default() };
@@ -98,6 +114,14 @@ impl PartialEq for MemoryContent {
             _ => false,
         }
     }
+}
+
+fn points_fingerprint(cloud: &PointCloud) -> String {
+    format!("{:016x} {:?} {:?}", cloud.content_hash(), cloud.origin, cloud.stations)
+}
+
+fn mesh_fingerprint(mesh: &Mesh) -> String {
+    format!("{:016x} {:?}", mesh.content_hash(), mesh.origin)
 }
 
 /// Returns the columns of a cloud as files name them.

@@ -1,17 +1,23 @@
 //! Clouds that are prepared and kept, rather than rendered.
 
-use crate::description::{ObjectSettings, SceneDescription};
+use crate::crs::{is_in_degrees, metres_from_degrees};
+use crate::description::{ObjectSettings, PreparationSettings, SceneDescription};
 use crate::error::{Error, Result};
 use crate::resolve::{
     MemoryEstimate, check_empty, keep_matching, report_denoise, report_normals, report_radii,
 };
 use std::path::PathBuf;
 use surfel_core::points::{
-    Denoise, Duplicates, Orientation, PointCloud, Preparation, clean, denoise, prepare,
-    remove_outliers, subsample,
+    Denoise, Duplicates, MixedPixels, Orientation, PointCloud, Preparation, clean, denoise,
+    prepare, remove_outliers, subsample, without_mixed_pixels,
 };
 use surfel_core::progress::Progress;
-use surfel_formats::{ColumnChoice, Loaded};
+use surfel_formats::{ColumnChoice, LoadOptions, Loaded, merge_loaded};
+
+/// A file keeps its points unless asked.
+const KEPT_POINTS: Duplicates = Duplicates::Keep;
+/// A file keeps the places of its points unless asked.
+const KEPT_POSITIONS: Denoise = Denoise::Off;
 
 /// Columns that a prepared cloud gets besides those that follow from the settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -54,27 +60,32 @@ pub fn prepare_files(
     Ok(Loaded { cloud, info })
 }
 
-/// Prepares a cloud by the settings of a description for everything.
+/// Prepares a cloud, with the information about its file, by the settings of a description for everything.
 ///
 /// # Errors
 ///
 /// Fails for a filter of a column that is not there or that keeps no point, for clouds that cannot be prepared, and if
 /// cancelled.
 pub fn prepare_points(
-    mut cloud: PointCloud,
+    mut loaded: Loaded,
     description: &SceneDescription,
     options: PrepareOptions,
     progress: &dyn Progress,
-) -> Result<PointCloud> {
+) -> Result<Loaded> {
     let settings = &description.objects_default.preparation;
     for (key, filter) in settings.point_filters()? {
-        keep_matching(&mut cloud, key, &filter, progress)?;
-        if cloud.is_empty() {
+        keep_matching(&mut loaded.cloud, key, &filter, progress)?;
+        if loaded.cloud.is_empty() {
             return Err(Error::Unfit(format!("no point meets {filter}")));
         }
     }
-    settings.drop_estimated(&mut cloud);
-    Ok(prepared(cloud, description, options, progress)?)
+    if settings.reproject == Some(true) {
+        move_to_metres(&mut loaded, None, progress);
+    }
+    report_degrees(&loaded, settings, progress);
+    settings.drop_estimated(&mut loaded.cloud);
+    let Loaded { cloud, info } = loaded;
+    Ok(Loaded { cloud: prepared(cloud, description, options, progress)?, info })
 }
 
 fn load(
@@ -88,11 +99,50 @@ fn load(
     let estimate = MemoryEstimate::from_files(&infos, preparation.subsample, 0);
     estimate.check(description.run.memory_limit)?;
     let options = preparation.load_options(ColumnChoice::All)?;
-    let (mut loaded, _) = surfel_formats::load_all(files, &options, progress)?;
+    let mut loaded = match preparation.reproject {
+        Some(true) => load_in_metres(files, &options, progress)?,
+        _ => surfel_formats::load_all(files, &options, progress)?.0,
+    };
     progress.end();
     progress.note(&format!("{} points, {}", loaded.cloud.len(), loaded.info.format));
+    report_degrees(&loaded, preparation, progress);
     preparation.drop_estimated(&mut loaded.cloud);
     Ok(loaded)
+}
+
+/// Reads files as one cloud. Those in degrees are moved to the coordinate system of the files before them.
+fn load_in_metres(
+    files: &[PathBuf],
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> surfel_formats::Result<Loaded> {
+    let mut parts: Vec<Loaded> = Vec::new();
+    for file in files {
+        let mut part = surfel_formats::load(file, options, progress)?;
+        let others = parts.iter().find_map(|part| part.info.coordinate_system.as_deref());
+        move_to_metres(&mut part, others, progress);
+        parts.push(part);
+    }
+    if parts.is_empty() {
+        return Err(surfel_formats::Error::NoInput);
+    }
+    Ok(merge_loaded(parts, files, progress))
+}
+
+/// Moves a cloud in degrees to metres, to the coordinate system of `others` if these have one.
+fn move_to_metres(loaded: &mut Loaded, others: Option<&str>, progress: &dyn Progress) {
+    if let Some(line) = metres_from_degrees(&mut loaded.cloud, &mut loaded.info, others) {
+        progress.choice(&line, &["reproject"]);
+    }
+}
+
+/// Warns of coordinates in degrees, unless the settings say whether they stay.
+fn report_degrees(loaded: &Loaded, settings: &PreparationSettings, progress: &dyn Progress) {
+    let system = loaded.info.coordinate_system.as_deref();
+    if settings.reproject.is_none() && is_in_degrees(&loaded.cloud, system) {
+        let line = "warning: x and y look like degrees of longitude and latitude; normals, radii and distances need metres";
+        progress.choice(line, &["reproject"]);
+    }
 }
 
 fn prepared(
@@ -103,24 +153,14 @@ fn prepared(
 ) -> surfel_core::Result<PointCloud> {
     let (settings, seed) = (&description.objects_default, description.picture.seed());
     let columns = columns(options, settings);
-    // A file keeps its points, and where they are, unless asked.
-    let mode = settings.preparation.denoise.unwrap_or(Denoise::Off);
-    let duplicates = settings.preparation.duplicates.unwrap_or(Duplicates::Keep);
     if !columns.normals && !columns.radii && !columns.variation {
-        let (cloud, _) = clean(cloud, duplicates, progress)?;
-        let mut cloud = match settings.preparation.subsample {
-            Some(choice) => subsample(&cloud, choice, seed, progress)?,
-            None => cloud,
-        };
-        if let Some(choice) = settings.preparation.remove_outliers {
-            cloud = remove_outliers(&cloud, choice, progress)?;
-        }
-        if let Some(moved) = denoise(&mut cloud, mode, progress)? {
-            progress.choice(&moved.report.line(), &["denoise"]);
-        }
-        return Ok(cloud);
+        return without_estimates(cloud, &settings.preparation, seed, progress);
     }
-    let mut preparation = Preparation { denoise: mode, duplicates, ..settings.preparation(seed) };
+    let mut preparation = Preparation {
+        denoise: settings.preparation.denoise.unwrap_or(KEPT_POSITIONS),
+        duplicates: settings.preparation.duplicates.unwrap_or(KEPT_POINTS),
+        ..settings.preparation(seed)
+    };
     preparation.keep_variation = columns.variation;
     preparation.estimates_normals = columns.normals;
     if columns.normals && settings.preparation.orient.is_none() {
@@ -146,6 +186,36 @@ fn prepared(
     Ok(cloud)
 }
 
+/// Takes the steps that drop or move points, those alone that the settings name.
+fn without_estimates(
+    cloud: PointCloud,
+    settings: &PreparationSettings,
+    seed: u64,
+    progress: &dyn Progress,
+) -> surfel_core::Result<PointCloud> {
+    let duplicates = settings.duplicates.unwrap_or(KEPT_POINTS);
+    let (mut cloud, _) = clean(cloud, duplicates, progress)?;
+    if settings.mixed_pixels == Some(MixedPixels::Drop)
+        && let Some(kept) = without_mixed_pixels(&cloud)
+    {
+        let n_mixed = cloud.len() - kept.len();
+        let line = format!("{n_mixed} mixed pixels between two surfaces dropped");
+        progress.choice(&line, &["mixed_pixels"]);
+        cloud = cloud.subset(&kept);
+    }
+    if let Some(choice) = settings.subsample {
+        cloud = subsample(&cloud, choice, seed, progress)?;
+    }
+    if let Some(choice) = settings.remove_outliers {
+        cloud = remove_outliers(&cloud, choice, progress)?;
+    }
+    let mode = settings.denoise.unwrap_or(KEPT_POSITIONS);
+    if let Some(moved) = denoise(&mut cloud, mode, progress)? {
+        progress.choice(&moved.report.line(), &["denoise"]);
+    }
+    Ok(cloud)
+}
+
 /// Returns the columns that were asked for; normals and radii if nothing was.
 fn columns(options: PrepareOptions, settings: &ObjectSettings) -> Columns {
     let preparation = &settings.preparation;
@@ -160,10 +230,129 @@ fn columns(options: PrepareOptions, settings: &ObjectSettings) -> Columns {
     let has_other_steps = preparation.subsample.is_some()
         || preparation.filters_points()
         || preparation.duplicates.is_some()
+        || preparation.mixed_pixels.is_some()
         || preparation.remove_outliers.is_some()
         || preparation.denoise.is_some();
     if is_empty && !has_other_steps {
         return Columns { normals: true, radii: true, variation: false };
     }
     columns
+}
+
+#[cfg(test)]
+mod tests {
+    //! Steps that are named are taken, and no others.
+
+    use super::*;
+    use crate::crs::{CoordinateSystem, Unit};
+    use crate::progress_log::{Choice, ProgressLog};
+    use surfel_core::math::{DVec3, Vec3};
+    use surfel_core::points::{COLUMN_INDEX, ROW_INDEX, Scalar, ScanStation, Subsample, Values};
+    use surfel_core::progress::NoProgress;
+    use surfel_formats::{FileInfo, SaveOptions};
+
+    /// Prepares a cloud without information about a file, and returns the choices that were reported.
+    fn prepare_with(
+        cloud: PointCloud,
+        change: impl FnOnce(&mut PreparationSettings),
+    ) -> (Loaded, Vec<Choice>) {
+        let mut description = SceneDescription::default();
+        change(&mut description.objects_default.preparation);
+        let loaded = Loaded { cloud, info: FileInfo::default() };
+        let log = ProgressLog::new(&NoProgress);
+        let prepared = prepare_points(loaded, &description, PrepareOptions::default(), &log);
+        (prepared.unwrap(), log.into_choices())
+    }
+
+    /// Returns a scan around Munich in degrees.
+    fn degrees() -> PointCloud {
+        let position = |i: i32| Vec3::new(1e-4 * (i % 30) as f32, 1e-4 * (i / 30) as f32, i as f32);
+        let mut cloud = PointCloud::from_positions((0..900).map(position).collect());
+        cloud.origin = DVec3::new(11.57, 48.13, 520.0);
+        cloud
+    }
+
+    #[test]
+    fn degrees_are_moved_if_asked_and_reported_otherwise() {
+        let prepared = |reproject: Option<bool>| {
+            let (loaded, choices) = prepare_with(degrees(), |settings| {
+                settings.reproject = reproject;
+                settings.duplicates = Some(Duplicates::Keep);
+            });
+            let lines = choices.into_iter().filter(|choice| choice.keys == ["reproject"]);
+            (loaded, lines.map(|choice| choice.reason).collect::<String>())
+        };
+        let (moved, line) = prepared(Some(true));
+        assert!(5e6 < moved.cloud.origin.y && line.ends_with("EPSG:32632"), "{line}");
+        assert_eq!(moved.info.coordinate_system.as_deref(), Some("EPSG:32632"));
+        let (kept, line) = prepared(None);
+        assert_eq!(kept.cloud.origin.y, 48.13);
+        assert!(line.starts_with("warning: x and y look like degrees"), "{line}");
+        let (kept, line) = prepared(Some(false));
+        assert_eq!((kept.cloud.origin.y, line.as_str()), (48.13, ""));
+    }
+
+    #[test]
+    fn a_moved_las_file_states_the_system_of_its_metres() {
+        let folder = std::env::temp_dir().join(format!("surfel-metres-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let [source, target] = ["degrees.las", "metres.las"].map(|name| folder.join(name));
+        let options =
+            SaveOptions { coordinate_system: Some("EPSG:4326".into()), ..SaveOptions::default() };
+        surfel_formats::save(&source, &degrees(), &options, &NoProgress).unwrap();
+        let mut description = SceneDescription::default();
+        description.objects_default.preparation.reproject = Some(true);
+        description.objects_default.preparation.duplicates = Some(Duplicates::Keep);
+        let options = PrepareOptions::default();
+        let Loaded { cloud, info } =
+            prepare_files(&[source], &description, options, &NoProgress).unwrap();
+        let options = SaveOptions::from_source(&info);
+        surfel_formats::save(&target, &cloud, &options, &NoProgress).unwrap();
+        let system = surfel_formats::inspect(&target).unwrap().coordinate_system.unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        let unit = CoordinateSystem::parse(&system).unwrap().unit();
+        assert!(matches!(unit, Unit::Metres(_)), "{system}");
+    }
+
+    /// Returns a scan of a wall at 5 m before one at 9 m, with a column of ten points in the air between them.
+    fn two_walls() -> PointCloud {
+        let cells = || (0..10).flat_map(|row| (0..20).map(move |column| [row, column]));
+        let position = |[row, column]: [i32; 2]| {
+            let range: f32 = match column {
+                0..10 => 5.0,
+                10 => 7.0,
+                _ => 9.0,
+            };
+            let [azimuth, elevation] = [column - 10, row - 5].map(|index| 0.01 * index as f32);
+            let level = elevation.cos();
+            range * Vec3::new(level * azimuth.cos(), level * azimuth.sin(), elevation.sin())
+        };
+        let index = |name: &str, axis: usize| Scalar {
+            name: name.into(),
+            values: Values::I32(cells().map(|cell| cell[axis]).collect()),
+        };
+        PointCloud {
+            scalars: vec![index(ROW_INDEX, 0), index(COLUMN_INDEX, 1)],
+            stations: vec![ScanStation { position: Some(DVec3::ZERO), ..ScanStation::default() }],
+            ..PointCloud::from_positions(cells().map(position).collect())
+        }
+    }
+
+    #[test]
+    fn mixed_pixels_are_dropped_if_asked() {
+        let prepared = |mixed_pixels, subsample| {
+            let (loaded, choices) = prepare_with(two_walls(), |settings| {
+                settings.mixed_pixels = mixed_pixels;
+                settings.subsample = subsample;
+            });
+            assert!(loaded.cloud.normals.is_none() && loaded.cloud.radii.is_none());
+            let is_reported = choices.iter().any(|choice| choice.keys == ["mixed_pixels"]);
+            (loaded.cloud.len(), is_reported)
+        };
+        let all = Some(Subsample::First(1000));
+        assert_eq!(prepared(Some(MixedPixels::Drop), None), (190, true));
+        assert_eq!(prepared(Some(MixedPixels::Drop), all), (190, true));
+        assert_eq!(prepared(Some(MixedPixels::Keep), None), (200, false));
+        assert_eq!(prepared(None, all), (200, false));
+    }
 }

@@ -36,7 +36,7 @@ pub struct SceneRenderer {
 }
 
 impl SceneRenderer {
-    /// Makes the renderer, and opens the device if a GPU is demanded.
+    /// Makes the renderer, and opens the device if a GPU is demanded: by the backend, or by naming it without one.
     ///
     /// # Errors
     ///
@@ -44,7 +44,7 @@ impl SceneRenderer {
     pub fn new(settings: &RunSettings) -> Result<Self> {
         let renderer = Self {
             cpu: CpuRenderer { simd: Simd::detect() },
-            backend: settings.backend(),
+            backend: settings.chosen_backend(),
             device: settings.device.clone(),
             gpu: OnceLock::new(),
             was_on_gpu: AtomicBool::new(false),

@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use surfel::SceneDescription;
 use surfel::description::rule::{Resolution, Rule};
-use surfel::description::{Backend, ObjectSettings, RunSettings};
+use surfel::description::{Backend, ObjectSettings};
 use surfel::resolve::{MemoryEstimate, choose_camera, choose_up, prepare_cloud, short_position};
 use surfel_core::flat::FlatGeometry;
 use surfel_core::math::{DAffine3, DVec3, Vec3};
@@ -90,8 +90,8 @@ pub struct Args {
 
 impl Scope for Args {
     fn has(heading: &str, path: &str) -> bool {
-        let is_of_camera =
-            path.starts_with("camera.") && !["camera.name", "camera.lock"].contains(&path);
+        let unread = ["camera.name", "camera.lock", "camera.station", "camera.interior"];
+        let is_of_camera = path.starts_with("camera.") && !unread.contains(&path);
         match heading {
             "Preparation" => path != "animation_name",
             "Surface" => !path.starts_with("clip"),
@@ -112,13 +112,13 @@ const DEFAULT_RAYS: [Rays; 5] =
 
 /// Measures rates and prints them.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    let RunSettings { memory_limit: limit, backend, device, .. } = global.start()?;
-    let is_on_gpu = backend == Some(Backend::Gpu);
-    let gpu = is_on_gpu.then(|| BenchGpu::open(device.as_deref())).transpose()?;
+    let settings = global.start()?;
+    let is_on_gpu = settings.chosen_backend() == Backend::Gpu;
+    let gpu = is_on_gpu.then(|| BenchGpu::open(settings.device.as_deref())).transpose()?;
     let description = args.options.description.clone()?;
     check_surface(args, &description)?;
     let file = args.camera_file.as_deref().map(CameraFile::read).transpose()?;
-    estimate_memory(args, &description)?.check(limit)?;
+    estimate_memory(args, &description)?.check(settings.memory_limit)?;
     let unbuilt = load_unbuilt(args, &description, file.as_ref(), report)?;
     let (n_points, n_triangles) = unbuilt.graph.n_points_and_triangles();
     let (scene, build) = build(unbuilt, report)?;

@@ -81,8 +81,8 @@ pub struct Args {
 }
 
 impl Scope for Args {
-    fn has(heading: &str, _: &str) -> bool {
-        ![EVERYWHERE, PLANS, "Output"].contains(&heading)
+    fn has(heading: &str, path: &str) -> bool {
+        ![EVERYWHERE, PLANS, "Output"].contains(&heading) && path != "bit_depth"
     }
 }
 

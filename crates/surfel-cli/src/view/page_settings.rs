@@ -10,8 +10,8 @@ use std::sync::Arc;
 use surfel::SceneDescription;
 use surfel::description::rule::absolute_text;
 use surfel::description::{
-    Crop, Invalid, MaterialChoice, ObjectDescription, ObjectOverride, OutputSettings, parse_table,
-    write_table,
+    Crop, Invalid, MaterialChoice, ObjectDescription, ObjectOverride, OrthographicHeight,
+    OutputSettings, parse_table, write_table,
 };
 use surfel::names::file_name;
 use surfel_web::{Error, Limits, SettingsMap};
@@ -26,12 +26,19 @@ fn is_read_once(setting: &ObjectOverride) -> bool {
     READ_ONCE.contains(&setting.key.as_str())
 }
 
-/// Returns the settings of a description that a page sees: none of files and what moves them, of output and run.
+/// Returns the settings of a description that a page sees.
 pub fn shown(description: SceneDescription) -> SettingsMap {
+    of_page(description).to_table()
+}
+
+/// Returns what a page sees of a description: nothing of files and what moves them, of output and run.
+pub fn of_page(description: SceneDescription) -> SceneDescription {
     let mut shown = description.with_content_of(&SceneDescription::default());
     shown.output = OutputSettings { time: shown.output.time, ..OutputSettings::default() };
     (shown.run, shown.plan, shown.picture.bit_depth) = Default::default();
-    shown.to_table()
+    // A page knows heights alone.
+    shown.camera.orthographic.take_if(|height| *height == OrthographicHeight::Off);
+    shown
 }
 
 /// The files and objects that settings of pages are about.

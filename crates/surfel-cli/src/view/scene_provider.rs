@@ -20,7 +20,7 @@ use crate::report::Report;
 use crate::shell::command_line;
 use serde_json::{Value, json};
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use surfel::SceneDescription;
 use surfel::description::rule::absolute_text;
@@ -165,14 +165,15 @@ impl FileSceneProvider {
         let mut names = self.rows.names().into_iter();
         let mut row = |files: &[PathBuf], own: &ObjectDescription, bounds: Option<Value>| {
             let read = || read_files.iter().filter(|read| files.contains(&read.path));
+            let n_triangles = read().map(|read| read.n_triangles).sum::<usize>();
             let notes = read().flat_map(|read| &read.notes);
             let notes = notes.map(|note| self.folders.removed_from(note));
             json!({
                 "name": names.next(),
                 "label": own.label,
-                "kind": files.first().map_or("points", |file| kind_of(file)),
+                "kind": if 0 < n_triangles { "triangles" } else { "points" },
                 "points": read().map(|read| read.n_points).sum::<usize>(),
-                "triangles": read().map(|read| read.n_triangles).sum::<usize>(),
+                "triangles": n_triangles,
                 "notes": notes.collect::<Vec<String>>(),
                 "visible": own.visible(),
                 "color": own.settings.color.color.as_ref().map(ToString::to_string),
@@ -252,10 +253,6 @@ pub fn viewed_folders(startup: &SceneDescription, typed: &[PathBuf]) -> ViewedFo
     };
     let others = typed.iter().chain(&startup.light.environment).chain(area);
     ViewedFolders::of(all_files(startup).chain(others).map(PathBuf::as_path))
-}
-
-fn kind_of(file: &Path) -> &'static str {
-    if surfel_formats::is_cloud(file).unwrap_or(true) { "points" } else { "triangles" }
 }
 
 /// Names of files without their folders, which a page need not know.
@@ -367,7 +364,7 @@ impl SceneProvider for FileSceneProvider {
             Some(overlay::faults(&description.picture, &auto.camera.camera, auto.up))
         };
         for fault in faults().unwrap_or_default() {
-            drawable.shift_remove(fault.path.trim_start_matches("picture."));
+            drawable.shift_remove(&fault.path);
         }
         drawable
     }
@@ -431,7 +428,7 @@ impl SceneProvider for FileSceneProvider {
         let mut words: Vec<String> = ["surfel", "render"].map(str::to_owned).into();
         words.extend(self.typed.iter().map(|file| file.display().to_string()));
         words.extend(added_files::words(&description));
-        words.extend(description.to_options());
+        words.extend(description.to_options_over(&page_settings::of_page(self.startup.clone())));
         words.extend(["-o", "picture.png"].map(str::to_owned));
         Ok(Export {
             command: command_line(&words),
@@ -447,3 +444,6 @@ impl SceneProvider for FileSceneProvider {
         page_settings::from_file(name, text, &served, &self.content(&[]))
     }
 }
+
+#[cfg(test)]
+mod tests;

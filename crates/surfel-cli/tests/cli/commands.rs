@@ -184,6 +184,28 @@ fn prepare_adds_the_requested_columns_or_all() {
     assert_eq!(columns(&["--filter", "rain >= 0 && x > -1e9"]), (900, [false, false, false]));
     assert_eq!(columns(&["--remove-outliers", "radius:1e9,1"]), (900, [false, false, false]));
     assert_eq!(columns(&["--denoise", "on"]), (900, [false, false, false]));
+    assert_eq!(columns(&["--mixed-pixels", "drop"]), (900, [false, false, false]));
+}
+
+#[test]
+fn prepare_moves_degrees_if_asked_and_warns_otherwise() {
+    let folder = Folder::new();
+    let degrees = |first: f64, i: i32| first + 1e-4 * f64::from(i);
+    let line = |i: i32| {
+        format!("{:.4} {:.4} {}\n", degrees(11.57, i % 30), degrees(48.13, i / 30), i % 17)
+    };
+    let cloud = folder.write("degrees.xyz", (0..900).map(line).collect::<String>());
+    let prepared = folder.path("out.xyz");
+    let message = |options: &[&str]| {
+        let arguments = [&["prepare", &cloud, "-o", &prepared, "--normals"], options].concat();
+        stderr(&surfel(&arguments))
+    };
+    let warning = "look like degrees of longitude and latitude";
+    let kept = message(&[]);
+    assert!(kept.contains(warning) && kept.contains("[--reproject]"), "{kept}");
+    let moved = message(&["--reproject"]);
+    assert!(moved.contains("moved to metres of EPSG:32632 [--reproject]"), "{moved}");
+    assert!(!moved.contains(warning) && !message(&["--reproject=false"]).contains(warning));
 }
 
 #[test]

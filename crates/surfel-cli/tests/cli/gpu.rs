@@ -35,6 +35,26 @@ fn a_demanded_gpu_that_is_absent_is_an_error_and_auto_takes_the_cpu() {
     assert!(run("auto").status.success());
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_named_device_demands_a_gpu_unless_the_backend_is_auto() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let picture = folder.path("out.png");
+    let render = ["render", &cloud, "-o", &picture, "--resolution", "32x24", "--spp", "1"];
+    for command in [&render[..], &["bench", &cloud]] {
+        let refused = without_devices(&[command, &["--device", "nvidai"]].concat());
+        let text = String::from_utf8_lossy(&refused.stderr);
+        assert!(text.starts_with("error: no GPU was found"), "{text}");
+        assert_eq!(refused.status.code(), Some(1), "{command:?}");
+    }
+    let text = fail(&[&render[..], &["--backend", "cpu", "--device", "0"]].concat(), 2);
+    let expected = "error: --device: names a GPU, and the backend is cpu; leave out one of them\n";
+    assert_eq!((&*text, folder.names()), (expected, vec!["dome.ply".to_owned()]));
+    let automatic = [&render[..], &["--backend", "auto", "--device", "nvidai"]].concat();
+    assert!(without_devices(&automatic).status.success());
+}
+
 #[test]
 fn gpus_refuse_what_they_do_not_render() {
     let folder = Folder::new();

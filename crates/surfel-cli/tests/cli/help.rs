@@ -79,6 +79,41 @@ fn unknown_options_and_commands_are_answered_with_the_nearest() {
 }
 
 #[test]
+fn words_of_other_programs_are_answered_with_the_options_of_the_command() {
+    for (option, tip) in [
+        ("--fov=60", "tip: here it is '--camera-view-angle'"),
+        ("--scalars=z", "tip: here it is '--color'"),
+        ("--window-size=640x480", "tip: here it is '--resolution'"),
+    ] {
+        let text = fail(&["render", "scan.laz", "-o", "no.png", option], 2);
+        assert!(text.contains(tip) && text.matches("tip:").count() == 1, "{text}");
+    }
+    assert!(!fail(&["info", "scan.laz", "--fov", "60"], 2).contains("here it is"));
+}
+
+#[test]
+fn a_file_without_a_command_is_answered_with_commands() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let text = fail(&[&cloud], 2);
+    assert!(text.contains(&format!("`surfel render {cloud} -o picture.png`")), "{text}");
+    assert!(text.contains(&format!("`surfel view {cloud}`")), "{text}");
+    assert!(!fail(&["absent.ply"], 2).contains("surfel render"));
+}
+
+#[test]
+fn commands_have_no_options_that_they_do_not_read() {
+    for (command, option) in [
+        ("view", "--bit-depth=16"),
+        ("bench", "--camera-station=1"),
+        ("bench", "--camera-interior=on"),
+    ] {
+        let text = fail(&[command, "scan.laz", option], 2);
+        assert!(text.contains("unexpected argument"), "{command}: {text}");
+    }
+}
+
+#[test]
 fn invalid_values_name_the_option_and_what_was_expected() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(10));

@@ -3,6 +3,17 @@
 use super::common::{Folder, dome, fail, stderr, succeed, surfel};
 
 #[test]
+fn marks_that_the_camera_does_not_allow_are_named_by_their_options() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let picture = folder.path("out.png");
+    for option in ["--scale-bar", "--north"] {
+        let message = fail(&["render", &cloud, "-o", &picture, option], 2);
+        assert!(message.contains(&format!("error: {option}: needs a camera")), "{message}");
+    }
+}
+
+#[test]
 fn invalid_values_end_with_code_2() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(10));

@@ -288,6 +288,24 @@ fn scene_files_that_cannot_be_read_are_named() {
 }
 
 #[test]
+fn names_that_were_typed_are_no_fault_of_a_scene_file() {
+    let folder = site();
+    let object = "[[object]]\nfile = \"a.ply\"\n";
+    let scene = folder.write("scene.toml", object);
+    let typed = ["--object-settings", "towr:color=class"];
+    let picture = folder.path("no.png");
+    let render = ["render", &scene, "-o", &picture];
+    let message = fail(&[&render[..], &typed].concat(), 2);
+    assert_eq!(message, "error: --object-settings: no file or object `towr`\n");
+    let message = refused(
+        &folder,
+        "scene.toml",
+        &format!("object_settings = [\"towr:color=class\"]\n{object}"),
+    );
+    assert!(message.contains("object_settings: no file or object `towr`"), "{message}");
+}
+
+#[test]
 fn a_pattern_that_matches_no_file_is_an_error() {
     let folder = site();
     let message = refused(&folder, "scene.toml", "[[object]]\nfiles = \"frame_*.ply\"");

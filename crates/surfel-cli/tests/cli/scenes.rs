@@ -119,6 +119,7 @@ fn keys_that_options_exclude_are_ignored() {
         ("camera.position = [3, 3, 3]", &["--camera-zoom-factor", "2"]),
         ("camera.view_angle = 60", &["--camera-panorama"]),
         ("camera.panorama = true", &["--camera-orthographic"]),
+        ("camera.orthographic = true", &["--camera-orthographic=false"]),
         ("background = \"transparent\"", &["--background", "#123456"]),
         ("background = \"#123456\"", &["--no-background"]),
         ("normals_k = 8", &["--normals-radius", "0.4"]),

@@ -5,7 +5,7 @@ mod reproject;
 mod wkt;
 
 pub use georeference::georeference;
-pub use reproject::{looks_like_degrees, metres_from_degrees};
+pub use reproject::{is_in_degrees, metres_from_degrees};
 
 use proj4rs::Proj;
 use proj4rs::adaptors::transform_xyz;

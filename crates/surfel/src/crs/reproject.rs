@@ -3,7 +3,7 @@
 use super::{CoordinateSystem, Place, Unit};
 use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::PointCloud;
-use surfel_formats::FileInfo;
+use surfel_formats::{FileInfo, LasProfile};
 
 /// Maximum extent of a scan in degrees, if no coordinate system is stated.
 const MAX_DEGREES: f64 = 2.0;
@@ -25,8 +25,7 @@ pub fn metres_from_degrees(
 ) -> Option<String> {
     let source = info.coordinate_system.as_deref().and_then(CoordinateSystem::parse);
     let extent = Extent::of(cloud);
-    let is_stated = source.as_ref().map(|source| source.unit() == Unit::Degrees);
-    if !extent.is_on_earth() || !is_stated.unwrap_or_else(|| extent.is_needle()) {
+    if !extent.is_in_degrees(source.as_ref()) {
         return None;
     }
     let source = source.or_else(|| CoordinateSystem::parse("EPSG:4326"))?;
@@ -58,19 +57,22 @@ pub fn metres_from_degrees(
         "longitudes and latitudes around {:.4}, {:.4} moved to metres of {name}",
         middle.longitude_deg, middle.latitude_deg
     );
+    // The records of the file describe the degrees.
+    let las = info.las.take().map(|las| LasProfile { projection: Vec::new(), ..las });
     *info = FileInfo {
         coordinate_system: Some(name),
         bounds: None,
         resolution: None,
+        las,
         ..std::mem::take(info)
     };
     Some(line)
 }
 
-/// True if the coordinates of a cloud look like degrees beside heights in metres.
-pub fn looks_like_degrees(cloud: &PointCloud) -> bool {
-    let extent = Extent::of(cloud);
-    extent.is_on_earth() && extent.is_needle()
+/// Returns true if the coordinates of a cloud are degrees: its `system` is geographic, or it has none and they look like
+/// degrees beside heights in metres.
+pub fn is_in_degrees(cloud: &PointCloud, system: Option<&str>) -> bool {
+    Extent::of(cloud).is_in_degrees(system.and_then(CoordinateSystem::parse).as_ref())
 }
 
 /// The least and greatest coordinates of a cloud.
@@ -86,9 +88,16 @@ impl Extent {
         Self { low, high }
     }
 
+    fn is_in_degrees(&self, system: Option<&CoordinateSystem>) -> bool {
+        let is_stated = system.map(|system| system.unit() == Unit::Degrees);
+        self.is_on_earth() && is_stated.unwrap_or_else(|| self.is_needle())
+    }
+
+    /// Returns false for a cloud without points, too.
     fn is_on_earth(&self) -> bool {
         let Self { low, high } = self;
-        -180.0 <= low.x && high.x <= 360.0 && -90.0 <= low.y && high.y <= 90.0
+        let is_longitude = -180.0 <= low.x && low.x <= high.x && high.x <= 360.0;
+        is_longitude && -90.0 <= low.y && high.y <= 90.0
     }
 
     /// True if a scan is far higher than wide, and far from zero.
@@ -162,6 +171,22 @@ mod tests {
         metres_from_degrees(&mut cloud, &mut info, Some("EPSG:25833")).unwrap();
         assert_eq!(info.coordinate_system.as_deref(), Some("EPSG:25833"));
         metres_from_degrees(&mut points(1.0, MUNICH), &mut stated("EPSG:4326"), Some("EPSG:4326"));
+    }
+
+    #[test]
+    fn records_of_degrees_are_not_kept() {
+        let records = vec![(2112, b"GEOGCS[\"WGS 84\"]\0".to_vec())];
+        let las = LasProfile { point_format: 6, projection: records, ..LasProfile::default() };
+        let mut info = FileInfo { las: Some(las), ..stated("EPSG:4326") };
+        metres_from_degrees(&mut points(1.0, MUNICH), &mut info, None).unwrap();
+        let las = info.las.unwrap();
+        assert_eq!((las.point_format, las.projection), (6, vec![]));
+    }
+
+    #[test]
+    fn clouds_without_points_are_not_in_degrees() {
+        assert!(is_in_degrees(&points(1.0, MUNICH), Some("EPSG:4326")));
+        assert!(!is_in_degrees(&PointCloud::default(), Some("EPSG:4326")));
     }
 
     #[test]

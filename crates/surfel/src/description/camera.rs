@@ -28,6 +28,8 @@ const INTERIORS: &[(&str, Interior)] =
 /// The height of an orthographic picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OrthographicHeight {
+    /// The picture is not orthographic.
+    Off,
     /// All of the scene is seen.
     Fit,
     /// The height of the picture in world units.
@@ -48,7 +50,7 @@ settings! {
         view_angle: f64, VIEW_ANGLE, "DEG";
         /// Projects without perspective; HEIGHT is the height of the picture in world units [default: all of the
         /// scene].
-        orthographic: OrthographicHeight, OrthographicRule, "HEIGHT";
+        orthographic: OrthographicHeight = OrthographicHeight::Off, OrthographicRule, "HEIGHT";
         /// Looks all around (equirectangular): the width is a full turn, the height reaches from straight up to
         /// straight down. Stands at a free spot inside the scene unless a position is given. Best twice as wide as
         /// high.
@@ -87,22 +89,26 @@ settings! {
     }
 }
 
-/// True, or the height of the picture.
+/// True, false, or the height of the picture.
 struct OrthographicRule;
 
-const HEIGHT: Checked = Checked { allows: POSITIVE.allows, expected: "true or a positive height" };
+const HEIGHT: Checked =
+    Checked { allows: POSITIVE.allows, expected: "true, false or a positive height" };
 
 impl Rule<OrthographicHeight> for OrthographicRule {
     fn read(&self, value: &Value, folder: &Path) -> Result<OrthographicHeight, Invalid> {
         match value {
             Value::Bool(true) => Ok(OrthographicHeight::Fit),
+            Value::Bool(false) => Ok(OrthographicHeight::Off),
             Value::String(text) if text == "true" => Ok(OrthographicHeight::Fit),
+            Value::String(text) if text == "false" => Ok(OrthographicHeight::Off),
             value => Ok(OrthographicHeight::Fixed(HEIGHT.read(value, folder)?)),
         }
     }
 
     fn write(&self, value: &OrthographicHeight) -> Value {
         match value {
+            OrthographicHeight::Off => json!(false),
             OrthographicHeight::Fit => json!(true),
             OrthographicHeight::Fixed(height) => json!(height),
         }
@@ -119,9 +125,18 @@ impl CameraSettings {
             name: self.name.clone(),
             ..Self::default()
         };
-        let is_neutral = self.azimuth_angle() == 0.0 && self.zoom_factor() == 1.0;
-        let set = Self { azimuth_angle: None, zoom_factor: None, panorama: None, ..self.clone() };
-        is_neutral && set == free && !self.is_panorama()
+        let is_neutral = self.azimuth_angle() == 0.0
+            && self.zoom_factor() == 1.0
+            && !self.is_panorama()
+            && self.orthographic() == OrthographicHeight::Off;
+        let set = Self {
+            azimuth_angle: None,
+            zoom_factor: None,
+            panorama: None,
+            orthographic: None,
+            ..self.clone()
+        };
+        is_neutral && set == free
     }
 
     /// Returns true for an equirectangular picture all around.

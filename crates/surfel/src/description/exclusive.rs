@@ -67,17 +67,20 @@ pub fn excluded_by(path: &str) -> impl Iterator<Item = &'static str> {
     })
 }
 
+/// Returns true if a key of a part is set to anything but false, which excludes nothing.
+pub fn is_set(settings: &dyn KeyedSettings, name: &str) -> bool {
+    settings.get(name).is_some_and(|value| value != serde_json::json!(false))
+}
+
 /// Fails at the first two keys that exclude each other.
 pub fn check(parts: &[Part<&dyn KeyedSettings>]) -> Result<(), Invalid> {
-    let is_set = |path: &str| {
+    let is_set_at = |path: &str| {
         let (prefix, name) = path.split_once('.').map_or(("", path), |(table, name)| (table, name));
-        parts.iter().any(|part| {
-            part.prefix.trim_end_matches('.') == prefix
-                && part.settings.get(name).is_some_and(|value| value != serde_json::json!(false))
-        })
+        let mut parts = parts.iter();
+        parts.any(|part| part.prefix.trim_end_matches('.') == prefix && is_set(part.settings, name))
     };
-    for (key, others) in EXCLUSIVE.iter().filter(|(key, _)| is_set(key)) {
-        if let Some(other) = others.iter().find(|other| is_set(other)) {
+    for (key, others) in EXCLUSIVE.iter().filter(|(key, _)| is_set_at(key)) {
+        if let Some(other) = others.iter().find(|other| is_set_at(other)) {
             return Err(Invalid::at(*key, format!("excludes {other}; leave out one of them")));
         }
     }

@@ -204,9 +204,14 @@ impl Rule<Vec<MaterialChoice>> for MaterialChoices {
 
 /// Reads `[NAME=]KIND[:PROPERTY=VALUE,...]`.
 fn parse(text: &str) -> Result<(Option<String>, MaterialDescription), Invalid> {
+    // Where a kind stands last, there are no properties: in `12:30.laz=glass` the colon belongs to the name.
+    let ends_with_kind =
+        text.rsplit_once('=').is_some_and(|(_, kind)| kind.parse::<Material>().is_ok());
     // The first `=` of `a=glass:ior=1.5` separates the name, none of `glass:ior=1.5` does.
     let (name, properties) = match text.rsplit_once(':') {
-        Some((name, properties)) if properties.contains('=') => (name, Some(properties)),
+        Some((name, properties)) if properties.contains('=') && !ends_with_kind => {
+            (name, Some(properties))
+        }
         _ => (text, None),
     };
     let (target, kind) = match name.rsplit_once('=') {
@@ -242,6 +247,10 @@ mod tests {
         assert_eq!((target.as_deref(), mirror.material()), (Some("a b.ply"), Material::MIRROR));
         let (target, water) = parse("pool.las=glass:ior=1.33,color=#ffffff").unwrap();
         assert_eq!((target.as_deref(), water.material().ior), (Some("pool.las"), 1.33));
+        for name in ["12:30.laz", "a=1:b=c"] {
+            let (target, glass) = parse(&format!("{name}=glass")).unwrap();
+            assert_eq!((target.as_deref(), glass.material()), (Some(name), Material::GLASS));
+        }
         for wrong in ["brick", "a.ply=", "glass:ior", "glass:ior=9", "glass:colour=#fff"] {
             assert!(parse(wrong).is_err(), "{wrong}");
         }

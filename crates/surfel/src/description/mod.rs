@@ -40,7 +40,7 @@ pub use lamp::{LampDescription, LampShape};
 pub use light::{LIGHT_KINDS, LightKind, LightSettings, SkySettings, SunSettings};
 pub use material::{MaterialChoice, MaterialDescription, MaterialSettings};
 pub use named_view::{NamedView, ViewSettings};
-pub use nearest::nearest;
+pub use nearest::{nearest, synonym};
 pub use object::{ObjectDescription, Placement, Rotation};
 pub use object_override::{ObjectOverride, OverrideSettings};
 pub use object_settings::{ColorSettings, ObjectSettings, PreparationSettings, SurfaceSettings};
@@ -199,7 +199,8 @@ impl SceneDescription {
 
     /// Sets the value of a key, named by its path or its option, from a value as a scene file has it.
     ///
-    /// Paths in the value start at `folder`. `null` makes the key automatic again. Keys that exclude this one are unset.
+    /// Paths in the value start at `folder`. `null` makes the key automatic again. Other keys stay as they are, also those
+    /// that this one excludes; [`Self::check`] finds them.
     ///
     /// # Errors
     ///
@@ -215,7 +216,7 @@ impl SceneDescription {
                 continue;
             };
             let path = format!("{prefix}{}", key.name);
-            if value.is_null() || is_none(&path, value) {
+            if value.is_null() || is_empty_list(&path, value) {
                 settings.unset(key.name);
                 return Ok(());
             }
@@ -277,17 +278,17 @@ impl SceneDescription {
 
     /// Lays another description over this one: its keys count, its objects, lamps and animations are added.
     ///
-    /// Keys of this one that exclude a key of the other are unset.
+    /// Keys of this one that exclude a key of the other are unset; keys that are false exclude nothing.
     pub fn overlay(&mut self, over: Self) {
         for part in over.parts() {
-            for key in
-                part.settings.keys().iter().filter(|key| part.settings.get(key.name).is_some())
-            {
+            let keys = part.settings.keys();
+            for key in keys.iter().filter(|key| exclusive::is_set(part.settings, key.name)) {
                 for excluded in exclusive::excluded_by(&format!("{}{}", part.prefix, key.name)) {
                     self.unset(excluded);
                 }
             }
         }
+        self.run.unset_excluded_by(&over.run);
         self.output.overlay(&over.output);
         self.picture.overlay(&over.picture);
         self.plan.overlay(&over.plan);
@@ -340,6 +341,7 @@ impl SceneDescription {
     /// Fails with the path of the first such key.
     pub fn check(&self) -> Result<(), Invalid> {
         exclusive::check(&self.parts())?;
+        self.run.check()?;
         if self.camera.position.is_some() && self.camera.position == self.camera.focal_point {
             return Err(Invalid::at("camera.position", "is the focal point too; move one of them"));
         }
@@ -433,13 +435,9 @@ impl<'de> Deserialize<'de> for SceneDescription {
     }
 }
 
-/// Returns true for values that say that there is none: false where a length could stand, and empty lists.
-fn is_none(path: &str, value: &Value) -> bool {
-    match path {
-        "camera.orthographic" => *value == Value::Bool(false) || value.as_str() == Some("false"),
-        path if is_list(path) || !has_option(path) => value.as_array().is_some_and(Vec::is_empty),
-        _ => false,
-    }
+/// Returns true for an empty list of a key that has several values: it says that there is none.
+fn is_empty_list(path: &str, value: &Value) -> bool {
+    (is_list(path) || !has_option(path)) && value.as_array().is_some_and(Vec::is_empty)
 }
 
 #[cfg(test)]

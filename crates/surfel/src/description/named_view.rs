@@ -2,7 +2,7 @@
 
 use super::keys::settings;
 use super::rule::Rule;
-use super::{CameraSettings, Invalid, read_table, write_table};
+use super::{CameraSettings, Invalid, OrthographicHeight, read_table, write_table};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -71,6 +71,7 @@ fn read_view(value: &Value, folder: &Path) -> Result<NamedView, Invalid> {
     };
     let mut settings = CameraSettings::default();
     read_table(&mut settings, camera, folder).map_err(|error| error.within("camera"))?;
+    settings.orthographic.take_if(|height| *height == OrthographicHeight::Off);
     Ok(NamedView { name: name.to_owned(), camera: settings })
 }
 

@@ -15,3 +15,48 @@ pub fn nearest<'k>(found: &str, known: impl IntoIterator<Item = &'k str>) -> Str
         None => String::new(),
     }
 }
+
+/// Words of other programs, with the keys that mean the same here.
+const SYNONYMS: [(&str, &str); 14] = [
+    ("fov", "camera.view_angle"),
+    ("eye", "camera.position"),
+    ("zoom", "camera.zoom_factor"),
+    ("width", "resolution"),
+    ("height", "resolution"),
+    ("size", "resolution"),
+    ("window_size", "resolution"),
+    ("samples", "spp"),
+    ("scalars", "color"),
+    ("scalar_field", "color"),
+    ("colormap", "cmap"),
+    ("clim", "range"),
+    ("voxel_size", "subsample"),
+    ("point_radius", "radius"),
+];
+
+/// Returns the path of the key for which this is the word of other programs.
+pub fn synonym(found: &str) -> Option<&'static str> {
+    let found = found.replace(['-', '.'], "_");
+    let found = found.strip_prefix("camera_").unwrap_or(&found);
+    SYNONYMS.iter().find(|(word, _)| *word == found).map(|(_, path)| *path)
+}
+
+#[cfg(test)]
+mod tests {
+    //! Words of other programs lead to keys.
+
+    use super::*;
+    use crate::SceneDescription;
+
+    #[test]
+    fn words_of_other_programs_are_no_keys_and_mean_one() {
+        let keys = SceneDescription::keys();
+        let is_key = |found: &str| keys.iter().any(|(path, ..)| path == found);
+        for (word, path) in SYNONYMS {
+            assert!(is_key(path) && !is_key(word), "{word}: {path}");
+        }
+        assert_eq!(synonym("window-size"), Some("resolution"));
+        assert_eq!(synonym("camera.fov"), Some("camera.view_angle"));
+        assert_eq!(synonym("resolution"), None);
+    }
+}

@@ -120,7 +120,7 @@ settings! {
         /// Reads what is whole of a damaged LAS, LAZ, PLY, E57, PCD, PTX or text file, and reports how much that is.
         salvage: bool = false, Flag, "BOOL";
         /// Moves clouds whose coordinates are degrees of longitude and latitude to metres: to the coordinate system of
-        /// the files before, or to their UTM zone.
+        /// the files before, or to their UTM zone. surfel prepare does so only if this is given.
         reproject: bool = true, Flag, "BOOL";
         /// Takes the vertices of meshes as points.
         vertices: bool = false, Flag, "BOOL";

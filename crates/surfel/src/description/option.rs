@@ -1,7 +1,7 @@
 //! Options of the program: the name of a key's option, and a description as words of a command line.
 
-use super::SceneDescription;
-use serde_json::Value;
+use super::{SceneDescription, exclusive};
+use serde_json::{Value, json};
 
 /// Returns the name of the option for the path of a key: `camera-view-angle` for `camera.view_angle`.
 ///
@@ -39,7 +39,14 @@ pub fn value_text(value: &Value) -> String {
 impl SceneDescription {
     /// Writes the keys that differ from their defaults as words of a command line, without files and objects.
     pub fn to_options(&self) -> Vec<String> {
-        let values = self.non_default().into_iter().filter(|(path, _)| has_option(path));
+        self.to_options_over(&Self::default())
+    }
+
+    /// Writes the keys as words of a command line, without files and objects, whose files set the keys of `base`: those
+    /// that differ from their defaults, and those at their defaults that `base` sets otherwise.
+    pub fn to_options_over(&self, base: &Self) -> Vec<String> {
+        let values = self.non_default().into_iter().chain(self.defaults_over(base));
+        let values = values.filter(|(path, _)| has_option(path));
         let options = values.flat_map(|(path, value)| {
             let option = option_name(&path);
             match value {
@@ -52,5 +59,22 @@ impl SceneDescription {
             }
         });
         options.collect()
+    }
+
+    /// Returns the keys that are at their defaults here and not in `base`, with their defaults. Keys that a key of this
+    /// description excludes are left out: they do not count.
+    fn defaults_over(&self, base: &Self) -> Vec<(String, Value)> {
+        let is_excluded = |path: &str| {
+            let mut values = exclusive::excluded_by(path).filter_map(|other| self.get(other));
+            values.any(|value| value != json!(false))
+        };
+        let keys = Self::keys().into_iter();
+        let defaults = keys.filter_map(|(path, _, key)| Some((path, key.default?)));
+        let restored = defaults.filter(|(path, default)| {
+            self.get(path).is_none_or(|value| value == *default)
+                && base.get(path).is_some_and(|value| value != *default)
+                && !is_excluded(path)
+        });
+        restored.collect()
     }
 }

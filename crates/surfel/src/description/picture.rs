@@ -112,8 +112,33 @@ settings! {
         /// Device that does the work: auto, cpu or gpu.
         backend: Backend = Backend::Auto,
             OneOf(&[("auto", Backend::Auto), ("cpu", Backend::Cpu), ("gpu", Backend::Gpu)]), "NAME";
-        /// GPU to use, by its index or a part of its name as `surfel devices` lists them [default: the first].
+        /// GPU that does the work, by its index or a part of its name as `surfel devices` lists them [default: the
+        /// first]. Naming one demands it, as the backend gpu does; with the backend auto it is taken where it is likely to
+        /// be faster.
         device: String, Text, "NAME|INDEX";
+    }
+}
+
+impl RunSettings {
+    /// Returns the backend that is set; without one a named device demands the GPU.
+    pub fn chosen_backend(&self) -> Backend {
+        let of_device = self.device.as_ref().map(|_| Backend::Gpu);
+        self.backend.or(of_device).unwrap_or_default()
+    }
+
+    /// Fails if a device is named for work on the CPU.
+    pub(super) fn check(&self) -> Result<(), Invalid> {
+        if self.backend == Some(Backend::Cpu) && self.device.is_some() {
+            let message = "names a GPU, and the backend is cpu; leave out one of them";
+            return Err(Invalid::at("device", message));
+        }
+        Ok(())
+    }
+
+    /// Unsets a device that the backend of other settings excludes, or a backend that their device excludes.
+    pub(super) fn unset_excluded_by(&mut self, over: &Self) {
+        self.device.take_if(|_| over.backend == Some(Backend::Cpu));
+        self.backend.take_if(|backend| *backend == Backend::Cpu && over.device.is_some());
     }
 }
 

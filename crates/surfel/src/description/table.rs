@@ -3,7 +3,7 @@
 use super::Part;
 use super::invalid::Invalid;
 use super::keys::KeyedSettings;
-use super::nearest::nearest;
+use super::nearest::{nearest, synonym};
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -67,7 +67,11 @@ pub(super) fn take_normalized(table: &Map<String, Value>) -> Map<String, Value> 
 
 pub(super) fn unknown_key(key: &str, known: impl IntoIterator<Item = impl AsRef<str>>) -> Invalid {
     let known: Vec<String> = known.into_iter().map(|name| name.as_ref().to_owned()).collect();
-    let advice = nearest(&key.replace('-', "_"), known.iter().map(String::as_str));
+    let synonym = synonym(key).filter(|path| known.iter().any(|known| known == path));
+    let advice = match synonym {
+        Some(path) => format!("; here it is `{path}`"),
+        None => nearest(&key.replace('-', "_"), known.iter().map(String::as_str)),
+    };
     Invalid::at(key, format!("unknown key{advice}"))
 }
 

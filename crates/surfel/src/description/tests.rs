@@ -107,6 +107,51 @@ fn an_overlay_overrides_keys_and_unsets_excluded_ones() {
 }
 
 #[test]
+fn false_lies_over_what_a_scene_sets() {
+    let mut scene = parse("[camera]\northographic = 12").unwrap();
+    scene.overlay(parse("camera.orthographic = false").unwrap());
+    assert_eq!(scene.camera.orthographic, Some(OrthographicHeight::Off));
+    assert!(scene.camera.is_automatic());
+}
+
+#[test]
+fn flags_that_are_false_unset_nothing() {
+    let mut scene = parse("gsd = 0.1\n[camera]\ndirection = [1, 0, 0]").unwrap();
+    scene.overlay(parse("camera.panorama = false\ncamera.orthographic = false").unwrap());
+    assert_eq!((scene.plan.gsd, scene.camera.direction), (Some(0.1), Some(DVec3::X)));
+    assert_eq!(scene.check(), Ok(()));
+}
+
+#[test]
+fn options_over_a_scene_restore_defaults_that_it_changes() {
+    let text = "spp = 64\nlegend = true\n[camera]\northographic = true\n[sun]\nelevation = 20";
+    let base = parse(text).unwrap();
+    let restored = ["--spp=4", "--legend=false", "--camera-orthographic=false"];
+    let plain = parse("spp = 4").unwrap().to_options_over(&base);
+    assert_eq!(plain, [&restored[..], &["--sun-elevation=40"]].concat());
+    // The date says where the sun stands.
+    let of_date = parse("[sun]\ndate = \"2026-06-21T15:00+02:00\"").unwrap();
+    assert_eq!(of_date.to_options_over(&base)[1..], restored);
+}
+
+#[test]
+fn a_named_device_demands_the_gpu() {
+    let backend = |text: &str| parse(text).unwrap().run.chosen_backend();
+    assert_eq!(backend("device = \"nvidia\""), Backend::Gpu);
+    assert_eq!(backend("device = \"0\"\nbackend = \"auto\""), Backend::Auto);
+    assert_eq!(backend(""), Backend::Auto);
+    assert_eq!(
+        error("device = \"0\"\nbackend = \"cpu\""),
+        "device: names a GPU, and the backend is cpu; leave out one of them"
+    );
+    let mut scene = parse("device = \"0\"").unwrap();
+    scene.overlay(parse("backend = \"cpu\"").unwrap());
+    assert_eq!((scene.run.chosen_backend(), scene.check()), (Backend::Cpu, Ok(())));
+    scene.overlay(parse("device = \"1\"").unwrap());
+    assert_eq!(scene.run.chosen_backend(), Backend::Gpu);
+}
+
+#[test]
 fn settings_of_an_object_override_those_of_the_scene() {
     let scene = parse("surface = \"sphere\"\nnormals-k = 12\n[[object]]\nfile = \"a.ply\"\nsurface = \"disc\"\nnormals-radius = 1").unwrap();
     let own = scene.objects[0].settings.over(&scene.objects_default);
@@ -143,6 +188,14 @@ fn errors_name_the_path_what_was_found_and_what_was_expected() {
     assert_eq!(
         error("[[object]]\nfile = \"a\"\ntranslat = [1, 2, 3]"),
         "object[0].translat: unknown key; the nearest known one is `translate`"
+    );
+    assert_eq!(
+        error("[camera]\nfov = 60"),
+        "camera.fov: unknown key; here it is `camera.view_angle`"
+    );
+    assert_eq!(
+        error("[[object]]\nfile = \"a\"\nscalars = \"z\""),
+        "object[0].scalars: unknown key; here it is `color`"
     );
     assert_eq!(
         error("[[object]]\nfile = \"a\"\ninstances = [{}, { scale = 0 }]"),

@@ -188,7 +188,7 @@ pub fn faults(picture: &PictureSettings, camera: &Camera, up: Vec3) -> Vec<Inval
             false => "needs a camera without perspective: add --camera-orthographic",
             true => "north is along the view; look down, as with --camera-direction 0,0,-1",
         };
-        Invalid::at(format!("picture.{key}"), advice)
+        Invalid::at(key, advice)
     };
     let lacks_scale = picture.scale_bar() && !is_orthographic;
     let lacks_north = picture.north() && arrow(camera, north(up)).is_none();
@@ -386,5 +386,6 @@ mod tests {
         let error = Overlay::new(&picture, legend, &camera, (Vec3::Z, Unit::Unknown), &NoProgress)
             .unwrap_err();
         assert!(error.to_string().contains("--camera-orthographic"), "{error}");
+        assert_eq!(error.path, "scale_bar");
     }
 }

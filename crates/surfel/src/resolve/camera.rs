@@ -224,8 +224,8 @@ pub fn choose_camera(
     let position = settings.position.unwrap_or(shifted);
     // A given position or focal point may look elsewhere than the fitted camera did.
     let view_up = settings.view_up.unwrap_or_else(|| default_view_up(up, focal_point - position));
-    let projection = match settings.orthographic {
-        Some(OrthographicHeight::Fixed(height)) => Projection::Orthographic { height },
+    let projection = match settings.orthographic() {
+        OrthographicHeight::Fixed(height) => Projection::Orthographic { height },
         _ => fitted.projection,
     };
     if settings.position.is_none() {
@@ -242,10 +242,10 @@ pub fn choose_camera(
 
 /// The camera of settings that leave nothing open.
 fn complete_camera(settings: &CameraSettings, fit: &CameraFit) -> Option<Camera> {
-    let projection = match settings.orthographic {
-        Some(OrthographicHeight::Fixed(height)) => Projection::Orthographic { height },
-        Some(OrthographicHeight::Fit) => return None,
-        None => Projection::Perspective { view_angle_deg: fit.view_angle_deg },
+    let projection = match settings.orthographic() {
+        OrthographicHeight::Fixed(height) => Projection::Orthographic { height },
+        OrthographicHeight::Fit => return None,
+        OrthographicHeight::Off => Projection::Perspective { view_angle_deg: fit.view_angle_deg },
     };
     Some(Camera {
         position: settings.position?,
@@ -278,7 +278,7 @@ fn panorama(
 
 fn fit(settings: &CameraSettings, frame: &CameraFit) -> CameraFit {
     CameraFit {
-        is_orthographic: settings.orthographic.is_some(),
+        is_orthographic: settings.orthographic() != OrthographicHeight::Off,
         view_angle_deg: settings.view_angle.unwrap_or(frame.view_angle_deg),
         direction: settings.direction,
         view_up: settings.view_up,

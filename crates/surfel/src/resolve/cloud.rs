@@ -1,6 +1,6 @@
 //! A cloud on its way from the file to a surface: read, prepared, coloured.
 
-use crate::crs::{looks_like_degrees, metres_from_degrees};
+use crate::crs::{is_in_degrees, metres_from_degrees};
 use crate::description::{Invalid, ObjectSettings, PreparationSettings};
 use crate::error::{Error, Result};
 use crate::memory_files::{MemoryContent, MemoryFiles};
@@ -58,7 +58,7 @@ pub fn import(
 
 /// Warns of points in memory whose coordinates look like degrees.
 fn report_degrees(cloud: &PointCloud, progress: &dyn Progress) {
-    if looks_like_degrees(cloud) {
+    if is_in_degrees(cloud, None) {
         progress.note(
             "warning: x and y look like degrees of longitude and latitude, z like metres; reproject the points to a system in metres first, with pyproj for example",
         );

@@ -36,7 +36,7 @@ pub fn report_gaps(points: &PointCloud, progress: &dyn Progress) {
     let line = format!(
         "warning: parts of the scene lie {gap:.4} apart, but are only {size:.4} long; are they in one coordinate system?"
     );
-    progress.choice(&line, &["clip_box", "objects"]);
+    progress.choice(&line, &["clip_box", "crop"]);
 }
 
 /// Returns the largest gap between coordinates and the length of the longer part beside it, if the gap is out of
@@ -57,23 +57,32 @@ mod tests {
     //! Gaps and empty pictures are reported, others are not.
 
     use super::*;
-    use crate::progress_log::ProgressLog;
+    use crate::SceneDescription;
+    use crate::progress_log::{Choice, ProgressLog};
     use surfel_core::math::Vec3;
     use surfel_core::progress::NoProgress;
 
-    fn reported(offset: f32) -> usize {
+    fn reported(offset: f32) -> Vec<Choice> {
         let part = |x: f32| (0..100).map(move |i| Vec3::new(x + 0.01 * i as f32, 0.0, 0.0));
         let cloud = PointCloud::from_positions(part(0.0).chain(part(offset)).collect());
         let log = ProgressLog::new(&NoProgress);
         report_gaps(&cloud, &log);
-        log.into_choices().len()
+        log.into_choices()
     }
 
     #[test]
     fn parts_far_apart_are_reported() {
-        assert_eq!(reported(1000.0), 1);
-        assert_eq!(reported(10.0), 0);
-        assert_eq!(reported(0.0), 0);
+        assert_eq!(reported(1000.0).len(), 1);
+        assert_eq!(reported(10.0), []);
+        assert_eq!(reported(0.0), []);
+    }
+
+    #[test]
+    fn the_warning_names_keys_of_the_description() {
+        let known = SceneDescription::keys();
+        for key in &reported(1000.0)[0].keys {
+            assert!(known.iter().any(|(path, ..)| path == key), "{key}");
+        }
     }
 
     #[test]

@@ -214,12 +214,14 @@ impl LoadedScene {
         groups.map(|group| group.iter().map(|(file, _)| file.as_path()).collect())
     }
 
-    /// Returns the number of what a node belongs to: first come the files without an object, of which those together that
-    /// became one cloud, then the objects.
+    /// Returns the number of what a node belongs to: 0 is all files without an object, if there are any; the objects follow
+    /// in their order.
     pub(crate) fn content_of(&self, node: usize) -> Option<usize> {
-        let files = self.files.chunk_by(|(_, a), (_, b)| a == b).map(|group| &group[0].1);
-        let mut all = files.chain(self.objects.iter().map(|object| &object.all));
-        all.position(|nodes| nodes.contains(&node))
+        if self.files.iter().any(|(_, nodes)| nodes.contains(&node)) {
+            return Some(0);
+        }
+        let object_idx = self.objects.iter().position(|object| object.all.contains(&node))?;
+        Some(object_idx + usize::from(!self.files.is_empty()))
     }
 
     /// Returns the nodes of objects in the scene's graph, and whether each is visible under another description of the

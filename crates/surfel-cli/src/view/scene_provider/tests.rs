@@ -1,0 +1,58 @@
+//! Facts that pages get about files, and the command lines that they export.
+
+use super::*;
+use crate::report::Verbosity;
+use surfel::memory_files::MemoryContent;
+use surfel_core::scene::Mesh;
+
+fn open(startup: SceneDescription) -> FileSceneProvider {
+    let typed = vec![PathBuf::from("scene.toml")];
+    FileSceneProvider::open(startup, typed, &Report::new(Verbosity::Quiet)).unwrap()
+}
+
+fn corners() -> Vec<Vec3> {
+    (0..400).map(|i| Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0)).collect()
+}
+
+/// A scene of a mesh and a cloud in memory.
+fn startup() -> SceneDescription {
+    let triangles = vec![[0, 19, 399]];
+    let mesh = Mesh { positions: corners(), triangles, ..Mesh::default() };
+    let cloud = PointCloud::from_positions(corners());
+    let mut startup = SceneDescription::of_files(["memory:0:mesh", "memory:1:cloud"]);
+    let memory = &mut startup.memory;
+    memory.insert("memory:0:mesh", MemoryContent::Triangles(Arc::new(mesh)));
+    memory.insert("memory:1:cloud", MemoryContent::Points(Arc::new(cloud)));
+    startup
+}
+
+fn kinds(provider: &FileSceneProvider) -> Vec<Value> {
+    provider.objects().iter().map(|object| object["kind"].clone()).collect()
+}
+
+#[test]
+fn what_was_read_decides_whether_an_object_is_a_cloud() {
+    assert_eq!(kinds(&open(startup())), ["triangles", "points"]);
+    let lines: String = corners().iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z)).collect();
+    let file = std::env::temp_dir().join(format!("surfel-kinds-{}.obj", std::process::id()));
+    std::fs::write(&file, [lines, "f 1 20 400\n".to_owned()].concat()).unwrap();
+    let mut startup = SceneDescription::of_files([&file]);
+    assert_eq!(kinds(&open(startup.clone())), ["triangles"]);
+    startup.objects_default.preparation.vertices = Some(true);
+    assert_eq!(kinds(&open(startup)), ["points"]);
+    std::fs::remove_file(&file).unwrap();
+}
+
+#[test]
+fn exported_commands_restore_defaults_that_a_scene_file_changes() {
+    let mut startup = startup();
+    startup.picture.spp = Some(64);
+    startup.camera.lock = Some(true);
+    let provider = open(startup);
+    let mut settings = provider.startup_settings();
+    settings.insert("spp".into(), json!(4));
+    settings.insert("camera".into(), json!({ "lock": false }));
+    let command = provider.export(&settings).unwrap().command;
+    let has = |option: &str| command.split(' ').any(|word| word == option);
+    assert!(has("--spp=4") && has("--camera-lock=false"), "{command}");
+}
