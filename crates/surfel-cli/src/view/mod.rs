@@ -97,6 +97,7 @@ Examples:
 
 /// Serves the viewer until it is interrupted.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
+    freed_memory::give_back_at_once();
     let description = args.scene.startup(global)?;
     start_threads(&description.run)?;
     let renderer = SceneRenderer::new(&description.run)?;

@@ -6,7 +6,6 @@ use super::facts::{
     classes, columns, filter_columns, has_returns, stations, surfaces, unit_symbol,
 };
 use super::file_names::{ClientProgress, ViewedFolders};
-use super::freed_memory;
 use super::histogram::histogram;
 use super::legend::legend_json;
 use super::page_overlay::page_overlay;
@@ -410,7 +409,6 @@ impl SceneProvider for FileSceneProvider {
 
     fn release(&self) {
         self.scene.release();
-        freed_memory::give_back();
     }
 
     fn export(&self, settings: &SettingsMap) -> Result<Export> {
