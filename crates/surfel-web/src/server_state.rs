@@ -127,7 +127,9 @@ impl ServerState {
     async fn release_unless_used(self: Arc<Self>) {
         let n_registered = self.n_registered.load(Ordering::Relaxed);
         tokio::time::sleep(self.limits.timeouts.release).await;
-        let is_used = self.n_registered.load(Ordering::Relaxed) != n_registered;
+        // A page may have come after the last one went and before the number was read.
+        let is_used = 0 < self.render_loop.n_clients()
+            || self.n_registered.load(Ordering::Relaxed) != n_registered;
         let provider = self.provider.borrow().clone();
         if let Some(provider) = provider.filter(|_| !is_used) {
             let _ = self.run_blocking(move || provider.release()).await;
