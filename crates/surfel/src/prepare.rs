@@ -1,6 +1,6 @@
 //! Clouds that are prepared and kept, rather than rendered.
 
-use crate::crs::{is_in_degrees, metres_from_degrees};
+use crate::crs::{LOOKS_LIKE_DEGREES, is_in_degrees, move_to_metres};
 use crate::description::{ObjectSettings, PreparationSettings, SceneDescription};
 use crate::error::{Error, Result};
 use crate::resolve::{
@@ -8,16 +8,11 @@ use crate::resolve::{
 };
 use std::path::PathBuf;
 use surfel_core::points::{
-    Denoise, Duplicates, MixedPixels, Orientation, PointCloud, Preparation, clean, denoise,
-    prepare, remove_outliers, subsample, without_mixed_pixels,
+    Denoise, Duplicates, MixedPixels, Orientation, PointCloud, Preparation, denoise, prepare,
+    select_points,
 };
 use surfel_core::progress::Progress;
 use surfel_formats::{ColumnChoice, LoadOptions, Loaded, merge_loaded};
-
-/// A file keeps its points unless asked.
-const KEPT_POINTS: Duplicates = Duplicates::Keep;
-/// A file keeps the places of its points unless asked.
-const KEPT_POSITIONS: Denoise = Denoise::Off;
 
 /// Columns that a prepared cloud gets besides those that follow from the settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -80,7 +75,7 @@ pub fn prepare_points(
         }
     }
     if settings.reproject == Some(true) {
-        move_to_metres(&mut loaded, None, progress);
+        move_to_metres(&mut loaded.cloud, &mut loaded.info, None, progress);
     }
     report_degrees(&loaded, settings, progress);
     settings.drop_estimated(&mut loaded.cloud);
@@ -120,7 +115,7 @@ fn load_in_metres(
     for file in files {
         let mut part = surfel_formats::load(file, options, progress)?;
         let others = parts.iter().find_map(|part| part.info.coordinate_system.as_deref());
-        move_to_metres(&mut part, others, progress);
+        move_to_metres(&mut part.cloud, &mut part.info, others, progress);
         parts.push(part);
     }
     if parts.is_empty() {
@@ -129,19 +124,12 @@ fn load_in_metres(
     Ok(merge_loaded(parts, files, progress))
 }
 
-/// Moves a cloud in degrees to metres, to the coordinate system of `others` if these have one.
-fn move_to_metres(loaded: &mut Loaded, others: Option<&str>, progress: &dyn Progress) {
-    if let Some(line) = metres_from_degrees(&mut loaded.cloud, &mut loaded.info, others) {
-        progress.choice(&line, &["reproject"]);
-    }
-}
-
 /// Warns of coordinates in degrees, unless the settings say whether they stay.
 fn report_degrees(loaded: &Loaded, settings: &PreparationSettings, progress: &dyn Progress) {
     let system = loaded.info.coordinate_system.as_deref();
     if settings.reproject.is_none() && is_in_degrees(&loaded.cloud, system) {
-        let line = "warning: x and y look like degrees of longitude and latitude; normals, radii and distances need metres";
-        progress.choice(line, &["reproject"]);
+        let line = format!("{LOOKS_LIKE_DEGREES}; normals, radii and distances need metres");
+        progress.choice(&line, &["reproject"]);
     }
 }
 
@@ -153,14 +141,16 @@ fn prepared(
 ) -> surfel_core::Result<PointCloud> {
     let (settings, seed) = (&description.objects_default, description.picture.seed());
     let columns = columns(options, settings);
-    if !columns.normals && !columns.radii && !columns.variation {
-        return without_estimates(cloud, &settings.preparation, seed, progress);
-    }
+    // A file keeps its points, and where they are, unless asked.
     let mut preparation = Preparation {
-        denoise: settings.preparation.denoise.unwrap_or(KEPT_POSITIONS),
-        duplicates: settings.preparation.duplicates.unwrap_or(KEPT_POINTS),
+        denoise: settings.preparation.denoise.unwrap_or(Denoise::Off),
+        duplicates: settings.preparation.duplicates.unwrap_or(Duplicates::Keep),
         ..settings.preparation(seed)
     };
+    if !columns.normals && !columns.radii && !columns.variation {
+        preparation.mixed_pixels = settings.preparation.mixed_pixels.unwrap_or(MixedPixels::Keep);
+        return without_estimates(cloud, &preparation, progress);
+    }
     preparation.keep_variation = columns.variation;
     preparation.estimates_normals = columns.normals;
     if columns.normals && settings.preparation.orient.is_none() {
@@ -186,31 +176,14 @@ fn prepared(
     Ok(cloud)
 }
 
-/// Takes the steps that drop or move points, those alone that the settings name.
+/// Takes the steps that drop or move points.
 fn without_estimates(
     cloud: PointCloud,
-    settings: &PreparationSettings,
-    seed: u64,
+    preparation: &Preparation,
     progress: &dyn Progress,
 ) -> surfel_core::Result<PointCloud> {
-    let duplicates = settings.duplicates.unwrap_or(KEPT_POINTS);
-    let (mut cloud, _) = clean(cloud, duplicates, progress)?;
-    if settings.mixed_pixels == Some(MixedPixels::Drop)
-        && let Some(kept) = without_mixed_pixels(&cloud)
-    {
-        let n_mixed = cloud.len() - kept.len();
-        let line = format!("{n_mixed} mixed pixels between two surfaces dropped");
-        progress.choice(&line, &["mixed_pixels"]);
-        cloud = cloud.subset(&kept);
-    }
-    if let Some(choice) = settings.subsample {
-        cloud = subsample(&cloud, choice, seed, progress)?;
-    }
-    if let Some(choice) = settings.remove_outliers {
-        cloud = remove_outliers(&cloud, choice, progress)?;
-    }
-    let mode = settings.denoise.unwrap_or(KEPT_POSITIONS);
-    if let Some(moved) = denoise(&mut cloud, mode, progress)? {
+    let (mut cloud, _) = select_points(cloud, preparation, progress)?;
+    if let Some(moved) = denoise(&mut cloud, preparation.denoise, progress)? {
         progress.choice(&moved.report.line(), &["denoise"]);
     }
     Ok(cloud)

@@ -57,12 +57,12 @@ pub use gaussians::{
     MIN_DISC_OPACITY, n_harmonics, rest_column,
 };
 pub use merge::merge;
-pub use mixed_pixels::{MixedPixels, without_mixed_pixels};
+pub use mixed_pixels::MixedPixels;
 pub use normals::{NormalReport, PlaneFit, fill_missing, fit_plane};
 pub use orient::{Orientation, orient};
 pub use outliers::{OutlierRemoval, remove_outliers};
 pub use preparation::{Preparation, SURFACE_VARIATION};
-pub use prepare::{PreparationReport, prepare};
+pub use prepare::{PreparationReport, prepare, select_points};
 pub use prepared_cloud::PreparedCloud;
 pub(crate) use prepared_cloud::check_length;
 pub use radius::{

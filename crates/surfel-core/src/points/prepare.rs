@@ -38,6 +38,35 @@ pub struct PreparationReport {
     pub structure: Option<StructureReport>,
 }
 
+/// Cleans a cloud, and drops mixed pixels, points beyond a subsample and outliers, as the preparation says.
+///
+/// # Errors
+///
+/// Returns [`Error::Setting`] for a setting out of range, [`Error::TooManyPoints`] beyond 32-bit indices, and
+/// [`Error::Cancelled`] if `progress` is cancelled.
+pub fn select_points(
+    cloud: PointCloud,
+    preparation: &Preparation,
+    progress: &dyn Progress,
+) -> Result<(PointCloud, CleanReport)> {
+    let (mut cloud, report) = clean(cloud, preparation.duplicates, progress)?;
+    if preparation.mixed_pixels == MixedPixels::Drop
+        && let Some(kept) = without_mixed_pixels(&cloud)
+    {
+        let n_mixed = cloud.len() - kept.len();
+        let line = format!("{n_mixed} mixed pixels between two surfaces dropped");
+        progress.choice(&line, &["mixed_pixels"]);
+        cloud = cloud.subset(&kept);
+    }
+    if let Some(choice) = preparation.subsample {
+        cloud = subsample(&cloud, choice, preparation.seed, progress)?;
+    }
+    if let Some(choice) = preparation.remove_outliers {
+        cloud = remove_outliers(&cloud, choice, progress)?;
+    }
+    Ok((cloud, report))
+}
+
 /// Cleans a cloud, thins it, removes outliers and noise, then adds the radii that are missing, and the normals if they
 /// are wanted. Those of the file stay. Columns that are estimated get offsets in each morph target, estimated from the
 /// points where the target moves them.
@@ -56,21 +85,7 @@ pub fn prepare(
     if preparation.radii_from_normals {
         take_radii_from_normals(&mut cloud, progress)?;
     }
-    let (mut cloud, clean) = clean(cloud, preparation.duplicates, progress)?;
-    if preparation.mixed_pixels == MixedPixels::Drop
-        && let Some(kept) = without_mixed_pixels(&cloud)
-    {
-        let n_mixed = cloud.len() - kept.len();
-        let line = format!("{n_mixed} mixed pixels between two surfaces dropped");
-        progress.choice(&line, &["mixed_pixels"]);
-        cloud = cloud.subset(&kept);
-    }
-    if let Some(choice) = preparation.subsample {
-        cloud = subsample(&cloud, choice, preparation.seed, progress)?;
-    }
-    if let Some(choice) = preparation.remove_outliers {
-        cloud = remove_outliers(&cloud, choice, progress)?;
-    }
+    let (mut cloud, clean) = select_points(cloud, preparation, progress)?;
     if cloud.is_empty() {
         return Err(Error::EmptyCloud);
     }

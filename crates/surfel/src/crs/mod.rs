@@ -5,7 +5,7 @@ mod reproject;
 mod wkt;
 
 pub use georeference::georeference;
-pub use reproject::{is_in_degrees, metres_from_degrees};
+pub use reproject::{LOOKS_LIKE_DEGREES, is_in_degrees, move_to_metres};
 
 use proj4rs::Proj;
 use proj4rs::adaptors::transform_xyz;

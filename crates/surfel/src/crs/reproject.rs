@@ -3,6 +3,7 @@
 use super::{CoordinateSystem, Place, Unit};
 use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::PointCloud;
+use surfel_core::progress::Progress;
 use surfel_formats::{FileInfo, LasProfile};
 
 /// Maximum extent of a scan in degrees, if no coordinate system is stated.
@@ -13,12 +14,28 @@ const MIN_NEEDLE_RATIO: f64 = 100.0;
 /// near zero.
 const MIN_OFFSET_RATIO: f64 = 100.0;
 
+/// Begin of a warning about coordinates that stay in degrees.
+pub const LOOKS_LIKE_DEGREES: &str = "warning: x and y look like degrees of longitude and latitude";
+
+/// Moves the points of a cloud in degrees to metres, to the coordinate system of `others` if these have one, and reports it.
+/// Everything else stays as it is.
+pub fn move_to_metres(
+    cloud: &mut PointCloud,
+    info: &mut FileInfo,
+    others: Option<&str>,
+    progress: &dyn Progress,
+) {
+    if let Some(line) = metres_from_degrees(cloud, info, others) {
+        progress.choice(&line, &["reproject"]);
+    }
+}
+
 /// Moves the points of a cloud from degrees to the coordinate system of `others` if that has a unit of length, or to
 /// their zone of the Universal Transverse Mercator (UTM) system. Heights stay.
 ///
 /// Returns a line about it for the user, or `None` if the coordinates are no degrees: the file states no geographic
 /// system, and none without a statement look like it.
-pub fn metres_from_degrees(
+fn metres_from_degrees(
     cloud: &mut PointCloud,
     info: &mut FileInfo,
     others: Option<&str>,

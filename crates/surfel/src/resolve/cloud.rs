@@ -1,6 +1,6 @@
 //! A cloud on its way from the file to a surface: read, prepared, coloured.
 
-use crate::crs::{is_in_degrees, metres_from_degrees};
+use crate::crs::{LOOKS_LIKE_DEGREES, is_in_degrees, move_to_metres};
 use crate::description::{Invalid, ObjectSettings, PreparationSettings};
 use crate::error::{Error, Result};
 use crate::memory_files::{MemoryContent, MemoryFiles};
@@ -59,9 +59,9 @@ pub fn import(
 /// Warns of points in memory whose coordinates look like degrees.
 fn report_degrees(cloud: &PointCloud, progress: &dyn Progress) {
     if is_in_degrees(cloud, None) {
-        progress.note(
-            "warning: x and y look like degrees of longitude and latitude, z like metres; reproject the points to a system in metres first, with pyproj for example",
-        );
+        progress.note(&format!(
+            "{LOOKS_LIKE_DEGREES}, z like metres; reproject the points to a system in metres first, with pyproj for example"
+        ));
     }
 }
 
@@ -94,10 +94,7 @@ fn with_metres(
     progress: &dyn Progress,
 ) -> (Graph<PointCloud>, FileInfo) {
     if let [Geometry::Points(cloud)] = &mut graph.geometries[..] {
-        let others = options.coordinate_system.as_deref();
-        if let Some(line) = metres_from_degrees(cloud, &mut info, others) {
-            progress.choice(&line, &["reproject"]);
-        }
+        move_to_metres(cloud, &mut info, options.coordinate_system.as_deref(), progress);
     }
     (graph, info)
 }
