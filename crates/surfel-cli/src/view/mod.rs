@@ -97,7 +97,7 @@ Examples:
 
 /// Serves the viewer until it is interrupted.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    freed_memory::give_back_at_once();
+    freed_memory::keep_little();
     let description = args.scene.startup(global)?;
     start_threads(&description.run)?;
     let renderer = SceneRenderer::new(&description.run)?;

@@ -6,6 +6,7 @@ use super::facts::{
     classes, columns, filter_columns, has_returns, stations, surfaces, unit_symbol,
 };
 use super::file_names::{ClientProgress, ViewedFolders};
+use super::freed_memory;
 use super::histogram::histogram;
 use super::legend::legend_json;
 use super::page_overlay::page_overlay;
@@ -409,6 +410,7 @@ impl SceneProvider for FileSceneProvider {
 
     fn release(&self) {
         self.scene.release();
+        freed_memory::give_back();
     }
 
     fn export(&self, settings: &SettingsMap) -> Result<Export> {
