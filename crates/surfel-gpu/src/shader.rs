@@ -204,8 +204,12 @@ const REGION: &[&str] = parts!["trace/region.wgsl"];
 const SUPPORT: &[&str] = parts!["trace/support_kernel.wgsl"];
 const CLOSEST: &[&str] = parts!["trace/query/closest.wgsl"];
 const CLOSEST_KERNEL: &[&str] = parts!["trace/closest_kernel.wgsl"];
+const CLOSEST_ALONE: &[&str] = parts!["trace/query/closest_alone.wgsl"];
+const GROUP: &[&str] = parts!["trace/group.wgsl"];
 const ANY: &[&str] = parts!["trace/query/any.wgsl"];
 const ANY_KERNEL: &[&str] = parts!["trace/any_kernel.wgsl"];
+const ANY_ALONE: &[&str] = parts!["trace/query/any_alone.wgsl"];
+const ANY_TESTED: &[&str] = parts!["trace/query/any_tested.wgsl"];
 const TRIANGLES: &[&str] = parts![
     "math/basis.wgsl",
     "surface/triangle.wgsl",
@@ -215,7 +219,6 @@ const TRIANGLES: &[&str] = parts![
 const EDGE: &[&str] =
     parts!["math/basis.wgsl", "surface/edge_test.wgsl", "trace/query/edge_test.wgsl",];
 const SOLIDS: &[&str] = parts!["trace/query/solids.wgsl"];
-const ACCEPT_ALL: &[&str] = parts!["trace/query/accept_all.wgsl"];
 const DISCS: &[&str] = parts!["trace/query/disc_query.wgsl", "trace/query/surface.wgsl"];
 const SPLATS: &[&str] = parts![
     "math/eigen.wgsl",
@@ -347,16 +350,18 @@ impl Kernel {
                     parts.push(TRAVERSE);
                 }
                 parts.extend_from_slice(match surface {
-                    Surface::Sphere | Surface::Capsule => &[CLOSEST, SOLIDS],
-                    Surface::Disc => &[CLOSEST, REGION, EDGE, DISCS],
+                    Surface::Sphere | Surface::Capsule => &[CLOSEST_ALONE, CLOSEST, SOLIDS],
+                    Surface::Disc => &[CLOSEST_ALONE, CLOSEST, REGION, EDGE, DISCS],
                     Surface::Splat | Surface::SplatFit | Surface::Cylinder => {
-                        &[REGION, EDGE, SPLATS]
+                        &[CLOSEST_ALONE, REGION, EDGE, SPLATS]
                     }
-                    Surface::Triangle => &[TRIANGLES],
-                    Surface::Mls(_) => &[CLOSEST, REGION, EDGE, MLS],
-                    Surface::Implicit => &[REGION, EDGE, IMPLICIT],
-                    Surface::Octree | Surface::OctreeSplat => &[OCTREE, OCTREE_SURFACE],
-                    Surface::Smooth => &[CLOSEST, REGION, EDGE, SMOOTH, SMOOTH_SURFACE],
+                    Surface::Triangle => &[CLOSEST_ALONE, TRIANGLES],
+                    Surface::Mls(_) => &[CLOSEST_ALONE, CLOSEST, REGION, EDGE, MLS],
+                    Surface::Implicit => &[CLOSEST_ALONE, REGION, EDGE, IMPLICIT],
+                    Surface::Octree | Surface::OctreeSplat => {
+                        &[CLOSEST_ALONE, OCTREE, OCTREE_SURFACE]
+                    }
+                    Surface::Smooth => &[GROUP, CLOSEST, REGION, EDGE, SMOOTH, SMOOTH_SURFACE],
                 });
                 parts
             }
@@ -377,16 +382,16 @@ impl Kernel {
                     parts.push(TRAVERSE);
                 }
                 parts.extend_from_slice(match surface {
-                    Surface::Sphere | Surface::Capsule => &[ANY, ACCEPT_ALL],
-                    Surface::Triangle => &[TRIANGLES],
+                    Surface::Sphere | Surface::Capsule => &[ANY_ALONE, ANY],
+                    Surface::Triangle => &[ANY_ALONE, TRIANGLES],
                     Surface::Disc | Surface::Splat | Surface::SplatFit => {
-                        &[ANY, REGION, EDGE, EDGE_FILTER]
+                        &[GROUP, ANY_TESTED, REGION, EDGE, EDGE_FILTER]
                     }
-                    Surface::Cylinder => &[REGION, EDGE, SPLATS, ANY_SURFACE],
-                    Surface::Mls(_) => &[CLOSEST, REGION, EDGE, MLS, ANY_SURFACE],
-                    Surface::Implicit => &[REGION, EDGE, IMPLICIT, ANY_SURFACE],
-                    Surface::Octree | Surface::OctreeSplat => &[OCTREE, ANY_CELL],
-                    Surface::Smooth => &[ANY, REGION, EDGE, SMOOTH, SMOOTH_FILTER],
+                    Surface::Cylinder => &[ANY_ALONE, REGION, EDGE, SPLATS, ANY_SURFACE],
+                    Surface::Mls(_) => &[ANY_ALONE, CLOSEST, REGION, EDGE, MLS, ANY_SURFACE],
+                    Surface::Implicit => &[ANY_ALONE, REGION, EDGE, IMPLICIT, ANY_SURFACE],
+                    Surface::Octree | Surface::OctreeSplat => &[ANY_ALONE, OCTREE, ANY_CELL],
+                    Surface::Smooth => &[GROUP, ANY_TESTED, REGION, EDGE, SMOOTH, SMOOTH_FILTER],
                 });
                 parts
             }

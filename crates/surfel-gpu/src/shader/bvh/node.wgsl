@@ -1,16 +1,16 @@
-// Nodes: the boxes of eight children as bytes on a grid, and the slab test of one child.
+// Nodes: the boxes of eight children as bytes on a grid, and the tests of all of them at once.
 
 struct Node {
     origin: vec3<f32>,
     exponents_and_counts: u32,
     first_node: u32,
     lane_zero_as_block: u32,
-    // Four lanes a word, two words an axis.
-    lower: array<u32, 6>,
-    upper: array<u32, 6>,
+    // Bounds along the three axes, four lanes a word.
+    lower: array<vec3<u32>, 2>,
+    upper: array<vec3<u32>, 2>,
 }
 
-// Words of four bytes that a node takes in `nodes`, and those that it fills.
+// Vectors of four words that a node takes in `nodes`.
 const NODE_VECTORS: u32 = 5u;
 
 fn load_node(node_idx: u32) -> Node {
@@ -25,8 +25,8 @@ fn load_node(node_idx: u32) -> Node {
         head.w,
         a.x,
         a.y,
-        array<u32, 6>(a.z, a.w, b.x, b.y, b.z, b.w),
-        array<u32, 6>(c.x, c.y, c.z, c.w, d.x, d.y),
+        array<vec3<u32>, 2>(vec3<u32>(a.z, b.x, b.z), vec3<u32>(a.w, b.y, b.w)),
+        array<vec3<u32>, 2>(vec3<u32>(c.x, c.z, d.x), vec3<u32>(c.y, c.w, d.y)),
     );
 }
 
@@ -49,16 +49,15 @@ fn node_step(node: Node) -> vec3<f32> {
     return bitcast<vec3<f32>>((exponents & vec3<u32>(0xffu)) << vec3<u32>(23u));
 }
 
-fn lower_bound(node: Node, step: vec3<f32>, lane: u32) -> vec3<f32> {
-    let word = lane >> 2u;
-    let steps = vec3<u32>(node.lower[word], node.lower[2u + word], node.lower[4u + word]);
-    return node.origin + vec3<f32>((steps >> vec3<u32>(8u * (lane & 3u))) & vec3<u32>(0xffu)) * step;
+// Returns the bytes of a word, the lowest first.
+fn bytes_of(word: u32) -> vec4<f32> {
+    return vec4<f32>((vec4<u32>(word) >> vec4<u32>(0u, 8u, 16u, 24u)) & vec4<u32>(0xffu));
 }
 
-fn upper_bound(node: Node, step: vec3<f32>, lane: u32) -> vec3<f32> {
-    let word = lane >> 2u;
-    let steps = vec3<u32>(node.upper[word], node.upper[2u + word], node.upper[4u + word]);
-    return node.origin + vec3<f32>((steps >> vec3<u32>(8u * (lane & 3u))) & vec3<u32>(0xffu)) * step;
+// Returns a bit for each of four lanes that is true.
+fn lane_bits(lanes: vec4<bool>) -> u32 {
+    let bits = select(vec4<u32>(0u), vec4<u32>(1u, 2u, 4u, 8u), lanes);
+    return bits.x | bits.y | bits.z | bits.w;
 }
 
 // Allowance for rounding, relative to the largest coordinates involved.
@@ -66,11 +65,13 @@ const ROUNDING: f32 = 1e-6;
 // Components of directions nearer to zero than this are replaced by it.
 const MIN_DIRECTION: f32 = 1e-18;
 
-// A ray prepared for the slab test: it meets the plane at x at distance x * `inverse` - `at_origin`.
+// A ray prepared for the slab test. Along each axis it meets the nearer plane x of a box at the distance
+// (x - `near_origin`) * `inverse`, and the farther one likewise.
 struct SlabRay {
     inverse: vec3<f32>,
-    low_at_origin: vec3<f32>,
-    high_at_origin: vec3<f32>,
+    is_negative: vec3<bool>,
+    near_origin: vec3<f32>,
+    far_origin: vec3<f32>,
     t_min: f32,
 }
 
@@ -78,25 +79,96 @@ struct SlabRay {
 fn slab_ray(root: Node, ray: Ray) -> SlabRay {
     let is_small = abs(ray.direction) < vec3<f32>(MIN_DIRECTION);
     let inverse = 1.0 / select(ray.direction, vec3<f32>(MIN_DIRECTION), is_small);
+    let is_negative = inverse < vec3<f32>(0.0);
     let step = node_step(root);
     let coordinates = max(abs(root.origin), abs(ray.origin));
     let largest = max(max(coordinates.x, coordinates.y), coordinates.z);
     let slack = ROUNDING * (largest + 256.0 * max(max(step.x, step.y), step.z));
-    return SlabRay(
-        inverse,
-        (ray.origin + slack) * inverse,
-        (ray.origin - slack) * inverse,
-        ray.t_min,
-    );
+    let toward = select(vec3<f32>(slack), vec3<f32>(-slack), is_negative);
+    return SlabRay(inverse, is_negative, ray.origin + toward, ray.origin - toward, ray.t_min);
 }
 
-// Returns the distance at which a ray enters the box of a child up to `t_max`, or -1 if it misses the box.
-fn enter_child(node: Node, step: vec3<f32>, lane: u32, ray: SlabRay, t_max: f32) -> f32 {
-    let at_low = lower_bound(node, step, lane) * ray.inverse - ray.low_at_origin;
-    let at_high = upper_bound(node, step, lane) * ray.inverse - ray.high_at_origin;
-    let near = min(at_low, at_high);
-    let far = max(at_low, at_high);
-    let enter = max(max(near.x, near.y), max(near.z, ray.t_min));
-    let leave = min(min(far.x, far.y), min(far.z, t_max));
-    return select(-1.0, enter, enter <= leave);
+// The children whose boxes a ray enters: the distance of each with the lane in its three lowest bits, so that keys are in
+// the order of distances; NO_CHILD for the others.
+struct ChildKeys {
+    lanes: array<vec4<u32>, 2>,
+}
+
+const NO_CHILD: u32 = 0xffffffffu;
+const LANE_MASK: u32 = 7u;
+
+// Returns the keys of the children whose boxes a ray enters up to `t_max`.
+fn entered_children(node: Node, ray: SlabRay, t_max: f32) -> ChildKeys {
+    let scale = node_step(node) * ray.inverse;
+    let near = (node.origin - ray.near_origin) * ray.inverse;
+    let far = (node.origin - ray.far_origin) * ray.inverse;
+    let n = vec4<u32>(n_children(node));
+    let range = vec2<f32>(ray.t_min, t_max);
+    let lanes = vec4<u32>(0u, 1u, 2u, 3u);
+    return ChildKeys(array<vec4<u32>, 2>(
+        entered_four(node.lower[0], node.upper[0], ray.is_negative, scale, near, far, range, lanes, n),
+        entered_four(node.lower[1], node.upper[1], ray.is_negative, scale, near, far, range, lanes + 4u, n),
+    ));
+}
+
+fn entered_four(
+    lower: vec3<u32>,
+    upper: vec3<u32>,
+    is_negative: vec3<bool>,
+    scale: vec3<f32>,
+    near_offset: vec3<f32>,
+    far_offset: vec3<f32>,
+    range: vec2<f32>,
+    lanes: vec4<u32>,
+    n_lanes: vec4<u32>,
+) -> vec4<u32> {
+    let near = select(lower, upper, is_negative);
+    let far = select(upper, lower, is_negative);
+    let near_x = bytes_of(near.x) * scale.x + near_offset.x;
+    let near_y = bytes_of(near.y) * scale.y + near_offset.y;
+    let near_z = bytes_of(near.z) * scale.z + near_offset.z;
+    let far_x = bytes_of(far.x) * scale.x + far_offset.x;
+    let far_y = bytes_of(far.y) * scale.y + far_offset.y;
+    let far_z = bytes_of(far.z) * scale.z + far_offset.z;
+    let enter = max(max(near_x, near_y), max(near_z, vec4<f32>(range.x)));
+    let leave = min(min(far_x, far_y), min(far_z, vec4<f32>(range.y)));
+    let is_entered = (enter <= leave) & (lanes < n_lanes);
+    let keys = (bitcast<vec4<u32>>(max(enter, vec4<f32>(0.0))) & vec4<u32>(~LANE_MASK)) | lanes;
+    return select(vec4<u32>(NO_CHILD), keys, is_entered);
+}
+
+// Returns the key of the nearest child.
+fn nearest_key(keys: ChildKeys) -> u32 {
+    let four = min(keys.lanes[0], keys.lanes[1]);
+    return min(min(four.x, four.y), min(four.z, four.w));
+}
+
+fn without_key(keys: ChildKeys, key: u32) -> ChildKeys {
+    let none = vec4<u32>(NO_CHILD);
+    let is_key = array<vec4<bool>, 2>(keys.lanes[0] == vec4<u32>(key), keys.lanes[1] == vec4<u32>(key));
+    return ChildKeys(array<vec4<u32>, 2>(
+        select(keys.lanes[0], none, is_key[0]),
+        select(keys.lanes[1], none, is_key[1]),
+    ));
+}
+
+// Returns the lanes of the children whose boxes overlap the box from `low` to `high`, as bits.
+fn overlapping_children(node: Node, low: vec3<f32>, high: vec3<f32>) -> u32 {
+    // Steps are powers of two, so that the reciprocals are exact; those of flat boxes are limited.
+    let per_step = 1.0 / max(node_step(node), vec3<f32>(1e-30));
+    let first = (low - node.origin) * per_step;
+    let last = (high - node.origin) * per_step;
+    let bits = overlapping_four(node.lower[0], node.upper[0], first, last)
+        | (overlapping_four(node.lower[1], node.upper[1], first, last) << 4u);
+    return bits & ((1u << n_children(node)) - 1u);
+}
+
+fn overlapping_four(lower: vec3<u32>, upper: vec3<u32>, first: vec3<f32>, last: vec3<f32>) -> u32 {
+    let begins = (bytes_of(lower.x) <= vec4<f32>(last.x))
+        & (bytes_of(lower.y) <= vec4<f32>(last.y))
+        & (bytes_of(lower.z) <= vec4<f32>(last.z));
+    let ends = (vec4<f32>(first.x) <= bytes_of(upper.x))
+        & (vec4<f32>(first.y) <= bytes_of(upper.y))
+        & (vec4<f32>(first.z) <= bytes_of(upper.z));
+    return lane_bits(begins & ends);
 }

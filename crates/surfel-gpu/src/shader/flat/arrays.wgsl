@@ -11,3 +11,7 @@ fn node_vector(idx: u32) -> vec4<u32> {
 fn block_vector(idx: u32) -> vec4<u32> {
     return blocks[idx];
 }
+
+fn block_word(idx: u32) -> u32 {
+    return blocks[idx >> 2u][idx & 3u];
+}

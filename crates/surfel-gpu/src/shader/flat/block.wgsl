@@ -1,13 +1,10 @@
 // Leaf blocks of eight points, quantised relative to their common lower corner.
 
-// The words of a block: corner and steps, positions by axis, normals, radii and colours.
-struct PointBlock {
-    head: vec4<u32>,
-    x: vec4<u32>,
-    y: vec4<u32>,
-    z: vec4<u32>,
-    normals: array<vec4<u32>, 2>,
-    radii: vec2<u32>,
+// The corner of a block and the steps of its positions and radii.
+struct BlockHead {
+    corner: vec3<f32>,
+    step: f32,
+    radius_step: f32,
 }
 
 // A point relative to the position for which its block was decoded.
@@ -19,6 +16,19 @@ struct Point {
     radius: f32,
 }
 
+// Four points of a block, one in each component, relative to the position for which they were decoded.
+struct FourPoints {
+    x: vec4<f32>,
+    y: vec4<f32>,
+    z: vec4<f32>,
+    // Integer components.
+    normal_x: vec4<f32>,
+    normal_y: vec4<f32>,
+    normal_z: vec4<f32>,
+    // 0 in unused lanes.
+    radius: vec4<f32>,
+}
+
 struct Surfel {
     center: vec3<f32>,
     normal: vec3<f32>,
@@ -26,36 +36,90 @@ struct Surfel {
     color: vec3<f32>,
 }
 
-// Vectors of four words that a block takes in `blocks`.
+// Vectors of four words that a block takes in `blocks`: corner and steps, positions by axis, normals, radii and colours.
 const BLOCK_VECTORS: u32 = 8u;
+// Indices of the first word of the positions, the normals and the radii.
+const POSITION_WORDS: u32 = 4u;
+const NORMAL_WORDS: u32 = 16u;
+const RADIUS_WORDS: u32 = 24u;
 
+fn load_head(block_idx: u32) -> BlockHead {
+    let head = block_vector(block_idx * BLOCK_VECTORS);
+    let step = bitcast<f32>((head.w & 0xffu) << 23u);
+    return BlockHead(bitcast<vec3<f32>>(head.xyz), step, bitcast<f32>(head.w & 0xffffff00u));
+}
 
-fn load_block(block_idx: u32) -> PointBlock {
-    let first = block_idx * BLOCK_VECTORS;
-    return PointBlock(
-        block_vector(first),
-        block_vector(first + 1u),
-        block_vector(first + 2u),
-        block_vector(first + 3u),
-        array<vec4<u32>, 2>(block_vector(first + 4u), block_vector(first + 5u)),
-        block_vector(first + 6u).xy,
-    );
+fn word_of_block(block_idx: u32, word_idx: u32) -> u32 {
+    return block_word(block_idx * (4u * BLOCK_VECTORS) + word_idx);
 }
 
 // Returns the point in `lane` relative to `origin`. The corner is subtracted first, so that rounding errors are
 // proportional to the distance from `origin`.
-fn block_point(block: PointBlock, lane: u32, origin: vec3<f32>) -> Point {
-    let step = bitcast<f32>((block.head.w & 0xffu) << 23u);
-    let radius_step = bitcast<f32>(block.head.w & 0xffffff00u);
-    let words = vec3<u32>(block.x[lane >> 1u], block.y[lane >> 1u], block.z[lane >> 1u]);
-    let steps = (words >> vec3<u32>(16u * (lane & 1u))) & vec3<u32>(0xffffu);
-    let normal = block.normals[lane >> 2u][lane & 3u];
-    let radius = (block.radii[lane >> 2u] >> (8u * (lane & 3u))) & 0xffu;
-    return Point(
-        (bitcast<vec3<f32>>(block.head.xyz) - origin) + vec3<f32>(steps) * step,
-        integer_normal(normal),
-        f32(radius + ((normal >> 30u) << 8u)) * radius_step,
+fn block_point(block_idx: u32, head: BlockHead, lane: u32, origin: vec3<f32>) -> Point {
+    let pair = POSITION_WORDS + (lane >> 1u);
+    let words = vec3<u32>(
+        word_of_block(block_idx, pair),
+        word_of_block(block_idx, pair + 4u),
+        word_of_block(block_idx, pair + 8u),
     );
+    let steps = (words >> vec3<u32>(16u * (lane & 1u))) & vec3<u32>(0xffffu);
+    let normal = word_of_block(block_idx, NORMAL_WORDS + lane);
+    let radius = (word_of_block(block_idx, RADIUS_WORDS + (lane >> 2u)) >> (8u * (lane & 3u))) & 0xffu;
+    return Point(
+        (head.corner - origin) + vec3<f32>(steps) * head.step,
+        integer_normal(normal),
+        f32(radius + ((normal >> 30u) << 8u)) * head.radius_step,
+    );
+}
+
+// Returns the lower or the upper four points of a block relative to `origin`.
+fn four_points(block_idx: u32, head: BlockHead, half: u32, origin: vec3<f32>) -> FourPoints {
+    let first = block_idx * BLOCK_VECTORS;
+    let corner = head.corner - origin;
+    let words = block_vector(first + 4u + half);
+    let radii = word_of_block(block_idx, RADIUS_WORDS + half);
+    let bytes = (vec4<u32>(radii) >> vec4<u32>(0u, 8u, 16u, 24u)) & vec4<u32>(0xffu);
+    let normals = bitcast<vec4<i32>>(words);
+    return FourPoints(
+        four_steps(block_vector(first + 1u), half) * head.step + corner.x,
+        four_steps(block_vector(first + 2u), half) * head.step + corner.y,
+        four_steps(block_vector(first + 3u), half) * head.step + corner.z,
+        vec4<f32>((normals << vec4<u32>(22u)) >> vec4<u32>(22u)),
+        vec4<f32>((normals << vec4<u32>(12u)) >> vec4<u32>(22u)),
+        vec4<f32>((normals << vec4<u32>(2u)) >> vec4<u32>(22u)),
+        vec4<f32>(bytes + ((words >> vec4<u32>(30u)) << vec4<u32>(8u))) * head.radius_step,
+    );
+}
+
+// Returns four of the eight positions along one axis, in steps.
+fn four_steps(words: vec4<u32>, half: u32) -> vec4<f32> {
+    let pairs = select(words.xy, words.zw, half == 1u);
+    return vec4<f32>((pairs.xxyy >> vec4<u32>(0u, 16u, 0u, 16u)) & vec4<u32>(0xffffu));
+}
+
+fn point_of_four(four: FourPoints, lane: u32) -> Point {
+    return Point(
+        vec3<f32>(four.x[lane], four.y[lane], four.z[lane]),
+        vec3<f32>(four.normal_x[lane], four.normal_y[lane], four.normal_z[lane]),
+        four.radius[lane],
+    );
+}
+
+// Returns the lanes of a block whose positions are nearer to `position` than the square root of `max_squared`, as bits.
+fn lanes_within(block_idx: u32, head: BlockHead, position: vec3<f32>, max_squared: f32) -> u32 {
+    let first = block_idx * BLOCK_VECTORS;
+    let corner = head.corner - position;
+    let x_words = block_vector(first + 1u);
+    let y_words = block_vector(first + 2u);
+    let z_words = block_vector(first + 3u);
+    var lanes = 0u;
+    for (var half = 0u; half < 2u; half++) {
+        let x = four_steps(x_words, half) * head.step + corner.x;
+        let y = four_steps(y_words, half) * head.step + corner.y;
+        let z = four_steps(z_words, half) * head.step + corner.z;
+        lanes |= lane_bits(x * x + y * y + z * z < vec4<f32>(max_squared)) << (4u * half);
+    }
+    return lanes;
 }
 
 fn integer_normal(bits: u32) -> vec3<f32> {
@@ -71,18 +135,17 @@ fn slot_color(slot: u32) -> vec3<f32> {
 
 // Returns a byte of the colours of the block of `slot`, which follow its eight radii, as linear light.
 fn color_byte(slot: u32, byte_idx: u32) -> f32 {
-    let word = 2u + (byte_idx >> 2u);
-    let vector = block_vector((slot >> 3u) * BLOCK_VECTORS + 6u + (word >> 2u));
-    let encoded = (vector[word & 3u] >> (8u * (byte_idx & 3u))) & 0xffu;
+    let word = word_of_block(slot >> 3u, RADIUS_WORDS + 2u + (byte_idx >> 2u));
+    let encoded = (word >> (8u * (byte_idx & 3u))) & 0xffu;
     return tables.srgb[encoded >> 2u][encoded & 3u];
 }
 
-// Returns the point at `slot` in the coordinates of the object.
-fn slot_point(slot: u32) -> Point {
-    return block_point(load_block(slot >> 3u), slot & 7u, vec3<f32>(0.0));
+// Returns the point at `slot` relative to `origin`.
+fn slot_point(slot: u32, origin: vec3<f32>) -> Point {
+    return block_point(slot >> 3u, load_head(slot >> 3u), slot & 7u, origin);
 }
 
 fn slot_surfel(slot: u32) -> Surfel {
-    let point = slot_point(slot);
+    let point = slot_point(slot, vec3<f32>(0.0));
     return Surfel(point.center, normalize(point.normal), point.radius, slot_color(slot));
 }

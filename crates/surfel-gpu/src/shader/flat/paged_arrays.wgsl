@@ -34,3 +34,22 @@ fn block_vector(idx: u32) -> vec4<u32> {
         }
     }
 }
+
+fn block_word(idx: u32) -> u32 {
+    let component = idx & 3u;
+    let at = (idx >> 2u) & PAGE_MASK;
+    switch idx >> (PAGE_SHIFT + 2u) {
+        case 0u: {
+            return blocks_0[at][component];
+        }
+        case 1u: {
+            return blocks_1[at][component];
+        }
+        case 2u: {
+            return blocks_2[at][component];
+        }
+        default: {
+            return blocks_3[at][component];
+        }
+    }
+}

@@ -1,5 +1,14 @@
 // Capsules: each point is a short thick line along its direction.
 
+// Returns the distances to the outer sides of four capsules, -1 without a hit.
+fn intersect_capsules(four: FourPoints, ray: Ray) -> vec4<f32> {
+    var distances = vec4<f32>(-1.0);
+    for (var lane = 0u; lane < 4u; lane++) {
+        distances[lane] = intersect_capsule(point_of_four(four, lane), ray);
+    }
+    return distances;
+}
+
 // Returns the distance to the outer side of a capsule, or -1 without a hit. The point's radius is half the length, its
 // normal the direction.
 fn intersect_capsule(point: Point, ray: Ray) -> f32 {

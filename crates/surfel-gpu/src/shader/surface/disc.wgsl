@@ -1,14 +1,17 @@
 // Discs: each point is the flat disc that its normal and radius describe (Wiesmeier 2011).
 
-// Returns the distance to both sides of a disc, or -1 without a hit. The test compares products, so that a ray in the
-// disc's plane divides by nothing that matters.
-fn intersect_disc(point: Point, ray: Ray) -> f32 {
-    let facing = dot(point.normal, ray.direction);
-    if facing == 0.0 {
-        return -1.0;
-    }
-    let distance = dot(point.normal, point.center) / facing;
-    let offset = point.center - distance * ray.direction;
-    let is_hit = dot(offset, offset) < point.radius * point.radius && ray.t_min <= distance;
-    return select(-1.0, distance, is_hit);
+// Returns the distances to both sides of four discs, -1 without a hit. A ray in the plane of a disc misses it.
+fn intersect_discs(four: FourPoints, ray: Ray) -> vec4<f32> {
+    let none = vec4<f32>(0.0);
+    let direction = ray.direction;
+    let facing = dot_four(four.normal_x, four.normal_y, four.normal_z, direction);
+    let height = four.normal_x * four.x + four.normal_y * four.y + four.normal_z * four.z;
+    let is_parallel = facing == none;
+    let distance = height / select(facing, vec4<f32>(1.0), is_parallel);
+    let x = four.x - distance * direction.x;
+    let y = four.y - distance * direction.y;
+    let z = four.z - distance * direction.z;
+    let is_inside = x * x + y * y + z * z < four.radius * four.radius;
+    let is_hit = is_inside & (vec4<f32>(ray.t_min) <= distance) & (facing != none);
+    return select(vec4<f32>(-1.0), distance, is_hit);
 }

@@ -1,15 +1,21 @@
 // The shapes that the points of a tree have.
 
-// Returns the distance to a point as a shape of the kernel's kind, or -1 without a hit.
-fn intersect_shape(point: Point, ray: Ray) -> f32 {
+// Returns the distances to four points as shapes of the kernel's kind, -1 without a hit.
+fn intersect_four(four: FourPoints, ray: Ray) -> vec4<f32> {
+    var distances = vec4<f32>(-1.0);
     if SHAPE == SPHERE {
-        return intersect_sphere(point, ray);
+        distances = intersect_spheres(four, ray);
+    } else if SHAPE == CAPSULE {
+        distances = intersect_capsules(four, ray);
+    } else if SHAPE == MLS {
+        distances = intersect_balls(four, ray);
+    } else {
+        distances = intersect_discs(four, ray);
     }
-    if SHAPE == CAPSULE {
-        return intersect_capsule(point, ray);
-    }
-    if SHAPE == MLS {
-        return intersect_ball(point, ray);
-    }
-    return intersect_disc(point, ray);
+    return select(vec4<f32>(-1.0), distances, vec4<f32>(0.0) < four.radius);
+}
+
+// Returns the scalar products of four vectors with another one.
+fn dot_four(x: vec4<f32>, y: vec4<f32>, z: vec4<f32>, vector: vec3<f32>) -> vec4<f32> {
+    return x * vector.x + y * vector.y + z * vector.z;
 }

@@ -81,29 +81,55 @@ fn no_fit_points(guide: vec3<f32>, radius: f32) -> SphereSums {
     return SphereSums(guide, 1.0 / radius, 0.0, none, none, 0.0, 0.0);
 }
 
-fn add_fit_point(sums: ptr<private, SphereSums>, point: FitPoint) {
-    let squared = dot(point.offset, point.offset);
+// Adds four points at a time, without branches but for blocks that are out of reach.
+fn add_fit_points(sums: ptr<private, SphereSums>, four: FourPoints) {
     let per_radius = (*sums).per_radius;
-    if !is_within_reach(point, per_radius) || 1.0 <= squared * point.inverse_support {
+    let squared = four.x * four.x + four.y * four.y + four.z * four.z;
+    let support = SUPPORT_FACTOR * max(four.radius, vec4<f32>(1e-18));
+    let in_support = squared * (1.0 / (support * support));
+    let is_near = squared * per_radius * per_radius < vec4<f32>(FIT_REACH * FIT_REACH);
+    let is_used = is_near & (in_support < vec4<f32>(1.0)) & (vec4<f32>(0.0) < four.radius);
+    if !any(is_used) {
         return;
     }
-    let offset = point.offset * per_radius;
-    let cosine = dot(point.normal, (*sums).guide);
-    let height = dot(point.normal, offset) * (1.0 / FIT_MAX_PLANE_DISTANCE);
-    let closeness = max(1.0 - height * height, 0.0);
-    let weight = point_weight(point) * alignment(abs(cosine)) * closeness * closeness;
-    let normal = point.normal * select(weight, -weight, cosine < 0.0);
-    let weighted_offset = offset * weight;
-    (*sums).weight += in_steps(weight);
-    (*sums).offset += in_steps_vector(weighted_offset);
-    (*sums).normal += in_steps_vector(normal);
-    (*sums).offset_dot_normal += in_steps(dot(offset, normal));
-    (*sums).offset_squared += in_steps(dot(offset, weighted_offset));
+    let length_squared =
+        four.normal_x * four.normal_x + four.normal_y * four.normal_y + four.normal_z * four.normal_z;
+    let per_length = 1.0 / sqrt(max(length_squared, vec4<f32>(1.0)));
+    let normal_x = four.normal_x * per_length;
+    let normal_y = four.normal_y * per_length;
+    let normal_z = four.normal_z * per_length;
+    let x = four.x * per_radius;
+    let y = four.y * per_radius;
+    let z = four.z * per_radius;
+    let cosine = dot_four(normal_x, normal_y, normal_z, (*sums).guide);
+    let height = (normal_x * x + normal_y * y + normal_z * z) * (1.0 / FIT_MAX_PLANE_DISTANCE);
+    let closeness = max(1.0 - height * height, vec4<f32>(0.0));
+    let inside = max(1.0 - in_support, vec4<f32>(0.0));
+    let inside_squared = inside * inside;
+    let full = inside_squared * inside_squared * alignment(abs(cosine)) * closeness * closeness;
+    let weight = select(vec4<f32>(0.0), full, is_used);
+    let signed_weight = select(weight, -weight, cosine < vec4<f32>(0.0));
+    let weighted_x = x * weight;
+    let weighted_y = y * weight;
+    let weighted_z = z * weight;
+    let turned_x = normal_x * signed_weight;
+    let turned_y = normal_y * signed_weight;
+    let turned_z = normal_z * signed_weight;
+    (*sums).weight += sum_in_steps(weight);
+    (*sums).offset += vec3<f32>(sum_in_steps(weighted_x), sum_in_steps(weighted_y), sum_in_steps(weighted_z));
+    (*sums).normal += vec3<f32>(sum_in_steps(turned_x), sum_in_steps(turned_y), sum_in_steps(turned_z));
+    (*sums).offset_dot_normal += sum_in_steps(x * turned_x + y * turned_y + z * turned_z);
+    (*sums).offset_squared += sum_in_steps(x * weighted_x + y * weighted_y + z * weighted_z);
 }
 
-// Returns the weight of a normal by the cosine of its angle to the guide: about exp(-|a - b|^2 / (2/3)^2).
-fn alignment(cosine: f32) -> f32 {
-    let eighth = max(1.0 - (1.0 - cosine) * (NORMAL_FALLOFF / 8.0), 0.0);
+fn sum_in_steps(values: vec4<f32>) -> f32 {
+    let steps = round(values * FIT_STEPS);
+    return (steps.x + steps.y) + (steps.z + steps.w);
+}
+
+// Returns the weights of normals by the cosines of their angles to the guide: about exp(-|a - b|^2 / (2/3)^2).
+fn alignment(cosine: vec4<f32>) -> vec4<f32> {
+    let eighth = max(1.0 - (1.0 - cosine) * (NORMAL_FALLOFF / 8.0), vec4<f32>(0.0));
     let squared = eighth * eighth;
     let fourth = squared * squared;
     return fourth * fourth;

@@ -1,38 +1,49 @@
 // The pass that merges the hits of rays on the instances of one tree into their nearest hits.
 
 @compute @workgroup_size(WORKGROUP_SIZE)
-fn closest(@builtin(global_invocation_id) id: vec3<u32>) {
-    let ray_idx = id.x;
-    if atomicLoad(&counts[FIRST_TAKEN + task.queue]) <= ray_idx {
-        return;
-    }
+fn closest(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) local_idx: u32) {
+    let is_open = id.x < atomicLoad(&counts[FIRST_TAKEN + task.queue]);
     for (var i = 0u; i < task.n_visits; i++) {
         visit_idx = task.first_visit + i;
-        merge_nearer(ray_idx);
+        var ray: Ray;
+        var may_hit = false;
+        if is_open {
+            ray = visiting_ray(id.x);
+            may_hit = ray.t_min <= ray.t_max;
+        }
+        let found = surface_hit_in_group(ray, may_hit, local_idx);
+        if may_hit && found.is_hit {
+            keep_nearer(id.x, found);
+        }
     }
 }
 
-// Replaces the hit of a ray by a nearer one on the instance.
-fn merge_nearer(ray_idx: u32) {
+// Returns a ray in the coordinates of the instance, up to the distance at which its hits count; its range is empty if it
+// misses the box of the instance.
+fn visiting_ray(ray_idx: u32) -> Ray {
     let world_ray = paths[ray_idx].ray;
     let known_distance = hits[ray_idx].distance;
-    let known_instance = hits[ray_idx].instance;
+    var ray = Ray(world_ray.origin, 1.0, world_ray.direction, 0.0);
     if !may_hit_instance(world_ray, min(world_ray.t_max, known_distance)) {
-        return;
+        return ray;
     }
     let scale = object_scale(world_ray);
-    var ray = object_ray(world_ray, scale);
+    ray = object_ray(world_ray, scale);
     // Hits as near as the nearest stay, although their distances were rounded. Discs behind the nearest are blended with
     // it, whatever other instances are between them.
     let limit = scaled_limit(known_distance, scale * (1.0 + 2.0 * EPSILON));
     ray.t_max = min(ray.t_max, min(limit + visits[visit_idx].max_blend_distance, NO_LIMIT));
-    if ray.t_max < ray.t_min {
-        return;
-    }
-    let found = surface_hit(ray);
+    return ray;
+}
+
+// Replaces the hit of a ray by one on the instance, if that is nearer.
+fn keep_nearer(ray_idx: u32, found: SurfaceHit) {
+    let scale = object_scale(paths[ray_idx].ray);
+    let known_distance = hits[ray_idx].distance;
+    let known_instance = hits[ray_idx].instance;
     let distance = found.distance / scale;
     let is_nearer = distance < known_distance || distance == known_distance && visits[visit_idx].instance <= known_instance;
-    if !found.is_hit || !is_nearer {
+    if !is_nearer {
         return;
     }
     var normal = world_normal(found.normal);

@@ -18,9 +18,9 @@ fn support(@builtin(global_invocation_id) id: vec3<u32>) {
     let world_ray = paths[ray_idx].ray;
     let scale = object_scale(world_ray);
     let ray = object_ray(world_ray, scale);
-    let point = slot_point(hit.slot);
     support_position = ray_at(ray, hit.distance * scale);
-    let to_center = point.center - support_position;
+    let point = slot_point(hit.slot, support_position);
+    let to_center = point.center;
     let radius = point.radius / visits[visit_idx].radius_factor;
     if SHAPE == SPHERE || SHAPE == CAPSULE {
         let across = to_center - dot(to_center, ray.direction) * ray.direction;
@@ -32,15 +32,15 @@ fn support(@builtin(global_invocation_id) id: vec3<u32>) {
     nearest_squared = dot(to_center, to_center);
     n_near = 0u;
     let reach = FIT_REACH * max(point.radius, radius);
-    query_box(support_position - reach, support_position + reach);
+    query_box(support_position - reach, support_position + reach, 0.0);
     hits[ray_idx].support_count = n_near;
     hits[ray_idx].support_distance = sqrt(nearest_squared) / radius;
 }
 
 fn visit_region_block(block_idx: u32) {
-    let block = load_block(block_idx);
+    let head = load_head(block_idx);
     for (var lane = 0u; lane < 8u; lane++) {
-        let point = block_point(block, lane, support_position);
+        let point = block_point(block_idx, head, lane, support_position);
         if 0.0 < point.radius {
             let squared = dot(point.center, point.center);
             n_near += select(0u, 1u, squared <= max_squared);

@@ -1,4 +1,4 @@
-// Any hit of a ray that counts.
+// Any hit of a ray on points that are shapes of their own.
 
 var<private> query_ray: Ray;
 var<private> has_hit: bool;
@@ -15,18 +15,10 @@ fn search_limit() -> f32 {
 }
 
 fn visit_block(block_idx: u32) -> bool {
-    let block = load_block(block_idx);
-    for (var lane = 0u; lane < 8u; lane++) {
-        let point = block_point(block, lane, query_ray.origin);
-        if point.radius <= 0.0 {
-            continue;
-        }
-        let distance = intersect_shape(point, query_ray);
-        let is_in_range = 0.0 <= distance && distance <= query_ray.t_max;
-        if is_in_range && accepts_hit(query_ray, distance, 8u * block_idx + lane) {
-            has_hit = true;
-            return true;
-        }
+    let head = load_head(block_idx);
+    for (var half = 0u; half < 2u; half++) {
+        let distances = intersect_four(four_points(block_idx, head, half, query_ray.origin), query_ray);
+        has_hit = has_hit || any((vec4<f32>(0.0) <= distances) & (distances <= vec4<f32>(query_ray.t_max)));
     }
-    return false;
+    return has_hit;
 }

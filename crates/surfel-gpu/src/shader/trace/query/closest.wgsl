@@ -22,17 +22,17 @@ fn search_limit() -> f32 {
 
 // Equally near points are told apart by their slots.
 fn visit_block(block_idx: u32) -> bool {
-    let block = load_block(block_idx);
-    for (var lane = 0u; lane < 8u; lane++) {
-        let point = block_point(block, lane, query_ray.origin);
-        if point.radius <= 0.0 {
-            continue;
-        }
-        let distance = intersect_shape(point, query_ray);
-        let slot = 8u * block_idx + lane;
-        let is_tie = distance == nearest_hit.distance && slot < nearest_hit.slot;
-        if 0.0 <= distance && (distance < nearest_hit.distance || is_tie) {
-            nearest_hit = NearestHit(distance, slot);
+    let head = load_head(block_idx);
+    for (var half = 0u; half < 2u; half++) {
+        let distances = intersect_four(four_points(block_idx, head, half, query_ray.origin), query_ray);
+        let first_slot = 8u * block_idx + 4u * half;
+        for (var lane = 0u; lane < 4u; lane++) {
+            let distance = distances[lane];
+            let slot = first_slot + lane;
+            let is_tie = distance == nearest_hit.distance && slot < nearest_hit.slot;
+            if 0.0 <= distance && (distance < nearest_hit.distance || is_tie) {
+                nearest_hit = NearestHit(distance, slot);
+            }
         }
     }
     return false;

@@ -16,13 +16,15 @@ fn is_enclosed(hit: CandidateHit, rejects_backfaces: bool) -> bool {
 fn evaluate_neighborhood(hit: CandidateHit) {
     neighborhood = no_neighbors(hit);
     let reach = NEIGHBORHOOD_RADIUS_FACTOR * hit.radius;
-    query_box(hit.position - reach, hit.position + reach);
+    query_box(hit.position - reach, hit.position + reach, 0.0);
 }
 
 fn add_neighbors(block_idx: u32) {
-    let block = load_block(block_idx);
-    for (var lane = 0u; lane < 8u; lane++) {
-        let point = block_point(block, lane, neighborhood.hit.position);
+    let head = load_head(block_idx);
+    let position = neighborhood.hit.position;
+    let reach = NEIGHBORHOOD_RADIUS_FACTOR * neighborhood.hit.radius;
+    for (var lanes = lanes_within(block_idx, head, position, reach * reach); lanes != 0u; lanes &= lanes - 1u) {
+        let point = block_point(block_idx, head, firstTrailingBit(lanes), position);
         if 0.0 < point.radius && is_neighbor(neighborhood.hit, point.center) {
             add_neighbor(&neighborhood, point.center, point.normal);
         }

@@ -11,7 +11,7 @@ fn surface_hit(whole_ray: Ray) -> SurfaceHit {
         if !found.is_hit {
             break;
         }
-        let point = slot_point(found.slot);
+        let point = slot_point(found.slot, ray.origin);
         let squared = dot(found.normal, found.normal);
         var normal = normalize(point.normal);
         if 1e-30 < squared {

@@ -33,9 +33,13 @@ fn visit_region_block(block_idx: u32) {
         return;
     }
     let max_squared = (MLS_SUPPORT + LIST_MARGIN) * (MLS_SUPPORT + LIST_MARGIN);
-    let block = load_block(block_idx);
-    for (var lane = 0u; lane < 8u; lane++) {
-        let point = block_point(block, lane, listed_position);
+    let head = load_head(block_idx);
+    // The exact test follows, in radii.
+    let max_distance = (MLS_SUPPORT + LIST_MARGIN) * (1.0 + 8.0 * EPSILON) * ball_radius;
+    var lanes = lanes_within(block_idx, head, listed_position, max_distance * max_distance);
+    for (; lanes != 0u; lanes &= lanes - 1u) {
+        let lane = firstTrailingBit(lanes);
+        let point = block_point(block_idx, head, lane, listed_position);
         let listed = point.center * (1.0 / ball_radius);
         if 0.0 < point.radius && dot(listed, listed) < max_squared {
             add_listed_point(listed - fit_shift, point.radius, 8u * block_idx + lane);
@@ -78,7 +82,7 @@ fn query_listed(task: u32, ray: Ray, behind: f32) {
     question = task;
     fit_shift = ray.direction * (behind / ball_radius);
     let reach = (MLS_SUPPORT + LIST_MARGIN) * ball_radius;
-    query_box(listed_position - reach, listed_position + reach);
+    query_box(listed_position - reach, listed_position + reach, 0.0);
     question = NEIGHBORS;
 }
 

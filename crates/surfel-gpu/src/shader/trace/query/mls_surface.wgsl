@@ -7,7 +7,7 @@ fn surface_hit(whole_ray: Ray) -> SurfaceHit {
         if nearest.slot == NONE {
             break;
         }
-        let radius = slot_point(nearest.slot).radius;
+        let radius = slot_point(nearest.slot, ray.origin).radius;
         let found = find_surface(whole_ray, nearest.distance, radius);
         if found.is_hit {
             return finished_hit(whole_ray, found, radius);
@@ -27,6 +27,6 @@ fn finished_hit(ray: Ray, found: MlsHit, ball_radius: f32) -> SurfaceHit {
     if 0.0 < color_sum.w {
         color = color_sum.xyz / color_sum.w;
     }
-    let is_backface = 0.0 < dot(slot_point(nearest_slot).normal, ray.direction);
+    let is_backface = 0.0 < dot(slot_point(nearest_slot, ray.origin).normal, ray.direction);
     return point_hit(found.distance, nearest_slot, radius, found.normal, color, is_backface);
 }

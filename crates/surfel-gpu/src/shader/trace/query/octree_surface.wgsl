@@ -18,7 +18,7 @@ fn surface_hit(ray: Ray) -> SurfaceHit {
         normal = cell_plane(nearest.cell_idx).xyz;
     }
     normal = select(normal, -normal, 0.0 < dot(normal, ray.direction));
-    let point = slot_point(slot);
+    let point = slot_point(slot, ray.origin);
     // New rays keep their distance from cells that are larger than the discs.
     let radius = max(point.radius, nearest.cube.size);
     let is_backface = 0.0 < dot(point.normal, ray.direction);

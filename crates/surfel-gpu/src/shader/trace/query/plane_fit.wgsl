@@ -37,8 +37,7 @@ fn is_nearer_center(squared: f32, slot: u32, other: f32, other_slot: u32) -> boo
 
 // Returns the centre of a disc relative to a hit, in radii.
 fn center_offset(slot: u32, position: vec3<f32>, radius: f32) -> vec3<f32> {
-    let point = block_point(load_block(slot >> 3u), slot & 7u, position);
-    return point.center / radius;
+    return slot_point(slot, position).center / radius;
 }
 
 // Returns the normal of the plane through the discs' centres, on the side of `facing_normal`, which it is where the

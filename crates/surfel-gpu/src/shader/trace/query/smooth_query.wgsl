@@ -4,8 +4,10 @@
 const FIT: u32 = 0u;
 const FINISH: u32 = 1u;
 const NEIGHBORS: u32 = 2u;
+// Distance in radii between the first fit and later ones up to which they find their points in the same list.
+const FIT_MARGIN: f32 = 0.25;
 
-var<private> question: u32;
+var<private> question: u32 = NEIGHBORS;
 var<private> sphere_sums: SphereSums;
 var<private> overhang: OverhangSums;
 var<private> colors: ColorSums;
@@ -13,6 +15,8 @@ var<private> nearest_squared: f32;
 var<private> nearest_slot: u32;
 // The position that points are relative to.
 var<private> fit_position: vec3<f32>;
+// Square of the distance from this position beyond which no point counts.
+var<private> fit_max_squared: f32;
 
 struct SmoothHit {
     is_hit: bool,
@@ -25,15 +29,17 @@ fn visit_region_block(block_idx: u32) {
         add_neighbors(block_idx);
         return;
     }
-    let block = load_block(block_idx);
-    for (var lane = 0u; lane < 8u; lane++) {
-        let point = block_point(block, lane, fit_position);
+    let head = load_head(block_idx);
+    if question == FIT {
+        add_fit_points(&sphere_sums, four_points(block_idx, head, 0u, fit_position));
+        add_fit_points(&sphere_sums, four_points(block_idx, head, 1u, fit_position));
+        return;
+    }
+    for (var lanes = lanes_within(block_idx, head, fit_position, fit_max_squared); lanes != 0u; lanes &= lanes - 1u) {
+        let lane = firstTrailingBit(lanes);
+        let point = block_point(block_idx, head, lane, fit_position);
         if 0.0 < point.radius {
-            if question == FIT {
-                add_fit_point(&sphere_sums, fit_point(point));
-            } else {
-                finish_with_point(point, 8u * block_idx + lane);
-            }
+            finish_with_point(point, 8u * block_idx + lane);
         }
     }
 }
@@ -64,7 +70,10 @@ fn finish_with_point(point: Point, slot: u32) {
 fn query_points(task: u32, position: vec3<f32>, radius: f32) {
     question = task;
     fit_position = position;
-    query_box(position - FIT_REACH * radius, position + FIT_REACH * radius);
+    let reach = FIT_REACH * radius;
+    // The exact test follows, in radii.
+    fit_max_squared = reach * reach * (1.0 + 8.0 * EPSILON);
+    query_box(position - reach, position + reach, FIT_MARGIN * radius);
     question = NEIGHBORS;
 }
 

@@ -8,8 +8,9 @@ fn splat(ray: Ray) -> SurfaceHit {
     if n_gathered == 0u {
         return missed_surface();
     }
-    nearest_distance = gathered_distances[0];
-    let nearest_slot = gathered_slots[0];
+    let nearest_idx = nearest_disc();
+    nearest_distance = gathered_distances[nearest_idx];
+    let nearest_slot = gathered_slots[nearest_idx];
     let nearest = slot_surfel(nearest_slot);
     if visits[visit_idx].gathers_to_nearest == 1u {
         drop_beyond(nearest_distance + nearest.radius);
