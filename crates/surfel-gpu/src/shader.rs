@@ -180,8 +180,9 @@ const LIGHTS: &[&str] = parts!["scene/light.wgsl", "scene/environment.wgsl"];
 const SPECULAR: &[&str] = parts!["integrator/specular.wgsl"];
 const SHADING: &[&str] =
     parts!["scene/texture.wgsl", "integrator/shading.wgsl", "integrator/media.wgsl"];
-const SHADE: &[&str] = parts!["integrator/background.wgsl", "integrator/whitted.wgsl"];
-const DIRECT: &[&str] = parts!["integrator/direct.wgsl"];
+const SHADE: &[&str] =
+    parts!["render/slot.wgsl", "integrator/background.wgsl", "integrator/whitted.wgsl"];
+const DIRECT: &[&str] = parts!["render/slot.wgsl", "integrator/direct.wgsl"];
 const TRANSMITTANCE: &[&str] = parts!["integrator/transmittance.wgsl"];
 const ARRAYS: &[&str] = parts!["flat/arrays.wgsl"];
 const PAGED_ARRAYS: &[&str] = parts!["flat/paged_arrays.wgsl"];
