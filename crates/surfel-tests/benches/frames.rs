@@ -7,6 +7,7 @@
 #![expect(clippy::print_stdout, reason = "a benchmark prints its figures")]
 
 use std::path::Path;
+use std::time::Instant;
 use surfel_core::flat::FlatScene;
 use surfel_core::math::{DQuat, DVec3, Vec3};
 use surfel_core::points::PointCloud;
@@ -33,6 +34,13 @@ struct Options {
     with_kernels: bool,
 }
 
+/// A picture.
+struct Frame {
+    /// Seconds by the wall.
+    secs: f64,
+    stats: RenderStats,
+}
+
 /// A camera and the place of the sun.
 struct View {
     camera: Camera,
@@ -50,7 +58,8 @@ fn main() {
         let view = view("500,-700,420,500,250,20,40,0,0,900");
         return measure_surfaces(&waves(1000, 0.0), &view, &options);
     }
-    let is_value = |i: usize| 0 < i && args[i - 1].starts_with("--") && args[i - 1] != "--kernels";
+    let has_value = |arg: &String| arg.starts_with("--") && arg != "--kernels" && arg != "--bench";
+    let is_value = |i: usize| i.checked_sub(1).is_some_and(|before| has_value(&args[before]));
     let files = args.iter().enumerate().filter(|(i, arg)| !arg.starts_with("--") && !is_value(*i));
     let files: Vec<&String> = files.map(|(_, arg)| arg).collect();
     let [cloud, camera] = files[..] else {
@@ -150,20 +159,22 @@ fn sun(view: &View, turn_rad: f64) -> Light {
 
 /// Prints the time of frames: of equal ones, and of those after a change of the light and of the camera.
 fn measure(renderer: &dyn Renderer, mut flat: FlatScene, view: &View, options: &Options) {
-    let render = |flat: &FlatScene| -> RenderStats {
-        renderer.render(flat, &options.settings, &NoProgress).unwrap().1
+    let render = |flat: &FlatScene| -> Frame {
+        let start = Instant::now();
+        let (_, stats) = renderer.render(flat, &options.settings, &NoProgress).unwrap();
+        Frame { secs: start.elapsed().as_secs_f64(), stats }
     };
     render(&flat);
-    let runs: Vec<RenderStats> = (0..options.n_runs).map(|_| render(&flat)).collect();
+    let runs: Vec<Frame> = (0..options.n_runs).map(|_| render(&flat)).collect();
     let turns = (1..=options.n_runs).map(|i| 0.02 * i as f64);
-    let lit: Vec<RenderStats> = turns
+    let lit: Vec<Frame> = turns
         .clone()
         .map(|turn| {
             flat.lights[0] = sun(view, turn);
             render(&flat)
         })
         .collect();
-    let seen: Vec<RenderStats> = turns
+    let seen: Vec<Frame> = turns
         .map(|turn| {
             let Camera { position, focal_point, .. } = view.camera;
             let turned = DQuat::from_rotation_z(turn) * (position - focal_point);
@@ -171,18 +182,18 @@ fn measure(renderer: &dyn Renderer, mut flat: FlatScene, view: &View, options: &
             render(&flat)
         })
         .collect();
-    let frame = |stats: &RenderStats| 1e3 * stats.frame_secs;
-    let [median, _] = print("frame", &runs, frame);
-    let work = |stats: &RenderStats| 1e3 * (stats.frame_secs - stats.transfer_secs);
+    let whole = |frame: &Frame| 1e3 * frame.secs;
+    let [median, _] = print("frame", &runs, whole);
+    let work = |frame: &Frame| 1e3 * (frame.secs - frame.stats.transfer_secs);
     print("without transfer", &runs, work);
-    print("after a change of light", &lit, frame);
-    print("after a change of camera", &seen, frame);
-    let mrays_per_s = runs[0].rays.total() as f64 / median / 1e3;
+    print("after a change of light", &lit, whole);
+    print("after a change of camera", &seen, whole);
+    let mrays_per_s = runs[0].stats.rays.total() as f64 / median / 1e3;
     println!("  {:.1} frames/s, {mrays_per_s:.1} million rays/s", 1e3 / median);
 }
 
 /// Prints and returns the median and the least of the times of pictures in milliseconds.
-fn print(name: &str, runs: &[RenderStats], millis: impl Fn(&RenderStats) -> f64) -> [f64; 2] {
+fn print(name: &str, runs: &[Frame], millis: impl Fn(&Frame) -> f64) -> [f64; 2] {
     let mut times: Vec<f64> = runs.iter().map(millis).collect();
     times.sort_by(f64::total_cmp);
     let [median, least] = [times[times.len() / 2], times[0]];
@@ -193,12 +204,14 @@ fn print(name: &str, runs: &[RenderStats], millis: impl Fn(&RenderStats) -> f64)
 /// Renders the first picture, and prints how its points went to the GPU.
 fn print_upload(gpu: &GpuRenderer, flat: &FlatScene, options: &Options) {
     let before = gpu.upload_time();
-    let (_, first) = gpu.render(flat, &options.settings, &NoProgress).unwrap();
+    let start = Instant::now();
+    gpu.render(flat, &options.settings, &NoProgress).unwrap();
+    let first_secs = start.elapsed().as_secs_f64();
     let after = gpu.upload_time();
     let (secs, gigabytes) =
         (after.secs - before.secs, (after.n_bytes - before.n_bytes) as f64 / 1e9);
     println!("  upload {gigabytes:.3} GB in {secs:.3} s, {:.2} GB/s", gigabytes / secs.max(1e-9));
-    println!("  first frame {:.1} ms", 1e3 * first.frame_secs);
+    println!("  first frame {:.1} ms", 1e3 * first_secs);
 }
 
 /// Prints the work of each kernel in one picture.
