@@ -99,8 +99,7 @@ impl Timestamps {
             encoder.resolve_query_set(&self.queries, 0..n, &self.resolved, 0);
             encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, n_bytes);
         });
-        let (ticks, _) =
-            readback.read(gpu, |bytes| bytemuck::pod_collect_to_vec::<_, u64>(bytes))?;
+        let (ticks, _) = readback.read(gpu, bytemuck::pod_collect_to_vec::<_, u64>)?;
         let secs_of_tick = 1e-9 * f64::from(gpu.queue.get_timestamp_period());
         let passes = ticks.windows(2);
         Ok(passes.map(|pair| pair[1].saturating_sub(pair[0]) as f64 * secs_of_tick).collect())

@@ -19,8 +19,9 @@ use surfel_core::scene::{
 use surfel_core::surface::{EdgeTest, SurfaceKind};
 use surfel_formats::LoadOptions;
 use surfel_gpu::GpuRenderer;
+use surfel_tests::backends;
 use surfel_tests::clouds::waves;
-use surfel_tests::{backends, scenes};
+use surfel_tests::scenes;
 
 /// Distance of the farthest things that darken the sky, as a fraction of the diagonal of the cloud's bounding box.
 const AO_FRACTION: f32 = 0.1;
@@ -161,7 +162,8 @@ fn sun(view: &View, turn_rad: f64) -> Light {
 fn measure(renderer: &dyn Renderer, mut flat: FlatScene, view: &View, options: &Options) {
     let render = |flat: &FlatScene| -> Frame {
         let start = Instant::now();
-        let (_, stats) = renderer.render(flat, &options.settings, &NoProgress).unwrap();
+        // The time to free the image does not count.
+        let (_image, stats) = renderer.render(flat, &options.settings, &NoProgress).unwrap();
         Frame { secs: start.elapsed().as_secs_f64(), stats }
     };
     render(&flat);
