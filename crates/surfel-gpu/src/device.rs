@@ -52,6 +52,9 @@ impl DeviceKind {
 const VECTOR_BYTES: u64 = 16;
 /// Number of storage buffers that a kernel uses at most, where trees are whole.
 const N_STORAGE_BUFFERS: u64 = 10;
+/// The features by which the time of each pass can be measured.
+const TIMING: wgpu::Features =
+    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
 /// Time after which a device that does not finish a piece of work counts as hung. Pieces take far less than a second.
 const WAIT_TIMEOUT: Duration = Duration::from_secs(60);
 
@@ -144,6 +147,7 @@ impl Gpu {
         check_limits(&info, &limits)?;
         let description = wgpu::DeviceDescriptor {
             label: Some("surfel"),
+            required_features: adapter.features() & TIMING,
             required_limits: limits,
             memory_hints: wgpu::MemoryHints::Performance,
             ..wgpu::DeviceDescriptor::default()
@@ -179,6 +183,11 @@ impl Gpu {
         N_STORAGE_BUFFERS - 1 + n_pages <= u64::from(n_allowed)
     }
 
+    /// Returns true if the time of each pass can be measured.
+    pub fn has_timestamps(&self) -> bool {
+        self.device.features().contains(TIMING)
+    }
+
     /// Fails if the device has failed since it was opened.
     pub fn check(&self) -> Result<()> {
         let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
@@ -187,7 +196,16 @@ impl Gpu {
 
     /// Waits until the device has done what it was told.
     pub fn wait(&self) -> Result<()> {
-        let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(WAIT_TIMEOUT) };
+        self.wait_until(None)
+    }
+
+    /// Waits until the device has done a submission and all before it.
+    pub fn wait_for(&self, submission: &wgpu::SubmissionIndex) -> Result<()> {
+        self.wait_until(Some(submission.clone()))
+    }
+
+    fn wait_until(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<()> {
+        let wait = wgpu::PollType::Wait { submission_index, timeout: Some(WAIT_TIMEOUT) };
         let polled = self.device.poll(wait);
         self.check()?;
         polled.map(drop).map_err(|_| {

@@ -13,7 +13,7 @@ use crate::shader::{Kernel, Surface};
 use crate::tree_visits::lone_visit;
 use crate::unsupported::trees;
 use crate::upload::{GpuTree, TreeRef, Uploads};
-use crate::wavefront::{Capacities, Contents, RECORD_STRIDE, Wavefront, written};
+use crate::wavefront::{Arrays, Capacities, Contents, RECORD_STRIDE, Wavefront, written};
 use bytemuck::Zeroable;
 use std::sync::Arc;
 use std::time::Instant;
@@ -67,7 +67,7 @@ pub struct Timing<'a> {
 pub fn time(
     gpu: &Gpu,
     kernels: &mut Kernels,
-    uploads: &mut Uploads,
+    (uploads, arrays): (&mut Uploads, &mut Option<Arrays>),
     timing: Timing,
     progress: &dyn Progress,
 ) -> surfel_core::Result<RayTimes> {
@@ -88,8 +88,11 @@ pub fn time(
     let of_trees = searches.iter().map(|search| (search.kernel, is_paged(search)));
     kernels.compile(gpu, own.into_iter().chain(of_trees))?;
     let kernels = &*kernels;
+    let n = timing.rays.len().min(MAX_RAYS) as u32;
+    let sizes = Capacities { n_pixels: n, n_entries: n, has_waves: false, is_transmissive: false };
+    let arrays = Arrays::update(arrays, gpu, sizes)?;
     for rays in timing.rays.chunks(MAX_RAYS) {
-        let chunk = Chunk::new(gpu, kernels, &searches, rays)?;
+        let chunk = Chunk::new(gpu, (kernels, arrays), &searches, rays)?;
         let visits: Vec<Visit> = searches.iter().map(|search| search.visit).collect();
         let bytes = bytemuck::cast_slice(&visits);
         let visits = written(gpu, "instances", bytes, wgpu::BufferUsages::STORAGE)?;
@@ -158,18 +161,21 @@ fn searches(geometry: &FlatGeometry, query: TimedQuery) -> Vec<Search> {
 }
 
 /// Rays on a device.
-struct Chunk {
-    wavefront: Wavefront,
+struct Chunk<'a> {
+    wavefront: Wavefront<'a>,
     paths: Vec<Path>,
     clear: Vec<Pass>,
     searches: Vec<Pass>,
 }
 
-impl Chunk {
-    fn new(gpu: &Gpu, kernels: &Kernels, searches: &[Search], rays: &[Ray]) -> Result<Self> {
+impl<'a> Chunk<'a> {
+    fn new(
+        gpu: &Gpu,
+        (kernels, arrays): (&Kernels, &'a Arrays),
+        searches: &[Search],
+        rays: &[Ray],
+    ) -> Result<Self> {
         let n = rays.len() as u32;
-        let sizes =
-            Capacities { n_pixels: n, n_entries: n, has_waves: false, is_transmissive: false };
         let mut tasks = Vec::new();
         let mut pass = |kernel: Kernel, size, task: Task| {
             let task_offset = tasks.len() as u32;
@@ -191,7 +197,7 @@ impl Chunk {
         let records = SceneRecords::empty();
         let words = written(gpu, "textures", &[0; 4], wgpu::BufferUsages::STORAGE)?;
         let contents = Contents { scene: &records, words: &words, tasks: &tasks };
-        let wavefront = Wavefront::new(gpu, kernels, sizes, contents)?;
+        let wavefront = Wavefront::new(gpu, kernels, arrays, contents)?;
         wavefront.set_frame(gpu, &FrameRecord { n_rays: n, capacity: n, ..Zeroable::zeroed() });
         let path = |ray: &Ray| Path {
             ray: Ray { t_max: ray.t_max.min(NO_LIMIT), ..*ray },

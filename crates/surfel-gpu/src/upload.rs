@@ -9,6 +9,7 @@ use crate::mesh_blocks::mesh_blocks;
 use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
 use crate::unsupported::trees;
 use std::sync::{Arc, Weak};
+use std::time::Instant;
 use surfel_core::bvh::BvhNode;
 use surfel_core::flat::FlatGeometry;
 
@@ -74,6 +75,25 @@ pub struct Uploads {
     geometries: Vec<(Weak<FlatGeometry>, GpuGeometry)>,
     /// The trained Gaussians of these geometries in one tree.
     gaussians: Option<(Vec<Weak<FlatGeometry>>, GpuTree)>,
+    /// The work so far.
+    pub time: UploadTime,
+}
+
+/// Bytes that went to a device, and the time that this took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UploadTime {
+    /// Number of bytes.
+    pub n_bytes: u64,
+    /// Seconds, with the time in which the CPU laid the bytes out.
+    pub secs: f64,
+}
+
+impl UploadTime {
+    fn add<'t>(&mut self, start: Instant, trees: impl IntoIterator<Item = &'t GpuTree>) {
+        let buffers = trees.into_iter().flat_map(|tree| tree.nodes.iter().chain(&tree.blocks));
+        self.n_bytes += buffers.map(wgpu::Buffer::size).sum::<u64>();
+        self.secs += start.elapsed().as_secs_f64();
+    }
 }
 
 impl Uploads {
@@ -86,7 +106,9 @@ impl Uploads {
         self.geometries.retain(|(geometry, _)| geometry.strong_count() != 0);
         for geometry in geometries {
             if self.position(geometry).is_none() {
+                let start = Instant::now();
                 let uploaded = upload(gpu, geometry)?;
+                self.time.add(start, uploaded.iter().flatten());
                 self.geometries.push((Arc::downgrade(geometry), uploaded));
             }
         }
@@ -104,8 +126,10 @@ impl Uploads {
             self.gaussians = known;
             return Ok(());
         }
+        let start = Instant::now();
         let arrays = GaussianArrays::new(geometries);
         if let Some(tree) = upload_tree(gpu, &arrays.nodes, &[], &arrays.blocks)? {
+            self.time.add(start, [&tree]);
             self.gaussians = Some((clouds.into_iter().map(Arc::downgrade).collect(), tree));
         }
         Ok(())
