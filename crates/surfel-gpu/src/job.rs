@@ -8,7 +8,7 @@ use crate::kernels::Kernels;
 use crate::part_size::next_part;
 use crate::passes::{Pass, PassStage, Passes};
 use crate::pixel_order::{PixelOrder, set_pixels};
-use crate::records::{FrameRecord, HitRecord, ShadingPointRecord};
+use crate::records::{FrameRecord, HitRecord};
 use crate::scene_records::{SceneRecords, frame};
 use crate::submitter::{Bound, BoundTree, Submitter};
 use crate::upload::{TreeRef, Uploads};
@@ -164,7 +164,8 @@ impl Job<'_> {
     fn sizes(&self, n_pixels: u32) -> Capacities {
         let n_pixels = u64::from(n_pixels);
         let has_waves = self.passes.next_wave.is_some();
-        let fitting = self.gpu.info.max_array_bytes / size_of::<ShadingPointRecord>() as u64;
+        // A hit is the largest entry.
+        let fitting = self.gpu.info.max_array_bytes / size_of::<HitRecord>() as u64;
         let max_entries = fitting.min(MAX_ENTRIES.into());
         let (wanted, per_pixel) = match has_waves {
             true => {
