@@ -73,7 +73,7 @@ fn no_polynomial_points(normal: vec3<f32>) -> PolynomialSums {
 }
 
 // Adds a point at `offset` from the position. There are no loops, which would keep the sums in memory.
-fn add_polynomial_point(sums: ptr<private, PolynomialSums>, offset: vec3<f32>, weight: f32) {
+fn add_polynomial_point(sums: ptr<function, PolynomialSums>, offset: vec3<f32>, weight: f32) {
     let u = dot((*sums).tangent, offset) * (1.0 / MLS_SUPPORT);
     let v = dot((*sums).bitangent, offset) * (1.0 / MLS_SUPPORT);
     let height = dot((*sums).normal, offset);
@@ -110,7 +110,7 @@ fn add_polynomial_point(sums: ptr<private, PolynomialSums>, offset: vec3<f32>, w
 
 // Adds what the fit of a polynomial of degree 3 needs beside that of one of degree 2.
 fn add_cubic_point(
-    sums: ptr<private, PolynomialSums>,
+    sums: ptr<function, PolynomialSums>,
     uv: vec2<f32>,
     height: f32,
     cube: vec4<f32>,

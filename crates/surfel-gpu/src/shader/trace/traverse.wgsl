@@ -3,58 +3,64 @@
 // Children that wait to be visited, siblings together: the index of their first sibling, their lanes in the order of
 // distance with three bits each below their number, and the least of their distances.
 var<private> waiting: array<vec3<u32>, MAX_DEPTH>;
-var<private> n_waiting: u32;
 const COUNT_SHIFT: u32 = 24u;
 
 // Index of the root.
 var<private> root_node: u32;
 
-// The ray, and the node that it visits.
-var<private> slabs: SlabRay;
-var<private> visited_node: u32;
-// Children of this node that are still to be visited, if the way was interrupted.
-var<private> visited_keys: ChildKeys;
-var<private> is_interrupted: bool;
-// Lanes of its child nodes in the order of distance, their number, and the keys of the first two.
-var<private> ahead_lanes: u32;
-var<private> n_ahead: u32;
-var<private> first_ahead: u32;
-var<private> second_ahead: u32;
-
-// Calls `visit_block` for the blocks whose boxes the ray enters before `search_limit()`, until it returns true.
-fn traverse(ray: Ray) {
-    start_traversal(ray);
-    _ = continue_traversal();
+// The state of a traversal. What searches keep in variables of functions stays in registers.
+struct Traversal {
+    slabs: SlabRay,
+    node_idx: u32,
+    n_waiting: u32,
+    // Children of the node that are still to be visited, if the traversal was interrupted there.
+    keys: ChildKeys,
+    is_interrupted: bool,
+    // Lanes of its child nodes in the order of distance, their number, and the keys of the first two.
+    lanes_ahead: u32,
+    n_ahead: u32,
+    first_ahead: u32,
+    second_ahead: u32,
 }
 
-fn start_traversal(ray: Ray) {
-    slabs = slab_ray(load_node(root_node), ray);
-    n_waiting = 0u;
-    visited_node = root_node;
-    is_interrupted = false;
+// Calls `visit_block` for the blocks whose boxes the ray enters before `search_limit`, until it returns true. Each query
+// has a structure `Search` of its own, which both take.
+fn traverse(ray: Ray, search: ptr<function, Search>) {
+    var traversal = start_traversal(ray);
+    _ = continue_traversal(&traversal, search);
+}
+
+fn start_traversal(ray: Ray) -> Traversal {
+    var traversal: Traversal;
+    traversal.slabs = slab_ray(load_node(root_node), ray);
+    traversal.node_idx = root_node;
+    return traversal;
 }
 
 // Goes on until `visit_block` returns true. Returns false at the end of the way.
-fn continue_traversal() -> bool {
+fn continue_traversal(traversal: ptr<function, Traversal>, search: ptr<function, Search>) -> bool {
     loop {
-        let node = load_node(visited_node);
-        if !is_interrupted {
-            visited_keys = entered_children(node, slabs, search_limit());
-            ahead_lanes = 0u;
-            n_ahead = 0u;
+        let node = load_node((*traversal).node_idx);
+        if !(*traversal).is_interrupted {
+            (*traversal).keys = entered_children(node, (*traversal).slabs, search_limit(search));
+            (*traversal).lanes_ahead = 0u;
+            (*traversal).n_ahead = 0u;
         }
-        is_interrupted = visit_children(node);
-        if is_interrupted {
+        (*traversal).is_interrupted = visit_children(node, traversal, search);
+        if (*traversal).is_interrupted {
             return true;
         }
-        if n_ahead != 0u && !is_behind_limit(first_ahead) {
+        let n_ahead = (*traversal).n_ahead;
+        if n_ahead != 0u && key_distance((*traversal).first_ahead) <= search_limit(search) {
+            let lanes = (*traversal).lanes_ahead;
+            let n_waiting = (*traversal).n_waiting;
             if n_ahead != 1u && n_waiting < MAX_DEPTH {
-                let rest = (ahead_lanes >> 3u) | ((n_ahead - 1u) << COUNT_SHIFT);
-                waiting[n_waiting] = vec3<u32>(node.first_node, rest, second_ahead);
-                n_waiting += 1u;
+                let rest = (lanes >> 3u) | ((n_ahead - 1u) << COUNT_SHIFT);
+                waiting[n_waiting] = vec3<u32>(node.first_node, rest, (*traversal).second_ahead);
+                (*traversal).n_waiting = n_waiting + 1u;
             }
-            visited_node = node.first_node + (ahead_lanes & LANE_MASK);
-        } else if !take_waiting() {
+            (*traversal).node_idx = node.first_node + (lanes & LANE_MASK);
+        } else if !take_waiting(traversal, search_limit(search)) {
             return false;
         }
     }
@@ -62,55 +68,58 @@ fn continue_traversal() -> bool {
 }
 
 // Visits the blocks among the children of a node and notes the nodes among them. Returns true if a block interrupts.
-fn visit_children(node: Node) -> bool {
+fn visit_children(node: Node, traversal: ptr<function, Traversal>, search: ptr<function, Search>) -> bool {
     let n_nodes = n_child_nodes(node);
     loop {
-        let key = nearest_key(visited_keys);
+        let key = nearest_key((*traversal).keys);
         if key == NO_CHILD {
             return false;
         }
-        visited_keys = without_key(visited_keys, key);
+        (*traversal).keys = without_key((*traversal).keys, key);
         let lane = key & LANE_MASK;
         if n_nodes <= lane {
-            if is_behind_limit(key) {
+            if search_limit(search) < key_distance(key) {
                 return false;
             }
-            if visit_block(child_block(node, lane)) {
+            if visit_block(child_block(node, lane), search) {
                 return true;
             }
             continue;
         }
-        ahead_lanes |= lane << (3u * n_ahead);
-        first_ahead = select(first_ahead, key, n_ahead == 0u);
-        second_ahead = select(second_ahead, key, n_ahead == 1u);
-        n_ahead += 1u;
+        let n_ahead = (*traversal).n_ahead;
+        (*traversal).lanes_ahead |= lane << (3u * n_ahead);
+        (*traversal).first_ahead = select((*traversal).first_ahead, key, n_ahead == 0u);
+        (*traversal).second_ahead = select((*traversal).second_ahead, key, n_ahead == 1u);
+        (*traversal).n_ahead = n_ahead + 1u;
     }
     return false;
 }
 
-// Goes to the next child that waits. Returns false if there is none.
-fn take_waiting() -> bool {
+// Goes to the next child that waits and is not beyond the limit of the search. Returns false if there is none.
+fn take_waiting(traversal: ptr<function, Traversal>, limit: f32) -> bool {
+    var n_waiting = (*traversal).n_waiting;
     loop {
         if n_waiting == 0u {
             return false;
         }
         n_waiting -= 1u;
-        if !is_behind_limit(waiting[n_waiting].z) {
+        if key_distance(waiting[n_waiting].z) <= limit {
             break;
         }
     }
     let siblings = waiting[n_waiting];
-    visited_node = siblings.x + (siblings.y & LANE_MASK);
+    (*traversal).node_idx = siblings.x + (siblings.y & LANE_MASK);
     let n_left = (siblings.y >> COUNT_SHIFT) - 1u;
     if n_left != 0u {
         let rest = (siblings.y & ((1u << COUNT_SHIFT) - 1u)) >> 3u;
         waiting[n_waiting].y = rest | (n_left << COUNT_SHIFT);
         n_waiting += 1u;
     }
+    (*traversal).n_waiting = n_waiting;
     return true;
 }
 
-// Returns true if a child is entered beyond the limit of the search.
-fn is_behind_limit(key: u32) -> bool {
-    return search_limit() < bitcast<f32>(key & ~LANE_MASK);
+// Returns the distance at which a child is entered.
+fn key_distance(key: u32) -> f32 {
+    return bitcast<f32>(key & ~LANE_MASK);
 }

@@ -6,34 +6,38 @@ struct NearestHit {
     slot: u32,
 }
 
-var<private> query_ray: Ray;
-var<private> nearest_hit: NearestHit;
-
-fn closest_hit(ray: Ray) -> NearestHit {
-    query_ray = ray;
-    nearest_hit = NearestHit(ray.t_max, NONE);
-    traverse(ray);
-    return nearest_hit;
+struct Search {
+    ray: Ray,
+    nearest: NearestHit,
 }
 
-fn search_limit() -> f32 {
-    return nearest_hit.distance;
+fn closest_hit(ray: Ray) -> NearestHit {
+    var search = Search(ray, NearestHit(ray.t_max, NONE));
+    traverse(ray, &search);
+    return search.nearest;
+}
+
+fn search_limit(search: ptr<function, Search>) -> f32 {
+    return (*search).nearest.distance;
 }
 
 // Equally near points are told apart by their slots.
-fn visit_block(block_idx: u32) -> bool {
+fn visit_block(block_idx: u32, search: ptr<function, Search>) -> bool {
+    let ray = (*search).ray;
+    var nearest = (*search).nearest;
     let head = load_head(block_idx);
     for (var half = 0u; half < 2u; half++) {
-        let distances = intersect_four(four_points(block_idx, head, half, query_ray.origin), query_ray);
+        let distances = intersect_four(four_points(block_idx, head, half, ray.origin), ray);
         let first_slot = 8u * block_idx + 4u * half;
         for (var lane = 0u; lane < 4u; lane++) {
             let distance = distances[lane];
             let slot = first_slot + lane;
-            let is_tie = distance == nearest_hit.distance && slot < nearest_hit.slot;
-            if 0.0 <= distance && (distance < nearest_hit.distance || is_tie) {
-                nearest_hit = NearestHit(distance, slot);
+            let is_tie = distance == nearest.distance && slot < nearest.slot;
+            if 0.0 <= distance && (distance < nearest.distance || is_tie) {
+                nearest = NearestHit(distance, slot);
             }
         }
     }
+    (*search).nearest = nearest;
     return false;
 }

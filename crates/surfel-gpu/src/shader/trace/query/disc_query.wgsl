@@ -1,7 +1,10 @@
 // The nearest disc on a ray.
 
+var<private> nearest_hit: NearestHit;
+
 fn splat(ray: Ray) -> SurfaceHit {
     let nearest = closest_hit(ray);
+    nearest_hit = nearest;
     if nearest.slot == NONE {
         return missed_surface();
     }

@@ -1,9 +1,5 @@
 // The filter by which only hits within the edge of the surface count.
 
-fn visit_region_block(block_idx: u32) {
-    add_neighbors(block_idx);
-}
-
 fn accepts_hit(ray: Ray, distance: f32, slot: u32) -> bool {
     if visits[visit_idx].has_edge_test == 0u {
         return true;

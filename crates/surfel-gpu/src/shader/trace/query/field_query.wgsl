@@ -1,9 +1,5 @@
 // The closest hit of a ray on the field of weighted planes, found in its kd-tree, that the edge test accepts.
 
-fn visit_region_block(block_idx: u32) {
-    add_neighbors(block_idx);
-}
-
 fn surface_hit(whole_ray: Ray) -> SurfaceHit {
     var ray = whole_ray;
     for (var n_rejected = 0u; n_rejected < FIELD_MAX_REJECTED_HITS; n_rejected++) {

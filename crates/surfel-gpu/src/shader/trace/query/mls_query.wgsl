@@ -1,22 +1,11 @@
 // The surface of moving least squares along a ray: from the ball that the ray enters to the polynomial fitted to the
 // points around.
 
-// The question that a query for blocks answers.
-const PLANE: u32 = 0u;
-const POLYNOMIAL: u32 = 1u;
-const FINISH: u32 = 2u;
-const NEIGHBORS: u32 = 3u;
-
-var<private> question: u32;
-var<private> plane_sums: PlaneSums;
-var<private> polynomial_sums: PolynomialSums;
-// The position around which points count, the radius of the ball that the ray entered, and the position of the fit
-// relative to the former in units of the latter.
+// The position around which points count, and the radius of the ball that the ray entered.
 var<private> listed_position: vec3<f32>;
 var<private> ball_radius: f32;
-var<private> fit_shift: vec3<f32>;
+// The colour of the last hit that was accepted, and its nearest point.
 var<private> color_sum: vec4<f32>;
-var<private> nearest_squared: f32;
 var<private> nearest_slot: u32;
 
 struct MlsHit {
@@ -27,75 +16,128 @@ struct MlsHit {
     restart: f32,
 }
 
-fn visit_region_block(block_idx: u32) {
-    if question == NEIGHBORS {
-        add_neighbors(block_idx);
-        return;
-    }
-    let max_squared = (MLS_SUPPORT + LIST_MARGIN) * (MLS_SUPPORT + LIST_MARGIN);
-    let head = load_head(block_idx);
+// The weighted sum of the colours around a hit, and its nearest point.
+struct HitColor {
+    sum: vec4<f32>,
+    nearest_squared: f32,
+    nearest_slot: u32,
+}
+
+// Lists the blocks within reach of the listed position.
+fn list_points() {
+    let reach = (MLS_SUPPORT + LIST_MARGIN) * ball_radius;
+    list_blocks(listed_position - reach, listed_position + reach, 0.0);
+}
+
+// Returns the lanes of a block whose points may count.
+fn listed_lanes(block_idx: u32, head: BlockHead) -> u32 {
     // The exact test follows, in radii.
     let max_distance = (MLS_SUPPORT + LIST_MARGIN) * (1.0 + 8.0 * EPSILON) * ball_radius;
-    var lanes = lanes_within(block_idx, head, listed_position, max_distance * max_distance);
-    for (; lanes != 0u; lanes &= lanes - 1u) {
-        let lane = firstTrailingBit(lanes);
-        let point = block_point(block_idx, head, lane, listed_position);
-        let listed = point.center * (1.0 / ball_radius);
-        if 0.0 < point.radius && dot(listed, listed) < max_squared {
-            add_listed_point(listed - fit_shift, point.radius, 8u * block_idx + lane);
-        }
-    }
+    return lanes_within(block_idx, head, listed_position, max_distance * max_distance);
 }
 
-// Adds a point at `offset` from the position of the fit, in radii of the ball.
-fn add_listed_point(offset: vec3<f32>, radius: f32, slot: u32) {
-    let inverse = ball_radius / (MLS_SUPPORT * radius);
-    let weight = mls_weight(offset, inverse * inverse);
-    if question == PLANE {
-        plane_sums = with_plane_point(plane_sums, offset, weight);
-        return;
-    }
-    if question == POLYNOMIAL {
-        add_polynomial_point(&polynomial_sums, offset, weight);
-        return;
-    }
-    let from_hit = offset * ball_radius;
-    if is_neighbor(neighborhood.hit, from_hit) {
-        add_neighbor(&neighborhood, from_hit, vec3<f32>(0.0));
-    }
-    if !HAS_COLORS {
-        return;
-    }
-    let cubed = weight * weight * weight;
-    if visits[visit_idx].blends_colors == 1u && MLS_MIN_COLOR_WEIGHT < cubed {
-        color_sum += cubed * vec4<f32>(slot_color(slot), 1.0);
-    }
-    let squared = dot(offset, offset);
-    if squared < nearest_squared || squared == nearest_squared && slot < nearest_slot {
-        nearest_squared = squared;
-        nearest_slot = slot;
-    }
+// A point near the position of a fit.
+struct ListedPoint {
+    is_used: bool,
+    // Offset from the position in radii of the ball.
+    offset: vec3<f32>,
+    weight: f32,
 }
 
-// Asks for the points around the listed position, for a fit at a distance along the ray behind it.
-fn query_listed(task: u32, ray: Ray, behind: f32) {
-    question = task;
-    fit_shift = ray.direction * (behind / ball_radius);
-    let reach = (MLS_SUPPORT + LIST_MARGIN) * ball_radius;
-    query_box(listed_position - reach, listed_position + reach, 0.0);
-    question = NEIGHBORS;
+// Returns the point in a lane, for a fit at a distance along the ray behind the listed position.
+fn listed_point(block_idx: u32, head: BlockHead, lane: u32, shift: vec3<f32>) -> ListedPoint {
+    let max_squared = (MLS_SUPPORT + LIST_MARGIN) * (MLS_SUPPORT + LIST_MARGIN);
+    let point = block_point(block_idx, head, lane, listed_position);
+    let listed = point.center * (1.0 / ball_radius);
+    let offset = listed - shift;
+    let inverse = ball_radius / (MLS_SUPPORT * max(point.radius, 1e-18));
+    let is_used = 0.0 < point.radius && dot(listed, listed) < max_squared;
+    return ListedPoint(is_used, offset, mls_weight(offset, inverse * inverse));
 }
 
 // Fits a plane or a polynomial at a distance along the ray behind the listed position.
 fn fit_at(ray: Ray, behind: f32, is_plane: bool, normal: vec3<f32>) -> FitHit {
+    let shift = ray.direction * (behind / ball_radius);
+    var plane_sums = no_plane_points();
+    var polynomial_sums = no_polynomial_points(normal);
+    list_points();
+    loop {
+        for (var i = 0u; i < n_listed; i++) {
+            let block_idx = listed_blocks[i];
+            let head = load_head(block_idx);
+            for (var lanes = listed_lanes(block_idx, head); lanes != 0u; lanes &= lanes - 1u) {
+                let point = listed_point(block_idx, head, firstTrailingBit(lanes), shift);
+                if !point.is_used {
+                    continue;
+                }
+                if is_plane {
+                    plane_sums = with_plane_point(plane_sums, point.offset, point.weight);
+                } else {
+                    add_polynomial_point(&polynomial_sums, point.offset, point.weight);
+                }
+            }
+        }
+        if !list_more() {
+            break;
+        }
+    }
     if is_plane {
-        plane_sums = no_plane_points();
-        query_listed(PLANE, ray, behind);
         return intersect_plane(plane_sums, ray.direction);
     }
-    polynomial_sums = no_polynomial_points(normal);
-    query_listed(POLYNOMIAL, ray, behind);
     return intersect_polynomial(polynomial_sums, ray.direction);
+}
+
+// Adds the points of a block to what is known of a hit.
+fn finish_with_block(
+    stats: ptr<function, NeighborhoodStats>,
+    color: ptr<function, HitColor>,
+    block_idx: u32,
+    shift: vec3<f32>,
+) {
+    let head = load_head(block_idx);
+    let lanes = listed_lanes(block_idx, head);
+    for (var half = 0u; half < 2u; half++) {
+        add_neighbors(stats, relative_to_hit(four_points(block_idx, head, half, listed_position), lanes >> (4u * half), shift));
+    }
+    if !HAS_COLORS {
+        return;
+    }
+    for (var rest = lanes; rest != 0u; rest &= rest - 1u) {
+        let lane = firstTrailingBit(rest);
+        let point = listed_point(block_idx, head, lane, shift);
+        if point.is_used {
+            add_color(color, point, 8u * block_idx + lane);
+        }
+    }
+}
+
+// Returns the points in these lanes relative to a hit, without normals.
+fn relative_to_hit(four: FourPoints, lanes: u32, shift: vec3<f32>) -> FourPoints {
+    let per_radius = 1.0 / ball_radius;
+    let is_used = ((vec4<u32>(lanes) >> vec4<u32>(0u, 1u, 2u, 3u)) & vec4<u32>(1u)) == vec4<u32>(1u);
+    let none = vec4<f32>(0.0);
+    return FourPoints(
+        (four.x * per_radius - shift.x) * ball_radius,
+        (four.y * per_radius - shift.y) * ball_radius,
+        (four.z * per_radius - shift.z) * ball_radius,
+        none,
+        none,
+        none,
+        select(none, four.radius, is_used),
+    );
+}
+
+fn add_color(color: ptr<function, HitColor>, point: ListedPoint, slot: u32) {
+    let cubed = point.weight * point.weight * point.weight;
+    if visits[visit_idx].blends_colors == 1u && MLS_MIN_COLOR_WEIGHT < cubed {
+        (*color).sum += cubed * vec4<f32>(slot_color(slot), 1.0);
+    }
+    let squared = dot(point.offset, point.offset);
+    let other = (*color).nearest_squared;
+    if squared < other || squared == other && slot < (*color).nearest_slot {
+        (*color).nearest_squared = squared;
+        (*color).nearest_slot = slot;
+    }
 }
 
 // Finds where a ray hits the surface near the ball that it enters.
@@ -143,12 +185,22 @@ fn is_accepted(ray: Ray, behind: f32, hit: MlsHit) -> bool {
     }
     let radius = ball_radius / visits[visit_idx].radius_factor;
     let position = ray_at(ray, hit.distance);
-    neighborhood = no_neighbors(CandidateHit(position, hit.normal, ray.direction, radius));
-    color_sum = vec4<f32>(0.0);
-    nearest_squared = NO_LIMIT;
-    nearest_slot = NONE;
-    query_listed(FINISH, ray, behind);
-    if !has_edge_test || is_surrounded(neighborhood, false) && !is_sparse(neighborhood) {
+    let shift = ray.direction * (behind / ball_radius);
+    let candidate = CandidateHit(position, hit.normal, ray.direction, radius);
+    var stats = no_neighbors(candidate);
+    var color = HitColor(vec4<f32>(0.0), NO_LIMIT, NONE);
+    list_points();
+    loop {
+        for (var i = 0u; i < n_listed; i++) {
+            finish_with_block(&stats, &color, listed_blocks[i], shift);
+        }
+        if !list_more() {
+            break;
+        }
+    }
+    color_sum = color.sum;
+    nearest_slot = color.nearest_slot;
+    if !has_edge_test || is_surrounded(stats, false) && !is_sparse(stats) {
         return true;
     }
     let wider = visits[visit_idx].edge_retest_factor * radius;

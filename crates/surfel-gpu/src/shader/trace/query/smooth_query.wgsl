@@ -1,22 +1,11 @@
 // The smooth surface along a ray: from the disc that the ray hits to the sphere fitted to the points around.
 
-// The question that a query for blocks answers.
-const FIT: u32 = 0u;
-const FINISH: u32 = 1u;
-const NEIGHBORS: u32 = 2u;
 // Distance in radii between the first fit and later ones up to which they find their points in the same list.
-const FIT_MARGIN: f32 = 0.25;
+const FIT_MARGIN: f32 = 0.1;
 
-var<private> question: u32 = NEIGHBORS;
-var<private> sphere_sums: SphereSums;
-var<private> overhang: OverhangSums;
+// The colour of the last hit that was accepted, and its nearest point.
 var<private> colors: ColorSums;
-var<private> nearest_squared: f32;
 var<private> nearest_slot: u32;
-// The position that points are relative to.
-var<private> fit_position: vec3<f32>;
-// Square of the distance from this position beyond which no point counts.
-var<private> fit_max_squared: f32;
 
 struct SmoothHit {
     is_hit: bool,
@@ -24,57 +13,88 @@ struct SmoothHit {
     normal: vec3<f32>,
 }
 
-fn visit_region_block(block_idx: u32) {
-    if question == NEIGHBORS {
-        add_neighbors(block_idx);
-        return;
+// The colour of a hit, and its nearest point.
+struct HitColor {
+    sums: ColorSums,
+    nearest_squared: f32,
+    nearest_slot: u32,
+}
+
+// Lists the blocks within reach of a position.
+fn list_points(position: vec3<f32>, radius: f32) {
+    let reach = FIT_REACH * radius;
+    list_blocks(position - reach, position + reach, FIT_MARGIN * radius);
+}
+
+// Sums up the points around a position, with the normals on the side of `guide`.
+fn fit_sums(position: vec3<f32>, guide: vec3<f32>, radius: f32) -> SphereSums {
+    var sums = no_fit_points(guide, radius);
+    list_points(position, radius);
+    loop {
+        for (var i = 0u; i < n_listed; i++) {
+            let block_idx = listed_blocks[i];
+            let head = load_head(block_idx);
+            add_fit_points(&sums, four_points(block_idx, head, 0u, position));
+            add_fit_points(&sums, four_points(block_idx, head, 1u, position));
+        }
+        if !list_more() {
+            break;
+        }
     }
+    return sums;
+}
+
+// Adds the points of a block to what is known of a hit.
+fn finish_with_block(
+    stats: ptr<function, NeighborhoodStats>,
+    overhang: ptr<function, OverhangSums>,
+    color: ptr<function, HitColor>,
+    block_idx: u32,
+) {
     let head = load_head(block_idx);
-    if question == FIT {
-        add_fit_points(&sphere_sums, four_points(block_idx, head, 0u, fit_position));
-        add_fit_points(&sphere_sums, four_points(block_idx, head, 1u, fit_position));
-        return;
-    }
-    for (var lanes = lanes_within(block_idx, head, fit_position, fit_max_squared); lanes != 0u; lanes &= lanes - 1u) {
-        let lane = firstTrailingBit(lanes);
-        let point = block_point(block_idx, head, lane, fit_position);
-        if 0.0 < point.radius {
-            finish_with_point(point, 8u * block_idx + lane);
+    let position = (*stats).hit.position;
+    for (var half = 0u; half < 2u; half++) {
+        let four = four_points(block_idx, head, half, position);
+        let squared = four.x * four.x + four.y * four.y + four.z * four.z;
+        let is_near = are_within_reach(four, squared, (*overhang).per_radius);
+        if !any(is_near) {
+            continue;
+        }
+        add_neighbors(stats, four);
+        let weights = select(vec4<f32>(0.0), point_weights(four, squared), is_near);
+        add_overhang_points(overhang, four, weights);
+        if HAS_COLORS {
+            add_colors(color, squared, weights, is_near, 8u * block_idx + 4u * half);
         }
     }
 }
 
-fn finish_with_point(point: Point, slot: u32) {
-    let fit = fit_point(point);
-    if !is_within_reach(fit, overhang.per_radius) {
-        return;
-    }
-    if is_neighbor(neighborhood.hit, point.center) {
-        add_neighbor(&neighborhood, point.center, point.normal);
-    }
-    add_overhang_point(&overhang, fit);
-    if !HAS_COLORS {
-        return;
-    }
+// Adds the colours of four points with these weights, and finds the nearest of them.
+fn add_colors(
+    color: ptr<function, HitColor>,
+    squared: vec4<f32>,
+    weights: vec4<f32>,
+    is_near: vec4<bool>,
+    first_slot: u32,
+) {
+    let cubed = weights * weights * weights;
+    let in_use = in_steps(cubed);
     if visits[visit_idx].blends_colors == 1u {
-        colors = with_color(colors, fit, slot_color(slot));
+        for (var lanes = lane_bits(vec4<f32>(0.0) < in_use); lanes != 0u; lanes &= lanes - 1u) {
+            let lane = firstTrailingBit(lanes);
+            let color_of_point = slot_color(first_slot + lane);
+            (*color).sums = with_color((*color).sums, in_use[lane], round(cubed[lane] * color_of_point * FIT_STEPS));
+        }
     }
-    let squared = dot(point.center, point.center);
-    if squared < nearest_squared || squared == nearest_squared && slot < nearest_slot {
-        nearest_squared = squared;
-        nearest_slot = slot;
+    for (var lane = 0u; lane < 4u; lane++) {
+        let slot = first_slot + lane;
+        let other = (*color).nearest_squared;
+        let is_nearer = squared[lane] < other || squared[lane] == other && slot < (*color).nearest_slot;
+        if is_near[lane] && is_nearer {
+            (*color).nearest_squared = squared[lane];
+            (*color).nearest_slot = slot;
+        }
     }
-}
-
-// Asks for the points within reach of a position.
-fn query_points(task: u32, position: vec3<f32>, radius: f32) {
-    question = task;
-    fit_position = position;
-    let reach = FIT_REACH * radius;
-    // The exact test follows, in radii.
-    fit_max_squared = reach * reach * (1.0 + 8.0 * EPSILON);
-    query_box(position - reach, position + reach, FIT_MARGIN * radius);
-    question = NEIGHBORS;
 }
 
 // Finds where a ray hits the surface near the disc that it hits.
@@ -84,9 +104,7 @@ fn find_surface(ray: Ray, disc_distance: f32, disc: Surfel) -> SmoothHit {
     var distance = disc_distance;
     var last_step = 0.0;
     for (var fit = 1u; fit <= MAX_FITS; fit++) {
-        sphere_sums = no_fit_points(normal, disc.radius);
-        query_points(FIT, ray_at(ray, distance), disc.radius);
-        let sphere = intersect_fit(sphere_sums, ray.direction);
+        let sphere = intersect_fit(fit_sums(ray_at(ray, distance), normal, disc.radius), ray.direction);
         let step = damped(sphere.step, last_step);
         last_step = step;
         let moved = distance + step;
@@ -116,18 +134,27 @@ fn is_accepted(ray: Ray, distance: f32, normal: vec3<f32>, disc: Surfel) -> bool
     }
     let position = ray_at(ray, distance);
     let hit = CandidateHit(position, normal, ray.direction, disc.radius);
-    neighborhood = no_neighbors(hit);
-    overhang = no_overhang(normal, disc.center - position, disc.radius);
-    colors = ColorSums(0.0, vec3<f32>(0.0));
-    nearest_squared = NO_LIMIT;
-    query_points(FINISH, position, disc.radius);
+    var stats = no_neighbors(hit);
+    var overhang = no_overhang(normal, disc.center - position, disc.radius);
+    var color = HitColor(ColorSums(0.0, vec3<f32>(0.0)), NO_LIMIT, nearest_slot);
+    list_points(position, disc.radius);
+    loop {
+        for (var i = 0u; i < n_listed; i++) {
+            finish_with_block(&stats, &overhang, &color, listed_blocks[i]);
+        }
+        if !list_more() {
+            break;
+        }
+    }
+    colors = color.sums;
+    nearest_slot = color.nearest_slot;
     if visits[visit_idx].has_edge_test == 0u {
         return true;
     }
     if sticks_out(overhang) {
         return false;
     }
-    if is_surrounded(neighborhood, false) && !is_sparse(neighborhood) {
+    if is_surrounded(stats, false) && !is_sparse(stats) {
         return true;
     }
     let radius = visits[visit_idx].edge_retest_factor * disc.radius;

@@ -141,6 +141,6 @@ fn is_through_slit(
         return false;
     }
     let position = ray_at(ray, disc_distance);
-    evaluate_neighborhood(CandidateHit(position, -ray.direction, ray.direction, disc.radius));
-    return is_surrounded(neighborhood, false) && !is_sparse(neighborhood);
+    let stats = neighborhood_of(CandidateHit(position, -ray.direction, ray.direction, disc.radius));
+    return is_surrounded(stats, false) && !is_sparse(stats);
 }

@@ -1,9 +1,5 @@
 // The surface of discs and splats: the first hit that the edge test does not reject.
 
-fn visit_region_block(block_idx: u32) {
-    add_neighbors(block_idx);
-}
-
 fn surface_hit(first_ray: Ray) -> SurfaceHit {
     var ray = first_ray;
     for (var n_rejected = 0u; n_rejected < MAX_REJECTED_HITS; n_rejected++) {
@@ -31,7 +27,7 @@ fn is_within_edge(ray: Ray, found: SurfaceHit) -> bool {
 
 // Returns true if a hit is enclosed already by the points in the blocks of the discs that the ray hits.
 fn is_enclosed_by_blocks(hit: CandidateHit) -> bool {
-    neighborhood = no_neighbors(hit);
+    var stats = no_neighbors(hit);
     for (var i = 0u; i < n_hit_discs(); i++) {
         let block_idx = hit_disc(i) >> 3u;
         var is_new = true;
@@ -39,8 +35,8 @@ fn is_enclosed_by_blocks(hit: CandidateHit) -> bool {
             is_new = is_new && hit_disc(earlier) >> 3u != block_idx;
         }
         if is_new {
-            add_neighbors(block_idx);
+            add_neighbors_in_block(&stats, block_idx);
         }
     }
-    return is_surrounded(neighborhood, true) && !is_sparse(neighborhood);
+    return is_surrounded(stats, true) && !is_sparse(stats);
 }

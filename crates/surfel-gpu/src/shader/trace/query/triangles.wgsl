@@ -1,24 +1,27 @@
 // The closest triangle on a ray, and whether any triangle lies on it.
 
-var<private> query_frame: RayFrame;
-var<private> nearest_distance: f32;
-var<private> nearest_slot: u32;
-
-fn search_limit() -> f32 {
-    return nearest_distance;
+struct Search {
+    frame: RayFrame,
+    distance: f32,
+    slot: u32,
 }
 
-fn visit_block(block_idx: u32) -> bool {
+fn search_limit(search: ptr<function, Search>) -> f32 {
+    return (*search).distance;
+}
+
+fn visit_block(block_idx: u32, search: ptr<function, Search>) -> bool {
+    let frame_of_ray = (*search).frame;
+    let origin = frame_of_ray.ray.origin;
     for (var lane = 0u; lane < 8u; lane++) {
         let slot = 8u * block_idx + lane;
         var corners = slot_corners(slot);
-        let origin = query_frame.ray.origin;
         corners = array<vec3<f32>, 3>(corners[0] - origin, corners[1] - origin, corners[2] - origin);
-        let distance = intersect_triangle(corners, query_frame);
-        let is_tie = distance == nearest_distance && slot < nearest_slot;
-        if 0.0 <= distance && (distance < nearest_distance || is_tie) {
-            nearest_distance = distance;
-            nearest_slot = slot;
+        let distance = intersect_triangle(corners, frame_of_ray);
+        let is_tie = distance == (*search).distance && slot < (*search).slot;
+        if 0.0 <= distance && (distance < (*search).distance || is_tie) {
+            (*search).distance = distance;
+            (*search).slot = slot;
             // A search without colours asks for any triangle.
             if !HAS_COLORS {
                 return true;
@@ -28,24 +31,22 @@ fn visit_block(block_idx: u32) -> bool {
     return false;
 }
 
-fn search_triangles(ray: Ray) {
-    query_frame = ray_frame(ray);
-    nearest_distance = ray.t_max;
-    nearest_slot = NONE;
-    traverse(ray);
+fn search_triangles(ray: Ray) -> Search {
+    var search = Search(ray_frame(ray), ray.t_max, NONE);
+    traverse(ray, &search);
+    return search;
 }
 
 fn is_occluded(ray: Ray) -> bool {
-    search_triangles(ray);
-    return nearest_slot != NONE;
+    return search_triangles(ray).slot != NONE;
 }
 
 fn surface_hit(ray: Ray) -> SurfaceHit {
-    search_triangles(ray);
-    if nearest_slot == NONE {
+    let nearest = search_triangles(ray);
+    if nearest.slot == NONE {
         return missed_surface();
     }
-    let corners = slot_corners(nearest_slot);
+    let corners = slot_corners(nearest.slot);
     let origin = ray.origin;
     let relative =
         array<vec3<f32>, 3>(corners[0] - origin, corners[1] - origin, corners[2] - origin);
@@ -56,7 +57,7 @@ fn surface_hit(ray: Ray) -> SurfaceHit {
     let is_backface = 0.0 < dot(outward, ray.direction);
     let geometric_normal = select(outward, -outward, is_backface);
     var hit =
-        point_hit(nearest_distance, nearest_slot, 0.0, geometric_normal, vec3<f32>(1.0), is_backface);
+        point_hit(nearest.distance, nearest.slot, 0.0, geometric_normal, vec3<f32>(1.0), is_backface);
     hit.barycentrics = weights.yz;
     interpolate_attributes(&hit, corners, weights);
     return hit;
