@@ -187,7 +187,16 @@ impl Gpu {
 
     /// Waits until the device has done what it was told.
     pub fn wait(&self) -> Result<()> {
-        let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(WAIT_TIMEOUT) };
+        self.poll(None)
+    }
+
+    /// Waits until the device has done what it was told up to a submission.
+    pub fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<()> {
+        self.poll(Some(submission))
+    }
+
+    fn poll(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<()> {
+        let wait = wgpu::PollType::Wait { submission_index, timeout: Some(WAIT_TIMEOUT) };
         let polled = self.device.poll(wait);
         self.check()?;
         polled.map(drop).map_err(|_| {

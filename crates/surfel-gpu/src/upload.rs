@@ -7,17 +7,11 @@ use crate::gaussian_arrays::{GaussianArrays, gaussian_clouds};
 use crate::kernels::{Kernels, bind};
 use crate::mesh_blocks::mesh_blocks;
 use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
+use crate::transfer::{Payload, Transfer};
 use crate::unsupported::trees;
 use std::sync::{Arc, Weak};
 use surfel_core::bvh::BvhNode;
 use surfel_core::flat::FlatGeometry;
-
-/// Bytes of a node in the device's memory: five times sixteen, so that it is read in vectors of four words.
-const NODE_BYTES: usize = 16 * NODE_VECTORS;
-/// Vectors of four words that a node takes.
-pub const NODE_VECTORS: usize = 5;
-/// Bytes that are uploaded at once.
-const CHUNK_BYTES: usize = 1 << 24;
 
 /// A tree over blocks of points in a device's memory.
 #[derive(Debug)]
@@ -164,42 +158,36 @@ fn upload_tree(
     if tree_nodes.is_empty() {
         return Ok(None);
     }
-    let mut node_bytes = padded_nodes(tree_nodes);
-    node_bytes.extend_from_slice(behind_nodes);
-    let nodes = pages(gpu, "nodes", &node_bytes, N_NODE_PAGES)?;
-    let blocks = pages(gpu, "blocks", tree_blocks, N_BLOCK_PAGES)?;
+    let mut transfer = Transfer::new(gpu);
+    let payload = Payload { nodes: tree_nodes, bytes: behind_nodes };
+    let nodes = pages(&mut transfer, gpu, "nodes", payload, N_NODE_PAGES)?;
+    let payload = Payload { nodes: &[], bytes: tree_blocks };
+    let blocks = pages(&mut transfer, gpu, "blocks", payload, N_BLOCK_PAGES)?;
+    transfer.finish()?;
     Ok(Some(GpuTree { nodes, blocks }))
 }
 
 /// Uploads bytes in pages.
 fn pages(
+    transfer: &mut Transfer,
     gpu: &Gpu,
     label: &'static str,
-    bytes: &[u8],
+    payload: Payload,
     max_pages: usize,
 ) -> Result<Vec<wgpu::Buffer>> {
     let max_pages = if gpu.has_pages() { max_pages } else { 1 };
-    let max_bytes = max_pages * gpu.page_bytes();
-    if max_bytes < bytes.len() {
+    let (max_bytes, n_bytes) = (max_pages * gpu.page_bytes(), payload.len());
+    if max_bytes < n_bytes {
         let (device, limit) = (gpu.info.name.clone(), "bytes in the pages of a tree");
-        let (found, needed) = (max_bytes as u64, bytes.len() as u64);
+        let (found, needed) = (max_bytes as u64, n_bytes as u64);
         return Err(Error::Limit { device, limit, found, needed });
     }
-    let page = |bytes: &[u8]| {
-        let buffer = array(gpu, label, bytes.len())?;
-        write(gpu, &buffer, bytes)?;
+    let page = |start: usize| {
+        let buffer = array(gpu, label, gpu.page_bytes().min(n_bytes - start))?;
+        transfer.fill(&buffer, payload, start)?;
         Ok(buffer)
     };
-    bytes.chunks(gpu.page_bytes()).map(page).collect()
-}
-
-/// Returns nodes, each followed by the bytes that are missing to `NODE_BYTES`.
-fn padded_nodes(nodes: &[BvhNode]) -> Vec<u8> {
-    let mut padded = vec![0; nodes.len() * NODE_BYTES];
-    for (node, padded) in nodes.iter().zip(padded.chunks_exact_mut(NODE_BYTES)) {
-        padded[..size_of::<BvhNode>()].copy_from_slice(bytemuck::bytes_of(node));
-    }
-    padded
+    (0..n_bytes).step_by(gpu.page_bytes()).map(page).collect()
 }
 
 /// Makes an array, if the device allows one of this size.
@@ -210,21 +198,4 @@ pub fn array(gpu: &Gpu, label: &'static str, n_bytes: usize) -> Result<wgpu::Buf
         return Err(Error::Limit { device: gpu.info.name.clone(), limit, found, needed });
     }
     gpu.buffer(label, needed, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
-}
-
-/// Writes an array chunk by chunk.
-pub fn write(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {
-    for (chunk_idx, chunk) in bytes.chunks(CHUNK_BYTES).enumerate() {
-        write_chunk(gpu, buffer, chunk_idx * CHUNK_BYTES, chunk)?;
-    }
-    Ok(())
-}
-
-/// Writes a chunk and waits for it, so that copies on their way never take the memory of the whole.
-fn write_chunk(gpu: &Gpu, buffer: &wgpu::Buffer, offset: usize, bytes: &[u8]) -> Result<()> {
-    gpu.catch("points", || {
-        gpu.queue.write_buffer(buffer, offset as u64, bytes);
-        gpu.queue.submit([]);
-    })?;
-    gpu.wait()
 }
