@@ -96,7 +96,7 @@ impl Job<'_> {
         let start = Instant::now();
         let n_pixels = u64::from(settings.width) * u64::from(region.n_rows());
         progress.begin("render", n_pixels);
-        let sizes = self.sizes(n_pixels);
+        let sizes = Self::sizes(gpu, self.scene, &self.passes, n_pixels);
         let Self { records, words, .. } = self;
         let contents = Contents { scene: records, words, tasks: &self.passes.tasks };
         let arrays = Arrays {
@@ -142,9 +142,10 @@ impl Job<'_> {
         Ok((image, stats))
     }
 
-    fn sizes(&self, n_pixels: u64) -> Capacities {
-        let has_waves = self.passes.next_wave.is_some();
-        let fitting = self.gpu.info.max_array_bytes / size_of::<ShadingPointRecord>() as u64;
+    /// Returns the sizes of the arrays of a picture with this number of pixels.
+    pub fn sizes(gpu: &Gpu, scene: &FlatScene, passes: &Passes, n_pixels: u64) -> Capacities {
+        let has_waves = passes.next_wave.is_some();
+        let fitting = gpu.info.max_array_bytes / size_of::<ShadingPointRecord>() as u64;
         let max_entries = fitting.min(MAX_ENTRIES.into());
         let (wanted, per_pixel) = match has_waves {
             true => {
@@ -158,7 +159,7 @@ impl Job<'_> {
             n_pixels: n_pixels.min(n_entries / per_pixel) as u32,
             n_entries: n_entries as u32,
             has_waves,
-            is_transmissive: self.scene.is_transmissive,
+            is_transmissive: scene.is_transmissive,
         }
     }
 

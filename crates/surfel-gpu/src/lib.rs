@@ -54,6 +54,7 @@ mod wavefront;
 mod tree_visits;
 mod passes;
 mod aovs;
+mod picture_memory;
 mod job;
 mod ray_timing;
 mod renderer;

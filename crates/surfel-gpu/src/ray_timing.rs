@@ -73,7 +73,7 @@ pub fn time(
 ) -> surfel_core::Result<RayTimes> {
     let searches = searches(timing.geometry, timing.query);
     let start = Instant::now();
-    uploads.update(gpu, std::slice::from_ref(timing.geometry))?;
+    uploads.update(gpu, std::slice::from_ref(timing.geometry), 0)?;
     let mut times = RayTimes {
         geometry_upload_secs: start.elapsed().as_secs_f64(),
         run_secs: vec![0.0; timing.n_runs as usize],

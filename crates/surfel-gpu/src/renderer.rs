@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::kernels::Kernels;
 use crate::passes::{Pass, Passes};
+use crate::picture_memory::picture_bytes;
 use crate::ray_timing::{self, RayTimes, Timing};
 use crate::scene_records::SceneRecords;
 use crate::unsupported::unsupported;
@@ -52,6 +53,13 @@ impl GpuRenderer {
         Ok(Self { gpu, state: Mutex::new(state) })
     }
 
+    /// Sets the maximum number of bytes to hold in the device's memory: trees, textures and the arrays of a picture. What
+    /// needs more is refused before it is uploaded.
+    pub fn with_memory_limit(mut self, memory_limit: Option<u64>) -> Self {
+        self.gpu.memory_limit = memory_limit;
+        self
+    }
+
     /// Returns the device.
     pub fn device(&self) -> &DeviceInfo {
         &self.gpu.info
@@ -96,7 +104,9 @@ impl Renderer for GpuRenderer {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let State { kernels, uploads, words } = &mut *state;
         let passes = Passes::new(scene, settings);
-        uploads.update(&self.gpu, &scene.geometries)?;
+        let n_pixels = u64::from(settings.width) * u64::from(region.n_rows());
+        let sizes = Job::sizes(&self.gpu, scene, &passes, n_pixels);
+        uploads.update(&self.gpu, &scene.geometries, picture_bytes(scene, &passes, sizes))?;
         let is_paged = |tree| uploads.tree(&scene.geometries, tree).is_some_and(GpuTree::is_paged);
         let of_pass = |pass: &Pass| (pass.kernel, pass.tree.is_some_and(is_paged));
         kernels.compile(&self.gpu, passes.all().map(of_pass))?;
@@ -157,5 +167,22 @@ mod tests {
             let CoreError::Renderer(reason) = &error else { panic!("{error}") };
             assert!(reason.starts_with(&renderer.device().name), "{reason}");
         }
+    }
+
+    #[test]
+    fn a_device_lost_amid_a_picture_is_an_error() {
+        /// Loses the device when the work is about to begin.
+        struct Loss(wgpu::Device);
+        impl Progress for Loss {
+            fn begin(&self, _: &str, _: u64) {
+                self.0.destroy();
+            }
+        }
+        let Ok(renderer) = GpuRenderer::open(None) else { return };
+        let settings = Settings { width: 8, height: 4, ..Settings::default() };
+        let loss = Loss(renderer.gpu.device.clone());
+        let error = renderer.render(&empty(), &settings, &loss).unwrap_err();
+        let CoreError::Renderer(reason) = &error else { panic!("{error}") };
+        assert!(reason.starts_with(&renderer.device().name), "{reason}");
     }
 }

@@ -11,6 +11,8 @@ pub const NODE_BYTES: usize = 16 * NODE_VECTORS;
 pub const NODE_VECTORS: usize = 5;
 /// Bytes of a chunk.
 const CHUNK_BYTES: usize = 1 << 24;
+/// Maximum number of bytes on their way to the device: one chunk is filled while the device copies the one before.
+pub const MAX_STAGING_BYTES: usize = 2 * CHUNK_BYTES;
 /// Maximum number of threads that fill a chunk. One copies about 10 GB/s, and few of them as much as the bus transfers.
 const MAX_THREADS: usize = 8;
 /// Bytes of a piece of a chunk: for one, a thread is worth its start, which takes some ten microseconds.

@@ -2,16 +2,19 @@
 
 use crate::device::Gpu;
 use crate::error::{Error, Result};
-use crate::field_arrays::structure;
+use crate::field_arrays::{structure, structure_vectors};
 use crate::gaussian_arrays::{GaussianArrays, gaussian_clouds};
 use crate::kernels::{Kernels, bind};
-use crate::mesh_blocks::mesh_blocks;
+use crate::mesh_blocks::{block_vectors, mesh_blocks};
 use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
-use crate::transfer::{Payload, Transfer};
+use crate::transfer::{MAX_STAGING_BYTES, NODE_BYTES, Payload, Transfer};
 use crate::unsupported::trees;
 use std::sync::{Arc, Weak};
 use surfel_core::bvh::BvhNode;
-use surfel_core::flat::FlatGeometry;
+use surfel_core::flat::{BlockTree, FlatGeometry};
+
+/// Bytes of a vector of four words.
+const VECTOR_BYTES: usize = 16;
 
 /// A tree over blocks of points in a device's memory.
 #[derive(Debug)]
@@ -26,6 +29,11 @@ impl GpuTree {
     /// Returns true if the tree has more than one page of nodes or blocks.
     pub fn is_paged(&self) -> bool {
         1 < self.nodes.len().max(self.blocks.len())
+    }
+
+    /// Returns the number of bytes of all pages.
+    fn n_bytes(&self) -> u64 {
+        self.nodes.iter().chain(&self.blocks).map(wgpu::Buffer::size).sum()
     }
 
     /// Binds the tree together with the records of its instances.
@@ -71,13 +79,28 @@ pub struct Uploads {
 }
 
 impl Uploads {
-    /// Uploads the geometries that are not uploaded yet, and frees those that are no longer in use.
+    /// Uploads the geometries that are not uploaded yet, and frees those that are no longer in use. The device must have
+    /// memory for them and for `other_bytes`.
     ///
     /// # Errors
-    /// Fails if a geometry is too large for the device.
-    pub fn update(&mut self, gpu: &Gpu, geometries: &[Arc<FlatGeometry>]) -> Result<()> {
+    /// Fails if a geometry is too large for the device, before anything is uploaded.
+    pub fn update(
+        &mut self,
+        gpu: &Gpu,
+        geometries: &[Arc<FlatGeometry>],
+        other_bytes: u64,
+    ) -> Result<()> {
         // A geometry that was changed has lost its weak references, also where it stayed at its place in memory.
         self.geometries.retain(|(geometry, _)| geometry.strong_count() != 0);
+        if !self.has_gaussians_of(geometries) {
+            self.gaussians = None;
+        }
+        if self.check_memory(gpu, geometries, other_bytes).is_err() {
+            // The geometries of other pictures make room.
+            let is_needed = |known: &Weak<_>| geometries.iter().any(|other| is_same(known, other));
+            self.geometries.retain(|(known, _)| is_needed(known));
+            self.check_memory(gpu, geometries, other_bytes)?;
+        }
         for geometry in geometries {
             if self.position(geometry).is_none() {
                 let uploaded = upload(gpu, geometry)?;
@@ -87,22 +110,54 @@ impl Uploads {
         self.update_gaussians(gpu, geometries)
     }
 
+    /// Fails if the trees that are missing have too many pages, or if all trees take too much memory.
+    fn check_memory(
+        &self,
+        gpu: &Gpu,
+        geometries: &[Arc<FlatGeometry>],
+        other_bytes: u64,
+    ) -> Result<()> {
+        let mut missing = Vec::new();
+        for (i, geometry) in geometries.iter().enumerate() {
+            let is_repeated = geometries[..i].iter().any(|other| Arc::ptr_eq(other, geometry));
+            if !is_repeated && self.position(geometry).is_none() {
+                missing.extend(geometry_sizes(geometry));
+            }
+        }
+        if self.gaussians.is_none() {
+            missing.push(gaussian_size(geometries));
+        }
+        for size in &missing {
+            check_pages(gpu, size.node_bytes, N_NODE_PAGES)?;
+            check_pages(gpu, size.block_bytes, N_BLOCK_PAGES)?;
+        }
+        let trees = self.geometries.iter().flat_map(|(_, trees)| trees.iter().flatten());
+        let held = trees.chain(self.gaussians.as_ref().map(|(_, tree)| tree)).map(GpuTree::n_bytes);
+        let missing: usize = missing.iter().map(|size| size.node_bytes + size.block_bytes).sum();
+        let staging = missing.min(MAX_STAGING_BYTES);
+        gpu.check_memory(held.sum::<u64>() + (missing + staging) as u64 + other_bytes)
+    }
+
     /// Uploads the trained Gaussians of all geometries in one tree, unless they are there.
     fn update_gaussians(&mut self, gpu: &Gpu, geometries: &[Arc<FlatGeometry>]) -> Result<()> {
-        let clouds: Vec<_> = gaussian_clouds(geometries).map(|(i, _)| &geometries[i]).collect();
-        let known = self.gaussians.take().filter(|(known, _)| {
-            known.len() == clouds.len()
-                && known.iter().zip(&clouds).all(|(known, cloud)| is_same(known, cloud))
-        });
-        if known.is_some() || clouds.is_empty() {
-            self.gaussians = known;
+        if self.gaussians.is_some() || gaussian_clouds(geometries).next().is_none() {
             return Ok(());
         }
         let arrays = GaussianArrays::new(geometries);
         if let Some(tree) = upload_tree(gpu, &arrays.nodes, &[], &arrays.blocks)? {
-            self.gaussians = Some((clouds.into_iter().map(Arc::downgrade).collect(), tree));
+            let clouds = gaussian_clouds(geometries).map(|(i, _)| Arc::downgrade(&geometries[i]));
+            self.gaussians = Some((clouds.collect(), tree));
         }
         Ok(())
+    }
+
+    /// Returns true if the tree of Gaussians has those of these geometries.
+    fn has_gaussians_of(&self, geometries: &[Arc<FlatGeometry>]) -> bool {
+        let clouds: Vec<_> = gaussian_clouds(geometries).map(|(i, _)| &geometries[i]).collect();
+        self.gaussians.as_ref().is_some_and(|(known, _)| {
+            known.len() == clouds.len()
+                && known.iter().zip(&clouds).all(|(known, cloud)| is_same(known, cloud))
+        })
     }
 
     /// Returns a tree that is uploaded, among those of these geometries.
@@ -127,6 +182,45 @@ impl Uploads {
 
 fn is_same(known: &Weak<FlatGeometry>, geometry: &Arc<FlatGeometry>) -> bool {
     known.upgrade().is_some_and(|known| Arc::ptr_eq(&known, geometry))
+}
+
+/// The bytes of the arrays of a tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct TreeSize {
+    /// Bytes of the nodes, and of a structure behind them.
+    node_bytes: usize,
+    block_bytes: usize,
+}
+
+/// Returns the sizes of the trees of a geometry.
+fn geometry_sizes(geometry: &FlatGeometry) -> [TreeSize; 3] {
+    match geometry {
+        FlatGeometry::Cloud(cloud) => {
+            let mut sizes = trees(cloud).map(|(_, points)| TreeSize {
+                node_bytes: points.nodes.len() * NODE_BYTES,
+                block_bytes: size_of_val(points.blocks.as_slice()),
+            });
+            sizes[0].node_bytes += VECTOR_BYTES * structure_vectors(cloud);
+            sizes
+        }
+        FlatGeometry::Mesh(mesh) => {
+            let n_vectors = mesh.triangles.blocks.len() * block_vectors(mesh) as usize;
+            let node_bytes = mesh.triangles.nodes.len() * NODE_BYTES;
+            let size = TreeSize { node_bytes, block_bytes: VECTOR_BYTES * n_vectors };
+            [size, TreeSize::default(), TreeSize::default()]
+        }
+    }
+}
+
+/// Returns the size of the tree of all trained Gaussians.
+fn gaussian_size(geometries: &[Arc<FlatGeometry>]) -> TreeSize {
+    let mut size = TreeSize::default();
+    for (_, gaussians) in gaussian_clouds(geometries) {
+        size.node_bytes += gaussians.nodes().len() * NODE_BYTES;
+        size.block_bytes += size_of_val(gaussians.blocks());
+        size.block_bytes += size_of_val(gaussians.coefficient_bits());
+    }
+    size
 }
 
 fn upload(gpu: &Gpu, geometry: &FlatGeometry) -> Result<GpuGeometry> {
@@ -160,9 +254,9 @@ fn upload_tree(
     }
     let mut transfer = Transfer::new(gpu);
     let payload = Payload { nodes: tree_nodes, bytes: behind_nodes };
-    let nodes = pages(&mut transfer, gpu, "nodes", payload, N_NODE_PAGES)?;
+    let nodes = pages(&mut transfer, gpu, "nodes", payload)?;
     let payload = Payload { nodes: &[], bytes: tree_blocks };
-    let blocks = pages(&mut transfer, gpu, "blocks", payload, N_BLOCK_PAGES)?;
+    let blocks = pages(&mut transfer, gpu, "blocks", payload)?;
     transfer.finish()?;
     Ok(Some(GpuTree { nodes, blocks }))
 }
@@ -173,21 +267,25 @@ fn pages(
     gpu: &Gpu,
     label: &'static str,
     payload: Payload,
-    max_pages: usize,
 ) -> Result<Vec<wgpu::Buffer>> {
-    let max_pages = if gpu.has_pages() { max_pages } else { 1 };
-    let (max_bytes, n_bytes) = (max_pages * gpu.page_bytes(), payload.len());
-    if max_bytes < n_bytes {
-        let (device, limit) = (gpu.info.name.clone(), "bytes in the pages of a tree");
-        let (found, needed) = (max_bytes as u64, n_bytes as u64);
-        return Err(Error::Limit { device, limit, found, needed });
-    }
+    let n_bytes = payload.len();
     let page = |start: usize| {
         let buffer = array(gpu, label, gpu.page_bytes().min(n_bytes - start))?;
         transfer.fill(&buffer, payload, start)?;
         Ok(buffer)
     };
     (0..n_bytes).step_by(gpu.page_bytes()).map(page).collect()
+}
+
+/// Fails if an array has more pages than kernels read.
+fn check_pages(gpu: &Gpu, n_bytes: usize, max_pages: usize) -> Result<()> {
+    let max_pages = if gpu.has_pages() { max_pages } else { 1 };
+    let (found, needed) = ((max_pages * gpu.page_bytes()) as u64, n_bytes as u64);
+    if found < needed {
+        let (device, limit) = (gpu.info.name.clone(), "bytes in the pages of a tree");
+        return Err(Error::Limit { device, limit, found, needed });
+    }
+    Ok(())
 }
 
 /// Makes an array, if the device allows one of this size.
