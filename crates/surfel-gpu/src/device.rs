@@ -18,7 +18,7 @@ pub struct DeviceInfo {
     pub driver: String,
     /// Size of the largest array that a kernel can read, in bytes.
     pub max_array_bytes: u64,
-    /// Size of the device's memory in bytes; none if its interface does not tell.
+    /// Size of the device's own memory in bytes; none if it has none, or if only Metal or DirectX 12 know it.
     pub memory_bytes: Option<u64>,
 }
 
@@ -93,7 +93,10 @@ fn info(adapter: &wgpu::Adapter) -> DeviceInfo {
         api: format!("{:?}", info.backend),
         driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
         max_array_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
-        memory_bytes: memory_bytes(adapter),
+        // Drivers on the processor state a fixed number, which is not their limit.
+        memory_bytes: (kind(adapter) != DeviceKind::Software)
+            .then(|| memory_bytes(adapter))
+            .flatten(),
     }
 }
 
@@ -226,15 +229,15 @@ impl Gpu {
 
     /// Waits until the device has done what it was told.
     pub fn wait(&self) -> Result<()> {
-        self.poll(None)
+        self.wait_until(None)
     }
 
-    /// Waits until the device has done what it was told up to a submission.
-    pub fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<()> {
-        self.poll(Some(submission))
+    /// Waits until the device has done a submission and all before it.
+    pub fn wait_for(&self, submission: &wgpu::SubmissionIndex) -> Result<()> {
+        self.wait_until(Some(submission.clone()))
     }
 
-    fn poll(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<()> {
+    fn wait_until(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<()> {
         let wait = wgpu::PollType::Wait { submission_index, timeout: Some(WAIT_TIMEOUT) };
         let polled = self.device.poll(wait);
         self.check()?;

@@ -108,7 +108,7 @@ impl<'a> Transfer<'a> {
             })?;
             let submitted = submitted.ok_or_else(|| self.refusal())?;
             if let Some(previous) = self.in_flight.replace(submitted) {
-                self.gpu.wait_for(previous)?;
+                self.gpu.wait_for(&previous)?;
             }
         }
         Ok(())
@@ -116,7 +116,7 @@ impl<'a> Transfer<'a> {
 
     /// Waits until all is on the device.
     pub fn finish(self) -> Result<()> {
-        self.in_flight.map_or(Ok(()), |last| self.gpu.wait_for(last))
+        self.in_flight.map_or(Ok(()), |last| self.gpu.wait_for(&last))
     }
 
     /// Returns the error of a device that gives no memory for a chunk, and no other error: it was lost.
