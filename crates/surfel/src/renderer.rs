@@ -73,8 +73,8 @@ impl SceneRenderer {
     }
 
     fn open_gpu(&self) -> GpuResult<GpuRenderer> {
-        let opened = GpuRenderer::open(self.device.as_deref())?;
-        Ok(opened.with_memory_limit(self.memory_limit))
+        let opened = GpuRenderer::open(self.device.as_deref());
+        opened.map(|gpu| gpu.with_memory_limit(self.memory_limit))
     }
 
     /// Returns a GPU that may be taken unasked: one that is not emulated, or that is named.
