@@ -45,14 +45,15 @@ impl RunStats<'_> {
     pub fn json(&self) -> Value {
         let Seconds { load, prepare, build, total } = self.seconds;
         let (n_points, n_triangles) = self.counts;
-        let RenderStats { rays, trace_secs, frame_secs } = self.rendered;
+        let RenderStats { rays, trace_secs, transfer_secs, frame_secs } = self.rendered;
         json!({
             "points": n_points,
             "triangles": n_triangles,
             "instances": self.flat.instances.len(),
             "seconds": {
                 "load": load, "prepare": prepare, "build": build,
-                "trace": trace_secs, "frame": frame_secs, "total": total,
+                "trace": trace_secs, "transfer": transfer_secs, "frame": frame_secs,
+                "total": total,
             },
             "rays": {
                 "primary": rays.primary, "shadow": rays.shadow, "sky": rays.sky,

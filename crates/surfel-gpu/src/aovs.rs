@@ -1,12 +1,12 @@
 //! AOVs from the hits of a device.
 
 use crate::numbers::{NONE, SURFACES, TRIANGLE};
-use crate::records::{FrameRecord, HitRecord};
+use crate::pixel_order::PixelOrder;
+use crate::records::HitRecord;
 use surfel_core::flat::{FlatGeometry, FlatScene};
 use surfel_core::image::Aovs;
 use surfel_core::integrator::albedo;
 use surfel_core::math::Vec3;
-use surfel_core::render::Settings;
 use surfel_core::scene::View;
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::SceneHit;
@@ -17,25 +17,22 @@ pub struct AovSource<'a> {
     pub scene: &'a FlatScene,
     /// The camera for the picture.
     pub view: &'a View,
-    /// The size of the picture.
-    pub settings: &'a Settings,
 }
 
-/// Sets the AOVs of the pixels from `first` on by the hits of the rays through their centres.
+/// Sets the AOVs of the pixels from number `first` on by the hits of the rays through their centres.
 pub fn set_aovs(
     aovs: &mut Aovs,
     hits: &[HitRecord],
     source: &AovSource,
-    frame: FrameRecord,
+    order: PixelOrder,
     first: u32,
 ) {
     for (i, hit) in hits.iter().enumerate().filter(|(_, hit)| hit.instance != NONE) {
-        let (scene, width) = (source.scene, source.settings.width);
-        let in_picture = frame.first_pixel + i as u32;
-        let (x, y) = (in_picture % width, in_picture / width);
+        let scene = source.scene;
+        let (x, y) = order.pixel_of(first + i as u32);
         let ray = source.view.ray(x as f32 + 0.5, y as f32 + 0.5);
         let position = ray.at(hit.distance);
-        let pixel = first as usize + i;
+        let pixel = order.image_idx(first + i as u32);
         aovs.depth[pixel] = source.view.depth(position);
         aovs.position[pixel] = position;
         aovs.normal[pixel] = Vec3::from_array(hit.normal);

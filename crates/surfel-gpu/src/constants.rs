@@ -12,7 +12,9 @@ use crate::numbers::light_kind;
 use crate::numbers::miss;
 use crate::numbers::queue;
 use crate::numbers::texture;
-use crate::numbers::{MAX_PLANES, TRIANGLE, WORKGROUP_SIZE, align_number, surface_number};
+use crate::numbers::{
+    BAND_HEIGHT, MAX_PLANES, TRIANGLE, WORKGROUP_SIZE, align_number, surface_number,
+};
 use surfel_core::bvh::MAX_DEPTH;
 use surfel_core::flat::{MAX_KD_DEPTH, MAX_OCTREE_DEPTH};
 use surfel_core::integrator::constants as integrator;
@@ -81,6 +83,7 @@ fn numbers() -> Vec<(&'static str, u32)> {
         ("FIRST_TAKEN", count::FIRST_TAKEN),
         ("FIRST_TRACED", count::FIRST_TRACED),
         ("N_ACTIVE", count::N_ACTIVE),
+        ("MAX_ADDED", count::MAX_ADDED),
         ("N_COUNTS", count::N_COUNTS),
         ("BACKGROUND_ENVIRONMENT", background::ENVIRONMENT),
         ("GRADIENT", background::GRADIENT),
@@ -115,6 +118,7 @@ fn numbers() -> Vec<(&'static str, u32)> {
 fn limits() -> Vec<(&'static str, u32)> {
     vec![
         ("WORKGROUP_SIZE", WORKGROUP_SIZE),
+        ("BAND_HEIGHT", BAND_HEIGHT),
         ("MAX_PLANES", MAX_PLANES as u32),
         ("MAX_DEPTH", MAX_DEPTH as u32),
         ("MAX_GATHERED", MAX_GATHERED as u32),

@@ -54,6 +54,9 @@ impl DeviceKind {
 const VECTOR_BYTES: u64 = 16;
 /// Number of storage buffers that a kernel uses at most, where trees are whole.
 const N_STORAGE_BUFFERS: u64 = 10;
+/// The features by which the time of each pass can be measured.
+const TIMING: wgpu::Features =
+    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
 /// Time after which a device that does not finish a piece of work counts as hung. Pieces take far less than a second.
 const WAIT_TIMEOUT: Duration = Duration::from_secs(60);
 
@@ -173,6 +176,7 @@ impl Gpu {
         check_limits(&info, &limits)?;
         let description = wgpu::DeviceDescriptor {
             label: Some("surfel"),
+            required_features: adapter.features() & TIMING,
             required_limits: limits,
             memory_hints: wgpu::MemoryHints::Performance,
             ..wgpu::DeviceDescriptor::default()
@@ -219,6 +223,11 @@ impl Gpu {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Returns true if the time of each pass can be measured.
+    pub fn has_timestamps(&self) -> bool {
+        self.device.features().contains(TIMING)
     }
 
     /// Fails if the device has failed since it was opened.

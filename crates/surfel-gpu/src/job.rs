@@ -3,25 +3,25 @@
 use crate::aovs::{AovSource, set_aovs};
 use crate::device::Gpu;
 use crate::error::{Error, Result};
+use crate::kernel_times::KernelTimes;
 use crate::kernels::Kernels;
-use crate::numbers::WORKGROUP_SIZE;
-use crate::passes::{Pass, PassStage, Passes, Size};
-use crate::records::{FrameRecord, HitRecord, ShadingPointRecord};
+use crate::part_size::next_part;
+use crate::passes::{Pass, PassStage, Passes};
+use crate::pixel_order::{PixelOrder, set_pixels};
+use crate::records::{FrameRecord, HitRecord};
 use crate::scene_records::{SceneRecords, frame};
-use crate::shader::Resources;
+use crate::submitter::{Bound, BoundTree, Submitter};
 use crate::upload::{TreeRef, Uploads};
-use crate::wavefront::{Capacities, Contents, DISPATCH_BYTES, Wavefront, written};
+use crate::wavefront::{Arrays, Capacities, Contents, Counts, PartReadback, Wavefront, written};
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
 use surfel_core::integrator::constants::MAX_SURFACES;
-use surfel_core::math::Vec4;
 use surfel_core::progress::Progress;
 use surfel_core::render::{RenderRegion, RenderStats, Settings};
+use surfel_core::scene::Background;
 
-/// Number of pixels of the first part of a picture.
-const FIRST_PART: u32 = 1 << 12;
 /// Maximum number of entries of a queue: it bounds the memory, up to 800 bytes an entry.
 const MAX_ENTRIES: u32 = 1 << 20;
 /// Number of entries of a queue for each pixel, where paths have branches. A part whose paths have more is rendered
@@ -29,14 +29,10 @@ const MAX_ENTRIES: u32 = 1 << 20;
 const ENTRIES_PER_PIXEL: u32 = 4;
 /// Minimum number of entries of a queue, where paths have branches.
 const MIN_ENTRIES: u32 = 1 << 14;
-/// Number of passes that the device is given at once. Between them work can be cancelled, and the wait for them is far
-/// shorter than its limit, also on slow devices and with many light samples.
-const PASSES_AT_ONCE: usize = 16;
+/// Number of wavefronts after which the CPU asks whether any path is left. Passes over empty queues cost next to nothing.
+const WAVES_AT_ONCE: usize = 4;
 /// Number of surfaces that rays toward a light pass before the device is asked whether any is left.
 const SURFACES_AT_ONCE: usize = 4;
-/// Time of a sample of a part above which the next part is smaller, and well below which it is larger. A device that
-/// also draws a screen must not be busy for long, and work is cancelled between samples.
-const MAX_SAMPLE_TIME: Duration = Duration::from_millis(200);
 
 /// One picture.
 pub struct Job<'a> {
@@ -54,98 +50,141 @@ pub struct Job<'a> {
     pub region: RenderRegion,
     /// The passes of a sample.
     pub passes: Passes,
+    /// The sizes of the arrays.
+    pub sizes: Capacities,
     /// The records that shading reads.
     pub records: SceneRecords,
     /// Texels and the like.
     pub words: &'a wgpu::Buffer,
 }
 
-/// A tree, bound for passes.
-struct BoundTree {
-    group: wgpu::BindGroup,
-    is_paged: bool,
+/// The state that a renderer keeps from picture to picture, and that each of them changes.
+pub struct Kept<'a> {
+    /// The large arrays.
+    pub arrays: &'a mut Option<Arrays>,
+    /// The times of kernels.
+    pub times: &'a mut KernelTimes,
+    /// Number of pixels of the next part.
+    pub part_size: &'a mut u32,
 }
 
-/// Durations of a part of a picture.
-#[derive(Clone, Copy, Debug, Default)]
-struct PartTimes {
-    /// Duration of the slowest sample.
-    slowest: Duration,
-    /// Duration of the search for the nearest hits of camera rays, in all samples.
-    trace: Duration,
+/// A picture while its parts are rendered.
+struct Picture<'a> {
+    source: AovSource<'a>,
+    order: PixelOrder,
+    image: Image,
+    stats: RenderStats,
+    /// The time at which the last part was there.
+    last_arrival: Instant,
+    /// Number of pixels of the next part.
+    part_size: &'a mut u32,
+    progress: &'a dyn Progress,
 }
 
-/// The arrays of a picture, bound for its passes.
-struct Arrays {
-    wavefront: Wavefront,
-    trees: BTreeMap<TreeRef, BoundTree>,
+/// A part that the device works on.
+struct Part<'a> {
+    first: u32,
+    n_pixels: u32,
+    start: Instant,
+    kernels: Option<wgpu::SubmissionIndex>,
+    readback: PartReadback<'a>,
 }
 
-/// The result of a part of a picture.
-enum Part {
-    /// It was rendered.
-    Done(PartTimes),
+/// The way of a sample to the device.
+#[derive(PartialEq)]
+enum Outcome {
+    /// It went there whole.
+    Done,
     /// A queue was too short.
     Overflow,
 }
 
 impl Job<'_> {
     /// Renders the picture.
-    pub fn render(&self, progress: &dyn Progress) -> surfel_core::Result<(Image, RenderStats)> {
-        let Self { gpu, settings, region, .. } = *self;
+    pub fn render(
+        &self,
+        kept: Kept,
+        progress: &dyn Progress,
+    ) -> surfel_core::Result<(Image, RenderStats)> {
+        let Self { gpu, settings, region, sizes, .. } = *self;
         let start = Instant::now();
-        let n_pixels = u64::from(settings.width) * u64::from(region.n_rows());
-        progress.begin("render", n_pixels);
-        let sizes = Self::sizes(gpu, self.scene, &self.passes, n_pixels);
+        let view = self.scene.camera.view(self.scene.origin, settings.width, settings.height);
+        let (first_row, n_rows) = (region.rows.0, region.n_rows());
+        let order = PixelOrder { width: settings.width, first_row, n_rows };
+        progress.begin("render", order.n_pixels().into());
         let Self { records, words, .. } = self;
         let contents = Contents { scene: records, words, tasks: &self.passes.tasks };
-        let arrays = Arrays {
-            wavefront: Wavefront::new(gpu, self.kernels, sizes, contents)?,
-            trees: self.bind_trees()?,
+        let arrays = Arrays::update(kept.arrays, gpu, sizes)?;
+        let wavefront = &Wavefront::new(gpu, self.kernels, arrays, contents)?;
+        let bound = Bound { kernels: self.kernels, wavefront, trees: &self.bind_trees()? };
+        let mut submitter = Submitter::new(gpu, bound, kept.times, progress)?;
+        let mut picture = Picture {
+            source: AovSource { scene: self.scene, view: &view },
+            order,
+            image: region.blank_image(settings),
+            stats: RenderStats::default(),
+            last_arrival: start,
+            part_size: kept.part_size,
+            progress,
         };
-        let wavefront = &arrays.wavefront;
-        let view = self.scene.camera.view(self.scene.origin, settings.width, settings.height);
-        let capacity = sizes.n_entries;
-        let frame = FrameRecord { capacity, ..frame(self.scene, &view, settings) };
-        let source = AovSource { scene: self.scene, view: &view, settings };
-        let mut image = region.blank_image(settings);
-        let mut stats = RenderStats::default();
-        let mut max_part = sizes.n_pixels;
-        let (mut done, mut part) = (0, FIRST_PART.min(max_part));
-        while done < n_pixels {
-            let n_rays = u64::from(part).min(n_pixels - done) as u32;
-            // Pictures have at most 2^28 pixels.
-            let first = done as u32;
-            let first_pixel = region.rows.0 * settings.width + first;
-            let frame = FrameRecord { first_pixel, n_rays, ..frame };
-            let Part::Done(times) = self.render_part(&arrays, frame, progress)? else {
-                wavefront.clear_counts(gpu);
-                max_part = self.smaller_part(n_rays)?;
-                part = max_part;
-                continue;
-            };
-            let sums = wavefront.read_pixels(gpu, n_rays)?;
-            self.resolve(&sums, first, &mut image);
-            if let Some(aovs) = &mut image.aovs {
-                let frame = FrameRecord { is_centered: 1, ..frame };
-                let hits = self.find_aov_hits(&arrays, frame, progress)?;
-                set_aovs(aovs, &hits, &source, frame, first);
-            }
-            stats.rays += wavefront.read_counts(gpu)?.rays();
-            wavefront.clear_counts(gpu);
-            stats.trace_secs += times.trace.as_secs_f64();
-            part = next_part(part, times.slowest, max_part);
-            done += u64::from(n_rays);
-            progress.advance(n_rays.into());
-        }
+        let (capacity, n_samples) = (sizes.n_entries, region.n_samples());
+        let frame = frame(self.scene, &view, settings);
+        let frame = FrameRecord { capacity, n_samples, first_row, n_rows, ..frame };
+        self.render_parts(&mut submitter, wavefront, frame, &mut picture)?;
+        let Picture { image, mut stats, .. } = picture;
+        stats.trace_secs = submitter.primary_secs;
         stats.frame_secs = start.elapsed().as_secs_f64();
         Ok((image, stats))
     }
 
+    /// Renders the parts of the picture, one after the other.
+    fn render_parts(
+        &self,
+        submitter: &mut Submitter,
+        wavefront: &Wavefront,
+        frame: FrameRecord,
+        picture: &mut Picture,
+    ) -> surfel_core::Result<()> {
+        let n_pixels = picture.order.n_pixels();
+        let mut max_part = self.sizes.n_pixels;
+        let (mut first_pixel, mut parity) = (0, 0);
+        let mut working: Option<Part> = None;
+        while first_pixel < n_pixels {
+            let n_rays = (*picture.part_size).min(max_part).min(n_pixels - first_pixel);
+            let frame = FrameRecord { first_pixel, n_rays, ..frame };
+            let start = Instant::now();
+            if self.submit_part(submitter, wavefront, frame)? == Outcome::Overflow {
+                max_part = self.smaller_part(n_rays)?;
+                continue;
+            }
+            self.add_aovs(submitter, wavefront, frame, picture)?;
+            let kernels = submitter.last().cloned();
+            let readback = wavefront.request_part(self.gpu, n_rays, parity);
+            let part = Part { first: first_pixel, n_pixels: n_rays, start, kernels, readback };
+            // While the CPU takes a part, the device works on the next one.
+            if let Some(before) = working.replace(part) {
+                self.take_part(before, picture)?;
+            }
+            first_pixel += n_rays;
+            parity = 1 - parity;
+        }
+        if let Some(last) = working {
+            if let Some(kernels) = &last.kernels {
+                self.gpu.wait_for(kernels)?;
+            }
+            let finish = Instant::now();
+            self.take_part(last, picture)?;
+            picture.stats.transfer_secs = finish.elapsed().as_secs_f64();
+        }
+        Ok(())
+    }
+
     /// Returns the sizes of the arrays of a picture with this number of pixels.
-    pub fn sizes(gpu: &Gpu, scene: &FlatScene, passes: &Passes, n_pixels: u64) -> Capacities {
+    pub fn sizes(gpu: &Gpu, scene: &FlatScene, passes: &Passes, n_pixels: u32) -> Capacities {
+        let n_pixels = u64::from(n_pixels);
         let has_waves = passes.next_wave.is_some();
-        let fitting = gpu.info.max_array_bytes / size_of::<ShadingPointRecord>() as u64;
+        // A hit is the largest entry.
+        let fitting = gpu.info.max_array_bytes / size_of::<HitRecord>() as u64;
         let max_entries = fitting.min(MAX_ENTRIES.into());
         let (wanted, per_pixel) = match has_waves {
             true => {
@@ -189,195 +228,133 @@ impl Job<'_> {
         Ok((n_pixels / 4).max(1))
     }
 
-    /// Renders all samples of a part.
-    fn render_part(
+    /// Gives all samples of a part to the device.
+    fn submit_part(
         &self,
-        arrays: &Arrays,
+        submitter: &mut Submitter,
+        wavefront: &Wavefront,
         frame: FrameRecord,
-        progress: &dyn Progress,
-    ) -> surfel_core::Result<Part> {
-        let mut times = PartTimes::default();
+    ) -> surfel_core::Result<Outcome> {
+        submitter.n_pixels = frame.n_rays;
+        wavefront.clear_counts(self.gpu);
         for sample_idx in self.region.samples.0..self.region.samples.1 {
-            let start = Instant::now();
+            // A picture is written for the submissions to come, so those of the sample before must be on their way.
+            submitter.flush()?;
             let is_first = (sample_idx == self.region.samples.0).into();
-            arrays.wavefront.set_frame(self.gpu, &FrameRecord { sample_idx, is_first, ..frame });
-            let Part::Done(of_sample) = self.render_sample(arrays, frame, progress)? else {
-                return Ok(Part::Overflow);
-            };
-            times.slowest = times.slowest.max(start.elapsed());
-            times.trace += of_sample.trace;
+            wavefront.set_frame(self.gpu, &FrameRecord { sample_idx, is_first, ..frame });
+            if self.submit_sample(submitter, wavefront, frame.capacity)? == Outcome::Overflow {
+                return Ok(Outcome::Overflow);
+            }
         }
-        Ok(Part::Done(times))
+        submitter.add(&self.passes.resolve)?;
+        submitter.flush()?;
+        Ok(Outcome::Done)
     }
 
-    /// Renders a sample, one wavefront after the other.
-    fn render_sample(
+    /// Gives a sample to the device, some wavefronts at once.
+    fn submit_sample(
         &self,
-        arrays: &Arrays,
-        frame: FrameRecord,
-        progress: &dyn Progress,
-    ) -> surfel_core::Result<Part> {
-        let mut run = Run { job: self, arrays, n_pixels: frame.n_rays, parity: 0 };
-        run.passes(&self.passes.camera, progress)?;
-        let start = Instant::now();
-        run.passes(&self.passes.trace, progress)?;
-        let done = PartTimes { trace: start.elapsed(), ..PartTimes::default() };
+        submitter: &mut Submitter,
+        wavefront: &Wavefront,
+        capacity: u32,
+    ) -> surfel_core::Result<Outcome> {
+        submitter.parity = 0;
+        submitter.add(&self.passes.camera)?;
+        submitter.is_primary = true;
+        submitter.add(&self.passes.trace)?;
+        submitter.is_primary = false;
+        let mut n_waves = 0;
         loop {
             for stage in &self.passes.shade {
                 match stage {
-                    PassStage::Once(passes) => run.passes(passes, progress)?,
-                    PassStage::Surfaces(passes) => run.surfaces(passes, progress)?,
+                    PassStage::Once(passes) => submitter.add(passes)?,
+                    PassStage::Surfaces(passes) => {
+                        self.submit_surfaces(submitter, wavefront, passes)?;
+                    }
                 }
             }
-            let Some(next_wave) = self.passes.next_wave else { return Ok(Part::Done(done)) };
-            match arrays.wavefront.read_counts(self.gpu)?.n_next_paths() {
-                0 => return Ok(Part::Done(done)),
-                n if frame.capacity < n => return Ok(Part::Overflow),
-                _ => {}
+            let Some(next_wave) = &self.passes.next_wave else { return Ok(Outcome::Done) };
+            n_waves += 1;
+            if n_waves % WAVES_AT_ONCE == 0 {
+                let counts = self.read_counts(submitter, wavefront)?;
+                if capacity < counts.max_added() {
+                    return Ok(Outcome::Overflow);
+                }
+                if counts.n_next_paths() == 0 {
+                    return Ok(Outcome::Done);
+                }
             }
-            run.parity = 1 - run.parity;
-            run.submit(&[next_wave])?;
-            run.passes(&self.passes.trace, progress)?;
+            submitter.parity = 1 - submitter.parity;
+            submitter.add([next_wave])?;
+            submitter.add(&self.passes.trace)?;
         }
-    }
-
-    /// Returns the hits of the rays through the centres of the pixels of a part.
-    fn find_aov_hits(
-        &self,
-        arrays: &Arrays,
-        frame: FrameRecord,
-        progress: &dyn Progress,
-    ) -> surfel_core::Result<Vec<HitRecord>> {
-        arrays.wavefront.set_frame(self.gpu, &frame);
-        let run = Run { job: self, arrays, n_pixels: frame.n_rays, parity: 0 };
-        run.passes(&self.passes.aov_hits, progress)?;
-        run.passes(&self.passes.aov_supports, progress)?;
-        Ok(arrays.wavefront.read_hits(self.gpu, frame.n_rays)?)
-    }
-
-    /// Sets the pixels from `first` on to the means of their samples over the background.
-    fn resolve(&self, sums: &[[f32; 4]], first: u32, image: &mut Image) {
-        let n_samples = self.region.n_samples() as f32;
-        for (i, sum) in sums.iter().enumerate() {
-            let pixel = first as usize + i;
-            let y = self.region.rows.0 + (pixel / self.settings.width as usize) as u32;
-            let height = (y as f32 + 0.5) / self.settings.height as f32;
-            let background = Vec4::from_array(self.scene.background.color_at(height));
-            let mean = Vec4::from_array(*sum) / n_samples;
-            image.coverage[pixel] = mean.w;
-            image.color[pixel] = (mean + (1.0 - mean.w) * background).to_array();
-        }
-    }
-}
-
-/// Returns the number of pixels of the part after one whose slowest sample took this time.
-fn next_part(part: u32, slowest: Duration, max_part: u32) -> u32 {
-    if MAX_SAMPLE_TIME < slowest {
-        (part / 2).max(WORKGROUP_SIZE).min(max_part)
-    } else if slowest < MAX_SAMPLE_TIME / 3 {
-        (part * 2).min(max_part)
-    } else {
-        part
-    }
-}
-
-/// The way of passes to the device.
-struct Run<'a> {
-    job: &'a Job<'a>,
-    arrays: &'a Arrays,
-    /// Number of pixels of the part.
-    n_pixels: u32,
-    /// Index of the array that holds the paths of the current wavefront.
-    parity: usize,
-}
-
-impl Run<'_> {
-    /// Runs passes, a few at once.
-    fn passes(&self, passes: &[Pass], progress: &dyn Progress) -> surfel_core::Result<()> {
-        for passes in passes.chunks(PASSES_AT_ONCE) {
-            progress.check()?;
-            self.submit(passes)?;
-            self.job.gpu.wait()?;
-        }
-        Ok(())
     }
 
     /// Runs the passes that take rays through one surface each, until none is left or too many were passed.
-    fn surfaces(&self, passes: &[Pass], progress: &dyn Progress) -> surfel_core::Result<()> {
+    fn submit_surfaces(
+        &self,
+        submitter: &mut Submitter,
+        wavefront: &Wavefront,
+        passes: &[Pass],
+    ) -> surfel_core::Result<()> {
         for _ in 0..MAX_SURFACES.div_ceil(SURFACES_AT_ONCE) {
             for _ in 0..SURFACES_AT_ONCE {
-                self.passes(passes, progress)?;
+                submitter.add(passes)?;
             }
-            if self.arrays.wavefront.read_counts(self.job.gpu)?.n_active() == 0 {
+            if self.read_counts(submitter, wavefront)?.n_active() == 0 {
                 break;
             }
         }
         Ok(())
     }
 
-    /// Gives passes to the device.
-    fn submit(&self, passes: &[Pass]) -> Result<()> {
-        let gpu = self.job.gpu;
-        gpu.catch("the passes", || {
-            let description = wgpu::CommandEncoderDescriptor::default();
-            let mut encoder = gpu.device.create_command_encoder(&description);
-            {
-                let description = wgpu::ComputePassDescriptor::default();
-                let mut encoder = encoder.begin_compute_pass(&description);
-                passes.iter().for_each(|pass| self.encode(&mut encoder, *pass));
-            }
-            gpu.queue.submit([encoder.finish()]);
-        })
+    /// Waits for all passes, and returns what they have counted.
+    fn read_counts(
+        &self,
+        submitter: &mut Submitter,
+        wavefront: &Wavefront,
+    ) -> surfel_core::Result<Counts> {
+        submitter.flush()?;
+        Ok(wavefront.read_counts(self.gpu)?)
     }
 
-    fn encode(&self, encoder: &mut wgpu::ComputePass, pass: Pass) {
-        let Self { arrays: Arrays { wavefront, trees }, job, .. } = *self;
-        let rays =
-            if pass.is_of_light { &wavefront.light_rays } else { &wavefront.paths[self.parity] };
-        let tree = pass.tree.and_then(|tree| trees.get(&tree));
-        let is_paged = tree.is_some_and(|tree| tree.is_paged);
-        encoder.set_pipeline(job.kernels.get(pass.kernel, is_paged));
-        encoder.set_bind_group(0, &wavefront.uniforms, &[pass.task_offset]);
-        encoder.set_bind_group(1, rays, &[]);
-        match pass.kernel.resources() {
-            Resources::Scene => encoder.set_bind_group(2, &wavefront.scene, &[]),
-            Resources::Dispatches => {
-                let dispatches =
-                    if pass.size == Size::One { &wavefront.dispatches } else { &wavefront.unused };
-                encoder.set_bind_group(2, dispatches, &[]);
-            }
-            Resources::Tree => {
-                let Some(tree) = tree else { return };
-                encoder.set_bind_group(2, &tree.group, &[]);
-            }
-        }
-        match pass.size {
-            Size::One => encoder.dispatch_workgroups(1, 1, 1),
-            Size::Pixels => {
-                encoder.dispatch_workgroups(self.n_pixels.div_ceil(WORKGROUP_SIZE), 1, 1);
-            }
-            Size::Queue(queue) => {
-                let offset = DISPATCH_BYTES * u64::from(queue);
-                encoder.dispatch_workgroups_indirect(&wavefront.dispatch_sizes, offset);
-            }
-        }
+    /// Sets the AOVs of a part that was rendered, if they are wanted.
+    fn add_aovs(
+        &self,
+        submitter: &mut Submitter,
+        wavefront: &Wavefront,
+        frame: FrameRecord,
+        picture: &mut Picture,
+    ) -> surfel_core::Result<()> {
+        let Picture { source, order, image: Image { aovs: Some(aovs), .. }, .. } = picture else {
+            return Ok(());
+        };
+        wavefront.set_frame(self.gpu, &FrameRecord { is_centered: 1, ..frame });
+        submitter.parity = 0;
+        submitter.add(&self.passes.aov_hits)?;
+        submitter.add(&self.passes.aov_supports)?;
+        submitter.flush()?;
+        let hits: Vec<HitRecord> = wavefront.read_hits(self.gpu, frame.n_rays)?;
+        set_aovs(aovs, &hits, source, *order, frame.first_pixel);
+        Ok(())
     }
-}
 
-#[cfg(test)]
-mod tests {
-    //! Parts grow while they are fast and shrink while they are slow.
-
-    use super::*;
-
-    #[test]
-    fn parts_follow_the_speed_of_the_device() {
-        let next = |part, millis| next_part(part, Duration::from_millis(millis), MAX_ENTRIES);
-        assert_eq!(next(FIRST_PART, 1), 2 * FIRST_PART);
-        assert_eq!(next(FIRST_PART, 100), FIRST_PART);
-        assert_eq!(next(FIRST_PART, 300), FIRST_PART / 2);
-        assert_eq!(next(WORKGROUP_SIZE, 9000), WORKGROUP_SIZE);
-        assert_eq!(next(MAX_ENTRIES, 0), MAX_ENTRIES);
-        assert_eq!(next_part(7, Duration::from_secs(9), 7), 7);
+    /// Waits for a part, adds it to the picture, and learns from its time how large those to come should be.
+    fn take_part(&self, part: Part, picture: &mut Picture) -> surfel_core::Result<()> {
+        let Part { first, n_pixels, start, readback, .. } = part;
+        let is_opaque = matches!(self.scene.background, Background::Gradient { .. });
+        let background_alpha = if is_opaque { 1.0 } else { 0.0 };
+        let set = |colors: &[[f32; 4]]| {
+            set_pixels(&mut picture.image, colors, first as usize, background_alpha);
+        };
+        let (counts, arrival) = readback.read(self.gpu, set)?;
+        picture.stats.rays += counts.rays();
+        // The device begins a part when it has finished the one before.
+        let time = arrival.saturating_duration_since(start.max(picture.last_arrival));
+        *picture.part_size =
+            next_part(*picture.part_size, n_pixels, time / self.region.n_samples());
+        picture.last_arrival = arrival;
+        picture.progress.advance(n_pixels.into());
+        Ok(())
     }
 }

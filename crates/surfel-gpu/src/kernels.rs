@@ -19,9 +19,9 @@ pub struct Kernels {
     pub paged_tree: wgpu::BindGroupLayout,
     /// Layout of the arrays of a scene.
     pub scene: wgpu::BindGroupLayout,
-    /// Layout of the sizes of dispatches.
-    pub dispatches: wgpu::BindGroupLayout,
-    /// Layouts of the kernels that read a tree, a tree in pages, the scene, or the sizes of dispatches.
+    /// Layout of one array that a kernel writes: the sizes of dispatches, or the colours of pixels.
+    pub output: wgpu::BindGroupLayout,
+    /// Layouts of the kernels that read a tree, a tree in pages or the scene, or write an array.
     pipeline_layouts: [wgpu::PipelineLayout; 4],
     compiled: BTreeMap<(Kernel, bool), wgpu::ComputePipeline>,
 }
@@ -38,8 +38,8 @@ impl Kernels {
             let n_pages = if gpu.has_pages() { N_NODE_PAGES + N_BLOCK_PAGES } else { 2 };
             let paged_tree = layout(gpu, &vec![read; 1 + n_pages]);
             let scene = layout(gpu, &[read; 4]);
-            let dispatches = layout(gpu, &[write]);
-            let pipeline_layouts = [&tree, &paged_tree, &scene, &dispatches].map(|resources| {
+            let output = layout(gpu, &[write]);
+            let pipeline_layouts = [&tree, &paged_tree, &scene, &output].map(|resources| {
                 gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                     label: None,
                     bind_group_layouts: &[Some(&uniforms), Some(&rays), Some(resources)],
@@ -47,7 +47,7 @@ impl Kernels {
                 })
             });
             let compiled = BTreeMap::new();
-            Self { uniforms, rays, tree, paged_tree, scene, dispatches, pipeline_layouts, compiled }
+            Self { uniforms, rays, tree, paged_tree, scene, output, pipeline_layouts, compiled }
         })
     }
 
@@ -62,12 +62,12 @@ impl Kernels {
     ) -> Result<()> {
         for (kernel, is_paged) in kernels {
             if !self.compiled.contains_key(&(kernel, is_paged)) {
-                let [tree, paged_tree, scene, dispatches] = &self.pipeline_layouts;
+                let [tree, paged_tree, scene, output] = &self.pipeline_layouts;
                 let layout = match kernel.resources() {
                     Resources::Tree if is_paged => paged_tree,
                     Resources::Tree => tree,
                     Resources::Scene => scene,
-                    Resources::Dispatches => dispatches,
+                    Resources::Dispatches | Resources::Colors => output,
                 };
                 let page_shift = is_paged.then_some(gpu.page_shift);
                 let pipeline =

@@ -4,6 +4,8 @@ use surfel_core::surface::{Align, SurfaceKind};
 
 /// Number of invocations of a workgroup.
 pub const WORKGROUP_SIZE: u32 = 64;
+/// Number of rows of a band, in which pixels are numbered column by column.
+pub const BAND_HEIGHT: u32 = 4;
 /// Maximum number of planes that limit camera rays.
 pub const MAX_PLANES: usize = 8;
 /// Maximum number of pages of the nodes of a tree.
@@ -82,8 +84,10 @@ pub mod count {
     pub const FIRST_TRACED: u32 = FIRST_TAKEN + N_QUEUES;
     /// Number of rays toward a light that are still on their way.
     pub const N_ACTIVE: u32 = FIRST_TRACED + UNCOUNTED + 1;
+    /// Greatest number of entries that were added to a queue. If it is more than the queue holds, some were lost.
+    pub const MAX_ADDED: u32 = N_ACTIVE + 1;
     /// Number of counts.
-    pub const N_COUNTS: u32 = N_ACTIVE + 1;
+    pub const N_COUNTS: u32 = MAX_ADDED + 1;
 }
 
 /// Numbers of backgrounds.

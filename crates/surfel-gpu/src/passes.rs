@@ -59,6 +59,8 @@ pub struct Passes {
     pub shade: Vec<PassStage>,
     /// The passes that begin the next wavefront; none if there is only one.
     pub next_wave: Option<Pass>,
+    /// The pass after all samples.
+    pub resolve: Option<Pass>,
     /// The passes that find the hits of the rays through the centres of pixels, if the picture has AOVs and these hits
     /// are not known from its only sample.
     pub aov_hits: Vec<Pass>,
@@ -101,6 +103,7 @@ impl Passes {
         if scene.materials.iter().any(has_branches) {
             passes.next_wave = Some(passes.take(queue::PATHS, ray_kind::SECONDARY));
         }
+        passes.resolve = Some(passes.pass(Kernel::Resolve, Size::Pixels, Task::default()));
         passes.add_aov_passes(&trees, &gaussians, settings);
         passes
     }
@@ -111,7 +114,8 @@ impl Passes {
             PassStage::Once(passes) | PassStage::Surfaces(passes) => passes,
         });
         let aovs = self.aov_hits.iter().chain(&self.aov_supports);
-        self.camera.iter().chain(&self.trace).chain(shade).chain(&self.next_wave).chain(aovs)
+        let last = self.next_wave.iter().chain(&self.resolve);
+        self.camera.iter().chain(&self.trace).chain(shade).chain(last).chain(aovs)
     }
 
     fn pass(&mut self, kernel: Kernel, size: Size, task: Task) -> Pass {

@@ -7,13 +7,14 @@ use crate::numbers::queue;
 use crate::numbers::ray_kind;
 use crate::numbers::{NO_LIMIT, NONE, WORKGROUP_SIZE};
 use crate::passes::{Pass, Size};
+use crate::picture_memory::array_bytes;
 use crate::records::{FrameRecord, Path, Task, Visit};
 use crate::scene_records::SceneRecords;
 use crate::shader::{Kernel, Surface};
 use crate::tree_visits::lone_visit;
 use crate::unsupported::trees;
 use crate::upload::{GpuTree, TreeRef, Uploads};
-use crate::wavefront::{Capacities, Contents, RECORD_STRIDE, Wavefront, written};
+use crate::wavefront::{Arrays, Capacities, Contents, RECORD_STRIDE, Wavefront, written};
 use bytemuck::Zeroable;
 use std::sync::Arc;
 use std::time::Instant;
@@ -67,19 +68,23 @@ pub struct Timing<'a> {
 pub fn time(
     gpu: &Gpu,
     kernels: &mut Kernels,
-    uploads: &mut Uploads,
+    (uploads, arrays): (&mut Uploads, &mut Option<Arrays>),
     timing: Timing,
     progress: &dyn Progress,
 ) -> surfel_core::Result<RayTimes> {
     let searches = searches(timing.geometry, timing.query);
+    let geometries = std::slice::from_ref(timing.geometry);
+    let n = timing.rays.len().min(MAX_RAYS) as u32;
+    let sizes = Capacities { n_pixels: n, n_entries: n, has_waves: false, is_transmissive: false };
+    let has_room = |sizes| uploads.has_room(gpu, geometries, array_bytes(sizes));
+    let found = Arrays::make_room(arrays, gpu, sizes, has_room)?;
     let start = Instant::now();
-    uploads.update(gpu, std::slice::from_ref(timing.geometry), 0)?;
+    uploads.update(gpu, geometries, array_bytes(found))?;
     let mut times = RayTimes {
         geometry_upload_secs: start.elapsed().as_secs_f64(),
         run_secs: vec![0.0; timing.n_runs as usize],
         ..RayTimes::default()
     };
-    let geometries = std::slice::from_ref(timing.geometry);
     let tree = |search: &Search| {
         uploads.tree(geometries, TreeRef::Geometry { geometry_idx: 0, tree_idx: search.tree_idx })
     };
@@ -88,8 +93,9 @@ pub fn time(
     let of_trees = searches.iter().map(|search| (search.kernel, is_paged(search)));
     kernels.compile(gpu, own.into_iter().chain(of_trees))?;
     let kernels = &*kernels;
+    let arrays = Arrays::update(arrays, gpu, sizes)?;
     for rays in timing.rays.chunks(MAX_RAYS) {
-        let chunk = Chunk::new(gpu, kernels, &searches, rays)?;
+        let chunk = Chunk::new(gpu, (kernels, arrays), &searches, rays)?;
         let visits: Vec<Visit> = searches.iter().map(|search| search.visit).collect();
         let bytes = bytemuck::cast_slice(&visits);
         let visits = written(gpu, "instances", bytes, wgpu::BufferUsages::STORAGE)?;
@@ -158,18 +164,21 @@ fn searches(geometry: &FlatGeometry, query: TimedQuery) -> Vec<Search> {
 }
 
 /// Rays on a device.
-struct Chunk {
-    wavefront: Wavefront,
+struct Chunk<'a> {
+    wavefront: Wavefront<'a>,
     paths: Vec<Path>,
     clear: Vec<Pass>,
     searches: Vec<Pass>,
 }
 
-impl Chunk {
-    fn new(gpu: &Gpu, kernels: &Kernels, searches: &[Search], rays: &[Ray]) -> Result<Self> {
+impl<'a> Chunk<'a> {
+    fn new(
+        gpu: &Gpu,
+        (kernels, arrays): (&Kernels, &'a Arrays),
+        searches: &[Search],
+        rays: &[Ray],
+    ) -> Result<Self> {
         let n = rays.len() as u32;
-        let sizes =
-            Capacities { n_pixels: n, n_entries: n, has_waves: false, is_transmissive: false };
         let mut tasks = Vec::new();
         let mut pass = |kernel: Kernel, size, task: Task| {
             let task_offset = tasks.len() as u32;
@@ -191,7 +200,7 @@ impl Chunk {
         let records = SceneRecords::empty();
         let words = written(gpu, "textures", &[0; 4], wgpu::BufferUsages::STORAGE)?;
         let contents = Contents { scene: &records, words: &words, tasks: &tasks };
-        let wavefront = Wavefront::new(gpu, kernels, sizes, contents)?;
+        let wavefront = Wavefront::new(gpu, kernels, arrays, contents)?;
         wavefront.set_frame(gpu, &FrameRecord { n_rays: n, capacity: n, ..Zeroable::zeroed() });
         let path = |ray: &Ray| Path {
             ray: Ray { t_max: ray.t_max.min(NO_LIMIT), ..*ray },

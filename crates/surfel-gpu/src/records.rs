@@ -29,14 +29,14 @@ pub struct FrameRecord {
     pub seed: [u32; 2],
     /// Width of the picture in pixels.
     pub width: u32,
-    /// Index in the picture of the pixel of the first ray.
+    /// Number of the pixel of the first ray among those of the rows that are rendered, in bands of rows, column by column.
     pub first_pixel: u32,
     /// Number of rays: one for each pixel.
     pub n_rays: u32,
     /// Index of the sample among those of its pixel.
     pub sample_idx: u32,
-    /// Number of samples of a pixel.
-    pub samples_per_pixel: u32,
+    /// Number of samples of a pixel that are summed up.
+    pub n_samples: u32,
     /// 1 if rays go through the centres of pixels.
     pub is_centered: u32,
     /// 1 if the sample is the first one that is summed up.
@@ -63,6 +63,14 @@ pub struct FrameRecord {
     pub pixel_at_origin: f32,
     /// Growth of a pixel with the distance.
     pub pixel_per_distance: f32,
+    /// The first row that is rendered.
+    pub first_row: u32,
+    /// Number of rows that are rendered.
+    pub n_rows: u32,
+    /// Zero.
+    pub reserved_a: u32,
+    /// Zero.
+    pub reserved_b: u32,
     /// Normals of planes, and their distances from the scene's origin along these.
     pub planes: [[f32; 4]; MAX_PLANES],
 }
@@ -405,12 +413,3 @@ pub struct ShadingPointRecord {
 /// Sums of radiance and alpha over all samples of a pixel, in fixed point of 32 bits before and 32 behind the point: the
 /// lower words come first.
 pub type Pixel = [u32; 8];
-
-/// Returns the values of the sums of a pixel.
-pub fn pixel_sums(pixel: &Pixel) -> [f32; 4] {
-    let value = |channel: usize| {
-        let fixed = u64::from(pixel[4 + channel]) << 32 | u64::from(pixel[channel]);
-        (fixed as f64 / (1u64 << 32) as f64) as f32
-    };
-    [value(0), value(1), value(2), value(3)]
-}

@@ -2,16 +2,19 @@
 
 use crate::device::{DeviceInfo, Gpu};
 use crate::error::{Error, Result};
-use crate::job::Job;
+use crate::job::{Job, Kept};
+use crate::kernel_times::{KernelTime, KernelTimes};
 use crate::kernels::Kernels;
+use crate::part_size::first_part;
 use crate::passes::{Pass, Passes};
 use crate::picture_memory::picture_bytes;
 use crate::ray_timing::{self, RayTimes, Timing};
 use crate::scene_records::SceneRecords;
 use crate::unsupported::unsupported;
-use crate::upload::{GpuTree, Uploads};
+use crate::upload::{GpuTree, UploadTime, Uploads};
+use crate::wavefront::Arrays;
 use crate::words::SceneWords;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
 use surfel_core::progress::Progress;
@@ -24,12 +27,16 @@ pub struct GpuRenderer {
     state: Mutex<State>,
 }
 
-/// Kernels and points, kept from picture to picture.
+/// Kernels, points and arrays, kept from picture to picture.
 #[derive(Debug)]
 struct State {
     kernels: Kernels,
     uploads: Uploads,
     words: Option<SceneWords>,
+    arrays: Option<Arrays>,
+    /// Number of pixels of the next part, once one was rendered.
+    part_size: Option<u32>,
+    times: KernelTimes,
 }
 
 impl GpuRenderer {
@@ -49,7 +56,14 @@ impl GpuRenderer {
     pub fn with_pages(selector: Option<&str>, max_page_bytes: u64) -> Result<Self> {
         let gpu = Gpu::open(selector, max_page_bytes)?;
         let kernels = Kernels::new(&gpu)?;
-        let state = State { kernels, uploads: Uploads::default(), words: None };
+        let state = State {
+            kernels,
+            uploads: Uploads::default(),
+            words: None,
+            arrays: None,
+            part_size: None,
+            times: KernelTimes::default(),
+        };
         Ok(Self { gpu, state: Mutex::new(state) })
     }
 
@@ -65,6 +79,32 @@ impl GpuRenderer {
         &self.gpu.info
     }
 
+    /// Returns the bytes of points and triangles that went to the device since it was opened, and the time that this took.
+    pub fn upload_time(&self) -> UploadTime {
+        self.state().uploads.time
+    }
+
+    /// Begins or ends to measure how long each kernel works, if the device has a clock. Pictures take longer meanwhile:
+    /// the device waits until its clock was read.
+    pub fn measure_kernels(&self, is_wanted: bool) {
+        self.state().times.is_measured = is_wanted;
+    }
+
+    /// Returns the kernels' names and the work of each that was measured.
+    pub fn kernel_times(&self) -> Vec<(String, KernelTime)> {
+        self.state().times.named()
+    }
+
+    /// Forgets the work of kernels that was measured.
+    pub fn reset_kernel_times(&self) {
+        self.state().times.reset();
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // A panic elsewhere leaves nothing half done here: kernels and uploads are added when they are complete.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Searches along given rays several times, as benchmarks do.
     ///
     /// # Errors
@@ -76,9 +116,9 @@ impl GpuRenderer {
     ) -> surfel_core::Result<RayTimes> {
         self.gpu.check()?;
         ray_timing::check(&self.gpu, timing.geometry, timing.query)?;
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let State { kernels, uploads, .. } = &mut *state;
-        ray_timing::time(&self.gpu, kernels, uploads, timing, progress)
+        let mut state = self.state();
+        let State { kernels, uploads, arrays, .. } = &mut *state;
+        ray_timing::time(&self.gpu, kernels, (uploads, arrays), timing, progress)
     }
 }
 
@@ -100,13 +140,15 @@ impl Renderer for GpuRenderer {
             return Err(Error::Device { device, reason }.into());
         }
         self.gpu.check()?;
-        // A panic elsewhere leaves nothing half done here: kernels and uploads are added when they are complete.
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let State { kernels, uploads, words } = &mut *state;
+        let mut state = self.state();
+        let State { kernels, uploads, words, arrays, part_size, times } = &mut *state;
         let passes = Passes::new(scene, settings);
-        let n_pixels = u64::from(settings.width) * u64::from(region.n_rows());
-        let sizes = Job::sizes(&self.gpu, scene, &passes, n_pixels);
-        uploads.update(&self.gpu, &scene.geometries, picture_bytes(scene, &passes, sizes))?;
+        // Pictures have at most 2^28 pixels.
+        let sizes = Job::sizes(&self.gpu, scene, &passes, settings.width * region.n_rows());
+        let bytes = |sizes| picture_bytes(scene, &passes, sizes);
+        let has_room = |sizes| uploads.has_room(&self.gpu, &scene.geometries, bytes(sizes));
+        let found = Arrays::make_room(arrays, &self.gpu, sizes, has_room)?;
+        uploads.update(&self.gpu, &scene.geometries, bytes(found))?;
         let is_paged = |tree| uploads.tree(&scene.geometries, tree).is_some_and(GpuTree::is_paged);
         let of_pass = |pass: &Pass| (pass.kernel, pass.tree.is_some_and(is_paged));
         kernels.compile(&self.gpu, passes.all().map(of_pass))?;
@@ -115,11 +157,23 @@ impl Renderer for GpuRenderer {
         let records = SceneRecords::new(scene, &words.offsets);
         let words = &words.buffer;
         let gpu = &self.gpu;
-        // The kernels number pixels row by row.
+        // The kernels render whole rows.
         let rows = RenderRegion { columns: RenderRegion::whole(settings).columns, ..region };
-        let job =
-            Job { gpu, kernels, uploads, scene, settings, region: rows, passes, records, words };
-        let (image, stats) = job.render(progress)?;
+        let job = Job {
+            gpu,
+            kernels,
+            uploads,
+            scene,
+            settings,
+            region: rows,
+            passes,
+            sizes,
+            records,
+            words,
+        };
+        let first_part = first_part(gpu.info.kind, *part_size);
+        let part_size = part_size.insert(first_part);
+        let (image, stats) = job.render(Kept { arrays, times, part_size }, progress)?;
         Ok((image.with_columns(region.columns), stats))
     }
 }
@@ -167,6 +221,24 @@ mod tests {
             let CoreError::Renderer(reason) = &error else { panic!("{error}") };
             assert!(reason.starts_with(&renderer.device().name), "{reason}");
         }
+    }
+
+    #[test]
+    fn arrays_of_larger_pictures_make_room() {
+        let Ok(renderer) = GpuRenderer::open(None) else { return };
+        let small = Settings { width: 8, height: 4, ..Settings::default() };
+        let large = Settings { width: 64, height: 64, ..small };
+        let render = |renderer: &GpuRenderer, settings: &Settings| {
+            renderer.render(&empty(), settings, &NoProgress).map(|_| {
+                let state = renderer.state();
+                state.arrays.as_ref().map(|arrays| arrays.sizes().n_pixels)
+            })
+        };
+        assert_eq!(render(&renderer, &large), Ok(Some(64 * 64)));
+        assert_eq!(render(&renderer, &small), Ok(Some(64 * 64)));
+        let limited = renderer.with_memory_limit(Some(1 << 20));
+        assert_eq!(render(&limited, &small), Ok(Some(8 * 4)));
+        assert!(render(&limited, &large).is_err());
     }
 
     #[test]

@@ -340,7 +340,6 @@ pub fn frame(scene: &FlatScene, view: &View, settings: &Settings) -> FrameRecord
         center: view.center.into(),
         seed: [settings.seed as u32, (settings.seed >> 32) as u32],
         width: settings.width,
-        samples_per_pixel: settings.samples_per_pixel,
         is_centered: (settings.samples_per_pixel == 1).into(),
         background_top: top.to_array(),
         background,

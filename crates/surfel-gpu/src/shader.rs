@@ -36,6 +36,8 @@ pub enum Kernel {
     AddLight,
     /// Tints the light of rays by the surfaces that they hit, and adds that of rays that hit none.
     PassSurface,
+    /// Computes the colours of pixels from the sums of their samples.
+    Resolve,
 }
 
 /// The arrays that a kernel reads beside those of rays.
@@ -47,6 +49,8 @@ pub enum Resources {
     Scene,
     /// The sizes of dispatches.
     Dispatches,
+    /// The colours of pixels.
+    Colors,
 }
 
 /// A surface that kernels trace.
@@ -169,14 +173,16 @@ const COMMON: &[&str] = parts!["math/ray.wgsl", "records.wgsl"];
 const SAMPLING: &[&str] = parts!["math/random.wgsl", "math/sampling.wgsl", "render/key.wgsl"];
 const GENERATE: &[&str] = parts!["scene/camera.wgsl", "render/generate.wgsl"];
 const QUEUE: &[&str] = parts!["render/queue.wgsl"];
+const RESOLVE: &[&str] = parts!["render/resolve.wgsl"];
 const CLEAR: &[&str] = parts!["render/clear.wgsl"];
 const SCENE: &[&str] = parts!["math/basis.wgsl", "scene/buffers.wgsl", "render/pixel.wgsl"];
 const LIGHTS: &[&str] = parts!["scene/light.wgsl", "scene/environment.wgsl"];
 const SPECULAR: &[&str] = parts!["integrator/specular.wgsl"];
 const SHADING: &[&str] =
     parts!["scene/texture.wgsl", "integrator/shading.wgsl", "integrator/media.wgsl"];
-const SHADE: &[&str] = parts!["integrator/background.wgsl", "integrator/whitted.wgsl"];
-const DIRECT: &[&str] = parts!["integrator/direct.wgsl"];
+const SHADE: &[&str] =
+    parts!["render/slot.wgsl", "integrator/background.wgsl", "integrator/whitted.wgsl"];
+const DIRECT: &[&str] = parts!["render/slot.wgsl", "integrator/direct.wgsl"];
 const TRANSMITTANCE: &[&str] = parts!["integrator/transmittance.wgsl"];
 const ARRAYS: &[&str] = parts!["flat/arrays.wgsl"];
 const PAGED_ARRAYS: &[&str] = parts!["flat/paged_arrays.wgsl"];
@@ -268,6 +274,7 @@ impl Kernel {
             Self::SampleLight,
             Self::AddLight,
             Self::PassSurface,
+            Self::Resolve,
         ];
         all.extend(Surface::ALL.map(Self::Closest));
         all.extend(Surface::ALL.map(Self::Any));
@@ -291,6 +298,7 @@ impl Kernel {
             Self::Any(_) => "any_hit",
             Self::AddLight => "add_light",
             Self::PassSurface => "pass_surface",
+            Self::Resolve => "resolve",
         }
     }
 
@@ -305,6 +313,7 @@ impl Kernel {
             Self::Shade | Self::SampleLight | Self::AddLight | Self::PassSurface => {
                 Resources::Scene
             }
+            Self::Resolve => Resources::Colors,
         }
     }
 
@@ -336,6 +345,7 @@ impl Kernel {
             Self::Generate => vec![COMMON, SAMPLING, GENERATE],
             Self::TakeQueue => vec![COMMON, QUEUE],
             Self::ClearHits => vec![COMMON, CLEAR],
+            Self::Resolve => vec![COMMON, SAMPLING, RESOLVE],
             Self::Shade => vec![COMMON, SAMPLING, SCENE, LIGHTS, SPECULAR, SHADING, SHADE],
             Self::SampleLight | Self::AddLight => {
                 vec![COMMON, SAMPLING, SCENE, LIGHTS, SPECULAR, DIRECT]

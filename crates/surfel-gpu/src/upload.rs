@@ -10,6 +10,7 @@ use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
 use crate::transfer::{MAX_STAGING_BYTES, NODE_BYTES, Payload, Transfer};
 use crate::unsupported::trees;
 use std::sync::{Arc, Weak};
+use std::time::Instant;
 use surfel_core::bvh::BvhNode;
 use surfel_core::flat::{BlockTree, FlatGeometry};
 
@@ -76,6 +77,25 @@ pub struct Uploads {
     geometries: Vec<(Weak<FlatGeometry>, GpuGeometry)>,
     /// The trained Gaussians of these geometries in one tree.
     gaussians: Option<(Vec<Weak<FlatGeometry>>, GpuTree)>,
+    /// The work so far.
+    pub time: UploadTime,
+}
+
+/// Bytes that went to a device, and the time that this took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UploadTime {
+    /// Number of bytes.
+    pub n_bytes: u64,
+    /// Seconds, with the time in which the CPU laid the bytes out.
+    pub secs: f64,
+}
+
+impl UploadTime {
+    fn add<'t>(&mut self, start: Instant, trees: impl IntoIterator<Item = &'t GpuTree>) {
+        let buffers = trees.into_iter().flat_map(|tree| tree.nodes.iter().chain(&tree.blocks));
+        self.n_bytes += buffers.map(wgpu::Buffer::size).sum::<u64>();
+        self.secs += start.elapsed().as_secs_f64();
+    }
 }
 
 impl Uploads {
@@ -90,12 +110,7 @@ impl Uploads {
         geometries: &[Arc<FlatGeometry>],
         other_bytes: u64,
     ) -> Result<()> {
-        // A geometry that was changed has lost its weak references, also where it stayed at its place in memory.
-        self.geometries.retain(|(geometry, _)| geometry.strong_count() != 0);
-        if !self.has_gaussians_of(geometries) {
-            self.gaussians = None;
-        }
-        if self.check_memory(gpu, geometries, other_bytes).is_err() {
+        if !self.has_room(gpu, geometries, other_bytes) {
             // The geometries of other pictures make room.
             let is_needed = |known: &Weak<_>| geometries.iter().any(|other| is_same(known, other));
             self.geometries.retain(|(known, _)| is_needed(known));
@@ -103,11 +118,29 @@ impl Uploads {
         }
         for geometry in geometries {
             if self.position(geometry).is_none() {
+                let start = Instant::now();
                 let uploaded = upload(gpu, geometry)?;
+                self.time.add(start, uploaded.iter().flatten());
                 self.geometries.push((Arc::downgrade(geometry), uploaded));
             }
         }
         self.update_gaussians(gpu, geometries)
+    }
+
+    /// Frees geometries that are no longer in use, and returns true if the device has memory for these and for
+    /// `other_bytes`.
+    pub fn has_room(
+        &mut self,
+        gpu: &Gpu,
+        geometries: &[Arc<FlatGeometry>],
+        other_bytes: u64,
+    ) -> bool {
+        // A geometry that was changed has lost its weak references, also where it stayed at its place in memory.
+        self.geometries.retain(|(geometry, _)| geometry.strong_count() != 0);
+        if !self.has_gaussians_of(geometries) {
+            self.gaussians = None;
+        }
+        self.check_memory(gpu, geometries, other_bytes).is_ok()
     }
 
     /// Fails if the trees that are missing have too many pages, or if all trees take too much memory.
@@ -143,8 +176,10 @@ impl Uploads {
         if self.gaussians.is_some() || gaussian_clouds(geometries).next().is_none() {
             return Ok(());
         }
+        let start = Instant::now();
         let arrays = GaussianArrays::new(geometries);
         if let Some(tree) = upload_tree(gpu, &arrays.nodes, &[], &arrays.blocks)? {
+            self.time.add(start, [&tree]);
             let clouds = gaussian_clouds(geometries).map(|(i, _)| Arc::downgrade(&geometries[i]));
             self.gaussians = Some((clouds.collect(), tree));
         }

@@ -6,9 +6,10 @@ use crate::kernels::{Kernels, bind};
 use crate::numbers::count;
 use crate::numbers::queue;
 use crate::numbers::ray_kind;
-use crate::records::{FrameRecord, HitRecord, Path, Pixel, ShadingPointRecord, pixel_sums};
+use crate::readback::Readback;
+use crate::records::{FrameRecord, HitRecord, Path, Pixel, ShadingPointRecord};
 use crate::scene_records::SceneRecords;
-use std::sync::mpsc;
+use std::time::Instant;
 use surfel_core::image::decode_srgb8;
 use surfel_core::integrator::RayCounts;
 use surfel_core::integrator::constants::{ALBEDO_STEPS, directional_albedo};
@@ -19,17 +20,39 @@ pub const RECORD_STRIDE: u64 = 256;
 /// Bytes of the sizes of the dispatches over one queue.
 pub const DISPATCH_BYTES: u64 = 12;
 
-/// The arrays of one picture.
+/// Bytes of the counts before the colours of pixels in a readback: colours begin at a multiple of their size.
+const COUNT_BYTES: u64 = 256;
+/// Maximum number of bytes of hits and the like that are read at once.
+pub const MAX_READ_BYTES: u64 = 1 << 24;
+
+/// The large arrays, which a renderer keeps from picture to picture. A picture reads nothing that one before it left.
 #[derive(Debug)]
-pub struct Wavefront {
-    frame: wgpu::Buffer,
-    pixels: wgpu::Buffer,
-    first_paths: wgpu::Buffer,
+pub struct Arrays {
+    sizes: Capacities,
+    paths: [wgpu::Buffer; 2],
     hits: wgpu::Buffer,
+    light_rays: wgpu::Buffer,
+    light_hits: wgpu::Buffer,
+    points: wgpu::Buffer,
+    pixels: wgpu::Buffer,
+    colors: wgpu::Buffer,
     counts: wgpu::Buffer,
+    tables: wgpu::Buffer,
+    unused_paths: wgpu::Buffer,
+    unused_sizes: wgpu::Buffer,
+    /// Two buffers for the counts and colours of a part, in turn.
+    part_readbacks: [wgpu::Buffer; 2],
     readback: wgpu::Buffer,
     /// Sizes of the dispatches over the queues.
     pub dispatch_sizes: wgpu::Buffer,
+}
+
+/// The arrays bound for the passes of one picture, with its small ones.
+#[derive(Debug)]
+pub struct Wavefront<'a> {
+    /// The large arrays.
+    pub arrays: &'a Arrays,
+    frame: wgpu::Buffer,
     /// The uniforms: picture, task and tables.
     pub uniforms: wgpu::BindGroup,
     /// The arrays of paths, with either of two arrays as that of the current wavefront.
@@ -40,12 +63,14 @@ pub struct Wavefront {
     pub dispatches: wgpu::BindGroup,
     /// An array in the place of these sizes, for kernels that do not write them.
     pub unused: wgpu::BindGroup,
+    /// The colours of pixels.
+    pub colors: wgpu::BindGroup,
     /// The arrays of the scene.
     pub scene: wgpu::BindGroup,
 }
 
 /// The sizes of the arrays of a picture.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Capacities {
     /// Number of pixels of a part.
     pub n_pixels: u32,
@@ -55,6 +80,16 @@ pub struct Capacities {
     pub has_waves: bool,
     /// True if light passes surfaces.
     pub is_transmissive: bool,
+}
+
+impl Capacities {
+    /// Returns true if arrays of these sizes hold what is wanted.
+    fn hold(&self, wanted: &Self) -> bool {
+        wanted.n_pixels <= self.n_pixels
+            && wanted.n_entries <= self.n_entries
+            && wanted.has_waves <= self.has_waves
+            && wanted.is_transmissive <= self.is_transmissive
+    }
 }
 
 /// The contents of a picture's arrays.
@@ -78,6 +113,11 @@ impl Counts {
         self.0[(count::FIRST_ADDED + queue::PATHS) as usize]
     }
 
+    /// Returns the greatest number of entries that were added to a queue.
+    pub fn max_added(&self) -> u32 {
+        self.0[count::MAX_ADDED as usize].max(self.n_next_paths())
+    }
+
     /// Returns the number of rays toward a light that are still on their way.
     pub fn n_active(&self) -> u32 {
         self.0[count::N_ACTIVE as usize]
@@ -95,42 +135,111 @@ impl Counts {
     }
 }
 
-impl Wavefront {
-    /// Makes the arrays.
-    pub fn new(
+impl Arrays {
+    /// Frees `known` if it does not hold what is wanted, or if it holds more and leaves no room for the rest of a picture.
+    /// Returns the sizes of the arrays that the picture will have.
+    ///
+    /// # Errors
+    /// Fails if the device does.
+    pub fn make_room(
+        known: &mut Option<Self>,
         gpu: &Gpu,
-        kernels: &Kernels,
-        sizes: Capacities,
-        contents: Contents,
-    ) -> Result<Self> {
+        wanted: Capacities,
+        has_room: impl FnOnce(Capacities) -> bool,
+    ) -> Result<Capacities> {
+        if let Some(Self { sizes, .. }) = *known {
+            if sizes == wanted || sizes.hold(&wanted) && has_room(sizes) {
+                return Ok(sizes);
+            }
+            // The memory never holds both. It is free once the device has finished with it.
+            *known = None;
+            gpu.wait()?;
+        }
+        Ok(wanted)
+    }
+
+    /// Returns arrays that hold what is wanted: `known`, or new ones in their place.
+    ///
+    /// # Errors
+    /// Fails if the device has too little memory.
+    pub fn update<'a>(
+        known: &'a mut Option<Self>,
+        gpu: &Gpu,
+        wanted: Capacities,
+    ) -> Result<&'a Self> {
+        Self::make_room(known, gpu, wanted, |_| true)?;
+        let arrays = match known.take() {
+            Some(arrays) => arrays,
+            None => Self::new(gpu, wanted)?,
+        };
+        Ok(known.insert(arrays))
+    }
+
+    /// Returns the sizes.
+    #[cfg(test)]
+    pub fn sizes(&self) -> Capacities {
+        self.sizes
+    }
+
+    fn new(gpu: &Gpu, sizes: Capacities) -> Result<Self> {
         let array = |label, n: u32, size: usize, usage| {
             gpu.buffer(label, u64::from(n) * size as u64, Usage::STORAGE | usage)
         };
         let Capacities { n_pixels, n_entries, .. } = sizes;
-        let of_paths = Usage::COPY_DST | Usage::COPY_SRC;
-        let paths = |label, n| array(label, n, size_of::<Path>(), of_paths);
-        let n_seconds = if sizes.has_waves { n_entries } else { 1 };
-        let (first, second) = (paths("paths", n_entries)?, paths("next paths", n_seconds)?);
-        let (light_rays, unused) = (paths("rays toward lights", n_entries)?, paths("unused", 1)?);
-        let hit_bytes = size_of::<HitRecord>();
-        let hits = array("hits", n_entries, hit_bytes, Usage::COPY_SRC)?;
-        let n_light_hits = if sizes.is_transmissive { n_entries } else { 1 };
-        let light_hits = array("hits of light", n_light_hits, hit_bytes, Usage::empty())?;
-        let points = array("points", n_entries, size_of::<ShadingPointRecord>(), Usage::empty())?;
-        let pixels = array("pixels", n_pixels, size_of::<Pixel>(), Usage::COPY_SRC)?;
-        let counts = [0u8; 4 * count::N_COUNTS as usize];
-        let counts = written(gpu, "counts", &counts, Usage::STORAGE | Usage::COPY_SRC)?;
+        let paths =
+            |label, n| array(label, n, size_of::<Path>(), Usage::COPY_DST | Usage::COPY_SRC);
+        let hits = |label, n| array(label, n, size_of::<HitRecord>(), Usage::COPY_SRC);
+        let of_cpu = Usage::MAP_READ | Usage::COPY_DST;
+        let part_bytes = COUNT_BYTES + u64::from(n_pixels) * size_of::<[f32; 4]>() as u64;
+        let part = || gpu.buffer("colours and counts", part_bytes, of_cpu);
+        let hit_bytes = u64::from(n_entries) * size_of::<HitRecord>() as u64;
+        let read_bytes = hit_bytes.clamp(COUNT_BYTES, MAX_READ_BYTES);
+        let count_bytes = 4 * u64::from(count::N_COUNTS);
+        let of_counts = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
         let dispatch_bytes = DISPATCH_BYTES * u64::from(queue::N_QUEUES + 1);
-        let dispatch_sizes =
-            gpu.buffer("sizes", dispatch_bytes, Usage::STORAGE | Usage::INDIRECT)?;
-        let unused_sizes = gpu.buffer("unused", dispatch_bytes, Usage::STORAGE)?;
+        let of_points = size_of::<ShadingPointRecord>();
+        Ok(Self {
+            sizes,
+            paths: [
+                paths("paths", n_entries)?,
+                paths("next paths", if sizes.has_waves { n_entries } else { 1 })?,
+            ],
+            hits: hits("hits", n_entries)?,
+            light_rays: paths("rays toward lights", n_entries)?,
+            light_hits: hits("hits of light", if sizes.is_transmissive { n_entries } else { 1 })?,
+            points: array("points", n_entries, of_points, Usage::empty())?,
+            pixels: array("pixels", n_pixels, size_of::<Pixel>(), Usage::empty())?,
+            colors: array("colours", n_pixels, size_of::<[f32; 4]>(), Usage::COPY_SRC)?,
+            counts: gpu.buffer("counts", count_bytes, of_counts)?,
+            tables: written(gpu, "tables", bytemuck::cast_slice(&tables()), Usage::UNIFORM)?,
+            unused_paths: paths("unused", 1)?,
+            unused_sizes: gpu.buffer("unused", dispatch_bytes, Usage::STORAGE)?,
+            part_readbacks: [part()?, part()?],
+            readback: gpu.buffer("results", read_bytes, of_cpu)?,
+            dispatch_sizes: gpu.buffer(
+                "sizes",
+                dispatch_bytes,
+                Usage::STORAGE | Usage::INDIRECT,
+            )?,
+        })
+    }
+}
+
+impl<'a> Wavefront<'a> {
+    /// Binds the arrays for a picture.
+    ///
+    /// # Errors
+    /// Fails if the device does.
+    pub fn new(
+        gpu: &Gpu,
+        kernels: &Kernels,
+        arrays: &'a Arrays,
+        contents: Contents,
+    ) -> Result<Self> {
+        let Arrays { hits, points, pixels, counts, tables, .. } = arrays;
         let tasks = written(gpu, "tasks", contents.tasks, Usage::UNIFORM)?;
-        let tables = written(gpu, "tables", bytemuck::cast_slice(&tables()), Usage::UNIFORM)?;
         let frame_bytes = size_of::<FrameRecord>() as u64;
         let frame = gpu.buffer("picture", frame_bytes, Usage::UNIFORM | Usage::COPY_DST)?;
-        let readback_bytes = u64::from(n_pixels) * hit_bytes as u64;
-        let readback_bytes = readback_bytes.max(4 * u64::from(count::N_COUNTS));
-        let readback = gpu.buffer("results", readback_bytes, Usage::MAP_READ | Usage::COPY_DST)?;
         let SceneRecords { materials, instances, lights } = contents.scene;
         let scene = [
             written(gpu, "materials", bytemuck::cast_slice(materials), Usage::STORAGE)?,
@@ -142,30 +251,31 @@ impl Wavefront {
             offset: 0,
             size: wgpu::BufferSize::new(RECORD_STRIDE),
         });
-        gpu.catch("the arrays of rays", || {
+        let wavefront = gpu.catch("the arrays of rays", || {
             let rays = |paths: &wgpu::Buffer, hits: &wgpu::Buffer, next: &wgpu::Buffer| {
-                let arrays = [paths, hits, next, &points, &pixels, &counts];
+                let arrays = [paths, hits, next, points, pixels, counts];
                 bind(gpu, &kernels.rays, &arrays.map(wgpu::Buffer::as_entire_binding))
             };
+            let output =
+                |array: &wgpu::Buffer| bind(gpu, &kernels.output, &[array.as_entire_binding()]);
             let uniforms = [frame.as_entire_binding(), task, tables.as_entire_binding()];
             let [materials, instances, lights] = &scene;
             let scene = [materials, instances, lights, contents.words];
+            let [first, second] = &arrays.paths;
             Self {
+                arrays,
                 uniforms: bind(gpu, &kernels.uniforms, &uniforms),
-                paths: [rays(&first, &hits, &second), rays(&second, &hits, &first)],
-                light_rays: rays(&light_rays, &light_hits, &unused),
-                dispatches: bind(gpu, &kernels.dispatches, &[dispatch_sizes.as_entire_binding()]),
-                unused: bind(gpu, &kernels.dispatches, &[unused_sizes.as_entire_binding()]),
+                paths: [rays(first, hits, second), rays(second, hits, first)],
+                light_rays: rays(&arrays.light_rays, &arrays.light_hits, &arrays.unused_paths),
+                dispatches: output(&arrays.dispatch_sizes),
+                unused: output(&arrays.unused_sizes),
+                colors: output(&arrays.colors),
                 scene: bind(gpu, &kernels.scene, &scene.map(wgpu::Buffer::as_entire_binding)),
                 frame,
-                pixels,
-                first_paths: first,
-                hits,
-                counts,
-                readback,
-                dispatch_sizes,
             }
-        })
+        })?;
+        wavefront.clear_counts(gpu);
+        Ok(wavefront)
     }
 
     /// Sets the part of the picture that the next passes render.
@@ -173,69 +283,84 @@ impl Wavefront {
         gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(frame));
     }
 
-    /// Returns the sums of the first `n` pixels.
-    pub fn read_pixels(&self, gpu: &Gpu, n: u32) -> Result<Vec<[f32; 4]>> {
-        let n_bytes = u64::from(n) * size_of::<Pixel>() as u64;
-        let pixels: Vec<Pixel> = self.read(gpu, &self.pixels, n_bytes)?;
-        Ok(pixels.iter().map(pixel_sums).collect())
+    /// Asks for the counts and the colours of the first `n` pixels. Two parts may be on their way, of different parity.
+    pub fn request_part(&self, gpu: &Gpu, n: u32, parity: usize) -> PartReadback<'a> {
+        let Arrays { colors, counts, part_readbacks, .. } = self.arrays;
+        let buffer = &part_readbacks[parity];
+        let color_bytes = u64::from(n) * size_of::<[f32; 4]>() as u64;
+        PartReadback(Readback::new(gpu, buffer, COUNT_BYTES + color_bytes, |encoder| {
+            encoder.copy_buffer_to_buffer(counts, 0, buffer, 0, counts.size());
+            encoder.copy_buffer_to_buffer(colors, 0, buffer, COUNT_BYTES, color_bytes);
+        }))
     }
 
     /// Returns the hits of the first `n` rays.
     pub fn read_hits(&self, gpu: &Gpu, n: u32) -> Result<Vec<HitRecord>> {
-        self.read(gpu, &self.hits, u64::from(n) * size_of::<HitRecord>() as u64)
+        self.read(gpu, &self.arrays.hits, n)
     }
 
     /// Sets the first paths of the first wavefront.
     pub fn write_paths(&self, gpu: &Gpu, paths: &[Path]) {
-        gpu.queue.write_buffer(&self.first_paths, 0, bytemuck::cast_slice(paths));
+        gpu.queue.write_buffer(&self.arrays.paths[0], 0, bytemuck::cast_slice(paths));
     }
 
     /// Returns the first `n` paths of the first wavefront.
     pub fn read_paths(&self, gpu: &Gpu, n: u32) -> Result<Vec<Path>> {
-        self.read(gpu, &self.first_paths, u64::from(n) * size_of::<Path>() as u64)
+        self.read(gpu, &self.arrays.paths[0], n)
     }
 
     /// Sets the numbers of entries that were added to all queues.
     pub fn fill_queues(&self, gpu: &Gpu, n: u32) {
         let counts = [n; queue::N_QUEUES as usize];
         let offset = 4 * u64::from(count::FIRST_ADDED);
-        gpu.queue.write_buffer(&self.counts, offset, bytemuck::cast_slice(&counts));
+        gpu.queue.write_buffer(&self.arrays.counts, offset, bytemuck::cast_slice(&counts));
     }
 
     /// Returns what the kernels have counted so far.
     pub fn read_counts(&self, gpu: &Gpu) -> Result<Counts> {
-        self.read(gpu, &self.counts, 4 * u64::from(count::N_COUNTS)).map(Counts)
+        self.read(gpu, &self.arrays.counts, count::N_COUNTS).map(Counts)
     }
 
     /// Sets all counts to zero.
     pub fn clear_counts(&self, gpu: &Gpu) {
-        gpu.queue.write_buffer(&self.counts, 0, &[0; 4 * count::N_COUNTS as usize]);
+        gpu.queue.write_buffer(&self.arrays.counts, 0, &[0; 4 * count::N_COUNTS as usize]);
     }
 
-    fn read<T: bytemuck::Pod>(
-        &self,
-        gpu: &Gpu,
-        buffer: &wgpu::Buffer,
-        n_bytes: u64,
-    ) -> Result<Vec<T>> {
-        let description = wgpu::CommandEncoderDescriptor::default();
-        let mut encoder = gpu.device.create_command_encoder(&description);
-        encoder.copy_buffer_to_buffer(buffer, 0, &self.readback, 0, n_bytes);
-        gpu.queue.submit([encoder.finish()]);
-        let slice = self.readback.slice(..n_bytes);
-        let (sender, receiver) = mpsc::channel();
-        // If the receiver is gone, the wait has failed before.
-        slice.map_async(wgpu::MapMode::Read, move |result| _ = sender.send(result));
-        gpu.wait()?;
-        let unreadable =
-            |reason: String| gpu.keep_failure(format!("results cannot be read: {reason}"));
-        let mapped = receiver.try_recv().map_err(|error| unreadable(error.to_string()))?;
-        mapped.map_err(|error| unreadable(error.to_string()))?;
-        let view = slice.get_mapped_range().map_err(|error| unreadable(error.to_string()))?;
-        let values = bytemuck::pod_collect_to_vec(&view);
-        drop(view);
-        self.readback.unmap();
-        Ok(values)
+    /// Returns the first `n` records of an array.
+    fn read<T: bytemuck::Pod>(&self, gpu: &Gpu, array: &wgpu::Buffer, n: u32) -> Result<Vec<T>> {
+        let buffer = &self.arrays.readback;
+        let record_bytes = size_of::<T>() as u64;
+        let n_at_once = buffer.size() / record_bytes;
+        let mut records = Vec::with_capacity(n as usize);
+        while (records.len() as u64) < u64::from(n) {
+            let first = records.len() as u64;
+            let n_bytes = n_at_once.min(u64::from(n) - first) * record_bytes;
+            let readback = Readback::new(gpu, buffer, n_bytes, |encoder| {
+                let offset = first * record_bytes;
+                encoder.copy_buffer_to_buffer(array, offset, buffer, 0, n_bytes);
+            });
+            let read = |bytes: &[u8]| records.extend(bytemuck::pod_collect_to_vec::<_, T>(bytes));
+            readback.read(gpu, read)?;
+        }
+        Ok(records)
+    }
+}
+
+/// The counts and colours of a part on their way to the CPU.
+#[derive(Debug)]
+pub struct PartReadback<'a>(Readback<'a>);
+
+impl PartReadback<'_> {
+    /// Waits for the part, gives its colours to `read`, and returns its counts and the time at which it was there.
+    ///
+    /// # Errors
+    /// Fails if the device does.
+    pub fn read(self, gpu: &Gpu, read: impl FnOnce(&[[f32; 4]])) -> Result<(Counts, Instant)> {
+        self.0.read(gpu, |bytes| {
+            let (counts, colors) = bytes.split_at(COUNT_BYTES as usize);
+            read(bytemuck::cast_slice(colors));
+            Counts(bytemuck::pod_collect_to_vec(&counts[..4 * count::N_COUNTS as usize]))
+        })
     }
 }
 

@@ -31,7 +31,7 @@ fn render_makes_a_picture_and_stats() {
     assert_eq!(stats["points"], 1600);
     assert_eq!(stats["rays"]["primary"], 96 * 54 * 4);
     assert!(stats["bytes_per_point"]["total"].as_f64().unwrap() < 200.0);
-    for key in ["load", "prepare", "build", "trace", "frame", "total"] {
+    for key in ["load", "prepare", "build", "trace", "transfer", "frame", "total"] {
         assert!(stats["seconds"][key].as_f64().unwrap() >= 0.0, "{key}");
     }
     let (width, height, channels, samples) = read_png(&picture);

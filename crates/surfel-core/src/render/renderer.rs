@@ -14,8 +14,10 @@ pub struct RenderStats {
     /// Numbers of rays traced.
     pub rays: RayCounts,
     /// Seconds spent in the search for the nearest hits of primary rays: the sum over all threads, divided
-    /// by their number.
+    /// by their number. 0 on a device that does not measure it.
     pub trace_secs: f64,
+    /// Seconds in which the last finished pixels came back from a device; 0 on the CPU.
+    pub transfer_secs: f64,
     /// Seconds for the whole picture, from a flat scene.
     pub frame_secs: f64,
 }

@@ -16,7 +16,7 @@ struct FrameRecord {
     first_pixel: u32,
     n_rays: u32,
     sample_idx: u32,
-    samples_per_pixel: u32,
+    n_samples: u32,
     is_centered: u32,
     is_first: u32,
     capacity: u32,
@@ -31,6 +31,11 @@ struct FrameRecord {
     // The least size of an octree's cells along a ray.
     pixel_at_origin: f32,
     pixel_per_distance: f32,
+    // The rows that are rendered.
+    first_row: u32,
+    n_rows: u32,
+    reserved_a: u32,
+    reserved_b: u32,
     // Normals of planes, and their distances from the scene's origin along these.
     planes: array<vec4<f32>, MAX_PLANES>,
 }
@@ -241,5 +246,5 @@ const EPSILON: f32 = 1.1920929e-7;
 @group(1) @binding(3) var<storage, read_write> points: array<ShadingPointRecord>;
 // Sums of radiance and alpha over all samples of each pixel, in fixed point: the lower words come first.
 @group(1) @binding(4) var<storage, read_write> pixels: array<array<atomic<u32>, 8>>;
-// Lengths of queues and numbers of rays, as `N_*` and `FIRST_*` give them.
+// Lengths of queues and numbers of rays, at the indices `FIRST_*`, `N_ACTIVE` and `MAX_ADDED`.
 @group(1) @binding(5) var<storage, read_write> counts: array<atomic<u32>, N_COUNTS>;

@@ -70,7 +70,7 @@ fn records_have_equal_layouts() {
             first_pixel,
             n_rays,
             sample_idx,
-            samples_per_pixel,
+            n_samples,
             is_centered,
             is_first,
             capacity,
@@ -84,6 +84,10 @@ fn records_have_equal_layouts() {
             n_light_samples,
             pixel_at_origin,
             pixel_per_distance,
+            first_row,
+            n_rows,
+            reserved_a,
+            reserved_b,
             planes
         }),
         rust_layout!(Visit {

@@ -63,6 +63,18 @@ fn mirrors_and_glass_are_equal() {
 }
 
 #[test]
+fn paths_with_more_branches_than_queues_hold_are_equal() {
+    let Some(gpu) = gpu() else { return };
+    let mut scene = flat(&in_a_room(SurfaceKind::Splat, Material::METAL));
+    // A hit of a camera ray on rough metal has sixteen branches, and a queue has four entries a pixel.
+    scene.materials.fill(Material::METAL);
+    let settings = Settings { samples_per_pixel: 1, light_samples: 16, max_depth: 1, ..SETTINGS };
+    check("branches", &scene, &settings);
+    let (_, stats) = gpu.render(&scene, &settings, &NoProgress).unwrap();
+    assert_eq!(stats.rays.primary, 80 * 60);
+}
+
+#[test]
 fn kinds_are_equal_as_mirrors_and_as_glass() {
     let kinds = [
         SurfaceKind::SplatFit,

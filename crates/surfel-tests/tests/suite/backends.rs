@@ -368,6 +368,17 @@ fn trees_in_pages_are_equal_and_larger_ones_are_refused() {
     assert!(reason.contains("allows 16384 bytes in the pages of a tree, "), "{reason}");
 }
 
+/// Cancels at a check after this number of others.
+struct CancelAfter(AtomicU32);
+
+impl Progress for CancelAfter {
+    fn is_cancelled(&self) -> bool {
+        let left = self.0.load(Ordering::Relaxed);
+        self.0.store(left.saturating_sub(1), Ordering::Relaxed);
+        left == 0
+    }
+}
+
 #[test]
 fn trees_in_pages_are_equal_for_surfaces_of_many_points_and_of_fields() {
     if gpu().is_none() {
@@ -414,15 +425,24 @@ fn more_memory_than_the_limit_is_refused_before_the_upload() {
 
 #[test]
 fn rendering_can_be_cancelled() {
-    struct CancelAtSecond(AtomicU32);
-    impl Progress for CancelAtSecond {
-        fn is_cancelled(&self) -> bool {
-            1 <= self.0.fetch_add(1, Ordering::Relaxed)
-        }
-    }
     let Some(gpu) = gpu() else { return };
     let scene = flat(&reference::scene(SurfaceKind::Splat));
-    let result = gpu.render(&scene, &SETTINGS, &CancelAtSecond(AtomicU32::new(0)));
+    let result = gpu.render(&scene, &SETTINGS, &CancelAfter(AtomicU32::new(1)));
     assert_eq!(result.err(), Some(Error::Cancelled));
     check("after-cancel", &scene, &SETTINGS);
+}
+
+#[test]
+fn cancelled_pictures_leave_nothing_to_later_ones() {
+    let Some(gpu) = gpu() else { return };
+    let scene = flat(&reference::scene(SurfaceKind::Disc));
+    // Several parts are on their way at once.
+    let settings =
+        Settings { width: 128, height: 100, light_samples: 4, with_aovs: false, ..SETTINGS };
+    let picture = render(gpu, &scene, &settings);
+    for n_checks in 0..4 {
+        let result = gpu.render(&scene, &settings, &CancelAfter(AtomicU32::new(n_checks)));
+        assert_eq!(result.err(), Some(Error::Cancelled));
+        assert!(picture == render(gpu, &scene, &settings), "{n_checks}");
+    }
 }

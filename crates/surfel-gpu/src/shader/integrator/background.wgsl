@@ -36,9 +36,3 @@ fn disc_radiance(sun: LightRecord, direction: vec3<f32>) -> vec3<f32> {
     // Unit strength means an irradiance of pi at normal incidence.
     return sun.color * min(0.5 / (1.0 - sun.cos_max), MAX_SUN_RADIANCE);
 }
-
-// Returns the background in the row of a pixel.
-fn pixel_background(pixel: u32) -> vec3<f32> {
-    let height = (f32(pixel_of(pixel).y) + 0.5) / f32(frame.height);
-    return mix(frame.background_top, frame.background_bottom, height);
-}

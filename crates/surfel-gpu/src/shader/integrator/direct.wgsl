@@ -9,33 +9,39 @@ struct LightRay {
 
 // Makes a ray toward the light from each point that the light can reach, or adds a light without shadows.
 @compute @workgroup_size(WORKGROUP_SIZE)
-fn sample_light(@builtin(global_invocation_id) id: vec3<u32>) {
-    if atomicLoad(&counts[FIRST_TAKEN + POINTS]) <= id.x {
-        return;
+fn sample_light(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) local_idx: u32) {
+    var path: Path;
+    let is_added = id.x < atomicLoad(&counts[FIRST_TAKEN + POINTS]) && make_light_ray(points[id.x], &path);
+    let slot = queue_slot(LIGHT_RAYS, local_idx, is_added);
+    if slot < frame.capacity {
+        paths[slot] = path;
     }
-    let point = points[id.x];
+}
+
+// Returns true if there is a ray from a point toward the light.
+fn make_light_ray(point: ShadingPointRecord, path: ptr<function, Path>) -> bool {
     let light = lights[task.light];
     if light.kind == HEADLIGHT {
         add_radiance(point.pixel, reflected_radiance(point, point.to_viewer, light.color));
-        return;
+        return false;
     }
     let n_samples = min(point.n_light_samples, task.max_samples);
     if n_samples <= task.sample_idx {
-        return;
+        return false;
     }
     let sampled = sampled_ray(point, light, point.index * n_samples + task.sample_idx);
     let is_behind = dot(point.geometric_normal, sampled.direction) <= 0.0;
     if is_behind || all(sampled.contribution == vec3<f32>(0.0)) {
-        return;
+        return false;
     }
-    let slot = atomicAdd(&counts[FIRST_ADDED + LIGHT_RAYS], 1u);
     let side = select(-point.geometric_normal, point.geometric_normal, 0.0 <= dot(point.geometric_normal, sampled.direction));
     let ray = Ray(point.position + point.spawn_offset * side, point.spawn_t_min, sampled.direction, sampled.t_max);
     // As in `from_surface`.
     let cos = max(abs(dot(ray.direction, point.geometric_normal)), 0.1);
     let height = abs(dot(ray.origin - point.position, point.geometric_normal));
     let weight = sampled.contribution / f32(n_samples);
-    paths[slot] = Path(ray, weight, point.pixel, vec3<f32>(1.0), height / cos, point.media, point.key, point.index, 1u);
+    *path = Path(ray, weight, point.pixel, vec3<f32>(1.0), height / cos, point.media, point.key, point.index, 1u);
+    return true;
 }
 
 // Adds the light of the rays that nothing blocks.

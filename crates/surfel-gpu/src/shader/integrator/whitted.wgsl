@@ -16,21 +16,27 @@ struct Microfacet {
 // Adds the radiance that a surface emits at the end of a path's ray, queues the point for direct light, and the rays
 // that continue the path.
 @compute @workgroup_size(WORKGROUP_SIZE)
-fn shade(@builtin(global_invocation_id) id: vec3<u32>) {
-    if atomicLoad(&counts[FIRST_TAKEN + PATHS]) <= id.x {
-        return;
+fn shade(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) local_idx: u32) {
+    var point: ShadingPointRecord;
+    let is_added = id.x < atomicLoad(&counts[FIRST_TAKEN + PATHS]) && shade_path(paths[id.x], hits[id.x], &point);
+    let slot = queue_slot(POINTS, local_idx, is_added);
+    if slot < frame.capacity {
+        points[slot] = point;
     }
-    let hit = hits[id.x];
-    var path = paths[id.x];
+}
+
+// Shades the end of a path's ray. Returns true if it is a point that receives direct light.
+fn shade_path(arriving: Path, hit: HitRecord, point: ptr<function, ShadingPointRecord>) -> bool {
+    var path = arriving;
     if hit.gaussian_distance < NO_LIMIT {
         path = behind_gaussians(path, hit);
         if hit.gaussian_transmittance <= 0.0 {
-            return;
+            return false;
         }
     }
     if hit.instance == NONE {
         shade_miss(path);
-        return;
+        return false;
     }
     let shading = shading_at(path.ray, hit);
     let interface_media = interface_at(path, shading, hit);
@@ -40,7 +46,7 @@ fn shade(@builtin(global_invocation_id) id: vec3<u32>) {
         continue_through_alpha(path, shading);
         path.weight *= shading.alpha;
         if shading.alpha <= 0.0 {
-            return;
+            return false;
         }
     }
     if miss_behavior(path) == MISS_BACKGROUND {
@@ -48,19 +54,18 @@ fn shade(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     if shading.is_unlit {
         add_radiance(path.pixel, path.weight * shading.base_color);
-        return;
+        return false;
     }
     add_radiance(path.pixel, path.weight * shading.emission);
     let lobes = lobes_of(shading, path.ray.direction, interface_media.eta);
     let is_rough = MIN_ROUGHNESS <= shading.roughness;
     let glossy = select(vec3<f32>(0.0), lobes.reflected, is_rough);
-    if any(lobes.diffuse != vec3<f32>(0.0)) || any(glossy != vec3<f32>(0.0)) {
-        add_point(path, shading, interface_media.near, lobes.diffuse, glossy);
-    }
     if (path.state & 0xffu) < frame.max_depth {
         add_branches(path, shading, interface_media, lobes.reflected, REFLECTED);
         add_branches(path, shading, interface_media, lobes.refracted, REFRACTED);
     }
+    *point = shading_point(path, shading, interface_media.near, lobes.diffuse, glossy);
+    return any(lobes.diffuse != vec3<f32>(0.0)) || any(glossy != vec3<f32>(0.0));
 }
 
 // Adds the light of the Gaussians before the end of a path's ray, and returns the path behind them.
@@ -79,12 +84,14 @@ fn miss_behavior(path: Path) -> u32 {
     return path.state >> 16u;
 }
 
-fn add_point(path: Path, shading: Shading, media: vec4<u32>, diffuse: vec3<f32>, glossy: vec3<f32>) {
-    let slot = atomicAdd(&counts[FIRST_ADDED + POINTS], 1u);
-    if frame.capacity <= slot {
-        return;
-    }
-    points[slot] = ShadingPointRecord(
+fn shading_point(
+    path: Path,
+    shading: Shading,
+    media: vec4<u32>,
+    diffuse: vec3<f32>,
+    glossy: vec3<f32>,
+) -> ShadingPointRecord {
+    return ShadingPointRecord(
         shading.position,
         shading.spawn_offset,
         shading.normal,

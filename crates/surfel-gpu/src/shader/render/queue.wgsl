@@ -6,7 +6,9 @@
 // Closes a queue: passes over it start as many workgroups as its entries need. What is added next is a new queue.
 @compute @workgroup_size(1)
 fn take_queue() {
-    let n = min(atomicExchange(&counts[FIRST_ADDED + task.queue], 0u), frame.capacity);
+    let n_added = atomicExchange(&counts[FIRST_ADDED + task.queue], 0u);
+    atomicMax(&counts[MAX_ADDED], n_added);
+    let n = min(n_added, frame.capacity);
     atomicStore(&counts[FIRST_TAKEN + task.queue], n);
     atomicAdd(&counts[FIRST_TRACED + task.ray_kind], n);
     if task.queue == LIGHT_RAYS {
