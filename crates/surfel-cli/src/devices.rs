@@ -31,7 +31,13 @@ fn gpu_lines() -> Vec<String> {
     let lines = devices.iter().enumerate().map(|(index, device)| {
         let (kind, mib) = (device.kind.name(), device.max_array_bytes >> 20);
         let surfel::surfel_gpu::DeviceInfo { name, api, driver, .. } = device;
-        format!("{index:<4} {name}, {kind}, {api}, driver {driver}, arrays of up to {mib} MiB")
+        let memory = device.memory_bytes.map_or_else(String::new, |bytes| {
+            let gib = bytes as f64 / f64::from(1 << 30);
+            format!(", {gib:.digits$} GiB of memory", digits = usize::from(gib < 10.0))
+        });
+        format!(
+            "{index:<4} {name}, {kind}, {api}, driver {driver}{memory}, arrays of up to {mib} MiB"
+        )
     });
     lines.collect()
 }

@@ -18,6 +18,8 @@ pub struct DeviceInfo {
     pub driver: String,
     /// Size of the largest array that a kernel can read, in bytes.
     pub max_array_bytes: u64,
+    /// Size of the device's own memory in bytes; none if it has none, or if only Metal or DirectX 12 know it.
+    pub memory_bytes: Option<u64>,
 }
 
 /// The kind of a device.
@@ -94,7 +96,32 @@ fn info(adapter: &wgpu::Adapter) -> DeviceInfo {
         api: format!("{:?}", info.backend),
         driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
         max_array_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
+        // Drivers on the processor state a fixed number, which is not their limit.
+        memory_bytes: (kind(adapter) != DeviceKind::Software)
+            .then(|| memory_bytes(adapter))
+            .flatten(),
     }
+}
+
+/// Returns the size of the largest heap of a device's own memory, which Vulkan tells.
+#[cfg(any(windows, target_os = "linux", target_os = "android", target_os = "freebsd"))]
+fn memory_bytes(adapter: &wgpu::Adapter) -> Option<u64> {
+    /// The bit `VK_MEMORY_HEAP_DEVICE_LOCAL_BIT`.
+    const DEVICE_LOCAL: u32 = 1;
+    // SAFETY: the adapter is only asked for its properties, while wgpu holds it and its instance.
+    let heaps = unsafe {
+        let adapter = adapter.as_hal::<wgpu::hal::api::Vulkan>()?;
+        let instance = adapter.shared_instance().raw_instance();
+        instance.get_physical_device_memory_properties(adapter.raw_physical_device())
+    };
+    let heaps = heaps.memory_heaps.iter().take(heaps.memory_heap_count as usize);
+    let own = heaps.filter(|heap| heap.flags.as_raw() & DEVICE_LOCAL != 0);
+    own.map(|heap| heap.size).max()
+}
+
+#[cfg(not(any(windows, target_os = "linux", target_os = "android", target_os = "freebsd")))]
+fn memory_bytes(_: &wgpu::Adapter) -> Option<u64> {
+    None
 }
 
 /// Returns the index of the device with this index, or with this text in its name, whatever its case; without a
@@ -128,6 +155,8 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     /// Binary logarithm of the number of vectors of four words in a page of a tree.
     pub page_shift: u32,
+    /// Maximum number of bytes to hold in the device's memory.
+    pub memory_limit: Option<u64>,
     /// The first failure, after which the device is not used any more.
     failure: Arc<Mutex<Option<Error>>>,
 }
@@ -166,9 +195,8 @@ impl Gpu {
             let reason = format!("was lost: {reason}");
             keep_first(&first, Error::Device { device: name.clone(), reason });
         });
-        let page_vectors = info.max_array_bytes.min(max_page_bytes) / VECTOR_BYTES;
-        let page_shift = page_vectors.max(1).ilog2();
-        Ok(Self { info, device, queue, page_shift, failure })
+        let page_shift = page_shift(info.max_array_bytes.min(max_page_bytes));
+        Ok(Self { info, device, queue, page_shift, memory_limit: None, failure })
     }
 
     /// Returns the number of bytes in a page of a tree.
@@ -181,6 +209,20 @@ impl Gpu {
         let n_pages = (N_NODE_PAGES + N_BLOCK_PAGES - 2) as u64;
         let n_allowed = self.device.limits().max_storage_buffers_per_shader_stage;
         N_STORAGE_BUFFERS - 1 + n_pages <= u64::from(n_allowed)
+    }
+
+    /// Fails if the device has less memory than is needed, or if the limit is lower.
+    pub fn check_memory(&self, needed: u64) -> Result<()> {
+        let device = || self.info.name.clone();
+        match (self.info.memory_bytes, self.memory_limit) {
+            (_, Some(limit)) if limit < needed => {
+                Err(Error::MemoryLimit { device: device(), limit, needed })
+            }
+            (Some(found), _) if found < needed => {
+                Err(Error::Memory { device: device(), found, needed })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Returns true if the time of each pass can be measured.
@@ -253,6 +295,11 @@ impl Gpu {
     }
 }
 
+/// Returns the binary logarithm of the number of vectors in the largest page of at most `max_bytes`.
+fn page_shift(max_bytes: u64) -> u32 {
+    (max_bytes / VECTOR_BYTES).max(1).ilog2()
+}
+
 fn keep_first(first: &Mutex<Option<Error>>, error: Error) {
     first.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
 }
@@ -281,9 +328,22 @@ fn check_limits(info: &DeviceInfo, limits: &wgpu::Limits) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    //! Devices are chosen by index and by name, and limits are checked.
+    //! Devices are chosen by index and by name, limits are checked, and failures are errors.
 
     use super::*;
+
+    fn open() -> Option<Gpu> {
+        match Gpu::open(None, u64::MAX) {
+            Ok(gpu) => Some(gpu),
+            Err(error) => {
+                #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
+                {
+                    println!("skipped: {error}");
+                }
+                None
+            }
+        }
+    }
 
     fn device(name: &str, kind: DeviceKind) -> DeviceInfo {
         DeviceInfo {
@@ -292,6 +352,7 @@ mod tests {
             api: "Vulkan".into(),
             driver: String::new(),
             max_array_bytes: 1 << 27,
+            memory_bytes: None,
         }
     }
 
@@ -322,5 +383,52 @@ mod tests {
         let limits = wgpu::Limits { max_storage_buffers_per_shader_stage: 4, ..enough };
         let error = check_limits(&info, &limits).unwrap_err();
         assert_eq!(error.to_string(), "small allows 4 storage buffers a kernel, 10 are needed");
+    }
+
+    #[test]
+    fn pages_hold_a_hundred_million_points() {
+        // Devices whose arrays end at 2 GiB - 1 have pages of 1 GiB.
+        let page_bytes = VECTOR_BYTES << page_shift(i32::MAX as u64);
+        assert_eq!(page_bytes, 1 << 30);
+        assert!(100_000_000 / 8 * 128 <= N_BLOCK_PAGES as u64 * page_bytes);
+        assert_eq!(VECTOR_BYTES << page_shift(1 << 27), 1 << 27);
+    }
+
+    #[test]
+    fn memory_is_checked_against_the_device_and_the_limit() {
+        let Some(mut gpu) = open() else { return };
+        gpu.info.memory_bytes = None;
+        assert_eq!(gpu.check_memory(u64::MAX), Ok(()));
+        gpu.info.memory_bytes = Some(2 << 30);
+        assert_eq!(gpu.check_memory(2 << 30), Ok(()));
+        let message = |gpu: &Gpu, needed| gpu.check_memory(needed).unwrap_err().to_string();
+        let name = gpu.info.name.clone();
+        let expected = format!("{name} has 2.0 GiB of memory, 3.0 GiB are needed");
+        assert_eq!(message(&gpu, 3 << 30), expected);
+        gpu.memory_limit = Some(1 << 20);
+        assert_eq!(gpu.check_memory(1 << 20), Ok(()));
+        let expected =
+            format!("{name}: 1.5 MiB of memory are needed, and --memory-limit is 1.0 MiB");
+        assert_eq!(message(&gpu, 3 << 19), expected);
+    }
+
+    #[test]
+    fn what_a_driver_refuses_is_an_error_with_its_name() {
+        let Some(gpu) = open() else { return };
+        let source = wgpu::ShaderSource::Wgsl("fn f() -> u32 { return 1.5; }".into());
+        let description = wgpu::ShaderModuleDescriptor { label: None, source };
+        let error =
+            gpu.catch("a kernel", || gpu.device.create_shader_module(description)).unwrap_err();
+        let expected = format!("{}: refused a kernel: ", gpu.info.name);
+        assert!(error.to_string().starts_with(&expected), "{error}");
+        // The device is still good for other work.
+        assert_eq!((gpu.check(), gpu.wait()), (Ok(()), Ok(())));
+    }
+
+    #[test]
+    fn a_device_without_memory_says_so() {
+        let source = "no memory".into();
+        let error = of_wgpu("small", wgpu::Error::OutOfMemory { source });
+        assert_eq!(error.to_string(), "small is out of memory");
     }
 }

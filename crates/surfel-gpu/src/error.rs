@@ -26,7 +26,27 @@ pub enum Error {
         /// The number that is needed.
         needed: u64,
     },
-    /// A device has too little memory.
+    /// A picture needs more memory than a device has.
+    #[error("{device} has {} of memory, {} are needed", readable(*.found), readable(*.needed))]
+    Memory {
+        /// Name of the device.
+        device: String,
+        /// The memory of the device in bytes.
+        found: u64,
+        /// The number of bytes that is needed.
+        needed: u64,
+    },
+    /// A picture needs more of a device's memory than is allowed.
+    #[error("{device}: {} of memory are needed, and --memory-limit is {}", readable(*.needed), readable(*.limit))]
+    MemoryLimit {
+        /// Name of the device.
+        device: String,
+        /// The limit in bytes.
+        limit: u64,
+        /// The number of bytes that is needed.
+        needed: u64,
+    },
+    /// A device ran out of memory.
     #[error("{device} is out of memory")]
     OutOfMemory {
         /// Name of the device.
@@ -49,4 +69,12 @@ impl From<Error> for surfel_core::Error {
     fn from(error: Error) -> Self {
         Self::Renderer(error.to_string())
     }
+}
+
+/// Returns bytes in the largest unit that leaves a number above one.
+fn readable(bytes: u64) -> String {
+    let units = ["KiB", "MiB", "GiB", "TiB"];
+    let power = (bytes.max(1).ilog2() / 10).clamp(1, units.len() as u32);
+    let value = bytes as f64 / 1024f64.powi(power as i32);
+    format!("{value:.1} {}", units[power as usize - 1])
 }

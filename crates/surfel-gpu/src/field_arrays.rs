@@ -25,6 +25,26 @@ pub fn structure(cloud: &FlatCloud) -> Vec<Vector> {
     }
 }
 
+/// Returns the number of vectors of the structure.
+pub fn structure_vectors(cloud: &FlatCloud) -> usize {
+    match cloud.surface {
+        SurfaceKind::Octree | SurfaceKind::OctreeSplat => {
+            let octree = &cloud.octree;
+            let n_cell_vectors = PLANE_VECTORS * octree.planes().len()
+                + CORNER_CELL_VECTORS * octree.all_corners().len();
+            OCTREE_HEAD_VECTORS + octree.nodes().len() + n_cell_vectors
+        }
+        SurfaceKind::Implicit => {
+            let tree = &cloud.field;
+            let (n_leaf_starts, n_entries) =
+                (tree.leaf_starts().len(), tree.entries().blocks.len());
+            let words = [2 * tree.n_nodes(), n_leaf_starts, 2 * n_entries];
+            KD_HEAD_VECTORS + words.map(|n| n.div_ceil(4)).iter().sum::<usize>()
+        }
+        _ => 0,
+    }
+}
+
 fn octree(octree: &Octree) -> Vec<Vector> {
     let first_cell = (OCTREE_HEAD_VECTORS + octree.nodes().len()) as u32;
     let cube = octree.cube().unwrap_or(Aabb { min: Vec3::ZERO, max: Vec3::ZERO });
@@ -80,4 +100,51 @@ fn kd_tree(tree: &FieldTree) -> Vec<Vector> {
 fn vectors(mut words: Vec<u32>) -> Vec<Vector> {
     words.resize(words.len().next_multiple_of(4), 0);
     words.chunks_exact(4).map(|words| [words[0], words[1], words[2], words[3]]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    //! The size of a structure is known before it is made.
+
+    use super::*;
+    use surfel_core::flat::{FlatGeometry, FlatScene};
+    use surfel_core::math::DVec3;
+    use surfel_core::points::{PointCloud, Preparation, prepare};
+    use surfel_core::progress::NoProgress;
+    use surfel_core::scene::{
+        Background, Camera, CloudGeometry, Geometry, Graph, Material, Projection, Scene,
+    };
+
+    fn scene(surface: SurfaceKind) -> FlatScene {
+        let position = |i: u16| {
+            let (x, y) = (f32::from(i % 20), f32::from(i / 20));
+            Vec3::new(x, y, (x * y).sin())
+        };
+        let cloud = PointCloud::from_positions((0..400).map(position).collect());
+        let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+        let mut points = CloudGeometry::with_uniform_color(cloud, [200; 3]);
+        points.surface = surface;
+        let camera = Camera {
+            position: DVec3::ZERO,
+            focal_point: DVec3::Y,
+            view_up: DVec3::Z,
+            projection: Projection::Panorama,
+        };
+        let graph = Graph::from_geometry(Geometry::Points(points), Material::MATTE);
+        let background = Background::Transparent;
+        let scene = Scene { graph, lights: Vec::new(), background, camera };
+        FlatScene::new(&scene, &NoProgress).unwrap()
+    }
+
+    #[test]
+    fn the_size_of_a_structure_is_known_before_it_is_made() {
+        use SurfaceKind::{Implicit, Octree, OctreeSplat, Splat};
+        for kind in [Implicit, Octree, OctreeSplat, Splat] {
+            let scene = scene(kind);
+            let FlatGeometry::Cloud(cloud) = &*scene.geometries[0] else { panic!() };
+            let n_vectors = structure_vectors(cloud);
+            assert_eq!(structure(cloud).len(), n_vectors, "{}", kind.name());
+            assert_eq!(0 < n_vectors, kind != Splat);
+        }
+    }
 }

@@ -50,6 +50,8 @@ pub struct Job<'a> {
     pub region: RenderRegion,
     /// The passes of a sample.
     pub passes: Passes,
+    /// The sizes of the arrays.
+    pub sizes: Capacities,
     /// The records that shading reads.
     pub records: SceneRecords,
     /// Texels and the like.
@@ -74,6 +76,9 @@ struct Picture<'a> {
     stats: RenderStats,
     /// The time at which the last part was there.
     last_arrival: Instant,
+    /// Number of pixels of the next part.
+    part_size: &'a mut u32,
+    progress: &'a dyn Progress,
 }
 
 /// A part that the device works on.
@@ -101,71 +106,85 @@ impl Job<'_> {
         kept: Kept,
         progress: &dyn Progress,
     ) -> surfel_core::Result<(Image, RenderStats)> {
-        let Self { gpu, settings, region, .. } = *self;
+        let Self { gpu, settings, region, sizes, .. } = *self;
         let start = Instant::now();
-        // Pictures have at most 2^28 pixels.
-        let n_pixels = settings.width * region.n_rows();
-        progress.begin("render", n_pixels.into());
-        let sizes = self.sizes(n_pixels);
+        let view = self.scene.camera.view(self.scene.origin, settings.width, settings.height);
+        let (first_row, n_rows) = (region.rows.0, region.n_rows());
+        let order = PixelOrder { width: settings.width, first_row, n_rows };
+        progress.begin("render", order.n_pixels().into());
         let Self { records, words, .. } = self;
         let contents = Contents { scene: records, words, tasks: &self.passes.tasks };
         let arrays = Arrays::update(kept.arrays, gpu, sizes)?;
         let wavefront = &Wavefront::new(gpu, self.kernels, arrays, contents)?;
         let bound = Bound { kernels: self.kernels, wavefront, trees: &self.bind_trees()? };
         let mut submitter = Submitter::new(gpu, bound, kept.times, progress)?;
-        let view = self.scene.camera.view(self.scene.origin, settings.width, settings.height);
-        let (first_row, n_rows) = (region.rows.0, region.n_rows());
-        let (capacity, n_samples) = (sizes.n_entries, region.n_samples());
-        let frame = frame(self.scene, &view, settings);
-        let frame = FrameRecord { capacity, n_samples, first_row, n_rows, ..frame };
         let mut picture = Picture {
             source: AovSource { scene: self.scene, view: &view },
-            order: PixelOrder { width: settings.width, first_row, n_rows },
+            order,
             image: region.blank_image(settings),
             stats: RenderStats::default(),
             last_arrival: start,
+            part_size: kept.part_size,
+            progress,
         };
-        let mut max_part = sizes.n_pixels;
-        let (mut first_pixel, mut parity) = (0, 0);
-        let mut working: Option<Part> = None;
-        while first_pixel < n_pixels {
-            let n_rays = (*kept.part_size).min(max_part).min(n_pixels - first_pixel);
-            let frame = FrameRecord { first_pixel, n_rays, ..frame };
-            let start = Instant::now();
-            if self.submit_part(&mut submitter, wavefront, frame)? == Outcome::Overflow {
-                max_part = self.smaller_part(n_rays)?;
-                continue;
-            }
-            self.add_aovs(&mut submitter, wavefront, frame, &mut picture)?;
-            let kernels = submitter.last().cloned();
-            let readback = wavefront.request_part(gpu, n_rays, parity);
-            let part = Part { first: first_pixel, n_pixels: n_rays, start, kernels, readback };
-            // While the CPU takes a part, the device works on the next one.
-            if let Some(before) = working.replace(part) {
-                self.take_part(before, &mut picture, kept.part_size, progress)?;
-            }
-            first_pixel += n_rays;
-            parity = 1 - parity;
-        }
-        if let Some(last) = working {
-            if let Some(kernels) = &last.kernels {
-                gpu.wait_for(kernels)?;
-            }
-            let finish = Instant::now();
-            self.take_part(last, &mut picture, kept.part_size, progress)?;
-            picture.stats.transfer_secs = finish.elapsed().as_secs_f64();
-        }
+        let (capacity, n_samples) = (sizes.n_entries, region.n_samples());
+        let frame = frame(self.scene, &view, settings);
+        let frame = FrameRecord { capacity, n_samples, first_row, n_rows, ..frame };
+        self.render_parts(&mut submitter, wavefront, frame, &mut picture)?;
         let Picture { image, mut stats, .. } = picture;
         stats.trace_secs = submitter.primary_secs;
         stats.frame_secs = start.elapsed().as_secs_f64();
         Ok((image, stats))
     }
 
-    fn sizes(&self, n_pixels: u32) -> Capacities {
+    /// Renders the parts of the picture, one after the other.
+    fn render_parts(
+        &self,
+        submitter: &mut Submitter,
+        wavefront: &Wavefront,
+        frame: FrameRecord,
+        picture: &mut Picture,
+    ) -> surfel_core::Result<()> {
+        let n_pixels = picture.order.n_pixels();
+        let mut max_part = self.sizes.n_pixels;
+        let (mut first_pixel, mut parity) = (0, 0);
+        let mut working: Option<Part> = None;
+        while first_pixel < n_pixels {
+            let n_rays = (*picture.part_size).min(max_part).min(n_pixels - first_pixel);
+            let frame = FrameRecord { first_pixel, n_rays, ..frame };
+            let start = Instant::now();
+            if self.submit_part(submitter, wavefront, frame)? == Outcome::Overflow {
+                max_part = self.smaller_part(n_rays)?;
+                continue;
+            }
+            self.add_aovs(submitter, wavefront, frame, picture)?;
+            let kernels = submitter.last().cloned();
+            let readback = wavefront.request_part(self.gpu, n_rays, parity);
+            let part = Part { first: first_pixel, n_pixels: n_rays, start, kernels, readback };
+            // While the CPU takes a part, the device works on the next one.
+            if let Some(before) = working.replace(part) {
+                self.take_part(before, picture)?;
+            }
+            first_pixel += n_rays;
+            parity = 1 - parity;
+        }
+        if let Some(last) = working {
+            if let Some(kernels) = &last.kernels {
+                self.gpu.wait_for(kernels)?;
+            }
+            let finish = Instant::now();
+            self.take_part(last, picture)?;
+            picture.stats.transfer_secs = finish.elapsed().as_secs_f64();
+        }
+        Ok(())
+    }
+
+    /// Returns the sizes of the arrays of a picture with this number of pixels.
+    pub fn sizes(gpu: &Gpu, scene: &FlatScene, passes: &Passes, n_pixels: u32) -> Capacities {
         let n_pixels = u64::from(n_pixels);
-        let has_waves = self.passes.next_wave.is_some();
+        let has_waves = passes.next_wave.is_some();
         // A hit is the largest entry.
-        let fitting = self.gpu.info.max_array_bytes / size_of::<HitRecord>() as u64;
+        let fitting = gpu.info.max_array_bytes / size_of::<HitRecord>() as u64;
         let max_entries = fitting.min(MAX_ENTRIES.into());
         let (wanted, per_pixel) = match has_waves {
             true => {
@@ -179,7 +198,7 @@ impl Job<'_> {
             n_pixels: n_pixels.min(n_entries / per_pixel) as u32,
             n_entries: n_entries as u32,
             has_waves,
-            is_transmissive: self.scene.is_transmissive,
+            is_transmissive: scene.is_transmissive,
         }
     }
 
@@ -321,13 +340,7 @@ impl Job<'_> {
     }
 
     /// Waits for a part, adds it to the picture, and learns from its time how large those to come should be.
-    fn take_part(
-        &self,
-        part: Part,
-        picture: &mut Picture,
-        part_size: &mut u32,
-        progress: &dyn Progress,
-    ) -> surfel_core::Result<()> {
+    fn take_part(&self, part: Part, picture: &mut Picture) -> surfel_core::Result<()> {
         let Part { first, n_pixels, start, readback, .. } = part;
         let is_opaque = matches!(self.scene.background, Background::Gradient { .. });
         let background_alpha = if is_opaque { 1.0 } else { 0.0 };
@@ -338,9 +351,10 @@ impl Job<'_> {
         picture.stats.rays += counts.rays();
         // The device begins a part when it has finished the one before.
         let time = arrival.saturating_duration_since(start.max(picture.last_arrival));
-        *part_size = next_part(*part_size, n_pixels, time / self.region.n_samples());
+        *picture.part_size =
+            next_part(*picture.part_size, n_pixels, time / self.region.n_samples());
         picture.last_arrival = arrival;
-        progress.advance(n_pixels.into());
+        picture.progress.advance(n_pixels.into());
         Ok(())
     }
 }

@@ -1,9 +1,13 @@
 //! The order of pixels on a device: neighbours in it are neighbours in the picture, so that their rays are alike.
 
 use crate::numbers::BAND_HEIGHT;
-use rayon::iter::{IndexedParallelIterator, ParallelIterator};
-use rayon::slice::ParallelSliceMut;
+use std::thread;
 use surfel_core::image::Image;
+
+/// Maximum number of threads that set pixels.
+const MAX_THREADS: usize = 8;
+/// Number of pixels for which a thread is worth its start, which takes some ten microseconds.
+const PIXELS_OF_THREAD: usize = 1 << 16;
 
 /// The rows of a picture that are rendered. Their pixels are numbered in bands of `BAND_HEIGHT` rows, column by column, as
 /// `shader/render/key.wgsl` does.
@@ -18,6 +22,11 @@ pub struct PixelOrder {
 }
 
 impl PixelOrder {
+    /// Returns the number of pixels. Pictures have at most 2^28.
+    pub fn n_pixels(&self) -> u32 {
+        self.width * self.n_rows
+    }
+
     /// Returns the column and row in the picture of the pixel with this number.
     pub fn pixel_of(&self, pixel: u32) -> (u32, u32) {
         let band = pixel / (BAND_HEIGHT * self.width);
@@ -36,17 +45,60 @@ impl PixelOrder {
 
 /// Sets the pixels of an image from number `first` on to colours that have their coverage in the place of alpha.
 /// `background_alpha` is the alpha of the background.
+///
+/// As in [`transfer`](crate::transfer), threads are not those of rayon, which may begin another picture on this device.
 pub fn set_pixels(image: &mut Image, colors: &[[f32; 4]], first: usize, background_alpha: f32) {
-    let width = image.width as usize;
-    let band_len = BAND_HEIGHT as usize * width;
+    let part = Part { colors, first, width: image.width as usize, background_alpha };
+    let band_len = part.band_len();
     let end = first + colors.len();
     let bands = first / band_len..end.div_ceil(band_len);
-    let of_colors = image.color.par_chunks_mut(band_len);
-    let of_coverage = image.coverage.par_chunks_mut(band_len);
-    let both = of_colors.zip(of_coverage).enumerate().skip(bands.start).take(bands.len());
-    both.for_each(|(band, (color, coverage))| {
-        let (height, start) = (color.len() / width, band * band_len);
-        let within = first.max(start)..end.min(start + color.len());
+    let (start, end) = (bands.start * band_len, image.color.len().min(bands.end * band_len));
+    let max_threads = rayon::current_num_threads().min(MAX_THREADS);
+    let n_threads = (colors.len() / PIXELS_OF_THREAD).clamp(1, max_threads);
+    let len = band_len * bands.len().div_ceil(n_threads).max(1);
+    let of_colors = image.color[start..end].chunks_mut(len);
+    let of_coverage = image.coverage[start..end].chunks_mut(len);
+    let mut pieces = (start..end).step_by(len).zip(of_colors.zip(of_coverage));
+    let own = pieces.next();
+    thread::scope(|scope| {
+        for (start, (color, coverage)) in pieces {
+            scope.spawn(move || part.set_bands(start, color, coverage));
+        }
+        if let Some((start, (color, coverage))) = own {
+            part.set_bands(start, color, coverage);
+        }
+    });
+}
+
+/// The pixels of a part of a picture.
+#[derive(Clone, Copy)]
+struct Part<'a> {
+    colors: &'a [[f32; 4]],
+    /// Number of the first pixel.
+    first: usize,
+    /// Width of the picture.
+    width: usize,
+    background_alpha: f32,
+}
+
+impl Part<'_> {
+    fn band_len(&self) -> usize {
+        BAND_HEIGHT as usize * self.width
+    }
+
+    /// Sets the pixels in bands whose first pixel has the number `start`.
+    fn set_bands(&self, start: usize, color: &mut [[f32; 4]], coverage: &mut [f32]) {
+        let band_len = self.band_len();
+        let bands = color.chunks_mut(band_len).zip(coverage.chunks_mut(band_len));
+        for (band, (color, coverage)) in bands.enumerate() {
+            self.set_band(start + band * band_len, color, coverage);
+        }
+    }
+
+    fn set_band(&self, start: usize, color: &mut [[f32; 4]], coverage: &mut [f32]) {
+        let Self { colors, first, width, background_alpha } = *self;
+        let height = color.len() / width;
+        let within = first.max(start)..(first + colors.len()).min(start + color.len());
         let columns = (within.start - start) / height..(within.end - start).div_ceil(height);
         for column in columns {
             for row in 0..height {
@@ -59,7 +111,7 @@ pub fn set_pixels(image: &mut Image, colors: &[[f32; 4]], first: usize, backgrou
                 }
             }
         }
-    });
+    }
 }
 
 #[cfg(test)]
@@ -89,23 +141,36 @@ mod tests {
         assert_eq!(pixels, [(0, 10), (0, 11), (1, 10), (2, 13), (0, 14), (0, 15), (1, 14)]);
     }
 
+    fn check_parts((width, n_rows): (u32, u32), part_len: usize) {
+        let order = PixelOrder { width, first_row: 3, n_rows };
+        let colors: Vec<[f32; 4]> =
+            (0..order.n_pixels()).map(|i| [i as f32, 2.0, 3.0, 0.25]).collect();
+        let mut image = Image::new(width, n_rows);
+        for (i, part) in colors.chunks(part_len).enumerate() {
+            set_pixels(&mut image, part, i * part_len, 1.0);
+        }
+        for pixel in 0..order.n_pixels() {
+            let idx = order.image_idx(pixel);
+            assert_eq!(image.color[idx], [pixel as f32, 2.0, 3.0, 1.0]);
+            assert_eq!(image.coverage[idx], 0.25);
+        }
+    }
+
     #[test]
     fn pixels_come_to_their_places_part_by_part() {
-        for (width, n_rows) in SIZES {
-            let order = PixelOrder { width, first_row: 3, n_rows };
-            let n = width * n_rows;
-            let colors: Vec<[f32; 4]> = (0..n).map(|i| [i as f32, 2.0, 3.0, 0.25]).collect();
+        for size in SIZES {
             for part_len in [1, 5, 64, 1000] {
-                let mut image = Image::new(width, n_rows);
-                for (i, part) in colors.chunks(part_len).enumerate() {
-                    set_pixels(&mut image, part, i * part_len, 1.0);
-                }
-                for pixel in 0..n {
-                    let idx = order.image_idx(pixel);
-                    assert_eq!(image.color[idx], [pixel as f32, 2.0, 3.0, 1.0]);
-                    assert_eq!(image.coverage[idx], 0.25);
-                }
+                check_parts(size, part_len);
             }
+        }
+    }
+
+    #[test]
+    fn pixels_come_to_their_places_in_several_threads() {
+        for n_threads in [1, 2, 5] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+            let n = 5 * PIXELS_OF_THREAD;
+            pool.install(|| check_parts((701, 701), n + 3));
         }
     }
 }

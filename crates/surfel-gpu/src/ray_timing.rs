@@ -7,6 +7,7 @@ use crate::numbers::queue;
 use crate::numbers::ray_kind;
 use crate::numbers::{NO_LIMIT, NONE, WORKGROUP_SIZE};
 use crate::passes::{Pass, Size};
+use crate::picture_memory::array_bytes;
 use crate::records::{FrameRecord, Path, Task, Visit};
 use crate::scene_records::SceneRecords;
 use crate::shader::{Kernel, Surface};
@@ -72,14 +73,18 @@ pub fn time(
     progress: &dyn Progress,
 ) -> surfel_core::Result<RayTimes> {
     let searches = searches(timing.geometry, timing.query);
+    let geometries = std::slice::from_ref(timing.geometry);
+    let n = timing.rays.len().min(MAX_RAYS) as u32;
+    let sizes = Capacities { n_pixels: n, n_entries: n, has_waves: false, is_transmissive: false };
+    let has_room = |sizes| uploads.has_room(gpu, geometries, array_bytes(sizes));
+    let found = Arrays::make_room(arrays, gpu, sizes, has_room)?;
     let start = Instant::now();
-    uploads.update(gpu, std::slice::from_ref(timing.geometry))?;
+    uploads.update(gpu, geometries, array_bytes(found))?;
     let mut times = RayTimes {
         geometry_upload_secs: start.elapsed().as_secs_f64(),
         run_secs: vec![0.0; timing.n_runs as usize],
         ..RayTimes::default()
     };
-    let geometries = std::slice::from_ref(timing.geometry);
     let tree = |search: &Search| {
         uploads.tree(geometries, TreeRef::Geometry { geometry_idx: 0, tree_idx: search.tree_idx })
     };
@@ -88,8 +93,6 @@ pub fn time(
     let of_trees = searches.iter().map(|search| (search.kernel, is_paged(search)));
     kernels.compile(gpu, own.into_iter().chain(of_trees))?;
     let kernels = &*kernels;
-    let n = timing.rays.len().min(MAX_RAYS) as u32;
-    let sizes = Capacities { n_pixels: n, n_entries: n, has_waves: false, is_transmissive: false };
     let arrays = Arrays::update(arrays, gpu, sizes)?;
     for rays in timing.rays.chunks(MAX_RAYS) {
         let chunk = Chunk::new(gpu, (kernels, arrays), &searches, rays)?;

@@ -7,6 +7,7 @@ use crate::kernel_times::{KernelTime, KernelTimes};
 use crate::kernels::Kernels;
 use crate::part_size::first_part;
 use crate::passes::{Pass, Passes};
+use crate::picture_memory::picture_bytes;
 use crate::ray_timing::{self, RayTimes, Timing};
 use crate::scene_records::SceneRecords;
 use crate::unsupported::unsupported;
@@ -64,6 +65,13 @@ impl GpuRenderer {
             times: KernelTimes::default(),
         };
         Ok(Self { gpu, state: Mutex::new(state) })
+    }
+
+    /// Sets the maximum number of bytes to hold in the device's memory: trees, textures and the arrays of a picture. What
+    /// needs more is refused before it is uploaded.
+    pub fn with_memory_limit(mut self, memory_limit: Option<u64>) -> Self {
+        self.gpu.memory_limit = memory_limit;
+        self
     }
 
     /// Returns the device.
@@ -135,7 +143,12 @@ impl Renderer for GpuRenderer {
         let mut state = self.state();
         let State { kernels, uploads, words, arrays, part_size, times } = &mut *state;
         let passes = Passes::new(scene, settings);
-        uploads.update(&self.gpu, &scene.geometries)?;
+        // Pictures have at most 2^28 pixels.
+        let sizes = Job::sizes(&self.gpu, scene, &passes, settings.width * region.n_rows());
+        let bytes = |sizes| picture_bytes(scene, &passes, sizes);
+        let has_room = |sizes| uploads.has_room(&self.gpu, &scene.geometries, bytes(sizes));
+        let found = Arrays::make_room(arrays, &self.gpu, sizes, has_room)?;
+        uploads.update(&self.gpu, &scene.geometries, bytes(found))?;
         let is_paged = |tree| uploads.tree(&scene.geometries, tree).is_some_and(GpuTree::is_paged);
         let of_pass = |pass: &Pass| (pass.kernel, pass.tree.is_some_and(is_paged));
         kernels.compile(&self.gpu, passes.all().map(of_pass))?;
@@ -146,8 +159,18 @@ impl Renderer for GpuRenderer {
         let gpu = &self.gpu;
         // The kernels render whole rows.
         let rows = RenderRegion { columns: RenderRegion::whole(settings).columns, ..region };
-        let job =
-            Job { gpu, kernels, uploads, scene, settings, region: rows, passes, records, words };
+        let job = Job {
+            gpu,
+            kernels,
+            uploads,
+            scene,
+            settings,
+            region: rows,
+            passes,
+            sizes,
+            records,
+            words,
+        };
         let first_part = first_part(gpu.info.kind, *part_size);
         let part_size = part_size.insert(first_part);
         let (image, stats) = job.render(Kept { arrays, times, part_size }, progress)?;
@@ -198,5 +221,40 @@ mod tests {
             let CoreError::Renderer(reason) = &error else { panic!("{error}") };
             assert!(reason.starts_with(&renderer.device().name), "{reason}");
         }
+    }
+
+    #[test]
+    fn arrays_of_larger_pictures_make_room() {
+        let Ok(renderer) = GpuRenderer::open(None) else { return };
+        let small = Settings { width: 8, height: 4, ..Settings::default() };
+        let large = Settings { width: 64, height: 64, ..small };
+        let render = |renderer: &GpuRenderer, settings: &Settings| {
+            renderer.render(&empty(), settings, &NoProgress).map(|_| {
+                let state = renderer.state();
+                state.arrays.as_ref().map(|arrays| arrays.sizes().n_pixels)
+            })
+        };
+        assert_eq!(render(&renderer, &large), Ok(Some(64 * 64)));
+        assert_eq!(render(&renderer, &small), Ok(Some(64 * 64)));
+        let limited = renderer.with_memory_limit(Some(1 << 20));
+        assert_eq!(render(&limited, &small), Ok(Some(8 * 4)));
+        assert!(render(&limited, &large).is_err());
+    }
+
+    #[test]
+    fn a_device_lost_amid_a_picture_is_an_error() {
+        /// Loses the device when the work is about to begin.
+        struct Loss(wgpu::Device);
+        impl Progress for Loss {
+            fn begin(&self, _: &str, _: u64) {
+                self.0.destroy();
+            }
+        }
+        let Ok(renderer) = GpuRenderer::open(None) else { return };
+        let settings = Settings { width: 8, height: 4, ..Settings::default() };
+        let loss = Loss(renderer.gpu.device.clone());
+        let error = renderer.render(&empty(), &settings, &loss).unwrap_err();
+        let CoreError::Renderer(reason) = &error else { panic!("{error}") };
+        assert!(reason.starts_with(&renderer.device().name), "{reason}");
     }
 }

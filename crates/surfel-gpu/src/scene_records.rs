@@ -184,6 +184,21 @@ fn instance_record(
     }
 }
 
+/// Returns the number of words of the texels, environment maps and colours by support of a scene.
+pub fn n_words(scene: &FlatScene) -> usize {
+    let textures = scene.textures.iter().map(|texture| texture.texels.len());
+    let environments = scene.lights.iter().filter_map(|light| match light {
+        Light::Environment(environment) => {
+            let arrays = environment.arrays();
+            Some(size_of_val(arrays.pixels) / 4 + arrays.row_cdf.len() + arrays.column_cdf.len())
+        }
+        _ => None,
+    });
+    let colors = scene.clouds().filter(|cloud| cloud.support_colors.is_some());
+    let colors = colors.map(|_| N_SUPPORT_COLORS as usize);
+    textures.chain(environments).chain(colors).sum()
+}
+
 /// Appends the texels, environment maps and colours by support of a scene; returns where each begins.
 pub fn append_words(scene: &FlatScene, words: &mut Vec<u32>) -> WordOffsets {
     let mut offsets = WordOffsets::default();
@@ -214,6 +229,7 @@ pub fn append_words(scene: &FlatScene, words: &mut Vec<u32>) -> WordOffsets {
             first
         }));
     }
+    debug_assert_eq!(words.len(), n_words(scene));
     words.resize(words.len().max(1), 0);
     offsets
 }

@@ -2,23 +2,20 @@
 
 use crate::device::Gpu;
 use crate::error::{Error, Result};
-use crate::field_arrays::structure;
+use crate::field_arrays::{structure, structure_vectors};
 use crate::gaussian_arrays::{GaussianArrays, gaussian_clouds};
 use crate::kernels::{Kernels, bind};
-use crate::mesh_blocks::mesh_blocks;
+use crate::mesh_blocks::{block_vectors, mesh_blocks};
 use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
+use crate::transfer::{MAX_STAGING_BYTES, NODE_BYTES, Payload, Transfer};
 use crate::unsupported::trees;
 use std::sync::{Arc, Weak};
 use std::time::Instant;
 use surfel_core::bvh::BvhNode;
-use surfel_core::flat::FlatGeometry;
+use surfel_core::flat::{BlockTree, FlatGeometry};
 
-/// Bytes of a node in the device's memory: five times sixteen, so that it is read in vectors of four words.
-const NODE_BYTES: usize = 16 * NODE_VECTORS;
-/// Vectors of four words that a node takes.
-pub const NODE_VECTORS: usize = 5;
-/// Bytes that are uploaded at once.
-const CHUNK_BYTES: usize = 1 << 24;
+/// Bytes of a vector of four words.
+const VECTOR_BYTES: usize = 16;
 
 /// A tree over blocks of points in a device's memory.
 #[derive(Debug)]
@@ -33,6 +30,11 @@ impl GpuTree {
     /// Returns true if the tree has more than one page of nodes or blocks.
     pub fn is_paged(&self) -> bool {
         1 < self.nodes.len().max(self.blocks.len())
+    }
+
+    /// Returns the number of bytes of all pages.
+    fn n_bytes(&self) -> u64 {
+        self.nodes.iter().chain(&self.blocks).map(wgpu::Buffer::size).sum()
     }
 
     /// Binds the tree together with the records of its instances.
@@ -97,13 +99,23 @@ impl UploadTime {
 }
 
 impl Uploads {
-    /// Uploads the geometries that are not uploaded yet, and frees those that are no longer in use.
+    /// Uploads the geometries that are not uploaded yet, and frees those that are no longer in use. The device must have
+    /// memory for them and for `other_bytes`.
     ///
     /// # Errors
-    /// Fails if a geometry is too large for the device.
-    pub fn update(&mut self, gpu: &Gpu, geometries: &[Arc<FlatGeometry>]) -> Result<()> {
-        // A geometry that was changed has lost its weak references, also where it stayed at its place in memory.
-        self.geometries.retain(|(geometry, _)| geometry.strong_count() != 0);
+    /// Fails if a geometry is too large for the device, before anything is uploaded.
+    pub fn update(
+        &mut self,
+        gpu: &Gpu,
+        geometries: &[Arc<FlatGeometry>],
+        other_bytes: u64,
+    ) -> Result<()> {
+        if !self.has_room(gpu, geometries, other_bytes) {
+            // The geometries of other pictures make room.
+            let is_needed = |known: &Weak<_>| geometries.iter().any(|other| is_same(known, other));
+            self.geometries.retain(|(known, _)| is_needed(known));
+            self.check_memory(gpu, geometries, other_bytes)?;
+        }
         for geometry in geometries {
             if self.position(geometry).is_none() {
                 let start = Instant::now();
@@ -115,24 +127,72 @@ impl Uploads {
         self.update_gaussians(gpu, geometries)
     }
 
+    /// Frees geometries that are no longer in use, and returns true if the device has memory for these and for
+    /// `other_bytes`.
+    pub fn has_room(
+        &mut self,
+        gpu: &Gpu,
+        geometries: &[Arc<FlatGeometry>],
+        other_bytes: u64,
+    ) -> bool {
+        // A geometry that was changed has lost its weak references, also where it stayed at its place in memory.
+        self.geometries.retain(|(geometry, _)| geometry.strong_count() != 0);
+        if !self.has_gaussians_of(geometries) {
+            self.gaussians = None;
+        }
+        self.check_memory(gpu, geometries, other_bytes).is_ok()
+    }
+
+    /// Fails if the trees that are missing have too many pages, or if all trees take too much memory.
+    fn check_memory(
+        &self,
+        gpu: &Gpu,
+        geometries: &[Arc<FlatGeometry>],
+        other_bytes: u64,
+    ) -> Result<()> {
+        let mut missing = Vec::new();
+        for (i, geometry) in geometries.iter().enumerate() {
+            let is_repeated = geometries[..i].iter().any(|other| Arc::ptr_eq(other, geometry));
+            if !is_repeated && self.position(geometry).is_none() {
+                missing.extend(geometry_sizes(geometry));
+            }
+        }
+        if self.gaussians.is_none() {
+            missing.push(gaussian_size(geometries));
+        }
+        for size in &missing {
+            check_pages(gpu, size.node_bytes, N_NODE_PAGES)?;
+            check_pages(gpu, size.block_bytes, N_BLOCK_PAGES)?;
+        }
+        let trees = self.geometries.iter().flat_map(|(_, trees)| trees.iter().flatten());
+        let held = trees.chain(self.gaussians.as_ref().map(|(_, tree)| tree)).map(GpuTree::n_bytes);
+        let missing: usize = missing.iter().map(|size| size.node_bytes + size.block_bytes).sum();
+        let staging = missing.min(MAX_STAGING_BYTES);
+        gpu.check_memory(held.sum::<u64>() + (missing + staging) as u64 + other_bytes)
+    }
+
     /// Uploads the trained Gaussians of all geometries in one tree, unless they are there.
     fn update_gaussians(&mut self, gpu: &Gpu, geometries: &[Arc<FlatGeometry>]) -> Result<()> {
-        let clouds: Vec<_> = gaussian_clouds(geometries).map(|(i, _)| &geometries[i]).collect();
-        let known = self.gaussians.take().filter(|(known, _)| {
-            known.len() == clouds.len()
-                && known.iter().zip(&clouds).all(|(known, cloud)| is_same(known, cloud))
-        });
-        if known.is_some() || clouds.is_empty() {
-            self.gaussians = known;
+        if self.gaussians.is_some() || gaussian_clouds(geometries).next().is_none() {
             return Ok(());
         }
         let start = Instant::now();
         let arrays = GaussianArrays::new(geometries);
         if let Some(tree) = upload_tree(gpu, &arrays.nodes, &[], &arrays.blocks)? {
             self.time.add(start, [&tree]);
-            self.gaussians = Some((clouds.into_iter().map(Arc::downgrade).collect(), tree));
+            let clouds = gaussian_clouds(geometries).map(|(i, _)| Arc::downgrade(&geometries[i]));
+            self.gaussians = Some((clouds.collect(), tree));
         }
         Ok(())
+    }
+
+    /// Returns true if the tree of Gaussians has those of these geometries.
+    fn has_gaussians_of(&self, geometries: &[Arc<FlatGeometry>]) -> bool {
+        let clouds: Vec<_> = gaussian_clouds(geometries).map(|(i, _)| &geometries[i]).collect();
+        self.gaussians.as_ref().is_some_and(|(known, _)| {
+            known.len() == clouds.len()
+                && known.iter().zip(&clouds).all(|(known, cloud)| is_same(known, cloud))
+        })
     }
 
     /// Returns a tree that is uploaded, among those of these geometries.
@@ -157,6 +217,45 @@ impl Uploads {
 
 fn is_same(known: &Weak<FlatGeometry>, geometry: &Arc<FlatGeometry>) -> bool {
     known.upgrade().is_some_and(|known| Arc::ptr_eq(&known, geometry))
+}
+
+/// The bytes of the arrays of a tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct TreeSize {
+    /// Bytes of the nodes, and of a structure behind them.
+    node_bytes: usize,
+    block_bytes: usize,
+}
+
+/// Returns the sizes of the trees of a geometry.
+fn geometry_sizes(geometry: &FlatGeometry) -> [TreeSize; 3] {
+    match geometry {
+        FlatGeometry::Cloud(cloud) => {
+            let mut sizes = trees(cloud).map(|(_, points)| TreeSize {
+                node_bytes: points.nodes.len() * NODE_BYTES,
+                block_bytes: size_of_val(points.blocks.as_slice()),
+            });
+            sizes[0].node_bytes += VECTOR_BYTES * structure_vectors(cloud);
+            sizes
+        }
+        FlatGeometry::Mesh(mesh) => {
+            let n_vectors = mesh.triangles.blocks.len() * block_vectors(mesh) as usize;
+            let node_bytes = mesh.triangles.nodes.len() * NODE_BYTES;
+            let size = TreeSize { node_bytes, block_bytes: VECTOR_BYTES * n_vectors };
+            [size, TreeSize::default(), TreeSize::default()]
+        }
+    }
+}
+
+/// Returns the size of the tree of all trained Gaussians.
+fn gaussian_size(geometries: &[Arc<FlatGeometry>]) -> TreeSize {
+    let mut size = TreeSize::default();
+    for (_, gaussians) in gaussian_clouds(geometries) {
+        size.node_bytes += gaussians.nodes().len() * NODE_BYTES;
+        size.block_bytes += size_of_val(gaussians.blocks());
+        size.block_bytes += size_of_val(gaussians.coefficient_bits());
+    }
+    size
 }
 
 fn upload(gpu: &Gpu, geometry: &FlatGeometry) -> Result<GpuGeometry> {
@@ -188,42 +287,40 @@ fn upload_tree(
     if tree_nodes.is_empty() {
         return Ok(None);
     }
-    let mut node_bytes = padded_nodes(tree_nodes);
-    node_bytes.extend_from_slice(behind_nodes);
-    let nodes = pages(gpu, "nodes", &node_bytes, N_NODE_PAGES)?;
-    let blocks = pages(gpu, "blocks", tree_blocks, N_BLOCK_PAGES)?;
+    let mut transfer = Transfer::new(gpu);
+    let payload = Payload { nodes: tree_nodes, bytes: behind_nodes };
+    let nodes = pages(&mut transfer, gpu, "nodes", payload)?;
+    let payload = Payload { nodes: &[], bytes: tree_blocks };
+    let blocks = pages(&mut transfer, gpu, "blocks", payload)?;
+    transfer.finish()?;
     Ok(Some(GpuTree { nodes, blocks }))
 }
 
 /// Uploads bytes in pages.
 fn pages(
+    transfer: &mut Transfer,
     gpu: &Gpu,
     label: &'static str,
-    bytes: &[u8],
-    max_pages: usize,
+    payload: Payload,
 ) -> Result<Vec<wgpu::Buffer>> {
-    let max_pages = if gpu.has_pages() { max_pages } else { 1 };
-    let max_bytes = max_pages * gpu.page_bytes();
-    if max_bytes < bytes.len() {
-        let (device, limit) = (gpu.info.name.clone(), "bytes in the pages of a tree");
-        let (found, needed) = (max_bytes as u64, bytes.len() as u64);
-        return Err(Error::Limit { device, limit, found, needed });
-    }
-    let page = |bytes: &[u8]| {
-        let buffer = array(gpu, label, bytes.len())?;
-        write(gpu, &buffer, bytes)?;
+    let n_bytes = payload.len();
+    let page = |start: usize| {
+        let buffer = array(gpu, label, gpu.page_bytes().min(n_bytes - start))?;
+        transfer.fill(&buffer, payload, start)?;
         Ok(buffer)
     };
-    bytes.chunks(gpu.page_bytes()).map(page).collect()
+    (0..n_bytes).step_by(gpu.page_bytes()).map(page).collect()
 }
 
-/// Returns nodes, each followed by the bytes that are missing to `NODE_BYTES`.
-fn padded_nodes(nodes: &[BvhNode]) -> Vec<u8> {
-    let mut padded = vec![0; nodes.len() * NODE_BYTES];
-    for (node, padded) in nodes.iter().zip(padded.chunks_exact_mut(NODE_BYTES)) {
-        padded[..size_of::<BvhNode>()].copy_from_slice(bytemuck::bytes_of(node));
+/// Fails if an array has more pages than kernels read.
+fn check_pages(gpu: &Gpu, n_bytes: usize, max_pages: usize) -> Result<()> {
+    let max_pages = if gpu.has_pages() { max_pages } else { 1 };
+    let (found, needed) = ((max_pages * gpu.page_bytes()) as u64, n_bytes as u64);
+    if found < needed {
+        let (device, limit) = (gpu.info.name.clone(), "bytes in the pages of a tree");
+        return Err(Error::Limit { device, limit, found, needed });
     }
-    padded
+    Ok(())
 }
 
 /// Makes an array, if the device allows one of this size.
@@ -234,21 +331,4 @@ pub fn array(gpu: &Gpu, label: &'static str, n_bytes: usize) -> Result<wgpu::Buf
         return Err(Error::Limit { device: gpu.info.name.clone(), limit, found, needed });
     }
     gpu.buffer(label, needed, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
-}
-
-/// Writes an array chunk by chunk.
-pub fn write(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {
-    for (chunk_idx, chunk) in bytes.chunks(CHUNK_BYTES).enumerate() {
-        write_chunk(gpu, buffer, chunk_idx * CHUNK_BYTES, chunk)?;
-    }
-    Ok(())
-}
-
-/// Writes a chunk and waits for it, so that copies on their way never take the memory of the whole.
-fn write_chunk(gpu: &Gpu, buffer: &wgpu::Buffer, offset: usize, bytes: &[u8]) -> Result<()> {
-    gpu.catch("points", || {
-        gpu.queue.write_buffer(buffer, offset as u64, bytes);
-        gpu.queue.submit([]);
-    })?;
-    gpu.wait()
 }

@@ -23,7 +23,7 @@ pub const DISPATCH_BYTES: u64 = 12;
 /// Bytes of the counts before the colours of pixels in a readback: colours begin at a multiple of their size.
 const COUNT_BYTES: u64 = 256;
 /// Maximum number of bytes of hits and the like that are read at once.
-const MAX_READ_BYTES: u64 = 1 << 24;
+pub const MAX_READ_BYTES: u64 = 1 << 24;
 
 /// The large arrays, which a renderer keeps from picture to picture. A picture reads nothing that one before it left.
 #[derive(Debug)]
@@ -136,6 +136,28 @@ impl Counts {
 }
 
 impl Arrays {
+    /// Frees `known` if it does not hold what is wanted, or if it holds more and leaves no room for the rest of a picture.
+    /// Returns the sizes of the arrays that the picture will have.
+    ///
+    /// # Errors
+    /// Fails if the device does.
+    pub fn make_room(
+        known: &mut Option<Self>,
+        gpu: &Gpu,
+        wanted: Capacities,
+        has_room: impl FnOnce(Capacities) -> bool,
+    ) -> Result<Capacities> {
+        if let Some(Self { sizes, .. }) = *known {
+            if sizes == wanted || sizes.hold(&wanted) && has_room(sizes) {
+                return Ok(sizes);
+            }
+            // The memory never holds both. It is free once the device has finished with it.
+            *known = None;
+            gpu.wait()?;
+        }
+        Ok(wanted)
+    }
+
     /// Returns arrays that hold what is wanted: `known`, or new ones in their place.
     ///
     /// # Errors
@@ -145,16 +167,18 @@ impl Arrays {
         gpu: &Gpu,
         wanted: Capacities,
     ) -> Result<&'a Self> {
-        if known.as_ref().is_some_and(|known| !known.sizes.hold(&wanted)) {
-            // The memory never holds both. It is free once the device has finished with it.
-            *known = None;
-            gpu.wait()?;
-        }
+        Self::make_room(known, gpu, wanted, |_| true)?;
         let arrays = match known.take() {
             Some(arrays) => arrays,
             None => Self::new(gpu, wanted)?,
         };
         Ok(known.insert(arrays))
+    }
+
+    /// Returns the sizes.
+    #[cfg(test)]
+    pub fn sizes(&self) -> Capacities {
+        self.sizes
     }
 
     fn new(gpu: &Gpu, sizes: Capacities) -> Result<Self> {

@@ -3,7 +3,8 @@
 use crate::device::Gpu;
 use crate::error::Result;
 use crate::scene_records::{WordOffsets, append_words};
-use crate::upload::{array, write};
+use crate::transfer::write;
+use crate::upload::array;
 use std::sync::Arc;
 use surfel_core::flat::{FlatGeometry, FlatScene};
 use surfel_core::scene::Light;

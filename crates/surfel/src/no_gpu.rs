@@ -33,6 +33,11 @@ impl GpuRenderer {
         Err(surfel_core::Error::Renderer(reason.into()))
     }
 
+    /// Does nothing.
+    pub fn with_memory_limit(self, _: Option<u64>) -> Self {
+        self
+    }
+
     /// Returns the device.
     pub fn device(&self) -> &DeviceInfo {
         match *self {}

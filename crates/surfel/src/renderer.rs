@@ -13,8 +13,10 @@ use surfel_core::trace::Simd;
 
 #[cfg(not(feature = "gpu"))]
 use crate::no_gpu::{DeviceKind, GpuRenderer, unsupported};
+#[cfg(not(feature = "gpu"))]
+use surfel_core::Result as GpuResult;
 #[cfg(feature = "gpu")]
-use surfel_gpu::{DeviceKind, GpuRenderer, unsupported};
+use surfel_gpu::{DeviceKind, GpuRenderer, Result as GpuResult, unsupported};
 
 /// Number of rays of a picture from which on a GPU is taken: with fewer, the CPU is done before a GPU's kernels are
 /// compiled. It is an estimate, not a measurement.
@@ -28,6 +30,7 @@ pub struct SceneRenderer {
     cpu: CpuRenderer,
     backend: Backend,
     device: Option<String>,
+    memory_limit: Option<u64>,
     /// The GPU, once it was opened; none if there is none that is worth it.
     gpu: OnceLock<Option<GpuRenderer>>,
     /// True if the last picture was rendered on the GPU.
@@ -46,13 +49,13 @@ impl SceneRenderer {
             cpu: CpuRenderer { simd: Simd::detect() },
             backend: settings.chosen_backend(),
             device: settings.device.clone(),
+            memory_limit: settings.memory_limit,
             gpu: OnceLock::new(),
             was_on_gpu: AtomicBool::new(false),
             has_reported_device: AtomicBool::new(false),
         };
         if renderer.backend == Backend::Gpu {
-            let opened = GpuRenderer::open(renderer.device.as_deref());
-            let opened = opened.map_err(surfel_core::Error::from)?;
+            let opened = renderer.open_gpu().map_err(surfel_core::Error::from)?;
             _ = renderer.gpu.set(Some(opened));
         }
         Ok(renderer)
@@ -69,13 +72,18 @@ impl SceneRenderer {
         self.was_on_gpu.load(Ordering::Relaxed).then(|| gpu.device().name.as_str())
     }
 
+    fn open_gpu(&self) -> GpuResult<GpuRenderer> {
+        let opened = GpuRenderer::open(self.device.as_deref());
+        opened.map(|gpu| gpu.with_memory_limit(self.memory_limit))
+    }
+
     /// Returns a GPU that may be taken unasked: one that is not emulated, or that is named.
     fn automatic_gpu(&self) -> Option<&GpuRenderer> {
         let open = || {
             if self.device.is_none() && !may_have_gpu() {
                 return None;
             }
-            let opened = GpuRenderer::open(self.device.as_deref()).ok()?;
+            let opened = self.open_gpu().ok()?;
             let is_emulated = opened.device().kind == DeviceKind::Software;
             (self.device.is_some() || !is_emulated).then_some(opened)
         };
@@ -164,9 +172,11 @@ fn is_worth(n_points: u64, n_rays: u64) -> bool {
 
 #[cfg(test)]
 mod tests {
-    //! A GPU is taken for large pictures, and not for huge clouds in small ones.
+    //! A GPU is taken for large pictures that fit it, and not for huge clouds in small ones.
 
     use super::*;
+    #[cfg(feature = "gpu")]
+    use std::sync::Mutex;
 
     #[test]
     fn large_pictures_are_worth_an_upload() {
@@ -174,5 +184,65 @@ mod tests {
         assert!(is_worth(1_000_000, full_hd) && is_worth(100_000_000, full_hd));
         assert!(!is_worth(1_000_000, 200 * 150 * 17));
         assert!(!is_worth(1_000_000_000, MIN_RAYS));
+    }
+
+    /// Keeps the notes about a picture.
+    #[cfg(feature = "gpu")]
+    #[derive(Default)]
+    struct Notes(Mutex<Vec<String>>);
+
+    #[cfg(feature = "gpu")]
+    impl Progress for Notes {
+        fn note(&self, text: &str) {
+            self.0.lock().unwrap().push(text.to_owned());
+        }
+    }
+
+    /// Returns an empty scene with a light: few of its rays are traced, and many may be.
+    #[cfg(feature = "gpu")]
+    fn empty() -> FlatScene {
+        use surfel_core::math::DVec3;
+        use surfel_core::scene::{Background, Camera, Graph, Light, Projection, Scene};
+        let camera = Camera {
+            position: DVec3::ZERO,
+            focal_point: DVec3::Y,
+            view_up: DVec3::Z,
+            projection: Projection::Panorama,
+        };
+        let lights = vec![Light::Headlight(1.0)];
+        let (graph, background) = (Graph::default(), Background::Transparent);
+        let scene = Scene { graph, lights, background, camera };
+        FlatScene::new(&scene, &surfel_core::progress::NoProgress).unwrap()
+    }
+
+    #[cfg(feature = "gpu")]
+    #[test]
+    fn what_exceeds_the_memory_limit_is_rendered_on_the_cpu_with_a_note() {
+        let run = RunSettings {
+            backend: Some(Backend::Auto),
+            device: Some("0".into()),
+            memory_limit: Some(1 << 10),
+            ..RunSettings::default()
+        };
+        let renderer = SceneRenderer::new(&run).unwrap();
+        if renderer.automatic_gpu().is_none() {
+            #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
+            {
+                println!("skipped: there is no GPU");
+            }
+            return;
+        }
+        let settings =
+            Settings { width: 64, height: 64, light_samples: 1 << 13, ..Settings::default() };
+        let notes = Notes::default();
+        let (image, _) = renderer.render(&empty(), &settings, &notes).unwrap();
+        assert_eq!((image.coverage[0], renderer.gpu_name()), (0.0, None));
+        let notes = notes.0.into_inner().unwrap();
+        let [note] = &notes[..] else { panic!("{notes:?}") };
+        assert!(note.starts_with("on the CPU: "), "{note}");
+        assert!(
+            note.ends_with("MiB of memory are needed, and --memory-limit is 1.0 KiB"),
+            "{note}"
+        );
     }
 }

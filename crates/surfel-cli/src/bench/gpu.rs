@@ -5,6 +5,7 @@ use crate::report::Report;
 use crate::stats::mrays_per_s;
 use serde_json::{Value, json};
 use std::sync::Arc;
+use surfel::description::RunSettings;
 use surfel::surfel_gpu::{GpuRenderer, TimedQuery, Timing};
 use surfel_core::flat::FlatGeometry;
 use surfel_core::math::Ray;
@@ -13,9 +14,10 @@ use surfel_core::math::Ray;
 pub struct BenchGpu(GpuRenderer);
 
 impl BenchGpu {
-    /// Opens the GPU of this index or name, or the first one.
-    pub fn open(selector: Option<&str>) -> anyhow::Result<Self> {
-        Ok(Self(GpuRenderer::open(selector)?))
+    /// Opens the GPU that the settings name, or the first one.
+    pub fn open(settings: &RunSettings) -> anyhow::Result<Self> {
+        let renderer = GpuRenderer::open(settings.device.as_deref())?;
+        Ok(Self(renderer.with_memory_limit(settings.memory_limit)))
     }
 
     /// Returns the name of the device.

@@ -114,7 +114,7 @@ const DEFAULT_RAYS: [Rays; 5] =
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
     let settings = global.start()?;
     let is_on_gpu = settings.chosen_backend() == Backend::Gpu;
-    let gpu = is_on_gpu.then(|| BenchGpu::open(settings.device.as_deref())).transpose()?;
+    let gpu = is_on_gpu.then(|| BenchGpu::open(&settings)).transpose()?;
     let description = args.options.description.clone()?;
     check_surface(args, &description)?;
     let file = args.camera_file.as_deref().map(CameraFile::read).transpose()?;

@@ -4,6 +4,7 @@ use super::rays::Rays;
 use crate::report::Report;
 use serde_json::Value;
 use std::sync::Arc;
+use surfel::description::RunSettings;
 use surfel_core::flat::FlatGeometry;
 use surfel_core::math::Ray;
 
@@ -12,7 +13,7 @@ pub(crate) enum BenchGpu {}
 
 impl BenchGpu {
     /// Fails, as there is no support of GPUs.
-    pub fn open(_: Option<&str>) -> anyhow::Result<Self> {
+    pub fn open(_: &RunSettings) -> anyhow::Result<Self> {
         anyhow::bail!(
             "this build has no GPU support; use --backend cpu, or build with the feature gpu"
         )

@@ -78,6 +78,33 @@ fn gpus_refuse_what_they_do_not_render() {
 }
 
 #[test]
+fn the_memory_limit_holds_for_the_memory_of_a_gpu() {
+    let folder = Folder::new();
+    let cloud = folder.write("dome.ply", dome(10));
+    let picture = folder.path("out.png");
+    // The queues of a picture take more than the picture, of which there is enough on the CPU.
+    let size = ["--resolution", "400x300", "--spp", "1", "--memory-limit", "20M"];
+    let render = |backend| {
+        let words = ["render", &cloud, "-o", &picture, "--backend", backend];
+        command(&[&words[..], &size].concat()).output().unwrap()
+    };
+    let refused = render("gpu");
+    let text = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(1), "{text}");
+    if text.contains("no GPU was found") {
+        #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
+        {
+            println!("skipped: {text}");
+        }
+        return;
+    }
+    let expected = " of memory are needed, and --memory-limit is 20.0 MiB\n";
+    assert!(text.starts_with("error: ") && text.ends_with(expected), "{text}");
+    assert_eq!(folder.names(), ["dome.ply"]);
+    assert!(render("cpu").status.success());
+}
+
+#[test]
 fn bench_traces_the_rays_of_the_cpu_on_a_gpu() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(30));

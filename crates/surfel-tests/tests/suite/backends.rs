@@ -380,6 +380,50 @@ impl Progress for CancelAfter {
 }
 
 #[test]
+fn trees_in_pages_are_equal_for_surfaces_of_many_points_and_of_fields() {
+    if gpu().is_none() {
+        return;
+    }
+    let device = std::env::var("SURFEL_DEVICE").ok();
+    let settings =
+        Settings { width: 24, height: 18, samples_per_pixel: 1, light_samples: 1, ..SETTINGS };
+    let with_pages = |shift: u32| GpuRenderer::with_pages(device.as_deref(), 1 << shift).unwrap();
+    for kind in [SurfaceKind::Smooth, SurfaceKind::Implicit, SurfaceKind::Octree] {
+        let scene = flat(&reference::scene(kind));
+        let is_refused = |renderer: &GpuRenderer| {
+            let error = renderer.render(&scene, &settings, &NoProgress).err();
+            let reason = error.map(|error| error.to_string());
+            let is_expected = |reason: &str| reason.contains(" bytes in the pages of a tree, ");
+            assert!(reason.as_deref().is_none_or(is_expected), "{reason:?}");
+            reason.is_some()
+        };
+        assert!(is_refused(&with_pages(12)), "{}", kind.name());
+        // With the smallest pages that hold the tree, it has more than one.
+        let paged = (13..20).map(with_pages).find(|renderer| !is_refused(renderer)).unwrap();
+        check_on(&paged, &format!("pages-{}", kind.name()), &scene, &settings);
+    }
+}
+
+#[test]
+fn more_memory_than_the_limit_is_refused_before_the_upload() {
+    if gpu().is_none() {
+        return;
+    }
+    let device = std::env::var("SURFEL_DEVICE").ok();
+    let open = || GpuRenderer::open(device.as_deref()).unwrap();
+    let scene = flat(&reference::scene(SurfaceKind::Disc));
+    let settings =
+        Settings { width: 24, height: 18, samples_per_pixel: 1, light_samples: 1, ..SETTINGS };
+    let error =
+        open().with_memory_limit(Some(1 << 16)).render(&scene, &settings, &NoProgress).unwrap_err();
+    let Error::Renderer(reason) = error else { panic!("{error}") };
+    let expected = " of memory are needed, and --memory-limit is 64.0 KiB";
+    assert!(reason.ends_with(expected), "{reason}");
+    let enough = open().with_memory_limit(Some(1 << 24));
+    check_on(&enough, "limit", &scene, &settings);
+}
+
+#[test]
 fn rendering_can_be_cancelled() {
     let Some(gpu) = gpu() else { return };
     let scene = flat(&reference::scene(SurfaceKind::Splat));

@@ -1,0 +1,216 @@
+//! The transfer of nodes and bytes to arrays of a device, chunk by chunk.
+
+use crate::device::Gpu;
+use crate::error::{Error, Result};
+use std::thread;
+use surfel_core::bvh::BvhNode;
+
+/// Bytes of a node in the device's memory: five times sixteen, so that it is read in vectors of four words.
+pub const NODE_BYTES: usize = 16 * NODE_VECTORS;
+/// Vectors of four words that a node takes.
+pub const NODE_VECTORS: usize = 5;
+/// Bytes of a chunk.
+const CHUNK_BYTES: usize = 1 << 24;
+/// Maximum number of bytes on their way to the device: one chunk is filled while the device copies the one before.
+pub const MAX_STAGING_BYTES: usize = 2 * CHUNK_BYTES;
+/// Maximum number of threads that fill a chunk. One copies about 10 GB/s, and few of them as much as the bus transfers.
+const MAX_THREADS: usize = 8;
+/// Bytes of a piece of a chunk: for one, a thread is worth its start, which takes some ten microseconds.
+const PIECE_BYTES: usize = 1 << 20;
+
+/// The contents of an array: nodes, each padded to `NODE_BYTES`, and bytes behind them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Payload<'a> {
+    /// The nodes.
+    pub nodes: &'a [BvhNode],
+    /// The bytes behind them.
+    pub bytes: &'a [u8],
+}
+
+impl Payload<'_> {
+    /// Returns the number of bytes.
+    pub fn len(&self) -> usize {
+        self.nodes.len() * NODE_BYTES + self.bytes.len()
+    }
+
+    /// Copies bytes from `offset` on, as many as `target` holds.
+    fn copy(&self, mut offset: usize, mut target: wgpu::WriteOnly<[u8]>) {
+        let first_byte = self.nodes.len() * NODE_BYTES;
+        while offset < first_byte && !target.is_empty() {
+            let (node_idx, skipped) = (offset / NODE_BYTES, offset % NODE_BYTES);
+            let mut padded = [0; NODE_BYTES];
+            padded[..size_of::<BvhNode>()]
+                .copy_from_slice(bytemuck::bytes_of(&self.nodes[node_idx]));
+            let n = (NODE_BYTES - skipped).min(target.len());
+            let (mut part, rest) = target.split_at(n);
+            part.copy_from_slice(&padded[skipped..skipped + n]);
+            (offset, target) = (offset + n, rest);
+        }
+        let start = offset.saturating_sub(first_byte);
+        let n = target.len();
+        target.copy_from_slice(&self.bytes[start..start + n]);
+    }
+
+    /// Copies bytes from `offset` on in several threads.
+    ///
+    /// These are threads of their own: a thread of rayon that waits for its tasks may begin another picture on this
+    /// device, which would wait for this one without end.
+    fn copy_in_parallel(&self, offset: usize, target: wgpu::WriteOnly<[u8]>) {
+        let (pieces, rest) = target.into_chunks::<PIECE_BYTES>();
+        let pieces = pieces.into_iter().enumerate();
+        let mut pieces: Vec<_> =
+            pieces.map(|(i, piece)| (offset + i * PIECE_BYTES, piece)).collect();
+        let end = offset + pieces.len() * PIECE_BYTES;
+        let n_threads = rayon::current_num_threads().min(MAX_THREADS);
+        let n_of_thread = pieces.len().div_ceil(n_threads);
+        thread::scope(|scope| {
+            while n_of_thread < pieces.len() {
+                let last = pieces.split_off(pieces.len() - n_of_thread);
+                scope.spawn(move || self.copy_pieces(last));
+            }
+            self.copy_pieces(pieces);
+            self.copy(end, rest);
+        });
+    }
+
+    /// Copies bytes to pieces, each from its offset on.
+    fn copy_pieces(&self, pieces: Vec<(usize, wgpu::WriteOnly<[u8; PIECE_BYTES]>)>) {
+        pieces.into_iter().for_each(|(offset, piece)| self.copy(offset, piece.into()));
+    }
+}
+
+/// A transfer of which at most two chunks are on their way.
+#[derive(Debug)]
+pub struct Transfer<'a> {
+    gpu: &'a Gpu,
+    /// The chunk that the device copies.
+    in_flight: Option<wgpu::SubmissionIndex>,
+}
+
+impl<'a> Transfer<'a> {
+    /// Makes a transfer of nothing yet.
+    pub fn new(gpu: &'a Gpu) -> Self {
+        Self { gpu, in_flight: None }
+    }
+
+    /// Fills an array with the bytes from `start` on.
+    pub fn fill(&mut self, buffer: &wgpu::Buffer, payload: Payload, start: usize) -> Result<()> {
+        let size = buffer.size() as usize;
+        for offset in (0..size).step_by(CHUNK_BYTES) {
+            let n_bytes = CHUNK_BYTES.min(size - offset);
+            let submitted = self.gpu.catch("points", || {
+                let n_bytes = wgpu::BufferSize::new(n_bytes as u64)?;
+                let queue = &self.gpu.queue;
+                let mut staging = queue.write_buffer_with(buffer, offset as u64, n_bytes)?;
+                payload.copy_in_parallel(start + offset, staging.slice(..));
+                drop(staging);
+                Some(queue.submit([]))
+            })?;
+            let submitted = submitted.ok_or_else(|| self.refusal())?;
+            if let Some(previous) = self.in_flight.replace(submitted) {
+                self.gpu.wait_for(&previous)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits until all is on the device.
+    pub fn finish(self) -> Result<()> {
+        self.in_flight.map_or(Ok(()), |last| self.gpu.wait_for(&last))
+    }
+
+    /// Returns the error of a device that gives no memory for a chunk, and no other error: it was lost.
+    fn refusal(&self) -> Error {
+        let lost = self.gpu.check().err();
+        lost.unwrap_or_else(|| self.gpu.keep_failure("gives no memory for points".to_owned()))
+    }
+}
+
+/// Fills an array.
+pub fn write(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {
+    let mut transfer = Transfer::new(gpu);
+    transfer.fill(buffer, Payload { bytes, ..Payload::default() }, 0)?;
+    transfer.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    //! What arrives is what was sent, also in arrays that begin amid a node.
+
+    use super::*;
+    use bytemuck::Zeroable;
+    use std::sync::mpsc;
+    use wgpu::BufferUsages as Usage;
+
+    fn open() -> Option<Gpu> {
+        match Gpu::open(None, u64::MAX) {
+            Ok(gpu) => Some(gpu),
+            Err(error) => {
+                #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
+                {
+                    println!("skipped: {error}");
+                }
+                None
+            }
+        }
+    }
+
+    fn read(gpu: &Gpu, buffer: &wgpu::Buffer) -> Vec<u8> {
+        let target = gpu.buffer("read", buffer.size(), Usage::MAP_READ | Usage::COPY_DST).unwrap();
+        let mut encoder =
+            gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(buffer, 0, &target, 0, buffer.size());
+        gpu.queue.submit([encoder.finish()]);
+        let (sender, receiver) = mpsc::channel();
+        target.slice(..).map_async(wgpu::MapMode::Read, move |result| sender.send(result).unwrap());
+        gpu.wait().unwrap();
+        receiver.recv().unwrap().unwrap();
+        target.slice(..).get_mapped_range().unwrap().to_vec()
+    }
+
+    #[test]
+    fn arrays_hold_what_was_sent() {
+        let Some(gpu) = open() else { return };
+        let node = |i: u32| {
+            let mut node = BvhNode::zeroed();
+            bytemuck::bytes_of_mut(&mut node).fill(i as u8);
+            node
+        };
+        // More than two chunks, so that memory is used again.
+        let nodes: Vec<BvhNode> = (0..400_000).map(node).collect();
+        let bytes: Vec<u8> = (0..CHUNK_BYTES + 160).map(|i| (i / 16) as u8).collect();
+        let mut expected: Vec<u8> = Vec::new();
+        for node in &nodes {
+            expected.extend_from_slice(bytemuck::bytes_of(node));
+            expected.resize(expected.len().next_multiple_of(NODE_BYTES), 0);
+        }
+        expected.extend_from_slice(&bytes);
+        let payload = Payload { nodes: &nodes, bytes: &bytes };
+        assert_eq!(payload.len(), expected.len());
+        // The second array begins amid a node, the third one amid the bytes.
+        let starts = [0, 16 * 1001, 400_000 * NODE_BYTES + 32];
+        let mut transfer = Transfer::new(&gpu);
+        let usage = Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC;
+        let arrays = starts.map(|start| {
+            let buffer = gpu.buffer("test", (expected.len() - start) as u64, usage).unwrap();
+            transfer.fill(&buffer, payload, start).unwrap();
+            buffer
+        });
+        transfer.finish().unwrap();
+        for (start, array) in starts.into_iter().zip(&arrays) {
+            assert!(read(&gpu, array) == expected[start..], "{start}");
+        }
+    }
+
+    #[test]
+    fn a_device_lost_amid_a_transfer_is_an_error() {
+        let Some(gpu) = open() else { return };
+        let bytes = vec![0; 2 * CHUNK_BYTES];
+        let usage = Usage::STORAGE | Usage::COPY_DST;
+        let buffer = gpu.buffer("test", bytes.len() as u64, usage).unwrap();
+        gpu.device.destroy();
+        let error = write(&gpu, &buffer, &bytes).unwrap_err();
+        assert!(error.to_string().starts_with(&gpu.info.name), "{error}");
+        assert!(gpu.check().is_err());
+    }
+}
