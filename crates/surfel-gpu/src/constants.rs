@@ -79,6 +79,8 @@ fn numbers() -> Vec<(&'static str, u32)> {
         ("PATHS", queue::PATHS),
         ("POINTS", queue::POINTS),
         ("LIGHT_RAYS", queue::LIGHT_RAYS),
+        ("UNDECIDED", queue::UNDECIDED),
+        ("N_QUEUES", queue::N_QUEUES),
         ("FIRST_ADDED", count::FIRST_ADDED),
         ("FIRST_TAKEN", count::FIRST_TAKEN),
         ("FIRST_TRACED", count::FIRST_TRACED),

@@ -32,7 +32,7 @@ impl Kernels {
         gpu.catch("the layouts of arrays", || {
             let (read, write) = (storage(true), storage(false));
             let uniforms = layout(gpu, &[uniform(false), uniform(true), uniform(false)]);
-            let rays = layout(gpu, &[write; 6]);
+            let rays = layout(gpu, &[write; 7]);
             let tree = layout(gpu, &[read; 3]);
             // A tree in pages takes more arrays than some devices allow in one kernel; they refuse such trees.
             let n_pages = if gpu.has_pages() { N_NODE_PAGES + N_BLOCK_PAGES } else { 2 };

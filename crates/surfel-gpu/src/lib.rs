@@ -49,6 +49,7 @@ mod gaussian_arrays;
 mod transfer;
 mod upload;
 mod scene_records;
+mod search;
 mod words;
 mod pixel_order;
 mod part_size;

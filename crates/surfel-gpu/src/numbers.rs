@@ -67,8 +67,10 @@ pub mod queue {
     pub const POINTS: u32 = 1;
     /// Rays toward a light.
     pub const LIGHT_RAYS: u32 = 2;
+    /// Rays that the test of their first disc leaves undecided.
+    pub const UNDECIDED: u32 = 3;
     /// Number of queues.
-    pub const N_QUEUES: u32 = 3;
+    pub const N_QUEUES: u32 = 4;
 }
 
 /// Indices of lengths of queues and numbers of rays.

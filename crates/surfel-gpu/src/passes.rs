@@ -4,6 +4,7 @@ use crate::numbers::queue;
 use crate::numbers::ray_kind;
 use crate::records::{Task, Visit};
 use crate::scene_records::n_light_samples;
+use crate::search::{ANY, CLOSEST, SearchKernels, SearchStep};
 use crate::shader::{Kernel, Surface};
 use crate::tree_visits::{TreeInstances, TreeVisits};
 use crate::upload::TreeRef;
@@ -128,7 +129,7 @@ impl Passes {
     /// Returns the pass of paths, or of rays toward lights, over these instances of a tree; none without any.
     fn tree_pass(
         &mut self,
-        kernel: fn(Surface) -> Kernel,
+        kernel: Kernel,
         tree: &TreeInstances,
         visits: Range<u32>,
         queue: u32,
@@ -139,7 +140,7 @@ impl Passes {
         (0 < n_visits).then(|| Pass {
             tree: Some(tree.tree),
             is_of_light,
-            ..self.pass(kernel(tree.surface), Size::Queue(queue), task)
+            ..self.pass(kernel, Size::Queue(queue), task)
         })
     }
 
@@ -154,13 +155,53 @@ impl Passes {
         })
     }
 
+    /// Returns the passes of a search in a tree.
+    fn search(
+        &mut self,
+        tree: &TreeInstances,
+        visits: Range<u32>,
+        queue: u32,
+        search: &SearchKernels,
+    ) -> Vec<Pass> {
+        let mut passes = Vec::new();
+        for step in search.steps(tree.surface, visits.len()) {
+            match step {
+                SearchStep::Search { kernel, is_rest } => {
+                    let pass = self.tree_pass(kernel, tree, visits.clone(), queue);
+                    let Some(mut pass) = pass else { continue };
+                    if is_rest {
+                        self.set_queue(&mut pass, queue::UNDECIDED);
+                    }
+                    passes.push(pass);
+                }
+                SearchStep::Take => {
+                    let is_of_light = queue == queue::LIGHT_RAYS;
+                    let take = self.take(queue::UNDECIDED, ray_kind::UNCOUNTED);
+                    passes.push(Pass { is_of_light, ..take });
+                }
+            }
+        }
+        passes
+    }
+
+    /// Lets a pass go over another queue.
+    fn set_queue(&mut self, pass: &mut Pass, queue: u32) {
+        let at = pass.task_offset as usize;
+        let task: &mut Task = bytemuck::from_bytes_mut(&mut self.tasks[at..at + size_of::<Task>()]);
+        task.queue = queue;
+        pass.size = Size::Queue(queue);
+    }
+
     /// Returns the passes that find hits, and the points behind them where these give the colour.
     fn closest(&mut self, tree: &TreeInstances, visits: Range<u32>, queue: u32) -> Vec<Pass> {
-        let closest = self.tree_pass(Kernel::Closest, tree, visits.clone(), queue);
+        let mut passes = self.search(tree, visits.clone(), queue, &CLOSEST);
         let support = tree.has_support_colors;
-        let support =
-            support.then(|| self.tree_pass(Kernel::Support, tree, visits, queue)).flatten();
-        closest.into_iter().chain(support).collect()
+        passes.extend(
+            support
+                .then(|| self.tree_pass(Kernel::Support(tree.surface), tree, visits, queue))
+                .flatten(),
+        );
+        passes
     }
 
     fn take(&mut self, queue: u32, ray_kind: u32) -> Pass {
@@ -194,8 +235,7 @@ impl Passes {
         let of_light = |pass: Pass| Pass { is_of_light: true, ..pass };
         once.push(of_light(self.pass(Kernel::TakeQueue, Size::One, task)));
         for tree in trees {
-            let any = self.tree_pass(Kernel::Any, tree, tree.opaque.clone(), queue::LIGHT_RAYS);
-            once.extend(any);
+            once.extend(self.search(tree, tree.opaque.clone(), queue::LIGHT_RAYS, &ANY));
         }
         once.extend(self.gaussian_pass(Kernel::GaussianShadow, queue::LIGHT_RAYS, gaussians));
         if !scene.is_transmissive {
@@ -233,7 +273,8 @@ impl Passes {
             self.aov_hits.extend(hits);
         }
         for tree in trees.iter().filter(|tree| tree.surface != Surface::Triangle) {
-            let support = self.tree_pass(Kernel::Support, tree, tree.all(), queue::PATHS);
+            let support =
+                self.tree_pass(Kernel::Support(tree.surface), tree, tree.all(), queue::PATHS);
             self.aov_supports.extend(support);
         }
         let support = self.gaussian_pass(Kernel::GaussianSupport, queue::PATHS, gaussians);

@@ -1,7 +1,9 @@
 //! The memory of a device that a picture takes besides its trees.
 
 use crate::passes::Passes;
-use crate::records::{HitRecord, InstanceRecord, MaterialRecord, Path, Pixel, ShadingPointRecord};
+use crate::records::{
+    FirstDisc, HitRecord, InstanceRecord, MaterialRecord, Path, Pixel, ShadingPointRecord,
+};
 use crate::scene_records::n_words;
 use crate::wavefront::{Capacities, MAX_READ_BYTES};
 use surfel_core::flat::FlatScene;
@@ -23,7 +25,8 @@ pub fn array_bytes(sizes: Capacities) -> u64 {
     let n_hit_arrays = if is_transmissive { 2 } else { 1 };
     let of_entry = n_path_arrays * size_of::<Path>()
         + n_hit_arrays * size_of::<HitRecord>()
-        + size_of::<ShadingPointRecord>();
+        + size_of::<ShadingPointRecord>()
+        + size_of::<FirstDisc>();
     // Colours come back through two arrays in turn.
     let of_pixel = size_of::<Pixel>() + 3 * size_of::<[f32; 4]>();
     let hit_bytes = u64::from(n_entries) * size_of::<HitRecord>() as u64;

@@ -10,11 +10,14 @@ use crate::passes::{Pass, Size};
 use crate::picture_memory::array_bytes;
 use crate::records::{FrameRecord, Path, Task, Visit};
 use crate::scene_records::SceneRecords;
+use crate::search::{ANY, CLOSEST, SearchKernels, SearchStep};
 use crate::shader::{Kernel, Surface};
 use crate::tree_visits::lone_visit;
 use crate::unsupported::trees;
 use crate::upload::{GpuTree, TreeRef, Uploads};
-use crate::wavefront::{Arrays, Capacities, Contents, RECORD_STRIDE, Wavefront, written};
+use crate::wavefront::{
+    Arrays, Capacities, Contents, DISPATCH_BYTES, RECORD_STRIDE, Wavefront, written,
+};
 use bytemuck::Zeroable;
 use std::sync::Arc;
 use std::time::Instant;
@@ -90,7 +93,13 @@ pub fn time(
     };
     let is_paged = |search: &Search| tree(search).is_some_and(GpuTree::is_paged);
     let own = [Kernel::TakeQueue, Kernel::ClearHits].map(|kernel| (kernel, false));
-    let of_trees = searches.iter().map(|search| (search.kernel, is_paged(search)));
+    let of_trees = searches.iter().flat_map(|search| {
+        let is_paged = is_paged(search);
+        search.steps().into_iter().filter_map(move |step| match step {
+            SearchStep::Search { kernel, .. } => Some((kernel, is_paged)),
+            SearchStep::Take => None,
+        })
+    });
     kernels.compile(gpu, own.into_iter().chain(of_trees))?;
     let kernels = &*kernels;
     let arrays = Arrays::update(arrays, gpu, sizes)?;
@@ -126,24 +135,28 @@ pub fn time(
 
 /// A search in one tree.
 struct Search {
-    kernel: Kernel,
+    surface: Surface,
+    kernels: SearchKernels,
     tree_idx: usize,
     visit: Visit,
 }
 
+impl Search {
+    fn steps(&self) -> Vec<SearchStep> {
+        self.kernels.steps(self.surface, 1)
+    }
+}
+
 /// Returns the searches that answer a question.
 fn searches(geometry: &FlatGeometry, query: TimedQuery) -> Vec<Search> {
-    let kernel = |surface| match query {
-        TimedQuery::Any => Kernel::Any(surface),
-        _ => Kernel::Closest(surface),
-    };
+    let kernels = if query == TimedQuery::Any { ANY } else { CLOSEST };
     let search = |tree_idx, surface| {
         let visit = lone_visit(geometry, tree_idx);
         let visit = match query {
             TimedQuery::Surface => visit,
             _ => Visit { has_edge_test: 0, min_discs: 1, ..visit },
         };
-        Search { kernel: kernel(surface), tree_idx, visit }
+        Search { surface, kernels, tree_idx, visit }
     };
     let cloud = match geometry {
         FlatGeometry::Mesh(_) => return vec![search(0, Surface::Triangle)],
@@ -168,7 +181,8 @@ struct Chunk<'a> {
     wavefront: Wavefront<'a>,
     paths: Vec<Path>,
     clear: Vec<Pass>,
-    searches: Vec<Pass>,
+    /// The passes of the searches, with the indices of their trees; a pass that takes a queue has none.
+    searches: Vec<(Pass, Option<usize>)>,
 }
 
 impl<'a> Chunk<'a> {
@@ -192,11 +206,24 @@ impl<'a> Chunk<'a> {
             clear.push(pass(Kernel::TakeQueue, Size::One, task));
         }
         clear.push(pass(Kernel::ClearHits, Size::Pixels, Task::default()));
-        let searches = searches.iter().zip(0..).map(|(search, first_visit)| {
-            let task = Task { first_visit, n_visits: 1, ..Task::default() };
-            pass(search.kernel, Size::Pixels, task)
-        });
-        let searches = searches.collect();
+        let mut passes = Vec::new();
+        for (tree_idx, search) in searches.iter().enumerate() {
+            let task = Task { first_visit: tree_idx as u32, n_visits: 1, ..Task::default() };
+            for step in search.steps() {
+                passes.push(match step {
+                    SearchStep::Search { kernel, is_rest } => {
+                        let queue = if is_rest { queue::UNDECIDED } else { queue::PATHS };
+                        (pass(kernel, Size::Queue(queue), Task { queue, ..task }), Some(tree_idx))
+                    }
+                    SearchStep::Take => {
+                        let (queue, ray_kind) = (queue::UNDECIDED, ray_kind::UNCOUNTED);
+                        let task = Task { queue, ray_kind, ..Task::default() };
+                        (pass(Kernel::TakeQueue, Size::One, task), None)
+                    }
+                });
+            }
+        }
+        let searches = passes;
         let records = SceneRecords::empty();
         let words = written(gpu, "textures", &[0; 4], wgpu::BufferUsages::STORAGE)?;
         let contents = Contents { scene: &records, words: &words, tasks: &tasks };
@@ -234,9 +261,10 @@ impl<'a> Chunk<'a> {
             {
                 let description = wgpu::ComputePassDescriptor::default();
                 let mut encoder = encoder.begin_compute_pass(&description);
-                let searches = self.searches.iter().zip(trees);
+                let searches =
+                    self.searches.iter().map(|(pass, tree)| (pass, tree.map(|i| &trees[i])));
                 let clear = self.clear.iter().map(|pass| (pass, None));
-                for (pass, tree) in clear.chain(searches.map(|(pass, tree)| (pass, Some(tree)))) {
+                for (pass, tree) in clear.chain(searches) {
                     let (resources, is_paged) = match tree {
                         Some((group, is_paged)) => (group, *is_paged),
                         None => (&self.wavefront.dispatches, false),
@@ -245,8 +273,15 @@ impl<'a> Chunk<'a> {
                     encoder.set_bind_group(0, &self.wavefront.uniforms, &[pass.task_offset]);
                     encoder.set_bind_group(1, &self.wavefront.paths[0], &[]);
                     encoder.set_bind_group(2, resources, &[]);
-                    let n_groups = if pass.size == Size::One { 1 } else { n_groups };
-                    encoder.dispatch_workgroups(n_groups, 1, 1);
+                    match pass.size {
+                        Size::One => encoder.dispatch_workgroups(1, 1, 1),
+                        Size::Queue(queue) => {
+                            let offset = DISPATCH_BYTES * u64::from(queue);
+                            let sizes = &self.wavefront.arrays.dispatch_sizes;
+                            encoder.dispatch_workgroups_indirect(sizes, offset);
+                        }
+                        Size::Pixels => encoder.dispatch_workgroups(n_groups, 1, 1),
+                    }
                 }
             }
             gpu.queue.submit([encoder.finish()]);

@@ -410,6 +410,9 @@ pub struct ShadingPointRecord {
     pub reserved_b: u32,
 }
 
+/// The slot of a ray's first disc and the distance to it as bits, the index of another ray that is undecided, and zero.
+pub type FirstDisc = [u32; 4];
+
 /// Sums of radiance and alpha over all samples of a pixel, in fixed point of 32 bits before and 32 behind the point: the
 /// lower words come first.
 pub type Pixel = [u32; 8];

@@ -16,6 +16,14 @@ pub enum Kernel {
     ClearHits,
     /// Finds the nearest hit on a tree whose points have this surface.
     Closest(Surface),
+    /// Finds the first discs of rays on a tree.
+    FirstDisc,
+    /// Finds discs on rays toward a light.
+    AnyDisc,
+    /// Tests whether rays hit the surface near their first discs.
+    TestClosest(Surface),
+    /// Tests whether rays toward a light are blocked near the discs that were found.
+    TestAny(Surface),
     /// Finds the points behind the hits on a tree.
     Support(Surface),
     /// Computes the light of trained Gaussians before the hits of rays.
@@ -144,6 +152,16 @@ impl Surface {
         !matches!(self, Self::Implicit | Self::Octree | Self::OctreeSplat)
     }
 
+    /// Returns true if passes test the first disc of each ray before others search what is behind it; with `is_any` any
+    /// disc of rays toward a light.
+    pub fn tests_first_disc(self, is_any: bool) -> bool {
+        match self {
+            Self::Smooth => true,
+            Self::Disc | Self::Splat | Self::SplatFit => is_any,
+            _ => false,
+        }
+    }
+
     /// Returns the maximum number of discs that are gathered along a ray.
     fn max_discs(self) -> usize {
         match self {
@@ -238,6 +256,13 @@ const ANY_SURFACE: &[&str] = parts!["trace/query/any_surface.wgsl"];
 const EDGE_FILTER: &[&str] = parts!["trace/query/edge_filter.wgsl"];
 const SMOOTH: &[&str] =
     parts!["surface/smooth.wgsl", "trace/query/damped.wgsl", "trace/query/smooth_query.wgsl",];
+const SMOOTH_DISC: &[&str] = parts!["trace/query/smooth_disc.wgsl"];
+const SLOT: &[&str] = parts!["render/slot.wgsl"];
+const NEARER: &[&str] = parts!["trace/nearer.wgsl"];
+const FIRST_DISC: &[&str] = parts!["trace/first_disc_kernel.wgsl"];
+const ANY_DISC: &[&str] = parts!["trace/any_disc_kernel.wgsl"];
+const TEST_CLOSEST: &[&str] = parts!["trace/test_closest_kernel.wgsl"];
+const TEST_ANY: &[&str] = parts!["trace/test_any_kernel.wgsl"];
 const SMOOTH_SURFACE: &[&str] = parts!["trace/query/smooth_surface.wgsl"];
 const MLS: &[&str] = parts![
     "math/eigen.wgsl",
@@ -279,6 +304,10 @@ impl Kernel {
             Self::PassSurface,
             Self::Resolve,
         ];
+        all.extend([Self::FirstDisc, Self::AnyDisc]);
+        let tested = |any: bool| Surface::ALL.into_iter().filter(move |s| s.tests_first_disc(any));
+        all.extend(tested(false).map(Self::TestClosest));
+        all.extend(tested(true).map(Self::TestAny));
         all.extend(Surface::ALL.map(Self::Closest));
         all.extend(Surface::ALL.map(Self::Any));
         let of_points = Surface::ALL.into_iter().filter(|surface| *surface != Surface::Triangle);
@@ -293,6 +322,10 @@ impl Kernel {
             Self::TakeQueue => "take_queue",
             Self::ClearHits => "clear_hits",
             Self::Closest(_) | Self::GaussianHits => "closest",
+            Self::FirstDisc => "first_disc",
+            Self::AnyDisc => "any_disc",
+            Self::TestClosest(_) => "test_closest",
+            Self::TestAny(_) => "test_any",
             Self::Support(_) | Self::GaussianSupport => "support",
             Self::Gaussians => "gaussians",
             Self::GaussianShadow => "gaussian_shadow",
@@ -309,6 +342,9 @@ impl Kernel {
     pub fn resources(self) -> Resources {
         match self {
             Self::Closest(_) | Self::Any(_) | Self::Support(_) => Resources::Tree,
+            Self::FirstDisc | Self::AnyDisc | Self::TestClosest(_) | Self::TestAny(_) => {
+                Resources::Tree
+            }
             Self::Gaussians | Self::GaussianShadow | Self::GaussianHits | Self::GaussianSupport => {
                 Resources::Tree
             }
@@ -326,8 +362,8 @@ impl Kernel {
         if let Some(page_shift) = page_shift {
             _ = writeln!(source, "const PAGE_SHIFT: u32 = {page_shift}u;");
         }
-        if let Self::Closest(surface) | Self::Any(surface) | Self::Support(surface) = self {
-            let has_colors = matches!(self, Self::Closest(_));
+        if let Some(surface) = self.surface() {
+            let has_colors = matches!(self, Self::Closest(_) | Self::TestClosest(_));
             _ = writeln!(source, "const SHAPE: u32 = {}u;", surface_number(surface.shape()));
             _ = writeln!(source, "const SURFACE: u32 = {}u;", surface.number());
             _ = writeln!(source, "const MAX_DISCS: u32 = {}u;", surface.max_discs());
@@ -343,6 +379,16 @@ impl Kernel {
         source
     }
 
+    /// Returns the surface that the kernel traces.
+    fn surface(self) -> Option<Surface> {
+        match self {
+            Self::Closest(surface) | Self::Any(surface) | Self::Support(surface) => Some(surface),
+            Self::TestClosest(surface) | Self::TestAny(surface) => Some(surface),
+            Self::FirstDisc | Self::AnyDisc => Some(Surface::Disc),
+            _ => None,
+        }
+    }
+
     fn parts(self) -> Vec<&'static [&'static str]> {
         match self {
             Self::Generate => vec![COMMON, SAMPLING, GENERATE],
@@ -355,7 +401,7 @@ impl Kernel {
             }
             Self::PassSurface => vec![COMMON, SAMPLING, SCENE, SPECULAR, SHADING, TRANSMITTANCE],
             Self::Closest(surface) => {
-                let mut parts = vec![COMMON, VISIT, TREE, CLOSEST_KERNEL];
+                let mut parts = vec![COMMON, VISIT, TREE, NEARER, CLOSEST_KERNEL];
                 if surface.is_in_blocks() {
                     parts.push(TRAVERSE);
                 }
@@ -371,9 +417,26 @@ impl Kernel {
                     Surface::Octree | Surface::OctreeSplat => {
                         &[CLOSEST_ALONE, OCTREE, OCTREE_SURFACE]
                     }
-                    Surface::Smooth => &[GROUP, CLOSEST, REGION, EDGE, SMOOTH, SMOOTH_SURFACE],
+                    Surface::Smooth => {
+                        &[GROUP, CLOSEST, REGION, EDGE, SMOOTH, SMOOTH_DISC, SMOOTH_SURFACE]
+                    }
                 });
                 parts
+            }
+            Self::FirstDisc => {
+                vec![COMMON, VISIT, TREE, TRAVERSE, CLOSEST, NEARER, FIRST_DISC]
+            }
+            Self::AnyDisc => vec![COMMON, VISIT, TREE, TRAVERSE, ANY, ANY_DISC],
+            Self::TestClosest(_) => {
+                let parts = [COMMON, VISIT, TREE, NEARER, SLOT, REGION, EDGE, SMOOTH, SMOOTH_DISC];
+                parts.into_iter().chain([TEST_CLOSEST]).collect()
+            }
+            Self::TestAny(Surface::Smooth) => {
+                let parts = [COMMON, VISIT, TREE, SLOT, REGION, EDGE, SMOOTH, SMOOTH_FILTER];
+                parts.into_iter().chain([TEST_ANY]).collect()
+            }
+            Self::TestAny(_) => {
+                vec![COMMON, VISIT, TREE, SLOT, REGION, EDGE, EDGE_FILTER, TEST_ANY]
             }
             Self::Support(_) => vec![COMMON, VISIT, TREE, REGION, SUPPORT],
             Self::Gaussians => {

@@ -7,7 +7,7 @@ use crate::numbers::count;
 use crate::numbers::queue;
 use crate::numbers::ray_kind;
 use crate::readback::Readback;
-use crate::records::{FrameRecord, HitRecord, Path, Pixel, ShadingPointRecord};
+use crate::records::{FirstDisc, FrameRecord, HitRecord, Path, Pixel, ShadingPointRecord};
 use crate::scene_records::SceneRecords;
 use std::time::Instant;
 use surfel_core::image::decode_srgb8;
@@ -34,6 +34,7 @@ pub struct Arrays {
     light_rays: wgpu::Buffer,
     light_hits: wgpu::Buffer,
     points: wgpu::Buffer,
+    first_discs: wgpu::Buffer,
     pixels: wgpu::Buffer,
     colors: wgpu::Buffer,
     counts: wgpu::Buffer,
@@ -208,6 +209,7 @@ impl Arrays {
             light_rays: paths("rays toward lights", n_entries)?,
             light_hits: hits("hits of light", if sizes.is_transmissive { n_entries } else { 1 })?,
             points: array("points", n_entries, of_points, Usage::empty())?,
+            first_discs: array("first discs", n_entries, size_of::<FirstDisc>(), Usage::empty())?,
             pixels: array("pixels", n_pixels, size_of::<Pixel>(), Usage::empty())?,
             colors: array("colours", n_pixels, size_of::<[f32; 4]>(), Usage::COPY_SRC)?,
             counts: gpu.buffer("counts", count_bytes, of_counts)?,
@@ -236,7 +238,7 @@ impl<'a> Wavefront<'a> {
         arrays: &'a Arrays,
         contents: Contents,
     ) -> Result<Self> {
-        let Arrays { hits, points, pixels, counts, tables, .. } = arrays;
+        let Arrays { hits, points, pixels, counts, first_discs, tables, .. } = arrays;
         let tasks = written(gpu, "tasks", contents.tasks, Usage::UNIFORM)?;
         let frame_bytes = size_of::<FrameRecord>() as u64;
         let frame = gpu.buffer("picture", frame_bytes, Usage::UNIFORM | Usage::COPY_DST)?;
@@ -253,7 +255,7 @@ impl<'a> Wavefront<'a> {
         });
         let wavefront = gpu.catch("the arrays of rays", || {
             let rays = |paths: &wgpu::Buffer, hits: &wgpu::Buffer, next: &wgpu::Buffer| {
-                let arrays = [paths, hits, next, points, pixels, counts];
+                let arrays = [paths, hits, next, points, pixels, counts, first_discs];
                 bind(gpu, &kernels.rays, &arrays.map(wgpu::Buffer::as_entire_binding))
             };
             let output =

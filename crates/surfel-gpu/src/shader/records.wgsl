@@ -248,3 +248,6 @@ const EPSILON: f32 = 1.1920929e-7;
 @group(1) @binding(4) var<storage, read_write> pixels: array<array<atomic<u32>, 8>>;
 // Lengths of queues and numbers of rays, at the indices `FIRST_*`, `N_ACTIVE` and `MAX_ADDED`.
 @group(1) @binding(5) var<storage, read_write> counts: array<atomic<u32>, N_COUNTS>;
+// For each ray the slot of its first disc, NONE without one, and the distance to it as bits; the third words are the queue
+// of the rays that are undecided after the test of this disc.
+@group(1) @binding(6) var<storage, read_write> first_discs: array<vec4<u32>>;

@@ -1,7 +1,7 @@
 // Queues of paths, shading points and rays toward lights.
 
 // Sizes of indirect dispatches, three words for each queue.
-@group(2) @binding(0) var<storage, read_write> dispatches: array<u32, 12>;
+@group(2) @binding(0) var<storage, read_write> dispatches: array<u32, 3u * N_QUEUES + 3u>;
 
 // Closes a queue: passes over it start as many workgroups as its entries need. What is added next is a new queue.
 @compute @workgroup_size(1)

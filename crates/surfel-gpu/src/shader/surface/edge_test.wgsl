@@ -36,56 +36,35 @@ fn no_neighbors(hit: CandidateHit) -> NeighborhoodStats {
     return stats;
 }
 
-// Adds those of four points relative to a hit that are its neighbours.
-fn add_neighbors(stats: ptr<function, NeighborhoodStats>, four: FourPoints) {
-    let hit = (*stats).hit;
-    let reach = NEIGHBORHOOD_RADIUS_FACTOR * hit.radius;
-    let squared = four.x * four.x + four.y * four.y + four.z * four.z;
-    let height = abs(dot_four(four.x, four.y, four.z, hit.normal));
-    let is_neighbor = (squared < vec4<f32>(reach * reach))
-        & (height < vec4<f32>(EDGE_MAX_PLANE_DISTANCE * hit.radius))
-        & (vec4<f32>(0.0) < four.radius);
-    if !any(is_neighbor) {
-        return;
-    }
-    let neighbors = lane_bits(is_neighbor);
-    (*stats).n_neighbors += countOneBits(neighbors);
-    add_passed(stats, four, is_neighbor);
-    let x = dot_four(four.x, four.y, four.z, (*stats).tangent);
-    let y = dot_four(four.x, four.y, four.z, (*stats).bitangent);
-    let is_beside = x * x + y * y <= vec4<f32>(1e-6 * hit.radius * hit.radius);
-    // The lower half of the directions is rotated a little, so that points of a grid are never exactly opposite to each
-    // other.
-    let none = vec4<f32>(0.0);
-    let is_below = (y < none) | ((y <= none) & (x < none));
-    let angle = select(none, vec4<f32>(TIE_BREAK_ANGLE), is_below);
-    let direction_x = x - angle * y;
-    let direction_y = y + angle * x;
-    let has_direction = is_neighbor & !is_beside;
-    for (var lane = 0u; lane < 4u; lane++) {
-        if has_direction[lane] {
-            add_direction(stats, vec2<f32>(direction_x[lane], direction_y[lane]));
-        }
-    }
+// Returns true if a point at `offset` from a hit is its neighbour.
+fn is_neighbor(hit: CandidateHit, offset: vec3<f32>) -> bool {
+    let max_distance = NEIGHBORHOOD_RADIUS_FACTOR * hit.radius;
+    let height = abs(dot(hit.normal, offset));
+    return dot(offset, offset) < max_distance * max_distance
+        && height < EDGE_MAX_PLANE_DISTANCE * hit.radius;
 }
 
-// Adds what tells the side from which the ray came: the neighbours that it has passed.
-fn add_passed(stats: ptr<function, NeighborhoodStats>, four: FourPoints, is_neighbor: vec4<bool>) {
+// Adds a neighbour at `offset` from the hit. Its normal has integer components.
+fn add_neighbor(stats: ptr<function, NeighborhoodStats>, offset: vec3<f32>, normal: vec3<f32>) {
     let hit = (*stats).hit;
-    let along = dot_four(four.x, four.y, four.z, hit.direction);
-    let is_passed = is_neighbor & (along < vec4<f32>(-MIN_PASSED_DISTANCE * hit.radius));
-    let n_passed = countOneBits(lane_bits(is_passed));
-    if n_passed == 0u {
+    (*stats).n_neighbors += 1u;
+    let along = dot(offset, hit.direction);
+    if along < -MIN_PASSED_DISTANCE * hit.radius {
+        (*stats).n_passed += 1u;
+        // Heights are rounded to integers, so that the sum over points does not depend on their order.
+        let above = dot(normal, along * hit.direction - offset);
+        (*stats).free_side += round(above * (HEIGHT_STEPS / hit.radius)) * normal;
+    }
+    let x = dot(offset, (*stats).tangent);
+    let y = dot(offset, (*stats).bitangent);
+    if x * x + y * y <= 1e-6 * hit.radius * hit.radius {
         return;
     }
-    (*stats).n_passed += n_passed;
-    let above = four.normal_x * (along * hit.direction.x - four.x)
-        + four.normal_y * (along * hit.direction.y - four.y)
-        + four.normal_z * (along * hit.direction.z - four.z);
-    // Heights are rounded to integers, so that the sum over points does not depend on their order.
-    let steps = select(vec4<f32>(0.0), round(above * (HEIGHT_STEPS / hit.radius)), is_passed);
-    (*stats).free_side +=
-        vec3<f32>(dot(steps, four.normal_x), dot(steps, four.normal_y), dot(steps, four.normal_z));
+    // The lower half of the directions is rotated a little, so that points of a grid are never exactly opposite to each
+    // other.
+    let is_below = y < 0.0 || y <= 0.0 && x < 0.0;
+    let angle = select(0.0, TIE_BREAK_ANGLE, is_below);
+    add_direction(stats, vec2<f32>(x - angle * y, y + angle * x));
 }
 
 fn add_direction(stats: ptr<function, NeighborhoodStats>, direction: vec2<f32>) {

@@ -1,6 +1,16 @@
 // Smooth surfaces: at each position a sphere is fitted to the weighted points around it (algebraic point set surfaces,
 // Guennebaud and Gross 2007). Weights also fall with the angle between normals, which keeps edges.
 
+// A point near the position of a fit.
+struct FitPoint {
+    // The point relative to the position.
+    offset: vec3<f32>,
+    // Unit normal.
+    normal: vec3<f32>,
+    // Reciprocal of the square of the support's radius.
+    inverse_support: f32,
+}
+
 // Weighted sums over the points around a position.
 struct SphereSums {
     // Unit normal to which the points' normals are compared.
@@ -39,42 +49,31 @@ struct ColorSums {
     color: vec3<f32>,
 }
 
-// The unit normals of four points, one in each component.
-struct FourNormals {
-    x: vec4<f32>,
-    y: vec4<f32>,
-    z: vec4<f32>,
+fn fit_point(point: Point) -> FitPoint {
+    let support = SUPPORT_FACTOR * point.radius;
+    let squared = max(dot(point.normal, point.normal), 1.0);
+    return FitPoint(point.center, point.normal / sqrt(squared), 1.0 / (support * support));
 }
 
-fn unit_normals(four: FourPoints) -> FourNormals {
-    let squared = four.normal_x * four.normal_x + four.normal_y * four.normal_y + four.normal_z * four.normal_z;
-    let per_length = 1.0 / sqrt(max(squared, vec4<f32>(1.0)));
-    return FourNormals(four.normal_x * per_length, four.normal_y * per_length, four.normal_z * per_length);
+// Returns the weight of a point, which falls from 1 at the position to 0 at the support's radius.
+fn point_weight(point: FitPoint) -> f32 {
+    let inside = max(1.0 - dot(point.offset, point.offset) * point.inverse_support, 0.0);
+    let squared = inside * inside;
+    return squared * squared;
 }
 
-// Returns the weights of four points at these squared distances from a position, which fall from 1 at the position to 0
-// at the support's radius.
-fn point_weights(four: FourPoints, squared: vec4<f32>) -> vec4<f32> {
-    let support = SUPPORT_FACTOR * max(four.radius, vec4<f32>(1e-18));
-    let inside = max(1.0 - squared * (1.0 / (support * support)), vec4<f32>(0.0));
-    let inside_squared = inside * inside;
-    return inside_squared * inside_squared;
+fn is_within_reach(point: FitPoint, per_radius: f32) -> bool {
+    let squared = dot(point.offset, point.offset);
+    return squared * per_radius * per_radius < FIT_REACH * FIT_REACH;
 }
 
-// Returns which of four points at these squared distances are within reach of a position.
-fn are_within_reach(four: FourPoints, squared: vec4<f32>, per_radius: f32) -> vec4<bool> {
-    let is_near = squared * per_radius * per_radius < vec4<f32>(FIT_REACH * FIT_REACH);
-    return is_near & (vec4<f32>(0.0) < four.radius);
+// Rounds to a multiple of 1 / FIT_STEPS, scaled by FIT_STEPS, so that sums hardly depend on the order of points.
+fn in_steps(value: f32) -> f32 {
+    return round(value * FIT_STEPS);
 }
 
-// Rounds to multiples of 1 / FIT_STEPS, scaled by FIT_STEPS, so that sums hardly depend on the order of points.
-fn in_steps(values: vec4<f32>) -> vec4<f32> {
-    return round(values * FIT_STEPS);
-}
-
-fn sum_in_steps(values: vec4<f32>) -> f32 {
-    let steps = in_steps(values);
-    return (steps.x + steps.y) + (steps.z + steps.w);
+fn in_steps_vector(vector: vec3<f32>) -> vec3<f32> {
+    return round(vector * FIT_STEPS);
 }
 
 fn no_fit_points(guide: vec3<f32>, radius: f32) -> SphereSums {
@@ -82,35 +81,50 @@ fn no_fit_points(guide: vec3<f32>, radius: f32) -> SphereSums {
     return SphereSums(guide, 1.0 / radius, 0.0, none, none, 0.0, 0.0);
 }
 
+// Adds four points at a time, without branches but for blocks that are out of reach.
 fn add_fit_points(sums: ptr<function, SphereSums>, four: FourPoints) {
     let per_radius = (*sums).per_radius;
     let squared = four.x * four.x + four.y * four.y + four.z * four.z;
-    let by_distance = point_weights(four, squared);
-    let is_used = are_within_reach(four, squared, per_radius) & (vec4<f32>(0.0) < by_distance);
+    let support = SUPPORT_FACTOR * max(four.radius, vec4<f32>(1e-18));
+    let in_support = squared * (1.0 / (support * support));
+    let is_near = squared * per_radius * per_radius < vec4<f32>(FIT_REACH * FIT_REACH);
+    let is_used = is_near & (in_support < vec4<f32>(1.0)) & (vec4<f32>(0.0) < four.radius);
     if !any(is_used) {
         return;
     }
-    let normals = unit_normals(four);
+    let length_squared =
+        four.normal_x * four.normal_x + four.normal_y * four.normal_y + four.normal_z * four.normal_z;
+    let per_length = 1.0 / sqrt(max(length_squared, vec4<f32>(1.0)));
+    let normal_x = four.normal_x * per_length;
+    let normal_y = four.normal_y * per_length;
+    let normal_z = four.normal_z * per_length;
     let x = four.x * per_radius;
     let y = four.y * per_radius;
     let z = four.z * per_radius;
-    let cosine = dot_four(normals.x, normals.y, normals.z, (*sums).guide);
-    let height = (normals.x * x + normals.y * y + normals.z * z) * (1.0 / FIT_MAX_PLANE_DISTANCE);
+    let cosine = dot_four(normal_x, normal_y, normal_z, (*sums).guide);
+    let height = (normal_x * x + normal_y * y + normal_z * z) * (1.0 / FIT_MAX_PLANE_DISTANCE);
     let closeness = max(1.0 - height * height, vec4<f32>(0.0));
-    let full = by_distance * alignment(abs(cosine)) * closeness * closeness;
+    let inside = max(1.0 - in_support, vec4<f32>(0.0));
+    let inside_squared = inside * inside;
+    let full = inside_squared * inside_squared * alignment(abs(cosine)) * closeness * closeness;
     let weight = select(vec4<f32>(0.0), full, is_used);
     let signed_weight = select(weight, -weight, cosine < vec4<f32>(0.0));
     let weighted_x = x * weight;
     let weighted_y = y * weight;
     let weighted_z = z * weight;
-    let turned_x = normals.x * signed_weight;
-    let turned_y = normals.y * signed_weight;
-    let turned_z = normals.z * signed_weight;
+    let turned_x = normal_x * signed_weight;
+    let turned_y = normal_y * signed_weight;
+    let turned_z = normal_z * signed_weight;
     (*sums).weight += sum_in_steps(weight);
     (*sums).offset += vec3<f32>(sum_in_steps(weighted_x), sum_in_steps(weighted_y), sum_in_steps(weighted_z));
     (*sums).normal += vec3<f32>(sum_in_steps(turned_x), sum_in_steps(turned_y), sum_in_steps(turned_z));
     (*sums).offset_dot_normal += sum_in_steps(x * turned_x + y * turned_y + z * turned_z);
     (*sums).offset_squared += sum_in_steps(x * weighted_x + y * weighted_y + z * weighted_z);
+}
+
+fn sum_in_steps(values: vec4<f32>) -> f32 {
+    let steps = round(values * FIT_STEPS);
+    return (steps.x + steps.y) + (steps.z + steps.w);
 }
 
 // Returns the weights of normals by the cosines of their angles to the guide: about exp(-|a - b|^2 / (2/3)^2).
@@ -156,33 +170,30 @@ fn no_overhang(normal: vec3<f32>, center: vec3<f32>, radius: f32) -> OverhangSum
     return OverhangSums(normal, center, 1.0 / radius, 0.0, 0.0);
 }
 
-// Adds four points with these weights. A point counts if it is on the other side of an edge: its normal is far from that
-// of the hit, and it lies below the hit's tangent plane.
-fn add_overhang_points(sums: ptr<function, OverhangSums>, four: FourPoints, weights: vec4<f32>) {
-    let normal = (*sums).normal;
-    let normals = unit_normals(four);
-    let none = vec4<f32>(0.0);
-    let cosine = dot_four(normals.x, normals.y, normals.z, normal);
-    let is_below = dot_four(four.x, four.y, four.z, normal) < none;
-    let is_other_side = (abs(cosine) < vec4<f32>(MAX_EDGE_COSINE)) & is_below;
-    if !any(is_other_side) {
+// Adds a point within reach. It counts if it is on the other side of an edge: its normal is far from that of the hit,
+// and it lies below the hit's tangent plane.
+fn add_overhang_point(sums: ptr<function, OverhangSums>, point: FitPoint) {
+    let is_other_side = abs(dot(point.normal, (*sums).normal)) < MAX_EDGE_COSINE
+        && dot((*sums).normal, point.offset) < 0.0;
+    if !is_other_side {
         return;
     }
-    let below = normals.x * four.x + normals.y * four.y + normals.z * four.z;
-    let of_center = dot_four(normals.x, normals.y, normals.z, (*sums).center) - below;
-    let height = select(below, -below, of_center < none) * (*sums).per_radius;
-    let used = select(none, weights, is_other_side);
-    (*sums).weight += sum_in_steps(used);
-    (*sums).height += sum_in_steps(used * height);
+    let of_center = dot(point.normal, (*sums).center - point.offset);
+    let below = dot(point.normal, point.offset);
+    let height = select(below, -below, of_center < 0.0) * (*sums).per_radius;
+    let weight = point_weight(point);
+    (*sums).weight += in_steps(weight);
+    (*sums).height += in_steps(weight * height);
 }
 
 fn sticks_out(sums: OverhangSums) -> bool {
     return MIN_EDGE_WEIGHT * FIT_STEPS < sums.weight && MAX_OVERHANG * sums.weight < sums.height;
 }
 
-// Adds a weight and a weighted colour, both in steps.
-fn with_color(sums: ColorSums, weight: f32, color: vec3<f32>) -> ColorSums {
-    return ColorSums(sums.weight + weight, sums.color + color);
+fn with_color(sums: ColorSums, point: FitPoint, color: vec3<f32>) -> ColorSums {
+    let weight = point_weight(point);
+    let cubed = weight * weight * weight;
+    return ColorSums(sums.weight + in_steps(cubed), sums.color + in_steps_vector(cubed * color));
 }
 
 // Returns the mean colour, which is that of the nearest point where the points have hardly any weight.

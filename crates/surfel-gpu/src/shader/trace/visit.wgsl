@@ -41,6 +41,14 @@ fn point_hit(
     return SurfaceHit(true, distance, slot, radius, normal, normal, opaque, is_backface, none.xy, none, false, none);
 }
 
+// Returns the index of the ray at a place in the queue of the pass.
+fn ray_of_entry(entry: u32) -> u32 {
+    if task.queue == UNDECIDED {
+        return first_discs[entry].z;
+    }
+    return entry;
+}
+
 // Goes to the visit of a hit. Returns false if the pass has none for it.
 fn find_visit(instance: u32, surface: u32) -> bool {
     visit_idx = task.first_visit;

@@ -1,14 +1,24 @@
 // Any hit of a ray on points that are shapes of their own.
 
+struct AnyHit {
+    distance: f32,
+    // NONE for a miss.
+    slot: u32,
+}
+
 struct Search {
     ray: Ray,
-    has_hit: bool,
+    hit: AnyHit,
 }
 
 fn is_occluded(ray: Ray) -> bool {
-    var search = Search(ray, false);
+    return any_hit_of(ray).slot != NONE;
+}
+
+fn any_hit_of(ray: Ray) -> AnyHit {
+    var search = Search(ray, AnyHit(0.0, NONE));
     traverse(ray, &search);
-    return search.has_hit;
+    return search.hit;
 }
 
 fn search_limit(search: ptr<function, Search>) -> f32 {
@@ -18,11 +28,14 @@ fn search_limit(search: ptr<function, Search>) -> f32 {
 fn visit_block(block_idx: u32, search: ptr<function, Search>) -> bool {
     let ray = (*search).ray;
     let head = load_head(block_idx);
-    var has_hit = false;
     for (var half = 0u; half < 2u; half++) {
         let distances = intersect_four(four_points(block_idx, head, half, ray.origin), ray);
-        has_hit = has_hit || any((vec4<f32>(0.0) <= distances) & (distances <= vec4<f32>(ray.t_max)));
+        let lanes = lane_bits((vec4<f32>(0.0) <= distances) & (distances <= vec4<f32>(ray.t_max)));
+        if lanes != 0u {
+            let lane = firstTrailingBit(lanes);
+            (*search).hit = AnyHit(distances[lane], 8u * block_idx + 4u * half + lane);
+            return true;
+        }
     }
-    (*search).has_hit = has_hit;
-    return has_hit;
+    return false;
 }

@@ -17,7 +17,7 @@ fn neighborhood_of(hit: CandidateHit) -> NeighborhoodStats {
     list_blocks(hit.position - reach, hit.position + reach, 0.0);
     loop {
         for (var i = 0u; i < n_listed; i++) {
-            add_neighbors_in_block(&stats, listed_blocks[i]);
+            add_neighbors(&stats, listed_blocks[i]);
         }
         if !list_more() {
             break;
@@ -26,11 +26,16 @@ fn neighborhood_of(hit: CandidateHit) -> NeighborhoodStats {
     return stats;
 }
 
-fn add_neighbors_in_block(stats: ptr<function, NeighborhoodStats>, block_idx: u32) {
+fn add_neighbors(stats: ptr<function, NeighborhoodStats>, block_idx: u32) {
     let head = load_head(block_idx);
     let position = (*stats).hit.position;
-    add_neighbors(stats, four_points(block_idx, head, 0u, position));
-    add_neighbors(stats, four_points(block_idx, head, 1u, position));
+    let reach = NEIGHBORHOOD_RADIUS_FACTOR * (*stats).hit.radius;
+    for (var lanes = lanes_within(block_idx, head, position, reach * reach); lanes != 0u; lanes &= lanes - 1u) {
+        let point = block_point(block_idx, head, firstTrailingBit(lanes), position);
+        if 0.0 < point.radius && is_neighbor((*stats).hit, point.center) {
+            add_neighbor(stats, point.center, point.normal);
+        }
+    }
 }
 
 // Returns a normal turned against a direction.

@@ -95,36 +95,20 @@ fn finish_with_block(
     shift: vec3<f32>,
 ) {
     let head = load_head(block_idx);
-    let lanes = listed_lanes(block_idx, head);
-    for (var half = 0u; half < 2u; half++) {
-        add_neighbors(stats, relative_to_hit(four_points(block_idx, head, half, listed_position), lanes >> (4u * half), shift));
-    }
-    if !HAS_COLORS {
-        return;
-    }
-    for (var rest = lanes; rest != 0u; rest &= rest - 1u) {
-        let lane = firstTrailingBit(rest);
+    for (var lanes = listed_lanes(block_idx, head); lanes != 0u; lanes &= lanes - 1u) {
+        let lane = firstTrailingBit(lanes);
         let point = listed_point(block_idx, head, lane, shift);
-        if point.is_used {
+        if !point.is_used {
+            continue;
+        }
+        let from_hit = point.offset * ball_radius;
+        if is_neighbor((*stats).hit, from_hit) {
+            add_neighbor(stats, from_hit, vec3<f32>(0.0));
+        }
+        if HAS_COLORS {
             add_color(color, point, 8u * block_idx + lane);
         }
     }
-}
-
-// Returns the points in these lanes relative to a hit, without normals.
-fn relative_to_hit(four: FourPoints, lanes: u32, shift: vec3<f32>) -> FourPoints {
-    let per_radius = 1.0 / ball_radius;
-    let is_used = ((vec4<u32>(lanes) >> vec4<u32>(0u, 1u, 2u, 3u)) & vec4<u32>(1u)) == vec4<u32>(1u);
-    let none = vec4<f32>(0.0);
-    return FourPoints(
-        (four.x * per_radius - shift.x) * ball_radius,
-        (four.y * per_radius - shift.y) * ball_radius,
-        (four.z * per_radius - shift.z) * ball_radius,
-        none,
-        none,
-        none,
-        select(none, four.radius, is_used),
-    );
 }
 
 fn add_color(color: ptr<function, HitColor>, point: ListedPoint, slot: u32) {

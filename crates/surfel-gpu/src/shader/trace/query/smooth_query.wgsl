@@ -52,48 +52,36 @@ fn finish_with_block(
     block_idx: u32,
 ) {
     let head = load_head(block_idx);
-    let position = (*stats).hit.position;
-    for (var half = 0u; half < 2u; half++) {
-        let four = four_points(block_idx, head, half, position);
-        let squared = four.x * four.x + four.y * four.y + four.z * four.z;
-        let is_near = are_within_reach(four, squared, (*overhang).per_radius);
-        if !any(is_near) {
+    let hit = (*stats).hit;
+    let reach = FIT_REACH * hit.radius;
+    // The exact test follows, in radii.
+    let max_squared = reach * reach * (1.0 + 8.0 * EPSILON);
+    for (var lanes = lanes_within(block_idx, head, hit.position, max_squared); lanes != 0u; lanes &= lanes - 1u) {
+        let lane = firstTrailingBit(lanes);
+        let point = block_point(block_idx, head, lane, hit.position);
+        let fit = fit_point(point);
+        if point.radius <= 0.0 || !is_within_reach(fit, (*overhang).per_radius) {
             continue;
         }
-        add_neighbors(stats, four);
-        let weights = select(vec4<f32>(0.0), point_weights(four, squared), is_near);
-        add_overhang_points(overhang, four, weights);
+        if is_neighbor(hit, point.center) {
+            add_neighbor(stats, point.center, point.normal);
+        }
+        add_overhang_point(overhang, fit);
         if HAS_COLORS {
-            add_colors(color, squared, weights, is_near, 8u * block_idx + 4u * half);
+            add_color(color, fit, 8u * block_idx + lane);
         }
     }
 }
 
-// Adds the colours of four points with these weights, and finds the nearest of them.
-fn add_colors(
-    color: ptr<function, HitColor>,
-    squared: vec4<f32>,
-    weights: vec4<f32>,
-    is_near: vec4<bool>,
-    first_slot: u32,
-) {
-    let cubed = weights * weights * weights;
-    let in_use = in_steps(cubed);
+fn add_color(color: ptr<function, HitColor>, point: FitPoint, slot: u32) {
     if visits[visit_idx].blends_colors == 1u {
-        for (var lanes = lane_bits(vec4<f32>(0.0) < in_use); lanes != 0u; lanes &= lanes - 1u) {
-            let lane = firstTrailingBit(lanes);
-            let color_of_point = slot_color(first_slot + lane);
-            (*color).sums = with_color((*color).sums, in_use[lane], round(cubed[lane] * color_of_point * FIT_STEPS));
-        }
+        (*color).sums = with_color((*color).sums, point, slot_color(slot));
     }
-    for (var lane = 0u; lane < 4u; lane++) {
-        let slot = first_slot + lane;
-        let other = (*color).nearest_squared;
-        let is_nearer = squared[lane] < other || squared[lane] == other && slot < (*color).nearest_slot;
-        if is_near[lane] && is_nearer {
-            (*color).nearest_squared = squared[lane];
-            (*color).nearest_slot = slot;
-        }
+    let squared = dot(point.offset, point.offset);
+    let other = (*color).nearest_squared;
+    if squared < other || squared == other && slot < (*color).nearest_slot {
+        (*color).nearest_squared = squared;
+        (*color).nearest_slot = slot;
     }
 }
 

@@ -81,15 +81,10 @@ fn fit_near_discs() {
     if own_idx < atomicLoad(&n_noted) {
         ray_idx = noted_rays[own_idx];
         let ray = group_rays[ray_idx];
-        let disc = slot_surfel(noted_slots[own_idx]);
-        nearest_slot = noted_slots[own_idx];
-        // The surface may lie before a disc, and even before the discs that were rejected.
-        let found = find_surface(ray, noted_distances[own_idx], disc);
+        let found = hit_near_disc(ray, noted_distances[own_idx], noted_slots[own_idx]);
         if found.is_hit {
-            let of_nearest = slot_surfel(nearest_slot);
-            let color = mean_color(colors, of_nearest.color);
-            let is_backface = select(0u, 1u, 0.0 < dot(of_nearest.normal, ray.direction));
-            hit = HitOnDisc(found.distance, found.normal, color, nearest_slot, disc.radius, is_backface);
+            let is_backface = select(0u, 1u, found.is_backface);
+            hit = HitOnDisc(found.distance, found.normal, found.color.xyz, found.slot, found.radius, is_backface);
             distance_bits = bitcast<u32>(noted_distances[own_idx]);
             atomicMin(&least_distances[ray_idx], distance_bits);
         }

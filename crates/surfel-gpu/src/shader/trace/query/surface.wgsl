@@ -35,7 +35,7 @@ fn is_enclosed_by_blocks(hit: CandidateHit) -> bool {
             is_new = is_new && hit_disc(earlier) >> 3u != block_idx;
         }
         if is_new {
-            add_neighbors_in_block(&stats, block_idx);
+            add_neighbors(&stats, block_idx);
         }
     }
     return is_surrounded(stats, true) && !is_sparse(stats);
