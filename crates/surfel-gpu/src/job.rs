@@ -23,7 +23,11 @@ use surfel_core::render::{RenderRegion, RenderStats, Settings};
 use surfel_core::scene::Background;
 
 /// Maximum number of entries of a queue: it bounds the memory, up to 800 bytes an entry.
-const MAX_ENTRIES: u32 = 1 << 20;
+const MAX_ENTRIES: u64 = 1 << 20;
+/// The same on devices with a large memory. A pass takes as long as its slowest ray, so few large passes are faster.
+const MAX_ENTRIES_IN_LARGE_MEMORY: u64 = 1 << 22;
+/// Bytes from which on a memory is large.
+const LARGE_MEMORY: u64 = 30 << 30;
 /// Number of entries of a queue for each pixel, where paths have branches. A part whose paths have more is rendered
 /// again in smaller parts.
 const ENTRIES_PER_PIXEL: u32 = 4;
@@ -185,7 +189,11 @@ impl Job<'_> {
         let has_waves = passes.next_wave.is_some();
         // A hit is the largest entry.
         let fitting = gpu.info.max_array_bytes / size_of::<HitRecord>() as u64;
-        let max_entries = fitting.min(MAX_ENTRIES.into());
+        let max_entries = match gpu.info.memory_bytes {
+            Some(bytes) if LARGE_MEMORY <= bytes => MAX_ENTRIES_IN_LARGE_MEMORY,
+            _ => MAX_ENTRIES,
+        };
+        let max_entries = fitting.min(max_entries);
         let (wanted, per_pixel) = match has_waves {
             true => {
                 let per_pixel = u64::from(ENTRIES_PER_PIXEL);

@@ -166,11 +166,11 @@ impl Passes {
         let mut passes = Vec::new();
         for step in search.steps(tree.surface, visits.len()) {
             match step {
-                SearchStep::Search { kernel, is_rest } => {
+                SearchStep::Search { kernel, round } => {
                     let pass = self.tree_pass(kernel, tree, visits.clone(), queue);
                     let Some(mut pass) = pass else { continue };
-                    if is_rest {
-                        self.set_queue(&mut pass, queue::UNDECIDED);
+                    if round != 0 {
+                        self.set_round(&mut pass, round);
                     }
                     passes.push(pass);
                 }
@@ -184,12 +184,12 @@ impl Passes {
         passes
     }
 
-    /// Lets a pass go over another queue.
-    fn set_queue(&mut self, pass: &mut Pass, queue: u32) {
+    /// Lets a pass of a search go over the rays that are undecided after the round before.
+    fn set_round(&mut self, pass: &mut Pass, round: u32) {
         let at = pass.task_offset as usize;
         let task: &mut Task = bytemuck::from_bytes_mut(&mut self.tasks[at..at + size_of::<Task>()]);
-        task.queue = queue;
-        pass.size = Size::Queue(queue);
+        (task.queue, task.round) = (queue::UNDECIDED, round);
+        pass.size = Size::Queue(queue::UNDECIDED);
     }
 
     /// Returns the passes that find hits, and the points behind them where these give the colour.

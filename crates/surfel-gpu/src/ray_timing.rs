@@ -166,12 +166,13 @@ fn searches(geometry: &FlatGeometry, query: TimedQuery) -> Vec<Search> {
         TimedQuery::Surface => {
             let shown = trees(cloud).into_iter().enumerate();
             let shown = shown.filter(|(_, (_, points))| !points.nodes.is_empty());
-            let surfaces = shown
-                .filter_map(|(i, (kind, _))| Some((i, Surface::of_kind(kind, &cloud.options)?)));
+            let surfaces = shown.filter_map(|(i, (kind, _))| {
+                Some((i, Surface::of_kind(kind, &cloud.options, cloud.edge_test)?))
+            });
             surfaces.map(|(i, surface)| search(i, surface)).collect()
         }
-        TimedQuery::Gather => vec![search(0, Surface::Splat)],
-        _ if cloud.surface.uses_discs() => vec![search(0, Surface::Disc)],
+        TimedQuery::Gather => vec![search(0, Surface::SplatRims)],
+        _ if cloud.surface.uses_discs() => vec![search(0, Surface::DiscRims)],
         _ => vec![search(0, Surface::Sphere)],
     }
 }
@@ -211,9 +212,10 @@ impl<'a> Chunk<'a> {
             let task = Task { first_visit: tree_idx as u32, n_visits: 1, ..Task::default() };
             for step in search.steps() {
                 passes.push(match step {
-                    SearchStep::Search { kernel, is_rest } => {
-                        let queue = if is_rest { queue::UNDECIDED } else { queue::PATHS };
-                        (pass(kernel, Size::Queue(queue), Task { queue, ..task }), Some(tree_idx))
+                    SearchStep::Search { kernel, round } => {
+                        let queue = if round == 0 { queue::PATHS } else { queue::UNDECIDED };
+                        let task = Task { queue, round, ..task };
+                        (pass(kernel, Size::Queue(queue), task), Some(tree_idx))
                     }
                     SearchStep::Take => {
                         let (queue, ray_kind) = (queue::UNDECIDED, ray_kind::UNCOUNTED);
@@ -304,7 +306,9 @@ impl<'a> Chunk<'a> {
 /// Returns an error if a question about a geometry has no kernel.
 pub fn check(gpu: &Gpu, geometry: &FlatGeometry, query: TimedQuery) -> Result<()> {
     let FlatGeometry::Cloud(cloud) = geometry else { return Ok(()) };
-    if query != TimedQuery::Surface || Surface::of_kind(cloud.surface, &cloud.options).is_some() {
+    if query != TimedQuery::Surface
+        || Surface::of_kind(cloud.surface, &cloud.options, cloud.edge_test).is_some()
+    {
         return Ok(());
     }
     let reason = format!("the GPU has no benchmark of the surface {}", cloud.surface.name());

@@ -157,8 +157,8 @@ pub struct Task {
     pub first_visit: u32,
     /// Number of visits.
     pub n_visits: u32,
-    /// Zero.
-    pub reserved_a: u32,
+    /// Index of the round of a search.
+    pub round: u32,
 }
 
 /// A light.
@@ -410,8 +410,26 @@ pub struct ShadingPointRecord {
     pub reserved_b: u32,
 }
 
-/// The slot of a ray's first disc and the distance to it as bits, the index of another ray that is undecided, and zero.
-pub type FirstDisc = [u32; 4];
+/// The disc on a ray near which a round of a search tests whether the ray hits the surface.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct FirstDisc {
+    /// Slot of the disc, [`NONE`](crate::numbers::NONE) without one.
+    pub slot: u32,
+    /// Distance to it along the ray.
+    pub distance: f32,
+    /// Slot of the first disc that the ray passed, from its front where front sides are known;
+    /// [`NONE`](crate::numbers::NONE) without one.
+    pub passed_slot: u32,
+    /// Distance to that disc.
+    pub passed_distance: f32,
+    /// Entries in the queues of undecided rays, one for even and one for odd rounds: the indices of other rays.
+    pub undecided: [u32; 2],
+    /// Zero.
+    pub reserved_a: u32,
+    /// Zero.
+    pub reserved_b: u32,
+}
 
 /// Sums of radiance and alpha over all samples of a pixel, in fixed point of 32 bits before and 32 behind the point: the
 /// lower words come first.

@@ -1,11 +1,15 @@
-//! The passes of a search in a tree: whole, or first near one disc of each ray and then behind it.
+//! The passes of a search in a tree: whole, or first near single discs of each ray and then behind them.
 
 use crate::shader::{Kernel, Surface};
+
+/// Number of rounds in which single discs are tested. Rays that are undecided then have many discs, which their workgroups
+/// test together.
+const N_ROUNDS: u32 = 4;
 
 /// The kernels of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchKernels {
-    /// Finds a disc on each ray.
+    /// Finds the next disc on each ray.
     disc: Kernel,
     /// Tests whether rays hit the surface near these discs.
     test: fn(Surface) -> Kernel,
@@ -34,12 +38,12 @@ pub const ANY: SearchKernels = SearchKernels {
 /// A step of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SearchStep {
-    /// A pass of a kernel over all rays, or with `is_rest` over those that are undecided.
+    /// A pass of a kernel over all rays, or over those that are undecided after the round before.
     Search {
         /// The kernel.
         kernel: Kernel,
-        /// True if the pass goes over undecided rays.
-        is_rest: bool,
+        /// Index of the round.
+        round: u32,
     },
     /// The queue of the undecided rays is taken.
     Take,
@@ -47,15 +51,20 @@ pub enum SearchStep {
 
 impl SearchKernels {
     /// Returns the steps of a search in a tree with this surface and number of instances. Most rays end near the first
-    /// disc that is found. Kernels that find it or test it have far less state than those that go on behind it, so a
-    /// device runs more of them at the same time.
+    /// disc that is found. Kernels that find a disc or test it have far less state than those that search all along a
+    /// ray, so a device runs more of them at the same time.
     pub fn steps(&self, surface: Surface, n_instances: usize) -> Vec<SearchStep> {
-        let of_all = |kernel| SearchStep::Search { kernel, is_rest: false };
-        let whole = (self.whole)(surface);
+        let whole = |round| SearchStep::Search { kernel: (self.whole)(surface), round };
         if n_instances != 1 || !surface.tests_first_disc(self.is_any) {
-            return vec![of_all(whole)];
+            return vec![whole(0)];
         }
-        let rest = SearchStep::Search { kernel: whole, is_rest: true };
-        vec![of_all(self.disc), of_all((self.test)(surface)), SearchStep::Take, rest]
+        let test = (self.test)(surface);
+        let mut steps = Vec::new();
+        for round in 0..N_ROUNDS {
+            steps.extend([self.disc, test].map(|kernel| SearchStep::Search { kernel, round }));
+            steps.push(SearchStep::Take);
+        }
+        steps.push(whole(N_ROUNDS));
+        steps
     }
 }

@@ -3,7 +3,7 @@
 use crate::constants::constants;
 use crate::numbers::{TRIANGLE, surface_number};
 use std::fmt::Write;
-use surfel_core::surface::{MAX_CANDIDATES, MAX_GATHERED, SurfaceKind, SurfaceOptions};
+use surfel_core::surface::{EdgeTest, MAX_CANDIDATES, MAX_GATHERED, SurfaceKind, SurfaceOptions};
 
 /// A kernel: one pass over the entries of a queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -70,8 +70,12 @@ pub enum Surface {
     Capsule,
     /// Flat discs.
     Disc,
+    /// Flat discs up to their rims.
+    DiscRims,
     /// Blended discs.
     Splat,
+    /// Blended discs up to their rims.
+    SplatRims,
     /// Blended discs with the normal of a plane through their centres.
     SplatFit,
     /// Blended discs at their mean distance.
@@ -92,11 +96,13 @@ pub enum Surface {
 
 impl Surface {
     /// Every surface.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 16] = [
         Self::Sphere,
         Self::Capsule,
         Self::Disc,
+        Self::DiscRims,
         Self::Splat,
+        Self::SplatRims,
         Self::SplatFit,
         Self::Cylinder,
         Self::Mls(1),
@@ -110,8 +116,15 @@ impl Surface {
     ];
 
     /// Returns the surface by which a kind with these options is traced, or none if no kernel traces it.
-    pub fn of_kind(kind: SurfaceKind, options: &SurfaceOptions) -> Option<Self> {
+    pub fn of_kind(
+        kind: SurfaceKind,
+        options: &SurfaceOptions,
+        edge_test: EdgeTest,
+    ) -> Option<Self> {
+        let has_rims = edge_test == EdgeTest::Off;
         match kind {
+            SurfaceKind::Disc if has_rims => Some(Self::DiscRims),
+            SurfaceKind::Splat | SurfaceKind::SplatMean if has_rims => Some(Self::SplatRims),
             SurfaceKind::Sphere => Some(Self::Sphere),
             SurfaceKind::Capsule => Some(Self::Capsule),
             SurfaceKind::Disc => Some(Self::Disc),
@@ -136,14 +149,16 @@ impl Surface {
         match self {
             Self::SplatFit => surface_number(SurfaceKind::SplatFit),
             Self::Cylinder => surface_number(SurfaceKind::Cylinder),
-            Self::Splat => surface_number(SurfaceKind::Splat),
+            Self::Splat | Self::SplatRims => surface_number(SurfaceKind::Splat),
             Self::Smooth => surface_number(SurfaceKind::Smooth),
             Self::Mls(_) => surface_number(SurfaceKind::Mls),
             Self::Implicit => surface_number(SurfaceKind::Implicit),
             Self::Octree => surface_number(SurfaceKind::Octree),
             Self::OctreeSplat => surface_number(SurfaceKind::OctreeSplat),
             Self::Triangle => TRIANGLE,
-            Self::Sphere | Self::Capsule | Self::Disc => surface_number(self.shape()),
+            Self::Sphere | Self::Capsule | Self::Disc | Self::DiscRims => {
+                surface_number(self.shape())
+            }
         }
     }
 
@@ -240,8 +255,12 @@ const TRIANGLES: &[&str] = parts![
     "flat/triangles.wgsl",
     "trace/query/triangles.wgsl",
 ];
-const EDGE: &[&str] =
-    parts!["math/basis.wgsl", "surface/edge_test.wgsl", "trace/query/edge_test.wgsl",];
+const EDGE: &[&str] = parts![
+    "math/basis.wgsl",
+    "surface/edge_test.wgsl",
+    "trace/query/facing.wgsl",
+    "trace/query/edge_test.wgsl",
+];
 const SOLIDS: &[&str] = parts!["trace/query/solids.wgsl"];
 const DISCS: &[&str] = parts!["trace/query/disc_query.wgsl", "trace/query/surface.wgsl"];
 const SPLATS: &[&str] = parts![
@@ -252,6 +271,9 @@ const SPLATS: &[&str] = parts![
     "trace/query/splat_query.wgsl",
     "trace/query/surface.wgsl",
 ];
+const WITHIN_EDGE: &[&str] = parts!["trace/query/within_edge.wgsl"];
+const WITHIN_RIMS: &[&str] = parts!["trace/query/within_rims.wgsl"];
+const FACING: &[&str] = parts!["trace/query/facing.wgsl"];
 const ANY_SURFACE: &[&str] = parts!["trace/query/any_surface.wgsl"];
 const EDGE_FILTER: &[&str] = parts!["trace/query/edge_filter.wgsl"];
 const SMOOTH: &[&str] =
@@ -384,7 +406,7 @@ impl Kernel {
         match self {
             Self::Closest(surface) | Self::Any(surface) | Self::Support(surface) => Some(surface),
             Self::TestClosest(surface) | Self::TestAny(surface) => Some(surface),
-            Self::FirstDisc | Self::AnyDisc => Some(Surface::Disc),
+            Self::FirstDisc | Self::AnyDisc => Some(Surface::DiscRims),
             _ => None,
         }
     }
@@ -407,9 +429,11 @@ impl Kernel {
                 }
                 parts.extend_from_slice(match surface {
                     Surface::Sphere | Surface::Capsule => &[CLOSEST_ALONE, CLOSEST, SOLIDS],
-                    Surface::Disc => &[CLOSEST_ALONE, CLOSEST, REGION, EDGE, DISCS],
+                    Surface::Disc => &[CLOSEST_ALONE, CLOSEST, REGION, EDGE, DISCS, WITHIN_EDGE],
+                    Surface::DiscRims => &[CLOSEST_ALONE, CLOSEST, FACING, DISCS, WITHIN_RIMS],
+                    Surface::SplatRims => &[CLOSEST_ALONE, FACING, SPLATS, WITHIN_RIMS],
                     Surface::Splat | Surface::SplatFit | Surface::Cylinder => {
-                        &[CLOSEST_ALONE, REGION, EDGE, SPLATS]
+                        &[CLOSEST_ALONE, REGION, EDGE, SPLATS, WITHIN_EDGE]
                     }
                     Surface::Triangle => &[CLOSEST_ALONE, TRIANGLES],
                     Surface::Mls(_) => &[CLOSEST_ALONE, CLOSEST, REGION, EDGE, MLS],
@@ -455,12 +479,16 @@ impl Kernel {
                     parts.push(TRAVERSE);
                 }
                 parts.extend_from_slice(match surface {
-                    Surface::Sphere | Surface::Capsule => &[ANY_ALONE, ANY],
+                    Surface::Sphere | Surface::Capsule | Surface::DiscRims | Surface::SplatRims => {
+                        &[ANY_ALONE, ANY]
+                    }
                     Surface::Triangle => &[ANY_ALONE, TRIANGLES],
                     Surface::Disc | Surface::Splat | Surface::SplatFit => {
                         &[GROUP, ANY_TESTED, REGION, EDGE, EDGE_FILTER]
                     }
-                    Surface::Cylinder => &[ANY_ALONE, REGION, EDGE, SPLATS, ANY_SURFACE],
+                    Surface::Cylinder => {
+                        &[ANY_ALONE, REGION, EDGE, SPLATS, WITHIN_EDGE, ANY_SURFACE]
+                    }
                     Surface::Mls(_) => &[ANY_ALONE, CLOSEST, REGION, EDGE, MLS, ANY_SURFACE],
                     Surface::Implicit => &[ANY_ALONE, REGION, EDGE, IMPLICIT, ANY_SURFACE],
                     Surface::Octree | Surface::OctreeSplat => &[ANY_ALONE, OCTREE, ANY_CELL],

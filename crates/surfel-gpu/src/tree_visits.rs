@@ -70,7 +70,9 @@ impl TreeVisits {
                 }
             };
             for (tree_idx, (kind, points)) in trees(cloud).into_iter().enumerate() {
-                let Some(surface) = Surface::of_kind(kind, &cloud.options) else { continue };
+                let Some(surface) = Surface::of_kind(kind, &cloud.options, cloud.edge_test) else {
+                    continue;
+                };
                 if !points.nodes.is_empty() {
                     add(tree_idx, surface, visit(placement, cloud, kind));
                 }

@@ -311,9 +311,12 @@ impl<'a> Wavefront<'a> {
         self.read(gpu, &self.arrays.paths[0], n)
     }
 
-    /// Sets the numbers of entries that were added to all queues.
+    /// Sets the numbers of entries that were added to the queues of paths and rays toward lights; the others are empty.
     pub fn fill_queues(&self, gpu: &Gpu, n: u32) {
-        let counts = [n; queue::N_QUEUES as usize];
+        let mut counts = [0; queue::N_QUEUES as usize];
+        for queue in [queue::PATHS, queue::LIGHT_RAYS] {
+            counts[queue as usize] = n;
+        }
         let offset = 4 * u64::from(count::FIRST_ADDED);
         gpu.queue.write_buffer(&self.arrays.counts, offset, bytemuck::cast_slice(&counts));
     }

@@ -82,7 +82,8 @@ struct Task {
     ray_kind: u32,
     first_visit: u32,
     n_visits: u32,
-    reserved_a: u32,
+    // Index of the round of a search.
+    round: u32,
 }
 
 struct LightRecord {
@@ -204,6 +205,20 @@ struct Path {
     state: u32,
 }
 
+// The disc on a ray near which a round of a search tests whether the ray hits the surface.
+struct FirstDisc {
+    // NONE without a disc.
+    slot: u32,
+    distance: f32,
+    // The first disc that the ray passed, from its front where front sides are known; NONE without one.
+    passed_slot: u32,
+    passed_distance: f32,
+    // Queues of undecided rays, one for even and one for odd rounds: the indices of other rays.
+    undecided: vec2<u32>,
+    reserved_a: u32,
+    reserved_b: u32,
+}
+
 // A point at which direct light is computed.
 struct ShadingPointRecord {
     position: vec3<f32>,
@@ -248,6 +263,4 @@ const EPSILON: f32 = 1.1920929e-7;
 @group(1) @binding(4) var<storage, read_write> pixels: array<array<atomic<u32>, 8>>;
 // Lengths of queues and numbers of rays, at the indices `FIRST_*`, `N_ACTIVE` and `MAX_ADDED`.
 @group(1) @binding(5) var<storage, read_write> counts: array<atomic<u32>, N_COUNTS>;
-// For each ray the slot of its first disc, NONE without one, and the distance to it as bits; the third words are the queue
-// of the rays that are undecided after the test of this disc.
-@group(1) @binding(6) var<storage, read_write> first_discs: array<vec4<u32>>;
+@group(1) @binding(6) var<storage, read_write> first_discs: array<FirstDisc>;

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::records::{
-    FrameRecord, HitRecord, InstanceRecord, LightRecord, MaterialRecord, Path, ShadingPointRecord,
-    Task, TextureRecord, Visit,
+    FirstDisc, FrameRecord, HitRecord, InstanceRecord, LightRecord, MaterialRecord, Path,
+    ShadingPointRecord, Task, TextureRecord, Visit,
 };
 use std::mem::{offset_of, size_of};
 use surfel_core::math::Ray;
@@ -127,7 +127,7 @@ fn records_have_equal_layouts() {
             ray_kind,
             first_visit,
             n_visits,
-            reserved_a
+            round
         }),
         rust_layout!(LightRecord {
             direction,
@@ -226,6 +226,15 @@ fn records_have_equal_layouts() {
             key,
             index,
             state
+        }),
+        rust_layout!(FirstDisc {
+            slot,
+            distance,
+            passed_slot,
+            passed_distance,
+            undecided,
+            reserved_a,
+            reserved_b
         }),
         rust_layout!(ShadingPointRecord {
             position,

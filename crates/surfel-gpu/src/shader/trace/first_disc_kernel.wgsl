@@ -1,5 +1,5 @@
-// The pass that finds the first disc of each ray. Most rays hit the surface near it, which a pass of its own tests: kernels
-// that do one thing keep their state in registers, and more of them run at the same time.
+// The pass that finds the next disc of each ray. Most rays hit the surface near their first disc. A pass of its own tests
+// it: kernels that do one thing keep their state in registers, and more of them run at the same time.
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn first_disc(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -7,10 +7,30 @@ fn first_disc(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     visit_idx = task.first_visit;
-    let ray = visiting_ray(id.x);
+    let ray_idx = ray_of_entry(id.x);
+    var ray = visiting_ray(ray_idx);
+    if task.round == 0u {
+        first_discs[ray_idx].passed_slot = NONE;
+    } else {
+        ray.t_min = pass_disc(ray_idx, ray.direction);
+    }
     var nearest = NearestHit(0.0, NONE);
     if ray.t_min <= ray.t_max {
         nearest = closest_hit(ray);
     }
-    first_discs[id.x] = vec4<u32>(nearest.slot, bitcast<u32>(nearest.distance), 0u, 0u);
+    first_discs[ray_idx].slot = nearest.slot;
+    first_discs[ray_idx].distance = nearest.distance;
+}
+
+// Notes that a ray passed the disc of the last round. Returns the distance at which the search goes on.
+fn pass_disc(ray_idx: u32, direction: vec3<f32>) -> f32 {
+    let passed = NearestHit(first_discs[ray_idx].distance, first_discs[ray_idx].slot);
+    let disc = slot_point(passed.slot, vec3<f32>(0.0));
+    let is_front = dot(disc.normal, direction) < 0.0;
+    if first_discs[ray_idx].passed_slot == NONE && (is_front || visits[visit_idx].has_front_sides == 0u) {
+        first_discs[ray_idx].passed_slot = passed.slot;
+        first_discs[ray_idx].passed_distance = passed.distance;
+    }
+    let behind = passed.distance + SMOOTH_RESTART_OFFSET * disc.radius;
+    return max(behind, passed.distance * (1.0 + 2.0 * EPSILON));
 }

@@ -44,7 +44,7 @@ fn point_hit(
 // Returns the index of the ray at a place in the queue of the pass.
 fn ray_of_entry(entry: u32) -> u32 {
     if task.queue == UNDECIDED {
-        return first_discs[entry].z;
+        return first_discs[entry].undecided[(task.round + 1u) & 1u];
     }
     return entry;
 }

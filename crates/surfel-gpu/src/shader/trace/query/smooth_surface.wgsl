@@ -109,33 +109,5 @@ fn own_hit(ray: Ray) -> SurfaceHit {
     if !is_passed {
         return hit;
     }
-    let disc = slot_surfel(passed.slot);
-    if is_through_slit(disc, passed.distance, hit.distance, hit.is_backface, ray) {
-        let normal = facing(disc.normal, ray.direction);
-        return point_hit(passed.distance, passed.slot, disc.radius, normal, disc.color, false);
-    }
-    return hit;
-}
-
-// Returns true if a ray went through a slit between the points around a disc, which it passed before its hit or a miss:
-// it hits a back face, or sees points all around and the disc not from its side.
-fn is_through_slit(
-    disc: Surfel,
-    disc_distance: f32,
-    hit_distance: f32,
-    hit_is_backface: bool,
-    ray: Ray,
-) -> bool {
-    if hit_distance <= disc_distance + MIN_SLIT_DEPTH * disc.radius {
-        return false;
-    }
-    if visits[visit_idx].has_front_sides == 1u && hit_is_backface {
-        return true;
-    }
-    if visits[visit_idx].has_edge_test == 0u || abs(dot(disc.normal, ray.direction)) < MIN_SLIT_COSINE {
-        return false;
-    }
-    let position = ray_at(ray, disc_distance);
-    let stats = neighborhood_of(CandidateHit(position, -ray.direction, ray.direction, disc.radius));
-    return is_surrounded(stats, false) && !is_sparse(stats);
+    return hit_before_slit(hit, passed.slot, passed.distance, ray);
 }
