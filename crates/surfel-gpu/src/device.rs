@@ -1,7 +1,7 @@
 //! Devices: the list of them, and one opened for work.
 
 use crate::error::{Error, Result};
-use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES, WORKGROUP_SIZE};
+use crate::numbers::{MAX_QUEUE_ENTRIES, N_BLOCK_PAGES, N_NODE_PAGES, WORKGROUP_SIZE};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -315,9 +315,11 @@ fn of_wgpu(device: &str, error: wgpu::Error) -> Error {
 fn check_limits(info: &DeviceInfo, limits: &wgpu::Limits) -> Result<()> {
     let n_buffers = u64::from(limits.max_storage_buffers_per_shader_stage);
     let n_invocations = u64::from(limits.max_compute_invocations_per_workgroup);
+    let n_workgroups = u64::from(limits.max_compute_workgroups_per_dimension);
     for (limit, found, needed) in [
         ("storage buffers a kernel", n_buffers, N_STORAGE_BUFFERS),
         ("invocations a workgroup", n_invocations, u64::from(WORKGROUP_SIZE)),
+        ("workgroups along an axis", n_workgroups, (MAX_QUEUE_ENTRIES / WORKGROUP_SIZE).into()),
     ] {
         if found < needed {
             return Err(Error::Limit { device: info.name.clone(), limit, found, needed });

@@ -5,6 +5,7 @@ use crate::device::Gpu;
 use crate::error::{Error, Result};
 use crate::kernel_times::KernelTimes;
 use crate::kernels::Kernels;
+use crate::numbers::MAX_QUEUE_ENTRIES;
 use crate::part_size::next_part;
 use crate::passes::{Pass, PassStage, Passes};
 use crate::pixel_order::{PixelOrder, set_pixels};
@@ -25,7 +26,7 @@ use surfel_core::scene::Background;
 /// Maximum number of entries of a queue: it bounds the memory, up to 800 bytes an entry.
 const MAX_ENTRIES: u64 = 1 << 20;
 /// The same on devices with a large memory. A pass takes as long as its slowest ray, so few large passes are faster.
-const MAX_ENTRIES_IN_LARGE_MEMORY: u64 = 1 << 22;
+const MAX_ENTRIES_IN_LARGE_MEMORY: u64 = MAX_QUEUE_ENTRIES as u64;
 /// Bytes from which on a memory is large.
 const LARGE_MEMORY: u64 = 30 << 30;
 /// Number of entries of a queue for each pixel, where paths have branches. A part whose paths have more is rendered

@@ -6,6 +6,8 @@ use surfel_core::surface::{Align, SurfaceKind};
 pub const WORKGROUP_SIZE: u32 = 64;
 /// Number of rows of a band, in which pixels are numbered column by column.
 pub const BAND_HEIGHT: u32 = 4;
+/// Maximum number of entries of a queue: devices start at most 65,535 workgroups along an axis.
+pub const MAX_QUEUE_ENTRIES: u32 = 65_535 * WORKGROUP_SIZE;
 /// Maximum number of planes that limit camera rays.
 pub const MAX_PLANES: usize = 8;
 /// Maximum number of pages of the nodes of a tree.

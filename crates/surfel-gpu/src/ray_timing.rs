@@ -5,10 +5,10 @@ use crate::error::{Error, Result};
 use crate::kernels::Kernels;
 use crate::numbers::queue;
 use crate::numbers::ray_kind;
-use crate::numbers::{NO_LIMIT, NONE, WORKGROUP_SIZE};
+use crate::numbers::{MAX_QUEUE_ENTRIES, NO_LIMIT, NONE, WORKGROUP_SIZE};
 use crate::passes::{Pass, Size};
 use crate::picture_memory::array_bytes;
-use crate::records::{FrameRecord, Path, Task, Visit};
+use crate::records::{FirstDisc, FrameRecord, Path, Task, Visit};
 use crate::scene_records::SceneRecords;
 use crate::search::{ANY, CLOSEST, SearchKernels, SearchStep};
 use crate::shader::{Kernel, Surface};
@@ -52,7 +52,7 @@ pub struct RayTimes {
 }
 
 /// Maximum number of rays that are traced at once.
-const MAX_RAYS: usize = 1 << 20;
+const MAX_RAYS: usize = MAX_QUEUE_ENTRIES as usize;
 
 /// Searches to be timed.
 #[derive(Clone, Copy, Debug)]
@@ -119,7 +119,7 @@ pub fn time(
         let groups = groups?;
         for run in 0..=timing.n_runs {
             progress.check()?;
-            times.ray_transfer_secs += chunk.reset(gpu)? / f64::from(timing.n_runs + 1);
+            times.ray_transfer_secs += chunk.reset(gpu, kernels)? / f64::from(timing.n_runs + 1);
             let start = Instant::now();
             chunk.search(gpu, kernels, &groups)?;
             if let Some(before) = run.checked_sub(1) {
@@ -135,6 +135,7 @@ pub fn time(
 
 /// A search in one tree.
 struct Search {
+    query: TimedQuery,
     surface: Surface,
     kernels: SearchKernels,
     tree_idx: usize,
@@ -143,7 +144,16 @@ struct Search {
 
 impl Search {
     fn steps(&self) -> Vec<SearchStep> {
-        self.kernels.steps(self.surface, 1)
+        match self.lone_kernel() {
+            Some(kernel) => vec![SearchStep::Search { kernel, round: 0 }],
+            None => self.kernels.steps(self.surface, 1),
+        }
+    }
+
+    /// Returns the kernel that finds no more than a disc, if that is the question.
+    fn lone_kernel(&self) -> Option<Kernel> {
+        (self.surface == Surface::DiscRims && self.query != TimedQuery::Surface)
+            .then_some(self.kernels.disc)
     }
 }
 
@@ -156,7 +166,7 @@ fn searches(geometry: &FlatGeometry, query: TimedQuery) -> Vec<Search> {
             TimedQuery::Surface => visit,
             _ => Visit { has_edge_test: 0, min_discs: 1, ..visit },
         };
-        Search { surface, kernels, tree_idx, visit }
+        Search { query, surface, kernels, tree_idx, visit }
     };
     let cloud = match geometry {
         FlatGeometry::Mesh(_) => return vec![search(0, Surface::Triangle)],
@@ -184,6 +194,8 @@ struct Chunk<'a> {
     clear: Vec<Pass>,
     /// The passes of the searches, with the indices of their trees; a pass that takes a queue has none.
     searches: Vec<(Pass, Option<usize>)>,
+    /// True if the searches find discs and nothing more.
+    finds_discs: bool,
 }
 
 impl<'a> Chunk<'a> {
@@ -207,6 +219,7 @@ impl<'a> Chunk<'a> {
             clear.push(pass(Kernel::TakeQueue, Size::One, task));
         }
         clear.push(pass(Kernel::ClearHits, Size::Pixels, Task::default()));
+        let finds_discs = searches.iter().all(|search| search.lone_kernel().is_some());
         let mut passes = Vec::new();
         for (tree_idx, search) in searches.iter().enumerate() {
             let task = Task { first_visit: tree_idx as u32, n_visits: 1, ..Task::default() };
@@ -236,16 +249,15 @@ impl<'a> Chunk<'a> {
             state: 1,
             ..Zeroable::zeroed()
         };
-        Ok(Self { wavefront, paths: rays.iter().map(path).collect(), clear, searches })
+        Ok(Self { wavefront, paths: rays.iter().map(path).collect(), clear, searches, finds_discs })
     }
 
     /// Uploads the rays, which have found nothing yet; returns the seconds that this took.
-    fn reset(&self, gpu: &Gpu) -> Result<f64> {
+    fn reset(&self, gpu: &Gpu, kernels: &Kernels) -> Result<f64> {
         let start = Instant::now();
         self.wavefront.write_paths(gpu, &self.paths);
         self.wavefront.fill_queues(gpu, self.paths.len() as u32);
-        gpu.queue.submit([]);
-        gpu.wait()?;
+        self.run(gpu, kernels, self.clear.iter().map(|pass| (pass, None)))?;
         Ok(start.elapsed().as_secs_f64())
     }
 
@@ -256,6 +268,17 @@ impl<'a> Chunk<'a> {
         kernels: &Kernels,
         trees: &[(wgpu::BindGroup, bool)],
     ) -> Result<()> {
+        let searches = self.searches.iter().map(|(pass, tree)| (pass, tree.map(|i| &trees[i])));
+        self.run(gpu, kernels, searches)
+    }
+
+    /// Runs passes, each with its tree, and waits for the end.
+    fn run<'p>(
+        &self,
+        gpu: &Gpu,
+        kernels: &Kernels,
+        passes: impl Iterator<Item = (&'p Pass, Option<&'p (wgpu::BindGroup, bool)>)>,
+    ) -> Result<()> {
         let n_groups = (self.paths.len() as u32).div_ceil(WORKGROUP_SIZE);
         gpu.catch("the passes", || {
             let description = wgpu::CommandEncoderDescriptor::default();
@@ -263,10 +286,7 @@ impl<'a> Chunk<'a> {
             {
                 let description = wgpu::ComputePassDescriptor::default();
                 let mut encoder = encoder.begin_compute_pass(&description);
-                let searches =
-                    self.searches.iter().map(|(pass, tree)| (pass, tree.map(|i| &trees[i])));
-                let clear = self.clear.iter().map(|pass| (pass, None));
-                for (pass, tree) in clear.chain(searches) {
+                for (pass, tree) in passes {
                     let (resources, is_paged) = match tree {
                         Some((group, is_paged)) => (group, *is_paged),
                         None => (&self.wavefront.dispatches, false),
@@ -294,6 +314,12 @@ impl<'a> Chunk<'a> {
     fn results(&self, gpu: &Gpu, query: TimedQuery) -> Result<Vec<f32>> {
         let n = self.paths.len() as u32;
         let found = |is_hit, distance| if is_hit { distance } else { f32::INFINITY };
+        if self.finds_discs {
+            let discs = self.wavefront.read_first_discs(gpu, n)?;
+            let distance =
+                |disc: &FirstDisc| if query == TimedQuery::Any { 0.0 } else { disc.distance };
+            return Ok(discs.iter().map(|disc| found(disc.slot != NONE, distance(disc))).collect());
+        }
         if query == TimedQuery::Any {
             let paths = self.wavefront.read_paths(gpu, n)?;
             return Ok(paths.iter().map(|path| found(path.state == 0, 0.0)).collect());

@@ -2,15 +2,17 @@
 
 use crate::shader::{Kernel, Surface};
 
-/// Number of rounds in which single discs are tested. Rays that are undecided then have many discs, which their workgroups
-/// test together.
-const N_ROUNDS: u32 = 4;
+/// Number of rounds in which the nearest discs of rays are tested. Rays that are undecided then have many discs, which
+/// their workgroups test together.
+const N_CLOSEST_ROUNDS: u32 = 4;
+/// Number of rounds for rays toward lights, whose discs come in any order: more rounds were slower.
+const N_ANY_ROUNDS: u32 = 1;
 
 /// The kernels of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchKernels {
     /// Finds the next disc on each ray.
-    disc: Kernel,
+    pub disc: Kernel,
     /// Tests whether rays hit the surface near these discs.
     test: fn(Surface) -> Kernel,
     /// Searches all along rays.
@@ -58,13 +60,14 @@ impl SearchKernels {
         if n_instances != 1 || !surface.tests_first_disc(self.is_any) {
             return vec![whole(0)];
         }
+        let n_rounds = if self.is_any { N_ANY_ROUNDS } else { N_CLOSEST_ROUNDS };
         let test = (self.test)(surface);
         let mut steps = Vec::new();
-        for round in 0..N_ROUNDS {
+        for round in 0..n_rounds {
             steps.extend([self.disc, test].map(|kernel| SearchStep::Search { kernel, round }));
             steps.push(SearchStep::Take);
         }
-        steps.push(whole(N_ROUNDS));
+        steps.push(whole(n_rounds));
         steps
     }
 }

@@ -209,7 +209,7 @@ impl Arrays {
             light_rays: paths("rays toward lights", n_entries)?,
             light_hits: hits("hits of light", if sizes.is_transmissive { n_entries } else { 1 })?,
             points: array("points", n_entries, of_points, Usage::empty())?,
-            first_discs: array("first discs", n_entries, size_of::<FirstDisc>(), Usage::empty())?,
+            first_discs: array("first discs", n_entries, size_of::<FirstDisc>(), Usage::COPY_SRC)?,
             pixels: array("pixels", n_pixels, size_of::<Pixel>(), Usage::empty())?,
             colors: array("colours", n_pixels, size_of::<[f32; 4]>(), Usage::COPY_SRC)?,
             counts: gpu.buffer("counts", count_bytes, of_counts)?,
@@ -299,6 +299,11 @@ impl<'a> Wavefront<'a> {
     /// Returns the hits of the first `n` rays.
     pub fn read_hits(&self, gpu: &Gpu, n: u32) -> Result<Vec<HitRecord>> {
         self.read(gpu, &self.arrays.hits, n)
+    }
+
+    /// Returns the discs that were found on the first `n` rays.
+    pub fn read_first_discs(&self, gpu: &Gpu, n: u32) -> Result<Vec<FirstDisc>> {
+        self.read(gpu, &self.arrays.first_discs, n)
     }
 
     /// Sets the first paths of the first wavefront.
