@@ -25,7 +25,8 @@ use surfel_core::scene::Background;
 
 /// Maximum number of entries of a queue: it bounds the memory, up to 800 bytes an entry.
 const MAX_ENTRIES: u64 = 1 << 20;
-/// The same on devices with a large memory. A pass takes as long as its slowest ray, so few large passes are faster.
+/// Maximum number of entries of a queue on devices with a large memory. A pass takes as long as its slowest ray, so few
+/// large passes are faster.
 const MAX_ENTRIES_IN_LARGE_MEMORY: u64 = MAX_QUEUE_ENTRIES as u64;
 /// Bytes from which on a memory is large.
 const LARGE_MEMORY: u64 = 30 << 30;

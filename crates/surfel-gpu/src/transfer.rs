@@ -135,7 +135,7 @@ pub fn write(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    //! What arrives is what was sent, also in arrays that begin amid a node.
+    //! Bytes arrive as they were sent, also in arrays that begin amid a node.
 
     use super::*;
     use bytemuck::Zeroable;
