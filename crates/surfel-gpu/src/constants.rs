@@ -13,7 +13,7 @@ use crate::numbers::miss;
 use crate::numbers::queue;
 use crate::numbers::texture;
 use crate::numbers::{
-    BAND_HEIGHT, MAX_PLANES, TRIANGLE, WORKGROUP_SIZE, align_number, surface_number,
+    BAND_HEIGHT, MAX_PLANES, NODE_VECTORS, TRIANGLE, WORKGROUP_SIZE, align_number, surface_number,
 };
 use surfel_core::bvh::MAX_DEPTH;
 use surfel_core::flat::{MAX_KD_DEPTH, MAX_OCTREE_DEPTH};
@@ -49,7 +49,6 @@ pub fn constants() -> String {
 fn kinds() -> Vec<(&'static str, u32)> {
     let kinds = [
         ("SPHERE", SurfaceKind::Sphere),
-        ("DISC", SurfaceKind::Disc),
         ("SPLAT", SurfaceKind::Splat),
         ("SPLAT_FIT", SurfaceKind::SplatFit),
         ("CYLINDER", SurfaceKind::Cylinder),
@@ -84,6 +83,7 @@ fn numbers() -> Vec<(&'static str, u32)> {
         ("FIRST_ADDED", count::FIRST_ADDED),
         ("FIRST_TAKEN", count::FIRST_TAKEN),
         ("FIRST_TRACED", count::FIRST_TRACED),
+        ("FIRST_TRACED_UPPER", count::FIRST_TRACED_UPPER),
         ("N_ACTIVE", count::N_ACTIVE),
         ("MAX_ADDED", count::MAX_ADDED),
         ("N_COUNTS", count::N_COUNTS),
@@ -123,6 +123,7 @@ fn limits() -> Vec<(&'static str, u32)> {
         ("BAND_HEIGHT", BAND_HEIGHT),
         ("MAX_PLANES", MAX_PLANES as u32),
         ("MAX_DEPTH", MAX_DEPTH as u32),
+        ("NODE_VECTORS", NODE_VECTORS as u32),
         ("MAX_GATHERED", MAX_GATHERED as u32),
         ("MAX_REJECTED_HITS", trace::MAX_REJECTED_HITS as u32),
         ("MAX_FITS", trace::MAX_FITS as u32),

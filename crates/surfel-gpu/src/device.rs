@@ -103,7 +103,7 @@ fn info(adapter: &wgpu::Adapter) -> DeviceInfo {
     }
 }
 
-/// Returns the size of the largest heap of a device's own memory, which Vulkan tells.
+/// Returns the size of the largest heap of a device's own memory, as Vulkan reports it.
 #[cfg(any(windows, target_os = "linux", target_os = "android", target_os = "freebsd"))]
 fn memory_bytes(adapter: &wgpu::Adapter) -> Option<u64> {
     /// The bit `VK_MEMORY_HEAP_DEVICE_LOCAL_BIT`.

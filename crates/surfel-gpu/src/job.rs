@@ -1,7 +1,7 @@
 //! One picture: it is rendered part by part, each part sample by sample, each sample wavefront by wavefront.
 
 use crate::aovs::{AovSource, set_aovs};
-use crate::device::Gpu;
+use crate::device::{DeviceKind, Gpu};
 use crate::error::{Error, Result};
 use crate::kernel_times::KernelTimes;
 use crate::kernels::Kernels;
@@ -14,7 +14,7 @@ use crate::scene_records::{SceneRecords, frame};
 use crate::submitter::{Bound, BoundTree, Submitter};
 use crate::upload::{TreeRef, Uploads};
 use crate::wavefront::{Arrays, Capacities, Contents, Counts, PartReadback, Wavefront, written};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
@@ -25,7 +25,7 @@ use surfel_core::scene::Background;
 
 /// Maximum number of entries of a queue: it bounds the memory, up to 800 bytes an entry.
 const MAX_ENTRIES: u64 = 1 << 20;
-/// Maximum number of entries of a queue on devices with a large memory. A pass takes as long as its slowest ray, so few
+/// Maximum number of entries of a queue on devices with a large memory of their own. A pass takes as long as its slowest ray, so few
 /// large passes are faster.
 const MAX_ENTRIES_IN_LARGE_MEMORY: u64 = MAX_QUEUE_ENTRIES as u64;
 /// Bytes from which on a memory is large.
@@ -65,7 +65,7 @@ pub struct Job<'a> {
 }
 
 /// The state that a renderer keeps from picture to picture, and that each of them changes.
-pub struct Kept<'a> {
+pub struct RendererState<'a> {
     /// The large arrays.
     pub arrays: &'a mut Option<Arrays>,
     /// The times of kernels.
@@ -96,20 +96,30 @@ struct Part<'a> {
     readback: PartReadback<'a>,
 }
 
-/// The way of a sample to the device.
+/// Whether a sample was submitted whole.
 #[derive(PartialEq)]
 enum Outcome {
-    /// It went there whole.
+    /// It was.
     Done,
     /// A queue was too short.
     Overflow,
+}
+
+/// Returns the maximum number of entries of a queue on a device.
+pub fn max_entries(gpu: &Gpu) -> u64 {
+    // A hit is the largest entry.
+    let fitting = gpu.info.max_array_bytes / size_of::<HitRecord>() as u64;
+    let is_large = gpu.info.memory_bytes.is_some_and(|bytes| LARGE_MEMORY <= bytes);
+    // An integrated GPU takes the memory of the processor.
+    let is_own = gpu.info.kind == DeviceKind::Discrete;
+    fitting.min(if is_large && is_own { MAX_ENTRIES_IN_LARGE_MEMORY } else { MAX_ENTRIES })
 }
 
 impl Job<'_> {
     /// Renders the picture.
     pub fn render(
         &self,
-        kept: Kept,
+        state: RendererState,
         progress: &dyn Progress,
     ) -> surfel_core::Result<(Image, RenderStats)> {
         let Self { gpu, settings, region, sizes, .. } = *self;
@@ -120,17 +130,17 @@ impl Job<'_> {
         progress.begin("render", order.n_pixels().into());
         let Self { records, words, .. } = self;
         let contents = Contents { scene: records, words, tasks: &self.passes.tasks };
-        let arrays = Arrays::update(kept.arrays, gpu, sizes)?;
+        let arrays = Arrays::update(state.arrays, gpu, sizes)?;
         let wavefront = &Wavefront::new(gpu, self.kernels, arrays, contents)?;
         let bound = Bound { kernels: self.kernels, wavefront, trees: &self.bind_trees()? };
-        let mut submitter = Submitter::new(gpu, bound, kept.times, progress)?;
+        let mut submitter = Submitter::new(gpu, bound, state.times, progress)?;
         let mut picture = Picture {
             source: AovSource { scene: self.scene, view: &view },
             order,
             image: region.blank_image(settings),
             stats: RenderStats::default(),
             last_arrival: start,
-            part_size: kept.part_size,
+            part_size: state.part_size,
             progress,
         };
         let (capacity, n_samples) = (sizes.n_entries, region.n_samples());
@@ -189,13 +199,7 @@ impl Job<'_> {
     pub fn sizes(gpu: &Gpu, scene: &FlatScene, passes: &Passes, n_pixels: u32) -> Capacities {
         let n_pixels = u64::from(n_pixels);
         let has_waves = passes.next_wave.is_some();
-        // A hit is the largest entry.
-        let fitting = gpu.info.max_array_bytes / size_of::<HitRecord>() as u64;
-        let max_entries = match gpu.info.memory_bytes {
-            Some(bytes) if LARGE_MEMORY <= bytes => MAX_ENTRIES_IN_LARGE_MEMORY,
-            _ => MAX_ENTRIES,
-        };
-        let max_entries = fitting.min(max_entries);
+        let max_entries = max_entries(gpu);
         let (wanted, per_pixel) = match has_waves {
             true => {
                 let per_pixel = u64::from(ENTRIES_PER_PIXEL);
@@ -219,7 +223,8 @@ impl Job<'_> {
         let bytes = bytemuck::cast_slice(&visits);
         let visits = written(self.gpu, "instances", bytes, wgpu::BufferUsages::STORAGE)?;
         let mut bound = BTreeMap::new();
-        for tree in self.passes.all().filter_map(|pass| pass.tree) {
+        let trees: BTreeSet<TreeRef> = self.passes.all().filter_map(|pass| pass.tree).collect();
+        for tree in trees {
             let Some(arrays) = self.uploads.tree(&self.scene.geometries, tree) else { continue };
             let bind = || arrays.bind(self.gpu, self.kernels, &visits);
             let group = self.gpu.catch("a tree", bind)?;
@@ -248,7 +253,7 @@ impl Job<'_> {
         submitter.n_pixels = frame.n_rays;
         wavefront.clear_counts(self.gpu);
         for sample_idx in self.region.samples.0..self.region.samples.1 {
-            // A picture is written for the submissions to come, so those of the sample before must be on their way.
+            // The frame counts for all later submissions, so the passes of the sample before are submitted first.
             submitter.flush()?;
             let is_first = (sample_idx == self.region.samples.0).into();
             wavefront.set_frame(self.gpu, &FrameRecord { sample_idx, is_first, ..frame });

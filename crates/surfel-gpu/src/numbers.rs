@@ -10,6 +10,8 @@ pub const BAND_HEIGHT: u32 = 4;
 pub const MAX_QUEUE_ENTRIES: u32 = 65_535 * WORKGROUP_SIZE;
 /// Maximum number of planes that limit camera rays.
 pub const MAX_PLANES: usize = 8;
+/// Vectors of four words that a node takes.
+pub const NODE_VECTORS: usize = 5;
 /// Maximum number of pages of the nodes of a tree.
 pub const N_NODE_PAGES: usize = 2;
 /// Maximum number of pages of the blocks of a tree.
@@ -69,7 +71,7 @@ pub mod queue {
     pub const POINTS: u32 = 1;
     /// Rays toward a light.
     pub const LIGHT_RAYS: u32 = 2;
-    /// Rays that the test of their first disc leaves undecided.
+    /// Rays that the tests of discs leave undecided.
     pub const UNDECIDED: u32 = 3;
     /// Number of queues.
     pub const N_QUEUES: u32 = 4;
@@ -86,8 +88,10 @@ pub mod count {
     pub const FIRST_TAKEN: u32 = FIRST_ADDED + N_QUEUES;
     /// Number of rays traced of the first kind.
     pub const FIRST_TRACED: u32 = FIRST_TAKEN + N_QUEUES;
+    /// The upper word of the number of rays traced of the first kind.
+    pub const FIRST_TRACED_UPPER: u32 = FIRST_TRACED + UNCOUNTED + 1;
     /// Number of rays toward a light that are still on their way.
-    pub const N_ACTIVE: u32 = FIRST_TRACED + UNCOUNTED + 1;
+    pub const N_ACTIVE: u32 = FIRST_TRACED_UPPER + UNCOUNTED + 1;
     /// Greatest number of entries that were added to a queue. If it is more than the queue holds, some were lost.
     pub const MAX_ADDED: u32 = N_ACTIVE + 1;
     /// Number of counts.

@@ -2,6 +2,8 @@
 
 use crate::device::DeviceKind;
 use crate::numbers::WORKGROUP_SIZE;
+use crate::shader::Kernel;
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 /// Number of pixels of the first part that a device renders.
@@ -10,15 +12,32 @@ const FIRST_PART: u32 = 1 << 16;
 /// another scene's size could keep a picture from being cancelled for minutes.
 const FIRST_SOFTWARE_PART: u32 = 1 << 12;
 /// Time of a sample of a part above which the next part is smaller. A device that also draws a screen must not be busy
-/// for long, and work is cancelled between parts.
+/// for long.
 const MAX_SAMPLE_TIME: Duration = Duration::from_millis(200);
 /// Time of a sample that a part is meant to take, by the rate of the part before.
-const USUAL_SAMPLE_TIME: Duration = Duration::from_millis(100);
+const TARGET_SAMPLE_TIME: Duration = Duration::from_millis(100);
 /// Maximum growth from one part to the next.
 const MAX_GROWTH: f64 = 8.0;
 
+/// The number of pixels of a part, for pictures that these kernels render.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PartSize {
+    /// The kernels.
+    pub kernels: BTreeSet<Kernel>,
+    /// The number of pixels.
+    pub n_pixels: u32,
+}
+
+impl PartSize {
+    /// Returns the size of the first part of a picture: that of the last part if the same kernels rendered it.
+    pub fn first(kind: DeviceKind, known: Option<Self>, kernels: BTreeSet<Kernel>) -> Self {
+        let known = known.filter(|known| known.kernels == kernels);
+        Self { n_pixels: first_part(kind, known.map(|known| known.n_pixels)), kernels }
+    }
+}
+
 /// Returns the number of pixels of the first part of a picture, on a device whose last part had `known` pixels.
-pub fn first_part(kind: DeviceKind, known: Option<u32>) -> u32 {
+fn first_part(kind: DeviceKind, known: Option<u32>) -> u32 {
     match kind {
         DeviceKind::Software => FIRST_SOFTWARE_PART,
         _ => known.unwrap_or(FIRST_PART),
@@ -28,7 +47,7 @@ pub fn first_part(kind: DeviceKind, known: Option<u32>) -> u32 {
 /// Returns the number of pixels of the parts to come, which was `wanted`, after a part of `n_pixels` whose samples took
 /// this time each.
 pub fn next_part(wanted: u32, n_pixels: u32, sample_time: Duration) -> u32 {
-    let rest = USUAL_SAMPLE_TIME.as_secs_f64() / sample_time.as_secs_f64().max(1e-9);
+    let rest = TARGET_SAMPLE_TIME.as_secs_f64() / sample_time.as_secs_f64().max(1e-9);
     if MAX_SAMPLE_TIME < sample_time {
         ((f64::from(n_pixels) * rest) as u32).max(WORKGROUP_SIZE)
     } else {
@@ -69,6 +88,15 @@ mod tests {
     fn small_parts_at_the_end_of_pictures_count_by_their_rate() {
         assert_eq!(next(FIRST_PART, 100, 1), FIRST_PART);
         assert_eq!(next(FIRST_PART, 1000, 1000), 100);
+    }
+
+    #[test]
+    fn other_kernels_begin_with_a_small_part() {
+        let shade = BTreeSet::from([Kernel::Shade]);
+        let known = PartSize { kernels: shade.clone(), n_pixels: 1 << 20 };
+        let first = |kernels| PartSize::first(DeviceKind::Discrete, Some(known.clone()), kernels);
+        assert_eq!(first(shade), known);
+        assert_eq!(first(BTreeSet::from([Kernel::NextDisc])).n_pixels, FIRST_PART);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::passes::Passes;
 use crate::records::{
-    FirstDisc, HitRecord, InstanceRecord, MaterialRecord, Path, Pixel, ShadingPointRecord,
+    HitRecord, InstanceRecord, MaterialRecord, Path, Pixel, SearchState, ShadingPointRecord,
 };
 use crate::scene_records::n_words;
 use crate::wavefront::{Capacities, MAX_READ_BYTES};
@@ -26,7 +26,7 @@ pub fn array_bytes(sizes: Capacities) -> u64 {
     let of_entry = n_path_arrays * size_of::<Path>()
         + n_hit_arrays * size_of::<HitRecord>()
         + size_of::<ShadingPointRecord>()
-        + size_of::<FirstDisc>();
+        + size_of::<SearchState>();
     // Colours come back through two arrays in turn.
     let of_pixel = size_of::<Pixel>() + 3 * size_of::<[f32; 4]>();
     let hit_bytes = u64::from(n_entries) * size_of::<HitRecord>() as u64;

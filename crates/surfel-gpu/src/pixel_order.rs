@@ -43,12 +43,12 @@ impl PixelOrder {
     }
 }
 
-/// Sets the pixels of an image from number `first` on to colours that have their coverage in the place of alpha.
+/// Sets the pixels of an image from number `first` on to colours with coverage as their fourth component.
 /// `background_alpha` is the alpha of the background.
 ///
 /// As in [`transfer`](crate::transfer), threads are not those of rayon, which may begin another picture on this device.
 pub fn set_pixels(image: &mut Image, colors: &[[f32; 4]], first: usize, background_alpha: f32) {
-    let part = Part { colors, first, width: image.width as usize, background_alpha };
+    let part = PixelSpan { colors, first, width: image.width as usize, background_alpha };
     let band_len = part.band_len();
     let end = first + colors.len();
     let bands = first / band_len..end.div_ceil(band_len);
@@ -72,7 +72,7 @@ pub fn set_pixels(image: &mut Image, colors: &[[f32; 4]], first: usize, backgrou
 
 /// The pixels of a part of a picture.
 #[derive(Clone, Copy)]
-struct Part<'a> {
+struct PixelSpan<'a> {
     colors: &'a [[f32; 4]],
     /// Number of the first pixel.
     first: usize,
@@ -81,7 +81,7 @@ struct Part<'a> {
     background_alpha: f32,
 }
 
-impl Part<'_> {
+impl PixelSpan<'_> {
     fn band_len(&self) -> usize {
         BAND_HEIGHT as usize * self.width
     }

@@ -1,14 +1,15 @@
 //! Timed searches along given rays, for benchmarks.
 
-use crate::device::Gpu;
+use crate::device::{DeviceKind, Gpu};
 use crate::error::{Error, Result};
+use crate::job::max_entries;
 use crate::kernels::Kernels;
 use crate::numbers::queue;
 use crate::numbers::ray_kind;
-use crate::numbers::{MAX_QUEUE_ENTRIES, NO_LIMIT, NONE, WORKGROUP_SIZE};
+use crate::numbers::{NO_LIMIT, NONE, WORKGROUP_SIZE};
 use crate::passes::{Pass, Size};
 use crate::picture_memory::array_bytes;
-use crate::records::{FirstDisc, FrameRecord, Path, Task, Visit};
+use crate::records::{FrameRecord, Path, SearchState, Task, Visit};
 use crate::scene_records::SceneRecords;
 use crate::search::{ANY, CLOSEST, SearchKernels, SearchStep};
 use crate::shader::{Kernel, Surface};
@@ -51,8 +52,8 @@ pub struct RayTimes {
     pub distances: Vec<f32>,
 }
 
-/// Maximum number of rays that are traced at once.
-const MAX_RAYS: usize = MAX_QUEUE_ENTRIES as usize;
+/// Maximum number of rays that are traced at once on a software device, which must finish them within the limit of a wait.
+const MAX_SOFTWARE_RAYS: usize = 1 << 18;
 
 /// Searches to be timed.
 #[derive(Clone, Copy, Debug)]
@@ -75,12 +76,16 @@ pub fn time(
     timing: Timing,
     progress: &dyn Progress,
 ) -> surfel_core::Result<RayTimes> {
-    let searches = searches(timing.geometry, timing.query);
+    let mut searches = searches(timing.geometry, timing.query);
     let geometries = std::slice::from_ref(timing.geometry);
-    let n = timing.rays.len().min(MAX_RAYS) as u32;
+    let max_rays = match gpu.info.kind {
+        DeviceKind::Software => MAX_SOFTWARE_RAYS,
+        _ => max_entries(gpu) as usize,
+    };
+    let n = timing.rays.len().min(max_rays) as u32;
     let sizes = Capacities { n_pixels: n, n_entries: n, has_waves: false, is_transmissive: false };
-    let has_room = |sizes| uploads.has_room(gpu, geometries, array_bytes(sizes));
-    let found = Arrays::make_room(arrays, gpu, sizes, has_room)?;
+    let fits_memory = |sizes| uploads.fits_memory(gpu, geometries, array_bytes(sizes));
+    let found = Arrays::free_unless_fitting(arrays, gpu, sizes, fits_memory)?;
     let start = Instant::now();
     uploads.update(gpu, geometries, array_bytes(found))?;
     let mut times = RayTimes {
@@ -91,6 +96,8 @@ pub fn time(
     let tree = |search: &Search| {
         uploads.tree(geometries, TreeRef::Geometry { geometry_idx: 0, tree_idx: search.tree_idx })
     };
+    // Empty trees are not uploaded.
+    searches.retain(|search| tree(search).is_some());
     let is_paged = |search: &Search| tree(search).is_some_and(GpuTree::is_paged);
     let own = [Kernel::TakeQueue, Kernel::ClearHits].map(|kernel| (kernel, false));
     let of_trees = searches.iter().flat_map(|search| {
@@ -103,7 +110,7 @@ pub fn time(
     kernels.compile(gpu, own.into_iter().chain(of_trees))?;
     let kernels = &*kernels;
     let arrays = Arrays::update(arrays, gpu, sizes)?;
-    for rays in timing.rays.chunks(MAX_RAYS) {
+    for rays in timing.rays.chunks(max_rays) {
         let chunk = Chunk::new(gpu, (kernels, arrays), &searches, rays)?;
         let visits: Vec<Visit> = searches.iter().map(|search| search.visit).collect();
         let bytes = bytemuck::cast_slice(&visits);
@@ -144,14 +151,14 @@ struct Search {
 
 impl Search {
     fn steps(&self) -> Vec<SearchStep> {
-        match self.lone_kernel() {
+        match self.disc_only_kernel() {
             Some(kernel) => vec![SearchStep::Search { kernel, round: 0 }],
             None => self.kernels.steps(self.surface, 1),
         }
     }
 
     /// Returns the kernel that finds no more than a disc, if that is the question.
-    fn lone_kernel(&self) -> Option<Kernel> {
+    fn disc_only_kernel(&self) -> Option<Kernel> {
         (self.surface == Surface::DiscRims && self.query != TimedQuery::Surface)
             .then_some(self.kernels.disc)
     }
@@ -214,12 +221,11 @@ impl<'a> Chunk<'a> {
             Pass { kernel, tree: None, task_offset, size, is_of_light: false }
         };
         let mut clear = Vec::new();
-        for queue in [queue::PATHS, queue::LIGHT_RAYS] {
-            let task = Task { queue, ray_kind: ray_kind::UNCOUNTED, ..Task::default() };
-            clear.push(pass(Kernel::TakeQueue, Size::One, task));
-        }
+        let task = Task { queue: queue::PATHS, ray_kind: ray_kind::UNCOUNTED, ..Task::default() };
+        clear.push(pass(Kernel::TakeQueue, Size::One, task));
         clear.push(pass(Kernel::ClearHits, Size::Pixels, Task::default()));
-        let finds_discs = searches.iter().all(|search| search.lone_kernel().is_some());
+        let finds_discs = !searches.is_empty()
+            && searches.iter().all(|search| search.disc_only_kernel().is_some());
         let mut passes = Vec::new();
         for (tree_idx, search) in searches.iter().enumerate() {
             let task = Task { first_visit: tree_idx as u32, n_visits: 1, ..Task::default() };
@@ -256,7 +262,7 @@ impl<'a> Chunk<'a> {
     fn reset(&self, gpu: &Gpu, kernels: &Kernels) -> Result<f64> {
         let start = Instant::now();
         self.wavefront.write_paths(gpu, &self.paths);
-        self.wavefront.fill_queues(gpu, self.paths.len() as u32);
+        self.wavefront.fill_paths(gpu, self.paths.len() as u32);
         self.run(gpu, kernels, self.clear.iter().map(|pass| (pass, None)))?;
         Ok(start.elapsed().as_secs_f64())
     }
@@ -315,9 +321,9 @@ impl<'a> Chunk<'a> {
         let n = self.paths.len() as u32;
         let found = |is_hit, distance| if is_hit { distance } else { f32::INFINITY };
         if self.finds_discs {
-            let discs = self.wavefront.read_first_discs(gpu, n)?;
+            let discs = self.wavefront.read_search_states(gpu, n)?;
             let distance =
-                |disc: &FirstDisc| if query == TimedQuery::Any { 0.0 } else { disc.distance };
+                |disc: &SearchState| if query == TimedQuery::Any { 0.0 } else { disc.distance };
             return Ok(discs.iter().map(|disc| found(disc.slot != NONE, distance(disc))).collect());
         }
         if query == TimedQuery::Any {

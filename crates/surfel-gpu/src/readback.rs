@@ -1,4 +1,4 @@
-//! The way of results from a device to the CPU: buffers that are copied to and then mapped.
+//! Copies results from a device to the CPU: into buffers that are then mapped.
 
 use crate::device::Gpu;
 use crate::error::Result;

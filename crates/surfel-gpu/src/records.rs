@@ -410,10 +410,10 @@ pub struct ShadingPointRecord {
     pub reserved_b: u32,
 }
 
-/// The disc on a ray near which a round of a search tests whether the ray hits the surface.
+/// The state of a search along a ray: the disc near which a round tests whether the ray hits the surface.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub struct FirstDisc {
+pub struct SearchState {
     /// Slot of the disc, [`NONE`](crate::numbers::NONE) without one.
     pub slot: u32,
     /// Distance to it along the ray.

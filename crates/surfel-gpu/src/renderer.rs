@@ -2,10 +2,10 @@
 
 use crate::device::{DeviceInfo, Gpu};
 use crate::error::{Error, Result};
-use crate::job::{Job, Kept};
+use crate::job::{Job, RendererState};
 use crate::kernel_times::{KernelTime, KernelTimes};
 use crate::kernels::Kernels;
-use crate::part_size::first_part;
+use crate::part_size::PartSize;
 use crate::passes::{Pass, Passes};
 use crate::picture_memory::picture_bytes;
 use crate::ray_timing::{self, RayTimes, Timing};
@@ -34,8 +34,8 @@ struct State {
     uploads: Uploads,
     words: Option<SceneWords>,
     arrays: Option<Arrays>,
-    /// Number of pixels of the next part, once one was rendered.
-    part_size: Option<u32>,
+    /// The size of the next part, once one was rendered.
+    part_size: Option<PartSize>,
     times: KernelTimes,
 }
 
@@ -146,8 +146,8 @@ impl Renderer for GpuRenderer {
         // Pictures have at most 2^28 pixels.
         let sizes = Job::sizes(&self.gpu, scene, &passes, settings.width * region.n_rows());
         let bytes = |sizes| picture_bytes(scene, &passes, sizes);
-        let has_room = |sizes| uploads.has_room(&self.gpu, &scene.geometries, bytes(sizes));
-        let found = Arrays::make_room(arrays, &self.gpu, sizes, has_room)?;
+        let fits_memory = |sizes| uploads.fits_memory(&self.gpu, &scene.geometries, bytes(sizes));
+        let found = Arrays::free_unless_fitting(arrays, &self.gpu, sizes, fits_memory)?;
         uploads.update(&self.gpu, &scene.geometries, bytes(found))?;
         let is_paged = |tree| uploads.tree(&scene.geometries, tree).is_some_and(GpuTree::is_paged);
         let of_pass = |pass: &Pass| (pass.kernel, pass.tree.is_some_and(is_paged));
@@ -171,9 +171,11 @@ impl Renderer for GpuRenderer {
             records,
             words,
         };
-        let first_part = first_part(gpu.info.kind, *part_size);
-        let part_size = part_size.insert(first_part);
-        let (image, stats) = job.render(Kept { arrays, times, part_size }, progress)?;
+        let kernels = job.passes.all().map(|pass| pass.kernel).collect();
+        let first_part = PartSize::first(gpu.info.kind, part_size.take(), kernels);
+        let part_size = &mut part_size.insert(first_part).n_pixels;
+        let state = RendererState { arrays, times, part_size };
+        let (image, stats) = job.render(state, progress)?;
         Ok((image.with_columns(region.columns), stats))
     }
 }
@@ -224,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn arrays_of_larger_pictures_make_room() {
+    fn arrays_of_larger_pictures_free_unless_fitting() {
         let Ok(renderer) = GpuRenderer::open(None) else { return };
         let small = Settings { width: 8, height: 4, ..Settings::default() };
         let large = Settings { width: 64, height: 64, ..small };

@@ -5,8 +5,6 @@ use crate::shader::{Kernel, Surface};
 /// Number of rounds in which the nearest discs of rays are tested. Rays that are undecided then have many discs, which
 /// their workgroups test together.
 const N_CLOSEST_ROUNDS: u32 = 4;
-/// Number of rounds for rays toward lights, whose discs come in any order: more rounds were slower.
-const N_ANY_ROUNDS: u32 = 1;
 
 /// The kernels of a search.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +21,7 @@ pub struct SearchKernels {
 
 /// The search for the nearest hits.
 pub const CLOSEST: SearchKernels = SearchKernels {
-    disc: Kernel::FirstDisc,
+    disc: Kernel::NextDisc,
     test: Kernel::TestClosest,
     whole: Kernel::Closest,
     is_any: false,
@@ -60,7 +58,7 @@ impl SearchKernels {
         if n_instances != 1 || !surface.tests_first_disc(self.is_any) {
             return vec![whole(0)];
         }
-        let n_rounds = if self.is_any { N_ANY_ROUNDS } else { N_CLOSEST_ROUNDS };
+        let n_rounds = if self.is_any { 1 } else { N_CLOSEST_ROUNDS };
         let test = (self.test)(surface);
         let mut steps = Vec::new();
         for round in 0..n_rounds {

@@ -16,8 +16,8 @@ pub enum Kernel {
     ClearHits,
     /// Finds the nearest hit on a tree whose points have this surface.
     Closest(Surface),
-    /// Finds the first discs of rays on a tree.
-    FirstDisc,
+    /// Finds the next disc of each ray: the nearest one, in later rounds the nearest behind it.
+    NextDisc,
     /// Finds discs on rays toward a light.
     AnyDisc,
     /// Tests whether rays hit the surface near their first discs.
@@ -243,11 +243,11 @@ const REGION: &[&str] = parts!["trace/region.wgsl"];
 const SUPPORT: &[&str] = parts!["trace/support_kernel.wgsl"];
 const CLOSEST: &[&str] = parts!["trace/query/closest.wgsl"];
 const CLOSEST_KERNEL: &[&str] = parts!["trace/closest_kernel.wgsl"];
-const CLOSEST_ALONE: &[&str] = parts!["trace/query/closest_alone.wgsl"];
+const CLOSEST_SINGLE_RAY: &[&str] = parts!["trace/query/closest_single_ray.wgsl"];
 const GROUP: &[&str] = parts!["trace/group.wgsl"];
 const ANY: &[&str] = parts!["trace/query/any.wgsl"];
 const ANY_KERNEL: &[&str] = parts!["trace/any_kernel.wgsl"];
-const ANY_ALONE: &[&str] = parts!["trace/query/any_alone.wgsl"];
+const ANY_SINGLE_RAY: &[&str] = parts!["trace/query/any_single_ray.wgsl"];
 const ANY_TESTED: &[&str] = parts!["trace/query/any_tested.wgsl"];
 const TRIANGLES: &[&str] = parts![
     "math/basis.wgsl",
@@ -281,7 +281,7 @@ const SMOOTH: &[&str] =
 const SMOOTH_DISC: &[&str] = parts!["trace/query/smooth_disc.wgsl"];
 const SLOT: &[&str] = parts!["render/slot.wgsl"];
 const NEARER: &[&str] = parts!["trace/nearer.wgsl"];
-const FIRST_DISC: &[&str] = parts!["trace/first_disc_kernel.wgsl"];
+const NEXT_DISC: &[&str] = parts!["trace/next_disc_kernel.wgsl"];
 const ANY_DISC: &[&str] = parts!["trace/any_disc_kernel.wgsl"];
 const TEST_CLOSEST: &[&str] = parts!["trace/test_closest_kernel.wgsl"];
 const TEST_ANY: &[&str] = parts!["trace/test_any_kernel.wgsl"];
@@ -326,7 +326,7 @@ impl Kernel {
             Self::PassSurface,
             Self::Resolve,
         ];
-        all.extend([Self::FirstDisc, Self::AnyDisc]);
+        all.extend([Self::NextDisc, Self::AnyDisc]);
         let tested = |any: bool| Surface::ALL.into_iter().filter(move |s| s.tests_first_disc(any));
         all.extend(tested(false).map(Self::TestClosest));
         all.extend(tested(true).map(Self::TestAny));
@@ -344,7 +344,7 @@ impl Kernel {
             Self::TakeQueue => "take_queue",
             Self::ClearHits => "clear_hits",
             Self::Closest(_) | Self::GaussianHits => "closest",
-            Self::FirstDisc => "first_disc",
+            Self::NextDisc => "next_disc",
             Self::AnyDisc => "any_disc",
             Self::TestClosest(_) => "test_closest",
             Self::TestAny(_) => "test_any",
@@ -364,7 +364,7 @@ impl Kernel {
     pub fn resources(self) -> Resources {
         match self {
             Self::Closest(_) | Self::Any(_) | Self::Support(_) => Resources::Tree,
-            Self::FirstDisc | Self::AnyDisc | Self::TestClosest(_) | Self::TestAny(_) => {
+            Self::NextDisc | Self::AnyDisc | Self::TestClosest(_) | Self::TestAny(_) => {
                 Resources::Tree
             }
             Self::Gaussians | Self::GaussianShadow | Self::GaussianHits | Self::GaussianSupport => {
@@ -406,7 +406,7 @@ impl Kernel {
         match self {
             Self::Closest(surface) | Self::Any(surface) | Self::Support(surface) => Some(surface),
             Self::TestClosest(surface) | Self::TestAny(surface) => Some(surface),
-            Self::FirstDisc | Self::AnyDisc => Some(Surface::DiscRims),
+            Self::NextDisc | Self::AnyDisc => Some(Surface::DiscRims),
             _ => None,
         }
     }
@@ -428,18 +428,20 @@ impl Kernel {
                     parts.push(TRAVERSE);
                 }
                 parts.extend_from_slice(match surface {
-                    Surface::Sphere | Surface::Capsule => &[CLOSEST_ALONE, CLOSEST, SOLIDS],
-                    Surface::Disc => &[CLOSEST_ALONE, CLOSEST, REGION, EDGE, DISCS, WITHIN_EDGE],
-                    Surface::DiscRims => &[CLOSEST_ALONE, CLOSEST, FACING, DISCS, WITHIN_RIMS],
-                    Surface::SplatRims => &[CLOSEST_ALONE, FACING, SPLATS, WITHIN_RIMS],
-                    Surface::Splat | Surface::SplatFit | Surface::Cylinder => {
-                        &[CLOSEST_ALONE, REGION, EDGE, SPLATS, WITHIN_EDGE]
+                    Surface::Sphere | Surface::Capsule => &[CLOSEST_SINGLE_RAY, CLOSEST, SOLIDS],
+                    Surface::Disc => {
+                        &[CLOSEST_SINGLE_RAY, CLOSEST, REGION, EDGE, DISCS, WITHIN_EDGE]
                     }
-                    Surface::Triangle => &[CLOSEST_ALONE, TRIANGLES],
-                    Surface::Mls(_) => &[CLOSEST_ALONE, CLOSEST, REGION, EDGE, MLS],
-                    Surface::Implicit => &[CLOSEST_ALONE, REGION, EDGE, IMPLICIT],
+                    Surface::DiscRims => &[CLOSEST_SINGLE_RAY, CLOSEST, FACING, DISCS, WITHIN_RIMS],
+                    Surface::SplatRims => &[CLOSEST_SINGLE_RAY, FACING, SPLATS, WITHIN_RIMS],
+                    Surface::Splat | Surface::SplatFit | Surface::Cylinder => {
+                        &[CLOSEST_SINGLE_RAY, REGION, EDGE, SPLATS, WITHIN_EDGE]
+                    }
+                    Surface::Triangle => &[CLOSEST_SINGLE_RAY, TRIANGLES],
+                    Surface::Mls(_) => &[CLOSEST_SINGLE_RAY, CLOSEST, REGION, EDGE, MLS],
+                    Surface::Implicit => &[CLOSEST_SINGLE_RAY, REGION, EDGE, IMPLICIT],
                     Surface::Octree | Surface::OctreeSplat => {
-                        &[CLOSEST_ALONE, OCTREE, OCTREE_SURFACE]
+                        &[CLOSEST_SINGLE_RAY, OCTREE, OCTREE_SURFACE]
                     }
                     Surface::Smooth => {
                         &[GROUP, CLOSEST, REGION, EDGE, SMOOTH, SMOOTH_DISC, SMOOTH_SURFACE]
@@ -447,8 +449,8 @@ impl Kernel {
                 });
                 parts
             }
-            Self::FirstDisc => {
-                vec![COMMON, VISIT, TREE, TRAVERSE, CLOSEST, NEARER, FIRST_DISC]
+            Self::NextDisc => {
+                vec![COMMON, VISIT, TREE, TRAVERSE, CLOSEST, NEARER, NEXT_DISC]
             }
             Self::AnyDisc => vec![COMMON, VISIT, TREE, TRAVERSE, ANY, ANY_DISC],
             Self::TestClosest(_) => {
@@ -480,18 +482,18 @@ impl Kernel {
                 }
                 parts.extend_from_slice(match surface {
                     Surface::Sphere | Surface::Capsule | Surface::DiscRims | Surface::SplatRims => {
-                        &[ANY_ALONE, ANY]
+                        &[ANY_SINGLE_RAY, ANY]
                     }
-                    Surface::Triangle => &[ANY_ALONE, TRIANGLES],
+                    Surface::Triangle => &[ANY_SINGLE_RAY, TRIANGLES],
                     Surface::Disc | Surface::Splat | Surface::SplatFit => {
                         &[GROUP, ANY_TESTED, REGION, EDGE, EDGE_FILTER]
                     }
                     Surface::Cylinder => {
-                        &[ANY_ALONE, REGION, EDGE, SPLATS, WITHIN_EDGE, ANY_SURFACE]
+                        &[ANY_SINGLE_RAY, REGION, EDGE, SPLATS, WITHIN_EDGE, ANY_SURFACE]
                     }
-                    Surface::Mls(_) => &[ANY_ALONE, CLOSEST, REGION, EDGE, MLS, ANY_SURFACE],
-                    Surface::Implicit => &[ANY_ALONE, REGION, EDGE, IMPLICIT, ANY_SURFACE],
-                    Surface::Octree | Surface::OctreeSplat => &[ANY_ALONE, OCTREE, ANY_CELL],
+                    Surface::Mls(_) => &[ANY_SINGLE_RAY, CLOSEST, REGION, EDGE, MLS, ANY_SURFACE],
+                    Surface::Implicit => &[ANY_SINGLE_RAY, REGION, EDGE, IMPLICIT, ANY_SURFACE],
+                    Surface::Octree | Surface::OctreeSplat => &[ANY_SINGLE_RAY, OCTREE, ANY_CELL],
                     Surface::Smooth => &[GROUP, ANY_TESTED, REGION, EDGE, SMOOTH, SMOOTH_FILTER],
                 });
                 parts

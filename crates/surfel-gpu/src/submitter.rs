@@ -1,4 +1,4 @@
-//! The way of passes to a device: many in a submission, the next one while the device works.
+//! Submits passes to a device: many in a submission, the next one while the device works.
 
 use crate::device::{DeviceKind, Gpu};
 use crate::error::Result;

@@ -110,7 +110,7 @@ impl Uploads {
         geometries: &[Arc<FlatGeometry>],
         other_bytes: u64,
     ) -> Result<()> {
-        if !self.has_room(gpu, geometries, other_bytes) {
+        if !self.fits_memory(gpu, geometries, other_bytes) {
             // The geometries of other pictures make room.
             let is_needed = |known: &Weak<_>| geometries.iter().any(|other| is_same(known, other));
             self.geometries.retain(|(known, _)| is_needed(known));
@@ -129,7 +129,7 @@ impl Uploads {
 
     /// Frees geometries that are no longer in use, and returns true if the device has memory for these and for
     /// `other_bytes`.
-    pub fn has_room(
+    pub fn fits_memory(
         &mut self,
         gpu: &Gpu,
         geometries: &[Arc<FlatGeometry>],

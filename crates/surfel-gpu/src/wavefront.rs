@@ -7,7 +7,7 @@ use crate::numbers::count;
 use crate::numbers::queue;
 use crate::numbers::ray_kind;
 use crate::readback::Readback;
-use crate::records::{FirstDisc, FrameRecord, HitRecord, Path, Pixel, ShadingPointRecord};
+use crate::records::{FrameRecord, HitRecord, Path, Pixel, SearchState, ShadingPointRecord};
 use crate::scene_records::SceneRecords;
 use std::time::Instant;
 use surfel_core::image::decode_srgb8;
@@ -34,7 +34,7 @@ pub struct Arrays {
     light_rays: wgpu::Buffer,
     light_hits: wgpu::Buffer,
     points: wgpu::Buffer,
-    first_discs: wgpu::Buffer,
+    search_states: wgpu::Buffer,
     pixels: wgpu::Buffer,
     colors: wgpu::Buffer,
     counts: wgpu::Buffer,
@@ -126,7 +126,10 @@ impl Counts {
 
     /// Returns the numbers of rays traced.
     pub fn rays(&self) -> RayCounts {
-        let n = |kind: u32| self.0[(count::FIRST_TRACED + kind) as usize].into();
+        let word = |idx: u32| u64::from(self.0[idx as usize]);
+        let n = |kind: u32| {
+            word(count::FIRST_TRACED_UPPER + kind) << 32 | word(count::FIRST_TRACED + kind)
+        };
         RayCounts {
             primary: n(ray_kind::PRIMARY),
             shadow: n(ray_kind::SHADOW),
@@ -142,14 +145,14 @@ impl Arrays {
     ///
     /// # Errors
     /// Fails if the device does.
-    pub fn make_room(
+    pub fn free_unless_fitting(
         known: &mut Option<Self>,
         gpu: &Gpu,
         wanted: Capacities,
-        has_room: impl FnOnce(Capacities) -> bool,
+        fits_memory: impl FnOnce(Capacities) -> bool,
     ) -> Result<Capacities> {
         if let Some(Self { sizes, .. }) = *known {
-            if sizes == wanted || sizes.hold(&wanted) && has_room(sizes) {
+            if sizes == wanted || sizes.hold(&wanted) && fits_memory(sizes) {
                 return Ok(sizes);
             }
             // The memory never holds both. It is free once the device has finished with it.
@@ -168,7 +171,7 @@ impl Arrays {
         gpu: &Gpu,
         wanted: Capacities,
     ) -> Result<&'a Self> {
-        Self::make_room(known, gpu, wanted, |_| true)?;
+        Self::free_unless_fitting(known, gpu, wanted, |_| true)?;
         let arrays = match known.take() {
             Some(arrays) => arrays,
             None => Self::new(gpu, wanted)?,
@@ -197,7 +200,7 @@ impl Arrays {
         let read_bytes = hit_bytes.clamp(COUNT_BYTES, MAX_READ_BYTES);
         let count_bytes = 4 * u64::from(count::N_COUNTS);
         let of_counts = Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST;
-        let dispatch_bytes = DISPATCH_BYTES * u64::from(queue::N_QUEUES + 1);
+        let dispatch_bytes = DISPATCH_BYTES * u64::from(queue::N_QUEUES);
         let of_points = size_of::<ShadingPointRecord>();
         Ok(Self {
             sizes,
@@ -209,7 +212,12 @@ impl Arrays {
             light_rays: paths("rays toward lights", n_entries)?,
             light_hits: hits("hits of light", if sizes.is_transmissive { n_entries } else { 1 })?,
             points: array("points", n_entries, of_points, Usage::empty())?,
-            first_discs: array("first discs", n_entries, size_of::<FirstDisc>(), Usage::COPY_SRC)?,
+            search_states: array(
+                "search states",
+                n_entries,
+                size_of::<SearchState>(),
+                Usage::COPY_SRC,
+            )?,
             pixels: array("pixels", n_pixels, size_of::<Pixel>(), Usage::empty())?,
             colors: array("colours", n_pixels, size_of::<[f32; 4]>(), Usage::COPY_SRC)?,
             counts: gpu.buffer("counts", count_bytes, of_counts)?,
@@ -238,7 +246,7 @@ impl<'a> Wavefront<'a> {
         arrays: &'a Arrays,
         contents: Contents,
     ) -> Result<Self> {
-        let Arrays { hits, points, pixels, counts, first_discs, tables, .. } = arrays;
+        let Arrays { hits, points, pixels, counts, search_states, tables, .. } = arrays;
         let tasks = written(gpu, "tasks", contents.tasks, Usage::UNIFORM)?;
         let frame_bytes = size_of::<FrameRecord>() as u64;
         let frame = gpu.buffer("picture", frame_bytes, Usage::UNIFORM | Usage::COPY_DST)?;
@@ -255,7 +263,7 @@ impl<'a> Wavefront<'a> {
         });
         let wavefront = gpu.catch("the arrays of rays", || {
             let rays = |paths: &wgpu::Buffer, hits: &wgpu::Buffer, next: &wgpu::Buffer| {
-                let arrays = [paths, hits, next, points, pixels, counts, first_discs];
+                let arrays = [paths, hits, next, points, pixels, counts, search_states];
                 bind(gpu, &kernels.rays, &arrays.map(wgpu::Buffer::as_entire_binding))
             };
             let output =
@@ -302,8 +310,8 @@ impl<'a> Wavefront<'a> {
     }
 
     /// Returns the discs that were found on the first `n` rays.
-    pub fn read_first_discs(&self, gpu: &Gpu, n: u32) -> Result<Vec<FirstDisc>> {
-        self.read(gpu, &self.arrays.first_discs, n)
+    pub fn read_search_states(&self, gpu: &Gpu, n: u32) -> Result<Vec<SearchState>> {
+        self.read(gpu, &self.arrays.search_states, n)
     }
 
     /// Sets the first paths of the first wavefront.
@@ -316,12 +324,10 @@ impl<'a> Wavefront<'a> {
         self.read(gpu, &self.arrays.paths[0], n)
     }
 
-    /// Sets the numbers of entries that were added to the queues of paths and rays toward lights; the others are empty.
-    pub fn fill_queues(&self, gpu: &Gpu, n: u32) {
+    /// Sets the number of entries that were added to the queue of paths; the others are empty.
+    pub fn fill_paths(&self, gpu: &Gpu, n: u32) {
         let mut counts = [0; queue::N_QUEUES as usize];
-        for queue in [queue::PATHS, queue::LIGHT_RAYS] {
-            counts[queue as usize] = n;
-        }
+        counts[queue::PATHS as usize] = n;
         let offset = 4 * u64::from(count::FIRST_ADDED);
         gpu.queue.write_buffer(&self.arrays.counts, offset, bytemuck::cast_slice(&counts));
     }
@@ -340,11 +346,11 @@ impl<'a> Wavefront<'a> {
     fn read<T: bytemuck::Pod>(&self, gpu: &Gpu, array: &wgpu::Buffer, n: u32) -> Result<Vec<T>> {
         let buffer = &self.arrays.readback;
         let record_bytes = size_of::<T>() as u64;
-        let n_at_once = buffer.size() / record_bytes;
+        let chunk_size = buffer.size() / record_bytes;
         let mut records = Vec::with_capacity(n as usize);
         while (records.len() as u64) < u64::from(n) {
             let first = records.len() as u64;
-            let n_bytes = n_at_once.min(u64::from(n) - first) * record_bytes;
+            let n_bytes = chunk_size.min(u64::from(n) - first) * record_bytes;
             let readback = Readback::new(gpu, buffer, n_bytes, |encoder| {
                 let offset = first * record_bytes;
                 encoder.copy_buffer_to_buffer(array, offset, buffer, 0, n_bytes);

@@ -26,7 +26,7 @@ use surfel_tests::scenes;
 /// Distance of the farthest things that darken the sky, as a fraction of the diagonal of the cloud's bounding box.
 const AO_FRACTION: f32 = 0.1;
 
-/// The wishes of the command line.
+/// The options of the command line.
 struct Options {
     on_gpu: bool,
     surfaces: Vec<SurfaceKind>,
@@ -73,9 +73,9 @@ fn main() {
 }
 
 fn options(args: &[String]) -> Options {
-    let value = |name: &str, usual: &str| {
+    let value = |name: &str, default: &str| {
         let found = args.iter().position(|arg| arg == name).and_then(|i| args.get(i + 1));
-        found.map_or(usual, String::as_str).to_owned()
+        found.map_or(default, String::as_str).to_owned()
     };
     let resolution = value("--resolution", "1920x1080");
     let (width, height) = resolution.split_once('x').unwrap();
@@ -185,7 +185,7 @@ fn measure(renderer: &dyn Renderer, mut flat: FlatScene, view: &View, options: &
         })
         .collect();
     let whole = |frame: &Frame| 1e3 * frame.secs;
-    let [median, _] = print("frame", &runs, whole);
+    let median = print("frame", &runs, whole);
     let work = |frame: &Frame| 1e3 * (frame.secs - frame.stats.transfer_secs);
     print("without transfer", &runs, work);
     print("after a change of light", &lit, whole);
@@ -194,13 +194,13 @@ fn measure(renderer: &dyn Renderer, mut flat: FlatScene, view: &View, options: &
     println!("  {:.1} frames/s, {mrays_per_s:.1} million rays/s", 1e3 / median);
 }
 
-/// Prints and returns the median and the least of the times of pictures in milliseconds.
-fn print(name: &str, runs: &[Frame], millis: impl Fn(&Frame) -> f64) -> [f64; 2] {
+/// Prints the median and the least of the times of pictures in milliseconds; returns the median.
+fn print(name: &str, runs: &[Frame], millis: impl Fn(&Frame) -> f64) -> f64 {
     let mut times: Vec<f64> = runs.iter().map(millis).collect();
     times.sort_by(f64::total_cmp);
     let [median, least] = [times[times.len() / 2], times[0]];
     println!("  {name:24} {median:9.2} ms (median) {least:9.2} ms (least)");
-    [median, least]
+    median
 }
 
 /// Renders the first picture, and prints how its points went to the GPU.

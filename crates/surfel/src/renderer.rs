@@ -18,8 +18,8 @@ use surfel_core::Result as GpuResult;
 #[cfg(feature = "gpu")]
 use surfel_gpu::{DeviceKind, GpuRenderer, Result as GpuResult, unsupported};
 
-/// Number of rays of a picture from which on a GPU is taken: with fewer, the CPU is done before a GPU's kernels are
-/// compiled. It is an estimate, not a measurement.
+/// Number of rays of a picture from which on a GPU is taken: with fewer, 16 cores are done before an H100 has
+/// started and compiled its kernels (docs/gpu.md).
 const MIN_RAYS: u64 = 1 << 24;
 /// Number of points for each ray above which the upload of the points would take longer than their picture.
 const MAX_POINTS_PER_RAY: u64 = 20;

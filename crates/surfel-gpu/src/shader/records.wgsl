@@ -205,8 +205,8 @@ struct Path {
     state: u32,
 }
 
-// The disc on a ray near which a round of a search tests whether the ray hits the surface.
-struct FirstDisc {
+// The state of a search along a ray: the disc near which a round tests whether the ray hits the surface.
+struct SearchState {
     // NONE without a disc.
     slot: u32,
     distance: f32,
@@ -263,4 +263,4 @@ const EPSILON: f32 = 1.1920929e-7;
 @group(1) @binding(4) var<storage, read_write> pixels: array<array<atomic<u32>, 8>>;
 // Lengths of queues and numbers of rays, at the indices `FIRST_*`, `N_ACTIVE` and `MAX_ADDED`.
 @group(1) @binding(5) var<storage, read_write> counts: array<atomic<u32>, N_COUNTS>;
-@group(1) @binding(6) var<storage, read_write> first_discs: array<FirstDisc>;
+@group(1) @binding(6) var<storage, read_write> search_states: array<SearchState>;

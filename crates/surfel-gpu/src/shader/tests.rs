@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::records::{
-    FirstDisc, FrameRecord, HitRecord, InstanceRecord, LightRecord, MaterialRecord, Path,
+    FrameRecord, HitRecord, InstanceRecord, LightRecord, MaterialRecord, Path, SearchState,
     ShadingPointRecord, Task, TextureRecord, Visit,
 };
 use std::mem::{offset_of, size_of};
@@ -227,7 +227,7 @@ fn records_have_equal_layouts() {
             index,
             state
         }),
-        rust_layout!(FirstDisc {
+        rust_layout!(SearchState {
             slot,
             distance,
             passed_slot,

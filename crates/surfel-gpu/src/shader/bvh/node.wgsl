@@ -10,9 +10,6 @@ struct Node {
     upper: array<vec3<u32>, 2>,
 }
 
-// Vectors of four words that a node takes in `nodes`.
-const NODE_VECTORS: u32 = 5u;
-
 fn load_node(node_idx: u32) -> Node {
     let first = node_idx * NODE_VECTORS;
     let head = node_vector(first);

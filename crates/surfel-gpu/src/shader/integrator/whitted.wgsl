@@ -233,6 +233,10 @@ fn add_path(added: Path) {
         }
         path.weight /= survival;
     }
+    // The count of a full queue stays, as it would wrap around in the end.
+    if frame.capacity < atomicLoad(&counts[FIRST_ADDED + PATHS]) {
+        return;
+    }
     let slot = atomicAdd(&counts[FIRST_ADDED + PATHS], 1u);
     if slot < frame.capacity {
         next_paths[slot] = path;

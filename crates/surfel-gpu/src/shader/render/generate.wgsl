@@ -1,4 +1,4 @@
-// The first passes of a sample: camera rays, and hits that are misses so far.
+// The first pass of a sample: camera rays.
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn generate(@builtin(global_invocation_id) id: vec3<u32>) {

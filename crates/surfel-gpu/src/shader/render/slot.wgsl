@@ -1,11 +1,10 @@
-// Slots in queues: a workgroup asks for those of all its entries at once, so that its invocations do not wait for each
-// other and for all others at one counter.
+// Slots in queues: each workgroup adds the number of its entries to the counter of the queue once.
 
 var<workgroup> n_entries: atomic<u32>;
 var<workgroup> first_slot: u32;
 
 // Returns the slot of an invocation's entry in a queue, NONE if it adds none. All invocations of a workgroup call this
-// together.
+// together, and once only: `n_entries` is not reset.
 fn queue_slot(queue: u32, local_idx: u32, is_added: bool) -> u32 {
     var slot = NONE;
     if is_added {

@@ -2,9 +2,10 @@
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn any_hit(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) local_idx: u32) {
-    let ray_idx = ray_of_entry(id.x);
+    var ray_idx = 0u;
     var is_open = id.x < atomicLoad(&counts[FIRST_TAKEN + task.queue]);
     if is_open {
+        ray_idx = ray_of_entry(id.x);
         is_open = paths[ray_idx].state != 0u;
     }
     for (var i = 0u; i < task.n_visits; i++) {

@@ -3,7 +3,10 @@
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn closest(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) local_idx: u32) {
     let is_open = id.x < atomicLoad(&counts[FIRST_TAKEN + task.queue]);
-    let ray_idx = ray_of_entry(id.x);
+    var ray_idx = 0u;
+    if is_open {
+        ray_idx = ray_of_entry(id.x);
+    }
     for (var i = 0u; i < task.n_visits; i++) {
         visit_idx = task.first_visit + i;
         var ray: Ray;

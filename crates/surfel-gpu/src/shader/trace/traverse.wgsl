@@ -1,4 +1,4 @@
-// The way of one ray through a tree, nearest child first. It can be interrupted and continued.
+// The traversal of a tree by one ray, nearest child first. It can be interrupted and continued.
 
 // Children that wait to be visited, siblings together: the index of their first sibling, their lanes in the order of
 // distance with three bits each below their number, and the least of their distances.

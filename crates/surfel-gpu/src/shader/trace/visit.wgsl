@@ -41,10 +41,10 @@ fn point_hit(
     return SurfaceHit(true, distance, slot, radius, normal, normal, opaque, is_backface, none.xy, none, false, none);
 }
 
-// Returns the index of the ray at a place in the queue of the pass.
+// Returns the index of the ray at an index in the queue of the pass.
 fn ray_of_entry(entry: u32) -> u32 {
     if task.queue == UNDECIDED {
-        return first_discs[entry].undecided[(task.round + 1u) & 1u];
+        return search_states[entry].undecided[(task.round + 1u) & 1u];
     }
     return entry;
 }

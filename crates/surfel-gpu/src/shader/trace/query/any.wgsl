@@ -9,17 +9,14 @@ struct AnyHit {
 struct Search {
     ray: Ray,
     hit: AnyHit,
-    // Number of hits that are passed over.
-    n_passed: u32,
 }
 
 fn is_occluded(ray: Ray) -> bool {
-    return any_hit_of(ray, 0u).slot != NONE;
+    return any_hit_of(ray).slot != NONE;
 }
 
-// Returns a hit; with `n_passed` another one than those that less of it give.
-fn any_hit_of(ray: Ray, n_passed: u32) -> AnyHit {
-    var search = Search(ray, AnyHit(0.0, NONE), n_passed);
+fn any_hit_of(ray: Ray) -> AnyHit {
+    var search = Search(ray, AnyHit(0.0, NONE));
     traverse(ray, &search);
     return search.hit;
 }
@@ -34,11 +31,8 @@ fn visit_block(block_idx: u32, search: ptr<function, Search>) -> bool {
     for (var half = 0u; half < 2u; half++) {
         let distances = intersect_four(four_points(block_idx, head, half, ray.origin), ray);
         let is_in_range = (vec4<f32>(0.0) <= distances) & (distances <= vec4<f32>(ray.t_max));
-        for (var lanes = lane_bits(is_in_range); lanes != 0u; lanes &= lanes - 1u) {
-            if (*search).n_passed != 0u {
-                (*search).n_passed -= 1u;
-                continue;
-            }
+        let lanes = lane_bits(is_in_range);
+        if lanes != 0u {
             let lane = firstTrailingBit(lanes);
             (*search).hit = AnyHit(distances[lane], 8u * block_idx + 4u * half + lane);
             return true;

@@ -13,11 +13,11 @@ struct Search {
 }
 
 // Searches until each ray of the workgroup is blocked or has reached its end. Returns true if the own ray is blocked.
-fn is_blocked_in_group(ray: Ray, searches: bool, local_idx: u32) -> bool {
+fn is_blocked_in_group(ray: Ray, starts: bool, local_idx: u32) -> bool {
     own_idx = local_idx;
     group_rays[own_idx] = ray;
     atomicStore(&is_blocked[own_idx], 0u);
-    var is_searching = searches;
+    var is_searching = starts;
     var search = Search(ray, 0u);
     var traversal = start_traversal(ray);
     loop {

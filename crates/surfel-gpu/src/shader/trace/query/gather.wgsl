@@ -87,7 +87,7 @@ fn with_disc_added(n: u32, limit: f32, distance: f32, slot: u32) -> u32 {
     return n_after;
 }
 
-// Returns the place of the farthest of `n` discs; equally far ones are told apart by their slots.
+// Returns the index of the farthest of `n` discs; equally far ones are told apart by their slots.
 fn farthest_disc(n: u32) -> u32 {
     var farthest = 0u;
     for (var i = 1u; i < n; i++) {
@@ -98,7 +98,7 @@ fn farthest_disc(n: u32) -> u32 {
     return farthest;
 }
 
-// Returns the place of the nearest disc.
+// Returns the index of the nearest disc.
 fn nearest_disc() -> u32 {
     var nearest = 0u;
     for (var i = 1u; i < n_gathered; i++) {

@@ -23,14 +23,14 @@ var<private> passed: NearestHit;
 var<private> ray_behind: Ray;
 var<private> n_discs: u32;
 
-fn surface_hit_in_group(ray: Ray, searches: bool, local_idx: u32) -> SurfaceHit {
+fn surface_hit_in_group(ray: Ray, starts: bool, local_idx: u32) -> SurfaceHit {
     own_idx = local_idx;
     group_rays[own_idx] = ray;
     atomicStore(&least_distances[own_idx], NONE);
     passed = NearestHit(NO_LIMIT, NONE);
     ray_behind = ray;
     n_discs = 0u;
-    var is_searching = searches;
+    var is_searching = starts;
     loop {
         let n_rays = begin_round(is_searching);
         if n_rays == 0u {
@@ -44,7 +44,7 @@ fn surface_hit_in_group(ray: Ray, searches: bool, local_idx: u32) -> SurfaceHit 
         workgroupBarrier();
         is_searching = is_searching && atomicLoad(&least_distances[own_idx]) == NONE;
     }
-    if !searches {
+    if !starts {
         return missed_surface();
     }
     return own_hit(ray);
@@ -85,7 +85,8 @@ fn fit_near_discs() {
         if found.is_hit {
             let is_backface = select(0u, 1u, found.is_backface);
             hit = HitOnDisc(found.distance, found.normal, found.color.xyz, found.slot, found.radius, is_backface);
-            distance_bits = bitcast<u32>(noted_distances[own_idx]);
+            // Minus zero would count as the farthest.
+            distance_bits = bitcast<u32>(abs(noted_distances[own_idx]));
             atomicMin(&least_distances[ray_idx], distance_bits);
         }
     }

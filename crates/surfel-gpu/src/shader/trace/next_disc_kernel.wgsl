@@ -2,7 +2,7 @@
 // it: kernels that do one thing keep their state in registers, and more of them run at the same time.
 
 @compute @workgroup_size(WORKGROUP_SIZE)
-fn first_disc(@builtin(global_invocation_id) id: vec3<u32>) {
+fn next_disc(@builtin(global_invocation_id) id: vec3<u32>) {
     if atomicLoad(&counts[FIRST_TAKEN + task.queue]) <= id.x {
         return;
     }
@@ -10,7 +10,7 @@ fn first_disc(@builtin(global_invocation_id) id: vec3<u32>) {
     let ray_idx = ray_of_entry(id.x);
     var ray = visiting_ray(ray_idx);
     if task.round == 0u {
-        first_discs[ray_idx].passed_slot = NONE;
+        search_states[ray_idx].passed_slot = NONE;
     } else {
         ray.t_min = pass_disc(ray_idx, ray.direction);
     }
@@ -18,18 +18,18 @@ fn first_disc(@builtin(global_invocation_id) id: vec3<u32>) {
     if ray.t_min <= ray.t_max {
         nearest = closest_hit(ray);
     }
-    first_discs[ray_idx].slot = nearest.slot;
-    first_discs[ray_idx].distance = nearest.distance;
+    search_states[ray_idx].slot = nearest.slot;
+    search_states[ray_idx].distance = nearest.distance;
 }
 
 // Notes that a ray passed the disc of the last round. Returns the distance at which the search goes on.
 fn pass_disc(ray_idx: u32, direction: vec3<f32>) -> f32 {
-    let passed = NearestHit(first_discs[ray_idx].distance, first_discs[ray_idx].slot);
+    let passed = NearestHit(search_states[ray_idx].distance, search_states[ray_idx].slot);
     let disc = slot_point(passed.slot, vec3<f32>(0.0));
     let is_front = dot(disc.normal, direction) < 0.0;
-    if first_discs[ray_idx].passed_slot == NONE && (is_front || visits[visit_idx].has_front_sides == 0u) {
-        first_discs[ray_idx].passed_slot = passed.slot;
-        first_discs[ray_idx].passed_distance = passed.distance;
+    if search_states[ray_idx].passed_slot == NONE && (is_front || visits[visit_idx].has_front_sides == 0u) {
+        search_states[ray_idx].passed_slot = passed.slot;
+        search_states[ray_idx].passed_distance = passed.distance;
     }
     let behind = passed.distance + SMOOTH_RESTART_OFFSET * disc.radius;
     return max(behind, passed.distance * (1.0 + 2.0 * EPSILON));
