@@ -46,6 +46,7 @@ mod kernels;
 mod unsupported;
 mod mesh_blocks;
 mod gaussian_arrays;
+mod threads;
 mod transfer;
 mod upload;
 mod scene_records;

@@ -1,13 +1,11 @@
 //! The order of pixels on a device: neighbours in it are neighbours in the picture, so that their rays are alike.
 
 use crate::numbers::BAND_HEIGHT;
-use std::thread;
+use crate::threads::for_each;
 use surfel_core::image::Image;
 
-/// Maximum number of threads that set pixels.
-const MAX_THREADS: usize = 8;
-/// Number of pixels for which a thread is worth its start, which takes some ten microseconds.
-const PIXELS_OF_THREAD: usize = 1 << 16;
+/// Minimum number of pixels of a piece: for one, a thread is worth its start, which takes some ten microseconds.
+const PIXELS_OF_PIECE: usize = 1 << 16;
 
 /// The rows of a picture that are rendered. Their pixels are numbered in bands of `BAND_HEIGHT` rows, column by column, as
 /// `shader/render/key.wgsl` does.
@@ -45,29 +43,17 @@ impl PixelOrder {
 
 /// Sets the pixels of an image from number `first` on to colours with coverage as their fourth component.
 /// `background_alpha` is the alpha of the background.
-///
-/// As in [`transfer`](crate::transfer), threads are not those of rayon, which may begin another picture on this device.
 pub fn set_pixels(image: &mut Image, colors: &[[f32; 4]], first: usize, background_alpha: f32) {
     let part = PixelSpan { colors, first, width: image.width as usize, background_alpha };
     let band_len = part.band_len();
     let end = first + colors.len();
     let bands = first / band_len..end.div_ceil(band_len);
     let (start, end) = (bands.start * band_len, image.color.len().min(bands.end * band_len));
-    let max_threads = rayon::current_num_threads().min(MAX_THREADS);
-    let n_threads = (colors.len() / PIXELS_OF_THREAD).clamp(1, max_threads);
-    let len = band_len * bands.len().div_ceil(n_threads).max(1);
+    let len = band_len * PIXELS_OF_PIECE.div_ceil(band_len);
     let of_colors = image.color[start..end].chunks_mut(len);
     let of_coverage = image.coverage[start..end].chunks_mut(len);
-    let mut pieces = (start..end).step_by(len).zip(of_colors.zip(of_coverage));
-    let own = pieces.next();
-    thread::scope(|scope| {
-        for (start, (color, coverage)) in pieces {
-            scope.spawn(move || part.set_bands(start, color, coverage));
-        }
-        if let Some((start, (color, coverage))) = own {
-            part.set_bands(start, color, coverage);
-        }
-    });
+    let pieces = (start..end).step_by(len).zip(of_colors.zip(of_coverage)).collect();
+    for_each(pieces, |(start, (color, coverage))| part.set_bands(start, color, coverage));
 }
 
 /// The pixels of a part of a picture.
@@ -169,7 +155,7 @@ mod tests {
     fn pixels_come_to_their_places_in_several_threads() {
         for n_threads in [1, 2, 5] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
-            let n = 5 * PIXELS_OF_THREAD;
+            let n = 5 * PIXELS_OF_PIECE;
             pool.install(|| check_parts((701, 701), n + 3));
         }
     }

@@ -3,7 +3,7 @@
 use crate::device::Gpu;
 use crate::error::{Error, Result};
 use crate::numbers::NODE_VECTORS;
-use std::thread;
+use crate::threads::for_each;
 use surfel_core::bvh::BvhNode;
 
 /// Bytes of a node in the device's memory: five times sixteen, so that it is read in vectors of four words.
@@ -12,8 +12,6 @@ pub const NODE_BYTES: usize = 16 * NODE_VECTORS;
 const CHUNK_BYTES: usize = 1 << 24;
 /// Maximum number of bytes on their way to the device: one chunk is filled while the device copies the one before.
 pub const MAX_STAGING_BYTES: usize = 2 * CHUNK_BYTES;
-/// Maximum number of threads that fill a chunk. One copies about 10 GB/s, and few of them as much as the bus transfers.
-const MAX_THREADS: usize = 8;
 /// Bytes of a piece of a chunk: for one, a thread is worth its start, which takes some ten microseconds.
 const PIECE_BYTES: usize = 1 << 20;
 
@@ -51,30 +49,12 @@ impl Payload<'_> {
     }
 
     /// Copies bytes from `offset` on in several threads.
-    ///
-    /// These are threads of their own: a thread of rayon that waits for its tasks may begin another picture on this
-    /// device, which would wait for this one without end.
     fn copy_in_parallel(&self, offset: usize, target: wgpu::WriteOnly<[u8]>) {
         let (pieces, rest) = target.into_chunks::<PIECE_BYTES>();
-        let pieces = pieces.into_iter().enumerate();
-        let mut pieces: Vec<_> =
-            pieces.map(|(i, piece)| (offset + i * PIECE_BYTES, piece)).collect();
+        let pieces: Vec<_> = pieces.into_iter().enumerate().collect();
         let end = offset + pieces.len() * PIECE_BYTES;
-        let n_threads = rayon::current_num_threads().min(MAX_THREADS);
-        let n_of_thread = pieces.len().div_ceil(n_threads);
-        thread::scope(|scope| {
-            while n_of_thread < pieces.len() {
-                let last = pieces.split_off(pieces.len() - n_of_thread);
-                scope.spawn(move || self.copy_pieces(last));
-            }
-            self.copy_pieces(pieces);
-            self.copy(end, rest);
-        });
-    }
-
-    /// Copies bytes to pieces, each from its offset on.
-    fn copy_pieces(&self, pieces: Vec<(usize, wgpu::WriteOnly<[u8; PIECE_BYTES]>)>) {
-        pieces.into_iter().for_each(|(offset, piece)| self.copy(offset, piece.into()));
+        for_each(pieces, |(i, piece)| self.copy(offset + i * PIECE_BYTES, piece.into()));
+        self.copy(end, rest);
     }
 }
 
