@@ -33,7 +33,7 @@ const LARGE_MEMORY: u64 = 30 << 30;
 /// Number of entries of a queue for each pixel, where paths have branches. A part whose paths have more is rendered
 /// again in smaller parts.
 const ENTRIES_PER_PIXEL: u32 = 4;
-/// Minimum number of entries of a queue, where paths have branches.
+/// Minimum number of entries of a queue, where paths have branches or the memory is small.
 const MIN_ENTRIES: u32 = 1 << 14;
 /// Number of wavefronts after which the CPU asks whether any path is left. Passes over empty queues cost next to nothing.
 const WAVES_AT_ONCE: usize = 4;
@@ -195,11 +195,33 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// Returns the sizes of the arrays of a picture with this number of pixels.
-    pub fn sizes(gpu: &Gpu, scene: &FlatScene, passes: &Passes, n_pixels: u32) -> Capacities {
+    /// Returns the sizes of the arrays of a picture with this number of pixels: the largest that fit the memory, or else
+    /// the smallest that are sensible.
+    pub fn sizes(
+        gpu: &Gpu,
+        scene: &FlatScene,
+        passes: &Passes,
+        n_pixels: u32,
+        mut fits_memory: impl FnMut(Capacities) -> bool,
+    ) -> Capacities {
+        let mut max_entries = max_entries(gpu);
+        loop {
+            let sizes = Self::sizes_up_to(max_entries, scene, passes, n_pixels);
+            if sizes.n_entries <= MIN_ENTRIES || fits_memory(sizes) {
+                return sizes;
+            }
+            max_entries = u64::from(sizes.n_entries / 2);
+        }
+    }
+
+    fn sizes_up_to(
+        max_entries: u64,
+        scene: &FlatScene,
+        passes: &Passes,
+        n_pixels: u32,
+    ) -> Capacities {
         let n_pixels = u64::from(n_pixels);
         let has_waves = passes.next_wave.is_some();
-        let max_entries = max_entries(gpu);
         let (wanted, per_pixel) = match has_waves {
             true => {
                 let per_pixel = u64::from(ENTRIES_PER_PIXEL);

@@ -143,10 +143,12 @@ impl Renderer for GpuRenderer {
         let mut state = self.state();
         let State { kernels, uploads, words, arrays, part_size, times } = &mut *state;
         let passes = Passes::new(scene, settings);
-        // Pictures have at most 2^28 pixels.
-        let sizes = Job::sizes(&self.gpu, scene, &passes, settings.width * region.n_rows());
         let bytes = |sizes| picture_bytes(scene, &passes, sizes);
-        let fits_memory = |sizes| uploads.fits_memory(&self.gpu, &scene.geometries, bytes(sizes));
+        let mut fits_memory =
+            |sizes| uploads.fits_memory(&self.gpu, &scene.geometries, bytes(sizes));
+        // Pictures have at most 2^28 pixels.
+        let n_pixels = settings.width * region.n_rows();
+        let sizes = Job::sizes(&self.gpu, scene, &passes, n_pixels, &mut fits_memory);
         let found = Arrays::free_unless_fitting(arrays, &self.gpu, sizes, fits_memory)?;
         uploads.update(&self.gpu, &scene.geometries, bytes(found))?;
         let is_paged = |tree| uploads.tree(&scene.geometries, tree).is_some_and(GpuTree::is_paged);

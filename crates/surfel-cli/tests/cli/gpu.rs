@@ -82,13 +82,13 @@ fn the_memory_limit_holds_for_the_memory_of_a_gpu() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(10));
     let picture = folder.path("out.png");
-    // The queues of a picture take more than the picture, of which there is enough on the CPU.
-    let size = ["--resolution", "400x300", "--spp", "1", "--memory-limit", "20M"];
-    let render = |backend| {
+    // The queues of a picture take more than the picture, for which the limit is enough on the CPU.
+    let render = |backend, resolution, limit| {
+        let size = ["--resolution", resolution, "--spp", "1", "--memory-limit", limit];
         let words = ["render", &cloud, "-o", &picture, "--backend", backend];
         command(&[&words[..], &size].concat()).output().unwrap()
     };
-    let refused = render("gpu");
+    let refused = render("gpu", "120x120", "2M");
     let text = String::from_utf8_lossy(&refused.stderr);
     assert_eq!(refused.status.code(), Some(1), "{text}");
     if text.contains("no GPU was found") {
@@ -100,10 +100,12 @@ fn the_memory_limit_holds_for_the_memory_of_a_gpu() {
     }
     // Lines about what was chosen come before.
     let error = text.lines().last().unwrap_or_default();
-    let expected = " of memory are needed, and --memory-limit is 20.0 MiB";
+    let expected = " of memory are needed, and --memory-limit is 2.0 MiB";
     assert!(error.starts_with("error: ") && error.ends_with(expected), "{text}");
     assert_eq!(folder.names(), ["dome.ply"]);
-    assert!(render("cpu").status.success());
+    assert!(render("cpu", "120x120", "2M").status.success());
+    // Under this limit the queues are shorter than the picture.
+    assert!(render("gpu", "400x300", "20M").status.success());
 }
 
 #[test]
