@@ -111,7 +111,7 @@ mod tests {
     //! Kernels have names in words, and their times are sums.
 
     use super::*;
-    use crate::shader::Surface;
+    use crate::surface::Surface;
 
     #[test]
     fn names_are_words() {

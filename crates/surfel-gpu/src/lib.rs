@@ -40,6 +40,7 @@ pub mod numbers;
 pub mod records;
 mod field_arrays;
 mod constants;
+mod surface;
 pub mod shader;
 mod device;
 mod kernels;

@@ -1,6 +1,7 @@
 //! The passes of a search in a tree: whole, or first near single discs of each ray and then behind them.
 
-use crate::shader::{Kernel, Surface};
+use crate::shader::Kernel;
+use crate::surface::Surface;
 
 /// Number of rounds in which the nearest discs of rays are tested. Rays that are undecided then have many discs, which
 /// their workgroups test together.

@@ -4,7 +4,7 @@ use crate::gaussian_arrays::gaussian_places;
 use crate::mesh_blocks::{attributes, block_vectors};
 use crate::numbers::{NODE_VECTORS, TRIANGLE, align_number, attribute, surface_number};
 use crate::records::Visit;
-use crate::shader::Surface;
+use crate::surface::Surface;
 use crate::unsupported::trees;
 use crate::upload::TreeRef;
 use std::collections::BTreeMap;

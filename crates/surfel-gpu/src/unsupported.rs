@@ -1,7 +1,7 @@
 //! The features of scenes that no kernel draws yet.
 
 use crate::numbers::MAX_PLANES;
-use crate::shader::Surface;
+use crate::surface::Surface;
 use surfel_core::flat::{FlatCloud, FlatGeometry, FlatScene};
 use surfel_core::surface::SurfaceKind;
 
