@@ -333,19 +333,7 @@ mod tests {
     //! Devices are chosen by index and by name, limits are checked, and failures are errors.
 
     use super::*;
-
-    fn open() -> Option<Gpu> {
-        match Gpu::open(None, u64::MAX) {
-            Ok(gpu) => Some(gpu),
-            Err(error) => {
-                #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
-                {
-                    println!("skipped: {error}");
-                }
-                None
-            }
-        }
-    }
+    use crate::test_support::open_gpu;
 
     fn device(name: &str, kind: DeviceKind) -> DeviceInfo {
         DeviceInfo {
@@ -398,7 +386,7 @@ mod tests {
 
     #[test]
     fn memory_is_checked_against_the_device_and_the_limit() {
-        let Some(mut gpu) = open() else { return };
+        let Some(mut gpu) = open_gpu() else { return };
         gpu.info.memory_bytes = None;
         assert_eq!(gpu.check_memory(u64::MAX), Ok(()));
         gpu.info.memory_bytes = Some(2 << 30);
@@ -416,7 +404,7 @@ mod tests {
 
     #[test]
     fn what_a_driver_refuses_is_an_error_with_its_name() {
-        let Some(gpu) = open() else { return };
+        let Some(gpu) = open_gpu() else { return };
         let source = wgpu::ShaderSource::Wgsl("fn f() -> u32 { return 1.5; }".into());
         let description = wgpu::ShaderModuleDescriptor { label: None, source };
         let error =

@@ -66,6 +66,8 @@ mod picture_memory;
 mod job;
 mod ray_timing;
 mod renderer;
+#[cfg(test)]
+mod test_support;
 
 pub use device::{DeviceInfo, DeviceKind, devices};
 pub use error::{Error, Result};

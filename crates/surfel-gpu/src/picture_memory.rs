@@ -40,46 +40,24 @@ mod tests {
     //! The estimate is what the device's allocator counts.
 
     use super::*;
-    use crate::device::Gpu;
     use crate::kernels::Kernels;
     use crate::scene_records::SceneRecords;
+    use crate::test_support::{empty_scene, open_gpu, report_skipped};
     use crate::wavefront::{Arrays, Contents, Wavefront, written};
-    use surfel_core::math::DVec3;
-    use surfel_core::progress::NoProgress;
-    use surfel_core::scene::{Background, Camera, Graph, Projection, Scene};
-
-    fn empty() -> FlatScene {
-        let camera = Camera {
-            position: DVec3::ZERO,
-            focal_point: DVec3::Y,
-            view_up: DVec3::Z,
-            projection: Projection::Panorama,
-        };
-        let (graph, background) = (Graph::default(), Background::Transparent);
-        let scene = Scene { graph, lights: Vec::new(), background, camera };
-        FlatScene::new(&scene, &NoProgress).unwrap()
-    }
 
     #[test]
     fn the_estimate_is_what_is_allocated() {
-        let gpu = match Gpu::open(None, u64::MAX) {
-            Ok(gpu) => gpu,
-            Err(error) => {
-                #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
-                {
-                    println!("skipped: {error}");
-                }
-                return;
-            }
-        };
+        let Some(gpu) = open_gpu() else { return };
         let allocated = || Some(gpu.device.generate_allocator_report()?.total_allocated_bytes);
-        let (kernels, scene) = (Kernels::new(&gpu).unwrap(), empty());
+        let (kernels, scene) = (Kernels::new(&gpu).unwrap(), empty_scene());
         let words = written(&gpu, "textures", &[0; 4], wgpu::BufferUsages::STORAGE).unwrap();
         for (has_waves, is_transmissive) in [(false, false), (true, false), (true, true)] {
             let sizes =
                 Capacities { n_pixels: 1 << 16, n_entries: 1 << 18, has_waves, is_transmissive };
             let estimate = picture_bytes(&scene, &Passes::default(), sizes);
-            let Some(before) = allocated() else { return };
+            let Some(before) = allocated() else {
+                return report_skipped("the device does not report its memory");
+            };
             let records = SceneRecords::empty();
             let contents = Contents { scene: &records, words: &words, tasks: &[0; 256] };
             let mut arrays = None;

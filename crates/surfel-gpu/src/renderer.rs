@@ -187,36 +187,15 @@ mod tests {
     //! A lost device is an error.
 
     use super::*;
+    use crate::test_support::{empty_scene, open_renderer};
     use surfel_core::Error as CoreError;
-    use surfel_core::math::DVec3;
     use surfel_core::progress::NoProgress;
-    use surfel_core::scene::{Background, Camera, Graph, Projection, Scene};
-
-    fn empty() -> FlatScene {
-        let camera = Camera {
-            position: DVec3::ZERO,
-            focal_point: DVec3::Y,
-            view_up: DVec3::Z,
-            projection: Projection::Panorama,
-        };
-        let (graph, background) = (Graph::default(), Background::Transparent);
-        let scene = Scene { graph, lights: Vec::new(), background, camera };
-        FlatScene::new(&scene, &NoProgress).unwrap()
-    }
 
     #[test]
     fn a_device_that_is_lost_is_an_error_for_ever() {
-        let renderer = match GpuRenderer::open(None) {
-            Ok(renderer) => renderer,
-            Err(error) => {
-                #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
-                {
-                    println!("skipped: {error}");
-                }
-                return;
-            }
-        };
-        let (scene, settings) = (empty(), Settings { width: 8, height: 4, ..Settings::default() });
+        let Some(renderer) = open_renderer() else { return };
+        let (scene, settings) =
+            (empty_scene(), Settings { width: 8, height: 4, ..Settings::default() });
         let render = || renderer.render(&scene, &settings, &NoProgress);
         assert!(render().is_ok());
         renderer.gpu.device.destroy();
@@ -228,12 +207,12 @@ mod tests {
     }
 
     #[test]
-    fn arrays_of_larger_pictures_free_unless_fitting() {
-        let Ok(renderer) = GpuRenderer::open(None) else { return };
+    fn arrays_of_larger_pictures_are_freed_where_memory_is_short() {
+        let Some(renderer) = open_renderer() else { return };
         let small = Settings { width: 8, height: 4, ..Settings::default() };
         let large = Settings { width: 64, height: 64, ..small };
         let render = |renderer: &GpuRenderer, settings: &Settings| {
-            renderer.render(&empty(), settings, &NoProgress).map(|_| {
+            renderer.render(&empty_scene(), settings, &NoProgress).map(|_| {
                 let state = renderer.state();
                 state.arrays.as_ref().map(|arrays| arrays.sizes().n_pixels)
             })
@@ -254,10 +233,10 @@ mod tests {
                 self.0.destroy();
             }
         }
-        let Ok(renderer) = GpuRenderer::open(None) else { return };
+        let Some(renderer) = open_renderer() else { return };
         let settings = Settings { width: 8, height: 4, ..Settings::default() };
         let loss = Loss(renderer.gpu.device.clone());
-        let error = renderer.render(&empty(), &settings, &loss).unwrap_err();
+        let error = renderer.render(&empty_scene(), &settings, &loss).unwrap_err();
         let CoreError::Renderer(reason) = &error else { panic!("{error}") };
         assert!(reason.starts_with(&renderer.device().name), "{reason}");
     }

@@ -117,22 +117,10 @@ mod tests {
     //! Bytes arrive as they were sent, also in arrays that begin amid a node.
 
     use super::*;
+    use crate::test_support::open_gpu;
     use bytemuck::Zeroable;
     use std::sync::mpsc;
     use wgpu::BufferUsages as Usage;
-
-    fn open() -> Option<Gpu> {
-        match Gpu::open(None, u64::MAX) {
-            Ok(gpu) => Some(gpu),
-            Err(error) => {
-                #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
-                {
-                    println!("skipped: {error}");
-                }
-                None
-            }
-        }
-    }
 
     fn read(gpu: &Gpu, buffer: &wgpu::Buffer) -> Vec<u8> {
         let target = gpu.buffer("read", buffer.size(), Usage::MAP_READ | Usage::COPY_DST).unwrap();
@@ -149,7 +137,7 @@ mod tests {
 
     #[test]
     fn arrays_hold_what_was_sent() {
-        let Some(gpu) = open() else { return };
+        let Some(gpu) = open_gpu() else { return };
         let node = |i: u32| {
             let mut node = BvhNode::zeroed();
             bytemuck::bytes_of_mut(&mut node).fill(i as u8);
@@ -183,7 +171,7 @@ mod tests {
 
     #[test]
     fn a_device_lost_amid_a_transfer_is_an_error() {
-        let Some(gpu) = open() else { return };
+        let Some(gpu) = open_gpu() else { return };
         let bytes = vec![0; 2 * CHUNK_BYTES];
         let usage = Usage::STORAGE | Usage::COPY_DST;
         let buffer = gpu.buffer("test", bytes.len() as u64, usage).unwrap();
