@@ -82,7 +82,8 @@ impl Passes {
         passes.visits = visits;
         passes.camera = passes.camera_passes(ray_kind::PRIMARY);
         passes.trace = passes.trace_passes(&trees);
-        let light = passes.gaussian_pass(Kernel::Gaussians, queue::PATHS, &gaussians);
+        let light =
+            passes.tree_pass(Kernel::Gaussians, TreeRef::Gaussians, &gaussians, queue::PATHS);
         passes.trace.extend(light);
         let shade = passes.pass(Kernel::Shade, Size::Queue(queue::PATHS), Task::default());
         let mut once = vec![shade];
@@ -120,7 +121,8 @@ impl Passes {
         self.camera.iter().chain(&self.trace).chain(shade).chain(last).chain(aovs)
     }
 
-    fn pass(&mut self, kernel: Kernel, size: Size, task: Task) -> Pass {
+    /// Returns a pass without a tree.
+    pub fn pass(&mut self, kernel: Kernel, size: Size, task: Task) -> Pass {
         let task_offset = self.tasks.len() as u32;
         self.tasks.extend_from_slice(bytemuck::bytes_of(&task));
         self.tasks.resize(task_offset as usize + RECORD_STRIDE as usize, 0);
@@ -131,81 +133,70 @@ impl Passes {
     fn tree_pass(
         &mut self,
         kernel: Kernel,
-        tree: &TreeInstances,
-        visits: Range<u32>,
+        tree: TreeRef,
+        visits: &Range<u32>,
         queue: u32,
     ) -> Option<Pass> {
-        let n_visits = visits.end - visits.start;
-        let task = Task { queue, first_visit: visits.start, n_visits, ..Task::default() };
         let is_of_light = queue == queue::LIGHT_RAYS;
-        (0 < n_visits).then(|| Pass {
-            tree: Some(tree.tree),
-            is_of_light,
-            ..self.pass(kernel, Size::Queue(queue), task)
-        })
+        (!visits.is_empty())
+            .then(|| Pass { is_of_light, ..self.round_pass(kernel, tree, visits, (queue, 0)) })
     }
 
-    /// Returns the pass of paths, or of rays toward lights, over trained Gaussians; none without any.
-    fn gaussian_pass(&mut self, kernel: Kernel, queue: u32, visits: &Range<u32>) -> Option<Pass> {
-        let n_visits = visits.end - visits.start;
-        let task = Task { queue, first_visit: visits.start, n_visits, ..Task::default() };
-        (0 < n_visits).then(|| Pass {
-            tree: Some(TreeRef::Gaussians),
-            is_of_light: queue == queue::LIGHT_RAYS,
-            ..self.pass(kernel, Size::Queue(queue), task)
-        })
-    }
-
-    /// Returns the passes of a search in a tree.
-    fn search(
+    /// Returns the pass of a round of a search over these instances of a tree.
+    fn round_pass(
         &mut self,
-        tree: &TreeInstances,
-        visits: Range<u32>,
+        kernel: Kernel,
+        tree: TreeRef,
+        visits: &Range<u32>,
+        (queue, round): (u32, u32),
+    ) -> Pass {
+        let n_visits = visits.end - visits.start;
+        let task = Task { queue, round, first_visit: visits.start, n_visits, ..Task::default() };
+        Pass { tree: Some(tree), ..self.pass(kernel, Size::Queue(queue), task) }
+    }
+
+    /// Returns the passes of a search along the rays of a queue over instances of a tree.
+    pub fn search(
+        &mut self,
+        steps: &[SearchStep],
+        tree: TreeRef,
+        visits: &Range<u32>,
         queue: u32,
-        search: &SearchKernels,
     ) -> Vec<Pass> {
-        let mut passes = Vec::new();
-        for step in search.steps(tree.surface, visits.len()) {
-            match step {
-                SearchStep::Search { kernel, round } => {
-                    let pass = self.tree_pass(kernel, tree, visits.clone(), queue);
-                    let Some(mut pass) = pass else { continue };
-                    if round != 0 {
-                        self.set_round(&mut pass, round);
-                    }
-                    passes.push(pass);
-                }
-                SearchStep::Take => {
-                    let is_of_light = queue == queue::LIGHT_RAYS;
-                    let take = self.take(queue::UNDECIDED, ray_kind::UNCOUNTED);
-                    passes.push(Pass { is_of_light, ..take });
-                }
+        let is_of_light = queue == queue::LIGHT_RAYS;
+        let pass = |step: &SearchStep| match *step {
+            SearchStep::Search { kernel, round } => {
+                let queue = if round == 0 { queue } else { queue::UNDECIDED };
+                self.round_pass(kernel, tree, visits, (queue, round))
             }
+            SearchStep::Take => self.take(queue::UNDECIDED, ray_kind::UNCOUNTED),
+        };
+        steps.iter().map(pass).map(|pass| Pass { is_of_light, ..pass }).collect()
+    }
+
+    /// Returns the passes of a search in a tree with the kernels of its surface.
+    fn tree_search(
+        &mut self,
+        kernels: &SearchKernels,
+        tree: &TreeInstances,
+        visits: &Range<u32>,
+        queue: u32,
+    ) -> Vec<Pass> {
+        let steps = kernels.steps(tree.surface, visits.len());
+        self.search(&steps, tree.tree, visits, queue)
+    }
+
+    /// Returns the passes that find hits, and the points behind them where these give the colour.
+    fn closest(&mut self, tree: &TreeInstances, visits: &Range<u32>, queue: u32) -> Vec<Pass> {
+        let mut passes = self.tree_search(&CLOSEST, tree, visits, queue);
+        if tree.has_support_colors {
+            passes.extend(self.tree_pass(Kernel::Support(tree.surface), tree.tree, visits, queue));
         }
         passes
     }
 
-    /// Lets a pass of a search go over the rays that are undecided after the round before.
-    fn set_round(&mut self, pass: &mut Pass, round: u32) {
-        let at = pass.task_offset as usize;
-        let task: &mut Task = bytemuck::from_bytes_mut(&mut self.tasks[at..at + size_of::<Task>()]);
-        (task.queue, task.round) = (queue::UNDECIDED, round);
-        pass.size = Size::Queue(queue::UNDECIDED);
-    }
-
-    /// Returns the passes that find hits, and the points behind them where these give the colour.
-    fn closest(&mut self, tree: &TreeInstances, visits: Range<u32>, queue: u32) -> Vec<Pass> {
-        let mut passes = self.search(tree, visits.clone(), queue, &CLOSEST);
-        let support = tree.has_support_colors;
-        passes.extend(
-            support
-                .then(|| self.tree_pass(Kernel::Support(tree.surface), tree, visits, queue))
-                .flatten(),
-        );
-        passes
-    }
-
-    fn take(&mut self, queue: u32, ray_kind: u32) -> Pass {
+    /// Returns the pass that takes a queue.
+    pub fn take(&mut self, queue: u32, ray_kind: u32) -> Pass {
         self.pass(Kernel::TakeQueue, Size::One, Task { queue, ray_kind, ..Task::default() })
     }
 
@@ -218,7 +209,7 @@ impl Passes {
         let task = Task { queue: queue::PATHS, ..Task::default() };
         let mut passes = vec![self.pass(Kernel::ClearHits, Size::Queue(queue::PATHS), task)];
         for tree in trees {
-            passes.extend(self.closest(tree, tree.all(), queue::PATHS));
+            passes.extend(self.closest(tree, &tree.all(), queue::PATHS));
         }
         passes
     }
@@ -236,9 +227,14 @@ impl Passes {
         let of_light = |pass: Pass| Pass { is_of_light: true, ..pass };
         once.push(of_light(self.pass(Kernel::TakeQueue, Size::One, task)));
         for tree in trees {
-            once.extend(self.search(tree, tree.opaque.clone(), queue::LIGHT_RAYS, &ANY));
+            once.extend(self.tree_search(&ANY, tree, &tree.opaque, queue::LIGHT_RAYS));
         }
-        once.extend(self.gaussian_pass(Kernel::GaussianShadow, queue::LIGHT_RAYS, gaussians));
+        once.extend(self.tree_pass(
+            Kernel::GaussianShadow,
+            TreeRef::Gaussians,
+            gaussians,
+            queue::LIGHT_RAYS,
+        ));
         if !scene.is_transmissive {
             once.push(of_light(self.pass(Kernel::AddLight, size, task)));
             return;
@@ -247,7 +243,7 @@ impl Passes {
         self.shade.push(PassStage::Once(std::mem::take(once)));
         let mut surfaces = Vec::new();
         for tree in trees {
-            surfaces.extend(self.closest(tree, tree.transmissive.clone(), queue::LIGHT_RAYS));
+            surfaces.extend(self.closest(tree, &tree.transmissive, queue::LIGHT_RAYS));
         }
         surfaces.push(of_light(self.pass(Kernel::PassSurface, size, task)));
         self.shade.push(PassStage::Surfaces(surfaces));
@@ -270,15 +266,17 @@ impl Passes {
             self.aov_hits = self.camera_passes(kind);
             let trace = self.trace_passes(trees);
             self.aov_hits.extend(trace);
-            let hits = self.gaussian_pass(Kernel::GaussianHits, queue::PATHS, gaussians);
+            let hits =
+                self.tree_pass(Kernel::GaussianHits, TreeRef::Gaussians, gaussians, queue::PATHS);
             self.aov_hits.extend(hits);
         }
         for tree in trees.iter().filter(|tree| tree.surface != Surface::Triangle) {
-            let support =
-                self.tree_pass(Kernel::Support(tree.surface), tree, tree.all(), queue::PATHS);
+            let kernel = Kernel::Support(tree.surface);
+            let support = self.tree_pass(kernel, tree.tree, &tree.all(), queue::PATHS);
             self.aov_supports.extend(support);
         }
-        let support = self.gaussian_pass(Kernel::GaussianSupport, queue::PATHS, gaussians);
+        let support =
+            self.tree_pass(Kernel::GaussianSupport, TreeRef::Gaussians, gaussians, queue::PATHS);
         self.aov_supports.extend(support);
     }
 }

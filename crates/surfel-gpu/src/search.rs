@@ -51,11 +51,14 @@ pub enum SearchStep {
 }
 
 impl SearchKernels {
-    /// Returns the steps of a search in a tree with this surface and number of instances. Most rays end near the first
+    /// Returns the steps of a search in a tree with this surface and number of instances, none without any. Most rays end near the first
     /// disc that is found. Kernels that find a disc or test it have far less state than those that search all along a
     /// ray, so a device runs more of them at the same time.
     pub fn steps(&self, surface: Surface, n_instances: usize) -> Vec<SearchStep> {
         let whole = |round| SearchStep::Search { kernel: (self.whole)(surface), round };
+        if n_instances == 0 {
+            return Vec::new();
+        }
         if n_instances != 1 || !surface.tests_first_disc(self.is_any) {
             return vec![whole(0)];
         }
