@@ -1,7 +1,9 @@
 //! Devices: the list of them, and one opened for work.
 
 use crate::error::{Error, Result};
-use crate::numbers::{MAX_QUEUE_ENTRIES, N_BLOCK_PAGES, N_NODE_PAGES, WORKGROUP_SIZE};
+use crate::numbers::{
+    MAX_QUEUE_ENTRIES, N_BLOCK_PAGES, N_NODE_PAGES, VECTOR_BYTES, WORKGROUP_SIZE,
+};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -50,8 +52,6 @@ impl DeviceKind {
     }
 }
 
-/// Bytes of a vector of four words.
-const VECTOR_BYTES: u64 = 16;
 /// Number of storage buffers that a kernel uses at most, where trees are whole.
 const N_STORAGE_BUFFERS: u64 = 11;
 /// The features by which the time of each pass can be measured.
@@ -201,7 +201,7 @@ impl Gpu {
 
     /// Returns the number of bytes in a page of a tree.
     pub fn page_bytes(&self) -> usize {
-        (VECTOR_BYTES as usize) << self.page_shift
+        VECTOR_BYTES << self.page_shift
     }
 
     /// Returns true if the device allows kernels that read a tree in pages.
@@ -297,7 +297,7 @@ impl Gpu {
 
 /// Returns the binary logarithm of the number of vectors in the largest page of at most `max_bytes`.
 fn page_shift(max_bytes: u64) -> u32 {
-    (max_bytes / VECTOR_BYTES).max(1).ilog2()
+    (max_bytes / VECTOR_BYTES as u64).max(1).ilog2()
 }
 
 fn keep_first(first: &Mutex<Option<Error>>, error: Error) {
@@ -378,7 +378,7 @@ mod tests {
     #[test]
     fn pages_hold_a_hundred_million_points() {
         // Devices whose arrays end at 2 GiB - 1 have pages of 1 GiB.
-        let page_bytes = VECTOR_BYTES << page_shift(i32::MAX as u64);
+        let page_bytes = (VECTOR_BYTES as u64) << page_shift(i32::MAX as u64);
         assert_eq!(page_bytes, 1 << 30);
         assert!(100_000_000 / 8 * 128 <= N_BLOCK_PAGES as u64 * page_bytes);
         assert_eq!(VECTOR_BYTES << page_shift(1 << 27), 1 << 27);

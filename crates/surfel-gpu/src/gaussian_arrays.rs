@@ -1,12 +1,10 @@
 //! The trained Gaussians of all clouds of a scene in one tree of a device: rays composite them together.
 
+use crate::numbers::VECTOR_BYTES;
 use std::sync::Arc;
 use surfel_core::bvh::BvhNode;
 use surfel_core::flat::{BlockTree, FlatGaussians, FlatGeometry, GaussianBlock};
 use surfel_core::math::LANES;
-
-/// Bytes of a vector of four words.
-const VECTOR_BYTES: usize = 16;
 
 /// The place of a cloud's Gaussians in the arrays of all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -11,10 +11,9 @@ use crate::passes::{Pass, PassStage, Passes};
 use crate::pixel_order::{PixelOrder, set_pixels};
 use crate::records::{FrameRecord, HitRecord};
 use crate::scene_records::{SceneRecords, frame};
-use crate::submitter::{Bound, BoundTree, Submitter};
-use crate::upload::{TreeRef, Uploads};
-use crate::wavefront::{Arrays, Capacities, Contents, Counts, PartReadback, Wavefront, written};
-use std::collections::{BTreeMap, BTreeSet};
+use crate::submitter::{Bound, Submitter, bind_trees};
+use crate::upload::Uploads;
+use crate::wavefront::{Arrays, Capacities, Contents, PartReadback, Wavefront};
 use std::time::Instant;
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
@@ -92,7 +91,6 @@ struct Part<'a> {
     first: u32,
     n_pixels: u32,
     start: Instant,
-    kernels: Option<wgpu::SubmissionIndex>,
     readback: PartReadback<'a>,
 }
 
@@ -132,7 +130,12 @@ impl Job<'_> {
         let contents = Contents { scene: records, words, tasks: &self.passes.tasks };
         let arrays = Arrays::update(state.arrays, gpu, sizes)?;
         let wavefront = &Wavefront::new(gpu, self.kernels, arrays, contents)?;
-        let bound = Bound { kernels: self.kernels, wavefront, trees: &self.bind_trees()? };
+        let trees = |tree| self.uploads.tree(&self.scene.geometries, tree);
+        let bound = Bound {
+            kernels: self.kernels,
+            wavefront,
+            trees: &bind_trees(gpu, self.kernels, trees, &self.passes)?,
+        };
         let mut submitter = Submitter::new(gpu, bound, state.times, progress)?;
         let mut picture = Picture {
             source: AovSource { scene: self.scene, view: &view },
@@ -146,7 +149,7 @@ impl Job<'_> {
         let (capacity, n_samples) = (sizes.n_entries, region.n_samples());
         let frame = frame(self.scene, &view, settings);
         let frame = FrameRecord { capacity, n_samples, first_row, n_rows, ..frame };
-        self.render_parts(&mut submitter, wavefront, frame, &mut picture)?;
+        self.render_parts(&mut submitter, frame, &mut picture)?;
         let Picture { image, mut stats, .. } = picture;
         stats.trace_secs = submitter.primary_secs;
         stats.frame_secs = start.elapsed().as_secs_f64();
@@ -157,10 +160,10 @@ impl Job<'_> {
     fn render_parts(
         &self,
         submitter: &mut Submitter,
-        wavefront: &Wavefront,
         frame: FrameRecord,
         picture: &mut Picture,
     ) -> surfel_core::Result<()> {
+        let wavefront = submitter.wavefront();
         let n_pixels = picture.order.n_pixels();
         let mut max_part = self.sizes.n_pixels;
         let (mut first_pixel, mut parity) = (0, 0);
@@ -169,14 +172,13 @@ impl Job<'_> {
             let n_rays = (*picture.part_size).min(max_part).min(n_pixels - first_pixel);
             let frame = FrameRecord { first_pixel, n_rays, ..frame };
             let start = Instant::now();
-            if self.submit_part(submitter, wavefront, frame)? == Outcome::Overflow {
+            if self.submit_part(submitter, frame)? == Outcome::Overflow {
                 max_part = self.smaller_part(n_rays)?;
                 continue;
             }
-            self.add_aovs(submitter, wavefront, frame, picture)?;
-            let kernels = submitter.last().cloned();
+            self.add_aovs(submitter, frame, picture)?;
             let readback = wavefront.request_part(self.gpu, n_rays, parity);
-            let part = Part { first: first_pixel, n_pixels: n_rays, start, kernels, readback };
+            let part = Part { first: first_pixel, n_pixels: n_rays, start, readback };
             // While the CPU takes a part, the device works on the next one.
             if let Some(before) = working.replace(part) {
                 self.take_part(before, picture)?;
@@ -185,7 +187,7 @@ impl Job<'_> {
             parity = 1 - parity;
         }
         if let Some(last) = working {
-            if let Some(kernels) = &last.kernels {
+            if let Some(kernels) = submitter.last() {
                 self.gpu.wait_for(kernels)?;
             }
             let finish = Instant::now();
@@ -238,23 +240,6 @@ impl Job<'_> {
         }
     }
 
-    /// Binds the trees that passes read, together with the records of their instances.
-    fn bind_trees(&self) -> Result<BTreeMap<TreeRef, BoundTree>> {
-        let mut visits = self.passes.visits.clone();
-        visits.resize_with(visits.len().max(1), bytemuck::Zeroable::zeroed);
-        let bytes = bytemuck::cast_slice(&visits);
-        let visits = written(self.gpu, "instances", bytes, wgpu::BufferUsages::STORAGE)?;
-        let mut bound = BTreeMap::new();
-        let trees: BTreeSet<TreeRef> = self.passes.all().filter_map(|pass| pass.tree).collect();
-        for tree in trees {
-            let Some(arrays) = self.uploads.tree(&self.scene.geometries, tree) else { continue };
-            let bind = || arrays.bind(self.gpu, self.kernels, &visits);
-            let group = self.gpu.catch("a tree", bind)?;
-            bound.insert(tree, BoundTree { group, is_paged: arrays.is_paged() });
-        }
-        Ok(bound)
-    }
-
     /// Returns the number of pixels of the parts after one of `n_pixels` whose paths did not fit the queues.
     fn smaller_part(&self, n_pixels: u32) -> Result<u32> {
         if n_pixels == 1 {
@@ -269,9 +254,9 @@ impl Job<'_> {
     fn submit_part(
         &self,
         submitter: &mut Submitter,
-        wavefront: &Wavefront,
         frame: FrameRecord,
     ) -> surfel_core::Result<Outcome> {
+        let wavefront = submitter.wavefront();
         submitter.n_pixels = frame.n_rays;
         wavefront.clear_counts(self.gpu);
         for sample_idx in self.region.samples.0..self.region.samples.1 {
@@ -279,7 +264,7 @@ impl Job<'_> {
             submitter.flush()?;
             let is_first = (sample_idx == self.region.samples.0).into();
             wavefront.set_frame(self.gpu, &FrameRecord { sample_idx, is_first, ..frame });
-            if self.submit_sample(submitter, wavefront, frame.capacity)? == Outcome::Overflow {
+            if self.submit_sample(submitter)? == Outcome::Overflow {
                 return Ok(Outcome::Overflow);
             }
         }
@@ -289,12 +274,7 @@ impl Job<'_> {
     }
 
     /// Gives a sample to the device, some wavefronts at once.
-    fn submit_sample(
-        &self,
-        submitter: &mut Submitter,
-        wavefront: &Wavefront,
-        capacity: u32,
-    ) -> surfel_core::Result<Outcome> {
+    fn submit_sample(&self, submitter: &mut Submitter) -> surfel_core::Result<Outcome> {
         submitter.parity = 0;
         submitter.add(&self.passes.camera)?;
         submitter.is_primary = true;
@@ -305,16 +285,14 @@ impl Job<'_> {
             for stage in &self.passes.shade {
                 match stage {
                     PassStage::Once(passes) => submitter.add(passes)?,
-                    PassStage::Surfaces(passes) => {
-                        self.submit_surfaces(submitter, wavefront, passes)?;
-                    }
+                    PassStage::Surfaces(passes) => submit_surfaces(submitter, passes)?,
                 }
             }
             let Some(next_wave) = &self.passes.next_wave else { return Ok(Outcome::Done) };
             n_waves += 1;
             if n_waves % WAVES_AT_ONCE == 0 {
-                let counts = self.read_counts(submitter, wavefront)?;
-                if capacity < counts.max_added() {
+                let counts = submitter.read_counts()?;
+                if self.sizes.n_entries < counts.max_added() {
                     return Ok(Outcome::Overflow);
                 }
                 if counts.n_next_paths() == 0 {
@@ -327,45 +305,17 @@ impl Job<'_> {
         }
     }
 
-    /// Runs the passes that take rays through one surface each, until none is left or too many were passed.
-    fn submit_surfaces(
-        &self,
-        submitter: &mut Submitter,
-        wavefront: &Wavefront,
-        passes: &[Pass],
-    ) -> surfel_core::Result<()> {
-        for _ in 0..MAX_SURFACES.div_ceil(SURFACES_AT_ONCE) {
-            for _ in 0..SURFACES_AT_ONCE {
-                submitter.add(passes)?;
-            }
-            if self.read_counts(submitter, wavefront)?.n_active() == 0 {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Waits for all passes, and returns what they have counted.
-    fn read_counts(
-        &self,
-        submitter: &mut Submitter,
-        wavefront: &Wavefront,
-    ) -> surfel_core::Result<Counts> {
-        submitter.flush()?;
-        Ok(wavefront.read_counts(self.gpu)?)
-    }
-
     /// Sets the AOVs of a part that was rendered, if they are wanted.
     fn add_aovs(
         &self,
         submitter: &mut Submitter,
-        wavefront: &Wavefront,
         frame: FrameRecord,
         picture: &mut Picture,
     ) -> surfel_core::Result<()> {
         let Picture { source, order, image: Image { aovs: Some(aovs), .. }, .. } = picture else {
             return Ok(());
         };
+        let wavefront = submitter.wavefront();
         wavefront.set_frame(self.gpu, &FrameRecord { is_centered: 1, ..frame });
         submitter.parity = 0;
         submitter.add(&self.passes.aov_hits)?;
@@ -378,7 +328,7 @@ impl Job<'_> {
 
     /// Waits for a part, adds it to the picture, and learns from its time how large those to come should be.
     fn take_part(&self, part: Part, picture: &mut Picture) -> surfel_core::Result<()> {
-        let Part { first, n_pixels, start, readback, .. } = part;
+        let Part { first, n_pixels, start, readback } = part;
         let is_opaque = matches!(self.scene.background, Background::Gradient { .. });
         let background_alpha = if is_opaque { 1.0 } else { 0.0 };
         let set = |colors: &[[f32; 4]]| {
@@ -394,4 +344,17 @@ impl Job<'_> {
         picture.progress.advance(n_pixels.into());
         Ok(())
     }
+}
+
+/// Runs the passes that take rays through one surface each, until none is left or too many were passed.
+fn submit_surfaces(submitter: &mut Submitter, passes: &[Pass]) -> surfel_core::Result<()> {
+    for _ in 0..MAX_SURFACES.div_ceil(SURFACES_AT_ONCE) {
+        for _ in 0..SURFACES_AT_ONCE {
+            submitter.add(passes)?;
+        }
+        if submitter.read_counts()?.n_active() == 0 {
+            break;
+        }
+    }
+    Ok(())
 }

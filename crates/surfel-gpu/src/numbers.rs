@@ -10,6 +10,8 @@ pub const BAND_HEIGHT: u32 = 4;
 pub const MAX_QUEUE_ENTRIES: u32 = 65_535 * WORKGROUP_SIZE;
 /// Maximum number of planes that limit camera rays.
 pub const MAX_PLANES: usize = 8;
+/// Bytes of a vector of four words.
+pub const VECTOR_BYTES: usize = 16;
 /// Vectors of four words that a node takes.
 pub const NODE_VECTORS: usize = 5;
 /// Maximum number of pages of the nodes of a tree.

@@ -7,7 +7,7 @@ use crate::kernel_times::{KernelTime, KernelTimes};
 use crate::kernels::Kernels;
 use crate::part_size::PartSize;
 use crate::passes::{Pass, Passes};
-use crate::picture_memory::picture_bytes;
+use crate::picture_memory::scene_bytes;
 use crate::ray_timing::{self, RayTimes, Timing};
 use crate::scene_records::SceneRecords;
 use crate::unsupported::unsupported;
@@ -143,12 +143,15 @@ impl Renderer for GpuRenderer {
         let mut state = self.state();
         let State { kernels, uploads, words, arrays, part_size, times } = &mut *state;
         let passes = Passes::new(scene, settings);
-        let bytes = |sizes| picture_bytes(scene, &passes, sizes);
-        let mut fits_memory =
-            |sizes| uploads.fits_memory(&self.gpu, &scene.geometries, bytes(sizes));
+        let scene_bytes = scene_bytes(scene, &passes);
+        let bytes = |sizes| scene_bytes + Arrays::n_bytes(sizes);
+        let makes_room =
+            |sizes| uploads.make_room(&self.gpu, &scene.geometries, bytes(sizes)).is_ok();
         // Pictures have at most 2^28 pixels.
         let n_pixels = settings.width * region.n_rows();
-        let sizes = Job::sizes(&self.gpu, scene, &passes, n_pixels, &mut fits_memory);
+        let sizes = Job::sizes(&self.gpu, scene, &passes, n_pixels, makes_room);
+        let fits_memory =
+            |sizes| uploads.check_memory(&self.gpu, &scene.geometries, bytes(sizes)).is_ok();
         let found = Arrays::free_unless_fitting(arrays, &self.gpu, sizes, fits_memory)?;
         uploads.update(&self.gpu, &scene.geometries, bytes(found))?;
         let is_paged = |tree| uploads.tree(&scene.geometries, tree).is_some_and(GpuTree::is_paged);

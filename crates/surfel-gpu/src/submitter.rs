@@ -5,11 +5,11 @@ use crate::error::Result;
 use crate::kernel_times::{KernelTimes, Timestamps};
 use crate::kernels::Kernels;
 use crate::numbers::WORKGROUP_SIZE;
-use crate::passes::{Pass, Size};
+use crate::passes::{Pass, Passes, Size};
 use crate::shader::Resources;
-use crate::upload::TreeRef;
-use crate::wavefront::{DISPATCH_BYTES, Wavefront};
-use std::collections::{BTreeMap, VecDeque};
+use crate::upload::{GpuTree, TreeRef};
+use crate::wavefront::{Counts, DISPATCH_BYTES, Wavefront, written};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use surfel_core::progress::Progress;
 
 /// Maximum number of passes in a submission. Work is cancelled between submissions; on a GPU a pass takes a few
@@ -28,6 +28,31 @@ pub struct BoundTree {
     pub group: wgpu::BindGroup,
     /// True if they are in pages.
     pub is_paged: bool,
+}
+
+/// Binds the trees that passes read, together with the records of their instances.
+///
+/// # Errors
+/// Fails if the device does.
+pub fn bind_trees<'a>(
+    gpu: &Gpu,
+    kernels: &Kernels,
+    trees: impl Fn(TreeRef) -> Option<&'a GpuTree>,
+    passes: &Passes,
+) -> Result<BTreeMap<TreeRef, BoundTree>> {
+    let mut bound = BTreeMap::new();
+    if passes.visits.is_empty() {
+        return Ok(bound);
+    }
+    let bytes = bytemuck::cast_slice(&passes.visits);
+    let visits = written(gpu, "instances", bytes, wgpu::BufferUsages::STORAGE)?;
+    let used: BTreeSet<TreeRef> = passes.all().filter_map(|pass| pass.tree).collect();
+    for tree in used {
+        let Some(arrays) = trees(tree) else { continue };
+        let group = gpu.catch("a tree", || arrays.bind(gpu, kernels, &visits))?;
+        bound.insert(tree, BoundTree { group, is_paged: arrays.is_paged() });
+    }
+    Ok(bound)
 }
 
 /// The resources that passes use.
@@ -151,6 +176,20 @@ impl<'a> Submitter<'a> {
     /// Returns the last submission; none before the first.
     pub fn last(&self) -> Option<&wgpu::SubmissionIndex> {
         self.in_flight.back()
+    }
+
+    /// Returns the arrays that the passes work on.
+    pub fn wavefront(&self) -> &'a Wavefront<'a> {
+        self.bound.wavefront
+    }
+
+    /// Waits for all passes, and returns what they have counted.
+    ///
+    /// # Errors
+    /// Fails as [`Submitter::add`] does.
+    pub fn read_counts(&mut self) -> surfel_core::Result<Counts> {
+        self.flush()?;
+        Ok(self.bound.wavefront.read_counts(self.gpu)?)
     }
 
     fn submit(&self) -> Result<wgpu::SubmissionIndex> {

@@ -2,12 +2,12 @@
 
 use crate::device::Gpu;
 use crate::error::{Error, Result};
-use crate::numbers::NODE_VECTORS;
+use crate::numbers::{NODE_VECTORS, VECTOR_BYTES};
 use crate::threads::for_each;
 use surfel_core::bvh::BvhNode;
 
 /// Bytes of a node in the device's memory: five times sixteen, so that it is read in vectors of four words.
-pub const NODE_BYTES: usize = 16 * NODE_VECTORS;
+pub const NODE_BYTES: usize = VECTOR_BYTES * NODE_VECTORS;
 /// Bytes of a chunk.
 const CHUNK_BYTES: usize = 1 << 24;
 /// Maximum number of bytes on their way to the device: one chunk is filled while the device copies the one before.

@@ -6,16 +6,13 @@ use crate::field_arrays::{structure, structure_vectors};
 use crate::gaussian_arrays::{GaussianArrays, gaussian_clouds};
 use crate::kernels::{Kernels, bind};
 use crate::mesh_blocks::{block_vectors, mesh_blocks};
-use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES};
+use crate::numbers::{N_BLOCK_PAGES, N_NODE_PAGES, VECTOR_BYTES};
 use crate::transfer::{MAX_STAGING_BYTES, NODE_BYTES, Payload, Transfer};
 use crate::unsupported::trees;
 use std::sync::{Arc, Weak};
 use std::time::Instant;
 use surfel_core::bvh::BvhNode;
 use surfel_core::flat::{BlockTree, FlatGeometry};
-
-/// Bytes of a vector of four words.
-const VECTOR_BYTES: usize = 16;
 
 /// A tree over blocks of points in a device's memory.
 #[derive(Debug)]
@@ -92,8 +89,7 @@ pub struct UploadTime {
 
 impl UploadTime {
     fn add<'t>(&mut self, start: Instant, trees: impl IntoIterator<Item = &'t GpuTree>) {
-        let buffers = trees.into_iter().flat_map(|tree| tree.nodes.iter().chain(&tree.blocks));
-        self.n_bytes += buffers.map(wgpu::Buffer::size).sum::<u64>();
+        self.n_bytes += trees.into_iter().map(GpuTree::n_bytes).sum::<u64>();
         self.secs += start.elapsed().as_secs_f64();
     }
 }
@@ -110,12 +106,7 @@ impl Uploads {
         geometries: &[Arc<FlatGeometry>],
         other_bytes: u64,
     ) -> Result<()> {
-        if !self.fits_memory(gpu, geometries, other_bytes) {
-            // The geometries of other pictures make room.
-            let is_needed = |known: &Weak<_>| geometries.iter().any(|other| is_same(known, other));
-            self.geometries.retain(|(known, _)| is_needed(known));
-            self.check_memory(gpu, geometries, other_bytes)?;
-        }
+        self.make_room(gpu, geometries, other_bytes)?;
         for geometry in geometries {
             if self.position(geometry).is_none() {
                 let start = Instant::now();
@@ -127,24 +118,30 @@ impl Uploads {
         self.update_gaussians(gpu, geometries)
     }
 
-    /// Frees geometries that are no longer in use, and returns true if the device has memory for these and for
-    /// `other_bytes`.
-    pub fn fits_memory(
+    /// Frees geometries that are no longer in use, and those of other pictures if these and `other_bytes` need their memory.
+    ///
+    /// # Errors
+    /// Fails if the device has too little memory also then.
+    pub fn make_room(
         &mut self,
         gpu: &Gpu,
         geometries: &[Arc<FlatGeometry>],
         other_bytes: u64,
-    ) -> bool {
-        // A geometry that was changed has lost its weak references, also where it stayed at its place in memory.
+    ) -> Result<()> {
+        // A geometry that was changed has lost its weak references.
         self.geometries.retain(|(geometry, _)| geometry.strong_count() != 0);
         if !self.has_gaussians_of(geometries) {
             self.gaussians = None;
         }
-        self.check_memory(gpu, geometries, other_bytes).is_ok()
+        if self.check_memory(gpu, geometries, other_bytes).is_err() {
+            let is_needed = |known: &Weak<_>| geometries.iter().any(|other| is_same(known, other));
+            self.geometries.retain(|(known, _)| is_needed(known));
+        }
+        self.check_memory(gpu, geometries, other_bytes)
     }
 
-    /// Fails if the trees that are missing have too many pages, or if all trees take too much memory.
-    fn check_memory(
+    /// Fails if the trees that are missing have too many pages, or if all trees and `other_bytes` take too much memory.
+    pub fn check_memory(
         &self,
         gpu: &Gpu,
         geometries: &[Arc<FlatGeometry>],
@@ -216,7 +213,8 @@ impl Uploads {
 }
 
 fn is_same(known: &Weak<FlatGeometry>, geometry: &Arc<FlatGeometry>) -> bool {
-    known.upgrade().is_some_and(|known| Arc::ptr_eq(&known, geometry))
+    // A weak reference keeps its address from being used again.
+    known.as_ptr() == Arc::as_ptr(geometry)
 }
 
 /// The bytes of the arrays of a tree.

@@ -23,7 +23,7 @@ pub const DISPATCH_BYTES: u64 = 12;
 /// Bytes of the counts before the colours of pixels in a readback: colours begin at a multiple of their size.
 const COUNT_BYTES: u64 = 256;
 /// Maximum number of bytes of hits and the like that are read at once.
-pub const MAX_READ_BYTES: u64 = 1 << 24;
+const MAX_READ_BYTES: u64 = 1 << 24;
 
 /// The large arrays, which a renderer keeps from picture to picture. A picture reads nothing that one before it left.
 #[derive(Debug)]
@@ -162,7 +162,7 @@ impl Arrays {
         Ok(wanted)
     }
 
-    /// Returns arrays that hold what is wanted: `known`, or new ones in their place.
+    /// Returns `known`, which [`Arrays::free_unless_fitting`] has left, or new arrays that hold what is wanted.
     ///
     /// # Errors
     /// Fails if the device has too little memory.
@@ -171,7 +171,6 @@ impl Arrays {
         gpu: &Gpu,
         wanted: Capacities,
     ) -> Result<&'a Self> {
-        Self::free_unless_fitting(known, gpu, wanted, |_| true)?;
         let arrays = match known.take() {
             Some(arrays) => arrays,
             None => Self::new(gpu, wanted)?,
@@ -183,6 +182,23 @@ impl Arrays {
     #[cfg(test)]
     pub fn sizes(&self) -> Capacities {
         self.sizes
+    }
+
+    /// Returns the bytes of arrays of these sizes, as `new` makes them.
+    pub fn n_bytes(sizes: Capacities) -> u64 {
+        let Capacities { n_pixels, n_entries, has_waves, is_transmissive } = sizes;
+        let n_path_arrays = if has_waves { 3 } else { 2 };
+        let n_hit_arrays = if is_transmissive { 2 } else { 1 };
+        let of_entry = n_path_arrays * size_of::<Path>()
+            + n_hit_arrays * size_of::<HitRecord>()
+            + size_of::<ShadingPointRecord>()
+            + size_of::<SearchState>();
+        // Colours come back through two arrays in turn.
+        let of_pixel = size_of::<Pixel>() + 3 * size_of::<[f32; 4]>();
+        let hit_bytes = u64::from(n_entries) * size_of::<HitRecord>() as u64;
+        u64::from(n_entries) * of_entry as u64
+            + u64::from(n_pixels) * of_pixel as u64
+            + hit_bytes.min(MAX_READ_BYTES)
     }
 
     fn new(gpu: &Gpu, sizes: Capacities) -> Result<Self> {
@@ -261,7 +277,7 @@ impl<'a> Wavefront<'a> {
             offset: 0,
             size: wgpu::BufferSize::new(RECORD_STRIDE),
         });
-        let wavefront = gpu.catch("the arrays of rays", || {
+        gpu.catch("the arrays of rays", || {
             let rays = |paths: &wgpu::Buffer, hits: &wgpu::Buffer, next: &wgpu::Buffer| {
                 let arrays = [paths, hits, next, points, pixels, counts, search_states];
                 bind(gpu, &kernels.rays, &arrays.map(wgpu::Buffer::as_entire_binding))
@@ -283,9 +299,7 @@ impl<'a> Wavefront<'a> {
                 scene: bind(gpu, &kernels.scene, &scene.map(wgpu::Buffer::as_entire_binding)),
                 frame,
             }
-        })?;
-        wavefront.clear_counts(gpu);
-        Ok(wavefront)
+        })
     }
 
     /// Sets the part of the picture that the next passes render.
@@ -324,12 +338,11 @@ impl<'a> Wavefront<'a> {
         self.read(gpu, &self.arrays.paths[0], n)
     }
 
-    /// Sets the number of entries that were added to the queue of paths; the others are empty.
+    /// Sets the number of entries that were added to the queue of paths, and all other counts to zero.
     pub fn fill_paths(&self, gpu: &Gpu, n: u32) {
-        let mut counts = [0; queue::N_QUEUES as usize];
-        counts[queue::PATHS as usize] = n;
-        let offset = 4 * u64::from(count::FIRST_ADDED);
-        gpu.queue.write_buffer(&self.arrays.counts, offset, bytemuck::cast_slice(&counts));
+        let mut counts = [0u32; count::N_COUNTS as usize];
+        counts[(count::FIRST_ADDED + queue::PATHS) as usize] = n;
+        gpu.queue.write_buffer(&self.arrays.counts, 0, bytemuck::cast_slice(&counts));
     }
 
     /// Returns what the kernels have counted so far.
