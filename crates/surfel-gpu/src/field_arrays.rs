@@ -107,40 +107,14 @@ mod tests {
     //! The size of a structure is known before it is made.
 
     use super::*;
-    use surfel_core::flat::{FlatGeometry, FlatScene};
-    use surfel_core::math::DVec3;
-    use surfel_core::points::{PointCloud, Preparation, prepare};
-    use surfel_core::progress::NoProgress;
-    use surfel_core::scene::{
-        Background, Camera, CloudGeometry, Geometry, Graph, Material, Projection, Scene,
-    };
-
-    fn scene(surface: SurfaceKind) -> FlatScene {
-        let position = |i: u16| {
-            let (x, y) = (f32::from(i % 20), f32::from(i / 20));
-            Vec3::new(x, y, (x * y).sin())
-        };
-        let cloud = PointCloud::from_positions((0..400).map(position).collect());
-        let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
-        let mut points = CloudGeometry::with_uniform_color(cloud, [200; 3]);
-        points.surface = surface;
-        let camera = Camera {
-            position: DVec3::ZERO,
-            focal_point: DVec3::Y,
-            view_up: DVec3::Z,
-            projection: Projection::Panorama,
-        };
-        let graph = Graph::from_geometry(Geometry::Points(points), Material::MATTE);
-        let background = Background::Transparent;
-        let scene = Scene { graph, lights: Vec::new(), background, camera };
-        FlatScene::new(&scene, &NoProgress).unwrap()
-    }
+    use crate::test_support::scene_of_points;
+    use surfel_core::flat::FlatGeometry;
 
     #[test]
     fn the_size_of_a_structure_is_known_before_it_is_made() {
         use SurfaceKind::{Implicit, Octree, OctreeSplat, Splat};
         for kind in [Implicit, Octree, OctreeSplat, Splat] {
-            let scene = scene(kind);
+            let scene = scene_of_points(kind);
             let FlatGeometry::Cloud(cloud) = &*scene.geometries[0] else { panic!() };
             let n_vectors = structure_vectors(cloud);
             assert_eq!(structure(cloud).len(), n_vectors, "{}", kind.name());

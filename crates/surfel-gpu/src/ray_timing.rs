@@ -190,9 +190,8 @@ fn searches(geometry: &FlatGeometry, query: TimedQuery) -> Vec<Search> {
         TimedQuery::Surface => {
             let shown = trees(cloud).into_iter().enumerate();
             let shown = shown.filter(|(_, (_, points))| !points.nodes.is_empty());
-            let surfaces = shown.filter_map(|(i, (kind, _))| {
-                Some((i, Surface::of_kind(kind, &cloud.options, cloud.edge_test)?))
-            });
+            let surfaces =
+                shown.filter_map(|(i, (kind, _))| Some((i, Surface::of_kind(kind, cloud)?)));
             surfaces.map(|(i, surface)| search(i, surface)).collect()
         }
         TimedQuery::Gather => vec![search(0, Surface::SplatRims)],
@@ -245,9 +244,7 @@ fn results(
 /// Returns an error if a question about a geometry has no kernel.
 pub fn check(gpu: &Gpu, geometry: &FlatGeometry, query: TimedQuery) -> Result<()> {
     let FlatGeometry::Cloud(cloud) = geometry else { return Ok(()) };
-    if query != TimedQuery::Surface
-        || Surface::of_kind(cloud.surface, &cloud.options, cloud.edge_test).is_some()
-    {
+    if query != TimedQuery::Surface || Surface::of_kind(cloud.surface, cloud).is_some() {
         return Ok(());
     }
     let reason = format!("the GPU has no benchmark of the surface {}", cloud.surface.name());

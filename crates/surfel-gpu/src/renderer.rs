@@ -84,20 +84,19 @@ impl GpuRenderer {
         self.state().uploads.time
     }
 
-    /// Begins or ends to measure how long each kernel works, if the device has a clock. Pictures take longer meanwhile:
-    /// the device waits until its clock was read.
+    /// Begins anew to measure how long each kernel works, if the device has a clock, or ends to. Pictures take longer
+    /// meanwhile: the device waits until its clock was read.
     pub fn measure_kernels(&self, is_wanted: bool) {
-        self.state().times.is_measured = is_wanted;
+        let times = &mut self.state().times;
+        times.is_measured = is_wanted;
+        if is_wanted {
+            times.reset();
+        }
     }
 
     /// Returns the kernels' names and the work of each that was measured.
     pub fn kernel_times(&self) -> Vec<(String, KernelTime)> {
         self.state().times.named()
-    }
-
-    /// Forgets the work of kernels that was measured.
-    pub fn reset_kernel_times(&self) {
-        self.state().times.reset();
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -187,12 +186,13 @@ impl Renderer for GpuRenderer {
 
 #[cfg(test)]
 mod tests {
-    //! A lost device is an error.
+    //! A lost device is an error, memory is shared well, and kernels are measured.
 
     use super::*;
-    use crate::test_support::{empty_scene, open_renderer};
+    use crate::test_support::{empty_scene, open_renderer, report_skipped, scene_of_points};
     use surfel_core::Error as CoreError;
     use surfel_core::progress::NoProgress;
+    use surfel_core::surface::SurfaceKind;
 
     #[test]
     fn a_device_that_is_lost_is_an_error_for_ever() {
@@ -225,6 +225,49 @@ mod tests {
         let limited = renderer.with_memory_limit(Some(1 << 20));
         assert_eq!(render(&limited, &small), Ok(Some(8 * 4)));
         assert!(render(&limited, &large).is_err());
+    }
+
+    #[test]
+    fn trees_of_other_pictures_make_room_before_queues_become_shorter() {
+        let Some(renderer) = open_renderer() else { return };
+        let scenes = [scene_of_points(SurfaceKind::Disc), scene_of_points(SurfaceKind::Disc)];
+        let settings = Settings { width: 256, height: 128, ..Settings::default() };
+        assert!(renderer.render(&scenes[0], &settings, &NoProgress).is_ok());
+        let tree_bytes = renderer.upload_time().n_bytes;
+        let sizes = renderer.state().arrays.as_ref().unwrap().sizes();
+        let passes = Passes::new(&scenes[0], &settings);
+        let picture_bytes = Arrays::n_bytes(sizes) + scene_bytes(&scenes[0], &passes);
+        // The limit fits a tree and its copy on the way, but no other tree.
+        let limit = picture_bytes + 2 * tree_bytes + tree_bytes / 2;
+        drop(renderer);
+        let renderer = open_renderer().unwrap().with_memory_limit(Some(limit));
+        for scene in [&scenes[0], &scenes[1], &scenes[0]] {
+            assert!(renderer.render(scene, &settings, &NoProgress).is_ok());
+            let state = renderer.state();
+            assert_eq!(state.arrays.as_ref().unwrap().sizes(), sizes);
+        }
+        assert_eq!(renderer.upload_time().n_bytes, 3 * tree_bytes);
+    }
+
+    #[test]
+    fn kernels_are_measured_once_it_is_wanted() {
+        let Some(renderer) = open_renderer() else { return };
+        if !renderer.gpu.has_timestamps() {
+            return report_skipped("the device has no clock");
+        }
+        let settings = Settings { width: 8, height: 4, ..Settings::default() };
+        let n_runs = || {
+            renderer.render(&empty_scene(), &settings, &NoProgress).unwrap();
+            let times = renderer.kernel_times();
+            times.iter().find(|(name, _)| name == "generate").map_or(0, |(_, time)| time.n_runs)
+        };
+        assert_eq!(n_runs(), 0);
+        renderer.measure_kernels(true);
+        let n = n_runs();
+        assert!(0 < n);
+        assert_eq!(n_runs(), 2 * n);
+        renderer.measure_kernels(true);
+        assert_eq!(n_runs(), n);
     }
 
     #[test]

@@ -146,11 +146,12 @@ const SMOOTH: &[&str] =
 const SMOOTH_DISC: &[&str] = parts!["trace/query/smooth_disc.wgsl"];
 const SLOT: &[&str] = parts!["render/slot.wgsl"];
 const NEARER: &[&str] = parts!["trace/nearer.wgsl"];
-const NEXT_DISC: &[&str] = parts!["trace/next_disc_kernel.wgsl"];
+const NEXT_DISC: &[&str] = parts!["trace/query/passed_disc.wgsl", "trace/next_disc_kernel.wgsl"];
 const ANY_DISC: &[&str] = parts!["trace/any_disc_kernel.wgsl"];
 const TEST_CLOSEST: &[&str] = parts!["trace/test_closest_kernel.wgsl"];
 const TEST_ANY: &[&str] = parts!["trace/test_any_kernel.wgsl"];
-const SMOOTH_SURFACE: &[&str] = parts!["trace/query/smooth_surface.wgsl"];
+const SMOOTH_SURFACE: &[&str] =
+    parts!["trace/query/passed_disc.wgsl", "trace/query/smooth_surface.wgsl"];
 const MLS: &[&str] = parts![
     "math/eigen.wgsl",
     "surface/mls.wgsl",

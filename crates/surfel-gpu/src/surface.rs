@@ -1,7 +1,8 @@
 //! The surfaces that kernels trace.
 
 use crate::numbers::{TRIANGLE, surface_number};
-use surfel_core::surface::{EdgeTest, MAX_CANDIDATES, MAX_GATHERED, SurfaceKind, SurfaceOptions};
+use surfel_core::flat::FlatCloud;
+use surfel_core::surface::{EdgeTest, MAX_CANDIDATES, MAX_GATHERED, SurfaceKind};
 
 /// A surface that kernels trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -57,13 +58,9 @@ impl Surface {
         Self::Triangle,
     ];
 
-    /// Returns the surface by which a kind with these options is traced, or none if no kernel traces it.
-    pub fn of_kind(
-        kind: SurfaceKind,
-        options: &SurfaceOptions,
-        edge_test: EdgeTest,
-    ) -> Option<Self> {
-        let has_rims = edge_test == EdgeTest::Off;
+    /// Returns the surface by which a kind with the options of a cloud is traced, or none if no kernel traces it.
+    pub fn of_kind(kind: SurfaceKind, cloud: &FlatCloud) -> Option<Self> {
+        let (options, has_rims) = (&cloud.options, cloud.edge_test == EdgeTest::Off);
         match kind {
             SurfaceKind::Disc if has_rims => Some(Self::DiscRims),
             SurfaceKind::Splat | SurfaceKind::SplatMean if has_rims => Some(Self::SplatRims),

@@ -1,12 +1,16 @@
-//! The device that tests run on, and a scene without anything.
+//! The device that tests run on, and small scenes.
 
 use crate::device::Gpu;
 use crate::error::Result;
 use crate::renderer::GpuRenderer;
 use surfel_core::flat::FlatScene;
-use surfel_core::math::DVec3;
+use surfel_core::math::{DVec3, Vec3};
+use surfel_core::points::{PointCloud, Preparation, prepare};
 use surfel_core::progress::NoProgress;
-use surfel_core::scene::{Background, Camera, Graph, Projection, Scene};
+use surfel_core::scene::{
+    Background, Camera, CloudGeometry, Geometry, Graph, Material, Projection, Scene,
+};
+use surfel_core::surface::SurfaceKind;
 
 /// Opens the first device, or the one that the variable `SURFEL_DEVICE` names. Without one the test says that it is skipped.
 pub fn open_gpu() -> Option<Gpu> {
@@ -36,13 +40,30 @@ pub fn report_skipped(reason: &str) {
 
 /// Returns a scene of nothing but a camera.
 pub fn empty_scene() -> FlatScene {
+    scene_of(Graph::default())
+}
+
+/// Returns a scene of 400 points with this surface.
+pub fn scene_of_points(surface: SurfaceKind) -> FlatScene {
+    let position = |i: u16| {
+        let (x, y) = (f32::from(i % 20), f32::from(i / 20));
+        Vec3::new(x, y, (x * y).sin())
+    };
+    let cloud = PointCloud::from_positions((0..400).map(position).collect());
+    let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+    let mut points = CloudGeometry::with_uniform_color(cloud, [200; 3]);
+    points.surface = surface;
+    scene_of(Graph::from_geometry(Geometry::Points(points), Material::MATTE))
+}
+
+fn scene_of(graph: Graph) -> FlatScene {
     let camera = Camera {
         position: DVec3::ZERO,
         focal_point: DVec3::Y,
         view_up: DVec3::Z,
         projection: Projection::Panorama,
     };
-    let (graph, background) = (Graph::default(), Background::Transparent);
+    let background = Background::Transparent;
     let scene = Scene { graph, lights: Vec::new(), background, camera };
     FlatScene::new(&scene, &NoProgress).unwrap()
 }

@@ -69,7 +69,7 @@ impl TreeVisits {
                 }
             };
             for (tree_idx, (kind, points)) in trees(cloud).into_iter().enumerate() {
-                let Some(surface) = Surface::of_kind(kind, &cloud.options, cloud.edge_test) else {
+                let Some(surface) = Surface::of_kind(kind, cloud) else {
                     continue;
                 };
                 if !points.nodes.is_empty() {

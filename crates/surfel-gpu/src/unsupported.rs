@@ -17,7 +17,7 @@ pub fn unsupported(scene: &FlatScene) -> Vec<String> {
         if let FlatGeometry::Cloud(cloud) = scene.geometry(instance) {
             let kind = cloud.surface;
             let what = format!("the surface {}", kind.name());
-            let is_traced = Surface::of_kind(kind, &cloud.options, cloud.edge_test).is_some();
+            let is_traced = Surface::of_kind(kind, cloud).is_some();
             add(!is_traced && kind != SurfaceKind::Gaussian, what);
         }
     }

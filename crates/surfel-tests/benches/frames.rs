@@ -219,7 +219,6 @@ fn print_upload(gpu: &GpuRenderer, flat: &FlatScene, options: &Options) {
 /// Prints the work of each kernel in one picture.
 fn print_kernels(gpu: &GpuRenderer, flat: &FlatScene, options: &Options) {
     gpu.measure_kernels(true);
-    gpu.reset_kernel_times();
     let n_runs = options.n_runs as f64;
     for _ in 0..options.n_runs {
         gpu.render(flat, &options.settings, &NoProgress).unwrap();

@@ -414,8 +414,9 @@ fn more_memory_than_the_limit_is_refused_before_the_upload() {
     let scene = flat(&reference::scene(SurfaceKind::Disc));
     let settings =
         Settings { width: 24, height: 18, samples_per_pixel: 1, light_samples: 1, ..SETTINGS };
-    let error =
-        open().with_memory_limit(Some(1 << 16)).render(&scene, &settings, &NoProgress).unwrap_err();
+    let refusing = open().with_memory_limit(Some(1 << 16));
+    let error = refusing.render(&scene, &settings, &NoProgress).unwrap_err();
+    assert_eq!(refusing.upload_time().n_bytes, 0);
     let Error::Renderer(reason) = error else { panic!("{error}") };
     let expected = " of memory are needed, and --memory-limit is 64.0 KiB";
     assert!(reason.ends_with(expected), "{reason}");
@@ -436,7 +437,7 @@ fn rendering_can_be_cancelled() {
 fn cancelled_pictures_leave_nothing_to_later_ones() {
     let Some(gpu) = gpu() else { return };
     let scene = flat(&reference::scene(SurfaceKind::Disc));
-    // Several parts are on their way at once.
+    // On a software device several parts are on their way at once.
     let settings =
         Settings { width: 128, height: 100, light_samples: 4, with_aovs: false, ..SETTINGS };
     let picture = render(gpu, &scene, &settings);

@@ -2,16 +2,11 @@
 
 // Returns the distances to both sides of four discs, -1 without a hit. A ray in the plane of a disc misses it.
 fn intersect_discs(four: FourPoints, ray: Ray) -> vec4<f32> {
-    let none = vec4<f32>(0.0);
-    let direction = ray.direction;
-    let facing = dot_four(four.normal_x, four.normal_y, four.normal_z, direction);
+    let facing = dot_four(four.normal_x, four.normal_y, four.normal_z, ray.direction);
     let height = four.normal_x * four.x + four.normal_y * four.y + four.normal_z * four.z;
-    let is_parallel = facing == none;
+    let is_parallel = facing == vec4<f32>(0.0);
     let distance = height / select(facing, vec4<f32>(1.0), is_parallel);
-    let x = four.x - distance * direction.x;
-    let y = four.y - distance * direction.y;
-    let z = four.z - distance * direction.z;
-    let is_inside = x * x + y * y + z * z < four.radius * four.radius;
-    let is_hit = is_inside & (vec4<f32>(ray.t_min) <= distance) & (facing != none);
+    let is_inside = squared_offsets(four, distance, ray.direction) < four.radius * four.radius;
+    let is_hit = is_inside & (vec4<f32>(ray.t_min) <= distance) & !is_parallel;
     return select(vec4<f32>(-1.0), distance, is_hit);
 }

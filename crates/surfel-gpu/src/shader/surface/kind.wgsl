@@ -15,6 +15,14 @@ fn intersect_four(four: FourPoints, ray: Ray) -> vec4<f32> {
     return select(vec4<f32>(-1.0), distances, vec4<f32>(0.0) < four.radius);
 }
 
+// Returns the squares of the distances of four points from the positions at these distances along a ray.
+fn squared_offsets(four: FourPoints, distance: vec4<f32>, direction: vec3<f32>) -> vec4<f32> {
+    let x = four.x - distance * direction.x;
+    let y = four.y - distance * direction.y;
+    let z = four.z - distance * direction.z;
+    return x * x + y * y + z * z;
+}
+
 // Returns the scalar products of four vectors with another one.
 fn dot_four(x: vec4<f32>, y: vec4<f32>, z: vec4<f32>, vector: vec3<f32>) -> vec4<f32> {
     return x * vector.x + y * vector.y + z * vector.z;

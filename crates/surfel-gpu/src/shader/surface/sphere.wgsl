@@ -3,14 +3,10 @@
 // Returns for each of four spheres the nearest root at or beyond `t_min`, which is the far side if the ray starts inside,
 // or -1 without a hit.
 fn intersect_spheres(four: FourPoints, ray: Ray) -> vec4<f32> {
-    let direction = ray.direction;
-    let along = dot_four(four.x, four.y, four.z, direction);
+    let along = dot_four(four.x, four.y, four.z, ray.direction);
     // The distance of the centre from the line, rather than b^2 - 4ac, which cancels for far spheres (Haines et al.,
     // Precision Improvements for Ray/Sphere Intersection, 2019).
-    let x = four.x - along * direction.x;
-    let y = four.y - along * direction.y;
-    let z = four.z - along * direction.z;
-    let squared = four.radius * four.radius - (x * x + y * y + z * z);
+    let squared = four.radius * four.radius - squared_offsets(four, along, ray.direction);
     let half_chord = sqrt(max(squared, vec4<f32>(0.0)));
     let near = along - half_chord;
     let t_min = vec4<f32>(ray.t_min);

@@ -26,11 +26,9 @@ fn next_disc(@builtin(global_invocation_id) id: vec3<u32>) {
 fn pass_disc(ray_idx: u32, direction: vec3<f32>) -> f32 {
     let passed = NearestHit(search_states[ray_idx].distance, search_states[ray_idx].slot);
     let disc = slot_point(passed.slot, vec3<f32>(0.0));
-    let is_front = dot(disc.normal, direction) < 0.0;
-    if search_states[ray_idx].passed_slot == NONE && (is_front || visits[visit_idx].has_front_sides == 0u) {
+    if search_states[ray_idx].passed_slot == NONE && counts_as_passed(disc, direction) {
         search_states[ray_idx].passed_slot = passed.slot;
         search_states[ray_idx].passed_distance = passed.distance;
     }
-    let behind = passed.distance + SMOOTH_RESTART_OFFSET * disc.radius;
-    return max(behind, passed.distance * (1.0 + 2.0 * EPSILON));
+    return behind_disc(passed.distance, disc);
 }

@@ -63,12 +63,10 @@ fn note_discs(n_wanted: u32) -> bool {
         }
         note_hit(nearest.distance, nearest.slot);
         let disc = slot_point(nearest.slot, vec3<f32>(0.0));
-        let is_front = dot(disc.normal, ray_behind.direction) < 0.0;
-        if passed.slot == NONE && (is_front || visits[visit_idx].has_front_sides == 0u) {
+        if passed.slot == NONE && counts_as_passed(disc, ray_behind.direction) {
             passed = nearest;
         }
-        let behind = nearest.distance + SMOOTH_RESTART_OFFSET * disc.radius;
-        ray_behind.t_min = max(behind, nearest.distance * (1.0 + 2.0 * EPSILON));
+        ray_behind.t_min = behind_disc(nearest.distance, disc);
     }
     return true;
 }
