@@ -3,6 +3,8 @@
 use crate::report::print;
 use crate::stats;
 use rayon::current_num_threads;
+#[cfg(feature = "gpu")]
+use surfel_core::bytes::readable;
 
 /// Arguments of `surfel devices`.
 #[derive(clap::Args, Debug)]
@@ -29,14 +31,13 @@ fn gpu_lines() -> Vec<String> {
         return vec!["no GPU: neither Vulkan nor Metal nor DirectX 12 has a device".into()];
     }
     let lines = devices.iter().enumerate().map(|(index, device)| {
-        let (kind, mib) = (device.kind.name(), device.max_array_bytes >> 20);
+        let (kind, arrays) = (device.kind.name(), readable(device.max_array_bytes));
         let surfel::surfel_gpu::DeviceInfo { name, api, driver, .. } = device;
-        let memory = device.memory_bytes.map_or_else(String::new, |bytes| {
-            let gib = bytes as f64 / f64::from(1 << 30);
-            format!(", {gib:.digits$} GiB of memory", digits = usize::from(gib < 10.0))
-        });
+        let memory = device
+            .memory_bytes
+            .map_or_else(String::new, |bytes| format!(", {} of memory", readable(bytes)));
         format!(
-            "{index:<4} {name}, {kind}, {api}, driver {driver}{memory}, arrays of up to {mib} MiB"
+            "{index:<4} {name}, {kind}, {api}, driver {driver}{memory}, arrays of up to {arrays}"
         )
     });
     lines.collect()

@@ -39,6 +39,7 @@
 //! ```
 
 mod error;
+pub mod bytes;
 pub mod math;
 pub mod progress;
 pub mod image;

@@ -1,5 +1,7 @@
 //! The errors of devices.
 
+use surfel_core::bytes::readable;
+
 /// An error of a device.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -69,12 +71,4 @@ impl From<Error> for surfel_core::Error {
     fn from(error: Error) -> Self {
         Self::Renderer(error.to_string())
     }
-}
-
-/// Returns bytes in the largest unit that leaves a number above one.
-fn readable(bytes: u64) -> String {
-    let units = ["KiB", "MiB", "GiB", "TiB"];
-    let power = (bytes.max(1).ilog2() / 10).clamp(1, units.len() as u32);
-    let value = bytes as f64 / 1024f64.powi(power as i32);
-    format!("{value:.1} {}", units[power as usize - 1])
 }

@@ -2,6 +2,16 @@
 
 use super::common::{Folder, command, dome, fail, succeed};
 
+/// Returns true if a run found no GPU, of which it wrote these lines; the test then says that it is skipped.
+#[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
+fn lacks_gpu(stderr: &str) -> bool {
+    let error = stderr.lines().find(|line| line.contains("no GPU was found"));
+    if let Some(error) = error {
+        println!("skipped: {error}");
+    }
+    error.is_some()
+}
+
 /// Runs the program on a machine whose Vulkan has no device.
 #[cfg(target_os = "linux")]
 fn without_devices(arguments: &[&str]) -> std::process::Output {
@@ -62,11 +72,7 @@ fn gpus_refuse_what_they_do_not_render() {
     let picture = folder.path("out.png");
     let render = ["render", &cloud, "-o", &picture, "--backend", "gpu", "--resolution", "32x24"];
     let text = fail(&[&render[..], &["--device", "nobody's"]].concat(), 1);
-    if text.contains("no GPU was found") {
-        #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
-        {
-            println!("skipped: {text}");
-        }
+    if lacks_gpu(&text) {
         return;
     }
     assert!(text.contains("unknown device 'nobody's'; known: 0 ("), "{text}");
@@ -91,16 +97,12 @@ fn the_memory_limit_holds_for_the_memory_of_a_gpu() {
     let refused = render("gpu", "120x120", "2M");
     let text = String::from_utf8_lossy(&refused.stderr);
     assert_eq!(refused.status.code(), Some(1), "{text}");
-    if text.contains("no GPU was found") {
-        #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
-        {
-            println!("skipped: {text}");
-        }
+    if lacks_gpu(&text) {
         return;
     }
     // Lines about what was chosen come before.
     let error = text.lines().last().unwrap_or_default();
-    let expected = " of memory are needed, and --memory-limit is 2.0 MiB";
+    let expected = " of memory are needed, and --memory-limit is 2.0 MB";
     assert!(error.starts_with("error: ") && error.ends_with(expected), "{text}");
     assert_eq!(folder.names(), ["dome.ply"]);
     assert!(render("cpu", "120x120", "2M").status.success());
@@ -120,11 +122,7 @@ fn bench_traces_the_rays_of_the_cpu_on_a_gpu() {
     };
     let [cpu, gpu] = ["cpu", "gpu"].map(bench);
     let text = String::from_utf8_lossy(&gpu.stderr);
-    if text.contains("no GPU was found") {
-        #[expect(clippy::print_stdout, reason = "a test that does nothing says so")]
-        {
-            println!("skipped: {text}");
-        }
+    if lacks_gpu(&text) {
         return;
     }
     assert!(gpu.status.success(), "{text}");

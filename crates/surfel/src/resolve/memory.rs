@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::troubleshooting::TroubleshootingSection;
 use std::collections::BTreeMap;
 use std::path::Path;
+use surfel_core::bytes::readable;
 use surfel_core::flat::{MAX_GAUSSIAN_BYTES, PointBlock, max_field_bytes};
 use surfel_core::math::LANES;
 use surfel_core::points::{GAUSSIAN_COLUMNS, MAX_REST_COLUMNS, PointCloud, Subsample};
@@ -199,15 +200,6 @@ fn kept(n_points: u64, subsample: Option<Subsample>) -> u64 {
         Some(Subsample::Stride(stride)) => (n_points as f64 / stride.max(1.0)) as u64,
         Some(Subsample::Spacing(_)) | None => n_points,
     }
-}
-
-/// Bytes in the largest unit that leaves a number above one.
-pub fn readable(bytes: u64) -> String {
-    let units = ["B", "KB", "MB", "GB", "TB"];
-    let power = (bytes.max(1).ilog2() / 10).min(4);
-    let value = bytes as f64 / 1024f64.powi(power as i32);
-    let digits = usize::from(0 < power);
-    format!("{value:.digits$} {}", units[power as usize])
 }
 
 #[cfg(test)]

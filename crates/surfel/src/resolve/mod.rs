@@ -34,7 +34,7 @@ pub(crate) use common_legend::common_legend;
 pub(crate) use exposure::automatic_exposure;
 pub(crate) use interior::hide_walls;
 pub use loaded::{KeepOptions, LoadedFile, LoadedScene};
-pub use memory::{MemoryEstimate, n_points, readable};
+pub use memory::{MemoryEstimate, n_points};
 pub use plan::coordinate_system;
 pub(crate) use sequence::Sequence;
 pub use spread::report_coverage;

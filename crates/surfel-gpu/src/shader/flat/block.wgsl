@@ -78,7 +78,6 @@ fn four_points(block_idx: u32, head: BlockHead, half: u32, origin: vec3<f32>) ->
     let corner = head.corner - origin;
     let words = block_vector(first + 4u + half);
     let radii = word_of_block(block_idx, RADIUS_WORDS + half);
-    let bytes = (vec4<u32>(radii) >> vec4<u32>(0u, 8u, 16u, 24u)) & vec4<u32>(0xffu);
     let normals = bitcast<vec4<i32>>(words);
     return FourPoints(
         four_steps(block_vector(first + 1u), half) * head.step + corner.x,
@@ -87,7 +86,7 @@ fn four_points(block_idx: u32, head: BlockHead, half: u32, origin: vec3<f32>) ->
         vec4<f32>((normals << vec4<u32>(22u)) >> vec4<u32>(22u)),
         vec4<f32>((normals << vec4<u32>(12u)) >> vec4<u32>(22u)),
         vec4<f32>((normals << vec4<u32>(2u)) >> vec4<u32>(22u)),
-        vec4<f32>(bytes + ((words >> vec4<u32>(30u)) << vec4<u32>(8u))) * head.radius_step,
+        (bytes_of(radii) + vec4<f32>((words >> vec4<u32>(30u)) << vec4<u32>(8u))) * head.radius_step,
     );
 }
 

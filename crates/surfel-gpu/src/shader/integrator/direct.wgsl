@@ -30,14 +30,13 @@ fn make_light_ray(point: ShadingPointRecord, path: ptr<function, Path>) -> bool 
         return false;
     }
     let sampled = sampled_ray(point, light, point.index * n_samples + task.sample_idx);
-    let is_behind = dot(point.geometric_normal, sampled.direction) <= 0.0;
-    if is_behind || all(sampled.contribution == vec3<f32>(0.0)) {
+    let cosine = dot(point.geometric_normal, sampled.direction);
+    if cosine <= 0.0 || all(sampled.contribution == vec3<f32>(0.0)) {
         return false;
     }
-    let side = select(-point.geometric_normal, point.geometric_normal, 0.0 <= dot(point.geometric_normal, sampled.direction));
-    let ray = Ray(point.position + point.spawn_offset * side, point.spawn_t_min, sampled.direction, sampled.t_max);
+    let ray = Ray(point.position + point.spawn_offset * point.geometric_normal, point.spawn_t_min, sampled.direction, sampled.t_max);
     // As in `from_surface`.
-    let cos = max(abs(dot(ray.direction, point.geometric_normal)), 0.1);
+    let cos = max(cosine, 0.1);
     let height = abs(dot(ray.origin - point.position, point.geometric_normal));
     let weight = sampled.contribution / f32(n_samples);
     *path = Path(ray, weight, point.pixel, vec3<f32>(1.0), height / cos, point.media, point.key, point.index, 1u);
