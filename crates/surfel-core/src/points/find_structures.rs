@@ -94,7 +94,7 @@ pub fn find_structures(
         settle(tree, point, radii[point], *structure, shape);
     };
     shapes.par_iter_mut().zip(&structures).enumerate().for_each(finish);
-    limit_crowded_discs(positions, radii, &mut shapes, progress)?;
+    limit_crowded_discs(tree, radii, &mut shapes, progress)?;
     narrow_lone_discs(tree, radii, typical.radius, widened, &mut shapes, progress)?;
     clamp_solids(&mut shapes, Structure::Line, typical.radius);
     clamp_solids(&mut shapes, Structure::Scatter, typical.radius);

@@ -101,7 +101,9 @@ pub fn close_gaps(
     let links = |index: usize| {
         progress.check()?;
         let own = &sides[index];
-        let others = octaves.nearest(&trees, tree.positions()[own.point as usize]);
+        let point = own.point as usize;
+        let max_distance = MAX_WIDTH * shapes[point].radius;
+        let others = octaves.nearest(&trees, tree.positions()[point], max_distance);
         Ok(widened(own, others, &sides, tree.positions(), shapes))
     };
     let links = (0..sides.len()).into_par_iter().map(links);
@@ -179,9 +181,9 @@ impl Octaves {
 
     /// Returns the sides near a position, nearest first; the one at the position is among them. The index of each is its
     /// place among all sides.
-    fn nearest(&self, trees: &[KdTree], position: Vec3) -> Vec<Neighbor> {
+    fn nearest(&self, trees: &[KdTree], position: Vec3, max_distance: f32) -> Vec<Neighbor> {
         let of_tree = |(tree, sides): (&KdTree, &Vec<u32>)| {
-            let mut neighbors = tree.nearest(position, N_CANDIDATES, None);
+            let mut neighbors = tree.nearest_within(position, N_CANDIDATES, max_distance);
             neighbors.iter_mut().for_each(|found| found.index = sides[found.index as usize]);
             neighbors
         };
@@ -212,9 +214,6 @@ fn widened(
     let mut radius = shape.radius;
     for neighbor in others {
         let distance = neighbor.distance_squared.sqrt();
-        if MAX_WIDTH * shape.radius < distance {
-            break;
-        }
         let other = &sides[neighbor.index as usize];
         let offset = positions[other.point as usize] - position;
         let octant_of_other = octant(&basis, offset);

@@ -80,8 +80,7 @@ pub fn widen_lines(
                 Some((shape, neighbors)) => {
                     shapes[point as usize] = shape;
                     if shape.is_disc() {
-                        let otherwise = Structure::Line;
-                        widened.push(WideDisc { point, neighbors, otherwise });
+                        widened.push(WideDisc::new(point, neighbors, Structure::Line));
                     }
                 }
                 None => left.push(point),

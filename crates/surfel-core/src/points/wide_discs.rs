@@ -7,17 +7,17 @@
 
 use super::neighbors::{KdTree, Neighbor};
 use super::normals::fit_plane;
-use super::radius::kth_distance;
 use super::solids::settle;
 use super::structure::{PointShape, Structure};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// Maximum number of surface points within a disc that was widened to close the gaps between scan lines.
 const MAX_POINTS_OF_DISC: usize = 64;
+/// Numbers of nearest points among which these are sought, in turn: others may lie among them.
+const N_NEAREST_OF_DISC: [usize; 3] = [64, 256, 1024];
 /// Number of neighbours that are asked whether they reach a point.
 const N_NEIGHBORS: usize = 12;
 /// Number of nearest points among which these neighbours are found.
@@ -49,12 +49,43 @@ pub struct WideDisc {
     pub neighbors: Vec<u32>,
     /// Structure of the point if the neighbours do not confirm the disc.
     pub otherwise: Structure,
+    /// True if the neighbours have changed since the disc was last looked at.
+    has_changed: bool,
+}
+
+/// All wide discs.
+struct WideDiscs<'a> {
+    discs: &'a [WideDisc],
+    /// Place of the disc of each point among the discs, `u32::MAX` if it is not a wide one.
+    places: Vec<u32>,
+}
+
+impl<'a> WideDiscs<'a> {
+    fn new(discs: &'a [WideDisc], n_points: usize) -> Self {
+        let mut places = vec![u32::MAX; n_points];
+        for (place, disc) in (0..).zip(discs) {
+            places[disc.point as usize] = place;
+        }
+        Self { discs, places }
+    }
+
+    /// Returns the disc of a point, if it is a wide one.
+    fn of_point(&self, point: u32) -> Option<&WideDisc> {
+        self.discs.get(self.places[point as usize] as usize)
+    }
+
+    /// True if another look at a disc would give the same result: neither its neighbours nor theirs have changed.
+    fn is_settled(&self, disc: &WideDisc) -> bool {
+        let has_changed =
+            |neighbor: &u32| self.of_point(*neighbor).is_some_and(|other| other.has_changed);
+        !disc.has_changed && !disc.neighbors.iter().any(has_changed)
+    }
 }
 
 /// Narrows the widened discs that reach over densely sampled surfaces, where the points at hand describe the surface
 /// better than a wide disc does.
 pub fn limit_crowded_discs(
-    positions: &[Vec3],
+    tree: &KdTree,
     radii: &[f32],
     shapes: &mut [PointShape],
     progress: &dyn Progress,
@@ -65,21 +96,41 @@ pub fn limit_crowded_discs(
     if wide.is_empty() {
         return Ok(());
     }
-    let surface: Vec<Vec3> =
-        (0..shapes.len()).filter(is_surface).map(|point| positions[point]).collect();
-    let tree = KdTree::new(&surface, progress)?;
     let limited = |point: &usize| -> Result<f32> {
         progress.check()?;
-        let neighbors = tree.nearest(positions[*point], MAX_POINTS_OF_DISC, None);
-        let reach = kth_distance(&neighbors, MAX_POINTS_OF_DISC);
-        let is_crowded = neighbors.len() == MAX_POINTS_OF_DISC && reach < shapes[*point].radius;
-        Ok(if is_crowded { reach.max(radii[*point]) } else { shapes[*point].radius })
+        let own = shapes[*point].radius;
+        let reach = reach_of_surface(tree, *point, own, shapes);
+        Ok(reach.map_or(own, |reach| reach.max(radii[*point])))
     };
     let limits = wide.par_iter().map(limited).collect::<Result<Vec<_>>>()?;
     for (point, radius) in wide.into_iter().zip(limits) {
         shapes[point].radius = radius;
     }
     Ok(())
+}
+
+/// Returns the distance from a point to the last of [`MAX_POINTS_OF_DISC`] nearest points of surfaces, itself among them, if
+/// it is below `max_distance`.
+fn reach_of_surface(
+    tree: &KdTree,
+    point: usize,
+    max_distance: f32,
+    shapes: &[PointShape],
+) -> Option<f32> {
+    let is_near = |neighbor: &Neighbor| neighbor.distance_squared.sqrt() < max_distance;
+    let is_surface =
+        |neighbor: &Neighbor| shapes[neighbor.index as usize].structure == Structure::Surface;
+    for n_nearest in N_NEAREST_OF_DISC {
+        let nearest = tree.nearest(tree.positions()[point], n_nearest, None);
+        let mut of_surface = nearest.iter().filter(|neighbor| is_surface(neighbor));
+        if let Some(last) = of_surface.nth(MAX_POINTS_OF_DISC - 1) {
+            return is_near(last).then(|| last.distance_squared.sqrt());
+        }
+        if !nearest.last().is_some_and(is_near) {
+            return None;
+        }
+    }
+    None
 }
 
 /// Narrows `widened` discs and others beyond the typical radius to the neighbours that reach them. Points that too few
@@ -106,49 +157,46 @@ fn narrow(
     tree: &KdTree,
     radii: &[f32],
     typical_radius: f32,
-    wide: &mut [WideDisc],
+    discs: &mut [WideDisc],
     shapes: &mut [PointShape],
     progress: &dyn Progress,
 ) -> Result<()> {
     let positions = tree.positions();
-    wide.par_iter_mut().for_each(|disc| disc.keep_confirming(positions, shapes));
-    let index_of: HashMap<u32, usize> =
-        wide.iter().enumerate().map(|(index, disc)| (disc.point, index)).collect();
+    discs.par_iter_mut().for_each(|disc| disc.keep_confirming(positions, shapes));
+    let wide = WideDiscs::new(discs, shapes.len());
     let narrowed = |disc: &WideDisc| -> Result<PointShape> {
         progress.check()?;
         let point = disc.point as usize;
         let mut shape = shapes[point];
+        if wide.is_settled(disc) {
+            return Ok(shape);
+        }
         if disc.neighbors.len() < MIN_CONFIRMING {
             settle(tree, point, radii[point], disc.otherwise, &mut shape);
             shape.radius = shape.radius.min(typical_radius);
-        } else if is_strip(positions, disc, wide, &index_of, shapes) {
+        } else if is_strip(positions, disc, &wide, shapes) {
             settle(tree, point, radii[point], Structure::Line, &mut shape);
         } else {
             shape.radius = shape.radius.min(MAX_OVERHANG * disc.reach(positions));
         }
         Ok(shape)
     };
-    let found = wide.par_iter().map(narrowed).collect::<Result<Vec<_>>>()?;
-    for (disc, shape) in wide.iter().zip(found) {
+    let found = wide.discs.par_iter().map(narrowed).collect::<Result<Vec<_>>>()?;
+    for (disc, shape) in discs.iter_mut().zip(found) {
         shapes[disc.point as usize] = shape;
+        disc.has_changed = false;
     }
     Ok(())
 }
 
 /// True if the neighbours of a disc and their neighbours form a strip, as the points of two wires do: a surface of scan
 /// lines is wider the farther one looks.
-fn is_strip(
-    positions: &[Vec3],
-    disc: &WideDisc,
-    wide: &[WideDisc],
-    index_of: &HashMap<u32, usize>,
-    shapes: &[PointShape],
-) -> bool {
+fn is_strip(positions: &[Vec3], disc: &WideDisc, wide: &WideDiscs, shapes: &[PointShape]) -> bool {
     let normal = shapes[disc.point as usize].normal;
     let mut around = disc.neighbors.clone();
     for neighbor in &disc.neighbors {
-        match index_of.get(neighbor) {
-            Some(index) => around.extend(&wide[*index].neighbors),
+        match wide.of_point(*neighbor) {
+            Some(other) => around.extend(&other.neighbors),
             None if MIN_COSINE < shapes[*neighbor as usize].normal.dot(normal).abs() => {
                 return false;
             }
@@ -187,16 +235,22 @@ fn other_wide_discs(
                 neighbors.push(nearest.index);
             }
         }
-        Ok(WideDisc { point: *point as u32, neighbors, otherwise: Structure::Scatter })
+        Ok(WideDisc::new(*point as u32, neighbors, Structure::Scatter))
     };
     others.par_iter().map(with_neighbors).collect()
 }
 
 impl WideDisc {
+    /// Creates a disc that was not looked at yet.
+    pub fn new(point: u32, neighbors: Vec<u32>, otherwise: Structure) -> Self {
+        Self { point, neighbors, otherwise, has_changed: true }
+    }
+
     /// Keeps the neighbours on surfaces that reach the point or lie in its plane.
     fn keep_confirming(&mut self, positions: &[Vec3], shapes: &[PointShape]) {
         let (position, normal) =
             (positions[self.point as usize], shapes[self.point as usize].normal);
+        let n_neighbors = self.neighbors.len();
         self.neighbors.retain(|other| {
             let offset = positions[*other as usize] - position;
             let other = shapes[*other as usize];
@@ -208,6 +262,7 @@ impl WideDisc {
             };
             other.is_disc() && (distance <= REACH * other.radius || is_in_plane())
         });
+        self.has_changed |= self.neighbors.len() < n_neighbors;
     }
 
     /// Returns the distance to the last neighbour.

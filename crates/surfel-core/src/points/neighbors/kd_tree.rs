@@ -1,6 +1,6 @@
 //! A balanced kd-tree without pointers.
 
-use super::candidate_set::{CandidateSet, KNearest, MANY, ManyNearest};
+use super::candidate_set::{CandidateSet, KNearest, MANY, ManyNearest, NearestSet};
 use super::neighbor::{Neighbor, check_count, key};
 use crate::error::Result;
 use crate::math::{Aabb, Vec3, Vec4, set_bits};
@@ -99,6 +99,23 @@ impl<'a> KdTree<'a> {
         } else {
             self.neighbors(&target, ManyNearest::new(k))
         }
+    }
+
+    /// Returns the k points nearest to `position` among those within a distance, nearest first.
+    pub fn nearest_within(&self, position: Vec3, k: usize, distance: f32) -> Vec<Neighbor> {
+        let k = k.min(self.n_points);
+        if k == 0 || !position.is_finite() {
+            return Vec::new();
+        }
+        let target = Target { position, own: u32::MAX };
+        let limited = |mut candidates: KNearest| {
+            candidates.limit_to(distance * distance);
+            candidates
+        };
+        let mut neighbors = self.neighbors(&target, limited(KNearest::new(k)));
+        // Where fewer points are near, the last entries stand for the limit.
+        neighbors.retain(|neighbor| neighbor.index != u32::MAX);
+        neighbors
     }
 
     fn neighbors(&self, target: &Target, mut candidates: impl CandidateSet) -> Vec<Neighbor> {

@@ -117,6 +117,20 @@ fn nearest_to_single_positions_equal_a_brute_force_search() {
 }
 
 #[test]
+fn the_nearest_within_a_distance_are_the_nearest_up_to_it() {
+    for (name, positions) in clouds() {
+        let tree = KdTree::new(&positions, &NoProgress).unwrap();
+        for (point, position) in positions.iter().enumerate().step_by(7) {
+            let mut expected = tree.nearest(*position, 16, None);
+            let middle = expected.get(8).map_or(1.0, |neighbor| neighbor.distance_squared.sqrt());
+            expected.retain(|neighbor| neighbor.distance_squared <= middle * middle);
+            let found = tree.nearest_within(*position, 16, middle);
+            assert_eq!(found, expected, "{name}, point {point}");
+        }
+    }
+}
+
+#[test]
 fn within_equals_a_brute_force_search_by_every_method() {
     for (name, positions) in clouds() {
         let bounds = positions.iter().filter(|p| p.is_finite()).copied();
