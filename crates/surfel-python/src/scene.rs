@@ -82,7 +82,9 @@ impl OpenScene {
             return Ok(last);
         }
         let log = ProgressLog::new(progress);
-        let view = self.install(|scene| scene.view(&description, &log))?;
+        let mut applied = description.clone();
+        applied.apply_object_settings()?;
+        let view = self.install(|scene| scene.view(&applied, &log))?;
         let choices = log.into_choices();
         let view = Arc::new(ChosenView { description, view, choices });
         *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(view.clone());
@@ -215,7 +217,7 @@ impl PyScene {
             // No lock is held while the interpreter may run another thread, which could wait for it.
             let before = self.description();
             let description = object.clone().added_to(py, &before)?;
-            let number = description.objects.len() - 1 + usize::from(!description.files.is_empty());
+            let number = description.objects.len() - 1 + usize::from(has_files(&description));
             let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
             if state.description == before {
                 *state = State { description, opened: Slot::default() };
@@ -483,4 +485,12 @@ pub fn _unread(
         }
     }
     Ok(PyScene::new(with_keys(py, &description, keys)?))
+}
+
+/// True if files come before the objects: not if settings by name make an object of each.
+fn has_files(description: &SceneDescription) -> bool {
+    let mut applied = description.clone();
+    // Settings may name what is added later.
+    let _ = applied.apply_object_settings();
+    !applied.files.is_empty()
 }

@@ -51,6 +51,17 @@ def test_added_things_follow_files(hill):
     assert scene.cast_rays([down(0, 0), down(10, 0)])["geometry_ids"].tolist() == [0, 1]
 
 
+def test_a_file_with_settings_of_its_own_comes_after_what_is_added(hill):
+    scene = surfel.load(hill, object_settings=["hill.xyz:color=elevation"])
+    assert scene.add(SQUARE, translate=(10, 0, 0)) == 0
+    assert scene.cast_rays([down(0, 0), down(10, 0)])["geometry_ids"].tolist() == [1, 0]
+
+
+def test_settings_by_name_hold_for_pictures(hill):
+    red = surfel.load(hill, object_settings=["hill.xyz:color=#ff0000"]).render(**SMALL)
+    assert (red.color == surfel.load(hill, color="#ff0000").render(**SMALL).color).all()
+
+
 def test_all_files_together_have_one_number(hill, tmp_path):
     house = tmp_path / "house.obj"
     house.write_text("v 4 -1 0\nv 6 -1 0\nv 6 1 0\nv 4 1 0\nf 1 2 3 4\n")

@@ -1,5 +1,6 @@
 """The viewer: its page, its end, and several at once."""
 
+import json
 import time
 import urllib.error
 import urllib.request
@@ -33,6 +34,13 @@ def test_programs_get_pictures_of_clouds_of_arrays(points):
             time.sleep(0.05)
         picture = fetch(viewer.link + "render?resolution=32x24&spp=1&light-samples=1")
         assert picture.startswith(b"\x89PNG")
+
+
+def test_the_number_of_threads_of_a_scene_holds_for_its_viewer(hill):
+    with surfel.view(surfel.load(hill, threads=3)) as viewer:
+        while b"ready" not in fetch(viewer.link + "healthz"):
+            time.sleep(0.05)
+        assert json.loads(fetch(viewer.link + "stats"))["info"]["threads"] == 3
 
 
 def test_ports_in_use_are_refused(hill):

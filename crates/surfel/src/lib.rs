@@ -94,6 +94,7 @@ pub use progress_log::Choice;
 pub use raycast::RayHit;
 pub use renderer::SceneRenderer;
 pub use resolve::{Resolved, resolve};
+pub use thread_pools::RendererOnThreads;
 
 /// The crates that this one stands on.
 #[cfg(feature = "gpu")]

@@ -107,10 +107,15 @@ impl LiveScene {
             made_for_previews: Made::default(),
             renderer: SceneRenderer::new(&description.run)?,
             hidden_walls: OnceLock::new(),
-            preparation_threads: start_threads(|_| ())?,
-            picture_threads: start_threads(|_| lower_priority())?,
+            preparation_threads: start_threads(&description.run, |_| ())?,
+            picture_threads: start_threads(&description.run, |_| lower_priority())?,
             use_case,
         })
+    }
+
+    /// Returns the number of threads that prepare and render.
+    pub fn n_threads(&self) -> usize {
+        self.preparation_threads.current_num_threads()
     }
 
     /// Frees everything that can be made again from the files' content. Views that are still held stay whole.

@@ -33,8 +33,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use surfel::resolve::check_files;
-use surfel::{SceneDescription, SceneRenderer};
+use surfel::{RendererOnThreads, SceneDescription, SceneRenderer};
 use surfel_core::progress::Progress;
+use surfel_core::render::Renderer;
 use surfel_web::{Error, FrameAncestors, SceneProvider, Server, TlsError, TlsIdentity};
 
 /// Arguments of `surfel view`.
@@ -131,7 +132,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
 /// Serves a description until `report` is cancelled.
 fn serve(
     server: Server,
-    renderer: SceneRenderer,
+    renderer: impl Renderer + Send + 'static,
     description: SceneDescription,
     typed: Vec<PathBuf>,
     report: &Report,
@@ -168,7 +169,9 @@ impl RunningViewer {
         let report = Report::new(Verbosity::Quiet);
         let is_stopped = report.cancellation();
         let typed = description.files.clone();
-        let renderer = SceneRenderer::new(&description.run).map_err(rejection)?;
+        let renderer = SceneRenderer::new(&description.run)
+            .and_then(|renderer| RendererOnThreads::new(renderer, &description.run))
+            .map_err(rejection)?;
         let run = move || serve(server, renderer, description, typed, &report);
         let thread = std::thread::Builder::new().name("viewer".into()).spawn(run);
         let thread = thread.map_err(|source| Error::Io { address: link.clone(), source })?;

@@ -285,7 +285,7 @@ impl SceneProvider for FileSceneProvider {
             "classes": classes(loaded),
             "has_returns": has_returns(loaded),
             "columns": filter_columns(loaded),
-            "threads": rayon::current_num_threads(),
+            "threads": self.scene.n_threads(),
             "simd": self.scene.simd().name(),
             "coordinate_system": loaded.file_info().coordinate_system,
             "unit": unit_symbol(loaded, &self.startup),
