@@ -5,7 +5,7 @@ use crate::dynamic_resolution::ResolutionController;
 use crate::encode::{self, Pixels};
 use crate::frame::{Frame, PlacedFile, Quality};
 use crate::keyframe::{Keyframe, keyframe_size};
-use crate::sample_counts::{REST_SAMPLES, Stage, of_samples, rest_samples};
+use crate::sample_counts::{Stage, after_pass, is_sent, of_samples, rest_samples};
 use crate::scene_provider::{PicturePart, PreparedScene};
 use crate::view::ViewState;
 use std::sync::Arc;
@@ -33,8 +33,12 @@ pub struct Accumulator {
     coverage_sum: Vec<f32>,
     /// Number of samples that all rows have.
     n_samples: u32,
-    /// Number of rows, from the top, that have one sample more.
+    /// Number of rows, from the top, that have the samples of one more pass.
     n_rows: u32,
+    /// Number of samples of that pass.
+    n_pass_samples: u32,
+    /// Number of rows of the last slice.
+    n_slice_rows: u32,
     secs_per_row: f64,
     /// Duration of the last slice in seconds; a lower bound if it was cancelled.
     slice_secs: f64,
@@ -82,9 +86,11 @@ const DRAFT_JPEG_QUALITY: u8 = 80;
 /// JPEG quality of refined pictures, from 1 to 100.
 const REFINED_JPEG_QUALITY: u8 = 92;
 /// Intended duration of a slice of the finished picture, in seconds.
-const SLICE_SECS: f64 = 0.015;
+const SLICE_SECS: f64 = 0.008;
 /// Minimum number of rows of a slice, unless rows take long: each slice has a fixed cost.
 const MIN_SLICE_ROWS: u32 = 8;
+/// Maximum ratio of the rows of a slice to those of the one before.
+const MAX_SLICE_GROWTH: f64 = 2.0;
 
 impl Accumulator {
     /// Version of the view that the last draft showed.
@@ -237,8 +243,9 @@ impl Accumulator {
             ..full
         };
         let is_rasterized = uses_rasterizer(&prepared.flat)?;
-        let slice = self.next_slice((width, height), is_rasterized);
+        let slice = self.next_slice((width, height), target, is_rasterized);
         let n_rows = slice.rows.1 - slice.rows.0;
+        self.n_slice_rows = n_rows;
         let Some(scene) = self.scene(prepared, view) else { return Ok(false) };
         let deadline = Deadline::new(progress, n_rows == 1 || is_rasterized);
         let start = Instant::now();
@@ -250,12 +257,8 @@ impl Accumulator {
         let has_overlay = view.scene.as_ref().is_some_and(|scene| scene.overlay.is_some());
         self.add(&image, slice, width as usize * height as usize, has_overlay);
         if self.n_rows == height {
-            (self.n_samples, self.n_rows) = (self.n_samples + 1, 0);
-            // Each picture that is sent has twice as many samples as the one before, at rest four times as many.
-            let n = self.n_samples;
-            let is_sent =
-                if of_samples < n { REST_SAMPLES.contains(&n) } else { n.is_power_of_two() };
-            self.has_frame = is_sent || n == of_samples;
+            (self.n_samples, self.n_rows) = (slice.samples.1, 0);
+            self.has_frame = is_sent(self.n_samples, of_samples);
         }
         Ok(true)
     }
@@ -389,8 +392,10 @@ impl Accumulator {
         };
         if !known.has_colors && known.version == self.version && is_complete && 0 < self.n_samples {
             let (sum, n_samples, n_rows) = (&self.sum, self.n_samples, self.n_rows);
+            let n_pass_samples = self.n_pass_samples;
             known.keyframe.set_colors(size, |x, y| {
-                let scale = 1.0 / (n_samples + u32::from(y < n_rows)) as f32;
+                let n_more = if y < n_rows { n_pass_samples } else { 0 };
+                let scale = 1.0 / (n_samples + n_more) as f32;
                 let [r, g, b, _] = sum[(y * size.0 + x) as usize];
                 [r, g, b].map(|channel| scale * channel)
             });
@@ -410,16 +415,24 @@ impl Accumulator {
         Some(keyframe.draw(&view, traced))
     }
 
-    /// Returns the next rows. The rasterizer draws all points for any number of rows, so it gets all rows.
-    fn next_slice(&self, (width, height): (u32, u32), is_rasterized: bool) -> RenderRegion {
-        let affordable = SLICE_SECS / self.secs_per_row.max(1e-6);
+    /// Returns the next rows and samples toward `target`. The rasterizer draws all points for any number of rows, so it gets
+    /// all rows.
+    fn next_slice(
+        &self,
+        (width, height): (u32, u32),
+        target: u32,
+        is_rasterized: bool,
+    ) -> RenderRegion {
+        // Below a cheap sky, rows may take long.
+        let affordable = (SLICE_SECS / self.secs_per_row.max(1e-6))
+            .min(MAX_SLICE_GROWTH * f64::from(self.n_slice_rows.max(MIN_SLICE_ROWS)));
         let is_slow = SLICE_TIMEOUT.as_secs_f64() <= f64::from(MIN_SLICE_ROWS) * self.secs_per_row;
         let n_rows = match is_rasterized {
             true => height,
             false => (affordable as u32).max(if is_slow { 1 } else { MIN_SLICE_ROWS }),
         };
         let rows = (self.n_rows, height.min(self.n_rows.saturating_add(n_rows)));
-        let samples = (self.n_samples, self.n_samples + 1);
+        let samples = (self.n_samples, after_pass(self.n_samples, target));
         RenderRegion { rows, columns: (0, width), samples }
     }
 
@@ -431,15 +444,16 @@ impl Accumulator {
             self.coverage_sum.resize(if has_overlay { n_pixels } else { 0 }, 0.0);
         }
         let start = slice.rows.0 as usize * image.width as usize;
+        let weight = slice.n_samples() as f32;
         for (sum, color) in self.sum[start..].iter_mut().zip(&image.color) {
             for (sum, channel) in sum.iter_mut().zip(color) {
-                *sum += channel;
+                *sum += weight * channel;
             }
         }
         for (sum, coverage) in self.coverage_sum.iter_mut().skip(start).zip(&image.coverage) {
-            *sum += coverage;
+            *sum += weight * coverage;
         }
-        self.n_rows = slice.rows.1;
+        (self.n_rows, self.n_pass_samples) = (slice.rows.1, slice.n_samples());
     }
 
     /// The flat scene with the client's camera; none without a camera.
