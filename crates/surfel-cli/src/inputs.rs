@@ -1,10 +1,20 @@
 //! Files as they are typed: folders, patterns and standard input become files.
 
 use crate::Usage;
+use crate::interrupt::is_cancelled;
 use anyhow::{Context, anyhow};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::time::Duration;
 use surfel::description::pattern::{file_names, matching};
+
+/// Size of a chunk of standard input.
+const CHUNK_BYTES: u64 = 1 << 20;
+/// Number of chunks that are read before one is written.
+const CHUNKS_AHEAD: usize = 4;
+/// Time between two looks at a signal.
+const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Returns the files that words of a command line stand for.
 ///
@@ -56,17 +66,49 @@ fn files_of_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
 
 /// Copies standard input to a temporary file, whose extension says what its first bytes are.
 fn standard_input() -> anyhow::Result<PathBuf> {
-    let mut bytes = Vec::new();
-    std::io::stdin().lock().read_to_end(&mut bytes).context("standard input cannot be read")?;
-    let format = surfel_formats::detect_bytes(&bytes);
-    let extension = format.and_then(|format| format.extensions.first()).unwrap_or(&"xyz");
-    let name = format!("surfel-stdin-{}.{extension}", std::process::id());
-    let path = std::env::temp_dir().join(name);
+    let path = std::env::temp_dir().join(format!("surfel-stdin-{}.xyz", std::process::id()));
     // A process of the same number may have been killed before it could remove its file.
     let _ = std::fs::remove_file(&path);
     // Only a new file: a link of this name could lead anywhere.
     let mut file = std::fs::File::create_new(&path).with_context(|| path.display().to_string())?;
     crate::cleanup::remove_at_exit(path.clone());
-    file.write_all(&bytes).with_context(|| path.display().to_string())?;
-    Ok(path)
+    for chunk in chunks_of_stdin()? {
+        let chunk = chunk?.context("standard input cannot be read")?;
+        file.write_all(&chunk).with_context(|| path.display().to_string())?;
+    }
+    drop(file);
+    let format = surfel_formats::detect_file(&path)?;
+    let extension = format.and_then(|format| format.extensions.first()).unwrap_or(&"xyz");
+    let named = path.with_extension(extension);
+    std::fs::rename(&path, &named).with_context(|| named.display().to_string())?;
+    crate::cleanup::remove_at_exit(named.clone());
+    Ok(named)
+}
+
+/// Returns standard input in chunks, until it ends or a signal cancels the run: a thread of its own waits for a writer
+/// that may never write.
+fn chunks_of_stdin()
+-> anyhow::Result<impl Iterator<Item = surfel_core::Result<std::io::Result<Vec<u8>>>>> {
+    let (sender, receiver) = sync_channel(CHUNKS_AHEAD);
+    let read = move || {
+        loop {
+            let mut chunk = Vec::new();
+            let read = std::io::stdin().lock().take(CHUNK_BYTES).read_to_end(&mut chunk);
+            let is_last = !matches!(read, Ok(1..));
+            if !matches!(read, Ok(0)) && sender.send(read.map(|_| chunk)).is_err() || is_last {
+                return;
+            }
+        }
+    };
+    std::thread::Builder::new().name("stdin".into()).spawn(read)?;
+    Ok(std::iter::from_fn(move || {
+        while !is_cancelled() {
+            match receiver.recv_timeout(SIGNAL_INTERVAL) {
+                Ok(chunk) => return Some(Ok(chunk)),
+                Err(RecvTimeoutError::Disconnected) => return None,
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+        }
+        Some(Err(surfel_core::Error::Cancelled))
+    }))
 }

@@ -270,9 +270,13 @@ pub(crate) fn is_scene(input: &Input) -> bool {
     probe(input).is_some_and(|format| matches!(format.read, Reader::Scene(_)))
 }
 
-/// Returns the format that the first bytes of a file show, if they show one.
-pub fn detect_bytes(bytes: &[u8]) -> Option<&'static Format> {
-    probe(&Input::from_bytes("-", bytes))
+/// Returns the format that the content of a file shows, if it shows one.
+///
+/// # Errors
+///
+/// Fails if the file cannot be read.
+pub fn detect_file(path: &Path) -> Result<Option<&'static Format>> {
+    Ok(probe(&Input::open(path)?))
 }
 
 fn probe(input: &Input) -> Option<&'static Format> {

@@ -55,7 +55,7 @@ mod environment;
 pub use environment::{HdrImage, load_environment_map, load_environment_map_bytes};
 pub use error::{Error, Location, Result};
 pub use file::{check_output_path, load_text, save_text};
-pub use format::{FORMATS, Format, detect_bytes};
+pub use format::{FORMATS, Format, detect_file};
 pub use gltf::{load_gltf, load_gltf_bytes};
 pub use graph::{is_scene, load_graph, load_graph_bytes};
 pub use image_file::{

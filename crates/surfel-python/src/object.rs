@@ -80,11 +80,16 @@ fn invalid(py: Python<'_>, error: Invalid) -> PyErr {
 
 /// Reads a 4x4 matrix as 16 numbers, row by row.
 fn matrix(transform: &Bound<'_, PyAny>) -> PyResult<Value> {
-    let rows: Vec<Vec<f64>> =
-        transform.call_method0("tolist").unwrap_or(transform.clone()).extract()?;
+    let rows = transform.call_method0("tolist").unwrap_or(transform.clone());
+    let rows: Vec<Vec<f64>> = rows.extract().unwrap_or_default();
+    let invalid = |message| Err(invalid_array(transform.py(), message));
     if rows.len() != 4 || rows.iter().any(|row| row.len() != 4) {
-        let message = "transform: expected a 4x4 matrix, row by row";
-        return Err(invalid_array(transform.py(), message));
+        return invalid("transform: expected a 4x4 matrix, row by row");
+    }
+    if rows[3] != [0.0, 0.0, 0.0, 1.0] {
+        return invalid(
+            "transform: expected 0, 0, 0, 1 as the last row; projections are not shown",
+        );
     }
     to_value("transform", &rows.concat().into_pyobject(transform.py())?)
 }

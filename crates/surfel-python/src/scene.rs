@@ -19,11 +19,15 @@ use std::time::Duration;
 use surfel::description::{Invalid, is_scene_file};
 use surfel::live_scene::{LiveScene, UseCase};
 use surfel::live_view::LiveView;
+use surfel::overlay::faults;
 use surfel::progress_log::{Choice, ProgressLog};
 use surfel::ray_query::{RayCaster, WorldRays};
+use surfel::resolve::check_files;
 use surfel::{Error, RenderedImage, SceneDescription};
 use surfel_core::image::{Image, class_color, class_name};
+use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
+use surfel_core::render::uses_rasterizer;
 use surfel_core::scene::Background;
 use surfel_core::scene::color::Legend;
 
@@ -84,7 +88,14 @@ impl OpenScene {
         let log = ProgressLog::new(progress);
         let mut applied = description.clone();
         applied.apply_object_settings()?;
+        if applied.materials != self.scene.startup().materials {
+            check_files(&applied)?;
+        }
         let view = self.install(|scene| scene.view(&applied, &log))?;
+        let up = view.description.world.up.unwrap_or(Vec3::Z);
+        if let Some(fault) = faults(&applied.picture, &view.flat.camera, up).into_iter().next() {
+            return Err(fault.into());
+        }
         let choices = log.into_choices();
         let view = Arc::new(ChosenView { description, view, choices });
         *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(view.clone());
@@ -159,7 +170,10 @@ impl PyScene {
         let (startup, slot) = self.state();
         let description = with_keys(py, &startup, keys)?;
         work::run(py, progress, |progress| {
-            let scene = opened(&slot, &startup, progress)?;
+            let scene = match is_read_alike(&startup, &description) {
+                true => opened(&slot, &startup, progress)?,
+                false => Arc::new(OpenScene::open(&description, progress)?),
+            };
             let view = scene.view(description, progress)?;
             Ok((scene, view))
         })
@@ -175,6 +189,10 @@ impl PyScene {
     ) -> PyResult<(T, Arc<ChosenView>)> {
         let py = rays.py();
         let (scene, chosen) = self.open_view(py, None, progress)?;
+        if uses_rasterizer(&chosen.view.flat).unwrap_or(false) {
+            let advice = "points have no surface that rays meet; choose another, as `smooth`";
+            return Err(invalid_setting(py, Invalid::at("surface", advice)));
+        }
         let local = rays.in_scene(&chosen.view, t_range)?;
         let answers = work::run(py, progress, |progress| {
             scene.install(|scene| query(&chosen.view.ray_caster(scene.simd()), &local, progress))
@@ -313,6 +331,12 @@ impl PyScene {
         progress: Option<&Bound<'_, PyAny>>,
         keys: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyImage> {
+        for key in ["output", "height_map"] {
+            if keys.is_some_and(|keys| keys.contains(key).unwrap_or(false)) {
+                let advice = "a file that the program writes; a picture of Python is saved by `image.save(path)`";
+                return Err(invalid_setting(py, Invalid::at(key, advice)));
+            }
+        }
         self.with_view(py, keys, progress, |scene, ChosenView { view, choices, .. }, progress| {
             let (image, _) = scene.picture(view, layers, progress)?;
             let point_ids = point_ids(view, &image);
@@ -485,6 +509,14 @@ pub fn _unread(
         }
     }
     Ok(PyScene::new(with_keys(py, &description, keys)?))
+}
+
+/// True if a scene that was read under one description can be shown under another. Files are checked and environment maps
+/// are read when a scene is opened, and threads are started.
+fn is_read_alike(startup: &SceneDescription, description: &SceneDescription) -> bool {
+    startup.light.environment == description.light.environment
+        && startup.camera.name == description.camera.name
+        && startup.run == description.run
 }
 
 /// True if files come before the objects: not if settings by name make an object of each.

@@ -83,6 +83,7 @@ pub fn view(
     open: bool,
 ) -> PyResult<PyViewer> {
     let description = scene.get().description();
+    description.check_is_not_empty().map_err(|error| invalid_setting(py, error))?;
     let running = RunningViewer::start(description, port)
         .map_err(|error| exception(py, "Error", &error.to_string()))?;
     let (link, frame_ancestors) = (running.link.clone(), running.frame_ancestors.clone());

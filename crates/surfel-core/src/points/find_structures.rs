@@ -12,6 +12,7 @@ use super::neighbors::{KdTree, Neighbor, Neighborhood};
 use super::normals::{PlaneFit, fit_plane};
 use super::radius::kth_distance;
 use super::scan_lines::widen_lines;
+use super::see_through::open_see_through_discs;
 use super::solids::{ball_radius, clamp_solids, settle};
 use super::stray_points::limit_stray_points;
 use super::structure::{PointShape, Structure, StructureReport, is_line, is_surface};
@@ -96,6 +97,9 @@ pub fn find_structures(
     shapes.par_iter_mut().zip(&structures).enumerate().for_each(finish);
     limit_crowded_discs(tree, radii, &mut shapes, progress)?;
     narrow_lone_discs(tree, radii, typical.radius, widened, &mut shapes, progress)?;
+    if is_land {
+        open_see_through_discs(tree, radii, typical.radius, &mut shapes, progress)?;
+    }
     clamp_solids(&mut shapes, Structure::Line, typical.radius);
     clamp_solids(&mut shapes, Structure::Scatter, typical.radius);
     limit_stray_points(tree, &mut shapes, progress)?;

@@ -44,8 +44,10 @@ def classes(values, n_points):
     import numpy
 
     array = _shaped("classification", as_array("classification", values), (n_points,))
-    if array.dtype.kind not in "iub" or (array.size and not 0 <= array.min() <= array.max() <= 255):
+    if array.dtype.kind not in "iub":
         raise InvalidArray(f"classification: found dtype {array.dtype}, expected integers from 0 to 255")
+    if array.size and not 0 <= array.min() <= array.max() <= 255:
+        raise InvalidArray(f"classification: found {array.min()} to {array.max()}, expected 0 to 255")
     return numpy.ascontiguousarray(array, dtype=numpy.uint8)
 
 
@@ -70,6 +72,9 @@ def colors(values, n_points):
     if array.ndim != 2 or len(array) != n_points or array.shape[1] not in (3, 4):
         raise InvalidArray(f"colors: found shape {array.shape}, expected ({n_points}, 3) or ({n_points}, 4)")
     array = array[:, :3]
+    # Tables hold all integers as int64; those up to 255 are of eight bits.
+    if array.dtype.kind in "iu" and array.dtype.itemsize > 2 and array.size and 0 <= array.min() and array.max() <= 65535:
+        array = array.astype(numpy.uint8 if array.max() <= 255 else numpy.uint16)
     if array.dtype == numpy.uint8:
         return numpy.ascontiguousarray(array, dtype=numpy.uint16) * numpy.uint16(257)
     if array.dtype.kind == "f":
@@ -78,7 +83,9 @@ def colors(values, n_points):
             raise InvalidArray(f"colors: found {array.min()} to {array.max()}, expected 0 to 1 in {array.dtype}")
         return numpy.rint(array * 65535).astype(numpy.uint16)
     if array.dtype != numpy.uint16:
-        raise InvalidArray(f"colors: found dtype {array.dtype}, expected uint8, uint16, or numbers from 0 to 1")
+        expected = "integers from 0 to 255 or 65535, or numbers from 0 to 1"
+        found = f"{array.min()} to {array.max()}" if array.size and array.dtype.kind in "iu" else "numbers"
+        raise InvalidArray(f"colors: found {found} of dtype {array.dtype}, expected {expected}")
     return numpy.ascontiguousarray(array)
 
 

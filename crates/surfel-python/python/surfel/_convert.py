@@ -37,14 +37,16 @@ def _if_filled(**columns):
 
 
 def _laspy(las):
-    if not _has(las, "X", "Y", "Z", "header", "point_format"):
+    if not _has(las, "X", "Y", "Z", "point_format"):
         return None
+    # A record of points holds scales and offsets itself, a file in its header.
+    placed = getattr(las, "header", las)
     names = [name for name in las.point_format.dimension_names if name not in ("X", "Y", "Z", *_COLORS)]
     columns = {name: as_array(name, las[name]) for name in names}
     result = {
         "points": tuple(_integers(axis) for axis in (las.X, las.Y, las.Z)),
-        "scales": las.header.scales,
-        "offsets": las.header.offsets,
+        "scales": placed.scales,
+        "offsets": placed.offsets,
         "intensity": columns.pop("intensity", None),
         "classification": columns.pop("classification", None),
         "scalars": {name: values for name, values in columns.items() if values.ndim == 1},

@@ -1,0 +1,174 @@
+//! Discs through which a scanner saw the land below: the wires of a power line side by side, the lattice of a pylon.
+//!
+//! Wires that lie a few spacings apart are a plane for their neighbours. A roof hides the land below it, except beyond its
+//! edges; below a wire land was measured all around.
+
+use super::neighbors::KdTree;
+use super::solids::settle;
+use super::structure::{PointShape, Structure};
+use crate::error::Result;
+use crate::math::Vec3;
+use crate::progress::Progress;
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// Number of points nearest to a disc as seen from above, among which the land is sought.
+const N_AROUND: usize = 48;
+/// Minimum height of a disc above the land, in radii.
+const MIN_HEIGHT: f32 = 2.0;
+/// Minimum ratio of the radius of a disc to the typical one: dense points hide what lies below.
+const MIN_RATIO: f32 = 1.0;
+/// Minimum distance as seen from above of a point of the land, in typical radii: below a point of a wall lie others of it.
+const MIN_DISTANCE: f32 = 0.5;
+/// Width of the cells that tell which discs stand high, in typical radii.
+const CELL: f32 = 4.0;
+
+/// Makes lines and scattered points of the discs through which land was seen. Z points up.
+///
+/// # Errors
+///
+/// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+pub fn open_see_through_discs(
+    tree: &KdTree,
+    radii: &[f32],
+    typical_radius: f32,
+    shapes: &mut [PointShape],
+    progress: &dyn Progress,
+) -> Result<()> {
+    let positions = tree.positions();
+    let lowest = LowestPoints::new(positions, CELL * typical_radius);
+    let is_candidate = |point: &usize| {
+        let shape = &shapes[*point];
+        let height = positions[*point].z - lowest.around(positions[*point]);
+        shape.is_disc()
+            && MIN_RATIO * typical_radius < shape.radius
+            && MIN_HEIGHT * shape.radius < height
+    };
+    let candidates: Vec<usize> = (0..shapes.len()).into_par_iter().filter(is_candidate).collect();
+    if candidates.is_empty() {
+        return Ok(());
+    }
+    let plan: Vec<Vec3> = positions.iter().map(|position| position.with_z(0.0)).collect();
+    let plan = KdTree::new(&plan, progress)?;
+    let is_open = |point: &usize| -> Result<bool> {
+        progress.check()?;
+        let far = MIN_DISTANCE * typical_radius;
+        Ok(sees_land(&plan, positions, *point, shapes[*point].radius, far))
+    };
+    let is_open = candidates.par_iter().map(is_open).collect::<Result<Vec<_>>>()?;
+    let opened = candidates.iter().zip(is_open).filter(|(_, is_open)| *is_open);
+    let opened: Vec<usize> = opened.map(|(point, _)| *point).collect();
+    let settled = |point: &usize| {
+        let mut shape = shapes[*point];
+        settle(tree, *point, radii[*point], Structure::Line, &mut shape);
+        shape
+    };
+    let settled: Vec<PointShape> = opened.par_iter().map(settled).collect();
+    opened.into_iter().zip(settled).for_each(|(point, shape)| shapes[point] = shape);
+    Ok(())
+}
+
+/// True if points farther than `min_distance` on all sides of a disc, as seen from above, lie far below it.
+fn sees_land(
+    plan: &KdTree,
+    positions: &[Vec3],
+    point: usize,
+    radius: f32,
+    min_distance: f32,
+) -> bool {
+    let own = positions[point];
+    let mut octants = 0u8;
+    for neighbor in plan.nearest(own.with_z(0.0), N_AROUND, Some(point as u32)) {
+        let offset = positions[neighbor.index as usize] - own;
+        let is_far = min_distance * min_distance < neighbor.distance_squared;
+        if is_far && offset.z < -MIN_HEIGHT * radius {
+            let turn = offset.y.atan2(offset.x) / std::f32::consts::TAU;
+            octants |= 1 << ((8.0 * turn.rem_euclid(1.0)) as u32 % 8);
+        }
+    }
+    let empty = !octants;
+    empty & empty.rotate_right(1) == 0
+}
+
+/// The heights of the lowest points in the cells of a grid in X and Y.
+struct LowestPoints {
+    cells: HashMap<[i64; 2], f32>,
+    width: f32,
+}
+
+impl LowestPoints {
+    fn new(positions: &[Vec3], width: f32) -> Self {
+        let mut lowest = Self { cells: HashMap::new(), width };
+        for position in positions {
+            let cell = lowest.cell(*position);
+            let height = lowest.cells.entry(cell).or_insert(f32::INFINITY);
+            *height = height.min(position.z);
+        }
+        lowest
+    }
+
+    fn cell(&self, position: Vec3) -> [i64; 2] {
+        [position.x, position.y].map(|coordinate| (coordinate / self.width).floor() as i64)
+    }
+
+    /// Returns the height of the lowest point in the cell of a position.
+    fn around(&self, position: Vec3) -> f32 {
+        self.cells.get(&self.cell(position)).copied().unwrap_or(position.z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Wires side by side over land, and roofs.
+
+    use super::*;
+    use crate::math::Random;
+    use crate::points::{PointCloud, Preparation, PreparedCloud, prepare};
+    use crate::progress::NoProgress;
+
+    /// Prepares points over land of 200x200 with a spacing of 0.7.
+    fn over_land(mut points: Vec<Vec3>) -> (PreparedCloud, Vec<Structure>) {
+        let mut random = Random::new(1, 0);
+        let mut place = || 200.0 * (random.next_f32() - 0.5);
+        points.extend((0..80_000).map(|_| Vec3::new(place(), place(), 0.0)));
+        let cloud = PointCloud::from_positions(points);
+        let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+        let structures = cloud.structures().unwrap();
+        (cloud, structures)
+    }
+
+    #[test]
+    fn wires_side_by_side_do_not_become_sheets() {
+        let mut random = Random::new(2, 0);
+        let mut noise = || 0.05 * (random.next_f32() - 0.5);
+        let wire = |y: f32| (0..400).map(move |i| Vec3::new(0.4 * (i - 200) as f32, y, 18.0));
+        let wires = [-3.0, -1.5, 0.0, 1.5, 3.0].into_iter().flat_map(wire);
+        let wires: Vec<Vec3> = wires.map(|p| p + Vec3::new(0.0, noise(), noise())).collect();
+        let n_wires = wires.len();
+        let (cloud, structures) = over_land(wires);
+        let n_discs = structures[..n_wires].iter().filter(|s| **s == Structure::Surface).count();
+        assert!(n_discs < n_wires / 50, "{n_discs} of {n_wires}");
+        let n_wide = cloud.radii()[..n_wires].iter().filter(|radius| 1.2 < **radius).count();
+        assert!(n_wide < n_wires / 50, "{n_wide} of {n_wires}");
+        assert!(!structures[n_wires..].contains(&Structure::Line));
+    }
+
+    #[test]
+    fn sparse_roofs_stay_surfaces() {
+        let mut random = Random::new(3, 0);
+        let mut place = || 12.0 * (random.next_f32() - 0.5);
+        let roof: Vec<Vec3> = (0..150).map(|_| Vec3::new(place(), place(), 8.0)).collect();
+        let mut random = Random::new(1, 0);
+        let mut place = || 200.0 * (random.next_f32() - 0.5);
+        let land = (0..80_000).map(|_| Vec3::new(place(), place(), 0.0));
+        // The roof hides the land below it.
+        let land = land.filter(|p| 6.0 < p.x.abs().max(p.y.abs()));
+        let n_roof = roof.len();
+        let cloud = PointCloud::from_positions(roof.into_iter().chain(land).collect());
+        let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+        let structures = cloud.structures().unwrap();
+        let is_surface = |structure: &&Structure| **structure == Structure::Surface;
+        let n_surface = structures[..n_roof].iter().filter(is_surface).count();
+        assert!(n_roof - n_roof / 20 < n_surface, "{n_surface} of {n_roof}");
+    }
+}
