@@ -27,12 +27,28 @@ def test_laspy_coordinates_are_exact(tmp_path):
     assert numpy.isfinite(scene.render().depth).any()
 
 
+def test_laspy_points_are_read_as_their_file():
+    laspy = pytest.importorskip("laspy")
+    las = laspy.LasData(laspy.LasHeader(version="1.2", point_format=2))
+    las.x, las.y, las.z = hill_points().T
+    las.red, las.green, las.blue = COLORS.T
+    high = surfel.Cloud(las.points[numpy.asarray(las.z) > 0.2])
+    assert 0 < len(high) < 2500 and high.points[:, 2].min() > 0.19
+    assert (surfel.Cloud(las.points).colors == surfel.Cloud(las).colors).all()
+
+
 def test_laspy_colours_of_eight_bits_are_bright():
     laspy = pytest.importorskip("laspy")
     las = laspy.LasData(laspy.LasHeader(version="1.2", point_format=2))
     las.x, las.y, las.z = hill_points().T
     las.red, las.green, las.blue = COLORS.T
     assert (surfel.Cloud(las).colors == COLORS * 257).all()
+
+
+def test_pandas_colours_of_any_integers_are_read():
+    pandas = pytest.importorskip("pandas")
+    columns = dict(zip("xyz", hill_points().T)) | dict(zip(("red", "green", "blue"), COLORS.T))
+    assert (surfel.Cloud(pandas.DataFrame(columns)).colors == COLORS * 257).all()
 
 
 def test_pandas_columns_become_scalars():

@@ -132,3 +132,32 @@ def test_parents_move_their_children(points):
     scene.add(surfel.Cloud(points), name="ground", translate=(5, 0, 0))
     scene.add(SQUARE, parent="ground", translate=(0, 5, 3))
     assert scene.cast_rays([down(5, 5)])["t_hit"].tolist() == [7.0]
+
+
+def test_keys_that_need_another_opening_count(hill, tmp_path):
+    scene = surfel.load(hill, **SMALL)
+    with pytest.raises(surfel.MissingFile, match="no.hdr"):
+        scene.render(environment=tmp_path / "no.hdr")
+    with pytest.raises(surfel.OutOfMemory):
+        scene.render(memory_limit="1K")
+    with pytest.raises(surfel.InvalidSetting, match="camera.name"):
+        scene.render(camera_name="nobody")
+    with pytest.raises(surfel.InvalidSetting, match="no file or object `nope`"):
+        scene.render(material="nope=mirror")
+    with pytest.raises(surfel.InvalidSetting, match="scale_bar"):
+        scene.render(scale_bar=True)
+    with pytest.raises(surfel.InvalidSetting, match="output"):
+        scene.render(output="picture.png")
+    assert (scene.render(threads=1).color == scene.render().color).all()
+
+
+def test_rays_need_a_surface(points):
+    scene = surfel.Scene(surface="points")
+    scene.add(surfel.Cloud(points))
+    with pytest.raises(surfel.InvalidSetting, match="points have no surface"):
+        scene.cast_rays([down(0, 0)])
+
+
+def test_a_viewer_needs_something_to_show():
+    with pytest.raises(surfel.InvalidSetting, match="object"):
+        surfel.view(surfel.Scene())

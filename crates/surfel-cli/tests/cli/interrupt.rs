@@ -41,6 +41,22 @@ fn the_first_signal_cancels_rendering_and_leaves_no_file() {
 }
 
 #[test]
+fn a_signal_ends_the_wait_for_standard_input() {
+    let folder = Folder::new();
+    let picture = folder.path("out.png");
+    let mut command = command(&["render", "-", "-o", &picture]);
+    let mut child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let copy = std::env::temp_dir().join(format!("surfel-stdin-{}.xyz", child.id()));
+    while !copy.exists() {
+        assert!(child.try_wait().unwrap().is_none(), "the program ended before its input");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    send("-INT", &child);
+    assert_eq!(wait(&mut child).code(), Some(130));
+    assert!(!copy.exists() && folder.names().is_empty());
+}
+
+#[test]
 fn second_signal_kills_blocked_process() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(30));

@@ -106,7 +106,7 @@ impl StructureReport {
         );
         match n_redundant {
             0 => line,
-            _ => format!("{line}; {n_redundant} points of dense scan lines are left out"),
+            _ => format!("{line}; {n_redundant} more that lie densely on scan lines are not drawn"),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::PointCloud;
 use super::cloud::is_valid_position;
-use crate::math::Vec3;
+use crate::math::{Aabb, Vec3};
 
 /// The inferred up axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +34,15 @@ const MAX_SIDES_RATIO: f64 = 1.5;
 
 /// Minimum ratio of the height of an upright object to its other two sides.
 const MIN_UPRIGHT_RATIO: f64 = 1.3;
+
+/// Thickness of the slabs at the foot and at the head of a figure, as a fraction of its height.
+const FOOT_THICKNESS: f64 = 0.05;
+
+/// Minimum ratio of the footprint of a figure's pedestal to that of its head.
+const MIN_FOOT_RATIO: f64 = 3.0;
+
+/// Minimum ratio of the footprint of a figure's pedestal to that of the whole.
+const MIN_FOOTPRINT: f64 = 0.5;
 
 /// Minimum ratio of each horizontal side to the height of a cloud that counts as flat, as terrain and cities do.
 const MIN_FLAT_RATIO: f64 = 4.0;
@@ -89,7 +98,9 @@ pub fn infer_up(cloud: &PointCloud, convention: &UpConvention) -> InferredUp {
                 "up is -Y: all points lie in the field of view of a depth camera at the origin";
             choice(Vec3::NEG_Y, reason.to_owned())
         }
-        _ => evidence.unwrap_or_else(|| choice(Vec3::Z, "up is +Z, the default".to_owned())),
+        _ => evidence
+            .or_else(|| shape.figure())
+            .unwrap_or_else(|| choice(Vec3::Z, "up is +Z, the default".to_owned())),
     }
 }
 
@@ -146,13 +157,19 @@ struct Ends {
 struct AxisStatistics {
     sides: [f64; 3],
     ends: [Ends; 3],
+    /// Areas in X and Z of the points near both ends of Y.
+    footprints: Ends,
 }
 
 impl AxisStatistics {
     fn of(positions: &[Vec3]) -> Self {
         let sample = sample(positions);
         if sample.is_empty() {
-            return Self { sides: [0.0; 3], ends: [Ends::default(); 3] };
+            return Self {
+                sides: [0.0; 3],
+                ends: [Ends::default(); 3],
+                footprints: Ends::default(),
+            };
         }
         let sorted = [0, 1, 2].map(|axis| {
             let mut values: Vec<f64> = sample.iter().map(|p| f64::from(p[axis])).collect();
@@ -171,7 +188,13 @@ impl AxisStatistics {
             let fraction = |count: usize| count as f64 / values.len() as f64;
             Ends { low: fraction(n_low), high: fraction(values.len() - n_below_high) }
         });
-        Self { sides, ends }
+        let (low, high) = range(&sorted[1]);
+        let thickness = FOOT_THICKNESS * sides[1];
+        let footprints = Ends {
+            low: footprint(&sample, |y| low <= y && y <= low + thickness),
+            high: footprint(&sample, |y| high - thickness <= y && y <= high),
+        };
+        Self { sides, ends, footprints }
     }
 
     /// Returns the axis whose one end has far more points than any other end: a floor or a flat base. The sides of a
@@ -214,6 +237,18 @@ impl AxisStatistics {
         Some(InferredUp { up, reason })
     }
 
+    /// Returns +Y for a figure that is highest along Y, with a wide foot and a narrow head, as a statue on its pedestal.
+    fn figure(&self) -> Option<InferredUp> {
+        let [x, y, z] = self.sides;
+        let Ends { low, high } = self.footprints;
+        let is_figure = 0.0 < low
+            && MIN_UPRIGHT_RATIO * x.max(z) <= y
+            && MIN_FOOT_RATIO * high <= low
+            && MIN_FOOTPRINT * x * z <= low;
+        let reason = "up is +Y: the points form a figure with a wide foot at the low end of Y";
+        is_figure.then(|| InferredUp { up: Vec3::Y, reason: reason.to_owned() })
+    }
+
     /// Returns +Z if the cloud is large, wide and flat in X and Y, as terrain and cities are.
     ///
     /// There is no such rule for Y: a wall in the plane of X and Z is as flat.
@@ -221,6 +256,13 @@ impl AxisStatistics {
         let reason = "up is +Z: the points spread wide over X and Y, as terrain does".to_owned();
         is_wide_and_flat(self.sides).then_some(InferredUp { up: Vec3::Z, reason })
     }
+}
+
+/// Returns the area in X and Z of the points at some heights along Y.
+fn footprint(positions: &[Vec3], is_at: impl Fn(f64) -> bool) -> f64 {
+    let at = positions.iter().filter(|position| is_at(f64::from(position.y)));
+    let size = Aabb::of_points(at.copied()).size();
+    f64::from(size.x) * f64::from(size.z)
 }
 
 /// Returns true for sides along X, Y and Z of terrain.
@@ -351,6 +393,36 @@ mod tests {
         assert_eq!(inferred(statue.iter().copied()), Vec3::Y);
         assert_eq!(inferred(statue.iter().map(|p| Vec3::new(p.x, -p.z, p.y))), Vec3::Z);
         assert_eq!(inferred(statue.iter().map(|p| Vec3::new(p.x, -p.y, p.z))), Vec3::NEG_Y);
+    }
+
+    #[test]
+    fn a_figure_on_a_pedestal_stands_upright() {
+        // A pedestal of which the sides and the top are seen, and a body that tapers to a head.
+        let mut random = Random::new(9, 0);
+        let mut next = || random.next_f32() - 0.5;
+        let mut points: Vec<Vec3> = Vec::new();
+        for i in 0..6000 {
+            let mut p = Vec3::new(next(), 0.3 * next(), next());
+            match i % 5 {
+                0 => p.y = 0.15,
+                side => p[2 * (side % 2)] = if side < 3 { -0.5 } else { 0.5 },
+            }
+            points.push(p);
+        }
+        let body = (0..20_000).map(|_| {
+            let height = next() + 0.5;
+            let turn = std::f32::consts::TAU * next();
+            let radius = 0.35 - 0.25 * height;
+            Vec3::new(radius * turn.cos(), 0.15 + 1.8 * height, radius * turn.sin())
+        });
+        points.extend(body.collect::<Vec<Vec3>>());
+        assert_eq!(inferred(points.iter().copied()), Vec3::Y);
+        let z_up = points.iter().map(|p| Vec3::new(p.x, -p.z, p.y));
+        assert_eq!(inferred(z_up), Vec3::Z);
+        // A car is as wide before as behind.
+        let car = points.iter().map(|p| Vec3::new(p.x, p.y.abs(), p.z));
+        let ends = car.clone().map(|p| Vec3::new(p.x, 2.0 - p.y, p.z)).chain(car);
+        assert_eq!(inferred(ends), Vec3::Z);
     }
 
     #[test]

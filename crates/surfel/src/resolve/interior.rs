@@ -7,7 +7,7 @@ use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Camera, Clip, ClipPlane, Graph, Room, find_room};
 
-/// Returns the room whose inside is to be seen, if the points show one.
+/// Returns the room whose inside is to be seen, if the points show one; reports if one is demanded that they do not show.
 ///
 /// Scenes that move keep their walls, as those before the camera change with time. Trained splats keep theirs too: they
 /// show things from outside as often as rooms from inside, and have no planes as walls.
@@ -16,12 +16,19 @@ pub fn choose_room(
     description: &SceneDescription,
     points: &PointCloud,
     up: Vec3,
+    progress: &dyn Progress,
 ) -> Option<Room> {
-    match description.camera.interior() {
+    let room = match description.camera.interior() {
         Interior::Auto if !scene.moves() && !has_splats(scene) => find_room(points, up, true),
         Interior::On => find_room(points, up, false),
         _ => None,
+    };
+    if room.is_none() && description.camera.interior() == Interior::On {
+        let line = "no room was found: nothing is hidden; stand inside with --camera-position or \
+            --camera-station";
+        progress.choice(line, &["camera.interior"]);
     }
+    room
 }
 
 fn has_splats(scene: &LoadedScene) -> bool {

@@ -147,7 +147,7 @@ impl AutoSettings {
         stand_sun_at_date(scene, &mut description, place, up, progress)?;
         let description = &description;
         report_gaps(&points, progress);
-        let room = choose_room(scene, description, &points, up);
+        let room = choose_room(scene, description, &points, up, progress);
         let station = choose_station(scene, description, up, room.as_ref());
         let (room_seen, station) = (room.as_ref(), station.as_ref());
         let extent = SceneExtent { points: &points, bounds, up, room: room_seen, station };
