@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Number of points nearest to a disc as seen from above, among which the land is sought.
 const N_AROUND: usize = 48;
@@ -22,6 +22,8 @@ const MIN_RATIO: f32 = 1.0;
 const MIN_DISTANCE: f32 = 0.5;
 /// Width of the cells that tell which discs stand high, in typical radii.
 const CELL: f32 = 4.0;
+/// Maximum number of points among which the lowest are sought.
+const MAX_SAMPLE: usize = 1 << 20;
 
 /// Makes lines and scattered points of the discs through which land was seen. Z points up.
 ///
@@ -48,12 +50,15 @@ pub fn open_see_through_discs(
     if candidates.is_empty() {
         return Ok(());
     }
-    let plan: Vec<Vec3> = positions.iter().map(|position| position.with_z(0.0)).collect();
+    let around = lowest.cells_around(candidates.iter().map(|point| positions[*point]));
+    let is_around = |position: &&Vec3| around.contains(&lowest.cell(**position));
+    let near: Vec<Vec3> = positions.par_iter().filter(is_around).copied().collect();
+    let plan: Vec<Vec3> = near.iter().map(|position| position.with_z(0.0)).collect();
     let plan = KdTree::new(&plan, progress)?;
     let is_open = |point: &usize| -> Result<bool> {
         progress.check()?;
         let far = MIN_DISTANCE * typical_radius;
-        Ok(sees_land(&plan, positions, *point, shapes[*point].radius, far))
+        Ok(sees_land(&plan, &near, positions[*point], shapes[*point].radius, far))
     };
     let is_open = candidates.par_iter().map(is_open).collect::<Result<Vec<_>>>()?;
     let opened = candidates.iter().zip(is_open).filter(|(_, is_open)| *is_open);
@@ -68,18 +73,12 @@ pub fn open_see_through_discs(
     Ok(())
 }
 
-/// True if points farther than `min_distance` on all sides of a disc, as seen from above, lie far below it.
-fn sees_land(
-    plan: &KdTree,
-    positions: &[Vec3],
-    point: usize,
-    radius: f32,
-    min_distance: f32,
-) -> bool {
-    let own = positions[point];
+/// True if points farther than `min_distance` on all sides of a disc, as seen from above, lie far below it. `plan` holds the
+/// places of `near` without their heights.
+fn sees_land(plan: &KdTree, near: &[Vec3], own: Vec3, radius: f32, min_distance: f32) -> bool {
     let mut octants = 0u8;
-    for neighbor in plan.nearest(own.with_z(0.0), N_AROUND, Some(point as u32)) {
-        let offset = positions[neighbor.index as usize] - own;
+    for neighbor in plan.nearest(own.with_z(0.0), N_AROUND, None) {
+        let offset = near[neighbor.index as usize] - own;
         let is_far = min_distance * min_distance < neighbor.distance_squared;
         if is_far && offset.z < -MIN_HEIGHT * radius {
             let turn = offset.y.atan2(offset.x) / std::f32::consts::TAU;
@@ -90,7 +89,7 @@ fn sees_land(
     empty & empty.rotate_right(1) == 0
 }
 
-/// The heights of the lowest points in the cells of a grid in X and Y.
+/// The heights of the lowest points in the cells of a grid in X and Y, of at most [`MAX_SAMPLE`] points.
 struct LowestPoints {
     cells: HashMap<[i64; 2], f32>,
     width: f32,
@@ -99,7 +98,7 @@ struct LowestPoints {
 impl LowestPoints {
     fn new(positions: &[Vec3], width: f32) -> Self {
         let mut lowest = Self { cells: HashMap::new(), width };
-        for position in positions {
+        for position in positions.iter().step_by(positions.len().div_ceil(MAX_SAMPLE).max(1)) {
             let cell = lowest.cell(*position);
             let height = lowest.cells.entry(cell).or_insert(f32::INFINITY);
             *height = height.min(position.z);
@@ -109,6 +108,13 @@ impl LowestPoints {
 
     fn cell(&self, position: Vec3) -> [i64; 2] {
         [position.x, position.y].map(|coordinate| (coordinate / self.width).floor() as i64)
+    }
+
+    /// Returns the cells of positions and those next to them.
+    fn cells_around(&self, positions: impl Iterator<Item = Vec3>) -> HashSet<[i64; 2]> {
+        let own: HashSet<[i64; 2]> = positions.map(|position| self.cell(position)).collect();
+        let next = |[x, y]: [i64; 2]| (0..9).map(move |i| [x + i % 3 - 1, y + i / 3 - 1]);
+        own.into_iter().flat_map(next).collect()
     }
 
     /// Returns the height of the lowest point in the cell of a position.
