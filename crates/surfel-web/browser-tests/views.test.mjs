@@ -40,6 +40,8 @@ test('views are saved, renamed, visited, deleted, and these changes undone', asy
   await page.locator('[aria-label="Go to from the south"]').click();
   assert.equal(await finishedPixels(page), first);
   assert.deepEqual((await state(page, 'camera')).position, opening.position);
+  // A state is recorded after 400 ms without a change; what follows sooner is undone with it.
+  await page.waitForTimeout(1000);
   await page.locator('[aria-label="Delete view 2"]').click();
   await settled(page);
   assert.deepEqual((await views()).map(({ name }) => name), ['from the south']);
