@@ -94,8 +94,11 @@ fn chunks_of_stdin()
         loop {
             let mut chunk = Vec::new();
             let read = std::io::stdin().lock().take(CHUNK_BYTES).read_to_end(&mut chunk);
-            let is_last = !matches!(read, Ok(1..));
-            if !matches!(read, Ok(0)) && sender.send(read.map(|_| chunk)).is_err() || is_last {
+            if matches!(read, Ok(0)) {
+                return;
+            }
+            let is_broken = read.is_err();
+            if sender.send(read.map(|_| chunk)).is_err() || is_broken {
                 return;
             }
         }

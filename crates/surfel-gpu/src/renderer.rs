@@ -84,7 +84,7 @@ impl GpuRenderer {
         self.state().uploads.time
     }
 
-    /// Begins anew to measure how long each kernel works, if the device has a clock, or ends to. Pictures take longer
+    /// Starts to measure how long each kernel works, if the device has a clock, or stops. Pictures take longer
     /// meanwhile: the device waits until its clock was read.
     pub fn measure_kernels(&self, is_wanted: bool) {
         let times = &mut self.state().times;

@@ -12,6 +12,7 @@ mod cloud;
 mod rays;
 mod object;
 mod threads;
+mod open_scene;
 mod scene;
 mod movie;
 mod preparation;

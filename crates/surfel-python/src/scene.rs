@@ -5,24 +5,21 @@ use crate::buffer::owned_array;
 use crate::errors::{invalid_setting, to_exception};
 use crate::image::PyImage;
 use crate::object::NewObject;
+use crate::open_scene::{ChosenView, OpenScene, SceneSlot, is_read_alike, opened};
 use crate::rays::{RayArray, ray_hits};
-use crate::threads::{on_threads, start_threads};
 use crate::value::{to_python, with_keys};
 use crate::work;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rayon::ThreadPool;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError, TryLockError};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
 use surfel::description::{Invalid, is_scene_file};
-use surfel::live_scene::{LiveScene, UseCase};
+use surfel::live_scene::LiveScene;
 use surfel::live_view::LiveView;
 use surfel::overlay::faults;
-use surfel::progress_log::{Choice, ProgressLog};
+use surfel::progress_log::Choice;
 use surfel::ray_query::{RayCaster, WorldRays};
-use surfel::resolve::check_files;
 use surfel::{Error, RenderedImage, SceneDescription};
 use surfel_core::image::{Image, class_color, class_name};
 use surfel_core::math::Vec3;
@@ -40,101 +37,15 @@ pub struct PyScene {
 struct State {
     description: SceneDescription,
     /// The scene as it was read; none until it is needed, and after something was added.
-    opened: Slot,
-}
-
-type Slot = Arc<Mutex<Option<Arc<OpenScene>>>>;
-
-/// A scene whose files are read.
-struct OpenScene {
-    scene: LiveScene,
-    /// Threads of the scene, if it has a number of its own.
-    threads: Option<ThreadPool>,
-    /// The view of the last description, and the choices that were made for it.
-    last: Mutex<Option<Arc<ChosenView>>>,
-}
-
-/// A view with its description and the choices that were made for it.
-struct ChosenView {
-    description: SceneDescription,
-    view: LiveView,
-    choices: Vec<Choice>,
+    opened: SceneSlot,
 }
 
 /// All of a ray, from its origin without end.
 const WHOLE_RAY: (f32, f32) = (0.0, f32::INFINITY);
 
-/// Time between two looks at a scene that another thread reads.
-const LOCK_POLL_INTERVAL: Duration = Duration::from_millis(2);
-
-impl OpenScene {
-    fn open(description: &SceneDescription, progress: &dyn Progress) -> surfel::Result<Self> {
-        let threads = start_threads(&description.run)?;
-        let open = || LiveScene::open(description, UseCase::Pictures, progress);
-        let scene = on_threads(threads.as_ref(), open)?;
-        Ok(Self { scene, threads, last: Mutex::default() })
-    }
-
-    /// Returns the view under a description, which is made unless it is the last one.
-    fn view(
-        &self,
-        description: SceneDescription,
-        progress: &dyn Progress,
-    ) -> surfel::Result<Arc<ChosenView>> {
-        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        if let Some(last) = last.filter(|last| last.description == description) {
-            return Ok(last);
-        }
-        let log = ProgressLog::new(progress);
-        let mut applied = description.clone();
-        applied.apply_object_settings()?;
-        if applied.materials != self.scene.startup().materials {
-            check_files(&applied)?;
-        }
-        let view = self.install(|scene| scene.view(&applied, &log))?;
-        let up = view.description.world.up.unwrap_or(Vec3::Z);
-        if let Some(fault) = faults(&applied.picture, &view.flat.camera, up).into_iter().next() {
-            return Err(fault.into());
-        }
-        let choices = log.into_choices();
-        let view = Arc::new(ChosenView { description, view, choices });
-        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(view.clone());
-        Ok(view)
-    }
-
-    /// Runs `work` on the scene's threads.
-    fn install<T: Send>(&self, work: impl FnOnce(&LiveScene) -> T + Send) -> T {
-        on_threads(self.threads.as_ref(), || work(&self.scene))
-    }
-}
-
-/// Returns the scene of a description, which is read unless it is there.
-fn opened(
-    slot: &Slot,
-    description: &SceneDescription,
-    progress: &dyn Progress,
-) -> surfel::Result<Arc<OpenScene>> {
-    let mut slot = loop {
-        match slot.try_lock() {
-            Ok(slot) => break slot,
-            Err(TryLockError::Poisoned(error)) => break error.into_inner(),
-            Err(TryLockError::WouldBlock) => {
-                progress.check()?;
-                std::thread::sleep(LOCK_POLL_INTERVAL);
-            }
-        }
-    };
-    if let Some(scene) = &*slot {
-        return Ok(scene.clone());
-    }
-    let scene = Arc::new(OpenScene::open(description, progress)?);
-    *slot = Some(scene.clone());
-    Ok(scene)
-}
-
 impl PyScene {
     fn new(description: SceneDescription) -> Self {
-        Self { state: Mutex::new(State { description, opened: Slot::default() }) }
+        Self { state: Mutex::new(State { description, opened: SceneSlot::default() }) }
     }
 
     /// Returns the description, without what is chosen from the data.
@@ -143,7 +54,7 @@ impl PyScene {
     }
 
     /// Returns the description and the slot of what was read of it.
-    fn state(&self) -> (SceneDescription, Slot) {
+    fn state(&self) -> (SceneDescription, SceneSlot) {
         let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         (state.description.clone(), state.opened.clone())
     }
@@ -238,7 +149,7 @@ impl PyScene {
             let number = description.objects.len() - 1 + usize::from(has_files(&description));
             let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
             if state.description == before {
-                *state = State { description, opened: Slot::default() };
+                *state = State { description, opened: SceneSlot::default() };
                 return Ok(number);
             }
         }
@@ -338,6 +249,11 @@ impl PyScene {
             }
         }
         self.with_view(py, keys, progress, |scene, ChosenView { view, choices, .. }, progress| {
+            let up = view.description.world.up.unwrap_or(Vec3::Z);
+            let faults = faults(&view.description.picture, &view.flat.camera, up);
+            if let Some(fault) = faults.into_iter().next() {
+                return Err(fault.into());
+            }
             let (image, _) = scene.picture(view, layers, progress)?;
             let point_ids = point_ids(view, &image);
             let line = |choice: &Choice| format!("{} [{}]", choice.reason, choice.keys.join(", "));
@@ -509,14 +425,6 @@ pub fn _unread(
         }
     }
     Ok(PyScene::new(with_keys(py, &description, keys)?))
-}
-
-/// True if a scene that was read under one description can be shown under another. Files are checked and environment maps
-/// are read when a scene is opened, and threads are started.
-fn is_read_alike(startup: &SceneDescription, description: &SceneDescription) -> bool {
-    startup.light.environment == description.light.environment
-        && startup.camera.name == description.camera.name
-        && startup.run == description.run
 }
 
 /// True if files come before the objects: not if settings by name make an object of each.

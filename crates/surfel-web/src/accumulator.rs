@@ -1,12 +1,13 @@
 //! A client's picture: a draft while the view changes, then samples accumulated a few rows at a time.
 
-use crate::deadline::{Deadline, SLICE_TIMEOUT};
+use crate::deadline::Deadline;
 use crate::dynamic_resolution::ResolutionController;
 use crate::encode::{self, Pixels};
 use crate::frame::{Frame, PlacedFile, Quality};
 use crate::keyframe::{Keyframe, keyframe_size};
 use crate::sample_counts::{Stage, after_pass, is_sent, of_samples, rest_samples};
 use crate::scene_provider::{PicturePart, PreparedScene};
+use crate::slice_timing::{SLICE_SECS, SliceTiming};
 use crate::view::ViewState;
 use std::sync::Arc;
 use std::time::Instant;
@@ -37,11 +38,8 @@ pub struct Accumulator {
     n_rows: u32,
     /// Number of samples of that pass.
     n_pass_samples: u32,
-    /// Number of rows of the last slice.
-    n_slice_rows: u32,
-    secs_per_row: f64,
-    /// Duration of the last slice in seconds; a lower bound if it was cancelled.
-    slice_secs: f64,
+    /// Sizes and durations of drafts and slices.
+    timing: SliceTiming,
     /// True if there is a picture worth showing that has not been sent.
     has_frame: bool,
     /// The last picture at rest, from which drafts are drawn.
@@ -85,13 +83,6 @@ const MIN_TRACED: f64 = 0.3;
 const DRAFT_JPEG_QUALITY: u8 = 80;
 /// JPEG quality of refined pictures, from 1 to 100.
 const REFINED_JPEG_QUALITY: u8 = 92;
-/// Intended duration of a slice of the finished picture, in seconds.
-const SLICE_SECS: f64 = 0.008;
-/// Minimum number of rows of a slice, unless rows take long: each slice has a fixed cost.
-const MIN_SLICE_ROWS: u32 = 8;
-/// Maximum ratio of the rows of a slice to those of the one before.
-const MAX_SLICE_GROWTH: f64 = 2.0;
-
 impl Accumulator {
     /// Version of the view that the last draft showed.
     pub fn version(&self) -> u64 {
@@ -100,13 +91,7 @@ impl Accumulator {
 
     /// Returns whether even the smallest slice takes long.
     pub fn is_slow(&self) -> bool {
-        2.0 * SLICE_TIMEOUT.as_secs_f64() < self.slice_secs
-    }
-
-    /// Records the duration of a slice. One that was cancelled would have taken longer, so it does not make a slow
-    /// client a quick one.
-    fn record_time(&mut self, secs: f64, is_done: bool) {
-        self.slice_secs = if is_done { secs } else { secs.max(self.slice_secs) };
+        self.timing.is_slow()
     }
 
     /// Renders a draft as large as `secs` allow; none without a scene.
@@ -193,8 +178,8 @@ impl Accumulator {
         let deadline = Deadline::new(progress, ResolutionController::is_min_size((width, height)));
         let start = Instant::now();
         let rendered = renderer.render(scene, &settings, &deadline);
-        self.record_time(start.elapsed().as_secs_f64(), rendered.is_ok());
-        self.resolution.record(n_pixels, self.slice_secs);
+        self.timing.record(start.elapsed().as_secs_f64(), rendered.is_ok());
+        self.resolution.record(n_pixels, self.timing.secs());
         rendered.map(Some)
     }
 
@@ -245,13 +230,11 @@ impl Accumulator {
         let is_rasterized = uses_rasterizer(&prepared.flat)?;
         let slice = self.next_slice((width, height), target, is_rasterized);
         let n_rows = slice.rows.1 - slice.rows.0;
-        self.n_slice_rows = n_rows;
         let Some(scene) = self.scene(prepared, view) else { return Ok(false) };
         let deadline = Deadline::new(progress, n_rows == 1 || is_rasterized);
         let start = Instant::now();
         let rendered = renderer.render_region(scene, &settings, slice, &deadline);
-        self.record_time(start.elapsed().as_secs_f64(), rendered.is_ok());
-        self.secs_per_row = self.slice_secs / f64::from(n_rows);
+        self.timing.record_slice(n_rows, start.elapsed().as_secs_f64(), rendered.is_ok());
         let (image, stats) = rendered?;
         self.work += Work::of(&stats);
         let has_overlay = view.scene.as_ref().is_some_and(|scene| scene.overlay.is_some());
@@ -330,7 +313,7 @@ impl Accumulator {
         let version = self.version;
         let n_known = self.next_keyframe.as_ref().filter(|next| next.version == version);
         let first = n_known.map_or(0, |next| next.n_rows);
-        let secs_per_row = self.keyframe_secs_per_row.max(0.5 * self.secs_per_row);
+        let secs_per_row = self.keyframe_secs_per_row.max(0.5 * self.timing.secs_per_row());
         let n_rows = ((SLICE_SECS / secs_per_row.max(1e-6)) as u32).max(1);
         let rows = (first, size.1.min(first.saturating_add(n_rows)));
         let settings = place_settings(prepared.render_settings, size);
@@ -423,14 +406,7 @@ impl Accumulator {
         target: u32,
         is_rasterized: bool,
     ) -> RenderRegion {
-        // Below a cheap sky, rows may take long.
-        let affordable = (SLICE_SECS / self.secs_per_row.max(1e-6))
-            .min(MAX_SLICE_GROWTH * f64::from(self.n_slice_rows.max(MIN_SLICE_ROWS)));
-        let is_slow = SLICE_TIMEOUT.as_secs_f64() <= f64::from(MIN_SLICE_ROWS) * self.secs_per_row;
-        let n_rows = match is_rasterized {
-            true => height,
-            false => (affordable as u32).max(if is_slow { 1 } else { MIN_SLICE_ROWS }),
-        };
+        let n_rows = if is_rasterized { height } else { self.timing.n_affordable_rows() };
         let rows = (self.n_rows, height.min(self.n_rows.saturating_add(n_rows)));
         let samples = (self.n_samples, after_pass(self.n_samples, target));
         RenderRegion { rows, columns: (0, width), samples }

@@ -21,6 +21,7 @@ mod frame;
 mod view;
 mod visibility;
 mod sample_counts;
+mod slice_timing;
 mod accumulator;
 mod outgoing;
 mod handshake;

@@ -7,6 +7,7 @@
 
 use super::free_space::FreeSpace;
 use super::neighbors::{KdTree, Neighbor};
+use super::octants::{Octants, octant};
 use super::structure::{PointShape, Structure};
 use crate::error::Result;
 use crate::math::{Basis, Vec3};
@@ -30,54 +31,25 @@ const MAX_SLOPE: f32 = 0.15;
 /// Ratio of the radius of a widened disc to the width of the gap.
 const OVERLAP: f32 = 1.25;
 
-/// A set of octants of directions around a normal, a bit each.
-#[derive(Clone, Copy, Default)]
-struct Octants(u8);
-
-impl Octants {
-    /// Returns the octants in which the neighbours lie.
-    fn of(positions: &[Vec3], point: usize, neighbors: &[Neighbor], basis: &Basis) -> Self {
-        let mut octants = Self::default();
-        for neighbor in neighbors.iter().take(N_AROUND) {
-            let offset = positions[neighbor.index as usize] - positions[point];
-            octants.insert(octant(basis, offset));
-        }
-        octants
+/// Returns the octants around a normal in which the neighbours lie.
+fn octants_of(positions: &[Vec3], point: usize, neighbors: &[Neighbor], basis: &Basis) -> Octants {
+    let mut octants = Octants::default();
+    for neighbor in neighbors.iter().take(N_AROUND) {
+        let offset = positions[neighbor.index as usize] - positions[point];
+        octants.insert(octant_of(basis, offset));
     }
-
-    fn insert(&mut self, octant: usize) {
-        self.0 |= 1 << octant;
-    }
-
-    fn contains(self, octant: usize) -> bool {
-        self.0 >> octant & 1 == 1
-    }
-
-    /// True if so many successive octants are empty that a gap lies there.
-    fn has_gap(self) -> bool {
-        let empty = !self.0;
-        let run = (1..MIN_EMPTY).fold(empty, |run, n| run & empty.rotate_right(n as u32));
-        run != 0
-    }
+    octants
 }
 
 /// Returns the octant of a direction in the plane of a basis, counterclockwise from the tangent.
-fn octant(basis: &Basis, offset: Vec3) -> usize {
-    let (x, y) = (basis.tangent.dot(offset), basis.bitangent.dot(offset));
-    let quadrant = match (x < 0.0, y < 0.0) {
-        (false, false) => 0,
-        (true, false) => 1,
-        (true, true) => 2,
-        (false, true) => 3,
-    };
-    let is_steep = x.abs() < y.abs();
-    2 * quadrant + usize::from(is_steep != (quadrant % 2 == 1))
+fn octant_of(basis: &Basis, offset: Vec3) -> usize {
+    octant(basis.tangent.dot(offset), basis.bitangent.dot(offset))
 }
 
 /// True if the nearest neighbours of a point leave a gap around it.
 pub fn is_by_gap(positions: &[Vec3], point: usize, neighbors: &[Neighbor], normal: Vec3) -> bool {
     normal == Vec3::ZERO
-        || Octants::of(positions, point, neighbors, &Basis::around(normal)).has_gap()
+        || octants_of(positions, point, neighbors, &Basis::around(normal)).has_gap(MIN_EMPTY)
 }
 
 /// Widens the discs on both sides of gaps until they reach each other, as far as no scanner saw through the gap. `radii`
@@ -146,13 +118,13 @@ fn sides(
             return Ok(None);
         }
         if radii[point] < shape.radius {
-            return Ok(Some(Side { point: point as u32, octants: Octants(u8::MAX) }));
+            return Ok(Some(Side { point: point as u32, octants: Octants::ALL }));
         }
         if !is_by_gap[point] {
             return Ok(None);
         }
         let neighbors = tree.nearest(positions[point], N_AROUND, Some(point as u32));
-        let octants = Octants::of(positions, point, &neighbors, &Basis::around(shape.normal));
+        let octants = octants_of(positions, point, &neighbors, &Basis::around(shape.normal));
         Ok(Some(Side { point: point as u32, octants }))
     };
     let sides = (0..shapes.len()).into_par_iter().map(side).collect::<Result<Vec<_>>>()?;
@@ -216,7 +188,7 @@ fn widened(
         let distance = neighbor.distance_squared.sqrt();
         let other = &sides[neighbor.index as usize];
         let offset = positions[other.point as usize] - position;
-        let octant_of_other = octant(&basis, offset);
+        let octant_of_other = octant_of(&basis, offset);
         let other_shape = &shapes[other.point as usize];
 
         if distance == 0.0
@@ -230,12 +202,12 @@ fn widened(
         if !own.octants.contains(octant_of_other) {
             radius = radius.max(reach);
         }
-        let octant_of_own = octant(&Basis::around(other_shape.normal), -offset);
+        let octant_of_own = octant_of(&Basis::around(other_shape.normal), -offset);
         if other_shape.radius < reach && !other.octants.contains(octant_of_own) {
             widened.push((other.point, reach));
         }
     }
-    if Octants(seen.0 | own.octants.0).has_gap() {
+    if seen.union(own.octants).has_gap(MIN_EMPTY) {
         return Vec::new();
     }
     if shape.radius < radius {
@@ -289,18 +261,5 @@ mod tests {
         assert!(5 * n_inside < at_gap.len(), "{n_inside} of {}", at_gap.len());
         let around_nothing = radii(0.0);
         assert!(!around_nothing.iter().any(is_wide), "an open border stays as it is");
-    }
-
-    #[test]
-    fn octants_go_round_and_three_empty_ones_are_a_gap() {
-        let basis = Basis::around(Vec3::Z);
-        let direction = |turn: f32| Vec3::new(turn.cos(), turn.sin(), 0.3);
-        for index in 0..8 {
-            let turn = (index as f32 + 0.5) * std::f32::consts::FRAC_PI_4;
-            let of_tangent = basis.tangent.y.atan2(basis.tangent.x);
-            assert_eq!(octant(&basis, direction(turn + of_tangent)), index);
-        }
-        assert!(Octants(0b0001_1111).has_gap() && Octants(0b0111_1100).has_gap());
-        assert!(!Octants(0b0101_0101).has_gap() && !Octants(0b0011_1111).has_gap());
     }
 }

@@ -29,6 +29,7 @@ mod typical;
 mod solids;
 mod stray_points;
 mod wide_discs;
+mod octants;
 mod see_through;
 mod junctions;
 mod scan_lines;

@@ -4,6 +4,7 @@
 //! edges; below a wire land was measured all around.
 
 use super::neighbors::KdTree;
+use super::octants::{Octants, octant};
 use super::solids::settle;
 use super::structure::{PointShape, Structure};
 use crate::error::Result;
@@ -20,6 +21,8 @@ const MIN_HEIGHT: f32 = 3.0;
 const MIN_RATIO: f32 = 1.0;
 /// Minimum distance as seen from above of a point of the land, in typical radii: below a point of a wall lie others of it.
 const MIN_DISTANCE: f32 = 0.5;
+/// Number of successive octants without land at which a disc may hide it, as a roof does.
+const MIN_EMPTY: usize = 2;
 /// Width of the cells that tell which discs stand high, in typical radii.
 const CELL: f32 = 4.0;
 /// Maximum number of points among which the lowest are sought.
@@ -77,17 +80,15 @@ pub fn open_see_through_discs(
 /// True if points farther than `min_distance` on all sides of a disc, as seen from above, lie `min_height` below it. `plan`
 /// holds the places of `near` without their heights.
 fn sees_land(plan: &KdTree, near: &[Vec3], own: Vec3, min_height: f32, min_distance: f32) -> bool {
-    let mut octants = 0u8;
+    let mut sides = Octants::default();
     for neighbor in plan.nearest(own.with_z(0.0), N_AROUND, None) {
         let offset = near[neighbor.index as usize] - own;
         let is_far = min_distance * min_distance < neighbor.distance_squared;
         if is_far && offset.z < -min_height {
-            let turn = offset.y.atan2(offset.x) / std::f32::consts::TAU;
-            octants |= 1 << ((8.0 * turn.rem_euclid(1.0)) as u32 % 8);
+            sides.insert(octant(offset.x, offset.y));
         }
     }
-    let empty = !octants;
-    empty & empty.rotate_right(1) == 0
+    !sides.has_gap(MIN_EMPTY)
 }
 
 /// The heights of the lowest points in the cells of a grid in X and Y, of at most [`MAX_SAMPLE`] points.

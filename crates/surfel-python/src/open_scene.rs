@@ -1,0 +1,105 @@
+//! Scenes whose files are read, and their views.
+
+use crate::threads::{on_threads, start_threads};
+use rayon::ThreadPool;
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
+use std::time::Duration;
+use surfel::SceneDescription;
+use surfel::live_scene::{LiveScene, UseCase};
+use surfel::live_view::LiveView;
+use surfel::progress_log::{Choice, ProgressLog};
+use surfel::resolve::check_files;
+use surfel_core::progress::Progress;
+
+/// A scene, or none until it is needed.
+pub type SceneSlot = Arc<Mutex<Option<Arc<OpenScene>>>>;
+
+/// A scene whose files are read.
+pub struct OpenScene {
+    /// The files' content.
+    pub scene: LiveScene,
+    /// Threads of the scene, if it has a number of its own.
+    threads: Option<ThreadPool>,
+    /// The view of the last description, and the choices that were made for it.
+    last: Mutex<Option<Arc<ChosenView>>>,
+}
+
+/// A view with its description and the choices that were made for it.
+pub struct ChosenView {
+    description: SceneDescription,
+    pub view: LiveView,
+    pub choices: Vec<Choice>,
+}
+
+/// Time between two looks at a scene that another thread reads.
+const LOCK_POLL_INTERVAL: Duration = Duration::from_millis(2);
+
+impl OpenScene {
+    /// Reads the files of a description.
+    pub fn open(description: &SceneDescription, progress: &dyn Progress) -> surfel::Result<Self> {
+        let threads = start_threads(&description.run)?;
+        let open = || LiveScene::open(description, UseCase::Pictures, progress);
+        let scene = on_threads(threads.as_ref(), open)?;
+        Ok(Self { scene, threads, last: Mutex::default() })
+    }
+
+    /// Returns the view under a description, which is made unless it is the last one.
+    pub fn view(
+        &self,
+        description: SceneDescription,
+        progress: &dyn Progress,
+    ) -> surfel::Result<Arc<ChosenView>> {
+        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some(last) = last.filter(|last| last.description == description) {
+            return Ok(last);
+        }
+        let log = ProgressLog::new(progress);
+        let mut applied = description.clone();
+        applied.apply_object_settings()?;
+        if applied.materials != self.scene.startup().materials {
+            check_files(&applied)?;
+        }
+        let view = self.install(|scene| scene.view(&applied, &log))?;
+        let choices = log.into_choices();
+        let view = Arc::new(ChosenView { description, view, choices });
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(view.clone());
+        Ok(view)
+    }
+
+    /// Runs `work` on the scene's threads.
+    pub fn install<T: Send>(&self, work: impl FnOnce(&LiveScene) -> T + Send) -> T {
+        on_threads(self.threads.as_ref(), || work(&self.scene))
+    }
+}
+
+/// Returns the scene of a description, which is read unless it is there.
+pub fn opened(
+    slot: &SceneSlot,
+    description: &SceneDescription,
+    progress: &dyn Progress,
+) -> surfel::Result<Arc<OpenScene>> {
+    let mut slot = loop {
+        match slot.try_lock() {
+            Ok(slot) => break slot,
+            Err(TryLockError::Poisoned(error)) => break error.into_inner(),
+            Err(TryLockError::WouldBlock) => {
+                progress.check()?;
+                std::thread::sleep(LOCK_POLL_INTERVAL);
+            }
+        }
+    };
+    if let Some(scene) = &*slot {
+        return Ok(scene.clone());
+    }
+    let scene = Arc::new(OpenScene::open(description, progress)?);
+    *slot = Some(scene.clone());
+    Ok(scene)
+}
+
+/// True if a scene that was read under one description can be shown under another. Files are checked and environment maps
+/// are read when a scene is opened, and threads are started.
+pub fn is_read_alike(startup: &SceneDescription, description: &SceneDescription) -> bool {
+    startup.light.environment == description.light.environment
+        && startup.camera.name == description.camera.name
+        && startup.run == description.run
+}
