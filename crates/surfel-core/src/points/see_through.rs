@@ -17,8 +17,6 @@ use std::collections::{HashMap, HashSet};
 const N_AROUND: usize = 96;
 /// Minimum height of a disc above the land, in typical radii. It is also higher than wide.
 const MIN_HEIGHT: f32 = 3.0;
-/// Minimum ratio of the radius of a disc to the typical one: dense points hide what lies below.
-const MIN_RATIO: f32 = 1.0;
 /// Minimum distance as seen from above of a point of the land, in typical radii: below a point of a wall lie others of it.
 const MIN_DISTANCE: f32 = 0.5;
 /// Number of successive octants without land at which a disc may hide it, as a roof does.
@@ -28,7 +26,8 @@ const CELL: f32 = 4.0;
 /// Maximum number of points among which the lowest are sought.
 const MAX_SAMPLE: usize = 1 << 20;
 
-/// Makes lines and scattered points of the discs through which land was seen. Z points up.
+/// Makes lines of the discs through which land was seen, if they are wider than the typical one: dense points hide what lies
+/// below. Z points up.
 ///
 /// # Errors
 ///
@@ -40,15 +39,16 @@ pub fn open_see_through_discs(
     shapes: &mut [PointShape],
     progress: &dyn Progress,
 ) -> Result<()> {
+    if !(0.0 < typical_radius && typical_radius.is_finite()) {
+        return Ok(());
+    }
     let positions = tree.positions();
     let lowest = LowestPoints::new(positions, CELL * typical_radius);
     let min_height = |radius: f32| radius.max(MIN_HEIGHT * typical_radius);
     let is_candidate = |point: &usize| {
         let shape = &shapes[*point];
         let height = positions[*point].z - lowest.around(positions[*point]);
-        shape.is_disc()
-            && MIN_RATIO * typical_radius < shape.radius
-            && min_height(shape.radius) < height
+        shape.is_disc() && typical_radius < shape.radius && min_height(shape.radius) < height
     };
     let candidates: Vec<usize> = (0..shapes.len()).into_par_iter().filter(is_candidate).collect();
     if candidates.is_empty() {
@@ -115,7 +115,9 @@ impl LowestPoints {
     /// Returns the cells of positions and those next to them.
     fn cells_around(&self, positions: impl Iterator<Item = Vec3>) -> HashSet<[i64; 2]> {
         let own: HashSet<[i64; 2]> = positions.map(|position| self.cell(position)).collect();
-        let next = |[x, y]: [i64; 2]| (0..9).map(move |i| [x + i % 3 - 1, y + i / 3 - 1]);
+        let next = |[x, y]: [i64; 2]| {
+            (0..9).map(move |i| [x.saturating_add(i % 3 - 1), y.saturating_add(i / 3 - 1)])
+        };
         own.into_iter().flat_map(next).collect()
     }
 

@@ -108,11 +108,9 @@ impl<'a> KdTree<'a> {
             return Vec::new();
         }
         let target = Target { position, own: u32::MAX };
-        let limited = |mut candidates: KNearest| {
-            candidates.limit_to(distance * distance);
-            candidates
-        };
-        let mut neighbors = self.neighbors(&target, limited(KNearest::new(k)));
+        let mut candidates = KNearest::new(k);
+        candidates.limit_to(distance * distance);
+        let mut neighbors = self.neighbors(&target, candidates);
         // Where fewer points are near, the last entries stand for the limit.
         neighbors.retain(|neighbor| neighbor.index != u32::MAX);
         neighbors
