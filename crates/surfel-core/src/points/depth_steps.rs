@@ -9,9 +9,11 @@ use crate::math::{Random, Vec3};
 /// Number of points that are examined, and the least number that tell depths from other coordinates.
 const N_SAMPLES: usize = 65_536;
 const MIN_POINTS: usize = 4096;
-/// Maximum share of different coordinates along the axis of depths, and minimum share along both others.
+/// Maximum share of different coordinates along the axis of depths, and how many times that share there is at least along
+/// both others. A wall across the view has few coordinates along these too: one of each pixel at each of a few depths.
 const MAX_DEPTHS: f32 = 0.05;
-const MIN_OTHERS: f32 = 0.25;
+const MIN_OTHERS: f32 = 0.02;
+const MIN_OTHERS_PER_DEPTH: f32 = 8.0;
 /// Difference of two equal coordinates by rounding, as a fraction of the largest.
 const ROUNDING: f32 = 1e-6;
 /// Number of depths before and behind one that its step is averaged over.
@@ -43,7 +45,8 @@ impl DepthSteps {
         let share = |of: usize| coordinates[of].len() as f32 / sample.len() as f32;
         let is_depth = |axis: &usize| {
             let [next, last] = [1, 2].map(|step| share((axis + step) % 3));
-            share(*axis) < MAX_DEPTHS && MIN_OTHERS < next.min(last)
+            let min_others = MIN_OTHERS.max(MIN_OTHERS_PER_DEPTH * share(*axis));
+            share(*axis) < MAX_DEPTHS && min_others < next.min(last)
         };
         let depth = (0..3).find(is_depth)?;
         let depths = coordinates.into_iter().nth(depth)?;
@@ -107,6 +110,19 @@ mod tests {
         let found =
             DepthSteps::find(&cloud).unwrap().at(rotation.as_quat() * Vec3::new(0.0, 0.0, 2.0));
         assert!((found / (4.0 / 300.0) - 1.0).abs() < 0.1, "{found}");
+    }
+
+    #[test]
+    fn steps_are_found_on_a_wall_across_the_view() {
+        let depth =
+            |pixel: usize| 2.3 + 0.002 * (pixel / 200) as f32 + 0.002 * (pixel % 200) as f32;
+        let point = |pixel: usize| {
+            let (x, y) = (-0.5 + (pixel % 200) as f32 / 200.0, -0.5 + (pixel / 200) as f32 / 200.0);
+            300.0 / (300.0 / depth(pixel)).round() * Vec3::new(x, y, 1.0)
+        };
+        let wall = PointCloud::from_positions((0..40_000).map(point).collect());
+        let found = DepthSteps::find(&wall).unwrap().at(Vec3::new(0.0, 0.0, 2.5));
+        assert!((found / (2.5 * 2.5 / 300.0) - 1.0).abs() < 0.1, "{found}");
     }
 
     #[test]
