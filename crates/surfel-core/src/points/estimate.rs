@@ -11,6 +11,7 @@ use super::preparation::Preparation;
 use super::radius::{DistanceSample, RadiusReport, median_distance};
 use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
 use super::scan_grid::ScanGrids;
+use super::scan_rings::ScanRings;
 use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
 use crate::error::Result;
 use crate::math::Vec3;
@@ -133,11 +134,13 @@ fn estimate_by_nearest<'a>(
     Ok(Estimates { fits, radii, tree: Some(tree), voters, is_by_gap })
 }
 
-/// Finds the structures of points, and replaces the estimates by those of their structure.
+/// Finds the structures of points, and replaces the estimates by those of their structure. `rings` are those of a spinning
+/// scanner.
 pub fn find_shapes<'a>(
     cloud: &'a PointCloud,
     estimates: &mut Estimates<'a>,
     preparation: &Preparation,
+    rings: Option<&ScanRings>,
     progress: &dyn Progress,
 ) -> Result<Option<(Vec<PointShape>, StructureReport)>> {
     let Estimates { fits, radii: Some((radii, report)), tree, voters, is_by_gap } = estimates
@@ -151,7 +154,7 @@ pub fn find_shapes<'a>(
     let voters = std::mem::take(voters);
     let (mut shapes, mut found) = match (preparation.structure, &mut *fits) {
         (StructureChoice::Auto, Some((fits, _))) => {
-            find_structures(&tree, fits, radii, voters, progress)?
+            find_structures(&tree, fits, radii, voters, rings, progress)?
         }
         _ => all_scattered(&tree, radii, progress)?,
     };

@@ -33,6 +33,8 @@ mod octants;
 mod see_through;
 mod junctions;
 mod scan_lines;
+mod scan_rings;
+mod ring_surfaces;
 mod find_structures;
 mod scan_grid;
 mod grid_rays;

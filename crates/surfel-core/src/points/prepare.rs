@@ -12,6 +12,7 @@ use super::orient::{Orientation, has_stations, orient, turn_to_stations};
 use super::outliers::remove_outliers;
 use super::preparation::{Preparation, SURFACE_VARIATION};
 use super::radius::{Radius, RadiusReport};
+use super::scan_rings::ScanRings;
 use super::structure::{PointShape, Structure, StructureReport};
 use super::subsample::subsample;
 use super::{PointCloud, PreparedCloud, Scalar, Values};
@@ -89,6 +90,11 @@ pub fn prepare(
     if cloud.is_empty() {
         return Err(Error::EmptyCloud);
     }
+    let rings = ScanRings::find(&cloud);
+    if let Some(ScanRings { rings, .. }) = &rings {
+        let line = format!("{} rings of a spinning scanner", rings.len());
+        progress.choice(&format!("{line}: gaps between them are closed"), &["structure"]);
+    }
     let denoised = denoise(&mut cloud, preparation.denoise, progress)?;
     let (denoise, denoised_normals) = denoised.map(|found| (found.report, found.normals)).unzip();
     let missing = Missing::any(&cloud, preparation);
@@ -98,7 +104,7 @@ pub fn prepare(
     let mut estimates =
         estimate(&cloud.positions, denoised_normals.as_deref(), preparation, &missing, progress)?;
     let shapes = match missing.structure {
-        true => find_shapes(&cloud, &mut estimates, preparation, progress)?,
+        true => find_shapes(&cloud, &mut estimates, preparation, rings.as_ref(), progress)?,
         false => None,
     };
     let Estimates { fits, radii, .. } = estimates;
@@ -107,7 +113,8 @@ pub fn prepare(
             add_variation(&mut cloud, &fits);
         }
         if missing.normals {
-            let found = add_normals(&mut cloud, &fits, preparation, progress)?;
+            let orientation = choose_orientation(&cloud, preparation, rings.as_ref(), progress);
+            let found = add_normals(&mut cloud, &fits, orientation, progress)?;
             found.repairs().iter().for_each(|line| progress.note(line));
             report.normals = Some(found);
             report.normals_from = Some(neighborhood);
@@ -158,16 +165,34 @@ fn add_variation(cloud: &mut PointCloud, fits: &[PlaneFit]) {
     cloud.scalars.push(Scalar { name: SURFACE_VARIATION.to_owned(), values });
 }
 
+/// Returns the orientation of the preparation, or that toward the scanner if the rings tell where it stood.
+fn choose_orientation(
+    cloud: &PointCloud,
+    preparation: &Preparation,
+    rings: Option<&ScanRings>,
+    progress: &dyn Progress,
+) -> Orientation {
+    match (preparation.orientation, rings) {
+        (Orientation::Auto, Some(rings)) => {
+            let scanner = rings.scanner.as_dvec3() + cloud.origin;
+            let [x, y, z] = scanner.to_array();
+            progress.choice(&format!("front sides toward the scanner at {x},{y},{z}"), &["orient"]);
+            Orientation::Viewpoint(scanner)
+        }
+        (orientation, _) => orientation,
+    }
+}
+
 fn add_normals(
     cloud: &mut PointCloud,
     fits: &[PlaneFit],
-    preparation: &Preparation,
+    orientation: Orientation,
     progress: &dyn Progress,
 ) -> Result<NormalReport> {
     let Some(given) = cloud.normals.take() else {
         let mut normals = fits.iter().map(|fit| fit.normal).collect::<Vec<_>>();
         let report = fill_missing(&cloud.positions, &mut normals, progress)?;
-        cloud.normals = Some(orient(cloud, normals, preparation.orientation, progress)?);
+        cloud.normals = Some(orient(cloud, normals, orientation, progress)?);
         return Ok(report);
     };
     // Each takes its sign from the nearest normal of the file; `clean` leaves at least one.
