@@ -22,6 +22,9 @@ const MIN_KNOWN: f32 = 0.95;
 const MIN_STEPS_DEG: [f32; 4] = [0.005, 0.02, 0.05, 0.1];
 /// Maximum width of the elevations of a laser, as a fraction of the step to those of the next.
 const MAX_RING_WIDTH: f32 = 0.2;
+/// Maximum distance between the quartiles of the elevations of a laser, in steps to those of the next. It is wide for a
+/// laser beside the middle of the scanner, and wider where the scanner moved.
+const MAX_SPREAD: f32 = 1.5;
 /// Minimum share of the points on a ring.
 const MIN_SHARE: f32 = 0.0005;
 /// Minimum share of successive points in one sense about the axis, where lasers follow each other in the file.
@@ -134,25 +137,28 @@ fn rings(directions: &[Option<Direction>], ring_of_point: &[u16]) -> Option<Vec<
         return None;
     }
     let direction = |point: &u32| directions[*point as usize];
-    let median_elevation = |points: &Vec<u32>| {
-        let of_points = points.iter().filter_map(direction);
-        let mut elevations: Vec<f32> = of_points.map(|one| one.elevation_deg).collect();
-        let middle = elevations.len() / 2;
-        *elevations.select_nth_unstable_by(middle, f32::total_cmp).1
-    };
-    let ring = |mut points: Vec<u32>| {
+    let mut widths = Vec::new();
+    let mut ring = |mut points: Vec<u32>| {
+        let elevations = points.iter().filter_map(direction).map(|one| one.elevation_deg);
+        let [low, elevation_deg, high] = quartiles(elevations.collect());
+        widths.push((high - low).to_radians());
         let azimuth = |point: &u32| direction(point).map_or(0.0, |one| one.azimuth);
         points.sort_by(|a, b| azimuth(a).total_cmp(&azimuth(b)));
-        let elevation_rad = median_elevation(&points).to_radians();
-        Ring { elevation_rad, azimuths: points.iter().map(azimuth).collect(), points }
+        let azimuths = points.iter().map(azimuth).collect();
+        Ring { elevation_rad: elevation_deg.to_radians(), azimuths, points }
     };
-    let mut rings: Vec<Ring> = of_ring.into_iter().map(ring).collect();
+    let mut rings: Vec<Ring> = of_ring.into_iter().map(&mut ring).collect();
     rings.sort_by(|a, b| a.elevation_rad.total_cmp(&b.elevation_rad));
     let steps = rings.windows(2).map(|pair| pair[1].elevation_rad - pair[0].elevation_rad);
-    let mut steps: Vec<f32> = steps.collect();
-    let middle = steps.len() / 2;
-    let step = *steps.select_nth_unstable_by(middle, f32::total_cmp).1;
-    (MIN_STEP_RAD < step).then_some(rings)
+    let [_, step, _] = quartiles(steps.collect());
+    let [_, width, _] = quartiles(widths);
+    (MIN_STEP_RAD < step && width < MAX_SPREAD * step).then_some(rings)
+}
+
+/// Returns the first quartile, the median and the third quartile of values, of which there are some.
+fn quartiles(mut values: Vec<f32>) -> [f32; 3] {
+    values.sort_unstable_by(f32::total_cmp);
+    [1, 2, 3].map(|quarter| values[quarter * (values.len() - 1) / 4])
 }
 
 /// Returns the rings of the points by a column of the file.
@@ -198,11 +204,8 @@ fn bounds_of_rings(sorted: &[f32], min_step: f32) -> Option<Vec<[f32; 2]>> {
     {
         return None;
     }
-    let middle = bounds.len() / 2;
-    let mut widths: Vec<f32> = bounds.iter().map(|[first, last]| last - first).collect();
-    let mut steps: Vec<f32> = bounds.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
-    let width = *widths.select_nth_unstable_by(middle, f32::total_cmp).1;
-    let step = *steps.select_nth_unstable_by(middle.min(bounds.len() - 2), f32::total_cmp).1;
+    let [_, width, _] = quartiles(bounds.iter().map(|[first, last]| last - first).collect());
+    let [_, step, _] = quartiles(bounds.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect());
     (width < MAX_RING_WIDTH * step).then_some(bounds)
 }
 
@@ -328,6 +331,13 @@ mod tests {
         let mut next = || random.next_f32() - 0.5;
         let filled = (0..9000).map(|_| Vec3::new(next(), next(), next())).collect();
         let grid = (0..9000).map(|i| Vec3::new((i % 90) as f32, (i / 90) as f32, -2.0)).collect();
+        // A scanner that moved on, with a column of its lasers.
+        let mut moved = scan(0.0);
+        let shift = |i: usize| Vec3::X * (i % N_COLUMNS) as f32;
+        moved.positions.iter_mut().enumerate().for_each(|(i, p)| *p += shift(i));
+        let lasers = (0..moved.len()).map(|i| (i / N_COLUMNS) as u8).collect();
+        moved.scalars = vec![Scalar { name: "ring".into(), values: Values::U8(lasers) }];
+        assert!(ScanRings::find(&moved).is_none());
         let circle =
             (0..9000).map(|i| Vec3::new((i as f32).cos(), (i as f32).sin(), 0.1)).collect();
         for positions in [filled, grid, circle, vec![Vec3::ZERO; 9000], vec![Vec3::NAN; 9000]] {
