@@ -7,7 +7,7 @@
 
 use super::free_space::FreeSpace;
 use super::neighbors::{KdTree, Neighbor};
-use super::octants::{Octants, octant};
+use super::octants::{Octants, octant_around};
 use super::structure::{PointShape, Structure};
 use crate::error::Result;
 use crate::math::{Basis, Vec3};
@@ -33,17 +33,8 @@ const OVERLAP: f32 = 1.25;
 
 /// Returns the octants around a normal in which the neighbours lie.
 fn octants_of(positions: &[Vec3], point: usize, neighbors: &[Neighbor], basis: &Basis) -> Octants {
-    let mut octants = Octants::default();
-    for neighbor in neighbors.iter().take(N_AROUND) {
-        let offset = positions[neighbor.index as usize] - positions[point];
-        octants.insert(octant_of(basis, offset));
-    }
-    octants
-}
-
-/// Returns the octant of a direction in the plane of a basis, counterclockwise from the tangent.
-fn octant_of(basis: &Basis, offset: Vec3) -> usize {
-    octant(basis.tangent.dot(offset), basis.bitangent.dot(offset))
+    let nearest = neighbors.iter().take(N_AROUND);
+    Octants::of(basis, nearest.map(|other| positions[other.index as usize] - positions[point]))
 }
 
 /// True if the nearest neighbours of a point leave a gap around it.
@@ -188,7 +179,7 @@ fn widened(
         let distance = neighbor.distance_squared.sqrt();
         let other = &sides[neighbor.index as usize];
         let offset = positions[other.point as usize] - position;
-        let octant_of_other = octant_of(&basis, offset);
+        let octant_of_other = octant_around(&basis, offset);
         let other_shape = &shapes[other.point as usize];
 
         if distance == 0.0
@@ -202,7 +193,7 @@ fn widened(
         if !own.octants.contains(octant_of_other) {
             radius = radius.max(reach);
         }
-        let octant_of_own = octant_of(&Basis::around(other_shape.normal), -offset);
+        let octant_of_own = octant_around(&Basis::around(other_shape.normal), -offset);
         if other_shape.radius < reach && !other.octants.contains(octant_of_own) {
             widened.push((other.point, reach));
         }

@@ -1,5 +1,7 @@
 //! Octants of directions in a plane, and whether points lie on all sides of another.
 
+use crate::math::{Basis, Vec3};
+
 /// A set of octants, a bit each.
 #[derive(Clone, Copy, Default)]
 pub struct Octants(u8);
@@ -7,6 +9,13 @@ pub struct Octants(u8);
 impl Octants {
     /// All octants.
     pub const ALL: Self = Self(u8::MAX);
+
+    /// Returns the octants of offsets in the plane of a basis.
+    pub fn of(basis: &Basis, offsets: impl Iterator<Item = Vec3>) -> Self {
+        let mut octants = Self::default();
+        offsets.for_each(|offset| octants.insert(octant_around(basis, offset)));
+        octants
+    }
 
     /// Adds an octant.
     pub fn insert(&mut self, octant: usize) {
@@ -30,6 +39,11 @@ impl Octants {
         let run = (1..min_empty).fold(empty, |run, n| run & empty.rotate_right(n as u32));
         run != 0
     }
+}
+
+/// Returns the octant of a direction in the plane of a basis, counterclockwise from the tangent.
+pub fn octant_around(basis: &Basis, offset: Vec3) -> usize {
+    octant(basis.tangent.dot(offset), basis.bitangent.dot(offset))
 }
 
 /// Returns the octant of a direction, counterclockwise from x.

@@ -2,12 +2,13 @@
 
 use super::neighbors::{KdTree, Neighbor};
 use super::normals::{PlaneFit, fit_plane};
+use super::octants::Octants;
 use super::radius::kth_distance;
 use super::structure::{PointShape, Structure, is_line, is_surface};
 use super::subsample::indices_by_spacing;
 use super::wide_discs::WideDisc;
 use crate::error::Result;
-use crate::math::Vec3;
+use crate::math::{Basis, Vec3};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -18,6 +19,11 @@ const MAX_WIDENING: f32 = 12.0;
 const N_THINNED_NEIGHBORS: usize = 12;
 /// Ratio of the spacings of successive sets of thinned points.
 const THINNING: f32 = 2.0;
+/// Maximum surface variation of thinned points that form a surface. Leaves along scan lines, and two stems side by side, are
+/// flat by chance.
+const MAX_VARIATION: f32 = 0.015;
+/// Number of successive octants without a neighbour from which a point lies at the border of a surface or beside it.
+const MIN_EMPTY: usize = 4;
 /// Minimum number of thinned points; fewer say nothing about structure.
 const MIN_THINNED: usize = 256;
 
@@ -64,7 +70,10 @@ pub fn widen_lines(
             if is_line(&fit) {
                 return Ok(None);
             }
-            let structure = match is_surface(&fit) {
+            let is_surface = is_surface(&fit)
+                && fit.variation < MAX_VARIATION
+                && is_amid(&thinned, position, &neighbors, fit.normal);
+            let structure = match is_surface {
                 true if kept.binary_search(point).is_ok() => Structure::Surface,
                 true => Structure::Redundant,
                 false => return Ok(Some((own, Vec::new()))),
@@ -90,6 +99,13 @@ pub fn widen_lines(
         spacing *= THINNING;
     }
     Ok(widened)
+}
+
+/// True if no half of the directions in the plane of a normal is without neighbours.
+fn is_amid(positions: &[Vec3], position: Vec3, neighbors: &[Neighbor], normal: Vec3) -> bool {
+    let offsets = neighbors.iter().map(|other| positions[other.index as usize] - position);
+    let octants = Octants::of(&Basis::around(normal), offsets);
+    !octants.has_gap(MIN_EMPTY)
 }
 
 /// Fits a plane to a position and points around it.
