@@ -4,6 +4,7 @@
 //! which points have few different coordinates, while they have many along the others.
 
 use super::PointCloud;
+use super::up::is_camera_frame;
 use crate::math::{Random, Vec3};
 
 /// Number of points that are examined, and the least number that tell depths from other coordinates.
@@ -33,10 +34,11 @@ impl DepthSteps {
         if n_points < MIN_POINTS {
             return None;
         }
-        let rotation = match &cloud.stations[..] {
-            [station] => station.rotation.as_quat(),
+        let (rotation, camera) = match &cloud.stations[..] {
+            [station] => (station.rotation.as_quat(), station.position.unwrap_or_default()),
             _ => Default::default(),
         };
+        let camera = (camera - cloud.origin).as_vec3();
         let mut random = Random::new(0, 0);
         let mut sample = || cloud.positions[random.below(n_points as u64) as usize];
         let sample: Vec<Vec3> = (0..n_points.min(N_SAMPLES)).map(|_| sample()).collect();
@@ -49,8 +51,18 @@ impl DepthSteps {
             share(*axis) < MAX_DEPTHS && min_others < next.min(last)
         };
         let depth = (0..3).find(is_depth)?;
+        // Flight lines have few coordinates along the flight as well.
+        let [x, y, ahead] = [1, 2, 3].map(|step| axes[(depth + step) % 3]);
+        let seen = |point: &Vec3| {
+            let offset = *point - camera;
+            Vec3::new(offset.dot(x), offset.dot(y), offset.dot(ahead))
+        };
+        let seen: Vec<Vec3> = sample.iter().map(seen).collect();
+        let opposite: Vec<Vec3> = seen.iter().map(|point| -*point).collect();
         let depths = coordinates.into_iter().nth(depth)?;
-        (2 * N_AVERAGED < depths.len()).then_some(Self { axis: axes[depth], depths })
+        let has_camera = is_camera_frame(&seen) || is_camera_frame(&opposite);
+        let is_found = has_camera && 2 * N_AVERAGED < depths.len();
+        is_found.then_some(Self { axis: axes[depth], depths })
     }
 
     /// Returns the distance between the depths around a position.
@@ -130,6 +142,11 @@ mod tests {
         let grid = (0..40_000).map(|i| Vec3::new((i % 200) as f32, (i / 200) as f32, 0.0));
         assert!(DepthSteps::find(&PointCloud::from_positions(grid.collect())).is_none());
         assert!(DepthSteps::find(&slanted(None)).is_none());
+        let flight_lines = (0..40_000).map(|i| {
+            let across = (i % 200) as f32 - 100.0;
+            Vec3::new(across + 1e-3 * (i as f32).sin(), 0.5 * (i / 200) as f32, (i as f32).cos())
+        });
+        assert!(DepthSteps::find(&PointCloud::from_positions(flight_lines.collect())).is_none());
         assert!(DepthSteps::find(&PointCloud::default()).is_none());
     }
 }

@@ -21,7 +21,7 @@ const N_THINNED_NEIGHBORS: usize = 12;
 const THINNING: f32 = 2.0;
 /// Maximum surface variation of thinned points that form a surface. Leaves along scan lines, and two stems side by side, are
 /// flat by chance.
-const MAX_VARIATION: f32 = 0.015;
+const MAX_VARIATION: f32 = 0.03;
 /// Number of successive octants without a neighbour from which a point lies at the border of a surface or beside it.
 const MIN_EMPTY: usize = 4;
 /// Minimum number of thinned points; fewer say nothing about structure.

@@ -127,7 +127,7 @@ pub(super) fn is_mostly_land(positions: &[Vec3]) -> bool {
 }
 
 /// Returns true if all points lie before a depth camera at the origin, whose X points right, Y down and Z ahead.
-fn is_camera_frame(positions: &[Vec3]) -> bool {
+pub(super) fn is_camera_frame(positions: &[Vec3]) -> bool {
     let sample = sample(positions);
     let in_view = |p: &&Vec3| p.x.abs().max(p.y.abs()) < MAX_CAMERA_SLOPE * p.z;
     let n_in_view = sample.iter().filter(in_view).count() as f64;
