@@ -152,13 +152,13 @@ pub fn find_shapes<'a>(
         None => KdTree::new(&cloud.positions, progress)?,
     };
     let voters = std::mem::take(voters);
+    let grids = if preparation.free_space { ScanGrids::new(cloud) } else { None };
     let (mut shapes, mut found) = match (preparation.structure, &mut *fits) {
         (StructureChoice::Auto, Some((fits, _))) => {
-            find_structures(&tree, fits, radii, voters, rings, progress)?
+            find_structures(&tree, fits, radii, voters, rings, grids.is_some(), progress)?
         }
         _ => all_scattered(&tree, radii, progress)?,
     };
-    let grids = if preparation.free_space { ScanGrids::new(cloud) } else { None };
     let mut free_space = FreeSpace::default();
     if let Some(grids) = &grids {
         let fits = fits.as_ref().map_or(&[][..], |(fits, _)| fits);

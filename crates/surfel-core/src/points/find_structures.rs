@@ -56,7 +56,7 @@ const MIN_SHARE_NEAR_SCATTER: f32 = 0.02;
 
 /// Finds the structure of each point from the planes through its neighbours and the distances to the most distant
 /// of them. `voters` are those of each point; if it is empty, they are searched where they are needed. `rings` are those of
-/// a spinning scanner.
+/// a spinning scanner, and `has_free_space` is true if scanners tell where they saw through.
 ///
 /// # Errors
 ///
@@ -67,6 +67,7 @@ pub fn find_structures(
     radii: &[f32],
     voters: Vec<Voters>,
     rings: Option<&ScanRings>,
+    has_free_space: bool,
     progress: &dyn Progress,
 ) -> Result<(Vec<PointShape>, StructureReport)> {
     let positions = tree.positions();
@@ -91,7 +92,7 @@ pub fn find_structures(
             close_ring_gaps(tree, rings, &mut shapes, progress)?;
             Vec::new()
         }
-        None => widen_lines(positions, &mut shapes, progress)?,
+        None => widen_lines(positions, &mut shapes, has_free_space, progress)?,
     };
     for (shape, fit) in shapes.iter_mut().zip(fits) {
         if shape.structure == Structure::Line && MAX_LINE_WIDTH < fit.width {

@@ -29,9 +29,13 @@ const MIN_THINNED: usize = 256;
 
 /// Looks at points on lines again, among fewer and fewer points: on a surface that is sampled densely along lines
 /// only, their neighbours come to surround them. Returns the discs of those points.
+///
+/// Unless scanners tell where they saw through, as `has_free_space` says, the lines beside a surface do not become part of
+/// it, as the outermost of three wires and stems that stand in a plane.
 pub fn widen_lines(
     positions: &[Vec3],
     shapes: &mut [PointShape],
+    has_free_space: bool,
     progress: &dyn Progress,
 ) -> Result<Vec<WideDisc>> {
     let mut widened = Vec::new();
@@ -72,7 +76,7 @@ pub fn widen_lines(
             }
             let is_surface = is_surface(&fit)
                 && fit.variation < MAX_VARIATION
-                && is_amid(&thinned, position, &neighbors, fit.normal);
+                && (has_free_space || is_amid(&thinned, position, &neighbors, fit.normal));
             let structure = match is_surface {
                 true if kept.binary_search(point).is_ok() => Structure::Surface,
                 true => Structure::Redundant,
