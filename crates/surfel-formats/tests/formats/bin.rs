@@ -1,4 +1,4 @@
-//! BIN files: records of position, radius and normal without a header.
+//! BIN files: records of floats without a header, which are told by their values.
 
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::progress::NoProgress;
@@ -49,6 +49,34 @@ fn only_requested_columns_are_loaded() {
 }
 
 #[test]
+fn returns_of_a_spinning_scanner_are_told_by_their_values() {
+    // 7 * 4 * 5 records, so that all lengths fit.
+    let point = |i: usize| {
+        let (sin, cos) = (0.3 * i as f32).sin_cos();
+        [12.0 * cos, 12.0 * sin, 0.01 * i as f32 - 1.7]
+    };
+    let intensity = |i: usize| (i % 10) as f32 / 10.0;
+    let floats =
+        |values: Vec<f32>| -> Vec<u8> { values.into_iter().flat_map(f32::to_le_bytes).collect() };
+    let kitti = (0..140).flat_map(|i| [&point(i)[..], &[intensity(i)]].concat());
+    let loaded = read("000000.bin", floats(kitti.collect())).unwrap();
+    assert_eq!(loaded.info.format, "BIN, records of 4 f32");
+    assert_eq!(loaded.info.columns, ["x", "y", "z", "intensity"]);
+    assert_eq!((loaded.cloud.len(), loaded.cloud.normals.is_none()), (140, true));
+    assert_eq!(loaded.cloud.positions[139], Vec3::from(point(139)));
+    let laser = |i: usize| (i % 32) as f32;
+    let nuscenes =
+        (0..140).flat_map(|i| [&point(i)[..], &[100.0 * intensity(i), laser(i)]].concat());
+    let loaded = read("lidar.pcd.bin", floats(nuscenes.collect())).unwrap();
+    assert_eq!(loaded.info.columns, ["x", "y", "z", "intensity", "ring"]);
+    assert_eq!(loaded.cloud.positions[77], Vec3::from(point(77)));
+    assert_eq!(loaded.cloud.scalar("ring").unwrap().get(77), 13.0);
+    let surfels = (0..140).flat_map(|i| [&point(i)[..], &[0.1, 0.0, 0.6, 0.8]].concat());
+    let loaded = read("a.bin", floats(surfels.collect())).unwrap();
+    assert_eq!(loaded.info.format, "BIN, records of 7 f32");
+}
+
+#[test]
 fn large_coordinates_get_an_origin() {
     let cloud = read("a.bin", file(&[[5e6, 1e7, 2.5, 1.0, 0.0, 0.0, 1.0]; 2])).unwrap().cloud;
     assert_eq!(cloud.world_position(0), DVec3::new(5e6, 1e7, 2.5));
@@ -70,8 +98,8 @@ fn a_partial_record_is_an_error() {
     let error = read("a.bin", &bytes[..47]).unwrap_err().to_string();
     assert_eq!(
         error,
-        "a.bin: byte 28: found a record of 19 bytes, expected 28: x y z radius nx ny nz as \
-         little-endian f32; copy the file again from its source, or convert it if it has other records"
+        "a.bin: byte 28: found a record of 19 bytes, expected 28: x y z radius nx ny nz, 20: x y z \
+         intensity ring, or 16: x y z intensity, as little-endian f32; copy the file again from its source, or convert it if it has other records"
     );
     assert!(read("a.bin", "").unwrap_err().to_string().contains("an empty file"));
     // These coordinate bits begin with the magic bytes of gzip.
