@@ -3,6 +3,7 @@
 use super::deformation::{Morph, Skin, pick};
 use super::scan_station::{STATION, ScanStation};
 use crate::math::{Aabb, DVec3, Vec3};
+use std::ops::Range;
 
 /// Maximum magnitude of a coordinate whose squares are sure to be finite. Files mark points without a measurement
 /// by larger numbers.
@@ -193,20 +194,21 @@ impl PointCloud {
 
     /// Drops the points from `start` on for which `keep` is false, in place.
     pub fn retain_from(&mut self, start: usize, keep: &[bool]) {
-        retain(&mut self.positions, start, keep);
-        self.normals.iter_mut().for_each(|column| retain(column, start, keep));
-        self.radii.iter_mut().for_each(|column| retain(column, start, keep));
-        self.colors.iter_mut().for_each(|column| retain(column, start, keep));
-        self.intensity.iter_mut().for_each(|column| retain(column, start, keep));
-        self.classification.iter_mut().for_each(|column| retain(column, start, keep));
-        self.source_indices.iter_mut().for_each(|column| retain(column, start, keep));
+        let kept = runs_of(start, keep);
+        retain(&mut self.positions, start, &kept);
+        self.normals.iter_mut().for_each(|column| retain(column, start, &kept));
+        self.radii.iter_mut().for_each(|column| retain(column, start, &kept));
+        self.colors.iter_mut().for_each(|column| retain(column, start, &kept));
+        self.intensity.iter_mut().for_each(|column| retain(column, start, &kept));
+        self.classification.iter_mut().for_each(|column| retain(column, start, &kept));
+        self.source_indices.iter_mut().for_each(|column| retain(column, start, &kept));
         for scalar in &mut self.scalars {
             match &mut scalar.values {
-                Values::U8(column) => retain(column, start, keep),
-                Values::U16(column) => retain(column, start, keep),
-                Values::I32(column) => retain(column, start, keep),
-                Values::F32(column) => retain(column, start, keep),
-                Values::F64(column) => retain(column, start, keep),
+                Values::U8(column) => retain(column, start, &kept),
+                Values::U16(column) => retain(column, start, &kept),
+                Values::I32(column) => retain(column, start, &kept),
+                Values::F32(column) => retain(column, start, &kept),
+                Values::F64(column) => retain(column, start, &kept),
             }
         }
     }
@@ -241,14 +243,27 @@ impl PointCloud {
     }
 }
 
-/// Drops the entries from `start` on for which `keep` is false.
-fn retain<T: Copy>(column: &mut Vec<T>, start: usize, keep: &[bool]) {
+/// Drops the entries from `start` on outside of the runs that are kept.
+fn retain<T: Copy>(column: &mut Vec<T>, start: usize, kept: &[Range<usize>]) {
     let mut end = start;
-    for (i, _) in keep.iter().enumerate().filter(|(_, is_kept)| **is_kept) {
-        column[end] = column[start + i];
-        end += 1;
+    for run in kept {
+        if end != run.start {
+            column.copy_within(run.clone(), end);
+        }
+        end += run.len();
     }
     column.truncate(end);
+}
+
+/// Returns the runs of points from `start` on that are kept.
+fn runs_of(start: usize, keep: &[bool]) -> Vec<Range<usize>> {
+    let mut at = start;
+    let runs = keep.chunk_by(|a, b| a == b).filter_map(|run| {
+        let range = at..at + run.len();
+        at = range.end;
+        run[0].then_some(range)
+    });
+    runs.collect()
 }
 
 impl AsRef<PointCloud> for PointCloud {
