@@ -20,7 +20,7 @@ const MAX_RANGE: f32 = 1000.0;
 /// Maximum intensity, and maximum number of lasers.
 const MAX_BYTE: f32 = 255.0;
 
-/// What the records of a file hold.
+/// Contents of the records of a file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Records {
     /// Position, radius and normal.

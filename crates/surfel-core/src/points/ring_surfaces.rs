@@ -1,7 +1,7 @@
 //! Surfaces between the rings of a spinning scanner, which are far denser along a ring than across.
 //!
-//! Where points of three successive rings lie on a line, as on the ground, a wall or the side of a car, the gaps between
-//! them are closed. Where the range jumps, they do not, and the gap stays open.
+//! The gaps are closed between rings whose points lie on a line, as on the ground, a wall or the side of a car. A jump of
+//! the range leaves a gap open.
 
 use super::neighbors::KdTree;
 use super::scan_rings::{Ring, ScanRings};

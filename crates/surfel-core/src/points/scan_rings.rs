@@ -351,7 +351,7 @@ mod tests {
         let azimuths = vec![-3.1, -1.0, 0.5, 3.0];
         let ring = Ring { elevation_rad: 0.0, azimuths, points: vec![0, 1, 2, 3] };
         assert_eq!(ring.nearest(3.13, 0.1), Some(0));
-        assert_eq!(ring.nearest(-3.14, 0.1), Some(0));
+        assert_eq!(ring.nearest(-3.13, 0.1), Some(0));
         assert_eq!(ring.nearest(0.45, 0.1), Some(2));
         assert_eq!(ring.nearest(0.3, 0.1), None);
     }
