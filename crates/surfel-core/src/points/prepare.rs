@@ -13,7 +13,7 @@ use super::outliers::remove_outliers;
 use super::preparation::{Preparation, SURFACE_VARIATION};
 use super::radius::{Radius, RadiusReport};
 use super::scan_rings::ScanRings;
-use super::structure::{PointShape, Structure, StructureReport};
+use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
 use super::subsample::subsample;
 use super::{PointCloud, PreparedCloud, Scalar, Values};
 use crate::error::{Error, Result};
@@ -90,14 +90,17 @@ pub fn prepare(
     if cloud.is_empty() {
         return Err(Error::EmptyCloud);
     }
-    let rings = ScanRings::find(&cloud);
-    if let Some(ScanRings { rings, .. }) = &rings {
+    let missing = Missing::any(&cloud, preparation);
+    let rings = if missing.fits { ScanRings::find(&cloud) } else { None };
+    if let Some(ScanRings { rings, .. }) = &rings
+        && missing.structure
+        && preparation.structure == StructureChoice::Auto
+    {
         let line = format!("{} rings of a spinning scanner", rings.len());
         progress.choice(&format!("{line}: gaps between them are closed"), &["structure"]);
     }
     let denoised = denoise(&mut cloud, preparation.denoise, progress)?;
     let (denoise, denoised_normals) = denoised.map(|found| (found.report, found.normals)).unzip();
-    let missing = Missing::any(&cloud, preparation);
     let estimated = Missing::all(&cloud, preparation);
     let mut report =
         PreparationReport { clean, denoise, n_points: cloud.len(), ..Default::default() };

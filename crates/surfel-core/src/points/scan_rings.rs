@@ -84,14 +84,17 @@ impl ScanRings {
         let step = cloud.len().div_ceil(N_SAMPLES);
         let spread: Vec<_> = cloud.positions.iter().step_by(step).map(direction).collect();
         let first: Vec<_> = cloud.positions.iter().take(N_SAMPLES).map(direction).collect();
-        let by_column = by_column(cloud);
-        if by_column.is_none() && by_elevation(&spread).is_none() && !is_in_order(&first) {
+        let has_elevations =
+            || [&spread, &first].into_iter().any(|few| by_elevation(few).is_some());
+        let column = by_column(cloud);
+        if column.is_none() && !has_elevations() && !is_in_order(&first) {
             return None;
         }
         let directions: Vec<_> = cloud.positions.iter().map(direction).collect();
-        let ring_of_point =
-            by_column.or_else(|| by_elevation(&directions)).or_else(|| by_order(&directions))?;
-        let rings = rings(&directions, &ring_of_point)?;
+        let found = |ring_of_point: Option<Vec<u16>>| rings(&directions, &ring_of_point?);
+        let rings = found(column)
+            .or_else(|| found(by_elevation(&directions)))
+            .or_else(|| found(by_order(&directions)))?;
         Some(Self { scanner, rings })
     }
 }
