@@ -13,8 +13,10 @@ use crate::table::{
 
 /// Number of records that tell what they hold.
 const N_SAMPLES: usize = 4096;
-/// Minimum share of them that must agree.
+/// Minimum fraction of them that must agree.
 const MIN_AGREEING: f32 = 0.9;
+/// Minimum number of records of a scanner: a few numbers may be anything.
+const MIN_RETURNS: usize = 64;
 /// Maximum distance that a spinning scanner measures, in metres.
 const MAX_RANGE: f32 = 1000.0;
 /// Maximum intensity, and maximum number of lasers.
@@ -35,7 +37,11 @@ impl Records {
     /// Tells the records of a file by its length and their values.
     fn of(input: &Input) -> Result<Self> {
         let all = [Self::Surfels, Self::ReturnsOfLasers, Self::Returns];
-        let fits = |records: &Self| input.len().is_multiple_of(records.stride());
+        let fits = |records: &Self| {
+            let n_records = input.len() / records.stride();
+            let is_sure = *records == Self::Surfels || MIN_RETURNS <= n_records;
+            is_sure && input.len().is_multiple_of(records.stride())
+        };
         if let Some(found) = all.into_iter().filter(fits).find(|records| records.agree_with(input))
         {
             return Ok(found);
@@ -43,6 +49,14 @@ impl Records {
         let rest = input.len() % Self::Surfels.stride();
         if rest == 0 {
             return Ok(Self::Surfels);
+        }
+        if all.iter().any(fits) {
+            return Err(input.malformed(
+                Location::Byte(0),
+                "numbers that are no position and intensity",
+                "x y z within 1000 and an intensity of 0 to 255 in most records of 16 or 20 bytes",
+                "convert the file if it has other records",
+            ));
         }
         Err(input.malformed(
             Location::Byte((input.len() - rest) as u64),
@@ -106,7 +120,7 @@ impl Records {
     }
 }
 
-/// Reads the number of points from the length of the file.
+/// Determines the records by some of their values, and their number by the length of the file.
 pub(crate) fn inspect(input: &Input) -> Result<FileInfo> {
     Ok(info(input, Records::of(input)?))
 }

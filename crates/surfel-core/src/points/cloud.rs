@@ -3,7 +3,6 @@
 use super::deformation::{Morph, Skin, pick};
 use super::scan_station::{STATION, ScanStation};
 use crate::math::{Aabb, DVec3, Vec3};
-use std::ops::Range;
 
 /// Maximum magnitude of a coordinate whose squares are sure to be finite. Files mark points without a measurement
 /// by larger numbers.
@@ -194,21 +193,20 @@ impl PointCloud {
 
     /// Drops the points from `start` on for which `keep` is false, in place.
     pub fn retain_from(&mut self, start: usize, keep: &[bool]) {
-        let kept = runs_of(start, keep);
-        retain(&mut self.positions, start, &kept);
-        self.normals.iter_mut().for_each(|column| retain(column, start, &kept));
-        self.radii.iter_mut().for_each(|column| retain(column, start, &kept));
-        self.colors.iter_mut().for_each(|column| retain(column, start, &kept));
-        self.intensity.iter_mut().for_each(|column| retain(column, start, &kept));
-        self.classification.iter_mut().for_each(|column| retain(column, start, &kept));
-        self.source_indices.iter_mut().for_each(|column| retain(column, start, &kept));
+        retain(&mut self.positions, start, keep);
+        self.normals.iter_mut().for_each(|column| retain(column, start, keep));
+        self.radii.iter_mut().for_each(|column| retain(column, start, keep));
+        self.colors.iter_mut().for_each(|column| retain(column, start, keep));
+        self.intensity.iter_mut().for_each(|column| retain(column, start, keep));
+        self.classification.iter_mut().for_each(|column| retain(column, start, keep));
+        self.source_indices.iter_mut().for_each(|column| retain(column, start, keep));
         for scalar in &mut self.scalars {
             match &mut scalar.values {
-                Values::U8(column) => retain(column, start, &kept),
-                Values::U16(column) => retain(column, start, &kept),
-                Values::I32(column) => retain(column, start, &kept),
-                Values::F32(column) => retain(column, start, &kept),
-                Values::F64(column) => retain(column, start, &kept),
+                Values::U8(column) => retain(column, start, keep),
+                Values::U16(column) => retain(column, start, keep),
+                Values::I32(column) => retain(column, start, keep),
+                Values::F32(column) => retain(column, start, keep),
+                Values::F64(column) => retain(column, start, keep),
             }
         }
     }
@@ -243,27 +241,19 @@ impl PointCloud {
     }
 }
 
-/// Drops the entries from `start` on outside of the runs that are kept.
-fn retain<T: Copy>(column: &mut Vec<T>, start: usize, kept: &[Range<usize>]) {
-    let mut end = start;
-    for run in kept {
-        if end != run.start {
-            column.copy_within(run.clone(), end);
+/// Drops the entries from `start` on for which `keep` is false; those that are kept move in runs.
+fn retain<T: Copy>(column: &mut Vec<T>, start: usize, keep: &[bool]) {
+    let (mut at, mut end) = (start, start);
+    for run in keep.chunk_by(|a, b| a == b) {
+        if run[0] {
+            if end != at {
+                column.copy_within(at..at + run.len(), end);
+            }
+            end += run.len();
         }
-        end += run.len();
+        at += run.len();
     }
     column.truncate(end);
-}
-
-/// Returns the runs of points from `start` on that are kept.
-fn runs_of(start: usize, keep: &[bool]) -> Vec<Range<usize>> {
-    let mut at = start;
-    let runs = keep.chunk_by(|a, b| a == b).filter_map(|run| {
-        let range = at..at + run.len();
-        at = range.end;
-        run[0].then_some(range)
-    });
-    runs.collect()
 }
 
 impl AsRef<PointCloud> for PointCloud {

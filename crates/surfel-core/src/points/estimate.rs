@@ -14,7 +14,7 @@ use super::scan_grid::ScanGrids;
 use super::scan_rings::ScanRings;
 use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
 use crate::error::Result;
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::progress::Progress;
 
 /// The columns to estimate.
@@ -152,22 +152,24 @@ pub fn find_shapes<'a>(
         None => KdTree::new(&cloud.positions, progress)?,
     };
     let voters = std::mem::take(voters);
-    let grids = if preparation.free_space { ScanGrids::new(cloud) } else { None };
     let (mut shapes, mut found) = match (preparation.structure, &mut *fits) {
         (StructureChoice::Auto, Some((fits, _))) => {
-            find_structures(&tree, fits, radii, voters, rings, grids.is_some(), progress)?
+            let at = |scanner: DVec3| (scanner - cloud.origin).as_vec3();
+            let rings = rings.map(|rings| (&rings.rings[..], at(rings.scanner)));
+            find_structures(&tree, fits, radii, voters, rings, progress)?
         }
         _ => all_scattered(&tree, radii, progress)?,
     };
-    let mut free_space = FreeSpace::default();
-    if let Some(grids) = &grids {
-        let fits = fits.as_ref().map_or(&[][..], |(fits, _)| fits);
-        free_space = FreeSpace::new(grids, &cloud.positions, progress)?;
-        let report = free_space.narrow(&tree, fits, &mut shapes, progress)?;
-        report.line().iter().for_each(|line| progress.choice(line, &["free_space"]));
-        if 0 < report.n_lines {
-            found = StructureReport::of(&shapes);
-        }
+    let grids = if preparation.free_space { ScanGrids::new(cloud) } else { None };
+    let free_space = match &grids {
+        Some(grids) => FreeSpace::new(grids, &cloud.positions, progress)?,
+        None => FreeSpace::default(),
+    };
+    let fits_of_points = fits.as_ref().map_or(&[][..], |(fits, _)| fits);
+    let narrowed = free_space.narrow(&tree, fits_of_points, &mut shapes, progress)?;
+    narrowed.line().iter().for_each(|line| progress.choice(line, &["free_space"]));
+    if 0 < narrowed.n_lines {
+        found = StructureReport::of(&shapes);
     }
     if !is_by_gap.is_empty() {
         close_gaps(&tree, radii, is_by_gap, &free_space, &mut shapes, progress)?;

@@ -13,7 +13,7 @@ use super::normals::{PlaneFit, fit_plane};
 use super::radius::kth_distance;
 use super::ring_surfaces::close_ring_gaps;
 use super::scan_lines::widen_lines;
-use super::scan_rings::ScanRings;
+use super::scan_rings::Ring;
 use super::see_through::open_see_through_discs;
 use super::solids::{ball_radius, clamp_solids, settle};
 use super::stray_points::limit_stray_points;
@@ -56,7 +56,7 @@ const MIN_SHARE_NEAR_SCATTER: f32 = 0.02;
 
 /// Finds the structure of each point from the planes through its neighbours and the distances to the most distant
 /// of them. `voters` are those of each point; if it is empty, they are searched where they are needed. `rings` are those of
-/// a spinning scanner, and `has_free_space` is true if scanners tell where they saw through.
+/// a spinning scanner at `scanner`, relative to the origin of the cloud.
 ///
 /// # Errors
 ///
@@ -66,8 +66,7 @@ pub fn find_structures(
     fits: &[PlaneFit],
     radii: &[f32],
     voters: Vec<Voters>,
-    rings: Option<&ScanRings>,
-    has_free_space: bool,
+    rings: Option<(&[Ring], Vec3)>,
     progress: &dyn Progress,
 ) -> Result<(Vec<PointShape>, StructureReport)> {
     let positions = tree.positions();
@@ -88,11 +87,11 @@ pub fn find_structures(
     let mut shapes: Vec<PointShape> = decided.into_iter().map(|decision| decision.shape).collect();
     join_to_surfaces(tree, typical.noise(), &mut shapes, progress)?;
     let widened = match rings {
-        Some(rings) => {
-            close_ring_gaps(tree, rings, &mut shapes, progress)?;
+        Some((rings, scanner)) => {
+            close_ring_gaps(tree, rings, scanner, &mut shapes, progress)?;
             Vec::new()
         }
-        None => widen_lines(positions, &mut shapes, has_free_space, progress)?,
+        None => widen_lines(positions, &mut shapes, progress)?,
     };
     for (shape, fit) in shapes.iter_mut().zip(fits) {
         if shape.structure == Structure::Line && MAX_LINE_WIDTH < fit.width {

@@ -91,7 +91,7 @@ pub fn prepare(
         return Err(Error::EmptyCloud);
     }
     let missing = Missing::any(&cloud, preparation);
-    let rings = if missing.fits { ScanRings::find(&cloud) } else { None };
+    let rings = if missing.fits { ScanRings::find(&cloud, progress)? } else { None };
     if let Some(ScanRings { rings, .. }) = &rings
         && missing.structure
         && preparation.structure == StructureChoice::Auto
@@ -116,7 +116,7 @@ pub fn prepare(
             add_variation(&mut cloud, &fits);
         }
         if missing.normals {
-            let orientation = choose_orientation(&cloud, preparation, rings.as_ref(), progress);
+            let orientation = orientation_by_rings(&cloud, preparation, rings.as_ref(), progress);
             let found = add_normals(&mut cloud, &fits, orientation, progress)?;
             found.repairs().iter().for_each(|line| progress.note(line));
             report.normals = Some(found);
@@ -168,19 +168,19 @@ fn add_variation(cloud: &mut PointCloud, fits: &[PlaneFit]) {
     cloud.scalars.push(Scalar { name: SURFACE_VARIATION.to_owned(), values });
 }
 
-/// Returns the orientation of the preparation, or that toward the scanner if the rings tell where it stood.
-fn choose_orientation(
+/// Returns the orientation of the preparation, or that toward the scanner if normals are missing altogether and rings show
+/// where it stood.
+fn orientation_by_rings(
     cloud: &PointCloud,
     preparation: &Preparation,
     rings: Option<&ScanRings>,
     progress: &dyn Progress,
 ) -> Orientation {
     match (preparation.orientation, rings) {
-        (Orientation::Auto, Some(rings)) => {
-            let scanner = rings.scanner.as_dvec3() + cloud.origin;
-            let [x, y, z] = scanner.to_array();
+        (Orientation::Auto, Some(rings)) if cloud.normals.is_none() => {
+            let [x, y, z] = rings.scanner.to_array();
             progress.choice(&format!("front sides toward the scanner at {x},{y},{z}"), &["orient"]);
-            Orientation::Viewpoint(scanner)
+            Orientation::Viewpoint(rings.scanner)
         }
         (orientation, _) => orientation,
     }

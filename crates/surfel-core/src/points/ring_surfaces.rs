@@ -4,7 +4,7 @@
 //! the range leaves a gap open.
 
 use super::neighbors::KdTree;
-use super::scan_rings::{Ring, ScanRings};
+use super::scan_rings::Ring;
 use super::structure::{PointShape, Structure};
 use crate::error::Result;
 use crate::math::Vec3;
@@ -33,54 +33,74 @@ const MAX_STRETCH_POINTS: usize = 16;
 const MIN_DEPTH: f32 = 0.5;
 /// Number of rays of a ring on each side of a disc's centre that may have passed through it.
 const N_SAMPLES: i32 = 8;
+/// Minimum cosine of the elevation of a ring around which these are sought as wide as the disc.
+const MIN_LEVEL: f32 = 0.1;
+/// Maximum number of rings of such rays.
+const MAX_RINGS_OF_RAYS: usize = 33;
 /// Minimum ratio of the radius of a disc, up to the nearest ray that passed through it, to the gap that it is to close.
 const MIN_FREE: f32 = 0.6;
-/// Distance between the discs that are kept along a ring, in radii.
+/// Distance between the discs that are kept along a ring, in radii, and minimum cosine between the normals of a disc that is
+/// kept and one that is not.
 const SPACING: f32 = 0.3;
+const MIN_COSINE: f32 = 0.95;
 
 /// Makes discs of the points on lines that lie on a surface between rings, as wide as the gaps. Discs that others on their
-/// ring describe as well become redundant.
+/// ring describe as well become redundant. `scanner` is relative to the origin of the points.
 ///
 /// # Errors
 ///
 /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
 pub fn close_ring_gaps(
     tree: &KdTree,
-    rings: &ScanRings,
+    rings: &[Ring],
+    scanner: Vec3,
     shapes: &mut [PointShape],
     progress: &dyn Progress,
 ) -> Result<()> {
-    let ScanRings { rings, scanner } = rings;
-    let scanner = *scanner;
-    let n_steps = rings.iter().map(|ring| ring.points.len()).max().unwrap_or(1);
-    let max_turn = MAX_STEPS * std::f32::consts::TAU / n_steps as f32;
+    let Some(fullest) = rings.iter().max_by_key(|ring| ring.points.len()) else { return Ok(()) };
+    let max_turn = MAX_STEPS * median_step(fullest);
     let surfaces = RingSurfaces { positions: tree.positions(), rings, scanner, max_turn };
     for (ring, Ring { points, .. }) in rings.iter().enumerate() {
-        progress.check()?;
-        let shape = |(place, point): (usize, &u32)| {
-            let own = &shapes[*point as usize];
-            let disc = || surfaces.disc(RingPoint { ring, place });
-            (own.structure == Structure::Line).then(disc).flatten()
+        let disc = |(index, point): (usize, &u32)| {
+            if index.is_multiple_of(4096) {
+                progress.check()?;
+            }
+            let is_line = shapes[*point as usize].structure == Structure::Line;
+            Ok(if is_line { surfaces.disc(RingPoint { ring, index }) } else { None })
         };
-        let discs: Vec<Option<PointShape>> = points.par_iter().enumerate().map(shape).collect();
-        let mut last_kept: Option<Vec3> = None;
+        let discs = points.par_iter().enumerate().map(disc).collect::<Result<Vec<_>>>()?;
+        let mut last_kept: Option<(Vec3, PointShape)> = None;
         for (i, (point, disc)) in points.iter().zip(&discs).enumerate() {
             let Some(mut disc) = *disc else {
                 last_kept = None;
                 continue;
             };
             let position = surfaces.positions[*point as usize];
-            let is_near = |kept: Vec3| kept.distance(position) < SPACING * disc.radius;
+            let is_alike = |(at, kept): (Vec3, PointShape)| {
+                at.distance(position) < SPACING * disc.radius.min(kept.radius)
+                    && MIN_COSINE < kept.normal.dot(disc.normal).abs()
+            };
             let is_last = discs.get(i + 1).is_none_or(Option::is_none);
-            if !is_last && last_kept.is_some_and(is_near) {
+            if !is_last && last_kept.is_some_and(is_alike) {
                 disc.structure = Structure::Redundant;
             } else {
-                last_kept = Some(position);
+                last_kept = Some((position, disc));
             }
             shapes[*point as usize] = disc;
         }
     }
     Ok(())
+}
+
+/// Returns the median step between successive azimuths of a ring, in radians, without those of several turns that repeat.
+fn median_step(ring: &Ring) -> f32 {
+    let steps = ring.azimuths.windows(2).map(|pair| pair[1] - pair[0]);
+    let mut steps: Vec<f32> = steps.filter(|step| 0.0 < *step).collect();
+    let middle = steps.len() / 2;
+    match steps.is_empty() {
+        true => 0.0,
+        false => *steps.select_nth_unstable_by(middle, f32::total_cmp).1,
+    }
 }
 
 /// A part of a ring.
@@ -98,11 +118,11 @@ struct RingSurfaces<'a> {
     max_turn: f32,
 }
 
-/// A point by its ring and its place on it.
+/// A point by its ring and its index there.
 #[derive(Clone, Copy)]
 struct RingPoint {
     ring: usize,
-    place: usize,
+    index: usize,
 }
 
 impl RingSurfaces<'_> {
@@ -126,11 +146,13 @@ impl RingSurfaces<'_> {
     fn free_radius(&self, point: RingPoint, normal: Vec3, radius: f32) -> f32 {
         let center = self.position(point) - self.scanner;
         let elevation_rad = self.rings[point.ring].elevation_rad;
-        let turn = (radius / center.length()).min(1.0).asin();
+        let angle = (radius / center.length()).min(1.0).asin();
+        let turn = angle / elevation_rad.cos().max(MIN_LEVEL);
         let turns = (-N_SAMPLES..=N_SAMPLES).map(|step| turn * step as f32 / N_SAMPLES as f32);
-        let is_near =
-            |ring: &usize| (self.rings[*ring].elevation_rad - elevation_rad).abs() <= turn;
-        let rays = (0..self.rings.len()).filter(is_near).flat_map(|ring| {
+        let below = |limit: f32| self.rings.partition_point(|ring| ring.elevation_rad < limit);
+        let near = below(elevation_rad - angle)..below(elevation_rad + angle).max(point.ring + 1);
+        let step = near.len().div_ceil(MAX_RINGS_OF_RAYS).max(1);
+        let rays = near.step_by(step).flat_map(|ring| {
             let at = move |turn| self.nearest(ring, self.azimuth(point) + turn);
             turns.clone().filter_map(at).map(|other| self.position(other) - self.scanner)
         });
@@ -171,29 +193,29 @@ impl RingSurfaces<'_> {
 
     /// Returns the point of a ring at an azimuth.
     fn nearest(&self, ring: usize, azimuth: f32) -> Option<RingPoint> {
-        let place = self.rings.get(ring)?.nearest(azimuth, self.max_turn)?;
-        Some(RingPoint { ring, place })
+        let index = self.rings.get(ring)?.nearest(azimuth, self.max_turn)?;
+        Some(RingPoint { ring, index })
     }
 
     fn position(&self, point: RingPoint) -> Vec3 {
-        self.positions[self.rings[point.ring].points[point.place] as usize]
+        self.positions[self.rings[point.ring].points[point.index] as usize]
     }
 
     fn azimuth(&self, point: RingPoint) -> f32 {
-        self.rings[point.ring].azimuths[point.place]
+        self.rings[point.ring].azimuths[point.index]
     }
 
     /// Returns the stretch of a ring within a distance from one of its points.
     fn stretch(&self, point: RingPoint, reach: f32) -> Stretch {
-        let RingPoint { ring, place } = point;
+        let RingPoint { ring, index } = point;
         let position = self.position(point);
         let n_points = self.rings[ring].points.len();
         let mut count = 1;
         let mut sum_of_side = |sense: isize| {
-            let places = (1..=MAX_STRETCH_POINTS.min(n_points / 2)).map(|step| {
-                (place as isize + sense * step as isize).rem_euclid(n_points as isize) as usize
+            let indices = (1..=MAX_STRETCH_POINTS.min(n_points / 2)).map(|step| {
+                (index as isize + sense * step as isize).rem_euclid(n_points as isize) as usize
             });
-            let offsets = places.map(|place| self.position(RingPoint { ring, place }) - position);
+            let offsets = indices.map(|index| self.position(RingPoint { ring, index }) - position);
             let near = offsets.take_while(|offset| offset.length() < reach);
             near.inspect(|_| count += 1).sum::<Vec3>()
         };

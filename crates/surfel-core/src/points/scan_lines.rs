@@ -2,13 +2,12 @@
 
 use super::neighbors::{KdTree, Neighbor};
 use super::normals::{PlaneFit, fit_plane};
-use super::octants::Octants;
 use super::radius::kth_distance;
 use super::structure::{PointShape, Structure, is_line, is_surface};
 use super::subsample::indices_by_spacing;
 use super::wide_discs::WideDisc;
 use crate::error::Result;
-use crate::math::{Basis, Vec3};
+use crate::math::Vec3;
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -22,20 +21,14 @@ const THINNING: f32 = 2.0;
 /// Maximum surface variation of thinned points that form a surface. Leaves along scan lines, and two stems side by side, are
 /// flat by chance.
 const MAX_VARIATION: f32 = 0.03;
-/// Number of successive octants without a neighbour from which a point lies at the border of a surface or beside it.
-const MIN_EMPTY: usize = 4;
 /// Minimum number of thinned points; fewer say nothing about structure.
 const MIN_THINNED: usize = 256;
 
 /// Looks at points on lines again, among fewer and fewer points: on a surface that is sampled densely along lines
 /// only, their neighbours come to surround them. Returns the discs of those points.
-///
-/// Unless scanners tell where they saw through, as `has_free_space` says, the lines beside a surface do not become part of
-/// it, as the outermost of three wires and stems that stand in a plane.
 pub fn widen_lines(
     positions: &[Vec3],
     shapes: &mut [PointShape],
-    has_free_space: bool,
     progress: &dyn Progress,
 ) -> Result<Vec<WideDisc>> {
     let mut widened = Vec::new();
@@ -74,9 +67,7 @@ pub fn widen_lines(
             if is_line(&fit) {
                 return Ok(None);
             }
-            let is_surface = is_surface(&fit)
-                && fit.variation < MAX_VARIATION
-                && (has_free_space || is_amid(&thinned, position, &neighbors, fit.normal));
+            let is_surface = is_surface(&fit) && fit.variation < MAX_VARIATION;
             let structure = match is_surface {
                 true if kept.binary_search(point).is_ok() => Structure::Surface,
                 true => Structure::Redundant,
@@ -103,13 +94,6 @@ pub fn widen_lines(
         spacing *= THINNING;
     }
     Ok(widened)
-}
-
-/// True if no half of the directions in the plane of a normal is without neighbours.
-fn is_amid(positions: &[Vec3], position: Vec3, neighbors: &[Neighbor], normal: Vec3) -> bool {
-    let offsets = neighbors.iter().map(|other| positions[other.index as usize] - position);
-    let octants = Octants::of(&Basis::around(normal), offsets);
-    !octants.has_gap(MIN_EMPTY)
 }
 
 /// Fits a plane to a position and points around it.

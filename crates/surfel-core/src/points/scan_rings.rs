@@ -1,10 +1,13 @@
 //! Rings of a spinning scanner: each of its lasers sweeps a cone about the vertical axis of the scanner.
 //!
-//! The laser of each point is told by a column, by elevations that repeat, or by the order of the points in the file, one
-//! turn of a laser after the other.
+//! The laser of each point follows from a column, from the order of the points in the file, one turn of a laser after the
+//! other, or from elevations that repeat.
 
 use super::{PointCloud, ROW_INDEX, Values, is_valid_position};
-use crate::math::Vec3;
+use crate::error::Result;
+use crate::math::{DVec3, Vec3};
+use crate::progress::Progress;
+use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
 
 /// Numbers of lasers of a scanner.
@@ -16,7 +19,7 @@ const MIN_POINTS: usize = 2048;
 const N_SAMPLES: usize = 65_536;
 /// Names of the columns that tell the laser of each point.
 const RING_COLUMNS: [&str; 6] = ["ring", "laser_id", "laser", "channel", "beam", ROW_INDEX];
-/// Minimum share of the points whose laser is known.
+/// Minimum fraction of the points whose laser is known.
 const MIN_KNOWN: f32 = 0.95;
 /// Differences of successive elevations in degrees, from which they are those of different lasers. They are tried in turn.
 const MIN_STEPS_DEG: [f32; 4] = [0.005, 0.02, 0.05, 0.1];
@@ -25,12 +28,18 @@ const MAX_RING_WIDTH: f32 = 0.2;
 /// Maximum distance between the quartiles of the elevations of a laser, in steps to those of the next. It is wide for a
 /// laser beside the middle of the scanner, and wider where the scanner moved.
 const MAX_SPREAD: f32 = 1.5;
-/// Minimum share of the points on a ring.
-const MIN_SHARE: f32 = 0.0005;
-/// Minimum share of successive points in one sense about the axis, where lasers follow each other in the file.
+/// Minimum fraction of the points on a ring.
+const MIN_FRACTION: f32 = 0.0005;
+/// Minimum fraction of successive points in one sense about the axis, where lasers follow each other in the file.
 const MIN_IN_ORDER: f32 = 0.98;
 /// Maximum turn between successive points of a laser, in radians: larger ones have no sense.
 const MAX_TURN: f32 = 0.75 * PI;
+/// Minimum turn back, in radians, at which the points of the next laser begin.
+const MIN_TURN_BACK: f32 = 0.2;
+/// Minimum variation of the ranges of a laser, as a fraction of their median, and minimum fraction of the lasers that have
+/// it. Spheres, columns and vases about the zero have rings of points, too, each at one distance.
+const MIN_VARIATION: f32 = 0.01;
+const MIN_VARIED: f32 = 0.05;
 /// Minimum median step between the elevations of successive lasers, in radians.
 const MIN_STEP_RAD: f32 = 5e-4;
 /// Marks a point without a ring.
@@ -38,8 +47,8 @@ const NO_RING: u16 = u16::MAX;
 
 /// The points of a cloud by the laser that measured them.
 pub struct ScanRings {
-    /// Position of the scanner, relative to the origin of the cloud.
-    pub scanner: Vec3,
+    /// World position of the scanner.
+    pub scanner: DVec3,
     /// Rings by ascending elevation.
     pub rings: Vec<Ring>,
 }
@@ -59,55 +68,82 @@ pub struct Ring {
 struct Direction {
     azimuth: f32,
     elevation_deg: f32,
+    range: f32,
 }
 
 impl ScanRings {
     /// Returns the rings of a scan from one place: that of its station, or else the zero of the world coordinates. Returns
     /// none for other clouds.
-    pub fn find(cloud: &PointCloud) -> Option<Self> {
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+    pub fn find(cloud: &PointCloud, progress: &dyn Progress) -> Result<Option<Self>> {
         let is_animated = !cloud.morphs.is_empty() || cloud.skin.is_some();
         if cloud.len() < MIN_POINTS || 1 < cloud.stations.len() || is_animated {
-            return None;
+            return Ok(None);
         }
         let station = cloud.stations.first().cloned().unwrap_or_default();
-        let scanner = (station.position.unwrap_or_default() - cloud.origin).as_vec3();
-        let from_scanner = station.rotation.inverse();
+        let scanner = station.position.unwrap_or_default();
+        let (from_scanner, offset) =
+            (station.rotation.inverse(), (scanner - cloud.origin).as_vec3());
         let direction = |position: &Vec3| {
-            let measured = (from_scanner * (*position - scanner).as_dvec3()).as_vec3();
+            let measured = (from_scanner * (*position - offset).as_dvec3()).as_vec3();
             let is_measured = is_valid_position(*position) && measured != Vec3::ZERO;
             is_measured.then(|| Direction {
                 azimuth: measured.y.atan2(measured.x),
                 elevation_deg: measured.z.atan2(measured.truncate().length()).to_degrees(),
+                range: measured.length(),
             })
         };
         // Most clouds have none, which some points tell.
         let step = cloud.len().div_ceil(N_SAMPLES);
-        let spread: Vec<_> = cloud.positions.iter().step_by(step).map(direction).collect();
-        let first: Vec<_> = cloud.positions.iter().take(N_SAMPLES).map(direction).collect();
-        let has_elevations =
-            || [&spread, &first].into_iter().any(|few| by_elevation(few).is_some());
-        let column = by_column(cloud);
-        if column.is_none() && !has_elevations() && !is_in_order(&first) {
-            return None;
+        let spread_sample: Vec<_> = cloud.positions.iter().step_by(step).map(direction).collect();
+        let first_sample: Vec<_> = cloud.positions.iter().take(N_SAMPLES).map(direction).collect();
+        let mut columns = RING_COLUMNS.into_iter().filter_map(|name| cloud.scalar(name));
+        let column =
+            columns.find(|values| rings(&spread_sample, &by_column(values, step)).is_some());
+        let mut samples = [&spread_sample, &first_sample].into_iter();
+        if column.is_none()
+            && samples.all(|sample| by_elevation(sample).is_none())
+            && !is_in_order(&first_sample)
+        {
+            return Ok(None);
         }
-        let directions: Vec<_> = cloud.positions.iter().map(direction).collect();
-        let found = |ring_of_point: Option<Vec<u16>>| rings(&directions, &ring_of_point?);
-        let rings = found(column)
-            .or_else(|| found(by_elevation(&directions)))
-            .or_else(|| found(by_order(&directions)))?;
-        Some(Self { scanner, rings })
+        progress.check()?;
+        let directions: Vec<_> = cloud.positions.par_iter().map(direction).collect();
+        progress.check()?;
+        let of_column = column.and_then(|values| rings(&directions, &by_column(values, 1)));
+        if let Some(rings) = of_column {
+            return Ok(Some(Self { scanner, rings }));
+        }
+        let is_stated = !cloud.stations.is_empty();
+        for find in [by_order, by_elevation] {
+            progress.check()?;
+            let found =
+                find(&directions).and_then(|rings_of_points| rings(&directions, &rings_of_points));
+            if let Some(rings) =
+                found.filter(|rings| is_stated || have_variation(rings, &directions))
+            {
+                return Ok(Some(Self { scanner, rings }));
+            }
+        }
+        Ok(None)
     }
 }
 
 impl Ring {
-    /// Returns the place of the point nearest to an azimuth, if there is one within `tolerance` radians.
+    /// Returns the index of the point nearest to an azimuth, if there is one within `tolerance` radians.
     pub fn nearest(&self, azimuth: f32, tolerance: f32) -> Option<usize> {
         let n = self.azimuths.len();
+        if n == 0 {
+            return None;
+        }
         // Azimuths beyond the seam count from its other side.
         let azimuth = (azimuth + PI).rem_euclid(TAU) - PI;
         let after = self.azimuths.partition_point(|other| *other < azimuth);
-        let turn = |place: usize| {
-            let turn = (self.azimuths[place] - azimuth).abs();
+        let turn = |index: usize| {
+            let turn = (self.azimuths[index] - azimuth).abs();
             turn.min(TAU - turn)
         };
         let nearest = [(after + n - 1) % n, after % n]
@@ -133,7 +169,8 @@ fn rings(directions: &[Option<Direction>], ring_of_point: &[u16]) -> Option<Vec<
         }
         of_ring[ring].push(point as u32);
     }
-    of_ring.retain(|points| MIN_SHARE * n_points as f32 <= points.len() as f32 && 1 < points.len());
+    of_ring
+        .retain(|points| MIN_FRACTION * n_points as f32 <= points.len() as f32 && 1 < points.len());
     let n_known: usize = of_ring.iter().map(Vec::len).sum();
     let is_known = MIN_KNOWN * n_points as f32 <= n_known as f32;
     if !is_known || !(MIN_RINGS..=MAX_RINGS).contains(&of_ring.len()) {
@@ -164,17 +201,27 @@ fn quartiles(mut values: Vec<f32>) -> [f32; 3] {
     [1, 2, 3].map(|quarter| values[quarter * (values.len() - 1) / 4])
 }
 
-/// Returns the rings of the points by a column of the file.
-fn by_column(cloud: &PointCloud) -> Option<Vec<u16>> {
-    let column = |values: &Values| {
-        let of_point = |point: usize| {
-            let value = values.get(point);
-            let is_index = value.fract() == 0.0 && (0.0..MAX_RINGS as f64).contains(&value);
-            is_index.then_some(value as u16)
-        };
-        (0..cloud.len()).map(of_point).collect::<Option<Vec<u16>>>()
+/// Returns true if the ranges of some rings vary, as those of things around a scanner do.
+fn have_variation(rings: &[Ring], directions: &[Option<Direction>]) -> bool {
+    let is_varied = |ring: &&Ring| {
+        let directions = ring.points.iter().filter_map(|point| directions[*point as usize]);
+        let mut ranges: Vec<f32> = directions.map(|direction| direction.range).collect();
+        ranges.sort_unstable_by(f32::total_cmp);
+        let [low, median, high] =
+            [1, 50, 99].map(|percent| ranges[percent * (ranges.len() - 1) / 100]);
+        MIN_VARIATION * median < high - low
     };
-    RING_COLUMNS.into_iter().filter_map(|name| cloud.scalar(name)).find_map(column)
+    MIN_VARIED * rings.len() as f32 <= rings.iter().filter(is_varied).count() as f32
+}
+
+/// Returns the rings of each `step`-th point by a column of the file.
+fn by_column(values: &Values, step: usize) -> Vec<u16> {
+    let ring = |point: usize| {
+        let value = values.get(point);
+        let is_index = value.fract() == 0.0 && (0.0..MAX_RINGS as f64).contains(&value);
+        if is_index { value as u16 } else { NO_RING }
+    };
+    (0..values.len()).step_by(step).map(ring).collect()
 }
 
 /// Returns the rings of the points by their elevations, if these repeat.
@@ -195,7 +242,7 @@ fn by_elevation(directions: &[Option<Direction>]) -> Option<Vec<u16>> {
 /// Returns the first and the last elevation of each ring; none if the elevations do not form rings when they are parted
 /// where they are more than `min_step` degrees apart.
 fn bounds_of_rings(sorted: &[f32], min_step: f32) -> Option<Vec<[f32; 2]>> {
-    let min_count = (MIN_SHARE * sorted.len() as f32).max(1.0) as usize;
+    let min_count = (MIN_FRACTION * sorted.len() as f32).max(1.0) as usize;
     let mut bounds: Vec<[f32; 2]> = Vec::new();
     let mut n_known = 0;
     for ring in sorted.chunk_by(|a, b| b - a <= min_step).filter(|ring| min_count <= ring.len()) {
@@ -228,22 +275,27 @@ fn is_in_order(directions: &[Option<Direction>]) -> bool {
     0 < n_left + n_right && MIN_IN_ORDER * (n_left + n_right) as f32 <= n_left.max(n_right) as f32
 }
 
-/// Returns the rings of the points by their order, if they go round and round the scanner, a laser at a turn.
+/// Returns the rings of the points by their order, if they go round and round the scanner, a laser at a turn. A laser may
+/// have points in a part of the turn only.
 fn by_order(directions: &[Option<Direction>]) -> Option<Vec<u16>> {
-    let n_turns = turns(directions).map(f64::from).sum::<f64>().abs() / f64::from(TAU);
-    let is_turn_of_each = (MIN_RINGS as f64 - 0.5..=MAX_RINGS as f64).contains(&n_turns);
-    if !is_turn_of_each || !is_in_order(directions) {
+    if !is_in_order(directions) {
         return None;
     }
-    let mut turned = 0.0f64;
-    let mut turns = std::iter::once(0.0).chain(turns(directions));
-    let ring = |direction: &Option<Direction>| {
-        direction.map_or(NO_RING, |_| {
-            turned += f64::from(turns.next().unwrap_or_default());
-            (turned.abs() / f64::from(TAU)) as u16
-        })
-    };
-    Some(directions.iter().map(ring).collect())
+    let n_left = turns(directions).filter(|turn| 0.0 < *turn).count();
+    let n_right = turns(directions).filter(|turn| *turn < 0.0).count();
+    let sense = if n_right < n_left { 1.0 } else { -1.0 };
+    let first = directions.iter().flatten().next()?.azimuth;
+    let (mut ring, mut last) = (0usize, 0.0f32);
+    let rings = directions.iter().map(|direction| {
+        let Some(Direction { azimuth, .. }) = *direction else { return NO_RING };
+        let turned = (sense * (azimuth - first)).rem_euclid(TAU);
+        if turned < last - MIN_TURN_BACK {
+            ring += 1;
+        }
+        last = turned;
+        if ring < MAX_RINGS { ring as u16 } else { NO_RING }
+    });
+    Some(rings.collect())
 }
 
 #[cfg(test)]
@@ -251,8 +303,9 @@ mod tests {
     //! Rings that are told in three ways, and clouds without any.
 
     use super::*;
-    use crate::math::{DVec3, Random};
+    use crate::math::Random;
     use crate::points::{Scalar, ScanStation};
+    use crate::progress::NoProgress;
 
     const N_RINGS: usize = 16;
     const N_COLUMNS: usize = 400;
@@ -272,8 +325,12 @@ mod tests {
         PointCloud::from_positions((0..N_RINGS * N_COLUMNS).map(point).collect())
     }
 
+    fn find(cloud: &PointCloud) -> Option<ScanRings> {
+        ScanRings::find(cloud, &NoProgress).unwrap()
+    }
+
     fn assert_rings(cloud: &PointCloud, ring_of: impl Fn(u32) -> usize) {
-        let found = ScanRings::find(cloud).unwrap();
+        let found = find(cloud).unwrap();
         assert_eq!(found.rings.len(), N_RINGS);
         for (index, ring) in found.rings.iter().enumerate() {
             // The first point of a turn may count to the last one.
@@ -300,10 +357,20 @@ mod tests {
         assert_rings(&cloud, |point| point as usize / N_COLUMNS);
         let turned = |i: usize| cloud.positions[i % N_RINGS * N_COLUMNS + i / N_RINGS];
         cloud.positions = (0..cloud.len()).map(turned).collect();
-        assert!(ScanRings::find(&cloud).is_none());
+        assert!(find(&cloud).is_none());
         let rings = (0..cloud.len()).map(|i| (i % N_RINGS) as f32).collect();
         cloud.scalars = vec![Scalar { name: "ring".into(), values: Values::F32(rings) }];
         assert_rings(&cloud, |point| point as usize % N_RINGS);
+    }
+
+    #[test]
+    fn lasers_may_see_a_part_of_the_turn() {
+        let mut cloud = scan(0.08);
+        let n_seen = |ring: usize| N_COLUMNS / [1, 2, 3, 6][ring % 4];
+        let is_seen = |i: usize| i % N_COLUMNS < n_seen(i / N_COLUMNS);
+        let seen: Vec<usize> = (0..cloud.len()).filter(|i| is_seen(*i)).collect();
+        cloud.positions = seen.iter().map(|i| cloud.positions[*i]).collect();
+        assert_rings(&cloud, |point| seen[point as usize] / N_COLUMNS);
     }
 
     fn by_elevation_of(cloud: &PointCloud) -> Option<Vec<u16>> {
@@ -311,6 +378,7 @@ mod tests {
             Some(Direction {
                 azimuth: p.y.atan2(p.x),
                 elevation_deg: p.z.atan2(p.truncate().length()).to_degrees(),
+                range: p.length(),
             })
         };
         by_elevation(&cloud.positions.iter().map(direction).collect::<Vec<_>>())
@@ -322,9 +390,9 @@ mod tests {
         let position = DVec3::new(5e5, 4e6, 100.0);
         cloud.origin = position + DVec3::Z;
         cloud.positions.iter_mut().for_each(|p| p.z -= 1.0);
-        assert!(ScanRings::find(&cloud).is_none());
+        assert!(find(&cloud).is_none());
         cloud.stations = vec![ScanStation { position: Some(position), ..ScanStation::default() }];
-        assert_eq!(ScanRings::find(&cloud).unwrap().scanner, Vec3::NEG_Z);
+        assert_eq!(find(&cloud).unwrap().scanner, position);
         assert_rings(&cloud, |point| point as usize / N_COLUMNS);
     }
 
@@ -340,13 +408,23 @@ mod tests {
         moved.positions.iter_mut().enumerate().for_each(|(i, p)| *p += shift(i));
         let lasers = (0..moved.len()).map(|i| (i / N_COLUMNS) as u8).collect();
         moved.scalars = vec![Scalar { name: "ring".into(), values: Values::U8(lasers) }];
-        assert!(ScanRings::find(&moved).is_none());
+        assert!(find(&moved).is_none());
+        // A column of points about the zero, and a sphere of circles of latitude.
+        let around = |i: usize| {
+            let (sin, cos) = (TAU * (i % 100) as f32 / 100.0).sin_cos();
+            Vec3::new(cos, sin, 0.1 * (i / 100) as f32 - 4.5)
+        };
+        let pillar: Vec<Vec3> = (0..9000).map(around).collect();
+        let sphere: Vec<Vec3> = pillar.iter().map(|point| point.normalize()).collect();
+        for solid in [pillar, sphere] {
+            assert!(find(&PointCloud::from_positions(solid)).is_none());
+        }
         let circle =
             (0..9000).map(|i| Vec3::new((i as f32).cos(), (i as f32).sin(), 0.1)).collect();
         for positions in [filled, grid, circle, vec![Vec3::ZERO; 9000], vec![Vec3::NAN; 9000]] {
-            assert!(ScanRings::find(&PointCloud::from_positions(positions)).is_none());
+            assert!(find(&PointCloud::from_positions(positions)).is_none());
         }
-        assert!(ScanRings::find(&PointCloud::default()).is_none());
+        assert!(find(&PointCloud::default()).is_none());
     }
 
     #[test]

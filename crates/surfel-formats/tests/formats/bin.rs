@@ -101,6 +101,9 @@ fn a_partial_record_is_an_error() {
         "a.bin: byte 28: found a record of 19 bytes, expected 28: x y z radius nx ny nz, 20: x y z \
          intensity ring, or 16: x y z intensity, as little-endian f32; copy the file again from its source, or convert it if it has other records"
     );
+    let far = file(&[[5e6, 1e7, 2.5, 1.0, 5e6, 1e7, 2.5]; 40]);
+    let error = read("a.bin", &far[..69 * 16]).unwrap_err().to_string();
+    assert!(error.contains("no position and intensity"), "{error}");
     assert!(read("a.bin", "").unwrap_err().to_string().contains("an empty file"));
     // These coordinate bits begin with the magic bytes of gzip.
     let coordinate = f32::from_bits(0x3f00_8b1f);
