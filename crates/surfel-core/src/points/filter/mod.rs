@@ -18,6 +18,8 @@ use rayon::prelude::*;
 
 /// Number of points that a task compares.
 const POINTS_PER_TASK: usize = 1 << 14;
+/// Number of points whose values are compared at once, so that these stay in the cache.
+const POINTS_PER_BLOCK: usize = 1 << 11;
 
 /// A condition on the columns of a point, as in `classification == 2 && z < 1200`.
 ///
@@ -92,7 +94,10 @@ impl PointFilter {
         let mut matches = vec![false; cloud.len() - start];
         let tasks = matches.par_chunks_mut(POINTS_PER_TASK).enumerate();
         tasks.for_each(|(task, matches)| {
-            evaluation.run(&self.condition, start + task * POINTS_PER_TASK, matches);
+            for (block, matches) in matches.chunks_mut(POINTS_PER_BLOCK).enumerate() {
+                let first = start + task * POINTS_PER_TASK + block * POINTS_PER_BLOCK;
+                evaluation.run(&self.condition, first, matches);
+            }
         });
         Ok(matches)
     }
