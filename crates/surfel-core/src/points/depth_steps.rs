@@ -10,8 +10,8 @@ use crate::math::{Random, Vec3};
 /// Number of points that are examined, and the least number that tell depths from other coordinates.
 const N_SAMPLES: usize = 65_536;
 const MIN_POINTS: usize = 4096;
-/// Maximum share of different coordinates along the axis of depths, and how many times that share there is at least along
-/// both others. A wall across the view has few coordinates along these too: one of each pixel at each of a few depths.
+/// Maximum share of different coordinates along the axis of depths, minimum share along both others, and minimum ratio of
+/// theirs to that of the depths. A wall across the view has few coordinates along these too: one of each pixel at each of a few depths.
 const MAX_DEPTHS: f32 = 0.05;
 const MIN_OTHERS: f32 = 0.02;
 const MIN_OTHERS_PER_DEPTH: f32 = 8.0;

@@ -14,7 +14,7 @@ use super::scan_grid::ScanGrids;
 use super::scan_rings::ScanRings;
 use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
 use crate::error::Result;
-use crate::math::{DVec3, Vec3};
+use crate::math::Vec3;
 use crate::progress::Progress;
 
 /// The columns to estimate.
@@ -154,8 +154,9 @@ pub fn find_shapes<'a>(
     let voters = std::mem::take(voters);
     let (mut shapes, mut found) = match (preparation.structure, &mut *fits) {
         (StructureChoice::Auto, Some((fits, _))) => {
-            let at = |scanner: DVec3| (scanner - cloud.origin).as_vec3();
-            let rings = rings.map(|rings| (&rings.rings[..], at(rings.scanner)));
+            let rings = rings.map(|ScanRings { rings, scanner }| {
+                (&rings[..], (*scanner - cloud.origin).as_vec3())
+            });
             find_structures(&tree, fits, radii, voters, rings, progress)?
         }
         _ => all_scattered(&tree, radii, progress)?,

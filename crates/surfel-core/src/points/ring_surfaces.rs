@@ -6,6 +6,7 @@
 use super::neighbors::KdTree;
 use super::scan_rings::Ring;
 use super::structure::{PointShape, Structure};
+use super::typical::quantile;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -95,12 +96,8 @@ pub fn close_ring_gaps(
 /// Returns the median step between successive azimuths of a ring, in radians, without those of several turns that repeat.
 fn median_step(ring: &Ring) -> f32 {
     let steps = ring.azimuths.windows(2).map(|pair| pair[1] - pair[0]);
-    let mut steps: Vec<f32> = steps.filter(|step| 0.0 < *step).collect();
-    let middle = steps.len() / 2;
-    match steps.is_empty() {
-        true => 0.0,
-        false => *steps.select_nth_unstable_by(middle, f32::total_cmp).1,
-    }
+    let steps: Vec<f32> = steps.filter(|step| 0.0 < *step).collect();
+    quantile(&steps, 0.5)
 }
 
 /// A part of a ring.

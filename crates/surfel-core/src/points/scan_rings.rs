@@ -3,6 +3,7 @@
 //! The laser of each point follows from a column, from the order of the points in the file, one turn of a laser after the
 //! other, or from elevations that repeat.
 
+use super::typical::quantile;
 use super::{PointCloud, ROW_INDEX, Values, is_valid_position};
 use crate::error::Result;
 use crate::math::{DVec3, Vec3};
@@ -106,7 +107,7 @@ impl ScanRings {
         let mut samples = [&spread_sample, &first_sample].into_iter();
         if column.is_none()
             && samples.all(|sample| by_elevation(sample).is_none())
-            && !is_in_order(&first_sample)
+            && sense(&first_sample).is_none()
         {
             return Ok(None);
         }
@@ -180,7 +181,8 @@ fn rings(directions: &[Option<Direction>], ring_of_point: &[u16]) -> Option<Vec<
     let mut widths = Vec::new();
     let mut ring = |mut points: Vec<u32>| {
         let elevations = points.iter().filter_map(direction).map(|one| one.elevation_deg);
-        let [low, elevation_deg, high] = quartiles(elevations.collect());
+        let elevations: Vec<f32> = elevations.collect();
+        let [low, elevation_deg, high] = [0.25, 0.5, 0.75].map(|part| quantile(&elevations, part));
         widths.push((high - low).to_radians());
         let azimuth = |point: &u32| direction(point).map_or(0.0, |one| one.azimuth);
         points.sort_by(|a, b| azimuth(a).total_cmp(&azimuth(b)));
@@ -190,25 +192,16 @@ fn rings(directions: &[Option<Direction>], ring_of_point: &[u16]) -> Option<Vec<
     let mut rings: Vec<Ring> = of_ring.into_iter().map(&mut ring).collect();
     rings.sort_by(|a, b| a.elevation_rad.total_cmp(&b.elevation_rad));
     let steps = rings.windows(2).map(|pair| pair[1].elevation_rad - pair[0].elevation_rad);
-    let [_, step, _] = quartiles(steps.collect());
-    let [_, width, _] = quartiles(widths);
+    let [step, width] = [steps.collect(), widths].map(|values: Vec<f32>| quantile(&values, 0.5));
     (MIN_STEP_RAD < step && width < MAX_SPREAD * step).then_some(rings)
-}
-
-/// Returns the first quartile, the median and the third quartile of values, of which there are some.
-fn quartiles(mut values: Vec<f32>) -> [f32; 3] {
-    values.sort_unstable_by(f32::total_cmp);
-    [1, 2, 3].map(|quarter| values[quarter * (values.len() - 1) / 4])
 }
 
 /// Returns true if the ranges of some rings vary, as those of things around a scanner do.
 fn have_variation(rings: &[Ring], directions: &[Option<Direction>]) -> bool {
     let is_varied = |ring: &&Ring| {
         let directions = ring.points.iter().filter_map(|point| directions[*point as usize]);
-        let mut ranges: Vec<f32> = directions.map(|direction| direction.range).collect();
-        ranges.sort_unstable_by(f32::total_cmp);
-        let [low, median, high] =
-            [1, 50, 99].map(|percent| ranges[percent * (ranges.len() - 1) / 100]);
+        let ranges: Vec<f32> = directions.map(|direction| direction.range).collect();
+        let [low, median, high] = [0.01, 0.5, 0.99].map(|part| quantile(&ranges, part));
         MIN_VARIATION * median < high - low
     };
     MIN_VARIED * rings.len() as f32 <= rings.iter().filter(is_varied).count() as f32
@@ -254,8 +247,9 @@ fn bounds_of_rings(sorted: &[f32], min_step: f32) -> Option<Vec<[f32; 2]>> {
     {
         return None;
     }
-    let [_, width, _] = quartiles(bounds.iter().map(|[first, last]| last - first).collect());
-    let [_, step, _] = quartiles(bounds.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect());
+    let widths = bounds.iter().map(|[first, last]| last - first).collect();
+    let steps = bounds.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
+    let [width, step] = [widths, steps].map(|values: Vec<f32>| quantile(&values, 0.5));
     (width < MAX_RING_WIDTH * step).then_some(bounds)
 }
 
@@ -268,22 +262,20 @@ fn turns(directions: &[Option<Direction>]) -> impl Iterator<Item = f32> + Clone 
     })
 }
 
-/// True if the points follow each other in one sense about the axis.
-fn is_in_order(directions: &[Option<Direction>]) -> bool {
+/// Returns the sense in which the points follow each other about the axis, 1 counterclockwise and -1 clockwise; none if many
+/// do not.
+fn sense(directions: &[Option<Direction>]) -> Option<f32> {
     let n_left = turns(directions).filter(|turn| 0.0 < *turn).count();
     let n_right = turns(directions).filter(|turn| *turn < 0.0).count();
-    0 < n_left + n_right && MIN_IN_ORDER * (n_left + n_right) as f32 <= n_left.max(n_right) as f32
+    let (n_turns, n_in_order) = (n_left + n_right, n_left.max(n_right));
+    let is_in_order = 0 < n_turns && MIN_IN_ORDER * n_turns as f32 <= n_in_order as f32;
+    is_in_order.then_some(if n_right < n_left { 1.0 } else { -1.0 })
 }
 
 /// Returns the rings of the points by their order, if they go round and round the scanner, a laser at a turn. A laser may
 /// have points in a part of the turn only.
 fn by_order(directions: &[Option<Direction>]) -> Option<Vec<u16>> {
-    if !is_in_order(directions) {
-        return None;
-    }
-    let n_left = turns(directions).filter(|turn| 0.0 < *turn).count();
-    let n_right = turns(directions).filter(|turn| *turn < 0.0).count();
-    let sense = if n_right < n_left { 1.0 } else { -1.0 };
+    let sense = sense(directions)?;
     let first = directions.iter().flatten().next()?.azimuth;
     let (mut ring, mut last) = (0usize, 0.0f32);
     let rings = directions.iter().map(|direction| {
@@ -300,7 +292,7 @@ fn by_order(directions: &[Option<Direction>]) -> Option<Vec<u16>> {
 
 #[cfg(test)]
 mod tests {
-    //! Rings that are told in three ways, and clouds without any.
+    //! Rings that are found in three ways, and clouds without any.
 
     use super::*;
     use crate::math::Random;
