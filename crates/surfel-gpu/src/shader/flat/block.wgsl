@@ -104,21 +104,67 @@ fn point_of_four(four: FourPoints, lane: u32) -> Point {
     );
 }
 
-// Returns the lanes of a block whose positions are nearer to `position` than the square root of `max_squared`, as bits.
-fn lanes_within(block_idx: u32, head: BlockHead, position: vec3<f32>, max_squared: f32) -> u32 {
+// The words of a block's points, for those who visit several of them.
+struct BlockPoints {
+    // The corner relative to the position for which the block was loaded.
+    corner: vec3<f32>,
+    step: f32,
+    radius_step: f32,
+    x: vec4<u32>,
+    y: vec4<u32>,
+    z: vec4<u32>,
+    lower_normals: vec4<u32>,
+    upper_normals: vec4<u32>,
+    radii: vec2<u32>,
+}
+
+fn load_points(block_idx: u32, origin: vec3<f32>) -> BlockPoints {
     let first = block_idx * BLOCK_VECTORS;
-    let corner = head.corner - position;
-    let x_words = block_vector(first + 1u);
-    let y_words = block_vector(first + 2u);
-    let z_words = block_vector(first + 3u);
+    let head = load_head(block_idx);
+    return BlockPoints(
+        head.corner - origin,
+        head.step,
+        head.radius_step,
+        block_vector(first + 1u),
+        block_vector(first + 2u),
+        block_vector(first + 3u),
+        block_vector(first + 4u),
+        block_vector(first + 5u),
+        block_vector(first + 6u).xy,
+    );
+}
+
+// Returns the lanes of the points that are nearer than the square root of `max_squared`, as bits.
+fn lanes_within(points: BlockPoints, max_squared: f32) -> u32 {
     var lanes = 0u;
     for (var half = 0u; half < 2u; half++) {
-        let x = four_steps(x_words, half) * head.step + corner.x;
-        let y = four_steps(y_words, half) * head.step + corner.y;
-        let z = four_steps(z_words, half) * head.step + corner.z;
+        let x = four_steps(points.x, half) * points.step + points.corner.x;
+        let y = four_steps(points.y, half) * points.step + points.corner.y;
+        let z = four_steps(points.z, half) * points.step + points.corner.z;
         lanes |= lane_bits(x * x + y * y + z * z < vec4<f32>(max_squared)) << (4u * half);
     }
     return lanes;
+}
+
+// Returns the point in `lane`.
+fn point_at(points: BlockPoints, lane: u32) -> Point {
+    let pair = lane >> 1u;
+    let words = vec3<u32>(component(points.x, pair), component(points.y, pair), component(points.z, pair));
+    let steps = (words >> vec3<u32>(16u * (lane & 1u))) & vec3<u32>(0xffffu);
+    let is_upper = 4u <= lane;
+    let normal = component(select(points.lower_normals, points.upper_normals, is_upper), lane & 3u);
+    let radius = (select(points.radii.x, points.radii.y, is_upper) >> (8u * (lane & 3u))) & 0xffu;
+    return Point(
+        points.corner + vec3<f32>(steps) * points.step,
+        integer_normal(normal),
+        f32(radius + ((normal >> 30u) << 8u)) * points.radius_step,
+    );
+}
+
+// Returns a component of a vector. Indexing by a variable would keep the vector in memory.
+fn component(vector: vec4<u32>, i: u32) -> u32 {
+    let pair = select(vector.xy, vector.zw, 2u <= i);
+    return select(pair.x, pair.y, (i & 1u) == 1u);
 }
 
 fn integer_normal(bits: u32) -> vec3<f32> {

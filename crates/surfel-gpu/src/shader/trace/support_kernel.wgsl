@@ -30,9 +30,9 @@ fn support(@builtin(global_invocation_id) id: vec3<u32>) {
     list_blocks(position - reach, position + reach, 0.0);
     loop {
         for (var i = 0u; i < n_listed; i++) {
-            let head = load_head(listed_blocks[i]);
+            let points = load_points(listed_blocks[i], position);
             for (var lane = 0u; lane < 8u; lane++) {
-                let other = block_point(listed_blocks[i], head, lane, position);
+                let other = point_at(points, lane);
                 if 0.0 < other.radius {
                     let squared = dot(other.center, other.center);
                     n_near += select(0u, 1u, squared <= max_squared);

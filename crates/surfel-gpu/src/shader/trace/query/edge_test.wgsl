@@ -27,11 +27,10 @@ fn neighborhood_of(hit: CandidateHit) -> NeighborhoodStats {
 }
 
 fn add_neighbors(stats: ptr<function, NeighborhoodStats>, block_idx: u32) {
-    let head = load_head(block_idx);
-    let position = (*stats).hit.position;
+    let points = load_points(block_idx, (*stats).hit.position);
     let reach = NEIGHBORHOOD_RADIUS_FACTOR * (*stats).hit.radius;
-    for (var lanes = lanes_within(block_idx, head, position, reach * reach); lanes != 0u; lanes &= lanes - 1u) {
-        let point = block_point(block_idx, head, firstTrailingBit(lanes), position);
+    for (var lanes = lanes_within(points, reach * reach); lanes != 0u; lanes &= lanes - 1u) {
+        let point = point_at(points, firstTrailingBit(lanes));
         if 0.0 < point.radius && is_neighbor((*stats).hit, point.center) {
             add_neighbor(stats, point.center, point.normal);
         }

@@ -30,10 +30,10 @@ fn list_points() {
 }
 
 // Returns the lanes of a block whose points may count.
-fn listed_lanes(block_idx: u32, head: BlockHead) -> u32 {
+fn listed_lanes(points: BlockPoints) -> u32 {
     // The exact test follows, in radii.
     let max_distance = (MLS_SUPPORT + LIST_MARGIN) * (1.0 + 8.0 * EPSILON) * ball_radius;
-    return lanes_within(block_idx, head, listed_position, max_distance * max_distance);
+    return lanes_within(points, max_distance * max_distance);
 }
 
 // A point near the position of a fit.
@@ -45,9 +45,9 @@ struct ListedPoint {
 }
 
 // Returns the point in a lane, for a fit at a distance along the ray behind the listed position.
-fn listed_point(block_idx: u32, head: BlockHead, lane: u32, shift: vec3<f32>) -> ListedPoint {
+fn listed_point(points: BlockPoints, lane: u32, shift: vec3<f32>) -> ListedPoint {
     let max_squared = (MLS_SUPPORT + LIST_MARGIN) * (MLS_SUPPORT + LIST_MARGIN);
-    let point = block_point(block_idx, head, lane, listed_position);
+    let point = point_at(points, lane);
     let listed = point.center * (1.0 / ball_radius);
     let offset = listed - shift;
     let inverse = ball_radius / (MLS_SUPPORT * max(point.radius, 1e-18));
@@ -63,10 +63,9 @@ fn fit_at(ray: Ray, behind: f32, is_plane: bool, normal: vec3<f32>) -> FitHit {
     list_points();
     loop {
         for (var i = 0u; i < n_listed; i++) {
-            let block_idx = listed_blocks[i];
-            let head = load_head(block_idx);
-            for (var lanes = listed_lanes(block_idx, head); lanes != 0u; lanes &= lanes - 1u) {
-                let point = listed_point(block_idx, head, firstTrailingBit(lanes), shift);
+            let points = load_points(listed_blocks[i], listed_position);
+            for (var lanes = listed_lanes(points); lanes != 0u; lanes &= lanes - 1u) {
+                let point = listed_point(points, firstTrailingBit(lanes), shift);
                 if !point.is_used {
                     continue;
                 }
@@ -94,10 +93,10 @@ fn finish_with_block(
     block_idx: u32,
     shift: vec3<f32>,
 ) {
-    let head = load_head(block_idx);
-    for (var lanes = listed_lanes(block_idx, head); lanes != 0u; lanes &= lanes - 1u) {
+    let points = load_points(block_idx, listed_position);
+    for (var lanes = listed_lanes(points); lanes != 0u; lanes &= lanes - 1u) {
         let lane = firstTrailingBit(lanes);
-        let point = listed_point(block_idx, head, lane, shift);
+        let point = listed_point(points, lane, shift);
         if !point.is_used {
             continue;
         }

@@ -81,11 +81,11 @@ fn bracket_zeros(ray: Ray, part: RaySegment) -> Bracket {
     var bracket = Bracket(NO_LIMIT, -NO_LIMIT, 0.0);
     for (var i = part.first_entry; i < part.end_entry; i++) {
         let entry = leaf_entry(i);
-        let head = load_head(entry.block_idx);
+        let points = load_points(entry.block_idx, start);
         for (var lanes = entry.lanes; lanes != 0u; lanes &= lanes - 1u) {
             let lane = firstTrailingBit(lanes);
             let is_flipped = ((entry.flips >> lane) & 1u) == 1u;
-            let point = ray_point(block_point(entry.block_idx, head, lane, start), is_flipped, ray.direction, part.length);
+            let point = ray_point(point_at(points, lane), is_flipped, ray.direction, part.length);
             if !point.is_near {
                 continue;
             }
@@ -119,11 +119,11 @@ fn sample_field(ray: Ray, part: RaySegment, begin: f32, end: f32) -> Samples {
     var heights = weights;
     for (var i = part.first_entry; i < part.end_entry; i++) {
         let entry = leaf_entry(i);
-        let head = load_head(entry.block_idx);
+        let points = load_points(entry.block_idx, start);
         for (var lanes = entry.lanes; lanes != 0u; lanes &= lanes - 1u) {
             let lane = firstTrailingBit(lanes);
             let is_flipped = ((entry.flips >> lane) & 1u) == 1u;
-            let point = ray_point(block_point(entry.block_idx, head, lane, start), is_flipped, ray.direction, part.length);
+            let point = ray_point(point_at(points, lane), is_flipped, ray.direction, part.length);
             if point.is_near {
                 let own = mat2x4<f32>(weights_at(point, near_places), weights_at(point, far_places));
                 weights += own;
@@ -179,15 +179,15 @@ fn hit_at(ray: Ray, part: RaySegment, distance: f32, slope: f32) -> FieldHit {
     var nearest_squared = NO_LIMIT;
     for (var i = part.first_entry; i < part.end_entry; i++) {
         let entry = leaf_entry(i);
-        let head = load_head(entry.block_idx);
+        let points = load_points(entry.block_idx, start);
         for (var lanes = entry.lanes; lanes != 0u; lanes &= lanes - 1u) {
             let lane = firstTrailingBit(lanes);
             let is_flipped = ((entry.flips >> lane) & 1u) == 1u;
-            if !ray_point(block_point(entry.block_idx, head, lane, start), is_flipped, ray.direction, part.length).is_near {
+            if !ray_point(point_at(points, lane), is_flipped, ray.direction, part.length).is_near {
                 continue;
             }
-            let point = block_point(entry.block_idx, head, lane, position);
             let slot = 8u * entry.block_idx + lane;
+            let point = slot_point(slot, position);
             let squared = dot(point.center, point.center);
             let weight = field_weight(squared, inverse_support_squared(point.radius));
             hit.normal += weight * side_normal(point.normal, is_flipped);

@@ -51,14 +51,14 @@ fn finish_with_block(
     color: ptr<function, HitColor>,
     block_idx: u32,
 ) {
-    let head = load_head(block_idx);
     let hit = (*stats).hit;
+    let points = load_points(block_idx, hit.position);
     let reach = FIT_REACH * hit.radius;
     // The exact test follows, in radii.
     let max_squared = reach * reach * (1.0 + 8.0 * EPSILON);
-    for (var lanes = lanes_within(block_idx, head, hit.position, max_squared); lanes != 0u; lanes &= lanes - 1u) {
+    for (var lanes = lanes_within(points, max_squared); lanes != 0u; lanes &= lanes - 1u) {
         let lane = firstTrailingBit(lanes);
-        let point = block_point(block_idx, head, lane, hit.position);
+        let point = point_at(points, lane);
         let fit = fit_point(point);
         if point.radius <= 0.0 || !is_within_reach(fit, (*overhang).per_radius) {
             continue;
