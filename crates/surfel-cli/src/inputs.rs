@@ -2,6 +2,7 @@
 
 use crate::Usage;
 use crate::interrupt::is_cancelled;
+use crate::stdin_copy::remember;
 use anyhow::{Context, anyhow};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -82,6 +83,7 @@ fn standard_input() -> anyhow::Result<PathBuf> {
     let named = path.with_extension(extension);
     std::fs::rename(&path, &named).with_context(|| named.display().to_string())?;
     crate::cleanup::remove_at_exit(named.clone());
+    remember(&named);
     Ok(named)
 }
 

@@ -3,6 +3,7 @@
 //! It is a library so that its options and its viewer can be fuzzed; `main.rs` only calls [`main`].
 
 mod usage;
+mod stdin_copy;
 mod report;
 mod interrupt;
 mod cleanup;

@@ -1,5 +1,6 @@
 //! Progress, choices, notes and errors on stderr.
 
+use crate::stdin_copy::with_stdin_named;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -161,13 +162,13 @@ fn new_bar(stage: &str, total: u64) -> ProgressBar {
 
 /// A line on stderr; nobody is left to tell if stderr is closed.
 fn say(line: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{line}");
+    let _ = writeln!(std::io::stderr().lock(), "{}", with_stdin_named(line));
 }
 
 /// Results on stdout; no error if nobody reads any more, as after `| head`.
 pub fn print(line: &str) -> std::io::Result<()> {
     let mut stdout = std::io::stdout().lock();
-    match writeln!(stdout, "{line}").and_then(|()| stdout.flush()) {
+    match writeln!(stdout, "{}", with_stdin_named(line)).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         result => result,
     }

@@ -53,6 +53,8 @@ fn invalid_standard_input_is_an_error() {
         let text = stderr(&output);
         assert_eq!(output.status.code(), Some(1), "{text}");
         assert!(text.starts_with("error: ") && !text.contains("panicked"), "{text}");
+        let names_it = text.contains("standard input") && !text.contains("surfel-stdin");
+        assert!(names_it, "{text}");
     }
     let output = pipe(&["render", "-", "-", "-o", &picture], dome(10).as_bytes());
     assert_eq!(output.status.code(), Some(2));

@@ -1,6 +1,6 @@
 //! Broken, missing and mislabelled files: the error names the file, and an old output stays.
 
-use super::common::{Folder, dome, fail, read_png, square, stderr, succeed, surfel};
+use super::common::{Folder, dome, fail, gltf, read_png, square, stderr, succeed, surfel};
 use std::fs;
 
 /// The header of a LAS 1.2 file that claims four billion points in 200 bytes.
@@ -73,7 +73,11 @@ fn errors_name_missing_paths_and_folders() {
     assert!(fail(&["render", &absent, "-o", &picture], 1).contains("absent.laz"));
     assert!(fail(&["render", &empty, "-o", &picture], 1).contains("empty: holds no"));
     assert!(fail(&["info", &absent], 1).contains("absent.laz"));
-    assert!(fail(&["render", &cloud, "-o", &nowhere], 1).contains("out.png"));
+    assert!(fail(&["render", &cloud, "-o", &nowhere], 1).contains("create it first"));
+    if cfg!(target_os = "linux") {
+        let text = fail(&["render", &cloud, "-o", "/proc/out.png"], 1);
+        assert!(text.contains("/proc/out.png") && !text.contains("create it first"), "{text}");
+    }
     assert!(fail(&["render", &cloud, "-o", &folder_path], 2).contains(&folder_path));
     assert!(fail(&["render", &cloud, "-o", &folder.path("out.gif")], 2).contains("gif"));
     assert!(fail(&["prepare", &cloud, "-o", &picture], 2).contains("out.png"));
@@ -100,6 +104,22 @@ fn the_error_for_a_missing_column_lists_those_of_the_file() {
             assert!(!text.contains("normals of"), "{text}");
         }
     }
+}
+
+#[test]
+fn settings_for_points_warn_where_there_are_triangles_alone() {
+    let folder = Folder::new();
+    let mesh = folder.write("triangle.gltf", gltf());
+    let picture = folder.path("out.png");
+    let arguments = ["render", &mesh, "-o", &picture, "--resolution", "32x24"];
+    let options = ["--color", "hail", "--class", "2"];
+    let output = surfel(&[&arguments[..], &options].concat());
+    let text = stderr(&output);
+    assert!(
+        text.contains("warning: settings for points") && text.contains("[--color, --class]"),
+        "{text}"
+    );
+    assert!(!stderr(&surfel(&arguments)).contains("warning"));
 }
 
 #[test]

@@ -175,14 +175,15 @@ fn support_is_a_colour_source_with_a_map_and_a_range() {
 }
 
 #[test]
-fn one_point_and_a_line_can_be_rendered() {
+fn one_point_and_a_line_are_in_the_picture() {
     let folder = Folder::new();
     let line: String = (0..50).map(|i| format!("{i} 0 0\n")).collect();
     let clouds = [("one.xyz", "1 2 3\n"), ("equal.xyz", &"1 2 3\n".repeat(9)), ("line.xyz", &line)];
     for (name, content) in clouds {
         let cloud = folder.write(name, content);
         let picture = folder.path(&format!("{name}.png"));
-        succeed(&["render", &cloud, "-o", &picture, "--resolution", "64x36"]);
+        let output = surfel(&["render", &cloud, "-o", &picture, "--resolution", "64x36"]);
         assert_eq!(read_png(&picture).0, 64, "{name}");
+        assert!(!stderr(&output).contains("of the picture is covered"), "{}", stderr(&output));
     }
 }

@@ -153,7 +153,8 @@ pub fn find_shapes<'a>(
     };
     let voters = std::mem::take(voters);
     let (mut shapes, mut found) = match (preparation.structure, &mut *fits) {
-        (StructureChoice::Auto, Some((fits, _))) => {
+        // A single point has no neighbours to lie in a line or a plane with.
+        (StructureChoice::Auto, Some((fits, _))) if 1 < cloud.len() => {
             let rings = rings.map(|ScanRings { rings, scanner }| {
                 (&rings[..], (*scanner - cloud.origin).as_vec3())
             });

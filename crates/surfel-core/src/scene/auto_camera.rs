@@ -11,7 +11,7 @@ use crate::points::PointCloud;
 
 /// Returns a camera that shows all of `cloud` but its outliers and a thin fringe far away from its middle.
 pub fn fit_camera(cloud: &PointCloud, fit: &CameraFit) -> Camera {
-    let points = without_fringe(sample_inliers(cloud));
+    let points = with_extent(without_fringe(sample_inliers(cloud)));
     let direction = fit.direction.and_then(DVec3::try_normalize);
     let forward = direction.unwrap_or_else(|| automatic_direction(&points, fit));
     let camera = match fit.is_turntable {
@@ -20,6 +20,16 @@ pub fn fit_camera(cloud: &PointCloud, fit: &CameraFit) -> Camera {
     };
     let world = |p: DVec3| cloud.origin + p;
     Camera { position: world(camera.position), focal_point: world(camera.focal_point), ..camera }
+}
+
+/// Returns points, or the corners of a cube of length 2 around them if all of them are at one position.
+fn with_extent(points: Vec<Vec3>) -> Vec<Vec3> {
+    let Some(first) = points.first().copied() else { return points };
+    if points.iter().any(|p| *p != first) {
+        return points;
+    }
+    let side = |i: usize, bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+    (0..8).map(|i| first + Vec3::new(side(i, 0), side(i, 1), side(i, 2))).collect()
 }
 
 /// Returns a panorama camera at a free position inside of `cloud`.

@@ -49,12 +49,14 @@ pub(super) fn without_fringe(points: Vec<Vec3>) -> Vec<Vec3> {
     const CORE_FRACTION: f64 = 0.95;
     /// Distance to which points are kept, in distances of the core. Only farther points can be a fringe.
     const FRINGE_RATIO: f32 = 2.0;
+    /// Minimum number of points: a fringe of fewer would be a single point.
+    const MIN_POINTS: usize = 20;
     let median = |axis: usize| {
         let mut values: Vec<f32> = points.iter().map(|p| p[axis]).collect();
         let middle = values.len() / 2;
         *values.select_nth_unstable_by(middle, f32::total_cmp).1
     };
-    if points.is_empty() {
+    if points.len() < MIN_POINTS {
         return points;
     }
     let middle = Vec3::new(median(0), median(1), median(2));

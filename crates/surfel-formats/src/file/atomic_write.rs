@@ -48,10 +48,11 @@ pub(crate) fn write_temp(path: &Path, write: impl FnOnce(&Path, File) -> Result<
 pub(crate) fn write_error(path: &Path, cause: io::Error) -> Error {
     let file = path.display().to_string();
     let advice = match cause.kind() {
-        io::ErrorKind::NotFound => {
+        io::ErrorKind::NotFound if !parent_folder(path).is_dir() => {
             let folder = parent_folder(path).display().to_string();
             return Error::FolderNotFound { file, folder };
         }
+        io::ErrorKind::NotFound => "choose another folder: the system makes no files in this one",
         io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
             "choose a folder you may write to"
         }

@@ -127,6 +127,7 @@ impl LoadedScene {
         progress.note(&format!("{names}: {summary}, {}", scene.file_info().format));
         scene.check_memory(description)?;
         scene.check_colors(description)?;
+        scene.report_unused(description, progress);
         if keep.source_indices {
             scene.number_points();
         }
