@@ -91,7 +91,10 @@ pub fn find_structures(
             close_ring_gaps(tree, rings, scanner, &mut shapes, progress)?;
             Vec::new()
         }
-        None => widen_lines(positions, &mut shapes, progress)?,
+        None => {
+            let is_vegetated = is_vegetated(&shapes);
+            widen_lines(positions, is_vegetated, &mut shapes, progress)?
+        }
     };
     for (shape, fit) in shapes.iter_mut().zip(fits) {
         if shape.structure == Structure::Line && MAX_LINE_WIDTH < fit.width {
@@ -215,6 +218,12 @@ fn decide(
         return shape(Structure::Surface, widest.normal);
     }
     shape(Structure::Scatter, normal)
+}
+
+/// True if so many points are scattered that much of the cloud is vegetation.
+fn is_vegetated(shapes: &[PointShape]) -> bool {
+    let n_scattered = shapes.iter().filter(|shape| shape.structure == Structure::Scatter).count();
+    MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32
 }
 
 /// Lets the region around a point decide whether it is scattered, so that structures do not flicker: a rough point of a
@@ -482,6 +491,25 @@ mod tests {
         }
         assert!(1000 < n_wide, "{n_wide}");
         assert!(0.5 < fraction(&structures, Structure::Redundant));
+    }
+
+    #[test]
+    fn stems_side_by_side_in_a_wood_are_no_sheet() {
+        // A thin stem of points that are 0.05 apart between two thick ones, and far from them a crown.
+        let mut random = Random::new(12, 0);
+        let mut noise = |size: f32| size * (random.next_f32() - 0.5);
+        let mut points: Vec<Vec3> =
+            (0..200).map(|i| Vec3::new(noise(0.04), noise(0.04), 0.05 * i as f32)).collect();
+        let n_thin = points.len();
+        points.extend((0..3000).map(|i| {
+            let x = if i % 2 == 0 { -1.3 } else { 1.3 };
+            Vec3::new(x + noise(0.4), noise(0.02), 5.0 + noise(10.0))
+        }));
+        let crown = Vec3::new(0.0, 60.0, 20.0);
+        points.extend((0..4000).map(|_| crown + Vec3::new(noise(9.0), noise(9.0), noise(9.0))));
+        let (cloud, _) = prepared(points);
+        let widest = cloud.radii()[..n_thin].iter().copied().fold(0.0, f32::max);
+        assert!(widest < 0.7, "{widest}");
     }
 
     #[test]
