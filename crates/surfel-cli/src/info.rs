@@ -4,6 +4,7 @@ use crate::global::Global;
 use crate::inputs::expand;
 use crate::options::{KeyOptions, Scope};
 use crate::report::{Report, print};
+use crate::stdin_copy::with_stdin_named;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -72,7 +73,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
         if args.json {
             all.push(info);
         } else {
-            print(&table(&info))?;
+            print(&with_stdin_named(&table(&info)))?;
         }
     }
     match all.as_slice() {

@@ -73,6 +73,7 @@ fn standard_input() -> anyhow::Result<PathBuf> {
     // Only a new file: a link of this name could lead anywhere.
     let mut file = std::fs::File::create_new(&path).with_context(|| path.display().to_string())?;
     crate::cleanup::remove_at_exit(path.clone());
+    remember(&path);
     for chunk in chunks_of_stdin()? {
         let chunk = chunk?.context("standard input cannot be read")?;
         file.write_all(&chunk).with_context(|| path.display().to_string())?;

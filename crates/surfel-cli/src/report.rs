@@ -168,7 +168,7 @@ fn say(line: &str) {
 /// Results on stdout; no error if nobody reads any more, as after `| head`.
 pub fn print(line: &str) -> std::io::Result<()> {
     let mut stdout = std::io::stdout().lock();
-    match writeln!(stdout, "{}", with_stdin_named(line)).and_then(|()| stdout.flush()) {
+    match writeln!(stdout, "{line}").and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         result => result,
     }

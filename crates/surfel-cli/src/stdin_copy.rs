@@ -2,18 +2,18 @@
 
 use std::borrow::Cow;
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::{PoisonError, RwLock};
 
-static COPY: OnceLock<String> = OnceLock::new();
+static COPY: RwLock<Option<String>> = RwLock::new(None);
 
 /// Remembers the file for [`with_stdin_named`].
 pub fn remember(copy: &Path) {
-    COPY.get_or_init(|| copy.display().to_string());
+    *COPY.write().unwrap_or_else(PoisonError::into_inner) = Some(copy.display().to_string());
 }
 
-/// Returns a message that calls the file what it is: standard input.
+/// Returns `message` with the path of the copy replaced by `standard input`.
 pub fn with_stdin_named(message: &str) -> Cow<'_, str> {
-    match COPY.get() {
+    match COPY.read().unwrap_or_else(PoisonError::into_inner).as_deref() {
         Some(copy) if message.contains(copy) => message.replace(copy, "standard input").into(),
         _ => message.into(),
     }

@@ -17,12 +17,14 @@ use super::scan_rings::Ring;
 use super::see_through::open_see_through_discs;
 use super::solids::{ball_radius, clamp_solids, settle};
 use super::stray_points::limit_stray_points;
-use super::structure::{PointShape, Structure, StructureReport, is_line, is_surface};
+use super::structure::{
+    MIN_VEGETATION, PointShape, Structure, StructureReport, is_line, is_surface,
+};
 use super::typical::{SPARSE, Typical};
 use super::up::is_mostly_land;
 use super::wide_discs::{limit_crowded_discs, narrow_lone_discs};
 use crate::error::Result;
-use crate::math::Vec3;
+use crate::math::{SymmetricMatrix, Vec3, smallest_eigenvector};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -46,8 +48,6 @@ const MIN_SCATTERED: f32 = 0.5;
 const MIN_SCATTERED_IN_NOISE: f32 = 0.9;
 /// Minimum share of scattered points among the rough ones of a cloud that is leafy, not noisy.
 const MIN_SCATTERED_ROUGH: f32 = 0.5;
-/// Minimum share of scattered points in a cloud with much vegetation.
-const MIN_VEGETATION: f32 = 0.2;
 /// Maximum number of rounds in which islands of a surface shrink.
 const N_ISLAND_ROUNDS: usize = 8;
 /// Share of scattered points from which a surface point is looked at again: small islands of a surface among scattered
@@ -86,14 +86,15 @@ pub fn find_structures(
         (0..decided.len()).filter(|point| decided[*point].is_above_land).collect();
     let mut shapes: Vec<PointShape> = decided.into_iter().map(|decision| decision.shape).collect();
     join_to_surfaces(tree, typical.noise(), &mut shapes, progress)?;
+    let n_rough = fits.par_iter().filter(|fit| !is_line(fit) && !is_surface(fit)).count();
     let widened = match rings {
         Some((rings, scanner)) => {
             close_ring_gaps(tree, rings, scanner, &mut shapes, progress)?;
             Vec::new()
         }
         None => {
-            let is_vegetated = is_vegetated(&shapes);
-            widen_lines(positions, is_vegetated, &mut shapes, progress)?
+            let land = is_vegetated(&shapes, n_rough).then(|| land_normal(&shapes));
+            widen_lines(positions, land, &mut shapes, progress)?
         }
     };
     for (shape, fit) in shapes.iter_mut().zip(fits) {
@@ -101,7 +102,6 @@ pub fn find_structures(
             shape.structure = Structure::Scatter;
         }
     }
-    let n_rough = fits.par_iter().filter(|fit| !is_line(fit) && !is_surface(fit)).count();
     let mut structures = smoothed(tree, &shapes, voters, n_rough, typical.radius, progress)?;
     above_land.iter().for_each(|point| structures[*point] = Structure::Scatter);
     let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
@@ -220,10 +220,31 @@ fn decide(
     shape(Structure::Scatter, normal)
 }
 
-/// True if so many points are scattered that much of the cloud is vegetation.
-fn is_vegetated(shapes: &[PointShape]) -> bool {
-    let n_scattered = shapes.iter().filter(|shape| shape.structure == Structure::Scatter).count();
-    MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32
+/// Returns true if much of the cloud is vegetation: many points are scattered, and not by noise.
+fn is_vegetated(shapes: &[PointShape], n_rough: usize) -> bool {
+    let n_scattered = count_scattered(shapes);
+    !is_noisy(n_scattered, n_rough) && MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32
+}
+
+/// Returns true if most of the points whose nearest neighbours lie in no plane are not scattered: the cloud is noisy rather
+/// than leafy.
+fn is_noisy(n_scattered: usize, n_rough: usize) -> bool {
+    (n_scattered as f32) < MIN_SCATTERED_ROUGH * n_rough as f32
+}
+
+fn count_scattered(shapes: &[PointShape]) -> usize {
+    shapes.iter().filter(|shape| shape.structure == Structure::Scatter).count()
+}
+
+/// Returns the direction, of either sign, to which the normals of the surface points are nearest: amid vegetation that of the
+/// land.
+fn land_normal(shapes: &[PointShape]) -> Vec3 {
+    let mut scatter = SymmetricMatrix::default();
+    for shape in shapes.iter().filter(|shape| shape.structure == Structure::Surface) {
+        // The eigenvector of the least eigenvalue of the negative matrix.
+        scatter.add_outer(shape.normal.as_dvec3(), -1.0);
+    }
+    smallest_eigenvector(&scatter).0.as_vec3()
 }
 
 /// Lets the region around a point decide whether it is scattered, so that structures do not flicker: a rough point of a
@@ -242,12 +263,12 @@ fn smoothed(
     progress: &dyn Progress,
 ) -> Result<Vec<Structure>> {
     let own = shapes.par_iter().map(|shape| shape.structure);
-    if own.clone().all(|structure| structure != Structure::Scatter) {
+    let n_scattered = count_scattered(shapes);
+    if n_scattered == 0 {
         return Ok(own.collect());
     }
-    let n_scattered = own.clone().filter(|structure| *structure == Structure::Scatter).count();
-    let is_noisy = (n_scattered as f32) < MIN_SCATTERED_ROUGH * n_rough as f32;
-    let is_vegetated = !is_noisy && MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32;
+    let is_noisy = is_noisy(n_scattered, n_rough);
+    let is_vegetated = is_vegetated(shapes, n_rough);
     let min_scattered = if is_noisy { MIN_SCATTERED_IN_NOISE } else { MIN_SCATTERED };
     let max_radius = if is_vegetated { SPARSE * typical_radius } else { f32::INFINITY };
     let voters = match voters.is_empty() {
@@ -494,22 +515,32 @@ mod tests {
     }
 
     #[test]
-    fn stems_side_by_side_in_a_wood_are_no_sheet() {
-        // A thin stem of points that are 0.05 apart between two thick ones, and far from them a crown.
+    fn stems_side_by_side_in_a_wood_are_no_sheet_and_scan_lines_on_its_land_are_one() {
         let mut random = Random::new(12, 0);
         let mut noise = |size: f32| size * (random.next_f32() - 0.5);
+        // A thin stem of points that are 0.05 apart between two thick ones.
         let mut points: Vec<Vec3> =
             (0..200).map(|i| Vec3::new(noise(0.04), noise(0.04), 0.05 * i as f32)).collect();
-        let n_thin = points.len();
         points.extend((0..3000).map(|i| {
             let x = if i % 2 == 0 { -1.3 } else { 1.3 };
             Vec3::new(x + noise(0.4), noise(0.02), 5.0 + noise(10.0))
         }));
-        let crown = Vec3::new(0.0, 60.0, 20.0);
-        points.extend((0..4000).map(|_| crown + Vec3::new(noise(9.0), noise(9.0), noise(9.0))));
-        let (cloud, _) = prepared(points);
-        let widest = cloud.radii()[..n_thin].iter().copied().fold(0.0, f32::max);
-        assert!(widest < 0.7, "{widest}");
+        // Fifteen scan lines, 0.4 apart, of points that are 0.02 apart.
+        points.extend((0..4500).map(|i| {
+            Vec3::new(0.02 * (i % 300) as f32, 30.0 + 0.4 * (i / 300) as f32, noise(0.002))
+        }));
+        points.extend((0..6000).map(|_| Vec3::new(noise(10.0), -20.0 + noise(10.0), 0.0)));
+        let crown = Vec3::new(0.0, 80.0, 20.0);
+        points.extend((0..6000).map(|_| crown + Vec3::new(noise(9.0), noise(9.0), noise(9.0))));
+        // The vertical may be any axis.
+        for turn in [|p: Vec3| p, |p: Vec3| Vec3::new(p.x, p.z, -p.y)] {
+            let (cloud, _) = prepared(points.iter().copied().map(turn).collect());
+            let widest = cloud.radii()[..200].iter().copied().fold(0.0, f32::max);
+            assert!(widest < 0.7, "{widest}");
+            let of_lines = &cloud.radii()[3200..7700];
+            let n_wide = of_lines.iter().filter(|radius| 0.4 < **radius).count();
+            assert!(200 < n_wide, "{n_wide}");
+        }
     }
 
     #[test]

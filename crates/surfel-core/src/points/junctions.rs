@@ -4,7 +4,7 @@
 use super::edge_planes::PLANE_THICKNESS;
 use super::neighbors::KdTree;
 use super::radius::kth_distance;
-use super::structure::{PointShape, Structure};
+use super::structure::{MIN_VEGETATION, PointShape, Structure};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -22,8 +22,6 @@ const MAX_THICKNESS: f32 = 0.25;
 const MIN_AGREEING: usize = N_NEIGHBORS / 4;
 /// Minimum cosine between normals that agree.
 const MIN_COSINE: f32 = 0.95;
-/// Fraction of scattered points from which a cloud has much vegetation.
-const MIN_VEGETATION: f32 = 0.2;
 /// Number of rounds: joined points join others.
 const N_ROUNDS: usize = 2;
 

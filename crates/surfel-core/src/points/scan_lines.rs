@@ -21,17 +21,19 @@ const THINNING: f32 = 2.0;
 /// Maximum surface variation of thinned points that form a surface. Leaves along scan lines, and two stems side by side, are
 /// flat by chance.
 const MAX_VARIATION: f32 = 0.03;
-/// Minimum cosine between the normal of land and the vertical.
+/// Minimum cosine between the normal of a surface and that of the land where surfaces amid vegetation are land.
 const MIN_LAND_COSINE: f32 = 0.5;
 /// Minimum number of thinned points; fewer say nothing about structure.
 const MIN_THINNED: usize = 256;
 
 /// Looks at points on lines again, among fewer and fewer points: on a surface that is sampled densely along lines
-/// only, their neighbours come to surround them. Returns the discs of those points. Amid much vegetation steep lines stay lines:
-/// stems side by side lie in planes by chance.
+/// only, their neighbours come to surround them. Returns the discs of those points.
+///
+/// `land` is the normal of the land of a cloud with much vegetation. There, lines in other planes stay lines: stems side by
+/// side lie in a plane by chance.
 pub fn widen_lines(
     positions: &[Vec3],
-    is_vegetated: bool,
+    land: Option<Vec3>,
     shapes: &mut [PointShape],
     progress: &dyn Progress,
 ) -> Result<Vec<WideDisc>> {
@@ -71,7 +73,7 @@ pub fn widen_lines(
             if is_line(&fit) {
                 return Ok(None);
             }
-            let is_stem = is_vegetated && fit.normal.z.abs() < MIN_LAND_COSINE;
+            let is_stem = land.is_some_and(|land| fit.normal.dot(land).abs() < MIN_LAND_COSINE);
             let is_surface = is_surface(&fit) && fit.variation < MAX_VARIATION && !is_stem;
             let structure = match is_surface {
                 true if kept.binary_search(point).is_ok() => Structure::Surface,

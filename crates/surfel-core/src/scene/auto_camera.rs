@@ -9,9 +9,14 @@ use super::turntable::fit_turntable;
 use crate::math::{DVec3, Vec3};
 use crate::points::PointCloud;
 
+/// Radius of a point without neighbours and without a radius of its own, as the preparation gives it.
+const LONE_RADIUS: f32 = 1.0;
+
 /// Returns a camera that shows all of `cloud` but its outliers and a thin fringe far away from its middle.
 pub fn fit_camera(cloud: &PointCloud, fit: &CameraFit) -> Camera {
-    let points = with_extent(without_fringe(sample_inliers(cloud)));
+    let radius = cloud.radii.as_ref().and_then(|radii| radii.first().copied());
+    let radius = radius.filter(|radius| 0.0 < *radius && radius.is_finite());
+    let points = with_extent(without_fringe(sample_inliers(cloud)), radius.unwrap_or(LONE_RADIUS));
     let direction = fit.direction.and_then(DVec3::try_normalize);
     let forward = direction.unwrap_or_else(|| automatic_direction(&points, fit));
     let camera = match fit.is_turntable {
@@ -22,13 +27,13 @@ pub fn fit_camera(cloud: &PointCloud, fit: &CameraFit) -> Camera {
     Camera { position: world(camera.position), focal_point: world(camera.focal_point), ..camera }
 }
 
-/// Returns points, or the corners of a cube of length 2 around them if all of them are at one position.
-fn with_extent(points: Vec<Vec3>) -> Vec<Vec3> {
+/// Returns `points`, or the corners of the cube around a ball of `radius` if all of them are at one position.
+fn with_extent(points: Vec<Vec3>, radius: f32) -> Vec<Vec3> {
     let Some(first) = points.first().copied() else { return points };
     if points.iter().any(|p| *p != first) {
         return points;
     }
-    let side = |i: usize, bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+    let side = |i: usize, bit: usize| if i >> bit & 1 == 1 { radius } else { -radius };
     (0..8).map(|i| first + Vec3::new(side(i, 0), side(i, 1), side(i, 2))).collect()
 }
 
@@ -81,6 +86,18 @@ mod tests {
     use super::*;
     use crate::math::Random;
     use crate::scene::camera_fit::MARGIN;
+
+    #[test]
+    fn a_single_point_is_seen_by_its_radius() {
+        for (radii, radius) in
+            [(None, LONE_RADIUS), (Some(vec![0.01]), 0.01), (Some(vec![50.0]), 50.0)]
+        {
+            let cloud = PointCloud { radii, ..PointCloud::from_positions(vec![Vec3::ONE]) };
+            let camera = fit_camera(&cloud, &CameraFit::default());
+            let distance = camera.position.distance(DVec3::ONE) as f32 / radius;
+            assert!((2.0..12.0).contains(&distance), "{distance} of {radius}");
+        }
+    }
 
     fn box_of_points(size: Vec3) -> PointCloud {
         let mut random = Random::new(2, 0);

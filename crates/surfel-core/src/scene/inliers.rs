@@ -49,8 +49,8 @@ pub(super) fn without_fringe(points: Vec<Vec3>) -> Vec<Vec3> {
     const CORE_FRACTION: f64 = 0.95;
     /// Distance to which points are kept, in distances of the core. Only farther points can be a fringe.
     const FRINGE_RATIO: f32 = 2.0;
-    /// Minimum number of points: a fringe of fewer would be a single point.
-    const MIN_POINTS: usize = 20;
+    /// Minimum number of points: of fewer, only one lies beyond the core.
+    const MIN_POINTS: usize = 22;
     let median = |axis: usize| {
         let mut values: Vec<f32> = points.iter().map(|p| p[axis]).collect();
         let middle = values.len() / 2;
@@ -157,6 +157,17 @@ mod tests {
             40.0 * distance.powi(power) * Vec3::new(angle.cos(), angle.sin(), 0.0)
         };
         (0..5000).map(|_| point(&mut random)).collect()
+    }
+
+    #[test]
+    fn one_far_point_of_few_is_no_fringe() {
+        for (n, n_kept) in [(2, 2), (3, 3), (21, 21), (42, 40)] {
+            // The last point is far away, of 42 the last two.
+            let far = |i: usize| if n - (n / 21).max(1) <= i { 100.0 } else { 0.0 };
+            let points =
+                (0..n).map(|i| Vec3::new(i as f32 / n as f32 + far(i), 0.0, 0.0)).collect();
+            assert_eq!(without_fringe(points).len(), n_kept, "{n}");
+        }
     }
 
     #[test]

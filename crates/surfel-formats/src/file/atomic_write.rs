@@ -52,7 +52,7 @@ pub(crate) fn write_error(path: &Path, cause: io::Error) -> Error {
             let folder = parent_folder(path).display().to_string();
             return Error::FolderNotFound { file, folder };
         }
-        io::ErrorKind::NotFound => "choose another folder: the system makes no files in this one",
+        io::ErrorKind::NotFound => "choose another folder or a shorter name",
         io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
             "choose a folder you may write to"
         }

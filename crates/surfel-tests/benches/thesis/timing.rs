@@ -56,6 +56,8 @@ pub fn times(scene: &FlatScene) -> [Option<Times>; 3] {
         pool.install(|| fastest(&renderer, scene))
     };
     let on_gpu = backends::gpu().and_then(|gpu| {
+        // The first pictures compile kernels, and learn how many pixels the device renders at once.
+        fastest(gpu, scene)?;
         gpu.measure_kernels(true);
         let measured = fastest(gpu, scene);
         // Pictures are slower while the kernels are measured.

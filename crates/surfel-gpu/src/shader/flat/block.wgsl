@@ -53,25 +53,6 @@ fn word_of_block(block_idx: u32, word_idx: u32) -> u32 {
     return block_word(block_idx * (4u * BLOCK_VECTORS) + word_idx);
 }
 
-// Returns the point in `lane` relative to `origin`. The corner is subtracted first, so that rounding errors are
-// proportional to the distance from `origin`.
-fn block_point(block_idx: u32, head: BlockHead, lane: u32, origin: vec3<f32>) -> Point {
-    let pair = POSITION_WORDS + (lane >> 1u);
-    let words = vec3<u32>(
-        word_of_block(block_idx, pair),
-        word_of_block(block_idx, pair + 4u),
-        word_of_block(block_idx, pair + 8u),
-    );
-    let steps = (words >> vec3<u32>(16u * (lane & 1u))) & vec3<u32>(0xffffu);
-    let normal = word_of_block(block_idx, NORMAL_WORDS + lane);
-    let radius = (word_of_block(block_idx, RADIUS_WORDS + (lane >> 2u)) >> (8u * (lane & 3u))) & 0xffu;
-    return Point(
-        (head.corner - origin) + vec3<f32>(steps) * head.step,
-        integer_normal(normal),
-        f32(radius + ((normal >> 30u) << 8u)) * head.radius_step,
-    );
-}
-
 // Returns the lower or the upper four points of a block relative to `origin`.
 fn four_points(block_idx: u32, head: BlockHead, half: u32, origin: vec3<f32>) -> FourPoints {
     let first = block_idx * BLOCK_VECTORS;
@@ -104,7 +85,7 @@ fn point_of_four(four: FourPoints, lane: u32) -> Point {
     );
 }
 
-// The words of a block's points, for those who visit several of them.
+// The words of a block's points, for kernels that visit several of them.
 struct BlockPoints {
     // The corner relative to the position for which the block was loaded.
     corner: vec3<f32>,
@@ -118,6 +99,7 @@ struct BlockPoints {
     radii: vec2<u32>,
 }
 
+// Loads the points of a block relative to `origin`.
 fn load_points(block_idx: u32, origin: vec3<f32>) -> BlockPoints {
     let first = block_idx * BLOCK_VECTORS;
     let head = load_head(block_idx);
@@ -134,7 +116,7 @@ fn load_points(block_idx: u32, origin: vec3<f32>) -> BlockPoints {
     );
 }
 
-// Returns the lanes of the points that are nearer than the square root of `max_squared`, as bits.
+// Returns the lanes of the points that are nearer to the origin than the square root of `max_squared`, as bits.
 fn lanes_within(points: BlockPoints, max_squared: f32) -> u32 {
     var lanes = 0u;
     for (var half = 0u; half < 2u; half++) {
@@ -185,9 +167,26 @@ fn color_byte(slot: u32, byte_idx: u32) -> f32 {
     return tables.srgb[encoded >> 2u][encoded & 3u];
 }
 
-// Returns the point at `slot` relative to `origin`.
+// Returns the point at `slot` relative to `origin`. The corner is subtracted first, so that rounding errors are
+// proportional to the distance from `origin`.
 fn slot_point(slot: u32, origin: vec3<f32>) -> Point {
-    return block_point(slot >> 3u, load_head(slot >> 3u), slot & 7u, origin);
+    let block_idx = slot >> 3u;
+    let lane = slot & 7u;
+    let head = load_head(block_idx);
+    let pair = POSITION_WORDS + (lane >> 1u);
+    let words = vec3<u32>(
+        word_of_block(block_idx, pair),
+        word_of_block(block_idx, pair + 4u),
+        word_of_block(block_idx, pair + 8u),
+    );
+    let steps = (words >> vec3<u32>(16u * (lane & 1u))) & vec3<u32>(0xffffu);
+    let normal = word_of_block(block_idx, NORMAL_WORDS + lane);
+    let radius = (word_of_block(block_idx, RADIUS_WORDS + (lane >> 2u)) >> (8u * (lane & 3u))) & 0xffu;
+    return Point(
+        (head.corner - origin) + vec3<f32>(steps) * head.step,
+        integer_normal(normal),
+        f32(radius + ((normal >> 30u) << 8u)) * head.radius_step,
+    );
 }
 
 fn slot_surfel(slot: u32) -> Surfel {

@@ -67,7 +67,7 @@ impl LoadedScene {
         Ok(())
     }
 
-    /// Warns of settings for points in a scene without any.
+    /// Warns of settings that choose or colour points in a scene without points.
     pub(super) fn report_unused(&self, description: &SceneDescription, progress: &dyn Progress) {
         if self.graph.geometries.is_empty() || self.clouds().next().is_some() {
             return;
