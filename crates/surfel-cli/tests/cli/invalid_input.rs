@@ -121,6 +121,9 @@ fn settings_for_points_warn_where_there_are_triangles_alone() {
         "{text}"
     );
     assert!(!stderr(&surfel(&arguments)).contains("warning"));
+    let cloud = folder.write("dome.ply", dome(10));
+    let both = surfel(&[&arguments[..], &[&cloud, "--color", "elevation"]].concat());
+    assert!(!stderr(&both).contains("settings for points"), "{}", stderr(&both));
 }
 
 #[test]
