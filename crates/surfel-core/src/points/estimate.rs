@@ -1,7 +1,7 @@
 //! Estimates of normals, radii and structures from the neighbours of each point, as far as a cloud lacks them.
 
 use super::PointCloud;
-use super::find_structures::{Voters, all_scattered, find_structures, voters};
+use super::find_structures::{all_scattered, find_structures};
 use super::free_space::FreeSpace;
 use super::gaps::{close_gaps, is_by_gap};
 use super::jets::{JetFit, MIN_JET_NEIGHBORS, fit_nearest_jet, refine_normals};
@@ -13,6 +13,7 @@ use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
 use super::scan_grid::ScanGrids;
 use super::scan_rings::ScanRings;
 use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
+use super::structure_votes::{Voters, voters_among};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -119,7 +120,7 @@ fn estimate_by_nearest<'a>(
         let jet = fit_nearest_jet(positions, point, neighbors, &fit, k_normal);
         let distance = k_radius.map_or(0.0, |k| kth_distance(neighbors, k));
         let around = has_voters
-            .then(|| (voters(neighbors), is_by_gap(positions, point, neighbors, fit.normal)));
+            .then(|| (voters_among(neighbors), is_by_gap(positions, point, neighbors, fit.normal)));
         (fit, jet, distance, around)
     };
     let k = k_normal.max(k_radius.unwrap_or(0)).max(MIN_JET_NEIGHBORS);

@@ -17,14 +17,14 @@ use super::scan_rings::Ring;
 use super::see_through::open_see_through_discs;
 use super::solids::{ball_radius, clamp_solids, settle};
 use super::stray_points::limit_stray_points;
-use super::structure::{
-    MIN_VEGETATION, PointShape, Structure, StructureReport, is_line, is_surface,
-};
-use super::typical::{SPARSE, Typical};
+use super::structure::{PointShape, Structure, StructureReport, is_line, is_surface};
+use super::structure_votes::{Voters, smoothed};
+use super::typical::Typical;
 use super::up::is_mostly_land;
+use super::vegetation::{is_vegetated, land_normal};
 use super::wide_discs::{limit_crowded_discs, narrow_lone_discs};
 use crate::error::Result;
-use crate::math::{SymmetricMatrix, Vec3, smallest_eigenvector};
+use crate::math::Vec3;
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -36,23 +36,6 @@ const N_MANY_NEIGHBORS: usize = 48;
 const N_WIDEST_NEIGHBORS: usize = 144;
 /// Maximum surface variation of so many neighbours of a surface. Crowns have more.
 const MAX_WIDEST_VARIATION: f32 = 0.03;
-/// Number of neighbours that vote on the structure of a point.
-const N_VOTERS: usize = 8;
-/// Indices of the neighbours that vote on the structure of a point, `u32::MAX` where there are fewer.
-pub type Voters = [u32; N_VOTERS];
-/// Number of rounds in which points take over half of their neighbours' mean.
-const N_ROUNDS: usize = 12;
-/// Share of scattered points around a point, after all rounds, that makes it a scattered one.
-const MIN_SCATTERED: f32 = 0.5;
-/// Minimum share of scattered points around a scattered point of a noisy cloud.
-const MIN_SCATTERED_IN_NOISE: f32 = 0.9;
-/// Minimum share of scattered points among the rough ones of a cloud that is leafy, not noisy.
-const MIN_SCATTERED_ROUGH: f32 = 0.5;
-/// Maximum number of rounds in which islands of a surface shrink.
-const N_ISLAND_ROUNDS: usize = 8;
-/// Share of scattered points from which a surface point is looked at again: small islands of a surface among scattered
-/// points, as where branches happen to lie in a plane, are scattered too.
-const MIN_SHARE_NEAR_SCATTER: f32 = 0.02;
 
 /// Finds the structure of each point from the planes through its neighbours and the distances to the most distant
 /// of them. `voters` are those of each point; if it is empty, they are searched where they are needed. `rings` are those of
@@ -118,15 +101,6 @@ pub fn find_structures(
     limit_stray_points(tree, &mut shapes, progress)?;
     let report = StructureReport::of(&shapes);
     Ok((shapes, report))
-}
-
-/// Returns the voters among the neighbours of a point, which come nearest first.
-pub fn voters(neighbors: &[Neighbor]) -> Voters {
-    let mut indices = [u32::MAX; N_VOTERS];
-    for (index, neighbor) in indices.iter_mut().zip(neighbors) {
-        *index = neighbor.index;
-    }
-    indices
 }
 
 /// Makes each point stand for itself.
@@ -220,138 +194,6 @@ fn decide(
     shape(Structure::Scatter, normal)
 }
 
-/// Returns true if much of the cloud is vegetation: many points are scattered, and not by noise.
-fn is_vegetated(shapes: &[PointShape], n_rough: usize) -> bool {
-    let n_scattered = count_scattered(shapes);
-    !is_noisy(n_scattered, n_rough) && MIN_VEGETATION * shapes.len() as f32 <= n_scattered as f32
-}
-
-/// Returns true if most of the points whose nearest neighbours lie in no plane are not scattered: the cloud is noisy rather
-/// than leafy.
-fn is_noisy(n_scattered: usize, n_rough: usize) -> bool {
-    (n_scattered as f32) < MIN_SCATTERED_ROUGH * n_rough as f32
-}
-
-fn count_scattered(shapes: &[PointShape]) -> usize {
-    shapes.iter().filter(|shape| shape.structure == Structure::Scatter).count()
-}
-
-/// Returns the direction, of either sign, to which the normals of the surface points are nearest: amid vegetation that of the
-/// land.
-fn land_normal(shapes: &[PointShape]) -> Vec3 {
-    let mut scatter = SymmetricMatrix::default();
-    for shape in shapes.iter().filter(|shape| shape.structure == Structure::Surface) {
-        // The eigenvector of the least eigenvalue of the negative matrix.
-        scatter.add_outer(shape.normal.as_dvec3(), -1.0);
-    }
-    smallest_eigenvector(&scatter).0.as_vec3()
-}
-
-/// Lets the region around a point decide whether it is scattered, so that structures do not flicker: a rough point of a
-/// surface stays on the surface, and a flat spot of a crown becomes leaves.
-///
-/// `n_rough` is the number of points whose nearest neighbours lie in no plane. If most of them lie in a plane of more
-/// neighbours, the cloud is noisy rather than leafy, and points are scattered only amid others.
-///
-/// A sparse scattered point by a surface stays one if much is scattered, as in a forest: its disc would be wide.
-fn smoothed(
-    tree: &KdTree,
-    shapes: &[PointShape],
-    voters: Vec<Voters>,
-    n_rough: usize,
-    typical_radius: f32,
-    progress: &dyn Progress,
-) -> Result<Vec<Structure>> {
-    let own = shapes.par_iter().map(|shape| shape.structure);
-    let n_scattered = count_scattered(shapes);
-    if n_scattered == 0 {
-        return Ok(own.collect());
-    }
-    let is_noisy = is_noisy(n_scattered, n_rough);
-    let is_vegetated = is_vegetated(shapes, n_rough);
-    let min_scattered = if is_noisy { MIN_SCATTERED_IN_NOISE } else { MIN_SCATTERED };
-    let max_radius = if is_vegetated { SPARSE * typical_radius } else { f32::INFINITY };
-    let voters = match voters.is_empty() {
-        true => {
-            tree.map(Neighborhood::Nearest(N_VOTERS), progress, |_, found| self::voters(found))?
-        }
-        false => voters,
-    };
-    let mut shares: Vec<f32> =
-        own.clone().map(|structure| f32::from(u8::from(structure == Structure::Scatter))).collect();
-    for _ in 0..N_ROUNDS {
-        let mixed = |(own, voters): (&f32, &Voters)| {
-            let of_voters = voters.iter().filter(|voter| **voter != u32::MAX);
-            let n_voters = of_voters.clone().count().max(1) as f32;
-            let sum: f32 = of_voters.map(|voter| shares[*voter as usize]).sum();
-            0.5 * (own + sum / n_voters)
-        };
-        shares = shares.par_iter().zip(&voters).map(mixed).collect();
-    }
-    let decided = |((own, shape), share): ((Structure, &PointShape), &f32)| match own {
-        Structure::Line => Structure::Line,
-        _ if min_scattered <= *share => Structure::Scatter,
-        Structure::Scatter if shape.radius <= max_radius => Structure::Surface,
-        own => own,
-    };
-    let mut structures: Vec<Structure> = own.zip(shapes).zip(&shares).map(decided).collect();
-    if !is_noisy {
-        scatter_islands(tree, &mut structures, &shares, progress)?;
-    }
-    Ok(structures)
-}
-
-/// Scatters the surface points most of whose neighbours are scattered. In each round after the first, only points near
-/// those that the last one scattered are looked at.
-fn scatter_islands(
-    tree: &KdTree,
-    structures: &mut [Structure],
-    shares: &[f32],
-    progress: &dyn Progress,
-) -> Result<()> {
-    let positions = tree.positions();
-    let is_near_scatter = |point: &u32| {
-        let (structure, share) = (structures[*point as usize], shares[*point as usize]);
-        structure == Structure::Surface && MIN_SHARE_NEAR_SCATTER <= share
-    };
-    let near_scatter = (0..positions.len() as u32).filter(is_near_scatter);
-    let mut candidates: Vec<IslandCandidate> =
-        near_scatter.map(|point| IslandCandidate { point, reach_squared: f32::INFINITY }).collect();
-    let position = |candidate: &IslandCandidate| positions[candidate.point as usize];
-    let mut scattered: Vec<Vec3> = candidates.iter().map(position).collect();
-    for _ in 0..N_ISLAND_ROUNDS {
-        let last_scattered = KdTree::new(&scattered, progress)?;
-        let look = |candidate: &mut IslandCandidate| {
-            progress.check()?;
-            let nearest = last_scattered.nearest(position(candidate), 1, None);
-            let is_far = |nearest: &Neighbor| candidate.reach_squared < nearest.distance_squared;
-            if nearest.first().is_none_or(is_far) {
-                return Ok(false);
-            }
-            let around = tree.nearest(position(candidate), N_MANY_NEIGHBORS, Some(candidate.point));
-            candidate.reach_squared = around.last().map_or(0.0, |last| last.distance_squared);
-            let of_neighbor = |neighbor: &Neighbor| structures[neighbor.index as usize];
-            let is_scattered = |neighbor: &&Neighbor| of_neighbor(neighbor) == Structure::Scatter;
-            Ok(around.len() <= 2 * around.iter().filter(is_scattered).count())
-        };
-        let is_island = candidates.par_iter_mut().map(look).collect::<Result<Vec<bool>>>()?;
-        let mut is_island = is_island.into_iter();
-        let (islands, others): (Vec<_>, Vec<_>) =
-            candidates.into_iter().partition(|_| is_island.next() == Some(true));
-        islands.iter().for_each(|island| structures[island.point as usize] = Structure::Scatter);
-        scattered = islands.iter().map(position).collect();
-        candidates = others;
-    }
-    Ok(())
-}
-
-/// A surface point near scattered ones.
-struct IslandCandidate {
-    point: u32,
-    /// Squared distance to the farthest of its neighbours, infinite if these are not known.
-    reach_squared: f32,
-}
-
 #[cfg(test)]
 mod tests {
     //! Structures of sampled shapes.
@@ -435,51 +277,6 @@ mod tests {
     }
 
     /// Points that fill a cube. The surface is those in the middle whose distance from it is below `radius`.
-    fn island_in_a_cube(radius: f32) -> (Vec<Vec3>, Vec<Structure>) {
-        let points = random_points(8000, 6, Vec3::from_array);
-        let structure = |point: &Vec3| match point.distance(Vec3::splat(0.5)) < radius {
-            true => Structure::Surface,
-            false => Structure::Scatter,
-        };
-        let structures = points.iter().map(structure).collect();
-        (points, structures)
-    }
-
-    #[test]
-    fn small_islands_of_a_surface_amid_leaves_vanish() {
-        // A sphere of the smaller radius has 33 points, one of the larger has 2100.
-        for (radius, stays) in [(0.1, false), (0.4, true)] {
-            let (points, mut structures) = island_in_a_cube(radius);
-            let tree = KdTree::new(&points, &NoProgress).unwrap();
-            let shares = vec![1.0; points.len()];
-            scatter_islands(&tree, &mut structures, &shares, &NoProgress).unwrap();
-            assert_eq!(structures.contains(&Structure::Surface), stays, "{radius}");
-        }
-    }
-
-    #[test]
-    fn islands_equal_a_look_at_all_points_in_each_round() {
-        let (points, mut structures) = island_in_a_cube(0.3);
-        let tree = KdTree::new(&points, &NoProgress).unwrap();
-        let mut expected = structures.clone();
-        for _ in 0..N_ISLAND_ROUNDS {
-            let last = expected.clone();
-            let is_scattered = |point: u32| last[point as usize] == Structure::Scatter;
-            for (point, structure) in expected.iter_mut().enumerate() {
-                let around = tree.nearest(points[point], N_MANY_NEIGHBORS, Some(point as u32));
-                let n_scattered = around.iter().filter(|other| is_scattered(other.index)).count();
-                if around.len() <= 2 * n_scattered {
-                    *structure = Structure::Scatter;
-                }
-            }
-        }
-        let n_before = structures.iter().filter(|own| **own == Structure::Surface).count();
-        scatter_islands(&tree, &mut structures, &vec![1.0; points.len()], &NoProgress).unwrap();
-        let n_after = structures.iter().filter(|own| **own == Structure::Surface).count();
-        assert!(0 < n_after && n_after < n_before, "{n_after} of {n_before}");
-        assert_eq!(structures, expected);
-    }
-
     #[test]
     fn points_of_a_wire_form_a_line_along_it() {
         let direction = Vec3::new(1.0, 2.0, 0.5).normalize();

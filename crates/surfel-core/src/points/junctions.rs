@@ -4,7 +4,8 @@
 use super::edge_planes::PLANE_THICKNESS;
 use super::neighbors::KdTree;
 use super::radius::kth_distance;
-use super::structure::{MIN_VEGETATION, PointShape, Structure};
+use super::structure::{PointShape, Structure};
+use super::vegetation::MIN_VEGETATION;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;

@@ -152,9 +152,6 @@ impl PointCloud {
     }
 }
 
-/// Minimum share of scattered points in a cloud with much vegetation.
-pub(super) const MIN_VEGETATION: f32 = 0.2;
-
 /// True if a plane describes a neighbourhood.
 pub(super) fn is_surface(fit: &PlaneFit) -> bool {
     fit.normal != Vec3::ZERO
