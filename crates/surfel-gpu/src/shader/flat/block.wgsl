@@ -87,10 +87,8 @@ fn point_of_four(four: FourPoints, lane: u32) -> Point {
 
 // The words of a block's points, for kernels that visit several of them.
 struct BlockPoints {
-    // The corner relative to the position for which the block was loaded.
-    corner: vec3<f32>,
-    step: f32,
-    radius_step: f32,
+    // With the corner relative to the position for which the block was loaded.
+    head: BlockHead,
     x: vec4<u32>,
     y: vec4<u32>,
     z: vec4<u32>,
@@ -104,9 +102,7 @@ fn load_points(block_idx: u32, origin: vec3<f32>) -> BlockPoints {
     let first = block_idx * BLOCK_VECTORS;
     let head = load_head(block_idx);
     return BlockPoints(
-        head.corner - origin,
-        head.step,
-        head.radius_step,
+        BlockHead(head.corner - origin, head.step, head.radius_step),
         block_vector(first + 1u),
         block_vector(first + 2u),
         block_vector(first + 3u),
@@ -120,9 +116,9 @@ fn load_points(block_idx: u32, origin: vec3<f32>) -> BlockPoints {
 fn lanes_within(points: BlockPoints, max_squared: f32) -> u32 {
     var lanes = 0u;
     for (var half = 0u; half < 2u; half++) {
-        let x = four_steps(points.x, half) * points.step + points.corner.x;
-        let y = four_steps(points.y, half) * points.step + points.corner.y;
-        let z = four_steps(points.z, half) * points.step + points.corner.z;
+        let x = four_steps(points.x, half) * points.head.step + points.head.corner.x;
+        let y = four_steps(points.y, half) * points.head.step + points.head.corner.y;
+        let z = four_steps(points.z, half) * points.head.step + points.head.corner.z;
         lanes |= lane_bits(x * x + y * y + z * z < vec4<f32>(max_squared)) << (4u * half);
     }
     return lanes;
@@ -136,10 +132,15 @@ fn point_at(points: BlockPoints, lane: u32) -> Point {
     let is_upper = 4u <= lane;
     let normal = component(select(points.lower_normals, points.upper_normals, is_upper), lane & 3u);
     let radius = (select(points.radii.x, points.radii.y, is_upper) >> (8u * (lane & 3u))) & 0xffu;
+    return decoded_point(points.head, steps, normal, radius);
+}
+
+// Returns the point with these steps of its position, word of its normal and lower byte of its radius.
+fn decoded_point(head: BlockHead, steps: vec3<u32>, normal: u32, radius: u32) -> Point {
     return Point(
-        points.corner + vec3<f32>(steps) * points.step,
+        head.corner + vec3<f32>(steps) * head.step,
         integer_normal(normal),
-        f32(radius + ((normal >> 30u) << 8u)) * points.radius_step,
+        f32(radius + ((normal >> 30u) << 8u)) * head.radius_step,
     );
 }
 
@@ -182,11 +183,7 @@ fn slot_point(slot: u32, origin: vec3<f32>) -> Point {
     let steps = (words >> vec3<u32>(16u * (lane & 1u))) & vec3<u32>(0xffffu);
     let normal = word_of_block(block_idx, NORMAL_WORDS + lane);
     let radius = (word_of_block(block_idx, RADIUS_WORDS + (lane >> 2u)) >> (8u * (lane & 3u))) & 0xffu;
-    return Point(
-        (head.corner - origin) + vec3<f32>(steps) * head.step,
-        integer_normal(normal),
-        f32(radius + ((normal >> 30u) << 8u)) * head.radius_step,
-    );
+    return decoded_point(BlockHead(head.corner - origin, head.step, head.radius_step), steps, normal, radius);
 }
 
 fn slot_surfel(slot: u32) -> Surfel {
