@@ -174,7 +174,8 @@ pub fn find_shapes<'a>(
     if 0 < narrowed.n_lines {
         found = StructureReport::of(&shapes);
     }
-    if !is_by_gap.is_empty() {
+    // Those between rings are closed already.
+    if !is_by_gap.is_empty() && rings.is_none() {
         close_gaps(&tree, radii, is_by_gap, &free_space, &mut shapes, progress)?;
     }
     if let (StructureChoice::Auto, Some((fits, _))) = (preparation.structure, fits) {

@@ -19,6 +19,9 @@ const MAX_DIFFERENCE: f32 = 0.4;
 const MAX_GAP: f32 = 0.4;
 /// Maximum cosine of the angle between a ray and the line to the next ring at which the range does not jump.
 const MAX_RAY_COSINE: f32 = 0.7;
+/// Minimum cosine of the angle between a ray and the normal of the surface that it measured. No scanner measures at a lower
+/// one.
+const MIN_RAY_COSINE: f32 = 0.1;
 /// Maximum ratio of successive gaps on one surface. On even ground the last one before the horizon is three times as wide as
 /// the one before.
 const MAX_GAP_RATIO: f32 = 4.0;
@@ -34,6 +37,8 @@ const MAX_STRETCH_POINTS: usize = 16;
 const MIN_DEPTH: f32 = 0.5;
 /// Number of rays of a ring on each side of a disc's centre that may have passed through it.
 const N_SAMPLES: i32 = 8;
+/// Number of such rays of the ring of the disc's centre.
+const N_OWN_SAMPLES: i32 = 64;
 /// Minimum cosine of the elevation of a ring around which these are sought as wide as the disc.
 const MIN_LEVEL: f32 = 0.1;
 /// Maximum number of rings of such rays.
@@ -66,13 +71,18 @@ pub fn close_ring_gaps(
             if index.is_multiple_of(4096) {
                 progress.check()?;
             }
-            let is_line = shapes[*point as usize].structure == Structure::Line;
-            Ok(if is_line { surfaces.disc(RingPoint { ring, index }) } else { None })
+            let (shape, point) = (&shapes[*point as usize], RingPoint { ring, index });
+            Ok(match shape.structure {
+                Structure::Line => surfaces.disc(point),
+                Structure::Surface if surfaces.is_noise(point, shape) => surfaces.disc(point),
+                _ => None,
+            })
         };
         let discs = points.par_iter().enumerate().map(disc).collect::<Result<Vec<_>>>()?;
         let mut last_kept: Option<(Vec3, PointShape)> = None;
         for (i, (point, disc)) in points.iter().zip(&discs).enumerate() {
             let Some(mut disc) = *disc else {
+                surfaces.narrow(RingPoint { ring, index: i }, &mut shapes[*point as usize]);
                 last_kept = None;
                 continue;
             };
@@ -123,6 +133,23 @@ struct RingPoint {
 }
 
 impl RingSurfaces<'_> {
+    /// Returns true if the surface of a point contains its ray, as the noise of the ranges along a ring does.
+    fn is_noise(&self, point: RingPoint, shape: &PointShape) -> bool {
+        let ray = self.position(point) - self.scanner;
+        shape.normal.dot(ray).abs() < MIN_RAY_COSINE * ray.length()
+    }
+
+    /// Narrows a disc that reaches beyond the next ring, up to the nearest ray that passed through it.
+    fn narrow(&self, point: RingPoint, shape: &mut PointShape) {
+        let elevation_rad = |ring: usize| self.rings.get(ring).map(|ring| ring.elevation_rad);
+        let at = elevation_rad(point.ring + 1).unwrap_or(f32::INFINITY);
+        let step = (at - self.rings[point.ring].elevation_rad).abs();
+        let range = self.position(point).distance(self.scanner);
+        if step * range < shape.radius {
+            shape.radius = self.free_radius(point, shape.normal, shape.radius);
+        }
+    }
+
     /// Returns the disc of a point that reaches the rings below and above on the same surface, if there is one.
     fn disc(&self, point: RingPoint) -> Option<PointShape> {
         let position = self.position(point);
@@ -139,27 +166,34 @@ impl RingSurfaces<'_> {
         (MIN_FREE * gap <= radius).then_some(shape)
     }
 
-    /// Returns the radius of a disc up to the nearest ray that passed through it.
+    /// Returns the radius of a disc up to the nearest ray that passed through it, or that its own ring lacks: it measured
+    /// nothing.
     fn free_radius(&self, point: RingPoint, normal: Vec3, radius: f32) -> f32 {
         let center = self.position(point) - self.scanner;
         let elevation_rad = self.rings[point.ring].elevation_rad;
         let angle = (radius / center.length()).min(1.0).asin();
-        let turn = angle / elevation_rad.cos().max(MIN_LEVEL);
-        let turns = (-N_SAMPLES..=N_SAMPLES).map(|step| turn * step as f32 / N_SAMPLES as f32);
-        let below = |limit: f32| self.rings.partition_point(|ring| ring.elevation_rad < limit);
-        let near = below(elevation_rad - angle)..below(elevation_rad + angle).max(point.ring + 1);
-        let step = near.len().div_ceil(MAX_RINGS_OF_RAYS).max(1);
-        let rays = near.step_by(step).flat_map(|ring| {
-            let at = move |turn| self.nearest(ring, self.azimuth(point) + turn);
-            turns.clone().filter_map(at).map(|other| self.position(other) - self.scanner)
-        });
-        let passage = |ray: Vec3| {
+        let level = elevation_rad.cos().max(MIN_LEVEL);
+        let turn = angle / level;
+        let turns = |n: i32| (-n..=n).map(move |step| turn * step as f32 / n as f32);
+        let at = |ring: usize, turn: f32| self.nearest(ring, self.azimuth(point) + turn);
+        let distance = |ray: RingPoint| {
+            let ray = self.position(ray) - self.scanner;
             let range = ray.length();
             let along = range * center.dot(normal) / ray.dot(normal);
             let is_passed = 0.0 < along && along + MIN_DEPTH * radius < range;
             is_passed.then(|| (along / range * ray).distance(center))
         };
-        rays.filter_map(passage).fold(radius, f32::min)
+        let of_own_ring = turns(N_OWN_SAMPLES).filter_map(|turn| match at(point.ring, turn) {
+            Some(ray) => distance(ray),
+            None => Some(turn.abs() * level * center.length()),
+        });
+        let below = |limit: f32| self.rings.partition_point(|ring| ring.elevation_rad < limit);
+        let near = below(elevation_rad - angle)..below(elevation_rad + angle).max(point.ring + 1);
+        let step = near.len().div_ceil(MAX_RINGS_OF_RAYS).max(1);
+        let rays = near
+            .step_by(step)
+            .flat_map(|ring| turns(N_SAMPLES).filter_map(move |turn| at(ring, turn)));
+        rays.filter_map(distance).chain(of_own_ring).fold(radius, f32::min)
     }
 
     /// Returns the point of the next ring on a side of a point, if both are on one surface: if the line between them is steep

@@ -23,8 +23,8 @@ pub const MAX_EXACT_TERMS: usize = (1 << 24) / STEPS as usize;
 /// Minimum weight of all points of a fit. With less, beyond the reach of all points but one or two, rounding showed as
 /// noise.
 pub const MIN_WEIGHT: f32 = 0.1;
-/// Additional weight of the nearest point's colour. Without it, rounding turned the colours of points with tiny weights
-/// black.
+/// Additional weight of the colour of the nearest point, in its radii. Without it, rounding turned the colours of points
+/// with tiny weights black.
 pub const NEAREST_COLOR_WEIGHT: f32 = 0.02;
 /// Exponent of the weight of normals at an angle of 90 degrees: 2 / (2/3)^2.
 pub const NORMAL_FALLOFF: f32 = 4.5;

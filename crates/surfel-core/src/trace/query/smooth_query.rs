@@ -38,7 +38,7 @@ pub struct SmoothHits<W> {
     pub normals: Vec3Lanes<W>,
     /// Linear colours.
     pub colors: Vec3Lanes<W>,
-    /// Slots of the points nearest to the hits, as bits.
+    /// Slots of the points nearest to the hits, each in its radii, as bits.
     pub slots: W,
 }
 
@@ -230,7 +230,9 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
                     colors.add(&point, Vec3Lanes::splat(color), is_near);
                 }
                 let slot = L::PacketLanes::splat(f32::from_bits(slot));
-                nearest.merge(is_near, point.offset.dot(point.offset), slot);
+                // A wide disc's neighbours reach less far than it does.
+                let distance = point.offset.dot(point.offset) * point.inverse_support;
+                nearest.merge(is_near, distance, slot);
             }
         }
     }

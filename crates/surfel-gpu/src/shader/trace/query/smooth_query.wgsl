@@ -77,7 +77,8 @@ fn add_color(color: ptr<function, HitColor>, point: FitPoint, slot: u32) {
     if visits[visit_idx].blends_colors == 1u {
         (*color).sums = with_color((*color).sums, point, slot_color(slot));
     }
-    let squared = dot(point.offset, point.offset);
+    // A wide disc's neighbours reach less far than it does.
+    let squared = dot(point.offset, point.offset) * point.inverse_support;
     let other = (*color).nearest_squared;
     if squared < other || squared == other && slot < (*color).nearest_slot {
         (*color).nearest_squared = squared;
