@@ -284,6 +284,7 @@ mod tests {
     //! Ground between rings, and a box that stands on it.
 
     use super::*;
+    use crate::math::Random;
     use crate::points::{PointCloud, Preparation, prepare};
     use crate::progress::NoProgress;
 
@@ -337,6 +338,26 @@ mod tests {
             let n_covering = discs.iter().filter(covers).count();
             assert!((3..100).contains(&n_covering), "{place}: {n_covering}");
         }
+    }
+
+    #[test]
+    fn noise_along_rings_does_not_tilt_the_ground() {
+        let mut random = Random::new(4, 0);
+        let mut scan = scan();
+        for position in &mut scan.positions {
+            *position *= 1.0 + 0.02 * random.next_gaussian() as f32 / position.length();
+        }
+        let (cloud, _) = prepare(scan, &Preparation::default(), &NoProgress).unwrap();
+        let structures = cloud.structures().unwrap();
+        let is_near = |point: &usize| {
+            let position = cloud.positions()[*point];
+            let is_low = position.x < 6.0 && position.z < -1.7 && position.length() < 5.0;
+            is_low && structures[*point] == Structure::Surface
+        };
+        let near: Vec<usize> = (0..cloud.len()).filter(is_near).collect();
+        let n_level = near.iter().filter(|point| 0.98 < cloud.normals()[**point].z).count();
+        assert!(100 < near.len(), "{}", near.len());
+        assert!(0.8 * near.len() as f32 <= n_level as f32, "{n_level} of {}", near.len());
     }
 
     #[test]
