@@ -341,11 +341,11 @@ mod tests {
     }
 
     #[test]
-    fn noise_along_rings_does_not_tilt_the_ground() {
+    fn noise_along_rings_tilts_little_of_the_ground() {
         let mut random = Random::new(4, 0);
         let mut scan = scan();
         for position in &mut scan.positions {
-            *position *= 1.0 + 0.02 * random.next_gaussian() as f32 / position.length();
+            *position *= 1.0 + 0.05 * random.next_gaussian() as f32 / position.length();
         }
         let (cloud, _) = prepare(scan, &Preparation::default(), &NoProgress).unwrap();
         let structures = cloud.structures().unwrap();
@@ -357,7 +357,8 @@ mod tests {
         let near: Vec<usize> = (0..cloud.len()).filter(is_near).collect();
         let n_level = near.iter().filter(|point| 0.98 < cloud.normals()[**point].z).count();
         assert!(100 < near.len(), "{}", near.len());
-        assert!(0.8 * near.len() as f32 <= n_level as f32, "{n_level} of {}", near.len());
+        // Planes through neighbours on one ring alone would leave 0.16 of them level.
+        assert!(0.4 * near.len() as f32 <= n_level as f32, "{n_level} of {}", near.len());
     }
 
     #[test]
