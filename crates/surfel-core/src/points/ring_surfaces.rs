@@ -19,8 +19,8 @@ const MAX_DIFFERENCE: f32 = 0.4;
 const MAX_GAP: f32 = 0.4;
 /// Maximum cosine of the angle between a ray and the line to the next ring at which the range does not jump.
 const MAX_RAY_COSINE: f32 = 0.7;
-/// Minimum cosine of the angle between a ray and the normal of the surface that it measured. No scanner measures at a lower
-/// one.
+/// Cosine of the angle between a ray and a normal below which the plane through a point may be one along the ring and the
+/// noise of the ranges.
 const MIN_RAY_COSINE: f32 = 0.1;
 /// Maximum ratio of successive gaps on one surface. On even ground the last one before the horizon is three times as wide as
 /// the one before.
@@ -66,23 +66,18 @@ pub fn close_ring_gaps(
     let Some(fullest) = rings.iter().max_by_key(|ring| ring.points.len()) else { return Ok(()) };
     let max_turn = MAX_STEPS * median_step(fullest);
     let surfaces = RingSurfaces { positions: tree.positions(), rings, scanner, max_turn };
+    surfaces.narrow_wide_discs(shapes, progress)?;
     for (ring, Ring { points, .. }) in rings.iter().enumerate() {
         let disc = |(index, point): (usize, &u32)| {
             if index.is_multiple_of(4096) {
                 progress.check()?;
             }
-            let (shape, point) = (&shapes[*point as usize], RingPoint { ring, index });
-            Ok(match shape.structure {
-                Structure::Line => surfaces.disc(point),
-                Structure::Surface if surfaces.is_noise(point, shape) => surfaces.disc(point),
-                _ => None,
-            })
+            Ok(surfaces.closing_disc(&shapes[*point as usize], RingPoint { ring, index }))
         };
         let discs = points.par_iter().enumerate().map(disc).collect::<Result<Vec<_>>>()?;
         let mut last_kept: Option<(Vec3, PointShape)> = None;
         for (i, (point, disc)) in points.iter().zip(&discs).enumerate() {
             let Some(mut disc) = *disc else {
-                surfaces.narrow(RingPoint { ring, index: i }, &mut shapes[*point as usize]);
                 last_kept = None;
                 continue;
             };
@@ -133,20 +128,36 @@ struct RingPoint {
 }
 
 impl RingSurfaces<'_> {
-    /// Returns true if the surface of a point contains its ray, as the noise of the ranges along a ring does.
-    fn is_noise(&self, point: RingPoint, shape: &PointShape) -> bool {
-        let ray = self.position(point) - self.scanner;
-        shape.normal.dot(ray).abs() < MIN_RAY_COSINE * ray.length()
+    /// Narrows the discs of nearest neighbours that reach beyond the next ring, up to the nearest rays that passed through
+    /// them.
+    fn narrow_wide_discs(&self, shapes: &mut [PointShape], progress: &dyn Progress) -> Result<()> {
+        for (ring, pair) in self.rings.windows(2).enumerate() {
+            progress.check()?;
+            let step_rad = pair[1].elevation_rad - pair[0].elevation_rad;
+            let radius = |(index, point): (usize, &u32)| {
+                let (shape, point) = (&shapes[*point as usize], RingPoint { ring, index });
+                let gap = step_rad * self.position(point).distance(self.scanner);
+                let is_wide = gap < shape.radius && shape.structure != Structure::Line;
+                is_wide.then(|| self.free_radius(point, shape.normal, shape.radius).max(gap))
+            };
+            let radii: Vec<Option<f32>> =
+                pair[0].points.par_iter().enumerate().map(radius).collect();
+            for (point, radius) in pair[0].points.iter().zip(radii) {
+                let shape = &mut shapes[*point as usize];
+                shape.radius = radius.unwrap_or(shape.radius);
+            }
+        }
+        Ok(())
     }
 
-    /// Narrows a disc that reaches beyond the next ring, up to the nearest ray that passed through it.
-    fn narrow(&self, point: RingPoint, shape: &mut PointShape) {
-        let elevation_rad = |ring: usize| self.rings.get(ring).map(|ring| ring.elevation_rad);
-        let at = elevation_rad(point.ring + 1).unwrap_or(f32::INFINITY);
-        let step = (at - self.rings[point.ring].elevation_rad).abs();
-        let range = self.position(point).distance(self.scanner);
-        if step * range < shape.radius {
-            shape.radius = self.free_radius(point, shape.normal, shape.radius);
+    /// Returns the disc that closes the gaps beside a point on a line, or on a plane that may be noise along its ring.
+    fn closing_disc(&self, shape: &PointShape, point: RingPoint) -> Option<PointShape> {
+        let ray = self.position(point) - self.scanner;
+        let contains_ray = || shape.normal.dot(ray).abs() < MIN_RAY_COSINE * ray.length();
+        match shape.structure {
+            Structure::Line => self.disc(point),
+            Structure::Surface if contains_ray() => self.disc(point),
+            _ => None,
         }
     }
 
