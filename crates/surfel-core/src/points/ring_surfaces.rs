@@ -38,7 +38,7 @@ const MIN_DEPTH: f32 = 0.5;
 /// Number of rays of a ring on each side of a disc's centre that may have passed through it.
 const N_SAMPLES: i32 = 8;
 /// Number of such rays of the ring of the disc's centre.
-const N_OWN_SAMPLES: i32 = 64;
+const N_OWN_SAMPLES: i32 = 24;
 /// Minimum cosine of the elevation of a ring around which these are sought as wide as the disc.
 const MIN_LEVEL: f32 = 0.1;
 /// Maximum number of rings of such rays.
