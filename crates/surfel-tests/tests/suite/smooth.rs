@@ -92,6 +92,29 @@ fn classes_are_not_blended() {
     assert!(found.iter().all(|hit| hit.color == Vec3::X || hit.color == Vec3::Z));
 }
 
+#[test]
+fn small_points_near_a_wide_disc_do_not_colour_it() {
+    let mut cloud = PointCloud::default();
+    let (mut radii, mut colors) = (Vec::new(), Vec::new());
+    for (x, y) in (-4..4).flat_map(|x| (-4..4).map(move |y| (x as f32, y as f32))) {
+        cloud.positions.extend([Vec3::new(x, y, 0.0), Vec3::new(x + 0.5, y + 0.5, -0.3)]);
+        radii.extend([1.5, 0.02]);
+        colors.extend([[255, 0, 0], [0, 0, 255]]);
+    }
+    cloud.normals = Some(vec![Vec3::Z; radii.len()]);
+    cloud.radii = Some(radii);
+    let mut points = scenes::colored(&scenes::points(cloud, SurfaceKind::Smooth), colors);
+    for blends_colors in [false, true] {
+        points.blends_colors = blends_colors;
+        let flat = FlatCloud::new(&points, &NoProgress).unwrap();
+        let ray = |i: usize| Ray::new(Vec3::new(0.01 * i as f32 - 1.0, 0.5, 3.0), -Vec3::Z);
+        let rays: Vec<Ray> = (0..200).map(ray).collect();
+        for hit in hits(&flat, &rays) {
+            assert!(hit.color.distance(Vec3::X) < 1e-6, "{hit:?}");
+        }
+    }
+}
+
 /// Distance between the points of `sheet_with_slit`.
 const SLIT_SPACING: f32 = 0.05;
 
