@@ -1,6 +1,7 @@
 //! Estimates of normals, radii and structures from the neighbours of each point, as far as a cloud lacks them.
 
 use super::PointCloud;
+use super::below_roofs::narrow_to_roofs;
 use super::find_structures::{all_scattered, find_structures};
 use super::free_space::FreeSpace;
 use super::gaps::{close_gaps, is_by_gap};
@@ -12,8 +13,11 @@ use super::radius::{DistanceSample, RadiusReport, median_distance};
 use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
 use super::scan_grid::ScanGrids;
 use super::scan_rings::ScanRings;
+use super::sparse_walls::find_sparse_walls;
 use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
 use super::structure_votes::{Voters, voters_among};
+use super::typical::{Typical, quantile};
+use super::up::is_mostly_land;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -174,9 +178,19 @@ pub fn find_shapes<'a>(
     if 0 < narrowed.n_lines {
         found = StructureReport::of(&shapes);
     }
+    let is_land = is_mostly_land(&cloud.positions);
+    if let (true, Some((fits, _))) = (is_land, &*fits) {
+        let typical = Typical::of(fits, radii);
+        let noise = typical.noise() * typical.radius;
+        find_sparse_walls(&cloud.positions, noise, typical.radius, &mut shapes, progress)?;
+        found = StructureReport::of(&shapes);
+    }
     // Those between rings are closed already.
     if !is_by_gap.is_empty() && rings.is_none() {
         close_gaps(&tree, radii, is_by_gap, &free_space, &mut shapes, progress)?;
+    }
+    if is_land {
+        narrow_to_roofs(&cloud.positions, quantile(radii, 0.5), &mut shapes, progress)?;
     }
     if let (StructureChoice::Auto, Some((fits, _))) = (preparation.structure, fits) {
         for (fit, shape) in fits.iter_mut().zip(&shapes) {

@@ -5,13 +5,14 @@
 
 use super::neighbors::KdTree;
 use super::octants::{Octants, octant};
+use super::plan_cells::{PlanCell, PlanCells};
 use super::solids::settle;
 use super::structure::{PointShape, Structure};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
 use rayon::prelude::*;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 /// Number of points nearest to a disc as seen from above, among which the land is sought.
 const N_AROUND: usize = 96;
@@ -54,9 +55,8 @@ pub fn open_see_through_discs(
     if candidates.is_empty() {
         return Ok(());
     }
-    let around = lowest.cells_around(candidates.iter().map(|point| positions[*point]));
-    let is_around = |position: &&Vec3| around.contains(&lowest.cell(**position));
-    let near: Vec<Vec3> = positions.par_iter().filter(is_around).copied().collect();
+    let near = lowest.plan.points_near(positions, candidates.iter().map(|point| positions[*point]));
+    let near: Vec<Vec3> = near.into_iter().map(|point| positions[point as usize]).collect();
     let plan: Vec<Vec3> = near.iter().map(|position| position.with_z(0.0)).collect();
     let plan = KdTree::new(&plan, progress)?;
     let is_open = |point: &usize| -> Result<bool> {
@@ -91,39 +91,26 @@ fn sees_land(plan: &KdTree, near: &[Vec3], own: Vec3, min_height: f32, min_dista
     !sides.has_gap(MIN_EMPTY)
 }
 
-/// The heights of the lowest points in the cells of a grid in X and Y, of at most [`MAX_SAMPLE`] points.
+/// The heights of the lowest points in the cells of the ground plan, of at most [`MAX_SAMPLE`] points.
 struct LowestPoints {
-    cells: HashMap<[i64; 2], f32>,
-    width: f32,
+    plan: PlanCells,
+    cells: HashMap<PlanCell, f32>,
 }
 
 impl LowestPoints {
     fn new(positions: &[Vec3], width: f32) -> Self {
-        let mut lowest = Self { cells: HashMap::new(), width };
+        let mut lowest = Self { plan: PlanCells { width }, cells: HashMap::new() };
         for position in positions.iter().step_by(positions.len().div_ceil(MAX_SAMPLE).max(1)) {
-            let cell = lowest.cell(*position);
+            let cell = lowest.plan.of(*position);
             let height = lowest.cells.entry(cell).or_insert(f32::INFINITY);
             *height = height.min(position.z);
         }
         lowest
     }
 
-    fn cell(&self, position: Vec3) -> [i64; 2] {
-        [position.x, position.y].map(|coordinate| (coordinate / self.width).floor() as i64)
-    }
-
-    /// Returns the cells of positions and those next to them.
-    fn cells_around(&self, positions: impl Iterator<Item = Vec3>) -> HashSet<[i64; 2]> {
-        let own: HashSet<[i64; 2]> = positions.map(|position| self.cell(position)).collect();
-        let next = |[x, y]: [i64; 2]| {
-            (0..9).map(move |i| [x.saturating_add(i % 3 - 1), y.saturating_add(i / 3 - 1)])
-        };
-        own.into_iter().flat_map(next).collect()
-    }
-
     /// Returns the height of the lowest point in the cell of a position.
     fn around(&self, position: Vec3) -> f32 {
-        self.cells.get(&self.cell(position)).copied().unwrap_or(position.z)
+        self.cells.get(&self.plan.of(position)).copied().unwrap_or(position.z)
     }
 }
 
