@@ -1,4 +1,4 @@
-//! Cameras of glTF files: which one is used, its focal point, and its keys in a dry run.
+//! Cameras of glTF files: which one is used, its focal point, and its keys in a dry run; and views from within.
 
 use super::common::{Folder, SMALL, fail, gltf_with_cameras, read_png, shot, succeed};
 use serde_json::{Value, json};
@@ -205,4 +205,28 @@ fn the_camera_stands_at_a_named_station() {
     assert!(both.contains("camera-position") || both.contains("camera.position"), "{both}");
     let info = succeed(&["info", &file]);
     assert!(info.contains("scan 2") && info.contains("4 points, scanner at 50, 0, 1"), "{info}");
+}
+
+#[test]
+fn a_tunnel_is_shown_from_within_unless_an_option_says_otherwise() {
+    let folder = Folder::new();
+    // A pipe of 60 units, 4 wide, with two rails.
+    let place = |i: usize| {
+        let (x, angle) = ((i % 600) as f64 * 0.1, (i / 600) as f64 * 0.1);
+        format!("{x} {} {}\n", 2.0 * angle.sin(), 2.0 * angle.cos())
+    };
+    let rail = |i: usize| format!("{} {} -1\n", (i / 2) as f64 * 0.1, (i % 2) as f64 - 0.5);
+    let text: String = (0..600 * 63).map(place).chain((0..1200).map(rail)).collect();
+    let file = folder.write("tunnel.xyz", text);
+    let position = |options: &[&str]| {
+        let camera = dry_run_camera("render", &file, options);
+        let position: Vec<f64> = serde_json::from_value(camera["position"].clone()).unwrap();
+        position
+    };
+    let within = position(&[]);
+    assert!((0.0..60.0).contains(&within[0]) && within[1].hypot(within[2]) < 0.5, "{within:?}");
+    for options in [["--camera-interior", "off"], ["--camera-elevation-angle", "30"]] {
+        let outside = position(&options);
+        assert!(2.5 < outside[1].hypot(outside[2]), "{outside:?}");
+    }
 }

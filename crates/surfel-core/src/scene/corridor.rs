@@ -45,7 +45,7 @@ pub(super) fn view_along(points: &[Vec3], other: DVec3, fit: &CameraFit) -> Opti
 }
 
 /// Returns the horizontal direction in which the points extend most, if they are a corridor.
-fn long_axis(points: &[Vec3], up: Vec3) -> Option<Vec3> {
+pub(super) fn long_axis(points: &[Vec3], up: Vec3) -> Option<Vec3> {
     let (east, north) = ground_axes(up);
     let count = points.len().max(1) as f64;
     let ground = || points.iter().map(|p| (f64::from(p.dot(east)), f64::from(p.dot(north))));

@@ -6,6 +6,8 @@ mod camera_fit;
 mod turntable;
 mod inliers;
 mod corridor;
+mod inside_view;
+mod tunnel;
 mod auto_viewpoint;
 mod auto_camera;
 mod environment;
@@ -40,13 +42,15 @@ pub use environment::{Environment, EnvironmentArrays};
 pub use graph::{Geometry, Graph, Joint, Node, Primitive, Transform};
 pub use ground::north;
 pub use inliers::inlier_bounds;
+pub use inside_view::InsideView;
 pub use interior::{Room, find_room};
 pub use light::{Light, PunctualLight, PunctualLightKind, Sky, Sun};
 pub use material::{AlphaMode, Material, MaterialTextures};
 pub use mesh::Mesh;
-pub use station::{StationView, find_depth_camera, find_station, view_from_station};
+pub use station::{find_depth_camera, find_station, view_from_station};
 pub use sunlit::sunlit_fraction;
 pub use texture::{Texture, TextureEncoding, TextureRef, Wrap};
+pub use tunnel::find_tunnel;
 
 pub use crate::points::{Morph, Skin};
 

@@ -1,10 +1,10 @@
 //! Stations: the place from which one scanner or depth camera measured a cloud in its own coordinates.
 
-use super::camera::{Camera, Projection};
 use super::direction_cells::{
     PolarPoint, density_slope, fraction_behind, polar_points, spread_within_cells,
 };
 use super::ground::ground_axes;
+use super::inside_view::InsideView;
 use crate::math::{Aabb, DVec3, Vec3};
 use crate::points::{MAX_CAMERA_SLOPE, PointCloud, is_valid_position};
 use std::f32::consts::TAU;
@@ -39,37 +39,10 @@ const WINDOW_DEG: usize = 90;
 /// Vertical angle of view in degrees: wider than for objects, as things all around are near.
 const VIEW_ANGLE_DEG: f64 = 60.0;
 
-/// The view from the station of a scan.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StationView {
-    /// World position of the scanner.
-    pub position: DVec3,
-    /// Horizontal unit vector into the longest view.
-    pub direction: DVec3,
-    /// Median distance of the points.
-    pub distance: f64,
-    /// Vertical angle of view in degrees.
-    pub view_angle_deg: f64,
-}
-
-impl StationView {
-    /// Returns the camera at the station, with its own view unless `view_angle_deg` is given.
-    pub fn camera(&self, up: Vec3, view_angle_deg: Option<f64>) -> Camera {
-        Camera {
-            position: self.position,
-            focal_point: self.position + self.distance * self.direction,
-            view_up: up.as_dvec3(),
-            projection: Projection::Perspective {
-                view_angle_deg: view_angle_deg.unwrap_or(self.view_angle_deg),
-            },
-        }
-    }
-}
-
 /// Returns the station of `cloud`, which is at the place that its file states or else at the zero of its world
 /// coordinates, or `None` if its points are not those of a scanner that stood there: they surround it, at many
 /// distances, and are dense in angle rather than in area.
-pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
+pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
     let position = match &cloud.stations[..] {
         [station] => station.position.unwrap_or_default(),
         _ => DVec3::ZERO,
@@ -88,7 +61,7 @@ pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
         && density_slope(&points)? < MAX_DENSITY_SLOPE
         && spread_within_cells(&points) < MAX_SPREAD_WITHIN_CELLS
         && fraction_behind(&points) < MAX_BEHIND;
-    is_scan.then(|| StationView {
+    is_scan.then(|| InsideView {
         position,
         direction: longest_view(&points, median, up),
         distance: median.into(),
@@ -98,7 +71,7 @@ pub fn find_station(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
 
 /// Returns the view from a station of `cloud` along its longest view, or `None` if its position is not known. Without
 /// points, the view is to the north.
-pub fn view_from_station(cloud: &PointCloud, station_idx: usize, up: Vec3) -> Option<StationView> {
+pub fn view_from_station(cloud: &PointCloud, station_idx: usize, up: Vec3) -> Option<InsideView> {
     let station = cloud.stations.get(station_idx)?;
     let position = station.position?;
     let scan_of = cloud.scan_of_point();
@@ -108,7 +81,7 @@ pub fn view_from_station(cloud: &PointCloud, station_idx: usize, up: Vec3) -> Op
     let points: Vec<Vec3> = points.collect();
     let points = polar_points((position - cloud.origin).as_vec3(), &points, up);
     let [_, median, _] = distances(&points).unwrap_or([1.0; 3]);
-    Some(StationView {
+    Some(InsideView {
         position,
         direction: longest_view(&points, median, up),
         distance: median.into(),
@@ -118,7 +91,7 @@ pub fn view_from_station(cloud: &PointCloud, station_idx: usize, up: Vec3) -> Op
 
 /// Returns the view of the depth camera at the zero of the world coordinates of `cloud`, which looks along +Z with -Y
 /// up, or `None` if its points are not those that such a camera measured.
-pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
+pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<InsideView> {
     let zero = (-cloud.origin).as_vec3();
     let points = sample(cloud);
     if up != Vec3::NEG_Y || points.len() < MIN_POINTS {
@@ -137,7 +110,7 @@ pub fn find_depth_camera(cloud: &PointCloud, up: Vec3) -> Option<StationView> {
     let [near, median, far] = distances(&points)?;
     let is_scan =
         MIN_CAMERA_DISTANCE_RATIO * near <= far && density_slope(&points)? < MAX_DENSITY_SLOPE;
-    is_scan.then(|| StationView {
+    is_scan.then(|| InsideView {
         position: DVec3::ZERO,
         direction: DVec3::Z,
         distance: median.into(),
@@ -336,7 +309,7 @@ mod tests {
             ..ScanStation::default()
         }];
         let station = find_station(&cloud, Vec3::Z).unwrap();
-        assert_eq!(station, StationView { position: moved, ..zero_based });
+        assert_eq!(station, InsideView { position: moved, ..zero_based });
         cloud.stations.push(unknown);
         let column = Values::U16((0..cloud.len()).map(|i| (i % 2) as u16).collect());
         cloud.scalars = vec![Scalar { name: STATION.into(), values: column }];

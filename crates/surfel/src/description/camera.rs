@@ -67,7 +67,8 @@ settings! {
         /// Moves the chosen camera nearer (above 1) or farther away.
         zoom_factor: f64 = 1.0, POSITIVE, "FACTOR";
         /// Hides the walls and the ceiling of a room that stand between its inside and the camera: auto (rooms with
-        /// furniture or other content), on (empty rooms too) or off. Only auto shows single scans from their station.
+        /// furniture or other content), on (empty rooms too) or off. Only auto shows single scans from their station
+        /// and tunnels from within.
         interior: Interior = Interior::Auto, OneOf(INTERIORS), "WHEN";
         /// Keeps the camera where it is, even if the scene animates it.
         lock: bool = false, Flag, "";

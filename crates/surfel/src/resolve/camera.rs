@@ -7,7 +7,7 @@ use surfel_core::math::{Aabb, DVec3, Vec3};
 use surfel_core::points::{PointCloud, UpConvention, infer_up};
 use surfel_core::progress::Progress;
 use surfel_core::scene::{
-    Camera, CameraFit, Graph, Projection, Room, StationView, default_view_up, fit_camera,
+    Camera, CameraFit, Graph, InsideView, Projection, Room, default_view_up, fit_camera,
     panorama_camera,
 };
 use surfel_formats::FileInfo;
@@ -37,8 +37,8 @@ pub struct SceneExtent<'a> {
     pub up: Vec3,
     /// The room that the points show, if its inside is to be seen.
     pub room: Option<&'a Room>,
-    /// The station from which the scene is shown.
-    pub station: Option<&'a StationView>,
+    /// The view from within the scene by which it is shown.
+    pub inside: Option<&'a InsideView>,
 }
 
 impl SceneCamera {
@@ -50,26 +50,19 @@ impl SceneCamera {
         motion: Option<CameraMotion>,
         progress: &dyn Progress,
     ) -> Self {
-        let SceneExtent { points, bounds, up, room, station } = *extent;
+        let SceneExtent { points, bounds, up, room, inside } = *extent;
         let settings = &description.camera;
         let middle = points.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
         let view_angle_deg = settings.view_angle;
         let of_file = graph.camera().filter(|_| settings.is_automatic());
-        let camera = match (of_file, station) {
+        let camera = match (of_file, inside) {
             (Some((node, camera)), _) => {
                 let name = &graph.nodes[node].name;
                 let line = format!("camera `{name}` of the file");
                 progress.choice(&line, &["camera.name", "camera.position"]);
                 adjusted_file_camera(camera, middle, view_angle_deg)
             }
-            (None, Some(station)) => {
-                let [x, y, z] = station.position.to_array();
-                let line = format!(
-                    "camera at the scanner's station {x},{y},{z}: the points were measured from there"
-                );
-                progress.choice(&line, &["camera.position", "camera.interior"]);
-                station.camera(up, view_angle_deg)
-            }
+            (None, Some(view)) => view.camera(up, view_angle_deg),
             (None, None) => {
                 let (width, height) = description.picture.resolution();
                 let aspect = f64::from(width) / f64::from(height);

@@ -31,7 +31,8 @@ pub fn choose_room(
     room
 }
 
-fn has_splats(scene: &LoadedScene) -> bool {
+/// True if a cloud of the scene has trained splats.
+pub fn has_splats(scene: &LoadedScene) -> bool {
     scene.clouds().any(|(_, cloud)| cloud.has_gaussians())
 }
 

@@ -4,6 +4,7 @@ mod cloud;
 mod camera;
 mod interior;
 mod station;
+mod inside;
 mod spread;
 mod environment;
 mod point_size;
@@ -48,11 +49,12 @@ use crate::overlay::Overlay;
 use crate::progress_log::{Choice, ProgressLog};
 use camera::SceneExtent;
 use complete_description::complete_description;
+use inside::{Inside, choose_inside};
 use interior::{choose_room, hidden_ceiling, hidden_walls};
 use plan::{check_height_map, frame_plan};
 use point_size::choose_point_size;
 use spread::report_gaps;
-use station::{choose_station, stand_at_station};
+use station::stand_at_station;
 use sun_and_sky::{LightingContext, ScanInView, choose_lights, lights};
 use sun_position::stand_sun_at_date;
 use surfel_core::math::Vec3;
@@ -148,9 +150,9 @@ impl AutoSettings {
         let description = &description;
         report_gaps(&points, progress);
         let room = choose_room(scene, description, &points, up, progress);
-        let station = choose_station(scene, description, up, room.as_ref());
-        let (room_seen, station) = (room.as_ref(), station.as_ref());
-        let extent = SceneExtent { points: &points, bounds, up, room: room_seen, station };
+        let inside = choose_inside(scene, &points, description, up, room.as_ref(), progress);
+        let (room_seen, view) = (room.as_ref(), inside.as_ref().map(Inside::view));
+        let extent = SceneExtent { points: &points, bounds, up, room: room_seen, inside: view };
         let motion = camera_motion(description)?;
         let camera = SceneCamera::choose(&scene.graph, &extent, description, motion, progress);
         let diagonal = (bounds.max - bounds.min).length();
@@ -159,8 +161,9 @@ impl AutoSettings {
             Some(room) => hidden_ceiling(room, &camera.camera, progress),
             None => hidden_walls(room.as_ref(), &camera.camera, progress),
         };
-        let is_inside = room.is_some_and(|room| room.contains(camera.camera.position));
-        let scan = station.map(|station| ScanInView { points: &points, station });
+        let is_inside = matches!(inside, Some(Inside::Tunnel(_)))
+            || room.is_some_and(|room| room.contains(camera.camera.position));
+        let scan = view.map(|view| ScanInView { points: &points, view });
         let has_normals = scene.has_normals(description);
         let context =
             LightingContext { camera: camera.camera, up, diagonal, is_inside, has_normals, scan };

@@ -1,32 +1,10 @@
-//! Views from the stations of scans: from the one that is asked for, and of single scans from their own.
+//! Views from the stations of scans that files state.
 
 use super::loaded::LoadedScene;
-use crate::description::{CameraSettings, Interior, Invalid, SceneDescription};
+use crate::description::{CameraSettings, Invalid};
 use surfel_core::math::{DAffine3, DQuat, Vec3};
 use surfel_core::points::PointCloud;
-use surfel_core::scene::{Room, StationView, find_depth_camera, find_station, view_from_station};
-
-/// Returns the station from which the scene is shown: that of a single cloud that stands still, if nothing is asked of
-/// the camera.
-///
-/// Turntables and rooms that do not contain the station are shown from outside.
-pub fn choose_station(
-    scene: &LoadedScene,
-    description: &SceneDescription,
-    up: Vec3,
-    room: Option<&Room>,
-) -> Option<StationView> {
-    let camera = &description.camera;
-    let is_open = camera.is_automatic() && camera.interior() == Interior::Auto;
-    let is_merged = scene.file_infos.len() != 1;
-    let is_turned = description.output.turntable.is_some();
-    if !is_open || is_merged || is_turned || scene.moves() || scene.graph.camera().is_some() {
-        return None;
-    }
-    let cloud = scene.single_cloud()?;
-    let station = find_station(cloud, up).or_else(|| find_depth_camera(cloud, up))?;
-    room.is_none_or(|room| room.contains(station.position)).then_some(station)
-}
+use surfel_core::scene::{InsideView, view_from_station};
 
 /// A station whose position is known, in the world of the scene.
 pub struct LocatedStation<'a> {
@@ -39,12 +17,12 @@ pub struct LocatedStation<'a> {
 
 impl LocatedStation<'_> {
     /// Returns the view along the longest view from the station.
-    pub fn view(&self, up: Vec3) -> Option<StationView> {
+    pub fn view(&self, up: Vec3) -> Option<InsideView> {
         let world = &self.world_from_cloud;
         let up = (world.matrix3.transpose() * up.as_dvec3()).normalize_or(up.as_dvec3());
         let view = view_from_station(self.cloud, self.station_idx, up.as_vec3())?;
         let ahead = world.transform_vector3(view.direction);
-        Some(StationView {
+        Some(InsideView {
             position: world.transform_point3(view.position),
             direction: ahead.normalize_or(view.direction),
             distance: view.distance * ahead.length(),

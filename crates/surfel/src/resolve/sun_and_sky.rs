@@ -6,7 +6,7 @@ use surfel_core::flat::{FlatPunctualLight, FlatScene};
 use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
-use surfel_core::scene::{Camera, Environment, Light, Sky, StationView, Sun, sunlit_fraction};
+use surfel_core::scene::{Camera, Environment, InsideView, Light, Sky, Sun, sunlit_fraction};
 use surfel_core::surface::SurfaceKind;
 
 /// Warm sun and bluish sky, which on level ground under the usual sun add up to white. The sky gives a third of the
@@ -42,16 +42,16 @@ pub struct LightingContext<'a> {
     pub is_inside: bool,
     /// True if points have normals of their own.
     pub has_normals: bool,
-    /// The scan that is shown from its station.
+    /// The scan that is shown from within.
     pub scan: Option<ScanInView<'a>>,
 }
 
-/// A scan that is shown from its station.
+/// A scan that is shown from within.
 pub struct ScanInView<'a> {
     /// The points of the scan.
     pub points: &'a PointCloud,
-    /// The view from its station.
-    pub station: &'a StationView,
+    /// The view from within.
+    pub view: &'a InsideView,
 }
 
 /// Returns the description with everything written into it that it leaves open about the lights of the whole scene.
@@ -65,7 +65,7 @@ pub fn choose_lights(
     let mut chosen = description.clone();
     let SceneDescription { light, sun, sky, .. } = &mut chosen;
     if is_lit && context.is_inside && light.light.is_none() && light.environment.is_none() {
-        progress.choice("headlight: the camera stands in a closed room", &["light"]);
+        progress.choice("headlight: the camera stands in a closed room or tunnel", &["light"]);
         light.light = Some(vec![LightKind::Headlight]);
     }
     let is_sun_open =
@@ -91,15 +91,15 @@ pub fn choose_lights(
     chosen
 }
 
-/// Returns true if the sun at its automatic place would reach hardly anything of what is shown from a scanner's station,
-/// as under a roof.
+/// Returns true if the sun at its automatic place would reach hardly anything of what is shown from within a scan, as
+/// under a roof.
 fn is_sun_hidden(context: &LightingContext) -> bool {
-    let Some(ScanInView { points, station }) = &context.scan else { return false };
+    let Some(ScanInView { points, view }) = &context.scan else { return false };
     let azimuth_deg = automatic_azimuth_deg(context) as f32;
     let elevation_deg = SunSettings::default().elevation() as f32;
     let to_sun = Sun::direction_from_angles(azimuth_deg, elevation_deg, context.up);
-    let position = (station.position - points.origin).as_vec3();
-    let ahead = station.direction.as_vec3();
+    let position = (view.position - points.origin).as_vec3();
+    let ahead = view.direction.as_vec3();
     sunlit_fraction(&points.positions, position, ahead, to_sun, context.up) < MIN_SUNLIT
 }
 
@@ -268,13 +268,13 @@ mod tests {
     fn a_scan_under_a_roof_is_lit_from_the_camera_unless_a_sun_is_asked_for() {
         let kinds = |has_ceiling: bool, azimuth: Option<f64>| {
             let points = scan(has_ceiling);
-            let station = StationView {
+            let view = InsideView {
                 position: DVec3::ZERO,
                 direction: DVec3::Y,
                 distance: 4.0,
                 view_angle_deg: 60.0,
             };
-            let scan = Some(ScanInView { points: &points, station: &station });
+            let scan = Some(ScanInView { points: &points, view: &view });
             let context = LightingContext { scan, ..context(DVec3::Y) };
             let mut description = SceneDescription::default();
             description.sun.azimuth = azimuth;
