@@ -40,6 +40,17 @@ const MAX_OVERHANG: f32 = 1.5;
 const MIN_RATIO: f32 = 2.0;
 /// Maximum width of a strip, as the ratio of its eigenvalues.
 const MAX_STRIP_WIDTH: f32 = 0.12;
+/// Minimum ratio of the radius of a disc to that of its nearest neighbours for more than one round.
+const MIN_WIDENING: f32 = 2.0;
+/// A fraction of one to this number of the neighbours may be dense points of a surface in the same plane.
+const MAX_DENSE: usize = 4;
+/// Number of rounds that tell a surface from a strip.
+const MIN_STRIP_ROUNDS: usize = 3;
+/// Width of the neighbours of such a round from which those of further rounds form no strip either.
+const MAX_WIDTH_OF_ROUND: f32 = 0.5;
+/// Maximum number of rounds in which the neighbours of neighbours are looked at. A pole, whose scan lines lie no farther
+/// apart than the points on them, is a strip and a surface.
+const N_STRIP_ROUNDS: usize = 8;
 /// Number of rounds: points that a round takes from a surface confirm no others in the next one.
 const N_ROUNDS: usize = 2;
 
@@ -174,7 +185,7 @@ fn narrow(
         if disc.neighbors.len() < MIN_CONFIRMING {
             settle(tree, point, radii[point], disc.otherwise, &mut shape);
             shape.radius = shape.radius.min(typical_radius);
-        } else if is_strip(positions, disc, &wide, shapes) {
+        } else if is_strip(positions, disc, radii[point], &wide, shapes) {
             settle(tree, point, radii[point], Structure::Line, &mut shape);
         } else {
             shape.radius = shape.radius.min(MAX_OVERHANG * disc.reach(positions));
@@ -189,25 +200,44 @@ fn narrow(
     Ok(())
 }
 
-/// True if the neighbours of a disc and their neighbours form a strip, as the points of two wires do: a surface of scan
-/// lines is wider the farther one looks.
-fn is_strip(positions: &[Vec3], disc: &WideDisc, wide: &WideDiscs, shapes: &[PointShape]) -> bool {
-    let normal = shapes[disc.point as usize].normal;
-    let mut around = disc.neighbors.clone();
-    for neighbor in &disc.neighbors {
-        match wide.of_point(*neighbor) {
-            Some(other) => around.extend(&other.neighbors),
-            None if MIN_COSINE < shapes[*neighbor as usize].normal.dot(normal).abs() => {
-                return false;
-            }
-            None => {}
+/// True if the neighbours of a disc, their neighbours and so on form a strip, as the points of two wires do: a surface of
+/// scan lines is wider the farther one looks.
+fn is_strip(
+    positions: &[Vec3],
+    disc: &WideDisc,
+    radius: f32,
+    wide: &WideDiscs,
+    shapes: &[PointShape],
+) -> bool {
+    let PointShape { normal, radius: widened, .. } = shapes[disc.point as usize];
+    let n_rounds = if MIN_WIDENING * radius < widened { N_STRIP_ROUNDS } else { 1 };
+    let (mut around, mut last) = (disc.neighbors.clone(), disc.neighbors.clone());
+    for round in 1..=n_rounds {
+        let is_dense_surface = |neighbor: &&u32| {
+            wide.of_point(**neighbor).is_none()
+                && MIN_COSINE < shapes[**neighbor as usize].normal.dot(normal).abs()
+        };
+        if last.len() < MAX_DENSE * last.iter().filter(is_dense_surface).count() {
+            return false;
         }
+        let discs = last.iter().filter_map(|neighbor| wide.of_point(*neighbor));
+        let mut next: Vec<u32> = discs.flat_map(|disc| disc.neighbors.iter().copied()).collect();
+        next.sort_unstable();
+        next.dedup();
+        next.retain(|neighbor| !around.contains(neighbor));
+        around.extend(&next);
+        let neighbor = |index: &u32| Neighbor { index: *index, distance_squared: 0.0 };
+        let neighbors: Vec<Neighbor> = around.iter().map(neighbor).collect();
+        let width = fit_plane(positions, disc.point as usize, &neighbors).width;
+        if width < MAX_STRIP_WIDTH {
+            return true;
+        }
+        if MIN_STRIP_ROUNDS <= round && MAX_WIDTH_OF_ROUND < width {
+            return false;
+        }
+        last = next;
     }
-    around.sort_unstable();
-    around.dedup();
-    let neighbor = |index: u32| Neighbor { index, distance_squared: 0.0 };
-    let around: Vec<Neighbor> = around.into_iter().map(neighbor).collect();
-    fit_plane(positions, disc.point as usize, &around).width < MAX_STRIP_WIDTH
+    false
 }
 
 /// Returns the surface points of more than a radius whose discs were not widened.
@@ -328,6 +358,42 @@ mod tests {
         let (cloud, _) = prepared(points);
         let n_wide = cloud.radii()[..200].iter().filter(|radius| 2.0 < **radius).count();
         assert_eq!(n_wide, 0);
+    }
+
+    #[test]
+    fn wires_with_dense_points_do_not_become_sheets() {
+        // Number of wires, distance between them and between their points.
+        for (n_wires, gap, step) in [(2, 0.5, 0.02), (3, 1.0, 0.07)] {
+            let mut random = Random::new(5, 0);
+            let mut noise = || 0.01 * random.next_gaussian() as f32;
+            let n_points = (24.0 / step) as usize * n_wires;
+            let mut points: Vec<Vec3> = (0..n_points)
+                .map(|i| {
+                    let along = step * (i / n_wires) as f32 + noise();
+                    Vec3::new(along, gap * (i % n_wires) as f32 + noise(), 6.0 + noise())
+                })
+                .collect();
+            points.extend(plane().iter().map(|point| 30.0 * (*point - Vec3::new(0.0, 0.5, 0.0))));
+            let (_, structures) = prepared(points);
+            let wires = structures[..n_points].iter();
+            let n_lines = wires.filter(|kind| **kind == Structure::Line).count();
+            assert!(8 * n_points < 10 * n_lines, "{n_lines} of {n_points}, {gap} apart");
+        }
+    }
+
+    #[test]
+    fn a_pole_of_a_few_scan_lines_is_a_surface() {
+        // Half of a round pole, 0.1 thick and 3 high, of points that are 0.01 apart on lines 0.04 apart.
+        let point = |i: usize| {
+            let (sin, cos) = (0.8 * (i % 5) as f32 - 1.6).sin_cos();
+            Vec3::new(0.05 * sin, 0.05 * cos, 0.01 * (i / 5) as f32)
+        };
+        let mut points: Vec<Vec3> = (0..1500).map(point).collect();
+        points.extend(plane().iter().map(|point| *point - Vec3::new(0.5, 0.5, 0.0)));
+        let (_, structures) = prepared(points);
+        let pole = structures[..1500].iter();
+        let n_lines = pole.filter(|kind| **kind == Structure::Line).count();
+        assert!(n_lines < 150, "{n_lines}");
     }
 
     #[test]

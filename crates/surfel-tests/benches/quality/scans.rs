@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use std::time::Instant;
 use surfel_core::image::Image;
 use surfel_core::math::Vec3;
-use surfel_core::points::{PointCloud, Preparation};
+use surfel_core::points::{PointCloud, Preparation, select_points};
 use surfel_core::progress::NoProgress;
 use surfel_core::scanner::Instrument;
 use surfel_core::scanner::scenes::NamedScene;
@@ -128,6 +128,8 @@ fn compare_surfaces(
         let points = scenes::prepared(cloud.clone(), &Preparation::default(), *kind);
         report_secs(case.name, &format!("{surface} prepared"), begin);
         if selection.written_clouds.is_some() {
+            let preparation = Preparation::default();
+            let (cloud, _) = select_points(cloud.clone(), &preparation, &NoProgress).unwrap();
             let cloud = with_normals(cloud, points.cloud(), scene, &*case.instrument);
             reconstruction::write_cloud(selection, case.name, &cloud);
         }
@@ -142,10 +144,10 @@ fn compare_surfaces(
     compared
 }
 
-/// Returns the scan with the normals of its prepared form, turned toward a position from which the instrument saw the
+/// Returns the selected points of a scan with the normals of their prepared form, turned toward a position from which the instrument saw the
 /// point: another program needs oriented normals, which it cannot tell without these positions.
 fn with_normals(
-    cloud: &PointCloud,
+    cloud: PointCloud,
     prepared: &PointCloud,
     scene: &NamedScene,
     instrument: &dyn Instrument,
@@ -161,7 +163,7 @@ fn with_normals(
     };
     let normals = prepared.normals.as_deref().unwrap_or_default();
     let normals = normals.par_iter().enumerate().map(toward_instrument).collect();
-    PointCloud { normals: Some(normals), ..cloud.clone() }
+    PointCloud { normals: Some(normals), ..cloud }
 }
 
 fn report_secs(case: &str, done: &str, begin: Instant) {
