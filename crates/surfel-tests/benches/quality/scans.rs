@@ -30,7 +30,7 @@ struct ScanCase {
     instrument: Box<dyn Instrument>,
 }
 
-fn all_scans() -> [ScanCase; 8] {
+fn all_scans() -> [ScanCase; 9] {
     fn case(
         name: &'static str,
         title: &'static str,
@@ -48,6 +48,7 @@ fn all_scans() -> [ScanCase; 8] {
             street::terrestrial(STEP_DEG),
         ),
         case("street-spinning", "Street, spinning laser", street::scene, street::spinning()),
+        case("street-standing", "Street, one revolution", street::scene, street::standing()),
         case("street-airborne", "Street, airborne", street::scene, street::airborne()),
         case(
             "forest-terrestrial",

@@ -5,16 +5,16 @@ use super::returns::{Return, into_cloud};
 use crate::error::Result;
 use crate::math::DVec3;
 use crate::math::Random;
-use crate::points::{PointCloud, Scalar, Values};
+use crate::points::{PointCloud, Scalar, ScanStation, Values};
 use crate::progress::Progress;
 use crate::scanner::sdf::{DRay, SdfScene};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// A spinning laser scanner and the path that it is driven along.
+/// A spinning laser scanner and the path that it is driven along, or the place where it stands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpinningLidar {
-    /// Corners of the path, at the height of the scanner.
+    /// Corners of the path, at the height of the scanner; the only one where it stands.
     pub path: Vec<DVec3>,
     /// Speed in metres per second.
     pub speed: f64,
@@ -97,7 +97,8 @@ impl SpinningLidar {
 }
 
 impl Instrument for SpinningLidar {
-    /// Returns points ordered by time, then ring, with the columns `ring` and `gps_time`.
+    /// Returns points ordered by time, then ring, with the columns `ring` and `gps_time`. A scanner that stands gives one
+    /// revolution, with its station.
     fn scan(&self, scene: &SdfScene, progress: &dyn Progress) -> Result<PointCloud> {
         check_positive("speed", self.speed)?;
         check_positive("rotation_hz", self.rotation_hz)?;
@@ -120,6 +121,10 @@ impl Instrument for SpinningLidar {
         let mut cloud = into_cloud(&returns, DVec3::ZERO, false);
         cloud.scalars.push(Scalar { name: "ring".to_owned(), values: Values::U8(rings) });
         cloud.scalars.push(Scalar { name: "gps_time".to_owned(), values: Values::F64(times) });
+        if let [position] = self.path[..] {
+            let position = Some(position);
+            cloud.stations = vec![ScanStation { position, ..ScanStation::default() }];
+        }
         Ok(cloud)
     }
 

@@ -72,6 +72,11 @@ pub fn spinning() -> SpinningLidar {
     SpinningLidar { path, speed: 12.0, ..SpinningLidar::default() }
 }
 
+/// Returns one revolution of the spinning scanner on the car, which stands.
+pub fn standing() -> SpinningLidar {
+    SpinningLidar { path: vec![DVec3::new(0.0, -1.2, 1.8)], n_azimuths: 2048, ..spinning() }
+}
+
 /// Returns two flight lines across the street.
 pub fn airborne() -> AirborneLidar {
     let line =
