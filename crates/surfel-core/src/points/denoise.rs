@@ -13,6 +13,7 @@ use super::noise::{GROUP_SIZE, Noise};
 use super::normals::fit_plane;
 use super::radius::format_length;
 use super::up::is_mostly_land;
+use super::wall_faces::{Face, N_FACE_NEIGHBORS};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -27,6 +28,8 @@ const MIN_NEIGHBORS: f32 = 12.0;
 const MAX_NEIGHBORS: f32 = 2048.0;
 /// Number of neighbours from which means of groups of points stand for them.
 const MIN_GROUPED: u32 = 96;
+/// Surface variation above which the neighbours may be on both faces of a thin wall.
+const MIN_UNEVEN: f32 = 0.06;
 /// Number of rounds in which normals are averaged.
 const N_NORMAL_ROUNDS: usize = 2;
 /// Number of times that a point moves.
@@ -180,21 +183,38 @@ fn moved(
             progress.advance(1024.min(positions.len() - point) as u64);
         }
         let count = counts[point];
-        Ok(match count {
-            0 => (*position, Vec3::ZERO),
-            _ if count < MIN_GROUPED => {
-                let (normal, noise) = (points.normals[point], noises[point].unwrap_or_default());
-                let jet = fit_wide_jet(tree, point, normal, noise);
-                let normal = jet.map_or(Vec3::ZERO, |jet| jet.normal);
-                (points.moved(*position, count, 1.0), normal)
-            }
-            _ => {
-                let count = count.div_ceil(GROUP_SIZE as u32);
-                (groups.moved(*position, count, GROUP_SIZE as f32), Vec3::ZERO)
-            }
-        })
+        let is_grouped = MIN_GROUPED <= count;
+        let layer = if is_grouped { &groups } else { &points };
+        if count == 0 {
+            return Ok((*position, Vec3::ZERO));
+        }
+        if layer.is_uneven_at(*position)
+            && let Some(moved) = moved_onto_face(tree, point)
+        {
+            return Ok((moved, Vec3::ZERO));
+        }
+        if is_grouped {
+            let count = count.div_ceil(GROUP_SIZE as u32);
+            return Ok((groups.moved(*position, count, GROUP_SIZE as f32), Vec3::ZERO));
+        }
+        let (normal, noise) = (points.normals[point], noises[point].unwrap_or_default());
+        let jet = fit_wide_jet(tree, point, normal, noise);
+        let normal = jet.map_or(Vec3::ZERO, |jet| jet.normal);
+        Ok((points.moved(*position, count, 1.0), normal))
     };
     positions.par_iter().enumerate().map(moved).collect()
+}
+
+/// Returns a point of a thin wall moved onto its own face, or `None` where its neighbours show none.
+fn moved_onto_face(tree: &KdTree, point: usize) -> Option<Vec3> {
+    let positions = tree.positions();
+    let position = positions[point];
+    let neighbors = tree.nearest(position, N_FACE_NEIGHBORS, Some(point as u32));
+    let face = Face::of(positions, point, &neighbors)?;
+    let height = |other: &Neighbor| face.normal.dot(positions[other.index as usize] - position);
+    let sum: f32 = face.points.iter().map(height).sum();
+    // The point itself has no height.
+    Some(position + sum / (face.points.len() + 1) as f32 * face.normal)
 }
 
 /// Points, or means of points, with normals that are averaged over neighbours of similar normals.
@@ -204,6 +224,8 @@ struct Layer<'a> {
     counts: Vec<u32>,
     /// Unit normals of either sign, zero if unknown.
     normals: Vec<Vec3>,
+    /// True if no plane fits the neighbours.
+    is_uneven: Vec<bool>,
 }
 
 impl<'a> Layer<'a> {
@@ -212,17 +234,25 @@ impl<'a> Layer<'a> {
         let normal = |(point, count): (usize, &u32)| {
             progress.check()?;
             if *count == 0 {
-                return Ok(Vec3::ZERO);
+                return Ok((Vec3::ZERO, false));
             }
             let neighbors = tree.nearest(positions[point], *count as usize, Some(point as u32));
-            Ok(fit_plane(positions, point, &neighbors).normal)
+            let fit = fit_plane(positions, point, &neighbors);
+            Ok((fit.normal, MIN_UNEVEN < fit.variation))
         };
-        let normals = counts.par_iter().enumerate().map(normal).collect::<Result<_>>()?;
-        let mut layer = Self { tree, counts, normals };
+        let found = counts.par_iter().enumerate().map(normal).collect::<Result<Vec<_>>>()?;
+        let (normals, is_uneven) = found.into_iter().unzip();
+        let mut layer = Self { tree, counts, normals, is_uneven };
         for _ in 0..N_NORMAL_ROUNDS {
             layer.normals = layer.averaged_normals(progress)?;
         }
         Ok(layer)
+    }
+
+    /// True if no plane fits the neighbours of the nearest point.
+    fn is_uneven_at(&self, position: Vec3) -> bool {
+        let nearest = self.tree.nearest(position, 1, None);
+        nearest.first().is_some_and(|nearest| self.is_uneven[nearest.index as usize])
     }
 
     fn averaged_normals(&self, progress: &dyn Progress) -> Result<Vec<Vec3>> {

@@ -22,6 +22,7 @@ use super::structure_votes::{Voters, smoothed};
 use super::typical::Typical;
 use super::up::is_mostly_land;
 use super::vegetation::{is_vegetated, land_normal};
+use super::wall_faces::join_faces;
 use super::wide_discs::{limit_crowded_discs, narrow_lone_discs};
 use crate::error::Result;
 use crate::math::Vec3;
@@ -68,6 +69,7 @@ pub fn find_structures(
     let above_land: Vec<usize> =
         (0..decided.len()).filter(|point| decided[*point].is_above_land).collect();
     let mut shapes: Vec<PointShape> = decided.into_iter().map(|decision| decision.shape).collect();
+    join_faces(tree, &mut shapes, progress)?;
     join_to_surfaces(tree, typical.noise(), &mut shapes, progress)?;
     let n_rough = fits.par_iter().filter(|fit| !is_line(fit) && !is_surface(fit)).count();
     let widened = match rings {

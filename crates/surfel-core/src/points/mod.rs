@@ -21,6 +21,7 @@ mod subsample;
 mod outliers;
 mod structure;
 mod vegetation;
+mod wall_faces;
 mod depth_steps;
 mod noise;
 mod denoise;
