@@ -5,6 +5,7 @@ use crate::stats;
 use rayon::current_num_threads;
 #[cfg(feature = "gpu")]
 use surfel_core::bytes::readable;
+use surfel_core::words::counted;
 
 /// Arguments of `surfel devices`.
 #[derive(clap::Args, Debug)]
@@ -19,7 +20,8 @@ Examples:
 
 /// Lists the processor and all GPUs.
 pub fn run(_: &Args) -> anyhow::Result<()> {
-    let mut lines = vec![format!("cpu  {}, {} threads", stats::device(), current_num_threads())];
+    let mut lines =
+        vec![format!("cpu  {}, {}", stats::device(), counted(current_num_threads(), "thread"))];
     lines.extend(gpu_lines());
     Ok(print(&lines.join("\n"))?)
 }

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use surfel::SceneDescription;
 use surfel::prepare::{PrepareOptions, prepare_files};
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 use surfel_formats::{Loaded, SaveOptions};
 
 /// Arguments of `surfel prepare`.
@@ -70,6 +71,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let options = SaveOptions::from_source(&info);
     surfel_formats::save(&args.output, &cloud, &options, report)?;
     report.end();
-    report.note(&format!("{}: {} points", args.output.display(), cloud.len()));
+    let points = counted(cloud.len(), "point");
+    report.note(&format!("{}: {points}", args.output.display()));
     Ok(())
 }

@@ -15,6 +15,7 @@ use surfel::description::Backend;
 use surfel::resolve::{AutoSettings, KeepOptions, LoadedScene, report_coverage};
 use surfel_core::progress::Progress;
 use surfel_core::trace::Simd;
+use surfel_core::words::counted;
 
 /// Arguments of `surfel render`.
 #[derive(clap::Args, Debug)]
@@ -126,7 +127,8 @@ pub fn render_to_file(
 
 /// Reports the threads and the SIMD level.
 pub fn report_threads(simd: Simd, progress: &dyn Progress) {
-    let line = format!("{} threads, {}", rayon::current_num_threads(), simd.name());
+    let threads = counted(rayon::current_num_threads(), "thread");
+    let line = format!("{threads}, {}", simd.name());
     progress.choice(&line, &["threads"]);
 }
 

@@ -40,6 +40,7 @@
 
 mod error;
 pub mod bytes;
+pub mod words;
 pub mod math;
 pub mod progress;
 pub mod image;

@@ -19,9 +19,8 @@ use surfel_core::bvh::MAX_DEPTH;
 use surfel_core::flat::{MAX_KD_DEPTH, MAX_OCTREE_DEPTH};
 use surfel_core::integrator::constants as integrator;
 use surfel_core::math::eigen_lanes as eigen;
-use surfel_core::points::HARMONIC_0;
+use surfel_core::points::{CAPSULE_ASPECT, HARMONIC_0};
 use surfel_core::surface::align;
-use surfel_core::surface::capsule;
 use surfel_core::surface::disc;
 use surfel_core::surface::edge_test;
 use surfel_core::surface::gaussian;
@@ -170,7 +169,7 @@ fn dimensions() -> Vec<(&'static str, u32)> {
 
 fn floats() -> Vec<(&'static str, f32)> {
     vec![
-        ("CAPSULE_ASPECT", capsule::ASPECT),
+        ("CAPSULE_ASPECT", CAPSULE_ASPECT),
         ("MIN_ALIGNED_COSINE", align::MIN_ALIGNED_COSINE),
         ("MIN_BENT_COSINE", align::MIN_BENT_COSINE),
         ("MIN_SPREAD", eigen::MIN_SPREAD),

@@ -12,6 +12,7 @@ use surfel_core::points::{
     select_points,
 };
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 use surfel_formats::{ColumnChoice, LoadOptions, Loaded, merge_loaded};
 
 /// Columns that a prepared cloud gets besides those that follow from the settings.
@@ -99,7 +100,8 @@ fn load(
         _ => surfel_formats::load_all(files, &options, progress)?.0,
     };
     progress.end();
-    progress.note(&format!("{} points, {}", loaded.cloud.len(), loaded.info.format));
+    let points = counted(loaded.cloud.len(), "point");
+    progress.note(&format!("{points}, {}", loaded.info.format));
     report_degrees(&loaded, preparation, progress);
     preparation.drop_estimated(&mut loaded.cloud);
     Ok(loaded)

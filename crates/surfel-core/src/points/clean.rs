@@ -5,6 +5,7 @@ use super::{PointCloud, Values, WITHHELD};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::progress::Progress;
+use crate::words::counted;
 use rayon::prelude::*;
 
 /// The repairs of [`clean`].
@@ -76,16 +77,16 @@ impl CleanReport {
     /// Returns one line for each kind of repair that was made.
     fn lines(&self) -> Vec<String> {
         let counts = [
-            (self.n_invalid_positions, "points dropped: no position, or beyond 1e15"),
-            (self.n_noise, "points dropped: classes of noise (7, 18)"),
-            (self.n_withheld, "points dropped: flagged withheld"),
-            (self.n_duplicates, "points dropped: exact duplicates"),
-            (self.n_invalid_normals, "normals treated as missing: zero or not finite"),
-            (self.n_scaled_normals, "normals scaled to unit length"),
-            (self.n_invalid_radii, "radii treated as missing: not positive and finite"),
+            (self.n_invalid_positions, "point", "dropped: no position, or beyond 1e15"),
+            (self.n_noise, "point", "dropped: classes of noise (7, 18)"),
+            (self.n_withheld, "point", "dropped: flagged withheld"),
+            (self.n_duplicates, "point", "dropped: exact duplicates"),
+            (self.n_invalid_normals, "normal", "treated as missing: zero or not finite"),
+            (self.n_scaled_normals, "normal", "scaled to unit length"),
+            (self.n_invalid_radii, "radius value", "treated as missing: not positive and finite"),
         ];
-        let found = counts.iter().filter(|(count, _)| 0 < *count);
-        found.map(|(count, what)| format!("{count} {what}")).collect()
+        let found = counts.iter().filter(|(count, ..)| 0 < *count);
+        found.map(|(n, thing, what)| format!("{} {what}", counted(*n, thing))).collect()
     }
 }
 

@@ -11,12 +11,12 @@ use super::jets::fit_wide_jet;
 use super::neighbors::{KdTree, Neighbor};
 use super::noise::{GROUP_SIZE, Noise};
 use super::normals::fit_plane;
-use super::radius::format_length;
 use super::up::is_mostly_land;
 use super::wall_faces::{Face, N_FACE_NEIGHBORS};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
+use crate::words::{counted, format_length};
 use rayon::prelude::*;
 
 /// Least noise, in spacings, from which a cloud is denoised unasked.
@@ -75,9 +75,9 @@ impl DenoiseReport {
     /// Returns a line about the moved points for the user.
     pub fn line(&self) -> String {
         format!(
-            "noise of {:.2} spacings: {} points moved onto their surface, by {} on average",
+            "noise of {:.2} spacings: {} moved onto the surface, by {} on average",
             self.noise,
-            self.n_moved,
+            counted(self.n_moved, "point"),
             format_length(self.mean_distance)
         )
     }

@@ -278,7 +278,6 @@ mod tests {
         }
     }
 
-    /// Points that fill a cube. The surface is those in the middle whose distance from it is below `radius`.
     #[test]
     fn points_of_a_wire_form_a_line_along_it() {
         let direction = Vec3::new(1.0, 2.0, 0.5).normalize();

@@ -12,6 +12,7 @@ use super::structure::{PointShape, Structure, is_line};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
+use crate::words::counted;
 use rayon::prelude::*;
 
 /// Minimum ratio of a narrowed to the original radius: at less, the points of an even surface no longer overlap.
@@ -34,9 +35,8 @@ impl FreeSpaceReport {
         let Self { n_narrowed, n_lines } = self;
         let n_changed = n_narrowed + n_lines;
         (0 < n_changed).then(|| {
-            format!(
-                "scanners saw past {n_changed} points: {n_narrowed} narrowed, {n_lines} made lines"
-            )
+            let points = counted(n_changed, "point");
+            format!("scanners saw past {points}: {n_narrowed} narrowed, {n_lines} made lines")
         })
     }
 

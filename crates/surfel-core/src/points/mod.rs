@@ -81,6 +81,7 @@ pub use radius::{
 };
 pub use scan_angle::{POINT_SOURCE, SCAN_ANGLE};
 pub use scan_station::{COLUMN_INDEX, ROW_INDEX, STATION, ScanStation};
+pub use solids::CAPSULE_ASPECT;
 pub use structure::{PointShape, STRUCTURE, Structure, StructureChoice, StructureReport};
 pub use subsample::{Subsample, subsample};
 pub(crate) use up::MAX_CAMERA_SLOPE;

@@ -1,10 +1,11 @@
 //! Radii stored as the lengths of normals (Wiesmeier, Ray Tracing Point Clouds, 2011).
 
 use super::PointCloud;
-use super::radius::{format_length, spacing};
+use super::radius::spacing;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
+use crate::words::format_length;
 use rayon::prelude::*;
 
 /// Minimum difference between 1 and the length of a normal that may be a radius.

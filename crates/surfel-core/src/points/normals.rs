@@ -1,10 +1,10 @@
 //! Normals from planes fitted to the neighbours of points.
 
 use super::neighbors::{KdTree, Neighbor, Neighborhood};
-use super::radius::format_length;
 use crate::error::Result;
 use crate::math::{DVec3, SymmetricMatrix, Vec3, smallest_eigenvector};
 use crate::progress::Progress;
+use crate::words::{counted, format_length};
 use rayon::prelude::*;
 
 /// Minimum ratio of the middle to the largest eigenvalue. Below it the neighbourhood is a line, whose width is less
@@ -133,15 +133,14 @@ impl NormalReport {
     /// Returns a line about the normals for the user. The planes were fitted to `neighborhood`.
     pub fn line(&self, neighborhood: Neighborhood) -> String {
         let n_points = self.n_estimated + self.n_from_nearest + self.n_up;
+        let points = counted(n_points, "point");
         match neighborhood {
             Neighborhood::Nearest(k) => format!(
-                "normals of {n_points} points from planes through {k} neighbours, or cubics through more where \
-                 they bend"
+                "normals of {points} from planes through {k} neighbours, or cubics through more where they bend"
             ),
-            Neighborhood::Within(distance) => format!(
-                "normals of {n_points} points from all points within {}",
-                format_length(distance)
-            ),
+            Neighborhood::Within(distance) => {
+                format!("normals of {points} from all points within {}", format_length(distance))
+            }
         }
     }
 
@@ -152,7 +151,8 @@ impl NormalReport {
         let replacement =
             if *n_up == 0 { "the normal of the nearest point that has one" } else { "+Z" };
         (0 < n_points).then(|| {
-            format!("{n_points} points without a plane through their neighbours got {replacement}")
+            let points = counted(n_points, "point");
+            format!("{points} without a plane through the neighbours got {replacement}")
         })
     }
 }

@@ -4,6 +4,7 @@ use super::neighbors::{KdTree, Neighbor, Neighborhood, nearest_by_brute_force};
 use crate::error::{Error, Result};
 use crate::math::{Random, Vec3};
 use crate::progress::Progress;
+use crate::words::{counted, format_length};
 use rayon::prelude::*;
 use std::str::FromStr;
 
@@ -198,11 +199,14 @@ impl RadiusReport {
 
     fn lines(&self) -> Vec<String> {
         let clamped = format!(
-            "{} radii of outliers clamped to {MAX_OUTLIER_RATIO} times their neighbours'",
-            self.n_clamped
+            "radii of {} clamped to {MAX_OUTLIER_RATIO} times their neighbours'",
+            counted(self.n_clamped, "outlier")
         );
-        let replaced =
-            format!("{} radii of zero set to {}", self.n_replaced, format_length(self.median));
+        let replaced = format!(
+            "zero radii of {} set to {}",
+            counted(self.n_replaced, "point"),
+            format_length(self.median)
+        );
         let lines = [(self.n_clamped, clamped), (self.n_replaced, replaced)];
         lines.into_iter().filter(|(count, _)| 0 < *count).map(|(_, line)| line).collect()
     }
@@ -214,15 +218,6 @@ fn with_report(radii: Vec<f32>) -> (Vec<f32>, RadiusReport) {
     let median = if min == max { Some(max) } else { median(radii.clone()) };
     let median = median.unwrap_or(0.0);
     (radii, RadiusReport { min, median, max, ..RadiusReport::default() })
-}
-
-/// Formats a length with three significant digits, as 0.459, 7.63 or 4120.
-pub(super) fn format_length(length: f32) -> String {
-    if !(1e-6..1e9).contains(&length) {
-        return format!("{length:.2e}");
-    }
-    let digits = (2 - length.log10().floor() as i32).max(0) as usize;
-    format!("{length:.digits$}")
 }
 
 /// Formats an ordinal number, as 1st, 2nd, 3rd, 4th, 11th or 21st.
@@ -419,8 +414,6 @@ mod tests {
         };
         let line = report.line(Radius::Adaptive { k: 12 });
         assert_eq!(line, "radii 0.459 to 7.63, median 0.701: the distance to the 12th neighbour");
-        let lengths = [4123.4, 0.095_432_76, 1e-12].map(format_length);
-        assert_eq!(lengths, ["4123", "0.0954", "1.00e-12"]);
         assert_eq!([1, 2, 3, 11, 22].map(ordinal), ["1st", "2nd", "3rd", "11th", "22nd"]);
     }
 

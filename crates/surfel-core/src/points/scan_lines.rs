@@ -44,9 +44,9 @@ pub fn widen_lines(
     if open.is_empty() {
         return Ok(widened);
     }
-    let middle = radii.len() / 4;
-    let (_, typical, _) = radii.select_nth_unstable_by(middle, f32::total_cmp);
-    let mut spacing = 0.5 * *typical;
+    let quarter = radii.len() / 4;
+    let (_, first_quartile, _) = radii.select_nth_unstable_by(quarter, f32::total_cmp);
+    let mut spacing = 0.5 * *first_quartile;
     let mut kept: Vec<u32> = (0..positions.len() as u32).collect();
     let mut thinned = positions.to_vec();
     while !open.is_empty() && 0.0 < spacing && spacing.is_finite() {

@@ -4,8 +4,9 @@ use super::neighbors::{KdTree, Neighbor};
 use super::radius::kth_distance;
 use super::structure::{PointShape, Structure};
 use crate::math::{DVec3, SymmetricMatrix, Vec3};
-use crate::surface::capsule;
 
+/// Half the length of a capsule, in multiples of its thickness's radius.
+pub const CAPSULE_ASPECT: f32 = 4.0;
 /// Number of neighbours that give the direction of a line.
 pub const N_LINE_NEIGHBORS: usize = 8;
 /// Number of neighbours that give the direction and the thickness of a straight line.
@@ -38,7 +39,7 @@ pub fn settle(
             let mut line = LineFit::of(tree.positions(), point, &neighbors);
             let mut reach = kth_distance(&neighbors, 2);
             if line.width < MAX_STRAIGHT_WIDTH {
-                reach = reach.max(capsule::ASPECT * line.thickness);
+                reach = reach.max(CAPSULE_ASPECT * line.thickness);
             } else {
                 let nearest = &neighbors[..N_LINE_NEIGHBORS.min(neighbors.len())];
                 line = LineFit::of(tree.positions(), point, nearest);
@@ -134,7 +135,7 @@ mod tests {
                 PointShape { structure: Structure::Surface, normal: Vec3::Z, radius: 0.1 };
             settle(&tree, point, 0.1, Structure::Line, &mut shape);
             assert!(0.99 < shape.normal.dot(direction).abs(), "{shape:?}");
-            let thickness = shape.radius / capsule::ASPECT / THICKNESS;
+            let thickness = shape.radius / CAPSULE_ASPECT / THICKNESS;
             assert!((0.7..1.4).contains(&thickness), "{thickness}");
         }
     }

@@ -2,9 +2,7 @@
 
 use super::shape::{PointLanes, RayLanes, Shape};
 use crate::math::{Aabb, Floats, Vec3};
-
-/// Half the length of a capsule, in multiples of its thickness's radius.
-pub const ASPECT: f32 = 4.0;
+use crate::points::CAPSULE_ASPECT;
 
 /// The shape of a capsule. The point's radius is half the length, its normal the direction.
 pub struct Capsule;
@@ -16,7 +14,7 @@ impl Shape for Capsule {
         let (zero, one) = (F::splat(0.0), F::splat(1.0));
         let length = points.normal.dot(points.normal).sqrt();
         let axis = points.normal.scaled(one / length);
-        let thickness = points.radius * F::splat(1.0 / ASPECT);
+        let thickness = points.radius * F::splat(1.0 / CAPSULE_ASPECT);
         let half_length = points.radius - thickness;
         // The distances are measured from the position on the ray that is nearest to the centre, as those of far
         // capsules would cancel.
@@ -50,14 +48,14 @@ impl Shape for Capsule {
 
 /// Returns the outward normal of a capsule at `position` on its surface.
 pub fn normal(position: Vec3, center: Vec3, direction: Vec3, radius: f32) -> Vec3 {
-    let half_length = radius * (1.0 - 1.0 / ASPECT);
+    let half_length = radius * (1.0 - 1.0 / CAPSULE_ASPECT);
     let offset = position - center;
     offset - offset.dot(direction).clamp(-half_length, half_length) * direction
 }
 
 /// Returns the bounding box of a capsule. `direction` has unit length.
 pub(super) fn bounds(center: Vec3, direction: Vec3, radius: f32) -> Aabb {
-    let thickness = radius / ASPECT;
+    let thickness = radius / CAPSULE_ASPECT;
     let extent = (radius - thickness) * direction.abs() + thickness;
     Aabb { min: center - extent, max: center + extent }
 }

@@ -14,7 +14,7 @@ pub const SOLID_SPAWN_OFFSET: f32 = 1e-3;
 /// The shape given to the points of a cloud (Wiesmeier, Ray Tracing Point Clouds, 2011).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum SurfaceKind {
-    /// Each point is rasterised as one pixel.
+    /// Each point is rasterised as a round spot of some pixels.
     Points,
     /// Each point is a sphere of its radius.
     Sphere,

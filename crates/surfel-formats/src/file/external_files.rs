@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use super::input::Input;
 
@@ -18,7 +19,7 @@ pub(crate) struct ResourceResolver<'a> {
 #[derive(Default)]
 pub(crate) struct MissingFiles {
     first: Option<String>,
-    n_others: u64,
+    n_others: usize,
 }
 
 impl<'a> ResourceResolver<'a> {
@@ -75,7 +76,9 @@ impl MissingFiles {
         match (&self.first, self.n_others) {
             (None, _) => {}
             (Some(first), 0) => progress.note(&format!("{effect}: {first}")),
-            (Some(first), n) => progress.note(&format!("{effect}: {first} (and {n} others)")),
+            (Some(first), n) => {
+                progress.note(&format!("{effect}: {first} (and {} more)", counted(n, "file")))
+            }
         }
     }
 }

@@ -6,6 +6,7 @@ use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Camera, Clip, ClipPlane, Graph, Room, find_room};
+use surfel_core::words::counted;
 
 /// Returns the room whose inside is to be seen, if the points show one; reports if one is demanded that they do not show.
 ///
@@ -44,8 +45,8 @@ pub fn hidden_walls(
 ) -> Vec<ClipPlane> {
     let planes = room.map_or(Vec::new(), |room| room.planes_before(camera));
     if !planes.is_empty() {
-        let line =
-            format!("room: {} sides between its inside and the camera are hidden", planes.len());
+        let sides = counted(planes.len(), "side");
+        let line = format!("room: {sides} between the inside and the camera hidden");
         progress.choice(&line, &["camera.interior"]);
     }
     planes

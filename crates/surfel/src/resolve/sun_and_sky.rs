@@ -8,6 +8,7 @@ use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Camera, Environment, InsideView, Light, Sky, Sun, sunlit_fraction};
 use surfel_core::surface::SurfaceKind;
+use surfel_core::words::format_length;
 
 /// Warm sun and bluish sky, which on level ground under the usual sun add up to white. The sky gives a third of the
 /// light, more than outdoors: with a quarter, shadows of dark scans were black.
@@ -181,7 +182,7 @@ fn choose_sky(settings: &mut SkySettings, context: &LightingContext, progress: &
     settings.fill_defaults();
     if settings.ao_distance.is_none() {
         let distance = (AO_FRACTION * context.diagonal).max(f32::MIN_POSITIVE);
-        let line = format!("things up to {distance:.3} away darken the sky");
+        let line = format!("things up to {} away darken the sky", format_length(distance));
         progress.choice(&line, &["sky.ao_distance"]);
         settings.ao_distance = Some(distance.into());
     }

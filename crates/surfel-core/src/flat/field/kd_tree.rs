@@ -138,12 +138,6 @@ impl FieldTree {
         self.nodes.len()
     }
 
-    /// Returns the mean number of points of a leaf that is not empty.
-    pub fn mean_leaf_size(&self) -> f64 {
-        let n: u32 = self.lanes.iter().map(|lanes| lanes.count_ones()).sum();
-        f64::from(n) / self.n_leaves().max(1) as f64
-    }
-
     /// Returns the size in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice())

@@ -15,7 +15,7 @@ use std::marker::PhantomData;
 
 /// Factor on the radius of a neighbourhood for the second try, if the first one holds too few points.
 pub const RETRY_RADIUS_FACTOR: f32 = 2.0;
-/// Maximum distance of a group's hits from the first one along any axis, in radii.
+/// Maximum distance of positions that share a traversal of the tree from the first one along any axis, in radii.
 const MAX_GROUP_SPREAD: f32 = 2.0;
 /// Minimum number of hits that are tested as a group; fewer are tested one by one.
 const MIN_GROUP_SIZE: u32 = 3;
@@ -192,7 +192,7 @@ fn evaluate_in_groups<L: Lanes, const BACKFACES: bool>(
     let stored = hits.store();
     let mut result = EdgeTestResult { enclosed: 0, sparse: 0 };
     while lanes != 0 {
-        let group = hits.group_of_first(lanes, MAX_GROUP_SPREAD);
+        let group = hits.group_of_first(lanes);
         lanes &= !group;
         if MIN_GROUP_SIZE <= group.count_ones() {
             let EdgeTestResult { enclosed, sparse } =
@@ -290,13 +290,13 @@ impl<W: PacketLanes> PacketCandidates<W> {
         offset.le(W::splat(distance)).bits()
     }
 
-    /// Returns the lanes of the first hit of `lanes` and of those within `spread` of its radii along each axis.
+    /// Returns the lanes of the first hit of `lanes` and of those near it, which share a traversal of the tree.
     #[inline(always)]
-    pub fn group_of_first(&self, lanes: u32, spread: f32) -> u32 {
+    pub fn group_of_first(&self, lanes: u32) -> u32 {
         let first = lanes.trailing_zeros() as usize % PACKET_WIDTH;
         let [x, y, z] = self.position.store_packet();
         let center = Vec3::new(x[first], y[first], z[first]);
-        1 << first | lanes & self.near(center, spread * self.radius.store()[first])
+        1 << first | lanes & self.near(center, MAX_GROUP_SPREAD * self.radius.store()[first])
     }
 
     /// Returns the box around the neighbourhoods of the hits in `lanes`, which reach `reach` radii far.

@@ -8,8 +8,6 @@ use crate::trace::query::edge_test::{PacketCandidates, lane_mask};
 use crate::trace::traversal::region::{BoxVisitor, query_box};
 use std::marker::PhantomData;
 
-/// Maximum distance of positions that share a traversal of the tree from the first one along any axis, in radii.
-const MAX_GROUP_SPREAD: f32 = 2.0;
 /// Offset of missing points, which is beyond every support.
 const FAR: f32 = 1e3;
 
@@ -80,7 +78,7 @@ impl PointLists {
         }
         let mut left = lanes;
         while left != 0 {
-            let group = positions.group_of_first(left, MAX_GROUP_SPREAD);
+            let group = positions.group_of_first(left);
             left &= !group;
             let region = positions.region(group, reach);
             self.blocks.clear();

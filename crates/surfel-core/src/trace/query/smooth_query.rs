@@ -24,8 +24,6 @@ pub const TOLERANCE: f32 = 0.01;
 pub const MAX_LAST_STEP: f32 = 0.2;
 /// Maximum distance along the ray between the disc that was hit and the surface, in radii.
 pub const MAX_DISTANCE_FROM_DISC: f32 = 1.0;
-/// Maximum distance of hits that share a traversal of the tree from the first one along any axis, in radii.
-const MAX_GROUP_SPREAD: f32 = 2.0;
 
 /// Surface points of up to sixteen rays.
 #[derive(Clone, Copy)]
@@ -95,7 +93,7 @@ impl<L: Lanes, const HAS_COLORS: bool> SimdTask for FindSurface<'_, L, HAS_COLOR
         };
         let mut left = lanes;
         while left != 0 {
-            let group = candidates.group_of_first(left, MAX_GROUP_SPREAD);
+            let group = candidates.group_of_first(left);
             left &= !group;
             let region = candidates.region_along_rays(group, FIT_REACH, MAX_DISTANCE_FROM_DISC);
             collect_blocks::<L>(&cloud.points, &region, blocks);

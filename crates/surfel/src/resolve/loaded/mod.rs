@@ -21,6 +21,7 @@ use surfel_core::points::{PointCloud, PreparedCloud};
 use surfel_core::progress::Progress;
 use surfel_core::scene::color::{ColorSource, choose_source};
 use surfel_core::scene::{Environment, Geometry, Graph, Track, Transform};
+use surfel_core::words::counted;
 use surfel_formats::FileInfo;
 
 /// The content of the files of a description, before it is prepared.
@@ -435,8 +436,10 @@ fn object_motions(description: &SceneDescription) -> Result<Vec<ObjectMotion>, I
 
 fn content_summary(graph: &Graph<PointCloud>) -> String {
     match graph.n_points_and_triangles() {
-        (points, 0) => format!("{points} points"),
-        (0, triangles) => format!("{triangles} triangles"),
-        (points, triangles) => format!("{points} points and {triangles} triangles"),
+        (points, 0) => counted(points, "point"),
+        (0, triangles) => counted(triangles, "triangle"),
+        (points, triangles) => {
+            format!("{} and {}", counted(points, "point"), counted(triangles, "triangle"))
+        }
     }
 }

@@ -1,0 +1,37 @@
+//! Numbers and lengths in sentences for the user.
+
+/// Formats a number of things, as `1 point` or `12 points`. `thing` is the singular of a noun whose plural ends in s.
+pub fn counted(n: usize, thing: &str) -> String {
+    match n {
+        1 => format!("1 {thing}"),
+        n => format!("{n} {thing}s"),
+    }
+}
+
+/// Formats a length with three significant digits, as 0.459, 7.63 or 4120.
+pub fn format_length(length: f32) -> String {
+    if !(1e-6..1e9).contains(&length) {
+        return format!("{length:.2e}");
+    }
+    let digits = (2 - length.log10().floor() as i32).max(0) as usize;
+    format!("{length:.digits$}")
+}
+
+#[cfg(test)]
+mod tests {
+    //! One, none and many; lengths of all sizes.
+
+    use super::*;
+
+    #[test]
+    fn one_thing_is_singular() {
+        let counts = [0, 1, 2].map(|n| counted(n, "point"));
+        assert_eq!(counts, ["0 points", "1 point", "2 points"]);
+    }
+
+    #[test]
+    fn lengths_have_three_digits() {
+        let lengths = [0.000_045_67, 0.4591, 7.634, 4120.3, 0.0, 3e12].map(format_length);
+        assert_eq!(lengths, ["0.0000457", "0.459", "7.63", "4120", "0.00e0", "3.00e12"]);
+    }
+}
