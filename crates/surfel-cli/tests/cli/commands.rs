@@ -396,3 +396,12 @@ fn a_dry_run_refuses_pixels_beside_a_mesh_as_rendering_does() {
     let text = object(&cloud, "surface = \"points\"") + &object(&mesh, "visible = false");
     succeed(&["render", "--dry-run", &folder.write("scene.toml", text)]);
 }
+
+#[test]
+fn prepare_does_not_replace_a_file_that_it_reads() {
+    let folder = Folder::new();
+    let file = folder.write("scan.xyz", "0 0 0\n1 0 0\n0 1 0\n0 1 0\n");
+    let message = fail(&["prepare", &file, "-o", &file, "--duplicates", "drop"], 2);
+    assert!(message.contains("name another output"), "{message}");
+    assert!(fs::read_to_string(&file).unwrap().ends_with("0 1 0\n0 1 0\n"));
+}
