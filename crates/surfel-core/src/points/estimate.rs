@@ -179,7 +179,8 @@ pub fn find_shapes<'a>(
         found = StructureReport::of(&shapes);
     }
     let is_land = is_mostly_land(&cloud.positions);
-    if let (true, Some((fits, _))) = (is_land, &*fits) {
+    if let (true, StructureChoice::Auto, Some((fits, _))) = (is_land, preparation.structure, &*fits)
+    {
         let typical = Typical::of(fits, radii);
         let noise = typical.noise() * typical.radius;
         find_sparse_walls(&cloud.positions, noise, typical.radius, &mut shapes, progress)?;

@@ -56,20 +56,19 @@ pub fn find_sparse_walls(
     let scattered: Vec<u32> = (0..positions.len() as u32).filter(is_scattered).collect();
     let places: Vec<Vec3> = scattered.iter().map(|point| positions[*point as usize]).collect();
     let tree = KdTree::new(&places, progress)?;
-    let wall = |place: usize| {
+    let wall = |i: usize| {
         progress.check()?;
-        Ok(Wall::around(&tree, place, N_DEVIATIONS * noise))
+        Ok(Wall::around(&tree, i, N_DEVIATIONS * noise))
     };
     let walls = (0..places.len()).into_par_iter().map(wall).collect::<Result<Vec<_>>>()?;
-    let confirmed: Vec<usize> =
-        (0..walls.len()).filter(|place| is_confirmed(*place, &walls)).collect();
-    let on_walls: Vec<Vec3> = confirmed.iter().map(|place| places[*place]).collect();
+    let confirmed: Vec<usize> = (0..walls.len()).filter(|i| is_confirmed(*i, &walls)).collect();
+    let on_walls: Vec<Vec3> = confirmed.iter().map(|i| places[*i]).collect();
     let is_below = are_below_roofs(&on_walls, positions, typical_radius, shapes, progress)?;
-    for (place, is_below) in confirmed.into_iter().zip(is_below) {
-        if let (Some(wall), true) = (&walls[place], is_below) {
+    for (i, is_below) in confirmed.into_iter().zip(is_below) {
+        if let (Some(wall), true) = (&walls[i], is_below) {
             let (normal, radius) = (wall.normal, wall.reach.min(MAX_RADIUS * typical_radius));
             let shape = PointShape { structure: Structure::Surface, normal, radius };
-            shapes[scattered[place] as usize] = shape;
+            shapes[scattered[i] as usize] = shape;
         }
     }
     Ok(())
@@ -131,9 +130,9 @@ impl Wall {
     }
 }
 
-/// True if at least half of the points on the wall of a point have a wall in the same direction.
-fn is_confirmed(place: usize, walls: &[Option<Wall>]) -> bool {
-    let Some(wall) = &walls[place] else { return false };
+/// True if at least half of the points on the wall of point `i` have a wall in the same direction.
+fn is_confirmed(i: usize, walls: &[Option<Wall>]) -> bool {
+    let Some(wall) = &walls[i] else { return false };
     let is_parallel = |other: &&u32| {
         let other = walls[**other as usize].as_ref();
         other.is_some_and(|other| MIN_COSINE < other.normal.dot(wall.normal).abs())
@@ -173,7 +172,7 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
-    use crate::points::{PointCloud, Preparation, PreparedCloud, prepare};
+    use crate::points::{PointCloud, Preparation, PreparedCloud, StructureChoice, prepare};
     use crate::progress::NoProgress;
 
     /// Half of the width of the building.
@@ -184,7 +183,7 @@ mod tests {
 
     /// Prepares a building whose walls have a point every 6 square units, on land with 4 points a square unit. The points of
     /// the walls come first, those of a tree last.
-    fn prepared() -> (PreparedCloud, Vec<Structure>) {
+    fn prepared(structure: StructureChoice) -> (PreparedCloud, Vec<Structure>) {
         let mut random = Random::new(7, 0);
         let mut noise = |size: f32| size * (random.next_f32() - 0.5);
         let mut points: Vec<Vec3> = Vec::new();
@@ -206,14 +205,15 @@ mod tests {
         let tree = Vec3::new(30.0, 30.0, 8.0);
         points.extend((0..1000).map(|_| tree + Vec3::new(noise(8.0), noise(8.0), noise(8.0))));
         let cloud = PointCloud::from_positions(points);
-        let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
+        let preparation = Preparation { structure, ..Preparation::default() };
+        let (cloud, _) = prepare(cloud, &preparation, &NoProgress).unwrap();
         let structures = cloud.structures().unwrap();
         (cloud, structures)
     }
 
     #[test]
     fn sparse_walls_below_roofs_are_surfaces_and_trees_are_not() {
-        let (cloud, structures) = prepared();
+        let (cloud, structures) = prepared(StructureChoice::Auto);
         let is_wall = |point: &usize| {
             let normal = cloud.normals()[*point];
             let facing = if point.is_multiple_of(2) { normal.x } else { normal.y };
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn walls_end_at_the_roof_and_at_the_corners() {
-        let (cloud, structures) = prepared();
+        let (cloud, structures) = prepared(StructureChoice::Auto);
         let is_upright = |point: &usize| {
             structures[*point] == Structure::Surface && cloud.normals()[*point].z.abs() < 0.3
         };
@@ -241,5 +241,11 @@ mod tests {
             side = side.max(along.abs() + radius - HALF);
         }
         assert!(N_ON_WALLS / 2 < discs.len() && top < 1.5 && side < 2.0, "{top} {side}");
+    }
+
+    #[test]
+    fn walls_stay_scattered_where_all_points_are_to_be() {
+        let (_, structures) = prepared(StructureChoice::Scatter);
+        assert!(structures.iter().all(|structure| *structure == Structure::Scatter));
     }
 }

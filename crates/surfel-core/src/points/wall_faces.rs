@@ -23,11 +23,11 @@ const N_REFITS: usize = 3;
 const REFIT_DISTANCE: f32 = 2.0;
 /// Distance from a plane within which others are counted, in distances of those on it.
 const WIDER: f32 = 3.0;
-/// Minimum share, among these, of the points on the plane. Of points that fill space, a third is on any plane.
-const MIN_SHARE: f32 = 0.8;
+/// Minimum fraction, of these, of the points on the plane. Of points that fill space, a third is on any plane.
+const MIN_FRACTION: f32 = 0.8;
 /// Number of nearest points on a face that a disc reaches.
 const N_REACHED: usize = 12;
-/// Maximum share, of the points farther away, of those on one side: a wall has its other face on the other side. Leaves that one
+/// Maximum fraction, of the points farther away, of those on one side: a wall has its other face on the other side. Leaves that one
 /// sweep of the scanner saw lie in a plane, too, amid those of other sweeps.
 const MAX_OTHER_SIDE: f32 = 0.05;
 /// Minimum number of neighbours on the plane.
@@ -163,7 +163,7 @@ impl Plane {
         let n_beyond = offsets.len() - n_near;
         let on_other_side = n_above.min(n_beyond - n_above);
         MIN_POINTS <= n_on_plane
-            && MIN_SHARE * n_near as f32 <= n_on_plane as f32
+            && MIN_FRACTION * n_near as f32 <= n_on_plane as f32
             && on_other_side as f32 <= MAX_OTHER_SIDE * n_beyond as f32
     }
 }
