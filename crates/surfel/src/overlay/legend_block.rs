@@ -2,6 +2,7 @@
 
 use super::canvas::{Area, Canvas, Ink, text_width};
 use super::ticks::ticks;
+use crate::crs::Unit;
 use surfel_core::scene::color::Legend;
 
 /// Height of a row in text heights.
@@ -30,8 +31,8 @@ pub(super) enum LegendBlock {
 }
 
 impl LegendBlock {
-    /// The block of a legend; `None` if there is nothing to explain.
-    pub fn new(legend: Legend) -> Option<Self> {
+    /// The block of a legend; `None` if there is nothing to explain. `unit` is that of the coordinates.
+    pub fn new(legend: Legend, unit: Unit) -> Option<Self> {
         match legend {
             Legend::None => None,
             Legend::Classes(classes) => {
@@ -42,7 +43,12 @@ impl LegendBlock {
                 Some(Self::Classes(rows.collect()))
             }
             Legend::Map { title, low, high, colors } => {
-                let title = if title == "elevation" { "elevation (m)".into() } else { title };
+                let title = match unit {
+                    Unit::Metres(_) if title == "elevation" => {
+                        format!("elevation ({})", unit.symbol())
+                    }
+                    _ => title,
+                };
                 let ticks = ticks(low, high, 6);
                 Some(Self::Bar { title, low, high, colors, ticks })
             }
@@ -125,5 +131,28 @@ fn draw_bar(canvas: &mut Canvas, bar: Area, colors: &[[u8; 3]]) {
         let color = [mix(0), mix(1), mix(2)];
         let y = top + row as f32;
         canvas.fill(Area { y, height: 1.0, ..bar }, Ink::opaque(color));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Titles of colour bars.
+
+    use super::*;
+
+    #[test]
+    fn elevations_have_the_unit_of_the_coordinates_if_it_is_known() {
+        let title = |name: &str, unit: Unit| {
+            let (title, colors) = (name.to_owned(), vec![[0; 3], [255; 3]]);
+            let legend = Legend::Map { title, low: 0.0, high: 9.0, colors };
+            match LegendBlock::new(legend, unit) {
+                Some(LegendBlock::Bar { title, .. }) => title,
+                _ => String::new(),
+            }
+        };
+        assert_eq!(title("elevation", Unit::Metres(1.0)), "elevation (m)");
+        assert_eq!(title("elevation", Unit::Metres(0.3048)), "elevation (ft)");
+        assert_eq!(title("elevation", Unit::Unknown), "elevation");
+        assert_eq!(title("intensity", Unit::Metres(1.0)), "intensity");
     }
 }

@@ -76,7 +76,7 @@ impl Overlay {
     /// The overlay that settings ask for, for cameras that may change: pictures lack what their camera does not allow.
     pub fn of(picture: &PictureSettings, legend: Legend, (up, unit): (Vec3, Unit)) -> Self {
         Self {
-            legend: LegendBlock::new(legend).filter(|_| picture.legend()),
+            legend: LegendBlock::new(legend, unit).filter(|_| picture.legend()),
             caption: picture.caption.clone(),
             has_scale_bar: picture.scale_bar(),
             unit,
