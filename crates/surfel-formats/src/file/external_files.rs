@@ -77,7 +77,7 @@ impl MissingFiles {
             (None, _) => {}
             (Some(first), 0) => progress.note(&format!("{effect}: {first}")),
             (Some(first), n) => {
-                progress.note(&format!("{effect}: {first} (and {} more)", counted(n, "file")))
+                progress.note(&format!("{effect}: {first} (and {})", counted(n, "other")))
             }
         }
     }

@@ -128,7 +128,7 @@ fn textures_are_read_once_and_missing_ones_are_reported() {
     assert_eq!((b.base_color, b.textures.normal), (Vec3::splat(0.5), None));
     assert_eq!((b.emissive, b.textures.emissive), (Vec3::ZERO, None));
     assert!(listener.has_note("a texture is left out: ") && listener.has_note("none.png"));
-    assert!(listener.has_note("(and 1 others)"));
+    assert!(listener.has_note("(and 1 other)"));
 }
 
 #[test]
