@@ -183,14 +183,15 @@ fn moved(
             progress.advance(1024.min(positions.len() - point) as u64);
         }
         let count = counts[point];
-        let is_grouped = MIN_GROUPED <= count;
-        let layer = if is_grouped { &groups } else { &points };
         if count == 0 {
             return Ok((*position, Vec3::ZERO));
         }
-        if layer.is_uneven_at(*position)
-            && let Some(moved) = moved_onto_face(tree, point)
-        {
+        let is_grouped = MIN_GROUPED <= count;
+        let is_uneven = match is_grouped {
+            true => groups.is_uneven_at(*position),
+            false => points.is_uneven[point],
+        };
+        if is_uneven && let Some(moved) = moved_onto_face(tree, point) {
             return Ok((moved, Vec3::ZERO));
         }
         if is_grouped {

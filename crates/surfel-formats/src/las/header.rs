@@ -85,7 +85,7 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
     };
     let (major, minor_version) = (input[24], input[25]);
     if major != 1 || 5 < minor_version {
-        let advice = "surfel reads LAS 1.0 to 1.5";
+        let advice = "surfel reads LAS 1.0 to 1.4";
         return Err(input.unsupported(format!("LAS version {major}.{minor_version}"), advice));
     }
     let is_1_4 = 4 <= minor_version && 375 <= input.len();
