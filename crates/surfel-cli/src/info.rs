@@ -12,8 +12,8 @@ use surfel::resolve::{MemoryEstimate, up_convention};
 use surfel_core::image::class_name;
 use surfel_core::math::Vec3;
 use surfel_core::points::{
-    PointCloud, STATION, ScanStation, Subsample, Values, infer_up, is_flag, points_per_area,
-    spacing,
+    COLOR_8_TO_16, PointCloud, STATION, ScanStation, Subsample, Values, have_8_bits, infer_up,
+    is_flag, points_per_area, spacing,
 };
 use surfel_core::progress::Progress;
 use surfel_formats::{ColumnChoice, EmbeddedImage, FileInfo, Loaded};
@@ -197,7 +197,8 @@ fn columns(cloud: &PointCloud) -> Map<String, Value> {
         columns.insert(name.to_owned(), range);
     };
     if let Some(colors) = &cloud.colors {
-        add("rgb", &mut colors.iter().flatten().map(|&channel| channel.into()));
+        let unit = if have_8_bits(colors) { COLOR_8_TO_16 } else { 1 };
+        add("rgb", &mut colors.iter().flatten().map(|channel| (channel / unit).into()));
     }
     if let Some(values) = &cloud.intensity {
         add("intensity", &mut values.iter().map(|&value| value.into()));

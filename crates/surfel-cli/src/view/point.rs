@@ -6,15 +6,9 @@ use surfel::live_view::SceneTrees;
 use surfel::resolve::LoadedScene;
 use surfel_core::flat::{FlatGeometry, FlatScene};
 use surfel_core::math::DAffine3;
-use surfel_core::points::{PointCloud, Values};
+use surfel_core::points::{COLOR_8_TO_16, PointCloud, Values, have_8_bits};
 use surfel_core::scene::{Geometry, Graph};
 use surfel_web::PickedPoint;
-
-/// An 8-bit value times this is the same colour with 16 bits.
-const COLOR_8_TO_16: u16 = 257;
-
-/// Number of colours from which the number of bits in the file is judged.
-const COLOR_SAMPLE: usize = 4096;
 
 /// Returns the picked point or triangle with all columns of its file. `flat` and `graph` are those of `trees` at the
 /// time of the picture.
@@ -105,16 +99,10 @@ fn columns(cloud: &PointCloud, index: usize) -> Vec<Value> {
     columns
 }
 
-/// Returns a colour with 8 bits per channel if the file seems to have no more; a sample of its points decides.
+/// Returns a colour with 8 bits per channel if these hold all colours of the cloud.
 fn channels(colors: &[[u16; 3]], index: usize) -> [u16; 3] {
-    let is_narrow = |color: &[u16; 3]| color.iter().all(|channel| channel % COLOR_8_TO_16 == 0);
-    let mut sample = colors.iter().step_by(colors.len().div_ceil(COLOR_SAMPLE));
-    let color = colors[index];
-    if is_narrow(&color) && sample.all(is_narrow) {
-        color.map(|channel| channel / COLOR_8_TO_16)
-    } else {
-        color
-    }
+    let unit = if have_8_bits(colors) { COLOR_8_TO_16 } else { 1 };
+    colors[index].map(|channel| channel / unit)
 }
 
 #[cfg(test)]

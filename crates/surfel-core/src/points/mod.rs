@@ -4,6 +4,7 @@ mod deformation;
 mod clean;
 mod scan_station;
 mod cloud;
+mod color_bits;
 mod gaussians;
 mod filter;
 mod flags;
@@ -56,6 +57,7 @@ mod prepare;
 
 pub use clean::{CleanReport, Duplicates, clean};
 pub use cloud::{PointCloud, Scalar, Values, is_valid_position};
+pub use color_bits::{COLOR_8_TO_16, have_8_bits, to_8_bits};
 pub use deformation::{Morph, Skin};
 pub use denoise::{Denoise, DenoiseReport, denoise};
 pub use density::points_per_area;

@@ -2,6 +2,7 @@
 
 mod header;
 mod crs;
+mod color_bits;
 mod fields;
 mod point_format;
 mod profile;

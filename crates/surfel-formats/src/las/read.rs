@@ -8,6 +8,7 @@ use surfel_core::math::DVec3;
 use surfel_core::points::{PointCloud, Values, is_flag};
 use surfel_core::progress::Progress;
 
+use super::color_bits::ColorBits;
 use super::crs::coordinate_system;
 use super::fields::columns;
 use super::find_chunks::find_chunks;
@@ -19,8 +20,8 @@ use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::salvage::Salvage;
 use crate::table::{
-    ColumnChoice, ColumnRole, ColumnSlices, FILTERED_POINTS_PER_BATCH, RecordLayout, choose_origin,
-    grow_checked, keep_matching, read_records, sample_positions, shrink,
+    ColumnChoice, ColumnRole, ColumnSlices, FILTERED_POINTS_PER_BATCH, RecordLayout,
+    append_decoded, choose_origin, grow_checked, keep_matching, sample_positions, shrink,
 };
 
 /// Reads the header.
@@ -43,7 +44,7 @@ pub(crate) fn read(
     let origin_of =
         |sample: Vec<DVec3>| options.origin.unwrap_or_else(|| choose_origin(&sample, tolerance));
     let mut salvage = Salvage::new(input, options.salvage);
-    let Decoded { mut cloud, n_points } = if header.is_compressed {
+    let Decoded { mut cloud, color_bits, n_points } = if header.is_compressed {
         let chunks = find_chunks(&mut salvage, &header, progress)?;
         let sample = chunks.first_records(input).map(|record| layout.world_position(record));
         let origin = origin_of(sample.collect());
@@ -54,21 +55,23 @@ pub(crate) fn read(
         let origin = origin_of(sample_positions(records, &layout));
         let n_points = (records.len() / header.record_length) as u64;
         progress.begin(&format!("read {}", input.name), n_points);
-        Decoded {
-            cloud: read_records(
-                input,
-                records,
-                &layout,
-                origin,
-                options.filter.as_ref(),
-                progress,
-            )?,
-            n_points,
+        let mut cloud = layout.empty_cloud(origin);
+        let mut color_bits = ColorBits::default();
+        let filter = options.filter.as_ref();
+        let n_in_batch =
+            filter.map_or(records.len(), |_| FILTERED_POINTS_PER_BATCH * layout.stride);
+        for batch in records.chunks(n_in_batch.max(1)) {
+            let n_before = cloud.len();
+            append_decoded(&mut cloud, input, batch, &layout, progress)?;
+            color_bits.scale(&mut cloud, n_before);
+            keep_matching(&mut cloud, n_before, filter)?;
         }
+        shrink(&mut cloud);
+        Decoded { cloud, color_bits, n_points }
     };
     salvage.report("points", n_points, Some(header.n_points), progress)?;
     if !cloud.is_empty() {
-        normalize_colors(input, &mut cloud, progress);
+        color_bits.report(input, &mut cloud, progress);
         drop_zero_columns(input, &mut cloud, progress);
     }
     let info = FileInfo { n_points: Some(n_points), ..file_info(input, &header) };
@@ -112,6 +115,8 @@ fn uncompressed_records<'a>(salvage: &mut Salvage<'a>, header: &Header) -> Resul
 struct Decoded {
     /// Points that the filter keeps.
     cloud: PointCloud,
+    /// Bits of the colours.
+    color_bits: ColorBits,
     /// Number of points that were read, kept or not.
     n_points: u64,
 }
@@ -134,10 +139,11 @@ impl ChunkReader<'_> {
     ) -> Result<Decoded> {
         progress.begin(&format!("read {}", self.input.name), self.header.n_points);
         let cloud = self.layout.empty_cloud(origin);
-        let mut decoded = Decoded { cloud, n_points: 0 };
+        let mut decoded = Decoded { cloud, color_bits: ColorBits::default(), n_points: 0 };
         let filter = self.options.filter.as_ref();
         if filter.is_none() {
             self.append_chunks(&mut decoded, chunks, &chunks.chunks, salvage, progress)?;
+            decoded.color_bits.scale(&mut decoded.cloud, 0);
             return Ok(decoded);
         }
         let mut rest = &chunks.chunks[..];
@@ -151,6 +157,7 @@ impl ChunkReader<'_> {
             let (batch, after) = rest.split_at(n_chunks);
             let n_before = decoded.cloud.len();
             self.append_chunks(&mut decoded, chunks, batch, salvage, progress)?;
+            decoded.color_bits.scale(&mut decoded.cloud, n_before);
             keep_matching(&mut decoded.cloud, n_before, filter)?;
             rest = after;
         }
@@ -168,7 +175,7 @@ impl ChunkReader<'_> {
         progress: &dyn Progress,
     ) -> Result<()> {
         let selection = selection(&self.options.columns);
-        let Decoded { cloud, n_points } = decoded;
+        let Decoded { cloud, n_points, .. } = decoded;
         let (n_before, origin) = (cloud.len(), cloud.origin);
         let n_new: usize = batch.iter().map(|chunk| chunk.n_points).sum();
         grow_checked(cloud, n_before + n_new, self.input)?;
@@ -234,19 +241,6 @@ fn selection(choice: &ColumnChoice) -> DecompressionSelection {
         selection = selection.decompress_nir();
     }
     selection
-}
-
-/// Scales colours of 8 bits to 16, and drops those that were never set.
-fn normalize_colors(input: &Input, cloud: &mut PointCloud, progress: &dyn Progress) {
-    let Some(colors) = &mut cloud.colors else { return };
-    let largest = colors.par_iter().flatten_iter().copied().max().unwrap_or(0);
-    if largest == 0 {
-        progress.note(&format!("{}: all colours are zero; treated as absent", input.name));
-        cloud.colors = None;
-    } else if largest <= 255 {
-        progress.note(&format!("{}: colours have 8 bits, scaled to 16", input.name));
-        colors.par_iter_mut().for_each(|color| *color = color.map(|channel| channel * 257));
-    }
 }
 
 /// Drops intensities, classes and flags that are all zero: every point format has fields for them, so zeros mean that

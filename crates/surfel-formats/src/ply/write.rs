@@ -5,56 +5,46 @@ use std::ops::Range;
 use std::path::Path;
 
 use surfel_core::math::DVec3;
-use surfel_core::points::{PointCloud, Values};
+use surfel_core::points::{PointCloud, Values, to_8_bits};
 use surfel_core::progress::Progress;
 
 use crate::error::Result;
 use crate::file::{write_error, write_file};
-use crate::table::{encode_points, has_wide_colors, scalar_word};
+use crate::save::note_rounded_colors;
+use crate::table::{encode_points, scalar_word};
 
 /// Writes `cloud` to `path`.
 pub(crate) fn write(path: &Path, cloud: &PointCloud, progress: &dyn Progress) -> Result<()> {
-    let types = Types::new(cloud);
+    let has_wide_positions = cloud.origin != DVec3::ZERO;
+    note_rounded_colors(path, cloud, progress);
     progress.begin(&format!("write {}", path.display()), cloud.len() as u64);
     write_file(path, |writer| {
         let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(|e| write_error(path, e));
-        put(header(cloud, &types).as_bytes())?;
-        encode_points(cloud.len(), |points| Ok(encode(cloud, &types, points)), progress, put)
+        put(header(cloud, has_wide_positions).as_bytes())?;
+        encode_points(
+            cloud.len(),
+            |points| Ok(encode(cloud, has_wide_positions, points)),
+            progress,
+            put,
+        )
     })
 }
 
-/// The types that hold the cloud's values without loss.
-struct Types {
-    /// True for f64 positions, false for f32.
-    has_wide_positions: bool,
-    /// True for colours of 16 bits, false for 8.
-    has_wide_colors: bool,
-}
-
-impl Types {
-    fn new(cloud: &PointCloud) -> Self {
-        Self {
-            has_wide_positions: cloud.origin != DVec3::ZERO,
-            has_wide_colors: cloud.colors.as_deref().is_some_and(has_wide_colors),
-        }
-    }
-}
-
-fn header(cloud: &PointCloud, types: &Types) -> String {
+/// Returns the header; positions are f64 if they are wide, else f32.
+fn header(cloud: &PointCloud, has_wide_positions: bool) -> String {
     let mut header =
         String::from("ply\nformat binary_little_endian 1.0\ncomment written by surfel\n");
     header += &format!("element vertex {}\n", cloud.len());
     let mut property =
         |type_name: &str, name: &str| header += &format!("property {type_name} {name}\n");
     for name in ["x", "y", "z"] {
-        property(if types.has_wide_positions { "double" } else { "float" }, name);
+        property(if has_wide_positions { "double" } else { "float" }, name);
     }
     if cloud.normals.is_some() {
         ["nx", "ny", "nz"].iter().for_each(|name| property("float", name));
     }
     if cloud.colors.is_some() {
-        let type_name = if types.has_wide_colors { "ushort" } else { "uchar" };
-        ["red", "green", "blue"].iter().for_each(|name| property(type_name, name));
+        ["red", "green", "blue"].iter().for_each(|name| property("uchar", name));
     }
     if cloud.radii.is_some() {
         property("float", "radius");
@@ -78,10 +68,10 @@ fn header(cloud: &PointCloud, types: &Types) -> String {
     header + "end_header\n"
 }
 
-fn encode(cloud: &PointCloud, types: &Types, points: Range<usize>) -> Vec<u8> {
+fn encode(cloud: &PointCloud, has_wide_positions: bool, points: Range<usize>) -> Vec<u8> {
     let mut bytes = Vec::new();
     for i in points {
-        if types.has_wide_positions {
+        if has_wide_positions {
             let position = cloud.world_position(i).to_array();
             position.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
         } else {
@@ -91,13 +81,7 @@ fn encode(cloud: &PointCloud, types: &Types, points: Range<usize>) -> Vec<u8> {
             normals[i].to_array().iter().for_each(|v| bytes.extend(v.to_le_bytes()));
         }
         if let Some(colors) = &cloud.colors {
-            for channel in colors[i] {
-                if types.has_wide_colors {
-                    bytes.extend(channel.to_le_bytes());
-                } else {
-                    bytes.push((channel / 257) as u8);
-                }
-            }
+            bytes.extend(colors[i].map(to_8_bits));
         }
         for column in [&cloud.radii, &cloud.intensity].into_iter().flatten() {
             bytes.extend(column[i].to_le_bytes());

@@ -1,7 +1,5 @@
 //! The range of colours and the columns that can be classes, found by their values.
 
-use rayon::prelude::*;
-
 /// The range of a file's colour channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ColorRange {
@@ -46,11 +44,6 @@ impl ColorRange {
             Self::Bits16 => "0 to 65535",
         }
     }
-}
-
-/// Returns true if 8 bits per channel do not hold the colours.
-pub(crate) fn has_wide_colors(colors: &[[u16; 3]]) -> bool {
-    colors.par_iter().any(|color| color.iter().any(|channel| channel % 257 != 0))
 }
 
 /// Returns true if `value` can be a class or a channel of 8 bits: a whole number from 0 to 255.

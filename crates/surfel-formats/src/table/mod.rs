@@ -16,7 +16,7 @@ pub use column_choice::{Column, ColumnChoice, TextColumn};
 
 pub(crate) use chunks::{ParseFault, TextChunk, find_line_end, line_at, parse_chunks};
 pub(crate) use cloud_builder::CloudBuilder;
-pub(crate) use color_range::{ColorRange, has_wide_colors, is_byte};
+pub(crate) use color_range::{ColorRange, is_byte};
 pub(crate) use column_role::ColumnRole;
 pub(crate) use column_slices::{ColumnSlices, shrink};
 pub(crate) use encode::{POINTS_PER_CHUNK, decimal_step, encode_points, scalar_word};
@@ -26,6 +26,6 @@ pub(crate) use line_reader::{
 };
 pub(crate) use named_columns::named_columns;
 pub(crate) use reader::{
-    FILTERED_POINTS_PER_BATCH, Tolerance, choose_origin, grow_checked, keep_matching,
-    origin_of_records, read_records, sample_positions,
+    FILTERED_POINTS_PER_BATCH, Tolerance, append_decoded, choose_origin, grow_checked,
+    keep_matching, origin_of_records, read_records, sample_positions,
 };

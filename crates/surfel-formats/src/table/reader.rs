@@ -64,7 +64,7 @@ pub(crate) fn keep_matching(
 }
 
 /// Decodes all of `records` to the end of a cloud.
-fn append_decoded(
+pub(crate) fn append_decoded(
     cloud: &mut PointCloud,
     input: &Input,
     records: &[u8],

@@ -5,14 +5,15 @@ use std::ops::Range;
 use std::path::Path;
 
 use surfel_core::math::Vec3;
-use surfel_core::points::{PointCloud, Values};
+use surfel_core::points::{PointCloud, Values, to_8_bits};
 use surfel_core::progress::Progress;
 
 use super::number::{MAX_DECIMALS, push_fixed, push_float, push_whole};
 use crate::error::Result;
 use crate::file::{extension, write_error, write_file};
 use crate::options::SaveOptions;
-use crate::table::{ColumnRole, decimal_step, encode_points, has_wide_colors, scalar_word};
+use crate::save::note_rounded_colors;
+use crate::table::{ColumnRole, decimal_step, encode_points, scalar_word};
 
 /// Writes `cloud` to `path`, whose extension gives the form of the text.
 pub(crate) fn write(
@@ -26,6 +27,7 @@ pub(crate) fn write(
     if form == TextForm::Pts {
         note_losses(path, cloud, progress);
     }
+    note_rounded_colors(path, cloud, progress);
     progress.begin(&format!("write {}", path.display()), cloud.len() as u64);
     write_file(path, |writer| {
         let mut put = |bytes: &[u8]| writer.write_all(bytes).map_err(|e| write_error(path, e));
@@ -67,8 +69,8 @@ enum Cells<'a> {
     Position(&'a PointCloud, usize, Digits),
     /// Component of vectors.
     Component(&'a [Vec3], usize),
-    /// Channel of colours, 8 bits of it unless `is_wide`.
-    Channel { colors: &'a [[u16; 3]], channel: usize, is_wide: bool },
+    /// Channel of colours, rounded to 8 bits.
+    Channel(&'a [[u16; 3]], usize),
     /// Radii or intensities.
     F32(&'a [f32]),
     /// Classes.
@@ -121,11 +123,8 @@ fn columns<'a>(
     let digits = |axis| Digits::new(cloud, options, axis);
     let positions =
         (0..3).map(|axis| (ColumnRole::Position(axis), Cells::Position(cloud, axis, digits(axis))));
-    let is_wide = form != TextForm::Pts && cloud.colors.as_deref().is_some_and(has_wide_colors);
     let colors = cloud.colors.iter().flat_map(|colors| {
-        (0..3).map(move |channel| {
-            (ColumnRole::Color(channel), Cells::Channel { colors, channel, is_wide })
-        })
+        (0..3).map(|channel| (ColumnRole::Color(channel), Cells::Channel(colors, channel)))
     });
     let intensity = cloud.intensity.iter().map(|v| (ColumnRole::Intensity, Cells::F32(v)));
     let normals = cloud.normals.iter().flat_map(|normals| {
@@ -180,12 +179,10 @@ fn note_losses(path: &Path, cloud: &PointCloud, progress: &dyn Progress) {
     ];
     let lost = present.iter().filter(|(_, is_present)| *is_present).map(|(name, _)| *name);
     let lost: Vec<&str> = lost.chain(cloud.scalars.iter().map(|s| s.name.as_str())).collect();
-    let note = |line: &str| progress.note(&format!("{}: {line}", path.display()));
     if !lost.is_empty() {
-        note(&format!("PTS holds intensity and colour only; left out: {}", lost.join(", ")));
-    }
-    if cloud.colors.as_deref().is_some_and(has_wide_colors) {
-        note("PTS holds colours of 8 bits; those of 16 are rounded");
+        let (path, lost) = (path.display(), lost.join(", "));
+        let line = format!("{path}: PTS holds intensity and colour only; left out: {lost}");
+        progress.note(&line);
     }
 }
 
@@ -218,12 +215,7 @@ impl Cells<'_> {
                 }
             }
             Self::Component(vectors, axis) => push_float(text, vectors[i][axis]),
-            Self::Channel { colors, channel, is_wide: true } => {
-                push_whole(text, colors[i][channel]);
-            }
-            Self::Channel { colors, channel, is_wide: false } => {
-                push_whole(text, (u32::from(colors[i][channel]) + 128) / 257);
-            }
+            Self::Channel(colors, channel) => push_whole(text, to_8_bits(colors[i][channel])),
             Self::F32(values) => push_float(text, values[i]),
             Self::Classes(classes) => push_whole(text, classes[i]),
             Self::Scalar(values) => match values {

@@ -139,6 +139,15 @@ pub fn full_cloud(n: usize) -> PointCloud {
     }
 }
 
+/// Returns the colours that a file with this extension holds: all but LAS and LAZ round them to 8 bits.
+pub fn colors_in_file(cloud: &PointCloud, extension: &str) -> Option<Vec<[u16; 3]>> {
+    let round = |channel: u16| (f64::from(channel) / 257.0).round() as u16 * 257;
+    let is_rounded = !["las", "laz"].contains(&extension);
+    let channel = |channel: u16| if is_rounded { round(channel) } else { channel };
+    let colors = cloud.colors.as_ref()?.iter();
+    Some(colors.map(|color| color.map(channel)).collect())
+}
+
 /// Returns the largest distance per axis between corresponding points.
 pub fn largest_difference(a: &PointCloud, b: &PointCloud) -> DVec3 {
     assert_eq!(a.len(), b.len());

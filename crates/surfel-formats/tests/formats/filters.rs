@@ -15,10 +15,14 @@ fn filtered(filter: &str) -> LoadOptions {
 #[test]
 fn every_format_keeps_the_same_points_as_a_filter_afterwards() {
     let cloud = full_cloud(120_000);
+    let mut dim = full_cloud(120_000);
+    dim.colors = dim.colors.map(|c| c.iter().map(|color| [color[0] / 257, 7, 0]).collect());
     let files = [
         ("a.ply", encode_cloud(&cloud, "ply"), "classification[2:4] && count < -7"),
         ("a.las", encode_cloud(&cloud, "las"), "ReturnNumber == 1 || z > 300"),
         ("a.laz", encode_cloud(&cloud, "laz"), "ReturnNumber == 1 || z > 300"),
+        ("dim.las", encode_cloud(&dim, "las"), "red > 200"),
+        ("dim.laz", encode_cloud(&dim, "laz"), "red > 200"),
         ("a.csv", "x,y,z\n1,2,3\n4,5,6\n7,8,9\n".into(), "x > 1 && z != 9"),
         ("ascii.pcd", pcd::ascii_file().into(), "label == 7"),
         ("compressed.pcd", pcd::compressed_file(), "red > 0"),

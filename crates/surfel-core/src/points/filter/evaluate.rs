@@ -3,8 +3,11 @@
 use super::condition::{Condition, Operand, Relation};
 use super::polygon::Polygon;
 use crate::error::{Error, Result};
-use crate::points::{PointCloud, Values};
+use crate::points::{COLOR_8_TO_16, PointCloud, Values};
 use std::ops::Range;
+
+/// The greatest channel of a colour of 8 bits. A channel that is compared with a greater number has 16 bits.
+const MAX_8_BITS: f64 = 255.0;
 
 /// The columns of a cloud that a condition compares.
 pub(super) struct Evaluation<'a> {
@@ -73,8 +76,10 @@ impl<'a> Evaluation<'a> {
                 }
             }
             Condition::Compare(left, relation, right) => {
-                let (left, right) =
-                    (self.values(left, start, matches), self.values(right, start, matches));
+                let (left, right) = (
+                    self.values(left, right, start, matches),
+                    self.values(right, left, start, matches),
+                );
                 let pairs = matches.iter_mut().zip(left.iter().zip(&right));
                 match relation {
                     Relation::Equal => pairs.for_each(|(is_match, (a, b))| *is_match = a == b),
@@ -106,8 +111,14 @@ impl<'a> Evaluation<'a> {
         }
     }
 
-    /// Returns the values of an operand for as many points as there are `matches`.
-    fn values(&self, operand: &Operand, start: usize, matches: &[bool]) -> Vec<f64> {
+    /// Returns the values of an operand, which is compared with the `other`, for as many points as there are `matches`.
+    fn values(
+        &self,
+        operand: &Operand,
+        other: &Operand,
+        start: usize,
+        matches: &[bool],
+    ) -> Vec<f64> {
         let n = matches.len();
         let name = match operand {
             Operand::Number(number) => return vec![*number; n],
@@ -115,13 +126,16 @@ impl<'a> Evaluation<'a> {
         };
         let column = self.columns.iter().find(|(known, _)| known == name).map(|(_, column)| column);
         let column = column.expect("columns were found before");
-        column.values(self.cloud, start..start + n)
+        let has_16_bits = matches!(other, Operand::Number(number) if MAX_8_BITS < *number);
+        let color_unit = if has_16_bits { 1 } else { COLOR_8_TO_16 };
+        column.values(self.cloud, color_unit, start..start + n)
     }
 }
 
 impl ColumnValues<'_> {
-    /// Returns the values of a range of points of the cloud that has the column.
-    fn values(self, cloud: &PointCloud, range: Range<usize>) -> Vec<f64> {
+    /// Returns the values of a range of points of the cloud that has the column, channels of colours in multiples of
+    /// `color_unit`.
+    fn values(self, cloud: &PointCloud, color_unit: u16, range: Range<usize>) -> Vec<f64> {
         let absent = "a column is there if it was found";
         match self {
             ColumnValues::Position(axis) => {
@@ -134,7 +148,8 @@ impl ColumnValues<'_> {
             }
             ColumnValues::Color(channel) => {
                 let colors = &cloud.colors.as_ref().expect(absent)[range];
-                colors.iter().map(|color| color[channel].into()).collect()
+                let unit = f64::from(color_unit);
+                colors.iter().map(|color| f64::from(color[channel]) / unit).collect()
             }
             ColumnValues::Radius => widen(&cloud.radii.as_ref().expect(absent)[range]),
             ColumnValues::Intensity => widen(&cloud.intensity.as_ref().expect(absent)[range]),
@@ -156,7 +171,7 @@ impl ColumnValues<'_> {
 const MAX_VALUES_AT_ONCE: usize = 1 << 16;
 
 /// Calls `visit` with the values of a column, block by block. The column has a name that a filter may use; `x`, `y` and
-/// `z` are world coordinates.
+/// `z` are world coordinates, and colours go from 0 to 255.
 ///
 /// # Errors
 ///
@@ -165,7 +180,7 @@ pub fn visit_column(cloud: &PointCloud, name: &str, mut visit: impl FnMut(&[f64]
     let column = find_column(name, cloud)?;
     for start in (0..cloud.len()).step_by(MAX_VALUES_AT_ONCE) {
         let end = cloud.len().min(start + MAX_VALUES_AT_ONCE);
-        visit(&column.values(cloud, start..end));
+        visit(&column.values(cloud, COLOR_8_TO_16, start..end));
     }
     Ok(())
 }

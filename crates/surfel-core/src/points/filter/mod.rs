@@ -25,8 +25,8 @@ const POINTS_PER_BLOCK: usize = 1 << 11;
 ///
 /// Columns are compared with numbers and with each other by `==`, `!=`, `<`, `<=`, `>` and `>=`, and joined by `&&`,
 /// `||`, `!` and parentheses. PDAL's ranges are understood too: `z[0:100)` means `z >= 0 && z < 100`. Names of columns
-/// are those of the file; case and separators do not matter. `x`, `y` and `z` are world coordinates, colours go from 0
-/// to 65535.
+/// are those of the file; case and separators do not matter. `x`, `y` and `z` are world coordinates. Colours go from 0 to
+/// 255; if a number above 255 is compared with them, they go from 0 to 65535.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointFilter {
     condition: Condition,
@@ -154,6 +154,9 @@ mod tests {
         assert_eq!(kept("z > 1001"), [2, 3]);
         assert_eq!(kept("1001 <= z && !(x >= 3)"), [1, 2]);
         assert_eq!(kept("blue == 65535 && red != 65535"), [0, 1, 2, 3]);
+        assert_eq!(kept("blue == 255 && red < 1"), [0, 1, 2, 3]);
+        assert_eq!(kept("blue > 255"), []);
+        assert_eq!(kept("blue > 65534 && green < blue"), [0, 1, 2, 3]);
         assert_eq!(kept("x > -1e0 and not y < .5 or intensity == 10"), [0, 1, 2, 3]);
     }
 

@@ -16,7 +16,7 @@ pub use support::SupportColors;
 
 use crate::error::Result;
 use crate::image::class_color;
-use crate::points::PointCloud;
+use crate::points::{PointCloud, to_8_bits};
 use crate::progress::Progress;
 use gamma::Gamma;
 use mapping::Mapping;
@@ -79,11 +79,6 @@ pub fn colorize(
 /// Returns a 16-bit channel as a fraction of its maximum.
 fn to_unit(value: u16) -> f32 {
     f32::from(value) / f32::from(u16::MAX)
-}
-
-/// Returns the 8-bit value nearest to a 16-bit channel.
-fn to_8_bits(value: u16) -> u8 {
-    ((u32::from(value) + 128) / 257) as u8
 }
 
 #[cfg(test)]
