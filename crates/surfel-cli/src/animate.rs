@@ -50,7 +50,7 @@ Examples:
 
 /// Renders a movie.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    let mut description = args.scene.description(global)?;
+    let mut description = args.scene.description(global, report)?;
     if args.output.is_some() {
         description.output.output.clone_from(&args.output);
     }

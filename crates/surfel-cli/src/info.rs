@@ -58,7 +58,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let options = description.objects_default.preparation.load_options(ColumnChoice::All)?;
     let limit = global.start()?.memory_limit;
     let mut all = Vec::new();
-    for file in &expand(&args.files)? {
+    for file in &expand(&args.files, report)? {
         let header = surfel_formats::inspect(file)?;
         let info = if args.summary {
             summarize(file, &header)

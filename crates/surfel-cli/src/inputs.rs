@@ -2,6 +2,7 @@
 
 use crate::Usage;
 use crate::interrupt::is_cancelled;
+use crate::report::Report;
 use crate::stdin_copy::remember;
 use anyhow::{Context, anyhow};
 use std::io::{Read, Write};
@@ -9,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::Duration;
 use surfel::description::pattern::{file_names, matching};
+use surfel_core::progress::Progress;
 
 /// Size of a chunk of standard input.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -17,13 +19,16 @@ const CHUNKS_AHEAD: usize = 4;
 /// Time between two looks at a signal.
 const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Returns the files that words of a command line stand for.
+/// Extensions of files of folders that often hold no points: notes, tables and the buffers of glTF.
+const EXTENSIONS_OF_OTHER_FILES: [&str; 4] = ["txt", "csv", "asc", "bin"];
+
+/// Returns the files that words of a command line stand for. Reports files of folders that it leaves out.
 ///
 /// # Errors
 ///
 /// Fails for folders without a file that surfel reads, for patterns that match nothing, and if standard input is named
 /// twice.
-pub fn expand(words: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+pub fn expand(words: &[PathBuf], report: &Report) -> anyhow::Result<Vec<PathBuf>> {
     if 1 < words.iter().filter(|word| is_stdin(word)).count() {
         return Err(
             Usage("- is standard input, which can be read once; name it once".into()).into()
@@ -34,7 +39,7 @@ pub fn expand(words: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
         if is_stdin(word) {
             files.push(standard_input()?);
         } else if word.is_dir() {
-            files.extend(files_of_folder(word)?);
+            files.extend(files_of_folder(word, report)?);
         } else if word.to_string_lossy().contains('*') && !word.exists() {
             files.extend(matching(word).map_err(|error| anyhow!(error))?);
         } else {
@@ -48,7 +53,7 @@ fn is_stdin(word: &Path) -> bool {
     word == Path::new("-")
 }
 
-fn files_of_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+fn files_of_folder(folder: &Path, report: &Report) -> anyhow::Result<Vec<PathBuf>> {
     let names = file_names(folder).map_err(|error| anyhow!(error))?;
     let is_known = |name: &String| {
         let name = name.to_ascii_lowercase();
@@ -57,12 +62,29 @@ fn files_of_folder(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
             .flat_map(|format| format.extensions)
             .any(|extension| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.')))
     };
-    let files: Vec<PathBuf> =
+    let mut files: Vec<PathBuf> =
         names.into_iter().filter(is_known).map(|name| folder.join(name)).collect();
+    files.retain(|file| {
+        let is_other = is_other_file(file);
+        if is_other {
+            report.note(&format!(
+                "{}: left out, since it does not begin with points",
+                file.display()
+            ));
+        }
+        !is_other
+    });
     if files.is_empty() {
         anyhow::bail!("{}: holds no point cloud, mesh or glTF scene", folder.display());
     }
     Ok(files)
+}
+
+/// Returns true for a readable file that has an extension of points and begins with something else.
+fn is_other_file(file: &Path) -> bool {
+    let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    EXTENSIONS_OF_OTHER_FILES.contains(&&*extension)
+        && matches!(surfel_formats::inspect(file), Err(surfel_formats::Error::Malformed { .. }))
 }
 
 /// Copies standard input to a temporary file, whose extension says what its first bytes are.

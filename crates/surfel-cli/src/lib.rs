@@ -120,12 +120,9 @@ pub fn run_program(words: impl IntoIterator<Item = OsString>) -> u8 {
 pub fn scene_provider(words: Vec<OsString>) -> anyhow::Result<Arc<dyn SceneProvider>> {
     let cli = parse(words)?;
     let Command::View(args) = &cli.command else { anyhow::bail!("expected `surfel view`") };
-    let description = args.scene.description(&cli.global)?;
-    Ok(view::open_scene_provider(
-        description,
-        args.scene.files.clone(),
-        &Report::new(Verbosity::Quiet),
-    )?)
+    let report = Report::new(Verbosity::Quiet);
+    let description = args.scene.description(&cli.global, &report)?;
+    Ok(view::open_scene_provider(description, args.scene.files.clone(), &report)?)
 }
 
 fn parse(words: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {

@@ -66,7 +66,7 @@ pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> 
     let run = global.start()?;
     let description = SceneDescription { run, ..args.options.description.clone()? };
     check_cloud(&args.output)?;
-    let files = expand(&args.files)?;
+    let files = expand(&args.files, report)?;
     refuse_input_as_output(&files, &args.output)?;
     let options = PrepareOptions { normals: args.normals, keep_variation: args.keep_variation };
     let Loaded { cloud, info } = prepare_files(&files, &description, options, report)?;

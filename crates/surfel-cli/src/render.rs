@@ -58,7 +58,7 @@ Not the picture you expected? docs/troubleshooting.md lists problems and the opt
 
 /// Renders a picture.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
-    let mut description = args.scene.description(global)?;
+    let mut description = args.scene.description(global, report)?;
     if args.output.is_some() {
         description.output.output.clone_from(&args.output);
     }

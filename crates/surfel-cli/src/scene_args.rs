@@ -3,6 +3,7 @@
 use crate::global::Global;
 use crate::inputs::expand;
 use crate::options::{KeyOptions, Scope};
+use crate::report::Report;
 use clap::Args;
 use std::path::PathBuf;
 use surfel::SceneDescription;
@@ -39,8 +40,12 @@ impl<S: Scope> SceneArgs<S> {
     /// # Errors
     ///
     /// Fails for files that cannot be read, and for keys and values that are not valid.
-    pub fn description(&self, global: &Global) -> anyhow::Result<SceneDescription> {
-        let mut description = self.startup(global)?;
+    pub fn description(
+        &self,
+        global: &Global,
+        report: &Report,
+    ) -> anyhow::Result<SceneDescription> {
+        let mut description = self.startup(global, report)?;
         description.apply_object_settings()?;
         Ok(description)
     }
@@ -51,10 +56,10 @@ impl<S: Scope> SceneArgs<S> {
     /// # Errors
     ///
     /// Fails for files that cannot be read, and for keys and values that are not valid.
-    pub fn startup(&self, global: &Global) -> anyhow::Result<SceneDescription> {
+    pub fn startup(&self, global: &Global, report: &Report) -> anyhow::Result<SceneDescription> {
         let mut description = SceneDescription::default();
         let mut layer = self.options.description.clone()?;
-        for file in expand(&self.files)? {
+        for file in expand(&self.files, report)? {
             if is_scene_file(&file) {
                 description.overlay(SceneDescription::read(&file)?);
             } else {

@@ -99,7 +99,7 @@ Examples:
 /// Serves the viewer until it is interrupted.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {
     freed_memory::keep_little();
-    let description = args.scene.startup(global)?;
+    let description = args.scene.startup(global, report)?;
     start_threads(&description.run)?;
     let renderer = SceneRenderer::new(&description.run)?;
     check_files(&description)?;

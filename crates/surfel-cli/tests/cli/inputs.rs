@@ -1,6 +1,6 @@
 //! Ways to name inputs: standard input, folders and patterns.
 
-use super::common::{Folder, SMALL, command, dome, fail, shot, square, stderr, succeed};
+use super::common::{Folder, SMALL, command, dome, fail, shot, square, stderr, succeed, surfel};
 use std::fs;
 use std::io::Write;
 use std::process::{Output, Stdio};
@@ -69,9 +69,13 @@ fn a_folder_stands_for_its_clouds_and_meshes() {
     let near = folder.write("tiles/near.ply", dome(20));
     let far = folder.write("tiles/far.xyz", square(6, 200));
     folder.write("tiles/notes.md", "no points");
+    let readme = folder.write("tiles/README.TXT", "The tiles of the valley\n");
+    folder.write("tiles/buffer.bin", [7; 41]);
     fs::create_dir(folder.path("tiles/more.ply")).unwrap();
     let expected = shot(&folder, &[&far, &near]);
     assert!(shot(&folder, &[&folder.path("tiles")]) == expected);
+    let output = surfel(&["info", "--summary", &folder.path("tiles")]);
+    assert!(stderr(&output).contains(&format!("{readme}: left out")), "{}", stderr(&output));
     assert!(shot(&folder, &[&near]) != expected);
     fs::remove_file(near).unwrap();
     fs::remove_file(far).unwrap();

@@ -25,9 +25,9 @@ const LONGITUDES: [&str; 4] = ["longitude", "lon", "lng", "long"];
 const LATITUDES: [&str; 2] = ["latitude", "lat"];
 
 impl ColumnRole {
-    /// Returns the role of a column with one of the usual names; case and separators do not matter.
+    /// Returns the role of a column with one of the usual names; case, separators and a unit in brackets do not matter.
     pub fn from_name(name: &str) -> Option<Self> {
-        let plain = plain_name(name);
+        let plain = plain_name(without_unit(name));
         Some(match plain.as_str() {
             "x" | "px" | "posx" | "xcoordinate" | "easting" | "east" | "rechtswert" | "ostwert" => {
                 Self::Position(0)
@@ -40,12 +40,14 @@ impl ColumnRole {
             name if LATITUDES.contains(&name) => Self::Position(1),
             // `Höhe` in any encoding, without the letter that is not ASCII.
             "hhe" => Self::Position(2),
+            // `Grün`.
+            "grn" => Self::Color(1),
             "nx" | "normalx" => Self::Normal(0),
             "ny" | "normaly" => Self::Normal(1),
             "nz" | "normalz" => Self::Normal(2),
-            "r" | "red" | "diffusered" => Self::Color(0),
-            "g" | "green" | "diffusegreen" => Self::Color(1),
-            "b" | "blue" | "diffuseblue" => Self::Color(2),
+            "r" | "red" | "diffusered" | "rot" => Self::Color(0),
+            "g" | "green" | "diffusegreen" | "gruen" => Self::Color(1),
+            "b" | "blue" | "diffuseblue" | "blau" => Self::Color(2),
             "i" => Self::Intensity,
             // CloudCompare writes `scalar_` before the names of its scalar fields.
             _ => match plain.strip_prefix("scalar").unwrap_or(&plain) {
@@ -95,13 +97,22 @@ impl ColumnRole {
 
     /// True for the name of a column of longitudes.
     pub fn is_longitude(name: &str) -> bool {
-        LONGITUDES.contains(&plain_name(name).as_str())
+        LONGITUDES.contains(&plain_name(without_unit(name)).as_str())
     }
 
     /// Returns true for the names of a colour's opacity, which a cloud does not keep.
     pub fn is_alpha(name: &str) -> bool {
         ["alpha", "a", "diffuse_alpha"].contains(&name.to_lowercase().as_str())
     }
+}
+
+/// Returns a name without a unit behind it, as in `Easting (m)` and `z [ft]`.
+fn without_unit(name: &str) -> &str {
+    let trimmed = name.trim_end();
+    let unit = [('(', ')'), ('[', ']')].into_iter().find_map(|(opening, closing)| {
+        trimmed.strip_suffix(closing).and_then(|start| start.rfind(opening))
+    });
+    unit.map_or(name, |unit| &name[..unit])
 }
 
 /// Returns the letters and digits of a name in lower case, since programs separate words in different ways.
@@ -124,6 +135,11 @@ mod tests {
         assert_eq!(ColumnRole::from_name("Longitude"), Some(ColumnRole::Position(0)));
         assert_eq!(ColumnRole::from_name("lat"), Some(ColumnRole::Position(1)));
         assert!(ColumnRole::is_longitude("Lon") && !ColumnRole::is_longitude("x"));
+        assert_eq!(ColumnRole::from_name("Easting (m)"), Some(ColumnRole::Position(0)));
+        assert_eq!(ColumnRole::from_name("Y[US survey ft] "), Some(ColumnRole::Position(1)));
+        assert_eq!(ColumnRole::from_name("Gr\u{fc}n"), Some(ColumnRole::Color(1)));
+        assert_eq!(ColumnRole::from_name("(m)"), None);
+        assert_eq!(ColumnRole::from_name("[z]x"), None);
         assert_eq!(ColumnRole::from_name("Scalar field"), None);
         assert_eq!(ColumnRole::from_name("f_rest_0"), None);
     }

@@ -1,9 +1,13 @@
 //! Reads lines of numbers in parallel, as records of f64.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
 use rayon::prelude::*;
 use surfel_core::math::DVec3;
 use surfel_core::points::{PointCloud, PointFilter};
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use super::cloud_builder::CloudBuilder;
 use super::layout::RecordLayout;
@@ -21,6 +25,9 @@ const TASKS_PER_BATCH: usize = 32;
 pub(crate) const MAX_LINE_LENGTH: usize = 1 << 20;
 /// Maximum number of fields in a line.
 pub(crate) const MAX_FIELDS: usize = 1000;
+
+/// Advice for a broken line.
+const LINE_ADVICE: &str = "repair or remove the line";
 
 /// The lines of a file to read.
 #[derive(Clone, Copy)]
@@ -50,8 +57,8 @@ pub(crate) type ParseLine<'a> =
     &'a (dyn Fn(u64, &[u8], &mut Vec<f64>) -> std::result::Result<(), LineError> + Sync);
 
 /// Reads lines to a cloud of the points that `filter` keeps; also returns the number of rows, kept or not. `layout_of`
-/// is called once, with the first rows as records of f64. A broken line is damage, before which the rows end; so is a
-/// file that ends before as many rows as its limit says.
+/// is called once, with the first rows as records of f64. A broken line is damage: it is left out, or ends rows whose
+/// number is stated. So is a file that ends before as many rows as its limit says.
 pub(crate) fn read_rows(
     salvage: &mut Salvage,
     rows: RowRange,
@@ -68,7 +75,18 @@ pub(crate) fn read_rows(
         Some(_) if salvage.is_on => rows.split_unfinished_line(input),
         _ => (rows, None),
     };
-    if let Err(error) = append_rows(&mut builder, whole, parse, progress) {
+    let broken = BrokenLines::default();
+    let leave_out = |number: u64, line: &[u8], row: &mut Vec<f64>| {
+        parse(number, line, row).or_else(|error| {
+            row.clear();
+            broken.add(number, error);
+            Ok(())
+        })
+    };
+    // Where the number of rows is stated, other data follow, which must not be taken for rows.
+    let leaves_out = salvage.is_on && claimed.is_none();
+    let parse_whole = if leaves_out { &leave_out } else { parse };
+    if let Err(error) = append_rows(&mut builder, whole, parse_whole, progress) {
         salvage.accept(error)?;
     } else if let (Some(last), Some(claimed)) = (last, claimed)
         && builder.n_read() + 1 == claimed
@@ -76,11 +94,41 @@ pub(crate) fn read_rows(
     {
         salvage.accept(error)?;
     }
+    broken.report(salvage, progress)?;
     let n_rows = builder.n_read();
     if let Some(claimed) = claimed.filter(|claimed| n_rows < *claimed) {
         salvage.accept(input.truncated(Location::Byte(input.len() as u64), n_rows, claimed))?;
     }
     Ok((builder.finish(), n_rows))
+}
+
+/// The broken lines that were left out.
+#[derive(Default)]
+struct BrokenLines {
+    /// Their number.
+    count: AtomicUsize,
+    /// The first of them, by its number.
+    first: Mutex<Option<(u64, LineError)>>,
+}
+
+impl BrokenLines {
+    fn add(&self, number: u64, error: LineError) {
+        self.count.fetch_add(1, Ordering::Relaxed);
+        let mut first = self.first.lock().unwrap_or_else(PoisonError::into_inner);
+        if first.as_ref().is_none_or(|(before, _)| number < *before) {
+            *first = Some((number, error));
+        }
+    }
+
+    /// Reports the number of lines, the first of which is damage of the file.
+    fn report(self, salvage: &mut Salvage, progress: &dyn Progress) -> Result<()> {
+        let first = self.first.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let Some((number, LineError { found, expected })) = first else { return Ok(()) };
+        let input = salvage.input;
+        let lines = counted(self.count.into_inner(), "broken line");
+        progress.note(&format!("{}: {lines} left out", input.name));
+        salvage.accept(input.malformed(Location::Line(number), found, expected, LINE_ADVICE))
+    }
 }
 
 impl RowRange {
@@ -122,8 +170,7 @@ pub(crate) fn append_rows(
                 batch.push(parsed.records);
                 builder.append(&batch)?;
                 let location = Location::Line(line + parsed.n_lines - 1);
-                let advice = "repair or remove the line";
-                return Err(input.malformed(location, found, expected, advice));
+                return Err(input.malformed(location, found, expected, LINE_ADVICE));
             }
             left = left.saturating_sub(n_rows);
             line += parsed.n_lines;

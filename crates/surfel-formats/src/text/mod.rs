@@ -115,7 +115,7 @@ fn unnamed_text(input: &Input, preamble: &Preamble) -> Error {
         Location::Line(preamble.data_line),
         format!("`{}`", line[..line.len().min(60)].escape_ascii()),
         "numbers, or a header with at least x, y and z, E, N and H or longitude, latitude and height",
-        "state the columns with --columns, as in -,x,y,z,-, or remove the line if it is no point",
+        "state the columns with --columns, as in -,x,y,z,- or, if the northing comes first, -,y,x,z,-; or remove the line if it is no point",
     )
 }
 
@@ -219,6 +219,14 @@ fn parse_line(
         row.clear();
         return Ok(());
     }
+    if preamble.separator.may_lack_fields(n_fields, columns.len()) {
+        let is_axis = |role: &ColumnRole| matches!(role, ColumnRole::Position(_));
+        let cells = &columns[n_fields..];
+        if !cells.iter().flatten().any(is_axis) {
+            row.extend(cells.iter().flatten().map(|_| f64::NAN));
+            n_fields = columns.len();
+        }
+    }
     let is_longer_by_empty_end = has_empty_end && n_fields == columns.len() + 1;
     if n_fields != columns.len() && !is_longer_by_empty_end {
         let expected = format!("{} as in the lines before", columns.len());
@@ -277,6 +285,7 @@ fn sample_rows(input: &Input, preamble: &Preamble) -> Sample {
 fn file_info(preamble: &Preamble) -> FileInfo {
     let separator = match preamble.separator {
         Separator::Whitespace => "spaces",
+        Separator::Tab => "tabs",
         Separator::Comma => "commas",
         Separator::Semicolon => "semicolons",
     };

@@ -72,7 +72,8 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
         // Texts may hold the separators of other files.
         let fits_header = |separator: &Separator| {
             let n_names = names.as_ref().map_or(0, Vec::len);
-            separator.fields(text).take(MAX_FIELDS).count() == n_names
+            let n_fields = separator.fields(text).take(MAX_FIELDS).count();
+            n_fields == n_names || separator.may_lack_fields(n_fields, n_names)
         };
         let separator =
             header_separator.filter(fits_header).unwrap_or_else(|| Separator::detect(text));
@@ -108,7 +109,9 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
         }
         let has_empty_end = fields.last().is_some_and(|field| field.is_empty());
         let fits = |names: &Vec<String>| {
-            names.len() == fields.len() || has_empty_end && names.len() + 1 == fields.len()
+            names.len() == fields.len()
+                || has_empty_end && names.len() + 1 == fields.len()
+                || separator.may_lack_fields(fields.len(), names.len())
         };
         let header = names.as_ref().or(comment_names.as_ref()).filter(|names| fits(names));
         let is_number = |field: &&[u8]| separator.parse_number(field).is_ok();
@@ -121,7 +124,8 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
             let names = names.or(comment_names.filter(fits));
             let n_names = names.as_ref().map_or(fields.len() - 1, Vec::len);
             // A separator at the end of each line does not begin a further column.
-            let n_fields = if has_empty_end { n_names } else { fields.len() };
+            let has_cut_end = has_empty_end || separator.may_lack_fields(fields.len(), n_names);
+            let n_fields = if has_cut_end { n_names } else { fields.len() };
             return Ok(Preamble {
                 names,
                 count,

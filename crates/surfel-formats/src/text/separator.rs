@@ -6,6 +6,7 @@ use crate::table::{LineError, parse_number};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Separator {
     Whitespace,
+    Tab,
     Comma,
     Semicolon,
 }
@@ -14,12 +15,19 @@ pub(super) enum Separator {
 const MAX_NUMBER_LENGTH: usize = 64;
 
 impl Separator {
-    /// Returns the separator that a line uses.
+    /// Returns the separator that a line uses. Tabs are one if there are texts with spaces between them, else
+    /// whitespace of any kind.
     pub fn detect(line: &[u8]) -> Self {
+        let has_spaces = |field: &[u8]| {
+            let mut words = Self::Whitespace.fields(field);
+            field.contains(&b' ') && !words.all(|word| parse_number(word).is_ok())
+        };
         if line.contains(&b';') {
             Self::Semicolon
         } else if line.contains(&b',') {
             Self::Comma
+        } else if line.contains(&b'\t') && Self::Tab.fields(line).any(has_spaces) {
+            Self::Tab
         } else {
             Self::Whitespace
         }
@@ -28,6 +36,12 @@ impl Separator {
     /// Splits a line into trimmed fields. One in double quotes may hold separators; the quotes are left out.
     pub fn fields(self, line: &[u8]) -> Fields<'_> {
         Fields { separator: self, rest: Some(line) }
+    }
+
+    /// Returns true if a line of fewer fields than there are columns may have ended with empty cells, which were trimmed
+    /// with the line.
+    pub fn may_lack_fields(self, n_fields: usize, n_columns: usize) -> bool {
+        self == Self::Tab && 1 < n_fields && n_fields < n_columns
     }
 
     /// Parses a number. Between semicolons a comma may stand for the decimal point.
@@ -57,7 +71,12 @@ impl<'a> Iterator for Fields<'a> {
     type Item = &'a [u8];
 
     fn next(&mut self) -> Option<&'a [u8]> {
-        let rest = self.rest?.trim_ascii_start();
+        let is_blank = |byte: &u8| match self.separator {
+            Separator::Tab => *byte == b' ',
+            _ => byte.is_ascii_whitespace(),
+        };
+        let rest = self.rest?;
+        let rest = &rest[rest.iter().take_while(|byte| is_blank(byte)).count()..];
         if self.separator == Separator::Whitespace && rest.is_empty() {
             return None;
         }
@@ -74,6 +93,7 @@ impl Fields<'_> {
     fn find_separator(&self, bytes: &[u8]) -> usize {
         let found = match self.separator {
             Separator::Whitespace => bytes.iter().position(u8::is_ascii_whitespace),
+            Separator::Tab => memchr::memchr(b'\t', bytes),
             Separator::Comma => memchr::memchr(b',', bytes),
             Separator::Semicolon => memchr::memchr(b';', bytes),
         };
@@ -120,6 +140,8 @@ mod tests {
         assert_eq!(fields("1, 2,,3,"), ["1", "2", "", "3", ""]);
         assert_eq!(fields("\"a, b\",1,\"c \"\"d\"\"\" ,"), ["a, b", "1", "c \"\"d\"\"", ""]);
         assert_eq!(fields("\"oak tree\" 1 2"), ["oak tree", "1", "2"]);
+        assert_eq!(fields("oak tree\t1 \t\t3"), ["oak tree", "1", "", "3"]);
+        assert_eq!(fields("1\t 2 3 "), ["1", "2", "3"]);
         assert_eq!(fields("\"open,1"), ["\"open", "1"]);
         assert_eq!(fields("\"\";5\""), ["", "5\""]);
         assert_eq!(fields("\"a\"b,1"), ["a", "1"]);

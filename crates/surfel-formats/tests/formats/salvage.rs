@@ -1,6 +1,7 @@
 //! Damaged files: what is whole of them is read if that is asked for, and a note says how much that is.
 
 use las::point::Format;
+use surfel_core::math::Vec3;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::NoProgress;
 use surfel_core::scene::Geometry;
@@ -225,6 +226,19 @@ fn an_ascii_row_that_may_be_cut_is_left_out() {
     let words = "1 of 3 points; found `x` at line 9, expected a number";
     assert_eq!(salvaged("a.ply", broken.as_bytes(), words).len(), 1);
     assert_eq!(salvaged("a.xyz", b"1 2 3\n4 5 6\n7 8", "2 points; found 2 fields").len(), 2);
+}
+
+#[test]
+fn broken_lines_of_text_are_left_out() {
+    let text = "1 2 3\n4 five 6\n7 8 9\n\n10 11\n12 13 14\n";
+    let cloud = salvaged("a.xyz", text.as_bytes(), "3 points; found `five` at line 2");
+    assert_eq!(cloud.positions, [1.0, 7.0, 12.0].map(|x| Vec3::new(x, x + 1.0, x + 2.0)));
+    let long = format!("{}{}", "1 2 3\n4 5 6\nx\n".repeat(100_000), "7 8 9\n");
+    let listener = Listener::default();
+    let loaded = load_bytes("a.xyz", long.as_bytes(), &options(), &listener).unwrap();
+    assert_eq!(loaded.cloud.len(), 200_001);
+    assert!(listener.has_note("a.xyz: 100000 broken lines left out"), "{:?}", listener.notes);
+    assert!(listener.has_note("found `x` at line 3"), "{:?}", listener.notes);
 }
 
 #[test]

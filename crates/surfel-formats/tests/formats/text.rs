@@ -3,7 +3,7 @@
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::NoProgress;
-use surfel_formats::{LoadOptions, TextColumn, load_bytes};
+use surfel_formats::{LoadOptions, Loaded, TextColumn, load_bytes};
 
 use crate::common::{Listener, read};
 
@@ -247,4 +247,21 @@ fn obj_vertices_are_read_with_their_colours() {
     assert_eq!(colored.colors.unwrap()[0], [0, 32768, 65535]);
     let error = read("a.obj", "v 1 2 3\nv 1 2\n").unwrap_err().to_string();
     assert!(error.contains("line 2: found 2 numbers"), "{error}");
+}
+
+#[test]
+fn names_may_have_units_and_tabs_may_separate_texts() {
+    let text = "Easting [m]\tNorthing [m]\tHeight [m]\tPoint name\n1\t2\t3\toak tree\n4\t5\t6\t\n";
+    let Loaded { cloud, info } = read("a.txt", text.as_bytes()).unwrap();
+    assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
+    assert_eq!(info.format, "text, 4 columns separated by tabs");
+    let gaps = "X (m)\tY (m)\tZ (m)\tintensity\n1\t2\t3\t\n4\t5\t6\t7\n";
+    let cloud = read("a.txt", gaps.as_bytes()).unwrap().cloud;
+    let intensity = cloud.intensity.unwrap();
+    assert!(intensity[0].is_nan() && intensity[1] == 7.0, "{intensity:?}");
+    let error = read("a.txt", b"X (m)\tY (m)\tZ (m)\n1\t2\n").unwrap_err().to_string();
+    assert!(error.contains("line 2"), "{error}");
+    let german = "x,y,z,Rot,Gr\u{fc}n,Blau\n1,2,3,255,128,0\n";
+    let colors = read("a.csv", german.as_bytes()).unwrap().cloud.colors;
+    assert_eq!(colors, Some(vec![[65_535, 128 * 257, 0]]));
 }
