@@ -8,12 +8,13 @@ use crate::stdin_copy::with_stdin_named;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use surfel::crs::short_name;
 use surfel::resolve::{MemoryEstimate, up_convention};
 use surfel_core::image::class_name;
 use surfel_core::math::Vec3;
 use surfel_core::points::{
     COLOR_8_TO_16, PointCloud, STATION, ScanStation, Subsample, Values, have_8_bits, infer_up,
-    is_flag, points_per_area, spacing,
+    is_flag, is_valid_position, points_per_area, spacing,
 };
 use surfel_core::progress::Progress;
 use surfel_formats::{ColumnChoice, EmbeddedImage, FileInfo, Loaded};
@@ -110,6 +111,7 @@ fn describe(file: &Path, loaded: &Loaded, report: &Report) -> surfel_core::Resul
         "file": file.display().to_string(),
         "format": source.format,
         "points": cloud.len(),
+        "points_without_position": cloud.len() - cloud.positions.iter().filter(|p| is_valid_position(**p)).count(),
         "triangles": source.n_triangles,
         "bounds": { "min": corner(bounds.min), "max": corner(bounds.max) },
         "global_shift": cloud.origin.to_array(),
@@ -223,6 +225,9 @@ fn table(info: &Value) -> String {
     let mut row = |name: &str, value: String| lines.push(format!("  {name:<14}{value}"));
     row("format", text(&info["format"]));
     row("points", text(&info["points"]));
+    if info["points_without_position"].as_u64().is_some_and(|count| 0 < count) {
+        row("", format!("{} of them without a position", text(&info["points_without_position"])));
+    }
     if !info["triangles"].is_null() {
         row("triangles", text(&info["triangles"]));
     }
@@ -251,7 +256,10 @@ fn table(info: &Value) -> String {
         }
     }
     row("resolution", text(&info["resolution"]));
-    row("coordinates", text(&info["coordinate_system"]));
+    row(
+        "coordinates",
+        info["coordinate_system"].as_str().map_or_else(|| text(&Value::Null), short_name),
+    );
     for (place, image) in info["images"].as_array().into_iter().flatten().enumerate() {
         row(if place == 0 { "images" } else { "" }, image_text(image));
     }

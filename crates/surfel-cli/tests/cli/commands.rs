@@ -244,6 +244,18 @@ fn info_prints_a_table_or_json() {
 }
 
 #[test]
+fn info_counts_triangles_and_points_without_position() {
+    let folder = Folder::new();
+    let mesh =
+        folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4 # a quad\nf 1 2 3\n");
+    let info: Value = serde_json::from_str(&succeed(&["info", "--json", &mesh])).unwrap();
+    assert_eq!((&info["points"], &info["triangles"]), (&json!(4), &json!(3)));
+    let cloud = folder.write("a.xyz", "1 2 3\nnan 5 6\n7 8 9\n");
+    let table = succeed(&["info", &cloud]);
+    assert!(table.contains("1 of them without a position"), "{table}");
+}
+
+#[test]
 fn info_counts_classes_and_returns_and_sums_up_headers() {
     let folder = Folder::new();
     let lines: String = (0..100)

@@ -19,8 +19,21 @@ use crate::table::{TextChunk, line_at};
 
 /// Returns true if the file has a face.
 pub(crate) fn has_faces(input: &Input) -> bool {
-    let mut lines = TextChunk { text: input, start: 0 }.lines(line_end);
-    lines.any(|(_, line)| matches!(split_keyword(line).0, b"f" | b"fo"))
+    faces(input).next().is_some()
+}
+
+/// Returns the number of triangles of all faces, broken ones among them.
+pub(super) fn count_triangles(input: &Input) -> u64 {
+    faces(input).map(|corners| (words(corners).count() as u64).saturating_sub(2)).sum()
+}
+
+/// Returns the corners of each face as text.
+fn faces<'a>(input: &'a Input) -> impl Iterator<Item = &'a [u8]> {
+    let lines = TextChunk { text: input, start: 0 }.lines(line_end);
+    lines.filter_map(|(_, line)| match split_keyword(line) {
+        (b"f" | b"fo", corners) => Some(corners),
+        _ => None,
+    })
 }
 
 /// Reads the faces as meshes of triangles.

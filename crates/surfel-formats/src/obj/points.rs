@@ -2,6 +2,7 @@
 
 use surfel_core::progress::Progress;
 
+use super::mesh::count_triangles;
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
@@ -51,7 +52,8 @@ pub(crate) fn read(
         progress,
     )?;
     salvage.report("points", n_points, None, progress)?;
-    let info = FileInfo { n_points: Some(n_points), ..file_info(n_columns) };
+    let n_triangles = Some(count_triangles(input)).filter(|count| 0 < *count);
+    let info = FileInfo { n_points: Some(n_points), n_triangles, ..file_info(n_columns) };
     Ok(Loaded { cloud, info })
 }
 

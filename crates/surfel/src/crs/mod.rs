@@ -6,6 +6,7 @@ mod wkt;
 
 pub use georeference::georeference;
 pub use reproject::{LOOKS_LIKE_DEGREES, is_in_degrees, move_to_metres};
+pub use wkt::short_name;
 
 use proj4rs::Proj;
 use proj4rs::adaptors::transform_xyz;

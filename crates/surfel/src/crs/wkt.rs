@@ -14,6 +14,22 @@ pub fn definition(text: &str) -> Option<(String, Option<EpsgCodes>)> {
     Some((definition, epsg_codes(text.trim())))
 }
 
+/// Returns the name of the system that a text describes, with its EPSG codes; the text itself if it is no WKT.
+pub fn short_name(text: &str) -> String {
+    let name = Node::parse(text).and_then(|root| {
+        let name = root.content.first()?.trim().strip_prefix('"')?.strip_suffix('"')?;
+        (!name.is_empty()).then(|| name.to_owned())
+    });
+    match (name, epsg_codes(text.trim())) {
+        (Some(name), Some(codes)) => {
+            let vertical = codes.vertical.map(|code| format!("+{code}")).unwrap_or_default();
+            format!("{name} (EPSG:{}{vertical})", codes.horizontal)
+        }
+        (Some(name), None) => name,
+        (None, _) => text.to_owned(),
+    }
+}
+
 fn depth(text: &str) -> usize {
     let (mut depth, mut deepest) = (0_usize, 0);
     for byte in text.bytes() {
@@ -119,6 +135,14 @@ mod tests {
         assert!(words.contains("+proj=tmerc") || words.contains("+proj=utm"), "{words}");
         let without = UTM.replace(r#",AUTHORITY["EPSG","26912"]"#, "");
         assert_eq!(definition(&without).unwrap().1, None);
+    }
+
+    #[test]
+    fn names_are_those_of_the_system() {
+        assert_eq!(short_name(UTM), "NAD83 / UTM zone 12N, metres (EPSG:26912)");
+        assert_eq!(short_name("LOCAL_CS[\"site\",UNIT[\"metre\",1]]"), "site");
+        assert_eq!(short_name("EPSG:2154+5720"), "EPSG:2154+5720");
+        assert_eq!(short_name("GEOGCS[\"\"]"), "GEOGCS[\"\"]");
     }
 
     #[test]
