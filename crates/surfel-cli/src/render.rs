@@ -111,6 +111,10 @@ pub fn render_to_file(
     let heights = heights.map(|path| Ok((path, scene.height_map(report)?)));
     let heights = heights.transpose().map_err(|error: surfel::Error| error)?;
     image.save(output)?;
+    if output != Path::new("-") {
+        let (width, height) = scene.description().picture.resolution();
+        report.note(&format!("{}: {width}x{height} pixels", output.display()));
+    }
     if let (Some((path, map)), Some(place)) = (heights, scene.georeference()) {
         surfel_formats::save_height_map(path, &map, place)?;
     }

@@ -70,7 +70,7 @@ fn steps(criterion: &mut Criterion) {
     group.sample_size(10).throughput(Throughput::Elements(n_points() as u64));
     let cloud = PointCloud::from_positions(in_scan_order());
     group.bench_function("clean", |bencher| {
-        bencher.iter(|| clean(cloud.clone(), Duplicates::Drop, &NoProgress))
+        bencher.iter(|| clean(cloud.clone(), Duplicates::Drop, &[], &NoProgress))
     });
     group.bench_function("subsample spacing", |bencher| {
         bencher.iter(|| subsample(black_box(&cloud), Subsample::Spacing(2.0), 0, &NoProgress));

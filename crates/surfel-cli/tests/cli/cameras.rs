@@ -230,3 +230,25 @@ fn a_tunnel_is_shown_from_within_unless_an_option_says_otherwise() {
         assert!(2.5 < outside[1].hypot(outside[2]), "{outside:?}");
     }
 }
+
+#[test]
+fn an_empty_closed_room_is_lit_from_the_camera_within() {
+    let folder = Folder::new();
+    let steps = |length: f64| (0..=(length * 10.0) as i32).map(|i| f64::from(i) / 10.0);
+    let [width, depth, height] = [6.0, 4.0, 2.5];
+    let points: String = steps(width)
+        .flat_map(|x| steps(depth).map(move |y| (x, y)))
+        .flat_map(|(x, y)| steps(height).map(move |z| [x, y, z]))
+        .filter(|p| (0..3).any(|axis| [0.0, [width, depth, height][axis]].contains(&p[axis])))
+        .map(|[x, y, z]| format!("{x} {y} {z}\n"))
+        .collect();
+    let room = folder.write("room.xyz", points);
+    let lights = |position: &str| -> Value {
+        let focal_point = "--camera-focal-point=5,3,1.2";
+        let arguments = ["render", &room, "--dry-run", "--camera-position", position, focal_point];
+        let description: Value = serde_json::from_str(&succeed(&arguments)).unwrap();
+        description["light"].clone()
+    };
+    assert_eq!(lights("1,1,1.6"), json!(["headlight"]));
+    assert_eq!(lights("-9,-9,6"), json!(["sun", "sky"]));
+}

@@ -48,8 +48,8 @@ const MAX_COMPARED: usize = 64;
 /// ASPRS classes of noise: low points and high noise.
 const NOISE_CLASSES: [u8; 2] = [7, 18];
 
-/// Drops points with invalid positions, those of classes of noise and those flagged withheld unless there are no others,
-/// and duplicates if chosen, and marks unusable normals and radii. Duplicates of a cloud that deforms are kept, as they may part at another time; so are those of trained Gaussians, which may
+/// Drops points with invalid positions, those of classes of noise other than `kept_noise` and those flagged withheld unless
+/// there are no others, and duplicates if chosen, and marks unusable normals and radii. Duplicates of a cloud that deforms are kept, as they may part at another time; so are those of trained Gaussians, which may
 /// have different sizes and colours.
 ///
 /// A column of normals or radii without a usable entry, as trained splats have, is removed.
@@ -60,10 +60,11 @@ const NOISE_CLASSES: [u8; 2] = [7, 18];
 pub fn clean(
     cloud: PointCloud,
     duplicates: Duplicates,
+    kept_noise: &[u8],
     progress: &dyn Progress,
 ) -> Result<(PointCloud, CleanReport)> {
     let mut report = CleanReport { n_points_before: cloud.len(), ..CleanReport::default() };
-    let dropped = find_dropped(&cloud, duplicates, progress, &mut report)?;
+    let dropped = find_dropped(&cloud, duplicates, kept_noise, progress, &mut report)?;
     let mut cloud = if dropped.is_empty() { cloud } else { without(&cloud, &dropped) };
     clean_normals(&mut cloud, &mut report);
     clean_radii(&mut cloud, &mut report);
@@ -94,6 +95,7 @@ impl CleanReport {
 fn find_dropped(
     cloud: &PointCloud,
     duplicates: Duplicates,
+    kept_noise: &[u8],
     progress: &dyn Progress,
     report: &mut CleanReport,
 ) -> Result<Vec<u32>> {
@@ -104,6 +106,7 @@ fn find_dropped(
     }
     progress.check()?;
     let is_invalid = |i: u32| !is_valid_position(positions[i as usize]);
+    let is_noise = |class: &u8| NOISE_CLASSES.contains(class) && !kept_noise.contains(class);
     let noise = cloud.classification.as_deref().filter(|classes| !classes.iter().all(is_noise));
     let is_noise = |i: u32| noise.is_some_and(|classes| is_noise(&classes[i as usize]));
     let indices = 0..positions.len() as u32;
@@ -142,10 +145,6 @@ fn withheld_points(cloud: &PointCloud, stays: impl Fn(u32) -> bool + Sync) -> Op
     let flags = cloud.scalar(WITHHELD)?;
     let is_shown = |i: u32| stays(i) && flags.get(i as usize) == 0.0;
     (0..cloud.len() as u32).into_par_iter().any(is_shown).then_some(flags)
-}
-
-fn is_noise(class: &u8) -> bool {
-    NOISE_CLASSES.contains(class)
 }
 
 /// Returns all but the first index of each group of candidates at equal positions. Takes 8 bytes per point while it
@@ -252,7 +251,7 @@ mod tests {
     use crate::progress::NoProgress;
 
     fn cleaned(cloud: PointCloud) -> (PointCloud, CleanReport) {
-        clean(cloud, Duplicates::Drop, &NoProgress).unwrap()
+        clean(cloud, Duplicates::Drop, &[], &NoProgress).unwrap()
     }
 
     #[test]
@@ -269,7 +268,7 @@ mod tests {
     fn duplicates_stay_if_chosen() {
         let positions = vec![Vec3::X, Vec3::Y, Vec3::X, Vec3::NAN];
         let cloud = PointCloud::from_positions(positions.clone());
-        let (cloud, report) = clean(cloud, Duplicates::Keep, &NoProgress).unwrap();
+        let (cloud, report) = clean(cloud, Duplicates::Keep, &[], &NoProgress).unwrap();
         assert_eq!(cloud.positions, positions[..3]);
         assert_eq!((report.n_invalid_positions, report.n_duplicates), (1, 0));
     }
@@ -356,6 +355,11 @@ mod tests {
         assert_eq!((report.n_noise, report.n_duplicates), (2, 0));
         let (cloud, report) = cleaned(classified([7, 7, 7, 18]));
         assert_eq!((cloud.len(), report.n_noise, report.n_duplicates), (3, 0, 1));
+        let positions = [Vec3::X, Vec3::Y, Vec3::Z].to_vec();
+        let mut cloud = PointCloud::from_positions(positions);
+        cloud.classification = Some(vec![5, 7, 18]);
+        let (cloud, report) = clean(cloud, Duplicates::Drop, &[5, 7], &NoProgress).unwrap();
+        assert_eq!((cloud.classification, report.n_noise), (Some(vec![5, 7]), 1));
     }
 
     #[test]

@@ -19,6 +19,8 @@ pub const SURFACE_VARIATION: &str = "surface_variation";
 pub struct Preparation {
     /// The choice whether duplicates are dropped.
     pub duplicates: Duplicates,
+    /// ASPRS classes of noise whose points are kept.
+    pub kept_noise: Vec<u8>,
     /// The choice whether points in the air between two surfaces are dropped, where the grid of a scan tells them.
     pub mixed_pixels: MixedPixels,
     /// The points to keep; none keeps all.
@@ -55,6 +57,7 @@ impl Default for Preparation {
     fn default() -> Self {
         Self {
             duplicates: Duplicates::default(),
+            kept_noise: Vec::new(),
             mixed_pixels: MixedPixels::default(),
             subsample: None,
             remove_outliers: None,

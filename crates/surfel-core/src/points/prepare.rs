@@ -50,7 +50,8 @@ pub fn select_points(
     preparation: &Preparation,
     progress: &dyn Progress,
 ) -> Result<(PointCloud, CleanReport)> {
-    let (mut cloud, report) = clean(cloud, preparation.duplicates, progress)?;
+    let (mut cloud, report) =
+        clean(cloud, preparation.duplicates, &preparation.kept_noise, progress)?;
     if preparation.mixed_pixels == MixedPixels::Drop
         && let Some(kept) = without_mixed_pixels(&cloud)
     {

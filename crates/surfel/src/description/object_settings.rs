@@ -193,6 +193,7 @@ impl ObjectSettings {
         let nearest = settings.normals_k.map(|k| Neighborhood::Nearest(k as usize));
         Preparation {
             duplicates: settings.duplicates.unwrap_or(default.duplicates),
+            kept_noise: settings.class.clone().unwrap_or_default(),
             mixed_pixels: settings.mixed_pixels(),
             subsample: settings.subsample,
             remove_outliers: settings.remove_outliers,

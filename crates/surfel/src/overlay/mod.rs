@@ -49,28 +49,18 @@ const LINES_PER_PICTURE: f32 = 45.0;
 const MIN_TEXT_SIZE: f32 = 11.0;
 
 impl Overlay {
-    /// The overlay that settings ask for. `camera` is the one of the first picture; `up` and `unit` are those of the
-    /// coordinates.
-    ///
-    /// # Errors
-    ///
-    /// Fails if a scale bar or a north arrow is asked of a camera that is not orthographic, and if north is along the
-    /// view.
+    /// The overlay that settings ask for. `up` and `unit` are those of the coordinates.
     pub fn new(
         picture: &PictureSettings,
         legend: Legend,
-        camera: &Camera,
         (up, unit): (Vec3, Unit),
         progress: &dyn Progress,
-    ) -> Result<Self, Invalid> {
-        if let Some(fault) = faults(picture, camera, up).into_iter().next() {
-            return Err(fault);
-        }
+    ) -> Self {
         let overlay = Self::of(picture, legend, (up, unit));
         if picture.legend() && overlay.legend.is_none() {
             progress.note("no legend: the colours are the points' own, or one for all");
         }
-        Ok(overlay)
+        overlay
     }
 
     /// The overlay that settings ask for, for cameras that may change: pictures lack what their camera does not allow.
@@ -239,7 +229,7 @@ mod tests {
     }
 
     fn overlay(picture: &PictureSettings, legend: Legend) -> Overlay {
-        Overlay::new(picture, legend, &plan(50.0), (Vec3::Z, Unit::Unknown), &NoProgress).unwrap()
+        Overlay::new(picture, legend, (Vec3::Z, Unit::Unknown), &NoProgress)
     }
 
     fn everything() -> (PictureSettings, Legend) {
@@ -383,8 +373,7 @@ mod tests {
         let camera =
             Camera { projection: Projection::Perspective { view_angle_deg: 35.0 }, ..plan(1.0) };
         let (picture, legend) = everything();
-        let error = Overlay::new(&picture, legend, &camera, (Vec3::Z, Unit::Unknown), &NoProgress)
-            .unwrap_err();
+        let error = faults(&picture, &camera, Vec3::Z).remove(0);
         assert!(error.to_string().contains("--camera-orthographic"), "{error}");
         assert_eq!(error.path, "scale_bar");
     }

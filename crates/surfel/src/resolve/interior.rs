@@ -2,7 +2,7 @@
 
 use super::loaded::LoadedScene;
 use crate::description::{Interior, SceneDescription};
-use surfel_core::math::Vec3;
+use surfel_core::math::{Aabb, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Camera, Clip, ClipPlane, Graph, Room, find_room};
@@ -30,6 +30,13 @@ pub fn choose_room(
         progress.choice(line, &["camera.interior"]);
     }
     room
+}
+
+/// Returns true if the camera stands in a closed room, be it an empty one.
+pub fn stands_in_room(points: &PointCloud, bounds: Aabb, up: Vec3, camera: &Camera) -> bool {
+    let local = (camera.position - points.origin).as_vec3();
+    let is_within = bounds.contains(Aabb::of_points([local]));
+    is_within && find_room(points, up, false).is_some_and(|room| room.contains(camera.position))
 }
 
 /// True if a cloud of the scene has trained splats.

@@ -45,12 +45,12 @@ pub(crate) use sun_and_sky::{expose, expose_lamps};
 use crate::crs::{CoordinateSystem, Unit};
 use crate::description::{CameraSettings, LightKind, OrthographicHeight, SceneDescription};
 use crate::error::Result;
-use crate::overlay::Overlay;
+use crate::overlay::{Overlay, faults};
 use crate::progress_log::{Choice, ProgressLog};
 use camera::SceneExtent;
 use complete_description::complete_description;
 use inside::{Inside, choose_inside};
-use interior::{choose_room, hidden_ceiling, hidden_walls};
+use interior::{choose_room, hidden_ceiling, hidden_walls, stands_in_room};
 use plan::{check_height_map, frame_plan};
 use point_size::choose_point_size;
 use spread::report_gaps;
@@ -162,7 +162,8 @@ impl AutoSettings {
             None => hidden_walls(room.as_ref(), &camera.camera, progress),
         };
         let is_inside = matches!(inside, Some(Inside::Tunnel(_)))
-            || room.is_some_and(|room| room.contains(camera.camera.position));
+            || room.is_some_and(|room| room.contains(camera.camera.position))
+            || stands_in_room(&points, bounds, up, &camera.camera);
         let scan = view.map(|view| ScanInView { points: &points, view });
         let has_normals = scene.has_normals(description);
         let context =
@@ -197,6 +198,7 @@ impl LoadedScene {
     ) -> Result<Resolved> {
         let complete = auto.complete_description(&self);
         let AutoSettings { up, camera, lights, description, hidden_walls, turned_room } = auto;
+        check_camera(&description, &camera.at(0.0, &self.graph), up)?;
         let clouds = self.take_prepared(&description, progress)?;
         let legend = match description.picture.legend() {
             true => common_legend(&self, &clouds, &description, up),
@@ -211,11 +213,8 @@ impl LoadedScene {
         let unit = system.as_ref().map_or(Unit::Unknown, CoordinateSystem::unit);
         let overlay = match is_exr(&description) {
             true => Overlay::default(),
-            false => {
-                Overlay::new(&description.picture, legend, &scene.camera, (up, unit), progress)?
-            }
+            false => Overlay::new(&description.picture, legend, (up, unit), progress),
         };
-        check_height_map(&description, &scene.camera)?;
         let settings = render_settings(&description);
         let choices = Vec::new();
         let description = complete;
@@ -278,6 +277,14 @@ pub fn render_settings(description: &SceneDescription) -> Settings {
 }
 
 /// Returns true if the picture is written with all layers, for other programs rather than to be looked at.
+/// Checks that the first camera allows the scale bar, the north arrow and the height map that are asked for.
+fn check_camera(description: &SceneDescription, camera: &Camera, up: Vec3) -> Result<()> {
+    let faults =
+        if is_exr(description) { Vec::new() } else { faults(&description.picture, camera, up) };
+    faults.into_iter().next().map_or(Ok(()), Err)?;
+    Ok(check_height_map(description, camera)?)
+}
+
 fn is_exr(description: &SceneDescription) -> bool {
     let extension = description.output.output.as_ref().and_then(|path| path.extension());
     extension.is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
