@@ -7,7 +7,7 @@ use super::point_columns::{PointColumns, fits_precision};
 use crate::bvh::{self, BvhNode, BvhPrimitive, NO_PRIMITIVE};
 use crate::error::Result;
 use crate::image::decode_srgb8;
-use crate::math::{LANES, Vec3};
+use crate::math::{LANES, Vec3, median};
 use crate::progress::Progress;
 use crate::surface::{SurfaceKind, Surfel};
 use rayon::prelude::*;
@@ -100,12 +100,7 @@ impl FlatPoints {
         const N_SAMPLES: usize = 1000;
         let step = self.blocks.len().div_ceil(N_SAMPLES).max(1);
         let sample = self.blocks.iter().step_by(step);
-        let mut distances: Vec<f32> = sample.filter_map(PointBlock::min_distance).collect();
-        let middle = distances.len() / 2;
-        if distances.is_empty() {
-            return f32::INFINITY;
-        }
-        *distances.select_nth_unstable_by(middle, f32::total_cmp).1
+        median(sample.filter_map(PointBlock::min_distance)).unwrap_or(f32::INFINITY)
     }
 
     /// Returns the radius of the point at `slot`.

@@ -1,5 +1,5 @@
-//! Boxes, rays, bases, Morton order, sampling maps, distributions, eigenvectors, counter-based random
-//! numbers, and the lanes in which kernels compute.
+//! Boxes, rays, bases, Morton order, sampling maps, distributions, quantiles, eigenvectors, counter-based
+//! random numbers, and the lanes in which kernels compute.
 
 mod aabb;
 mod basis;
@@ -10,6 +10,7 @@ pub mod eigen_lanes;
 mod lanes;
 mod morton;
 mod portable;
+mod quantile;
 mod random;
 mod ray;
 mod sampling;
@@ -31,6 +32,7 @@ pub use lanes::{
 };
 pub use morton::morton_decode;
 pub use portable::{PortableLanes, PortableMask};
+pub use quantile::{TotalOrder, median, quantile};
 pub use random::{Random, hash};
 pub use ray::Ray;
 pub use sampling::{cosine_hemisphere, disk, owen_sobol_2d, uniform_cone};

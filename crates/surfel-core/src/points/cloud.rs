@@ -2,7 +2,7 @@
 
 use super::deformation::{Morph, Skin, pick};
 use super::scan_station::{STATION, ScanStation};
-use crate::math::{Aabb, DVec3, Vec3};
+use crate::math::{Aabb, DVec3, Vec3, median};
 
 /// Maximum magnitude of a coordinate whose squares are sure to be finite. Files mark points without a measurement
 /// by larger numbers.
@@ -215,20 +215,11 @@ impl PointCloud {
     ///
     /// An outlier does not move the median, as it does the middle of the bounds.
     pub fn choose_origin(sample: &[DVec3]) -> DVec3 {
-        let median = |axis: usize| {
-            let mut values: Vec<f64> = sample
-                .iter()
-                .map(|p| p[axis])
-                .filter(|x| x.abs() < f64::from(MAX_COORDINATE))
-                .collect();
-            let middle = values.len() / 2;
-            if values.is_empty() {
-                0.0
-            } else {
-                values.select_nth_unstable_by(middle, f64::total_cmp).1.round()
-            }
+        let rounded_median = |axis: usize| {
+            let values = sample.iter().map(|p| p[axis]);
+            median(values.filter(|x| x.abs() < f64::from(MAX_COORDINATE))).map_or(0.0, f64::round)
         };
-        DVec3::new(median(0), median(1), median(2))
+        DVec3::new(rounded_median(0), rounded_median(1), rounded_median(2))
     }
 
     /// Moves the zero of `positions` to `origin`; world coordinates stay.

@@ -16,7 +16,7 @@ use super::scan_rings::ScanRings;
 use super::sparse_walls::find_sparse_walls;
 use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
 use super::structure_votes::{Voters, voters_among};
-use super::typical::{Typical, quantile};
+use super::typical::{Typical, sampled_quantile};
 use super::up::is_mostly_land;
 use crate::error::Result;
 use crate::math::Vec3;
@@ -191,7 +191,7 @@ pub fn find_shapes<'a>(
         close_gaps(&tree, radii, is_by_gap, &free_space, &mut shapes, progress)?;
     }
     if is_land {
-        narrow_to_roofs(&cloud.positions, quantile(radii, 0.5), &mut shapes, progress)?;
+        narrow_to_roofs(&cloud.positions, sampled_quantile(radii, 0.5), &mut shapes, progress)?;
     }
     if let (StructureChoice::Auto, Some((fits, _))) = (preparation.structure, fits) {
         for (fit, shape) in fits.iter_mut().zip(&shapes) {

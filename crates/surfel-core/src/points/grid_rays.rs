@@ -3,7 +3,7 @@
 //! Most scanners turn by equal steps: one index of the grid is an azimuth, the other an elevation.
 
 use super::scan_grid::ScanGrid;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Vec3, median};
 use std::f64::consts::{PI, TAU};
 
 /// Number of rays with points that the steps are found from.
@@ -57,11 +57,10 @@ impl GridRays {
             Some((wrapped(azimuth - sample.azimuth), elevation - sample.elevation))
         };
         let median_turn = |offset: [isize; 2]| {
-            let turns: Vec<(f64, f64)> =
-                samples.iter().filter_map(|sample| turn_to(sample, offset)).collect();
-            let azimuth = median(turns.iter().map(|turn| turn.0).collect());
-            (MIN_PAIRS <= turns.len())
-                .then(|| (azimuth, median(turns.iter().map(|turn| turn.1).collect())))
+            let turns = samples.iter().filter_map(|sample| turn_to(sample, offset));
+            let (azimuths, elevations): (Vec<f64>, Vec<f64>) = turns.unzip();
+            let is_enough = MIN_PAIRS <= azimuths.len();
+            is_enough.then_some((median(azimuths)?, median(elevations)?))
         };
         let (along_rows, along_columns) = (median_turn([1, 0])?, median_turn([0, 1])?);
         let has_azimuth_columns = along_columns.1.abs() < along_columns.0.abs();
@@ -132,7 +131,7 @@ impl Steps {
             steps.step += slope;
         }
         let residuals = pairs.iter().map(|(index, angle)| steps.residual(*index, *angle).abs());
-        (median(residuals.collect()) < MAX_RESIDUAL * steps.step.abs()).then_some(steps)
+        (median(residuals)? < MAX_RESIDUAL * steps.step.abs()).then_some(steps)
     }
 
     fn residual(&self, index: f64, angle: f64) -> f64 {
@@ -157,15 +156,6 @@ fn angles(measured: DVec3) -> (f64, f64) {
 /// Returns an angle between -pi and pi.
 fn wrapped(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
-}
-
-/// Returns the median; infinite for no values.
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return f64::INFINITY;
-    }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 use super::neighbors::{KdTree, Neighbor};
 use super::normals::{PlaneFit, canonical_sign};
 use crate::error::Result;
-use crate::math::Vec3;
+use crate::math::{Vec3, quantile};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -124,13 +124,9 @@ fn regional_noises(tree: &KdTree, jets: &[Option<JetFit>]) -> Vec<f32> {
     let mut noises = vec![0.0; jets.len()];
     for region in tree.order().chunks(REGION_SIZE) {
         let jets = region.iter().filter_map(|point| jets[*point as usize]);
-        let mut residuals: Vec<f32> = jets.map(|jet| jet.residual).collect();
-        if residuals.is_empty() {
-            continue;
+        if let Some(noise) = quantile(jets.map(|jet| jet.residual), 0.25) {
+            region.iter().for_each(|point| noises[*point as usize] = noise);
         }
-        let quarter = residuals.len() / 4;
-        let (_, noise, _) = residuals.select_nth_unstable_by(quarter, f32::total_cmp);
-        region.iter().for_each(|point| noises[*point as usize] = *noise);
     }
     noises
 }

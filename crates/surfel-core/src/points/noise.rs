@@ -7,7 +7,7 @@ use super::depth_steps::DepthSteps;
 use super::neighbors::KdTree;
 use super::normals::{PlaneFit, fit_plane};
 use crate::error::Result;
-use crate::math::Vec3;
+use crate::math::{Vec3, quantile};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -100,10 +100,8 @@ impl Noise {
     }
 
     /// Returns the noise that this fraction of the regions does not exceed.
-    pub fn quantile(&self, fraction: f32) -> f32 {
-        let mut noises = self.noises.clone();
-        noises.sort_unstable_by(f32::total_cmp);
-        noises.get((fraction * noises.len() as f32) as usize).copied().unwrap_or(0.0)
+    pub fn quantile(&self, fraction: f64) -> f32 {
+        quantile(self.noises.iter().copied(), fraction).unwrap_or(0.0)
     }
 
     /// True if the cloud is made of surfaces, not of leaves.

@@ -3,7 +3,7 @@
 use super::PointCloud;
 use super::radius::spacing;
 use crate::error::Result;
-use crate::math::Vec3;
+use crate::math::{Vec3, median};
 use crate::progress::Progress;
 use crate::words::format_length;
 use rayon::prelude::*;
@@ -26,11 +26,14 @@ pub fn take_radii_from_normals(cloud: &mut PointCloud, progress: &dyn Progress) 
         return Ok(());
     };
     let lengths: Vec<f32> = normals.par_iter().map(|normal| normal.length()).collect();
-    let mut valid: Vec<f32> =
+    let valid: Vec<f32> =
         lengths.iter().copied().filter(|length| 0.0 < *length && length.is_finite()).collect();
     let n_units = valid.iter().filter(|length| (**length - 1.0).abs() < MIN_DIFFERENCE).count();
-    let Some((min, median, max)) = statistics(&mut valid) else { return Ok(()) };
-    if valid.len() < 10 * n_units || max < MIN_VARIATION * min {
+    let min = valid.iter().copied().fold(f32::INFINITY, f32::min);
+    let max = valid.iter().copied().fold(0.0, f32::max);
+    let n_valid = valid.len();
+    let Some(median) = median(valid) else { return Ok(()) };
+    if n_valid < 10 * n_units || max < MIN_VARIATION * min {
         return Ok(());
     }
     let finite: Vec<Vec3> = cloud.positions.iter().copied().filter(|p| p.is_finite()).collect();
@@ -42,14 +45,6 @@ pub fn take_radii_from_normals(cloud: &mut PointCloud, progress: &dyn Progress) 
     progress.choice(&line, &["radius"]);
     cloud.radii = Some(lengths);
     Ok(())
-}
-
-/// Returns the least, the median and the greatest of values; `None` if there are none.
-fn statistics(values: &mut [f32]) -> Option<(f32, f32, f32)> {
-    let min = values.iter().copied().reduce(f32::min)?;
-    let max = values.iter().copied().reduce(f32::max)?;
-    let middle = values.len() / 2;
-    Some((min, *values.select_nth_unstable_by(middle, f32::total_cmp).1, max))
 }
 
 #[cfg(test)]

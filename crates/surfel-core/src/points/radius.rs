@@ -2,7 +2,7 @@
 
 use super::neighbors::{KdTree, Neighbor, Neighborhood, nearest_by_brute_force};
 use crate::error::{Error, Result};
-use crate::math::{Random, Vec3};
+use crate::math::{Random, Vec3, median};
 use crate::progress::Progress;
 use crate::words::{counted, format_length};
 use rayon::prelude::*;
@@ -135,7 +135,7 @@ pub(super) fn clamp_outlier_radii(
 ) -> Result<(Vec<f32>, RadiusReport)> {
     // A sample of a million gives the median closely enough and takes little memory.
     let sample = distances.iter().copied().step_by((distances.len() >> 20) + 1);
-    let typical = median(sample.filter(|r| is_valid_radius(*r)).collect());
+    let typical = median(sample.filter(|r| is_valid_radius(*r)));
     let typical = typical.unwrap_or(1.0);
     let clamped = |(point, &distance): (usize, &f32)| {
         progress.check()?;
@@ -147,8 +147,8 @@ pub(super) fn clamp_outlier_radii(
         }
         let neighbors = tree.nearest(tree.positions()[point], k, Some(point as u32));
         let around = neighbors.iter().map(|neighbor| distances[neighbor.index as usize]);
-        let limit = MAX_OUTLIER_RATIO
-            * median(around.filter(|r| is_valid_radius(*r)).collect()).unwrap_or(typical);
+        let limit =
+            MAX_OUTLIER_RATIO * median(around.filter(|r| is_valid_radius(*r))).unwrap_or(typical);
         let repair = if limit < distance { Repair::Clamped } else { Repair::None };
         Ok((distance.min(limit), repair))
     };
@@ -215,7 +215,7 @@ impl RadiusReport {
 fn with_report(radii: Vec<f32>) -> (Vec<f32>, RadiusReport) {
     let min = radii.iter().copied().reduce(f32::min).unwrap_or(0.0);
     let max = radii.iter().copied().reduce(f32::max).unwrap_or(0.0);
-    let median = if min == max { Some(max) } else { median(radii.clone()) };
+    let median = if min == max { Some(max) } else { median(radii.iter().copied()) };
     let median = median.unwrap_or(0.0);
     (radii, RadiusReport { min, median, max, ..RadiusReport::default() })
 }
@@ -264,7 +264,7 @@ pub fn median_distance(
     };
     let distances = points.par_iter().map(distances).collect::<Result<Vec<_>>>()?;
     let lengths = distances.into_iter().flatten().map(|found| found.distance_squared.sqrt());
-    Ok(median(lengths.filter(|d| is_valid_radius(*d)).collect()).unwrap_or(1.0))
+    Ok(median(lengths.filter(|d| is_valid_radius(*d))).unwrap_or(1.0))
 }
 
 /// Estimates the mean distance between neighbouring points on the surface that they sample: the median over a
@@ -282,7 +282,7 @@ pub fn spacing(positions: &[Vec3], progress: &dyn Progress) -> Result<f32> {
         let last = neighbors.last()?;
         Some(2.0 * (last.distance_squared / neighbors.len() as f32).sqrt())
     });
-    Ok(median(spacings.filter(|s| is_valid_radius(*s)).collect()).unwrap_or(0.0))
+    Ok(median(spacings.filter(|s| is_valid_radius(*s))).unwrap_or(0.0))
 }
 
 /// Returns the indices of random points, or of all points if there are no more than `samples`.
@@ -295,11 +295,6 @@ fn sample_points(n_points: usize, samples: usize, seed: u64) -> Result<Vec<usize
     }
     let mut random = Random::new(seed, 0);
     Ok((0..samples).map(|_| random.below(n_points as u64) as usize).collect())
-}
-
-fn median(mut values: Vec<f32>) -> Option<f32> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
 impl FromStr for Radius {

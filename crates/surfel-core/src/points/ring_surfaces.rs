@@ -6,7 +6,7 @@
 use super::neighbors::KdTree;
 use super::scan_rings::Ring;
 use super::structure::{PointShape, Structure};
-use super::typical::quantile;
+use super::typical::sampled_quantile;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -102,7 +102,7 @@ pub fn close_ring_gaps(
 fn median_step(ring: &Ring) -> f32 {
     let steps = ring.azimuths.windows(2).map(|pair| pair[1] - pair[0]);
     let steps: Vec<f32> = steps.filter(|step| 0.0 < *step).collect();
-    quantile(&steps, 0.5)
+    sampled_quantile(&steps, 0.5)
 }
 
 /// A part of a ring.

@@ -7,7 +7,7 @@ use super::structure::{PointShape, Structure, is_line, is_surface};
 use super::subsample::indices_by_spacing;
 use super::wide_discs::WideDisc;
 use crate::error::Result;
-use crate::math::Vec3;
+use crate::math::{Vec3, quantile};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -40,13 +40,9 @@ pub fn widen_lines(
     let mut widened = Vec::new();
     let lines = shapes.iter().enumerate().filter(|(_, shape)| shape.structure == Structure::Line);
     let mut open: Vec<u32> = lines.map(|(point, _)| point as u32).collect();
-    let mut radii: Vec<f32> = open.iter().map(|point| shapes[*point as usize].radius).collect();
-    if open.is_empty() {
-        return Ok(widened);
-    }
-    let quarter = radii.len() / 4;
-    let (_, first_quartile, _) = radii.select_nth_unstable_by(quarter, f32::total_cmp);
-    let mut spacing = 0.5 * *first_quartile;
+    let radii = open.iter().map(|point| shapes[*point as usize].radius);
+    let Some(first_quartile) = quantile(radii, 0.25) else { return Ok(widened) };
+    let mut spacing = 0.5 * first_quartile;
     let mut kept: Vec<u32> = (0..positions.len() as u32).collect();
     let mut thinned = positions.to_vec();
     while !open.is_empty() && 0.0 < spacing && spacing.is_finite() {

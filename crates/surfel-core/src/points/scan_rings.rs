@@ -3,7 +3,7 @@
 //! The laser of each point follows from a column, from the order of the points in the file, one turn of a laser after the
 //! other, or from elevations that repeat.
 
-use super::typical::quantile;
+use super::typical::sampled_quantile;
 use super::{PointCloud, ROW_INDEX, Values, is_valid_position};
 use crate::error::Result;
 use crate::math::{DVec3, Vec3};
@@ -182,7 +182,8 @@ fn rings(directions: &[Option<Direction>], ring_of_point: &[u16]) -> Option<Vec<
     let mut ring = |mut points: Vec<u32>| {
         let elevations = points.iter().filter_map(direction).map(|one| one.elevation_deg);
         let elevations: Vec<f32> = elevations.collect();
-        let [low, elevation_deg, high] = [0.25, 0.5, 0.75].map(|part| quantile(&elevations, part));
+        let [low, elevation_deg, high] =
+            [0.25, 0.5, 0.75].map(|part| sampled_quantile(&elevations, part));
         widths.push((high - low).to_radians());
         let azimuth = |point: &u32| direction(point).map_or(0.0, |one| one.azimuth);
         points.sort_by(|a, b| azimuth(a).total_cmp(&azimuth(b)));
@@ -192,7 +193,8 @@ fn rings(directions: &[Option<Direction>], ring_of_point: &[u16]) -> Option<Vec<
     let mut rings: Vec<Ring> = of_ring.into_iter().map(&mut ring).collect();
     rings.sort_by(|a, b| a.elevation_rad.total_cmp(&b.elevation_rad));
     let steps = rings.windows(2).map(|pair| pair[1].elevation_rad - pair[0].elevation_rad);
-    let [step, width] = [steps.collect(), widths].map(|values: Vec<f32>| quantile(&values, 0.5));
+    let [step, width] =
+        [steps.collect(), widths].map(|values: Vec<f32>| sampled_quantile(&values, 0.5));
     (MIN_STEP_RAD < step && width < MAX_SPREAD * step).then_some(rings)
 }
 
@@ -201,7 +203,7 @@ fn have_variation(rings: &[Ring], directions: &[Option<Direction>]) -> bool {
     let is_varied = |ring: &&Ring| {
         let directions = ring.points.iter().filter_map(|point| directions[*point as usize]);
         let ranges: Vec<f32> = directions.map(|direction| direction.range).collect();
-        let [low, median, high] = [0.01, 0.5, 0.99].map(|part| quantile(&ranges, part));
+        let [low, median, high] = [0.01, 0.5, 0.99].map(|part| sampled_quantile(&ranges, part));
         MIN_VARIATION * median < high - low
     };
     MIN_VARIED * rings.len() as f32 <= rings.iter().filter(is_varied).count() as f32
@@ -249,7 +251,7 @@ fn bounds_of_rings(sorted: &[f32], min_step: f32) -> Option<Vec<[f32; 2]>> {
     }
     let widths = bounds.iter().map(|[first, last]| last - first).collect();
     let steps = bounds.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
-    let [width, step] = [widths, steps].map(|values: Vec<f32>| quantile(&values, 0.5));
+    let [width, step] = [widths, steps].map(|values: Vec<f32>| sampled_quantile(&values, 0.5));
     (width < MAX_RING_WIDTH * step).then_some(bounds)
 }
 

@@ -3,7 +3,7 @@
 use super::neighbors::{KdTree, Neighbor};
 use super::radius::kth_distance;
 use super::structure::{PointShape, Structure};
-use crate::math::{DVec3, SymmetricMatrix, Vec3};
+use crate::math::{DVec3, SymmetricMatrix, Vec3, median};
 
 /// Half the length of a capsule, in multiples of its thickness's radius.
 pub const CAPSULE_ASPECT: f32 = 4.0;
@@ -97,14 +97,10 @@ pub fn ball_radius(distance: f32, radius: f32) -> f32 {
 /// than the typical radius of a surface.
 pub fn clamp_solids(shapes: &mut [PointShape], structure: Structure, typical_radius: f32) {
     let solids = shapes.iter().filter(|shape| shape.structure == structure);
-    let mut radii: Vec<f32> = solids.map(|shape| shape.radius).collect();
-    if radii.is_empty() {
-        return;
-    }
-    let middle = radii.len() / 2;
-    let median = *radii.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let n_solids = solids.clone().count();
+    let Some(median) = median(solids.map(|shape| shape.radius)) else { return };
     let limit = MAX_SOLID_RATIO * median;
-    let limit = if radii.len() < MIN_SOLIDS { limit.min(typical_radius) } else { limit };
+    let limit = if n_solids < MIN_SOLIDS { limit.min(typical_radius) } else { limit };
     for shape in shapes.iter_mut().filter(|shape| shape.structure == structure) {
         shape.radius = shape.radius.min(limit);
     }

@@ -7,7 +7,7 @@ use super::neighbors::KdTree;
 use super::normals::fit_plane;
 use super::solids::{N_LINE_NEIGHBORS, settle};
 use super::structure::{PointShape, Structure, is_line};
-use super::typical::quantile;
+use super::typical::sampled_quantile;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::progress::Progress;
@@ -17,7 +17,7 @@ use rayon::prelude::*;
 const MIN_ON_SURFACES: f32 = 0.5;
 /// Fraction of the discs, from the smallest on, that a stray point is compared with: chance makes surfaces of a few stray
 /// points, too.
-const TRUSTED_DISCS: f32 = 0.95;
+const TRUSTED_DISCS: f64 = 0.95;
 /// Maximum ratio of the radius of a ball or capsule to that of the nearest disc.
 const MAX_STRAY_RATIO: f32 = 2.0;
 /// Maximum ratio of the radius of a larger disc, far from all these, to that of the nearest: the spacing of a scan grows
@@ -68,8 +68,8 @@ impl DiscSizes {
         let is_enough = MIN_ON_SURFACES * shapes.len() as f32 <= radii.len() as f32;
         (!radii.is_empty() && is_enough).then(|| Self {
             n_discs: radii.len(),
-            typical: quantile(&radii, 0.5),
-            largest: quantile(&radii, TRUSTED_DISCS),
+            typical: sampled_quantile(&radii, 0.5),
+            largest: sampled_quantile(&radii, TRUSTED_DISCS),
         })
     }
 

@@ -3,15 +3,15 @@
 use super::edge_planes::PLANE_THICKNESS;
 use super::normals::PlaneFit;
 use super::structure::is_surface;
+use crate::math::quantile;
 
 /// Ratio of a radius to the typical one from which the neighbourhood is sparse.
 pub const SPARSE: f32 = 2.0;
 
 /// Returns a quantile of some ten thousand of the values, or zero if there are none.
-pub fn quantile(values: &[f32], fraction: f32) -> f32 {
-    let mut sample: Vec<f32> = values.iter().step_by(values.len() / 10_000 + 1).copied().collect();
-    sample.sort_unstable_by(f32::total_cmp);
-    sample.get((fraction * sample.len() as f32) as usize).copied().unwrap_or(0.0)
+pub fn sampled_quantile(values: &[f32], fraction: f64) -> f32 {
+    let sample = values.iter().step_by(values.len() / 10_000 + 1).copied();
+    quantile(sample, fraction).unwrap_or(0.0)
 }
 
 /// Typical properties of the neighbourhoods of a cloud's points.
@@ -29,9 +29,9 @@ impl Typical {
     pub fn of(fits: &[PlaneFit], radii: &[f32]) -> Self {
         let variations: Vec<f32> = fits.iter().map(|fit| fit.variation).collect();
         Self {
-            variation: quantile(&variations, 0.5),
-            low_variation: quantile(&variations, 0.25),
-            radius: quantile(radii, 0.5),
+            variation: sampled_quantile(&variations, 0.5),
+            low_variation: sampled_quantile(&variations, 0.25),
+            radius: sampled_quantile(radii, 0.5),
         }
     }
 

@@ -1,7 +1,7 @@
 //! Points as a scanner would have measured them, by cells of directions: they tell whether one stood there.
 
 use super::ground::ground_axes;
-use crate::math::Vec3;
+use crate::math::{Vec3, median, quantile};
 use std::collections::BTreeMap;
 use std::f32::consts::{PI, TAU};
 
@@ -73,11 +73,11 @@ pub fn spread_within_cells(points: &[PolarPoint]) -> f64 {
 /// Returns the fraction of the points that lie behind others of their narrow cell.
 pub fn fraction_behind(points: &[PolarPoint]) -> f64 {
     let (mut n_behind, mut n_counted) = (0, 0);
-    for mut distances in cells(points, NARROW_CELL_DEG).into_values() {
-        if MIN_CELL_POINTS <= distances.len() {
-            // A stray point may lie before all others.
-            let nearest = distances.len() / 10;
-            let limit = BEHIND_RATIO * *distances.select_nth_unstable_by(nearest, f32::total_cmp).1;
+    for distances in cells(points, NARROW_CELL_DEG).into_values() {
+        // A stray point may lie before all others.
+        let nearest = quantile(distances.iter().copied(), 0.1);
+        if let Some(nearest) = nearest.filter(|_| MIN_CELL_POINTS <= distances.len()) {
+            let limit = BEHIND_RATIO * nearest;
             n_behind += distances.iter().filter(|distance| limit < **distance).count();
             n_counted += distances.len();
         }
@@ -91,10 +91,9 @@ pub fn density_slope(points: &[PolarPoint]) -> Option<f64> {
     let full = cells(points, CELL_DEG)
         .into_values()
         .filter(|distances| MIN_CELL_POINTS <= distances.len());
-    let logarithms = full.map(|mut distances| {
-        let middle = distances.len() / 2;
-        let median = *distances.select_nth_unstable_by(middle, f32::total_cmp).1;
-        (2.0 * f64::from(median).ln(), (distances.len() as f64).ln())
+    let logarithms = full.filter_map(|distances| {
+        let n_points = distances.len() as f64;
+        Some((2.0 * f64::from(median(distances)?).ln(), n_points.ln()))
     });
     let logarithms: Vec<(f64, f64)> = logarithms.collect();
     let n = logarithms.len() as f64;

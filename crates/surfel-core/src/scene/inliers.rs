@@ -1,6 +1,6 @@
 //! The points of a cloud without its outliers.
 
-use crate::math::{Aabb, Vec3};
+use crate::math::{Aabb, Vec3, median};
 use crate::points::{PointCloud, is_valid_position};
 use std::collections::HashSet;
 
@@ -51,15 +51,11 @@ pub(super) fn without_fringe(points: Vec<Vec3>) -> Vec<Vec3> {
     const FRINGE_RATIO: f32 = 2.0;
     /// Minimum number of points: of fewer, only one lies beyond the core.
     const MIN_POINTS: usize = 22;
-    let median = |axis: usize| {
-        let mut values: Vec<f32> = points.iter().map(|p| p[axis]).collect();
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f32::total_cmp).1
-    };
     if points.len() < MIN_POINTS {
         return points;
     }
-    let middle = Vec3::new(median(0), median(1), median(2));
+    let middle = [0, 1, 2].map(|axis| median(points.iter().map(|p| p[axis])).unwrap_or_default());
+    let middle = Vec3::from_array(middle);
     let mut distances: Vec<f32> = points.iter().map(|p| p.distance(middle)).collect();
     let rank = (CORE_FRACTION * (distances.len() - 1) as f64) as usize;
     let core = *distances.select_nth_unstable_by(rank, f32::total_cmp).1;

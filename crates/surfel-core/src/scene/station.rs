@@ -5,7 +5,7 @@ use super::direction_cells::{
 };
 use super::ground::ground_axes;
 use super::inside_view::InsideView;
-use crate::math::{Aabb, DVec3, Vec3};
+use crate::math::{Aabb, DVec3, Vec3, quantile};
 use crate::points::{MAX_CAMERA_SLOPE, PointCloud, is_valid_position};
 use std::f32::consts::TAU;
 
@@ -137,10 +137,8 @@ fn sample_indices(cloud: &PointCloud) -> impl Iterator<Item = usize> {
 
 /// Returns the 10th, 50th and 90th percentile of the distances.
 fn distances(points: &[PolarPoint]) -> Option<[f32; 3]> {
-    let mut distances: Vec<f32> = points.iter().map(|point| point.distance).collect();
-    distances.sort_unstable_by(f32::total_cmp);
-    let percentile = |percent: usize| distances.get(distances.len() * percent / 100).copied();
-    Some([percentile(10)?, percentile(50)?, percentile(90)?])
+    let quantile = |fraction| quantile(points.iter().map(|point| point.distance), fraction);
+    Some([quantile(0.1)?, quantile(0.5)?, quantile(0.9)?])
 }
 
 fn n_filled_sectors(points: &[PolarPoint]) -> usize {

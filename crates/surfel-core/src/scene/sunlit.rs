@@ -3,7 +3,7 @@
 
 use super::direction_cells::{PolarPoint, cells, polar_points};
 use super::ground::ground_axes;
-use crate::math::Vec3;
+use crate::math::{Vec3, median};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -54,12 +54,8 @@ pub fn sunlit_fraction(points: &[Vec3], station: Vec3, ahead: Vec3, to_sun: Vec3
 
 /// Returns the median distance in each cell of directions that has points.
 fn median_distances(points: &[PolarPoint]) -> BTreeMap<(u32, u32), f32> {
-    let median = |mut distances: Vec<f32>| {
-        let middle = distances.len() / 2;
-        *distances.select_nth_unstable_by(middle, f32::total_cmp).1
-    };
     let cells = cells(points, CELL_DEG).into_iter();
-    cells.map(|(cell, distances)| (cell, median(distances))).collect()
+    cells.filter_map(|(cell, distances)| Some((cell, median(distances)?))).collect()
 }
 
 #[cfg(test)]

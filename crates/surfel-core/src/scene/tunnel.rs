@@ -5,7 +5,7 @@ use super::corridor::long_axis;
 use super::ground::ground_axes;
 use super::inliers::{range_along, sample_inliers};
 use super::inside_view::InsideView;
-use crate::math::Vec3;
+use crate::math::{Vec3, median, quantile};
 use crate::points::PointCloud;
 use std::f32::consts::TAU;
 
@@ -105,9 +105,7 @@ fn is_hollow(slices: &[Slice], n_slices: usize) -> bool {
     let n_closed = slices.iter().filter(|slice| slice.is_closed).count();
     let sum = |count: fn(&Slice) -> usize| slices.iter().map(count).sum::<usize>() as f64;
     let n_points = sum(|slice| slice.n_points);
-    let mut radii: Vec<f32> = slices.iter().map(|slice| slice.radius).collect();
-    radii.sort_unstable_by(f32::total_cmp);
-    let typical = radii[radii.len() / 2];
+    let Some(typical) = median(slices.iter().map(|slice| slice.radius)) else { return false };
     let is_open_end = |slice: &Slice| {
         MIN_END * typical <= slice.radius
             && slice.n_in_middle as f64 <= MAX_IN_MIDDLE * slice.n_points as f64
@@ -184,10 +182,9 @@ impl Slice {
             of_sectors[sector].push(distance);
         }
         let (mut n_in_middle, mut n_inner, mut radius) = (0, 0, 0.0);
-        for distances in of_sectors.iter_mut().filter(|distances| !distances.is_empty()) {
+        for distances in &of_sectors {
             // Few points lie behind the wall.
-            let rank = distances.len() * 9 / 10;
-            let wall = *distances.select_nth_unstable_by(rank, f32::total_cmp).1;
+            let Some(wall) = quantile(distances.iter().copied(), 0.9) else { continue };
             let n_within =
                 |fraction: f32| distances.iter().filter(|d| **d < fraction * wall).count();
             radius += wall / N_SECTORS as f32;

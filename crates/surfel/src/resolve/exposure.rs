@@ -1,6 +1,7 @@
 //! Automatic exposure: a small preview shows how bright the median and the highlights of the scene are.
 
 use surfel_core::flat::FlatScene;
+use surfel_core::math::{median, quantile};
 use surfel_core::progress::Progress;
 use surfel_core::render::{Renderer, Settings};
 
@@ -14,7 +15,7 @@ const MIN_MEDIAN: f32 = 0.15;
 const MAX_EXCESS: f32 = 1.4;
 
 /// Fraction of the covered pixels that are darker than the highlights.
-const HIGHLIGHT_PERCENTILE: f32 = 0.99;
+const HIGHLIGHT_PERCENTILE: f64 = 0.99;
 
 /// Least and greatest number of stops: a black object must not turn white.
 const LIMITS: (f32, f32) = (-1.0, 2.2);
@@ -43,16 +44,12 @@ pub fn automatic_exposure(
     Ok(stops(covered.map(|([r, g, b, _], _)| r.max(*g).max(*b)).collect()))
 }
 
-fn stops(mut values: Vec<f32>) -> f32 {
-    if values.is_empty() {
+fn stops(values: Vec<f32>) -> f32 {
+    let Some(highlights) = quantile(values.iter().copied(), HIGHLIGHT_PERCENTILE) else {
         return 0.0;
-    }
-    let mut percentile = |fraction: f32| {
-        let rank = ((fraction * values.len() as f32) as usize).min(values.len() - 1);
-        values.select_nth_unstable_by(rank, f32::total_cmp).1.max(1e-6)
     };
-    let for_highlights = HIGHLIGHT_TARGET / percentile(HIGHLIGHT_PERCENTILE);
-    let for_median = MIN_MEDIAN / percentile(0.5);
+    let for_highlights = HIGHLIGHT_TARGET / highlights.max(1e-6);
+    let for_median = MIN_MEDIAN / median(values).map_or(1e-6, |median| median.max(1e-6));
     let gain = for_highlights.max(for_median.min(MAX_EXCESS * for_highlights));
     gain.log2().clamp(LIMITS.0, LIMITS.1)
 }

@@ -2,6 +2,7 @@
 
 use super::loaded::LoadedScene;
 use crate::description::SceneDescription;
+use surfel_core::math::median;
 use surfel_core::points::{PointCloud, Subsample};
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Camera, View};
@@ -71,13 +72,8 @@ fn median_spacing(
             counts[(y / CELL) as usize * n_columns + (x / CELL) as usize] += 1;
         }
     }
-    counts.retain(|count| 0 < *count);
-    if counts.is_empty() {
-        return 0.0;
-    }
-    let middle = counts.len() / 2;
-    let (_, median, _) = counts.select_nth_unstable(middle);
-    CELL / (*median as f32 * per_sample).sqrt()
+    let median = median(counts.into_iter().filter(|count| 0 < *count));
+    median.map_or(0.0, |median| CELL / (median as f32 * per_sample).sqrt())
 }
 
 #[cfg(test)]
