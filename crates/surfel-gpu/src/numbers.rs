@@ -178,7 +178,7 @@ pub mod attribute {
     pub const TANGENTS_OF_SECOND_UVS: u32 = 32;
 }
 
-/// The surface kinds, at the numbers that stand for them in the kernels.
+/// The surface kinds in the order of their numbers.
 pub const SURFACES: [SurfaceKind; 14] = [
     SurfaceKind::Points,
     SurfaceKind::Sphere,
@@ -201,10 +201,46 @@ pub const TRIANGLE: u32 = SURFACES.len() as u32;
 
 /// Returns the number that stands for a surface kind in the kernels.
 pub fn surface_number(kind: SurfaceKind) -> u32 {
-    SURFACES.iter().position(|known| *known == kind).map_or(0, |number| number as u32)
+    match kind {
+        SurfaceKind::Points => 0,
+        SurfaceKind::Sphere => 1,
+        SurfaceKind::Disc => 2,
+        SurfaceKind::SplatMean => 3,
+        SurfaceKind::Splat => 4,
+        SurfaceKind::SplatFit => 5,
+        SurfaceKind::Cylinder => 6,
+        SurfaceKind::Mls => 7,
+        SurfaceKind::Implicit => 8,
+        SurfaceKind::Octree => 9,
+        SurfaceKind::OctreeSplat => 10,
+        SurfaceKind::Gaussian => 11,
+        SurfaceKind::Smooth => 12,
+        SurfaceKind::Capsule => 13,
+    }
 }
 
 /// Returns the number that stands for a rule by which normals are turned.
 pub fn align_number(align: Align) -> u32 {
-    Align::ALL.iter().position(|(_, known)| *known == align).map_or(0, |number| number as u32)
+    match align {
+        Align::Each => 0,
+        Align::Nearest => 1,
+        Align::Both => 2,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Each surface kind has one number.
+
+    use super::*;
+
+    #[test]
+    fn surfaces_are_found_by_their_numbers() {
+        for (number, kind) in SURFACES.into_iter().enumerate() {
+            assert_eq!(surface_number(kind), number as u32);
+        }
+        for (name, kind) in SurfaceKind::ALL {
+            assert!(SURFACES.contains(&kind), "{name}");
+        }
+    }
 }

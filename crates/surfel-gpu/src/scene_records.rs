@@ -14,8 +14,8 @@ use surfel_core::flat::{FlatGeometry, FlatPunctualLight, FlatScene, Instance};
 use surfel_core::math::Vec3;
 use surfel_core::render::Settings;
 use surfel_core::scene::{
-    AlphaMode, Background, Environment, Lens, Light, Material, PunctualLightKind, TextureRef, View,
-    Wrap,
+    AlphaMode, Background, Environment, Lens, Light, Material, PunctualLightKind, Sky, Sun,
+    TextureRef, View, Wrap,
 };
 
 /// The first words of the textures, environment maps and colours by support of a scene in one array.
@@ -75,37 +75,44 @@ fn lights(scene: &FlatScene, offsets: &WordOffsets) -> Vec<LightRecord> {
         Light::Environment(environment) => {
             environment_record(environment, environments.next().copied().unwrap_or_default())
         }
-        _ => light_record(light),
+        Light::Sun(sun) => sun_record(sun),
+        Light::Sky(sky) => sky_record(sky),
+        Light::Headlight(strength) => headlight_record(*strength),
     });
     let lamps = scene.punctual_lights.iter().enumerate();
     lights.chain(lamps.map(|(i, lamp)| lamp_record(i as u32, lamp))).collect()
 }
 
-fn light_record(light: &Light) -> LightRecord {
-    let none = LightRecord { lamp: NONE, ..Zeroable::zeroed() };
-    match light {
-        Light::Sun(sun) => {
-            let is_point = sun.angular_diameter_deg <= 0.0;
-            LightRecord {
-                direction: sun.direction.to_array(),
-                kind: if is_point { light_kind::POINT_SUN } else { light_kind::SUN },
-                color: sun.color.to_array(),
-                cos_max: (sun.angular_diameter_deg.to_radians() / 2.0).cos(),
-                ..none
-            }
-        }
-        Light::Sky(sky) => LightRecord {
-            direction: sky.up.to_array(),
-            kind: light_kind::SKY,
-            color: sky.zenith.to_array(),
-            ground: sky.ground.to_array(),
-            ao_distance: sky.ao_distance.min(NO_LIMIT),
-            ..none
-        },
-        Light::Headlight(strength) => {
-            LightRecord { kind: light_kind::HEADLIGHT, color: [*strength; 3], ..none }
-        }
-        Light::Environment(_) => none,
+fn sun_record(sun: &Sun) -> LightRecord {
+    let is_point = sun.angular_diameter_deg <= 0.0;
+    LightRecord {
+        direction: sun.direction.to_array(),
+        kind: if is_point { light_kind::POINT_SUN } else { light_kind::SUN },
+        color: sun.color.to_array(),
+        cos_max: (sun.angular_diameter_deg.to_radians() / 2.0).cos(),
+        lamp: NONE,
+        ..Zeroable::zeroed()
+    }
+}
+
+fn sky_record(sky: &Sky) -> LightRecord {
+    LightRecord {
+        direction: sky.up.to_array(),
+        kind: light_kind::SKY,
+        color: sky.zenith.to_array(),
+        ground: sky.ground.to_array(),
+        lamp: NONE,
+        ao_distance: sky.ao_distance.min(NO_LIMIT),
+        ..Zeroable::zeroed()
+    }
+}
+
+fn headlight_record(strength: f32) -> LightRecord {
+    LightRecord {
+        kind: light_kind::HEADLIGHT,
+        color: [strength; 3],
+        lamp: NONE,
+        ..Zeroable::zeroed()
     }
 }
 

@@ -130,7 +130,13 @@ impl Surface {
             Self::Sphere => SurfaceKind::Sphere,
             Self::Capsule => SurfaceKind::Capsule,
             Self::Mls(_) => SurfaceKind::Mls,
-            _ => SurfaceKind::Disc,
+            Self::Disc | Self::DiscRims | Self::Splat | Self::SplatRims | Self::SplatFit => {
+                SurfaceKind::Disc
+            }
+            Self::Cylinder | Self::Implicit | Self::Octree | Self::OctreeSplat | Self::Smooth => {
+                SurfaceKind::Disc
+            }
+            Self::Triangle => SurfaceKind::Disc,
         }
     }
 }
