@@ -9,17 +9,14 @@ use surfel::resolve::{LoadedScene, coordinate_system, located_stations};
 use surfel_core::image::{class_color, class_name};
 use surfel_core::math::Vec3;
 use surfel_core::points::{PointCloud, PointFilter};
+use surfel_core::scene::color::ColorSource;
 use surfel_core::surface::SurfaceKind;
 use surfel_formats::{FileInfo, common_file_info};
 
 /// Columns of a cloud as `--color` takes them.
 pub fn columns(cloud: &PointCloud) -> Vec<&str> {
-    let usual = [
-        ("rgb", cloud.colors.is_some()),
-        ("intensity", cloud.intensity.is_some()),
-        ("class", cloud.classification.is_some()),
-    ];
-    let usual = usual.into_iter().filter_map(|(name, is_there)| is_there.then_some(name));
+    let is_column = |source: &ColorSource| !source.is_computed() && source.is_available_in(cloud);
+    let usual = ColorSource::names_where(is_column).into_iter();
     usual.chain(cloud.scalars.iter().map(|scalar| scalar.name.as_str())).collect()
 }
 

@@ -201,7 +201,7 @@ impl FileSceneProvider {
         let mut clouds = self.scene.loaded().clouds().map(|(_, cloud)| columns(cloud));
         let mut names = clouds.next().unwrap_or_default();
         clouds.for_each(|others| names.retain(|name| others.contains(name)));
-        names.extend(["elevation", "normal", "support"]);
+        names.extend(ColorSource::names_where(ColorSource::is_computed));
         names
     }
 

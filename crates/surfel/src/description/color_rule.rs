@@ -96,9 +96,10 @@ impl Rule<ColorSource> for ColorSourceRule {
             Some(color) => Ok(ColorSource::Constant(color)),
             None if text == "height" => Ok(ColorSource::Elevation),
             None => text.parse().map_err(|_| {
-                expected(
-                    "rgb, intensity, elevation, class, normal, support, the name of a column, #RRGGBB or a colour's CSS name",
-                )
+                expected(format!(
+                    "{}, the name of a column, #RRGGBB or a colour's CSS name",
+                    ColorSource::names_where(|_| true).join(", ")
+                ))
             }),
         }
     }

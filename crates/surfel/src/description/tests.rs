@@ -3,6 +3,7 @@
 use super::*;
 use serde_json::json;
 use surfel_core::math::{DVec3, Vec3};
+use surfel_core::scene::color::ColorSource;
 use surfel_core::scene::{Camera, Projection};
 use surfel_core::surface::SurfaceKind;
 
@@ -254,6 +255,15 @@ fn every_key_has_a_unique_option_and_a_sentence_of_help() {
     for (path, _, key) in &keys {
         assert!(key.doc.ends_with(['.', ']']) && 10 < key.doc.len(), "{path}: {}", key.doc);
     }
+}
+
+#[test]
+fn the_help_of_colors_lists_every_source() {
+    let names = ColorSource::names_where(|_| true).join(", ");
+    let keys = SceneDescription::keys();
+    let mut of_colors = keys.iter().filter(|(path, ..)| path == "color");
+    assert!(of_colors.all(|(.., key)| key.doc.contains(&names)));
+    assert!(keys.iter().any(|(path, ..)| path == "color"));
 }
 
 #[test]

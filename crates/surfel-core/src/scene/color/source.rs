@@ -27,6 +27,33 @@ pub enum ColorSource {
 }
 
 impl ColorSource {
+    /// The sources that have a name of their own.
+    pub const NAMED: [Self; 6] =
+        [Self::Rgb, Self::Intensity, Self::Elevation, Self::Class, Self::Normal, Self::Support];
+
+    /// Returns the name of the source, unless it is a colour or a column.
+    pub fn name(&self) -> Option<&'static str> {
+        match self {
+            Self::Rgb => Some("rgb"),
+            Self::Intensity => Some("intensity"),
+            Self::Elevation => Some("elevation"),
+            Self::Class => Some("class"),
+            Self::Normal => Some("normal"),
+            Self::Support => Some("support"),
+            Self::Constant(_) | Self::Column(_) => None,
+        }
+    }
+
+    /// Returns the names of those sources that `accepts` is true for.
+    pub fn names_where(accepts: impl Fn(&Self) -> bool) -> Vec<&'static str> {
+        Self::NAMED.iter().filter(|source| accepts(source)).filter_map(Self::name).collect()
+    }
+
+    /// True if surfel computes the values, so that files need no column for them.
+    pub fn is_computed(&self) -> bool {
+        matches!(self, Self::Elevation | Self::Normal | Self::Support)
+    }
+
     /// True if the values of the source are names of things rather than amounts, so that no value lies between two
     /// others: classes and whole numbers.
     pub fn is_categorical(&self, cloud: &PointCloud) -> bool {
@@ -53,16 +80,12 @@ impl ColorSource {
 
     /// Returns the error for a cloud without the column that the source needs.
     pub(super) fn missing_from(&self, cloud: &PointCloud) -> Error {
-        let mut known: Vec<&str> = vec!["elevation", "support", "#RRGGBB"];
-        let columns = [
-            ("rgb", Self::Rgb),
-            ("intensity", Self::Intensity),
-            ("class", Self::Class),
-            ("normal", Self::Normal),
-        ];
-        known.extend(
-            columns.iter().filter(|(_, color)| color.is_available_in(cloud)).map(|(name, _)| *name),
-        );
+        let needs_column = |source: &Self| !source.is_available_in(&PointCloud::default());
+        let mut known = Self::names_where(|source| !needs_column(source));
+        known.push("#RRGGBB");
+        known.extend(Self::names_where(|source| {
+            needs_column(source) && source.is_available_in(cloud)
+        }));
         known.extend(cloud.scalars.iter().map(|scalar| scalar.name.as_str()));
         let kind = "column of this cloud";
         Error::UnknownName { kind, found: self.to_string(), known: known.join(", ") }
@@ -72,14 +95,9 @@ impl ColorSource {
 impl fmt::Display for ColorSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Rgb => f.write_str("rgb"),
-            Self::Intensity => f.write_str("intensity"),
-            Self::Elevation => f.write_str("elevation"),
-            Self::Class => f.write_str("class"),
-            Self::Normal => f.write_str("normal"),
-            Self::Support => f.write_str("support"),
             Self::Constant([r, g, b]) => write!(f, "#{r:02x}{g:02x}{b:02x}"),
             Self::Column(name) => f.write_str(name),
+            named => f.write_str(named.name().unwrap_or_default()),
         }
     }
 }
@@ -95,16 +113,16 @@ impl FromStr for ColorSource {
         };
         match text.trim() {
             "" => Err(invalid()),
-            "rgb" | "RGB" => Ok(Self::Rgb),
-            "intensity" => Ok(Self::Intensity),
-            "elevation" => Ok(Self::Elevation),
-            "class" | "classification" => Ok(Self::Class),
-            "normal" | "normals" => Ok(Self::Normal),
-            "support" => Ok(Self::Support),
+            "RGB" => Ok(Self::Rgb),
+            "classification" => Ok(Self::Class),
+            "normals" => Ok(Self::Normal),
             color if color.starts_with('#') => {
                 parse_hex(color).map(Self::Constant).ok_or_else(invalid)
             }
-            name => Ok(Self::Column(name.to_owned())),
+            name => {
+                let named = Self::NAMED.into_iter().find(|source| source.name() == Some(name));
+                Ok(named.unwrap_or_else(|| Self::Column(name.to_owned())))
+            }
         }
     }
 }
@@ -131,14 +149,22 @@ mod tests {
 
     #[test]
     fn sources_are_parsed_and_displayed_by_name() {
-        for text in
-            ["rgb", "intensity", "elevation", "class", "normal", "support", "#0a141e", "gps_time"]
-        {
+        for source in ColorSource::NAMED {
+            assert_eq!(source.to_string().parse::<ColorSource>().unwrap(), source);
+        }
+        for text in ["rgb", "support", "#0a141e", "gps_time"] {
             assert_eq!(text.parse::<ColorSource>().unwrap().to_string(), text);
         }
         assert_eq!("#fff".parse::<ColorSource>().unwrap(), ColorSource::Constant([255; 3]));
         for text in ["", "#12345", "#ggg", "#éé"] {
             assert!(text.parse::<ColorSource>().is_err());
         }
+    }
+
+    #[test]
+    fn errors_list_all_names() {
+        let names = ColorSource::names_where(|_| true).join(", ");
+        let error = "".parse::<ColorSource>().unwrap_err().to_string();
+        assert!(error.contains(&format!("{names}, #RRGGBB")), "{error}");
     }
 }

@@ -12,6 +12,7 @@ use surfel_core::points::{STRUCTURE, SURFACE_VARIATION};
 use surfel_core::progress::Progress;
 use surfel_core::render::check_surfaces;
 use surfel_core::scene::Geometry;
+use surfel_core::scene::color::ColorSource;
 use surfel_core::surface::SurfaceKind;
 
 impl LoadedScene {
@@ -54,9 +55,10 @@ impl LoadedScene {
                 continue;
             }
             return Err(Error::Unfit(format!(
-                "{}: no column {color}; --color takes elevation, normal, support, {SURFACE_VARIATION}, {STRUCTURE}, \
-                 #RRGGBB, a CSS colour name and what the file has: {}; {}",
+                "{}: no column {color}; --color takes {}, {SURFACE_VARIATION}, {STRUCTURE}, #RRGGBB, a CSS colour \
+                 name and what the file has: {}; {}",
                 list_files(self.files_of(i, description)),
+                ColorSource::names_where(ColorSource::is_computed).join(", "),
                 match colorable_columns(&self.file_info().columns) {
                     none if none.is_empty() => "only positions".to_owned(),
                     columns => columns.join(", "),
