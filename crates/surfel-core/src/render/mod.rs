@@ -13,7 +13,7 @@ pub use footprint::POINT_SIZE_RANGE;
 pub use raster::uses_rasterizer;
 pub use region::RenderRegion;
 pub use renderer::{RenderStats, Renderer};
-pub use settings::{MAX_PIXELS, Settings};
+pub use settings::{MAX_PIXELS, MAX_SAMPLES, Settings};
 
 use crate::error::Result;
 use crate::flat::FlatScene;

@@ -28,7 +28,7 @@ pub struct Settings {
 /// Maximum number of pixels of a picture.
 pub const MAX_PIXELS: u64 = 1 << 28;
 /// Maximum number of camera or light samples per pixel.
-const MAX_SAMPLES: u32 = 1 << 16;
+pub const MAX_SAMPLES: u32 = 1 << 16;
 
 impl Default for Settings {
     /// Returns 1920 x 1080 pixels, 4 camera rays and 16 light samples per pixel, 8 bounces, seed 0, points of

@@ -117,7 +117,7 @@ settings! {
         /// (leaves) apart; surface and scatter take all points for one.
         structure: StructureChoice = StructureChoice::default(), parsed(StructureChoice::to_string), "CHOICE";
         /// Ends surfaces where a scanner saw through, as the grids of E57, PTX and PCD files tell.
-        free_space: bool = true, Flag, "BOOL";
+        free_space: bool = Preparation::default().free_space, Flag, "BOOL";
         /// Reads what is whole of a damaged LAS, LAZ, PLY, E57, PCD, PTX or text file, and reports how much that is.
         salvage: bool = false, Flag, "BOOL";
         /// Moves clouds whose coordinates are degrees of longitude and latitude to metres: to the coordinate system of

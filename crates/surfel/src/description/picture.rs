@@ -7,7 +7,7 @@ use super::rule::{Checked, Flag, OneOf, Resolution, Text, as_number, count, numb
 use super::rule::{POSITIVE, Rule};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use surfel_core::render::POINT_SIZE_RANGE;
+use surfel_core::render::{MAX_SAMPLES, POINT_SIZE_RANGE, Settings};
 use surfel_core::scene::Background;
 use surfel_formats::BitDepth;
 
@@ -15,20 +15,20 @@ settings! {
     /// Size, quality and background of a picture.
     pub struct PictureSettings {
         /// Width and height in pixels.
-        resolution: (u32, u32) = (1920, 1080), Resolution, "WxH", common;
+        resolution: (u32, u32) = default_resolution(), Resolution, "WxH", common;
         /// Camera rays per pixel.
-        spp: u32 = 4, count(1, 65_536), "N", common;
+        spp: u32 = Settings::default().samples_per_pixel, count(1, MAX_SAMPLES as u64), "N", common;
         /// Rays per pixel toward the sky or environment, and toward each light with soft shadows.
-        light_samples: u32 = 16, count(1, 65_536), "N";
+        light_samples: u32 = Settings::default().light_samples, count(1, MAX_SAMPLES as u64), "N";
         /// Maximum number of reflections and refractions of a ray.
-        max_depth: u32 = 8, count(0, 64), "N";
+        max_depth: u32 = Settings::default().max_depth, count(0, 64), "N";
         /// Diameter of the points of `--surface points` in pixels [default: chosen so that most of them touch].
         point_size: f64, number(POINT_SIZE_RANGE.0 as f64, POINT_SIZE_RANGE.1 as f64), "PX";
         /// Background: a colour, two colours (top, bottom), gradient, transparent, or environment (the sky or
         /// environment map that lights the scene).
         background: Background = default_background(), BackgroundRule, "COLOR", common;
         /// Seed of the random numbers; another seed gives other noise.
-        seed: u64 = 0, count(0, u64::MAX), "N";
+        seed: u64 = Settings::default().seed, count(0, u64::MAX), "N";
         /// Draws a legend: the classes that are there with their colours, or the colour map with its values.
         legend: bool = false, Flag, "";
         /// Draws a bar of a round length; for --camera-orthographic.
@@ -40,6 +40,11 @@ settings! {
         /// Bits per channel of a PNG or TIFF.
         bit_depth: BitDepth = BitDepth::Eight, BIT_DEPTH, "BITS";
     }
+}
+
+fn default_resolution() -> (u32, u32) {
+    let Settings { width, height, .. } = Settings::default();
+    (width, height)
 }
 
 /// A number of bits, also as text.
