@@ -35,7 +35,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::Arc;
 pub use surfel_web::FrameAncestors;
-use surfel_web::SceneProvider;
+use surfel_web::{Limits, SceneProvider};
 use usage::Usage;
 pub use view::RunningViewer;
 
@@ -122,7 +122,8 @@ pub fn scene_provider(words: Vec<OsString>) -> anyhow::Result<Arc<dyn SceneProvi
     let Command::View(args) = &cli.command else { anyhow::bail!("expected `surfel view`") };
     let report = Report::new(Verbosity::Quiet);
     let description = args.scene.description(&cli.global, &report)?;
-    Ok(view::open_scene_provider(description, args.scene.files.clone(), &report)?)
+    let files = args.scene.files.clone();
+    Ok(view::open_scene_provider(description, files, Limits::default(), &report)?)
 }
 
 fn parse(words: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {

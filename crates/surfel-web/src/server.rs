@@ -63,6 +63,11 @@ impl Server {
         Self { limits, ..self }
     }
 
+    /// Returns the limits.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
     /// Encrypts all connections.
     pub fn with_tls(self, identity: TlsIdentity) -> Self {
         let mut guard = self.guard;

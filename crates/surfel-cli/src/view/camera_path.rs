@@ -73,6 +73,7 @@ pub fn write_film(
     scene: &LiveScene,
     mut description: SceneDescription,
     options: &FilmOptions,
+    limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<Arc<dyn WrittenFile>> {
     let FilmOptions { format, fps } = options;
@@ -84,7 +85,7 @@ pub fn write_film(
     let n_frames = film_length(scene, &description).map_err(rejection)?;
     let picture = &description.picture;
     let rays_per_pixel = u64::from(picture.spp()) + u64::from(picture.light_samples());
-    Limits::default().check_film(picture.resolution(), rays_per_pixel, n_frames)?;
+    limits.check_film(picture.resolution(), rays_per_pixel, n_frames)?;
     let name = format!("film.{format}");
     let mut written_to = String::new();
     let file = TempFile::write(&name, |path| {

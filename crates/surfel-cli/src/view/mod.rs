@@ -36,7 +36,7 @@ use surfel::resolve::check_files;
 use surfel::{RendererOnThreads, SceneDescription, SceneRenderer};
 use surfel_core::progress::Progress;
 use surfel_core::render::Renderer;
-use surfel_web::{Error, FrameAncestors, SceneProvider, Server, TlsError, TlsIdentity};
+use surfel_web::{Error, FrameAncestors, Limits, SceneProvider, Server, TlsError, TlsIdentity};
 
 /// Arguments of `surfel view`.
 #[derive(clap::Args, Debug)]
@@ -138,11 +138,12 @@ fn serve(
     report: &Report,
 ) -> surfel_web::Result<()> {
     let report_for_loading = report.for_thread();
+    let limits = server.limits().clone();
     let open = move |progress: &dyn Progress| {
         let folders = viewed_folders(&description, &typed);
         let progress = ClientProgress { folders: &folders, progress };
         let report = report_for_loading.with_listener(&progress);
-        open_scene_provider(description, typed, &report).map_err(rejection)
+        open_scene_provider(description, typed, limits, &report).map_err(rejection)
     };
     server.run(Arc::new(renderer), report.cancellation(), open)
 }
@@ -204,11 +205,12 @@ fn read_identity(certificate: &Path, key: &Path) -> anyhow::Result<TlsIdentity> 
     })
 }
 
-/// Reads the files of a description for the viewer.
+/// Reads the files of a description for a viewer with these limits.
 pub fn open_scene_provider(
     description: SceneDescription,
     typed: Vec<PathBuf>,
+    limits: Limits,
     report: &Report,
 ) -> surfel::Result<Arc<dyn SceneProvider>> {
-    Ok(Arc::new(FileSceneProvider::open(description, typed, report)?))
+    Ok(Arc::new(FileSceneProvider::open(description, typed, limits, report)?))
 }

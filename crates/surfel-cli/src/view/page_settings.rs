@@ -47,6 +47,8 @@ pub struct Content<'c> {
     pub startup: &'c SceneDescription,
     /// The rows of its files and objects.
     pub rows: &'c Rows,
+    /// The limits of the viewer.
+    pub limits: &'c Limits,
     /// The files that the page has added.
     pub added: &'c [Arc<PageFile>],
 }
@@ -54,7 +56,7 @@ pub struct Content<'c> {
 /// Reads the settings of a page, which may say anything, over the files and objects of the startup and those that the
 /// page has added.
 pub fn read(content: &Content, settings: &SettingsMap) -> Result<SceneDescription, Error> {
-    let &Content { startup, rows, added } = content;
+    let &Content { startup, rows, limits, added } = content;
     let mut page = SceneDescription::default();
     let mut of_description = settings.clone();
     of_description.shift_remove(added_files::KEY);
@@ -82,7 +84,7 @@ pub fn read(content: &Content, settings: &SettingsMap) -> Result<SceneDescriptio
         let text = format!("a page cannot change {} of a file", fault.key);
         return Err(Error::invalid_value("object_settings", text));
     }
-    Limits::default().check_samples(page.picture.spp(), page.picture.light_samples())?;
+    limits.check_samples(page.picture.spp(), page.picture.light_samples())?;
     page.run = startup.run.clone();
     rename_targets(&mut page, |name| rows.target_of(name).to_owned());
     let mut page = page.with_content_of(startup);
@@ -192,9 +194,10 @@ mod tests {
     use std::sync::LazyLock;
 
     static NO_ROWS: LazyLock<Rows> = LazyLock::new(Rows::default);
+    static LIMITS: LazyLock<Limits> = LazyLock::new(Limits::default);
 
     fn content(startup: &SceneDescription) -> Content<'_> {
-        Content { startup, rows: &NO_ROWS, added: &[] }
+        Content { startup, rows: &NO_ROWS, limits: &LIMITS, added: &[] }
     }
 
     #[test]
@@ -206,6 +209,16 @@ mod tests {
         };
         assert!(with_area("/etc/passwd").unwrap_err().to_string().contains("cannot name a file"));
         assert!(with_area("0,0,10,10").unwrap().is_some());
+    }
+
+    #[test]
+    fn a_page_keeps_to_the_limits_of_its_viewer() {
+        let startup = SceneDescription::default();
+        let settings = SettingsMap::from_iter([("spp".to_owned(), json!(64))]);
+        assert!(read(&content(&startup), &settings).is_ok());
+        let limits = Limits { max_samples: 63, ..Limits::default() };
+        let narrow = Content { limits: &limits, ..content(&startup) };
+        assert_eq!(read(&narrow, &settings).unwrap_err().key(), Some("spp"));
     }
 
     #[test]

@@ -48,6 +48,7 @@ pub struct FileSceneProvider {
     /// Files as they were typed, scene files among them.
     typed: Vec<PathBuf>,
     rows: Rows,
+    limits: Limits,
     added_files: AddedFiles,
     scene: Arc<LiveScene>,
     up: Vec3,
@@ -68,6 +69,7 @@ impl FileSceneProvider {
     pub fn open(
         mut startup: SceneDescription,
         typed: Vec<PathBuf>,
+        limits: Limits,
         report: &Report,
     ) -> surfel::Result<Self> {
         let scene = LiveScene::open(&startup, UseCase::Viewers, report)?;
@@ -85,6 +87,7 @@ impl FileSceneProvider {
             startup_settings,
             typed,
             rows,
+            limits,
             added_files: AddedFiles::default(),
             scene,
             up,
@@ -101,7 +104,7 @@ impl FileSceneProvider {
     }
 
     fn content<'c>(&'c self, added: &'c [Arc<PageFile>]) -> Content<'c> {
-        Content { startup: &self.startup, rows: &self.rows, added }
+        Content { startup: &self.startup, rows: &self.rows, limits: &self.limits, added }
     }
 
     fn view(&self, description: &SceneDescription, progress: &dyn Progress) -> Result<LiveView> {
@@ -266,7 +269,6 @@ impl SceneProvider for FileSceneProvider {
         let loaded = self.scene.loaded();
         let points = loaded.sample_points();
         let (n_points, n_triangles) = loaded.graph.n_points_and_triangles();
-        let limits = Limits::default();
         json!({
             "name": name_of(&self.typed),
             "points": n_points,
@@ -289,11 +291,6 @@ impl SceneProvider for FileSceneProvider {
             "simd": self.scene.simd().name(),
             "coordinate_system": loaded.file_info().coordinate_system,
             "unit": unit_symbol(loaded, &self.startup),
-            "limits": {
-                "max_pixels": limits.max_view_pixels,
-                "max_save_pixels": limits.max_save_pixels,
-                "max_message_bytes": limits.max_message_bytes,
-            },
         })
     }
 
@@ -343,7 +340,7 @@ impl SceneProvider for FileSceneProvider {
         let description = self.read(settings)?;
         let picture = &description.picture;
         let rays_per_pixel = u64::from(picture.spp()) + u64::from(picture.light_samples());
-        Limits::default().check_save(picture.resolution(), rays_per_pixel)?;
+        self.limits.check_save(picture.resolution(), rays_per_pixel)?;
         let view = self.view(&description, progress)?;
         let (up, camera) = (view.description.world.up.unwrap_or(self.up), &view.flat.camera);
         if let Some(fault) = overlay::faults(picture, camera, up).into_iter().next() {
@@ -396,7 +393,7 @@ impl SceneProvider for FileSceneProvider {
         let text = "there is no path of the camera; add views to it";
         let path = camera_path(settings)?.ok_or_else(|| Error::invalid_request(text))?;
         let description = with_path(self.read(settings)?, path);
-        self.folders.removed(write_film(&self.scene, description, options, progress))
+        self.folders.removed(write_film(&self.scene, description, options, &self.limits, progress))
     }
 
     fn read_added_file(

@@ -7,7 +7,8 @@ use surfel_core::scene::Mesh;
 
 fn open(startup: SceneDescription) -> FileSceneProvider {
     let typed = vec![PathBuf::from("scene.toml")];
-    FileSceneProvider::open(startup, typed, &Report::new(Verbosity::Quiet)).unwrap()
+    FileSceneProvider::open(startup, typed, Limits::default(), &Report::new(Verbosity::Quiet))
+        .unwrap()
 }
 
 fn corners() -> Vec<Vec3> {
