@@ -1,5 +1,6 @@
 //! Scenes, clouds and ground truth that the tests and benchmarks of all crates share.
 
+pub mod cancel_after;
 pub mod clouds;
 pub mod scenes;
 pub mod backends;

@@ -17,10 +17,25 @@ use surfel_core::scene::{
 use surfel_core::surface::{EdgeTest, SurfaceKind};
 use surfel_core::trace::Simd;
 
+/// The kinds of surface that are the zeros of a field, which has a structure of its own.
+pub const FIELD_KINDS: [SurfaceKind; 3] =
+    [SurfaceKind::Implicit, SurfaceKind::Octree, SurfaceKind::OctreeSplat];
+
+/// Returns the kinds of surface that rays hit: all but pixels, which have no rays, and Gaussians, which emit light
+/// along the rays.
+pub fn hit_kinds() -> impl Iterator<Item = SurfaceKind> {
+    let others = [SurfaceKind::Points, SurfaceKind::Gaussian];
+    SurfaceKind::ALL.into_iter().map(|(_, kind)| kind).filter(move |kind| !others.contains(kind))
+}
+
+/// Returns the preparation that takes all points for one surface.
+pub fn one_surface() -> Preparation {
+    Preparation { structure: StructureChoice::Surface, ..Preparation::default() }
+}
+
 /// Prepares a cloud as one surface, which adds missing normals and radii, and makes it grey.
 pub fn points(cloud: PointCloud, surface: SurfaceKind) -> CloudGeometry {
-    let preparation = Preparation { structure: StructureChoice::Surface, ..Preparation::default() };
-    prepared(cloud, &preparation, surface)
+    prepared(cloud, &one_surface(), surface)
 }
 
 /// Prepares a cloud and makes it grey.

@@ -3,6 +3,7 @@
 use super::common::{Folder, dome, fail, read_png, square, stderr, succeed, surfel, tile};
 use serde_json::{Value, json};
 use std::fs;
+use surfel_core::surface::SurfaceKind;
 
 #[test]
 fn stats_do_not_replace_other_files() {
@@ -45,29 +46,36 @@ fn render_accepts_all_surfaces_and_colors() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(30));
     let picture = folder.path("dome.png");
+    // Each run makes a picture of its own, in which points are seen.
     let render = |options: &[&str]| {
-        let common = ["render", &cloud, "-o", &picture, "--resolution", "32x24", "--spp", "1"];
-        succeed(&[&common, options].concat());
+        let size = ["--resolution", "32x24", "--spp", "1", "--no-background"];
+        let printed = succeed(&[&["render", &cloud, "-o", &picture], &size[..], options].concat());
+        assert_eq!(printed, "", "{options:?}");
+        let (width, height, channels, samples) = read_png(&picture);
+        assert_eq!((width, height, channels), (32, 24, 4), "{options:?}");
+        assert!(samples.iter().skip(3).step_by(4).any(|alpha| *alpha == 255), "{options:?}");
+        fs::remove_file(&picture).unwrap();
+        samples
     };
-    for surface in
-        ["points", "sphere", "disc", "splat-mean", "splat", "splat-fit", "cylinder", "mls"]
-    {
-        render(&["--surface", surface]);
-    }
-    for surface in ["implicit", "octree", "octree-splat"] {
-        render(&["--surface", surface]);
+    let all_differ = |pictures: &[Vec<u8>]| {
+        let is_new = |(i, picture)| !pictures[..i].contains(picture);
+        pictures.iter().enumerate().all(is_new)
+    };
+    for (surface, kind) in SurfaceKind::ALL {
+        if kind != SurfaceKind::Gaussian {
+            render(&["--surface", surface]);
+        }
     }
     render(&["--surface", "octree", "--octree-depth", "4"]);
     render(&["--surface", "cylinder", "--reach", "1.5", "--density", "4"]);
     render(&["--surface", "mls", "--reach", "2", "--degree", "3"]);
-    for color in
-        ["rgb", "elevation", "class", "normal", "#ff8000", "rain", "RAIN", "surface_variation"]
-    {
-        render(&["--color", color, "--cmap", "turbo_r"]);
-    }
-    for light in ["sun", "sky", "headlight", "sun,sky,headlight", "none"] {
-        render(&["--light", light, "--sun-angle", "0"]);
-    }
+    let colored = |color: &str| render(&["--color", color, "--cmap", "turbo_r"]);
+    let by_rain = colored("rain");
+    assert!(colored("RAIN") == by_rain);
+    let colors = ["rgb", "elevation", "class", "normal", "#ff8000", "surface_variation"];
+    assert!(all_differ(&[colors.map(colored).to_vec(), vec![by_rain]].concat()));
+    let lights = ["sun", "sky", "headlight", "sun,sky,headlight", "none"];
+    assert!(all_differ(&lights.map(|light| render(&["--light", light, "--sun-angle", "0"]))));
     render(&["--camera-orthographic", "--camera-direction", "0,0,-1"]);
     render(&["--camera-orthographic", "3", "--up", "-Y", "--exposure", "-1"]);
     render(&["--camera-panorama"]);
@@ -75,6 +83,7 @@ fn render_accepts_all_surfaces_and_colors() {
     render(&["--camera-position", "-3,-3,2", "--camera-focal-point", "0,0,0"]);
     render(&["--subsample", "random:200", "--radius", "0.1", "--normals-k", "8", "--orient", "up"]);
     render(&["--neighbors", "grid", "--normals-radius", "0.2", "--radius", "median:6"]);
+    assert_eq!(folder.names(), ["dome.ply"]);
 }
 
 #[test]

@@ -202,17 +202,9 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
-    use crate::points::{
-        Denoise, PointCloud, Preparation, PreparedCloud, StructureChoice, prepare,
-    };
+    use crate::points::test_clouds::prepared;
+    use crate::points::{Denoise, PointCloud, Preparation, StructureChoice, prepare};
     use crate::progress::NoProgress;
-
-    fn prepared(positions: Vec<Vec3>) -> (PreparedCloud, Vec<Structure>) {
-        let cloud = PointCloud::from_positions(positions);
-        let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
-        let structures = cloud.structures().unwrap();
-        (cloud, structures)
-    }
 
     fn fraction(structures: &[Structure], kind: Structure) -> f64 {
         let n = structures.iter().filter(|structure| **structure == kind).count();

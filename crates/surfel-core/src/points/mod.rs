@@ -54,6 +54,8 @@ mod preparation;
 mod curvature;
 mod estimate;
 mod prepare;
+#[cfg(test)]
+mod test_clouds;
 
 pub use clean::{CleanReport, Duplicates, clean};
 pub use cloud::{PointCloud, Scalar, Values, is_valid_position};

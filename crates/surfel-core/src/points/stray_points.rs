@@ -141,15 +141,7 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
-    use crate::points::{PointCloud, Preparation, PreparedCloud, prepare};
-    use crate::progress::NoProgress;
-
-    fn prepared(points: Vec<Vec3>) -> (PreparedCloud, Vec<Structure>) {
-        let cloud = PointCloud::from_positions(points);
-        let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
-        let structures = cloud.structures().unwrap();
-        (cloud, structures)
-    }
+    use crate::points::test_clouds::prepared;
 
     /// Points of a level plane of this length and width about zero.
     fn plane(n: usize, length: f32, width: f32) -> Vec<Vec3> {

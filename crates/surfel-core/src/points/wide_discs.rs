@@ -307,15 +307,8 @@ mod tests {
     //! Stray points, wires and sparse parts of surfaces.
 
     use crate::math::{Random, Vec3};
-    use crate::points::{PointCloud, Preparation, PreparedCloud, Structure, prepare};
-    use crate::progress::NoProgress;
-
-    fn prepared(positions: Vec<Vec3>) -> (PreparedCloud, Vec<Structure>) {
-        let cloud = PointCloud::from_positions(positions);
-        let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
-        let structures = cloud.structures().unwrap();
-        (cloud, structures)
-    }
+    use crate::points::Structure;
+    use crate::points::test_clouds::prepared;
 
     /// A plane of 5000 points whose spacing is 0.014.
     fn plane() -> Vec<Vec3> {

@@ -1,8 +1,7 @@
 //! The clouds of the thesis, or others of their sizes, with cameras.
 
 use surfel_core::math::{DVec3, Random, Vec3};
-use surfel_core::points::{PointCloud, StructureChoice};
-use surfel_core::points::{Preparation, PreparedCloud, prepare};
+use surfel_core::points::{PointCloud, PreparedCloud, prepare};
 use surfel_core::progress::NoProgress;
 use surfel_core::scanner::scenes::ruin;
 use surfel_core::scene::{Camera, CameraFit, CloudGeometry, Projection, fit_camera};
@@ -10,6 +9,7 @@ use surfel_core::surface::{EdgeTest, SurfaceKind};
 use surfel_tests::clouds;
 use surfel_tests::ground_truth::{GroundTruth, shared_data};
 use surfel_tests::sampling::Sampling;
+use surfel_tests::scenes;
 use surfel_tests::shapes;
 
 /// A prepared cloud and a camera.
@@ -73,8 +73,7 @@ impl Subject {
 }
 
 fn prepared(cloud: PointCloud) -> PreparedCloud {
-    let preparation = Preparation { structure: StructureChoice::Surface, ..Preparation::default() };
-    prepare(cloud, &preparation, &NoProgress).unwrap().0
+    prepare(cloud, &scenes::one_surface(), &NoProgress).unwrap().0
 }
 
 const CORNER: DVec3 = DVec3::new(-0.55, 0.7, -0.45);

@@ -5,7 +5,7 @@ use super::figures;
 use std::path::Path;
 use std::time::Instant;
 use surfel_core::flat::FlatCloud;
-use surfel_core::points::{PointCloud, Preparation, StructureChoice};
+use surfel_core::points::{PointCloud, Preparation};
 use surfel_core::progress::NoProgress;
 use surfel_core::scene::Mesh;
 use surfel_core::surface::SurfaceKind;
@@ -45,8 +45,7 @@ impl Sampled {
 
 /// Returns the preparation of a cloud as one surface, with normals where a kind needs them.
 pub fn preparation(kind: SurfaceKind) -> Preparation {
-    let (structure, estimates_normals) = (StructureChoice::Surface, kind.needs_normals());
-    Preparation { structure, estimates_normals, ..Preparation::default() }
+    Preparation { estimates_normals: kind.needs_normals(), ..scenes::one_surface() }
 }
 
 /// Asserts the figures of all kinds for a small cloud.

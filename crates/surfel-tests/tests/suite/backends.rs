@@ -3,13 +3,12 @@
 use crate::light;
 use crate::reference;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU32, Ordering};
 use surfel_core::Error;
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
 use surfel_core::math::{DAffine3, DQuat, DVec3, Vec3};
 use surfel_core::points::{Preparation, StructureChoice};
-use surfel_core::progress::{NoProgress, Progress};
+use surfel_core::progress::NoProgress;
 use surfel_core::render::{RenderRegion, Renderer, Settings};
 use surfel_core::scene::{
     Background, Camera, ClipPlane, Geometry, Graph, Light, Material, Node, Projection,
@@ -19,24 +18,14 @@ use surfel_core::surface::{Align, EdgeTest, GatherLimit, SurfaceKind, SurfaceOpt
 use surfel_formats::{ImageOptions, save_image};
 use surfel_gpu::GpuRenderer;
 use surfel_tests::backends::{Difference, TOLERANCE, cpu, gpu, render};
+use surfel_tests::cancel_after::CancelAfter;
 use surfel_tests::clouds;
 use surfel_tests::scenes;
 
-/// The kinds of surface that the GPU renders: all but that without rays.
-const KINDS: [SurfaceKind; 12] = [
-    SurfaceKind::Sphere,
-    SurfaceKind::Disc,
-    SurfaceKind::SplatMean,
-    SurfaceKind::Splat,
-    SurfaceKind::SplatFit,
-    SurfaceKind::Cylinder,
-    SurfaceKind::Mls,
-    SurfaceKind::Smooth,
-    SurfaceKind::Implicit,
-    SurfaceKind::Octree,
-    SurfaceKind::OctreeSplat,
-    SurfaceKind::Gaussian,
-];
+/// Returns the kinds of surface that the GPU renders: all but that without rays.
+fn kinds() -> impl Iterator<Item = SurfaceKind> {
+    scenes::hit_kinds().chain([SurfaceKind::Gaussian])
+}
 
 pub const SETTINGS: Settings = Settings {
     width: 80,
@@ -88,14 +77,14 @@ pub fn flat(scene: &Scene) -> FlatScene {
 
 #[test]
 fn surfaces_are_equal() {
-    for kind in KINDS {
+    for kind in kinds() {
         check(kind.name(), &flat(&reference::scene(kind)), &SETTINGS);
     }
 }
 
 #[test]
 fn surfaces_without_edge_test_are_equal() {
-    for kind in KINDS {
+    for kind in kinds() {
         let mut scene = reference::scene(kind);
         if let Geometry::Points(points) = &mut scene.graph.geometries[0] {
             points.edge_test = EdgeTest::Off;
@@ -282,7 +271,7 @@ fn pictures_of_a_gpu_equal_the_references() {
     // The references of the CPU have 8 bits, where rounding alone may make a step.
     let n_pixels = (TOLERANCE.other_pixels * 96.0 * 72.0) as usize;
     let allowed = reference::Difference { n_pixels, n_steps: TOLERANCE.steps };
-    reference::check(gpu, &KINDS, allowed);
+    reference::check(gpu, &kinds().collect::<Vec<_>>(), allowed);
 }
 
 #[test]
@@ -326,7 +315,7 @@ fn pictures_repeat_and_follow_changes_of_the_scene() {
 #[test]
 fn ray_counts_are_equal() {
     let Some(gpu) = gpu() else { return };
-    for kind in KINDS {
+    for kind in kinds() {
         let scene = flat(&reference::scene(kind));
         let count = |renderer: &dyn Renderer| {
             renderer.render(&scene, &SETTINGS, &NoProgress).unwrap().1.rays
@@ -366,17 +355,6 @@ fn trees_in_pages_are_equal_and_larger_ones_are_refused() {
     let error = with_pages(1 << 12).render(&scene, &settings, &NoProgress).unwrap_err();
     let Error::Renderer(reason) = error else { panic!("{error}") };
     assert!(reason.contains("allows 16384 bytes in the pages of a tree, "), "{reason}");
-}
-
-/// Cancels at a check after this number of others.
-struct CancelAfter(AtomicU32);
-
-impl Progress for CancelAfter {
-    fn is_cancelled(&self) -> bool {
-        let left = self.0.load(Ordering::Relaxed);
-        self.0.store(left.saturating_sub(1), Ordering::Relaxed);
-        left == 0
-    }
 }
 
 #[test]
@@ -428,7 +406,7 @@ fn more_memory_than_the_limit_is_refused_before_the_upload() {
 fn rendering_can_be_cancelled() {
     let Some(gpu) = gpu() else { return };
     let scene = flat(&reference::scene(SurfaceKind::Splat));
-    let result = gpu.render(&scene, &SETTINGS, &CancelAfter(AtomicU32::new(1)));
+    let result = gpu.render(&scene, &SETTINGS, &CancelAfter::new(1));
     assert_eq!(result.err(), Some(Error::Cancelled));
     check("after-cancel", &scene, &SETTINGS);
 }
@@ -442,7 +420,7 @@ fn cancelled_pictures_leave_nothing_to_later_ones() {
         Settings { width: 128, height: 100, light_samples: 4, with_aovs: false, ..SETTINGS };
     let picture = render(gpu, &scene, &settings);
     for n_checks in 0..4 {
-        let result = gpu.render(&scene, &settings, &CancelAfter(AtomicU32::new(n_checks)));
+        let result = gpu.render(&scene, &settings, &CancelAfter::new(n_checks));
         assert_eq!(result.err(), Some(Error::Cancelled));
         assert!(picture == render(gpu, &scene, &settings), "{n_checks}");
     }

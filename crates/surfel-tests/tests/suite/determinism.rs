@@ -2,15 +2,15 @@
 //! and every stage of the work can be cancelled.
 
 use rayon::ThreadPoolBuilder;
-use std::sync::atomic::{AtomicU64, Ordering};
 use surfel_core::flat::FlatScene;
 use surfel_core::image::Image;
 use surfel_core::math::{Vec3, Vec4};
-use surfel_core::progress::{NoProgress, Progress};
+use surfel_core::progress::NoProgress;
 use surfel_core::render::{CpuRenderer, RenderRegion, Renderer, Settings};
 use surfel_core::scene::{Light, Material, Scene, Sky, Sun};
 use surfel_core::surface::SurfaceKind;
 use surfel_core::trace::Simd;
+use surfel_tests::cancel_after::CancelAfter;
 use surfel_tests::clouds;
 use surfel_tests::scenes;
 
@@ -77,21 +77,10 @@ fn preparation_and_tree_do_not_depend_on_threads() {
     assert!(build(1) == build(2));
 }
 
-/// Cancels the work when it has been asked a number of times whether to cancel.
-struct CancelAt {
-    left: AtomicU64,
-}
-
-impl Progress for CancelAt {
-    fn is_cancelled(&self) -> bool {
-        self.left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1)).is_err()
-    }
-}
-
 #[test]
 fn every_stage_can_be_cancelled() {
     for left in [0, 1, 5, 20] {
-        let progress = CancelAt { left: AtomicU64::new(left) };
+        let progress = CancelAfter::new(left);
         let result = FlatScene::new(&scene(SurfaceKind::Splat), &progress).and_then(|flat| {
             CpuRenderer { simd: Simd::detect() }.render(&flat, &SETTINGS, &progress)
         });
@@ -105,7 +94,7 @@ fn rasterised_points_can_be_cancelled_in_every_row() {
     let n_rows = u64::from(SETTINGS.height);
     // The first question is asked while the points are drawn, and two more in each row of pixels.
     for left in [0, 1, n_rows / 2, n_rows + 1, 2 * n_rows] {
-        let progress = CancelAt { left: AtomicU64::new(left) };
+        let progress = CancelAfter::new(left);
         let result = CpuRenderer { simd: Simd::detect() }.render(&flat, &SETTINGS, &progress);
         assert!(matches!(result, Err(surfel_core::Error::Cancelled)), "after {left}");
     }

@@ -1,7 +1,7 @@
 //! Light on points with known answers: furnaces, shadows, unlit colours, layers and backgrounds.
 
 use surfel_core::flat::FlatScene;
-use surfel_core::image::{Image, encode_srgb8};
+use surfel_core::image::encode_srgb8;
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::NoProgress;
@@ -26,12 +26,6 @@ const SETTINGS: Settings = Settings {
     with_aovs: true,
 };
 
-fn render(scene: &Scene, settings: &Settings) -> Image {
-    let flat = FlatScene::new(scene, &NoProgress).unwrap();
-    let renderer = CpuRenderer { simd: Simd::detect() };
-    renderer.render(&flat, settings, &NoProgress).unwrap().0
-}
-
 const FURNACE: Sky =
     Sky { up: Vec3::Z, zenith: Vec3::ONE, ground: Vec3::ONE, ao_distance: f32::INFINITY };
 
@@ -46,7 +40,7 @@ fn pixels_are_lit_by_the_normals_of_points_that_have_some() {
         }
         let (lights, camera) = (vec![light.clone()], scenes::from_above(1.0));
         let scene = Scene { lights, camera, ..scenes::lit(points) };
-        let image = render(&scene, &Settings { point_size: 3.0, ..SETTINGS });
+        let image = scenes::render(&scene, &Settings { point_size: 3.0, ..SETTINGS });
         let sum: f32 = image.color.iter().map(|color| color[0]).sum();
         sum / image.coverage.iter().sum::<f32>()
     };
@@ -108,7 +102,7 @@ fn a_shadow_lies_where_the_sun_casts_it() {
         [(Vec3::Z, Vec3::ZERO), (Vec3::new(1.0, 0.0, 1.0).normalize(), Vec3::new(-1.0, 0.0, 0.0))]
     {
         scene.lights = vec![Light::Sun(Sun { direction, ..sun })];
-        let image = render(&scene, &SETTINGS);
+        let image = scenes::render(&scene, &SETTINGS);
         let mut n_checked = 0;
         for (pixel, position) in image.color.iter().zip(&image.aovs.as_ref().unwrap().position) {
             // Only pixels of the floor that the ball does not hide are tested.
@@ -134,7 +128,7 @@ fn a_wide_sun_casts_a_penumbra() {
     let mut scene = ball_over_floor(sun);
     scene.camera.position = DVec3::new(0.0, 0.0, 10.0);
     let settings = Settings { light_samples: 64, ..SETTINGS };
-    let image = render(&scene, &settings);
+    let image = scenes::render(&scene, &settings);
     let grey = image
         .color
         .iter()
@@ -153,7 +147,7 @@ fn unlit_colors_are_exact() {
             let mut scene = scenes::lit(scenes::colored(&points, colors));
             scene.graph.materials[0] = Material::UNLIT;
             let settings = Settings { samples_per_pixel: 4, ..SETTINGS };
-            let image = render(&scene, &settings);
+            let image = scenes::render(&scene, &settings);
             let center = image.color[32 * 64 + 32];
             let full = if kind == SurfaceKind::Points {
                 image.color.iter().find(|pixel| pixel[3] == 1.0).copied().unwrap()
@@ -169,7 +163,7 @@ fn unlit_colors_are_exact() {
 fn layers_hold_the_hits_of_the_pixel_centres() {
     let scene =
         scenes::scene(clouds::georeferenced(&clouds::sphere(20_000, 1.0)), SurfaceKind::Splat);
-    let image = render(&scene, &SETTINGS);
+    let image = scenes::render(&scene, &SETTINGS);
     let aovs = image.aovs.as_ref().unwrap();
     let center = 32 * 64 + 32;
     assert!((aovs.depth[center] - 5.0).abs() < 0.01, "{}", aovs.depth[center]);
@@ -193,7 +187,7 @@ fn the_environment_is_seen_behind_points() {
             scene.background = Background::Environment;
             let ground = Vec3::new(0.1, 0.2, 0.3);
             scene.lights = vec![Light::Sky(Sky { ground, ..FURNACE })];
-            render(&scene, &SETTINGS)
+            scenes::render(&scene, &SETTINGS)
         };
         let (points, splats) = (picture(SurfaceKind::Points), picture(SurfaceKind::Splat));
         for corner in [0, 63, 63 * 64, 64 * 64 - 1] {
@@ -214,7 +208,7 @@ fn points_wrap_around_panoramas() {
         view_up: DVec3::Z,
         projection: Projection::Panorama,
     };
-    let image = render(&scene, &Settings { point_size: 9.0, ..SETTINGS });
+    let image = scenes::render(&scene, &Settings { point_size: 9.0, ..SETTINGS });
     let is_covered = |x: usize| image.coverage[32 * 64 + x] == 1.0;
     let columns: Vec<usize> = (0..64).filter(|x| is_covered(*x)).collect();
     let expected = (0..4).chain(28..36).chain(60..64);
@@ -236,7 +230,7 @@ fn the_nearest_points_of_several_clouds_are_seen() {
     for position in [DVec3::new(5.0, 1.0, 3.0), DVec3::new(1.0, 5.0, -4.0)] {
         let picture = |scene: &Scene| {
             let camera = Camera { position, ..scene.camera };
-            render(&Scene { camera, ..scene.clone() }, &SETTINGS)
+            scenes::render(&Scene { camera, ..scene.clone() }, &SETTINGS)
         };
         let (merged, separate) = (picture(&merged), picture(&separate));
         let [a, b] = [&merged, &separate].map(|image| &image.aovs.as_ref().unwrap().depth);

@@ -176,19 +176,7 @@ fn overlapping(kind: SurfaceKind) -> Graph {
 #[test]
 fn overlapping_instances_are_hit_like_separate_ones() {
     let rays = scenes::random_rays(1500, 1.2, 75);
-    for kind in [
-        SurfaceKind::Sphere,
-        SurfaceKind::Disc,
-        SurfaceKind::SplatMean,
-        SurfaceKind::Splat,
-        SurfaceKind::SplatFit,
-        SurfaceKind::Cylinder,
-        SurfaceKind::Mls,
-        SurfaceKind::Smooth,
-        SurfaceKind::Implicit,
-        SurfaceKind::Octree,
-        SurfaceKind::OctreeSplat,
-    ] {
+    for kind in scenes::hit_kinds() {
         let scene = flat(overlapping(kind));
         let n_hits = check_against_brute_force(kind.name(), &scene, &rays);
         assert!(500 < n_hits, "{n_hits}");

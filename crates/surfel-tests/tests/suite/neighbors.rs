@@ -5,17 +5,15 @@ use crate::brute_force::{all_hits, within_limit};
 use crate::rays::{hits, rays_from_above};
 use surfel_core::flat::FlatCloud;
 use surfel_core::math::{Ray, Vec3};
-use surfel_core::points::{PointCloud, Preparation, StructureChoice};
+use surfel_core::points::{PointCloud, Preparation};
 use surfel_core::progress::NoProgress;
 use surfel_core::surface::{EdgeTest, SurfaceKind, SurfaceOptions};
 use surfel_core::trace::{Hit, Simd, Splat, SurfaceHit, occlusions, splats, surface_hits};
 use surfel_tests::clouds;
 use surfel_tests::scenes;
+use surfel_tests::scenes::FIELD_KINDS;
 
 const KINDS: [SurfaceKind; 2] = [SurfaceKind::Cylinder, SurfaceKind::Mls];
-/// The kinds whose surface is the zeros of a field, with structures of their own.
-const FIELD_KINDS: [SurfaceKind; 3] =
-    [SurfaceKind::Implicit, SurfaceKind::Octree, SurfaceKind::OctreeSplat];
 
 /// Returns a cloud with these options.
 fn flat_with(cloud: PointCloud, kind: SurfaceKind, options: SurfaceOptions) -> FlatCloud {
@@ -267,8 +265,7 @@ fn the_order_of_rays_does_not_change_their_hits() {
 
 /// Returns splats whose planes are fitted to points without normals.
 fn splats_without_normals(cloud: PointCloud) -> FlatCloud {
-    let (structure, estimates_normals) = (StructureChoice::Surface, false);
-    let preparation = Preparation { structure, estimates_normals, ..Preparation::default() };
+    let preparation = Preparation { estimates_normals: false, ..scenes::one_surface() };
     let cloud = PointCloud { normals: None, ..cloud };
     let points = scenes::prepared(cloud, &preparation, SurfaceKind::SplatFit);
     assert!(points.cloud().normals.is_none());

@@ -175,8 +175,8 @@ fn small_radii_leave_no_holes_if_discs_overlap() {
 #[test]
 fn the_scale_of_a_cloud_does_not_matter() {
     let rays = rays_from_above(0.65, 40);
-    let kinds = [SurfaceKind::Implicit, SurfaceKind::Octree, SurfaceKind::OctreeSplat];
-    for (kind, scale) in kinds.into_iter().flat_map(|kind| [1e-6, 1.0, 1e6].map(|s| (kind, s))) {
+    let scales = |kind| [1e-6, 1.0, 1e6].map(|scale| (kind, scale));
+    for (kind, scale) in scenes::FIELD_KINDS.into_iter().flat_map(scales) {
         let mut cloud = clouds::sphere(2000, 1.0);
         cloud.positions.iter_mut().for_each(|position| *position *= scale);
         let flat = scenes::flat(cloud, kind);

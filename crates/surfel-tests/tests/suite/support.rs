@@ -24,12 +24,6 @@ const SETTINGS: Settings = Settings {
     with_aovs: true,
 };
 
-/// The kinds of surface that rays hit. Gaussians have a support of their own.
-fn traced_kinds() -> impl Iterator<Item = SurfaceKind> {
-    let others = [SurfaceKind::Points, SurfaceKind::Gaussian];
-    SurfaceKind::ALL.into_iter().map(|(_, kind)| kind).filter(move |kind| !others.contains(kind))
-}
-
 /// Finds the support of hits at all SIMD levels, which must agree.
 fn supports(scene: &FlatScene, rays: &[Ray], hits: &[SceneHit]) -> Vec<Support> {
     let all = Simd::available().into_iter().map(|simd| {
@@ -53,7 +47,7 @@ fn mixed(kind: SurfaceKind) -> CloudGeometry {
 #[test]
 fn supports_equal_those_of_a_plain_loop() {
     let rays = scenes::random_rays(3000, 1.0, 5);
-    for kind in traced_kinds() {
+    for kind in scenes::hit_kinds() {
         let scene = flat(scenes::graph(vec![(Geometry::Points(mixed(kind)), Material::MATTE)]));
         let FlatGeometry::Cloud(cloud) = scene.geometry(&scene.instances[0]) else {
             panic!("the scene is a cloud");
@@ -108,7 +102,7 @@ fn a_lattice_has_the_support_of_its_closed_form() {
     let half = 0.5f32;
     let rays = [Vec3::ZERO, Vec3::new(half, half, 0.0), Vec3::new(0.25, 0.0, 0.0)]
         .map(|target| Ray::new(target + 9.0 * Vec3::Z, Vec3::NEG_Z));
-    for kind in traced_kinds().filter(|kind| kind.uses_discs()) {
+    for kind in scenes::hit_kinds().filter(|kind| kind.uses_discs()) {
         for (name, matrix) in [
             ("in place", DAffine3::IDENTITY),
             ("larger", DAffine3::from_scale(DVec3::splat(4.0))),
@@ -141,7 +135,7 @@ fn a_lattice_has_the_support_of_its_closed_form() {
 #[test]
 fn layers_hold_the_support() {
     let floor = scenes::floor(-1.5, 3.0);
-    for kind in traced_kinds() {
+    for kind in scenes::hit_kinds() {
         let mut scene = scenes::lit(scenes::points(clouds::sphere(4000, 1.0), kind));
         scene.graph = scenes::graph(vec![
             (Geometry::Points(scenes::points(clouds::sphere(4000, 1.0), kind)), Material::MATTE),
@@ -178,7 +172,7 @@ fn colors_show_the_distances_of_the_layer() {
     let colormap = Colormap::from_name("turbo").unwrap();
     let range = PercentileRange { low: 0.0, high: 0.8 };
     let support_colors = SupportColors { colormap, range };
-    for kind in traced_kinds() {
+    for kind in scenes::hit_kinds() {
         let mut points = mixed(kind);
         points.support_colors = Some(support_colors);
         let image = scenes::render(&scenes::lit(points), &SETTINGS);
