@@ -19,6 +19,7 @@ use crate::options::{FileInfo, LoadOptions, Loaded};
 /// prepared. The columns of `options` apply to points only.
 ///
 /// # Errors
+///
 /// Fails if the file cannot be read, if its format is not supported or broken, if it does not fit in memory, or if the
 /// work is cancelled. Missing materials and textures are notes of `progress`.
 pub fn load_graph(
@@ -32,6 +33,7 @@ pub fn load_graph(
 /// Returns true if a file holds a scene with transforms and animation, rather than one cloud or mesh.
 ///
 /// # Errors
+///
 /// Fails if the file cannot be read.
 pub fn is_scene(path: &Path) -> Result<bool> {
     Ok(format::is_scene(&Input::open(path)?))
@@ -43,6 +45,7 @@ pub fn is_scene(path: &Path) -> Result<bool> {
 /// Materials and textures in further files are not read; `progress` gets a note of them.
 ///
 /// # Errors
+///
 /// Fails for the reasons of [`load_graph`], and if a glTF scene has buffers in further files.
 pub fn load_graph_bytes(
     name: &str,

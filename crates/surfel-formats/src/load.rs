@@ -16,6 +16,7 @@ use crate::options::{FileInfo, LoadOptions, Loaded};
 /// world.
 ///
 /// # Errors
+///
 /// Fails if the file cannot be read, if its format is not supported or broken, if its points do not fit in memory,
 /// or if the work is cancelled.
 pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Loaded> {
@@ -26,6 +27,7 @@ pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
 /// without a signature.
 ///
 /// # Errors
+///
 /// Fails for the reasons of [`load`], and if the bytes name further files that hold points.
 pub fn load_bytes(
     name: &str,
@@ -39,6 +41,7 @@ pub fn load_bytes(
 /// Reads several files to one cloud, relative to the origin of the largest, and returns information about each.
 ///
 /// # Errors
+///
 /// Fails for the reasons of [`load`], and if `paths` is empty.
 pub fn load_all(
     paths: &[PathBuf],
@@ -57,6 +60,7 @@ pub fn load_all(
 /// Reads the information that a file states about itself, without its points.
 ///
 /// # Errors
+///
 /// Fails if the file cannot be read, or if its format is not supported or its header broken.
 pub fn inspect(path: &Path) -> Result<FileInfo> {
     let input = Input::open(path)?;
@@ -67,6 +71,7 @@ pub fn inspect(path: &Path) -> Result<FileInfo> {
 /// its extension gives the format of bytes without a signature.
 ///
 /// # Errors
+///
 /// Fails if the format is not supported or the header broken.
 pub fn inspect_bytes(name: &str, bytes: &[u8]) -> Result<FileInfo> {
     let input = Input::from_bytes(name, bytes);

@@ -17,6 +17,7 @@ static ADVICE: LazyLock<String> =
 /// Writes `cloud` to `path`, whose extension gives the format.
 ///
 /// # Errors
+///
 /// Fails if the extension is none of [`writable_extensions`], if the format cannot hold the cloud, if the file cannot
 /// be written, or if the work is cancelled. A failed write leaves no file, and an old file in its place stays.
 pub fn save(
@@ -34,6 +35,7 @@ pub fn save(
 /// Checks before any work that a cloud can be written to `path`.
 ///
 /// # Errors
+///
 /// Fails if the extension is none of [`writable_extensions`], or for the reasons of [`check_output_path`].
 pub fn check_cloud_output(path: &Path) -> Result<()> {
     find_writer(path)?;

@@ -20,6 +20,7 @@ impl TempFile {
     /// Lets `write` make the file of a name, as in `points.laz`, and files that it needs beside it.
     ///
     /// # Errors
+    ///
     /// Fails as `write` does, and if the system's folder for temporary files cannot be written to.
     pub fn write<E: From<Error>>(
         name: &str,
@@ -44,6 +45,7 @@ impl TempFile {
     /// Opens the file.
     ///
     /// # Errors
+    ///
     /// Fails if the file was removed by another program.
     pub fn open(&self) -> io::Result<File> {
         File::open(&self.path)

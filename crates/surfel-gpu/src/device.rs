@@ -166,6 +166,7 @@ impl Gpu {
     /// arrays, are split.
     ///
     /// # Errors
+    ///
     /// Fails if there is no such device, if it allows less than is needed, or if its driver refuses to open it.
     pub fn open(selector: Option<&str>, max_page_bytes: u64) -> Result<Self> {
         let adapters = adapters();

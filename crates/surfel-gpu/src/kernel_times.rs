@@ -70,6 +70,7 @@ impl Timestamps {
     /// Makes the buffers for up to `max_passes` passes.
     ///
     /// # Errors
+    ///
     /// Fails if the device does.
     pub fn new(gpu: &Gpu, max_passes: u32) -> Result<Self> {
         let count = max_passes + 1;
@@ -91,6 +92,7 @@ impl Timestamps {
     /// Waits for the passes of a submission, and returns the seconds that each of them took.
     ///
     /// # Errors
+    ///
     /// Fails if the device does.
     pub fn read(&self, gpu: &Gpu, n_passes: usize) -> Result<Vec<f64>> {
         let n = n_passes as u32 + 1;

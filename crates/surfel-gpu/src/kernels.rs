@@ -54,6 +54,7 @@ impl Kernels {
     /// Compiles kernels that are not compiled yet, each for whole trees or for trees in pages.
     ///
     /// # Errors
+    ///
     /// Fails if the driver refuses one.
     pub fn compile(
         &mut self,

@@ -36,6 +36,7 @@ impl<'a> Readback<'a> {
     /// Waits for the results, and returns what `read` makes of them, and the time at which they were there.
     ///
     /// # Errors
+    ///
     /// Fails if the device does.
     pub fn read<T>(self, gpu: &Gpu, read: impl FnOnce(&[u8]) -> T) -> Result<(T, Instant)> {
         gpu.wait_for(&self.submission)?;

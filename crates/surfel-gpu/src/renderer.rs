@@ -43,6 +43,7 @@ impl GpuRenderer {
     /// Opens the device with this index or name, or the one that is preferred.
     ///
     /// # Errors
+    ///
     /// Fails if there is no such device, if it allows less than is needed, or if its driver refuses to open it.
     pub fn open(selector: Option<&str>) -> Result<Self> {
         Self::with_pages(selector, u64::MAX)
@@ -52,6 +53,7 @@ impl GpuRenderer {
     /// the device has smaller arrays.
     ///
     /// # Errors
+    ///
     /// Fails as [`GpuRenderer::open`] does.
     pub fn with_pages(selector: Option<&str>, max_page_bytes: u64) -> Result<Self> {
         let gpu = Gpu::open(selector, max_page_bytes)?;
@@ -107,6 +109,7 @@ impl GpuRenderer {
     /// Searches along given rays several times, as benchmarks do.
     ///
     /// # Errors
+    ///
     /// Fails if the device cannot answer the question or hold the geometry, if it fails, or if `progress` is cancelled.
     pub fn time_rays(
         &self,

@@ -33,6 +33,7 @@ pub struct BoundTree {
 /// Binds the trees that passes read, together with the records of their instances.
 ///
 /// # Errors
+///
 /// Fails if the device does.
 pub fn bind_trees<'a>(
     gpu: &Gpu,
@@ -97,6 +98,7 @@ impl<'a> Submitter<'a> {
     /// Returns a submitter that measures the times of kernels, if these are wanted and the device has a clock.
     ///
     /// # Errors
+    ///
     /// Fails if the device does.
     pub fn new(
         gpu: &'a Gpu,
@@ -130,6 +132,7 @@ impl<'a> Submitter<'a> {
     /// Adds passes; those that make a submission full go to the device.
     ///
     /// # Errors
+    ///
     /// Fails if the device does, or once `progress` is cancelled.
     pub fn add<'p>(
         &mut self,
@@ -148,6 +151,7 @@ impl<'a> Submitter<'a> {
     /// Submits the passes that were added.
     ///
     /// # Errors
+    ///
     /// Fails as [`Submitter::add`] does.
     pub fn flush(&mut self) -> surfel_core::Result<()> {
         if self.waiting.is_empty() {
@@ -186,6 +190,7 @@ impl<'a> Submitter<'a> {
     /// Waits for all passes, and returns what they have counted.
     ///
     /// # Errors
+    ///
     /// Fails as [`Submitter::add`] does.
     pub fn read_counts(&mut self) -> surfel_core::Result<Counts> {
         self.flush()?;

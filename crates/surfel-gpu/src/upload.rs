@@ -99,6 +99,7 @@ impl Uploads {
     /// memory for them and for `other_bytes`.
     ///
     /// # Errors
+    ///
     /// Fails if a geometry is too large for the device, before anything is uploaded.
     pub fn update(
         &mut self,
@@ -121,6 +122,7 @@ impl Uploads {
     /// Frees geometries that are no longer in use, and those of other pictures if these and `other_bytes` need their memory.
     ///
     /// # Errors
+    ///
     /// Fails if the device has too little memory also then.
     pub fn make_room(
         &mut self,

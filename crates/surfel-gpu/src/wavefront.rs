@@ -144,6 +144,7 @@ impl Arrays {
     /// Returns the sizes of the arrays that the picture will have.
     ///
     /// # Errors
+    ///
     /// Fails if the device does.
     pub fn free_unless_fitting(
         known: &mut Option<Self>,
@@ -165,6 +166,7 @@ impl Arrays {
     /// Returns `known`, which [`Arrays::free_unless_fitting`] has left, or new arrays that hold what is wanted.
     ///
     /// # Errors
+    ///
     /// Fails if the device has too little memory.
     pub fn update<'a>(
         known: &'a mut Option<Self>,
@@ -255,6 +257,7 @@ impl<'a> Wavefront<'a> {
     /// Binds the arrays for a picture.
     ///
     /// # Errors
+    ///
     /// Fails if the device does.
     pub fn new(
         gpu: &Gpu,
@@ -383,6 +386,7 @@ impl PartReadback<'_> {
     /// Waits for the part, gives its colours to `read`, and returns its counts and the time at which it was there.
     ///
     /// # Errors
+    ///
     /// Fails if the device does.
     pub fn read(self, gpu: &Gpu, read: impl FnOnce(&[[f32; 4]])) -> Result<(Counts, Instant)> {
         self.0.read(gpu, |bytes| {

@@ -71,6 +71,7 @@ impl SceneWords {
     /// Returns the words of a scene: `known` if they are the same.
     ///
     /// # Errors
+    ///
     /// Fails if they are too many for the device.
     pub fn update(known: Option<Self>, gpu: &Gpu, scene: &FlatScene) -> Result<Self> {
         let source = Source::new(scene);

@@ -87,6 +87,7 @@ impl AccessGuard {
     /// A guard for a server that listens at `host`, without TLS. Beyond loopback it makes a new token.
     ///
     /// # Errors
+    ///
     /// Fails if the system has no random numbers.
     pub fn new(host: IpAddr) -> Result<Self, getrandom::Error> {
         let (scheme, frame_ancestors) = (Scheme::Http, FrameAncestors::default());
@@ -107,6 +108,7 @@ impl AccessGuard {
     /// Checks the host that a request names, and who has sent it.
     ///
     /// # Errors
+    ///
     /// Fails if `Host` is missing, repeated, or on loopback no loopback name, and if another web site has made the
     /// browser send the request. A link from there to the page itself is allowed, and so is a frame of it if there are
     /// origins whose pages may show one: the page's policy says which, and browsers obey it.
@@ -126,6 +128,7 @@ impl AccessGuard {
     /// Checks the token of a request: `?token=`, a bearer token, or the cookie that `exchange_token` has set.
     ///
     /// # Errors
+    ///
     /// Fails if a token is needed, and the request's is missing or wrong.
     pub fn check_token<B>(&self, request: &Request<B>) -> Result<(), AccessDenied> {
         let headers = request.headers();
@@ -145,6 +148,7 @@ impl AccessGuard {
     /// server needs none.
     ///
     /// # Errors
+    ///
     /// Fails if the token is wrong.
     pub fn exchange_token<B>(
         &self,

@@ -97,6 +97,7 @@ impl Accumulator {
     /// Renders a draft as large as `secs` allow; none without a scene.
     ///
     /// # Errors
+    ///
     /// Fails if rendering fails or is cancelled.
     pub fn draft(
         &mut self,
@@ -195,6 +196,7 @@ impl Accumulator {
     /// Renders one slice and adds it; returns whether there was one to render.
     ///
     /// # Errors
+    ///
     /// Fails if rendering fails or is cancelled.
     pub fn refine(
         &mut self,

@@ -29,6 +29,7 @@ pub struct Announcement {
 /// Receives and reads a file; returns the message about it.
 ///
 /// # Errors
+///
 /// Fails for files beyond the limits, for those that do not arrive, as reading does, and if cancelled.
 pub async fn run(
     state: &Arc<ServerState>,

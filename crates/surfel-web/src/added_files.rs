@@ -73,6 +73,7 @@ impl FileUploads {
     /// Reserves memory for a file.
     ///
     /// # Errors
+    ///
     /// Fails for a file without bytes or with a name that is none, for one beyond the limit, and if those of other pages
     /// leave too little.
     pub fn reserve(self: &Arc<Self>, name: &str, n_bytes: u64) -> Result<Reservation> {
@@ -91,6 +92,7 @@ impl FileUploads {
     /// Expects the bytes of a file under a random name.
     ///
     /// # Errors
+    ///
     /// Fails if the system has no random numbers.
     pub fn expect(self: &Arc<Self>, n_bytes: u64) -> Result<UploadGuard> {
         let mut bytes = [0; NAME_BYTES];
@@ -105,6 +107,7 @@ impl FileUploads {
     /// Takes the bytes of an upload; each piece must arrive within `patience`.
     ///
     /// # Errors
+    ///
     /// Fails for names that are not expected, for other numbers of bytes than announced, and for slow clients.
     pub async fn take(
         &self,
@@ -156,6 +159,7 @@ impl Reservation {
     /// Reserves another number of bytes instead.
     ///
     /// # Errors
+    ///
     /// Fails beyond the limits; the reservation then stays as it was.
     pub fn resize(&mut self, name: &str, n_bytes: u64) -> Result<()> {
         let (max_file, max_all) = (self.uploads.max_file_bytes, self.uploads.max_bytes);

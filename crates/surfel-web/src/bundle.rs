@@ -15,6 +15,7 @@ pub type ReadFile<'r> = &'r dyn Fn(&str) -> Option<String>;
 /// of each script that is loaded when it is needed, and returns its address.
 ///
 /// # Errors
+///
 /// Fails with the reason if a module is missing, imports itself through others, or uses another form of `import` or
 /// `export`.
 pub fn bundle_modules(
@@ -48,6 +49,7 @@ pub fn bundle_modules(
 /// Returns the style sheets in their order as one, without comments and needless spaces.
 ///
 /// # Errors
+///
 /// Fails with the reason if one is missing.
 pub fn bundle_styles(names: &[&str], read: ReadFile) -> Result<String, String> {
     let texts = names.iter().map(|name| read(name).ok_or_else(|| format!("{name}: is missing")));

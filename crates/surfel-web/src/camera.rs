@@ -25,6 +25,7 @@ const DEFAULT_VIEW_ANGLE_DEG: f64 = 35.0;
 /// Reads a complete `camera` setting.
 ///
 /// # Errors
+///
 /// Fails if a key is missing, or if its value makes no camera.
 pub fn parse(settings: &Value) -> Result<Camera> {
     let keys = CameraKeys::deserialize(settings);

@@ -120,6 +120,7 @@ impl Client {
     /// Renders and sends a draft within about `secs` if the view has changed; returns whether it had.
     ///
     /// # Errors
+    ///
     /// Fails if rendering fails or is cancelled.
     pub fn draft(&self, renderer: &dyn Renderer, secs: f64) -> surfel_core::Result<bool> {
         let (view, version) = self.versioned_view();
@@ -138,6 +139,7 @@ impl Client {
     /// Renders one slice of the picture of a stage; returns whether there was anything to do.
     ///
     /// # Errors
+    ///
     /// Fails if rendering fails or is cancelled.
     pub fn refine(&self, renderer: &dyn Renderer, stage: Stage) -> surfel_core::Result<bool> {
         let (view, version) = self.versioned_view();

@@ -9,6 +9,7 @@ const MAX_CORNERS: usize = 100;
 /// Checks the corners of the figure `name` and the up axis; returns them with a unit axis.
 ///
 /// # Errors
+///
 /// Fails if there are fewer corners than `min` or too many, and if a number is not finite.
 pub fn parse(
     name: &str,

@@ -27,6 +27,7 @@ impl Downloads {
     /// Keeps a file for as long as the returned guard lives.
     ///
     /// # Errors
+    ///
     /// Fails if the system has no random numbers.
     pub fn add(
         self: &Arc<Self>,
@@ -58,6 +59,7 @@ impl Drop for DownloadGuard {
 /// Reads a file piece by piece, as fast as the client does.
 ///
 /// # Errors
+///
 /// Fails if the file cannot be opened.
 pub fn body(file: &Arc<dyn WrittenFile>) -> std::io::Result<Body> {
     let (reader, held) = (file.open()?, file.clone());

@@ -119,6 +119,7 @@ impl Limits {
     /// Checks the size of a page's interactive picture.
     ///
     /// # Errors
+    ///
     /// Fails if the picture has no pixels, too many, or too long a side.
     pub fn check_view_size(&self, width: u32, height: u32) -> Result<()> {
         self.check_size(width, height, self.max_view_pixels)
@@ -127,6 +128,7 @@ impl Limits {
     /// Checks the size of a saved picture.
     ///
     /// # Errors
+    ///
     /// Fails if the picture has no pixels, too many, or too long a side.
     pub fn check_save_size(&self, width: u32, height: u32) -> Result<()> {
         self.check_size(width, height, self.max_save_pixels)
@@ -135,6 +137,7 @@ impl Limits {
     /// Checks the numbers of camera rays and light samples a pixel.
     ///
     /// # Errors
+    ///
     /// Fails with the key of the number that is too large.
     pub fn check_samples(&self, spp: u32, light_samples: u32) -> Result<()> {
         let max_samples = self.max_samples;
@@ -150,6 +153,7 @@ impl Limits {
     /// Checks the size of a saved picture, and the work that it takes with a number of rays a pixel.
     ///
     /// # Errors
+    ///
     /// Fails for pictures that would fill the memory or take days.
     pub fn check_save(&self, (width, height): (u32, u32), rays_per_pixel: u64) -> Result<()> {
         self.check_save_size(width, height)?;
@@ -165,6 +169,7 @@ impl Limits {
     /// Checks the size of a film, and the work that it takes with a number of rays a pixel.
     ///
     /// # Errors
+    ///
     /// Fails for films that would fill the disk or take days.
     pub fn check_film(
         &self,

@@ -13,6 +13,7 @@ use tokio::sync::mpsc;
 /// Does long work for a page once a permit is free, and reports its progress to the page.
 ///
 /// # Errors
+///
 /// Fails as the work does, and if it is cancelled.
 pub async fn run_slowly<T: Send + 'static>(
     state: &Arc<ServerState>,
@@ -28,6 +29,7 @@ pub async fn run_slowly<T: Send + 'static>(
 /// Does work for a page, and reports its progress to the page.
 ///
 /// # Errors
+///
 /// Fails as the work does, and if it is cancelled.
 pub async fn run_at_once<T: Send + 'static>(
     state: &Arc<ServerState>,

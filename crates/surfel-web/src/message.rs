@@ -63,6 +63,7 @@ impl Incoming {
     /// Reads a message.
     ///
     /// # Errors
+    ///
     /// Fails if the text is not JSON, or not a known message.
     pub fn parse(text: &str) -> Result<Self> {
         serde_json::from_str(text)

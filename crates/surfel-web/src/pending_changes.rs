@@ -49,6 +49,7 @@ impl PendingChanges {
     /// Merges a newer change into those that wait.
     ///
     /// # Errors
+    ///
     /// Fails if more bytes would wait than the limit allows; the change is then dropped.
     pub fn add(&self, newer: SettingsChange) -> Result<()> {
         self.append(&mut self.lock(), newer)?;

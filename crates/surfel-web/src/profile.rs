@@ -12,6 +12,7 @@ const MAX_POINTS: usize = 20_000;
 /// Checks a line from a page.
 ///
 /// # Errors
+///
 /// Fails if it has fewer than two corners or too many, and if a number is not what it should be.
 pub fn parse(corners: &[[f64; 3]], width: f64, up: [f64; 3]) -> Result<ProfileLine> {
     let (corners, up) = corners::parse("profile", 2, corners, up)?;
@@ -24,6 +25,7 @@ pub fn parse(corners: &[[f64; 3]], width: f64, up: [f64; 3]) -> Result<ProfileLi
 /// Returns the points of a profile as a page gets them: a list for each of their properties.
 ///
 /// # Errors
+///
 /// Fails if `progress` is cancelled.
 pub fn profile(
     scene: &PreparedScene,

@@ -35,6 +35,7 @@ impl RenderLoop {
     /// Starts the thread, which runs until `close` is called.
     ///
     /// # Errors
+    ///
     /// Fails if the system denies a thread.
     pub fn start(
         self: &Arc<Self>,

@@ -40,12 +40,14 @@ pub trait SceneProvider: Send + Sync + 'static {
     /// The scene of these settings; the provider chooses missing settings from the data.
     ///
     /// # Errors
+    ///
     /// Fails if a setting is invalid, if the data cannot be prepared with it, or if `progress` cancels.
     fn prepare(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<PreparedScene>;
 
     /// The finished picture of these settings as a PNG file, byte for byte as the command line writes it.
     ///
     /// # Errors
+    ///
     /// Fails if a setting is invalid, if the picture exceeds the limits, or if `progress` cancels.
     fn render_png(&self, settings: &SettingsMap, progress: &dyn Progress) -> Result<Vec<u8>>;
 
@@ -58,12 +60,14 @@ pub trait SceneProvider: Send + Sync + 'static {
     /// between them.
     ///
     /// # Errors
+    ///
     /// Fails if no points have the column.
     fn histogram(&self, column: &str) -> Result<Value>;
 
     /// Writes the points that these settings show to a file of a format: `laz` or `ply`.
     ///
     /// # Errors
+    ///
     /// Fails if a setting is invalid, if no points are shown, and if `progress` cancels.
     fn write_points(
         &self,
@@ -75,6 +79,7 @@ pub trait SceneProvider: Send + Sync + 'static {
     /// Writes the film of the camera's path in these settings, whose `resolution` is that of the frames.
     ///
     /// # Errors
+    ///
     /// Fails if a setting is invalid, without a path, if the film exceeds the limits, and if `progress` cancels.
     fn write_film(
         &self,
@@ -86,6 +91,7 @@ pub trait SceneProvider: Send + Sync + 'static {
     /// Reads a file that a page adds to its view. The settings of the page then name it by its id, in the list `added_files`.
     ///
     /// # Errors
+    ///
     /// Fails if the bytes are of no known format or broken, if they need too much memory, and if `progress` cancels.
     fn read_added_file(
         &self,
@@ -99,12 +105,14 @@ pub trait SceneProvider: Send + Sync + 'static {
     /// These settings as a command line and as scene files.
     ///
     /// # Errors
+    ///
     /// Fails if a setting is invalid.
     fn export(&self, settings: &SettingsMap) -> Result<Export>;
 
     /// The settings in the text of a scene file that a page sends; `name` is the file's name.
     ///
     /// # Errors
+    ///
     /// Fails if the text is no scene file, or if its objects are not those that are viewed.
     fn read_scene_file(&self, name: &str, text: &str) -> Result<SettingsMap>;
 }
@@ -156,6 +164,7 @@ pub trait WrittenFile: Send + Sync {
     /// Opens the file.
     ///
     /// # Errors
+    ///
     /// Fails if the file is not there any more.
     fn open(&self) -> std::io::Result<Box<dyn Read + Send>>;
 }

@@ -47,6 +47,7 @@ impl Server {
     /// Binds to a port; port 0 takes any free one.
     ///
     /// # Errors
+    ///
     /// Fails if the system refuses the address or the port, or has no random numbers for a token.
     pub fn bind(host: IpAddr, port: u16) -> Result<Self> {
         let address = SocketAddr::new(host, port);
@@ -98,6 +99,7 @@ impl Server {
     /// Answers requests until `is_stopped` is set. Pages may connect while `open` still loads the files.
     ///
     /// # Errors
+    ///
     /// Fails if `open` fails, or if the system denies threads or the listener.
     pub fn run(
         self,

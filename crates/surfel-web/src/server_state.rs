@@ -104,6 +104,7 @@ impl ServerState {
     /// Runs a blocking task on a thread of its own, once a permit is free.
     ///
     /// # Errors
+    ///
     /// Fails if the task panics.
     pub async fn run_blocking<R: Send + 'static>(
         &self,

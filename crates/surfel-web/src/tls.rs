@@ -31,6 +31,7 @@ impl TlsIdentity {
     /// Reads a chain of certificates, the server's own one first, and the private key of that one.
     ///
     /// # Errors
+    ///
     /// Fails if one of them is not in the PEM format, or if they do not belong together.
     pub fn from_pem(certificates: &[u8], key: &[u8]) -> Result<Self, TlsError> {
         let chain: Vec<CertificateDer<'static>> = CertificateDer::pem_slice_iter(certificates)

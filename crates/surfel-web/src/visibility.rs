@@ -16,6 +16,7 @@ const MARGIN_OF_SCENE: f32 = 0.002;
 /// seen.
 ///
 /// # Errors
+///
 /// Fails if there are too many points, if a number is not finite, and if there is no scene yet.
 pub fn visibility(view: &ViewState, points: &[[f64; 3]]) -> Result<Vec<bool>> {
     if MAX_POINTS < points.len() || points.iter().flatten().any(|number| !number.is_finite()) {

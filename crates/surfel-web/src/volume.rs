@@ -9,6 +9,7 @@ use surfel_core::progress::Progress;
 /// Checks a request of a page. `base` is `lowest`, `mean` or a height.
 ///
 /// # Errors
+///
 /// Fails for corners that bound no area, another base, and a cell without size.
 pub fn parse(
     corners: &[[f64; 3]],
@@ -36,6 +37,7 @@ pub fn parse(
 /// Returns the volume as a page gets it.
 ///
 /// # Errors
+///
 /// Fails for corners on a line, and if `progress` is cancelled.
 pub fn volume(
     scene: &PreparedScene,

@@ -58,6 +58,7 @@ impl AddedFiles {
     /// The files that settings list.
     ///
     /// # Errors
+    ///
     /// Fails for files that are not kept any more, and if one is listed twice.
     pub fn listed(&self, settings: &SettingsMap) -> Result<Vec<Arc<PageFile>>> {
         let Some(list) = settings.get(KEY) else { return Ok(Vec::new()) };
@@ -78,6 +79,7 @@ impl PageFile {
     /// Reads a file that a page sends. Its name is made different from those of other files of the page and of `rows`.
     ///
     /// # Errors
+    ///
     /// Fails as reading does, and for files that need too much memory.
     pub fn read(file: &SentFile, rows: &[String], progress: &dyn Progress) -> Result<Self> {
         let (bytes, max_bytes) = (file.bytes, file.max_bytes);

@@ -24,6 +24,7 @@ const MAX_KEYS: usize = 500;
 /// Returns the path of the camera in settings, if they have one.
 ///
 /// # Errors
+///
 /// Fails for keys and values that an animation of the camera does not have, and for too many keys.
 pub fn camera_path(settings: &SettingsMap) -> Result<Option<AnimationDescription>> {
     let Some(path) = settings.get(KEY) else { return Ok(None) };
@@ -68,6 +69,7 @@ pub fn with_path(
 /// Renders the film of a description.
 ///
 /// # Errors
+///
 /// Fails for other formats, for films beyond the limits, as rendering does, and if cancelled.
 pub fn write_film(
     scene: &LiveScene,

@@ -14,6 +14,7 @@ const MAX_VALUE: f64 = 1e300;
 /// takes does not grow with the clouds: they are gone through twice.
 ///
 /// # Errors
+///
 /// Fails if no cloud has values of the column.
 pub fn histogram(clouds: &[&PointCloud], column: &str) -> surfel_core::Result<Value> {
     let (mut low, mut high, mut is_whole) = (f64::INFINITY, f64::NEG_INFINITY, true);

@@ -16,6 +16,7 @@ const FORMATS: [&str; 2] = ["laz", "ply"];
 /// Writes the points of a view at a time to a file.
 ///
 /// # Errors
+///
 /// Fails for other formats, for a view without points, as writing does, and if cancelled.
 pub fn write_shown_points(
     view: &LiveView,

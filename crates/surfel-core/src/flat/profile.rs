@@ -56,6 +56,7 @@ struct Segment {
 /// Returns at most `limit` points beside a line, a fixed random choice if there are more.
 ///
 /// # Errors
+///
 /// Fails if `progress` is cancelled.
 pub fn height_profile(
     scene: &FlatScene,

@@ -57,6 +57,7 @@ impl Slots for FlatGaussians {
 /// Calls `find` for each point that is shown; returns what it finds, in a fixed order.
 ///
 /// # Errors
+///
 /// Fails if `progress` is cancelled.
 pub fn visit_points<T: Send>(
     scene: &FlatScene,
@@ -72,6 +73,7 @@ pub fn visit_points<T: Send>(
 /// once, however many points there are.
 ///
 /// # Errors
+///
 /// Fails if `progress` is cancelled.
 pub fn visit_points_in_turn<T: Send>(
     scene: &FlatScene,

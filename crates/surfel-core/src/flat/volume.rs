@@ -58,6 +58,7 @@ const SPACINGS_PER_CELL: f64 = 2.0;
 /// Returns the volumes between points and base: the height of a cell is the mean height of its points.
 ///
 /// # Errors
+///
 /// Fails for corners that bound no area, and if `progress` is cancelled.
 pub fn cut_and_fill(
     scene: &FlatScene,

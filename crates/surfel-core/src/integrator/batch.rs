@@ -11,6 +11,7 @@ pub trait Integrator: Sync {
     /// Colours are linear and premultiplied by alpha, the part of the background that the scene hides.
     ///
     /// # Errors
+    ///
     /// Fails with [`Error::Cancelled`](crate::Error::Cancelled) once the work is cancelled.
     fn radiance(&self, batch: &CameraRayBatch) -> Result<(Vec<Vec4>, RayCounts)>;
 }

@@ -72,6 +72,7 @@ impl DirectLight<'_> {
     /// Adds the direct light reflected at `points` toward the viewer to `radiance`.
     ///
     /// # Errors
+    ///
     /// Fails once the work is cancelled.
     pub fn add(&self, points: &[ShadingPoint], radiance: &mut [Vec3]) -> Result<RayCounts> {
         let mut counts = RayCounts::default();

@@ -18,6 +18,7 @@ pub const MIN_TRANSMITTANCE: f32 = 1.0 / 512.0;
 /// index together with the media that its origin lies in.
 ///
 /// # Errors
+///
 /// Fails once the work is cancelled.
 pub fn shadow_transmittance(
     tracer: &Tracer,

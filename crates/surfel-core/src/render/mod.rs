@@ -21,6 +21,7 @@ use crate::flat::FlatScene;
 /// Checks that a picture can be rendered of `scene`.
 ///
 /// # Errors
+///
 /// Fails if only some of the scene's surfaces are rasterised points: the rasterizer draws all of a scene
 /// or none of it.
 pub fn check(scene: &FlatScene) -> Result<()> {
@@ -30,6 +31,7 @@ pub fn check(scene: &FlatScene) -> Result<()> {
 /// Checks surfaces before their trees are built; each is true if it is rasterised points.
 ///
 /// # Errors
+///
 /// Fails where [`check`] would.
 pub fn check_surfaces(are_raster: impl Iterator<Item = bool>) -> Result<()> {
     raster::all_or_none(are_raster).map(drop)

@@ -22,6 +22,7 @@ const EMPTY: u64 = u64::MAX;
 /// True if the surfaces of the scene are rasterised points.
 ///
 /// # Errors
+///
 /// Fails if only some of the surfaces are: the rasterizer draws all of a scene or none of it.
 pub fn uses_rasterizer(scene: &FlatScene) -> Result<bool> {
     let is_raster = |instance: &Instance| match scene.geometry(instance) {
@@ -34,6 +35,7 @@ pub fn uses_rasterizer(scene: &FlatScene) -> Result<bool> {
 /// Returns true if all surfaces are rasterised points, false if none is.
 ///
 /// # Errors
+///
 /// Fails if only some of them are.
 pub fn all_or_none(are_raster: impl Iterator<Item = bool>) -> Result<bool> {
     let (raster, traced): (Vec<bool>, Vec<bool>) = are_raster.partition(|is_raster| *is_raster);

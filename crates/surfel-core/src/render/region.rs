@@ -57,6 +57,7 @@ impl RenderRegion {
     /// Checks that the region is a part of the picture.
     ///
     /// # Errors
+    ///
     /// Fails if the region is empty or extends beyond the picture.
     pub fn check(&self, settings: &Settings) -> Result<()> {
         let whole = Self::whole(settings);

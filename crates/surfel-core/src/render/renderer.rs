@@ -27,6 +27,7 @@ pub trait Renderer: Sync {
     /// Renders the pixels of `region`, each as the mean of the region's samples alone.
     ///
     /// # Errors
+    ///
     /// Fails if `settings` or `region` are out of range, if the scene cannot be rendered (see
     /// [`check`](super::check)), or once `progress` is cancelled.
     fn render_region(
@@ -40,6 +41,7 @@ pub trait Renderer: Sync {
     /// Renders the whole picture.
     ///
     /// # Errors
+    ///
     /// Fails as [`Renderer::render_region`] does.
     fn render(
         &self,

@@ -51,6 +51,7 @@ impl Settings {
     /// Checks that all settings are within their limits.
     ///
     /// # Errors
+    ///
     /// Fails if the picture has no pixels or more than [`MAX_PIXELS`], if a number of samples is 0 or
     /// above 65,536, or if points are smaller than 1 or larger than 64 pixels.
     pub fn check(&self) -> Result<()> {

@@ -60,6 +60,7 @@ impl CloudGeometry {
     /// Makes a geometry of the default surface with sRGB-encoded `colors`.
     ///
     /// # Errors
+    ///
     /// Fails with [`Error::ColumnLength`](crate::Error::ColumnLength) unless there is one colour for each
     /// point.
     pub fn new(cloud: PreparedCloud, colors: Vec<[u8; 3]>) -> Result<Self> {

@@ -202,6 +202,7 @@ impl<C> Graph<C> {
     /// Replaces each cloud by the result of `map`, in the order of the geometries.
     ///
     /// # Errors
+    ///
     /// Fails with the first error of `map`.
     pub fn try_map_clouds<D, E>(
         self,

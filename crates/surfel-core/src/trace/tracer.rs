@@ -56,6 +56,7 @@ impl<'a> Tracer<'a> {
     /// Runs [`scene_hits`](super::scene_hits) at the size of a pixel.
     ///
     /// # Errors
+    ///
     /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels the job.
     pub fn hits(&self, filter: InstanceFilter, rays: &[Ray], hits: &mut [SceneHit]) -> Result<()> {
         self.in_chunks(rays.len(), |chunk| {
@@ -67,6 +68,7 @@ impl<'a> Tracer<'a> {
     /// Runs [`scene_supports`] for hits that [`Tracer::hits`] found.
     ///
     /// # Errors
+    ///
     /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels the job.
     pub fn supports(&self, rays: &[Ray], hits: &[SceneHit]) -> Result<Vec<Support>> {
         let mut supports = vec![Support::NONE; rays.len()];
@@ -80,6 +82,7 @@ impl<'a> Tracer<'a> {
     /// Runs [`scene_gaussians`](super::scene_gaussians) for rays up to their hits on surfaces.
     ///
     /// # Errors
+    ///
     /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels the job.
     pub fn gaussians(&self, rays: &[Ray], hits: &[SceneHit]) -> Result<Vec<GaussianLight>> {
         let up_to_hit =
@@ -91,6 +94,7 @@ impl<'a> Tracer<'a> {
     /// Runs [`scene_gaussians`](super::scene_gaussians) for rays up to their ends.
     ///
     /// # Errors
+    ///
     /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels the job.
     pub fn gaussians_along(&self, rays: &[Ray]) -> Result<Vec<GaussianLight>> {
         let mut lights = vec![GaussianLight::NONE; rays.len()];
@@ -103,6 +107,7 @@ impl<'a> Tracer<'a> {
     /// Runs [`scene_occlusions`].
     ///
     /// # Errors
+    ///
     /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels the job.
     pub fn occlusions(
         &self,

@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 /// Writes a text to a file, which replaces an old one once it is complete.
 ///
 /// # Errors
+///
 /// Fails if the file cannot be written; an old file then stays.
 pub fn save_text(path: &Path, text: &str) -> Result<()> {
     write_file(path, |writer| {

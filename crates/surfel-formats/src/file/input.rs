@@ -11,6 +11,7 @@ use crate::error::{Error, Location, Result};
 /// Reads a text file of at most `max_bytes` bytes.
 ///
 /// # Errors
+///
 /// Fails if the file cannot be read, is longer, or is not UTF-8.
 pub fn load_text(path: &Path, max_bytes: usize) -> Result<String> {
     let input = Input::open(path)?;

@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 /// Checks that a file of any format can be written to `path`.
 ///
 /// # Errors
+///
 /// Fails if the folder of `path` does not exist, or if `path` is a folder itself.
 pub fn check_output_path(path: &Path) -> Result<()> {
     let folder = parent_folder(path);

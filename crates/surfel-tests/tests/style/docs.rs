@@ -1,4 +1,5 @@
-//! Documentation: it begins each file and each module of tests, and none of its lines opens like a fragment.
+//! Documentation: it begins each file and each module of tests, none of its lines opens like a fragment, and headings
+//! stand apart.
 
 use crate::source::Crate;
 use crate::source::ident;
@@ -10,6 +11,9 @@ use proc_macro2::TokenTree;
 const FRAGMENT_OPENINGS: [&str; 9] =
     ["Of", "What", "Where", "Which", "Who", "Whose", "Those", "The same", "Whoever"];
 
+/// Headings of the sections of a function.
+const HEADINGS: [&str; 3] = ["# Errors", "# Panics", "# Safety"];
+
 /// Lists doc lines that begin with a fragment word.
 pub fn fragments(crates: &[Crate]) -> Vec<String> {
     let mut found = Vec::new();
@@ -17,6 +21,21 @@ pub fn fragments(crates: &[Crate]) -> Vec<String> {
         for (line, text) in doc_lines(&file.tokens) {
             if let Some(opening) = fragment_opening(&text) {
                 found.push(format!("{}:{line}: a doc line begins with `{opening}`", file.path));
+            }
+        }
+    }
+    found
+}
+
+/// Lists headings of sections without an empty line before and after.
+pub fn crowded_headings(crates: &[Crate]) -> Vec<String> {
+    let mut found = Vec::new();
+    for file in crates.iter().flat_map(|source| &source.files) {
+        for lines in doc_lines(&file.tokens).windows(3) {
+            let [(_, before), (line, text), (_, after)] = lines else { continue };
+            let is_crowded = !before.trim().is_empty() || !after.trim().is_empty();
+            if HEADINGS.contains(&text.trim()) && is_crowded {
+                found.push(format!("{}:{line}: no empty line around `{}`", file.path, text.trim()));
             }
         }
     }
@@ -115,6 +134,19 @@ mod tests {
     fn sentences_are_not_fragments() {
         let text = "//! Points.\n\n/// Returns the points of which `a` is one.\nfn a() {}\n";
         assert!(fragments(&[crate_of("demo", [("src/lib.rs", text)])]).is_empty());
+    }
+
+    #[test]
+    fn headings_without_empty_lines_are_found() {
+        let function = |lines: &str| format!("//! Points.\n\n{lines}\nfn a() {{}}\n");
+        let found = |lines: &str| {
+            crowded_headings(&[crate_of("demo", [("src/lib.rs", &function(lines)[..])])])
+        };
+        assert!(found("/// Reads.\n///\n/// # Errors\n///\n/// Fails.").is_empty());
+        let expected = ["crates/demo/src/lib.rs:5: no empty line around `# Errors`"];
+        assert_eq!(found("/// Reads.\n///\n/// # Errors\n/// Fails."), expected);
+        let expected = ["crates/demo/src/lib.rs:4: no empty line around `# Panics`"];
+        assert_eq!(found("/// Reads.\n/// # Panics\n///\n/// If empty."), expected);
     }
 
     #[test]

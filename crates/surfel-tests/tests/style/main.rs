@@ -20,6 +20,11 @@ fn doc_lines_are_no_fragments() {
 }
 
 #[test]
+fn headings_of_sections_stand_apart() {
+    check(docs::crowded_headings);
+}
+
+#[test]
 fn each_file_says_what_it_holds() {
     check(docs::files_without_docs);
 }

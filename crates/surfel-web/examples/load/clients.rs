@@ -30,6 +30,7 @@ pub struct PageStats {
 /// Opens this many pages of the viewer at `link` and lets all of them orbit.
 ///
 /// # Errors
+///
 /// Fails if a page cannot be opened, or if the server closes its connection.
 pub async fn orbit_pages(
     link: &str,

@@ -35,6 +35,7 @@ impl Coloring {
     /// Returns the colours of hits by their support, if these are the source.
     ///
     /// # Errors
+    ///
     /// Fails if the default colour map is unknown, which does not happen.
     pub fn support_colors(&self) -> Result<Option<SupportColors>> {
         let Some(source @ ColorSource::Support) = &self.source else { return Ok(None) };

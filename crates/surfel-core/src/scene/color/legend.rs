@@ -33,6 +33,7 @@ const N_STEPS: usize = 32;
 /// Returns the legend of the colours that [`colorize`](super::colorize) gives to the same cloud.
 ///
 /// # Errors
+///
 /// Fails if `cloud` lacks the column that the colours show.
 pub fn legend(cloud: &PointCloud, coloring: &Coloring) -> Result<Legend> {
     let (source, _) = coloring.source_for(cloud);

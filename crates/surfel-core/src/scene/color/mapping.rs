@@ -29,6 +29,7 @@ impl<'c> Mapping<'c> {
     /// Makes the mapping for a source that has values.
     ///
     /// # Errors
+    ///
     /// Fails if `cloud` lacks the source's column.
     pub fn new(cloud: &'c PointCloud, coloring: &Coloring, source: &ColorSource) -> Result<Self> {
         let value_at = source.values(cloud, coloring).ok_or_else(|| source.missing_from(cloud))?;

@@ -26,6 +26,7 @@ use rayon::prelude::*;
 /// range.
 ///
 /// # Errors
+///
 /// Fails if `cloud` lacks the column that the colours show, or once the work is cancelled.
 pub fn colorize(
     cloud: &PointCloud,

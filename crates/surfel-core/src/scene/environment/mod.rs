@@ -69,6 +69,7 @@ impl Environment {
     /// largest finite one; [`Environment::n_repaired`] counts the pixels changed so.
     ///
     /// # Errors
+    ///
     /// Fails if the picture is empty, if the number of pixels is not `width * height`, if no component of
     /// any pixel is finite and at least 0, or if `up` or `rotation_deg` are not finite or `up` is zero.
     pub fn new(
@@ -111,6 +112,7 @@ impl Environment {
     /// Returns the environment with another `up` and rotation, as in [`Environment::new`].
     ///
     /// # Errors
+    ///
     /// Fails if `up` or `rotation_deg` are not finite or `up` is zero.
     pub fn with_orientation(&self, up: Vec3, rotation_deg: f32) -> Result<Self> {
         Ok(Self { axes: axes(up, rotation_deg)?, ..self.clone() })
