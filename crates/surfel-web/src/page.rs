@@ -168,9 +168,10 @@ pub const COMMON_HEADERS: [(HeaderName, HeaderValue); 3] = [
 
 #[cfg(test)]
 mod tests {
-    //! The page is bundled.
+    //! The page is bundled, and its keys choose colours that there are.
 
     use super::*;
+    use surfel_core::scene::color::ColorSource;
 
     #[test]
     fn the_page_can_be_bundled() {
@@ -185,5 +186,16 @@ mod tests {
             let is_named = page.contains(&format!("\"{name}\""));
             assert!(is_named || script.contains(&format!("import('./{name}')")), "{name}");
         }
+    }
+
+    #[test]
+    fn keys_choose_colors_by_the_names_of_their_sources() {
+        let script = Embedded::get("keyboard.js").unwrap().data;
+        let script = std::str::from_utf8(&script).unwrap();
+        let named: Vec<&str> =
+            script.split("colorBy('").skip(1).filter_map(|rest| rest.split('\'').next()).collect();
+        assert!(!named.is_empty());
+        let known = ColorSource::names_where(|_| true);
+        assert!(named.iter().all(|name| known.contains(name)), "{named:?}");
     }
 }
