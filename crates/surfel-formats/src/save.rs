@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use surfel_core::points::{PointCloud, have_8_bits};
+use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 
 use crate::error::Result;
@@ -45,13 +45,6 @@ pub fn check_cloud_output(path: &Path) -> Result<()> {
 /// Returns the extensions of the clouds that surfel writes as a list in words, as in ".ply, .las or .laz".
 pub fn writable_extensions(conjunction: &str) -> String {
     list_extensions(writers().flat_map(|writer| writer.extensions), conjunction)
-}
-
-/// Notes that a format of 8 bits rounds colours of 16.
-pub(crate) fn note_rounded_colors(path: &Path, cloud: &PointCloud, progress: &dyn Progress) {
-    if cloud.colors.as_deref().is_some_and(|colors| !have_8_bits(colors)) {
-        progress.note(&format!("{}: colours of 16 bits are rounded to 8", path.display()));
-    }
 }
 
 fn writers() -> impl Iterator<Item = &'static CloudWriter> {

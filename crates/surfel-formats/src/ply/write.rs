@@ -10,8 +10,7 @@ use surfel_core::progress::Progress;
 
 use crate::error::Result;
 use crate::file::{write_error, write_file};
-use crate::save::note_rounded_colors;
-use crate::table::{encode_points, scalar_word};
+use crate::table::{encode_points, note_rounded_colors, scalar_word};
 
 /// Writes `cloud` to `path`.
 pub(crate) fn write(path: &Path, cloud: &PointCloud, progress: &dyn Progress) -> Result<()> {

@@ -1,8 +1,10 @@
-//! Encodes points to bytes in parallel and writes them in order; the names and steps that writers share.
+//! Encodes points to bytes in parallel and writes them in order; the names, steps and notes that writers share.
 
 use std::ops::Range;
+use std::path::Path;
 
 use rayon::prelude::*;
+use surfel_core::points::{PointCloud, have_8_bits};
 use surfel_core::progress::Progress;
 
 use super::column_role::ColumnRole;
@@ -38,6 +40,13 @@ pub(crate) fn encode_points(
         }
     }
     Ok(())
+}
+
+/// Notes that a format of 8 bits rounds colours of 16.
+pub(crate) fn note_rounded_colors(path: &Path, cloud: &PointCloud, progress: &dyn Progress) {
+    if cloud.colors.as_deref().is_some_and(|colors| !have_8_bits(colors)) {
+        progress.note(&format!("{}: colours of 16 bits are rounded to 8", path.display()));
+    }
 }
 
 /// Returns a scalar's name as one word that no reader takes for another column.

@@ -19,7 +19,9 @@ pub(crate) use cloud_builder::CloudBuilder;
 pub(crate) use color_range::{ColorRange, is_byte};
 pub(crate) use column_role::ColumnRole;
 pub(crate) use column_slices::{ColumnSlices, shrink};
-pub(crate) use encode::{POINTS_PER_CHUNK, decimal_step, encode_points, scalar_word};
+pub(crate) use encode::{
+    POINTS_PER_CHUNK, decimal_step, encode_points, note_rounded_colors, scalar_word,
+};
 pub(crate) use layout::{ColumnField, Field, NumberType, RecordLayout};
 pub(crate) use line_reader::{
     LineError, MAX_FIELDS, MAX_LINE_LENGTH, RowRange, append_rows, parse_number, read_rows,

@@ -12,8 +12,7 @@ use super::number::{MAX_DECIMALS, push_fixed, push_float, push_whole};
 use crate::error::Result;
 use crate::file::{extension, write_error, write_file};
 use crate::options::SaveOptions;
-use crate::save::note_rounded_colors;
-use crate::table::{ColumnRole, decimal_step, encode_points, scalar_word};
+use crate::table::{ColumnRole, decimal_step, encode_points, note_rounded_colors, scalar_word};
 
 /// Writes `cloud` to `path`, whose extension gives the form of the text.
 pub(crate) fn write(

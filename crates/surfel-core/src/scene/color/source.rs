@@ -111,9 +111,10 @@ impl FromStr for ColorSource {
             found: text.to_owned(),
             expected: "rgb, intensity, elevation, class, normal, support, #RRGGBB or the name of a column",
         };
-        match text.trim() {
+        let plain = text.trim().to_lowercase();
+        match &*plain {
             "" => Err(invalid()),
-            "RGB" => Ok(Self::Rgb),
+            "z" => Ok(Self::Elevation),
             "classification" => Ok(Self::Class),
             "normals" => Ok(Self::Normal),
             color if color.starts_with('#') => {
@@ -121,7 +122,7 @@ impl FromStr for ColorSource {
             }
             name => {
                 let named = Self::NAMED.into_iter().find(|source| source.name() == Some(name));
-                Ok(named.unwrap_or_else(|| Self::Column(name.to_owned())))
+                Ok(named.unwrap_or_else(|| Self::Column(text.trim().to_owned())))
             }
         }
     }
@@ -155,6 +156,14 @@ mod tests {
         for text in ["rgb", "support", "#0a141e", "gps_time"] {
             assert_eq!(text.parse::<ColorSource>().unwrap().to_string(), text);
         }
+        for (text, source) in [
+            ("Intensity", ColorSource::Intensity),
+            ("RGB", ColorSource::Rgb),
+            ("Z", ColorSource::Elevation),
+        ] {
+            assert_eq!(text.parse::<ColorSource>().unwrap(), source);
+        }
+        assert_eq!("Amplitude".parse::<ColorSource>().unwrap().to_string(), "Amplitude");
         assert_eq!("#fff".parse::<ColorSource>().unwrap(), ColorSource::Constant([255; 3]));
         for text in ["", "#12345", "#ggg", "#éé"] {
             assert!(text.parse::<ColorSource>().is_err());
