@@ -111,6 +111,11 @@ pub fn denoise(
         return Ok(None);
     }
     let noises = noise.at_points(&tree, progress)?;
+    drop(tree);
+    // Points whose neighbours are near in memory are moved about twice as fast.
+    let sorted: Vec<Vec3> = order.par_iter().map(|point| positions[*point as usize]).collect();
+    let noises: Vec<_> = order.par_iter().map(|point| noises[*point as usize]).collect();
+    let tree = KdTree::new(&sorted, progress)?;
     let is_land = is_mostly_land(positions);
     let noise_of_ground = noise.quantile(0.25);
     let count = |(point, noise): (usize, &Option<f32>)| {
@@ -122,13 +127,18 @@ pub fn denoise(
         Ok((NEIGHBORS_PER_NOISE * noise).clamp(MIN_NEIGHBORS, MAX_NEIGHBORS) as u32)
     };
     let counts = noises.par_iter().enumerate().map(count).collect::<Result<Vec<u32>>>()?;
-    let (moved, normals): (Vec<Vec3>, Vec<Vec3>) =
-        moved(&tree, &groups, &order, &counts, &noises, progress)?.into_iter().unzip();
-    let distances = positions.iter().zip(&moved).map(|(from, to)| f64::from(from.distance(*to)));
+    let (mut moved_points, mut normals) = (positions.clone(), vec![Vec3::ZERO; positions.len()]);
+    let results = moved(&tree, &groups, &counts, &noises, progress)?;
+    for (point, (position, normal)) in order.iter().zip(results) {
+        moved_points[*point as usize] = position;
+        normals[*point as usize] = normal;
+    }
+    let distances =
+        positions.iter().zip(&moved_points).map(|(from, to)| f64::from(from.distance(*to)));
     let sum: f64 = distances.sum();
-    let n_moved = positions.iter().zip(&moved).filter(|(from, to)| from != to).count();
+    let n_moved = positions.iter().zip(&moved_points).filter(|(from, to)| from != to).count();
     let mean_distance = (sum / n_moved.max(1) as f64) as f32;
-    cloud.positions = moved;
+    cloud.positions = moved_points;
     let report = DenoiseReport { noise: noise.median(), n_moved, mean_distance };
     Ok(Some(Denoised { report, normals }))
 }
@@ -155,12 +165,11 @@ fn means_of_groups(positions: &[Vec3], order: &[u32]) -> Vec<Vec3> {
 }
 
 /// Returns the points moved onto their surface, and their normals, zero where no cubic follows the points. `groups` are
-/// the means of groups of points in `order`, `counts` the numbers of neighbours that take part, zero for points that
-/// stay, and `noises` the noise in spacings where it is known.
+/// the means of each [`GROUP_SIZE`] points in their order, `counts` the numbers of neighbours that take part, zero for
+/// points that stay, and `noises` the noise in spacings where it is known.
 fn moved(
     tree: &KdTree,
     groups: &KdTree,
-    order: &[u32],
     counts: &[u32],
     noises: &[Option<f32>],
     progress: &dyn Progress,
@@ -168,10 +177,10 @@ fn moved(
     let positions = tree.positions();
     // Points and groups beside those that are used take part in the normals of these.
     let of_group = |group: &[u32]| {
-        let most = group.iter().map(|point| counts[*point as usize]).max().unwrap_or(0);
+        let most = group.iter().copied().max().unwrap_or(0);
         if 2 * most < MIN_GROUPED { 0 } else { most.div_ceil(GROUP_SIZE as u32) }
     };
-    let counts_of_groups = order.par_chunks(GROUP_SIZE).map(of_group).collect();
+    let counts_of_groups = counts.par_chunks(GROUP_SIZE).map(of_group).collect();
     let of_point = |count: &u32| if 2 * MIN_GROUPED < *count { 0 } else { *count };
     let counts_of_points = counts.iter().map(of_point).collect();
     let points = Layer::new(tree, counts_of_points, progress)?;

@@ -4,6 +4,7 @@ use super::normals::PlaneFit;
 use super::{PointCloud, Scalar, Values};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
+use crate::words::counted;
 use rayon::prelude::*;
 use std::str::FromStr;
 
@@ -78,7 +79,7 @@ pub struct StructureReport {
     pub n_lines: usize,
     /// Number of points that stand for themselves.
     pub n_scatter: usize,
-    /// Number of points of surfaces that are left out, as others on their scan line suffice.
+    /// Number of points of surfaces that are left out, as others cover them.
     pub n_redundant: usize,
 }
 
@@ -106,7 +107,10 @@ impl StructureReport {
         );
         match n_redundant {
             0 => line,
-            _ => format!("{line}; {n_redundant} more that lie densely on scan lines are not drawn"),
+            _ => {
+                let points = counted(n_redundant, "point");
+                format!("{line}; {points} of the surface not drawn, since others cover them")
+            }
         }
     }
 }
