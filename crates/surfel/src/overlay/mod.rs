@@ -372,7 +372,7 @@ mod tests {
     fn cameras_with_perspective_have_no_scale() {
         let camera =
             Camera { projection: Projection::Perspective { view_angle_deg: 35.0 }, ..plan(1.0) };
-        let (picture, legend) = everything();
+        let (picture, _) = everything();
         let error = faults(&picture, &camera, Vec3::Z).remove(0);
         assert!(error.to_string().contains("--camera-orthographic"), "{error}");
         assert_eq!(error.path, "scale_bar");
