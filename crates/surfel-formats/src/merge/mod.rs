@@ -4,26 +4,21 @@ mod precision;
 
 use std::path::PathBuf;
 
-use surfel_core::points::{COLOR_8_TO_16, PointCloud, merge};
+use surfel_core::points::merge;
 use surfel_core::progress::Progress;
 
 use self::precision::CloudPrecision;
 use crate::las::common_profile;
 use crate::options::{FileInfo, LasProfile, Loaded};
 
-/// The colour of points without one beside points with colours.
-const NO_COLOR: [u16; 3] = [204 * COLOR_8_TO_16; 3];
-
 /// Merges the clouds of several files into one, relative to the origin of the largest.
 ///
-/// If at least half of the points have colours, the others become grey. Other columns that some of the files lack are
-/// dropped. `progress` gets a note of these, and of files whose points lie too
+/// Columns that some of the files lack are dropped. `progress` gets a note of these, and of files whose points lie too
 /// far from the common origin to keep their resolution.
 pub fn merge_loaded(mut parts: Vec<Loaded>, paths: &[PathBuf], progress: &dyn Progress) -> Loaded {
     if parts.len() < 2 {
         return parts.pop().unwrap_or_default();
     }
-    fill_colors(&mut parts, paths, progress);
     let infos: Vec<FileInfo> = parts.iter().map(|part| part.info.clone()).collect();
     let precisions: Vec<CloudPrecision> =
         parts.iter().map(|Loaded { cloud, info }| CloudPrecision::new(cloud, info)).collect();
@@ -44,23 +39,6 @@ pub fn merge_loaded(mut parts: Vec<Loaded>, paths: &[PathBuf], progress: &dyn Pr
         }
     }
     Loaded { cloud, info: common_file_info(&infos) }
-}
-
-/// Gives clouds without colours a grey, if at least half of all points have colours.
-fn fill_colors(parts: &mut [Loaded], paths: &[PathBuf], progress: &dyn Progress) {
-    let count = |is_counted: fn(&PointCloud) -> bool| -> usize {
-        let clouds = parts.iter().map(|part| &part.cloud);
-        clouds.filter(|cloud| is_counted(cloud)).map(PointCloud::len).sum()
-    };
-    if count(|cloud| cloud.colors.is_some()) < count(|cloud| cloud.colors.is_none()) {
-        return;
-    }
-    for (Loaded { cloud, .. }, path) in parts.iter_mut().zip(paths) {
-        if cloud.colors.is_none() && !cloud.is_empty() {
-            progress.note(&format!("{}: has no colours; its points are grey", path.display()));
-            cloud.colors = Some(vec![NO_COLOR; cloud.len()]);
-        }
-    }
 }
 
 /// Returns the information that holds for all files together: sums of counts, and what they have in common.

@@ -171,30 +171,6 @@ fn several_files_merge_with_their_common_columns() {
 }
 
 #[test]
-fn points_without_colours_are_grey_unless_most_have_none() {
-    let folder = Folder::new("grey");
-    let mut gray = full_cloud(3);
-    gray.colors = None;
-    let paths = [folder.path("colours.laz"), folder.path("none.ply")];
-    save(&paths[1], &gray, &SaveOptions::default(), &NoProgress).unwrap();
-    for n_colored in [4, 2] {
-        let colored = full_cloud(n_colored);
-        save(&paths[0], &colored, &SaveOptions::default(), &NoProgress).unwrap();
-        let listener = Listener::default();
-        let (all, _) = load_all(&paths, &LoadOptions::default(), &listener).unwrap();
-        let colors = colored.colors.map(|mut colors| {
-            colors.extend([[204 * 257; 3]; 3]);
-            colors
-        });
-        assert_eq!(all.cloud.colors, colors.filter(|_| n_colored == 4));
-        assert_eq!(
-            listener.has_note("none.ply: has no colours; its points are grey"),
-            n_colored == 4
-        );
-    }
-}
-
-#[test]
 fn distant_files_keep_their_precision_and_rounding_is_reported() {
     let folder = Folder::new("far-apart");
     let n = 1000;
