@@ -151,6 +151,7 @@ pub(crate) fn read(
         .origin
         .unwrap_or_else(|| origin_of_records(input, &layout, Tolerance::F32_COORDINATES));
     progress.begin(&format!("read {}", input.name), (input.len() / stride) as u64);
-    let cloud = read_records(input, input, &layout, origin, options.filter.as_ref(), progress)?;
+    let cloud =
+        read_records(input, input, &layout, origin, options.filter.as_ref(), |_, _| (), progress)?;
     Ok(Loaded { cloud, info })
 }

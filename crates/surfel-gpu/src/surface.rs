@@ -130,13 +130,17 @@ impl Surface {
             Self::Sphere => SurfaceKind::Sphere,
             Self::Capsule => SurfaceKind::Capsule,
             Self::Mls(_) => SurfaceKind::Mls,
-            Self::Disc | Self::DiscRims | Self::Splat | Self::SplatRims | Self::SplatFit => {
-                SurfaceKind::Disc
-            }
-            Self::Cylinder | Self::Implicit | Self::Octree | Self::OctreeSplat | Self::Smooth => {
-                SurfaceKind::Disc
-            }
-            Self::Triangle => SurfaceKind::Disc,
+            Self::Disc
+            | Self::DiscRims
+            | Self::Splat
+            | Self::SplatRims
+            | Self::SplatFit
+            | Self::Cylinder
+            | Self::Implicit
+            | Self::Octree
+            | Self::OctreeSplat
+            | Self::Smooth
+            | Self::Triangle => SurfaceKind::Disc,
         }
     }
 }

@@ -49,8 +49,9 @@ const MAX_COMPARED: usize = 64;
 const NOISE_CLASSES: [u8; 2] = [7, 18];
 
 /// Drops points with invalid positions, those of classes of noise other than `kept_noise` and those flagged withheld unless
-/// there are no others, and duplicates if chosen, and marks unusable normals and radii. Duplicates of a cloud that deforms are kept, as they may part at another time; so are those of trained Gaussians, which may
-/// have different sizes and colours.
+/// there are no others, and duplicates if chosen, and marks unusable normals and radii. Duplicates of a cloud that deforms
+/// are kept, as they may part at another time; so are those of trained Gaussians, which may have different sizes and
+/// colours.
 ///
 /// A column of normals or radii without a usable entry, as trained splats have, is removed.
 ///

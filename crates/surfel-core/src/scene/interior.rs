@@ -42,11 +42,12 @@ pub struct Room {
     low: [f32; 3],
     /// Highest coordinates along the axes.
     high: [f32; 3],
+    /// True if there are points well within.
+    has_content: bool,
 }
 
-/// Returns the room that a cloud shows, or `None` if its points do not cover a floor, a ceiling and three walls, or if
-/// `needs_content` is set and the box is empty.
-pub fn find_room(cloud: &PointCloud, up: Vec3, needs_content: bool) -> Option<Room> {
+/// Returns the room that a cloud shows, or `None` if its points do not cover a floor, a ceiling and three walls.
+pub fn find_room(cloud: &PointCloud, up: Vec3) -> Option<Room> {
     const MIN_POINTS: usize = 1000;
     let points = sample_inliers(cloud);
     if points.len() < MIN_POINTS {
@@ -56,9 +57,9 @@ pub fn find_room(cloud: &PointCloud, up: Vec3, needs_content: bool) -> Option<Ro
     let few: Vec<Vec3> = points.iter().step_by(step).copied().collect();
     let rooms = (0..45).map(|step| box_at(&few, up, 2.0 * step as f32));
     let (room, _) = rooms.max_by(|(_, a), (_, b)| a.cmp(b))?;
-    let room = Room { origin: cloud.origin, ..room };
-    let is_filled = !needs_content || MIN_CONTENT <= room.content(&points);
-    (is_filled && room.is_high() && room.is_enclosed(&points)).then_some(room)
+    let has_content = MIN_CONTENT <= room.content(&points);
+    let room = Room { origin: cloud.origin, has_content, ..room };
+    (room.is_high() && room.is_enclosed(&points)).then_some(room)
 }
 
 /// Returns the box of the densest layers for an azimuth, and the number of points in the layers of its walls.
@@ -69,7 +70,7 @@ fn box_at(points: &[Vec3], up: Vec3, azimuth_deg: f32) -> (Room, usize) {
     let sides = axes.map(|axis| densest_layers(points, axis));
     let n_in_walls = sides[..2].iter().map(|side| side.2).sum();
     let (low, high) = (sides.map(|side| side.0), sides.map(|side| side.1));
-    (Room { origin: DVec3::ZERO, axes, low, high }, n_in_walls)
+    (Room { origin: DVec3::ZERO, axes, low, high, has_content: false }, n_in_walls)
 }
 
 /// Returns the coordinates of the densest layer near each end of an axis, and the number of points in both.
@@ -159,6 +160,11 @@ impl Room {
         is_hollow && 3 <= n_walls && vertical.iter().all(is_closed)
     }
 
+    /// Returns true if there are points well within the room: furniture, or people.
+    pub fn has_content(&self) -> bool {
+        self.has_content
+    }
+
     /// Returns true if a world position lies within the room.
     pub fn contains(&self, position: DVec3) -> bool {
         let local = self.local((position - self.origin).as_vec3());
@@ -243,6 +249,11 @@ mod tests {
         PointCloud { origin: DVec3::new(500.0, 600.0, 70.0), ..cloud }
     }
 
+    /// Returns the room of a cloud if there is something in it.
+    fn find_filled(cloud: &PointCloud) -> Option<Room> {
+        find_room(cloud, Vec3::Z).filter(Room::has_content)
+    }
+
     fn camera_at(position: DVec3) -> Camera {
         Camera {
             position,
@@ -255,14 +266,14 @@ mod tests {
     #[test]
     fn a_furnished_room_is_found_at_any_azimuth() {
         for azimuth_deg in [0.0, 20.0, 75.0] {
-            assert!(find_room(&room(azimuth_deg, true), Vec3::Z, true).is_some(), "{azimuth_deg}");
+            assert!(find_filled(&room(azimuth_deg, true)).is_some(), "{azimuth_deg}");
         }
     }
 
     #[test]
     fn an_empty_box_is_a_room_only_on_request() {
-        assert_eq!(find_room(&room(0.0, false), Vec3::Z, true), None);
-        assert!(find_room(&room(0.0, false), Vec3::Z, false).is_some());
+        assert_eq!(find_filled(&room(0.0, false)), None);
+        assert!(find_room(&room(0.0, false), Vec3::Z).is_some());
     }
 
     #[test]
@@ -270,15 +281,15 @@ mod tests {
         let cloud = room(0.0, true);
         let open = cloud.positions.iter().copied().filter(|p| p.z < 2.4).collect();
         let open = PointCloud { positions: open, ..PointCloud::default() };
-        assert_eq!(find_room(&open, Vec3::Z, true), None);
+        assert_eq!(find_filled(&open), None);
         let ball = (0..20_000).map(|i| {
             let z = 1.0 - (2.0 * i as f32 + 1.0) / 20_000.0;
             let (sin, cos) = (2.399_963 * i as f32).sin_cos();
             Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
         });
         let ball = PointCloud::from_positions(ball.collect());
-        assert_eq!(find_room(&ball, Vec3::Z, false), None);
-        assert_eq!(find_room(&PointCloud::default(), Vec3::Z, false), None);
+        assert_eq!(find_room(&ball, Vec3::Z), None);
+        assert_eq!(find_room(&PointCloud::default(), Vec3::Z), None);
     }
 
     #[test]
@@ -295,11 +306,11 @@ mod tests {
                 + 15.0 * (x * y).sin().powi(8)
         };
         let terrain = PointCloud::from_positions(scattered(60_000, &hills));
-        assert_eq!(find_room(&terrain, Vec3::Z, true), None);
+        assert_eq!(find_filled(&terrain), None);
         let mut hall = room(0.0, true);
         let mut widen = |by: f32| {
             hall.positions.iter_mut().for_each(|p| *p *= Vec3::new(by, by, 1.0));
-            find_room(&hall, Vec3::Z, true)
+            find_filled(&hall)
         };
         assert!(widen(6.0).is_some());
         assert_eq!(widen(3.0), None);
@@ -308,7 +319,7 @@ mod tests {
     #[test]
     fn the_ceiling_and_two_near_walls_are_hidden_from_above_a_corner() {
         let cloud = room(20.0, true);
-        let room = find_room(&cloud, Vec3::Z, true).unwrap();
+        let room = find_filled(&cloud).unwrap();
         let center = cloud.origin + DVec3::new(2.2, 2.9, 1.25);
         assert!(room.contains(center));
         let forward = room.view_direction(0.0, None);

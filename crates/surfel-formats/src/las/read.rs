@@ -20,8 +20,8 @@ use crate::file::Input;
 use crate::options::{FileInfo, LoadOptions, Loaded};
 use crate::salvage::Salvage;
 use crate::table::{
-    ColumnChoice, ColumnRole, ColumnSlices, FILTERED_POINTS_PER_BATCH, RecordLayout,
-    append_decoded, choose_origin, grow_checked, keep_matching, sample_positions, shrink,
+    ColumnChoice, ColumnRole, ColumnSlices, FILTERED_POINTS_PER_BATCH, RecordLayout, choose_origin,
+    grow_checked, keep_matching, read_records, sample_positions, shrink,
 };
 
 /// Reads the header.
@@ -55,18 +55,10 @@ pub(crate) fn read(
         let origin = origin_of(sample_positions(records, &layout));
         let n_points = (records.len() / header.record_length) as u64;
         progress.begin(&format!("read {}", input.name), n_points);
-        let mut cloud = layout.empty_cloud(origin);
         let mut color_bits = ColorBits::default();
+        let scale = |cloud: &mut PointCloud, start| color_bits.scale(cloud, start);
         let filter = options.filter.as_ref();
-        let n_in_batch =
-            filter.map_or(records.len(), |_| FILTERED_POINTS_PER_BATCH * layout.stride);
-        for batch in records.chunks(n_in_batch.max(1)) {
-            let n_before = cloud.len();
-            append_decoded(&mut cloud, input, batch, &layout, progress)?;
-            color_bits.scale(&mut cloud, n_before);
-            keep_matching(&mut cloud, n_before, filter)?;
-        }
-        shrink(&mut cloud);
+        let cloud = read_records(input, records, &layout, origin, filter, scale, progress)?;
         Decoded { cloud, color_bits, n_points }
     };
     salvage.report("points", n_points, Some(header.n_points), progress)?;

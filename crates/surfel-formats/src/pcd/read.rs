@@ -172,7 +172,15 @@ fn read_binary(
     };
     let origin = options.origin.unwrap_or_else(|| origin_of_records(&records, &layout, tolerance));
     let n_points = (records.len() / stride) as u64;
-    let cloud = read_records(input, &records, &layout, origin, options.filter.as_ref(), progress)?;
+    let cloud = read_records(
+        input,
+        &records,
+        &layout,
+        origin,
+        options.filter.as_ref(),
+        |_, _| (),
+        progress,
+    )?;
     Ok((cloud, n_points))
 }
 

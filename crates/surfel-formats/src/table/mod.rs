@@ -28,6 +28,6 @@ pub(crate) use line_reader::{
 };
 pub(crate) use named_columns::named_columns;
 pub(crate) use reader::{
-    FILTERED_POINTS_PER_BATCH, Tolerance, append_decoded, choose_origin, grow_checked,
-    keep_matching, origin_of_records, read_records, sample_positions,
+    FILTERED_POINTS_PER_BATCH, Tolerance, choose_origin, grow_checked, keep_matching,
+    origin_of_records, read_records, sample_positions,
 };

@@ -27,23 +27,27 @@ impl Tolerance {
     pub const F32_COORDINATES: Self = Self(4e-3);
 }
 
-/// Decodes those of `records` that `filter` keeps to a cloud.
+/// Decodes those of `records` that `filter` keeps to a cloud. `complete` finishes the points from an index on, before the
+/// filter compares them.
 pub(crate) fn read_records(
     input: &Input,
     records: &[u8],
     layout: &RecordLayout,
     origin: DVec3,
     filter: Option<&PointFilter>,
+    mut complete: impl FnMut(&mut PointCloud, usize),
     progress: &dyn Progress,
 ) -> Result<PointCloud> {
     let mut cloud = layout.empty_cloud(origin);
     if filter.is_none() {
         append_decoded(&mut cloud, input, records, layout, progress)?;
+        complete(&mut cloud, 0);
         return Ok(cloud);
     }
     for batch in records.chunks(FILTERED_POINTS_PER_BATCH * layout.stride) {
         let n_before = cloud.len();
         append_decoded(&mut cloud, input, batch, layout, progress)?;
+        complete(&mut cloud, n_before);
         keep_matching(&mut cloud, n_before, filter)?;
     }
     shrink(&mut cloud);
@@ -64,7 +68,7 @@ pub(crate) fn keep_matching(
 }
 
 /// Decodes all of `records` to the end of a cloud.
-pub(crate) fn append_decoded(
+fn append_decoded(
     cloud: &mut PointCloud,
     input: &Input,
     records: &[u8],

@@ -2,26 +2,26 @@
 
 use super::loaded::LoadedScene;
 use crate::description::{Interior, SceneDescription};
-use surfel_core::math::{Aabb, Vec3};
-use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
-use surfel_core::scene::{Camera, Clip, ClipPlane, Graph, Room, find_room};
+use surfel_core::scene::{Camera, Clip, ClipPlane, Graph, Room};
 use surfel_core::words::counted;
 
 /// Returns the room whose inside is to be seen, if the points show one; reports if one is demanded that they do not show.
+/// `found` is the room of the points, also if it is empty.
 ///
 /// Scenes that move keep their walls, as those before the camera change with time. Trained splats keep theirs too: they
 /// show things from outside as often as rooms from inside, and have no planes as walls.
-pub fn choose_room(
+pub fn choose_room<'a>(
     scene: &LoadedScene,
     description: &SceneDescription,
-    points: &PointCloud,
-    up: Vec3,
+    found: Option<&'a Room>,
     progress: &dyn Progress,
-) -> Option<Room> {
+) -> Option<&'a Room> {
     let room = match description.camera.interior() {
-        Interior::Auto if !scene.moves() && !has_splats(scene) => find_room(points, up, true),
-        Interior::On => find_room(points, up, false),
+        Interior::Auto if !scene.moves() && !has_splats(scene) => {
+            found.filter(|room| room.has_content())
+        }
+        Interior::On => found,
         _ => None,
     };
     if room.is_none() && description.camera.interior() == Interior::On {
@@ -30,13 +30,6 @@ pub fn choose_room(
         progress.choice(line, &["camera.interior"]);
     }
     room
-}
-
-/// Returns true if the camera stands in a closed room, be it an empty one.
-pub fn stands_in_room(points: &PointCloud, bounds: Aabb, up: Vec3, camera: &Camera) -> bool {
-    let local = (camera.position - points.origin).as_vec3();
-    let is_within = bounds.contains(Aabb::of_points([local]));
-    is_within && find_room(points, up, false).is_some_and(|room| room.contains(camera.position))
 }
 
 /// True if a cloud of the scene has trained splats.

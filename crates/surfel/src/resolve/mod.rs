@@ -50,7 +50,7 @@ use crate::progress_log::{Choice, ProgressLog};
 use camera::SceneExtent;
 use complete_description::complete_description;
 use inside::{Inside, choose_inside};
-use interior::{choose_room, hidden_ceiling, hidden_walls, stands_in_room};
+use interior::{choose_room, hidden_ceiling, hidden_walls};
 use plan::{check_height_map, frame_plan};
 use point_size::choose_point_size;
 use spread::report_gaps;
@@ -62,7 +62,9 @@ use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::render::Settings;
 use surfel_core::scene::color::Legend;
-use surfel_core::scene::{Camera, ClipPlane, Light, Projection, Room, Scene, inlier_bounds};
+use surfel_core::scene::{
+    Camera, ClipPlane, Light, Projection, Room, Scene, find_room, inlier_bounds,
+};
 use surfel_core::surface::SurfaceKind;
 
 /// A scene that is ready for its trees: everything is read, chosen and prepared, at second 0.
@@ -149,21 +151,21 @@ impl AutoSettings {
         stand_sun_at_date(scene, &mut description, place, up, progress)?;
         let description = &description;
         report_gaps(&points, progress);
-        let room = choose_room(scene, description, &points, up, progress);
-        let inside = choose_inside(scene, &points, description, up, room.as_ref(), progress);
-        let (room_seen, view) = (room.as_ref(), inside.as_ref().map(Inside::view));
-        let extent = SceneExtent { points: &points, bounds, up, room: room_seen, inside: view };
+        let found_room = find_room(&points, up);
+        let room = choose_room(scene, description, found_room.as_ref(), progress);
+        let inside = choose_inside(scene, &points, description, up, room, progress);
+        let view = inside.as_ref().map(Inside::view);
+        let extent = SceneExtent { points: &points, bounds, up, room, inside: view };
         let motion = camera_motion(description)?;
         let camera = SceneCamera::choose(&scene.graph, &extent, description, motion, progress);
         let diagonal = (bounds.max - bounds.min).length();
-        let turned_room = room.clone().filter(|_| description.output.turntable.is_some());
+        let turned_room = room.cloned().filter(|_| description.output.turntable.is_some());
         let hidden_walls = match &turned_room {
             Some(room) => hidden_ceiling(room, &camera.camera, progress),
-            None => hidden_walls(room.as_ref(), &camera.camera, progress),
+            None => hidden_walls(room, &camera.camera, progress),
         };
         let is_inside = matches!(inside, Some(Inside::Tunnel(_)))
-            || room.is_some_and(|room| room.contains(camera.camera.position))
-            || stands_in_room(&points, bounds, up, &camera.camera);
+            || found_room.is_some_and(|room| room.contains(camera.camera.position));
         let scan = view.map(|view| ScanInView { points: &points, view });
         let has_normals = scene.has_normals(description);
         let context =
