@@ -7,7 +7,7 @@ pub const COLOR_8_TO_16: u16 = 257;
 
 /// Returns the channel of 8 bits nearest to one of 16.
 pub fn to_8_bits(channel: u16) -> u8 {
-    ((u32::from(channel) + 128) / 257) as u8
+    ((u32::from(channel) + 128) / u32::from(COLOR_8_TO_16)) as u8
 }
 
 /// Returns true if 8 bits per channel hold the colours.

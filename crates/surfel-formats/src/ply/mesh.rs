@@ -2,7 +2,7 @@
 
 use surfel_core::image::{decode_srgb, decode_srgb8};
 use surfel_core::math::{Vec2, Vec4};
-use surfel_core::points::{PointCloud, Values};
+use surfel_core::points::{COLOR_8_TO_16, PointCloud, Values};
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Material, Mesh, TextureRef};
 
@@ -126,7 +126,7 @@ fn uvs(cloud: &PointCloud) -> Option<Vec<Vec2>> {
 fn linear_colors(cloud: &PointCloud) -> Option<Vec<Vec4>> {
     let colors = cloud.colors.as_ref()?;
     let alpha = cloud.scalar("alpha");
-    let linear = |channel: u16| match (channel / 257, channel % 257) {
+    let linear = |channel: u16| match (channel / COLOR_8_TO_16, channel % COLOR_8_TO_16) {
         // Most files have 8 bits, for which there is a table.
         (byte, 0) => decode_srgb8(byte as u8),
         _ => decode_srgb(f32::from(channel) / 65535.0),

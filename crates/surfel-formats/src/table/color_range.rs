@@ -1,5 +1,7 @@
 //! The range of colours and the columns that can be classes, found by their values.
 
+use surfel_core::points::COLOR_8_TO_16;
+
 /// The range of a file's colour channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ColorRange {
@@ -31,7 +33,7 @@ impl ColorRange {
     pub fn scale(self) -> f64 {
         match self {
             Self::Unit => 65535.0,
-            Self::Bits8 => 257.0,
+            Self::Bits8 => f64::from(COLOR_8_TO_16),
             Self::Bits16 => 1.0,
         }
     }

@@ -2,7 +2,9 @@
 
 use crate::math::DVec3;
 use crate::math::Vec3;
-use crate::points::{COLUMN_INDEX, PointCloud, ROW_INDEX, STATION, Scalar, ScanStation, Values};
+use crate::points::{
+    COLOR_8_TO_16, COLUMN_INDEX, PointCloud, ROW_INDEX, STATION, Scalar, ScanStation, Values,
+};
 use crate::scanner::sdf::{DRay, SdfHit, SdfScene};
 
 /// The return of one ray.
@@ -29,7 +31,7 @@ impl Return {
         Self {
             position: (ray.origin + range * ray.direction).as_vec3(),
             normal: normal.as_vec3(),
-            color: color.to_array().map(|c| (c * 255.0).round() as u16 * 257),
+            color: color.to_array().map(|c| (c * 255.0).round() as u16 * COLOR_8_TO_16),
             intensity: intensity(f64::from(color.element_sum()) / 3.0, incidence, hit.distance),
             class: sdf.class(),
             source,
