@@ -128,7 +128,7 @@ pub fn denoise(
     };
     let counts = noises.par_iter().enumerate().map(count).collect::<Result<Vec<u32>>>()?;
     let (mut moved_points, mut normals) = (positions.clone(), vec![Vec3::ZERO; positions.len()]);
-    let results = moved(&tree, &groups, &counts, &noises, progress)?;
+    let results = moved(&tree, &groups, &order, &counts, &noises, progress)?;
     for (point, (position, normal)) in order.iter().zip(results) {
         moved_points[*point as usize] = position;
         normals[*point as usize] = normal;
@@ -165,11 +165,12 @@ fn means_of_groups(positions: &[Vec3], order: &[u32]) -> Vec<Vec3> {
 }
 
 /// Returns the points moved onto their surface, and their normals, zero where no cubic follows the points. `groups` are
-/// the means of each [`GROUP_SIZE`] points in their order, `counts` the numbers of neighbours that take part, zero for
-/// points that stay, and `noises` the noise in spacings where it is known.
+/// the means of each [`GROUP_SIZE`] points in their order, `seeds` decide which faces of walls are tried, `counts` are the
+/// numbers of neighbours that take part, zero for points that stay, and `noises` the noise in spacings where it is known.
 fn moved(
     tree: &KdTree,
     groups: &KdTree,
+    seeds: &[u32],
     counts: &[u32],
     noises: &[Option<f32>],
     progress: &dyn Progress,
@@ -200,7 +201,7 @@ fn moved(
             true => groups.is_uneven_at(*position),
             false => points.is_uneven[point],
         };
-        if is_uneven && let Some(moved) = moved_onto_face(tree, point) {
+        if is_uneven && let Some(moved) = moved_onto_face(tree, point, seeds[point]) {
             return Ok((moved, Vec3::ZERO));
         }
         if is_grouped {
@@ -216,11 +217,11 @@ fn moved(
 }
 
 /// Returns a point of a thin wall moved onto its own face, or `None` where its neighbours show none.
-fn moved_onto_face(tree: &KdTree, point: usize) -> Option<Vec3> {
+fn moved_onto_face(tree: &KdTree, point: usize, seed: u32) -> Option<Vec3> {
     let positions = tree.positions();
     let position = positions[point];
     let neighbors = tree.nearest(position, N_FACE_NEIGHBORS, Some(point as u32));
-    let face = Face::of(positions, point, &neighbors)?;
+    let face = Face::of(positions, point, &neighbors, seed)?;
     let height = |other: &Neighbor| face.normal.dot(positions[other.index as usize] - position);
     let sum: f32 = face.points.iter().map(height).sum();
     // The point itself has no height.

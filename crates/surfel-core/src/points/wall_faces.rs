@@ -46,8 +46,9 @@ pub struct Face {
 }
 
 impl Face {
-    /// Returns the face of a point, or `None` if too few of the neighbours near any plane through the point lie on it.
-    pub fn of(positions: &[Vec3], point: usize, neighbors: &[Neighbor]) -> Option<Self> {
+    /// Returns the face of a point, or `None` if too few of the neighbours near any plane through the point lie on it. `seed`
+    /// decides which planes are tried.
+    pub fn of(positions: &[Vec3], point: usize, neighbors: &[Neighbor], seed: u32) -> Option<Self> {
         let center = positions[point];
         let offset = |neighbor: &Neighbor| positions[neighbor.index as usize] - center;
         let offsets: Vec<Vec3> = neighbors.iter().map(offset).collect();
@@ -56,7 +57,7 @@ impl Face {
         let nearest = &offsets[..N_NEAREST.min(offsets.len())];
         let reach_of_nearest = nearest.last()?.length();
         let candidate = |plane: u64| {
-            let bits = hash((point as u64) << 8 | plane);
+            let bits = hash(u64::from(seed) << 8 | plane);
             let [a, b] =
                 [bits, bits >> 32].map(|bits| nearest[(bits % nearest.len() as u64) as usize]);
             let cross = a.cross(b);
@@ -113,7 +114,9 @@ pub fn join_faces(tree: &KdTree, shapes: &mut [PointShape], progress: &dyn Progr
         progress.check()?;
         let (positions, own) = (tree.positions(), Some(*point as u32));
         let neighbors = tree.nearest(positions[*point], N_FACE_NEIGHBORS, own);
-        let Some(face) = Face::of(positions, *point, &neighbors) else { return Ok(None) };
+        let Some(face) = Face::of(positions, *point, &neighbors, *point as u32) else {
+            return Ok(None);
+        };
         let is_surface =
             |other: &&Neighbor| shapes[other.index as usize].structure == Structure::Surface;
         let n_on_surface = face.others.iter().filter(is_surface).count();
@@ -195,7 +198,7 @@ mod tests {
     fn face(tree: &KdTree, point: usize) -> Option<Face> {
         let positions = tree.positions();
         let neighbors = tree.nearest(positions[point], N_FACE_NEIGHBORS, Some(point as u32));
-        Face::of(positions, point, &neighbors)
+        Face::of(positions, point, &neighbors, point as u32)
     }
 
     #[test]
