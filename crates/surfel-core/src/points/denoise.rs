@@ -112,7 +112,7 @@ pub fn denoise(
     }
     let noises = noise.at_points(&tree, progress)?;
     drop(tree);
-    // Points whose neighbours are near in memory are moved about twice as fast.
+    // Neighbours near each other in memory make the moves 1.6 times as fast in clouds of random order.
     let sorted: Vec<Vec3> = order.par_iter().map(|point| positions[*point as usize]).collect();
     let noises: Vec<_> = order.par_iter().map(|point| noises[*point as usize]).collect();
     let tree = KdTree::new(&sorted, progress)?;
