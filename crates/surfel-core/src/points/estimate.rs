@@ -64,7 +64,7 @@ pub struct Estimates<'a> {
     pub fits: Option<(Vec<PlaneFit>, Neighborhood)>,
     pub radii: Option<(Vec<f32>, RadiusReport)>,
     /// The tree of the points, if one was built.
-    tree: Option<KdTree<'a>>,
+    pub tree: Option<KdTree<'a>>,
     /// The voters on the structure of each point, if structures are missing and they were found.
     voters: Vec<Voters>,
     /// True for points by gaps; empty if they were not looked for.
@@ -202,6 +202,7 @@ pub fn find_shapes<'a>(
     }
     *radii = shapes.iter().map(|shape| shape.radius).collect();
     report.update(radii);
+    estimates.tree = Some(tree);
     Ok(Some((shapes, found)))
 }
 

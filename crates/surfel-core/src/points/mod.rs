@@ -53,6 +53,7 @@ mod density;
 mod preparation;
 mod curvature;
 mod estimate;
+mod line_axes;
 mod prepare;
 #[cfg(test)]
 mod test_clouds;
@@ -70,6 +71,7 @@ pub use gaussians::{
     GAUSSIAN_COLUMNS, Gaussian, GaussianColumns, HARMONIC_0, MAX_HARMONICS, MAX_REST_COLUMNS,
     MIN_DISC_OPACITY, n_harmonics, rest_column,
 };
+pub use line_axes::LineReport;
 pub use merge::merge;
 pub use mixed_pixels::MixedPixels;
 pub use normals::{NormalReport, PlaneFit, fill_missing, fit_plane};

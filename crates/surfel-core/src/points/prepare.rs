@@ -2,8 +2,9 @@
 
 use super::clean::{CleanReport, clean};
 use super::curvature::radii_by_curvature;
-use super::denoise::{DenoiseReport, denoise};
+use super::denoise::{Denoise, DenoiseReport, denoise};
 use super::estimate::{Estimates, Missing, estimate, find_shapes};
+use super::line_axes::{LineReport, find_axes, move_to_axes};
 use super::mixed_pixels::{MixedPixels, without_mixed_pixels};
 use super::neighbors::Neighborhood;
 use super::normal_lengths::take_radii_from_normals;
@@ -27,6 +28,8 @@ pub struct PreparationReport {
     pub clean: CleanReport,
     /// Effect of denoising, if points were moved.
     pub denoise: Option<DenoiseReport>,
+    /// Effect of moving points onto the axes of lines, if axes were searched.
+    pub lines: Option<LineReport>,
     /// Number of points after cleaning and subsampling.
     pub n_points: usize,
     /// Origin of the estimated normals.
@@ -107,11 +110,20 @@ pub fn prepare(
         PreparationReport { clean, denoise, n_points: cloud.len(), ..Default::default() };
     let mut estimates =
         estimate(&cloud.positions, denoised_normals.as_deref(), preparation, &missing, progress)?;
-    let shapes = match missing.structure {
+    let mut shapes = match missing.structure {
         true => find_shapes(&cloud, &mut estimates, preparation, rings.as_ref(), progress)?,
         false => None,
     };
-    let Estimates { fits, radii, .. } = estimates;
+    let Estimates { fits, mut radii, tree, .. } = estimates;
+    if let (Some((shapes, _)), Some((radii, _)), Some(tree), true) =
+        (&mut shapes, &mut radii, tree, preparation.denoise != Denoise::Off)
+    {
+        let scanner = rings.as_ref().map(|rings| (rings.scanner - cloud.origin).as_vec3());
+        let axes = find_axes(&cloud, &tree, shapes, scanner, progress)?;
+        drop(tree);
+        report.lines = Some(move_to_axes(&axes, &mut cloud.positions, shapes));
+        radii.iter_mut().zip(shapes).for_each(|(radius, shape)| *radius = shape.radius);
+    }
     if let Some((fits, neighborhood)) = fits {
         if preparation.keep_variation {
             add_variation(&mut cloud, &fits);

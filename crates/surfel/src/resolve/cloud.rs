@@ -337,6 +337,9 @@ pub fn report_denoise(report: &PreparationReport, progress: &dyn Progress) {
     if let Some(denoise) = &report.denoise {
         progress.choice(&denoise.line(), &["denoise"]);
     }
+    if let Some(lines) = report.lines.filter(|lines| 0 < lines.n_moved) {
+        progress.choice(&lines.line(), &["denoise"]);
+    }
 }
 
 /// Reports how normals were estimated.
