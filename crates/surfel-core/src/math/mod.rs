@@ -32,6 +32,7 @@ pub use lanes::{
 };
 pub use morton::morton_decode;
 pub use portable::{PortableLanes, PortableMask};
+pub(crate) use quantile::sampled_quantile;
 pub use quantile::{TotalOrder, median, quantile};
 pub use random::{Random, hash};
 pub use ray::Ray;

@@ -1,25 +1,25 @@
 //! Estimates of normals, radii and structures from the neighbours of each point, as far as a cloud lacks them.
 
 use super::PointCloud;
-use super::below_roofs::narrow_to_roofs;
-use super::find_structures::{all_scattered, find_structures};
-use super::free_space::FreeSpace;
-use super::gaps::{close_gaps, is_by_gap};
-use super::jets::{JetFit, MIN_JET_NEIGHBORS, fit_nearest_jet, refine_normals};
+use super::gaps::close_gaps::{close_gaps, is_by_gap};
+use super::gaps::free_space::FreeSpace;
 use super::neighbors::{KdTree, Neighbor, NeighborMethod, Neighborhood, map_neighborhoods};
-use super::normals::{PlaneFit, fit_plane};
+use super::normals::jets::{JetFit, MIN_JET_NEIGHBORS, fit_nearest_jet, refine_normals};
+use super::normals::planes::{PlaneFit, fit_plane};
 use super::preparation::Preparation;
-use super::radius::{DistanceSample, RadiusReport, median_distance};
-use super::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
-use super::scan_grid::ScanGrids;
-use super::scan_rings::ScanRings;
-use super::sparse_walls::find_sparse_walls;
-use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
-use super::structure_votes::{Voters, voters_among};
-use super::typical::{Typical, sampled_quantile};
+use super::radii::radius::{DistanceSample, RadiusReport, median_distance};
+use super::radii::radius::{clamp_outlier_radii, estimate_radii, kth_distance};
+use super::scan::scan_grid::ScanGrids;
+use super::scan::scan_rings::ScanRings;
+use super::structure::below_roofs::narrow_to_roofs;
+use super::structure::find_structures::{all_scattered, find_structures};
+use super::structure::point_shape::{PointShape, Structure, StructureChoice, StructureReport};
+use super::structure::sparse_walls::find_sparse_walls;
+use super::structure::structure_votes::{Voters, voters_among};
+use super::structure::typical::Typical;
 use super::up::is_mostly_land;
 use crate::error::Result;
-use crate::math::Vec3;
+use crate::math::{Vec3, sampled_quantile};
 use crate::progress::Progress;
 
 /// The columns to estimate.

@@ -1,14 +1,14 @@
 //! Settings of the preparation of a cloud.
 
-use super::clean::Duplicates;
-use super::denoise::Denoise;
-use super::mixed_pixels::MixedPixels;
+use super::cleaning::clean::Duplicates;
+use super::cleaning::outliers::OutlierRemoval;
+use super::cleaning::subsample::Subsample;
+use super::denoising::denoise::Denoise;
 use super::neighbors::{NeighborMethod, Neighborhood};
-use super::orient::Orientation;
-use super::outliers::OutlierRemoval;
-use super::radius::Radius;
-use super::structure::StructureChoice;
-use super::subsample::Subsample;
+use super::normals::orient::Orientation;
+use super::radii::radius::Radius;
+use super::scan::mixed_pixels::MixedPixels;
+use super::structure::point_shape::StructureChoice;
 use crate::error::{Error, Result};
 
 /// Name of the scalar column that `Preparation::keep_variation` adds.

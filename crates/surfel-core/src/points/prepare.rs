@@ -1,21 +1,21 @@
 //! Preparation: cleans a cloud, thins and denoises it, and adds the normals and radii that it lacks.
 
-use super::clean::{CleanReport, clean};
-use super::curvature::radii_by_curvature;
-use super::denoise::{Denoise, DenoiseReport, denoise};
+use super::cleaning::clean::{CleanReport, clean};
+use super::cleaning::outliers::remove_outliers;
+use super::cleaning::subsample::subsample;
+use super::denoising::denoise::{Denoise, DenoiseReport, denoise};
+use super::denoising::line_axes::{LineReport, find_axes, move_to_axes};
 use super::estimate::{Estimates, Missing, estimate, find_shapes};
-use super::line_axes::{LineReport, find_axes, move_to_axes};
-use super::mixed_pixels::{MixedPixels, without_mixed_pixels};
 use super::neighbors::Neighborhood;
-use super::normal_lengths::take_radii_from_normals;
-use super::normals::{NormalReport, PlaneFit, fill_missing};
-use super::orient::{Orientation, has_stations, orient, turn_to_stations};
-use super::outliers::remove_outliers;
+use super::normals::orient::{Orientation, has_stations, orient, turn_to_stations};
+use super::normals::planes::{NormalReport, PlaneFit, fill_missing};
 use super::preparation::{Preparation, SURFACE_VARIATION};
-use super::radius::{Radius, RadiusReport};
-use super::scan_rings::ScanRings;
-use super::structure::{PointShape, Structure, StructureChoice, StructureReport};
-use super::subsample::subsample;
+use super::radii::curvature::radii_by_curvature;
+use super::radii::normal_lengths::take_radii_from_normals;
+use super::radii::radius::{Radius, RadiusReport};
+use super::scan::mixed_pixels::{MixedPixels, without_mixed_pixels};
+use super::scan::scan_rings::ScanRings;
+use super::structure::point_shape::{PointShape, Structure, StructureChoice, StructureReport};
 use super::{PointCloud, PreparedCloud, Scalar, Values};
 use crate::error::{Error, Result};
 use crate::math::Vec3;

@@ -1,7 +1,7 @@
 //! Prepared clouds, whose type guarantees that they can be traced.
 
-use super::cloud::{PointCloud, is_valid_position};
-use super::orient::has_stations;
+use super::normals::orient::has_stations;
+use super::{PointCloud, is_valid_position};
 use crate::error::{Error, Result};
 use crate::math::{DVec3, Vec3};
 use rayon::prelude::*;

@@ -1,6 +1,6 @@
 //! Clouds for the tests of this folder.
 
-use super::structure::Structure;
+use super::structure::point_shape::Structure;
 use super::{PointCloud, Preparation, PreparedCloud, prepare};
 use crate::math::Vec3;
 use crate::progress::NoProgress;

@@ -1,7 +1,7 @@
 //! Inference of the up axis of a cloud whose file does not state it.
 
 use super::PointCloud;
-use super::cloud::is_valid_position;
+use super::is_valid_position;
 use crate::math::{Aabb, Vec3};
 
 /// The inferred up axis.
@@ -105,12 +105,12 @@ pub fn infer_up(cloud: &PointCloud, convention: &UpConvention) -> InferredUp {
 }
 
 /// Returns true if a cloud is large, wide and flat in X and Y, as terrain and cities are.
-pub(super) fn is_terrain(positions: &[Vec3]) -> bool {
+pub(crate) fn is_terrain(positions: &[Vec3]) -> bool {
     AxisStatistics::of(positions).terrain().is_some()
 }
 
 /// Returns true if most points of a cloud form land that is large, wide and flat in X and Y, whatever stands on it.
-pub(super) fn is_mostly_land(positions: &[Vec3]) -> bool {
+pub(crate) fn is_mostly_land(positions: &[Vec3]) -> bool {
     /// Fraction of the points at each end of an axis that need not be part of the land.
     const FRACTION: f64 = 0.1;
     let sample = sample(positions);
@@ -127,7 +127,7 @@ pub(super) fn is_mostly_land(positions: &[Vec3]) -> bool {
 }
 
 /// Returns true if all points lie before a depth camera at the origin, whose X points right, Y down and Z ahead.
-pub(super) fn is_camera_frame(positions: &[Vec3]) -> bool {
+pub(crate) fn is_camera_frame(positions: &[Vec3]) -> bool {
     let sample = sample(positions);
     let in_view = |p: &&Vec3| p.x.abs().max(p.y.abs()) < MAX_CAMERA_SLOPE * p.z;
     let n_in_view = sample.iter().filter(in_view).count() as f64;

@@ -1,0 +1,13 @@
+//! Point clouds as columns, the columns that have a meaning, conditions on them, and merging.
+//!
+//! A file uses only those above it.
+
+pub mod deformation;
+pub mod scan_station;
+pub mod point_cloud;
+pub mod color_bits;
+pub mod flags;
+pub mod gaussians;
+pub mod filter;
+pub mod merge;
+pub mod density;

@@ -1,0 +1,447 @@
+//! Moves noisy points onto the surface that their neighbours describe.
+//!
+//! The more noise, the more neighbours take part. Normals are averaged over neighbours of similar normals, which keeps
+//! edges (bilateral filter), and each point moves along its normal onto the weighted mean of its neighbours' planes
+//! (after Huang et al., Edge-Aware Point Set Resampling, 2013).
+
+use super::depth_steps::DepthSteps;
+use super::noise::{GROUP_SIZE, Noise};
+use crate::error::Result;
+use crate::math::Vec3;
+use crate::points::PointCloud;
+use crate::points::neighbors::{KdTree, Neighbor};
+use crate::points::normals::jets::fit_wide_jet;
+use crate::points::normals::planes::fit_plane;
+use crate::points::structure::above_land::is_above_land;
+use crate::points::structure::wall_faces::{Face, N_FACE_NEIGHBORS};
+use crate::points::up::is_mostly_land;
+use crate::progress::Progress;
+use crate::words::{counted, format_length};
+use rayon::prelude::*;
+
+/// Least noise, in spacings, from which a cloud is denoised unasked.
+const MIN_NOISE: f32 = 0.15;
+/// Number of neighbours per spacing of noise: the fitted normals err by some two degrees.
+const NEIGHBORS_PER_NOISE: f32 = 80.0;
+/// Numbers of neighbours that take part: the least and the most.
+const MIN_NEIGHBORS: f32 = 12.0;
+const MAX_NEIGHBORS: f32 = 2048.0;
+/// Number of neighbours from which means of groups of points stand for them.
+const MIN_GROUPED: u32 = 96;
+/// Surface variation above which the neighbours may be on both faces of a thin wall.
+const MIN_UNEVEN: f32 = 0.06;
+/// Number of rounds in which normals are averaged.
+const N_NORMAL_ROUNDS: usize = 2;
+/// Number of times that a point moves.
+const N_MOVES: usize = 2;
+/// Difference of two unit normals at which the weight has fallen to 1 / e.
+const NORMAL_WIDTH: f32 = 0.4;
+/// Height above a neighbour's plane, in standard deviations of the noise, from which it belongs to another surface.
+const MAX_HEIGHT: f32 = 6.0;
+
+/// The choice whether points are moved onto their surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Denoise {
+    /// Noisy surfaces without normals are denoised.
+    #[default]
+    Auto,
+    /// All points are moved.
+    On,
+    /// All points stay where they are.
+    Off,
+}
+
+/// Effect of denoising.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DenoiseReport {
+    /// Median noise over the regions of surfaces: the standard deviation of points from their surface, in spacings.
+    pub noise: f32,
+    /// Number of points that were moved.
+    pub n_moved: usize,
+    /// Mean distance by which these were moved.
+    pub mean_distance: f32,
+}
+
+/// Results of denoising beside the moved points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Denoised {
+    /// The effect.
+    pub report: DenoiseReport,
+    /// Unit normal of either sign of each point where a cubic follows the noisy points, zero elsewhere.
+    pub normals: Vec<Vec3>,
+}
+
+impl DenoiseReport {
+    /// Returns a line about the moved points for the user.
+    pub fn line(&self) -> String {
+        format!(
+            "noise of {:.2} spacings: {} moved onto the surface, by {} on average",
+            self.noise,
+            counted(self.n_moved, "point"),
+            format_length(self.mean_distance)
+        )
+    }
+}
+
+/// Moves the points of a cloud onto their surface; returns none if the points stay. Points that morph targets or joints
+/// move stay where they are.
+///
+/// # Errors
+///
+/// Returns [`Error::TooManyPoints`](crate::Error::TooManyPoints) beyond 32-bit indices and
+/// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+pub fn denoise(
+    cloud: &mut PointCloud,
+    choice: Denoise,
+    progress: &dyn Progress,
+) -> Result<Option<Denoised>> {
+    let is_animated = !cloud.morphs.is_empty() || cloud.skin.is_some();
+    let is_auto = choice == Denoise::Auto;
+    if is_animated || choice == Denoise::Off || (is_auto && cloud.normals.is_some()) {
+        return Ok(None);
+    }
+    let positions = &cloud.positions;
+    let tree = KdTree::new(positions, progress)?;
+    let order = tree.order();
+    let means = means_of_groups(positions, &order);
+    let groups = KdTree::new(&means, progress)?;
+    let steps = DepthSteps::find(cloud);
+    let noise = Noise::new(&tree, &groups, &order, steps.as_ref(), progress)?;
+    if is_auto && (noise.median() < MIN_NOISE || !noise.is_of_surfaces()) {
+        return Ok(None);
+    }
+    let noises = noise.at_points(&tree, progress)?;
+    drop(tree);
+    // Neighbours near each other in memory make the moves 1.6 times as fast in clouds of random order.
+    let sorted: Vec<Vec3> = order.par_iter().map(|point| positions[*point as usize]).collect();
+    let noises: Vec<_> = order.par_iter().map(|point| noises[*point as usize]).collect();
+    let tree = KdTree::new(&sorted, progress)?;
+    let is_land = is_mostly_land(positions);
+    let noise_of_ground = noise.quantile(0.25);
+    let count = |(point, noise): (usize, &Option<f32>)| {
+        progress.check()?;
+        let Some(noise) = *noise else { return Ok(0) };
+        if is_land && is_plant(&tree, point, noise_of_ground) {
+            return Ok(0);
+        }
+        Ok((NEIGHBORS_PER_NOISE * noise).clamp(MIN_NEIGHBORS, MAX_NEIGHBORS) as u32)
+    };
+    let counts = noises.par_iter().enumerate().map(count).collect::<Result<Vec<u32>>>()?;
+    let (mut moved_points, mut normals) = (positions.clone(), vec![Vec3::ZERO; positions.len()]);
+    let results = moved(&tree, &groups, &order, &counts, &noises, progress)?;
+    for (point, (position, normal)) in order.iter().zip(results) {
+        moved_points[*point as usize] = position;
+        normals[*point as usize] = normal;
+    }
+    let distances =
+        positions.iter().zip(&moved_points).map(|(from, to)| f64::from(from.distance(*to)));
+    let sum: f64 = distances.sum();
+    let n_moved = positions.iter().zip(&moved_points).filter(|(from, to)| from != to).count();
+    let mean_distance = (sum / n_moved.max(1) as f64) as f32;
+    cloud.positions = moved_points;
+    let report = DenoiseReport { noise: noise.median(), n_moved, mean_distance };
+    Ok(Some(Denoised { report, normals }))
+}
+
+/// True for a point above land: low plants look like noise of the ground, but are none. `noise` is that of the ground in
+/// spacings.
+fn is_plant(tree: &KdTree, point: usize, noise: f32) -> bool {
+    const N_NEIGHBORS: usize = 24;
+    /// Heights by noise alone, in multiples of it: planes through few noisy points err as much as the points do.
+    const SLACK: f32 = 2.0;
+    let positions = tree.positions();
+    let neighbors = tree.nearest(positions[point], N_NEIGHBORS, Some(point as u32));
+    let radius_in_spacings = (N_NEIGHBORS as f32 / std::f32::consts::PI).sqrt();
+    is_above_land(positions, point, &neighbors, SLACK * noise / radius_in_spacings)
+}
+
+/// Returns the means of groups of points that follow each other in `order`.
+fn means_of_groups(positions: &[Vec3], order: &[u32]) -> Vec<Vec3> {
+    let mean = |group: &[u32]| {
+        let sum: Vec3 = group.iter().map(|point| positions[*point as usize]).sum();
+        sum / group.len() as f32
+    };
+    order.par_chunks(GROUP_SIZE).map(mean).collect()
+}
+
+/// Returns the points moved onto their surface, and their normals, zero where no cubic follows the points. `groups` are
+/// the means of each [`GROUP_SIZE`] points in their order, `seeds` decide which faces of walls are tried, `counts` are the
+/// numbers of neighbours that take part, zero for points that stay, and `noises` the noise in spacings where it is known.
+fn moved(
+    tree: &KdTree,
+    groups: &KdTree,
+    seeds: &[u32],
+    counts: &[u32],
+    noises: &[Option<f32>],
+    progress: &dyn Progress,
+) -> Result<Vec<(Vec3, Vec3)>> {
+    let positions = tree.positions();
+    // Points and groups beside those that are used take part in the normals of these.
+    let of_group = |group: &[u32]| {
+        let most = group.iter().copied().max().unwrap_or(0);
+        if 2 * most < MIN_GROUPED { 0 } else { most.div_ceil(GROUP_SIZE as u32) }
+    };
+    let counts_of_groups = counts.par_chunks(GROUP_SIZE).map(of_group).collect();
+    let of_point = |count: &u32| if 2 * MIN_GROUPED < *count { 0 } else { *count };
+    let counts_of_points = counts.iter().map(of_point).collect();
+    let points = Layer::new(tree, counts_of_points, progress)?;
+    let groups = Layer::new(groups, counts_of_groups, progress)?;
+    progress.begin("denoise", positions.len() as u64);
+    let moved = |(point, position): (usize, &Vec3)| {
+        if point.is_multiple_of(1024) {
+            progress.check()?;
+            progress.advance(1024.min(positions.len() - point) as u64);
+        }
+        let count = counts[point];
+        if count == 0 {
+            return Ok((*position, Vec3::ZERO));
+        }
+        let is_grouped = MIN_GROUPED <= count;
+        let is_uneven = match is_grouped {
+            true => groups.is_uneven_at(*position),
+            false => points.is_uneven[point],
+        };
+        if is_uneven && let Some(moved) = moved_onto_face(tree, point, seeds[point]) {
+            return Ok((moved, Vec3::ZERO));
+        }
+        if is_grouped {
+            let count = count.div_ceil(GROUP_SIZE as u32);
+            return Ok((groups.moved(*position, count, GROUP_SIZE as f32), Vec3::ZERO));
+        }
+        let (normal, noise) = (points.normals[point], noises[point].unwrap_or_default());
+        let jet = fit_wide_jet(tree, point, normal, noise);
+        let normal = jet.map_or(Vec3::ZERO, |jet| jet.normal);
+        Ok((points.moved(*position, count, 1.0), normal))
+    };
+    positions.par_iter().enumerate().map(moved).collect()
+}
+
+/// Returns a point of a thin wall moved onto its own face, or `None` where its neighbours show none.
+fn moved_onto_face(tree: &KdTree, point: usize, seed: u32) -> Option<Vec3> {
+    let positions = tree.positions();
+    let position = positions[point];
+    let neighbors = tree.nearest(position, N_FACE_NEIGHBORS, Some(point as u32));
+    let face = Face::of(positions, point, &neighbors, seed)?;
+    let height = |other: &Neighbor| face.normal.dot(positions[other.index as usize] - position);
+    let sum: f32 = face.points.iter().map(height).sum();
+    // The point itself has no height.
+    Some(position + sum / (face.points.len() + 1) as f32 * face.normal)
+}
+
+/// Points, or means of points, with normals that are averaged over neighbours of similar normals.
+struct Layer<'a> {
+    tree: &'a KdTree<'a>,
+    /// Number of neighbours that take part in the normal of each point.
+    counts: Vec<u32>,
+    /// Unit normals of either sign, zero if unknown.
+    normals: Vec<Vec3>,
+    /// True if no plane fits the neighbours.
+    is_uneven: Vec<bool>,
+}
+
+impl<'a> Layer<'a> {
+    fn new(tree: &'a KdTree<'a>, counts: Vec<u32>, progress: &dyn Progress) -> Result<Self> {
+        let positions = tree.positions();
+        let normal = |(point, count): (usize, &u32)| {
+            progress.check()?;
+            if *count == 0 {
+                return Ok((Vec3::ZERO, false));
+            }
+            let neighbors = tree.nearest(positions[point], *count as usize, Some(point as u32));
+            let fit = fit_plane(positions, point, &neighbors);
+            Ok((fit.normal, MIN_UNEVEN < fit.variation))
+        };
+        let found = counts.par_iter().enumerate().map(normal).collect::<Result<Vec<_>>>()?;
+        let (normals, is_uneven) = found.into_iter().unzip();
+        let mut layer = Self { tree, counts, normals, is_uneven };
+        for _ in 0..N_NORMAL_ROUNDS {
+            layer.normals = layer.averaged_normals(progress)?;
+        }
+        Ok(layer)
+    }
+
+    /// True if no plane fits the neighbours of the nearest point.
+    fn is_uneven_at(&self, position: Vec3) -> bool {
+        let nearest = self.tree.nearest(position, 1, None);
+        nearest.first().is_some_and(|nearest| self.is_uneven[nearest.index as usize])
+    }
+
+    fn averaged_normals(&self, progress: &dyn Progress) -> Result<Vec<Vec3>> {
+        let averaged = |(point, position): (usize, &Vec3)| {
+            progress.check()?;
+            let normal = self.normals[point];
+            if normal == Vec3::ZERO {
+                return Ok(normal);
+            }
+            let neighbors = self.neighbors(*position, self.counts[point]);
+            let weighted = neighbors.points.iter().map(|neighbor| {
+                let (other, similarity) = self.similar_normal(neighbor, normal);
+                let offset = self.tree.positions()[neighbor.index as usize] - position;
+                neighbors.closeness(offset, normal) * similarity * other
+            });
+            Ok(weighted.sum::<Vec3>().normalize_or(normal))
+        };
+        self.tree.positions().par_iter().enumerate().map(averaged).collect()
+    }
+
+    /// Returns the neighbours of a position.
+    fn neighbors(&self, position: Vec3, count: u32) -> Neighbors {
+        // A point is the nearest to itself.
+        let points = self.tree.nearest(position, count as usize + 1, None);
+        let reach = points.last().map_or(0.0, |last| last.distance_squared);
+        Neighbors { points, per_reach: 1.0 / reach.max(f32::MIN_POSITIVE) }
+    }
+
+    /// Returns the normal of a neighbour on the side of `normal`, and its weight by the angle in between.
+    fn similar_normal(&self, neighbor: &Neighbor, normal: Vec3) -> (Vec3, f32) {
+        let other = self.normals[neighbor.index as usize];
+        let cosine = normal.dot(other);
+        let difference = (2.0 - 2.0 * cosine.abs()) / (NORMAL_WIDTH * NORMAL_WIDTH);
+        // About exp(-difference).
+        let similarity = (1.0 - difference / 8.0).max(0.0).powi(8);
+        (if cosine < 0.0 { -other } else { other }, similarity)
+    }
+
+    /// Returns a position moved onto the surface along the normal of the nearest point. Each neighbour stands for
+    /// `group_size` points.
+    fn moved(&self, position: Vec3, count: u32, group_size: f32) -> Vec3 {
+        let neighbors = self.neighbors(position, count);
+        let Some(nearest) = neighbors.points.first() else { return position };
+        let normal = self.normals[nearest.index as usize];
+        let n_points = group_size * count as f32;
+        let noise = n_points / NEIGHBORS_PER_NOISE * (std::f32::consts::PI / n_points).sqrt();
+        let max_height = MAX_HEIGHT * MAX_HEIGHT * noise * noise;
+        let mut moved = position;
+        for _ in 0..N_MOVES {
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for neighbor in &neighbors.points {
+                let offset = moved - self.tree.positions()[neighbor.index as usize];
+                let (other, similarity) = self.similar_normal(neighbor, normal);
+                // The mean of both normals: this height is zero for any two points of a sphere.
+                let height = 0.5 * (normal + other).dot(offset);
+                let squared = height * height * neighbors.per_reach;
+                let closeness = neighbors.closeness(offset, normal);
+                let flatness = (1.0 - squared / max_height).max(0.0);
+                let own = closeness * closeness * similarity * flatness;
+                sum += own * height;
+                weight += own;
+            }
+            if 0.0 < weight {
+                moved -= normal * (sum / weight);
+            }
+        }
+        moved
+    }
+}
+
+/// The neighbours of a position, nearest first.
+struct Neighbors {
+    points: Vec<Neighbor>,
+    /// Reciprocal of the squared distance of the last one.
+    per_reach: f32,
+}
+
+impl Neighbors {
+    /// Returns the weight of a neighbour at `offset` by its distance in the plane of the normal.
+    fn closeness(&self, offset: Vec3, normal: Vec3) -> f32 {
+        let height = offset.dot(normal);
+        let inside = (1.0 - (offset.length_squared() - height * height) * self.per_reach).max(0.0);
+        inside * inside
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Noise that is known, and points that must stay.
+
+    use super::*;
+    use crate::math::Random;
+    use crate::points::Morph;
+    use crate::progress::NoProgress;
+
+    /// Returns points of a grid in the plane z = 0 with a spacing of 1, moved by noise along each axis.
+    fn noisy_plane(noise: f64) -> PointCloud {
+        let mut random = Random::new(1, 0);
+        let mut offset = || (noise * random.next_gaussian()) as f32;
+        let grid = (0..10_000).map(|i| Vec3::new((i % 100) as f32, (i / 100) as f32, 0.0));
+        let moved = grid.map(|point| point + Vec3::new(offset(), offset(), offset()));
+        PointCloud::from_positions(moved.collect())
+    }
+
+    /// Returns the root mean square height over z = 0 of the points away from the border.
+    fn roughness(points: &[Vec3]) -> f32 {
+        let is_inside =
+            |point: &&Vec3| (10.0..90.0).contains(&point.x) && (10.0..90.0).contains(&point.y);
+        let inside: Vec<&Vec3> = points.iter().filter(is_inside).collect();
+        (inside.iter().map(|point| point.z * point.z).sum::<f32>() / inside.len() as f32).sqrt()
+    }
+
+    #[test]
+    fn noise_is_measured_and_most_of_it_removed() {
+        for noise in [0.3, 1.0, 2.0] {
+            let mut cloud = noisy_plane(noise);
+            let report = denoise(&mut cloud, Denoise::Auto, &NoProgress).unwrap().unwrap().report;
+            let measured = report.noise / noise as f32;
+            assert!((0.7..1.3).contains(&measured), "{noise}: {report:?}");
+            assert_eq!(report.n_moved, cloud.len());
+            let left = roughness(&cloud.positions) / noise as f32;
+            assert!(left < 0.4, "{noise}: {left} of it is left");
+        }
+    }
+
+    #[test]
+    fn a_sphere_keeps_its_radius() {
+        let mut random = Random::new(2, 0);
+        // A spacing of 1.
+        let radius = (10_000.0 / (4.0 * std::f32::consts::PI)).sqrt();
+        let mut gaussian = || random.next_gaussian() as f32;
+        let points = (0..10_000)
+            .map(|_| {
+                let direction = Vec3::new(gaussian(), gaussian(), gaussian()).normalize();
+                (radius + 0.3 * gaussian()) * direction
+            })
+            .collect();
+        let mut cloud = PointCloud::from_positions(points);
+        denoise(&mut cloud, Denoise::On, &NoProgress).unwrap().unwrap();
+        let points = cloud.positions;
+        let mean = points.iter().map(|point| point.length()).sum::<f32>() / points.len() as f32;
+        assert!((mean - radius).abs() < 0.03, "{mean} instead of {radius}");
+    }
+
+    #[test]
+    fn clean_surfaces_and_clouds_that_fill_space_stay() {
+        let mut random = Random::new(3, 0);
+        let mut coordinate = || random.next_f32();
+        let filled = (0..20_000).map(|_| Vec3::new(coordinate(), coordinate(), coordinate()));
+        for cloud in [noisy_plane(0.05), PointCloud::from_positions(filled.collect())] {
+            let mut moved = cloud.clone();
+            assert_eq!(denoise(&mut moved, Denoise::Auto, &NoProgress).unwrap(), None);
+            assert_eq!(moved, cloud);
+        }
+    }
+
+    #[test]
+    fn few_equal_and_collinear_points_stay() {
+        let line = (0..100).map(|i| Vec3::new(i as f32, 0.0, 0.0)).collect();
+        let few = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+        for points in [Vec::new(), vec![Vec3::ONE], vec![Vec3::ONE; 1000], line, few] {
+            let cloud = PointCloud::from_positions(points);
+            let mut moved = cloud.clone();
+            let found = denoise(&mut moved, Denoise::On, &NoProgress).unwrap().unwrap();
+            let report = found.report;
+            assert_eq!((report.n_moved, &moved), (0, &cloud));
+        }
+    }
+
+    #[test]
+    fn clouds_with_normals_are_moved_only_if_asked() {
+        let mut cloud = noisy_plane(0.5);
+        cloud.normals = Some(vec![Vec3::Z; cloud.len()]);
+        assert_eq!(denoise(&mut cloud, Denoise::Auto, &NoProgress).unwrap(), None);
+        assert!(denoise(&mut cloud, Denoise::On, &NoProgress).unwrap().is_some());
+        let mut animated = noisy_plane(0.5);
+        animated.morphs =
+            vec![Morph { positions: vec![Vec3::Z; animated.len()], ..Morph::default() }];
+        assert_eq!(denoise(&mut animated, Denoise::On, &NoProgress).unwrap(), None);
+    }
+}

@@ -1,0 +1,9 @@
+//! Denoising: the noise of a cloud, the depth steps of a depth camera, and the points moved onto their surface or onto the axis
+//! of their line.
+//!
+//! A file uses only those above it.
+
+pub mod depth_steps;
+pub mod noise;
+pub mod denoise;
+pub mod line_axes;

@@ -1,0 +1,250 @@
+//! The noise of a cloud: the standard deviation of points from their surface, in spacings.
+//!
+//! If a plane fits better the more neighbours it is fitted to, the distances from it are noise, not shape. The noise is
+//! measured at some points of each region.
+
+use super::depth_steps::DepthSteps;
+use crate::error::Result;
+use crate::math::{Vec3, quantile};
+use crate::points::neighbors::KdTree;
+use crate::points::normals::planes::{PlaneFit, fit_plane};
+use crate::progress::Progress;
+use rayon::prelude::*;
+
+/// Number of points of a group, whose mean stands for them in large neighbourhoods.
+pub const GROUP_SIZE: usize = 8;
+/// Numbers of neighbours between which the noise is searched.
+const MIN_NOISE_NEIGHBORS: usize = 16;
+const MAX_NOISE_NEIGHBORS: usize = 8192;
+/// Number of neighbours above which groups of points stand for them in this search.
+const MAX_UNGROUPED: usize = 1024;
+/// Surface variation below which a plane fits well enough to tell noise by it.
+const MAX_PLANE_VARIATION: f32 = 0.03;
+/// Surface variation below which noise can be told where the surface begins to bend.
+const MAX_BENT_VARIATION: f32 = 0.08;
+/// Surface variation above which a neighbourhood fills space, as the noise is larger than the neighbourhood.
+const MIN_SPACE_VARIATION: f32 = 0.12;
+/// Ratio of the variation to that of half as many neighbours above which a shape bends, and noise cannot be told.
+const MAX_BEND_RATIO: f32 = 0.75;
+/// Number of points in a region of one noise: a fraction of the cloud, between two limits.
+const REGION_SIZES: [usize; 2] = [256, 4096];
+const N_REGIONS: usize = 256;
+/// Number of points that are asked for the noise of a region.
+const N_SAMPLES: usize = 16;
+/// Minimum share of them at which the noise can be told.
+const MIN_KNOWN: f32 = 0.25;
+/// Ratio of the third quartile of a region's noises to the median above which surfaces of different noise are mixed.
+const MIXED_RATIO: f32 = 2.0;
+/// Minimum share of points at which the noise can be told in a cloud of surfaces. Forests have 0.3 to 0.7.
+const MIN_SURFACES: f32 = 0.8;
+/// Noise in steps of a depth camera. Evenly spread errors have 1 / sqrt(12), but neighbouring points err together, so
+/// that a plane must reach over several steps: at half a step, walls across the view stayed in patches.
+const NOISE_PER_STEP: f32 = 1.0;
+/// Number of regions over which the noise is interpolated.
+const N_BLENDED_REGIONS: usize = 4;
+
+/// The noise by regions of a cloud.
+pub struct Noise {
+    /// Middles of the regions whose noise is known, and their noise in spacings.
+    centers: Vec<Vec3>,
+    noises: Vec<f32>,
+    /// True for each point of a region that fills space, as leaves do.
+    fills_space: Vec<bool>,
+    /// Share of the samples whose noise is known.
+    known_share: f32,
+}
+
+impl Noise {
+    /// Measures the noise. `order` lists the points so that those near each other follow each other, and `groups` are the
+    /// means of each [`GROUP_SIZE`] of them. `steps` are those of a depth camera.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+    pub fn new(
+        tree: &KdTree,
+        groups: &KdTree,
+        order: &[u32],
+        steps: Option<&DepthSteps>,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let [least, most] = REGION_SIZES;
+        let size = (order.len() / N_REGIONS).clamp(least, most);
+        progress.begin("noise", order.len() as u64);
+        let measure = |points: &[u32]| {
+            progress.check()?;
+            progress.advance(points.len() as u64);
+            Ok(Region::new(tree, groups, points, steps))
+        };
+        let regions = order.par_chunks(size).map(measure).collect::<Result<Vec<_>>>()?;
+        let mut fills_space = vec![false; tree.positions().len()];
+        let (mut centers, mut noises) = (Vec::new(), Vec::new());
+        let (mut n_known, mut n_samples) = (0, 0);
+        for (points, region) in order.chunks(size).zip(&regions) {
+            n_known += region.noises.len();
+            n_samples += region.n_samples;
+            if let Some(noise) = region.noise() {
+                centers.push(region.center);
+                noises.push(noise);
+            } else if region.fills_space() {
+                points.iter().for_each(|point| fills_space[*point as usize] = true);
+            }
+        }
+        let known_share = n_known as f32 / n_samples.max(1) as f32;
+        Ok(Self { centers, noises, fills_space, known_share })
+    }
+
+    /// Returns the median noise over the regions.
+    pub fn median(&self) -> f32 {
+        self.quantile(0.5)
+    }
+
+    /// Returns the noise that this fraction of the regions does not exceed.
+    pub fn quantile(&self, fraction: f64) -> f32 {
+        quantile(self.noises.iter().copied(), fraction).unwrap_or(0.0)
+    }
+
+    /// True if the cloud is made of surfaces, not of leaves.
+    pub fn is_of_surfaces(&self) -> bool {
+        MIN_SURFACES < self.known_share
+    }
+
+    /// Returns the noise at a position, interpolated between the nearest regions.
+    fn at(&self, centers: &KdTree, position: Vec3) -> f32 {
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for region in centers.nearest(position, N_BLENDED_REGIONS, None) {
+            let nearness = 1.0 / region.distance_squared.max(f32::MIN_POSITIVE.sqrt());
+            sum += nearness * self.noises[region.index as usize];
+            weight += nearness;
+        }
+        sum / weight
+    }
+
+    /// Returns the noise at each point in spacings, or none where points fill space.
+    pub fn at_points(&self, points: &KdTree, progress: &dyn Progress) -> Result<Vec<Option<f32>>> {
+        let centers = KdTree::new(&self.centers, progress)?;
+        let noise = |(position, fills_space): (&Vec3, &bool)| {
+            let is_known = !fills_space && !self.noises.is_empty();
+            is_known.then(|| self.at(&centers, *position))
+        };
+        Ok(points.positions().par_iter().zip(&self.fills_space).map(noise).collect())
+    }
+}
+
+/// Points near each other, some of which were asked for their noise.
+struct Region {
+    /// Mean of the points.
+    center: Vec3,
+    n_samples: usize,
+    /// The known noises in ascending order.
+    noises: Vec<f32>,
+    /// Number of samples whose neighbours fill space.
+    n_filled: usize,
+}
+
+impl Region {
+    fn new(tree: &KdTree, groups: &KdTree, points: &[u32], steps: Option<&DepthSteps>) -> Self {
+        let step = points.len().div_ceil(N_SAMPLES).max(1);
+        let samples: Vec<NoiseAtPoint> = points
+            .iter()
+            .step_by(step)
+            .map(|point| match NoiseAtPoint::new(tree, groups, *point) {
+                NoiseAtPoint::Known(noise) => {
+                    NoiseAtPoint::Known(noise.max(noise_by_steps(tree, *point, steps)))
+                }
+                unknown => unknown,
+            })
+            .collect();
+        let noise = |sample: &NoiseAtPoint| match sample {
+            NoiseAtPoint::Known(noise) => Some(*noise),
+            _ => None,
+        };
+        let mut noises: Vec<f32> = samples.iter().filter_map(noise).collect();
+        noises.sort_unstable_by(f32::total_cmp);
+        let fills = |sample: &&NoiseAtPoint| **sample == NoiseAtPoint::FillsSpace;
+        let sum: Vec3 = points.iter().map(|point| tree.positions()[*point as usize]).sum();
+        Self {
+            center: sum / points.len() as f32,
+            n_samples: samples.len(),
+            n_filled: samples.iter().filter(fills).count(),
+            noises,
+        }
+    }
+
+    /// Returns the noise if enough of the samples know it: the median, or the third quartile where surfaces of very
+    /// different noise lie upon each other.
+    fn noise(&self) -> Option<f32> {
+        if (self.noises.len() as f32) < MIN_KNOWN * self.n_samples as f32 {
+            return None;
+        }
+        let median = *self.noises.get(self.noises.len() / 2)?;
+        let third_quartile = self.noises[3 * self.noises.len() / 4];
+        Some(if MIXED_RATIO * median < third_quartile { third_quartile } else { median })
+    }
+
+    fn fills_space(&self) -> bool {
+        self.n_samples <= 2 * self.n_filled
+    }
+}
+
+/// Returns the noise that the steps of a depth camera stand for, in spacings. They are terraces wider than the
+/// neighbourhoods in which the noise is told, so that they do not count there.
+fn noise_by_steps(tree: &KdTree, point: u32, steps: Option<&DepthSteps>) -> f32 {
+    let Some(steps) = steps else { return 0.0 };
+    let position = tree.positions()[point as usize];
+    let neighbors = tree.nearest(position, MIN_NOISE_NEIGHBORS, Some(point));
+    let reach = neighbors.last().map_or(0.0, |last| last.distance_squared);
+    let spacing = (std::f32::consts::PI * reach / MIN_NOISE_NEIGHBORS as f32).sqrt();
+    NOISE_PER_STEP * steps.at(position) / spacing.max(f32::MIN_POSITIVE)
+}
+
+/// The noise around a point.
+#[derive(Clone, Copy, PartialEq)]
+enum NoiseAtPoint {
+    /// The standard deviation, in spacings, from the plane through so many neighbours that a plane fits.
+    Known(f32),
+    /// The surface bends.
+    Bent,
+    /// The neighbours fill space, however many.
+    FillsSpace,
+}
+
+impl NoiseAtPoint {
+    /// Measures the noise around a point from its neighbours, then from groups of points around it.
+    fn new(points: &KdTree, groups: &KdTree, point: u32) -> Self {
+        let center = points.positions()[point as usize];
+        let (mut last_variation, mut has_fallen, mut has_risen) = (f32::INFINITY, false, false);
+        let mut k = MIN_NOISE_NEIGHBORS;
+        while k <= MAX_NOISE_NEIGHBORS {
+            let (tree, n_nearest) = match MAX_UNGROUPED < k {
+                true => (groups, k / GROUP_SIZE),
+                false => (points, k),
+            };
+            let neighbors = tree.nearest(center, n_nearest, None);
+            let [nearest, others @ ..] = &neighbors[..] else { return Self::Bent };
+            let fit = fit_plane(tree.positions(), nearest.index as usize, others);
+            if neighbors.len() < n_nearest || fit.normal == Vec3::ZERO {
+                return Self::Bent;
+            }
+            let variation = fit.variation;
+            if variation < MAX_PLANE_VARIATION {
+                return Self::Known(fit.residual(k));
+            }
+            if MAX_BEND_RATIO * last_variation < variation {
+                if has_fallen && last_variation < MAX_BENT_VARIATION {
+                    let last = PlaneFit { variation: last_variation, ..fit };
+                    return Self::Known(last.residual(k / 2));
+                }
+                if has_risen && last_variation < MIN_SPACE_VARIATION {
+                    return Self::Bent;
+                }
+                has_risen = true;
+            } else if last_variation < f32::INFINITY {
+                (has_fallen, has_risen) = (true, false);
+            }
+            last_variation = variation;
+            k *= 2;
+        }
+        Self::FillsSpace
+    }
+}

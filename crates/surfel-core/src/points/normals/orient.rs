@@ -1,0 +1,483 @@
+//! Orientation of normals, which decides the front side of a surface.
+
+use crate::error::{Error, Result};
+use crate::math::{DVec3, Vec3};
+use crate::points::neighbors::{KdTree, Neighborhood};
+use crate::points::scan::scan_angle::SightLines;
+use crate::points::up::is_terrain;
+use crate::points::{PointCloud, is_valid_position};
+use crate::progress::Progress;
+use rayon::prelude::*;
+use std::collections::{HashMap, HashSet};
+use std::str::FromStr;
+
+/// Number of neighbours that each point is linked to. Each link takes about 10 bytes per point for a while.
+const DEGREE: usize = 8;
+
+/// Marks an unused link.
+const NONE: u32 = u32::MAX;
+
+/// The rule that decides the sign of estimated normals.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Orientation {
+    /// No rule: the sign has no meaning.
+    #[default]
+    None,
+    /// The first of these that the cloud tells enough for: its stations, scan angles, up if it is terrain, else a
+    /// spanning tree.
+    Auto,
+    /// Toward a point in world coordinates, as a scanner's position.
+    Viewpoint(DVec3),
+    /// Toward the station of each point's scan. Normals of points whose station is not known stay.
+    Station,
+    /// Along the line of sight that the scan angles of an airborne scan tell. Without them, up.
+    ScanAngle,
+    /// Toward +Z, as for airborne scans.
+    Up,
+    /// Propagated along a minimum spanning tree from neighbour to neighbour, the most parallel first (Hoppe et al.
+    /// 1992). The normal of the highest point of each connected component points up or, if it is nearly level,
+    /// outward.
+    SpanningTree,
+}
+
+/// Flips the normals of the points of `cloud` as needed.
+///
+/// # Errors
+///
+/// Returns [`Error::TooManyPoints`] beyond 32-bit indices and [`Error::Cancelled`] if `progress` is cancelled.
+pub fn orient(
+    cloud: &PointCloud,
+    normals: Vec<Vec3>,
+    orientation: Orientation,
+    progress: &dyn Progress,
+) -> Result<Vec<Vec3>> {
+    match orientation {
+        Orientation::None => Ok(normals),
+        Orientation::Auto => {
+            let chosen = choose_orientation(cloud, &normals);
+            progress.choice(&format!("front sides {}", chosen.reason()), &["orient"]);
+            orient(cloud, normals, chosen, progress)
+        }
+        Orientation::Viewpoint(world_viewpoint) => {
+            let viewpoint = world_viewpoint - cloud.origin;
+            Ok(flip_if(normals, |i, normal| {
+                (viewpoint - cloud.positions[i].as_dvec3()).dot(normal.as_dvec3()) < 0.0
+            }))
+        }
+        Orientation::Station => {
+            let mut normals = normals;
+            turn_to_stations(cloud, &mut normals);
+            Ok(normals)
+        }
+        Orientation::ScanAngle => {
+            let sights = SightLines::new(cloud);
+            let toward = |i: usize| sights.as_ref().map_or(DVec3::Z, |s| s.toward_scanner(i));
+            Ok(flip_if(normals, |i, normal| toward(i).dot(normal.as_dvec3()) < 0.0))
+        }
+        Orientation::Up => Ok(flip_if(normals, |_, normal| normal.z < 0.0)),
+        Orientation::SpanningTree => by_spanning_tree(&cloud.positions, normals, progress),
+    }
+}
+
+/// Flips the normals that point away from the known station of their point, and returns their number: no scanner sees a
+/// surface from behind.
+pub(crate) fn turn_to_stations(cloud: &PointCloud, normals: &mut [Vec3]) -> usize {
+    let Some(scan_of) = cloud.scan_of_point() else { return 0 };
+    let turned = normals.par_iter_mut().enumerate().filter(|(i, normal)| {
+        let station = cloud.stations.get(scan_of.get(*i)).and_then(|station| station.position);
+        let offset = station.map_or(DVec3::ZERO, |station| station - cloud.world_position(*i));
+        offset.dot(normal.as_dvec3()) < 0.0
+    });
+    turned.map(|(_, normal)| *normal = -*normal).count()
+}
+
+/// Returns true if the positions of all stations of a cloud are known.
+pub(crate) fn has_stations(cloud: &PointCloud) -> bool {
+    let is_known = cloud.stations.iter().all(|station| station.position.is_some());
+    is_known && !cloud.is_empty() && cloud.station_of(0).is_some()
+}
+
+/// Returns the most trusted orientation that the columns and the shape of a cloud allow.
+fn choose_orientation(cloud: &PointCloud, normals: &[Vec3]) -> Orientation {
+    if has_stations(cloud) {
+        Orientation::Station
+    } else if SightLines::new(cloud).is_some() {
+        Orientation::ScanAngle
+    } else if is_terrain(&cloud.positions) && are_mostly_steep(cloud, normals) {
+        Orientation::Up
+    } else {
+        Orientation::SpanningTree
+    }
+}
+
+/// Returns true if most surfaces are seen from above: those of terrestrial scans are mostly walls and trunks.
+fn are_mostly_steep(cloud: &PointCloud, normals: &[Vec3]) -> bool {
+    const MIN_STEEPNESS: f32 = 0.5;
+    const MIN_FRACTION: usize = 2;
+    let valid = cloud.positions.par_iter().zip(normals).filter(|(p, _)| is_valid_position(**p));
+    let n_steep = valid.clone().filter(|(_, normal)| MIN_STEEPNESS < normal.z.abs()).count();
+    valid.count() < MIN_FRACTION * n_steep
+}
+
+fn flip_if(mut normals: Vec<Vec3>, is_backward: impl Fn(usize, Vec3) -> bool + Sync) -> Vec<Vec3> {
+    normals.par_iter_mut().enumerate().for_each(|(i, normal)| {
+        if is_backward(i, *normal) {
+            *normal = -*normal;
+        }
+    });
+    normals
+}
+
+fn by_spanning_tree(
+    positions: &[Vec3],
+    normals: Vec<Vec3>,
+    progress: &dyn Progress,
+) -> Result<Vec<Vec3>> {
+    let links = KdTree::new(positions, progress)?.map(
+        Neighborhood::Nearest(DEGREE),
+        progress,
+        |_, neighbors| {
+            let mut links = [NONE; DEGREE];
+            links.iter_mut().zip(neighbors).for_each(|(link, neighbor)| *link = neighbor.index);
+            links
+        },
+    )?;
+    let edges = sorted_edges(&links, &normals, progress)?;
+    progress.begin("orient", edges.len() as u64);
+    let mut components = SignedUnionFind::new(normals.len());
+    for (edge_idx, &edge) in edges.iter().enumerate() {
+        if edge_idx % (1 << 16) == 0 {
+            progress.check()?;
+            progress.advance((1 << 16).min(edges.len() - edge_idx) as u64);
+        }
+        let (a, b) = ends(edge, &links);
+        components.join(a, b, normals[a as usize].dot(normals[b as usize]) < 0.0);
+    }
+    drop((edges, links));
+    let members = components.members(progress)?;
+    let (backward, n_components) = backward_components(positions, &normals, &members, progress)?;
+    progress.note(&format!(
+        "normals oriented along a spanning tree in {n_components} connected components"
+    ));
+    Ok(flip_if(normals, |i, _| members[i].is_flipped != backward.contains(&members[i].root)))
+}
+
+/// Returns the edges of the neighbour graph as `weight << 40 | link`, the most parallel first.
+fn sorted_edges(
+    links: &[[u32; DEGREE]],
+    normals: &[Vec3],
+    progress: &dyn Progress,
+) -> Result<Vec<u64>> {
+    progress.check()?;
+    let edges_of = |point: usize| {
+        (0..DEGREE).filter_map(move |link| {
+            let other = links[point][link];
+            let is_listed_there =
+                (other as usize) < point && links[other as usize].contains(&(point as u32));
+            if other == NONE || is_listed_there {
+                return None;
+            }
+            let weight = 1.0 - normals[point].dot(normals[other as usize]).abs();
+            let steps = (weight.max(0.0) * (1 << 23) as f32) as u64;
+            Some(steps << 40 | (point * DEGREE + link) as u64)
+        })
+    };
+    let mut edges: Vec<u64> = (0..links.len()).into_par_iter().flat_map_iter(edges_of).collect();
+    progress.check()?;
+    edges.par_sort_unstable();
+    Ok(edges)
+}
+
+fn ends(edge: u64, links: &[[u32; DEGREE]]) -> (u32, u32) {
+    let link = (edge & ((1 << 40) - 1)) as usize;
+    ((link / DEGREE) as u32, links[link / DEGREE][link % DEGREE])
+}
+
+/// A point as a member of a connected component.
+#[derive(Clone, Copy)]
+struct Member {
+    /// The component's root point.
+    root: u32,
+    /// True if the point's normal is opposite to that of the root.
+    is_flipped: bool,
+}
+
+/// A union-find structure whose members have a sign relative to their root, so that signs need no traversal of the
+/// spanning tree.
+struct SignedUnionFind {
+    /// Parents as `parent << 1 | is_flipped`.
+    parents: Vec<u64>,
+    sizes: Vec<u32>,
+}
+
+impl SignedUnionFind {
+    fn new(n_points: usize) -> Self {
+        Self { parents: (0..n_points as u64).map(|i| i << 1).collect(), sizes: vec![1; n_points] }
+    }
+
+    fn find(&mut self, point: u32) -> Member {
+        let (mut at, mut is_flipped) = (point as usize, false);
+        loop {
+            let parent = self.parents[at];
+            if (parent >> 1) as usize == at {
+                return Member { root: at as u32, is_flipped };
+            }
+            // Path halving: the parent becomes the grandparent, with both signs.
+            let above = self.parents[(parent >> 1) as usize];
+            let grandparent = above ^ (parent & 1);
+            self.parents[at] = grandparent;
+            is_flipped ^= grandparent & 1 == 1;
+            at = (grandparent >> 1) as usize;
+        }
+    }
+
+    fn members(&mut self, progress: &dyn Progress) -> Result<Vec<Member>> {
+        let mut members = Vec::with_capacity(self.parents.len());
+        for point in 0..self.parents.len() as u32 {
+            if point.is_multiple_of(1 << 16) {
+                progress.check()?;
+            }
+            members.push(self.find(point));
+        }
+        Ok(members)
+    }
+
+    fn join(&mut self, a: u32, b: u32, is_opposite: bool) {
+        let (a, b) = (self.find(a), self.find(b));
+        if a.root == b.root {
+            return;
+        }
+        let is_flipped = a.is_flipped ^ b.is_flipped ^ is_opposite;
+        let (above, below) = (a.root as usize, b.root as usize);
+        let (above, below) =
+            if self.sizes[above] < self.sizes[below] { (below, above) } else { (above, below) };
+        self.parents[below] = (above as u64) << 1 | u64::from(is_flipped);
+        self.sizes[above] += self.sizes[below];
+    }
+}
+
+/// Returns the roots of connected components whose normals must all be flipped, and the number of all components.
+fn backward_components(
+    positions: &[Vec3],
+    normals: &[Vec3],
+    members: &[Member],
+    progress: &dyn Progress,
+) -> Result<(HashSet<u32>, usize)> {
+    let mut components: HashMap<u32, Component> = HashMap::new();
+    for (point, member) in members.iter().enumerate() {
+        if point % (1 << 16) == 0 {
+            progress.check()?;
+        }
+        let new = Component { highest: point, ..Component::default() };
+        let component = components.entry(member.root).or_insert(new);
+        if positions[component.highest].z < positions[point].z {
+            component.highest = point;
+        }
+        component.sum += positions[point].as_dvec3();
+        component.n_points += 1;
+    }
+    let n_components = components.len();
+    let backward = components.into_iter().filter(|(_, component)| {
+        let sign = if members[component.highest].is_flipped { -1.0 } else { 1.0 };
+        let normal = sign * normals[component.highest].as_dvec3();
+        let outward =
+            positions[component.highest].as_dvec3() - component.sum / component.n_points as f64;
+        // At the top of a wall the normal is level.
+        let facing = if 0.2 < normal.z.abs() { normal.z } else { normal.dot(outward) };
+        facing < 0.0
+    });
+    Ok((backward.map(|(root, _)| root).collect(), n_components))
+}
+
+#[derive(Default)]
+struct Component {
+    highest: usize,
+    sum: DVec3,
+    n_points: usize,
+}
+
+impl Orientation {
+    /// Returns the rule in words, as the end of "front sides ...".
+    fn reason(self) -> &'static str {
+        match self {
+            Self::None | Self::Auto | Self::Viewpoint(_) => "as they are",
+            Self::Station => "toward the station of each scan",
+            Self::ScanAngle => "toward the scanner, by scan angles",
+            Self::Up => "up, as the cloud is terrain",
+            Self::SpanningTree => "from neighbour to neighbour, outward",
+        }
+    }
+}
+
+impl FromStr for Orientation {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let viewpoint = |numbers: &str| {
+            let numbers: Vec<f64> =
+                numbers.split(',').map(|x| x.trim().parse().ok()).collect::<Option<_>>()?;
+            let [x, y, z] = numbers.try_into().ok()?;
+            let viewpoint = DVec3::new(x, y, z);
+            viewpoint.is_finite().then_some(Self::Viewpoint(viewpoint))
+        };
+        let orientation = match text.split_once(':').unwrap_or((text, "")) {
+            ("none", "") => Some(Self::None),
+            ("auto", "") => Some(Self::Auto),
+            ("scan-angle", "") => Some(Self::ScanAngle),
+            ("station", "") => Some(Self::Station),
+            ("up", "") => Some(Self::Up),
+            ("mst", "") => Some(Self::SpanningTree),
+            ("viewpoint", numbers) => viewpoint(numbers),
+            _ => None,
+        };
+        orientation.ok_or_else(|| Error::Setting {
+            name: "orientation",
+            found: text.to_owned(),
+            expected: "auto, none, station, scan-angle, up, mst or viewpoint:x,y,z",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Signs of normals.
+
+    use super::*;
+    use crate::math::Random;
+    use crate::points::{SCAN_ANGLE, STATION, Scalar, ScanStation, Values};
+    use crate::progress::NoProgress;
+
+    /// Two separate balls, with a third of their outward normals flipped.
+    fn balls() -> (PointCloud, Vec<Vec3>) {
+        let mut random = Random::new(1, 0);
+        let outward: Vec<Vec3> = (0..4000)
+            .map(|_| Vec3::from_array(std::array::from_fn(|_| random.next_gaussian() as f32)))
+            .map(Vec3::normalize)
+            .collect();
+        let center = |i: usize| if i < 2000 { Vec3::ZERO } else { Vec3::new(0.0, 9.0, 30.0) };
+        let positions = outward.iter().enumerate().map(|(i, &n)| center(i) + n).collect();
+        let mixed = outward.iter().map(|&n| if random.below(3) == 0 { -n } else { n }).collect();
+        let mut cloud = PointCloud::from_positions(positions);
+        cloud.normals = Some(outward);
+        (cloud, mixed)
+    }
+
+    #[test]
+    fn a_spanning_tree_orients_closed_surfaces_outward() {
+        let (cloud, mixed) = balls();
+        let found = orient(&cloud, mixed, Orientation::SpanningTree, &NoProgress).unwrap();
+        assert_eq!(Some(found), cloud.normals);
+    }
+
+    #[test]
+    fn a_spanning_tree_orients_ground_of_any_shape_upward() {
+        for curvature in [-0.05f32, 0.0, 0.05] {
+            let height = |x: f32, y: f32| curvature * (x * x + y * y);
+            let place = |i: usize| ((i % 40) as f32 - 20.0, (i / 40) as f32 - 20.0);
+            let points = (0..1600).map(|i| {
+                let (x, y) = place(i);
+                Vec3::new(x, y, height(x, y))
+            });
+            let cloud = PointCloud::from_positions(points.collect());
+            let normals: Vec<Vec3> = (0..1600)
+                .map(|i| {
+                    let (x, y) = place(i);
+                    let sign = if i % 7 < 3 { -1.0 } else { 1.0 };
+                    sign * Vec3::new(-2.0 * curvature * x, -2.0 * curvature * y, 1.0).normalize()
+                })
+                .collect();
+            let found = orient(&cloud, normals, Orientation::SpanningTree, &NoProgress).unwrap();
+            assert!(found.iter().all(|normal| 0.0 < normal.z), "curvature {curvature}");
+        }
+    }
+
+    #[test]
+    fn a_viewpoint_is_given_in_world_coordinates() {
+        let mut cloud = PointCloud::from_positions(vec![Vec3::ZERO, Vec3::X * 10.0]);
+        cloud.origin = DVec3::new(1e6, 0.0, 0.0);
+        let viewpoint = Orientation::Viewpoint(DVec3::new(1e6 + 5.0, 0.0, 0.0));
+        let found = orient(&cloud, vec![Vec3::X; 2], viewpoint, &NoProgress).unwrap();
+        assert_eq!(found, [Vec3::X, -Vec3::X]);
+        let found = orient(&cloud, vec![-Vec3::Z, Vec3::Z], Orientation::Up, &NoProgress).unwrap();
+        assert_eq!(found, [Vec3::Z; 2]);
+    }
+
+    #[test]
+    fn normals_point_to_the_station_of_their_scan() {
+        let station =
+            |x: f64| ScanStation { position: Some(DVec3::X * x), ..ScanStation::default() };
+        let unknown = ScanStation { position: None, ..ScanStation::default() };
+        let indices = Values::U16(vec![0, 1, 2]);
+        let cloud = PointCloud {
+            origin: DVec3::new(1e6, 0.0, 0.0),
+            stations: vec![station(0.0), station(2e6), unknown],
+            scalars: vec![Scalar { name: STATION.into(), values: indices }],
+            ..PointCloud::from_positions(vec![Vec3::ZERO; 3])
+        };
+        let found = orient(&cloud, vec![Vec3::X; 3], Orientation::Station, &NoProgress).unwrap();
+        assert_eq!(found, [-Vec3::X, Vec3::X, Vec3::X]);
+    }
+
+    #[test]
+    fn the_most_trusted_orientation_is_chosen() {
+        let ground = |i: usize| Vec3::new((i % 100) as f32, (i / 100) as f32, 0.0);
+        let terrain = PointCloud::from_positions((0..10_000).map(ground).collect());
+        let normals = vec![Vec3::NEG_Z; terrain.len()];
+        assert_eq!(choose_orientation(&terrain, &normals), Orientation::Up);
+        let walls = vec![Vec3::X; terrain.len()];
+        assert_eq!(choose_orientation(&terrain, &walls), Orientation::SpanningTree);
+        let mut flight = terrain.clone();
+        let angles = Values::F32((0..10_000).map(|i| (i % 100) as f32 - 50.0).collect());
+        flight.scalars.push(Scalar { name: SCAN_ANGLE.into(), values: angles });
+        assert_eq!(choose_orientation(&flight, &normals), Orientation::ScanAngle);
+        let station = |position| ScanStation { position, ..ScanStation::default() };
+        let scan = PointCloud { stations: vec![station(Some(DVec3::Z))], ..flight.clone() };
+        assert_eq!(choose_orientation(&scan, &normals), Orientation::Station);
+        let unposed = PointCloud { stations: vec![station(None)], ..flight };
+        assert_eq!(choose_orientation(&unposed, &normals), Orientation::ScanAngle);
+        let (balls, mixed) = balls();
+        assert_eq!(choose_orientation(&balls, &mixed), Orientation::SpanningTree);
+        let found = orient(&balls, mixed, Orientation::Auto, &NoProgress).unwrap();
+        assert_eq!(Some(found), balls.normals);
+    }
+
+    #[test]
+    fn walls_face_the_scanner_that_the_scan_angle_tells() {
+        let position = |i: usize| Vec3::new((i % 100) as f32 - 50.0, (i / 100) as f32, 0.0);
+        let angle = |i: usize| (position(i).x / 100.0).atan().to_degrees();
+        let cloud = PointCloud {
+            scalars: vec![Scalar {
+                name: SCAN_ANGLE.into(),
+                values: Values::F32((0..2000).map(angle).collect()),
+            }],
+            ..PointCloud::from_positions((0..2000).map(position).collect())
+        };
+        let found = orient(&cloud, vec![Vec3::X; 2000], Orientation::ScanAngle, &NoProgress);
+        for (position, normal) in cloud.positions.iter().zip(found.unwrap()) {
+            assert!(position.x.abs() < 1.0 || normal.x * position.x < 0.0, "{position}");
+        }
+        let unknown = PointCloud::from_positions(vec![Vec3::ZERO]);
+        let found = orient(&unknown, vec![Vec3::NEG_Z], Orientation::ScanAngle, &NoProgress);
+        assert_eq!(found.unwrap(), [Vec3::Z]);
+    }
+
+    #[test]
+    fn few_or_equal_points_are_oriented() {
+        for positions in [vec![], vec![Vec3::X], vec![Vec3::X; 40], vec![Vec3::NAN, Vec3::X]] {
+            let normals = vec![-Vec3::Z; positions.len()];
+            let cloud = PointCloud::from_positions(positions);
+            let found = orient(&cloud, normals, Orientation::SpanningTree, &NoProgress).unwrap();
+            assert!(found.iter().all(|&normal| normal == Vec3::Z), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn orientations_are_parsed() {
+        let viewpoint = Orientation::Viewpoint(DVec3::new(1.0, -2.5, 3e5));
+        assert_eq!("viewpoint:1, -2.5,3e5".parse::<Orientation>().unwrap(), viewpoint);
+        assert_eq!("mst".parse::<Orientation>().unwrap(), Orientation::SpanningTree);
+        for text in ["", "up:1", "viewpoint", "viewpoint:1,2", "viewpoint:1,2,nan", "down"] {
+            assert!(text.parse::<Orientation>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Solids: the capsules of points on lines, and the balls of scattered points.
+
+use super::point_shape::{PointShape, Structure};
+use crate::math::{DVec3, SymmetricMatrix, Vec3, median};
+use crate::points::neighbors::{KdTree, Neighbor};
+use crate::points::radii::radius::kth_distance;
+
+/// Half the length of a capsule, in multiples of its thickness's radius.
+pub const CAPSULE_ASPECT: f32 = 4.0;
+/// Number of neighbours that give the direction of a line.
+pub const N_LINE_NEIGHBORS: usize = 8;
+/// Number of neighbours that give the direction and the thickness of a straight line.
+const N_STRAIGHT_NEIGHBORS: usize = 24;
+/// Maximum ratio of the deviations across and along a straight line: twigs and edges have more.
+const MAX_STRAIGHT_WIDTH: f32 = 0.1;
+/// Ratio of the radius of a round line to the standard deviation, across it, of the points that a scanner measures on the side
+/// toward it.
+const THICKNESS_OF_DEVIATION: f32 = 1.4;
+/// Radius of a ball in distances to the second neighbour: balls of neighbours overlap a little.
+const BALL_REACH: f32 = 0.6;
+/// Maximum ratio of the radius of a ball or capsule to the median of its structure.
+const MAX_SOLID_RATIO: f32 = 1.5;
+/// Minimum number of points of a structure for a typical radius of their own.
+const MIN_SOLIDS: usize = 16;
+
+/// Gives a point the direction and the radius of its final structure. Surface points keep what was decided.
+pub fn settle(
+    tree: &KdTree,
+    point: usize,
+    radius: f32,
+    structure: Structure,
+    shape: &mut PointShape,
+) {
+    let position = tree.positions()[point];
+    match structure {
+        Structure::Surface | Structure::Redundant => {}
+        Structure::Line => {
+            let neighbors = tree.nearest(position, N_STRAIGHT_NEIGHBORS, Some(point as u32));
+            let mut line = LineFit::of(tree.positions(), point, &neighbors);
+            let mut reach = kth_distance(&neighbors, 2);
+            if line.width < MAX_STRAIGHT_WIDTH {
+                reach = reach.max(CAPSULE_ASPECT * line.thickness);
+            } else {
+                let nearest = &neighbors[..N_LINE_NEIGHBORS.min(neighbors.len())];
+                line = LineFit::of(tree.positions(), point, nearest);
+            }
+            shape.normal = line.direction;
+            shape.radius = if 0.0 < reach { reach } else { radius };
+        }
+        Structure::Scatter => {
+            let neighbors = tree.nearest(position, 2, Some(point as u32));
+            shape.radius = ball_radius(kth_distance(&neighbors, 2), radius);
+        }
+    }
+    shape.structure = structure;
+}
+
+/// The line through a point and its neighbours.
+struct LineFit {
+    /// Direction in which they extend most.
+    direction: Vec3,
+    /// Ratio of the deviations across and along it.
+    width: f32,
+    /// Radius of a round line on whose surface, seen from one side, they would lie.
+    thickness: f32,
+}
+
+impl LineFit {
+    fn of(positions: &[Vec3], point: usize, neighbors: &[Neighbor]) -> Self {
+        let center = positions[point].as_dvec3();
+        let offsets = neighbors.iter().map(|other| positions[other.index as usize].as_dvec3());
+        let offsets: Vec<DVec3> = offsets.map(|other| other - center).collect();
+        // The point itself has no offset.
+        let weight = 1.0 / (offsets.len() + 1) as f64;
+        let mean = weight * offsets.iter().sum::<DVec3>();
+        let mut scatter = SymmetricMatrix::default();
+        offsets.iter().for_each(|offset| scatter.add_outer(*offset - mean, weight));
+        scatter.add_outer(mean, weight);
+        let (values, vectors) = scatter.eigen();
+        let [across, along] = [values[0] + values[1], values[2]].map(|v| v.max(0.0).sqrt() as f32);
+        Self {
+            direction: vectors[2].as_vec3().normalize_or(Vec3::Z),
+            width: across / along.max(f32::MIN_POSITIVE),
+            thickness: THICKNESS_OF_DEVIATION * across,
+        }
+    }
+}
+
+/// Returns the radius of a ball by the distance to the second neighbour; `radius` is that of a disc, which a stray
+/// point's ball does not exceed.
+pub fn ball_radius(distance: f32, radius: f32) -> f32 {
+    let reach = BALL_REACH * distance;
+    if 0.0 < reach { reach.min(radius) } else { radius }
+}
+
+/// Clamps the radii of stray points, which would be as large as the empty space around them. A few of them are no larger
+/// than the typical radius of a surface.
+pub fn clamp_solids(shapes: &mut [PointShape], structure: Structure, typical_radius: f32) {
+    let solids = shapes.iter().filter(|shape| shape.structure == structure);
+    let n_solids = solids.clone().count();
+    let Some(median) = median(solids.map(|shape| shape.radius)) else { return };
+    let limit = MAX_SOLID_RATIO * median;
+    let limit = if n_solids < MIN_SOLIDS { limit.min(typical_radius) } else { limit };
+    for shape in shapes.iter_mut().filter(|shape| shape.structure == structure) {
+        shape.radius = shape.radius.min(limit);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Straight lines have the thickness that their points show.
+
+    use super::*;
+    use crate::math::Random;
+    use crate::progress::NoProgress;
+
+    #[test]
+    fn capsules_of_a_wire_are_as_thick_as_the_wire_and_lie_along_it() {
+        const THICKNESS: f32 = 0.012;
+        let direction = Vec3::new(3.0, 1.0, 0.5).normalize();
+        let (side, up) = direction.any_orthonormal_pair();
+        let mut random = Random::new(6, 0);
+        let point = |i: usize| {
+            let (sin, cos) = (std::f32::consts::PI * random.next_f32()).sin_cos();
+            0.02 * i as f32 * direction + THICKNESS * (cos * side + sin * up)
+        };
+        let positions: Vec<Vec3> = (0..500).map(point).collect();
+        let tree = KdTree::new(&positions, &NoProgress).unwrap();
+        for point in 50..450 {
+            let mut shape =
+                PointShape { structure: Structure::Surface, normal: Vec3::Z, radius: 0.1 };
+            settle(&tree, point, 0.1, Structure::Line, &mut shape);
+            assert!(0.99 < shape.normal.dot(direction).abs(), "{shape:?}");
+            let thickness = shape.radius / CAPSULE_ASPECT / THICKNESS;
+            assert!((0.7..1.4).contains(&thickness), "{thickness}");
+        }
+    }
+}
