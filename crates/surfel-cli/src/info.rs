@@ -17,6 +17,7 @@ use surfel_core::points::{
     is_flag, is_valid_position, points_per_area, spacing,
 };
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 use surfel_formats::{ColumnChoice, EmbeddedImage, FileInfo, Loaded};
 
 #[derive(clap::Args)]
@@ -272,8 +273,9 @@ fn table(info: &Value) -> String {
     row("up", text(&info["up"]["reason"]));
     for (place, station) in info["stations"].as_array().into_iter().flatten().enumerate() {
         let title = if place == 0 { "stations" } else { "" };
-        let (name, points) = (text(&station["name"]), text(&station["points"]));
-        row(title, format!("{name:<24}{points} points, scanner at {}", text(&station["position"])));
+        let name = text(&station["name"]);
+        let points = counted(station["points"].as_u64().unwrap_or(0), "point");
+        row(title, format!("{name:<24}{points}, scanner at {}", text(&station["position"])));
     }
     let n_points = info["points"].as_f64().unwrap_or(1.0);
     for key in ["classes", "returns", "flags"] {
@@ -294,11 +296,11 @@ fn image_text(image: &Value) -> String {
     let resolution: Vec<String> =
         image["resolution"].as_array().into_iter().flatten().map(text).collect();
     let mut line = format!(
-        "{:<24}{}, {} pixels, {} bytes",
+        "{:<24}{}, {} pixels, {}",
         text(&image["name"]),
         text(&image["camera"]),
         resolution.join(" x "),
-        text(&image["bytes"])
+        counted(image["bytes"].as_u64().unwrap_or(0), "byte")
     );
     for (words, key) in [("camera at", "position"), ("of", "scan")] {
         if !image[key].is_null() {

@@ -1,11 +1,11 @@
 //! Numbers and lengths in sentences for the user.
 
+use std::fmt::Display;
+
 /// Formats a number of things, as `1 point` or `12 points`. `thing` is the singular of a noun whose plural ends in s.
-pub fn counted(n: usize, thing: &str) -> String {
-    match n {
-        1 => format!("1 {thing}"),
-        n => format!("{n} {thing}s"),
-    }
+pub fn counted<N: Display + From<u8> + PartialEq>(n: N, thing: &str) -> String {
+    let ending = if n == N::from(1) { "" } else { "s" };
+    format!("{n} {thing}{ending}")
 }
 
 /// Formats a length with three significant digits, as 0.459, 7.63 or 4120.

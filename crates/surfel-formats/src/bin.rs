@@ -2,6 +2,7 @@
 //! tracing benchmarks, four (position, intensity) that of KITTI, five (and the laser) that of nuScenes.
 
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use crate::error::{Location, Result};
 use crate::file::Input;
@@ -60,7 +61,7 @@ impl Records {
         }
         Err(input.malformed(
             Location::Byte((input.len() - rest) as u64),
-            format!("a record of {rest} bytes"),
+            format!("a record of {}", counted(rest, "byte")),
             "28: x y z radius nx ny nz, 20: x y z intensity ring, or 16: x y z intensity, as \
              little-endian f32",
             "copy the file again from its source, or convert it if it has other records",

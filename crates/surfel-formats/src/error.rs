@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::fmt;
 use std::io;
+use surfel_core::words::counted;
 
 /// The error of an operation on a file; its message names the file and gives advice.
 #[derive(Debug, thiserror::Error)]
@@ -45,7 +46,8 @@ pub enum Error {
     },
     /// A file ends before its last point.
     #[error(
-        "{file}: the file ends early, at {location}: {readable} of {claimed} points are complete; {advice}"
+        "{file}: the file ends early, at {location}: {readable} of {} complete; {advice}",
+        points_are(*claimed)
     )]
     Truncated {
         /// Name of the file.
@@ -178,6 +180,12 @@ impl Error {
             other => other.to_string(),
         }
     }
+}
+
+/// Returns the number of points that a file claims, as the subject of a sentence.
+fn points_are(claimed: u64) -> String {
+    let verb = if claimed == 1 { "is" } else { "are" };
+    format!("{} {verb}", counted(claimed, "point"))
 }
 
 impl fmt::Display for Location {

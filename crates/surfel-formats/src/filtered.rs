@@ -1,6 +1,7 @@
 //! Reads the points of a file that a filter keeps.
 
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use crate::error::{Error, Result};
 use crate::file::Input;
@@ -22,7 +23,11 @@ pub(crate) fn read_filtered(
     let Loaded { mut cloud, mut info } = loaded.map_err(|error| with_all_columns(error, input))?;
     let n_kept = cloud.len() as u64;
     let n_points = info.n_points.replace(n_kept).unwrap_or(n_kept);
-    progress.note(&format!("{}: {n_kept} of {n_points} points meet {filter}", input.name));
+    progress.note(&format!(
+        "{}: {n_kept} of {} meet {filter}",
+        input.name,
+        counted(n_points, "point")
+    ));
     options.columns.drop_others(&mut cloud);
     Ok(Loaded { cloud, info })
 }

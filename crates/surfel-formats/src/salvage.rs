@@ -1,6 +1,7 @@
 //! Reads what is whole of damaged files, if that is asked for.
 
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use crate::error::{Error, Result};
 use crate::file::Input;
@@ -47,10 +48,11 @@ impl<'a> Salvage<'a> {
         Ok(error)
     }
 
-    /// Reports how many of the `claimed` points or other `things` were read in spite of damage; fails if there are none.
+    /// Reports how many of the `claimed` points or other things were read in spite of damage; fails if there are none. `thing` is
+    /// the singular.
     pub fn report(
         self,
-        things: &str,
+        thing: &str,
         readable: u64,
         claimed: Option<u64>,
         progress: &dyn Progress,
@@ -59,12 +61,11 @@ impl<'a> Salvage<'a> {
         if readable == 0 {
             return Err(damage);
         }
-        let of_claimed = claimed.map(|claimed| format!(" of {claimed}")).unwrap_or_default();
-        progress.note(&format!(
-            "{}: salvaged {readable}{of_claimed} {things}; {}",
-            self.input.name,
-            damage.damage()
-        ));
+        let things = match claimed {
+            Some(claimed) => format!("{readable} of {}", counted(claimed, thing)),
+            None => counted(readable, thing),
+        };
+        progress.note(&format!("{}: salvaged {things}; {}", self.input.name, damage.damage()));
         Ok(())
     }
 }

@@ -5,6 +5,7 @@ use surfel_core::math::{DVec3, Vec3};
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Material, Mesh};
+use surfel_core::words::counted;
 
 use crate::error::{Location, Result};
 use crate::file::{Input, ResourceResolver};
@@ -123,7 +124,7 @@ fn count(input: &Input) -> Result<usize> {
     };
     let readable = (input.len() - BODY) / STRIDE;
     if (readable as u64) < claimed {
-        let found = format!("the end of the file after {readable} triangles");
+        let found = format!("the end of the file after {}", counted(readable, "triangle"));
         return Err(input.malformed(end, found, format!("{claimed}"), advice));
     }
     Ok(claimed as usize)

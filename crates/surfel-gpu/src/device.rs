@@ -394,11 +394,12 @@ mod tests {
         assert_eq!(gpu.check_memory(2 << 30), Ok(()));
         let message = |gpu: &Gpu, needed| gpu.check_memory(needed).unwrap_err().to_string();
         let name = gpu.info.name.clone();
-        let expected = format!("{name} has 2.0 GB of memory, 3.0 GB are needed");
+        let expected = format!("{name} has 2.0 GiB of memory, 3.0 GiB are needed");
         assert_eq!(message(&gpu, 3 << 30), expected);
         gpu.memory_limit = Some(1 << 20);
         assert_eq!(gpu.check_memory(1 << 20), Ok(()));
-        let expected = format!("{name}: 1.5 MB of memory are needed, and --memory-limit is 1.0 MB");
+        let expected =
+            format!("{name}: 1.5 MiB of memory are needed, and --memory-limit is 1.0 MiB");
         assert_eq!(message(&gpu, 3 << 19), expected);
     }
 

@@ -12,6 +12,7 @@ use surfel_core::image::decode_srgb;
 use surfel_core::math::{DVec3, Vec3, Vec4};
 use surfel_core::points::{PointCloud, Scalar, Values};
 use surfel_core::scene::Mesh;
+use surfel_core::words::counted;
 use surfel_formats::SaveOptions;
 
 /// A point cloud: positions and the columns beside them. It does not change; threads may share it.
@@ -185,7 +186,7 @@ impl PyCloud {
     }
 
     fn __repr__(&self) -> String {
-        format!("<surfel.Cloud of {} points>", self.cloud.len())
+        format!("<surfel.Cloud of {}>", counted(self.cloud.len(), "point"))
     }
 }
 
@@ -298,7 +299,7 @@ impl PyMesh {
     }
 
     fn __repr__(&self) -> String {
-        format!("<surfel.Mesh of {} triangles>", self.mesh.triangles.len())
+        format!("<surfel.Mesh of {}>", counted(self.mesh.triangles.len(), "triangle"))
     }
 }
 

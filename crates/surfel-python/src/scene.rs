@@ -27,6 +27,7 @@ use surfel_core::progress::Progress;
 use surfel_core::render::uses_rasterizer;
 use surfel_core::scene::Background;
 use surfel_core::scene::color::Legend;
+use surfel_core::words::counted;
 
 /// A scene of files and clouds. Threads may share it.
 #[pyclass(frozen, module = "surfel", name = "Scene")]
@@ -353,8 +354,8 @@ impl PyScene {
 
     fn __repr__(&self) -> String {
         let (description, _) = self.state();
-        let n_files = description.files.len();
-        format!("<surfel.Scene of {n_files} files and {} objects>", description.objects.len())
+        let files = counted(description.files.len(), "file");
+        format!("<surfel.Scene of {files} and {}>", counted(description.objects.len(), "object"))
     }
 }
 

@@ -184,7 +184,7 @@ def test_clouds_cannot_be_saved_anyhow(points, tmp_path):
 
 def test_meshes_of_arrays_are_refused_or_taken():
     corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
-    assert repr(surfel.Mesh(corners, [[0, 1, 2]])) == "<surfel.Mesh of 1 triangles>"
+    assert repr(surfel.Mesh(corners, [[0, 1, 2]])) == "<surfel.Mesh of 1 triangle>"
     for triangles, words in [
         ([[0, 1, 3]], "triangles: found indices 0 to 3, expected 0 to 2"),
         ([[0, 1, -1]], "triangles: found indices -1 to 1"),

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { coordinate, count, duration, exact, fileSize, rounded, shortest, ticks, withUnit } from '../page/format.js';
+import { coordinate, count, counted, duration, exact, fileSize, rounded, shortest, ticks, withUnit } from '../page/format.js';
 import { coordinatesText } from '../page/cursor-coordinates.js';
 import { formatMaterial, materialOf, parseMaterial, withMaterial } from '../page/materials.js';
 import { readHeader, socketAddress } from '../page/connection.js';
@@ -21,6 +21,7 @@ test('other numbers are rounded', () => {
   assert.equal(rounded(1234.5678), '1\u202f234.6');
   assert.equal(rounded(0.00123456), '0.0012');
   assert.equal(count(2499578), '2\u202f499\u202f578');
+  assert.deepEqual([0, 1, 1200].map((n) => counted(n, 'point')), ['0 points', '1 point', '1\u202f200 points']);
   assert.equal(duration(2.44), '2.4 s');
   assert.equal(duration(200), '3 min 20 s');
   assert.equal(duration(7380), '2 h 3 min');

@@ -1,7 +1,7 @@
 // The part of the camera path's card that exports the path as a film: format, size, rate, progress and file.
 
 import { element } from './dom.js';
-import { count, duration, fileSize, stemOf } from './format.js';
+import { counted, duration, fileSize, stemOf } from './format.js';
 
 const FORMATS = { mp4: 'MP4 (H.264)', webm: 'WebM (VP9)', gif: 'GIF', png: 'animated PNG' };
 
@@ -46,7 +46,7 @@ export function setUpFilmExport(viewer, sceneFile) {
       link.href = address;
       link.download = `${stemOf(viewer.info.name)}-film.${format.value}`;
       link.hidden = false;
-      show(false, `${count(n_frames)} frames, ${fileSize(n_bytes)}`);
+      show(false, `${counted(n_frames, 'frame')}, ${fileSize(n_bytes)}`);
     } catch (error) {
       show(false, error.message === 'cancelled' ? 'Cancelled.' : error.message);
     }

@@ -35,6 +35,11 @@ export function count(value) {
   return withSeparators(value, { maximumFractionDigits: 0 });
 }
 
+/** A number of things, as `1 point` or `12 points`; `thing` is a noun whose plural ends in s. */
+export function counted(n, thing) {
+  return `${count(n)} ${thing}${n === 1 ? '' : 's'}`;
+}
+
 /** A duration in seconds as text: `2.4 s`, `3 min 20 s`. */
 export function duration(seconds) {
   if (seconds < 10) return `${seconds.toFixed(1)} s`;

@@ -2,7 +2,7 @@
 
 import { withoutSettings } from './added.js';
 import { element, iconButton } from './dom.js';
-import { count } from './format.js';
+import { counted } from './format.js';
 import { materialOf, withMaterial } from './materials.js';
 import { labelOf, settingOf, withSetting } from './object-settings.js';
 import { section } from './panel.js';
@@ -101,7 +101,7 @@ function singleRows(object, panel) {
 
 function objectPart(object, panel, viewer, navigation) {
   const { name } = object;
-  const size = object.kind === 'points' ? amount(object.points, 'point') : amount(object.triangles, 'triangle');
+  const size = object.kind === 'points' ? counted(object.points, 'point') : counted(object.triangles, 'triangle');
   const [visibility, ...details] = panel.addRows(objectControls(object));
   if (object.bounds) visibility.append(iconButton('fit', `Zoom to ${name}`, () => navigation.fit(object.bounds), { 'data-of-object': 'fit' }));
   if (object.id) visibility.append(iconButton('delete', `Remove ${name}`, () => remove(viewer, object), { 'data-of-object': 'delete' }));
@@ -129,8 +129,6 @@ function remove(viewer, { id, name }) {
   const others = viewer.scene.added_files.filter((other) => other !== id);
   viewer.changeSettings({ ...withoutSettings(viewer.scene, name), added_files: others.length ? others : null });
 }
-
-const amount = (n, word) => `${count(n)} ${word}${n === 1 ? '' : 's'}`;
 
 /** The notes of the reader about the files of an object. */
 const notesOf = ({ notes }) => notes.map((text) => element('p', { class: 'note' }, text));

@@ -1,7 +1,7 @@
 // The part of the export dialog that downloads the points that are shown, as a file with the columns of theirs.
 
 import { element } from './dom.js';
-import { count, duration, fileSize, stemOf } from './format.js';
+import { counted, duration, fileSize, stemOf } from './format.js';
 
 const FORMATS = ['laz', 'ply'];
 
@@ -38,7 +38,7 @@ export function setUpPointsExport(viewer, dialog) {
       link.href = address;
       link.download = `${stemOf(viewer.info.name)}-shown.${format}`;
       link.hidden = false;
-      show(false, `${count(n_points)} points, ${fileSize(n_bytes)}`);
+      show(false, `${counted(n_points, 'point')}, ${fileSize(n_bytes)}`);
     } catch (error) {
       show(false, error.message === 'cancelled' ? 'Cancelled.' : error.message);
     }

@@ -1,7 +1,7 @@
 // The card with the chart of a height profile.
 
 import { download, element, iconButton } from './dom.js';
-import { count, rounded, stemOf, withUnit } from './format.js';
+import { count, counted, rounded, stemOf, withUnit } from './format.js';
 import { chartOf, levelLength, nearestPoint, positionsOf } from './profile.js';
 import { showToast } from './toast.js';
 
@@ -114,7 +114,7 @@ export class ProfileCard {
       context.fillStyle = `rgb(${colors[i].join(' ')})`;
       context.fillRect(x(distance) - POINT_SIZE / 2, y(heights[i]) - POINT_SIZE / 2, POINT_SIZE, POINT_SIZE);
     });
-    const shown = distances.length < n_found ? `${count(distances.length)} of ${count(n_found)} points` : `${count(n_found)} points`;
+    const shown = distances.length < n_found ? `${count(distances.length)} of ${counted(n_found, 'point')}` : counted(n_found, 'point');
     this.summary = n_found ? `${shown}, vertical exaggeration ${rounded(exaggeration, 2)}` : 'There are no points in this strip.';
     this.#mark(null);
   }

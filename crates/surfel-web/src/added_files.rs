@@ -209,8 +209,8 @@ impl PageFiles {
 fn mebibytes(n_bytes: u64) -> String {
     const MEBIBYTE: f64 = (1 << 20) as f64;
     match n_bytes as f64 / MEBIBYTE {
-        few if few < 10.0 => format!("{few:.1} MB"),
-        many => format!("{many:.0} MB"),
+        few if few < 10.0 => format!("{few:.1} MiB"),
+        many => format!("{many:.0} MiB"),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::scene_provider::{Error, Result};
 use surfel_core::math::DVec3;
+use surfel_core::words::counted;
 
 /// Maximum number of corners.
 const MAX_CORNERS: usize = 100;
@@ -19,7 +20,8 @@ pub fn parse(
 ) -> Result<(Vec<DVec3>, DVec3)> {
     if !(min..=MAX_CORNERS).contains(&corners.len()) {
         let found = corners.len();
-        let text = format!("{name}: found {found} corners, expected {min} to {MAX_CORNERS}");
+        let text =
+            format!("{name}: found {}, expected {min} to {MAX_CORNERS}", counted(found, "corner"));
         return Err(Error::invalid_request(text));
     }
     let corners: Vec<DVec3> = corners.iter().copied().map(DVec3::from_array).collect();

@@ -12,6 +12,7 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use surfel_core::math::DVec3;
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 use surfel_formats::{Movie, MovieOptions};
 
 /// Returns the number of frames of a description's movie.
@@ -216,7 +217,11 @@ fn open(
     let movie = Movie::open(output, options, resumes)?;
     let n_frames = options.n_frames;
     if 0 < movie.n_done() {
-        progress.note(&format!("{} of {n_frames} frames are there already", movie.n_done()));
+        progress.note(&format!(
+            "{} of {} already done",
+            movie.n_done(),
+            counted(n_frames, "frame")
+        ));
     }
     progress.begin("animate", u64::from(n_frames));
     Ok(movie)

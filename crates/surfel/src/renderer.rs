@@ -240,6 +240,9 @@ mod tests {
         let notes = notes.0.into_inner().unwrap();
         let [note] = &notes[..] else { panic!("{notes:?}") };
         assert!(note.starts_with("on the CPU: "), "{note}");
-        assert!(note.ends_with("MB of memory are needed, and --memory-limit is 1.0 KB"), "{note}");
+        assert!(
+            note.ends_with("MiB of memory are needed, and --memory-limit is 1.0 KiB"),
+            "{note}"
+        );
     }
 }

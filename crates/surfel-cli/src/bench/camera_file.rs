@@ -4,6 +4,7 @@ use anyhow::Context;
 use std::path::Path;
 use surfel_core::math::DVec3;
 use surfel_core::scene::{Camera, Projection};
+use surfel_core::words::counted;
 
 /// A camera and a point light in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +37,7 @@ impl CameraFile {
         let numbers = text.split(',').enumerate().map(|(i, text)| number(text, i + 1));
         let numbers = numbers.collect::<Result<Vec<f64>, String>>()?;
         let &[ex, ey, ez, tx, ty, tz, view_angle_deg, lx, ly, lz] = &numbers[..] else {
-            return Err(format!("found {} numbers, expected {FORM}", numbers.len()));
+            return Err(format!("found {}, expected {FORM}", counted(numbers.len(), "number")));
         };
         let [eye, target, light] = [[ex, ey, ez], [tx, ty, tz], [lx, ly, lz]].map(DVec3::from);
         let camera = Self { eye, target, view_angle_deg, light };

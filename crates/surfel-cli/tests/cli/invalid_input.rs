@@ -133,12 +133,12 @@ fn the_memory_limit_is_checked_before_the_work() {
     let picture = folder.path("out.png");
     let arguments = ["render", &cloud, "-o", &picture, "--memory-limit", "1M"];
     let text = fail(&arguments, 1);
-    assert!(text.contains("--resolution") && text.contains("1.0 MB"), "{text}");
-    // 10,000 points with an octree need another 4.6 MB.
+    assert!(text.contains("--resolution") && text.contains("1.0 MiB"), "{text}");
+    // 10,000 points with an octree need another 4.6 MiB.
     let small = ["render", &cloud, "-o", &picture, "--resolution", "64x48", "--memory-limit", "3M"];
     succeed(&[&small[..], &["--dry-run"]].concat());
     let text = fail(&[&small[..], &["--surface", "octree"]].concat(), 1);
-    assert!(text.contains("3.0 MB") && text.contains("--subsample"), "{text}");
+    assert!(text.contains("3.0 MiB") && text.contains("--subsample"), "{text}");
     let text = fail(&["prepare", &cloud, "-o", &folder.path("a.ply"), "--memory-limit", "9K"], 1);
     assert!(text.contains("--memory-limit"), "{text}");
     assert!(fail(&["info", &cloud, "--memory-limit", "9K"], 1).contains("--memory-limit"));

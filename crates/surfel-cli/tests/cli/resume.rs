@@ -53,7 +53,7 @@ fn an_interrupted_movie_continues_with_the_missing_frames() {
     assert_eq!(first, again);
 
     let message = stderr(&command(&resume).output().unwrap());
-    assert!(message.contains("of 40 frames are there already"), "{message}");
+    assert!(message.contains("of 40 frames already done"), "{message}");
     assert!(fs::read(&part).unwrap() == fs::read(&whole).unwrap());
     assert_eq!(folder.names(), ["dome.ply", "part.gif", "whole.gif"]);
 }

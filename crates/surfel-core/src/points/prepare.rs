@@ -20,6 +20,7 @@ use super::{PointCloud, PreparedCloud, Scalar, Values};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::progress::Progress;
+use crate::words::counted;
 
 /// Report of [`prepare`]. A field is none if the cloud already had the column.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -100,7 +101,7 @@ pub fn prepare(
         && missing.structure
         && preparation.structure == StructureChoice::Auto
     {
-        let line = format!("{} rings of a spinning scanner", rings.len());
+        let line = format!("{} of a spinning scanner", counted(rings.len(), "ring"));
         progress.choice(&format!("{line}: gaps between them are closed"), &["structure"]);
     }
     let denoised = denoise(&mut cloud, preparation.denoise, progress)?;
@@ -235,7 +236,10 @@ fn turn_given_normals(cloud: &mut PointCloud, progress: &dyn Progress) {
     let Some(mut normals) = cloud.normals.take() else { return };
     let n_turned = if has_stations(cloud) { turn_to_stations(cloud, &mut normals) } else { 0 };
     if 0 < n_turned {
-        let line = format!("{n_turned} normals of the file turned toward the station of each scan");
+        let line = format!(
+            "{} of the file turned toward the station of each scan",
+            counted(n_turned, "normal")
+        );
         progress.choice(&line, &["orient"]);
     }
     cloud.normals = Some(normals);

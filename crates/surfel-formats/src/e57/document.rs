@@ -1,6 +1,7 @@
 //! The header of a file and its XML, which describes the scans.
 
 use std::io::Cursor;
+use surfel_core::words::counted;
 
 use e57::{E57Reader, Image, PointCloud};
 use surfel_core::progress::Progress;
@@ -102,7 +103,7 @@ pub(super) fn salvage_document(
         note(&complete_last_scan(&mut document.scans, pages));
         let n_skipped = n_other_sections(&document.scans, pages, progress)?;
         if 0 < n_skipped {
-            note(&format!("{n_skipped} more lists of points or cells are skipped"));
+            note(&format!("skipped {} of points or cells", counted(n_skipped, "more list")));
         }
         return Ok(document);
     }
@@ -117,10 +118,13 @@ pub(super) fn salvage_document(
     note(&format!(
         "the description of the scans is missing; the first three fields of {} are taken for positions about \
          their scanner, and poses, names, colors and all else are lost",
-        if scans.len() == 1 { "a scan".into() } else { format!("{} scans", scans.len()) }
+        counted(scans.len(), "scan")
     ));
     if let Some(reason) = skipped.first() {
-        note(&format!("{} more lists of points or cells are skipped: {reason}", skipped.len()));
+        note(&format!(
+            "skipped {} of points or cells: {reason}",
+            counted(skipped.len(), "more list")
+        ));
     }
     Ok(Document { scans, images: Vec::new(), coordinate_system: None, is_described: false })
 }

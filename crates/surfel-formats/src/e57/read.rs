@@ -1,6 +1,7 @@
 //! Reads the points of all scans of a file.
 
 use std::sync::atomic::{AtomicU64, Ordering};
+use surfel_core::words::counted;
 
 use rayon::prelude::*;
 use surfel_core::math::DVec3;
@@ -109,11 +110,12 @@ pub(crate) fn read(
     }
     // Without a description nothing claims a number.
     let n_claimed = document.is_described.then_some(n_claimed);
-    salvage.report("points", n_points, n_claimed, progress)?;
+    salvage.report("point", n_points, n_claimed, progress)?;
     info.n_points = Some(n_points);
     let n_invalid = n_invalid.into_inner();
     if 0 < n_invalid {
-        let line = format!("{n_invalid} of {n_points} points have no valid position; skipped");
+        let line =
+            format!("skipped {n_invalid} of {}: no valid position", counted(n_points, "point"));
         progress.note(&format!("{}: {line}", input.name));
     }
     let mut cloud = builder.finish();
@@ -139,7 +141,7 @@ fn scans(input: &Input, document: &Document) -> Result<Vec<Scan>> {
     let checked = document.scans.iter().enumerate().map(|(i, description)| {
         let n_fields = description.prototype.len();
         if MAX_FIELDS < n_fields {
-            let found = format!("{n_fields} fields in scan {i}");
+            let found = format!("{} in scan {i}", counted(n_fields, "field"));
             return Err(malformed(found, format!("at most {MAX_FIELDS}")));
         }
         // Where nothing says which points were measured, those at the scanner were not.
@@ -191,8 +193,7 @@ fn file_info(
     let filled = scans.iter().zip(&document.scans).filter(|(scan, _)| 0 < scan.n_points);
     let bounds: Option<Vec<[DVec3; 2]>> =
         filled.map(|(scan, description)| scan.stated_bounds(description)).collect();
-    let n_scans = document.scans.len();
-    let scans = if n_scans == 1 { "1 scan".into() } else { format!("{n_scans} scans") };
+    let scans = counted(document.scans.len(), "scan");
     let names = columns.iter().map(|(role, _)| role.name().to_owned());
     FileInfo {
         format: format!("E57 1.0, {scans}"),

@@ -1,6 +1,7 @@
 //! The bytes of a scan's values: a stream for each field, cut into packets.
 
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use super::pages::Pages;
 use crate::error::{Location, Result};
@@ -162,7 +163,7 @@ fn add_packet(
     let n_found = n_streams(pages, at);
     if n_found != streams.len() {
         let expected = format!("{}, one for each field", streams.len());
-        return Err((format!("a packet of {n_found} streams"), expected));
+        return Err((format!("a packet of {}", counted(n_found, "stream")), expected));
     }
     let mut part = DATA_HEADER_LENGTH + 2 * streams.len() as u64;
     for (i, stream) in streams.iter_mut().enumerate() {

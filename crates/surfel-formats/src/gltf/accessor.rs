@@ -1,6 +1,7 @@
 //! Accessors: typed columns of numbers in buffers. All claims of an accessor are checked before it is read.
 
 use std::array;
+use surfel_core::words::counted;
 
 use super::document::Document;
 use super::json::Json;
@@ -225,7 +226,9 @@ impl<'a> StridedElements<'a> {
         let stride = view.stride.unwrap_or(size);
         if stride < size {
             let found = format!("a byteStride of {stride} in bufferView {}", view_ref.index()?);
-            return Err(json.error(found, format!("at least the {size} bytes of an element")));
+            return Err(
+                json.error(found, format!("at least the {} of an element", counted(size, "byte")))
+            );
         }
         let offset = json.unsigned_or("byteOffset", 0)?;
         // 128 bits cannot overflow.
@@ -233,8 +236,14 @@ impl<'a> StridedElements<'a> {
         let needed = if count == 0 { 0 } else { u128::from(offset) + last + size as u128 };
         let n_bytes = view.bytes.len();
         if (n_bytes as u128) < needed {
-            let found = format!("{count} elements of {size} bytes, {stride} apart, from {offset}");
-            return Err(json.error(found, format!("{n_bytes} bytes at most, as the view has")));
+            let found = format!(
+                "{} of {}, {stride} apart, from {offset}",
+                counted(count, "element"),
+                counted(size, "byte")
+            );
+            return Err(
+                json.error(found, format!("{} at most, as the view has", counted(n_bytes, "byte")))
+            );
         }
         let bytes = if count == 0 { &[] } else { &view.bytes[offset as usize..] };
         Ok(Self { bytes, stride, size })

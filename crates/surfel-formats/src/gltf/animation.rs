@@ -2,6 +2,7 @@
 
 use surfel_core::math::{DQuat, DVec3};
 use surfel_core::scene::{Animation, Channel, Interpolation, Keyframes, Node, Track};
+use surfel_core::words::counted;
 
 use super::accessor::{Accessor, IntegerPolicy};
 use super::document::Document;
@@ -159,7 +160,11 @@ impl<'a> Sampler<'_, 'a> {
         let values = Accessor::open(self.document, &self.json.require("output")?)?;
         let needed = times_secs.len().saturating_mul(n_values * values_per_key(interpolation));
         if values.count != needed {
-            let found = format!("{} values for {} keys", values.count, times_secs.len());
+            let found = format!(
+                "{} for {}",
+                counted(values.count, "value"),
+                counted(times_secs.len(), "key")
+            );
             return Err(self.error("output", found, format!("{needed}")));
         }
         Ok(Keyframes { times_secs, values: read(&values)?, interpolation })

@@ -2,6 +2,7 @@
 
 use surfel_core::math::{Vec2, Vec3, Vec4};
 use surfel_core::scene::{Morph, Skin};
+use surfel_core::words::counted;
 
 use super::accessor::{Accessor, IntegerPolicy};
 use super::document::Document;
@@ -142,7 +143,8 @@ impl<'a> VertexAttributes<'_, 'a> {
         if accessor.count == self.count {
             return Ok(Some(accessor));
         }
-        let found = format!("{} elements in {}", accessor.count, accessor.json.pointer());
+        let found =
+            format!("{} in {}", counted(accessor.count, "element"), accessor.json.pointer());
         Err(reference.error(found, format!("{}, one per position", self.count)))
     }
 

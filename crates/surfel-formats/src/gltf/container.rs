@@ -1,6 +1,7 @@
 //! The two file formats of glTF: plain JSON, and GLB, which holds JSON and a buffer in one file.
 
 use serde_json::Value;
+use surfel_core::words::counted;
 
 use super::json::{Json, shorten};
 use crate::error::{Error, Location, Result};
@@ -63,7 +64,7 @@ fn read_chunks<'a>(input: &'a Input) -> Result<(&'a [u8], Option<&'a [u8]>)> {
     let word = |at: usize| {
         let word = bytes.get(at..at + 4).and_then(|word| word.try_into().ok());
         word.map(u32::from_le_bytes).ok_or_else(|| {
-            let found = format!("the end of {} bytes", bytes.len());
+            let found = format!("the end of {}", counted(bytes.len(), "byte"));
             input.malformed(Location::Byte(at as u64), found, "a header of a GLB", ADVICE)
         })
     };
@@ -73,7 +74,7 @@ fn read_chunks<'a>(input: &'a Input) -> Result<(&'a [u8], Option<&'a [u8]>)> {
         return Err(input.unsupported(format!("version {version} of GLB"), advice));
     }
     let Some(body) = bytes.get(..length) else {
-        let found = format!("{} bytes", bytes.len());
+        let found = counted(bytes.len(), "byte");
         let expected = format!("the {length} that its header announces");
         return Err(input.malformed(Location::Byte(8), found, expected, ADVICE));
     };
@@ -82,7 +83,7 @@ fn read_chunks<'a>(input: &'a Input) -> Result<(&'a [u8], Option<&'a [u8]>)> {
     while at + 8 <= body.len() {
         let (size, kind) = (word(at)? as usize, word(at + 4)?.to_le_bytes());
         let Some(chunk) = body[at + 8..].get(..size) else {
-            let found = format!("a chunk of {size} bytes");
+            let found = format!("a chunk of {}", counted(size, "byte"));
             let expected = format!("at most the {} that are left", body.len() - at - 8);
             return Err(input.malformed(Location::Byte(at as u64), found, expected, ADVICE));
         };

@@ -1,6 +1,7 @@
 //! State shared by all parts of the reader: the JSON, the buffers, a memory budget and collected warnings.
 
 use std::cell::{Cell, RefCell};
+use surfel_core::words::counted;
 
 use surfel_core::progress::Progress;
 
@@ -68,7 +69,7 @@ pub(super) fn load_buffers<'a>(
         if let Some(data) = &data
             && data.len() < n_bytes
         {
-            let found = format!("{n_bytes}, but the buffer has {} bytes", data.len());
+            let found = format!("{n_bytes}, but the buffer has {}", counted(data.len(), "byte"));
             return Err(length.error(found, "no more bytes than there are"));
         }
         buffers.push(Buffer { data, n_bytes });
@@ -122,8 +123,10 @@ impl<'a> Document<'a> {
         let (offset, length) = (view.unsigned_or("byteOffset", 0)?, view.require("byteLength")?);
         let end = offset.checked_add(length.unsigned()?).filter(|end| *end <= *n_bytes as u64);
         let Some(end) = end else {
-            let found = format!("{} bytes from byte {offset}", length.unsigned()?);
-            return Err(view.error(found, format!("a part of the buffer's {n_bytes} bytes")));
+            let found = format!("{} from byte {offset}", counted(length.unsigned()?, "byte"));
+            return Err(
+                view.error(found, format!("a part of the buffer's {}", counted(*n_bytes, "byte")))
+            );
         };
         let stride = view.get("byteStride").map(|stride| stride.index()).transpose()?;
         Ok(BufferView { bytes: &data[offset as usize..end as usize], stride })
@@ -166,7 +169,7 @@ impl<'a> Document<'a> {
         }
         match self.n_suppressed.get() {
             0 => {}
-            n => self.progress.note(&format!("{file}: {n} more warnings")),
+            n => self.progress.note(&format!("{file}: {}", counted(n, "more warning"))),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use surfel_core::math::{DQuat, DVec3};
 use surfel_core::scene::{Node, Transform};
+use surfel_core::words::counted;
 
 use super::accessor::{Accessor, IntegerPolicy};
 use super::document::Document;
@@ -23,7 +24,7 @@ pub(super) fn read<'a>(
         let Some(reference) = attributes.get(key) else { return Ok(None) };
         let accessor = Accessor::open(document, &reference)?;
         if count.is_some_and(|count| count != accessor.count) {
-            let found = format!("{} elements", accessor.count);
+            let found = counted(accessor.count, "element");
             return Err(reference.error(found, "as many as the other attributes have"));
         }
         count = Some(accessor.count);

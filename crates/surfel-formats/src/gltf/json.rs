@@ -1,6 +1,7 @@
 //! JSON values that know their JSON pointer, so that errors can name it.
 
 use serde_json::Value;
+use surfel_core::words::counted;
 
 use crate::error::{Error, Location, Result};
 
@@ -136,7 +137,7 @@ impl<'a> Json<'a> {
     pub fn numbers<const N: usize>(&self) -> Result<[f64; N]> {
         let values: Vec<f64> = self.array()?.map(|item| item.number()).collect::<Result<_>>()?;
         let n = values.len();
-        values.try_into().map_err(|_| self.error(format!("{n} numbers"), format!("{N}")))
+        values.try_into().map_err(|_| self.error(counted(n, "number"), format!("{N}")))
     }
 
     /// Returns a string.

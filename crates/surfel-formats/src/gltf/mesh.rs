@@ -1,6 +1,7 @@
 //! Meshes: the primitives of a node with their materials.
 
 use std::collections::HashMap;
+use surfel_core::words::counted;
 
 use surfel_core::scene::{Material, Primitive};
 
@@ -117,6 +118,5 @@ fn read_weights(json: &Json, n_targets: usize) -> Result<Vec<f32>> {
     if weights.len() == n_targets {
         return Ok(weights);
     }
-    Err(json
-        .error(format!("{} weights", weights.len()), format!("{n_targets}, one per morph target")))
+    Err(json.error(counted(weights.len(), "weight"), format!("{n_targets}, one per morph target")))
 }

@@ -1,6 +1,7 @@
 //! Nodes with their meshes, skins, cameras and lights.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use surfel_core::words::counted;
 
 use surfel_core::math::{DAffine3, DQuat, DVec3, Vec3};
 use surfel_core::scene::{Joint, Node, Projection, PunctualLight, PunctualLightKind, Transform};
@@ -104,7 +105,7 @@ fn read_joints<'a>(
     let list = skin.require("joints")?;
     let n_joints = list.array()?.len();
     if n_joints < n_used {
-        let found = format!("a skin of {n_joints} joints");
+        let found = format!("a skin of {}", counted(n_joints, "joint"));
         return Err(reference.error(found, format!("the {n_used} that its mesh uses")));
     }
     document.reserve(&skin, n_joints, size_of::<Joint>())?;
@@ -112,7 +113,7 @@ fn read_joints<'a>(
     if let Some(matrices) = skin.get("inverseBindMatrices") {
         let accessor = Accessor::open(document, &matrices)?;
         if accessor.count < n_joints {
-            let found = format!("{} matrices for {n_joints} joints", accessor.count);
+            let found = format!("{} matrices for {}", accessor.count, counted(n_joints, "joint"));
             return Err(matrices.error(found, "one per joint"));
         }
         for matrix in accessor.floats::<16>(document, IntegerPolicy::Reject, None)? {

@@ -1,6 +1,7 @@
 //! Primitives: triangles and points. Primitives with the same accessors share one geometry.
 
 use std::collections::{BTreeSet, HashMap};
+use surfel_core::words::counted;
 
 use surfel_core::image::encode_srgb;
 use surfel_core::math::{Vec3, Vec4};
@@ -130,7 +131,7 @@ fn read_indices<'a>(
     let out_of_range = indices.iter().position(|[index]| count <= *index as usize);
     if let Some(at) = out_of_range {
         let found = format!("{} at {at}", indices[at][0]);
-        return Err(reference.error(found, format!("less than the {count} positions")));
+        return Err(reference.error(found, format!("less than the {}", counted(count, "position"))));
     }
     Ok(indices.into_iter().map(|[index]| index).collect())
 }
@@ -154,14 +155,17 @@ fn read_mesh(vertices: &VertexAttributes, triangles: Vec<[u32; 3]>) -> Result<Op
     let n_lost = drop_invalid_triangles(&mut mesh).n_invalid;
     if 0 < n_lost {
         let line = format!(
-            "{n_lost} triangles with a corner that is not finite or beyond 1e15 are skipped"
+            "skipped {} with a corner that is not finite or beyond 1e15",
+            counted(n_lost, "triangle")
         );
         vertices.document.warn(line);
     }
     let n_repaired = repair_normals(&mut mesh);
     if 0 < n_repaired {
-        let line =
-            format!("{n_repaired} normals of length zero are replaced by those of the triangles");
+        let line = format!(
+            "replaced {} of length zero by those of the triangles",
+            counted(n_repaired, "normal")
+        );
         vertices.document.warn(line);
     }
     let (has_normals, has_tangents) = (mesh.normals.is_some(), mesh.tangents.is_some());
@@ -195,7 +199,7 @@ fn read_points(vertices: &VertexAttributes) -> Result<Option<PointCloud>> {
         let finite: Vec<u32> = (0..n_all as u32).filter(is_finite).collect();
         cloud = cloud.subset(&finite);
         let n_lost = n_all - cloud.len();
-        document.warn(format!("{n_lost} points that are not finite are skipped"));
+        document.warn(format!("skipped {} without a finite position", counted(n_lost, "point")));
     }
     Ok((!cloud.is_empty()).then_some(cloud))
 }

@@ -3,6 +3,7 @@
 use surfel_core::math::{DAffine3, DQuat, DVec3};
 use surfel_core::points::PointCloud;
 use surfel_core::scene::{Animation, Graph, Track, Transform};
+use surfel_core::words::counted;
 
 use super::document::Document;
 use super::hierarchy::Hierarchy;
@@ -84,8 +85,10 @@ pub(super) fn check_all(
     }
     if let Some(first) = hidden.first() {
         let n = hidden.len();
-        document
-            .warn(format!("not shown because they are scaled to 0: `{first}`, {n} nodes in all"));
+        document.warn(format!(
+            "not shown because they are scaled to 0: `{first}`, {} in all",
+            counted(n, "node")
+        ));
     }
     Ok(())
 }

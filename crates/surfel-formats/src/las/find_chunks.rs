@@ -2,6 +2,7 @@
 
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use surfel_core::words::counted;
 
 use laz::LazVlr;
 use laz::laszip::ChunkTable;
@@ -165,7 +166,7 @@ fn read_chunk_table(input: &Input, header: &Header, vlr: &LazVlr) -> Result<Vec<
     let n_chunks = read_u32(input, at + 4);
     // Each chunk begins with an uncompressed record.
     if ((header.data.len() / header.record_length) as u32) < n_chunks {
-        let found = format!("{n_chunks} chunks");
+        let found = counted(n_chunks, "chunk");
         return Err(broken(
             input,
             Location::Byte(at as u64 + 4),

@@ -3,6 +3,7 @@
 use std::io::{Cursor, ErrorKind};
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use surfel_core::words::counted;
 
 use laz::record::{
     LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
@@ -122,7 +123,8 @@ impl Chunks {
     pub fn check(&self, input: &Input, chunk: &Chunk, location: Location) -> Result<()> {
         let bytes = &input[chunk.bytes.clone()];
         if MAX_POINTS_PER_BYTE * (bytes.len() as u64) < chunk.n_points as u64 {
-            let found = format!("{} points in {} bytes", chunk.n_points, bytes.len());
+            let found =
+                format!("{} in {}", counted(chunk.n_points, "point"), counted(bytes.len(), "byte"));
             return Err(broken(input, location, found, "a count that the bytes can hold"));
         }
         let n_fixed = self.n_bytes_before_layers();
@@ -130,7 +132,7 @@ impl Chunks {
         if n_fixed <= bytes.len() && needed <= bytes.len() as u64 {
             return Ok(());
         }
-        let found = format!("{} bytes", bytes.len());
+        let found = counted(bytes.len(), "byte");
         Err(broken(input, location, found, &format!("{needed}, as the chunk's layers announce")))
     }
 
@@ -261,7 +263,7 @@ pub(super) fn read_laszip_record(input: &Input, header: &Header) -> Result<LazVl
         || !items.iter().all(fits)
         || total != header.record_length
     {
-        let found = format!("{} items of {total} bytes", items.len());
+        let found = format!("{} of {}", counted(items.len(), "item"), counted(total, "byte"));
         let expected = format!(
             "the parts of point format {} in {} bytes",
             header.point_format, header.record_length

@@ -61,7 +61,7 @@ pub(crate) fn read(
         let cloud = read_records(input, records, &layout, origin, filter, scale, progress)?;
         Decoded { cloud, color_bits, n_points }
     };
-    salvage.report("points", n_points, Some(header.n_points), progress)?;
+    salvage.report("point", n_points, Some(header.n_points), progress)?;
     if !cloud.is_empty() {
         color_bits.report(input, &mut cloud, progress);
         drop_zero_columns(input, &mut cloud, progress);

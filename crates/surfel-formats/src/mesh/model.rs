@@ -3,6 +3,7 @@
 use surfel_core::math::{DVec3, Vec3};
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Material, Mesh, Texture};
+use surfel_core::words::counted;
 
 use super::repair::{DroppedTriangles, drop_invalid_triangles, repair_normals};
 use crate::error::{Location, Result};
@@ -49,8 +50,11 @@ pub(crate) fn repair_model(
         progress.note(&format!("{}: triangles dropped: {reasons}", input.name));
     }
     if 0 < n_repaired {
-        progress
-            .note(&format!("{}: {n_repaired} normals without a direction replaced", input.name));
+        progress.note(&format!(
+            "{}: {} without a direction replaced",
+            input.name,
+            counted(n_repaired, "normal")
+        ));
     }
     let n_triangles = model.parts.iter().map(|(mesh, _)| mesh.triangles.len() as u64).sum();
     Ok((model, n_triangles))

@@ -1,6 +1,7 @@
 //! Decodes PNG and JPEG pictures to textures.
 
 use std::io::Cursor;
+use surfel_core::words::counted;
 
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use surfel_core::scene::Texture;
@@ -21,7 +22,7 @@ pub(crate) fn decode_texture(name: &str, bytes: &[u8]) -> Result<Texture> {
         Ok(other) => return Err(unsupported(name, format!("a picture in {other:?}"))),
         Err(_) => {
             let magic = bytes[..bytes.len().min(4)].escape_ascii();
-            let found = format!("`{magic}` at the start of {} bytes", bytes.len());
+            let found = format!("`{magic}` at the start of {}", counted(bytes.len(), "byte"));
             return Err(malformed(name, found, "a PNG or JPEG picture"));
         }
     };

@@ -17,6 +17,7 @@ mod video;
 use std::ffi::OsStr;
 use std::io::Write;
 use std::path::Path;
+use surfel_core::words::counted;
 
 use surfel_core::image::Image;
 use surfel_core::progress::Progress;
@@ -172,7 +173,7 @@ impl Movie {
         if self.n_done() < n_frames {
             return Err(Error::InvalidFrames {
                 file: self.spec.file(),
-                found: format!("{} of {n_frames} frames", self.n_done()),
+                found: format!("{} of {}", self.n_done(), counted(n_frames, "frame")),
                 expected: "all".into(),
                 advice: "run again with --resume to make the others",
             });

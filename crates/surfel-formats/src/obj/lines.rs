@@ -1,6 +1,7 @@
 //! The lines of OBJ and MTL files: a keyword and its arguments.
 
 use crate::table::{LineError, parse_number};
+use surfel_core::words::counted;
 
 /// Returns the length of the line at the start of `text`, which a backslash continues; `None` if it does not end.
 pub(super) fn line_end(text: &[u8]) -> Option<usize> {
@@ -34,7 +35,7 @@ pub(super) fn numbers<const MIN: usize, const MAX: usize>(
     }
     if count < MIN {
         let expected = format!("at least {MIN}");
-        return Err(LineError { found: format!("{count} numbers"), expected });
+        return Err(LineError { found: counted(count, "number"), expected });
     }
     Ok((numbers, count))
 }

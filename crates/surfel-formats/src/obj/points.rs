@@ -1,6 +1,7 @@
 //! Reads the vertices of OBJ files as points, with the colours that some programs write after the coordinates.
 
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use super::mesh::count_triangles;
 use crate::error::{Location, Result};
@@ -51,7 +52,7 @@ pub(crate) fn read(
         options.filter.as_ref(),
         progress,
     )?;
-    salvage.report("points", n_points, None, progress)?;
+    salvage.report("point", n_points, None, progress)?;
     let n_triangles = Some(count_triangles(input)).filter(|count| 0 < *count);
     let info = FileInfo { n_points: Some(n_points), n_triangles, ..file_info(n_columns) };
     Ok(Loaded { cloud, info })
@@ -79,7 +80,7 @@ fn first_vertex(input: &Input) -> Result<usize> {
         6 | 7 => Ok(6),
         n_words => Err(input.malformed(
             Location::Line(i as u64 + 1),
-            format!("{n_words} numbers"),
+            counted(n_words, "number"),
             "3 for a vertex, or 6 with its colour",
             "repair or remove the line",
         )),
@@ -109,7 +110,7 @@ fn parse_vertex(
     }
     if row.len() != n_columns {
         let expected = format!("{n_columns} as in the first vertex");
-        return Err(LineError { found: format!("{} numbers", row.len()), expected });
+        return Err(LineError { found: counted(row.len(), "number"), expected });
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use super::header::{Header, PcdField};
 use super::lzf::{MAX_RATIO, decompress};
@@ -35,7 +36,7 @@ pub(super) fn records(
     let (values, fault) = decompress(&data[..data.len().min(n_compressed)], n_bytes);
     let n_readable = n_readable(header, n_points, values.len());
     if fault.is_some() || data.len() < n_compressed {
-        let found_points = format!("{n_readable} of {n_points} points are whole");
+        let found_points = format!("{n_readable} of {} whole", counted(n_points, "point"));
         let error = match fault {
             Some(fault) if n_compressed <= data.len() => {
                 let location = Location::Byte((header.body + 8 + fault.byte) as u64);
@@ -68,7 +69,7 @@ fn sizes<'a>(input: &'a Input, header: &Header) -> Result<(usize, usize, &'a [u8
         Some((u32::from_le_bytes(*compressed), u32::from_le_bytes(*whole), data))
     });
     let Some((n_compressed, n_bytes, data)) = sizes else {
-        let found = format!("{} bytes after the header", body.len());
+        let found = format!("{} after the header", counted(body.len(), "byte"));
         let location = Location::Byte(header.body as u64);
         return Err(input.malformed(location, found, "the sizes of the compressed points", ADVICE));
     };

@@ -3,6 +3,7 @@
 use crate::error::{Location, Result};
 use crate::file::Input;
 use crate::table::{MAX_FIELDS, NumberType};
+use surfel_core::words::counted;
 
 /// Maximum bytes of a header: names of a thousand fields take a tenth of it.
 const MAX_HEADER_LENGTH: usize = 1 << 17;
@@ -199,7 +200,7 @@ impl Entries {
         let counts = self.counts.clone().unwrap_or_else(|| vec![1; names.len()]);
         for (key, n) in [("SIZE", sizes.len()), ("TYPE", types.len()), ("COUNT", counts.len())] {
             if n != names.len() {
-                let found = format!("{n} values of `{key}`");
+                let found = format!("{} of `{key}`", counted(n, "value"));
                 return Err((found, format!("{}, one for each field", names.len())));
             }
         }

@@ -1,6 +1,7 @@
 //! Reads the points of PCD files: binary ones in place, ascii ones by lines.
 
 use std::borrow::Cow;
+use surfel_core::words::counted;
 
 use surfel_core::math::DVec3;
 use surfel_core::points::{COLUMN_INDEX, PointCloud, ROW_INDEX, Scalar, ScanStation, Values};
@@ -41,7 +42,7 @@ pub(crate) fn read(
         Encoding::Ascii => read_ascii(&mut salvage, &header, options, progress)?,
         _ => read_binary(&mut salvage, &header, options, progress)?,
     };
-    salvage.report("points", n_points, Some(header.n_points()), progress)?;
+    salvage.report("point", n_points, Some(header.n_points()), progress)?;
     if header.is_organized() {
         add_grid(&mut cloud, &header, options);
     }
@@ -250,8 +251,8 @@ fn parse_point(
     for field in &header.fields {
         for _ in 0..field.count {
             let word = words.next().ok_or_else(|| LineError {
-                found: format!("{n_found} values"),
-                expected: format!("{} values a point", header.n_values()),
+                found: counted(n_found, "value"),
+                expected: format!("{} a point", counted(header.n_values(), "value")),
             })?;
             n_found += 1;
             if field.is_packed_color() {

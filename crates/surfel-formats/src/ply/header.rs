@@ -3,6 +3,7 @@
 use crate::error::{Error, Location, Result};
 use crate::file::Input;
 use crate::table::{MAX_FIELDS, MAX_LINE_LENGTH, NumberType};
+use surfel_core::words::counted;
 
 /// The header of a file.
 pub(super) struct Header {
@@ -61,7 +62,7 @@ impl Element {
         input.malformed(
             Location::Byte(input.len() as u64),
             "the end of the file",
-            format!("{} elements `{}`", self.count, self.name),
+            format!("{} `{}`", counted(self.count, "element"), self.name),
             "copy the file again from its source",
         )
     }

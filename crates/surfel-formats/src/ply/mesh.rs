@@ -50,7 +50,7 @@ pub(crate) fn read_mesh(
         return Err(vertex.truncated(input, n_vertices));
     }
     let faces = read_faces(&mut salvage, &header, vertex.count, progress)?;
-    salvage.report("faces", faces.n_read, Some(count_faces(&header)), progress)?;
+    salvage.report("face", faces.n_read, Some(count_faces(&header)), progress)?;
     let mut mesh = Mesh {
         origin: cloud.origin,
         uvs: [uvs(&cloud), None],

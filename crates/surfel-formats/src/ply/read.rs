@@ -2,6 +2,7 @@
 
 use surfel_core::points::{GAUSSIAN_COLUMNS, PointCloud};
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use super::element_lines::end_of_lines;
 use super::faces::count_faces;
@@ -42,13 +43,13 @@ pub(crate) fn read(
             progress.note(&format!("{}: {line}", input.name));
         }
         let (cloud, n_points) = read_cloud(&mut salvage, &header, options, progress)?;
-        salvage.report("points", n_points, info.n_points.replace(n_points), progress)?;
+        salvage.report("point", n_points, info.n_points.replace(n_points), progress)?;
         return Ok(Loaded { cloud, info });
     }
     let columns = options.columns.with_names(&GAUSSIAN_COLUMNS);
     let needed = LoadOptions { columns, ..options.clone() };
     let (mut cloud, n_points) = read_cloud(&mut salvage, &header, &needed, progress)?;
-    salvage.report("points", n_points, info.n_points.replace(n_points), progress)?;
+    salvage.report("point", n_points, info.n_points.replace(n_points), progress)?;
     let keeps_gaussians = keeps_gaussians(options);
     if let Some(mut line) = add_discs(&mut cloud, keeps_gaussians) {
         if keeps_gaussians {
@@ -220,7 +221,7 @@ fn parse_vertex(
     let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
     let mut number = |n_found: usize| {
         let word = words.next().ok_or_else(|| LineError {
-            found: format!("{n_found} values"),
+            found: counted(n_found, "value"),
             expected: format!("{} properties a vertex", vertex.properties.len()),
         })?;
         parse_number(word)

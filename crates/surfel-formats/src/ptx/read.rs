@@ -3,6 +3,7 @@
 use surfel_core::math::{DMat3, DQuat, DVec3};
 use surfel_core::points::{COLUMN_INDEX, ROW_INDEX, ScanStation};
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use super::scans::{Scan, find_scans, first_header};
 use crate::error::{Error, Location, Result};
@@ -69,12 +70,14 @@ pub(crate) fn read(
     let n_points = builder.n_read();
     let n_empty = n_cells_read - n_points;
     if 0 < n_empty {
-        let line =
-            format!("{n_empty} of {n_cells_read} cells of the scanner's grid are empty; skipped");
+        let line = format!(
+            "skipped {n_empty} of {} of the scanner's grid: empty",
+            counted(n_cells_read, "cell")
+        );
         progress.note(&format!("{}: {line}", input.name));
     }
     let n_cells = scans.iter().fold(0, |sum: u64, scan| sum.saturating_add(scan.n_cells()));
-    salvage.report("cells of the scanner's grid", n_cells_read, Some(n_cells), progress)?;
+    salvage.report("cell", n_cells_read, Some(n_cells), progress)?;
     let mut cloud = builder.finish();
     let stations = scans.iter().enumerate().map(|(i, scan)| ScanStation {
         name: format!("scan {}", i + 1),
@@ -116,7 +119,7 @@ fn roles(input: &Input, scans: &[Scan]) -> Result<Vec<ColumnRole>> {
     if let Some(scan) = filled().find(|scan| ![3, 4, 7].contains(&scan.n_fields)) {
         return Err(input.malformed(
             Location::Line(scan.line),
-            format!("{} fields", scan.n_fields),
+            counted(scan.n_fields, "field"),
             "x y z, with or without intensity, and red green blue after it",
             "write the file again",
         ));
@@ -161,7 +164,7 @@ fn parse_cell(
     }
     if row.len() != scan.n_fields {
         let expected = format!("{} as in the scan's first line", scan.n_fields);
-        return Err(LineError { found: format!("{} fields", row.len()), expected });
+        return Err(LineError { found: counted(row.len(), "field"), expected });
     }
     let measured = DVec3::new(row[0], row[1], row[2]);
     if measured == DVec3::ZERO || !measured.is_finite() {

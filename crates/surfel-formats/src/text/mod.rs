@@ -10,6 +10,7 @@ mod write;
 pub(crate) use write::write;
 
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use crate::error::{Error, Location, Result};
 use crate::file::Input;
@@ -90,9 +91,10 @@ pub(crate) fn read(
         options.filter.as_ref(),
         progress,
     )?;
-    salvage.report("points", n_points, preamble.count, progress)?;
+    salvage.report("point", n_points, preamble.count, progress)?;
     if let Some(count) = preamble.count {
-        let line = format!("a line before the points says {count} points, {n_points} were read");
+        let line =
+            format!("a line before the points says {}, {n_points} read", counted(count, "point"));
         progress.note(&format!("{}: {line}", input.name));
     }
     let mut info = file_info(&preamble);
@@ -148,14 +150,15 @@ fn check_columns(input: &Input, columns: &[Option<ColumnRole>], preamble: &Pream
     if columns.len() != preamble.n_fields {
         return Err(input.malformed(
             location,
-            format!("{} columns", preamble.n_fields),
+            counted(preamble.n_fields, "column"),
             format!("{}", columns.len()),
             "state all columns with --columns, `-` for one to skip",
         ));
     }
     for axis in 0..3 {
         if !columns.contains(&Some(ColumnRole::Position(axis))) {
-            let found = format!("{} columns without {}", columns.len(), ["x", "y", "z"][axis]);
+            let found =
+                format!("{} without {}", counted(columns.len(), "column"), ["x", "y", "z"][axis]);
             let advice = "state the columns with --columns, as in x,y,z,-,r,g,b";
             return Err(input.malformed(location, found, "columns x, y and z", advice));
         }
@@ -230,7 +233,7 @@ fn parse_line(
     let is_longer_by_empty_end = has_empty_end && n_fields == columns.len() + 1;
     if n_fields != columns.len() && !is_longer_by_empty_end {
         let expected = format!("{} as in the lines before", columns.len());
-        return Err(LineError { found: format!("{n_fields} fields"), expected });
+        return Err(LineError { found: counted(n_fields, "field"), expected });
     }
     Ok(())
 }
@@ -291,7 +294,7 @@ fn file_info(preamble: &Preamble) -> FileInfo {
     };
     let names = preamble.names.as_deref().unwrap_or_default();
     FileInfo {
-        format: format!("text, {} columns separated by {separator}", preamble.n_fields),
+        format: format!("text, {} separated by {separator}", counted(preamble.n_fields, "column")),
         n_points: preamble.count,
         columns: names.to_owned(),
         coordinate_system: has_longitudes(names).then(|| WGS84.to_owned()),

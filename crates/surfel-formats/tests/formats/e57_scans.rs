@@ -144,7 +144,7 @@ fn spherical_coordinates_are_converted_and_invalid_points_skipped() {
     let expected = [2.0 * Vec3::X, 3.0 * Vec3::Y, 4.0 * Vec3::Z];
     assert_eq!(cloud.len(), 3);
     assert!(cloud.positions.iter().zip(expected).all(|(a, b)| a.distance(b) < 1e-6));
-    assert!(listener.has_note("1 of 4 points have no valid position; skipped"));
+    assert!(listener.has_note("skipped 1 of 4 points: no valid position"));
 }
 
 #[test]

@@ -188,7 +188,7 @@ fn points_keep_their_colours_and_lines_are_skipped() {
     assert_eq!(part.positions, vec![Vec3::new(1.0, 1.0, 0.0), Vec3::ZERO]);
     assert_eq!(loaded.info.n_points, Some(5));
     assert!(loaded.has_note("lines, which surfel does not draw, are skipped (3 times)"));
-    assert!(loaded.has_note("1 points that are not finite"));
+    assert!(loaded.has_note("skipped 1 point without a finite position"));
     assert_eq!(loaded.graph.nodes[1].primitives.len(), 2);
 }
 
@@ -225,7 +225,7 @@ fn local_mesh_defects_are_repaired_and_reported() {
     let mesh = asset.mesh();
     assert_eq!(mesh.normals, Some(vec![Vec3::Z; 4]));
     assert_eq!((mesh.tangents, mesh.uvs, mesh.colors), (None, [None, None], None));
-    for words in ["1 normals of length zero", "TANGENT", "TEXCOORD_0", "COLOR_0"] {
+    for words in ["1 normal of length zero", "TANGENT", "TEXCOORD_0", "COLOR_0"] {
         assert!(loaded.has_note(words), "{words}");
     }
     asset.buffer[12..16].copy_from_slice(&f32::NAN.to_le_bytes());
@@ -234,6 +234,6 @@ fn local_mesh_defects_are_repaired_and_reported() {
         asset
             .load()
             .unwrap()
-            .has_note("1 triangles with a corner that is not finite or beyond 1e15")
+            .has_note("skipped 1 triangle with a corner that is not finite or beyond 1e15")
     );
 }

@@ -263,7 +263,7 @@ fn sparse_accessors_are_checked() {
     asset.graph();
     for (pointer, value, words) in [
         ("/count", json!(3), "found 0 after 3, expected increasing indices"),
-        ("/count", json!(5), "/accessors/0/sparse/indices: found 5 elements of 1 bytes"),
+        ("/count", json!(5), "/accessors/0/sparse/indices: found 5 elements of 1 byte,"),
         ("/count", json!(u64::MAX), "/accessors/0/sparse/indices"),
         ("/indices/componentType", json!(5120), "expected 5121, 5123 or 5125"),
         ("/indices/componentType", json!(5123), "found 0 after 769, expected increasing indices"),

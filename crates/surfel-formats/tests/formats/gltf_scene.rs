@@ -266,7 +266,7 @@ fn points_deform_like_meshes() {
     let [Geometry::Points(points)] = &loaded.graph.geometries[..] else { panic!() };
     assert_eq!(points.positions, [Vec3::Y]);
     assert_eq!(points.morphs[1].positions, [Vec3::splat(2.0)]);
-    assert!(loaded.has_note("1 points that are not finite"));
+    assert!(loaded.has_note("skipped 1 point without a finite position"));
 }
 
 #[test]

@@ -34,7 +34,7 @@ fn scans_are_moved_to_world_coordinates() {
     assert_eq!(world, expected.map(|p| DVec3::from_array(p) + offset));
     assert_eq!(cloud.intensity, Some(vec![0.25, 0.75, 1.0]));
     assert_eq!(cloud.colors.unwrap()[0], [65535, 0, 128 * 257]);
-    assert!(listener.has_note("1 of 4 cells of the scanner's grid are empty; skipped"));
+    assert!(listener.has_note("skipped 1 of 4 cells of the scanner's grid: empty"));
     assert_eq!(loaded.info.format, "PTX, 2 scans");
     assert_eq!(loaded.info.n_points, Some(3));
 }

@@ -17,6 +17,7 @@ use surfel_core::progress::Progress;
 use surfel_core::scene::color::{ColorSource, choose_source, colorize};
 use surfel_core::scene::{CloudGeometry, Geometry, Graph, Material, Transform};
 use surfel_core::surface::SurfaceKind;
+use surfel_core::words::counted;
 use surfel_formats::{ColumnChoice, FileInfo, Loaded};
 
 /// The columns that the surface gaussian needs, in words.
@@ -166,7 +167,7 @@ pub fn filtered_copy(
         let n_points = kept.len();
         let matches = matches(cloud, key, &filter)?;
         kept.retain(|i| matches[*i as usize]);
-        progress.note(&format!("{} of {n_points} points meet {filter}", kept.len()));
+        progress.note(&format!("{} of {} meet {filter}", kept.len(), counted(n_points, "point")));
         check_any_left(kept.len(), n_points, key, &filter)?;
     }
     Ok(cloud.subset(&kept))
@@ -180,7 +181,9 @@ fn check_any_left(
     filter: &PointFilter,
 ) -> Result<(), Invalid> {
     match n_left {
-        0 => Err(Invalid::at(key, format!("none of {n_points} points meets {filter}"))),
+        0 => {
+            Err(Invalid::at(key, format!("none of {} meets {filter}", counted(n_points, "point"))))
+        }
         _ => Ok(()),
     }
 }
@@ -198,7 +201,7 @@ pub(crate) fn keep_matching(
 ) -> Result<(), Invalid> {
     let n_points = cloud.len();
     cloud.retain_from(0, &matches(cloud, key, filter)?);
-    progress.note(&format!("{} of {n_points} points meet {filter}", cloud.len()));
+    progress.note(&format!("{} of {} meet {filter}", cloud.len(), counted(n_points, "point")));
     Ok(())
 }
 

@@ -11,6 +11,7 @@ use surfel_core::math::LANES;
 use surfel_core::points::{GAUSSIAN_COLUMNS, MAX_REST_COLUMNS, PointCloud, Subsample};
 use surfel_core::scene::{Geometry, Graph};
 use surfel_core::surface::SurfaceKind;
+use surfel_core::words::counted;
 use surfel_formats::FileInfo;
 
 /// Counts from which the memory of a picture follows, known before it is rendered.
@@ -139,9 +140,9 @@ impl MemoryEstimate {
         if all <= limit {
             return Ok(());
         }
-        let things = [(self.n_points, "points"), (self.n_triangles, "triangles")];
+        let things = [(self.n_points, "point"), (self.n_triangles, "triangle")];
         let there = things.iter().filter(|(count, _)| 0 < *count);
-        let things: Vec<String> = there.map(|(count, name)| format!("{count} {name}")).collect();
+        let things: Vec<String> = there.map(|(count, name)| counted(*count, name)).collect();
         Err(Error::OutOfMemory(format!(
             "{} need about {} of memory ({} as read, {} tree, {} picture), and \
              --memory-limit is {}; {}raise the limit; {}",

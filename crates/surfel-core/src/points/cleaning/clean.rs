@@ -131,7 +131,7 @@ fn find_dropped(
             Duplicates::Drop => dropped.extend(found),
             Duplicates::Keep if found.is_empty() => {}
             Duplicates::Keep => {
-                let line = format!("{} points kept: exact duplicates", found.len());
+                let line = format!("{} kept: exact duplicates", counted(found.len(), "point"));
                 progress.choice(&line, &["duplicates"]);
             }
         }

@@ -5,6 +5,7 @@ use crate::points::PointCloud;
 use crate::points::neighbors::{KdTree, Neighbor, Neighborhood};
 use crate::points::radii::radius::kth_distance;
 use crate::progress::Progress;
+use crate::words::counted;
 use std::str::FromStr;
 
 /// The points of a cloud that count as outliers.
@@ -83,7 +84,7 @@ pub fn remove_outliers(
     let is_kept = |point: &u32| f64::from(values[*point as usize]) <= limit;
     let kept: Vec<u32> = (0..cloud.len() as u32).filter(is_kept).collect();
     let n_outliers = cloud.len() - kept.len();
-    progress.note(&format!("{removal} removed {n_outliers} of {} points", cloud.len()));
+    progress.note(&format!("{removal} removed {n_outliers} of {}", counted(cloud.len(), "point")));
     Ok(cloud.subset(&kept))
 }
 

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::math::{Random, Vec3, hash};
 use crate::points::PointCloud;
 use crate::progress::Progress;
+use crate::words::counted;
 use std::collections::HashMap;
 use std::str::FromStr;
 
@@ -39,7 +40,7 @@ pub fn subsample(
         Subsample::Random(count) => random_indices(n_points, count, seed),
         Subsample::Spacing(distance) => indices_by_spacing(&cloud.positions, distance, progress)?,
     };
-    progress.note(&format!("{subsample} kept {} of {n_points} points", indices.len()));
+    progress.note(&format!("{subsample} kept {} of {}", indices.len(), counted(n_points, "point")));
     Ok(cloud.subset(&indices))
 }
 

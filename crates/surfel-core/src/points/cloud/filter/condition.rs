@@ -1,6 +1,7 @@
 //! Conditions as trees.
 
 use super::polygon::Polygon;
+use crate::words::counted;
 use std::fmt;
 
 /// A condition on a point.
@@ -102,7 +103,9 @@ impl fmt::Display for Condition {
             Self::Within(polygons) if polygons.len() == 1 => {
                 f.write_str("(x, y) inside of a polygon")
             }
-            Self::Within(polygons) => write!(f, "(x, y) inside of {} polygons", polygons.len()),
+            Self::Within(polygons) => {
+                write!(f, "(x, y) inside of {}", counted(polygons.len(), "polygon"))
+            }
             Self::Compare(left, relation, right) => {
                 let sign = RELATIONS.iter().find(|(_, known)| known == relation);
                 write!(f, "{left} {} {right}", sign.map_or("", |(sign, _)| sign))

@@ -1,6 +1,7 @@
 //! Areas of the XY plane bounded by polygons.
 
 use crate::error::{Error, Result};
+use crate::words::counted;
 
 /// Maximum number of strips into which a polygon is cut.
 const MAX_STRIPS: usize = 4096;
@@ -68,7 +69,7 @@ impl Polygon {
             let is_closed = ring.first() == ring.last();
             let n_corners = ring.len() - usize::from(is_closed && !ring.is_empty());
             if n_corners < 3 {
-                return Err(fail(format!("a ring of {n_corners} corners")));
+                return Err(fail(format!("a ring of {}", counted(n_corners, "corner"))));
             }
             let next = ring.iter().cycle().skip(1);
             sides.extend(ring.iter().zip(next).filter_map(|(a, b)| Side::new(*a, *b)));
