@@ -34,13 +34,13 @@ pub fn write(folder: &Path, progress: &dyn Progress) -> anyhow::Result<()> {
 /// Returns points of the unit sphere, on a spiral that keeps them evenly apart (Swinbank and Purser 2006).
 fn ball(n: usize) -> PointCloud {
     let golden = PI * (3.0 - 5f64.sqrt());
-    let place = |i: usize| {
+    let position = |i: usize| {
         let z = 1.0 - (2 * i + 1) as f64 / n as f64;
         let (sin, cos) = (golden * i as f64).sin_cos();
         let level = (1.0 - z * z).sqrt();
         DVec3::new(level * cos, level * sin, z).as_vec3()
     };
-    let positions: Vec<Vec3> = (0..n).map(place).collect();
+    let positions: Vec<Vec3> = (0..n).map(position).collect();
     PointCloud { normals: Some(positions.clone()), ..PointCloud::from_positions(positions) }
 }
 
@@ -63,9 +63,9 @@ fn knot() -> String {
         for j in 0..N_AROUND {
             let (sin, cos) = (TAU * j as f64 / N_AROUND as f64).sin_cos();
             let normal = cos * outward + sin * across;
-            let place = spine(t) + THICKNESS * normal;
+            let position = spine(t) + THICKNESS * normal;
             // Writing to a text cannot fail.
-            let _ = writeln!(text, "v {:.6} {:.6} {:.6}", place.x, place.y, place.z);
+            let _ = writeln!(text, "v {:.6} {:.6} {:.6}", position.x, position.y, position.z);
             let _ = writeln!(text, "vn {:.5} {:.5} {:.5}", normal.x, normal.y, normal.z);
         }
     }
@@ -81,8 +81,8 @@ fn knot() -> String {
 }
 
 fn scene() -> String {
-    let world = |place: DVec3| {
-        let [x, y, z] = (UTM_ORIGIN + place).to_array();
+    let world = |position: DVec3| {
+        let [x, y, z] = (UTM_ORIGIN + position).to_array();
         format!("[{x:.3}, {y:.3}, {z:.3}]")
     };
     let (eye, target) = (world(EYE), world(TARGET));

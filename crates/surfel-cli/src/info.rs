@@ -261,8 +261,8 @@ fn table(info: &Value) -> String {
         "coordinates",
         info["coordinate_system"].as_str().map_or_else(|| text(&Value::Null), short_name),
     );
-    for (place, image) in info["images"].as_array().into_iter().flatten().enumerate() {
-        row(if place == 0 { "images" } else { "" }, image_text(image));
+    for (i, image) in info["images"].as_array().into_iter().flatten().enumerate() {
+        row(if i == 0 { "images" } else { "" }, image_text(image));
     }
     if is_summary {
         // The names in files of text are not read before their points.
@@ -271,22 +271,22 @@ fn table(info: &Value) -> String {
         return lines.join("\n");
     }
     row("up", text(&info["up"]["reason"]));
-    for (place, station) in info["stations"].as_array().into_iter().flatten().enumerate() {
-        let title = if place == 0 { "stations" } else { "" };
+    for (i, station) in info["stations"].as_array().into_iter().flatten().enumerate() {
+        let title = if i == 0 { "stations" } else { "" };
         let name = text(&station["name"]);
         let points = counted(station["points"].as_u64().unwrap_or(0), "point");
         row(title, format!("{name:<24}{points}, scanner at {}", text(&station["position"])));
     }
     let n_points = info["points"].as_f64().unwrap_or(1.0);
     for key in ["classes", "returns", "flags"] {
-        for (place, (name, count)) in info[key].as_object().into_iter().flatten().enumerate() {
+        for (i, (name, count)) in info[key].as_object().into_iter().flatten().enumerate() {
             let percent = 100.0 * count.as_f64().unwrap_or(0.0) / n_points;
-            let title = if place == 0 { key } else { "" };
+            let title = if i == 0 { key } else { "" };
             row(title, format!("{name:<24}{:<12}{percent:.1} %", text(count)));
         }
     }
-    for (place, (name, range)) in info["columns"].as_object().into_iter().flatten().enumerate() {
-        let title = if place == 0 { "columns" } else { "" };
+    for (i, (name, range)) in info["columns"].as_object().into_iter().flatten().enumerate() {
+        let title = if i == 0 { "columns" } else { "" };
         row(title, format!("{name:<24}{}", range_text(range)));
     }
     lines.join("\n")

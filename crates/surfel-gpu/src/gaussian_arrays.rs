@@ -8,7 +8,7 @@ use surfel_core::math::LANES;
 
 /// The place of a cloud's Gaussians in the arrays of all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct GaussianPlace {
+pub struct GaussianRange {
     /// Index of the geometry.
     pub geometry_idx: usize,
     /// Index of the root of the cloud's tree.
@@ -39,17 +39,17 @@ pub fn gaussian_clouds(
     clouds.filter(|(_, gaussians)| !gaussians.nodes().is_empty())
 }
 
-/// Returns the places of all Gaussians, in the order of the geometries.
-pub fn gaussian_places(geometries: &[Arc<FlatGeometry>]) -> Vec<GaussianPlace> {
+/// Returns the ranges of all Gaussians, in the order of the geometries.
+pub fn gaussian_ranges(geometries: &[Arc<FlatGeometry>]) -> Vec<GaussianRange> {
     let (mut root_node, mut first_vector) = (0, 0);
-    let place = |(geometry_idx, gaussians): (usize, &FlatGaussians)| {
+    let range = |(geometry_idx, gaussians): (usize, &FlatGaussians)| {
         let block_vectors = block_vectors(gaussians);
-        let place = GaussianPlace { geometry_idx, root_node, first_vector, block_vectors };
+        let range = GaussianRange { geometry_idx, root_node, first_vector, block_vectors };
         root_node += gaussians.nodes().len() as u32;
         first_vector += gaussians.blocks().len() as u32 * block_vectors;
-        place
+        range
     };
-    gaussian_clouds(geometries).map(place).collect()
+    gaussian_clouds(geometries).map(range).collect()
 }
 
 /// Returns the vectors of four words that a block takes with the coefficients of its colours.

@@ -97,7 +97,7 @@ struct Part<'a> {
 /// Whether a sample was submitted whole.
 #[derive(PartialEq)]
 enum Outcome {
-    /// It was.
+    /// The sample was submitted whole.
     Done,
     /// A queue was too short.
     Overflow,

@@ -1,6 +1,6 @@
 //! The trees of a scene with the records of their instances.
 
-use crate::gaussian_arrays::gaussian_places;
+use crate::gaussian_arrays::gaussian_ranges;
 use crate::mesh_blocks::{attributes, block_vectors};
 use crate::numbers::{NODE_VECTORS, TRIANGLE, align_number, attribute, surface_number};
 use crate::records::Visit;
@@ -87,19 +87,19 @@ impl TreeVisits {
 
     /// Adds the instances of trained Gaussians, which have one tree.
     fn add_gaussians(&mut self, scene: &FlatScene) {
-        let places = gaussian_places(&scene.geometries);
+        let ranges = gaussian_ranges(&scene.geometries);
         let first = self.visits.len() as u32;
         for (instance_idx, instance) in scene.instances.iter().enumerate() {
             let geometry_idx = instance.geometry_idx as usize;
-            let place = places.iter().find(|place| place.geometry_idx == geometry_idx);
-            let (Some(place), FlatGeometry::Cloud(cloud)) = (place, scene.geometry(instance))
+            let range = ranges.iter().find(|range| range.geometry_idx == geometry_idx);
+            let (Some(range), FlatGeometry::Cloud(cloud)) = (range, scene.geometry(instance))
             else {
                 continue;
             };
             self.visits.push(Visit {
-                root_node: place.root_node,
-                first_vector: place.first_vector,
-                block_vectors: place.block_vectors,
+                root_node: range.root_node,
+                first_vector: range.first_vector,
+                block_vectors: range.block_vectors,
                 n_harmonics: cloud.gaussians.n_harmonics() as u32,
                 ..visit(placement(instance_idx as u32, instance), cloud, cloud.surface)
             });

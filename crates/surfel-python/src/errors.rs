@@ -49,8 +49,8 @@ pub fn invalid_array(py: Python<'_>, message: &str) -> PyErr {
 
 /// Makes an exception of a class of the module `surfel`.
 pub fn exception(py: Python<'_>, class: &str, message: &str) -> PyErr {
-    let made = || py.import("surfel._errors")?.getattr(class)?.call1((message,));
-    made().map_or_else(|error| error, PyErr::from_value)
+    let build = || py.import("surfel._errors")?.getattr(class)?.call1((message,));
+    build().map_or_else(|error| error, PyErr::from_value)
 }
 
 /// The exception for work that panicked, which is a fault of surfel.

@@ -46,7 +46,7 @@ function watch(page) {
   });
 }
 
-/** What is seen of the notebook: the state of the kernel, the prompts of the cells and their outputs. */
+/** The visible part of the notebook: the state of the kernel, the prompts of the cells and their outputs. */
 const describe = (page) => page.evaluate(() => {
   const { session } = window.jupyterapp?.shell.currentWidget?.sessionContext ?? {};
   const texts = (selector) => [...document.querySelectorAll(selector)].map((it) => it.textContent.trim());

@@ -1,4 +1,4 @@
-"""What workers keep: the last used scenes that fit into memory."""
+"""The cache of workers: the last used scenes that fit into memory."""
 
 import threading
 import time

@@ -23,7 +23,7 @@ pub struct Deviation {
     /// The root mean square of the difference in distance along the ray where both are seen, in mean point spacings,
     /// without pixels that are far off.
     pub depth_rms: f64,
-    /// Pixels whose distances differ by more than [`FAR_OFF`] spacings, as a fraction of those that show both.
+    /// Pixels whose distances differ by more than [`MAX_DEPTH_SPACINGS`] spacings, as a fraction of those that show both.
     pub far_off: f64,
     /// The mean angle between the normals where both are seen, in degrees.
     pub normal_deg: f64,
@@ -32,7 +32,7 @@ pub struct Deviation {
 }
 
 /// Mean point spacings beyond which a pixel shows another part of the surface.
-pub const FAR_OFF: f64 = 5.0;
+pub const MAX_DEPTH_SPACINGS: f64 = 5.0;
 
 impl TrueViews {
     /// Traces four views of a mesh, each `resolution` pixels wide and high.
@@ -70,7 +70,7 @@ impl TrueViews {
             }
         }
         let fraction = |count: usize, total: usize| count as f64 / total as f64;
-        let is_near = |depth: &f64| depth.abs() <= FAR_OFF;
+        let is_near = |depth: &f64| depth.abs() <= MAX_DEPTH_SPACINGS;
         let near = || errors.iter().map(|(depth, _)| *depth).filter(is_near);
         let n_near = near().count();
         let squares: f64 = near().map(|depth| depth * depth).sum();

@@ -66,7 +66,7 @@ test('the saved picture is the one on the screen', async () => {
 test('drafts have the caption in the size and place of the finished picture', async () => {
   await show(page, { caption: 'The town', background: '#000000', camera: { ...PLAN, orthographic: 4000 } });
   await page.evaluate(() => {
-    /** Which pixels of a row through the caption are bright; it lies over a black background. */
+    /** True for the bright pixels of a row through the caption; it lies over a black background. */
     window.readCaption = () => {
       const { width, height } = document.getElementById('picture');
       const pixels = window.readPixels();

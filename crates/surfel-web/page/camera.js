@@ -258,9 +258,9 @@ export function cornersOf({ min, max }) {
 
 /** A camera of a scene file with the picture's up and the projection of the `current` one where it has none. */
 export function completed(camera, current) {
-  const { view_angle, orthographic, panorama, ...place } = current;
+  const { view_angle, orthographic, panorama, ...pose } = current;
   const hasProjection = camera.view_angle || camera.orthographic || camera.panorama;
-  return { ...(hasProjection ? place : current), ...camera };
+  return { ...(hasProjection ? pose : current), ...camera };
 }
 
 /** Interpolates between two cameras of one projection; `t` is from 0 to 1. */

@@ -3,7 +3,7 @@
 import { isMeasurement } from './measure.js';
 import { createPatch } from './merge-patch.js';
 
-/** What an address without a link stands for. */
+/** The content of an address without a link. */
 export const NO_LINK = { patch: {}, measurements: [] };
 const PREFIX = '#view=';
 /** Keys of the window and the files, which are not part of a view. */

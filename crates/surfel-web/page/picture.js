@@ -61,7 +61,7 @@ export class Picture {
    * Draws an image at its place in a picture of the size of `whole`, which covers the full height, as the vertical angle
    * of view does; other aspect ratios are centred.
    */
-  #draw(image, place, whole) {
+  #draw(image, rect, whole) {
     const { width, height } = this.canvas;
     const scale = height / whole.height;
     const hasAspect = Math.abs(whole.width / whole.height - width / height) < 0.01;
@@ -69,7 +69,7 @@ export class Picture {
     const left = (width - scaleX * whole.width) / 2;
     // Smoothing of high quality takes longer than all else that the page does for a draft.
     this.#context.imageSmoothingQuality = this.viewer.isMoving ? 'low' : 'high';
-    this.#context.drawImage(image, left + scaleX * place.x, scale * place.y, scaleX * place.width, scale * place.height);
+    this.#context.drawImage(image, left + scaleX * rect.x, scale * rect.y, scaleX * rect.width, scale * rect.height);
   }
 }
 

@@ -30,10 +30,10 @@ export function sunClock(viewer) {
 
   const row = (label, ...fields) => element('div', { class: 'row' },
     element('label', { for: fields[0].id }, label), element('div', { class: 'field slider' }, ...fields));
-  const made = element('details', { class: 'inner', 'data-section': 'sun position by date' },
+  const part = element('details', { class: 'inner', 'data-section': 'sun position by date' },
     element('summary', {}, icon('chevron'), 'Sun position by date'),
     row('Date', day), row('Hour', hour, clock), row('Latitude', latitude),
     element('p', { class: 'note' }, 'Solar time: the sun is highest about noon.'));
-  viewer.sceneChanged.listen(() => { made.hidden = !viewer.scene.light?.includes('sun'); });
-  return made;
+  viewer.sceneChanged.listen(() => { part.hidden = !viewer.scene.light?.includes('sun'); });
+  return part;
 }

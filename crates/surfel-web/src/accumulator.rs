@@ -127,12 +127,12 @@ impl Accumulator {
             None => traced,
         };
         let (width, height) = (image.width, image.height);
-        let mut files = vec![place(jpeg(&image, DRAFT_JPEG_QUALITY), (0, 0), view.size)];
+        let mut files = vec![placed_file(jpeg(&image, DRAFT_JPEG_QUALITY), (0, 0), view.size)];
         if let Some(overlay) = &prepared.overlay {
             let patches = overlay.patches(&image, view.size, &camera, view.is_moving);
             files.extend(patches.iter().map(|PicturePart { x, y, image }| {
                 let file = jpeg(image, REFINED_JPEG_QUALITY);
-                place(file, (*x, *y), (image.width, image.height))
+                placed_file(file, (*x, *y), (image.width, image.height))
             }));
         }
         self.keyframe_secs = start.elapsed().as_secs_f64();
@@ -284,7 +284,7 @@ impl Accumulator {
             height: height as u16,
             samples: self.n_samples,
             of_samples,
-            files: vec![place(file, (0, 0), view.size)],
+            files: vec![placed_file(file, (0, 0), view.size)],
             trace_secs: work.trace_secs,
             encode_secs: start.elapsed().as_secs_f64(),
             mrays_per_s: work.mrays_per_s(),
@@ -318,7 +318,7 @@ impl Accumulator {
         let secs_per_row = self.keyframe_secs_per_row.max(0.5 * self.timing.secs_per_row());
         let n_rows = ((SLICE_SECS / secs_per_row.max(1e-6)) as u32).max(1);
         let rows = (first, size.1.min(first.saturating_add(n_rows)));
-        let settings = place_settings(prepared.render_settings, size);
+        let settings = position_settings(prepared.render_settings, size);
         let region = RenderRegion { rows, columns: (0, size.0), samples: (0, 1) };
         let deadline = Deadline::new(progress, rows.1 - rows.0 == 1);
         let Some(scene) = self.scene(prepared.clone(), view) else { return Ok(false) };
@@ -446,8 +446,8 @@ impl Accumulator {
     }
 }
 
-/// Returns settings of a picture of this size that shows the place of each pixel, for as few rays as there can be.
-fn place_settings(full: Settings, (width, height): (u32, u32)) -> Settings {
+/// Returns settings of a picture of this size that shows the position of each pixel, for as few rays as there can be.
+fn position_settings(full: Settings, (width, height): (u32, u32)) -> Settings {
     Settings {
         width,
         height,
@@ -468,7 +468,7 @@ fn pixels_of(image: &Image) -> Pixels<'_> {
     Pixels { width, height, sum: &image.color, weight: 1.0 }
 }
 
-fn place(file: Vec<u8>, (x, y): (u32, u32), (width, height): (u32, u32)) -> PlacedFile {
+fn placed_file(file: Vec<u8>, (x, y): (u32, u32), (width, height): (u32, u32)) -> PlacedFile {
     let [x, y, width, height] = [x, y, width, height].map(|length| length as u16);
     PlacedFile { x, y, width, height, file }
 }

@@ -91,9 +91,9 @@ impl ConnectionEntry {
         if self.table.max_authorized <= state.authorized.len() {
             return false;
         }
-        let place = state.pending.iter().position(|pending| pending.id == self.id);
-        let Some(place) = place else { return false };
-        state.pending.remove(place);
+        let index = state.pending.iter().position(|pending| pending.id == self.id);
+        let Some(index) = index else { return false };
+        state.pending.remove(index);
         state.authorized.insert(self.id)
     }
 

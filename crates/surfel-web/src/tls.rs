@@ -60,8 +60,8 @@ mod tests {
     use super::*;
 
     fn identity() -> (Vec<u8>, Vec<u8>) {
-        let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
-        (made.cert.pem().into(), made.signing_key.serialize_pem().into())
+        let generated = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
+        (generated.cert.pem().into(), generated.signing_key.serialize_pem().into())
     }
 
     #[test]

@@ -48,9 +48,9 @@ impl<T> Lru2<T> {
         }
         // Before the new one takes as much memory.
         self.drop_oldest();
-        let made = Arc::new(make()?);
-        self.entries().push_back((key, made.clone()));
-        Ok(made)
+        let value = Arc::new(make()?);
+        self.entries().push_back((key, value.clone()));
+        Ok(value)
     }
 
     /// Forgets all results but one that is being made.
@@ -128,16 +128,16 @@ mod tests {
 
     #[test]
     fn the_last_two_results_are_kept() {
-        let (cache, mut n_made) = (Lru2::default(), 0);
+        let (cache, mut n_computed) = (Lru2::default(), 0);
         for key in [1, 2, 1, 2, 3, 2, 1] {
-            let made = cache.get_or_make(key, &NoProgress, || {
-                n_made += 1;
+            let value = cache.get_or_make(key, &NoProgress, || {
+                n_computed += 1;
                 Ok(key)
             });
-            assert_eq!(*made.unwrap(), key);
+            assert_eq!(*value.unwrap(), key);
         }
         assert_eq!([1, 2, 3].map(|key| cache.contains(key)), [true, true, false]);
-        assert_eq!(n_made, 4);
+        assert_eq!(n_computed, 4);
         cache.clear();
         assert!(!cache.contains(1) && !cache.contains(2));
     }
@@ -146,32 +146,32 @@ mod tests {
     fn known_results_are_returned_while_another_is_made() {
         let cache = Lru2::<i32>::default();
         cache.get_or_make(1, &NoProgress, || Ok(10)).unwrap();
-        let made = cache.get_or_make(2, &NoProgress, || {
+        let value = cache.get_or_make(2, &NoProgress, || {
             assert!(cache.contains(1) && !cache.contains(2));
             // A cancelled caller does not wait.
             assert!(cache.get_or_make(3, &Cancelled, || Ok(30)).is_err());
             Ok(2 * *cache.get_or_make(1, &Cancelled, || Ok(11))?)
         });
-        assert_eq!(*made.unwrap(), 20);
+        assert_eq!(*value.unwrap(), 20);
         assert!(cache.contains(1) && cache.contains(2));
     }
 
     #[test]
     fn two_callers_of_one_key_make_it_once() {
         let cache = Lru2::default();
-        let (n_made, start) = (AtomicUsize::new(0), Barrier::new(2));
+        let (n_computed, start) = (AtomicUsize::new(0), Barrier::new(2));
         let call = || {
             start.wait();
-            let made = cache.get_or_make(1, &NoProgress, || {
+            let value = cache.get_or_make(1, &NoProgress, || {
                 std::thread::sleep(Duration::from_millis(20));
-                Ok(n_made.fetch_add(1, Ordering::Relaxed))
+                Ok(n_computed.fetch_add(1, Ordering::Relaxed))
             });
-            *made.unwrap()
+            *value.unwrap()
         };
         std::thread::scope(|scope| {
             let calls = [scope.spawn(call), scope.spawn(call)];
             assert_eq!(calls.map(|call| call.join().unwrap()), [0, 0]);
         });
-        assert_eq!(n_made.into_inner(), 1);
+        assert_eq!(n_computed.into_inner(), 1);
     }
 }

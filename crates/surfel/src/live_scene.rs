@@ -40,9 +40,9 @@ pub struct LiveScene {
     extended: Lru2<LoadedScene>,
     /// The content without the points that a description drops.
     filtered: Lru2<LoadedScene>,
-    made: Made,
+    cache: BuildCache,
     /// Apart, so that previews leave what was made of all points.
-    made_for_previews: Made,
+    preview_cache: BuildCache,
     renderer: SceneRenderer,
     /// Walls that the first camera hides; they stay hidden while it moves, so that no tree is built again.
     hidden_walls: OnceLock<Vec<ClipPlane>>,
@@ -65,7 +65,7 @@ pub enum UseCase {
 
 /// Results for the last descriptions.
 #[derive(Debug, Default)]
-struct Made {
+struct BuildCache {
     prepared: Lru2<Vec<PreparedCloud>>,
     /// The clouds of added objects, apart, so that all others need not be prepared again beside them.
     prepared_added: Lru2<Vec<PreparedCloud>>,
@@ -74,7 +74,7 @@ struct Made {
     known_trees: KnownTrees,
 }
 
-impl Made {
+impl BuildCache {
     fn clear(&self) {
         self.prepared.clear();
         self.prepared_added.clear();
@@ -103,8 +103,8 @@ impl LiveScene {
             regrouped: Lru2::default(),
             extended: Lru2::default(),
             filtered: Lru2::default(),
-            made: Made::default(),
-            made_for_previews: Made::default(),
+            cache: BuildCache::default(),
+            preview_cache: BuildCache::default(),
             renderer: SceneRenderer::new(&description.run)?,
             hidden_walls: OnceLock::new(),
             preparation_threads: start_threads(&description.run, |_| ())?,
@@ -123,8 +123,8 @@ impl LiveScene {
         self.regrouped.clear();
         self.extended.clear();
         self.filtered.clear();
-        self.made.clear();
-        self.made_for_previews.clear();
+        self.cache.clear();
+        self.preview_cache.clear();
     }
 
     /// Returns the description of the start, in which files with settings of their own are objects.
@@ -216,8 +216,8 @@ impl LiveScene {
         let has_added = first < description.objects.len();
         let base = preparation_key(&without_added(description, first));
         let is_added_prepared =
-            !has_added || self.made.prepared_added.contains(preparation_key(description));
-        is_added_prepared && self.made.prepared.contains(base)
+            !has_added || self.cache.prepared_added.contains(preparation_key(description));
+        is_added_prepared && self.cache.prepared.contains(base)
     }
 
     /// Returns the scene under a description at the description's time.
@@ -230,7 +230,7 @@ impl LiveScene {
         description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<LiveView> {
-        self.view_of(&self.made, description, progress)
+        self.view_of(&self.cache, description, progress)
     }
 
     /// Returns the scene under a description that keeps few points, to be shown for a moment.
@@ -243,12 +243,12 @@ impl LiveScene {
         description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<LiveView> {
-        self.view_of(&self.made_for_previews, description, progress)
+        self.view_of(&self.preview_cache, description, progress)
     }
 
     fn view_of(
         &self,
-        made: &Made,
+        cache: &BuildCache,
         description: &SceneDescription,
         progress: &dyn Progress,
     ) -> Result<LiveView> {
@@ -265,11 +265,11 @@ impl LiveScene {
         let exposure = description.light.exposure();
         // An automatic exposure is chosen at second 0, as for a movie. Otherwise the first file of a sequence is not read.
         let metered_at = if exposure == Exposure::Auto { 0.0 } else { time_secs };
-        let (_, metered) = self.flat_at(made, &kept, metered_at, description, &auto, progress)?;
+        let (_, metered) = self.flat_at(cache, &kept, metered_at, description, &auto, progress)?;
         let meter = || exposure_stops(exposure, &self.renderer, &metered, &settings, progress);
         let stops = self.preparation_threads.install(meter)?;
         let (trees, mut flat) =
-            self.flat_at(made, &kept, time_secs, description, &auto, progress)?;
+            self.flat_at(cache, &kept, time_secs, description, &auto, progress)?;
         expose(&mut flat, stops);
         complete.light.exposure = Some(Exposure::Stops(stops.into()));
         let moves_camera = auto.moves_camera(&kept);
@@ -330,14 +330,14 @@ impl LiveScene {
 
     fn flat_at(
         &self,
-        made: &Made,
+        cache: &BuildCache,
         loaded: &LoadedScene,
         time_secs: f64,
         description: &SceneDescription,
         auto: &AutoSettings,
         progress: &dyn Progress,
     ) -> Result<(Arc<SceneTrees>, FlatScene)> {
-        let trees = self.trees_at(made, loaded, time_secs, description, auto, progress)?;
+        let trees = self.trees_at(cache, loaded, time_secs, description, auto, progress)?;
         let mut flat = trees.flat.clone();
         flat.lights.clone_from(&auto.lights);
         flat.background = description.picture.background();
@@ -358,7 +358,7 @@ impl LiveScene {
     /// Everything but lights and camera, which change without any tree.
     fn trees_at(
         &self,
-        made: &Made,
+        cache: &BuildCache,
         loaded: &LoadedScene,
         time_secs: f64,
         description: &SceneDescription,
@@ -368,11 +368,11 @@ impl LiveScene {
         let preparation = preparation_key(description);
         let frames = loaded.sequence_frames_at(time_secs);
         let trees = tree_key(description, preparation, auto, &frames);
-        made.trees.get_or_make(trees, progress, || {
-            let clouds = self.prepared(made, loaded, description, progress)?;
+        cache.trees.get_or_make(trees, progress, || {
+            let clouds = self.prepared(cache, loaded, description, progress)?;
             let source =
                 TreeSource { loaded, time_secs, description, auto, use_case: self.use_case };
-            let build = || source.build(clouds, &made.known_trees, progress);
+            let build = || source.build(clouds, &cache.known_trees, progress);
             self.preparation_threads.install(build)
         })
     }
@@ -380,7 +380,7 @@ impl LiveScene {
     /// The prepared clouds of all files and objects.
     fn prepared(
         &self,
-        made: &Made,
+        cache: &BuildCache,
         loaded: &LoadedScene,
         description: &SceneDescription,
         progress: &dyn Progress,
@@ -393,10 +393,10 @@ impl LiveScene {
             self.preparation_threads.install(|| loaded.prepared(description, is_meant, progress))
         };
         let base = preparation_key(&without_added(description, first));
-        let mut clouds = made.prepared.get_or_make(base, progress, || prepare(false))?.to_vec();
+        let mut clouds = cache.prepared.get_or_make(base, progress, || prepare(false))?.to_vec();
         if first < n_objects {
             let key = preparation_key(description);
-            let added = made.prepared_added.get_or_make(key, progress, || prepare(true))?;
+            let added = cache.prepared_added.get_or_make(key, progress, || prepare(true))?;
             clouds.extend_from_slice(&added);
         }
         Ok(clouds)

@@ -79,8 +79,8 @@ impl LiveView {
     fn georeference(&self) -> Option<Georeference> {
         let system = coordinate_system(&self.loaded, &self.description);
         let size = (self.settings.width, self.settings.height);
-        let place = georeference(&self.flat.camera, size, system.as_ref());
-        place.filter(|_| self.description.plan.is_to_scale())
+        let georeference = georeference(&self.flat.camera, size, system.as_ref());
+        georeference.filter(|_| self.description.plan.is_to_scale())
     }
 
     /// Returns for each instance the number of what it shows: 0 is all files without an object, if there are any; the

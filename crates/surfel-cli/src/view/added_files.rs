@@ -195,7 +195,7 @@ pub fn words(description: &SceneDescription) -> Vec<String> {
 }
 
 /// Returns the text of a scene file in which added files lie in the folder of the file.
-pub fn beside(text: &str) -> String {
+pub fn with_relative_paths(text: &str) -> String {
     without_ids(&text.replace(&absolute_text(Path::new(FOLDER)), FOLDER))
 }
 

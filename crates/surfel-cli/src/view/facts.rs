@@ -71,6 +71,6 @@ pub fn has_returns(scene: &LoadedScene) -> bool {
         "return_number <= number_of_returns".parse().expect("the condition is valid");
     let mut clouds = scene.clouds().map(|(_, cloud)| cloud).peekable();
     // Fails for missing columns, also without points.
-    let tells_returns = |cloud: &PointCloud| filter.matches(cloud, cloud.len()).is_ok();
-    clouds.peek().is_some() && clouds.all(tells_returns)
+    let has_returns = |cloud: &PointCloud| filter.matches(cloud, cloud.len()).is_ok();
+    clouds.peek().is_some() && clouds.all(has_returns)
 }

@@ -239,7 +239,7 @@ fn complete_settings(
 fn toml_of(description: &SceneDescription) -> Result<String> {
     let text = toml::to_string_pretty(description);
     let text = text.map_err(|error| Error::invalid_request(error.to_string()))?;
-    Ok(added_files::beside(&text))
+    Ok(added_files::with_relative_paths(&text))
 }
 
 /// The files of the command line and of objects.
@@ -431,7 +431,7 @@ impl SceneProvider for FileSceneProvider {
             command: command_line(&words),
             toml: toml_of(&complete)?,
             film: film.transpose()?,
-            json: added_files::beside(&format!("{:#}", with_info(&complete, &kept))),
+            json: added_files::with_relative_paths(&format!("{:#}", with_info(&complete, &kept))),
         })
     }
 

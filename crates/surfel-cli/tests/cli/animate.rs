@@ -344,10 +344,10 @@ fn a_sequence_of_clouds_is_streamed() {
     assert_eq!(frames.len(), n_files);
     // Each frame, and each picture at a time, equals a picture of its file alone.
     for (number, time) in [(0, "0"), (7, "1.75"), (23, "5.75"), (23, "99")] {
-        let alone = format!("{view}[[object]]\nfile = \"f{number}.xyz\"\n");
-        let alone = read_shot(&folder, &[&folder.write("alone.toml", alone)]);
-        assert!(frames[number] == alone, "{number}");
-        assert!(read_shot(&folder, &[&scene, "--time", time]) == alone, "{time}");
+        let single = format!("{view}[[object]]\nfile = \"f{number}.xyz\"\n");
+        let single = read_shot(&folder, &[&folder.write("alone.toml", single)]);
+        assert!(frames[number] == single, "{number}");
+        assert!(read_shot(&folder, &[&scene, "--time", time]) == single, "{time}");
     }
     // One cloud is in memory, whatever the number of files.
     let dry_run = succeed(&["animate", &scene, "--dry-run"]);
@@ -407,11 +407,11 @@ fn the_dry_run_of_a_movie_renders_the_same_movie() {
     assert_eq!(folder.names(), ["dome.ply"]);
     assert!(succeed(&["animate", &cloud, "--frames", "3", "--dry-run"]).contains("\"frames\": 3"));
     succeed(&arguments);
-    let made = fs::read(&path).unwrap();
+    let expected = fs::read(&path).unwrap();
     fs::remove_file(&path).unwrap();
     let dry_run = folder.write("dry_run.json", dry_run);
     succeed(&["animate", &dry_run]);
-    assert!(fs::read(&path).unwrap() == made);
+    assert!(fs::read(&path).unwrap() == expected);
     // `surfel render` of the same file gives the first frame.
     let picture = folder.path("first.png");
     succeed(&["render", &dry_run, "-o", &picture]);

@@ -211,12 +211,12 @@ fn the_camera_stands_at_a_named_station() {
 fn a_tunnel_is_shown_from_within_unless_an_option_says_otherwise() {
     let folder = Folder::new();
     // A pipe of 60 units, 4 wide, with two rails.
-    let place = |i: usize| {
+    let pipe = |i: usize| {
         let (x, angle) = ((i % 600) as f64 * 0.1, (i / 600) as f64 * 0.1);
         format!("{x} {} {}\n", 2.0 * angle.sin(), 2.0 * angle.cos())
     };
     let rail = |i: usize| format!("{} {} -1\n", (i / 2) as f64 * 0.1, (i % 2) as f64 - 0.5);
-    let text: String = (0..600 * 63).map(place).chain((0..1200).map(rail)).collect();
+    let text: String = (0..600 * 63).map(pipe).chain((0..1200).map(rail)).collect();
     let file = folder.write("tunnel.xyz", text);
     let position = |options: &[&str]| {
         let camera = dry_run_camera("render", &file, options);

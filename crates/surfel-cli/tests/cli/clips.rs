@@ -5,7 +5,7 @@ use super::common::{Folder, dome, fail, shot, tile};
 /// Returns the points of a level grid of spacing 1, from `first` to `last` along x and y, relative to `zero`, as text.
 fn level(first: i32, last: i32, zero: [f64; 2]) -> String {
     let side = first..=last;
-    let places = side.clone().flat_map(|x| side.clone().map(move |y| [x, y]));
+    let cells = side.clone().flat_map(|x| side.clone().map(move |y| [x, y]));
     let line = |[x, y]: [i32; 2]| {
         let [red, green] = [20 * x + 30, 20 * y + 30];
         format!(
@@ -14,7 +14,7 @@ fn level(first: i32, last: i32, zero: [f64; 2]) -> String {
             zero[1] + f64::from(y)
         )
     };
-    places.map(line).collect()
+    cells.map(line).collect()
 }
 
 /// Options with which a picture depends on the visible points alone.

@@ -94,10 +94,10 @@ pub fn stderr(output: &Output) -> String {
 
 /// Returns a coloured hemisphere on a floor as PLY, with classes and the column `rain`.
 pub fn dome(n_side: usize) -> String {
-    let place = |i: usize| 2.0 * i as f64 / (n_side - 1) as f64 - 1.0;
+    let coordinate = |i: usize| 2.0 * i as f64 / (n_side - 1) as f64 - 1.0;
     let mut body = String::new();
     for (i, j) in (0..n_side * n_side).map(|n| (n % n_side, n / n_side)) {
-        let (x, y) = (place(i), place(j));
+        let (x, y) = (coordinate(i), coordinate(j));
         let z = (0.5 - x * x - y * y).max(0.0).sqrt();
         body += &format!("{x} {y} {z} {} {} 128 {} {}\n", i % 256, j % 256, 2 + i % 5, i * j);
     }

@@ -7,8 +7,8 @@ const N_SIDE: usize = 40;
 
 /// Returns a sheet of points: level for `bend` 0, otherwise wider and in waves.
 fn sheet(bend: f32) -> Vec<[f32; 3]> {
-    let place = |i: usize| 2.0 * i as f32 / (N_SIDE - 1) as f32 - 1.0;
-    let points = (0..N_SIDE * N_SIDE).map(|n| [place(n % N_SIDE), place(n / N_SIDE)]);
+    let coordinate = |i: usize| 2.0 * i as f32 / (N_SIDE - 1) as f32 - 1.0;
+    let points = (0..N_SIDE * N_SIDE).map(|n| [coordinate(n % N_SIDE), coordinate(n / N_SIDE)]);
     points.map(|[x, z]| [(1.0 + bend) * x, 0.4 * bend * (4.0 * x).sin(), z]).collect()
 }
 

@@ -30,8 +30,8 @@ fn middle_of_red((width, _, channels, samples): (u32, u32, usize, Vec<u8>)) -> [
     let (mut sum, mut total) = ([0.0; 2], 0.0);
     for (i, pixel) in samples.chunks_exact(channels).enumerate() {
         let weight = f64::from(pixel[0].saturating_sub(pixel[1]));
-        let place = [i as u32 % width, i as u32 / width].map(|at| f64::from(at) + 0.5);
-        sum = [0, 1].map(|axis| sum[axis] + weight * place[axis]);
+        let position = [i as u32 % width, i as u32 / width].map(|at| f64::from(at) + 0.5);
+        sum = [0, 1].map(|axis| sum[axis] + weight * position[axis]);
         total += weight;
     }
     sum.map(|sum| sum / total)
@@ -127,8 +127,8 @@ fn gdal_reads_place_system_and_elevations() {
     };
     assert_eq!(value(&picture, &x, &y)[..3], [255.0, 0.0, 0.0]);
     // Just within and without the square's right edge, half a pixel to either side.
-    let beside = |offset: f64| value(&picture, &(MARKER[0] + offset).to_string(), &y)[1];
-    assert!(beside(0.45) < 64.0 && 100.0 < beside(0.62));
+    let value_at = |offset: f64| value(&picture, &(MARKER[0] + offset).to_string(), &y)[1];
+    assert!(value_at(0.45) < 64.0 && 100.0 < value_at(0.62));
     let elevation = value(&heights, &x, &y)[0];
     assert!((elevation - ELEVATION).abs() < 0.01, "{elevation}");
     let info = gdal("gdalinfo", &["-json", &heights]).unwrap();

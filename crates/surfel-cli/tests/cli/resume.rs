@@ -27,7 +27,7 @@ fn interrupt(arguments: &[&str], folder: &str, pattern: &str) {
 }
 
 /// Options of a movie that takes long enough to be interrupted.
-const LONG: [&str; 8] =
+const SLOW_MOVIE: [&str; 8] =
     ["--turntable", "4", "--fps", "10", "--resolution", "160x120", "--spp", "4"];
 
 #[test]
@@ -35,9 +35,9 @@ fn an_interrupted_movie_continues_with_the_missing_frames() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(40));
     let whole = folder.path("whole.gif");
-    succeed(&[&["animate", &cloud, "-o", &whole], &LONG[..]].concat());
+    succeed(&[&["animate", &cloud, "-o", &whole], &SLOW_MOVIE[..]].concat());
     let part = folder.path("part.gif");
-    let arguments = [&["animate", &cloud, "-o", &part], &LONG[..]].concat();
+    let arguments = [&["animate", &cloud, "-o", &part], &SLOW_MOVIE[..]].concat();
     let frames = folder.path("part.gif.frames");
     interrupt(&arguments, &frames, "000002.png");
     assert!(!folder.names().contains(&"part.gif".to_owned()));
@@ -67,7 +67,7 @@ fn a_movie_with_changed_materials_is_not_resumed() {
     let mesh = folder.write("mesh.obj", format!("mtllib m.mtl\n{mesh}"));
     folder.write("m.mtl", "newmtl m\nKd 1 0 0\n");
     let part = folder.path("part.gif");
-    let arguments = [&["animate", &mesh, "-o", &part], &LONG[..]].concat();
+    let arguments = [&["animate", &mesh, "-o", &part], &SLOW_MOVIE[..]].concat();
     interrupt(&arguments, &folder.path("part.gif.frames"), "000002.png");
     folder.write("m.mtl", "newmtl m\nKd 0 0.5 0\n");
     let message = fail(&[&arguments[..], &["--resume"]].concat(), 1);
@@ -79,7 +79,7 @@ fn numbered_pictures_can_be_resumed() {
     let folder = Folder::new();
     let cloud = folder.write("dome.ply", dome(40));
     let part = folder.path("f##.png");
-    let arguments = [&["animate", &cloud, "-o", &part], &LONG[..]].concat();
+    let arguments = [&["animate", &cloud, "-o", &part], &SLOW_MOVIE[..]].concat();
     interrupt(&arguments, &folder.path(""), "f03.png");
     let early = fs::metadata(folder.path("f01.png")).unwrap().modified().unwrap();
     succeed(&[&arguments[..], &["--resume"]].concat());

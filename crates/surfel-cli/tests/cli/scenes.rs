@@ -173,7 +173,7 @@ fn inputs_are_relative_to_the_scene_file_and_outputs_to_the_working_directory() 
 
 /// Returns the picture of a run, and the picture of the scene file that its dry run prints.
 pub fn picture_and_replay(folder: &Folder, arguments: &[&str]) -> (Vec<u8>, Vec<u8>) {
-    let made = shot(folder, arguments);
+    let picture = shot(folder, arguments);
     let output = folder.path("again.png");
     let dry_run =
         succeed(&[&["render"], arguments, &SMALL, &["-o", &output, "--dry-run"]].concat());
@@ -182,7 +182,7 @@ pub fn picture_and_replay(folder: &Folder, arguments: &[&str]) -> (Vec<u8>, Vec<
     let dry_run = folder.write("elsewhere/dry_run.json", dry_run);
     succeed(&["render", &dry_run]);
     let again = fs::read(&output).unwrap();
-    (made, again)
+    (picture, again)
 }
 
 #[test]
@@ -392,12 +392,12 @@ fn up_does_not_depend_on_the_order_of_files() {
 #[test]
 fn sequences_of_different_rates_keep_them() {
     let folder = site();
-    let text = |rate: &str, place: &str| {
-        format!("[[object]]\nfiles = [\"dome.ply\", \"tile.ply\"]\nfps = {rate}\n{place}\n")
+    let text = |rate: &str, node: &str| {
+        format!("[[object]]\nfiles = [\"dome.ply\", \"tile.ply\"]\nfps = {rate}\n{node}\n")
     };
-    let place = "name = \"second\"\ntranslate = [4, 0, 0]";
-    let both = folder.write("both.toml", text("10", "") + &text("1", place));
-    let slow = folder.write("slow.toml", text("1", "") + &text("1", place));
+    let node = "name = \"second\"\ntranslate = [4, 0, 0]";
+    let both = folder.write("both.toml", text("10", "") + &text("1", node));
+    let slow = folder.write("slow.toml", text("1", "") + &text("1", node));
     // After half a second the fast sequence shows its last file, the slow one its first.
     assert_ne!(shot(&folder, &[&both, "--time", "0.5"]), shot(&folder, &[&slow, "--time", "0.5"]));
     assert_eq!(

@@ -78,11 +78,14 @@ fn each_frame_of_a_sequence_is_the_picture_of_its_file() {
         let (frames, _) = read_apng(&path);
         assert_eq!(frames.len(), FRAMES.len());
         for (i, (frame, file)) in frames.iter().zip(FRAMES).enumerate() {
-            let alone = scene(light, &format!("file = \"{file}\"\n"));
-            let alone = read_shot(&folder, &[&folder.write("alone.toml", alone)]);
-            assert!(*frame == alone, "{file} under {light}");
+            let single = scene(light, &format!("file = \"{file}\"\n"));
+            let single = read_shot(&folder, &[&folder.write("alone.toml", single)]);
+            assert!(*frame == single, "{file} under {light}");
             let time = format!("{}", 0.5 * i as f64);
-            assert!(read_shot(&folder, &[&sequence, "--time", &time]) == alone, "{file} at {time}");
+            assert!(
+                read_shot(&folder, &[&sequence, "--time", &time]) == single,
+                "{file} at {time}"
+            );
             assert!(i == 0 || *frame != frames[i - 1], "{file}");
         }
     }

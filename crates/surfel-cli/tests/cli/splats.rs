@@ -14,13 +14,13 @@ const FROM_ABOVE: [&str; 6] =
 /// Returns two squares of nearly opaque splats, one below the other, as PLY, whose colour is the sRGB value 204, 51, 128.
 fn splats(n_side: i32) -> String {
     let header: String = PROPERTIES.map(|name| format!("property float {name}\n")).concat();
-    let places = (0..n_side * n_side).map(|i| (i % n_side - n_side / 2, i / n_side - n_side / 2));
+    let cells = (0..n_side * n_side).map(|i| (i % n_side - n_side / 2, i / n_side - n_side / 2));
     // The colours are (c - 0.5) / 0.2821, the deviations e^-0.5 and e^-4.
     let splat = |(x, y): (i32, i32)| {
         let shape = "1.0635 -1.0635 0.00695 6 -0.5 -0.5 -4 1 0 0 0";
         format!("{x} {y} 0 {shape}\n{x} {y} -0.5 {shape}\n")
     };
-    let body: String = places.map(splat).collect();
+    let body: String = cells.map(splat).collect();
     format!(
         "ply\nformat ascii 1.0\nelement vertex {}\n{header}end_header\n{body}",
         2 * n_side * n_side
@@ -44,11 +44,11 @@ fn splats_show_their_trained_colours_with_no_option() {
     let picture = folder.path("a.png");
     let arguments =
         [&["render", &file, "-o", &picture, "--resolution", "32x24"][..], &FROM_ABOVE].concat();
-    let told = stderr(&surfel(&arguments));
+    let message = stderr(&surfel(&arguments));
     for line in ["surface gaussian: trained splats", "colors as trained", "no lights"] {
-        assert!(told.contains(line), "{line}: {told}");
+        assert!(message.contains(line), "{line}: {message}");
     }
-    assert!(!told.contains("exposure"), "{told}");
+    assert!(!message.contains("exposure"), "{message}");
     let with =
         |arguments: &[&str]| middle(&folder, &[&[file.as_str()], arguments, &FROM_ABOVE].concat());
     assert_eq!(with(&[]), [204, 51, 128]);
@@ -65,8 +65,8 @@ fn splats_show_their_trained_colours_with_no_option() {
 fn what_is_chosen_for_splats_is_written_into_the_description() {
     let folder = Folder::new();
     let file = folder.write("splats.ply", splats(5));
-    let alone = succeed(&["render", &file, "--dry-run", "-o", "a.png"]);
-    assert!(alone.contains("\"gaussian\""), "{alone}");
+    let single = succeed(&["render", &file, "--dry-run", "-o", "a.png"]);
+    assert!(single.contains("\"gaussian\""), "{single}");
     // Beside a cloud of points, each has its own surface; a mesh has light.
     let scan = folder.write("scan.xyz", "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0.5 0.5 0.2\n");
     let both = ["render", &file, &scan, "--dry-run", "-o", "a.png"];
@@ -91,13 +91,13 @@ fn clipped_and_filtered_splats_are_those_of_a_smaller_file() {
         .collect();
     let smaller = folder.write("smaller.ply", smaller.replace("vertex 162", "vertex 126"));
     let expected = shot(&folder, &[&[smaller.as_str()][..], &FROM_ABOVE].concat());
-    let ways =
+    let filters =
         ["--clip-box=-2.5,-9,-9,9,9,9", "--crop=-2.5,-9,9,9", "--filter=x > -2.5 && scale_2 < -3"];
     assert!(shot(&folder, &[&[file.as_str()][..], &FROM_ABOVE].concat()) != expected);
-    for way in ways {
+    for filter in filters {
         assert!(
-            shot(&folder, &[&[file.as_str(), way][..], &FROM_ABOVE].concat()) == expected,
-            "{way:?}"
+            shot(&folder, &[&[file.as_str(), filter][..], &FROM_ABOVE].concat()) == expected,
+            "{filter:?}"
         );
     }
 }

@@ -153,11 +153,11 @@ fn errors_name_files_without_their_folders() {
     let folder = sequences::site();
     let files = format!("files = {:?}\nfps = 2\n", sequences::FRAMES);
     let scene = folder.write("scene.toml", sequences::scene("\"sun\"", &files));
-    let place = folder.path("");
+    let prefix = folder.path("");
     let server = Server::start(&[&scene, "--spp", "1"]);
     let assert_hidden = |query: &str, name: &str| {
         let error = server.error(&format!("/render?resolution=40x30&{query}"));
-        assert!(error.contains(name) && !error.contains(&place), "{query}: {error}");
+        assert!(error.contains(name) && !error.contains(&prefix), "{query}: {error}");
     };
     assert_hidden("color=nothing", ".ply");
     for name in sequences::FRAMES {

@@ -104,12 +104,12 @@ fn visit<T: Send>(
         if !is_chosen {
             return None;
         }
-        point_beside(point, line, segments).map(&keep)
+        point_in_strip(point, line, segments).map(&keep)
     })
 }
 
 /// Returns the place of a point in the profile if it is beside the line, on the first segment that it is beside.
-fn point_beside(
+fn point_in_strip(
     point: &VisitedPoint,
     line: &ProfileLine,
     segments: &[Segment],
@@ -117,8 +117,9 @@ fn point_beside(
     segments.iter().find_map(|segment| {
         let to_point = point.position - segment.start;
         let (along, offset) = (segment.along.dot(to_point), segment.left.dot(to_point));
-        let is_beside = (0.0..=segment.length).contains(&along) && offset.abs() <= line.width / 2.0;
-        is_beside.then(|| ProfilePoint {
+        let is_in_strip =
+            (0.0..=segment.length).contains(&along) && offset.abs() <= line.width / 2.0;
+        is_in_strip.then(|| ProfilePoint {
             distance: segment.distance + along,
             offset,
             height: line.up.dot(point.position),

@@ -251,8 +251,8 @@ impl<'a> WavefrontState<'a> {
     /// samples in proportion to their weights.
     fn n_samples_of(&self, weight: Vec3) -> u32 {
         let n_light_samples = self.batch.samples.n_light_samples;
-        let share = n_light_samples as f32 * weight.max_element();
-        (share.ceil() as u32).clamp(1, n_light_samples)
+        let n_samples = n_light_samples as f32 * weight.max_element();
+        (n_samples.ceil() as u32).clamp(1, n_light_samples)
     }
 
     /// Returns the branches of a path into a lobe that receives `fraction` of its weight, without their new rays: one

@@ -21,8 +21,8 @@ pub(super) fn sample_inliers(cloud: &PointCloud) -> Vec<Vec3> {
     let valid = cloud.positions.iter().step_by(stride).copied().filter(|p| is_valid_position(*p));
     // A place counts once, however many points lie there.
     let mut seen = HashSet::new();
-    let places = valid.filter(|p| seen.insert(p.to_array().map(f32::to_bits)));
-    without_stray_groups(without_outliers(&places.collect::<Vec<Vec3>>()))
+    let distinct = valid.filter(|p| seen.insert(p.to_array().map(f32::to_bits)));
+    without_stray_groups(without_outliers(&distinct.collect::<Vec<Vec3>>()))
 }
 
 /// Returns the points within the inner quantiles of all axes, widened by a quarter of their range.
@@ -185,8 +185,8 @@ mod tests {
             |points: Vec<Vec3>| Aabb::of_points(without_stray_groups(points)).size().max_element();
         let without = size(scene.iter().copied().chain(strays).collect());
         assert!(without < 15.0, "{without}");
-        let beside = (0..100).map(|_| cube(3.0) + 40.0 * Vec3::X);
-        assert!(40.0 < size(scene.iter().copied().chain(beside).collect()));
+        let stray_group = (0..100).map(|_| cube(3.0) + 40.0 * Vec3::X);
+        assert!(40.0 < size(scene.iter().copied().chain(stray_group).collect()));
         for few in [vec![], vec![Vec3::ONE], vec![Vec3::ONE; 3]] {
             assert_eq!(without_stray_groups(few.clone()), few);
         }

@@ -207,8 +207,8 @@ mod tests {
         let total = areas.x + areas.y + areas.z;
         let mut side = |_| {
             let mut p = Vec3::from_array(std::array::from_fn(|_| random.next_f32() - 0.5));
-            let place = total * random.next_f32();
-            let axis = usize::from(areas.x < place) + usize::from(areas.x + areas.y < place);
+            let sample = total * random.next_f32();
+            let axis = usize::from(areas.x < sample) + usize::from(areas.x + areas.y < sample);
             p[axis] = if p[axis] < 0.0 { -0.5 } else { 0.5 };
             size * p
         };
@@ -319,8 +319,8 @@ mod tests {
         assert_eq!(view_from_station(&cloud, 0, Vec3::Z), Some(station));
         assert_eq!(view_from_station(&cloud, 1, Vec3::Z), None);
         cloud.positions.clear();
-        let alone = view_from_station(&cloud, 0, Vec3::Z).unwrap();
-        assert!(alone.direction.is_finite() && alone.distance == 1.0, "{alone:?}");
+        let single = view_from_station(&cloud, 0, Vec3::Z).unwrap();
+        assert!(single.direction.is_finite() && single.distance == 1.0, "{single:?}");
     }
 
     #[test]

@@ -41,8 +41,8 @@ pub fn sunlit_fraction(points: &[Vec3], station: Vec3, ahead: Vec3, to_sun: Vec3
     let (east, north) = ground_axes(up);
     let is_shadowed = |offset: &Vec3| {
         (0..N_STEPS).any(|i| {
-            let place = *offset + FIRST_STEP * STEP_RATIO.powi(i) * offset.length() * to_sun;
-            PolarPoint::of_offset(place, east, north, up).is_some_and(|polar| {
+            let sampled = *offset + FIRST_STEP * STEP_RATIO.powi(i) * offset.length() * to_sun;
+            PolarPoint::of_offset(sampled, east, north, up).is_some_and(|polar| {
                 let measured = distances.get(&polar.cell(CELL_DEG));
                 measured.is_some_and(|distance| PASSED_RATIO.contains(&(polar.distance / distance)))
             })
@@ -101,7 +101,7 @@ mod tests {
         assert!(0.9 < square, "{square}");
         let arcade = sunlit(&scan(|_| true));
         assert!(arcade < 0.1, "{arcade}");
-        let roof = sunlit(&scan(|place| place.truncate().length() < 2.5));
+        let roof = sunlit(&scan(|position| position.truncate().length() < 2.5));
         assert!(0.5 < roof && roof < square, "{roof}");
         assert_eq!(sunlit(&[]), 1.0);
     }

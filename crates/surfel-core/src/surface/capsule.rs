@@ -103,7 +103,7 @@ mod tests {
         let ray = Ray::new(Vec3::new(0.0, 0.1, -5.0), Vec3::Z);
         let expected = 5.0 - 0.75 - (0.25f32 * 0.25 - 0.01).sqrt();
         assert!((hit(Vec3::ZERO, Vec3::Z, 1.0, &ray).unwrap() - expected).abs() < 1e-4);
-        let beside = Ray::new(Vec3::new(0.0, 0.3, -5.0), Vec3::Z);
-        assert_eq!(hit(Vec3::ZERO, Vec3::Z, 1.0, &beside), None);
+        let miss = Ray::new(Vec3::new(0.0, 0.3, -5.0), Vec3::Z);
+        assert_eq!(hit(Vec3::ZERO, Vec3::Z, 1.0, &miss), None);
     }
 }

@@ -69,17 +69,17 @@ pub(super) fn read(input: &Input, progress: &dyn Progress) -> Result<HdrImage> {
         let decode = |(end, chunk): (u64, Chunk)| {
             progress.check()?;
             let start = end.saturating_sub(compressed_bytes(&chunk).len() as u64);
-            let place = || Location::Byte(start);
+            let location = || Location::Byte(start);
             let wrong_block = || {
                 let expected = "one of the first part in full size";
-                malformed(input, place(), "a block of another image", expected)
+                malformed(input, location(), "a block of another image", expected)
             };
             if chunk.layer_index != 0 {
                 return Err(wrong_block());
             }
-            check_dwa(input, place(), header, &chunk)?;
+            check_dwa(input, location(), header, &chunk)?;
             let decode = || UncompressedBlock::decompress_chunk(chunk, &meta_data, false);
-            let block = run_decoder(input, place, decode)?;
+            let block = run_decoder(input, location, decode)?;
             if is_full_size_first_part(&block.index) { Ok(block) } else { Err(wrong_block()) }
         };
         let n_chunks = batch.len() as u64;
@@ -173,13 +173,13 @@ fn sample(line: &[u8], sample_type: SampleType, i: usize) -> f32 {
 
 /// Rejects a block in DWA compression that claims to unpack to more than its pixels, because the crate
 /// allocates that much memory at once.
-fn check_dwa(input: &Input, place: Location, header: &Header, chunk: &Chunk) -> Result<()> {
+fn check_dwa(input: &Input, location: Location, header: &Header, chunk: &Chunk) -> Result<()> {
     if !matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
         return Ok(());
     }
     let area = run_decoder(
         input,
-        || place.clone(),
+        || location.clone(),
         || {
             let tile = header.get_block_data_indices(&chunk.compressed_block)?;
             Ok(header.get_absolute_block_pixel_coordinates(tile)?.size.area())
@@ -201,7 +201,7 @@ fn check_dwa(input: &Input, place: Location, header: &Header, chunk: &Chunk) -> 
     match claimed.into_iter().flatten().find(|claimed| limit < *claimed) {
         Some(claimed) => {
             let found = format!("a block of {n_bytes} bytes that unpacks to {claimed}");
-            Err(malformed(input, place, found, "a size that fits it"))
+            Err(malformed(input, location, found, "a size that fits it"))
         }
         None => Ok(()),
     }
@@ -218,7 +218,7 @@ fn compressed_bytes(chunk: &Chunk) -> &[u8] {
 /// Runs `work` of the `exr` crate and converts its errors and panics.
 fn run_decoder<T>(
     input: &Input,
-    place: impl Fn() -> Location,
+    location: impl Fn() -> Location,
     work: impl FnOnce() -> exr::error::Result<T>,
 ) -> Result<T> {
     // Malformed headers can make the crate panic: it divides by zero or indexes past the end of a table.
@@ -230,16 +230,18 @@ fn run_decoder<T>(
         Ok(Err(exr::error::Error::NotSupported(what))) => {
             Err(input.unsupported(format!("EXR data of a rare kind ({what})"), CONVERT_ADVICE))
         }
-        Ok(Err(_)) if place() == Location::Byte(input.len() as u64) => {
-            Err(malformed(input, place(), "the end of the file", expected))
+        Ok(Err(_)) if location() == Location::Byte(input.len() as u64) => {
+            Err(malformed(input, location(), "the end of the file", expected))
         }
-        Ok(Err(error)) => Err(malformed(input, place(), format!("bad data ({error})"), expected)),
-        Err(_) => Err(malformed(input, place(), "bytes that no encoder writes", expected)),
+        Ok(Err(error)) => {
+            Err(malformed(input, location(), format!("bad data ({error})"), expected))
+        }
+        Err(_) => Err(malformed(input, location(), "bytes that no encoder writes", expected)),
     }
 }
 
-fn malformed(input: &Input, place: Location, found: impl Into<String>, expected: &str) -> Error {
-    input.malformed(place, found, expected, REWRITE_ADVICE)
+fn malformed(input: &Input, location: Location, found: impl Into<String>, expected: &str) -> Error {
+    input.malformed(location, found, expected, REWRITE_ADVICE)
 }
 
 /// A reader that shares its position, so that errors can name it.

@@ -50,14 +50,14 @@ impl HdrImage {
 /// Rejects a size that the file's bytes cannot decode to, or that exceeds the limit for all files.
 pub(super) fn check_size(
     input: &Input,
-    place: Location,
+    location: Location,
     size: [u64; 2],
     bytes_per_pixel: u64,
 ) -> Result<()> {
     let [width, height] = size;
     if width == 0 || height == 0 {
         let found = format!("a size of {width} x {height} pixels");
-        return Err(input.malformed(place, found, "at least one", "write the file again"));
+        return Err(input.malformed(location, found, "at least one", "write the file again"));
     }
     let n_pixels = width.saturating_mul(height);
     if MAX_PIXELS < n_pixels {
@@ -70,7 +70,7 @@ pub(super) fn check_size(
     if max_decoded_bytes(input) < n_bytes {
         let found = format!("{width} x {height} pixels in {} bytes", input.len());
         let advice = "copy the file again from its source, or write it again with less compression";
-        return Err(input.malformed(place, found, "a size that the bytes can hold", advice));
+        return Err(input.malformed(location, found, "a size that the bytes can hold", advice));
     }
     Ok(())
 }

@@ -103,9 +103,9 @@ fn parse(input: &Input, bytes: &[u8]) -> Result<Value> {
     let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
     let value: Value = serde_json::from_slice(bytes).map_err(|error| {
         // The message of the error ends with line and column.
-        let (place, found) = (Location::Line(error.line() as u64), error.to_string());
+        let (location, found) = (Location::Line(error.line() as u64), error.to_string());
         let advice = "the file is damaged or not glTF; export it again";
-        input.malformed(place, found, "JSON", advice)
+        input.malformed(location, found, "JSON", advice)
     })?;
     if value.is_object() {
         return Ok(value);

@@ -69,8 +69,8 @@ pub fn save_image(path: &Path, image: &Image, options: &ImageOptions) -> Result<
 fn write_world_file(path: &Path, extension: &str, options: &ImageOptions) -> Result<()> {
     match &options.georeference {
         Some(georeference) => {
-            let beside = path.with_extension(world_file_extension(extension));
-            save_text(&beside, &georeference.world_file())
+            let world_file = path.with_extension(world_file_extension(extension));
+            save_text(&world_file, &georeference.world_file())
         }
         None => Ok(()),
     }

@@ -208,13 +208,13 @@ pub fn skinned_asset() -> Asset {
 pub fn animated_asset() -> Asset {
     let mut asset = skinned_asset();
     let times = asset.numbers("SCALAR", &[0.0f32, 0.5, 2.0]);
-    let places = asset.numbers("VEC3", &[0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 4.0, 0.0]);
+    let positions = asset.numbers("VEC3", &[0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 4.0, 0.0]);
     let turns = asset.numbers("VEC4", &[0i8, 0, 0, 127, 0, 0, 127, 0, 0, 127, 0, 0]);
     let sizes = asset.numbers("VEC3", &[1.0f32; 27]);
     let weights = asset.numbers("SCALAR", &[0u8, 255, 51, 0, 0, 0]);
     asset.json["animations"] = json!([
         {"name": "walk", "samplers": [
-            {"input": times, "output": places, "interpolation": "LINEAR"},
+            {"input": times, "output": positions, "interpolation": "LINEAR"},
             {"input": times, "output": turns, "interpolation": "STEP"},
             {"input": times, "output": sizes, "interpolation": "CUBICSPLINE"},
             {"input": times, "output": weights},
@@ -252,8 +252,8 @@ pub fn full_asset() -> Asset {
     let lights = "KHR_lights_punctual";
     asset.json["extensions"] = json!({lights: {"lights": [{"type": "spot", "spot": {}}]}});
     asset.json["nodes"][2]["extensions"] = json!({lights: {"light": 0}});
-    let places = asset.numbers("VEC3", &[0.0f32, 0.0, 0.0, 1.0, 2.0, 3.0]);
-    let instancing = json!({"attributes": {"TRANSLATION": places}});
+    let positions = asset.numbers("VEC3", &[0.0f32, 0.0, 0.0, 1.0, 2.0, 3.0]);
+    let instancing = json!({"attributes": {"TRANSLATION": positions}});
     let cloud = asset.numbers("VEC3", &SQUARE);
     let primitive = json!({"attributes": {"POSITION": cloud}, "mode": 0});
     let mesh = asset.push("meshes", json!({"primitives": [primitive]}));

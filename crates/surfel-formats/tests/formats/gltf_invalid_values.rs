@@ -205,7 +205,7 @@ fn draco_vertices_are_rejected_even_if_the_extension_is_not_required() {
 #[test]
 fn non_finite_animations_and_skins_are_rejected() {
     let asset = full_asset();
-    let place = |asset: &Asset, accessor: usize| {
+    let byte_offset = |asset: &Asset, accessor: usize| {
         let view = asset.json["accessors"][accessor]["bufferView"].as_u64().unwrap();
         asset.json["bufferViews"][view as usize]["byteOffset"].as_u64().unwrap() as usize
     };
@@ -215,7 +215,7 @@ fn non_finite_animations_and_skins_are_rejected() {
     let binds = asset.json["skins"][0]["inverseBindMatrices"].as_u64().unwrap() as usize;
     let with = |accessor: usize, at: usize, value: f32| {
         let mut broken = asset.clone();
-        let at = place(&broken, accessor) + 4 * at;
+        let at = byte_offset(&broken, accessor) + 4 * at;
         broken.buffer[at..at + 4].copy_from_slice(&value.to_le_bytes());
         broken.message()
     };
@@ -240,7 +240,7 @@ fn non_finite_animations_and_skins_are_rejected() {
     }
     // A rotation by a zero quaternion.
     let mut broken = asset.clone();
-    let at = place(&broken, sampler(1, "output"));
+    let at = byte_offset(&broken, sampler(1, "output"));
     broken.buffer[at..at + 4].fill(0);
     assert!(broken.message().contains("the quaternion [0.0, 0.0, 0.0, 0.0] at 0"));
     let mut broken = asset.clone();

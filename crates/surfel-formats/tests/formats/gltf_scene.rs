@@ -275,9 +275,9 @@ fn the_first_animation_is_read_and_the_others_are_listed() {
     let channels = &loaded.graph.animation.channels;
     assert_eq!(channels.len(), 4);
     assert!(channels.iter().all(|channel| channel.node == 4));
-    let Track::Translation(places) = &channels[0].track else { panic!() };
-    assert_eq!((places.times_secs[1], places.interpolation), (0.5, Interpolation::Linear));
-    assert_eq!(places.at(1.25), DVec3::new(1.0, 2.0, 0.0));
+    let Track::Translation(positions) = &channels[0].track else { panic!() };
+    assert_eq!((positions.times_secs[1], positions.interpolation), (0.5, Interpolation::Linear));
+    assert_eq!(positions.at(1.25), DVec3::new(1.0, 2.0, 0.0));
     let Track::Rotation(turns) = &channels[1].track else { panic!() };
     assert_eq!(
         (turns.interpolation, turns.values[1]),
@@ -294,9 +294,9 @@ fn the_first_animation_is_read_and_the_others_are_listed() {
 #[test]
 fn instances_become_nodes() {
     let mut asset = triangle();
-    let places = asset.numbers("VEC3", &[0.0f32, 0.0, 0.0, 1.0, 2.0, 3.0]);
+    let positions = asset.numbers("VEC3", &[0.0f32, 0.0, 0.0, 1.0, 2.0, 3.0]);
     let turns = asset.numbers("VEC4", &[0i16, 0, 0, 32767, 0, 32767, 0, 0]);
-    let attributes = json!({"TRANSLATION": places, "ROTATION": turns, "_ID": 99});
+    let attributes = json!({"TRANSLATION": positions, "ROTATION": turns, "_ID": 99});
     asset.json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
     asset.json["nodes"][0]["extensions"] =
         json!({"EXT_mesh_gpu_instancing": {"attributes": attributes}});

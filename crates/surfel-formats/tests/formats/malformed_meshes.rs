@@ -123,8 +123,8 @@ fn invalid_ply_faces_are_errors_with_a_location() {
         let cut = &binary[..binary.len() - 4];
         message("a.ply", [cut, &index.to_le_bytes()].concat())
     };
-    let place = binary.len() - 13;
-    assert!(with_last(4).starts_with(&format!("a.ply: byte {place}: found vertex 4")));
+    let offset = binary.len() - 13;
+    assert!(with_last(4).starts_with(&format!("a.ply: byte {offset}: found vertex 4")));
     assert!(with_last(-1).contains("found vertex -1"));
     assert!(message("a.ply", &binary[..binary.len() - 1]).contains("2 elements `face`"));
 

@@ -185,10 +185,10 @@ fn distant_files_keep_their_precision_and_rounding_is_reported() {
     for paths in [[far.clone(), near.clone()], [near.clone(), far.clone()]] {
         let listener = Listener::default();
         let (all, _) = load_all(&paths, &LoadOptions::default(), &listener).unwrap();
-        let mut places: Vec<u32> = all.cloud.positions.iter().map(|p| p.x.to_bits()).collect();
-        places.sort_unstable();
-        places.dedup();
-        assert!(n <= places.len(), "{} places", places.len());
+        let mut xs: Vec<u32> = all.cloud.positions.iter().map(|p| p.x.to_bits()).collect();
+        xs.sort_unstable();
+        xs.dedup();
+        assert!(n <= xs.len(), "{} places", xs.len());
         assert!(
             listener.has_note("far.xyz: far from the common origin [0, 0, 0]: its x is rounded")
         );

@@ -45,8 +45,8 @@ fn a_second_column_of_a_role_becomes_a_scalar() {
         assert_eq!(cloud.positions, [Vec3::new(1.0, 2.0, 3.0)], "{file}");
         assert_eq!(cloud.scalar("height").unwrap().get(0), 4.0, "{file}");
     }
-    let alone = read("a.csv", "x,y,height\n1,2,4\n").unwrap().cloud;
-    assert_eq!(alone.positions, [Vec3::new(1.0, 2.0, 4.0)]);
+    let heights = read("a.csv", "x,y,height\n1,2,4\n").unwrap().cloud;
+    assert_eq!(heights.positions, [Vec3::new(1.0, 2.0, 4.0)]);
     let columns = TextColumn::parse_list("x,y,-,height,z");
     let options = LoadOptions { text_columns: Some(columns), ..LoadOptions::default() };
     let stated = load_bytes("a.txt", b"1 2 9 4 3\n", &options, &Listener::default()).unwrap().cloud;
@@ -95,8 +95,8 @@ fn a_first_column_that_numbers_the_points_is_skipped() {
         read("a.txt", lines.collect::<String>()).unwrap().cloud
     };
     let numbered = cloud_of(|i| i + 1);
-    let place = numbered.world_position(3);
-    assert_eq!((place, numbered.intensity), (DVec3::new(7.0, 8.0, 3.0), None));
+    let position = numbered.world_position(3);
+    assert_eq!((position, numbered.intensity), (DVec3::new(7.0, 8.0, 3.0), None));
     // The first column of a grid of points starts again with each row.
     let grid = cloud_of(|i| i % 20);
     assert_eq!(grid.world_position(3), DVec3::new(3.0, 7.0, 8.0));

@@ -72,7 +72,7 @@ struct Visit {
     reserved_b: u32,
 }
 
-// What a pass does: the sample of a light, the queue that it works on and the kind of its rays, or the instances of a
+// The work of a pass: the sample of a light, the queue that it works on and the kind of its rays, or the instances of a
 // tree.
 struct Task {
     light: u32,
@@ -170,7 +170,7 @@ struct HitRecord {
     // The points behind the hit, once they are asked for.
     support_count: u32,
     support_distance: f32,
-    // Of the second and third corners of a triangle.
+    // Barycentric coordinates of the second and third corners of a triangle.
     barycentrics: vec2<f32>,
     // Both sets of texture coordinates.
     uvs: vec4<f32>,

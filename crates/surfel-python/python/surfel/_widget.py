@@ -26,7 +26,7 @@ export default { render };
 
 
 def mimebundle(viewer):
-    """What a notebook shows of a viewer: its page by anywidget, or a link where anywidget is not installed."""
+    """The view of a viewer in a notebook: its page by anywidget, or a link where anywidget is not installed."""
     try:
         import anywidget
         import traitlets

@@ -269,9 +269,10 @@ fn many_instances_are_equal() {
     scene.graph.append(Graph::from_geometry(ball, Material::GLASS));
     scene.graph.nodes.clear();
     for i in 0..60 {
-        let place = DVec3::new(f64::from(i % 8) - 4.0, f64::from(i / 8) - 4.0, 0.1 * f64::from(i));
+        let position =
+            DVec3::new(f64::from(i % 8) - 4.0, f64::from(i / 8) - 4.0, 0.1 * f64::from(i));
         let turned = DAffine3::from_axis_angle(DVec3::Z, f64::from(i));
-        let matrix = DAffine3::from_translation(place) * turned;
+        let matrix = DAffine3::from_translation(position) * turned;
         let (geometry, scale) = if i % 3 == 0 { (1, 1.0) } else { (0, 0.3) };
         let matrix = matrix * DAffine3::from_scale(DVec3::splat(scale));
         scene.graph.nodes.push(scenes::node(geometry, geometry, matrix));

@@ -94,10 +94,10 @@ fn smooth_hits_among_thousands_of_points_do_not_depend_on_other_rays() {
         let mut together = vec![SurfaceHit::MISS; rays.len()];
         surface_hits(&scene, simd, &rays, &mut together);
         for (ray, together) in rays.iter().zip(&together) {
-            let mut alone = [SurfaceHit::MISS];
-            surface_hits(&scene, simd, &[*ray], &mut alone);
+            let mut single = [SurfaceHit::MISS];
+            surface_hits(&scene, simd, &[*ray], &mut single);
             assert!(!together.is_miss(), "{ray:?}");
-            assert_eq!(alone[0], *together, "{ray:?}");
+            assert_eq!(single[0], *together, "{ray:?}");
         }
     }
 }

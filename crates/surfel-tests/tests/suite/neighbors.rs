@@ -255,9 +255,9 @@ fn the_order_of_rays_does_not_change_their_hits() {
         let together = hits(&flat, &rays);
         for simd in Simd::available() {
             for (i, ray) in rays.iter().enumerate().step_by(7) {
-                let mut alone = [SurfaceHit::MISS];
-                surface_hits(&flat, simd, &[*ray], &mut alone);
-                assert_eq!(alone[0], together[i], "{kind:?} {} {i}", simd.name());
+                let mut single = [SurfaceHit::MISS];
+                surface_hits(&flat, simd, &[*ray], &mut single);
+                assert_eq!(single[0], together[i], "{kind:?} {} {i}", simd.name());
             }
         }
     }
@@ -294,9 +294,9 @@ fn rays_find_points_without_normals_alone_and_in_packets() {
     assert!(500 < occluded.iter().filter(|occluded| **occluded).count());
     for simd in Simd::available() {
         for (ray, found) in rays.iter().zip(&together).step_by(7) {
-            let mut alone = [SurfaceHit::MISS];
-            surface_hits(&flat, simd, &[*ray], &mut alone);
-            assert_eq!(alone[0], *found, "{} {ray:?}", simd.name());
+            let mut single = [SurfaceHit::MISS];
+            surface_hits(&flat, simd, &[*ray], &mut single);
+            assert_eq!(single[0], *found, "{} {ray:?}", simd.name());
         }
     }
 }

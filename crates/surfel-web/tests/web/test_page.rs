@@ -78,9 +78,9 @@ impl Picture {
 fn placed_files(mut bytes: &[u8]) -> Vec<([u16; 4], Vec<u8>)> {
     let mut files = Vec::new();
     while let Some((head, rest)) = bytes.split_at_checked(12) {
-        let place = [0, 2, 4, 6].map(|i| u16::from_le_bytes([head[i], head[i + 1]]));
+        let rect = [0, 2, 4, 6].map(|i| u16::from_le_bytes([head[i], head[i + 1]]));
         let length = u32::from_le_bytes(head[8..].try_into().unwrap()) as usize;
-        files.push((place, rest[..length].to_vec()));
+        files.push((rect, rest[..length].to_vec()));
         bytes = &rest[length..];
     }
     files

@@ -14,10 +14,10 @@ use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 
 /// An encrypted server beyond loopback, and clients that trust its certificate.
 fn start() -> (TestServer, TlsConnector) {
-    let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
-    let key = made.signing_key.serialize_pem();
-    let identity = TlsIdentity::from_pem(made.cert.pem().as_bytes(), key.as_bytes()).unwrap();
-    (TestServer::start_encrypted("0.0.0.0", identity), connector(made.cert.der()))
+    let generated = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
+    let key = generated.signing_key.serialize_pem();
+    let identity = TlsIdentity::from_pem(generated.cert.pem().as_bytes(), key.as_bytes()).unwrap();
+    (TestServer::start_encrypted("0.0.0.0", identity), connector(generated.cert.der()))
 }
 
 /// A connector that trusts this certificate alone.

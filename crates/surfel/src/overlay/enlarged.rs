@@ -34,8 +34,8 @@ impl Enlarged<'_> {
         let (columns, rows) = area.pixels(self.size);
         let (x, y) = (columns.start, rows.start);
         let mut image = Image::new(columns.len() as u32, rows.len() as u32);
-        let places = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
-        for (i, (x, y)) in places.enumerate() {
+        let pixels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+        for (i, (x, y)) in pixels.enumerate() {
             (image.color[i], image.coverage[i]) = self.pixel(x, y);
         }
         Patch { x, y, image }

@@ -146,13 +146,14 @@ impl Overlay {
         if let Some(legend) = &self.legend {
             let is_free = |corner: &Corner| blocks.iter().all(|block| block.corner != *corner);
             let free = CORNERS.into_iter().filter(is_free);
-            let places = free.map(|corner| Block::new(Content::Legend(legend), corner, &layout));
+            let candidates =
+                free.map(|corner| Block::new(Content::Legend(legend), corner, &layout));
             let covered = |block: &Block| match (style.legend_corner, self.is_fixed) {
                 (Some(kept), _) => f32::from(u8::from(block.corner != kept)),
                 (None, true) => 0.0,
                 (None, false) => coverage(block.area),
             };
-            let best = places.min_by(|a, b| covered(a).total_cmp(&covered(b)));
+            let best = candidates.min_by(|a, b| covered(a).total_cmp(&covered(b)));
             style.legend_corner = best.as_ref().map(|block| block.corner);
             blocks.extend(best);
         }
@@ -298,8 +299,8 @@ mod tests {
         }
         overlay(&picture, legend.clone()).draw(&mut image, &plan(50.0));
         let red = |i: &usize| 0.5 < image.color[*i][0] && image.color[*i][1] < 0.1;
-        let place = (0..image.color.len()).find(red).unwrap();
-        assert!(place % 400 < 200 && place / 400 < 150, "{place}");
+        let legend_position = (0..image.color.len()).find(red).unwrap();
+        assert!(legend_position % 400 < 200 && legend_position / 400 < 150, "{legend_position}");
         assert_eq!(overlay(&PictureSettings::default(), legend).legend, None);
     }
 
@@ -356,13 +357,13 @@ mod tests {
         let overlay = overlay(&picture, everything().1);
         let mut draft = Image::new(160, 90);
         let mut style = Style::default();
-        let mut place = |draft: &Image| {
+        let mut legend_position = |draft: &Image| {
             let patches = overlay.patches(draft, (640, 360), &plan(50.0), &mut style);
             (patches[0].x, patches[0].y)
         };
-        let at_first = place(&draft);
+        let at_first = legend_position(&draft);
         draft.coverage[80 * 160 + 80..].fill(1.0);
-        assert_eq!(place(&draft), at_first);
+        assert_eq!(legend_position(&draft), at_first);
         style = Style::default();
         let freest = overlay.patches(&draft, (640, 360), &plan(50.0), &mut style);
         assert_ne!((freest[0].x, freest[0].y), at_first);

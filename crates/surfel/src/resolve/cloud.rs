@@ -123,9 +123,9 @@ pub fn graph_of(cloud: PointCloud) -> Graph<PointCloud> {
 pub fn into_cloud(
     mut graph: Graph<PointCloud>,
 ) -> std::result::Result<PointCloud, Box<Graph<PointCloud>>> {
-    let is_in_place = matches!(&graph.nodes[..], [node] if node.transform == Transform::IDENTITY);
+    let is_identity = matches!(&graph.nodes[..], [node] if node.transform == Transform::IDENTITY);
     let is_cloud = matches!(graph.geometries[..], [Geometry::Points(_)]);
-    if !is_cloud || !is_in_place {
+    if !is_cloud || !is_identity {
         return Err(Box::new(graph));
     }
     match graph.geometries.pop() {

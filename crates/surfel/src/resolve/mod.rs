@@ -147,8 +147,8 @@ impl AutoSettings {
         choose_surface(scene, &mut description, progress);
         let bounds = inlier_bounds(&points);
         frame_plan(scene, &mut description, (&points, bounds), up, progress)?;
-        let place = points.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
-        stand_sun_at_date(scene, &mut description, place, up, progress)?;
+        let middle = points.origin + (0.5 * (bounds.min + bounds.max)).as_dvec3();
+        stand_sun_at_date(scene, &mut description, middle, up, progress)?;
         let description = &description;
         report_gaps(&points, progress);
         let found_room = find_room(&points, up);

@@ -71,13 +71,13 @@ pub fn stand_at_station(
         };
         return Err(Invalid::at("camera.station", format!("no station `{name}`; {known}")));
     };
-    let mut settled = CameraSettings { position: Some(view.position), ..camera.clone() };
+    let mut located = CameraSettings { position: Some(view.position), ..camera.clone() };
     if !camera.is_panorama() {
         let angle_rad = -camera.azimuth_angle().to_radians();
         let direction = DQuat::from_axis_angle(up.as_dvec3(), angle_rad) * view.direction;
-        settled.azimuth_angle = None;
-        settled.focal_point.get_or_insert(view.position + view.distance * direction);
-        settled.view_angle.get_or_insert(view.view_angle_deg);
+        located.azimuth_angle = None;
+        located.focal_point.get_or_insert(view.position + view.distance * direction);
+        located.view_angle.get_or_insert(view.view_angle_deg);
     }
-    Ok(settled)
+    Ok(located)
 }

@@ -118,12 +118,12 @@ impl Builder<'_> {
         let is_parallel = MIN_PARALLEL <= points.slots.len();
         drop(points);
         let spare = (budget - needed) as u128;
-        let share = |part: usize| {
+        let budget_of = |part: usize| {
             part + (spare * part as u128 / (bytes_below + bytes_above) as u128) as usize
         };
         let [points_below, points_above] = parts;
-        let build_below = || self.subtree(below, points_below, share(bytes_below), depth + 1);
-        let build_above = || self.subtree(above, points_above, share(bytes_above), depth + 1);
+        let build_below = || self.subtree(below, points_below, budget_of(bytes_below), depth + 1);
+        let build_above = || self.subtree(above, points_above, budget_of(bytes_above), depth + 1);
         let children = match is_parallel {
             true => rayon::join(build_below, build_above),
             false => (build_below(), build_above()),

@@ -14,8 +14,8 @@ pub(super) const FINEST_CELL: f32 = 0.5;
 /// Maximum distance of a plane from the middle of its cell, in those of the corners. Planes on the face between two cells
 /// belong to both: rounding decided otherwise, and left holes.
 const MAX_PLANE_HEIGHT: f32 = 1.1;
-/// Number of places of a cell at which the field is evaluated: the corners and the middle.
-const N_PLACES: usize = 9;
+/// Number of positions of a cell at which the field is evaluated: the corners and the middle.
+const N_SAMPLES: usize = 9;
 /// Minimum number of points of a cell whose children are computed in parallel.
 const MIN_PARALLEL: usize = 4096;
 
@@ -94,7 +94,7 @@ impl Level<'_> {
     }
 
     fn cell<C: OctreeCell>(&self, cube: &Aabb, points: &CellPoints) -> Option<C> {
-        if !take(self.n_steps_left, N_PLACES * points.slots.len()) {
+        if !take(self.n_steps_left, N_SAMPLES * points.slots.len()) {
             return None;
         }
         let flips = self.field.flips(points, cube);

@@ -107,8 +107,8 @@ pub(crate) fn indices_by_spacing(
         let is_too_close = (0..8).any(|corner| {
             let step = |axis: usize| if corner >> axis & 1 == 1 { side[axis] } else { 0 };
             let cell = std::array::from_fn(|axis| own[axis] + step(axis));
-            std::iter::successors(cells.get(&cell).copied(), |place| before[*place])
-                .any(|place| is_closer(positions[kept[place] as usize], position, distance))
+            std::iter::successors(cells.get(&cell).copied(), |kept_idx| before[*kept_idx])
+                .any(|kept_idx| is_closer(positions[kept[kept_idx] as usize], position, distance))
         });
         if !is_too_close {
             before.push(cells.insert(own, kept.len()));

@@ -10,7 +10,7 @@ use crate::points::up::is_camera_frame;
 /// Number of points that are examined, and the least number that tell depths from other coordinates.
 const N_SAMPLES: usize = 65_536;
 const MIN_POINTS: usize = 4096;
-/// Maximum share of different coordinates along the axis of depths, minimum share along both others, and minimum ratio of
+/// Maximum fraction of different coordinates along the axis of depths, minimum fraction along both others, and minimum ratio of
 /// theirs to that of the depths. A wall across the view has few coordinates along these too: one of each pixel at each of a few depths.
 const MAX_DEPTHS: f32 = 0.05;
 const MIN_OTHERS: f32 = 0.02;
@@ -44,11 +44,11 @@ impl DepthSteps {
         let sample: Vec<Vec3> = (0..n_points.min(N_SAMPLES)).map(|_| sample()).collect();
         let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| rotation * axis);
         let coordinates = axes.map(|axis| distinct(sample.iter().map(|point| point.dot(axis))));
-        let share = |of: usize| coordinates[of].len() as f32 / sample.len() as f32;
+        let distinct_fraction = |of: usize| coordinates[of].len() as f32 / sample.len() as f32;
         let is_depth = |axis: &usize| {
-            let [next, last] = [1, 2].map(|step| share((axis + step) % 3));
-            let min_others = MIN_OTHERS.max(MIN_OTHERS_PER_DEPTH * share(*axis));
-            share(*axis) < MAX_DEPTHS && min_others < next.min(last)
+            let [next, last] = [1, 2].map(|step| distinct_fraction((axis + step) % 3));
+            let min_others = MIN_OTHERS.max(MIN_OTHERS_PER_DEPTH * distinct_fraction(*axis));
+            distinct_fraction(*axis) < MAX_DEPTHS && min_others < next.min(last)
         };
         let depth = (0..3).find(is_depth)?;
         // Flight lines have few coordinates along the flight as well.

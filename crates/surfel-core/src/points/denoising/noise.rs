@@ -31,11 +31,11 @@ const REGION_SIZES: [usize; 2] = [256, 4096];
 const N_REGIONS: usize = 256;
 /// Number of points that are asked for the noise of a region.
 const N_SAMPLES: usize = 16;
-/// Minimum share of them at which the noise can be told.
+/// Minimum fraction of them at which the noise can be told.
 const MIN_KNOWN: f32 = 0.25;
 /// Ratio of the third quartile of a region's noises to the median above which surfaces of different noise are mixed.
 const MIXED_RATIO: f32 = 2.0;
-/// Minimum share of points at which the noise can be told in a cloud of surfaces. Forests have 0.3 to 0.7.
+/// Minimum fraction of points at which the noise can be told in a cloud of surfaces. Forests have 0.3 to 0.7.
 const MIN_SURFACES: f32 = 0.8;
 /// Noise in steps of a depth camera. Evenly spread errors have 1 / sqrt(12), but neighbouring points err together, so
 /// that a plane must reach over several steps: at half a step, walls across the view stayed in patches.
@@ -50,8 +50,8 @@ pub struct Noise {
     noises: Vec<f32>,
     /// True for each point of a region that fills space, as leaves do.
     fills_space: Vec<bool>,
-    /// Share of the samples whose noise is known.
-    known_share: f32,
+    /// Fraction of the samples whose noise is known.
+    known_fraction: f32,
 }
 
 impl Noise {
@@ -90,8 +90,8 @@ impl Noise {
                 points.iter().for_each(|point| fills_space[*point as usize] = true);
             }
         }
-        let known_share = n_known as f32 / n_samples.max(1) as f32;
-        Ok(Self { centers, noises, fills_space, known_share })
+        let known_fraction = n_known as f32 / n_samples.max(1) as f32;
+        Ok(Self { centers, noises, fills_space, known_fraction })
     }
 
     /// Returns the median noise over the regions.
@@ -106,7 +106,7 @@ impl Noise {
 
     /// True if the cloud is made of surfaces, not of leaves.
     pub fn is_of_surfaces(&self) -> bool {
-        MIN_SURFACES < self.known_share
+        MIN_SURFACES < self.known_fraction
     }
 
     /// Returns the noise at a position, interpolated between the nearest regions.

@@ -10,7 +10,7 @@ use crate::points::neighbors::KdTree;
 use crate::points::normals::planes::PlaneFit;
 use crate::points::scan::scan_grid::ScanGrids;
 use crate::points::structure::point_shape::{PointShape, Structure, is_line};
-use crate::points::structure::solids::settle;
+use crate::points::structure::solids::apply_structure;
 use crate::progress::Progress;
 use crate::words::counted;
 use rayon::prelude::*;
@@ -142,7 +142,7 @@ fn as_line(
     shape: &PointShape,
 ) -> Option<PointShape> {
     let mut line = *shape;
-    settle(tree, point, shape.radius, Structure::Line, &mut line);
+    apply_structure(tree, point, shape.radius, Structure::Line, &mut line);
     let across = shape.normal.cross(line.normal);
     let is_near = |ray: &&FreeRay| ray.offset.length() < MAX_SIDE_DISTANCE * shape.radius;
     let mut sides = rays.iter().filter(is_near).map(|ray| ray.offset.dot(across));

@@ -46,9 +46,9 @@ fn found(
     lists.into_inner().unwrap()
 }
 
-fn points(n_points: usize, mut place: impl FnMut(&mut Random) -> Vec3) -> Vec<Vec3> {
+fn points(n_points: usize, mut sample: impl FnMut(&mut Random) -> Vec3) -> Vec<Vec3> {
     let mut random = Random::new(11, n_points as u64);
-    (0..n_points).map(|_| place(&mut random)).collect()
+    (0..n_points).map(|_| sample(&mut random)).collect()
 }
 
 fn in_a_box(random: &mut Random) -> Vec3 {

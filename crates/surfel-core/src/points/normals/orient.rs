@@ -373,15 +373,15 @@ mod tests {
     fn a_spanning_tree_orients_ground_of_any_shape_upward() {
         for curvature in [-0.05f32, 0.0, 0.05] {
             let height = |x: f32, y: f32| curvature * (x * x + y * y);
-            let place = |i: usize| ((i % 40) as f32 - 20.0, (i / 40) as f32 - 20.0);
+            let position_of = |i: usize| ((i % 40) as f32 - 20.0, (i / 40) as f32 - 20.0);
             let points = (0..1600).map(|i| {
-                let (x, y) = place(i);
+                let (x, y) = position_of(i);
                 Vec3::new(x, y, height(x, y))
             });
             let cloud = PointCloud::from_positions(points.collect());
             let normals: Vec<Vec3> = (0..1600)
                 .map(|i| {
-                    let (x, y) = place(i);
+                    let (x, y) = position_of(i);
                     let sign = if i % 7 < 3 { -1.0 } else { 1.0 };
                     sign * Vec3::new(-2.0 * curvature * x, -2.0 * curvature * y, 1.0).normalize()
                 })

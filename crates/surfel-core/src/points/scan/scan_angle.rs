@@ -210,7 +210,7 @@ mod tests {
         let cloud = with_angles((0..400).map(|i| (i % 20) as f32).collect());
         assert!(SightLines::new(&cloud).is_some());
         assert!(SightLines::new(&PointCloud::default()).is_none());
-        let at_one_place = PointCloud { positions: vec![Vec3::ONE; 400], ..cloud };
-        assert!(SightLines::new(&at_one_place).is_none());
+        let coincident = PointCloud { positions: vec![Vec3::ONE; 400], ..cloud };
+        assert!(SightLines::new(&coincident).is_none());
     }
 }

@@ -67,14 +67,14 @@ mod tests {
     use crate::progress::NoProgress;
 
     /// Returns the fraction of points of a place that lie above land, among `others`.
-    fn above(place: &[Vec3], others: &[Vec3]) -> f64 {
-        let points = [place, others].concat();
+    fn above(own: &[Vec3], others: &[Vec3]) -> f64 {
+        let points = [own, others].concat();
         let tree = KdTree::new(&points, &NoProgress).unwrap();
         let is_above = |point: &usize| {
             let neighbors = tree.nearest(points[*point], 24, Some(*point as u32));
             is_above_land(&points, *point, &neighbors, 0.02)
         };
-        (0..place.len()).filter(is_above).count() as f64 / place.len() as f64
+        (0..own.len()).filter(is_above).count() as f64 / own.len() as f64
     }
 
     #[test]

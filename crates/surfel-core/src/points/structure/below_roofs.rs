@@ -13,8 +13,8 @@ use rayon::prelude::*;
 const MAX_COSINE: f32 = 0.3;
 /// Number of points, as seen from above, among which the highest is sought.
 const N_NEAREST: usize = 24;
-/// Number of places on each side of a disc at which the highest points are sought.
-const N_PLACES: i32 = 4;
+/// Number of positions on each side of a disc at which the highest points are sought.
+const N_SAMPLES: i32 = 4;
 /// Ratio of a radius to the next one that is tried.
 const STEP: f32 = 0.8;
 
@@ -40,8 +40,8 @@ pub fn narrow_to_roofs(
     let near = cells.points_near(positions, walls.iter().map(|point| positions[*point]));
     let plan: Vec<Vec3> = near.iter().map(|p| positions[*p as usize].with_z(0.0)).collect();
     let plan = KdTree::new(&plan, progress)?;
-    let highest = |place: Vec3| {
-        let nearest = plan.nearest(place.with_z(0.0), N_NEAREST, None);
+    let highest = |position: Vec3| {
+        let nearest = plan.nearest(position.with_z(0.0), N_NEAREST, None);
         let heights = nearest.iter().map(|p| positions[near[p.index as usize] as usize].z);
         heights.fold(f32::NEG_INFINITY, f32::max)
     };
@@ -50,12 +50,12 @@ pub fn narrow_to_roofs(
         let (position, shape) = (positions[*point], &shapes[*point]);
         let along = shape.normal.cross(Vec3::Z).normalize_or_zero();
         let is_below = |radius: f32| {
-            let is_below_at = |place: i32| {
-                let offset = place as f32 / N_PLACES as f32 * radius;
+            let is_below_at = |i: i32| {
+                let offset = i as f32 / N_SAMPLES as f32 * radius;
                 let top = position.z + (radius * radius - offset * offset).sqrt();
                 top <= highest(position + offset * along) + typical_radius
             };
-            (-N_PLACES..=N_PLACES).all(is_below_at)
+            (-N_SAMPLES..=N_SAMPLES).all(is_below_at)
         };
         let radii = std::iter::successors(Some(shape.radius), |radius| Some(STEP * radius));
         let mut wide = radii.take_while(|radius| typical_radius < *radius);

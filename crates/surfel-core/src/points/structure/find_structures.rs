@@ -12,7 +12,7 @@ use super::point_shape::{PointShape, Structure, StructureReport, is_line, is_sur
 use super::ring_surfaces::close_ring_gaps;
 use super::scan_lines::widen_lines;
 use super::see_through::open_see_through_discs;
-use super::solids::{ball_radius, clamp_solids, settle};
+use super::solids::{apply_structure, ball_radius, clamp_solids};
 use super::stray_points::limit_stray_points;
 use super::structure_votes::{Voters, smoothed};
 use super::typical::Typical;
@@ -90,7 +90,7 @@ pub fn find_structures(
     let mut structures = smoothed(tree, &shapes, voters, n_rough, typical.radius, progress)?;
     above_land.iter().for_each(|point| structures[*point] = Structure::Scatter);
     let finish = |(point, (shape, structure)): (usize, (&mut PointShape, &Structure))| {
-        settle(tree, point, radii[point], *structure, shape);
+        apply_structure(tree, point, radii[point], *structure, shape);
     };
     shapes.par_iter_mut().zip(&structures).enumerate().for_each(finish);
     limit_crowded_discs(tree, radii, &mut shapes, progress)?;

@@ -1,4 +1,4 @@
-//! Square cells of the ground plan: points near some places as seen from above.
+//! Square cells of the ground plan: points near some positions as seen from above.
 
 use crate::math::Vec3;
 use rayon::prelude::*;
@@ -20,9 +20,9 @@ impl PlanCells {
         [position.x, position.y].map(|coordinate| (coordinate / self.width).floor() as i64)
     }
 
-    /// Returns, in the order of `positions`, those in the cells of some places and in the cells next to them.
-    pub fn points_near(self, positions: &[Vec3], places: impl Iterator<Item = Vec3>) -> Vec<u32> {
-        let own: HashSet<PlanCell> = places.map(|place| self.of(place)).collect();
+    /// Returns, in the order of `positions`, those in the cells of some targets and in the cells next to them.
+    pub fn points_near(self, positions: &[Vec3], targets: impl Iterator<Item = Vec3>) -> Vec<u32> {
+        let own: HashSet<PlanCell> = targets.map(|target| self.of(target)).collect();
         let around = |[x, y]: PlanCell| {
             (0..9).map(move |i| [x.saturating_add(i % 3 - 1), y.saturating_add(i / 3 - 1)])
         };

@@ -343,10 +343,10 @@ mod tests {
         // Places between the rings, away from the box.
         for i in 0..200 {
             let (distance, azimuth) = (5.0 + 0.04 * i as f32, 1.0 + 0.02 * i as f32);
-            let place = Vec3::new(distance * azimuth.cos(), distance * azimuth.sin(), -1.8);
-            let covers = |(center, radius): &&(Vec3, f32)| center.distance(place) < *radius;
+            let position = Vec3::new(distance * azimuth.cos(), distance * azimuth.sin(), -1.8);
+            let covers = |(center, radius): &&(Vec3, f32)| center.distance(position) < *radius;
             let n_covering = discs.iter().filter(covers).count();
-            assert!((3..100).contains(&n_covering), "{place}: {n_covering}");
+            assert!((3..100).contains(&n_covering), "{position}: {n_covering}");
         }
     }
 

@@ -6,7 +6,7 @@
 use super::octants::{Octants, octant};
 use super::plan_cells::{PlanCell, PlanCells};
 use super::point_shape::{PointShape, Structure};
-use super::solids::settle;
+use super::solids::apply_structure;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::points::neighbors::KdTree;
@@ -67,13 +67,13 @@ pub fn open_see_through_discs(
     let is_open = candidates.par_iter().map(is_open).collect::<Result<Vec<_>>>()?;
     let opened = candidates.iter().zip(is_open).filter(|(_, is_open)| *is_open);
     let opened: Vec<usize> = opened.map(|(point, _)| *point).collect();
-    let settled = |point: &usize| {
+    let line_shape = |point: &usize| {
         let mut shape = shapes[*point];
-        settle(tree, *point, radii[*point], Structure::Line, &mut shape);
+        apply_structure(tree, *point, radii[*point], Structure::Line, &mut shape);
         shape
     };
-    let settled: Vec<PointShape> = opened.par_iter().map(settled).collect();
-    opened.into_iter().zip(settled).for_each(|(point, shape)| shapes[point] = shape);
+    let line_shapes: Vec<PointShape> = opened.par_iter().map(line_shape).collect();
+    opened.into_iter().zip(line_shapes).for_each(|(point, shape)| shapes[point] = shape);
     Ok(())
 }
 
@@ -126,8 +126,8 @@ mod tests {
     /// Prepares points over land of 200x200 with a spacing of 0.7.
     fn over_land(mut points: Vec<Vec3>) -> (PreparedCloud, Vec<Structure>) {
         let mut random = Random::new(1, 0);
-        let mut place = || 200.0 * (random.next_f32() - 0.5);
-        points.extend((0..80_000).map(|_| Vec3::new(place(), place(), 0.0)));
+        let mut coordinate = || 200.0 * (random.next_f32() - 0.5);
+        points.extend((0..80_000).map(|_| Vec3::new(coordinate(), coordinate(), 0.0)));
         let cloud = PointCloud::from_positions(points);
         let (cloud, _) = prepare(cloud, &Preparation::default(), &NoProgress).unwrap();
         let structures = cloud.structures().unwrap();
@@ -138,9 +138,9 @@ mod tests {
     fn wires_side_by_side_do_not_become_sheets() {
         let mut random = Random::new(2, 0);
         // Heights and sides of the wires of a pylon. The distances between points are random.
-        let places = [(15.2, 6.0), (15.2, -6.0), (19.2, 5.0), (19.2, -5.0), (23.2, 4.0)];
+        let positions = [(15.2, 6.0), (15.2, -6.0), (19.2, 5.0), (19.2, -5.0), (23.2, 4.0)];
         let mut wires: Vec<Vec3> = Vec::new();
-        for (height, side) in places {
+        for (height, side) in positions {
             let mut noise = || 0.05 * (random.next_f32() - 0.5);
             let point = |_| {
                 let (y, z) = (side + noise(), height + noise());
@@ -160,11 +160,12 @@ mod tests {
     #[test]
     fn sparse_roofs_stay_surfaces() {
         let mut random = Random::new(3, 0);
-        let mut place = || 12.0 * (random.next_f32() - 0.5);
-        let roof: Vec<Vec3> = (0..150).map(|_| Vec3::new(place(), place(), 8.0)).collect();
+        let mut coordinate = || 12.0 * (random.next_f32() - 0.5);
+        let roof: Vec<Vec3> =
+            (0..150).map(|_| Vec3::new(coordinate(), coordinate(), 8.0)).collect();
         let mut random = Random::new(1, 0);
-        let mut place = || 200.0 * (random.next_f32() - 0.5);
-        let land = (0..80_000).map(|_| Vec3::new(place(), place(), 0.0));
+        let mut coordinate = || 200.0 * (random.next_f32() - 0.5);
+        let land = (0..80_000).map(|_| Vec3::new(coordinate(), coordinate(), 0.0));
         // The roof hides the land below it.
         let land = land.filter(|p| 6.0 < p.x.abs().max(p.y.abs()));
         let n_roof = roof.len();

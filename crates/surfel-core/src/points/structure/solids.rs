@@ -24,7 +24,7 @@ const MAX_SOLID_RATIO: f32 = 1.5;
 const MIN_SOLIDS: usize = 16;
 
 /// Gives a point the direction and the radius of its final structure. Surface points keep what was decided.
-pub fn settle(
+pub fn apply_structure(
     tree: &KdTree,
     point: usize,
     radius: f32,
@@ -129,7 +129,7 @@ mod tests {
         for point in 50..450 {
             let mut shape =
                 PointShape { structure: Structure::Surface, normal: Vec3::Z, radius: 0.1 };
-            settle(&tree, point, 0.1, Structure::Line, &mut shape);
+            apply_structure(&tree, point, 0.1, Structure::Line, &mut shape);
             assert!(0.99 < shape.normal.dot(direction).abs(), "{shape:?}");
             let thickness = shape.radius / CAPSULE_ASPECT / THICKNESS;
             assert!((0.7..1.4).contains(&thickness), "{thickness}");

@@ -54,15 +54,15 @@ pub fn find_sparse_walls(
 ) -> Result<()> {
     let is_scattered = |point: &u32| shapes[*point as usize].structure == Structure::Scatter;
     let scattered: Vec<u32> = (0..positions.len() as u32).filter(is_scattered).collect();
-    let places: Vec<Vec3> = scattered.iter().map(|point| positions[*point as usize]).collect();
-    let tree = KdTree::new(&places, progress)?;
+    let candidates: Vec<Vec3> = scattered.iter().map(|point| positions[*point as usize]).collect();
+    let tree = KdTree::new(&candidates, progress)?;
     let wall = |i: usize| {
         progress.check()?;
         Ok(Wall::around(&tree, i, N_DEVIATIONS * noise))
     };
-    let walls = (0..places.len()).into_par_iter().map(wall).collect::<Result<Vec<_>>>()?;
+    let walls = (0..candidates.len()).into_par_iter().map(wall).collect::<Result<Vec<_>>>()?;
     let confirmed: Vec<usize> = (0..walls.len()).filter(|i| is_confirmed(*i, &walls)).collect();
-    let on_walls: Vec<Vec3> = confirmed.iter().map(|i| places[*i]).collect();
+    let on_walls: Vec<Vec3> = confirmed.iter().map(|i| candidates[*i]).collect();
     let is_below = are_below_roofs(&on_walls, positions, typical_radius, shapes, progress)?;
     for (i, is_below) in confirmed.into_iter().zip(is_below) {
         if let (Some(wall), true) = (&walls[i], is_below) {
@@ -142,28 +142,28 @@ fn is_confirmed(i: usize, walls: &[Option<Wall>]) -> bool {
 
 /// Returns for each place whether a roof lies above or beside it, at most a typical radius lower.
 fn are_below_roofs(
-    places: &[Vec3],
+    candidates: &[Vec3],
     positions: &[Vec3],
     typical_radius: f32,
     shapes: &[PointShape],
     progress: &dyn Progress,
 ) -> Result<Vec<bool>> {
     let cells = PlanCells { width: MAX_RADIUS * typical_radius };
-    let near = cells.points_near(positions, places.iter().copied());
+    let near = cells.points_near(positions, candidates.iter().copied());
     let plan: Vec<Vec3> = near.iter().map(|p| positions[*p as usize].with_z(0.0)).collect();
     let plan = KdTree::new(&plan, progress)?;
-    let is_below = |place: &Vec3| {
+    let is_below = |candidate: &Vec3| {
         progress.check()?;
         let is_roof = |neighbor: &&Neighbor| {
             let point = near[neighbor.index as usize] as usize;
             shapes[point].structure == Structure::Surface
                 && MIN_ROOF_COSINE < shapes[point].normal.z.abs()
-                && place.z < positions[point].z + typical_radius
+                && candidate.z < positions[point].z + typical_radius
         };
-        let nearest = plan.nearest(place.with_z(0.0), N_NEAREST, None);
+        let nearest = plan.nearest(candidate.with_z(0.0), N_NEAREST, None);
         Ok(MIN_OF_ROOF <= nearest.iter().filter(is_roof).count())
     };
-    places.par_iter().map(is_below).collect()
+    candidates.par_iter().map(is_below).collect()
 }
 
 #[cfg(test)]

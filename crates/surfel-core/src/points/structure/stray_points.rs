@@ -4,7 +4,7 @@
 //! some of them lie in a plane by chance. They are compared with the discs of the nearest surface.
 
 use super::point_shape::{PointShape, Structure, is_line};
-use super::solids::{N_LINE_NEIGHBORS, settle};
+use super::solids::{N_LINE_NEIGHBORS, apply_structure};
 use crate::error::Result;
 use crate::math::{Vec3, sampled_quantile};
 use crate::points::neighbors::KdTree;
@@ -26,7 +26,7 @@ const MAX_DISC_RATIO: f32 = 5.0;
 /// ground of a scanner on a tripod discs grow to far larger ones.
 const MAX_SPREAD: f32 = 3.0;
 /// Ratio of the distance to the nearest disc to its radius from which a point is no part of its surroundings.
-const FAR_RATIO: f32 = 8.0;
+const ISOLATED_RATIO: f32 = 8.0;
 /// Maximum number of discs among which the nearest is searched.
 const MAX_DISCS: usize = 100_000;
 
@@ -44,8 +44,8 @@ pub fn limit_stray_points(
     if !shapes.iter().any(|shape| sizes.is_wide(shape)) {
         return Ok(());
     }
-    let (places, radii) = sizes.trusted(shapes, all.positions());
-    let discs = TrustedDiscs { sizes, radii, tree: KdTree::new(&places, progress)? };
+    let (centers, radii) = sizes.trusted(shapes, all.positions());
+    let discs = TrustedDiscs { sizes, radii, tree: KdTree::new(&centers, progress)? };
     shapes.par_iter_mut().enumerate().for_each(|(point, shape)| discs.limit(all, point, shape));
     Ok(())
 }
@@ -114,17 +114,17 @@ impl TrustedDiscs<'_> {
         let nearest = tree.nearest(position, 1, None);
         let Some(disc) = nearest.first() else { return };
         let radius = radii[disc.index as usize];
-        let is_far = FAR_RATIO * radius < disc.distance_squared.sqrt();
+        let is_isolated = ISOLATED_RATIO * radius < disc.distance_squared.sqrt();
         let is_disc = shape.structure == Structure::Surface;
-        if shape.radius <= sizes.max_ratio(shape) * radius || is_disc && !is_far {
+        if shape.radius <= sizes.max_ratio(shape) * radius || is_disc && !is_isolated {
             return;
         }
-        let limit = if is_far { sizes.typical } else { MAX_STRAY_RATIO * radius };
+        let limit = if is_isolated { sizes.typical } else { MAX_STRAY_RATIO * radius };
         if is_disc {
             let around = all.nearest(position, N_LINE_NEIGHBORS, Some(point as u32));
             let is_line = is_line(&fit_plane(all.positions(), point, &around));
             let structure = if is_line { Structure::Line } else { Structure::Scatter };
-            settle(all, point, limit, structure, shape);
+            apply_structure(all, point, limit, structure, shape);
         }
         shape.radius = shape.radius.min(limit);
     }

@@ -15,15 +15,15 @@ const N_VOTERS: usize = 8;
 pub type Voters = [u32; N_VOTERS];
 /// Number of rounds in which points take over half of their neighbours' mean.
 const N_ROUNDS: usize = 12;
-/// Share of scattered points around a point, after all rounds, that makes it a scattered one.
+/// Fraction of scattered points around a point, after all rounds, that makes it a scattered one.
 const MIN_SCATTERED: f32 = 0.5;
-/// Minimum share of scattered points around a scattered point of a noisy cloud.
+/// Minimum fraction of scattered points around a scattered point of a noisy cloud.
 const MIN_SCATTERED_IN_NOISE: f32 = 0.9;
 /// Maximum number of rounds in which islands of a surface shrink.
 const N_ISLAND_ROUNDS: usize = 8;
-/// Share of scattered points from which a surface point is looked at again: small islands of a surface among scattered
+/// Fraction of scattered points from which a surface point is looked at again: small islands of a surface among scattered
 /// points, as where branches happen to lie in a plane, are scattered too.
-const MIN_SHARE_NEAR_SCATTER: f32 = 0.02;
+const MIN_FRACTION_NEAR_SCATTER: f32 = 0.02;
 /// Number of neighbours most of which are scattered around a point of an island.
 const N_ISLAND_NEIGHBORS: usize = 48;
 
@@ -66,26 +66,26 @@ pub fn smoothed(
         }
         false => voters,
     };
-    let mut shares: Vec<f32> =
+    let mut fractions: Vec<f32> =
         own.clone().map(|structure| f32::from(u8::from(structure == Structure::Scatter))).collect();
     for _ in 0..N_ROUNDS {
         let mixed = |(own, voters): (&f32, &Voters)| {
             let of_voters = voters.iter().filter(|voter| **voter != u32::MAX);
             let n_voters = of_voters.clone().count().max(1) as f32;
-            let sum: f32 = of_voters.map(|voter| shares[*voter as usize]).sum();
+            let sum: f32 = of_voters.map(|voter| fractions[*voter as usize]).sum();
             0.5 * (own + sum / n_voters)
         };
-        shares = shares.par_iter().zip(&voters).map(mixed).collect();
+        fractions = fractions.par_iter().zip(&voters).map(mixed).collect();
     }
-    let decided = |((own, shape), share): ((Structure, &PointShape), &f32)| match own {
+    let decided = |((own, shape), fraction): ((Structure, &PointShape), &f32)| match own {
         Structure::Line => Structure::Line,
-        _ if min_scattered <= *share => Structure::Scatter,
+        _ if min_scattered <= *fraction => Structure::Scatter,
         Structure::Scatter if shape.radius <= max_radius => Structure::Surface,
         own => own,
     };
-    let mut structures: Vec<Structure> = own.zip(shapes).zip(&shares).map(decided).collect();
+    let mut structures: Vec<Structure> = own.zip(shapes).zip(&fractions).map(decided).collect();
     if !is_noisy {
-        scatter_islands(tree, &mut structures, &shares, progress)?;
+        scatter_islands(tree, &mut structures, &fractions, progress)?;
     }
     Ok(structures)
 }
@@ -95,13 +95,13 @@ pub fn smoothed(
 fn scatter_islands(
     tree: &KdTree,
     structures: &mut [Structure],
-    shares: &[f32],
+    fractions: &[f32],
     progress: &dyn Progress,
 ) -> Result<()> {
     let positions = tree.positions();
     let is_near_scatter = |point: &u32| {
-        let (structure, share) = (structures[*point as usize], shares[*point as usize]);
-        structure == Structure::Surface && MIN_SHARE_NEAR_SCATTER <= share
+        let (structure, fraction) = (structures[*point as usize], fractions[*point as usize]);
+        structure == Structure::Surface && MIN_FRACTION_NEAR_SCATTER <= fraction
     };
     let near_scatter = (0..positions.len() as u32).filter(is_near_scatter);
     let mut candidates: Vec<IslandCandidate> =
@@ -168,8 +168,8 @@ mod tests {
         for (radius, stays) in [(0.1, false), (0.4, true)] {
             let (points, mut structures) = island_in_a_cube(radius);
             let tree = KdTree::new(&points, &NoProgress).unwrap();
-            let shares = vec![1.0; points.len()];
-            scatter_islands(&tree, &mut structures, &shares, &NoProgress).unwrap();
+            let fractions = vec![1.0; points.len()];
+            scatter_islands(&tree, &mut structures, &fractions, &NoProgress).unwrap();
             assert_eq!(structures.contains(&Structure::Surface), stays, "{radius}");
         }
     }

@@ -3,9 +3,9 @@
 use super::point_shape::{PointShape, Structure};
 use crate::math::{SymmetricMatrix, Vec3, smallest_eigenvector};
 
-/// Minimum share of scattered points in a cloud with much vegetation.
+/// Minimum fraction of scattered points in a cloud with much vegetation.
 pub const MIN_VEGETATION: f32 = 0.2;
-/// Minimum share of scattered points among the rough ones of a cloud that is leafy, not noisy.
+/// Minimum fraction of scattered points among the rough ones of a cloud that is leafy, not noisy.
 const MIN_SCATTERED_ROUGH: f32 = 0.5;
 
 /// Returns true if much of the cloud is vegetation: many points are scattered, and not by noise.

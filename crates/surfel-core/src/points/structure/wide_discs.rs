@@ -6,7 +6,7 @@
 //! The plane of two parallel wires is as flat as a surface, but it is a narrow strip.
 
 use super::point_shape::{PointShape, Structure};
-use super::solids::settle;
+use super::solids::apply_structure;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::points::neighbors::{KdTree, Neighbor};
@@ -67,26 +67,26 @@ pub struct WideDisc {
 /// All wide discs.
 struct WideDiscs<'a> {
     discs: &'a [WideDisc],
-    /// Place of the disc of each point among the discs, `u32::MAX` if it is not a wide one.
-    places: Vec<u32>,
+    /// Index of the disc of each point, `u32::MAX` if it has no wide one.
+    disc_indices: Vec<u32>,
 }
 
 impl<'a> WideDiscs<'a> {
     fn new(discs: &'a [WideDisc], n_points: usize) -> Self {
-        let mut places = vec![u32::MAX; n_points];
-        for (place, disc) in (0..).zip(discs) {
-            places[disc.point as usize] = place;
+        let mut disc_indices = vec![u32::MAX; n_points];
+        for (disc_idx, disc) in (0..).zip(discs) {
+            disc_indices[disc.point as usize] = disc_idx;
         }
-        Self { discs, places }
+        Self { discs, disc_indices }
     }
 
     /// Returns the disc of a point, if it is a wide one.
     fn of_point(&self, point: u32) -> Option<&WideDisc> {
-        self.discs.get(self.places[point as usize] as usize)
+        self.discs.get(self.disc_indices[point as usize] as usize)
     }
 
     /// True if another look at a disc would give the same result: neither its neighbours nor theirs have changed.
-    fn is_settled(&self, disc: &WideDisc) -> bool {
+    fn is_stable(&self, disc: &WideDisc) -> bool {
         let has_changed =
             |neighbor: &u32| self.of_point(*neighbor).is_some_and(|other| other.has_changed);
         !disc.has_changed && !disc.neighbors.iter().any(has_changed)
@@ -179,14 +179,14 @@ fn narrow(
         progress.check()?;
         let point = disc.point as usize;
         let mut shape = shapes[point];
-        if wide.is_settled(disc) {
+        if wide.is_stable(disc) {
             return Ok(shape);
         }
         if disc.neighbors.len() < MIN_CONFIRMING {
-            settle(tree, point, radii[point], disc.otherwise, &mut shape);
+            apply_structure(tree, point, radii[point], disc.otherwise, &mut shape);
             shape.radius = shape.radius.min(typical_radius);
         } else if is_strip(positions, disc, radii[point], &wide, shapes) {
-            settle(tree, point, radii[point], Structure::Line, &mut shape);
+            apply_structure(tree, point, radii[point], Structure::Line, &mut shape);
         } else {
             shape.radius = shape.radius.min(MAX_OVERHANG * disc.reach(positions));
         }

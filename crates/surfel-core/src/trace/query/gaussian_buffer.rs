@@ -25,8 +25,8 @@ impl GaussianHit {
     /// Returns a number that orders hits by distance, which is never negative, then by cloud and slot.
     #[inline(always)]
     fn key(&self) -> u128 {
-        let place = u64::from(self.cloud_idx) << 32 | u64::from(self.slot);
-        u128::from(self.distance.to_bits()) << 64 | u128::from(place)
+        let index = u64::from(self.cloud_idx) << 32 | u64::from(self.slot);
+        u128::from(self.distance.to_bits()) << 64 | u128::from(index)
     }
 
     /// Returns true if this hit comes before another one.

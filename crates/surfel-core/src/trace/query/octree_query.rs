@@ -261,9 +261,9 @@ fn corner_distances<F: Floats>(
         let after = cell.value(high);
         let changes = before.le(zero) & zero.lt(after) | zero.lt(before) & after.le(zero);
         if changes.bits() != 0 {
-            let place = cell.root((low, before), (high, after));
-            let normal = corner_normal(corners, cell.position(place));
-            let found = start + place;
+            let root = cell.root((low, before), (high, after));
+            let normal = corner_normal(corners, cell.position(root));
+            let found = start + root;
             let is_in_range = rays.t_min.le(found) & found.le(rays.t_max);
             let rises = (after - before) * normal.dot(rays.direction);
             let is_new = changes & is_in_range & zero.le(rises) & found.lt(distance);
@@ -285,30 +285,30 @@ struct CellRays<'c, F> {
 
 impl<F: Floats> CellRays<'_, F> {
     #[inline(always)]
-    fn position(&self, place: F) -> Vec3Lanes<F> {
-        self.origin.plus(self.direction.scaled(place))
+    fn position(&self, t: F) -> Vec3Lanes<F> {
+        self.origin.plus(self.direction.scaled(t))
     }
 
     #[inline(always)]
-    fn value(&self, place: F) -> F {
-        trilinear(self.values, self.position(place))
+    fn value(&self, t: F) -> F {
+        trilinear(self.values, self.position(t))
     }
 
-    /// Returns the zero between two places with values of different signs, by two steps of regula falsi.
+    /// Returns the zero between two distances with values of different signs, by two steps of regula falsi.
     #[inline(always)]
     fn root(&self, low: (F, F), high: (F, F)) -> F {
-        let place = zero_of_line(low, high);
-        let (value, zero) = (self.value(place), F::splat(0.0));
+        let guess = zero_of_line(low, high);
+        let (value, zero) = (self.value(guess), F::splat(0.0));
         let is_like_low = zero.lt(value) & zero.lt(low.1) | value.le(zero) & low.1.le(zero);
         let other = F::select(is_like_low, high.0, low.0);
         let other_value = F::select(is_like_low, high.1, low.1);
-        let better = zero_of_line((place, value), (other, other_value));
+        let better = zero_of_line((guess, value), (other, other_value));
         // Where the value is exactly zero, the line may be level.
-        F::select(value.le(zero) & zero.le(value), place, better)
+        F::select(value.le(zero) & zero.le(value), guess, better)
     }
 }
 
-/// Returns the place at which the line through two values at places is zero.
+/// Returns the distance at which the line through two values at distances is zero.
 #[inline(always)]
 fn zero_of_line<F: Floats>(a: (F, F), b: (F, F)) -> F {
     a.0 + (b.0 - a.0) * (a.1 / (a.1 - b.1))
@@ -325,13 +325,13 @@ fn trilinear<F: Floats>(corners: &[f32; 8], position: Vec3Lanes<F>) -> F {
 }
 
 #[inline(always)]
-fn between_corners<F: Floats>(low: f32, high: f32, place: F) -> F {
-    F::splat(low) + place * F::splat(high - low)
+fn between_corners<F: Floats>(low: f32, high: f32, fraction: F) -> F {
+    F::splat(low) + fraction * F::splat(high - low)
 }
 
 #[inline(always)]
-fn between<F: Floats>(low: F, high: F, place: F) -> F {
-    low + place * (high - low)
+fn between<F: Floats>(low: F, high: F, fraction: F) -> F {
+    low + fraction * (high - low)
 }
 
 #[inline(always)]

@@ -200,15 +200,15 @@ impl<W: PacketLanes> PacketField<W> {
         Crossings { lanes: found, roots, slopes }
     }
 
-    /// Returns the field at a place of each ray.
+    /// Returns the field at the distance `t` of each ray.
     #[inline(always)]
-    fn value(&self, places: W) -> (W, W::Mask) {
+    fn value(&self, t: W) -> (W, W::Mask) {
         count(Counted::Terms, PACKET_WIDTH * self.points.len());
         let mut sums = FieldSums::new();
         for point in &self.points {
-            let distance = point.squared - places * (point.twice_along - places);
+            let distance = point.squared - t * (point.twice_along - t);
             let inverse = W::splat(point.point.inverse_support_squared);
-            sums.add(field_weight(distance, inverse), point.height + places * point.slope);
+            sums.add(field_weight(distance, inverse), point.height + t * point.slope);
         }
         sums.value()
     }

@@ -128,17 +128,17 @@ fn limits_of_nearest<W: PacketLanes>(squared: &[[f32; PACKET_WIDTH]]) -> Limits<
         }
         let fraction = (wanted + W::splat(0.5) - n_low) / (n_high - n_low);
         let fraction = fraction.max(W::splat(0.05)).min(W::splat(0.95));
-        let place = low + (high - low) * fraction;
+        let guess = low + (high - low) * fraction;
         let mut n = zero;
         for squared in squared {
-            n = n + W::select(W::load(squared).le(place), one, zero);
+            n = n + W::select(W::load(squared).le(guess), one, zero);
         }
         let found = open & (n.le(wanted) & wanted.le(n)).bits();
-        limits = W::select(lane_mask::<W>(found), place, limits);
+        limits = W::select(lane_mask::<W>(found), guess, limits);
         open &= !found;
         let is_low = n.lt(wanted);
-        (low, n_low) = (W::select(is_low, place, low), W::select(is_low, n, n_low));
-        (high, n_high) = (W::select(is_low, high, place), W::select(is_low, n_high, n));
+        (low, n_low) = (W::select(is_low, guess, low), W::select(is_low, n, n_low));
+        (high, n_high) = (W::select(is_low, high, guess), W::select(is_low, n_high, n));
     }
     Limits { limits, ties: open }
 }

@@ -9,7 +9,7 @@ use crate::trace::traversal::region::{BoxVisitor, query_box};
 use std::marker::PhantomData;
 
 /// Offset of missing points, which is beyond every support.
-const FAR: f32 = 1e3;
+const MISSING_POINT_OFFSET: f32 = 1e3;
 
 /// One point of each position.
 #[derive(Clone, Copy)]
@@ -22,7 +22,7 @@ pub struct PointRow {
 
 impl PointRow {
     const NONE: Self = Self {
-        offset: [[FAR; PACKET_WIDTH]; 3],
+        offset: [[MISSING_POINT_OFFSET; PACKET_WIDTH]; 3],
         inverse_support: [1.0; PACKET_WIDTH],
         slot: [0.0; PACKET_WIDTH],
     };
@@ -74,7 +74,9 @@ impl PointLists {
         let mask = lane_mask::<L::PacketLanes>(lanes);
         for row in &mut self.rows {
             let x = L::PacketLanes::load(&row.offset[0]);
-            row.offset[0] = L::PacketLanes::select(mask, L::PacketLanes::splat(FAR), x).store();
+            row.offset[0] =
+                L::PacketLanes::select(mask, L::PacketLanes::splat(MISSING_POINT_OFFSET), x)
+                    .store();
         }
         let mut left = lanes;
         while left != 0 {

@@ -204,12 +204,12 @@ impl RayField {
         *n_points += lanes.bits().count_ones() as usize;
     }
 
-    /// Returns the field at eight equidistant places of an interval.
+    /// Returns the field at eight equidistant positions of an interval.
     #[inline(always)]
     fn sample<L: Lanes>(&self, (from, to): (f32, f32)) -> Samples {
         const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
         let step = (to - from) / (LANES - 1) as f32;
-        let places = L::splat(from) + L::splat(step) * L::load(&STEPS);
+        let t = L::splat(from) + L::splat(step) * L::load(&STEPS);
         let mut sums = FieldSums::new();
         let n = self.n_points;
         count(Counted::Terms, LANES * n);
@@ -217,9 +217,9 @@ impl RayField {
         let (height, slope) = (&self.height[..n], &self.slope[..n]);
         let inverse = &self.inverse_support_squared[..n];
         for i in 0..n {
-            let distance = L::splat(squared[i]) - places * (L::splat(twice_along[i]) - places);
+            let distance = L::splat(squared[i]) - t * (L::splat(twice_along[i]) - t);
             let weight = field_weight(distance, L::splat(inverse[i]));
-            sums.add(weight, L::splat(height[i]) + places * L::splat(slope[i]));
+            sums.add(weight, L::splat(height[i]) + t * L::splat(slope[i]));
         }
         let (values, is_valid) = sums.value();
         let is_above = L::splat(0.0).lt(values).bits();

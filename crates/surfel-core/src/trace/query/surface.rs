@@ -383,8 +383,8 @@ mod tests {
         let mut points = CloudGeometry::with_uniform_color(cloud, [188; 3]);
         points.surface = SurfaceKind::SplatFit;
         let flat = FlatCloud::new(&points, &NoProgress).unwrap();
-        let place = |i: usize| (i as f32 - 29.5) / 42.5;
-        let origins = (0..3600).map(|i| Vec3::new(place(i % 60), place(i / 60), 5.0));
+        let coordinate = |i: usize| (i as f32 - 29.5) / 42.5;
+        let origins = (0..3600).map(|i| Vec3::new(coordinate(i % 60), coordinate(i / 60), 5.0));
         // Up to 45 degrees from the normal.
         let origins = origins.filter(|origin| origin.truncate().length() < 0.7);
         let rays: Vec<Ray> = origins.map(|origin| Ray::new(origin, Vec3::NEG_Z)).collect();

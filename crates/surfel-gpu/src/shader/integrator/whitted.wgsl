@@ -114,8 +114,8 @@ fn shading_point(
 // Returns the number of light samples of a path with this weight: all branches of a camera ray share its samples in
 // proportion to their weights.
 fn n_samples_of(weight: vec3<f32>) -> u32 {
-    let share = f32(frame.n_light_samples) * largest(weight);
-    return clamp(u32(ceil(share)), 1u, frame.n_light_samples);
+    let n_samples = f32(frame.n_light_samples) * largest(weight);
+    return clamp(u32(ceil(n_samples)), 1u, frame.n_light_samples);
 }
 
 // Queues the branches of a path into a lobe that receives `fraction` of its weight: one into a mirror's lobe, one for

@@ -51,14 +51,14 @@ def _check(recipes, rim):
 
 
 def _survey(recipe):
-    """What a tile is like: its description, its corners, and the range of its colours."""
+    """The properties of a tile: its description, its corners, and the range of its colours."""
     thinned = {"subsample": f"random:{N_SURVEYED}", "up": "+Z"} | recipe.keys
     scene = recipe.derived(recipe.paths, **thinned).scene()
     return scene.describe(), scene.bounds.tolist(), scene._color_range()
 
 
 class Layout:
-    """Where the tiles of a mosaic lie, and the keywords with which all are rendered.
+    """The layout of the tiles of a mosaic, and the keywords with which all are rendered.
 
     `windows` has the pixels of each tile's points, `regions` those that are rendered of it, as columns and rows from the
     first to before the second.

@@ -1,4 +1,4 @@
-"""What a worker keeps: prepared scenes and films, the last used ones, as many as memory allows."""
+"""The cache of a worker: prepared scenes and films, the last used ones, as many as memory allows."""
 
 import collections
 import os

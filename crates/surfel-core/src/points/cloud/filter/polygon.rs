@@ -29,8 +29,8 @@ impl Side {
 
     /// Returns true if a ray from a position along +X crosses the side.
     fn crosses(&self, [x, y]: [f64; 2]) -> bool {
-        let is_beside = self.low[1] <= y && y < self.high_y;
-        is_beside && x < self.low[0] + (y - self.low[1]) * self.slope
+        let spans_y = self.low[1] <= y && y < self.high_y;
+        spans_y && x < self.low[0] + (y - self.low[1]) * self.slope
     }
 }
 

@@ -70,9 +70,9 @@ fn corner_distance(interval: CellInterval, ray: Ray) -> f32 {
         let high = f32(part + 1u) * step;
         let after = value_at(high);
         if (before <= 0.0) != (after <= 0.0) {
-            let place = zero_between(vec2<f32>(low, before), vec2<f32>(high, after));
-            let rises = (after - before) * dot(corner_normal(cell_origin + place * cell_direction), ray.direction);
-            let found = start + place;
+            let root = zero_between(vec2<f32>(low, before), vec2<f32>(high, after));
+            let rises = (after - before) * dot(corner_normal(cell_origin + root * cell_direction), ray.direction);
+            let found = start + root;
             if 0.0 <= rises && ray.t_min <= found && found <= ray.t_max {
                 return found;
             }
@@ -82,28 +82,28 @@ fn corner_distance(interval: CellInterval, ray: Ray) -> f32 {
     return NO_LIMIT;
 }
 
-fn value_at(place: f32) -> f32 {
+fn value_at(t: f32) -> f32 {
     let c = query_corners.values;
     let low = vec4<f32>(c[0], c[2], c[4], c[6]);
     let high = vec4<f32>(c[1], c[3], c[5], c[7]);
-    let position = cell_origin + place * cell_direction;
+    let position = cell_origin + t * cell_direction;
     let by_x = low + position.x * (high - low);
     let by_y = by_x.xz + position.y * (by_x.yw - by_x.xz);
     return by_y.x + position.z * (by_y.y - by_y.x);
 }
 
-// Returns the zero between two places with values of different signs, by two steps of regula falsi.
+// Returns the zero between two distances with values of different signs, by two steps of regula falsi.
 fn zero_between(low: vec2<f32>, high: vec2<f32>) -> f32 {
-    let place = zero_of_line(low, high);
-    let value = value_at(place);
+    let guess = zero_of_line(low, high);
+    let value = value_at(guess);
     if value == 0.0 {
-        return place;
+        return guess;
     }
     let is_like_low = (0.0 < value) == (0.0 < low.y);
-    return zero_of_line(vec2<f32>(place, value), select(low, high, is_like_low));
+    return zero_of_line(vec2<f32>(guess, value), select(low, high, is_like_low));
 }
 
-// Returns the place at which the line through two values at places is zero.
+// Returns the distance at which the line through two values at distances is zero.
 fn zero_of_line(a: vec2<f32>, b: vec2<f32>) -> f32 {
     let fall = a.y - b.y;
     return a.x + (b.x - a.x) * select(0.0, a.y / select(fall, 1.0, fall == 0.0), fall != 0.0);
@@ -117,6 +117,6 @@ fn corner_normal(position: vec3<f32>) -> vec3<f32> {
     return mix_corners(low, high, position.z);
 }
 
-fn mix_corners(low: vec3<f32>, high: vec3<f32>, place: f32) -> vec3<f32> {
-    return low + place * (high - low);
+fn mix_corners(low: vec3<f32>, high: vec3<f32>, fraction: f32) -> vec3<f32> {
+    return low + fraction * (high - low);
 }

@@ -17,7 +17,7 @@ struct Bracket {
     support: f32,
 }
 
-// The field at eight equidistant places of an interval.
+// The field at eight equidistant positions of an interval.
 struct Samples {
     begin: f32,
     step: f32,
@@ -109,12 +109,12 @@ fn bracket_zeros(ray: Ray, part: RaySegment) -> Bracket {
     return bracket;
 }
 
-// Returns the field at equidistant places of an interval.
+// Returns the field at equidistant positions of an interval.
 fn sample_field(ray: Ray, part: RaySegment, begin: f32, end: f32) -> Samples {
     let start = ray_at(ray, part.start);
     let step = (end - begin) / f32(N_SAMPLES - 1u);
-    let near_places = begin + step * vec4<f32>(0.0, 1.0, 2.0, 3.0);
-    let far_places = begin + step * vec4<f32>(4.0, 5.0, 6.0, 7.0);
+    let near_t = begin + step * vec4<f32>(0.0, 1.0, 2.0, 3.0);
+    let far_t = begin + step * vec4<f32>(4.0, 5.0, 6.0, 7.0);
     var weights = mat2x4<f32>(vec4<f32>(0.0), vec4<f32>(0.0));
     var heights = weights;
     for (var i = part.first_entry; i < part.end_entry; i++) {
@@ -125,19 +125,19 @@ fn sample_field(ray: Ray, part: RaySegment, begin: f32, end: f32) -> Samples {
             let is_flipped = ((entry.flips >> lane) & 1u) == 1u;
             let point = ray_point(point_at(points, lane), is_flipped, ray.direction, part.length);
             if point.is_near {
-                let own = mat2x4<f32>(weights_at(point, near_places), weights_at(point, far_places));
+                let own = mat2x4<f32>(weights_at(point, near_t), weights_at(point, far_t));
                 weights += own;
-                heights[0] += own[0] * (point.height + near_places * point.slope);
-                heights[1] += own[1] * (point.height + far_places * point.slope);
+                heights[0] += own[0] * (point.height + near_t * point.slope);
+                heights[1] += own[1] * (point.height + far_t * point.slope);
             }
         }
     }
     return signs_of(begin, step, weights, heights);
 }
 
-// Returns the weights of a point at four places.
-fn weights_at(point: RayPoint, places: vec4<f32>) -> vec4<f32> {
-    let squares = point.squared - places * (point.along + point.along - places);
+// Returns the weights of a point at four distances.
+fn weights_at(point: RayPoint, t: vec4<f32>) -> vec4<f32> {
+    let squares = point.squared - t * (point.along + point.along - t);
     let inside = max(1.0 - squares * point.inverse_support_squared, vec4<f32>(0.0));
     let squared = inside * inside;
     return squared * squared;
