@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use laz::LazVlr;
 use surfel_core::math::DVec3;
+use surfel_core::words::counted;
 
 use crate::display::format_vector;
-use crate::error::{Location, Result};
+use crate::error::{Error, Location, Result};
 use crate::file::Input;
 
 /// The header of a file.
@@ -67,22 +68,9 @@ impl Header {
 
 /// Reads and checks the header of a LAS or LAZ file.
 pub(super) fn read_header(input: &Input) -> Result<Header> {
-    let ends_early = |expected: &str| {
-        let location = Location::Byte(input.len() as u64);
-        input.malformed(
-            location,
-            "the end of the file",
-            expected,
-            "copy the file again from its source",
-        )
-    };
     if input.len() < 227 {
-        return Err(ends_early("a header of at least 227 bytes"));
+        return Err(ends_early(input, "a header of at least 227 bytes"));
     }
-    let malformed = |byte: u64, found: String, expected: &str| {
-        let advice = "the header is broken; copy the file again from its source";
-        input.malformed(Location::Byte(byte), found, expected, advice)
-    };
     let (major, minor_version) = (input[24], input[25]);
     if major != 1 || 5 < minor_version {
         let advice = "surfel reads LAS 1.0 to 1.4";
@@ -94,53 +82,24 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
     if data_start < header_size.max(227) || (input.len() as u64) < data_start {
         let expected =
             format!("between {} and {}, inside the file", header_size.max(227), input.len());
-        return Err(malformed(96, format!("points at byte {data_start}"), &expected));
+        return Err(malformed(input, 96, format!("points at byte {data_start}"), &expected));
     }
-    let point_format = input[104] & 0x3f;
-    let record_length = usize::from(read_u16(input, 105));
-    let Some(&min_length) = RECORD_LENGTHS.get(usize::from(point_format)) else {
-        return Err(malformed(104, format!("point format {point_format}"), "0 to 10"));
-    };
-    if record_length < min_length {
-        let expected = format!("at least {min_length} for point format {point_format}");
-        return Err(malformed(105, format!("records of {record_length} bytes"), &expected));
-    }
-    let vector = |byte| {
-        DVec3::new(read_f64(input, byte), read_f64(input, byte + 8), read_f64(input, byte + 16))
-    };
-    let (scale, offset) = (vector(131), vector(155));
+    let (point_format, record_length) = read_point_format(input)?;
+    let (scale, offset) = read_scale_and_offset(input)?;
     // For each axis the greatest coordinate and then the least.
     let every_second = |byte| {
         DVec3::new(read_f64(input, byte), read_f64(input, byte + 16), read_f64(input, byte + 32))
     };
     let bounds = [every_second(187), every_second(179)];
-    if !scale.is_finite() || scale.cmpeq(DVec3::ZERO).any() || !offset.is_finite() {
-        let found = format!("scale {} and offset {}", format_vector(scale), format_vector(offset));
-        return Err(malformed(131, found, "finite numbers, and scales other than 0"));
-    }
     let legacy_count = u64::from(read_u32(input, 107));
     let count = if is_1_4 { read_u64(input, 247) } else { 0 };
     let n_points = if count == 0 { legacy_count } else { count };
-
-    let mut records = Vec::new();
-    let mut at = header_size as usize;
-    for _ in 0..read_u32(input, 100) {
-        let record = read_vlr(input, at).ok_or_else(|| ends_early("a variable length record"))?;
-        at = record.data.end;
-        records.push(record);
-    }
+    let mut records = read_records(input, header_size as usize)?;
     let mut data = data_start as usize..input.len();
-    let extended_start = if is_1_4 { read_u64(input, 235) } else { 0 };
-    let n_extended = if is_1_4 { read_u32(input, 243) } else { 0 };
-    if 0 < n_extended && data_start <= extended_start && extended_start < input.len() as u64 {
-        data.end = extended_start as usize;
-        let mut at = data.end;
-        for _ in 0..n_extended {
-            // These records come last, so a file cut off here still has all its points.
-            let Some(record) = read_extended_vlr(input, at) else { break };
-            at = record.data.end;
-            records.push(record);
-        }
+    let extended_start = if is_1_4 { extended_start(input) } else { None };
+    if let Some(start) = extended_start.filter(|start| data_start <= *start) {
+        data.end = start as usize;
+        records.extend(read_extended_records(input, data.end));
     }
     let has_laszip = records.iter().any(|record| record.user_id == LazVlr::USER_ID);
     Ok(Header {
@@ -155,6 +114,75 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
         data,
         records,
     })
+}
+
+/// Returns the format of the points and the bytes of each.
+fn read_point_format(input: &Input) -> Result<(u8, usize)> {
+    let point_format = input[104] & 0x3f;
+    let record_length = usize::from(read_u16(input, 105));
+    let Some(&min_length) = RECORD_LENGTHS.get(usize::from(point_format)) else {
+        return Err(malformed(input, 104, format!("point format {point_format}"), "0 to 10"));
+    };
+    if record_length < min_length {
+        let expected = format!("at least {min_length} for point format {point_format}");
+        let found = format!("records of {}", counted(record_length, "byte"));
+        return Err(malformed(input, 105, found, &expected));
+    }
+    Ok((point_format, record_length))
+}
+
+/// Returns the unit of the integer coordinates, and the world coordinates of zero.
+fn read_scale_and_offset(input: &Input) -> Result<(DVec3, DVec3)> {
+    let vector = |byte| {
+        DVec3::new(read_f64(input, byte), read_f64(input, byte + 8), read_f64(input, byte + 16))
+    };
+    let (scale, offset) = (vector(131), vector(155));
+    if !scale.is_finite() || scale.cmpeq(DVec3::ZERO).any() || !offset.is_finite() {
+        let found = format!("scale {} and offset {}", format_vector(scale), format_vector(offset));
+        let expected = "finite numbers, and scales other than 0";
+        return Err(malformed(input, 131, found, expected));
+    }
+    Ok((scale, offset))
+}
+
+/// Returns the variable length records between the header and the points.
+fn read_records(input: &Input, mut at: usize) -> Result<Vec<Vlr>> {
+    let mut records = Vec::new();
+    for _ in 0..read_u32(input, 100) {
+        let record =
+            read_vlr(input, at).ok_or_else(|| ends_early(input, "a variable length record"))?;
+        at = record.data.end;
+        records.push(record);
+    }
+    Ok(records)
+}
+
+/// Returns the first byte of the extended variable length records of LAS 1.4, if there are any within the file.
+fn extended_start(input: &Input) -> Option<u64> {
+    let (start, n_records) = (read_u64(input, 235), read_u32(input, 243));
+    (0 < n_records && start < input.len() as u64).then_some(start)
+}
+
+/// Returns the extended variable length records. They come last, so a file cut off among them still has all its points.
+fn read_extended_records(input: &Input, mut at: usize) -> Vec<Vlr> {
+    let mut records = Vec::new();
+    for _ in 0..read_u32(input, 243) {
+        let Some(record) = read_extended_vlr(input, at) else { break };
+        at = record.data.end;
+        records.push(record);
+    }
+    records
+}
+
+fn ends_early(input: &Input, expected: &str) -> Error {
+    let (location, advice) =
+        (Location::Byte(input.len() as u64), "copy the file again from its source");
+    input.malformed(location, "the end of the file", expected, advice)
+}
+
+fn malformed(input: &Input, byte: u64, found: String, expected: &str) -> Error {
+    let advice = "the header is broken; copy the file again from its source";
+    input.malformed(Location::Byte(byte), found, expected, advice)
 }
 
 fn read_vlr(bytes: &[u8], at: usize) -> Option<Vlr> {

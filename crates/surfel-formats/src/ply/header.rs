@@ -101,17 +101,9 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
             }
             ["ply"] | ["comment" | "obj_info", ..] | [] => {}
             ["format", name, _version] => {
-                encoding = Some(match *name {
-                    "ascii" => Encoding::Ascii,
-                    "binary_little_endian" => Encoding::LittleEndian,
-                    "binary_big_endian" => Encoding::BigEndian,
-                    _ => {
-                        return Err(malformed(
-                            &line,
-                            "ascii, binary_little_endian or binary_big_endian",
-                        ));
-                    }
-                });
+                let expected = "ascii, binary_little_endian or binary_big_endian";
+                let found = parse_encoding(name).ok_or_else(|| malformed(&line, expected))?;
+                encoding = Some(found);
             }
             ["element", name, count] => {
                 let Ok(count) = count.parse() else {
@@ -119,15 +111,8 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
                 };
                 elements.push(Element { name: (*name).into(), count, properties: Vec::new() });
             }
-            ["property", type_name, .., name] => {
-                let property = match words.as_slice() {
-                    [_, _, _] => parse_type(type_name).map(|number_type| (number_type, None)),
-                    [_, "list", length, item, _] => parse_type(item)
-                        .zip(parse_type(length).filter(|length| !length.is_float()))
-                        .map(|(item, length)| (item, Some(length))),
-                    _ => None,
-                };
-                let Some((number_type, length_type)) = property else {
+            ["property", _, .., _] => {
+                let Some(property) = parse_property(&words) else {
                     return Err(malformed(
                         &line,
                         "`property TYPE NAME` or `property list TYPE TYPE NAME` with types such as float and uchar",
@@ -140,11 +125,7 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
                     let expected = format!("at most {MAX_FIELDS} properties an element");
                     return Err(malformed(&line, &expected));
                 }
-                element.properties.push(Property {
-                    name: (*name).into(),
-                    number_type,
-                    length_type,
-                });
+                element.properties.push(property);
             }
             ["end_header"] => {
                 let Some(encoding) = encoding else {
@@ -161,6 +142,28 @@ pub(super) fn read_header(input: &Input) -> Result<Header> {
             }
         }
     }
+}
+
+fn parse_encoding(name: &str) -> Option<Encoding> {
+    Some(match name {
+        "ascii" => Encoding::Ascii,
+        "binary_little_endian" => Encoding::LittleEndian,
+        "binary_big_endian" => Encoding::BigEndian,
+        _ => return None,
+    })
+}
+
+/// Returns the property that a line of words declares.
+fn parse_property(words: &[&str]) -> Option<Property> {
+    let (number_type, length_type, name) = match words {
+        [_, number_type, name] => (parse_type(number_type)?, None, name),
+        [_, "list", length, item, name] => {
+            let length_type = parse_type(length).filter(|length| !length.is_float())?;
+            (parse_type(item)?, Some(length_type), name)
+        }
+        _ => return None,
+    };
+    Some(Property { name: (*name).into(), number_type, length_type })
 }
 
 /// Returns the type of a name, old or new.

@@ -35,33 +35,17 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
         let advice = "save it as UTF-8 or as plain text";
         return Err(input.malformed(Location::Byte(0), "text in UTF-16", "UTF-8", advice));
     }
-    let mut names: Option<Vec<String>> = None;
-    let mut header_separator = None;
-    // A comment may be a header or only mention x, y and z: the number of fields decides.
-    let mut comment_names = None;
-    let mut count = None;
-    let mut at = 0;
-    let mut line_number = 0;
+    let mut header = HeaderLines::default();
+    let (mut at, mut line_number) = (0, 0);
     while at < input.len() {
-        let rest = &input[at..];
-        let near = &rest[..rest.len().min(MAX_LINE_LENGTH + 1)];
-        let end = memchr::memchr(b'\n', near).map(|end| end + 1);
-        if end.is_none() && near.len() < rest.len() {
-            let expected = format!("lines of at most {MAX_LINE_LENGTH} bytes");
-            return Err(input.malformed(
-                Location::Line(line_number + 1),
-                "a longer line",
-                expected,
-                ONE_POINT_PER_LINE,
-            ));
-        }
-        let length = end.unwrap_or(rest.len());
-        // Some programs put a byte order mark before UTF-8.
-        let line = rest[..length].trim_ascii();
-        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
-        line_number += 1;
         let start = at;
-        at += length;
+        line_number += 1;
+        let location = Location::Line(line_number);
+        let line = line_at(input, at, &location)?;
+        at += line.len();
+        // Some programs put a byte order mark before UTF-8.
+        let line = line.trim_ascii();
+        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
         let (text, is_comment) = match comment(line) {
             Some(text) => (text.trim_ascii(), true),
             None => (line, false),
@@ -69,14 +53,7 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
         if text.is_empty() {
             continue;
         }
-        // Texts may hold the separators of other files.
-        let fits_header = |separator: &Separator| {
-            let n_names = names.as_ref().map_or(0, Vec::len);
-            let n_fields = separator.fields(text).take(MAX_FIELDS).count();
-            n_fields == n_names || separator.may_lack_fields(n_fields, n_names)
-        };
-        let separator =
-            header_separator.filter(fits_header).unwrap_or_else(|| Separator::detect(text));
+        let separator = header.separator_of(text);
         let has_too_many = separator.fields(text).nth(MAX_FIELDS).is_some();
         if has_too_many && is_comment {
             continue;
@@ -84,67 +61,109 @@ pub(super) fn read_preamble(input: &Input) -> Result<Preamble> {
         if has_too_many {
             let found = format!("more than {MAX_FIELDS} fields");
             let expected = format!("at most {MAX_FIELDS} in a line");
-            return Err(input.malformed(
-                Location::Line(line_number),
-                found,
-                expected,
-                ONE_POINT_PER_LINE,
-            ));
+            return Err(input.malformed(location, found, expected, ONE_POINT_PER_LINE));
         }
         let fields: Vec<&[u8]> = separator.fields(text).collect();
+        if header.take(&fields, separator, is_comment) {
+            continue;
+        }
+        let preamble = header.before_points(&fields, separator, start, line_number);
+        return preamble.ok_or_else(|| not_numbers(input, location, text, separator));
+    }
+    let (found, expected) = ("no line with numbers", "x y z in each line");
+    Err(input.malformed(Location::Line(line_number), found, expected, "the file holds no points"))
+}
+
+/// Returns the line that begins at a byte, with its end.
+fn line_at<'a>(input: &'a Input, at: usize, location: &Location) -> Result<&'a [u8]> {
+    let rest = &input[at..];
+    let near = &rest[..rest.len().min(MAX_LINE_LENGTH + 1)];
+    let end = memchr::memchr(b'\n', near).map(|end| end + 1);
+    if end.is_none() && near.len() < rest.len() {
+        let expected = format!("lines of at most {MAX_LINE_LENGTH} bytes");
+        let found = "a longer line";
+        return Err(input.malformed(location.clone(), found, expected, ONE_POINT_PER_LINE));
+    }
+    Ok(&rest[..end.unwrap_or(rest.len())])
+}
+
+/// The content of the lines before the points, as far as they were read.
+#[derive(Default)]
+struct HeaderLines {
+    names: Option<Vec<String>>,
+    /// Separator of the names.
+    separator: Option<Separator>,
+    /// Names in a comment. It may be a header or only mention x, y and z: the number of fields decides.
+    comment_names: Option<Vec<String>>,
+    /// Number of points.
+    count: Option<u64>,
+}
+
+impl HeaderLines {
+    /// Returns the separator of a line: that of the names, if it gives as many fields. Texts may hold the separators of
+    /// other files.
+    fn separator_of(&self, text: &[u8]) -> Separator {
+        let n_names = self.names.as_ref().map_or(0, Vec::len);
+        let fits = |separator: &Separator| {
+            let n_fields = separator.fields(text).take(MAX_FIELDS).count();
+            n_fields == n_names || separator.may_lack_fields(n_fields, n_names)
+        };
+        self.separator.filter(fits).unwrap_or_else(|| Separator::detect(text))
+    }
+
+    /// Keeps the content of a comment, of names and of a number of points. Returns false for any other line.
+    fn take(&mut self, fields: &[&[u8]], separator: Separator, is_comment: bool) -> bool {
         if is_comment {
-            comment_names = column_names(&fields).or(comment_names);
-            continue;
+            self.comment_names = column_names(fields).or(self.comment_names.take());
+            return true;
         }
-        if let Some(header) = column_names(&fields) {
-            names = Some(header);
-            header_separator = Some(separator);
-            continue;
+        if let Some(names) = column_names(fields) {
+            self.names = Some(names);
+            self.separator = Some(separator);
+            return true;
         }
-        if let ([field], None) = (&fields[..], count)
+        if let ([field], None) = (fields, self.count)
             && let Ok(points) = String::from_utf8_lossy(field).parse()
         {
-            count = Some(points);
-            continue;
+            self.count = Some(points);
+            return true;
         }
+        false
+    }
+
+    /// Returns the preamble before the first line of points, which has these fields; `None` if they are no point.
+    fn before_points(
+        self,
+        fields: &[&[u8]],
+        separator: Separator,
+        data: usize,
+        data_line: u64,
+    ) -> Option<Preamble> {
         let has_empty_end = fields.last().is_some_and(|field| field.is_empty());
         let fits = |names: &Vec<String>| {
             names.len() == fields.len()
                 || has_empty_end && names.len() + 1 == fields.len()
                 || separator.may_lack_fields(fields.len(), names.len())
         };
-        let header = names.as_ref().or(comment_names.as_ref()).filter(|names| fits(names));
+        let header =
+            self.names.as_ref().or(self.comment_names.as_ref()).filter(|names| fits(names));
         let is_number = |field: &&[u8]| separator.parse_number(field).is_ok();
         let has_text = !fields.iter().all(|field| field.is_empty() || is_number(field));
         let is_point = match header {
-            Some(names) => has_numbers_on_axes(names, &fields, is_number),
+            Some(names) => has_numbers_on_axes(names, fields, is_number),
             None => 3 <= fields.iter().filter(|field| is_number(field)).count(),
         };
-        if !has_text || is_point {
-            let names = names.or(comment_names.filter(fits));
-            let n_names = names.as_ref().map_or(fields.len() - 1, Vec::len);
-            // A separator at the end of each line does not begin a further column.
-            let has_cut_end = has_empty_end || separator.may_lack_fields(fields.len(), n_names);
-            let n_fields = if has_cut_end { n_names } else { fields.len() };
-            return Ok(Preamble {
-                names,
-                count,
-                separator,
-                n_fields,
-                has_text,
-                data: start,
-                data_line: line_number,
-            });
+        if has_text && !is_point {
+            return None;
         }
-        return Err(not_numbers(input, Location::Line(line_number), text, separator));
+        let names = self.names.or(self.comment_names.filter(fits));
+        let n_names = names.as_ref().map_or(fields.len() - 1, Vec::len);
+        // A separator at the end of each line does not begin a further column.
+        let has_cut_end = has_empty_end || separator.may_lack_fields(fields.len(), n_names);
+        let n_fields = if has_cut_end { n_names } else { fields.len() };
+        let count = self.count;
+        Some(Preamble { names, count, separator, n_fields, has_text, data, data_line })
     }
-    let advice = "the file holds no points";
-    Err(input.malformed(
-        Location::Line(line_number),
-        "no line with numbers",
-        "x y z in each line",
-        advice,
-    ))
 }
 
 /// Returns true if the fields of x, y and z are numbers.

@@ -197,12 +197,7 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
     // A fitted sphere has no rim that sticks out beyond a bend and shows its back.
     let candidates = CandidateHitLanes::new(hits.normals, direction, radius);
     let mut neighborhood = NeighborhoodStats::<_, false>::new(candidates);
-    let mut centers = [[0.0; PACKET_WIDTH]; 3];
-    for lane in set_bits::<PACKET_WIDTH>(lanes) {
-        let center = cloud.points.center(hit_slots[lane]);
-        [centers[0][lane], centers[1][lane], centers[2][lane]] = center.to_array();
-    }
-    let center = Vec3Lanes::load_packet(&centers).minus(position);
+    let center = centers_of(&cloud.points, hit_slots, lanes).minus(position);
     let mut overhang = OverhangSums::new(hits.normals, center, radius);
     let mut colors = ColorSums::default();
     let mut nearest =
@@ -250,14 +245,39 @@ fn finish<L: Lanes, const HAS_COLORS: bool>(
     if HAS_COLORS {
         hits.slots = L::PacketLanes::select(mask, nearest.slots, hits.slots);
         let slots = nearest.slots.store().map(f32::to_bits);
-        let mut of_nearest = [[0.0; PACKET_WIDTH]; 3];
-        for lane in set_bits::<PACKET_WIDTH>(accepted) {
-            let color = cloud.points.surfel(slots[lane]).color;
-            [of_nearest[0][lane], of_nearest[1][lane], of_nearest[2][lane]] = color.to_array();
-        }
-        let mean = colors.mean(Vec3Lanes::load_packet(&of_nearest));
+        let mean = colors.mean(colors_of(&cloud.points, &slots, accepted));
         hits.colors = Vec3Lanes::select(mask, mean, hits.colors);
     }
+}
+
+/// Returns the centers of the discs in these lanes, and zero in all others.
+#[inline(always)]
+fn centers_of<W: PacketLanes>(
+    points: &FlatPoints,
+    slots: &[Slot; PACKET_WIDTH],
+    lanes: u32,
+) -> Vec3Lanes<W> {
+    let mut centers = [[0.0; PACKET_WIDTH]; 3];
+    for lane in set_bits::<PACKET_WIDTH>(lanes) {
+        let center = points.center(slots[lane]);
+        [centers[0][lane], centers[1][lane], centers[2][lane]] = center.to_array();
+    }
+    Vec3Lanes::load_packet(&centers)
+}
+
+/// Returns the colours of the discs in these lanes, and zero in all others.
+#[inline(always)]
+fn colors_of<W: PacketLanes>(
+    points: &FlatPoints,
+    slots: &[Slot; PACKET_WIDTH],
+    lanes: u32,
+) -> Vec3Lanes<W> {
+    let mut colors = [[0.0; PACKET_WIDTH]; 3];
+    for lane in set_bits::<PACKET_WIDTH>(lanes) {
+        let color = points.surfel(slots[lane]).color;
+        [colors[0][lane], colors[1][lane], colors[2][lane]] = color.to_array();
+    }
+    Vec3Lanes::load_packet(&colors)
 }
 
 /// Returns a step along the ray after another one. Where it would turn back, steps could go to and fro around a bend:
