@@ -54,7 +54,10 @@ Examples:
   surfel render statue.ply -o statue.exr --up +Y --spp 64 --no-background
   surfel render huge.laz -o quick.png --subsample random:2000000 --spp 1 --stats -
 
-Not the picture you expected? docs/troubleshooting.md lists problems and the options that help.";
+Not the picture you expected? Each choice is shown with the option that overrides it.
+  --radius-scale 1.5 closes holes, 0.7 sharpens details
+  --up +Y turns what lies on its side, --camera-azimuth-angle 180 shows the other side
+  --color, --gamma and --exposure change colours and brightness";
 
 /// Renders a picture.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {

@@ -58,7 +58,6 @@
 
 pub mod names;
 pub mod crs;
-mod troubleshooting;
 pub mod memory_files;
 pub mod description;
 mod error;

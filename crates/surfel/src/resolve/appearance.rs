@@ -8,7 +8,6 @@ use crate::description::{
     Invalid, LightKind, MaterialChoice, MaterialDescription, ObjectDescription, SceneDescription,
 };
 use crate::error::Result;
-use crate::troubleshooting::TroubleshootingSection;
 use std::path::Path;
 use surfel_core::math::Vec3;
 use surfel_core::points::{PointCloud, PreparedCloud};
@@ -62,7 +61,8 @@ fn clip(
     let with_plane = clips.iter().any(|clip| clip.plane.is_some()).then_some("clip_plane");
     let keys: Vec<&str> = with_box.into_iter().chain(with_plane).collect();
     if !keys.is_empty() && graph.n_points_and_triangles() == (0, 0) {
-        let text = format!("everything is hidden; {}", TroubleshootingSection::EmptyPicture);
+        let text =
+            "everything is hidden; give coordinates of the file, whose bounds `surfel info` shows";
         return Err(Invalid::at(keys.join(", "), text).into());
     }
     Ok(())

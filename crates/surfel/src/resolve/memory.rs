@@ -2,7 +2,6 @@
 
 use crate::description::SceneDescription;
 use crate::error::{Error, Result};
-use crate::troubleshooting::TroubleshootingSection;
 use std::collections::BTreeMap;
 use std::path::Path;
 use surfel_core::bytes::readable;
@@ -145,7 +144,7 @@ impl MemoryEstimate {
         let things: Vec<String> = there.map(|(count, name)| counted(*count, name)).collect();
         Err(Error::OutOfMemory(format!(
             "{} need about {} of memory ({} as read, {} tree, {} picture), and \
-             --memory-limit is {}; {}raise the limit; {}",
+             --memory-limit is {}; {}raise the limit",
             things.join(" and "),
             readable(all),
             readable(read),
@@ -153,7 +152,6 @@ impl MemoryEstimate {
             readable(picture),
             readable(limit),
             self.advice(limit),
-            TroubleshootingSection::OutOfMemory,
         )))
     }
 

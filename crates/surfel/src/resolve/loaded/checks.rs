@@ -7,7 +7,6 @@ use super::LoadedScene;
 use crate::description::{PreparationSettings, SceneDescription};
 use crate::error::{Error, Result};
 use crate::names::list_files;
-use crate::troubleshooting::TroubleshootingSection;
 use surfel_core::points::{STRUCTURE, SURFACE_VARIATION};
 use surfel_core::progress::Progress;
 use surfel_core::render::check_surfaces;
@@ -56,14 +55,13 @@ impl LoadedScene {
             }
             return Err(Error::Unfit(format!(
                 "{}: no column {color}; --color takes {}, {SURFACE_VARIATION}, {STRUCTURE}, #RRGGBB, a CSS colour \
-                 name and what the file has: {}; {}",
+                 name and what the file has: {}",
                 list_files(self.files_of(i, description)),
                 ColorSource::names_where(ColorSource::is_computed).join(", "),
                 match colorable_columns(&self.file_info().columns) {
                     none if none.is_empty() => "only positions".to_owned(),
                     columns => columns.join(", "),
                 },
-                TroubleshootingSection::WrongColors,
             )));
         }
         Ok(())
