@@ -27,7 +27,8 @@ pub fn stand_sun_at_date(
     let system = coordinate_system(scene, description);
     let place = description.world.place.or_else(|| system.as_ref()?.place(position));
     let Some(place) = place else {
-        let advice = "no file states where on Earth it lies; add --place LAT,LON or --crs EPSG:CODE";
+        let advice =
+            "no file states where on Earth it lies; add --place LAT,LON or --crs EPSG:CODE";
         return Err(Invalid::at("sun", advice));
     };
     let by_axes = Compass { north: north(up).as_dvec3(), up: up.as_dvec3() };
