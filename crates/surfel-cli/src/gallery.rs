@@ -88,7 +88,7 @@ fn scene() -> String {
     let (eye, target) = (world(EYE), world(TARGET));
     let (glass, mirror, knot) = (world(GLASS), world(MIRROR), world(KNOT));
     format!(
-        r##"# A scanned ruin with three objects in it. `surfel render --help` explains the keys.
+        r##"# A scanned ruin with three objects in it. `surfel render --help` lists the settings as options.
 resolution = "1280x720"
 background = "#4f7fb8,#d5e2ee"
 

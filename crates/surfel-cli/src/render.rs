@@ -55,9 +55,8 @@ Examples:
   surfel render huge.laz -o quick.png --subsample random:2000000 --spp 1 --stats -
 
 Not the picture you expected? Each choice is shown with the option that overrides it.
-  --radius-scale 1.5 closes holes, 0.7 sharpens details
-  --up +Y turns what lies on its side, --camera-azimuth-angle 180 shows the other side
-  --color, --gamma and --exposure change colours and brightness";
+  Holes or blur: --radius-scale 1.5 or 0.7. On its side: --up +Y or +Z.
+  The wrong side: --camera-azimuth-angle 180. Colours or light: --color, --gamma, --exposure.";
 
 /// Renders a picture.
 pub fn run(args: &Args, global: &Global, report: &Report) -> anyhow::Result<()> {

@@ -1,5 +1,7 @@
 //! The errors of the library.
 
+use crate::words::counted;
+
 /// An error of the library.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -35,7 +37,9 @@ pub enum Error {
     },
     /// A column does not have one entry for each point.
     #[error(
-        "the column of {column} has {found} entries, one for each of {expected} points expected"
+        "the column of {column} has {}, one for each of {} expected",
+        entries(*found),
+        counted(*expected, "point")
     )]
     ColumnLength {
         /// Name of the column.
@@ -88,3 +92,7 @@ pub enum Error {
 
 /// A result whose error is [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
+
+fn entries(n: usize) -> String {
+    if n == 1 { "1 entry".to_owned() } else { format!("{n} entries") }
+}

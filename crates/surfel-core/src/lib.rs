@@ -38,9 +38,9 @@
 //! # Ok::<(), surfel_core::Error>(())
 //! ```
 
-mod error;
 pub mod bytes;
 pub mod words;
+mod error;
 pub mod math;
 pub mod progress;
 pub mod image;

@@ -6,7 +6,7 @@ use surfel_core::bvh::BvhNode;
 use surfel_core::flat::{BlockTree, FlatGaussians, FlatGeometry, GaussianBlock};
 use surfel_core::math::LANES;
 
-/// The place of a cloud's Gaussians in the arrays of all.
+/// The range of a cloud's Gaussians in the arrays of all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaussianRange {
     /// Index of the geometry.

@@ -64,12 +64,12 @@ impl CameraFile {
     }
 }
 
-fn number(text: &str, number_idx: usize) -> Result<f64, String> {
+fn number(text: &str, ordinal: usize) -> Result<f64, String> {
     let number = text.trim().parse::<f64>().ok();
     // Beyond this the squares of lengths are no longer finite in f32.
     number.filter(|number| number.abs() < 1e15).ok_or_else(|| {
         let found: String = text.trim().chars().take(40).collect();
-        format!("number {number_idx}: found `{}`, expected {FORM}", found.escape_debug())
+        format!("number {ordinal}: found `{}`, expected {FORM}", found.escape_debug())
     })
 }
 

@@ -9,7 +9,7 @@
 //! - `cleaning`: points that are dropped;
 //! - `normals` and `radii`: the discs that points become;
 //! - `structure`: which points form a surface, a line or neither;
-//! - `denoising`: points moved onto their surface;
+//! - `denoising`: points moved onto their surface or line;
 //! - `gaps`: discs that are narrowed where a scanner saw through them, and widened between parts of one surface.
 //!
 //! A file or folder uses only those above it.

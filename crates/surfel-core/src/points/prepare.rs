@@ -60,7 +60,7 @@ pub fn select_points(
         && let Some(kept) = without_mixed_pixels(&cloud)
     {
         let n_mixed = cloud.len() - kept.len();
-        let line = format!("{n_mixed} mixed pixels between two surfaces dropped");
+        let line = format!("{} between two surfaces dropped", counted(n_mixed, "mixed pixel"));
         progress.choice(&line, &["mixed_pixels"]);
         cloud = cloud.subset(&kept);
     }
@@ -116,7 +116,7 @@ pub fn prepare(
         false => None,
     };
     let Estimates { fits, mut radii, tree, .. } = estimates;
-    if let (Some((shapes, _)), Some((radii, _)), Some(tree), true) =
+    if let (Some((shapes, _)), Some((radii, found)), Some(tree), true) =
         (&mut shapes, &mut radii, tree, preparation.denoise != Denoise::Off)
     {
         let scanner = rings.as_ref().map(|rings| (rings.scanner - cloud.origin).as_vec3());
@@ -124,6 +124,7 @@ pub fn prepare(
         drop(tree);
         report.lines = Some(move_to_axes(&axes, &mut cloud.positions, shapes));
         radii.iter_mut().zip(shapes).for_each(|(radius, shape)| *radius = shape.radius);
+        found.update(radii);
     }
     if let Some((fits, neighborhood)) = fits {
         if preparation.keep_variation {

@@ -154,7 +154,7 @@ mod tests {
             PreparedCloud::new(cloud).unwrap_err().to_string()
         };
         assert_eq!(error(|cloud| cloud.radii = None), "the cloud has no radii");
-        let expected = "the column of radii has 1 entries, one for each of 2 points expected";
+        let expected = "the column of radii has 1 entry, one for each of 2 points expected";
         assert_eq!(error(|cloud| cloud.radii = Some(vec![0.5])), expected);
         let expected = "the column of joints has 0 entries, one for each of 2 points expected";
         assert_eq!(error(|cloud| cloud.skin = Some(Skin::default())), expected);

@@ -56,12 +56,12 @@ pub(super) fn read_header(salvage: &mut Salvage) -> Result<Header> {
         return Err(input.malformed(location, "the end of the file", expected, ADVICE));
     };
     if page_length != PAGE_LENGTH as u64 {
-        let found = format!("pages of {page_length} bytes");
+        let found = format!("pages of {}", counted(page_length, "byte"));
         let expected = format!("{PAGE_LENGTH}, as the standard asks");
         return Err(input.malformed(Location::Byte(40), found, expected, ADVICE));
     }
     if length == 0 || !length.is_multiple_of(page_length) {
-        let found = format!("a length of {length} bytes");
+        let found = format!("a length of {}", counted(length, "byte"));
         let expected = format!("whole pages of {PAGE_LENGTH}");
         return Err(input.malformed(Location::Byte(16), found, expected, ADVICE));
     }

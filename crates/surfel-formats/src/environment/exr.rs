@@ -5,6 +5,7 @@
 use std::cell::Cell;
 use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use surfel_core::words::counted;
 
 use exr::block::chunk::{Chunk, CompressedBlock};
 use exr::block::reader::Reader;
@@ -200,7 +201,8 @@ fn check_dwa(input: &Input, location: Location, header: &Header, chunk: &Chunk) 
         [1, 6, 7, 8, 9].map(|index| counters.get(index).map(|bytes| u64::from_le_bytes(*bytes)));
     match claimed.into_iter().flatten().find(|claimed| limit < *claimed) {
         Some(claimed) => {
-            let found = format!("a block of {n_bytes} bytes that unpacks to {claimed}");
+            let found =
+                format!("a block of {} that unpacks to {claimed}", counted(n_bytes, "byte"));
             Err(malformed(input, location, found, "a size that fits it"))
         }
         None => Ok(()),

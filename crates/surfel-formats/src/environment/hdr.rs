@@ -3,6 +3,7 @@
 
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use super::hdr_image::{HdrImage, check_size, warn_about_primaries};
 use crate::error::{Location, Result};
@@ -235,14 +236,12 @@ impl ScanlineReader<'_> {
         read.map_err(|error| {
             let (found, expected) = match error {
                 ScanlineError::EndOfFile => {
-                    ("the end of the file".into(), format!("{length} pixels"))
+                    ("the end of the file".into(), counted(length, "pixel"))
                 }
-                ScanlineError::WrongLength(other) => {
-                    (format!("{other} pixels"), length.to_string())
-                }
+                ScanlineError::WrongLength(other) => (counted(other, "pixel"), length.to_string()),
                 ScanlineError::EmptyRun => ("a run of no bytes".into(), "one of 1 to 128".into()),
                 ScanlineError::RunTooLong => {
-                    ("a run past its end".into(), format!("{length} pixels"))
+                    ("a run past its end".into(), counted(length, "pixel"))
                 }
                 ScanlineError::NothingToRepeat => {
                     ("a repetition first".into(), "a pixel first".into())

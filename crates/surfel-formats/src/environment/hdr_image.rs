@@ -2,6 +2,7 @@
 
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
+use surfel_core::words::counted;
 
 use crate::error::{Location, Result};
 use crate::file::Input;
@@ -68,7 +69,7 @@ pub(super) fn check_size(
     // The decoded image has three floats per pixel, whatever the file stores.
     let n_bytes = n_pixels.saturating_mul(bytes_per_pixel.max(size_of::<Vec3>() as u64));
     if max_decoded_bytes(input) < n_bytes {
-        let found = format!("{width} x {height} pixels in {} bytes", input.len());
+        let found = format!("{width} x {height} pixels in {}", counted(input.len(), "byte"));
         let advice = "copy the file again from its source, or write it again with less compression";
         return Err(input.malformed(location, found, "a size that the bytes can hold", advice));
     }

@@ -37,7 +37,7 @@ pub(crate) fn decode_texture(name: &str, bytes: &[u8]) -> Result<Texture> {
         return Err(Error::Unsupported { file: name.into(), action: "read", found, advice });
     }
     if n_texels == 0 || bytes.len() as u64 * MAX_TEXELS_PER_BYTE < n_texels {
-        let found = format!("{width} x {height} texels in {} bytes", bytes.len());
+        let found = format!("{width} x {height} texels in {}", counted(bytes.len(), "byte"));
         return Err(malformed(name, found, "a whole picture"));
     }
     let mut limits = Limits::no_limits();

@@ -36,7 +36,7 @@ pub(super) fn records(
     let (values, fault) = decompress(&data[..data.len().min(n_compressed)], n_bytes);
     let n_readable = n_readable(header, n_points, values.len());
     if fault.is_some() || data.len() < n_compressed {
-        let found_points = format!("{n_readable} of {} whole", counted(n_points, "point"));
+        let found_points = format!("{n_readable} of {} are whole", counted(n_points, "point"));
         let error = match fault {
             Some(fault) if n_compressed <= data.len() => {
                 let location = Location::Byte((header.body + 8 + fault.byte) as u64);
@@ -77,13 +77,13 @@ fn sizes<'a>(input: &'a Input, header: &Header) -> Result<(usize, usize, &'a [u8
     if u128::from(n_bytes) != expected_bytes {
         let location = Location::Byte(header.body as u64 + 4);
         let expected = format!("{expected_bytes}, as its fields and points take");
-        return Err(input.malformed(location, format!("{n_bytes} bytes"), expected, ADVICE));
+        return Err(input.malformed(location, counted(n_bytes, "byte"), expected, ADVICE));
     }
     let max_bytes = u64::from(n_compressed) * MAX_RATIO as u64;
     if max_bytes < n_bytes.into() {
         let location = Location::Byte(header.body as u64);
         let expected = format!("at most {max_bytes} from {n_compressed} bytes");
-        return Err(input.malformed(location, format!("{n_bytes} bytes"), expected, ADVICE));
+        return Err(input.malformed(location, counted(n_bytes, "byte"), expected, ADVICE));
     }
     Ok((n_compressed as usize, n_bytes as usize, data))
 }

@@ -77,7 +77,7 @@ pub(crate) fn read(
         progress.note(&format!("{}: {line}", input.name));
     }
     let n_cells = scans.iter().fold(0, |sum: u64, scan| sum.saturating_add(scan.n_cells()));
-    salvage.report("cell", n_cells_read, Some(n_cells), progress)?;
+    salvage.report("grid cell", n_cells_read, Some(n_cells), progress)?;
     let mut cloud = builder.finish();
     let stations = scans.iter().enumerate().map(|(i, scan)| ScanStation {
         name: format!("scan {}", i + 1),

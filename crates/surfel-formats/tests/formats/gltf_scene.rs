@@ -153,7 +153,7 @@ fn nodes_scaled_to_zero_are_hidden_unless_animated() {
     };
     let loaded = asset.load().unwrap();
     assert_eq!(is_visible(&loaded.graph), [true, false, false, true, false]);
-    assert!(loaded.has_note("scaled to 0: `below`, 1 nodes in all"), "{:?}", loaded.notes);
+    assert!(loaded.has_note("scaled to 0: `below`, 1 node in all"), "{:?}", loaded.notes);
     let times = asset.numbers("SCALAR", &[0.0f32, 1.0]);
     let scales = asset.numbers("VEC3", &[0.0f32, 0.0, 0.0, 1.0, 1.0, 1.0]);
     asset.push(

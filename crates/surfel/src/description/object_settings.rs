@@ -91,8 +91,8 @@ settings! {
         /// all by RATIO standard deviations (statistical alone: 16,2), or radius:DISTANCE,COUNT, with fewer than COUNT
         /// others (16) within DISTANCE.
         remove_outliers: OutlierRemoval, parsed(OutlierRemoval::to_string), "CHOICE";
-        /// Moves noisy points onto their surface: auto (surfaces whose noise is at least 0.15 of the spacing), on or
-        /// off [default: auto, off for surfel prepare].
+        /// Moves noisy points onto their surface, and those of wires onto the axis of the wire: auto (surfaces whose noise is at
+        /// least 0.15 of the spacing, and wires), on or off [default: auto, off for surfel prepare].
         denoise: Denoise, OneOf(DENOISE), "WHEN";
         /// Points in the air where the range of a scan jumps, as the grids of E57, PTX and PCD files tell: drop or keep. surfel
         /// prepare drops them only if it adds normals or radii, or if this is given.

@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use surfel_core::math::Vec3;
 use surfel_core::progress::Progress;
 use surfel_core::scene::Environment;
+use surfel_core::words::counted;
 use surfel_formats::HdrImage;
 
 /// Reads the environment map, upright as in its file.
@@ -19,8 +20,9 @@ pub fn load_environment(
     let environment = Environment::new(width, height, pixels, Vec3::Z, 0.0)
         .map_err(|cause| Error::Content { files: vec![file.clone()], cause })?;
     if 0 < environment.n_repaired() {
-        let what = "pixels repaired that are no light (negative, infinite, NaN)";
-        progress.note(&format!("{}: {} {what}", file.display(), environment.n_repaired()));
+        let pixels = counted(environment.n_repaired(), "pixel");
+        let what = "with a negative, infinite or NaN value";
+        progress.note(&format!("{}: repaired {pixels} {what}", file.display()));
     }
     Ok(Some(environment))
 }

@@ -42,7 +42,7 @@ const MAX_HEIGHT: f32 = 6.0;
 /// The choice whether points are moved onto their surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Denoise {
-    /// Noisy surfaces without normals are denoised.
+    /// Noisy surfaces without normals, and points on straight lines, are denoised.
     #[default]
     Auto,
     /// All points are moved.

@@ -10,11 +10,11 @@ pub const CAPSULE_ASPECT: f32 = 4.0;
 /// Number of neighbours that give the direction of a line.
 pub const N_LINE_NEIGHBORS: usize = 8;
 /// Number of neighbours that give the direction and the thickness of a straight line.
-const N_STRAIGHT_NEIGHBORS: usize = 24;
+pub const N_STRAIGHT_NEIGHBORS: usize = 24;
 /// Maximum ratio of the deviations across and along a straight line: twigs and edges have more.
-const MAX_STRAIGHT_WIDTH: f32 = 0.1;
-/// Ratio of the radius of a round line to the standard deviation, across it, of the points that a scanner measures on the side
-/// toward it.
+pub const MAX_STRAIGHT_WIDTH: f32 = 0.1;
+/// Ratio of the radius of a round line to the standard deviation of its points across it: 1.0 where scanners measured all
+/// around it, 1.6 where one scanner measured one side.
 const THICKNESS_OF_DEVIATION: f32 = 1.4;
 /// Radius of a ball in distances to the second neighbour: balls of neighbours overlap a little.
 const BALL_REACH: f32 = 0.6;
@@ -56,17 +56,20 @@ pub fn apply_structure(
 }
 
 /// The line through a point and its neighbours.
-struct LineFit {
+pub struct LineFit {
+    /// Mean offset of all of them from the point.
+    pub mean: DVec3,
     /// Direction in which they extend most.
-    direction: Vec3,
+    pub direction: Vec3,
     /// Ratio of the deviations across and along it.
-    width: f32,
-    /// Radius of a round line on whose surface, seen from one side, they would lie.
-    thickness: f32,
+    pub width: f32,
+    /// Radius of a round line on whose surface they would lie.
+    pub thickness: f32,
 }
 
 impl LineFit {
-    fn of(positions: &[Vec3], point: usize, neighbors: &[Neighbor]) -> Self {
+    /// Fits the line.
+    pub fn of(positions: &[Vec3], point: usize, neighbors: &[Neighbor]) -> Self {
         let center = positions[point].as_dvec3();
         let offsets = neighbors.iter().map(|other| positions[other.index as usize].as_dvec3());
         let offsets: Vec<DVec3> = offsets.map(|other| other - center).collect();
@@ -79,6 +82,7 @@ impl LineFit {
         let (values, vectors) = scatter.eigen();
         let [across, along] = [values[0] + values[1], values[2]].map(|v| v.max(0.0).sqrt() as f32);
         Self {
+            mean,
             direction: vectors[2].as_vec3().normalize_or(Vec3::Z),
             width: across / along.max(f32::MIN_POSITIVE),
             thickness: THICKNESS_OF_DEVIATION * across,

@@ -308,7 +308,7 @@ impl<F: Floats> CellRays<'_, F> {
     }
 }
 
-/// Returns the distance at which the line through two values at distances is zero.
+/// Returns the distance at which the line through two pairs of distance and value is zero.
 #[inline(always)]
 fn zero_of_line<F: Floats>(a: (F, F), b: (F, F)) -> F {
     a.0 + (b.0 - a.0) * (a.1 / (a.1 - b.1))

@@ -103,7 +103,7 @@ fn zero_between(low: vec2<f32>, high: vec2<f32>) -> f32 {
     return zero_of_line(vec2<f32>(guess, value), select(low, high, is_like_low));
 }
 
-// Returns the distance at which the line through two values at distances is zero.
+// Returns the distance at which the line through two pairs of distance and value is zero.
 fn zero_of_line(a: vec2<f32>, b: vec2<f32>) -> f32 {
     let fall = a.y - b.y;
     return a.x + (b.x - a.x) * select(0.0, a.y / select(fall, 1.0, fall == 0.0), fall != 0.0);
