@@ -120,3 +120,22 @@ fn the_first_column_of_a_text_may_be_skipped() {
     let summary = succeed(&["info", "--summary", &cloud]);
     assert!(summary.contains("columns       not stated"), "{summary}");
 }
+
+#[test]
+fn a_file_without_colours_is_named_with_the_option_that_keeps_it_apart() {
+    let folder = Folder::new();
+    let lines = |color: &str| -> String {
+        (0..100).map(|i| format!("{} {} 1{color}\n", i % 10, i / 10)).collect()
+    };
+    let red = folder.write("red.xyz", lines(" 255 0 0"));
+    let bare = folder.write("bare.xyz", lines(""));
+    let picture = folder.path("both.png");
+    let arguments = [&["render", &red, &bare, "-o", &picture], &SMALL[..]].concat();
+    let message = stderr(&surfel(&arguments));
+    let option = format!("{bare}:color=#d6d2ca");
+    let expected = format!("no colours in {bare}: --object-settings {option} keeps it apart");
+    assert!(message.contains(&expected), "{message}");
+    let message = stderr(&surfel(&[&arguments[..], &["--object-settings", &option]].concat()));
+    assert!(!message.contains("no colours in"), "{message}");
+    assert!(message.contains("color rgb"), "{message}");
+}

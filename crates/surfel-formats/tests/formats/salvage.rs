@@ -245,11 +245,11 @@ fn broken_lines_of_text_are_left_out() {
 fn cut_scans_keep_their_whole_cells() {
     let whole = ptx::two_scans();
     let cut = &whole[..whole.len() - 2];
-    let cloud = salvaged("a.ptx", cut.as_bytes(), "3 of 4 cells");
+    let cloud = salvaged("a.ptx", cut.as_bytes(), "3 of 4 grid cells");
     assert_eq!((cloud.len(), cloud.stations.len()), (2, 2));
     // The second scan ends within its header.
     let header = whole.find("500010").unwrap();
-    let cloud = salvaged("a.ptx", &whole.as_bytes()[..header + 3], "2 of 2 cells");
+    let cloud = salvaged("a.ptx", &whole.as_bytes()[..header + 3], "2 of 2 grid cells");
     assert_eq!((cloud.len(), cloud.stations.len()), (1, 1));
 }
 

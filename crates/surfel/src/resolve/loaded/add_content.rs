@@ -17,6 +17,7 @@ use surfel_core::progress::Progress;
 use surfel_core::scene::{
     Channel, Graph, Interpolation, Keyframes, Node, Track, Transform, inlier_bounds,
 };
+use surfel_core::words::counted;
 use surfel_formats::{FileInfo, Loaded};
 
 impl LoadedScene {
@@ -260,6 +261,13 @@ fn merged(
     settings: &PreparationSettings,
     progress: &dyn Progress,
 ) -> Result<Graph<PointCloud>> {
+    let lacks_colors = |cloud: &PointCloud| !cloud.is_empty() && cloud.colors.is_none();
+    let colorless = files.iter().zip(&clouds).filter(|(_, part)| lacks_colors(&part.cloud));
+    let colorless: Vec<&PathBuf> = colorless.map(|(file, _)| file).collect();
+    let has_colors = clouds.iter().any(|part| part.cloud.colors.is_some());
+    if let (Some(first), true) = (colorless.first(), has_colors) {
+        progress.note(&colorless_line(first, colorless.len() - 1));
+    }
     let cloud = surfel_formats::merge_loaded(clouds, files, progress).cloud;
     if cloud.is_empty() {
         check_empty(files, settings)?;
@@ -269,4 +277,15 @@ fn merged(
     let mut graph = graph_of(cloud);
     graph.nodes[0].name = file_name(&files[0]);
     Ok(graph)
+}
+
+/// Returns a line that names a file without colours, where others have some, and the option that keeps it apart from them.
+fn colorless_line(file: &Path, n_others: usize) -> String {
+    let file = file.display();
+    let others = match n_others {
+        0 => String::new(),
+        n => format!(" and {} more", counted(n, "file")),
+    };
+    let option = format!("--object-settings {file}:color=#d6d2ca");
+    format!("no colours in {file}{others}: {option} keeps it apart and the others coloured")
 }
