@@ -143,7 +143,7 @@ export const pictureControls = [
 
 const withoutScale = (_, { camera }) => (camera?.orthographic === undefined ? 'needs orthographic' : '');
 
-/** Controls of legend, scale bar and caption, on the screen and in the saved file. `unavailable` says why a control is disabled. */
+/** Controls of legend, scale bar and caption. `unavailable` says why a control is disabled. */
 export const annotationControls = [
   { key: 'legend', label: 'Legend', kind: 'toggle', help: 'Classes with their colours, or the colour map with its values',
     unavailable: (_, { legend }) => (legend ? '' : 'the colours need none') },

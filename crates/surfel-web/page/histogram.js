@@ -81,7 +81,13 @@ export function histogramRows(viewer) {
 
   const showHistogram = () => {
     const { counts, low: least, high: most } = histogram;
-    drawBars(bars, counts);
+    const top = counts.reduce((largest, n) => Math.max(largest, n), 1);
+    bars.setAttribute('viewBox', `0 0 ${counts.length} 1`);
+    bars.replaceChildren(...counts.map((n, i) => {
+      // A few points must be seen beside very many.
+      const height = n === 0 ? 0 : Math.max(0.03, n / top);
+      return svg('rect', { x: i, width: 0.9, y: 1 - height, height });
+    }));
     const isWhole = Number.isInteger(least) && Number.isInteger(most) && Number.isInteger(histogram.width);
     for (const handle of [low, high]) {
       Object.assign(handle, { min: least, max: most, step: isWhole ? 1 : (most - least) / N_STEPS || 1 });
@@ -126,15 +132,4 @@ export function histogramRows(viewer) {
       element('div', { class: 'field select' }, choice, icon('chevron'))),
     chart,
   ];
-}
-
-/** Draws a bar for each count, in a box one unit high. */
-function drawBars(bars, counts) {
-  const top = counts.reduce((largest, n) => Math.max(largest, n), 1);
-  bars.setAttribute('viewBox', `0 0 ${counts.length} 1`);
-  bars.replaceChildren(...counts.map((n, i) => {
-    // A few points must be seen beside very many.
-    const height = n === 0 ? 0 : Math.max(0.03, n / top);
-    return svg('rect', { x: i, width: 0.9, y: 1 - height, height });
-  }));
 }

@@ -92,12 +92,21 @@ export function setUpKeyboard(viewer, navigation, viewHistory, actions) {
     navigation.settle();
   };
 
+  const undoOrRedo = (event) => {
+    const key = event.key.toLowerCase();
+    const isRedo = key === 'y' || (key === 'z' && event.shiftKey);
+    if (!isRedo && key !== 'z') return;
+    if (isRedo) viewHistory.redo();
+    else viewHistory.undo();
+    event.preventDefault();
+  };
+
   window.addEventListener('keydown', (event) => {
     if (document.querySelector('dialog[open]')) return;
     if (event.key === 'Escape') actions.escape();
     if (!viewer.camera || event.altKey || usesKeys(event.target)) return;
     if (event.ctrlKey || event.metaKey) {
-      undoOrRedo(viewHistory, event);
+      undoOrRedo(event);
       return;
     }
     if (event.key === 'Enter' && !event.target.closest('button, summary, a')) actions.enter();
@@ -119,16 +128,6 @@ export function setUpKeyboard(viewer, navigation, viewHistory, actions) {
   });
   window.addEventListener('keyup', (event) => held.delete(event.key.toLowerCase()));
   window.addEventListener('blur', () => held.clear());
-}
-
-/** Handles Ctrl + Z, Ctrl + Shift + Z and Ctrl + Y. */
-function undoOrRedo(viewHistory, event) {
-  const key = event.key.toLowerCase();
-  const isRedo = key === 'y' || (key === 'z' && event.shiftKey);
-  if (!isRedo && key !== 'z') return;
-  if (isRedo) viewHistory.redo();
-  else viewHistory.undo();
-  event.preventDefault();
 }
 
 /** Whether the focused element is a control that keys are meant for. A button that was clicked keeps its focus, but not the keys. */

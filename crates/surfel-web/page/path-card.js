@@ -51,15 +51,27 @@ export function setUpPathCard(viewer, navigation) {
     if (camera) change(withNewKey(keys(), camera));
   };
 
-  const row = ({ time, camera }, i) => keyRow(i, time, {
-    setTime: (seconds) => change(withTime(keys(), i, seconds)),
-    goTo: () => navigation.transitionTo(camera),
-    replace: () => {
-      const replaced = fittingView(keys().filter((_, other) => other !== i));
-      if (replaced) change(keys().map((key, other) => (other === i ? { ...key, camera: replaced } : key)));
-    },
-    remove: () => change(keys().filter((_, other) => other !== i)),
-  });
+  const item = ({ time, camera }, i) => {
+    const name = `view ${i + 1}`;
+    const field = element('input', {
+      type: 'number', min: 0, step: 0.5, 'aria-label': `Seconds of ${name}`, 'data-path-time': i,
+      onchange: () => {
+        if (Number.isFinite(field.valueAsNumber)) change(withTime(keys(), i, field.valueAsNumber));
+        else field.value = time;
+      },
+    });
+    field.value = time;
+    return element('li', {}, field, element('span', { class: 'note' }, 's'),
+      element('button', { type: 'button', class: 'button', 'aria-label': `Go to ${name}`, onclick: () => navigation.transitionTo(camera) }, 'Go'),
+      element('button', {
+        type: 'button', class: 'button', 'aria-label': `Set ${name} to the current view`,
+        onclick: () => {
+          const replaced = fittingView(keys().filter((_, other) => other !== i));
+          if (replaced) change(keys().map((key, other) => (other === i ? { ...key, camera: replaced } : key)));
+        },
+      }, 'Set'),
+      iconButton('delete', `Delete ${name}`, () => change(keys().filter((_, other) => other !== i))));
+  };
 
   const playOrStop = () => {
     if (navigation.isFollowing) navigation.stop();
@@ -77,7 +89,7 @@ export function setUpPathCard(viewer, navigation) {
     if (!viewer.scene || (areEqual(path, shown) && list.dataset.filled)) return;
     shown = path;
     list.dataset.filled = 'yes';
-    list.replaceChildren(...keys().map(row));
+    list.replaceChildren(...keys().map(item));
     interpolation.value = path?.interpolation ?? 'cubic';
     const n = keys().length;
     note.textContent = n ? '' : 'Move to a view and add it; then move to the next one.';
@@ -103,22 +115,4 @@ export function setUpPathCard(viewer, navigation) {
   viewer.cameraChanged.listen(update);
   update();
   return () => show(card.hidden);
-}
-
-/** The row of the view `i` of the path: its time and buttons. `actions` has `setTime(seconds)`, `goTo()`, `replace()` and `remove()`. */
-function keyRow(i, time, actions) {
-  const name = `view ${i + 1}`;
-  const field = element('input', {
-    type: 'number', min: 0, step: 0.5, 'aria-label': `Seconds of ${name}`, 'data-path-time': i,
-    onchange: () => {
-      if (Number.isFinite(field.valueAsNumber)) actions.setTime(field.valueAsNumber);
-      else field.value = time;
-    },
-  });
-  field.value = time;
-  const button = (text, label, onclick) => element('button', { type: 'button', class: 'button', 'aria-label': label, onclick }, text);
-  return element('li', {}, field, element('span', { class: 'note' }, 's'),
-    button('Go', `Go to ${name}`, actions.goTo),
-    button('Set', `Set ${name} to the current view`, actions.replace),
-    iconButton('delete', `Delete ${name}`, actions.remove));
 }

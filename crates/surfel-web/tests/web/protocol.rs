@@ -120,7 +120,7 @@ async fn profiles_have_the_points_beside_their_line() {
         page.send_json(request(2, invalid)).await;
         let error = page.message("error").await;
         assert_eq!(
-            (&error["id"], error["text"].as_str().unwrap().contains("corners")),
+            (&error["id"], error["text"].as_str().unwrap().contains("corner")),
             (&json!(2), true)
         );
     }
