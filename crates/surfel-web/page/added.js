@@ -4,7 +4,7 @@ import { cornersOf } from './camera.js';
 import { distance, mix } from './vector.js';
 
 /** How far away other things lie that the user is told of, in diagonals of all else. */
-const MAX_DIAGONALS = 20;
+const MAX_SIZES = 20;
 
 /** The patch of a link, which cannot carry added files and their settings. `added` has the files by their ids. */
 export function withoutAdded({ added_files, ...patch }, added) {
@@ -30,5 +30,5 @@ export function boxAround(boxes) {
 export function distanceBetween(bounds, others) {
   const [a, b] = [bounds, others].map(({ min, max }) => mix(min, max, 0.5));
   const size = Math.max(distance(bounds.min, bounds.max), distance(others.min, others.max));
-  return MAX_DIAGONALS * size < distance(a, b) ? distance(a, b) : 0;
+  return MAX_SIZES * size < distance(a, b) ? distance(a, b) : 0;
 }

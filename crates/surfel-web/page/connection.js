@@ -4,7 +4,7 @@ const MIN_RECONNECT_DELAY_MS = 500;
 const MAX_RECONNECT_DELAY_MS = 5000;
 const HEADER_BYTES = 20;
 /** Rectangle and length before each file of a picture. */
-const RECT_BYTES = 12;
+const PLACE_BYTES = 12;
 const PICTURE_TYPES = { 1: 'image/jpeg', 2: 'image/png', 3: 'image/png' };
 
 const SAVED_PICTURE = 3;
@@ -34,8 +34,8 @@ export function readFiles(buffer, type) {
   for (let at = HEADER_BYTES; at < buffer.byteLength;) {
     const [x, y, width, height] = [0, 2, 4, 6].map((offset) => view.getUint16(at + offset, true));
     const length = view.getUint32(at + 8, true);
-    files.push({ x, y, width, height, blob: new Blob([new Uint8Array(buffer, at + RECT_BYTES, length)], { type }) });
-    at += RECT_BYTES + length;
+    files.push({ x, y, width, height, blob: new Blob([new Uint8Array(buffer, at + PLACE_BYTES, length)], { type }) });
+    at += PLACE_BYTES + length;
   }
   return files;
 }

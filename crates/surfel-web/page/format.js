@@ -35,7 +35,7 @@ export function count(value) {
   return withSeparators(value, { maximumFractionDigits: 0 });
 }
 
-/** A number of things, as `1 point` or `12 points`; `thing` is a noun whose plural ends in s. */
+/** A number of things: `1 point`, `12 points`. */
 export function counted(n, thing) {
   return `${count(n)} ${thing}${n === 1 ? '' : 's'}`;
 }
