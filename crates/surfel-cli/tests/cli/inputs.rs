@@ -135,6 +135,9 @@ fn a_file_without_colours_is_named_with_the_option_that_keeps_it_apart() {
     let option = format!("{bare}:color=#d6d2ca");
     let expected = format!("no colours in {bare}: --object-settings {option} keeps it apart");
     assert!(message.contains(&expected), "{message}");
+    let another = folder.write("another.xyz", lines(""));
+    let message = stderr(&surfel(&[&arguments[..], &[&another]].concat()));
+    assert!(message.contains(&format!("no colours in {bare} and 1 file more: ")), "{message}");
     let message = stderr(&surfel(&[&arguments[..], &["--object-settings", &option]].concat()));
     assert!(!message.contains("no colours in"), "{message}");
     assert!(message.contains("color rgb"), "{message}");

@@ -29,7 +29,7 @@ pub struct PreparationReport {
     pub clean: CleanReport,
     /// Effect of denoising, if points were moved.
     pub denoise: Option<DenoiseReport>,
-    /// Effect of moving points onto the axes of lines, if axes were searched.
+    /// Effect of moving points onto the axes of lines, if points were moved.
     pub lines: Option<LineReport>,
     /// Number of points after cleaning and subsampling.
     pub n_points: usize,
@@ -122,7 +122,7 @@ pub fn prepare(
         let scanner = rings.as_ref().map(|rings| (rings.scanner - cloud.origin).as_vec3());
         let axes = find_axes(&cloud, &tree, shapes, scanner, progress)?;
         drop(tree);
-        report.lines = Some(move_to_axes(&axes, &mut cloud.positions, shapes));
+        report.lines = move_to_axes(&axes, &mut cloud.positions, shapes);
         radii.iter_mut().zip(shapes).for_each(|(radius, shape)| *radius = shape.radius);
         found.update(radii);
     }

@@ -340,7 +340,7 @@ pub fn report_denoise(report: &PreparationReport, progress: &dyn Progress) {
     if let Some(denoise) = &report.denoise {
         progress.choice(&denoise.line(), &["denoise"]);
     }
-    if let Some(lines) = report.lines.filter(|lines| 0 < lines.n_moved) {
+    if let Some(lines) = &report.lines {
         progress.choice(&lines.line(), &["denoise"]);
     }
 }

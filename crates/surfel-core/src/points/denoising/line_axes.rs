@@ -14,7 +14,6 @@ use crate::points::structure::solids::{
 use crate::progress::Progress;
 use crate::words::{counted, format_length};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_4;
 
 /// Effect of moving points onto the axes of their lines.
@@ -84,23 +83,33 @@ pub fn find_axes(
         Ok(StraightLine::of(tree, point, toward_scanner).map(|line| (point, line)))
     };
     let lines = (0..shapes.len()).into_par_iter().map(line).filter_map(Result::transpose);
-    let lines: BTreeMap<usize, StraightLine> = lines.collect::<Result<_>>()?;
-    let axis = |(point, line): (&usize, &StraightLine)| {
+    let lines: Vec<(usize, StraightLine)> = lines.collect::<Result<_>>()?;
+    let radius_at = |neighbor: &Neighbor| {
+        let found = lines.binary_search_by_key(&(neighbor.index as usize), |(point, _)| *point);
+        found.ok().map(|line_idx| lines[line_idx].1.radius)
+    };
+    let axis = |(point, line): &(usize, StraightLine)| {
         progress.check()?;
-        // The radius of one line errs by a sixth, as 25 points show it.
-        let others = line.neighbors.iter().filter_map(|other| lines.get(&(other.index as usize)));
-        let (sum, n) = others.fold((line.radius, 1), |(sum, n), line| (sum + line.radius, n + 1));
+        // The radius of one line errs by a tenth, as 25 points show it. Neighbours are searched again, as their lists would take
+        // more memory than the cloud where all of it is lines.
+        let neighbors = tree.nearest(positions[*point], N_STRAIGHT_NEIGHBORS, Some(*point as u32));
+        let radii = neighbors.iter().filter_map(radius_at);
+        let (sum, n) = radii.fold((line.radius, 1), |(sum, n), radius| (sum + radius, n + 1));
         Ok(line.axis(*point, positions[*point], sum / f64::from(n), shapes[*point].radius))
     };
     lines.par_iter().map(axis).collect()
 }
 
-/// Moves points onto their axes, and gives their capsules the directions and lengths of these.
+/// Moves points onto their axes, and gives their capsules the directions and lengths of these. Returns none if there are no
+/// axes.
 pub fn move_to_axes(
     axes: &[LineAxis],
     positions: &mut [Vec3],
     shapes: &mut [PointShape],
-) -> LineReport {
+) -> Option<LineReport> {
+    if axes.is_empty() {
+        return None;
+    }
     let mut sum = 0.0;
     for axis in axes {
         let (position, shape) = (&mut positions[axis.point], &mut shapes[axis.point]);
@@ -108,13 +117,14 @@ pub fn move_to_axes(
         *position = axis.position;
         *shape = PointShape { normal: axis.direction, radius: axis.half_length, ..*shape };
     }
-    LineReport { n_moved: axes.len(), mean_distance: (sum / axes.len().max(1) as f64) as f32 }
+    Some(LineReport { n_moved: axes.len(), mean_distance: (sum / axes.len() as f64) as f32 })
 }
 
 /// The straight line through a point and its neighbours.
 struct StraightLine {
-    neighbors: Vec<Neighbor>,
     fit: LineFit,
+    /// Distance from the point to its second neighbour.
+    reach: f32,
     /// Mean of the unit vectors across the line toward the scanners of the points; zero if they are not known.
     toward_scanners: DVec3,
     /// Radius of the line.
@@ -134,6 +144,7 @@ impl StraightLine {
         if neighbors.len() < N_STRAIGHT_NEIGHBORS || MAX_STRAIGHT_WIDTH <= fit.width {
             return None;
         }
+        let reach = kth_distance(&neighbors, 2);
         let direction = fit.direction.as_dvec3();
         let members = || neighbors.iter().map(|other| other.index as usize).chain([point]);
         let across = |vector: DVec3| vector.reject_from(direction).normalize_or_zero();
@@ -141,7 +152,7 @@ impl StraightLine {
             members().map(|member| toward_scanner(member).map(across)).collect();
         let Some(toward) = toward else {
             let radius = f64::from(fit.thickness);
-            return Some(Self { neighbors, fit, toward_scanners: DVec3::ZERO, radius });
+            return Some(Self { fit, reach, toward_scanners: DVec3::ZERO, radius });
         };
         let n_members = toward.len() as f64;
         // The fit takes the position and the slope of the line from the same points.
@@ -158,7 +169,7 @@ impl StraightLine {
             });
             radius = (3.0 * squares.sum::<f64>() / n_free).sqrt();
         }
-        Some(Self { neighbors, fit, toward_scanners, radius })
+        Some(Self { fit, reach, toward_scanners, radius })
     }
 
     /// Returns the axis of a line of the given radius. `capsule` is half the length of the point's capsule, which grows only if it
@@ -166,8 +177,7 @@ impl StraightLine {
     fn axis(&self, point: usize, position: Vec3, radius: f64, capsule: f32) -> LineAxis {
         let direction = self.fit.direction.as_dvec3();
         let on_axis = self.fit.mean.reject_from(direction) - shift(self.toward_scanners, radius);
-        let reach = kth_distance(&self.neighbors, 2).min(capsule);
-        let reach = reach.max(CAPSULE_ASPECT * radius as f32);
+        let reach = self.reach.min(capsule).max(CAPSULE_ASPECT * radius as f32);
         let half_length = if 0.0 < reach { reach } else { capsule };
         let position = (position.as_dvec3() + on_axis).as_vec3();
         LineAxis { point, position, direction: self.fit.direction, half_length }
@@ -186,7 +196,7 @@ mod tests {
 
     use super::*;
     use crate::math::Random;
-    use crate::points::{STATION, Scalar, ScanStation, Values};
+    use crate::points::{Denoise, Preparation, STATION, Scalar, ScanStation, Values, prepare};
     use crate::progress::NoProgress;
 
     const RADIUS: f64 = 0.012;
@@ -214,7 +224,7 @@ mod tests {
         let line = PointShape { structure: Structure::Line, normal: Vec3::Y, radius: 0.1 };
         let mut shapes = vec![line; cloud.len()];
         let axes = axes(&cloud, scanner);
-        let report = move_to_axes(&axes, &mut cloud.positions, &mut shapes);
+        let report = move_to_axes(&axes, &mut cloud.positions, &mut shapes).unwrap();
         assert_eq!(report.n_moved, cloud.len());
         assert!((0.5..1.5).contains(&(f64::from(report.mean_distance) / RADIUS)), "{report:?}");
         (cloud, shapes)
@@ -269,5 +279,22 @@ mod tests {
         let mut point = |_| Vec3::from_array(std::array::from_fn(|_| random.next_f32()));
         let cloud = PointCloud::from_positions((0..200).map(&mut point).collect());
         assert_eq!(axes(&cloud, None), []);
+    }
+
+    #[test]
+    fn prepare_moves_points_of_wires_unless_denoising_is_off() {
+        let cloud = wire(&[DVec3::new(2.0, -9.0, -5.0)], 0.1 * RADIUS);
+        let prepared = |denoise| {
+            let preparation = Preparation { denoise, ..Preparation::default() };
+            prepare(cloud.clone(), &preparation, &NoProgress).unwrap()
+        };
+        let (kept, report) = prepared(Denoise::Off);
+        assert!(kept.positions == cloud.positions && report.lines.is_none());
+        let (moved, report) = prepared(Denoise::Auto);
+        assert_eq!(report.lines.unwrap().n_moved, cloud.len());
+        let (radii, found) = (moved.radii(), report.radii.unwrap());
+        assert_eq!(radii.iter().copied().reduce(f32::max), Some(found.max));
+        let is_on_axis = |p: &Vec3| p.as_dvec3().reject_from(DVec3::X).length() < 0.5 * RADIUS;
+        assert!(moved.positions[20..580].iter().all(is_on_axis));
     }
 }

@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use surfel_core::math::Aabb;
 use surfel_core::points::PointCloud;
 use surfel_core::progress::Progress;
+use surfel_core::scene::color::choose_source;
 use surfel_core::scene::{
     Channel, Graph, Interpolation, Keyframes, Node, Track, Transform, inlier_bounds,
 };
@@ -261,12 +262,8 @@ fn merged(
     settings: &PreparationSettings,
     progress: &dyn Progress,
 ) -> Result<Graph<PointCloud>> {
-    let lacks_colors = |cloud: &PointCloud| !cloud.is_empty() && cloud.colors.is_none();
-    let colorless = files.iter().zip(&clouds).filter(|(_, part)| lacks_colors(&part.cloud));
-    let colorless: Vec<&PathBuf> = colorless.map(|(file, _)| file).collect();
-    let has_colors = clouds.iter().any(|part| part.cloud.colors.is_some());
-    if let (Some(first), true) = (colorless.first(), has_colors) {
-        progress.note(&colorless_line(first, colorless.len() - 1));
+    if let Some(line) = colorless_line(&clouds, files) {
+        progress.note(&line);
     }
     let cloud = surfel_formats::merge_loaded(clouds, files, progress).cloud;
     if cloud.is_empty() {
@@ -279,13 +276,19 @@ fn merged(
     Ok(graph)
 }
 
-/// Returns a line that names a file without colours, where others have some, and the option that keeps it apart from them.
-fn colorless_line(file: &Path, n_others: usize) -> String {
-    let file = file.display();
-    let others = match n_others {
-        0 => String::new(),
-        n => format!(" and {} more", counted(n, "file")),
-    };
-    let option = format!("--object-settings {file}:color=#d6d2ca");
-    format!("no colours in {file}{others}: {option} keeps it apart and the others coloured")
+/// Returns a line that names a file without colours, if others have some, and the option that keeps it apart from them.
+fn colorless_line(clouds: &[Loaded], files: &[PathBuf]) -> Option<String> {
+    clouds.iter().find(|part| part.cloud.colors.is_some())?;
+    let lacks_colors = |cloud: &PointCloud| !cloud.is_empty() && cloud.colors.is_none();
+    let mut colorless = clouds.iter().zip(files).filter(|(part, _)| lacks_colors(&part.cloud));
+    let (part, file) = colorless.next()?;
+    let (file, source) = (file.display(), choose_source(&part.cloud).0);
+    let option = format!("--object-settings {file}:color={source}");
+    Some(match colorless.count() {
+        0 => format!("no colours in {file}: {option} keeps it apart and the others coloured"),
+        n => format!(
+            "no colours in {file} and {} more: {option}, once for each of them, keeps the others coloured",
+            counted(n, "file")
+        ),
+    })
 }
