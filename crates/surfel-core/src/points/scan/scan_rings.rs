@@ -30,6 +30,8 @@ const MAX_RING_WIDTH: f32 = 0.2;
 const MAX_SPREAD: f32 = 1.5;
 /// Minimum fraction of the points on a ring.
 const MIN_FRACTION: f32 = 0.0005;
+/// Minimum number of points with elevations that lie close together: the elevations of few random points do so by chance.
+const MIN_RING_POINTS: usize = 16;
 /// Minimum fraction of successive points in one sense about the axis, where lasers follow each other in the file.
 const MIN_IN_ORDER: f32 = 0.98;
 /// Maximum turn between successive points of a laser, in radians: larger ones have no sense.
@@ -236,7 +238,8 @@ fn by_elevation(directions: &[Option<Direction>]) -> Option<Vec<u16>> {
 /// Returns the first and the last elevation of each ring; none if the elevations do not form rings when they are parted
 /// where they are more than `min_step` degrees apart.
 fn bounds_of_rings(sorted: &[f32], min_step: f32) -> Option<Vec<[f32; 2]>> {
-    let min_count = (MIN_FRACTION * sorted.len() as f32).max(1.0) as usize;
+    let min_count = (MIN_FRACTION * sorted.len() as f32) as usize;
+    let min_count = min_count.max(MIN_RING_POINTS);
     let mut bounds: Vec<[f32; 2]> = Vec::new();
     let mut n_known = 0;
     for ring in sorted.chunk_by(|a, b| b - a <= min_step).filter(|ring| min_count <= ring.len()) {
@@ -418,6 +421,19 @@ mod tests {
             assert!(find(&PointCloud::from_positions(positions)).is_none());
         }
         assert!(find(&PointCloud::default()).is_none());
+    }
+
+    #[test]
+    fn random_points_of_a_hill_beside_the_zero_have_no_rings() {
+        for n_points in (2100..4000).step_by(100) {
+            let mut random = Random::new(n_points, 0);
+            let mut point = |_| {
+                let (x, y) = (20.0 * random.next_f32(), 16.0 * random.next_f32());
+                Vec3::new(x, y, 1.5 + (0.4 * x).sin() + 0.5 * (0.5 * y).cos())
+            };
+            let hill = PointCloud::from_positions((0..n_points).map(&mut point).collect());
+            assert!(find(&hill).is_none(), "{n_points} points");
+        }
     }
 
     #[test]
