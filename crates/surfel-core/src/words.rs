@@ -10,6 +10,9 @@ pub fn counted<N: Display + From<u8> + PartialEq>(n: N, thing: &str) -> String {
 
 /// Formats a length with three significant digits, as 0.459, 7.63 or 4120.
 pub fn format_length(length: f32) -> String {
+    if length == 0.0 {
+        return "0".to_owned();
+    }
     if !(1e-6..1e9).contains(&length) {
         return format!("{length:.2e}");
     }
@@ -32,6 +35,6 @@ mod tests {
     #[test]
     fn lengths_have_three_digits() {
         let lengths = [0.000_045_67, 0.4591, 7.634, 4120.3, 0.0, 3e12].map(format_length);
-        assert_eq!(lengths, ["0.0000457", "0.459", "7.63", "4120", "0.00e0", "3.00e12"]);
+        assert_eq!(lengths, ["0.0000457", "0.459", "7.63", "4120", "0", "3.00e12"]);
     }
 }

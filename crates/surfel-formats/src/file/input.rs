@@ -90,7 +90,7 @@ impl<'a> Input<'a> {
         location: Location,
         found: impl Into<String>,
         expected: impl Into<String>,
-        advice: &'static str,
+        advice: impl Into<Cow<'static, str>>,
     ) -> Error {
         Error::Malformed {
             file: self.name.to_string(),

@@ -42,6 +42,11 @@ pub(crate) fn write(
         let line = "the coordinate system is neither WKT nor an EPSG code, and is left out";
         progress.note(&format!("{}: {line}", path.display()));
     }
+    if cloud.intensity.is_some() && plan.standard.intensity.is_none() {
+        let line =
+            "the intensity is an extra column, since it is not whole numbers from 0 to 65535";
+        progress.note(&format!("{}: {line}", path.display()));
+    }
     if let Some(line) = &plan.change {
         progress.note(&format!("{}: {line}", path.display()));
     }

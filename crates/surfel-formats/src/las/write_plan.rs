@@ -40,7 +40,7 @@ pub(super) struct WritePlan<'a> {
 /// The columns that standard fields hold.
 #[derive(Default)]
 pub(super) struct StandardColumns<'a> {
-    intensity: Option<&'a [f32]>,
+    pub intensity: Option<&'a [f32]>,
     pub return_number: Option<&'a Values>,
     number_of_returns: Option<&'a Values>,
     user_data: Option<&'a Values>,

@@ -53,8 +53,10 @@ pub(crate) fn read(
         (None, None) if preamble.has_text => return Err(unnamed_text(input, &preamble)),
         (None, None) => {
             let (columns, description) = infer_columns(&sample.rows, preamble.n_fields);
+            let is_survey = columns.first() == Some(&None);
+            let example = if is_survey { ", -,y,x,z if the northing comes first" } else { "" };
             progress.note(&format!(
-                "{}: no header; columns taken as {description} (state them with --columns)",
+                "{}: no header; columns taken as {description} (state them with --columns{example})",
                 input.name
             ));
             columns
@@ -92,7 +94,7 @@ pub(crate) fn read(
         progress,
     )?;
     salvage.report("point", n_points, preamble.count, progress)?;
-    if let Some(count) = preamble.count {
+    if let Some(count) = preamble.count.filter(|count| *count != n_points) {
         let line =
             format!("a line before the points says {}, {n_points} read", counted(count, "point"));
         progress.note(&format!("{}: {line}", input.name));
@@ -113,12 +115,39 @@ fn roles_of_header(names: &[String]) -> Vec<Option<ColumnRole>> {
 fn unnamed_text(input: &Input, preamble: &Preamble) -> Error {
     let line = input[preamble.data..].split(|byte| *byte == b'\n').next().unwrap_or_default();
     let line = line.trim_ascii();
+    let [easting_first, northing_first] = [["x", "y", "z"], ["y", "x", "z"]]
+        .map(|coordinates| possible_columns(line, preamble, coordinates));
+    let advice = format!(
+        "state the columns with --columns, as in {easting_first} or, if the northing comes first, {northing_first}; \
+         or remove the line if it is no point"
+    );
     input.malformed(
         Location::Line(preamble.data_line),
         format!("`{}`", line[..line.len().min(60)].escape_ascii()),
         "numbers, or a header with at least x, y and z, E, N and H or longitude, latitude and height",
-        "state the columns with --columns, as in -,x,y,z,- or, if the northing comes first, -,y,x,z,-; or remove the line if it is no point",
+        advice,
     )
+}
+
+/// Returns columns as `--columns` takes them that fit a line of a survey: three coordinates, perhaps after the number of
+/// the point, and texts that are skipped.
+fn possible_columns(line: &[u8], preamble: &Preamble, coordinates: [&str; 3]) -> String {
+    let fields: Vec<&[u8]> = preamble.separator.fields(line).collect();
+    let is_number = |field: &&[u8]| preamble.separator.parse_number(field).is_ok();
+    let n_numbers = fields.iter().filter(|field| is_number(field)).count();
+    let mut n_before = n_numbers.saturating_sub(3).min(1);
+    let mut coordinates = coordinates.into_iter();
+    let names = fields.iter().map(|field| {
+        if !is_number(field) {
+            return "-";
+        }
+        if 0 < n_before {
+            n_before -= 1;
+            return "-";
+        }
+        coordinates.next().unwrap_or("-")
+    });
+    names.collect::<Vec<_>>().join(",")
 }
 
 /// Leaves out columns whose values are texts. A text in place of a coordinate, a colour or a normal stays an error.

@@ -221,7 +221,18 @@ fn text_without_a_header_needs_stated_columns() {
     let file = "P1,20,10,3,TREE\nP2,21,11,3,\"a, b\"\n";
     let error = read("a.csv", file).unwrap_err().to_string();
     assert!(error.contains("line 1: found `P1,20,10,3,TREE`"), "{error}");
-    assert!(error.contains("--columns, as in -,x,y,z,-"), "{error}");
+    assert!(error.contains("--columns, as in -,x,y,z,- or, if"), "{error}");
+    for (line, expected) in [
+        ("20,10,3,TREE", ["x,y,z,-", "y,x,z,-"]),
+        ("1,20,10,3,TREE", ["-,x,y,z,-", "-,y,x,z,-"]),
+        ("P1 20 10 3", ["-,x,y,z", "-,y,x,z"]),
+    ] {
+        let error = read("a.csv", &format!("{line}\n{line}\n")).unwrap_err().to_string();
+        let [easting_first, northing_first] = expected;
+        let advice =
+            format!("as in {easting_first} or, if the northing comes first, {northing_first};");
+        assert!(error.contains(&advice), "{error}");
+    }
     let columns = Some(TextColumn::parse_list("-,y,x,z,code"));
     let options = LoadOptions { text_columns: columns, ..LoadOptions::default() };
     let listener = Listener::default();

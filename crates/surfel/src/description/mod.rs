@@ -40,7 +40,7 @@ pub use lamp::{LampDescription, LampShape};
 pub use light::{LIGHT_KINDS, LightKind, LightSettings, SkySettings, SunSettings};
 pub use material::{MaterialChoice, MaterialDescription, MaterialSettings};
 pub use named_view::{NamedView, ViewSettings};
-pub use nearest::{nearest, synonym};
+pub use nearest::{nearest, nearest_if_any, synonym};
 pub use object::{ObjectDescription, Placement, Rotation};
 pub use object_override::{ObjectOverride, OverrideSettings};
 pub use object_settings::{ColorSettings, ObjectSettings, PreparationSettings, SurfaceSettings};

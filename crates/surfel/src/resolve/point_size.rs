@@ -7,6 +7,7 @@ use surfel_core::points::{PointCloud, Subsample};
 use surfel_core::progress::Progress;
 use surfel_core::scene::{Camera, View};
 use surfel_core::surface::SurfaceKind;
+use surfel_core::words::counted;
 
 /// Side of a cell in pixels.
 const CELL: f32 = 16.0;
@@ -39,7 +40,8 @@ pub fn choose_point_size(
     let spacing = median_spacing(points, n_points, &view, (width, height));
     let size = (2.0 * OVERLAP * spacing).round() / 2.0;
     let size = f64::from(size.clamp(LIMITS.0, LIMITS.1));
-    let line = format!("point size {size} pixels: the points are about {spacing:.2} pixels apart");
+    let pixels = counted(size, "pixel");
+    let line = format!("point size {pixels}: the points are about {spacing:.2} pixels apart");
     progress.choice(&line, &["point_size"]);
     description.picture.point_size = Some(size);
 }

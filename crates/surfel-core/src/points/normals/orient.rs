@@ -7,6 +7,7 @@ use crate::points::scan::scan_angle::SightLines;
 use crate::points::up::is_terrain;
 use crate::points::{PointCloud, is_valid_position};
 use crate::progress::Progress;
+use crate::words::counted;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::str::FromStr;
@@ -156,9 +157,8 @@ fn by_spanning_tree(
     drop((edges, links));
     let members = components.members(progress)?;
     let (backward, n_components) = backward_components(positions, &normals, &members, progress)?;
-    progress.note(&format!(
-        "normals oriented along a spanning tree in {n_components} connected components"
-    ));
+    let components = counted(n_components, "connected component");
+    progress.note(&format!("normals oriented along a spanning tree in {components}"));
     Ok(flip_if(normals, |i, _| members[i].is_flipped != backward.contains(&members[i].root)))
 }
 

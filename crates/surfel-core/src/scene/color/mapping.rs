@@ -33,18 +33,14 @@ impl<'c> Mapping<'c> {
     /// Fails if `cloud` lacks the source's column.
     pub fn new(cloud: &'c PointCloud, coloring: &Coloring, source: &ColorSource) -> Result<Self> {
         let value_at = source.values(cloud, coloring).ok_or_else(|| source.missing_from(cloud))?;
-        let found = || {
-            if *source == ColorSource::Support {
-                return Some(DEFAULT_RANGE);
-            }
-            PercentileRange::from_values(
-                cloud.len(),
-                &value_at,
-                PercentileRange::DEFAULT_PERCENTILES,
-            )
-        };
         let given = coloring.range.map(|(low, high)| PercentileRange { low, high });
-        let range = given.or_else(found).unwrap_or(PercentileRange { low: 0.0, high: 1.0 });
+        let (range, range_origin) = match given {
+            Some(given) => (given, "as given"),
+            None if *source == ColorSource::Support => {
+                (DEFAULT_RANGE, "at a point to one radius away from all points")
+            }
+            None => automatic_range(cloud.len(), &value_at),
+        };
         let map = match coloring.colormap {
             Some(map) => map,
             None => Colormap::from_name(source.default_colormap())?,
@@ -54,11 +50,6 @@ impl<'c> Mapping<'c> {
         let gamma = match coloring.gamma {
             None if !is_gray => Gamma::NONE,
             given => Gamma::new(given, cloud.len(), |i| range.normalize(value_at(i))),
-        };
-        let range_origin = match source {
-            _ if given.is_some() => "as given",
-            ColorSource::Support => "at a point to one radius away from all points",
-            _ => "2 % to 98 % of the values",
         };
         Ok(Self { value_at, range, map, map_range, gamma, range_origin })
     }
@@ -74,6 +65,21 @@ impl<'c> Mapping<'c> {
         let Self { range, range_origin, map, gamma, .. } = self;
         let gamma = gamma.described().map_or_else(String::new, |gamma| format!(", {gamma}"));
         format!("from {} ({range_origin}), map {}{gamma}", format_range(*range), map.name())
+    }
+}
+
+/// Returns the range from the 2nd to the 98th percentile, or of all values if these two are equal, and its origin.
+fn automatic_range(
+    n_values: usize,
+    value_at: impl Fn(usize) -> f64,
+) -> (PercentileRange, &'static str) {
+    let range = |percentiles| PercentileRange::from_values(n_values, &value_at, percentiles);
+    match range(PercentileRange::DEFAULT_PERCENTILES) {
+        None => (PercentileRange { low: 0.0, high: 1.0 }, "no values"),
+        Some(found) if found.low == found.high => {
+            (range((0.0, 100.0)).unwrap_or(found), "all values, as most are equal")
+        }
+        Some(found) => (found, "2 % to 98 % of the values"),
     }
 }
 

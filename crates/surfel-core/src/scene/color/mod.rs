@@ -150,6 +150,20 @@ mod tests {
     }
 
     #[test]
+    fn few_other_values_among_equal_ones_have_other_colors() {
+        let values = (0..1000).map(|i| if i < 10 { 2.0 } else { 0.0 }).collect();
+        let scalars = vec![Scalar { name: "structure".into(), values: Values::F64(values) }];
+        let cloud = PointCloud { scalars, ..PointCloud::from_positions(vec![Vec3::ZERO; 1000]) };
+        let coloring = coloring(Some("structure"));
+        let colors = colorize(&cloud, &coloring, &NoProgress).unwrap();
+        assert_ne!(colors[0], colors[999]);
+        let Legend::Map { low, high, .. } = legend(&cloud, &coloring).unwrap() else {
+            panic!("no map");
+        };
+        assert_eq!((low, high), (0.0, 2.0));
+    }
+
+    #[test]
     fn columns_are_mapped_from_their_percentiles() {
         let mut cloud = lattice();
         let values = Values::U16((0..2500).collect());

@@ -4,7 +4,7 @@ use super::super::check_files::n_pixels;
 use super::super::cloud::can_be_colored;
 use super::super::memory::MemoryEstimate;
 use super::LoadedScene;
-use crate::description::{PreparationSettings, SceneDescription};
+use crate::description::{PreparationSettings, SceneDescription, nearest_if_any};
 use crate::error::{Error, Result};
 use crate::names::list_files;
 use surfel_core::points::{STRUCTURE, SURFACE_VARIATION};
@@ -53,15 +53,15 @@ impl LoadedScene {
             if can_be_colored(cloud, &color) {
                 continue;
             }
+            let info = self.file_info();
+            let columns = colorable_columns(&info.columns);
             return Err(Error::Unfit(format!(
-                "{}: no column {color}; --color takes {}, {SURFACE_VARIATION}, {STRUCTURE}, #RRGGBB, a CSS colour \
+                "{}: no column {color}{}; --color takes {}, {SURFACE_VARIATION}, {STRUCTURE}, #RRGGBB, a CSS colour \
                  name and what the file has: {}",
                 list_files(self.files_of(i, description)),
+                nearest_if_any(&color.to_string(), columns.iter().copied()),
                 ColorSource::names_where(ColorSource::is_computed).join(", "),
-                match colorable_columns(&self.file_info().columns) {
-                    none if none.is_empty() => "only positions".to_owned(),
-                    columns => columns.join(", "),
-                },
+                if columns.is_empty() { "only positions".to_owned() } else { columns.join(", ") },
             )));
         }
         Ok(())
