@@ -54,7 +54,7 @@ pub(crate) fn read(
         (None, None) => {
             let (columns, description) = infer_columns(&sample.rows, preamble.n_fields);
             let is_survey = columns.first() == Some(&None);
-            let example = if is_survey { ", -,y,x,z if the northing comes first" } else { "" };
+            let example = if is_survey { ", as -,y,x,z if the northing comes first" } else { "" };
             progress.note(&format!(
                 "{}: no header; columns taken as {description} (state them with --columns{example})",
                 input.name

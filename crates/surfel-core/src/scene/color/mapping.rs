@@ -6,7 +6,7 @@ use super::source::ColorSource;
 use super::support::DEFAULT_RANGE;
 use crate::error::Result;
 use crate::image::{Colormap, PercentileRange};
-use crate::points::PointCloud;
+use crate::points::{PointCloud, STRUCTURE};
 
 /// Range of the gray map that intensity uses if no map is named: shading is invisible on black.
 const INTENSITY_GRAY_RANGE: (f32, f32) = (0.3, 0.95);
@@ -38,6 +38,10 @@ impl<'c> Mapping<'c> {
             Some(given) => (given, "as given"),
             None if *source == ColorSource::Support => {
                 (DEFAULT_RANGE, "at a point to one radius away from all points")
+            }
+            None if *source == ColorSource::Column(STRUCTURE.into()) => {
+                let (range, _) = automatic_range(cloud.len(), &value_at);
+                (range, "0 surface, 1 line, 2 scatter, 3 not drawn")
             }
             None => automatic_range(cloud.len(), &value_at),
         };
