@@ -86,6 +86,7 @@ mod tests {
     use super::*;
     use crate::math::Random;
     use crate::scene::camera_fit::MARGIN;
+    use crate::scene::{Geometry, Graph, Material, Mesh};
 
     #[test]
     fn a_single_point_is_seen_by_its_radius() {
@@ -96,6 +97,26 @@ mod tests {
             let camera = fit_camera(&cloud, &CameraFit::default());
             let distance = camera.position.distance(DVec3::ONE) as f32 / radius;
             assert!((2.0..12.0).contains(&distance), "{distance} of {radius}");
+        }
+    }
+
+    #[test]
+    fn a_floor_of_few_vertices_is_no_outlier_of_the_ball_on_it() {
+        let mut random = Random::new(4, 0);
+        let mut axis = || 2.0 * random.next_f32() - 1.0;
+        let ball = (0..20_000).map(|_| Vec3::new(axis(), axis(), axis()).normalize()).collect();
+        let ball = Geometry::Points(PointCloud::from_positions(ball));
+        let corner = |i: i32| Vec3::new((i % 2) as f32 - 0.5, (i / 2) as f32 - 0.5, -0.1) * 10.0;
+        let corners: Vec<Vec3> = (0..4).map(corner).collect();
+        let triangles = vec![[0, 1, 2], [1, 3, 2]];
+        let floor = Mesh { positions: corners.clone(), triangles, ..Mesh::default() };
+        let mut graph = Graph::from_geometry(ball, Material::default());
+        graph.append(Graph::from_geometry(Geometry::Triangles(floor), Material::default()));
+        let camera = fit_camera(&graph.sample_points(), &CameraFit::default());
+        let view = camera.view(DVec3::ZERO, 1600, 900);
+        for corner in corners {
+            let (x, y, _) = view.project(corner).unwrap();
+            assert!((0.0..1600.0).contains(&x) && (0.0..900.0).contains(&y), "{x} {y}");
         }
     }
 

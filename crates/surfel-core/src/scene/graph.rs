@@ -304,9 +304,12 @@ impl<C: AsRef<PointCloud>> Graph<C> {
         self.sample_points_of(&self.visible_nodes())
     }
 
-    /// Returns a sample of the points and vertices of all instances for whose nodes `is_chosen` is true.
+    /// Returns a sample of the points and vertices of all instances for whose nodes `is_chosen` is true. Beside clouds,
+    /// meshes of few vertices have points on their triangles, so that they do not count as outliers.
     pub fn sample_points_of(&self, is_chosen: &[bool]) -> PointCloud {
         const MAX_POINTS: usize = 400_000;
+        /// Number of points on all meshes as a fraction of those of all clouds.
+        const MESH_FRACTION: f64 = 0.25;
         let world = self.world_from_nodes();
         let nodes = self.nodes.iter().zip(&world).zip(is_chosen).filter(|(_, chosen)| **chosen);
         let instances: Vec<(&Geometry<C>, &DAffine3)> = nodes
@@ -316,11 +319,22 @@ impl<C: AsRef<PointCloud>> Graph<C> {
         let n_points: usize =
             instances.iter().map(|(geometry, _)| geometry.positions().len()).sum();
         let step = n_points.div_ceil(MAX_POINTS).max(1);
+        let clouds =
+            instances.iter().filter(|(geometry, _)| matches!(geometry, Geometry::Points(_)));
+        let sizes: Vec<usize> = clouds.map(|(geometry, _)| geometry.positions().len()).collect();
+        let (n_clouds, n_of_clouds) = (sizes.len(), sizes.iter().sum::<usize>());
+        let n_meshes = instances.len() - n_clouds;
+        let n_on_mesh = (MESH_FRACTION * (n_of_clouds / step) as f64) as usize / n_meshes.max(1);
         let mut points = Vec::new();
         for (geometry, world) in instances {
             let origin = geometry.origin();
             let point = |p: &Vec3| world.transform_point3(origin + p.as_dvec3());
             points.extend(geometry.positions().iter().step_by(step).map(point));
+            if let Geometry::Triangles(mesh) = geometry
+                && mesh.positions.len() < n_on_mesh
+            {
+                points.extend(points_on_triangles(mesh, n_on_mesh).iter().map(point));
+            }
         }
         let origin = PointCloud::choose_origin(&points);
         let positions = points.iter().map(|point| (*point - origin).as_vec3()).collect();
@@ -376,4 +390,22 @@ impl<C: AsRef<PointCloud>> Graph<C> {
         }
         world_from_nodes
     }
+}
+
+/// Returns about `n` points on the triangles of a mesh, the same number on each.
+fn points_on_triangles(mesh: &Mesh, n: usize) -> Vec<Vec3> {
+    /// Steps of an even sequence of points in the unit square (Roberts 2018).
+    const STEPS: [f32; 2] = [0.754_877_7, 0.569_840_3];
+    let per_triangle = n.div_ceil(mesh.triangles.len().max(1));
+    let corner = |vertex: u32| mesh.positions.get(vertex as usize).copied();
+    let corners =
+        mesh.triangles.iter().filter_map(|[a, b, c]| Some([corner(*a)?, corner(*b)?, corner(*c)?]));
+    let points = corners.flat_map(|[a, b, c]| {
+        (0..per_triangle).map(move |i| {
+            let [u, v] = STEPS.map(|step| (0.5 + step * i as f32).fract());
+            let (u, v) = if u + v <= 1.0 { (u, v) } else { (1.0 - u, 1.0 - v) };
+            a + u * (b - a) + v * (c - a)
+        })
+    });
+    points.collect()
 }
