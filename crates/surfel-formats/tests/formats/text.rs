@@ -227,7 +227,7 @@ fn text_without_a_header_needs_stated_columns() {
         ("1,20,10,3,TREE", ["-,x,y,z,-", "-,y,x,z,-"]),
         ("P1 20 10 3", ["-,x,y,z", "-,y,x,z"]),
     ] {
-        let error = read("a.csv", &format!("{line}\n{line}\n")).unwrap_err().to_string();
+        let error = read("a.csv", format!("{line}\n{line}\n")).unwrap_err().to_string();
         let [easting_first, northing_first] = expected;
         let advice =
             format!("as in {easting_first} or, if the northing comes first, {northing_first};");
