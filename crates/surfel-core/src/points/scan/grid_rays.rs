@@ -1,6 +1,7 @@
 //! Directions of the rays of a scan's grid, with those that measured nothing.
 //!
-//! Most scanners turn by equal steps: one index of the grid is an azimuth, the other an elevation.
+//! Most scanners turn by equal steps: one index of the grid is an azimuth, the other an elevation. Where the scanner turns
+//! on during each sweep, both angles depend on both indices.
 
 use super::scan_grid::ScanGrid;
 use crate::math::{DVec3, Vec3, median};
@@ -14,6 +15,8 @@ const MIN_PAIRS: usize = 32;
 const MAX_ELEVATION: f64 = 1.3;
 /// Maximum median distance of points from their rays, in steps.
 const MAX_RESIDUAL: f64 = 0.25;
+/// Minimum median distance without a drift, in steps, at which a drift is looked for.
+const MIN_DRIFT_RESIDUAL: f64 = 0.05;
 
 /// The equally spaced rays of a grid, in the scanner's axes.
 pub struct GridRays {
@@ -21,16 +24,27 @@ pub struct GridRays {
     has_azimuth_columns: bool,
     azimuth: Steps,
     elevation: Steps,
-    /// Cosine and sine of each azimuth and of each elevation.
-    azimuths: Vec<[f64; 2]>,
-    elevations: Vec<[f64; 2]>,
+    /// Cosine and sine of the azimuth and of the elevation by their own and by the other index.
+    azimuths: [Vec<[f64; 2]>; 2],
+    elevations: [Vec<[f64; 2]>; 2],
 }
 
 /// Equal steps of an angle in radians.
 #[derive(Clone, Copy, Default)]
 struct Steps {
     start: f64,
+    /// Change from one index to the next.
     step: f64,
+    /// Change from one to the next of the other index.
+    drift: f64,
+}
+
+/// An angle with its own index and the other one.
+#[derive(Clone, Copy)]
+struct AngleOfCell {
+    index: f64,
+    other: f64,
+    angle: f64,
 }
 
 /// A ray with a point.
@@ -68,17 +82,25 @@ impl GridRays {
             true => (1, [along_columns.0, along_rows.1]),
             false => (0, [along_rows.0, along_columns.1]),
         };
-        let azimuth = samples.iter().map(|s| (s.cell[azimuth_axis] as f64, s.azimuth));
-        let elevation = samples.iter().map(|s| (s.cell[1 - azimuth_axis] as f64, s.elevation));
-        let azimuth = Steps::fit(&azimuth.collect::<Vec<_>>(), steps[0])?;
-        let elevation = Steps::fit(&elevation.collect::<Vec<_>>(), steps[1])?;
+        let of_cells = |axis: usize, angle: fn(&Sample) -> f64| {
+            let of_cell = |sample: &Sample| AngleOfCell {
+                index: sample.cell[axis] as f64,
+                other: sample.cell[1 - axis] as f64,
+                angle: angle(sample),
+            };
+            samples.iter().map(of_cell).collect::<Vec<_>>()
+        };
+        let azimuth = Steps::fit(&of_cells(azimuth_axis, |sample| sample.azimuth), steps[0])?;
+        let elevation =
+            Steps::fit(&of_cells(1 - azimuth_axis, |sample| sample.elevation), steps[1])?;
         let size = [grid.n_rows, grid.n_columns];
+        let (n_azimuths, n_elevations) = (size[azimuth_axis], size[1 - azimuth_axis]);
         Some(Self {
             has_azimuth_columns,
             azimuth,
             elevation,
-            azimuths: azimuth.table(size[azimuth_axis]),
-            elevations: elevation.table(size[1 - azimuth_axis]),
+            azimuths: azimuth.tables(n_azimuths, n_elevations),
+            elevations: elevation.tables(n_elevations, n_azimuths),
         })
     }
 
@@ -86,17 +108,22 @@ impl GridRays {
     pub fn direction(&self, row: usize, column: usize) -> DVec3 {
         let (azimuth, elevation) =
             if self.has_azimuth_columns { (column, row) } else { (row, column) };
-        let ([cos, sin], [level, up]) = (self.azimuths[azimuth], self.elevations[elevation]);
+        let [cos, sin] = sum_of_angles(&self.azimuths, azimuth, elevation);
+        let [level, up] = sum_of_angles(&self.elevations, elevation, azimuth);
         DVec3::new(level * cos, level * sin, up)
     }
 
     /// Returns the row and column, as fractions, of the ray through a position in the scanner's axes.
     pub fn cell(&self, measured: DVec3) -> [f64; 2] {
-        let (azimuth, elevation) = angles(measured);
+        let angles = angles(measured);
         let n_of_turn = TAU / self.azimuth.step.abs();
-        let azimuth = (azimuth - self.azimuth.start) / self.azimuth.step;
-        let azimuth = (azimuth + 0.5).rem_euclid(n_of_turn) - 0.5;
-        let elevation = (elevation - self.elevation.start) / self.elevation.step;
+        let (mut azimuth, mut elevation) = (0.0, 0.0);
+        // Once more with the drift, which is far less than a step.
+        for _ in 0..2 {
+            elevation = self.elevation.index(angles.1, azimuth);
+            azimuth = self.azimuth.index(angles.0, elevation);
+            azimuth = (azimuth + 0.5).rem_euclid(n_of_turn) - 0.5;
+        }
         if self.has_azimuth_columns { [elevation, azimuth] } else { [azimuth, elevation] }
     }
 
@@ -108,43 +135,84 @@ impl GridRays {
 }
 
 impl Steps {
-    /// Fits equal steps of about `step` to pairs of an index and an angle; `None` if they are not equal.
-    fn fit(pairs: &[(f64, f64)], step: f64) -> Option<Self> {
+    /// Fits equal steps of about `step`, if need be with a drift; `None` if they are not equal.
+    fn fit(angles: &[AngleOfCell], step: f64) -> Option<Self> {
         if !(1e-6 < step.abs() && step.abs() < 0.5) {
             return None;
         }
-        let count = pairs.len() as f64;
-        let directions = pairs.iter().map(|(index, angle)| (angle - index * step).sin_cos());
+        let directions = angles.iter().map(|cell| (cell.angle - cell.index * step).sin_cos());
         let (sin, cos) = directions.fold((0.0, 0.0), |(x, y), (sin, cos)| (x + sin, y + cos));
-        let mut steps = Self { start: sin.atan2(cos), step };
-        let mean = pairs.iter().map(|pair| pair.0).sum::<f64>() / count;
-        for _ in 0..2 {
-            let (mut sum, mut product, mut square) = (0.0, 0.0, 0.0);
-            for (index, angle) in pairs {
-                let residual = steps.residual(*index, *angle);
-                sum += residual;
-                product += (index - mean) * residual;
-                square += (index - mean) * (index - mean);
-            }
-            let slope = if 0.0 < square { product / square } else { 0.0 };
-            steps.start += sum / count - slope * mean;
-            steps.step += slope;
-        }
-        let residuals = pairs.iter().map(|(index, angle)| steps.residual(*index, *angle).abs());
-        (median(residuals)? < MAX_RESIDUAL * steps.step.abs()).then_some(steps)
-    }
-
-    fn residual(&self, index: f64, angle: f64) -> f64 {
-        wrapped(angle - self.start - index * self.step)
-    }
-
-    fn table(&self, count: usize) -> Vec<[f64; 2]> {
-        let angle = |index: usize| {
-            let (sin, cos) = (self.start + index as f64 * self.step).sin_cos();
-            [cos, sin]
+        let steps = Self { start: sin.atan2(cos), step, drift: 0.0 };
+        let fit = |has_drift| {
+            let steps = steps.refined(angles, has_drift).refined(angles, has_drift);
+            let residuals = angles.iter().map(|cell| steps.residual(cell).abs());
+            Some((median(residuals)? / steps.step.abs(), steps))
         };
-        (0..count).map(angle).collect()
+        let (mut residual, mut steps) = fit(false)?;
+        if MIN_DRIFT_RESIDUAL < residual
+            && let Some((with_drift, drifting)) = fit(true)
+            && with_drift < 0.5 * residual
+        {
+            (residual, steps) = (with_drift, drifting);
+        }
+        (residual < MAX_RESIDUAL).then_some(steps)
     }
+
+    /// Returns the steps of least squares, with or without a drift.
+    fn refined(&self, angles: &[AngleOfCell], has_drift: bool) -> Self {
+        let count = angles.len() as f64;
+        let mean = |value: fn(&AngleOfCell) -> f64| angles.iter().map(value).sum::<f64>() / count;
+        let (index, other) = (mean(|cell| cell.index), mean(|cell| cell.other));
+        let (mut sum, mut products, mut squares) = (0.0, [0.0; 2], [0.0; 3]);
+        for cell in angles {
+            let (residual, a, b) = (self.residual(cell), cell.index - index, cell.other - other);
+            sum += residual;
+            products[0] += a * residual;
+            products[1] += b * residual;
+            squares[0] += a * a;
+            squares[1] += a * b;
+            squares[2] += b * b;
+        }
+        let determinant = squares[0] * squares[2] - squares[1] * squares[1];
+        let slopes = if has_drift && 1e-6 * squares[0] * squares[2] < determinant {
+            [
+                (squares[2] * products[0] - squares[1] * products[1]) / determinant,
+                (squares[0] * products[1] - squares[1] * products[0]) / determinant,
+            ]
+        } else if 0.0 < squares[0] {
+            [products[0] / squares[0], 0.0]
+        } else {
+            [0.0; 2]
+        };
+        Self {
+            start: self.start + sum / count - slopes[0] * index - slopes[1] * other,
+            step: self.step + slopes[0],
+            drift: self.drift + slopes[1],
+        }
+    }
+
+    fn residual(&self, cell: &AngleOfCell) -> f64 {
+        wrapped(cell.angle - self.start - cell.index * self.step - cell.other * self.drift)
+    }
+
+    /// Returns the index, as a fraction, of an angle beside one of the other index.
+    fn index(&self, angle: f64, other: f64) -> f64 {
+        (angle - self.start - other * self.drift) / self.step
+    }
+
+    /// Returns cosine and sine of the angle of each index, and of its change by each of the other index.
+    fn tables(&self, n_indices: usize, n_others: usize) -> [Vec<[f64; 2]>; 2] {
+        let cos_sin = |angle: f64| [angle.cos(), angle.sin()];
+        let own = (0..n_indices).map(|index| cos_sin(self.start + index as f64 * self.step));
+        let by_other = (0..n_others).map(|other| cos_sin(other as f64 * self.drift));
+        [own.collect(), by_other.collect()]
+    }
+}
+
+/// Returns cosine and sine of an angle that depends on two indices.
+fn sum_of_angles([own, by_other]: &[Vec<[f64; 2]>; 2], index: usize, other: usize) -> [f64; 2] {
+    let ([cos_a, sin_a], [cos_b, sin_b]) = (own[index], by_other[other]);
+    [cos_a * cos_b - sin_a * sin_b, sin_a * cos_b + cos_a * sin_b]
 }
 
 /// Returns azimuth and elevation of a position in the scanner's axes.
@@ -203,6 +271,29 @@ mod tests {
             assert!(rays.direction(row, column).distance(expected) < 1e-4);
             let rows = cloud.scalars[0].values.clone();
             cloud.scalars[0].values = std::mem::replace(&mut cloud.scalars[1].values, rows);
+        }
+    }
+
+    #[test]
+    fn a_scanner_may_turn_on_during_a_sweep() {
+        let mut cloud = scan(300, 80, |_, _| Some(3.0));
+        let indices = [0, 1].map(|axis| cloud.scalars[axis].values.clone());
+        let direction = |row: f64, column: f64| {
+            let azimuth = 0.01 * (column - 1.5 * row / 300.0);
+            let elevation = 0.004 * (row - 150.0) + 0.00002 * column;
+            let (level, up) = (elevation.cos(), elevation.sin());
+            DVec3::new(level * azimuth.cos(), level * azimuth.sin(), up)
+        };
+        for (point, position) in cloud.positions.iter_mut().enumerate() {
+            *position = (3.0 * direction(indices[0].get(point), indices[1].get(point))).as_vec3();
+        }
+        let (grid, rays) = rays(&cloud).unwrap();
+        for ([row, column], _) in grid.cells() {
+            let expected = direction(row as f64, column as f64);
+            assert!(rays.direction(row, column).distance(expected) < 1e-5);
+            let cell = rays.cell(expected);
+            assert!((cell[0] - row as f64).abs() < 0.01, "{row} {column}: {cell:?}");
+            assert!((cell[1] - column as f64).abs() < 0.01, "{row} {column}: {cell:?}");
         }
     }
 
