@@ -3,8 +3,9 @@
 //! Most scanners turn by equal steps: one index of the grid is an azimuth, the other an elevation. Where the scanner turns
 //! on during each sweep, both angles depend on both indices.
 
-use super::scan_grid::ScanGrid;
+use super::scan_grid::{ScanGrid, ScanGrids};
 use crate::math::{DVec3, Vec3, median};
+use crate::points::PointCloud;
 use std::f64::consts::{PI, TAU};
 
 /// Number of rays with points that the steps are found from.
@@ -52,6 +53,19 @@ struct Sample {
     cell: [usize; 2],
     azimuth: f64,
     elevation: f64,
+}
+
+/// Returns the grids of the scans whose station is known; `None` if there are none. A station that the file does not state
+/// is at the zero of the world coordinates if the grid's rays have equal steps as seen from there.
+pub fn located_grids(cloud: &PointCloud) -> Option<ScanGrids> {
+    let mut grids = ScanGrids::new(cloud)?;
+    for scan in &mut grids.scans {
+        let is_located = |grid: &mut ScanGrid| {
+            grid.is_station_stated || GridRays::new(grid, &cloud.positions).is_some()
+        };
+        *scan = scan.take_if(is_located);
+    }
+    grids.scans.iter().any(Option::is_some).then_some(grids)
 }
 
 impl GridRays {
@@ -232,9 +246,8 @@ mod tests {
 
     use super::*;
     use crate::math::DQuat;
-    use crate::points::scan::scan_grid::ScanGrids;
+    use crate::points::Values;
     use crate::points::scan::scan_grid::tests::scan;
-    use crate::points::{PointCloud, Values};
 
     fn rays(cloud: &PointCloud) -> Option<(ScanGrid, GridRays)> {
         let grid = ScanGrids::new(cloud)?.scans.pop()??;
@@ -272,6 +285,19 @@ mod tests {
             let rows = cloud.scalars[0].values.clone();
             cloud.scalars[0].values = std::mem::replace(&mut cloud.scalars[1].values, rows);
         }
+    }
+
+    #[test]
+    fn a_station_that_is_not_stated_is_at_the_zero_if_rays_have_equal_steps_from_there() {
+        let range = |row: usize, column: usize| Some(2.0 + ((row * column) % 5) as f32);
+        let mut cloud = scan(40, 40, range);
+        cloud.stations[0].position = None;
+        let grids = located_grids(&cloud).unwrap();
+        assert_eq!(grids.scans[0].as_ref().unwrap().station, Vec3::ZERO);
+        cloud.positions.iter_mut().for_each(|position| *position += Vec3::new(0.5, -0.5, 0.2));
+        assert!(located_grids(&cloud).is_none());
+        cloud.stations[0].position = Some(DVec3::new(0.5, -0.5, 0.2));
+        assert!(located_grids(&cloud).is_some());
     }
 
     #[test]

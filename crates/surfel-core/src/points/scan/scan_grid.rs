@@ -14,6 +14,8 @@ const MAX_FURTHER_RAYS: usize = 4096;
 pub struct ScanGrid {
     /// Position of the scanner, relative to the origin of the cloud.
     pub station: Vec3,
+    /// False if the station is the zero of the world coordinates only because nothing states another place.
+    pub is_station_stated: bool,
     /// Rotation from the scanner's axes to those of the world.
     pub rotation: DQuat,
     /// Number of rows.
@@ -26,7 +28,7 @@ pub struct ScanGrid {
 
 /// The grids of the scans of a cloud.
 pub struct ScanGrids {
-    /// Grids by the index of their station; none for a scan without a grid or a known position.
+    /// Grids by the index of their station; none for a scan without a grid.
     pub scans: Vec<Option<ScanGrid>>,
 }
 
@@ -39,14 +41,17 @@ struct Extent {
 }
 
 impl ScanGrids {
-    /// Returns the grids of the scans whose station is known; `None` if there are none.
+    /// Returns the grids of the scans; `None` if there are none. A station of unknown position is taken to be at the zero
+    /// of the world coordinates.
     pub fn new(cloud: &PointCloud) -> Option<Self> {
         let indices = [cloud.scalar(ROW_INDEX)?, cloud.scalar(COLUMN_INDEX)?];
         let scan_of = cloud.scan_of_point()?;
         let extents = extents(cloud, indices, &scan_of);
         let grid = |(station, extent): (&crate::points::ScanStation, Extent)| {
-            let position = station.position?;
-            ScanGrid::empty((position - cloud.origin).as_vec3(), station.rotation, &extent)
+            let position = station.position.unwrap_or_default();
+            let grid =
+                ScanGrid::empty((position - cloud.origin).as_vec3(), station.rotation, &extent)?;
+            Some(ScanGrid { is_station_stated: station.position.is_some(), ..grid })
         };
         let mut scans: Vec<Option<ScanGrid>> =
             cloud.stations.iter().zip(extents.iter().copied()).map(grid).collect();
@@ -74,7 +79,8 @@ impl ScanGrid {
         if max_rays.checked_add(MAX_FURTHER_RAYS)? < n_rays {
             return None;
         }
-        Some(Self { station, rotation, n_rows, n_columns, points: vec![NO_POINT; n_rays] })
+        let points = vec![NO_POINT; n_rays];
+        Some(Self { station, is_station_stated: true, rotation, n_rows, n_columns, points })
     }
 
     /// Returns the point of a ray; `None` beyond the grid and where the ray measured nothing.
@@ -196,9 +202,6 @@ pub(crate) mod tests {
     fn scans_without_a_station_or_a_grid_have_none() {
         let whole = || scan(4, 4, |_, _| Some(1.0));
         let mut cloud = whole();
-        cloud.stations[0].position = None;
-        assert!(single(&cloud).is_none());
-        cloud = whole();
         cloud.stations.clear();
         assert!(single(&cloud).is_none());
         cloud = whole();
