@@ -14,6 +14,9 @@ const MIN_MEDIAN: f32 = 0.15;
 /// Greatest factor by which highlights exceed their target to brighten a dark median.
 const MAX_EXCESS: f32 = 1.4;
 
+/// Fraction of the covered pixels that stay below white where a dark median is brightened.
+const UNCLIPPED_PERCENTILE: f64 = 0.98;
+
 /// Fraction of the covered pixels that are darker than the highlights.
 const HIGHLIGHT_PERCENTILE: f64 = 0.99;
 
@@ -48,9 +51,11 @@ fn stops(values: Vec<f32>) -> f32 {
     let Some(highlights) = quantile(values.iter().copied(), HIGHLIGHT_PERCENTILE) else {
         return 0.0;
     };
+    let unclipped = quantile(values.iter().copied(), UNCLIPPED_PERCENTILE).unwrap_or(highlights);
     let for_highlights = HIGHLIGHT_TARGET / highlights.max(1e-6);
+    let for_unclipped = 1.0 / unclipped.max(1e-6);
     let for_median = MIN_MEDIAN / median(values).map_or(1e-6, |median| median.max(1e-6));
-    let gain = for_highlights.max(for_median.min(MAX_EXCESS * for_highlights));
+    let gain = for_highlights.max(for_median.min(MAX_EXCESS * for_highlights).min(for_unclipped));
     gain.log2().clamp(LIMITS.0, LIMITS.1)
 }
 
@@ -73,12 +78,19 @@ mod tests {
     #[test]
     fn a_dark_median_brightens_the_picture_by_half_a_stop_at_most() {
         let stops_of = |median: f32| {
-            let mut values = vec![median; 900];
-            values.extend([HIGHLIGHT_TARGET; 100]);
+            let mut values = vec![median; 985];
+            values.extend([HIGHLIGHT_TARGET; 15]);
             stops(values)
         };
         assert_eq!(stops_of(MIN_MEDIAN), 0.0);
         assert!((stops_of(MIN_MEDIAN / 1.2) - 1.2f32.log2()).abs() < 1e-4);
         assert!((stops_of(0.01) - MAX_EXCESS.log2()).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_dark_median_does_not_turn_more_than_a_fiftieth_of_the_picture_white() {
+        let mut values = vec![0.01; 900];
+        values.extend([HIGHLIGHT_TARGET; 100]);
+        assert!((stops(values) - (1.0 / HIGHLIGHT_TARGET).log2()).abs() < 1e-4);
     }
 }
