@@ -2,9 +2,10 @@
 //!
 //! The more noise, the more neighbours take part. Normals are averaged over neighbours of similar normals, which keeps
 //! edges (bilateral filter), and each point moves along its normal onto the weighted mean of its neighbours' planes
-//! (after Huang et al., Edge-Aware Point Set Resampling, 2013).
+//! (after Huang et al., Edge-Aware Point Set Resampling, 2013). Points of flat faces move onto the plane of their face.
 
 use super::depth_steps::DepthSteps;
+use super::flat_faces::{FlatFaces, MIN_WITNESSES, spacing};
 use super::noise::{GROUP_SIZE, Noise};
 use crate::error::Result;
 use crate::math::Vec3;
@@ -186,6 +187,12 @@ fn moved(
     let counts_of_points = counts.iter().map(of_point).collect();
     let points = Layer::new(tree, counts_of_points, progress)?;
     let groups = Layer::new(groups, counts_of_groups, progress)?;
+    let normal_of = |point: usize| match points.normals[point] {
+        Vec3::ZERO => groups.normal_near(positions[point]),
+        normal => normal,
+    };
+    let faces = FlatFaces::find(tree, counts, noises, normal_of, progress)?;
+    let places = faces.tree(progress)?;
     progress.begin("denoise", positions.len() as u64);
     let moved = |(point, position): (usize, &Vec3)| {
         if point.is_multiple_of(1024) {
@@ -195,6 +202,14 @@ fn moved(
         let count = counts[point];
         if count == 0 {
             return Ok((*position, Vec3::ZERO));
+        }
+        let n_witnesses = MIN_WITNESSES.max(count as usize);
+        let neighbors = tree.nearest(*position, n_witnesses, Some(point as u32));
+        let noise = noises[point].unwrap_or_default();
+        let witnesses = neighbors.iter().map(|neighbor| positions[neighbor.index as usize]);
+        let deviation = noise * spacing(&neighbors);
+        if let Some(moved) = faces.moved(&places, *position, witnesses.collect(), deviation) {
+            return Ok(moved);
         }
         let is_grouped = MIN_GROUPED <= count;
         let is_uneven = match is_grouped {
@@ -208,8 +223,7 @@ fn moved(
             let count = count.div_ceil(GROUP_SIZE as u32);
             return Ok((groups.moved(*position, count, GROUP_SIZE as f32), Vec3::ZERO));
         }
-        let (normal, noise) = (points.normals[point], noises[point].unwrap_or_default());
-        let jet = fit_wide_jet(tree, point, normal, noise);
+        let jet = fit_wide_jet(tree, point, points.normals[point], noise);
         let normal = jet.map_or(Vec3::ZERO, |jet| jet.normal);
         Ok((points.moved(*position, count, 1.0), normal))
     };
@@ -264,6 +278,12 @@ impl<'a> Layer<'a> {
     fn is_uneven_at(&self, position: Vec3) -> bool {
         let nearest = self.tree.nearest(position, 1, None);
         nearest.first().is_some_and(|nearest| self.is_uneven[nearest.index as usize])
+    }
+
+    /// Returns the normal of the nearest point, or zero if there is none.
+    fn normal_near(&self, position: Vec3) -> Vec3 {
+        let nearest = self.tree.nearest(position, 1, None);
+        nearest.first().map_or(Vec3::ZERO, |nearest| self.normals[nearest.index as usize])
     }
 
     fn averaged_normals(&self, progress: &dyn Progress) -> Result<Vec<Vec3>> {

@@ -4,6 +4,7 @@
 //! A file uses only those above it.
 
 pub mod depth_steps;
+pub mod flat_faces;
 pub mod noise;
 pub mod denoise;
 pub mod line_axes;

@@ -172,6 +172,14 @@ fn fit_jet(
     })
 }
 
+/// Returns the sum of the squared heights of points over the cubic fitted to them, or none if they do not determine it. The
+/// points are `[x, y, height]`, with `x` and `y` from about -1 to 1.
+pub fn cubic_residual(points: &[[f64; 3]]) -> Option<f64> {
+    let mut sums = NormalEquations::default();
+    points.iter().for_each(|[x, y, height]| sums.add(*x, *y, *height, 1.0));
+    Some(sums.residual(&sums.solve()?))
+}
+
 /// Exponents of x and y in the terms of a cubic.
 const EXPONENTS: [(usize, usize); N_TERMS] =
     [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)];

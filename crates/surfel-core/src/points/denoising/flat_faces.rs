@@ -1,0 +1,382 @@
+//! Planes of flat faces, as walls and floors. They follow from eight times as many neighbours as other surfaces, so that
+//! less noise is left. Points beyond the edge where two of them meet move onto it.
+
+use crate::error::Result;
+use crate::math::{DVec3, SymmetricMatrix, Vec3, smallest_eigenvector};
+use crate::points::neighbors::{KdTree, Neighbor};
+use crate::points::normals::jets::cubic_residual;
+use crate::progress::Progress;
+use rayon::prelude::*;
+
+/// Number of points, among as many as take part on other surfaces, that are asked for the plane around them.
+const SEEDS_PER_NEIGHBORS: usize = 3;
+/// Numbers of neighbours, in multiples of those of other surfaces, and the greatest root mean square height, in standard
+/// deviations of the noise, of the cubic through them over their plane. Each plane starts from the one before; the first
+/// one is not judged.
+const SCALES: [(usize, f32); 3] = [(1, f32::INFINITY), (4, 0.55), (8, 0.3)];
+/// Maximum number of neighbours around a point, and of those among them that take part.
+const MAX_NEIGHBORS: usize = 2048;
+const MAX_FITTED: usize = 512;
+/// Number of times that a plane is fitted again to the points near it.
+const N_REFITS: usize = 2;
+/// Distance from a plane of the points on it, in standard deviations of the noise.
+const MAX_HEIGHT: f32 = 3.0;
+/// Minimum fraction of the neighbours on the plane: at an edge half of them are, without those beside the edge.
+const MIN_FRACTION: f32 = 0.35;
+/// Distance along the plane from points off it, in spacings, within which a point does not count. Points of two faces lie
+/// near the plane of either where these meet.
+const MARGIN: f32 = 1.5;
+/// Minimum ratio of the middle to the largest eigenvalue: many planes pass through a narrow strip.
+const MIN_WIDTH: f64 = 0.1;
+/// Maximum ratio of the variance of the neighbours to that of the noise.
+const MAX_VARIANCE_RATIO: f32 = 2.5;
+/// Number of planes around a point among which that of its face is sought.
+const N_NEAREST: usize = 48;
+/// Minimum number of neighbours that tell the planes on which a point may be.
+pub const MIN_WITNESSES: usize = 24;
+/// Minimum fraction of them on a plane.
+const MIN_ON_PLANE: f32 = 0.3;
+/// Maximum number of points, for each plane of a face, around which the face bends.
+const MAX_BENT: usize = 2;
+/// Cosine of the angle between normals: those of one face have more, those of two faces that meet in an edge less.
+const MIN_SAME_FACE: f32 = 0.985;
+const MAX_EDGE: f32 = 0.94;
+/// Distance from the plane of another face, in standard deviations, of the points that tell which side is inside, and the
+/// ratio of their numbers on both sides.
+const CLEARLY_BESIDE: f32 = 1.5;
+const MIN_INSIDE_RATIO: usize = 3;
+
+/// The plane of a flat face.
+#[derive(Clone, Copy)]
+struct Plane {
+    /// Point on the plane.
+    middle: Vec3,
+    /// Unit normal of either sign.
+    normal: Vec3,
+    /// Distance from the middle to which the plane is known.
+    reach: f32,
+}
+
+/// The surface around a point.
+#[derive(Clone, Copy)]
+enum Around {
+    Flat(Plane),
+    /// A surface that bends, with the point.
+    Bent(Vec3),
+}
+
+/// The flat faces of a cloud.
+pub struct FlatFaces {
+    /// The surface around some of the points.
+    samples: Vec<Around>,
+    /// Where these are.
+    places: Vec<Vec3>,
+}
+
+impl FlatFaces {
+    /// Finds the flat faces. `counts` are the numbers of neighbours of each point that take part on other surfaces, zero for
+    /// points that stay, `noises` the noise in spacings, and `normal_of` gives a rough normal of a point.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+    pub fn find(
+        tree: &KdTree,
+        counts: &[u32],
+        noises: &[Option<f32>],
+        normal_of: impl Fn(usize) -> Vec3 + Sync,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let positions = tree.positions();
+        let (largest, _) = SCALES[SCALES.len() - 1];
+        let around = |point: &usize| {
+            progress.check()?;
+            let (position, normal) = (positions[*point], normal_of(*point));
+            let count = (counts[*point] as usize).min(MAX_NEIGHBORS / largest);
+            let neighbors = tree.nearest(position, largest * count, Some(*point as u32));
+            if neighbors.len() < largest * count || normal == Vec3::ZERO {
+                return Ok(None);
+            }
+            let noise = noises[*point].unwrap_or_default() * spacing(&neighbors[..count]);
+            let start = Plane { middle: position, normal, reach: 0.0 };
+            Ok(Around::new(positions, start, &neighbors, count, noise))
+        };
+        let is_sample = |point: &usize| {
+            let step = (counts[*point] as usize / SEEDS_PER_NEIGHBORS).max(1);
+            counts[*point] != 0 && point.is_multiple_of(step)
+        };
+        let asked: Vec<usize> = (0..positions.len()).filter(is_sample).collect();
+        let found = asked.par_iter().map(around).collect::<Result<Vec<_>>>()?;
+        let samples: Vec<Around> = found.into_iter().flatten().collect();
+        let place = |sample: &Around| match sample {
+            Around::Flat(plane) => plane.middle,
+            Around::Bent(position) => *position,
+        };
+        let places = samples.iter().map(place).collect();
+        Ok(Self { samples, places })
+    }
+
+    /// Returns the tree over the places where the surface is known.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Error::Cancelled`](crate::Error::Cancelled) if `progress` is cancelled.
+    pub fn tree(&self, progress: &dyn Progress) -> Result<KdTree<'_>> {
+        KdTree::new(&self.places, progress)
+    }
+
+    /// Returns a point moved onto the plane of its face, or onto the edge if it lies beyond, and the normal of the face,
+    /// zero near an edge. Returns none if the point is on no flat face.
+    ///
+    /// `places` is [`Self::tree`], `neighbors` are those of the point, and `noise` is the standard deviation around it.
+    pub fn moved(
+        &self,
+        places: &KdTree,
+        position: Vec3,
+        neighbors: Vec<Vec3>,
+        noise: f32,
+    ) -> Option<(Vec3, Vec3)> {
+        let witnesses = Witnesses { positions: neighbors, noise };
+        let mut faces = self.faces_at(places, position, &witnesses);
+        faces.retain(|face| witnesses.is_on(face, position));
+        let height = |face: &Plane| face.height(position).abs();
+        let own = *faces.iter().min_by(|a, b| height(a).total_cmp(&height(b)))?;
+        faces.retain(|other| own.normal.dot(other.normal).abs() < MAX_EDGE);
+        let mut moved = position - own.normal * own.height(position);
+        for other in &faces {
+            if witnesses.is_beyond(&own, other, moved) {
+                let along = other.normal.reject_from(own.normal).normalize();
+                moved -= along * (other.height(moved) / along.dot(other.normal));
+            }
+        }
+        Some((moved, if faces.is_empty() { own.normal } else { Vec3::ZERO }))
+    }
+
+    /// Returns the planes, one a face, on which enough of the neighbours of a position lie.
+    fn faces_at(&self, places: &KdTree, position: Vec3, witnesses: &Witnesses) -> Vec<Plane> {
+        let (mut planes, mut bent) = (Vec::new(), Vec::new());
+        for sample in places.nearest(position, N_NEAREST, None) {
+            match self.samples[sample.index as usize] {
+                Around::Flat(plane) => planes.push((plane, sample.distance_squared.sqrt())),
+                Around::Bent(position) => bent.push(position),
+            }
+        }
+        planes.retain(|(plane, distance)| *distance < plane.reach && witnesses.are_on(plane));
+        let mut faces = Vec::new();
+        while let Some((first, _)) = planes.first().copied() {
+            let is_same = |(plane, _): &(Plane, f32)| {
+                let cosine = first.normal.dot(plane.normal);
+                let height = plane.height(position) * cosine.signum();
+                let step = (first.height(position) - height).abs();
+                MIN_SAME_FACE < cosine.abs() && step < witnesses.noise
+            };
+            let (same, others): (Vec<_>, Vec<_>) = planes.into_iter().partition(is_same);
+            let face = Plane::mean(&same, position);
+            let n_bent = bent.iter().filter(|bent| witnesses.is_on(&face, **bent)).count();
+            if n_bent <= MAX_BENT * same.len() {
+                faces.push(face);
+            }
+            planes = others;
+        }
+        faces
+    }
+}
+
+impl Around {
+    /// Returns the surface around a point from its neighbours, nearest first: flat if noise of the standard deviation `noise`
+    /// explains their distances from a plane, bent if not, none if no plane passes through enough of them. `start` is a
+    /// rough plane, and `count` the number of neighbours that take part on other surfaces.
+    fn new(
+        positions: &[Vec3],
+        start: Plane,
+        neighbors: &[Neighbor],
+        count: usize,
+        noise: f32,
+    ) -> Option<Self> {
+        let mut plane = start;
+        let step = neighbors.len().div_ceil(MAX_FITTED);
+        for (scale, max_bend) in SCALES {
+            let nearest = &neighbors[..scale * count];
+            let fitted = nearest.iter().step_by(step);
+            let points: Vec<Vec3> =
+                fitted.map(|neighbor| positions[neighbor.index as usize]).collect();
+            plane.reach = nearest.last()?.distance_squared.sqrt();
+            let is_judged = max_bend < f32::INFINITY;
+            let spacing = spacing(nearest) * (step as f32).sqrt();
+            let margin = if is_judged { MARGIN * spacing } else { 0.0 };
+            let (mut on_plane, mut variance) = (Vec::new(), 0.0);
+            for _ in 0..N_REFITS {
+                on_plane = plane.inside_face(&points, MAX_HEIGHT * noise, margin);
+                let is_enough = MIN_FRACTION * points.len() as f32 <= on_plane.len() as f32;
+                variance = is_enough.then(|| plane.refit(&on_plane)).flatten()?;
+            }
+            let is_bent = || plane.bend(&on_plane).is_none_or(|bend| max_bend * noise < bend);
+            if is_judged && (MAX_VARIANCE_RATIO * noise * noise < variance || is_bent()) {
+                return Some(Self::Bent(start.middle));
+            }
+        }
+        Some(Self::Flat(plane))
+    }
+}
+
+impl Plane {
+    fn height(&self, position: Vec3) -> f32 {
+        self.normal.dot(position - self.middle)
+    }
+
+    /// Returns the points nearer to the plane than `max_height`, without those beside points that are farther.
+    fn inside_face(&self, points: &[Vec3], max_height: f32, margin: f32) -> Vec<Vec3> {
+        let is_near = |point: &Vec3| self.height(*point).abs() < max_height;
+        let (mut near, mut far): (Vec<Vec3>, Vec<Vec3>) = points.iter().partition(|p| is_near(p));
+        // Those high above are not of a face that meets this one here.
+        far.retain(|other| self.height(*other).abs() < max_height + 2.0 * margin);
+        let is_beside = |point: &Vec3, other: &Vec3| {
+            (other - point).reject_from_normalized(self.normal).length_squared() < margin * margin
+        };
+        near.retain(|point| !far.iter().any(|other| is_beside(point, other)));
+        near
+    }
+
+    /// Fits the plane to points and returns the variance of their distances from it; none if they are a narrow strip.
+    fn refit(&mut self, points: &[Vec3]) -> Option<f32> {
+        let (mut scatter, mut sum) = (SymmetricMatrix::default(), DVec3::ZERO);
+        for point in points {
+            let offset = (point - self.middle).as_dvec3();
+            scatter.add_outer(offset, 1.0);
+            sum += offset;
+        }
+        let n_points = points.len() as f64;
+        scatter.add_outer(sum, -1.0 / n_points);
+        let (normal, [smallest, middle, largest]) = smallest_eigenvector(&scatter);
+        // NaN fails this test, too.
+        let is_wide = MIN_WIDTH * largest < middle;
+        if !is_wide {
+            return None;
+        }
+        self.normal = normal.as_vec3().normalize();
+        self.middle += (sum / n_points).as_vec3();
+        // A plane takes three points.
+        Some((smallest.max(0.0) / (n_points - 3.0).max(1.0)) as f32)
+    }
+
+    /// Returns the root mean square height over the plane of the cubic through the points that the plane is fitted to, or
+    /// none if they do not determine a cubic.
+    fn bend(&self, points: &[Vec3]) -> Option<f32> {
+        let (u, v) = self.normal.any_orthonormal_pair();
+        let coordinates = |point: &Vec3| {
+            let offset = (point - self.middle) / self.reach;
+            [u, v, self.normal].map(|axis| f64::from(axis.dot(offset)))
+        };
+        let points: Vec<[f64; 3]> = points.iter().map(coordinates).collect();
+        let of_plane: f64 = points.iter().map(|[.., height]| height * height).sum();
+        let explained = (of_plane - cubic_residual(&points)?).max(0.0);
+        Some(self.reach * (explained / points.len() as f64).sqrt() as f32)
+    }
+
+    /// Returns the mean at a position of planes, each with its distance from there; the nearer ones have more weight.
+    fn mean(planes: &[(Self, f32)], position: Vec3) -> Self {
+        let (first, _) = planes[0];
+        let (mut normal, mut height, mut weights) = (Vec3::ZERO, 0.0, 0.0);
+        for (plane, distance) in planes {
+            let inside = 1.0 - (distance / plane.reach).powi(2);
+            let weight = (inside * inside).max(f32::EPSILON);
+            let signed = weight * plane.normal.dot(first.normal).signum();
+            normal += signed * plane.normal;
+            height += signed * plane.height(position);
+            weights += weight;
+        }
+        let normal = normal.normalize();
+        Self { middle: position - normal * (height / weights), normal, reach: first.reach }
+    }
+}
+
+/// The neighbours of a point, which tell the faces that it may be on.
+struct Witnesses {
+    positions: Vec<Vec3>,
+    /// Standard deviation of the noise.
+    noise: f32,
+}
+
+impl Witnesses {
+    fn is_on(&self, plane: &Plane, position: Vec3) -> bool {
+        plane.height(position).abs() < MAX_HEIGHT * self.noise
+    }
+
+    /// True if enough of the neighbours are on a plane.
+    fn are_on(&self, plane: &Plane) -> bool {
+        let n_on = self.positions.iter().filter(|position| self.is_on(plane, **position)).count();
+        MIN_ON_PLANE * self.positions.len() as f32 <= n_on as f32
+    }
+
+    /// True if a position on the face `own` lies on that side of another face where `own` has no points.
+    fn is_beyond(&self, own: &Plane, other: &Plane, position: Vec3) -> bool {
+        let clearly = CLEARLY_BESIDE * self.noise;
+        let on_own = self.positions.iter().filter(|position| self.is_on(own, **position));
+        let (mut n_above, mut n_below) = (0, 0);
+        for height in on_own.map(|position| other.height(*position)) {
+            n_above += usize::from(clearly < height);
+            n_below += usize::from(height < -clearly);
+        }
+        match 0.0 < other.height(position) {
+            true => MIN_INSIDE_RATIO * n_above < n_below,
+            false => MIN_INSIDE_RATIO * n_below < n_above,
+        }
+    }
+}
+
+/// Returns the spacing of points on a surface that has these neighbours, nearest first.
+pub fn spacing(neighbors: &[Neighbor]) -> f32 {
+    let reach = neighbors.last().map_or(0.0, |last| last.distance_squared);
+    (std::f32::consts::PI * reach / (neighbors.len() + 1) as f32).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    //! Noisy clouds with known faces.
+
+    use super::*;
+    use crate::math::Random;
+    use crate::points::{Denoise, PointCloud, denoise};
+    use crate::progress::NoProgress;
+
+    #[test]
+    fn faces_of_a_noisy_box_are_flat_and_end_at_its_edges() {
+        let (mut random, half) = (Random::new(4, 0), 20.0f32);
+        let mut points = Vec::new();
+        for axis in 0..3 {
+            for (sign, i) in
+                [-1.0, 1.0].into_iter().flat_map(|sign| (0..1600).map(move |i| (sign, i)))
+            {
+                let mut coordinates = [sign * half; 3];
+                coordinates[(axis + 1) % 3] = (i % 40) as f32 + 0.5 - half;
+                coordinates[(axis + 2) % 3] = (i / 40) as f32 + 0.5 - half;
+                points.push(coordinates.map(|x| x + 0.3 * random.next_gaussian() as f32));
+            }
+        }
+        let points = points.into_iter().map(Vec3::from_array).collect();
+        let mut cloud = PointCloud::from_positions(points);
+        denoise(&mut cloud, Denoise::Auto, &NoProgress).unwrap().unwrap();
+        let outside = |point: &Vec3| point.abs().max_element() - half;
+        let heights: Vec<f32> = cloud.positions.iter().map(outside).collect();
+        let mean_square = heights.iter().map(|x| x * x).sum::<f32>() / heights.len() as f32;
+        // The noise is 0.3.
+        assert!(mean_square.sqrt() < 0.08, "{}", mean_square.sqrt());
+        let n_outside = heights.iter().filter(|height| 0.3 < **height).count();
+        assert!(n_outside < heights.len() / 100, "{n_outside}");
+    }
+
+    #[test]
+    fn a_wall_goes_on_behind_a_shelf() {
+        let mut random = Random::new(5, 0);
+        let mut noise = || 0.3 * random.next_gaussian() as f32;
+        let wall = (0..2500).map(|i| Vec3::new((i % 50) as f32, 0.0, (i / 50) as f32));
+        let shelf = (0..1000).map(|i| Vec3::new((i % 50) as f32, 1.0 + (i / 50) as f32, 25.0));
+        let points = wall.chain(shelf).map(|p| p + Vec3::new(noise(), noise(), noise()));
+        let mut cloud = PointCloud::from_positions(points.collect());
+        let before = cloud.positions.clone();
+        denoise(&mut cloud, Denoise::On, &NoProgress).unwrap().unwrap();
+        let moved = before[..2500].iter().zip(&cloud.positions).map(|(a, b)| (a.z - b.z).abs());
+        assert!(moved.clone().fold(0.0, f32::max) < 1.0);
+        assert!(moved.sum::<f32>() / 2500.0 < 0.05);
+    }
+}
