@@ -404,10 +404,10 @@ pub struct ShadingPointRecord {
     pub media: [u32; 4],
     /// Random key of the path.
     pub key: [u32; 2],
+    /// Reciprocal of the cosine to the normal from which on rays toward lights begin at once.
+    pub light_steepness: f32,
     /// Zero.
-    pub reserved_a: u32,
-    /// Zero.
-    pub reserved_b: u32,
+    pub reserved: u32,
 }
 
 /// The state of a search along a ray: the disc near which a round tests whether the ray hits the surface.

@@ -225,7 +225,7 @@ impl DirectLight<'_> {
                     if is_behind || sampled.contribution == Vec3::ZERO {
                         continue;
                     }
-                    let ray = point.shading.spawn(sampled.direction);
+                    let ray = point.shading.spawn_to_light(sampled.direction);
                     rays.push(Ray { t_max: sampled.t_max, ..ray });
                     contributions.push((point_idx, weight * sampled.contribution));
                 }

@@ -146,6 +146,14 @@ impl Shading {
             }
         }
     }
+
+    /// Makes a ray toward a light, in `direction`: the steeper it leaves the surface, the nearer it begins.
+    pub fn spawn_to_light(&self, direction: Vec3) -> Ray {
+        let ray = self.spawn(direction);
+        let steepness = self.surface.map_or(0.0, SurfaceKind::light_steepness);
+        let along = (1.0 - steepness * self.geometric_normal.dot(direction)).max(0.0);
+        Ray { t_min: along * ray.t_min, ..ray }
+    }
 }
 
 /// A point on a triangle.

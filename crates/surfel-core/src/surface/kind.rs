@@ -132,6 +132,15 @@ impl SurfaceKind {
         }
     }
 
+    /// Returns the reciprocal of the cosine to the normal from which on rays toward lights ignore no hits, or 0 if all ignore
+    /// those within the spawn distance.
+    pub fn light_steepness(self) -> f32 {
+        match self {
+            Self::Smooth | Self::Implicit => smooth::LIGHT_STEEPNESS,
+            _ => 0.0,
+        }
+    }
+
     /// Returns a ray that leaves the surface at `position` on the side of `normal` without hitting it again
     /// at once.
     ///

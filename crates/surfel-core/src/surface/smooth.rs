@@ -12,6 +12,9 @@ pub const FIT_REACH: f32 = 1.4;
 pub const SPAWN_OFFSET: f32 = 0.2;
 /// The distance before which secondary rays ignore hits, in radii.
 pub const SPAWN_T_MIN: f32 = 0.5;
+/// Reciprocal of the cosine to the normal from which on a ray toward a light ignores none: it meets the wall beside a floor,
+/// so that no light leaks in between.
+pub const LIGHT_STEEPNESS: f32 = 2.0;
 /// Factors of `edge_retest_factor` for evenly spaced and for random points.
 const EDGE_RETEST_EVEN: f32 = 1.3;
 const EDGE_RETEST_RANDOM: f32 = 1.5;

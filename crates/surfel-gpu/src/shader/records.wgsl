@@ -236,8 +236,8 @@ struct ShadingPointRecord {
     n_light_samples: u32,
     media: vec4<u32>,
     key: vec2<u32>,
-    reserved_a: u32,
-    reserved_b: u32,
+    light_steepness: f32,
+    reserved: u32,
 }
 
 struct Tables {

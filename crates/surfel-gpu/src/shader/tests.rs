@@ -251,8 +251,8 @@ fn records_have_equal_layouts() {
             n_light_samples,
             media,
             key,
-            reserved_a,
-            reserved_b
+            light_steepness,
+            reserved
         }),
     ];
     let module = parse(Kernel::Generate, None);

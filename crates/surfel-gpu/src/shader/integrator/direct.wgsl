@@ -34,7 +34,9 @@ fn make_light_ray(point: ShadingPointRecord, path: ptr<function, Path>) -> bool 
     if cosine <= 0.0 || all(sampled.contribution == vec3<f32>(0.0)) {
         return false;
     }
-    let ray = Ray(point.position + point.spawn_offset * point.geometric_normal, point.spawn_t_min, sampled.direction, sampled.t_max);
+    let origin = point.position + point.spawn_offset * point.geometric_normal;
+    let along = max(1.0 - point.light_steepness * cosine, 0.0);
+    let ray = Ray(origin, along * point.spawn_t_min, sampled.direction, sampled.t_max);
     // As in `from_surface`.
     let cos = max(cosine, 0.1);
     let height = abs(dot(ray.origin - point.position, point.geometric_normal));

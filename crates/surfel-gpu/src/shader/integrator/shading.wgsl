@@ -15,9 +15,11 @@ struct Shading {
     is_thin: bool,
     emission: vec3<f32>,
     is_unlit: bool,
-    // Distance by which new rays are offset, and where they begin.
+    // Distance by which new rays are offset, where they begin, and the reciprocal of the cosine to the normal from which on
+    // those toward lights begin at once.
     spawn_offset: f32,
     spawn_t_min: f32,
+    light_steepness: f32,
 }
 
 fn shading_at(ray: Ray, hit: HitRecord) -> Shading {
@@ -37,6 +39,7 @@ fn shading_at(ray: Ray, hit: HitRecord) -> Shading {
         material.is_thin == 1u,
         material.emissive,
         material.is_unlit == 1u,
+        0.0,
         0.0,
         0.0,
     );
@@ -152,6 +155,7 @@ fn set_spawn(shading: ptr<function, Shading>, ray: Ray, hit: HitRecord) {
     if hit.surface == SMOOTH || hit.surface == IMPLICIT {
         offset = SMOOTH_SPAWN_OFFSET;
         t_min = SMOOTH_SPAWN_T_MIN;
+        (*shading).light_steepness = SMOOTH_LIGHT_STEEPNESS;
     } else if hit.surface == MLS {
         offset = MLS_SPAWN_OFFSET;
         t_min = MLS_SPAWN_T_MIN;

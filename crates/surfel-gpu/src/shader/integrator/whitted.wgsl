@@ -106,7 +106,7 @@ fn shading_point(
         n_samples_of(path.weight),
         media,
         path.key,
-        0u,
+        shading.light_steepness,
         0u,
     );
 }
