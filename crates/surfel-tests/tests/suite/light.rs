@@ -139,6 +139,28 @@ fn a_wide_sun_casts_a_penumbra() {
 }
 
 #[test]
+fn no_light_leaks_between_a_floor_and_the_wall_before_the_sun() {
+    const SPACING: f32 = 0.04;
+    let grid = || (0..50 * 50).map(|i| SPACING * Vec3::new((i % 50) as f32, (i / 50) as f32, 0.0));
+    let wall = grid().map(|p| Vec3::new(0.0, p.y, p.x));
+    let cloud = PointCloud::from_positions(grid().chain(wall).collect());
+    let direction = Vec3::new(-1.0, 0.0, 0.8).normalize();
+    let sun = Sun { direction, color: Vec3::ONE, angular_diameter_deg: 0.0 };
+    let camera = Camera {
+        position: DVec3::new(10.0, 1.0, 8.0),
+        focal_point: DVec3::new(0.0, 1.0, 0.0),
+        view_up: DVec3::Z,
+        projection: Projection::Orthographic { height: 1.0 },
+    };
+    let scene = scenes::scene(cloud, SurfaceKind::Smooth);
+    let image =
+        scenes::render(&Scene { lights: vec![Light::Sun(sun)], camera, ..scene }, &SETTINGS);
+    let covered = image.color.iter().zip(&image.coverage).filter(|(_, c)| 0.0 < **c);
+    let n_bright = covered.clone().filter(|(pixel, _)| 0.1 < pixel[0]).count();
+    assert_eq!((covered.count(), n_bright), (64 * 64, 0));
+}
+
+#[test]
 fn unlit_colors_are_exact() {
     for (name, kind) in SurfaceKind::ALL {
         for value in [0u8, 1, 64, 128, 200, 255] {
