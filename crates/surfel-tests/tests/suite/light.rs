@@ -150,7 +150,7 @@ fn no_light_leaks_between_a_floor_and_the_wall_before_the_sun() {
         position: DVec3::new(10.0, 1.0, 8.0),
         focal_point: DVec3::new(0.0, 1.0, 0.0),
         view_up: DVec3::Z,
-        projection: Projection::Orthographic { height: 1.0 },
+        projection: Projection::Orthographic { height: 0.25 },
     };
     let scene = scenes::scene(cloud, SurfaceKind::Smooth);
     let image =
