@@ -1,4 +1,5 @@
-//! Tips for command lines that cannot be read: options by words of other programs, and files without a command.
+//! Tips for command lines that cannot be read: options and commands by words of other programs, and files without a
+//! command.
 
 use crate::shell::quoted;
 use clap::Command;
@@ -16,7 +17,10 @@ pub fn with_tip(mut error: clap::Error, words: &[OsString], program: &Command) -
     };
     let tip = match error.kind() {
         ErrorKind::UnknownArgument => option_tip(text(ContextKind::InvalidArg), words, program),
-        ErrorKind::InvalidSubcommand => file_tip(text(ContextKind::InvalidSubcommand)),
+        ErrorKind::InvalidSubcommand => {
+            let word = text(ContextKind::InvalidSubcommand);
+            file_tip(word).or_else(|| command_tip(word))
+        }
         _ => None,
     };
     if let Some(tip) = tip {
@@ -26,6 +30,36 @@ pub fn with_tip(mut error: clap::Error, words: &[OsString], program: &Command) -
         error.insert(ContextKind::Suggested, tips);
     }
     error
+}
+
+/// Commands by words of other programs, with the tip that answers them.
+const COMMAND_TIPS: [(&[&str], &str); 5] = [
+    (
+        &["convert", "translate", "export", "save"],
+        "`surfel prepare scan.laz -o scan.ply --duplicates keep` writes a cloud in another format",
+    ),
+    (
+        &["clean", "filter", "merge", "subsample", "sample", "normals"],
+        "here it is 'surfel prepare', as in `surfel prepare scan.laz -o ready.ply`",
+    ),
+    (
+        &["show", "open", "display", "viewer", "serve"],
+        "here it is 'surfel view', as in `surfel view scan.laz`",
+    ),
+    (
+        &["image", "picture", "draw", "raytrace", "trace"],
+        "here it is 'surfel render', as in `surfel render scan.laz -o scan.png`",
+    ),
+    (
+        &["movie", "video", "turntable"],
+        "here it is 'surfel animate', as in `surfel animate scan.laz -o turn.mp4 --turntable 8`",
+    ),
+];
+
+/// Names the command that other programs call `word`.
+fn command_tip(word: &str) -> Option<String> {
+    let known = COMMAND_TIPS.iter().find(|(words, _)| words.contains(&word));
+    known.map(|(_, tip)| (*tip).to_owned())
 }
 
 /// Names the option of the command that other programs call `word`.

@@ -102,6 +102,19 @@ fn a_file_without_a_command_is_answered_with_commands() {
 }
 
 #[test]
+fn commands_of_other_programs_are_answered_with_those_of_surfel() {
+    for (word, tip) in [
+        ("convert", "tip: `surfel prepare scan.laz -o scan.ply"),
+        ("show", "tip: here it is 'surfel view'"),
+        ("movie", "tip: here it is 'surfel animate'"),
+    ] {
+        let text = fail(&[word, "in.laz", "out.ply"], 2);
+        assert!(text.contains(tip) && text.matches("tip:").count() == 1, "{text}");
+    }
+    assert!(succeed(&["help"]).contains("prepare"));
+}
+
+#[test]
 fn commands_have_no_options_that_they_do_not_read() {
     for (command, option) in [
         ("view", "--bit-depth=16"),
